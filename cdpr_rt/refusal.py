@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, field
 from enum import StrEnum
-from typing import Any
+from typing import Any, Final
 
 _SHOWN = 60
 
@@ -30,7 +30,7 @@ class RefusalCode(StrEnum):
 
 
 @dataclass(frozen=True)
-class Refusal:
+class CommandRefusal:
     """Why a command was refused, for programs; as text for people.
 
     An error of the loop that is raised with it, in place of a text, carries it to the reply.
@@ -80,14 +80,57 @@ class Refusal:
         return asdict(self)
 
     @classmethod
-    def from_json(cls, value: Any) -> Refusal | None:
+    def from_json(cls, value: Any) -> CommandRefusal | None:
         """Return what an answer holds, None where it is not a refusal as it is known here."""
         try:
             refusal = cls(**{**value, "code": RefusalCode(value["code"])})
-            str(refusal)
-        except (TypeError, KeyError, ValueError, AttributeError):
+        except (TypeError, KeyError, ValueError):
             return None
-        return refusal
+        return refusal if refusal._is_sound() else None
+
+    def _is_sound(self) -> bool:
+        """Return whether its members are of their types, and all arguments of its code are there.
+
+        Further arguments, as of a newer daemon, do not matter.
+        """
+        asked, arguments = self.asked, self.arguments
+        if not (
+            isinstance(self.command, str)
+            and isinstance(asked, dict)
+            and isinstance(arguments, dict)
+        ):
+            return False
+        if self.code is RefusalCode.OUT_OF_RANGE and not all(map(_is_number, asked.values())):
+            return False
+        return all(is_sound(arguments.get(key)) for key, is_sound in _ARGUMENTS[self.code].items())
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+def _is_index(value: Any) -> bool:
+    return value is None or (type(value) is int and value >= 0)
+
+
+def _is_text(value: Any) -> bool:
+    return isinstance(value, str)
+
+
+def _are_texts(value: Any) -> bool:
+    return isinstance(value, list) and all(map(_is_text, value))
+
+
+_ARGUMENTS: Final[Mapping[RefusalCode, Mapping[str, Callable[[Any], bool]]]] = {
+    RefusalCode.NOT_IN_STATE: {"state": _is_text, "allowed": _are_texts},
+    RefusalCode.OUT_OF_RANGE: {"index": _is_index, "low": _is_number, "high": _is_number},
+    RefusalCode.NOT_FEASIBLE: {"why": _is_text},
+    RefusalCode.NOTHING_LEFT: {"left": _is_text, "instead": _is_text},
+    RefusalCode.NOT_TIGHT: {},
+    RefusalCode.NOT_CALIBRATED: {"why": _is_text},
+    RefusalCode.BAD_SOURCE: {"why": _is_text, "allowed": _are_texts},
+}
+"""By the code: what goes with it, and what holds of that."""
 
 
 def shown(value: Any) -> str:
@@ -96,7 +139,7 @@ def shown(value: Any) -> str:
     return text if len(text) <= _SHOWN else f"{text[:_SHOWN]} ..."
 
 
-def refusal_of(error: Exception) -> Refusal | None:
+def refusal_of(error: Exception) -> CommandRefusal | None:
     """Return the refusal that an error of the loop carries, None where it has only words."""
     first = error.args[0] if error.args else None
-    return first if isinstance(first, Refusal) else None
+    return first if isinstance(first, CommandRefusal) else None

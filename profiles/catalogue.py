@@ -20,7 +20,7 @@ from cdpr_profiles.reading.places import (
     KINDS,
     SERIES,
     SHIPPED,
-    Kind,
+    ProfileKind,
     find,
     profile_files,
     require,
@@ -271,12 +271,12 @@ def load_winch_or_robot(name: str | Path) -> Winch | Robot:
     return load_robot(name)
 
 
-def list_profiles() -> dict[Kind, tuple[str, ...]]:
+def list_profiles() -> dict[ProfileKind, tuple[str, ...]]:
     """Return the names of all profiles by kind; motors include every one of a series."""
     return {kind: tuple(sorted(_names(kind))) for kind in KINDS}
 
 
-def load_profile(kind: Kind, name: str) -> object:
+def load_profile(kind: ProfileKind, name: str) -> object:
     """Return a profile by its kind and name, of a motor without a size sheet its ratings.
 
     Raises ProfileError.
@@ -307,7 +307,7 @@ def _motor_series() -> dict[Path, MotorSeries]:
     return {path: read_toml_model(path, MotorSeries) for path in paths}
 
 
-def _names(kind: Kind) -> set[str]:
+def _names(kind: ProfileKind) -> set[str]:
     names = {path.stem for path in profile_files(kind)}
     if kind == "motors":
         for series in _motor_series().values():
@@ -327,7 +327,7 @@ def _load_reference(
         raise
 
 
-_LOADERS: dict[Kind, Callable[[str], object]] = {
+_LOADERS: dict[ProfileKind, Callable[[str], object]] = {
     "motors": load_motor,
     "drives": load_drive,
     "cables": load_cable,

@@ -71,7 +71,7 @@ class Quirks(Profile):
     """Bit 10 of the statusword is without meaning in homing mode; bit 12 comes once at rest."""
 
 
-class Verification(Profile):
+class Evidence(Profile):
     """How well one fact of a profile is known."""
 
     status: Literal["verified", "manual", "assumed"]
@@ -122,7 +122,7 @@ class DriveProfile(Profile):
     rpdos: tuple[Pdo, ...] = Field(min_length=1)
     tpdos: tuple[Pdo, ...] = Field(min_length=1)
     quirks: Quirks = Quirks()
-    verified: dict[str, Verification] = Field(default_factory=dict)
+    verified: dict[str, Evidence] = Field(default_factory=dict)
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:

@@ -18,7 +18,7 @@ from cdpr_rt.calibration.estimation.parameters import CableGeometry
 from cdpr_rt.calibration.markers.coverage import coverage
 from cdpr_rt.calibration.markers.map_fit import MapFit
 from cdpr_rt.calibration.markers.sighting import laid_out
-from cdpr_rt.calibration.outcome import LEAST_POINTS, Method, Outcome
+from cdpr_rt.calibration.outcome import LEAST_POINTS, CalibrationMethod, Outcome
 from cdpr_rt.calibration.readings.camera_data import Images
 from cdpr_rt.calibration.readings.observations import Observations
 from cdpr_rt.calibration.verification.held_out import LEAST_POSES, held_out, hold_out
@@ -40,7 +40,7 @@ def calibrate(
     robot: Robot,
     geometry: CableGeometry,
     seen: Observations,
-    method: Method,
+    method: CalibrationMethod,
     images: Images | None = None,
 ) -> Outcome:
     """Return the calibration that observations support; raises InvalidRequestError for too few.

@@ -44,7 +44,7 @@ _ADVICE = {
 
 
 @dataclass(frozen=True)
-class Change:
+class DetectedChange:
     """Something that is not as it was when the robot was calibrated."""
 
     kind: str
@@ -75,7 +75,7 @@ class Change:
         effect = f"positions are off by up to {1e3 * self.effect_m:.1f} mm"
         return f"{what}; {effect}: {_ADVICE[self.kind]}"
 
-    def told(self) -> dict[str, object]:
+    def as_json(self) -> dict[str, object]:
         """Return it for JSON, cables counted from 1."""
         return {
             "kind": self.kind,
@@ -97,7 +97,7 @@ class Check:
     """Root mean square of what lengths are off, at poses that they are to tell."""
     misfit: float
     """Mean square of what is left over its variance once the changes are taken out."""
-    changes: tuple[Change, ...]
+    changes: tuple[DetectedChange, ...]
     wanted_m: float
 
     @property
@@ -131,12 +131,12 @@ def check_geometry(geometry: CableGeometry, seen: Observations, wanted_m: float)
     there = fit(replace(geometry, identified=()), seen, robust=False)
     at = linearise(whole, seen, there.poses, np.zeros(len(seen.jumps)))
     system = _System(whole, at, there.poses)
-    changes: list[Change] = []
+    changes: list[DetectedChange] = []
     columns: list[IntArray] = []
     while len(changes) < _MOST_CHANGES and (found := system.best(columns)) is not None:
         kind, cable, alike, own = found
         columns.append(own)
-        changes.append(Change(kind, cable, np.zeros(0), np.zeros(0), 0.0, alike))
+        changes.append(DetectedChange(kind, cable, np.zeros(0), np.zeros(0), 0.0, alike))
     changes = system.sized(changes, columns)
     off_m = there.length_residual_m * length_std_m(geometry, seen)
     rms = float(np.sqrt((off_m**2).sum() / max(int(seen.used.sum()), 1)))
@@ -217,7 +217,9 @@ class _System:
         )
         return kind, cable, alike, self._own[kind, cable]
 
-    def sized(self, changes: list[Change], columns: Sequence[IntArray]) -> list[Change]:
+    def sized(
+        self, changes: list[DetectedChange], columns: Sequence[IntArray]
+    ) -> list[DetectedChange]:
         """Return the changes with their sizes when all are fitted together."""
         x, covariance, _ = self._solve(columns)
         std = np.sqrt(np.diag(covariance))

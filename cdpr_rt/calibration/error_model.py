@@ -49,14 +49,14 @@ class Noise:
 
 
 @dataclass(frozen=True)
-class Errors:
+class RmsErrors:
     """Root mean squares of the errors, (3.39a) and (3.39b)."""
 
     exit_m: float
     offset_m: float
 
     @classmethod
-    def of(cls, errors_m: FloatArray) -> Errors:
+    def of(cls, errors_m: FloatArray) -> RmsErrors:
         """Return those of errors (..., n, 4)."""
         squares = errors_m**2
         return cls(float(np.sqrt(squares[..., :3].mean())), float(np.sqrt(squares[..., 3].mean())))

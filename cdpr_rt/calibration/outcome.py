@@ -23,14 +23,14 @@ from cdpr_rt.calibration.markers.coverage import Coverage, listed
 from cdpr_rt.calibration.verification.held_out import Unused
 from cdpr_rt.calibration.verification.more_poses import MORE
 from cdpr_rt.calibration.verification.verdict import (
-    Change,
+    CalibrationChange,
     OpenDirection,
     camera_table,
     parameter_table,
 )
 from cdpr_rt.calibration.verification.verification import Verification
 
-Method = Literal["points", "redundancy", "camera"]
+CalibrationMethod = Literal["points", "redundancy", "camera"]
 _WANTED_mm_PER_m = 0.3
 """1.5 mm for 5 m of frame, 3 sigma."""
 _MOST_OVER_WANTED = 3.0
@@ -47,7 +47,7 @@ class Outcome:
 
     robot: Robot
     found: Fit
-    method: Method
+    method: CalibrationMethod
     faults: list[Fault]
     open_directions: list[OpenDirection]
     verified: Verification
@@ -63,7 +63,7 @@ class Outcome:
     known_room: bool
     """Whether anything was measured in the room: points, or places of markers."""
     unused: Unused
-    change: Change
+    change: CalibrationChange
     """By how much it changes the robot's file."""
     birge_ratio: float
     """How many times as large errors at measured points not used are as predicted; nan without."""
@@ -216,7 +216,7 @@ class Outcome:
             )
         return lines
 
-    def told(self) -> dict[str, Any]:
+    def as_json(self) -> dict[str, Any]:
         """Return everything for JSON."""
         return {
             "good": self.good,
@@ -226,7 +226,7 @@ class Outcome:
                 "significant": self.change.significant,
                 "chance": self.change.chance,
                 "chi_squared": self.change.chi_squared,
-                "parameters_told": self.change.told,
+                "parameters_told": self.change.degrees_of_freedom,
                 "positions_move_by_mm": 1e3 * self.change.moved_m,
             },
             "poses": self.found.seen.poses,
@@ -237,7 +237,7 @@ class Outcome:
             "frame": frame_of(self),
             "corner_factor": self.found.corner_factor,
             "parameters": parameter_table(self.found),
-            "faults": [fault.told() for fault in self.faults],
+            "faults": [fault.as_json() for fault in self.faults],
             "open": [
                 {"what": one.what, "advice": one.advice, "share": one.share}
                 for one in self.open_directions
@@ -260,7 +260,7 @@ class Outcome:
                 "length_residual_before_mm": 1e3 * self.before.residual_m,
             },
             "camera": camera_table(self.found),
-            "coverage": None if self.cover is None else self.cover.told(),
+            "coverage": None if self.cover is None else self.cover.as_json(),
         }
 
 

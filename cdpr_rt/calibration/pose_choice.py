@@ -8,7 +8,12 @@ from __future__ import annotations
 import numpy as np
 
 from cdpr_rt.arrays import FloatArray, IntArray
-from cdpr_rt.calibration.estimation.parameters import CABLE_ROWS, CableGeometry, Kind, Knowledge
+from cdpr_rt.calibration.estimation.parameters import (
+    CABLE_ROWS,
+    CableGeometry,
+    Knowledge,
+    ParameterKind,
+)
 from cdpr_rt.calibration.estimation.residuals import lengths_told, linearise
 from cdpr_rt.calibration.readings.observations import Observations
 from cdpr_rt.robots.kinematics.cable_kernel import CABLE_ROWS as KERNEL_ROWS
@@ -98,7 +103,7 @@ def cable_geometry(model: PlatformModel) -> CableGeometry:
     """Return what poses are to tell of a robot: exit points, offsets and drums of rigid cables."""
     none = np.zeros(model.kinematics.n)
     start = np.zeros((none.size, CABLE_ROWS))
-    kinds: tuple[Kind, ...] = ("exit", "offset", "drum")
+    kinds: tuple[ParameterKind, ...] = ("exit", "offset", "drum")
     return CableGeometry(model, none, none, kinds, Knowledge(EXIT_m, OFFSET_m), start)
 
 

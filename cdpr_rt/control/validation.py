@@ -16,7 +16,7 @@ VELOCITY_LOW_PASS_Hz = 50.0
 
 
 @dataclass(frozen=True)
-class Metrics:
+class ValidationMetrics:
     """The three figures of the thesis' validation, worst over directions when combined."""
 
     rms_position_error_deg: float
@@ -56,7 +56,7 @@ def evaluate(
     effort_Nm: FloatArray,
     period_s: float,
     judged: BoolArray | None = None,
-) -> Metrics:
+) -> ValidationMetrics:
     """Judge one run in one direction.
 
     All arrays have shape (k,); `effort_Nm` is what the PID alone asked for. `judged` marks the
@@ -72,7 +72,7 @@ def evaluate(
     error = (setpoint_rad - angle_rad)[chosen]
     velocity = low_pass_velocity(angle_rad, period_s)
     effort = effort_Nm[chosen]
-    return Metrics(
+    return ValidationMetrics(
         rms_position_error_deg=math.degrees(rms(error)),
         peak_pid_effort_Nm=float(np.max(np.abs(effort - effort.mean()))),
         peak_velocity_error_deg_s=math.degrees(
@@ -82,9 +82,9 @@ def evaluate(
     )
 
 
-def worst(runs: list[Metrics]) -> Metrics:
+def worst(runs: list[ValidationMetrics]) -> ValidationMetrics:
     """Return the larger of each figure over several runs, such as the two directions."""
-    return Metrics(
+    return ValidationMetrics(
         max(m.rms_position_error_deg for m in runs),
         max(m.peak_pid_effort_Nm for m in runs),
         max(m.peak_velocity_error_deg_s for m in runs),
@@ -92,7 +92,7 @@ def worst(runs: list[Metrics]) -> Metrics:
     )
 
 
-def ratios(without: Metrics, having: Metrics) -> Ratios:
+def ratios(without: ValidationMetrics, having: ValidationMetrics) -> Ratios:
     """Return how many times smaller each figure is with compensation than without."""
 
     def divide(a: float, b: float) -> float:
@@ -113,7 +113,7 @@ def floor(
     encoder_step_rad: float,
     torque_step_Nm: float,
     samples: int = 16000,
-) -> Metrics:
+) -> ValidationMetrics:
     """Return what quantised readings and torques alone leave on the true angle, friction aside.
 
     Both roundings count as white noise of their step over √12; the rounding's residual,
@@ -137,7 +137,7 @@ def floor(
     velocity = position * omega**2 * keep**2
     effort_width = _independent(effort, samples)
     velocity_width = _independent(velocity, samples)
-    return Metrics(
+    return ValidationMetrics(
         math.degrees(math.sqrt(float(np.mean(position)))),
         math.sqrt(float(np.mean(effort))) * math.sqrt(2.0 * math.log(effort_width)),
         math.degrees(math.sqrt(float(np.mean(velocity))))

@@ -31,7 +31,7 @@ class Readable(Protocol):
         """Return the descriptor that is readable when something has come."""
 
 
-class Source(Readable, Protocol):
+class EventSource(Readable, Protocol):
     """What waits listen to, such as a port on a bus; none of its methods waits."""
 
     def poll(self) -> bool:
@@ -70,7 +70,7 @@ class Clock(ABC):
     """Whether time is that of simulated buses and moves only when they are granted more."""
 
     def __init__(self) -> None:
-        self._sources: list[Source] = []
+        self._sources: list[EventSource] = []
         self._tasks: list[Task[Any]] = []
         self._running: Task[Any] | None = None
 
@@ -85,11 +85,11 @@ class Clock(ABC):
 
     # -- what is listened to
 
-    def add(self, source: Source) -> None:
+    def add(self, source: EventSource) -> None:
         """Listen to `source` in all waits from now on."""
         self._sources.append(source)
 
-    def remove(self, source: Source) -> None:
+    def remove(self, source: EventSource) -> None:
         """Listen to `source` no longer; one that was removed before is no error."""
         self._sources = [other for other in self._sources if other is not source]
 

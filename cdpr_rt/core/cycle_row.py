@@ -21,7 +21,7 @@ Row = NDArray[np.void]
 
 
 @dataclass(frozen=True)
-class Field:
+class CycleField:
     """One quantity of a cycle; its unit is the end of its name."""
 
     name: str
@@ -52,14 +52,14 @@ def _listed(members: type[IntEnum], word: str) -> str:
 
 
 SCALAR_FIELDS: Final = (
-    Field(
+    CycleField(
         "cycle", "<u8", "cycle.device.feedback.cycle", "SYNCs since cycles began", metric="cycles"
     ),
-    Field("time_s", "<f8", "cycle.device.feedback.time_s", "bus time of the SYNC"),
-    Field(
+    CycleField("time_s", "<f8", "cycle.device.feedback.time_s", "bus time of the SYNC"),
+    CycleField(
         "stamp_ns", "<i8", "cycle.began_ns", "CLOCK_MONOTONIC when the loop woke for it", wall=True
     ),
-    Field(
+    CycleField(
         "lateness_s",
         "<f8",
         "cycle.late_s",
@@ -68,7 +68,7 @@ SCALAR_FIELDS: Final = (
         live=True,
         metric="lateness",
     ),
-    Field(
+    CycleField(
         "exchange_s",
         "<f8",
         "exchange_s",
@@ -77,7 +77,7 @@ SCALAR_FIELDS: Final = (
         live=True,
         metric="exchange",
     ),
-    Field(
+    CycleField(
         "compute_s",
         "<f8",
         "compute_s",
@@ -86,7 +86,7 @@ SCALAR_FIELDS: Final = (
         live=True,
         metric="compute",
     ),
-    Field(
+    CycleField(
         "missed",
         "<u8",
         "missed",
@@ -94,7 +94,7 @@ SCALAR_FIELDS: Final = (
         live=True,
         metric="missed_answers",
     ),
-    Field(
+    CycleField(
         "late_cycles",
         "<u8",
         "cycle.lateness.late",
@@ -103,7 +103,7 @@ SCALAR_FIELDS: Final = (
         live=True,
         metric="late_cycles",
     ),
-    Field(
+    CycleField(
         "stream_age_s",
         "<f8",
         "last_program.stream_age_s",
@@ -111,36 +111,38 @@ SCALAR_FIELDS: Final = (
         live=True,
         metric="stream_age_seconds",
     ),
-    Field(
+    CycleField(
         "stream_buttons",
         "<u8",
         "last_program.stream_buttons",
         "buttons of the sample that is played: bit 0 the clutch, "
         "bits 8 to 15 the number of the confirmation",
     ),
-    Field(
+    CycleField(
         "state",
         "<u1",
         "life.state",
         f"state of the loop: {_listed(LoopState, 'label')}",
         labels=LoopState,
     ),
-    Field("program", "<u1", "program_number", "number of the program in the description's list"),
-    Field(
+    CycleField(
+        "program", "<u1", "program_number", "number of the program in the description's list"
+    ),
+    CycleField(
         "reaction",
         "<u1",
         "reaction",
         f"reaction of the supervisor in this cycle: {_listed(Reaction, 'label')}",
         labels=Reaction,
     ),
-    Field("limit", "<u1", "limit", f"the limit that caused it: {_listed(Limit, 'key')}"),
-    Field("limit_axis", "<i2", "limit_axis", "the axis concerned, -1 without"),
-    Field("answered", "<u2", "answered", "axes that answered this SYNC", live=True),
+    CycleField("limit", "<u1", "limit", f"the limit that caused it: {_listed(Limit, 'key')}"),
+    CycleField("limit_axis", "<i2", "limit_axis", "the axis concerned, -1 without"),
+    CycleField("answered", "<u2", "answered", "axes that answered this SYNC", live=True),
 )
 """One value a cycle."""
 
 AXIS_FIELDS: Final = (
-    Field(
+    CycleField(
         "setpoint_rad",
         "<f8",
         "setpoint.position_rad",
@@ -148,10 +150,10 @@ AXIS_FIELDS: Final = (
         status=True,
         live=True,
     ),
-    Field(
+    CycleField(
         "setpoint_velocity_rad_s", "<f8", "setpoint.velocity_rad_s", "how fast the set-point moves"
     ),
-    Field(
+    CycleField(
         "position_rad",
         "<f8",
         "cycle.device.feedback.position_rad",
@@ -160,7 +162,7 @@ AXIS_FIELDS: Final = (
         live=True,
         metric="position_radians",
     ),
-    Field(
+    CycleField(
         "velocity_rad_s",
         "<f8",
         "parts.estimator.estimate.velocity_rad_s",
@@ -169,7 +171,7 @@ AXIS_FIELDS: Final = (
         live=True,
         metric="velocity_radians_per_second",
     ),
-    Field(
+    CycleField(
         "torque_actual_Nm",
         "<f8",
         "cycle.device.feedback.torque_Nm",
@@ -178,8 +180,10 @@ AXIS_FIELDS: Final = (
         live=True,
         metric="torque_newton_metres",
     ),
-    Field("torque_asked_Nm", "<f8", "asked_Nm", "torque that the controller wanted, before limits"),
-    Field(
+    CycleField(
+        "torque_asked_Nm", "<f8", "asked_Nm", "torque that the controller wanted, before limits"
+    ),
+    CycleField(
         "torque_sent_Nm",
         "<f8",
         "cycle.device.command.sent_torque_Nm",
@@ -187,15 +191,15 @@ AXIS_FIELDS: Final = (
         status=True,
         live=True,
     ),
-    Field("effort_Nm", "<f8", "program.controller.effort_Nm", "the controller's part of it"),
-    Field(
+    CycleField("effort_Nm", "<f8", "program.controller.effort_Nm", "the controller's part of it"),
+    CycleField(
         "compensation_Nm",
         "<f8",
         "program.controller.compensation_Nm",
         "the compensation's part of it",
         live=True,
     ),
-    Field(
+    CycleField(
         "tension_N",
         "<f8",
         "parts.estimator.estimate.tension_N",
@@ -203,7 +207,7 @@ AXIS_FIELDS: Final = (
         status=True,
         metric="tension_newtons",
     ),
-    Field(
+    CycleField(
         "cable_length_m",
         "<f8",
         "parts.estimator.estimate.cable_length_m",
@@ -212,38 +216,40 @@ AXIS_FIELDS: Final = (
         live=True,
         metric="cable_length_metres",
     ),
-    Field(
+    CycleField(
         "index_rad",
         "<f8",
         "cycle.device.feedback.index_rad",
         "motor angle of the encoder's index, where it is known",
     ),
-    Field(
+    CycleField(
         "statusword",
         "<u2",
         "cycle.device.feedback.statusword",
         "CiA 402 statusword (6041h)",
         status=True,
     ),
-    Field(
+    CycleField(
         "valid",
         "?",
         "cycle.device.feedback.valid",
         "whether the drive answered this SYNC",
         status=True,
     ),
-    Field("alive", "?", "cycle.device.feedback.alive", "whether its heartbeats come", status=True),
-    Field(
+    CycleField(
+        "alive", "?", "cycle.device.feedback.alive", "whether its heartbeats come", status=True
+    ),
+    CycleField(
         "rate_ok", "?", "cycle.device.feedback.rate_ok", "whether its answers come at their rate"
     ),
-    Field(
+    CycleField(
         "index_known",
         "?",
         "cycle.device.feedback.index_known",
         "whether the encoder's index has been found",
         status=True,
     ),
-    Field(
+    CycleField(
         "tension_measured",
         "?",
         "parts.estimator.estimate.tension_measured",
@@ -255,8 +261,8 @@ AXIS_FIELDS: Final = (
 
 _SEVEN = "x, y, z in m and quaternion w, x, y, z; null where it is not known"
 POSE_FIELDS: Final = (
-    Field("pose", "<f8", "last_program.pose", f"the platform's pose: {_SEVEN}"),
-    Field(
+    CycleField("pose", "<f8", "last_program.pose", f"the platform's pose: {_SEVEN}"),
+    CycleField(
         "pose_setpoint", "<f8", "program.pose_setpoint", f"where the platform should be: {_SEVEN}"
     ),
 )

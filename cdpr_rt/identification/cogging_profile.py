@@ -20,7 +20,7 @@ from cdpr_rt.control.compensation import AxisCompensation, FrictionFeedforward
 from cdpr_rt.errors import ControlError
 from cdpr_rt.identification import HarmonicResult, ThesisResult
 
-Method = Literal["thesis", "better"]
+CompensationMethod = Literal["thesis", "better"]
 
 _MOST_SAMPLES = 1 << 16
 _LONGEST_s = 0.5
@@ -140,12 +140,13 @@ class CoggingProfile(_Part):
     repaired_fraction: _Share
     coverage: _Share
     thesis: StoredMethod
-    better: StoredMethod
+    harmonic: StoredMethod = Field(alias="better")
+    """Of the harmonic model; its key in the file is `better`, as it is given to this class."""
 
     def save(self, path: Path) -> None:
         """Write the profile; a file of that name is replaced at once or not at all."""
         part = path.with_suffix(path.suffix + ".part")
-        part.write_text(self.model_dump_json(indent=1) + "\n", encoding="utf-8")
+        part.write_text(self.model_dump_json(by_alias=True, indent=1) + "\n", encoding="utf-8")
         part.replace(path)
 
     @classmethod
@@ -158,7 +159,7 @@ class CoggingProfile(_Part):
             profile = read_json_model(path, cls)
         except ProfileError as error:
             raise CoggingProfileError(str(error)) from None
-        for name, method in (("thesis", profile.thesis), ("better", profile.better)):
+        for name, method in (("thesis", profile.thesis), ("better", profile.harmonic)):
             forward, backward = method.table_Nm
             if len(forward) != len(backward):
                 raise CoggingProfileError(
@@ -182,13 +183,13 @@ class CoggingProfile(_Part):
         yield from bounds.inertia("inertia_kg_m2", self.inertia_kg_m2)
         total = math.fsum(abs(harmonic.amplitude_Nm) for harmonic in self.harmonics)
         yield from bounds.compensation("harmonics: sum of amplitude_Nm", total)
-        for name, method in (("better", self.better), ("thesis", self.thesis)):
+        for name, method in (("better", self.harmonic), ("thesis", self.thesis)):
             for key, problem in method.faults(bounds):
                 yield f"{name}.{key}", problem
 
     def compensation(
         self,
-        method: Method,
+        method: CompensationMethod,
         identity: DriveIdentity,
         bounds: MotorBounds,
         *,
@@ -212,7 +213,7 @@ class CoggingProfile(_Part):
                 "the encoder index of this axis is not known: home it, or latch the index with the "
                 "touch probe, before its cogging profile can be applied"
             )
-        return (self.thesis if method == "thesis" else self.better).compensation(bounds)
+        return (self.thesis if method == "thesis" else self.harmonic).compensation(bounds)
 
 
 TABLE_SAMPLES = 4096

@@ -10,7 +10,7 @@ import numpy as np
 
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.programs.base import ProgramError
-from cdpr_rt.refusal import Refusal, RefusalCode, shown
+from cdpr_rt.refusal import CommandRefusal, RefusalCode, shown
 
 
 class CommandArguments:
@@ -72,7 +72,7 @@ class CommandArguments:
         if not low <= value <= high:  # nan is refused by this, too
             bounds = {"index": index, "low": low, "high": high}
             code = RefusalCode.OUT_OF_RANGE
-            raise ProgramError(Refusal(code, self._program, {key: value}, bounds))
+            raise ProgramError(CommandRefusal(code, self._program, {key: value}, bounds))
         return float(value)
 
     def _refused(self, key: str, value: Any, allowed: str) -> ProgramError:

@@ -19,7 +19,7 @@ from cdpr_rt.robots.kinematics.pose import Pose
 from cdpr_rt.robots.kinematics.pose_setpoint import poses_of_coordinates
 from cdpr_rt.robots.rigid_body import G_m_s2, home_rotation, in_space, inertia_kg_m2
 from cdpr_rt.robots.robot_arrays import limits_of
-from cdpr_rt.robots.tension.tension_distribution import TensionDistribution, tension_distribution
+from cdpr_rt.robots.tension.tension_distribution import TensionSolver, tension_distribution
 from cdpr_rt.robots.workspace import CableWorkspace, wrenches_in_motion
 
 RESERVE, _MARGIN_SHARE = 0.12, 0.4
@@ -166,7 +166,7 @@ class PlatformModel:
         contact = self.interference.first_contact(positions, looks)
         return "" if contact is None else in_words(contact.things, contact.distance_m)
 
-    def least_tensions(self, low_N: FloatArray, high_N: FloatArray) -> TensionDistribution:
+    def least_tensions(self, low_N: FloatArray, high_N: FloatArray) -> TensionSolver:
         """Return the distribution that keeps tensions as near to the lower bounds as can be."""
         return tension_distribution("minimum-deviation", low_N, high_N, self.wrench_scale, low_N)
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cdpr_rt.arrays import FloatArray
-from cdpr_rt.core.cycle_row import AXIS_FIELDS, POSE_FIELDS, SCALAR_FIELDS, Field
+from cdpr_rt.core.cycle_row import AXIS_FIELDS, POSE_FIELDS, SCALAR_FIELDS, CycleField
 from cdpr_rt.core.shared_block import RowWriter, SharedBlock
 from cdpr_rt.jit import bound, copy_bytes, jit
 
@@ -62,7 +62,7 @@ class CycleRows:
         # compiled here, not in a cycle
         self._bind(tuple(np.zeros(n, field.kind) for field in AXIS_FIELDS))
 
-    def _offset(self, field: Field) -> int:
+    def _offset(self, field: CycleField) -> int:
         fields: Any = self._rows.dtype.fields
         return int(fields[field.name][1])
 

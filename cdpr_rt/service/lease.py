@@ -29,7 +29,7 @@ class Holder:
 
 
 @dataclass(frozen=True)
-class Renewed:
+class LeaseRenewal:
     """What a token has renewed: the taking it belongs to, and for how long at a time."""
 
     number: int
@@ -74,7 +74,7 @@ class Lease:
             self._right.begin(self._until_ns)
             return self._token
 
-    def renew(self, token: str | None) -> Renewed:
+    def renew(self, token: str | None) -> LeaseRenewal:
         """Extend it by its whole time; return the number of its grant and that time.
 
         Raises LeaseError where `token` is not, or is no longer, that of the holder.
@@ -83,7 +83,7 @@ class Lease:
             self._require(token)
             self._until_ns = self._clock_ns() + self._ttl_ns
             self._right.until(self._until_ns)
-            return Renewed(self._right.number, self._ttl_ns * 1e-9)
+            return LeaseRenewal(self._right.number, self._ttl_ns * 1e-9)
 
     def release(self, token: str | None) -> None:
         """Give it back; a program that moves on somebody's behalf holds then. As `renew`."""

@@ -19,7 +19,7 @@ class PlannerBusyError(ControlError):
     """No path can be planned now."""
 
 
-class PathPlanner:
+class PathPlanRunner:
     """Plans one path at a time; who has asked looks at `job` until it is not `planning`."""
 
     def __init__(self) -> None:
@@ -31,7 +31,7 @@ class PathPlanner:
         self._task: asyncio.Task[None] | None = None
         self._cancelled = ""
 
-    def begin(self, wanted: dict[str, Any]) -> dict[str, Any]:
+    def begin(self, request: dict[str, Any]) -> dict[str, Any]:
         """Begin to plan a file; returns the job. Raises PlannerBusyError while one is planned."""
         if self.work is None:
             raise PlannerBusyError("this daemon plans no paths")
@@ -40,7 +40,7 @@ class PathPlanner:
         number = self.job["number"] + 1
         self.job = {"number": number, "planning": True, "error": None, "plan": None}
         self._cancelled = ""
-        self._task = asyncio.create_task(self._plan(self.work, wanted))
+        self._task = asyncio.create_task(self._plan(self.work, request))
         return self.job
 
     def cancel(self, why: str) -> None:
@@ -48,14 +48,14 @@ class PathPlanner:
         if self.job["planning"]:
             self._cancelled = why
 
-    async def _plan(self, work: Plan, wanted: dict[str, Any]) -> None:
+    async def _plan(self, work: Plan, request: dict[str, Any]) -> None:
         answer: dict[str, Any] = {"error": "planning was ended"}
         try:
             with tempfile.TemporaryDirectory(prefix="cdpr-path-") as folder:
-                file = Path(folder) / wanted["name"]
-                file.write_text(wanted["text"], encoding="utf-8")
-                status, text = await work(file, wanted)
-            answer = _read(status, text.replace(str(file), wanted["name"]))
+                file = Path(folder) / request["name"]
+                file.write_text(request["text"], encoding="utf-8")
+                status, text = await work(file, request)
+            answer = _read(status, text.replace(str(file), request["name"]))
             if self._cancelled:
                 answer = {"error": f"not followed: {self._cancelled} while it was planned"}
         except TimeoutError:  # an OSError too, one without words

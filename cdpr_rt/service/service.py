@@ -16,7 +16,7 @@ from cdpr_rt.service.http.tickets import Tickets
 from cdpr_rt.service.lease import Lease, LeaseError
 from cdpr_rt.service.link import URGENT, LoopLink, Reply
 from cdpr_rt.service.part import Part
-from cdpr_rt.service.path_planner import PathPlanner
+from cdpr_rt.service.path_planner import PathPlanRunner
 from cdpr_rt.service.rows import newest_row, plain, row_table
 from cdpr_rt.service.streams.setpoint_stream import SetpointStream, StreamError
 
@@ -49,7 +49,7 @@ class Service:
         self.events = self.link.events
         self.parts: list[Part] = []
         self._unstarted: dict[str, str] = {}
-        self.planner = PathPlanner()
+        self.planner = PathPlanRunner()
         """Plans paths, in a process of its own."""
         self.stream: SetpointStream | None = None
         """That which has started, None where set-points are not received."""

@@ -13,7 +13,7 @@ from cdpr_drivers.decode.frame import Frame
 from cdpr_drivers.decode.names import ObjectNames
 from cdpr_drivers.decode.pdo import PdoTable, PdoView
 from cdpr_drivers.decode.sdo import SdoDecoder, SdoEvent, Step
-from cdpr_drivers.decode.values import Field, NodeView, read_field
+from cdpr_drivers.decode.values import DecodedValue, NodeView, read_field
 from cdpr_profiles import DriveProfile, Winch
 
 _NODE, _FUNCTION = 0x07F, 0x780
@@ -29,7 +29,7 @@ class Record:
     """NMT, SYNC, TIME, EMCY, TPDO1, RPDO1, SDO, heartbeat, LSS, error, frame."""
     node_id: int | None
     text: str
-    fields: tuple[Field, ...] = ()
+    fields: tuple[DecodedValue, ...] = ()
     problem: bool = False
     """Whether it reports an error or violates the standard."""
 
@@ -159,7 +159,7 @@ class Decoder:
 
     def _sdo_record(self, frame: Frame, node_id: int, arrow: str, event: SdoEvent) -> Record:
         node = self._node(node_id)
-        fields: tuple[Field, ...] = ()
+        fields: tuple[DecodedValue, ...] = ()
         if event.data is not None and event.index is not None and event.step in _WITH_VALUE:
             fields = (read_field(node, event.index, event.sub, event.data),)
         text = f"{arrow} {_sdo_text(node, event, fields)}"
@@ -181,7 +181,7 @@ class Decoder:
 _WITH_VALUE = (Step.VALUE, Step.ASK_WRITE, Step.WRITTEN)
 
 
-def _sdo_text(node: NodeView, event: SdoEvent, fields: tuple[Field, ...]) -> str:
+def _sdo_text(node: NodeView, event: SdoEvent, fields: tuple[DecodedValue, ...]) -> str:
     """Return what an SDO frame does, in words."""
     what = "" if event.index is None else _object(node, event.index, event.sub)
     value = fields[0].text if fields else ""

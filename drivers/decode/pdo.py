@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 
-from cdpr_drivers.decode.values import Field, NodeView, read_field
+from cdpr_drivers.decode.values import DecodedValue, NodeView, read_field
 from cdpr_profiles import Pdo
 
 _FIRST_ID, _LAST_ID = 0x180, 0x57F
@@ -39,9 +39,9 @@ class PdoView:
     entries: dict[int, int] = field(default_factory=dict)
     """Mapping entry (CiA 301: index, sub-index, bits) by position from 1."""
 
-    def read(self, data: bytes) -> tuple[list[Field], str]:
+    def read(self, data: bytes) -> tuple[list[DecodedValue], str]:
         """Return the values in a frame, and a note where it does not fit the mapping."""
-        values: list[Field] = []
+        values: list[DecodedValue] = []
         start = 0
         for position in range(1, (self.count or 0) + 1):
             entry = self.entries.get(position)

@@ -33,7 +33,7 @@ _PDO_MAPS = ((0x1600, 0x1800), (0x1A00, 0x1C00))
 
 
 @dataclass(frozen=True)
-class Field:
+class DecodedValue:
     """One value in a frame."""
 
     index: int
@@ -82,22 +82,24 @@ class NodeView:
         return self.drive.position_sign * unit
 
 
-def read_field(node: NodeView, index: int, sub: int, raw: bytes) -> Field:
+def read_field(node: NodeView, index: int, sub: int, raw: bytes) -> DecodedValue:
     """Return what the bytes of an object mean on this node; any bytes are taken."""
     name = node.names.name(index, sub)
     if not raw or len(raw) > 8 or node.names.is_other(index, sub):
         text = _other(node.names.plain(index, sub, raw))
-        return Field(index, sub, name, raw, text, "", text)
+        return DecodedValue(index, sub, name, raw, text, "", text)
     number = int.from_bytes(raw, "little", signed=node.names.is_signed(index, sub))
     quantity = _quantity(node, index, sub)
     if quantity is not None:
         scale, unit, digits = quantity
         value = number * scale
-        return Field(index, sub, name, raw, value, unit, f"{value:.{digits}f} {unit}".rstrip())
+        return DecodedValue(
+            index, sub, name, raw, value, unit, f"{value:.{digits}f} {unit}".rstrip()
+        )
     words = _words(node, index, sub, number)
     if words is not None:
-        return Field(index, sub, name, raw, words, "", words)
-    return Field(index, sub, name, raw, float(number), "", _integer(number))
+        return DecodedValue(index, sub, name, raw, words, "", words)
+    return DecodedValue(index, sub, name, raw, float(number), "", _integer(number))
 
 
 def _integer(number: int) -> str:

@@ -4,7 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from cdpr_profiles.devices.safety_io import Brake, Contactor, Input, Output, SafetyIoProfile
+from cdpr_profiles.devices.safety_io import (
+    Brake,
+    Contactor,
+    DigitalInput,
+    DigitalOutput,
+    SafetyIoProfile,
+)
 
 _OVERWRITTEN_POLLS = 2
 """Polls in a row in which an output is not what was written before it is an alarm."""
@@ -27,12 +33,12 @@ class IoState:
     lights: dict[str, bool]
 
 
-def reads(point: Input, image: dict[int, bool]) -> bool:
+def reads(point: DigitalInput, image: dict[int, bool]) -> bool:
     """Return whether the input is active, inversion taken into account."""
     return image[point.input] != point.inverted
 
 
-def described(point: Input, image: dict[int, bool]) -> str:
+def described(point: DigitalInput, image: dict[int, bool]) -> str:
     """Return the input with its raw value, for messages."""
     return f"input {point.input} reads {int(image[point.input])}"
 
@@ -59,7 +65,7 @@ def interpret(
     )
 
 
-def _on(output: Output, coils: dict[int, bool]) -> bool:
+def _on(output: DigitalOutput, coils: dict[int, bool]) -> bool:
     return coils[output.coil] != output.inverted
 
 

@@ -98,7 +98,7 @@ def load_profiles(robot: Robot, limits: Limits | None = None) -> CoggingProfiles
     motor or cannot be true of it.
     """
     found = tuple(map(_load, robot.axes, _bounds(robot, limits)))
-    lengths = {len(one.better.table_Nm[0]): i for i, one in enumerate(found) if one is not None}
+    lengths = {len(one.harmonic.table_Nm[0]): i for i, one in enumerate(found) if one is not None}
     if len(lengths) > 1:
         paths = " and ".join(f"{robot.axes[i].commissioned}" for i in lengths.values())
         raise ConfigurationError(
@@ -146,7 +146,7 @@ def compensation_of(
     Within the torques of `limits`, those of the robot's file if left out.
     """
     pairs = zip(profiles, _bounds(robot, limits), strict=True)
-    return tuple(None if p is None else p.better.compensation(bounds) for p, bounds in pairs)
+    return tuple(None if p is None else p.harmonic.compensation(bounds) for p, bounds in pairs)
 
 
 def check_drive_identities(

@@ -18,14 +18,14 @@ MOST_POINTS = 1968
 LightColour = Literal["red", "yellow", "green", "blue", "white"]
 
 
-class Input(Profile):
+class DigitalInput(Profile):
     """A discrete input; `inverted` where 0 means what the key's name says."""
 
     input: Address
     inverted: bool = False
 
 
-class Output(Profile):
+class DigitalOutput(Profile):
     """A coil; `inverted` where writing 0 does what the key's name says."""
 
     coil: Address
@@ -35,8 +35,8 @@ class Output(Profile):
 class Contactor(Profile):
     """The enable contactor: closes on `output`; `feedback` is true while it is closed."""
 
-    output: Output
-    feedback: Input
+    output: DigitalOutput
+    feedback: DigitalInput
     timeout_s: float = Field(default=0.3, gt=0, le=10)
     """Longest time from the output to the feedback."""
 
@@ -44,8 +44,8 @@ class Contactor(Profile):
 class Brake(Profile):
     """A brake that is released by `output` and applied without it (and without supply)."""
 
-    output: Output
-    feedback: Input
+    output: DigitalOutput
+    feedback: DigitalInput
     """True while the brake is released."""
     timeout_s: float = Field(default=0.3, gt=0, le=10)
 
@@ -57,11 +57,11 @@ class AxisPoints(Profile):
     node_id: int | None = Field(default=None, ge=1, le=127)
     """Node id of the axis' drive, by which a session finds its brake."""
     brake: Brake | None = None
-    limit_negative: Input | None = None
+    limit_negative: DigitalInput | None = None
     """True while the axis stands on the switch."""
-    limit_positive: Input | None = None
+    limit_positive: DigitalInput | None = None
 
-    def limits(self) -> Iterator[tuple[str, Input]]:
+    def limits(self) -> Iterator[tuple[str, DigitalInput]]:
         """Yield the limit switches of the axis, each with its name."""
         for name, point in (("negative", self.limit_negative), ("positive", self.limit_positive)):
             if point is not None:
@@ -71,13 +71,13 @@ class AxisPoints(Profile):
 class Lights(Profile):
     """The stack light's colours."""
 
-    red: Output | None = None
-    yellow: Output | None = None
-    green: Output | None = None
-    blue: Output | None = None
-    white: Output | None = None
+    red: DigitalOutput | None = None
+    yellow: DigitalOutput | None = None
+    green: DigitalOutput | None = None
+    blue: DigitalOutput | None = None
+    white: DigitalOutput | None = None
 
-    def items(self) -> Iterator[tuple[LightColour, Output]]:
+    def items(self) -> Iterator[tuple[LightColour, DigitalOutput]]:
         """Yield the colours there are."""
         colours: tuple[LightColour, ...] = ("red", "yellow", "green", "blue", "white")
         for colour in colours:
@@ -119,14 +119,14 @@ class SafetyIoProfile(Profile):
     answer_timeout_s: float = Field(default=0.05, ge=0.005, le=5)
     trip_timeout_s: float = Field(default=0.1, ge=0.01, le=5)
     """Without a good poll for so long the motion is stopped."""
-    chain: Input
+    chain: DigitalInput
     """The emergency-stop chain: true while it is closed (all well)."""
     contactor: Contactor
     axes: tuple[AxisPoints, ...] = ()
     lights: Lights = Lights()
     watchdog: DeviceWatchdog | None = None
 
-    def inputs(self) -> Iterator[tuple[str, Input]]:
+    def inputs(self) -> Iterator[tuple[str, DigitalInput]]:
         """Yield every input with the key it stands under."""
         yield "chain", self.chain
         yield "contactor.feedback", self.contactor.feedback
@@ -136,7 +136,7 @@ class SafetyIoProfile(Profile):
             for name, point in axis.limits():
                 yield f"axes[{i}].limit_{name}", point
 
-    def outputs(self) -> Iterator[tuple[str, Output]]:
+    def outputs(self) -> Iterator[tuple[str, DigitalOutput]]:
         """Yield every output with the key it stands under."""
         yield "contactor.output", self.contactor.output
         for i, axis in enumerate(self.axes):

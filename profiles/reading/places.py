@@ -11,12 +11,12 @@ from cdpr_profiles.errors import ProfileError
 from cdpr_profiles.reading.bounded_input import is_file, path_of, read_toml
 from cdpr_profiles.reading.reader import closest
 
-Kind = Literal[
+ProfileKind = Literal[
     "motors", "drives", "cables", "winches", "robots", "tension_sensors", "safety_io", "rails"
 ]
-KINDS: tuple[Kind, ...] = get_args(Kind)
+KINDS: tuple[ProfileKind, ...] = get_args(ProfileKind)
 SHIPPED = Path(__file__).resolve().parents[1]
-_OWN_KEYS: dict[Kind, str] = {
+_OWN_KEYS: dict[ProfileKind, str] = {
     "motors": "torque_constant_Nm_per_Arms",
     "drives": "eds",
     "cables": "breaking_force_kgf",
@@ -39,13 +39,13 @@ def user_folder() -> Path:
     return folder / "cdpr-rt" / "profiles"
 
 
-def profile_files(kind: Kind) -> Iterator[Path]:
+def profile_files(kind: ProfileKind) -> Iterator[Path]:
     """Yield the files of a kind, the user's own first."""
     for folder in (user_folder() / kind, SHIPPED / kind):
         yield from sorted(p for p in folder.glob("*.toml") if not p.name.endswith(SERIES))
 
 
-def find(kind: Kind, name: str | Path, beside: Path | None = None) -> Path | None:
+def find(kind: ProfileKind, name: str | Path, beside: Path | None = None) -> Path | None:
     """Return the file of a profile given by name or path, None where no file has this name.
 
     `beside` is a folder that is searched first and that relative paths start from.
@@ -59,7 +59,7 @@ def find(kind: Kind, name: str | Path, beside: Path | None = None) -> Path | Non
     return next((p for folder in folders if is_file(p := folder / f"{text}.toml")), None)
 
 
-def require(kind: Kind, name: str | Path, beside: Path | None = None) -> Path:
+def require(kind: ProfileKind, name: str | Path, beside: Path | None = None) -> Path:
     """Return the file of a profile as `find` does; raises ProfileError where there is none."""
     path = find(kind, name, beside)
     if path is None:
@@ -68,7 +68,7 @@ def require(kind: Kind, name: str | Path, beside: Path | None = None) -> Path:
 
 
 def unknown_profile(
-    kind: Kind, name: str | Path, beside: Path | None = None, more: Iterable[str] = ()
+    kind: ProfileKind, name: str | Path, beside: Path | None = None, more: Iterable[str] = ()
 ) -> ProfileError:
     """Return the error for a name that no profile has; `more` names what else is allowed."""
     known = {path.stem for path in profile_files(kind)} | set(more)
@@ -88,7 +88,7 @@ def unknown_profile(
     return ProfileError(kind, "", f"{problem}; {hint} (or a path to a file)")
 
 
-def _is_of(kind: Kind, path: Path) -> bool:
+def _is_of(kind: ProfileKind, path: Path) -> bool:
     """Whether a TOML file is of this kind, as far as its keys tell."""
     try:
         return kind not in _OWN_KEYS or _OWN_KEYS[kind] in read_toml(path)
@@ -96,7 +96,7 @@ def _is_of(kind: Kind, path: Path) -> bool:
         return False
 
 
-def reference(kind: Kind, path: Path) -> str:
+def reference(kind: ProfileKind, path: Path) -> str:
     """Return a reference valid in any folder and for any user: a shipped profile's name, or a path.
 
     A profile of the user's own that has the name of a shipped one takes the name from it.

@@ -10,6 +10,7 @@ from types import UnionType
 from typing import Any, Self, TypeVar, Union, get_args, get_origin
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, ValidationError
+from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails
 
 from cdpr_profiles.errors import ProfileError, brief
@@ -164,13 +165,19 @@ def _keys_at(model: type[BaseModel], loc: Iterable[int | str]) -> list[str]:
     """Return the keys which the model has at a place in the file."""
     here: Any = model
     for part in loc:
-        found = _model_in(here)
-        if found is not None and part in found.model_fields:
-            here = found.model_fields[str(part)].annotation
+        fields = _fields_by_key(here)
+        if part in fields:
+            here = fields[str(part)].annotation
         else:
             here = next((a for a in reversed(get_args(here)) if a is not Ellipsis), here)
-    found = _model_in(here)
-    return list(found.model_fields) if found is not None else []
+    return list(_fields_by_key(here))
+
+
+def _fields_by_key(annotation: Any) -> dict[str, FieldInfo]:
+    """Return the fields of the model which an annotation means, by their keys in a file."""
+    found = _model_in(annotation)
+    fields = found.model_fields if found is not None else {}
+    return {field.alias or name: field for name, field in fields.items()}
 
 
 def _model_in(annotation: Any) -> type[BaseModel] | None:

@@ -12,7 +12,7 @@ from pydantic import Field
 from pymodbus.constants import ExcCodes
 from pymodbus.simulator import DataType, SimData, SimDevice
 
-from cdpr_profiles.devices.safety_io import Input, SafetyIoProfile
+from cdpr_profiles.devices.safety_io import DigitalInput, SafetyIoProfile
 from cdpr_profiles.reading.reader import Profile
 from cdpr_sim_bus.devices.modbus_servers import AnswerFaults, Panel
 from cdpr_sim_bus.physics_board import BoardAxis, Window
@@ -222,7 +222,7 @@ class SimSafetyIo:
             if axis.limit_positive is not None:
                 self._show(axis.limit_positive, high is not None and angle > high)
 
-    def _show(self, point: Input, on: bool) -> None:
+    def _show(self, point: DigitalInput, on: bool) -> None:
         self._inputs[point.input] = on != point.inverted
 
     # -- the device

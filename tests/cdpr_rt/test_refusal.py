@@ -3,35 +3,39 @@
 from __future__ import annotations
 
 import json
+import pickle
 from typing import Any
 
 import pytest
 
 from cdpr_rt.errors import ControlError
-from cdpr_rt.refusal import Refusal, RefusalCode, refusal_of
+from cdpr_rt.refusal import CommandRefusal, RefusalCode, refusal_of
+from cdpr_rt.runtime.control_loop.lifecycle import RefusedError
 
 RANGE = {"index": 1, "low": -2.0, "high": 2.0}
 STATE = {"state": "fault", "allowed": ["ready", "active"]}
 FROM = {"why": "the lengths are not known", "allowed": ["home", "last"]}
 REFUSALS = [
     (
-        Refusal(RefusalCode.NOT_IN_STATE, "enable", arguments=STATE),
+        CommandRefusal(RefusalCode.NOT_IN_STATE, "enable", arguments=STATE),
         "enable: not in state fault; allowed in ready or active",
     ),
     (
-        Refusal(RefusalCode.OUT_OF_RANGE, "jog", {"velocity_rad_s": 5.0}, RANGE),
+        CommandRefusal(RefusalCode.OUT_OF_RANGE, "jog", {"velocity_rad_s": 5.0}, RANGE),
         "jog: velocity_rad_s[1]: value 5.0; allowed: a number from -2 to 2",
     ),
     (
-        Refusal(RefusalCode.OUT_OF_RANGE, "path", {"feed": 5.0}, {**RANGE, "index": None}),
+        CommandRefusal(RefusalCode.OUT_OF_RANGE, "path", {"feed": 5.0}, {**RANGE, "index": None}),
         "path: feed: value 5.0; allowed: a number from -2 to 2",
     ),
     (
-        Refusal(RefusalCode.NOT_FEASIBLE, "pose", {"position_m": [0.1, 2.0]}, {"why": "cable 1"}),
+        CommandRefusal(
+            RefusalCode.NOT_FEASIBLE, "pose", {"position_m": [0.1, 2.0]}, {"why": "cable 1"}
+        ),
         "pose: position_m: value [0.1, 2.0]: cable 1",
     ),
     (
-        Refusal(
+        CommandRefusal(
             RefusalCode.NOTHING_LEFT,
             "path",
             {"resume": True},
@@ -40,19 +44,19 @@ REFUSALS = [
         "path: resume: no path has been left; allowed: plan",
     ),
     (
-        Refusal(RefusalCode.NOT_TIGHT, "pose"),
+        CommandRefusal(RefusalCode.NOT_TIGHT, "pose"),
         "pose: the cables are not tight; run tighten first",
     ),
     (
-        Refusal(RefusalCode.NOT_CALIBRATED, "pose", arguments={"why": "not calibrated"}),
+        CommandRefusal(RefusalCode.NOT_CALIBRATED, "pose", arguments={"why": "not calibrated"}),
         "pose: not calibrated",
     ),
     (
-        Refusal(RefusalCode.BAD_SOURCE, "tighten", {"from": "lengths"}, FROM),
+        CommandRefusal(RefusalCode.BAD_SOURCE, "tighten", {"from": "lengths"}, FROM),
         "tighten: from: value 'lengths': the lengths are not known; allowed: from home, last",
     ),
     (
-        Refusal(RefusalCode.BAD_SOURCE, "tighten", {}, {**FROM, "allowed": []}),
+        CommandRefusal(RefusalCode.BAD_SOURCE, "tighten", {}, {**FROM, "allowed": []}),
         "tighten: the lengths are not known",
     ),
 ]
@@ -63,9 +67,17 @@ def test_every_code_is_among_these() -> None:
 
 
 @pytest.mark.parametrize(("refusal", "text"), REFUSALS)
-def test_it_is_told_in_words_and_survives_json(refusal: Refusal, text: str) -> None:
+def test_it_is_told_in_words_and_survives_json(refusal: CommandRefusal, text: str) -> None:
     assert str(refusal) == str(ControlError(refusal)) == text
-    assert Refusal.from_json(json.loads(json.dumps(refusal.as_json()))) == refusal
+    assert CommandRefusal.from_json(json.loads(json.dumps(refusal.as_json()))) == refusal
+
+
+def test_the_loop_s_error_can_be_pickled_and_takes_other_words() -> None:
+    refusal = REFUSALS[0][0]
+    copy = pickle.loads(pickle.dumps(RefusedError(refusal)))
+    assert type(copy) is RefusedError
+    assert (str(copy), refusal_of(copy)) == (str(refusal), refusal)
+    assert str(type(copy)("other words")) == "other words"
 
 
 def test_an_error_carries_it_and_one_of_words_none() -> None:
@@ -87,7 +99,19 @@ def test_an_error_carries_it_and_one_of_words_none() -> None:
         {"code": "out_of_range", "command": "jog", "asked": [], "arguments": RANGE},
         {"code": "not_in_state", "command": "jog", "arguments": {"state": "a", "allowed": [1]}},
         {"code": "not_tight", "command": "jog", "more": 1},
+        {"code": "not_tight", "command": 1},
+        {"code": "not_tight", "command": "jog", "asked": []},
+        {"code": "not_tight", "command": "jog", "arguments": "none"},
+        {"code": "not_calibrated", "command": "jog", "arguments": {"why": 1}},
+        {"code": "not_in_state", "command": "jog", "arguments": {**STATE, "state": []}},
+        {"code": "not_in_state", "command": "jog", "arguments": {**STATE, "allowed": "ready"}},
+        {"code": "out_of_range", "command": "jog", "asked": {"a": "b"}, "arguments": RANGE},
+        {"code": "out_of_range", "command": "jog", "arguments": {**RANGE, "low": "1"}},
+        {"code": "out_of_range", "command": "jog", "arguments": {**RANGE, "index": -1}},
+        {"code": "out_of_range", "command": "jog", "arguments": {**RANGE, "index": "1"}},
+        {"code": "nothing_left", "command": "path", "arguments": {"left": "path"}},
+        {"code": "bad_source", "command": "tighten", "arguments": {"why": "x", "allowed": None}},
     ],
 )
 def test_what_is_not_one_as_it_is_known_here_is_none(value: Any) -> None:
-    assert Refusal.from_json(value) is None
+    assert CommandRefusal.from_json(value) is None

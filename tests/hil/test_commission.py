@@ -63,10 +63,10 @@ def test_default_plant_reaches_the_figures(default: tuple[Path, dict[str, Any]])
     _, result = default
     validation = result["validation"]
     assert validation["judged_on"] == "true angle"
-    better, thesis = validation["better"]["ratios"], validation["thesis"]["ratios"]
-    assert better["rms_position_error"] >= 10
-    assert better["peak_pid_effort"] >= 10
-    assert better["peak_velocity_error"] >= 8
+    harmonic, thesis = validation["better"]["ratios"], validation["thesis"]["ratios"]
+    assert harmonic["rms_position_error"] >= 10
+    assert harmonic["peak_pid_effort"] >= 10
+    assert harmonic["peak_velocity_error"] >= 8
     assert thesis["rms_position_error"] >= 3
     assert thesis["peak_pid_effort"] >= 6
     assert result["bus"]["overruns"] == 0

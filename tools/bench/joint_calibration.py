@@ -14,13 +14,13 @@ from cdpr_sim_bus.camera.camera_plant import CameraPlant
 from cdpr_sim_bus.camera.sim_camera import SimCamera
 from cdpr_sim_bus.physics_board import PlatformState
 from cdpr_tools.calibrate.ablation import accuracy_of, box_targets
-from cdpr_tools.calibrate.made_readings import Errors, Layout, made_readings
+from cdpr_tools.calibrate.made_readings import ErrorBudget, SheetLayout, made_readings
 from cdpr_tools.output import Output
 
 TARGET_S: Final = 20.0
 _ROBOT, _STILL = "spatial-8", (0.0, 0.0, 0.0)
-_ERRORS = Errors(hand_eye_m=0.0, hand_eye_deg=0.0)  # the simulated camera's mount is as told
-_LAYOUT = Layout(size_m=0.15)
+_ERRORS = ErrorBudget(hand_eye_m=0.0, hand_eye_deg=0.0)  # the simulated camera's mount is as told
+_LAYOUT = SheetLayout(size_m=0.15)
 
 
 def measure(count: int, seed: int, out: Output) -> dict[str, Any]:

@@ -14,7 +14,7 @@ from typing import Any, TextIO
 
 from cdpr_drivers.bus.budget import worst_case_bits
 from cdpr_drivers.decode import Decoder, Frame, Record, format_line
-from cdpr_tools.busview.source import Source
+from cdpr_tools.busview.source import FrameSource
 from cdpr_tools.errors import BadInputError, WorkFailedError, os_error_as
 
 _MORE_BITS_EXTENDED = 25
@@ -242,7 +242,7 @@ class LogFile:
 
 
 def watch(
-    source: Source,
+    source: FrameSource,
     viewer: Viewer,
     log: LogFile | None,
     seconds: float | None,

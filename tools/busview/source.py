@@ -133,11 +133,11 @@ def frame_of(message: can.Message) -> Frame:
     )
 
 
-Source = SimbusSource | PythonCanSource
+FrameSource = SimbusSource | PythonCanSource
 """A bus to listen to: its `name` in log files, and why it is `lost` once nothing comes any more."""
 
 
-def open_source(url: BusUrl, filters: Filters | None = None) -> Source:
+def open_source(url: BusUrl, filters: Filters | None = None) -> FrameSource:
     """Open a bus to listen to; raises BadInputError where that is not possible."""
     with raised_as(BadInputError, BusError):
         if url.interface == "simbus":

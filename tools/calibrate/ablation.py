@@ -35,18 +35,18 @@ from cdpr_rt.calibration.readings.observations import Observations
 from cdpr_rt.calibration.verification.verification import relative_errors
 from cdpr_rt.robots.platform_model import PlatformModel
 from cdpr_tools.calibrate.made_readings import (
-    Errors,
+    ErrorBudget,
     HAND_EYE_deg,
     HAND_EYE_m,
-    Layout,
     Made,
+    SheetLayout,
     made_readings,
 )
 from cdpr_tools.errors import BadInputError
 from cdpr_tools.jobs import cores, runner
 
 VERIFIED, _AMONG = 10, 20
-THESIS: Final = Errors(
+THESIS: Final = ErrorBudget(
     exit_m=0.03, home_m=0.01, home_deg=0.5, drum=0.005, elongation=0.43, encoder_m=5e-4,
     tension_N=1.0, spread_N=20.0, corner_px=1.0, focal=5e-3, centre_px=5.0, distortion=5.0,
     hand_eye_m=0.005, hand_eye_deg=1.5, print_scale=5e-3, sheet_scale=1e-3, bend_m=1.5e-3,
@@ -55,48 +55,52 @@ THESIS: Final = Errors(
 """Which the thesis had, it does not say: with these its method errs as it did in the frame of a
 marker, half as much to the first pose.
 """
-CARE: Final = Errors()
+CARE: Final = ErrorBudget()
 """Corners along edges, sheets on plates, 30 images for ChArUco, drums measured."""
-FLAT, ROUGH = Layout(size_m=0.08), Layout(size_m=0.2, height_m=0.15, tilt_deg=15.0)
+FLAT, ROUGH = SheetLayout(size_m=0.08), SheetLayout(size_m=0.2, height_m=0.15, tilt_deg=15.0)
 
 
 @dataclass(frozen=True)
-class Case:
+class AblationCase:
     """One row of a table."""
 
     name: str
-    errors: Errors
-    layout: Layout = FLAT
+    errors: ErrorBudget
+    layout: SheetLayout = FLAT
     poses: int = 100
     joint: bool = False
     identified: tuple[str, ...] = ("exit", "offset")
     chosen: bool = False
 
 
-def _without(**none: float) -> Errors:
+def _without(**none: float) -> ErrorBudget:
     return replace(THESIS, **none)
 
 
 _ALL: Final = ("exit", "offset", "drum", "elongation")
 SOURCES: Final = (
-    Case("thesis-like: all of these errors", THESIS),
-    Case("without noise of corners", _without(corner_px=0.01)),
-    Case("without errors of the lens", _without(focal=0.0, centre_px=0.0, distortion=0.0)),
-    Case("without errors of the sheets", _without(print_scale=0.0, sheet_scale=0.0, bend_m=0.0)),
-    Case("with the camera's place known", _without(hand_eye_m=0.0, hand_eye_deg=0.0)),
-    Case("with rigid cables", _without(elongation=-1.0)),
-    Case("without errors of drums", _without(drum=0.0)),
-    Case("without noise of encoders", _without(encoder_m=0.0)),
+    AblationCase("thesis-like: all of these errors", THESIS),
+    AblationCase("without noise of corners", _without(corner_px=0.01)),
+    AblationCase("without errors of the lens", _without(focal=0.0, centre_px=0.0, distortion=0.0)),
+    AblationCase(
+        "without errors of the sheets", _without(print_scale=0.0, sheet_scale=0.0, bend_m=0.0)
+    ),
+    AblationCase("with the camera's place known", _without(hand_eye_m=0.0, hand_eye_deg=0.0)),
+    AblationCase("with rigid cables", _without(elongation=-1.0)),
+    AblationCase("without errors of drums", _without(drum=0.0)),
+    AblationCase("without noise of encoders", _without(encoder_m=0.0)),
 )
 STEPS: Final = (
     SOURCES[0],
-    Case("joint fit, same parameters", THESIS, joint=True),
-    Case("+ drums and elongation identified", THESIS, joint=True, identified=_ALL),
-    Case("+ 50 poses in place of 100", THESIS, poses=50, joint=True, identified=_ALL),
-    Case("+ chosen poses", THESIS, poses=50, joint=True, identified=_ALL, chosen=True),
-    Case("+ markers larger and not coplanar", THESIS, ROUGH, 50, True, _ALL, True),
-    Case("+ 6 of them at known places", THESIS, replace(ROUGH, known=6), 50, True, _ALL, True),
-    Case("+ more care", CARE, replace(ROUGH, known=6), 50, True, _ALL, True),
+    AblationCase("joint fit, same parameters", THESIS, joint=True),
+    AblationCase("+ drums and elongation identified", THESIS, joint=True, identified=_ALL),
+    AblationCase("+ 50 poses in place of 100", THESIS, poses=50, joint=True, identified=_ALL),
+    AblationCase("+ chosen poses", THESIS, poses=50, joint=True, identified=_ALL, chosen=True),
+    AblationCase("+ markers larger and not coplanar", THESIS, ROUGH, 50, True, _ALL, True),
+    AblationCase(
+        "+ 6 of them at known places", THESIS, replace(ROUGH, known=6), 50, True, _ALL, True
+    ),
+    AblationCase("+ more care", CARE, replace(ROUGH, known=6), 50, True, _ALL, True),
 )
 
 
@@ -119,7 +123,7 @@ class _Trial:
     """One calibration of a case."""
 
     robot: str
-    case: Case
+    case: AblationCase
     seed: int
 
     def run(self) -> Accuracy:
@@ -152,7 +156,7 @@ def count(draws: int) -> int:
     return draws * (len(SOURCES) + len(STEPS) - 1)
 
 
-def _row(case: Case, found: list[Accuracy]) -> dict[str, Any]:
+def _row(case: AblationCase, found: list[Accuracy]) -> dict[str, Any]:
     means: dict[str, float | None] = {
         one.name: float(np.mean([getattr(each, one.name) for each in found]))
         for one in fields(Accuracy)
@@ -163,7 +167,7 @@ def _row(case: Case, found: list[Accuracy]) -> dict[str, Any]:
     return {"name": case.name, "poses": case.poses, **means}
 
 
-def trial(robot: str, case: Case, seed: int) -> Accuracy:
+def trial(robot: str, case: AblationCase, seed: int) -> Accuracy:
     """Return how good one calibration is."""
     profile = load_robot(robot)
     known = Knowledge(exit_m=max(case.errors.exit_m, 1e-3), drum=max(case.errors.drum, 1e-4))
@@ -178,7 +182,7 @@ def trial(robot: str, case: Case, seed: int) -> Accuracy:
     return _by_thesis(geometry, made)
 
 
-def _targets(geometry: CableGeometry, case: Case, seed: int) -> FloatArray:
+def _targets(geometry: CableGeometry, case: AblationCase, seed: int) -> FloatArray:
     """Return coordinates of the poses of a case, the first at home, and of those that verify."""
     if not case.chosen:
         return box_targets(geometry.model, case.poses, seed)

@@ -187,6 +187,6 @@ def as_json(found: Check) -> dict[str, object]:
         "misfit": float(np.round(found.misfit, 6)),
         "effect_mm": 1e3 * found.effect_m,
         "matters_from_mm": 1e3 * found.wanted_m,
-        "changes": [change.told() for change in found.changes],
+        "changes": [change.as_json() for change in found.changes],
         "verdict": found.verdict(),
     }

@@ -15,7 +15,7 @@ from cdpr_profiles.calibration.in_force import in_force, next_version, take_over
 from cdpr_profiles.errors import ProfileError
 from cdpr_rt.calibration.calibrate import calibrate
 from cdpr_rt.calibration.estimation.parameters import CableGeometry
-from cdpr_rt.calibration.outcome import Method, Outcome, calibration_of
+from cdpr_rt.calibration.outcome import CalibrationMethod, Outcome, calibration_of
 from cdpr_rt.calibration.readings.camera_data import HandEye, Images
 from cdpr_rt.calibration.readings.data import CalibrationData, with_points
 from cdpr_rt.errors import ControlError, InvalidRequestError
@@ -60,7 +60,7 @@ def identified(
         except InvalidRequestError as error:
             raise BadInputError(f"--points {points}: {error}") from None
     images = None if data.camera is None else Images(data.camera, data.sightings())
-    method: Method = "points" if seen.measured.any() else "redundancy"
+    method: CalibrationMethod = "points" if seen.measured.any() else "redundancy"
     return calibrate(robot, geometry, seen, "camera" if images else method, images)
 
 
@@ -126,7 +126,7 @@ def finish(
     with out.stage(f"fitting {len(data.poses)} poses"):
         outcome = replace(identified(robot, data, points, geometry), adopt=adopt)
         known = None if judge is None else judge(outcome)
-    told: dict[str, Any] = {**outcome.told(), "data": str(source)}
+    told: dict[str, Any] = {**outcome.as_json(), "data": str(source)}
     out.say(*_lines(outcome, data))
     if known is not None:
         told["verification"] = {**told["verification"], **known.verification()}
@@ -231,7 +231,7 @@ def distrust_again(robot: Robot) -> None:
 
 def _lines(outcome: Outcome, data: CalibrationData) -> list[str]:
     """Return the outcome for people."""
-    told = outcome.told()
+    told = outcome.as_json()
     lines = [f"{outcome.robot.name}: {told['poses']} poses, in the frame of {told['frame']}"]
     if data.left_out:
         lines.append(f"{len(data.left_out)} poses were refused, the last: {data.left_out[-1]}")

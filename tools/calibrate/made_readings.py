@@ -34,7 +34,7 @@ _SLACK_N, _MOST_N = 25.0, 125.0
 
 
 @dataclass(frozen=True)
-class Errors:
+class ErrorBudget:
     """What is wrong with a robot, its camera and its sheets; standard deviations unless said."""
 
     exit_m: float = 0.03
@@ -75,7 +75,7 @@ _DISTORTION = np.array([1.3e-3, 6.9e-3, 7e-5, 9e-5, 1.2e-2])
 
 
 @dataclass(frozen=True)
-class Layout:
+class SheetLayout:
     """Sheets about the robot, in rows on its floor."""
 
     rows: int = 6
@@ -119,8 +119,8 @@ def made_readings(
     robot: Robot,
     targets: FloatArray,
     wanted: FloatArray,
-    errors: Errors,
-    layout: Layout,
+    errors: ErrorBudget,
+    layout: SheetLayout,
     seed: int,
     *,
     of_data: int,
@@ -168,7 +168,7 @@ def _read_cables(
     home: FloatArray,
     exits: FloatArray,
     drums: FloatArray,
-    errors: Errors,
+    errors: ErrorBudget,
     rng: np.random.Generator,
 ) -> tuple[FloatArray, FloatArray]:
     """Return lengths and tensions as they are told, (N, n); `home` is where the file has it."""
@@ -196,7 +196,7 @@ def _read_cables(
     return told, felt
 
 
-def _missed(wanted: FloatArray, errors: Errors, rng: np.random.Generator) -> FloatArray:
+def _missed(wanted: FloatArray, errors: ErrorBudget, rng: np.random.Generator) -> FloatArray:
     poses = wanted.copy()
     poses[:, 0] += rng.normal(0.0, errors.home_m, (len(poses), 3))
     turns = np.radians(rng.normal(0.0, errors.home_deg, (len(poses), 3)))
@@ -220,7 +220,7 @@ def _tensions(u: FloatArray, arm: FloatArray, mass_kg: float, wanted_N: FloatArr
     return np.array(found)
 
 
-def _sheets(layout: Layout, rng: np.random.Generator) -> tuple[FloatArray, FloatArray]:
+def _sheets(layout: SheetLayout, rng: np.random.Generator) -> tuple[FloatArray, FloatArray]:
     count = layout.rows * layout.columns
     row, column = np.divmod(np.arange(count), layout.columns)
     middle = np.column_stack(
@@ -238,8 +238,8 @@ def _sheets(layout: Layout, rng: np.random.Generator) -> tuple[FloatArray, Float
 
 
 def _setup(
-    errors: Errors,
-    layout: Layout,
+    errors: ErrorBudget,
+    layout: SheetLayout,
     position: FloatArray,
     rotation: FloatArray,
     rng: np.random.Generator,
@@ -292,8 +292,8 @@ def _images(
     turn: FloatArray,
     position: FloatArray,
     rotation: FloatArray,
-    layout: Layout,
-    errors: Errors,
+    layout: SheetLayout,
+    errors: ErrorBudget,
     rng: np.random.Generator,
 ) -> list[Sighting]:
     """Return what a true lens sees of true sheets, with noise."""

@@ -13,8 +13,8 @@ from scipy.spatial.transform import Rotation
 from cdpr_profiles import load_robot
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.calibration.error_model import (
-    Errors,
     Noise,
+    RmsErrors,
     predicted_errors,
     predicted_spread,
     simulated_errors,
@@ -54,7 +54,7 @@ _NONE_m: Final = 1e-9
 
 
 @dataclass(frozen=True)
-class Case:
+class StudyCase:
     """One point of a curve: so much noise, or bias, at so many poses."""
 
     name: str
@@ -70,14 +70,14 @@ class Case:
 class Trials:
     """Trials of one case; `poses` are those of which each draws its own."""
 
-    case: Case
+    case: StudyCase
     exits_m: FloatArray
     anchors_m: FloatArray
     poses: FloatArray
     draws: int
     seed: int
 
-    def run(self) -> tuple[Errors, Errors]:
+    def run(self) -> tuple[RmsErrors, RmsErrors]:
         """Return errors by the model and by trial, the means over other choices of poses too."""
         rng = np.random.default_rng(self.seed)
         cables, count = len(self.exits_m), self.case.poses
@@ -90,7 +90,7 @@ class Trials:
             told = predicted_errors(*known, unit) if self.case.bias else predicted_spread(*known)
             model.append(told)
             trial.append(simulated_errors(*known, unit))
-        return Errors.of(np.array(model)), Errors.of(np.array(trial))
+        return RmsErrors.of(np.array(model)), RmsErrors.of(np.array(trial))
 
 
 def held_poses(robot: str, count: int, seed: int) -> FloatArray:
@@ -114,26 +114,26 @@ def held_poses(robot: str, count: int, seed: int) -> FloatArray:
     raise BadInputError(f"{robot}: hardly a pose in its frame is held by its cables")
 
 
-def cases() -> list[Case]:
+def cases() -> list[StudyCase]:
     """Return all cases of the study."""
     names = list(BOUNDS)
     biased = [
-        Case(f"{name} bias", f"B.{k}", BIASES[name].scaled(share), share=share, bias=True)
+        StudyCase(f"{name} bias", f"B.{k}", BIASES[name].scaled(share), share=share, bias=True)
         for k, name in enumerate(names, 1)
         for share in SHARES
     ]
     noisy = [
-        Case(name, f"B.{k}", BOUNDS[name].scaled(share), share=share)
+        StudyCase(name, f"B.{k}", BOUNDS[name].scaled(share), share=share)
         for k, name in enumerate(names, 4)
         for share in SHARES
     ]
     paired = [
-        Case(f"{one} and {other}", figure, BOUNDS[one].scaled(x) + BOUNDS[other].scaled(y))
+        StudyCase(f"{one} and {other}", figure, BOUNDS[one].scaled(x) + BOUNDS[other].scaled(y))
         for figure, (one, other) in PAIRS.items()
         for x in PAIR_SHARES
         for y in PAIR_SHARES
     ]
-    counted = [Case(name, name, noise, n) for name, noise in FIGURES.items() for n in COUNTS]
+    counted = [StudyCase(name, name, noise, n) for name, noise in FIGURES.items() for n in COUNTS]
     return noisy + counted + biased + paired
 
 
@@ -159,7 +159,7 @@ def study(
     return rows
 
 
-def case_row(case: Case, model: Errors, trial: Errors) -> dict[str, Any]:
+def case_row(case: StudyCase, model: RmsErrors, trial: RmsErrors) -> dict[str, Any]:
     """Return the figures of one case, for JSON."""
     off_exit, off_offset = _off(trial.exit_m, model.exit_m), _off(trial.offset_m, model.offset_m)
     offs = [off for off in (off_exit, off_offset) if off is not None]

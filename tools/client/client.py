@@ -17,8 +17,8 @@ import httpx
 from cdpr_profiles.errors import ProfileError, brief
 from cdpr_profiles.reading.bounded_input import parse_json
 from cdpr_profiles.reading.places import reference
-from cdpr_rt.refusal import Refusal
-from cdpr_tools.client.refusals import RefusedError
+from cdpr_rt.refusal import CommandRefusal
+from cdpr_tools.client.refusals import DaemonRefusalError
 from cdpr_tools.client.status_text import DEAD, death_text
 from cdpr_tools.daemon.loop_file import launcher_does
 from cdpr_tools.daemon.paths import (
@@ -128,8 +128,8 @@ class Daemon:
             raise BadInputError(message)
         if answer.get("state") == DEAD:
             raise WorkFailedError(death_text(self.get("/status")))
-        if (refusal := Refusal.from_json(answer.get("refusal"))) is not None:
-            raise RefusedError(refusal)
+        if (refusal := CommandRefusal.from_json(answer.get("refusal"))) is not None:
+            raise DaemonRefusalError.of(refusal)
         raise WorkFailedError(message)
 
 

@@ -10,10 +10,10 @@ from typing import Any, Final
 
 from cdpr_profiles.reading.bounded_input import read_text
 from cdpr_rt.motion.path.reading import require_kind
-from cdpr_rt.refusal import Refusal, RefusalCode
+from cdpr_rt.refusal import CommandRefusal, RefusalCode
 from cdpr_tools.client.client import Daemon, HeldRight, await_start
 from cdpr_tools.client.motion import RENEW_S, TELL_S, ended_text, finish
-from cdpr_tools.client.refusals import RefusedError, in_typed_words
+from cdpr_tools.client.refusals import DaemonRefusalError, in_typed_words
 from cdpr_tools.client.status_text import (
     GO_ON,
     left_text,
@@ -107,7 +107,8 @@ def require_held(status: dict[str, Any]) -> None:
     state = str(status["state"])
     if state != "active":
         states = {"state": state, "allowed": ["active"]}
-        raise RefusedError(Refusal(RefusalCode.NOT_IN_STATE, "path", arguments=states))
+        refusal = CommandRefusal(RefusalCode.NOT_IN_STATE, "path", arguments=states)
+        raise DaemonRefusalError.of(refusal)
     if (status.get("program_progress") or {}).get("tight") is False:
         raise WorkFailedError("path: the cables are not tight; `cdpr tighten` first")
 

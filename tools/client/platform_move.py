@@ -18,7 +18,7 @@ _ANGLES: Final = {"angle": 2, "rx": 0, "ry": 1, "rz": 2}
 _ROUNDING: Final = 1e-9
 
 
-class Frame(StrEnum):
+class ReferenceFrame(StrEnum):
     """Along and about which axes a relative motion is."""
 
     ROOM = "room"
@@ -32,7 +32,7 @@ class PlatformMove:
     to: str | None
     rotate: str | None
     relative: bool
-    frame: Frame
+    frame: ReferenceFrame
     speed: float | None
 
     @property
@@ -60,7 +60,7 @@ class PlatformMove:
             rotate = numbers("--rotate", self.rotate, turns, "deg", math.radians(1.0))
         if self.relative:
             to, rotate = self._from_here(daemon, platform, to, rotate, turns)
-        elif self.frame is not Frame.ROOM:
+        elif self.frame is not ReferenceFrame.ROOM:
             raise BadInputError(f"--frame {self.frame}: allowed: together with --relative")
         arguments: dict[str, Any] = {}
         if to is not None:
@@ -95,7 +95,7 @@ class PlatformMove:
         axes = from_home * Rotation.from_rotvec(
             at_home if len(at_home) == len(_COORDINATES[3]) else (0.0, 0.0, *at_home)
         )
-        if self.frame is Frame.ROOM:
+        if self.frame is ReferenceFrame.ROOM:
             axes = Rotation.identity()
         if to is not None:
             way = axes.apply([*to, 0.0][: len(_COORDINATES[3])])

@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from typing import Final
+from typing import Final, Self
 
-from cdpr_rt.refusal import Refusal, RefusalCode
+from cdpr_rt.refusal import CommandRefusal, RefusalCode
 from cdpr_tools.errors import BadInputError, WorkFailedError
 
 _DEG, _MM = math.degrees(1.0), 1e3
@@ -31,15 +31,20 @@ _REMEDIES: Final = {
 }
 
 
-class RefusedError(WorkFailedError):
-    """The loop has refused a command, and has said why by a code."""
+class DaemonRefusalError(WorkFailedError):
+    """The loop has refused a command; `refusal` says why by a code, None where only words do."""
 
-    def __init__(self, refusal: Refusal, text: str = "") -> None:
-        super().__init__((text or str(refusal)) + _remedy(refusal))
+    def __init__(self, text: str, refusal: CommandRefusal | None = None) -> None:
+        super().__init__(text)  # the one argument: pickle and type(error)(text) make it anew by it
         self.refusal = refusal
 
+    @classmethod
+    def of(cls, refusal: CommandRefusal, text: str = "") -> Self:
+        """Return the error of a refusal, in its own words or in `text`, with what is to be done."""
+        return cls((text or str(refusal)) + _remedy(refusal), refusal)
 
-def _remedy(refusal: Refusal) -> str:
+
+def _remedy(refusal: CommandRefusal) -> str:
     """Return what is to be done about a refusal, to be appended to it, "" where that is unknown."""
     if refusal.code is not RefusalCode.NOT_IN_STATE:
         return ""
@@ -60,17 +65,19 @@ def in_typed_words(
     """
     try:
         yield
-    except RefusedError as error:
+    except DaemonRefusalError as error:
         refusal = error.refusal
+        if refusal is None:
+            raise
         if refusal.code is RefusalCode.OUT_OF_RANGE:
             if _KEYS.keys().isdisjoint(refusal.asked):
                 raise
             raise BadInputError(_out_of_range(refusal, axes)) from None
         typed = asked if refusal.asked and asked else command
-        raise RefusedError(refusal, f"{typed}: {refusal.reason(**words)}") from None
+        raise DaemonRefusalError.of(refusal, f"{typed}: {refusal.reason(**words)}") from None
 
 
-def _out_of_range(refusal: Refusal, axes: Sequence[str]) -> str:
+def _out_of_range(refusal: CommandRefusal, axes: Sequence[str]) -> str:
     (key, value), index = next(iter(refusal.asked.items())), refusal.arguments.get("index")
     factor, unit, option = _KEYS[key]
     low, high = (float(f"{factor * refusal.arguments[end]:.4g}") for end in ("low", "high"))

@@ -52,7 +52,7 @@ app = typer.Typer()
 
 
 @dataclass(frozen=True)
-class _Wanted:
+class _Request:
     """How a motor is commissioned."""
 
     plan: Plan
@@ -111,21 +111,21 @@ def commission(
     out = Output(as_json)
     profile = load_winch_or_robot(machine)
     folder = out_dir or Path("out") / f"commission-{profile.profile}"
-    wanted = _Wanted(QUICK if quick else THOROUGH, bandwidth_Hz, index, safety_io)
+    request = _Request(QUICK if quick else THOROUGH, bandwidth_Hz, index, safety_io)
     if isinstance(profile, Robot):
         motors = chosen_axes(profile, axis or (), every, folder)
         for motor in motors:
             prepare(motor.paths.out, overwrite)
         with detached_motors(profile, bus or (), motors, out, plant) as urls:
             _ask(motors, urls, yes)
-            out.result(_commission_robot(profile, motors, urls, wanted, out))
+            out.result(_commission_robot(profile, motors, urls, request, out))
         return
     if axis or every:
         raise BadInputError("--axis, --all: for a robot; a winch has one motor")
     url = open_bus(_only(bus))
     paths = prepare(folder, overwrite)
     confirm_motion(url, yes, f"commissioning {_TURNS}")
-    out.result(_commission(profile, url, paths, wanted, out, plant))
+    out.result(_commission(profile, url, paths, request, out, plant))
 
 
 def _only(buses: Sequence[str] | None) -> str:
@@ -144,14 +144,14 @@ def _commission_robot(
     robot: Robot,
     motors: Sequence[MotorOfRobot],
     urls: Sequence[BusUrl],
-    wanted: _Wanted,
+    request: _Request,
     out: Output,
 ) -> dict[str, Any]:
     """Commission one motor after the other; return what the command ends with."""
     results = {}
     for motor, url in zip(motors, urls, strict=True):
         out.say(f"axis {motor.axis.name}, node {motor.axis.node_id} on {url}")
-        results[motor.axis.name] = _commission(motor.winch, url, motor.paths, wanted, out)
+        results[motor.axis.name] = _commission(motor.winch, url, motor.paths, request, out)
     out.say(*lines_for_robot(robot, motors))
     folder = motors[0].paths.out.parent
     return {"ok": True, "robot": robot.reference, "commissioned": str(folder), "axes": results}
@@ -161,15 +161,15 @@ def _commission(
     winch: Winch,
     url: BusUrl,
     paths: Paths,
-    wanted: _Wanted,
+    request: _Request,
     out: Output,
     plant: Path | None = None,
 ) -> dict[str, Any]:
     """Commission the motor of `winch`; return what was found, as the report tells it."""
     with keeping_raw_data(paths.raw_folder):
-        with open_winch(winch, url, out, plant, paths.truth, wanted.safety_io) as session:
-            run = Commissioning(session, out, paths, wanted.plan).run(
-                wanted.bandwidth_Hz, wanted.index
+        with open_winch(winch, url, out, plant, paths.truth, request.safety_io) as session:
+            run = Commissioning(session, out, paths, request.plan).run(
+                request.bandwidth_Hz, request.index
             )
         write(paths.run, to_json(run, indent=1))
         found = identify(winch, run["latency_s"], paths)

@@ -10,7 +10,7 @@ import typer
 
 from cdpr_tools.commands.options import JsonOption, OverwriteOption
 from cdpr_tools.errors import FAILED, BadInputError, os_error_as
-from cdpr_tools.host.host_checks import Finding, look_around
+from cdpr_tools.host.host_checks import HostFinding, look_around
 from cdpr_tools.output import Output
 
 app = typer.Typer()
@@ -60,7 +60,7 @@ def doctor(
         raise typer.Exit(FAILED)
 
 
-def lines_of(finding: Finding) -> list[str]:
+def lines_of(finding: HostFinding) -> list[str]:
     """Return a finding as lines for people."""
     lines = [f"{finding.level:8}{finding.what:22}{finding.found}"]
     return lines + [f"{'':8}{'':22}-> {finding.remedy}"] * bool(finding.remedy)

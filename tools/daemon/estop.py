@@ -31,7 +31,7 @@ _LISTENS_S: Final = 2.0
 
 
 @dataclass(frozen=True)
-class Outcome:
+class EmergencyStopResult:
     """Result of the emergency stop of one robot."""
 
     robot: str
@@ -48,10 +48,10 @@ class EmergencyStop:
         self._robot = path.stem
         self._pidfd = -1
         self._block: SharedBlock | None = None
-        self._known: Outcome | None = self._signal_loop(path)
+        self._known: EmergencyStopResult | None = self._signal_loop(path)
         self._asked_ns = time.monotonic_ns()
 
-    def _signal_loop(self, path: Path) -> Outcome | None:
+    def _signal_loop(self, path: Path) -> EmergencyStopResult | None:
         """Send the signal; return what is known without waiting, None where there is to wait."""
         try:
             found = self._found = LoopFile.read(path)
@@ -77,7 +77,7 @@ class EmergencyStop:
             os.close(self._pidfd)
             self._pidfd = -1
 
-    def outcome(self) -> Outcome:
+    def outcome(self) -> EmergencyStopResult:
         """Wait until every drive has confirmed, or it is known that some will not.
 
         A loop that does not turn is killed: its drives stop by themselves without its heartbeat.
@@ -100,7 +100,7 @@ class EmergencyStop:
                 return self._kill()
             if failure := self._failure_reason():
                 return self._failed(f"{failure} ({self._reported_state()})")
-        return Outcome(self._robot, True, off)
+        return EmergencyStopResult(self._robot, True, off)
 
     def _failure_reason(self) -> str:
         """Return why waiting ends without a confirmation, empty until then."""
@@ -114,7 +114,7 @@ class EmergencyStop:
             return f"not every drive has confirmed within {_CONFIRM_S:g} s that its power is off"
         return ""
 
-    def _kill(self) -> Outcome:
+    def _kill(self) -> EmergencyStopResult:
         signal.pidfd_send_signal(self._pidfd, signal.SIGKILL)
         killed = "was killed" if self._ended(_KILLED_S) else "does not even end when it is killed"
         return self._failed(
@@ -122,8 +122,8 @@ class EmergencyStop:
             + _own_stop_notice(self._found)
         )
 
-    def _failed(self, text: str) -> Outcome:
-        return Outcome(self._robot, False, text)
+    def _failed(self, text: str) -> EmergencyStopResult:
+        return EmergencyStopResult(self._robot, False, text)
 
     def _ended(self, within_s: float) -> bool:
         return bool(select.select([self._pidfd], [], [], within_s)[0])

@@ -15,7 +15,7 @@ from cdpr_tools.errors import WorkFailedError
 from cdpr_tools.experiment.model.hand_model import HandModel, PositionFilter
 from cdpr_tools.experiment.model.operator_model import OperatorModel
 from cdpr_tools.experiment.model.parameters import OperatorParameters, Station
-from cdpr_tools.experiment.model.plants import Plant
+from cdpr_tools.experiment.model.plants import TeleoperatedRobot
 from cdpr_tools.experiment.model.vision import VisionModel
 
 PACKET_S: Final = 0.02
@@ -73,7 +73,7 @@ class Trial:
 class _Link:
     """Packets under way to the robot, and what it did with them."""
 
-    def __init__(self, plant: Plant, delay_s: float, scale: float) -> None:
+    def __init__(self, plant: TeleoperatedRobot, delay_s: float, scale: float) -> None:
         self._plant, self._delay_s, self._scale = plant, delay_s, scale
         self._under_way: deque[tuple[float, FloatArray, int]] = deque()
         self.confirmed_cycles: list[int] = []
@@ -93,7 +93,7 @@ class _Link:
 
 
 def run_trial(
-    plant: Plant,
+    plant: TeleoperatedRobot,
     condition: Condition,
     targets_m: FloatArray,
     parameters: OperatorParameters,

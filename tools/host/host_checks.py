@@ -24,7 +24,7 @@ _LIMITS_FILE = "/etc/security/limits.d/realtime.conf"
 
 
 @dataclass(frozen=True)
-class Finding:
+class HostFinding:
     """One thing looked at: `level` is ok, note (works, but) or problem (will not work)."""
 
     what: str
@@ -33,7 +33,7 @@ class Finding:
     remedy: str = ""
 
 
-def look_around() -> Iterator[Finding]:
+def look_around() -> Iterator[HostFinding]:
     """Yield everything that can be found out without changing anything."""
     for check in _CHECKS:
         yield check()
@@ -41,25 +41,25 @@ def look_around() -> Iterator[Finding]:
         yield can_interface(interface)
 
 
-def _simbus() -> Finding:
+def _simbus() -> HostFinding:
     try:
         socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET).close()
     except OSError as error:
-        return Finding("embedded bus", "problem", error.strerror or "", "run on Linux")
-    return Finding("embedded bus", "ok", "packet sockets are there")
+        return HostFinding("embedded bus", "problem", error.strerror or "", "run on Linux")
+    return HostFinding("embedded bus", "ok", "packet sockets are there")
 
 
-def _socketcan() -> Finding:
+def _socketcan() -> HostFinding:
     try:
         socket.socket(socket.AF_CAN, socket.SOCK_RAW, socket.CAN_RAW).close()
     except OSError as error:
         remedy = "load the modules: modprobe can_raw vcan; simbus: works without"
-        return Finding("SocketCAN", "note", error.strerror or "not available", remedy)
+        return HostFinding("SocketCAN", "note", error.strerror or "not available", remedy)
     names = ", ".join(interface.name for interface in list_interfaces())
-    return Finding("SocketCAN", "ok", f"interfaces: {names or 'none yet'}")
+    return HostFinding("SocketCAN", "ok", f"interfaces: {names or 'none yet'}")
 
 
-def can_interface(interface: CanInterface) -> Finding:
+def can_interface(interface: CanInterface) -> HostFinding:
     """Judge one CAN interface: is it up, does its queue hold a cycle, how is its controller."""
     name = interface.name
     what = f"CAN {name}"
@@ -68,26 +68,26 @@ def can_interface(interface: CanInterface) -> Finding:
         found += f", {interface.bitrate_bit_s / 1000:g} kbit/s"
     if interface.state == "bus-off":
         remedy = f"mend the wire, then: ip link set {name} type can restart"
-        return Finding(what, "problem", found, remedy)
+        return HostFinding(what, "problem", found, remedy)
     if not interface.is_up:
         kind = "" if interface.is_virtual else " type can bitrate 1000000 restart-ms 100"
-        return Finding(what, "note", found, f"ip link set {name} up{kind}")
+        return HostFinding(what, "note", found, f"ip link set {name} up{kind}")
     if interface.state not in ("error-active", "up"):
         remedy = "look at cable, termination, bit rate and the power of the other nodes"
-        return Finding(what, "note", found, remedy)
+        return HostFinding(what, "note", found, remedy)
     if interface.queue_frames < _QUEUE_FRAMES:
         remedy = f"a burst of commands may not fit: ip link set {name} txqueuelen 1000"
-        return Finding(what, "note", found, remedy)
-    return Finding(what, "ok", found)
+        return HostFinding(what, "note", found, remedy)
+    return HostFinding(what, "ok", found)
 
 
-def _serial_ports() -> Finding:
+def _serial_ports() -> HostFinding:
     ports = [p for kind in ("ttyACM*", "ttyUSB*") for p in sorted(Path("/dev").glob(kind))]
     closed = [str(p) for p in ports if not os.access(p, os.R_OK | os.W_OK)]
     if closed:
         remedy = f"join their group: usermod -aG {_group_of(Path(closed[0]))} $USER"
-        return Finding("serial adapters", "note", f"not for you: {', '.join(closed)}", remedy)
-    return Finding("serial adapters", "ok", ", ".join(map(str, ports)) or "none plugged in")
+        return HostFinding("serial adapters", "note", f"not for you: {', '.join(closed)}", remedy)
+    return HostFinding("serial adapters", "ok", ", ".join(map(str, ports)) or "none plugged in")
 
 
 def _group_of(path: Path) -> str:
@@ -97,24 +97,24 @@ def _group_of(path: Path) -> str:
         return "dialout"
 
 
-def _cores() -> Finding:
+def _cores() -> HostFinding:
     count = len(os.sched_getaffinity(0))
     if count >= 2:
-        return Finding("processors", "ok", f"{count} usable")
+        return HostFinding("processors", "ok", f"{count} usable")
     remedy = "the loop wants one to itself: two are better"
-    return Finding("processors", "note", f"{count} usable", remedy)
+    return HostFinding("processors", "note", f"{count} usable", remedy)
 
 
-def _scheduling() -> Finding:
+def _scheduling() -> HostFinding:
     soft, hard = resource.getrlimit(resource.RLIMIT_RTPRIO)
     if os.geteuid() != 0 and max(soft, hard) <= 0:
         remedy = f"add '@realtime - rtprio 90' to {_LIMITS_FILE}, join that group, log in again"
-        return Finding("real-time scheduling", "note", "SCHED_FIFO is not allowed", remedy)
+        return HostFinding("real-time scheduling", "note", "SCHED_FIFO is not allowed", remedy)
     refused = _fifo_refused()
     if refused:
         remedy = "this control group has no real-time share: start it as a systemd service"
-        return Finding("real-time scheduling", "note", f"SCHED_FIFO: {refused}", remedy)
-    return Finding("real-time scheduling", "ok", "SCHED_FIFO is allowed")
+        return HostFinding("real-time scheduling", "note", f"SCHED_FIFO: {refused}", remedy)
+    return HostFinding("real-time scheduling", "ok", "SCHED_FIFO is allowed")
 
 
 def _fifo_refused() -> str:
@@ -128,42 +128,42 @@ def _fifo_refused() -> str:
     return ""
 
 
-def _throttling() -> Finding:
+def _throttling() -> HostFinding:
     text = _text(Path("/proc/sys/kernel/sched_rt_runtime_us"))
     period = _text(Path("/proc/sys/kernel/sched_rt_period_us"))
     if not text or not period:
-        return Finding("real-time throttling", "ok", "not there")
+        return HostFinding("real-time throttling", "ok", "not there")
     if int(text) < 0:
-        return Finding("real-time throttling", "ok", "off")
+        return HostFinding("real-time throttling", "ok", "off")
     share = 100.0 * int(text) / int(period)
     found = f"real-time processes get {share:.3g} % of each {int(period) / 1e6:g} s"
     if share >= 90.0:
-        return Finding("real-time throttling", "ok", found)
-    return Finding(
+        return HostFinding("real-time throttling", "ok", found)
+    return HostFinding(
         "real-time throttling", "note", found, "sysctl -w kernel.sched_rt_runtime_us=950000"
     )
 
 
-def _memory() -> Finding:
+def _memory() -> HostFinding:
     _, hard = resource.getrlimit(resource.RLIMIT_MEMLOCK)
     if os.geteuid() == 0 or hard == resource.RLIM_INFINITY or hard >= _MEMLOCK_BYTES:
-        return Finding("locked memory", "ok", "enough may be locked")
+        return HostFinding("locked memory", "ok", "enough may be locked")
     remedy = f"add '@realtime - memlock unlimited' to {_LIMITS_FILE}, log in again"
-    return Finding("locked memory", "note", f"only {hard >> 10} KiB may be locked", remedy)
+    return HostFinding("locked memory", "note", f"only {hard >> 10} KiB may be locked", remedy)
 
 
-def _kernel() -> Finding:
+def _kernel() -> HostFinding:
     release = platform.release()
     kind = preemption(
         platform.version(), _text(Path("/sys/kernel/realtime")), _text(Path("/proc/cmdline"))
     )
     if kind == "PREEMPT_RT":
-        return Finding("kernel", "ok", f"{release}, {kind}")
+        return HostFinding("kernel", "ok", f"{release}, {kind}")
     remedy = "for a real robot, install the distribution's PREEMPT_RT kernel"
     if kind == "PREEMPT_DYNAMIC":
         kind += f", {_preemption_built_in(release) or 'its default mode'}"
         remedy += "; until then, boot with preempt=full"
-    return Finding("kernel", "note", f"{release}, {kind}, not PREEMPT_RT", remedy)
+    return HostFinding("kernel", "note", f"{release}, {kind}, not PREEMPT_RT", remedy)
 
 
 def preemption(version: str, realtime: str, command_line: str) -> str:
@@ -191,48 +191,48 @@ def _preemption_built_in(release: str) -> str:
     return "mode full" if "\nCONFIG_PREEMPT=y\n" in text else ""
 
 
-def _timers() -> Finding:
+def _timers() -> HostFinding:
     resolution_s = time.clock_getres(time.CLOCK_MONOTONIC)
     if resolution_s <= 1e-6:
-        return Finding("timers", "ok", "high resolution")
+        return HostFinding("timers", "ok", "high resolution")
     remedy = "boot without highres=off and nohz=off; needs CONFIG_HIGH_RES_TIMERS"
-    return Finding("timers", "problem", f"steps of {1e3 * resolution_s:g} ms", remedy)
+    return HostFinding("timers", "problem", f"steps of {1e3 * resolution_s:g} ms", remedy)
 
 
-def _clock_source() -> Finding:
+def _clock_source() -> HostFinding:
     used = _text(_CLOCKS / "current_clocksource")
     if not used or used in _GOOD_CLOCKS:
-        return Finding("clock source", "ok", used or "not told")
+        return HostFinding("clock source", "ok", used or "not told")
     found = f"{used}: each look at the clock is slow"
     available = _text(_CLOCKS / "available_clocksource").split()
     better = next((clock for clock in available if clock in _GOOD_CLOCKS), "")
     if better:
-        return Finding(
+        return HostFinding(
             "clock source", "note", found, f"echo {better} > {_CLOCKS}/current_clocksource"
         )
     remedy = "dmesg tells why tsc was given up; a firmware update may mend it"
-    return Finding("clock source", "note", found, remedy)
+    return HostFinding("clock source", "note", found, remedy)
 
 
-def _governor() -> Finding:
+def _governor() -> HostFinding:
     files = sorted(_CPUS.glob("cpu[0-9]*/cpufreq/scaling_governor"))
     kinds = {_text(file) for file in files}
     if kinds <= {"performance"}:
-        return Finding("CPU governor", "ok", "performance" if kinds else "fixed frequency")
+        return HostFinding("CPU governor", "ok", "performance" if kinds else "fixed frequency")
     remedy = "cpupower frequency-set -g performance"
-    return Finding("CPU governor", "note", ", ".join(sorted(kinds)), remedy)
+    return HostFinding("CPU governor", "note", ", ".join(sorted(kinds)), remedy)
 
 
-def _isolation() -> Finding:
+def _isolation() -> HostFinding:
     isolated = _text(_CPUS / "isolated")
     if isolated:
-        return Finding("isolated processors", "ok", isolated)
+        return HostFinding("isolated processors", "ok", isolated)
     count = os.cpu_count() or 1
     if count < 3:
-        return Finding("isolated processors", "ok", "none, and none to spare")
+        return HostFinding("isolated processors", "ok", "none, and none to spare")
     last = count - 1
     remedy = f"boot with isolcpus=managed_irq,domain,{last} nohz_full={last} rcu_nocbs={last}"
-    return Finding("isolated processors", "note", "none", remedy)
+    return HostFinding("isolated processors", "note", "none", remedy)
 
 
 def _text(path: Path) -> str:
@@ -242,7 +242,7 @@ def _text(path: Path) -> str:
         return ""
 
 
-_CHECKS: tuple[Callable[[], Finding], ...] = (
+_CHECKS: tuple[Callable[[], HostFinding], ...] = (
     _simbus,
     _socketcan,
     _serial_ports,

@@ -120,9 +120,9 @@ def _over_angle(run: Recording, chosen: BoolArray) -> tuple[FloatArray, BoolArra
     return np.asarray(curve), seen
 
 
-def friction_Nm(better: HarmonicResult, speed_rad_s: float) -> tuple[float, float]:
+def friction_Nm(harmonic: HarmonicResult, speed_rad_s: float) -> tuple[float, float]:
     """Return the model's friction torque at a steady speed with increasing, decreasing angle."""
-    f = better.friction
+    f = harmonic.friction
     fall = math.exp(-((speed_rad_s / f.stribeck_speed_rad_s) ** 2))
     viscous = f.viscous_Nms_rad * speed_rad_s
     return (
@@ -144,18 +144,18 @@ class TableError:
     """By how much motor angle that order comes late, in the sense of the motion."""
 
 
-def table_errors(thesis: ThesisResult, better: HarmonicResult) -> tuple[TableError, TableError]:
+def table_errors(thesis: ThesisResult, harmonic: HarmonicResult) -> tuple[TableError, TableError]:
     """Compare the thesis' curves with the harmonic model, for each direction."""
     samples = thesis.curve_Nm.shape[1]
-    model = better.tables(samples)
-    order = strongest_order(better)
+    model = harmonic.tables(samples)
+    order = strongest_order(harmonic)
     turning = np.exp(-1j * order * np.arange(samples) * (math.tau / samples))
     errors = []
     for side, sign in ((0, 1.0), (1, -1.0)):
         error = thesis.variation_Nm[side] - model[side]
         worst = int(np.argmax(np.abs(error)))
         ratio = 1.0 + 0.0j
-        if better.harmonics:
+        if harmonic.harmonics:
             ratio = complex((thesis.variation_Nm[side] @ turning) / (model[side] @ turning))
         errors.append(
             TableError(
@@ -169,11 +169,11 @@ def table_errors(thesis: ThesisResult, better: HarmonicResult) -> tuple[TableErr
     return errors[0], errors[1]
 
 
-def strongest_order(better: HarmonicResult) -> int:
+def strongest_order(harmonic: HarmonicResult) -> int:
     """Return the order with the largest amplitude, 1 where none was found."""
-    if not better.harmonics:
+    if not harmonic.harmonics:
         return 1
-    return max(better.harmonics, key=lambda one: one.amplitude_Nm.value).order
+    return max(harmonic.harmonics, key=lambda one: one.amplitude_Nm.value).order
 
 
 def filter_gain(order: int) -> float:

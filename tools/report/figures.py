@@ -78,7 +78,7 @@ def overlay(raw_Nm: FloatArray, order: int) -> str:
 
 
 def tables(
-    raw_Nm: FloatArray, thesis_Nm: FloatArray, better_Nm: FloatArray, repaired: BoolArray
+    raw_Nm: FloatArray, thesis_Nm: FloatArray, harmonic_Nm: FloatArray, repaired: BoolArray
 ) -> str:
     """Draw measured torque and both methods' curves, (2, m) each (Tremblay, figures 1.6, 1.7).
 
@@ -90,7 +90,7 @@ def tables(
         measured = decimated(degrees, raw_Nm[side])
         ax.plot(*measured, color=COLOURS["none"], lw=2.2, alpha=0.6, label="measured, averaged")
         ax.plot(degrees, thesis_Nm[side], color=COLOURS["thesis"], label="thesis: filtered")
-        ax.plot(degrees, better_Nm[side], color=COLOURS["better"], label=LABELS["better"])
+        ax.plot(degrees, harmonic_Nm[side], color=COLOURS["better"], label=LABELS["better"])
         low, high = ax.get_ylim()
         ax.fill_between(
             degrees, low, high, where=repaired[side], color=REPAIRED, alpha=0.35, lw=0,

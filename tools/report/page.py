@@ -64,7 +64,7 @@ class _Report:
         ramps = {m: curves.read_ramp(self._passes(m)[0], truth) for m in METHODS}
         judged = words.judged_on(self._validation, len(self._passes("better")))
         found = self._found
-        methods = words.method_words(self._validation, found.thesis, found.better, ramps)
+        methods = words.method_words(self._validation, found.thesis, found.harmonic, ramps)
         parts = [
             f"<h1>{escape(title)}</h1>",
             paragraph(self._motor_and_drive(), small=True),
@@ -121,12 +121,12 @@ class _Report:
         return f'<div class="verdict{"" if good else " missed"}">{lines}</div>'
 
     def _torque(self) -> list[str]:
-        thesis, better = self._found.thesis, self._found.better
+        thesis, harmonic = self._found.thesis, self._found.harmonic
         speed = abs(read_raw_log(self._recorded("sweep")[0]).header["speed_rad_s"])
-        order = curves.strongest_order(better)
+        order = curves.strongest_order(harmonic)
         shift = curves.shift_deg(thesis.raw_Nm, order)
         means = " and ".join(number(1e3 * one) for one in thesis.mean_Nm)
-        frictions = " and ".join(number(1e3 * one) for one in curves.friction_Nm(better, speed))
+        frictions = " and ".join(number(1e3 * one) for one in curves.friction_Nm(harmonic, speed))
         share = f"{number(100 * thesis.repaired_fraction, 2)} % of the curves, in which the rotor "
         return [
             paragraph(
@@ -153,7 +153,7 @@ class _Report:
                 figures.tables(
                     thesis.raw_Nm,
                     thesis.curve_Nm,
-                    better.tables(thesis.raw_Nm.shape[1]) + thesis.mean_Nm[:, None],
+                    harmonic.tables(thesis.raw_Nm.shape[1]) + thesis.mean_Nm[:, None],
                     thesis.repaired,
                 ),
                 "Measured torque with the curves of both methods, for each direction",
@@ -192,13 +192,13 @@ class _Report:
             ),
             tables.harmonics(facts),
             self._friction(),
-            tables.estimates(self._found.better),
+            tables.estimates(self._found.harmonic),
             tables.quality(facts),
         ]
 
     def _friction(self) -> str:
         speed = np.geomspace(*_SPEEDS_RAD_S, 200)
-        both = np.array([curves.friction_Nm(self._found.better, one) for one in speed.tolist()])
+        both = np.array([curves.friction_Nm(self._found.harmonic, one) for one in speed.tolist()])
         return self._picture(
             figures.friction(speed, both[:, 0], both[:, 1]),
             "Friction over speed in both directions",

@@ -74,29 +74,29 @@ def harmonics(identification: Mapping[str, Any]) -> str:
     return table(head, rows, caption)
 
 
-def estimates(better: HarmonicResult) -> str:
+def estimates(harmonic: HarmonicResult) -> str:
     """Return what was identified beside the cogging."""
-    f = better.friction
+    f = harmonic.friction
 
     def row(name: str, one: ConfidenceInterval, factor: float = 1.0) -> list[str]:
         known = number(abs(factor) * one.half_width, 2) if one.half_width > 0.0 else "assumed"
         return [name, data(factor * one.value), known]
 
-    drift = 100.0 * 60.0 * better.cogging_trend_1_s
+    drift = 100.0 * 60.0 * harmonic.cogging_trend_1_s
     rise = f"{number(1e3 * f.stribeck_forward_Nm)} / {number(1e3 * f.stribeck_backward_Nm)}"
     rows = [
-        row("Coulomb friction, increasing angle (mNm)", better.coulomb_forward_Nm, 1e3),
-        row("Coulomb friction, decreasing angle (mNm)", better.coulomb_backward_Nm, 1e3),
+        row("Coulomb friction, increasing angle (mNm)", harmonic.coulomb_forward_Nm, 1e3),
+        row("Coulomb friction, decreasing angle (mNm)", harmonic.coulomb_backward_Nm, 1e3),
         ["Its rise towards standstill, increasing / decreasing (mNm)", rise, "–"],
         [
             "Stribeck speed, at which that rise is down to 37 % (rad/s)",
             number(f.stribeck_speed_rad_s),
             "–",
         ],
-        row("Viscous friction (mNm s/rad)", better.viscous_Nms_rad, 1e3),
-        row("Rotor inertia (kg mm²)", better.inertia_kg_m2, 1e6),
-        row("Delay from angle to torque, as identified (ms)", better.latency_s, 1e3),
-        row("Static lag of each direction (deg)", better.lag_rad, math.degrees(1.0)),
+        row("Viscous friction (mNm s/rad)", harmonic.viscous_Nms_rad, 1e3),
+        row("Rotor inertia (kg mm²)", harmonic.inertia_kg_m2, 1e6),
+        row("Delay from angle to torque, as identified (ms)", harmonic.latency_s, 1e3),
+        row("Static lag of each direction (deg)", harmonic.lag_rad, math.degrees(1.0)),
         ["Change of the cogging with warmth (% a minute)", number(drift), "–"],
     ]
     return table(["", "Value", "± (95 %)"], rows)

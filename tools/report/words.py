@@ -89,9 +89,9 @@ def judged_on(validation: Mapping[str, Any], passes: int) -> str:
 
 
 def floor_words(validation: Mapping[str, Any], encoder_deg: float, torque_Nm: float) -> list[str]:
-    """Say how far above the floor the better method is, and what sets the floor."""
-    floor, better = validation["floor"], validation["better"]
-    above = {q.name: better[q.key] / floor[q.key] for q in QUANTITIES if floor[q.key] > 0.0}
+    """Say how far above the floor the harmonic model is, and what sets the floor."""
+    floor, harmonic = validation["floor"], validation["better"]
+    above = {q.name: harmonic[q.key] / floor[q.key] for q in QUANTITIES if floor[q.key] > 0.0}
     times = joined([f"{number(ratio, 2)} in the {name}" for name, ratio in above.items()])
     words = [
         f"The floor is what the encoder’s steps of {number(encoder_deg)} deg and the drive’s "
@@ -188,7 +188,7 @@ def next_words(results: Mapping[str, Any]) -> list[str]:
 def method_words(
     validation: Mapping[str, Any],
     thesis: ThesisResult,
-    better: HarmonicResult,
+    harmonic: HarmonicResult,
     ramps: Mapping[str, Ramp],
 ) -> list[str]:
     """Say in figures how the thesis' curves differ from the model and what that costs."""
@@ -201,28 +201,28 @@ def method_words(
             for q in short
         ]
         words.append(f"The thesis’ method falls short here: {joined(shortfalls)}. The reasons:")
-    errors = table_errors(thesis, better)
+    errors = table_errors(thesis, harmonic)
     words.append(
         f"Its curves differ from the harmonic model {_error(errors[0])} for increasing and "
         f"{_error(errors[1])} for decreasing angle, where the cogging itself reaches "
-        f"{number(1e3 * float(abs(better.tables(3600)).max()))} mNm."
+        f"{number(1e3 * float(abs(harmonic.tables(3600)).max()))} mNm."
     )
     words.append(
-        _cost(validation, better, max(one.peak_Nm for one in errors), ramps["thesis"].standing)
+        _cost(validation, harmonic, max(one.peak_Nm for one in errors), ramps["thesis"].standing)
     )
-    if better.harmonics:
-        order = strongest_order(better)
+    if harmonic.harmonics:
+        order = strongest_order(harmonic)
         words.append(
             f"In the strongest order, {order}, they have {number(errors[0].gain)} and "
             f"{number(errors[1].gain)} of the model’s amplitude and come "
             f"{lag_text(errors[0].behind_deg)} and {lag_text(errors[1].behind_deg)} in the "
             "sense of the motion."
         )
-    return words + _method_limits(thesis, better)
+    return words + _method_limits(thesis, harmonic)
 
 
 def _cost(
-    validation: Mapping[str, Any], better: HarmonicResult, table_error_Nm: float, standing: float
+    validation: Mapping[str, Any], harmonic: HarmonicResult, table_error_Nm: float, standing: float
 ) -> str:
     """Say what the PID has to do for the table's error."""
     effort = validation["thesis"]["peak_pid_effort_Nm"]
@@ -233,7 +233,7 @@ def _cost(
     )
     if standing < _SEEN:
         return words
-    f = better.friction
+    f = harmonic.friction
     rise = max(f.stribeck_forward_Nm, f.stribeck_backward_Nm)
     higher = (
         f", which the model finds up to {number(1e3 * rise)} mNm higher at standstill than at speed"
@@ -247,7 +247,7 @@ def _cost(
     )
 
 
-def _method_limits(thesis: ThesisResult, better: HarmonicResult) -> list[str]:
+def _method_limits(thesis: ThesisResult, harmonic: HarmonicResult) -> list[str]:
     """Say what in the thesis' method makes its curves differ."""
     words = []
     if thesis.repaired_fraction > 0.0:
@@ -256,7 +256,7 @@ def _method_limits(thesis: ThesisResult, better: HarmonicResult) -> list[str]:
             "there the rotor ran away from the ramp and the other direction’s curve stands in, "
             "which is not the same curve."
         )
-    flattened = [(h.order, filter_gain(h.order)) for h in better.harmonics]
+    flattened = [(h.order, filter_gain(h.order)) for h in harmonic.harmonics]
     flattened = [(order, gain) for order, gain in flattened if gain < _FLAT]
     if flattened:
         shares = joined(

@@ -37,7 +37,7 @@ _APART_m = 0.15
 
 
 @dataclass(frozen=True)
-class Kind:
+class RobotKind:
     """A kind of robot, with the shipped robot whose figures are its defaults."""
 
     name: str
@@ -113,8 +113,8 @@ class Kind:
         return min(wanted / usual for wanted, usual in zip(frame_m, self.frame_m, strict=True))
 
 
-def kind_of(name: str) -> Kind:
+def kind_of(name: str) -> RobotKind:
     """Return the kind of this name, one of KINDS."""
     robot = load_robot(name)
     assert robot.platform is not None
-    return Kind(name, robot, robot.platform)
+    return RobotKind(name, robot, robot.platform)

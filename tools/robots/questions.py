@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from cdpr_profiles import ProfileError, Winch, load_winch
-from cdpr_tools.robots.kinds import KINDS, Kind, kind_of
+from cdpr_tools.robots.kinds import KINDS, RobotKind, kind_of
 
 Answers = dict[str, Any]
 """What was answered, by key, of the type that the key's question gives it; SI."""
@@ -46,7 +46,7 @@ class Question:
 def kind_question() -> Question:
     """Return the first question, on which all others depend."""
 
-    def read(text: str, _: Answers) -> Kind:
+    def read(text: str, _: Answers) -> RobotKind:
         if text not in KINDS:
             raise AnswerError(f"allowed: {', '.join(KINDS)}")
         return kind_of(text)
@@ -54,13 +54,13 @@ def kind_question() -> Question:
     return Question("kind", "Kind of robot", read, lambda _: next(iter(KINDS)))
 
 
-def questions(folder: Path, name: str, kind: Kind) -> list[Question]:
+def questions(folder: Path, name: str, kind: RobotKind) -> list[Question]:
     """Return the questions about a kind in their order; files are looked for in `folder` first."""
     drives = _drives(folder, name, kind)
     return [*drives, *_geometry(kind), *_limits(kind), *(_turning(kind) if kind.turns else [])]
 
 
-def _drives(folder: Path, name: str, kind: Kind) -> list[Question]:
+def _drives(folder: Path, name: str, kind: RobotKind) -> list[Question]:
     """Return the questions on winches, buses and drives."""
     usual = kind.robot.axes[0].winch.profile
     buses = [
@@ -81,7 +81,7 @@ def _drives(folder: Path, name: str, kind: Kind) -> list[Question]:
     ]  # fmt: skip
 
 
-def _geometry(kind: Kind) -> list[Question]:
+def _geometry(kind: RobotKind) -> list[Question]:
     """Return the questions on where the cables leave the frame and end on the platform."""
     return [
         Question("frame_m", f"Frame: {kind.sides} (m)", _size(kind), lambda _: _text(kind.frame_m)),
@@ -91,7 +91,7 @@ def _geometry(kind: Kind) -> list[Question]:
     ]
 
 
-def _limits(kind: Kind) -> list[Question]:
+def _limits(kind: RobotKind) -> list[Question]:
     """Return the questions on torques, tensions, mass and motion."""
     platform, limits = kind.platform, kind.robot.limits
     torque, highest, least = (
@@ -137,7 +137,7 @@ def _limits(kind: Kind) -> list[Question]:
     ]  # fmt: skip
 
 
-def _turning(kind: Kind) -> list[Question]:
+def _turning(kind: RobotKind) -> list[Question]:
     """Return the questions on targets that are turned; angles are asked in degrees."""
     platform = kind.platform
 
@@ -174,7 +174,7 @@ def _speed_share(answers: Answers) -> float:
 
 
 def places(
-    kind: Kind,
+    kind: RobotKind,
     low_m: tuple[float, ...],
     high_m: tuple[float, ...],
     stand: Callable[[Answers], tuple[float, ...]],
@@ -202,7 +202,7 @@ def places(
     ]
 
 
-def _exit(i: int, kind: Kind) -> Question:
+def _exit(i: int, kind: RobotKind) -> Question:
     def default(answers: Answers) -> str:
         """Return the shipped robot's exit point, its frame stretched to the size that is wanted."""
         return _text(kind.exits_m(answers["frame_m"])[i])
@@ -213,7 +213,7 @@ def _exit(i: int, kind: Kind) -> Question:
     )
 
 
-def _side(kind: Kind) -> Question:
+def _side(kind: RobotKind) -> Question:
     if kind.turns_freely:
         text = "Side of the triangle on which the cables end (m; 0 if all end in one point)"
     else:
@@ -227,7 +227,7 @@ def _side(kind: Kind) -> Question:
     return Question("side_m", text, _number(least, 10.0), default)
 
 
-def _anchor(i: int, kind: Kind) -> Question:
+def _anchor(i: int, kind: RobotKind) -> Question:
     def facing(answers: Answers) -> str:
         """Return the corner that faces the exit point, the cables in their order around."""
         n = kind.cables
@@ -333,7 +333,7 @@ def _point(size: int) -> Callable[[str, Answers], tuple[float, ...]]:
     return read
 
 
-def _size(kind: Kind) -> Callable[[str, Answers], tuple[float, ...]]:
+def _size(kind: RobotKind) -> Callable[[str, Answers], tuple[float, ...]]:
     def read(text: str, answers: Answers) -> tuple[float, ...]:
         size = _point(kind.size)(text, answers)
         if not all(x > 0.0 for x in size):

@@ -63,7 +63,7 @@ def teleoperate(settings: TeleopSettings, out: Output) -> None:
         if name not in (status["robot"], description.get("robot"), description.get("reference")):
             raise BadInputError(f"{settings.robot}: {daemon.where} runs {status['robot']}")
         host, port = stream_address(status, settings)
-        program, wanted = _program_of(description)
+        program, arguments = _program_of(description)
         directions = directions_of(description)
         with (
             _ended_by_signals() as ended,
@@ -71,7 +71,7 @@ def teleoperate(settings: TeleopSettings, out: Output) -> None:
             daemon.control() as control,
             _stream(host, port, daemon, control.token) as stream,
         ):
-            control.post("/program", {"program": program, "wanted": wanted})
+            control.post("/program", {"program": program, "wanted": arguments})
             number = description["programs"].index(program)
             session = TeleopSession(stream, device, settings.scale, number, directions[0])
             out.note(f"{program} by {host}:{port}; {device.hint}")

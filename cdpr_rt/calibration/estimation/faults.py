@@ -43,7 +43,7 @@ class Fault:
     alike: tuple[int, ...] = ()
     """Other cables of which it might as well be, by lengths alone."""
 
-    def told(self) -> dict[str, object]:
+    def as_json(self) -> dict[str, object]:
         """Return it for JSON, cables and poses counted from 1."""
         return {
             "kind": self.kind,

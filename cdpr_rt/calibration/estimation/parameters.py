@@ -19,10 +19,17 @@ from cdpr_rt.errors import InvalidRequestError
 from cdpr_rt.robots.kinematics.cable_kernel import ANCHOR, RADIUS
 from cdpr_rt.robots.platform_model import PlatformModel, platform_model_of
 
-Kind = Literal["exit", "offset", "drum", "anchor", "pulley", "elongation"]
-KINDS: Final[tuple[Kind, ...]] = ("exit", "offset", "drum", "anchor", "pulley", "elongation")
-USUAL: Final[tuple[Kind, ...]] = ("exit", "offset", "drum", "elongation")
-_ROWS: Final[dict[Kind, tuple[int, ...]]] = {
+ParameterKind = Literal["exit", "offset", "drum", "anchor", "pulley", "elongation"]
+KINDS: Final[tuple[ParameterKind, ...]] = (
+    "exit",
+    "offset",
+    "drum",
+    "anchor",
+    "pulley",
+    "elongation",
+)
+USUAL: Final[tuple[ParameterKind, ...]] = ("exit", "offset", "drum", "elongation")
+_ROWS: Final[dict[ParameterKind, tuple[int, ...]]] = {
     "exit": (0, 1, 2), "offset": (3,), "drum": (4,), "anchor": (5, 6, 7), "pulley": (8,),
 }  # fmt: skip
 CABLE_ROWS: Final = 9
@@ -73,7 +80,7 @@ class CableGeometry:
     compliance_1_N: FloatArray
     """1/EA of each cable by the file, 0 where cables are taken for rigid; (n,)."""
     weight_N_m: FloatArray
-    identified: tuple[Kind, ...] = USUAL
+    identified: tuple[ParameterKind, ...] = USUAL
     knowledge: Knowledge = field(default_factory=Knowledge)
     cable: FloatArray = field(default_factory=lambda: np.zeros((0, CABLE_ROWS)))
     elongation: float = 0.0

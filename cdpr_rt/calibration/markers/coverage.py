@@ -57,7 +57,7 @@ class Coverage:
         many = len(self.ids) if share is None else f"{share:.0%} of the"
         return [f"{many} markers seen", *self.advice]
 
-    def told(self) -> dict[str, Any]:
+    def as_json(self) -> dict[str, Any]:
         """Return it for JSON."""
         return {
             "share_seen": self.share_seen,

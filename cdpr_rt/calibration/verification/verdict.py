@@ -164,20 +164,21 @@ def predicted_std(found: Fit, poses: FloatArray, relative: bool = False) -> Floa
 
 
 @dataclass(frozen=True)
-class Change:
+class CalibrationChange:
     """By how much a calibration changes a robot's file, all parameters together."""
 
     moved_m: float
     """Root mean square of by how much positions in the workspace move."""
     chi_squared: float
-    told: float
+    degrees_of_freedom: float
     """How many parameters the observations tell; chi squared on the average if the file is right.
     """
 
     @property
     def chance(self) -> float:
         """How often noise alone would change as much."""
-        return float(chi2.sf(self.chi_squared, self.told)) if self.told > 0.0 else 1.0
+        degrees = self.degrees_of_freedom
+        return float(chi2.sf(self.chi_squared, degrees)) if degrees > 0.0 else 1.0
 
     @property
     def significant(self) -> bool:
@@ -185,7 +186,7 @@ class Change:
         return self.chance < _CHANCE
 
 
-def change_of(found: Fit, poses: FloatArray, relative: bool, larger: float) -> Change:
+def change_of(found: Fit, poses: FloatArray, relative: bool, larger: float) -> CalibrationChange:
     """Return how far a fit is from the robot's file, at poses (M, 4, 3).
 
     With parameters v, their covariance C and that known before K, v^T C^-1 v would be near to chi
@@ -195,11 +196,13 @@ def change_of(found: Fit, poses: FloatArray, relative: bool, larger: float) -> C
     geometry = found.geometry
     v, known, size = geometry.values(), geometry.known_std(), geometry.size
     covariance = larger**2 * found.uncertainty[:size, :size]
-    told = size - float((np.diag(found.covariance)[:size] / found.inflation / known**2).sum())
+    degrees = size - float((np.diag(found.covariance)[:size] / found.inflation / known**2).sum())
     scaled = covariance / np.outer(known, known)
     squares = float(v / known @ np.linalg.solve(scaled, v / known)) if size else 0.0
     A = _by_parameters(found, poses, relative)[:, : geometry.coordinates]
-    return Change(float(np.sqrt(((A @ v) ** 2).sum() / len(poses))), squares, max(told, 0.0))
+    return CalibrationChange(
+        float(np.sqrt(((A @ v) ** 2).sum() / len(poses))), squares, max(degrees, 0.0)
+    )
 
 
 def _by_parameters(found: Fit, poses: FloatArray, relative: bool) -> FloatArray:

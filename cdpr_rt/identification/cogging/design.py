@@ -25,7 +25,7 @@ FIXED = 7
 
 
 @dataclass(frozen=True)
-class Layout:
+class ColumnLayout:
     """Order of the columns: the fixed ones, then cosine and sine of each order."""
 
     orders: tuple[int, ...]
@@ -55,7 +55,7 @@ class Normal:
 class Equations:
     """Normal equations by (fold, kind); kinds are numbered by run class and sliding or creeping."""
 
-    layout: Layout
+    layout: ColumnLayout
     folds: int = 0
     kinds: int = 0
     parts: dict[tuple[int, int], Normal] = field(default_factory=dict)
@@ -94,7 +94,7 @@ def _harmonics(
                     out[r - first, FIXED + column] += bump[w] * waves[column]
 
 
-def matrix(windows: Windows, layout: Layout, first: int, last: int) -> FloatArray:
+def matrix(windows: Windows, layout: ColumnLayout, first: int, last: int) -> FloatArray:
     """Return the regression's columns for windows `first` up to `last`, (last - first, columns)."""
     rows = slice(first, last)
     out = np.zeros((last - first, layout.columns))
@@ -137,7 +137,7 @@ def folds(windows: Sequence[Windows]) -> list[FloatArray]:
     return numbered
 
 
-def accumulate(windows: Sequence[Windows], layout: Layout) -> Equations:
+def accumulate(windows: Sequence[Windows], layout: ColumnLayout) -> Equations:
     """Sum the normal equations of all runs, by fold and kind, in chunks of bounded memory."""
     kind, fold = kinds(windows), folds(windows)
     equations = Equations(layout)

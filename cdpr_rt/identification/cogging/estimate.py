@@ -9,7 +9,7 @@ import numpy as np
 
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.identification.cogging import design
-from cdpr_rt.identification.cogging.design import Layout
+from cdpr_rt.identification.cogging.design import ColumnLayout
 from cdpr_rt.identification.cogging.sweep import TWO_PI
 from cdpr_rt.identification.cogging.windows import IntArray, Windows
 
@@ -50,10 +50,10 @@ class Rows:
 
 
 @dataclass(frozen=True)
-class Fit:
+class HarmonicFit:
     """Coefficients of the used columns and the extra ones behind, with their covariance."""
 
-    layout: Layout
+    layout: ColumnLayout
     used: list[int]
     beta: FloatArray
     covariance: FloatArray
@@ -82,7 +82,7 @@ class Fit:
         return float(np.sqrt(max(self.covariance[i, i], 0.0)))
 
 
-def gather(windows: Sequence[Windows], layout: Layout) -> Rows:
+def gather(windows: Sequence[Windows], layout: ColumnLayout) -> Rows:
     """Collect the rows in which the rotor moves with the ramp."""
     xs, ys, accelerations, ks, ds, ts, cs = [], [], [], [], [], [], []
     clusters = 0
@@ -104,12 +104,12 @@ def gather(windows: Sequence[Windows], layout: Layout) -> Rows:
 
 def fit(
     windows: Sequence[Windows],
-    layout: Layout,
+    layout: ColumnLayout,
     used: list[int],
     priors: list[Prior],
     lag_prior: tuple[float, float],
     inertia_kg_m2: float,
-) -> Fit:
+) -> HarmonicFit:
     """Fit the used columns, all harmonics and the static lag by Gauss-Newton steps.
 
     `lag_prior` is mean and standard deviation in rad. In slow runs the noise of the acceleration
@@ -136,7 +136,7 @@ def fit(
             inertia = float(beta[0]) if used[0] == design.INERTIA else inertia
     score_covariance = _score_covariance(x * (weight * residual)[:, None], rows.cluster)
     covariance = inverse @ (score_covariance + np.diag(precision)) @ inverse
-    return Fit(layout, columns, beta, covariance, lag + float(beta[-_EXTRA]), residual)
+    return HarmonicFit(layout, columns, beta, covariance, lag + float(beta[-_EXTRA]), residual)
 
 
 def _prior_arrays(columns: list[int], priors: list[Prior]) -> tuple[FloatArray, FloatArray]:
@@ -158,7 +158,7 @@ def _inverse(matrix: FloatArray) -> FloatArray:
 
 
 def _linearised(
-    rows: Rows, layout: Layout, columns: list[int], beta: FloatArray, lag: float
+    rows: Rows, layout: ColumnLayout, columns: list[int], beta: FloatArray, lag: float
 ) -> FloatArray:
     """Return the used columns, harmonics shifted by the lag so far, and the extra columns.
 

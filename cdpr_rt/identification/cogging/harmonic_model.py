@@ -11,8 +11,8 @@ import numpy as np
 from cdpr_rt.arrays import FloatArray, rms
 from cdpr_rt.control.compensation import FrictionFeedforward
 from cdpr_rt.identification.cogging import design
-from cdpr_rt.identification.cogging.design import Equations, Layout
-from cdpr_rt.identification.cogging.estimate import Fit, Prior, fit
+from cdpr_rt.identification.cogging.design import ColumnLayout, Equations
+from cdpr_rt.identification.cogging.estimate import HarmonicFit, Prior, fit
 from cdpr_rt.identification.cogging.friction import STARTS, FrictionRun, FrictionShape, fit_shape
 from cdpr_rt.identification.cogging.result import Harmonic, HarmonicResult, likely_cause
 from cdpr_rt.identification.cogging.selection import (
@@ -96,7 +96,7 @@ def _identify(legs: Sequence[SweepData], start: _Start) -> HarmonicResult:
         if not any(np.any(w.moving & (w.direction == sign)) for w in windows):
             raise IdentificationError(f"the rotor was never seen moving with {word} angle")
     shape = start.before.shape if start.before else FrictionShape()
-    every = Layout(tuple(range(1, MAX_ORDER + 1)), shape)
+    every = ColumnLayout(tuple(range(1, MAX_ORDER + 1)), shape)
     equations = design.accumulate(windows, every)
     choice, beta, inertia = _choose(equations)
     inertia = inertia or start.inertia_kg_m2
@@ -115,7 +115,7 @@ def _identify(legs: Sequence[SweepData], start: _Start) -> HarmonicResult:
     for _ in range(_ROUNDS):
         shape = _shape(runs, start, choice.orders, beta, inertia, starts) or shape
         starts = [shape]
-        fitted = fit(windows, Layout(choice.orders, shape), used, priors, lag, inertia)
+        fitted = fit(windows, ColumnLayout(choice.orders, shape), used, priors, lag, inertia)
         beta = fitted.beta[len(used) : len(fitted.used)]
         quick = quick and _plausible(fitted.value(design.INERTIA), start)
         used = [c for c in used if c != design.INERTIA or quick]
@@ -169,7 +169,7 @@ def _shape(
     starts: list[FrictionShape],
 ) -> FrictionShape | None:
     """Find the friction's shape from short windows, with the cogging found so far taken off."""
-    layout = Layout(orders, FrictionShape())
+    layout = ColumnLayout(orders, FrictionShape())
     motions = []
     for run in runs:
         noise = encoder_noise_rad(run)
@@ -208,12 +208,12 @@ def _priors(before: HarmonicResult | None, quick: bool) -> list[Prior]:
     return priors + [Prior(c, m, max(1e-9, abs(m) * share)) for c, m, share in known]
 
 
-def _estimate(fitted: Fit, column: int) -> ConfidenceInterval:
+def _estimate(fitted: HarmonicFit, column: int) -> ConfidenceInterval:
     return ConfidenceInterval(fitted.value(column), _CONFIDENCE * fitted.deviation(column))
 
 
 def _result(
-    fitted: Fit, windows: list[Windows], choice: OrderSelection, start: _Start, quick: bool
+    fitted: HarmonicFit, windows: list[Windows], choice: OrderSelection, start: _Start, quick: bool
 ) -> HarmonicResult:
     """Assemble the result."""
     layout, before = fitted.layout, start.before
@@ -261,7 +261,7 @@ def _result(
     )
 
 
-def _harmonic(fitted: Fit, which: int, pole_pairs: int) -> Harmonic:
+def _harmonic(fitted: HarmonicFit, which: int, pole_pairs: int) -> Harmonic:
     """Return one order with the confidence of amplitude and phase from both coefficients."""
     order = fitted.layout.orders[which]
     column = fitted.layout.order(which)

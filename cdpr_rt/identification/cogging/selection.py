@@ -10,7 +10,7 @@ import numpy as np
 import scipy
 
 from cdpr_rt.arrays import FloatArray
-from cdpr_rt.identification.cogging.design import Equations, Layout, Normal
+from cdpr_rt.identification.cogging.design import ColumnLayout, Equations, Normal
 from cdpr_rt.identification.cogging.windows import IntArray
 
 _MOST = 40
@@ -49,11 +49,11 @@ def _by_fold(equations: Equations, weight: FloatArray) -> list[Normal]:
     return sums
 
 
-def _empty(layout: Layout) -> Normal:
+def _empty(layout: ColumnLayout) -> Normal:
     return Normal(np.zeros((layout.columns, layout.columns)), np.zeros(layout.columns))
 
 
-def _sum(parts: Sequence[Normal], layout: Layout) -> Normal:
+def _sum(parts: Sequence[Normal], layout: ColumnLayout) -> Normal:
     out = _empty(layout)
     for part in parts:
         out.xx += part.xx
@@ -141,7 +141,7 @@ def choose(equations: Equations, fixed: list[int], weight: FloatArray) -> OrderS
     )
 
 
-def _rank(train: Normal, fixed: list[int], layout: Layout) -> IntArray:
+def _rank(train: Normal, fixed: list[int], layout: ColumnLayout) -> IntArray:
     """Return the places of the orders by falling significance."""
     columns = fixed + [c for i in range(len(layout.orders)) for c in layout.order(i)]
     lower, scale = _factor(train, columns)
@@ -156,7 +156,7 @@ def _rank(train: Normal, fixed: list[int], layout: Layout) -> IntArray:
 
 
 def _path(
-    train: Normal, test: Normal, fixed: list[int], layout: Layout, ranking: IntArray
+    train: Normal, test: Normal, fixed: list[int], layout: ColumnLayout, ranking: IntArray
 ) -> FloatArray:
     """Return the mean squared (weighted) error on held-back rows with 0, 1, ... orders."""
     most = min(_MOST, ranking.size)

@@ -31,7 +31,7 @@ class NotThePoseError(TripError):
 
 
 @dataclass(frozen=True)
-class Held:
+class TargetNotReached:
     """A platform that has not come to its target in time, and is held where it is."""
 
     place: FloatArray
@@ -69,7 +69,7 @@ class PoseReader(Protocol):
 class PlatformOperator(PoseReader, Protocol):
     """Moves a platform as well."""
 
-    def go(self, place: FloatArray) -> Held | None:
+    def go(self, place: FloatArray) -> TargetNotReached | None:
         """Take it to a place (d,); None where it has come there.
 
         Raises PoseRefusedError, TripError where motion is ended.
@@ -162,7 +162,9 @@ def measure_poses(
             raise TripError(f"{measured.failures} poses in turn, the last {what}, {failure}")
 
 
-def _go(operator: PlatformOperator, place: FloatArray, between: FloatArray) -> Held | None:
+def _go(
+    operator: PlatformOperator, place: FloatArray, between: FloatArray
+) -> TargetNotReached | None:
     try:
         return operator.go(place)
     except PoseRefusedError:
@@ -173,7 +175,7 @@ def _go(operator: PlatformOperator, place: FloatArray, between: FloatArray) -> H
 
 
 def _read(
-    operator: PlatformOperator, place: FloatArray, held: Held | None, measured: Measured
+    operator: PlatformOperator, place: FloatArray, held: TargetNotReached | None, measured: Measured
 ) -> str:
     """Read a pose where the platform has come to; return what was wrong, empty for nothing."""
     try:

@@ -10,7 +10,7 @@ from typing import Any
 
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.control.tuning import PidDesign
-from cdpr_rt.control.validation import Metrics, evaluate, floor, ratios, worst
+from cdpr_rt.control.validation import ValidationMetrics, evaluate, floor, ratios, worst
 from cdpr_rt.identification.rawlog import RawLog, read_raw_log
 from cdpr_rt.procedures.measurement import Recording, recording
 
@@ -23,7 +23,7 @@ AngleOf = Callable[[RawLog, Recording], FloatArray]
 """Gives the angle from the index on which a recorded pass is judged, (samples,)."""
 
 
-def judge(paths: Sequence[Path], angle_of: AngleOf | None) -> Metrics:
+def judge(paths: Sequence[Path], angle_of: AngleOf | None) -> ValidationMetrics:
     """Return the figures of the passes, the worst of each; on the encoder's angle by default."""
     figures = []
     for path in paths:
@@ -65,5 +65,5 @@ def lowest(
     )
 
 
-def _figures(metrics: Metrics) -> dict[str, float]:
+def _figures(metrics: ValidationMetrics) -> dict[str, float]:
     return {name: getattr(metrics, name) for name in FIGURES}

@@ -33,7 +33,7 @@ class Identified:
     """What both methods found."""
 
     thesis: ThesisResult
-    better: HarmonicResult
+    harmonic: HarmonicResult
 
 
 def legs(paths: list[Path]) -> list[SweepData]:
@@ -48,21 +48,21 @@ def identify(winch: Winch, latency_s: float, paths: Paths) -> Identified:
     Raises RawLogError and IdentificationError.
     """
     found = identify_first(winch, latency_s, paths)
-    second = SecondPass(found.better, legs(paths.passes("fast")))
+    second = SecondPass(found.harmonic, legs(paths.passes("fast")))
     for number in range(MOST_ROUNDS):
         recorded = paths.passes(round_name(number))
         if not recorded or second.done:
             break
         second.add(legs(recorded))
-    return dataclasses.replace(found, better=second.best)
+    return dataclasses.replace(found, harmonic=second.best)
 
 
 def identify_first(winch: Winch, latency_s: float, paths: Paths) -> Identified:
     """Identify from the sweeps and the fast legs alone."""
     sweep, fast = (legs(paths.passes(name)) for name in ("sweep", "fast"))
     inertia, pole_pairs = winch.motor.rotor_inertia_kg_m2, winch.motor.poles // 2
-    better = identify_harmonic_model(sweep + fast, inertia, latency_s, pole_pairs)
-    return Identified(identify_thesis(sweep), better)
+    harmonic = identify_harmonic_model(sweep + fast, inertia, latency_s, pole_pairs)
+    return Identified(identify_thesis(sweep), harmonic)
 
 
 def round_name(number: int) -> str:
@@ -72,7 +72,7 @@ def round_name(number: int) -> str:
 
 def store_profile(winch: Winch, identity: DriveIdentity, found: Identified, paths: Paths) -> None:
     """Write the cogging profile."""
-    better = found.better
+    harmonic = found.harmonic
     names = ("sweep", "fast", *(round_name(number) for number in range(MOST_ROUNDS)))
     raw = [path.name for name in names for path in paths.passes(name)]
     CoggingProfile(
@@ -81,13 +81,13 @@ def store_profile(winch: Winch, identity: DriveIdentity, found: Identified, path
         identity=identity,
         created=datetime.now(UTC).replace(microsecond=0),
         raw_data=raw,
-        inertia_kg_m2=better.inertia_kg_m2.value,
-        harmonics=stored_harmonics(better),
-        residual_rms_Nm=better.residual_rms_Nm,
+        inertia_kg_m2=harmonic.inertia_kg_m2.value,
+        harmonics=stored_harmonics(harmonic),
+        residual_rms_Nm=harmonic.residual_rms_Nm,
         repaired_fraction=found.thesis.repaired_fraction,
-        coverage=better.coverage,
+        coverage=harmonic.coverage,
         thesis=stored_thesis(found.thesis),
-        better=stored_harmonic_model(better),
+        better=stored_harmonic_model(harmonic),
     ).save(paths.profile)
 
 

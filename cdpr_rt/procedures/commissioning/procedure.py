@@ -137,7 +137,7 @@ class Commissioning:
             "encoder_counts_per_turn": boot.counts_per_turn,
             "rated_torque_Nm": boot.rated_torque_Nm,
             "torque_step_Nm": session.torque_step_Nm,
-            "inertia_kg_m2": found.better.inertia_kg_m2.value,
+            "inertia_kg_m2": found.harmonic.inertia_kg_m2.value,
             "pid": [dataclasses.asdict(design) for design in designs],
             "bandwidth_Hz": bandwidth_Hz,
             "bandwidths_Hz": wanted,
@@ -212,7 +212,7 @@ class Commissioning:
         """Record ramps under compensation and refine, until they do not get smoother."""
         session = self._session
         second = session.run_blocking(
-            lambda: SecondPass(found.better, legs(self._paths.passes("fast")))
+            lambda: SecondPass(found.harmonic, legs(self._paths.passes("fast")))
         )
         passes = both_ways(VALIDATION_SPEED_RAD_S, _SHORT_LEAD_IN_RAD, 1)
         for number in range(self._plan.rounds):
@@ -225,7 +225,7 @@ class Commissioning:
             recorded = self._measure.track(round_name(number), design, known, passes)
             session.disable()
             session.run_blocking(partial(_refine, second, recorded))
-        return dataclasses.replace(found, better=second.best)
+        return dataclasses.replace(found, harmonic=second.best)
 
     def _design(self, inertia_kg_m2: float, bandwidth_Hz: float) -> PidDesign:
         winch, period_s = self._session.winch, self._session.device.period_s

@@ -119,31 +119,31 @@ def assemble(
 
 def identification(found: Identified) -> dict[str, Any]:
     """Return what was identified, in plain values."""
-    better, thesis = found.better, found.thesis
-    harmonics = better.harmonics
-    friction = better.friction
+    harmonic, thesis = found.harmonic, found.thesis
+    harmonics = harmonic.harmonics
+    friction = harmonic.friction
     return {
-        "orders": list(better.orders),
-        "amplitudes_Nm": list(better.amplitudes_Nm),
+        "orders": list(harmonic.orders),
+        "amplitudes_Nm": list(harmonic.amplitudes_Nm),
         "confidence_Nm": [h.amplitude_Nm.half_width for h in harmonics],
         "phases_deg": [h.phase_deg.value for h in harmonics],
         "per_pole_pair": [h.per_pole_pair for h in harmonics],
         "hints": [h.hint for h in harmonics],
-        "residual_rms_Nm": better.residual_rms_Nm,
+        "residual_rms_Nm": harmonic.residual_rms_Nm,
         "repaired_fraction": thesis.repaired_fraction,
-        "coverage": better.coverage,
-        "excluded_fraction": better.excluded_fraction,
-        "held_back_error_Nm": better.held_out_error_Nm,
-        "coulomb_forward_Nm": better.coulomb_forward_Nm.value,
-        "coulomb_backward_Nm": better.coulomb_backward_Nm.value,
-        "viscous_Nms_rad": better.viscous_Nms_rad.value,
+        "coverage": harmonic.coverage,
+        "excluded_fraction": harmonic.excluded_fraction,
+        "held_back_error_Nm": harmonic.held_out_error_Nm,
+        "coulomb_forward_Nm": harmonic.coulomb_forward_Nm.value,
+        "coulomb_backward_Nm": harmonic.coulomb_backward_Nm.value,
+        "viscous_Nms_rad": harmonic.viscous_Nms_rad.value,
         "stribeck_forward_Nm": friction.stribeck_forward_Nm,
         "stribeck_backward_Nm": friction.stribeck_backward_Nm,
         "stribeck_speed_rad_s": friction.stribeck_speed_rad_s,
-        "inertia_kg_m2": better.inertia_kg_m2.value,
-        "inertia_measured": better.inertia_measured,
-        "latency_s": better.latency_s.value,
-        "lag_deg": math.degrees(better.lag_rad.value),
+        "inertia_kg_m2": harmonic.inertia_kg_m2.value,
+        "inertia_measured": harmonic.inertia_measured,
+        "latency_s": harmonic.latency_s.value,
+        "lag_deg": math.degrees(harmonic.lag_rad.value),
         "thesis_mean_Nm": thesis.mean_Nm,
     }
 

@@ -19,7 +19,7 @@ from cdpr_rt.programs.bumpless_transfer import BumplessTransfer
 from cdpr_rt.programs.platform.arrival import NEAR_SHARE, Arrival, NEAR_m
 from cdpr_rt.programs.platform.paths.path_store import PathStore
 from cdpr_rt.programs.program_base import CommandedProgram
-from cdpr_rt.refusal import Refusal, RefusalCode
+from cdpr_rt.refusal import CommandRefusal, RefusalCode
 from cdpr_rt.robots.interface import PlatformControl, RobotModel
 from cdpr_rt.robots.kinematics.free_rotation_kernel import SWINGS_m
 from cdpr_rt.robots.kinematics.pose_setpoint import pose_of_coordinates, write_quaternion
@@ -223,9 +223,9 @@ class PlatformProgram(CommandedProgram):
         """Raise ProgramError where the platform is not to be moved to a pose."""
         if self._parts.not_calibrated_reason:
             why = {"why": self._parts.not_calibrated_reason}
-            raise ProgramError(Refusal(RefusalCode.NOT_CALIBRATED, self.name, arguments=why))
+            raise ProgramError(CommandRefusal(RefusalCode.NOT_CALIBRATED, self.name, arguments=why))
         if not self._parts.tight:
-            raise ProgramError(Refusal(RefusalCode.NOT_TIGHT, self.name))
+            raise ProgramError(CommandRefusal(RefusalCode.NOT_TIGHT, self.name))
 
     @property
     def pose(self) -> FloatArray | None:

@@ -23,7 +23,7 @@ from cdpr_rt.programs.platform.platform_program import (
     distance_m,
     synchronise,
 )
-from cdpr_rt.refusal import Refusal, RefusalCode
+from cdpr_rt.refusal import CommandRefusal, RefusalCode
 from cdpr_rt.robots.kinematics.pose import place_text
 
 _SLOWEST_m_s = 1e-4
@@ -150,7 +150,7 @@ class PoseProgram(PlatformProgram):
             if aim is None:
                 left = {"left": "target", "instead": "position_m"}
                 code = RefusalCode.NOTHING_LEFT
-                raise ProgramError(Refusal(code, self.name, {"resume": True}, left))
+                raise ProgramError(CommandRefusal(code, self.name, {"resume": True}, left))
             self._require_way(aim, {"resume": True})
         return what, aim, speed
 
@@ -344,5 +344,5 @@ class PoseProgram(PlatformProgram):
         stopping_position(control.position, control.velocity, self._slowing, self._rest)
 
 
-def _not_feasible(asked: Mapping[str, Any], why: str) -> Refusal:
-    return Refusal(RefusalCode.NOT_FEASIBLE, "pose", asked, {"why": why})
+def _not_feasible(asked: Mapping[str, Any], why: str) -> CommandRefusal:
+    return CommandRefusal(RefusalCode.NOT_FEASIBLE, "pose", asked, {"why": why})

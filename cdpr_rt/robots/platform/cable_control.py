@@ -35,7 +35,7 @@ from cdpr_rt.robots.platform.loop_design import designed_loop
 from cdpr_rt.robots.platform.motor_learning import MotorLearning
 from cdpr_rt.robots.platform.shaped_setpoint import ShapedSetpoint
 from cdpr_rt.robots.platform_model import PlatformModel
-from cdpr_rt.robots.tension.tension_distribution import TensionDistribution, tension_distribution
+from cdpr_rt.robots.tension.tension_distribution import TensionSolver, tension_distribution
 from cdpr_rt.robots.tension.tension_split import OK, split
 from cdpr_rt.robots.workspace import SHARES, infeasibility_text
 
@@ -162,7 +162,7 @@ class CableControl:
         """Fix the arrays of the kernels that have the cables exert the force, and the motors."""
         model, motors, scale = self.model, self._motors, self.model.wrench_scale
         n, d, method = model.kinematics.n, model.size, model.platform.tension_distribution
-        self._distribution: TensionDistribution | None = None  # the split's own
+        self._distribution: TensionSolver | None = None  # the split's own
         if method != "minimum-deviation":
             self._distribution = tension_distribution(method, self.low_N, self.high_N, scale)
         plan, size = np.array([self.low_N, self.high_N]), max(n, 8)

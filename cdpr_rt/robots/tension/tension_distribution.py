@@ -29,7 +29,7 @@ class TensionError(ControlError):
 _FEASIBLE, _SUBSTITUTED, _NEAREST, _SINGULAR, _REFUSED = TensionOutcome
 
 
-class TensionDistribution(ABC):
+class TensionSolver(ABC):
     """Tensions that carry a wrench within their bounds, by one method.
 
     Keeps nothing from one call to the next: the same W, w_e and bounds give the same tensions.
@@ -116,7 +116,7 @@ class TensionDistribution(ABC):
         """Write tensions t0 + N' lambda within bounds into `t`; NEAREST where there are none."""
 
 
-class MinimumDeviation(TensionDistribution):
+class MinimumDeviation(TensionSolver):
     """The tensions within bounds nearest to wanted ones; continuous in W, w_e and bounds."""
 
     def _choose(self, null_directions: int, t: FloatArray) -> TensionOutcome:
@@ -124,7 +124,7 @@ class MinimumDeviation(TensionDistribution):
         return _FEASIBLE if found else _NEAREST
 
 
-class ClosedForm(TensionDistribution):
+class ClosedForm(TensionSolver):
     """Pott's closed form about the wanted tensions; where it finds none, those nearest to them.
 
     Continuous but where the cable changes that it puts on a bound, and where it finds none.
@@ -137,7 +137,7 @@ class ClosedForm(TensionDistribution):
         return _SUBSTITUTED if found else _NEAREST
 
 
-class PolygonPoint(TensionDistribution):
+class PolygonPoint(TensionSolver):
     """A point of the polygon of all tensions within bounds, with at most two null directions.
 
     The least sum (1-norm) is at a vertex, which changes by steps; the least sum of squares (2-norm)
@@ -180,10 +180,10 @@ def tension_distribution(
     high_N: FloatArray,
     wrench_scale: FloatArray,
     wanted_N: FloatArray | None = None,
-) -> TensionDistribution:
+) -> TensionSolver:
     """Return the tension distribution that `method` names, one of METHODS.
 
-    `wrench_scale` (d,) has one entry for each controlled direction, see `TensionDistribution`;
+    `wrench_scale` (d,) has one entry for each controlled direction, see `TensionSolver`;
     `wanted_N` (n,) belongs to "minimum-deviation". Raises TensionError.
     """
     if (method == "minimum-deviation") != (wanted_N is not None):

@@ -16,7 +16,7 @@ from cdpr_rt.core.states import LoopState, Reaction, Transition
 from cdpr_rt.core.task import Task
 from cdpr_rt.errors import ControlError
 from cdpr_rt.programs.base import Program
-from cdpr_rt.refusal import Refusal, refusal_of
+from cdpr_rt.refusal import CommandRefusal, refusal_of
 from cdpr_rt.runtime.control_loop.engine import HOLD, Engine
 from cdpr_rt.runtime.control_loop.lifecycle import RefusedError
 from cdpr_rt.runtime.control_loop.transition_runner import Steps, TransitionRunner
@@ -164,9 +164,9 @@ class CommandDispatcher:
         self._engine.machine.clock.cancel(put_off.task)
         self._reply(_number(put_off.command), f"given up: {why}")
 
-    def _reply(self, number: int, error: Refusal | str) -> None:
+    def _reply(self, number: int, error: CommandRefusal | str) -> None:
         state, text = self._life.state.label, str(error)
-        refusal = {"refusal": error.as_json()} if isinstance(error, Refusal) else {}
+        refusal = {"refusal": error.as_json()} if isinstance(error, CommandRefusal) else {}
         # letters may take a dozen bytes each
         for most, more in ((_MOST_TEXT, refusal), (_MOST_TEXT, {}), (_SHORT_TEXT, {})):
             reply = {"to": number, "ok": not text, "text": text[:most], "state": state, **more}

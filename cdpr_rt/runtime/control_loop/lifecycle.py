@@ -8,7 +8,7 @@ from typing import Any
 
 from cdpr_rt.core.states import ALLOWED, LoopState, Transition
 from cdpr_rt.errors import ControlError
-from cdpr_rt.refusal import Refusal, RefusalCode
+from cdpr_rt.refusal import CommandRefusal, RefusalCode
 
 _MOST_CHARACTERS = 2000
 
@@ -38,7 +38,7 @@ class Lifecycle:
     def not_in_state(self, command: str, *allowed: LoopState) -> RefusedError:
         """Return the refusal of a command that is only allowed in other states."""
         states = {"state": self.state.label, "allowed": [state.label for state in allowed]}
-        return RefusedError(Refusal(RefusalCode.NOT_IN_STATE, command, arguments=states))
+        return RefusedError(CommandRefusal(RefusalCode.NOT_IN_STATE, command, arguments=states))
 
     def enter(self, state: LoopState) -> None:
         """Go to `state`."""

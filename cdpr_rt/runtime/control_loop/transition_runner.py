@@ -7,12 +7,12 @@ from typing import Any
 
 from cdpr_rt.core.task import Task
 from cdpr_rt.errors import ControlError
-from cdpr_rt.refusal import Refusal, refusal_of
+from cdpr_rt.refusal import CommandRefusal, refusal_of
 from cdpr_rt.runtime.control_loop.engine import Engine
 from cdpr_rt.runtime.control_loop.lifecycle import RefusedError
 
 Steps = Iterator[None]
-Listener = Callable[[Refusal | str], None]
+Listener = Callable[[CommandRefusal | str], None]
 """Called at the end of a transition with the error, "" where it succeeded."""
 
 
@@ -63,13 +63,13 @@ class TransitionRunner:
             self._end(steps, f"{type(error).__name__}: {error}")
             raise
 
-    def _end(self, steps: Steps, error: Refusal | str) -> None:
+    def _end(self, steps: Steps, error: CommandRefusal | str) -> None:
         if self._steps is steps:  # it may have begun another
             self._steps = None
             self._tell(error)
         self._engine.life.changed = True
 
-    def _tell(self, error: Refusal | str) -> None:
+    def _tell(self, error: CommandRefusal | str) -> None:
         listeners, self._listeners = self._listeners, []
         for listener in listeners:
             listener(error)

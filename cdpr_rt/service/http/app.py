@@ -13,7 +13,7 @@ from starlette.responses import JSONResponse
 
 from cdpr_rt.service.http import models
 from cdpr_rt.service.http.docs_page import docs_page
-from cdpr_rt.service.http.metrics import Metrics
+from cdpr_rt.service.http.metrics import MetricsCollector
 from cdpr_rt.service.http.tickets import VALID_S
 from cdpr_rt.service.http.websocket_routes import WebSocketRoutes
 from cdpr_rt.service.lease import LeaseError
@@ -148,7 +148,7 @@ def _error(
 
 
 def _add_reading(app: FastAPI, service: Service) -> None:
-    metrics = Metrics(service)
+    metrics = MetricsCollector(service)
 
     @app.get("/status")
     async def status() -> models.Status:

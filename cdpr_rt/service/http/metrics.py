@@ -18,7 +18,7 @@ from prometheus_client.core import (
 from prometheus_client.registry import Collector
 
 from cdpr_rt.arrays import FloatArray
-from cdpr_rt.core.cycle_row import AXIS_FIELDS, SCALAR_FIELDS, Field, Row
+from cdpr_rt.core.cycle_row import AXIS_FIELDS, SCALAR_FIELDS, CycleField, Row
 from cdpr_rt.core.shared_block import RowReader
 from cdpr_rt.core.states import LoopState
 from cdpr_rt.service.link import DEAD, STARTING
@@ -55,7 +55,7 @@ class _Histogram:
         return list(zip(names, np.cumsum(self.counts).astype(float).tolist(), strict=True))
 
 
-class Metrics(Collector):
+class MetricsCollector(Collector):
     """Collects from the rows while `watch` runs, from the rest when it is asked."""
 
     def __init__(self, service: Service) -> None:
@@ -134,7 +134,7 @@ class Metrics(Collector):
         return family
 
 
-def _about(field: Field) -> str:
+def _about(field: CycleField) -> str:
     """Return what a field means; no metric is null, what cannot be known is left out."""
     about = field.meaning.partition("; null")[0]
     return about[0].upper() + about[1:]

@@ -41,11 +41,11 @@ def _check_scalar(key: str, value: Any) -> None:
         )
 
 
-def _checked(wanted: dict[str, Any]) -> dict[str, Any]:
+def _checked(arguments: dict[str, Any]) -> dict[str, Any]:
     """Raise ValueError for what no program can want; it is said in `_WANTED` as well."""
-    if len(wanted) > _MOST_KEYS:
-        raise ValueError(f"{len(wanted)} keys; allowed: {_MOST_KEYS}")
-    for key, value in wanted.items():
+    if len(arguments) > _MOST_KEYS:
+        raise ValueError(f"{len(arguments)} keys; allowed: {_MOST_KEYS}")
+    for key, value in arguments.items():
         if re.fullmatch(_KEY, key) is None:
             raise ValueError("key; allowed: a letter, then up to 39 letters, digits and _")
         values = value if isinstance(value, list) else [value]
@@ -53,7 +53,7 @@ def _checked(wanted: dict[str, Any]) -> dict[str, Any]:
             raise ValueError(f"{key}: {len(values)} values; allowed: {_MOST_NUMBERS}")
         for one in values:
             _check_scalar(key, one)
-    return wanted
+    return arguments
 
 
 _Name = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_-]{0,31}$", description="A program's name.")]

@@ -20,7 +20,7 @@ from cdpr_rt.core.shared_block import RowReader, SharedBlock, SharedBlockError
 from cdpr_rt.errors import ControlError
 from cdpr_rt.service.part import Part
 from cdpr_rt.service.recordings import recording_schema as topics
-from cdpr_rt.service.recordings.recording_events import Events
+from cdpr_rt.service.recordings.recording_events import EventDetector
 from cdpr_rt.service.recordings.recording_file import NameTakenError, RecordingError, RecordingFile
 from cdpr_rt.service.recordings.recording_json import RowTexts
 from cdpr_rt.service.recordings.retention import Retention, size_text
@@ -83,7 +83,7 @@ class Recorder(Part):
         self._event = self._channel(topics.EVENTS, topics.EVENT_SCHEMA)
         self._remarks: deque[tuple[dict[str, Any], int]] = deque(maxlen=_MOST_REMARKS)
         self._seen: dict[str, int] = {}
-        self._events = Events()
+        self._events = EventDetector()
         self._told_status: dict[str, Any] = {}
         self._synced_s = time.monotonic()
         self._told_lost = 0

@@ -15,7 +15,7 @@ from cdpr_rt.motion.stream_buttons import confirmation
 _WATCHED = ("state", "program", "reaction", "limit", "limit_axis", "stream_buttons")
 
 
-class Events:
+class EventDetector:
     """Finds changes of state, program and reaction and confirmations in rows, reasons in a status.
 
     Clamping is no event: it may come and go with every cycle.

@@ -40,7 +40,7 @@ _LATEST_NS = 1 << 62
 _NORM_TOLERANCE = 0.1
 
 
-class Kind(IntEnum):
+class PacketKind(IntEnum):
     """What a packet is; senders send the odd ones, the robot answers with the even ones."""
 
     HELLO = 1
@@ -64,7 +64,7 @@ class Standing(IntEnum):
     """One with this sequence number was taken before, or it comes far too late."""
 
 
-class Fault(IntEnum):
+class PacketFault(IntEnum):
     """Why a packet was dropped without an answer."""
 
     SIZE = 0
@@ -83,7 +83,7 @@ class Fault(IntEnum):
 class PacketError(ControlError):
     """A packet is none of ours, or says what cannot be; `fault` tells which check it failed."""
 
-    def __init__(self, fault: Fault, text: str) -> None:
+    def __init__(self, fault: PacketFault, text: str) -> None:
         self.fault = fault
         super().__init__(text)
 
@@ -98,7 +98,7 @@ class Hello:
     def pack(self) -> bytes:
         """Return it without a tag."""
         return _GREETING.pack(
-            MAGIC, VERSION, Kind.HELLO, 0, self.session, self.nonce, bytes(NONCE_BYTES)
+            MAGIC, VERSION, PacketKind.HELLO, 0, self.session, self.nonce, bytes(NONCE_BYTES)
         )
 
 
@@ -112,7 +112,7 @@ class Welcome:
 
     def pack(self) -> bytes:
         """Return it without a tag."""
-        head = MAGIC, VERSION, Kind.WELCOME, 0, self.session
+        head = MAGIC, VERSION, PacketKind.WELCOME, 0, self.session
         return _GREETING.pack(*head, self.nonce, self.robot_nonce)
 
 
@@ -148,7 +148,7 @@ class StreamSetpoint:
     def pack(self) -> bytes:
         """Return it without a tag."""
         return _SETPOINT.pack(
-            MAGIC, VERSION, Kind.SETPOINT, 0, self.session, self.buttons, self.sequence,
+            MAGIC, VERSION, PacketKind.SETPOINT, 0, self.session, self.buttons, self.sequence,
             self.sent_ns, self.echo_ns, self.echo_held_ns, *self.position_m, *self.quaternion,
             self.scale, self.right,
         )  # fmt: skip
@@ -181,7 +181,7 @@ class StreamAnswer:
     def pack(self) -> bytes:
         """Return it without a tag."""
         return _STATE.pack(
-            MAGIC, VERSION, Kind.STATE, self.standing, self.session, self.state, self.program,
+            MAGIC, VERSION, PacketKind.STATE, self.standing, self.session, self.state, self.program,
             self.reaction, self.limit, self.sequence, self.sent_ns, self.robot_ns, *self.pose,
             *self.pose_setpoint, self.round_trip_s,
         )  # fmt: skip
@@ -196,38 +196,40 @@ class Bye:
 
     def pack(self) -> bytes:
         """Return it without a tag."""
-        return _BYE.pack(MAGIC, VERSION, Kind.BYE, 0, self.session, self.sequence)
+        return _BYE.pack(MAGIC, VERSION, PacketKind.BYE, 0, self.session, self.sequence)
 
 
 Packet = Hello | Welcome | StreamSetpoint | StreamAnswer | Bye
 _SIZES: Final = {
-    Kind.HELLO: _GREETING.size,
-    Kind.WELCOME: _GREETING.size,
-    Kind.SETPOINT: _SETPOINT.size,
-    Kind.STATE: _STATE.size,
-    Kind.BYE: _BYE.size,
+    PacketKind.HELLO: _GREETING.size,
+    PacketKind.WELCOME: _GREETING.size,
+    PacketKind.SETPOINT: _SETPOINT.size,
+    PacketKind.STATE: _STATE.size,
+    PacketKind.BYE: _BYE.size,
 }
 LONGEST_BYTES: Final = max(_SIZES.values()) + TAG_BYTES
 
 
-def peek(data: bytes) -> tuple[Kind, int]:
+def peek(data: bytes) -> tuple[PacketKind, int]:
     """Return kind and session of a packet whose head and length are right; raises PacketError."""
     if len(data) < _HEAD.size:
-        raise PacketError(Fault.SIZE, f"{len(data)} bytes are no packet")
+        raise PacketError(PacketFault.SIZE, f"{len(data)} bytes are no packet")
     magic, version, number, _, session = _HEAD.unpack_from(data)
     if magic != MAGIC:
-        raise PacketError(Fault.MAGIC, f"begins with {magic!r}, not {MAGIC!r}")
+        raise PacketError(PacketFault.MAGIC, f"begins with {magic!r}, not {MAGIC!r}")
     if version != VERSION:
-        raise PacketError(Fault.VERSION, f"version {version}; allowed: {VERSION}")
+        raise PacketError(PacketFault.VERSION, f"version {version}; allowed: {VERSION}")
     try:
-        kind = Kind(number)
+        kind = PacketKind(number)
     except ValueError:
-        raise PacketError(Fault.KIND, f"kind {number}; allowed: 1 to {max(Kind)}") from None
+        raise PacketError(
+            PacketFault.KIND, f"kind {number}; allowed: 1 to {max(PacketKind)}"
+        ) from None
     size = _SIZES[kind] + TAG_BYTES
     if len(data) == _SIZES[kind]:
-        raise PacketError(Fault.UNSIGNED, f"{kind.name}: without a tag")
+        raise PacketError(PacketFault.UNSIGNED, f"{kind.name}: without a tag")
     if len(data) != size:
-        raise PacketError(Fault.SIZE, f"{kind.name}: {len(data)} bytes; allowed: {size}")
+        raise PacketError(PacketFault.SIZE, f"{kind.name}: {len(data)} bytes; allowed: {size}")
     return kind, session
 
 
@@ -236,9 +238,9 @@ def parse(data: bytes, key: bytes) -> Packet:
     kind, session = peek(data)
     body, tag = data[:-TAG_BYTES], data[-TAG_BYTES:]
     if not hmac.compare_digest(tag, _tag(body, key)):
-        raise PacketError(Fault.TAG, "the tag was not made with this key")
+        raise PacketError(PacketFault.TAG, "the tag was not made with this key")
     if session == 0:
-        raise PacketError(Fault.ABSURD, "session 0; allowed: 1 to 4294967295")
+        raise PacketError(PacketFault.ABSURD, "session 0; allowed: 1 to 4294967295")
     return _PARSERS[kind](data)
 
 
@@ -289,16 +291,18 @@ def _parse_setpoint(data: bytes) -> StreamSetpoint:
     session, buttons, sequence, sent_ns, echo_ns, echo_held_ns = values[4:10]
     position, attitude, scale, right = values[10:13], values[13:17], values[17], values[18]
     if not all(map(math.isfinite, values[10:18])):
-        raise PacketError(Fault.NOT_FINITE, "position, orientation or scale is not finite")
+        raise PacketError(PacketFault.NOT_FINITE, "position, orientation or scale is not finite")
     if not 0.0 < scale <= LARGEST_SCALE:
-        raise PacketError(Fault.ABSURD, f"scale {scale}; allowed: above 0, to {LARGEST_SCALE:g}")
+        raise PacketError(
+            PacketFault.ABSURD, f"scale {scale}; allowed: above 0, to {LARGEST_SCALE:g}"
+        )
     if math.hypot(*position) * max(1.0, scale) > REACH_M:
-        raise PacketError(Fault.ABSURD, f"position {position} m; allowed: to {REACH_M:g} m")
+        raise PacketError(PacketFault.ABSURD, f"position {position} m; allowed: to {REACH_M:g} m")
     norm = math.hypot(*attitude)
     if abs(norm - 1.0) > _NORM_TOLERANCE:
-        raise PacketError(Fault.ABSURD, f"quaternion {attitude}; allowed: of length 1")
+        raise PacketError(PacketFault.ABSURD, f"quaternion {attitude}; allowed: of length 1")
     if not 0 <= sent_ns < _LATEST_NS:
-        raise PacketError(Fault.ABSURD, f"sent_ns {sent_ns}; allowed: 0 to 2^62")
+        raise PacketError(PacketFault.ABSURD, f"sent_ns {sent_ns}; allowed: 0 to 2^62")
     w, x, y, z = (part / norm for part in attitude)
     return StreamSetpoint(
         session, sequence, sent_ns, position, (w, x, y, z), scale, buttons, echo_ns,
@@ -311,7 +315,7 @@ def _parse_state(data: bytes) -> StreamAnswer:
     try:
         standing = Standing(values[3])
     except ValueError:
-        raise PacketError(Fault.ABSURD, f"status {values[3]} is unknown") from None
+        raise PacketError(PacketFault.ABSURD, f"status {values[3]} is unknown") from None
     session, state, program, reaction, limit = values[4:9]
     sequence, sent_ns, robot_ns = values[9:12]
     return StreamAnswer(
@@ -325,10 +329,10 @@ def _parse_bye(data: bytes) -> Bye:
     return Bye(session, sequence)
 
 
-_PARSERS: Final[dict[Kind, Callable[[bytes], Packet]]] = {
-    Kind.HELLO: _parse_hello,
-    Kind.WELCOME: _parse_welcome,
-    Kind.SETPOINT: _parse_setpoint,
-    Kind.STATE: _parse_state,
-    Kind.BYE: _parse_bye,
+_PARSERS: Final[dict[PacketKind, Callable[[bytes], Packet]]] = {
+    PacketKind.HELLO: _parse_hello,
+    PacketKind.WELCOME: _parse_welcome,
+    PacketKind.SETPOINT: _parse_setpoint,
+    PacketKind.STATE: _parse_state,
+    PacketKind.BYE: _parse_bye,
 }

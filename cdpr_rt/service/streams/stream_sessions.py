@@ -18,11 +18,11 @@ from cdpr_rt.service.streams.stream_packet import (
     NO_RIGHT,
     NONCE_BYTES,
     Bye,
-    Fault,
     Hello,
-    Kind,
     Packet,
     PacketError,
+    PacketFault,
+    PacketKind,
     Standing,
     StreamAnswer,
     StreamSession,
@@ -48,7 +48,7 @@ _LONGEST_STEP = 1 << 20
 _LONGEST_ROUND_TRIP_NS = 60_000_000_000
 
 _GREETINGS = "hello", "bye", "silent"
-_COUNTED = [each.name.lower() for each in (*Fault, *Standing)] + [*_GREETINGS]
+_COUNTED = [each.name.lower() for each in (*PacketFault, *Standing)] + [*_GREETINGS]
 
 Address = tuple[Any, ...]
 """Of a sender, as the socket tells it."""
@@ -117,7 +117,7 @@ class StreamSessionManager:
 
     def __init__(self, block: SharedBlock, lease: Lease, key: bytes | None = None) -> None:
         self.counts: Counter[str] = Counter(dict.fromkeys(_COUNTED, 0))
-        """Packets by what became of them: names of `Fault` and `Standing`, and the greetings."""
+        """Packets by what became of them: names of `PacketFault`, of `Standing`, and greetings."""
         self.round_trip_s = math.nan
         """Delay there and back of the newest set-point that told it."""
         self._block = block
@@ -184,9 +184,9 @@ class StreamSessionManager:
         if session is not None and session.is_of(name, address):
             return parse(data, session.key), session.key
         if self._key is None:
-            raise PacketError(Fault.SESSION, f"session {name} is none that was given")
+            raise PacketError(PacketFault.SESSION, f"session {name} is none that was given")
         # no limit of tries: only who forges could use it up, and a tag is not guessed anyway
-        greets = kind in (Kind.HELLO, Kind.WELCOME)
+        greets = kind in (PacketKind.HELLO, PacketKind.WELCOME)
         key = self._key if greets else session_key(self._key, self._nonce, name)
         return parse(data, key), key
 

@@ -119,16 +119,16 @@ class FoxgloveServer:
         self._send_json_to_all({"op": "unadvertise", "channelIds": list(self._topics)})
         self._topics.clear()
         for viewer in self._viewers:
-            viewer.wanted.clear()
+            viewer.subscriptions.clear()
 
     def is_wanted(self, topic: Topic) -> bool:
         """Whether anybody has subscribed to it."""
-        return any(topic.number in viewer.wanted for viewer in self._viewers)
+        return any(topic.number in viewer.subscriptions for viewer in self._viewers)
 
     def send(self, topic: Topic, data: bytes, time_ns: int) -> None:
         """Send a message, of `time_ns` since 1970, to who has subscribed and has read so far."""
         for viewer in self._viewers:
-            number = viewer.wanted.get(topic.number)
+            number = viewer.subscriptions.get(topic.number)
             if number is not None and viewer.has_room():
                 broadcast([viewer], _DATA.pack(_MESSAGE_DATA, number, time_ns) + data)
 
@@ -212,10 +212,10 @@ class FoxgloveServer:
                     match wish:
                         case {"id": int(number), "channelId": int(topic)}:
                             if topic in self._topics and 0 <= number <= _MOST_ID:
-                                viewer.wanted[topic] = number
+                                viewer.subscriptions[topic] = number
             case {"op": "unsubscribe", "subscriptionIds": list(given)}:
-                kept = {topic: n for topic, n in viewer.wanted.items() if n not in given}
-                viewer.wanted = kept
+                kept = {topic: n for topic, n in viewer.subscriptions.items() if n not in given}
+                viewer.subscriptions = kept
 
     def _send_json_to_all(self, what: dict[str, Any]) -> None:
         for viewer in self._viewers:
@@ -228,7 +228,7 @@ class _Viewer(ServerConnection):
 
     def __init__(self, server: FoxgloveServer, *given: Any, **named: Any) -> None:
         super().__init__(*given, **named)
-        self.wanted: dict[int, int] = {}
+        self.subscriptions: dict[int, int] = {}
         """The subscription to each topic, both by number."""
         self.is_greeted = False
         self._foxglove = server

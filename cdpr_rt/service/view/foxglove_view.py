@@ -29,7 +29,7 @@ from cdpr_rt.core.cycle_row import AXIS_FIELDS, SCALAR_FIELDS, Row
 from cdpr_rt.core.shared_block import RowReader, SharedBlock, SharedBlockError
 from cdpr_rt.service.part import Part
 from cdpr_rt.service.recordings.recording import WallClock
-from cdpr_rt.service.recordings.recording_events import Events
+from cdpr_rt.service.recordings.recording_events import EventDetector
 from cdpr_rt.service.rows import LABELS
 from cdpr_rt.service.view.cable_scene import CableScene
 from cdpr_rt.service.view.foxglove_server import FoxgloveServer, Topic
@@ -69,7 +69,7 @@ class LiveView(Part):
         self._listener = listener
         self._wall = WallClock(block)
         self._reader = RowReader(block)
-        self._events = Events()
+        self._events = EventDetector()
         self._versions = {"description": 0, "status": 0}
         self._topics: _Topics | None = None
         self._server = FoxgloveServer(f"cdpr-rt {robot}", origins)

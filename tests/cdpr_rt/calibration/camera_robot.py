@@ -11,10 +11,10 @@ from cdpr_rt.calibration.camera.camera_start import CameraStart, camera_start
 from cdpr_rt.calibration.estimation.parameters import USUAL, CableGeometry, Knowledge
 from cdpr_rt.calibration.readings.camera_data import Images
 from cdpr_rt.calibration.readings.observations import Observations
-from cdpr_tools.calibrate.made_readings import Errors, Layout, Made, made_readings
+from cdpr_tools.calibrate.made_readings import ErrorBudget, Made, SheetLayout, made_readings
 
 KNOWN = Knowledge(exit_m=0.03, length_m=1.5e-4, tension_N=1.0, drum=0.002)
-FEW = Layout(rows=3, columns=4, size_m=0.15)
+FEW = SheetLayout(rows=3, columns=4, size_m=0.15)
 
 
 @dataclass(frozen=True)
@@ -34,8 +34,8 @@ class CameraRobot:
 def camera_robot(
     poses: int = 20,
     seed: int = 3,
-    errors: Errors | None = None,
-    layout: Layout = FEW,
+    errors: ErrorBudget | None = None,
+    layout: SheetLayout = FEW,
     *,
     hand_eye_known: bool = True,
     knowledge: Knowledge = KNOWN,
@@ -52,7 +52,7 @@ def camera_robot(
     targets[:, 3:] = rng.uniform(-1.0, 1.0, (poses, 3)) * model.angle_rad / np.sqrt(3.0)
     targets[0] = model.home
     made = made_readings(
-        robot, targets, model.poses(targets), errors or Errors(), layout, seed,
+        robot, targets, model.poses(targets), errors or ErrorBudget(), layout, seed,
         of_data=poses, hand_eye_known=hand_eye_known,
     )  # fmt: skip
     assert made.data.camera is not None

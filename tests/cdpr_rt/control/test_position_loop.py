@@ -54,7 +54,7 @@ class MotorUnderLoop:
         self._step()
         known = None
         if compensated:
-            stored = profile_of(winch, self.plant, 1).better
+            stored = profile_of(winch, self.plant, 1).harmonic
             known = Compensation([stored.compensation(MotorBounds(motor))], PERIOD_S)
             self._feedback.index_rad[0] = math.radians(self.plant.encoder.index_deg) + self._offset
             self._feedback.index_known[0] = True

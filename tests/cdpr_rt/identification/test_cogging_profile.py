@@ -70,6 +70,8 @@ def test_round_trip(tmp_path):
     profile().save(path)
     assert CoggingProfile.load(path) == profile()
     assert [p.name for p in tmp_path.iterdir()] == ["p.json"]
+    stored = json.loads(path.read_text())
+    assert "better" in stored and "harmonic" not in stored
 
 
 def test_compensation_is_what_was_stored():
@@ -94,7 +96,7 @@ def test_another_motor_or_no_index_is_refused():
 
 
 def spoil(change):
-    data = json.loads(profile().model_dump_json())
+    data = json.loads(profile().model_dump_json(by_alias=True))
     change(data)
     return json.dumps(data)
 
@@ -102,7 +104,7 @@ def spoil(change):
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        (lambda: profile().model_dump_json()[:200], "is not valid JSON"),
+        (lambda: profile().model_dump_json(by_alias=True)[:200], "is not valid JSON"),
         (lambda: spoil(lambda d: d.pop("motor")), "motor"),
         (lambda: spoil(lambda d: d["identity"].update(serial="x")), "identity.serial: value 'x'"),
         (lambda: spoil(lambda d: d.update(colour="red")), "colour: unknown key"),
@@ -111,6 +113,12 @@ def spoil(change):
             "inertia_kg_m2: value -1.0; allowed: greater than 0",
         ),
         (lambda: spoil(lambda d: d["better"]["table_Nm"][0].pop()), "better.table_Nm"),
+        (
+            lambda: spoil(lambda d: d.update(beter=d.pop("better"))),
+            "beter: unknown key; did you mean 'better'?",
+        ),
+        (lambda: spoil(lambda d: d["better"].update(tabel_Nm=[])), "did you mean 'table_Nm'?"),
+        (lambda: spoil(lambda d: d.update(harmonic=d.pop("better"))), "harmonic: unknown key"),
     ],
 )
 def test_a_damaged_file_is_refused_with_the_reason(tmp_path, text, message):
@@ -128,7 +136,7 @@ def test_a_missing_file_is_refused(tmp_path):
 
 def changed(path: str, value: object) -> CoggingProfile:
     """Return the profile with one value replaced, the place given as `better.friction.x`."""
-    data = json.loads(profile().model_dump_json())
+    data = json.loads(profile().model_dump_json(by_alias=True))
     here, *keys, last = data, *path.split(".")
     for key in keys:
         here = here[int(key) if key.isdecimal() else key]
@@ -190,7 +198,9 @@ def test_an_axis_that_may_use_little_torque_allows_little_compensation() -> None
 def test_a_time_that_is_none_is_refused(tmp_path, key, value):
     path = tmp_path / "p.json"
     path.write_text(
-        re.sub(rf'"{key}": ?[0-9.e-]+', f'"{key}": {value}', profile().model_dump_json())
+        re.sub(
+            rf'"{key}": ?[0-9.e-]+', f'"{key}": {value}', profile().model_dump_json(by_alias=True)
+        )
     )
     with pytest.raises(CoggingProfileError, match=r"p\.json"):
         CoggingProfile.load(path)

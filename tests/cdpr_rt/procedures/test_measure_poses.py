@@ -9,11 +9,11 @@ from cdpr_rt.arrays import FloatArray
 from cdpr_rt.calibration.markers.sighting import Sighting
 from cdpr_rt.errors import TripError
 from cdpr_rt.procedures.calibration.measure_poses import (
-    Held,
     Look,
     Measured,
     NotThePoseError,
     PoseRefusedError,
+    TargetNotReached,
     measure_poses,
 )
 
@@ -37,7 +37,7 @@ class Operator:
         self.trip: TripError | None = None
         self.gone: list[float] = []
 
-    def go(self, place: FloatArray) -> Held | None:
+    def go(self, place: FloatArray) -> TargetNotReached | None:
         straight = self.here[0] == BETWEEN[0] or place[0] == BETWEEN[0]
         if place[0] == self.refused or (place[0] == self.behind and not straight):
             raise PoseRefusedError("cable 2 would need 200 N")
@@ -46,11 +46,11 @@ class Operator:
         self.gone.append(float(place[0]))
         if place[0] == self.held_on_way_to:
             self.here = 0.5 * (self.here + place)
-            return Held(self.here, "700 mm off after 12 s: no way on")
+            return TargetNotReached(self.here, "700 mm off after 12 s: no way on")
         self.here = np.minimum(place, self.beyond)
         if place[0] <= self.beyond:
             return None
-        return Held(self.here, "900 mm off after 14 s: cable 2 would need 200 N")
+        return TargetNotReached(self.here, "900 mm off after 14 s: cable 2 would need 200 N")
 
     def stay(self, seconds: float) -> None:
         assert seconds > 0.0

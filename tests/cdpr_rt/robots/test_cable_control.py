@@ -16,7 +16,7 @@ from cdpr_rt.errors import GeometryError
 from cdpr_rt.robots.platform.cable_control import CableControl
 from cdpr_rt.robots.platform_model import platform_model_of
 from cdpr_sim_bus.robot.robot_plant import RobotPlant
-from cdpr_tools.bench.control.measure import Motion, controls, run_block
+from cdpr_tools.bench.control.measure import PeriodicMotion, controls, run_block
 
 ROBOTS = ("planar-3", "spatial-8", "suspended-8")
 PLANE = ((0.5, 1.5), (-0.5, 2.3), (0.55, 2.35), (-0.4, 1.45))
@@ -129,7 +129,7 @@ def test_a_robot_with_much_friction_does_not_leap() -> None:
 @pytest.mark.parametrize("name", ROBOTS)
 def test_torques_are_those_of_plain_numpy(name: str) -> None:
     ours, obvious = controls(robot(name))
-    motion = Motion(robot(name), ours, 400)
+    motion = PeriodicMotion(robot(name), ours, 400)
     _, torques = run_block(ours, motion, 0, 400)
     _, wanted = run_block(obvious, motion, 0, 400)
     assert np.ptp(torques, axis=0).min() > 0.02
@@ -139,7 +139,7 @@ def test_torques_are_those_of_plain_numpy(name: str) -> None:
 @pytest.mark.parametrize("name", ROBOTS)
 def test_an_update_allocates_nothing_that_stays(name: str) -> None:
     ours, _ = controls(robot(name))
-    motion = Motion(robot(name), ours, 50)
+    motion = PeriodicMotion(robot(name), ours, 50)
     run_block(ours, motion, 0, 50)
     n = motion.angle_rad.shape[1]
     feedback, setpoint, torque = AxisFeedback(n), Setpoint(n), np.zeros(n)

@@ -9,13 +9,13 @@ from typing import Any
 
 import pytest
 
-from cdpr_rt.service.path_planner import PathPlanner, PlannerBusyError
+from cdpr_rt.service.path_planner import PathPlanRunner, PlannerBusyError
 
 WANTED = {"name": "part.nc", "text": "M2\n"}
 
 
 def planned(status: int, text: str, stopped: str = "") -> dict[str, Any]:
-    planner, seen = PathPlanner(), []
+    planner, seen = PathPlanRunner(), []
 
     async def work(file: Path, wanted: dict[str, Any]) -> tuple[int, str]:
         seen.append((file.read_text(), wanted))
@@ -56,4 +56,4 @@ def test_a_stop_while_it_is_planned_leaves_nothing_to_follow():
 
 def test_without_the_robot_nothing_is_planned():
     with pytest.raises(PlannerBusyError):
-        PathPlanner().begin(WANTED)
+        PathPlanRunner().begin(WANTED)

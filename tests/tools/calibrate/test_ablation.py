@@ -9,7 +9,7 @@ import pytest
 from cdpr_here import cdpr_here
 
 from cdpr_tools.calibrate import ablation
-from cdpr_tools.calibrate.ablation import SOURCES, STEPS, Accuracy, Case, trial
+from cdpr_tools.calibrate.ablation import SOURCES, STEPS, AblationCase, Accuracy, trial
 
 
 def test_the_joint_fit_is_several_times_better_than_the_thesis_way() -> None:
@@ -30,7 +30,7 @@ def test_the_last_step_is_within_what_is_wanted() -> None:
 def test_each_case_has_its_own_trials(monkeypatch: pytest.MonkeyPatch) -> None:
     asked = []
 
-    def one(robot: str, case: Case, seed: int) -> Accuracy:
+    def one(robot: str, case: AblationCase, seed: int) -> Accuracy:
         asked.append((robot, seed))
         return Accuracy(float(case.poses), float(case.joint), float(seed), 0.0)
 

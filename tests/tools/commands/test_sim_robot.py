@@ -17,7 +17,7 @@ from scipy.spatial.transform import Rotation
 from cdpr_drivers.camera.open_camera import open_camera
 from cdpr_rt.core.clock import LockstepClock
 from cdpr_sim_bus.robot.logs.truth_log import HEADER_BYTES
-from cdpr_tools.commands.sim.sim_fault import Fault, fault
+from cdpr_tools.commands.sim.sim_fault import InjectedFault, fault
 from cdpr_tools.errors import BadInputError, WorkFailedError
 from tests.tools.robot_rig import Simulator, simulated, unique
 
@@ -81,7 +81,7 @@ class Robot:
         assert len(seen) == before + count
         return seen[-1]
 
-    def fault(self, what: Fault, value: str | None = None, axis: str = "1") -> None:
+    def fault(self, what: InjectedFault, value: str | None = None, axis: str = "1") -> None:
         fault("planar-3", what, value, bus=[f"simbus:{self.name}"], axis=axis)
 
     def close(self) -> None:
@@ -129,20 +129,23 @@ def test_a_cable_is_cut_while_the_robot_runs(
     robot: Robot, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert robot.sync(0.05)["tension_N"][:2].min() > 1e-3
-    robot.fault(Fault.CUT_CABLE, axis="upper right")
+    robot.fault(InjectedFault.CUT_CABLE, axis="upper right")
     assert capsys.readouterr().out == "upper right: cut-cable\n"
     assert (robot.sync(0.05)["tension_N"][:2] > 1e-3).tolist() == [True, False]
     # by its number, more cable than was taut
-    robot.fault(Fault.SLIP, "500", axis="1")
+    robot.fault(InjectedFault.SLIP, "500", axis="1")
     assert robot.sync(0.05)["tension_N"][0] < 0.5
 
 
 @pytest.mark.parametrize(
     ("what", "reason"),
     [
-        ((Fault.SLIP, None, "upper"), "--axis upper: allowed: 1 to 3, or upper left, upper right"),
-        ((Fault.SLIP, "0"), "slip 0: allowed: whole numbers 1 to 65535"),
-        ((Fault.ENCODER_JUMP, "far"), "encoder-jump far: allowed: whole numbers"),
+        (
+            (InjectedFault.SLIP, None, "upper"),
+            "--axis upper: allowed: 1 to 3, or upper left, upper right",
+        ),
+        ((InjectedFault.SLIP, "0"), "slip 0: allowed: whole numbers 1 to 65535"),
+        ((InjectedFault.ENCODER_JUMP, "far"), "encoder-jump far: allowed: whole numbers"),
     ],
 )
 def test_a_fault_that_cannot_be_is_refused(robot: Robot, what: tuple[Any, ...], reason: str):
@@ -155,7 +158,7 @@ def test_detached_motors_have_no_cable_to_cut() -> None:
         simulated("planar-3", "--detached") as bus,
         pytest.raises(WorkFailedError, match=r"axis 'lower'.*06060000h"),
     ):
-        fault("planar-3", Fault.CUT_CABLE, bus=[bus], axis="lower")
+        fault("planar-3", InjectedFault.CUT_CABLE, bus=[bus], axis="lower")
 
 
 def test_a_robots_file_says_how_its_platform_stands_in_space(tmp_path: Path) -> None:

@@ -22,7 +22,7 @@ from cdpr_rt.core.cycle_row import Row
 from cdpr_rt.core.states import LoopState
 from cdpr_rt.programs.idle import IdleProgram
 from cdpr_rt.programs.model import model_of
-from cdpr_rt.refusal import Refusal
+from cdpr_rt.refusal import CommandRefusal
 from cdpr_rt.robots.robot_arrays import limits_of
 from tests.drivers.bus_log import BusLog, logged
 from tests.tools.daemon.loop_rig import LoopRig, opened
@@ -362,7 +362,7 @@ def test_a_refusal_says_by_a_code_and_figures_what_is_in_the_way(ready: LoopRig)
     assert refusal["code"] == "out_of_range" and refusal["asked"] == {"velocity_rad_s": 1e6}
     assert refusal["arguments"]["index"] == 1
     assert 0.0 < refusal["arguments"]["high"] == -refusal["arguments"]["low"] < 1e6
-    assert str(Refusal.from_json(refusal)) == answer["text"]
+    assert str(CommandRefusal.from_json(refusal)) == answer["text"]
     answer = ready.command("program", program="jog", wanted={"velocity_rad_s": [0.0]})
     assert not answer["ok"] and "refusal" not in answer
 

@@ -13,7 +13,7 @@ from typing import Any
 
 import pytest
 
-from cdpr_tools.daemon.estop import EmergencyStop, Outcome
+from cdpr_tools.daemon.estop import EmergencyStop, EmergencyStopResult
 from cdpr_tools.daemon.loop_file import LoopFile, started
 from cdpr_tools.daemon.paths import find_loop_files, find_sockets, is_trusted, unsearched_folders
 from cdpr_tools.errors import WorkFailedError
@@ -52,7 +52,7 @@ def named(of: int, **other: Any) -> dict[str, Any]:
     return {**told, "block_fd": 0, "drives_stop_s": 0.2, **other}
 
 
-def stopped(path: Path) -> Outcome:
+def stopped(path: Path) -> EmergencyStopResult:
     with closing(EmergencyStop(path)) as stop:
         return stop.outcome()
 

@@ -14,9 +14,9 @@ import typer
 from scipy.spatial.transform import Rotation
 from typer.testing import CliRunner
 
-from cdpr_rt.refusal import Refusal, RefusalCode
-from cdpr_tools.client.platform_move import Frame, PlatformMove
-from cdpr_tools.client.refusals import RefusedError
+from cdpr_rt.refusal import CommandRefusal, RefusalCode
+from cdpr_tools.client.platform_move import PlatformMove, ReferenceFrame
+from cdpr_tools.client.refusals import DaemonRefusalError
 from cdpr_tools.client.status_text import platform_text
 from cdpr_tools.commands.daemon import daemon_motion, with_daemon
 from cdpr_tools.errors import BadInputError, CommandError, WorkFailedError
@@ -50,7 +50,7 @@ class Told:
         self,
         platform: dict[str, Any],
         progress: dict[str, Any] | None = None,
-        refusal: Refusal | None = None,
+        refusal: CommandRefusal | None = None,
     ) -> None:
         self.platform, self.progress, self.refusal = platform, progress or {}, refusal
         self.posted: list[dict[str, Any]] = []
@@ -81,7 +81,7 @@ class Told:
 
     def post(self, _path: str, body: dict[str, Any]) -> None:
         if self.refusal:
-            raise RefusedError(self.refusal)
+            raise DaemonRefusalError.of(self.refusal)
         self.posted.append(body)
 
     def renew(self) -> None: ...
@@ -93,7 +93,7 @@ def wanted(
     to: str | None = None,
     rotate: str | None = None,
     relative: bool = False,
-    frame: Frame = Frame.ROOM,
+    frame: ReferenceFrame = ReferenceFrame.ROOM,
     speed: float | None = None,
 ) -> dict[str, Any]:
     return PlatformMove(to, rotate, relative, frame, speed).arguments(told)  # type: ignore[arg-type]
@@ -118,7 +118,7 @@ def test_a_relative_motion_is_along_the_room_s_axes_or_the_platform_s() -> None:
     assert asked["position_m"] == pytest.approx(HERE["target_m"] + step_m)
     assert asked["rotation_rad"] == pytest.approx((turn * from_home).as_rotvec())
 
-    asked = wanted(Told(ROOM, HERE), **typed, frame=Frame.PLATFORM)  # type: ignore[arg-type]
+    asked = wanted(Told(ROOM, HERE), **typed, frame=ReferenceFrame.PLATFORM)  # type: ignore[arg-type]
     assert asked["position_m"] == pytest.approx(HERE["target_m"] + orientation.apply(step_m))
     at_home = Rotation.from_rotvec(ROOM["home_rotation_rad"])
     got = Rotation.from_rotvec(asked["rotation_rad"]) * at_home
@@ -128,7 +128,7 @@ def test_a_relative_motion_is_along_the_room_s_axes_or_the_platform_s() -> None:
 def test_in_a_plane_a_relative_motion_turns_about_its_normal() -> None:
     here = {"target_m": [0.0, 2.0], "target_rotation_rad": [0.1]}
     told = Told(TURNING | {"home_rotation_rad": [math.pi / 2 - 0.1]}, here)
-    asked = wanted(told, "100 0", "2", relative=True, frame=Frame.PLATFORM)
+    asked = wanted(told, "100 0", "2", relative=True, frame=ReferenceFrame.PLATFORM)
     assert asked["position_m"] == pytest.approx([0.0, 2.1])
     assert asked["rotation_rad"] == pytest.approx([0.1 + math.radians(2.0)])
 
@@ -150,7 +150,8 @@ def test_in_a_plane_a_relative_motion_turns_about_its_normal() -> None:
         (ROOM, {"rotate": "1"}, "--rotate 1: 1 number; allowed: 3, RX RY RZ in deg"),
         (PLANE, {"to": "0 2000", "speed": 900.0}, "--speed 900: allowed: up to 500 mm/s"),
         (PLANE, {"to": "5 0", "relative": True}, "--relative: it is not known where"),
-        (PLANE, {"to": "5 0", "frame": Frame.PLATFORM}, "--frame platform: allowed: together"),
+        (PLANE, {"to": "5 0", "frame": ReferenceFrame.PLATFORM},
+         "--frame platform: allowed: together"),
     ],
 )  # fmt: skip
 def test_what_is_not_allowed_is_refused_as_it_was_typed(
@@ -242,7 +243,7 @@ def test_mistakes_end_with_a_message(
 def test_the_daemon_s_refusal_names_what_was_typed(monkeypatch: pytest.MonkeyPatch) -> None:
     why = {"why": "cable 1 would need 9 N"}
     asked = {"position_m": [0.0, 0.0, 0.7]}
-    told = Told(ROOM, HERE, Refusal(RefusalCode.NOT_FEASIBLE, "pose", asked, why))
+    told = Told(ROOM, HERE, CommandRefusal(RefusalCode.NOT_FEASIBLE, "pose", asked, why))
     result = typed(monkeypatch, told, "--to", "0", "0", "700")
     assert isinstance(result.exception, WorkFailedError)
     assert str(result.exception) == "--to 0 0 700: cable 1 would need 9 N"

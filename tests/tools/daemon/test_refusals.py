@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 import socket
 import threading
 from pathlib import Path
@@ -9,40 +10,40 @@ from typing import Any
 
 import pytest
 
-from cdpr_rt.refusal import Refusal, RefusalCode
+from cdpr_rt.refusal import CommandRefusal, RefusalCode
 from cdpr_tools.client.client import open_daemon
-from cdpr_tools.client.refusals import RefusedError, in_typed_words
+from cdpr_tools.client.refusals import DaemonRefusalError, in_typed_words
 from cdpr_tools.errors import BadInputError, WorkFailedError
 
 WHY = {"why": "on the way, at 250.0, -1500.0 mm turned by 5.7 deg: cable 1"}
 RANGE = {"index": 1, "low": -1.0, "high": 1.0}
 
 
-def told(refusal: Refusal, *typed: Any, **words: Any) -> str:
-    with pytest.raises(RefusedError) as raised, in_typed_words(*typed, **words):
-        raise RefusedError(refusal)
+def told(refusal: CommandRefusal, *typed: Any, **words: Any) -> str:
+    with pytest.raises(DaemonRefusalError) as raised, in_typed_words(*typed, **words):
+        raise DaemonRefusalError.of(refusal)
     return str(raised.value)
 
 
 def test_what_was_asked_for_is_named_as_it_was_typed() -> None:
-    refusal = Refusal(RefusalCode.NOT_FEASIBLE, "pose", {"position_m": [0.3, 2.0]}, WHY)
+    refusal = CommandRefusal(RefusalCode.NOT_FEASIBLE, "pose", {"position_m": [0.3, 2.0]}, WHY)
     assert told(refusal, "move", "--to 300 2000") == f"--to 300 2000: {WHY['why']}"
-    refusal = Refusal(RefusalCode.NOT_TIGHT, "pose")
+    refusal = CommandRefusal(RefusalCode.NOT_TIGHT, "pose")
     assert told(refusal, "move", "--to 300 2000").startswith("move: the cables are not tight")
 
 
 def test_what_is_allowed_is_named_as_it_is_typed() -> None:
     nothing = {"left": "target", "instead": "position_m"}
-    refusal = Refusal(RefusalCode.NOTHING_LEFT, "pose", {"resume": True}, nothing)
+    refusal = CommandRefusal(RefusalCode.NOTHING_LEFT, "pose", {"resume": True}, nothing)
     text = told(refusal, "resume", instead="cdpr move --to")
     assert text == "resume: no target has been left; allowed: cdpr move --to"
     # the same words beside another refusal of the same command
     states = {"state": "ready", "allowed": ["active"]}
-    refusal = Refusal(RefusalCode.NOT_IN_STATE, "program", arguments=states)
+    refusal = CommandRefusal(RefusalCode.NOT_IN_STATE, "program", arguments=states)
     text = told(refusal, "resume", instead="cdpr move --to")
     assert text == "resume: not in state ready; allowed in active; `cdpr enable` gives power"
     sources = {"why": "the cables' lengths are not known", "allowed": ["home"]}
-    refusal = Refusal(RefusalCode.BAD_SOURCE, "tighten", {"from": "lengths"}, sources)
+    refusal = CommandRefusal(RefusalCode.BAD_SOURCE, "tighten", {"from": "lengths"}, sources)
     text = told(refusal, "tighten", "tighten --from lengths", option="--from ")
     assert text == "tighten --from lengths: the cables' lengths are not known; allowed: --from home"
 
@@ -59,14 +60,16 @@ def test_what_is_allowed_is_named_as_it_is_typed() -> None:
 def test_a_number_out_of_its_bounds_is_bad_input_in_units_that_are_typed(
     asked: dict[str, float], index: int | None, text: str
 ) -> None:
-    refusal = Refusal(RefusalCode.OUT_OF_RANGE, "pid", asked, {**RANGE, "index": index})
+    refusal = CommandRefusal(RefusalCode.OUT_OF_RANGE, "pid", asked, {**RANGE, "index": index})
     with pytest.raises(BadInputError) as raised, in_typed_words("move", "", ("left", "right")):
-        raise RefusedError(refusal)
+        raise DaemonRefusalError.of(refusal)
     assert str(raised.value) == text
 
 
 def test_a_number_that_no_option_stands_for_is_told_as_the_loop_tells_it() -> None:
-    refusal = Refusal(RefusalCode.OUT_OF_RANGE, "path", {"feed": 2.0}, {**RANGE, "index": None})
+    refusal = CommandRefusal(
+        RefusalCode.OUT_OF_RANGE, "path", {"feed": 2.0}, {**RANGE, "index": None}
+    )
     assert told(refusal, "path", "--feed") == str(refusal)
 
 
@@ -81,16 +84,35 @@ def test_a_number_that_no_option_stands_for_is_told_as_the_loop_tells_it() -> No
 )
 def test_the_remedy_follows_from_the_state(state: str, allowed: list[str], remedy: str) -> None:
     states = {"state": state, "allowed": allowed}
-    text = str(RefusedError(Refusal(RefusalCode.NOT_IN_STATE, "jog", arguments=states)))
+    refusal = CommandRefusal(RefusalCode.NOT_IN_STATE, "jog", arguments=states)
+    text = str(DaemonRefusalError.of(refusal))
     assert text == f"jog: not in state {state}; allowed in {' or '.join(allowed)}{remedy}"
     # words alone have none
-    assert told(Refusal(RefusalCode.NOT_CALIBRATED, "jog", {}, {"why": text}), "jog").endswith(text)
+    assert told(
+        CommandRefusal(RefusalCode.NOT_CALIBRATED, "jog", {}, {"why": text}), "jog"
+    ).endswith(text)
+
+
+def test_the_error_goes_from_process_to_process_and_takes_other_words() -> None:
+    states = {"state": "ready", "allowed": ["active"]}
+    refusal = CommandRefusal(RefusalCode.NOT_IN_STATE, "jog", arguments=states)
+    error = DaemonRefusalError.of(refusal)
+    copy = pickle.loads(pickle.dumps(error))
+    assert type(copy) is DaemonRefusalError
+    assert (str(copy), copy.refusal) == (str(error), refusal)
+    other = type(error)("jog: words")
+    assert str(other) == "jog: words"
+    with pytest.raises(DaemonRefusalError, match=r"^jog: words$"), in_typed_words("move"):
+        raise other
 
 
 @pytest.mark.parametrize(
     ("refusal", "kind"),
     [
-        (b'{"code": "not_tight", "command": "pose", "asked": {}, "arguments": {}}', RefusedError),
+        (
+            b'{"code": "not_tight", "command": "pose", "asked": {}, "arguments": {}}',
+            DaemonRefusalError,
+        ),
         (b'{"code": "of another version", "command": "pose"}', WorkFailedError),
         (b"null", WorkFailedError),
     ],
@@ -118,4 +140,4 @@ def test_a_daemon_s_answer_is_raised_with_its_code(
         thread.join()
     assert type(raised.value) is kind
     words = "pose: the cables are not tight; run tighten first"
-    assert str(raised.value) == (words if kind is RefusedError else "its words")
+    assert str(raised.value) == (words if kind is DaemonRefusalError else "its words")

@@ -11,7 +11,7 @@ import pytest
 from cdpr_tools.host import host_checks
 from cdpr_tools.host.host_checks import (
     CanInterface,
-    Finding,
+    HostFinding,
     can_interface,
     list_interfaces,
     look_around,
@@ -40,7 +40,7 @@ def link(state: int | None, flags: int = UP, kind: bytes = b"can", queue: int = 
     return head + named + attribute(18 | 0x8000, info)
 
 
-def judged(message: bytes) -> Finding:
+def judged(message: bytes) -> HostFinding:
     interface = parse_link(message)
     assert interface is not None
     return can_interface(interface)

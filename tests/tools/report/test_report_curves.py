@@ -44,17 +44,17 @@ def test_thinned_curves_keep_their_peaks(size: int, seed: int) -> None:
     offset=st.floats(-0.1, 0.1),
 )
 def test_table_error_is_found(gain: float, late_deg: tuple[float, float], offset: float) -> None:
-    better = harmonic_result()
+    harmonic = harmonic_result()
     late = np.radians(late_deg)
     curve = gain * np.vstack(
-        [better.cogging_Nm(ANGLE - late[0]), better.cogging_Nm(ANGLE + late[1])]
+        [harmonic.cogging_Nm(ANGLE - late[0]), harmonic.cogging_Nm(ANGLE + late[1])]
     )
     thesis = ThesisResult(curve, curve + offset, curve.mean(axis=1) + offset, curve > 9.0, (2, 2))
-    errors = curves.table_errors(thesis, better)
+    errors = curves.table_errors(thesis, harmonic)
     for side, error in enumerate(errors):
         assert error.gain == pytest.approx(gain, rel=1e-6)
         assert error.behind_deg == pytest.approx(late_deg[side], abs=1e-6)
-        difference = curve[side] - better.cogging_Nm(ANGLE)
+        difference = curve[side] - harmonic.cogging_Nm(ANGLE)
         assert error.peak_Nm == pytest.approx(np.abs(difference).max(), abs=1e-9)
         assert error.rms_Nm == pytest.approx(np.sqrt(np.mean(difference**2)), abs=1e-9)
     both = curves.shift_deg(curve, 4)
@@ -69,12 +69,12 @@ def test_filter_gain_is_that_of_the_thesis_filter(order: int) -> None:
 
 
 def test_friction_of_each_direction() -> None:
-    better = harmonic_result()
-    forward, backward = curves.friction_Nm(better, 0.3)
+    harmonic = harmonic_result()
+    forward, backward = curves.friction_Nm(harmonic, 0.3)
     assert forward == pytest.approx(0.08 + 0.02 / math.e + 5e-4 * 0.3)
     assert backward == pytest.approx(-(0.08 + 0.01 / math.e + 5e-4 * 0.3))
-    assert curves.strongest_order(better) == 4
-    assert curves.strongest_order(dataclasses.replace(better, harmonics=())) == 1
+    assert curves.strongest_order(harmonic) == 4
+    assert curves.strongest_order(dataclasses.replace(harmonic, harmonics=())) == 1
 
 
 def test_ramp_is_read_as_it_was_recorded(tmp_path: Path) -> None:

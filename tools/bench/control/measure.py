@@ -36,7 +36,7 @@ def measure(name: str, cycles: int, out: Output) -> dict[str, Any]:  # noqa: ARG
     """
     robot = load_robot(name)
     ours, baseline = controls(robot)
-    motion = Motion(robot, ours, cycles + _BLOCK)
+    motion = PeriodicMotion(robot, ours, cycles + _BLOCK)
     spent: dict[str, list[int]] = {"ours": [], "obvious": []}
     difference = 0.0
     for first in range(0, cycles + _BLOCK, _BLOCK):
@@ -104,7 +104,7 @@ def controls(robot: Robot) -> tuple[CableControl, BaselineCableControl]:
     return ours, baseline
 
 
-class Motion:
+class PeriodicMotion:
     """A platform that goes round and round from the middle of its box: arrays over k cycles."""
 
     def __init__(self, robot: Robot, control: CableControl, cycles: int) -> None:
@@ -128,7 +128,7 @@ class Motion:
 
 
 def run_block(
-    control: CableControl | BaselineCableControl, motion: Motion, first: int, cycles: int
+    control: CableControl | BaselineCableControl, motion: PeriodicMotion, first: int, cycles: int
 ) -> tuple[list[int], FloatArray]:
     """Run a part of the motion; return what each update took, ns, and the torques (cycles, n)."""
     n = motion.angle_rad.shape[1]

@@ -41,7 +41,7 @@ _T = TypeVar("_T")
 
 
 @dataclass(frozen=True)
-class Run:
+class LoopRun:
     """Cycles of one variant, and what they cost."""
 
     compute_s: FloatArray
@@ -54,7 +54,7 @@ class Run:
     """Of the loop's whole process, for all cycles."""
 
     @classmethod
-    def of(cls, rows: Row, processor_s: float) -> Run:
+    def of(cls, rows: Row, processor_s: float) -> LoopRun:
         """Take what the loop has written of its cycles."""
         return cls(
             rows["compute_s"],
@@ -176,24 +176,24 @@ def _retried(work: Callable[[], _T]) -> _T:
     return work()
 
 
-def _daemon(robot: Robot, seconds: float, folder: Path) -> tuple[Run, Run]:
+def _daemon(robot: Robot, seconds: float, folder: Path) -> tuple[LoopRun, LoopRun]:
     """Run the loop alone, then with recording and clients of both live views."""
     with BenchDaemon(robot, folder) as daemon:
         daemon.move(_SPEED_RAD_S)
         time.sleep(_SETTLE_S)
-        alone = Run.of(*daemon.measure(seconds))
+        alone = LoopRun.of(*daemon.measure(seconds))
         with daemon.served():
             daemon.move(_SPEED_RAD_S)
             time.sleep(_SETTLE_S)
-            recorded = Run.of(*daemon.measure(seconds))
+            recorded = LoopRun.of(*daemon.measure(seconds))
         if not any(path.stat().st_size for path in daemon.recordings()):
             raise WorkFailedError(f"{robot.name}: nothing was recorded")
         return alone, recorded
 
 
-def _baseline(robot: Robot, seconds: float) -> Run:
+def _baseline(robot: Robot, seconds: float) -> LoopRun:
     measured = baseline_process.measure(robot, seconds, _SPEED_RAD_S)
-    return Run(
+    return LoopRun(
         np.array(measured["compute_s"]),
         np.array(measured["lateness_s"]),
         np.array(measured["exchange_s"]),
@@ -211,7 +211,7 @@ def _full_bus(robot: Robot, seconds: float, folder: Path) -> dict[str, Any]:
         time.sleep(_SETTLE_S)
         (bus,) = daemon.buses()
         before = query_status(bus)
-        run = Run.of(*daemon.measure(seconds))
+        run = LoopRun.of(*daemon.measure(seconds))
         after = query_status(bus)
     return {
         "axes": len(robot.axes),
@@ -223,7 +223,7 @@ def _full_bus(robot: Robot, seconds: float, folder: Path) -> dict[str, Any]:
     }
 
 
-def _combined(runs: Sequence[Run]) -> dict[str, Any]:
+def _combined(runs: Sequence[LoopRun]) -> dict[str, Any]:
     """Put rounds together; the processor time is the middle one of the rounds'."""
     return {
         "cycles": sum(run.cycles for run in runs),

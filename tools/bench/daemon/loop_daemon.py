@@ -160,11 +160,11 @@ class BenchDaemon:
         self._run("sweep", {"distance_rad": turns, "speed_rad_s": speed_rad_s, "legs": 1000})
         self._await("active", "sweep")
 
-    def _run(self, program: str, wanted: dict[str, Any]) -> None:
+    def _run(self, program: str, arguments: dict[str, Any]) -> None:
         self._keep_right_to_move()
         do = "program" if self.block.status()["state"] == "active" else "enable"
         right = self._right.number
-        self.block.post_command({"do": do, "right": right, "program": program, "wanted": wanted})
+        self.block.post_command({"do": do, "right": right, "program": program, "wanted": arguments})
 
     def _lead(self) -> None:
         """Send the platform to the other end of its way."""

@@ -13,7 +13,7 @@ from cdpr_rt.arrays import FloatArray
 from cdpr_rt.robots.interface import TensionOutcome
 from cdpr_rt.robots.tension.tension_distribution import (
     METHODS,
-    TensionDistribution,
+    TensionSolver,
     tension_distribution,
 )
 from cdpr_tools.bench.geometries import ROBOTS, CableRobot
@@ -40,7 +40,7 @@ _PERCENTILES = {"p50": 50.0, "p99": 99.0, "p99.9": 99.9}
 class _Ours:
     """One of the project's methods, asked as the solvers are."""
 
-    def __init__(self, robot: CableRobot, distribution: TensionDistribution, n: int) -> None:
+    def __init__(self, robot: CableRobot, distribution: TensionSolver, n: int) -> None:
         self.t = np.zeros(n)
         self.distribution = distribution
         self._w_e = robot.wrench_N_Nm
@@ -148,7 +148,7 @@ def _measure_robot(robot: CableRobot, poses: int, out: Output) -> dict[str, Any]
     }
 
 
-def _distribution(robot: CableRobot, method: str) -> TensionDistribution:
+def _distribution(robot: CableRobot, method: str) -> TensionSolver:
     n = robot.exit_points.shape[0]
     low, high = np.full(n, robot.low_N), np.full(n, robot.high_N)
     wanted = 0.5 * (low + high) if method == "minimum-deviation" else None

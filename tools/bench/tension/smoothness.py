@@ -8,7 +8,7 @@ import numpy as np
 
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.robots.interface import TensionOutcome
-from cdpr_rt.robots.tension.tension_distribution import TensionDistribution
+from cdpr_rt.robots.tension.tension_distribution import TensionSolver
 from cdpr_tools.bench.geometries import CableRobot
 
 _POINTS = 500
@@ -34,7 +34,7 @@ class Smoothness:
 class _PathPoint:
     """One distribution of one robot, asked for places along a path with one orientation."""
 
-    def __init__(self, robot: CableRobot, distribution: TensionDistribution) -> None:
+    def __init__(self, robot: CableRobot, distribution: TensionSolver) -> None:
         self._robot, self._distribution = robot, distribution
         self.rotation: FloatArray = np.eye(3)
 
@@ -59,7 +59,7 @@ class _PathPoint:
 
 
 def smoothness(
-    robot: CableRobot, distribution: TensionDistribution, points: int, seed: int
+    robot: CableRobot, distribution: TensionSolver, points: int, seed: int
 ) -> tuple[Smoothness, Smoothness]:
     """Follow straight paths of 0.5 m, `points` in all; return where tensions carry and where not.
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from cdpr_profiles import Robot
 from cdpr_rt.calibration.readings.data import MeasuredPoint, load_points
-from cdpr_tools.calibrate.measuring.run import Source
+from cdpr_tools.calibrate.measuring.run import PoseSource
 from cdpr_tools.errors import BadInputError
 
 _METRES: Final = 300.0
@@ -40,7 +40,7 @@ def check_points(path: Path, robot: Robot, poses: int | None) -> None:
             )
 
 
-def source_of(robot: Robot, asked: list[Source]) -> Source:
+def source_of(robot: Robot, asked: list[PoseSource]) -> PoseSource:
     """Return what a run is to use besides lengths and tensions; raises BadInputError."""
     if not asked and robot.platform is not None and len(robot.platform.controlled) == 6:
         return "camera"

@@ -42,18 +42,18 @@ def robot_of(daemon: Daemon) -> tuple[Robot, dict[str, Any]]:
     Raises BadInputError where it has no platform, runs with a calibration in force, by which its
     lengths would count, or has been loaded from another state of its file.
     """
-    told = daemon.get("/description")
-    robot = load_robot(told["reference"])
+    description = daemon.get("/description")
+    robot = load_robot(description["reference"])
     if robot.platform is None:
         raise BadInputError(f"{robot.path}: has no platform; allowed: robots with a [platform]")
-    if told["calibration"] is not None:
+    if description["calibration"] is not None:
         raise BadInputError(
             f"{robot.profile} runs with a calibration in force, and its lengths count by that; "
             f"allowed: by its file: cdpr calibrate undo {robot.reference}, then start it anew"
         )
-    if told["geometry_sha256"] != geometry_sha256(robot):
+    if description["geometry_sha256"] != geometry_sha256(robot):
         raise BadInputError(f"{robot.path}: has been changed since the daemon was started with it")
-    return robot, told
+    return robot, description
 
 
 def read_into(

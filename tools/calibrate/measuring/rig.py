@@ -20,10 +20,10 @@ from cdpr_rt.core.limits import Limit
 from cdpr_rt.core.states import LoopState
 from cdpr_rt.errors import TripError
 from cdpr_rt.procedures.calibration.measure_poses import (
-    Held,
     Look,
     NotThePoseError,
     PoseRefusedError,
+    TargetNotReached,
 )
 from cdpr_rt.runtime.control_loop.stop_requests import EMERGENCY_STOP
 from cdpr_tools.calibrate.measuring.outside import OutsidePose
@@ -106,7 +106,7 @@ class RigOperator:
         self._finish(_TIGHTEN_S)
         return np.pad(np.array(platform.home_m), (0, self.directions.d - self.directions.k))
 
-    def go(self, place: FloatArray) -> Held | None:
+    def go(self, place: FloatArray) -> TargetNotReached | None:
         """Take it to a place (d,), or hold it where it is once that takes too long.
 
         Raises PoseRefusedError, TripError, StoppedError.
@@ -123,14 +123,17 @@ class RigOperator:
         try:
             if self._ended(within_s):
                 return None
-            told = rig.progress
+            progress = rig.progress
             rig.program("hold")
             self._ended(_BRAKE_S)
         except WorkFailedError as error:
             raise self._trip(str(error)) from None
         here = self._here()
-        kept = told["trouble"] or told["held_back"] or told["missing"] or "still on its way"
-        return Held(here, f"{self._apart(here, place)} off after {within_s:.0f} s: {kept}")
+        kept = progress["trouble"] or progress["held_back"] or progress["missing"]
+        return TargetNotReached(
+            here,
+            f"{self._apart(here, place)} off after {within_s:.0f} s: {kept or 'still on its way'}",
+        )
 
     def _finish(self, within_s: float) -> None:
         """Run cycles until the program has nothing left to do, or somebody wants an end."""
@@ -170,8 +173,8 @@ class RigOperator:
 
     def _here(self) -> FloatArray:
         """Return the place (d,) at which the controller has the platform."""
-        told = self.rig.progress
-        return np.array([*told["position_m"], *told.get("rotation_rad", ())])
+        progress = self.rig.progress
+        return np.array([*progress["position_m"], *progress.get("rotation_rad", ())])
 
     def _planned_s(self, place: FloatArray, speed_m_s: float) -> float:
         """Return how long the way from here takes that `pose` plans, from rest to rest."""

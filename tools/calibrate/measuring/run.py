@@ -51,15 +51,15 @@ _FIRST_S, _HELD_OUT_S = 8.0, 3.0
 _SPARE = 10
 """Further places, for those that the robot refuses."""
 
-Source = Literal["camera", "scanner", "redundancy", "points"]
+PoseSource = Literal["camera", "scanner", "redundancy", "points"]
 
 
-class RunSettings(Profile):
+class CalibrationRunSettings(Profile):
     """What a run was asked for; one that goes on does the same."""
 
     robot: str
     plant: str | None
-    source: Source
+    source: PoseSource
     poses: int | None = Field(ge=1)
     """None: as many as bring something."""
     seed: int = Field(ge=0)
@@ -79,7 +79,7 @@ class RunSettings(Profile):
         """Write them into the folder of the run; raises ProfileError."""
         write_text(folder / SETTINGS, self.model_dump_json(indent=1) + "\n")
 
-    def going_on(self, poses: int | None, places: Listed | None) -> RunSettings:
+    def going_on(self, poses: int | None, places: Listed | None) -> CalibrationRunSettings:
         """Return them with as many poses, or a list; raises BadInputError for one of the other."""
         if poses is None:
             return self
@@ -89,7 +89,7 @@ class RunSettings(Profile):
         return self.model_copy(update={"poses": poses, "places": places})
 
     @classmethod
-    def load(cls, folder: Path) -> RunSettings:
+    def load(cls, folder: Path) -> CalibrationRunSettings:
         """Read them; raises ProfileError."""
         return read_json_model(folder / SETTINGS, cls)
 
@@ -171,7 +171,7 @@ class Kept:
 
 
 def measure(
-    out: Output, robot: Robot, settings: RunSettings, kept: Kept, enough: Enough
+    out: Output, robot: Robot, settings: CalibrationRunSettings, kept: Kept, enough: Enough
 ) -> CalibrationData:
     """Measure what is missing, on a simulator of its own; return all.
 
@@ -247,7 +247,9 @@ def _told_only(enough: Enough) -> Enough:
     return asked
 
 
-def judge_of(robot: Robot, settings: RunSettings, folder: Path) -> Callable[[Outcome], Judged]:
+def judge_of(
+    robot: Robot, settings: CalibrationRunSettings, folder: Path
+) -> Callable[[Outcome], Judged]:
     """Return what compares the outcome of a run with what its simulator knows."""
 
     def judge(outcome: Outcome) -> Judged:
@@ -261,7 +263,7 @@ def judge_of_folder(robot: Robot, folder: Path) -> Callable[[Outcome], Judged] |
     """Return what compares an outcome of a run's folder; None of one that holds readings alone."""
     if not (folder / SETTINGS).exists() or not (folder / OUTSIDE).exists():
         return None
-    return judge_of(robot, RunSettings.load(folder), folder)
+    return judge_of(robot, CalibrationRunSettings.load(folder), folder)
 
 
 def _going_on(robot: Robot, kept: Kept) -> str:

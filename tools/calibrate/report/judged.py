@@ -40,7 +40,7 @@ class PoseErrors:
         scale = Scale.of(poses[1:, 0], others[1:, 0])
         return cls(*relative_errors(poses, others), scale)
 
-    def told(self) -> dict[str, Any]:
+    def as_json(self) -> dict[str, Any]:
         """Return them for JSON."""
         far_mm = 1e3 * np.linalg.norm(self.position_m, axis=1)
         turned_deg = np.degrees(np.linalg.norm(self.turn_rad, axis=1))
@@ -78,14 +78,14 @@ class Judged:
 
     def verification(self) -> dict[str, Any]:
         """Return what the scanner says, for JSON."""
-        before = self.scanner_before.told()
+        before = self.scanner_before.as_json()
         frame = None
         if self.in_marker_frame is not None:
-            frame = {"marker": self.marker, **self.in_marker_frame.told()}
+            frame = {"marker": self.marker, **self.in_marker_frame.as_json()}
         return {
             "reference": "scanner",
             "by": "the simulated scanner, relative to the first pose",
-            **self.scanner.told(),
+            **self.scanner.as_json(),
             "of_which_scanner_mm": 1e3 * self.scanner_alone[0],
             "of_which_scanner_deg": float(np.degrees(self.scanner_alone[1])),
             "mean_position_error_before_mm": before["mean_position_error_mm"],
@@ -106,7 +106,7 @@ class Judged:
         lines = []
         for what, errors in shown:
             if errors is not None:
-                told = errors.told()
+                told = errors.as_json()
                 lines.append(
                     f"poses not used against {what}: mean {told['mean_position_error_mm']:.2f} mm "
                     f"and {told['mean_orientation_error_deg']:.3f} deg, worst "
@@ -124,7 +124,7 @@ class Judged:
 
     def true_errors(self) -> dict[str, Any]:
         """Return errors against what was true, for JSON."""
-        return {**self.truth.told(), "parameters": self.parameters}
+        return {**self.truth.as_json(), "parameters": self.parameters}
 
 
 def judged(robot: Robot, plant: Path | None, outcome: Outcome, outside: OutsidePoses) -> Judged:

@@ -62,7 +62,7 @@ class _Report:
             paragraph(
                 f"{data.robot} · {len(data.poses)} poses, {len(data.left_out)} refused · "
                 f"{'simulated' if data.simulated else 'measured'} {data.date} · in the frame of "
-                f"{outcome.told()['frame']}",
+                f"{outcome.as_json()['frame']}",
                 small=True,
             ),
             self._verdict(),
@@ -199,7 +199,7 @@ def _errors_table(judged: Judged) -> str:
     ):
         if errors is None:
             continue
-        told = errors.told()
+        told = errors.as_json()
         keys = ("position_error_mm", "orientation_error_deg")
         cells = [number(told[f"{kind}_{key}"]) for key in keys for kind in ("mean", "worst")]
         rows.append([escape(name), *cells, errors.scale.text])

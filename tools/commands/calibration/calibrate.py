@@ -183,7 +183,7 @@ def run(
         if points is not None:
             check_points(points, profile, None if resume else count)
 
-    given: dict[runs.Source, bool] = {
+    given: dict[runs.PoseSource, bool] = {
         "camera": camera,
         "redundancy": redundancy,
         "scanner": scanner,
@@ -192,7 +192,7 @@ def run(
 
     folder = out_dir or Path("out") / f"calibrate-{profile.profile}"
     if resume:
-        settings = runs.RunSettings.load(folder)
+        settings = runs.CalibrationRunSettings.load(folder)
         source = settings.source
         settings = settings.going_on(count, listed)
         if points is not None:
@@ -206,7 +206,7 @@ def run(
         source = source_of(profile, [name for name, asked in given.items() if asked])
         if known is not None and source != "camera":
             raise BadInputError("--hand-eye: is of a camera; allowed: with --camera")
-        settings = runs.RunSettings(
+        settings = runs.CalibrationRunSettings(
             robot=profile.profile,
             plant=None if plant is None else str(plant.resolve()),
             source=source,

@@ -43,8 +43,8 @@ def read(
     from cdpr_tools.calibrate.measuring import daemon_pose  # noqa: PLC0415  # slow to load
     from cdpr_tools.calibrate.measuring.run import DATA, IMAGES  # noqa: PLC0415  # slow to load
 
-    robot, told = daemon_pose.robot_of(daemon)
-    data = daemon_pose.data_of(out_dir, robot, told["simulated"])
+    robot, description = daemon_pose.robot_of(daemon)
+    data = daemon_pose.data_of(out_dir, robot, description["simulated"])
     opened = None
     if camera is not None:
         from cdpr_tools.calibrate.measuring.pose_camera import (  # noqa: PLC0415  # needs an extra
@@ -64,5 +64,5 @@ def read(
     if number >= _ENOUGH:
         out.say(f"fit them: cdpr calibrate fit {robot.reference} --data {out_dir}")
     reading = data.poses[-1]
-    told = {"pose": number, **reading.model_dump(include={"target", "length_m", "tension_N"})}
-    out.result({"ok": True, **told, "data": out_dir / DATA})
+    figures = {"pose": number, **reading.model_dump(include={"target", "length_m", "tension_N"})}
+    out.result({"ok": True, **figures, "data": out_dir / DATA})

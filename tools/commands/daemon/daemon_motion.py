@@ -18,7 +18,7 @@ from cdpr_tools.client.motion import (
     is_done,
     require_program,
 )
-from cdpr_tools.client.platform_move import Frame, PlatformMove
+from cdpr_tools.client.platform_move import PlatformMove, ReferenceFrame
 from cdpr_tools.client.refusals import in_typed_words
 from cdpr_tools.commands.daemon.with_daemon import with_daemon
 from cdpr_tools.errors import BadInputError
@@ -92,8 +92,9 @@ def move(
         bool, typer.Option("--relative", help="Relative to the present position.")
     ] = False,
     frame: Annotated[
-        Frame, typer.Option(help="With --relative: along and about whose axes the platform moves.")
-    ] = Frame.ROOM,
+        ReferenceFrame,
+        typer.Option(help="With --relative: along and about whose axes the platform moves."),
+    ] = ReferenceFrame.ROOM,
     cable: Annotated[
         bool, typer.Option("--cable", help="Relative, in mm of cable; positive pays out.")
     ] = False,
@@ -111,7 +112,7 @@ def move(
             raise BadInputError("--to, --rotate: not together with axes or --cable")
         _move_platform(daemon, out, PlatformMove(to, rotate, relative, frame, speed))
         return
-    if frame is not Frame.ROOM:
+    if frame is not ReferenceFrame.ROOM:
         raise BadInputError(f"--frame {frame}: allowed: together with --to or --rotate")
     _run_to_end(daemon, out, "pid", _to_angles(daemon, axes or [], relative, cable, speed))
 
@@ -199,7 +200,7 @@ def _given(daemon: Daemon, texts: list[str], unit: str) -> tuple[int, dict[int, 
     return len(axes), values
 
 
-class Source(StrEnum):
+class LengthSource(StrEnum):
     """From what the cables' lengths follow."""
 
     HOME = "home"
@@ -213,7 +214,7 @@ def tighten(
     daemon: Daemon,
     out: Output,
     source: Annotated[
-        Source | None,
+        LengthSource | None,
         typer.Option(
             "--from",
             help="Lengths of the cables: the platform stands at home, those of the last stop, or "

@@ -19,7 +19,7 @@ from cdpr_tools.errors import BadInputError, WorkFailedError, raised_as
 _OBJECT = 0x2F00
 
 
-class Fault(StrEnum):
+class InjectedFault(StrEnum):
     """What can be brought about in any axis."""
 
     CUT_CABLE = "cut-cable"
@@ -39,12 +39,12 @@ class _How(NamedTuple):
 
 
 _HOW = {
-    Fault.CUT_CABLE: _How(12, 1, 1, 1, ""),
-    Fault.SLIP: _How(13, 100, 1, 0xFFFF, "mm"),
-    Fault.ENCODER_JUMP: _How(11, 500, -(2**31), 2**31 - 1, "counts"),
-    Fault.DRIVE_FAULT: _How(1, 0x7305, 1, 0xFFFF, ""),
-    Fault.SILENCE: _How(6, 0xFFFF, 1, 0xFFFF, "ms"),
-    Fault.CELL_OFF: _How(14, 40, -(2**15), 2**15 - 1, "N"),
+    InjectedFault.CUT_CABLE: _How(12, 1, 1, 1, ""),
+    InjectedFault.SLIP: _How(13, 100, 1, 0xFFFF, "mm"),
+    InjectedFault.ENCODER_JUMP: _How(11, 500, -(2**31), 2**31 - 1, "counts"),
+    InjectedFault.DRIVE_FAULT: _How(1, 0x7305, 1, 0xFFFF, ""),
+    InjectedFault.SILENCE: _How(6, 0xFFFF, 1, 0xFFFF, "ms"),
+    InjectedFault.CELL_OFF: _How(14, 40, -(2**15), 2**15 - 1, "N"),
 }
 
 
@@ -56,7 +56,9 @@ def fault(
     machine: Annotated[
         str, typer.Argument(help="Winch or robot that is simulated.", metavar="WINCH|ROBOT")
     ],
-    what: Annotated[Fault, typer.Argument(help="What goes wrong, at once.", metavar="FAULT")],
+    what: Annotated[
+        InjectedFault, typer.Argument(help="What goes wrong, at once.", metavar="FAULT")
+    ],
     value: Annotated[
         str | None,
         typer.Argument(
@@ -109,13 +111,13 @@ def _buses_of_daemon(robot: str) -> list[str]:
     return [f"{name}={bus['url']}" for name, bus in buses.items()]
 
 
-def _amount_text(what: Fault, amount: int, how: _How) -> str:
-    if what is Fault.CUT_CABLE:
+def _amount_text(what: InjectedFault, amount: int, how: _How) -> str:
+    if what is InjectedFault.CUT_CABLE:
         return ""
-    return f" {amount:#06x}" if what is Fault.DRIVE_FAULT else f" {amount} {how.unit}"
+    return f" {amount:#06x}" if what is InjectedFault.DRIVE_FAULT else f" {amount} {how.unit}"
 
 
-def _amount(what: Fault, how: _How, text: str | None) -> int:
+def _amount(what: InjectedFault, how: _How, text: str | None) -> int:
     try:
         amount = how.usual if text is None else int(text, 0)
     except ValueError:

@@ -164,11 +164,11 @@ def _listen(settings: RunSettings, app: ASGIApp, service: Service) -> list[Serve
     return servers
 
 
-async def plan_in_process(robot: str, file: Path, wanted: dict[str, Any]) -> tuple[int, str]:
+async def plan_in_process(robot: str, file: Path, request: dict[str, Any]) -> tuple[int, str]:
     """Plan a file for a robot's profile; return exit status and the JSON line."""
-    options = [f"--blend={wanted['blend_mm']}", f"--ignore={wanted['ignore']}"]
-    if wanted["origin_mm"] is not None:
-        options.append(f"--origin={wanted['origin_mm']}")
+    options = [f"--blend={request['blend_mm']}", f"--ignore={request['ignore']}"]
+    if request["origin_mm"] is not None:
+        options.append(f"--origin={request['origin_mm']}")
     command = [sys.executable, "-P", "-m", "cdpr_tools.cli", "path", str(file)]
     process = await asyncio.create_subprocess_exec(
         "sh", "-c", _WITHIN, "sh", *command, "--robot", robot, "--keep", "--json", *options,

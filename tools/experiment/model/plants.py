@@ -13,7 +13,7 @@ from cdpr_rt.motion.approach import approach
 from cdpr_rt.motion.stream_buttons import CLUTCH
 
 
-class Plant(Protocol):
+class TeleoperatedRobot(Protocol):
     """A robot that takes a hand's packets; it moves on only in `advance`."""
 
     @property

@@ -22,7 +22,7 @@ from cdpr_rt.programs.platform.platform_program import (
     along_velocity,
     synchronise,
 )
-from cdpr_rt.refusal import Refusal, RefusalCode
+from cdpr_rt.refusal import CommandRefusal, RefusalCode
 
 _KEYS: Final = ("plan", "resume", "pause", "back_m", "feed")
 _SLOWEST: Final = 0.01
@@ -168,7 +168,7 @@ class PathProgram(PlatformProgram):
         if left is None:
             nothing = {"left": "path", "instead": "plan"}
             asked = {what: True}
-            raise ProgramError(Refusal(RefusalCode.NOTHING_LEFT, self.name, asked, nothing))
+            raise ProgramError(CommandRefusal(RefusalCode.NOTHING_LEFT, self.name, asked, nothing))
         name, time_s = left
         plan = self._plan
         if plan is None or plan.name != name:
@@ -186,7 +186,7 @@ class PathProgram(PlatformProgram):
         obstacle = control.infeasibility(there) or control.way_infeasibility(there, here)
         if obstacle:
             why = {"why": f"on the way to where it begins: {obstacle}"}
-            raise ProgramError(Refusal(RefusalCode.NOT_FEASIBLE, self.name, arguments=why))
+            raise ProgramError(CommandRefusal(RefusalCode.NOT_FEASIBLE, self.name, arguments=why))
 
     def _take(self, command: _Command) -> None:
         self._feed = command.feed

@@ -12,7 +12,7 @@ from cdpr_rt.arrays import FloatArray
 from cdpr_rt.core.exchange import AxisFeedback
 from cdpr_rt.programs.platform.platform_program import PlatformParts, distance_m
 from cdpr_rt.programs.platform.tightening.standing_tensions import StandingTensions
-from cdpr_rt.refusal import Refusal, RefusalCode
+from cdpr_rt.refusal import CommandRefusal, RefusalCode
 from cdpr_rt.robots.rigid_body import G_m_s2
 
 _TURNED_MORE_rad = math.radians(30.0)
@@ -28,13 +28,15 @@ _FALLEN = (
 _FALLEN_ELSEWHERE = "; where it stands so elsewhere: from lengths"
 
 
-def bad_source(asked: Mapping[str, Any], why: str, *allowed: str) -> Refusal:
+def bad_source(asked: Mapping[str, Any], why: str, *allowed: str) -> CommandRefusal:
     """Return the refusal to take the cables' lengths from where it was `asked`."""
     arguments = {"why": why, "allowed": allowed}
-    return Refusal(RefusalCode.BAD_SOURCE, "tighten", asked, arguments)
+    return CommandRefusal(RefusalCode.BAD_SOURCE, "tighten", asked, arguments)
 
 
-def source_refusal(parts: PlatformParts, source: str, asked: Mapping[str, Any]) -> Refusal | None:
+def source_refusal(
+    parts: PlatformParts, source: str, asked: Mapping[str, Any]
+) -> CommandRefusal | None:
     """Return why not to take the lengths from a source, None for nothing.
 
     Where the platform was let go, or fell, somebody has to have `asked` for it by name.

@@ -159,8 +159,8 @@ class TightenProgram(PlatformProgram):
         done = tight and self._at_rest
         state = {"stage": stage, "tight": tight, "done": float(done), "trouble": self._failure}
         if tight:
-            told = super().progress()
-            return {**told, **state, "trouble": self._failure or told["trouble"]}
+            progress = super().progress()
+            return {**progress, **state, "trouble": self._failure or progress["trouble"]}
         tension_N = self._control.tension_N if held else self._winches.tension_N
         return {"tension_N": tension_N.tolist(), **state}
 
@@ -294,11 +294,11 @@ class TightenProgram(PlatformProgram):
             return self._last.at(feedback.position_rad, self._cable)
         if self._source == "lengths":
             return self._parts.estimator.estimate.cable_length_m
-        told = self._parts.estimator.estimate
+        estimate = self._parts.estimator.estimate
+        self._home_measured[:] = estimate.tension_measured
         middle_rad = 0.5 * (feedback.position_rad + self._rising_rad)
-        self._home_rad[:] = np.where(told.tension_measured, feedback.position_rad, middle_rad)
-        self._home_measured[:] = told.tension_measured
-        self._home_N[:] = np.where(told.tension_measured, told.tension_N, self._pretension_N)
+        self._home_rad[:] = np.where(self._home_measured, feedback.position_rad, middle_rad)
+        self._home_N[:] = np.where(self._home_measured, estimate.tension_N, self._pretension_N)
         hysteresis = self._cable * (feedback.position_rad - self._home_rad)
         return np.asarray(self._control.lengths_at_home(self._home_N) + hysteresis)
 

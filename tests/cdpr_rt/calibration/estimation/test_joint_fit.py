@@ -28,12 +28,12 @@ from cdpr_rt.calibration.verification.verification import (
     verifies,
 )
 from cdpr_rt.errors import InvalidRequestError
-from cdpr_tools.calibrate.made_readings import Errors, HAND_EYE_m
+from cdpr_tools.calibrate.made_readings import ErrorBudget, HAND_EYE_m
 from tests.cdpr_rt.calibration.camera_robot import FEW, CameraRobot, camera_robot
 
 _FREE = (0, 1, 2, 3, 4, 5)
 _STEP = 1e-6
-NOTHING_WRONG = Errors(
+NOTHING_WRONG = ErrorBudget(
     elongation=0.0, encoder_m=1e-6, tension_N=0.0, corner_px=0.01, focal=0.0, centre_px=0.0,
     distortion=0.0, print_scale=0.0, sheet_scale=0.0, bend_m=0.0, known_m=0.0,
 )  # fmt: skip
@@ -126,8 +126,9 @@ def test_without_noise_the_truth_is_found_and_no_place_of_the_camera_need_be_kno
 
 def test_it_agrees_with_an_independent_solver() -> None:
     # exit points and offsets by (3.18), corners by OpenCV; markers and all poses unknown
-    what = camera_robot(7, 7, Errors(elongation=0.0, drum=0.0), replace(FEW, rows=2, columns=2),
-                        identified=("exit", "offset"))  # fmt: skip
+    errors = ErrorBudget(elongation=0.0, drum=0.0)
+    sheets = replace(FEW, rows=2, columns=2)
+    what = camera_robot(7, 7, errors, sheets, identified=("exit", "offset"))
     setup = what.images.setup
     held = setup.intrinsics.model_copy(update={"sigmas": None})
     images = Images(setup.model_copy(update={"intrinsics": held}), what.images.sightings)
@@ -201,7 +202,7 @@ def _plain_solution(
 
 def test_errors_are_as_large_as_predicted() -> None:
     # nothing that the model does not know: noise of corners and encoders, drums, tape, lens, size
-    errors = Errors(sheet_scale=0.0, bend_m=0.0, tension_N=0.0, elongation=0.0)
+    errors = ErrorBudget(sheet_scale=0.0, bend_m=0.0, tension_N=0.0, elongation=0.0)
     chi, freedom = 0.0, 0
     for seed in range(3):
         what = camera_robot(15, 20 + seed, errors, hand_eye_known=True,
@@ -295,7 +296,7 @@ def test_a_wrong_size_of_all_sheets_is_told_by_the_cables(layout: object) -> Non
     assert len(sized) == 1 and "smaller than told" in sized[0].text
     assert sized[0].size == pytest.approx(-0.0385, abs=0.008)
     assert off_mm(what, done.found.poses) < 3.0
-    assert ("places of markers are known" in done.told()["frame"]) == bool(layout.known)  # type: ignore[attr-defined]
+    assert ("places of markers are known" in done.as_json()["frame"]) == bool(layout.known)  # type: ignore[attr-defined]
 
 
 @pytest.mark.parametrize("drums", [(0.02,) * 8, (0.0, 0.0, 0.03, 0.0, 0.0, 0.0, 0.0, 0.0)])
@@ -326,8 +327,8 @@ def test_intrinsics_of_another_camera_are_named() -> None:
 
 
 def test_a_robot_that_is_as_its_file_says_is_not_calibrated_for_the_worse() -> None:
-    right = Errors(exit_m=0.0, home_m=0.0, home_deg=0.0, drum=0.0, elongation=0.0)
-    for errors, known_better in ((right, False), (Errors(), True)):
+    right = ErrorBudget(exit_m=0.0, home_m=0.0, home_deg=0.0, drum=0.0, elongation=0.0)
+    for errors, known_better in ((right, False), (ErrorBudget(), True)):
         what = camera_robot(20, errors=errors)
         done = outcome_of(what, what.seen, what.images)
         told = done.insignificance() or ""
@@ -341,7 +342,7 @@ def test_what_no_pose_held_out_verifies_is_not_taken_over() -> None:
         for one, out in zip(what.images.sightings, held_out(20), strict=True)
     ]
     done = outcome_of(what, what.seen, replace(what.images, sightings=blind))
-    assert done.told()["verification"]["reference"] == "none"
+    assert done.as_json()["verification"]["reference"] == "none"
     assert any("nothing verifies it" in text for text in done.objections())
 
 

@@ -15,7 +15,7 @@ from cdpr_rt.calibration.estimation.noise import (
 )
 from cdpr_rt.calibration.estimation.parameters import DRUM
 from cdpr_rt.calibration.estimation.residuals import length_std_m
-from cdpr_tools.calibrate.made_readings import Errors
+from cdpr_tools.calibrate.made_readings import ErrorBudget
 from tests.cdpr_rt.calibration.camera_robot import KNOWN, CameraRobot, camera_robot
 from tests.cdpr_rt.calibration.made_up import made_up, measured
 
@@ -28,7 +28,7 @@ def fitted(what: CameraRobot) -> Fit:
 @pytest.mark.parametrize("tension_N", [0.8, 2.5])
 def test_lengths_and_tensions_tell_how_uncertain_they_are(tension_N: float) -> None:
     guess = replace(KNOWN, length_m=3e-4, tension_N=4.0)
-    what = camera_robot(40, 5, Errors(tension_N=tension_N), knowledge=guess)
+    what = camera_robot(40, 5, ErrorBudget(tension_N=tension_N), knowledge=guess)
     first = fitted(what)
     assert balance(first, first.seen).std_N == pytest.approx(tension_N, rel=0.12)  # 236 rows: 5 %
     _, weighed = fit_with_noise_seen(first, what.geometry)
@@ -38,7 +38,7 @@ def test_lengths_and_tensions_tell_how_uncertain_they_are(tension_N: float) -> N
 
 
 def test_another_mass_than_the_file_s_is_not_taken_for_noise() -> None:
-    found = fitted(camera_robot(40, 5, Errors(tension_N=0.5)))
+    found = fitted(camera_robot(40, 5, ErrorBudget(tension_N=0.5)))
     told = balance(found, found.seen).std_N
     assert told is not None
     seen = replace(found.seen, tension_N=1.1 * found.seen.tension_N)  # as of a mass 10 % larger
@@ -54,7 +54,7 @@ def test_few_poses_tell_nothing_of_tensions() -> None:
 
 
 def test_balanced_tensions_hold_the_platform_and_err_less() -> None:
-    what = camera_robot(40, 5, Errors(tension_N=3.0))
+    what = camera_robot(40, 5, ErrorBudget(tension_N=3.0))
     first = fitted(what)
     tension = first.seen.tension_N.copy()
     tension[0] += 60.0  # as of a platform on its stand
@@ -130,7 +130,7 @@ def test_a_fit_that_begins_where_another_ended_settles_there() -> None:
 def test_errors_are_as_large_as_predicted_where_tensions_err_as_much_as_they_differ() -> None:
     by_all, by_noise = [], []
     for seed in range(30, 33):
-        what = camera_robot(40, seed, Errors(tension_N=3.0, spread_N=10.0))
+        what = camera_robot(40, seed, ErrorBudget(tension_N=3.0, spread_N=10.0))
         found, _ = fit_with_noise_seen(fitted(what), what.geometry)
         rows, n = found.geometry.rows, what.geometry.n
         drums = rows.index(DRUM) + np.arange(n) * len(rows)
@@ -170,7 +170,7 @@ def test_elongation_and_drums_err_as_predicted_whichever_tensions_err() -> None:
     off: dict[str, list[float]] = {"true": [], "told": []}
     for about, errors in off.items():
         for seed in range(30, 33):
-            what = camera_robot(40, seed, Errors(tension_N=3.0 if about == "true" else 0.05))
+            what = camera_robot(40, seed, ErrorBudget(tension_N=3.0 if about == "true" else 0.05))
             if about == "told":
                 what = with_tensions_about_those_told(what, 3.0, seed)
             weighed = replace(what.geometry, knowledge=replace(KNOWN, tension_N=3.0, yielding=1.43))

@@ -28,7 +28,7 @@ def test_islands_make_a_calibration_not_good(apart: bool) -> None:
     said = "\n".join(outcome.verdict())
     assert ("NOT GOOD: markers fall into 2 islands that no image connects" in said) == apart
     assert ("together with the others: take one that shows" in said) == apart
-    assert len(outcome.told()["coverage"]["islands"]) == 1 + apart
+    assert len(outcome.as_json()["coverage"]["islands"]) == 1 + apart
     assert any("islands" in one for one in outcome.objections()) == apart
     assert not (outcome.good and apart)
 

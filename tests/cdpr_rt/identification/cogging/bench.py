@@ -15,7 +15,7 @@ from cdpr_rt.control.compensation import AxisCompensation, Compensation, Frictio
 from cdpr_rt.control.compensation import _torque as compensate
 from cdpr_rt.control.pid import _update as pid_update
 from cdpr_rt.control.tuning import design_pid, sweep_gain
-from cdpr_rt.control.validation import Metrics, evaluate, worst
+from cdpr_rt.control.validation import ValidationMetrics, evaluate, worst
 from cdpr_rt.identification import (
     SecondPass,
     SweepData,
@@ -259,7 +259,7 @@ class Commissioned:
     second: SecondPass
 
     @property
-    def better(self):
+    def harmonic(self):
         return self.second.best
 
 
@@ -271,10 +271,10 @@ def fast_legs(bench):
     return legs + [bench.ramp(v, 0.25, ramp_s=0.3, gains=gains)[0] for v in (12, -12)]
 
 
-def compensation(better):
-    look_ahead = max(0.0, better.latency_s.value)
+def compensation(harmonic):
+    look_ahead = max(0.0, harmonic.latency_s.value)
     return AxisCompensation(
-        better.tables(4096), better.friction, look_ahead, OBSERVER, most_Nm=10.0
+        harmonic.tables(4096), harmonic.friction, look_ahead, OBSERVER, most_Nm=10.0
     )
 
 
@@ -312,10 +312,10 @@ def judged_turns(setpoint_rad, setpoint_velocity_rad_s, lead_in_rad):
     return marked
 
 
-def validate(done: Commissioned) -> dict[str, Metrics]:
+def validate(done: Commissioned) -> dict[str, ValidationMetrics]:
     """The ramps of the thesis' validation, both ways, judged on the true angle."""
     bench, plant = done.bench, done.bench.plant
-    gains = design_pid(done.better.inertia_kg_m2.value, LATENCY, BANDWIDTH).gains
+    gains = design_pid(done.harmonic.inertia_kg_m2.value, LATENCY, BANDWIDTH).gains
     latency = plant.delay + 1.5 * T + 1 / (2 * math.pi * plant.current_Hz)
     result = {}
     for name in ("better", "oracle", "none", "thesis"):
@@ -324,7 +324,7 @@ def validate(done: Commissioned) -> dict[str, Metrics]:
             known = {
                 "none": lambda: None,
                 "thesis": lambda: AxisCompensation(done.thesis.tables(4096), most_Nm=10.0),
-                "better": lambda: compensation(done.better),
+                "better": lambda: compensation(done.harmonic),
                 "oracle": lambda: bench.oracle(latency, OBSERVER),
             }[name]()
             run, rec = bench.ramp(v, 1, lead=0.3, gains=gains, comp=known)

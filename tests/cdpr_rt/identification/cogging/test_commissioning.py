@@ -36,32 +36,32 @@ def default():
 
 
 def test_default_motor_is_identified(default):
-    better, plant = default.better, default.bench.plant
-    assert better.orders == (4,)
+    harmonic, plant = default.harmonic, default.bench.plant
+    assert harmonic.orders == (4,)
     amplitude = true_amplitude(default.bench, 0.06)
-    assert better.amplitudes_Nm[0] == pytest.approx(amplitude, rel=2e-3)
-    inertia = better.inertia_kg_m2
+    assert harmonic.amplitudes_Nm[0] == pytest.approx(amplitude, rel=2e-3)
+    inertia = harmonic.inertia_kg_m2
     assert abs(inertia.value - plant.inertia / 1.04) < inertia.half_width
-    assert better.latency_s.value == pytest.approx(0.00232, abs=2e-4)
+    assert harmonic.latency_s.value == pytest.approx(0.00232, abs=2e-4)
     friction = (1 + plant.friction_per_K * default.bench.rise) / 1.04
-    assert better.coulomb_forward_Nm.value == pytest.approx(0.08 * 1.05 * friction, rel=0.01)
-    assert better.coulomb_backward_Nm.value == pytest.approx(0.08 * 0.95 * friction, rel=0.01)
-    assert better.viscous_Nms_rad.value == pytest.approx(5e-4 / 1.04, rel=0.05)
-    assert better.friction.stribeck_speed_rad_s == pytest.approx(0.2, rel=0.2)
-    assert better.coverage == 1.0
-    assert better.harmonics[0].per_pole_pair == 1.0
+    assert harmonic.coulomb_forward_Nm.value == pytest.approx(0.08 * 1.05 * friction, rel=0.01)
+    assert harmonic.coulomb_backward_Nm.value == pytest.approx(0.08 * 0.95 * friction, rel=0.01)
+    assert harmonic.viscous_Nms_rad.value == pytest.approx(5e-4 / 1.04, rel=0.05)
+    assert harmonic.friction.stribeck_speed_rad_s == pytest.approx(0.2, rel=0.2)
+    assert harmonic.coverage == 1.0
+    assert harmonic.harmonics[0].per_pole_pair == 1.0
 
 
 def test_default_motor_runs_smoothly(default):
     figures = validate(default)
     thesis = ratios(figures["none"], figures["thesis"])
-    better = ratios(figures["none"], figures["better"])
+    harmonic = ratios(figures["none"], figures["better"])
     assert thesis.rms_position_error >= 3
     assert thesis.peak_pid_effort >= 6
     assert thesis.peak_velocity_error >= 5
-    assert better.rms_position_error >= 10
-    assert better.peak_pid_effort >= 10
-    assert better.peak_velocity_error >= 8
+    assert harmonic.rms_position_error >= 10
+    assert harmonic.peak_pid_effort >= 10
+    assert harmonic.peak_velocity_error >= 8
     assert_near_oracle(figures)
 
 
@@ -75,9 +75,9 @@ def test_slots_with_runaway_odd_encoder_and_drift():
     )
     done = commission(plant)
     assert done.thesis.repaired_fraction > 0.1
-    assert {24, 72} <= set(done.better.orders)
+    assert {24, 72} <= set(done.harmonic.orders)
     for order, amplitude, _ in plant.terms:
-        found = next(h for h in done.better.harmonics if h.order == order)
+        found = next(h for h in done.harmonic.harmonics if h.order == order)
         assert found.amplitude_Nm.value == pytest.approx(
             true_amplitude(done.bench, amplitude), rel=0.01
         )
@@ -94,9 +94,9 @@ def test_low_friction_and_offset_ripple():
         seed=3,
     )
     done = commission(plant)
-    assert done.better.orders[0] == 4
-    assert done.better.amplitudes_Nm[0] == pytest.approx(0.08, rel=5e-3)
-    assert "current sensor" in done.better.harmonics[0].hint
+    assert done.harmonic.orders[0] == 4
+    assert done.harmonic.amplitudes_Nm[0] == pytest.approx(0.08, rel=5e-3)
+    assert "current sensor" in done.harmonic.harmonics[0].hint
     assert_near_oracle(validate(done))
 
 
@@ -111,4 +111,4 @@ def test_motor_without_cogging_gets_no_order():
 
 
 def test_compensation_looks_ahead_by_the_identified_latency(default):
-    assert compensation(default.better).look_ahead_s == default.better.latency_s.value
+    assert compensation(default.harmonic).look_ahead_s == default.harmonic.latency_s.value

@@ -17,8 +17,8 @@ from scipy.optimize import linprog, lsq_linear
 from cdpr_rt.robots.interface import TensionOutcome
 from cdpr_rt.robots.tension.tension_distribution import (
     METHODS,
-    TensionDistribution,
     TensionError,
+    TensionSolver,
     tension_distribution,
 )
 from tests.cdpr_rt.robots.tension.cable_robots import (
@@ -36,7 +36,7 @@ seeds = st.integers(0, 2**32 - 1)
 
 def of(
     method: str, low: FloatArray, high: FloatArray, scale: FloatArray, wanted: FloatArray
-) -> TensionDistribution:
+) -> TensionSolver:
     return tension_distribution(
         method, low, high, scale, wanted if method == "minimum-deviation" else None
     )

@@ -14,7 +14,7 @@ from cdpr_rt.core.shared_block import RowWriter
 from cdpr_rt.core.states import Reaction
 from cdpr_rt.motion.stream_buttons import confirmation, stream_buttons
 from cdpr_rt.service.recordings.recording import Recorder
-from cdpr_rt.service.recordings.recording_events import Events
+from cdpr_rt.service.recordings.recording_events import EventDetector
 from cdpr_rt.service.recordings.recording_file import RecordingError
 from cdpr_rt.service.recordings.recording_reader import (
     CLOSED,
@@ -341,7 +341,7 @@ def test_what_an_operator_confirms_is_an_event_once() -> None:
     rows["stream_buttons"][20:40] = stream_buttons(clutch=False, confirmed=1)
     rows["stream_buttons"][40:] = stream_buttons(clutch=True, confirmed=3)  # number 2 was lost
     rows["reaction"][50:] = Reaction.HOLD
-    watched = Events()
+    watched = EventDetector()
     watched.of_rows(rows[:5])
     told = [event for some in (rows[5:30], rows[30:]) for event, _ in watched.of_rows(some)]
     assert [(event["cycle"], event["text"]) for event in told] == [

@@ -12,9 +12,9 @@ import pytest
 from cdpr_rt.errors import ControlError
 from cdpr_rt.service.streams.stream_packet import (
     Bye,
-    Fault,
     Hello,
     PacketError,
+    PacketFault,
     Standing,
     StreamAnswer,
     parse,
@@ -183,7 +183,7 @@ def test_answers_cannot_be_made_without_the_key() -> None:
     assert data is not None
     with pytest.raises(PacketError) as caught:
         parse(data[:-1] + bytes([data[-1] ^ 1]), key)
-    assert caught.value.fault == Fault.TAG
+    assert caught.value.fault == PacketFault.TAG
     with pytest.raises(PacketError):
         parse(data, stream_key(KEY))
 

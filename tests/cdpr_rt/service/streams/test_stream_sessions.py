@@ -11,9 +11,9 @@ from cdpr_rt.service.lease import LeaseError
 from cdpr_rt.service.streams.stream_packet import (
     TAG_BYTES,
     Bye,
-    Fault,
     Hello,
     PacketError,
+    PacketFault,
     Standing,
     StreamAnswer,
     Welcome,
@@ -72,24 +72,24 @@ def test_a_delay_that_cannot_be_is_not_believed(echo_ns: int) -> None:
 @pytest.mark.parametrize(
     ("change", "fault"),
     [
-        ({"position_m": (math.nan, 0.0, 0.0)}, Fault.NOT_FINITE),
-        ({"position_m": (0.0, math.inf, 0.0)}, Fault.NOT_FINITE),
-        ({"position_m": (0.0, 0.0, 20.1)}, Fault.ABSURD),
-        ({"position_m": (1e308, 1e308, 1e308)}, Fault.ABSURD),
-        ({"position_m": (1.0, 0.0, 0.0), "scale": 50.0}, Fault.ABSURD),
-        ({"quaternion": (math.nan, 0.0, 0.0, 0.0)}, Fault.NOT_FINITE),
-        ({"quaternion": (0.0, 0.0, 0.0, 0.0)}, Fault.ABSURD),
-        ({"quaternion": (2.0, 0.0, 0.0, 0.0)}, Fault.ABSURD),
-        ({"scale": 0.0}, Fault.ABSURD),
-        ({"scale": -1.0}, Fault.ABSURD),
-        ({"scale": math.inf}, Fault.NOT_FINITE),
-        ({"scale": 101.0, "position_m": (0.0, 0.0, 0.0)}, Fault.ABSURD),
-        ({"sent_ns": -1}, Fault.ABSURD),
-        ({"sent_ns": 1 << 62}, Fault.ABSURD),
-        ({"session": 0}, Fault.ABSURD),
+        ({"position_m": (math.nan, 0.0, 0.0)}, PacketFault.NOT_FINITE),
+        ({"position_m": (0.0, math.inf, 0.0)}, PacketFault.NOT_FINITE),
+        ({"position_m": (0.0, 0.0, 20.1)}, PacketFault.ABSURD),
+        ({"position_m": (1e308, 1e308, 1e308)}, PacketFault.ABSURD),
+        ({"position_m": (1.0, 0.0, 0.0), "scale": 50.0}, PacketFault.ABSURD),
+        ({"quaternion": (math.nan, 0.0, 0.0, 0.0)}, PacketFault.NOT_FINITE),
+        ({"quaternion": (0.0, 0.0, 0.0, 0.0)}, PacketFault.ABSURD),
+        ({"quaternion": (2.0, 0.0, 0.0, 0.0)}, PacketFault.ABSURD),
+        ({"scale": 0.0}, PacketFault.ABSURD),
+        ({"scale": -1.0}, PacketFault.ABSURD),
+        ({"scale": math.inf}, PacketFault.NOT_FINITE),
+        ({"scale": 101.0, "position_m": (0.0, 0.0, 0.0)}, PacketFault.ABSURD),
+        ({"sent_ns": -1}, PacketFault.ABSURD),
+        ({"sent_ns": 1 << 62}, PacketFault.ABSURD),
+        ({"session": 0}, PacketFault.ABSURD),
     ],
 )
-def test_nonsense_is_dropped_and_counted(change: dict[str, object], fault: Fault) -> None:
+def test_nonsense_is_dropped_and_counted(change: dict[str, object], fault: PacketFault) -> None:
     rig = StreamRig()
     packet = replace(BASE, **{"session": rig.given.number, **change})  # type: ignore[arg-type]
     if packet.session == 0:

@@ -24,10 +24,10 @@ from cdpr_rt.calibration.readings.data import CalibrationData, load_data
 from cdpr_rt.errors import TripError
 from cdpr_rt.procedures.calibration.measure_poses import (
     SETTLE_S,
-    Held,
     Look,
     NotThePoseError,
     PoseRefusedError,
+    TargetNotReached,
 )
 from cdpr_tools.calibrate.measuring import run
 from cdpr_tools.calibrate.measuring.outside import OutsidePose, OutsidePoses
@@ -68,7 +68,7 @@ class Rig:
     def tighten(self) -> FloatArray:
         return self.here
 
-    def go(self, place: FloatArray) -> Held | None:
+    def go(self, place: FloatArray) -> TargetNotReached | None:
         self._left -= 1
         if self._failure is not None and self._left < 0:
             self.failed_at = place
@@ -79,7 +79,7 @@ class Rig:
         self.gone.append(place)
         if len(self.gone) == self.stuck_at:
             self.here = 0.5 * (self.here + place)
-            return Held(self.here, "40 mm off after 12 s: no way on")
+            return TargetNotReached(self.here, "40 mm off after 12 s: no way on")
         self.here = place
         return None
 
@@ -123,19 +123,21 @@ def rigs(monkeypatch: pytest.MonkeyPatch) -> Callable[..., list[Rig]]:
     return use
 
 
-def settings(poses: int | None = 15) -> run.RunSettings:
-    return run.RunSettings(robot="planar-4", plant=None, source="camera", poses=poses, seed=1)
+def settings(poses: int | None = 15) -> run.CalibrationRunSettings:
+    return run.CalibrationRunSettings(
+        robot="planar-4", plant=None, source="camera", poses=poses, seed=1
+    )
 
 
 def never(_: CalibrationData) -> str | None:
     return None
 
 
-def begin(folder: Path, wanted: run.RunSettings) -> CalibrationData:
+def begin(folder: Path, wanted: run.CalibrationRunSettings) -> CalibrationData:
     return run.measure(Output(True), ROBOT, wanted, run.Kept.new(folder, ROBOT, SETUP), never)
 
 
-def go_on(folder: Path, wanted: run.RunSettings) -> CalibrationData:
+def go_on(folder: Path, wanted: run.CalibrationRunSettings) -> CalibrationData:
     return run.measure(Output(True), ROBOT, wanted, run.Kept.of_before(folder, ROBOT), never)
 
 
@@ -181,7 +183,7 @@ def test_a_list_of_poses_is_gone_to_wholly_also_after_a_run_that_ended(
     with pytest.raises(WorkFailedError):
         begin(tmp_path, wanted)
     wanted.save(tmp_path)
-    again = run.RunSettings.load(tmp_path)
+    again = run.CalibrationRunSettings.load(tmp_path)
     assert again == wanted == again.going_on(None, None)
     data = go_on(tmp_path, again)
     home = data.poses[0].target
