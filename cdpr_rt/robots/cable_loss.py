@@ -89,7 +89,8 @@ class CableLoss:
     - Then the winches let it down as the program `lower` does where the pose is not known.
     - Cables are elastic, without weight. Winches rub with 0, 3 or 6 % of the motor's rated torque,
       whichever gets a figure the largest: what rubs may keep the platform or turn it over.
-    - The ground is level, as high as the platform stands at home.
+    - The ground is level, as high as the platform stands at home, or where that is lower, as it
+      is when the cable breaks: nothing begins in the ground, whose spring would fling it.
     """
 
     def __init__(self, robot: Robot) -> None:
@@ -113,9 +114,7 @@ class CableLoss:
         self._body, self._free = body_of(model.platform), np.zeros(6)
         self._free[list(free_directions(model.platform))] = 1.0
         self._feet = np.unique(model.corners, axis=0)
-        home = model.home_pose
-        standing = home.p + self._feet @ home.Q.T
-        self._ground_m = float(standing[:, model.positions - 1].min())
+        self._ground_m = self._lowest_m(model.home_pose)
 
     def swing(self, cable: int, position_m: tuple[float, ...]) -> Swing:
         """Return what the platform does at a position when a cable, counted from 0, breaks."""
@@ -172,10 +171,16 @@ class CableLoss:
         course["misled_N"] = _MISLED_SHARE * (model.high_N - model.low_N)[cable]
         course["paying_out_m_s"], course["fastest_in_m_s"] = UNKNOWN_POSE_m_s, FASTEST_IN_m_s
         course["integral_rate_1_s"] = HANGING_LOAD_1_s
-        course["up"], course["ground_m"] = model.positions - 1, self._ground_m
+        course["up"], course["ground_m"] = (
+            model.positions - 1, min(self._ground_m, self._lowest_m(start))
+        )  # fmt: skip
         course["foot_N_m"], course["friction"] = foot_N_m, _GROUND_FRICTION
         course["foot_N_s_m"] = 2.0 * _GROUND_DAMPING * math.sqrt(foot_N_m / per_kg)
         return course
+
+    def _lowest_m(self, pose: Pose) -> float:
+        standing = pose.p + self._feet @ pose.Q.T
+        return float(standing[:, self._model.positions - 1].min())
 
     def _noticed_s(self, cable: int) -> float:
         own = self._winches[cable]

@@ -56,6 +56,18 @@ def test_it_swings_from_all_corners_and_gets_as_far_away_as_to_the_ground(name: 
             assert swing.away_m > 0.9 * (swing.position_m[-1] - platform.home_m[-1])
 
 
+def test_a_place_lower_than_the_stand_is_not_in_the_ground() -> None:
+    robot = load_robot("point-4")
+    assert robot.platform is not None
+    x, y, low = robot.platform.workspace_min_m
+    lying = [
+        CableLoss(dataclasses.replace(robot, platform=platform)).swing(0, (x, y, low))
+        for stand in (low, low + 0.2)
+        for platform in [dataclasses.replace(robot.platform, home_m=(0.0, 0.0, stand))]
+    ]
+    assert lying[1].away_m == pytest.approx(lying[0].away_m, rel=1e-3)
+
+
 def test_it_tells_the_worst_of_winches_that_rub_and_that_do_not() -> None:
     robot, place = load_robot("planar-4"), (0.8, 2.0)
     loss = CableLoss(robot)
