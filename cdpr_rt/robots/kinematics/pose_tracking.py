@@ -99,7 +99,8 @@ def track_pose(
         cables[ERROR, i] = -motors[RATE, i]
     assemble(cables, solver)
     if factorise(solver, 0.0):
-        residual, suspect = largest_residual(motors[LENGTH], cables, solver)
+        if cost < math.inf:  # lengths that are no numbers do not agree
+            residual, suspect = largest_residual(motors[LENGTH], cables, solver)
         for k in range(6):
             twist[k] = solver[GRADIENT, k]
         substitute(solver, twist)

@@ -211,6 +211,18 @@ def test_tensions_that_are_missing_are_told(place: tuple[float, float], told: bo
     assert control.tension_N.max() <= model.high_N[0] + 1e-9
 
 
+def test_a_length_that_is_no_number_does_not_agree_with_the_others() -> None:
+    control, feedback = spatial().control(), AxisFeedback(8)
+    control.take_lengths(control.lengths_at_home(np.zeros(8)), feedback)
+    control.begin(feedback)
+    control.observe(feedback)
+    assert control.residual_m < 0.03
+    feedback.position_rad[2] = np.nan
+    control.observe(feedback)
+    assert np.isnan(control.residual_m)
+    assert control.suspect == -1
+
+
 def test_an_acceleration_that_tensions_cannot_give_is_told() -> None:
     control = planar().control()
     feedback, setpoint, torque = AxisFeedback(3), Setpoint(3), np.zeros(3)
