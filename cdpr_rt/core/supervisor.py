@@ -262,14 +262,14 @@ class Supervisor:
         self._limits = np.zeros(n, _LIMITS)
         for name in _FIGURES:
             self._limits[name] = getattr(limits, name)
-        self._limits["period_s"] = self._period_s = period_s
+        self._limits["period_s"] = period_s
         wanted = DEFAULT_REACTIONS | dict(limits.reactions)
         self._reactions = np.array([wanted.get(limit, 0) for limit in Limit], np.int64)
         self._past = np.zeros(n, _PAST)
         self._window = np.zeros((limits.window_cycles, n), np.int64)
         self._verdict = np.zeros(1, _VERDICT)
         self._told = ""
-        self._disagree_s = 0.0
+        self._disagree_s = self._elapsed_s = 0.0
         self._judged: tuple[Any, Any, Any, Any] = (None,) * 4
         """Whose arrays the kernel is bound to."""
         self._check: Callable[..., int] = _check
@@ -303,6 +303,7 @@ class Supervisor:
             or torque_Nm is not judged[3]
         ):
             self._bind(feedback, estimate, setpoint, torque_Nm)
+        self._elapsed_s = estimate.elapsed_s
         return self._check(estimate.elapsed_s, estimate.slack_allowed)
 
     def _bind(
@@ -339,11 +340,12 @@ class Supervisor:
         """Judge by how much cable lengths contradict each other; return the `Reaction` so far.
 
         `axis` is that of the cable which contradicts the others, -1 where that is not known. It
-        counts once it has lasted `broken_within_s`: that a cable has broken is told as such.
+        counts once they have disagreed for `broken_within_s` longer than they agreed in between:
+        that a cable has broken is told as such, and what swings about agreement is noticed.
         """
-        allowed = self.limits.lengths_disagree_m
+        allowed, elapsed_s = self.limits.lengths_disagree_m, self._elapsed_s
         agree = disagree_m <= allowed
-        self._disagree_s = 0.0 if agree else self._disagree_s + self._period_s
+        self._disagree_s = max(self._disagree_s + (-elapsed_s if agree else elapsed_s), 0.0)
         if self._disagree_s > self.limits.broken_within_s:
             _judge(self._verdict, self._reactions, int(Limit.LENGTHS), axis, disagree_m, allowed)
         return int(self._verdict["reaction"][0])

@@ -30,7 +30,8 @@ class StateArrays:
     """State of n axes as arrays: the rows named in `axis_codec`, one column per axis."""
 
     def __init__(self, n: int) -> None:
-        # a column more: views of some axes are as little contiguous, and have the same machine code
+        # one column is not used: so these are strided as views of some axes are, and kernels are
+        # compiled once for both
         self.ints: Ints = np.zeros((codec.INT_ROWS, n + 1), np.int64)[:, :n]
         self.floats: FloatArray = np.zeros((codec.FLOAT_ROWS, n + 1))[:, :n]
         self.flags: BoolArray = np.zeros((codec.FLAG_ROWS, n + 1), np.bool_)[:, :n]

@@ -14,7 +14,7 @@ from typing import Any, Final
 from cdpr_drivers.bus.adapters.simbus_socket import connect, control_message
 from cdpr_drivers.bus.batch import KernelBatch
 from cdpr_drivers.bus.frame_reader import FrameReader, discard
-from cdpr_drivers.bus.frames import FRAME_BYTES, HEAD_BYTES, Batch, Bytes, FrameBuffer
+from cdpr_drivers.bus.frames import FRAME_BYTES, HEAD_BYTES, Batch, FrameBuffer
 from cdpr_drivers.bus.socket_port import SocketPort
 from cdpr_drivers.bus.url import BusUrl
 from cdpr_drivers.errors import BusError
@@ -35,60 +35,26 @@ _LOST_S = 1e-3
 
 
 class LedPort(SocketPort):
-    """A port on a bus that this process leads: a batch goes in one packet.
+    """A port on a bus that this process leads."""
 
-    Where no other bus is led, that has the next frame as well: time stands still until it comes,
-    and it is the SYNC at the latest, or a `go`. The SYNC of another bus would let time pass.
-    """
-
-    def __init__(self, url: BusUrl, sock: socket.socket, *, only: bool = True) -> None:
+    def __init__(self, url: BusUrl, sock: socket.socket) -> None:
         super().__init__(url, sock, {"mode": "lockstep"})
-        self._transmit, self._only = sock.send, only
-        self._held: _HeldBatch | None = None
-        self.send = self._send
 
     def batch(self, frames: FrameBuffer) -> Batch:
-        """Return the batch that sends or receives the rows of `frames`."""
-        fits = len(frames.rows) < _MOST_FRAMES
-        return _HeldBatch(self, frames) if fits else super().batch(frames)
-
-    def hold(self, batch: _HeldBatch) -> None:
-        """Have what is in `batch` sent with what is sent next, or at once."""
-        if self._held is not None:
-            self._transmit(self._held.alone)
-        self._held = batch if self._only else None
-        if not self._only:
-            self._transmit(batch.alone)
-
-    def _send(self, packet: Bytes) -> int:
-        held, self._held = self._held, None
-        if held is None:
-            return self._transmit(packet)
-        if len(packet) == FRAME_BYTES:
-            held.last[:] = packet
-            self._transmit(held.with_next)
-        else:
-            self._transmit(held.alone)
-            self._transmit(packet)
-        return len(packet)
+        """Return the batch that receives the rows of `frames`, or sends them in one packet."""
+        one_packet = len(frames.rows) <= _MOST_FRAMES
+        return _PacketBatch(self, frames) if one_packet else super().batch(frames)
 
 
-class _HeldBatch(KernelBatch):
-    """A batch that an own copy of goes out with the next frame of the port."""
-
+class _PacketBatch(KernelBatch):
     def __init__(self, port: LedPort, frames: FrameBuffer) -> None:
         super().__init__(port, frames)
-        n = len(frames.rows)
-        copy = FrameBuffer(n + 1)
-        copy.packet[: _LAYOUT.size] = _LAYOUT.pack(_FRAMES, 0.0, 0.0)
-        self._hold, self._frames, self._copy = port.hold, frames.bytes, copy.bytes[:n]
-        self.last, self.with_next = copy.rows[n], copy.packet
-        self.alone = copy.packet[:-FRAME_BYTES]
+        self._packet = frames.packet
+        self._packet[: _LAYOUT.size] = _LAYOUT.pack(_FRAMES, 0.0, 0.0)
 
     def send(self) -> None:
         """See `Batch.send`."""
-        self._copy[:] = self._frames
-        self._hold(self)
+        self._port.send(self._packet)
 
 
 class SimulatedBus(FrameReader):
@@ -204,7 +170,7 @@ class SimulatedBusClock(LockstepClock):
 
     def _lead_again(self, url: BusUrl) -> SimulatedBus:
         connect(url.channel).close()  # raises where there is none
-        bus = _lead(url, only=len(self._by_url) == 1)
+        bus = _lead(url)
         if bus is None:
             raise BusError(f"{url}: the bus has come back with another clock; begin anew")
         bus.set_time(self.now_s)
@@ -232,9 +198,8 @@ def open_clock(urls: Iterable[BusUrl], *, real_time: bool = False) -> Clock:
     the clock is CLOCK_MONOTONIC.
     """
     buses: dict[str, SimulatedBus] = {}
-    urls = list(urls)
     for url in urls:
-        led = _lead(url, only=len(urls) == 1)
+        led = _lead(url)
         if led is None:
             for bus in buses.values():
                 bus.release()
@@ -243,7 +208,7 @@ def open_clock(urls: Iterable[BusUrl], *, real_time: bool = False) -> Clock:
     return SimulatedBusClock(buses, real_time=real_time) if buses else PacedClock()
 
 
-def _lead(url: BusUrl, *, only: bool) -> SimulatedBus | None:
+def _lead(url: BusUrl) -> SimulatedBus | None:
     """Return the bus with this process as its leader, None where it cannot be."""
     if url.interface != "simbus":
         return None
@@ -261,7 +226,7 @@ def _lead(url: BusUrl, *, only: bool) -> SimulatedBus | None:
     if answer is None:
         sock.close()
         return None
-    port = LedPort(url, sock, only=only)
+    port = LedPort(url, sock)
     sock.setsockopt(socket.SOL_SOCKET, socket.SO_SNDTIMEO, bytes(16))
     next_s = answer["next_s"]
     return SimulatedBus(port, float(answer["now_s"]), math.inf if next_s is None else float(next_s))

@@ -145,7 +145,9 @@ def test_a_cable_of_eight_that_slips_is_noticed_by_the_others() -> None:
         robot.inject_fault(1, 13, 60)
         end_of_fault(robot)
         assert robot.state is LoopState.FAULT
-        assert "the cables' lengths disagree by" in robot.loop.life.reason
+        told = robot.loop.life.reason
+        assert "the cables' lengths disagree by" in told
+        assert told.startswith(("the cables", "axis 2: "))  # no other cable than that is named
 
 
 def test_a_lowering_that_fails_does_not_leave_motors_with_power(hanging: LockstepRobot) -> None:

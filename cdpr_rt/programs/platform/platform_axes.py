@@ -72,7 +72,7 @@ class PlatformHold(ProgramDefaults):
         return self._active.pose_setpoint
 
     def progress(self) -> dict[str, Any]:
-        """Return whether the platform or the axes are held, and where; of one that fell, that."""
+        """Return whether the platform or the axes are held, and where; whether it has fallen."""
         parts = self._parts
         progress = {"tight": parts.tight, **self._active.progress()}
         if parts.last.fallen:

@@ -218,20 +218,19 @@ def test_the_cause_is_told_before_what_follows_from_it(bus: str) -> None:
     assert "EMCY 8130h" in text
 
 
-def test_a_drive_that_goes_off_by_itself_is_not_enabled_again(bus: str) -> None:
-    """By somebody else's controlword, between ours and the SYNC: these go together if we lead."""
-    with open_rig(bus, lead=False) as rig:
-        rig.enable()
-        with can.Bus(interface="simbus", channel=rig.bus[7:]) as other:
-            rig.cycle()
-            while (heard := other.recv(60.0)) is not None and heard.arbitration_id != 0x201:
-                pass
-            other.send(can.Message(arbitration_id=0x201, data=bytes(4), is_extended_id=False))
-            time.sleep(0.05)
-            text, _ = rig.until_alarm(0.1)
-        assert "left operation enabled by itself" in text
-        rig.run(0.1, alarms=True)
-        assert rig.group.reached(State.SWITCH_ON_DISABLED)
+def test_a_drive_that_goes_off_by_itself_is_not_enabled_again(rig: Rig) -> None:
+    rig.enable()
+    with can.Bus(interface="simbus", channel=rig.bus[7:]) as other:
+        rig.cycle()
+        # somebody else's controlword comes after ours, and both before the next SYNC
+        while (heard := other.recv(60.0)) is not None and heard.arbitration_id != 0x201:
+            pass
+        other.send(can.Message(arbitration_id=0x201, data=bytes(4), is_extended_id=False))
+        time.sleep(0.05)
+        text, _ = rig.until_alarm(0.1)
+    assert "left operation enabled by itself" in text
+    rig.run(0.1, alarms=True)
+    assert rig.group.reached(State.SWITCH_ON_DISABLED)
 
 
 # -- the end

@@ -85,40 +85,15 @@ def commands(led: Led, n: int) -> tuple[Batch, FrameBuffer, bytes]:
     return led.port.batch(buffer), buffer, b"".join(map(bytes, buffer.rows))
 
 
-def test_commands_go_in_one_packet_with_the_sync(led: Led) -> None:
-    batch, buffer, frames = commands(led, 4)
-    batch.send()
-    assert led.sent() == []
-    buffer.bytes[:] = 0  # they go as they were
-    led.port.send(frame(0x80))
-    head = PACKET.pack(b"bus-data", 0.0, 0.0)
-    assert led.sent() == [head + frames + frame(0x80)]
-    led.port.send(frame(0x80))
-    assert led.sent() == [frame(0x80)]
-
-
-def test_commands_go_before_whatever_else_is_sent(led: Led) -> None:
-    batch, _, frames = commands(led, 2)
-    head = PACKET.pack(b"bus-data", 0.0, 0.0)
-    batch.send()
-    batch.send()
-    assert led.sent() == [head + frames]
-    led.time(0.5)
-    assert not led.bus.go(0.5)
-    assert led.sent() == [head + frames, PACKET.pack(b"bus-go\0\0", 0.5, 0.0)]
-
-
-def test_commands_do_not_wait_where_another_bus_lets_time_pass(led: Led) -> None:
-    _, buffer, frames = commands(led, 4)
-    port = LedPort(led.port.url, led.port._sock, only=False)
-    port.batch(buffer).send()
-    assert led.sent() == [PACKET.pack(b"bus-data", 0.0, 0.0) + frames]
-    port.send(frame(0x80))
-    assert led.sent() == [frame(0x80)]
+def test_commands_go_in_one_packet(led: Led) -> None:
+    for n in (1, 4, 26):
+        batch, _, frames = commands(led, n)
+        batch.send()
+        assert led.sent() == [PACKET.pack(b"bus-data", 0.0, 0.0) + frames]
 
 
 def test_commands_too_many_for_a_packet_go_one_by_one(led: Led) -> None:
-    batch, _, frames = commands(led, 30)
+    batch, _, frames = commands(led, 27)
     batch.send()
     assert led.sent() == [frames[at : at + 16] for at in range(0, len(frames), 16)]
 

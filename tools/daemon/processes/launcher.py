@@ -40,6 +40,8 @@ _LOOP_STALLED_S = 2.0
 _SERVICE_STALLED_S = 10.0
 # for so long it does not even go on reading its libraries, however slow the machine
 _SERVICE_START_S = 30.0
+# it has all of that behind it by now, and is busy with something else
+_SERVICE_LOADING_S = 600.0
 # a service that dies at once is not started in a tight circle
 _RESTART_S = (0.1, 0.5, 2.0, 5.0)
 _STEADY_S = 30.0
@@ -228,6 +230,9 @@ class Launcher:
         silent_s, allowed_s = self._silence_s("service_alive_ns"), _SERVICE_STALLED_S
         if not self._block.counters["service_alive_ns"][0]:  # it has not turned even once
             silent_s, allowed_s = service.idle_s(), _SERVICE_START_S
+            loading_s = time.monotonic() - service.started
+            if loading_s > _SERVICE_LOADING_S:
+                silent_s, allowed_s = loading_s, _SERVICE_LOADING_S
         if silent_s > allowed_s:
             self._say(f"the service has not turned for {allowed_s:g} s and is killed")
             service.process.kill()
