@@ -42,7 +42,7 @@ class LedPort(SocketPort):
 
     def batch(self, frames: FrameBuffer) -> Batch:
         """Return the batch that receives the rows of `frames`, or sends them in one packet."""
-        one_packet = len(frames.rows) <= _MOST_FRAMES
+        one_packet = 1 < len(frames.rows) <= _MOST_FRAMES
         return _PacketBatch(self, frames) if one_packet else super().batch(frames)
 
 

@@ -86,14 +86,15 @@ def commands(led: Led, n: int) -> tuple[Batch, FrameBuffer, bytes]:
 
 
 def test_commands_go_in_one_packet(led: Led) -> None:
-    for n in (1, 4, 26):
+    for n in (2, 4, 26):
         batch, _, frames = commands(led, n)
         batch.send()
         assert led.sent() == [PACKET.pack(b"bus-data", 0.0, 0.0) + frames]
 
 
-def test_commands_too_many_for_a_packet_go_one_by_one(led: Led) -> None:
-    batch, _, frames = commands(led, 27)
+@pytest.mark.parametrize("n", [1, 27])
+def test_a_command_alone_and_too_many_for_a_packet_go_one_by_one(led: Led, n: int) -> None:
+    batch, _, frames = commands(led, n)
     batch.send()
     assert led.sent() == [frames[at : at + 16] for at in range(0, len(frames), 16)]
 
