@@ -269,7 +269,7 @@ class Supervisor:
         self._window = np.zeros((limits.window_cycles, n), np.int64)
         self._verdict = np.zeros(1, _VERDICT)
         self._told = ""
-        self._disagree_s = self._elapsed_s = 0.0
+        self._disagree_s = 0.0
         self._judged: tuple[Any, Any, Any, Any] = (None,) * 4
         """Whose arrays the kernel is bound to."""
         self._check: Callable[..., int] = _check
@@ -303,7 +303,6 @@ class Supervisor:
             or torque_Nm is not judged[3]
         ):
             self._bind(feedback, estimate, setpoint, torque_Nm)
-        self._elapsed_s = estimate.elapsed_s
         return self._check(estimate.elapsed_s, estimate.slack_allowed)
 
     def _bind(
@@ -336,14 +335,15 @@ class Supervisor:
             then=(0.0, False),
         )
 
-    def compare_lengths(self, disagree_m: float, axis: int) -> int:
+    def compare_lengths(self, elapsed_s: float, disagree_m: float, axis: int) -> int:
         """Judge by how much cable lengths contradict each other; return the `Reaction` so far.
 
-        `axis` is that of the cable which contradicts the others, -1 where that is not known. It
-        counts once they have disagreed for `broken_within_s` longer than they agreed in between:
-        that a cable has broken is told as such, and what swings about agreement is noticed.
+        `elapsed_s` is the time since the last cycle; `axis` that of the cable which contradicts the
+        others, -1 where it is not known. It counts once they have disagreed for `broken_within_s`
+        longer than they agreed in between: that a cable has broken is told as such, and what
+        swings about agreement is noticed.
         """
-        allowed, elapsed_s = self.limits.lengths_disagree_m, self._elapsed_s
+        allowed = self.limits.lengths_disagree_m
         agree = disagree_m <= allowed
         self._disagree_s = max(self._disagree_s + (-elapsed_s if agree else elapsed_s), 0.0)
         if self._disagree_s > self.limits.broken_within_s:

@@ -43,6 +43,6 @@ def warm_up_supervision(estimator: Estimator, supervisor: Supervisor, n: int) ->
     feedback.valid[:] = True
     estimator.update(feedback, TensionFeedback(n), motor_loss_Nm=np.zeros(n))
     supervisor.check(feedback, estimator.estimate, Setpoint(n), np.zeros(n))
-    supervisor.compare_lengths(0.0, -1)
+    supervisor.compare_lengths(0.0, 0.0, -1)
     estimator.reset()
     supervisor.reset()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -17,6 +16,7 @@ from cdpr_drivers.canopen.network import CanNetwork
 from cdpr_drivers.cia402 import POWER_OFF, State
 from cdpr_drivers.errors import BusError, DriverError, ModeRefusedError
 from cdpr_rt.arrays import BoolArray
+from cdpr_rt.core.clock import Clock
 from cdpr_rt.core.exchange import AxisCommand, AxisFeedback
 
 _STOP_TIMEOUT_S = 1.0
@@ -81,7 +81,7 @@ class AxisBuses:
             self.feedback, self.command = self._single_group.feedback, self._single_group.command
         self.transmits = 0
         """How often commands went out on all buses."""
-        self._answers = AnswerWait(self.groups[0].paced_wait_s)
+        self._answers = AnswerWait(self.clock, self.groups[0].paced_wait_s)
         self._sync_s = 0.0
         self._failed = [False] * len(self.groups)
         """Which buses have failed in this cycle."""
@@ -107,7 +107,7 @@ class AxisBuses:
         Where one of several fails, `receive` raises, once the others have answered.
         """
         self._failure = None
-        self._sync_s = time.monotonic()
+        self._sync_s = self.clock.now_s
         if self._single_group is not None:
             self._failed[0] = False
             try:
@@ -139,7 +139,7 @@ class AxisBuses:
         waits = sum(group.waits for group in self.groups)
         answered = self._receive(self._sync_s + self.groups[0].paced_wait_s)
         too_early = sum(group.waits for group in self.groups) > waits
-        self._answers.learn(time.monotonic() - self._sync_s, too_early)
+        self._answers.learn(self.clock.now_s - self._sync_s, too_early)
         return answered
 
     def _receive(self, deadline_s: float) -> int:
@@ -355,15 +355,15 @@ class AnswerWait:
     sleep, from SYNC on.
     """
 
-    def __init__(self, most_s: float) -> None:
-        self._most_s = most_s
+    def __init__(self, clock: Clock, most_s: float) -> None:
+        self._clock, self._most_s = clock, most_s
         self._expected_s = 0.0
 
     def sleep(self, since_s: float) -> None:
-        """Sleep until the answers to the SYNC of `since_s` (monotonic) have usually come."""
-        left = since_s + self._expected_s - time.monotonic()
-        if left > _SHORTEST_SLEEP_S:
-            time.sleep(left)
+        """Sleep until the answers to the SYNC of `since_s` have usually come."""
+        until_s = since_s + self._expected_s
+        if until_s - self._clock.now_s > _SHORTEST_SLEEP_S:
+            self._clock.sleep_until(until_s)
 
     def learn(self, took_s: float, too_early: bool) -> None:
         """Adapt to how long all answers took and whether some were missing after the sleep."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import select
-import time
 from collections.abc import Sequence
 
 import numpy as np
@@ -113,11 +112,11 @@ class AxisExchange:
             if reader.now_s == before_s:  # no drive knows the period (1006h), as after a restart
                 reader.go(before_s + self.period_s)
         elif self.lockstep:
-            now_s = time.monotonic()
+            now_s = self.clock.now_s
             some_s = now_s + (_REPEATED_TIMEOUT_S if self._late else _PARTIAL_ANSWER_TIMEOUT_S)
             self._receive_until(some_s, some_s if self._late else now_s + _ANSWER_TIMEOUT_S)
         else:
-            deadline_s = deadline_s or time.monotonic() + self.paced_wait_s
+            deadline_s = deadline_s or self.clock.now_s + self.paced_wait_s
             self._receive_until(deadline_s, deadline_s)
         self._alarms = self._end_answers()
         return self.n - self._missing
@@ -130,7 +129,7 @@ class AxisExchange:
         while True:
             self._reader.poll()
             end_s = until_s if self._missing < self.n else silent_until_s
-            left_s = end_s - time.monotonic()
+            left_s = end_s - self.clock.now_s
             if not self._missing or left_s <= 0.0:
                 self._late = self._missing > 0
                 return
@@ -155,7 +154,7 @@ class AxisExchange:
         self._alarms = self._encode()
         try:
             self._commands.send()
-            now_s = self.feedback.time_s if self.lockstep else time.monotonic()
+            now_s = self.feedback.time_s if self.lockstep else self.clock.now_s
             if now_s >= self._heartbeat_at_s:
                 self._heartbeat_at_s = now_s + self._heartbeat_every_s
                 self._port.send(self.network.heartbeat_frame)

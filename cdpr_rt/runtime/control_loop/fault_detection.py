@@ -27,7 +27,7 @@ class FaultDetection:
             feedback = cycle.device.feedback
             reaction = supervisor.check(feedback, estimate, engine.setpoint, torque_Nm)
             if parts.lengths_disagree is not None:
-                reaction = supervisor.compare_lengths(*parts.lengths_disagree())
+                reaction = supervisor.compare_lengths(estimate.elapsed_s, *parts.lengths_disagree())
         else:
             torque_Nm[:] = 0.0
         # in a fault the drives' alarms are known, and formatting them takes time

@@ -325,13 +325,13 @@ def test_lengths_that_disagree_for_longer_than_a_break_takes(axis: int, named: s
     for off_m, cycles in ((0.029, 200), (0.031, 40), (0.03, 40), (math.nan, 50)):
         for _ in range(cycles):
             cycle.check(supervisor)
-            told.append(supervisor.compare_lengths(off_m, axis))
+            told.append(supervisor.compare_lengths(PERIOD_S, off_m, axis))
     assert told == [Reaction.NONE] * (len(told) - 1) + [Reaction.CONTROLLED_STOP]
     assert supervisor.axis == axis
     assert supervisor.reason().startswith(f"{named}the cables' lengths disagree by")
     supervisor.reset()
     cycle.check(supervisor)
-    assert supervisor.compare_lengths(math.nan, axis) == Reaction.NONE
+    assert supervisor.compare_lengths(PERIOD_S, math.nan, axis) == Reaction.NONE
 
 
 def test_lengths_that_swing_about_agreement_are_told_too():
@@ -341,7 +341,7 @@ def test_lengths_that_swing_about_agreement_are_told_too():
     for k in range(1000):
         cycle.check(supervisor)
         off_m = abs(0.06 * math.sin(2.0 * math.pi * 8.0 * k * PERIOD_S))
-        told.append(supervisor.compare_lengths(off_m, -1))
+        told.append(supervisor.compare_lengths(PERIOD_S, off_m, -1))
     assert Reaction.CONTROLLED_STOP in told
 
 
