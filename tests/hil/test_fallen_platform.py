@@ -139,7 +139,8 @@ def test_drives_that_lose_their_power_together_let_it_fall_as_well(folder: Path)
         robot.carry_out("pose", position_m=[-0.4, 0.5, 1.7])
         for axis in range(8):
             robot.inject_fault(axis, 1, 0x3220)
-        robot.run(12.0)  # the stop under control is given up after ten
+        robot._turn_until(lambda: robot.loop.busy, 3.0, "a reaction")
+        robot._turn_until(lambda: not robot.loop.busy, 60.0, "the power off")
         assert robot.state is LoopState.FAULT
         robot.command("acknowledge")
         robot.enable()
