@@ -138,6 +138,15 @@ SCALAR_FIELDS: Final = (
     CycleField("limit", "<u1", "limit", f"the limit that caused it: {_listed(Limit, 'key')}"),
     CycleField("limit_axis", "<i2", "limit_axis", "the axis concerned, -1 without"),
     CycleField("answered", "<u2", "answered", "axes that answered this SYNC", live=True),
+    CycleField(
+        "lengths_disagree_m",
+        "<f8",
+        "lengths_disagree_m",
+        "how far a platform's cable lengths are from agreeing, as the limit of that name judges "
+        "them; 0 while slack or where none is redundant, null without power",
+        live=True,
+        metric="lengths_disagree_metres",
+    ),
 )
 """One value a cycle."""
 

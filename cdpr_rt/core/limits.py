@@ -76,7 +76,7 @@ class Limits:
     stale_cycles: int = 1 << 30
     """Cycles for which a drive may be unheard or its answers irregular."""
     lengths_disagree_m: float = math.inf
-    """By how much the cables of a platform may contradict each other, root mean square."""
+    """By how much a platform's cables may contradict each other, largest normalised residual."""
     late_s: float = math.inf
     """For how long the loop itself may be held up."""
     reactions: Mapping[Limit, Reaction] = field(default_factory=dict)

@@ -10,6 +10,7 @@ from typing import Any, Final
 import numpy as np
 
 from cdpr_profiles import Robot, RobotAxis
+from cdpr_profiles.calibration.geometry import GeometryCalibration
 from cdpr_profiles.devices.tension_sensor import load_tension_sensors
 from cdpr_profiles.platform import Platform
 from cdpr_rt.arrays import FloatArray
@@ -31,6 +32,9 @@ DISAGREE_SHARE: Final = 0.0075
 DISAGREE_m: Final = 0.03
 """By how much lengths may contradict each other, as a share of the diagonal of the box around the
 exit points, and at most, where a robot's file says no other."""
+CALIBRATED_SHARE: Final = 1.0 / 3.0
+CALIBRATED_m: Final = 0.005
+"""Of that once the geometry has been calibrated, and at least."""
 LOW_SHARE: Final = 0.5
 """Of the least tension, where torques alone tell of tensions."""
 
@@ -40,8 +44,11 @@ def can_lower(robot: Robot) -> bool:
     return robot.platform is not None
 
 
-def limits_of(robot: Robot) -> Limits:
-    """Return the limits of a robot's axes, those without a figure in its file filled in."""
+def limits_of(robot: Robot, *, calibration_in_doubt: bool = False) -> Limits:
+    """Return the limits of a robot's axes, those without a figure in its file filled in.
+
+    Lengths agree better once the geometry has been calibrated, unless that is in doubt.
+    """
     axes, file = robot.axes, robot.limits
 
     def each(values: tuple[float, ...] | None, otherwise: FloatArray | float) -> FloatArray:
@@ -62,7 +69,8 @@ def limits_of(robot: Robot) -> Limits:
         cable_m = np.array([axis.winch.cable_m_per_motor_rad for axis in axes])
         following = np.maximum(following, FOLLOWING_m / np.abs(cable_m))
     figures: dict[str, Any] = {key: one for key, one in file if isinstance(one, int | float)}
-    figures.setdefault("lengths_disagree_m", _disagreement_m(robot.platform))
+    known = None if calibration_in_doubt else robot.calibration
+    figures.setdefault("lengths_disagree_m", _disagreement_m(robot.platform, known))
     return Limits(
         torque_Nm=torque_Nm,
         torque_rate_Nm_s=each(file.torque_rate_Nm_s, torque_Nm / TORQUE_RISE_S),
@@ -83,10 +91,15 @@ def exit_point_diagonal_m(platform: Platform) -> float:
     return float(np.linalg.norm(np.ptp(np.array(platform.exit_points_m), axis=0)))
 
 
-def _disagreement_m(platform: Platform | None) -> float:
+def _disagreement_m(platform: Platform | None, calibration: GeometryCalibration | None) -> float:
     """Return by how much lengths may disagree: on a small frame a slip tells less."""
-    share_m = np.inf if platform is None else DISAGREE_SHARE * exit_point_diagonal_m(platform)
-    return float(min(DISAGREE_m, share_m))
+    if platform is None:
+        return DISAGREE_m
+    most_m = min(DISAGREE_m, DISAGREE_SHARE * exit_point_diagonal_m(platform))
+    if calibration is None:
+        return most_m
+    expected_m = 1e-3 * calibration.predicted_3_sigma_mm
+    return min(most_m, max(CALIBRATED_SHARE * most_m, CALIBRATED_m, expected_m))
 
 
 def supervisor_limits(limits: Limits, robot: Robot) -> Limits:

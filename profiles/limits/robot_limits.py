@@ -66,8 +66,8 @@ class RobotLimits(Profile):
     stale_cycles: int = Field(default=250, ge=1, le=10_000)
     """Cycles for which a drive may be unheard or its answers irregular."""
     lengths_disagree_m: float | None = Field(default=None, gt=0, le=10)
-    """By how much the cables of a platform may contradict each other, root mean square; by the
-    size of the frame where left out."""
+    """By how much the cables of a platform may contradict each other, largest normalised residual;
+    by the size of the frame, and whether it is calibrated, where left out."""
     late_s: float = Field(default=0.05, gt=0, le=10)
     """For how long the loop itself may be held up."""
     reactions: Reactions = Reactions()

@@ -6,6 +6,7 @@ Speeds are those of the simulator's true pose, which no controller reads.
 from __future__ import annotations
 
 import math
+import shutil
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -14,11 +15,13 @@ import numpy as np
 import pytest
 
 from cdpr_profiles import load_robot
+from cdpr_profiles.calibration.in_force import take_over
 from cdpr_rt.core.states import LoopState
 from cdpr_tools.errors import WorkFailedError
 from cdpr_tools.trials.evaluation.pose_log import read_pose_log
 from cdpr_tools.trials.lockstep import LockstepRobot
 from cdpr_tools.trials.streams.stream import StreamSender
+from tests.profiles.test_geometry_calibration import calibration
 
 UPPER_LEFT, UPPER_RIGHT, LOWER = range(3)
 HIGH = (0.1, 1.65)
@@ -136,13 +139,23 @@ def test_the_winches_that_are_left_let_the_platform_down(
     assert records["tension_N"][-1].max() < 8.0
 
 
-def test_a_cable_of_eight_that_slips_is_noticed_by_the_others() -> None:
-    """By 60 mm, which leaves it tight enough not to be taken for a broken one."""
-    with LockstepRobot("spatial-8") as robot:
+@pytest.mark.parametrize("slip_mm", [60, 30])
+def test_a_cable_of_eight_that_slips_is_noticed_by_the_others(tmp_path: Path, slip_mm: int) -> None:
+    """By so little that it is tight enough not to be taken for a broken one.
+
+    Half of it needs a calibrated robot.
+    """
+    path = tmp_path / "mine.toml"
+    shutil.copy(load_robot("spatial-8").path, path)
+    if slip_mm < 60:
+        file = load_robot(path)
+        right = {"drum_scales": (1.0,) * 8, "elongation_scale": 1.0, "home_m": file.platform.home_m}
+        take_over(file, calibration(file, move_m=0.0).model_copy(update=right))
+    with LockstepRobot(path) as robot:
         robot.enable()
         robot.carry_out("tighten", 60.0)
-        robot.run(0.3)
-        robot.inject_fault(1, 13, 60)
+        assert 0.0 < robot.run(0.3)["lengths_disagree_m"].max() < 1e-3
+        robot.inject_fault(1, 13, slip_mm)
         end_of_fault(robot)
         assert robot.state is LoopState.FAULT
         told = robot.loop.life.reason

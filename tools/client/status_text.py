@@ -189,7 +189,9 @@ def tightness_text(status: dict[str, Any]) -> str:
     if tight is None or status["state"] != "active":
         return ""
     if tight:
-        return "held by its cables"
+        apart_mm = 1e3 * ((status["cycle"] or {}).get("lengths_disagree_m") or 0.0)
+        agree = f", whose lengths agree within {apart_mm:.1f} mm" if apart_mm else ""
+        return f"held by its cables{agree}"
     fell = (status.get("program_progress") or {}).get("fallen")
     return f"cables loose, power on{FALLEN if fell else ''}"
 

@@ -57,7 +57,8 @@ class LockstepRobot:
     `commissioned` is the folder of what commissioning has learnt of the motors, where the robot's
     file does not name it; nothing is made of it where the robot is not to be `compensated`, and of
     the others nothing is learnt in motion where it `learns` nothing. The
-    calibration of its geometry in force is left aside where it is not to be run `as_calibrated`.
+    calibration of its geometry in force is left aside where it is not to be run `as_calibrated`,
+    and believed less where it is `calibration_in_doubt`.
     `scanner` is where a simulated device outside logs the poses that it measures, `camera` the
     socket to make of a simulated camera on the platform. The
     right to move is held from the beginning, see `right`. Raises CommandError, DriverError and
@@ -76,6 +77,7 @@ class LockstepRobot:
         compensated: bool = True,
         learns: bool = True,
         as_calibrated: bool = True,
+        calibration_in_doubt: bool = False,
         scanner: Path | None = None,
         camera: Path | None = None,
     ) -> None:
@@ -90,6 +92,7 @@ class LockstepRobot:
         self._plant, self._truth_path, self._record = plant, truth_log, record
         self._scanner, self._camera, self._learns = scanner, camera, learns
         self._more_programs = dict(programs or {})
+        self._limits = limits_of(self.robot, calibration_in_doubt=calibration_in_doubt)
         self._stack = ExitStack()
         self._turns = self._status_seen = 0
         self.block: SharedBlock
@@ -140,7 +143,7 @@ class LockstepRobot:
         stack.callback(os.close, block.fd)
         block.counters["start_monotonic_ns"] = time.monotonic_ns()
         block.counters["start_realtime_ns"] = time.time_ns()
-        limits = limits_of(robot)
+        limits = self._limits
         self.machine = RobotMachine(robot, [bus], tension_port=port, limits=limits)
         stack.callback(self.machine.clock.close)
         stack.callback(self.machine.close)

@@ -69,6 +69,8 @@ class TrialKind:
     """How long it lasts, in bus time, where nothing else is wanted."""
     compares: bool = False
     """Whether it is run with compensation and without, each as long as it lasts."""
+    as_calibrated: bool = True
+    """Whether a calibration of the geometry counts that is in force."""
 
 
 KINDS: Final = {
@@ -108,6 +110,7 @@ KINDS: Final = {
         lambda parts, robot, _settings: tape.judge(parts[_ONE], robot),
         lambda parts, robot, _settings: pictures.of_tape(parts[_ONE], robot),
         30.0,
+        as_calibrated=False,
     ),
 }
 
@@ -133,7 +136,7 @@ def perform(settings: TrialSettings, folder: Path, out: Output) -> dict[str, Any
     text = uncommissioned_text(with_commissioned(robot, _path(settings.commissioned)))
     if settings.compensated and text:
         out.note(text)
-    if geometry := geometry_note(calibrated(robot)):
+    if kind.as_calibrated and (geometry := geometry_note(calibrated(robot))):
         out.note(geometry)
     plant = _plant(settings, robot, folder)
     for part in settings.parts:
@@ -150,6 +153,7 @@ def perform(settings: TrialSettings, folder: Path, out: Output) -> dict[str, Any
                 commissioned=_path(settings.commissioned),
                 compensated=compensated,
                 learns=compensated or len(settings.parts) == 1,
+                as_calibrated=kind.as_calibrated,
             ) as run,
         ):
             kind.drive(run, settings)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Mapping
 from typing import Any, Final
@@ -77,6 +78,8 @@ class Engine:
         """What the supervisor called for in the last cycle, and the limit that caused it."""
         self.limit_axis = -1
         """The axis that exceeded it, -1 where it is of none alone."""
+        self.lengths_disagree_m = math.nan
+        """How far a platform's cable lengths are from agreeing, nan while nothing drives them."""
         self.right = RightToMove(block, clock_ns)
         self._realtime = False
         self._rows = CycleRows(block)

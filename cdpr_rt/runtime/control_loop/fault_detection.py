@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.core.cycle import Cycle
 from cdpr_rt.core.limits import Limit
@@ -22,12 +24,16 @@ class FaultDetection:
         engine, parts = self._engine, self._engine.parts
         supervisor = parts.supervisor
         reaction = 0
+        engine.lengths_disagree_m = math.nan
         if engine.driving:
             estimate = parts.estimator.estimate
             feedback = cycle.device.feedback
             reaction = supervisor.check(feedback, estimate, engine.setpoint, torque_Nm)
             if parts.lengths_disagree is not None:
-                reaction = supervisor.compare_lengths(estimate.elapsed_s, *parts.lengths_disagree())
+                engine.lengths_disagree_m, axis = parts.lengths_disagree()
+                reaction = supervisor.compare_lengths(
+                    estimate.elapsed_s, engine.lengths_disagree_m, axis
+                )
         else:
             torque_Nm[:] = 0.0
         # in a fault the drives' alarms are known, and formatting them takes time

@@ -17,6 +17,7 @@ from cdpr_rt.robots.interface import TensionOutcome
 from cdpr_rt.robots.platform.cable_control import CableControl
 from cdpr_rt.robots.platform_model import RESERVE, directions_of, platform_model_of
 from cdpr_rt.robots.robot_arrays import limits_of
+from tests.profiles.test_geometry_calibration import calibration
 
 PLANAR, SUSPENDED = load_robot("planar-3"), load_robot("suspended-8")
 
@@ -118,6 +119,31 @@ def test_a_slip_on_a_small_frame_is_noticed() -> None:
 def test_a_slip_of_80_mm_is_more_than_lengths_may_disagree(name: str) -> None:
     robot = load_robot(name)
     assert (0.08 * _shares_of_a_slip(robot) > limits_of(robot).lengths_disagree_m).all()
+
+
+@pytest.mark.parametrize("name", ["planar-3", "planar-4", "point-4", "spatial-8", "suspended-8"])
+def test_on_a_calibrated_robot_a_slip_of_30_mm_is_more(name: str) -> None:
+    file = load_robot(name)
+    robot = dataclasses.replace(file, calibration=calibration(file))
+    least_m = 0.03 * _shares_of_a_slip(robot).min()
+    assert limits_of(robot).lengths_disagree_m < least_m < limits_of(file).lengths_disagree_m
+    doubted = limits_of(robot, calibration_in_doubt=True)
+    assert doubted.lengths_disagree_m == limits_of(file).lengths_disagree_m
+
+
+@pytest.mark.parametrize(
+    ("predicted_mm", "allowed_m"),
+    [(0.5, 0.005), (8.0, 0.008), (20.0, 0.01312)],
+    ids=["as finely as is judged", "as it was calibrated", "as without"],
+)
+def test_a_calibration_on_a_small_frame_counts_as_far_as_it_is_good(
+    predicted_mm: float, allowed_m: float
+) -> None:
+    exits = tuple(tuple(0.35 * x for x in point) for point in PLANAR.platform.exit_points_m)
+    platform = dataclasses.replace(PLANAR.platform, exit_points_m=exits)
+    known = calibration(PLANAR).model_copy(update={"predicted_3_sigma_mm": predicted_mm})
+    robot = dataclasses.replace(PLANAR, platform=platform, calibration=known)
+    assert limits_of(robot).lengths_disagree_m == pytest.approx(allowed_m, abs=1e-5)
 
 
 def _shares_of_a_slip(robot: Robot) -> np.ndarray:

@@ -37,6 +37,22 @@ def status_of(**keys: Any) -> dict[str, Any]:
     }
 
 
+@pytest.mark.parametrize(
+    ("disagree_m", "told"),
+    [(0.00034, ", whose lengths agree within 0.3 mm"), (0.0, ""), (None, "")],
+    ids=["eight cables", "none redundant", "not known"],
+)
+def test_a_held_platform_tells_how_well_its_lengths_agree(
+    disagree_m: float | None, told: str
+) -> None:
+    status = status_of(state="active", program_progress={"tight": True})
+    status["cycle"] = {
+        "cycle": 1, "time_s": 0.1, "exchange_s": 0.0, "compute_s": 0.0, "missed": 0,
+        "late_cycles": 0, "lengths_disagree_m": disagree_m,
+    }  # fmt: skip
+    assert f"held by its cables{told}" in [str(line) for line in status_text(status).renderables]
+
+
 def test_of_a_loop_that_is_loaded_no_axes_are_shown_yet() -> None:
     """Their names are not known before; what is compiled meanwhile stands in the notices."""
     notices = ["compiling the control loop goes on: 20 kernels so far"]

@@ -286,6 +286,7 @@ def simulated_rig(
             scanner=path,
             camera=None if camera is None else socket,
             as_calibrated=as_calibrated,
+            calibration_in_doubt=True,
         ) as rig:
             operator = RigOperator(rig, ScannerTail(path), scanner, stop)
             try:
