@@ -13,7 +13,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from cdpr_profiles.limits.limit_kinds import Limit
+from cdpr_profiles.limits.robot_limits import Limit
 from cdpr_rt.core.states import LoopState, Reaction
 
 Row = NDArray[np.void]

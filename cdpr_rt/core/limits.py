@@ -7,8 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Final
 
-from cdpr_profiles.limits.limit_kinds import Limit
-from cdpr_profiles.limits.robot_limits import Reactions
+from cdpr_profiles.limits.robot_limits import Limit, Reactions
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.core.states import Reaction
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from cdpr_profiles.limits.limit_kinds import Limit
+from cdpr_profiles.limits.robot_limits import Limit
 
 _PAGE = Path(__file__).parents[2] / "docs" / "supervisor.md"
 
