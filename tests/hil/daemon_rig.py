@@ -214,7 +214,9 @@ def held_right(daemon: RealDaemon, client: str) -> Iterator[httpx.Headers]:
     assert daemon.http.delete("/control", headers=headers).status_code == 200
 
 
-def cdpr(*arguments: str | Path) -> subprocess.CompletedProcess[str]:
-    """Run a command to its end."""
+def cdpr(*arguments: str | Path, typed: str = "") -> subprocess.CompletedProcess[str]:
+    """Run a command to its end; `typed` is its standard input."""
     command = [sys.executable, "-m", "cdpr_tools.cli", *map(str, arguments)]
-    return subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE_S, check=False)
+    return subprocess.run(
+        command, input=typed, capture_output=True, text=True, timeout=PATIENCE_S, check=False
+    )

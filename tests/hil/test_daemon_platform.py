@@ -184,3 +184,29 @@ def test_poses_at_which_it_stands_are_read_for_a_calibration(
     lengths_m = lengths_told(geometry, there, tension_N)[0]
     assert data.poses[1].length_m == pytest.approx(lengths_m.tolist(), abs=0.005)
     told(turning, "lower")
+
+
+def test_it_goes_to_the_poses_of_a_calibration_by_itself(
+    turning: RealDaemon, tmp_path: Path
+) -> None:
+    """Near to each other, since only the ways take time; what is measured of two is typed."""
+    poses, folder = tmp_path / "poses.csv", tmp_path / "cal"
+    places = [(0.03 * (j % 4), 1.4 + 0.03 * (j // 4), 0.02 * (j % 3)) for j in range(14)]
+    rows = [",".join(map(str, place)) for place in places]
+    poses.write_text("x_m,y_m,angle_rad\n" + "\n".join(rows) + "\n")
+    command = ("calibrate", "measure", "--poses", str(poses), "--ask", "--dry-run")
+    status, why = refused(turning, *command, "--out", str(folder))
+    assert (status, "not held on its cables" in why, folder.exists()) == (1, True, False)
+    told(turning, "tighten")
+    done = cdpr(*command, *turning.at, "--out", folder, typed="0 1000\n\n\n0 1000 0.5\n")
+    assert done.stderr.count("measured x y in mm") == 5, done.stderr  # what is typed ends there
+    assert "the platform is held at the last pose" in done.stdout
+    data = load_data(folder / "data.json")
+    assert len(data.poses) == 15 and data.simulated
+    assert {pose.target for pose in data.poses[1:]} == set(places)
+    assert (folder / "points.csv").read_text().splitlines()[1:] == [
+        "1,0.0,1000.0",
+        "4,0.0,1000.0,0.5",
+    ]
+    assert turning.status()["program"] == "hold"
+    told(turning, "lower")

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from cdpr_profiles import Robot
-from cdpr_profiles.calibration.geometry import geometry_sha256
 from cdpr_profiles.calibration.in_force import calibrated, in_force
 from cdpr_rt.calibration.camera.seen_poses import with_seen_poses
 from cdpr_rt.calibration.check import Check, check_geometry
@@ -27,12 +25,21 @@ from cdpr_rt.procedures.calibration.measure_poses import (
     read_pose,
 )
 from cdpr_tools.calibrate.finish import identified
+from cdpr_tools.calibrate.measuring.daemon_pose import (
+    DaemonPoses,
+    image_taker,
+    no_poses,
+    robot_of,
+)
+from cdpr_tools.calibrate.measuring.daemon_run import DaemonOperator, read_places
 from cdpr_tools.calibrate.measuring.places import chosen_places
-from cdpr_tools.calibrate.measuring.rig import StoppedError, simulated_rig
-from cdpr_tools.errors import WorkFailedError
+from cdpr_tools.calibrate.measuring.rig import simulated_rig
+from cdpr_tools.calibrate.measuring.ways import StoppedError
+from cdpr_tools.client.client import Daemon
+from cdpr_tools.errors import BadInputError, WorkFailedError
 from cdpr_tools.output import Output
 from cdpr_tools.robots.poses.choice import Choose
-from cdpr_tools.signals import stop_on_signals
+from cdpr_tools.signals import HELD, stop_on_signals
 
 if TYPE_CHECKING:
     from cdpr_tools.calibrate.measuring.pose_camera import PoseCamera
@@ -84,7 +91,42 @@ def checked(
     folder. Raises what the robot does, WorkFailedError.
     """
     robot, known = calibrated(file), before(out, file)
-    data = _read(out, robot, plant, scanner, seed, folder, known)
+    return _judged(robot, known, _read(out, robot, plant, scanner, seed, folder, known))
+
+
+def checked_running(
+    out: Output, file: Robot, daemon: Daemon, camera: str | None, seed: int, folder: Path
+) -> Check:
+    """Do the same with the robot that a daemon runs with that calibration, from home.
+
+    It looks with the `camera` of a URL where there is one. Raises CommandError besides.
+    """
+    robot, description = robot_of(daemon, as_calibrated=True)
+    if robot.path != file.path:
+        raise BadInputError(f"{file.reference}: the daemon of this name runs {robot.reference}")
+    known = before(out, file)
+    if known is None and camera is not None:
+        raise BadInputError("--camera: allowed: of a robot that was calibrated with one")
+    if known is not None and camera is None:
+        out.note("--camera is left out: lengths alone are looked at")
+        known = None
+    places = chosen_places(robot, POSES, seed, Choose.SPREAD)
+    kept = DaemonPoses(folder, no_poses(robot, description["simulated"]), CHECK)
+    if known is not None:
+        kept.data = kept.data.model_copy(update={"camera": known.setup})
+    with (
+        stop_on_signals(HELD) as stop,
+        image_taker(camera, None, None, kept, out.note) as image,
+    ):
+        try:
+            operator = DaemonOperator(daemon, robot, image, stop)
+            read_places(out, robot, operator, kept, places, POSES + 1)
+        except StoppedError:
+            raise WorkFailedError("stopped; nothing is said of the robot") from None
+    return _judged(robot, known, kept.data)
+
+
+def _judged(robot: Robot, known: Before | None, data: CalibrationData) -> Check:
     if len(data.poses) <= _LEAST:
         raise WorkFailedError(f"{len(data.poses) - 1} poses of {POSES} only: {data.left_out[-1]}")
     geometry = CableGeometry.of(robot)
@@ -149,14 +191,12 @@ def _read(
 
 def _kept(robot: Robot, measured: Measured, known: Before | None, folder: Path) -> CalibrationData:
     """Return what was read, which is in the folder then."""
-    data = CalibrationData(
-        robot=robot.profile,
-        geometry_sha256=geometry_sha256(robot),
-        simulated=True,
-        date=datetime.now(UTC).isoformat(timespec="seconds"),
-        left_out=tuple(measured.refused),
-        camera=None if known is None else known.setup,
-        poses=tuple(measured.readings),
+    data = no_poses(robot, simulated=True).model_copy(
+        update={
+            "left_out": tuple(measured.refused),
+            "camera": None if known is None else known.setup,
+            "poses": tuple(measured.readings),
+        }
     )
     data.save(folder / CHECK)
     return data

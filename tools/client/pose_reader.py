@@ -37,7 +37,7 @@ class DaemonReader:
 
     def place(self) -> FloatArray:
         """Return where the platform is, (d,)."""
-        progress = self._status()["program_progress"]
+        progress = self.status()["program_progress"]
         return np.array([*progress["position_m"], *progress.get("rotation_rad", ())])
 
     def stay(self, seconds: float) -> None:
@@ -58,18 +58,24 @@ class DaemonReader:
 
     def _rows(self, seconds: float) -> FloatArray:
         """Return lengths, tensions and angles (k, 3, n), two at least, while bus time passes."""
-        status = self._status()
+        status = self.status()
         begun_s = status["cycle"]["time_s"]
         rows: list[list[list[float | None]]] = []
         while status["cycle"]["time_s"] < begun_s + seconds or len(rows) < 2:
             rows.append([[axis[key] for axis in status["axes"]] for key in _KEYS])
             time.sleep(_ASK_S)
-            status = self._status()
+            status = self.status()
         return np.array(rows, float)
 
-    def _status(self) -> dict[str, Any]:
+    def status(self) -> dict[str, Any]:
+        """Return the daemon's status; raises WorkFailedError where the platform is not held."""
         status = self._daemon.get("/status")
-        if status["state"] != "active" or "position_m" not in status["program_progress"]:
+        progress = status["program_progress"]
+        if (
+            status["state"] != "active"
+            or progress.get("tight") is False
+            or "position_m" not in progress
+        ):
             raise WorkFailedError(
                 f"the platform is not held on its cables ({status['state']}, "
                 f"{status['program']}); allowed: after `cdpr enable`, `cdpr tighten`, `cdpr move`"

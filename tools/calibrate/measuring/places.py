@@ -21,7 +21,10 @@ from cdpr_rt.robots.reach.reachable import SHARE, Reach
 from cdpr_tools.errors import BadInputError
 from cdpr_tools.robots.poses.choice import KINDS, Choose, choose, read_poses
 
-MOST_POSES = 1000
+MOST_POSES = 100
+"""Where nobody has said how many."""
+_MOST_ASKED, _SPARE = 1000, 10
+"""How many may be asked for, and further ones for those that the robot refuses."""
 BATCH = 10
 """Poses after which is looked what they tell."""
 _ROUNDED_rad = 1e-5
@@ -64,6 +67,13 @@ def chosen_places(robot: Robot, count: int, seed: int, by: Choose = Choose.INFOR
     return Places(reach.start, chosen.positions)
 
 
+def places_of(robot: Robot, count: int | None, listed: Listed | None, seed: int) -> Places:
+    """Return the places that `poses_wanted` tells of: those of a list, else what tells most."""
+    if listed is not None:
+        return listed_places(robot, np.array(listed))
+    return chosen_places(robot, (count or MOST_POSES) + _SPARE, seed)
+
+
 def listed_places(robot: Robot, listed: FloatArray) -> Places:
     """Return places (m, d) that a list has named; raises BadInputError as `chosen_places` does."""
     return Places(_from_middle(robot).start, listed)
@@ -88,9 +98,9 @@ def poses_wanted(robot: Robot, text: str | None) -> tuple[int | None, Listed | N
     """
     if text is None:
         return None, None
-    allowed = f"allowed: {LEAST_POSES} to {MOST_POSES}, or NAME.csv or NAME.toml with a list"
+    allowed = f"allowed: {LEAST_POSES} to {_MOST_ASKED}, or NAME.csv or NAME.toml with a list"
     if text.removeprefix("-").isdecimal():
-        if len(text) > _DIGITS or not LEAST_POSES <= int(text) <= MOST_POSES:
+        if len(text) > _DIGITS or not LEAST_POSES <= int(text) <= _MOST_ASKED:
             raise BadInputError(f"--poses {brief(text)}: {allowed}")
         return int(text), None
     if Path(text).suffix not in KINDS:
@@ -104,8 +114,8 @@ def _listed(robot: Robot, path: Path) -> FloatArray:
     reach = _from_middle(robot)
     told = read_poses(path, reach.model)
     places = told.points
-    if not LEAST_POSES - 1 <= len(places) < MOST_POSES:
-        allowed = f"{LEAST_POSES - 1} to {MOST_POSES - 1}, home is read besides"
+    if not LEAST_POSES - 1 <= len(places) < _MOST_ASKED:
+        allowed = f"{LEAST_POSES - 1} to {_MOST_ASKED - 1}, home is read besides"
         raise BadInputError(f"--poses {path}: {len(places)} poses; allowed: {allowed}")
     seen: set[tuple[float, ...]] = set()
     for place, line, inside in zip(places, told.lines, reach.are_targets(places), strict=True):

@@ -16,17 +16,23 @@ from cdpr_profiles.reading.bounded_input import parse_json
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.calibration.markers.sighting import Sighting
 from cdpr_rt.core.clock import Clock
-from cdpr_rt.core.limits import Limit
 from cdpr_rt.core.states import LoopState
 from cdpr_rt.errors import TripError
 from cdpr_rt.procedures.calibration.measure_poses import (
     Look,
-    NotThePoseError,
     PoseRefusedError,
     TargetNotReached,
 )
-from cdpr_rt.runtime.control_loop.stop_requests import EMERGENCY_STOP
 from cdpr_tools.calibrate.measuring.outside import OutsidePose
+from cdpr_tools.calibrate.measuring.ways import (
+    LATE_S,
+    StoppedError,
+    motion_ended,
+    not_reached,
+    place_of,
+    speed_m_s,
+    within_s,
+)
 from cdpr_tools.errors import WorkFailedError
 from cdpr_tools.trials.directions import Directions, platform_of
 from cdpr_tools.trials.lockstep import CommandRefusedError, LockstepRobot
@@ -36,19 +42,7 @@ if TYPE_CHECKING:
     from cdpr_tools.calibrate.measuring.pose_camera import PoseCamera
 
 _TIGHTEN_S, _BRAKE_S = 180.0, 5.0
-_SLOWED, _LATE_S = 1.5, 10.0
-"""A motion may take so many times as long as planned, and that much longer."""
 _HEADER_BYTES = 1024
-_SPEED_SHARE = 0.5
-"""Of the speed of the robot's file: a robot that is not calibrated yet is not hurried."""
-_NO_POSE_MAKES = frozenset(
-    limit.key
-    for limit in (
-        Limit.SAFETY_STOP, Limit.SAFETY_ALARM, Limit.STALE, Limit.MISSED, Limit.MISSED_IN_WINDOW,
-        Limit.LATE,
-    )
-)  # fmt: skip
-"""Limits that are exceeded wherever the platform is."""
 
 
 class ScannerTail:
@@ -73,10 +67,6 @@ class ScannerTail:
         offset = _HEADER_BYTES + first * self._dtype.itemsize
         rows = np.fromfile(self._path, self._dtype, count=self.count() - first, offset=offset)
         return np.array(rows["position_m"]), np.array(rows["rotation"])
-
-
-class StoppedError(Exception):
-    """Somebody wants an end; what was read is kept."""
 
 
 class RigOperator:
@@ -112,28 +102,23 @@ class RigOperator:
         Raises PoseRefusedError, TripError, StoppedError.
         """
         self._standing = None
-        rig, speed = self.rig, _SPEED_SHARE * float(self.directions.speed[0])
+        rig, directions = self.rig, self.directions
         try:
-            rig.program("pose", **self.directions.arguments(place, speed))
+            rig.program("pose", **directions.arguments(place, speed_m_s(directions)))
         except CommandRefusedError as error:
             if rig.loop.busy or rig.state is not LoopState.ACTIVE:  # it is being ended, or was
                 raise self._trip(str(error)) from None
             raise PoseRefusedError(str(error)) from None
-        within_s = _SLOWED * self._planned_s(place, speed) + _LATE_S
+        allowed_s = within_s(directions, place_of(rig.progress), place)
         try:
-            if self._ended(within_s):
+            if self._ended(allowed_s):
                 return None
             progress = rig.progress
             rig.program("hold")
             self._ended(_BRAKE_S)
         except WorkFailedError as error:
             raise self._trip(str(error)) from None
-        here = self._here()
-        kept = progress["trouble"] or progress["held_back"] or progress["missing"]
-        return TargetNotReached(
-            here,
-            f"{self._apart(here, place)} off after {within_s:.0f} s: {kept or 'still on its way'}",
-        )
+        return not_reached(directions, place, place_of(rig.progress), allowed_s, progress)
 
     def _finish(self, within_s: float) -> None:
         """Run cycles until the program has nothing left to do, or somebody wants an end."""
@@ -153,7 +138,7 @@ class RigOperator:
             ended = rig.loop.engine.program is not program or program.at_rest
             return ended or self._stop() or rig.now_s > end_s
 
-        rig.until(over, within_s + _LATE_S, program.name)
+        rig.until(over, within_s + LATE_S, program.name)
         self._heed()
         if rig.loop.engine.program is not program:
             raise WorkFailedError(f"{program.name} was ended: {rig.state_text()}")
@@ -164,33 +149,8 @@ class RigOperator:
             raise StoppedError
 
     def _trip(self, text: str) -> TripError:
-        """Return that the motion was ended, and whether a pose can have had a part in it."""
         life = self.rig.loop.life
-        limit = (life.details or {}).get("limit")
-        if limit in _NO_POSE_MAKES or EMERGENCY_STOP in life.reason:
-            return NotThePoseError(text)
-        return TripError(text)
-
-    def _here(self) -> FloatArray:
-        """Return the place (d,) at which the controller has the platform."""
-        progress = self.rig.progress
-        return np.array([*progress["position_m"], *progress.get("rotation_rad", ())])
-
-    def _planned_s(self, place: FloatArray, speed_m_s: float) -> float:
-        """Return how long the way from here takes that `pose` plans, from rest to rest."""
-        directions = self.directions
-        way = np.abs(place - self._here())
-        cruise_s = float((way / directions.speed).max()) * float(directions.speed[0]) / speed_m_s
-        square_s2 = float((way / directions.acceleration).max())
-        if square_s2 > cruise_s**2:  # it does not come to its speed
-            return 2.0 * math.sqrt(square_s2)
-        return cruise_s + square_s2 / max(cruise_s, 1e-9)
-
-    def _apart(self, here: FloatArray, place: FloatArray) -> str:
-        k = self.directions.k
-        far_mm = 1e3 * float(np.linalg.norm((here - place)[:k]))
-        turned = math.degrees(float(np.linalg.norm((here - place)[k:])))
-        return f"{far_mm:.0f} mm" + (f" and {turned:.1f} deg" if self.directions.turns else "")
+        return motion_ended(text, life.reason, life.details)
 
     def stay(self, seconds: float) -> None:
         """Let bus time pass; raises TripError where the motion is ended meanwhile."""

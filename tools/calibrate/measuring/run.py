@@ -32,8 +32,15 @@ from cdpr_rt.procedures.calibration.measure_poses import (
     read_pose,
 )
 from cdpr_tools.calibrate.measuring.outside import OutsidePose, OutsidePoses
-from cdpr_tools.calibrate.measuring.places import Listed, Places, chosen_places, listed_places
-from cdpr_tools.calibrate.measuring.rig import RigOperator, StoppedError, simulated_rig
+from cdpr_tools.calibrate.measuring.places import (
+    MOST_POSES,
+    Listed,
+    Places,
+    listed_places,
+    places_of,
+)
+from cdpr_tools.calibrate.measuring.rig import RigOperator, simulated_rig
+from cdpr_tools.calibrate.measuring.ways import StoppedError
 from cdpr_tools.calibrate.report.judged import Judged, judged
 from cdpr_tools.errors import BadInputError, CommandError, WorkFailedError
 from cdpr_tools.output import Advance, Output
@@ -45,11 +52,7 @@ if TYPE_CHECKING:
 DATA, SETTINGS, OUTSIDE, IMAGES = "data.json", "run.json", "outside.json", "images"
 COUNTED = "counted.json"
 """Of poses that `cdpr calibrate read` has read: it marks a folder of these."""
-_MOST_POSES = 100
-"""Where nobody has said how many."""
 _FIRST_S, _HELD_OUT_S = 8.0, 3.0
-_SPARE = 10
-"""Further places, for those that the robot refuses."""
 
 PoseSource = Literal["camera", "scanner", "redundancy", "points"]
 
@@ -178,7 +181,7 @@ def measure(
     What is read is kept whatever ends it, and the error says how to go on. Raises what the robot
     and its camera do, WorkFailedError where somebody stops it.
     """
-    wanted, listed = settings.poses or _MOST_POSES, kept.not_gone_to(settings.places)
+    wanted, listed = settings.poses or MOST_POSES, kept.not_gone_to(settings.places)
     if listed is not None:  # home is read at each start
         wanted = len(kept.data.poses) + len(listed) + bool(listed)
     if len(kept.data.poses) >= wanted:
@@ -187,7 +190,7 @@ def measure(
         places = listed_places(robot, np.array(listed))
     else:
         with out.stage("choosing poses"):
-            places = chosen_places(robot, wanted + _SPARE, settings.seed)
+            places = places_of(robot, settings.poses, None, settings.seed)
     plant = None if settings.plant is None else Path(settings.plant)
 
     def camera(url: str, clock: Clock) -> PoseCamera:
@@ -220,7 +223,7 @@ def measure(
                 out.progress(f"reading {up_to}{wanted} poses", float(wanted))
             )
             _Measuring(out, operator, kept, wanted, advance).go(
-                robot, places, enough if settings.poses is None else _told_only(enough)
+                robot, places, enough if settings.poses is None else told_only(enough)
             )
     except StoppedError:
         raise WorkFailedError(f"stopped; {_going_on(robot, kept)}") from None
@@ -237,7 +240,7 @@ def _is_of_real_robot(path: Path) -> bool:
         return False  # nothing that can be used
 
 
-def _told_only(enough: Enough) -> Enough:
+def told_only(enough: Enough) -> Enough:
     """Return what tells what is wrong and never has enough: somebody has said how many."""
 
     def asked(data: CalibrationData) -> str | None:

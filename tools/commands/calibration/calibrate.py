@@ -3,29 +3,42 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
-from cdpr_profiles import Robot, load_robot
+from cdpr_profiles import load_robot
 from cdpr_profiles.calibration.in_force import undo as take_back
+from cdpr_tools.client.client import open_daemon
+from cdpr_tools.commands.calibration.calibrate_measure import measure
 from cdpr_tools.commands.calibration.calibrate_read import read
+from cdpr_tools.commands.calibration.options import (
+    AdoptOption,
+    CalibrationPlantOption,
+    CameraUrlOption,
+    DryRunOption,
+    IdentifyOption,
+    KnownMmOption,
+    PointsOption,
+    PosesOption,
+    geometry_of,
+    hand_eye_of,
+)
 from cdpr_tools.commands.options import (
     ClusterOption,
     HandEyeOption,
     JsonOption,
+    KeyFileOption,
     OverwriteOption,
     PngOption,
     RobotArgument,
     SeedOption,
+    SocketOption,
+    UrlOption,
 )
 from cdpr_tools.errors import BadInputError, WorkFailedError, os_error_as
 from cdpr_tools.loading import told_on_a_terminal
 from cdpr_tools.output import Output
-
-if TYPE_CHECKING:
-    from cdpr_rt.calibration.estimation.parameters import CableGeometry
-    from cdpr_rt.calibration.readings.camera_data import HandEye
 
 app = typer.Typer(
     name="calibrate",
@@ -33,41 +46,11 @@ app = typer.Typer(
     no_args_is_help=True,
 )
 
-_Points = Annotated[
-    Path | None,
-    typer.Option(
-        help="Measured positions, CSV with these columns: pose (from 1),x_mm,y_mm,z_mm,sigma_mm.",
-        metavar="FILE",
-    ),
-]
-_Identify = Annotated[
-    str | None,
-    typer.Option(
-        help="What is identified: exit,offset,drum,elongation where left out; anchor, pulley too.",
-        metavar="LIST",
-    ),
-]
-_KnownMm = Annotated[
-    float | None,
-    typer.Option(
-        "--known-mm", min=0.1, max=500.0,
-        help="How well the exit points of the robot's file are known, one standard deviation; as "
-        "with a tape where left out.",
-    ),
-]  # fmt: skip
-_Plant = Annotated[
-    Path | None,
-    typer.Option(help="Plant file: the truth about robot, cables, motors and camera."),
-]
-_DryRun = Annotated[bool, typer.Option("--dry-run", help="Tell what is found; take nothing over.")]
-_Adopt = Annotated[
-    bool,
-    typer.Option("--adopt", help="Take it over even if its changes are not significant."),
-]
 _DRAWS, _FEW = 200, 5
 
 
 app.command()(read)
+app.command()(measure)
 
 
 @app.command(name="fit")
@@ -77,13 +60,13 @@ def fit_data(
         Path,
         typer.Option(help="Folder of a run, or readings as its data.json.", metavar="FOLDER|FILE"),
     ],
-    points: _Points = None,
+    points: PointsOption = None,
     hand_eye: HandEyeOption = None,
-    identify: _Identify = None,
-    known_mm: _KnownMm = None,
+    identify: IdentifyOption = None,
+    known_mm: KnownMmOption = None,
     out_dir: Annotated[Path | None, typer.Option("--out", help="Folder for the result.")] = None,
-    dry_run: _DryRun = False,
-    adopt: _Adopt = False,
+    dry_run: DryRunOption = False,
+    adopt: AdoptOption = False,
     as_json: JsonOption = False,
 ) -> None:
     """Identify from what was measured before, as in a run that is complete; nothing moves.
@@ -103,9 +86,9 @@ def fit_data(
     if data.is_dir():
         judge = runs.judge_of_folder(profile, data)
         data /= runs.DATA
-    read_before = with_hand_eye(load_data(data), _hand_eye(hand_eye))
+    read_before = with_hand_eye(load_data(data), hand_eye_of(hand_eye))
     finish(
-        *(out, profile, read_before, points, _geometry(profile, identify, known_mm)),
+        *(out, profile, read_before, points, geometry_of(profile, identify, known_mm)),
         *(data, out_dir or data.parent, dry_run, adopt, judge),
     )
 
@@ -127,16 +110,9 @@ def run(
     scanner: Annotated[
         bool, typer.Option("--scanner", help="With poses that the simulated scanner measures.")
     ] = False,
-    points: _Points = None,
-    poses: Annotated[
-        str | None,
-        typer.Option(
-            metavar="N|FILE",
-            help="How many poses, home among them, or a list as `cdpr poses` writes it; else up to "
-            "100, while more bring something.",
-        ),
-    ] = None,
-    plant: _Plant = None,
+    points: PointsOption = None,
+    poses: PosesOption = None,
+    plant: CalibrationPlantOption = None,
     intrinsics: Annotated[
         Path | None,
         typer.Option(help="Of the camera; else found by a board first.", metavar="FILE"),
@@ -147,8 +123,8 @@ def run(
     ] = None,
     hand_eye: HandEyeOption = None,
     seed: SeedOption = 1,
-    identify: _Identify = None,
-    known_mm: _KnownMm = None,
+    identify: IdentifyOption = None,
+    known_mm: KnownMmOption = None,
     out_dir: Annotated[
         Path | None, typer.Option("--out", help="Folder for data, images, result and report.")
     ] = None,
@@ -156,8 +132,8 @@ def run(
         bool, typer.Option("--resume", help="Go on with what a run has left that ended early.")
     ] = False,
     overwrite: OverwriteOption = False,
-    dry_run: _DryRun = False,
-    adopt: _Adopt = False,
+    dry_run: DryRunOption = False,
+    adopt: AdoptOption = False,
     as_json: JsonOption = False,
 ) -> None:
     """Move a simulated robot through poses, read its cables, identify, verify and take over.
@@ -177,8 +153,8 @@ def run(
 
         profile = load_robot(robot)
         refuse_impossible(profile)
-        geometry = _geometry(profile, identify, known_mm)
-        known = _hand_eye(hand_eye)
+        geometry = geometry_of(profile, identify, known_mm)
+        known = hand_eye_of(hand_eye)
         count, listed = poses_wanted(profile, poses)
         if points is not None:
             check_points(points, profile, None if resume else count)
@@ -244,17 +220,25 @@ def check(
     scanner: Annotated[
         bool, typer.Option("--scanner", help="With poses that the simulated scanner measures.")
     ] = False,
-    plant: _Plant = None,
+    plant: CalibrationPlantOption = None,
+    running: Annotated[
+        bool,
+        typer.Option("--running", help="The robot that a daemon runs instead, tight and at home."),
+    ] = False,
+    camera: CameraUrlOption = None,
     seed: SeedOption = 1,
     out_dir: Annotated[
         Path | None, typer.Option("--out", help="Folder for the readings, check.json.")
     ] = None,
+    socket: SocketOption = None,
+    url: UrlOption = None,
+    key_file: KeyFileOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Take a calibrated simulated robot to ten poses and say whether it is as it was.
+    """Take a calibrated robot to ten poses and say whether it is as it was.
 
-    Ends with status 1 where it has moved: a cable, a drum or an exit point has changed so much
-    that it matters.
+    It is simulated, or `--running`. Ends with status 1 where it has moved: a cable, a drum or an
+    exit point has changed so much that it matters.
     """
     out = Output(as_json)
     with out.stage("looking at the robot's file"):
@@ -264,7 +248,16 @@ def check(
         profile = load_robot(robot)
         refuse_impossible(profile)
     folder = out_dir or Path("out") / f"check-{profile.profile}"
-    found = checks.checked(out, profile, plant, scanner, seed, folder)
+    if running:
+        if scanner or plant is not None:
+            raise BadInputError("--running: not together with --scanner or --plant")
+        name = None if socket is not None or url is not None else robot
+        with open_daemon(name, socket, url, key_file) as daemon:
+            found = checks.checked_running(out, profile, daemon, camera, seed, folder)
+    elif camera is not None:
+        raise BadInputError("--camera: allowed: with --running")
+    else:
+        found = checks.checked(out, profile, plant, scanner, seed, folder)
     out.say(*checks.lines(found, profile))
     out.result({"ok": not found.moved, **checks.as_json(found), "data": folder / checks.CHECK})
     if found.moved:
@@ -359,21 +352,3 @@ def _ablation(
         tables = ablations.ablation(robot, draws, seed, cluster, advance)
     out.say(*ablations.lines(tables))
     out.result({"ok": True, "robot": robot, "draws": draws, "seed": seed, **tables})
-
-
-def _hand_eye(path: Path | None) -> HandEye | None:
-    from cdpr_rt.calibration.readings.camera_data import HandEye  # noqa: PLC0415  # slow to load
-
-    return None if path is None else HandEye.load_file(path)
-
-
-def _geometry(robot: Robot, identify: str | None, known_mm: float | None) -> CableGeometry:
-    from cdpr_rt.calibration.estimation.parameters import (  # noqa: PLC0415  # slow to load
-        USUAL,
-        CableGeometry,
-        Knowledge,
-    )
-
-    known = Knowledge() if known_mm is None else Knowledge(exit_m=1e-3 * known_mm)
-    kinds = USUAL if identify is None else tuple(part.strip() for part in identify.split(","))
-    return CableGeometry.of(robot, kinds, known)

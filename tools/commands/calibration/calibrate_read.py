@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
-from contextlib import closing, nullcontext
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from cdpr_tools.client.client import Daemon
+from cdpr_tools.commands.calibration.options import (
+    CameraUrlOption,
+    IntrinsicsOption,
+    MarkersOption,
+)
 from cdpr_tools.commands.daemon.with_daemon import with_daemon
 from cdpr_tools.output import Output
 
@@ -22,43 +26,26 @@ def read(
     out_dir: Annotated[
         Path, typer.Option("--out", help="Folder of the poses; the first one begins it.")
     ],
-    camera: Annotated[
-        str | None,
-        typer.Option(help="Take an image with it, such as opencv:0.", metavar="CAMERA"),
-    ] = None,
-    intrinsics: Annotated[
-        Path | None, typer.Option(help="Of the camera, for the first pose.", metavar="FILE")
-    ] = None,
-    markers: Annotated[
-        Path | None,
-        typer.Option(help="Sizes of the sheets, for the first pose.", metavar="FILE"),
-    ] = None,
+    camera: CameraUrlOption = None,
+    intrinsics: IntrinsicsOption = None,
+    markers: MarkersOption = None,
 ) -> None:
     """Read where a running robot's platform stands, for `cdpr calibrate fit`; moves nothing.
 
     The first pose is that at home, after `cdpr tighten`; `cdpr move` takes it to the others.
-    Fifteen are the least.
+    Fifteen are the least. `cdpr calibrate measure` goes to them by itself.
     """
-    from cdpr_rt.core.clock import PacedClock  # noqa: PLC0415  # slow to load
     from cdpr_tools.calibrate.measuring import daemon_pose  # noqa: PLC0415  # slow to load
-    from cdpr_tools.calibrate.measuring.run import DATA, IMAGES  # noqa: PLC0415  # slow to load
+    from cdpr_tools.calibrate.measuring.run import DATA  # noqa: PLC0415  # slow to load
+    from cdpr_tools.client.pose_reader import DaemonReader  # noqa: PLC0415  # slow to load
 
     robot, description = daemon_pose.robot_of(daemon)
     data = daemon_pose.data_of(out_dir, robot, description["simulated"])
-    opened = None
-    if camera is not None:
-        from cdpr_tools.calibrate.measuring.pose_camera import (  # noqa: PLC0415  # needs an extra
-            PoseCamera,
-        )
-
-        data = daemon_pose.with_camera(data, intrinsics, markers)
-        assert data.camera is not None  # see `with_camera`
-        opened = PoseCamera(
-            camera, PacedClock(), data.camera.intrinsics, data.camera.sheets,
-            out_dir / IMAGES, out.note,
-        )  # fmt: skip
-    with nullcontext() if opened is None else closing(opened):
-        data = daemon_pose.read_into(daemon, robot, data, out_dir, opened)
+    kept = daemon_pose.DaemonPoses(out_dir, data)
+    with daemon_pose.image_taker(camera, intrinsics, markers, kept, out.note) as image:
+        reader = DaemonReader(daemon, daemon_pose.cable_m_per_rad(robot), image)
+        daemon_pose.read_into(reader, robot, kept)
+    data = kept.data
     number = len(data.poses)
     out.say(*daemon_pose.lines(robot, data))
     if number >= _ENOUGH:

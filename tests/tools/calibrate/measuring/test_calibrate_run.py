@@ -32,7 +32,7 @@ from cdpr_rt.procedures.calibration.measure_poses import (
 from cdpr_tools.calibrate.measuring import run
 from cdpr_tools.calibrate.measuring.outside import OutsidePose, OutsidePoses
 from cdpr_tools.calibrate.measuring.places import chosen_places
-from cdpr_tools.calibrate.measuring.rig import StoppedError
+from cdpr_tools.calibrate.measuring.ways import StoppedError
 from cdpr_tools.errors import BadInputError, WorkFailedError
 from cdpr_tools.output import Output
 

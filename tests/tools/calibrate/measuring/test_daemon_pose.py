@@ -10,11 +10,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cdpr_profiles import load_robot
+from cdpr_profiles import Robot, load_robot
 from cdpr_profiles.calibration.geometry import geometry_sha256
 from cdpr_rt.calibration.markers.sighting import Sighting
 from cdpr_rt.calibration.readings.data import CalibrationData, load_data
-from cdpr_tools.calibrate.measuring import daemon_pose, run
+from cdpr_tools.calibrate.measuring import daemon_pose, pose_camera, run
+from cdpr_tools.client.pose_reader import DaemonReader
 from cdpr_tools.errors import BadInputError, CommandError, WorkFailedError
 
 pytestmark = pytest.mark.long
@@ -34,7 +35,7 @@ class Told:
         assert ROBOT.platform is not None
         self.place = [*ROBOT.platform.home_m, 0.0]
         self.angle_rad, self.counted_m, self.moving_m = 1.0, 2.0, 0.0
-        self.time_s, self.state = 0.0, "active"
+        self.time_s, self.state, self.tight = 0.0, "active", True
 
     def get(self, path: str) -> dict[str, Any]:
         if path == "/description":
@@ -49,17 +50,26 @@ class Told:
             }
             for i, m in enumerate(per_rad)
         ]
-        progress = {"position_m": self.place[:2], "rotation_rad": self.place[2:]}
+        progress = {
+            "tight": self.tight, "position_m": self.place[:2], "rotation_rad": self.place[2:]
+        }  # fmt: skip
         return {
             "state": self.state, "program": "hold", "program_progress": progress, "axes": axes,
             "cycle": {"time_s": self.time_s},
         }  # fmt: skip
 
 
-def read(told: Told, folder: Path, **more: Any) -> CalibrationData:
+def read(told: Told, folder: Path, image: daemon_pose.TakeImage | None = None) -> CalibrationData:
+    robot, kept = kept_in(told, folder)
+    reader = DaemonReader(told, daemon_pose.cable_m_per_rad(robot), image or (lambda _: None))  # type: ignore[arg-type]
+    daemon_pose.read_into(reader, robot, kept)
+    return kept.data
+
+
+def kept_in(told: Told, folder: Path) -> tuple[Robot, daemon_pose.DaemonPoses]:
     robot, description = daemon_pose.robot_of(told)  # type: ignore[arg-type]
     data = daemon_pose.data_of(folder, robot, description["simulated"])
-    return daemon_pose.read_into(told, robot, data, folder, **more)  # type: ignore[arg-type]
+    return robot, daemon_pose.DaemonPoses(folder, data)
 
 
 def test_poses_follow_each_other_and_lengths_that_count_anew_are_noticed(tmp_path: Path) -> None:
@@ -93,6 +103,10 @@ def unpowered(told: Told, _: Path) -> None:
     told.state = "ready"
 
 
+def lowered(told: Told, _: Path) -> None:
+    told.tight = False
+
+
 def swinging(told: Told, _: Path) -> None:
     told.moving_m = 0.01
 
@@ -118,6 +132,7 @@ def of_a_run(told: Told, folder: Path) -> None:
         (shift("geometry_sha256", "0"), BadInputError, "changed since the daemon"),
         (away, BadInputError, "mm from home; allowed for the first pose: home"),
         (unpowered, WorkFailedError, "not held on its cables .ready, hold."),
+        (lowered, WorkFailedError, "not held on its cables .active, hold."),
         (swinging, WorkFailedError, "did not come to rest"),
         (of_the_simulator, BadInputError, "of another robot, bus or state"),
         (of_a_run, BadInputError, "of a run that moved by itself"),
@@ -132,33 +147,42 @@ def test_what_would_not_belong_together_is_refused(
         read(told, tmp_path)
 
 
-def test_an_image_goes_with_each_pose_and_the_files_with_the_first(tmp_path: Path) -> None:
+def test_an_image_goes_with_each_pose_and_the_files_with_the_first(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     lens, sheets = tmp_path / "lens.toml", tmp_path / "sheets.toml"
     lens.write_text(LENS)
     sheets.write_text("size_m = 0.1\n")
     told, folder = Told(), tmp_path / "cal"
+    folder.mkdir()
 
     class Camera:
+        def __init__(self, *_: Any) -> None:
+            pass
+
         def see(self, number: int, wait: Callable[[float], None]) -> Sighting:
             return Sighting(f"pose {number}", {number: np.zeros((4, 2))})
 
-    robot, _ = daemon_pose.robot_of(told)  # type: ignore[arg-type]
-    data = daemon_pose.data_of(folder, robot, False)
+        def close(self) -> None:
+            pass
+
+    monkeypatch.setattr(pose_camera, "PoseCamera", Camera)
+
+    def look(where: Path, *files: Path | None) -> None:
+        robot, kept = kept_in(told, where)
+        with daemon_pose.image_taker("opencv:0", *files, kept, print) as image:
+            reader = DaemonReader(told, daemon_pose.cable_m_per_rad(robot), image)  # type: ignore[arg-type]
+            daemon_pose.read_into(reader, robot, kept)
+
     with pytest.raises(BadInputError, match="--intrinsics and --markers as well"):
-        daemon_pose.with_camera(data, lens, None)
-    for number in (1, 2):
-        data = daemon_pose.data_of(folder, robot, False)
-        files = (lens, sheets) if number == 1 else (None, None)
-        data = daemon_pose.with_camera(data, *files)
-        folder.mkdir(exist_ok=True)
-        daemon_pose.read_into(told, robot, data, folder, Camera())  # type: ignore[arg-type]
+        look(folder, lens, None)
+    look(folder, lens, sheets)
+    look(folder, None, None)
     kept = json.loads((folder / "data.json").read_text())
     assert [one["image"]["markers"][0]["id"] for one in kept["poses"]] == [1, 2]
     assert kept["camera"]["intrinsics"]["width_px"] == 64
-    blind = load_data(folder / "data.json").model_copy(update={"camera": None, "poses": ()})
+    other = tmp_path / "other"
+    other.mkdir()
+    read(told, other)
     with pytest.raises(BadInputError, match="read without"):
-        other = tmp_path / "other"
-        other.mkdir()
-        read(told, other)
-        daemon_pose.with_camera(daemon_pose.data_of(other, robot, False), lens, sheets)
-    assert daemon_pose.with_camera(blind, lens, sheets).camera is not None
+        look(other, lens, sheets)

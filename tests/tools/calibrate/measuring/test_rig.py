@@ -19,7 +19,8 @@ from cdpr_rt.procedures.calibration.measure_poses import (
 from cdpr_tools.calibrate.measuring import rig
 from cdpr_tools.calibrate.measuring.outside import OutsidePose
 from cdpr_tools.calibrate.measuring.places import chosen_places
-from cdpr_tools.calibrate.measuring.rig import StoppedError, simulated_rig
+from cdpr_tools.calibrate.measuring.rig import simulated_rig
+from cdpr_tools.calibrate.measuring.ways import StoppedError
 
 pytestmark = pytest.mark.long
 

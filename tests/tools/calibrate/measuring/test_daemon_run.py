@@ -1,0 +1,280 @@
+"""A platform that a daemon, which is made up, moves from pose to pose: what is kept and ends it."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from cdpr_profiles import Robot, load_robot
+from cdpr_profiles.calibration.geometry import geometry_sha256
+from cdpr_profiles.calibration.in_force import calibrated, take_over, undo
+from cdpr_rt.arrays import FloatArray
+from cdpr_rt.calibration.estimation.parameters import CableGeometry
+from cdpr_rt.calibration.estimation.residuals import lengths_told
+from cdpr_rt.calibration.readings.data import load_data, load_points
+from cdpr_rt.errors import TripError
+from cdpr_tools.calibrate.check import checked_running
+from cdpr_tools.calibrate.measuring import asked_points, daemon_pose
+from cdpr_tools.calibrate.measuring.asked_points import AskedPoints
+from cdpr_tools.calibrate.measuring.daemon_run import DaemonOperator, measure_with_daemon
+from cdpr_tools.calibrate.measuring.places import Places
+from cdpr_tools.calibrate.measuring.ways import StoppedError
+from cdpr_tools.client.client import ConnectionLostError
+from cdpr_tools.errors import BadInputError, WorkFailedError
+from cdpr_tools.output import Output
+from tests.profiles.test_geometry_calibration import calibration
+from tests.tools.calibrate.measuring.test_daemon_pose import ROBOT, Told, kept_in
+
+PLACES = [(0.1, 1.5, 0.0), (0.2, 1.6, 0.05), (-0.1, 1.7, 0.0), (0.0, 1.4, -0.05)]
+
+
+class Moved(Told):
+    """A daemon that moves its platform, unless a place is refused, not reached, or ends it."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.program, self.target = "hold", list(self.place)
+        self.refused: set[float] = set()
+        self.stuck: set[float] = set()
+        self.faulty: set[float] = set()
+        self.limit, self.renewed, self.holds, self.rights = "slack", 0, 0, 0
+        self.lost = False
+
+    def get(self, path: str) -> dict[str, Any]:
+        if self.lost:
+            raise ConnectionLostError("gone")
+        if path == "/events":
+            return {"events": []}
+        status = super().get(path)
+        if path != "/status":
+            return status
+        if self.program == "pose" and self.target[0] in self.faulty:
+            self.state = "fault"
+        arrived = self.program == "pose" and self.target[0] not in self.stuck
+        if arrived:
+            self.place = list(self.target)
+            here = {"position_m": self.place[:2], "rotation_rad": self.place[2:]}
+            status["program_progress"] |= here
+        status["program_progress"] |= {
+            "done": float(arrived), "trouble": "", "held_back": "a cable would be slack",
+            "missing": "",
+        }  # fmt: skip
+        reason = "axis 1: slack" if self.state == "fault" else ""
+        limit = {"limit": self.limit} if reason else None
+        return status | {
+            "program": self.program, "state": self.state, "reason": reason, "reason_limit": limit,
+        }  # fmt: skip
+
+    @contextmanager
+    def control(self) -> Iterator[Moved]:
+        self.rights += 1
+        try:
+            yield self
+        except BaseException:
+            self.hold()
+            raise
+
+    def post(self, path: str, body: dict[str, Any]) -> None:
+        wanted = body["wanted"]
+        assert (path, body["program"]) == ("/program", "pose")
+        assert wanted["speed_m_s"] == 0.5 * ROBOT.platform.speed_m_s  # type: ignore[union-attr]
+        if wanted["position_m"][0] in self.refused:
+            raise WorkFailedError("a cable is in the way")
+        self.program, self.target = "pose", [*wanted["position_m"], *wanted["rotation_rad"]]
+
+    def renew(self) -> None:
+        self.renewed += 1
+
+    def hold(self) -> None:
+        self.program, self.holds = "hold", self.holds + 1
+
+
+class Measurement:
+    """A measurement with such a daemon, of four places, in a folder."""
+
+    def __init__(self, daemon: Moved, folder: Path) -> None:
+        self.daemon, self.folder = daemon, folder
+        self.asked: list[int] = []
+        self.stopped = False
+
+    def run(self, wanted: int = 5) -> daemon_pose.DaemonPoses:
+        robot, kept = kept_in(self.daemon, self.folder)
+        operator = DaemonOperator(self.daemon, robot, lambda _: None, lambda: self.stopped)  # type: ignore[arg-type]
+        places = Places(np.array([0.0, 1.5, 0.0]), np.array(PLACES))
+        out = Output(as_json=False)
+        measure_with_daemon(
+            out, robot, operator, kept, places, wanted, lambda _: None, self.asked.append
+        )
+        return kept
+
+
+@pytest.fixture
+def measurement(tmp_path: Path) -> Measurement:
+    return Measurement(Moved(), tmp_path)
+
+
+def test_home_is_read_and_then_each_place_and_all_are_kept(measurement: Measurement) -> None:
+    kept = measurement.run()
+    data = load_data(measurement.folder / "data.json")
+    assert data == kept.data and len(data.poses) == 5 and data.restarts == ()
+    assert {pose.target for pose in data.poses[1:]} == set(PLACES)
+    assert measurement.asked == [1, 2, 3, 4, 5]
+    # the right is held while something moves, and only then
+    assert measurement.daemon.rights == measurement.daemon.holds == 4
+    assert measurement.daemon.program == "hold"
+
+
+def test_one_that_was_ended_goes_on_behind_what_is_kept(measurement: Measurement) -> None:
+    assert measurement.run(3).data.restarts == ()
+    assert measurement.run(4).data.restarts == ()
+    measurement.daemon.counted_m += 0.01  # as after another start
+    kept = measurement.run()
+    assert len(kept.data.poses) == 5 and kept.data.restarts == (4,)
+    assert measurement.daemon.rights == 4
+
+
+def test_a_place_that_is_refused_is_left_out_and_one_that_is_not_reached_read(
+    measurement: Measurement, capsys: pytest.CaptureFixture[str]
+) -> None:
+    measurement.daemon.refused, measurement.daemon.stuck = {0.2}, {-0.1}
+    data = measurement.run().data
+    told = capsys.readouterr().err
+    assert "a cable is in the way" in told
+    assert "mm" in told and "still on its way" not in told and "a cable would be slack" in told
+    assert set(data.tried) == {PLACES[1], PLACES[2]}
+    assert len(data.poses) == 4
+
+
+@pytest.mark.parametrize(("limit", "tried"), [("slack", 1), ("late", 0)])
+def test_a_fault_ends_it_with_what_was_read_kept(
+    measurement: Measurement, limit: str, tried: int
+) -> None:
+    measurement.daemon.faulty, measurement.daemon.limit = {-0.1}, limit
+    with pytest.raises(TripError, match=r"the motion was ended: axis 1: slack \(fault\)") as caught:
+        measurement.run()
+    assert "the same command goes on behind them" in caught.value.__notes__[0]
+    data = load_data(measurement.folder / "data.json")
+    assert len(data.tried) == tried and 1 <= len(data.poses) < 5
+
+
+def test_a_stop_holds_and_a_lost_daemon_is_told(measurement: Measurement) -> None:
+    measurement.run(2)
+
+    def renew() -> None:
+        measurement.stopped = True
+
+    measurement.daemon.stuck = {place[0] for place in PLACES}
+    measurement.daemon.renew = renew  # type: ignore[method-assign]
+    with pytest.raises(WorkFailedError, match="stopped; 2 poses are kept"):
+        measurement.run()
+    assert measurement.daemon.program == "hold"
+    measurement.stopped, measurement.daemon.lost = False, True
+    with pytest.raises(ConnectionLostError):
+        measurement.run()
+
+
+class Calibrated(Moved):
+    """One that runs a robot as calibrated, a drum of which may pay out more than it did."""
+
+    def __init__(self, robot: Robot, drum: float) -> None:
+        super().__init__()
+        self.robot, self.drum = robot, drum
+        self.description |= {
+            "reference": str(robot.path), "geometry_sha256": geometry_sha256(robot),
+            "calibration": {"version": 1},
+        }  # fmt: skip
+        self.geometry = CableGeometry.of(robot)
+        self.tension_N = np.full((1, 4), 40.0)
+        self.home_m = self.lengths_m(np.array([*robot.platform.home_m, 0.0]))  # type: ignore[union-attr]
+
+    def lengths_m(self, place: FloatArray) -> FloatArray:
+        poses = self.geometry.model.poses(place[None])
+        return np.asarray(lengths_told(self.geometry, poses, self.tension_N)[0])
+
+    def get(self, path: str) -> dict[str, Any]:
+        status = super().get(path)
+        if path == "/status":
+            lengths_m = self.lengths_m(np.array(self.place))
+            lengths_m[1] -= self.drum * (lengths_m[1] - self.home_m[1])
+            for axis, length_m in zip(status["axes"], lengths_m, strict=True):
+                axis |= {"cable_length_m": float(length_m), "tension_N": 40.0}
+        return status
+
+
+@pytest.fixture
+def file(tmp_path: Path) -> Robot:
+    """A robot's file beside which a calibration is in force."""
+    path = tmp_path / "mine.toml"
+    shutil.copy(ROBOT.path, path)
+    robot = load_robot(path)
+    take_over(robot, calibration(robot))
+    return robot
+
+
+@pytest.mark.parametrize(("drum", "moved"), [(0.0, False), (0.01, True)])
+def test_a_robot_that_runs_is_checked_against_its_calibration(
+    file: Robot, drum: float, moved: bool, tmp_path: Path
+) -> None:
+    daemon = Calibrated(calibrated(file), drum)
+    out = Output(as_json=False)
+    found = checked_running(out, file, daemon, None, 1, tmp_path / "out")  # type: ignore[arg-type]
+    assert (found.moved, found.poses) == (moved, 11)
+    if moved:
+        (change,) = found.changes
+        assert (change.kind, change.cable) == ("drum", 1)
+        assert change.size == pytest.approx([0.01], rel=0.2)
+    data = load_data(tmp_path / "out" / "check.json")
+    assert len(data.poses) == 11 and not data.simulated
+
+
+def test_a_robot_that_does_not_run_with_its_calibration_is_not_checked(
+    file: Robot, tmp_path: Path
+) -> None:
+    out, folder = Output(as_json=False), tmp_path / "out"
+    daemon = Calibrated(calibrated(file), 0.0)
+    with pytest.raises(BadInputError, match="calibrated with one"):
+        checked_running(out, file, daemon, "opencv:0", 1, folder)  # type: ignore[arg-type]
+    with pytest.raises(BadInputError, match="the daemon of this name runs"):
+        checked_running(out, ROBOT, daemon, None, 1, folder)  # type: ignore[arg-type]
+    undo(file)
+    with pytest.raises(BadInputError, match="or its calibration, has been changed"):
+        checked_running(out, file, daemon, None, 1, folder)  # type: ignore[arg-type]
+    assert not folder.exists() and daemon.rights == 0
+
+
+@pytest.fixture
+def typed(monkeypatch: pytest.MonkeyPatch) -> Iterator[int]:
+    """What is typed: the end of a pipe to write to."""
+    source, sink = os.pipe()
+    with os.fdopen(source) as stdin:
+        monkeypatch.setattr(asked_points.sys, "stdin", stdin)
+        yield sink
+
+
+def test_what_a_person_measures_is_kept_as_points(tmp_path: Path, typed: int) -> None:
+    said: list[str] = []
+    ask = AskedPoints(tmp_path / "points.csv", 3, said.append, lambda: False)
+    os.write(typed, b"1 2\n1.5, -2 3e2\n\n4 5 6 0.3\n7 8 9 -1\nnan 0 0\n10 11 12\n13 14")
+    os.close(typed)
+    for pose in (1, 2, 3, 4, 5, 6):
+        ask(pose)
+    points = load_points(tmp_path / "points.csv")
+    assert [point.pose for point in points] == [0, 2, 3]
+    assert points[0].position_m.tolist() == [0.0015, -0.002, 0.3]
+    assert [point.std_m for point in points] == [0.002, 0.0003, 0.002]
+    assert sum("allowed: x y z" in line for line in said) == 3
+    assert said[-1].startswith("pose 5 stands")  # at the end of what is typed nothing is asked
+
+
+def test_a_stop_ends_the_asking(tmp_path: Path, typed: int) -> None:
+    ask = AskedPoints(tmp_path / "points.csv", 2, lambda _: None, lambda: True)
+    with pytest.raises(StoppedError):
+        ask(1)
+    os.close(typed)

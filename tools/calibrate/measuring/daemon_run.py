@@ -1,0 +1,185 @@
+"""The poses of a calibration, gone to and read on a robot that a daemon runs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from cdpr_profiles import Robot
+from cdpr_rt.arrays import FloatArray
+from cdpr_rt.errors import ControlError
+from cdpr_rt.procedures.calibration.measure_poses import (
+    Measured,
+    PoseRefusedError,
+    TargetNotReached,
+    measure_poses,
+)
+from cdpr_tools.calibrate.measuring.daemon_pose import (
+    DaemonPoses,
+    TakeImage,
+    cable_m_per_rad,
+    read_into,
+)
+from cdpr_tools.calibrate.measuring.places import Places
+from cdpr_tools.calibrate.measuring.run import Enough
+from cdpr_tools.calibrate.measuring.ways import (
+    StoppedError,
+    motion_ended,
+    not_reached,
+    speed_m_s,
+    within_s,
+)
+from cdpr_tools.client.client import Daemon, HeldRight, NoDaemonError
+from cdpr_tools.client.motion import RENEW_S, ended_text, is_done
+from cdpr_tools.client.pose_reader import DaemonReader
+from cdpr_tools.errors import CommandError, WorkFailedError
+from cdpr_tools.output import Output
+from cdpr_tools.trials.directions import Directions, platform_of
+
+Ask = Callable[[int], None]
+"""Takes what a person measures at a pose, counted from 1, at which the platform stands."""
+
+
+class DaemonOperator(DaemonReader):
+    """Moves and reads the platform of a robot that a daemon runs; a `PlatformOperator`.
+
+    Between two motions the platform is held, and the right to move given back. `stop` is asked
+    whether somebody wants an end, which is told by StoppedError.
+    """
+
+    def __init__(
+        self,
+        daemon: Daemon,
+        robot: Robot,
+        image: TakeImage,
+        stop: Callable[[], bool],
+    ) -> None:
+        super().__init__(daemon, cable_m_per_rad(robot), image)
+        self._directions, self._stop = Directions.of(platform_of(robot)), stop
+
+    def go(self, place: FloatArray) -> TargetNotReached | None:
+        """Take it to a place (d,), or hold it where it is once that takes too long.
+
+        Raises PoseRefusedError, TripError, StoppedError, NoDaemonError.
+        """
+        directions = self._directions
+        arguments = directions.arguments(place, speed_m_s(directions))
+        allowed_s = within_s(directions, self.place(), place)
+        with self._daemon.control() as right:
+            try:
+                right.post("/program", {"program": "pose", "wanted": arguments})
+            except NoDaemonError:
+                raise
+            except CommandError as error:
+                self.status()  # raises where the motion is being ended
+                raise PoseRefusedError(str(error)) from None
+            progress = self._until(right, allowed_s)
+            right.hold()
+        if is_done(progress):
+            return None
+        return not_reached(directions, place, self.place(), allowed_s, progress)
+
+    def _until(self, right: HeldRight, seconds: float) -> dict[str, Any]:
+        """Return the progress of `pose` once it is done, or so much bus time is over."""
+        status = self.status()
+        end_s = status["cycle"]["time_s"] + seconds
+        while status["program"] == "pose" and status["cycle"]["time_s"] < end_s:
+            if is_done(status["program_progress"]):
+                break
+            right.renew()
+            self.stay(RENEW_S)
+            status = self.status()
+        if status["program"] != "pose":
+            raise self._ended(status)
+        progress: dict[str, Any] = status["program_progress"]
+        return progress
+
+    def status(self) -> dict[str, Any]:
+        """Return the daemon's status; raises TripError where the robot's power has gone."""
+        if self._stop():
+            raise StoppedError
+        try:
+            return super().status()
+        except NoDaemonError:
+            raise
+        except WorkFailedError:
+            if (status := self._daemon.get("/status"))["state"] == "active":
+                raise  # its cables are loose, or nobody knows where it is
+            raise self._ended(status) from None
+
+    def _ended(self, status: dict[str, Any]) -> Exception:
+        text = f"the motion was ended: {ended_text(self._daemon, status)} ({status['state']})"
+        return motion_ended(text, status["reason"], status["reason_limit"])
+
+
+def measure_with_daemon(
+    out: Output,
+    robot: Robot,
+    operator: DaemonOperator,
+    kept: DaemonPoses,
+    places: Places,
+    wanted: int,
+    enough: Enough,
+    ask: Ask,
+) -> None:
+    """Read home where there are no poses yet, then places until there are as many as wanted.
+
+    What is read is kept whatever ends it, and the error says how to go on. Raises CommandError,
+    ControlError, WorkFailedError where somebody stops it.
+    """
+    try:
+        read_places(out, robot, operator, kept, places, wanted, enough, ask)
+    except StoppedError:
+        raise WorkFailedError(f"stopped; {_going_on(kept)}") from None
+    except (CommandError, ControlError) as error:
+        error.add_note(_going_on(kept))
+        raise
+
+
+def read_places(
+    out: Output,
+    robot: Robot,
+    operator: DaemonOperator,
+    kept: DaemonPoses,
+    places: Places,
+    wanted: int,
+    enough: Enough = lambda _data: None,
+    ask: Ask = lambda _pose: None,
+) -> None:
+    """Do what `measure_with_daemon` does; raises StoppedError besides, and says less."""
+    with out.progress(f"reading up to {wanted} poses", float(wanted)) as advance:
+        if not kept.data.poses:
+            read_into(operator, robot, kept)
+            ask(1)
+
+        def keep() -> None:
+            kept.add(measured.readings[-1], operator.counted_m)
+            advance(float(len(kept.data.poses)))
+            ask(len(kept.data.poses))
+
+        before = kept.data
+        measured = Measured(keep, list(before.poses), list(before.left_out), list(before.tried))
+        done = {reading.target for reading in before.poses} | set(before.tried)
+        try:
+            for batch in places.batches():
+                left = np.array([place for place in batch if tuple(place.tolist()) not in done])
+                left = left[: wanted - len(measured.readings)]
+                measure_poses(operator, left, places.middle, measured, out)
+                if len(measured.readings) >= wanted or (len(left) and enough(kept.data)):
+                    return
+        finally:
+            update = {"left_out": tuple(measured.refused), "tried": tuple(measured.tried)}
+            kept.data = kept.data.model_copy(update=update)
+            kept.save()
+    out.note(f"{len(measured.readings)} poses only: all others were refused")
+
+
+def _going_on(kept: DaemonPoses) -> str:
+    if not kept.data.poses:
+        return "nothing was read yet"
+    return (
+        f"{len(kept.data.poses)} poses are kept in {kept.folder}; the same command goes on behind "
+        "them"
+    )

@@ -1,0 +1,86 @@
+"""Options and what they mean that several commands of `cdpr calibrate` share."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from cdpr_profiles import Robot
+
+if TYPE_CHECKING:
+    from cdpr_rt.calibration.estimation.parameters import CableGeometry
+    from cdpr_rt.calibration.readings.camera_data import HandEye
+
+PointsOption = Annotated[
+    Path | None,
+    typer.Option(
+        help="Measured positions, CSV with these columns: pose (from 1),x_mm,y_mm,z_mm,sigma_mm.",
+        metavar="FILE",
+    ),
+]
+IdentifyOption = Annotated[
+    str | None,
+    typer.Option(
+        help="What is identified: exit,offset,drum,elongation where left out; anchor, pulley too.",
+        metavar="LIST",
+    ),
+]
+KnownMmOption = Annotated[
+    float | None,
+    typer.Option(
+        "--known-mm", min=0.1, max=500.0,
+        help="How well the exit points of the robot's file are known, one standard deviation; as "
+        "with a tape where left out.",
+    ),
+]  # fmt: skip
+CalibrationPlantOption = Annotated[
+    Path | None,
+    typer.Option(help="Plant file: the truth about robot, cables, motors and camera."),
+]
+DryRunOption = Annotated[
+    bool, typer.Option("--dry-run", help="Tell what is found; take nothing over.")
+]
+AdoptOption = Annotated[
+    bool,
+    typer.Option("--adopt", help="Take it over even if its changes are not significant."),
+]
+PosesOption = Annotated[
+    str | None,
+    typer.Option(
+        metavar="N|FILE",
+        help="How many poses, home among them, or a list as `cdpr poses` writes it; else up to "
+        "100, while more bring something.",
+    ),
+]
+CameraUrlOption = Annotated[
+    str | None,
+    typer.Option("--camera", help="Take images with it, such as opencv:0.", metavar="CAMERA"),
+]
+IntrinsicsOption = Annotated[
+    Path | None, typer.Option(help="Of the camera, for the first pose.", metavar="FILE")
+]
+MarkersOption = Annotated[
+    Path | None, typer.Option(help="Sizes of the sheets, for the first pose.", metavar="FILE")
+]
+
+
+def hand_eye_of(path: Path | None) -> HandEye | None:
+    """Return what `--hand-eye` says; raises ProfileError."""
+    from cdpr_rt.calibration.readings.camera_data import HandEye  # noqa: PLC0415  # slow to load
+
+    return None if path is None else HandEye.load_file(path)
+
+
+def geometry_of(robot: Robot, identify: str | None, known_mm: float | None) -> CableGeometry:
+    """Return what is identified of a robot; raises InvalidRequestError for an unknown kind."""
+    from cdpr_rt.calibration.estimation.parameters import (  # noqa: PLC0415  # slow to load
+        USUAL,
+        CableGeometry,
+        Knowledge,
+    )
+
+    known = Knowledge() if known_mm is None else Knowledge(exit_m=1e-3 * known_mm)
+    kinds = USUAL if identify is None else tuple(part.strip() for part in identify.split(","))
+    return CableGeometry.of(robot, kinds, known)
