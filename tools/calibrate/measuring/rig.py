@@ -25,7 +25,6 @@ from cdpr_rt.procedures.calibration.measure_poses import (
 )
 from cdpr_tools.calibrate.measuring.outside import OutsidePose
 from cdpr_tools.calibrate.measuring.ways import (
-    LATE_S,
     StoppedError,
     motion_ended,
     not_reached,
@@ -138,7 +137,7 @@ class RigOperator:
             ended = rig.loop.engine.program is not program or program.at_rest
             return ended or self._stop() or rig.now_s > end_s
 
-        rig.until(over, within_s + LATE_S, program.name)
+        rig.until(over, within_s + _BRAKE_S, program.name)
         self._heed()
         if rig.loop.engine.program is not program:
             raise WorkFailedError(f"{program.name} was ended: {rig.state_text()}")

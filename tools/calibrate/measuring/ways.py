@@ -15,8 +15,8 @@ from cdpr_rt.procedures.calibration.measure_poses import NotThePoseError, Target
 from cdpr_rt.runtime.control_loop.stop_requests import EMERGENCY_STOP
 from cdpr_tools.trials.directions import Directions
 
-LATE_S: Final = 10.0
 _SLOWED: Final = 1.5
+_LATE_S: Final = 10.0
 """A motion may take so many times as long as planned, and that much longer."""
 _SPEED_SHARE: Final = 0.5
 """Of the speed of the robot's file: a robot that is not calibrated yet is not hurried."""
@@ -57,7 +57,7 @@ def within_s(directions: Directions, here: FloatArray, place: FloatArray) -> flo
         planned_s = 2.0 * math.sqrt(square_s2)
     else:
         planned_s += square_s2 / max(planned_s, 1e-9)
-    return _SLOWED * planned_s + LATE_S
+    return _SLOWED * planned_s + _LATE_S
 
 
 def not_reached(

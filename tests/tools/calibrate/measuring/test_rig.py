@@ -16,7 +16,7 @@ from cdpr_rt.procedures.calibration.measure_poses import (
     measure_poses,
     read_pose,
 )
-from cdpr_tools.calibrate.measuring import rig
+from cdpr_tools.calibrate.measuring import ways
 from cdpr_tools.calibrate.measuring.outside import OutsidePose
 from cdpr_tools.calibrate.measuring.places import chosen_places
 from cdpr_tools.calibrate.measuring.rig import simulated_rig
@@ -82,8 +82,8 @@ def test_a_pose_that_is_not_reached_in_time_is_read_where_the_platform_is_held(
 
     with simulated_rig("planar-3", plant=None, scanner=False) as operator:
         operator.tighten()
-        monkeypatch.setattr(rig, "_SLOWED", 0.3)
-        monkeypatch.setattr(rig, "_LATE_S", 0.0)
+        monkeypatch.setattr(ways, "_SLOWED", 0.3)
+        monkeypatch.setattr(ways, "_LATE_S", 0.0)
         measured = Measured(lambda: None)
         measure_poses(operator, [first], places.middle, measured, Noted())
         true = operator.rig.truth()["position_m"][:2].copy()
