@@ -1,0 +1,271 @@
+"""The check of every limit in a cycle, as a kernel over the axes."""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+import numpy as np
+
+from cdpr_rt.arrays import BoolArray, FloatArray
+from cdpr_rt.core.limits import Limit, Limits
+from cdpr_rt.jit import jit
+
+# kernels take plain numbers
+_TORQUE, _TORQUE_RATE = int(Limit.TORQUE), int(Limit.TORQUE_RATE)
+_SPEED, _FOLLOWING_ERROR = int(Limit.SPEED), int(Limit.FOLLOWING_ERROR)
+_CABLE_LENGTH, _TENSION_SENSOR = int(Limit.CABLE_LENGTH), int(Limit.TENSION_SENSOR)
+_TENSION_LOW, _TENSION_HIGH = int(Limit.TENSION_LOW), int(Limit.TENSION_HIGH)
+_SLACK, _BROKEN_CABLE = int(Limit.SLACK), int(Limit.BROKEN_CABLE)
+_STALE, _LATE, _NOT_FINITE = int(Limit.STALE), int(Limit.LATE), int(Limit.NOT_FINITE)
+_MISSED, _MISSED_IN_WINDOW = int(Limit.MISSED), int(Limit.MISSED_IN_WINDOW)
+_ENCODER_JUMP = int(Limit.ENCODER_JUMP)
+
+FIGURES: Final = tuple(name for name in Limits.__dataclass_fields__ if name != "reactions")
+"""The attributes of `Limits` that are numbers."""
+AXIS_LIMITS: Final = np.dtype([(name, "<f8") for name in (*FIGURES, "period_s")])
+AXIS_HISTORY: Final = np.dtype(
+    [
+        ("torque", "<f8"),  # as passed on in the last cycle
+        ("missed", "<f8"),  # consecutive
+        ("in_window", "<f8"),
+        ("window_index", "<i8"),  # where in the window the last cycle is
+        ("stale", "<f8"),
+        ("low_s", "<f8"),  # since the tension was last sufficient
+        ("slack_s", "<f8"),
+        ("tight_rad", "<f8"),  # motor angle when it was
+        ("low_armed", "<f8"),  # whether it was since enabling, or since this was noted last
+        ("slack_armed", "<f8"),
+        ("mean_N", "<f8"),  # its tension, low-passed
+        ("valid_count", "<f8"),  # valid angles since enabling, up to 2
+        ("valid_rad", "<f8"),  # the last valid angle
+        ("velocity_rad_s", "<f8"),  # then
+        ("invalid_s", "<f8"),  # since the last valid angle
+    ]
+)
+VERDICT: Final = np.dtype(
+    [("reaction", "<i8"), ("limit", "<i8"), ("axis", "<i8"), ("value", "<f8"), ("allowed", "<f8")]
+)
+_JUMP_rad: Final = 0.05
+"""How far an angle may be from its extrapolation, besides what the limit of speed allows."""
+_SNAPPED_SHARE, _MEAN_S = 0.6, 0.1
+"""A cable that runs in has snapped below this share of its tension's mean over such a time."""
+_PAID_OUT_m: Final = 5e-4
+"""A cable is not broken where this much was paid out while its tension fell."""
+
+
+@jit
+def note_exceeded(
+    verdict: Any, reactions: Any, limit: int, axis: int, value: float, allowed: float
+) -> None:
+    """Keep the most severe of what was exceeded in this cycle, the first of equals."""
+    reaction = reactions[limit]
+    if reaction > verdict[0]["reaction"]:
+        verdict[0]["reaction"], verdict[0]["limit"], verdict[0]["axis"] = reaction, limit, axis
+        verdict[0]["value"], verdict[0]["allowed"] = value, allowed
+
+
+@jit
+def _bound_torque(
+    i: int,
+    limits: Any,
+    history: Any,
+    reactions: Any,
+    verdict: Any,
+    period: float,
+    torque: FloatArray,
+) -> None:
+    asked = torque[i]
+    if not np.isfinite(asked):
+        note_exceeded(verdict, reactions, _NOT_FINITE, i, asked, 0.0)
+        asked = 0.0
+    bound, rate = limits["torque_Nm"], limits["torque_rate_Nm_s"]
+    if abs(asked) > bound:
+        note_exceeded(verdict, reactions, _TORQUE, i, asked, bound)
+        asked = min(max(asked, -bound), bound)
+    step = asked - history["torque"]
+    if abs(step) > rate * period:
+        note_exceeded(verdict, reactions, _TORQUE_RATE, i, step / period, rate)
+        asked = history["torque"] + min(max(step, -rate * period), rate * period)
+    history["torque"] = torque[i] = asked
+
+
+@jit
+def _watch_answers(
+    i: int,
+    limits: Any,
+    history: Any,
+    reactions: Any,
+    verdict: Any,
+    valid: bool,
+    regular: bool,
+    window: Any,
+) -> None:
+    missed = 0 if valid else 1
+    # where this cycle's flag goes, that of one window ago still is
+    history["window_index"] = index = (history["window_index"] + 1) % window.shape[0]
+    history["missed"] = 0.0 if valid else history["missed"] + 1.0
+    history["in_window"] += missed - window[index, i]
+    window[index, i] = missed
+    history["stale"] = 0.0 if regular else history["stale"] + 1.0
+    if history["missed"] > limits["missed_cycles"]:
+        note_exceeded(verdict, reactions, _MISSED, i, history["missed"], limits["missed_cycles"])
+    if history["in_window"] > limits["missed_in_window"]:
+        note_exceeded(
+            verdict,
+            reactions,
+            _MISSED_IN_WINDOW,
+            i,
+            history["in_window"],
+            limits["missed_in_window"],
+        )
+    if history["stale"] > limits["stale_cycles"]:
+        note_exceeded(verdict, reactions, _STALE, i, history["stale"], limits["stale_cycles"])
+
+
+@jit
+def _watch_jumps(
+    i: int, limits: Any, history: Any, reactions: Any, verdict: Any, elapsed: float, position: float
+) -> None:
+    history["invalid_s"] += elapsed
+    step = position - history["valid_rad"]
+    jump = step - history["velocity_rad_s"] * history["invalid_s"]
+    possible = limits["speed_rad_s"] * history["invalid_s"] + _JUMP_rad
+    if history["valid_count"] == 2.0 and abs(jump) > possible:
+        note_exceeded(verdict, reactions, _ENCODER_JUMP, i, jump, possible)
+    history["velocity_rad_s"] = step / history["invalid_s"] if history["valid_count"] else 0.0
+    history["valid_count"] = min(history["valid_count"] + 1.0, 2.0)
+    history["valid_rad"], history["invalid_s"] = position, 0.0
+
+
+@jit
+def _watch_motion(
+    i: int,
+    limits: Any,
+    reactions: Any,
+    verdict: Any,
+    error: float,
+    velocity: float,
+    length: float,
+    paying_out: float,
+) -> None:
+    # a value that is not a number is not within its limit either
+    if not abs(velocity) <= limits["speed_rad_s"]:
+        note_exceeded(verdict, reactions, _SPEED, i, velocity, limits["speed_rad_s"])
+    if not abs(error) <= limits["following_error_rad"]:
+        note_exceeded(verdict, reactions, _FOLLOWING_ERROR, i, error, limits["following_error_rad"])
+    # beyond a length only the way back is open
+    if length > limits["cable_length_max_m"] and paying_out > 0.0:
+        note_exceeded(verdict, reactions, _CABLE_LENGTH, i, length, limits["cable_length_max_m"])
+    if length < limits["cable_length_min_m"] and paying_out < 0.0:
+        note_exceeded(verdict, reactions, _CABLE_LENGTH, i, length, limits["cable_length_min_m"])
+
+
+@jit
+def _has_snapped(
+    limits: Any, history: Any, elapsed: float, tension: float, winding_in: float
+) -> bool:
+    """Whether a cable that was tight comes in faster than it may and has lost its tension."""
+    before = history["mean_N"]
+    if np.isfinite(tension):
+        history["mean_N"] += elapsed / (elapsed + _MEAN_S) * (tension - before)
+    runs_away = history["slack_armed"] != 0.0 and winding_in > limits["speed_rad_s"]
+    return bool(runs_away and tension < _SNAPPED_SHARE * before)
+
+
+@jit
+def _watch_tension(
+    i: int,
+    limits: Any,
+    history: Any,
+    reactions: Any,
+    verdict: Any,
+    elapsed: float,
+    tension: float,
+    slack_allowed: bool,
+    position: float,
+    cable_m_per_rad: float,
+) -> None:
+    if tension > limits["tension_max_N"]:
+        note_exceeded(verdict, reactions, _TENSION_HIGH, i, tension, limits["tension_max_N"])
+    if slack_allowed:
+        history["low_armed"] = history["slack_armed"] = 0.0
+        return
+    if not tension < limits["tension_min_N"]:
+        history["low_s"] = history["slack_s"] = 0.0
+        history["tight_rad"] = position
+        if tension >= limits["tension_min_N"]:
+            history["low_armed"] = history["slack_armed"] = 1.0
+        return
+    history["low_s"] += elapsed
+    history["slack_s"] = history["slack_s"] + elapsed if tension < limits["slack_N"] else 0.0
+    paid_out = (position - history["tight_rad"]) * cable_m_per_rad
+    at_once = history["low_s"] <= limits["broken_within_s"] and paid_out < _PAID_OUT_m
+    # each is noted once, so that the cable can be tightened, and again when it was tight
+    if history["slack_armed"] and history["slack_s"] > 0.0 and at_once:
+        history["low_armed"] = history["slack_armed"] = 0.0
+        note_exceeded(verdict, reactions, _BROKEN_CABLE, i, tension, limits["tension_min_N"])
+    elif history["slack_armed"] and history["slack_s"] > limits["slack_s"]:
+        history["low_armed"] = history["slack_armed"] = 0.0
+        note_exceeded(verdict, reactions, _SLACK, i, tension, limits["slack_N"])
+    elif history["low_armed"] and history["low_s"] > limits["slack_s"]:
+        history["low_armed"] = 0.0
+        note_exceeded(verdict, reactions, _TENSION_LOW, i, tension, limits["tension_min_N"])
+
+
+@jit
+def check_axes(
+    all_limits: Any,
+    histories: Any,
+    window: Any,
+    reactions: Any,
+    verdict: Any,
+    position: FloatArray,
+    setpoint: FloatArray,
+    setpoint_velocity: FloatArray,
+    valid: BoolArray,
+    alive: BoolArray,
+    rate_ok: BoolArray,
+    velocity: FloatArray,
+    cable_m_per_rad: FloatArray,
+    length: FloatArray,
+    tension: FloatArray,
+    sensor_ok: BoolArray,
+    torque: FloatArray,
+    elapsed: float,
+    slack_allowed: bool,
+) -> int:
+    """Check one cycle of n axes and clamp `torque` (n,) in place; return the reaction.
+
+    `all_limits`, `histories` (n,) and `verdict` (1,) are records of `AXIS_LIMITS`, `AXIS_HISTORY`
+    and `VERDICT`; `window` (m, n) says which answers of the last m cycles were missed, `reactions`
+    what is done about each `Limit`. The others are (n,), as in `AxisFeedback`, `AxisEstimate` and
+    `Setpoint`; `elapsed` is from the last SYNC to this one, s.
+    """
+    verdict[0]["reaction"] = verdict[0]["limit"] = 0
+    period = all_limits[0]["period_s"]
+    if elapsed - period > all_limits[0]["late_s"]:
+        note_exceeded(verdict, reactions, _LATE, -1, elapsed - period, all_limits[0]["late_s"])
+    for i in range(torque.size):
+        limits, history = all_limits[i], histories[i]
+        _bound_torque(i, limits, history, reactions, verdict, period, torque)
+        regular = alive[i] and rate_ok[i]
+        _watch_answers(i, limits, history, reactions, verdict, valid[i], regular, window)
+        if not valid[i]:
+            history["invalid_s"] += elapsed
+            continue
+        _watch_jumps(i, limits, history, reactions, verdict, elapsed, position[i])
+        winding_in = -velocity[i] * np.sign(cable_m_per_rad[i])
+        mean_N = history["mean_N"]
+        if _has_snapped(limits, history, elapsed, tension[i], winding_in):
+            note_exceeded(verdict, reactions, _BROKEN_CABLE, i, tension[i], mean_N)
+        error, paying_out = setpoint[i] - position[i], setpoint_velocity[i] * cable_m_per_rad[i]
+        _watch_motion(i, limits, reactions, verdict, error, velocity[i], length[i], paying_out)
+        if not sensor_ok[i]:
+            # what takes its place is an estimate, whose step would look like a broken cable
+            note_exceeded(verdict, reactions, _TENSION_SENSOR, i, np.nan, np.nan)
+            continue
+        _watch_tension(
+            i, limits, history, reactions, verdict, elapsed, tension[i], slack_allowed, position[i],
+            cable_m_per_rad[i],
+        )  # fmt: skip
+    return int(verdict[0]["reaction"])
