@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -14,17 +14,13 @@ from cdpr_rt.arrays import FloatArray
 from cdpr_rt.core.limits import Limits
 from cdpr_rt.errors import GeometryError
 from cdpr_rt.robots.interference.interference import in_words
+from cdpr_rt.robots.not_held import point_text, why_not_held
 from cdpr_rt.robots.platform.loop_design import designed_loop
-from cdpr_rt.robots.platform_model import platform_model
 from cdpr_rt.robots.rigid_body import in_space, is_point
 from cdpr_rt.robots.robot_arrays import limits_of
 from cdpr_rt.robots.statics import NONE_rad, PlatformStatics, statics_of
 
 _GRID = 25
-_FLAT = 1e-3
-"""Share of their span by which points may be off a line or a plane and still count as in it."""
-_SHARES = np.concatenate([np.linspace(0.99, 0.03, 97), np.geomspace(0.0295, 1e-5, 120)])
-_TIMES = np.geomspace(1.02, 20.0, 150)
 _LONGEST_PERIOD_s = 0.005
 """Of a cycle, with which the platform's control is still stiff enough to overcome friction."""
 _NEAREST_m = 0.1
@@ -124,7 +120,7 @@ def _tensions(statics: PlatformStatics) -> Iterator[Finding]:
     for place, where in ((home[None], ""), (way, "on the way to the box of targets, ")):
         missing = ~statics.is_target(place)
         if missing.any():
-            text = where + _not_held(statics, place[missing.argmax()], NONE_rad)
+            text = where + why_not_held(statics, place[missing.argmax()], NONE_rad)
             yield Finding("platform.home_m", text, impossible=True)
             break
     points, turns = statics.points(), statics.orientations
@@ -135,77 +131,12 @@ def _tensions(statics: PlatformStatics) -> Iterator[Finding]:
         text = f"in {math.floor(100 * taken)} % of the box targets are taken; "
         smaller = statics.largest_box(statics.box) if platform.is_planar else None
         if smaller is not None:
-            text += f"in all of {_point(smaller.low_m)} to {_point(smaller.high_m)} m they would be"
+            low, high = point_text(smaller.low_m), point_text(smaller.high_m)
+            text += f"in all of {low} to {high} m they would be"
         else:
             worst = np.unravel_index(moving_N.argmin(), moving_N.shape)
-            text += _not_held(statics, points[worst[1:]], turns[worst[0]])
+            text += why_not_held(statics, points[worst[1:]], turns[worst[0]])
         yield Finding("platform.workspace_min_m", text, impossible=taken == 0.0)
-
-
-def _not_held(statics: PlatformStatics, position_m: FloatArray, turn_rad: FloatArray) -> str:
-    """Say why the platform is not moved there, and what would help."""
-    where, reserve = f"at {_point(position_m)} m", float(statics.margin_N(position_m, 0, turn_rad))
-    if turn_rad.any():
-        where += f", turned {_turn(turn_rad)}"
-    if not math.isfinite(reserve):
-        return f"{where} {_singular(statics)}"
-    needed = ", ".join(f"{value:.0f}" for value in statics.tensions_N(position_m, turn_rad))
-    allowed = f"{statics.low_N.min():g} to {statics.model.left_by_torque_N.max():g} N are allowed"
-    if reserve < 0.0:
-        text = f"{where} the cables would need {needed} N; {allowed}"
-    else:
-        text = f"{where} the cables have {needed} N; {allowed}, which leaves too little for motion"
-    return f"{text}; {_what_helps(statics, position_m, turn_rad)}"
-
-
-def _singular(statics: PlatformStatics) -> str:
-    """Say that a direction is not held, and which points in a line or a plane are to blame."""
-    text = "the cables cannot hold one direction, whatever their tensions"
-    for name, points in (("exit points", statics.exits_m), ("anchor points", statics.anchors_m)):
-        spread = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
-        flat = int(np.sum(spread > _FLAT * max(float(spread[0]), _FLAT)))
-        if flat == 1:
-            return f"{text}: all {name} lie in one line"
-        if flat == 2 and len(spread) == 3 and _is_upright(points) and points is statics.exits_m:
-            return f"{text}: all {name} lie in one upright plane"
-    return f"{text}: anchor points elsewhere on the platform help"
-
-
-def _is_upright(points: FloatArray) -> bool:
-    normal = np.linalg.svd(points - points.mean(axis=0))[2][2]
-    return abs(float(normal[2])) < _FLAT
-
-
-def _what_helps(statics: PlatformStatics, position_m: FloatArray, turn_rad: FloatArray) -> str:
-    """Say by how much one figure would have to change for a target there."""
-    platform, low_N = statics.platform, statics.low_N
-    most, mass_kg = platform.acceleration_m_s2, platform.mass_kg
-
-    def helps(platform: Platform, low_N: FloatArray) -> bool:
-        bounds = (low_N, statics.high_N, statics.model.left_by_torque_N)
-        changed = PlatformStatics(platform_model(platform, *bounds))
-        return bool(changed.is_target(position_m, turn_rad))
-
-    for share in _SHARES if turn_rad.any() else ():
-        if bool(statics.is_target(position_m, share * turn_rad)):
-            angle = share * platform.workspace_angle_rad
-            return f"workspace_angle_rad up to {angle:.3g} is possible there"
-    least = replace(platform, acceleration_m_s2=_SHARES[-1] * most)
-    for share in _SHARES if helps(least, low_N) else ():
-        if helps(replace(platform, acceleration_m_s2=share * most), low_N):
-            return f"acceleration_m_s2 up to {share * most:.3g} is possible there"
-    for share in _SHARES:
-        if helps(replace(platform, mass_kg=share * mass_kg), low_N):
-            return f"a platform of up to {share * mass_kg:.3g} kg is possible there"
-    for share in _SHARES:
-        if helps(platform, share * low_N):
-            return f"tension_min_N up to {share * low_N.min():.3g} is possible there"
-    for times in _TIMES:
-        if helps(replace(platform, mass_kg=times * mass_kg), low_N):
-            return f"a platform of {times * mass_kg:.3g} kg and more is possible there"
-    turned = len(platform.controlled) > len(platform.home_m)
-    others = ", or other anchor points, which turn it both ways about each axis"
-    return f"only a place further inside the exit points helps{others if turned else ''}"
 
 
 def standing_tensions_N(statics: PlatformStatics) -> FloatArray:
@@ -275,7 +206,7 @@ def _turning(statics: PlatformStatics) -> Iterator[Finding]:
     places = np.concatenate([home[None], statics.points().reshape(-1, 2)])
     angle = np.where(statics.is_target(places), statics.angle_rad(places), 0.0)
     if np.isnan(angle).any():
-        where = _point(places[int(np.isnan(angle).argmax())])
+        where = point_text(places[int(np.isnan(angle).argmax())])
         text = (
             f"at {where} m the cables would turn the platform over; each cable should be made fast "
             "on the side of the platform that faces its exit point"
@@ -290,7 +221,7 @@ def _turning(statics: PlatformStatics) -> Iterator[Finding]:
         )
         yield Finding("platform.home_m", text, impossible=False)
     if degrees.max() > _FAR_TURNED_deg:
-        where = _point(places[int(degrees.argmax())])
+        where = point_text(places[int(degrees.argmax())])
         text = (
             f"at {where} m the platform turns by {degrees.max():.0f} deg, which no cable can "
             "prevent; anchor points that lie towards their exit points let it turn less"
@@ -376,7 +307,7 @@ def _contact(statics: PlatformStatics) -> Iterator[Finding]:
     text = (
         f"value {interference.clearance_m:g}; in {share} % of the box, turned as at home, "
         "something is nearer, and no move goes there: at "
-        f"{_point(points.reshape(-1, points.shape[-1])[i])} m {things}"
+        f"{point_text(points.reshape(-1, points.shape[-1])[i])} m {things}"
     )
     everywhere = bool(touching.all()) and all(
         (interference.clearances(statics.poses(points, turn))[0] < interference.clearance_m).all()
@@ -399,14 +330,3 @@ def _beside_the_body(platform: Platform) -> Iterator[Finding]:
             "contact: a body that reaches to its anchor points helps"
         )
         yield Finding(f"axes[{i}].anchor_point_m", text, impossible=False)
-
-
-def _turn(turn_rad: FloatArray) -> str:
-    angle = float(np.linalg.norm(turn_rad))
-    # + 0: a rounded -0 is shown as 0
-    axis = ", ".join(f"{value:.2g}" for value in np.round(turn_rad / angle, 2) + 0.0)
-    return f"by {math.degrees(angle):.0f} deg about ({axis})"
-
-
-def _point(position_m: FloatArray | tuple[float, ...]) -> str:
-    return "(" + ", ".join(f"{value:.2f}" for value in position_m) + ")"
