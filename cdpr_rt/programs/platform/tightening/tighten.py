@@ -14,6 +14,7 @@ from cdpr_rt.programs.arguments import CommandArguments
 from cdpr_rt.programs.base import ProgramError
 from cdpr_rt.programs.platform.arrival import Arrival
 from cdpr_rt.programs.platform.platform_program import PlatformParts, PlatformProgram
+from cdpr_rt.programs.platform.tightening.home_lengths import HomeLengths
 from cdpr_rt.programs.platform.tightening.index_path import index_path
 from cdpr_rt.programs.platform.tightening.standing import (
     bad_source,
@@ -41,8 +42,9 @@ _STILL_m = 0.0003
 _STILL_S = 0.3
 _HAND_OVER_S = 0.5
 _PULLED = 0.95
-_MOST_m, _ONCE_TIGHT_m = 1.0, 0.05
-_MOST_S = 60.0
+_SLACK_m, _ONCE_TIGHT_m = 1.0, 0.05
+"""How far a cable may be wound in while some are slack, and once all are tight, besides stretch."""
+_TIGHT_WITHIN_S = 60.0
 
 _STAGES = (("slack", TAKE_UP_SHARE), ("pull", 1.0), ("beyond", OVERSHOOT), ("lengths", 1.0))
 _SOURCES = ("home", "lengths", "last")
@@ -85,11 +87,7 @@ class TightenProgram(PlatformProgram):
         stretch_m = parts.control.lengths_at_home(np.zeros(cable_m.size)) - tight_m
         self._once_tight_m = _ONCE_TIGHT_m + float(stretch_m.max())
         self._start_rad, self._still_rad, self._rising_rad = np.zeros((3, cable_m.size))
-        self._home_rad = np.full(cable_m.size, np.nan)
-        """Angles at which lengths were taken at home, nan once they have been corrected."""
-        self._home_N = np.array(self._pretension_N)
-        """Tensions that stretched them then, and which of these load cells have measured."""
-        self._home_measured = np.zeros(cable_m.size, np.bool_)
+        self._home_lengths = HomeLengths(parts, self._cable)
         self._stage = 0
         self._share = 0.0
         self._still = self._cycles = 0
@@ -207,7 +205,7 @@ class TightenProgram(PlatformProgram):
         self._hangs = False
         self._control.observe(feedback)
         self._take_last()
-        self._home_rad[:] = np.nan
+        self._home_lengths.forget()
         self._take_over(feedback, torque_Nm)
         self._control.stand_still()
         self._finish(feedback, setpoint, torque_Nm)
@@ -289,18 +287,12 @@ class TightenProgram(PlatformProgram):
 
     def _lengths(self, feedback: AxisFeedback) -> FloatArray:
         """Return the cables' lengths, (n,), as they are now."""
-        self._home_rad[:] = np.nan
+        self._home_lengths.forget()
         if self._source == "last" and self._last is not None:
             return self._last.at(feedback.position_rad, self._cable)
         if self._source == "lengths":
             return self._parts.estimator.estimate.cable_length_m
-        estimate = self._parts.estimator.estimate
-        self._home_measured[:] = estimate.tension_measured
-        middle_rad = 0.5 * (feedback.position_rad + self._rising_rad)
-        self._home_rad[:] = np.where(self._home_measured, feedback.position_rad, middle_rad)
-        self._home_N[:] = np.where(self._home_measured, estimate.tension_N, self._pretension_N)
-        hysteresis = self._cable * (feedback.position_rad - self._home_rad)
-        return np.asarray(self._control.lengths_at_home(self._home_N) + hysteresis)
+        return self._home_lengths.take(feedback, self._rising_rad, self._pretension_N)
 
     def _take_over(self, feedback: AxisFeedback, torque_Nm: FloatArray) -> None:
         """Begin to have the platform's control ask for the torques, from those of this cycle on."""
@@ -321,16 +313,16 @@ class TightenProgram(PlatformProgram):
 
     def _trouble(self, feedback: AxisFeedback) -> str:
         moved_m = np.abs((feedback.position_rad - self._start_rad) * self._cable)
-        most = int(moved_m.argmax())
+        i = int(moved_m.argmax())
         # what stands does not move once its cables are tight
-        allowed_m = self._once_tight_m if self._stage > 0 else _MOST_m
-        if moved_m[most] > allowed_m:
+        allowed_m = self._once_tight_m if self._stage > 0 else _SLACK_m
+        if moved_m[i] > allowed_m:
             return (
-                f"cable {most + 1}: {1e3 * moved_m[most]:.0f} mm reeled in and not tight, "
+                f"cable {i + 1}: {1e3 * moved_m[i]:.0f} mm reeled in and not tight, "
                 f"{1e3 * allowed_m:.0f} mm allowed"
             )
-        if self._cycles * self._parts.period_s > _MOST_S:
-            return f"not tight within {_MOST_S:g} s"
+        if self._cycles * self._parts.period_s > _TIGHT_WITHIN_S:
+            return f"not tight within {_TIGHT_WITHIN_S:g} s"
         return ""
 
     def _fail_if(self, trouble: str) -> None:
@@ -352,7 +344,7 @@ class TightenProgram(PlatformProgram):
             self._acceleration[:] = parts.acceleration
             self._speed[:] = parts.speeds(INDEX_m_s)
         else:
-            self._correct_motor_torque()
+            self._home_lengths.correct(self._feedback)
 
     def _needs_index(self) -> bool:
         """Whether an index is missing that compensation needs, or that checks the last lengths."""
@@ -372,26 +364,9 @@ class TightenProgram(PlatformProgram):
             if not found and not self._path:
                 self._failure = "a motor has not passed its index"
             if found:
-                self._correct_motor_torque()
+                self._home_lengths.correct(self._feedback)
                 self._failure = self._compare_indices()
         return False
-
-    def _correct_motor_torque(self) -> None:
-        """Correct lengths taken at home for cogging and friction, once the index is known.
-
-        These torques were part of the tensions by which the cables stretched.
-        """
-        parts, control, known = self._parts, self._control, self._parts.compensation
-        if known is None or np.isnan(self._home_rad).any():
-            return
-        torque_error_N = known.standing_Nm(self._home_rad, self._feedback) / self._cable
-        torque_error_N[self._home_measured] = 0.0
-        stretch_error_m = control.lengths_at_home(self._home_N + torque_error_N)
-        stretch_error_m -= control.lengths_at_home(self._home_N)
-        self._home_rad[:] = np.nan
-        length_m = parts.estimator.estimate.cable_length_m + stretch_error_m
-        parts.estimator.set_lengths(self._feedback.position_rad, length_m)
-        control.take_lengths(length_m, self._feedback)
 
     def _compare_indices(self) -> str:
         """Return which index contradicts the lengths of the last stop, or an empty text."""
