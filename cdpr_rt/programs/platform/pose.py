@@ -63,31 +63,32 @@ class PoseProgram(PlatformProgram):
         self._epoch = -1
         self._last_sample, self._hand = np.zeros(7), np.zeros((4, 4))
         self._last_sample[3] = 1.0
-        self._goal, self._seen_goal, self._kept = np.zeros((3, d))
-        self._slowing = np.array(parts.acceleration)
+        self._goal, self._examined_goal, self._previous_target = np.zeros((3, d))
+        self._stopping_acceleration = np.array(parts.acceleration)
         self._deadband_weight = 0.0
-        self._hindrance, self._near = hand_target.FREE, -1
+        self._hindrance, self._contact_pair = hand_target.FREE, -1
         self._clutched = False
-        self._aim: FloatArray | None = None
-        self._has_aim = False
-        self._inside = False
-        self._asked = np.array(parts.speed)
+        self._commanded: FloatArray | None = None
+        """The last position commanded and not reached, where `resume` goes."""
+        self._has_command = False
+        self._stops_feasibly = False
+        self._commanded_speed = np.array(parts.speed)
         self._braking = False
         self._blocked_at, self._blocked = np.full(d, np.nan), False
-        self._before = np.zeros((3, d))
+        self._saved_setpoint = np.zeros((3, d))
         k = self._k
-        self._steps = [*(slice(i, i + 1) for i in range(k)), *[slice(k, d)] * (d > k)]
+        self._parts_of_target = [*(slice(i, i + 1) for i in range(k)), *[slice(k, d)] * (d > k)]
         # compiled here, not when a motion or the stream begins
         self._follow_sample()
-        self._calm()
-        synchronise(self._target, self._target, self._asked)
+        self._apply_deadband()
+        synchronise(self._target, self._target, self._commanded_speed)
 
     def start(self, feedback: AxisFeedback, setpoint: Setpoint, torque_Nm: FloatArray) -> None:
         """Go on from the present set-point and torque; brakes until a position is commanded."""
         super().start(feedback, setpoint, torque_Nm)
-        self._following = self._has_aim = self._inside = False
+        self._following = self._has_command = self._stops_feasibly = False
         self._braking = self._blocked = False
-        self._hindrance, self._near = hand_target.FREE, -1
+        self._hindrance, self._contact_pair = hand_target.FREE, -1
 
     @property
     def stream_age_s(self) -> float:
@@ -101,12 +102,14 @@ class PoseProgram(PlatformProgram):
 
     def progress(self) -> dict[str, Any]:
         """Return the platform's state, the target, and the state of the stream."""
-        state, aim, k = super().progress(), self._aim, self._k
-        state["interrupted_target_m"] = None if aim is None else aim[:k].tolist()
+        state, commanded, k = super().progress(), self._commanded, self._k
+        state["interrupted_target_m"] = None if commanded is None else commanded[:k].tolist()
         if self._about.size:
-            state["interrupted_target_rotation_rad"] = None if aim is None else aim[k:].tolist()
+            state["interrupted_target_rotation_rad"] = (
+                None if commanded is None else commanded[k:].tolist()
+            )
         if self._blocked:
-            state["trouble"] = f"no way on, {self._infeasibility_at(self._seen_goal)}"
+            state["trouble"] = f"no way on, {self._infeasibility_at(self._examined_goal)}"
         if self._following:
             state |= {"stream": self.stream.state.name.lower(), **self.stream.counts()}
         return state
@@ -116,9 +119,9 @@ class PoseProgram(PlatformProgram):
         lags = super()._held_back()
         if lags or not self._following:
             return lags
-        if self._near >= 0:
-            return self._control.contact(self._near)
-        return self._infeasibility_at(self._seen_goal) or _HELD_BACK[self._hindrance]
+        if self._contact_pair >= 0:
+            return self._control.contact(self._contact_pair)
+        return self._infeasibility_at(self._examined_goal) or _HELD_BACK[self._hindrance]
 
     def _infeasibility_at(self, position: FloatArray) -> str:
         """Return where and why a position is not feasible, an empty text where it is."""
@@ -132,48 +135,48 @@ class PoseProgram(PlatformProgram):
     def _parsed(self, arguments: Mapping[str, Any]) -> tuple[str, FloatArray | None, float]:
         allowed = [key for key in _KEYS if key != "rotation_rad" or self._about.size]
         keys = CommandArguments(self.name, arguments, allowed)
-        most = float(self._parts.speed[0])
-        speed = keys.number("speed_m_s", _SLOWEST_m_s, most, most)
+        fastest = float(self._parts.speed[0])
+        speed = keys.number("speed_m_s", _SLOWEST_m_s, fastest, fastest)
         self._require_pose()
         if not arguments:
             return "stay", None, speed
         if "rotation_rad" in keys and "position_m" not in keys:
-            what = keys.one_of("rotation_rad", "stream", "resume")
+            key = keys.one_of("rotation_rad", "stream", "resume")
         else:
-            what = keys.one_of("position_m", "stream", "resume")
-        if what not in ("stream", "resume"):
+            key = keys.one_of("position_m", "stream", "resume")
+        if key not in ("stream", "resume"):
             return "go", self._position(keys), speed
-        if arguments[what] is not True:
-            raise ProgramError(f"pose: {what}: value {arguments[what]!r}; allowed: true")
-        aim = self._aim
-        if what == "resume":
-            if aim is None:
+        if arguments[key] is not True:
+            raise ProgramError(f"pose: {key}: value {arguments[key]!r}; allowed: true")
+        commanded = self._commanded
+        if key == "resume":
+            if commanded is None:
                 left = {"left": "target", "instead": "position_m"}
                 code = RefusalCode.NOTHING_LEFT
                 raise ProgramError(CommandRefusal(code, self.name, {"resume": True}, left))
-            self._require_way(aim, {"resume": True})
-        return what, aim, speed
+            self._require_way(commanded, {"resume": True})
+        return key, commanded, speed
 
     def _position(self, keys: CommandArguments) -> FloatArray:
-        """Return the position (d,) that is wanted; what is left out stays as it is."""
-        k, control, wanted = self._k, self._control, np.zeros(self._target.size)
+        """Return the position (d,) that is commanded; what is left out stays as it is."""
+        k, control, position = self._k, self._control, np.zeros(self._target.size)
         acceleration = self._parts.acceleration
-        stopping_position(control.position, control.velocity, acceleration, wanted)
+        stopping_position(control.position, control.velocity, acceleration, position)
         asked = {}
         if "position_m" in keys:
-            wanted[:k] = self._checked_position(keys)
-            asked["position_m"] = wanted[:k].tolist()
+            position[:k] = self._checked_position(keys)
+            asked["position_m"] = position[:k].tolist()
         if "rotation_rad" in keys:
-            wanted[k:] = self._checked_rotation(keys)
-            asked["rotation_rad"] = wanted[k:].tolist()
+            position[k:] = self._checked_rotation(keys)
+            asked["rotation_rad"] = position[k:].tolist()
         else:
-            turned, most = float(np.linalg.norm(wanted[k:])), self._parts.model.angle_rad
-            wanted[k:] *= 1.0 if turned <= most else most / turned
-        why_not = control.infeasibility(wanted)
+            angle, limit = float(np.linalg.norm(position[k:])), self._parts.model.angle_rad
+            position[k:] *= 1.0 if angle <= limit else limit / angle
+        why_not = control.infeasibility(position)
         if why_not:
             raise ProgramError(_not_feasible(asked, why_not))
-        self._require_way(wanted, asked)
-        return wanted
+        self._require_way(position, asked)
+        return position
 
     def _require_way(self, position: FloatArray, asked: Mapping[str, Any]) -> None:
         """Raise ProgramError where the straight way to a position (d,) is not feasible."""
@@ -192,46 +195,46 @@ class PoseProgram(PlatformProgram):
         return position
 
     def _checked_rotation(self, keys: CommandArguments) -> FloatArray:
-        limit = np.full(self._about.size, _HALF_TURN_rad)
-        rotation = keys.axes("rotation_rad", limit, each="an angle that is controlled")
-        angle, most = float(np.linalg.norm(rotation)), self._parts.model.angle_rad
-        if not angle <= most:
+        half_turns = np.full(self._about.size, _HALF_TURN_rad)
+        rotation = keys.axes("rotation_rad", half_turns, each="an angle that is controlled")
+        angle, limit = float(np.linalg.norm(rotation)), self._parts.model.angle_rad
+        if not angle <= limit:
             raise ProgramError(
                 f"pose: rotation_rad: value {rotation.tolist()}, {angle:g} rad from the "
-                f"orientation at home; allowed: up to {most:g} rad"
+                f"orientation at home; allowed: up to {limit:g} rad"
             )
         return rotation
 
     def _take(self, parsed: tuple[str, FloatArray | None, float]) -> None:
-        what, position, speed = parsed
-        self._asked[:] = self._parts.speeds(speed)
-        self._following = what == "stream"
-        self._has_aim = what in ("go", "resume")
+        action, position, speed = parsed
+        self._commanded_speed[:] = self._parts.speeds(speed)
+        self._following = action == "stream"
+        self._has_command = action in ("go", "resume")
         self._braking = self._blocked = False
         self._blocked_at[:] = np.nan
         if self._following:
             self.stream.reset()
-            self._aim = None
+            self._commanded = None
             self._deadband_weight = 0.0
-        if self._has_aim and position is not None:
-            self._aim = np.array(position)
-            self._set_out(self._aim)
+        if self._has_command and position is not None:
+            self._commanded = np.array(position)
+            self._set_out(self._commanded)
             return
         self._brake()
         if self._following:
-            self._speed[:] = self._asked
+            self._speed[:] = self._commanded_speed
             self._acceleration[:] = self._parts.acceleration
             self._target[:] = self._stopping_position()
 
-    def _set_out(self, aim: FloatArray) -> None:
+    def _set_out(self, commanded: FloatArray) -> None:
         """Set out for a target, from rest so that all directions take the same time."""
         control = self._control
-        self._target[:] = aim
-        self._speed[:] = self._asked
+        self._target[:] = commanded
+        self._speed[:] = self._commanded_speed
         self._acceleration[:] = self._parts.acceleration
         if not control.velocity.any():
-            synchronise(control.position, aim, self._speed)
-            synchronise(control.position, aim, self._acceleration)
+            synchronise(control.position, commanded, self._speed)
+            synchronise(control.position, commanded, self._acceleration)
 
     # -- cycle by cycle
 
@@ -241,24 +244,24 @@ class PoseProgram(PlatformProgram):
             return False
         if self._braking:
             if self._approach():
-                self._go_on()
+                self._set_out_again()
             return False
         at_rest = self._advance(self._target)
-        if at_rest and self._has_aim:
-            self._aim = None
+        if at_rest and self._has_command:
+            self._commanded = None
         return at_rest
 
-    def _go_on(self) -> None:
+    def _set_out_again(self) -> None:
         """Set out anew, straight on, after a way that no tensions hold; or give it up."""
-        here, aim, scale_m = self._control.position, self._aim, self._parts.scale_m
-        if self._blocked or aim is None:
+        here, commanded, scale_m = self._control.position, self._commanded, self._parts.scale_m
+        if self._blocked or commanded is None:
             return
         if distance_m(here, self._blocked_at, scale_m) < _BLOCKED_m:
             self._blocked = True
             return
         self._braking = False
         self._blocked_at[:] = here
-        self._set_out(aim)
+        self._set_out(commanded)
 
     def _follow(self) -> None:
         stream = self.stream
@@ -274,11 +277,11 @@ class PoseProgram(PlatformProgram):
         else:
             self._follow_sample()
         self._clutched = bool(stream.buttons & CLUTCH)
-        self._calm()
+        self._apply_deadband()
         self._advance(self._goal)
 
-    def _calm(self) -> None:
-        """Have trembling around the target not move the platform."""
+    def _apply_deadband(self) -> None:
+        """Write the goal: the target behind a soft dead band, as hands tremble."""
         self._deadband_weight = soft_deadband(
             self._target, self._control.position, self._parts.scale_m, self._deadband_weight,
             _DEADBAND_m, self._goal,
@@ -292,25 +295,24 @@ class PoseProgram(PlatformProgram):
             self._low, self._high, self._parts.model.angle_rad, self._speed, self._acceleration,
             control.position, target, self._hand, goal,
         )  # fmt: skip
-        self._seen_goal[:] = goal
+        self._examined_goal[:] = goal
         near = control.contact_at(goal)
         if near >= 0 or distance_m(goal, target, self._parts.scale_m) > 0.0:
-            self._near = near
+            self._contact_pair = near
         if near < 0 and (control.is_feasible(goal) or not control.is_feasible(target)):
             target[:] = goal
             return
         # along the edge in one direction, where not in all; turning is one of them
-        for part in self._steps:
-            self._kept[part], target[part] = target[part], goal[part]
+        for part in self._parts_of_target:
+            self._previous_target[part], target[part] = target[part], goal[part]
             if control.is_feasible(target) and control.contact_at(target) < 0:
                 return
-            target[part] = self._kept[part]
+            target[part] = self._previous_target[part]
 
     def _advance(self, goal: FloatArray) -> bool:
         """Go one cycle towards a goal, or brake where the stopping position would be infeasible."""
-        control, before = self._control, self._before
-        before[0], before[1] = control.position, control.velocity
-        before[2] = control.acceleration
+        control, saved = self._control, self._saved_setpoint
+        saved[0], saved[1], saved[2] = control.position, control.velocity, control.acceleration
         arrived = self._go_towards(goal)
         self._stopping_position()
         if self._following:
@@ -319,29 +321,30 @@ class PoseProgram(PlatformProgram):
         # all of the way to a pose has been looked at before
         near = control.contact_ahead(self._rest) if self._following else -1
         if near >= 0:
-            self._near = near
-        if near >= 0 or (self._inside and not stops):
-            control.position[:], control.velocity[:] = before[0], before[1]
-            control.acceleration[:] = before[2]
+            self._contact_pair = near
+        if near >= 0 or (self._stops_feasibly and not stops):
+            control.position[:], control.velocity[:], control.acceleration[:] = saved
             if self._following:
                 self._stop_straight()
-                self._acceleration, self._slowing = self._slowing, self._acceleration
+                usual, self._acceleration = self._acceleration, self._stopping_acceleration
                 self._go_towards(self._rest)
-                self._acceleration, self._slowing = self._slowing, self._acceleration
+                self._acceleration = usual
                 return False
             self._braking = True
-            self._seen_goal[:] = self._rest
+            self._examined_goal[:] = self._rest
             self._target[:] = self._stopping_position()
             self._go_towards(self._target)
             return False
-        self._inside = stops
+        self._stops_feasibly = stops
         return arrived
 
     def _stop_straight(self) -> None:
         """Write at which position it comes to rest if it brakes straight on, and how it does."""
         control = self._control
-        along_velocity(control.velocity, self._parts.acceleration, self._slowing)
-        stopping_position(control.position, control.velocity, self._slowing, self._rest)
+        along_velocity(control.velocity, self._parts.acceleration, self._stopping_acceleration)
+        stopping_position(
+            control.position, control.velocity, self._stopping_acceleration, self._rest
+        )
 
 
 def _not_feasible(asked: Mapping[str, Any], why: str) -> CommandRefusal:

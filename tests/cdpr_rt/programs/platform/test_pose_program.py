@@ -170,8 +170,8 @@ def test_what_no_tensions_hold_is_not_entered_on_the_way_either_and_that_is_told
 ) -> None:
     wide.program.command({"position_m": [0.5, 1.8]})
     wide.program._target[:] = 1.7, 0.8  # as if nobody had looked before
-    assert wide.program._aim is not None
-    wide.program._aim[:] = 1.7, 0.8
+    assert wide.program._commanded is not None
+    wide.program._commanded[:] = 1.7, 0.8
     wide.run(6.0)
     assert all(wide.control.is_feasible(place) for place in wide.path)
     assert wide.control.velocity == pytest.approx(np.zeros(2), abs=1e-9)
