@@ -13,10 +13,11 @@ from cdpr_rt.jit import jit
 
 TWO_PI = 2.0 * math.pi
 
+_FADE_IN_S = 0.2
 # columns of the parameter array of one axis
 _LOOK_AHEAD, _OBSERVER_POLE, _BLEND = 0, 1, 2
 _COULOMB_FORWARD, _COULOMB_BACKWARD, _STRIBECK_FORWARD, _STRIBECK_BACKWARD = 3, 4, 5, 6
-_STRIBECK_SPEED, _VISCOUS, _AVAILABLE, _MOST = 7, 8, 9, 10
+_STRIBECK_SPEED, _VISCOUS, _AVAILABLE, _BOUND = 7, 8, 9, 10
 _COLUMNS = 11
 # columns of the state of one axis
 _FADE, _STARTED, _DEVIATION, _DRIFT = 0, 1, 2, 3
@@ -132,14 +133,14 @@ def _torque(
         backward -= parameters[i, _COULOMB_BACKWARD] + parameters[i, _STRIBECK_BACKWARD] * stribeck
         total = 0.5 * (1.0 + side) * forward + 0.5 * (1.0 - side) * backward
         total += parameters[i, _VISCOUS] * moving
-        most = parameters[i, _MOST]
+        bound = parameters[i, _BOUND]
         # written so that what is not a number stays none: the supervisor looks for it
-        if total > most:
-            total = most
-        elif total < -most:
-            total = -most
+        if total > bound:
+            total = bound
+        elif total < -bound:
+            total = -bound
         out[i] = state[i, _FADE] * total
-        cogging[i] = state[i, _FADE] * min(max(periodic, -most), most)
+        cogging[i] = state[i, _FADE] * min(max(periodic, -bound), bound)
 
 
 def _row(axis: AxisCompensation, period_s: float) -> list[float]:
@@ -163,14 +164,12 @@ class Compensation:
     """Cogging and friction torque of n axes from their profiles (Tremblay, figure 1.8).
 
     Linear interpolation in the tables; the direction comes from the set-point's velocity, with a
-    linear hand-over around standstill; the torque fades in over `fade_in_s` once the axis' index
+    linear hand-over around standstill; the torque fades in over 0.2 s once the axis' index
     is known and is zero while it is not, or where the axis has no profile (None).
     All tables must have the same length. Raises ValueError for tables of another shape.
     """
 
-    def __init__(
-        self, axes: list[AxisCompensation | None], period_s: float, fade_in_s: float = 0.2
-    ) -> None:
+    def __init__(self, axes: list[AxisCompensation | None], period_s: float) -> None:
         sizes = {axis.table_Nm.shape for axis in axes if axis is not None}
         if len(sizes) > 1 or any(len(s) != 2 or s[0] != 2 or s[1] < 2 for s in sizes):
             raise ValueError(f"tables must all have one shape (2, m), got {sorted(sizes)}")
@@ -189,7 +188,7 @@ class Compensation:
         self.available: BoolArray = self._parameters[:, _AVAILABLE] != 0.0
         """Which axes have a profile, (n,); until its index is known nothing comes of it."""
         self._period_s = period_s
-        self._fade_step = min(1.0, period_s / fade_in_s) if fade_in_s > 0.0 else 1.0
+        self._fade_step = min(1.0, period_s / _FADE_IN_S)
 
     def reset(self) -> None:
         """Fade in anew and forget the deviation from the set-point."""
@@ -213,7 +212,7 @@ class Compensation:
         forward = p[:, _COULOMB_FORWARD] + p[:, _STRIBECK_FORWARD]
         backward = p[:, _COULOMB_BACKWARD] + p[:, _STRIBECK_BACKWARD]
         known = self.available & feedback.index_known
-        most = p[:, _MOST]
+        most = p[:, _BOUND]
         return np.where(known, np.clip(cogging + 0.5 * (forward - backward), -most, most), 0.0)
 
     def torque(self, feedback: AxisFeedback, setpoint: Setpoint, out: FloatArray) -> None:

@@ -20,7 +20,7 @@ _FRICTION_FULL_rad_s = 0.1
 _M_PER_RAD, _GAIN, _BIAS, _FRICTION, _FRICTION_PER_N, _INERTIA = range(6)
 """The rows of `WinchArrays.table`."""
 
-_PAST = np.dtype(
+_STATE = np.dtype(
     [
         ("position", "<f8"),
         ("torque", "<f8"),  # low-passed, less what is known to turn the motor alone
@@ -92,7 +92,7 @@ class AxisEstimate:
 @jit
 def _update(
     winch: FloatArray,
-    past: Any,
+    states: Any,
     velocity: FloatArray,
     length: FloatArray,
     tension: FloatArray,
@@ -104,27 +104,27 @@ def _update(
     elapsed: float,
 ) -> None:
     for i in range(position.size):
-        own = past[i]
-        own["elapsed"] += elapsed
+        state = states[i]
+        state["elapsed"] += elapsed
         if not valid[i]:
             continue
         # a measured friction of the winch has the motor's in it, but not its cogging
-        outer = torque[i] - (loss[i] if winch[_FRICTION, i] == 0.0 else cogging[i])
-        if own["started"] == 0.0:
-            own["position"], own["torque"] = position[i], outer
-            own["started"], velocity[i] = 1.0, 0.0
-        since = own["elapsed"]
-        weight = since / (since + FILTER_S)
-        gain = weight * ((position[i] - own["position"]) / since - velocity[i])
-        velocity[i] += gain
-        own["torque"] += weight * (outer - own["torque"])
-        own["position"], own["elapsed"] = position[i], 0.0
-        length[i] = own["length_at_zero"] + winch[_M_PER_RAD, i] * position[i]
+        net_torque = torque[i] - (loss[i] if winch[_FRICTION, i] == 0.0 else cogging[i])
+        if state["started"] == 0.0:
+            state["position"], state["torque"] = position[i], net_torque
+            state["started"], velocity[i] = 1.0, 0.0
+        dt = state["elapsed"]
+        weight = dt / (dt + FILTER_S)
+        change = weight * ((position[i] - state["position"]) / dt - velocity[i])
+        velocity[i] += change
+        state["torque"] += weight * (net_torque - state["torque"])
+        state["position"], state["elapsed"] = position[i], 0.0
+        length[i] = state["length_at_zero"] + winch[_M_PER_RAD, i] * position[i]
         tension[i] = np.nan
         if winch[_GAIN, i] > 0.0:
             # what the torque does not spend on accelerating the motor is on the cable
-            loaded = own["torque"] - winch[_INERTIA, i] * gain / since
-            tension[i] = _tension(winch[:, i], loaded, velocity[i])
+            cable_torque = state["torque"] - winch[_INERTIA, i] * change / dt
+            tension[i] = _tension(winch[:, i], cable_torque, velocity[i])
 
 
 @jit
@@ -138,55 +138,42 @@ def _tension(winch: FloatArray, torque: float, velocity: float) -> float:
 
 @jit
 def _take_sensors(
-    sensor_of: Any,
     read_N: FloatArray,
     read_valid: BoolArray,
     tension: FloatArray,
     measured: BoolArray,
     sensor_ok: BoolArray,
 ) -> None:
-    for i in range(tension.size):
-        sensor = sensor_of[i]
-        if sensor < 0 or sensor >= read_N.size:
-            continue
-        sensor_ok[i] = measured[i] = read_valid[sensor]
-        if read_valid[sensor]:
-            tension[i] = read_N[sensor]
+    for i in range(min(tension.size, read_N.size)):
+        sensor_ok[i] = measured[i] = read_valid[i]
+        if read_valid[i]:
+            tension[i] = read_N[i]
 
 
 class Estimator:
     """Brings an `AxisEstimate` up to date once a cycle; allocates nothing.
 
-    `sensor_of_axis` (n,) says which reading belongs to an axis, -1 for none; without it the
-    readings are those of the first axes.
+    Readings of tension are those of the first axes.
     """
 
-    def __init__(
-        self,
-        n: int,
-        period_s: float,
-        winches: WinchArrays | None = None,
-        sensor_of_axis: Any = None,
-    ) -> None:
+    def __init__(self, n: int, period_s: float, winches: WinchArrays | None = None) -> None:
         self.estimate = AxisEstimate(n)
         self.origins_lost = 0
         """How often lengths were forgotten: whether angles still count from the same origins."""
         self._period_s = period_s
         self._winch = (winches or WinchArrays.bare(n)).table()
         self.estimate.cable_m_per_rad[:] = self._winch[_M_PER_RAD]
-        self._past = np.zeros(n, _PAST)
-        self._past["length_at_zero"] = np.nan
-        sensors = range(n) if sensor_of_axis is None else sensor_of_axis
-        self._sensor_of = np.array(sensors, np.int64)
-        self._nothing = np.zeros(n)
-        self._taken: tuple[Any, Any, Any] = (None, None, None)
-        """Whose arrays the kernel is bound to."""
+        self._state = np.zeros(n, _STATE)
+        self._state["length_at_zero"] = np.nan
+        self._no_torque = np.zeros(n)
+        self._bound_to: tuple[Any, Any, Any] = (None, None, None)
+        """Feedback, losses and cogging whose arrays the kernel is bound to."""
         self._update: Callable[..., None] = _update
 
     def reset(self) -> None:
         """Forget speeds, torques and tensions, after cycles did not run; lengths stay known."""
         for field in ("position", "torque", "elapsed", "started"):
-            self._past[field] = 0.0
+            self._state[field] = 0.0
         self.estimate.velocity_rad_s[:] = 0.0
         self.estimate.tension_N[:] = np.nan
         self.estimate.tension_measured[:] = False
@@ -195,22 +182,22 @@ class Estimator:
     @property
     def position_rad(self) -> FloatArray:
         """The motors' angles as last heard, (n,)."""
-        return np.asarray(self._past["position"])
+        return np.asarray(self._state["position"])
 
     def set_lengths(self, position_rad: FloatArray, length_m: FloatArray) -> None:
         """Take the cables to have `length_m` (n,) at the motor angles; nan leaves one as it is."""
         for i, length in enumerate(length_m):
             if math.isfinite(length) and self._winch[_M_PER_RAD, i] != 0.0:
-                self._past["length_at_zero"][i] = (
+                self._state["length_at_zero"][i] = (
                     length - self._winch[_M_PER_RAD, i] * position_rad[i]
                 )
                 self.estimate.cable_length_m[i] = length
-        np.isfinite(self._past["length_at_zero"], out=self.estimate.length_known)
+        np.isfinite(self._state["length_at_zero"], out=self.estimate.length_known)
 
     def forget_lengths(self) -> None:
         """Take no length for known any more, such as after the drives have lost their origins."""
         self.origins_lost += 1
-        self._past["length_at_zero"] = np.nan
+        self._state["length_at_zero"] = np.nan
         self.estimate.length_known[:] = False
 
     def update(
@@ -229,24 +216,24 @@ class Estimator:
         """
         estimate = self.estimate
         estimate.elapsed_s = elapsed_s or self._period_s
-        loss = self._nothing if motor_loss_Nm is None else motor_loss_Nm
-        cogging = self._nothing if cogging_Nm is None else cogging_Nm
-        taken = self._taken
-        if feedback is not taken[0] or loss is not taken[1] or cogging is not taken[2]:
+        loss = self._no_torque if motor_loss_Nm is None else motor_loss_Nm
+        cogging = self._no_torque if cogging_Nm is None else cogging_Nm
+        last = self._bound_to
+        if feedback is not last[0] or loss is not last[1] or cogging is not last[2]:
             self._bind(feedback, loss, cogging)
         self._update(estimate.elapsed_s)
         if tension is not None:
             _take_sensors(
-                self._sensor_of, tension.tension_N, tension.valid, estimate.tension_N,
-                estimate.tension_measured, estimate.sensor_ok,
+                tension.tension_N, tension.valid, estimate.tension_N, estimate.tension_measured,
+                estimate.sensor_ok,
             )  # fmt: skip
 
     def _bind(self, feedback: AxisFeedback, loss: FloatArray, cogging: FloatArray) -> None:
-        self._taken = feedback, loss, cogging
+        self._bound_to = feedback, loss, cogging
         self._update = bound(
             _update,
             self._winch,
-            self._past,
+            self._state,
             self.estimate.velocity_rad_s,
             self.estimate.cable_length_m,
             self.estimate.tension_N,

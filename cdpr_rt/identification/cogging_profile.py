@@ -188,17 +188,12 @@ class CoggingProfile(_Part):
                 yield f"{name}.{key}", problem
 
     def compensation(
-        self,
-        method: CompensationMethod,
-        identity: DriveIdentity,
-        bounds: MotorBounds,
-        *,
-        index_will_be_seen: bool = True,
+        self, method: CompensationMethod, identity: DriveIdentity, bounds: MotorBounds
     ) -> AxisCompensation:
         """Return what the axis' compensation needs.
 
-        Raises CoggingProfileError where motor or drive differ from those at commissioning, where it
-        cannot be true of the motor, or without an index (`index_will_be_seen` False).
+        Raises CoggingProfileError where motor or drive differ from those at commissioning, or where
+        it cannot be true of the motor.
         """
         self.require_true_of(bounds)
         for key, mine in self.identity.model_dump().items():
@@ -208,11 +203,6 @@ class CoggingProfile(_Part):
                     f"the cogging profile is of a drive with {key} = {mine}, "
                     f"this axis has {other}: commission it anew"
                 )
-        if not index_will_be_seen:
-            raise CoggingProfileError(
-                "the encoder index of this axis is not known: home it, or latch the index with the "
-                "touch probe, before its cogging profile can be applied"
-            )
         return (self.thesis if method == "thesis" else self.harmonic).compensation(bounds)
 
 

@@ -103,7 +103,7 @@ class Recording:
     """False when the recording ends before the pass does."""
 
 
-def recording(log: RawLog, axis: int = 0) -> Recording:
+def recording(log: RawLog) -> Recording:
     """Take a raw log as the recording of a pass and refer it to the encoder index.
 
     Raises RawLogError when the log is of something else, ends before the part that counts, or
@@ -115,7 +115,7 @@ def recording(log: RawLog, axis: int = 0) -> Recording:
         first_cycle = int(log.header["first_cycle"])
     except (KeyError, TypeError, ValueError) as error:
         raise RawLogError(f"{log.path}: not the recording of a pass ({error})") from error
-    answered = log.column("valid", axis) != 0.0
+    answered = log.column("valid") != 0.0
     since_start = (log.column("cycle") - first_cycle) * period
     judged = ((since_start >= begin) & (since_start < end))[answered]
     if not judged.any():
@@ -123,21 +123,21 @@ def recording(log: RawLog, axis: int = 0) -> Recording:
             f"{log.path}: ends after {since_start[-1]:.1f} s; the part to be measured begins at "
             f"{begin:.1f} s"
         )
-    if not log.column("index_known", axis)[answered].all():
-        raise RawLogError(f"{log.path}: axis {axis}: the encoder index was not known in this run")
-    index = log.column("index_rad", axis)[answered]
+    if not log.column("index_known")[answered].all():
+        raise RawLogError(f"{log.path}: the encoder index was not known in this run")
+    index = log.column("index_rad")[answered]
     sweep = SweepData(
         time_s=log.column("time_s")[answered],
-        angle_rad=log.column("position_rad", axis)[answered] - index,
-        torque_Nm=log.column("torque_sent_Nm", axis)[answered],
-        setpoint_rad=log.column("setpoint_rad", axis)[answered] - index,
-        setpoint_velocity_rad_s=log.column("setpoint_velocity_rad_s", axis)[answered],
+        angle_rad=log.column("position_rad")[answered] - index,
+        torque_Nm=log.column("torque_sent_Nm")[answered],
+        setpoint_rad=log.column("setpoint_rad")[answered] - index,
+        setpoint_velocity_rad_s=log.column("setpoint_velocity_rad_s")[answered],
     )
     if not all(np.isfinite(getattr(sweep, field.name)).all() for field in fields(sweep)):
         raise RawLogError(f"{log.path}: holds numbers that are not finite")
     return Recording(
         sweep=sweep,
-        effort_Nm=log.column("effort_Nm", axis)[answered],
+        effort_Nm=log.column("effort_Nm")[answered],
         cycle=log.column("cycle")[answered],
         judged=judged,
         period_s=period,

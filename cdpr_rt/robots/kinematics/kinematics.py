@@ -100,9 +100,7 @@ class CableKinematics:
         anchors = self.geometry[cable_kernel.ANCHOR : cable_kernel.RADIUS]
         return self.directions == PLANAR_POINT and bool(np.ptp(anchors, axis=1).any())
 
-    def lengths(
-        self, pose: Pose, tension_N: FloatArray | None = None, out: FloatArray | None = None
-    ) -> FloatArray:
+    def lengths(self, pose: Pose, tension_N: FloatArray | None = None) -> FloatArray:
         """Return the lengths (n,) without tension of cables that hold `tension_N` (n,) at `pose`.
 
         Tensions act at the platform; without them they are 0. Lengths on pulleys are counted from
@@ -110,23 +108,21 @@ class CableKinematics:
         pulley, or a cable under that tension does not carry itself.
         """
         self._run(pose)
-        rho = np.empty(self.n) if out is None else out
+        rho = np.empty(self.n)
         self._unstretch(self._no_tension if tension_N is None else tension_N, rho)
         if not np.isfinite(rho).all():
             i = int(np.argmin(np.isfinite(rho)))
             raise GeometryError(f"cable {i + 1}: does not carry itself under the tension given")
         return rho
 
-    def jacobian(self, pose: Pose, out: FloatArray | None = None) -> FloatArray:
+    def jacobian(self, pose: Pose) -> FloatArray:
         """Return J (n, d), eqs. (3.10), (3.14): derivative of straight lengths by the twist.
 
         A cable's row is (u, Q b × u), u being the unit vector from exit to anchor. Raises
         GeometryError where an anchor is in its exit point or pulley.
         """
         self._run(pose)
-        return np.take(
-            self._cables, self._chosen, axis=0, out=None if out is None else out.T, mode="clip"
-        ).T
+        return np.asarray(self._cables[self._chosen].T)
 
     def wrench_matrix(self, pose: Pose, out: FloatArray | None = None) -> FloatArray:
         """Return W = -J^T (d, n): forces, then moments about the platform's origin, room's axes.

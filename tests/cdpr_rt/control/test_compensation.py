@@ -117,10 +117,8 @@ def test_friction_is_that_of_the_rotor_and_never_pushes_back():
 
 
 def test_fades_in_when_the_index_is_seen_and_stops_without():
-    compensation, out = (
-        Compensation([AxisCompensation(TABLE + 1.0, most_Nm=10.0)], 1e-3, 0.2),
-        np.zeros(1),
-    )
+    compensation = Compensation([AxisCompensation(TABLE + 1.0, most_Nm=10.0)], 1e-3)
+    out = np.zeros(1)
     hidden, seen = at(known=False), at()
     for _ in range(50):
         compensation.torque(*hidden, out)

@@ -88,11 +88,9 @@ def test_another_drive_is_refused_by_name(key):
         profile().compensation("better", other, BOUNDS)
 
 
-def test_another_motor_or_no_index_is_refused():
+def test_another_motor_is_refused():
     with pytest.raises(CoggingProfileError, match=r"MPP0923D.*MPP1003D"):
         profile().compensation("better", IDENTITY, MotorBounds(OTHER))
-    with pytest.raises(CoggingProfileError, match="index"):
-        profile().compensation("better", IDENTITY, BOUNDS, index_will_be_seen=False)
 
 
 def spoil(change):

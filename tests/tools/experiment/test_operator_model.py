@@ -155,7 +155,7 @@ def test_a_robot_that_does_not_move_is_given_up(monkeypatch: pytest.MonkeyPatch)
 
     with pytest.raises(WorkFailedError, match="target 1 was not confirmed"):
         run_trial(
-            Stuck(PLATFORM, CENTRE, 0.02),
+            Stuck(PLATFORM, CENTRE),
             Condition("A", 4.0, 0.0, 0),
             targets_m(CENTRE),
             OPERATOR,

@@ -12,6 +12,8 @@ from cdpr_rt.arrays import FloatArray
 from cdpr_rt.motion.approach import approach
 from cdpr_rt.motion.stream_buttons import CLUTCH
 
+_PERIOD_S = 0.005
+
 
 class TeleoperatedRobot(Protocol):
     """A robot that takes a hand's packets; it moves on only in `advance`."""
@@ -48,11 +50,10 @@ class PerfectRobot:
     What an operator does with it is the operator's doing alone.
     """
 
-    def __init__(self, platform: Platform, begin_m: FloatArray, period_s: float = 0.005) -> None:
+    def __init__(self, platform: Platform, begin_m: FloatArray) -> None:
         self._target = begin_m.copy()
         self._hand: FloatArray | None = None
         self._leads = False
-        self._period_s = period_s
         self._speed = np.full(2, platform.speed_m_s)
         self._acceleration = np.full(2, platform.acceleration_m_s2)
         self._position = begin_m.copy()
@@ -68,7 +69,7 @@ class PerfectRobot:
     @property
     def now_s(self) -> float:
         """Its time."""
-        return self.cycle * self._period_s
+        return self.cycle * _PERIOD_S
 
     @property
     def truth_m(self) -> FloatArray:
@@ -77,12 +78,12 @@ class PerfectRobot:
 
     def advance(self, until_s: float) -> None:
         """Let time pass."""
-        for _ in range(math.ceil((until_s - 1e-9) / self._period_s) - self.cycle):
+        for _ in range(math.ceil((until_s - 1e-9) / _PERIOD_S) - self.cycle):
             approach(
                 self._target,
                 self._speed,
                 self._acceleration,
-                self._period_s,
+                _PERIOD_S,
                 self._position,
                 self._velocity,
                 self._slope,
