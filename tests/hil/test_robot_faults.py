@@ -274,7 +274,7 @@ def test_a_stop_leaves_the_next_start_its_lengths_and_the_platform_on_its_stand(
     planar: Path, tmp_path: Path
 ) -> None:
     with LockstepRobot(planar) as robot:
-        last, platform = robot.loop.engine.parts.last, robot.robot.platform
+        last, platform = robot.loop.engine.parts.last_stop, robot.robot.platform
         assert last is not None
         assert platform is not None
         last.path = tmp_path / "lengths.json"

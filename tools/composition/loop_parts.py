@@ -56,7 +56,7 @@ def loop_parts(
         estimator=estimator,
         lengths_disagree=None if platform is None else platform.lengths_disagree,
         lowering=lowering,
-        last=None if platform is None else platform.last,
+        last_stop=None if platform is None else platform.last_stop,
         paths=None if platform is None else platform.paths,
         notices=tuple if platform is None else platform.notices,
         before_power=lambda: look_at_calibration(robot, platform),

@@ -134,7 +134,7 @@ class LowerProgram(PlatformProgram):
             return
         if self._stage == "home":
             if self._parts.tight:
-                self._parts.last.displaced = True
+                self._parts.last_stop.displaced = True
                 self._carry_weight(torque_Nm)
             self._pay_out(feedback, torque_Nm, UNKNOWN_POSE_m_s, HANGING_LOAD_1_s)
         setpoint.position_rad[:] = feedback.position_rad

@@ -75,7 +75,7 @@ class PlatformHold(ProgramDefaults):
         """Return whether the platform or the axes are held, and where; whether it has fallen."""
         parts = self._parts
         progress = {"tight": parts.tight, **self._active.progress()}
-        if parts.last.fallen:
+        if parts.last_stop.fallen:
             progress["fallen"] = True
         left = self._path.left()
         return progress if left is None else {**progress, "path": left}
@@ -122,5 +122,5 @@ class PlatformJog(JogProgram):
     def start(self, feedback: AxisFeedback, setpoint: Setpoint, torque_Nm: FloatArray) -> None:
         """Go on from the present set-point and torque; brakes until speeds are commanded."""
         self._parts.slacken()
-        self._parts.last.take()
+        self._parts.last_stop.take()
         super().start(feedback, setpoint, torque_Nm)

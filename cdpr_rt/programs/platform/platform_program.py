@@ -84,7 +84,7 @@ class PlatformParts:
         self.near_m = max(NEAR_m, NEAR_SHARE * exit_point_diagonal_m(model.platform))
         """How far from its set-point a platform has arrived."""
         self.compensation = compensation
-        self.last = LastLengths()
+        self.last_stop = LastLengths()
         """The lengths at which it was stopped."""
         self.paths = PathStore(model)
         """The planned paths."""
@@ -116,7 +116,7 @@ class PlatformParts:
         self.estimator.estimate.slack_allowed = not tight
 
     @property
-    def known(self) -> bool:
+    def pose_known(self) -> bool:
         """Whether it is known where the platform is."""
         return bool(self.estimator.estimate.length_known.all())
 
@@ -147,12 +147,12 @@ class PlatformParts:
 
     def slacken(self) -> None:
         """Mark the cables as slack; a platform that they carried may have moved."""
-        self.last.displaced = self.last.displaced or self.tight
+        self.last_stop.displaced = self.last_stop.displaced or self.tight
         self.tight = False
 
     def forget(self) -> None:
         """Forget where the platform is, as if it stood at home."""
-        self.tight = self.last.displaced = self.last.fallen = False
+        self.tight = self.last_stop.displaced = self.last_stop.fallen = False
         self.estimator.forget_lengths()
         self.control.reset()
         self.follow_origins()
@@ -196,7 +196,7 @@ class PlatformProgram(CommandedProgram):
         self._at_rest = False
         self._arrival.restart()
         if feedback.cycle - parts.cycle not in (0, 1):
-            if parts.known:
+            if parts.pose_known:
                 control.take_lengths(parts.estimator.estimate.cable_length_m, feedback)
             control.begin(feedback)
             control.stand_still()
@@ -230,12 +230,12 @@ class PlatformProgram(CommandedProgram):
     @property
     def pose(self) -> FloatArray | None:
         """Return where the platform is, (7,)."""
-        return self._control.pose if self._parts.known else None
+        return self._control.pose if self._parts.pose_known else None
 
     @property
     def pose_setpoint(self) -> FloatArray | None:
         """Return the commanded pose, (7,)."""
-        if not self._parts.known:
+        if not self._parts.pose_known:
             return None
         self._write_setpoint(self._control.shaped)
         return self._seen
@@ -280,7 +280,7 @@ class PlatformProgram(CommandedProgram):
     def _held_back(self) -> str:
         """Return why the set-point is slowed down, an empty text where it is not."""
         lag_m = self._lag_m()
-        if lag_m < _WAITING_m or not self._parts.known:
+        if lag_m < _WAITING_m or not self._parts.pose_known:
             return ""
         return f"the platform is {1e3 * lag_m:.0f} mm behind: friction, or something in its way"
 

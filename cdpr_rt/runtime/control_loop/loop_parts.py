@@ -34,7 +34,7 @@ class LoopParts:
     """Returns how far cable lengths are from agreeing, m, and which cable's is off, or -1."""
     lowering: Lowering | None = None
     """How the platform is lowered, None for a robot without such a program."""
-    last: LastLengths | None = None
+    last_stop: LastLengths | None = None
     """Stores the cables' lengths of the last stop, where a start can use them."""
     paths: PathStore | None = None
     """The planned paths of a robot with a platform."""

@@ -112,13 +112,13 @@ class SafeStop:
         self, reaction: Reaction, then: LoopState, torque_Nm: FloatArray | None = None
     ) -> None:
         """End the motion as `reaction` says and go to state `then`."""
-        engine, way = self._engine, self._method(reaction, then)
-        if way in (StopMethod.BRAKE, StopMethod.LOWER_WITHOUT_POSE) and not self._begin(way):
-            way = StopMethod.QUICK_STOP
-        engine.reacting = Reaction.QUICK_STOP if way is StopMethod.QUICK_STOP else reaction
-        if way in (StopMethod.QUICK_STOP, StopMethod.TORQUE_OFF):
+        engine, method = self._engine, self._method(reaction, then)
+        if method in (StopMethod.BRAKE, StopMethod.LOWER_WITHOUT_POSE) and not self._begin(method):
+            method = StopMethod.QUICK_STOP
+        engine.reacting = Reaction.QUICK_STOP if method is StopMethod.QUICK_STOP else reaction
+        if method in (StopMethod.QUICK_STOP, StopMethod.TORQUE_OFF):
             self._note_fall()
-            if way is StopMethod.QUICK_STOP:
+            if method is StopMethod.QUICK_STOP:
                 self._machine.quick_stop()
             else:
                 self._machine.power_off()
@@ -130,7 +130,7 @@ class SafeStop:
 
     def _note_fall(self) -> None:
         """Note that a platform falls, where no brakes hold it and it may hang on its cables."""
-        last, lowering, engine = self._engine.parts.last, self._lowering, self._engine
+        last, lowering, engine = self._engine.parts.last_stop, self._lowering, self._engine
         if last is None or lowering is None or not self.lowers:
             return
         hangs = self.without_pose or not self._estimator.estimate.slack_allowed
@@ -147,10 +147,10 @@ class SafeStop:
             return StopMethod.BRAKE
         return StopMethod.LOWER_WITHOUT_POSE if self.lowers else StopMethod.QUICK_STOP
 
-    def _begin(self, way: StopMethod) -> bool:
+    def _begin(self, method: StopMethod) -> bool:
         """Have the program brake or lower; return whether it does."""
         try:
-            if way is StopMethod.LOWER_WITHOUT_POSE:
+            if method is StopMethod.LOWER_WITHOUT_POSE:
                 self._lower_without_pose()
             else:
                 self._engine.program.stop()
@@ -234,7 +234,7 @@ class SafeStop:
 
     def _keep_lengths(self) -> Steps:
         """Store the cables' lengths for the next start, where they are known."""
-        last, device = self._engine.parts.last, self._machine.device
+        last, device = self._engine.parts.last_stop, self._machine.device
         if last is None or device is None:
             return
         estimate, feedback = self._estimator.estimate, device.feedback

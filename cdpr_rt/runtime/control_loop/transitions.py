@@ -194,7 +194,7 @@ class Transitions:
             life.set_reason(f"{error}: {', '.join(machine.states())}")
             self._safe_stop.stop(Reaction.TORQUE_OFF, LoopState.FAULT)
             raise ControlError(life.reason) from error
-        last, device = engine.parts.last, machine.device
+        last, device = engine.parts.last_stop, machine.device
         if last is not None and device is not None:
             position_rad = device.feedback.position_rad.copy()
             yield from self._runner.run_blocking(lambda: last.begin_to_move(position_rad))

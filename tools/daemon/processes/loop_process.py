@@ -63,10 +63,10 @@ def main() -> int:
         return BAD_INPUT
     simulated = any(url.is_simulated for url in robot_urls(robot, settings.buses).values())
     block.write_description({**description(robot, limits, parts), "simulated": simulated})
-    if parts.last is not None and robot.platform is not None:
-        parts.last.path = _lengths_file(robot, settings)
-        parts.last.geometry = robot.geometry_identity
-        parts.last.load(len(robot.axes), robot.platform.longest_cable_m)
+    if parts.last_stop is not None and robot.platform is not None:
+        parts.last_stop.path = _lengths_file(robot, settings)
+        parts.last_stop.geometry = robot.geometry_identity
+        parts.last_stop.load(len(robot.axes), robot.platform.longest_cable_m)
     if parts.paths is not None:
         _open_paths(parts.paths, robot, settings, block)
     loop = ControlLoop(block, machine, parts)

@@ -41,23 +41,23 @@ def source_refusal(
 
     Where the platform was let go, or fell, somebody has to have `asked` for it by name.
     """
-    last = parts.last
+    last = parts.last_stop
     if asked and parts.tight:
         return bad_source(asked, "the cables are tight already; lower it first")
     if last.fallen and not asked:
-        elsewhere, allowed = (_FALLEN_ELSEWHERE, ("lengths",)) if parts.known else ("", ())
+        elsewhere, allowed = (_FALLEN_ELSEWHERE, ("lengths",)) if parts.pose_known else ("", ())
         return bad_source(asked, _FALLEN + elsewhere, "home", *allowed)
     if source == "home" and last.displaced and not asked:
         why = (
             "the platform was let go elsewhere, and where it stands is not known; stand it at home"
         )
         return bad_source(asked, why, "home")
-    if source == "lengths" and not parts.known:
+    if source == "lengths" and not parts.pose_known:
         return bad_source(asked, "the cables' lengths are not known", "home")
     if source == "last" and last.lengths is None:
         return bad_source(asked, f"no lengths of the last stop: {last.why}")
     why = ""
-    if source == "home" and parts.known and not parts.tight:
+    if source == "home" and parts.pose_known and not parts.tight:
         why = why_not_to_wind_in(parts, parts.estimator.estimate.cable_length_m)
     return bad_source(asked, why) if why else None
 

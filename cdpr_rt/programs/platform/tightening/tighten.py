@@ -165,7 +165,7 @@ class TightenProgram(PlatformProgram):
     # -- commands
 
     def _default_source(self) -> str:
-        return "lengths" if self._parts.known else "home"
+        return "lengths" if self._parts.pose_known else "home"
 
     def _parsed(self, arguments: Mapping[str, Any]) -> tuple[str, bool]:
         CommandArguments(self.name, arguments, ("from",))
@@ -261,7 +261,7 @@ class TightenProgram(PlatformProgram):
             self._finish(feedback, setpoint, torque_Nm)
 
     def _take_last(self) -> None:
-        last = self._parts.last.take()
+        last = self._parts.last_stop.take()
         self._last = last if self._source == "last" else None
 
     def _why_not_to_pull(self, feedback: AxisFeedback) -> str:
@@ -280,10 +280,10 @@ class TightenProgram(PlatformProgram):
 
     def _lengths_before(self, source: str, feedback: AxisFeedback) -> FloatArray | None:
         """Return the lengths (n,) by what was known of them before, None for nothing."""
-        stopped, parts = self._parts.last.lengths, self._parts
+        stopped, parts = self._parts.last_stop.lengths, self._parts
         if source == "last" and stopped is not None:
             return stopped.at(feedback.position_rad, self._cable)
-        return parts.estimator.estimate.cable_length_m if parts.known else None
+        return parts.estimator.estimate.cable_length_m if parts.pose_known else None
 
     def _lengths(self, feedback: AxisFeedback) -> FloatArray:
         """Return the cables' lengths, (n,), as they are now."""
@@ -304,7 +304,7 @@ class TightenProgram(PlatformProgram):
         stopping, self._hands_over = self._stopping, False
         parts = self._parts
         parts.cycle, parts.tight = feedback.cycle, True
-        parts.last.displaced = parts.last.fallen = False
+        parts.last_stop.displaced = parts.last_stop.fallen = False
         super().start(feedback, setpoint, torque_Nm)
         if stopping:
             self.stop()

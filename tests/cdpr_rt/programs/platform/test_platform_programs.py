@@ -47,7 +47,7 @@ def tightened(robot: Standing) -> Standing:
 
 
 def test_slack_comes_in_and_lengths_are_those_of_home(robot: Standing):
-    assert not robot.parts.known
+    assert not robot.parts.pose_known
     tightened(robot)
     assert robot.tension_N.min() > 15.0
     robot.run(0.01)
@@ -138,12 +138,12 @@ def let_go_of(robot: Standing) -> None:
 
 
 def test_what_ends_it_meanwhile_leaves_the_platform_as_displaced_as_it_was(robot: Standing):
-    robot.parts.last.displaced = True
+    robot.parts.last_stop.displaced = True
     handing_over(robot, "home")
     let_go_of(robot)
-    assert robot.parts.last.displaced
+    assert robot.parts.last_stop.displaced
     assert handing_over(robot, "home").until_done(10.0)["done"]
-    assert not robot.parts.last.displaced
+    assert not robot.parts.last_stop.displaced
 
 
 def test_whether_it_hangs_is_looked_at_again_once_that_was_ended(
@@ -272,7 +272,7 @@ def test_a_platform_let_go_elsewhere_is_not_taken_to_stand_at_home(robot: Standi
         tighten.check({})
     robot.switch("tighten", {"from": "home"})
     robot.until_done(20.0)
-    assert not robot.parts.last.displaced
+    assert not robot.parts.last_stop.displaced
 
 
 def test_a_platform_that_cannot_come_home_is_let_down_where_it_is(robot: Standing):
@@ -310,8 +310,8 @@ def test_holding_keeps_axes_before_and_the_platform_after(robot: Standing):
 def test_lengths_that_are_not_there_are_refused(
     robot: Standing, wanted: dict[str, str], named: str
 ):
-    robot.parts.last.take()
-    robot.parts.last.why = "the robot has not been stopped with known lengths yet"
+    robot.parts.last_stop.take()
+    robot.parts.last_stop.why = "the robot has not been stopped with known lengths yet"
     with pytest.raises(ProgramError, match=named):
         robot.programs["tighten"].check(wanted)
 
