@@ -95,7 +95,7 @@ class Service:
                 self.events.add(part.name, f"{part.name}: did not end well: {error}")
 
     def issue_stream_session(self, token: str | None) -> dict[str, Any]:
-        """Give the holder of the right to move a session of the stream, as `models.StreamSession`.
+        """Give the holder of the right to move a session of the stream, as `models.StreamAccess`.
 
         Raises LeaseError, and StreamError where no stream is received.
         """

@@ -190,10 +190,10 @@ def _add_control(app: FastAPI, service: Service) -> None:
         return models.Control.model_validate(service.control())
 
     @app.post("/control", responses=_REFUSALS)
-    async def take(body: models.TakeControl) -> models.Held:
+    async def take(body: models.TakeControl) -> models.ControlTaken:
         """Take the right to move; it lapses `ttl_s` after the last request that shows the token."""
         token = service.lease.take(body.client, body.ttl_s)
-        return models.Held(token=token, ttl_s=body.ttl_s)
+        return models.ControlTaken(token=token, ttl_s=body.ttl_s)
 
     @app.put("/control", responses=_REFUSALS)
     async def renew(token: Token = None) -> models.Renewed:
@@ -215,12 +215,12 @@ def _add_control(app: FastAPI, service: Service) -> None:
         return models.Ticket(ticket=service.tickets.issue(), valid_s=VALID_S)
 
     @app.post("/stream", responses={**_REFUSALS, **_NO_STREAM})
-    async def stream(token: Token = None) -> models.StreamSession:
+    async def stream(token: Token = None) -> models.StreamAccess:
         """Get a session of the set-point stream, in place of the one before.
 
         It lasts as long as the right to move; `session` and `key` sign the packets.
         """
-        return models.StreamSession.model_validate(service.issue_stream_session(token))
+        return models.StreamAccess.model_validate(service.issue_stream_session(token))
 
 
 _OPEN_COMMANDS: Final = {
@@ -236,7 +236,7 @@ _OPEN_COMMANDS: Final = {
 
 def _add_open_commands(app: FastAPI, service: Service) -> None:
     def add(do: str, about: str) -> None:
-        async def command(body: models.Who | None = None) -> models.Done:
+        async def command(body: models.ClientRequest | None = None) -> models.Done:
             return _done(await service.command(do, body.client if body else "somebody"))
 
         app.post(f"/{do}", responses=_REFUSALS, name=do, description=about)(command)
@@ -247,7 +247,7 @@ def _add_open_commands(app: FastAPI, service: Service) -> None:
 
 def _add_motion(app: FastAPI, service: Service) -> None:
     async def ask(
-        do: str, body: models.Who, token: str | None, request: Request, **fields: Any
+        do: str, body: models.ClientRequest, token: str | None, request: Request, **fields: Any
     ) -> models.Done:
         reply = await service.command_with_right(
             do, body.client, token, request.is_disconnected, **fields
@@ -264,7 +264,9 @@ def _add_motion(app: FastAPI, service: Service) -> None:
         return await ask("enable", body, token, request, **fields)
 
     @app.post("/program", responses=_REFUSALS)
-    async def program(body: models.Program, request: Request, token: Token = None) -> models.Done:
+    async def program(
+        body: models.ProgramRequest, request: Request, token: Token = None
+    ) -> models.Done:
         """Change over to a program, without a bump."""
         fields = {"program": body.program, "wanted": body.wanted}
         return await ask("program", body, token, request, **fields)

@@ -26,7 +26,7 @@ _SLOW_S = 1.0
 _MOST_REASON_BYTES = 123  # RFC 6455, 5.5
 
 
-class Order(models.Who):
+class Order(models.ClientRequest):
     """What the holder of the right to move sends over its connection."""
 
     do: Literal["renew", "hold", "program", "set"]
@@ -35,7 +35,7 @@ class Order(models.Who):
     id: int | None = None
 
 
-_PROGRAM: Final = TypeAdapter(models.Program)
+_PROGRAM: Final = TypeAdapter(models.ProgramRequest)
 _SET: Final = TypeAdapter(models.Set)
 
 

@@ -80,7 +80,7 @@ class _Body(BaseModel):
     model_config = ConfigDict(extra="forbid")
 
 
-class Who(_Body):
+class ClientRequest(_Body):
     """Who asks, for the record of events; the whole body may be left out."""
 
     client: _Client = "somebody"
@@ -96,21 +96,21 @@ class TakeControl(_Body):
     ] = 2.0
 
 
-class Enable(Who):
+class Enable(ClientRequest):
     """What runs from the first moment with power."""
 
     program: _Name = "hold"
     wanted: _Wanted = {}
 
 
-class Program(Who):
+class ProgramRequest(ClientRequest):
     """What is to run from now on."""
 
     program: _Name
     wanted: _Wanted = {}
 
 
-class PathFile(Who):
+class PathFile(ClientRequest):
     """A path's file, to be planned."""
 
     name: Annotated[
@@ -134,7 +134,7 @@ class PathFile(Who):
     ] = ""
 
 
-class Set(Who):
+class Set(ClientRequest):
     """What the running program is to do now."""
 
     wanted: _Wanted
@@ -185,7 +185,7 @@ class Planned(_Answer):
     """What the program `path` knows it by."""
 
 
-class Held(_Answer):
+class ControlTaken(_Answer):
     """The right to move, for whoever shows the token."""
 
     token: str
@@ -205,7 +205,7 @@ class Ticket(_Answer):
     valid_s: float
 
 
-class StreamSession(_Answer):
+class StreamAccess(_Answer):
     """A session of the set-point stream, for the holder of the right to move."""
 
     session: int
