@@ -18,7 +18,7 @@ from cdpr_profiles.errors import ProfileError
 from cdpr_rt.errors import ControlError, InvalidRequestError
 from cdpr_sim_bus.errors import BusSetupError, SimulatorError
 from cdpr_tools.command_group import group_of
-from cdpr_tools.compiling import tell_of_compiling
+from cdpr_tools.compiling import announce_compiling
 from cdpr_tools.errors import BAD_INPUT, DONE, FAILED, CommandError
 
 MODULES = {
@@ -178,7 +178,7 @@ def exit_status(error: BaseException) -> int:
 
 def main() -> None:
     """Run the command line; a known error is one line on standard error, never a traceback."""
-    tell_of_compiling()
+    announce_compiling()
     try:
         app(standalone_mode=True)
     except (CommandError, ControlError, DriverError, ProfileError, SimulatorError) as error:

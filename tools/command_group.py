@@ -11,13 +11,13 @@ import typer
 from typer.core import TyperCommand, TyperGroup
 from typing_extensions import override
 
-from cdpr_tools.loading import told_on_a_terminal
+from cdpr_tools.loading import loading_notice
 
 
 @cache
 def load(module: str, name: str) -> Any:
     """Return the group or command `name` of a module of cdpr_tools.commands: its `app`."""
-    with told_on_a_terminal():
+    with loading_notice():
         app = importlib.import_module(f"cdpr_tools.commands.{module}").app
     group = typer.main.get_group(app)
     return group if group.name == name else group.commands[name]

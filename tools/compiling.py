@@ -28,11 +28,11 @@ _sockets: list[socket.socket] = []
 
 
 @contextmanager
-def compiling_told_to(listener: Callable[[str], None]) -> Iterator[None]:
+def compiling_notices_to(listener: Callable[[str], None]) -> Iterator[None]:
     """Call `listener` with how far it is for each kernel that the block compiles.
 
     In the thread that compiles, and with each notice of another process that is passed on.
-    Only where `tell_of_compiling` is in force.
+    Only where `announce_compiling` is in force.
     """
     _listeners.append(listener)
     try:
@@ -118,8 +118,8 @@ class _Notice(logging.Handler):
         print(text, file=sys.stderr, flush=True)
 
 
-def tell_of_compiling(what: str = "the numerics") -> None:
-    """Say it from now on where something has to be compiled, with `what` as the name of all."""
+def announce_compiling(what: str = "the numerics") -> None:
+    """Say from now on when kernels have to be compiled; `what` names them all."""
     _share_with_children()
     _LOG.handlers[:] = [_Notice(what)]
     _LOG.propagate = False
@@ -147,7 +147,7 @@ class _EndsIt(logging.Handler):
 def compiling_until(ended: Callable[[], bool]) -> Iterator[None]:
     """Leave the block before the next kernel that it compiles once `ended` says so.
 
-    Only where `tell_of_compiling` is in force: nothing else tells of each kernel.
+    Only where `announce_compiling` is in force: nothing else tells of each kernel.
     """
     handler = _EndsIt(ended)
     _LOG.addHandler(handler)

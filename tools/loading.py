@@ -14,8 +14,8 @@ _TEXT, _WIPE = "loading ...", "\r\x1b[K"
 
 
 @contextmanager
-def told_on_a_terminal() -> Iterator[None]:
-    """Say so soon after the block begins, and wipe it out at its end."""
+def loading_notice() -> Iterator[None]:
+    """Say so on a terminal soon after the block begins, and wipe it out at its end."""
     # a shell that asks for completions has its line there
     if not sys.stderr.isatty() or "_CDPR_COMPLETE" in os.environ or os.getenv("TERM") == "dumb":
         yield

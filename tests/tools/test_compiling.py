@@ -12,10 +12,10 @@ import pytest
 from cdpr_tools.compiling import NOTICE
 
 KERNELS = """
-from cdpr_tools.compiling import tell_of_compiling
+from cdpr_tools.compiling import announce_compiling
 from {module} import jit
 
-tell_of_compiling("the test")
+announce_compiling("the test")
 
 @jit
 def inner(x, k):
@@ -49,9 +49,9 @@ def test_kernels_of_which_nothing_is_kept_are_told_once_and_compiled_once(
 
 TWICE = """
 import subprocess, sys
-from cdpr_tools.compiling import tell_of_compiling
+from cdpr_tools.compiling import announce_compiling
 
-tell_of_compiling()
+announce_compiling()
 if len(sys.argv) == 1:
     for _ in range(2):
         subprocess.run([sys.executable, __file__, "child"], check=True)
@@ -78,7 +78,7 @@ import logging, time
 from cdpr_tools import compiling
 
 compiling._EVERY_S = 0.5
-compiling.tell_of_compiling("the test")
+compiling.announce_compiling("the test")
 for _ in range(30):
     logging.getLogger("cdpr.compiling").info("a kernel")
     time.sleep(0.1)
@@ -101,11 +101,11 @@ def test_what_is_compiled_for_long_is_told_again_and_again(
 
 LISTENED = """
 import logging
-from cdpr_tools.compiling import compiling_told_to, pass_on, tell_of_compiling
+from cdpr_tools.compiling import compiling_notices_to, pass_on, announce_compiling
 
 heard = []
-tell_of_compiling("the test")
-with compiling_told_to(heard.append):
+announce_compiling("the test")
+with compiling_notices_to(heard.append):
     for _ in range(2):
         logging.getLogger("cdpr.compiling").info("a kernel")
     pass_on("compiling the drives goes on: 5 kernels so far ...\\n")

@@ -11,9 +11,9 @@ import pytest
 
 SCRIPT = """
 import sys, time
-from cdpr_tools.loading import told_on_a_terminal
+from cdpr_tools.loading import loading_notice
 
-with told_on_a_terminal():
+with loading_notice():
     time.sleep(float(sys.argv[1]))
 print("done", file=sys.stderr)
 """

@@ -13,7 +13,7 @@ from cdpr_profiles import load_robot
 from cdpr_rt.errors import GeometryError
 from cdpr_tools.commands.options import JsonOption, SeedOption
 from cdpr_tools.errors import FAILED, BadInputError, raised_as
-from cdpr_tools.loading import told_on_a_terminal
+from cdpr_tools.loading import loading_notice
 from cdpr_tools.output import Output
 
 app = typer.Typer(
@@ -23,7 +23,7 @@ app = typer.Typer(
 
 def _run(module: str, as_json: bool, **given: Any) -> None:
     """Measure with a module's `measure`, and show the figures with its `report`."""
-    with told_on_a_terminal():
+    with loading_notice():
         bench = importlib.import_module(f"cdpr_tools.bench.{module}")
     out = Output(as_json)
     figures = bench.measure(**given, out=out)

@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 from typing_extensions import override
 
-from cdpr_tools.compiling import tell_of_compiling
+from cdpr_tools.compiling import announce_compiling
 from cdpr_tools.composition.simulator import OwnSimulator
 from cdpr_tools.errors import BadInputError
 from tests.tools.robot_rig import unique
@@ -45,7 +45,7 @@ def test_what_is_compiled_meanwhile_ends_where_it_fails(tmp_path: Path) -> None:
             compiled.append(kernel)
             time.sleep(0.1)
 
-    tell_of_compiling()
+    announce_compiling()
     bus = f"simbus:{unique()}"
     with pytest.raises(BadInputError, match="nonsense: unknown key"):
         OwnSimulator("winch-mpp0923d", bus, plant, meanwhile=work)

@@ -37,7 +37,7 @@ from cdpr_tools.commands.options import (
     UrlOption,
 )
 from cdpr_tools.errors import BadInputError, WorkFailedError, os_error_as
-from cdpr_tools.loading import told_on_a_terminal
+from cdpr_tools.loading import loading_notice
 from cdpr_tools.output import Output
 
 app = typer.Typer(
@@ -314,7 +314,7 @@ def study(
     on all cores or a cluster; --png draws NAME.png, NAME-B.png and NAME-C.png. With --ablation:
     what made the thesis' 31 mm, and what each improvement takes off.
     """
-    with told_on_a_terminal():
+    with loading_notice():
         from cdpr_tools.calibrate import study as studies  # noqa: PLC0415  # slow to load
 
     out = Output(as_json)
@@ -340,7 +340,7 @@ def _ablation(
     out: Output, robot: str, draws: int, seed: int, cluster: str | None, png: Path | None
 ) -> None:
     try:
-        with told_on_a_terminal():
+        with loading_notice():
             from cdpr_tools.calibrate import ablation as ablations  # noqa: PLC0415  # slow to load
     except ModuleNotFoundError as error:
         raise BadInputError(

@@ -34,7 +34,7 @@ from cdpr_rt.robots.checks import refuse_impossible
 from cdpr_rt.service.recordings.retention import BYTES_PER_AXIS, Retention, size_text
 from cdpr_tools.calibrate.words import geometry_note
 from cdpr_tools.commands.options import JsonOption, RobotBusOption, SafetyIoOption, YesOption
-from cdpr_tools.compiling import compiling_told_to
+from cdpr_tools.compiling import compiling_notices_to
 from cdpr_tools.composition.simulator import OwnSimulator
 from cdpr_tools.consent import require_consent
 from cdpr_tools.daemon.loop_file import LoopFile, named_launcher
@@ -191,7 +191,7 @@ def run(
             bus_url = settings.buses[0]
             judge = partial(_judge, profile, out)  # which compiles, where nothing is kept yet
             tell("simulated drives")
-            with compiling_told_to(tell):
+            with compiling_notices_to(tell):
                 simulator = OwnSimulator(
                     profile.reference, bus_url, plant, camera=camera, meanwhile=judge
                 )

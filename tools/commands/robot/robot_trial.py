@@ -19,7 +19,7 @@ from cdpr_tools.commands.options import (
     SeedOption,
 )
 from cdpr_tools.errors import BadInputError
-from cdpr_tools.loading import told_on_a_terminal
+from cdpr_tools.loading import loading_notice
 from cdpr_tools.output import Output
 from cdpr_tools.signals import interrupted_by_sigterm
 
@@ -79,7 +79,7 @@ def trial(
     Every cycle crosses the simulated bus to the daemon's own loop, in bus time: ten minutes take a
     few. Ends with exit status 0 once it has judged, whether all that is wanted is reached or not.
     """
-    with told_on_a_terminal():
+    with loading_notice():
         from cdpr_tools.trials import trial as trials  # noqa: PLC0415  # slow to load
 
     out = Output(as_json)

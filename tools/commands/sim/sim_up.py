@@ -25,7 +25,7 @@ from cdpr_sim_bus.physics_board import PhysicsBoard
 from cdpr_sim_bus.robot.plant import Plant
 from cdpr_tools.commands.options import ExitWithStdinOption
 from cdpr_tools.commands.sim import sim_robot
-from cdpr_tools.compiling import tell_of_compiling
+from cdpr_tools.compiling import announce_compiling
 from cdpr_tools.errors import BadInputError, os_error_as, raised_as
 
 app = typer.Typer()
@@ -105,7 +105,7 @@ def up(
 ) -> None:
     """Run simulated drives until Ctrl-C; tells on standard output when they are up."""
     profile = load_winch_or_robot(machine)
-    tell_of_compiling("the simulated drives")
+    announce_compiling("the simulated drives")
     mode = ClockMode.LOCKSTEP if lockstep else ClockMode.PACED
     if isinstance(profile, Robot):
         if nodes > 1 or unconfigured or slcan or socketcand is not None:

@@ -28,7 +28,7 @@ from cdpr_rt.runtime.control_loop.loop import ControlLoop
 from cdpr_rt.runtime.machine import Machine
 from cdpr_rt.runtime.realtime import freeze_memory
 from cdpr_rt.state_file import state_path
-from cdpr_tools.compiling import compiling_told_to, tell_of_compiling
+from cdpr_tools.compiling import announce_compiling, compiling_notices_to
 from cdpr_tools.composition.loop_parts import description, loop_parts
 from cdpr_tools.daemon.loop_file import POWER_OFF_SIGNAL
 from cdpr_tools.daemon.processes.child import end_with_launcher
@@ -38,7 +38,7 @@ from cdpr_tools.errors import BAD_INPUT, DONE, FAILED
 
 def main() -> int:
     """Run the loop that the launcher has asked for; return the exit status."""
-    tell_of_compiling("the control loop")
+    announce_compiling("the control loop")
     settings = RunSettings.from_argv()
     block = SharedBlock.attach(settings.block_fd)
     try:
@@ -56,7 +56,7 @@ def main() -> int:
                 robot, settings.buses, settings.safety_io, settings.tension_port, real_time=True,
                 limits=limits,
             )  # fmt: skip
-        with compiling_told_to(lambda text: block.write_status({"notices": [text]})):
+        with compiling_notices_to(lambda text: block.write_status({"notices": [text]})):
             parts = loop_parts(robot, limits, block)
     except (ProfileError, DriverError, ControlError) as error:
         print(f"cdpr: {error}", file=sys.stderr)
