@@ -9,6 +9,7 @@ import socket
 import sys
 import tempfile
 import time
+from collections.abc import Callable
 from contextlib import ExitStack
 from functools import partial
 from importlib.util import find_spec
@@ -172,7 +173,7 @@ def run(
     _require_free(settings.socket)
     _require_no_master(profile, settings)
     if not settings.own_simulator:
-        _judge(profile, out)
+        _note_doubts(profile, out)
     _ask(profile, settings, yes)
     if record is not None:
         with os_error_as(BadInputError, f"--record {record}"):
@@ -181,23 +182,37 @@ def run(
     manager = ServiceManager()  # before any child is started: none of them speaks for the daemon
     with ExitStack() as stack:
         tell = stack.enter_context(named_launcher(settings.socket))
-        if text := uncommissioned_text(with_commissioned(profile, commissioned)):
-            out.note(text)
-        if text := geometry_note(profile):
-            out.note(text)
+        for text in (
+            uncommissioned_text(with_commissioned(profile, commissioned)),
+            geometry_note(profile),
+        ):
+            if text:
+                out.note(text)
         simulator = None
         if settings.own_simulator:
-            out.note(f"starting simulated drives: {len(profile.axes)} ...")
-            bus_url = settings.buses[0]
-            judge = partial(_judge, profile, out)  # which compiles, where nothing is kept yet
-            tell("simulated drives")
-            with compiling_notices_to(tell):
-                simulator = OwnSimulator(
-                    profile.reference, bus_url, plant, camera=camera, meanwhile=judge
-                )
+            simulator = _simulator(profile, settings, plant, camera, out, tell)
             stack.callback(simulator.stop)
-            tell("")
         _launch(profile, settings, out, manager, simulator)
+
+
+def _simulator(
+    robot: Robot,
+    settings: RunSettings,
+    plant: Path | None,
+    camera: Path | None,
+    out: Output,
+    tell: Callable[[str], None],
+) -> OwnSimulator:
+    """Start the robot's simulated drives, and `tell` the launcher's file of it meanwhile."""
+    out.note(f"starting simulated drives: {len(robot.axes)} ...")
+    check = partial(_note_doubts, robot, out)  # compiles kernels, where none are kept yet
+    tell("simulated drives")
+    with compiling_notices_to(tell):
+        simulator = OwnSimulator(
+            robot.reference, settings.buses[0], plant, camera=camera, meanwhile=check
+        )
+    tell("")
+    return simulator
 
 
 def _require_writable(folder: Path) -> None:
@@ -207,7 +222,7 @@ def _require_writable(folder: Path) -> None:
         pass
 
 
-def _judge(robot: Robot, out: Output) -> None:
+def _note_doubts(robot: Robot, out: Output) -> None:
     """Say what is doubtful about the robot; raises ProfileError for one that cannot work."""
     for doubt in refuse_impossible(robot):
         out.note(doubt)

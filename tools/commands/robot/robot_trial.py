@@ -95,13 +95,12 @@ def trial(
         folder = out_dir or Path("out") / name
         if folder.exists() and any(folder.iterdir()):
             raise BadInputError(f"--out {folder}: holds something already; allowed: a new folder")
-        usual = trials.KINDS[kind]
-        if minutes is not None and usual.compares:
+        default = trials.KINDS[kind]
+        fixed_duration = default.compares or kind is KindOfTrial.PATH
+        if minutes is not None and fixed_duration:
             raise BadInputError(f"--minutes {minutes:g}: {kind} lasts as long as it lasts")
         if speed_mm_s is not None and kind not in (KindOfTrial.LINE, KindOfTrial.PATH):
             raise BadInputError(f"--speed-mm-s {speed_mm_s:g}: allowed: with line and path")
-        if minutes is not None and kind is KindOfTrial.PATH:
-            raise BadInputError(f"--minutes {minutes:g}: {kind} lasts as long as it lasts")
         if speed_mm_s is None and kind is KindOfTrial.PATH and profile.platform is not None:
             speed_mm_s = 1e3 * profile.platform.speed_m_s
         settings = trials.TrialSettings(
@@ -109,7 +108,7 @@ def trial(
             robot=robot,
             plant=None if plant is None else str(plant.absolute()),
             seed=seed,
-            minutes=usual.minutes if minutes is None else minutes,
+            minutes=default.minutes if minutes is None else minutes,
             commissioned=None if commissioned is None else str(commissioned.absolute()),
             compensated=not without_compensation,
             **({} if speed_mm_s is None else {"speed_m_s": 1e-3 * speed_mm_s}),

@@ -18,6 +18,7 @@ from cdpr_sim_bus.frame import FrameLog
 from cdpr_sim_bus.physics_board import PhysicsBoard
 from cdpr_sim_bus.robot.cable_robot import CableRobot
 from cdpr_sim_bus.robot.logs.pose_logs import BoardPose, PoseLog, PoseScanner
+from cdpr_sim_bus.robot.plant import Plant
 from cdpr_sim_bus.robot.robot_plant import RobotPlant
 from cdpr_tools.composition.robot_physics import physics_of
 from cdpr_tools.composition.simulator import OwnCamera
@@ -32,11 +33,12 @@ def up(
     store_file: Callable[[int], Path | None],
     board: Path | None,
     until_stdin_ends: bool,
-    truth_log: Path | None = None,
-    detached: bool = False,
-    frame_log: FrameLog | None = None,
-    scanner: Path | None = None,
-    camera: Path | None = None,
+    *,
+    truth_log: Path | None,
+    detached: bool,
+    frame_log: FrameLog | None,
+    scanner: Path | None,
+    camera: Path | None,
 ) -> None:
     """Run the simulated drives of `robot` until Ctrl-C; serial numbers count the axes from 1.
 
@@ -58,15 +60,7 @@ def up(
         body, plants = physics_of(robot, plant, detached)
         if body is None:
             _refuse_platforms(truth_log, scanner, camera)
-        members = [None] * len(plants) if body is None else body.members()
-        drives = []
-        for i, (axis, own, member) in enumerate(zip(robot.axes, plants, members, strict=True)):
-            with raised_as(BadInputError, StoreError):
-                drive = SimDrive.for_winch(
-                    axis.winch, own, store=store_file(i + 1), serial=i + 1, robot=member
-                )
-            stack.callback(drive.close)
-            drives.append(drive)
+        drives = _drives(stack, robot, plants, body, store_file)
         if camera is not None and board is None:
             folder = stack.enter_context(TemporaryDirectory(prefix="cdpr-board-"))
             board = Path(folder) / "board"
@@ -97,6 +91,28 @@ def up(
             until_stdin_ends=until_stdin_ends,
             frame_log=frame_log,
         )
+
+
+def _drives(
+    stack: ExitStack,
+    robot: Robot,
+    plants: Sequence[Plant],
+    body: CableRobot | None,
+    store_file: Callable[[int], Path | None],
+) -> list[SimDrive]:
+    """Return a drive for each axis, with the physics of `body` if there is one."""
+    members = [None] * len(plants) if body is None else body.members()
+    drives = []
+    for serial, (axis, plant, member) in enumerate(
+        zip(robot.axes, plants, members, strict=True), 1
+    ):
+        with raised_as(BadInputError, StoreError):
+            drive = SimDrive.for_winch(
+                axis.winch, plant, store=store_file(serial), serial=serial, robot=member
+            )
+        stack.callback(drive.close)
+        drives.append(drive)
+    return drives
 
 
 def _refuse_platforms(truth_log: Path | None, scanner: Path | None, camera: Path | None) -> None:
