@@ -82,28 +82,35 @@ class RobotFile(Profile):
         if self.master_heartbeat_s < 2 * self.sync_period_s:
             allowed = f"allowed: at least two cycles ({2 * self.sync_period_s:g})"
             yield "master_heartbeat_s", f"value {self.master_heartbeat_s:g}; {allowed}"
+        yield from self._bus_faults()
+        yield from self._node_faults()
+
+    def _bus_faults(self) -> Iterator[tuple[str, str]]:
         names = [bus.name for bus in self.buses]
         for i, bus in enumerate(self.buses):
             if bus.name in names[:i]:
                 yield f"buses[{i}].name", f"value {bus.name!r}; allowed: each name once"
             elif all(axis.bus != bus.name for axis in self.axes):
                 yield f"buses[{i}].name", f"value {bus.name!r}; allowed: a bus that an axis is on"
-        taken: dict[tuple[str, int], int] = {}
-        nodes: dict[int, int] = {}
+
+    def _node_faults(self) -> Iterator[tuple[str, str]]:
+        names = [bus.name for bus in self.buses]
+        first_on_bus: dict[tuple[str, int], int] = {}
+        first_of_all: dict[int, int] = {}
         for i, axis in enumerate(self.axes):
             if axis.bus not in names:
                 yield f"axes[{i}].bus", f"value {axis.bus!r}; allowed: {', '.join(names)}"
             if axis.node_id == self.master_node_id:
                 problem = f"value {axis.node_id}; allowed: another than master_node_id"
                 yield f"axes[{i}].node_id", problem
-            first = taken.setdefault((axis.bus, axis.node_id), i)
+            first = first_on_bus.setdefault((axis.bus, axis.node_id), i)
             if first != i:
                 problem = (
                     f"value {axis.node_id}; allowed: each node id once on a bus, "
                     f"axes[{first}] has it on {axis.bus!r}"
                 )
                 yield f"axes[{i}].node_id", problem
-            other = nodes.setdefault(axis.node_id, i)
+            other = first_of_all.setdefault(axis.node_id, i)
             if self.safety_io is not None and self.axes[other].bus != axis.bus:
                 problem = (
                     f"value {axis.node_id}; allowed: each node id once on all buses where there is "

@@ -98,7 +98,7 @@ class CableLoss:
         self._model = model = platform_model_of(robot)
         limits, n, self._axes = limits_of(robot), len(robot.axes), robot.axes
         self._period_s = robot.sync_period_s
-        winches, motors = zip(*((one.winch, one.winch.motor) for one in robot.axes), strict=True)
+        winches, motors = zip(*((axis.winch, axis.winch.motor) for axis in robot.axes), strict=True)
         per_rad = np.array([abs(winch.cable_m_per_motor_rad) for winch in winches])
         self._rated_N = np.array([motor.rated_torque_Nm for motor in motors]) / per_rad
         self._fastest_m_s = np.broadcast_to(limits.speed_rad_s, (n,)) * per_rad
@@ -120,7 +120,7 @@ class CableLoss:
         """Return what the platform does at a position when a cable, counted from 0, breaks."""
         start = self._model.pose(np.array(position_m))
         up, first = self._model.positions - 1, slice(math.ceil(SWING_S / self._period_s))
-        most = np.zeros(4)
+        largest = np.zeros(4)
         for friction in _FRICTIONS:
             path = self.path(cable, start, friction)
             moved = path[:, 0] - start.p
@@ -128,8 +128,8 @@ class CableLoss:
             aside = np.linalg.norm(np.delete(moved, up, axis=1), axis=1)
             cosine = (np.einsum("kij,ij->k", path[first, 1:], start.Q) - 1.0) / 2.0
             turn = math.acos(min(max(float(cosine.min()), -1.0), 1.0))
-            most = np.maximum(most, (away[first].max(), turn, away.max(), aside.max()))
-        return Swing(cable, tuple(position_m), *most.tolist())
+            largest = np.maximum(largest, (away[first].max(), turn, away.max(), aside.max()))
+        return Swing(cable, tuple(position_m), *largest.tolist())
 
     def path(self, cable: int, start: Pose, friction: float = 0.0) -> FloatArray:
         """Return the poses (c, 4, 3) of all cycles from when a cable breaks until it lies still.
@@ -183,7 +183,8 @@ class CableLoss:
         return float(standing[:, self._model.positions - 1].min())
 
     def _noticed_s(self, cable: int) -> float:
-        own = self._winches[cable]
-        momentum = own["rotor_kg"] * self._fastest_m_s[cable]
-        slack = own["held_N"] * (_NOTICED_S - _NOTICING_S) < _NOTICED_LATE * momentum
-        return _NOTICED_S if slack else _NOTICED_LATE * momentum / own["held_N"] + _NOTICING_S
+        """Return for how long the loss of a cable is not noticed."""
+        winch = self._winches[cable]
+        momentum = winch["rotor_kg"] * self._fastest_m_s[cable]
+        slack = winch["held_N"] * (_NOTICED_S - _NOTICING_S) < _NOTICED_LATE * momentum
+        return _NOTICED_S if slack else _NOTICED_LATE * momentum / winch["held_N"] + _NOTICING_S

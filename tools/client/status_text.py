@@ -72,15 +72,26 @@ def _lines(status: dict[str, Any]) -> list[Text]:
         lines.append(Text(f"reason: {status['reason']}", style="yellow"))
     if state == DEAD:
         return [*lines, *_of_dead(status)]
-    texts = [text for text in (platform_text(status), tightness_text(status)) if text]
-    if texts:
-        lines.append(Text("; ".join(texts)))
+    platform = "; ".join(filter(None, (platform_text(status), tightness_text(status))))
+    motors = compensation_text(status["axes"]), learnt_text(status)
+    lines += [Text(text) for text in (platform, _left_path(status), *motors) if text]
+    return [
+        *lines,
+        *_loop_lines(status),
+        *(Text(f"note: {x}", style="dim") for x in status["notices"]),
+    ]
+
+
+def _left_path(status: dict[str, Any]) -> str:
     path = (status.get("program_progress") or {}).get("path")
     if path and status["program"] == "hold" and path["time_s"] < path["duration_s"]:
-        lines.append(Text(f"{left_text(path)}; {GO_ON}"))
-    for text in (compensation_text(status["axes"]), learnt_text(status)):
-        if text:
-            lines.append(Text(text))
+        return f"{left_text(path)}; {GO_ON}"
+    return ""
+
+
+def _loop_lines(status: dict[str, Any]) -> list[Text]:
+    """Return who may move the robot, and how the loop and its parts fare."""
+    lines = []
     control = status["control"]
     if control["held"]:
         lines.append(Text(f"the right to move: {control['client']}"))
@@ -102,7 +113,6 @@ def _lines(status: dict[str, Any]) -> list[Text]:
     recording = status["parts"].get("recording")
     if recording:
         lines.append(Text(_recording(recording)))
-    lines += [Text(f"note: {notice}", style="dim") for notice in status["notices"]]
     return lines
 
 
