@@ -8,8 +8,13 @@ _MOST_LINE_CHARS = 1000
 
 def brief(text: str, most: int = _MOST_CHARS) -> str:
     """Return a text for use in a message: printable and cut to `most` characters."""
-    shown = text if text.isprintable() else repr(text)[1:-1]
-    return shown if len(shown) <= most else shown[: most - 3] + "..."
+    printable = text if text.isprintable() else repr(text)[1:-1]
+    return printable if len(printable) <= most else printable[: most - 3] + "..."
+
+
+def value_text(value: object) -> str:
+    """Return a value for use in a message, cut to 60 characters."""
+    return brief(repr(value), 60)
 
 
 class ProfileError(Exception):

@@ -8,9 +8,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from cdpr_profiles.eds.eds_compact import expand_compact
-from cdpr_profiles.eds.eds_text import Remarks, Section, integer, read_sections, shown
+from cdpr_profiles.eds.eds_text import Remarks, Section, integer, read_sections
 from cdpr_profiles.eds.eds_values import DOMAIN, INTEGER_BITS, Value, data_type_of, limits, value_of
-from cdpr_profiles.errors import ProfileError
+from cdpr_profiles.errors import ProfileError, value_text
 
 _VAR, _ARRAY, _RECORD = 7, 8, 9
 _CONTAINERS = (_ARRAY, _RECORD)
@@ -163,7 +163,7 @@ def _read_info(sections: dict[str, Section], eds: EdsFile) -> None:
     words = ("vendorname", "productname", "ordercode")
     for key, value in section.keys.items():
         if value and key not in words and integer(value) is None:
-            eds.remarks.add(section.place(key), f"value {shown(value)}; allowed: a number")
+            eds.remarks.add(section.place(key), f"value {value_text(value)}; allowed: a number")
         elif value:
             eds.info[key] = value
     usage = sections.get("dummyusage", Section("DummyUsage"))
@@ -186,7 +186,7 @@ def _read_commissioning(sections: dict[str, Section], eds: EdsFile) -> None:
         if value is not None and fits(value):
             found[key] = value
         elif text:
-            eds.remarks.add(section.place(key), f"value {shown(text)}; allowed: {allowed}")
+            eds.remarks.add(section.place(key), f"value {value_text(text)}; allowed: {allowed}")
     eds.node_id = found.get("NodeID")
     eds.bitrate_bit_s = found["Baudrate"] * 1000 if "Baudrate" in found else None
 
@@ -201,7 +201,9 @@ def _read_object(section: Section, index: int, sections: dict[str, Section], eds
     if kind in _DEFINITIONS:
         return
     if kind not in (2, _VAR, *_CONTAINERS):
-        eds.remarks.add(section.place("ObjectType"), f"value {shown(text)}; allowed: 0x7, 0x8, 0x9")
+        eds.remarks.add(
+            section.place("ObjectType"), f"value {value_text(text)}; allowed: 0x7, 0x8, 0x9"
+        )
         kind = _RECORD if has_entries else _VAR
     if kind == _VAR and has_entries and not section.get("DataType"):
         eds.remarks.add(section.place("ObjectType"), "a variable with sub-indices; taken as record")
@@ -242,7 +244,7 @@ def _entry(section: Section, index: int, sub: int, remarks: Remarks) -> EdsObjec
         return None
     access = section.get("AccessType").lower()
     if access not in _ACCESS:
-        access = shown(section.get("AccessType"))
+        access = value_text(section.get("AccessType"))
         remarks.add(
             section.place("AccessType"),
             f"value {access}; allowed: {', '.join(_ACCESS)}; taken as ro",
@@ -250,7 +252,7 @@ def _entry(section: Section, index: int, sub: int, remarks: Remarks) -> EdsObjec
         access = "ro"
     mappable = section.get("PDOMapping")
     if mappable and integer(mappable) not in (0, 1):
-        remarks.add(section.place("PDOMapping"), f"value {shown(mappable)}; allowed: 0, 1")
+        remarks.add(section.place("PDOMapping"), f"value {value_text(mappable)}; allowed: 0, 1")
     low, high = limits(section, data_type, remarks)
     default, relative = value_of(section, "DefaultValue", data_type, remarks)
     value, value_relative = value_of(section, "ParameterValue", data_type, remarks)
@@ -283,7 +285,7 @@ def _check_counts(sections: dict[str, Section], eds: EdsFile) -> None:
         if not there:
             eds.remarks.add(section.place(), "has no sub-indices")
         elif integer(text) != there and not section.get("CompactSubObj"):
-            problem = f"value {shown(text)}" if text else "is missing"
+            problem = f"value {value_text(text)}" if text else "is missing"
             eds.remarks.add(section.place("SubNumber"), f"{problem}; there are {there} sub-indices")
 
 
@@ -299,7 +301,7 @@ def _check_lists(sections: dict[str, Section], eds: EdsFile) -> None:
         if integer(count) != len(indexes):
             eds.remarks.add(
                 section.place("SupportedObjects"),
-                f"value {shown(count)}; there are {len(indexes)} objects in the list",
+                f"value {value_text(count)}; there are {len(indexes)} objects in the list",
             )
         known = {index for index in indexes if index is not None}
         listed |= known

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import re
 
-from cdpr_profiles.eds.eds_text import Remarks, Section, integer, shown
+from cdpr_profiles.eds.eds_text import Remarks, Section, integer
+from cdpr_profiles.errors import value_text
 
 _INDEX = re.compile(r"[0-9a-f]{4}", re.ASCII)
 _MOST_PDOS = 512
@@ -36,7 +37,7 @@ def _expand_array(key: str, sections: dict[str, Section], remarks: Remarks) -> N
     text = head.get("CompactSubObj")
     count = integer(text)
     if count is None or not 0 <= count <= 254:
-        remarks.add(head.place("CompactSubObj"), f"value {shown(text)}; allowed: 0 to 254")
+        remarks.add(head.place("CompactSubObj"), f"value {value_text(text)}; allowed: 0 to 254")
         return
     if count == 0:
         return

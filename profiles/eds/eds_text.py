@@ -8,12 +8,11 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from cdpr_profiles.errors import ProfileError
+from cdpr_profiles.errors import ProfileError, value_text
 from cdpr_profiles.reading.bounded_input import read_bytes
 
 MOST_EDS_BYTES = 2 << 20
 _MOST_REMARKS = 200
-_SHOWN_CHARS = 60
 
 _HEADER = re.compile(r"\[([^\]]*)\]\s*(?:;.*)?")
 _COMMENT = re.compile(r"\s;.*")
@@ -71,12 +70,6 @@ class Number:
     relative: bool = False
 
 
-def shown(value: str) -> str:
-    """Return a value as messages show it."""
-    text = repr(value)
-    return text if len(text) <= _SHOWN_CHARS else text[: _SHOWN_CHARS - 3] + "..."
-
-
 def integer(text: str) -> int | None:
     """Return a decimal, hexadecimal (0x) or octal (leading 0) integer, None for anything else."""
     match = _NUMBER.fullmatch(text.strip())
@@ -109,7 +102,7 @@ def read_sections(path: Path, remarks: Remarks) -> dict[str, Section]:
         if line[0] == "[":
             here = _begin(line, line_number, sections, remarks)
         elif here is None:
-            remarks.add(f"line {line_number}", f"{shown(line)} stands in no section; left out")
+            remarks.add(f"line {line_number}", f"{value_text(line)} stands in no section; left out")
         else:
             _take(line, line_number, here, remarks)
     if not sections:
@@ -141,7 +134,9 @@ def _begin(line: str, line_number: int, sections: dict[str, Section], remarks: R
     """Return the section that a header begins; keys under a broken header are dropped."""
     match = _HEADER.fullmatch(line)
     if match is None or not match[1].strip():
-        remarks.add(f"line {line_number}", f"{shown(line)} is no section; left out with its keys")
+        remarks.add(
+            f"line {line_number}", f"{value_text(line)} is no section; left out with its keys"
+        )
         return Section("")
     name = match[1].strip()
     if name.lower() in sections:
@@ -153,11 +148,11 @@ def _take(line: str, line_number: int, section: Section, remarks: Remarks) -> No
     key, equals, value = line.partition("=")
     key, value = key.strip(), _COMMENT.sub("", " " + value).strip()
     if not equals or not key:
-        remarks.add(f"line {line_number}", f"{shown(line)} is not KEY=VALUE; left out")
+        remarks.add(f"line {line_number}", f"{value_text(line)} is not KEY=VALUE; left out")
     elif key.lower() not in section.keys:
         section.keys[key.lower()] = value
         section.spelling[key.lower()] = key
     elif section.keys[key.lower()] != value:
         remarks.add(
-            section.place(key), f"is there twice; the first value counts, not {shown(value)}"
+            section.place(key), f"is there twice; the first value counts, not {value_text(value)}"
         )

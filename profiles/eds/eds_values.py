@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 
-from cdpr_profiles.eds.eds_text import Number, Remarks, Section, integer, number, shown
+from cdpr_profiles.eds.eds_text import Number, Remarks, Section, integer, number
+from cdpr_profiles.errors import value_text
 
 DOMAIN = 0x0F
 _STRINGS = (0x09, 0x0B)
@@ -29,7 +30,7 @@ def data_type_of(section: Section, remarks: Remarks) -> int | None:
     if data_type is None or data_type < 1:
         remarks.add(
             section.place("DataType"),
-            (f"value {shown(text)}" if text else "is missing")
+            (f"value {value_text(text)}" if text else "is missing")
             + "; allowed: a type of CiA 301, 0x0001 to 0x001B; the object is left out",
         )
         return None
@@ -37,7 +38,7 @@ def data_type_of(section: Section, remarks: Remarks) -> int | None:
         return data_type
     remarks.add(
         section.place("DataType"),
-        f"value {shown(text)} is no type of CiA 301 (0x0001 to 0x001B); taken as plain bytes",
+        f"value {value_text(text)} is no type of CiA 301 (0x0001 to 0x001B); taken as plain bytes",
     )
     return DOMAIN
 
@@ -72,7 +73,7 @@ def value_of(
     found = _real(text) if data_type in _REALS else _octets(text)
     if found is None and data_type != DOMAIN:
         allowed = "a number" if data_type in _REALS else "pairs of hexadecimal digits"
-        remarks.add(section.place(key), f"value {shown(text)}; allowed: {allowed}; left out")
+        remarks.add(section.place(key), f"value {value_text(text)}; allowed: {allowed}; left out")
     return found, False
 
 
@@ -88,7 +89,7 @@ def _integer_value(
     if found is not None and low <= found.value <= high:
         return found.value, found.relative
     allowed = f"{low} to {high}" if found else "a number as 10, 0x0A or $NODEID+0x180"
-    remarks.add(section.place(key), f"value {shown(text)}; allowed: {allowed}; left out")
+    remarks.add(section.place(key), f"value {value_text(text)}; allowed: {allowed}; left out")
     return None, False
 
 

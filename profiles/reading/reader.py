@@ -13,10 +13,9 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, ValidationError
 from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails
 
-from cdpr_profiles.errors import ProfileError, brief
+from cdpr_profiles.errors import ProfileError, brief, value_text
 from cdpr_profiles.reading.bounded_input import MOST_JSON_BYTES, parse_json, read_text, read_toml
 
-_SHOWN_VALUE_CHARS = 60
 _MOST_FAULTS = 10
 
 
@@ -140,11 +139,11 @@ def _faults(model: type[BaseModel], errors: list[ErrorDetails]) -> Iterable[tupl
                 yield dotted(error["loc"]), _count_fault(error, "{min_length} or more")
         elif error["type"] not in ("missing", "extra_forbidden"):
             allowed = error["msg"].removeprefix("Input should be ")
-            yield dotted(error["loc"]), f"value {_shown(error['input'])}; allowed: {allowed}"
+            yield dotted(error["loc"]), f"value {value_text(error['input'])}; allowed: {allowed}"
 
 
 def _count_fault(error: ErrorDetails, allowed: str) -> str:
-    return f"value {_shown(error['input'])}; allowed: {allowed.format(**error['ctx'])} entries"
+    return f"value {value_text(error['input'])}; allowed: {allowed.format(**error['ctx'])} entries"
 
 
 def dotted(loc: Iterable[int | str]) -> str:
@@ -154,11 +153,6 @@ def dotted(loc: Iterable[int | str]) -> str:
         name = brief(str(part))
         text += f"[{part}]" if isinstance(part, int) else f".{name}" if text else name
     return text
-
-
-def _shown(value: Any) -> str:
-    text = repr(value)
-    return text if len(text) <= _SHOWN_VALUE_CHARS else text[: _SHOWN_VALUE_CHARS - 3] + "..."
 
 
 def _keys_at(model: type[BaseModel], loc: Iterable[int | str]) -> list[str]:
