@@ -155,16 +155,17 @@ class Hub(Switch):
         self._just_synced = False
         if self.lead.until_s is not None:
             events = self._without_leader(events)
-        if self._waiting or len(events) > 1:
+        if self._waiting.heads or len(events) > 1:
             self._serve_all(events)
         elif events:
             self._watcher.handlers[events[0][0]]()
         if self._paced:
             # while frames wait time goes on with them, so that none comes too late
-            if not events and not self._waiting:
+            if not events and not self._waiting.heads:
                 self._tick(self.clock.now(self._watcher.looked_s))
         elif self.clock.stopped:
-            self.lead.go_on()
+            if self.lead.until_s is not None or self.lead.time_pending:
+                self.lead.go_on()
         elif not events or not self.clock.held:
             self._follow(self.clock.now(time.monotonic()))
         if self._leftover:
@@ -183,7 +184,7 @@ class Hub(Switch):
 
     def wait_s(self) -> float | None:
         """Return for how long the next turn may wait, None for ever."""
-        if self._leftover or self._waiting or self.lead.until_s is not None:
+        if self._leftover or self._waiting.heads or self.lead.until_s is not None:
             return 0.0
         if self._just_synced:
             return HOLD_S
@@ -248,10 +249,10 @@ class Hub(Switch):
                 self._watcher.handlers[descriptor]()
         waiting = self._waiting
         for client in contending:
-            if client not in waiting:
+            if client not in waiting.heads:
                 self._fetch(client)
         for _ in range(_BURST):
-            if not waiting:
+            if not waiting.heads:
                 return
             winner, frame = waiting.pop()
             # the sender of a SYNC waits for the answers, unless time has passed meanwhile
@@ -312,7 +313,10 @@ class Hub(Switch):
         if answer is None:
             self._routes.clear()
         else:
-            self._transmit(answer, client, client.sock.send)
+            try:
+                client.sock.send(answer)
+            except OSError as error:
+                self._lose(client, error)
         return True
 
     def _take(self, frame: bytes, source: Client) -> bool:
@@ -340,7 +344,6 @@ class Hub(Switch):
                 load.occupy(now_s, route.bits[length])
         for peer in route.clients:
             if peer is not source:
-                peer.delivered = True
                 self._deliver(frame, peer)
         if route.nodes:
             self._deliver_to_nodes(frame, route, now_s)
@@ -384,12 +387,12 @@ class Hub(Switch):
         self._count_sync(now_s, route.bits[length])
         for peer in route.clients:
             if peer is not source:
-                peer.delivered = True
                 self._deliver(frame, peer)
         for node in route.nodes:
             node.receive(frame, now_s)
         self._flush()
         if leader is not None:
-            self.settle()
+            if self._leftover:
+                self.settle()
             if leader is source:
                 self.lead.send_time()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import errno
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from collections.abc import Set as AbstractSet
 from typing import Protocol
 
@@ -154,27 +154,20 @@ class Contention:
     def __init__(self, *, paced: bool, bitrate: int) -> None:
         self._paced = paced
         self._window_s = LONGEST_FRAME_BITS / bitrate
-        self._heads: dict[Client, tuple[int, bytes]] = {}
-
-    def __bool__(self) -> bool:
-        """Return whether a frame waits."""
-        return bool(self._heads)
-
-    def __contains__(self, client: Client) -> bool:
-        """Return whether a frame of `client` waits."""
-        return client in self._heads
+        self.heads: dict[Client, tuple[int, bytes]] = {}
+        """The frame of each client that waits, with its key of arbitration."""
 
     def add(self, client: Client, frame: bytes) -> None:
         """Queue the frame that `client` sent last."""
-        self._heads[client] = (arbitration_key(HEADER.unpack_from(frame)[0]), frame)
+        self.heads[client] = (arbitration_key(HEADER.unpack_from(frame)[0]), frame)
 
     def discard(self, client: Client) -> None:
         """Discard the frame of a client that has disconnected."""
-        self._heads.pop(client, None)
+        self.heads.pop(client, None)
 
     def pop(self) -> tuple[Client, bytes]:
         """Return the frame that wins arbitration, with its sender; there must be one."""
-        heads = self._heads
+        heads = self.heads
         if len(heads) == 1:
             client, (_, frame) = heads.popitem()
             return client, frame
@@ -247,18 +240,20 @@ class Switch(ABC):
             self.load.occupy(now_s, bits)
 
     def _deliver(self, frame: bytes, peer: Client) -> None:
-        self._transmit(frame, peer, peer.send)
-
-    def _transmit(self, packet: bytes, peer: Client, send: Callable[[bytes], object]) -> None:
+        peer.delivered = True
         try:
-            send(packet)
-        except BlockingIOError:
+            peer.send(frame)
+        except OSError as error:
+            self._lose(peer, error)
+
+    def _lose(self, peer: Client, error: OSError) -> None:
+        """Count a packet that `peer` could not take, or remove one whose socket has failed."""
+        if isinstance(error, BlockingIOError):
             # a client that does not read loses frames; the bus does not wait for it
             peer.dropped += 1
             self.dropped += 1
-        except OSError as error:
-            if error.errno not in (errno.EPIPE, errno.ECONNRESET) or peer.essential:
-                self._remove(peer, f"lost: {error.strerror}")
+        elif error.errno not in (errno.EPIPE, errno.ECONNRESET) or peer.essential:
+            self._remove(peer, f"lost: {error.strerror}")
 
     def _route(self, can_id: int) -> Route:
         if len(self._routes) >= _MOST_ROUTES:
@@ -306,7 +301,6 @@ class Switch(ABC):
             if self._paced:
                 load.occupy(self._now_s, route.bits[length])
         for peer in route.clients:
-            peer.delivered = True
             self._deliver(frame, peer)
         for node in route.nodes:
             if node is not source:

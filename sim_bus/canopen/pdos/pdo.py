@@ -227,6 +227,9 @@ def _sampler(identifier: int, entries: list[Entry]) -> Callable[[], bytes]:
     size = struct.calcsize(layout)
     frame = struct.Struct(f"{cob_ids.FRAME_HEAD}{layout[1:]}{8 - size}x")
     pack = frame.pack
+    if len(entries) == 3 and not any(entry.getter for entry in entries):
+        x, y, z = entries
+        return lambda: pack(identifier, size, x.value, y.value, z.value)
     reads = [_reader(entry) for entry in entries]
     if len(reads) == 1:
         (a,) = reads
