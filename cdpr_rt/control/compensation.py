@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
 from cdpr_rt.arrays import BoolArray, FloatArray
 from cdpr_rt.core.exchange import AxisFeedback, Setpoint
-from cdpr_rt.jit import jit
+from cdpr_rt.jit import bound, jit
 
 TWO_PI = 2.0 * math.pi
 
@@ -189,6 +191,9 @@ class Compensation:
         """Which axes have a profile, (n,); until its index is known nothing comes of it."""
         self._period_s = period_s
         self._fade_step = min(1.0, period_s / _FADE_IN_S)
+        self._taken: tuple[Any, Any, Any] = (None, None, None)
+        """Whose arrays the kernel is bound to."""
+        self._torque: Callable[[], None]
 
     def reset(self) -> None:
         """Fade in anew and forget the deviation from the set-point."""
@@ -217,8 +222,12 @@ class Compensation:
 
     def torque(self, feedback: AxisFeedback, setpoint: Setpoint, out: FloatArray) -> None:
         """Write the torque to add, (n,), Nm."""
-        _torque(
-            self._tables, self._means, self._parameters, self._state, self._period_s,
-            self._fade_step, feedback.position_rad, feedback.index_rad, feedback.index_known,
-            setpoint.position_rad, setpoint.velocity_rad_s, out, self.cogging_Nm,
-        )  # fmt: skip
+        taken = self._taken
+        if feedback is not taken[0] or setpoint is not taken[1] or out is not taken[2]:
+            self._taken = feedback, setpoint, out
+            self._torque = bound(
+                _torque, self._tables, self._means, self._parameters, self._state, self._period_s,
+                self._fade_step, feedback.position_rad, feedback.index_rad, feedback.index_known,
+                setpoint.position_rad, setpoint.velocity_rad_s, out, self.cogging_Nm,
+            )  # fmt: skip
+        self._torque()

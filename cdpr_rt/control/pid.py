@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.control.compensation import Compensation
 from cdpr_rt.core.exchange import AxisFeedback, Setpoint
-from cdpr_rt.jit import jit
+from cdpr_rt.jit import bound, jit
 
 # the last state of an axis: whether its controller runs, or what its integral begins with
 _RUNNING, _BUMPLESS_START = 1.0, 2.0
@@ -132,6 +134,9 @@ class Pid:
         self.effort_Nm = np.zeros(len(gains))
         self.compensation_Nm = self.motor_loss_Nm = np.zeros(len(gains))
         self.cogging_Nm = np.zeros(len(gains)) if compensation is None else compensation.cogging_Nm
+        self._taken: tuple[Any, Any, Any] = (None, None, None)
+        """Whose arrays the kernel is bound to."""
+        self._update: Callable[[], None]
 
     def reset(self) -> None:
         """Start anew: integral and slope zero."""
@@ -153,8 +158,12 @@ class Pid:
         """Write the limited sum of PID and compensation."""
         if self._compensation is not None:
             self._compensation.torque(feedback, setpoint, self.compensation_Nm)
-        _update(
-            self._gains, self._limit, self._period_s, self._state, feedback.position_rad,
-            setpoint.position_rad, setpoint.velocity_rad_s, self.compensation_Nm, self.effort_Nm,
-            torque_Nm,
-        )  # fmt: skip
+        taken = self._taken
+        if feedback is not taken[0] or setpoint is not taken[1] or torque_Nm is not taken[2]:
+            self._taken = feedback, setpoint, torque_Nm
+            self._update = bound(
+                _update, self._gains, self._limit, self._period_s, self._state,
+                feedback.position_rad, setpoint.position_rad, setpoint.velocity_rad_s,
+                self.compensation_Nm, self.effort_Nm, torque_Nm,
+            )  # fmt: skip
+        self._update()

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Any
+
 import numpy as np
 
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.core.exchange import AxisFeedback, Setpoint
-from cdpr_rt.jit import jit
+from cdpr_rt.jit import bound, jit
 
 
 @jit
@@ -38,13 +41,20 @@ class Proportional:
         self._limit = np.array(limit_Nm, float)
         self.effort_Nm = np.zeros_like(self._gain)
         self.compensation_Nm = self.motor_loss_Nm = self.cogging_Nm = np.zeros_like(self._gain)
+        self._taken: tuple[Any, Any, Any] = (None, None, None)
+        """Whose arrays the kernel is bound to."""
+        self._update: Callable[[], None]
 
     def reset(self) -> None:
         """Nothing is remembered."""
 
     def update(self, feedback: AxisFeedback, setpoint: Setpoint, torque_Nm: FloatArray) -> None:
         """Write the limited proportional torque."""
-        _update(
-            self._gain, self._limit, feedback.position_rad, setpoint.position_rad, self.effort_Nm,
-            torque_Nm,
-        )  # fmt: skip
+        taken = self._taken
+        if feedback is not taken[0] or setpoint is not taken[1] or torque_Nm is not taken[2]:
+            self._taken = feedback, setpoint, torque_Nm
+            self._update = bound(
+                _update, self._gain, self._limit, feedback.position_rad, setpoint.position_rad,
+                self.effort_Nm, torque_Nm,
+            )  # fmt: skip
+        self._update()

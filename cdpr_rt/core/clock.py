@@ -291,7 +291,8 @@ class LockstepClock(Clock):
     def run_tasks(self) -> None:
         """See `Clock.run_tasks`; the next cycle is not to be early either."""
         super().run_tasks()
-        self._await_wall()
+        if self._real_time:
+            self._await_wall()
 
     def _await_wall(self) -> None:
         """Wait until the wall clock has come as far; little of what it is ahead is made up for."""

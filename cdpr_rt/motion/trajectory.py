@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Protocol
 
 import numpy as np
 
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.core.exchange import Setpoint
-from cdpr_rt.jit import jit
+from cdpr_rt.jit import bound, jit
 
 
 @jit
 def _fill(
-    t: float,
     start: FloatArray,
     velocity: FloatArray,
     ramp_s: float,
@@ -21,6 +21,7 @@ def _fill(
     position: FloatArray,
     speed: FloatArray,
     acceleration: FloatArray,
+    t: float,
 ) -> None:
     end = cruise_s + 2.0 * ramp_s
     # travelled and shape are in units of the cruising velocity: one profile serves all axes
@@ -76,13 +77,17 @@ class TrapezoidalMove:
         self.cruise_s = float(cruise_s)
         self.ramp_s = float(ramp_s)
         self.duration_s = self.cruise_s + 2.0 * self.ramp_s + settle_s
+        self._filled: Setpoint | None = None
+        """Whose arrays the kernel is bound to."""
+        self._fill: Callable[[float], None]
 
     def fill(self, time_s: float, setpoint: Setpoint) -> None:
         """Write the set-point at `time_s` after the move's start."""
-        _fill(
-            time_s, self.start_rad, self.velocity_rad_s, self.ramp_s, self.cruise_s,
-            *setpoint.arrays,
-        )  # fmt: skip
+        if setpoint is not self._filled:
+            self._filled = setpoint
+            own = self.start_rad, self.velocity_rad_s, self.ramp_s, self.cruise_s
+            self._fill = bound(_fill, *own, *setpoint.arrays, then=(0.0,))
+        self._fill(time_s)
 
     def end_rad(self) -> FloatArray:
         """Return where the move ends, (n,)."""

@@ -107,7 +107,8 @@ class AxisBuses:
         Where one of several fails, `receive` raises, once the others have answered.
         """
         self._failure = None
-        self._sync_s = self.clock.now_s
+        if not self.lockstep:
+            self._sync_s = self.clock.now_s
         if self._single_group is not None:
             self._failed[0] = False
             try:
