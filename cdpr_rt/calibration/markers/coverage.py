@@ -85,7 +85,9 @@ def coverage(sightings: Sequence[Sighting], placed: Sequence[int] = ()) -> Cover
     return Coverage(
         *(len(sightings), ids, islands, share, unseen, seldom, useless),
         tuple(
-            _advice(islands, unseen, seldom, useless, len(sightings)) + _strange(read - set(ids))
+            _mirrored(sightings, ids)
+            + _advice(islands, unseen, seldom, useless, len(sightings))
+            + _strange(read - set(ids))
         ),
     )
 
@@ -125,6 +127,14 @@ def _advice(
             "how markers lie: put sheets closer together, or go higher"
         )
     return said
+
+
+def _mirrored(sightings: Sequence[Sighting], ids: Sequence[int]) -> list[str]:
+    """Return what is to be said where more markers are seen mirrored than as they should be."""
+    mirrored = sorted({marker for one in sightings for marker in one.mirrored})
+    if len(mirrored) <= len(ids):
+        return []
+    return [f"{listed(mirrored)} read as mirror images: are all sheets, or the images, so?"]
 
 
 def _strange(ids: set[int]) -> list[str]:

@@ -90,12 +90,24 @@ def test_intrinsics_of_another_lens_fail_with_the_reason(photos: Path, tmp_path:
     assert "has 480 x 384 pixels, the intrinsics are for 640 x 384" in done.stderr
 
 
+def test_images_that_are_mirrored_are_said_to_be(photos: Path, tmp_path: Path) -> None:
+    for path in photos.glob("*.png"):
+        image = cv2.imread(str(path), cv2.IMREAD_GRAYSCALE)
+        cv2.imwrite(str(tmp_path / path.name), image[:, ::-1])
+    done = cdpr_here(
+        *("markers", "map", tmp_path, "--size-mm", "150", "--camera", photos / "camera.toml")
+    )
+    assert done.returncode == 2
+    assert "7 read as mirror images: are all sheets, or the images, so?" in done.stderr
+
+
 @pytest.mark.parametrize(
     ("words", "said"),
     [
         (("map", "{photos}"), "--size-mm is missing"),
         (("map", "{photos}", "--size-mm", "150", "--dictionary", "4x4"), "did you mean"),
         (("map", "{photos}", "--size-mm", "150", "--reference", "77"), "is not in the map"),
+        (("map", "{photos}", "--size-mm", "150", "--dictionary", "6X6_50"), "some of 4X4_50"),
         (("map", "/nowhere", "--size-mm", "150"), "a folder with images"),
         (("print", "0-3", "--size-mm", "190"), "150 mm is the largest"),
         (("print", "3-x", "--size-mm", "100"), "allowed: such as 0-39"),

@@ -18,7 +18,7 @@ from cdpr_profiles import Robot
 from cdpr_profiles.calibration.geometry import geometry_sha256, write_text
 from cdpr_profiles.errors import ProfileError
 from cdpr_profiles.reading.reader import Profile, read_json_model
-from cdpr_rt.calibration.markers.coverage import coverage
+from cdpr_rt.calibration.markers.coverage import coverage, listed
 from cdpr_rt.calibration.outcome import Outcome
 from cdpr_rt.calibration.readings.camera_data import CameraSetup
 from cdpr_rt.calibration.readings.data import CalibrationData, Numbers, load_data
@@ -350,9 +350,11 @@ class _Measuring:
         if seen is None or setup is None or seen.problem is not None:
             return  # what is wrong with an image is told already; the next one may be better
         if not seen.markers:
+            why = "was another set printed, or does the camera not look at the sheets?"
+            if seen.mirrored:
+                why = f"{listed(seen.mirrored)} read as mirror images: are all printed so?"
             raise WorkFailedError(
-                f"at home the camera sees no marker of {setup.sheets.dictionary}: was another set "
-                "printed, or does the camera not look at the sheets?"
+                f"at home the camera sees no marker of {setup.sheets.dictionary}: {why}"
             )
         self._out.note(f"at home the camera sees {len(seen.markers)} markers")
 

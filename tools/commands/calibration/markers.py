@@ -7,6 +7,7 @@ from typing import Annotated, Any
 
 import numpy as np
 import typer
+from numpy.typing import NDArray
 
 from cdpr_drivers.camera.camera import Image
 from cdpr_drivers.camera.folder_camera import FolderCamera
@@ -18,6 +19,7 @@ from cdpr_rt.calibration.markers.coverage import Coverage
 from cdpr_rt.calibration.markers.geometry.rotations import logarithms
 from cdpr_rt.calibration.markers.images.charuco import Board
 from cdpr_rt.calibration.markers.images.detection import MarkerDetector
+from cdpr_rt.calibration.markers.images.dictionaries import dictionary_shown
 from cdpr_rt.calibration.markers.map_fit import MapFit, fit_map, verdict
 from cdpr_rt.calibration.markers.sighting import Sighting
 from cdpr_rt.core.clock import PacedClock
@@ -155,7 +157,19 @@ def _sightings(
                 mirrors = len(found) % every == 0
                 found.append(detector.detect(image.pixels, image.name, mirrors=mirrors))
                 advance(float(len(found)))
+                last = image.pixels
+    if not any(one.corners_px or one.mirrored for one in found):
+        _require_set(last, sheets.dictionary)
     return found
+
+
+def _require_set(pixels: NDArray[np.uint8], dictionary: str) -> None:
+    """Raise BadInputError where an image shows markers of another set."""
+    shown = dictionary_shown(pixels)
+    if shown is not None and shown != dictionary:
+        raise BadInputError(
+            f"--dictionary {dictionary}: no image shows a marker of it; they show some of {shown}"
+        )
 
 
 def _require_size(image: Image, intrinsics: CameraIntrinsics) -> None:

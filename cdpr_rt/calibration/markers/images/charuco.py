@@ -13,10 +13,13 @@ from numpy.typing import NDArray
 
 from cdpr_profiles.devices.camera import CameraIntrinsics
 from cdpr_rt.arrays import FloatArray
-from cdpr_rt.calibration.markers.images.dictionaries import opencv_dictionary
+from cdpr_rt.calibration.markers.images.detection import MarkerDetector
+from cdpr_rt.calibration.markers.images.dictionaries import dictionary_shown, opencv_dictionary
 from cdpr_rt.errors import ControlError, InvalidRequestError
 
 _LEAST_CORNERS, _LEAST_VIEWS, _ENOUGH_VIEWS = 8, 5, 15
+_LOOKED_AT = 3
+"""Images, for why there is no board in any."""
 _CELLS = 4
 _ENOUGH_CELLS = 0.8
 _TILT_deg, _TILTED_VIEWS = 25.0, 5
@@ -88,9 +91,10 @@ def fit_intrinsics(images: Sequence[tuple[str, NDArray[np.uint8]]], board: Board
     views, left_out = _views(images, board)
     if len(views) < _LEAST_VIEWS:
         why = f"; left out: {'; '.join(left_out[:3])}" if left_out else ""
+        cause = "" if views else "".join(f"; {text}" for text in _why_none(images, board))
         raise CalibrationError(
             f"{len(views)} images show the board; {_LEAST_VIEWS} are the least, "
-            f"{_ENOUGH_VIEWS} enough{why}"
+            f"{_ENOUGH_VIEWS} enough{cause}{why}"
         )
     height, width = images[0][1].shape
     found = _solved(views, (width, height))
@@ -144,6 +148,23 @@ def _views(
             continue
         views.append((name, on_board, in_image))
     return views, left_out
+
+
+def _why_none(images: Sequence[tuple[str, NDArray[np.uint8]]], board: Board) -> list[str]:
+    """Return why no image shows the board, as far as the first images tell; often nothing."""
+    detector = MarkerDetector(board.dictionary)
+    sights = [detector.detect(pixels, name, mirrors=True) for name, pixels in images[:_LOOKED_AT]]
+    read = max((one.corners_px for one in sights), key=len, default={})
+    mirrored = max((one.mirrored for one in sights), key=len, default=())
+    if len(mirrored) > len(read):
+        return [f"{len(mirrored)} markers read as mirror images: is the board, or the image, so?"]
+    if len(read) >= _LEAST_CORNERS // 2:
+        return [
+            f"{len(read)} markers of {board.dictionary} are read, but no board of {board.columns} "
+            f"columns and {board.rows} rows has them so: were they exchanged?"
+        ]
+    shown = {dictionary_shown(pixels) for _, pixels in images[:_LOOKED_AT]}
+    return [f"markers of {name} are read, none of {board.dictionary}" for name in shown if name]
 
 
 def _solved(views: Sequence[_View], size: tuple[int, int]) -> Any:

@@ -115,6 +115,24 @@ def test_intrinsics_of_a_board_are_the_true_ones_within_what_they_say() -> None:
         fit_intrinsics([images[0], ("b", images[1][1][1:])], Board())
 
 
+@pytest.mark.parametrize(
+    ("board", "flipped", "said"),
+    [
+        (Board(dictionary="6X6_100"), False, "markers of 5X5_50 are read, none of 6X6_100"),
+        (Board(6, 9), False, "no board of 6 columns and 9 rows has them so: were they exchanged"),
+        (Board(), True, "markers read as mirror images: is the board, or the image, so"),
+    ],
+)
+def test_a_board_that_is_another_than_told_is_said_to_be(
+    board: Board, flipped: bool, said: str
+) -> None:
+    camera = SimCamera(plant(grids=(), board=BoardPlant(), samples=16))
+    states = random_poses(Box((-0.02, -0.02, 0.4), (0.02, 0.02, 0.45), 15.0), 5, 8)
+    images = [camera.grab(state)[:, :: -1 if flipped else 1] for state in states]
+    with pytest.raises(CalibrationError, match=f"0 images show the board.*{said}"):
+        fit_intrinsics([(f"{k}", np.ascontiguousarray(one)) for k, one in enumerate(images)], board)
+
+
 @pytest.mark.parametrize("name", ["DICT_6X6_250", "6x6_250", "nonsense"])
 def test_a_set_of_markers_that_opencv_lacks_is_told_with_what_is_meant(name: str) -> None:
     said = "did you mean '6X6_250'" if "6" in name else "allowed: 4X4_50, 4X4_100"
