@@ -25,6 +25,11 @@ class OutsidePose(Profile):
     rotation_std_rad: float | None = None
     """About each axis."""
 
+    def with_truth_of(self, other: OutsidePose) -> OutsidePose:
+        """Return this with what was true at another time."""
+        of_other = ("true_position_m", "true_rotation")
+        return self.model_copy(update={name: getattr(other, name) for name in of_other})
+
 
 class OutsidePoses(Profile):
     """Of all poses of a calibration's data, in their order."""

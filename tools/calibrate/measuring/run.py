@@ -312,7 +312,8 @@ class _Measuring:
         try:
             if longer_s := _scanned_s(count - 1):
                 operator.stay(longer_s)
-                outside = operator.outside()
+                # a cable may slip or creep meanwhile: what was true counts when lengths were read
+                outside = operator.outside().with_truth_of(outside)
         finally:  # the pose is read, whatever ends the stay
             self._kept.keep(self._measured, self._restarts, outside)
         operator.number = count + 1

@@ -249,6 +249,34 @@ def test_the_scanner_takes_its_time_at_the_first_pose_and_at_those_held_out(
     assert longer[0][1] > max(s for _, s in longer[1:])
 
 
+def test_what_was_true_is_that_of_the_reading_though_the_scanner_measures_longer(
+    tmp_path: Path, rigs: Callable[..., list[Rig]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    rigs()
+    stay, outside = Rig.stay, Rig.outside
+
+    def slips(rig: Rig, seconds: float) -> None:
+        stay(rig, seconds)
+        if seconds != SETTLE_S:
+            rig.here = rig.here + 0.01
+
+    def scanned(rig: Rig) -> OutsidePose:
+        seen = outside(rig)
+        return seen.model_copy(update={"position_m": seen.true_position_m})
+
+    monkeypatch.setattr(Rig, "stay", slips)
+    monkeypatch.setattr(Rig, "outside", scanned)
+    data = begin(tmp_path, settings())
+    kept = OutsidePoses.load_file(tmp_path / run.OUTSIDE).poses
+    later = []
+    for reading, other in zip(data.poses, kept, strict=True):
+        assert other.true_position_m[:2] == pytest.approx(reading.target[:2])
+        assert other.position_m is not None
+        later.append(other.position_m[0] - other.true_position_m[0])
+    assert np.flatnonzero(later).tolist() == [0, 4, 9, 14]
+    assert np.array(later)[[0, 4, 9, 14]] == pytest.approx(0.01)
+
+
 def test_a_pose_that_is_read_is_kept_whatever_ends_the_scanner_s_longer_stay(
     tmp_path: Path, rigs: Callable[..., list[Rig]], monkeypatch: pytest.MonkeyPatch
 ) -> None:
