@@ -9,7 +9,7 @@ import numpy as np
 
 from cdpr_profiles import Robot
 from cdpr_rt.arrays import FloatArray
-from cdpr_rt.calibration.camera.camera_faults import map_faults, told_right
+from cdpr_rt.calibration.camera.camera_faults import map_faults, moved_or_slipped, told_right
 from cdpr_rt.calibration.camera.camera_start import camera_start
 from cdpr_rt.calibration.estimation.faults import Fault, fit_without_faults, parameter_faults
 from cdpr_rt.calibration.estimation.fit import Fit
@@ -114,7 +114,7 @@ def _with_camera(
     of_map = map_faults(start.map, laid_out(images.sightings, images.setup.sheets.placed))
     told = {(one.kind, one.cable) for one in wrong}
     others = [one for one in parameter_faults(found) if (one.kind, one.cable) not in told]
-    faults = [*of_map, *readings, *wrong, *others]
+    faults = [*of_map, *readings, *moved_or_slipped(readings), *wrong, *others]
     return _Whole(found, weighed, faults, start.seen, start.map, start.known_room)
 
 

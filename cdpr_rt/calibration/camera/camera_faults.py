@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
@@ -25,6 +26,8 @@ _LOOSE_LENS = (20.0, 20.0, 0.1, 0.1, 0.005, 0.005, 0.1)
 """Standard deviations, of the lens in px and of k1, k2, p1, p2, k3, of what is set free."""
 _COUNTS: Final[dict[FaultKind, int]] = {"size": 1, "drum": 0, "lens": 9}
 """Causes, and how many numbers each sets free; 0 for one of each cable."""
+_AT_ONCE = 3
+"""Cables that slip from one pose to the next, of which it is asked whether they did."""
 _SURE = 9.0
 """By how much one explanation has to fit better than others, in the sum of squares."""
 
@@ -38,6 +41,24 @@ def map_faults(found: MapFit, sightings: Sequence[Sighting]) -> list[Fault]:
     ]
     texts = [*misfits(found.bundle), *warnings(sightings, found.dropped)]
     return faults + [Fault("marker", -1, -1, 0.0, text) for text in texts]
+
+
+def moved_or_slipped(faults: Sequence[Fault]) -> list[Fault]:
+    """Return what is to be said where several cables are off from one pose on.
+
+    They seldom slip at once. A camera that was moved on its platform looks alike: what its images
+    say of all later poses contradicts the lengths, and offsets of some cables explain most of it.
+    """
+    at = Counter(fault.pose for fault in faults if fault.kind == "jump")
+    return [
+        Fault(
+            "camera", -1, pose, 0.0,
+            f"{UNDECIDED}{cables} cables are off from pose {pose + 1} on: either they slipped "
+            "together, or the camera was moved on its platform; look at both, and measure anew",
+        )
+        for pose, cables in at.items()
+        if cables >= _AT_ONCE
+    ]  # fmt: skip
 
 
 def told_right(geometry: CableGeometry, found: Fit, first: MapFit) -> tuple[Fit, list[Fault]]:

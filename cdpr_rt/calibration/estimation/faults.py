@@ -15,7 +15,7 @@ from cdpr_rt.calibration.estimation.residuals import length_std_m
 from cdpr_rt.calibration.readings.observations import Observations
 
 FaultKind = Literal[
-    "slack", "outlier", "jump", "drum", "elongation", "image", "marker", "lens", "size"
+    "slack", "outlier", "jump", "drum", "elongation", "image", "marker", "camera", "lens", "size"
 ]
 _OUTLIER, _JUMP = 25.0, 40.0
 """By how much leaving it out should lower the sum of squared residuals, to first order."""
@@ -93,10 +93,10 @@ def fit_without_faults(
     least = _LEAST_GAIN * max(found.variance_factor, 1.0)
     sure = [fault for fault, gain in zip(left_out, gains, strict=True) if gain > least]
     if len(sure) < len(left_out):
-        kept = replace(seen, start=found.poses)
-        for fault in sure:
-            kept = _without(kept, fault)
-        found = fit(geometry, kept, start=found.geometry, camera=found.camera)
+        found = _only_without(geometry, seen, sure, found)
+    some = [fault for fault in sure if fault.kind != "jump" or _is_off(fault, found)]
+    if len(some) < len(sure):
+        sure, found = some, _only_without(geometry, seen, some, found)
     faults += [_with_size(fault, found) for fault in sure]
     return found, faults + parameter_faults(found)
 
@@ -128,6 +128,23 @@ def _without(seen: Observations, fault: Fault) -> Observations:
     used = seen.used.copy()
     used[fault.pose, fault.cable] = False
     return replace(seen, used=used)
+
+
+def _only_without(
+    geometry: CableGeometry, seen: Observations, faults: list[Fault], found: Fit
+) -> Fit:
+    """Return the fit without these faults, from another one on."""
+    seen = replace(seen, start=found.poses)
+    for fault in faults:
+        seen = _without(seen, fault)
+    return fit(geometry, seen, start=found.geometry, camera=found.camera)
+
+
+def _is_off(fault: Fault, found: Fit) -> bool:
+    """Return whether a jump still has a size: one found later may have been all of it."""
+    k = found.seen.jumps.index((fault.cable, fault.pose))
+    variance = found.covariance[found.geometry.size + k, found.geometry.size + k]
+    return bool(found.jumps_m[k] ** 2 > _FAR**2 * variance)
 
 
 def _with_size(fault: Fault, found: Fit) -> Fault:
