@@ -13,8 +13,12 @@ def brief(text: str, most: int = _MOST_CHARS) -> str:
 
 
 def value_text(value: object) -> str:
-    """Return a value for use in a message, cut to 60 characters."""
-    return brief(repr(value), 60)
+    """Return a value for use in a message, arrays in brackets, cut to 60 characters."""
+    return brief(repr(_as_lists(value)), 60)
+
+
+def _as_lists(value: object) -> object:
+    return [_as_lists(entry) for entry in value] if isinstance(value, list | tuple) else value
 
 
 class ProfileError(Exception):

@@ -8,10 +8,13 @@ from typing import Annotated, Any, Final, Literal, get_args
 
 from pydantic import AfterValidator, BeforeValidator, Field
 
+from cdpr_profiles.errors import value_text
 from cdpr_profiles.reading.reader import Profile
 
 FURTHEST_m = 1000.0
 """Largest coordinate that is allowed."""
+WIDEST_m: Final = 300.0
+"""Largest distance of two exit points; most stadiums are less wide, most frames in mm are more."""
 
 
 def _in_metres(value: float) -> float:
@@ -30,8 +33,17 @@ def _direction(values: tuple[float, ...]) -> tuple[float, ...]:
     return tuple(value / size for value in values)
 
 
-def _one_or_several(value: Any) -> Any:
-    return (value,) if isinstance(value, int | float) and not isinstance(value, bool) else value
+def _one_or_several(allowed: str) -> BeforeValidator:
+    """Take a single number as an array of one, and refuse matrices and texts by what is allowed."""
+
+    def check(value: Any) -> Any:
+        if isinstance(value, int | float) and not isinstance(value, bool):
+            return (value,)
+        if not isinstance(value, list | tuple) or any(isinstance(v, list | tuple) for v in value):
+            raise ValueError(f"value {value_text(value)}; allowed: {allowed}")
+        return value
+
+    return BeforeValidator(check)
 
 
 _Coordinate = Annotated[float, AfterValidator(_in_metres)]
@@ -40,7 +52,14 @@ Direction = Annotated[
     tuple[float, ...], Field(min_length=2, max_length=3), AfterValidator(_direction)
 ]
 """A direction in the room; its length does not matter, and is 1 once read."""
-_Numbers = Annotated[tuple[float, ...], BeforeValidator(_one_or_several)]
+_Inertia = Annotated[
+    tuple[float, ...],
+    _one_or_several("six numbers Ixx Iyy Izz Ixy Ixz Iyz, not a matrix; in a plane one number"),
+]
+_Rotation = Annotated[
+    tuple[float, ...],
+    _one_or_several("three numbers, a rotation vector, not a matrix; in a plane one angle"),
+]
 """A single number is an array of one."""
 
 TensionMethod = Literal[
@@ -87,11 +106,11 @@ class PlatformFile(Profile):
     speed_m_s: float = Field(gt=0, le=20)
     acceleration_m_s2: float = Field(gt=0, le=100)
     """Along each direction."""
-    inertia_kg_m2: _Numbers | None = None
+    inertia_kg_m2: _Inertia | None = None
     """Ixx Iyy Izz Ixy Ixz Iyz about the centre of mass in the platform's frame; one in a plane."""
     centre_of_mass_m: Point | None = None
     """In the platform's frame; its origin if left out."""
-    home_rotation_rad: _Numbers | None = None
+    home_rotation_rad: _Rotation | None = None
     """Rotation vector from the room's axes to the platform's at home, an angle in a plane."""
     workspace_angle_rad: float = Field(default=0.0, ge=0, lt=math.pi)
     """Largest angle from the orientation at home in which targets may lie."""

@@ -6,9 +6,8 @@ from itertools import combinations
 
 import numpy as np
 
-from cdpr_profiles.platform import DIRECTIONS, PlatformFile, controlled_by_default
+from cdpr_profiles.platform import DIRECTIONS, PlatformFile, WIDEST_m, controlled_by_default
 
-_WIDEST_m = 100.0
 _LEAST_ARM_m = 0.01
 """Anchor points nearer together than this are meant to be one, or are in another unit."""
 _ROUNDING = 1e-6
@@ -85,9 +84,9 @@ def _size_faults(
 ) -> Iterator[tuple[str, str]]:
     """Yield points, rotations and inertias of a size that no robot has, as in another unit."""
     frame_m, platform_m = _widest(exits), _widest(anchors)
-    if frame_m > _WIDEST_m:
+    if frame_m > WIDEST_m:
         problem = (
-            f"exit points are up to {frame_m:g} m apart; allowed: up to {_WIDEST_m:g} m "
+            f"exit points are up to {frame_m:g} m apart; allowed: up to {WIDEST_m:g} m "
             "(are they in millimetres?)"
         )
         yield "axes[0].exit_point_m", problem

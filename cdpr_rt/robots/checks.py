@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from cdpr_profiles import ProfileError, Robot
+from cdpr_profiles.limits.motor_bounds import MOST_SPEED_RATIO
 from cdpr_profiles.platform import DIRECTIONS, Platform
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.core.limits import Limits
@@ -25,6 +26,8 @@ _LONGEST_PERIOD_s = 0.005
 """Of a cycle, with which the platform's control is still stiff enough to overcome friction."""
 _NEAREST_m = 0.1
 """An anchor point closer than this to an exit point is about to be pulled into it."""
+_ALIKE_m = 0.01
+"""Two cables nearer to each other at both their ends pull alike: an axis was described twice."""
 _SLOW_Hz = 0.5
 """Of a loop's mode: it takes 2.3 s to come within 2 % of where it goes."""
 _RUBS_SHARE = 0.06
@@ -57,7 +60,7 @@ def findings(robot: Robot, limits: Limits | None = None) -> list[Finding]:
     if not any(finding.impossible for finding in found):
         # with points that cannot be meant, tensions and torques only repeat it
         found += [*_tensions(statics), *_motors(robot, limits, statics)]
-        found += _lengths(robot, limits, statics)
+        found += [*_speeds(robot, limits, statics), *_lengths(robot, limits, statics)]
         if statics.turns:
             found += _turning(statics)
         found += [*_loop(robot, statics), *_swinging(robot.platform), *_standing(statics)]
@@ -91,14 +94,19 @@ def _shape(robot: Robot, statics: PlatformStatics) -> Iterator[Finding]:
     a, b, n = statics.exits_m, statics.anchors_m, len(robot.axes)
     apart = [(i, j, float(np.linalg.norm(a[i] - a[j]))) for i in range(n) for j in range(i)]
     for i, j, distance in apart:
-        if distance < _NEAREST_m:
-            text = f"{distance:.3g} m from that of axes[{j}]; allowed: {_NEAREST_m:g} m and more"
+        if max(distance, float(np.linalg.norm(b[i] - b[j]))) < _ALIKE_m:
+            text = f"{distance:.3g} m from that of axes[{j}], and so are their anchor points; "
+            text += "allowed: one cable in one place"
             yield Finding(f"axes[{i}].exit_point_m", text, impossible=True)
     span = max(distance for _, _, distance in apart)
+    if span < _NEAREST_m:
+        text = f"exit points are up to {span:.3g} m apart; allowed: {_NEAREST_m:g} m and more"
+        yield Finding("axes[0].exit_point_m", text, impossible=True)
+        return
     wide = max(float(np.linalg.norm(b[i] - b[j])) for i in range(n) for j in range(i))
     if wide > _WIDE_ARMS * span:
         text = (
-            f"anchor points are up to {wide:.3g} m apart, exit points {span:.3g} m; allowed: half "
+            f"anchor points are up to {wide:.4g} m apart, exit points {span:.4g} m; allowed: half "
             "of that (is one of them in millimetres?)"
         )
         yield Finding("axes[0].anchor_point_m", text, impossible=True)
@@ -129,13 +137,11 @@ def _tensions(statics: PlatformStatics) -> Iterator[Finding]:
     if taken < 1.0:
         # 99.9 % is not all
         text = f"in {math.floor(100 * taken)} % of the box targets are taken; "
-        smaller = statics.largest_box(statics.box) if platform.is_planar else None
-        if smaller is not None:
+        if (smaller := statics.largest_box(statics.box)) is not None:
             low, high = point_text(smaller.low_m), point_text(smaller.high_m)
-            text += f"in all of {low} to {high} m they would be"
-        else:
-            worst = np.unravel_index(moving_N.argmin(), moving_N.shape)
-            text += why_not_held(statics, points[worst[1:]], turns[worst[0]])
+            text += f"in all of {low} to {high} m they would be; "
+        worst = np.unravel_index(moving_N.argmin(), moving_N.shape)
+        text += why_not_held(statics, points[worst[1:]], turns[worst[0]])
         yield Finding("platform.workspace_min_m", text, impossible=taken == 0.0)
 
 
@@ -148,7 +154,6 @@ def standing_tensions_N(statics: PlatformStatics) -> FloatArray:
 
 
 def _motors(robot: Robot, limits: Limits, statics: PlatformStatics) -> Iterator[Finding]:
-    platform = statics.platform
     arm_m = np.array([abs(axis.winch.cable_m_per_motor_rad) for axis in robot.axes])
     allowed_Nm = np.broadcast_to(limits.torque_Nm, arm_m.shape)
     needed_Nm = statics.high_N * arm_m
@@ -170,23 +175,41 @@ def _motors(robot: Robot, limits: Limits, statics: PlatformStatics) -> Iterator[
             "smaller box or a larger gear helps"
         )
         yield Finding("platform.workspace_max_m", text, impossible=False)
+
+
+def _speeds(robot: Robot, limits: Limits, statics: PlatformStatics) -> Iterator[Finding]:
+    platform, winches = statics.platform, [axis.winch for axis in robot.axes]
+    arm_m = np.array([abs(winch.cable_m_per_motor_rad) for winch in winches])
     # each direction has the speed of its own, so that all together are faster along a diagonal
-    together = math.sqrt(len(platform.home_m))
-    turning_m_s = 0.0
+    cable_m_s = math.sqrt(len(platform.home_m)) * platform.speed_m_s
+    turning = ""
     if platform.workspace_angle_rad > 0.0:
-        arm = float(np.linalg.norm(statics.anchors_m, axis=1).max())
+        reach_m = float(np.linalg.norm(statics.anchors_m, axis=1).max())
         angles = len(platform.controlled) - len(platform.home_m)
-        turning_m_s = math.sqrt(angles) * platform.angular_speed_rad_s * arm
-    cable_m_s = together * platform.speed_m_s + turning_m_s
-    most_m_s = arm_m * np.broadcast_to(limits.speed_rad_s, arm_m.shape)
-    i = int(most_m_s.argmin())
-    if cable_m_s > most_m_s[i]:
+        cable_m_s += math.sqrt(angles) * platform.angular_speed_rad_s * reach_m
+        turning = " and about all"
+    most_rad_s = np.broadcast_to(limits.speed_rad_s, arm_m.shape)
+    i = int((arm_m * most_rad_s).argmin())
+    share = float(arm_m[i] * most_rad_s[i]) / cable_m_s
+    if share < 1.0:
         text = (
-            f"value {platform.speed_m_s:g}; allowed: up to "
-            f"{max(most_m_s[i] - turning_m_s, 0.0) / together:.3g}, where axes[{i}] reaches the "
-            "limit of its speed"
+            f"value {platform.speed_m_s:g}; along{turning} all directions at once cables run at "
+            f"up to {cable_m_s:.3g} m/s, axes[{i}] at {share * cable_m_s:.3g} m/s by its limit of "
+            f"speed; allowed: up to {_rounded_down(share * platform.speed_m_s)}"
         )
+        if turning:
+            angular = _rounded_down(share * platform.angular_speed_rad_s)
+            text += f" with angular_speed_rad_s up to {angular}"
+        needed = cable_m_s / arm_m[i]
+        if needed <= MOST_SPEED_RATIO * winches[i].motor.rated_speed_rad_s:
+            text += f", or limits.speed_rad_s from {math.ceil(needed)}"
         yield Finding("platform.speed_m_s", text, impossible=True)
+
+
+def _rounded_down(value: float) -> str:
+    """Return a value to three digits, none of which makes it larger."""
+    digits = 2 - math.floor(math.log10(value))
+    return f"{math.floor(value * 10.0**digits) / 10.0**digits:g}"
 
 
 def _rubbing(robot: Robot, statics: PlatformStatics) -> Iterator[Finding]:

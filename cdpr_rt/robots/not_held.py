@@ -16,20 +16,20 @@ _FLAT = 1e-3
 """Share of their span by which points may be off a line or a plane and still count as in it."""
 _SHARES = np.concatenate([np.linspace(0.99, 0.03, 97), np.geomspace(0.0295, 1e-5, 120)])
 """Of a figure, tried one after the other from little to much less, until one helps."""
-_TIMES = np.geomspace(1.02, 20.0, 150)
+_TIMES = np.geomspace(1.02, 100.0, 230)
 """The same upwards."""
 
 
 def why_not_held(statics: PlatformStatics, position_m: FloatArray, turn_rad: FloatArray) -> str:
     """Return why the platform is not moved to a position (k,), turned (3,), and what would help."""
     where = f"at {point_text(position_m)} m"
-    reserve = float(statics.margin_N(position_m, 0, turn_rad))
+    reserve = float(statics.margin_N(position_m, 0.0, turn_rad))
     if turn_rad.any():
         where += f", turned {_turn(turn_rad)}"
     if not math.isfinite(reserve):
         return f"{where} {_singular(statics)}"
-    needed = ", ".join(f"{value:.0f}" for value in statics.tensions_N(position_m, turn_rad))
-    allowed = f"{statics.low_N.min():g} to {statics.model.left_by_torque_N.max():g} N are allowed"
+    needed = ", ".join(str(round(value)) for value in statics.tensions_N(position_m, turn_rad))
+    allowed = f"{statics.low_N.min():g} to {statics.model.left_by_torque_N.max():.4g} N are allowed"
     if reserve < 0.0:
         text = f"{where} the cables would need {needed} N; {allowed}"
     else:
@@ -77,12 +77,16 @@ def _what_helps(statics: PlatformStatics, position_m: FloatArray, turn_rad: Floa
     for share in _SHARES:
         if helps(replace(platform, mass_kg=share * mass_kg), low_N):
             return f"a platform of up to {share * mass_kg:.3g} kg is possible there"
-    for share in _SHARES:
-        if helps(platform, share * low_N):
-            return f"tension_min_N up to {share * low_N.min():.3g} is possible there"
-    for times in _TIMES:
-        if helps(replace(platform, mass_kg=times * mass_kg), low_N):
-            return f"a platform of {times * mass_kg:.3g} kg and more is possible there"
+    loose = next((share for share in _SHARES if helps(platform, share * low_N)), None)
+    heavier = (replace(platform, mass_kg=times * mass_kg) for times in _TIMES)
+    heavy = next((changed.mass_kg for changed in heavier if helps(changed, low_N)), None)
+    if heavy is not None:
+        text = f"a platform of {heavy:.3g} kg and more is possible there"
+        if loose is not None:
+            text += f", or tension_min_N up to {loose * low_N.min():.3g} with winches as small"
+        return text
+    if loose is not None:
+        return f"tension_min_N up to {loose * low_N.min():.3g} is possible there"
     turned = len(platform.controlled) > len(platform.home_m)
     others = ", or other anchor points, which turn it both ways about each axis"
     return f"only a place further inside the exit points helps{others if turned else ''}"
@@ -97,4 +101,4 @@ def _turn(turn_rad: FloatArray) -> str:
 
 def point_text(position_m: FloatArray | tuple[float, ...]) -> str:
     """Return a position (k,), m, in brackets, to the centimetre."""
-    return "(" + ", ".join(f"{value:.2f}" for value in position_m) + ")"
+    return "(" + ", ".join(f"{round(value, 2) + 0.0:.2f}" for value in position_m) + ")"

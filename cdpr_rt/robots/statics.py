@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +18,7 @@ from cdpr_rt.robots.interface import TensionOutcome
 from cdpr_rt.robots.kinematics.cable_kernel import ARC, CABLE_ROWS, FREE, run_poses
 from cdpr_rt.robots.kinematics.free_rotation_kernel import STEEPNESS, turn_to_rest
 from cdpr_rt.robots.kinematics.kinematics import PLANAR_POINT
-from cdpr_rt.robots.platform_model import PlatformModel, platform_model_of
+from cdpr_rt.robots.platform_model import PlatformModel, platform_model, platform_model_of
 from cdpr_rt.robots.rigid_body import home_rotation, in_space, orientations
 
 _MARGIN = 0.1
@@ -181,12 +181,31 @@ class PlatformStatics:
         return angle.reshape(np.shape(position_m)[:-1])
 
     def largest_box(self, inside: Box) -> Box | None:
-        """Return the largest box within `inside` that is all of targets, None where there is none.
+        """Return a box within `inside` that is all of targets if it is the box of targets, or None.
 
-        At all orientations. It is as exact as a grid of 45 by 45 points, 11 by 11 by 11 in space.
+        The largest at all orientations, as exact as a grid of 45 by 45 points, 11 by 11 by 11 in
+        space. The control's reserve follows from the middle of the box: while that of the box
+        found is more than was counted with, the largest within is looked for.
         """
-        fine = _FINE[len(inside.low_m)]
-        points = inside.grid(*(fine for _ in inside.low_m))
+        statics = self
+        while (box := statics.largest_held(inside)) is not None:
+            statics = self._with_box(box)
+            if bool(statics.is_target(statics._fine(box), self.orientations).all()):
+                return box
+            inside = box
+        return None
+
+    def _with_box(self, box: Box) -> PlatformStatics:
+        platform = replace(self.platform, workspace_min_m=box.low_m, workspace_max_m=box.high_m)
+        bounds = (self.low_N, self.high_N, self.model.left_by_torque_N)
+        return PlatformStatics(platform_model(platform, *bounds))
+
+    def _fine(self, box: Box) -> FloatArray:
+        return box.grid(*(_FINE[len(box.low_m)] for _ in box.low_m))
+
+    def largest_held(self, inside: Box) -> Box | None:
+        """Return the largest box within that is held with the reserve of this box of targets."""
+        points = self._fine(inside)
         good = self.is_target(points, self.orientations)
         best, found = 0, None
         for ends, rest in _slabs(good):

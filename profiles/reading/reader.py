@@ -139,6 +139,7 @@ def _faults(model: type[BaseModel], errors: list[ErrorDetails]) -> Iterable[tupl
                 yield dotted(error["loc"]), _count_fault(error, "{min_length} or more")
         elif error["type"] not in ("missing", "extra_forbidden"):
             allowed = error["msg"].removeprefix("Input should be ")
+            allowed = "an array" if error["type"] in ("tuple_type", "list_type") else allowed
             yield dotted(error["loc"]), f"value {value_text(error['input'])}; allowed: {allowed}"
 
 

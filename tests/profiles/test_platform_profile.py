@@ -118,6 +118,12 @@ HOME = "home_m = [0.0, 0.0, 0.5]"
          "platform.home_rotation_rad", "is it in degrees?"),
         (HALL, HOME, HOME + "\nhome_rotation_rad = 0.1", "platform.home_rotation_rad",
          "3 in space"),
+        (HALL, HOME, HOME + "\nhome_rotation_rad = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]",
+         "platform.home_rotation_rad", "value [[1, 0, 0], [0, 1, 0], [0, 0, 1]]; allowed: three n"),
+        (HALL, INERTIA, "inertia_kg_m2 = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]",
+         "platform.inertia_kg_m2", "allowed: six numbers Ixx Iyy Izz Ixy Ixz Iyz, not a matrix"),
+        (HALL, INERTIA, 'inertia_kg_m2 = "round"', "platform.inertia_kg_m2", "allowed: six num"),
+        (HALL, "exit_point_m = [", 'exit_point_m = 5.0 # ', "axes[0].exit_point_m", "an array"),
         (HALL, HOME, HOME + "\ncentre_of_mass_m = [0.0, 0.0, 500.0]",
          "platform.centre_of_mass_m", "not beyond the frame"),
         (HALL, "angle_rad = 0.2618", "angle_rad = 15.0", "platform.workspace_angle_rad",
@@ -139,7 +145,7 @@ HOME = "home_m = [0.0, 0.0, 0.5]"
          "no angle where all anchor points are alike"),
         (CAMERA, "mass_kg", "workspace_angle_rad = 0.1\nmass_kg", "platform.workspace_angle_rad",
          "allowed: 0 where no angle is controlled"),
-        (WALL, "exit_point_m = [-2.0, 3.0]", "exit_point_m = [-200.0, 3.0]", "axes[0].exit_point_m",
+        (WALL, "exit_point_m = [-2.0, 3.0]", "exit_point_m = [-350.0, 3.0]", "axes[0].exit_point_m",
          "are they in millimetres?"),
     ],
 )  # fmt: skip
@@ -152,6 +158,17 @@ def test_sizes_and_directions_that_no_robot_has_are_refused(
     with pytest.raises(ProfileError) as caught:
         load_robot(path)
     assert key == caught.value.key and problem in str(caught.value), caught.value
+
+
+def test_a_camera_over_a_stadium_is_a_robot(tmp_path: Path) -> None:
+    path = tmp_path / "stadium.toml"
+    path.write_text(
+        CAMERA.replace("3.0, 2.5, 4.0", "100.0, 70.0, 40.0").replace(
+            "3.0, -2.5, 4.0", "100.0, -70.0, 40.0"
+        )
+    )
+    platform = load_robot(path).platform
+    assert platform is not None and platform.exit_points_m[0] == (-100.0, 70.0, 40.0)
 
 
 def test_anchor_points_a_millimetre_apart_are_no_platform(tmp_path: Path) -> None:

@@ -89,16 +89,30 @@ def proposed_box(answers: Answers) -> tuple[tuple[float, ...], tuple[float, ...]
         least[-1] = 0.0  # all cables come from above: it is held down to the floor
     middle, size = 0.5 * (least + most), most - least
     around = Box(_point(least), _point(most))
-    found = _statics_of(answers, around).largest_box(around)
-    if found is not None:
+    statics = _statics_of(answers, around)
+    # where no box keeps the reserve of its own middle when turned, some of it can be reached
+    for found in (statics.largest_box(around), statics.largest_held(around)):
+        if found is None:
+            continue
         whole_m = found.high_m[-1] - found.low_m[-1]
         gap_m = max(_STAND_SHARE * whole_m, _lower_when_turned_m(answers, found))
         low = np.array(found.low_m) + gap_m * np.eye(len(size))[-1]
         low, high = np.ceil(100.0 * low) / 100.0, np.floor(100.0 * np.array(found.high_m)) / 100.0
         if (low < high).all():
-            return _bearable(answers, low, high)
+            return _settled(answers, Box(*_bearable(answers, low, high)))
     aside = np.maximum(0.1 * size, 0.05)
     return _point(middle - aside), _point(middle + aside)
+
+
+def _settled(answers: Answers, box: Box) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """Return the largest box within that is all of targets, to the cm, as its middle has moved."""
+    found = _statics_of(answers, box).largest_box(box) or box
+    low, high = np.ceil(100.0 * np.array(found.low_m)), np.floor(100.0 * np.array(found.high_m))
+    return (
+        (_point(low / 100.0), _point(high / 100.0))
+        if (low < high).all()
+        else (box.low_m, box.high_m)
+    )
 
 
 def _lower_when_turned_m(answers: Answers, box: Box) -> float:

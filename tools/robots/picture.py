@@ -18,6 +18,8 @@ from cdpr_rt.robots.statics import Box, PlatformStatics, statics_of, view_of
 
 _CABLE, _PLATFORM, _TARGETS = "#444444", "#d1581a", "#7a3fa0"
 _WIDE_in = 7.4
+_SEEN_THROUGH = 0.6
+"""Of the platform, which may cover all of the box of targets."""
 _NAMES = "xyz"
 
 # of their extent: exit points closer than this have names that would touch
@@ -32,7 +34,7 @@ _View = tuple[int, int]
 
 def draw_robot(robot: Robot, platform: Platform, path: Path) -> None:
     """Write the picture of a robot as PNG; raises OSError."""
-    figure_of(robot, platform).savefig(path, format="png")
+    figure_of(robot, platform).savefig(path, format="png", bbox_inches="tight")
 
 
 def figure_of(robot: Robot, platform: Platform) -> Figure:
@@ -117,7 +119,7 @@ def _draw_machine(ax: Axes, robot: Robot, platform: Platform, view: _View) -> No
     ax.plot([], [], color=_CABLE, lw=1.2, label="cables, at rest")
     ax.plot(*exits.T, "s", ms=6, color=_CABLE, label="exit points")
     around = np.argsort(np.arctan2(*(anchors - anchors.mean(axis=0)).T[::-1]))
-    ax.add_patch(Polygon(anchors[around], color=_PLATFORM, alpha=0.9, zorder=3))
+    ax.add_patch(Polygon(anchors[around], color=_PLATFORM, alpha=_SEEN_THROUGH, zorder=3))
     ax.plot(*home, "o", ms=3, color=_PLATFORM, label="platform, at rest", zorder=3)
     low = np.array(platform.workspace_min_m)[list(view)]
     width, height = np.array(platform.workspace_max_m)[list(view)] - low

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from cdpr_profiles import ProfileError, Winch, load_winch
+from cdpr_profiles.platform import WIDEST_m
 from cdpr_tools.robots.kinds import KINDS, RobotKind, kind_of
 
 Answers = dict[str, Any]
@@ -19,10 +20,6 @@ _COUNTS = ("no", "one", "two", "three", "four", "five", "six", "seven", "eight")
 _POINTS = {2: "-2, 3", 3: "-2, 1.5, 3"}
 _TORQUE_RESERVE = 0.85
 """Share of the torque that tensions may take; the rest is for friction and for control."""
-
-
-_FARTHEST_m = 100.0
-"""Of a point from the frame's zero."""
 
 
 class AnswerError(ValueError):
@@ -326,8 +323,8 @@ def _point(size: int) -> Callable[[str, Answers], tuple[float, ...]]:
             point = ()
         if len(point) != size:
             raise AnswerError(f"allowed: {_COUNTS[size]} numbers in m, such as `{_POINTS[size]}`")
-        if not all(abs(x) <= _FARTHEST_m for x in point):
-            raise AnswerError(f"allowed: up to {_FARTHEST_m:g} m each (in metres, not millimetres)")
+        if not all(abs(x) <= WIDEST_m for x in point):
+            raise AnswerError(f"allowed: up to {WIDEST_m:g} m each (in metres, not millimetres)")
         return point
 
     return read

@@ -274,4 +274,5 @@ def _sketch(robot: Robot, platform: Platform) -> list[str]:
 
 
 def _point(position_m: Sequence[float] | FloatArray, digits: int = 2) -> str:
-    return "(" + ", ".join(f"{value:.{digits}f}" for value in position_m) + ")"
+    # 0.0 is added so that nothing is told as -0
+    return "(" + ", ".join(f"{round(value, digits) + 0.0:.{digits}f}" for value in position_m) + ")"

@@ -302,7 +302,50 @@ def test_what_no_place_mends_is_not_laid_to_the_place(tmp_path: Path) -> None:
 
 def test_turning_takes_part_in_the_speed_of_the_cables(tmp_path: Path) -> None:
     text = SUSPENDED.replace("angular_speed_rad_s = 0.25", "angular_speed_rad_s = 0.6")
-    assert "platform.speed_m_s" in findings_of(tmp_path, text)
+    told = findings_of(tmp_path, text)["platform.speed_m_s"]
+    found = re.search(
+        r"up to (\S+) with angular_speed_rad_s up to (\S+), or limits.speed_rad_s from (\d+)$", told
+    )
+    assert found is not None, told
+    # each of the two ways out is one
+    slower = SUSPENDED.replace("angular_speed_rad_s = 0.25", f"angular_speed_rad_s = {found[2]}")
+    slower = re.sub(r"\nspeed_m_s = [\d.]+", f"\nspeed_m_s = {found[1]}", slower)
+    assert "platform.speed_m_s" not in findings_of(tmp_path, slower)
+    quicker = re.sub(r"\nspeed_rad_s = [\d.]+", f"\nspeed_rad_s = {found[3]}", text)
+    assert "platform.speed_m_s" not in findings_of(tmp_path, quicker)
+
+
+def test_cables_may_leave_in_one_point_and_not_end_in_one_as_well(tmp_path: Path) -> None:
+    # the robocrane as it is published: three points, two cables from each
+    crane = (SHIPPED / "robots" / "suspended-6.toml").read_text()
+    for pair, point in (
+        (r"-?0\.15, 4\.0", "0.0, 4.0"),
+        (r"-3\.\d+, -\d\.\d+", "-3.464, -2.0"),
+        (r"3\.\d+, -\d\.\d+", "3.464, -2.0"),
+    ):
+        crane, count = re.subn(
+            rf"exit_point_m = \[{pair}, 4\.0\]", f"exit_point_m = [{point}, 4.0]", crane
+        )
+        assert count == 2
+    path = tmp_path / "crane.toml"
+    path.write_text(crane)
+    assert not [f for f in findings(load_robot(path)) if f.impossible]
+
+
+def test_the_reserve_of_a_smaller_box_is_that_of_its_own_middle() -> None:
+    statics = statics_of(load_robot("point-4"))
+    # in the middle of the wide box little can be kept, in that of the smaller one more has to be
+    low, high = (-2.7, -2.2, 1.2), (2.7, 2.2, 3.8)
+    platform = dataclasses.replace(
+        statics.platform, workspace_min_m=low, workspace_max_m=high, home_m=(0.0, 0.0, 1.2)
+    )
+    wide = PlatformStatics(platform_model(platform, statics.low_N, statics.high_N))
+    box = wide.largest_box(wide.box)
+    assert box is not None
+    platform = dataclasses.replace(platform, workspace_min_m=box.low_m, workspace_max_m=box.high_m)
+    smaller = PlatformStatics(platform_model(platform, statics.low_N, statics.high_N))
+    assert smaller.model.reserve_N > wide.model.reserve_N + 0.5
+    assert smaller.is_target(smaller.points()).all()
 
 
 def test_a_mass_beside_the_origin_is_held_by_other_tensions() -> None:
@@ -331,8 +374,14 @@ def test_a_mass_beside_the_origin_is_held_by_other_tensions() -> None:
         ([("torque_Nm = 4.5", "torque_Nm = 2.5")], "limits.tension_max_N", "up to 96 N", True),
         ([("speed_m_s = 0.5", "speed_m_s = 5")], "platform.speed_m_s", "allowed: up to 1.9", True),
         ([("[-0.075, 0.0433]", "[-75.0, 43.3]")], "axes[0].anchor_point_m", "in millimetres", True),
-        ([("[0.0, 0.0]", "[2.0, 3.0]")], "axes[2].exit_point_m", "0 m from that of axes[1]", True),
-        ([("[0.0, 0.0]", "[0.0, 3.0]")], "platform.home_m", "tension_min_N up to 2 is", True),
+        ([("[0.0, 0.0]", "[2.0, 3.0]")], "platform.home_m", "the cables would need", True),
+        (
+            [("[0.0, 0.0]", "[2.0, 3.0]"), ("[0.0, -0.0866]", "[0.075, 0.0433]")],
+            "axes[2].exit_point_m",
+            "0 m from that of axes[1], and so are their anchor points",
+            True,
+        ),
+        ([("[0.0, 0.0]", "[0.0, 3.0]")], "platform.home_m", "tension_min_N up to 2 with", True),
         ([("[-2.0, 3.0]", "[-0.5, 2.0]")], "platform.workspace_min_m", "from the exit point", True),
         (
             [("slack_N", "cable_length_max_m = 2.5\nslack_N")],

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from cdpr_here import cdpr_here
 
-from cdpr_profiles import load_robot
+from cdpr_profiles import ProfileError, load_robot
 from cdpr_profiles.reading.places import SHIPPED
 from cdpr_rt.robots.checks import findings
 from cdpr_rt.robots.platform_model import RESERVE
@@ -205,6 +205,24 @@ def test_the_defaults_of_a_frame_of_any_size_are_a_robot_that_works(
     assert side_m == pytest.approx(scale * kind_of(kind).side_m, rel=0.02)
 
 
+def test_the_box_that_is_proposed_of_a_wide_and_low_frame_is_all_of_targets(tmp_path: Path) -> None:
+    path = tmp_path / "stadium.toml"
+    given = {"kind": "point-4", "frame_m": "80 50 20"}
+    assert findings(write_robot(answers_of(path, given, usual), path)) == []
+
+
+def test_a_platform_too_light_for_its_winches_is_told_what_would_do(tmp_path: Path) -> None:
+    path = tmp_path / "light.toml"
+    given = {"kind": "suspended-6", "frame_m": "1.5 1.5 1.5", "mass_kg": "1"}
+    with pytest.raises(ProfileError) as caught:
+        write_robot(answers_of(path, given, usual), path)
+    assert re.search(
+        r"a platform of \d+\.?\d* kg and more is possible there, or tension_min_N up to 0\.\d+ "
+        "with winches as small",
+        str(caught.value),
+    )
+
+
 def test_smaller_winches_and_a_smaller_frame_get_a_smaller_platform(tmp_path: Path) -> None:
     path = tmp_path / "mine.toml"
     given = {"kind": "suspended-8", "frame_m": "3 2 2", "winch": "winch-300n"}
@@ -348,7 +366,7 @@ def test_all_wrong_keys_are_named_with_those_of_the_kind(tmp_path: Path) -> None
         ("mass", "2", "--set mass: no such question; did you mean 'mass_kg'?"),
         ("mass_kg", "nan", "--set mass_kg: value 'nan'; allowed: a number from 0.01 to 10000"),
         ("exit_1_m", "1,2,3", "--set exit_1_m: value '1,2,3'; allowed: two numbers"),
-        ("frame_m", "3000, 2000", "allowed: up to 100 m each (in metres, not millimetres)"),
+        ("frame_m", "3000, 2000", "allowed: up to 300 m each (in metres, not millimetres)"),
         ("name", "two\nlines", "allowed: a text of one line"),
     ],
 )
