@@ -274,7 +274,7 @@ def axis_values(texts: list[str], axes: list[dict[str, Any]], unit: str) -> dict
             name = names[0]
         if name not in names:
             raise BadInputError(
-                f"{text}: allowed: AXIS={unit} with axis {', '.join(names)}, such as "
+                f"{text}: allowed: AXIS={unit} of {', '.join(map(repr, names))}, such as "
                 f"{quote(f'{names[0]}=20')}"
             )
         if names.index(name) in values:

@@ -272,7 +272,13 @@ class CommandDispatcher:
     def _require(self, transition: Transition) -> None:
         self._life.require(transition)
         if self._runner.busy:
-            raise RefusedError(f"{transition.name.lower()}: another command is being carried out")
+            raise RefusedError(f"{transition.name.lower()}: {self._occupied()}")
+
+    def _occupied(self) -> str:
+        """Return what keeps the loop from taking a command at the moment."""
+        if self._engine.reacting:
+            return "the robot is being stopped, a platform let down; the power goes off then"
+        return "another command is being carried out"
 
     def _require_running(self, what: str) -> None:
         engine = self._engine
@@ -280,7 +286,7 @@ class CommandDispatcher:
         if (engine.driving and not self._runner.busy) or shadow:
             return
         if self._life.state is LoopState.ACTIVE:
-            raise RefusedError(f"{what}: another command is being carried out")
+            raise RefusedError(f"{what}: {self._occupied()}")
         raise self._life.not_in_state(what, LoopState.ACTIVE)
 
     def _right(self, what: str, command: Command) -> int:

@@ -146,6 +146,7 @@ def test_a_cable_is_cut_while_the_robot_runs(
         ),
         ((InjectedFault.SLIP, "0"), "slip 0: allowed: whole numbers 1 to 65535"),
         ((InjectedFault.ENCODER_JUMP, "far"), "encoder-jump far: allowed: whole numbers"),
+        ((InjectedFault.CELL_OFF,), "cell-off: Planar robot with 3 cables has no load cells"),
     ],
 )
 def test_a_fault_that_cannot_be_is_refused(robot: Robot, what: tuple[Any, ...], reason: str):

@@ -11,6 +11,7 @@ from rich.text import Text
 
 from cdpr_tools.client.client import Daemon, NoDaemonError, open_daemon
 from cdpr_tools.client.motion import ProgressNotes
+from cdpr_tools.client.refusals import DaemonRefusalError
 from cdpr_tools.client.status_text import DEAD, FALLEN, power_text, status_text
 from cdpr_tools.commands.daemon.with_daemon import with_daemon, with_daemon_at_once
 from cdpr_tools.commands.options import (
@@ -132,8 +133,20 @@ def _booted(daemon: Daemon, out: Output) -> dict[str, Any]:
 @app.command()
 @with_daemon_at_once
 def disable(daemon: Daemon, out: Output) -> None:
-    """Stop the motion under control, then take the power off."""
-    _show(out, daemon.post("/disable"))
+    """Stop the motion under control, then take the power off.
+
+    Where a fault has done so already nothing changes.
+    """
+    try:
+        answer = daemon.post("/disable")
+    except DaemonRefusalError as error:
+        refusal = error.refusal
+        if refusal is None or refusal.arguments.get("state") != "fault":
+            raise
+        answer = {"state": "fault", "text": daemon.get("/status")["reason"]}
+        _show(out, answer, "stopped by it already; next: `cdpr ack`, once its cause is gone")
+        return
+    _show(out, answer)
 
 
 @app.command()

@@ -82,6 +82,11 @@ def fault(
     chosen = _axis(robot, axis)
     how = _HOW[what]
     amount = _amount(what, how, value)
+    if what is InjectedFault.CELL_OFF and robot.tension_sensors is None:
+        raise BadInputError(
+            f"{what}: {robot.name} has no load cells, its tensions are estimated from torques; "
+            "allowed: for a robot whose file names tension_sensors"
+        )
     url = robot_urls(robot, bus or _buses_of_daemon(profile.profile))[chosen.bus]
     winch = chosen.winch
     with raised_as(BadInputError, BusError):
