@@ -189,13 +189,14 @@ def _reported(
     """Write picture and report; return their paths for JSON. Raises WorkFailedError."""
     from cdpr_tools.calibrate.report.page import write_report  # noqa: PLC0415
     from cdpr_tools.calibrate.report.picture import found_figure  # noqa: PLC0415  # slow to load
+    from cdpr_tools.report.style import save_figure  # noqa: PLC0415
 
     report, path = folder / _REPORT, folder / _PICTURE
     advice = dict.fromkeys(one.advice for one in outcome.open_directions)
     next_steps = [*advice, outcome.advice(), *more]
     write_report(report, outcome, data, judged, next_steps, images)
     try:
-        found_figure(outcome).savefig(path, format="png")
+        save_figure(found_figure(outcome), path)
     except OSError as error:
         raise WorkFailedError(f"{path}: cannot be written: {error.strerror}") from error
     return {"picture": str(path), "report": str(report)}

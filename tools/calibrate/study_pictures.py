@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from cdpr_tools.calibrate.study import FIGURES, PAIRS, plateaus
-from cdpr_tools.report.style import BACKWARD, FORWARD, canvas, legend_above
+from cdpr_tools.report.style import BACKWARD, FORWARD, canvas, legend_above, save_figure
 
 _Rows = list[dict[str, Any]]
 _ENDS: Final = (("exit", FORWARD, "exit points a"), ("offset", BACKWARD, "initial lengths ρ_0"))
@@ -26,7 +26,7 @@ def draw(path: Path, rows: _Rows) -> list[Path]:
     drawn = {"": _counted(rows), "-B": _compared(rows), "-C": _paired(rows)}
     paths = [path.with_stem(path.stem + end) for end in drawn]
     for one, figure in zip(paths, drawn.values(), strict=True):
-        figure.savefig(one, format="png")
+        save_figure(figure, one)
     return paths
 
 

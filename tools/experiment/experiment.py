@@ -25,6 +25,7 @@ from cdpr_tools.experiment.statistics import rows, variance_analysis
 from cdpr_tools.jobs import processes
 from cdpr_tools.output import Output, to_json
 from cdpr_tools.recordings.stored_settings import load_settings
+from cdpr_tools.report.style import save_figure
 from cdpr_tools.trials.directions import platform_of
 
 SETTINGS: Final = "experiment.json"
@@ -164,7 +165,7 @@ def _drawn(
     ticks = min(session.glob("*.npy"))
     targets = targets_m(centre_m(load_robot(settings.robot), session.name.split("-")[0]))
     path = folder / "figure-2.8.png"
-    figures.path(targets, _truth_m(ticks)).savefig(path)
+    save_figure(figures.path(targets, _truth_m(ticks)), path)
     return [path, *figures.draw(points, alone, folder)]
 
 

@@ -15,7 +15,7 @@ from cdpr_rt.arrays import FloatArray
 from cdpr_tools.experiment import thesis
 from cdpr_tools.experiment.points import Points
 from cdpr_tools.experiment.statistics import PARTS, levels, spread_mm, thesis_row
-from cdpr_tools.report.style import canvas, legend_above
+from cdpr_tools.report.style import canvas, legend_above, save_figure
 
 _OURS: Final = ("#2f6fb0", "#d1581a", "#3b8f5a", "#7a3fa0")
 _THESIS: Final = "#8a8f98"
@@ -36,9 +36,9 @@ def draw(points: Points, alone: Points, folder: Path) -> list[Path]:
     drawn = []
     for name, (variable, title) in _PICTURES.items():
         drawn.append(folder / name)
-        errors(points, variable, title).savefig(drawn[-1])
+        save_figure(errors(points, variable, title), drawn[-1])
     drawn.append(folder / "parts.png")
-    parts(points, alone).savefig(drawn[-1])
+    save_figure(parts(points, alone), drawn[-1])
     return drawn
 
 

@@ -11,7 +11,7 @@ from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.patheffects import withStroke
 
 from cdpr_rt.calibration.markers.map_fit import MapFit
-from cdpr_tools.report.style import legend_beside_title
+from cdpr_tools.report.style import legend_beside_title, save_figure
 
 _CAMERA, _REFERENCE = "#444444", "#d1581a"
 
@@ -65,4 +65,4 @@ def draw_map(fit: MapFit, path: Path) -> None:
     low.set(xlabel=f"distance from marker {fit.fixed[0]} (m)", ylabel="known to (mm, 1 sigma)")
     low.set_ylim(bottom=0.0)
     legend_beside_title(low)
-    figure.savefig(path, format="png")
+    save_figure(figure, path)

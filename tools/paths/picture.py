@@ -13,11 +13,10 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 from matplotlib.ticker import MaxNLocator
 
-import cdpr_tools.report.style  # noqa: F401 - how the project's pictures look
 from cdpr_profiles import Robot
 from cdpr_rt.arrays import FloatArray
 from cdpr_tools.paths.preview import Preview
-from cdpr_tools.report.style import decimated
+from cdpr_tools.report.style import decimated, save_figure
 
 _NAMES: Final = "xyz"
 _BOX, _STOP, _WRONG, _BOUND = "#7a3fa0", "#444444", "#b02f2f", "#b02f2f"
@@ -70,7 +69,7 @@ def draw_path(shown: Preview, robot: Robot, file: Path) -> None:
         more_handles, more_labels = tension.get_legend_handles_labels()
         handles, labels = handles + more_handles, labels + more_labels
     figure.legend(handles, labels, loc="outside lower center", ncols=6)
-    figure.savefig(file, format="png")
+    save_figure(figure, file)
 
 
 def _views(shown: Preview) -> list[_View]:

@@ -21,7 +21,7 @@ from cdpr_rt.service.recordings.recording_reader import Columns, RecordingReader
 from cdpr_tools.errors import BadInputError, WorkFailedError, os_error_as
 from cdpr_tools.recordings.selection import ELAPSED, Selection
 from cdpr_tools.recordings.summary import WHILE_ACTIVE, Reasons, is_fault, why_while_active
-from cdpr_tools.report.style import decimated, legend_above, legend_beside_title
+from cdpr_tools.report.style import decimated, legend_above, legend_beside_title, save_figure
 
 FIELDS = (
     "setpoint_rad", "position_rad", "velocity_rad_s", "torque_sent_Nm", "tension_N",
@@ -103,7 +103,7 @@ def draw(selection: Selection, columns: Columns, axes: Sequence[str] | None, pat
     grid.figure.align_ylabels()
     with os_error_as(WorkFailedError, f"{path}: cannot be written"):
         path.parent.mkdir(parents=True, exist_ok=True)
-        grid.figure.savefig(path, format="png")
+        save_figure(grid.figure, path)
     return int(columns["state"].size)
 
 

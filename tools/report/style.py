@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import base64
+import contextlib
 import io
 from collections.abc import Sequence
+from pathlib import Path
 
 import matplotlib as mpl
 import numpy as np
@@ -53,6 +55,22 @@ def canvas(
     figure = Figure(figsize=(7.4, height * rows), layout="constrained")
     axes = figure.subplots(rows, columns, squeeze=False, sharex=sharex, sharey=sharey)
     return figure, [ax for row in axes for ax in row]
+
+
+def save_figure(figure: Figure, path: Path, tight: bool = False) -> None:
+    """Write a PNG as a whole or not at all, as on a disk that is full; raises OSError.
+
+    `tight`: as large as what is drawn, whatever the layout left outside.
+    """
+    drawn, part = io.BytesIO(), path.with_name(f"{path.name}.part")
+    figure.savefig(drawn, format="png", bbox_inches="tight" if tight else None)
+    try:
+        part.write_bytes(drawn.getvalue())
+        part.replace(path)
+    except OSError:
+        with contextlib.suppress(OSError):  # the first error tells what is wrong
+            part.unlink(missing_ok=True)
+        raise
 
 
 def legend_above(figure: Figure, *axes: Axes, columns: int = 4) -> None:

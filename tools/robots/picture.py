@@ -10,11 +10,11 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Polygon, Rectangle
 from matplotlib.ticker import MaxNLocator
 
-import cdpr_tools.report.style  # noqa: F401 - how the project's pictures look
 from cdpr_profiles import Robot
 from cdpr_profiles.platform import Platform
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.robots.statics import Box, PlatformStatics, statics_of, view_of
+from cdpr_tools.report.style import save_figure
 
 _CABLE, _PLATFORM, _TARGETS = "#444444", "#d1581a", "#7a3fa0"
 _WIDE_in = 7.4
@@ -34,7 +34,7 @@ _View = tuple[int, int]
 
 def draw_robot(robot: Robot, platform: Platform, path: Path) -> None:
     """Write the picture of a robot as PNG; raises OSError."""
-    figure_of(robot, platform).savefig(path, format="png", bbox_inches="tight")
+    save_figure(figure_of(robot, platform), path, tight=True)
 
 
 def figure_of(robot: Robot, platform: Platform) -> Figure:

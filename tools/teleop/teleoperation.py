@@ -74,7 +74,7 @@ def teleoperate(settings: TeleopSettings, out: Output) -> None:
             control.post("/program", {"program": program, "wanted": arguments})
             number = description["programs"].index(program)
             session = TeleopSession(stream, device, settings.scale, number, directions[0])
-            out.note(f"{program} by {host}:{port}; {device.hint}")
+            out.note(f"leading {name} over {host}:{port}; {device.hint}")
             try:
                 end = _shown(
                     session, View(session, description, status["reason"]), daemon, out, ended

@@ -9,7 +9,7 @@ import numpy as np
 
 from cdpr_profiles.winch_calibration import WinchCalibration
 from cdpr_rt.identification.tension_gain import TorquePoint
-from cdpr_tools.report.style import BACKWARD, FORWARD, canvas, legend_above
+from cdpr_tools.report.style import BACKWARD, FORWARD, canvas, legend_above, save_figure
 
 _SIDES = ((True, FORWARD, "winding in", 1.0), (False, BACKWARD, "paying out", -1.0))
 
@@ -33,4 +33,4 @@ def draw_calibration(path: Path, points: Sequence[TorquePoint], found: WinchCali
     below.axhline(0.0, color="#777777", lw=0.8)
     below.set(xlabel="cable tension (N)", ylabel="left by the lines (mNm)", xlim=line)
     legend_above(figure, above)
-    figure.savefig(path, format="png")
+    save_figure(figure, path)

@@ -17,6 +17,7 @@ from cdpr_tools.calibrate.words import geometry_note
 from cdpr_tools.errors import BadInputError
 from cdpr_tools.output import Output, to_json
 from cdpr_tools.recordings.stored_settings import load_settings
+from cdpr_tools.report.style import save_figure
 from cdpr_tools.trials import limits, line, path, tape, targets
 from cdpr_tools.trials.directions import platform_of
 from cdpr_tools.trials.evaluation import pictures
@@ -167,7 +168,7 @@ def judge(folder: Path) -> dict[str, Any]:
     kind, robot = KINDS[settings.kind], load_robot(settings.robot)
     parts = {part: Recorded(folder / part) for part in settings.parts}
     figures = kind.judge(parts, robot, settings)
-    kind.draw(parts, robot, settings).savefig(folder / PICTURE)
+    save_figure(kind.draw(parts, robot, settings), folder / PICTURE)
     result = {
         **asdict(settings),
         "figures": {figure.key: figure.as_table() for figure in figures},

@@ -12,9 +12,9 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 from matplotlib.ticker import MaxNLocator
 
-import cdpr_tools.report.style  # noqa: F401 - how the project's pictures look
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.robots.reach.reachable import Reach
+from cdpr_tools.report.style import save_figure
 from cdpr_tools.robots.poses.choice import Chosen
 
 _WAY, _START, _BOX, _OBSTACLE = "#999999", "#d1581a", "#7a3fa0", "#cccccc"
@@ -40,7 +40,7 @@ def draw_poses(title: str, reach: Reach, chosen: Chosen, path: Path) -> None:
     figure.suptitle(title)
     handles, labels = all_axes[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=4)
-    figure.savefig(path, format="png")
+    save_figure(figure, path)
 
 
 def _draw_view(

@@ -16,12 +16,12 @@ from matplotlib.ticker import MaxNLocator
 from mpl_toolkits.mplot3d.art3d import Line3DCollection
 from scipy.interpolate import RegularGridInterpolator
 
-import cdpr_tools.report.style  # noqa: F401 - how the project's pictures look
 from cdpr_profiles import Robot
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.robots.statics import Box
 from cdpr_rt.robots.workspace_analysis.rays import Rays
 from cdpr_rt.robots.workspace_analysis.surface import Triangles
+from cdpr_tools.report.style import save_figure
 from cdpr_tools.robots.workspace.search import Found, Search, in_mm
 
 _RAYS, _GRID, _MACHINE = "#d1581a", "#1b4f8a", "#444444"
@@ -54,7 +54,7 @@ def draw_workspace(robot: Robot, wanted: Search, found: Found, path: Path) -> No
             _draw_section(figure, figure.add_subplot(2, 2, 2 + k), wanted, found, view)
     figure.suptitle(f"{robot.name}: {_title(wanted)}", fontsize=10, x=0.01, ha="left")
     figure.legend(handles=_LEGEND, loc="outside lower center", ncols=4)
-    figure.savefig(path, format="png")
+    save_figure(figure, path)
 
 
 def _title(wanted: Search) -> str:
