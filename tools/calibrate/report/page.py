@@ -129,7 +129,7 @@ class _Report:
             pictures.found_figure(self._outcome),
             "Exit points moved, and lengths left over",
             "Above: where exit points are against the robot's file. Below: what lengths contradict "
-            "each other by, all cables, in the order of the poses.",
+            "each other by, a colour a cable, in the order of the poses.",
         )
         errors = {}
         if self._judged is not None:

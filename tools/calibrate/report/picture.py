@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import QuadMesh
@@ -18,7 +19,8 @@ from cdpr_rt.calibration.verification.verdict import predicted_std
 from cdpr_tools.calibrate.report.judged import Judged, PoseErrors
 from cdpr_tools.report.style import BACKWARD, COLOURS, FORWARD, canvas, legend_above
 
-_LENGTH = "#444444"
+_COLOURS = 10
+"""Of cables that are told apart by strong ones alone."""
 _PLACED_m = 0.5
 """A marker of which the place is known no better was left out of the fit."""
 _ARROW_m = 0.08
@@ -28,7 +30,9 @@ _FINE, _COARSE = 15, 3
 
 
 def found_figure(outcome: Outcome) -> Figure:
-    """Draw where exit points moved, and what the lengths still contradict."""
+    """Draw where exit points moved, and what the lengths still contradict, a colour a cable."""
+    names = [axis.name for axis in outcome.robot.axes]
+    colour_of = mpl.colormaps["tab10" if len(names) <= _COLOURS else "tab20"]
     found, geometry = outcome.found, outcome.found.geometry
     figure, (above, below) = canvas(2, height=2.7)
     n = geometry.n
@@ -42,18 +46,17 @@ def found_figure(outcome: Outcome) -> Figure:
             label="xyz"[place], color=(FORWARD, BACKWARD, COLOURS["none"])[place],
         )  # fmt: skip
     above.set(ylabel="exit point moved (mm, ± 2 sigma)", xlabel="cable")
-    above.set_xticks(range(n), [str(i + 1) for i in range(n)])
+    above.set_xticks(range(n), [f"{i + 1}\n{name}" for i, name in enumerate(names)])
     off_mm = 1e3 * found.length_residual_m * length_std_m(geometry, found.seen)
     poses = np.arange(1, found.seen.poses + 1)
     for i in range(n):
         used = found.seen.used[:, i]
-        below.plot(poses[used], off_mm[used, i], "o", ms=2.5, color=_LENGTH)
-    below.plot([], [], "o", ms=2.5, color=_LENGTH, label="length left by the fit")
+        below.plot(poses[used], off_mm[used, i], "o", ms=2.5, color=colour_of(i), label=names[i])
     for fault in (one for one in outcome.faults if one.kind == "jump"):
-        label = f"cable {fault.cable + 1} jumped by {1e3 * fault.size:+.1f} mm"
+        label = f"{names[fault.cable]} jumped by {1e3 * fault.size:+.1f} mm"
         below.axvline(fault.pose + 0.5, color=BACKWARD, lw=0.9, label=label)
     below.axhline(0.0, color="#777777", lw=0.8)
-    below.set(xlabel="pose", ylabel="length off (mm)", xlim=(0.5, poses[-1] + 0.5))
+    below.set(xlabel="pose", ylabel="length left by the fit (mm)", xlim=(0.5, poses[-1] + 0.5))
     below.xaxis.set_major_locator(MaxNLocator(integer=True, min_n_ticks=1))
     legend_above(figure, above, below)
     return figure

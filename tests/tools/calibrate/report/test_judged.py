@@ -17,6 +17,7 @@ from cdpr_tools.calibrate.measuring.outside import OutsidePose, OutsidePoses
 from cdpr_tools.calibrate.report import judged as judging
 from cdpr_tools.calibrate.report.judged import Judged, judged
 from cdpr_tools.calibrate.report.page import write_report
+from cdpr_tools.calibrate.report.picture import found_figure
 from cdpr_tools.composition.robot_physics import TrueGeometry
 from tests.cdpr_rt.calibration.camera_robot import CameraRobot, camera_robot
 
@@ -110,3 +111,12 @@ def test_the_report_is_one_file_with_its_pictures(
     assert "true error" in text and "cable 8 exit point z" in text
     write_report(page, outcome, robot.made.data, None, [], tmp_path / "nowhere")
     assert page.read_text().count("<figure>") == 3
+
+
+def test_the_picture_names_the_axes_and_tells_their_residuals_apart(outcome: Outcome) -> None:
+    names = [axis.name for axis in outcome.robot.axes]
+    above, below = found_figure(outcome).axes
+    assert [text.get_text().split("\n")[1] for text in above.get_xticklabels()] == names
+    dots = [line for line in below.get_lines() if line.get_label() in names]
+    assert [line.get_label() for line in dots] == names
+    assert len({str(line.get_color()) for line in dots}) == 8
