@@ -151,6 +151,22 @@ class RobotModel(Protocol):
         """
 
 
+class PullFit(Protocol):
+    """What motors are found to take up of their torque while cables are pulled tight at home."""
+
+    def prepare(self, tension_N: FloatArray) -> None:
+        """Take the pretension (n,) that is pulled around."""
+
+    def begin(self, position_rad: FloatArray) -> None:
+        """Begin anew, at these angles (n,)."""
+
+    def take(self, position_rad: FloatArray, tension_N: FloatArray) -> None:
+        """Take in a cycle's angles (n,) and the tensions asked for, (n,)."""
+
+    def end(self) -> FloatArray:
+        """Return the angles (n,) at which the cables have the pretension, nan where not known."""
+
+
 class PlatformControl(Controller, Protocol):
     """A controller whose set-point is a platform's, in the coordinates of its robot's file.
 
@@ -184,6 +200,10 @@ class PlatformControl(Controller, Protocol):
     @property
     def inertia_kg_m2(self) -> FloatArray:
         """Of each motor, (n,)."""
+
+    @property
+    def pull_fit(self) -> PullFit:
+        """Finds what motors take up that were not commissioned; learning begins there."""
 
     @property
     def pose(self) -> FloatArray:

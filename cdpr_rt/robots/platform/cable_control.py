@@ -33,6 +33,7 @@ from cdpr_rt.robots.platform.control_rows import (
 )
 from cdpr_rt.robots.platform.loop_design import designed_loop
 from cdpr_rt.robots.platform.motor_learning import MotorLearning
+from cdpr_rt.robots.platform.pull_fit import PullFit
 from cdpr_rt.robots.platform.shaped_setpoint import ShapedSetpoint
 from cdpr_rt.robots.platform_model import PlatformModel
 from cdpr_rt.robots.tension.tension_distribution import TensionSolver, tension_distribution
@@ -96,6 +97,7 @@ class CableControl:
         if learns and not known.all():
             scale, reserve_N = model.wrench_scale, model.reserve_N
             self.learning = MotorLearning(axes, known, scale, reserve_N, period_s)
+        self.pull_fit = PullFit(axes, known, self.lengths_at_home, self.learning)
         self._cells: CellFeedback | None = None
         self._check = cell_check(model, axes, period_s)
         moves = np.zeros((4, 6))

@@ -115,6 +115,19 @@ class MotorLearning:
         self._x[:] = 0.0
         self._P[:] = np.diag(self._states[kernel.SIGMA] ** 2)
 
+    def begin_with(self, found: BoolArray, torque_Nm: FloatArray, covariance: FloatArray) -> None:
+        """Begin anew with what was `found` (n,) of motors at rest; the others' is forgotten.
+
+        `torque_Nm` (n, 3) are friction, sine and cosine of the cogging, `covariance` (n, 3, 3).
+        """
+        self.forget()
+        for i in np.flatnonzero(found):
+            motor = slice(kernel.TERMS * i, kernel.TERMS * (i + 1))
+            self._x[motor] = np.clip(torque_Nm[i], -self.most_Nm[i], self.most_Nm[i])
+            self._P[motor, motor] = covariance[i]
+        friction = self._x[: kernel.TERMS * len(found) : kernel.TERMS]
+        np.maximum(friction, 0.0, out=friction)
+
     @property
     def learnt_Nm(self) -> FloatArray:
         """Friction and amplitude of the cogging of each motor, (2, n)."""

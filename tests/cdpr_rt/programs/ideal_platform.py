@@ -62,6 +62,19 @@ ROOM = Platform(
 )  # fmt: skip
 
 
+class NothingFound:
+    """A fit that finds nothing of any motor."""
+
+    def prepare(self, tension_N: FloatArray) -> None:
+        self._angle_rad = np.full(tension_N.size, np.nan)
+
+    def begin(self, position_rad: FloatArray) -> None: ...
+    def take(self, position_rad: FloatArray, tension_N: FloatArray) -> None: ...
+
+    def end(self) -> FloatArray:
+        return self._angle_rad
+
+
 class IdealControl:
     """A platform that is where its set-point is, on tensions that its workspace answers for."""
 
@@ -97,6 +110,7 @@ class IdealControl:
 
     load_cell_fault = ""
     learnt_Nm = None
+    pull_fit = NothingFound()
 
     def clear_load_cell_fault(self) -> None: ...
 

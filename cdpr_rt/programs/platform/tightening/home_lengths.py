@@ -1,4 +1,4 @@
-"""Cable lengths taken at home, and corrected once the motors' cogging and friction are known."""
+"""The cables' lengths as they follow from a platform that stands at home, pulled tight."""
 
 from __future__ import annotations
 
@@ -9,51 +9,61 @@ from cdpr_rt.core.exchange import AxisFeedback
 from cdpr_rt.programs.platform.platform_program import PlatformParts
 
 
-class HomeLengths:
-    """The lengths of cables that are tight while the platform stands at home.
+class LengthsAtHome:
+    """Lengths (n,) at home, by the tensions that load cells measure, or that motors are asked for.
 
-    They follow from home's pose and the tensions that stretch the cables. Where no load cell
-    measures these, they are the torques', of which cogging and friction are a part.
+    Where no cell measures, the angle at the pretension is the one that the control's `pull_fit`
+    finds, without friction and cogging; else the middle of those from above and from below, in
+    which friction cancels out. Cogging that is known is corrected once the index is.
     """
 
-    def __init__(self, parts: PlatformParts, cable_m_per_rad: FloatArray) -> None:
-        self._parts, self._control = parts, parts.control
-        self._cable = cable_m_per_rad
-        self._position_rad = np.full(cable_m_per_rad.size, np.nan)
-        """Angles at which they were taken, nan once they have been corrected."""
-        self._tension_N = np.zeros(cable_m_per_rad.size)
-        self._measured = np.zeros(cable_m_per_rad.size, np.bool_)
+    def __init__(self, parts: PlatformParts, cable_m: FloatArray, pretension_N: FloatArray) -> None:
+        """Take the pretension at home, (n,)."""
+        n = cable_m.size
+        self._parts, self._cable = parts, np.array(cable_m)
+        self._falling_rad = np.zeros(n)
+        self._rad = np.full(n, np.nan)
+        """Angles at which lengths were taken, nan once they have been corrected."""
+        self._N, self._pretension_N = np.zeros(n), np.array(pretension_N)
+        """Tensions that stretched them then, and the pretension."""
+        self._sure = np.zeros(n, np.bool_)
+        """Which of these are not those that a motor's cogging and friction have made."""
+        parts.control.pull_fit.prepare(pretension_N)
 
     def forget(self) -> None:
-        """Have nothing to correct: lengths are known otherwise."""
-        self._position_rad[:] = np.nan
+        """Have nothing to correct any more."""
+        self._rad[:] = np.nan
 
-    def take(
-        self, feedback: AxisFeedback, rising_rad: FloatArray, pretension_N: FloatArray
-    ) -> FloatArray:
-        """Return the lengths (n,) at the motors' present angles.
+    def keep_falling(self, feedback: AxisFeedback) -> None:
+        """Keep the angles at the pretension, which is come to from above."""
+        self._falling_rad[:] = feedback.position_rad
 
-        The tension has come down to `pretension_N` (n,) again, through which it rose at the angles
-        `rising_rad` (n,): halfway between, friction cancels out.
-        """
-        estimate = self._parts.estimator.estimate
-        self._measured[:] = estimate.tension_measured
-        middle_rad = 0.5 * (feedback.position_rad + rising_rad)
-        self._position_rad[:] = np.where(self._measured, feedback.position_rad, middle_rad)
-        self._tension_N[:] = np.where(self._measured, estimate.tension_N, pretension_N)
-        hysteresis = self._cable * (feedback.position_rad - self._position_rad)
-        return np.asarray(self._control.lengths_at_home(self._tension_N) + hysteresis)
+    def take(self, feedback: AxisFeedback) -> FloatArray:
+        """Return the lengths (n,) at the pretension, which is come to from below."""
+        control, estimate = self._parts.control, self._parts.estimator.estimate
+        measured, fitted_rad = estimate.tension_measured, control.pull_fit.end()
+        middle_rad = 0.5 * (feedback.position_rad + self._falling_rad)
+        found = np.isfinite(fitted_rad)
+        self._sure[:] = measured | found
+        self._rad[:] = np.where(found, fitted_rad, middle_rad)
+        self._rad[measured] = feedback.position_rad[measured]
+        self._N[:] = np.where(measured, estimate.tension_N, self._pretension_N)
+        turned_m = self._cable * (feedback.position_rad - self._rad)
+        return np.asarray(control.lengths_at_home(self._N) + turned_m)
 
     def correct(self, feedback: AxisFeedback) -> None:
-        """Correct lengths taken for cogging and friction, once the motors' indices are known."""
-        parts, control, compensation = self._parts, self._control, self._parts.compensation
-        if compensation is None or np.isnan(self._position_rad).any():
+        """Correct lengths for cogging and friction that are known, once the index is.
+
+        These torques were part of the tensions by which the cables stretched.
+        """
+        parts, control, known = self._parts, self._parts.control, self._parts.compensation
+        if known is None or np.isnan(self._rad).any():
             return
-        torque_Nm = compensation.standing_Nm(self._position_rad, feedback)
-        error_N = np.where(self._measured, 0.0, torque_Nm / self._cable)
-        stretch_error_m = control.lengths_at_home(self._tension_N + error_N)
-        stretch_error_m -= control.lengths_at_home(self._tension_N)
-        self._position_rad[:] = np.nan
+        torque_error_N = known.standing_Nm(self._rad, feedback) / self._cable
+        torque_error_N[self._sure] = 0.0
+        stretch_error_m = control.lengths_at_home(self._N + torque_error_N)
+        stretch_error_m -= control.lengths_at_home(self._N)
+        self.forget()
         length_m = parts.estimator.estimate.cable_length_m + stretch_error_m
         parts.estimator.set_lengths(feedback.position_rad, length_m)
         control.take_lengths(length_m, feedback)

@@ -14,7 +14,7 @@ from cdpr_rt.programs.arguments import CommandArguments
 from cdpr_rt.programs.base import ProgramError
 from cdpr_rt.programs.platform.arrival import Arrival
 from cdpr_rt.programs.platform.platform_program import PlatformParts, PlatformProgram
-from cdpr_rt.programs.platform.tightening.home_lengths import HomeLengths
+from cdpr_rt.programs.platform.tightening.home_lengths import LengthsAtHome
 from cdpr_rt.programs.platform.tightening.index_path import index_path
 from cdpr_rt.programs.platform.tightening.standing import (
     bad_source,
@@ -46,7 +46,12 @@ _SLACK_m, _ONCE_TIGHT_m = 1.0, 0.05
 """How far a cable may be wound in while some are slack, and once all are tight, besides stretch."""
 _TIGHT_WITHIN_S = 60.0
 
-_STAGES = (("slack", TAKE_UP_SHARE), ("pull", 1.0), ("beyond", OVERSHOOT), ("lengths", 1.0))
+_STAGES = (
+    ("slack", TAKE_UP_SHARE), ("pull", 1.0), ("beyond", OVERSHOOT), ("back", 1.0),
+    ("below", 2.0 - OVERSHOOT), ("lengths", 1.0),
+)  # fmt: skip
+_FITTED_FROM = 2
+"""Stage from which angles tell what motors take up: the first rise takes winches along."""
 _SOURCES = ("home", "lengths", "last")
 
 
@@ -86,8 +91,8 @@ class TightenProgram(PlatformProgram):
         tight_m = parts.control.lengths_at_home(OVERSHOOT * self._pretension_N)
         stretch_m = parts.control.lengths_at_home(np.zeros(cable_m.size)) - tight_m
         self._once_tight_m = _ONCE_TIGHT_m + float(stretch_m.max())
-        self._start_rad, self._still_rad, self._rising_rad = np.zeros((3, cable_m.size))
-        self._home_lengths = HomeLengths(parts, self._cable)
+        self._start_rad, self._still_rad = np.zeros((2, cable_m.size))
+        self._at_home = LengthsAtHome(parts, cable_m, self._home_pretension_N)
         self._stage = 0
         self._share = 0.0
         self._still = self._cycles = 0
@@ -139,6 +144,8 @@ class TightenProgram(PlatformProgram):
         self._pretension_N[:] = self._from_N + self._blend * (self._to_N - self._from_N)
         np.multiply(self._pretension_N, self._share, out=self._winches.high_N)
         self._winches.update(feedback, torque_Nm)
+        if self._source == "home" and self._stage >= _FITTED_FROM:
+            self._control.pull_fit.take(feedback.position_rad, self._winches.tension_N)
         setpoint.position_rad[:] = feedback.position_rad
         setpoint.velocity_rad_s[:] = setpoint.acceleration_rad_s2[:] = 0.0
         self._cycles += 1
@@ -205,7 +212,7 @@ class TightenProgram(PlatformProgram):
         self._hangs = False
         self._control.observe(feedback)
         self._take_last()
-        self._home_lengths.forget()
+        self._at_home.forget()
         self._take_over(feedback, torque_Nm)
         self._control.stand_still()
         self._finish(feedback, setpoint, torque_Nm)
@@ -232,8 +239,11 @@ class TightenProgram(PlatformProgram):
         self._fail_if(self._why_not_to_pull(feedback))
         if self._failure:
             return
-        if _STAGES[self._stage][0] == "pull":
-            self._rising_rad[:] = feedback.position_rad
+        stage = _STAGES[self._stage][0]
+        if stage == "pull":
+            self._control.pull_fit.begin(feedback.position_rad)
+        elif stage == "back":
+            self._at_home.keep_falling(feedback)
         self._stage += 1
 
     def _end_tight(self, feedback: AxisFeedback, torque_Nm: FloatArray) -> None:
@@ -287,12 +297,12 @@ class TightenProgram(PlatformProgram):
 
     def _lengths(self, feedback: AxisFeedback) -> FloatArray:
         """Return the cables' lengths, (n,), as they are now."""
-        self._home_lengths.forget()
+        self._at_home.forget()
         if self._source == "last" and self._last is not None:
             return self._last.at(feedback.position_rad, self._cable)
         if self._source == "lengths":
             return self._parts.estimator.estimate.cable_length_m
-        return self._home_lengths.take(feedback, self._rising_rad, self._pretension_N)
+        return self._at_home.take(feedback)
 
     def _take_over(self, feedback: AxisFeedback, torque_Nm: FloatArray) -> None:
         """Begin to have the platform's control ask for the torques, from those of this cycle on."""
@@ -344,7 +354,7 @@ class TightenProgram(PlatformProgram):
             self._acceleration[:] = parts.acceleration
             self._speed[:] = parts.speeds(INDEX_m_s)
         else:
-            self._home_lengths.correct(self._feedback)
+            self._at_home.correct(self._feedback)
 
     def _needs_index(self) -> bool:
         """Whether an index is missing that compensation needs, or that checks the last lengths."""
@@ -364,7 +374,7 @@ class TightenProgram(PlatformProgram):
             if not found and not self._path:
                 self._failure = "a motor has not passed its index"
             if found:
-                self._home_lengths.correct(self._feedback)
+                self._at_home.correct(self._feedback)
                 self._failure = self._compare_indices()
         return False
 

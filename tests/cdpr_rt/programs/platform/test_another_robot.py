@@ -23,6 +23,7 @@ from cdpr_rt.programs.platform.platform_program import PlatformParts
 from cdpr_rt.programs.platform.pose import PoseProgram
 from cdpr_rt.robots.interface import TensionOutcome
 from cdpr_rt.robots.kinematics.pose import Pose
+from tests.cdpr_rt.programs.ideal_platform import NothingFound
 
 PERIOD_S, BELT_m, INERTIA_kg_m2, TORQUE_Nm = 1e-3, 0.02, 1e-4, 2.0
 PLATFORM = Platform(
@@ -117,6 +118,9 @@ class BeltControl:
     def forget_motors(self) -> None: ...
     def clear_load_cell_fault(self) -> None: ...
     def clear_compensation(self) -> None: ...
+
+    pull_fit = NothingFound()
+
     def measure_tensions(self, tension_N: FloatArray, measured: BoolArray) -> None: ...
 
     def begin(self, feedback: AxisFeedback) -> None:

@@ -1,0 +1,121 @@
+"""What motors take up of their torque, and where they stand, from cables that are pulled tight."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from cdpr_profiles import RobotAxis
+from cdpr_rt.arrays import BoolArray, FloatArray
+from cdpr_rt.jit import bound
+from cdpr_rt.robots.platform import pull_kernel as kernel
+from cdpr_rt.robots.platform.motor_learning import (
+    COGGING_SHARE,
+    FRICTION_SHARE,
+    MotorLearning,
+)
+
+NOISE_SHARE = 0.01
+"""What else a motor takes up (standard deviation), over its rated torque."""
+_STEEPER = 0.15
+"""By how much a tension grows otherwise than is asked for: wrong stiffness, torque constants."""
+_ALIKE_rad = 0.8
+"""Of a motor's electrical turn: angles as near tell no more than one."""
+_LEAST_SHARE, _MOST_SHARE, _SHARES = 0.3, 1.7, 57
+"""Of the pretension, between which the cables' lengths are kept."""
+_PULLED_N = 1e-6
+_SLID = 0.1
+"""How much of what tells one thing a motor has to slide in both directions."""
+_MISFIT = 3.0
+"""Residual over noise above which a fit is not believed, as where the platform has moved."""
+_SLOW_SHARE, _UNLIKE = 0.8, 0.25
+"""Friction in motion, over that of a motor that all but stands; and how unlike it may be."""
+
+
+class PullFit:
+    """Friction, cogging and the angle at the pretension of each motor, while the platform stands.
+
+    See `pull_kernel`; a least-squares fit of what all cycles tell, with what is usual of friction
+    and cogging (zero, with the standard deviations of `MotorLearning`). Nothing is found of motors
+    that are `known` (n,). What is found is where the `learning` begins.
+    """
+
+    def __init__(
+        self,
+        axes: Sequence[RobotAxis],
+        known: BoolArray,
+        lengths_at_home: Callable[[FloatArray], FloatArray],
+        learning: MotorLearning | None,
+    ) -> None:
+        """Take what the lengths without tension (n,) at home are for tensions (n,)."""
+        n = len(axes)
+        self._known, self._learning, self._lengths_at_home = known, learning, lengths_at_home
+        self._rated_Nm = np.array([axis.winch.motor.rated_torque_Nm for axis in axes])
+        self._motors = np.ones((kernel.MOTOR_ROWS, n))
+        self._motors[kernel.M_PER_RAD] = [axis.winch.cable_m_per_motor_rad for axis in axes]
+        self._motors[kernel.POLE_PAIRS] = [axis.winch.motor.pole_pairs for axis in axes]
+        self._shares = np.linspace(_LEAST_SHARE, _MOST_SHARE, _SHARES)
+        self._lengths = np.ones((2, _SHARES, n))
+        size = kernel.UNKNOWNS + 1
+        self._turned, self._slid = np.zeros((2, 2, n))
+        self._sums = np.zeros((n, size, size))
+        self.unknowns = np.zeros((n, kernel.UNKNOWNS))
+        """What was found, (n, 5)."""
+        self._take = bound(
+            kernel.take, self._motors, self._shares, self._lengths, self._turned, self._sums,
+            self._slid, np.zeros(size), then=(np.zeros(n), np.zeros(n)),
+        )  # fmt: skip
+
+    def prepare(self, tension_N: FloatArray) -> None:
+        """Take the pretension (n,) that is pulled around."""
+        pretension_N = np.maximum(tension_N, _PULLED_N)
+        self._motors[kernel.PRETENSION_N] = pretension_N
+        at_tension = self._lengths_at_home(tension_N)
+        for row, share in zip(self._lengths[0], self._shares, strict=True):
+            row[:] = self._lengths_at_home(share * tension_N) - at_tension
+        slope = np.gradient(self._lengths[0], self._shares, axis=0)
+        self._lengths[1] = -slope / pretension_N
+
+    def begin(self, position_rad: FloatArray) -> None:
+        """Begin anew, at these angles (n,)."""
+        self._motors[kernel.ORIGIN] = position_rad
+        self._turned[:] = self._sums[:] = self._slid[:] = 0.0
+
+    def take(self, position_rad: FloatArray, tension_N: FloatArray) -> None:
+        """Take in a cycle's angles (n,) and the tensions asked for, (n,)."""
+        self._take(position_rad, tension_N)
+
+    def end(self) -> FloatArray:
+        """Return the angles (n,) at which the cables have the pretension, nan where not known."""
+        n = len(self._rated_Nm)
+        found, angle_rad = np.zeros(n, np.bool_), np.full(n, np.nan)
+        covariance = np.zeros((n, kernel.UNKNOWNS, kernel.UNKNOWNS))
+        for i in range(n):
+            alike = _ALIKE_rad / self._motors[kernel.POLE_PAIRS, i]
+            if self._known[i] or (self._slid[:, i] < _SLID * alike).any():
+                continue
+            misfit, self.unknowns[i], covariance[i] = self._fit(i, alike)
+            found[i] = misfit < _MISFIT
+        angle_rad[found] = (self._motors[kernel.ORIGIN] + self.unknowns[:, kernel.ANGLE])[found]
+        if self._learning is not None:
+            torques, slow = self.unknowns[:, kernel.FRICTION :].copy(), slice(kernel.FRICTION, None)
+            torques[:, 0] *= _SLOW_SHARE
+            covariance = covariance[:, slow, slow]
+            covariance[:, 0, 0] += (_UNLIKE * torques[:, 0]) ** 2
+            self._learning.begin_with(found, torques, covariance)
+        return angle_rad
+
+    def _fit(self, i: int, alike: float) -> tuple[float, FloatArray, FloatArray]:
+        """Return residual over noise, what was found of motor i (5,), and its covariance (5, 5)."""
+        rated_Nm, m = self._rated_Nm[i], kernel.UNKNOWNS
+        noise = (NOISE_SHARE * rated_Nm) ** 2
+        lower = self._sums[i]
+        sums = (lower + np.tril(lower, -1).T) / (alike * noise)
+        shares = np.array([FRICTION_SHARE, COGGING_SHARE, COGGING_SHARE])
+        usual = np.array([0.0, _STEEPER**-2, *(shares * rated_Nm) ** -2.0])
+        covariance = np.linalg.inv(sums[:m, :m] + np.diag(usual))
+        x = covariance @ sums[:m, m]
+        left = sums[m, m] - 2.0 * x @ sums[:m, m] + x @ sums[:m, :m] @ x
+        misfit = max(left, 0.0) * alike / self._slid[:, i].sum()
+        return float(np.sqrt(misfit)), x, covariance * max(misfit, 1.0)

@@ -1,0 +1,137 @@
+"""What is found of motors whose cables are pulled tight around a platform that stands."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from cdpr_profiles import load_robot
+from cdpr_rt.robots.platform.cable_control import CableControl
+from cdpr_rt.robots.platform.motor_learning import MotorLearning
+from cdpr_rt.robots.platform.pull_fit import PullFit
+from cdpr_rt.robots.platform_model import platform_model_of
+
+ROBOT = load_robot("suspended-6")
+N, POLE_PAIRS = 6, 4
+CABLE_m = np.array([axis.winch.cable_m_per_motor_rad for axis in ROBOT.axes])
+RATED_Nm = ROBOT.axes[0].winch.motor.rated_torque_Nm
+PRETENSION_N = np.full(N, 80.0)
+FRICTION_Nm = np.array([0.04, 0.08, 0.12, 0.06, 0.10, 0.09])
+PHASE_rad = np.array([0.3, 1.5, 2.6, 3.9, 5.0, 6.1])
+COGGING_Nm = np.array([0.06, 0.03, 0.0, 0.07, 0.05, 0.06])
+START_rad = 40.0
+NOBODY = np.zeros(N, np.bool_)
+
+
+@pytest.fixture(scope="module")
+def lengths() -> Callable[[np.ndarray], np.ndarray]:
+    limits = np.full(N, 4.0)
+    control = CableControl(platform_model_of(ROBOT), list(ROBOT.axes), limits, 1e-3)
+    return control.lengths_at_home
+
+
+class Winches:
+    """Motors with friction and cogging that pull at cables made fast at home, without inertia."""
+
+    def __init__(self, lengths: Callable[[np.ndarray], np.ndarray], gain: float = 1.0) -> None:
+        """Take what the motors exert over what is asked of them, `gain`."""
+        self.tensions_N, self.gain = np.linspace(0.1, 300.0, 600), gain
+        self.free_m = np.array([lengths(np.full(N, t)) for t in self.tensions_N])
+        self.at_pretension_rad = np.full(N, START_rad)
+        self.theta = self.at_pretension_rad + 4.0 * np.sign(CABLE_m)
+        self.zero_m = lengths(PRETENSION_N) - CABLE_m * self.at_pretension_rad
+
+    def pull(self, tension_N: np.ndarray) -> None:
+        """Turn each motor as far as its friction lets it."""
+        for i in range(N):
+            turns = self.theta[i] + np.linspace(-6.0, 6.0, 6001)
+            held = np.interp(
+                -self.zero_m[i] - CABLE_m[i] * turns, -self.free_m[:, i], self.tensions_N
+            )
+            cogging = COGGING_Nm[i] * np.sin(POLE_PAIRS * turns + PHASE_rad[i])
+            left = CABLE_m[i] * (held - self.gain * tension_N[i]) - cogging
+            stays = np.abs(left) <= FRICTION_Nm[i]
+            self.theta[i] = turns[stays][np.abs(turns[stays] - self.theta[i]).argmin()]
+
+
+def pulled(fit: PullFit, winches: Winches, moved_m: float = 0.0) -> np.ndarray:
+    """Return the angles that are found from the pretension to above, below, and back to it."""
+    fit.prepare(PRETENSION_N)
+    winches.pull(PRETENSION_N)
+    fit.begin(winches.theta)
+    shares = np.concatenate(
+        [np.linspace(1.0, 1.5, 40), np.linspace(1.5, 0.5, 80), np.linspace(0.5, 1.0, 40)]
+    )
+    for k, share in enumerate(shares):
+        if k == 60:  # the platform moves along with its cables
+            winches.zero_m += moved_m
+        winches.pull(share * PRETENSION_N)
+        fit.take(winches.theta, share * PRETENSION_N)
+    return fit.end()
+
+
+def off_N(found_rad: np.ndarray, winches: Winches) -> np.ndarray:
+    softness = (winches.free_m[150] - winches.free_m[170]) / (
+        winches.tensions_N[170] - winches.tensions_N[150]
+    )
+    return CABLE_m * (found_rad - winches.at_pretension_rad) / softness
+
+
+def test_lengths_are_found_without_friction_and_cogging(
+    lengths: Callable[[np.ndarray], np.ndarray],
+) -> None:
+    winches = Winches(lengths)
+    learning = MotorLearning(ROBOT.axes, NOBODY, np.ones(N), 500.0, 1e-3)
+    fit = PullFit(ROBOT.axes, NOBODY, lengths, learning)
+    found = pulled(fit, winches)
+    left_N = np.abs(off_N(winches.theta, winches))
+    assert left_N.max() > 10.0  # what is taken up where they have come to rest
+    assert np.abs(off_N(found, winches)).max() < 2.0
+    # friction in motion is taken to be four fifths of it, and nothing is more than 8 % of rated
+    np.testing.assert_allclose(learning.friction_Nm, 0.8 * FRICTION_Nm, atol=0.012)
+    cogging = np.stack([COGGING_Nm * np.cos(PHASE_rad), COGGING_Nm * np.sin(PHASE_rad)], axis=1)
+    np.testing.assert_allclose(learning.cogging_Nm, cogging, atol=0.015)
+
+
+def test_a_torque_constant_that_is_off_is_not_taken_for_cogging(
+    lengths: Callable[[np.ndarray], np.ndarray],
+) -> None:
+    """Nothing but a load cell knows of it: the pretension is truly 5 % more than was asked for."""
+    winches = Winches(lengths, gain=1.05)
+    fit = PullFit(ROBOT.axes, NOBODY, lengths, None)
+    found = pulled(fit, winches)
+    wrong_N = 0.05 * PRETENSION_N
+    assert np.abs(np.abs(off_N(found, winches)) - wrong_N).max() < 2.5
+
+
+def test_a_platform_that_moves_meanwhile_is_not_believed(
+    lengths: Callable[[np.ndarray], np.ndarray],
+) -> None:
+    fit = PullFit(ROBOT.axes, NOBODY, lengths, None)
+    assert np.isnan(pulled(fit, Winches(lengths), moved_m=0.02)).all()
+
+
+def test_nothing_is_found_of_motors_that_are_known_or_do_not_turn(
+    lengths: Callable[[np.ndarray], np.ndarray],
+) -> None:
+    known = np.arange(N) % 2 == 0
+    learning = MotorLearning(ROBOT.axes, known, np.ones(N), 500.0, 1e-3)
+    fit = PullFit(ROBOT.axes, known, lengths, learning)
+    assert (np.isnan(pulled(fit, Winches(lengths))) == known).all()
+    assert not learning.friction_Nm[known].any() and learning.friction_Nm[~known].all()
+    fit.begin(np.zeros(N))
+    for _ in range(50):
+        fit.take(np.zeros(N), PRETENSION_N)
+    assert np.isnan(fit.end()).all()
+    assert not learning.friction_Nm.any()
+
+
+def test_what_is_found_is_bounded_as_what_is_learnt_is(
+    lengths: Callable[[np.ndarray], np.ndarray],
+) -> None:
+    learning = MotorLearning(ROBOT.axes, NOBODY, np.ones(N), 3.0, 1e-3)
+    pulled(PullFit(ROBOT.axes, NOBODY, lengths, learning), Winches(lengths))
+    assert (learning.friction_Nm <= learning.most_Nm).all()
+    assert (np.abs(learning.cogging_Nm) <= learning.most_Nm[:, None]).all()
