@@ -48,8 +48,8 @@ def write_learnt(
 ) -> None:
     """Write φ into `terms` (n, 3), and the torques (n,) that make up for what was learnt.
 
-    `reference` (n,) is the wanted speed of the motors, `most` (n,) what friction and cogging are
-    at most, each. A little of the friction is left: with too much of it made up for, the platform
+    `reference` (n,) is the wanted speed of the motors, `most` (2, n) what friction and cogging are
+    at most. A little of the friction is left: with too much of it made up for, the platform
     would run ahead.
     """
     for i in range(torque.size):
@@ -59,7 +59,7 @@ def write_learnt(
         friction = _SHARE * x[TERMS * i]
         sine, cosine = x[TERMS * i + 1], x[TERMS * i + 2]
         size = math.sqrt(sine * sine + cosine * cosine)
-        share = 1.0 if size <= most[i] else most[i] / size
+        share = 1.0 if size <= most[1, i] else most[1, i] / size
         torque[i] = friction * terms[i, 0]
         torque[i] += share * (sine * terms[i, 1] + cosine * terms[i, 2])
 
@@ -86,9 +86,9 @@ def learn(
 ) -> int:
     """Take in one cycle: `x` (m,) and their covariance `P` (m, m); return the next direction.
 
-    `most` (n,) bounds w. Of M (d, d) the lower half counts. `usable` is whether the force was
-    exerted. Where it was not, no motor has to turn, or neither friction nor cogging can be what is
-    seen, nothing is learnt. `scratch` (2, m) is overwritten.
+    `most` (2, n) bounds friction and cogging. Of M (d, d) the lower half counts. `usable` is
+    whether the force was exerted. Where it was not, no motor has to turn, or neither friction nor
+    cogging can be what is seen, nothing is learnt. `scratch` (2, m) is overwritten.
     """
     n, d = J.shape
     w = TERMS * n
@@ -111,9 +111,9 @@ def learn(
     noise = settings[NOISE_N] * scale[direction]
     if _take_in(measured, noise * noise, h, Ph, x, P):
         for i in range(n):
-            x[TERMS * i] = min(max(x[TERMS * i], 0.0), most[i])
+            x[TERMS * i] = min(max(x[TERMS * i], 0.0), most[0, i])
             for j in range(1, TERMS):
-                x[TERMS * i + j] = min(max(x[TERMS * i + j], -most[i]), most[i])
+                x[TERMS * i + j] = min(max(x[TERMS * i + j], -most[1, i]), most[1, i])
     following: int = (direction + 1) % d
     return following
 

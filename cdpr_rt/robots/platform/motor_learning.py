@@ -59,10 +59,13 @@ class MotorLearning:
         self._states[kernel.FADING] = [MOTORS_FADING_S] * (m - d) + [WRENCH_FADING_S] * d
         self._scale, self._cable = scale, cable
         self._pole_pairs = np.array([float(axis.winch.motor.pole_pairs) for axis in axes])
-        self.most_Nm = np.minimum(
+        self._usual_Nm = np.minimum(
             MOST_SHARE * rated_Nm, MOST_RESERVE_SHARE * reserve_N * np.abs(cable)
         )
-        """What friction and cogging of each motor are at most, each, (n,)."""
+        self._largest_Nm = MOST_SHARE * rated_Nm
+        self._together_Nm = 2.0 * MOST_RESERVE_SHARE * reserve_N * np.abs(cable)
+        self.most_Nm = np.zeros((2, n))
+        """What friction and cogging of each motor are at most, (2, n)."""
         self._x, self._P = np.zeros(m), np.zeros((m, m))
         self._terms, self._filters = np.zeros((n, kernel.TERMS)), np.zeros(4 * n + 2 * d)
         self._direction = 0
@@ -112,6 +115,7 @@ class MotorLearning:
     def forget(self) -> None:
         """Forget what was learnt, as where the encoders have begun anew."""
         self.restart()
+        self.most_Nm[:] = self._usual_Nm
         self._x[:] = 0.0
         self._P[:] = np.diag(self._states[kernel.SIGMA] ** 2)
 
@@ -119,14 +123,19 @@ class MotorLearning:
         """Begin anew with what was `found` (n,) of motors at rest; the others' is forgotten.
 
         `torque_Nm` (n, 3) are friction, sine and cosine of the cogging, `covariance` (n, 3, 3).
+        Friction that was found may take what cogging leaves of what both are at most together.
         """
         self.forget()
+        friction, cogging = torque_Nm[:, 0], np.hypot(torque_Nm[:, 1], torque_Nm[:, 2])
+        left = np.minimum(self._together_Nm - cogging, self._largest_Nm)
+        most, room = self.most_Nm, np.maximum(np.minimum(friction, left), self._usual_Nm)
+        most[0] = np.where(found, room, self._usual_Nm)
+        most[1] = np.minimum(self._usual_Nm, self._together_Nm - most[0])
+        bounds = most[[0, 1, 1]].T
         for i in np.flatnonzero(found):
             motor = slice(kernel.TERMS * i, kernel.TERMS * (i + 1))
-            self._x[motor] = np.clip(torque_Nm[i], -self.most_Nm[i], self.most_Nm[i])
+            self._x[motor] = np.clip(torque_Nm[i], [0.0, *-bounds[i, 1:]], bounds[i])
             self._P[motor, motor] = covariance[i]
-        friction = self._x[: kernel.TERMS * len(found) : kernel.TERMS]
-        np.maximum(friction, 0.0, out=friction)
 
     @property
     def learnt_Nm(self) -> FloatArray:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 
 import numpy as np
@@ -25,8 +26,10 @@ _ALIKE_rad = 0.8
 _LEAST_SHARE, _MOST_SHARE, _SHARES = 0.3, 1.7, 57
 """Of the pretension, between which the cables' lengths are kept."""
 _PULLED_N = 1e-6
-_SLID = 0.1
-"""How much of what tells one thing a motor has to slide in both directions."""
+_COUNTS = 2.0
+"""Within which an encoder shows to and fro what stands."""
+_TURNED_rad = 0.005
+"""How far a motor has to turn in both directions for what is found to be believed."""
 _MISFIT = 3.0
 """Residual over noise above which a fit is not believed, as where the platform has moved."""
 _SLOW_SHARE, _UNLIKE = 0.8, 0.25
@@ -58,13 +61,17 @@ class PullFit:
         self._shares = np.linspace(_LEAST_SHARE, _MOST_SHARE, _SHARES)
         self._lengths = np.ones((2, _SHARES, n))
         size = kernel.UNKNOWNS + 1
-        self._turned, self._slid = np.zeros((2, 2, n))
+        self._motors[kernel.PLAY] = [
+            _COUNTS * math.tau / axis.winch.encoder_counts_per_turn for axis in axes
+        ]
+        self._seen, self._turned = np.zeros((2, 2, n))
+        self._yielding = np.zeros(n)
         self._sums = np.zeros((n, size, size))
         self.unknowns = np.zeros((n, kernel.UNKNOWNS))
         """What was found, (n, 5)."""
         self._take = bound(
-            kernel.take, self._motors, self._shares, self._lengths, self._turned, self._sums,
-            self._slid, np.zeros(size), then=(np.zeros(n), np.zeros(n)),
+            kernel.take, self._motors, self._shares, self._lengths, self._seen, self._yielding,
+            self._turned, self._sums, np.zeros(size), then=(np.zeros(n), np.zeros(n)),
         )  # fmt: skip
 
     def prepare(self, tension_N: FloatArray) -> None:
@@ -78,9 +85,10 @@ class PullFit:
         self._lengths[1] = -slope / pretension_N
 
     def begin(self, position_rad: FloatArray) -> None:
-        """Begin anew, at these angles (n,)."""
+        """Begin anew, at these angles (n,), to which the cables have been reeled in."""
         self._motors[kernel.ORIGIN] = position_rad
-        self._turned[:] = self._sums[:] = self._slid[:] = 0.0
+        self._seen[:] = self._turned[:] = self._sums[:] = 0.0
+        self._yielding[:] = -np.sign(self._motors[kernel.M_PER_RAD])
 
     def take(self, position_rad: FloatArray, tension_N: FloatArray) -> None:
         """Take in a cycle's angles (n,) and the tensions asked for, (n,)."""
@@ -93,7 +101,7 @@ class PullFit:
         covariance = np.zeros((n, kernel.UNKNOWNS, kernel.UNKNOWNS))
         for i in range(n):
             alike = _ALIKE_rad / self._motors[kernel.POLE_PAIRS, i]
-            if self._known[i] or (self._slid[:, i] < _SLID * alike).any():
+            if self._known[i] or (self._turned[:, i] < _TURNED_rad).any():
                 continue
             misfit, self.unknowns[i], covariance[i] = self._fit(i, alike)
             found[i] = misfit < _MISFIT
@@ -117,5 +125,5 @@ class PullFit:
         covariance = np.linalg.inv(sums[:m, :m] + np.diag(usual))
         x = covariance @ sums[:m, m]
         left = sums[m, m] - 2.0 * x @ sums[:m, m] + x @ sums[:m, :m] @ x
-        misfit = max(left, 0.0) * alike / self._slid[:, i].sum()
+        misfit = max(left, 0.0) * alike / self._turned[:, i].sum()
         return float(np.sqrt(misfit)), x, covariance * max(misfit, 1.0)

@@ -10,8 +10,9 @@ with θ_P the angle at which the cable has the tension P, s by how much more the
 is asked for, f dry friction and (A, B) cogging. What is added up are the sums of squares and
 products of this equation's factors and of y, `sums` (n, 6, 6), lower halves.
 
-Friction has its direction only once a motor has slid for some way. `turned` (2, n) are the least
-and the greatest angle of the way before that, as a play has them.
+Friction turns round with the direction, over the way in which a contact yields before it slides: in
+place of sign θ̇ stands z in -1 to 1, dz/dθ = (1 - z sign θ̇)/δ (Dahl, 1968). What an encoder shows to
+and fro is no motion: `seen` (2, n) are the least and the greatest angle, as a play has them.
 """
 
 from __future__ import annotations
@@ -23,10 +24,10 @@ from cdpr_rt.jit import jit
 
 UNKNOWNS = 5
 ANGLE, STEEPER, FRICTION, SINE, COSINE = range(UNKNOWNS)
-PRETENSION_N, M_PER_RAD, POLE_PAIRS, ORIGIN, MOTOR_ROWS = range(5)
-"""Rows of `motors` (4, n): P, c, p, and the angle from which θ and θ_P are counted."""
-PLAY_rad = 0.015
-"""A motor has slid, and friction all of its size, once it has turned by so much."""
+PRETENSION_N, M_PER_RAD, POLE_PAIRS, ORIGIN, PLAY, MOTOR_ROWS = range(6)
+"""Rows of `motors` (5, n): P, c, p, the angle from which θ and θ_P are counted, the play, rad."""
+_YIELD_rad = 0.006
+"""δ: what there is in motors of 1 to 4 Nm; twice or half of it finds much the same."""
 
 
 @jit
@@ -34,25 +35,30 @@ def take(
     motors: FloatArray,
     shares: FloatArray,
     lengths: FloatArray,
+    seen: FloatArray,
+    yielding: FloatArray,
     turned: FloatArray,
     sums: FloatArray,
-    slid: FloatArray,
     h: FloatArray,
     position: FloatArray,
     tension: FloatArray,
 ) -> None:
     """Take in the angles (n,) of a cycle at the tensions asked for (n,).
 
-    `lengths` (2, m, n) are l - l(P) and e of each cable at m even `shares` of P. `slid` (2, n) is
-    by how much each motor has slid this way and that, rad. An angle counts by how much it is
-    farther than those before. `h` (6,) is overwritten.
+    `lengths` (2, m, n) are l - l(P) and e of each cable at m even `shares` of P. `yielding`
+    (n,) are z, `turned` (2, n) by how much each motor has turned this way and that, rad. An angle
+    counts by how much it is farther than those before. `h` (6,) is overwritten.
     """
     step = shares[1] - shares[0]
     for i in range(position.size):
         theta = position[i] - motors[ORIGIN, i]
-        side, way = _slides(turned, theta, i)
+        way = _farther(motors[PLAY, i], seen, theta, i)
+        side = math.copysign(1.0, way)
+        way = abs(way)
+        z = yielding[i] + way / _YIELD_rad * (side - yielding[i])
+        yielding[i] = min(max(z, -1.0), 1.0)
         at = (tension[i] / motors[PRETENSION_N, i] - shares[0]) / step
-        if side == 0 or not 0.0 <= at < shares.size - 1:
+        if way == 0.0 or not 0.0 <= at < shares.size - 1:
             continue
         k = int(at)
         upper = at - k
@@ -62,27 +68,22 @@ def take(
             continue
         c, angle = motors[M_PER_RAD, i], motors[POLE_PAIRS, i] * position[i]
         h[ANGLE], h[STEEPER] = -c * c / e, c * (tension[i] - motors[PRETENSION_N, i])
-        h[FRICTION], h[SINE], h[COSINE] = side, math.sin(angle), math.cos(angle)
+        h[FRICTION], h[SINE], h[COSINE] = yielding[i], math.sin(angle), math.cos(angle)
         h[UNKNOWNS] = c * (length - c * theta) / e
-        slid[0 if side > 0 else 1, i] += way
+        turned[0 if side > 0.0 else 1, i] += way
         for j in range(UNKNOWNS + 1):
             for m in range(j + 1):
                 sums[i, j, m] += way * h[j] * h[m]
 
 
 @jit
-def _slides(turned: FloatArray, theta: float, i: int) -> tuple[int, float]:
-    """Move the play of motor i along; return the direction in which it slides, 0 for none.
-
-    And by how much it is farther than before.
-    """
-    side, way = 0, 0.0
-    if theta > turned[1, i]:
-        side, way = (1 if theta - turned[0, i] >= PLAY_rad else 0), theta - turned[1, i]
-        turned[1, i] = theta
-        turned[0, i] = max(turned[0, i], theta - PLAY_rad)
-    elif theta < turned[0, i]:
-        side, way = (-1 if turned[1, i] - theta >= PLAY_rad else 0), turned[0, i] - theta
-        turned[0, i] = theta
-        turned[1, i] = min(turned[1, i], theta + PLAY_rad)
-    return side, way
+def _farther(play: float, seen: FloatArray, theta: float, i: int) -> float:
+    """Move the play of motor i along; return by how much it is farther than before, signed."""
+    way = 0.0
+    if theta > seen[1, i]:
+        way = theta - seen[1, i]
+        seen[1, i], seen[0, i] = theta, max(seen[0, i], theta - play)
+    elif theta < seen[0, i]:
+        way = theta - seen[0, i]
+        seen[0, i], seen[1, i] = theta, min(seen[1, i], theta + play)
+    return way

@@ -128,10 +128,19 @@ def test_nothing_is_found_of_motors_that_are_known_or_do_not_turn(
     assert not learning.friction_Nm.any()
 
 
-def test_what_is_found_is_bounded_as_what_is_learnt_is(
-    lengths: Callable[[np.ndarray], np.ndarray],
+@pytest.mark.parametrize("reserve_N", [3.0, 20.0, 500.0])
+def test_what_is_found_leaves_the_tensions_a_third_of_their_reserve(
+    lengths: Callable[[np.ndarray], np.ndarray], reserve_N: float
 ) -> None:
-    learning = MotorLearning(ROBOT.axes, NOBODY, np.ones(N), 3.0, 1e-3)
+    learning = MotorLearning(ROBOT.axes, NOBODY, np.ones(N), reserve_N, 1e-3)
     pulled(PullFit(ROBOT.axes, NOBODY, lengths, learning), Winches(lengths))
-    assert (learning.friction_Nm <= learning.most_Nm).all()
-    assert (np.abs(learning.cogging_Nm) <= learning.most_Nm[:, None]).all()
+    added_Nm = learning.friction_Nm + np.linalg.norm(learning.cogging_Nm, axis=1)
+    third_Nm = reserve_N / 3.0 * np.abs(CABLE_m)
+    assert (learning.friction_Nm > 0.0).all()
+    assert (learning.most_Nm.sum(axis=0) <= 2.0 * third_Nm + 1e-12).all()
+    assert (learning.friction_Nm <= learning.most_Nm[0]).all()
+    if reserve_N == 20.0:  # where friction is larger than a third, and cogging less
+        assert (learning.friction_Nm > 1.05 * third_Nm).any()
+    assert np.isfinite(added_Nm).all()
+    learning.forget()
+    assert (learning.most_Nm <= third_Nm + 1e-12).all()
