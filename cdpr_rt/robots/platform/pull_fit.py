@@ -26,6 +26,8 @@ _ALIKE_rad = 0.8
 _LEAST_SHARE, _MOST_SHARE, _SHARES = 0.3, 1.7, 57
 """Of the pretension, between which the cables' lengths are kept."""
 _PULLED_N = 1e-6
+_ANYWHERE_rad = 1e3
+"""Standard deviation of an angle of which nothing is known."""
 _COUNTS = 2.0
 """Within which an encoder shows to and fro what stands."""
 _TURNED_rad = 0.005
@@ -83,6 +85,7 @@ class PullFit:
             row[:] = self._lengths_at_home(share * tension_N) - at_tension
         slope = np.gradient(self._lengths[0], self._shares, axis=0)
         self._lengths[1] = -slope / pretension_N
+        self._fit()  # what numpy loads for it is not to be loaded in a cycle
 
     def begin(self, position_rad: FloatArray) -> None:
         """Begin anew, at these angles (n,), to which the cables have been reeled in."""
@@ -96,34 +99,35 @@ class PullFit:
 
     def end(self) -> FloatArray:
         """Return the angles (n,) at which the cables have the pretension, nan where not known."""
-        n = len(self._rated_Nm)
-        found, angle_rad = np.zeros(n, np.bool_), np.full(n, np.nan)
-        covariance = np.zeros((n, kernel.UNKNOWNS, kernel.UNKNOWNS))
-        for i in range(n):
-            alike = _ALIKE_rad / self._motors[kernel.POLE_PAIRS, i]
-            if self._known[i] or (self._turned[:, i] < _TURNED_rad).any():
-                continue
-            misfit, self.unknowns[i], covariance[i] = self._fit(i, alike)
-            found[i] = misfit < _MISFIT
-        angle_rad[found] = (self._motors[kernel.ORIGIN] + self.unknowns[:, kernel.ANGLE])[found]
+        misfit, x, covariance = self._fit()
+        found = ~self._known & (self._turned >= _TURNED_rad).all(axis=0) & (misfit < _MISFIT)
+        self.unknowns[:] = x
         if self._learning is not None:
-            torques, slow = self.unknowns[:, kernel.FRICTION :].copy(), slice(kernel.FRICTION, None)
+            torques, of_torques = x[:, kernel.FRICTION :].copy(), slice(kernel.FRICTION, None)
             torques[:, 0] *= _SLOW_SHARE
-            covariance = covariance[:, slow, slow]
+            covariance = covariance[:, of_torques, of_torques]
             covariance[:, 0, 0] += (_UNLIKE * torques[:, 0]) ** 2
             self._learning.begin_with(found, torques, covariance)
-        return angle_rad
+        return np.where(found, self._motors[kernel.ORIGIN] + x[:, kernel.ANGLE], np.nan)
 
-    def _fit(self, i: int, alike: float) -> tuple[float, FloatArray, FloatArray]:
-        """Return residual over noise, what was found of motor i (5,), and its covariance (5, 5)."""
-        rated_Nm, m = self._rated_Nm[i], kernel.UNKNOWNS
-        noise = (NOISE_SHARE * rated_Nm) ** 2
-        lower = self._sums[i]
-        sums = (lower + np.tril(lower, -1).T) / (alike * noise)
+    def _fit(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return of each motor residual over noise, (n,), what was found, (n, 5), its covariance.
+
+        Covariances are (n, 5, 5).
+        """
+        rated_Nm, m = self._rated_Nm[:, None], kernel.UNKNOWNS
+        alike_rad = _ALIKE_rad / self._motors[kernel.POLE_PAIRS]
+        noise = alike_rad * (NOISE_SHARE * self._rated_Nm) ** 2
+        sums = self._sums + np.swapaxes(np.tril(self._sums, -1), 1, 2)
+        sums /= noise[:, None, None]
         shares = np.array([FRICTION_SHARE, COGGING_SHARE, COGGING_SHARE])
-        usual = np.array([0.0, _STEEPER**-2, *(shares * rated_Nm) ** -2.0])
-        covariance = np.linalg.inv(sums[:m, :m] + np.diag(usual))
-        x = covariance @ sums[:m, m]
-        left = sums[m, m] - 2.0 * x @ sums[:m, m] + x @ sums[:m, :m] @ x
-        misfit = max(left, 0.0) * alike / self._turned[:, i].sum()
-        return float(np.sqrt(misfit)), x, covariance * max(misfit, 1.0)
+        usual = np.full((rated_Nm.size, m), [_ANYWHERE_rad, _STEEPER, 1.0, 1.0, 1.0])
+        usual[:, kernel.FRICTION :] = shares * rated_Nm
+        products, rest = sums[:, :m, :m], sums[:, :m, m]
+        covariance = np.linalg.inv(products + np.eye(m) * usual[:, None] ** -2.0)
+        x = np.einsum("ijk,ik->ij", covariance, rest)
+        left = sums[:, m, m] - 2.0 * np.einsum("ij,ij->i", x, rest)
+        left += np.einsum("ij,ijk,ik->i", x, products, x)
+        told = np.maximum(self._turned.sum(axis=0), _TURNED_rad) / alike_rad
+        misfit = np.maximum(left, 0.0) / told
+        return np.sqrt(misfit), x, covariance * np.maximum(misfit, 1.0)[:, None, None]
