@@ -59,9 +59,7 @@ class MotorBounds:
 
     def bias(self, key: str, torque_Nm: float) -> Faults:
         """Yield a fault for a bias that would turn the motor by itself."""
-        most = BIAS_SHARE * self.motor.rated_torque_Nm
-        of = f"Nm, {100 * BIAS_SHARE:g} % of the rated torque of {self.motor.model}"
-        yield from within(key, torque_Nm, -most, most, of)
+        yield from self._within_share(key, torque_Nm, BIAS_SHARE)
 
     def viscous(self, key: str, viscous_Nms_rad: float) -> Faults:
         """Yield a fault for viscous friction that is too large for the motor."""
@@ -89,9 +87,12 @@ class MotorBounds:
 
     def winch_friction(self, key: str, torque_Nm: float) -> Faults:
         """Yield a fault for a bias or friction too large for a winch without tension."""
-        most = WINCH_FRICTION_SHARE * self.motor.rated_torque_Nm
-        of = f"Nm, {100 * WINCH_FRICTION_SHARE:g} % of the rated torque of {self.motor.model}"
-        yield from within(key, torque_Nm, -most, most, of)
+        yield from self._within_share(key, torque_Nm, WINCH_FRICTION_SHARE)
+
+    def _within_share(self, key: str, torque_Nm: float, share: float) -> Faults:
+        bound = share * self.motor.rated_torque_Nm
+        of = f"Nm, {100 * share:g} % of the rated torque of {self.motor.model}"
+        yield from within(key, torque_Nm, -bound, bound, of)
 
 
 def within(key: str, value: float, low: float, high: float, of: str) -> Faults:
