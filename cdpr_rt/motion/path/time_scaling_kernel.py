@@ -12,6 +12,7 @@ from typing import Final
 
 from cdpr_rt.arrays import FloatArray, IntArray
 from cdpr_rt.jit import jit
+from cdpr_rt.motion.path.quintic import quintic
 
 _NOTHING: Final = 1e-12
 _MOST_CUTS: Final = 60
@@ -208,16 +209,9 @@ def place_between(
     h = s[i + 1] - s[i]
     u = min(max((along - s[i]) / h, 0.0), 1.0)
     for k in range(q.shape[1]):
-        p0, v0, a0 = q[i, k], h * first[i, k], h * h * second[i, k]
-        p1, v1, a1 = q[i + 1, k], h * first[i + 1, k], h * h * second[i + 1, k]
-        gap, slope, bend = p1 - p0 - v0 - 0.5 * a0, v1 - v0 - a0, a1 - a0
-        c3 = 10.0 * gap - 4.0 * slope + 0.5 * bend
-        c4 = -15.0 * gap + 7.0 * slope - bend
-        c5 = 6.0 * gap - 3.0 * slope + 0.5 * bend
-        out[0, k] = p0 + u * (v0 + u * (0.5 * a0 + u * (c3 + u * (c4 + u * c5))))
-        out[1, k] = (v0 + u * (a0 + u * (3 * c3 + u * (4 * c4 + u * 5 * c5)))) / h
-        out[2, k] = (a0 + u * (6 * c3 + u * (12 * c4 + u * 20 * c5))) / h**2
-        out[3, k] = (6 * c3 + u * (24 * c4 + u * 60 * c5)) / h**3
+        out[0, k], out[1, k], out[2, k], out[3, k] = quintic(
+            q[i, k], first[i, k], second[i, k], q[i + 1, k], first[i + 1, k], second[i + 1, k], h, u
+        )
 
 
 @jit

@@ -7,6 +7,7 @@ from typing import Final
 
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.jit import jit
+from cdpr_rt.motion.path.quintic import quintic
 
 TIME, RATE = 0, 1
 """Places in the state: time along the plan, s, and how fast it passes."""
@@ -22,21 +23,12 @@ _NOTHING: Final = 1e-12
 @jit
 def _between(
     samples: FloatArray, period: float, i: int, k: int, u: float
-) -> tuple[float, float, float]:
-    """Return a coordinate and two derivatives at a share u between samples: Hermite, 5th order."""
-    p0, v0 = samples[i, 0, k], period * samples[i, 1, k]
-    a0 = period * period * samples[i, 2, k]
-    p1, v1 = samples[i + 1, 0, k], period * samples[i + 1, 1, k]
-    a1 = period * period * samples[i + 1, 2, k]
-    gap, slope, bend = p1 - p0 - v0 - 0.5 * a0, v1 - v0 - a0, a1 - a0
-    c3 = 10.0 * gap - 4.0 * slope + 0.5 * bend
-    c4 = -15.0 * gap + 7.0 * slope - bend
-    c5 = 6.0 * gap - 3.0 * slope + 0.5 * bend
-    return (
-        p0 + u * (v0 + u * (0.5 * a0 + u * (c3 + u * (c4 + u * c5)))),
-        (v0 + u * (a0 + u * (3.0 * c3 + u * (4.0 * c4 + u * 5.0 * c5)))) / period,
-        (a0 + u * (6.0 * c3 + u * (12.0 * c4 + u * 20.0 * c5))) / period**2,
-    )
+) -> tuple[float, float, float, float]:
+    """Return a coordinate and its derivatives at a share u between two samples."""
+    return quintic(
+        samples[i, 0, k], samples[i, 1, k], samples[i, 2, k],
+        samples[i + 1, 0, k], samples[i + 1, 1, k], samples[i + 1, 2, k], period, u,
+    )  # fmt: skip
 
 
 @jit
@@ -45,7 +37,7 @@ def _place(samples: FloatArray, period: float, time: float, out: FloatArray) -> 
     i = min(max(int(time / period), 0), samples.shape[0] - 2)
     u = min(max(time / period - i, 0.0), 1.0)
     for k in range(samples.shape[2]):
-        out[0, k], out[1, k], out[2, k] = _between(samples, period, i, k, u)
+        out[0, k], out[1, k], out[2, k], _ = _between(samples, period, i, k, u)
 
 
 @jit
@@ -113,7 +105,7 @@ def _keeps_between(
     """Return whether a coordinate keeps speed and acceleration at places between two samples."""
     more = min(0.5 * period * jerk, acceleration)
     for j in range(1, 4):
-        _, v, a = _between(samples, period, i, k, 0.25 * j)
+        _, v, a, _ = _between(samples, period, i, k, 0.25 * j)
         if not abs(a) <= _MORE * acceleration + more:
             return False
         if not abs(v) <= _MORE * speed + 0.25 * period * acceleration:
