@@ -54,51 +54,36 @@ _PAID_OUT_m: Final = 5e-4
 
 
 @jit
-def note_exceeded(
-    verdict: Any, reactions: Any, limit: int, axis: int, value: float, allowed: float
-) -> None:
+def _exceeded(worst: Any, limit: int, axis: int, value: float, allowed: float) -> None:
     """Keep the most severe of what was exceeded in this cycle, the first of equals."""
-    reaction = reactions[limit]
-    if reaction > verdict[0]["reaction"]:
-        verdict[0]["reaction"], verdict[0]["limit"], verdict[0]["axis"] = reaction, limit, axis
-        verdict[0]["value"], verdict[0]["allowed"] = value, allowed
+    verdict, reactions = worst
+    if reactions[limit] > verdict["reaction"]:
+        verdict["reaction"], verdict["limit"] = reactions[limit], limit
+        verdict["axis"], verdict["value"], verdict["allowed"] = axis, value, allowed
 
 
 @jit
 def _bound_torque(
-    i: int,
-    limits: Any,
-    history: Any,
-    reactions: Any,
-    verdict: Any,
-    period: float,
-    torque: FloatArray,
+    i: int, limits: Any, history: Any, worst: Any, period: float, torque: FloatArray
 ) -> None:
     asked = torque[i]
     if not np.isfinite(asked):
-        note_exceeded(verdict, reactions, _NOT_FINITE, i, asked, 0.0)
+        _exceeded(worst, _NOT_FINITE, i, asked, 0.0)
         asked = 0.0
     bound, rate = limits["torque_Nm"], limits["torque_rate_Nm_s"]
     if abs(asked) > bound:
-        note_exceeded(verdict, reactions, _TORQUE, i, asked, bound)
+        _exceeded(worst, _TORQUE, i, asked, bound)
         asked = min(max(asked, -bound), bound)
     step = asked - history["torque"]
     if abs(step) > rate * period:
-        note_exceeded(verdict, reactions, _TORQUE_RATE, i, step / period, rate)
+        _exceeded(worst, _TORQUE_RATE, i, step / period, rate)
         asked = history["torque"] + min(max(step, -rate * period), rate * period)
     history["torque"] = torque[i] = asked
 
 
 @jit
 def _watch_answers(
-    i: int,
-    limits: Any,
-    history: Any,
-    reactions: Any,
-    verdict: Any,
-    valid: bool,
-    regular: bool,
-    window: Any,
+    i: int, limits: Any, history: Any, worst: Any, valid: bool, regular: bool, window: Any
 ) -> None:
     missed = 0 if valid else 1
     # where this cycle's flag goes, that of one window ago still is
@@ -108,30 +93,23 @@ def _watch_answers(
     window[index, i] = missed
     history["stale"] = 0.0 if regular else history["stale"] + 1.0
     if history["missed"] > limits["missed_cycles"]:
-        note_exceeded(verdict, reactions, _MISSED, i, history["missed"], limits["missed_cycles"])
+        _exceeded(worst, _MISSED, i, history["missed"], limits["missed_cycles"])
     if history["in_window"] > limits["missed_in_window"]:
-        note_exceeded(
-            verdict,
-            reactions,
-            _MISSED_IN_WINDOW,
-            i,
-            history["in_window"],
-            limits["missed_in_window"],
-        )
+        _exceeded(worst, _MISSED_IN_WINDOW, i, history["in_window"], limits["missed_in_window"])
     if history["stale"] > limits["stale_cycles"]:
-        note_exceeded(verdict, reactions, _STALE, i, history["stale"], limits["stale_cycles"])
+        _exceeded(worst, _STALE, i, history["stale"], limits["stale_cycles"])
 
 
 @jit
 def _watch_jumps(
-    i: int, limits: Any, history: Any, reactions: Any, verdict: Any, elapsed: float, position: float
+    i: int, limits: Any, history: Any, worst: Any, elapsed: float, position: float
 ) -> None:
     history["invalid_s"] += elapsed
     step = position - history["valid_rad"]
     jump = step - history["velocity_rad_s"] * history["invalid_s"]
     possible = limits["speed_rad_s"] * history["invalid_s"] + _JUMP_rad
     if history["valid_count"] == 2.0 and abs(jump) > possible:
-        note_exceeded(verdict, reactions, _ENCODER_JUMP, i, jump, possible)
+        _exceeded(worst, _ENCODER_JUMP, i, jump, possible)
     history["velocity_rad_s"] = step / history["invalid_s"] if history["valid_count"] else 0.0
     history["valid_count"] = min(history["valid_count"] + 1.0, 2.0)
     history["valid_rad"], history["invalid_s"] = position, 0.0
@@ -139,25 +117,18 @@ def _watch_jumps(
 
 @jit
 def _watch_motion(
-    i: int,
-    limits: Any,
-    reactions: Any,
-    verdict: Any,
-    error: float,
-    velocity: float,
-    length: float,
-    paying_out: float,
+    i: int, limits: Any, worst: Any, error: float, velocity: float, length: float, paying_out: float
 ) -> None:
     # a value that is not a number is not within its limit either
     if not abs(velocity) <= limits["speed_rad_s"]:
-        note_exceeded(verdict, reactions, _SPEED, i, velocity, limits["speed_rad_s"])
+        _exceeded(worst, _SPEED, i, velocity, limits["speed_rad_s"])
     if not abs(error) <= limits["following_error_rad"]:
-        note_exceeded(verdict, reactions, _FOLLOWING_ERROR, i, error, limits["following_error_rad"])
+        _exceeded(worst, _FOLLOWING_ERROR, i, error, limits["following_error_rad"])
     # beyond a length only the way back is open
     if length > limits["cable_length_max_m"] and paying_out > 0.0:
-        note_exceeded(verdict, reactions, _CABLE_LENGTH, i, length, limits["cable_length_max_m"])
+        _exceeded(worst, _CABLE_LENGTH, i, length, limits["cable_length_max_m"])
     if length < limits["cable_length_min_m"] and paying_out < 0.0:
-        note_exceeded(verdict, reactions, _CABLE_LENGTH, i, length, limits["cable_length_min_m"])
+        _exceeded(worst, _CABLE_LENGTH, i, length, limits["cable_length_min_m"])
 
 
 @jit
@@ -177,8 +148,7 @@ def _watch_tension(
     i: int,
     limits: Any,
     history: Any,
-    reactions: Any,
-    verdict: Any,
+    worst: Any,
     elapsed: float,
     tension: float,
     slack_allowed: bool,
@@ -186,7 +156,7 @@ def _watch_tension(
     cable_m_per_rad: float,
 ) -> None:
     if tension > limits["tension_max_N"]:
-        note_exceeded(verdict, reactions, _TENSION_HIGH, i, tension, limits["tension_max_N"])
+        _exceeded(worst, _TENSION_HIGH, i, tension, limits["tension_max_N"])
     if slack_allowed:
         history["low_armed"] = history["slack_armed"] = 0.0
         return
@@ -203,13 +173,13 @@ def _watch_tension(
     # each is noted once, so that the cable can be tightened, and again when it was tight
     if history["slack_armed"] and history["slack_s"] > 0.0 and at_once:
         history["low_armed"] = history["slack_armed"] = 0.0
-        note_exceeded(verdict, reactions, _BROKEN_CABLE, i, tension, limits["tension_min_N"])
+        _exceeded(worst, _BROKEN_CABLE, i, tension, limits["tension_min_N"])
     elif history["slack_armed"] and history["slack_s"] > limits["slack_s"]:
         history["low_armed"] = history["slack_armed"] = 0.0
-        note_exceeded(verdict, reactions, _SLACK, i, tension, limits["slack_N"])
+        _exceeded(worst, _SLACK, i, tension, limits["slack_N"])
     elif history["low_armed"] and history["low_s"] > limits["slack_s"]:
         history["low_armed"] = 0.0
-        note_exceeded(verdict, reactions, _TENSION_LOW, i, tension, limits["tension_min_N"])
+        _exceeded(worst, _TENSION_LOW, i, tension, limits["tension_min_N"])
 
 
 @jit
@@ -242,30 +212,31 @@ def check_axes(
     `Setpoint`; `elapsed` is from the last SYNC to this one, s.
     """
     verdict[0]["reaction"] = verdict[0]["limit"] = 0
+    worst = verdict[0], reactions
     period = all_limits[0]["period_s"]
     if elapsed - period > all_limits[0]["late_s"]:
-        note_exceeded(verdict, reactions, _LATE, -1, elapsed - period, all_limits[0]["late_s"])
+        _exceeded(worst, _LATE, -1, elapsed - period, all_limits[0]["late_s"])
     for i in range(torque.size):
         limits, history = all_limits[i], histories[i]
-        _bound_torque(i, limits, history, reactions, verdict, period, torque)
+        _bound_torque(i, limits, history, worst, period, torque)
         regular = alive[i] and rate_ok[i]
-        _watch_answers(i, limits, history, reactions, verdict, valid[i], regular, window)
+        _watch_answers(i, limits, history, worst, valid[i], regular, window)
         if not valid[i]:
             history["invalid_s"] += elapsed
             continue
-        _watch_jumps(i, limits, history, reactions, verdict, elapsed, position[i])
+        _watch_jumps(i, limits, history, worst, elapsed, position[i])
         winding_in = -velocity[i] * np.sign(cable_m_per_rad[i])
         mean_N = history["mean_N"]
         if _has_snapped(limits, history, elapsed, tension[i], winding_in):
-            note_exceeded(verdict, reactions, _BROKEN_CABLE, i, tension[i], mean_N)
+            _exceeded(worst, _BROKEN_CABLE, i, tension[i], mean_N)
         error, paying_out = setpoint[i] - position[i], setpoint_velocity[i] * cable_m_per_rad[i]
-        _watch_motion(i, limits, reactions, verdict, error, velocity[i], length[i], paying_out)
+        _watch_motion(i, limits, worst, error, velocity[i], length[i], paying_out)
         if not sensor_ok[i]:
             # what takes its place is an estimate, whose step would look like a broken cable
-            note_exceeded(verdict, reactions, _TENSION_SENSOR, i, np.nan, np.nan)
+            _exceeded(worst, _TENSION_SENSOR, i, np.nan, np.nan)
             continue
         _watch_tension(
-            i, limits, history, reactions, verdict, elapsed, tension[i], slack_allowed, position[i],
+            i, limits, history, worst, elapsed, tension[i], slack_allowed, position[i],
             cable_m_per_rad[i],
         )  # fmt: skip
     return int(verdict[0]["reaction"])

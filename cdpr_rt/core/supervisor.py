@@ -17,7 +17,6 @@ from cdpr_rt.core.limit_kernel import (
     FIGURES,
     VERDICT,
     check_axes,
-    note_exceeded,
 )
 from cdpr_rt.core.limits import DEFAULT_REACTIONS, Limit, Limits
 from cdpr_rt.core.states import Reaction
@@ -123,9 +122,7 @@ class Supervisor:
         agree = disagree_m <= allowed
         self._disagree_s = max(self._disagree_s + (-elapsed_s if agree else elapsed_s), 0.0)
         if self._disagree_s > self.limits.broken_within_s:
-            note_exceeded(
-                self._verdict, self._reactions, int(Limit.LENGTHS), axis, disagree_m, allowed
-            )
+            return self._note(Limit.LENGTHS, axis, disagree_m, allowed)
         return int(self._verdict["reaction"][0])
 
     def report(self, limit: Limit, reason: str) -> int:
@@ -133,11 +130,14 @@ class Supervisor:
 
         It counts until the next `check`, and beside what that one found only if it is worse.
         """
-        reaction = int(self._reactions[limit])
-        if reaction > self._verdict["reaction"][0]:
-            self._verdict[0] = (reaction, limit, -1, math.nan, math.nan)
+        return self._note(limit, -1, math.nan, math.nan, reason)
+
+    def _note(self, limit: Limit, axis: int, value: float, allowed: float, reason: str = "") -> int:
+        reaction, worst = int(self._reactions[limit]), int(self._verdict["reaction"][0])
+        if reaction > worst:
+            self._verdict[0] = (reaction, limit, axis, value, allowed)
             self._reported_reason = reason
-        return int(self._verdict["reaction"][0])
+        return max(reaction, worst)
 
     @property
     def reaction(self) -> Reaction:
