@@ -54,17 +54,18 @@ class PidProgram(AxisProgram):
             distance = keys.axes(key, limit * np.abs(cable), optional=True) / cable
         else:
             distance = keys.axes(key, limit, optional=True)
-        speed = self._model.speed_rad_s
-        most = keys.number("speed_rad_s", _SLOWEST_RAD_S, float(speed.max()), float(speed.max()))
-        return key, distance, np.minimum(speed, most)
+        limits = self._model.speed_rad_s
+        fastest = float(limits.max())
+        speed = keys.number("speed_rad_s", _SLOWEST_RAD_S, fastest, fastest)
+        return key, distance, np.minimum(limits, speed)
 
     def _take(self, parsed: _Target) -> None:
         key, distance, speed = parsed
         setpoint = self._setpoint
-        here, pace = setpoint.position_rad, setpoint.velocity_rad_s
-        there = distance if key == "position_rad" else here + distance
-        stop = here + 0.5 * pace * np.abs(pace) / self._model.acceleration_rad_s2
-        self._motion.set_out(np.where(np.isnan(distance), stop, there), setpoint, speed)
+        position, velocity = setpoint.position_rad, setpoint.velocity_rad_s
+        target = distance if key == "position_rad" else position + distance
+        stop = position + 0.5 * velocity * np.abs(velocity) / self._model.acceleration_rad_s2
+        self._motion.set_out(np.where(np.isnan(distance), stop, target), setpoint, speed)
         self._has_target = True
 
     def _move(self, setpoint: Setpoint) -> bool:

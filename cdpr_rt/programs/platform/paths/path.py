@@ -137,37 +137,37 @@ class PathProgram(PlatformProgram):
         self._require_pose()
         if set(arguments) == {"feed"}:
             return _Command("feed", None, 0.0, 0.0, feed)
-        what = keys.one_of("plan", "resume", "pause", "back_m")
-        if what in ("resume", "pause") and arguments[what] is not True:
-            raise ProgramError(f"path: {what}: value {arguments[what]!r}; allowed: true")
-        if what == "pause":
-            return _Command(what, None, 0.0, 0.0, feed)
-        if what == "plan":
+        key = keys.one_of("plan", "resume", "pause", "back_m")
+        if key in ("resume", "pause") and arguments[key] is not True:
+            raise ProgramError(f"path: {key}: value {arguments[key]!r}; allowed: true")
+        if key == "pause":
+            return _Command(key, None, 0.0, 0.0, feed)
+        if key == "plan":
             plan, time_s = self.store.plan(str(arguments["plan"])), 0.0
             feed = keys.number("feed", _SLOWEST, 1.0, 1.0)
         else:
-            plan, time_s = self._taken_up(what)
-        on_way = what == "plan" or not self._follows(plan)
+            plan, time_s = self._taken_up(key)
+        on_way = key == "plan" or not self._follows(plan)
         if on_way:
             self._require_way(plan, time_s)
         back_s = time_s
-        if what == "back_m":
+        if key == "back_m":
             back_m = keys.number("back_m", 0.0, _FARTHEST_BACK_m, 0.0)
-            wanted = plan.along_m[plan.row(time_s)] - back_m
-            back_s = plan.period_s * plan.row_along(wanted)
-        return _Command(what, plan, time_s, back_s, feed, on_way)
+            along_m = plan.along_m[plan.row(time_s)] - back_m
+            back_s = plan.period_s * plan.row_along(along_m)
+        return _Command(key, plan, time_s, back_s, feed, on_way)
 
     def _follows(self, plan: StoredPlan) -> bool:
         """Return whether the set-point is on this plan, and nothing has moved it since."""
         known = self._plan is not None and self._plan.name == plan.name
         return known and self._stage == "path" and self._last_cycle == self._parts.cycle
 
-    def _taken_up(self, what: str) -> tuple[StoredPlan, float]:
+    def _taken_up(self, key: str) -> tuple[StoredPlan, float]:
         """Return the plan that was left, and the time up to which it has come."""
         left = self.store.unfinished
         if left is None:
             nothing = {"left": "path", "instead": "plan"}
-            asked = {what: True}
+            asked = {key: True}
             raise ProgramError(CommandRefusal(RefusalCode.NOTHING_LEFT, self.name, asked, nothing))
         name, time_s = left
         plan = self._plan
@@ -179,11 +179,11 @@ class PathProgram(PlatformProgram):
 
     def _require_way(self, plan: StoredPlan, time_s: float) -> None:
         """Raise ProgramError where the straight way to a place of the plan is not feasible."""
-        control, there = self._control, np.array(plan.samples[plan.row(time_s), 0])
-        most, here = np.zeros((2, there.size))
-        along_velocity(control.velocity, self._parts.acceleration, most)
-        stopping_position(control.position, control.velocity, most, here)
-        obstacle = control.infeasibility(there) or control.way_infeasibility(there, here)
+        control, begin = self._control, np.array(plan.samples[plan.row(time_s), 0])
+        acceleration, stop = np.zeros((2, begin.size))
+        along_velocity(control.velocity, self._parts.acceleration, acceleration)
+        stopping_position(control.position, control.velocity, acceleration, stop)
+        obstacle = control.infeasibility(begin) or control.way_infeasibility(begin, stop)
         if obstacle:
             why = {"why": f"on the way to where it begins: {obstacle}"}
             raise ProgramError(CommandRefusal(RefusalCode.NOT_FEASIBLE, self.name, arguments=why))
@@ -215,8 +215,8 @@ class PathProgram(PlatformProgram):
 
     def _next_stop(self, plan: StoredPlan) -> float:
         """Return when the plan waits next, or ends."""
-        here = self._state[playback.TIME]
-        waits = plan.waits_s[plan.waits_s > here + 0.5 * plan.period_s]
+        time_s = self._state[playback.TIME]
+        waits = plan.waits_s[plan.waits_s > time_s + 0.5 * plan.period_s]
         return float(waits[0]) if waits.size else plan.duration_s
 
     # -- cycle by cycle
