@@ -5,6 +5,7 @@ from __future__ import annotations
 import fcntl
 import ipaddress
 import os
+import re
 import stat
 import sys
 from pathlib import Path
@@ -24,6 +25,7 @@ _ALL_SEALS = fcntl.F_SEAL_WRITE | fcntl.F_SEAL_GROW | fcntl.F_SEAL_SHRINK | fcnt
 _OPEN_TO_OTHERS = stat.S_IRWXG | stat.S_IRWXO
 _HIGHEST_PORT = 65535
 _LIVE_HOST = "127.0.0.1"
+_ORIGIN = re.compile(r"https?://[a-z0-9.-]+(:\d{1,5})?", re.IGNORECASE)
 
 
 def is_loopback(host: str) -> bool:
@@ -32,6 +34,16 @@ def is_loopback(host: str) -> bool:
         return ipaddress.ip_address(host).is_loopback
     except ValueError:
         return host == "localhost"
+
+
+def checked_origin(origin: str) -> str:
+    """Return the origin of a web page; raises BadInputError for what no browser names so."""
+    if not _ORIGIN.fullmatch(origin):
+        raise BadInputError(
+            f"--live-origin {origin}: allowed: where a web page is from, such as "
+            "https://app.foxglove.dev or http://localhost:8080, without a path"
+        )
+    return origin.lower()
 
 
 class Address(BaseModel):

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import os
-import re
 import socket
 import sys
 import tempfile
@@ -42,7 +41,7 @@ from cdpr_tools.daemon.loop_file import LoopFile, named_launcher
 from cdpr_tools.daemon.paths import SOCKET_SUFFIX, default_recordings, default_socket
 from cdpr_tools.daemon.processes.launcher import Launcher
 from cdpr_tools.daemon.processes.notify import ServiceManager
-from cdpr_tools.daemon.settings import Address, RunSettings
+from cdpr_tools.daemon.settings import Address, RunSettings, checked_origin
 from cdpr_tools.errors import (
     BAD_INPUT,
     DONE,
@@ -54,7 +53,6 @@ from cdpr_tools.errors import (
 from cdpr_tools.output import Output, to_json
 
 _KEPT_DAYS, _KEPT_GB = 30.0, 20.0
-_ORIGIN = re.compile(r"https?://[a-z0-9.-]+(:\d{1,5})?", re.IGNORECASE)
 _RING_S = 15.0  # longer than a service that hangs is waited for and started again
 
 
@@ -280,7 +278,7 @@ def settings_for(
         record=None if no_record else record or default_recordings(),
         keep=_kept(record, keep_days, keep_gb),
         live=live,
-        live_origins=tuple(map(_checked_origin, live_origin or ())),
+        live_origins=tuple(map(checked_origin, live_origin or ())),
         stream=None if stream is None else Address.parse("--stream", stream),
         launcher_pid=os.getpid(),
     )
@@ -391,13 +389,3 @@ def _ask(robot: Robot, settings: RunSettings, yes: bool) -> None:
     if real and not settings.read_only:
         where = " and ".join(real)
         require_consent(f"{robot.name} on {where}: its motors will turn when told to.", yes)
-
-
-def _checked_origin(origin: str) -> str:
-    """Return the origin of a web page; raises BadInputError for what no browser names so."""
-    if not _ORIGIN.fullmatch(origin):
-        raise BadInputError(
-            f"--live-origin {origin}: allowed: where a web page is from, such as "
-            "https://app.foxglove.dev or http://localhost:8080, without a path"
-        )
-    return origin.lower()
