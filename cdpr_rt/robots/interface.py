@@ -238,8 +238,11 @@ class PlatformControl(Controller, Protocol):
     def clear_load_cell_fault(self) -> None:
         """Forget which load cell was off."""
 
-    def begin(self, feedback: AxisFeedback) -> None:
-        """Take the motors to stand where they are, and the platform where its cables have it."""
+    def begin(self, feedback: AxisFeedback, tension_N: FloatArray | None = None) -> None:
+        """Take the motors to stand where they are, and the platform where its cables have it.
+
+        Cables that stand with `tension_N` (n,), which may be far from what is planned with.
+        """
 
     def observe(self, feedback: AxisFeedback) -> None:
         """Bring the estimate of the platform's pose up to date, by one cycle."""

@@ -274,7 +274,10 @@ class LockstepRobot:
     def carry_out(self, name: str, within_s: float = 60.0, **arguments: Any) -> None:
         """Run a program until nothing is left for it to do; raises WorkFailedError otherwise."""
         self.program(name, **arguments)
+        program = self.loop.engine.program
         self.finish(within_s)
+        if trouble := program.progress().get("trouble", ""):
+            raise WorkFailedError(f"{name}: {trouble}")
 
     def finish(self, within_s: float = 60.0) -> None:
         """Run cycles until the present program has nothing left to do."""

@@ -269,16 +269,21 @@ class CableControl:
 
     # -- where the platform is
 
-    def begin(self, feedback: AxisFeedback) -> None:
-        """Take the motors to stand where they are, and the platform where its cables have it."""
+    def begin(self, feedback: AxisFeedback, tension_N: FloatArray | None = None) -> None:
+        """Take the motors to stand where they are, and the platform where its cables have it.
+
+        Cables that stand with `tension_N` (n,), which may be far from what is planned with.
+        """
         motors = self._motors
         motors[tracking.THETA] = feedback.position_rad
         motors[[tracking.OMEGA, tracking.LOWPASSED_ONCE, tracking.LOWPASSED]] = 0.0
-        motors[tracking.TENSION] = np.maximum(motors[tracking.TENSION], self.low_N)
+        planned_N = np.maximum(motors[tracking.TENSION], self.low_N)
+        motors[tracking.TENSION] = planned_N if tension_N is None else tension_N
         self._pose.array[:] = self._home.array
         for _ in range(_SETTLING_STEPS):
             self.observe(feedback)
         self._swing[:] = 0.0
+        motors[tracking.TENSION] = planned_N
 
     def stand_still(self, *, on_stand: bool = False) -> None:
         """Have the set-point stand where the platform is.

@@ -100,7 +100,7 @@ def why_not_at_home(
             f"{1e3 * allowed_m:.0f} mm allowed"
         )
     control.take_lengths(length_m, feedback)
-    control.begin(feedback)
+    control.begin(feedback, tension_N)
     here, home = control.estimated, parts.model.home
     near = distance_m(here, home, parts.scale_m) <= parts.platform.home_tolerance_m
     if near or disagreement(parts):
@@ -116,15 +116,17 @@ def _not_at_home(why: str) -> str:
     )
 
 
-def why_not_to_pull(parts: PlatformParts, length_m: FloatArray, feedback: AxisFeedback) -> str:
+def why_not_to_pull(
+    parts: PlatformParts, length_m: FloatArray, tension_N: FloatArray, feedback: AxisFeedback
+) -> str:
     """Return why not to pull at the platform where it is, an empty text for nothing.
 
-    Its pose follows from the cables' lengths `length_m` (n,), which are to agree. It is not to be
-    turned much, with nothing in contact straight on the way home.
+    Its pose follows from the cables' lengths `length_m` (n,) at `tension_N` (n,), which are to
+    agree. It is not to be turned much, with nothing in contact straight on the way home.
     """
     control, k = parts.control, parts.model.positions
     control.take_lengths(length_m, feedback)
-    control.begin(feedback)
+    control.begin(feedback, tension_N)
     if why := disagreement(parts):
         return why
     here, home = np.array(control.estimated), parts.model.home
@@ -183,9 +185,11 @@ def _not_pulled(here: FloatArray, k: int, why: str) -> str:
     )
 
 
-def disagreement(parts: PlatformParts) -> str:
+def disagreement(parts: PlatformParts, source: str = "lengths") -> str:
     """Return by how much the lengths that the control has contradict each other, if too much."""
     off = _off(parts)
+    if off and source == "home":
+        return f"{off}; it does not stand at home, or a point is not where the robot's file has it"
     return f"{off}; stand the platform at home and tighten from it" if off else ""
 
 

@@ -250,9 +250,13 @@ class TightenProgram(PlatformProgram):
         """Take the lengths, and hold the platform where they have it, unless they disagree."""
         self._take_last()
         self._control.take_lengths(self._lengths(feedback), feedback)
-        self._control.begin(feedback)
-        self._fail_if(disagreement(self._parts))
+        estimate = self._parts.estimator.estimate
+        tension_N = np.where(estimate.tension_measured, estimate.tension_N, self._pretension_N)
+        # as they stand: what the cables press with may stretch them otherwise than what is planned
+        self._control.begin(feedback, tension_N)
+        self._fail_if(disagreement(self._parts, self._source))
         if not self._failure:
+            self._control.begin(feedback)
             self._take_over(feedback, torque_Nm)
             self._hands_over, self._path = True, []
             self._let_go_cycle = feedback.cycle
@@ -281,7 +285,7 @@ class TightenProgram(PlatformProgram):
             return ""
         if self._source == "home":
             return why_not_at_home(parts, length_m, self._winches.high_N, feedback)
-        why = why_not_to_pull(parts, length_m, feedback)
+        why = why_not_to_pull(parts, length_m, self._winches.high_N, feedback)
         if why or self._stage > 0:
             return why
         tensions_N, stays = self._standing.at(parts.model.pose(parts.control.estimated))
