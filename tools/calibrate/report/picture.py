@@ -45,7 +45,7 @@ def found_figure(outcome: Outcome) -> Figure:
             at, 1e3 * geometry.cable[:, place], width, yerr=2e3 * std[:, column], capsize=2,
             label="xyz"[place], color=(FORWARD, BACKWARD, COLOURS["none"])[place],
         )  # fmt: skip
-    above.set(ylabel="exit point moved (mm, ± 2 sigma)", xlabel="cable")
+    above.set(ylabel="exit point moved\n(mm, ± 2 sigma)", xlabel="cable")
     above.set_xticks(range(n), [f"{i + 1}\n{name}" for i, name in enumerate(names)])
     off_mm = 1e3 * found.length_residual_m * length_std_m(geometry, found.seen)
     poses = np.arange(1, found.seen.poses + 1)
