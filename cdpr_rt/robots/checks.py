@@ -28,6 +28,10 @@ _NEAREST_m = 0.1
 """An anchor point closer than this to an exit point is about to be pulled into it."""
 _ALIKE_m = 0.01
 """Two cables nearer to each other at both their ends pull alike: an axis was described twice."""
+_SAGS_m_N = 0.01
+"""What a cable may take in by its sag for a newton: a motor's friction is some newtons."""
+_ROUNDED_UP = 1.05
+"""So that two digits are not less."""
 _SLOW_Hz = 0.5
 """Of a loop's mode: it takes 2.3 s to come within 2 % of where it goes."""
 _RUBS_SHARE = 0.06
@@ -61,6 +65,7 @@ def findings(robot: Robot, limits: Limits | None = None) -> list[Finding]:
         # with points that cannot be meant, tensions and torques only repeat it
         found += [*_tensions(statics), *_motors(robot, limits, statics)]
         found += [*_speeds(robot, limits, statics), *_lengths(robot, limits, statics)]
+        found += _sagging(robot, statics)
         if statics.turns:
             found += _turning(statics)
         found += [*_loop(robot, statics), *_swinging(robot.platform), *_standing(statics)]
@@ -313,6 +318,25 @@ def _lengths(robot: Robot, limits: Limits, statics: PlatformStatics) -> Iterator
         if sign * (bound[i] - needed[i]) > 0.0:
             text = f"{bound[i]:g} m; in the box of targets axes[{i}] has {needed[i]:.3g} m of cable"
             yield Finding(f"limits.{key}", text, impossible=True)
+
+
+def _sagging(robot: Robot, statics: PlatformStatics) -> Iterator[Finding]:
+    """Look at the slope of w² a² L/(24 T²), which a cable of weight w and span a takes in by sag."""
+    points = statics.points()
+    spans = (statics.exits_m - points[..., None, :] - statics.anchors_m)[..., :-1]
+    square_m3 = (spans**2).sum(axis=-1) * statics.free_lengths(points)
+    weights = np.array([axis.winch.cable.weight_per_length_N_m for axis in robot.axes])
+    moment = weights**2 * square_m3.reshape(-1, len(robot.axes)).max(axis=0) / 12.0
+    m_per_N = moment / statics.low_N**3
+    i = int(m_per_N.argmax())
+    if m_per_N[i] > _SAGS_m_N:
+        enough_N = _ROUNDED_UP * math.cbrt(moment[i] / _SAGS_m_N)
+        text = (
+            f"value {statics.low_N[i]:g}; with that tension the cable of axes[{i}] sags so much "
+            f"that a newton more takes {m_per_N[i]:.2g} m of it in, and lengths tell little of "
+            f"where the platform is; allowed: from {enough_N:.2g}"
+        )
+        yield Finding("limits.tension_min_N", text, impossible=False)
 
 
 def _contact(statics: PlatformStatics) -> Iterator[Finding]:

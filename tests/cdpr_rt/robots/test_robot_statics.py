@@ -196,6 +196,38 @@ def test_a_home_where_the_platform_would_tip_is_doubtful(tmp_path: Path) -> None
     assert any(f.key == "platform.home_m" and "tip it on its stand" in f.text for f in told)
 
 
+@pytest.mark.parametrize("low_N", [1.0, 2.0])
+def test_cables_that_sag_are_told_with_the_tension_that_would_do(
+    tmp_path: Path, low_N: float
+) -> None:
+    """The slope of what a parabola across its chord is longer than that, over all of the box."""
+    lower = [
+        ("tension_min_N = 20.0", f"tension_min_N = {low_N}"),
+        ("slack_N = 3.0", "slack_N = 0.1"),
+    ]
+    robot = robot_of(tmp_path, *lower)
+    told = [f.text for f in findings(robot) if f.key == "limits.tension_min_N"]
+    statics, cable = statics_of(robot), robot.axes[0].winch.cable
+    spans = (statics.exits_m - statics.points()[..., None, :] - statics.anchors_m).reshape(-1, 2)
+
+    def sag_m(tension_N: float) -> np.ndarray:
+        chord = np.hypot(*spans.T)
+        load_N_m = cable.weight_per_length_N_m * np.abs(spans[:, 0]) / chord
+        depth = load_N_m * chord**2 / (8.0 * tension_N)
+        return 8.0 / 3.0 * depth**2 / chord
+
+    slope = float((sag_m(low_N - 0.01) - sag_m(low_N + 0.01)).max()) / 0.02
+    assert bool(told) == (slope > 0.01)
+    if told:
+        assert f"{slope:.1g}"[:4] in told[0]
+        enough_N = float(told[0].split("from ")[1])
+        text = robot.path.read_text().replace(
+            f"tension_min_N = {low_N}", f"tension_min_N = {enough_N}"
+        )
+        robot.path.write_text(text)
+        assert not any(f.key == "limits.tension_min_N" for f in findings(load_robot(robot.path)))
+
+
 SUSPENDED = (SHIPPED / "robots" / "suspended-8.toml").read_text()
 
 

@@ -88,9 +88,10 @@ class TightenProgram(PlatformProgram):
         inertia = np.full(cable_m.size, parts.control.inertia_kg_m2)
         self._winches = WinchSpeedLoop(inertia, cable_m, parts.period_s)
         self._winches.paying_out_m_s[:] = -TAKE_UP_m_s
-        tight_m = parts.control.lengths_at_home(OVERSHOOT * self._pretension_N)
-        stretch_m = parts.control.lengths_at_home(np.zeros(cable_m.size)) - tight_m
-        self._once_tight_m = _ONCE_TIGHT_m + float(stretch_m.max())
+        # a long cable comes in by its sag rather than by its stretch, from where friction has it
+        shares = np.array([0.0, 0.5 * TAKE_UP_SHARE, OVERSHOOT])[:, None]
+        lengths_m = [parts.control.lengths_at_home(N) for N in shares * self._pretension_N]
+        self._once_tight_m = _ONCE_TIGHT_m + float(np.ptp(lengths_m, axis=0).max())
         self._start_rad, self._still_rad = np.zeros((2, cable_m.size))
         self._at_home = LengthsAtHome(parts, cable_m, self._home_pretension_N)
         self._stage = 0
