@@ -321,7 +321,7 @@ def _lengths(robot: Robot, limits: Limits, statics: PlatformStatics) -> Iterator
 
 
 def _sagging(robot: Robot, statics: PlatformStatics) -> Iterator[Finding]:
-    """Look at the slope of w² a² L/(24 T²), which a cable of weight w and span a takes in by sag."""
+    """Look at the slope of w² a² L/(24 T²), by which sag lengthens a cable of span a."""
     points = statics.points()
     spans = (statics.exits_m - points[..., None, :] - statics.anchors_m)[..., :-1]
     square_m3 = (spans**2).sum(axis=-1) * statics.free_lengths(points)
