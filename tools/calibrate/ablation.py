@@ -57,6 +57,8 @@ marker, half as much to the first pose.
 """
 CARE: Final = ErrorBudget()
 """Corners along edges, sheets on plates, 30 images for ChArUco, drums measured."""
+MEASURED: Final = replace(CARE, hand_eye_m=1e-3, hand_eye_deg=0.1)
+"""The same, and where the camera sits on the platform."""
 FLAT, ROUGH = SheetLayout(size_m=0.08), SheetLayout(size_m=0.2, height_m=0.15, tilt_deg=15.0)
 
 
@@ -101,6 +103,9 @@ STEPS: Final = (
         "+ 6 of them at known places", THESIS, replace(ROUGH, known=6), 50, True, _ALL, True
     ),
     AblationCase("+ more care", CARE, replace(ROUGH, known=6), 50, True, _ALL, True),
+    AblationCase(
+        "+ the camera's place measured", MEASURED, replace(ROUGH, known=6), 50, True, _ALL, True
+    ),
 )
 
 
