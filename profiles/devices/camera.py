@@ -84,6 +84,8 @@ class MarkerSheets(Profile):
     placed: Annotated[tuple[_Id, ...], Field(max_length=1024)] = ()
     """Ids of all that were laid out, where that is known."""
     known: Annotated[tuple[KnownMarker, ...], Field(max_length=1024)] = ()
+    known_std_m: Annotated[float, Field(ge=1e-6, le=1.0)] | None = None
+    """Of each coordinate of a corner of these, a standard deviation; None where nobody has said."""
 
     @model_validator(mode="after")
     def _check(self) -> Self:

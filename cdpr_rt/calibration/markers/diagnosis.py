@@ -89,7 +89,6 @@ def _judged(
     images = seen.image[rows]
     place, scale = _each_place(rows, bundle, seen)
     size, sigma = _size(rows, bundle, seen)
-    spread = np.linalg.norm(place - np.median(place, axis=0), axis=1)
     if abs(size - 1.0) > max(_SIZE_OFF, _SIZE_SIGMAS * sigma) and _fits_with(
         size, rows, bundle, seen, limit
     ):
@@ -114,7 +113,7 @@ def _judged(
         return Suspect(
             marker,
             "bad",
-            f"marker {marker} does not fit in {np.sum(spread > scale)} of {len(rows)} images: is "
+            f"marker {marker} does not fit in {far.sum()} of {len(rows)} images: is "
             "its sheet flat, whole and of the right size?",
         )
     order = np.argsort(images)

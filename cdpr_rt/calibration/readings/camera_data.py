@@ -52,6 +52,14 @@ class CameraSetup(Profile):
     hand_eye: HandEye | None = None
     """None where nothing is known of it: the robot's own turning tells it."""
 
+    @classmethod
+    def of(cls, intrinsics: CameraIntrinsics, sheets: MarkerSheets) -> CameraSetup:
+        """Return that of two files, with places known as well as the sheets' file says."""
+        setup = cls(intrinsics=intrinsics, sheets=sheets)
+        if sheets.known_std_m is None:
+            return setup
+        return setup.model_copy(update={"known_std_m": sheets.known_std_m})
+
     def as_found(self, lens: FloatArray, size_change: float) -> CameraSetup:
         """Return it with another lens (9,), sheets larger by a relative change, and no hand_eye."""
         fx, fy, cx, cy, *distortion = lens.tolist()

@@ -31,7 +31,7 @@ def camera_setup(
     scene = CameraPlant() if plant is None else RobotPlant.load_file(plant).camera
     lens = CameraIntrinsics.load_file(intrinsics) if intrinsics else _by_board(out, scene)
     sheets = MarkerSheets.load_file(markers) if markers else _ordered(scene)
-    return CameraSetup(intrinsics=lens, sheets=sheets)
+    return CameraSetup.of(lens, sheets)
 
 
 def _by_board(out: Output, scene: CameraPlant) -> CameraIntrinsics:

@@ -193,9 +193,7 @@ def _camera_setup(
         raise BadInputError("--camera: the poses before were read without; allowed: another --out")
     if intrinsics is None or markers is None:
         raise BadInputError("--camera: the first pose wants --intrinsics and --markers as well")
-    return CameraSetup(
-        intrinsics=CameraIntrinsics.load_file(intrinsics), sheets=MarkerSheets.load_file(markers)
-    )
+    return CameraSetup.of(CameraIntrinsics.load_file(intrinsics), MarkerSheets.load_file(markers))
 
 
 def lines(robot: Robot, data: CalibrationData) -> list[str]:

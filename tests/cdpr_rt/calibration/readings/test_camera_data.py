@@ -99,3 +99,15 @@ def test_an_id_that_is_listed_twice_counts_as_repeated(tmp_path: Path) -> None:
 def test_what_no_camera_saw_is_refused_with_its_key(tmp_path: Path, change: Any, told: str) -> None:
     with pytest.raises(ProfileError, match=told):
         load_data(spoilt(tmp_path / "data.json", change))
+
+
+def test_places_are_known_as_well_as_the_file_of_the_sheets_says(tmp_path: Path) -> None:
+    path, camera = tmp_path / "markers.toml", data().camera
+    assert camera is not None
+    for line, std_m in (("", 0.001), ("known_std_m = 0.0004", 0.0004)):
+        path.write_text(f"size_m = 0.15\n{line}\n[[known]]\nid = 3\nposition_m = [0.1, 0.2, 0.0]\n")
+        setup = CameraSetup.of(camera.intrinsics, MarkerSheets.load_file(path))
+        assert setup.known_std_m == std_m
+    path.write_text("size_m = 0.15\nknown_std_m = 2.0\n")
+    with pytest.raises(ProfileError, match="known_std_m"):
+        MarkerSheets.load_file(path)
