@@ -37,7 +37,9 @@ _OPTIONS = {"live_view": "--live", "stream": "--stream"}
 _STAGES = {
     ("tighten", "slack"): "winding in the slack of the cables",
     ("tighten", "pull"): "pulling the cables tight",
-    ("tighten", "beyond"): "pulling half as much again, so that friction cancels out",
+    ("tighten", "beyond"): "pulling half as much again, to tell friction and cogging",
+    ("tighten", "back"): "pulling as before",
+    ("tighten", "below"): "pulling half as much, to tell friction and cogging",
     ("tighten", "lengths"): "taking the cables' lengths",
     ("tighten", "index"): "moving the platform until each motor's index has passed",
     ("tighten", "held"): "holding the platform",
