@@ -217,10 +217,10 @@ def test_points_of_poses_that_come_later_do_not_end_a_run(tmp_path: Path) -> Non
 
 def test_points_are_taken_besides_a_camera() -> None:
     robot = load_robot("spatial-8")
-    assert source_of(robot, ["camera", "points"]) == "camera"
-    assert source_of(robot, ["points"]) == "points"
+    assert source_of(robot, camera=True, points=True) == "camera"
+    assert source_of(robot, points=True) == "points"
     with pytest.raises(BadInputError, match="or --camera with --points"):
-        source_of(robot, ["camera", "scanner", "points"])
+        source_of(robot, camera=True, scanner=True, points=True)
 
 
 @pytest.mark.parametrize(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Final
+from typing import Final, get_args
 
 import numpy as np
 
@@ -40,8 +40,12 @@ def check_points(path: Path, robot: Robot, poses: int | None) -> None:
             )
 
 
-def source_of(robot: Robot, asked: list[PoseSource]) -> PoseSource:
-    """Return what a run is to use besides lengths and tensions; raises BadInputError."""
+def source_of(robot: Robot, **given: bool) -> PoseSource:
+    """Return what a run is to use besides lengths and tensions, by which options are given.
+
+    Raises BadInputError.
+    """
+    asked = [source for source in get_args(PoseSource) if given.get(source)]
     if not asked and robot.platform is not None and len(robot.platform.controlled) == 6:
         return "camera"
     if asked == ["camera", "points"]:
@@ -55,4 +59,5 @@ def source_of(robot: Robot, asked: list[PoseSource]) -> PoseSource:
             f"--camera: {robot.profile} does not turn its platform about two axes, which is what "
             "tells where the camera sits on it; allowed: --scanner, --points, --redundancy"
         )
-    return asked[0]
+    chosen: PoseSource = asked[0]
+    return chosen

@@ -82,14 +82,24 @@ class CalibrationRunSettings(Profile):
         """Write them into the folder of the run; raises ProfileError."""
         write_text(folder / SETTINGS, self.model_dump_json(indent=1) + "\n")
 
-    def going_on(self, poses: int | None, places: Listed | None) -> CalibrationRunSettings:
-        """Return them with as many poses, or a list; raises BadInputError for one of the other."""
-        if poses is None:
-            return self
-        if (places is None) != (self.places is None):
-            kind = "a list of poses" if self.places is not None else "no list of poses"
-            raise BadInputError(f"--poses: allowed: as the run that goes on was begun, with {kind}")
-        return self.model_copy(update={"poses": poses, "places": places})
+    def going_on(
+        self, poses: int | None, places: Listed | None, points: Path | None
+    ) -> CalibrationRunSettings:
+        """Return them with as many poses, or a list, and points, where these are given.
+
+        Raises BadInputError for a list where there was none, and the other way round.
+        """
+        update: dict[str, object] = {}
+        if points is not None:
+            update["points"] = str(points.resolve())
+        if poses is not None:
+            if (places is None) != (self.places is None):
+                kind = "a list of poses" if self.places is not None else "no list of poses"
+                raise BadInputError(
+                    f"--poses: allowed: as the run that goes on was begun, with {kind}"
+                )
+            update |= {"poses": poses, "places": places}
+        return self.model_copy(update=update)
 
     @classmethod
     def load(cls, folder: Path) -> CalibrationRunSettings:

@@ -159,27 +159,22 @@ def run(
         if points is not None:
             check_points(points, profile, None if resume else count)
 
-    given: dict[runs.PoseSource, bool] = {
-        "camera": camera,
-        "redundancy": redundancy,
-        "scanner": scanner,
-        "points": points is not None,
-    }
-
     folder = out_dir or Path("out") / f"calibrate-{profile.profile}"
     if resume:
-        settings = runs.CalibrationRunSettings.load(folder)
-        source = settings.source
-        settings = settings.going_on(count, listed)
-        if points is not None:
-            settings = settings.model_copy(update={"points": str(points.resolve())})
-        elif settings.points is not None:
+        settings = runs.CalibrationRunSettings.load(folder).going_on(count, listed, points)
+        if points is None and settings.points is not None:
             points = Path(settings.points)
             check_points(points, profile, None)
         kept = runs.Kept.of_before(folder, profile)
     else:
         _require_new(folder, runs.DATA, overwrite)
-        source = source_of(profile, [name for name, asked in given.items() if asked])
+        source = source_of(
+            profile,
+            camera=camera,
+            redundancy=redundancy,
+            scanner=scanner,
+            points=points is not None,
+        )
         if known is not None and source != "camera":
             raise BadInputError("--hand-eye: is of a camera; allowed: with --camera")
         settings = runs.CalibrationRunSettings(

@@ -184,13 +184,13 @@ def test_a_list_of_poses_is_gone_to_wholly_also_after_a_run_that_ended(
         begin(tmp_path, wanted)
     wanted.save(tmp_path)
     again = run.CalibrationRunSettings.load(tmp_path)
-    assert again == wanted == again.going_on(None, None)
+    assert again == wanted == again.going_on(None, None, None)
     data = go_on(tmp_path, again)
     home = data.poses[0].target
     assert {reading.target for reading in data.poses} == {home, *listed}
     assert len(data.poses) == 18 and go_on(tmp_path, again) == data
     with pytest.raises(BadInputError, match="was begun, with a list of poses"):
-        again.going_on(30, None)
+        again.going_on(30, None, None)
 
 
 def test_a_kill_between_two_files_loses_one_pose_and_no_more(
