@@ -84,7 +84,8 @@ def lead(
     """
     k, up, edge = low.size, low.size - 1, FREE
     stands = position[up] < low[up] - _BELOW_m
-    goal[:] = target
+    for i in range(goal.size):
+        goal[i] = target[i]
     if about.size > 0 and not stands:
         _turn(k, about, pose, last, target, scratch, goal)
     for i in range(k):
@@ -94,7 +95,8 @@ def lead(
             edge = ON_STAND if moved != 0.0 else edge
             moved = 0.0
         goal[i] = target[i] + (moved if math.isfinite(moved) else 0.0)
-    last[:] = pose
+    for i in range(last.size):
+        last[i] = pose[i]
     for i in range(goal.size):
         # a platform slower than the stream must not run on after the stream has stopped
         reach = speed[i] * (0.5 * speed[i] / acceleration[i] + LEAD_S)

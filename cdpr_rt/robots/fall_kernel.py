@@ -84,8 +84,9 @@ def fall(
     still = 0
     for cycle in range(path.shape[0]):
         if cycle == c.held_cycles:
-            last[:], speed[:] = length, rate
-            integral[:] = -np.maximum(winches["weight_N"], winches["low_N"])
+            for i in range(n):
+                last[i], speed[i] = length[i], rate[i]
+                integral[i] = -max(winches[i].weight_N, winches[i].low_N)
         if cycle >= c.held_cycles:
             control_speed(
                 c.period_s, weight, winches["low_N"], winches["high_N"], out, c.fastest_in_m_s,
@@ -171,7 +172,9 @@ def _step(
         pose[0, k] += h * twist[k]
         rest[k] = h * twist[3 + k]
     exponential(rest[:3], turned)
-    before[:, :3] = pose[1:]
+    for i in range(3):
+        for j in range(3):
+            before[i, j] = pose[1 + i, j]
     for i in range(3):
         for j in range(3):
             pose[1 + i, j] = 0.0

@@ -85,7 +85,8 @@ def first_contact(
     clear before the platform has moved by _LEAVES clearances, and to stay so. A pair that
     `most_looks` do not prove clear counts as in contact; last is whether it is known to be.
     """
-    allowed = np.full(pairs.shape[0], clearance)
+    allowed = np.empty(pairs.shape[0])
+    allowed[:] = clearance
     share, pair, apart, known = _advance(
         geometry, boxes, pairs, clearance, trim, way, most_looks, allowed
     )
@@ -113,10 +114,14 @@ def _advance(
     pose, twist, moves, scratch = (
         np.empty((4, 3)), np.empty((2, 3)), np.empty((4, 3)), np.empty((4, 3)),
     )  # fmt: skip
-    until, least = np.zeros(count), np.full(count, -math.inf)
+    until, least = np.zeros(count), np.empty(count)
+    least[:] = -math.inf
     body_speed = _write_speeds(geometry, boxes, way, rates)
     share, looks = 0.0, 0
-    leaves = _LEAVES * clearance / (max(body_speed, np.max(rates[_SPEED])) + TINY)
+    fastest = body_speed
+    for i in range(n):
+        fastest = max(fastest, rates[_SPEED, i])
+    leaves = _LEAVES * clearance / (fastest + TINY)
     while share < 1.0:
         place_on(way, share, scratch, pose, twist)
         write_ends(geometry, pose, cables, ends)

@@ -157,7 +157,8 @@ def _low_pass(
     w = TERMS * n
     if not usable:
         filters[: w + n + d] = 0.0
-        filters[w + n + d :] = v
+        for k in range(d):
+            filters[w + n + d + k] = v[k]
         return False
     share = settings[PERIOD] * settings[POLE] / (1.0 + settings[PERIOD] * settings[POLE])
     moving = False

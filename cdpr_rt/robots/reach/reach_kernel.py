@@ -47,7 +47,10 @@ def reach_all(
     `first_contact` and, about the point where wrenches act, of `held_until`.
     """
     way = np.zeros((WAY_ROWS, 3))
-    way[START], way[BASE:] = home[0], home[1:]
+    for k in range(3):
+        way[START, k] = home[0, k]
+        for i in range(3):
+            way[BASE + i, k] = home[1 + i, k]
     for j in range(ends.shape[0]):
         for k in range(start.size):
             row, column = START, chosen[k]

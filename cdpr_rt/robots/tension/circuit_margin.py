@@ -56,7 +56,8 @@ def write_circuit_margins(
         if rank < d:
             margins[j] = -math.inf
             continue
-        carrying[0] = space[0]
+        for i in range(n):
+            carrying[0, i] = space[0, i]
         for k in range(1, wrenches.shape[0]):
             other_wrench(wrenches[k], scale, scaled, scratch, carrying[k])
         margins[j] = circuit_margin(space, n - d, bounds, carrying, generators, least)

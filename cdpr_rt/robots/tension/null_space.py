@@ -83,7 +83,8 @@ def null_spaces(
         null_directions[j] = n - rank if rank == d else -1
         if rank < d:
             continue
-        particular[j, 0] = spaces[j, 0]
+        for i in range(n):
+            particular[j, 0, i] = spaces[j, 0, i]
         for k in range(1, wrenches.shape[0]):
             other_wrench(wrenches[k], scale, scaled, scratch, particular[j, k])
 

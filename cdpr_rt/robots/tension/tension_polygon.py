@@ -52,7 +52,7 @@ def choose(
         size = scratch.shape[1] ** 2
         X, Y, entered = scratch[1].reshape(size), scratch[2].reshape(size), scratch[3].reshape(size)
         first, last = _walk(space, bounds, x, X, Y, entered)
-        chosen[:2] = x[:2]
+        chosen[0], chosen[1] = x[0], x[1]
         if last > first:
             _of_polygon(space, X[first:last], Y[first:last], point, chosen)
     for i in range(n):

@@ -100,7 +100,7 @@ def _margin(
     found, margin = shrunk[3], most
     for i in range(n):
         margin = min(margin, 0.5 * (bounds[1, i] - bounds[0, i]))
-    shrunk[2] = bounds[2]
+        shrunk[2, i] = bounds[2, i]
     while True:
         for i in range(n):
             shrunk[0, i], shrunk[1, i] = bounds[0, i] + margin, bounds[1, i] - margin
