@@ -17,6 +17,7 @@ COMPILING = logging.getLogger("cdpr.compiling")
 """Is told, at level INFO, of each kernel of which no machine code is kept on this machine."""
 
 _SETTINGS: Any = config
+_NJIT: Any = numba.njit  # whose types do not know all of its options
 _F = TypeVar("_F", bound=Callable[..., Any])
 
 
@@ -88,7 +89,8 @@ def jit(function: _F) -> _F:
     elsewhere = _SETTINGS.CACHE_DIR
     _SETTINGS.CACHE_DIR = _CACHE
     try:
-        compiled: Any = numba.njit(cache=True)(function)
+        # nothing calls them from C: the wrapper for that is a twentieth of the time to compile
+        compiled: Any = _NJIT(cache=True, no_cfunc_wrapper=True)(function)
     finally:
         _SETTINGS.CACHE_DIR = elsewhere
     compiled.get_call_template = partial(_call_template, compiled)
