@@ -37,7 +37,11 @@ class AskedPoints:
         """Ask for the position at a pose, counted from 1; raises StoppedError."""
         names = " ".join(self._names)
         while self._open:
-            self._say(f"pose {pose} stands: measured {names} in mm [and sigma], Enter for none:")
+            # who measures stands beside a robot that moves once this is answered
+            self._say(
+                f"pose {pose} stands: measured {names} in mm [and sigma], Enter for none; stand "
+                "clear, it moves on then:"
+            )
             words = self._line().replace(",", " ").split()
             if not words:
                 return
