@@ -18,7 +18,7 @@ from cdpr_tools.calibrate.measuring import daemon_pose, pose_camera, run
 from cdpr_tools.client.pose_reader import DaemonReader
 from cdpr_tools.errors import BadInputError, CommandError, WorkFailedError
 
-pytestmark = pytest.mark.long
+pytestmark = pytest.mark.usefixtures("daemon_time")
 
 ROBOT = load_robot("planar-4")
 LENS = "width_px = 64\nheight_px = 48\nfocal_px = [50.0, 50.0]\ncentre_px = [32.0, 24.0]\n"

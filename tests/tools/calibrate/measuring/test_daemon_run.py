@@ -26,14 +26,13 @@ from cdpr_tools.calibrate.measuring.asked_points import AskedPoints
 from cdpr_tools.calibrate.measuring.daemon_run import DaemonOperator, measure_with_daemon
 from cdpr_tools.calibrate.measuring.places import Places
 from cdpr_tools.calibrate.measuring.ways import StoppedError
-from cdpr_tools.client import pose_reader
 from cdpr_tools.client.client import ConnectionLostError
 from cdpr_tools.errors import BadInputError, WorkFailedError
 from cdpr_tools.output import Output
 from tests.profiles.test_geometry_calibration import calibration
 from tests.tools.calibrate.measuring.test_daemon_pose import ROBOT, Told, kept_in
 
-pytestmark = pytest.mark.long
+pytestmark = pytest.mark.usefixtures("daemon_time")
 
 PLACES = [(0.1, 1.5, 0.0), (0.2, 1.6, 0.05), (-0.1, 1.7, 0.0), (0.0, 1.4, -0.05)]
 
@@ -97,12 +96,6 @@ class Moved(Told):
 
     def hold(self) -> None:
         self.program, self.holds = "hold", self.holds + 1
-
-
-@pytest.fixture(autouse=True)
-def at_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The time of the daemon goes on with each question; nobody has to wait for it."""
-    monkeypatch.setattr(pose_reader, "_ASK_S", 0.0)
 
 
 class Measurement:

@@ -1,0 +1,13 @@
+"""What tests with a daemon that is made up share."""
+
+from __future__ import annotations
+
+import pytest
+
+from cdpr_tools.client import pose_reader
+
+
+@pytest.fixture
+def daemon_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The time of the daemon goes on with each question; nobody has to wait for it."""
+    monkeypatch.setattr(pose_reader, "_ASK_S", 0.0)
