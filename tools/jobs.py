@@ -14,7 +14,7 @@ from typing import Any, Protocol, TypeVar
 
 from cdpr_tools.errors import BadInputError, WorkFailedError
 
-_ANSWER_S = 5.0
+_ANSWER_S, _SAFE_PATH = 5.0, "PYTHONSAFEPATH"
 _LOOK_S = 1.0
 """How often is looked whether all processes live while a result is waited for."""
 _T = TypeVar("_T")
@@ -78,10 +78,15 @@ def cores() -> int:
 
 def processes(workers: int) -> Pool:
     """Return processes that end with the block; an interrupt of the terminal is ours to handle."""
+    own, before = multiprocessing.get_context("spawn"), os.environ.get(_SAFE_PATH)
     # each is started with -c, which looks into the working directory before all others
-    os.environ["PYTHONSAFEPATH"] = "1"
-    own = multiprocessing.get_context("spawn")
-    return own.Pool(workers, signal.signal, (signal.SIGINT, signal.SIG_IGN))
+    os.environ[_SAFE_PATH] = "1"
+    try:
+        return own.Pool(workers, signal.signal, (signal.SIGINT, signal.SIG_IGN))
+    finally:
+        del os.environ[_SAFE_PATH]
+        if before is not None:
+            os.environ[_SAFE_PATH] = before
 
 
 @contextmanager

@@ -19,8 +19,9 @@ from cdpr_rt.robots.platform.motor_learning import (
 
 NOISE_SHARE = 0.01
 """What else a motor takes up (standard deviation), over its rated torque."""
-_STEEPER = 0.15
-"""By how much a tension grows otherwise than is asked for: wrong stiffness, torque constants."""
+_STEEPER, _LEAST_STEEP = 0.15, 0.5
+"""By how much a tension grows otherwise than is asked for (standard deviation), as with another
+stiffness; and the least that it grows, over what is asked for."""
 _ALIKE_rad = 0.8
 """Of a motor's electrical turn: angles as near tell no more than one."""
 _LEAST_SHARE, _MOST_SHARE, _SHARES = 0.3, 1.7, 57
@@ -130,4 +131,6 @@ class PullFit:
         left += np.einsum("ij,ijk,ik->i", x, products, x)
         told = np.maximum(self._turned.sum(axis=0), _TURNED_rad) / alike_rad
         misfit = np.maximum(left, 0.0) / told
+        # cables that are softer show all torques larger
+        x[:, kernel.FRICTION :] /= np.maximum(1.0 + x[:, [kernel.STEEPER]], _LEAST_STEEP)
         return np.sqrt(misfit), x, covariance * np.maximum(misfit, 1.0)[:, None, None]

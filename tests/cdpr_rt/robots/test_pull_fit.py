@@ -11,6 +11,7 @@ from cdpr_profiles import load_robot
 from cdpr_rt.robots.platform.cable_control import CableControl
 from cdpr_rt.robots.platform.motor_learning import MotorLearning
 from cdpr_rt.robots.platform.pull_fit import PullFit
+from cdpr_rt.robots.platform.pull_kernel import FRICTION
 from cdpr_rt.robots.platform_model import platform_model_of
 
 ROBOT = load_robot("suspended-6")
@@ -93,6 +94,20 @@ def test_lengths_are_found_without_friction_and_cogging(
     np.testing.assert_allclose(learning.friction_Nm, 0.8 * FRICTION_Nm, atol=0.012)
     cogging = np.stack([COGGING_Nm * np.cos(PHASE_rad), COGGING_Nm * np.sin(PHASE_rad)], axis=1)
     np.testing.assert_allclose(learning.cogging_Nm, cogging, atol=0.015)
+
+
+@pytest.mark.parametrize("stiffness", [0.7, 1.3])
+def test_friction_is_found_of_cables_that_are_softer_or_stiffer_than_told(
+    lengths: Callable[[np.ndarray], np.ndarray], stiffness: float
+) -> None:
+    loose_m = lengths(np.zeros(N))
+
+    def true_lengths(tension_N: np.ndarray) -> np.ndarray:
+        return loose_m - (loose_m - lengths(tension_N)) / stiffness
+
+    fit = PullFit(ROBOT.axes, NOBODY, lengths, None)
+    pulled(fit, Winches(true_lengths))
+    np.testing.assert_allclose(fit.unknowns[:, FRICTION], FRICTION_Nm, atol=0.012)
 
 
 def test_a_torque_constant_that_is_off_is_not_taken_for_cogging(

@@ -31,12 +31,6 @@ SETTINGS = ExperimentSettings(
 )  # fmt: skip
 
 
-@pytest.fixture(autouse=True)
-def no_safe_path_afterwards(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The experiment sets it for its processes; its own process is that of the tests."""
-    monkeypatch.setenv("PYTHONSAFEPATH", "")
-
-
 @pytest.fixture(scope="module")
 def session(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Two targets with motors of which nothing is known, and an operator who is soon content."""
