@@ -8,6 +8,7 @@ import socket
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from http import HTTPStatus
 from pathlib import Path
 from shlex import quote
 from typing import Any, Final
@@ -130,6 +131,8 @@ class Daemon:
             raise WorkFailedError(death_text(self.get("/status")))
         if (refusal := CommandRefusal.from_json(answer.get("refusal"))) is not None:
             raise DaemonRefusalError.of(refusal)
+        if response.status_code == HTTPStatus.CONFLICT and answer.get("state"):
+            raise DaemonRefusalError(message)  # the loop's, in words alone
         raise WorkFailedError(message)
 
 

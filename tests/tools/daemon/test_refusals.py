@@ -107,20 +107,28 @@ def test_the_error_goes_from_process_to_process_and_takes_other_words() -> None:
 
 
 @pytest.mark.parametrize(
-    ("refusal", "kind"),
+    ("state", "refusal", "kind", "words"),
     [
         (
+            b'"ready"',
             b'{"code": "not_tight", "command": "pose", "asked": {}, "arguments": {}}',
             DaemonRefusalError,
+            "pose: the cables are not tight; run tighten first",
         ),
-        (b'{"code": "of another version", "command": "pose"}', WorkFailedError),
-        (b"null", WorkFailedError),
+        (
+            b'"ready"',
+            b'{"code": "of another version", "command": "pose"}',
+            DaemonRefusalError,
+            "its words",
+        ),
+        (b'"ready"', b"null", DaemonRefusalError, "its words"),
+        (b"null", b"null", WorkFailedError, "its words"),  # the service's, such as of the right
     ],
 )
 def test_a_daemon_s_answer_is_raised_with_its_code(
-    tmp_path: Path, refusal: bytes, kind: type[Exception]
+    tmp_path: Path, state: bytes, refusal: bytes, kind: type[Exception], words: str
 ) -> None:
-    body = b'{"error": "its words", "state": "ready", "refusal": %s}' % refusal
+    body = b'{"error": "its words", "state": %s, "refusal": %s}' % (state, refusal)
     head = b"HTTP/1.1 409 Conflict\r\nContent-Length: %d\r\nConnection: close\r\n\r\n" % len(body)
 
     def serve() -> None:
@@ -139,5 +147,4 @@ def test_a_daemon_s_answer_is_raised_with_its_code(
             daemon.post("/program")
         thread.join()
     assert type(raised.value) is kind
-    words = "pose: the cables are not tight; run tighten first"
-    assert str(raised.value) == (words if kind is DaemonRefusalError else "its words")
+    assert str(raised.value) == words

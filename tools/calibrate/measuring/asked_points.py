@@ -6,16 +6,34 @@ import math
 import os
 import select
 import sys
+import termios
 from collections.abc import Callable
 from pathlib import Path
 from typing import Final
 
 from cdpr_profiles.errors import ProfileError
+from cdpr_rt.calibration.readings.data import load_points
 from cdpr_tools.calibrate.measuring.ways import StoppedError
+from cdpr_tools.errors import BadInputError
 
 _LOOK_S: Final = 0.2
 _NAMES: Final = ("x", "y", "z")
 _BYTES: Final = 4096
+
+
+def require_points_of(poses: int, path: Path) -> None:
+    """Raise BadInputError where a file has points of poses that have not been read; ProfileError.
+
+    They were measured at poses of an earlier run, whose data are not in the folder any more.
+    """
+    if not path.exists():
+        return
+    last = max((point.pose + 1 for point in load_points(path)), default=0)
+    if last > poses:
+        raise BadInputError(
+            f"{path}: has a point of pose {last}, where {poses} were read: of an earlier run; "
+            "allowed: another --out, or remove it"
+        )
 
 
 class AskedPoints:
@@ -29,13 +47,16 @@ class AskedPoints:
         self, path: Path, coordinates: int, say: Callable[[str], None], stop: Callable[[], bool]
     ) -> None:
         self._path, self._names, self._say, self._stop = path, _NAMES[:coordinates], say, stop
-        self._read, self._open = b"", True
+        self._read, self._open = b"", sys.stdin is not None  # None: closed by a shell's `<&-`
         if not path.exists():
             self._append(",".join(["pose", *(f"{name}_mm" for name in self._names), "sigma_mm"]))
 
     def __call__(self, pose: int) -> None:
         """Ask for the position at a pose, counted from 1; raises StoppedError."""
         names = " ".join(self._names)
+        if self._open and sys.stdin.isatty():
+            # what was typed before the platform stood here was not measured here
+            termios.tcflush(sys.stdin.fileno(), termios.TCIFLUSH)
         while self._open:
             # who measures stands beside a robot that moves once this is answered
             self._say(

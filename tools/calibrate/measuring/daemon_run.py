@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from cdpr_drivers.errors import DriverError
 from cdpr_profiles import Robot
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.errors import ControlError
@@ -34,6 +35,7 @@ from cdpr_tools.calibrate.measuring.ways import (
 from cdpr_tools.client.client import Daemon, HeldRight, NoDaemonError
 from cdpr_tools.client.motion import RENEW_S, ended_text, is_done
 from cdpr_tools.client.pose_reader import DaemonReader
+from cdpr_tools.client.refusals import DaemonRefusalError
 from cdpr_tools.errors import CommandError, WorkFailedError
 from cdpr_tools.output import Output
 from cdpr_tools.trials.directions import Directions, platform_of
@@ -62,7 +64,8 @@ class DaemonOperator(DaemonReader):
     def go(self, place: FloatArray) -> TargetNotReached | None:
         """Take it to a place (d,), or hold it where it is once that takes too long.
 
-        Raises PoseRefusedError, TripError, StoppedError, NoDaemonError.
+        Raises PoseRefusedError, TripError, StoppedError, CommandError for what no pose has a part
+        in, such as a daemon whose loop does not answer.
         """
         directions = self._directions
         arguments = directions.arguments(place, speed_m_s(directions))
@@ -70,9 +73,7 @@ class DaemonOperator(DaemonReader):
         with self._daemon.control() as right:
             try:
                 right.post("/program", {"program": "pose", "wanted": arguments})
-            except NoDaemonError:
-                raise
-            except CommandError as error:
+            except DaemonRefusalError as error:
                 self.status()  # raises where the motion is being ended
                 raise PoseRefusedError(str(error)) from None
             progress = self._until(right, allowed_s)
@@ -83,35 +84,45 @@ class DaemonOperator(DaemonReader):
 
     def _until(self, right: HeldRight, seconds: float) -> dict[str, Any]:
         """Return the progress of `pose` once it is done, or so much bus time is over."""
-        status = self.status()
-        end_s = status["cycle"]["time_s"] + seconds
-        while status["program"] == "pose" and status["cycle"]["time_s"] < end_s:
-            if is_done(status["program_progress"]):
-                break
+        end_s = self.status()["cycle"]["time_s"] + seconds
+        while True:
             right.renew()
-            self.stay(RENEW_S)
+            self.stay(RENEW_S)  # the loop replies to a command before its status tells of it
             status = self.status()
-        if status["program"] != "pose":
-            raise self._ended(status)
-        progress: dict[str, Any] = status["program_progress"]
-        return progress
+            if status["program"] != "pose":
+                raise self._ended(status)
+            progress: dict[str, Any] = status["program_progress"]
+            if is_done(progress) or status["cycle"]["time_s"] >= end_s:
+                return progress
 
     def status(self) -> dict[str, Any]:
-        """Return the daemon's status; raises TripError where the robot's power has gone."""
+        """Return the daemon's status; raises TripError where the power has gone, or is about to."""
         if self._stop():
             raise StoppedError
         try:
-            return super().status()
+            status = super().status()
         except NoDaemonError:
             raise
         except WorkFailedError:
-            if (status := self._daemon.get("/status"))["state"] == "active":
+            status = self._daemon.get("/status")
+            if status["state"] == "active" and _reaction(status) is None:
                 raise  # its cables are loose, or nobody knows where it is
             raise self._ended(status) from None
+        if _reaction(status) is not None:
+            raise self._ended(status)
+        return status
 
     def _ended(self, status: dict[str, Any]) -> Exception:
-        text = f"the motion was ended: {ended_text(self._daemon, status)} ({status['state']})"
+        reaction = _reaction(status)
+        how = status["state"] if reaction is None else f"{reaction} under way"
+        text = f"the motion was ended: {ended_text(self._daemon, status)} ({how})"
         return motion_ended(text, status["reason"], status["reason_limit"])
+
+
+def _reaction(status: dict[str, Any]) -> str | None:
+    """Return how the robot is being stopped, None where it is not."""
+    reaction = str(status.get("reacting", "none"))
+    return None if reaction == "none" else reaction
 
 
 def measure_with_daemon(
@@ -127,13 +138,13 @@ def measure_with_daemon(
     """Read home where there are no poses yet, then places until there are as many as wanted.
 
     What is read is kept whatever ends it, and the error says how to go on. Raises CommandError,
-    ControlError, WorkFailedError where somebody stops it.
+    ControlError, DriverError, WorkFailedError where somebody stops it.
     """
     try:
         read_places(out, robot, operator, kept, places, wanted, enough, ask)
     except StoppedError:
         raise WorkFailedError(f"stopped; {_going_on(kept)}") from None
-    except (CommandError, ControlError) as error:
+    except (CommandError, ControlError, DriverError) as error:
         error.add_note(_going_on(kept))
         raise
 

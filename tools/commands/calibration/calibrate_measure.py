@@ -57,7 +57,7 @@ def measure(
     with out.stage("choosing poses"):
         from cdpr_tools.calibrate.finish import enough, finish, with_hand_eye  # noqa: PLC0415
         from cdpr_tools.calibrate.measuring import daemon_pose, daemon_run  # noqa: PLC0415
-        from cdpr_tools.calibrate.measuring.asked_points import AskedPoints  # noqa: PLC0415
+        from cdpr_tools.calibrate.measuring.asked_points import AskedPoints, require_points_of  # noqa: PLC0415
         from cdpr_tools.calibrate.measuring.places import MOST_POSES, places_of, poses_wanted  # noqa: PLC0415
         from cdpr_tools.calibrate.measuring.run import DATA, told_only  # noqa: PLC0415  # slow to load
         from cdpr_tools.trials.directions import platform_of  # noqa: PLC0415  # slow to load
@@ -67,8 +67,9 @@ def measure(
         count, listed = poses_wanted(robot, poses)
         folder = out_dir or Path("out") / f"calibrate-{robot.profile}"
         data = daemon_pose.data_of(folder, robot, description["simulated"])
+        points = folder / "points.csv"
+        require_points_of(len(data.poses), points)
         places, wanted = places_of(robot, count, listed, seed), count or MOST_POSES
-    points = folder / "points.csv"
     with stop_on_signals(HELD) as stop:
         kept = daemon_pose.DaemonPoses(folder, data)
         with daemon_pose.image_taker(camera, intrinsics, markers, kept, out.note) as image:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import select
 import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -22,11 +23,12 @@ from cdpr_rt.calibration.readings.data import load_data, load_points
 from cdpr_rt.errors import TripError
 from cdpr_tools.calibrate.check import checked_running
 from cdpr_tools.calibrate.measuring import asked_points, daemon_pose
-from cdpr_tools.calibrate.measuring.asked_points import AskedPoints
+from cdpr_tools.calibrate.measuring.asked_points import AskedPoints, require_points_of
 from cdpr_tools.calibrate.measuring.daemon_run import DaemonOperator, measure_with_daemon
 from cdpr_tools.calibrate.measuring.places import Places
 from cdpr_tools.calibrate.measuring.ways import StoppedError
 from cdpr_tools.client.client import ConnectionLostError
+from cdpr_tools.client.refusals import DaemonRefusalError
 from cdpr_tools.errors import BadInputError, WorkFailedError
 from cdpr_tools.output import Output
 from tests.profiles.test_geometry_calibration import calibration
@@ -47,7 +49,9 @@ class Moved(Told):
         self.stuck: set[float] = set()
         self.faulty: set[float] = set()
         self.limit, self.renewed, self.holds, self.rights = "slack", 0, 0, 0
-        self.lost = False
+        self.lost = self.silent = False
+        self.late, self.reacting = 0, "none"
+        """How many statuses tell of a command late, and how the robot is being stopped."""
 
     def get(self, path: str) -> dict[str, Any]:
         if self.lost:
@@ -68,10 +72,12 @@ class Moved(Told):
             "done": float(arrived), "trouble": "", "held_back": "a cable would be slack",
             "missing": "",
         }  # fmt: skip
-        reason = "axis 1: slack" if self.state == "fault" else ""
+        reason = "axis 1: slack" if self.state == "fault" or self.reacting != "none" else ""
         limit = {"limit": self.limit} if reason else None
+        program, self.late = "hold" if self.late else self.program, max(self.late - 1, 0)
         return status | {
-            "program": self.program, "state": self.state, "reason": reason, "reason_limit": limit,
+            "program": program, "state": self.state, "reason": reason, "reason_limit": limit,
+            "reacting": self.reacting,
         }  # fmt: skip
 
     @contextmanager
@@ -87,8 +93,12 @@ class Moved(Told):
         wanted = body["wanted"]
         assert (path, body["program"]) == ("/program", "pose")
         assert wanted["speed_m_s"] == 0.5 * ROBOT.platform.speed_m_s  # type: ignore[union-attr]
+        if self.silent:
+            raise WorkFailedError("the loop has not turned for 2.0 s")
+        if self.reacting != "none":
+            raise DaemonRefusalError("pose: the robot is being stopped")
         if wanted["position_m"][0] in self.refused:
-            raise WorkFailedError("a cable is in the way")
+            raise DaemonRefusalError("a cable is in the way")
         self.program, self.target = "pose", [*wanted["position_m"], *wanted["rotation_rad"]]
 
     def renew(self) -> None:
@@ -164,6 +174,48 @@ def test_a_fault_ends_it_with_what_was_read_kept(
     assert "the same command goes on behind them" in caught.value.__notes__[0]
     data = load_data(measurement.folder / "data.json")
     assert len(data.tried) == tried and 1 <= len(data.poses) < 5
+
+
+def test_a_robot_that_is_being_stopped_ends_it_before_other_places_are_asked_for(
+    measurement: Measurement,
+) -> None:
+    """As one whose platform is let down: it has power yet, and refuses whatever is asked."""
+    measurement.run(2)
+    daemon = measurement.daemon
+    control = daemon.control
+
+    def stopped_meanwhile() -> Any:
+        daemon.reacting = "controlled stop"
+        return control()
+
+    daemon.control = stopped_meanwhile  # type: ignore[method-assign]
+    with pytest.raises(TripError, match=r"axis 1: slack \(controlled stop under way\)"):
+        measurement.run()
+    assert daemon.rights == 2 and len(load_data(measurement.folder / "data.json").tried) == 1
+    with pytest.raises(TripError):  # nor is anything read then
+        measurement.run()
+    assert daemon.rights == 2
+
+
+def test_a_loop_that_does_not_answer_is_not_taken_for_a_refusal(measurement: Measurement) -> None:
+    measurement.run(2)
+    measurement.daemon.silent = True
+    with pytest.raises(WorkFailedError, match="has not turned"):
+        measurement.run()
+    assert measurement.daemon.rights == 2
+    assert load_data(measurement.folder / "data.json").tried == ()
+
+
+def test_a_status_may_tell_of_a_command_later_than_its_reply(measurement: Measurement) -> None:
+    daemon = measurement.daemon
+    post = daemon.post
+
+    def post_before_status(path: str, body: dict[str, Any]) -> None:
+        post(path, body)
+        daemon.late = 1
+
+    daemon.post = post_before_status  # type: ignore[method-assign]
+    assert len(measurement.run().data.poses) == 5
 
 
 def test_a_stop_holds_and_a_lost_daemon_is_told(measurement: Measurement) -> None:
@@ -273,6 +325,47 @@ def test_what_a_person_measures_is_kept_as_points(tmp_path: Path, typed: int) ->
     assert [point.std_m for point in points] == [0.002, 0.0003, 0.002]
     assert sum("allowed: x y z" in line for line in said) == 3
     assert said[-1].startswith("pose 5 stands")  # at the end of what is typed nothing is asked
+
+
+def test_what_was_typed_before_the_platform_stood_is_no_answer(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    source, terminal = os.openpty()
+    path, said = tmp_path / "points.csv", [""]
+
+    def say(text: str) -> None:
+        if text.startswith("pose"):
+            os.write(source, f"{len(said)} 0\n".encode())
+        said.append(text)
+
+    with os.fdopen(terminal) as stdin:
+        monkeypatch.setattr(asked_points.sys, "stdin", stdin)
+        os.write(source, b"7 7\n")
+        assert select.select([terminal], [], [], 5.0)[0]
+        ask = AskedPoints(path, 2, say, lambda: False)
+        ask(1)
+        ask(2)
+    os.close(source)
+    assert [point.position_m.tolist()[:2] for point in load_points(path)] == [
+        [0.001, 0],
+        [0.002, 0],
+    ]
+
+
+def test_nothing_is_asked_without_an_input(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(asked_points.sys, "stdin", None)
+    AskedPoints(tmp_path / "points.csv", 2, pytest.fail, lambda: False)(1)
+
+
+def test_points_of_poses_that_are_not_there_are_refused(tmp_path: Path) -> None:
+    path = tmp_path / "points.csv"
+    require_points_of(0, path)
+    path.write_text("pose,x_mm,y_mm,sigma_mm\n")
+    require_points_of(0, path)
+    path.write_text("pose,x_mm,y_mm,sigma_mm\n1,0,0\n3,0,0\n")
+    require_points_of(3, path)
+    with pytest.raises(BadInputError, match=r"point of pose 3, where 2 were read"):
+        require_points_of(2, path)
 
 
 def test_a_stop_ends_the_asking(tmp_path: Path, typed: int) -> None:
