@@ -166,6 +166,9 @@ class PullFit(Protocol):
     def end(self) -> FloatArray:
         """Return the angles (n,) at which the cables have the pretension, nan where not known."""
 
+    def begin_learning(self) -> None:
+        """Begin the learning anew with what was found last, where there is such."""
+
 
 class PlatformControl(Controller, Protocol):
     """A controller whose set-point is a platform's, in the coordinates of its robot's file.

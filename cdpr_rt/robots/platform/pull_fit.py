@@ -44,7 +44,7 @@ class PullFit:
 
     See `pull_kernel`; a least-squares fit of what all cycles tell, with what is usual of friction
     and cogging (zero, with the standard deviations of `MotorLearning`). Nothing is found of motors
-    that are `known` (n,). What is found is where the `learning` begins.
+    that are `known` (n,). What is found is where the `learning` begins, once it is to.
     """
 
     def __init__(
@@ -72,6 +72,8 @@ class PullFit:
         self._sums = np.zeros((n, size, size))
         self.unknowns = np.zeros((n, kernel.UNKNOWNS))
         """What was found, (n, 5)."""
+        self._found = np.zeros(n, np.bool_)
+        self._covariance = np.zeros((n, kernel.UNKNOWNS, kernel.UNKNOWNS))
         self._take = bound(
             kernel.take, self._motors, self._shares, self._lengths, self._seen, self._yielding,
             self._turned, self._sums, np.zeros(size), then=(np.zeros(n), np.zeros(n)),
@@ -101,15 +103,22 @@ class PullFit:
     def end(self) -> FloatArray:
         """Return the angles (n,) at which the cables have the pretension, nan where not known."""
         misfit, x, covariance = self._fit()
-        found = ~self._known & (self._turned >= _TURNED_rad).all(axis=0) & (misfit < _MISFIT)
-        self.unknowns[:] = x
-        if self._learning is not None:
-            torques, of_torques = x[:, kernel.FRICTION :].copy(), slice(kernel.FRICTION, None)
-            torques[:, 0] *= _SLOW_SHARE
-            covariance = covariance[:, of_torques, of_torques]
-            covariance[:, 0, 0] += (_UNLIKE * torques[:, 0]) ** 2
-            self._learning.begin_with(found, torques, covariance)
-        return np.where(found, self._motors[kernel.ORIGIN] + x[:, kernel.ANGLE], np.nan)
+        self.unknowns[:], self._covariance[:] = x, covariance
+        turned = (self._turned >= _TURNED_rad).all(axis=0)
+        self._found[:] = ~self._known & turned & (misfit < _MISFIT)
+        angle_rad = self._motors[kernel.ORIGIN] + self.unknowns[:, kernel.ANGLE]
+        return np.where(self._found, angle_rad, np.nan)
+
+    def begin_learning(self) -> None:
+        """Begin the learning anew with what was found last."""
+        if self._learning is None:
+            return
+        of_torques = slice(kernel.FRICTION, None)
+        torques = self.unknowns[:, of_torques].copy()
+        torques[:, 0] *= _SLOW_SHARE
+        covariance = self._covariance[:, of_torques, of_torques].copy()
+        covariance[:, 0, 0] += (_UNLIKE * torques[:, 0]) ** 2
+        self._learning.begin_with(self._found, torques, covariance)
 
     def _fit(self) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return of each motor residual over noise, (n,), what was found, (n, 5), its covariance.

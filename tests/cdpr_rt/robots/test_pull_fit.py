@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -16,8 +17,12 @@ from cdpr_rt.robots.platform_model import platform_model_of
 
 ROBOT = load_robot("suspended-6")
 N, POLE_PAIRS = 6, 4
-CABLE_m = np.array([axis.winch.cable_m_per_motor_rad for axis in ROBOT.axes])
-RATED_Nm = ROBOT.axes[0].winch.motor.rated_torque_Nm
+AXES = [
+    replace(axis, winch=replace(axis.winch, cable_sign=1 - 2 * (i % 2)))
+    for i, axis in enumerate(ROBOT.axes)
+]
+"""Every other cable is paid out by turning the other way."""
+CABLE_m = np.array([axis.winch.cable_m_per_motor_rad for axis in AXES])
 PRETENSION_N = np.full(N, 80.0)
 FRICTION_Nm = np.array([0.04, 0.08, 0.12, 0.06, 0.10, 0.09])
 PHASE_rad = np.array([0.3, 1.5, 2.6, 3.9, 5.0, 6.1])
@@ -84,9 +89,11 @@ def test_lengths_are_found_without_friction_and_cogging(
     lengths: Callable[[np.ndarray], np.ndarray],
 ) -> None:
     winches = Winches(lengths)
-    learning = MotorLearning(ROBOT.axes, NOBODY, np.ones(N), 500.0, 1e-3)
-    fit = PullFit(ROBOT.axes, NOBODY, lengths, learning)
+    learning = MotorLearning(AXES, NOBODY, np.ones(N), 500.0, 1e-3)
+    fit = PullFit(AXES, NOBODY, lengths, learning)
     found = pulled(fit, winches)
+    assert not learning.learnt_Nm.any()  # before it is sure that the platform stands at home
+    fit.begin_learning()
     left_N = np.abs(off_N(winches.theta, winches))
     assert left_N.max() > 10.0  # what is taken up where they have come to rest
     assert np.abs(off_N(found, winches)).max() < 2.0
@@ -115,7 +122,7 @@ def test_a_torque_constant_that_is_off_is_not_taken_for_cogging(
 ) -> None:
     """Nothing but a load cell knows of it: the pretension is truly 5 % more than was asked for."""
     winches = Winches(lengths, gain=1.05)
-    fit = PullFit(ROBOT.axes, NOBODY, lengths, None)
+    fit = PullFit(AXES, NOBODY, lengths, None)
     found = pulled(fit, winches)
     wrong_N = 0.05 * PRETENSION_N
     assert np.abs(np.abs(off_N(found, winches)) - wrong_N).max() < 2.5
@@ -124,7 +131,7 @@ def test_a_torque_constant_that_is_off_is_not_taken_for_cogging(
 def test_a_platform_that_moves_meanwhile_is_not_believed(
     lengths: Callable[[np.ndarray], np.ndarray],
 ) -> None:
-    fit = PullFit(ROBOT.axes, NOBODY, lengths, None)
+    fit = PullFit(AXES, NOBODY, lengths, None)
     assert np.isnan(pulled(fit, Winches(lengths), moved_m=0.02)).all()
 
 
@@ -132,14 +139,16 @@ def test_nothing_is_found_of_motors_that_are_known_or_do_not_turn(
     lengths: Callable[[np.ndarray], np.ndarray],
 ) -> None:
     known = np.arange(N) % 2 == 0
-    learning = MotorLearning(ROBOT.axes, known, np.ones(N), 500.0, 1e-3)
-    fit = PullFit(ROBOT.axes, known, lengths, learning)
+    learning = MotorLearning(AXES, known, np.ones(N), 500.0, 1e-3)
+    fit = PullFit(AXES, known, lengths, learning)
     assert (np.isnan(pulled(fit, Winches(lengths))) == known).all()
+    fit.begin_learning()
     assert not learning.friction_Nm[known].any() and learning.friction_Nm[~known].all()
     fit.begin(np.zeros(N))
     for _ in range(50):
         fit.take(np.zeros(N), PRETENSION_N)
     assert np.isnan(fit.end()).all()
+    fit.begin_learning()
     assert not learning.friction_Nm.any()
 
 
@@ -147,8 +156,10 @@ def test_nothing_is_found_of_motors_that_are_known_or_do_not_turn(
 def test_what_is_found_leaves_the_tensions_a_third_of_their_reserve(
     lengths: Callable[[np.ndarray], np.ndarray], reserve_N: float
 ) -> None:
-    learning = MotorLearning(ROBOT.axes, NOBODY, np.ones(N), reserve_N, 1e-3)
-    pulled(PullFit(ROBOT.axes, NOBODY, lengths, learning), Winches(lengths))
+    learning = MotorLearning(AXES, NOBODY, np.ones(N), reserve_N, 1e-3)
+    fit = PullFit(AXES, NOBODY, lengths, learning)
+    pulled(fit, Winches(lengths))
+    fit.begin_learning()
     added_Nm = learning.friction_Nm + np.linalg.norm(learning.cogging_Nm, axis=1)
     third_Nm = reserve_N / 3.0 * np.abs(CABLE_m)
     assert (learning.friction_Nm > 0.0).all()

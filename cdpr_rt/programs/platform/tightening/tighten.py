@@ -257,6 +257,8 @@ class TightenProgram(PlatformProgram):
         self._control.begin(feedback, tension_N)
         self._fail_if(disagreement(self._parts, self._source))
         if not self._failure:
+            if self._source == "home":  # elsewhere than told nothing right is found
+                self._control.pull_fit.begin_learning()
             self._control.begin(feedback)
             self._take_over(feedback, torque_Nm)
             self._hands_over, self._path = True, []
