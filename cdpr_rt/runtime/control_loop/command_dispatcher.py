@@ -60,6 +60,7 @@ class CommandDispatcher:
         self._transitions = transitions
         self._request_stop = request_stop
         self._put_off: _PutOff | None = None
+        self._replies: list[tuple[int, CommandRefusal | str]] = []
         self._counters = engine.block.counters
         # read in every cycle: a memoryview is faster
         queues = ("urgent", "urgent_taken", "commands", "commands_taken")
@@ -164,7 +165,20 @@ class CommandDispatcher:
         self._engine.machine.clock.cancel(put_off.task)
         self._reply(_number(put_off.command), f"given up: {why}")
 
+    def send_replies(self) -> None:
+        """Reply to what has been done, refused or given up since the last call.
+
+        Called once the status says so: who has the reply and then asks for the status finds in it
+        what was commanded.
+        """
+        for number, error in self._replies:
+            self._send(number, error)
+        self._replies.clear()
+
     def _reply(self, number: int, error: CommandRefusal | str) -> None:
+        self._replies.append((number, error))
+
+    def _send(self, number: int, error: CommandRefusal | str) -> None:
         state, text = self._life.state.label, str(error)
         refusal = {"refusal": error.as_json()} if isinstance(error, CommandRefusal) else {}
         # letters may take a dozen bytes each

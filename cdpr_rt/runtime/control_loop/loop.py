@@ -66,7 +66,7 @@ class ControlLoop:
             self.status.publish()
 
     def turn(self) -> None:
-        """Run one cycle, or sleep; then stop requests, commands, transition and status."""
+        """Run one cycle, or sleep; then stop requests, commands, transition, status and replies."""
         self._alive[0] = time.monotonic_ns()
         engine = self.engine
         if engine.cycling:
@@ -81,6 +81,7 @@ class ControlLoop:
         except Exception as mistake:
             self.safe_stop.remove_power(mistake)
         self.status.update()
+        self._commands.send_replies()
 
     def request_stop(self) -> None:
         """Have the loop end under control. For signal handlers."""

@@ -43,6 +43,25 @@ def active(rig: LoopRig) -> Iterator[LoopRig]:
         rig.obeyed("disable")
 
 
+def test_who_has_the_reply_finds_the_command_in_the_status(
+    active: LoopRig, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    found: list[tuple[str, str]] = []
+    post = active.block.post_reply
+
+    def look_and_post(reply: dict[str, object]) -> None:
+        status = active.block.status()
+        found.append((status["program"], status["state"]))
+        post(reply)
+
+    monkeypatch.setattr(active.block, "post_reply", look_and_post)
+    active.obeyed("program", **JOG)
+    active.obeyed("hold")
+    active.obeyed("disable")
+    assert found[:2] == [("jog", "active"), ("hold", "active")]
+    assert found[2][1] == "ready"
+
+
 class Clients:
     """Clients of a link, and a loop that turns when told to."""
 
