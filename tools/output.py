@@ -56,6 +56,7 @@ class Output:
         self.as_json = as_json
         self.notes = Console(stderr=True, highlight=False, emoji=False)
         self.text = self.notes if as_json else Console(highlight=False, emoji=False)
+        self._bar: Progress | None = None
 
     def say(self, *lines: str) -> None:
         """Write lines for people."""
@@ -99,6 +100,19 @@ class Output:
             yield
 
     @contextmanager
+    def paused(self) -> Iterator[None]:
+        """Draw nothing while the block runs, so that somebody can type."""
+        bar = self._bar
+        if bar is None:
+            yield
+            return
+        bar.stop()
+        try:
+            yield
+        finally:
+            bar.start()
+
+    @contextmanager
     def _shown(self, columns: Any, advance: Advance, shown: bool) -> Iterator[Advance]:
         if not shown:
             yield advance
@@ -106,7 +120,11 @@ class Output:
             with Progress(*columns, console=self.notes, transient=True) as bar:
                 task = bar.add_task(advance.what, total=advance.total)
                 advance.on_change = lambda: bar.update(task, completed=advance.done)
-                yield advance
+                self._bar = bar
+                try:
+                    yield advance
+                finally:
+                    self._bar = None
         else:
             with self._told_now_and_then(advance):
                 yield advance

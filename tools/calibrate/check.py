@@ -27,6 +27,7 @@ from cdpr_rt.procedures.calibration.measure_poses import (
 from cdpr_tools.calibrate.finish import identified
 from cdpr_tools.calibrate.measuring.daemon_pose import (
     DaemonPoses,
+    held_place,
     image_taker,
     no_poses,
     robot_of,
@@ -110,8 +111,9 @@ def checked_running(
     if known is not None and camera is None:
         out.note("--camera is left out: lengths alone are looked at")
         known = None
-    places = chosen_places(robot, POSES, seed, Choose.SPREAD)
     kept = DaemonPoses(folder, no_poses(robot, description["simulated"]), CHECK)
+    kept.require_home(robot, held_place(daemon, robot))  # before what takes a while
+    places = chosen_places(robot, POSES, seed, Choose.SPREAD)
     if known is not None:
         kept.data = kept.data.model_copy(update={"camera": known.setup})
     with (

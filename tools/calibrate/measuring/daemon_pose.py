@@ -63,6 +63,11 @@ def robot_of(daemon: Daemon, as_calibrated: bool = False) -> tuple[Robot, dict[s
     return robot, description
 
 
+def held_place(daemon: Daemon, robot: Robot) -> FloatArray:
+    """Return where a daemon's platform is, (d,); raises WorkFailedError where it is not held."""
+    return DaemonReader(daemon, cable_m_per_rad(robot), lambda _wait: None).place()
+
+
 def no_poses(robot: Robot, simulated: bool) -> CalibrationData:
     """Return the data of a robot of which nothing has been read yet."""
     return CalibrationData(

@@ -66,25 +66,28 @@ def measure(
         geometry, known = geometry_of(robot, identify, known_mm), hand_eye_of(hand_eye)
         count, listed = poses_wanted(robot, poses)
         folder = out_dir or Path("out") / f"calibrate-{robot.profile}"
-        data = daemon_pose.data_of(folder, robot, description["simulated"])
+        kept = daemon_pose.DaemonPoses(
+            folder, daemon_pose.data_of(folder, robot, description["simulated"])
+        )
         points = folder / "points.csv"
-        require_points_of(len(data.poses), points)
+        require_points_of(len(kept.data.poses), points)
+        # refused before poses are chosen, which takes a while, and before a file is made
+        kept.require_home(robot, daemon_pose.held_place(daemon, robot))
         places, wanted = places_of(robot, count, listed, seed), count or MOST_POSES
-    with stop_on_signals(HELD) as stop:
-        kept = daemon_pose.DaemonPoses(folder, data)
-        with daemon_pose.image_taker(camera, intrinsics, markers, kept, out.note) as image:
-            kept.data = with_hand_eye(kept.data, known)
-            operator = daemon_run.DaemonOperator(daemon, robot, image, stop)
-            operator.place()  # refused where it is not held, before a file is made
-            asked = (
-                AskedPoints(points, len(platform_of(robot).home_m), out.note, stop) if ask else None
-            )
-            told = enough(out, robot, points if ask else None, geometry)
-            daemon_run.measure_with_daemon(
-                out, robot, operator, kept, places, wanted,
-                told if count is None else told_only(told),
-                asked or (lambda _pose: None),
-            )  # fmt: skip
+    with (
+        stop_on_signals(HELD) as stop,
+        daemon_pose.image_taker(camera, intrinsics, markers, kept, out.note) as image,
+    ):
+        kept.data = with_hand_eye(kept.data, known)
+        operator = daemon_run.DaemonOperator(daemon, robot, image, stop)
+        home_m = platform_of(robot).home_m
+        asked = AskedPoints(out, points, len(home_m), operator.place) if ask else None
+        told = enough(out, robot, points if ask else None, geometry)
+        daemon_run.measure_with_daemon(
+            out, robot, operator, kept, places, wanted,
+            told if count is None else told_only(told),
+            asked or (lambda _pose: None),
+        )  # fmt: skip
     out.say("the platform is held at the last pose; `cdpr lower` takes it back onto its stand")
     finish(
         *(out, robot, kept.data, points if points.exists() else None, geometry),
