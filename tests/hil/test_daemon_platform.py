@@ -198,7 +198,7 @@ def test_it_goes_to_the_poses_of_a_calibration_by_itself(
     status, why = refused(turning, *command, "--out", str(folder))
     assert (status, "not held on its cables" in why, folder.exists()) == (1, True, False)
     told(turning, "tighten")
-    done = cdpr(*command, *turning.at, "--out", folder, typed="0 1000\n\n\n0 1000 0.5\n")
+    done = cdpr(*command, *turning.at, "--out", folder, typed="0 1000\n\n\n0 1450 0.5\n")
     assert done.stderr.count("measured x y in mm") == 5, done.stderr  # what is typed ends there
     assert "the platform is held at the last pose" in done.stdout
     data = load_data(folder / "data.json")
@@ -206,7 +206,7 @@ def test_it_goes_to_the_poses_of_a_calibration_by_itself(
     assert {pose.target for pose in data.poses[1:]} == set(places)
     assert (folder / "points.csv").read_text().splitlines()[1:] == [
         "1,0.0,1000.0",
-        "4,0.0,1000.0,0.5",
+        "4,0.0,1450.0,0.5",
     ]
     assert turning.status()["program"] == "hold"
     told(turning, "lower")

@@ -26,6 +26,7 @@ from cdpr_rt.robots.persistence.calibration_state import (
     not_calibrated_reason,
 )
 from cdpr_tools.calibrate.measuring.begin import points_of
+from cdpr_tools.calibrate.measuring.run import COUNTED
 from cdpr_tools.errors import BadInputError, WorkFailedError
 from cdpr_tools.output import Output
 
@@ -136,8 +137,11 @@ def finish(
     taken: dict[str, Any] | None = None
     more = [f"nothing was taken over: {why_not}"]
     if why_not is None:
-        taken, more = _taken(outcome, str(source.resolve()), data.simulated)
-    more.append(f"fit it again: cdpr calibrate fit {robot.reference} --data {source.parent}")
+        taken, more = _taken(outcome, source, data.simulated)
+    measured = "" if points is None else f" --points {points}"
+    more.append(
+        f"fit it again: cdpr calibrate fit {robot.reference} --data {source.parent}{measured}"
+    )
     with out.stage("drawing the report"):
         told |= _reported(outcome, data, known, more, folder, source.parent / _IMAGES)
     out.say(*more, f"report: {told['report']}")
@@ -159,12 +163,15 @@ def _why_not(outcome: Outcome, dry_run: bool) -> str | None:
     return "its changes are not significant (--adopt takes it over all the same)"
 
 
-def _taken(outcome: Outcome, raw_data: str, simulated: bool) -> tuple[dict[str, Any], list[str]]:
+def _taken(outcome: Outcome, source: Path, simulated: bool) -> tuple[dict[str, Any], list[str]]:
     """Take a good calibration over; return it for JSON, and what there is to say and do."""
     robot = outcome.robot
-    found, path = _take_over(outcome, raw_data, simulated)
-    plant = " --plant FILE, where the run had one" if simulated else ""
-    check = f"cdpr calibrate check {robot.reference}{plant}"
+    found, path = _take_over(outcome, str(source.resolve()), simulated)
+    if not simulated or source.with_name(COUNTED).exists():
+        how = "--running, once it runs anew, tight and at home"
+    else:
+        how = "--plant FILE, where the run had one"
+    check = f"cdpr calibrate check {robot.reference} {how}"
     lines = [
         f"calibration {found.version} ({found.identity}) takes effect at the next start: {path}",
         f"take it back: cdpr calibrate undo {robot.reference}",

@@ -97,6 +97,8 @@ def test_points_of_a_person_calibrate_and_are_taken_over_shown_and_undone(tmp_pa
     assert proof["mean_position_error_mm"] < 0.6 * proof["mean_position_error_before_mm"]
     assert abs(proof["scale_factor"] - 1.0) < 4.0 * proof["scale_factor_std"] < 0.01
     assert "distances between them are " in done.stderr
+    assert f"calibrate fit spatial-8 --data {tmp_path} --points {points}" in done.stderr
+    assert "cdpr calibrate check spatial-8 --running" in done.stderr
     assert len(told["parameters"]) == 8 * 5 + 1
     assert matplotlib.image.imread(told["picture"]).std() > 0.01
     robot = load_robot("spatial-8")
