@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
@@ -47,8 +48,9 @@ Ask = Callable[[int], None]
 class DaemonOperator(DaemonReader):
     """Moves and reads the platform of a robot that a daemon runs; a `PlatformOperator`.
 
-    Between two motions the platform is held, and the right to move given back. `stop` is asked
-    whether somebody wants an end, which is told by StoppedError.
+    The right to move is held while it is `in_control`: nobody else moves the platform then, and
+    whatever ends its program, such as a hold from elsewhere, ends that. `stop` is asked whether
+    somebody wants an end, which is told by StoppedError.
     """
 
     def __init__(
@@ -60,6 +62,25 @@ class DaemonOperator(DaemonReader):
     ) -> None:
         super().__init__(daemon, cable_m_per_rad(robot), image)
         self._directions, self._stop = Directions.of(platform_of(robot)), stop
+        self._right: HeldRight | None = None
+        self._renewed_s = 0.0
+        """When the right was renewed last, in bus time."""
+        self._program = ""
+        """Which one was begun last and still has to run, "" for none."""
+
+    @contextmanager
+    def in_control(self) -> Iterator[None]:
+        """Hold the right to move in the block, and the platform at its end."""
+        try:
+            with self._daemon.control() as self._right:
+                yield
+                self._hold(self._right)
+        finally:
+            self._right, self._program = None, ""
+
+    def _hold(self, right: HeldRight) -> None:
+        self._program = "hold"
+        right.hold()
 
     def go(self, place: FloatArray) -> TargetNotReached | None:
         """Take it to a place (d,), or hold it where it is once that takes too long.
@@ -67,36 +88,39 @@ class DaemonOperator(DaemonReader):
         Raises PoseRefusedError, TripError, StoppedError, CommandError for what no pose has a part
         in, such as a daemon whose loop does not answer.
         """
-        directions = self._directions
+        directions, right = self._directions, self._right
+        assert right is not None  # in control
         arguments = directions.arguments(place, speed_m_s(directions))
         allowed_s = within_s(directions, self.place(), place)
-        with self._daemon.control() as right:
-            try:
-                right.post("/program", {"program": "pose", "wanted": arguments})
-            except DaemonRefusalError as error:
-                self.status()  # raises where the motion is being ended
-                raise PoseRefusedError(str(error)) from None
-            progress = self._until(right, allowed_s)
-            right.hold()
+        self._program = ""
+        try:
+            right.post("/program", {"program": "pose", "wanted": arguments})
+        except DaemonRefusalError as error:
+            self.status()  # raises where the motion is being ended
+            raise PoseRefusedError(str(error)) from None
+        self.stay(RENEW_S)  # what a status tells at once may be of the program before
+        self._program = "pose"
+        progress = self._until(allowed_s)
         if is_done(progress):
             return None
+        self._hold(right)
         return not_reached(directions, place, self.place(), allowed_s, progress)
 
-    def _until(self, right: HeldRight, seconds: float) -> dict[str, Any]:
+    def _until(self, seconds: float) -> dict[str, Any]:
         """Return the progress of `pose` once it is done, or so much bus time is over."""
         end_s = self.status()["cycle"]["time_s"] + seconds
         while True:
-            right.renew()
-            self.stay(RENEW_S)  # the loop replies to a command before its status tells of it
             status = self.status()
-            if status["program"] != "pose":
-                raise self._ended(status)
             progress: dict[str, Any] = status["program_progress"]
             if is_done(progress) or status["cycle"]["time_s"] >= end_s:
                 return progress
+            self.stay(RENEW_S)
 
     def status(self) -> dict[str, Any]:
-        """Return the daemon's status; raises TripError where the power has gone, or is about to."""
+        """Return the daemon's status, with the right renewed.
+
+        Raises TripError where the power has gone or is about to, or another program runs.
+        """
         if self._stop():
             raise StoppedError
         try:
@@ -108,8 +132,12 @@ class DaemonOperator(DaemonReader):
             if status["state"] == "active" and _reaction(status) is None:
                 raise  # its cables are loose, or nobody knows where it is
             raise self._ended(status) from None
-        if _reaction(status) is not None:
+        if _reaction(status) is not None or self._program not in ("", status["program"]):
             raise self._ended(status)
+        time_s = status["cycle"]["time_s"]
+        if self._right is not None and abs(time_s - self._renewed_s) >= RENEW_S:
+            self._right.renew()
+            self._renewed_s = time_s
         return status
 
     def _ended(self, status: dict[str, Any]) -> Exception:
@@ -160,7 +188,10 @@ def read_places(
     ask: Ask = lambda _pose: None,
 ) -> None:
     """Do what `measure_with_daemon` does; raises StoppedError besides, and says less."""
-    with out.progress(f"reading up to {wanted} poses", float(wanted)) as advance:
+    with (
+        operator.in_control(),
+        out.progress(f"reading up to {wanted} poses", float(wanted)) as advance,
+    ):
         if not kept.data.poses:
             read_into(operator, robot, kept)
             ask(1)

@@ -113,6 +113,7 @@ class Measurement:
     def __init__(self, daemon: Moved, folder: Path) -> None:
         self.daemon, self.folder = daemon, folder
         self.asked: list[int] = []
+        self.ask = self.asked.append
         self.stopped = False
 
     def run(self, wanted: int = 5) -> daemon_pose.DaemonPoses:
@@ -120,9 +121,7 @@ class Measurement:
         operator = DaemonOperator(self.daemon, robot, lambda _: None, lambda: self.stopped)  # type: ignore[arg-type]
         places = Places(np.array([0.0, 1.5, 0.0]), np.array(PLACES))
         out = Output(as_json=False)
-        measure_with_daemon(
-            out, robot, operator, kept, places, wanted, lambda _: None, self.asked.append
-        )
+        measure_with_daemon(out, robot, operator, kept, places, wanted, lambda _: None, self.ask)
         return kept
 
 
@@ -137,8 +136,9 @@ def test_home_is_read_and_then_each_place_and_all_are_kept(measurement: Measurem
     assert data == kept.data and len(data.poses) == 5 and data.restarts == ()
     assert {pose.target for pose in data.poses[1:]} == set(PLACES)
     assert measurement.asked == [1, 2, 3, 4, 5]
-    # the right is held while something moves, and only then
-    assert measurement.daemon.rights == measurement.daemon.holds == 4
+    # the right is held from the first pose to the last, and renewed
+    assert measurement.daemon.rights == measurement.daemon.holds == 1
+    assert measurement.daemon.renewed > 20
     assert measurement.daemon.program == "hold"
 
 
@@ -148,7 +148,6 @@ def test_one_that_was_ended_goes_on_behind_what_is_kept(measurement: Measurement
     measurement.daemon.counted_m += 0.01  # as after another start
     kept = measurement.run()
     assert len(kept.data.poses) == 5 and kept.data.restarts == (4,)
-    assert measurement.daemon.rights == 4
 
 
 def test_a_place_that_is_refused_is_left_out_and_one_that_is_not_reached_read(
@@ -193,7 +192,7 @@ def test_a_robot_that_is_being_stopped_ends_it_before_other_places_are_asked_for
     assert daemon.rights == 2 and len(load_data(measurement.folder / "data.json").tried) == 1
     with pytest.raises(TripError):  # nor is anything read then
         measurement.run()
-    assert daemon.rights == 2
+    assert len(load_data(measurement.folder / "data.json").poses) == 2
 
 
 def test_a_loop_that_does_not_answer_is_not_taken_for_a_refusal(measurement: Measurement) -> None:
@@ -215,6 +214,19 @@ def test_a_status_may_tell_of_a_command_later_than_its_reply(measurement: Measur
 
     daemon.post = post_before_status  # type: ignore[method-assign]
     assert len(measurement.run().data.poses) == 5
+
+
+def test_a_hold_from_elsewhere_ends_it_also_while_the_platform_stands(
+    measurement: Measurement,
+) -> None:
+    def ask(pose: int) -> None:
+        if pose == 3:
+            measurement.daemon.program = "hold"
+
+    measurement.ask = ask
+    with pytest.raises(TripError, match="the motion was ended"):
+        measurement.run()
+    assert len(load_data(measurement.folder / "data.json").poses) == 3
 
 
 def test_a_stop_holds_and_a_lost_daemon_is_told(measurement: Measurement) -> None:
