@@ -110,7 +110,10 @@ class PullFit:
         return np.where(self._found, angle_rad, np.nan)
 
     def begin_learning(self) -> None:
-        """Begin the learning anew with what was found last."""
+        """Begin the learning anew with what was found last.
+
+        Over less than a period cogging cannot be told from another stiffness: it is left out.
+        """
         if self._learning is None:
             return
         of_torques = slice(kernel.FRICTION, None)
@@ -118,6 +121,10 @@ class PullFit:
         torques[:, 0] *= _SLOW_SHARE
         covariance = self._covariance[:, of_torques, of_torques].copy()
         covariance[:, 0, 0] += (_UNLIKE * torques[:, 0]) ** 2
+        less = self._motors[kernel.POLE_PAIRS] * self._turned.min(axis=0) < math.tau
+        torques[less, 1:] = covariance[less, 0, 1:] = covariance[less, 1:] = 0.0
+        usual_Nm = COGGING_SHARE * self._rated_Nm
+        covariance[:, [1, 2], [1, 2]] += np.where(less, usual_Nm**2, 0.0)[:, None]
         self._learning.begin_with(self._found, torques, covariance)
 
     def _fit(self) -> tuple[FloatArray, FloatArray, FloatArray]:

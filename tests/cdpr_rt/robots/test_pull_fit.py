@@ -99,6 +99,22 @@ def test_lengths_are_found_without_friction_and_cogging(
     assert np.abs(off_N(found, winches)).max() < 2.0
     # friction in motion is taken to be four fifths of it, and nothing is more than 8 % of rated
     np.testing.assert_allclose(learning.friction_Nm, 0.8 * FRICTION_Nm, atol=0.012)
+    # cables so stiff that motors turn by two thirds of a period
+    assert not learning.cogging_Nm.any()
+
+
+def test_cogging_is_found_of_motors_that_turn_by_a_period(
+    lengths: Callable[[np.ndarray], np.ndarray],
+) -> None:
+    loose_m = lengths(np.zeros(N))
+
+    def softer(tension_N: np.ndarray) -> np.ndarray:
+        return loose_m - 2.5 * (loose_m - lengths(tension_N))
+
+    learning = MotorLearning(AXES, NOBODY, np.ones(N), 500.0, 1e-3)
+    fit = PullFit(AXES, NOBODY, softer, learning)
+    pulled(fit, Winches(softer))
+    fit.begin_learning()
     cogging = np.stack([COGGING_Nm * np.cos(PHASE_rad), COGGING_Nm * np.sin(PHASE_rad)], axis=1)
     np.testing.assert_allclose(learning.cogging_Nm, cogging, atol=0.015)
 
@@ -112,7 +128,7 @@ def test_friction_is_found_of_cables_that_are_softer_or_stiffer_than_told(
     def true_lengths(tension_N: np.ndarray) -> np.ndarray:
         return loose_m - (loose_m - lengths(tension_N)) / stiffness
 
-    fit = PullFit(ROBOT.axes, NOBODY, lengths, None)
+    fit = PullFit(AXES, NOBODY, lengths, None)
     pulled(fit, Winches(true_lengths))
     np.testing.assert_allclose(fit.unknowns[:, FRICTION], FRICTION_Nm, atol=0.012)
 
