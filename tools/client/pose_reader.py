@@ -14,7 +14,8 @@ from cdpr_rt.procedures.calibration.measure_poses import Look
 from cdpr_tools.client.client import Daemon
 from cdpr_tools.errors import WorkFailedError
 
-_ASK_S = 0.02
+_ASK_S, _SILENT_S = 0.02, 5.0
+"""Between two questions, and after which a loop that does not turn is not waited for."""
 _KEYS = ("cable_length_m", "tension_N", "position_rad")
 
 
@@ -70,7 +71,9 @@ class DaemonReader:
     def status(self) -> dict[str, Any]:
         """Return the daemon's status; raises WorkFailedError where the platform is not held."""
         status = self._daemon.get("/status")
-        progress = status["program_progress"]
+        progress, silent_s = status["program_progress"], status["loop"]["silent_s"]
+        if silent_s > _SILENT_S:
+            raise WorkFailedError(f"the loop has not turned for {silent_s:.0f} s")
         if (
             status["state"] != "active"
             or progress.get("tight") is False

@@ -221,7 +221,6 @@ def read_places(
 def _going_on(kept: DaemonPoses) -> str:
     if not kept.data.poses:
         return "nothing was read yet"
-    return (
-        f"{len(kept.data.poses)} poses are kept in {kept.folder}; the same command goes on behind "
-        "them"
-    )
+    count = len(kept.data.poses)
+    are = "1 pose is" if count == 1 else f"{count} poses are"
+    return f"{are} kept in {kept.folder}; the same command goes on behind"

@@ -36,6 +36,7 @@ class Told:
         self.place = [*ROBOT.platform.home_m, 0.0]
         self.angle_rad, self.counted_m, self.moving_m = 1.0, 2.0, 0.0
         self.time_s, self.state, self.tight = 0.0, "active", True
+        self.silent_s = 0.0
 
     def get(self, path: str) -> dict[str, Any]:
         if path == "/description":
@@ -55,7 +56,7 @@ class Told:
         }  # fmt: skip
         return {
             "state": self.state, "program": "hold", "program_progress": progress, "axes": axes,
-            "cycle": {"time_s": self.time_s},
+            "cycle": {"time_s": self.time_s}, "loop": {"silent_s": self.silent_s},
         }  # fmt: skip
 
 
@@ -107,6 +108,10 @@ def lowered(told: Told, _: Path) -> None:
     told.tight = False
 
 
+def hung(told: Told, _: Path) -> None:
+    told.silent_s = 5.5
+
+
 def swinging(told: Told, _: Path) -> None:
     told.moving_m = 0.01
 
@@ -133,6 +138,7 @@ def of_a_run(told: Told, folder: Path) -> None:
         (away, BadInputError, "mm from home; allowed for the first pose: home"),
         (unpowered, WorkFailedError, "not held on its cables .ready, hold."),
         (lowered, WorkFailedError, "not held on its cables .active, hold."),
+        (hung, WorkFailedError, "the loop has not turned for"),
         (swinging, WorkFailedError, "did not come to rest"),
         (of_the_simulator, BadInputError, "of another robot, bus or state"),
         (of_a_run, BadInputError, "of a run that moved by itself"),

@@ -169,7 +169,7 @@ def test_a_fault_ends_it_with_what_was_read_kept(
     measurement.daemon.faulty, measurement.daemon.limit = {-0.1}, limit
     with pytest.raises(TripError, match=r"the motion was ended: axis 1: slack \(fault\)") as caught:
         measurement.run()
-    assert "the same command goes on behind them" in caught.value.__notes__[0]
+    assert "the same command goes on behind" in caught.value.__notes__[0]
     data = load_data(measurement.folder / "data.json")
     assert len(data.tried) == tried and 1 <= len(data.poses) < 5
 
