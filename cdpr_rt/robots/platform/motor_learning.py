@@ -120,17 +120,18 @@ class MotorLearning:
         self._P[:] = np.diag(self._states[kernel.SIGMA] ** 2)
 
     def begin_with(self, found: BoolArray, torque_Nm: FloatArray, covariance: FloatArray) -> None:
-        """Begin anew with what was `found` (n,) of motors at rest; the others' is forgotten.
+        """Begin with what was `found` (n,) at rest of motors of which nothing is known yet.
 
         `torque_Nm` (n, 3) are friction, sine and cosine of the cogging, `covariance` (n, 3, 3).
         Friction that was found may take what cogging leaves of what both are at most together.
         """
-        self.forget()
+        terms = self._x[: kernel.TERMS * found.size].reshape(-1, kernel.TERMS)
+        found = found & ~terms.any(axis=1)  # what was learnt in motion is better
         friction, cogging = torque_Nm[:, 0], np.hypot(torque_Nm[:, 1], torque_Nm[:, 2])
         left = np.minimum(self._together_Nm - cogging, self._largest_Nm)
         most, room = self.most_Nm, np.maximum(np.minimum(friction, left), self._usual_Nm)
-        most[0] = np.where(found, room, self._usual_Nm)
-        most[1] = np.minimum(self._usual_Nm, self._together_Nm - most[0])
+        most[0] = np.where(found, room, most[0])
+        most[1] = np.where(found, np.minimum(self._usual_Nm, self._together_Nm - room), most[1])
         bounds = most[[0, 1, 1]].T
         for i in np.flatnonzero(found):
             motor = slice(kernel.TERMS * i, kernel.TERMS * (i + 1))

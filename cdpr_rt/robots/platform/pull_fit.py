@@ -110,7 +110,7 @@ class PullFit:
         return np.where(self._found, angle_rad, np.nan)
 
     def begin_learning(self) -> None:
-        """Begin the learning anew with what was found last.
+        """Begin the learning with what was found last, of motors of which it knows nothing yet.
 
         Over less than a period cogging cannot be told from another stiffness: it is left out.
         """

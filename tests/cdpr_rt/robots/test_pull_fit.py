@@ -160,12 +160,30 @@ def test_nothing_is_found_of_motors_that_are_known_or_do_not_turn(
     assert (np.isnan(pulled(fit, Winches(lengths))) == known).all()
     fit.begin_learning()
     assert not learning.friction_Nm[known].any() and learning.friction_Nm[~known].all()
+    learning.forget()
     fit.begin(np.zeros(N))
     for _ in range(50):
         fit.take(np.zeros(N), PRETENSION_N)
     assert np.isnan(fit.end()).all()
     fit.begin_learning()
     assert not learning.friction_Nm.any()
+
+
+def test_what_is_known_of_a_motor_is_not_begun_anew(
+    lengths: Callable[[np.ndarray], np.ndarray],
+) -> None:
+    """As when cables are tightened again after motions that have taught more."""
+    learning = MotorLearning(AXES, NOBODY, np.ones(N), 500.0, 1e-3)
+    fit = PullFit(AXES, NOBODY, lengths, learning)
+    pulled(fit, Winches(lengths))
+    fit.begin_learning()
+    before_Nm, bounds_Nm = learning.friction_Nm, learning.most_Nm.copy()
+    fit.unknowns[:, FRICTION] *= 0.5
+    fit.begin_learning()
+    assert (learning.friction_Nm == before_Nm).all() and (learning.most_Nm == bounds_Nm).all()
+    learning.forget()
+    fit.begin_learning()
+    assert (learning.friction_Nm < 0.6 * before_Nm).all()
 
 
 @pytest.mark.parametrize("reserve_N", [3.0, 20.0, 500.0])
