@@ -327,14 +327,15 @@ def _sagging(robot: Robot, statics: PlatformStatics) -> Iterator[Finding]:
     square_m3 = (spans**2).sum(axis=-1) * statics.free_lengths(points)
     weights = np.array([axis.winch.cable.weight_per_length_N_m for axis in robot.axes])
     moment = weights**2 * square_m3.reshape(-1, len(robot.axes)).max(axis=0) / 12.0
-    m_per_N = moment / statics.low_N**3
+    # with the least that is planned
+    m_per_N = moment / (statics.low_N + statics.model.reserve_N) ** 3
     i = int(m_per_N.argmax())
     if m_per_N[i] > _SAGS_m_N:
         enough_N = _ROUNDED_UP * math.cbrt(moment[i] / _SAGS_m_N)
         text = (
-            f"value {statics.low_N[i]:g}; with that tension the cable of axes[{i}] sags so much "
-            f"that a newton more takes {m_per_N[i]:.2g} m of it in, and lengths tell little of "
-            f"where the platform is; allowed: from {enough_N:.2g}"
+            f"value {statics.low_N[i]:g}; with the least tension that is planned the cable of "
+            f"axes[{i}] sags so much that a newton more takes {m_per_N[i]:.2g} m of it in, and "
+            f"lengths tell little of where the platform is; enough: {enough_N:.2g}"
         )
         yield Finding("limits.tension_min_N", text, impossible=False)
 

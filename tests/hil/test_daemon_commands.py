@@ -115,7 +115,11 @@ def test_a_controller_runs_to_its_end_and_hold_follows(
 @pytest.mark.parametrize(
     ("arguments", "status", "said"),
     [
-        (("jog", "middle=3"), 2, "middle=3: allowed: AXIS=deg/s with axis left, right"),
+        (
+            ("jog", "middle=3"),
+            2,
+            "middle=3: allowed: AXIS=deg/s of 'left', 'right', such as left=20",
+        ),
         (("jog", "left=fast"), 2, "'fast' is no number of deg/s"),
         (("jog", "left=nan"), 2, "left=nan: allowed: a finite number"),
         (("jog", "left=1e6"), 2, "left=1e+06: allowed: -4749 to 4749 deg/s"),
