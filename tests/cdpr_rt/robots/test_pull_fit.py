@@ -63,12 +63,12 @@ class Winches:
 
 
 def pulled(fit: PullFit, winches: Winches, moved_m: float = 0.0) -> np.ndarray:
-    """Return the angles that are found from the pretension to above, below, and back to it."""
+    """Return the angles that are found from the pretension to below, above, and back to it."""
     fit.prepare(PRETENSION_N)
     winches.pull(PRETENSION_N)
     fit.begin(winches.theta)
     shares = np.concatenate(
-        [np.linspace(1.0, 1.5, 40), np.linspace(1.5, 0.5, 80), np.linspace(0.5, 1.0, 40)]
+        [np.linspace(1.0, 0.5, 40), np.linspace(0.5, 1.5, 80), np.linspace(1.5, 1.0, 40)]
     )
     for k, share in enumerate(shares):
         if k == 60:  # the platform moves along with its cables

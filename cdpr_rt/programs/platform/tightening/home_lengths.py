@@ -21,7 +21,7 @@ class LengthsAtHome:
         """Take the pretension at home, (n,)."""
         n = cable_m.size
         self._parts, self._cable = parts, np.array(cable_m)
-        self._falling_rad = np.zeros(n)
+        self._rising_rad = np.zeros(n)
         self._rad = np.full(n, np.nan)
         """Angles at which lengths were taken, nan once they have been corrected."""
         self._N, self._pretension_N = np.zeros(n), np.array(pretension_N)
@@ -34,15 +34,15 @@ class LengthsAtHome:
         """Have nothing to correct any more."""
         self._rad[:] = np.nan
 
-    def keep_falling(self, feedback: AxisFeedback) -> None:
-        """Keep the angles at the pretension, which is come to from above."""
-        self._falling_rad[:] = feedback.position_rad
+    def keep_rising(self, feedback: AxisFeedback) -> None:
+        """Keep the angles at the pretension, which is come to from below."""
+        self._rising_rad[:] = feedback.position_rad
 
     def take(self, feedback: AxisFeedback) -> FloatArray:
-        """Return the lengths (n,) at the pretension, which is come to from below."""
+        """Return the lengths (n,) at the pretension, which is come to from above."""
         control, estimate = self._parts.control, self._parts.estimator.estimate
         measured, fitted_rad = estimate.tension_measured, control.pull_fit.end()
-        middle_rad = 0.5 * (feedback.position_rad + self._falling_rad)
+        middle_rad = 0.5 * (feedback.position_rad + self._rising_rad)
         found = np.isfinite(fitted_rad)
         self._sure[:] = measured | found
         self._rad[:] = np.where(found, fitted_rad, middle_rad)

@@ -47,8 +47,8 @@ _SLACK_m, _ONCE_TIGHT_m = 1.0, 0.05
 _TIGHT_WITHIN_S = 60.0
 
 _STAGES = (
-    ("slack", TAKE_UP_SHARE), ("pull", 1.0), ("beyond", OVERSHOOT), ("back", 1.0),
-    ("below", 2.0 - OVERSHOOT), ("lengths", 1.0),
+    ("slack", TAKE_UP_SHARE), ("pull", 1.0), ("below", 2.0 - OVERSHOOT), ("back", 1.0),
+    ("beyond", OVERSHOOT), ("lengths", 1.0),
 )  # fmt: skip
 _FITTED_FROM = 2
 """Stage from which angles tell what motors take up: the first rise takes winches along."""
@@ -244,7 +244,7 @@ class TightenProgram(PlatformProgram):
         if stage == "pull":
             self._control.pull_fit.begin(feedback.position_rad)
         elif stage == "back":
-            self._at_home.keep_falling(feedback)
+            self._at_home.keep_rising(feedback)
         self._stage += 1
 
     def _end_tight(self, feedback: AxisFeedback, torque_Nm: FloatArray) -> None:
