@@ -109,7 +109,7 @@ def test_cogging_is_found_of_motors_that_turn_by_a_period(
     loose_m = lengths(np.zeros(N))
 
     def softer(tension_N: np.ndarray) -> np.ndarray:
-        return loose_m - 3.0 * (loose_m - lengths(tension_N))
+        return loose_m - 4.0 * (loose_m - lengths(tension_N))
 
     learning = MotorLearning(AXES, NOBODY, np.ones(N), 500.0, 1e-3)
     fit = PullFit(AXES, NOBODY, softer, learning)
