@@ -308,7 +308,7 @@ def test_a_flood_from_the_holders_own_address_neither_moves_nor_silences_it(
         try:
             for k in range(20):
                 assert client.put("/control", headers=shown).status_code == 200
-                if k == 5:  # each connection has its buffers now, which the allocator keeps
+                if k == 10:  # each connection has its buffers now, which the allocator keeps
                     memory_B = resident_B(service)
                 time.sleep(0.2)
         finally:
