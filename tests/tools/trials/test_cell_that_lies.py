@@ -52,7 +52,5 @@ def test_a_cell_that_lies_is_named_and_the_motion_goes_on(robot: LockstepRobot) 
     assert notices(robot) == [told], "it stays in the status"
     assert robot.state is LoopState.ACTIVE
     robot.carry_out("lower", 60.0)
-    robot.program("tighten")  # how near to home friction lets it come is not looked at here
-    robot.run(15.0)
-    assert robot.progress["tight"]
+    robot.carry_out("tighten", 60.0)
     assert not notices(robot)

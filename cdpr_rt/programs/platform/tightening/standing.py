@@ -149,6 +149,23 @@ def hangs(parts: PlatformParts) -> bool:
     return carried_N > _CARRIED_SHARE * parts.platform.mass_kg * G_m_s2
 
 
+def rests_at_home(parts: PlatformParts, length_m: FloatArray, feedback: AxisFeedback) -> bool:
+    """Return whether a platform is at home by its cables' lengths (n,), and not carried by them.
+
+    As after it was let down: friction of the winches leaves tensions that add up to its weight, and
+    all but cancel each other.
+    """
+    control, model = parts.control, parts.model
+    control.take_lengths(length_m, feedback)
+    control.begin(feedback)
+    here = control.estimated
+    if distance_m(here, model.home, parts.scale_m) > parts.platform.home_tolerance_m:
+        return False
+    tension_N = np.nan_to_num(parts.estimator.estimate.tension_N)
+    carried_N = (model.kinematics.wrench_matrix(model.pose(here)) @ tension_N)[model.positions - 1]
+    return bool(carried_N < _CARRIED_SHARE * parts.platform.mass_kg * G_m_s2)
+
+
 def why_not_to_hold(
     parts: PlatformParts, standing: StandingTensions, length_m: FloatArray, feedback: AxisFeedback
 ) -> str:

@@ -20,6 +20,7 @@ from cdpr_rt.programs.platform.tightening.standing import (
     bad_source,
     disagreement,
     hangs,
+    rests_at_home,
     source_refusal,
     why_not_at_home,
     why_not_to_hold,
@@ -197,7 +198,7 @@ class TightenProgram(PlatformProgram):
             return False
         now.position_rad[:] = parts.estimator.position_rad
         length_m = self._lengths_before(source, now)
-        if length_m is None:
+        if length_m is None or rests_at_home(parts, length_m, now):
             return False
         if why := why_not_to_hold(parts, self._standing, length_m, now):
             raise ProgramError(bad_source(arguments, why))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.optimize import nnls
 from scipy.spatial.transform import Rotation
 
 from cdpr_profiles import load_robot
@@ -13,10 +14,13 @@ from cdpr_rt.core.exchange import AxisFeedback
 from cdpr_rt.programs.model import model_of
 from cdpr_rt.programs.platform.platform_program import PlatformParts
 from cdpr_rt.programs.platform.tightening.standing import (
+    hangs,
+    rests_at_home,
     why_not_at_home,
     why_not_to_wind_in,
 )
 from cdpr_rt.programs.registry import platform_parts
+from cdpr_rt.robots.rigid_body import G_m_s2
 from cdpr_rt.robots.robot_arrays import limits_of, winches_of
 
 PERIOD_S = 1e-3
@@ -25,7 +29,11 @@ SEED = 1
 
 @pytest.fixture(scope="module", params=["spatial-8", "suspended-8"])
 def parts(request: pytest.FixtureRequest) -> PlatformParts:
-    robot = load_robot(request.param)
+    return parts_of(request.param)
+
+
+def parts_of(name: str) -> PlatformParts:
+    robot = load_robot(name)
     n, limits = len(robot.axes), limits_of(robot)
     model = model_of(robot.axes, PERIOD_S, [2.3e-3] * n, limits)
     made = platform_parts(robot, limits, model, Estimator(n, PERIOD_S, winches_of(robot.axes)))
@@ -81,3 +89,36 @@ def test_slack_is_not_wound_in_where_cables_do_not_even_reach_home(parts: Platfo
     for slack_m in (0.0, 0.5):
         assert not why_not_to_wind_in(parts, home_m + slack_m)
         assert not why_not_to_wind_in(parts, home_m + slack_m - (0.3 + slack_m) * np.eye(n)[2])
+
+
+def test_tensions_that_add_up_to_the_weight_carry_it_where_they_do_not_cancel(
+    parts: PlatformParts,
+) -> None:
+    model, control, n = parts.model, parts.control, parts.control.low_N.size
+    feedback, tension_N = AxisFeedback(n), parts.estimator.estimate.tension_N
+    length_m = control.lengths_at_home(control.low_N)
+    W, weight_N = model.kinematics.wrench_matrix(model.home_pose), parts.platform.mass_kg * G_m_s2
+    # the least tensions that pull up with a share of the weight, and hold all other directions
+    for share, rests in ((1.0, False), (0.85, False), (0.6, True)):
+        wrench = np.zeros(len(W))
+        wrench[model.positions - 1] = share * weight_N
+        tension_N[:] = nnls(W, wrench)[0]
+        assert W @ tension_N == pytest.approx(wrench, abs=1e-6)
+        assert rests_at_home(parts, length_m, feedback) == rests
+
+
+def test_a_platform_that_rests_is_not_taken_to_hang_on_what_friction_leaves() -> None:
+    """Tensions of cables from all sides cancel each other, whatever they add up to."""
+    parts = parts_of("spatial-8")
+    control, model, n = parts.control, parts.model, parts.control.low_N.size
+    W = model.kinematics.wrench_matrix(model.home_pose).copy()
+    cancelling, off = nnls(np.vstack([W, np.ones(n)]), np.eye(len(W) + 1)[-1])
+    assert off < 1e-6
+    parts.estimator.estimate.tension_N[:] = 2.0 * parts.platform.mass_kg * G_m_s2 * cancelling
+    home_m, feedback = model.kinematics.lengths(model.home_pose).copy(), AxisFeedback(n)
+    length_m = control.lengths_at_home(control.low_N)
+    assert hangs(parts) and rests_at_home(parts, length_m, feedback)
+    # elsewhere nothing tells that it lies on something
+    raised = model.home + 2.0 * parts.platform.home_tolerance_m * np.eye(len(W))[2]
+    raised_m = model.kinematics.lengths(model.pose(raised)) - home_m
+    assert not rests_at_home(parts, length_m + raised_m, feedback)
