@@ -191,7 +191,7 @@ class Compensation:
         """Which axes have a profile, (n,); until its index is known nothing comes of it."""
         self._period_s = period_s
         self._fade_step = min(1.0, period_s / _FADE_IN_S)
-        self._taken: tuple[Any, Any, Any] = (None, None, None)
+        self._bound_to: tuple[Any, Any, Any] = (None, None, None)
         """Whose arrays the kernel is bound to."""
         self._torque: Callable[[], None]
 
@@ -222,9 +222,9 @@ class Compensation:
 
     def torque(self, feedback: AxisFeedback, setpoint: Setpoint, out: FloatArray) -> None:
         """Write the torque to add, (n,), Nm."""
-        taken = self._taken
-        if feedback is not taken[0] or setpoint is not taken[1] or out is not taken[2]:
-            self._taken = feedback, setpoint, out
+        last = self._bound_to
+        if feedback is not last[0] or setpoint is not last[1] or out is not last[2]:
+            self._bound_to = feedback, setpoint, out
             self._torque = bound(
                 _torque, self._tables, self._means, self._parameters, self._state, self._period_s,
                 self._fade_step, feedback.position_rad, feedback.index_rad, feedback.index_known,

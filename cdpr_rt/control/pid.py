@@ -134,7 +134,7 @@ class Pid:
         self.effort_Nm = np.zeros(len(gains))
         self.compensation_Nm = self.motor_loss_Nm = np.zeros(len(gains))
         self.cogging_Nm = np.zeros(len(gains)) if compensation is None else compensation.cogging_Nm
-        self._taken: tuple[Any, Any, Any] = (None, None, None)
+        self._bound_to: tuple[Any, Any, Any] = (None, None, None)
         """Whose arrays the kernel is bound to."""
         self._update: Callable[[], None]
 
@@ -158,9 +158,9 @@ class Pid:
         """Write the limited sum of PID and compensation."""
         if self._compensation is not None:
             self._compensation.torque(feedback, setpoint, self.compensation_Nm)
-        taken = self._taken
-        if feedback is not taken[0] or setpoint is not taken[1] or torque_Nm is not taken[2]:
-            self._taken = feedback, setpoint, torque_Nm
+        last = self._bound_to
+        if feedback is not last[0] or setpoint is not last[1] or torque_Nm is not last[2]:
+            self._bound_to = feedback, setpoint, torque_Nm
             self._update = bound(
                 _update, self._gains, self._limit, self._period_s, self._state,
                 feedback.position_rad, setpoint.position_rad, setpoint.velocity_rad_s,

@@ -41,7 +41,7 @@ class Proportional:
         self._limit = np.array(limit_Nm, float)
         self.effort_Nm = np.zeros_like(self._gain)
         self.compensation_Nm = self.motor_loss_Nm = self.cogging_Nm = np.zeros_like(self._gain)
-        self._taken: tuple[Any, Any, Any] = (None, None, None)
+        self._bound_to: tuple[Any, Any, Any] = (None, None, None)
         """Whose arrays the kernel is bound to."""
         self._update: Callable[[], None]
 
@@ -50,9 +50,9 @@ class Proportional:
 
     def update(self, feedback: AxisFeedback, setpoint: Setpoint, torque_Nm: FloatArray) -> None:
         """Write the limited proportional torque."""
-        taken = self._taken
-        if feedback is not taken[0] or setpoint is not taken[1] or torque_Nm is not taken[2]:
-            self._taken = feedback, setpoint, torque_Nm
+        last = self._bound_to
+        if feedback is not last[0] or setpoint is not last[1] or torque_Nm is not last[2]:
+            self._bound_to = feedback, setpoint, torque_Nm
             self._update = bound(
                 _update, self._gain, self._limit, feedback.position_rad, setpoint.position_rad,
                 self.effort_Nm, torque_Nm,

@@ -77,14 +77,14 @@ class TrapezoidalMove:
         self.cruise_s = float(cruise_s)
         self.ramp_s = float(ramp_s)
         self.duration_s = self.cruise_s + 2.0 * self.ramp_s + settle_s
-        self._filled: Setpoint | None = None
+        self._bound_to: Setpoint | None = None
         """Whose arrays the kernel is bound to."""
         self._fill: Callable[[float], None]
 
     def fill(self, time_s: float, setpoint: Setpoint) -> None:
         """Write the set-point at `time_s` after the move's start."""
-        if setpoint is not self._filled:
-            self._filled = setpoint
+        if setpoint is not self._bound_to:
+            self._bound_to = setpoint
             own = self.start_rad, self.velocity_rad_s, self.ramp_s, self.cruise_s
             self._fill = bound(_fill, *own, *setpoint.arrays, then=(0.0,))
         self._fill(time_s)

@@ -151,7 +151,7 @@ class RobotModel(Protocol):
         """
 
 
-class PullFit(Protocol):
+class MotorFit(Protocol):
     """What motors are found to take up of their torque while cables are pulled tight at home."""
 
     def prepare(self, tension_N: FloatArray) -> None:
@@ -205,7 +205,7 @@ class PlatformControl(Controller, Protocol):
         """Of each motor, (n,)."""
 
     @property
-    def pull_fit(self) -> PullFit:
+    def pull_fit(self) -> MotorFit:
         """Finds what motors take up that were not commissioned; learning begins there."""
 
     @property

@@ -153,23 +153,11 @@ def _reaction(status: dict[str, Any]) -> str | None:
     return None if reaction == "none" else reaction
 
 
-def measure_with_daemon(
-    out: Output,
-    robot: Robot,
-    operator: DaemonOperator,
-    kept: DaemonPoses,
-    places: Places,
-    wanted: int,
-    enough: Enough,
-    ask: Ask,
-) -> None:
-    """Read home where there are no poses yet, then places until there are as many as wanted.
-
-    What is read is kept whatever ends it, and the error says how to go on. Raises CommandError,
-    ControlError, DriverError, WorkFailedError where somebody stops it.
-    """
+@contextmanager
+def going_on(kept: DaemonPoses) -> Iterator[None]:
+    """Have what ends the block say how to go on; StoppedError becomes WorkFailedError."""
     try:
-        read_places(out, robot, operator, kept, places, wanted, enough, ask)
+        yield
     except StoppedError:
         raise WorkFailedError(f"stopped; {_going_on(kept)}") from None
     except (CommandError, ControlError, DriverError) as error:
@@ -187,7 +175,11 @@ def read_places(
     enough: Enough = lambda _data: None,
     ask: Ask = lambda _pose: None,
 ) -> None:
-    """Do what `measure_with_daemon` does; raises StoppedError besides, and says less."""
+    """Read home where there are no poses yet, then places until there are as many as wanted.
+
+    What is read is kept whatever ends it. Raises CommandError, ControlError, DriverError, and
+    StoppedError where somebody wants an end.
+    """
     with (
         operator.in_control(),
         out.progress(f"reading up to {wanted} poses", float(wanted)) as advance,

@@ -19,6 +19,7 @@ from cdpr_tools.commands.calibration.options import (
     DryRunOption,
     IdentifyOption,
     KnownMmOption,
+    OutDirOption,
     PointsOption,
     PosesOption,
     geometry_of,
@@ -125,9 +126,7 @@ def run(
     seed: SeedOption = 1,
     identify: IdentifyOption = None,
     known_mm: KnownMmOption = None,
-    out_dir: Annotated[
-        Path | None, typer.Option("--out", help="Folder for data, images, result and report.")
-    ] = None,
+    out_dir: OutDirOption = None,
     resume: Annotated[
         bool, typer.Option("--resume", help="Go on with what a run has left that ended early.")
     ] = False,

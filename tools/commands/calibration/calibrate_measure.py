@@ -16,6 +16,7 @@ from cdpr_tools.commands.calibration.options import (
     IntrinsicsOption,
     KnownMmOption,
     MarkersOption,
+    OutDirOption,
     PosesOption,
     geometry_of,
     hand_eye_of,
@@ -42,9 +43,7 @@ def measure(
     seed: SeedOption = 1,
     identify: IdentifyOption = None,
     known_mm: KnownMmOption = None,
-    out_dir: Annotated[
-        Path | None, typer.Option("--out", help="Folder for data, images, result and report.")
-    ] = None,
+    out_dir: OutDirOption = None,
     dry_run: DryRunOption = False,
     adopt: AdoptOption = False,
 ) -> None:
@@ -77,13 +76,14 @@ def measure(
     with (
         stop_on_signals(HELD) as stop,
         daemon_pose.image_taker(camera, intrinsics, markers, kept, out.note) as image,
+        daemon_run.going_on(kept),
     ):
         kept.data = with_hand_eye(kept.data, known)
         operator = daemon_run.DaemonOperator(daemon, robot, image, stop)
         home_m = platform_of(robot).home_m
         asked = AskedPoints(out, points, len(home_m), operator.place) if ask else None
         told = enough(out, robot, points if ask else None, geometry)
-        daemon_run.measure_with_daemon(
+        daemon_run.read_places(
             out, robot, operator, kept, places, wanted,
             told if count is None else told_only(told),
             asked or (lambda _pose: None),

@@ -54,6 +54,9 @@ PosesOption = Annotated[
         "100, while more bring something.",
     ),
 ]
+OutDirOption = Annotated[
+    Path | None, typer.Option("--out", help="Folder for data, images, result and report.")
+]
 CameraUrlOption = Annotated[
     str | None,
     typer.Option("--camera", help="Take images with it, such as opencv:0.", metavar="CAMERA"),

@@ -21,7 +21,7 @@ from cdpr_rt.calibration.readings.data import load_data
 from cdpr_rt.errors import TripError
 from cdpr_tools.calibrate.check import checked_running
 from cdpr_tools.calibrate.measuring import daemon_pose
-from cdpr_tools.calibrate.measuring.daemon_run import DaemonOperator, measure_with_daemon
+from cdpr_tools.calibrate.measuring.daemon_run import DaemonOperator, going_on, read_places
 from cdpr_tools.calibrate.measuring.places import Places
 from cdpr_tools.client.client import ConnectionLostError
 from cdpr_tools.client.refusals import DaemonRefusalError
@@ -119,7 +119,8 @@ class Measurement:
         operator = DaemonOperator(self.daemon, robot, lambda _: None, lambda: self.stopped)  # type: ignore[arg-type]
         places = Places(np.array([0.0, 1.5, 0.0]), np.array(PLACES))
         out = Output(as_json=False)
-        measure_with_daemon(out, robot, operator, kept, places, wanted, lambda _: None, self.ask)
+        with going_on(kept):
+            read_places(out, robot, operator, kept, places, wanted, lambda _: None, self.ask)
         return kept
 
 
