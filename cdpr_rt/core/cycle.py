@@ -56,6 +56,8 @@ class Cycle:
         self._no_elapsed_yet = True
         self._deadline_s = 0.0
         self._no_deadline_yet = True
+        self._free_s = 0.0
+        """When the last cycle's commands are off the wire at the latest."""
 
     def begin(self) -> None:
         """Tell that no cycles have run for a while: the next one is not late by it."""
@@ -71,7 +73,10 @@ class Cycle:
 
     def transmit(self) -> None:
         """Send the command as it stands, and close the cycle."""
-        self.device.transmit()
+        device = self.device
+        device.transmit()
+        if not device.lockstep:
+            self._free_s = device.clock.now_s + device.commands_s
 
     def watch_alarm(self) -> str:
         """Return for what cause beside the axes the torque must go at once, or an empty text."""
@@ -98,9 +103,11 @@ class Cycle:
     def _await_deadline(self) -> None:
         period, clock = self.device.period_s, self.device.clock
         self._deadline_s += period
+        # a SYNC that met commands on the wire would be late by them, and so would all after it
+        begin_s = max(self._deadline_s, self._free_s)
         now = clock.now_s
-        if now < self._deadline_s:
-            clock.sleep_until(self._deadline_s)
+        if now < begin_s:
+            clock.sleep_until(begin_s)
             now = clock.now_s
         elif self._no_deadline_yet:
             self._deadline_s = now

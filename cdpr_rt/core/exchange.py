@@ -65,6 +65,8 @@ class AxisDevice(Protocol):
     period_s: float
     lockstep: bool
     """Whether the next SYNC goes out as soon as the last one has been answered."""
+    commands_s: float
+    """How long the commands of a cycle are on the wire at most, on the slowest bus."""
     feedback: AxisFeedback
     command: AxisCommand
 

@@ -33,6 +33,8 @@ class BusAxes:
     network: CanNetwork
     axes: Sequence[AxisConfig]
     axis_numbers: Sequence[int]
+    commands_s: float
+    """How long the commands of a cycle are on the wire at most."""
 
 
 class AxisBuses:
@@ -68,6 +70,7 @@ class AxisBuses:
             for group in self.groups:
                 group.close()
             raise
+        self.commands_s = max(bus.commands_s for bus in buses)
         self._names = {group: bus.name for group, bus in zip(self.groups, buses, strict=True)}
         self.axes: tuple[AxisConfig, ...] = tuple(self._by_axis(lambda group: group.axes))
         self.feedback, self.command = arrays.feedback, arrays.command

@@ -69,6 +69,8 @@ class ListeningDevice:
 
     lockstep = True
     """The next cycle begins with the other master's SYNC, not at a deadline of this process."""
+    commands_s = 0.0
+    """It sends none."""
 
     def __init__(self, buses: Sequence[MonitoredBus], period_s: float, clock: PacedClock) -> None:
         self.buses = tuple(buses)

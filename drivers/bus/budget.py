@@ -43,6 +43,8 @@ class BusBudget:
     """SYNC and every PDO of a cycle, stuffed as badly as can be."""
     bare_cycle_s: float
     """The same without a single stuff bit."""
+    commands_s: float
+    """What the master sends of it, SYNC not included."""
     heartbeat_share: float
     """Share of the wire that heartbeats (and PDOs limited by their own times) take."""
     changes_s: float
@@ -104,7 +106,7 @@ def bus_budget(
 
     `master_heartbeat_s` follows from what the drives tolerate where it is left out.
     """
-    every, waiting = _Frames(), _Frames()
+    every, commands, waiting = _Frames(), _Frames(), _Frames()
     every.add(_SYNC_BYTES)
     share_bit_s = 0.0
     last = max(
@@ -113,6 +115,8 @@ def bus_budget(
     for node, drive in drives:
         for pdo in _cyclic_pdos(drive):
             every.add(_bytes(pdo))
+        for pdo in command_pdos(drive):
+            commands.add(_bytes(pdo))
         for pdo in _pdos_on_change(drive):
             if pdo.cob_id(node) < last:
                 # it wins arbitration against a PDO of the cycle, so it may come in every one
@@ -133,6 +137,7 @@ def bus_budget(
         period_s=period_s,
         cycle_s=every.worst / bitrate_bit_s,
         bare_cycle_s=every.bare / bitrate_bit_s,
+        commands_s=commands.worst / bitrate_bit_s,
         heartbeat_share=share_bit_s / bitrate_bit_s,
         changes_s=waiting.worst / bitrate_bit_s,
         longest_wait_s=worst_case_bits(_FULL_BYTES) / bitrate_bit_s,

@@ -9,6 +9,7 @@ from dataclasses import replace
 from cdpr_drivers.axes.axis_buses import AxisBuses, BusAxes
 from cdpr_drivers.axes.axis_layout import AxisConfig
 from cdpr_drivers.bus import BusUrl
+from cdpr_drivers.bus.budget import machine_budget
 from cdpr_drivers.bus.master_lock import MasterLock
 from cdpr_drivers.canopen.boot.boot import BootReport, BootReports, BootSettings, boot_all
 from cdpr_drivers.canopen.network import CanNetwork
@@ -130,6 +131,7 @@ def device_of(
     """Return the axes that have booted as one device; raises the drivers' errors."""
     place_of = {i: place for place, i in enumerate(booted)}
     buses = []
+    commands_s = {budget.bus: budget.commands_s for budget in machine_budget(robot)}
     for name, network in networks.items():
         here = [i for i in robot.axes_on(name) if i in booted]
         if not here:
@@ -138,7 +140,7 @@ def device_of(
             AxisConfig.from_boot(robot.axes[i].winch.drive, booted[i], torque_Nm[i]) for i in here
         ]
         axis_numbers = [place_of[i] for i in here]
-        buses.append(BusAxes(name, network, configs, axis_numbers))
+        buses.append(BusAxes(name, network, configs, axis_numbers, commands_s[name]))
     return AxisBuses(buses, robot.sync_period_s)
 
 

@@ -41,7 +41,7 @@ LIMITS = Limits(
 class Inertias:
     """Two damped inertias; torque written in one cycle acts from the next SYNC on."""
 
-    n, period_s = 2, PERIOD_S
+    n, period_s, commands_s = 2, PERIOD_S, 0.0
 
     def __init__(self, lockstep: bool = True) -> None:
         self.lockstep = lockstep

@@ -106,6 +106,8 @@ def test_the_figures_are_those_of_the_simulated_bus():
 def test_eight_drives_take_two_buses_at_1_kHz():
     eight = bus_budget("one", 1_000_000, 1e-3, [(node, DRIVE) for node in range(1, 9)])
     assert eight.cycle_s == pytest.approx(1895e-6)
+    # statuswords and controlwords are of 16 bits, as torques are; positions are of 32
+    assert eight.commands_s == pytest.approx(8 * 95e-6)
     assert eight.cycle_limit_Hz == pytest.approx(527.7, abs=0.05)
     assert not eight.fits
     assert "8 drives need 1895 us" in str(eight)

@@ -27,6 +27,7 @@ class _NoDrives:
     """A device without axes and without a bus, so that only the waiting is left."""
 
     lockstep = False
+    commands_s = 0.0
 
     def __init__(self, period_s: float) -> None:
         self.period_s = period_s
