@@ -1,15 +1,26 @@
-"""The page that says where things are names files that there are."""
+"""Where things are: the page names files that there are, and no folder is too full to look over."""
 
 from __future__ import annotations
 
 import re
+from collections import Counter
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
-PATHS = re.compile(r"`((?:cdpr_rt|drivers|profiles|sim_bus|tools)/[\w/.]+)`")
+PACKAGES = ("cdpr_rt", "drivers", "profiles", "sim_bus", "tools")
+PATHS = re.compile(rf"`((?:{'|'.join(PACKAGES)})/[\w/.]+)`")
+MOST_MODULES = 12
+"""At the top of one package, its `__init__.py` among them."""
 
 
 def test_each_path_exists() -> None:
     paths = PATHS.findall((ROOT / "docs/where-things-are.md").read_text())
     assert len(paths) > 50
     assert [path for path in paths if not (ROOT / path).exists()] == []
+
+
+def test_no_package_has_too_many_modules() -> None:
+    modules = (module for package in PACKAGES for module in (ROOT / package).rglob("*.py"))
+    counts = Counter(str(module.parent.relative_to(ROOT)) for module in modules)
+    assert len(counts) > 50
+    assert {folder: n for folder, n in counts.items() if n > MOST_MODULES} == {}

@@ -12,7 +12,7 @@ from cdpr_rt.arrays import FloatArray
 from cdpr_rt.control.compensation import AxisCompensation
 from cdpr_rt.control.pid import PidGains
 from cdpr_rt.control.tuning import PidDesign, standstill_gains, stiffest_pid, sweep_gain
-from cdpr_rt.core.limits import Limits
+from cdpr_rt.core.supervision.limits import Limits
 
 BANDWIDTHS_Hz = (30.0, 25.0, 20.0, 15.0, 12.0, 10.0, 8.0, 6.0, 5.0, 4.0, 3.0, 2.0, 1.0, 0.5)
 """Bandwidths of the position loops that are tried, the stiffest first."""

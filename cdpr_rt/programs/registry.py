@@ -9,8 +9,8 @@ from cdpr_rt.arrays import FloatArray
 from cdpr_rt.control.compensation import Compensation
 from cdpr_rt.core.estimate import Estimator
 from cdpr_rt.core.exchange import AxisFeedback, Setpoint
-from cdpr_rt.core.limits import Limits
 from cdpr_rt.core.shared_block import SharedBlock
+from cdpr_rt.core.supervision.limits import Limits
 from cdpr_rt.motion.pose_stream import PoseStream
 from cdpr_rt.programs.axes.axis_program import AxisProgram
 from cdpr_rt.programs.axes.follow import FollowProgram

@@ -11,7 +11,7 @@ import numpy as np
 from cdpr_profiles import Robot
 from cdpr_profiles.platform import DIRECTIONS, Platform
 from cdpr_rt.arrays import FloatArray
-from cdpr_rt.core.limits import Limits
+from cdpr_rt.core.supervision.limits import Limits
 from cdpr_rt.robots.interference.interference import Interference, in_words
 from cdpr_rt.robots.kinematics.cable_kernel import ANCHOR, RADIUS
 from cdpr_rt.robots.kinematics.kinematics import PLANAR, SPATIAL, CableKinematics

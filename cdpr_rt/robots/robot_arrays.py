@@ -15,7 +15,7 @@ from cdpr_profiles.devices.tension_sensor import load_tension_sensors
 from cdpr_profiles.platform import Platform
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.core.estimate import WinchArrays
-from cdpr_rt.core.limits import DEFAULT_REACTIONS, Limits, reactions_of
+from cdpr_rt.core.supervision.limits import DEFAULT_REACTIONS, Limits, reactions_of
 
 RATED_SPEED_SHARE: Final = 0.2
 """Of the motors' rated speed, where a robot's file says no other."""

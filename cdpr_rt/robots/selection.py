@@ -5,7 +5,7 @@ from __future__ import annotations
 from cdpr_profiles import Robot
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.control.compensation import Compensation
-from cdpr_rt.core.limits import Limits
+from cdpr_rt.core.supervision.limits import Limits
 from cdpr_rt.robots.interface import PlatformControl, RobotModel
 from cdpr_rt.robots.platform.cable_control import CableControl
 from cdpr_rt.robots.platform_model import platform_model_of

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from cdpr_profiles import Robot
 from cdpr_profiles.platform import Platform
 from cdpr_rt.arrays import FloatArray
-from cdpr_rt.core.limits import Limits
+from cdpr_rt.core.supervision.limits import Limits
 from cdpr_rt.robots.free_rotation import rotation_of
 from cdpr_rt.robots.interface import TensionOutcome
 from cdpr_rt.robots.kinematics.cable_kernel import ARC, CABLE_ROWS, FREE, run_poses

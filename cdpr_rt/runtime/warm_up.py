@@ -10,8 +10,8 @@ from cdpr_rt.control.pid import Pid, PidGains
 from cdpr_rt.control.proportional import Proportional
 from cdpr_rt.core.estimate import Estimator
 from cdpr_rt.core.exchange import AxisFeedback, Setpoint
-from cdpr_rt.core.limits import Limits
-from cdpr_rt.core.supervisor import Supervisor
+from cdpr_rt.core.supervision.limits import Limits
+from cdpr_rt.core.supervision.supervisor import Supervisor
 from cdpr_rt.core.tension_feedback import TensionFeedback
 from cdpr_rt.motion.trajectory import TrapezoidalMove
 

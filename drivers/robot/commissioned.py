@@ -15,7 +15,7 @@ from cdpr_drivers.errors import ConfigurationError
 from cdpr_profiles import Robot, RobotAxis
 from cdpr_profiles.limits.motor_bounds import MotorBounds
 from cdpr_rt.control.compensation import AxisCompensation
-from cdpr_rt.core.limits import Limits
+from cdpr_rt.core.supervision.limits import Limits
 from cdpr_rt.identification.cogging_profile import (
     CoggingProfile,
     CoggingProfileError,

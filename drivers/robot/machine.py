@@ -32,7 +32,7 @@ from cdpr_drivers.robot.tensions import RobotTensions
 from cdpr_profiles import Robot
 from cdpr_profiles.errors import ProfileError
 from cdpr_rt.core.cycle import Watch
-from cdpr_rt.core.limits import Limits
+from cdpr_rt.core.supervision.limits import Limits
 from cdpr_rt.core.tension_feedback import TensionFeedback
 from cdpr_rt.errors import ControlError
 from cdpr_rt.robots.robot_arrays import limits_of

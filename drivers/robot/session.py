@@ -22,10 +22,10 @@ from cdpr_drivers.robot.machine import RobotMachine
 from cdpr_drivers.robot.session_watch import Watching, no_watches
 from cdpr_profiles import Robot, Winch
 from cdpr_rt.core.estimate import Estimator
-from cdpr_rt.core.limits import Limit, Limits
 from cdpr_rt.core.shared_block import SharedBlock
 from cdpr_rt.core.states import Reaction
-from cdpr_rt.core.supervisor import Supervisor
+from cdpr_rt.core.supervision.limits import Limit, Limits
+from cdpr_rt.core.supervision.supervisor import Supervisor
 from cdpr_rt.errors import NotInTimeError
 from cdpr_rt.identification.cogging_profile import DriveIdentity
 from cdpr_rt.procedures.winch_operator import Tolerance, WinchOperator

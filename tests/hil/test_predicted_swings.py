@@ -9,7 +9,7 @@ import pytest
 
 from cdpr_profiles import load_robot
 from cdpr_rt.core.states import LoopState
-from cdpr_rt.robots.cable_loss import SWING_S, CableLoss
+from cdpr_rt.robots.cable_loss.prediction import SWING_S, CableLoss
 from cdpr_tools.trials.evaluation.pose_log import read_pose_log
 from cdpr_tools.trials.lockstep import LockstepRobot
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cdpr_rt.robots.checks import refuse_impossible
+from cdpr_rt.robots.feasibility.checks import refuse_impossible
 from cdpr_rt.robots.statics import statics_of
 from cdpr_tools.trials.lockstep import LockstepRobot
 

@@ -20,8 +20,8 @@ from cdpr_profiles.reading.bounded_input import read_toml
 from cdpr_profiles.reading.places import SHIPPED
 from cdpr_profiles.reading.reader import validated
 from cdpr_profiles.winch_calibration import WinchCalibration
-from cdpr_rt.core.limits import DEFAULT_REACTIONS, Limit
 from cdpr_rt.core.states import Reaction
+from cdpr_rt.core.supervision.limits import DEFAULT_REACTIONS, Limit
 from cdpr_rt.robots.robot_arrays import described, limits_of, winches_of
 
 FILE = """

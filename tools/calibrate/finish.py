@@ -19,7 +19,7 @@ from cdpr_rt.calibration.outcome import CalibrationMethod, Outcome, calibration_
 from cdpr_rt.calibration.readings.camera_data import HandEye, Images
 from cdpr_rt.calibration.readings.data import CalibrationData, with_points
 from cdpr_rt.errors import ControlError, InvalidRequestError
-from cdpr_rt.robots.checks import refuse_impossible
+from cdpr_rt.robots.feasibility.checks import refuse_impossible
 from cdpr_rt.robots.persistence.calibration_state import (
     mark_calibrated,
     mark_not_calibrated,

@@ -12,9 +12,9 @@ from cdpr_profiles.calibration.in_force import in_force
 from cdpr_profiles.errors import ProfileError
 from cdpr_profiles.platform import Platform
 from cdpr_rt.core.estimate import Estimator
-from cdpr_rt.core.limits import Limits
 from cdpr_rt.core.shared_block import SharedBlock
-from cdpr_rt.core.supervisor import Supervisor
+from cdpr_rt.core.supervision.limits import Limits
+from cdpr_rt.core.supervision.supervisor import Supervisor
 from cdpr_rt.programs.model import model_of
 from cdpr_rt.programs.platform.lower import LowerProgram, lowering_s
 from cdpr_rt.programs.platform.platform_program import PlatformParts

@@ -12,7 +12,7 @@ from cdpr_profiles import Robot
 from cdpr_profiles.platform import Platform
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.errors import GeometryError
-from cdpr_rt.robots.cable_loss import SWING_S, corner_swings
+from cdpr_rt.robots.cable_loss.prediction import SWING_S, corner_swings
 from cdpr_rt.robots.free_rotation import free_rotation
 from cdpr_rt.robots.kinematics.free_rotation_kernel import SWINGS_m
 from cdpr_rt.robots.platform.loop_design import STIFFNESS_SHARES, designed_loop

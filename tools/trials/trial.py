@@ -12,7 +12,7 @@ from matplotlib.figure import Figure as Picture
 from cdpr_drivers.robot.commissioned import uncommissioned_text, with_commissioned
 from cdpr_profiles import Robot, load_robot
 from cdpr_profiles.calibration.in_force import calibrated
-from cdpr_rt.robots.checks import refuse_impossible
+from cdpr_rt.robots.feasibility.checks import refuse_impossible
 from cdpr_tools.calibrate.words import geometry_note
 from cdpr_tools.errors import BadInputError
 from cdpr_tools.output import Output, to_json

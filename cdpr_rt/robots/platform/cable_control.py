@@ -31,9 +31,9 @@ from cdpr_rt.robots.platform.control_rows import (
     motor_rows,
     tracking_filters,
 )
+from cdpr_rt.robots.platform.learning.motor_learning import MotorLearning
+from cdpr_rt.robots.platform.learning.pull_fit import PullFit
 from cdpr_rt.robots.platform.loop_design import designed_loop
-from cdpr_rt.robots.platform.motor_learning import MotorLearning
-from cdpr_rt.robots.platform.pull_fit import PullFit
 from cdpr_rt.robots.platform.shaped_setpoint import ShapedSetpoint
 from cdpr_rt.robots.platform_model import PlatformModel
 from cdpr_rt.robots.tension.tension_distribution import TensionSolver, tension_distribution

@@ -17,7 +17,7 @@ import numpy as np
 from cdpr_rt.arrays import BoolArray, FloatArray
 from cdpr_rt.jit import bound, jit
 from cdpr_rt.robots.platform.cell_check import CellCheck
-from cdpr_rt.robots.platform.motor_learning import MOST_RESERVE_SHARE
+from cdpr_rt.robots.platform.learning.motor_learning import MOST_RESERVE_SHARE
 from cdpr_rt.robots.tension.tension_split import FAST
 
 RATE_1_s = 2.0

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 from cdpr_rt.core.estimate import Estimator
-from cdpr_rt.core.supervisor import Supervisor
+from cdpr_rt.core.supervision.supervisor import Supervisor
 from cdpr_rt.programs.base import Program
 from cdpr_rt.programs.platform.paths.path_store import PathStore
 from cdpr_rt.robots.persistence.last_lengths import LastLengths

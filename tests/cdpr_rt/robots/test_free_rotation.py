@@ -9,7 +9,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from platform_physics import Machine, Physics, bar, planar, spatial
 from scipy.linalg import eigh
 from scipy.optimize import brentq
 
@@ -20,6 +19,7 @@ from cdpr_rt.robots.kinematics import free_rotation_kernel as kernel
 from cdpr_rt.robots.kinematics.pose import Pose
 from cdpr_rt.robots.platform_model import platform_model_of
 from cdpr_sim_bus.robot.robot_plant import RobotPlant
+from tests.cdpr_rt.robots.platform.platform_physics import Machine, Physics, bar, planar, spatial
 
 OTHERS = Path(__file__).parents[2] / "hil" / "others"
 TENSION_N = np.array([40.0, 45.0, 33.0])

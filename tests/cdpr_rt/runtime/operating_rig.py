@@ -15,10 +15,10 @@ from cdpr_rt.core.clock import Clock, LockstepClock, PacedClock
 from cdpr_rt.core.cycle import Watch
 from cdpr_rt.core.estimate import Estimator
 from cdpr_rt.core.exchange import AxisCommand, AxisFeedback
-from cdpr_rt.core.limits import Limit, Limits
 from cdpr_rt.core.shared_block import SharedBlock
 from cdpr_rt.core.states import Reaction
-from cdpr_rt.core.supervisor import Supervisor
+from cdpr_rt.core.supervision.limits import Limit, Limits
+from cdpr_rt.core.supervision.supervisor import Supervisor
 from cdpr_rt.identification.rawlog import RawLogWriter, column_names
 from cdpr_rt.motion.trajectory import TrapezoidalMove
 from cdpr_rt.programs.axes.track import TrackProgram

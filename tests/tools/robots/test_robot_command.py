@@ -17,7 +17,7 @@ from cdpr_here import cdpr_here
 
 from cdpr_profiles import ProfileError, load_robot
 from cdpr_profiles.reading.places import SHIPPED
-from cdpr_rt.robots.checks import findings
+from cdpr_rt.robots.feasibility.checks import findings
 from cdpr_rt.robots.platform_model import RESERVE
 from cdpr_rt.robots.statics import statics_of
 from cdpr_tools.errors import BadInputError

@@ -18,7 +18,7 @@ from cdpr_drivers.robot.robot_buses import robot_urls
 from cdpr_profiles import Robot
 from cdpr_rt.control.tuning import stiffest_pid
 from cdpr_rt.core.clock import PacedClock
-from cdpr_rt.core.limits import Limits
+from cdpr_rt.core.supervision.limits import Limits
 from cdpr_rt.robots.robot_arrays import limits_of
 from cdpr_tools.bench.daemon.loop_daemon import answers_in_time
 from cdpr_tools.composition.simulator import OwnSimulator

@@ -144,7 +144,7 @@ def run(
     """
     out = Output(as_json)
     with out.stage("looking at the robot's file"):
-        from cdpr_rt.robots.checks import refuse_impossible  # noqa: PLC0415
+        from cdpr_rt.robots.feasibility.checks import refuse_impossible  # noqa: PLC0415
         from cdpr_tools.calibrate.finish import enough, finish, with_hand_eye  # noqa: PLC0415
         from cdpr_tools.calibrate.measuring import run as runs  # noqa: PLC0415  # slow to load
         from cdpr_tools.calibrate.measuring.begin import check_points, source_of  # noqa: PLC0415
@@ -236,7 +236,7 @@ def check(
     """
     out = Output(as_json)
     with out.stage("looking at the robot's file"):
-        from cdpr_rt.robots.checks import refuse_impossible  # noqa: PLC0415
+        from cdpr_rt.robots.feasibility.checks import refuse_impossible  # noqa: PLC0415
         from cdpr_tools.calibrate import check as checks  # noqa: PLC0415  # slow to load
 
         profile = load_robot(robot)

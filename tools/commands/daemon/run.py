@@ -30,7 +30,7 @@ from cdpr_profiles import Robot
 from cdpr_profiles.calibration.in_force import load_calibrated
 from cdpr_rt.core.shared_block import MOST_AXES, SharedBlock
 from cdpr_rt.private_files import make_private_folder
-from cdpr_rt.robots.checks import refuse_impossible
+from cdpr_rt.robots.feasibility.checks import refuse_impossible
 from cdpr_rt.service.recordings.retention import BYTES_PER_AXIS, Retention, size_text
 from cdpr_tools.calibrate.words import geometry_note
 from cdpr_tools.commands.options import JsonOption, RobotBusOption, SafetyIoOption, YesOption

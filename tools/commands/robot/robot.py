@@ -13,7 +13,7 @@ from cdpr_profiles import Robot, load_robot
 from cdpr_profiles.calibration.in_force import load_calibrated
 from cdpr_profiles.errors import ProfileError
 from cdpr_profiles.platform import Platform
-from cdpr_rt.robots import checks
+from cdpr_rt.robots.feasibility import checks
 from cdpr_rt.robots.persistence.calibration_state import mark_calibrated
 from cdpr_tools.calibrate.words import calibration_lines
 from cdpr_tools.commands.options import JsonOption, PngOption, RobotArgument

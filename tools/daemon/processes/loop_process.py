@@ -22,7 +22,7 @@ from cdpr_rt.core.shared_block import SharedBlock
 from cdpr_rt.errors import ControlError
 from cdpr_rt.programs.platform.paths.path_progress import paths_folder
 from cdpr_rt.programs.platform.paths.path_store import PathStore
-from cdpr_rt.robots.checks import refuse_impossible
+from cdpr_rt.robots.feasibility.checks import refuse_impossible
 from cdpr_rt.robots.robot_arrays import limits_of
 from cdpr_rt.runtime.control_loop.loop import ControlLoop
 from cdpr_rt.runtime.machine import Machine

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from cdpr_rt.programs.platform.tightening.standing_tensions import OVERSHOOT, StandingTensions
-from tests.cdpr_rt.robots.platform_physics import heavier, spatial
+from tests.cdpr_rt.robots.platform.platform_physics import heavier, spatial
 
 
 @pytest.mark.parametrize(("mass_kg", "share"), [(6.0, 1.0), (12.0, 0.75), (14.0, 0.25)])

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from cdpr_rt.arrays import FloatArray
-from cdpr_rt.robots.fall_kernel import COURSE, WINCHES, fall
+from cdpr_rt.robots.cable_loss.fall_kernel import COURSE, WINCHES, fall
 from cdpr_rt.robots.kinematics.cable_kernel import ANCHOR, GEOMETRY_ROWS
 from cdpr_rt.robots.platform.body_kernel import CENTRE, GRAVITY, INERTIA, MASS, body_of
-from tests.cdpr_rt.robots.test_cable_loss import hung
+from tests.cdpr_rt.robots.cable_loss.test_cable_loss import hung
 
 G_m_s2, MASS_kg, PERIOD_S = 9.80665, 2.0, 1e-3
 STIFFNESS_N_m = 1e5

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from cdpr_profiles import load_robot
 from cdpr_rt.control.compensation import AxisCompensation, Compensation
 from cdpr_rt.robots.platform.cable_control import CableControl
-from cdpr_rt.robots.platform.motor_learning import MOST_SHARE, MotorLearning
+from cdpr_rt.robots.platform.learning.motor_learning import MOST_SHARE, MotorLearning
 from cdpr_rt.robots.platform_model import platform_model_of
 
 ROBOT = load_robot("planar-3")

@@ -10,8 +10,8 @@ import numpy as np
 from cdpr_profiles import RobotAxis
 from cdpr_rt.arrays import BoolArray, FloatArray
 from cdpr_rt.jit import bound
-from cdpr_rt.robots.platform import pull_kernel as kernel
-from cdpr_rt.robots.platform.motor_learning import (
+from cdpr_rt.robots.platform.learning import pull_kernel as kernel
+from cdpr_rt.robots.platform.learning.motor_learning import (
     COGGING_SHARE,
     FRICTION_SHARE,
     MotorLearning,

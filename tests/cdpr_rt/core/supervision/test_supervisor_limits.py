@@ -9,10 +9,10 @@ from dataclasses import dataclass, field
 
 import pytest
 
-from cdpr_rt.core.limits import DEFAULT_REACTIONS
 from cdpr_rt.core.states import Reaction
-from cdpr_rt.core.supervisor import Limit, Limits, Supervisor
-from tests.cdpr_rt.core.supervisor_rig import PERIOD_S, SAFE, Cycle, with_rate
+from cdpr_rt.core.supervision.limits import DEFAULT_REACTIONS
+from cdpr_rt.core.supervision.supervisor import Limit, Limits, Supervisor
+from tests.cdpr_rt.core.supervision.supervisor_rig import PERIOD_S, SAFE, Cycle, with_rate
 
 Change = Callable[[Cycle, int], None]
 

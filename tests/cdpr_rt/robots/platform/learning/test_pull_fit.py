@@ -10,9 +10,9 @@ import pytest
 
 from cdpr_profiles import load_robot
 from cdpr_rt.robots.platform.cable_control import CableControl
-from cdpr_rt.robots.platform.motor_learning import MotorLearning
-from cdpr_rt.robots.platform.pull_fit import PullFit
-from cdpr_rt.robots.platform.pull_kernel import FRICTION
+from cdpr_rt.robots.platform.learning.motor_learning import MotorLearning
+from cdpr_rt.robots.platform.learning.pull_fit import PullFit
+from cdpr_rt.robots.platform.learning.pull_kernel import FRICTION
 from cdpr_rt.robots.platform_model import platform_model_of
 
 ROBOT = load_robot("suspended-6")

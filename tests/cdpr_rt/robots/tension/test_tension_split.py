@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from platform_physics import Machine, planar, spatial
 from scipy.optimize import lsq_linear, nnls
 
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.robots.platform_model import PlatformModel
 from cdpr_rt.robots.tension.tension_split import FAST, INFEASIBLE, OK, SINGULAR, split
+from tests.cdpr_rt.robots.platform.platform_physics import Machine, planar, spatial
 
 MACHINES = {"plane": planar, "space": spatial}
 

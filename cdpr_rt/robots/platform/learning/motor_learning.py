@@ -9,7 +9,7 @@ import numpy as np
 from cdpr_profiles import RobotAxis
 from cdpr_rt.arrays import BoolArray, FloatArray
 from cdpr_rt.jit import bound
-from cdpr_rt.robots.platform import learning_kernel as kernel
+from cdpr_rt.robots.platform.learning import learning_kernel as kernel
 from cdpr_rt.robots.platform.loop_design import latency_s
 
 POLE_rad_s = 19.0

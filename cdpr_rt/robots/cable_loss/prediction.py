@@ -22,7 +22,7 @@ from cdpr_rt.control.winch_speed_loop import (
     HANGING_LOAD_1_s,
     UNKNOWN_POSE_m_s,
 )
-from cdpr_rt.robots.fall_kernel import COURSE, WINCHES, fall
+from cdpr_rt.robots.cable_loss.fall_kernel import COURSE, WINCHES, fall
 from cdpr_rt.robots.kinematics.cable_kernel import ARC, CABLE_ROWS, FREE, run_cables
 from cdpr_rt.robots.kinematics.pose import Pose
 from cdpr_rt.robots.platform.body_kernel import body_of

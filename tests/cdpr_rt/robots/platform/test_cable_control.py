@@ -7,7 +7,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from platform_physics import PERIOD_S, Physics, planar, spatial, with_friction
 
 from cdpr_profiles import Robot, load_robot
 from cdpr_profiles.platform import BoxFile
@@ -17,6 +16,13 @@ from cdpr_rt.robots.platform.cable_control import CableControl
 from cdpr_rt.robots.platform_model import platform_model_of
 from cdpr_sim_bus.robot.robot_plant import RobotPlant
 from cdpr_tools.bench.control.measure import PeriodicMotion, controls, run_block
+from tests.cdpr_rt.robots.platform.platform_physics import (
+    PERIOD_S,
+    Physics,
+    planar,
+    spatial,
+    with_friction,
+)
 
 ROBOTS = ("planar-3", "spatial-8", "suspended-8")
 PLANE = ((0.5, 1.5), (-0.5, 2.3), (0.55, 2.35), (-0.4, 1.45))

@@ -10,7 +10,7 @@ import pytest
 
 from cdpr_profiles import Robot, load_robot
 from cdpr_profiles.platform import Platform
-from cdpr_rt.robots.cable_loss import SWING_S, CableLoss, corner_swings
+from cdpr_rt.robots.cable_loss.prediction import SWING_S, CableLoss, corner_swings
 from cdpr_rt.robots.platform_model import platform_model, platform_model_of
 from cdpr_rt.robots.resonance import lowest_resonance_Hz
 from tests.cdpr_rt.robots.pulley import over_a_pulley

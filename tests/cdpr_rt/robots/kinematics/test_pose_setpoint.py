@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from platform_physics import planar, spatial
 from scipy.spatial.transform import Rotation
 
 from cdpr_rt.arrays import FloatArray
@@ -14,6 +13,7 @@ from cdpr_rt.robots.kinematics import pose_setpoint
 from cdpr_rt.robots.kinematics import pose_tracking as tracking
 from cdpr_rt.robots.kinematics.cable_kernel import CABLE_ROWS
 from cdpr_rt.robots.kinematics.pose import Pose
+from tests.cdpr_rt.robots.platform.platform_physics import planar, spatial
 
 PERIOD_S = 1e-3
 quick = settings(max_examples=60)

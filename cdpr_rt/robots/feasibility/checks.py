@@ -12,10 +12,10 @@ from cdpr_profiles import ProfileError, Robot
 from cdpr_profiles.limits.motor_bounds import MOST_SPEED_RATIO
 from cdpr_profiles.platform import DIRECTIONS, Platform
 from cdpr_rt.arrays import FloatArray
-from cdpr_rt.core.limits import Limits
+from cdpr_rt.core.supervision.limits import Limits
 from cdpr_rt.errors import GeometryError
+from cdpr_rt.robots.feasibility.not_held import point_text, why_not_held
 from cdpr_rt.robots.interference.interference import in_words
-from cdpr_rt.robots.not_held import point_text, why_not_held
 from cdpr_rt.robots.platform.loop_design import designed_loop
 from cdpr_rt.robots.rigid_body import in_space, is_point
 from cdpr_rt.robots.robot_arrays import limits_of

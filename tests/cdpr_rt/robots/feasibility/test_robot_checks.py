@@ -12,7 +12,7 @@ import pytest
 
 from cdpr_profiles import ProfileError, Robot, load_robot
 from cdpr_profiles.reading.places import SHIPPED
-from cdpr_rt.robots.checks import findings, refuse_impossible
+from cdpr_rt.robots.feasibility.checks import findings, refuse_impossible
 from cdpr_rt.robots.statics import statics_of
 
 PLANAR = (SHIPPED / "robots" / "planar-3.toml").read_text()
@@ -302,7 +302,8 @@ def test_what_cannot_work_is_told_with_what_would(
     assert any(problem in found.text and found.impossible is impossible for found in about), about
     # what takes seconds to find is found once
     monkeypatch.setattr(
-        "cdpr_rt.robots.checks.findings", lambda asked, _limits: told if asked is robot else []
+        "cdpr_rt.robots.feasibility.checks.findings",
+        lambda asked, _limits: told if asked is robot else [],
     )
     if impossible:
         with pytest.raises(ProfileError, match=r"mine\.toml: ") as caught:

@@ -11,15 +11,15 @@ import numpy as np
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.core.estimate import AxisEstimate
 from cdpr_rt.core.exchange import AxisFeedback, Setpoint
-from cdpr_rt.core.limit_kernel import (
+from cdpr_rt.core.states import Reaction
+from cdpr_rt.core.supervision.limit_kernel import (
     AXIS_HISTORY,
     AXIS_LIMITS,
     FIGURES,
     VERDICT,
     check_axes,
 )
-from cdpr_rt.core.limits import DEFAULT_REACTIONS, Limit, Limits
-from cdpr_rt.core.states import Reaction
+from cdpr_rt.core.supervision.limits import DEFAULT_REACTIONS, Limit, Limits
 from cdpr_rt.jit import bound
 
 __all__ = ["Limit", "Limits", "Supervisor"]

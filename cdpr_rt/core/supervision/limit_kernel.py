@@ -7,7 +7,7 @@ from typing import Any, Final
 import numpy as np
 
 from cdpr_rt.arrays import BoolArray, FloatArray
-from cdpr_rt.core.limits import Limit, Limits
+from cdpr_rt.core.supervision.limits import Limit, Limits
 from cdpr_rt.jit import jit
 
 # kernels take plain numbers

@@ -8,7 +8,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from platform_physics import PERIOD_S, Machine, heavier, planar, spatial
 from scipy.linalg import expm, null_space
 
 from cdpr_profiles import RobotAxis, load_robot
@@ -25,6 +24,13 @@ from cdpr_rt.robots.platform.loop_design import (
     OBSERVER_rad_s,
 )
 from cdpr_rt.robots.robot_arrays import limits_of
+from tests.cdpr_rt.robots.platform.platform_physics import (
+    PERIOD_S,
+    Machine,
+    heavier,
+    planar,
+    spatial,
+)
 
 _LATE_S, _CABLE_DAMPING_S = 0.8e-3, 2e-3
 

@@ -1,0 +1,1 @@
+"""Prediction of what a platform does when one of its cables breaks."""
