@@ -301,6 +301,10 @@ def test_the_documented_robot_is_one(tmp_path: Path) -> None:
     assert told.axes[1].calibration == calibration()
     figures = re.findall(r"^([a-z]\w+) = ", limits.partition("[limits.reactions]")[0], re.M)
     assert figures == [key for key in RobotLimits.model_fields if key != "reactions"]
+    limits_in_force = limits_of(told)
+    for figure in figures:
+        in_force, in_file = getattr(limits_in_force, figure), getattr(told.limits, figure)
+        assert np.all(np.equal(in_force, in_file)), figure
     path.write_text(platform)
     keys = read_toml(path)["platform"]
     documented = validated(path, keys, PlatformFile)
