@@ -186,11 +186,11 @@ class Platform:
         size, n = len(self.home_m), len(self.exit_points_m)
         up = (0.0,) * (size - 1) + (1.0,)
         arm_m = max(_LEAST_ARM_m, *(math.hypot(*anchor) for anchor in self.anchor_points_m))
-        wanted = self.controlled or controlled_by_default(self.anchor_points_m)
+        controlled = self.controlled or controlled_by_default(self.anchor_points_m)
         filled: dict[str, Any] = {
             "centre_of_mass_m": self.centre_of_mass_m or (0.0,) * size,
             "home_rotation_rad": self.home_rotation_rad or (0.0,) * (1 if size == 2 else 3),
-            "controlled": tuple(name for name in DIRECTIONS[size] if name in wanted),
+            "controlled": tuple(name for name in DIRECTIONS[size] if name in controlled),
             "pulley_radius_m": self.pulley_radius_m or (0.0,) * n,
             "pulley_axes": self.pulley_axes or (up,) * n,
             "angular_speed_rad_s": self.angular_speed_rad_s or self.speed_m_s / arm_m,

@@ -71,13 +71,13 @@ def _kernel_cache() -> str:
     numba looks only at the file of the function it compiles, not at those of the functions that
     one calls, and would go on using machine code of an older callee.
     """
-    here = Path(__file__).parent
+    package = Path(__file__).parent
     digest = hashlib.sha256()
-    for source in sorted(here.rglob("*.py")):
+    for source in sorted(package.rglob("*.py")):
         text = source.read_bytes()
         if b"from cdpr_sim_bus.jit import" in text:
             digest.update(text)
-    base = Path(_SETTINGS.CACHE_DIR or here / "__pycache__")
+    base = Path(_SETTINGS.CACHE_DIR or package / "__pycache__")
     return str(base / f"kernels-{digest.hexdigest()[:12]}")
 
 

@@ -45,7 +45,7 @@ def runner(workers: int, cluster: str | None) -> Iterator[Runner]:
         with _ray(cluster) as run:
             yield run
     elif workers == 1:
-        yield _here
+        yield _in_this_process
     else:
         with processes(workers) as pool:
 
@@ -78,11 +78,11 @@ def cores() -> int:
 
 def processes(workers: int) -> Pool:
     """Return processes that end with the block; an interrupt of the terminal is ours to handle."""
-    own, before = multiprocessing.get_context("spawn"), os.environ.get(_SAFE_PATH)
+    context, before = multiprocessing.get_context("spawn"), os.environ.get(_SAFE_PATH)
     # each is started with -c, which looks into the working directory before all others
     os.environ[_SAFE_PATH] = "1"
     try:
-        return own.Pool(workers, signal.signal, (signal.SIGINT, signal.SIG_IGN))
+        return context.Pool(workers, signal.signal, (signal.SIGINT, signal.SIG_IGN))
     finally:
         del os.environ[_SAFE_PATH]
         if before is not None:
@@ -98,7 +98,7 @@ def _ray(address: str) -> Iterator[Runner]:
             f"--cluster {address}: needs ray, which comes with: pip install 'cdpr-rt[cluster]'"
         ) from None
     try:
-        _knock(address)
+        _require_listener(address)
         ray.init(address=address, log_to_driver=False, logging_level="error")
     except (ConnectionError, OSError, RuntimeError, ValueError) as error:
         raise WorkFailedError(f"--cluster {address}: {str(error).splitlines()[0]}") from error
@@ -118,14 +118,14 @@ def _ray(address: str) -> Iterator[Runner]:
         ray.shutdown()
 
 
-def _knock(address: str) -> None:
+def _require_listener(address: str) -> None:
     """Raise OSError where nobody listens at HOST:PORT, which Ray itself notices after minutes."""
     host, colon, port = address.removeprefix("ray://").rpartition(":")
     if colon and port.isdecimal():
         socket.create_connection((host, int(port)), timeout=_ANSWER_S).close()
 
 
-def _here(jobs: Sequence[Job[_T]], /) -> Iterator[_T]:
+def _in_this_process(jobs: Sequence[Job[_T]], /) -> Iterator[_T]:
     return map(_run, jobs)
 
 

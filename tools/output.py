@@ -23,7 +23,7 @@ from rich.progress import (
 )
 
 _SLOW_S = 2.0
-_TOLD_FROM = 0.005
+_ESTIMATED_FROM = 0.005
 """Share of the work from which on it is told how long the rest may take."""
 _TELL_S = (2.0, 5.0)
 """Where nothing can be drawn over again: when work is first told of to go on, then how often."""
@@ -126,11 +126,11 @@ class Output:
                 finally:
                     self._bar = None
         else:
-            with self._told_now_and_then(advance):
+            with self._noted_now_and_then(advance):
                 yield advance
 
     @contextmanager
-    def _told_now_and_then(self, advance: Advance) -> Iterator[None]:
+    def _noted_now_and_then(self, advance: Advance) -> Iterator[None]:
         over = threading.Event()
 
         def tell() -> None:
@@ -168,7 +168,7 @@ class Advance:
             return f"{self.what}: for {elapsed_s:.0f} s now"
         # a file that is still written to grows beyond what it was
         share = min(self.done / self.total, 1.0)
-        if share < _TOLD_FROM:
+        if share < _ESTIMATED_FROM:
             return f"{self.what}: 0 %"
         left_s = elapsed_s * (1.0 / share - 1.0)
         left = f"{left_s:.0f} s" if left_s < 100.0 else f"{left_s / 60.0:.0f} min"

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from types import FrameType
 
-_TOLD = "stopping under control; a second Ctrl-C takes the power at once"
+_STOPPING = "stopping under control; a second Ctrl-C takes the power at once"
 HELD = "the motion stops and is held, with power; `cdpr disable` or `cdpr stop` takes that"
 """What a Ctrl-C does to a command that has a daemon move something."""
 
@@ -39,7 +39,7 @@ class StopRequest:
     def note(self, _number: int, _frame: FrameType | None) -> None:
         """Take a signal."""
         self._times += 1
-        notice = _TOLD if self.energised else self._notice
+        notice = _STOPPING if self.energised else self._notice
         if self._times == 1 and notice and self._interrupts:
             # printing is not allowed to interrupt itself
             os.write(sys.stderr.fileno(), f"{notice}\n".encode())
@@ -69,12 +69,12 @@ def stop_on_signals(notice: str = "") -> Iterator[StopRequest]:
     `notice` is said at the first request. After a Ctrl-C in the block further ones change nothing:
     the command ends already.
     """
-    wanted = StopRequest(notice)
+    request = StopRequest(notice)
     numbers = (signal.SIGINT, signal.SIGTERM)
-    before = {number: signal.signal(number, wanted.note) for number in numbers}
+    before = {number: signal.signal(number, request.note) for number in numbers}
     try:
-        yield wanted
+        yield request
     finally:
         # in one step: an interrupt in between would end the interpreter while it takes itself apart
-        signal.signal(signal.SIGINT, signal.SIG_IGN if wanted() else before[signal.SIGINT])
+        signal.signal(signal.SIGINT, signal.SIG_IGN if request() else before[signal.SIGINT])
         signal.signal(signal.SIGTERM, before[signal.SIGTERM])

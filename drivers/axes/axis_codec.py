@@ -327,15 +327,15 @@ def _torque_units(i: int, ints: Ints, floats: FloatArray) -> int:
     What rounding leaves over is carried into the next cycle (first-order error feedback), so that
     the mean is right to far less than one unit.
     """
-    wanted = floats[COMMAND_NM, i]
-    if not np.isfinite(wanted):
+    torque_Nm = floats[COMMAND_NM, i]
+    if not np.isfinite(torque_Nm):
         ints[ALARM, i] |= NOT_FINITE
-        wanted = 0.0
+        torque_Nm = 0.0
     if ints[STATE, i] != _ENABLED or ints[TARGET, i] != _ENABLED:
         floats[RESIDUAL_UNITS, i] = 0.0
         return 0
     limit = floats[LIMIT_UNITS, i]
-    exact = wanted / floats[NM_PER_UNIT, i] + floats[RESIDUAL_UNITS, i]
+    exact = torque_Nm / floats[NM_PER_UNIT, i] + floats[RESIDUAL_UNITS, i]
     units = min(max(np.rint(exact), -limit), limit)
     floats[RESIDUAL_UNITS, i] = min(max(exact - units, -0.5), 0.5)
     return int(units)

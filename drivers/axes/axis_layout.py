@@ -128,19 +128,19 @@ class GroupLayout:
         for number, pdo in enumerate(axis.drive.tpdos):
             self._claim(pdo.cob_id(axis.node_id), i, number)
             for index, start, size in _places(pdo):
-                wanted = _TPDO_FIELDS.get(index)
-                if wanted is None or number != pdo_of.get(index, number):
+                quantity = _TPDO_FIELDS.get(index)
+                if quantity is None or number != pdo_of.get(index, number):
                     continue
                 if 8 * size != _BITS[index]:
                     raise DriverError(
                         f"drive profile {axis.drive.name!r}: tpdos: {index:04X}h has {8 * size} "
                         f"bits; allowed: {_BITS[index]}"
                     )
-                if wanted in self.fields[i, :row, 1]:
+                if quantity in self.fields[i, :row, 1]:
                     continue
                 pdo_of[index] = number
                 signed = int(index not in _UNSIGNED)
-                self.fields[i, row] = number, wanted, start, size, signed
+                self.fields[i, row] = number, quantity, start, size, signed
                 row += 1
         self.mode_mapped[i] = 0x6061 in pdo_of
         self.probe_mapped[i] = 0x60B9 in pdo_of and pdo_of[0x60B9] == pdo_of.get(0x60BA)

@@ -50,8 +50,8 @@ class GenicamCamera(Camera):
             self._harvester.add_file(producer)
             self._harvester.update()
             self._require_one(serial)
-            wanted = {"serial_number": serial} if serial else 0
-            self._acquirer: Any = self._harvester.create(wanted)
+            selection = {"serial_number": serial} if serial else 0
+            self._acquirer: Any = self._harvester.create(selection)
             with suppress(Exception):  # what it gives otherwise is told with the image
                 self._acquirer.remote_device.node_map.PixelFormat.value = "Mono8"
             self._triggered = self._use_software_trigger()

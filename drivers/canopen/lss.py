@@ -310,10 +310,10 @@ class LssMaster(LssLink):
         self._send(bytes([_ACTIVATE]) + round(delay_s * 1e3).to_bytes(2, "little"))
 
     def _set(self, command: int, content: bytes, what: str) -> None:
-        error, own = self._ask_single(bytes([command]) + content, command)[1:3]
+        error, maker_code = self._ask_single(bytes([command]) + content, command)[1:3]
         if error == 0:
             return
         reason = _REASONS.get((command, error), f"LSS error code {error}")
         if error == _VENDOR_SPECIFIC:
-            reason = f"for a reason of the maker's own, code {own}"
+            reason = f"for a reason of the maker's own, code {maker_code}"
         raise LssError(f"the device refuses {what}: {reason}")

@@ -156,5 +156,5 @@ _LSS_COMMANDS: dict[int, Callable[[bytes], str]] = {
 }
 
 
-def _wrong_length(what: str, data: bytes, wanted: int, arrow: str = "") -> Reading:
-    return f"{arrow}{what} of {len(data)} bytes, not {wanted}: {data.hex(' ').upper()}", True
+def _wrong_length(what: str, data: bytes, expected: int, arrow: str = "") -> Reading:
+    return f"{arrow}{what} of {len(data)} bytes, not {expected}: {data.hex(' ').upper()}", True

@@ -21,12 +21,12 @@ class ObjectNames:
     """What an EDS calls the objects; those it lacks are called as in the generic CiA 402 EDS."""
 
     def __init__(self, eds: Path | None = None) -> None:
-        self._own = _dictionary(eds) if eds is not None else None
+        self._device = _dictionary(eds) if eds is not None else None
         self._standard = _standard()
 
     def name(self, index: int, sub: int) -> str:
         """Return an object's name, "" where no data sheet has it."""
-        for dictionary in (self._own, self._standard):
+        for dictionary in (self._device, self._standard):
             entry = dictionary.get(index) if dictionary is not None else None
             if entry is None:
                 continue
@@ -59,7 +59,7 @@ class ObjectNames:
             return data
 
     def _variable(self, index: int, sub: int) -> ODVariable | None:
-        for dictionary in (self._own, self._standard):
+        for dictionary in (self._device, self._standard):
             entry = dictionary.get(index) if dictionary is not None else None
             found = entry if isinstance(entry, ODVariable) or entry is None else _part(entry, sub)
             if found is not None:

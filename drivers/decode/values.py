@@ -22,7 +22,7 @@ _SPEEDS = frozenset((0x607F, 0x6081, 0x6082, 0x6099))
 _TORQUES = frozenset((0x6071, 0x6074, 0x6077, 0x60B2))
 _TORQUE_LIMITS = frozenset((0x6072, 0x60E0, 0x60E1))
 _HOMING, _CYCLIC = 6, (8, 9, 10)
-_OWN_UNITS = {
+_RELATIVE_TORQUE_UNITS = {
     "per_mille_of_rated": "per mille of rated",
     "percent_of_rated": "percent of rated",
 }
@@ -64,7 +64,7 @@ class NodeView:
         """Motor torque of one unit of 6077h, with the drive's sign; None where not known."""
         if self.drive is None:
             return None
-        if self.rated_torque_Nm is None and self.drive.torque_unit in _OWN_UNITS:
+        if self.rated_torque_Nm is None and self.drive.torque_unit in _RELATIVE_TORQUE_UNITS:
             return None
         return self.drive.torque_sign * torque_unit_Nm(self.drive, self.rated_torque_Nm or 0.0)
 
@@ -140,7 +140,7 @@ def _torque(node: NodeView) -> tuple[float, str, int]:
     if scale is not None:
         return scale, "Nm", 4
     unit = node.drive.torque_unit if node.drive is not None else "per_mille_of_rated"
-    return 1.0, _OWN_UNITS[unit], 0
+    return 1.0, _RELATIVE_TORQUE_UNITS[unit], 0
 
 
 _PDO_TIMES = {3: (0.1, "ms", 1), 5: (1.0, "ms", 0)}

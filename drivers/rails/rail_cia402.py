@@ -175,9 +175,9 @@ class Cia402RailAxis:
             self._write(0x6040, int(CONTROLWORD_TABLE[target, state]))
             self._clock.sleep(_LOOK_S)
 
-    def _await_bit(self, bit: int, wanted: bool, problem: str) -> None:
+    def _await_bit(self, bit: int, expected: bool, problem: str) -> None:
         deadline = self._clock.now_s + self._drive.state_timeout_s
-        while bool(self._statusword() & bit) != wanted:
+        while bool(self._statusword() & bit) != expected:
             if self._clock.now_s > deadline:
                 raise self._wrong(problem)
             self._clock.sleep(_LOOK_S)

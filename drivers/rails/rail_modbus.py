@@ -147,10 +147,10 @@ class ModbusRailAxis:
             self._count = (self._count + 1) & 0xFFFF
             self._client.write_registers(watchdog.trigger_register, [self._count])
 
-    def _await(self, bit: int, wanted: bool, timeout_s: float, problem: str) -> None:
+    def _await(self, bit: int, expected: bool, timeout_s: float, problem: str) -> None:
         clock = self._clock
         deadline_s = clock.now_s + timeout_s
-        while self._is(bit) != wanted:
+        while self._is(bit) != expected:
             if clock.now_s > deadline_s:
                 status = self._map.status_register
                 raise RailError(f"{self._rail.name}: {problem} (status register {status})")

@@ -68,11 +68,11 @@ def boot_robot(
     bitrates = {bus.name: bus.bitrate_bit_s for bus in robot.buses}
 
     def boot_bus(name: str, network: CanNetwork) -> Callable[[], BootReports]:
-        wanted = {
+        drives = {
             axis.node_id: (axis.winch.drive, _settings(robot, axis, most_Nm))
             for axis, most_Nm in ((robot.axes[i], torque_Nm[i]) for i in robot.axes_on(name))
         }
-        return lambda: boot_all(network, wanted, bitrate_bit_s=bitrates[name])
+        return lambda: boot_all(network, drives, bitrate_bit_s=bitrates[name])
 
     clock = next(iter(networks.values())).clock
     tasks = clock.gather([boot_bus(*bus) for bus in networks.items()])
@@ -94,13 +94,13 @@ def boot_robot(
             else:
                 absent[i] = str(reports.missing[node_id])
     if failures:
-        raise RobotBootError("; ".join(_told(error) for error in failures)) from failures[0]
+        raise RobotBootError("; ".join(_error_text(error) for error in failures)) from failures[0]
     if not booted:
         raise RobotBootError(f"{robot.name}: no drive booted; {'; '.join(absent.values())}")
     return dict(sorted(booted.items())), absent
 
 
-def _told(error: DriverError) -> str:
+def _error_text(error: DriverError) -> str:
     *others, where = error.__notes__
     return f"{where}: " + "; ".join([str(error), *others])
 
@@ -133,13 +133,14 @@ def device_of(
     buses = []
     commands_s = {budget.bus: budget.commands_s for budget in machine_budget(robot)}
     for name, network in networks.items():
-        here = [i for i in robot.axes_on(name) if i in booted]
-        if not here:
+        booted_axes = [i for i in robot.axes_on(name) if i in booted]
+        if not booted_axes:
             continue
         configs = [
-            AxisConfig.from_boot(robot.axes[i].winch.drive, booted[i], torque_Nm[i]) for i in here
+            AxisConfig.from_boot(robot.axes[i].winch.drive, booted[i], torque_Nm[i])
+            for i in booted_axes
         ]
-        axis_numbers = [place_of[i] for i in here]
+        axis_numbers = [place_of[i] for i in booted_axes]
         buses.append(BusAxes(name, network, configs, axis_numbers, commands_s[name]))
     return AxisBuses(buses, robot.sync_period_s)
 

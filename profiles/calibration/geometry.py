@@ -92,14 +92,14 @@ class GeometryCalibration(Profile):
         """Return what is further from the robot's file than errors of measuring."""
         exits = list(zip(self.exit_points_m, platform.exit_points_m, strict=True))
         anchors = zip(self.anchor_points_m or (), platform.anchor_points_m, strict=False)
-        moved_m = min(max(_apart_m(here, file) for here, file in exits), _FURTHEST_m)
+        moved_m = min(max(_apart_m(calibrated, file) for calibrated, file in exits), _FURTHEST_m)
         for key, pairs, most_m in (
             ("exit_points_m", exits, _FURTHEST_m),
             ("anchor_points_m", anchors, _ANCHOR_m),
             ("home_m", [(self.home_m, platform.home_m)], platform.home_tolerance_m + moved_m),
         ):
-            for i, (here, file) in enumerate(pairs):
-                if not _apart_m(here, file) <= most_m:  # nor what is not a number
+            for i, (calibrated, file) in enumerate(pairs):
+                if not _apart_m(calibrated, file) <= most_m:  # nor what is not a number
                     yield f"{key}[{i}]", f"more than {most_m:.3g} m from the robot's file"
 
     def _far_values(self, platform: Platform) -> Iterator[tuple[str, str]]:
@@ -192,5 +192,5 @@ def write_text(path: Path, text: str) -> None:
         raise ProfileError(path, "", f"cannot be written: {error.strerror}") from None
 
 
-def _apart_m(here: Sequence[float], there: Sequence[float]) -> float:
-    return math.dist(here, there)
+def _apart_m(calibrated: Sequence[float], reference: Sequence[float]) -> float:
+    return math.dist(calibrated, reference)

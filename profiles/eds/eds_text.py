@@ -94,17 +94,17 @@ def number(text: str) -> Number | None:
 def read_sections(path: Path, remarks: Remarks) -> dict[str, Section]:
     """Return the sections of a file by folded name; raises ProfileError for what is no EDS."""
     sections: dict[str, Section] = {}
-    here = None
+    section = None
     for line_number, raw in enumerate(decoded_eds(path, remarks).splitlines(), 1):
         line = raw.strip()
         if not line or line[0] in ";#":
             continue
         if line[0] == "[":
-            here = _begin(line, line_number, sections, remarks)
-        elif here is None:
+            section = _begin(line, line_number, sections, remarks)
+        elif section is None:
             remarks.add(f"line {line_number}", f"{value_text(line)} stands in no section; left out")
         else:
-            _take(line, line_number, here, remarks)
+            _take(line, line_number, section, remarks)
     if not sections:
         raise ProfileError(
             path, "", "is no EDS or DCF: it has no section such as [DeviceInfo] or [1000]"

@@ -158,14 +158,16 @@ def dotted(loc: Iterable[int | str]) -> str:
 
 def _keys_at(model: type[BaseModel], loc: Iterable[int | str]) -> list[str]:
     """Return the keys which the model has at a place in the file."""
-    here: Any = model
+    annotation: Any = model
     for part in loc:
-        fields = _fields_by_key(here)
+        fields = _fields_by_key(annotation)
         if part in fields:
-            here = fields[str(part)].annotation
+            annotation = fields[str(part)].annotation
         else:
-            here = next((a for a in reversed(get_args(here)) if a is not Ellipsis), here)
-    return list(_fields_by_key(here))
+            annotation = next(
+                (a for a in reversed(get_args(annotation)) if a is not Ellipsis), annotation
+            )
+    return list(_fields_by_key(annotation))
 
 
 def _fields_by_key(annotation: Any) -> dict[str, FieldInfo]:

@@ -78,7 +78,7 @@ class Client:
         """Return whether a frame with this identifier and these flags passes the filters."""
         if self.filters is None:
             return True
-        return any((can_id & mask) == (wanted & mask) for wanted, mask in self.filters)
+        return any((can_id & mask) == (filter_id & mask) for filter_id, mask in self.filters)
 
     def _receive_stamped(self, size: int) -> bytes:
         """Return the next packet as `recv` does, and note when it was sent."""
@@ -195,7 +195,7 @@ class Listener:
         self._name = name
         self._sock = listening_socket(name)
         self._allowed = frozenset({os.geteuid(), 0})
-        self._has_told = False
+        self._refusal_printed = False
 
     def fileno(self) -> int:
         """Return the descriptor that is readable when a client arrives."""
@@ -216,8 +216,8 @@ class Listener:
         if uid in self._allowed:
             return sock
         sock.close()
-        if not self._has_told:
-            self._has_told = True
+        if not self._refusal_printed:
+            self._refusal_printed = True
             print(
                 f"simbus:{self._name}: user {uid} may not join; allowed: the user who runs the bus,"
                 " and root (others after this one are not told)",

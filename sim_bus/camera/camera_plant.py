@@ -175,8 +175,8 @@ class CameraPlant(PlantFile):
         if path is None:
             return cls()
         table = read_toml(Path(path))
-        own = table.get("camera", table)
-        return validated(Path(path), own if isinstance(own, dict) else table, cls)
+        section = table.get("camera", table)
+        return validated(Path(path), section if isinstance(section, dict) else table, cls)
 
 
 DEFAULT_SCENE = (GridPlant(),)

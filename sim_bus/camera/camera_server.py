@@ -122,10 +122,10 @@ class CameraServer:
     def _answer(self, line: bytes) -> bytes:
         lens = self._camera.plant.lens
         size = {"width": lens.width_px, "height": lens.height_px}
-        wanted = _wish(line)
-        if wanted == "about":
+        request = _wish(line)
+        if request == "about":
             return json.dumps(size).encode() + b"\n"
-        if wanted != "grab":
+        if request != "grab":
             return b'{"error": "unknown request; known: about, grab"}\n'
         state = self._platform.state()
         if state is None:

@@ -49,12 +49,12 @@ def ray_table(lens: LensPlant) -> FloatArray:
     u, v = np.meshgrid(
         np.arange(lens.width_px, dtype=float), np.arange(lens.height_px, dtype=float)
     )
-    wanted_x = (u - lens.centre_px[0]) / lens.focal_px[0]
-    wanted_y = (v - lens.centre_px[1]) / lens.focal_px[1]
-    x, y = wanted_x.copy(), wanted_y.copy()
+    distorted_x = (u - lens.centre_px[0]) / lens.focal_px[0]
+    distorted_y = (v - lens.centre_px[1]) / lens.focal_px[1]
+    x, y = distorted_x.copy(), distorted_y.copy()
     for _ in range(_ITERATIONS):
         at_x, at_y = distorted(x, y, lens)
-        off_x, off_y = wanted_x - at_x, wanted_y - at_y
+        off_x, off_y = distorted_x - at_x, distorted_y - at_y
         x, y = x + off_x, y + off_y
         if max(np.abs(off_x).max(), np.abs(off_y).max()) < 1e-10:
             break

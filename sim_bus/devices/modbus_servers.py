@@ -176,10 +176,10 @@ class RtuServer:
         for number in (signal.SIGINT, signal.SIGTERM):
             loop.add_signal_handler(number, self._ended.set)
         self._listen_to_stdin(loop, until_stdin_ends)
-        path, own = self._open_terminals()
+        path, server_end = self._open_terminals()
         devices = [unit.device() for unit in self._units.values()]
         server = ModbusSerialServer(
-            devices, port=own, ignore_missing_devices=True, trace_packet=self._corrupt
+            devices, port=server_end, ignore_missing_devices=True, trace_packet=self._corrupt
         )
         try:
             await server.serve_forever(background=True)

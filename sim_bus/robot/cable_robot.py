@@ -55,33 +55,33 @@ class CableRobot:
         """Connect motor `i`, a record of shape (1,), to its cable; return the record to use."""
         self.commands[i] = command
         self.motors[i] = motor[0]
-        here = self.motors[i : i + 1]
+        motor = self.motors[i : i + 1]
         plant, transmission = self._plant.cables, self._transmissions[i]
         error = float(self._rng.normal(0.0, plant.drum_radius_sigma))
         if plant.drum_radius_errors:
             error += plant.drum_radius_errors[i]
         gain = transmission.cable_m_per_rad * (1.0 + error)
-        here["load_kind"] = LOAD_KINDS.index("platform")
-        here["cable_gain"] = gain
-        here["rigidity"] = transmission.cable_stiffness_N * (1.0 + plant.stiffness_error)
-        here["weight"] = self._weights[i] if plant.sag else 0.0
-        here["damping_time"] = plant.damping_s
-        here["creep_share"] = plant.creep_shares
-        here["creep_rate"] = 1.0 / np.array(plant.creep_times_s)
-        here["winch_friction"] = plant.winch_friction_Nm
-        here["friction_share"] = plant.friction_share * abs(gain)
+        motor["load_kind"] = LOAD_KINDS.index("platform")
+        motor["cable_gain"] = gain
+        motor["rigidity"] = transmission.cable_stiffness_N * (1.0 + plant.stiffness_error)
+        motor["weight"] = self._weights[i] if plant.sag else 0.0
+        motor["damping_time"] = plant.damping_s
+        motor["creep_share"] = plant.creep_shares
+        motor["creep_rate"] = 1.0 / np.array(plant.creep_times_s)
+        motor["winch_friction"] = plant.winch_friction_Nm
+        motor["friction_share"] = plant.friction_share * abs(gain)
         winding = self._plant.winding
-        here["drum_gain"] = 1.0 / transmission.gear_ratio
+        motor["drum_gain"] = 1.0 / transmission.gear_ratio
         radius = gain * transmission.gear_ratio
-        here["gear_yield"] = radius**2 / self._plant.winding.gear_stiffness_Nm_rad
-        here["run_out"] = winding.run_out_m
-        here["run_out_phase"] = self._rng.uniform(0.0, 2.0 * math.pi)
-        here["lag"] = winding.carriage_error * winding.pitch_m / (2.0 * math.pi)
-        here["carriage_offset"] = winding.carriage_offset_m
-        here["carriage_distance"] = winding.carriage_distance_m
-        here["angle_start"] = here["angle"]
-        here["cable_start"] = self.distance_m(i) + self._plant.start.slack_m
-        return here
+        motor["gear_yield"] = radius**2 / self._plant.winding.gear_stiffness_Nm_rad
+        motor["run_out"] = winding.run_out_m
+        motor["run_out_phase"] = self._rng.uniform(0.0, 2.0 * math.pi)
+        motor["lag"] = winding.carriage_error * winding.pitch_m / (2.0 * math.pi)
+        motor["carriage_offset"] = winding.carriage_offset_m
+        motor["carriage_distance"] = winding.carriage_distance_m
+        motor["angle_start"] = motor["angle"]
+        motor["cable_start"] = self.distance_m(i) + self._plant.start.slack_m
+        return motor
 
     def step(self, i: int, until: float) -> MotorSample:
         """Advance all to `until`, return the `motor.Sample` of motor `i`."""

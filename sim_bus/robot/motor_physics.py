@@ -279,18 +279,18 @@ def remember_angle(m: Any) -> None:
 @jit
 def delayed_angle(m: Any) -> float:
     """Return the rotor angle `delay` ago, within jitter, interpolated between the stored ones."""
-    wanted = m.time - m.delay
+    sample_time = m.time - m.delay
     if m.jitter > 0.0:
         unit = float(random_bits(m) >> np.uint64(11)) * 2.0**-53
-        wanted = min(m.time, wanted + m.jitter * (2.0 * unit - 1.0))
+        sample_time = min(m.time, sample_time + m.jitter * (2.0 * unit - 1.0))
     after_time, after = m.time, m.angle
     for back in range(DELAY_SLOTS):
         k = (m.slot - back) % DELAY_SLOTS
         before_time, before = m.slot_time[k], m.slot_angle[k]
-        if before_time <= wanted:
+        if before_time <= sample_time:
             if before_time == -math.inf or after_time <= before_time:
                 return float(before)
-            share = (wanted - before_time) / (after_time - before_time)
+            share = (sample_time - before_time) / (after_time - before_time)
             return float(before + share * (after - before))
         after_time, after = before_time, before
     return float(after)

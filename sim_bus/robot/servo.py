@@ -151,7 +151,7 @@ def control(m: Any, kind: int, target: float, h: float) -> int:
         m.torque_demand = 0.0
         return 0
     if kind == TORQUE:
-        wanted = torque_mode_torque(m, target, h)
+        unlimited = torque_mode_torque(m, target, h)
         free = m.torque_demand
     else:
         if kind == VELOCITY:
@@ -160,15 +160,15 @@ def control(m: Any, kind: int, target: float, h: float) -> int:
             profile_position(m, target, h)
         else:
             follow_position(m, target, h)
-        wanted = motion_torque(m, kind, h)
-        free = wanted
-    demand = max(-m.limit_negative, min(m.limit_positive, wanted))
+        unlimited = motion_torque(m, kind, h)
+        free = unlimited
+    demand = max(-m.limit_negative, min(m.limit_positive, unlimited))
     m.torque_demand = demand
     if demand == free:
         return 0
     if kind != TORQUE:
         # Anti-windup: take back what the integrator added beyond the limit.
-        m.integral += (demand - wanted) / m.velocity_gain * min(1.0, h * m.integral_rate * 4.0)
+        m.integral += (demand - unlimited) / m.velocity_gain * min(1.0, h * m.integral_rate * 4.0)
     return LIMITED
 
 

@@ -70,14 +70,14 @@ def report(figures: dict[str, Any]) -> list[str]:
         f"  SciPy takes {figures['ratio']:.0f} times as long; wanted at most "
         f"{figures['target_ms']:g} ms: {verdict(figures['reached'])}",
     ]
-    if told := figures.get("joint"):
+    if joint := figures.get("joint"):
         lines += [
-            f"{told['images']} images of {told['markers']} markers, {told['corners']} corners, "
+            f"{joint['images']} images of {joint['markers']} markers, {joint['corners']} corners, "
             "processor time:",
-            f"  {'detection':34}{told['detection_s']:10.2f} s",
-            f"  {'map, joint fit, faults, verdict':34}{told['fit_s']:10.2f} s, poses by lengths "
-            f"{told['position_mm']:.2f} mm and {told['turn_deg']:.3f} deg off",
-            f"  wanted at most {told['target_s']:g} s: {verdict(told['reached'])}",
+            f"  {'detection':34}{joint['detection_s']:10.2f} s",
+            f"  {'map, joint fit, faults, verdict':34}{joint['fit_s']:10.2f} s, poses by lengths "
+            f"{joint['position_mm']:.2f} mm and {joint['turn_deg']:.3f} deg off",
+            f"  wanted at most {joint['target_s']:g} s: {verdict(joint['reached'])}",
         ]
     return lines
 

@@ -49,12 +49,12 @@ def measure(count: int, seed: int, out: Output) -> dict[str, Any]:
         fit = fit_map(sightings, intrinsics, sheets, reference)
         done = time.process_time()
         reference = fit.map.reference
-        told_m = fit.bundle.shape_sigma_m
+        sigma_m = fit.bundle.shape_sigma_m
         results[name] = {
             "detection_s": round(seen - start, 2),
             "fit_s": round(done - seen, 2),
             "corner_sigma_px": round(fit.bundle.sigma_px, 4),
-            "told_mm": round(1e3 * rms(told_m[np.isfinite(told_m).all(axis=1)]), 3),
+            "told_mm": round(1e3 * rms(sigma_m[np.isfinite(sigma_m).all(axis=1)]), 3),
             **_errors(fit, camera),
         }
     ours = results["ours"]
@@ -78,8 +78,8 @@ def report(figures: dict[str, Any]) -> list[str]:
         a, b = ours[key], theirs[key]
         ratio = f"{b / a:9.1f}" if a else ""
         lines.append(f"{text:32}{a:8.{digits}f} {unit:3}{b:13.{digits}f} {unit:3}{ratio}")
-    told = verdict(figures["reached"]["time"])
-    return [*lines, f"detection and map wanted within {TARGET_S:g} s: {told}"]
+    time_verdict = verdict(figures["reached"]["time"])
+    return [*lines, f"detection and map wanted within {TARGET_S:g} s: {time_verdict}"]
 
 
 def _ours(images: _Images) -> list[Sighting]:

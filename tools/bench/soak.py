@@ -103,12 +103,12 @@ class BusVerdict:
 def compare(name: str, session: Session, before: Counts, after: Counts) -> BusVerdict:
     """Hold what the master has done on a bus against what the bus has counted."""
     device = session.device
-    here = next(bus for bus in device.buses if bus.name == name)
+    bus = next(bus for bus in device.buses if bus.name == name)
     cycles, transmits = after.cycles - before.cycles, after.transmits - before.transmits
     missed = after.missed - before.missed
     elapsed_s = after.bus_time_s - before.bus_time_s
-    frames = cycles - missed + cycles / max(1, round(here.network.heartbeat_s / device.period_s))
-    for drive in (axis.drive for axis in here.axes):
+    frames = cycles - missed + cycles / max(1, round(bus.network.heartbeat_s / device.period_s))
+    for drive in (axis.drive for axis in bus.axes):
         frames += transmits * len(command_pdos(drive))
         frames += sum(cycles / pdo.transmission_type for pdo in answer_pdos(drive))
         frames += elapsed_s / drive.heartbeat_producer_s
@@ -121,7 +121,7 @@ def compare(name: str, session: Session, before: Counts, after: Counts) -> BusVe
         frames_expected=round(frames),
         frames_counted=after.bus["frames"] - before.bus["frames"],
         overruns=after.bus["overruns"] - before.bus["overruns"],
-        tolerance=2 * (len(here.axes) + 1),
+        tolerance=2 * (len(bus.axes) + 1),
     )
 
 

@@ -83,9 +83,9 @@ def report(figures: dict[str, Any]) -> list[str]:
         "",
         f"{figures['compared']:<46d}{'us a pose':>12}{'times ours':>12}{'otherwise':>11}",
     ]
-    for name, told in figures["others"].items():
+    for name, other in figures["others"].items():
         lines.append(
-            f"{_METHODS[name]:46}{told['us']:12.1f}{told['times']:12.1f}{told['otherwise']:11d}"
+            f"{_METHODS[name]:46}{other['us']:12.1f}{other['times']:12.1f}{other['otherwise']:11d}"
         )
     lines += [f"{_METHODS[name]}: not installed" for name in figures["not_installed"]]
     return [

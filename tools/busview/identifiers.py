@@ -44,11 +44,11 @@ def filters(identifiers: frozenset[int]) -> list[tuple[int, int]]:
     return list(_blocks(identifiers, 0, _LAST + 1))
 
 
-def _blocks(wanted: frozenset[int], start: int, size: int) -> Iterator[tuple[int, int]]:
+def _blocks(identifiers: frozenset[int], start: int, size: int) -> Iterator[tuple[int, int]]:
     """Yield the aligned blocks of a power of two that lie wholly in `wanted`."""
-    inside = sum(1 for i in range(start, start + size) if i in wanted)
+    inside = sum(1 for i in range(start, start + size) if i in identifiers)
     if inside == size:
         yield start, (_LAST & ~(size - 1)) | EFF_FLAG
     elif inside:
-        yield from _blocks(wanted, start, size // 2)
-        yield from _blocks(wanted, start + size // 2, size // 2)
+        yield from _blocks(identifiers, start, size // 2)
+        yield from _blocks(identifiers, start + size // 2, size // 2)

@@ -246,7 +246,7 @@ def watch(
     viewer: Viewer,
     log: LogFile | None,
     seconds: float | None,
-    stop_wanted: Callable[[], bool],
+    stop_requested: Callable[[], bool],
 ) -> None:
     """Show what comes until the time is up, the user wants an end, or the bus is lost.
 
@@ -257,7 +257,7 @@ def watch(
     more = False
     while True:
         left_s = _WAIT_S if deadline is None else min(_WAIT_S, deadline - time.monotonic())
-        ended = left_s <= 0.0 or stop_wanted() or viewer.closed or source.lost is not None
+        ended = left_s <= 0.0 or stop_requested() or viewer.closed or source.lost is not None
         if not ended:
             source.receive(0.0 if more else left_s)
         frames = source.next_frames(_BATCH)

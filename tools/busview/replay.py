@@ -36,12 +36,12 @@ def read_frames(path: Path, channel: str | None) -> Iterator[LogEntry]:
     Files of candump are read by their own format, others (.asc, .blf, .trc, ...) by python-can.
     Raises BadInputError for a file that cannot be read or holds several buses, LogError.
     """
-    wanted = channel
+    read_channel = channel
     there: set[str] = set()
     for logged in _frames(path):
         there.add(logged.channel)
-        wanted = wanted or logged.channel
-        if logged.channel == wanted:
+        read_channel = read_channel or logged.channel
+        if logged.channel == read_channel:
             yield logged
         elif channel is None:
             names = ", ".join(sorted(there))
@@ -95,9 +95,9 @@ def _python_can_frames(path: Path) -> Iterator[LogEntry]:
 class Pacer:
     """Waits as long as passed between the frames when they were recorded."""
 
-    def __init__(self, speed: float | None, stop_wanted: Callable[[], bool]) -> None:
+    def __init__(self, speed: float | None, stop_requested: Callable[[], bool]) -> None:
         self._speed = speed
-        self._stop_wanted = stop_wanted
+        self._stop_requested = stop_requested
         self._first: tuple[float, float] | None = None
 
     def wait_for(self, frame: Frame) -> None:
@@ -108,7 +108,7 @@ class Pacer:
             self._first = frame.time_s, time.monotonic()
         recorded_s, begun_s = self._first
         due_s = begun_s + (frame.time_s - recorded_s) / self._speed
-        while (left_s := due_s - time.monotonic()) > 0.0 and not self._stop_wanted():
+        while (left_s := due_s - time.monotonic()) > 0.0 and not self._stop_requested():
             time.sleep(min(left_s, _LOOK_S))
 
 
@@ -177,7 +177,7 @@ def play(
     log: Iterable[LogEntry],
     viewer: Viewer,
     pacer: Pacer,
-    stop_wanted: Callable[[], bool],
+    stop_requested: Callable[[], bool],
     sender: Sender | None = None,
     block: int = 1,
 ) -> None:
@@ -189,7 +189,7 @@ def play(
     try:
         for logged in log:
             pacer.wait_for(logged.frame)
-            if stop_wanted() or viewer.closed:
+            if stop_requested() or viewer.closed:
                 if sender is not None:
                     raise WorkFailedError("stopped on request, not all was sent")
                 return

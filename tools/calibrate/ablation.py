@@ -320,20 +320,20 @@ def lines(tables: dict[str, list[dict[str, Any]]]) -> list[str]:
         "; it measured 26 to 31 mm, 1.3 to 1.6 deg (to a marker 60 to 65 mm, 2.1 to 2.9 deg):",
         "steps": "step by step to the joint fit, each with all that stands above it:",
     }
-    told = []
+    lines = []
     for key, title in titles.items():
-        told += [
+        lines += [
             title,
             f"{'':36}{'poses':>6}{'to the first pose':>22}{'to the markers':>22}"
             f"{'errors/predicted':>20}",
         ]
-        told += [
+        lines += [
             f"{row['name']:36}{row['poses']:6d}{row['position_mm']:11.2f} mm{row['turn_deg']:6.2f} "
             f"°{row['marker_mm']:12.2f} mm{row['marker_deg']:6.2f} °{_ratio(row):>18}"
             for row in tables[key]
         ]
-        told.append("")
-    return told[:-1]
+        lines.append("")
+    return lines[:-1]
 
 
 def _ratio(row: dict[str, Any]) -> str:

@@ -206,18 +206,18 @@ def _kept(robot: Robot, measured: Measured, known: Before | None, folder: Path) 
 
 def lines(found: Check, robot: Robot) -> list[str]:
     """Return what the check says, and what to do."""
-    told = found.verdict()
+    verdict = found.verdict()
     known = calibrated(robot).calibration
     against = (
         "its file" if known is None else f"calibration {known.version} of {known.date:%Y-%m-%d}"
     )
-    told[0] = f"{robot.profile} against {against}: {told[0]}"
+    verdict[0] = f"{robot.profile} against {against}: {verdict[0]}"
     if found.moved:
-        told.append(
+        verdict.append(
             f"mend what moved, or calibrate anew: cdpr calibrate run {robot.reference}; until then "
             "positions are off by what is said above"
         )
-    return told
+    return verdict
 
 
 def as_json(found: Check) -> dict[str, object]:

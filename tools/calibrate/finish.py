@@ -84,9 +84,9 @@ def enough(
     out: Output, robot: Robot, points: Path | None, geometry: CableGeometry
 ) -> Callable[[CalibrationData], str | None]:
     """Return what a run asks after each batch of poses: what is wrong, and whether it is enough."""
-    told: set[str] = set()
+    named: set[str] = set()
 
-    def asked(data: CalibrationData) -> str | None:
+    def check(data: CalibrationData) -> str | None:
         if len(data.poses) < _LEAST_JUDGED:
             return None
         try:
@@ -95,14 +95,14 @@ def enough(
             return None
         for fault in outcome.faults:
             who = " ".join([fault.kind, *fault.text.split()[:2]])  # sizes change with each fit
-            if who not in told:
-                told.add(who)
+            if who not in named:
+                named.add(who)
                 out.note(f"after {len(data.poses)} poses: {fault.text}")
         if outcome.good and outcome.gain_of_more < _LITTLE:
             return f"{len(data.poses)} poses are enough: {outcome.advice()}"
         return None
 
-    return asked
+    return check
 
 
 def finish(
@@ -127,11 +127,11 @@ def finish(
     with out.stage(f"fitting {len(data.poses)} poses"):
         outcome = replace(identified(robot, data, points, geometry), adopt=adopt)
         known = None if judge is None else judge(outcome)
-    told: dict[str, Any] = {**outcome.as_json(), "data": str(source)}
+    result: dict[str, Any] = {**outcome.as_json(), "data": str(source)}
     out.say(*_lines(outcome, data))
     if known is not None:
-        told["verification"] = {**told["verification"], **known.verification()}
-        told["truth"] = known.true_errors()
+        result["verification"] = {**result["verification"], **known.verification()}
+        result["truth"] = known.true_errors()
         out.say(*known.lines())
     why_not = _why_not(outcome, dry_run)
     taken: dict[str, Any] | None = None
@@ -143,9 +143,9 @@ def finish(
         f"fit it again: cdpr calibrate fit {robot.reference} --data {source.parent}{measured}"
     )
     with out.stage("drawing the report"):
-        told |= _reported(outcome, data, known, more, folder, source.parent / _IMAGES)
-    out.say(*more, f"report: {told['report']}")
-    out.result({"ok": outcome.good, **told, "in_force": taken, "not_taken_over": why_not})
+        result |= _reported(outcome, data, known, more, folder, source.parent / _IMAGES)
+    out.say(*more, f"report: {result['report']}")
+    out.result({"ok": outcome.good, **result, "in_force": taken, "not_taken_over": why_not})
     if not outcome.good:
         raise typer.Exit(WorkFailedError.exit_status)
 
@@ -239,13 +239,13 @@ def distrust_again(robot: Robot) -> None:
 
 def _lines(outcome: Outcome, data: CalibrationData) -> list[str]:
     """Return the outcome for people."""
-    told = outcome.as_json()
-    lines = [f"{outcome.robot.name}: {told['poses']} poses, in the frame of {told['frame']}"]
+    result = outcome.as_json()
+    lines = [f"{outcome.robot.name}: {result['poses']} poses, in the frame of {result['frame']}"]
     if data.left_out:
         lines.append(f"{len(data.left_out)} poses were refused, the last: {data.left_out[-1]}")
     lines.append("changes to the robot's file, ± 1 sigma (predicted):")
     lines += [
         f"  {row['name']:26}{row['change']:+9.2f} ± {row['std']:.2f} {row['unit']}"
-        for row in told["parameters"]
+        for row in result["parameters"]
     ]
     return lines + outcome.verdict()

@@ -118,7 +118,7 @@ class Made:
 def made_readings(
     robot: Robot,
     targets: FloatArray,
-    wanted: FloatArray,
+    nominal: FloatArray,
     errors: ErrorBudget,
     layout: SheetLayout,
     seed: int,
@@ -132,21 +132,21 @@ def made_readings(
     is wanted, since its geometry is off.
     """
     rng = np.random.default_rng(seed)
-    poses = _missed(wanted, errors, rng)
+    poses = _missed(nominal, errors, rng)
     platform = robot.platform
     assert platform is not None
     n = len(robot.axes)
     exits = np.array(platform.exit_points_m) + rng.normal(0.0, errors.exit_m, (n, 3))
     drums = rng.normal(0.0, errors.drum, n)
-    told, felt = _read_cables(robot, poses, wanted[0], exits, drums, errors, rng)
+    length, tension = _read_cables(robot, poses, nominal[0], exits, drums, errors, rng)
     position, rotation = _sheets(layout, rng)
     setup, place, turn = _setup(errors, layout, position, rotation, rng, hand_eye_known)
     images = _images(poses[:of_data], place, turn, position, rotation, layout, errors, rng)
     readings = tuple(
         PoseReading(
             target=tuple(targets[j].tolist()),
-            length_m=tuple(told[j].tolist()),
-            tension_N=tuple(felt[j].tolist()),
+            length_m=tuple(length[j].tolist()),
+            tension_N=tuple(tension[j].tolist()),
             image=ImageReading.of(images[j]),
         )
         for j in range(of_data)
@@ -159,7 +159,7 @@ def made_readings(
         camera=setup,
         poses=readings,
     )
-    return Made(targets, poses, exits, drums, position, rotation, data, told, felt)
+    return Made(targets, poses, exits, drums, position, rotation, data, length, tension)
 
 
 def _read_cables(
@@ -190,21 +190,25 @@ def _read_cables(
     corners = home[0] + anchors @ home[1:].T
     start = np.linalg.norm(np.array(platform.exit_points_m) - corners, axis=1)
     start = start / (1.0 + soft * tension[0])
-    told = start + (free - free[0]) / (1.0 + drums)
-    told += rng.normal(0.0, 1.0, told.shape) * errors.encoder_m
-    felt = np.maximum(tension + rng.normal(0.0, errors.tension_N, tension.shape), _SLACK_N / 5.0)
-    return told, felt
+    length = start + (free - free[0]) / (1.0 + drums)
+    length += rng.normal(0.0, 1.0, length.shape) * errors.encoder_m
+    measured_N = np.maximum(
+        tension + rng.normal(0.0, errors.tension_N, tension.shape), _SLACK_N / 5.0
+    )
+    return length, measured_N
 
 
-def _missed(wanted: FloatArray, errors: ErrorBudget, rng: np.random.Generator) -> FloatArray:
-    poses = wanted.copy()
+def _missed(nominal: FloatArray, errors: ErrorBudget, rng: np.random.Generator) -> FloatArray:
+    poses = nominal.copy()
     poses[:, 0] += rng.normal(0.0, errors.home_m, (len(poses), 3))
     turns = np.radians(rng.normal(0.0, errors.home_deg, (len(poses), 3)))
     poses[:, 1:] = Rotation.from_rotvec(turns).as_matrix() @ poses[:, 1:]
     return poses
 
 
-def _tensions(u: FloatArray, arm: FloatArray, mass_kg: float, wanted_N: FloatArray) -> FloatArray:
+def _tensions(
+    u: FloatArray, arm: FloatArray, mass_kg: float, preferred_N: FloatArray
+) -> FloatArray:
     """Return tensions (N, n) that hold the platform, nearest to those wanted; thesis (3.80)."""
     W = np.concatenate([u, np.cross(arm, u)], axis=2).transpose(0, 2, 1)
     load = np.array([0.0, 0.0, -mass_kg * G_m_s2, 0.0, 0.0, 0.0])
@@ -212,10 +216,10 @@ def _tensions(u: FloatArray, arm: FloatArray, mass_kg: float, wanted_N: FloatArr
     found = [
         lsq_linear(
             np.vstack([held * one, np.eye(n)]),
-            np.concatenate([-held * load, wanted]),
+            np.concatenate([-held * load, preferred]),
             (_SLACK_N, _MOST_N),
         ).x
-        for one, wanted in zip(W, wanted_N, strict=True)
+        for one, preferred in zip(W, preferred_N, strict=True)
     ]
     return np.array(found)
 

@@ -87,8 +87,10 @@ class Trials:
             chosen = self.poses[rng.choice(len(self.poses), count, replace=False)]
             known = self.exits_m, self.anchors_m, chosen, self.case.noise
             unit = same if self.case.bias else rng.normal(size=(count, cables + 6))
-            told = predicted_errors(*known, unit) if self.case.bias else predicted_spread(*known)
-            model.append(told)
+            predicted = (
+                predicted_errors(*known, unit) if self.case.bias else predicted_spread(*known)
+            )
+            model.append(predicted)
             trial.append(simulated_errors(*known, unit))
         return RmsErrors.of(np.array(model)), RmsErrors.of(np.array(trial))
 
@@ -198,36 +200,38 @@ def plateaus(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
     """
     found = []
     for name in FIGURES:
-        own = [row for row in rows if row["name"] == name]
-        told: dict[str, Any] = {"figure": name}
+        points = [row for row in rows if row["name"] == name]
+        plateau: dict[str, Any] = {"figure": name}
         for key in ("exit", "offset"):
-            model = np.array([row[f"predicted_{key}_mm"] for row in own]) ** 2
-            trial = np.array([row[f"{key}_mm"] for row in own]) ** 2
+            model = np.array([row[f"predicted_{key}_mm"] for row in points]) ** 2
+            trial = np.array([row[f"{key}_mm"] for row in points]) ** 2
             floor = max(float(np.average(trial - model, weights=model**-2)), 0.0)
-            told[f"floor_{key}_mm"] = math.sqrt(floor)
-            told[f"{key}_poses"] = own[-1]["poses"] * float(model[-1]) / floor if floor else None
-        found.append(told)
+            plateau[f"floor_{key}_mm"] = math.sqrt(floor)
+            plateau[f"{key}_poses"] = (
+                points[-1]["poses"] * float(model[-1]) / floor if floor else None
+            )
+        found.append(plateau)
     return found
 
 
 def lines(rows: list[dict[str, Any]]) -> list[str]:
     """Return table 3.1 and the figures' content for people."""
-    told = []
+    shown = []
     for title, figures in (
         ("noise at 100 poses (sigma), beside the thesis' table 3.1:", ("B.4", "B.5", "B.6")),
         ("the same bias at all of 100 poses, figures B.1 to B.3:", ("B.1", "B.2", "B.3")),
         ("noise of two kinds at 100 poses, figures C.1 to C.6:", tuple(PAIRS)),
         *((f"errors by the number of poses, figure {name}:", (name,)) for name in FIGURES),
     ):
-        told.append(f"{title:64}{'e(a) mm':>14}{'e(rho_0) mm':>14}{'ratio':>7}{'model':>9}")
-        told += [*(_line(row) for row in rows if row["figure"] in figures), ""]
+        shown.append(f"{title:64}{'e(a) mm':>14}{'e(rho_0) mm':>14}{'ratio':>7}{'model':>9}")
+        shown += [*(_line(row) for row in rows if row["figure"] in figures), ""]
     for one in plateaus(rows):
-        told.append(
+        shown.append(
             f"figure {one['figure']}: of e(a) {one['floor_exit_mm']:.2f} mm, of e(rho_0) "
             f"{one['floor_offset_mm']:.2f} mm stay at any number of poses; noise makes as much at "
             f"{_count(one['exit_poses'])} and {_count(one['offset_poses'])} poses"
         )
-    return told
+    return shown
 
 
 def _line(row: dict[str, Any]) -> str:

@@ -34,8 +34,8 @@ def _counted(rows: _Rows) -> Figure:
     """Draw figures 3.7 and 3.8: errors by the number of poses, and the floor they come down to."""
     figure, axes = canvas(1, 2, height=3.4)
     for ax, name, plateau in zip(axes, FIGURES, plateaus(rows), strict=True):
-        own = [row for row in rows if row["figure"] == name]
-        _errors(ax, own, "poses")
+        points = [row for row in rows if row["figure"] == name]
+        _errors(ax, points, "poses")
         for key, colour, label in _ENDS:
             ax.axhline(plateau[f"floor_{key}_mm"], color=colour, ls=":",
                        label=f"{label}, floor")  # fmt: skip
@@ -49,11 +49,11 @@ def _compared(rows: _Rows) -> Figure:
     figure, axes = canvas(4, 3, height=2.3)
     for k in range(6):
         name, what = list(_UNITS.values())[k % 3]
-        own = [row for row in rows if row["figure"] == f"B.{k + 1}"]
+        points = [row for row in rows if row["figure"] == f"B.{k + 1}"]
         top, bottom = axes[k % 3 + 6 * (k // 3)], axes[k % 3 + 6 * (k // 3) + 3]
-        _errors(top, own, name)
+        _errors(top, points, name)
         for key, colour, _ in _ENDS:
-            there = [row for row in own if row[f"off_{key}"] is not None]
+            there = [row for row in points if row[f"off_{key}"] is not None]
             off = [100 * row[f"off_{key}"] for row in there]
             bottom.plot([row[name] for row in there], off, "o-", ms=3, color=colour)
         bottom.axhspan(-20, 20, color="#888888", alpha=0.12)
@@ -70,12 +70,12 @@ def _compared(rows: _Rows) -> Figure:
 def _errors(ax: Axes, rows: _Rows, by: str) -> None:
     """Draw errors of trials and by the model, those that there are, on logarithmic axes."""
     for key, colour, label in _ENDS:
-        own = [row for row in rows if row[f"off_{key}"] is not None]
-        if own:
-            x = [row[by] for row in own]
-            ax.plot(x, [row[f"{key}_mm"] for row in own], "o", ms=4, color=colour,
+        points = [row for row in rows if row[f"off_{key}"] is not None]
+        if points:
+            x = [row[by] for row in points]
+            ax.plot(x, [row[f"{key}_mm"] for row in points], "o", ms=4, color=colour,
                     label=f"{label}, trial")  # fmt: skip
-            ax.plot(x, [row[f"predicted_{key}_mm"] for row in own], color=colour,
+            ax.plot(x, [row[f"predicted_{key}_mm"] for row in points], color=colour,
                     label=f"{label}, model")  # fmt: skip
     ax.set(xscale="log", yscale="log")
 
@@ -87,7 +87,7 @@ def _paired(rows: _Rows) -> Figure:
     """
     figure, axes = canvas(3, 2, height=2.7)
     for k, (title, pair) in enumerate(PAIRS.items()):
-        own = [row for row in rows if row["figure"] == title]
+        points = [row for row in rows if row["figure"] == title]
         (x, x_label), (y, y_label) = (_UNITS[one] for one in pair)
         for ax, (key, _, label), name in zip(axes[2 * k :], _ENDS, title.split(", "), strict=False):
             units = [_at_bound(rows, one)[f"predicted_{key}_mm"] for one in pair]
@@ -96,7 +96,7 @@ def _paired(rows: _Rows) -> Figure:
             errors = np.hypot(units[0] * shares, units[1] * shares[:, None])
             drawn = ax.contourf(most[0] * shares, most[1] * shares, errors, 10, cmap="Blues")
             figure.colorbar(drawn, ax=ax, label="RMS error (mm)")
-            for row in own:
+            for row in points:
                 ax.text(row[x], row[y], f"{100 * row[f'off_{key}']:+.0f} %", fontsize=7,
                         ha="center", va="center",
                         bbox={"boxstyle": "round", "fc": "white", "ec": "none"})  # fmt: skip

@@ -362,8 +362,10 @@ def _still(status: dict[str, Any], waited: bool) -> str:
     One that has been waited for goes on to check its bus; another may stay inactive.
     """
     if status.get("state") == "starting":
-        told = "; ".join(status.get("notices") or ())
-        return told or "its control loop is loaded, and compiled where this machine runs it first"
+        notices = "; ".join(status.get("notices") or ())
+        return (
+            notices or "its control loop is loaded, and compiled where this machine runs it first"
+        )
     booting = ("unconfigured", "inactive") if waited else ("unconfigured",)
     if status.get("state") in booting and not status.get("reason", "none yet"):
         return "its drives are booting"

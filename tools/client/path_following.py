@@ -144,7 +144,7 @@ class _Watch:
         self._control, self._out = control, out
         self.paused = ""
         """Where and by whom it was paused, empty until then."""
-        self._told_s, self._stage = time.monotonic(), ""
+        self._noted_s, self._stage = time.monotonic(), ""
 
     def look(self) -> dict[str, Any] | None:
         """Return the progress once nothing more comes by itself, else None.
@@ -176,12 +176,12 @@ class _Watch:
         stage, before, now_s = stage_text("path", path), self._stage, time.monotonic()
         if stage != before:
             self._out.note(f"{stage} ...")
-        elif now_s - self._told_s < TELL_S:
+        elif now_s - self._noted_s < TELL_S:
             return
         else:
             on_it = path["stage"] == "path"
             self._out.note(progress_text(path) if on_it else place_text(progress))
-        self._stage, self._told_s = stage, now_s
+        self._stage, self._noted_s = stage, now_s
 
 
 def progress_text(path: dict[str, Any]) -> str:

@@ -85,8 +85,8 @@ class PlatformMove:
         from scipy.spatial.transform import Rotation  # noqa: PLC0415  # slow to load
 
         progress = daemon.get("/status").get("program_progress") or {}
-        here = progress.get("target_m") or progress.get("position_m")
-        if not here:
+        start_m = progress.get("target_m") or progress.get("position_m")
+        if not start_m:
             raise BadInputError("--relative: it is not known where the platform is; tighten first")
         about = [_ANGLES[name] for name in turns]
         turned = progress.get("target_rotation_rad") or progress.get("rotation_rad") or []
@@ -99,7 +99,7 @@ class PlatformMove:
             axes = Rotation.identity()
         if to is not None:
             way = axes.apply([*to, 0.0][: len(_COORDINATES[3])])
-            to = [x + step for x, step in zip(here, way, strict=False)]
+            to = [x + step for x, step in zip(start_m, way, strict=False)]
         if rotate is not None:
             step = Rotation.from_rotvec(axes.apply(_in_space(rotate, about)))
             vector = (step * from_home).as_rotvec()

@@ -90,8 +90,8 @@ def monitor(
         source = open_source(url, _filters(ids))
         stack.callback(source.close)
         file = None if log is None else stack.enter_context(LogFile(log))
-        stop_wanted = stack.enter_context(stop_on_signals())
-        watch(source, viewer, file, seconds, stop_wanted)
+        stop_requested = stack.enter_context(stop_on_signals())
+        watch(source, viewer, file, seconds, stop_requested)
         if isinstance(source, SimbusSource):
             _ask_bus(source, summary)
     if source.lost is not None:
@@ -131,7 +131,7 @@ def replay(
     """Show a recorded session as the monitor does, or send it to a bus again."""
     out = Output(as_json)
     known = known_bus(None, profile, winch, robot)
-    wanted = None if ids is None else parse_identifiers(ids)
+    identifiers = None if ids is None else parse_identifiers(ids)
     url = None if to is None else running_bus(to)
     if url is not None:
         check(file, channel)
@@ -142,16 +142,16 @@ def replay(
         stack.callback(_show, out, summary)
         lines = stack.enter_context(LineWriter(sys.stderr if as_json else sys.stdout))
         viewer = Viewer(known.decoder(), summary, lines, raw=raw)
-        stop_wanted = stack.enter_context(stop_on_signals())
-        frames = filtered(read_frames(file, channel), wanted)
+        stop_requested = stack.enter_context(stop_on_signals())
+        frames = filtered(read_frames(file, channel), identifiers)
         if url is None:
             whole = speed is None and str(file) != "-"
-            pacer = Pacer(speed, stop_wanted)
-            play(frames, viewer, pacer, stop_wanted, block=BLOCK if whole else 1)
+            pacer = Pacer(speed, stop_requested)
+            play(frames, viewer, pacer, stop_requested, block=BLOCK if whole else 1)
             sent: dict[str, int] = {}
         else:
             sender = stack.enter_context(Sender(url, out.note))
-            play(frames, viewer, Pacer(speed or 1.0, stop_wanted), stop_wanted, sender)
+            play(frames, viewer, Pacer(speed or 1.0, stop_requested), stop_requested, sender)
             sent = {"sent": sender.sent, "not_sent": sender.not_sent}
     out.result({"ok": True, "file": file, **sent, **summary.table()})
 

@@ -37,9 +37,9 @@ def shares(
             with options(**{one.name: given.pop(one.name) for one in shared}) as first:
                 command(*first, **given)
 
-        own = parameters(command)[2:]
+        added = parameters(command)[2:]
         needed = [one for one in shared if one.default is Parameter.empty]
-        signed = [*needed, *own, *(one for one in shared if one not in needed)]
+        signed = [*needed, *added, *(one for one in shared if one not in needed)]
         run.__signature__ = Signature(signed)  # type: ignore[attr-defined]
         run.__annotations__ = {one.name: one.annotation for one in signed}
         return run

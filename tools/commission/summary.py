@@ -81,11 +81,11 @@ def _show_loop(out: Output, design: dict[str, Any]) -> None:
 
 def _show_shortfall(out: Output, validation: dict[str, Any]) -> None:
     for method in ("thesis", "better"):
-        ratios, wanted = validation[method]["ratios"], validation["targets"][method]
+        ratios, targets = validation[method]["ratios"], validation["targets"][method]
         missed = [
-            f"{key.replace('_', ' ')} {ratios[key]:.1f} of {wanted[key]:g}"
-            for key in wanted
-            if ratios[key] < wanted[key]
+            f"{key.replace('_', ' ')} {ratios[key]:.1f} of {targets[key]:g}"
+            for key in targets
+            if ratios[key] < targets[key]
         ]
         if missed:
             out.say(

@@ -105,14 +105,14 @@ def description(robot: Robot, limits: Limits, parts: LoopParts) -> dict[str, Any
         "limits": described(limits, len(robot.axes)),
         "programs": list(parts.programs),
         "lowering_s": 0.0 if parts.lowering is None else parts.lowering.longest_s,
-        "platform": None if robot.platform is None else _told(robot.platform),
+        "platform": None if robot.platform is None else _platform_description(robot.platform),
         "geometry_sha256": geometry_sha256(robot),
         "calibration": None if robot.calibration is None else robot.calibration.summary(),
         "notes": list(robot.notes),
     }
 
 
-def _told(platform: Platform) -> dict[str, Any]:
+def _platform_description(platform: Platform) -> dict[str, Any]:
     body = None if platform.body is None else platform.body.model_dump()
     obstacles = [box.model_dump() for box in platform.obstacles]
     return {**asdict(platform), "body": body, "obstacles": obstacles}

@@ -60,8 +60,8 @@ def true_geometry(robot: Robot, plant: Path | None) -> TrueGeometry:
     body, plants = physics_of(robot, plant, detached=False)
     assert body is not None  # a platform is on the cables
     drives = [
-        SimDrive.for_winch(axis.winch, own, robot=member)
-        for axis, own, member in zip(robot.axes, plants, body.members(), strict=True)
+        SimDrive.for_winch(axis.winch, plant, robot=member)
+        for axis, plant, member in zip(robot.axes, plants, body.members(), strict=True)
     ]
     for drive in drives:
         drive.close()

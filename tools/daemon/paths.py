@@ -53,9 +53,9 @@ def find_launcher_files(robot: str | None = None) -> list[Path]:
 
 def unsearched_folders() -> str:
     """Return in words where daemons were not looked for though some may be there."""
-    own, reasons = _runtime_folder(), []
-    if os.path.lexists(own) and not _is_owned_by(own, os.geteuid()):
-        reasons.append(f"{own} is open to others or not this user's, and was not looked into")
+    folder, reasons = _runtime_folder(), []
+    if os.path.lexists(folder) and not _is_owned_by(folder, os.geteuid()):
+        reasons.append(f"{folder} is open to others or not this user's, and was not looked into")
     if _SYSTEM.is_dir() and not os.access(_SYSTEM, os.R_OK | os.X_OK):
         reasons.append(f"{_SYSTEM} is closed to this user, try it with `sudo`")
     return "; ".join(reasons)
@@ -106,5 +106,5 @@ def _runtime_folder() -> Path:
     base = os.environ.get("XDG_RUNTIME_DIR", "")
     if base.startswith("/"):
         return Path(base) / _FOLDER
-    own = Path(f"/run/user/{os.geteuid()}")
-    return own / _FOLDER if own.is_dir() else Path(f"/tmp/{_FOLDER}-{os.geteuid()}")
+    folder = Path(f"/run/user/{os.geteuid()}")
+    return folder / _FOLDER if folder.is_dir() else Path(f"/tmp/{_FOLDER}-{os.geteuid()}")

@@ -95,16 +95,18 @@ def choose_tpdos(eds: EdsFile) -> Choice:
     offers = _offers(eds, 0x1800, 0x180)
     choice = _choose(eds, offers, offers, FEEDBACK, "TPDO")
     taken = {pdo["number"] for pdo in choice.pdos}
-    wanted = [index for index in EXTRA if index not in choice.indexes and _mappable(eds, index)]
-    if not set(wanted) & {_PROBE_STATUS} or not set(wanted) & {_PROBE_POSITION}:
-        wanted = [index for index in wanted if index == _MODE_SHOWN]
+    extra_objects = [
+        index for index in EXTRA if index not in choice.indexes and _mappable(eds, index)
+    ]
+    if not set(extra_objects) & {_PROBE_STATUS} or not set(extra_objects) & {_PROBE_POSITION}:
+        extra_objects = [index for index in extra_objects if index == _MODE_SHOWN]
     for offer in offers:
-        if not wanted or offer.number in taken or not offer.serves(_SYNC_WHEN_CHANGED):
+        if not extra_objects or offer.number in taken or not offer.serves(_SYNC_WHEN_CHANGED):
             continue
-        if set(wanted) <= set(offer.indexes):
+        if set(extra_objects) <= set(offer.indexes):
             entries = list(offer.entries)
         elif offer.room:
-            entries = [_whole(index) for index in wanted[: offer.room]]
+            entries = [_whole(index) for index in extra_objects[: offer.room]]
         else:
             continue
         extra = offer.table(entries, _SYNC_WHEN_CHANGED)
@@ -116,35 +118,35 @@ def _choose(
     eds: EdsFile,
     offers: list[PdoOffer],
     as_they_are: list[PdoOffer],
-    wanted: tuple[int, ...],
+    objects: tuple[int, ...],
     kind: str,
 ) -> Choice:
     """Take one PDO as it is, else map one anew, else spread the objects over several."""
     usable = [offer for offer in offers if offer.serves(_EVERY_SYNC)]
     for offer in as_they_are:
-        if offer in usable and set(wanted) <= set(offer.indexes):
+        if offer in usable and set(objects) <= set(offer.indexes):
             return Choice([offer.table(offer.entries, _EVERY_SYNC)], "map by default in the EDS")
-    blocked = [index for index in wanted if not _mappable(eds, index)]
-    entries = [_whole(index) for index in wanted]
+    blocked = [index for index in objects if not _mappable(eds, index)]
+    entries = [_whole(index) for index in objects]
     for offer in usable:
-        if not blocked and offer.room >= len(wanted):
+        if not blocked and offer.room >= len(objects):
             return Choice(
                 [offer.table(entries, _EVERY_SYNC)],
                 "a map of our own, which by the EDS the drive lets be written",
             )
-    spread = _over_several_pdos(usable, as_they_are, wanted, lambda index: _mappable(eds, index))
+    spread = _over_several_pdos(usable, as_they_are, objects, lambda index: _mappable(eds, index))
     if spread is not None:
         return Choice(spread, "spread over several PDOs, since none has room for all")
-    raise ProfileError(eds.path, kind, _reason(offers, usable, blocked, wanted, kind))
+    raise ProfileError(eds.path, kind, _reason(offers, usable, blocked, objects, kind))
 
 
 def _over_several_pdos(
     usable: Iterable[PdoOffer],
     as_they_are: Iterable[PdoOffer],
-    wanted: tuple[int, ...],
+    objects: tuple[int, ...],
     mappable: Callable[[int], bool],
 ) -> list[dict[str, Any]] | None:
-    missing = list(wanted)
+    missing = list(objects)
     chosen = []
     for offer in usable:
         if set(missing) & set(offer.indexes) and (offer in as_they_are):
@@ -165,18 +167,18 @@ def _reason(
     offers: list[PdoOffer],
     usable: list[PdoOffer],
     blocked: list[int],
-    wanted: tuple[int, ...],
+    objects: tuple[int, ...],
     kind: str,
 ) -> str:
-    objects = ", ".join(f"{index:04X}h" for index in wanted)
-    problem = f"no {kind} can carry {objects}, which torque control needs: "
+    names = ", ".join(f"{index:04X}h" for index in objects)
+    problem = f"no {kind} can carry {names}, which torque control needs: "
     if not offers:
         return problem + f"the file describes no {kind}"
     if not usable:
         return problem + "none can answer every SYNC (transmission type 1 cannot be written)"
     if blocked:
-        objects = ", ".join(f"[{index:04X}] PDOMapping" for index in blocked)
-        return problem + f"{objects} is not 1, and no map by default has it"
+        names = ", ".join(f"[{index:04X}] PDOMapping" for index in blocked)
+        return problem + f"{names} is not 1, and no map by default has it"
     return problem + "the maps are fixed, or have too few entries that can be written"
 
 

@@ -88,16 +88,16 @@ def _identity(made: Proposal, eds: EdsFile) -> None:
         (2, "product_code", "ProductNumber"),
         (3, "revision", "RevisionNumber"),
     ):
-        own, declared = eds.number(0x1018, sub), eds.info_number(info)
-        if own and declared and own != declared:
+        in_identity, declared = eds.number(0x1018, sub), eds.info_number(info)
+        if in_identity and declared and in_identity != declared:
             eds.remarks.add(
                 f"[DeviceInfo] {info}",
-                f"value {declared:#x}, but 1018h:{sub} is {own:#x}, which counts",
+                f"value {declared:#x}, but 1018h:{sub} is {in_identity:#x}, which counts",
             )
-        value = own or declared or 0
+        value = in_identity or declared or 0
         if not 0 <= value <= 0xFFFFFFFF:
             value = 0
-        source = f"1018h:{sub} in the EDS" if own else f"[DeviceInfo] {info} in the EDS"
+        source = f"1018h:{sub} in the EDS" if in_identity else f"[DeviceInfo] {info} in the EDS"
         made.set(
             key, value, *((_MANUAL, source) if value else (_ASSUMED, "the EDS does not give it"))
         )

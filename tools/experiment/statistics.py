@@ -93,11 +93,11 @@ def _row(variable: str, name: str, value: Any, points: Points) -> dict[str, Any]
         "following_three_sigma_mm": spread_mm(points["following_m"]).tolist(),
     }
     if beside is not None:
-        told = asdict(beside)
-        row["thesis"] = {key: told[key] for key in told if key != "variable"}
-        wanted = GOAL_SHARE * np.array(beside.three_sigma_mm)
+        thesis = asdict(beside)
+        row["thesis"] = {key: thesis[key] for key in thesis if key != "variable"}
+        goal = GOAL_SHARE * np.array(beside.three_sigma_mm)
         row["share_of_thesis"] = (spread / beside.three_sigma_mm).tolist()
-        row["reached"] = bool(np.all(spread <= wanted))
+        row["reached"] = bool(np.all(spread <= goal))
     return row
 
 

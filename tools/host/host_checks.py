@@ -318,18 +318,18 @@ def parse_link(data: bytes) -> CanInterface | None:
         return None
     found = _attributes(data[_LINK.size :])
     info = _attributes(found.get(_LINKINFO, b""))
-    own = _attributes(info.get(_INFO_DATA, b""))
+    can_data = _attributes(info.get(_INFO_DATA, b""))
     is_up = bool(flags & _IFF_UP)
     state = "up" if is_up else "down"
-    if is_up and _STATE in own:
-        state = _STATES[min(_number(own[_STATE]), len(_STATES) - 1)]
+    if is_up and _STATE in can_data:
+        state = _STATES[min(_number(can_data[_STATE]), len(_STATES) - 1)]
     return CanInterface(
         name=found.get(_IFNAME, b"").rstrip(b"\0").decode(errors="replace"),
         is_up=is_up,
         is_virtual=info.get(_INFO_KIND, b"").rstrip(b"\0") != b"can",
         queue_frames=_number(found.get(_TXQLEN, b"")),
         state=state,
-        bitrate_bit_s=_number(own.get(_BITTIMING, b"")),
+        bitrate_bit_s=_number(can_data.get(_BITTIMING, b"")),
     )
 
 

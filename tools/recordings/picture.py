@@ -36,7 +36,7 @@ _STRIP_in, _PANEL_in, _NARROW_in, _WIDE_in = 0.25, 1.7, 7.4, 12.0
 _PATH_ROWS: Final = 2
 _LETTERS_PER_in: Final = 13
 """Of what is told below the picture, in a line."""
-_MOST_TOLD, _PATH_POINTS = 8, 3000
+_MOST_FAULTS, _PATH_POINTS = 8, 3000
 _LETTER = 0.015
 """Share of the picture's width that a letter takes."""
 _MOVED = 1e-6
@@ -52,12 +52,12 @@ _SHADES = {
 }
 
 
-def axes_of(names: Sequence[str], wanted: Sequence[str] | None) -> list[int]:
+def axes_of(names: Sequence[str], asked: Sequence[str] | None) -> list[int]:
     """Return the numbers of the axes in `wanted`, all without. Raises BadInputError."""
-    for name in wanted or ():
+    for name in asked or ():
         if name not in names:
             raise BadInputError(f"--axis {name}: allowed: {', '.join(names)}")
-    return [names.index(name) for name in wanted or names]
+    return [names.index(name) for name in asked or names]
 
 
 def draw(selection: Selection, columns: Columns, axes: Sequence[str] | None, path: Path) -> int:
@@ -126,11 +126,11 @@ def _draw_what_happened(grid: _Grid, selection: Selection, columns: Columns) -> 
         grid.timed[-1].set_xlim(first_s, beyond_s)
         for ax in (*grid.strips, *grid.timed) if ended else ():
             ax.axvspan(last_s, beyond_s, fc="none", ec="#b3261e", hatch="////", lw=0, label=_ENDED)
-    shown = (*happened[:_MOST_TOLD], *ended)
-    told = [f"{after_s:.3f} s: {text}" for after_s, text in shown]
-    if told:
+    shown = (*happened[:_MOST_FAULTS], *ended)
+    faults = [f"{after_s:.3f} s: {text}" for after_s, text in shown]
+    if faults:
         letters = int(_LETTERS_PER_in * grid.figure.get_figwidth())
-        lines = [fill(text, letters, subsequent_indent="    ") for text in told]
+        lines = [fill(text, letters, subsequent_indent="    ") for text in faults]
         text = "\n".join(map(_as_it_is, lines))
         grid.figure.supxlabel(text, x=0.01, ha="left", fontsize="medium")
 
@@ -201,8 +201,8 @@ def faults_of(readers: Sequence[RecordingReader], columns: Columns) -> list[tupl
     found, reasons, last = [], Reasons(stamped), ""
     for at_ns, event in shown:
         later = [other_ns for other_ns in reactions if other_ns > at_ns]
-        told = reasons.after(at_ns, min(later, default=math.inf))
-        reason, last = "" if told == last else told, told or last
+        found_reason = reasons.after(at_ns, min(later, default=math.inf))
+        reason, last = "" if found_reason == last else found_reason, found_reason or last
         after_s = float(np.interp(at_ns, columns["stamp_ns"], columns[ELAPSED]))
         found.append((after_s, str(event["text"]) + (f": {reason}" if reason else "")))
     return found
@@ -229,10 +229,10 @@ def _draw_limits(ax: Axes, description: dict[str, Any], chosen: Sequence[int]) -
 
 def _draw_path(ax: Axes, columns: Columns) -> None:
     """Draw the platform's way seen from the front, its target dashed."""
-    pose, wanted = columns["pose"], columns["pose_setpoint"]
+    pose, setpoint = columns["pose"], columns["pose_setpoint"]
     upward = 1 if _flat(pose[:, 2]) else 2
     step = max(1, len(pose) // _PATH_POINTS)
-    for values, style, label in ((pose, "-", "platform"), (wanted, "--", "target")):
+    for values, style, label in ((pose, "-", "platform"), (setpoint, "--", "target")):
         known = 1e3 * values[::step]
         ax.plot(known[:, 0], known[:, upward], style, color=_COLOURS[style == "--"], label=label)
     ax.set_xlabel("x (mm)")
@@ -251,9 +251,9 @@ Curves = dict[str, tuple[FloatArray, FloatArray]]
 
 
 def _draw_pose(ax: Axes, elapsed: FloatArray, curves: Curves, dot: str | None) -> None:
-    for (name, (is_there, wanted)), colour in zip(curves.items(), _COLOURS, strict=False):
+    for (name, (is_there, setpoint)), colour in zip(curves.items(), _COLOURS, strict=False):
         ax.plot(*decimated(elapsed, is_there), color=colour, marker=dot, label=name)
-        ax.plot(*decimated(elapsed, wanted), color=colour, ls="--", lw=0.8)
+        ax.plot(*decimated(elapsed, setpoint), color=colour, ls="--", lw=0.8)
     legend_beside_title(ax, 3)
 
 
@@ -269,8 +269,8 @@ def pose_curves(columns: Columns) -> dict[str, Curves]:
     panels = {
         "platform (m)": _moved(position),
         "turned (deg)": {
-            name: (np.degrees(is_there), np.degrees(wanted))
-            for name, (is_there, wanted) in _moved(rotation).items()
+            name: (np.degrees(is_there), np.degrees(setpoint))
+            for name, (is_there, setpoint) in _moved(rotation).items()
         },
     }
     found = {label: curves for label, curves in panels.items() if curves}

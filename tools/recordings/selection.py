@@ -109,10 +109,10 @@ class Selection:
                 self.advance(done / _BYTES_PER_S)
                 elapsed = time(columns["time_s"], columns["stamp_ns"])
                 self.ends_s = float(elapsed[-1])
-                wanted = (elapsed >= self._from_s) & (elapsed <= self._until_s)
-                if wanted.any():
-                    chosen = {name: columns[name][wanted] for name in self._fields or columns}
-                    yield {ELAPSED: elapsed[wanted], **chosen}
+                in_range = (elapsed >= self._from_s) & (elapsed <= self._until_s)
+                if in_range.any():
+                    chosen = {name: columns[name][in_range] for name in self._fields or columns}
+                    yield {ELAPSED: elapsed[in_range], **chosen}
 
     def _check_robot(self, reader: RecordingReader) -> None:
         """Raise BadInputError where a file is not of the robot of those before it."""

@@ -35,7 +35,7 @@ class Reasons:
 
     def __init__(self, events: Iterable[tuple[int, dict[str, Any]]]) -> None:
         """Take events, each with its stamp."""
-        self._told = sorted(
+        self._stamped = sorted(
             (at_ns, str(event["text"])) for at_ns, event in events if is_reason(event)
         )
 
@@ -44,9 +44,9 @@ class Reasons:
 
         A state that follows on a reaction has that one's reason.
         """
-        k = bisect_left(self._told, (at_ns - _EARLY_ns, ""))
-        if k < len(self._told) and self._told[k][0] < next_ns - _EARLY_ns:
-            return self._told[k][1]
+        k = bisect_left(self._stamped, (at_ns - _EARLY_ns, ""))
+        if k < len(self._stamped) and self._stamped[k][0] < next_ns - _EARLY_ns:
+            return self._stamped[k][1]
         return ""
 
 
@@ -233,14 +233,14 @@ def _named_runs(runs: list[dict[str, Any]], reader: RecordingReader) -> list[dic
     for run in runs:
         number, cut_ns = run["program"], run.get("cut_ns")
         named = programs[number] if 0 <= number < len(programs) else str(number)
-        told = {**run, "program": named}
+        named_run = {**run, "program": named}
         if cut_ns is not None:
             later = [other for other in cuts if other > cut_ns]
             why = reasons.after(cut_ns, min(later, default=math.inf)) or "a fault"
             # where the power is taken at once the idle program has the last cycles
-            cut = found[-1] if found and named == "idle" else told
+            cut = found[-1] if found and named == "idle" else named_run
             cut.setdefault("cut_short_by", why)
-        found.append(told)
+        found.append(named_run)
     return [
         {key: value for key, value in one.items() if key != "cut_ns"}
         for run, one in zip(runs, found, strict=True)
@@ -250,13 +250,13 @@ def _named_runs(runs: list[dict[str, Any]], reader: RecordingReader) -> list[dic
 
 def _run_text(run: dict[str, Any], axes: Sequence[str]) -> str:
     """Return when a program ran, what cut it short, and where platform or axes were at its end."""
-    pose, wanted = np.array(run["pose"], float), np.array(run["pose_setpoint"], float)
+    pose, setpoint = np.array(run["pose"], float), np.array(run["pose_setpoint"], float)
     if np.isfinite(pose).all():
         size = 3 if pose[2] else 2  # in a plane its third coordinate is none
         at = ", ".join(f"{x:z.1f}" for x in 1e3 * pose[:size])
         where = f"platform at {at} mm"
-        if np.isfinite(wanted).all():
-            off_mm = 1e3 * float(np.linalg.norm(pose[:3] - wanted[:3]))
+        if np.isfinite(setpoint).all():
+            off_mm = 1e3 * float(np.linalg.norm(pose[:3] - setpoint[:3]))
             where += f", {off_mm:.1f} mm from its target"
     else:
         angles = np.degrees(np.array(run["position_rad"], float))

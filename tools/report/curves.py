@@ -46,14 +46,14 @@ def read_ramp(path: Path, truth: Truth | None) -> Ramp:
     sweep, judged = run.sweep, run.judged
     angle = sweep.angle_rad if truth is None else truth.angle_of(log, run)
     velocity = low_pass_velocity(angle, run.period_s)[judged]
-    wanted = sweep.setpoint_velocity_rad_s[judged]
+    setpoint = sweep.setpoint_velocity_rad_s[judged]
     effort = run.effort_Nm[judged]
     return Ramp(
         time_s=np.asarray(np.arange(effort.size) * run.period_s, float),
         position_error_deg=np.degrees((sweep.setpoint_rad - angle)[judged]),
         effort_Nm=effort - effort.mean(),
-        velocity_error_deg_s=np.degrees(velocity - wanted),
-        standing=float(np.mean(np.abs(velocity) < _STANDING * np.abs(wanted))),
+        velocity_error_deg_s=np.degrees(velocity - setpoint),
+        standing=float(np.mean(np.abs(velocity) < _STANDING * np.abs(setpoint))),
     )
 
 

@@ -125,8 +125,10 @@ def loops(
     `designs` belong to `bandwidths_Hz`, one by one.
     """
     margins = {
-        wanted: [number(one[k]) for k in ("phase_margin_deg", "gain_margin_dB", "sensitivity_peak")]
-        for wanted, one in zip(bandwidths_Hz, designs, strict=True)
+        bandwidth_Hz: [
+            number(one[k]) for k in ("phase_margin_deg", "gain_margin_dB", "sensitivity_peak")
+        ]
+        for bandwidth_Hz, one in zip(bandwidths_Hz, designs, strict=True)
     }
     rows = [
         [

@@ -110,7 +110,7 @@ class RobotKind:
 
     def scale(self, frame_m: tuple[float, ...]) -> float:
         """Return how much larger the frame is than the shipped robot's, by its least stretch."""
-        return min(wanted / usual for wanted, usual in zip(frame_m, self.frame_m, strict=True))
+        return min(size_m / usual_m for size_m, usual_m in zip(frame_m, self.frame_m, strict=True))
 
 
 def kind_of(name: str) -> RobotKind:

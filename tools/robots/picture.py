@@ -95,8 +95,8 @@ def _draw_workspace(
     points[..., view] = cells
     xs, ys = cells[0, :, 0], cells[:, 0, 1]
     still = np.nan_to_num(statics.margin_N(points), neginf=-1e3)
-    wanted, kept_N = platform.acceleration_m_s2, statics.model.reserve_N
-    moving = statics.margin_N(points, wanted, statics.orientations) - kept_N
+    acceleration, kept_N = platform.acceleration_m_s2, statics.model.reserve_N
+    moving = statics.margin_N(points, acceleration, statics.orientations) - kept_N
     moving = np.nan_to_num(moving, neginf=-1e3)
     if still.max() > 0.0:
         levels = MaxNLocator(9).tick_values(0.0, float(still.max()))

@@ -51,8 +51,8 @@ def _of_tensions(
     statics, limits = statics_of(robot), limits_of(robot)
     home, points, turns = np.array(platform.home_m), statics.points(), statics.orientations
     still = np.array([statics.margin_N(points, 0.0, turn) for turn in turns])
-    wanted = platform.acceleration_m_s2
-    moving = np.array([statics.margin_N(points, wanted, turn) for turn in turns])
+    acceleration = platform.acceleration_m_s2
+    moving = np.array([statics.margin_N(points, acceleration, turn) for turn in turns])
     lengths = np.array([statics.lengths(points, turn) for turn in turns])
     at_home_m, least_N = statics.lengths(home), statics.least_tensions_N(home)
     for figures, swings in zip(axes, corner_swings(robot), strict=True):

@@ -39,16 +39,16 @@ class View:
         self._platform = platform if len(platform.get("home_m", ())) == 2 else None
         self._axes = [str(axis.get("name")) for axis in description.get("axes", [])]
         self._reason = reason
-        self._told: tuple[float, dict[str, Any]] = -math.inf, {}
+        self._last_status: tuple[float, dict[str, Any]] = -math.inf, {}
 
     def tell(self, status: dict[str, Any]) -> None:
         """Have it show the daemon's status, until that is too old to be true."""
-        self._told = time.monotonic(), status
+        self._last_status = time.monotonic(), status
 
     @property
     def _status(self) -> dict[str, Any]:
-        told_s, status = self._told
-        return status if time.monotonic() - told_s < _STALE_S else {}
+        received_s, status = self._last_status
+        return status if time.monotonic() - received_s < _STALE_S else {}
 
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
         """Yield the picture, where the plane is known and there is room, and the figures."""

@@ -126,15 +126,15 @@ def judge(parts: dict[str, Recorded], speed_m_s: float) -> list[Figure]:
         key, less = ("_less_mean", ", less its mean") if less_mean else ("", "")
         rms = {part: rms_mm(recorded, less_mean) for part, recorded in parts.items()}
         for i, (what, text) in enumerate((("path", "line"), ("setpoint", "set-point"))):
-            wanted = what == "setpoint" and not less_mean
+            judged = what == "setpoint" and not less_mean
             for part, values in rms.items():
                 title = f"RMS distance from the {text}{less}, {NAMES[part]}"
-                limit = SETPOINT_mm if wanted and not slow and part == best(parts) else None
+                limit = SETPOINT_mm if judged and not slow and part == best(parts) else None
                 figures.append(Figure(f"{what}_{part}{key}_mm", title, values[i], "mm", limit))
             if len(rms) == len(NAMES):
                 ratio = rms[WITHOUT][i] / rms[WITH][i]
                 title = f"distance from the {text}{less}, without over with"
-                limit = RATIO if wanted and slow else None
+                limit = RATIO if judged and slow else None
                 ratios.append(Figure(f"{what}{key}_ratio", title, ratio, "", limit, True))
     return [*figures, *_orientation(parts), *ratios]
 

@@ -121,9 +121,9 @@ class TrialRun:
     def _time_s(self, place: FloatArray, speed_m_s: float | None) -> float:
         """Return how long the way to a place takes at least, by its slowest direction."""
         directions, truth = self.directions, self.rig.truth()
-        here = directions.places(truth["position_m"][None], truth["rotation"][None])[0]
+        place_now = directions.places(truth["position_m"][None], truth["rotation"][None])[0]
         share = 1.0 if speed_m_s is None else speed_m_s / directions.speed[0]
-        return float((np.abs(place - here) / (share * directions.speed)).max())
+        return float((np.abs(place - place_now) / (share * directions.speed)).max())
 
 
 @contextmanager

@@ -69,9 +69,9 @@ def judge(recorded: Recorded, robot: Robot) -> list[Figure]:
     """
     directions, marks = recorded.directions, recorded.marked("pose")
     rows = [recorded.row(mark["cycle"]) for mark in marks]
-    wanted = np.array([directions.place(mark, "target") for mark in marks])
-    wanted = wanted.reshape(-1, directions.d)
-    off = np.linalg.norm(recorded.true_m[rows] - wanted[:, : directions.k], axis=1)
+    targets = np.array([directions.place(mark, "target") for mark in marks])
+    targets = targets.reshape(-1, directions.d)
+    off = np.linalg.norm(recorded.true_m[rows] - targets[:, : directions.k], axis=1)
     cut_short = bool(recorded.marked(_TIME_OVER))
     text = f"poses, out and back{f', of {POSES}: its time was over' if cut_short else ''}"
     figures = [
@@ -83,7 +83,7 @@ def judge(recorded: Recorded, robot: Robot) -> list[Figure]:
     ]
     if directions.turns:
         true = recorded.truth["rotation"][rows]
-        turned = directions.turn_between(directions.rotations(wanted), true)
+        turned = directions.turn_between(directions.rotations(targets), true)
         angle = float(np.degrees(np.linalg.norm(turned, axis=1).max(initial=0.0)))
         figures.append(Figure("orientation_off_deg", "worst angle from a pose", angle, "deg"))
     return figures

@@ -48,10 +48,10 @@ def errors_deg(recorded: Recorded) -> FloatArray:
     directions = recorded.directions
     if not directions.turns:
         return np.zeros((0, 3))
-    wanted = directions.rotations(_targets(recorded))
+    rotations = directions.rotations(_targets(recorded))
     turned = [
         directions.turn_between(target, recorded.truth["rotation"][rows]).mean(axis=0)
-        for target, rows in zip(wanted, _looked(recorded), strict=True)
+        for target, rows in zip(rotations, _looked(recorded), strict=True)
     ]
     return np.degrees(turned).reshape(-1, 3)
 

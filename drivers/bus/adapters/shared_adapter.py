@@ -54,7 +54,7 @@ class _Subscriber:
     """One user of a shared adapter: the socket pair to it, and its filters."""
 
     def __init__(self, filters: Filters | None, health: BusHealth, *, receive_errors: bool) -> None:
-        self.sock, self.own_end = socket.socketpair(socket.AF_UNIX, socket.SOCK_STREAM)
+        self.sock, self.subscriber_end = socket.socketpair(socket.AF_UNIX, socket.SOCK_STREAM)
         self.sock.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, BUFFER_BYTES)
         self.sock.setblocking(False)
         self.filters = None if filters is None else list(filters)
@@ -232,11 +232,11 @@ class SharedAdapterPort(SocketPort):
         """Subscribe; raises BusError when the adapter cannot be opened."""
         health = health if health is not None else BusHealth()
         self._subscriber = _Subscriber(filters, health, receive_errors=receive_errors)
-        super().__init__(url, self._subscriber.own_end, {}, health)
+        super().__init__(url, self._subscriber.subscriber_end, {}, health)
         try:
             self._shared = _join(url, open_adapter, self._subscriber)
         except BaseException:
-            self._subscriber.own_end.close()
+            self._subscriber.subscriber_end.close()
             self._subscriber.sock.close()
             raise
         self.send = self._send
@@ -256,7 +256,7 @@ class SharedAdapterPort(SocketPort):
 
     def _close(self) -> None:
         self._shared.remove(self._subscriber)
-        self._subscriber.own_end.close()
+        self._subscriber.subscriber_end.close()
 
     def lost(self, error: OSError | None = None) -> BusError:
         """Return the BusError with the reason why the bus cannot be used any more."""
@@ -283,10 +283,10 @@ class SharedAdapterBus(PacketBus):
             self._shared = _join(url, open_adapter, self._subscriber)
         except BaseException:
             self._is_shutdown = True  # python-can warns of buses that were not shut down
-            self._subscriber.own_end.close()
+            self._subscriber.subscriber_end.close()
             self._subscriber.sock.close()
             raise
-        super().__init__(url.channel, str(url), self._subscriber.own_end, can_filters)
+        super().__init__(url.channel, str(url), self._subscriber.subscriber_end, can_filters)
 
     def _apply_filters(self, filters: can.typechecking.CanFilters | None) -> None:
         pairs = None if filters is None else [pair_of(entry) for entry in filters]

@@ -27,7 +27,7 @@ def passes(can_id: int, filters: Filters | None) -> bool:
     """Return whether a frame with this identifier, flags included, passes; None lets all pass."""
     if filters is None:
         return True
-    return any((can_id & mask) == (wanted & mask) for wanted, mask in filters)
+    return any((can_id & mask) == (filter_id & mask) for filter_id, mask in filters)
 
 
 def connect(name: str) -> socket.socket:

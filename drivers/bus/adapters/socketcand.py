@@ -82,12 +82,12 @@ class SocketcandConnection:
 
     def _greet(self) -> None:
         channel = self._url.channel
-        for command, wanted in (
+        for command, expected in (
             ("", b"hi"), (f"< open {channel} >", b"ok"), ("< rawmode >", b"ok")
         ):  # fmt: skip
             self.sock.sendall(command.encode())
             answer = self._answer()
-            if answer != wanted:
+            if answer != expected:
                 said = answer.decode("ascii", "replace")
                 raise BusError(
                     f"{self._url}: the server answers {said!r} to {command or 'the connection'!r}"
@@ -293,12 +293,12 @@ class SocketcandPort(SocketPort):
         """Queue the frames that pass the filters, and error frames where they are asked for."""
         for frame in frames:
             can_id = int.from_bytes(frame[:4], sys.byteorder)
-            wanted = self._passes.get(can_id)
-            if wanted is None:
-                wanted = passes(can_id, self._filters)
+            is_passed = self._passes.get(can_id)
+            if is_passed is None:
+                is_passed = passes(can_id, self._filters)
                 if can_id & ERR_FLAG:
-                    wanted = self._receive_errors
+                    is_passed = self._receive_errors
                 if len(self._passes) < _MOST_IDENTIFIERS:
-                    self._passes[can_id] = wanted
-            if wanted:
+                    self._passes[can_id] = is_passed
+            if is_passed:
                 self._pending.append(frame)

@@ -232,13 +232,14 @@ class _NodeBoot:
         )
         # of these only the vendor id is mandatory (CiA 301)
         in_eds = self._dictionary.get(_IDENTITY, ())
-        for letter, sub, what, name, wanted in steps:
+        for letter, sub, what, name, expected in steps:
             found = self._read_identity(_IDENTITY, sub) if sub in in_eds else None
             setattr(self._report, name, found or 0)
-            if wanted is not None and found != wanted:
+            if expected is not None and found != expected:
                 raise self._error(
                     letter,
-                    f"its {what} is {_hex(found)}, the profile {profile.name!r} has {wanted:08X}h",
+                    f"its {what} is {_hex(found)}, the profile {profile.name!r} has "
+                    f"{expected:08X}h",
                     "choose the profile of this drive, or connect the drive that was meant",
                 )
 

@@ -24,17 +24,19 @@ _PDO_OFF = 1 << 31
 Block = tuple[DcfEntry, ...]
 
 
-def configure(network: CanNetwork, node_id: int, wanted: Configuration, changed: list[str]) -> bool:
+def configure(
+    network: CanNetwork, node_id: int, configuration: Configuration, changed: list[str]
+) -> bool:
     """Write into a drive what differs from `wanted`, and append to `changed` what that was.
 
     Where the drive's 1020h holds the stamp of `wanted`, only objects that a reset of
     communication does not restore are compared. Afterwards 1020h holds that stamp. Returns
     whether 1020h held the stamp before. Raises SdoError, BusError.
     """
-    stamp = wanted.stamp()
+    stamp = configuration.stamp()
     stamp_matched = read_stamp(network, node_id) == stamp
     before = len(changed)
-    for block in wanted.blocks():
+    for block in configuration.blocks():
         if is_application(block) or not stamp_matched:
             _write_block(network, node_id, block, changed)
     if _VERIFY in network.dictionary(node_id) and (not stamp_matched or len(changed) > before):

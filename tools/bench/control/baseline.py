@@ -84,12 +84,12 @@ class BaselineCableControl:
         """Write torques and the axes' set-points, (n,) each."""
         J, twist = self._locate(feedback.position_rad)
         self.past = [*self.past[1:], np.array([self.position, self.velocity, self.acceleration])]
-        wanted, Q, v_d, a_d = self._follow(np.mean(self.past, axis=0))
-        rho, J_d = self._cables(wanted, Q)
+        position, Q, v_d, a_d = self._follow(np.mean(self.past, axis=0))
+        rho, J_d = self._cables(position, Q)
         setpoint.position_rad[:] = (rho / self.stretch - self.at_zero) / self.c
         setpoint.velocity_rad_s[:] = J_d @ v_d / self.c
         setpoint.acceleration_rad_s2[:] = J_d @ a_d / self.c
-        error = np.concatenate([wanted - self.p, Rotation.from_matrix(Q @ self.Q.T).as_rotvec()])
+        error = np.concatenate([position - self.p, Rotation.from_matrix(Q @ self.Q.T).as_rotvec()])
         M, known = self._body(v_d, a_d)
         force = self._force(J, M[np.ix_(self.chosen, self.chosen)], error, v_d, twist)
         late = self.theta + latency_s(self.T) * self.omega
@@ -233,13 +233,13 @@ class BaselineCableControl:
         return t, carried, N
 
     def _project(
-        self, W: FloatArray, N: FloatArray, wrench: FloatArray, wanted: FloatArray, wider: float
+        self, W: FloatArray, N: FloatArray, wrench: FloatArray, preferred: FloatArray, wider: float
     ) -> FloatArray:
         """Return the tensions within bounds that carry a wrench nearest to wanted ones.
 
         As a least distance that non-negative least squares finds: Lawson and Hanson (1974), 23.4.
         """
-        nearest = wanted - np.linalg.pinv(W) @ (W @ wanted + wrench)
+        nearest = preferred - np.linalg.pinv(W) @ (W @ preferred + wrench)
         inside = np.concatenate([nearest - self.low + wider, self.high + wider - nearest])
         if inside.min() >= 0.0:
             return np.asarray(nearest)

@@ -176,9 +176,9 @@ def _on_vcan(exchanges: int, out: Output) -> dict[str, Any]:
         return {"missing": problem}
     out.note(f"{exchanges} exchanges of each variant on {url} ...")
     with _echo(str(url)) as ready, one_core(int(ready["pid"])):
-        own = OwnAccess(url)
+        access = OwnAccess(url)
         figures = _compare(url, PythonCanAccess("socketcan", VCAN), exchanges)
-        figures["delivery_us"] = _delivery(own)
+        figures["delivery_us"] = _delivery(access)
     return figures
 
 

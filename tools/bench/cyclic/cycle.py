@@ -54,8 +54,8 @@ def measure(cycles: int, out: Output) -> dict[str, Any]:
             for variant in variants:
                 times[variant.name].append(_run(variant, block, bus, frames[variant.name]))
         statuswords = {variant.name: variant.statuswords() for variant in variants}
-    own_cost = _clock_cost_ns()
-    cpu = {name: np.concatenate([t[0] for t in of]) - own_cost for name, of in times.items()}
+    clock_cost = _clock_cost_ns()
+    cpu = {name: np.concatenate([t[0] for t in of]) - clock_cost for name, of in times.items()}
     wall = {name: np.concatenate([t[1] for t in of]) for name, of in times.items()}
     cpu_us = {name: _percentiles(values) for name, values in cpu.items()}
     return {

@@ -155,9 +155,9 @@ def _probe(period_s: float, cycles: int, variant: str) -> tuple[list[str], Times
 
 
 @contextmanager
-def _load(wanted: bool) -> Iterator[None]:
+def _load(loaded: bool) -> Iterator[None]:
     """Keep every processor busy with ordinary processes while the block runs."""
-    count = len(os.sched_getaffinity(0)) if wanted else 0
+    count = len(os.sched_getaffinity(0)) if loaded else 0
     burners = [subprocess.Popen([sys.executable, "-P", "-c", _BURN]) for _ in range(count)]
     try:
         yield

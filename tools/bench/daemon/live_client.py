@@ -38,9 +38,9 @@ async def _follow(view: ClientConnection) -> bool:
     if isinstance(message, bytes):
         return True
     offered = json.loads(message).get("channels", [])
-    wanted = [{"id": channel["id"], "channelId": channel["id"]} for channel in offered]
-    if wanted:
-        await view.send(json.dumps({"op": "subscribe", "subscriptions": wanted}))
+    subscriptions = [{"id": channel["id"], "channelId": channel["id"]} for channel in offered]
+    if subscriptions:
+        await view.send(json.dumps({"op": "subscribe", "subscriptions": subscriptions}))
     return False
 
 

@@ -112,14 +112,14 @@ class BaselineLoop:
         setpoint = start + speed_rad_s * k * self.period_s
         error = setpoint - self.position
         self.integral = np.clip(self.integral + error * self.period_s, -1.0, 1.0)
-        wanted = self.kp * error + self.ki * self.integral
-        self.command(k, setpoint, wanted + self.kd * (speed_rad_s - self.velocity))
+        torque_asked = self.kp * error + self.ki * self.integral
+        self.command(k, setpoint, torque_asked + self.kd * (speed_rad_s - self.velocity))
 
-    def command(self, k: int, setpoint: Any, wanted: Any) -> None:
+    def command(self, k: int, setpoint: Any, torque_asked: Any) -> None:
         """Bound the torques that are wanted, none where a limit is exceeded; keep the cycle."""
         limits, error = self.limits, setpoint - self.position
         step = limits["torque_rate_Nm_s"] * self.period_s
-        torque = np.clip(wanted, self.torque - step, self.torque + step)
+        torque = np.clip(torque_asked, self.torque - step, self.torque + step)
         torque = np.clip(torque, -limits["torque_Nm"], limits["torque_Nm"])
         if (
             np.any(np.abs(self.velocity) > limits["speed_rad_s"])
@@ -131,9 +131,9 @@ class BaselineLoop:
             torque = np.zeros(self.n)
             self.stopped += 1
         self.torque = torque
-        self.keep(k, setpoint, wanted)
+        self.keep(k, setpoint, torque_asked)
 
-    def keep(self, k: int, setpoint: Any, wanted: Any) -> None:
+    def keep(self, k: int, setpoint: Any, torque_asked: Any) -> None:
         """Record the cycle."""
         row = self.kept[k % self.kept.size]
         row["time_s"] = k * self.period_s
@@ -142,7 +142,7 @@ class BaselineLoop:
             "position_rad": self.position,
             "velocity_rad_s": self.velocity,
             "torque_actual_Nm": self.measured_Nm,
-            "torque_asked_Nm": wanted,
+            "torque_asked_Nm": torque_asked,
             "torque_sent_Nm": self.torque,
             "tension_N": self.tension_N,
             "cable_length_m": self.length_m,

@@ -119,10 +119,10 @@ class BenchDaemon:
     def _leave_core(self, simulator_pid: int) -> None:
         """Leave the loop's core to it, if it has one, as the daemon's launcher does."""
         assert self.loop is not None  # about to be entered
-        here = os.sched_getaffinity(0)
-        rest = here - os.sched_getaffinity(self.loop.process.pid)
+        allowed = os.sched_getaffinity(0)
+        rest = allowed - os.sched_getaffinity(self.loop.process.pid)
         if rest:
-            self._stack.callback(os.sched_setaffinity, 0, here)
+            self._stack.callback(os.sched_setaffinity, 0, allowed)
             for pid in (0, simulator_pid):
                 os.sched_setaffinity(pid, rest)
 

@@ -158,6 +158,6 @@ class BruteMargin:
             along = np.einsum("mi,mik->mk", y, t[:, chosen])
             off = np.abs(along[:, 0] - y @ middle[chosen]) + np.abs(along[:, 1:]).sum(axis=1)
             with np.errstate(divide="ignore", invalid="ignore"):
-                here = (np.abs(y) @ half[chosen] - off) / size
-            least = np.minimum(least, np.where(size > 1e-9, here, np.inf))
+                margin = (np.abs(y) @ half[chosen] - off) / size
+            least = np.minimum(least, np.where(size > 1e-9, margin, np.inf))
         return least

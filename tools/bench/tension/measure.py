@@ -151,8 +151,8 @@ def _measure_robot(robot: CableRobot, poses: int, out: Output) -> dict[str, Any]
 def _distribution(robot: CableRobot, method: str) -> TensionSolver:
     n = robot.exit_points.shape[0]
     low, high = np.full(n, robot.low_N), np.full(n, robot.high_N)
-    wanted = 0.5 * (low + high) if method == "minimum-deviation" else None
-    return tension_distribution(method, low, high, robot.wrench_scale, wanted)
+    reference = 0.5 * (low + high) if method == "minimum-deviation" else None
+    return tension_distribution(method, low, high, robot.wrench_scale, reference)
 
 
 def _interleaved(matrices: FloatArray, methods: dict[str, Any]) -> tuple[dict[str, Any], ...]:

@@ -70,9 +70,9 @@ class AskedPoints:
             if sys.stdin.isatty():
                 # typed while it was on its way here: nobody has measured this pose yet
                 termios.tcflush(sys.stdin, termios.TCIFLUSH)
-            self._ask(pose, self._here())
+            self._ask(pose, self._origin_m())
 
-    def _ask(self, pose: int, here_m: FloatArray) -> None:
+    def _ask(self, pose: int, origin_m: FloatArray) -> None:
         names, doubted = " ".join(self._names), [""]
         while True:
             # who measures stands beside a robot that moves once this is answered
@@ -80,7 +80,7 @@ class AskedPoints:
                 f"pose {pose} stands: measured {names} in mm [and sigma], Enter for none; stand "
                 "clear, it moves on then:"
             )
-            words = self._line(pose, here_m).split()
+            words = self._line(pose, origin_m).split()
             if not words:
                 return
             numbers = self._numbers(words)
@@ -90,12 +90,12 @@ class AskedPoints:
                     "how sure, above 0, where not 2 mm"
                 )
                 continue
-            off_m = float(np.linalg.norm(1e-3 * np.array(numbers[: len(here_m)]) - here_m))
+            off_m = float(np.linalg.norm(1e-3 * np.array(numbers[: len(origin_m)]) - origin_m))
             if off_m <= _DOUBTFUL_m or words == doubted:
                 self._append(",".join([str(pose), *map(repr, numbers)]))
                 return
             doubted = words
-            by_cables = " ".join(f"{1e3 * x:.0f}" for x in here_m)
+            by_cables = " ".join(f"{1e3 * x:.0f}" for x in origin_m)
             self._out.note(
                 f"that is {1e3 * off_m:.0f} mm from where its cables have it, {by_cables}; "
                 "where it is right, type the same again"
@@ -110,26 +110,26 @@ class AskedPoints:
         given = k <= len(numbers) <= k + 1 and all(map(math.isfinite, numbers))
         return numbers if given and min(numbers[k:], default=1.0) > 0.0 else []
 
-    def _line(self, pose: int, here_m: FloatArray) -> str:
+    def _line(self, pose: int, origin_m: FloatArray) -> str:
         """Return a line of standard input, an empty one at its end."""
         number = sys.stdin.fileno()
         while b"\n" not in self._read:
-            self._require_there(pose, here_m)
+            self._require_there(pose, origin_m)
             if select.select([number], [], [], _LOOK_S)[0]:
                 more = os.read(number, _BYTES)
                 if not more:
                     self._open = False
                     return ""
                 self._read += more
-        self._require_there(pose, here_m)
+        self._require_there(pose, origin_m)
         line, _, self._read = self._read.partition(b"\n")
         return line.decode(errors="replace")
 
-    def _here(self) -> FloatArray:
+    def _origin_m(self) -> FloatArray:
         return self._place()[: len(self._names)]
 
-    def _require_there(self, pose: int, here_m: FloatArray) -> None:
-        if np.abs(self._here() - here_m).max() > _MOVED_m:
+    def _require_there(self, pose: int, origin_m: FloatArray) -> None:
+        if np.abs(self._origin_m() - origin_m).max() > _MOVED_m:
             raise WorkFailedError(
                 f"the platform was moved after pose {pose} had been read, so that nothing measured "
                 "belongs to it"

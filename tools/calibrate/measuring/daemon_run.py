@@ -171,7 +171,7 @@ def read_places(
     operator: DaemonOperator,
     kept: DaemonPoses,
     places: Places,
-    wanted: int,
+    most: int,
     enough: Enough = lambda _data: None,
     ask: Ask = lambda _pose: None,
 ) -> None:
@@ -182,7 +182,7 @@ def read_places(
     """
     with (
         operator.in_control(),
-        out.progress(f"reading up to {wanted} poses", float(wanted)) as advance,
+        out.progress(f"reading up to {most} poses", float(most)) as advance,
     ):
         if not kept.data.poses:
             read_into(operator, robot, kept)
@@ -199,9 +199,9 @@ def read_places(
         try:
             for batch in places.batches():
                 left = np.array([place for place in batch if tuple(place.tolist()) not in done])
-                left = left[: wanted - len(measured.readings)]
+                left = left[: most - len(measured.readings)]
                 measure_poses(operator, left, places.middle, measured, out)
-                if len(measured.readings) >= wanted or (len(left) and enough(kept.data)):
+                if len(measured.readings) >= most or (len(left) and enough(kept.data)):
                     return
         finally:
             update = {"left_out": tuple(measured.refused), "tried": tuple(measured.tried)}

@@ -42,15 +42,15 @@ class Places:
 
     def batches(self) -> Iterator[FloatArray]:
         """Yield them a batch at a time, each place of it the nearest to the one before."""
-        here = self.middle
+        last = self.middle
         scale = np.ptp(self.chosen, axis=0) + 1e-9
         for first in range(0, len(self.chosen), BATCH):
             left = list(self.chosen[first : first + BATCH])
             batch = []
             while left:
-                far = [float(np.linalg.norm((place - here) / scale)) for place in left]
-                here = left.pop(int(np.argmin(far)))
-                batch.append(here)
+                far = [float(np.linalg.norm((place - last) / scale)) for place in left]
+                last = left.pop(int(np.argmin(far)))
+                batch.append(last)
             yield np.array(batch)
 
 
@@ -112,19 +112,19 @@ def poses_wanted(robot: Robot, text: str | None) -> tuple[int | None, Listed | N
 def _listed(robot: Robot, path: Path) -> FloatArray:
     """Return the places (m, d) of a list of poses, all of which the robot can go to."""
     reach = _from_middle(robot)
-    told = read_poses(path, reach.model)
-    places = told.points
+    read = read_poses(path, reach.model)
+    places = read.points
     if not LEAST_POSES - 1 <= len(places) < _MOST_ASKED:
         allowed = f"{LEAST_POSES - 1} to {_MOST_ASKED - 1}, home is read besides"
         raise BadInputError(f"--poses {path}: {len(places)} poses; allowed: {allowed}")
     seen: set[tuple[float, ...]] = set()
-    for place, line, inside in zip(places, told.lines, reach.are_targets(places), strict=True):
+    for place, line, inside in zip(places, read.lines, reach.are_targets(places), strict=True):
         if why_not := _why_not(reach.model, place, bool(inside)):
             raise PathError(path, line, why_not)
         if tuple(place) in seen:
             raise PathError(path, line, "is there before; allowed: each pose once")
         seen.add(tuple(place))
-    for share, why, line in zip(*reach.shares(places), told.lines, strict=True):
+    for share, why, line in zip(*reach.shares(places), read.lines, strict=True):
         if why != WHOLE:
             what = "touches something" if why == CONTACT else "cannot be held"
             middle = ", ".join(f"{x:.3f}" for x in reach.start[: reach.model.positions])

@@ -45,7 +45,7 @@ class PoseCamera:
         self._folder = folder
         self._camera: Camera | None = open_camera(url, clock)
         self._bad = 0
-        self._told: set[str] = set()
+        self._noted: set[str] = set()
 
     def see(self, number: int, wait: Callable[[float], None]) -> Sighting:
         """Return what is seen at a pose, counted from 1: no markers in an image that is bad.
@@ -82,8 +82,8 @@ class PoseCamera:
             (seen.mirrored, "printed as its mirror image, and is left out"),
         ):
             for text in (f"marker {marker} is {what}" for marker in markers):
-                if text not in self._told:
-                    self._told.add(text)
+                if text not in self._noted:
+                    self._noted.add(text)
                     self._note(f"{seen.name}: {text}")
 
     def _grab(self, left: int) -> Image | None:

@@ -191,10 +191,10 @@ def measure(
     What is read is kept whatever ends it, and the error says how to go on. Raises what the robot
     and its camera do, WorkFailedError where somebody stops it.
     """
-    wanted, listed = settings.poses or MOST_POSES, kept.not_gone_to(settings.places)
+    most, listed = settings.poses or MOST_POSES, kept.not_gone_to(settings.places)
     if listed is not None:  # home is read at each start
-        wanted = len(kept.data.poses) + len(listed) + bool(listed)
-    if len(kept.data.poses) >= wanted:
+        most = len(kept.data.poses) + len(listed) + bool(listed)
+    if len(kept.data.poses) >= most:
         return kept.data
     if listed is not None:
         places = listed_places(robot, np.array(listed))
@@ -229,10 +229,8 @@ def measure(
                     )
                 )
             up_to = "" if settings.poses else "up to "
-            advance = stack.enter_context(
-                out.progress(f"reading {up_to}{wanted} poses", float(wanted))
-            )
-            _Measuring(out, operator, kept, wanted, advance).go(
+            advance = stack.enter_context(out.progress(f"reading {up_to}{most} poses", float(most)))
+            _Measuring(out, operator, kept, most, advance).go(
                 robot, places, enough if settings.poses is None else told_only(enough)
             )
     except StoppedError:
@@ -302,10 +300,10 @@ class _Measuring:
     """A robot that stands ready at home, and what is read of it from there."""
 
     def __init__(
-        self, out: Output, operator: RigOperator, kept: Kept, wanted: int, advance: Advance
+        self, out: Output, operator: RigOperator, kept: Kept, most: int, advance: Advance
     ) -> None:
         self._out, self._operator, self._kept = out, operator, kept
-        self._wanted, self._advance = wanted, advance
+        self._most, self._advance = most, advance
         before = kept.data
         self._restarts = before.restarts
         if before.poses:
@@ -347,9 +345,9 @@ class _Measuring:
         self._look_at_home()
         for batch in places.batches():
             left = np.array([place for place in batch if tuple(place.tolist()) not in done])
-            left = left[: self._wanted - len(measured.readings)]
+            left = left[: self._most - len(measured.readings)]
             measure_poses(operator, left, places.middle, measured, self._out)
-            if len(measured.readings) >= self._wanted:
+            if len(measured.readings) >= self._most:
                 return
             if len(left) and self._judged(enough):
                 return

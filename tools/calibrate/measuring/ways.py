@@ -44,12 +44,12 @@ def speed_m_s(directions: Directions) -> float:
     return _SPEED_SHARE * float(directions.speed[0])
 
 
-def within_s(directions: Directions, here: FloatArray, place: FloatArray) -> float:
+def within_s(directions: Directions, start: FloatArray, place: FloatArray) -> float:
     """Return for how long a platform may be on its way between two places (d,), from rest to rest.
 
     Planned are speeds and accelerations of all directions that share their time, as `pose` does.
     """
-    way = np.abs(place - here)
+    way = np.abs(place - start)
     share = float(directions.speed[0]) / speed_m_s(directions)
     planned_s = float((way / directions.speed).max()) * share
     square_s2 = float((way / directions.acceleration).max())
@@ -63,7 +63,7 @@ def within_s(directions: Directions, here: FloatArray, place: FloatArray) -> flo
 def not_reached(
     directions: Directions,
     place: FloatArray,
-    here: FloatArray,
+    start: FloatArray,
     allowed_s: float,
     progress: dict[str, Any],
 ) -> TargetNotReached:
@@ -72,12 +72,12 @@ def not_reached(
     `progress` is that of its motion when the time allowed was over.
     """
     k = directions.k
-    apart = f"{1e3 * float(np.linalg.norm((here - place)[:k])):.0f} mm"
+    apart = f"{1e3 * float(np.linalg.norm((start - place)[:k])):.0f} mm"
     if directions.turns:
-        apart += f" and {math.degrees(float(np.linalg.norm((here - place)[k:]))):.1f} deg"
+        apart += f" and {math.degrees(float(np.linalg.norm((start - place)[k:]))):.1f} deg"
     kept = progress["trouble"] or progress["held_back"] or progress["missing"]
     why = f"{apart} off after {allowed_s:.0f} s: {kept or 'still on its way'}"
-    return TargetNotReached(here, why)
+    return TargetNotReached(start, why)
 
 
 def motion_ended(text: str, reason: str, details: Mapping[str, Any] | None) -> TripError:

@@ -106,12 +106,13 @@ class Judged:
         lines = []
         for what, errors in shown:
             if errors is not None:
-                told = errors.as_json()
+                figures = errors.as_json()
                 lines.append(
-                    f"poses not used against {what}: mean {told['mean_position_error_mm']:.2f} mm "
-                    f"and {told['mean_orientation_error_deg']:.3f} deg, worst "
-                    f"{told['worst_position_error_mm']:.2f} mm and "
-                    f"{told['worst_orientation_error_deg']:.3f} deg; distances between them are "
+                    f"poses not used against {what}: mean "
+                    f"{figures['mean_position_error_mm']:.2f} mm and "
+                    f"{figures['mean_orientation_error_deg']:.3f} deg, worst "
+                    f"{figures['worst_position_error_mm']:.2f} mm and "
+                    f"{figures['worst_orientation_error_deg']:.3f} deg; distances between them are "
                     f"{errors.scale.text} times those by lengths"
                 )
         far_mm, turned_deg = 1e3 * self.scanner_alone[0], np.degrees(self.scanner_alone[1])

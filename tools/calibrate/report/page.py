@@ -199,9 +199,9 @@ def _errors_table(judged: Judged) -> str:
     ):
         if errors is None:
             continue
-        told = errors.as_json()
+        figures = errors.as_json()
         keys = ("position_error_mm", "orientation_error_deg")
-        cells = [number(told[f"{kind}_{key}"]) for key in keys for kind in ("mean", "worst")]
+        cells = [number(figures[f"{kind}_{key}"]) for key in keys for kind in ("mean", "worst")]
         rows.append([escape(name), *cells, errors.scale.text])
     head = ["against", "position, mean (mm)", "worst", "orientation, mean (deg)", "worst", "scale"]
     caption = (

@@ -72,7 +72,7 @@ def map_figure(outcome: Outcome, judged: Judged | None) -> Figure:
     for ax, shade, view in zip(axes, shades, views, strict=True):
         shade.set_clim(0.0, high)
         if judged is not None:
-            _held_out(ax, judged.truth, judged.places_m, view, told=ax is axes[-1])
+            _held_out(ax, judged.truth, judged.places_m, view, labelled=ax is axes[-1])
         ax.margins(0.03)
         ax.set(xlabel=f"{'xyz'[view[0]]} (m)", ylabel=f"{'xyz'[view[1]]} (m)", aspect="equal")
     bar = figure.colorbar(shades[0], ax=axes, shrink=0.8)
@@ -103,7 +103,7 @@ def _shade(ax: Axes, outcome: Outcome, view: tuple[int, int]) -> QuadMesh:
 
 
 def _held_out(
-    ax: Axes, errors: PoseErrors, places_m: FloatArray, view: tuple[int, int], *, told: bool
+    ax: Axes, errors: PoseErrors, places_m: FloatArray, view: tuple[int, int], *, labelled: bool
 ) -> None:
     """Draw true errors of poses not used as arrows, and their scale where it is to be told."""
     i, j = view
@@ -117,7 +117,7 @@ def _held_out(
     tips = places_m + errors.position_m * (_ARROW_m / size_m)
     ax.update_datalim(tips[:, view])  # axes leave room for what is longer than they know
     ax.autoscale_view()
-    if not told:
+    if not labelled:
         return
     label = f"true error of a pose not used: {1e3 * size_m:g} mm"
     ax.quiverkey(arrows, 0.1, 1.06, size_m, label, labelpos="E")
@@ -153,9 +153,9 @@ def markers_figure(found: Fit) -> Figure:
     ax.plot(where[:, 0], where[:, 1], "x", ms=4, color=COLOURS["none"], label="camera")
     largest_m = float(std_m.max(initial=1e-9))
     label: str | None = f"marker; circle: 1 sigma, the largest {1e3 * largest_m:.2f} mm"
-    for k, own_m in zip(placed.tolist(), std_m.tolist(), strict=True):
+    for k, sigma_m in zip(placed.tolist(), std_m.tolist(), strict=True):
         x, y = camera.marker_position_m[k, :2]
-        radius = _ARROW_m * own_m / largest_m
+        radius = _ARROW_m * sigma_m / largest_m
         ax.add_patch(Circle((x, y), radius, fill=False, color=FORWARD))
         ax.plot([x], [y], "s", ms=5, color=FORWARD, label=label)
         label, marker = None, camera.ids[k]
@@ -171,9 +171,9 @@ def _known_to(found: Fit, camera: CameraModel) -> tuple[IntArray, FloatArray]:
     That is what is left of their covariance when all are moved to where they fit best.
     """
     first = found.geometry.size + found.jumps_m.size + camera.first_marker
-    own = first + 6 * np.arange(len(camera.ids))[:, None] + np.arange(3)
-    placed = np.flatnonzero(np.sqrt(np.diag(found.uncertainty)[own].max(axis=1)) < _PLACED_m)
-    at, index = camera.marker_position_m[placed], own[placed].ravel()
+    columns = first + 6 * np.arange(len(camera.ids))[:, None] + np.arange(3)
+    placed = np.flatnonzero(np.sqrt(np.diag(found.uncertainty)[columns].max(axis=1)) < _PLACED_m)
+    at, index = camera.marker_position_m[placed], columns[placed].ravel()
     motions = np.zeros((len(placed), 3, 6))
     motions[:, :, :3] = np.eye(3)
     for axis in range(3):

@@ -72,7 +72,7 @@ def measure(
         require_points_of(len(kept.data.poses), points)
         # refused before poses are chosen, which takes a while, and before a file is made
         kept.require_home(robot, daemon_pose.held_place(daemon, robot))
-        places, wanted = places_of(robot, count, listed, seed), count or MOST_POSES
+        places, most = places_of(robot, count, listed, seed), count or MOST_POSES
     with (
         stop_on_signals(HELD) as stop,
         daemon_pose.image_taker(camera, intrinsics, markers, kept, out.note) as image,
@@ -82,10 +82,10 @@ def measure(
         operator = daemon_run.DaemonOperator(daemon, robot, image, stop)
         home_m = platform_of(robot).home_m
         asked = AskedPoints(out, points, len(home_m), operator.place) if ask else None
-        told = enough(out, robot, points if ask else None, geometry)
+        enough_measured = enough(out, robot, points if ask else None, geometry)
         daemon_run.read_places(
-            out, robot, operator, kept, places, wanted,
-            told if count is None else told_only(told),
+            out, robot, operator, kept, places, most,
+            enough_measured if count is None else told_only(enough_measured),
             asked or (lambda _pose: None),
         )  # fmt: skip
     out.say("the platform is held at the last pose; `cdpr lower` takes it back onto its stand")

@@ -62,16 +62,16 @@ def print_command(
     """Write a PDF with a marker of true size on each page, and a bar to check the printer with."""
     out = Output(as_json)
     described = _sheets(sheets, size_mm, dictionary)
-    wanted = _ids(ids)
+    marker_ids = _ids(ids)
     _require_page(page)
     _require_free(target, overwrite)
     with os_error_as(BadInputError, f"--out {target}"):
-        write_marker_sheets(target, described, wanted, page)
+        write_marker_sheets(target, described, marker_ids, page)
     out.say(
-        f"{target}: {len(wanted)} sheets on {page}. Print at 100 %, without fitting to the page; "
-        "then measure the bar and a black square."
+        f"{target}: {len(marker_ids)} sheets on {page}. Print at 100 %, without fitting to the "
+        "page; then measure the bar and a black square."
     )
-    out.result({"ok": True, "out": target, "ids": wanted, "page": page})
+    out.result({"ok": True, "out": target, "ids": marker_ids, "page": page})
 
 
 @app.command()

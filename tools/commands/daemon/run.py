@@ -253,10 +253,10 @@ def settings_for(
     load_profiles(with_commissioned(robot, commissioned))
     if record is not None and no_record:
         raise BadInputError("--record and --no-record: one of them")
-    own = asks_for_own_simulator(bus or ())
-    if plant is not None and not own:
+    own_simulator = asks_for_own_simulator(bus or ())
+    if plant is not None and not own_simulator:
         raise BadInputError("--plant: only for a simulator that the command starts (simbus:)")
-    if read_only and own:
+    if read_only and own_simulator:
         raise BadInputError(
             "--read-only: no other master is on a simulator that the command starts; "
             "give --bus simbus:NAME of one that runs"
@@ -264,10 +264,10 @@ def settings_for(
     return RunSettings(
         robot=robot.reference,
         name=robot.profile,
-        buses=(f"simbus:own-{os.getpid()}",) if own else tuple(bus or ()),
-        simulated=own
+        buses=(f"simbus:own-{os.getpid()}",) if own_simulator else tuple(bus or ()),
+        simulated=own_simulator
         or all(url.is_simulated for url in robot_urls(robot, tuple(bus or ())).values()),
-        own_simulator=own,
+        own_simulator=own_simulator,
         read_only=read_only,
         safety_io=safety_io,
         tension_port=tension_port,

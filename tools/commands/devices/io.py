@@ -76,19 +76,19 @@ def light(
     out = Output(as_json)
     with _link(io) as link:
         lights = {str(known): output for known, output in link.profile.lights.items()}
-        wanted = lights.get(colour)
-        if wanted is None:
+        lamp = lights.get(colour)
+        if lamp is None:
             raise BadInputError(f"colour {colour!r}; {io} has {', '.join(lights) or 'no lights'}")
         link.set_watchdog()
         try:
-            _keep(link, wanted.coil, not wanted.inverted, seconds)
+            _keep(link, lamp.coil, not lamp.inverted, seconds)
             if not link.state().lights[colour]:
-                raise WorkFailedError(f"{colour} was set, but output {wanted.coil} reads otherwise")
+                raise WorkFailedError(f"{colour} was set, but output {lamp.coil} reads otherwise")
         except KeyboardInterrupt:
             out.note("stopped on request")
         finally:
-            link.write(wanted.coil, wanted.inverted)
-    out.say(f"{colour} was on, output {wanted.coil}")
+            link.write(lamp.coil, lamp.inverted)
+    out.say(f"{colour} was on, output {lamp.coil}")
     out.result({"ok": True, "colour": colour})
 
 

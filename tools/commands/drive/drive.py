@@ -77,8 +77,8 @@ def info(winch: WinchOnBus, out: Output) -> None:
             "rated_torque_Nm": 1e-3 * read_if_there(0x6076, 0, round(1e3 * rated_Nm)),
             "encoder_counts_per_turn": read_if_there(0x608F, 1, profile.encoder_counts_per_turn),
         }
-    wanted = profile.drive
-    identity["profile_fits"] = (vendor, product) == (wanted.vendor_id, wanted.product_code)
+    drive = profile.drive
+    identity["profile_fits"] = (vendor, product) == (drive.vendor_id, drive.product_code)
     for key, value in identity.items():
         shown = f"{value:08X}h" if key in ("vendor_id", "product_code", "revision") else value
         shown = ", ".join(value) if isinstance(value, list) else shown

@@ -57,8 +57,8 @@ class _Device:
 
     def __str__(self) -> str:
         without = {UNCONFIGURED: "no node id", NODE_ID_UNKNOWN: "node id not told"}
-        own = without.get(self.node_id, f"node id {self.node_id}")
-        return f"{self.address}: {own}; " + (
+        node_id = without.get(self.node_id, f"node id {self.node_id}")
+        return f"{self.address}: {node_id}; " + (
             f"profile {self.profile}" if self.profile else "no profile fits"
         )
 
@@ -214,12 +214,12 @@ def _choose(found: list[_Device], master: LssMaster) -> _Device:
 
 def _check(master: LssMaster, device: _Device, found: list[_Device], wish: _Wish) -> None:
     """Refuse a node id that is taken, and a drive that is being driven."""
-    wanted = wish.node_id
-    if wanted is not None and wanted != device.node_id:
-        other = next((d for d in found if d.node_id == wanted and d != device), None)
-        sign = f"it is {other.address}" if other else master.node_id_in_use(wanted)
+    node_id = wish.node_id
+    if node_id is not None and node_id != device.node_id:
+        other = next((d for d in found if d.node_id == node_id and d != device), None)
+        sign = f"it is {other.address}" if other else master.node_id_in_use(node_id)
         if sign:
-            raise BadInputError(f"--node-id {wanted}: taken by another node ({sign})")
+            raise BadInputError(f"--node-id {node_id}: taken by another node ({sign})")
     if device.has_node_id:
         _check_power(master, device.node_id)
 

@@ -147,8 +147,8 @@ def _preview(
 
     with out.progress("planning", 10.0) as advance:
         shown = previews.preview(robot, file, options, lambda _, part: advance(10.0 * part))
-    told = previews.figures(shown)
-    out.say(*previews.lines(shown, robot, told))
+    preview_figures = previews.figures(shown)
+    out.say(*previews.lines(shown, robot, preview_figures))
     if picture is not None:
         from cdpr_tools.paths.picture import draw_path  # noqa: PLC0415  # slow to load
 
@@ -158,5 +158,5 @@ def _preview(
     if wrong := previews.obstacle_text(shown):
         raise BadInputError(wrong)
     if keep:
-        told["plan"] = previews.keep(shown, robot)
-    out.result({"ok": True, **told})
+        preview_figures["plan"] = previews.keep(shown, robot)
+    out.result({"ok": True, **preview_figures})

@@ -172,23 +172,25 @@ def workspace(
     moving = 0.0 if static else platform.acceleration_m_s2
     criterion = criterion_of(profile, moving, typed.turns(platform), margin, contact_free)
     box = typed.box(platform)
-    wanted = Search(criterion, box, cells, rays, typed.start(box), workers, cluster)
+    settings = Search(criterion, box, cells, rays, typed.start(box), workers, cluster)
     if mesh is not None and platform.is_planar:
         raise BadInputError(f"--mesh {mesh}: allowed: of robots in space; this one's is flat")
-    found = search(wanted, out)
-    told = figures(profile, wanted, found)
-    out.say(*lines(profile, wanted, told))
-    _write(profile, wanted, found, png, mesh)
+    found = search(settings, out)
+    results = figures(profile, settings, found)
+    out.say(*lines(profile, settings, results))
+    _write(profile, settings, found, png, mesh)
     out.say(*(f"{what:11}{path}" for what, path in (("picture", png), ("mesh", mesh)) if path))
-    out.result({"ok": True, **told})
+    out.result({"ok": True, **results})
 
 
-def _write(robot: Robot, wanted: Search, found: Found, png: Path | None, mesh: Path | None) -> None:
+def _write(
+    robot: Robot, settings: Search, found: Found, png: Path | None, mesh: Path | None
+) -> None:
     if png is not None:
         from cdpr_tools.robots.workspace.picture import draw_workspace  # noqa: PLC0415
 
         with os_error_as(BadInputError, f"--png {png}"):
-            draw_workspace(robot, wanted, found, png)
+            draw_workspace(robot, settings, found, png)
     if mesh is not None:
         import trimesh  # noqa: PLC0415  # slow to load
 

@@ -197,14 +197,14 @@ class Launcher:
         """Leave the loop's core to it, once it has taken one; a new service inherits that."""
         if self._left_core or self._loop.end:
             return
-        taken = os.sched_getaffinity(self._loop.process.pid)
-        here = os.sched_getaffinity(0)
-        if len(taken) > 1 or not here - taken:
+        loop_cores = os.sched_getaffinity(self._loop.process.pid)
+        allowed = os.sched_getaffinity(0)
+        if len(loop_cores) > 1 or not allowed - loop_cores:
             return
         self._left_core = True
         besides = (self._service, self._simulator)
         for pid in (os.getpid(), *(one.process.pid for one in besides if one is not None)):
-            move_to(pid, here - taken)
+            move_to(pid, allowed - loop_cores)
 
     def _watch_service(self, now: float) -> None:
         if self._service is not None:

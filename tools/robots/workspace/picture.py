@@ -38,33 +38,33 @@ _LEGEND = [
 ]
 
 
-def draw_workspace(robot: Robot, wanted: Search, found: Found, path: Path) -> None:
+def draw_workspace(robot: Robot, settings: Search, found: Found, path: Path) -> None:
     """Write the picture as PNG; raises OSError.
 
     In space, after figures 3.3 and 3.4 of the thesis: both surfaces, and the three sections
     through the centre of the rays, coloured by the margin.
     """
-    if len(wanted.box.low_m) == 2:
+    if len(settings.box.low_m) == 2:
         figure = Figure(figsize=(7.4, 5.8), layout="constrained")
-        _draw_section(figure, figure.subplots(), wanted, found, (0, 1))
+        _draw_section(figure, figure.subplots(), settings, found, (0, 1))
     else:
         figure = Figure(figsize=(_WIDE_in, 0.82 * _WIDE_in), layout="constrained")
-        _draw_surfaces(figure.add_subplot(2, 2, 1, projection="3d"), wanted, found)
+        _draw_surfaces(figure.add_subplot(2, 2, 1, projection="3d"), settings, found)
         for k, view in enumerate(_SECTIONS):
-            _draw_section(figure, figure.add_subplot(2, 2, 2 + k), wanted, found, view)
-    figure.suptitle(f"{robot.name}: {_title(wanted)}", fontsize=10, x=0.01, ha="left")
+            _draw_section(figure, figure.add_subplot(2, 2, 2 + k), settings, found, view)
+    figure.suptitle(f"{robot.name}: {_title(settings)}", fontsize=10, x=0.01, ha="left")
     figure.legend(handles=_LEGEND, loc="outside lower center", ncols=4)
     save_figure(figure, path)
 
 
-def _title(wanted: Search) -> str:
-    moving = wanted.criterion.acceleration_m_s2
+def _title(settings: Search) -> str:
+    moving = settings.criterion.acceleration_m_s2
     kind = f"wrench-feasible workspace at {moving:g} m/s2" if moving else "static workspace"
-    turns = len(wanted.criterion.turns_rad)
+    turns = len(settings.criterion.turns_rad)
     return kind + (f", all of {turns} orientations" if turns > 1 else "")
 
 
-def _draw_surfaces(ax: Any, wanted: Search, found: Found) -> None:
+def _draw_surfaces(ax: Any, settings: Search, found: Found) -> None:
     """Draw the grid's surface, and over it a net whose knots are ends of rays."""
     vertices, triangles = found.grid.surface
     ax.plot_trisurf(*vertices.T, triangles=triangles, color=_GRID, alpha=0.3, linewidth=0.0)
@@ -73,26 +73,26 @@ def _draw_surfaces(ax: Any, wanted: Search, found: Found) -> None:
     net = Rays(rays.centre_m, rays.directions[::each], rays.lengths_m[::each])
     edges = np.concatenate([net.triangles[:, [0, 1]], net.triangles[:, [1, 2]]])
     ax.add_collection3d(Line3DCollection(list(net.ends_m[edges]), colors=_RAYS, linewidths=0.5))
-    ax.plot(*np.array(wanted.criterion.platform.exit_points_m).T, "s", ms=4, color=_MACHINE)
-    low, high = np.array([wanted.box.low_m, wanted.box.high_m])
+    ax.plot(*np.array(settings.criterion.platform.exit_points_m).T, "s", ms=4, color=_MACHINE)
+    low, high = np.array([settings.box.low_m, settings.box.high_m])
     ax.set(xlabel="x (m)", ylabel="y (m)", zlabel="z (m)")
     ax.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
     ax.set_box_aspect(tuple(high - low), zoom=1.2)
 
 
 def _draw_section(
-    figure: Figure, ax: Axes, wanted: Search, found: Found, view: tuple[int, int]
+    figure: Figure, ax: Axes, settings: Search, found: Found, view: tuple[int, int]
 ) -> None:
     i, j = view
-    low, high = np.array([wanted.box.low_m, wanted.box.high_m])
+    low, high = np.array([settings.box.low_m, settings.box.high_m])
     sides = high - low
     counts = [max(2, round(_FINE * float(sides[k] / sides.max()))) for k in view]
     cells = Box((low[i], low[j]), (high[i], high[j])).grid(*counts)
     centre = found.rays.centre_m
     points = np.broadcast_to(centre, (cells[..., 0].size, len(centre))).copy()
     points[:, view] = cells.reshape(-1, 2)
-    least = wanted.criterion.least_N
-    margins = wanted.criterion.depths(points).reshape(cells.shape[:2]) + least
+    least = settings.criterion.least_N
+    margins = settings.criterion.depths(points).reshape(cells.shape[:2]) + least
     levels = MaxNLocator(8).tick_values(least, max(found.grid.deepest[1] + least, least + 1e-3))
     filled = ax.contourf(
         cells[0, :, 0], cells[:, 0, 1], np.maximum(margins, _OUTSIDE_N),
@@ -103,7 +103,7 @@ def _draw_section(
     bar.set_label("margin (N)")
     bar.outline.set_visible(False)
     _draw_borders(ax, found, view, cells)
-    ax.plot(*np.array(wanted.criterion.platform.exit_points_m)[:, view].T, "s", ms=4, c=_MACHINE)
+    ax.plot(*np.array(settings.criterion.platform.exit_points_m)[:, view].T, "s", ms=4, c=_MACHINE)
     ax.plot(*centre[list(view)], "+", ms=8, color=_MACHINE)
     ax.set(xlabel=f"{_NAMES[i]} (m)", ylabel=f"{_NAMES[j]} (m)", aspect="equal")
     ax.set(xlim=(low[i], high[i]), ylim=(low[j], high[j]))

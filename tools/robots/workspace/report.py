@@ -13,9 +13,9 @@ from cdpr_tools.robots.workspace.search import Found, Search, in_mm
 _AGREE = 0.02
 
 
-def figures(robot: Robot, wanted: Search, found: Found) -> dict[str, Any]:
+def figures(robot: Robot, settings: Search, found: Found) -> dict[str, Any]:
     """Return what was found, SI, as JSON has it."""
-    criterion, grid, rays = wanted.criterion, found.grid, found.rays
+    criterion, grid, rays = settings.criterion, found.grid, found.rays
     size = "volume_m3" if grid.depths.ndim == 3 else "area_m2"
     deepest_m, depth_N = grid.deepest
     return {
@@ -24,7 +24,7 @@ def figures(robot: Robot, wanted: Search, found: Found) -> dict[str, Any]:
         "margin_at_least_N": criterion.least_N,
         "turns_rad": criterion.turns_rad,
         "contact_free": criterion.contact_free,
-        "searched_m": [wanted.box.low_m, wanted.box.high_m],
+        "searched_m": [settings.box.low_m, settings.box.high_m],
         "reaches_sides": grid.cut,
         "grid": {"places": grid.depths.shape, "spacing_m": grid.spacing_m, size: grid.size},
         "rays": {"count": len(rays.lengths_m), "centre_m": rays.centre_m, size: rays.size},
@@ -35,7 +35,7 @@ def figures(robot: Robot, wanted: Search, found: Found) -> dict[str, Any]:
     }
 
 
-def lines(robot: Robot, wanted: Search, found: dict[str, Any]) -> list[str]:
+def lines(robot: Robot, settings: Search, found: dict[str, Any]) -> list[str]:
     """Return the same as lines for people."""
     grid, rays = found["grid"], found["rays"]
     key, unit = ("volume_m3", "m3") if "volume_m3" in grid else ("area_m2", "m2")
@@ -44,8 +44,8 @@ def lines(robot: Robot, wanted: Search, found: dict[str, Any]) -> list[str]:
     off, unseen = found["rays_against_grid"], found["unseen_share"]
     text = [
         f"{robot.name} ({robot.profile})",
-        *_criterion_lines(wanted),
-        f"searched   {in_mm(wanted.box.low_m)} to {in_mm(wanted.box.high_m)} mm",
+        *_criterion_lines(settings),
+        f"searched   {in_mm(settings.box.low_m)} to {in_mm(settings.box.high_m)} mm",
         f"grid       {grid[key]:.4g} {unit} by {places} places, {apart:.0f} mm apart or less",
         f"rays       {rays[key]:.4g} {unit} by {rays['count']} rays from "
         f"{in_mm(rays['centre_m'])} mm, {100.0 * abs(off):.1f} % {'more' if off > 0 else 'less'}",
@@ -68,8 +68,8 @@ def lines(robot: Robot, wanted: Search, found: dict[str, Any]) -> list[str]:
     return text
 
 
-def _criterion_lines(wanted: Search) -> list[str]:
-    criterion = wanted.criterion
+def _criterion_lines(settings: Search) -> list[str]:
+    criterion = settings.criterion
     platform, turns = criterion.platform, np.array(criterion.turns_rad)
     what = "static workspace: the platform at rest"
     if criterion.acceleration_m_s2:

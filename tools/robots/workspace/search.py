@@ -47,14 +47,14 @@ class Found:
     rays: Rays
 
 
-def search(wanted: Search, out: Output) -> Found:
+def search(settings: Search, out: Output) -> Found:
     """Search it; raises CommandError where it is empty, or the centre outside."""
-    shape = shape_of(wanted.box, wanted.cells)
-    turns = len(wanted.criterion.turns_rad)
-    checks = turns * (int(np.prod(shape)) + _CHECKS_A_RAY * wanted.rays)
+    shape = shape_of(settings.box, settings.cells)
+    turns = len(settings.criterion.turns_rad)
+    checks = turns * (int(np.prod(shape)) + _CHECKS_A_RAY * settings.rays)
     usual = 1 if checks < _WORTH_PROCESSES else cores()
     with (
-        runner(wanted.workers or usual, wanted.cluster) as run,
+        runner(settings.workers or usual, settings.cluster) as run,
         out.progress("poses", checks / _CHECKS_A_SECOND) as advance,
     ):
 
@@ -65,19 +65,19 @@ def search(wanted: Search, out: Output) -> Found:
                 advance(turns * (first + k * each) / _CHECKS_A_SECOND)
             return np.concatenate(results)
 
-        points = grid_points(wanted.box, shape)
+        points = grid_points(settings.box, shape)
         count = max(1, _CHECKS_A_JOB // turns)
         grid_jobs = [
-            GridJob(wanted.criterion, points[k : k + count]) for k in range(0, len(points), count)
+            GridJob(settings.criterion, points[k : k + count]) for k in range(0, len(points), count)
         ]
-        grid = Grid(wanted.box, computed(grid_jobs, 0, count).reshape(shape))
-        centre = _centre(wanted, grid)
-        if wanted.criterion.contact_free:
-            grid = _reached(wanted.criterion, grid, centre, run)
-        ways = directions(wanted.rays, len(shape))
+        grid = Grid(settings.box, computed(grid_jobs, 0, count).reshape(shape))
+        centre = _centre(settings, grid)
+        if settings.criterion.contact_free:
+            grid = _reached(settings.criterion, grid, centre, run)
+        ways = directions(settings.rays, len(shape))
         count = max(1, count // _CHECKS_A_RAY)
         ray_jobs = [
-            RayJob(wanted.criterion, centre, ways[k : k + count], wanted.box)
+            RayJob(settings.criterion, centre, ways[k : k + count], settings.box)
             for k in range(0, len(ways), count)
         ]
         lengths = computed(ray_jobs, len(points), count * _CHECKS_A_RAY)
@@ -97,7 +97,7 @@ def _reached(criterion: Criterion, grid: Grid, centre: FloatArray, run: Runner) 
     return Grid(grid.box, depths.reshape(grid.depths.shape))
 
 
-def _centre(wanted: Search, grid: Grid) -> FloatArray:
+def _centre(settings: Search, grid: Grid) -> FloatArray:
     """Return where rays start."""
     deepest, depth_N = grid.deepest
     if not depth_N >= 0.0:
@@ -105,20 +105,20 @@ def _centre(wanted: Search, grid: Grid) -> FloatArray:
         if not np.isfinite(depth_N):
             near = "some direction is held by no tensions anywhere"
         raise WorkFailedError(
-            f"no place of the grid from {in_mm(wanted.box.low_m)} to {in_mm(wanted.box.high_m)} mm "
-            f"is in this workspace; {near}"
+            f"no place of the grid from {in_mm(settings.box.low_m)} to "
+            f"{in_mm(settings.box.high_m)} mm is in this workspace; {near}"
         )
-    platform = wanted.criterion.platform
-    centre = wanted.centre_m
+    platform = settings.criterion.platform
+    centre = settings.centre_m
     if centre is None:
         centre = np.add(platform.workspace_min_m, platform.workspace_max_m) / 2.0
-    low, high = wanted.box.low_m, wanted.box.high_m
+    low, high = settings.box.low_m, settings.box.high_m
     inside = bool((centre > low).all() and (centre < high).all())
-    if not inside or not wanted.criterion.depths(centre[None])[0] >= 0.0:
-        if wanted.centre_m is not None:
+    if not inside or not settings.criterion.depths(centre[None])[0] >= 0.0:
+        if settings.centre_m is not None:
             raise _outside(centre, deepest)
         centre = deepest
-    if not wanted.criterion.clear_shares(centre, centre[None])[0] > 0.0:
+    if not settings.criterion.clear_shares(centre, centre[None])[0] > 0.0:
         raise BadInputError(
             f"--contact-free: something is in contact where the rays start, at {in_mm(centre)} mm; "
             "allowed: another --centre, or orientation"

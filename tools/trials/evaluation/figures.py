@@ -33,9 +33,9 @@ class Figure:
         shown = f"{self.text:{_TEXT}}{self.value:{_VALUE}.4g} {self.unit:6}"
         if self.limit is None:
             return shown.rstrip()
-        wanted = "at least" if self.at_least else "at most"
+        relation = "at least" if self.at_least else "at most"
         verdict = "reached" if self.reached else "MISSED"
-        return f"{shown}wanted {wanted} {self.limit:g}: {verdict}"
+        return f"{shown}wanted {relation} {self.limit:g}: {verdict}"
 
     def as_table(self) -> dict[str, Any]:
         """Return it for JSON."""

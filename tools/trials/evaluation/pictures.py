@@ -19,7 +19,7 @@ from cdpr_tools.trials.streams import streaming
 _AXES = (
     "#2f6fb0", "#d1581a", "#3b8f5a", "#7a3fa0", "#1f8a8a", "#b03a5b", "#8a6d1f", "#8a8f98",
 )  # fmt: skip
-_TRUE, _WANTED, _BOUND = "#2f6fb0", "#d1581a", "#b02f2f"
+_TRUE, _SETPOINT, _BOUND = "#2f6fb0", "#d1581a", "#b02f2f"
 _STYLES = {"solid": "-", "dashed": "--", "dotted": ":"}
 _EXCERPT_S = 12.0
 _VIEWS = {2: ((0, 1),), 3: ((0, 1), (0, 2))}
@@ -51,8 +51,8 @@ def _errors(ax: Axes, errors: FloatArray, allowed_mm: float) -> None:
     """Draw errors (m, 2) of two directions with mean and spread."""
     ax.plot(*errors.T, "o", color=_TRUE, ms=4, alpha=0.7, label="at a target")
     mean, sigma = errors.mean(axis=0), errors.std(axis=0, ddof=1)
-    ax.plot(*mean, "+", color=_WANTED, ms=12, mew=2, label="mean")
-    ax.add_patch(Ellipse(mean, *(6.0 * sigma), fill=False, color=_WANTED, label="3 sigma"))
+    ax.plot(*mean, "+", color=_SETPOINT, ms=12, mew=2, label="mean")
+    ax.add_patch(Ellipse(mean, *(6.0 * sigma), fill=False, color=_SETPOINT, label="3 sigma"))
     allowed = Ellipse((0, 0), 2 * allowed_mm, 2 * allowed_mm, fill=False, color="#777777", ls="--")
     allowed.set_label(f"{allowed_mm:g} mm")
     ax.add_patch(allowed)
@@ -77,10 +77,10 @@ def _orientations(off: Axes, over: Axes, recorded: Recorded, errors: FloatArray)
 def _angles(ax: Axes, recorded: Recorded) -> None:
     """Draw the angles from the orientation at home over time."""
     directions = recorded.directions
-    true, wanted = np.degrees(recorded.true_places), np.degrees(recorded.setpoint_places)
+    true, setpoint = np.degrees(recorded.true_places), np.degrees(recorded.setpoint_places)
     minutes = recorded.time_s / 60.0
     for k, i in enumerate(directions.turns):
-        ax.plot(*decimated(minutes, wanted[:, i]), color=_AXES[k], lw=0.4, ls="--")
+        ax.plot(*decimated(minutes, setpoint[:, i]), color=_AXES[k], lw=0.4, ls="--")
         ax.plot(*decimated(minutes, true[:, i]), color=_AXES[k], lw=0.6, label=directions.names[i])
     ax.set(xlabel="min", ylabel="deg", title="turned from home (dashed: wanted)")
     legend_beside_title(ax)
@@ -207,11 +207,15 @@ def of_stream(recorded: Recorded) -> Figure:
 def _followed(ax: Axes, recorded: Recorded, chosen: range | tuple[int, ...], unit: float) -> None:
     """Draw the beginning of set-point and true place in some directions."""
     shown = recorded.time_s < _EXCERPT_S
-    time_s, wanted = recorded.time_s[shown], recorded.setpoint_places[shown]
+    time_s, setpoint = recorded.time_s[shown], recorded.setpoint_places[shown]
     for colour, i in zip(_AXES, chosen, strict=False):
-        name, begin = recorded.directions.names[i], wanted[0, i]
+        name, begin = recorded.directions.names[i], setpoint[0, i]
         ax.plot(
-            time_s, unit * (wanted[:, i] - begin), color=colour, ls="--", label=f"{name}, set-point"
+            time_s,
+            unit * (setpoint[:, i] - begin),
+            color=colour,
+            ls="--",
+            label=f"{name}, set-point",
         )
         true = recorded.true_places[shown, i]
         ax.plot(time_s, unit * (true - begin), color=colour, label=f"{name}, true")
@@ -245,7 +249,7 @@ def of_path(recorded: Recorded, robot: Robot, speed_m_s: float) -> Figure:
     grid = figure.add_gridspec(2, len(views), height_ratios=[3.2, 2.0])
     for column, (i, j) in enumerate(views):
         ax = figure.add_subplot(grid[0, column])
-        ax.plot(*errors.described_m[:, [i, j]].T, color=_WANTED, lw=0.8, label="file")
+        ax.plot(*errors.described_m[:, [i, j]].T, color=_SETPOINT, lw=0.8, label="file")
         ax.plot(*errors.true_m[:, [i, j]].T, color=_TRUE, lw=0.8, label="true")
         ax.set(xlabel=f"{'xyz'[i]} (m)", ylabel=f"{'xyz'[j]} (m)", aspect="equal")
         if not column:

@@ -90,7 +90,7 @@ class Recorded:
     @cached_property
     def setpoint_places(self) -> FloatArray:
         """Where it was to be, angles too where they are controlled, (c, d)."""
-        return self.directions.places(self.setpoint_m, self._wanted_rotations)
+        return self.directions.places(self.setpoint_m, self._setpoint_rotations)
 
     @cached_property
     def turned_off_rad(self) -> FloatArray:
@@ -100,10 +100,10 @@ class Recorded:
         """
         if not self.directions.turns:
             return np.zeros((len(self.truth), 0))
-        return self.directions.turn_between(self._wanted_rotations, self.truth["rotation"])
+        return self.directions.turn_between(self._setpoint_rotations, self.truth["rotation"])
 
     @cached_property
-    def _wanted_rotations(self) -> FloatArray:
+    def _setpoint_rotations(self) -> FloatArray:
         return rotations_of(self.cycles["pose_setpoint"][:, 3:])
 
     def row(self, cycle: int) -> int:

@@ -16,7 +16,7 @@ from cdpr_rt.service.streams.stream_packet import (
 from cdpr_rt.service.streams.stream_sessions import Address, StreamSessionManager
 from cdpr_tools.trials.right import RightInBusTime
 
-_HERE: Final[Address] = ("127.0.0.1", 1)
+_LOOPBACK: Final[Address] = ("127.0.0.1", 1)
 _LOOK_NS: Final = 10_000_000
 
 
@@ -38,7 +38,7 @@ class StreamInBusTime:
         """
         return StreamSender(self.sessions.issue(self._right.token))
 
-    def take(self, data: bytes, address: Address = _HERE) -> bytes | None:
+    def take(self, data: bytes, address: Address = _LOOPBACK) -> bytes | None:
         """Take one packet as it arrives now; return the answer, None where none is due."""
         return self.sessions.receive(data, address, self._clock_ns())
 
