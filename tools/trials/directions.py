@@ -108,9 +108,24 @@ class Directions:
         return np.hstack([position_m[:, : self.k], angles])
 
     def turn_between(self, from_rotation: FloatArray, to_rotation: FloatArray) -> FloatArray:
-        """Return the rotation vectors of R_to R_from^T, (m, 3), in rad along the room's axes."""
+        """Return the rotation vectors of R_to R_from^T, (m, 3), in rad along the room's axes.
+
+        Where angles are not controlled, what the platform turns about their axes is left out: about
+        one, a rotation vector is that of the shortest turn between both directions of that axis,
+        which the platform carries with it; about two, its entries along them are 0.
+        """
+        if len(self._free) == 1:
+            carried = self.home_rotation.T[:, self._free[0]]
+            return _shortest_turns(from_rotation @ carried, to_rotation @ carried)
         turn = to_rotation @ np.swapaxes(from_rotation, -1, -2)
-        return np.asarray(Rotation.from_matrix(turn).as_rotvec())
+        vectors = np.asarray(Rotation.from_matrix(turn).as_rotvec())
+        vectors[..., self._free] = 0.0
+        return vectors
+
+    @property
+    def _free(self) -> list[int]:
+        """Which entries of a rotation vector are not controlled; none in a plane."""
+        return [] if self.k == 2 else [i for i in range(3) if i not in self.about]
 
     @property
     def about(self) -> list[int]:
@@ -128,3 +143,11 @@ def platform_of(robot: Robot) -> Platform:
 def rotations_of(quaternion: FloatArray) -> FloatArray:
     """Return the rotations (m, 3, 3) of quaternions w x y z, (m, 4)."""
     return np.asarray(Rotation.from_quat(quaternion[:, [1, 2, 3, 0]]).as_matrix())
+
+
+def _shortest_turns(from_axis: FloatArray, to_axis: FloatArray) -> FloatArray:
+    """Return the rotation vectors (m, 3) that turn unit vectors into others the shortest way."""
+    across = np.cross(from_axis, to_axis)
+    sine = np.linalg.norm(across, axis=-1, keepdims=True)
+    angle = np.arctan2(sine, np.sum(from_axis * to_axis, axis=-1, keepdims=True))
+    return np.asarray(across * np.divide(angle, sine, out=np.ones_like(sine), where=sine > 0.0))

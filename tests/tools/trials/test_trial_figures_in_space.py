@@ -1,5 +1,7 @@
 """Each trial's figures in space, on motion that was made up and whose figures are known."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -42,6 +44,26 @@ def test_a_place_is_where_the_platform_is_and_how_it_has_turned_from_home(values
     np.testing.assert_allclose(SPACE.places(place[None, :3], rotation[None])[0], place, atol=1e-7)
     mark = SPACE.marked(place, "target")
     assert SPACE.place(mark, "target").tolist() == place.tolist()
+
+
+@pytest.mark.parametrize("spin", [0.0, -0.4, 3.0])
+def test_what_a_rod_spins_about_its_own_axis_is_no_error(spin):
+    rod = replace(SPACE, names=("x", "y", "z", "rx", "ry"))
+    wanted = np.array([0.1, -0.2, 1.5, 0.1, 0.05])
+    tilted = np.array([0.1, -0.2, 1.5, -0.03, 0.12])
+    own_axis = rod.home_rotation.T[:, 2]
+    target, true = rod.rotations(np.array([wanted, tilted]))
+    spun = true @ turn_about(own_axis, spin)
+    np.testing.assert_allclose(rod.places(tilted[None, :3], spun[None])[0], tilted, atol=1e-12)
+    off = np.linalg.norm(rod.turn_between(target, spun))
+    assert off == pytest.approx(np.arccos((target @ own_axis) @ (true @ own_axis)))
+    assert np.linalg.norm(rod.turn_between(spun, spun)) == 0.0
+
+
+def test_what_a_platform_swings_about_two_free_axes_is_no_error():
+    upright = replace(SPACE, names=("x", "y", "z", "rz"), home_rotation=np.eye(3))
+    turn = Rotation.from_rotvec([0.2, -0.1, 0.3]).as_matrix()
+    np.testing.assert_allclose(upright.turn_between(np.eye(3), turn), [0.0, 0.0, 0.3], atol=1e-12)
 
 
 def test_an_angle_in_the_plane_is_about_the_third_axis():
