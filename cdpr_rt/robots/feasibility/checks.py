@@ -12,6 +12,7 @@ from cdpr_profiles import ProfileError, Robot
 from cdpr_profiles.limits.motor_bounds import MOST_SPEED_RATIO
 from cdpr_profiles.platform import DIRECTIONS, Platform
 from cdpr_rt.arrays import FloatArray
+from cdpr_rt.core.shared_block import MOST_AXES
 from cdpr_rt.core.supervision.limits import Limits
 from cdpr_rt.errors import GeometryError
 from cdpr_rt.robots.feasibility.not_held import point_text, why_not_held
@@ -87,6 +88,9 @@ def refuse_impossible(robot: Robot, limits: Limits | None = None) -> list[str]:
 
 
 def _cycle(robot: Robot) -> Iterator[Finding]:
+    if len(robot.axes) > MOST_AXES:
+        text = f"{len(robot.axes)}; allowed: up to {MOST_AXES}, as many as a daemon runs"
+        yield Finding("axes", text, impossible=True)
     if robot.sync_period_s > _LONGEST_PERIOD_s:
         text = (
             f"value {robot.sync_period_s:g}; allowed: up to {_LONGEST_PERIOD_s:g} for a platform, "

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from cdpr_profiles.platform import Platform
+from cdpr_profiles.platform import DIRECTIONS, Platform
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.robots.platform_model import platform_model
 from cdpr_rt.robots.statics import PlatformStatics
@@ -44,11 +44,20 @@ def _singular(statics: PlatformStatics) -> str:
         spread = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
         dimensions = int(np.sum(spread > _FLAT * max(float(spread[0]), _FLAT)))
         if dimensions == 1:
-            return f"{text}: all {name} lie in one line"
+            left_out = _free_axis(statics) if points is statics.anchors_m else ""
+            return f"{text}: all {name} lie in one line{left_out}"
         in_plane = dimensions == 2 and len(spread) == 3
         if in_plane and points is statics.exits_m and _is_upright(points):
             return f"{text}: all {name} lie in one upright plane"
     return f"{text}: anchor points elsewhere on the platform help"
+
+
+def _free_axis(statics: PlatformStatics) -> str:
+    """Return which axis need not be controlled, of anchor points in a line along it in space."""
+    along = np.abs(np.linalg.svd(statics.anchors_m - statics.anchors_m.mean(axis=0))[2][0])
+    if len(along) < 3 or along.max() < 1.0 - _FLAT:
+        return ""
+    return f"; allowed: platform.controlled without {DIRECTIONS[3][3 + int(along.argmax())]}"
 
 
 def _is_upright(points: FloatArray) -> bool:

@@ -133,7 +133,17 @@ def test_points_in_a_line_or_an_upright_plane_are_told_to_hold_nothing(tmp_path:
     camera = (SHIPPED / "robots" / "point-4.toml").read_text()
     for i, exit_m in enumerate(re.findall(r"exit_point_m = (\[.*\])", camera)):
         camera = camera.replace(exit_m, f"[{-3.0 + 2.0 * i}, 0.0, 4.0]", 1)
-    assert "all exit points lie in one line" in findings_of(tmp_path, camera)["platform.home_m"]
+    told = findings_of(tmp_path, camera)["platform.home_m"]
+    assert told.endswith("all exit points lie in one line")
+
+
+def test_of_a_rod_the_axis_that_need_not_be_controlled_is_named(tmp_path: Path) -> None:
+    for turned, free in (("0.0, 0.0, 0.0", "rz"), ("0.0, 1.5708, 0.0", "rx"), ("0, 0.7, 0", "")):
+        upright = re.sub(r"(anchor_point_m =) \[(.*), .*, .*\]", r"\1 [0.0, 0.0, \2]", SUSPENDED)
+        text = upright.replace("mass_kg", f"home_rotation_rad = [{turned}]\nmass_kg", 1)
+        told = findings_of(tmp_path, text)["platform.home_m"]
+        assert ("platform.controlled without" in told) == bool(free)
+        assert told.endswith(free)
 
 
 def test_orientations_that_cables_cannot_hold_are_told_with_the_angle_that_they_can(
@@ -311,3 +321,11 @@ def test_what_cannot_work_is_told_with_what_would(
         assert f"{key}: " in str(caught.value)
     else:
         assert any(f"{key}: " in line for line in refuse_impossible(robot))
+
+
+def test_more_cables_than_a_daemon_runs_are_told(tmp_path: Path) -> None:
+    axes = re.findall(r"\[\[axes\]\][^\[]*(?:\[[\d., -]*\][^\[]*)*", SUSPENDED)
+    more = [re.sub('name = "', f'name = "{i}', axis) for i in range(1, 3) for axis in axes]
+    more = [re.sub(r"node_id = .*", f"node_id = {20 + k}", axis) for k, axis in enumerate(more)]
+    text = SUSPENDED + "\n".join(re.sub(r"4\.0\]", "3.5]", axis) for axis in more)
+    assert findings_of(tmp_path, text)["axes"] == "24; allowed: up to 16, as many as a daemon runs"
