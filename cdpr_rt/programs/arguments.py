@@ -9,8 +9,12 @@ from typing import Any
 import numpy as np
 
 from cdpr_rt.arrays import FloatArray
-from cdpr_rt.programs.base import ProgramError
+from cdpr_rt.errors import ControlError
 from cdpr_rt.refusal import CommandRefusal, RefusalCode, shown
+
+
+class ProgramError(ControlError):
+    """A command that a program refuses; the message names the key and value."""
 
 
 class CommandArguments:

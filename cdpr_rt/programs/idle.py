@@ -6,9 +6,9 @@ from cdpr_rt.arrays import FloatArray
 from cdpr_rt.control.base import Idle
 from cdpr_rt.core.exchange import AxisFeedback, Setpoint
 from cdpr_rt.jit import jit
+from cdpr_rt.programs.base import Program
 from cdpr_rt.programs.bumpless_transfer import BumplessTransfer
 from cdpr_rt.programs.model import AxesModel
-from cdpr_rt.programs.program_base import ProgramDefaults
 
 _FILTER_S = 0.01
 
@@ -30,7 +30,7 @@ def _track_axes(
         slope[i] = 0.0
 
 
-class IdleProgram(ProgramDefaults):
+class IdleProgram(Program):
     """Fades the torque out; the set-point tracks the axes' angles and filtered speeds.
 
     The program that comes next thus begins at the speed at which an axis turns.

@@ -10,8 +10,8 @@ from cdpr_rt.arrays import FloatArray
 from cdpr_rt.control.base import Controller
 from cdpr_rt.core.exchange import AxisFeedback, Setpoint
 from cdpr_rt.motion.approach import ramp_velocity
+from cdpr_rt.programs.base import CommandedProgram
 from cdpr_rt.programs.model import AxesModel
-from cdpr_rt.programs.program_base import CommandedProgram
 
 
 class BumplessController(Protocol):

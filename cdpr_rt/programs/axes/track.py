@@ -9,11 +9,11 @@ from cdpr_rt.arrays import FloatArray
 from cdpr_rt.control.base import Controller, Idle
 from cdpr_rt.core.exchange import AxisFeedback, Setpoint
 from cdpr_rt.motion.trajectory import Motion
-from cdpr_rt.programs.base import ProgramError
-from cdpr_rt.programs.program_base import ProgramDefaults
+from cdpr_rt.programs.arguments import ProgramError
+from cdpr_rt.programs.base import Program
 
 
-class TrackProgram(ProgramDefaults):
+class TrackProgram(Program):
     """Runs what `take` was given; a stop brakes along the motion's own braking motion.
 
     The controller is reset at the start; the last program's torque is not carried over.
@@ -21,11 +21,11 @@ class TrackProgram(ProgramDefaults):
 
     name = "track"
     needs_lease = False
+    at_rest = True
+    """Whether the motion's last cycle has been run."""
 
     def __init__(self, n: int, period_s: float) -> None:
         self.controller: Controller = Idle(n)
-        self.at_rest = True
-        """Whether the motion's last cycle has been run."""
         self._motion: Motion | None = None
         self._period_s = period_s
         self._cycle = self._last = 0

@@ -5,10 +5,10 @@ from __future__ import annotations
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.control.base import Controller, Idle
 from cdpr_rt.core.exchange import AxisFeedback, Setpoint
-from cdpr_rt.programs.program_base import ProgramDefaults
+from cdpr_rt.programs.base import Program
 
 
-class ZeroTorqueProgram(ProgramDefaults):
+class ZeroTorqueProgram(Program):
     """Commands zero torque from its first cycle on; for bare rotors, and cables made fast.
 
     It serves as `idle` and as `hold` where there is nothing to be held.

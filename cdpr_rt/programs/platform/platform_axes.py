@@ -9,18 +9,18 @@ import numpy as np
 
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.core.exchange import AxisFeedback, Setpoint
+from cdpr_rt.programs.arguments import ProgramError
 from cdpr_rt.programs.axes.axis_program import AxisProgram, BumplessController
 from cdpr_rt.programs.axes.jog import JogProgram
-from cdpr_rt.programs.base import Program, ProgramError
+from cdpr_rt.programs.base import Program
 from cdpr_rt.programs.idle import IdleProgram
 from cdpr_rt.programs.model import AxesModel
 from cdpr_rt.programs.platform.paths.path import PathProgram
 from cdpr_rt.programs.platform.platform_program import PlatformParts, PlatformProgram
 from cdpr_rt.programs.platform.tightening.standing import hangs
-from cdpr_rt.programs.program_base import ProgramDefaults
 
 
-class PlatformHold(ProgramDefaults):
+class PlatformHold(Program):
     """Brakes and holds the platform, or each axis by itself where the cables are slack.
 
     One that is on a path stays on it.

@@ -14,11 +14,11 @@ from cdpr_rt.core.estimate import Estimator
 from cdpr_rt.core.exchange import AxisFeedback, Setpoint
 from cdpr_rt.jit import jit
 from cdpr_rt.motion.approach import approach, stopping_position
-from cdpr_rt.programs.base import ProgramError
+from cdpr_rt.programs.arguments import ProgramError
+from cdpr_rt.programs.base import CommandedProgram
 from cdpr_rt.programs.bumpless_transfer import BumplessTransfer
 from cdpr_rt.programs.platform.arrival import NEAR_SHARE, Arrival, NEAR_m
 from cdpr_rt.programs.platform.paths.path_store import PathStore
-from cdpr_rt.programs.program_base import CommandedProgram
 from cdpr_rt.refusal import CommandRefusal, RefusalCode
 from cdpr_rt.robots.interface import PlatformControl, RobotModel
 from cdpr_rt.robots.kinematics.free_rotation_kernel import SWINGS_m

@@ -14,8 +14,7 @@ from cdpr_rt.motion import hand_target
 from cdpr_rt.motion.approach import soft_deadband, stopping_position
 from cdpr_rt.motion.pose_stream import PoseStream, StreamState
 from cdpr_rt.motion.stream_buttons import CLUTCH
-from cdpr_rt.programs.arguments import CommandArguments
-from cdpr_rt.programs.base import ProgramError
+from cdpr_rt.programs.arguments import CommandArguments, ProgramError
 from cdpr_rt.programs.platform.platform_program import (
     PlatformParts,
     PlatformProgram,

@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 
 from cdpr_rt.motion.rotations import multiply, to_quaternion, to_rotation_vector
 from cdpr_rt.motion.stream_buttons import CLUTCH
-from cdpr_rt.programs.base import ProgramError
+from cdpr_rt.programs.arguments import ProgramError
 from cdpr_rt.programs.platform.lower import LowerProgram, lowering_s
 from cdpr_rt.programs.platform.platform_program import PlatformProgram
 from cdpr_rt.programs.platform.tightening.index_path import index_path

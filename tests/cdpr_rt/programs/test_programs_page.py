@@ -11,7 +11,8 @@ import pytest
 from cdpr_profiles import load_robot
 from cdpr_rt.core.estimate import Estimator
 from cdpr_rt.core.shared_block import SharedBlock
-from cdpr_rt.programs.base import Program, ProgramError
+from cdpr_rt.programs.arguments import ProgramError
+from cdpr_rt.programs.base import Program
 from cdpr_rt.programs.model import model_of
 from cdpr_rt.programs.registry import build_programs, platform_parts
 from cdpr_rt.robots.robot_arrays import limits_of, winches_of

@@ -21,7 +21,7 @@ from cdpr_rt.runtime.warm_up import warm_up
 
 CYCLE = (
     *("control.compensation", "control.pid", "control.proportional"),
-    *("core.estimate", "core.limit_kernel", "motion.trajectory"),
+    *("core.estimate", "core.supervision.limit_kernel", "motion.trajectory"),
 )
 
 

@@ -18,7 +18,7 @@ from cdpr_rt.core.cycle_row import Row
 from cdpr_rt.core.exchange import AxisFeedback, Setpoint
 from cdpr_rt.core.states import LoopState, Reaction
 from cdpr_rt.core.supervision.supervisor import Limit
-from cdpr_rt.programs.program_base import ProgramDefaults
+from cdpr_rt.programs.base import Program
 from tests.drivers.modbus.load_cell_rig import LoadCellRig
 from tests.tools.daemon.loop_rig import LoopRig, opened
 from tests.tools.robot_rig import robot_file, simulated
@@ -37,7 +37,7 @@ following_error = "torque off"
 Deed = Callable[[int, AxisFeedback, Setpoint, FloatArray], None]
 
 
-class Wild(ProgramDefaults):
+class Wild(Program):
     """A program that does whatever a test wants; axis 0 is left at rest."""
 
     name = "wild"

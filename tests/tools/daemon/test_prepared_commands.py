@@ -9,7 +9,7 @@ import pytest
 
 from cdpr_rt.core.states import LoopState
 from cdpr_rt.core.supervision.limits import Limit
-from cdpr_rt.programs.base import ProgramError
+from cdpr_rt.programs.arguments import ProgramError
 from cdpr_rt.programs.idle import IdleProgram
 from cdpr_rt.programs.model import model_of
 from cdpr_rt.robots.robot_arrays import limits_of

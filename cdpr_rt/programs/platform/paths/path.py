@@ -12,8 +12,7 @@ import numpy as np
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.core.exchange import AxisFeedback, Setpoint
 from cdpr_rt.motion.approach import stopping_position
-from cdpr_rt.programs.arguments import CommandArguments
-from cdpr_rt.programs.base import ProgramError
+from cdpr_rt.programs.arguments import CommandArguments, ProgramError
 from cdpr_rt.programs.platform.paths import path_playback as playback
 from cdpr_rt.programs.platform.paths.path_store import StoredPlan
 from cdpr_rt.programs.platform.platform_program import (

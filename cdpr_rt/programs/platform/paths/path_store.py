@@ -23,7 +23,7 @@ from cdpr_rt.arrays import FloatArray
 from cdpr_rt.core.shared_block import PATH
 from cdpr_rt.motion.path.time_scaling import PERIOD_S, TimedPath
 from cdpr_rt.private_files import FILE_MODE, make_private_folder
-from cdpr_rt.programs.base import ProgramError
+from cdpr_rt.programs.arguments import ProgramError
 from cdpr_rt.programs.platform.paths.path_progress import read_progress
 from cdpr_rt.programs.platform.paths.plan_check import first_fault
 from cdpr_rt.robots.interface import RobotModel

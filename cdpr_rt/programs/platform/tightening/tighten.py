@@ -10,8 +10,7 @@ import numpy as np
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.control.winch_speed_loop import WinchSpeedLoop
 from cdpr_rt.core.exchange import AxisFeedback, Setpoint
-from cdpr_rt.programs.arguments import CommandArguments
-from cdpr_rt.programs.base import ProgramError
+from cdpr_rt.programs.arguments import CommandArguments, ProgramError
 from cdpr_rt.programs.platform.arrival import Arrival
 from cdpr_rt.programs.platform.platform_program import PlatformParts, PlatformProgram
 from cdpr_rt.programs.platform.tightening.home_lengths import LengthsAtHome

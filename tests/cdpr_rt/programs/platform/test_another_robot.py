@@ -18,7 +18,7 @@ from cdpr_rt.core.estimate import Estimator
 from cdpr_rt.core.exchange import AxisFeedback, Setpoint
 from cdpr_rt.core.shared_block import SharedBlock
 from cdpr_rt.motion.pose_stream import PoseStream
-from cdpr_rt.programs.base import ProgramError
+from cdpr_rt.programs.arguments import ProgramError
 from cdpr_rt.programs.platform.platform_program import PlatformParts
 from cdpr_rt.programs.platform.pose import PoseProgram
 from cdpr_rt.robots.interface import TensionOutcome

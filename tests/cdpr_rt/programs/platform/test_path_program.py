@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from cdpr_rt.motion.path.time_scaling import TimedPath
-from cdpr_rt.programs.base import ProgramError
+from cdpr_rt.programs.arguments import ProgramError
 from cdpr_rt.programs.platform.paths import path_progress
 from cdpr_rt.programs.platform.paths.path_progress import (
     keep_progress,

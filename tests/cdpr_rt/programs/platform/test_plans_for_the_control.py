@@ -12,7 +12,7 @@ from cdpr_profiles import Robot, load_robot
 from cdpr_rt.core.estimate import Estimator
 from cdpr_rt.motion.path.description import Move, PathDescription
 from cdpr_rt.procedures.path.planning import PathPlanner
-from cdpr_rt.programs.base import ProgramError
+from cdpr_rt.programs.arguments import ProgramError
 from cdpr_rt.programs.model import model_of
 from cdpr_rt.programs.platform.paths.path_store import PathStore, write_plan
 from cdpr_rt.programs.registry import platform_parts

@@ -11,7 +11,7 @@ from cdpr_profiles import load_robot
 from cdpr_rt.control.winch_speed_loop import WinchSpeedLoop
 from cdpr_rt.core.estimate import Estimator
 from cdpr_rt.core.exchange import AxisFeedback
-from cdpr_rt.programs.base import ProgramError
+from cdpr_rt.programs.arguments import ProgramError
 from cdpr_rt.programs.model import model_of
 from cdpr_rt.programs.platform.platform_program import PlatformParts
 from cdpr_rt.programs.platform.tightening import tighten as tighten_module

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from cdpr_rt.motion.stream_buttons import CLUTCH
-from cdpr_rt.programs.base import ProgramError
+from cdpr_rt.programs.arguments import ProgramError
 from tests.cdpr_rt.programs.platform.led_platform import (
     ROBOT,
     LedPlatform,
