@@ -11,7 +11,7 @@ _SHOWN = 60
 
 
 class RefusalCode(StrEnum):
-    """What is in a command's way; in brackets the arguments beside what was asked for."""
+    """Reason of a refusal; in brackets the arguments beside what was asked for."""
 
     NOT_IN_STATE = "not_in_state"
     """The loop's state does not allow it (`state`, `allowed`: names of states)."""

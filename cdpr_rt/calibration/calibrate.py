@@ -87,7 +87,7 @@ class _Whole:
     """The robot's file with readings as good as they have shown to be."""
     faults: list[Fault]
     seen: Observations
-    """What it was fitted to, before anything was left out."""
+    """Observations of the fit, before any was left out."""
     map: MapFit | None = None
     known_room: bool = False
     """Whether places of markers are known in the room."""

@@ -55,13 +55,13 @@ class DetectedChange:
     """(k,) m, of a drum relative."""
     std: FloatArray
     effect_m: float
-    """By how much it puts positions off that lengths tell, at the worst of the poses."""
+    """Error of positions from lengths that it causes, at the worst of the poses."""
     alike: tuple[int, ...] = ()
     """Other cables whose change of this kind would explain it nearly as well."""
 
     @property
     def text(self) -> str:
-        """What has changed, by how much, and what to look at."""
+        """Change, its size, and advice, in words."""
         others = ", ".join(str(other + 1) for other in self.alike)
         who = f"cable {self.cable + 1}" + (f" (or {others})" if others else "")
         many = ", ".join(f"{1e3 * x:+.1f}" for x in self.size)
@@ -90,7 +90,7 @@ class DetectedChange:
 
 @dataclass(frozen=True)
 class Check:
-    """What a few poses say of a calibration."""
+    """Check of a calibration by a few poses."""
 
     poses: int
     residual_m: float
@@ -102,7 +102,7 @@ class Check:
 
     @property
     def effect_m(self) -> float:
-        """By how much positions are put off by what has changed."""
+        """Error of positions by all changes together."""
         return sum(change.effect_m for change in self.changes)
 
     @property

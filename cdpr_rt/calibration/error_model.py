@@ -1,4 +1,4 @@
-"""How errors of measurement become errors of exit points and initial lengths: model and trial.
+"""Propagation of errors of measurement to exit points and initial lengths: model and trial.
 
 Tremblay, section 3.5. With c = p + Q b - a and ρ = ρ_0 + Δρ, (3.40) is
 
@@ -24,7 +24,7 @@ _STEPS = 12
 
 @dataclass(frozen=True)
 class Noise:
-    """How large errors are at each pose: their standard deviations, or those of a bias."""
+    """Standard deviations of errors at each pose, or of a bias."""
 
     length_m: float = 0.0
     position_m: float = 0.0

@@ -34,7 +34,7 @@ CalibrationMethod = Literal["points", "redundancy", "camera"]
 _WANTED_mm_PER_m = 0.3
 """1.5 mm for 5 m of frame, 3 sigma."""
 _MOST_OVER_WANTED = 3.0
-"""What is known worse than so many times what is wanted is not taken over."""
+"""Ratio of predicted to wanted error above which a calibration is not adopted."""
 _MISFIT = 9.0
 LEAST_POINTS = 3
 """Poses that have to be measured to tell where the robot is in its room."""
@@ -52,7 +52,7 @@ class Outcome:
     open_directions: list[OpenDirection]
     verified: Verification
     before: Verification
-    """The same by the robot's file, whose lengths are those at the start."""
+    """Verification of the robot's file, whose lengths are those at the start."""
     verified_left_out: int
     """Readings at those poses of cables that hung slack, or next to a slip, which are left out."""
     predicted_3_sigma_mm: float
@@ -64,13 +64,13 @@ class Outcome:
     """Whether anything was measured in the room: points, or places of markers."""
     unused: Unused
     change: CalibrationChange
-    """By how much it changes the robot's file."""
+    """Change of the robot's file."""
     birge_ratio: float
-    """How many times as large errors at measured points not used are as predicted; nan without."""
+    """Ratio of errors at unused measured points to predicted ones (Birge); nan without points."""
     adopt: bool = False
     """Whether it is to be taken over even where its changes are not significant."""
     cover: Coverage | None = None
-    """How the images hang together; None without any."""
+    """Connection of the images; None without any."""
 
     @property
     def worse(self) -> bool:
@@ -163,7 +163,7 @@ class Outcome:
 
     @property
     def gain_of_more(self) -> float:
-        """What ten more poses would take off, relative."""
+        """Relative reduction of the predicted error by ten more poses."""
         return 1.0 - self.with_more_3_sigma_mm / max(self.predicted_3_sigma_mm, 1e-9)
 
     def verdict(self) -> list[str]:

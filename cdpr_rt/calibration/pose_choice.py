@@ -1,4 +1,4 @@
-"""Which of many poses to use: spread out, or those that tell most about the geometry.
+"""Choice among many poses: spread out, or those that tell most about the geometry.
 
 Both take one pose after the other, each the best beside those that are taken already.
 """
@@ -21,11 +21,11 @@ from cdpr_rt.robots.kinematics.cable_kernel import run_poses
 from cdpr_rt.robots.platform_model import PlatformModel
 
 EXIT_m = OFFSET_m = 0.1
-"""What exit points and initial lengths are taken to be uncertain by before: a tape's measure."""
+"""Prior standard deviation of exit points and initial lengths: a tape measure's."""
 LENGTH_m, POSITION_m, ROTATION_rad = 1e-3, 5e-3, 5e-3
 """Standard deviations of what is measured at a pose: lengths, and by a camera the pose."""
 HAND_EYE_m, HAND_EYE_rad = 0.1, 0.2
-"""Of the camera's place on its platform before."""
+"""Prior standard deviation of the camera's place on its platform."""
 _AT_ONCE = 64
 
 

@@ -12,13 +12,13 @@ class Controller(Protocol):
     """Turns feedback and set-point into torques, once per cycle."""
 
     effort_Nm: FloatArray
-    """What the feedback loop asked for in this cycle, (n,)."""
+    """Torque of the feedback loop in this cycle, (n,)."""
     compensation_Nm: FloatArray
-    """What was added from knowledge of the motor, or of its cable's tension, (n,)."""
+    """Feed-forward torque from the model of the motor, or its cable's tension, (n,)."""
     motor_loss_Nm: FloatArray
-    """The part of it that is known of the motor's cogging and friction, (n,)."""
+    """Part of it that the motor's cogging and friction take up, (n,)."""
     cogging_Nm: FloatArray
-    """The part of that that averages to nothing over a turn of the motor, (n,)."""
+    """Cogging: the part of `motor_loss_Nm` whose mean over a motor turn is 0, (n,)."""
 
     def reset(self) -> None:
         """Forget the past, before a motion starts."""

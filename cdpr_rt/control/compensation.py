@@ -41,7 +41,7 @@ class FrictionFeedforward:
 
 @dataclass(frozen=True)
 class AxisCompensation:
-    """What one axis needs: tables (2, m) in Nm over the turn from the index, and timing.
+    """Compensation of one axis: tables (2, m) in Nm over the turn from the index, and timing.
 
     `table_Nm[0]` is for increasing angles, `table_Nm[1]` for decreasing ones; sample j lies at
     2π·j/m from the index. `look_ahead_s` is the time from the instant an angle was true to the
@@ -54,7 +54,7 @@ class AxisCompensation:
 
     table_Nm: FloatArray
     most_Nm: float = field(kw_only=True)
-    """What is added is never more than this, whatever table and friction say."""
+    """Bound of the compensation's magnitude."""
     friction: FrictionFeedforward = FrictionFeedforward()
     look_ahead_s: float = 0.0
     observer_s: float = 0.0
@@ -186,9 +186,9 @@ class Compensation:
         self._means = self._tables.mean(axis=2)
         self._state = np.zeros((n, _STATES))
         self.cogging_Nm = np.zeros(n)
-        """The part of the torque last written that averages to nothing over a turn, (n,)."""
+        """Cogging: the part of the last torque whose mean over a motor turn is 0, (n,)."""
         self.available: BoolArray = self._parameters[:, _AVAILABLE] != 0.0
-        """Which axes have a profile, (n,); until its index is known nothing comes of it."""
+        """Whether an axis has a profile, (n,); it is used once the index is known."""
         self._period_s = period_s
         self._fade_step = min(1.0, period_s / _FADE_IN_S)
         self._bound_to: tuple[Any, Any, Any] = (None, None, None)

@@ -22,7 +22,7 @@ MAX_SENSITIVITY = 2.0
 DERIVATIVE_FILTER_RATIO = 10.0
 """The derivative's filter pole lies at this multiple of the crossover frequency."""
 INERTIA_RATIO = 50.0
-"""How many times the rotor's inertia a firm loop bears; a mass on the cable is such a multiple."""
+"""Inertia that a firm loop bears over the rotor's, as of a mass on the cable."""
 SWEEP_PHASE = 0.3
 """Phase in radians that the latency may take at the sweep's natural frequency."""
 _MOST_FACTOR = 8.0

@@ -1,4 +1,4 @@
-"""How well a validation ramp was followed, and what quantisation alone would leave (1.5)."""
+"""Tracking error of a validation ramp, and its floor by quantisation (1.5)."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class ValidationMetrics:
 
 @dataclass(frozen=True)
 class Ratios:
-    """How many times smaller each figure became; None where it was and stays zero."""
+    """Factor by which each figure decreased; None where it was and stays zero."""
 
     rms_position_error: float
     peak_pid_effort: float

@@ -17,22 +17,22 @@ from cdpr_rt.core.task import Condition, Task
 
 _T = TypeVar("_T")
 _BLOCKING_POLL_S = 0.002
-"""How often is looked whether work beside the thread is done."""
+"""Period of polling work in another thread."""
 _MADE_UP_S = 0.02
-"""Of what simulated time has fallen behind wall-clock time, so much is made up for."""
+"""Most of simulated time's lag behind wall-clock time that is made up for."""
 _LONGEST_GRANT_S = 0.1
 """Bus time goes on by so much at a time, so that a request to end is seen between."""
 
 
 class Readable(Protocol):
-    """What has a descriptor to wait for."""
+    """Object with a file descriptor to wait for."""
 
     def fileno(self) -> int:
         """Return the descriptor that is readable when something has come."""
 
 
 class EventSource(Readable, Protocol):
-    """What waits listen to, such as a port on a bus; none of its methods waits."""
+    """Source of events, such as a port on a bus; none of its methods waits."""
 
     def poll(self) -> bool:
         """Process what has come; return whether there was anything."""

@@ -28,7 +28,7 @@ class Watch(Protocol):
 
 @dataclass
 class Lateness:
-    """How the paced loop kept its deadlines."""
+    """Statistics of the paced loop's deadlines."""
 
     cycles: int = 0
     late: int = 0
@@ -48,7 +48,7 @@ class Cycle:
         self.watches = tuple(watches)
         self.lateness = Lateness()
         self.late_s = 0.0
-        """How far this cycle began behind its deadline, 0 in lockstep."""
+        """Delay of this cycle's begin behind its deadline, 0 in lockstep."""
         self.began_ns = 0
         """CLOCK_MONOTONIC when this cycle's SYNC went out."""
         self.elapsed_s = device.period_s

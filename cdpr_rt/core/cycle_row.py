@@ -28,7 +28,7 @@ class CycleField:
     kind: str
     """Type of one value, as numpy writes it."""
     source: str
-    """Where the loop has it: a path of attributes that begins at the engine."""
+    """Path of attributes to its value, from the engine."""
     meaning: str
     wall: bool = False
     """Whether it tells of the machine that ran the loop; all else follows from the bus."""
@@ -37,9 +37,9 @@ class CycleField:
     live: bool = False
     """Whether the live view shows it: angles in degrees, wall times in ms, the longest of each."""
     metric: str = ""
-    """What Prometheus calls it, without prefix: wall times are histograms; "" where it is none."""
+    """Name in Prometheus without prefix, "" for none; wall times are histograms."""
     labels: type[LoopState] | type[Reaction] | None = None
-    """What its numbers stand for."""
+    """Enumeration of its numbers."""
 
     @property
     def is_wall_time(self) -> bool:
@@ -278,7 +278,7 @@ POSE_FIELDS: Final = (
 """Seven values, nan in a row where they are not known."""
 
 FIELDS: Final = {field.name: field for field in (*SCALAR_FIELDS, *AXIS_FIELDS, *POSE_FIELDS)}
-"""All of a row by their names, in its order."""
+"""All fields of a row by name, in its order."""
 SCALARS: Final = tuple(field.name for field in SCALAR_FIELDS)
 AXES: Final = tuple(field.name for field in AXIS_FIELDS)
 WALL_TIMES: Final = tuple(field.name for field in FIELDS.values() if field.wall)

@@ -1,4 +1,4 @@
-"""What a cycle knows of each axis beyond its feedback: velocity, cable length, tension."""
+"""Estimate of each axis from its feedback: velocity, cable length, tension."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ _STATE = np.dtype(
 
 @dataclass(frozen=True)
 class WinchArrays:
-    """What the estimate needs of n winches; shapes are (n,).
+    """Parameters of n winches for the estimate; shapes are (n,).
 
     Winding torque = gain·tension + bias ± (friction + friction_per_N·tension), plus while the
     cable is wound in, as a winch's calibration has it.
@@ -47,7 +47,7 @@ class WinchArrays:
     friction_Nm: FloatArray
     friction_per_N_m: FloatArray
     inertia_kg_m2: FloatArray
-    """What the motor accelerates besides the cable."""
+    """Inertia that the motor accelerates besides the cable."""
 
     @classmethod
     def bare(cls, n: int) -> WinchArrays:
@@ -159,7 +159,7 @@ class Estimator:
     def __init__(self, n: int, period_s: float, winches: WinchArrays | None = None) -> None:
         self.estimate = AxisEstimate(n)
         self.origins_lost = 0
-        """How often lengths were forgotten: whether angles still count from the same origins."""
+        """Number of times that lengths were forgotten, as the angles' origins were lost."""
         self._period_s = period_s
         self._winch = (winches or WinchArrays.bare(n)).table()
         self.estimate.cable_m_per_rad[:] = self._winch[_M_PER_RAD]

@@ -1,4 +1,4 @@
-"""What one cycle exchanges between the controller and a group of axes: arrays over the n axes."""
+"""Exchange of one cycle between the controller and n axes: feedback, command, set-point."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class AxisFeedback:
 
 
 class AxisCommand:
-    """What the controller asks of n axes in one cycle; shapes are (n,)."""
+    """Command of one cycle to n axes; shapes are (n,)."""
 
     def __init__(self, n: int) -> None:
         self.torque_Nm: FloatArray = np.zeros(n)

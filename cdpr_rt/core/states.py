@@ -1,4 +1,4 @@
-"""States of the loop, and what may follow on what."""
+"""States of the loop and the transitions between them."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Final
 
 
 class LoopState(IntEnum):
-    """Where the loop stands; motors have power in `ACTIVE` only."""
+    """State of the loop; motors have power in `ACTIVE` only."""
 
     UNCONFIGURED = 0
     """No bus is open, or the loop is about to open them."""
@@ -22,7 +22,7 @@ class LoopState(IntEnum):
 
     @property
     def label(self) -> str:
-        """What a person calls it."""
+        """Name in words."""
         return self.name.lower()
 
 
@@ -31,7 +31,7 @@ CUT_SHORT: Final = "the power was taken at once while the loop was ending"
 
 
 class Transition(IntEnum):
-    """What an operator may ask for."""
+    """Transition that an operator may command."""
 
     CONFIGURE = 0
     CHECK = 1
@@ -51,7 +51,7 @@ ALLOWED: Final[dict[Transition, tuple[LoopState, ...]]] = {
 
 
 class Reaction(IntEnum):
-    """What the supervisor does about a limit, in the order of severity."""
+    """Reaction of the supervisor to an exceeded limit, in the order of severity."""
 
     NONE = 0
     CLAMP = 1
@@ -67,5 +67,5 @@ class Reaction(IntEnum):
 
     @property
     def label(self) -> str:
-        """What a person calls it."""
+        """Name in words."""
         return self.name.lower().replace("_", " ")

@@ -14,7 +14,7 @@ from cdpr_rt.core.clock import Clock
 
 
 class TensionFault(IntEnum):
-    """Why a tension is not valid."""
+    """Reason why a tension is not valid."""
 
     NONE = 0
     NO_READING = 1
@@ -26,7 +26,7 @@ class TensionFault(IntEnum):
 
     @property
     def label(self) -> str:
-        """What a person calls it."""
+        """Name in words."""
         return self.name.lower().replace("_", " ")
 
 

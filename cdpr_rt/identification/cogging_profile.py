@@ -38,7 +38,7 @@ class _Part(BaseModel):
 
 
 class DriveIdentity(_Part):
-    """Which drive and encoder a profile belongs to (CANopen object 1018h)."""
+    """Identity of drive (CANopen object 1018h) and encoder of a profile."""
 
     vendor_id: Unsigned32
     product_code: Unsigned32
@@ -48,7 +48,7 @@ class DriveIdentity(_Part):
 
 
 class StoredFriction(_Part):
-    """As compensation.FrictionFeedforward."""
+    """`FrictionFeedforward` as stored."""
 
     coulomb_forward_Nm: float
     coulomb_backward_Nm: float

@@ -12,9 +12,9 @@ from cdpr_rt.jit import jit
 from cdpr_rt.motion.rotations import multiply, to_quaternion, to_rotation_vector
 
 FREE, AT_EDGE, ON_STAND = 0, 1, 2
-"""Why a target does not follow the hand."""
+"""Reason why a target does not follow the hand."""
 LEAD_S = 0.3
-"""How long a platform that is slower than the hand may run on after it."""
+"""Longest time for which a platform that is slower than the hand may run on after it."""
 _BELOW_m = 1e-3
 
 

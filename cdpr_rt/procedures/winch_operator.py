@@ -1,4 +1,4 @@
-"""What a procedure that measures one winch is handed: the winch to operate, and whom to tell."""
+"""Interface of a procedure to the winch that it measures, and to the user."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class Notifier(Protocol):
 
 @dataclass(frozen=True)
 class Tolerance:
-    """What a motion may do before it is ended; a bare rotor may swing by turns without harm."""
+    """Limits of a motion in a procedure; a bare rotor may swing by turns without harm."""
 
     following_error_rad: float = 4.0 * math.tau
     speed_rad_s: float | None = None
@@ -36,7 +36,7 @@ class Tolerance:
 
 
 class BootedDrive(Protocol):
-    """What a drive told when it booted."""
+    """Data of a drive from its boot."""
 
     device_name: str
     rated_torque_Nm: float
@@ -58,12 +58,12 @@ class WinchOperator(Operator, ABC):
     @property
     @abstractmethod
     def boot(self) -> BootedDrive:
-        """What its drive told when it booted."""
+        """Data of its drive from the boot."""
 
     @property
     @abstractmethod
     def drive_identity(self) -> DriveIdentity:
-        """What a cogging profile is bound to, besides the motor."""
+        """Identity of drive and encoder, to which a cogging profile is bound besides the motor."""
 
     @property
     @abstractmethod
@@ -96,6 +96,6 @@ class WinchOperator(Operator, ABC):
 
     @property
     def identity(self) -> dict[str, Any]:
-        """What raw data keep of where they come from."""
+        """Origin of raw data: winch, motor, drive."""
         whose = {"winch": self.winch.reference, "motor": self.winch.motor.model}
         return whose | self.drive_identity.model_dump()

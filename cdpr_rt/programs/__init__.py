@@ -1,1 +1,1 @@
-"""What a running robot can be told to do."""
+"""Programs: the set-points and controllers that a running robot can be commanded to run."""

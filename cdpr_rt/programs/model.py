@@ -38,15 +38,15 @@ class AxesModel:
     cable_m_per_rad: FloatArray
     """Cable paid out per radian, with its sign."""
     gains: tuple[PidGains, ...]
-    """Of the position loops, one an axis."""
+    """Gains of the position loops, one an axis."""
     sweep_gain_Nm_rad: FloatArray
-    """Of the cogging sweep's proportional controller."""
+    """Gain of the cogging sweep's proportional controller, (n,)."""
     compensation: tuple[AxisCompensation | None, ...] = ()
     """Cogging and friction of each motor where they are known; empty where none is."""
 
     @property
     def n(self) -> int:
-        """How many axes there are."""
+        """Number of axes."""
         return len(self.gains)
 
 

@@ -1,1 +1,1 @@
-"""What is particular to each kind of cable robot: its geometry, and how tensions are chosen."""
+"""Model of a cable robot and control of its platform: geometry, tensions, workspace, loops."""

@@ -1,4 +1,4 @@
-"""How a platform in a plane swings about the rotation that no cable controls.
+"""Oscillation of a platform in a plane about the rotation that no cable controls.
 
 See `free_rotation_kernel`: with ψ(p, t) the angle at which tensions t at a position p have no
 moment, a platform whose cables follow its position is turned from there by δ,
@@ -40,7 +40,7 @@ class FreeRotation:
     swing_rad: float
     """The amplitude that a way from corner to corner at full speed leaves, at most."""
     swing_m: float
-    """That of an anchor point."""
+    """Amplitude of an anchor point."""
 
     def lasts_s(self, amplitude_m: float) -> float:
         """Return for how long anchor points swing by more than an amplitude after such a way."""

@@ -1,4 +1,4 @@
-"""What the controller asks of a robot, whatever its cables and directions.
+"""Interface of a robot to the controller, whatever its cables and directions.
 
 `PlatformControl` finds where the platform is and moves it; `RobotModel` says what its file allows,
 by `Kinematics`, `TensionDistribution` and `Workspace`. Programs know these alone; the parts that
@@ -18,16 +18,16 @@ from cdpr_rt.robots.kinematics.pose import Pose
 
 
 class TensionOutcome(IntEnum):
-    """What the tensions of a tension distribution do."""
+    """Outcome of a tension distribution."""
 
     FEASIBLE = 0
     """They carry the wrench within their bounds."""
     SUBSTITUTED = 1
-    """So they do, but the method found none: they are those of minimum deviation."""
+    """As FEASIBLE, but by minimum deviation, since the method itself found none."""
     NEAREST = 2
-    """None within the bounds carry the wrench; these come nearest."""
+    """No tensions within the bounds carry the wrench; these leave the least of it out."""
     SINGULAR = 3
-    """The cables cannot hold one direction whatever their tensions; these come nearest."""
+    """The wrench matrix has not full rank; these leave the least of the wrench out."""
     REFUSED = 4
     """An argument is not finite or of another size, or bounds are reversed: nothing is written."""
 
@@ -57,17 +57,18 @@ class TensionDistribution(Protocol):
 
 
 class Workspace(Protocol):
-    """Where the platform is held; which place and why not, `PlatformControl` says in words."""
+    """Wrench-feasible workspace: the poses at which tensions within bounds hold the platform."""
 
     def capacity_margins(self, poses: FloatArray, least_N: float) -> FloatArray:
-        """Return how far tensions stay within their bounds at poses (m, 4, 3), (m,), N.
+        """Return the capacity margins (m,), N, of poses (m, 4, 3).
 
-        Below 0 where they cannot. One below `least_N` may be less still.
+        That is the greatest distance that all tensions can keep from their bounds, below 0 where
+        some are outside. A margin below `least_N` may be less still.
         """
 
 
 class RobotModel(Protocol):
-    """What a robot's file says of its platform, as the programs compute with it.
+    """Model of a robot's platform from its file, for the programs.
 
     A position (d,) has one entry for each controlled direction: the k coordinates of the origin, m,
     the last of them upward, then the rotation vector from the orientation at home, rad.
@@ -79,7 +80,7 @@ class RobotModel(Protocol):
 
     @property
     def kinematics(self) -> Kinematics:
-        """Of the platform's origin."""
+        """Kinematics about the platform's origin."""
 
     @property
     def low_N(self) -> FloatArray:
@@ -90,16 +91,16 @@ class RobotModel(Protocol):
         """Upper bounds of the tensions, (n,)."""
 
     @property
-    def left_by_torque_N(self) -> FloatArray:
-        """What of the upper bounds motors can pull with beside turning themselves, (n,)."""
+    def torque_limited_N(self) -> FloatArray:
+        """Upper bounds of the tensions, (n,), that motors can hold while rotors accelerate."""
 
     @property
     def positions(self) -> int:
-        """How many coordinates the origin has, k."""
+        """Number of coordinates of the origin, k."""
 
     @property
     def size(self) -> int:
-        """How many directions are controlled, d."""
+        """Number of controlled directions, d."""
 
     @property
     def home(self) -> FloatArray:
@@ -127,7 +128,7 @@ class RobotModel(Protocol):
 
     @property
     def wrench_scale(self) -> FloatArray:
-        """What of each controlled direction counts as much as 1 N, (d,): 1, for moments m."""
+        """Scale that makes forces and moments comparable, (d,): 1, and an arm in m for moments."""
 
     def weight(self) -> FloatArray:
         """Return the wrench of gravity on the platform at home's orientation, (d,)."""
@@ -139,10 +140,10 @@ class RobotModel(Protocol):
         """Return the arrays of the poses (m, 4, 3) at positions (m, d) or (m, k)."""
 
     def least_tensions(self, low_N: FloatArray, high_N: FloatArray) -> TensionDistribution:
-        """Return the distribution that keeps tensions as near to the lower bounds as can be."""
+        """Return the distribution that deviates least from the lower bounds (n,), in squares."""
 
     def workspace(self, acceleration_m_s2: float | None = None) -> Workspace:
-        """Return where the platform is held while it is accelerated; by default as targets are."""
+        """Return the workspace under an acceleration, by default that of the robot's file."""
 
     def contact_on_way(self, positions: FloatArray, looks: int) -> str:
         """Return what is in contact straight from position to position (m, d), "" for nothing.
@@ -152,7 +153,7 @@ class RobotModel(Protocol):
 
 
 class MotorFit(Protocol):
-    """What motors are found to take up of their torque while cables are pulled tight at home."""
+    """Identification of motors' friction and cogging while cables are pulled tight at home."""
 
     def prepare(self, tension_N: FloatArray) -> None:
         """Take the pretension (n,) that is pulled around."""
@@ -186,39 +187,39 @@ class PlatformControl(Controller, Protocol):
     shaped: FloatArray
     """The set-point's position as the control follows it."""
     tension_N: FloatArray
-    """The tensions of the last cycle."""
+    """Commanded tensions of the last cycle."""
     least_N: FloatArray
     """The lowest tensions allowed."""
     low_N: FloatArray
     """The lowest tensions that are planned with."""
     torque_Nm: FloatArray
-    """What the motors may be asked for."""
+    """Highest motor torques that may be commanded, (n,)."""
     estimated: FloatArray
-    """Where the platform is, (d,)."""
+    """Estimated position, (d,)."""
     residual_m: float
-    """How far the cables' lengths are from agreeing: their largest normalised residual."""
+    """Largest normalised residual of the cables' lengths at the estimated pose."""
     suspect: int
-    """The cable that has it, -1 where the lengths do not tell which of them is off."""
+    """Cable with that residual, -1 where the lengths do not tell which of them is wrong."""
 
     @property
     def inertia_kg_m2(self) -> FloatArray:
-        """Of each motor, (n,)."""
+        """Inertia of each motor, (n,)."""
 
     @property
     def pull_fit(self) -> MotorFit:
-        """Finds what motors take up that were not commissioned; learning begins there."""
+        """Identification of motors that were not commissioned; learning begins with its result."""
 
     @property
     def pose(self) -> FloatArray:
-        """Where the platform is, (7,): x y z, quaternion w x y z."""
+        """Estimated pose, (7,): x y z, quaternion w x y z."""
 
     @property
     def swing_rad(self) -> float:
-        """By how much a platform that no cable keeps from turning may swing to and fro; else 0."""
+        """Amplitude of the rotation that no cable controls, 0 where there is none."""
 
     @property
     def swing_m(self) -> float:
-        """By how much an anchor point of such a platform may swing to and fro; else 0."""
+        """Amplitude of an anchor point in that rotation, 0 where there is none."""
 
     @property
     def free_lengths_m(self) -> FloatArray:
@@ -226,7 +227,7 @@ class PlatformControl(Controller, Protocol):
 
     @property
     def learnt_Nm(self) -> FloatArray | None:
-        """Friction and cogging of each motor as learnt in motion, (2, n); None: nothing is."""
+        """Friction and cogging of each motor learnt in motion, (2, n); None without learning."""
 
     def forget_motors(self) -> None:
         """Forget what was learnt of the motors, as where their encoders have begun anew."""
@@ -236,10 +237,10 @@ class PlatformControl(Controller, Protocol):
 
     @property
     def load_cell_fault(self) -> str:
-        """Which load cell is off and by how much, an empty text for none; kept once it is told."""
+        """Load cell that disagrees and by how much, in words; "" for none. Latched."""
 
     def clear_load_cell_fault(self) -> None:
-        """Forget which load cell was off."""
+        """Clear the latched load cell fault."""
 
     def begin(self, feedback: AxisFeedback, tension_N: FloatArray | None = None) -> None:
         """Take the motors to stand where they are, and the platform where its cables have it.
@@ -251,7 +252,7 @@ class PlatformControl(Controller, Protocol):
         """Bring the estimate of the platform's pose up to date, by one cycle."""
 
     def clear_compensation(self) -> None:
-        """Have it said that nothing is added, while a program drives the winches itself."""
+        """Set the recorded compensation to 0, while a program drives the winches itself."""
 
     def stand_still(self, *, on_stand: bool = False) -> None:
         """Have the set-point stand where the platform is, which may rest `on_stand`."""

@@ -1,4 +1,4 @@
-"""What a robot's file says of its platform, as the parts that compute with it."""
+"""Model of a robot's platform from its file: kinematics, tensions, workspace."""
 
 from __future__ import annotations
 
@@ -39,24 +39,24 @@ class PlatformModel:
 
     platform: Platform
     kinematics: CableKinematics
-    about_mass: CableKinematics
-    """The same about the centre of mass, in whose place the origin is."""
+    about_centre_of_mass: CableKinematics
+    """Kinematics about the centre of mass, with it as the origin."""
     low_N: FloatArray
     high_N: FloatArray
     """Bounds of the tensions, (n,)."""
     reserve_N: float
-    """What the control keeps from them."""
-    left_by_torque_N: FloatArray
-    """What of the upper bounds motors can pull with beside turning themselves, (n,)."""
+    """Distance from both bounds that is left to the control."""
+    torque_limited_N: FloatArray
+    """Upper bounds of the tensions, (n,), that motors can hold while rotors accelerate."""
 
     @property
     def positions(self) -> int:
-        """How many coordinates the origin has, k."""
+        """Number of coordinates of the origin, k."""
         return len(self.platform.home_m)
 
     @property
     def size(self) -> int:
-        """How many directions are controlled, d."""
+        """Number of controlled directions, d."""
         return len(self.kinematics.directions)
 
     @cached_property
@@ -99,7 +99,7 @@ class PlatformModel:
 
     @property
     def wrench_scale(self) -> FloatArray:
-        """What of each controlled direction counts as much as 1 N: 1, and for moments an arm, m."""
+        """Scale that makes forces and moments comparable, (d,): 1, and an arm in m for moments."""
         return self._each(1.0, _arm_m(self.platform))
 
     def weight(self) -> FloatArray:
@@ -113,10 +113,10 @@ class PlatformModel:
     def workspace(
         self, acceleration_m_s2: float | None = None, reserve_N: float | None = None
     ) -> CableWorkspace:
-        """Return where the platform is held while it is accelerated along all directions.
+        """Return the workspace in which the platform can accelerate along all directions at once.
 
-        By default as targets are: as much as the file has it, with the control's reserve. Tensions
-        are within their bounds and what the motors' torque leaves of them. Where targets may be
+        By default with the file's acceleration and the control's reserve. Tensions are within
+        their lower bounds and `torque_limited_N`. Where targets may be
         turned there is as much of the angular acceleration; inertia is as at home.
         """
         platform = self.platform
@@ -132,10 +132,10 @@ class PlatformModel:
             platform.mass_kg, wanted, self.positions - 1, directions, turning
         )
         return CableWorkspace(
-            self.about_mass,
+            self.about_centre_of_mass,
             weight,
             self.low_N,
-            self.left_by_torque_N,
+            self.torque_limited_N,
             self.wrench_scale,
             self.reserve_N if reserve_N is None else reserve_N,
             in_space(platform.centre_of_mass_m),
@@ -144,7 +144,7 @@ class PlatformModel:
 
     @cached_property
     def interference(self) -> Interference:
-        """Which of cables, platform and obstacles touch, and where."""
+        """Contact checks among cables, platform and obstacles."""
         platform = self.platform
         body = None
         if platform.body is not None:
@@ -167,7 +167,7 @@ class PlatformModel:
         return "" if contact is None else in_words(contact.things, contact.distance_m)
 
     def least_tensions(self, low_N: FloatArray, high_N: FloatArray) -> TensionSolver:
-        """Return the distribution that keeps tensions as near to the lower bounds as can be."""
+        """Return the distribution that deviates least from the lower bounds (n,), in squares."""
         return tension_distribution("minimum-deviation", low_N, high_N, self.wrench_scale, low_N)
 
     def pose(self, position: FloatArray) -> Pose:
@@ -193,18 +193,18 @@ def platform_model(
     platform: Platform,
     low_N: FloatArray,
     high_N: FloatArray,
-    left_by_torque_N: FloatArray | None = None,
+    torque_limited_N: FloatArray | None = None,
 ) -> PlatformModel:
     """Return the model of a platform whose cables' tensions have these bounds, (n,).
 
-    Motors leave all of them unless `left_by_torque_N` (n,) says less. Raises GeometryError for a
+    `torque_limited_N` (n,) are `high_N` if left out. Raises GeometryError for a
     geometry that no robot has.
     """
     low, high = np.array(low_N, float), np.array(high_N, float)
     kinematics = cable_kinematics(platform)
-    about_mass = cable_kinematics(platform, np.array(platform.centre_of_mass_m))
-    left = high if left_by_torque_N is None else np.array(left_by_torque_N)
-    without = PlatformModel(platform, kinematics, about_mass, low, high, 0.0, left)
+    about_centre_of_mass = cable_kinematics(platform, np.array(platform.centre_of_mass_m))
+    left = high if torque_limited_N is None else np.array(torque_limited_N)
+    without = PlatformModel(platform, kinematics, about_centre_of_mass, low, high, 0.0, left)
     box = np.array([platform.workspace_min_m, platform.workspace_max_m])
     middle = without.poses(box.mean(axis=0)[None])
     margin_N = float(without.workspace(0.0).margins(middle)[0][0])
@@ -238,11 +238,15 @@ def platform_model_of(robot: Robot, limits: Limits | None = None) -> PlatformMod
         np.broadcast_to(bound, (n,)).astype(float)
         for bound in (limits.tension_min_N, limits.tension_max_N)
     )
-    return platform_model(robot.platform, low, high, _left_by_torque(robot, limits, high))
+    return platform_model(robot.platform, low, high, _torque_limited_N(robot, limits, high))
 
 
-def _left_by_torque(robot: Robot, limits: Limits, high_N: FloatArray) -> FloatArray:
-    """Return upper bounds (n,) of tensions: what the motors can hold beside turning themselves."""
+def _torque_limited_N(robot: Robot, limits: Limits, high_N: FloatArray) -> FloatArray:
+    """Return the upper bounds (n,) of tensions that motors can hold while rotors accelerate.
+
+    t = (τ - J a/r)/r with rotor inertia J, cable per radian r, and the largest acceleration a of an
+    anchor point.
+    """
     platform = robot.platform
     assert platform is not None  # asked for by who has one
     torque_Nm = np.asarray(limits.torque_Nm)

@@ -40,7 +40,7 @@ def highest_rad_s(model: PlatformModel, axes: Sequence[RobotAxis], position_m: F
 
 def _squares(model: PlatformModel, axes: Sequence[RobotAxis], position_m: FloatArray) -> FloatArray:
     """Return the eigenvalues, ascending, of m positions, (m, n)."""
-    platform, geometry = model.platform, model.about_mass.geometry
+    platform, geometry = model.platform, model.about_centre_of_mass.geometry
     Q, chosen = model.home_pose.Q, list(free_directions(platform))
     poses = model.poses(np.reshape(position_m, (-1, model.positions)))
     poses[:, 0] += Q @ in_space(platform.centre_of_mass_m)

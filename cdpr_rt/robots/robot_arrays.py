@@ -18,25 +18,25 @@ from cdpr_rt.core.estimate import WinchArrays
 from cdpr_rt.core.supervision.limits import DEFAULT_REACTIONS, Limits, reactions_of
 
 RATED_SPEED_SHARE: Final = 0.2
-"""Of the motors' rated speed, where a robot's file says no other."""
+"""Default speed limit over the motors' rated speed."""
 TORQUE_RISE_S: Final = 0.005
-"""In which the whole torque may be built up, where a robot's file says no other rate."""
+"""Default time in which the whole torque may be built up."""
 CABLE_SAFETY: Final = 5.0
-"""Breaking force over the highest tension, where a robot's file says no other."""
+"""Default safety factor: breaking force over the highest tension."""
 SLACK_SHARE: Final = 0.25
-"""Of the least tension, where a robot's file does not say what is slack."""
+"""Default tension of a slack cable over the least tension allowed."""
 FOLLOWING_m: Final = 0.15
-"""Following error of a platform's cables, where its file says no other: three times the lag at
-which its set-point waits for it."""
+"""Default following error of a platform's cables: three times the lag at which its set-point waits
+for it."""
 DISAGREE_SHARE: Final = 0.0075
 DISAGREE_m: Final = 0.03
-"""By how much lengths may contradict each other, as a share of the diagonal of the box around the
-exit points, and at most, where a robot's file says no other."""
+"""Default limit of the lengths' normalised residual: over the diagonal of the box around the exit
+points, and at most."""
 CALIBRATED_SHARE: Final = 1.0 / 3.0
 CALIBRATED_m: Final = 0.005
-"""Of that once the geometry has been calibrated, and at least."""
+"""Share of it once the geometry has been calibrated, and its least value then."""
 LOW_SHARE: Final = 0.5
-"""Of the least tension, where torques alone tell of tensions."""
+"""Supervised over planned least tension, where tensions are estimated from torques."""
 
 
 def can_lower(robot: Robot) -> bool:
@@ -103,10 +103,10 @@ def _disagreement_m(platform: Platform | None, calibration: GeometryCalibration 
 
 
 def supervisor_limits(limits: Limits, robot: Robot) -> Limits:
-    """Return what a robot's supervisor holds its cables against.
+    """Return the limits of a robot's supervisor from those that are planned with.
 
-    What is planned with are the limits themselves. A tension that is known from torques alone is
-    uncertain by the motors' friction: a platform's cables are told to be low at half the least.
+    A tension that is estimated from torques alone is uncertain by the motors' friction: a
+    platform's cables count as low below half the planned least tension.
     """
     if not can_lower(robot) or robot.tension_sensors is not None:
         return limits
@@ -114,7 +114,7 @@ def supervisor_limits(limits: Limits, robot: Robot) -> Limits:
 
 
 def winches_of(axes: Sequence[RobotAxis]) -> WinchArrays:
-    """Return what the estimate needs of the axes.
+    """Return the winches' arrays for the estimate.
 
     Without a calibration the tension follows from drum and gear, friction left out.
     """

@@ -1,4 +1,4 @@
-"""Which model and which control a robot's platform has."""
+"""Selection of model and control for the platform of a robot's file."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the cables of a robot can hold: its wrench-feasible workspace by tensions."""
+"""Static tensions of a robot's cables over its workspace, and their margins."""
 
 from __future__ import annotations
 
@@ -197,7 +197,7 @@ class PlatformStatics:
 
     def _with_box(self, box: Box) -> PlatformStatics:
         platform = replace(self.platform, workspace_min_m=box.low_m, workspace_max_m=box.high_m)
-        bounds = (self.low_N, self.high_N, self.model.left_by_torque_N)
+        bounds = (self.low_N, self.high_N, self.model.torque_limited_N)
         return PlatformStatics(platform_model(platform, *bounds))
 
     def _fine(self, box: Box) -> FloatArray:

@@ -1,4 +1,4 @@
-"""Where a robot's cables can hold its platform: wrench-feasible workspace of n cables."""
+"""Wrench-feasible workspace of n cables."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ SHARES = np.linspace(0.0, 1.0, 33)
 
 
 class CableWorkspace:
-    """Poses at which tensions within bounds carry each of some wrenches.
+    """Wrench-feasible workspace: poses at which tensions within bounds carry each of some wrenches.
 
     The margin of a pose is the greatest distance, N, that all tensions can keep from both their
     bounds while they carry the worst of the wrenches: W t + w_e = 0, eq. (3.80). Below zero it is

@@ -54,7 +54,7 @@ class Operator:
 
     @property
     def lateness(self) -> Lateness:
-        """How the deadlines were kept."""
+        """Statistics of the deadlines."""
         cycle = self._engine.cycle
         return Lateness() if cycle is None else cycle.lateness
 

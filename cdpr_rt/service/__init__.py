@@ -1,1 +1,1 @@
-"""What serves the control loop to people and programs, from a process of its own."""
+"""Service: the control loop's interfaces to people and programs, in a process of its own."""

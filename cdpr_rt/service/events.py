@@ -1,4 +1,4 @@
-"""What happened to the daemon, in order: states, reasons, commands, faults of its own parts."""
+"""Event log of the daemon: states, reasons, commands, faults of its own parts."""
 
 from __future__ import annotations
 

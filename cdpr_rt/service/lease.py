@@ -30,10 +30,10 @@ class Holder:
 
 @dataclass(frozen=True)
 class LeaseRenewal:
-    """What a token has renewed: the taking it belongs to, and for how long at a time."""
+    """Renewal of a lease."""
 
     number: int
-    """Of the grant; what is asked for with it counts under this grant only."""
+    """Number of the grant; commands with it count under this grant only."""
     ttl_s: float
 
 

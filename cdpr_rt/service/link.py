@@ -40,13 +40,13 @@ class CommandTooLongError(ControlError):
 
 @dataclass(frozen=True)
 class Reply:
-    """What the loop answered."""
+    """Reply of the loop."""
 
     ok: bool
     text: str
     state: str
     refusal: dict[str, Any] | None = None
-    """Why it was refused, as `Refusal.as_json`, None where there are only words."""
+    """Refusal as `CommandRefusal.as_json`, None where there are only words."""
 
 
 class LoopLink:
@@ -91,7 +91,7 @@ class LoopLink:
 
     @property
     def ended_how(self) -> str:
-        """What is known of the loop's end, "" while it lives."""
+        """Reason of the loop's end, "" while it lives."""
         if not self.dead:
             return ""
         status = self.status()

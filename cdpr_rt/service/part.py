@@ -1,4 +1,4 @@
-"""What runs beside the control interface in the service's process: recorder, live view, stream."""
+"""Base class of what runs beside the control interface: recorder, live view, stream."""
 
 from __future__ import annotations
 

@@ -14,7 +14,7 @@ LABELS: Final = {
     for field in FIELDS.values()
     if field.labels is not None
 }
-"""What the numbers of some fields stand for."""
+"""Names of the numbers of some fields."""
 
 
 def newest_row(block: SharedBlock) -> Row | None:

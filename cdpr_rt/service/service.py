@@ -1,4 +1,4 @@
-"""What the control interface stands on: the loop's link, the right to move, and the parts."""
+"""State of the service behind the control interface: link to the loop, lease, parts."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ WAIT_S: Final = {
     "shutdown": 30.0,
     "program": 15.0,
 }
-"""How long a reply may take; all others come within a few cycles."""
+"""Time-outs of replies; all others come within a few cycles."""
 _WAIT_S = 3.0
 
 
@@ -52,13 +52,13 @@ class Service:
         self.planner = PathPlanRunner()
         """Plans paths, in a process of its own."""
         self.stream: SetpointStream | None = None
-        """That which has started, None where set-points are not received."""
+        """The running set-point stream, None where none is received."""
         self.counts = {"refused": 0, "live_clients": 0, "slow_clients_dropped": 0}
         """Figures of the service itself, shown as the part `service`."""
         self.background: list[Callable[[], Coroutine[Any, Any, None]]] = []
-        """What else runs while the service does, until cancelled."""
+        """Further coroutines that run while the service does, until cancelled."""
         self.http: tuple[str, int] | None = None
-        """Where it listens on TCP, None where it does not."""
+        """Address at which it listens on TCP, None where it does not."""
         self.end_daemon: Callable[[], None] = lambda: None
         """Ends the daemon where its loop has died, and no command can reach it."""
         self._held_by = ""

@@ -1,4 +1,4 @@
-"""What is wrong with images and markers, and whom to believe where camera and cables disagree."""
+"""Faults of images and markers, and which is right where camera and cables disagree."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ _COUNTS: Final[dict[FaultKind, int]] = {"size": 1, "drum": 0, "lens": 9}
 _AT_ONCE = 3
 """Cables that slip from one pose to the next, of which it is asked whether they did."""
 _SURE = 9.0
-"""By how much one explanation has to fit better than others, in the sum of squares."""
+"""Ratio of sums of squares by which one explanation has to fit better than others."""
 
 
 def map_faults(found: MapFit, sightings: Sequence[Sighting]) -> list[Fault]:
@@ -97,7 +97,7 @@ def told_right(geometry: CableGeometry, found: Fit, first: MapFit) -> tuple[Fit,
 
 @dataclass(frozen=True)
 class _Cause:
-    """What was told wrong, and the fit with that set free, which takes so many numbers."""
+    """Explanation by a wrong figure of the file, and the fit with it free, by so many numbers."""
 
     kinds: tuple[FaultKind, ...]
     count: int

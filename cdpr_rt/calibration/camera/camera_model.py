@@ -1,4 +1,4 @@
-"""What is fitted of a camera: its place on the platform, the size of sheets, lens, and markers.
+"""Fitted parameters of a camera: its place on the platform, the size of sheets, lens, markers.
 
 The order of its parameters is: position and rotation of the camera on the platform (6), relative
 size of all sheets (1), of the lens those with a standard deviation (up to 9), and position and
@@ -18,21 +18,21 @@ from cdpr_rt.calibration.markers.reprojection import Views
 from cdpr_rt.calibration.markers.seen_markers import SeenMarkers
 
 SIZE, LENS = 6, 7
-"""Where the relative size of the sheets, and the lens, begin among the parameters."""
+"""Indices of the relative size of the sheets, and of the lens, among the parameters."""
 _FREE = 10.0
 """Standard deviation of what nothing is known of, m and rad: next to no observation."""
 
 
 @dataclass(frozen=True)
 class CameraKnowledge:
-    """What is known of a camera and its markers before the fit."""
+    """Prior knowledge of a camera and its markers."""
 
     position_m: FloatArray
-    """Of the camera on the platform, (3,)."""
+    """Position of the camera on the platform, (3,)."""
     rotation: FloatArray
-    """From its frame to the platform's, (3, 3)."""
+    """Rotation from its frame to the platform's, (3, 3)."""
     hand_eye_std: FloatArray
-    """Of both, m and rad, (6,)."""
+    """Standard deviations of both, m and rad, (6,)."""
     size_std: float
     """Relative, of the size of all sheets alike."""
     lens: FloatArray
@@ -49,7 +49,7 @@ class CameraKnowledge:
     sigma_px: float
     """By which corners are weighted: noise, and what sheets are off by themselves."""
     noise_px: float
-    """Of corners, which tells those that do not fit."""
+    """Noise of corners, by which outliers are found."""
 
 
 @dataclass(frozen=True)
@@ -72,17 +72,17 @@ class CameraModel:
 
     @cached_property
     def free_lens(self) -> IntArray:
-        """Which parameters of the lens are fitted."""
+        """Indices of the fitted parameters of the lens."""
         return np.flatnonzero(self.knowledge.lens_std > 0.0)
 
     @property
     def first_marker(self) -> int:
-        """Where the markers' parameters begin."""
+        """Index of the markers' first parameter."""
         return LENS + len(self.free_lens)
 
     @property
     def size(self) -> int:
-        """How many parameters there are."""
+        """Number of parameters."""
         return 0 if self.held else self.first_marker + 6 * len(self.ids)
 
     def known_std(self) -> FloatArray:

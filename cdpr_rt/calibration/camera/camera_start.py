@@ -24,9 +24,9 @@ from cdpr_rt.calibration.readings.observations import Observations
 from cdpr_rt.errors import InvalidRequestError
 
 _UNKNOWN_STD = (0.5, 0.5, 0.5, 1.0, 1.0, 1.0)
-"""Of a camera's place on the platform of which nothing is told, m and rad."""
+"""Prior standard deviation of a camera's unknown place on the platform, m and rad."""
 _LIKELY_deg, _LIKELY_SIGMAS = 15.0, 6.0
-"""Of the camera's rotation: a robot's file lets its platform's turns be told only roughly."""
+"""Largest likely error of the camera's rotation: by a robot's file turns are known only roughly."""
 _ROOM_m, _ROOM_rad = 0.2, 0.15
 """A layout of known markers that lies no further off than this by the robot's file is in its room.
 """

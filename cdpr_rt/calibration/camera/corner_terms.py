@@ -1,4 +1,4 @@
-"""What corners of markers add to the fit: residuals, derivatives and their normal equations.
+"""Terms of markers' corners in the fit: residuals, derivatives and their normal equations.
 
 A corner is seen at π(R_c^T (t_m + R_m s c - p_c)) with p_c = p + Q h and R_c = Q R_h for a platform
 at (p, Q) and a camera at (h, R_h) on it. With the derivative D by the camera's pose, those by the

@@ -1,4 +1,4 @@
-"""Where a camera is on a platform, from poses of both: closed forms to begin a fit at.
+"""Hand-eye calibration: a camera's place on a platform from poses of both, in closed form.
 
 Platform poses (Q_j, p_j) in the room and camera poses (C_j, c_j) in the frame of a map go with the
 camera's place on the platform (X, x) and the map's in the room (Z, z) as

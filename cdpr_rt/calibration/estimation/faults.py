@@ -1,4 +1,4 @@
-"""What is wrong with the observations: a cable slack or slipped, a drum that is another."""
+"""Faults of observations: a cable slack or slipped, another drum than in the file."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ FaultKind = Literal[
     "slack", "outlier", "jump", "drum", "elongation", "image", "marker", "camera", "lens", "size"
 ]
 _OUTLIER, _JUMP = 25.0, 40.0
-"""By how much leaving it out should lower the sum of squared residuals, to first order."""
+"""Least reduction of the sum of squared residuals by leaving it out, to first order."""
 _LEAST_GAIN = 16.0
-"""By how much it has to, over the variance of what is left (F-test)."""
+"""Least reduction over the variance of what is left (F-test)."""
 _MOST_FAULTS = 16
 _ALIKE, _MAYBE = 0.8, 0.2
 _ENDS = 2

@@ -49,7 +49,7 @@ class Fit:
 
     geometry: CableGeometry
     jumps_m: FloatArray
-    """Of the lengths that jumped, as of the observations."""
+    """Sizes of the jumps of lengths, in the order of the observations' jumps."""
     poses: FloatArray
     """(N, 4, 3)"""
     seen: Observations
@@ -74,7 +74,7 @@ class Fit:
     """Sum of squared residuals of lengths and measured poses over their degrees of freedom: 1 where
     the standard deviations hold."""
     corner_factor: float
-    """The same of corners of markers, by the median of their distances; 1 without."""
+    """Variance factor of corners of markers, by the median of their distances; 1 without."""
     total_cost: float
     """Of all that was observed and known before, as far as the losses count it."""
     steps: int
@@ -104,7 +104,7 @@ class Fit:
 
     @property
     def length_residual_m(self) -> FloatArray:
-        """What the lengths are off, in units of their standard deviation, (N, n)."""
+        """Residuals of the lengths in units of their standard deviations, (N, n)."""
         return self.at.residual[:, : self.geometry.n]
 
 
@@ -137,7 +137,7 @@ def fit(
 
 @dataclass(frozen=True)
 class _State:
-    """All unknowns at one place of the search, and what it costs."""
+    """All unknowns at one step of the search, and their cost."""
 
     geometry: CableGeometry
     jumps: FloatArray
@@ -145,7 +145,7 @@ class _State:
     poses: FloatArray
     at: Linearised
     off_px: FloatArray
-    """Of corners, (n, 4, 2)."""
+    """Residuals of corners, (n, 4, 2)."""
     prior: FloatArray
     cost: float
 

@@ -1,4 +1,4 @@
-"""How uncertain lengths and tensions were, by what they leave over: neither is known before.
+"""Standard deviations of lengths and tensions from residuals: neither is known before.
 
 Tensions t hold the platform: W t + w = 0, with the wrench matrix W and the weight's wrench w, which
 is linear in the mass m and in m c. With W = U S V^T the d numbers S^-1 U^T (W t + w) of a pose have

@@ -1,4 +1,4 @@
-"""What of a robot's geometry is identified: its parameters, their names, and what is known before.
+"""Identified parameters of a robot's geometry: their names, and prior knowledge of them.
 
 A vector of parameters is, for each cable in turn, those of `CABLE_KINDS` that are identified, and
 after them the elongation where it is. Each is what to add to what the robot's file says.
@@ -42,9 +42,9 @@ class Knowledge:
     """Standard deviations of what is known before: of the file's geometry, and of readings."""
 
     exit_m: float = 0.05
-    """Of each coordinate of an exit point: a tape measure's."""
+    """Standard deviation of each coordinate of an exit point: a tape measure's."""
     offset_m: float = 0.2
-    """Of a cable's length when the encoders began to count."""
+    """Standard deviation of a cable's length when the encoders began to count."""
     drum: float = 0.005
     """Relative, of the cable that a turn of the motor pays out."""
     anchor_m: float = 0.002
@@ -52,9 +52,9 @@ class Knowledge:
     elongation: float = 0.5
     """Relative, of the elongation by tension."""
     length_m: float = 0.0003
-    """Of a cable length as the encoder has it, from one pose to the next."""
+    """Standard deviation of a cable length by the encoder, from one pose to the next."""
     tension_N: float = 3.0
-    """Of a tension as the motor's torque tells it: its dry friction."""
+    """Standard deviation of a tension by the motor's torque: its dry friction."""
     yielding: float = 1.0
     """By how many times the file's elongation noise of tensions makes lengths uncertain."""
     slope_noise: float = 0.0
@@ -115,17 +115,17 @@ class CableGeometry:
 
     @property
     def n(self) -> int:
-        """How many cables there are."""
+        """Number of cables."""
         return self.model.kinematics.n
 
     @property
     def coordinates(self) -> int:
-        """How many coordinates a point has."""
+        """Number of coordinates of a point."""
         return self.model.positions
 
     @cached_property
     def free(self) -> tuple[int, ...]:
-        """Which entries of a twist a pose is looked for in; an angle that is free among them."""
+        """Components of the twist in which poses are estimated, a free angle among them."""
         directions = self.model.kinematics.directions
         return (*directions, 5) if self.turns else directions
 
@@ -136,7 +136,7 @@ class CableGeometry:
 
     @cached_property
     def rows(self) -> tuple[int, ...]:
-        """Which of a cable's nine parameters are identified."""
+        """Identified ones among a cable's nine parameters."""
         return tuple(
             row
             for kind in self.identified
@@ -146,12 +146,12 @@ class CableGeometry:
 
     @property
     def shared(self) -> int:
-        """How many parameters all cables share: the elongation, or none."""
+        """Number of parameters that all cables share: the elongation, or none."""
         return int("elongation" in self.identified)
 
     @property
     def size(self) -> int:
-        """How many parameters are identified."""
+        """Number of identified parameters."""
         return self.n * len(self.rows) + self.shared
 
     def values(self) -> FloatArray:

@@ -1,4 +1,4 @@
-"""What noise of tensions does to a fit: lengths of a pose err together, and the elongation too.
+"""Effect of noisy tensions on a fit: lengths of a pose err together, and the elongation too.
 
 A length that yields by l c (1 + κ) t errs with the tension by (1 + κ) A e, A = l c / σ. So does its
 derivative A t by κ, which is told as A (t + e). Of the information I about κ it feigns
@@ -26,7 +26,7 @@ from cdpr_rt.calibration.estimation.residuals import length_std_m
 from cdpr_rt.calibration.readings.observations import Observations
 
 _MOST_SHARE = 0.9
-"""Of the information about the elongation that is taken for noise."""
+"""Share of the information about the elongation that is taken for noise."""
 
 
 def slope_covariance(geometry: CableGeometry, seen: Observations) -> FloatArray:

@@ -46,19 +46,19 @@ class BundleError(ControlError):
 
 @dataclass(frozen=True)
 class Bundle:
-    """What fits best, and how well."""
+    """Result of the bundle adjustment."""
 
     estimate: Estimate
     off_px: FloatArray
-    """How far each corner is off, (n, 4)."""
+    """Distance of each corner from its prediction, (n, 4)."""
     weight: FloatArray
-    """Of each corner in the fit, (n, 4), 1 for one that fits."""
+    """Weight of each corner in the fit, (n, 4), 1 for one that fits."""
     sigma_px: float
     """Standard deviation of a coordinate of a corner, from the weighted residuals."""
     covariance: FloatArray
-    """Of all parameters (p, p) in the order of `reprojection`, 0 for what is held fixed."""
+    """Covariance of all parameters (p, p) in the order of `reprojection`, 0 for fixed ones."""
     sheets: SheetErrors
-    """What the sheets are off by themselves; the covariance has it in it."""
+    """Errors of the sheets themselves, which the covariance contains."""
     steps: int
 
     @property

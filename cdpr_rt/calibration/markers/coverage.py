@@ -22,7 +22,7 @@ _LISTED = 12
 
 @dataclass(frozen=True)
 class Coverage:
-    """How the images hang together."""
+    """Connection of the images by the markers that they share."""
 
     images: int
     ids: tuple[int, ...]

@@ -1,4 +1,4 @@
-"""What is wrong with a map that fits badly: which marker, how, or whether it is the lens.
+"""Diagnosis of a map that fits badly: which marker, how, or whether it is the lens.
 
 Each image that locates its camera by the other markers measures a marker anew. If these places
 differ by more than they can, the marker was moved (all images before some instant agree, and all
@@ -20,7 +20,7 @@ from cdpr_rt.calibration.markers.seen_markers import SeenMarkers
 from cdpr_rt.errors import ControlError
 
 _BAD_SHARE = 0.25
-"""Of a marker's images that do not fit, from which on it is looked at."""
+"""Share of a marker's images that do not fit, from which on it is examined."""
 _BAD_SIGMAS = 6.0
 _LEAST_IMAGES = 3
 """Of a marker that is partly covered in others, to stay in the map."""
@@ -55,7 +55,7 @@ class Suspect:
 
 @dataclass(frozen=True)
 class LensSuspicion:
-    """What the images say about the intrinsics they were given."""
+    """Diagnosis of the intrinsics by the images."""
 
     wrong: bool
     focal_change: float

@@ -30,7 +30,7 @@ _EDGE_COST = 0.05
 
 @dataclass(frozen=True)
 class Pair:
-    """How marker `b` lies in the frame of marker `a`, and how many images agree."""
+    """Pose of marker `b` in the frame of marker `a`, and the number of images that agree."""
 
     a: int
     b: int
@@ -38,11 +38,11 @@ class Pair:
     position_m: FloatArray
     images: int
     of: int
-    """How many show both."""
+    """Number of images that show both."""
 
     @property
     def cost(self) -> float:
-        """What a step along it costs: little where many images agree, and few do not."""
+        """Cost of a step along it: small where many images agree, and few do not."""
         return _EDGE_COST + (self.of / self.images) ** 2 / self.images
 
 

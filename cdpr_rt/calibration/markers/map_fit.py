@@ -34,7 +34,7 @@ _MISFIT_WEIGHT, _MISFIT_SHARE = 0.05, 0.05
 
 @dataclass(frozen=True)
 class KnownFit:
-    """How a map that was made without them agrees with the markers whose places are known."""
+    """Agreement of a map with the known places of markers that it was made without."""
 
     scale: float
     """Distances in the layout over those of the map."""
@@ -49,7 +49,7 @@ class MapFit:
 
     bundle: Bundle
     seen: SeenMarkers
-    """What the map was made from."""
+    """Markers that the map was made from."""
     fixed: tuple[int, ...]
     coverage: Coverage
     dropped: tuple[Suspect, ...]
@@ -57,11 +57,11 @@ class MapFit:
     lens: LensSuspicion
     known: KnownFit | None
     faults: tuple[str, ...]
-    """What is wrong, in words; the map is not to be trusted where there is one."""
+    """Faults in words; the map is not to be trusted where there is one."""
     warnings: tuple[str, ...]
-    """What was wrong with markers that are not in the map, which is the better for it."""
+    """Faults of markers that were left out of the map."""
     notes: tuple[str, ...]
-    """What should be known."""
+    """Warnings in words."""
 
     @property
     def map(self) -> MarkerMap:

@@ -73,7 +73,7 @@ class MarkerMap:
 
 @dataclass(frozen=True)
 class MapDifference:
-    """How a map differs from another in the frame of one marker: thesis, figures 3.20 and 3.21."""
+    """Differences of a map from another in the frame of one marker: thesis, figures 3.20, 3.21."""
 
     ids: tuple[int, ...]
     distance_m: FloatArray

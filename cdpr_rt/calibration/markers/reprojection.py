@@ -1,4 +1,4 @@
-"""Where a map has corners seen, and the sparse derivatives of that; the fit's other terms join it.
+"""Reprojection of a map's corners with sparse derivatives, and the fit's other residuals.
 
 Parameters are changed as poses of the platform are: (position + x_p, exp(x_φ) rotation), both along
 the axes of the map. Their order is: 6 of each image's camera, 6 of each marker, then 9 of the lens.
@@ -30,7 +30,7 @@ class Estimate:
 
     @property
     def parameters(self) -> int:
-        """How many numbers can be changed."""
+        """Number of parameters."""
         return 6 * len(self.map.names) + 6 * len(self.map.ids) + LENS_PARAMETERS
 
     def changed(self, step: FloatArray) -> Estimate:
@@ -56,7 +56,7 @@ class Corners:
     """
 
     off_px: FloatArray
-    """By how much corners are expected right of and below where they were seen, (n, 4, 2)."""
+    """Predicted less seen corners, to the right and down, (n, 4, 2)."""
     by_camera: FloatArray
     """(n, 8, 6)"""
     by_marker: FloatArray

@@ -1,4 +1,4 @@
-"""What was seen of markers in a set of images."""
+"""Markers seen in a set of images."""
 
 from __future__ import annotations
 

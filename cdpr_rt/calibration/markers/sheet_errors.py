@@ -1,4 +1,4 @@
-"""How much sheets differ from squares of the size told, and what that does to a map's covariance.
+"""Errors of printed sheets against squares of their nominal size, and a map's covariance by them.
 
 Noise is new in each image; a sheet's errors (scale of the printer, paper that is not flat) are the
 same in all. They do not average out, and a covariance that takes them for noise is too small.
@@ -23,7 +23,7 @@ _SIGMAS = 3.0
 
 @dataclass(frozen=True)
 class SheetErrors:
-    """What the corners' residuals have in common over images, on their sheets."""
+    """Common part of the corners' residuals over images, on their sheets."""
 
     sigma_m: float
     """Standard deviation of a coordinate of a corner on its sheet; 0 where none shows."""

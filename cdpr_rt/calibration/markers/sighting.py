@@ -1,4 +1,4 @@
-"""What one image shows of markers: what a detector hands on, and what data files hold."""
+"""Markers detected in one image, as detectors return them and data files hold them."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from cdpr_rt.arrays import FloatArray
 
 @dataclass(frozen=True)
 class Sighting:
-    """What one image shows."""
+    """Markers detected in one image."""
 
     name: str
     corners_px: Mapping[int, FloatArray]
-    """Of each marker that is there once and sharp, (4, 2)."""
+    """Corners of each marker that is there once and sharp, (4, 2)."""
     repeated: tuple[int, ...] = ()
     """Ids that are there more than once."""
     unsharp: tuple[int, ...] = ()
@@ -22,7 +22,7 @@ class Sighting:
     mirrored: tuple[int, ...] = ()
     """Ids that only a mirror image of it shows."""
     problem: str | None = None
-    """What is wrong with the image as a whole, in words."""
+    """Fault of the image as a whole in words, "" for none."""
 
 
 def laid_out(sightings: Sequence[Sighting], placed: Collection[int]) -> list[Sighting]:

@@ -1,1 +1,1 @@
-"""What a calibration measured: files of readings, and the arrays that the fit takes."""
+"""Readings of a calibration: files, and arrays for the fit."""

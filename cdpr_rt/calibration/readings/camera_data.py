@@ -1,4 +1,4 @@
-"""What a camera on the platform adds to the data of a calibration: its setup, and what it saw."""
+"""Data of a camera on the platform in a calibration: its setup, and its images."""
 
 from __future__ import annotations
 
@@ -23,15 +23,15 @@ _Id = Annotated[int, Field(ge=0, lt=1024)]
 
 
 class HandEye(Profile):
-    """Where the camera is on the platform, as far as that is known before."""
+    """Prior knowledge of the camera's pose on the platform."""
 
     position_m: Annotated[tuple[_Length_m, ...], Field(min_length=3, max_length=3)]
-    """Of the camera's pinhole in the platform's frame."""
+    """Position of the camera's pinhole in the platform's frame."""
     rotation_deg: Annotated[tuple[_Angle_deg, ...], Field(min_length=3, max_length=3)]
     """Rotation vector from the camera's frame, z where it looks and x to the right of the image,
     to the platform's."""
     position_std_m: Annotated[float, Field(ge=1e-6, le=10.0)] = 0.005
-    """Of each coordinate: a ruler's."""
+    """Standard deviation of each coordinate: a ruler's."""
     rotation_std_deg: Annotated[float, Field(ge=1e-4, le=180.0)] = 2.0
     """About each axis."""
 
@@ -48,7 +48,7 @@ class CameraSetup(Profile):
     size_std: Annotated[float, Field(ge=1e-6, le=0.5)] = 0.002
     """Relative: how well the size of the sheets, all alike, is known."""
     known_std_m: Annotated[float, Field(ge=1e-6, le=1.0)] = 0.001
-    """Of each coordinate of a corner of a marker whose place is known."""
+    """Standard deviation of each coordinate of a corner of a marker whose place is known."""
     hand_eye: HandEye | None = None
     """None where nothing is known of it: the robot's own turning tells it."""
 
@@ -85,7 +85,7 @@ class MarkerReading(Profile):
 
 
 class ImageReading(Profile):
-    """What the image of a pose showed; of none that could be used `markers` is empty."""
+    """Image of a pose; `markers` is empty where none could be used."""
 
     markers: Annotated[tuple[MarkerReading, ...], Field(max_length=1024)] = ()
     repeated: tuple[_Id, ...] = ()
@@ -93,7 +93,7 @@ class ImageReading(Profile):
     mirrored: tuple[_Id, ...] = ()
     """Ids that only its mirror image shows."""
     problem: Annotated[str, Field(max_length=500)] | None = None
-    """What is wrong with the image as a whole."""
+    """Fault of the image as a whole in words, "" for none."""
 
     @classmethod
     def of(cls, seen: Sighting) -> Self:
@@ -121,7 +121,7 @@ class ImageReading(Profile):
 
 @dataclass(frozen=True)
 class Images:
-    """What the camera on the platform saw, an image for each pose, and what took them."""
+    """Images of the camera on the platform, one for each pose, and its setup."""
 
     setup: CameraSetup
     sightings: Sequence[Sighting]

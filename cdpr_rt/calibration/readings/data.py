@@ -1,4 +1,4 @@
-"""What a calibration measured, as a file; and points that a person measured beside it."""
+"""Data files of a calibration: its readings, and points that a person measured beside it."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ Numbers = tuple[Annotated[float, Field(ge=-1e6, le=1e6)], ...]
 
 
 class PoseReading(Profile):
-    """What was read while the platform stood somewhere."""
+    """Readings while the platform stood at one pose."""
 
     target: Numbers
     """Where it was to be, (d,), as the program `pose` takes it, or where it stood where it did not
@@ -51,7 +51,7 @@ class PoseReading(Profile):
     rotation: tuple[Numbers, ...] | None = None
     rotation_std_rad: float | None = Field(default=None, gt=0)
     image: ImageReading | None = None
-    """What the camera on the platform saw there."""
+    """Image of the camera on the platform there."""
 
     @model_validator(mode="after")
     def _measured_wholly(self) -> PoseReading:
@@ -76,7 +76,7 @@ class CalibrationData(Profile):
     format: Literal["cdpr-rt geometry data 1"] = "cdpr-rt geometry data 1"
     robot: str
     geometry_sha256: str
-    """Of the robot's files as loaded when the platform was measured."""
+    """Digest of the robot's files as loaded when the platform was measured."""
     simulated: bool
     """Whether it was a simulated robot; what is found then moves no other."""
     date: str
@@ -173,7 +173,7 @@ def load_data(path: Path) -> CalibrationData:
 
 @dataclass(frozen=True)
 class MeasuredPoint:
-    """Where the platform's origin was at a pose, as far as it was measured; nan where not."""
+    """Measured position of the platform's origin at a pose; nan where not measured."""
 
     pose: int
     """Counted from 0."""

@@ -1,4 +1,4 @@
-"""What was observed at the poses of a calibration: lengths, tensions, measured poses, markers."""
+"""Observations at the poses of a calibration: lengths, tensions, measured poses, markers."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class Observations:
     start: FloatArray
     """Poses to begin the search at, as arrays of `Pose`, (N, 4, 3)."""
     used: BoolArray
-    """Which lengths count, (N, n)."""
+    """Whether a length counts, (N, n)."""
     position_m: FloatArray
     """Measured positions in the room, (N, 3)."""
     position_std_m: FloatArray
@@ -36,13 +36,13 @@ class Observations:
     rotation_std_rad: FloatArray
     """About each of the room's axes, (N, 3)."""
     target_m: FloatArray
-    """Which point of the platform `position_m` is of, (3,)."""
+    """Point of the platform to which `position_m` belongs, (3,)."""
     reference_m: FloatArray
     """Lengths when the encoders began to count, about which drum errors turn, (n,)."""
     jumps: tuple[tuple[int, int], ...] = ()
     """(cable, pose) where a cable's length jumped: from this pose on it has another offset."""
     markers: SeenMarkers | None = None
-    """What the camera on the platform saw, an image for each pose."""
+    """Markers seen by the camera on the platform, an image for each pose."""
     tension_free: FloatArray | None = None
     """Projections on what noise of tensions is left, (N, n, n), where their balance has told the
     rest; None for all of it."""
@@ -75,7 +75,7 @@ class Observations:
 
     @property
     def poses(self) -> int:
-        """How many poses there are."""
+        """Number of poses."""
         return len(self.length_m)
 
     @property

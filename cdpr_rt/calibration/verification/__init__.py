@@ -1,1 +1,1 @@
-"""How good a fit is: on poses held out, by its covariance, and with further poses."""
+"""Quality of a fit: on poses held out, by its covariance, and with further poses."""

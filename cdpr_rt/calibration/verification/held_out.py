@@ -45,7 +45,7 @@ class Reference:
     setup: CameraSetup
     map: MapFit
     images: Images
-    """Of the poses held out."""
+    """Images of the poses held out."""
 
 
 @dataclass(frozen=True)
@@ -53,9 +53,9 @@ class Unused:
     """The poses held out, and the fit to all others."""
 
     index: IntArray
-    """Which poses they are, counted from 0."""
+    """Indices of the poses held out."""
     seen: Observations
-    """What was read there; without what hung slack, with jumps as the other poses tell them."""
+    """Observations there, without slack cables, with jumps as the other poses tell them."""
     part: Fit
     reference: Reference | None
     """With which they are compared where a camera saw them; None without one."""

@@ -1,4 +1,4 @@
-"""What further poses would bring: the covariance once there are more of the same kind."""
+"""Predicted covariance with further poses of the same kind."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from cdpr_rt.calibration.estimation.fit import Fit
 
 MORE = 10
-"""Poses of which is told what they would bring."""
+"""Number of further poses in predictions."""
 
 
 def with_more_poses(found: Fit, more: int = MORE) -> Fit:

@@ -1,4 +1,4 @@
-"""How good a calibration is, and what it leaves open: in numbers and in words."""
+"""Quality of a calibration and its undetermined directions, in numbers and in words."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ _EXPLAINED = 0.6
 _LEAST_SPARE = 4
 _AXES = "xyz"
 _CHANCE = 0.001
-"""Of a change that is noise to be taken for one that is there."""
+"""Probability by which noise passes for a significant change."""
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,7 @@ class OpenDirection:
     what: str
     advice: str
     share: float
-    """Of its variance before that is left, 0.5 to 1."""
+    """Share of its prior variance that is left, 0.5 to 1."""
 
 
 def require_enough(geometry: CableGeometry, seen: Observations) -> None:
@@ -165,18 +165,17 @@ def predicted_std(found: Fit, poses: FloatArray, relative: bool = False) -> Floa
 
 @dataclass(frozen=True)
 class CalibrationChange:
-    """By how much a calibration changes a robot's file, all parameters together."""
+    """Change of a robot's file by a calibration, all parameters together."""
 
     moved_m: float
     """Root mean square of by how much positions in the workspace move."""
     chi_squared: float
     degrees_of_freedom: float
-    """How many parameters the observations tell; chi squared on the average if the file is right.
-    """
+    """Number of parameters that observations determine: mean of chi squared for a right file."""
 
     @property
     def chance(self) -> float:
-        """How often noise alone would change as much."""
+        """Probability of as large a change by noise alone."""
         degrees = self.degrees_of_freedom
         return float(chi2.sf(self.chi_squared, degrees)) if degrees > 0.0 else 1.0
 

@@ -1,4 +1,4 @@
-"""How poses by lengths alone compare with what else was seen of them, on poses held out."""
+"""Comparison of poses by lengths alone with independent measurements, on poses held out."""
 
 from __future__ import annotations
 
@@ -18,17 +18,17 @@ from cdpr_rt.calibration.markers.geometry.rotations import logarithms
 from cdpr_rt.calibration.readings.observations import Observations
 
 _LEAST_MARKERS = 2
-"""That an image must show for a pose: the tilt of one alone is not known well."""
+"""Least markers in an image for a pose: the tilt of one alone is not known well."""
 _LEAST_POSES = 3
 _SURE = 0.975
-"""How seldom chance alone may make poses told worse: one in forty, some two standard errors."""
+"""Quantile of the test whether poses are told worse: some two standard errors."""
 _GROSS = 2.0
-"""So many times the error before is worse, whatever part of it chance has."""
+"""Ratio of root mean squares from which on errors are worse, whatever the test says."""
 
 
 @dataclass(frozen=True)
 class Scale:
-    """How many times as large distances between poses are as those that lengths tell."""
+    """Ratio of measured distances between poses to those by lengths."""
 
     factor: float
     std: float
@@ -63,7 +63,7 @@ def _ratio(told_m: FloatArray, measured_m: FloatArray) -> float:
 
 @dataclass(frozen=True)
 class Verification:
-    """How lengths alone tell poses that the fit has not seen, beside what was measured there."""
+    """Errors of poses by lengths alone, at poses that the fit has not used."""
 
     poses: int
     errors_m: FloatArray
@@ -71,24 +71,24 @@ class Verification:
     told_m: FloatArray
     """Positions by lengths, (M, k)."""
     turn_errors_rad: FloatArray
-    """Of the rotations, where those were measured, (M, 3)."""
+    """Errors of the rotations, where those were measured, (M, 3)."""
     residual_m: float
-    """Root mean square of what lengths contradict each other by."""
+    """Root mean square of the lengths' residuals."""
     squares_m2: FloatArray
-    """Sum of the squares of that at each pose, (N,)."""
+    """Sum of squares of the lengths' residuals at each pose, (N,)."""
     by_camera: bool = False
     """Whether the camera measured the poses, on a map of the images of other poses alone."""
 
     @property
     def kind(self) -> Literal["camera", "points", "none"]:
-        """What told the poses that lengths are compared with, in a word."""
+        """Kind of the reference with which poses by lengths are compared."""
         if not self.errors_m.size:
             return "none"
         return "camera" if self.by_camera else "points"
 
     @property
     def reference(self) -> str:
-        """The same in words."""
+        """Reference in words."""
         if self.kind != "camera":
             return "measured points" if self.errors_m.size else "nothing but the lengths"
         return (
@@ -114,7 +114,7 @@ class Verification:
 
     @property
     def scale(self) -> Scale:
-        """Of distances measured between the poses, by those that lengths tell."""
+        """Ratio of measured distances between the poses to those by lengths."""
         return Scale.of(self.told_m, self.told_m - self.errors_m)
 
     def worse_than(self, before: Verification) -> bool:

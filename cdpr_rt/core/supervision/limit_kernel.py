@@ -46,7 +46,7 @@ VERDICT: Final = np.dtype(
     [("reaction", "<i8"), ("limit", "<i8"), ("axis", "<i8"), ("value", "<f8"), ("allowed", "<f8")]
 )
 _JUMP_rad: Final = 0.05
-"""How far an angle may be from its extrapolation, besides what the limit of speed allows."""
+"""Distance of an angle from its extrapolation allowed beyond that of the speed limit."""
 _SNAPPED_SHARE, _MEAN_S = 0.6, 0.1
 """A cable that runs in has snapped below this share of its tension's mean over such a time."""
 _PAID_OUT_m: Final = 5e-4

@@ -1,4 +1,4 @@
-"""What a supervisor limits, what it tolerates, and what is done about each."""
+"""Limits of a supervisor, and the reaction to each."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ __all__ = [
 ]
 
 POSE_UNRELIABLE: Final = frozenset(limit for limit in Limit if limit.unreliable)
-"""After these a platform's pose is not to be believed, or not all of its winches obey."""
+"""Limits after which a platform's pose is unreliable, or not all of its winches obey."""
 
 LENGTHS_UNRELIABLE: Final = frozenset(limit for limit in Limit if limit.unreliable == "lengths")
-"""After these not even the cables' lengths are known any more."""
+"""Limits after which not even the cables' lengths are known any more."""
 
 
 def reactions_of(named: Reactions, lowers: bool = False) -> dict[Limit, Reaction]:
-    """Return what a robot's file wants done about each limit.
+    """Return the reaction to each limit by a robot's file.
 
     Of a robot whose platform can be lowered, quick stops of which its file says nothing are
     controlled stops: the winches that are left let it down.
@@ -49,9 +49,9 @@ Bound = float | FloatArray
 
 @dataclass(frozen=True)
 class Limits:
-    """What the supervisor tolerates: one figure for every axis, or (n,) for each its own.
+    """Limits of the axes: one figure for all, or (n,) one for each.
 
-    What is left out is not watched; the figures that robots have by default are `RobotLimits`'.
+    Those left out are not watched; the figures that robots have by default are `RobotLimits`'.
     """
 
     torque_Nm: Bound
@@ -75,8 +75,8 @@ class Limits:
     stale_cycles: int = 1 << 30
     """Cycles for which a drive may be unheard or its answers irregular."""
     lengths_disagree_m: float = math.inf
-    """By how much a platform's cables may contradict each other, largest normalised residual."""
+    """Largest normalised residual of a platform's cable lengths."""
     late_s: float = math.inf
     """For how long the loop itself may be held up."""
     reactions: Mapping[Limit, Reaction] = field(default_factory=dict)
-    """Where they differ from `DEFAULT_REACTIONS`."""
+    """Reactions that differ from `DEFAULT_REACTIONS`."""

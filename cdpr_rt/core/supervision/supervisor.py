@@ -1,4 +1,4 @@
-"""The last word between controller and drives: every limit, and what is done about it."""
+"""Supervisor between controller and drives: every limit, and the reaction to it."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ __all__ = ["Limit", "Limits", "Supervisor"]
 
 
 class Supervisor:
-    """Clamps torque and says what must be done about the worst of what is exceeded.
+    """Clamps torque and returns the reaction to the most severe of the exceeded limits.
 
     It latches nothing: whoever runs the cycle acts. `names` are what messages call the axes.
     """
@@ -141,31 +141,31 @@ class Supervisor:
 
     @property
     def reaction(self) -> Reaction:
-        """What the last cycle called for."""
+        """Reaction of the last cycle."""
         return Reaction(int(self._verdict["reaction"][0]))
 
     @property
     def limit(self) -> Limit:
-        """What was exceeded, NONE where nothing was."""
+        """Exceeded limit, NONE where none was."""
         return Limit(int(self._verdict["limit"][0]))
 
     @property
     def axis(self) -> int:
-        """Which axis exceeded it, -1 where it is of none alone."""
+        """Axis that exceeded it, -1 where it is of no single axis."""
         return int(self._verdict["axis"][0]) if self.limit else -1
 
     @property
     def value(self) -> float:
-        """What it was, in the SI unit `unit`; nan where it has no value."""
+        """Value that exceeded it, in its SI unit; nan where it has none."""
         return float(self._verdict["value"][0])
 
     @property
     def allowed(self) -> float:
-        """What it may be."""
+        """Allowed value."""
         return float(self._verdict["allowed"][0])
 
     def reason(self) -> str:
-        """Return what was exceeded, by which axis and how far, or an empty text."""
+        """Return the exceeded limit, its axis, value and allowed value in words; "" for none."""
         limit = self.limit
         if self._reported_reason or not limit:
             return self._reported_reason

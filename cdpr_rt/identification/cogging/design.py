@@ -33,7 +33,7 @@ class ColumnLayout:
 
     @property
     def columns(self) -> int:
-        """How many columns there are."""
+        """Number of columns."""
         return FIXED + 2 * len(self.orders)
 
     def order(self, which: int) -> list[int]:

@@ -35,7 +35,7 @@ from cdpr_rt.identification.confidence import ConfidenceInterval
 
 MAX_ORDER = 200
 _BINS = 360
-"""Of a turn, in which the rotor was seen or not."""
+"""Bins over a turn, by which coverage is counted."""
 _LATENCY_SD_s = 1e-3
 _LATENCY_SD_AGAIN_s = 2e-4
 _LAG_SD_rad = np.deg2rad(1.0)
@@ -80,7 +80,7 @@ def refine(before: HarmonicResult, run_legs: Sequence[SweepData]) -> HarmonicRes
 
 @dataclass(frozen=True)
 class _Start:
-    """What is known before a fit; `before` is the result that is being refined."""
+    """Prior knowledge of a fit; `before` is the result that is being refined."""
 
     latency_s: float
     pole_pairs: int

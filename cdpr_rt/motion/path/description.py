@@ -26,16 +26,16 @@ class PathError(InvalidRequestError):
 
 @dataclass(frozen=True)
 class Coordinates:
-    """What a position (d,) of a path is made of: names of its entries, positions first."""
+    """Entries of a position (d,) of a path by name, coordinates first."""
 
     names: tuple[str, ...]
     """Out of x y z rx ry rz, or x y angle; rotations are the vector from the one at home."""
     reference: FloatArray
-    """Where G28 leads to, (d,)."""
+    """Target of G28, (d,)."""
 
     @property
     def positions(self) -> int:
-        """How many entries are in m; the others are in rad."""
+        """Number of entries in m; the others are in rad."""
         return sum(name in ("x", "y", "z") for name in self.names)
 
 

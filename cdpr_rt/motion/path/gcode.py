@@ -38,19 +38,19 @@ _LETTERS: Final = {
 
 @dataclass(frozen=True)
 class GcodeSettings:
-    """What a G-code file leaves open."""
+    """Settings that a G-code file does not contain."""
 
     origin_m: FloatArray
-    """Where its zero (G54) is in the room, (k,)."""
+    """Position of its zero (G54) in the room, (k,)."""
     blend_m: float = 1e-3
-    """Within which corners are cut, where the file does not say (G61, G64 P)."""
+    """Default tolerance of cut corners (G61, G64 P)."""
     ignored: frozenset[str] = frozenset()
     """Letters and codes that are skipped, such as S, M3."""
 
 
 @dataclass
 class _State:
-    """What stays from line to line."""
+    """Modal state."""
 
     motion: str = "G0"
     unit_m: float = _MM_m

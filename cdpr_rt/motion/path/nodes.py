@@ -20,7 +20,7 @@ _SPACING_m: Final = 0.01
 _TURN_rad: Final = 0.08
 """Between nodes at most, along a piece and around an arc."""
 _LEAST_m: Final = 5e-4
-"""What is cut off a corner counts as so much at least, lest nodes are too many."""
+"""Least cut of a corner by which nodes are spaced, which bounds their number."""
 _IN_CORNER: Final = 8
 """Intervals of a corner that is cut."""
 _FULLNESS: Final = 2.0
@@ -49,7 +49,7 @@ class PathNodes:
     speed: FloatArray
     """Wanted at most, (N,): m/s, or rad/s where it only turns."""
     line: NDArray[np.int64]
-    """Of the file, (N,)."""
+    """Line of the file, (N,)."""
     runs: NDArray[np.int64]
     """First and last node of each, (r, 2)."""
     dwell_s: FloatArray
@@ -58,7 +58,7 @@ class PathNodes:
 
     @property
     def length_m(self) -> float:
-        """How far the platform's origin moves."""
+        """Length of the origin's path."""
         k = self.coordinates.positions
         return float(np.linalg.norm(np.diff(self.q[:, :k], axis=0), axis=1).sum())
 

@@ -50,7 +50,7 @@ class Pieces:
     stops: BoolArray
     """Whether the path rests at the end of each."""
     cut: FloatArray
-    """By how much the end of each, and the beginning of the next, is cut off for the corner."""
+    """Length cut off the end of each, and off the beginning of the next, for the corner."""
 
     def at(
         self, i: NDArray[np.int64], share: FloatArray

@@ -22,13 +22,13 @@ from cdpr_rt.motion.path.nodes import PathNodes
 PERIOD_S: Final = 0.01
 """Between the samples of a plan."""
 MOST_SAMPLES: Final = 100_000
-"""Of a plan: what the loop reads between two cycles."""
+"""Longest plan, which the loop reads between two cycles."""
 _TOLERANCE: Final = 1.005
 _ROUNDS: Final = 20
 _FINER: Final = 3.0
 """Places that are looked at for each sample."""
 _SHARE: Final = 0.98
-"""Of acceleration and jerk that the first passes use; the rest is for smoothing."""
+"""Share of acceleration and jerk that the first passes use; the rest is for smoothing."""
 _SLOWEST_m_s: Final = 1e-4
 _NOTHING: Final = 1e-9
 
@@ -43,12 +43,12 @@ class PathLimits:
 
     @property
     def table(self) -> FloatArray:
-        """All of it, (3, d)."""
+        """Velocity, acceleration and jerk, (3, d)."""
         return np.array([self.velocity, self.acceleration, self.jerk])
 
     @property
     def smoothing_s(self) -> float:
-        """Over what time velocities are averaged: accelerations step by twice their most, over it.
+        """Time over which velocities are averaged: accelerations step by twice their most, over it.
 
         A jerk that is not limited leaves a millisecond.
         """
@@ -57,7 +57,7 @@ class PathLimits:
 
 @dataclass(frozen=True)
 class WrenchBounds:
-    """Which wrenches the tensions can exert along a path, as half-spaces, and which it takes.
+    """Wrenches that tensions can exert along a path, as half-spaces, and those that it requires.
 
     lower <= normals · (by_u u + by_x x) <= upper at node i with `row[i]`, -1 where any motion
     within the limits of acceleration is carried anyway.
@@ -84,7 +84,7 @@ class WrenchBounds:
 
     @property
     def arrays(self) -> tuple[NDArray[np.int64], FloatArray, FloatArray, FloatArray]:
-        """What does not go by node."""
+        """Arrays that are not over the nodes, and `row`."""
         return self.row, self.normals, self.lower, self.upper
 
 
@@ -102,11 +102,11 @@ class TimedPath:
     waits: NDArray[np.int64]
     """Samples at which it waits until it is told to go on."""
     rounds: int
-    """How often runs were scaled, at most."""
+    """Most passes of scaling of a run."""
 
     @property
     def duration_s(self) -> float:
-        """How long it takes, without what it waits."""
+        """Duration without waits."""
         return self.period_s * (len(self.samples) - 1)
 
 

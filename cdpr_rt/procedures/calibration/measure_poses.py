@@ -15,7 +15,7 @@ from cdpr_rt.calibration.readings.data import PoseReading
 from cdpr_rt.errors import TripError
 
 LOOK_S, SETTLE_S = 0.5, 1.0
-"""How long a reading is the mean of, and how long the platform stands before."""
+"""Averaging time of a reading, and settling time before it."""
 _STILL_m = 1.5e-4
 """Change of a length within a reading beyond which the platform does not stand still."""
 _MOST_LOOKS = 10
@@ -41,7 +41,7 @@ class TargetNotReached:
 
 @dataclass(frozen=True)
 class Look:
-    """What was read over a while."""
+    """Readings over some time."""
 
     length_m: FloatArray
     """(cycles, n)"""
@@ -102,7 +102,7 @@ def read_pose(operator: PoseReader, target: FloatArray) -> PoseReading:
 
 @dataclass
 class Measured:
-    """What a procedure has read so far; `keep` is called whenever that has grown."""
+    """Readings of a procedure so far; `keep` is called after each that is added."""
 
     keep: Callable[[], None]
     readings: list[PoseReading] = field(default_factory=list)

@@ -8,7 +8,7 @@ from pathlib import Path
 
 @dataclass(frozen=True)
 class Paths:
-    """Where a commissioning leaves its files."""
+    """Files of a commissioning."""
 
     out: Path
 

@@ -1,4 +1,4 @@
-"""What the recorded passes of a commissioning tell of a motor, and its cogging profile."""
+"""Identification of a motor from the recorded passes of a commissioning; its cogging profile."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ from cdpr_rt.procedures.measurement import recording
 
 @dataclasses.dataclass(frozen=True)
 class Identified:
-    """What both methods found."""
+    """Results of both methods."""
 
     thesis: ThesisResult
     harmonic: HarmonicResult

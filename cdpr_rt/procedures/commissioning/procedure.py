@@ -51,7 +51,7 @@ _SHORT_LEAD_IN_RAD = math.pi
 
 @dataclasses.dataclass(frozen=True)
 class Plan:
-    """How thoroughly a commissioning measures."""
+    """Extent of a commissioning's measurements."""
 
     sweep_speed_rad_s: float = math.radians(3.0)
     turns: int = 2

@@ -32,7 +32,7 @@ _Word = Annotated[int, Field(ge=0, lt=1 << 32)]
 
 
 class _Part(BaseModel):
-    """Of what the report takes from `run.json`; the rest of it is for people."""
+    """Part of `run.json` that the report reads; the rest is for people."""
 
     model_config = ConfigDict(extra="allow", strict=True, allow_inf_nan=False)
 

@@ -57,7 +57,7 @@ class PathPlan:
     timed: TimedPath | None
     """None with an obstacle that has nothing to do with time."""
     constant_s: float
-    """How long it would take at one speed and one acceleration that every place bears."""
+    """Duration at the one speed and acceleration that every place allows."""
     slowed: int
     """Moves whose wanted speed the robot does not reach anywhere."""
 

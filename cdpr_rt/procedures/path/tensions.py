@@ -31,7 +31,7 @@ class PathTensions:
     """Bounds that are planned with: the file's, with the control's reserve, (n,)."""
     high_N: FloatArray
     carried: NDArray[np.bool_]
-    """Where there are tensions within these bounds, (m,)."""
+    """Whether tensions are within these bounds, (m,)."""
 
 
 def path_tensions(model: PlatformModel, timed: TimedPath) -> PathTensions:
@@ -39,7 +39,7 @@ def path_tensions(model: PlatformModel, timed: TimedPath) -> PathTensions:
     step = -(-len(timed.samples) // _MOST)
     chosen = np.arange(0, len(timed.samples), step)
     q, v, a = (np.ascontiguousarray(timed.samples[chosen, i]) for i in range(3))
-    low, high = model.low_N + model.reserve_N, model.left_by_torque_N - model.reserve_N
+    low, high = model.low_N + model.reserve_N, model.torque_limited_N - model.reserve_N
     method = model.platform.tension_distribution
     wanted = low if method == "minimum-deviation" else None
     distribution = tension_distribution(method, low, high, model.wrench_scale, wanted)

@@ -31,7 +31,7 @@ _NATURAL_HZ = 12.0
 _SPEED_FILTER_S = 0.002
 _LONGEST_S, _END_S = 3600.0, 1e-3
 TOLERANCE = Tolerance(math.inf, 60.0)
-"""Of a rotor on an elastic cable, whose set-point may be far ahead of it."""
+"""Limits of a rotor on an elastic cable, whose set-point may be far ahead of it."""
 _TURNED_RAD, _TURNED_SHARE = 0.15, 0.1
 
 
@@ -72,7 +72,7 @@ class _Pull:
 
     @property
     def travel_rad(self) -> float:
-        """How far the set-point has gone this way."""
+        """Travel of the set-point in the present direction."""
         return abs(self._speed_rad_s) * (self._now_s - self._since_s)
 
     def turn_back(self) -> None:

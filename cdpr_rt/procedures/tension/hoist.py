@@ -30,7 +30,7 @@ _UNEVEN_SHARE, _UNEVEN_Nm = 0.04, 0.02
 
 @dataclass(frozen=True)
 class HoistPlan:
-    """How far and how fast a mass is raised and lowered, on the motor side."""
+    """Travel and speed of raising and lowering a mass, on the motor side."""
 
     speed_rad_s: float
     lead_in_rad: float

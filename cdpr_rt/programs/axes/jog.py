@@ -17,7 +17,7 @@ from cdpr_rt.programs.model import AxesModel
 DEFAULT_TIMEOUT_S = 0.5
 LONGEST_TIMEOUT_S = 2.0
 LONGEST_S = 3600.0
-"""How long one jog may last."""
+"""Longest duration of one jog."""
 
 
 _DURATION: Final = "duration_s"

@@ -15,7 +15,7 @@ from cdpr_rt.programs.axes.point_to_point import PointToPoint
 from cdpr_rt.programs.model import AxesModel
 
 FURTHEST_RAD = 1e4
-"""How far one command may send an axis."""
+"""Largest distance of one command."""
 _SLOWEST_RAD_S = 1e-4
 
 _Target = tuple[str, FloatArray, FloatArray]

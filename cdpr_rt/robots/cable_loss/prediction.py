@@ -1,4 +1,4 @@
-"""What a platform does when one of its cables breaks: how far it swings, and how far it gets.
+"""Prediction of a platform's motion after one of its cables breaks: swing and travel.
 
 Computed in time, as no place of equilibrium tells it: motors give way to what is above their
 torque, and the winches that are left then let the platform down.
@@ -32,19 +32,19 @@ from cdpr_rt.robots.rigid_body import free_directions, in_space, inertia_kg_m2, 
 from cdpr_rt.robots.robot_arrays import limits_of
 
 SWING_S = 1.0
-"""What counts as the swing; afterwards the platform is being let down."""
+"""Time from the break that counts as the swing; afterwards the platform is lowered."""
 _LONGEST_S = 30.0
 _NOTICED_LATE, _NOTICING_S, _NOTICED_S = 1.5, 0.015, 0.25
-"""Over the time in which the rotor gets too fast; what filters and buses take besides; at most,
-which is for cables that pull with next to nothing."""
+"""Time until the break is detected: a factor on the time in which the rotor exceeds its speed
+limit, the delay of filters and buses, and the most, which is for cables of next to no tension."""
 _MISLED_SHARE = 0.25
-"""Of the span of tensions, which is where the control's proportional part is saturated."""
+"""Force of the misled control over the span of tensions, where its proportional part saturates."""
 _FRICTIONS = (0.0, 0.03, 0.06)
-"""Of the winches, as shares of the motors' rated torques."""
+"""Friction of the winches over the motors' rated torques; each is simulated."""
 _CABLE_DAMPING_S = 2e-3
 _NEAREST_m = 1e-3
 _STEP_rad = 0.2
-"""Of the quickest oscillation, of rotors and platform or a foot on the ground, in a step."""
+"""Phase of the fastest oscillation, of rotors and platform or a foot on the ground, in a step."""
 _GROUND_FRICTION = 0.2
 """Less than most floors have, so that the platform slides further."""
 _GROUND_DAMPING = 0.25
@@ -53,7 +53,7 @@ _GROUND_DAMPING = 0.25
 
 @dataclass(frozen=True)
 class Swing:
-    """What a platform does that was at rest at a position when a cable broke."""
+    """Motion of a platform that was at rest at a position when a cable broke."""
 
     cable: int
     position_m: tuple[float, ...]
@@ -64,7 +64,7 @@ class Swing:
     away_m: float
     """Largest distance from there until it lies still, on the ground."""
     aside_m: float
-    """Likewise, but for height."""
+    """Largest horizontal distance from there until it lies still."""
 
 
 def corner_swings(robot: Robot) -> list[list[Swing]]:

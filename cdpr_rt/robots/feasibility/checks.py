@@ -24,19 +24,19 @@ from cdpr_rt.robots.statics import NONE_rad, PlatformStatics, statics_of
 
 _GRID = 25
 _LONGEST_PERIOD_s = 0.005
-"""Of a cycle, with which the platform's control is still stiff enough to overcome friction."""
+"""Longest cycle at which the platform's control is stiff enough to overcome friction."""
 _NEAREST_m = 0.1
 """An anchor point closer than this to an exit point is about to be pulled into it."""
 _ALIKE_m = 0.01
 """Two cables nearer to each other at both their ends pull alike: an axis was described twice."""
 _SAGS_m_N = 0.01
-"""What a cable may take in by its sag for a newton: a motor's friction is some newtons."""
+"""Largest change of length by sag for a newton: a motor's friction is some newtons."""
 _ROUNDED_UP = 1.05
 """So that two digits are not less."""
 _SLOW_Hz = 0.5
-"""Of a loop's mode: it takes 2.3 s to come within 2 % of where it goes."""
+"""Slowest mode of a loop: it settles within 2 % in 2.3 s."""
 _RUBS_SHARE = 0.06
-"""Of a motor's rated torque: what friction and cogging of a servo winch together may take up."""
+"""Friction and cogging of a servo winch together over the motor's rated torque, at most."""
 _FAR_TURNED_deg, _TIPPED_deg = 10.0, 4.0
 _WIDE_ARMS = 0.5
 """Anchor points further apart than this share of the exit points are probably not in metres."""

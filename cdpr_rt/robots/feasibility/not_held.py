@@ -1,4 +1,4 @@
-"""Why a platform is not held at a pose, and which figure of its robot's file would change that."""
+"""Reason why a pose is not feasible, and the figure of the robot's file that would change it."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from cdpr_rt.robots.statics import PlatformStatics
 _FLAT = 1e-3
 """Share of their span by which points may be off a line or a plane and still count as in it."""
 _SHARES = np.concatenate([np.linspace(0.99, 0.03, 97), np.geomspace(0.0295, 1e-5, 120)])
-"""Of a figure, tried one after the other from little to much less, until one helps."""
+"""Factors on a figure, tried one after the other until one helps: decreasing."""
 _TIMES = np.geomspace(1.02, 100.0, 230)
-"""The same upwards."""
+"""Increasing factors, likewise."""
 
 
 def why_not_held(statics: PlatformStatics, position_m: FloatArray, turn_rad: FloatArray) -> str:
@@ -29,7 +29,7 @@ def why_not_held(statics: PlatformStatics, position_m: FloatArray, turn_rad: Flo
     if not math.isfinite(reserve):
         return f"{where} {_singular(statics)}"
     needed = ", ".join(str(round(value)) for value in statics.tensions_N(position_m, turn_rad))
-    allowed = f"{statics.low_N.min():g} to {statics.model.left_by_torque_N.max():.4g} N are allowed"
+    allowed = f"{statics.low_N.min():g} to {statics.model.torque_limited_N.max():.4g} N are allowed"
     if reserve < 0.0:
         text = f"{where} the cables would need {needed} N; {allowed}"
     else:
@@ -71,7 +71,7 @@ def _what_helps(statics: PlatformStatics, position_m: FloatArray, turn_rad: Floa
     acceleration, mass_kg = platform.acceleration_m_s2, platform.mass_kg
 
     def helps(platform: Platform, low_N: FloatArray) -> bool:
-        bounds = (low_N, statics.high_N, statics.model.left_by_torque_N)
+        bounds = (low_N, statics.high_N, statics.model.torque_limited_N)
         changed = PlatformStatics(platform_model(platform, *bounds))
         return bool(changed.is_target(position_m, turn_rad))
 

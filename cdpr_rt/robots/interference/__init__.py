@@ -1,1 +1,1 @@
-"""Where cables touch each other, the platform, or boxes of the frame."""
+"""Interference of cables with each other, the platform, and boxes of the frame."""

@@ -52,13 +52,13 @@ from cdpr_rt.robots.kinematics.pose import exponential
 
 START, STEP, TURNED, TURN, BASE, WAY_ROWS = 0, 1, 2, 3, 4, 7
 TOUCH_m: Final = 1e-6
-"""What is nearer than this above the clearance is in contact."""
+"""Distance above the clearance below which a pair is in contact."""
 _LEAVING: Final = 0.9
 """Share of its distance that a pair which is in contact at the start has to keep."""
 _LEAVES: Final = 4.0
 """Clearances by which the platform moves at most until what touches altogether has come apart."""
 _WATCHES: Final = 32
-"""How often that is looked at meanwhile."""
+"""Number of checks meanwhile."""
 _DEEPER: Final = 0.05
 """Clearances by which it may get deeper, for rounding and play."""
 _SPEED, _ACCELERATION, _EXIT, _FAR, _FREE, _HOLDS, _RATES = range(7)

@@ -25,9 +25,9 @@ from cdpr_rt.robots.kinematics.kinematics import CableKinematics
 from cdpr_rt.robots.kinematics.pose import place_text
 
 _PARTS: Final = 16
-"""In which a short way is looked at."""
+"""Number of parts in which a short way is checked."""
 _EVERYWHERE_m: Final = 1e4
-"""How deep boxes of a plane are."""
+"""Depth of the boxes of a planar robot, on either side."""
 
 
 @dataclass(frozen=True)
@@ -35,12 +35,12 @@ class Contact:
     """The first place of a way where two things are nearer to each other than the clearance."""
 
     position: FloatArray
-    """Of the platform, (d,): coordinates, then rotation vector."""
+    """Position of the platform, (d,): coordinates, then rotation vector."""
     coordinates: int
     part: int
-    """Which straight part of the way, from 0."""
+    """Index of the straight part of the way."""
     share: float
-    """Of that part."""
+    """Share of that part."""
     things: tuple[str, str]
     distance_m: float
     known: bool
@@ -54,7 +54,7 @@ class Contact:
 
 
 class Interference:
-    """Which things of a robot touch: cables, its platform's body, boxes of the room.
+    """Contacts among cables, the platform's body and boxes of the room.
 
     Two cables, by the centre lines of their free parts, or a cable and a box, are in contact where
     they are nearer to each other than the clearance; boxes likewise. Near a point that two of them
@@ -84,7 +84,7 @@ class Interference:
         self.pairs: IntArray = np.array(
             list(self._found_pairs(body is not None, planar)), np.int64
         ).reshape(-1, 4)
-        """What is compared: rows of `clearance_kernel`."""
+        """Array `pairs` of `clearance_kernel`."""
         self._way = np.zeros((WAY_ROWS, 3))
         self._way[0], self._way[4:] = self._home[0], self._home[1:]
         self._nears: Callable[[int], int] | None = None

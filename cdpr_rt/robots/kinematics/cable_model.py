@@ -1,4 +1,4 @@
-"""What a cable is: straight, elastic, or sagging under its own weight."""
+"""Model of a cable: rigid, elastic, or an elastic catenary."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class CableModel:
     stiffness_N: float = math.inf
     """EA: tension over strain."""
     weight_N_m: float = 0.0
-    """Of the cable that is not stretched."""
+    """Weight per unstretched length."""
 
     def __post_init__(self) -> None:
         if not self.stiffness_N > 0.0:

@@ -24,7 +24,7 @@ from cdpr_rt.robots.kinematics.cable_kernel import ANCHOR
 MASS, INERTIA, CENTRE_x, CENTRE_y, MOMENT, STEEPNESS, STIFFNESS, SWINGING, REACH, ROWS = range(10)
 
 DAMPING_RATIO = 0.005
-"""Of the swing to the critical damping: of air and cables alone, no cable winds."""
+"""Damping ratio of the swing, by air and cables alone, since no cable winds."""
 SWINGS_m = 2e-3
 """An amplitude of anchor points that is worth a word."""
 _NEWTON_STEPS, _MOST_STEP_rad = 30, 0.2

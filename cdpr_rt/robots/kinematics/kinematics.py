@@ -72,7 +72,7 @@ class CableKinematics:
         self.model = model or CableModel()
         self._up = np.eye(3)[np.shape(exit_points_m)[1] - 1]
         self.geometry = np.zeros((cable_kernel.GEOMETRY_ROWS, self.n))
-        """As of `cable_kernel`, as is `solver` of `normal_equations`: for kernels of a cycle."""
+        """Array `geometry` of `cable_kernel`; `solver` is that of `normal_equations`."""
         self.geometry[: cable_kernel.ANCHOR] = a.T
         self.geometry[cable_kernel.ANCHOR : cable_kernel.RADIUS] = b.T
         self.geometry[cable_kernel.RADIUS] = pulley_radius_m

@@ -22,7 +22,7 @@ HOME = 3
 _BEFORE, _START, _BEST = 0, 1, 2
 
 CONVERGED, UNFINISHED, SINGULAR, STALLED = 0, 1, 2, 3
-"""How a search ended: found; steps used up; a direction is free; in a minimum that is none."""
+"""How a search ended: converged; out of steps; rank deficient; in a local minimum."""
 
 TOLERANCE = 1e-9
 """A search ends where what is left to go, in m and rad, is less."""

@@ -1,1 +1,1 @@
-"""What is kept of a robot from one run to the next: lengths, and which geometry is in force."""
+"""State of a robot kept from one run to the next: cable lengths, and the calibration in force."""

@@ -16,7 +16,7 @@ class CalibrationState:
     robot: str
     calibrated: bool
     why: str
-    """What made it so: which calibration, or what moved."""
+    """Cause of the state: the calibration, or what has moved."""
     date: str
     """ISO 8601, UTC; empty where nothing was ever written down."""
 

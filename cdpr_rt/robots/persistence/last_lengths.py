@@ -40,7 +40,7 @@ class StoppedLengths:
 
 
 class LastLengths:
-    """What a stop has left to the next start: in memory, and in a file where there is one."""
+    """Cable lengths of the last stop, for the next start: in memory, and in a file."""
 
     def __init__(self, path: Path | None = None) -> None:
         self.path = path
@@ -48,7 +48,7 @@ class LastLengths:
         """Identity of the calibration by which lengths are known, empty for the robot's file."""
         self.lengths: StoppedLengths | None = None
         self.why = "the robot has not been stopped with known lengths yet"
-        """Why there are none, where there are none."""
+        """Reason why no lengths are known, "" where they are."""
         self.displaced = False
         """Whether the platform has been let go since, other than at home."""
         self.fallen = False

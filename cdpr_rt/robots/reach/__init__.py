@@ -1,1 +1,1 @@
-"""Which poses a robot reaches straight from another, held all the way and without contact."""
+"""Straight motions that are held all the way and without contact."""

@@ -18,7 +18,7 @@ from cdpr_rt.robots.interference.contact_kernel import (
 from cdpr_rt.robots.reach.held_kernel import held_until
 
 WHOLE, CONTACT, NOT_HELD = range(3)
-"""Why a way ends: it is the whole of it, something is in contact, or tensions do not hold."""
+"""Why a way ends: at its target, at a contact, or where tensions are not feasible."""
 
 
 @jit

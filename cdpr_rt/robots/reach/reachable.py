@@ -26,12 +26,12 @@ class Reached:
 
     positions: FloatArray
     shares: FloatArray
-    """Of the way to what was drawn, (m,)."""
+    """Share of the way to the drawn pose that was gone, (m,)."""
     drawn: int
     cut_by_contact: int
     cut_by_tensions: int
     outside: int
-    """How many ended outside the box of targets, or down on the stand, and are left out."""
+    """Number that ended outside the box of targets, or down on the stand, and are left out."""
 
 
 class Reach:
@@ -62,7 +62,7 @@ class Reach:
         centre, wrenches, generators, scale, bounds = workspace.arrays
         self._arrays = (
             np.array(model.kinematics.directions), *model.interference.arrays,
-            model.about_mass.geometry, centre, wrenches, generators, scale, bounds,
+            model.about_centre_of_mass.geometry, centre, wrenches, generators, scale, bounds,
         )  # fmt: skip
 
     def shares(self, ends: FloatArray) -> tuple[FloatArray, IntArray]:

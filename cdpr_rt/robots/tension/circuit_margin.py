@@ -1,4 +1,4 @@
-"""How far tensions can stay from all their bounds, in closed form, for up to d + 2 cables.
+"""Capacity margin of tensions in closed form, for up to d + 2 cables.
 
 W t + w_e = 0, eq. (3.80), leaves t = t0 + N' lambda with r = n - d rows of N. A circuit is a y (n,)
 with y N' = 0 and as few entries as there can be: r + 1 of them, the determinants of r columns of N

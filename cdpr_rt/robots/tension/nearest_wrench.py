@@ -8,7 +8,7 @@ from cdpr_rt.arrays import FloatArray
 from cdpr_rt.jit import jit
 
 NO_LIMIT = 1 << 30
-"""What `nearest_wrench` returns where nothing of the wrench is missing: no cable's number."""
+"""Returned by `nearest_wrench` where the whole wrench is exerted: no cable's number."""
 _ROUNDING = 1e-9
 """Share of the terms of a wrench that may be missing of it."""
 _INDEPENDENT = 1e-9

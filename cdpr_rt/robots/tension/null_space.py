@@ -16,7 +16,7 @@ from cdpr_rt.jit import jit
 _RANK = 1e-9
 """Share of the longest column below which what is left of the others counts as nothing."""
 _HUGE = 1e100
-"""What is larger counts as infinite, since its square may be."""
+"""Larger entries count as infinite, since their squares may be."""
 
 
 @jit

@@ -108,7 +108,7 @@ class TensionSolver(ABC):
 
     @property
     def limiting_bound(self) -> int:
-        """Which bound of that cable: -1 the lower one, 1 the upper one, 0 none."""
+        """Bound of that cable: -1 the lower one, 1 the upper one, 0 none."""
         return 0 if self._limit == NO_LIMIT else (self._limit > 0) - (self._limit < 0)
 
     @abstractmethod

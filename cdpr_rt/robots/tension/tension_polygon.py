@@ -14,7 +14,7 @@ from cdpr_rt.arrays import FloatArray
 from cdpr_rt.jit import jit
 
 ONE_NORM, TWO_NORM, CENTROID = 0, 1, 2
-"""Which point: least sum of tensions, least sum of squares, or the centre of area."""
+"""Point of the polygon: least sum of tensions, least sum of squares, or the centroid."""
 _PARALLEL = 1e-12
 """A cable whose tension changes by less, for a newton along a line, does not bound that line."""
 _THIN = 1e-12

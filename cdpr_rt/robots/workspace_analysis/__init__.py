@@ -1,1 +1,1 @@
-"""How far a robot's workspace reaches: by rays from a centre, by a grid, as a surface."""
+"""Extent of a robot's workspace: by rays from a centre, by a grid, as a surface."""

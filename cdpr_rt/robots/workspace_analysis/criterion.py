@@ -1,4 +1,4 @@
-"""What a place has to satisfy to belong to a workspace."""
+"""Criterion by which a place belongs to a workspace."""
 
 from __future__ import annotations
 
@@ -89,7 +89,7 @@ def criterion_of(
     """Return the criterion of a robot that has a platform, within its limits."""
     assert robot.platform is not None
     model = platform_model_of(robot)
-    low, high = tuple(model.low_N.tolist()), tuple(model.left_by_torque_N.tolist())
+    low, high = tuple(model.low_N.tolist()), tuple(model.torque_limited_N.tolist())
     turns = tuple(tuple(turn) for turn in np.asarray(turns_rad).tolist())
     return Criterion(robot.platform, low, high, acceleration_m_s2, turns, least_N, contact_free)
 

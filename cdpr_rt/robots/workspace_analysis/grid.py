@@ -54,7 +54,7 @@ class Grid:
 
     @property
     def spacing_m(self) -> FloatArray:
-        """How far neighbours are apart along each coordinate, (k,)."""
+        """Spacing along each coordinate, (k,)."""
         sides = np.subtract(self.box.high_m, self.box.low_m)
         return np.asarray(sides / (np.array(self.depths.shape) - 1))
 

@@ -65,7 +65,7 @@ class Rays:
 
     @property
     def ends_m(self) -> FloatArray:
-        """Where the rays end, (m, k)."""
+        """End points of the rays, (m, k)."""
         return np.asarray(self.centre_m + self.lengths_m[:, None] * self.directions)
 
     @cached_property

@@ -1,4 +1,4 @@
-"""What wrenches motion along a path takes of the cables, and which ones they can exert there."""
+"""Wrenches that motion along a path requires, and those that the cables can exert there."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class AvailableWrenches:
 
     @property
     def holds(self) -> NDArray[np.bool_]:
-        """Where the platform can be held at rest, (m,)."""
+        """Whether the platform can be held at rest, (m,)."""
         return np.asarray(((self.lower <= 0.0) & (self.upper >= 0.0)).all(axis=1))
 
     def spare(self, most: FloatArray) -> NDArray[np.bool_]:
@@ -49,7 +49,7 @@ def available_wrenches(model: PlatformModel, positions: FloatArray) -> Available
     chosen = np.array(list(itertools.combinations(range(n), d - 1)), np.int64)
     normals = np.zeros((m, len(chosen), d))
     lower, upper = np.zeros((2, m, len(chosen)))
-    low, high = model.low_N + model.reserve_N, model.left_by_torque_N - model.reserve_N
+    low, high = model.low_N + model.reserve_N, model.torque_limited_N - model.reserve_N
     write_facets(matrices, model.wrench_scale, chosen, low, high, normals, lower, upper)
     weight = np.zeros(6)
     weight[model.positions - 1] = -model.platform.mass_kg * G_m_s2

@@ -65,21 +65,21 @@ class Engine:
         self.cycle: Cycle | None = None
         self.notices: list[str] = []
         self.lost_bus = ""
-        """Why cycles cannot go on: the error of a lost bus."""
+        """Error of a lost bus, by which cycles cannot go on; "" for none."""
         self.exchange_s = 0.0
         """Time from the last SYNC to its last answer."""
         self.compute_s = 0.0
         """Time from that answer until the last command had been sent."""
         self.answered = 0
-        """How many axes answered the last SYNC."""
+        """Number of axes that answered the last SYNC."""
         self.asked_Nm: FloatArray = np.zeros(block.n)
-        """What the program asked for, before its limits."""
+        """Torque commanded by the program, before limits, (n,)."""
         self.reaction = self.limit = 0
-        """What the supervisor called for in the last cycle, and the limit that caused it."""
+        """Reaction of the supervisor in the last cycle, and the limit that caused it."""
         self.limit_axis = -1
-        """The axis that exceeded it, -1 where it is of none alone."""
+        """Axis that exceeded it, -1 where it is of no single axis."""
         self.lengths_disagree_m = math.nan
-        """How far a platform's cable lengths are from agreeing, nan while nothing drives them."""
+        """Largest normalised residual of a platform's cable lengths, nan without power."""
         self.right = RightToMove(block, clock_ns)
         self._realtime = False
         self._rows = CycleRows(block)

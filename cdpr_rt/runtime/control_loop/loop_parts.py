@@ -14,7 +14,7 @@ from cdpr_rt.robots.persistence.last_lengths import LastLengths
 
 @dataclass(frozen=True)
 class Lowering:
-    """How a platform is lowered before the power goes, where no brakes would hold it."""
+    """Lowering of a platform before power-off, where no brakes would hold it."""
 
     program: str
     """Name of the program; `{"blind": true}` has it lower without a pose."""
@@ -31,15 +31,15 @@ class LoopParts:
     supervisor: Supervisor
     estimator: Estimator
     lengths_disagree: Callable[[], tuple[float, int]] | None = None
-    """Returns how far cable lengths are from agreeing, m, and which cable's is off, or -1."""
+    """Returns the largest normalised residual of cable lengths, m, and its cable, or -1."""
     lowering: Lowering | None = None
-    """How the platform is lowered, None for a robot without such a program."""
+    """Lowering of the platform, None for a robot without such a program."""
     last_stop: LastLengths | None = None
     """Stores the cables' lengths of the last stop, where a start can use them."""
     paths: PathStore | None = None
     """The planned paths of a robot with a platform."""
     notices: Callable[[], Sequence[str]] = tuple
-    """Returns what an operator should know of the robot besides its state."""
+    """Returns notices to the operator, besides the state."""
     before_power: Callable[[], object] = lambda: None
     """Called before the drives get power; may wait for files."""
     enable_realtime: Callable[[], Sequence[str]] = tuple

@@ -39,7 +39,7 @@ class Transitions:
         self.ended = False
         """Whether the loop has been shut down."""
         self.power_off_unconfirmed = ""
-        """Which drive is not confirmed to be without power at the end, as text."""
+        """Drive whose power-off is not confirmed at the end, as text."""
 
     def start_up(self) -> Steps:
         """Boot and check; the fault reason is set where either fails."""

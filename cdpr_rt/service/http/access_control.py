@@ -23,7 +23,7 @@ from cdpr_rt.service.link import URGENT
 
 MOST_BODY_BYTES: Final = 16384
 MOST_PATH_BYTES: Final = 1 << 21
-"""Of a path's file, in the body of `POST /path`."""
+"""Longest body of `POST /path`, a path's file."""
 _PATH_PATH: Final = "/path"
 _BODY_S = 5.0
 _REQUESTS_PER_S, _BURST = 200.0, 400.0
@@ -47,7 +47,7 @@ class _RefusedError(Exception):
 
 @dataclass(frozen=True)
 class AccessPolicy:
-    """What one listener asks of those who connect to it."""
+    """Access policy of one listener."""
 
     key: bytes | None = None
     """The shared key, asked for beyond the status; without one nobody moves or ends anything here.

@@ -17,7 +17,7 @@ MOST_OF_PEER: Final = 24
 MOST_FOR_STOPS: Final = 16
 """Places beyond these, for connections that ask for nothing but a stop."""
 MOST_PEERS: Final = 1024
-"""Of rates: who was not seen for longest is forgotten beyond these."""
+"""Most peers of which rates are kept; the one not seen for longest is forgotten first."""
 _STOP_S, _WORK_BESIDE_S = 0.03, 0.01
 """A stop is through its passes in that time; a piece of other work is done so often meanwhile."""
 _CREDENTIALS: Final = struct.Struct("3i")  # struct ucred: pid, uid, gid

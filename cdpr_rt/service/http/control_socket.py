@@ -27,7 +27,7 @@ _MOST_REASON_BYTES = 123  # RFC 6455, 5.5
 
 
 class Order(models.ClientRequest):
-    """What the holder of the right to move sends over its connection."""
+    """Message of the holder of the right to move."""
 
     do: Literal["renew", "hold", "program", "set"]
     program: str = ""

@@ -1,4 +1,4 @@
-"""What the control interface takes and gives, as JSON."""
+"""JSON models of the control interface."""
 
 from __future__ import annotations
 

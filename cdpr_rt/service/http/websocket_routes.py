@@ -112,7 +112,7 @@ class WebSocketRoutes:
 
 
 class _Updates:
-    """What one client has not been told yet."""
+    """Data not yet sent to one client."""
 
     def __init__(self, service: Service) -> None:
         self._service = service

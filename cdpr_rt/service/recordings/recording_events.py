@@ -1,4 +1,4 @@
-"""What happened, told in words, out of what is recorded."""
+"""Events in words from recorded rows."""
 
 from __future__ import annotations
 

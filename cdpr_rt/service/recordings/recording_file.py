@@ -22,7 +22,7 @@ _CHUNK_BYTES: Final = 1 << 22
 _DATA_END: Final = struct.pack("<BQI", 0x0F, 4, 0)
 _FOOTER_WITHOUT_SUMMARY: Final = struct.pack("<BQQQI", 0x02, 20, 0, 0, 0)
 _END: Final = _DATA_END + _FOOTER_WITHOUT_SUMMARY + _MAGIC
-"""What ends a file that has no index; readers then go through it from the beginning."""
+"""End of a file without an index; readers then go through it from the beginning."""
 
 
 class RecordingError(ControlError):
@@ -34,7 +34,7 @@ class NameTakenError(RecordingError):
 
 
 class _Held:
-    """What the MCAP writer writes to: keeps it until it is wanted, never fails.
+    """Buffer that the MCAP writer writes to; never fails.
 
     So no error of the disk can reach the library, which has no way to report one.
     """

@@ -15,7 +15,7 @@ from cdpr_rt.jit import jit
 _FLOAT, _INTEGER, _BOOLEAN, _NOTHING = 0, 1, 2, 3
 _KINDS: Final = {"f": _FLOAT, "i": _INTEGER, "u": _INTEGER, "b": _BOOLEAN}
 _MOST_CHARS: Final = 26
-"""Of one value: sign, 19 digits, point and exponent of a float64."""
+"""Longest text of one value: sign, 19 digits, point and exponent of a float64."""
 _BATCH: Final = 256
 
 Bytes = NDArray[np.uint8]

@@ -69,7 +69,7 @@ class RecordingReader:
         self.offset_ns = 0
         """From a stamp to the time of day."""
         self.description: dict[str, Any] = {}
-        """What was published last."""
+        """Robot's description as published last."""
         self.axes: list[str] = []
         """Their names, as far as the description has some."""
         self.status: list[dict[str, Any]] = []

@@ -1,4 +1,4 @@
-"""What a recording's messages hold: one JSON schema for each topic."""
+"""JSON schema of each topic of a recording."""
 
 from __future__ import annotations
 

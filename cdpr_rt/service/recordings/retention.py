@@ -1,4 +1,4 @@
-"""Which recordings are kept: a cap by age and one by size, so that no disk fills up unseen."""
+"""Retention of recordings by age and size, so that no disk fills up unseen."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Final
 
 BYTES_PER_AXIS: Final = 60.0
-"""What an axis takes of a file in a cycle, about: more in motion, less at rest."""
+"""Bytes of an axis in a cycle, about: more in motion, less at rest."""
 _WRITTEN_S: Final = 60.0
 """A file that was written to within so long may be another daemon's, and stays."""
 _DAY_S: Final = 86400.0
@@ -20,7 +20,7 @@ _GAP_DAYS: Final = 30.0
 
 @dataclass(frozen=True)
 class Retention:
-    """What is kept of a robot's recordings; infinite: everything."""
+    """Limits of a robot's kept recordings; infinite: all are kept."""
 
     days: float = float("inf")
     total_bytes: float = float("inf")

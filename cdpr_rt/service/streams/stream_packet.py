@@ -41,7 +41,7 @@ _NORM_TOLERANCE = 0.1
 
 
 class PacketKind(IntEnum):
-    """What a packet is; senders send the odd ones, the robot answers with the even ones."""
+    """Type of a packet; senders send the odd ones, the robot answers with the even ones."""
 
     HELLO = 1
     WELCOME = 2
@@ -51,7 +51,7 @@ class PacketKind(IntEnum):
 
 
 class Standing(IntEnum):
-    """What has become of a set-point, as the robot's answer tells."""
+    """Outcome of a set-point in the robot's answer."""
 
     ACCEPTED = 1
     BUSY = 2
@@ -65,7 +65,7 @@ class Standing(IntEnum):
 
 
 class PacketFault(IntEnum):
-    """Why a packet was dropped without an answer."""
+    """Reason why a packet was dropped without an answer."""
 
     SIZE = 0
     MAGIC = 1
@@ -126,7 +126,7 @@ class StreamSession:
 
 @dataclass(frozen=True)
 class StreamSetpoint:
-    """Where the hand that leads is: position in m, attitude as a unit quaternion w x y z."""
+    """Pose of the leading hand: position in m, attitude as a unit quaternion w x y z."""
 
     session: int
     sequence: int

@@ -55,7 +55,7 @@ Address = tuple[Any, ...]
 
 
 class Window:
-    """Which sequence numbers have come: each counts once, and none from long before."""
+    """Window of received sequence numbers: each counts once, and none from long before."""
 
     def __init__(self) -> None:
         self.highest = -1

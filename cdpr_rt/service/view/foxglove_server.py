@@ -28,7 +28,7 @@ _OPEN_S, _TIMEOUT_S = 5.0, 10.0
 _UNREAD_BYTES: Final = 1 << 16
 _MOST_UNSENT_BYTES: Final = 1 << 18
 _MOST_RECEIVED_BYTES: Final = 1 << 16
-"""What a viewer may say at once, and in each second: all it has to say is what it wants to see."""
+"""Rate limit of a viewer's messages: at once, and in each second."""
 _MOST_REASON: Final = 200
 _MOST_ID: Final = (1 << 32) - 1
 _DATA: Final = struct.Struct("<BIQ")
@@ -37,7 +37,7 @@ _MESSAGE_DATA: Final = 1  # the opcode of binary frames that carry a message
 
 @dataclass(frozen=True)
 class Topic:
-    """What can be subscribed to: `encoding` is that of the messages, `json` or `protobuf`."""
+    """Topic that can be subscribed to; `encoding` of its messages is `json` or `protobuf`."""
 
     number: int
     name: str

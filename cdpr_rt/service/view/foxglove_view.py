@@ -38,7 +38,7 @@ RATE_Hz: Final = 50.0
 _AXES: Final = {
     field.name: re.sub(r"_rad(?=_s$|$)", "_deg", field.name) for field in AXIS_FIELDS if field.live
 }
-"""What the live view calls each field that it shows of an axis."""
+"""Name of each field of an axis in the live view."""
 _SCALARS: Final = tuple(field for field in SCALAR_FIELDS if field.live)
 _TIMES: Final = {
     field.name: re.sub(r"_s$", "_ms", field.name) for field in _SCALARS if field.is_wall_time
@@ -157,7 +157,7 @@ class _Topics:
         self._pose = server.advertise("/pose", "protobuf", pose)
         self._wanted = server.advertise("/pose_setpoint", "protobuf", pose)
         self.scene: CableScene | None = None
-        """What is drawn of cables and platform, None of robots without one."""
+        """Scene of cables and platform, None of robots without a platform."""
         self._cables = server.advertise("/cables", "protobuf", SceneUpdate.get_schema())
         self._frame = server.advertise("/tf", "protobuf", FrameTransform.get_schema())
         self._log = server.advertise("/log", "protobuf", Log.get_schema())

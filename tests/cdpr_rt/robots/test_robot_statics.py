@@ -58,7 +58,11 @@ def test_the_reserve_is_what_linear_programming_finds(
     model = statics.model
     w_e = -statics.platform.mass_kg * (a + UP)
     workspace = CableWorkspace(
-        model.about_mass, w_e[None], model.low_N, model.left_by_torque_N, model.wrench_scale
+        model.about_centre_of_mass,
+        w_e[None],
+        model.low_N,
+        model.torque_limited_N,
+        model.wrench_scale,
     )
     margins, worst = workspace.margins(model.poses(p[None]))
     tensions, reserve = worst[0], margins[0]

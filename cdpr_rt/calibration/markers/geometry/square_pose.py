@@ -21,7 +21,7 @@ _DAMPING = 1e-9
 
 @dataclass(frozen=True)
 class SquarePoses:
-    """Of each of n squares two poses in the camera's frame, the better one first."""
+    """Two poses of each of n squares in the camera's frame, the better one first."""
 
     rotation: FloatArray
     """(n, 2, 3, 3)."""

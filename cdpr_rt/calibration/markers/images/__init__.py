@@ -1,1 +1,1 @@
-"""What images show of markers."""
+"""Detection of markers in images."""

@@ -75,9 +75,9 @@ class IntrinsicsFit:
     used: tuple[str, ...]
     """Names of the images."""
     left_out: tuple[str, ...]
-    """Of images, with why."""
+    """Images that were left out, with reasons."""
     missing: tuple[str, ...]
-    """What no image shows yet, in words; the intrinsics are good where this is empty."""
+    """Views that are missing, in words; the intrinsics are good where there are none."""
 
 
 def fit_intrinsics(images: Sequence[tuple[str, NDArray[np.uint8]]], board: Board) -> IntrinsicsFit:

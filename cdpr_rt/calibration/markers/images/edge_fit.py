@@ -39,7 +39,7 @@ class EdgeFit:
     good: NDArray[np.bool_]
     """Whether all four edges were there to see, (k,)."""
     width_px: FloatArray
-    """Of the widest edge of each, from ink to paper, (k,): over its steepest slope."""
+    """Width of the widest edge of each, from ink to paper, (k,): over its steepest slope."""
 
 
 def fit_corners(pixels: NDArray[np.uint8], corners: FloatArray, squares: int) -> EdgeFit:

@@ -70,7 +70,7 @@ class StoredPlan:
 
 def robot_key(model: RobotModel) -> str:
     """Return a text that another robot has not, nor this one with another file or other motors."""
-    bounds = (model.low_N, model.high_N, model.left_by_torque_N)
+    bounds = (model.low_N, model.high_N, model.torque_limited_N)
     key_text = repr((model.platform, *(bound.tolist() for bound in bounds)))
     return hashlib.sha256(key_text.encode()).hexdigest()[:32]
 

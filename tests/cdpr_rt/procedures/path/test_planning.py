@@ -81,7 +81,7 @@ def test_a_place_that_no_tensions_hold_is_named(planner):
     from dataclasses import replace  # noqa: PLC0415
 
     weak = PathPlanner(load_robot("spatial-8"))
-    weak.model = replace(weak.model, left_by_torque_N=np.full(8, 70.0), reserve_N=12.0)
+    weak.model = replace(weak.model, torque_limited_N=np.full(8, 70.0), reserve_N=12.0)
     path = gcode(weak, "G0 X0 Y0 Z0", "X300", "X300 Y450 Z170", "X-300 Y450")
     obstacle = weak.plan(path).obstacle
     assert obstacle is not None
@@ -109,7 +109,7 @@ def test_available_wrenches_are_those_of_linear_programs(planner, plane):
         assert found.holds.all()
         still = model.workspace(0.0, 0.0)
         matrices, rest = still.wrench_matrices(model.poses(place)), still.wrenches[0]
-        low_N, high_N = model.low_N + model.reserve_N, model.left_by_torque_N - model.reserve_N
+        low_N, high_N = model.low_N + model.reserve_N, model.torque_limited_N - model.reserve_N
         bounds = list(zip(low_N, high_N, strict=True))
         for j, f in itertools.product(range(3), range(0, found.normals.shape[1], 9)):
             normal = found.normals[j, f]

@@ -68,7 +68,7 @@ class Carriage:
     positions = size = 2
     angle_rad = 0.0
     low_N, high_N = np.full(2, -100.0), np.full(2, 100.0)
-    left_by_torque_N = high_N
+    torque_limited_N = high_N
     home, wrench_scale = np.array(PLATFORM.home_m), np.ones(2)
     speed, acceleration = np.full(2, PLATFORM.speed_m_s), np.full(2, PLATFORM.acceleration_m_s2)
     jerk = np.full(2, PLATFORM.jerk_m_s3)

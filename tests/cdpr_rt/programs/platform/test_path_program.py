@@ -126,7 +126,7 @@ def test_what_is_refused(rig, tmp_path):
 
 def test_a_plan_for_other_motors_is_refused(rig, tmp_path):
     model = rig.platform.model
-    weaker = replace(model, left_by_torque_N=0.9 * model.high_N)
+    weaker = replace(model, torque_limited_N=0.9 * model.high_N)
     lines = np.arange(len(rig.timed.samples))
     name = write_plan(rig.folder, rig.timed, lines, "square.nc", weaker)
     with pytest.raises(ProgramError, match="another robot, or its file has changed"):

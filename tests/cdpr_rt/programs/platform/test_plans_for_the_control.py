@@ -33,7 +33,7 @@ def test_what_was_planned_for_a_robot_is_taken_by_its_control(share: float, tmp_
     robot, n = with_torque(share), 3
     planner = PathPlanner(robot)
     model = planner.model
-    assert (model.left_by_torque_N < model.high_N).all() == (share < 1.0)
+    assert (model.torque_limited_N < model.high_N).all() == (share < 1.0)
     start = 0.5 * np.add(planner.platform.workspace_min_m, planner.platform.workspace_max_m)
     path = PathDescription("line.nc", planner.coordinates, start, 1)
     path.add(Move(2, np.add(start, [0.1, 0.0]), np.inf, 0.0))
@@ -48,7 +48,7 @@ def test_what_was_planned_for_a_robot_is_taken_by_its_control(share: float, tmp_
     parts.paths.open(tmp_path)
     parts.paths.load(name)
     assert parts.paths.is_loaded(name)
-    highest_N = model.left_by_torque_N - model.reserve_N
+    highest_N = model.torque_limited_N - model.reserve_N
     np.testing.assert_allclose(parts.control.workspace.high, highest_N)
     other = PathStore(platform_model_of(with_torque(0.8 * share)))
     other.open(tmp_path)
