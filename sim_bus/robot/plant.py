@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal, Self, TypeVar
 
-import numpy as np
-from numpy.typing import ArrayLike, NDArray
 from pydantic import Field, model_validator
 
 from cdpr_profiles.reading.reader import Profile
@@ -262,45 +260,3 @@ class Plant(PlantFile):
     def inertia_kg_m2(self) -> float:
         """Inertia of rotor and load together."""
         return self.motor.inertia_kg_m2 + self.load.inertia_kg_m2
-
-    def cogging_Nm(
-        self, angle_rad: ArrayLike, *, energised: bool = True, rise_K: float = 0.0
-    ) -> NDArray[np.float64]:
-        """Return the torque that holds the rotor against the cogging at mechanical angles.
-
-        `angle_rad` counts from the mechanical zero, in which frame the index lies at
-        `encoder.index_deg`: c = Σ A sin(order·θ + phase). The offset ripple acts while energised.
-        """
-        angle = np.asarray(angle_rad, dtype=np.float64)
-        total = np.zeros_like(angle)
-        for term in self.cogging:
-            wave = term.amplitude_Nm * np.sin(term.order * angle + np.deg2rad(term.phase_deg))
-            if term.kind == "torque":
-                total += (1.0 + self.thermal.cogging_per_K * rise_K) * wave
-            elif energised:
-                total += (1.0 + self.motor.torque_constant_error) * wave
-        return total
-
-    def friction_Nm(
-        self,
-        velocity_rad_s: ArrayLike,
-        *,
-        angle_rad: ArrayLike | None = None,
-        rise_K: float = 0.0,
-    ) -> NDArray[np.float64]:
-        """Return the friction torque that opposes steady motion at the given velocities.
-
-        It is that at mechanical angles, and on average over a turn where they are left out.
-        """
-        v = np.asarray(velocity_rad_s, dtype=np.float64)
-        f = self.friction
-        sign = np.sign(v)
-        level = f.coulomb_Nm + (f.breakaway_Nm - f.coulomb_Nm) * np.exp(
-            -((v / f.stribeck_rad_s) ** 2)
-        )
-        dry = sign * (1.0 + 0.5 * f.direction_asymmetry * sign) * level
-        if angle_rad is not None:
-            angle = np.asarray(angle_rad, dtype=np.float64)
-            dry *= 1.0 + f.angle_share * np.sin(angle + np.deg2rad(f.angle_phase_deg))
-        scale = 1.0 + self.thermal.friction_per_K * rise_K
-        return np.asarray(scale * (dry + f.viscous_Nms_rad * v))

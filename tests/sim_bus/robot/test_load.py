@@ -18,6 +18,7 @@ from cdpr_sim_bus.robot.motor import Motor
 from cdpr_sim_bus.robot.motor_state import Transmission
 from cdpr_sim_bus.robot.plant import Plant
 from tests.sim_bus.cia402.drive_rig import Rig
+from tests.sim_bus.robot.plant_torques import friction_Nm
 
 GAIN = 0.026
 G = 9.80665
@@ -67,7 +68,7 @@ def test_raising_and_lowering_a_mass_takes_weight_plus_and_minus_friction(
     winding_in = -sign * 2.0
     up, down = torque_at(motor, winding_in), torque_at(motor, -winding_in)
     weight = mass_kg * G * GAIN * 1.02
-    friction = 0.03 + 0.06 * weight + p.friction_Nm([2.0, -2.0]) * [1, -1]
+    friction = 0.03 + 0.06 * weight + friction_Nm(p, [2.0, -2.0]) * [1, -1]
     first, second = friction if winding_in > 0 else friction[::-1]
     assert -sign * up == pytest.approx(weight + first, rel=2e-3)
     assert -sign * down == pytest.approx(weight - second, rel=2e-3)

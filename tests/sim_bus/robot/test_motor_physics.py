@@ -14,6 +14,7 @@ from scipy.integrate import solve_ivp
 from cdpr_sim_bus.robot import servo
 from cdpr_sim_bus.robot.motor import Motor, Sample
 from cdpr_sim_bus.robot.plant import Plant
+from tests.sim_bus.robot.plant_torques import cogging_Nm, friction_Nm
 
 COLD = {"cogging_per_K": 0.0, "friction_per_K": 0.0}
 
@@ -143,7 +144,7 @@ def test_steady_friction_follows_the_stribeck_curve(
     for _ in range(200):
         motor.record["velocity"] = velocity if forward else -velocity
         sample = motor.step(travel / velocity / 200, servo.OFF, 0.0)
-    expected = p.friction_Nm(sample.velocity_rad_s, angle_rad=sample.angle_rad)
+    expected = friction_Nm(p, sample.velocity_rad_s, angle_rad=sample.angle_rad)
     assert sample.friction_Nm == pytest.approx(float(expected), rel=0.02)
 
 
@@ -231,12 +232,12 @@ def test_cogging_oracle_is_the_torque_that_holds_the_rotor() -> None:
     motor = Motor(p)
     for k in range(300):
         sample = motor.step(1e-3, servo.VELOCITY, 3000.0 if k > 5 else 0.0)
-        assert sample.cogging_Nm == pytest.approx(float(p.cogging_Nm(sample.angle_rad)), abs=6e-3)
+        assert sample.cogging_Nm == pytest.approx(float(cogging_Nm(p, sample.angle_rad)), abs=6e-3)
     motor.step(0.05, servo.OFF, 0.0)
     sample = motor.step(1e-4, servo.OFF, 0.0)
-    unpowered = p.cogging_Nm(sample.angle_rad, energised=False)
+    unpowered = cogging_Nm(p, sample.angle_rad, energised=False)
     assert sample.cogging_Nm == pytest.approx(float(unpowered), abs=1e-3)
-    assert abs(float(unpowered) - float(p.cogging_Nm(sample.angle_rad))) > 1e-4
+    assert abs(float(unpowered) - float(cogging_Nm(p, sample.angle_rad))) > 1e-4
 
 
 def test_torque_constant_error_shows_in_the_motion_and_not_in_the_drive() -> None:
@@ -275,10 +276,10 @@ def test_warming_scales_cogging_and_friction() -> None:
         for _ in range(1000):
             sample = step_torque(motor, 1e-3, 0.0)
         assert sample.rise_K == pytest.approx(20 * (1 - math.exp(-t)), rel=1e-3)
-        cogging = p.cogging_Nm(sample.angle_rad, rise_K=sample.rise_K)
+        cogging = cogging_Nm(p, sample.angle_rad, rise_K=sample.rise_K)
         assert sample.cogging_Nm == pytest.approx(float(cogging), abs=3e-4)
-        friction = p.friction_Nm(
-            sample.velocity_rad_s, angle_rad=sample.angle_rad, rise_K=sample.rise_K
+        friction = friction_Nm(
+            p, sample.velocity_rad_s, angle_rad=sample.angle_rad, rise_K=sample.rise_K
         )
         assert sample.friction_Nm == pytest.approx(float(friction), rel=2e-3)
     for _ in range(5000):
