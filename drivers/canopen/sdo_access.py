@@ -103,20 +103,15 @@ class ObjectAccess:
 
         self._transfer(node_id, index, sub, f"set to {value}", transfer, _ATTEMPTS)
 
-    def write_bytes(
-        self, node_id: int, index: int, sub: int, data: bytes, *, timeout_s: float = _TIMEOUT_S
-    ) -> None:
+    def write_bytes(self, node_id: int, index: int, sub: int, data: bytes) -> None:
         """Write an object's data as they are; raises SdoError, BusError."""
         number = f"{data[::-1].hex().upper()}h"  # as CiA 301 writes it, the highest byte first
         what = f"set to {number if len(data) <= 8 else f'{len(data)} bytes'}"
-        self._transfer(
-            node_id,
-            index,
-            sub,
-            what,
-            lambda client: client.download(index, sub, data, timeout_s),
-            _ATTEMPTS,
-        )
+
+        def transfer(client: SdoClient) -> None:
+            client.download(index, sub, data, _TIMEOUT_S)
+
+        self._transfer(node_id, index, sub, what, transfer, _ATTEMPTS)
 
     def cancel(self, node_id: int) -> bool:
         """Have the transfer with a node that a task runs end; return whether one ran.

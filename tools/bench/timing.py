@@ -31,9 +31,10 @@ def timed(work: Callable[[], object], count: int, warm_up: int) -> tuple[Times, 
 def percentiles(
     values: NDArray[Any] | Sequence[float], *percents: float, digits: int
 ) -> dict[str, float]:
-    """Return percentiles rounded to so many digits, by names such as p50 and p99.9."""
+    """Return percentiles rounded to so many digits, by names such as p50, p99.9 and max."""
     found = np.percentile(values, percents)
-    return {f"p{p:g}": round(float(v), digits) for p, v in zip(percents, found, strict=True)}
+    names = ("max" if p == 100.0 else f"p{p:g}" for p in percents)
+    return {name: round(float(v), digits) for name, v in zip(names, found, strict=True)}
 
 
 def verdict(reached: bool) -> str:

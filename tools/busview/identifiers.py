@@ -45,7 +45,7 @@ def filters(identifiers: frozenset[int]) -> list[tuple[int, int]]:
 
 
 def _blocks(identifiers: frozenset[int], start: int, size: int) -> Iterator[tuple[int, int]]:
-    """Yield the aligned blocks of a power of two that lie wholly in `wanted`."""
+    """Yield the aligned blocks of a power of two that lie wholly in `identifiers`."""
     inside = sum(1 for i in range(start, start + size) if i in identifiers)
     if inside == size:
         yield start, (_LAST & ~(size - 1)) | EFF_FLAG

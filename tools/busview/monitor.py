@@ -6,6 +6,7 @@ import os
 import queue
 import threading
 import time
+from collections import Counter
 from collections.abc import Callable, Iterable
 from contextlib import suppress
 from dataclasses import dataclass, field
@@ -19,13 +20,6 @@ from cdpr_tools.errors import BadInputError, WorkFailedError, os_error_as
 
 _MORE_BITS_EXTENDED = 25
 """20 bits of the identifier and the 5 that they may have stuffed."""
-
-
-@dataclass
-class _Traffic:
-    node_id: int | None
-    kind: str
-    frames: int = 0
 
 
 @dataclass
@@ -46,7 +40,7 @@ class Summary:
     """Frames that went past the monitor, where that is known."""
     led: bool | None = None
     """Whether a master leads the bus at the end, where that is known."""
-    _by_id: dict[tuple[str, str], _Traffic] = field(default_factory=dict)
+    _by_id: Counter[tuple[str, str, int | None]] = field(default_factory=Counter)
 
     def add(self, record: Record) -> None:
         """Count one frame."""
@@ -57,11 +51,7 @@ class Summary:
         self.frames += 1
         self.problems += record.problem
         self.bits += _bits(frame)
-        key = (frame.id_text, record.kind)
-        traffic = self._by_id.get(key)
-        if traffic is None:
-            traffic = self._by_id[key] = _Traffic(record.node_id, record.kind)
-        traffic.frames += 1
+        self._by_id[frame.id_text, record.kind, record.node_id] += 1
 
     @property
     def duration_s(self) -> float:
@@ -82,17 +72,10 @@ class Summary:
     def rows(self) -> list[dict[str, Any]]:
         """Return frames and frames a second by identifier, in the order of their priority."""
         rows = []
-        for (identifier, kind), traffic in sorted(self._by_id.items()):
-            rate = traffic.frames / self.duration_s if self._has_rates else None
-            rows.append(
-                {
-                    "id": identifier,
-                    "kind": kind,
-                    "node_id": traffic.node_id,
-                    "frames": traffic.frames,
-                    "per_s": rate,
-                }
-            )
+        for (identifier, kind, node_id), frames in sorted(self._by_id.items()):
+            row = {"id": identifier, "kind": kind, "node_id": node_id, "frames": frames}
+            rate = frames / self.duration_s if self._has_rates else None
+            rows.append({**row, "per_s": rate})
         return rows
 
     def table(self) -> dict[str, Any]:

@@ -25,6 +25,7 @@ from cdpr_tools.commands.options import (
     IndexOption,
     JsonOption,
     OverwriteOption,
+    RecordedWinchOption,
     RobotOption,
     SocketOption,
     YesOption,
@@ -45,6 +46,10 @@ app = typer.Typer(
 )
 
 _OutOption = Annotated[Path, typer.Option("--out", help="Folder for the recordings.")]
+_TurnsOption = Annotated[int, typer.Option(min=1, max=20, help="Turns in each direction.")]
+_SpeedOption = Annotated[
+    float, typer.Option("--speed-deg-s", min=0.5, max=60.0, help="Speed of the sweep.")
+]
 
 
 @app.command()
@@ -53,10 +58,8 @@ def sweep(
     winch: WinchOnBus,
     out: Output,
     out_dir: _OutOption,
-    turns: Annotated[int, typer.Option(min=1, max=20, help="Turns in each direction.")] = 2,
-    speed_deg_s: Annotated[
-        float, typer.Option("--speed-deg-s", min=0.5, max=60.0, help="Speed of the sweep.")
-    ] = 3.0,
+    turns: _TurnsOption = 2,
+    speed_deg_s: _SpeedOption = 3.0,
     overwrite: OverwriteOption = False,
     index: IndexOption = "homing",
     yes: YesOption = False,
@@ -82,10 +85,8 @@ def sweep(
 def sweep_axis(
     axis: Annotated[str, typer.Argument(help="Axis of the running robot.")],
     out_dir: _OutOption,
-    turns: Annotated[int, typer.Option(min=1, max=20, help="Turns in each direction.")] = 2,
-    speed_deg_s: Annotated[
-        float, typer.Option("--speed-deg-s", min=0.5, max=60.0, help="Speed of the sweep.")
-    ] = 3.0,
+    turns: _TurnsOption = 2,
+    speed_deg_s: _SpeedOption = 3.0,
     overwrite: OverwriteOption = False,
     robot: RobotOption = None,
     socket: SocketOption = None,
@@ -127,9 +128,7 @@ def sweep_axis(
 @app.command()
 def fit(
     folder: Annotated[Path, typer.Argument(help="The --out folder of sweep or commission.")],
-    winch: Annotated[
-        str | None, typer.Option(help="Winch profile; the one recorded by default.")
-    ] = None,
+    winch: RecordedWinchOption = None,
     as_json: JsonOption = False,
 ) -> None:
     """Identify from recorded data and write the cogging profile into the folder."""

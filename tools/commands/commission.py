@@ -29,6 +29,7 @@ from cdpr_tools.commands.options import (
     OverwriteOption,
     PlantOption,
     SafetyIoOption,
+    WinchOrRobotArgument,
     YesOption,
 )
 from cdpr_tools.commission import summary
@@ -63,12 +64,7 @@ class _Request:
 
 @app.command()
 def commission(
-    machine: Annotated[
-        str,
-        typer.Argument(
-            help="Winch or robot profile: a name or the path of a file.", metavar="WINCH|ROBOT"
-        ),
-    ],
+    machine: WinchOrRobotArgument,
     bus: Annotated[
         list[str] | None,
         typer.Option(

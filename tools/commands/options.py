@@ -167,6 +167,15 @@ OverwriteOption = Annotated[
 ExitWithStdinOption = Annotated[
     bool, typer.Option("--exit-with-stdin", help="Stop when standard input, a pipe, ends.")
 ]
+WinchOrRobotArgument = Annotated[
+    str,
+    typer.Argument(
+        help="Winch or robot profile: a name or the path of a file.", metavar="WINCH|ROBOT"
+    ),
+]
+RecordedWinchOption = Annotated[
+    str | None, typer.Option("--winch", help="Winch profile; the one recorded by default.")
+]
 RobotBusOption = Annotated[
     list[str] | None,
     typer.Option(

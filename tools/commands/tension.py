@@ -29,6 +29,7 @@ from cdpr_rt.procedures.tension.masses import (
 from cdpr_tools.commands.options import (
     JsonOption,
     OverwriteOption,
+    RecordedWinchOption,
     SafetyIoOption,
     YesOption,
 )
@@ -267,9 +268,7 @@ class _Run:
 @app.command()
 def fit(
     folder: Annotated[Path, typer.Argument(help="The --out folder of a calibration.")],
-    winch: Annotated[
-        str | None, typer.Option(help="Winch profile; the one recorded by default.")
-    ] = None,
+    winch: RecordedWinchOption = None,
     as_json: JsonOption = False,
 ) -> None:
     """Identify again from the recordings of a calibration."""

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import contextlib
 import json
 import os
 import select
 import subprocess
-import sys
 import time
 from collections.abc import Callable
 from itertools import count
@@ -16,6 +14,7 @@ from typing import IO
 
 from cdpr_tools.compiling import NOTICE, compiling_until, pass_on
 from cdpr_tools.errors import BadInputError, WorkFailedError
+from cdpr_tools.module_process import end_by_stdin, module_command
 
 # the first start on a machine compiles the physics, a slow one for minutes
 _START_TIMEOUT_S = 600.0
@@ -35,7 +34,7 @@ class _OwnProcess:
         done here while it starts; of that no more is compiled once the process has ended.
         """
         self.process = subprocess.Popen(
-            [sys.executable, "-P", "-m", "cdpr_tools.cli", *command, "--exit-with-stdin"],
+            module_command("cdpr_tools.cli", *command, "--exit-with-stdin"),
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
@@ -85,15 +84,7 @@ class _OwnProcess:
 
     def stop(self) -> None:
         """End it; what it logs is complete afterwards."""
-        with contextlib.suppress(OSError):
-            self._pipe(self.process.stdin).close()
-        try:
-            self.process.wait(_STOP_TIMEOUT_S)
-        except subprocess.TimeoutExpired:
-            self.process.kill()
-            self.process.wait()
-        for pipe in (self.process.stdout, self.process.stderr):
-            self._pipe(pipe).close()
+        end_by_stdin(self.process, _STOP_TIMEOUT_S)
 
 
 class OwnLoadCells(_OwnProcess):

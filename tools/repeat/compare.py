@@ -132,8 +132,8 @@ def _shown(text: bytes) -> str:
 class Verdict:
     """What came out for one file."""
 
-    name: str
-    """In its run's folder, without the time of day and ids of processes."""
+    file: str
+    """Its name in its run's folder, without the time of day and ids of processes."""
     same: bool | None
     """Whether it is the same in all runs, None where it is not compared."""
     hashes: Sequence[str]
@@ -144,20 +144,11 @@ class Verdict:
     def line(self) -> str:
         """Return it as a line."""
         if self.same is None:
-            return f"not compared              {self.name}"
+            return f"not compared              {self.file}"
         hashes = list(dict.fromkeys(self.hashes))
         if self.same:
-            return f"same     {hashes[0]} {self.name}"
-        return f"DIFFERS  {hashes[0]} {self.name}: {self.difference}"
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return it for JSON."""
-        return {
-            "file": self.name,
-            "same": self.same,
-            "hashes": list(self.hashes),
-            "difference": self.difference,
-        }
+            return f"same     {hashes[0]} {self.file}"
+        return f"DIFFERS  {hashes[0]} {self.file}: {self.difference}"
 
 
 def compare(runs: Sequence[Run]) -> list[Verdict]:

@@ -17,6 +17,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from cdpr_tools.errors import BadInputError, WorkFailedError, os_error_as
+from cdpr_tools.module_process import module_command
 
 _STOP_S = (0.1, 5.0)
 _PAUSE_S = 1.5
@@ -155,7 +156,7 @@ def run_once(
 @contextmanager
 def _running(command: Sequence[str], work: Path, out: int) -> Iterator[subprocess.Popen[bytes]]:
     """Run the command meanwhile; end it, and whatever it has left, in order if possible."""
-    words = [sys.executable, "-P", "-m", "cdpr_tools.cli", *command]
+    words = module_command("cdpr_tools.cli", *command)
     if "/" in command[0]:
         words = [str(Path(command[0]).absolute()), *command[1:]]
     path = f"{Path(sys.executable).parent}:{os.environ.get('PATH', os.defpath)}"

@@ -5,10 +5,9 @@ from __future__ import annotations
 import json
 import os
 import subprocess
-import sys
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager, nullcontext, suppress
+from contextlib import contextmanager, nullcontext
 from typing import Any
 
 import can
@@ -22,6 +21,7 @@ from cdpr_rt.runtime.realtime import one_core
 from cdpr_tools.bench.cyclic.echo_bus import ANSWERED, ASKED, FRAMES
 from cdpr_tools.bench.timing import Times, percentiles, timed
 from cdpr_tools.errors import WorkFailedError
+from cdpr_tools.module_process import end_by_stdin, module_command
 from cdpr_tools.output import Output
 
 PERCENTILES = (50.0, 99.9)
@@ -239,28 +239,18 @@ def _delivery(variant: OwnAccess) -> dict[str, float]:
 def _echo(bus: str) -> Iterator[dict[str, Any]]:
     """Run the far end on `bus`; yield what it reported when it was up."""
     process = subprocess.Popen(
-        [sys.executable, "-P", "-m", "cdpr_tools.bench.cyclic.echo_bus", bus],
+        module_command("cdpr_tools.bench.cyclic.echo_bus", bus),
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
         start_new_session=True,
     )
-    assert process.stdin is not None  # opened with PIPE
-    assert process.stdout is not None
+    assert process.stdout is not None  # opened with PIPE
     try:
         line = process.stdout.readline()
         if not line:
             raise WorkFailedError(process.communicate()[1].strip() or "the far end did not start")
         yield json.loads(line)["ready"]
     finally:
-        with suppress(OSError):
-            process.stdin.close()
-        try:
-            process.wait(_STOP_TIMEOUT_S)
-        except subprocess.TimeoutExpired:
-            process.kill()
-            process.wait()
-        process.stdout.close()
-        assert process.stderr is not None
-        process.stderr.close()
+        end_by_stdin(process, _STOP_TIMEOUT_S)

@@ -18,6 +18,7 @@ from matplotlib.axes import Axes
 from cdpr_tools.bench.cyclic.wakeups import Times
 from cdpr_tools.bench.timing import percentiles
 from cdpr_tools.errors import BadInputError, WorkFailedError
+from cdpr_tools.module_process import module_command
 from cdpr_tools.output import Output
 from cdpr_tools.report.style import COLOURS, canvas, legend_above
 
@@ -25,7 +26,7 @@ VARIANTS = {"ordinary": "ordinary process", "realtime": "real-time settings"}
 LOADS = {"idle": "nothing else asked of the machine", "loaded": "every processor kept busy"}
 
 _ROUNDS = 2
-_PERCENTILES = (50.0, 99.0, 99.9)
+_PERCENTILES = (50.0, 99.0, 99.9, 100.0)
 _US = 1e-3  # of a ns
 _BINS_A_DECADE = 12
 _COLOURS = {"ordinary": COLOURS["better"], "realtime": COLOURS["thesis"]}
@@ -61,7 +62,10 @@ def measure(rate_Hz: float, seconds: float, picture: Path, out: Output) -> dict[
         "processors": len(os.sched_getaffinity(0)),
         "not_allowed": not_allowed,
         "late_us": {
-            load: {variant: _figures(times) for variant, times in variants.items()}
+            load: {
+                variant: percentiles(times * _US, *_PERCENTILES, digits=1)
+                for variant, times in variants.items()
+            }
             for load, variants in late.items()
         },
         "picture": picture,
@@ -131,22 +135,10 @@ def _histogram(ax: Axes, times: Times, bins: Any, label: str, colour: str) -> No
     ax.set_yscale("log")
 
 
-def _figures(times: Times) -> dict[str, float]:
-    late_us = times * _US
-    most_us = round(float(late_us.max()), 1)
-    return percentiles(late_us, *_PERCENTILES, digits=1) | {"max": most_us}
-
-
 def _probe(period_s: float, cycles: int, variant: str) -> tuple[list[str], Times]:
-    command = [
-        sys.executable,
-        "-P",
-        "-m",
-        "cdpr_tools.bench.cyclic.wakeups",
-        repr(period_s),
-        str(cycles),
-        variant,
-    ]
+    command = module_command(
+        "cdpr_tools.bench.cyclic.wakeups", repr(period_s), str(cycles), variant
+    )
     run = subprocess.run(command, capture_output=True, check=False)
     head, _, data = run.stdout.partition(b"\n")
     if run.returncode != 0 or not data:

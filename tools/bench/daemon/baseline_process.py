@@ -6,7 +6,6 @@ import json
 import math
 import os
 import subprocess
-import sys
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from typing import Any
@@ -23,6 +22,7 @@ from cdpr_rt.robots.robot_arrays import limits_of
 from cdpr_tools.bench.daemon.loop_daemon import answers_in_time
 from cdpr_tools.composition.simulator import OwnSimulator
 from cdpr_tools.errors import WorkFailedError
+from cdpr_tools.module_process import module_command
 
 PROGRAM = "cdpr_tools.bench.daemon.loop_baseline"
 OF_PLATFORM = "cdpr_tools.bench.daemon.pose_baseline"
@@ -42,7 +42,7 @@ def measure(robot: Robot, seconds: float, speed_rad_s: float) -> dict[str, Any]:
     with _booted(robot, limits) as channels:
         given = {**_axes(robot, limits, channels), "seconds": seconds, "speed_rad_s": speed_rad_s}
         done = subprocess.run(
-            [sys.executable, "-P", "-m", program, json.dumps(given)],
+            module_command(program, json.dumps(given)),
             capture_output=True,
             text=True,
             timeout=_TIMEOUT_S + seconds,

@@ -1,4 +1,4 @@
-"""What another process has used of the processors so far."""
+"""The daemon's loop as benches run it: on a simulator of its own, its processor time measured."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ import json
 import math
 import os
 import subprocess
-import sys
 import time
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, suppress
@@ -26,6 +25,7 @@ from cdpr_tools.daemon.processes.child import Child
 from cdpr_tools.daemon.processes.launcher import LOOP, SERVICE
 from cdpr_tools.daemon.settings import RunSettings
 from cdpr_tools.errors import WorkFailedError
+from cdpr_tools.module_process import end_by_stdin, module_command
 
 _SCHEDULED = 2  # CPUCLOCK_SCHED: as the scheduler counts, to the nanosecond
 
@@ -262,7 +262,7 @@ class _LiveClient:
 
     def __init__(self, control: Path) -> None:
         self._process = subprocess.Popen(
-            [sys.executable, "-P", "-m", LIVE_CLIENT, str(control)],
+            module_command(LIVE_CLIENT, str(control)),
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             text=True,
@@ -274,4 +274,4 @@ class _LiveClient:
             raise WorkFailedError("the live view cannot be reached")
 
     def close(self) -> None:
-        self._process.communicate("", timeout=_STOP_S)
+        end_by_stdin(self._process, _STOP_S)

@@ -6,7 +6,6 @@ import json
 import os
 import secrets
 import subprocess
-import sys
 import tempfile
 import time
 from collections import Counter
@@ -20,6 +19,7 @@ from cdpr_tools.bench.daemon.loop_daemon import with_tolerant_limits
 from cdpr_tools.bench.timing import percentiles, verdict
 from cdpr_tools.client.client import Daemon, open_daemon
 from cdpr_tools.errors import WorkFailedError
+from cdpr_tools.module_process import module_command
 from cdpr_tools.output import Output
 
 ROBOT = "bench-2"
@@ -28,7 +28,7 @@ FLOODS: Final = {"alone": (0, 0), "flooded": (4, 0), "flooded_lowest": (4, 19)}
 TRANSPORTS: Final = ("unix", "http")
 BOUND_MS: Final = 50.0
 _STOPS: Final = ("/disable", "/hold")
-_PERCENTILES = (50.0, 99.0)
+_PERCENTILES = (50.0, 99.0, 100.0)
 _FLOOD = "cdpr_tools.bench.daemon.flood"
 _START_S, _END_S, _LEAD_S = 120.0, 60.0, 2.0
 _PAUSE_S = 0.01
@@ -56,7 +56,8 @@ def measure(stops: int, out: Output) -> dict[str, Any]:
                         time.sleep(_PAUSE_S)
                         advance(float(stops * number + k + 1))
         figures = {
-            case: {by: _percentiles(ms) for by, ms in of.items()} for case, of in took_ms.items()
+            case: {by: percentiles(ms, *_PERCENTILES, digits=2) for by, ms in of.items()}
+            for case, of in took_ms.items()
         }
     worst = max(figures["flooded"][transport]["p99"] for transport in TRANSPORTS)
     return {
@@ -92,10 +93,6 @@ def report(figures: dict[str, Any]) -> list[str]:
         f"wanted below {figures['bound_ms']:g} ms at the 99th percentile: "
         f"{verdict(figures['reached'])}",
     ]
-
-
-def _percentiles(ms: list[float]) -> dict[str, float]:
-    return percentiles(ms, *_PERCENTILES, digits=2) | {"max": round(max(ms), 2)}
 
 
 class _Bench:
@@ -140,16 +137,7 @@ def _daemon(folder: Path) -> Iterator[_Bench]:
     robot = with_tolerant_limits(load_robot(ROBOT), folder)
     options = ["--socket", str(bench.socket), "--key-file", str(bench.key_file), "--no-record"]
     options += ["--http", "127.0.0.1:0", "--stream", "127.0.0.1:0", "--live", "0"]
-    command = [
-        sys.executable,
-        "-P",
-        "-m",
-        "cdpr_tools.cli",
-        "run",
-        str(robot.path),
-        "--bus",
-        "simbus:",
-    ]
+    command = module_command("cdpr_tools.cli", "run", str(robot.path), "--bus", "simbus:")
     with (folder / "errors").open("w+") as errors:
         process = subprocess.Popen([*command, *options], stdout=subprocess.PIPE, stderr=errors)
         try:
@@ -188,7 +176,7 @@ def _flooded(bench: _Bench, clients: int, nice: int, sent: Counter[str]) -> Iter
         "seconds": _MOST_FLOOD_S,
         "nice": nice,
     }
-    command = [sys.executable, "-P", "-m", _FLOOD, json.dumps(target)]
+    command = module_command(_FLOOD, json.dumps(target))
     floods = [subprocess.Popen(command, stdout=subprocess.PIPE, text=True) for _ in range(clients)]
     try:
         if floods:

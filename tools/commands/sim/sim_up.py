@@ -23,7 +23,7 @@ from cdpr_sim_bus.clock import ClockMode
 from cdpr_sim_bus.frame import FrameLog
 from cdpr_sim_bus.physics_board import PhysicsBoard
 from cdpr_sim_bus.robot.plant import Plant
-from cdpr_tools.commands.options import ExitWithStdinOption
+from cdpr_tools.commands.options import ExitWithStdinOption, WinchOrRobotArgument
 from cdpr_tools.commands.sim import sim_robot
 from cdpr_tools.compiling import announce_compiling
 from cdpr_tools.errors import BadInputError, os_error_as, raised_as
@@ -33,12 +33,7 @@ app = typer.Typer()
 
 @app.command()
 def up(
-    machine: Annotated[
-        str,
-        typer.Argument(
-            help="Winch or robot profile: a name or the path of a file.", metavar="WINCH|ROBOT"
-        ),
-    ],
+    machine: WinchOrRobotArgument,
     bus: Annotated[
         list[str],
         typer.Option(

@@ -7,6 +7,7 @@ import random
 import tempfile
 from collections.abc import Sequence
 from contextlib import ExitStack
+from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated
 
@@ -85,7 +86,7 @@ def verify(
             "runs": [
                 {"seconds": run.seconds, "stops": run.stops, "held_s": run.held_s} for run in done
             ],
-            "files": [verdict.as_dict() for verdict in verdicts],
+            "files": [asdict(verdict) for verdict in verdicts],
         }
     )
     if not same:

@@ -13,6 +13,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from cdpr_tools.daemon.settings import RunSettings
+from cdpr_tools.module_process import module_command
 
 _PR_SET_PDEATHSIG = 1
 
@@ -52,10 +53,8 @@ class Child:
     """One of the daemon's processes; it inherits the shared memory and `keep`."""
 
     def __init__(self, module: str, settings: RunSettings, keep: Sequence[int] = ()) -> None:
-        # -P: no module of the working directory in place of ours; PYTHONPATH is its user's to set
-        command = [sys.executable, "-P", "-m", module, settings.model_dump_json()]
         self.process = subprocess.Popen(
-            command,
+            module_command(module, settings.model_dump_json()),
             stdin=subprocess.DEVNULL,
             stdout=sys.stderr.fileno(),  # standard output is the launcher's alone
             env={**os.environ, **_ONE_THREAD},
