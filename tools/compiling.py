@@ -130,7 +130,7 @@ class _NotWantedError(Exception):
     """What is compiled is not wanted any more."""
 
 
-class _EndsIt(logging.Handler):
+class _EndsCompiling(logging.Handler):
     """Raises where the next kernel would be compiled, once that is not wanted any more."""
 
     def __init__(self, ended: Callable[[], bool]) -> None:
@@ -149,7 +149,7 @@ def compiling_until(ended: Callable[[], bool]) -> Iterator[None]:
 
     Only where `announce_compiling` is in force: nothing else tells of each kernel.
     """
-    handler = _EndsIt(ended)
+    handler = _EndsCompiling(ended)
     _LOG.addHandler(handler)
     try:
         with suppress(_NotWantedError):

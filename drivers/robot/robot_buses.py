@@ -17,7 +17,7 @@ def simulated_url(name: str, bus: str) -> str:
     return f"simbus:{name}-{bus}"
 
 
-def asks_for_own_simulator(texts: Sequence[str]) -> bool:
+def starts_own_simulator(texts: Sequence[str]) -> bool:
     """Whether the command has to start a simulator of its own."""
     return list(texts) == ["simbus:"]
 
@@ -57,7 +57,7 @@ def robot_urls(robot: Robot, texts: Sequence[str]) -> dict[str, BusUrl]:
 def refuse_simulated_calibration(robot: Robot, texts: Sequence[str]) -> None:
     """Raise ConfigurationError where a calibration of a simulated robot would move a real one."""
     known = robot.calibration
-    if known is None or not known.simulated or asks_for_own_simulator(texts):
+    if known is None or not known.simulated or starts_own_simulator(texts):
         return
     real = [str(url) for url in robot_urls(robot, texts).values() if not url.is_simulated]
     if real:

@@ -122,7 +122,7 @@ class CameraServer:
     def _answer(self, line: bytes) -> bytes:
         lens = self._camera.plant.lens
         size = {"width": lens.width_px, "height": lens.height_px}
-        request = _wish(line)
+        request = _requested(line)
         if request == "about":
             return json.dumps(size).encode() + b"\n"
         if request != "grab":
@@ -168,7 +168,7 @@ class CameraServer:
         return {"done": " ".join(words)}
 
 
-def _wish(line: bytes) -> str:
+def _requested(line: bytes) -> str:
     try:
         asked = json.loads(line)
     except ValueError:

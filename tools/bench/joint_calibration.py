@@ -14,7 +14,7 @@ from cdpr_sim_bus.camera.camera_plant import CameraPlant
 from cdpr_sim_bus.camera.sim_camera import SimCamera
 from cdpr_sim_bus.physics_board import PlatformState
 from cdpr_tools.calibrate.ablation import accuracy_of, box_targets
-from cdpr_tools.calibrate.made_readings import ErrorBudget, SheetLayout, made_readings
+from cdpr_tools.calibrate.synthetic_readings import ErrorBudget, SheetLayout, synthetic_readings
 from cdpr_tools.output import Output
 
 TARGET_S: Final = 20.0
@@ -28,7 +28,7 @@ def measure(count: int, seed: int, out: Output) -> dict[str, Any]:
     robot = load_robot(_ROBOT)
     geometry = CableGeometry.of(robot, knowledge=Knowledge(exit_m=_ERRORS.exit_m))
     targets = box_targets(geometry.model, count, seed)
-    made = made_readings(
+    made = synthetic_readings(
         robot, targets, geometry.model.poses(targets), _ERRORS, _LAYOUT, seed, of_data=count
     )
     setup = made.data.camera

@@ -1,8 +1,8 @@
 """What made the error of the thesis' calibration, and what each improvement takes off it.
 
-Each trial makes a robot and its readings up (`made_readings`), calibrates it, and has lengths alone
-tell ten poses that were not used. Errors are those of these poses seen from the first one, and
-seen from the frame of the markers.
+Each trial calibrates a synthetic robot from its readings (`synthetic_readings`), and has lengths
+alone tell ten poses that were not used. Errors are those of these poses seen from the first one,
+and seen from the frame of the markers.
 """
 
 from __future__ import annotations
@@ -34,13 +34,13 @@ from cdpr_rt.calibration.pose_choice import informative
 from cdpr_rt.calibration.readings.observations import Observations
 from cdpr_rt.calibration.verification.verification import relative_errors
 from cdpr_rt.robots.platform_model import PlatformModel
-from cdpr_tools.calibrate.made_readings import (
+from cdpr_tools.calibrate.synthetic_readings import (
     ErrorBudget,
     HAND_EYE_deg,
     HAND_EYE_m,
-    Made,
     SheetLayout,
-    made_readings,
+    SyntheticReadings,
+    synthetic_readings,
 )
 from cdpr_tools.errors import BadInputError
 from cdpr_tools.jobs import cores, runner
@@ -178,7 +178,7 @@ def trial(robot: str, case: AblationCase, seed: int) -> Accuracy:
     known = Knowledge(exit_m=max(case.errors.exit_m, 1e-3), drum=max(case.errors.drum, 1e-4))
     geometry = CableGeometry.of(profile, case.identified, known)
     targets = _targets(geometry, case, seed)
-    made = made_readings(
+    made = synthetic_readings(
         profile, targets, geometry.model.poses(targets), case.errors, case.layout, seed,
         of_data=case.poses,
     )  # fmt: skip
@@ -215,7 +215,7 @@ def box_targets(model: PlatformModel, poses: int, seed: int) -> FloatArray:
 
 
 def accuracy_of(
-    geometry: CableGeometry, made: Made, reference_m: FloatArray
+    geometry: CableGeometry, made: SyntheticReadings, reference_m: FloatArray
 ) -> tuple[float, float]:
     """Return mean errors, mm and deg, of poses by lengths alone seen from the first."""
     count = len(made.data.poses)
@@ -223,7 +223,7 @@ def accuracy_of(
     return _means(*relative_errors(poses, made.poses[count:]))
 
 
-def _by_thesis(geometry: CableGeometry, made: Made) -> Accuracy:
+def _by_thesis(geometry: CableGeometry, made: SyntheticReadings) -> Accuracy:
     """Map of the markers first, poses by the camera, then (3.20) with rigid cables."""
     setup = made.data.camera
     assert setup is not None
@@ -252,7 +252,7 @@ def _by_thesis(geometry: CableGeometry, made: Made) -> Accuracy:
     return _accuracy(poses, made.poses[count:], frame, true)
 
 
-def _by_joint_fit(robot: Robot, geometry: CableGeometry, made: Made) -> Accuracy:
+def _by_joint_fit(robot: Robot, geometry: CableGeometry, made: SyntheticReadings) -> Accuracy:
     setup = made.data.camera
     assert setup is not None
     seen = made.data.observations(robot, geometry.model)
@@ -273,7 +273,7 @@ def _by_joint_fit(robot: Robot, geometry: CableGeometry, made: Made) -> Accuracy
     return replace(accuracy, chi_square=_chi_square(robot, found, made))
 
 
-def _chi_square(robot: Robot, found: Fit, made: Made) -> float:
+def _chi_square(robot: Robot, found: Fit, made: SyntheticReadings) -> float:
     """Return the square of errors by the predicted covariance, over how many there are."""
     assert robot.platform is not None
     geometry = found.geometry
@@ -289,7 +289,7 @@ def _chi_square(robot: Robot, found: Fit, made: Made) -> float:
 
 
 def _located(
-    geometry: CableGeometry, made: Made, begin: FloatArray, reference_m: FloatArray
+    geometry: CableGeometry, made: SyntheticReadings, begin: FloatArray, reference_m: FloatArray
 ) -> FloatArray:
     count = len(made.data.poses)
     seen = Observations.of_lengths(made.length_m[count:], made.tension_N[count:], begin)

@@ -31,14 +31,14 @@ from cdpr_tools.errors import BadInputError, WorkFailedError
 from cdpr_tools.output import Output
 
 if TYPE_CHECKING:
-    from cdpr_tools.calibrate.report.judged import Judged
+    from cdpr_tools.calibrate.report.truth_comparison import TruthComparison
 
 _PICTURE, _REPORT, _IMAGES = "calibration.png", "calibration.html", "images"
 _LEAST_JUDGED = 20
 _LITTLE = 0.1
 """What ten more poses have to bring at least, relative, for it to be worth it."""
 
-Judge = Callable[[Outcome], "Judged"]
+CompareWithTruth = Callable[[Outcome], "TruthComparison"]
 """Compares an outcome with what a simulator knows, once it is there."""
 
 
@@ -80,7 +80,7 @@ def with_hand_eye(data: CalibrationData, known: HandEye | None) -> CalibrationDa
     return data.model_copy(update={"camera": camera})
 
 
-def enough(
+def stop_criterion(
     out: Output, robot: Robot, points: Path | None, geometry: CableGeometry
 ) -> Callable[[CalibrationData], str | None]:
     """Return what a run asks after each batch of poses: what is wrong, and whether it is enough."""
@@ -115,7 +115,7 @@ def finish(
     folder: Path,
     dry_run: bool,
     adopt: bool,
-    judge: Judge | None = None,
+    compare: CompareWithTruth | None = None,
 ) -> None:
     """Identify, tell, report, and take over what is good; `source` is the file of the data.
 
@@ -126,7 +126,7 @@ def finish(
     """
     with out.stage(f"fitting {len(data.poses)} poses"):
         outcome = replace(identified(robot, data, points, geometry), adopt=adopt)
-        known = None if judge is None else judge(outcome)
+        known = None if compare is None else compare(outcome)
     result: dict[str, Any] = {**outcome.as_json(), "data": str(source)}
     out.say(*_lines(outcome, data))
     if known is not None:
@@ -188,7 +188,7 @@ def _taken(outcome: Outcome, source: Path, simulated: bool) -> tuple[dict[str, A
 def _reported(
     outcome: Outcome,
     data: CalibrationData,
-    judged: Judged | None,
+    comparison: TruthComparison | None,
     more: list[str],
     folder: Path,
     images: Path,
@@ -201,7 +201,7 @@ def _reported(
     report, path = folder / _REPORT, folder / _PICTURE
     advice = dict.fromkeys(one.advice for one in outcome.open_directions)
     next_steps = [*advice, outcome.advice(), *more]
-    write_report(report, outcome, data, judged, next_steps, images)
+    write_report(report, outcome, data, comparison, next_steps, images)
     try:
         save_figure(found_figure(outcome), path)
     except OSError as error:

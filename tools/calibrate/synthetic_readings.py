@@ -97,7 +97,7 @@ class SheetLayout:
 
 
 @dataclass(frozen=True)
-class Made:
+class SyntheticReadings:
     """A robot with its truth, and what is read of it."""
 
     targets: FloatArray
@@ -115,7 +115,7 @@ class Made:
     tension_N: FloatArray = field(default_factory=lambda: np.zeros((0, 0)))
 
 
-def made_readings(
+def synthetic_readings(
     robot: Robot,
     targets: FloatArray,
     nominal: FloatArray,
@@ -125,8 +125,8 @@ def made_readings(
     *,
     of_data: int,
     hand_eye_known: bool = True,
-) -> Made:
-    """Return readings near the poses `wanted` (N, 4, 3), of which `targets` (N, 6) are the numbers.
+) -> SyntheticReadings:
+    """Return readings near the poses `nominal` (N, 4, 3), whose numbers are `targets` (N, 6).
 
     The first is at home; the data hold the first `of_data`. The platform does not stand where it
     is wanted, since its geometry is off.
@@ -159,7 +159,9 @@ def made_readings(
         camera=setup,
         poses=readings,
     )
-    return Made(targets, poses, exits, drums, position, rotation, data, length, tension)
+    return SyntheticReadings(
+        targets, poses, exits, drums, position, rotation, data, length, tension
+    )
 
 
 def _read_cables(

@@ -328,7 +328,7 @@ def await_start(daemon: Daemon, out: Output) -> None:
     Raises WorkFailedError where it takes too long, or where the control loop has died.
     """
     waiting = _Waiting(out)
-    while what := _still(status := daemon.get("/status"), waiting.waited):
+    while what := _startup_stage(status := daemon.get("/status"), waiting.waited):
         waiting.go_on(what)
     if status["state"] == DEAD:
         raise WorkFailedError(death_text(status))
@@ -356,7 +356,7 @@ class _Waiting:
         time.sleep(_ASK_S)
 
 
-def _still(status: dict[str, Any], waited: bool) -> str:
+def _startup_stage(status: dict[str, Any], waited: bool) -> str:
     """Return what is going on in a daemon that is not up yet, "" in one that is.
 
     One that has been waited for goes on to check its bus; another may stay inactive.

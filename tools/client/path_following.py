@@ -63,7 +63,7 @@ def plain_name(file: Path) -> str:
     return f"{stem or 'path'}{suffix}"
 
 
-def take_up(opened: Opened, out: Output, back_mm: float | None, feed: float) -> None:
+def resume_path(opened: Opened, out: Output, back_mm: float | None, feed: float) -> None:
     """Go on with the path that was left, or step back along it."""
     with opened as daemon:
         _require_platform(daemon, out)

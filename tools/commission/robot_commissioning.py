@@ -11,7 +11,7 @@ from pathlib import Path
 from cdpr_drivers.bus import BusUrl
 from cdpr_drivers.robot.bus_fit import require_fit
 from cdpr_drivers.robot.commissioned import folder_of
-from cdpr_drivers.robot.robot_buses import asks_for_own_simulator, robot_urls
+from cdpr_drivers.robot.robot_buses import robot_urls, starts_own_simulator
 from cdpr_profiles import Robot, RobotAxis, Winch
 from cdpr_rt.procedures.commissioning.commission_files import Paths
 from cdpr_rt.runtime.realtime import one_core
@@ -66,7 +66,7 @@ def detached_motors(
     """
     require_fit(robot)
     with ExitStack() as stack:
-        if asks_for_own_simulator(buses):
+        if starts_own_simulator(buses):
             name = f"simbus:own-{os.getpid()}"
             out.note(f"starting simulated drives without cables: {len(robot.axes)} ...")
             simulator = OwnSimulator(robot.reference, name, plant, detached=True)

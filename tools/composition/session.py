@@ -15,7 +15,7 @@ from cdpr_drivers.bus.simulated_bus import open_clock
 from cdpr_drivers.canopen.network import CanNetwork
 from cdpr_drivers.errors import BusError
 from cdpr_drivers.robot.bus_fit import require_fit
-from cdpr_drivers.robot.robot_buses import asks_for_own_simulator
+from cdpr_drivers.robot.robot_buses import starts_own_simulator
 from cdpr_drivers.robot.safety import CLOSED
 from cdpr_drivers.robot.session import Session, booted
 from cdpr_drivers.robot.session_watch import Watching, no_watches
@@ -119,7 +119,7 @@ def open_robot(
     with ExitStack() as stack:
         stop_requested = stack.enter_context(stop_on_signals())
         pid = None
-        if asks_for_own_simulator(buses):
+        if starts_own_simulator(buses):
             out.note(f"starting simulated drives: {len(robot.axes)} ...")
             buses, pid = _own_simulator(stack, robot.reference, meanwhile=_compiled(robot))
         session = stack.enter_context(booted(robot, buses, stop_requested, safety_io))

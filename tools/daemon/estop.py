@@ -195,7 +195,7 @@ _END_S: Final = 90.0
 """A platform is let down in less."""
 
 
-def end_left_over(robot: str | None, socket: Path | None) -> list[str]:
+def end_leftover_processes(robot: str | None, socket: Path | None) -> list[str]:
     """Have a loop that runs without a service stop under control; return what was done, as lines.
 
     Nothing is done, and no line returned, where none runs. Raises BadInputError where several do

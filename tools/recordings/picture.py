@@ -53,7 +53,7 @@ _SHADES = {
 
 
 def axes_of(names: Sequence[str], asked: Sequence[str] | None) -> list[int]:
-    """Return the numbers of the axes in `wanted`, all without. Raises BadInputError."""
+    """Return the numbers of the axes in `asked`, all without. Raises BadInputError."""
     for name in asked or ():
         if name not in names:
             raise BadInputError(f"--axis {name}: allowed: {', '.join(names)}")

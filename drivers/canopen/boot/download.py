@@ -27,9 +27,9 @@ Block = tuple[DcfEntry, ...]
 def configure(
     network: CanNetwork, node_id: int, configuration: Configuration, changed: list[str]
 ) -> bool:
-    """Write into a drive what differs from `wanted`, and append to `changed` what that was.
+    """Write into a drive what differs from `configuration`, and append to `changed` what that was.
 
-    Where the drive's 1020h holds the stamp of `wanted`, only objects that a reset of
+    Where the drive's 1020h holds the stamp of `configuration`, only objects that a reset of
     communication does not restore are compared. Afterwards 1020h holds that stamp. Returns
     whether 1020h held the stamp before. Raises SdoError, BusError.
     """

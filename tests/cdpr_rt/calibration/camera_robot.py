@@ -11,7 +11,12 @@ from cdpr_rt.calibration.camera.camera_start import CameraStart, camera_start
 from cdpr_rt.calibration.estimation.parameters import USUAL, CableGeometry, Knowledge
 from cdpr_rt.calibration.readings.camera_data import Images
 from cdpr_rt.calibration.readings.observations import Observations
-from cdpr_tools.calibrate.made_readings import ErrorBudget, Made, SheetLayout, made_readings
+from cdpr_tools.calibrate.synthetic_readings import (
+    ErrorBudget,
+    SheetLayout,
+    SyntheticReadings,
+    synthetic_readings,
+)
 
 KNOWN = Knowledge(exit_m=0.03, length_m=1.5e-4, tension_N=1.0, drum=0.002)
 FEW = SheetLayout(rows=3, columns=4, size_m=0.15)
@@ -23,7 +28,7 @@ class CameraRobot:
 
     robot: Robot
     geometry: CableGeometry
-    made: Made
+    made: SyntheticReadings
     seen: Observations
     images: Images
 
@@ -51,7 +56,7 @@ def camera_robot(
     targets[:, :3] = rng.uniform(platform.workspace_min_m, platform.workspace_max_m, (poses, 3))
     targets[:, 3:] = rng.uniform(-1.0, 1.0, (poses, 3)) * model.angle_rad / np.sqrt(3.0)
     targets[0] = model.home
-    made = made_readings(
+    made = synthetic_readings(
         robot, targets, model.poses(targets), errors or ErrorBudget(), layout, seed,
         of_data=poses, hand_eye_known=hand_eye_known,
     )  # fmt: skip

@@ -19,10 +19,10 @@ from cdpr_rt.calibration.estimation.parameters import CableGeometry
 from cdpr_rt.calibration.readings.data import CalibrationData, PoseReading, load_data
 from cdpr_rt.calibration.verification.verification import Verification
 from cdpr_rt.robots.persistence.calibration_state import mark_not_calibrated, not_calibrated_reason
-from cdpr_tools.calibrate.finish import enough
-from cdpr_tools.calibrate.made_readings import HAND_EYE_m
+from cdpr_tools.calibrate.finish import stop_criterion
 from cdpr_tools.calibrate.measuring.begin import source_of
 from cdpr_tools.calibrate.study import PAIRS
+from cdpr_tools.calibrate.synthetic_readings import HAND_EYE_m
 from cdpr_tools.errors import BadInputError
 from cdpr_tools.output import Output
 from tests.cdpr_rt.calibration.camera_robot import camera_robot
@@ -213,7 +213,7 @@ def test_points_of_poses_that_come_later_do_not_end_a_run(tmp_path: Path) -> Non
     what = made_up("spatial-8", 45, 12, noise_m=2e-4, home_first=True)
     data = load_data(data_of(what, tmp_path / "data.json"))
     points, robot = points_of(what, tmp_path / "p.csv"), load_robot("spatial-8")
-    asked = enough(Output(True), robot, points, CableGeometry.of(robot))
+    asked = stop_criterion(Output(True), robot, points, CableGeometry.of(robot))
     asked(data.model_copy(update={"poses": data.poses[:30]}))
 
 

@@ -9,7 +9,7 @@ from cdpr_here import cdpr_here
 
 from cdpr_drivers.bus import query_status
 from cdpr_drivers.errors import ConfigurationError
-from cdpr_drivers.robot.robot_buses import asks_for_own_simulator, robot_urls
+from cdpr_drivers.robot.robot_buses import robot_urls, starts_own_simulator
 from cdpr_profiles import Robot, load_robot
 from tests.tools.robot_rig import Simulator, robot_file, unique
 
@@ -36,8 +36,8 @@ def test_the_file_says_where_the_buses_are_unless_told_otherwise():
 def test_one_simulated_name_stands_for_all_buses(without_urls: Robot):
     assert urls(SPATIAL, "simbus:x") == {"can0": "simbus:x-can0", "can1": "simbus:x-can1"}
     assert urls(without_urls, "simbus:x") == {"left": "simbus:x-left", "right": "simbus:x-right"}
-    assert asks_for_own_simulator(["simbus:"])
-    assert not asks_for_own_simulator(["simbus:x"])
+    assert starts_own_simulator(["simbus:"])
+    assert not starts_own_simulator(["simbus:x"])
 
 
 def test_a_robot_on_one_bus_takes_one_url(tmp_path: Path):

@@ -23,7 +23,7 @@ from cdpr_tools.client.client import (
     key_values,
     open_daemon,
 )
-from cdpr_tools.commands.robot.path import robot_called
+from cdpr_tools.commands.robot.path import robot_by_name
 from cdpr_tools.daemon.loop_file import named_launcher
 from cdpr_tools.errors import BadInputError
 
@@ -103,9 +103,9 @@ def test_a_file_is_that_of_the_robot_that_the_daemon_of_its_name_runs(folder: Pa
 
 def test_a_robot_is_found_by_the_name_of_the_daemon_that_runs_its_file(folder: Path) -> None:
     with running(folder / "mine.sock", "planar-3"):
-        assert robot_called("mine").profile == "planar-3"
+        assert robot_by_name("mine").profile == "planar-3"
     with pytest.raises(ProfileError, match="no profile named 'mine'"):
-        robot_called("mine")
+        robot_by_name("mine")
 
 
 @pytest.mark.parametrize(("path", "tries"), [("/hold", 3), ("/disable", 3), ("/check", 1)])

@@ -25,7 +25,7 @@ from cdpr_tools.calibrate.measuring.daemon_pose import (
     read_into,
 )
 from cdpr_tools.calibrate.measuring.places import Places
-from cdpr_tools.calibrate.measuring.run import Enough
+from cdpr_tools.calibrate.measuring.run import StopCriterion
 from cdpr_tools.calibrate.measuring.ways import (
     StoppedError,
     motion_ended,
@@ -172,7 +172,7 @@ def read_places(
     kept: DaemonPoses,
     places: Places,
     most: int,
-    enough: Enough = lambda _data: None,
+    criterion: StopCriterion = lambda _data: None,
     ask: Ask = lambda _pose: None,
 ) -> None:
     """Read home where there are no poses yet, then places until there are as many as wanted.
@@ -201,7 +201,7 @@ def read_places(
                 left = np.array([place for place in batch if tuple(place.tolist()) not in done])
                 left = left[: most - len(measured.readings)]
                 measure_poses(operator, left, places.middle, measured, out)
-                if len(measured.readings) >= most or (len(left) and enough(kept.data)):
+                if len(measured.readings) >= most or (len(left) and criterion(kept.data)):
                     return
         finally:
             update = {"left_out": tuple(measured.refused), "tried": tuple(measured.tried)}

@@ -41,7 +41,7 @@ from cdpr_tools.calibrate.measuring.places import (
 )
 from cdpr_tools.calibrate.measuring.rig import RigOperator, simulated_rig
 from cdpr_tools.calibrate.measuring.ways import StoppedError
-from cdpr_tools.calibrate.report.judged import Judged, judged
+from cdpr_tools.calibrate.report.truth_comparison import TruthComparison, compare_with_truth
 from cdpr_tools.errors import BadInputError, CommandError, WorkFailedError
 from cdpr_tools.output import Advance, Output
 from cdpr_tools.signals import stop_on_signals
@@ -82,7 +82,7 @@ class CalibrationRunSettings(Profile):
         """Write them into the folder of the run; raises ProfileError."""
         write_text(folder / SETTINGS, self.model_dump_json(indent=1) + "\n")
 
-    def going_on(
+    def resumed(
         self, poses: int | None, places: Listed | None, points: Path | None
     ) -> CalibrationRunSettings:
         """Return them with as many poses, or a list, and points, where these are given.
@@ -107,12 +107,12 @@ class CalibrationRunSettings(Profile):
         return read_json_model(folder / SETTINGS, cls)
 
 
-Enough = Callable[[CalibrationData], str | None]
+StopCriterion = Callable[[CalibrationData], str | None]
 """Is asked after each batch; says why no more poses are needed, None where some are."""
 
 
 @dataclass
-class Kept:
+class StoredRun:
     """What a run has read, in the files of its folder; on pose after pose these are complete."""
 
     folder: Path
@@ -120,7 +120,7 @@ class Kept:
     outside: list[OutsidePose] = field(default_factory=list)
 
     @classmethod
-    def new(cls, folder: Path, robot: Robot, camera: CameraSetup | None) -> Kept:
+    def new(cls, folder: Path, robot: Robot, camera: CameraSetup | None) -> StoredRun:
         """Return what has read nothing yet; what the folder held of earlier poses is removed.
 
         Raises ProfileError, and BadInputError where that was read of a real robot.
@@ -147,7 +147,7 @@ class Kept:
         return cls(folder, data)
 
     @classmethod
-    def of_before(cls, folder: Path, robot: Robot) -> Kept:
+    def resumed(cls, folder: Path, robot: Robot) -> StoredRun:
         """Return what a run has left that ended early; raises ProfileError, BadInputError."""
         data = load_data(folder / DATA)
         if data.geometry_sha256 != geometry_sha256(robot):
@@ -162,7 +162,7 @@ class Kept:
         """Return the targets (d,) that were read, or tried in vain."""
         return {reading.target for reading in self.data.poses} | set(self.data.tried)
 
-    def not_gone_to(self, places: Listed | None) -> Listed | None:
+    def remaining(self, places: Listed | None) -> Listed | None:
         """Return those of listed places (m, d) to which nothing has gone yet; None of no list."""
         return None if places is None else tuple(one for one in places if one not in self.done())
 
@@ -184,14 +184,18 @@ class Kept:
 
 
 def measure(
-    out: Output, robot: Robot, settings: CalibrationRunSettings, kept: Kept, enough: Enough
+    out: Output,
+    robot: Robot,
+    settings: CalibrationRunSettings,
+    kept: StoredRun,
+    criterion: StopCriterion,
 ) -> CalibrationData:
     """Measure what is missing, on a simulator of its own; return all.
 
     What is read is kept whatever ends it, and the error says how to go on. Raises what the robot
     and its camera do, WorkFailedError where somebody stops it.
     """
-    most, listed = settings.poses or MOST_POSES, kept.not_gone_to(settings.places)
+    most, listed = settings.poses or MOST_POSES, kept.remaining(settings.places)
     if listed is not None:  # home is read at each start
         most = len(kept.data.poses) + len(listed) + bool(listed)
     if len(kept.data.poses) >= most:
@@ -231,7 +235,9 @@ def measure(
             up_to = "" if settings.poses else "up to "
             advance = stack.enter_context(out.progress(f"reading {up_to}{most} poses", float(most)))
             _Measuring(out, operator, kept, most, advance).go(
-                robot, places, enough if settings.poses is None else told_only(enough)
+                robot,
+                places,
+                criterion if settings.poses is None else report_faults_only(criterion),
             )
     except StoppedError:
         raise WorkFailedError(f"stopped; {_going_on(robot, kept)}") from None
@@ -248,36 +254,38 @@ def _is_of_real_robot(path: Path) -> bool:
         return False  # nothing that can be used
 
 
-def told_only(enough: Enough) -> Enough:
+def report_faults_only(criterion: StopCriterion) -> StopCriterion:
     """Return what tells what is wrong and never has enough: somebody has said how many."""
 
     def asked(data: CalibrationData) -> str | None:
-        enough(data)
+        criterion(data)
         return None
 
     return asked
 
 
-def judge_of(
+def truth_comparison_of(
     robot: Robot, settings: CalibrationRunSettings, folder: Path
-) -> Callable[[Outcome], Judged]:
+) -> Callable[[Outcome], TruthComparison]:
     """Return what compares the outcome of a run with what its simulator knows."""
 
-    def judge(outcome: Outcome) -> Judged:
+    def compare(outcome: Outcome) -> TruthComparison:
         plant = None if settings.plant is None else Path(settings.plant)
-        return judged(robot, plant, outcome, OutsidePoses.load_file(folder / OUTSIDE))
+        return compare_with_truth(robot, plant, outcome, OutsidePoses.load_file(folder / OUTSIDE))
 
-    return judge
+    return compare
 
 
-def judge_of_folder(robot: Robot, folder: Path) -> Callable[[Outcome], Judged] | None:
+def truth_comparison_of_folder(
+    robot: Robot, folder: Path
+) -> Callable[[Outcome], TruthComparison] | None:
     """Return what compares an outcome of a run's folder; None of one that holds readings alone."""
     if not (folder / SETTINGS).exists() or not (folder / OUTSIDE).exists():
         return None
-    return judge_of(robot, CalibrationRunSettings.load(folder), folder)
+    return truth_comparison_of(robot, CalibrationRunSettings.load(folder), folder)
 
 
-def _going_on(robot: Robot, kept: Kept) -> str:
+def _going_on(robot: Robot, kept: StoredRun) -> str:
     if not kept.data.poses:
         return "nothing was read yet"
     return (
@@ -300,7 +308,7 @@ class _Measuring:
     """A robot that stands ready at home, and what is read of it from there."""
 
     def __init__(
-        self, out: Output, operator: RigOperator, kept: Kept, most: int, advance: Advance
+        self, out: Output, operator: RigOperator, kept: StoredRun, most: int, advance: Advance
     ) -> None:
         self._out, self._operator, self._kept = out, operator, kept
         self._most, self._advance = most, advance
@@ -327,15 +335,15 @@ class _Measuring:
         operator.number = count + 1
         self._advance(float(count))
 
-    def go(self, robot: Robot, places: Places, enough: Enough) -> None:
+    def go(self, robot: Robot, places: Places, criterion: StopCriterion) -> None:
         """Read home, then a batch of places after another until it is enough."""
         try:
-            self._go(robot, places, enough)
+            self._go(robot, places, criterion)
         finally:
             if self._kept.data.poses:
                 self._kept.save(self._measured)
 
-    def _go(self, robot: Robot, places: Places, enough: Enough) -> None:
+    def _go(self, robot: Robot, places: Places, criterion: StopCriterion) -> None:
         operator, measured = self._operator, self._measured
         done = self._kept.done()
         try:
@@ -349,7 +357,7 @@ class _Measuring:
             measure_poses(operator, left, places.middle, measured, self._out)
             if len(measured.readings) >= self._most:
                 return
-            if len(left) and self._judged(enough):
+            if len(left) and self._judged(criterion):
                 return
         self._out.note(f"{len(measured.readings)} poses only: all others were refused")
 
@@ -367,7 +375,7 @@ class _Measuring:
             )
         self._out.note(f"at home the camera sees {len(seen.markers)} markers")
 
-    def _judged(self, enough: Enough) -> bool:
+    def _judged(self, criterion: StopCriterion) -> bool:
         """Tell what the poses so far are good for; return whether no more are needed."""
         data = self._kept.data
         if data.camera is not None:
@@ -376,7 +384,7 @@ class _Measuring:
                 self._out.note(f"after {len(data.poses)} poses: {text}")
             if not any(len(island) > 1 for island in cover.islands):
                 raise WorkFailedError("no image shows two markers together: put them closer")
-        why = enough(data)
+        why = criterion(data)
         if why is not None:
             self._out.note(why)
         return why is not None

@@ -67,7 +67,7 @@ def not_reached(
     allowed_s: float,
     progress: dict[str, Any],
 ) -> TargetNotReached:
-    """Return what is told of a platform that stands `here` and not at a place (d,).
+    """Return what is told of a platform that stands at `start` and not at a place (d,).
 
     `progress` is that of its motion when the time allowed was over.
     """

@@ -13,7 +13,7 @@ from cdpr_rt.calibration.outcome import Outcome
 from cdpr_rt.calibration.readings.data import CalibrationData
 from cdpr_rt.calibration.verification.verdict import parameter_table
 from cdpr_tools.calibrate.report import picture as pictures
-from cdpr_tools.calibrate.report.judged import Judged
+from cdpr_tools.calibrate.report.truth_comparison import TruthComparison
 from cdpr_tools.report.save import save
 from cdpr_tools.report.style import data_uri
 from cdpr_tools.report.text import number, page, paragraph, picture, section, table
@@ -30,12 +30,12 @@ def write_report(
     path: Path,
     outcome: Outcome,
     data: CalibrationData,
-    judged: Judged | None,
+    comparison: TruthComparison | None,
     next_steps: list[str],
     images: Path,
 ) -> None:
     """Write the page; raises WorkFailedError where it cannot be written."""
-    save(path, _Report(outcome, data, judged, next_steps, images).html())
+    save(path, _Report(outcome, data, comparison, next_steps, images).html())
 
 
 class _Report:
@@ -45,11 +45,11 @@ class _Report:
         self,
         outcome: Outcome,
         data: CalibrationData,
-        judged: Judged | None,
+        comparison: TruthComparison | None,
         next_steps: list[str],
         images: Path,
     ) -> None:
-        self._outcome, self._data, self._judged = outcome, data, judged
+        self._outcome, self._data, self._comparison = outcome, data, comparison
         self._next, self._images = next_steps, images
         self._pictures = 0
 
@@ -91,23 +91,23 @@ class _Report:
         return f'<div class="verdict{kind}"><b>{head}</b>{body}</div>'
 
     def _how_good(self) -> list[str]:
-        outcome, judged = self._outcome, self._judged
+        outcome, comparison = self._outcome, self._comparison
         lines = []
-        if judged is not None:
-            lines.append(_errors_table(judged))
+        if comparison is not None:
+            lines.append(_errors_table(comparison))
         lines.append(
             self._picture(
-                pictures.map_figure(outcome, judged),
+                pictures.map_figure(outcome, comparison),
                 "Predicted errors over the workspace",
                 "How well positions are known where the platform goes, at home's orientation, the "
                 "worst along the axis that is not drawn."
-                + (" Arrows: true errors of poses not used." if judged is not None else ""),
+                + (" Arrows: true errors of poses not used." if comparison is not None else ""),
             )
         )
-        if judged is not None:
+        if comparison is not None:
             lines.append(
                 self._picture(
-                    pictures.held_out_figure(judged),
+                    pictures.held_out_figure(comparison),
                     "Errors of poses not used, before and after",
                     "Poses that the fit has not used, by lengths alone, beside what the scanner "
                     "measured; relative to the first pose.",
@@ -132,8 +132,8 @@ class _Report:
             "each other by, a colour a cable, in the order of the poses.",
         )
         errors = {}
-        if self._judged is not None:
-            errors = {row["name"]: row["error"] for row in self._judged.parameters}
+        if self._comparison is not None:
+            errors = {row["name"]: row["error"] for row in self._comparison.parameters}
         rows = [
             [
                 escape(str(row["name"])),
@@ -189,13 +189,13 @@ class _Report:
         return [picture(source, self._pictures, "An image of the camera", caption)]
 
 
-def _errors_table(judged: Judged) -> str:
+def _errors_table(comparison: TruthComparison) -> str:
     rows = []
     for name, errors in (
-        ("scanner, relative to the first pose", judged.scanner),
-        ("the same by the robot's file", judged.scanner_before),
-        (f"scanner, in the frame of marker {judged.marker}", judged.in_marker_frame),
-        ("what was true, relative to the first pose", judged.truth),
+        ("scanner, relative to the first pose", comparison.scanner),
+        ("the same by the robot's file", comparison.scanner_before),
+        (f"scanner, in the frame of marker {comparison.marker}", comparison.in_marker_frame),
+        ("what was true, relative to the first pose", comparison.truth),
     ):
         if errors is None:
             continue

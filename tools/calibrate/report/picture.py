@@ -16,7 +16,7 @@ from cdpr_rt.calibration.estimation.fit import Fit
 from cdpr_rt.calibration.estimation.residuals import length_std_m
 from cdpr_rt.calibration.outcome import Outcome
 from cdpr_rt.calibration.verification.verdict import predicted_std
-from cdpr_tools.calibrate.report.judged import Judged, PoseErrors
+from cdpr_tools.calibrate.report.truth_comparison import PoseErrors, TruthComparison
 from cdpr_tools.report.style import BACKWARD, COLOURS, FORWARD, canvas, legend_above
 
 _COLOURS = 10
@@ -62,7 +62,7 @@ def found_figure(outcome: Outcome) -> Figure:
     return figure
 
 
-def map_figure(outcome: Outcome, judged: Judged | None) -> Figure:
+def map_figure(outcome: Outcome, comparison: TruthComparison | None) -> Figure:
     """Draw how well positions are known all over the workspace, from above and from a side."""
     platform = outcome.found.geometry.model.platform
     views = [(0, 1)] if len(platform.home_m) == 2 else [(0, 1), (0, 2)]
@@ -71,8 +71,8 @@ def map_figure(outcome: Outcome, judged: Judged | None) -> Figure:
     high = max(float(np.asarray(shade.get_array()).max()) for shade in shades)
     for ax, shade, view in zip(axes, shades, views, strict=True):
         shade.set_clim(0.0, high)
-        if judged is not None:
-            _held_out(ax, judged.truth, judged.places_m, view, labelled=ax is axes[-1])
+        if comparison is not None:
+            _held_out(ax, comparison.truth, comparison.places_m, view, labelled=ax is axes[-1])
         ax.margins(0.03)
         ax.set(xlabel=f"{'xyz'[view[0]]} (m)", ylabel=f"{'xyz'[view[1]]} (m)", aspect="equal")
     bar = figure.colorbar(shades[0], ax=axes, shrink=0.8)
@@ -123,10 +123,10 @@ def _held_out(
     ax.quiverkey(arrows, 0.1, 1.06, size_m, label, labelpos="E")
 
 
-def held_out_figure(judged: Judged) -> Figure:
+def held_out_figure(comparison: TruthComparison) -> Figure:
     """Draw errors of poses not used beside the scanner's, before and after."""
     figure, axes = canvas(1, 2, height=2.6)
-    after, before = judged.scanner, judged.scanner_before
+    after, before = comparison.scanner, comparison.scanner_before
     numbers = np.arange(len(after.position_m))
     for ax, key, scale, unit in (
         (axes[0], "position_m", 1e3, "mm"), (axes[1], "turn_rad", np.degrees(1.0), "deg"),
@@ -138,7 +138,7 @@ def held_out_figure(judged: Judged) -> Figure:
             size = scale * np.linalg.norm(getattr(errors, key), axis=1)
             ax.bar(numbers + shift, size, 0.4, color=colour, label=label if ax is axes[0] else None)
         ax.set(xlabel="pose not used", ylabel=f"off the scanner ({unit})")
-        ax.set_xticks(numbers, [str(j + 1) for j in judged.index], rotation=90)
+        ax.set_xticks(numbers, [str(j + 1) for j in comparison.index], rotation=90)
     legend_above(figure, axes[0])
     return figure
 

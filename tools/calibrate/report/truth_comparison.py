@@ -56,7 +56,7 @@ class PoseErrors:
 
 
 @dataclass(frozen=True)
-class Judged:
+class TruthComparison:
     """A calibration beside scanner and truth, on poses that the fit had not seen."""
 
     scanner: PoseErrors
@@ -128,7 +128,9 @@ class Judged:
         return {**self.truth.as_json(), "parameters": self.parameters}
 
 
-def judged(robot: Robot, plant: Path | None, outcome: Outcome, outside: OutsidePoses) -> Judged:
+def compare_with_truth(
+    robot: Robot, plant: Path | None, outcome: Outcome, outside: OutsidePoses
+) -> TruthComparison:
     """Return how a calibration did; raises BadInputError, ProfileError for a plant that is none."""
     unused, part = outcome.unused, outcome.unused.part
     measured = np.array([pose.position_m is not None for pose in outside.poses])
@@ -145,7 +147,7 @@ def judged(robot: Robot, plant: Path | None, outcome: Outcome, outside: OutsideP
     )
     scanner, true = _outside(outside, index)
     marker, frame = _marker_frame(plant, part, poses, scanner)
-    return Judged(
+    return TruthComparison(
         PoseErrors.from_first(poses, scanner),
         PoseErrors.from_first(before, scanner),
         _scanner_alone(outside, index, scanner),

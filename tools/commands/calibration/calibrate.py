@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -22,6 +22,7 @@ from cdpr_tools.commands.calibration.options import (
     OutDirOption,
     PointsOption,
     PosesOption,
+    ScannerOption,
     geometry_of,
     hand_eye_of,
 )
@@ -40,6 +41,9 @@ from cdpr_tools.commands.options import (
 from cdpr_tools.errors import BadInputError, WorkFailedError, os_error_as
 from cdpr_tools.loading import loading_notice
 from cdpr_tools.output import Output
+
+if TYPE_CHECKING:
+    from cdpr_rt.calibration.readings.camera_data import CameraSetup, HandEye
 
 app = typer.Typer(
     name="calibrate",
@@ -83,14 +87,14 @@ def fit_data(
 
     out = Output(as_json)
     profile = load_robot(robot)
-    judge = None
+    compare = None
     if data.is_dir():
-        judge = runs.judge_of_folder(profile, data)
+        compare = runs.truth_comparison_of_folder(profile, data)
         data /= runs.DATA
     read_before = with_hand_eye(load_data(data), hand_eye_of(hand_eye))
     finish(
         *(out, profile, read_before, points, geometry_of(profile, identify, known_mm)),
-        *(data, out_dir or data.parent, dry_run, adopt, judge),
+        *(data, out_dir or data.parent, dry_run, adopt, compare),
     )
 
 
@@ -108,9 +112,7 @@ def run(
     redundancy: Annotated[
         bool, typer.Option("--redundancy", help="From encoder lengths and tensions alone.")
     ] = False,
-    scanner: Annotated[
-        bool, typer.Option("--scanner", help="With poses that the simulated scanner measures.")
-    ] = False,
+    scanner: ScannerOption = False,
     points: PointsOption = None,
     poses: PosesOption = None,
     plant: CalibrationPlantOption = None,
@@ -145,26 +147,25 @@ def run(
     out = Output(as_json)
     with out.stage("looking at the robot's file"):
         from cdpr_rt.robots.feasibility.checks import refuse_impossible  # noqa: PLC0415
-        from cdpr_tools.calibrate.finish import enough, finish, with_hand_eye  # noqa: PLC0415
+        from cdpr_tools.calibrate.finish import finish, stop_criterion, with_hand_eye  # noqa: PLC0415
         from cdpr_tools.calibrate.measuring import run as runs  # noqa: PLC0415  # slow to load
         from cdpr_tools.calibrate.measuring.begin import check_points, source_of  # noqa: PLC0415
         from cdpr_tools.calibrate.measuring.places import poses_wanted  # noqa: PLC0415
 
         profile = load_robot(robot)
         refuse_impossible(profile)
-        geometry = geometry_of(profile, identify, known_mm)
-        known = hand_eye_of(hand_eye)
+        geometry, known = geometry_of(profile, identify, known_mm), hand_eye_of(hand_eye)
         count, listed = poses_wanted(profile, poses)
         if points is not None:
             check_points(points, profile, None if resume else count)
 
     folder = out_dir or Path("out") / f"calibrate-{profile.profile}"
     if resume:
-        settings = runs.CalibrationRunSettings.load(folder).going_on(count, listed, points)
+        settings = runs.CalibrationRunSettings.load(folder).resumed(count, listed, points)
         if points is None and settings.points is not None:
             points = Path(settings.points)
             check_points(points, profile, None)
-        kept = runs.Kept.of_before(folder, profile)
+        kept = runs.StoredRun.resumed(folder, profile)
     else:
         _require_new(folder, runs.DATA, overwrite)
         source = source_of(
@@ -174,8 +175,7 @@ def run(
             scanner=scanner,
             points=points is not None,
         )
-        if known is not None and source != "camera":
-            raise BadInputError("--hand-eye: is of a camera; allowed: with --camera")
+        _require_camera(known, source)
         settings = runs.CalibrationRunSettings(
             robot=profile.profile,
             plant=None if plant is None else str(plant.resolve()),
@@ -185,20 +185,31 @@ def run(
             places=listed,
             points=None if points is None else str(points.resolve()),
         )
-        setup = None
-        if source == "camera":
-            from cdpr_tools.calibrate.measuring.camera_setup import camera_setup  # noqa: PLC0415
-
-            setup = camera_setup(out, plant, intrinsics, markers)
-        kept = runs.Kept.new(folder, profile, setup)
+        setup = _camera_setup(out, plant, intrinsics, markers) if source == "camera" else None
+        kept = runs.StoredRun.new(folder, profile, setup)
     settings.save(folder)
     kept.data = with_hand_eye(kept.data, known)
-    data = runs.measure(out, profile, settings, kept, enough(out, profile, points, geometry))
-    judge = runs.judge_of(profile, settings, folder)
-    finish(
-        *(out, profile, data, points, geometry),
-        *(folder / runs.DATA, folder, dry_run, adopt, judge),
+    data = runs.measure(
+        out, profile, settings, kept, stop_criterion(out, profile, points, geometry)
     )
+    finish(
+        *(out, profile, data, points, geometry, folder / runs.DATA, folder, dry_run, adopt),
+        runs.truth_comparison_of(profile, settings, folder),
+    )
+
+
+def _require_camera(hand_eye: HandEye | None, source: str) -> None:
+    if hand_eye is not None and source != "camera":
+        raise BadInputError("--hand-eye: is of a camera; allowed: with --camera")
+
+
+def _camera_setup(
+    out: Output, plant: Path | None, intrinsics: Path | None, markers: Path | None
+) -> CameraSetup:
+    """Return the camera of a new run; its module needs an extra."""
+    from cdpr_tools.calibrate.measuring.camera_setup import camera_setup  # noqa: PLC0415
+
+    return camera_setup(out, plant, intrinsics, markers)
 
 
 def _require_new(folder: Path, name: str, overwrite: bool) -> None:
@@ -211,9 +222,7 @@ def _require_new(folder: Path, name: str, overwrite: bool) -> None:
 @app.command()
 def check(
     robot: RobotArgument,
-    scanner: Annotated[
-        bool, typer.Option("--scanner", help="With poses that the simulated scanner measures.")
-    ] = False,
+    scanner: ScannerOption = False,
     plant: CalibrationPlantOption = None,
     running: Annotated[
         bool,

@@ -54,11 +54,11 @@ def measure(
     `cdpr calibrate read` as well, it goes on behind them. Ctrl-C holds; status as of `run`.
     """
     with out.stage("choosing poses"):
-        from cdpr_tools.calibrate.finish import enough, finish, with_hand_eye  # noqa: PLC0415
+        from cdpr_tools.calibrate.finish import finish, stop_criterion, with_hand_eye  # noqa: PLC0415
         from cdpr_tools.calibrate.measuring import daemon_pose, daemon_run  # noqa: PLC0415
         from cdpr_tools.calibrate.measuring.asked_points import AskedPoints, require_points_of  # noqa: PLC0415
         from cdpr_tools.calibrate.measuring.places import MOST_POSES, places_of, poses_wanted  # noqa: PLC0415
-        from cdpr_tools.calibrate.measuring.run import DATA, told_only  # noqa: PLC0415  # slow to load
+        from cdpr_tools.calibrate.measuring.run import DATA, report_faults_only  # noqa: PLC0415  # slow to load
         from cdpr_tools.trials.directions import platform_of  # noqa: PLC0415  # slow to load
 
         robot, description = daemon_pose.robot_of(daemon)
@@ -82,10 +82,10 @@ def measure(
         operator = daemon_run.DaemonOperator(daemon, robot, image, stop)
         home_m = platform_of(robot).home_m
         asked = AskedPoints(out, points, len(home_m), operator.place) if ask else None
-        enough_measured = enough(out, robot, points if ask else None, geometry)
+        criterion = stop_criterion(out, robot, points if ask else None, geometry)
         daemon_run.read_places(
             out, robot, operator, kept, places, most,
-            enough_measured if count is None else told_only(enough_measured),
+            criterion if count is None else report_faults_only(criterion),
             asked or (lambda _pose: None),
         )  # fmt: skip
     out.say("the platform is held at the last pose; `cdpr lower` takes it back onto its stand")

@@ -54,6 +54,9 @@ PosesOption = Annotated[
         "100, while more bring something.",
     ),
 ]
+ScannerOption = Annotated[
+    bool, typer.Option("--scanner", help="With poses that the simulated scanner measures.")
+]
 OutDirOption = Annotated[
     Path | None, typer.Option("--out", help="Folder for data, images, result and report.")
 ]

@@ -23,7 +23,7 @@ from cdpr_tools.commands.options import (
     YesOption,
 )
 from cdpr_tools.consent import require_consent
-from cdpr_tools.daemon.estop import end_left_over
+from cdpr_tools.daemon.estop import end_leftover_processes
 from cdpr_tools.errors import WorkFailedError
 from cdpr_tools.output import Output
 from cdpr_tools.signals import stop_on_signals
@@ -182,7 +182,7 @@ def stop(
         with open_daemon(robot, socket, url, key_file) as daemon:
             _end(daemon, out)
     except NoDaemonError:
-        left = [] if url is not None else end_left_over(robot, socket)
+        left = [] if url is not None else end_leftover_processes(robot, socket)
         out.say(*left or ["nothing runs"])
     out.result({"ok": True})
 

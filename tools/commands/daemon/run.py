@@ -22,9 +22,9 @@ from cdpr_drivers.errors import BusError
 from cdpr_drivers.robot.bus_fit import require_fit
 from cdpr_drivers.robot.commissioned import load_profiles, uncommissioned_text, with_commissioned
 from cdpr_drivers.robot.robot_buses import (
-    asks_for_own_simulator,
     refuse_simulated_calibration,
     robot_urls,
+    starts_own_simulator,
 )
 from cdpr_profiles import Robot
 from cdpr_profiles.calibration.in_force import load_calibrated
@@ -166,7 +166,7 @@ def run(
         tension_port=tension_port,
         commissioned=commissioned,
     )
-    if camera is not None and not asks_for_own_simulator(bus or ()):
+    if camera is not None and not starts_own_simulator(bus or ()):
         raise BadInputError("--camera: only for a simulator that the command starts (simbus:)")
     _require_free(settings.socket)
     _require_no_master(profile, settings)
@@ -253,7 +253,7 @@ def settings_for(
     load_profiles(with_commissioned(robot, commissioned))
     if record is not None and no_record:
         raise BadInputError("--record and --no-record: one of them")
-    own_simulator = asks_for_own_simulator(bus or ())
+    own_simulator = starts_own_simulator(bus or ())
     if plant is not None and not own_simulator:
         raise BadInputError("--plant: only for a simulator that the command starts (simbus:)")
     if read_only and own_simulator:

@@ -14,7 +14,7 @@ import typer
 from typer.main import get_command
 
 from cdpr_drivers.bus import BusUrl
-from cdpr_drivers.robot.robot_buses import asks_for_own_simulator, robot_urls
+from cdpr_drivers.robot.robot_buses import robot_urls, starts_own_simulator
 from cdpr_profiles import Robot, load_robot
 from cdpr_rt.programs.platform.lower import lowering_s
 from cdpr_rt.robots.robot_arrays import can_lower
@@ -53,7 +53,7 @@ def print_unit(
     apart = (*_ASIDE, _OF_THE_SIMULATOR)
     run.settings_for(profile, **{k: v for k, v in asked.items() if k not in apart})
     buses = asked["bus"] or []
-    urls = [] if asks_for_own_simulator(buses) else list(robot_urls(profile, buses).values())
+    urls = [] if starts_own_simulator(buses) else list(robot_urls(profile, buses).values())
     if user is None:
         user = "cdpr" if os.geteuid() == 0 else pwd.getpwuid(os.geteuid()).pw_name
     typer.echo(service_unit(profile, urls, list(_words(asked)), user), nl=False)

@@ -64,7 +64,7 @@ class _Device:
 
 
 @dataclass(frozen=True)
-class _Wish:
+class _NewSettings:
     """What is to be set in one device."""
 
     node_id: int | None
@@ -124,7 +124,7 @@ def lss(
     if serial is not None and serial > 0xFFFFFFFF:
         raise BadInputError(f"--serial {serial}: allowed: 0 to {0xFFFFFFFF}")
     rate = None if bitrate is None else _bitrate(bitrate)
-    wish = _Wish(node_id, rate, store, switch_delay_ms * 1e-3 if activate else None)
+    new = _NewSettings(node_id, rate, store, switch_delay_ms * 1e-3 if activate else None)
     kind = None if profile is None else load_drive(profile)
     clock = open_clock([url])
     with raised_as(BadInputError, BusError):
@@ -135,14 +135,14 @@ def lss(
         out.say(f"{len(found)} device{'s' * (len(found) != 1)} found")
         for device in found:
             out.say(f"  {device}")
-        if str(wish):
+        if str(new):
             device = _choose(found, master)
-            _check(master, device, found, wish)
-            question = f"on {url}: {device.address} gets {wish}."
+            _check(master, device, found, new)
+            question = f"on {url}: {device.address} gets {new}."
             require_consent(question, yes or url.is_simulated, "nothing was changed")
-            _set(master, device, wish, out)
+            _set(master, device, new, out)
     done = {
-        "set": {"node_id": node_id, "bitrate_bit_s": rate, "stored": store} if str(wish) else None
+        "set": {"node_id": node_id, "bitrate_bit_s": rate, "stored": store} if str(new) else None
     }
     out.result({"ok": True, "found": [device.as_dict for device in found], **done})
 
@@ -212,9 +212,9 @@ def _choose(found: list[_Device], master: LssMaster) -> _Device:
     raise WorkFailedError(f"no device found: {hint}")
 
 
-def _check(master: LssMaster, device: _Device, found: list[_Device], wish: _Wish) -> None:
+def _check(master: LssMaster, device: _Device, found: list[_Device], new: _NewSettings) -> None:
     """Refuse a node id that is taken, and a drive that is being driven."""
-    node_id = wish.node_id
+    node_id = new.node_id
     if node_id is not None and node_id != device.node_id:
         other = next((d for d in found if d.node_id == node_id and d != device), None)
         sign = f"it is {other.address}" if other else master.node_id_in_use(node_id)
@@ -245,24 +245,24 @@ def _check_power(master: LssMaster, node_id: int) -> None:
     )
 
 
-def _set(master: LssMaster, device: _Device, wish: _Wish, out: Output) -> None:
+def _set(master: LssMaster, device: _Device, new: _NewSettings, out: Output) -> None:
     _select(master, device)
-    if wish.node_id is not None:
-        master.set_node_id(wish.node_id)
-    if wish.bitrate_bit_s is not None:
-        master.set_bitrate(wish.bitrate_bit_s)
-    if wish.store:
+    if new.node_id is not None:
+        master.set_node_id(new.node_id)
+    if new.bitrate_bit_s is not None:
+        master.set_bitrate(new.bitrate_bit_s)
+    if new.store:
         try:
             master.store()
         except LssError as error:
             raise WorkFailedError(
                 f"{error}; what was set is lost at power-off (--no-store does without storing)"
             ) from error
-    out.say(f"{device.address}: {wish} set" + (" and stored" if wish.store else ", not stored"))
-    if wish.node_id is not None:
-        _restart(master, device, wish.node_id, out)
-    if wish.bitrate_bit_s is not None:
-        _change_over(master, device, wish, out)
+    out.say(f"{device.address}: {new} set" + (" and stored" if new.store else ", not stored"))
+    if new.node_id is not None:
+        _restart(master, device, new.node_id, out)
+    if new.bitrate_bit_s is not None:
+        _change_over(master, device, new, out)
 
 
 def _restart(master: LssMaster, device: _Device, new: int, out: Output) -> None:
@@ -278,18 +278,18 @@ def _restart(master: LssMaster, device: _Device, new: int, out: Output) -> None:
     out.say(f"node {new} is there")
 
 
-def _change_over(master: LssMaster, device: _Device, wish: _Wish, out: Output) -> None:
+def _change_over(master: LssMaster, device: _Device, new: _NewSettings, out: Output) -> None:
     """Change the bit rate now, or say when it will change."""
-    rate = f"{(wish.bitrate_bit_s or 0) // 1000} kbit/s"
-    if wish.activate_delay_s is None:
+    rate = f"{(new.bitrate_bit_s or 0) // 1000} kbit/s"
+    if new.activate_delay_s is None:
         out.say(
             f"{rate} count from the next power-on, when the whole bus must have them: every other "
             "drive, the adapter, and bitrate_bit_s in the winch's file"
         )
         return
     _select(master, device)
-    master.activate_bitrate(wish.activate_delay_s)
+    master.activate_bitrate(new.activate_delay_s)
     out.say(
-        f"the device falls silent, changes to {rate} after {wish.activate_delay_s:g} s and speaks "
-        f"again {wish.activate_delay_s:g} s later; change the adapter's bit rate in between"
+        f"the device falls silent, changes to {rate} after {new.activate_delay_s:g} s and speaks "
+        f"again {new.activate_delay_s:g} s later; change the adapter's bit rate in between"
     )

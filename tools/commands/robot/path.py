@@ -115,15 +115,15 @@ def path(
         if file is not None:
             following.follow(opened, out, file, options, 0.01 * feed)
         else:
-            following.take_up(opened, out, back, 0.01 * feed)
+            following.resume_path(opened, out, back, 0.01 * feed)
         return
     assert file is not None  # see above
     if robot is None:
         raise BadInputError("--robot: missing; allowed: a robot's name or file, or --run")
-    _preview(robot_called(robot), file, options, out, picture, keep)
+    _preview(robot_by_name(robot), file, options, out, picture, keep)
 
 
-def robot_called(name: str) -> Robot:
+def robot_by_name(name: str) -> Robot:
     """Return the robot of a profile's name or file, else the one that a daemon of this name runs.
 
     Raises ProfileError.

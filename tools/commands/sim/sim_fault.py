@@ -30,7 +30,7 @@ class InjectedFault(StrEnum):
     CELL_OFF = "cell-off"
 
 
-class _How(NamedTuple):
+class _FaultInjection(NamedTuple):
     sub: int
     usual: int
     least: int
@@ -38,13 +38,13 @@ class _How(NamedTuple):
     unit: str
 
 
-_HOW = {
-    InjectedFault.CUT_CABLE: _How(12, 1, 1, 1, ""),
-    InjectedFault.SLIP: _How(13, 100, 1, 0xFFFF, "mm"),
-    InjectedFault.ENCODER_JUMP: _How(11, 500, -(2**31), 2**31 - 1, "counts"),
-    InjectedFault.DRIVE_FAULT: _How(1, 0x7305, 1, 0xFFFF, ""),
-    InjectedFault.SILENCE: _How(6, 0xFFFF, 1, 0xFFFF, "ms"),
-    InjectedFault.CELL_OFF: _How(14, 40, -(2**15), 2**15 - 1, "N"),
+_INJECTIONS = {
+    InjectedFault.CUT_CABLE: _FaultInjection(12, 1, 1, 1, ""),
+    InjectedFault.SLIP: _FaultInjection(13, 100, 1, 0xFFFF, "mm"),
+    InjectedFault.ENCODER_JUMP: _FaultInjection(11, 500, -(2**31), 2**31 - 1, "counts"),
+    InjectedFault.DRIVE_FAULT: _FaultInjection(1, 0x7305, 1, 0xFFFF, ""),
+    InjectedFault.SILENCE: _FaultInjection(6, 0xFFFF, 1, 0xFFFF, "ms"),
+    InjectedFault.CELL_OFF: _FaultInjection(14, 40, -(2**15), 2**15 - 1, "N"),
 }
 
 
@@ -80,8 +80,8 @@ def fault(
     profile = load_winch_or_robot(machine)
     robot = robot_of_winch(profile) if isinstance(profile, Winch) else profile
     chosen = _axis(robot, axis)
-    how = _HOW[what]
-    amount = _amount(what, how, value)
+    injection = _INJECTIONS[what]
+    amount = _amount(what, injection, value)
     if what is InjectedFault.CELL_OFF and robot.tension_sensors is None:
         raise BadInputError(
             f"{what}: {robot.name} has no load cells, its tensions are estimated from torques; "
@@ -95,12 +95,12 @@ def fault(
         )
     try:
         network.add_node(winch.node_id, load_dictionary(winch.drive.eds, winch.node_id))
-        network.write(winch.node_id, _OBJECT, how.sub, amount)
+        network.write(winch.node_id, _OBJECT, injection.sub, amount)
     except SdoError as error:
         raise WorkFailedError(f"axis {chosen.name!r}: {error}") from error
     finally:
         network.close()
-    typer.echo(f"{chosen.name}: {what}{_amount_text(what, amount, how)}")
+    typer.echo(f"{chosen.name}: {what}{_amount_text(what, amount, injection)}")
 
 
 def _buses_of_daemon(robot: str) -> list[str]:
@@ -116,19 +116,21 @@ def _buses_of_daemon(robot: str) -> list[str]:
     return [f"{name}={bus['url']}" for name, bus in buses.items()]
 
 
-def _amount_text(what: InjectedFault, amount: int, how: _How) -> str:
+def _amount_text(what: InjectedFault, amount: int, injection: _FaultInjection) -> str:
     if what is InjectedFault.CUT_CABLE:
         return ""
-    return f" {amount:#06x}" if what is InjectedFault.DRIVE_FAULT else f" {amount} {how.unit}"
+    return f" {amount:#06x}" if what is InjectedFault.DRIVE_FAULT else f" {amount} {injection.unit}"
 
 
-def _amount(what: InjectedFault, how: _How, text: str | None) -> int:
+def _amount(what: InjectedFault, injection: _FaultInjection, text: str | None) -> int:
     try:
-        amount = how.usual if text is None else int(text, 0)
+        amount = injection.usual if text is None else int(text, 0)
     except ValueError:
-        amount = how.least - 1
-    if not how.least <= amount <= how.most:
-        raise BadInputError(f"{what} {text}: allowed: whole numbers {how.least} to {how.most}")
+        amount = injection.least - 1
+    if not injection.least <= amount <= injection.most:
+        raise BadInputError(
+            f"{what} {text}: allowed: whole numbers {injection.least} to {injection.most}"
+        )
     return amount
 
 

@@ -28,7 +28,7 @@ from cdpr_rt.calibration.verification.verification import (
     verifies,
 )
 from cdpr_rt.errors import InvalidRequestError
-from cdpr_tools.calibrate.made_readings import ErrorBudget, HAND_EYE_m
+from cdpr_tools.calibrate.synthetic_readings import ErrorBudget, HAND_EYE_m
 from tests.cdpr_rt.calibration.camera_robot import FEW, CameraRobot, camera_robot
 
 _FREE = (0, 1, 2, 3, 4, 5)

@@ -15,7 +15,7 @@ from cdpr_rt.calibration.estimation.noise import (
 )
 from cdpr_rt.calibration.estimation.parameters import DRUM
 from cdpr_rt.calibration.estimation.residuals import length_std_m
-from cdpr_tools.calibrate.made_readings import ErrorBudget
+from cdpr_tools.calibrate.synthetic_readings import ErrorBudget
 from tests.cdpr_rt.calibration.camera_robot import KNOWN, CameraRobot, camera_robot
 from tests.cdpr_rt.calibration.made_up import made_up, measured
 

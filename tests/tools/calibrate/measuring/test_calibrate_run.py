@@ -134,11 +134,11 @@ def never(_: CalibrationData) -> str | None:
 
 
 def begin(folder: Path, wanted: run.CalibrationRunSettings) -> CalibrationData:
-    return run.measure(Output(True), ROBOT, wanted, run.Kept.new(folder, ROBOT, SETUP), never)
+    return run.measure(Output(True), ROBOT, wanted, run.StoredRun.new(folder, ROBOT, SETUP), never)
 
 
 def go_on(folder: Path, wanted: run.CalibrationRunSettings) -> CalibrationData:
-    return run.measure(Output(True), ROBOT, wanted, run.Kept.of_before(folder, ROBOT), never)
+    return run.measure(Output(True), ROBOT, wanted, run.StoredRun.resumed(folder, ROBOT), never)
 
 
 @pytest.mark.parametrize(
@@ -184,13 +184,13 @@ def test_a_list_of_poses_is_gone_to_wholly_also_after_a_run_that_ended(
         begin(tmp_path, wanted)
     wanted.save(tmp_path)
     again = run.CalibrationRunSettings.load(tmp_path)
-    assert again == wanted == again.going_on(None, None, None)
+    assert again == wanted == again.resumed(None, None, None)
     data = go_on(tmp_path, again)
     home = data.poses[0].target
     assert {reading.target for reading in data.poses} == {home, *listed}
     assert len(data.poses) == 18 and go_on(tmp_path, again) == data
     with pytest.raises(BadInputError, match="was begun, with a list of poses"):
-        again.going_on(30, None, None)
+        again.resumed(30, None, None)
 
 
 def test_a_kill_between_two_files_loses_one_pose_and_no_more(
@@ -230,7 +230,7 @@ def test_more_poses_are_read_until_they_bring_nothing(
         asked.append(len(data.poses))
         return "enough" if len(data.poses) > 20 else None
 
-    kept = run.Kept.new(tmp_path, ROBOT, SETUP)
+    kept = run.StoredRun.new(tmp_path, ROBOT, SETUP)
     data = run.measure(Output(True), ROBOT, settings(None), kept, enough)
     assert 20 < len(data.poses) < 35 and asked[-1] == len(data.poses)
 
@@ -281,14 +281,14 @@ def test_a_pose_that_is_read_is_kept_whatever_ends_the_scanner_s_longer_stay(
     tmp_path: Path, rigs: Callable[..., list[Rig]], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     made = rigs()
-    told = run.Kept.keep
+    told = run.StoredRun.keep
 
-    def keep(self: run.Kept, *what: Any) -> None:
+    def keep(self: run.StoredRun, *what: Any) -> None:
         told(self, *what)
         if len(self.data.poses) == 4:
             made[0].trip = TripError("the motion was ended: fault")
 
-    monkeypatch.setattr(run.Kept, "keep", keep)
+    monkeypatch.setattr(run.StoredRun, "keep", keep)
     with pytest.raises(TripError, match="ended"):
         begin(tmp_path, settings())
     left = load_data(tmp_path / run.DATA)
@@ -361,17 +361,17 @@ def test_a_new_run_leaves_nothing_of_the_poses_before(
     (tmp_path / run.IMAGES).mkdir()
     for name in (f"{run.IMAGES}/pose-15.png", run.COUNTED):
         (tmp_path / name).write_text("of before")
-    run.Kept.new(tmp_path, ROBOT, SETUP)
+    run.StoredRun.new(tmp_path, ROBOT, SETUP)
     assert list(tmp_path.iterdir()) == []
     with pytest.raises(ProfileError, match=run.DATA):
         go_on(tmp_path, settings())
 
 
 def test_what_was_read_of_a_real_robot_is_not_overwritten_by_a_simulation(tmp_path: Path) -> None:
-    kept = run.Kept.new(tmp_path, ROBOT, None)
+    kept = run.StoredRun.new(tmp_path, ROBOT, None)
     kept.data.model_copy(update={"simulated": False}).save(tmp_path / run.DATA)
     with pytest.raises(BadInputError, match="was read of a real robot"):
-        run.Kept.new(tmp_path, ROBOT, None)
+        run.StoredRun.new(tmp_path, ROBOT, None)
     assert (tmp_path / run.DATA).exists()
 
 

@@ -126,7 +126,7 @@ def of_a_run(told: Told, folder: Path) -> None:
     """It was begun with --overwrite where poses had been read by hand."""
     told.description["simulated"] = True  # as all runs are
     read(told, folder)
-    run.Kept.new(folder, ROBOT, None).data.save(folder / run.DATA)
+    run.StoredRun.new(folder, ROBOT, None).data.save(folder / run.DATA)
 
 
 @pytest.mark.parametrize(

@@ -14,10 +14,10 @@ import pytest
 from cdpr_rt.calibration.calibrate import calibrate
 from cdpr_rt.calibration.outcome import Outcome
 from cdpr_tools.calibrate.measuring.outside import OutsidePose, OutsidePoses
-from cdpr_tools.calibrate.report import judged as judging
-from cdpr_tools.calibrate.report.judged import Judged, judged
+from cdpr_tools.calibrate.report import truth_comparison
 from cdpr_tools.calibrate.report.page import write_report
 from cdpr_tools.calibrate.report.picture import found_figure
+from cdpr_tools.calibrate.report.truth_comparison import TruthComparison, compare_with_truth
 from cdpr_tools.composition.robot_physics import TrueGeometry
 from tests.cdpr_rt.calibration.camera_robot import CameraRobot, camera_robot
 
@@ -36,7 +36,7 @@ def outcome(robot: CameraRobot) -> Outcome:
 
 
 @pytest.fixture
-def known(robot: CameraRobot, outcome: Outcome, monkeypatch: pytest.MonkeyPatch) -> Judged:
+def known(robot: CameraRobot, outcome: Outcome, monkeypatch: pytest.MonkeyPatch) -> TruthComparison:
     """Return what is said of it by the truth that it was made up with."""
     made, rng = robot.made, np.random.default_rng(1)
     sheets = [
@@ -47,7 +47,7 @@ def known(robot: CameraRobot, outcome: Outcome, monkeypatch: pytest.MonkeyPatch)
     ]
     monkeypatch.setattr("cdpr_sim_bus.camera.scene.build_scene", lambda _: sheets)
     true = TrueGeometry(made.exits_m, made.drums, ELONGATION)
-    monkeypatch.setattr(judging, "true_geometry", lambda *_: true)
+    monkeypatch.setattr(truth_comparison, "true_geometry", lambda *_: true)
 
     def as_tuples(matrix: np.ndarray) -> tuple[tuple[float, ...], ...]:
         return tuple(tuple(row) for row in matrix.tolist())
@@ -65,11 +65,11 @@ def known(robot: CameraRobot, outcome: Outcome, monkeypatch: pytest.MonkeyPatch)
                 rotation_std_rad=SCANNER_rad,
             )
         )
-    return judged(robot.robot, None, outcome, OutsidePoses(poses=tuple(poses)))
+    return compare_with_truth(robot.robot, None, outcome, OutsidePoses(poses=tuple(poses)))
 
 
 def test_errors_are_those_of_poses_held_out_beside_scanner_and_truth(
-    known: Judged, outcome: Outcome
+    known: TruthComparison, outcome: Outcome
 ) -> None:
     proof, truth = known.verification(), known.true_errors()
     assert known.index.tolist() == outcome.unused.index.tolist() == [4, 9, 14, 19, 24]
@@ -91,7 +91,7 @@ def test_errors_are_those_of_poses_held_out_beside_scanner_and_truth(
 
 
 def test_the_report_is_one_file_with_its_pictures(
-    known: Judged, outcome: Outcome, robot: CameraRobot, tmp_path: Path
+    known: TruthComparison, outcome: Outcome, robot: CameraRobot, tmp_path: Path
 ) -> None:
     shown = [len(one.image.markers) if one.image else 0 for one in robot.made.data.poses]
     images = tmp_path / "images"
