@@ -7,7 +7,7 @@ import sys
 from collections.abc import Callable
 from functools import cache, partial
 from pathlib import Path
-from typing import Any, TypeVar, cast
+from typing import Any, TypeVar, TypeVarTuple, cast
 
 import numba
 from numba.core import cgutils, config, event, types
@@ -21,6 +21,7 @@ _SETTINGS: Any = config
 _NJIT: Any = numba.njit  # whose types do not know all of its options
 _T = TypeVar("_T")
 _F = TypeVar("_F", bound=Callable[..., Any])
+_Objects = TypeVarTuple("_Objects")
 
 
 def _skip_blas() -> None:
@@ -126,6 +127,29 @@ def bound(kernel: Callable[..., _T], *arrays: Any, then: tuple[Any, ...] = ()) -
     type_of: Callable[[Any], Any] = numba.typeof
     types = tuple(type_of(argument) for argument in (*arrays, *then))
     return partial(dispatcher.compile(types), *arrays)
+
+
+def bound_to(bind: Callable[[*_Objects], _F]) -> Callable[[*_Objects], _F]:
+    """Return `bind` that is called only where an argument is another object than the last time.
+
+    For kernels `bound` to the arrays of up to four objects that stay the same from cycle to cycle;
+    what it returned last is returned again.
+    """
+    # four names in place of a tuple: this is called several times a cycle
+    last_a: Any = None
+    last_b: Any = None
+    last_c: Any = None
+    last_d: Any = None
+    kernel: Any = None
+
+    def current(a: Any, b: Any = None, c: Any = None, d: Any = None) -> _F:
+        nonlocal last_a, last_b, last_c, last_d, kernel
+        if a is not last_a or b is not last_b or c is not last_c or d is not last_d:
+            kernel = bind(*(one for one in (a, b, c, d) if one is not None))
+            last_a, last_b, last_c, last_d = a, b, c, d
+        return kernel  # type: ignore[no-any-return]
+
+    return cast(Callable[[*_Objects], _F], current)
 
 
 @cast(Callable[[Callable[..., Any]], Callable[[int, int, int], None]], intrinsic)

@@ -5,13 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 
 from cdpr_rt.arrays import BoolArray, FloatArray
 from cdpr_rt.core.exchange import AxisFeedback, Setpoint
-from cdpr_rt.jit import bound, jit
+from cdpr_rt.jit import bound, bound_to, jit
 
 TWO_PI = 2.0 * math.pi
 
@@ -191,9 +190,7 @@ class Compensation:
         """Whether an axis has a profile, (n,); it is used once the index is known."""
         self._period_s = period_s
         self._fade_step = min(1.0, period_s / _FADE_IN_S)
-        self._bound_to: tuple[Any, Any, Any] = (None, None, None)
-        """Whose arrays the kernel is bound to."""
-        self._torque: Callable[[], None]
+        self._kernel = bound_to(self._bind)
 
     def reset(self) -> None:
         """Fade in anew and forget the deviation from the set-point."""
@@ -222,12 +219,13 @@ class Compensation:
 
     def torque(self, feedback: AxisFeedback, setpoint: Setpoint, out: FloatArray) -> None:
         """Write the torque to add, (n,), Nm."""
-        last = self._bound_to
-        if feedback is not last[0] or setpoint is not last[1] or out is not last[2]:
-            self._bound_to = feedback, setpoint, out
-            self._torque = bound(
-                _torque, self._tables, self._means, self._parameters, self._state, self._period_s,
-                self._fade_step, feedback.position_rad, feedback.index_rad, feedback.index_known,
-                setpoint.position_rad, setpoint.velocity_rad_s, out, self.cogging_Nm,
-            )  # fmt: skip
-        self._torque()
+        self._kernel(feedback, setpoint, out)()
+
+    def _bind(
+        self, feedback: AxisFeedback, setpoint: Setpoint, out: FloatArray
+    ) -> Callable[[], None]:
+        return bound(
+            _torque, self._tables, self._means, self._parameters, self._state, self._period_s,
+            self._fade_step, feedback.position_rad, feedback.index_rad, feedback.index_known,
+            setpoint.position_rad, setpoint.velocity_rad_s, out, self.cogging_Nm,
+        )  # fmt: skip

@@ -5,14 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.control.compensation import Compensation
 from cdpr_rt.core.exchange import AxisFeedback, Setpoint
-from cdpr_rt.jit import bound, jit
+from cdpr_rt.jit import bound, bound_to, jit
 
 # the last state of an axis: whether its controller runs, or what its integral begins with
 _RUNNING, _BUMPLESS_START = 1.0, 2.0
@@ -134,9 +133,7 @@ class Pid:
         self.effort_Nm = np.zeros(len(gains))
         self.compensation_Nm = self.motor_loss_Nm = np.zeros(len(gains))
         self.cogging_Nm = np.zeros(len(gains)) if compensation is None else compensation.cogging_Nm
-        self._bound_to: tuple[Any, Any, Any] = (None, None, None)
-        """Whose arrays the kernel is bound to."""
-        self._update: Callable[[], None]
+        self._kernel = bound_to(self._bind)
 
     def reset(self) -> None:
         """Start anew: integral and slope zero."""
@@ -158,12 +155,13 @@ class Pid:
         """Write the limited sum of PID and compensation."""
         if self._compensation is not None:
             self._compensation.torque(feedback, setpoint, self.compensation_Nm)
-        last = self._bound_to
-        if feedback is not last[0] or setpoint is not last[1] or torque_Nm is not last[2]:
-            self._bound_to = feedback, setpoint, torque_Nm
-            self._update = bound(
-                _update, self._gains, self._limit, self._period_s, self._state,
-                feedback.position_rad, setpoint.position_rad, setpoint.velocity_rad_s,
-                self.compensation_Nm, self.effort_Nm, torque_Nm,
-            )  # fmt: skip
-        self._update()
+        self._kernel(feedback, setpoint, torque_Nm)()
+
+    def _bind(
+        self, feedback: AxisFeedback, setpoint: Setpoint, torque_Nm: FloatArray
+    ) -> Callable[[], None]:
+        return bound(
+            _update, self._gains, self._limit, self._period_s, self._state,
+            feedback.position_rad, setpoint.position_rad, setpoint.velocity_rad_s,
+            self.compensation_Nm, self.effort_Nm, torque_Nm,
+        )  # fmt: skip

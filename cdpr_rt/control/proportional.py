@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.core.exchange import AxisFeedback, Setpoint
-from cdpr_rt.jit import bound, jit
+from cdpr_rt.jit import bound, bound_to, jit
 
 
 @jit
@@ -41,20 +40,19 @@ class Proportional:
         self._limit = np.array(limit_Nm, float)
         self.effort_Nm = np.zeros_like(self._gain)
         self.compensation_Nm = self.motor_loss_Nm = self.cogging_Nm = np.zeros_like(self._gain)
-        self._bound_to: tuple[Any, Any, Any] = (None, None, None)
-        """Whose arrays the kernel is bound to."""
-        self._update: Callable[[], None]
+        self._kernel = bound_to(self._bind)
 
     def reset(self) -> None:
         """Nothing is remembered."""
 
     def update(self, feedback: AxisFeedback, setpoint: Setpoint, torque_Nm: FloatArray) -> None:
         """Write the limited proportional torque."""
-        last = self._bound_to
-        if feedback is not last[0] or setpoint is not last[1] or torque_Nm is not last[2]:
-            self._bound_to = feedback, setpoint, torque_Nm
-            self._update = bound(
-                _update, self._gain, self._limit, feedback.position_rad, setpoint.position_rad,
-                self.effort_Nm, torque_Nm,
-            )  # fmt: skip
-        self._update()
+        self._kernel(feedback, setpoint, torque_Nm)()
+
+    def _bind(
+        self, feedback: AxisFeedback, setpoint: Setpoint, torque_Nm: FloatArray
+    ) -> Callable[[], None]:
+        return bound(
+            _update, self._gain, self._limit, feedback.position_rad, setpoint.position_rad,
+            self.effort_Nm, torque_Nm,
+        )  # fmt: skip

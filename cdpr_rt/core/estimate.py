@@ -12,7 +12,7 @@ import numpy as np
 from cdpr_rt.arrays import BoolArray, FloatArray
 from cdpr_rt.core.exchange import AxisFeedback
 from cdpr_rt.core.tension_feedback import TensionFeedback
-from cdpr_rt.jit import bound, jit
+from cdpr_rt.jit import bound, bound_to, jit
 
 FILTER_S = 0.01
 """Speed and torque are judged over this: one encoder step a cycle is hundreds a second."""
@@ -166,9 +166,7 @@ class Estimator:
         self._state = np.zeros(n, _STATE)
         self._state["length_at_zero"] = np.nan
         self._no_torque = np.zeros(n)
-        self._bound_to: tuple[Any, Any, Any] = (None, None, None)
-        """Feedback, losses and cogging whose arrays the kernel is bound to."""
-        self._update: Callable[..., None] = _update
+        self._kernel = bound_to(self._bind)
 
     def reset(self) -> None:
         """Forget speeds, torques and tensions, after cycles did not run; lengths stay known."""
@@ -218,29 +216,19 @@ class Estimator:
         estimate.elapsed_s = elapsed_s or self._period_s
         loss = self._no_torque if motor_loss_Nm is None else motor_loss_Nm
         cogging = self._no_torque if cogging_Nm is None else cogging_Nm
-        last = self._bound_to
-        if feedback is not last[0] or loss is not last[1] or cogging is not last[2]:
-            self._bind(feedback, loss, cogging)
-        self._update(estimate.elapsed_s)
+        self._kernel(feedback, loss, cogging)(estimate.elapsed_s)
         if tension is not None:
             _take_sensors(
                 tension.tension_N, tension.valid, estimate.tension_N, estimate.tension_measured,
                 estimate.sensor_ok,
             )  # fmt: skip
 
-    def _bind(self, feedback: AxisFeedback, loss: FloatArray, cogging: FloatArray) -> None:
-        self._bound_to = feedback, loss, cogging
-        self._update = bound(
-            _update,
-            self._winch,
-            self._state,
-            self.estimate.velocity_rad_s,
-            self.estimate.cable_length_m,
-            self.estimate.tension_N,
-            feedback.position_rad,
-            feedback.torque_Nm,
-            feedback.valid,
-            loss,
-            cogging,
-            then=(0.0,),
-        )
+    def _bind(
+        self, feedback: AxisFeedback, loss: FloatArray, cogging: FloatArray
+    ) -> Callable[[float], None]:
+        estimate = self.estimate
+        return bound(
+            _update, self._winch, self._state, estimate.velocity_rad_s, estimate.cable_length_m,
+            estimate.tension_N, feedback.position_rad, feedback.torque_Nm, feedback.valid, loss,
+            cogging, then=(0.0,),
+        )  # fmt: skip

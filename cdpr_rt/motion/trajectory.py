@@ -9,7 +9,7 @@ import numpy as np
 
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.core.exchange import Setpoint
-from cdpr_rt.jit import bound, jit
+from cdpr_rt.jit import bound, bound_to, jit
 
 
 @jit
@@ -77,17 +77,15 @@ class TrapezoidalMove:
         self.cruise_s = float(cruise_s)
         self.ramp_s = float(ramp_s)
         self.duration_s = self.cruise_s + 2.0 * self.ramp_s + settle_s
-        self._bound_to: Setpoint | None = None
-        """Whose arrays the kernel is bound to."""
-        self._fill: Callable[[float], None]
+        self._kernel = bound_to(self._bind)
 
     def fill(self, time_s: float, setpoint: Setpoint) -> None:
         """Write the set-point at `time_s` after the move's start."""
-        if setpoint is not self._bound_to:
-            self._bound_to = setpoint
-            own = self.start_rad, self.velocity_rad_s, self.ramp_s, self.cruise_s
-            self._fill = bound(_fill, *own, *setpoint.arrays, then=(0.0,))
-        self._fill(time_s)
+        self._kernel(setpoint)(time_s)
+
+    def _bind(self, setpoint: Setpoint) -> Callable[[float], None]:
+        own = self.start_rad, self.velocity_rad_s, self.ramp_s, self.cruise_s
+        return bound(_fill, *own, *setpoint.arrays, then=(0.0,))
 
     def end_rad(self) -> FloatArray:
         """Return where the move ends, (n,)."""

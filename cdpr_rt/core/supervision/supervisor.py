@@ -20,7 +20,7 @@ from cdpr_rt.core.supervision.limit_kernel import (
     check_axes,
 )
 from cdpr_rt.core.supervision.limits import DEFAULT_REACTIONS, Limit, Limits
-from cdpr_rt.jit import bound
+from cdpr_rt.jit import bound, bound_to
 
 __all__ = ["Limit", "Limits", "Supervisor"]
 
@@ -45,9 +45,7 @@ class Supervisor:
         self._verdict = np.zeros(1, VERDICT)
         self._reported_reason = ""
         self._disagree_s = 0.0
-        self._bound_to: tuple[Any, Any, Any, Any] = (None,) * 4
-        """Feedback, estimate, set-point and torques whose arrays the kernel is bound to."""
-        self._check: Callable[..., int] = check_axes
+        self._kernel = bound_to(self._bind)
 
     def reset(self, torque_Nm: FloatArray | float = 0.0) -> None:
         """Forget the past, before motors are driven; `torque_Nm` is what they are driven with."""
@@ -70,15 +68,8 @@ class Supervisor:
         The arrays of all four are those of the last call as long as the objects are.
         """
         self._reported_reason = ""
-        last = self._bound_to
-        if (
-            feedback is not last[0]
-            or estimate is not last[1]
-            or setpoint is not last[2]
-            or torque_Nm is not last[3]
-        ):
-            self._bind(feedback, estimate, setpoint, torque_Nm)
-        return self._check(estimate.elapsed_s, estimate.slack_allowed)
+        check = self._kernel(feedback, estimate, setpoint, torque_Nm)
+        return check(estimate.elapsed_s, estimate.slack_allowed)
 
     def _bind(
         self,
@@ -86,29 +77,14 @@ class Supervisor:
         estimate: AxisEstimate,
         setpoint: Setpoint,
         torque_Nm: FloatArray,
-    ) -> None:
-        self._bound_to = feedback, estimate, setpoint, torque_Nm
-        self._check = bound(
-            check_axes,
-            self._limits,
-            self._history,
-            self._window,
-            self._reactions,
-            self._verdict,
-            feedback.position_rad,
-            setpoint.position_rad,
-            setpoint.velocity_rad_s,
-            feedback.valid,
-            feedback.alive,
-            feedback.rate_ok,
-            estimate.velocity_rad_s,
-            estimate.cable_m_per_rad,
-            estimate.cable_length_m,
-            estimate.tension_N,
-            estimate.sensor_ok,
-            torque_Nm,
+    ) -> Callable[[float, bool], int]:
+        return bound(
+            check_axes, self._limits, self._history, self._window, self._reactions, self._verdict,
+            feedback.position_rad, setpoint.position_rad, setpoint.velocity_rad_s, feedback.valid,
+            feedback.alive, feedback.rate_ok, estimate.velocity_rad_s, estimate.cable_m_per_rad,
+            estimate.cable_length_m, estimate.tension_N, estimate.sensor_ok, torque_Nm,
             then=(0.0, False),
-        )
+        )  # fmt: skip
 
     def compare_lengths(self, elapsed_s: float, disagree_m: float, axis: int) -> int:
         """Judge by how much cable lengths contradict each other; return the `Reaction` so far.
