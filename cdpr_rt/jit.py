@@ -15,7 +15,7 @@ from numba.extending import intrinsic
 from typing_extensions import override
 
 COMPILING = logging.getLogger("cdpr.compiling")
-"""Is told, at level INFO, of each kernel of which no machine code is kept on this machine."""
+"""Logger, at level INFO, of each kernel of which no machine code is cached on this machine."""
 
 _SETTINGS: Any = config
 _NJIT: Any = numba.njit  # whose types do not know all of its options
@@ -43,7 +43,7 @@ _skip_blas()
 
 
 class _CompileListener(event.Listener):
-    """Tells of what is compiled for want of machine code that is kept."""
+    """Logs kernels that are compiled because no machine code is cached."""
 
     @override
     def on_start(self, event: Any) -> None:

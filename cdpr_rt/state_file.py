@@ -33,7 +33,7 @@ def state_path(kind: str, name: str) -> Path:
 
 
 def read_state(path: Path) -> dict[str, Any] | None:
-    """Return what the file holds, None where there is none; raises StateFileError."""
+    """Return the file's content, None where there is no file; raises StateFileError."""
     try:
         held = read_json(path, _MOST_BYTES)
     except FileMissingError:

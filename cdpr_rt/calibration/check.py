@@ -167,7 +167,7 @@ class _System:
         self._nuisance, self._known = self._of_home(poses[0])
 
     def _of_home(self, home: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return what the platform's place at home does to lengths, and how well it is known."""
+        """Return the derivative of lengths by the platform's place at home, and its deviations."""
         geometry = self._geometry
         cables = np.empty((1, KERNEL_ROWS, geometry.n))
         run_poses(geometry.kernel_geometry(), home[None], cables)
@@ -235,7 +235,7 @@ class _System:
         """Return by how much poses that lengths tell are off by a change, at the worst."""
         at = self._at
         # of a platform that turns freely the balance of its moments tells the angle, not lengths
-        rows = self._geometry.n + int(self._geometry.turns)
+        rows = self._geometry.n + int(self._geometry.turns_freely)
         x = at.by_pose[:, :rows]
         moved = np.einsum("jra,a->jr", at.by_parameter[:, :rows, own], size)
         step = np.einsum("jdr,jr->jd", np.linalg.pinv(x), moved)

@@ -74,7 +74,7 @@ class Outcome:
 
     @property
     def worse(self) -> bool:
-        """Whether poses that the fit had not seen are told worse, and not by noise alone."""
+        """Whether errors at poses held out are larger than before, and not by noise alone."""
         return self.verified.worse_than(self.before)
 
     @property

@@ -7,6 +7,7 @@ first sample.
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,25 +48,53 @@ _LARGEST_SCALE = 1000.0
 _NEARLY_PARALLEL = 1.0 - 1e-9
 
 
+class Posted(NamedTuple):
+    """Fields of the samples as posted, a slot each."""
+
+    sequence: IntArray
+    session: NDArray[np.uint32]
+    right: IntArray
+    sent_ns: IntArray
+    position: FloatArray
+    quaternion: FloatArray
+    scale: FloatArray
+    buttons: NDArray[np.uint32]
+
+
+class Buffer(NamedTuple):
+    """State of the buffer: the row played last, and the samples that wait in order."""
+
+    played: FloatArray
+    """(COLUMNS,)"""
+    times: FloatArray
+    """Times of sending, (QUEUE_LENGTH,)."""
+    sequences: IntArray
+    rows: FloatArray
+    """(QUEUE_LENGTH, COLUMNS)"""
+    scalars: FloatArray
+    counts: IntArray
+
+    @classmethod
+    def empty(cls) -> Buffer:
+        """Return a buffer without samples."""
+        return cls(
+            np.zeros(COLUMNS), np.zeros(QUEUE_LENGTH), np.zeros(QUEUE_LENGTH, np.int64),
+            np.zeros((QUEUE_LENGTH, COLUMNS)), np.zeros(SCALARS), np.zeros(COUNTS, np.int64),
+        )  # fmt: skip
+
+
 @jit
-def _begin(
-    now: float,
-    sent_s: float,
-    sequence: int,
-    session: int,
-    row: FloatArray,
-    played: FloatArray,
-    scalars: FloatArray,
-    counts: IntArray,
-) -> None:
+def _begin(sent_s: float, sequence: int, session: int, row: FloatArray, buffer: Buffer) -> None:
     """Start the stream with one sample; it is played after a first delay."""
+    scalars, counts = buffer.scalars, buffer.counts
+    now = scalars[NOW]
     scalars[_SENDER_ZERO] = sent_s
     scalars[_INTERVAL] = _FIRST_INTERVAL_S
     scalars[_WINDOW_START] = now
     scalars[EARLIEST] = scalars[EARLIEST_BEFORE] = now
     scalars[_LATEST] = scalars[_LATEST_BEFORE] = now
     scalars[PLAYED] = -_INTERVALS_WAITED * _FIRST_INTERVAL_S
-    played[:] = row
+    buffer.played[:] = row
     counts[SIZE] = 0
     counts[SESSION] = session
     counts[_PLAYED_UP_TO] = sequence - 1
@@ -106,21 +135,18 @@ def _continues(
     row: FloatArray,
     most_m_s: float,
     most_rad_s: float,
-    played: FloatArray,
-    times: FloatArray,
-    rows: FloatArray,
-    scalars: FloatArray,
-    counts: IntArray,
+    buffer: Buffer,
 ) -> bool:
     """Return whether clock and pose continue those of the sample before."""
-    before, last = scalars[PLAYED], played
+    scalars, times = buffer.scalars, buffer.times
+    before, last = scalars[PLAYED], buffer.played
     if place > 0:
-        before, last = times[place - 1], rows[place - 1]
+        before, last = times[place - 1], buffer.rows[place - 1]
     earliest = min(scalars[EARLIEST], scalars[EARLIEST_BEFORE])
     transit = scalars[NOW] - sent
     if sent <= before or abs(transit - earliest) > _LARGEST_STEP_OF_CLOCK_S:
         return False
-    if place < counts[SIZE] and sent >= times[place]:
+    if place < buffer.counts[SIZE] and sent >= times[place]:
         return False
     squared, along = 0.0, 0.0
     for i in range(3):
@@ -146,18 +172,9 @@ def _update_transit(transit: float, scalars: FloatArray) -> None:
 
 
 @jit
-def _insert(
-    place: int,
-    sent: float,
-    sequence: int,
-    row: FloatArray,
-    times: FloatArray,
-    sequences: IntArray,
-    rows: FloatArray,
-    scalars: FloatArray,
-    counts: IntArray,
-) -> None:
+def _insert(place: int, sent: float, sequence: int, row: FloatArray, buffer: Buffer) -> None:
     """Insert a sample into the queue, and update interval and transits."""
+    _, times, sequences, rows, scalars, counts = buffer
     size, now = counts[SIZE], scalars[NOW]
     if place == size and size > 0:
         interval = (sent - times[size - 1]) / (sequence - sequences[size - 1])
@@ -188,14 +205,10 @@ def _accept(
     most_m_s: float,
     most_rad_s: float,
     stopped: bool,
-    played: FloatArray,
-    times: FloatArray,
-    sequences: IntArray,
-    rows: FloatArray,
-    scalars: FloatArray,
-    counts: IntArray,
+    buffer: Buffer,
 ) -> None:
     """Accept one sample, or count why it is refused."""
+    scalars, counts = buffer.scalars, buffer.counts
     if not _valid(row):
         counts[REFUSED] += 1
         return
@@ -207,14 +220,12 @@ def _accept(
         if transit - scalars[EARLIEST] < _LONGEST_DELAY_S:
             _update_transit(transit, scalars)
         return
-    place = _insertion_index(sequence, sequences, counts[SIZE]) if known else 0
+    place = _insertion_index(sequence, buffer.sequences, counts[SIZE]) if known else 0
     if place == -1:
         counts[REPEATED] += 1
         return
     steady = known and not stopped
-    if steady and not _continues(
-        place, sent, row, most_m_s, most_rad_s, played, times, rows, scalars, counts
-    ):
+    if steady and not _continues(place, sent, row, most_m_s, most_rad_s, buffer):
         if sequence < counts[_HIGHEST]:
             counts[LATE] += 1
             return
@@ -223,54 +234,42 @@ def _accept(
         counts[REFUSED] += 1
         return
     if not steady:
-        _begin(scalars[NOW], sent_s, sequence, session, row, played, scalars, counts)
+        _begin(sent_s, sequence, session, row, buffer)
         place, sent = 0, 0.0
-    _insert(place, sent, sequence, row, times, sequences, rows, scalars, counts)
+    _insert(place, sent, sequence, row, buffer)
 
 
 @jit
 def receive(
-    first: int,
-    last: int,
-    sequence: IntArray,
-    session: NDArray[np.uint32],
-    right: IntArray,
-    sent_ns: IntArray,
-    position: FloatArray,
-    quaternion: FloatArray,
-    scale: FloatArray,
-    buttons: NDArray[np.uint32],
-    mover: int,
     most_m_s: float,
     most_rad_s: float,
     silence_s: float,
+    posted: Posted,
     row: FloatArray,
-    played: FloatArray,
-    times: FloatArray,
-    sequences: IntArray,
-    rows: FloatArray,
-    scalars: FloatArray,
-    counts: IntArray,
+    buffer: Buffer,
+    first: int,
+    last: int,
+    mover: int,
 ) -> None:
-    """Take the posted samples numbered from `first` up to `last`.
+    """Take the posted samples numbered from `first` up to `last`; `row` (COLUMNS,) is overwritten.
 
     Those of another grant of the right to move than `mover` are only counted.
     """
+    scalars = buffer.scalars
     for k in range(first, last):
         slot = k % SAMPLES
-        if right[slot] != mover:
-            counts[OTHER_RIGHT] += 1
+        if posted.right[slot] != mover:
+            buffer.counts[OTHER_RIGHT] += 1
             continue
         for i in range(3):
-            row[i] = position[slot, i]
+            row[i] = posted.position[slot, i]
         for i in range(4):
-            row[3 + i] = quaternion[slot, i]
-        row[SCALE] = scale[slot]
-        row[BUTTONS] = buttons[slot]
+            row[3 + i] = posted.quaternion[slot, i]
+        row[SCALE] = posted.scale[slot]
+        row[BUTTONS] = posted.buttons[slot]
         _accept(
-            sequence[slot], session[slot], 1e-9 * np.float64(sent_ns[slot]), row, most_m_s,
-            most_rad_s, scalars[NOW] - scalars[ARRIVED] > silence_s, played, times, sequences,
-            rows, scalars, counts,
+            posted.sequence[slot], posted.session[slot], 1e-9 * np.float64(posted.sent_ns[slot]),
+            row, most_m_s, most_rad_s, scalars[NOW] - scalars[ARRIVED] > silence_s, buffer,
         )  # fmt: skip
 
 
@@ -296,17 +295,9 @@ def _slerp(part: float, towards: FloatArray, quaternion: FloatArray) -> None:
 
 
 @jit
-def play(
-    period: float,
-    silence_s: float,
-    played: FloatArray,
-    times: FloatArray,
-    sequences: IntArray,
-    rows: FloatArray,
-    scalars: FloatArray,
-    counts: IntArray,
-) -> int:
+def play(period: float, silence_s: float, buffer: Buffer) -> int:
     """Advance the playback by a cycle, at most to the newest sample; return the state."""
+    played, times, sequences, rows, scalars, counts = buffer
     earliest = min(scalars[EARLIEST], scalars[EARLIEST_BEFORE])
     latest = max(scalars[_LATEST], scalars[_LATEST_BEFORE])
     delay = min(latest - earliest + _INTERVALS_WAITED * scalars[_INTERVAL], _LONGEST_DELAY_S)

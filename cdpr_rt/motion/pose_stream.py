@@ -15,6 +15,7 @@ import numpy as np
 
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.core.shared_block import SAMPLES, SharedBlock
+from cdpr_rt.jit import bound
 from cdpr_rt.motion import jitter_buffer as playback
 
 
@@ -51,7 +52,7 @@ class PoseStream:
         self._posted = block.counters["samples"]
         self._mover = block.counters["mover"]
         samples = block.samples
-        self._fields = (
+        posted = playback.Posted(
             samples["sequence"].view(np.int64),  # kernels mix no signed and unsigned numbers
             samples["session"],
             samples["right"].view(np.int64),
@@ -61,24 +62,18 @@ class PoseStream:
             samples["scale"],
             samples["buttons"],
         )
-        self._row = np.zeros(playback.COLUMNS)
-        self._played = np.zeros(playback.COLUMNS)
-        self._scalars = np.zeros(playback.SCALARS)
-        self._counts = np.zeros(playback.COUNTS, np.int64)
-        self._state = (
-            self._played,
-            np.zeros(playback.QUEUE_LENGTH),
-            np.zeros(playback.QUEUE_LENGTH, np.int64),
-            np.zeros((playback.QUEUE_LENGTH, playback.COLUMNS)),
-            self._scalars,
-            self._counts,
-        )
+        buffer = playback.Buffer.empty()
+        self._played, self._scalars, self._counts = buffer.played, buffer.scalars, buffer.counts
+        self._receive = bound(
+            playback.receive, FASTEST_m_s, FASTEST_rad_s, SILENCE_s, posted,
+            np.zeros(playback.COLUMNS), buffer, then=(0, 0, 0),
+        )  # fmt: skip
+        self._play = bound(playback.play, period_s, SILENCE_s, buffer)
         self._next = 0
         self._cycles = 0
         self.state = StreamState.STOPPED
         self.pose: FloatArray = self._played[:7]
         """The pose played, (7,): x y z in m, quaternion w x y z. Its meaning is the program's."""
-        self.update()  # compiled here, not when the first sample comes
         self.reset()
 
     def reset(self) -> None:
@@ -101,21 +96,15 @@ class PoseStream:
         posted = int(self._posted[0])
         # one slot may be being written; a new writer may count from 0
         first = min(max(self._next, posted - SAMPLES + 1), posted)
-        self._receive(first, posted)
+        self._receive(first, posted, int(self._mover[0]))
         if int(self._posted[0]) - first >= SAMPLES:
             self._counts[playback.OVERRUN] += posted - first
             self.reset()  # they may have been overwritten while they were read
             return self.state
         self._counts[playback.OVERRUN] += max(0, first - self._next)
         self._next = posted
-        self.state = _STATES[playback.play(self._period_s, SILENCE_s, *self._state)]
+        self.state = _STATES[self._play()]
         return self.state
-
-    def _receive(self, first: int, last: int) -> None:
-        playback.receive(
-            first, last, *self._fields, int(self._mover[0]), FASTEST_m_s,
-            FASTEST_rad_s, SILENCE_s, self._row, *self._state,
-        )  # fmt: skip
 
     @property
     def epoch(self) -> int:

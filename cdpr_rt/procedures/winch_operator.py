@@ -92,7 +92,7 @@ class WinchOperator(Operator, ABC):
 
     @abstractmethod
     def bus_record(self) -> dict[str, Any]:
-        """Return what reports tell of the bus: url, missed answers, load where that is known."""
+        """Return the bus for reports: url, missed answers, load where that is known."""
 
     @property
     def identity(self) -> dict[str, Any]:

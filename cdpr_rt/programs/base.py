@@ -36,7 +36,7 @@ class Program(ABC):
         """Go on from the present set-point and torque, (n,) each, as the last cycle left them."""
 
     def preparation(self, _arguments: Mapping[str, Any]) -> Callable[[], None] | None:
-        """Return what has to be done before a command with these arguments, None for nothing.
+        """Return the preparation of a command with these arguments, None for nothing.
 
         It may take its time, as reading a file does, and is called in another thread; what it
         raises refuses the command.
@@ -44,7 +44,7 @@ class Program(ABC):
         return None
 
     def check(self, arguments: Mapping[str, Any]) -> Any:
-        """Return what `apply` takes; raises ProgramError for what is refused, and changes nothing.
+        """Return checked arguments for `apply`; raises ProgramError, and changes nothing.
 
         The program need not run.
         """
@@ -96,7 +96,7 @@ class Program(ABC):
         return 0
 
     def progress(self) -> dict[str, Any]:
-        """Return what the status shows of it, such as the part done; not called in every cycle."""
+        """Return progress for the status, such as the part done; not called in every cycle."""
         return {}
 
 
@@ -110,7 +110,7 @@ class CommandedProgram(Program):
     _at_rest = True
 
     def check(self, arguments: Mapping[str, Any]) -> Any:
-        """Return what `apply` takes; raises ProgramError for what is refused."""
+        """Return checked arguments for `apply`; raises ProgramError."""
         return self._parsed(arguments)
 
     def apply(self, checked: Any) -> None:
@@ -136,7 +136,7 @@ class CommandedProgram(Program):
         return self._at_rest
 
     def _parsed(self, arguments: Mapping[str, Any]) -> Any:
-        """Return what `_take` takes; raises ProgramError."""
+        """Return parsed arguments for `_take`; raises ProgramError."""
         return CommandArguments(self.name, arguments, ())
 
     def _take(self, _parsed: Any) -> None:

@@ -35,7 +35,7 @@ _WARM_UP_CYCLES = 5
 def platform_parts(
     robot: Robot, limits: Limits, model: AxesModel, estimator: Estimator, *, learns: bool = True
 ) -> PlatformParts | None:
-    """Return what the programs of a platform share; None where there is none.
+    """Return the shared parts of a platform's programs; None without a platform.
 
     `learns`: of motors that were not commissioned, friction and cogging are learnt in motion.
     Raises GeometryError where its tensions have no bounds to hold it by.

@@ -51,7 +51,7 @@ class FreeRotation:
 
 
 def rotation_of(platform: Platform) -> FloatArray:
-    """Return what of a platform's `rotation` does not change, (ROWS,); the rest is 0."""
+    """Return the constant entries of a platform's `rotation`, (ROWS,); the rest is 0."""
     rotation = np.zeros(kernel.ROWS)
     rotation[kernel.MASS] = platform.mass_kg
     rotation[kernel.INERTIA] = inertia_kg_m2(platform)[2, 2]

@@ -286,4 +286,4 @@ class PlatformControl(Controller, Protocol):
         """Return why the platform cannot stand at a position, an empty text where it can."""
 
     def way_infeasibility(self, position: FloatArray, start: FloatArray | None = None) -> str:
-        """Return what is in the straight way to a position, from where it is or from `start`."""
+        """Return why the straight way to a position, from here or `start`, is infeasible, or ""."""

@@ -19,7 +19,7 @@ def platform_of(
     *,
     learns: bool = True,
 ) -> tuple[RobotModel, PlatformControl]:
-    """Return the model of a robot's platform and what controls it; the robot has to have one.
+    """Return the model and the control of a robot's platform; the robot has to have one.
 
     Motors may be asked for `torque_Nm` (n,). The control has the tension distribution and the cable
     model that the robot's file names; where it `learns`, it learns in motion of motors that

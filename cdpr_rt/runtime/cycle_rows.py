@@ -85,7 +85,7 @@ class CycleRows:
         self._bind(_axes_of(engine))
 
     def write(self, engine: Any) -> None:
-        """Write and publish one row of what `engine` has now."""
+        """Write and publish one row of the present values of `engine`."""
         k = self._written % self._capacity
         _SCALARS.pack_into(self._raw, k * self._size, *_scalars_of(engine))
         poses = tuple([_UNKNOWN if pose is None else pose for pose in _poses_of(engine)])

@@ -69,7 +69,7 @@ class PathPlanRunner:
 
 
 def _read(status: int, text: str) -> dict[str, Any]:
-    """Return what the process has told."""
+    """Return the result of the process."""
     try:
         answer = json.loads(text)
     except ValueError:

@@ -62,7 +62,7 @@ def moved_or_slipped(faults: Sequence[Fault]) -> list[Fault]:
 
 
 def told_right(geometry: CableGeometry, found: Fit, first: MapFit) -> tuple[Fit, list[Fault]]:
-    """Return the fit that is to be believed, and what was told wrong: sheets, drums or the lens.
+    """Return the fit with wrong figures set free, and which those are: sheets, drums or the lens.
 
     Where one of them is far off what was known of it, cables and camera contradict each other.
     Each is set free in turn, with the others as they were told, and then each two together.
@@ -110,7 +110,7 @@ class _Cause:
 
 
 def _tried(geometry: CableGeometry, found: Fit, kinds: tuple[FaultKind, ...]) -> _Cause:
-    """Return an explanation: the fit with what it is about set free."""
+    """Return an explanation: the fit with its figure set free."""
     camera = found.camera
     assert camera is not None
     seen = replace(found.seen, start=found.poses)
@@ -128,7 +128,7 @@ def _tried(geometry: CableGeometry, found: Fit, kinds: tuple[FaultKind, ...]) ->
 
 
 def _believed(geometry: CableGeometry, best: _Cause) -> tuple[Fit, list[Fault]]:
-    """Return the fit by the one explanation that there is, and in words what was told wrong."""
+    """Return the fit by the one explanation that there is, and the wrong figure in words."""
     why = "; exit points, and what was measured, agree best with that, and it is believed"
     found, faults = best.fit, []
     for kind in best.kinds:
@@ -142,7 +142,7 @@ def _believed(geometry: CableGeometry, best: _Cause) -> tuple[Fit, list[Fault]]:
 
 
 def _contradiction(geometry: CableGeometry, found: Fit, first: MapFit) -> bool:
-    """Return whether anything that is told of sheets, drums or lens is far off."""
+    """Return whether a given figure of sheets, drums or lens is far off."""
     camera = found.camera
     assert camera is not None
     free, known = camera.free_lens, camera.knowledge

@@ -127,10 +127,10 @@ class CableGeometry:
     def free(self) -> tuple[int, ...]:
         """Components of the twist in which poses are estimated, a free angle among them."""
         directions = self.model.kinematics.directions
-        return (*directions, 5) if self.turns else directions
+        return (*directions, 5) if self.turns_freely else directions
 
     @property
-    def turns(self) -> bool:
+    def turns_freely(self) -> bool:
         """Whether the platform turns freely in its plane, to where tensions have no moment."""
         return self.model.kinematics.turns_freely
 

@@ -71,12 +71,12 @@ def linearise(
     run_poses(kernel, poses, cables)
     chosen = [i for i in geometry.free if i < 6]
     size = geometry.size + len(seen.jumps)
-    rows = n + int(geometry.turns) + 6
+    rows = n + int(geometry.turns_freely) + 6
     out = Linearised(
         np.zeros((count, rows)), np.zeros((count, rows, size)), np.zeros((count, rows, d))
     )
     _closure(geometry, seen, poses, jumps_m, cables, kernel, chosen, out)
-    if geometry.turns:
+    if geometry.turns_freely:
         _balance(geometry, seen, poses, cables, kernel, chosen, out)
     _measured_poses(seen, poses, chosen, out)
     return out

@@ -71,7 +71,7 @@ class Elongations:
     """q with which the fit has the mean of both."""
 
     def off(self, elongation: float) -> float:
-        """Return the root mean square of what κ is off."""
+        """Return the root mean square error of κ."""
         one, other = 1.0 + elongation - self.by_set, 1.0 + elongation - self.by_true
         return math.sqrt((1.0 - self.share) * one**2 + self.share * other**2)
 

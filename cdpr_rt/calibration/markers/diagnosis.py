@@ -182,7 +182,7 @@ def _best_cut(split: np.ndarray[tuple[int], np.dtype[np.bool_]]) -> tuple[int, i
 
 
 def _size(rows: IntArray, bundle: Bundle, seen: SeenMarkers) -> tuple[float, float]:
-    """Return a marker's size over what was told and its standard deviation, cameras as they are."""
+    """Return a marker's size over the nominal one, and its standard deviation, cameras fixed."""
     own = seen.keep(np.isin(np.arange(len(seen)), rows))
     map_ = bundle.estimate.map
     number = int(seen.marker[rows[0]])

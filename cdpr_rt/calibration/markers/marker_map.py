@@ -58,7 +58,7 @@ class MarkerMap:
         return self.moved(self.rotation[k].T, -self.rotation[k].T @ self.position_m[k], marker)
 
     def moved(self, turn: FloatArray, shift: FloatArray, reference: int) -> MarkerMap:
-        """Return the map in a frame in which what was at x is at `turn` x + `shift`."""
+        """Return the map transformed by x -> `turn` x + `shift`."""
         return MarkerMap(
             self.ids,
             reference,

@@ -49,7 +49,7 @@ def require_enough(geometry: CableGeometry, seen: Observations) -> None:
     d, n = len(geometry.free), geometry.n
     coordinates = np.isfinite(seen.position_std_m[:, : geometry.coordinates]).sum()
     angles = np.isfinite(seen.rotation_std_rad).sum() if d > geometry.coordinates else 0
-    told = int(seen.used.sum() + coordinates + angles) + geometry.turns * seen.poses
+    told = int(seen.used.sum() + coordinates + angles) + geometry.turns_freely * seen.poses
     unknown = d * seen.poses + n * (geometry.coordinates + int("offset" in geometry.identified))
     if seen.markers is not None:  # an image tells the camera's pose on a map in a frame of its own
         told += d * len(np.unique(seen.markers.image))
@@ -208,7 +208,7 @@ def _by_parameters(found: Fit, poses: FloatArray, relative: bool) -> FloatArray:
     """Return the derivatives (M, d, P) of poses that lengths tell, as of `predicted_std`."""
     geometry = found.geometry
     at = _at(found, poses)
-    rows = geometry.n + int(geometry.turns)
+    rows = geometry.n + int(geometry.turns_freely)
     x, p = at.by_pose[:, :rows], at.by_parameter[:, :rows, : geometry.size]
     across = np.swapaxes(x, 1, 2)
     A = np.asarray(-np.linalg.solve(across @ x, across @ p))
@@ -225,7 +225,7 @@ def _at(found: Fit, poses: FloatArray) -> Linearised:
 
 
 def _less_rigid_motion(A: FloatArray, poses: FloatArray, free: tuple[int, ...]) -> FloatArray:
-    """Return derivatives (M, d, P) of what is left when the room is moved to where it fits best."""
+    """Return derivatives (M, d, P) less the rigid motion of the room that fits them best."""
     count, d, size = A.shape
     place = poses[:, 0] - poses[:, 0].mean(axis=0)
     motions = np.zeros((count, 6, 6))

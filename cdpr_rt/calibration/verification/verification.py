@@ -36,7 +36,7 @@ class Scale:
 
     @classmethod
     def of(cls, told_m: FloatArray, measured_m: FloatArray) -> Scale:
-        """Return the ratio of measured (M, k) to told (M, k) distances, all pairs together.
+        """Return the ratio of measured (M, k) to computed (M, k) distances, all pairs together.
 
         s^2 = sum |q_i - q_j|^2 / sum |p_i - p_j|^2; section 3.8 of the thesis looks at the scale.
         """
@@ -118,7 +118,7 @@ class Verification:
         return Scale.of(self.told_m, self.told_m - self.errors_m)
 
     def worse_than(self, before: Verification) -> bool:
-        """Return whether these poses are told worse than `before`, by more than noise explains.
+        """Return whether errors are larger than those of `before`, by more than noise explains.
 
         Of distances d_j less those before the mean is beyond t_0.975 of its standard error
         (Student's paired test): what the measurement errs by is in both. Or, since a few poses

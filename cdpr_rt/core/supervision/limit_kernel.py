@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
@@ -45,6 +45,27 @@ AXIS_HISTORY: Final = np.dtype(
 VERDICT: Final = np.dtype(
     [("reaction", "<i8"), ("limit", "<i8"), ("axis", "<i8"), ("value", "<f8"), ("allowed", "<f8")]
 )
+
+
+class Signals(NamedTuple):
+    """Signals of one cycle that limits are checked against, as in the objects they are of, (n,)."""
+
+    position: FloatArray
+    """`AxisFeedback`, to `rate_ok`."""
+    valid: BoolArray
+    alive: BoolArray
+    rate_ok: BoolArray
+    setpoint: FloatArray
+    """`Setpoint`."""
+    setpoint_velocity: FloatArray
+    velocity: FloatArray
+    """`AxisEstimate`, to `sensor_ok`."""
+    cable_m_per_rad: FloatArray
+    length: FloatArray
+    tension: FloatArray
+    sensor_ok: BoolArray
+
+
 _JUMP_rad: Final = 0.05
 """Distance of an angle from its extrapolation allowed beyond that of the speed limit."""
 _SNAPPED_SHARE, _MEAN_S = 0.6, 0.1
@@ -189,17 +210,7 @@ def check_axes(
     window: Any,
     reactions: Any,
     verdict: Any,
-    position: FloatArray,
-    setpoint: FloatArray,
-    setpoint_velocity: FloatArray,
-    valid: BoolArray,
-    alive: BoolArray,
-    rate_ok: BoolArray,
-    velocity: FloatArray,
-    cable_m_per_rad: FloatArray,
-    length: FloatArray,
-    tension: FloatArray,
-    sensor_ok: BoolArray,
+    signals: Signals,
     torque: FloatArray,
     elapsed: float,
     slack_allowed: bool,
@@ -208,8 +219,7 @@ def check_axes(
 
     `all_limits`, `histories` (n,) and `verdict` (1,) are records of `AXIS_LIMITS`, `AXIS_HISTORY`
     and `VERDICT`; `window` (m, n) says which answers of the last m cycles were missed, `reactions`
-    what is done about each `Limit`. The others are (n,), as in `AxisFeedback`, `AxisEstimate` and
-    `Setpoint`; `elapsed` is from the last SYNC to this one, s.
+    what is done about each `Limit`; `elapsed` is from the last SYNC to this one, s.
     """
     verdict[0]["reaction"] = verdict[0]["limit"] = 0
     worst = verdict[0], reactions
@@ -219,24 +229,25 @@ def check_axes(
     for i in range(torque.size):
         limits, history = all_limits[i], histories[i]
         _bound_torque(i, limits, history, worst, period, torque)
-        regular = alive[i] and rate_ok[i]
-        _watch_answers(i, limits, history, worst, valid[i], regular, window)
-        if not valid[i]:
+        regular = signals.alive[i] and signals.rate_ok[i]
+        _watch_answers(i, limits, history, worst, signals.valid[i], regular, window)
+        if not signals.valid[i]:
             history["invalid_s"] += elapsed
             continue
-        _watch_jumps(i, limits, history, worst, elapsed, position[i])
-        winding_in = -velocity[i] * np.sign(cable_m_per_rad[i])
+        position, velocity = signals.position[i], signals.velocity[i]
+        tension, cable_m_per_rad = signals.tension[i], signals.cable_m_per_rad[i]
+        _watch_jumps(i, limits, history, worst, elapsed, position)
         mean_N = history["mean_N"]
-        if _has_snapped(limits, history, elapsed, tension[i], winding_in):
-            _exceeded(worst, _BROKEN_CABLE, i, tension[i], mean_N)
-        error, paying_out = setpoint[i] - position[i], setpoint_velocity[i] * cable_m_per_rad[i]
-        _watch_motion(i, limits, worst, error, velocity[i], length[i], paying_out)
-        if not sensor_ok[i]:
+        if _has_snapped(limits, history, elapsed, tension, -velocity * np.sign(cable_m_per_rad)):
+            _exceeded(worst, _BROKEN_CABLE, i, tension, mean_N)
+        paying_out = signals.setpoint_velocity[i] * cable_m_per_rad
+        error = signals.setpoint[i] - position
+        _watch_motion(i, limits, worst, error, velocity, signals.length[i], paying_out)
+        if not signals.sensor_ok[i]:
             # what takes its place is an estimate, whose step would look like a broken cable
             _exceeded(worst, _TENSION_SENSOR, i, np.nan, np.nan)
             continue
         _watch_tension(
-            i, limits, history, worst, elapsed, tension[i], slack_allowed, position[i],
-            cable_m_per_rad[i],
-        )  # fmt: skip
+            i, limits, history, worst, elapsed, tension, slack_allowed, position, cable_m_per_rad
+        )
     return int(verdict[0]["reaction"])

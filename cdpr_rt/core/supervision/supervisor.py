@@ -17,12 +17,11 @@ from cdpr_rt.core.supervision.limit_kernel import (
     AXIS_LIMITS,
     FIGURES,
     VERDICT,
+    Signals,
     check_axes,
 )
 from cdpr_rt.core.supervision.limits import DEFAULT_REACTIONS, Limit, Limits
 from cdpr_rt.jit import bound, bound_to
-
-__all__ = ["Limit", "Limits", "Supervisor"]
 
 
 class Supervisor:
@@ -80,10 +79,13 @@ class Supervisor:
     ) -> Callable[[float, bool], int]:
         return bound(
             check_axes, self._limits, self._history, self._window, self._reactions, self._verdict,
-            feedback.position_rad, setpoint.position_rad, setpoint.velocity_rad_s, feedback.valid,
-            feedback.alive, feedback.rate_ok, estimate.velocity_rad_s, estimate.cable_m_per_rad,
-            estimate.cable_length_m, estimate.tension_N, estimate.sensor_ok, torque_Nm,
-            then=(0.0, False),
+            Signals(
+                feedback.position_rad, feedback.valid, feedback.alive, feedback.rate_ok,
+                setpoint.position_rad, setpoint.velocity_rad_s, estimate.velocity_rad_s,
+                estimate.cable_m_per_rad, estimate.cable_length_m, estimate.tension_N,
+                estimate.sensor_ok,
+            ),
+            torque_Nm, then=(0.0, False),
         )  # fmt: skip
 
     def compare_lengths(self, elapsed_s: float, disagree_m: float, axis: int) -> int:

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.motion.path import time_scaling_kernel as kernel
 from cdpr_rt.motion.path.nodes import PathNodes
+from cdpr_rt.motion.path.time_scaling_kernel import Curve, WrenchBounds
 
 PERIOD_S: Final = 0.01
 """Between the samples of a plan."""
@@ -56,39 +57,6 @@ class PathLimits:
 
 
 @dataclass(frozen=True)
-class WrenchBounds:
-    """Wrenches that tensions can exert along a path, as half-spaces, and those that it requires.
-
-    lower <= normals · (by_u u + by_x x) <= upper at node i with `row[i]`, -1 where any motion
-    within the limits of acceleration is carried anyway.
-    """
-
-    row: NDArray[np.int64]
-    """(N,)"""
-    normals: FloatArray
-    """(t, f, d)"""
-    lower: FloatArray
-    """(t, f), below 0, as `upper` above: what rest takes has been taken off."""
-    upper: FloatArray
-    by_u: FloatArray
-    """(N, d), what d²s/dt² takes, and ..."""
-    by_x: FloatArray
-    """... (ds/dt)²."""
-
-    @classmethod
-    def none(cls, count: int, d: int) -> WrenchBounds:
-        """Return no bounds for so many nodes."""
-        nothing = np.zeros((count, d))
-        rows = np.full(count, -1, np.int64)
-        return cls(rows, np.zeros((1, 1, d)), np.zeros((1, 1)), np.zeros((1, 1)), nothing, nothing)
-
-    @property
-    def arrays(self) -> tuple[NDArray[np.int64], FloatArray, FloatArray, FloatArray]:
-        """Arrays that are not over the nodes, and `row`."""
-        return self.row, self.normals, self.lower, self.upper
-
-
-@dataclass(frozen=True)
 class TimedPath:
     """A path in time: samples every `period_s`."""
 
@@ -121,9 +89,7 @@ def time_path(nodes: PathNodes, limits: PathLimits, wrenches: WrenchBounds) -> T
             motion, slower, rounds = _scale(nodes, limits, wrenches, bound, int(begin), int(end))
             part = np.zeros((len(motion), 3, nodes.q.shape[1]))
             where = np.zeros(len(motion), np.int64)
-            kernel.sample_run(
-                begin, end, slower, nodes.s, nodes.q, nodes.first, nodes.second, motion, part, where
-            )
+            kernel.sample_run(begin, end, slower, curve_of(nodes), motion, part, where)
             part[-1], part[-1, 0] = 0.0, last_q  # not as rounded
             samples.append(part[:-1])
             node.append(where[:-1])
@@ -149,6 +115,11 @@ def time_path(nodes: PathNodes, limits: PathLimits, wrenches: WrenchBounds) -> T
         np.array(waits, np.int64),
         most,
     )
+
+
+def curve_of(nodes: PathNodes) -> Curve:
+    """Return the nodes' arrays for the kernels."""
+    return Curve(nodes.s, nodes.q, nodes.first, nodes.second)
 
 
 def speed_bounds(nodes: PathNodes, limits: PathLimits) -> FloatArray:
@@ -183,20 +154,16 @@ def _scale(
     """Return a run's smoothed motion (c, 4), by how much it is to be slower, and the rounds."""
     x, times, swept = np.zeros((3, len(bound)))
     width_s, most = limits.smoothing_s, _SHARE * limits.acceleration
-    forces = (wrenches.by_u, wrenches.by_x)
-    geometry = (nodes.s, nodes.q, nodes.first, nodes.second)
+    curve = curve_of(nodes)
     for rounds in range(1, _ROUNDS + 1):
-        kernel.scale_run(
-            begin, end, nodes.s, nodes.first, nodes.second, most, *wrenches.arrays, *forces,
-            bound, x,
-        )  # fmt: skip
+        kernel.scale_run(begin, end, curve, most, wrenches, bound, x)
         kernel.clock_run(begin, end, nodes.s, x, times, swept)
         duration_s = float(times[end]) + width_s
         motion = _smoothed(nodes, begin, end, width_s, duration_s, _FINER, x, times, swept)
         strain, where = np.zeros(len(motion)), np.zeros(len(motion), np.int64)
         kernel.strain_run(
-            begin, end, *geometry, nodes.speed, nodes.coordinates.positions, limits.table,
-            *wrenches.arrays, *forces, motion, strain, where,
+            begin, end, curve, nodes.speed, nodes.coordinates.positions, limits.table, wrenches,
+            motion, strain, where,
         )  # fmt: skip
         if rounds == _ROUNDS or not kernel.lower_bounds(
             begin, end, width_s, _TOLERANCE, nodes.s, motion, strain, where, bound

@@ -8,7 +8,9 @@ inequalities linear in (x, u) at each node; u is even between two nodes, so that
 from __future__ import annotations
 
 import math
-from typing import Final
+from typing import Final, NamedTuple
+
+import numpy as np
 
 from cdpr_rt.arrays import FloatArray, IntArray
 from cdpr_rt.jit import jit
@@ -22,35 +24,65 @@ _SHORT_m: Final = 1e-5
 """Between nodes that are nearer to each other the third derivative is not known, for rounding."""
 
 
+class Curve(NamedTuple):
+    """The N nodes of a path in d coordinates, smooth between those of a run."""
+
+    s: FloatArray
+    """Length along the path, (N,)."""
+    q: FloatArray
+    """Positions (N, d)."""
+    first: FloatArray
+    """First derivatives by length, (N, d)."""
+    second: FloatArray
+
+
+class WrenchBounds(NamedTuple):
+    """Wrenches that tensions can exert along a path, as half-spaces, and those that it requires.
+
+    lower <= normals · (by_u u + by_x x) <= upper at node i with `row[i]`, -1 where any motion
+    within the limits of acceleration is carried anyway.
+    """
+
+    row: IntArray
+    """(N,)"""
+    normals: FloatArray
+    """(t, f, d)"""
+    lower: FloatArray
+    """(t, f), below 0, as `upper` above: what rest takes has been taken off."""
+    upper: FloatArray
+    by_u: FloatArray
+    """(N, d), what d²s/dt² takes, and ..."""
+    by_x: FloatArray
+    """... (ds/dt)²."""
+
+    @classmethod
+    def none(cls, count: int, d: int) -> WrenchBounds:
+        """Return no bounds for so many nodes."""
+        nothing = np.zeros((count, d))
+        rows = np.full(count, -1, np.int64)
+        return cls(rows, np.zeros((1, 1, d)), np.zeros((1, 1)), np.zeros((1, 1)), nothing, nothing)
+
+
 @jit
 def _bounds(
-    x: float,
-    first: FloatArray,
-    second: FloatArray,
-    most: FloatArray,
-    row: int,
-    normals: FloatArray,
-    lower: FloatArray,
-    upper: FloatArray,
-    by_u: FloatArray,
-    by_x: FloatArray,
-    found: FloatArray,
+    x: float, i: int, curve: Curve, most: FloatArray, wrenches: WrenchBounds, found: FloatArray
 ) -> None:
-    """Write the least and the greatest u at x, and how fast they change with x, into found (4,).
+    """Write the least and greatest u at x at node i, and their derivatives by x, into found (4,).
 
-    Of accelerations first·u + second·x, up to `most` either way; and where `row` is not -1 of
-    wrenches by_u·u + by_x·x whose products with `normals[row]` (f, d) are within bounds (f,).
+    By accelerations first·u + second·x, up to `most` (d,) either way, and by `wrenches`.
     """
     found[0], found[1], found[2], found[3] = -_FAR, _FAR, 0.0, 0.0
-    for k in range(first.size):
-        _narrow(first[k], second[k], -most[k], most[k], x, found)
+    for k in range(most.size):
+        _narrow(curve.first[i, k], curve.second[i, k], -most[k], most[k], x, found)
+    row = wrenches.row[i]
     if row >= 0:
-        for f in range(normals.shape[1]):
+        normals, by_u, by_x = wrenches.normals[row], wrenches.by_u[i], wrenches.by_x[i]
+        for f in range(normals.shape[0]):
             a, b = 0.0, 0.0
-            for k in range(normals.shape[2]):
-                a += normals[row, f, k] * by_u[k]
-                b += normals[row, f, k] * by_x[k]
-            _narrow(a, b, lower[row, f], upper[row, f], x, found)
+            for k in range(normals.shape[1]):
+                a += normals[f, k] * by_u[k]
+                b += normals[f, k] * by_x[k]
+            _narrow(a, b, wrenches.lower[row, f], wrenches.upper[row, f], x, found)
 
 
 @jit
@@ -71,16 +103,9 @@ def _narrow(a: float, b: float, low: float, high: float, x: float, found: FloatA
 def scale_run(
     begin: int,
     end: int,
-    s: FloatArray,
-    first: FloatArray,
-    second: FloatArray,
+    curve: Curve,
     most: FloatArray,
-    rows: IntArray,
-    normals: FloatArray,
-    lower: FloatArray,
-    upper: FloatArray,
-    by_u: FloatArray,
-    by_x: FloatArray,
+    wrenches: WrenchBounds,
     bound: FloatArray,
     x: FloatArray,
 ) -> None:
@@ -88,16 +113,13 @@ def scale_run(
 
     Backward: the greatest x from which the next node's can be reached. Forward: the greatest u.
     """
-    found = x[:4].copy()
+    s, found = curve.s, x[:4].copy()
     x[begin] = x[end] = 0.0
     for i in range(end - 1, begin, -1):
         step = 2.0 * (s[i + 1] - s[i])
         here = bound[i]
         for _ in range(_MOST_CUTS):
-            _bounds(
-                here, first[i], second[i], most, rows[i], normals, lower, upper, by_u[i], by_x[i],
-                found,
-            )  # fmt: skip
+            _bounds(here, i, curve, most, wrenches, found)
             _narrow(1.0, 1.0 / step, 0.0, x[i + 1] / step, here, found)
             gap, slope = found[0] - found[1], found[2] - found[3]
             if gap <= _NOTHING:
@@ -110,10 +132,7 @@ def scale_run(
         x[i] = here
     for i in range(begin, end - 1):
         step = 2.0 * (s[i + 1] - s[i])
-        _bounds(
-            x[i], first[i], second[i], most, rows[i], normals, lower, upper, by_u[i], by_x[i],
-            found,
-        )  # fmt: skip
+        _bounds(x[i], i, curve, most, wrenches, found)
         x[i + 1] = max(min(x[i + 1], x[i] + step * found[1]), 0.0)
 
 
@@ -193,19 +212,12 @@ def smooth_run(
 
 
 @jit
-def place_between(
-    along: float,
-    i: int,
-    s: FloatArray,
-    q: FloatArray,
-    first: FloatArray,
-    second: FloatArray,
-    out: FloatArray,
-) -> None:
+def place_between(along: float, i: int, curve: Curve, out: FloatArray) -> None:
     """Write position and three derivatives by length, (4, d), between the nodes i and i + 1.
 
     The polynomial of fifth order that has both nodes' positions and two derivatives.
     """
+    s, q, first, second = curve
     h = s[i + 1] - s[i]
     u = min(max((along - s[i]) / h, 0.0), 1.0)
     for k in range(q.shape[1]):
@@ -218,19 +230,11 @@ def place_between(
 def strain_run(
     begin: int,
     end: int,
-    s: FloatArray,
-    q: FloatArray,
-    first: FloatArray,
-    second: FloatArray,
+    curve: Curve,
     speed: FloatArray,
     positions: int,
     limits: FloatArray,
-    rows: IntArray,
-    normals: FloatArray,
-    lower: FloatArray,
-    upper: FloatArray,
-    by_u: FloatArray,
-    by_x: FloatArray,
+    wrenches: WrenchBounds,
     motion: FloatArray,
     strain: FloatArray,
     node: IntArray,
@@ -239,21 +243,20 @@ def strain_run(
 
     `limits` (3, d) are those of velocity, acceleration and jerk, `speed` (N,) that along the path.
     """
-    at = q[:4].copy()  # a run has five nodes at least
+    s, at = curve.s, curve.q[:4].copy()  # a run has five nodes at least
     i = begin
     for c in range(motion.shape[0]):
         while i < end - 1 and s[i + 1] <= motion[c, 0]:
             i += 1
         node[c] = i
-        place_between(motion[c, 0], i, s, q, first, second, at)
+        place_between(motion[c, 0], i, curve, at)
         v, a = motion[c, 1], motion[c, 2]
         bends = 1.0 if s[i + 1] - s[i] > _SHORT_m else 0.0
         worst, along = _direction_strain(at, motion[c], bends, limits, positions)
         wanted = speed[i] if motion[c, 0] - s[i] < 0.5 * (s[i + 1] - s[i]) else speed[i + 1]
         worst = max(worst, along / wanted)
-        if rows[i] >= 0:
-            by_wrench = _wrench_strain(rows[i], normals, lower, upper, by_u[i], by_x[i], v * v, a)
-            worst = max(worst, by_wrench)
+        if wrenches.row[i] >= 0:
+            worst = max(worst, _wrench_strain(i, wrenches, v * v, a))
         strain[c] = worst
 
 
@@ -279,22 +282,14 @@ def _direction_strain(
 
 
 @jit
-def _wrench_strain(
-    row: int,
-    normals: FloatArray,
-    lower: FloatArray,
-    upper: FloatArray,
-    by_u: FloatArray,
-    by_x: FloatArray,
-    x: float,
-    u: float,
-) -> float:
-    worst = 0.0
-    for f in range(normals.shape[1]):
+def _wrench_strain(i: int, wrenches: WrenchBounds, x: float, u: float) -> float:
+    row, by_u, by_x = wrenches.row[i], wrenches.by_u[i], wrenches.by_x[i]
+    normals, worst = wrenches.normals[row], 0.0
+    for f in range(normals.shape[0]):
         needed = 0.0
-        for k in range(normals.shape[2]):
-            needed += normals[row, f, k] * (by_u[k] * u + by_x[k] * x)
-        room = upper[row, f] if needed > 0.0 else -lower[row, f]
+        for k in range(normals.shape[1]):
+            needed += normals[f, k] * (by_u[k] * u + by_x[k] * x)
+        room = wrenches.upper[row, f] if needed > 0.0 else -wrenches.lower[row, f]
         worst = max(worst, abs(needed) / max(room, _NOTHING))
     return math.sqrt(worst)
 
@@ -341,24 +336,21 @@ def sample_run(
     begin: int,
     end: int,
     slower: float,
-    s: FloatArray,
-    q: FloatArray,
-    first: FloatArray,
-    second: FloatArray,
+    curve: Curve,
     motion: FloatArray,
     samples: FloatArray,
     node: IntArray,
 ) -> None:
     """Write positions, velocities and accelerations (c, 3, d) of a motion slowed by a factor."""
-    at = q[:4].copy()  # a run has five nodes at least
+    s, at = curve.s, curve.q[:4].copy()  # a run has five nodes at least
     i = begin
     for c in range(motion.shape[0]):
         while i < end - 1 and s[i + 1] <= motion[c, 0]:
             i += 1
         node[c] = i
-        place_between(motion[c, 0], i, s, q, first, second, at)
+        place_between(motion[c, 0], i, curve, at)
         v, a = motion[c, 1] / slower, motion[c, 2] / slower**2
-        for k in range(q.shape[1]):
+        for k in range(at.shape[1]):
             samples[c, 0, k] = at[0, k]
             samples[c, 1, k] = at[1, k] * v
             samples[c, 2, k] = at[1, k] * a + at[2, k] * v * v

@@ -139,7 +139,7 @@ def _rows(rows: Any, source: str) -> Iterator[tuple[int, list[str]]]:
 
 
 def _column(source: str, line: int, name: str, coordinates: Coordinates) -> tuple[str, float]:
-    """Return what a column is about, and its unit in SI."""
+    """Return the quantity of a column and the factor to its SI unit."""
     for key, factors in (("speed", _SPEEDS), ("blend", _BLENDS)):
         if name in factors:
             return key, factors[name]

@@ -86,7 +86,7 @@ class _Run(_Part):
 
 
 def read_run(paths: Paths) -> dict[str, Any]:
-    """Return what the run on the bus left; raises InvalidRequestError where it is not all there."""
+    """Return the run on the bus; raises InvalidRequestError where a part of it is missing."""
     try:
         read_json_model(paths.run, _Run)
         run: dict[str, Any] = read_json(paths.run)

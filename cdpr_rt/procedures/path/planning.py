@@ -18,10 +18,10 @@ from cdpr_rt.motion.path.time_scaling import (
     PERIOD_S,
     PathLimits,
     TimedPath,
-    WrenchBounds,
     speed_bounds,
     time_path,
 )
+from cdpr_rt.motion.path.time_scaling_kernel import WrenchBounds
 from cdpr_rt.procedures.path.unit_slips import size_fault
 from cdpr_rt.robots.interference.interference import in_words
 from cdpr_rt.robots.platform_model import PlatformModel, platform_model_of

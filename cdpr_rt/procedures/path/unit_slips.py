@@ -48,7 +48,7 @@ def size_fault(path: PathDescription, low_m: FloatArray, high_m: FloatArray) -> 
 
 
 def size_note(path: PathDescription, low_m: FloatArray, high_m: FloatArray) -> str:
-    """Return what may be wrong with the size of a path that is inside, "" for nothing."""
+    """Return the likely mistake of unit by the size of a path that is inside, "" for none."""
     points = path.points[:, : path.coordinates.positions]
     size, room = np.ptp(points, axis=0), high_m - low_m
     if not size.any() or (size > _SMALL * room).any():

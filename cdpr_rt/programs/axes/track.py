@@ -67,7 +67,7 @@ class TrackProgram(Program):
 
     @property
     def rest_s(self) -> float:
-        """Return how long the motion goes on."""
+        """Return the remaining duration of the motion."""
         return (self._last - self._cycle + 1) * self._period_s
 
     def progress(self) -> dict[str, Any]:

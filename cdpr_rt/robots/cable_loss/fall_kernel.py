@@ -33,7 +33,7 @@ WINCHES = np.dtype(
     ]
 )
 """A record for each cable, (n,)."""
-COURSE = np.dtype(
+PARAMETERS = np.dtype(
     [
         ("period_s", "<f8"),
         ("steps", "<i8"),  # in a cycle
@@ -57,7 +57,7 @@ _STILL_m_s, _STILL_S = 0.02, 0.5
 
 @jit
 def fall(
-    course: Any,
+    parameters: Any,
     winches: Any,
     body: FloatArray,
     free: FloatArray,
@@ -72,7 +72,7 @@ def fall(
     each component of the twist that there is, 0 otherwise; `geometry` (10, n) is that of
     `cable_kernel`, `feet` (k, 3) are what can touch the ground, m, in the platform's frame.
     """
-    c, n = course[0], winches.size
+    c, n = parameters[0], winches.size
     h, weight = c.period_s / c.steps, c.period_s / (c.period_s + FILTER_S)
     pose, twist, cables = start.copy(), np.zeros(6), np.empty((CABLE_ROWS, n))
     length, rate, tension, pull = np.empty(n), np.zeros(n), np.zeros(n), winches["held_N"].copy()

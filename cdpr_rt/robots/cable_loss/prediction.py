@@ -22,7 +22,7 @@ from cdpr_rt.control.winch_speed_loop import (
     HANGING_LOAD_1_s,
     UNKNOWN_POSE_m_s,
 )
-from cdpr_rt.robots.cable_loss.fall_kernel import COURSE, WINCHES, fall
+from cdpr_rt.robots.cable_loss.fall_kernel import PARAMETERS, WINCHES, fall
 from cdpr_rt.robots.kinematics.cable_kernel import ARC, CABLE_ROWS, FREE, run_cables
 from cdpr_rt.robots.kinematics.pose import Pose
 from cdpr_rt.robots.platform.body_kernel import body_of
@@ -151,12 +151,12 @@ class CableLoss:
         winches["friction_N"] = friction * self._rated_N
         path = np.empty((math.ceil(_LONGEST_S / self._period_s), 4, 3))
         cycles = fall(
-            self._course(cable, start), winches, self._body, self._free,
+            self._parameters(cable, start), winches, self._body, self._free,
             model.kinematics.geometry, self._feet, start.array, path,
         )  # fmt: skip
         return path[:cycles]
 
-    def _course(self, cable: int, start: Pose) -> NDArray[np.void]:
+    def _parameters(self, cable: int, start: Pose) -> NDArray[np.void]:
         model, platform, period_s = self._model, self._model.platform, self._period_s
         quickest_rad_s = highest_rad_s(model, self._axes, start.p[: model.positions])
         steps = math.ceil(period_s * quickest_rad_s / _STEP_rad)
@@ -165,18 +165,16 @@ class CableLoss:
             arms_m = np.linalg.norm(self._feet - in_space(platform.centre_of_mass_m), axis=1)
             per_kg += float(arms_m.max() ** 2 / np.linalg.eigvalsh(inertia_kg_m2(platform))[0])
         foot_N_m = (_STEP_rad * steps / period_s) ** 2 / (per_kg * len(self._feet))
-        course = np.zeros(1, COURSE)
-        course["period_s"], course["steps"], course["cut"] = period_s, steps, cable
-        course["held_cycles"] = math.ceil(self._noticed_s(cable) / period_s)
-        course["misled_N"] = _MISLED_SHARE * (model.high_N - model.low_N)[cable]
-        course["paying_out_m_s"], course["fastest_in_m_s"] = UNKNOWN_POSE_m_s, FASTEST_IN_m_s
-        course["integral_rate_1_s"] = HANGING_LOAD_1_s
-        course["up"], course["ground_m"] = (
-            model.positions - 1, min(self._ground_m, self._lowest_m(start))
-        )  # fmt: skip
-        course["foot_N_m"], course["friction"] = foot_N_m, _GROUND_FRICTION
-        course["foot_N_s_m"] = 2.0 * _GROUND_DAMPING * math.sqrt(foot_N_m / per_kg)
-        return course
+        p = np.zeros(1, PARAMETERS)
+        p["period_s"], p["steps"], p["cut"] = period_s, steps, cable
+        p["held_cycles"] = math.ceil(self._noticed_s(cable) / period_s)
+        p["misled_N"] = _MISLED_SHARE * (model.high_N - model.low_N)[cable]
+        p["paying_out_m_s"], p["fastest_in_m_s"] = UNKNOWN_POSE_m_s, FASTEST_IN_m_s
+        p["integral_rate_1_s"] = HANGING_LOAD_1_s
+        p["up"], p["ground_m"] = model.positions - 1, min(self._ground_m, self._lowest_m(start))
+        p["foot_N_m"], p["friction"] = foot_N_m, _GROUND_FRICTION
+        p["foot_N_s_m"] = 2.0 * _GROUND_DAMPING * math.sqrt(foot_N_m / per_kg)
+        return p
 
     def _lowest_m(self, pose: Pose) -> float:
         standing = pose.p + self._feet @ pose.Q.T

@@ -1,7 +1,5 @@
 """Kernels of the clearances of cables, platform and boxes at poses, in m.
 
-    pairs   (q, 4)       rows KIND, FIRST, SECOND, TRIMMED: which two things are compared
-    boxes   (1 + k, 2, 3) the platform's body in its own frame, then boxes of the room
     ends    (2, n, 3)    where the free part of each cable begins (at its exit point or the tangent
                          of its pulley) and where it ends, in the room
     points  (4, 3)       ends of the segments of a pair, as far as they count
@@ -14,7 +12,7 @@ and ANCHOR. At most half of it is.
 from __future__ import annotations
 
 import math
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -38,25 +36,34 @@ TRIM_TIMES: Final = 10.0
 1/10 rad (5.7 deg) from each other are clear of each other."""
 
 
+class Scene(NamedTuple):
+    """Cables, platform and boxes of a robot, and the pairs of them that are compared."""
+
+    geometry: FloatArray
+    """(10, n), as of `cable_kernel`."""
+    boxes: FloatArray
+    """(1 + k, 2, 3): the platform's body in its own frame, then boxes of the room."""
+    pairs: IntArray
+    """(q, 4), columns KIND, FIRST, SECOND, TRIMMED."""
+    clearance: float
+    """Distance below which a pair is in contact, m."""
+    trim: float
+    """Length of a cable that is left out next to a point that it shares, m."""
+
+
 @jit
 def write_clearances(
-    geometry: FloatArray,
-    boxes: FloatArray,
-    pairs: IntArray,
-    trim: float,
-    poses: FloatArray,
-    clearances: FloatArray,
-    nearest: IntArray,
+    scene: Scene, poses: FloatArray, clearances: FloatArray, nearest: IntArray
 ) -> None:
     """Write the least distance of all pairs (m,), and which pair it is, at poses (m, 4, 3)."""
-    n = geometry.shape[1]
+    n = scene.geometry.shape[1]
     cables, ends = np.empty((CABLE_ROWS, n)), np.empty((2, n, 3))
     points, near, corners = np.empty((4, 3)), np.empty((2, 3)), np.empty((8, 3))
     for j in range(clearances.size):
-        write_ends(geometry, poses[j], cables, ends)
+        write_ends(scene.geometry, poses[j], cables, ends)
         clearances[j], nearest[j] = math.inf, -1
-        for k in range(pairs.shape[0]):
-            apart = distance(pairs[k], poses[j], ends, boxes, trim, points, near, corners)
+        for k in range(scene.pairs.shape[0]):
+            apart = distance(scene, k, poses[j], ends, points, near, corners)
             if not apart >= clearances[j]:
                 clearances[j], nearest[j] = apart, k
 
@@ -77,19 +84,19 @@ def write_ends(
 
 @jit
 def distance(
-    pair: IntArray,
+    scene: Scene,
+    k: int,
     pose: FloatArray,
     ends: FloatArray,
-    boxes: FloatArray,
-    trim: float,
     points: FloatArray,
     near: FloatArray,
     corners: FloatArray,
 ) -> float:
-    """Return how far the two things of a pair are apart; write their points and nearest points.
+    """Return the distance of pair `k`; write its points and nearest points.
 
     Those of a cable and the body are in the platform's frame, all others in the room's.
     """
+    pair, boxes, trim = scene.pairs[k], scene.boxes, scene.trim
     kind, first, second = pair[KIND], pair[FIRST], pair[SECOND]
     if kind == BODY_BOX:
         return box_to_box(pose, boxes[0], boxes[second], corners, near)
@@ -105,15 +112,9 @@ def distance(
 
 
 @jit
-def depth(
-    pair: IntArray,
-    pose: FloatArray,
-    ends: FloatArray,
-    boxes: FloatArray,
-    trim: float,
-    points: FloatArray,
-) -> float:
-    """Return how deep two things of a pair that are not apart are in each other; cables are not."""
+def depth(scene: Scene, k: int, pose: FloatArray, ends: FloatArray, points: FloatArray) -> float:
+    """Return the penetration depth of pair `k`, which is not apart; 0 for two cables."""
+    pair, boxes, trim = scene.pairs[k], scene.boxes, scene.trim
     kind, first, second = pair[KIND], pair[FIRST], pair[SECOND]
     if kind == CABLES:
         return 0.0

@@ -18,7 +18,7 @@ formula the acceleration |TURN|² |b| at most.
 from __future__ import annotations
 
 import math
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -34,6 +34,7 @@ from cdpr_rt.robots.interference.clearance_kernel import (
     KIND,
     SECOND,
     TRIMMED,
+    Scene,
     depth,
     distance,
     write_ends,
@@ -68,16 +69,24 @@ MOST_LOOKS: Final = 20_000
 _SMALL = 1e-4
 
 
+class _Look(NamedTuple):
+    """Arrays of one place of the way, overwritten at each."""
+
+    pose: FloatArray
+    twist: FloatArray
+    """(2, 3)"""
+    points: FloatArray
+    """(4, 3), and `near` (2, 3), of the pair that is looked at, as of `distance`."""
+    near: FloatArray
+    rates: FloatArray
+    """(7, n): bounds of speeds and accelerations of each cable's ends."""
+    moves: FloatArray
+    """(4, 3): for both ends of both things of the pair by how much they stay behind, their speed
+    along n, and their acceleration."""
+
+
 @jit
-def first_contact(
-    geometry: FloatArray,
-    boxes: FloatArray,
-    pairs: IntArray,
-    clearance: float,
-    trim: float,
-    way: FloatArray,
-    most_looks: int,
-) -> tuple[float, int, float, bool]:
+def first_contact(scene: Scene, way: FloatArray, most_looks: int) -> tuple[float, int, float, bool]:
     """Return the share of the way at which a pair comes into contact, which pair, and its distance.
 
     Returns 2.0 and -1 where none does. What is in contact at the start has to stay about as far
@@ -85,40 +94,33 @@ def first_contact(
     clear before the platform has moved by _LEAVES clearances, and to stay so. A pair that
     `most_looks` do not prove clear counts as in contact; last is whether it is known to be.
     """
-    allowed = np.empty(pairs.shape[0])
-    allowed[:] = clearance
-    share, pair, apart, known = _advance(
-        geometry, boxes, pairs, clearance, trim, way, most_looks, allowed
-    )
+    allowed = np.empty(scene.pairs.shape[0])
+    allowed[:] = scene.clearance
+    share, pair, apart, known = _advance(scene, way, most_looks, allowed)
     if pair < 0:
-        pair, apart = _still_near(geometry, boxes, pairs, clearance, trim, way, allowed)
+        pair, apart = _still_near(scene, way, allowed)
         share = 2.0 if pair < 0 else 1.0
     return share, pair, apart, known
 
 
 @jit
 def _advance(
-    geometry: FloatArray,
-    boxes: FloatArray,
-    pairs: IntArray,
-    clearance: float,
-    trim: float,
-    way: FloatArray,
-    most_looks: int,
-    allowed: FloatArray,
+    scene: Scene, way: FloatArray, most_looks: int, allowed: FloatArray
 ) -> tuple[float, int, float, bool]:
     """Return the first contact on the way; write how far apart each pair has to stay, `allowed`."""
-    n, count = geometry.shape[1], pairs.shape[0]
-    cables, ends, rates = np.empty((CABLE_ROWS, n)), np.empty((2, n, 3)), np.empty((_RATES, n))
-    points, near, corners = np.empty((4, 3)), np.empty((2, 3)), np.empty((8, 3))
-    pose, twist, moves, scratch = (
-        np.empty((4, 3)), np.empty((2, 3)), np.empty((4, 3)), np.empty((4, 3)),
+    geometry, clearance = scene.geometry, scene.clearance
+    n, count = geometry.shape[1], scene.pairs.shape[0]
+    look = _Look(
+        np.empty((4, 3)), np.empty((2, 3)), np.empty((4, 3)), np.empty((2, 3)),
+        np.empty((_RATES, n)), np.empty((4, 3)),
     )  # fmt: skip
+    pose, twist, points, near, rates, _ = look
+    cables, ends = np.empty((CABLE_ROWS, n)), np.empty((2, n, 3))
+    corners, scratch = np.empty((8, 3)), np.empty((4, 3))
     until, least = np.zeros(count), np.empty(count)
     least[:] = -math.inf
-    body_speed = _write_speeds(geometry, boxes, way, rates)
-    share, looks = 0.0, 0
-    fastest = body_speed
+    body_speed = _write_speeds(geometry, scene.boxes, way, rates)
+    share, looks, fastest = 0.0, 0, body_speed
     for i in range(n):
         fastest = max(fastest, rates[_SPEED, i])
     leaves = _LEAVES * clearance / (fastest + TINY)
@@ -129,12 +131,12 @@ def _advance(
         for k in range(count):
             if until[k] > share + _TOGETHER:
                 continue
-            apart = distance(pairs[k], pose, ends, boxes, trim, points, near, corners)
+            apart = distance(scene, k, pose, ends, points, near, corners)
             if looks == 0:
                 allowed[k] = _to_keep(apart, clearance)
             if allowed[k] < 0.0 and share < leaves:
                 if not apart > 0.0:
-                    apart = -depth(pairs[k], pose, ends, boxes, trim, points)
+                    apart = -depth(scene, k, pose, ends, points)
                 if apart < least[k]:
                     return share, k, max(apart, 0.0), True
                 least[k] = max(least[k], apart - _DEEPER * clearance)
@@ -143,10 +145,8 @@ def _advance(
             if allowed[k] < 0.0:
                 allowed[k] = clearance  # has to have come apart
             if apart - allowed[k] >= TOUCH_m and looks < most_looks:
-                until[k] = share + _clear_for(
-                    pairs[k], apart, allowed[k], trim, pose, twist, way, points, near, rates,
-                    body_speed, moves,
-                )  # fmt: skip
+                kept = _clear_for(scene, k, apart, allowed[k], way, body_speed, look)
+                until[k] = share + kept
             elif until[k] <= share:
                 return share, k, apart, apart - allowed[k] < TOUCH_m
         share = 1.0
@@ -157,26 +157,18 @@ def _advance(
 
 
 @jit
-def _still_near(
-    geometry: FloatArray,
-    boxes: FloatArray,
-    pairs: IntArray,
-    clearance: float,
-    trim: float,
-    way: FloatArray,
-    allowed: FloatArray,
-) -> tuple[int, float]:
+def _still_near(scene: Scene, way: FloatArray, allowed: FloatArray) -> tuple[int, float]:
     """Return the first pair in contact at the start that is not clear at the end, -1 for none."""
-    n = geometry.shape[1]
+    n, clearance = scene.geometry.shape[1], scene.clearance
     pose, twist, scratch, points = (
         np.empty((4, 3)), np.empty((2, 3)), np.empty((4, 3)), np.empty((4, 3)),
     )  # fmt: skip
     near, corners, ends = np.empty((2, 3)), np.empty((8, 3)), np.empty((2, n, 3))
     place_on(way, 1.0, scratch, pose, twist)
-    write_ends(geometry, pose, np.empty((CABLE_ROWS, n)), ends)
-    for k in range(pairs.shape[0]):
+    write_ends(scene.geometry, pose, np.empty((CABLE_ROWS, n)), ends)
+    for k in range(scene.pairs.shape[0]):
         if allowed[k] < clearance:
-            apart = distance(pairs[k], pose, ends, boxes, trim, points, near, corners)
+            apart = distance(scene, k, pose, ends, points, near, corners)
             if not apart >= clearance:
                 return k, apart
     return -1, math.inf
@@ -287,32 +279,24 @@ def _write_exit_speeds(
 
 @jit
 def _clear_for(
-    pair: IntArray,
+    scene: Scene,
+    k: int,
     apart: float,
     allowed: float,
-    trim: float,
-    pose: FloatArray,
-    twist: FloatArray,
     way: FloatArray,
-    points: FloatArray,
-    near: FloatArray,
-    rates: FloatArray,
     body_speed: float,
-    moves: FloatArray,
+    look: _Look,
 ) -> float:
-    """Return for which share of the way, from here, a pair stays further apart than allowed.
-
-    `moves` (4, 3) has for both ends of both things by how much they stay behind, their speed along
-    n, and their acceleration.
-    """
+    """Return for which share of the way, from here, pair `k` stays further apart than allowed."""
+    pair, rates, moves = scene.pairs[k], look.rates, look.moves
     if pair[KIND] == BODY_BOX:
         return (apart - allowed) / (body_speed + TINY)
     moves[:] = 0.0
     least, others = float(rates[_HOLDS, pair[FIRST]]), 1
-    _write_moves(pair, 0, apart, trim, pose, twist, way, points, near, rates, moves)
+    _write_moves(pair, 0, apart, scene.trim, way, look)
     if pair[KIND] == CABLES:
         least, others = min(least, rates[_HOLDS, pair[SECOND]]), 2
-        _write_moves(pair, 1, apart, trim, pose, twist, way, points, near, rates, moves)
+        _write_moves(pair, 1, apart, scene.trim, way, look)
     for a in range(2):
         for b in range(2, 2 + others):
             left = apart - allowed + moves[a, 0] + moves[b, 0]
@@ -323,19 +307,10 @@ def _clear_for(
 
 @jit
 def _write_moves(
-    pair: IntArray,
-    row: int,
-    apart: float,
-    trim: float,
-    pose: FloatArray,
-    twist: FloatArray,
-    way: FloatArray,
-    points: FloatArray,
-    near: FloatArray,
-    rates: FloatArray,
-    moves: FloatArray,
+    pair: IntArray, row: int, apart: float, trim: float, way: FloatArray, look: _Look
 ) -> None:
     """Write how both ends of a pair's first or second (`row` 1) thing, a cable, may move."""
+    pose, twist, points, near, rates, moves = look
     i, sign = pair[FIRST + row], (1.0 - 2.0 * row) / apart
     nx, ny = sign * (near[1, 0] - near[0, 0]), sign * (near[1, 1] - near[0, 1])
     nz = sign * (near[1, 2] - near[0, 2])

@@ -74,7 +74,7 @@ class Interference:
         planar: bool = False,
     ) -> None:
         """Take the pose at home (4, 3), and boxes (2, c): least and greatest coordinates."""
-        self.clearance_m, self._trim = clearance_m, kernel.TRIM_TIMES * clearance_m
+        self.clearance_m = clearance_m
         self._geometry, self._directions = kinematics.geometry, np.array(kinematics.directions)
         self._coordinates = sum(direction < 3 for direction in kinematics.directions)
         self._home = np.array(home, float)
@@ -85,23 +85,21 @@ class Interference:
             list(self._found_pairs(body is not None, planar)), np.int64
         ).reshape(-1, 4)
         """Array `pairs` of `clearance_kernel`."""
+        self.scene = kernel.Scene(
+            self._geometry, self._boxes, self.pairs, clearance_m, kernel.TRIM_TIMES * clearance_m
+        )
         self._way = np.zeros((WAY_ROWS, 3))
         self._way[0], self._way[4:] = self._home[0], self._home[1:]
         self._nears: Callable[[int], int] | None = None
         if len(self.pairs):
-            self._first_contact = bound(first_contact, *self.arrays, self._way, then=(MOST_LOOKS,))
+            self._first_contact = bound(first_contact, self.scene, self._way, then=(MOST_LOOKS,))
             n, corners = kinematics.n, np.abs(self._boxes[0]).max(axis=0)
             arms = np.linalg.norm([*self._geometry[ANCHOR:RADIUS].T, corners], axis=1)
             self._nears = bound(
-                nears, *self.arrays, self._way, float(arms.max()), np.empty((CABLE_ROWS, n)),
+                nears, self.scene, self._way, float(arms.max()), np.empty((CABLE_ROWS, n)),
                 np.empty((2, 2, n, 3)), np.empty((3, 4, 3)), np.empty((5, 8, 3)),
                 np.empty(len(self.pairs)), then=(_PARTS,),
             )  # fmt: skip
-
-    @property
-    def arrays(self) -> tuple[FloatArray, FloatArray, IntArray, float, float]:
-        """Geometry, boxes, pairs, clearance and trim, as of `contact_kernel`."""
-        return self._geometry, self._boxes, self.pairs, self.clearance_m, self._trim
 
     def clearances(self, poses: FloatArray) -> tuple[FloatArray, IntArray]:
         """Return the least distances (m,), m, and which pair has it, at poses (m, 4, 3).
@@ -109,10 +107,8 @@ class Interference:
         inf and -1 for a robot of which nothing can touch.
         """
         clearances, nearest = np.empty(len(poses)), np.empty(len(poses), np.int64)
-        kernel.write_clearances(
-            self._geometry, self._boxes, self.pairs, self._trim,
-            np.ascontiguousarray(poses, float), clearances, nearest,
-        )  # fmt: skip
+        contiguous = np.ascontiguousarray(poses, float)
+        kernel.write_clearances(self.scene, contiguous, clearances, nearest)
         return clearances, nearest
 
     def contact(self, pose: FloatArray) -> str:

@@ -15,6 +15,7 @@ from cdpr_rt.robots.interference.clearance_kernel import (
     BODY_BOX,
     CABLE_BOX,
     KIND,
+    Scene,
     depth,
     distance,
     write_ends,
@@ -26,11 +27,7 @@ _NOTHING_m: Final = 1e-9
 
 @jit
 def nears(
-    geometry: FloatArray,
-    boxes: FloatArray,
-    pairs: IntArray,
-    clearance: float,
-    trim: float,
+    scene: Scene,
     way: FloatArray,
     arm: float,
     cables: FloatArray,
@@ -49,30 +46,31 @@ def nears(
     points, near, corners, scratch, twist = (
         scratch[0, :4], scratch[1, :2], scratch[2], scratch[3, :4], scratch[4, :2],
     )  # fmt: skip
+    pairs, clearance = scene.pairs, scene.clearance
     moved = size_of(way[STEP]) + arm * size_of(way[TURN])
     for j in range(2):
         place_on(way, float(j), scratch, poses[j], twist)
-        write_ends(geometry, poses[j], cables, ends[j])
+        write_ends(scene.geometry, poses[j], cables, ends[j])
     close = False
     for k in range(pairs.shape[0]):
-        now = distance(pairs[k], poses[0], ends[0], boxes, trim, points, near, corners)
-        then = distance(pairs[k], poses[1], ends[1], boxes, trim, points, near, corners)
+        now = distance(scene, k, poses[0], ends[0], points, near, corners)
+        then = distance(scene, k, poses[1], ends[1], points, near, corners)
         before[k] = -1.0
         if now >= clearance and then >= clearance:
             if parts > 0 and now + then - _together(pairs[k], moved) < 2.0 * clearance:
                 before[k], close = now, True
             continue
         if now <= 0.0 and then <= 0.0:
-            now = -depth(pairs[k], poses[0], ends[0], boxes, trim, points)
-            then = -depth(pairs[k], poses[1], ends[1], boxes, trim, points)
+            now = -depth(scene, k, poses[0], ends[0], points)
+            then = -depth(scene, k, poses[1], ends[1], points)
         if then < clearance and not then >= now - _NOTHING_m:
             return k
     for j in range(1, parts + 1 if close else 0):
         place_on(way, j / parts, scratch, poses[2], twist)
-        write_ends(geometry, poses[2], cables, ends[0])
+        write_ends(scene.geometry, poses[2], cables, ends[0])
         for k in range(pairs.shape[0]):
             if before[k] >= 0.0:
-                now = distance(pairs[k], poses[2], ends[0], boxes, trim, points, near, corners)
+                now = distance(scene, k, poses[2], ends[0], points, near, corners)
                 if now + before[k] - _together(pairs[k], moved / parts) < 2.0 * clearance:
                     return k
                 before[k] = now

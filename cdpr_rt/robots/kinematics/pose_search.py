@@ -86,8 +86,7 @@ def descend(
         if size < TOLERANCE:
             return SINGULAR if singular else CONVERGED, k, new
         slow = 0.0 < _SLOW_SHARE * before < size < _NEAR
-        before = size if damping == 0.0 else 0.0
-        cost = new
+        before, cost = size if damping == 0.0 else 0.0, new
         damping = 0.1 * damping if damping > 1e-5 else 0.0
     return UNFINISHED, k, cost
 
@@ -109,7 +108,7 @@ def _factorise_damped(cables: FloatArray, solver: FloatArray, damping: float) ->
 
 @jit
 def _converged(size: float, before: float, cost: float) -> bool:
-    """Return whether what is left to go behind a step of this size, and cost, is of no account.
+    """Return whether the remaining distance after a step of this size, and cost, is negligible.
 
     It shrinks as the last two steps did, faster where lengths agree.
     """

@@ -53,7 +53,7 @@ def mark_not_calibrated(robot: str, why: str) -> CalibrationState:
 
 
 def not_calibrated_reason(robot: str) -> str:
-    """Return why the geometry of a robot may not be believed any more; empty where it may.
+    """Return why the geometry of a robot is unreliable, "" where it is reliable.
 
     A robot that has never been calibrated has the geometry of its file.
     """

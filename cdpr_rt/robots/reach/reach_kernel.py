@@ -6,6 +6,7 @@ import numpy as np
 
 from cdpr_rt.arrays import FloatArray, IntArray
 from cdpr_rt.jit import jit
+from cdpr_rt.robots.interference.clearance_kernel import Scene
 from cdpr_rt.robots.interference.contact_kernel import (
     BASE,
     MOST_LOOKS,
@@ -27,11 +28,7 @@ def reach_all(
     start: FloatArray,
     ends: FloatArray,
     chosen: IntArray,
-    geometry: FloatArray,
-    boxes: FloatArray,
-    pairs: IntArray,
-    clearance: float,
-    trim: float,
+    scene: Scene,
     centred: FloatArray,
     centre: FloatArray,
     wrenches: FloatArray,
@@ -57,9 +54,7 @@ def reach_all(
             if chosen[k] > 2:
                 row, column = TURNED, chosen[k] - 3
             way[row, column], way[row + STEP, column] = start[k], ends[j, k] - start[k]
-        touches, pair, _, _ = first_contact(
-            geometry, boxes, pairs, clearance, trim, way, MOST_LOOKS
-        )
+        touches, pair, _, _ = first_contact(scene, way, MOST_LOOKS)
         until = min(touches, 1.0)
         why[j] = WHOLE if pair < 0 else CONTACT
         shares[j], _ = held_until(

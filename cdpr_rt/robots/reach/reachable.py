@@ -61,7 +61,7 @@ class Reach:
             raise GeometryError(f"the start at {place} m: {why_not}")
         centre, wrenches, generators, scale, bounds = workspace.arrays
         self._arrays = (
-            np.array(model.kinematics.directions), *model.interference.arrays,
+            np.array(model.kinematics.directions), model.interference.scene,
             model.about_centre_of_mass.geometry, centre, wrenches, generators, scale, bounds,
         )  # fmt: skip
 

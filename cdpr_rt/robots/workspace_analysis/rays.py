@@ -29,7 +29,7 @@ class RayJob:
     box: Box
 
     def run(self) -> FloatArray:
-        """Return how far each ray goes before it leaves the workspace for the first time, m, (m,).
+        """Return the length of each ray up to where it first leaves the workspace, m, (m,).
 
         Within 0.1 mm, but for gaps narrower than 1/64 of the ray, of which contact is none; the
         centre has to be inside.

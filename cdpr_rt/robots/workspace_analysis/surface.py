@@ -65,7 +65,7 @@ def area(values: FloatArray, cell_m2: float) -> float:
 
 
 def _outside(values: FloatArray) -> float:
-    """Return what stands for a place that is outside whatever is next to it."""
+    """Return the value of a place that is outside whatever is next to it."""
     finite = np.abs(values[np.isfinite(values)])
     return -_OUTSIDE * max(float(finite.max(initial=0.0)), 1e-9)
 

@@ -30,7 +30,7 @@ _MOVING = frozenset({"enable", "program", "set"})
 
 
 @dataclass(frozen=True)
-class _PutOff:
+class _Deferred:
     """A command whose preparation goes on beside the cycles."""
 
     command: Command
@@ -43,7 +43,7 @@ class _PutOff:
 class CommandDispatcher:
     """Takes commands, refuses those that the state forbids, and replies once to each.
 
-    One that needs something to be prepared, such as a file to be read, is put off until that has
+    One that needs something to be prepared, such as a file to be read, is deferred until that has
     been done, and dispatched anew then. Any other command that is carried out meanwhile ends it,
     and so does whatever else changes state or program, such as a hold by the supervisor.
     """
@@ -59,7 +59,7 @@ class CommandDispatcher:
         self._runner = runner
         self._transitions = transitions
         self._request_stop = request_stop
-        self._put_off: _PutOff | None = None
+        self._deferred: _Deferred | None = None
         self._replies: list[tuple[int, CommandRefusal | str]] = []
         self._counters = engine.block.counters
         # read in every cycle: a memoryview is faster
@@ -81,15 +81,15 @@ class CommandDispatcher:
         }
 
     def poll(self) -> None:
-        """Take one stop request, then one command, if there are any, or one that was put off."""
-        if self._put_off is not None and self._is_overtaken(self._put_off):
-            self._give_up(self._put_off, self._life.reason or "something else came first")
+        """Take one stop request, then one command, if there are any, or a deferred one."""
+        if self._deferred is not None and self._is_superseded(self._deferred):
+            self._cancel(self._deferred, self._life.reason or "something else came first")
         if self._urgent[0] != self._urgent_taken[0]:
             self._take(self._urgent_taken, self._engine.block.take_urgent)
         if self._commands[0] != self._commands_taken[0]:
             self._take(self._commands_taken, self._engine.block.take_command)
-        elif self._put_off is not None and self._put_off.task.done:
-            self._take_up(self._put_off)
+        elif self._deferred is not None and self._deferred.task.done:
+            self._resume(self._deferred)
 
     def _take(self, taken: memoryview, take: Callable[[], Command | None]) -> None:
         try:
@@ -120,50 +120,50 @@ class CommandDispatcher:
         except Exception as error:  # whatever a command holds: the loop goes on
             answer(f"{do}: {type(error).__name__}: {error}")
             return
-        put_off = self._put_off
-        if put_off is not None and put_off.command is command:
-            return  # replied to when it is taken up
-        if put_off is not None and do != "lengths":
-            self._give_up(put_off, _ANOTHER)
+        deferred = self._deferred
+        if deferred is not None and deferred.command is command:
+            return  # replied to when it is resumed
+        if deferred is not None and do != "lengths":
+            self._cancel(deferred, _ANOTHER)
         if steps is None:
             answer("")
         else:
             self._runner.begin(steps, answer)
 
     def _prepare(self, command: Command, program: Program) -> bool:
-        """Return whether a command for a program has been put off, as something is to be done."""
+        """Return whether a command for a program is deferred, as something has to be prepared."""
         work = program.preparation(self._arguments(command))
         if work is None:
             return False
         engine, clock = self._engine, self._engine.machine.clock
-        if self._put_off is not None:
-            self._give_up(self._put_off, _ANOTHER)
+        if self._deferred is not None:
+            self._cancel(self._deferred, _ANOTHER)
         task = clock.start(lambda: clock.run_blocking(work))
-        self._put_off = _PutOff(command, task, engine.program, self._life.state)
+        self._deferred = _Deferred(command, task, engine.program, self._life.state)
         return True
 
-    def _is_overtaken(self, put_off: _PutOff) -> bool:
+    def _is_superseded(self, deferred: _Deferred) -> bool:
         """Return whether the robot does something else by now than when the command came."""
         engine, state = self._engine, self._life.state
-        changed = engine.program is not put_off.program or state is not put_off.state
+        changed = engine.program is not deferred.program or state is not deferred.state
         return changed or engine.reacting is not Reaction.NONE
 
-    def _take_up(self, put_off: _PutOff) -> None:
+    def _resume(self, deferred: _Deferred) -> None:
         """Dispatch a command whose preparation has ended, or reply why that has failed."""
-        self._put_off = None
+        self._deferred = None
         try:
-            put_off.task.result()
+            deferred.task.result()
         except Exception as error:  # of a file, whatever it holds: the loop goes on
             mistake = "" if isinstance(error, ControlError) else f"{type(error).__name__}: "
             said = refusal_of(error) or f"{mistake}{error}"
-            self._reply(_number(put_off.command), said)
+            self._reply(_number(deferred.command), said)
             return
-        self._dispatch(put_off.command)
+        self._dispatch(deferred.command)
 
-    def _give_up(self, put_off: _PutOff, why: str) -> None:
-        self._put_off = None
-        self._engine.machine.clock.cancel(put_off.task)
-        self._reply(_number(put_off.command), f"given up: {why}")
+    def _cancel(self, deferred: _Deferred, why: str) -> None:
+        self._deferred = None
+        self._engine.machine.clock.cancel(deferred.task)
+        self._reply(_number(deferred.command), f"given up: {why}")
 
     def send_replies(self) -> None:
         """Reply to what has been done, refused or given up since the last call.

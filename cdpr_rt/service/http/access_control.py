@@ -71,7 +71,7 @@ class AccessPolicy:
 
 
 def names_of_this_machine() -> frozenset[str]:
-    """Return what this machine is called, in its own words and on a network without DNS."""
+    """Return this machine's names: its host name, and that on a network without DNS (mDNS)."""
     name = socket.gethostname().lower()
     return frozenset({name, f"{name}.local"})
 

@@ -1,4 +1,4 @@
-"""Connections: which are kept where there are too many, how often who asks, who is served next."""
+"""Limits of connections and request rates, and the order in which requests are served."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class Connection(Protocol):
 
     transport: Any
     peer: str
-    """Whose it is: a process of this machine, or an address."""
+    """Peer: a process of this machine, or an address."""
     is_authenticated: bool
     """Whether it has shown the key, or the token of who may move."""
     since_s: float
@@ -78,7 +78,7 @@ class ConnectionLimiter:
         connection.is_authenticated = len(known) < MOST and len(of_this) < MOST_OF_PEER
 
     def replace(self, connection: Connection, successor: Connection) -> None:
-        """Have `successor` in the place of `connection`, whose transport it goes on with."""
+        """Replace `connection` by `successor`, which takes over its transport."""
         if connection in self._all:
             successor.stops_only = connection.stops_only
             successor.is_authenticated = connection.is_authenticated

@@ -188,5 +188,5 @@ def _first_of(error: ValidationError) -> str:
 
 
 async def _is_here() -> bool:
-    """Whether the client has gone: who reads cancels what it has asked for then."""
+    """Whether the client has gone; its pending requests are cancelled then."""
     return False

@@ -135,7 +135,7 @@ class MetricsCollector(Collector):
 
 
 def _about(field: CycleField) -> str:
-    """Return what a field means; no metric is null, what cannot be known is left out."""
+    """Return a field's description; no metric is null, unknown values are left out."""
     about = field.meaning.partition("; null")[0]
     return about[0].upper() + about[1:]
 

@@ -126,7 +126,7 @@ class Recorder(Part):
         self._remarks.append(({"text": text, **values}, time.monotonic_ns()))
 
     def status(self) -> dict[str, Any]:
-        """Return how it goes: `recording`, `file`, `rows`, `lost_rows`, `bytes`, `error`."""
+        """Return figures: `recording`, `file`, `rows`, `lost_rows`, `bytes`, `error`."""
         file = self._file
         return {
             "recording": file is not None,
@@ -276,7 +276,7 @@ def reserve_of(disk_bytes: int) -> int:
 
 
 def _lasting(status: dict[str, Any]) -> dict[str, Any]:
-    """Return a status without what rows tell, and what is another for each process and moment."""
+    """Return a status without values that are in rows, or differ by process and moment."""
     return {
         name: _lasting(value) if isinstance(value, dict) else value
         for name, value in status.items()

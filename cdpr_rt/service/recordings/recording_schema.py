@@ -18,13 +18,13 @@ _KNOWN_OR_NOT = {"type": ["number", "null"]}
 
 
 def cycle_schema(n: int) -> dict[str, Any]:
-    """Return the schema of a row for n axes, without what wall-clock time is in."""
+    """Return the schema of a row for n axes, without fields by wall-clock time."""
     about = "One cycle of the control loop; arrays over the axes, in SI units"
     return _row_schema("Cycle", about, CYCLE_FIELDS, n)
 
 
 def timing_schema() -> dict[str, Any]:
-    """Return the schema of what wall-clock time is in, of one row."""
+    """Return the schema of a row's fields by wall-clock time."""
     about = "When a cycle of the control loop ran, and how long it took, by wall-clock time"
     return _row_schema("Timing", about, TIMING_FIELDS, 1)
 

@@ -107,7 +107,7 @@ class _Session:
 
 
 class StreamSessionManager:
-    """Takes packets, posts what counts into `block`, and says what is to be answered.
+    """Receives packets, posts valid samples into `block`, and returns the answers.
 
     One session holds the stream. The control interface gives it to the holder of the right to move
     by `issue`, or it begins with a shared `key`: nobody is answered who has neither. It is bound to

@@ -72,7 +72,7 @@ def made_up(
     held = []
     for j, array in enumerate(model.poses(places)):
         pose = Pose(array[0], array[1:])
-        if file.turns:
+        if file.turns_freely:
             pose = _balanced(pose, exits, anchors, tension[j])
         if in_balance:
             tension[j] = _holding(true, pose, tension[j])

@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.core.estimate import FILTER_S, Estimator, WinchArrays
 from cdpr_rt.core.exchange import AxisFeedback, Setpoint
-from cdpr_rt.core.supervision.supervisor import Limit, Limits, Supervisor
+from cdpr_rt.core.supervision.limits import Limit, Limits
+from cdpr_rt.core.supervision.supervisor import Supervisor
 from cdpr_rt.core.tension_feedback import TensionFault, TensionFeedback
 
 PERIOD_S = 1e-3

@@ -14,7 +14,8 @@ from cdpr_rt.control.proportional import Proportional
 from cdpr_rt.core.estimate import Estimator
 from cdpr_rt.core.exchange import AxisFeedback, Setpoint
 from cdpr_rt.core.states import Reaction
-from cdpr_rt.core.supervision.supervisor import Limits, Supervisor
+from cdpr_rt.core.supervision.limits import Limits
+from cdpr_rt.core.supervision.supervisor import Supervisor
 from cdpr_rt.core.tension_feedback import TensionFeedback
 from cdpr_rt.motion.trajectory import TrapezoidalMove
 from cdpr_rt.runtime.warm_up import warm_up

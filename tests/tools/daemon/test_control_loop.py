@@ -17,16 +17,12 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from cdpr_drivers.cia402 import STATE_TABLE, State
-from cdpr_profiles import load_robot
 from cdpr_rt.core.cycle_row import Row
 from cdpr_rt.core.states import LoopState
-from cdpr_rt.programs.idle import IdleProgram
-from cdpr_rt.programs.model import model_of
 from cdpr_rt.refusal import CommandRefusal
-from cdpr_rt.robots.robot_arrays import limits_of
 from tests.drivers.bus_log import BusLog, logged
 from tests.tools.daemon.loop_rig import LoopRig, opened
-from tests.tools.robot_rig import Simulator, robot_file, simulated, unique
+from tests.tools.robot_rig import robot_file, simulated
 
 PERIOD_S = 2e-3
 FAULT_CODE, SILENT_MS = 1, 6
@@ -253,59 +249,6 @@ def test_a_drive_that_falls_silent_is_booted_anew(jogging: LoopRig) -> None:
     assert jogging.loop.engine.cycle is not cycle or jogging.machine.intact()
     jogging.obeyed("enable")
     assert drive_states(jogging.run(0.1)) == {State.OPERATION_ENABLED}
-
-
-def test_a_drive_that_stays_deaf_keeps_the_fault(lab: tuple[Path, str]) -> None:
-    with simulated(lab[0]) as url, opened(lab[0], url) as rig:
-        rig.inject_fault(1, SILENT_MS, 65535)
-        rig.turn_until(lambda: rig.state is LoopState.FAULT)
-        rig.turn_until(lambda: not rig.loop.busy)
-        answer = rig.command("acknowledge")
-        assert not answer["ok"]
-        assert "node 2" in answer["text"]
-        assert rig.state is LoopState.FAULT
-        assert "node 2" in rig.status["reason"]
-
-
-def test_a_bus_that_is_gone_and_comes_back(lab: tuple[Path, str]) -> None:
-    name = unique()
-    simulator = Simulator(str(lab[0]), "--bus", f"simbus:{name}")
-    with opened(lab[0], f"simbus:{name}") as rig:
-        rig.obeyed("enable")
-        rig.run(0.1)
-        simulator.kill()
-        rig.turn_until(lambda: rig.state is LoopState.FAULT)
-        rig.turn_until(lambda: not rig.loop.busy)
-        assert "gone" in rig.status["reason"]
-        answer = rig.command("acknowledge")
-        assert not answer["ok"]
-        assert rig.state is LoopState.FAULT
-        with simulated(lab[0], name=name):
-            rig.obeyed("acknowledge")
-            assert rig.state is LoopState.READY
-            rig.obeyed("enable")
-            assert drive_states(rig.run(0.1)) == {State.OPERATION_ENABLED}
-            rig.obeyed("disable")
-
-
-def test_a_program_that_fails_stops_the_drives_and_not_the_loop(lab: tuple[Path, str]) -> None:
-    class Failing(IdleProgram):
-        name = "failing"
-
-        def update(self, feedback: Any, setpoint: Any, torque_Nm: Any) -> None:
-            raise ZeroDivisionError("by nought")
-
-    model = model_of(load_robot(lab[0]).axes, PERIOD_S, [3e-3] * 2, limits_of(load_robot(lab[0])))
-    with simulated(lab[0]) as url, opened(lab[0], url, {"failing": Failing(model)}) as rig:
-        rig.obeyed("enable")
-        rig.command("program", program="failing")
-        rig.turn_until(lambda: rig.state is LoopState.FAULT)
-        reason = rig.status["reason"]
-        assert "failing: ZeroDivisionError: by nought" in reason
-        rig.turn_until(lambda: not rig.loop.busy)
-        assert State.OPERATION_ENABLED not in drive_states(rig.run(0.1))
-        rig.obeyed("acknowledge")
-        rig.obeyed("enable")
 
 
 def test_a_request_to_end_brakes_within_the_acceleration_limit(lab: tuple[Path, str]) -> None:

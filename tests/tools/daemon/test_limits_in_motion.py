@@ -17,7 +17,7 @@ from cdpr_rt.control.base import Idle
 from cdpr_rt.core.cycle_row import Row
 from cdpr_rt.core.exchange import AxisFeedback, Setpoint
 from cdpr_rt.core.states import LoopState, Reaction
-from cdpr_rt.core.supervision.supervisor import Limit
+from cdpr_rt.core.supervision.limits import Limit
 from cdpr_rt.programs.base import Program
 from tests.drivers.modbus.load_cell_rig import LoadCellRig
 from tests.tools.daemon.loop_rig import LoopRig, opened

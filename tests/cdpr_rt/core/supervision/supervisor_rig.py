@@ -6,7 +6,8 @@ import numpy as np
 
 from cdpr_rt.core.estimate import AxisEstimate
 from cdpr_rt.core.exchange import AxisFeedback, Setpoint
-from cdpr_rt.core.supervision.supervisor import Limits, Supervisor
+from cdpr_rt.core.supervision.limits import Limits
+from cdpr_rt.core.supervision.supervisor import Supervisor
 
 PERIOD_S = 1e-3
 SAFE = Limits(

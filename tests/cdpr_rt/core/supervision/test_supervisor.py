@@ -13,7 +13,8 @@ from hypothesis import strategies as st
 
 from cdpr_rt.core.estimate import Estimator
 from cdpr_rt.core.states import Reaction
-from cdpr_rt.core.supervision.supervisor import Limit, Limits, Supervisor
+from cdpr_rt.core.supervision.limits import Limit, Limits
+from cdpr_rt.core.supervision.supervisor import Supervisor
 from tests.cdpr_rt.core.supervision.supervisor_rig import PERIOD_S, SAFE, Cycle, with_rate
 
 # -- clamping

@@ -15,7 +15,8 @@ from toppra import algorithm, constraint
 
 from cdpr_rt.motion.path.description import Arc, Coordinates, Move, PathDescription
 from cdpr_rt.motion.path.nodes import PathNodes, nodes_of
-from cdpr_rt.motion.path.time_scaling import PathLimits, TimedPath, WrenchBounds, time_path
+from cdpr_rt.motion.path.time_scaling import PathLimits, TimedPath, time_path
+from cdpr_rt.motion.path.time_scaling_kernel import WrenchBounds
 
 toppra.setup_logging("ERROR")
 ROOM = Coordinates(("x", "y", "z", "rx", "ry", "rz"), np.zeros(6))

@@ -10,7 +10,8 @@ from scipy.spatial import KDTree
 from cdpr_rt.core.shared_block import PATH
 from cdpr_rt.motion.path.description import Coordinates, Move, PathDescription
 from cdpr_rt.motion.path.nodes import nodes_of
-from cdpr_rt.motion.path.time_scaling import PathLimits, TimedPath, WrenchBounds, time_path
+from cdpr_rt.motion.path.time_scaling import PathLimits, TimedPath, time_path
+from cdpr_rt.motion.path.time_scaling_kernel import WrenchBounds
 from cdpr_rt.programs.platform.paths.path import PathProgram
 from cdpr_rt.programs.platform.paths.path_progress import (
     write_progress,

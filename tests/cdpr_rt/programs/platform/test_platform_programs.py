@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
 import numpy as np
 import pytest
 
@@ -13,7 +11,6 @@ from cdpr_rt.core.estimate import Estimator
 from cdpr_rt.core.exchange import AxisFeedback
 from cdpr_rt.programs.arguments import ProgramError
 from cdpr_rt.programs.model import model_of
-from cdpr_rt.programs.platform.platform_program import PlatformParts
 from cdpr_rt.programs.platform.tightening import tighten as tighten_module
 from cdpr_rt.programs.platform.tightening.index_path import index_path
 from cdpr_rt.programs.registry import platform_parts
@@ -28,17 +25,6 @@ from tests.cdpr_rt.programs.platform.standing_robot import (
     STIFFNESS_N_m,
     home_pretension_N,
 )
-
-
-@pytest.fixture(scope="module")
-def made() -> Standing:
-    return Standing()
-
-
-@pytest.fixture
-def robot(made: Standing) -> Iterator[Standing]:
-    made.loosen((0.02, 0.005, 0.03))
-    yield made
 
 
 def tightened(robot: Standing) -> Standing:
@@ -102,91 +88,6 @@ def test_tensions_for_where_it_stands_are_not_stepped_to(robot: Standing):
     # full tensions in a second, and from some to others in a second
     fastest_N_s = np.max(asked_N) + 1.5 * other_N
     assert np.abs(np.diff(asked_N, axis=0)).max() < fastest_N_s * PERIOD_S
-
-
-def handing_over(robot: Standing, source: str | None = None) -> Standing:
-    """Tighten up to where what presses on the stand is let go."""
-    robot.switch("tighten", {"from": source} if source else {})
-    for _ in range(2000):
-        robot.run(0.01)
-        if robot.program.progress()["stage"] == "held":
-            assert not robot.parts.tight
-            return robot
-    raise AssertionError("not tight")
-
-
-def test_it_is_not_moved_before_it_is_let_go(robot: Standing):
-    handing_over(robot)
-    with pytest.raises(ProgramError, match="the cables are not tight; run tighten first"):
-        robot.programs["pose"].check({"stream": True})
-    steps_Nm = []
-    while not robot.parts.tight:
-        before_Nm = robot.torque.copy()
-        robot.run(PERIOD_S)
-        steps_Nm.append(np.abs(robot.torque - before_Nm).max())
-    assert 0.4 < len(steps_Nm) * PERIOD_S < 0.6
-    assert max(steps_Nm) < 0.1
-    here = robot.parts.control
-    assert here.position == pytest.approx(here.estimated, abs=1e-4)
-    assert robot.until_done(10.0)["done"]
-
-
-def test_a_stop_meanwhile_ends_on_tight_cables(robot: Standing):
-    handing_over(robot)
-    robot.program.stop()
-    robot.run(0.7)
-    assert robot.program.at_rest
-    assert robot.parts.tight
-
-
-def let_go_of(robot: Standing) -> None:
-    """Take the power away as a safe stop does, which asks no program."""
-    robot.program = robot.programs["idle"]
-    robot.program.start(robot.feedback, robot.setpoint, robot.torque)
-    robot.run(0.05)
-
-
-def test_what_ends_it_meanwhile_leaves_the_platform_as_displaced_as_it_was(robot: Standing):
-    robot.parts.last_stop.displaced = True
-    handing_over(robot, "home")
-    let_go_of(robot)
-    assert robot.parts.last_stop.displaced
-    assert handing_over(robot, "home").until_done(10.0)["done"]
-    assert not robot.parts.last_stop.displaced
-
-
-def test_whether_it_hangs_is_looked_at_again_once_that_was_ended(
-    robot: Standing, monkeypatch: pytest.MonkeyPatch
-):
-    looked = []
-
-    def hangs(parts: PlatformParts) -> bool:
-        looked.append(parts)
-        return False
-
-    monkeypatch.setattr("cdpr_rt.programs.platform.tightening.tighten.hangs", hangs)
-    handing_over(robot)
-    looked.clear()
-    robot.program.check({"from": "lengths"})
-    assert not looked
-    let_go_of(robot)
-    robot.programs["tighten"].check({"from": "lengths"})
-    assert looked
-
-
-@pytest.mark.parametrize("name", ["hold", "lower", "tighten"])
-def test_other_programs_meanwhile_go_on_without_a_step(robot: Standing, name: str):
-    handing_over(robot)
-    before_Nm, lengths_m = robot.torque.copy(), robot.estimator.estimate.cable_length_m.copy()
-    robot.switch(name)
-    robot.run(0.003)
-    assert robot.torque == pytest.approx(before_Nm, abs=0.15)
-    assert robot.estimator.estimate.cable_length_m == pytest.approx(lengths_m, abs=1e-3)
-    robot.run(12.0)
-    assert robot.parts.tight == (name == "tighten")
-    if name == "lower":
-        assert robot.program.at_rest
-        assert not robot.torque.any()
 
 
 def test_a_cable_that_ends_nowhere_is_told_and_all_are_let_go(robot: Standing):

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from cdpr_rt.arrays import FloatArray
-from cdpr_rt.robots.cable_loss.fall_kernel import COURSE, WINCHES, fall
+from cdpr_rt.robots.cable_loss.fall_kernel import PARAMETERS, WINCHES, fall
 from cdpr_rt.robots.kinematics.cable_kernel import ANCHOR, GEOMETRY_ROWS
 from cdpr_rt.robots.platform.body_kernel import CENTRE, GRAVITY, INERTIA, MASS, body_of
 from tests.cdpr_rt.robots.cable_loss.test_cable_loss import hung
@@ -40,13 +40,13 @@ def fallen(
         free[3:] = 0.0
     else:
         body[INERTIA:GRAVITY] = inertia_kg_m2.ravel()
-    course: Any = np.zeros(1, COURSE)
+    parameters: Any = np.zeros(1, PARAMETERS)
     values = {"period_s": PERIOD_S, "steps": 5, "cut": 1, "up": 2, "ground_m": ground_m}
     values |= {"held_cycles": round(held_s / PERIOD_S), "misled_N": misled_N, "friction": 0.2}
     values |= {"paying_out_m_s": 0.15, "fastest_in_m_s": 0.5, "integral_rate_1_s": 4.0}
     values |= {"foot_N_m": 2e4, "foot_N_s_m": 400.0}
     for key, value in values.items():
-        course[key] = value
+        parameters[key] = value
     winches: Any = np.zeros(2, WINCHES)
     given = {
         "stiffness_N_m": STIFFNESS_N_m,
@@ -61,7 +61,7 @@ def fallen(
     geometry[ANCHOR : ANCHOR + 3, 0] = anchor_m
     pose = np.vstack([start_m, np.eye(3)])
     path = np.empty((round(seconds / PERIOD_S), 4, 3))
-    cycles = fall(course, winches, body, free, geometry, np.zeros((1, 3)), pose, path)
+    cycles = fall(parameters, winches, body, free, geometry, np.zeros((1, 3)), pose, path)
     return path[:cycles]
 
 
