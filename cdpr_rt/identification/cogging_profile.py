@@ -18,7 +18,8 @@ from cdpr_profiles.limits.motor_bounds import MotorBounds
 from cdpr_profiles.reading.reader import read_json_model
 from cdpr_rt.control.compensation import AxisCompensation, FrictionFeedforward
 from cdpr_rt.errors import ControlError
-from cdpr_rt.identification import HarmonicResult, ThesisResult
+from cdpr_rt.identification.cogging.result import HarmonicResult
+from cdpr_rt.identification.cogging.thesis import ThesisResult
 
 CompensationMethod = Literal["thesis", "better"]
 

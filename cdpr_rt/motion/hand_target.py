@@ -4,10 +4,7 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-from numpy.typing import NDArray
-
-from cdpr_rt.arrays import FloatArray
+from cdpr_rt.arrays import FloatArray, IntArray
 from cdpr_rt.jit import jit
 from cdpr_rt.motion.rotations import multiply, to_quaternion, to_rotation_vector
 
@@ -21,7 +18,7 @@ _BELOW_m = 1e-3
 @jit
 def _turn(
     k: int,
-    about: NDArray[np.int64],
+    about: IntArray,
     pose: FloatArray,
     last: FloatArray,
     target: FloatArray,
@@ -64,7 +61,7 @@ def lead(
     scale: float,
     pose: FloatArray,
     last: FloatArray,
-    about: NDArray[np.int64],
+    about: IntArray,
     low: FloatArray,
     high: FloatArray,
     angle: float,

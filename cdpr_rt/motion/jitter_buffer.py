@@ -12,11 +12,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from cdpr_rt.arrays import FloatArray
+from cdpr_rt.arrays import FloatArray, IntArray
 from cdpr_rt.core.shared_block import SAMPLES
 from cdpr_rt.jit import jit
-
-IntArray = NDArray[np.int64]
 
 QUEUE_LENGTH = 64
 """The most samples that wait to be played."""

@@ -13,7 +13,7 @@ import numpy as np
 from cdpr_rt.arrays import BoolArray, FloatArray
 from cdpr_rt.control.base import Controller
 from cdpr_rt.errors import RawLogError
-from cdpr_rt.identification import SweepData
+from cdpr_rt.identification.cogging.sweep import SweepData
 from cdpr_rt.identification.rawlog import RawLog, RawLogWriter, column_names
 from cdpr_rt.motion.trajectory import TrapezoidalMove
 from cdpr_rt.runtime.operating import Operator

@@ -7,11 +7,10 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from cdpr_profiles import Robot
 from cdpr_profiles.platform import Platform
-from cdpr_rt.arrays import FloatArray
+from cdpr_rt.arrays import BoolArray, FloatArray
 from cdpr_rt.core.supervision.limits import Limits
 from cdpr_rt.robots.free_rotation import rotation_of
 from cdpr_rt.robots.interface import TensionOutcome
@@ -136,9 +135,7 @@ class PlatformStatics:
             np.min([self._at(position_m, acceleration_m_s2, turn)[0] for turn in turns], axis=0)
         )
 
-    def is_target(
-        self, position_m: FloatArray, turns_rad: FloatArray = NONE_rad
-    ) -> NDArray[np.bool_]:
+    def is_target(self, position_m: FloatArray, turns_rad: FloatArray = NONE_rad) -> BoolArray:
         """Return where the platform can be held and accelerated with the controller's reserve.
 
         At every one of the turns (k, 3).
@@ -231,8 +228,8 @@ class PlatformStatics:
 
 
 def _slabs(
-    good: NDArray[np.bool_],
-) -> Iterator[tuple[tuple[int, int], NDArray[np.bool_]]]:
+    good: BoolArray,
+) -> Iterator[tuple[tuple[int, int], BoolArray]]:
     """Yield (first, last) along the first coordinate, and what is good in all between."""
     for first in range(len(good)):
         rest = np.ones(good.shape[1:], bool)
@@ -241,7 +238,7 @@ def _slabs(
             yield (first, last), rest
 
 
-def _longest_run(good: NDArray[np.bool_]) -> tuple[int, int]:
+def _longest_run(good: BoolArray) -> tuple[int, int]:
     """Return the first and the last place of the longest run of True, 0 and 0 where there is none.
 
     Of runs as long as each other, the one nearest to the middle.

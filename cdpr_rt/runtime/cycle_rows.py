@@ -9,7 +9,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from cdpr_rt.arrays import FloatArray
+from cdpr_rt.arrays import FloatArray, IntArray
 from cdpr_rt.core.cycle_row import AXIS_FIELDS, POSE_FIELDS, SCALAR_FIELDS, CycleField
 from cdpr_rt.core.shared_block import RowWriter, SharedBlock
 from cdpr_rt.jit import bound, copy_bytes, jit
@@ -28,7 +28,7 @@ _UNKNOWN = np.full(7, np.nan)
 
 @jit
 def _fill(
-    copies: NDArray[np.int64],
+    copies: IntArray,
     rows: int,
     size: int,
     pose_rows: FloatArray,

@@ -21,10 +21,11 @@ from cdpr_drivers.robot.commissioned import identity_of
 from cdpr_drivers.robot.machine import RobotMachine
 from cdpr_drivers.robot.session_watch import Watching, no_watches
 from cdpr_profiles import Robot, Winch
+from cdpr_profiles.limits.robot_limits import Limit
 from cdpr_rt.core.estimate import Estimator
 from cdpr_rt.core.shared_block import SharedBlock
 from cdpr_rt.core.states import Reaction
-from cdpr_rt.core.supervision.limits import Limit, Limits
+from cdpr_rt.core.supervision.limits import Limits
 from cdpr_rt.core.supervision.supervisor import Supervisor
 from cdpr_rt.errors import NotInTimeError
 from cdpr_rt.identification.cogging_profile import DriveIdentity

@@ -14,14 +14,14 @@ from hypothesis import strategies as st
 
 from cdpr_drivers.bus.budget import machine_budget
 from cdpr_profiles import ProfileError, load_robot
-from cdpr_profiles.limits.robot_limits import Reactions, RobotLimits
+from cdpr_profiles.limits.robot_limits import Limit, Reactions, RobotLimits
 from cdpr_profiles.platform import PlatformFile
 from cdpr_profiles.reading.bounded_input import read_toml
 from cdpr_profiles.reading.places import SHIPPED
 from cdpr_profiles.reading.reader import validated
 from cdpr_profiles.winch_calibration import WinchCalibration
 from cdpr_rt.core.states import Reaction
-from cdpr_rt.core.supervision.limits import DEFAULT_REACTIONS, Limit
+from cdpr_rt.core.supervision.limits import DEFAULT_REACTIONS
 from cdpr_rt.robots.robot_arrays import described, limits_of, winches_of
 
 FILE = """

@@ -12,8 +12,8 @@ import scipy
 
 from cdpr_rt.arrays import BoolArray, FloatArray, rms
 from cdpr_rt.control.validation import low_pass_velocity
-from cdpr_rt.identification import HarmonicResult, ThesisResult
-from cdpr_rt.identification.cogging.thesis import DEGREE, GRID, WINDOW_deg
+from cdpr_rt.identification.cogging.result import HarmonicResult
+from cdpr_rt.identification.cogging.thesis import DEGREE, GRID, ThesisResult, WINDOW_deg
 from cdpr_rt.identification.rawlog import read_raw_log
 from cdpr_rt.procedures.measurement import Recording, recording
 from cdpr_tools.recordings.truth import Truth

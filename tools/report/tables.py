@@ -7,7 +7,8 @@ from collections.abc import Mapping, Sequence
 from html import escape
 from typing import Any
 
-from cdpr_rt.identification import ConfidenceInterval, HarmonicResult
+from cdpr_rt.identification.cogging.result import HarmonicResult
+from cdpr_rt.identification.confidence import ConfidenceInterval
 from cdpr_rt.procedures.commissioning.evaluation import METHODS
 from cdpr_tools.report.text import data, number, plain, table
 from cdpr_tools.report.words import NAMES, QUANTITIES, Quantity, missed_targets

@@ -6,7 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from cdpr_rt.identification import HarmonicResult, ThesisResult
+from cdpr_rt.identification.cogging.result import HarmonicResult
+from cdpr_rt.identification.cogging.thesis import ThesisResult
 from cdpr_tools.report.curves import (
     Ramp,
     ResidualEffort,

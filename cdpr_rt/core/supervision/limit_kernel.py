@@ -6,8 +6,9 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
+from cdpr_profiles.limits.robot_limits import Limit
 from cdpr_rt.arrays import BoolArray, FloatArray
-from cdpr_rt.core.supervision.limits import Limit, Limits
+from cdpr_rt.core.supervision.limits import Limits
 from cdpr_rt.jit import jit
 
 # kernels take plain numbers

@@ -11,15 +11,6 @@ from cdpr_profiles.limits.robot_limits import Limit, Reactions
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.core.states import Reaction
 
-__all__ = [
-    "DEFAULT_REACTIONS",
-    "LENGTHS_UNRELIABLE",
-    "POSE_UNRELIABLE",
-    "Limit",
-    "Limits",
-    "reactions_of",
-]
-
 POSE_UNRELIABLE: Final = frozenset(limit for limit in Limit if limit.unreliable)
 """Limits after which a platform's pose is unreliable, or not all of its winches obey."""
 

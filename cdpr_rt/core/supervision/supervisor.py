@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from cdpr_profiles.limits.robot_limits import Limit
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.core.estimate import AxisEstimate
 from cdpr_rt.core.exchange import AxisFeedback, Setpoint
@@ -20,7 +21,7 @@ from cdpr_rt.core.supervision.limit_kernel import (
     Signals,
     check_axes,
 )
-from cdpr_rt.core.supervision.limits import DEFAULT_REACTIONS, Limit, Limits
+from cdpr_rt.core.supervision.limits import DEFAULT_REACTIONS, Limits
 from cdpr_rt.jit import bound, bound_to
 
 

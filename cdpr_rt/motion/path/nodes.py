@@ -10,11 +10,10 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
-from cdpr_rt.arrays import FloatArray
+from cdpr_rt.arrays import BoolArray, FloatArray, IntArray
 from cdpr_rt.motion.path.description import Coordinates, PathDescription
-from cdpr_rt.motion.path.pieces import BoolArray, Pieces, pieces_of
+from cdpr_rt.motion.path.pieces import Pieces, pieces_of
 
 _SPACING_m: Final = 0.01
 _TURN_rad: Final = 0.08
@@ -48,9 +47,9 @@ class PathNodes:
     second: FloatArray
     speed: FloatArray
     """Wanted at most, (N,): m/s, or rad/s where it only turns."""
-    line: NDArray[np.int64]
+    line: IntArray
     """Line of the file, (N,)."""
-    runs: NDArray[np.int64]
+    runs: IntArray
     """First and last node of each, (r, 2)."""
     dwell_s: FloatArray
     """Time at rest after each run, (r,)."""

@@ -10,12 +10,9 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
-from cdpr_rt.arrays import FloatArray
+from cdpr_rt.arrays import BoolArray, FloatArray, IntArray
 from cdpr_rt.motion.path.description import PathDescription
-
-BoolArray = NDArray[np.bool_]
 
 _NOTHING_m: Final = 1e-7
 _STRAIGHT_rad: Final = 1e-4
@@ -43,7 +40,7 @@ class Pieces:
     length: FloatArray
     speed: FloatArray
     """Wanted at most, m/s, or rad/s of those that only turn."""
-    line: NDArray[np.int64]
+    line: IntArray
     dwell_s: FloatArray
     """Time at rest at the end of each."""
     waits: BoolArray
@@ -52,9 +49,7 @@ class Pieces:
     cut: FloatArray
     """Length cut off the end of each, and off the beginning of the next, for the corner."""
 
-    def at(
-        self, i: NDArray[np.int64], share: FloatArray
-    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+    def at(self, i: IntArray, share: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return positions with first and second derivative by length (k, d), at shares of pieces.
 
         Shares (k,) of the pieces `i` (k,) are from 0 to 1.

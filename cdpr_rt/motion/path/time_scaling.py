@@ -13,9 +13,8 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
-from cdpr_rt.arrays import FloatArray
+from cdpr_rt.arrays import FloatArray, IntArray
 from cdpr_rt.motion.path import time_scaling_kernel as kernel
 from cdpr_rt.motion.path.nodes import PathNodes
 from cdpr_rt.motion.path.time_scaling_kernel import Curve, WrenchBounds
@@ -63,11 +62,11 @@ class TimedPath:
     period_s: float
     samples: FloatArray
     """Position, velocity and acceleration (c, 3, d)."""
-    node: NDArray[np.int64]
+    node: IntArray
     """The node before each, (c,)."""
     along_m: FloatArray
     """Length along the path, weighted as the nodes', (c,)."""
-    waits: NDArray[np.int64]
+    waits: IntArray
     """Samples at which it waits until it is told to go on."""
     rounds: int
     """Most passes of scaling of a run."""

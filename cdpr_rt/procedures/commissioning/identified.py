@@ -7,15 +7,11 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from cdpr_profiles import Winch
-from cdpr_rt.identification import (
-    MOST_ROUNDS,
-    HarmonicResult,
-    SecondPass,
-    SweepData,
-    ThesisResult,
-    identify_harmonic_model,
-    identify_thesis,
-)
+from cdpr_rt.identification.cogging.harmonic_model import identify_harmonic_model
+from cdpr_rt.identification.cogging.result import HarmonicResult
+from cdpr_rt.identification.cogging.second_pass import MOST_ROUNDS, SecondPass
+from cdpr_rt.identification.cogging.sweep import SweepData
+from cdpr_rt.identification.cogging.thesis import ThesisResult, identify_thesis
 from cdpr_rt.identification.cogging_profile import (
     CoggingProfile,
     DriveIdentity,

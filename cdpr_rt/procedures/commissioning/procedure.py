@@ -15,7 +15,7 @@ from cdpr_profiles.limits.motor_bounds import MotorBounds
 from cdpr_rt.control.compensation import AxisCompensation
 from cdpr_rt.control.tuning import PidDesign, TuningError, design_pid, stiffest_pid, sweep_gain
 from cdpr_rt.errors import TripError
-from cdpr_rt.identification import MOST_ROUNDS, SecondPass
+from cdpr_rt.identification.cogging.second_pass import MOST_ROUNDS, SecondPass
 from cdpr_rt.identification.cogging_profile import CoggingProfile, stored_harmonic_model
 from cdpr_rt.procedures.commissioning.commission_files import Paths
 from cdpr_rt.procedures.commissioning.evaluation import METHODS

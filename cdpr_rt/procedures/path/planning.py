@@ -7,10 +7,9 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from cdpr_profiles import Robot
-from cdpr_rt.arrays import FloatArray
+from cdpr_rt.arrays import FloatArray, IntArray
 from cdpr_rt.motion.path.description import Coordinates, PathDescription, PathError
 from cdpr_rt.motion.path.nodes import PathNodes, nodes_of
 from cdpr_rt.motion.path.time_scaling import (
@@ -209,7 +208,7 @@ class PathPlanner:
             steepest = ((self.limits.acceleration + bend) / np.abs(nodes.first)).min(axis=1)
         return np.asarray(np.abs(by_u) * steepest[:, None] + np.abs(by_x) * fastest)
 
-    def looked_at(self, nodes: PathNodes) -> NDArray[np.int64]:
+    def looked_at(self, nodes: PathNodes) -> IntArray:
         """Return nodes not farther from each other than 20 mm, those at stops among them."""
         cell = np.floor(nodes.s / _POSES_m).astype(np.int64)
         fresh = np.concatenate([[True], np.diff(cell) > 0])

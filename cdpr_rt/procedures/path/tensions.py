@@ -6,9 +6,8 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
-from cdpr_rt.arrays import FloatArray
+from cdpr_rt.arrays import BoolArray, FloatArray, IntArray
 from cdpr_rt.motion.path.time_scaling import TimedPath
 from cdpr_rt.robots.interface import TensionOutcome
 from cdpr_rt.robots.platform_model import PlatformModel
@@ -23,14 +22,14 @@ _MOST: Final = 20_000
 class PathTensions:
     """Tensions at some of a plan's samples, evenly chosen where there are too many."""
 
-    sample: NDArray[np.int64]
+    sample: IntArray
     """Which, (m,)."""
     tension_N: FloatArray
     """(m, n)"""
     low_N: FloatArray
     """Bounds that are planned with: the file's, with the control's reserve, (n,)."""
     high_N: FloatArray
-    carried: NDArray[np.bool_]
+    carried: BoolArray
     """Whether tensions are within these bounds, (m,)."""
 
 

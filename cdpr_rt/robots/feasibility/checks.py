@@ -35,7 +35,7 @@ _ROUNDED_UP = 1.05
 """So that two digits are not less."""
 _SLOW_Hz = 0.5
 """Slowest mode of a loop: it settles within 2 % in 2.3 s."""
-_RUBS_SHARE = 0.06
+_FRICTION_SHARE = 0.06
 """Friction and cogging of a servo winch together over the motor's rated torque, at most."""
 _FAR_TURNED_deg, _TIPPED_deg = 10.0, 4.0
 _WIDE_ARMS = 0.5
@@ -65,12 +65,14 @@ def findings(robot: Robot, limits: Limits | None = None) -> list[Finding]:
     if not any(finding.impossible for finding in found):
         # with points that cannot be meant, tensions and torques only repeat it
         found += [*_tensions(statics), *_motors(robot, limits, statics)]
-        found += [*_speeds(robot, limits, statics), *_lengths(robot, limits, statics)]
+        found += [*_cable_speeds(robot, limits, statics), *_lengths(robot, limits, statics)]
         found += _sagging(robot, statics)
         if statics.turns:
-            found += _turning(statics)
-        found += [*_loop(robot, statics), *_swinging(robot.platform), *_standing(statics)]
-        found += [*_contact(statics), *_beside_the_body(robot.platform), *_rubbing(robot, statics)]
+            found += _free_rotation(statics)
+        found += [*_loop(robot, statics), *_uncontrolled_rotation(robot.platform)]
+        found += _stand_clearance(statics)
+        platform = robot.platform
+        found += [*_contact(statics), *_anchors_off_body(platform), *_friction(robot, statics)]
     return sorted(found, key=lambda finding: not finding.impossible)
 
 
@@ -186,7 +188,7 @@ def _motors(robot: Robot, limits: Limits, statics: PlatformStatics) -> Iterator[
         yield Finding("platform.workspace_max_m", text, impossible=False)
 
 
-def _speeds(robot: Robot, limits: Limits, statics: PlatformStatics) -> Iterator[Finding]:
+def _cable_speeds(robot: Robot, limits: Limits, statics: PlatformStatics) -> Iterator[Finding]:
     platform, winches = statics.platform, [axis.winch for axis in robot.axes]
     arm_m = np.array([abs(winch.cable_m_per_motor_rad) for winch in winches])
     # each direction has the speed of its own, so that all together are faster along a diagonal
@@ -221,19 +223,19 @@ def _rounded_down(value: float) -> str:
     return f"{math.floor(value * 10.0**digits) / 10.0**digits:g}"
 
 
-def _rubbing(robot: Robot, statics: PlatformStatics) -> Iterator[Finding]:
+def _friction(robot: Robot, statics: PlatformStatics) -> Iterator[Finding]:
     winches, kept_N = [axis.winch for axis in robot.axes], statics.model.reserve_N
     rated_N = max(w.motor.rated_torque_Nm / abs(w.cable_m_per_motor_rad) for w in winches)
-    if 0.0 < kept_N < _RUBS_SHARE * rated_N:
+    if 0.0 < kept_N < _FRICTION_SHARE * rated_N:
         text = (
             f"tensions keep {kept_N:.2g} N from their bounds for the control, friction and cogging "
-            f"of such winches may take up {_RUBS_SHARE * rated_N:.2g} N: it sticks, and runs over "
-            "its targets; smaller winches, or a mass for tensions mid of their bounds, help"
+            f"of such winches may take up {_FRICTION_SHARE * rated_N:.2g} N: it sticks, and runs "
+            "over its targets; smaller winches, or a mass for tensions mid of their bounds, help"
         )
         yield Finding("platform.mass_kg", text, impossible=False)
 
 
-def _turning(statics: PlatformStatics) -> Iterator[Finding]:
+def _free_rotation(statics: PlatformStatics) -> Iterator[Finding]:
     home = np.array(statics.platform.home_m)
     places = np.concatenate([home[None], statics.points().reshape(-1, 2)])
     angle = np.where(statics.is_target(places), statics.angle_rad(places), 0.0)
@@ -276,7 +278,7 @@ def _loop(robot: Robot, statics: PlatformStatics) -> Iterator[Finding]:
         yield Finding("platform.mass_kg", text, impossible=False)
 
 
-def _swinging(platform: Platform) -> Iterator[Finding]:
+def _uncontrolled_rotation(platform: Platform) -> Iterator[Finding]:
     angles = DIRECTIONS[3][3:]
     left = [name for name in angles if name not in platform.controlled]
     if not platform.is_planar and left and not is_point(platform):
@@ -297,7 +299,7 @@ def lower_when_turned_m(statics: PlatformStatics) -> float:
     return float(height.min() - (math.cos(angle) * height - math.sin(angle) * aside).min())
 
 
-def _standing(statics: PlatformStatics) -> Iterator[Finding]:
+def _stand_clearance(statics: PlatformStatics) -> Iterator[Finding]:
     """Look whether a turned platform meets, at the bottom of its box, what it stands on at home."""
     platform, up = statics.platform, statics.model.positions - 1
     angle, lower_m = platform.workspace_angle_rad, lower_when_turned_m(statics)
@@ -368,7 +370,7 @@ def _contact(statics: PlatformStatics) -> Iterator[Finding]:
     yield Finding("platform.clearance_m", text, impossible=everywhere)
 
 
-def _beside_the_body(platform: Platform) -> Iterator[Finding]:
+def _anchors_off_body(platform: Platform) -> Iterator[Finding]:
     """Look for cables that are made fast off the box that the platform is said to be."""
     if platform.body is None or (platform.is_planar and not platform.obstacles):
         return  # nothing is held against it: cables in a plane run in layers

@@ -7,10 +7,9 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, cKDTree
 
-from cdpr_rt.arrays import FloatArray
+from cdpr_rt.arrays import BoolArray, FloatArray, IntArray
 from cdpr_rt.robots.statics import Box
 from cdpr_rt.robots.workspace_analysis.criterion import Criterion
 from cdpr_rt.robots.workspace_analysis.surface import Triangles, volume
@@ -50,7 +49,7 @@ class RayJob:
         ends = self.centre_m + inside[:, None] * self.directions
         return inside * self.criterion.clear_shares(self.centre_m, ends)
 
-    def _held(self, rays: NDArray[np.int64], there: FloatArray) -> NDArray[np.bool_]:
+    def _held(self, rays: IntArray, there: FloatArray) -> BoolArray:
         points = self.centre_m + there[:, None] * self.directions[rays]
         return np.asarray(self.criterion.depths(points) >= 0.0)
 

@@ -6,9 +6,8 @@ import itertools
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from cdpr_rt.arrays import FloatArray
+from cdpr_rt.arrays import BoolArray, FloatArray
 from cdpr_rt.robots.platform_model import PlatformModel
 from cdpr_rt.robots.rigid_body import G_m_s2, in_space, inertia_kg_m2
 from cdpr_rt.robots.wrenches.facet_kernel import write_facets
@@ -32,11 +31,11 @@ class AvailableWrenches:
     upper: FloatArray
 
     @property
-    def holds(self) -> NDArray[np.bool_]:
+    def holds(self) -> BoolArray:
         """Whether the platform can be held at rest, (m,)."""
         return np.asarray(((self.lower <= 0.0) & (self.upper >= 0.0)).all(axis=1))
 
-    def spare(self, most: FloatArray) -> NDArray[np.bool_]:
+    def spare(self, most: FloatArray) -> BoolArray:
         """Return where each wrench of a box is carried, (m,); `most` (m, d) are half its sides."""
         needed = np.einsum("mfd,md->mf", np.abs(self.normals), most)
         return np.asarray(((needed <= self.upper) & (-needed >= self.lower)).all(axis=1))

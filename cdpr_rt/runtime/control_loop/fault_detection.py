@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 
+from cdpr_profiles.limits.robot_limits import Limit
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.core.cycle import Cycle
 from cdpr_rt.core.states import LoopState, Reaction
-from cdpr_rt.core.supervision.limits import Limit
 from cdpr_rt.runtime.control_loop.engine import Engine
 from cdpr_rt.runtime.control_loop.safe_stop import SafeStop
 

@@ -8,9 +8,10 @@ from typing import Final
 
 import numpy as np
 
+from cdpr_profiles.limits.robot_limits import Limit
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.core.states import LoopState, Reaction
-from cdpr_rt.core.supervision.limits import LENGTHS_UNRELIABLE, POSE_UNRELIABLE, Limit
+from cdpr_rt.core.supervision.limits import LENGTHS_UNRELIABLE, POSE_UNRELIABLE
 from cdpr_rt.errors import ControlError
 from cdpr_rt.runtime.control_loop.engine import HOLD, IDLE, Engine
 from cdpr_rt.runtime.control_loop.transition_runner import Steps, TransitionRunner

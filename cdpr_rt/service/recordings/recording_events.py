@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from cdpr_profiles.limits.robot_limits import Limit
 from cdpr_rt.core.cycle_row import Row
 from cdpr_rt.core.states import LoopState, Reaction
-from cdpr_rt.core.supervision.limits import Limit
 from cdpr_rt.motion.stream_buttons import confirmation
 
 _WATCHED = ("state", "program", "reaction", "limit", "limit_axis", "stream_buttons")

@@ -7,10 +7,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from cdpr_profiles.limits.robot_limits import Limit
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.core.estimate import FILTER_S, Estimator, WinchArrays
 from cdpr_rt.core.exchange import AxisFeedback, Setpoint
-from cdpr_rt.core.supervision.limits import Limit, Limits
+from cdpr_rt.core.supervision.limits import Limits
 from cdpr_rt.core.supervision.supervisor import Supervisor
 from cdpr_rt.core.tension_feedback import TensionFault, TensionFeedback
 

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from cdpr_profiles.limits.robot_limits import Limit
 from cdpr_rt.control.proportional import Proportional
 from cdpr_rt.core.clock import Clock, LockstepClock, PacedClock
 from cdpr_rt.core.cycle import Watch
@@ -17,7 +18,7 @@ from cdpr_rt.core.estimate import Estimator
 from cdpr_rt.core.exchange import AxisCommand, AxisFeedback
 from cdpr_rt.core.shared_block import SharedBlock
 from cdpr_rt.core.states import Reaction
-from cdpr_rt.core.supervision.limits import Limit, Limits
+from cdpr_rt.core.supervision.limits import Limits
 from cdpr_rt.core.supervision.supervisor import Supervisor
 from cdpr_rt.identification.rawlog import RawLogWriter, column_names
 from cdpr_rt.motion.trajectory import TrapezoidalMove

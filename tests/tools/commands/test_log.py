@@ -12,10 +12,10 @@ import pytest
 from cdpr_here import cdpr_here
 from matplotlib.image import imread
 
+from cdpr_profiles.limits.robot_limits import Limit
 from cdpr_rt.core.cycle_row import Row
 from cdpr_rt.core.shared_block import RowWriter
 from cdpr_rt.core.states import LoopState, Reaction
-from cdpr_rt.core.supervision.limits import Limit
 from cdpr_rt.service.recordings.recording import Recorder
 from cdpr_tools.recordings.picture import FIELDS, faults_of, pose_curves
 from cdpr_tools.recordings.selection import Selection

@@ -11,13 +11,13 @@ import numpy as np
 import pytest
 
 from cdpr_drivers.cia402 import STATE_TABLE, State
+from cdpr_profiles.limits.robot_limits import Limit
 from cdpr_profiles.reading.places import SHIPPED
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.control.base import Idle
 from cdpr_rt.core.cycle_row import Row
 from cdpr_rt.core.exchange import AxisFeedback, Setpoint
 from cdpr_rt.core.states import LoopState, Reaction
-from cdpr_rt.core.supervision.limits import Limit
 from cdpr_rt.programs.base import Program
 from tests.drivers.modbus.load_cell_rig import LoadCellRig
 from tests.tools.daemon.loop_rig import LoopRig, opened

@@ -7,8 +7,8 @@ from typing import Any
 
 import pytest
 
+from cdpr_profiles.limits.robot_limits import Limit
 from cdpr_rt.core.states import LoopState
-from cdpr_rt.core.supervision.limits import Limit
 from cdpr_rt.programs.arguments import ProgramError
 from cdpr_rt.programs.idle import IdleProgram
 from cdpr_rt.programs.model import model_of

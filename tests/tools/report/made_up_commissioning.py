@@ -13,8 +13,10 @@ import numpy as np
 
 from cdpr_rt.control.compensation import FrictionFeedforward
 from cdpr_rt.control.tuning import design_pid
-from cdpr_rt.identification import ConfidenceInterval, Harmonic, HarmonicResult, identify_thesis
 from cdpr_rt.identification.cogging.friction import FrictionShape
+from cdpr_rt.identification.cogging.result import Harmonic, HarmonicResult
+from cdpr_rt.identification.cogging.thesis import identify_thesis
+from cdpr_rt.identification.confidence import ConfidenceInterval
 from cdpr_rt.identification.rawlog import RawLogWriter, column_names
 from cdpr_rt.procedures.commissioning.commission_files import Paths
 from cdpr_rt.procedures.commissioning.identified import Identified, legs, validation_name

@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.signal import savgol_filter
 
-from cdpr_rt.identification import ThesisResult
+from cdpr_rt.identification.cogging.thesis import ThesisResult
 from cdpr_rt.procedures.measurement import Pass
 from cdpr_tools.recordings.truth import Truth
 from cdpr_tools.report import curves

@@ -8,8 +8,8 @@ from typing import Any, Final
 
 import numpy as np
 
+from cdpr_profiles.limits.robot_limits import Limit
 from cdpr_rt.arrays import FloatArray
-from cdpr_rt.core.supervision.limits import Limit
 from cdpr_rt.errors import TripError
 from cdpr_rt.procedures.calibration.measure_poses import NotThePoseError, TargetNotReached
 from cdpr_rt.runtime.control_loop.stop_requests import EMERGENCY_STOP

@@ -13,7 +13,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from cdpr_rt.arrays import FloatArray
+from cdpr_rt.arrays import BoolArray, FloatArray
 
 _POINTS = 48
 """Along each edge."""
@@ -36,7 +36,7 @@ class EdgeFit:
 
     corners_px: FloatArray
     """(k, 4, 2)."""
-    good: NDArray[np.bool_]
+    good: BoolArray
     """Whether all four edges were there to see, (k,)."""
     width_px: FloatArray
     """Width of the widest edge of each, from ink to paper, (k,): over its steepest slope."""
@@ -44,7 +44,7 @@ class EdgeFit:
 
 def fit_corners(pixels: NDArray[np.uint8], corners: FloatArray, squares: int) -> EdgeFit:
     """Return better corners than `corners` (k, 4, 2) of markers `squares` wide, with border."""
-    good: NDArray[np.bool_] = np.ones(len(corners), np.bool_)
+    good: BoolArray = np.ones(len(corners), np.bool_)
     width = np.zeros(len(corners))
     for _ in range(_PASSES):
         if not len(corners):
@@ -83,9 +83,7 @@ def _sampled(pixels: NDArray[np.uint8], grid: FloatArray) -> FloatArray:
     return np.concatenate(levels).astype(float).reshape(grid.shape[:-1])
 
 
-def _crossings(
-    profile: FloatArray, offset: FloatArray
-) -> tuple[FloatArray, NDArray[np.bool_], FloatArray]:
+def _crossings(profile: FloatArray, offset: FloatArray) -> tuple[FloatArray, BoolArray, FloatArray]:
     """Return where profiles (k, 4, points, steps) are half-way, whether, and each edge's width."""
     quarter = _STEPS // 4
     ink = profile[..., :quarter].mean(axis=-1)
@@ -109,9 +107,7 @@ def _crossings(
     return where, valid, np.nanmedian(filled, axis=2)
 
 
-def _parabolas(
-    s: FloatArray, where: FloatArray, valid: NDArray[np.bool_]
-) -> tuple[FloatArray, NDArray[np.bool_]]:
+def _parabolas(s: FloatArray, where: FloatArray, valid: BoolArray) -> tuple[FloatArray, BoolArray]:
     """Return a + b s + c s² through the crossings of each edge, (k, 4, 3), and whether it fits."""
     basis = np.stack([np.ones_like(s), s, s * s], axis=1)
     weight = valid.astype(float)

@@ -11,9 +11,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from cdpr_profiles.limits.robot_limits import Limit
 from cdpr_rt.core.estimate import Estimator
 from cdpr_rt.core.states import Reaction
-from cdpr_rt.core.supervision.limits import Limit, Limits
+from cdpr_rt.core.supervision.limits import Limits
 from cdpr_rt.core.supervision.supervisor import Supervisor
 from tests.cdpr_rt.core.supervision.supervisor_rig import PERIOD_S, SAFE, Cycle, with_rate
 

@@ -7,8 +7,8 @@ import math
 
 import pytest
 
+from cdpr_profiles.limits.robot_limits import Limit
 from cdpr_rt.core.states import Reaction
-from cdpr_rt.core.supervision.limits import Limit
 from cdpr_rt.core.supervision.supervisor import Supervisor
 from tests.cdpr_rt.core.supervision.supervisor_rig import PERIOD_S, SAFE, Cycle
 from tests.cdpr_rt.core.supervision.test_supervisor_limits import run, tension

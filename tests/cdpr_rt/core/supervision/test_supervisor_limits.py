@@ -8,8 +8,9 @@ from dataclasses import dataclass, field
 
 import pytest
 
+from cdpr_profiles.limits.robot_limits import Limit
 from cdpr_rt.core.states import Reaction
-from cdpr_rt.core.supervision.limits import DEFAULT_REACTIONS, Limit, Limits
+from cdpr_rt.core.supervision.limits import DEFAULT_REACTIONS, Limits
 from cdpr_rt.core.supervision.supervisor import Supervisor
 from tests.cdpr_rt.core.supervision.supervisor_rig import PERIOD_S, SAFE, Cycle, with_rate
 

@@ -16,13 +16,10 @@ from cdpr_rt.control.compensation import _torque as compensate
 from cdpr_rt.control.pid import _update as pid_update
 from cdpr_rt.control.tuning import design_pid, sweep_gain
 from cdpr_rt.control.validation import ValidationMetrics, evaluate, worst
-from cdpr_rt.identification import (
-    SecondPass,
-    SweepData,
-    ThesisResult,
-    identify_harmonic_model,
-    identify_thesis,
-)
+from cdpr_rt.identification.cogging.harmonic_model import identify_harmonic_model
+from cdpr_rt.identification.cogging.second_pass import SecondPass
+from cdpr_rt.identification.cogging.sweep import SweepData
+from cdpr_rt.identification.cogging.thesis import ThesisResult, identify_thesis
 
 T = 1e-3
 SUB = 20

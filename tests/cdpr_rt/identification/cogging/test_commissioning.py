@@ -5,7 +5,7 @@ import math
 import pytest
 
 from cdpr_rt.control.validation import ratios
-from cdpr_rt.identification import identify_harmonic_model
+from cdpr_rt.identification.cogging.harmonic_model import identify_harmonic_model
 from tests.cdpr_rt.identification.cogging.bench import (
     Bench,
     TruePlant,

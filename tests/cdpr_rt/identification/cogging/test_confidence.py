@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from cdpr_rt.control.tuning import design_pid
-from cdpr_rt.identification import identify_harmonic_model, refine
+from cdpr_rt.identification.cogging.harmonic_model import identify_harmonic_model, refine
 from tests.cdpr_rt.identification.cogging.bench import (
     BANDWIDTH,
     LATENCY,

@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from cdpr_rt.identification import IdentificationError, SweepData, identify_thesis
-from cdpr_rt.identification.cogging.thesis import GRID
+from cdpr_rt.identification.cogging.sweep import IdentificationError, SweepData
+from cdpr_rt.identification.cogging.thesis import GRID, identify_thesis
 
 SPEED = math.radians(3.0)
 
