@@ -75,6 +75,8 @@ DIRECTIONS: Final[dict[int, tuple[DirectionName, ...]]] = {
     3: ("x", "y", "z", "rx", "ry", "rz"),
 }
 """Directions of a platform by how many coordinates it has: positions, then angles."""
+NO_PLATFORM: Final = "has no platform; allowed: robots with a [platform]"
+"""Said, after its name or path, of a robot that is asked for what only a platform has."""
 _LEAST_ARM_m = 0.1
 _RISE_S = 0.1
 """In which the acceleration is reached where no jerk is given."""

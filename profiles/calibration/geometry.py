@@ -15,7 +15,7 @@ from typing import Any, Literal
 from pydantic import Field
 
 from cdpr_profiles.errors import ProfileError
-from cdpr_profiles.platform import Platform, Point
+from cdpr_profiles.platform import NO_PLATFORM, Platform, Point
 from cdpr_profiles.reading.reader import Profile
 from cdpr_profiles.robot import Robot, RobotAxis
 
@@ -70,7 +70,7 @@ class GeometryCalibration(Profile):
         """Return (key, problem) for what cannot be of `robot`."""
         platform = robot.platform
         if platform is None:
-            return [("robot", f"{robot.profile} has no platform")]
+            return [("robot", f"{robot.profile}: {NO_PLATFORM}")]
         found, n, k = [], len(robot.axes), len(platform.home_m)
         for key in ("exit_points_m", "drum_scales", "exit_std_m"):
             if len(getattr(self, key)) != n:

@@ -13,6 +13,7 @@ from cdpr_rt.motion.path.reading import require_kind
 from cdpr_rt.refusal import CommandRefusal, RefusalCode
 from cdpr_tools.client.client import Daemon, HeldRight, await_start
 from cdpr_tools.client.motion import RENEW_S, TELL_S, ended_text, finish
+from cdpr_tools.client.platform_move import require_platform
 from cdpr_tools.client.refusals import DaemonRefusalError, in_typed_words
 from cdpr_tools.client.status_text import (
     GO_ON,
@@ -98,8 +99,7 @@ def go_on(daemon: Daemon, out: Output) -> None:
 
 def _require_platform(daemon: Daemon, out: Output) -> None:
     await_start(daemon, out)
-    if "path" not in daemon.get("/description").get("programs", []):
-        raise BadInputError("path: only for robots whose platform is moved as a whole")
+    require_platform(daemon.get("/description"), "path")
 
 
 def require_held(status: dict[str, Any]) -> None:

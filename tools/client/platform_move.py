@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any, Final
 
+from cdpr_profiles.platform import NO_PLATFORM
 from cdpr_tools.client.client import Daemon
 from cdpr_tools.errors import BadInputError
 from cdpr_tools.number_options import numbers
@@ -44,9 +45,9 @@ class PlatformMove:
 
     def arguments(self, daemon: Daemon) -> dict[str, Any]:
         """Return what the program `pose` is to do; raises BadInputError."""
-        platform = daemon.get("/description").get("platform")
-        if platform is None:
-            raise BadInputError(f"{self.typed}: the robot has no platform; allowed: AXIS=ANGLE...")
+        description = daemon.get("/description")
+        require_platform(description, self.typed, "; its axes are moved by AXIS=ANGLE...")
+        platform = description["platform"]
         names = _COORDINATES[len(platform["home_m"])]
         turns = [name for name in platform.get("controlled", ()) if name in _ANGLES]
         to = None if self.to is None else numbers("--to", self.to, names, "mm", 1e-3)
@@ -148,3 +149,12 @@ def _in_space(values: Sequence[float], about: Sequence[int]) -> list[float]:
     for axis, value in zip(about, values, strict=False):
         vector[axis] = value
     return vector
+
+
+def require_platform(description: dict[str, Any], asked: str, instead: str = "") -> None:
+    """Raise BadInputError where a daemon's description is of a robot without a platform.
+
+    What was `asked` for comes first, what is possible `instead` last.
+    """
+    if description.get("platform") is None:
+        raise BadInputError(f"{asked}: {description.get('robot')}: {NO_PLATFORM}{instead}")

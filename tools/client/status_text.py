@@ -32,7 +32,10 @@ def death_text(status: dict[str, Any]) -> str:
 
 
 GO_ON = "`cdpr path --resume` goes on"
-FALLEN = "; it has fallen: look at it, then `cdpr tighten --from home` where it stands there"
+FALLEN = (
+    "; it has fallen: look at it, then `cdpr tighten --from home` where it stands there, or "
+    "`--from lengths` where it stands upright elsewhere"
+)
 _OPTIONS = {"live_view": "--live", "stream": "--stream"}
 _STAGES = {
     ("tighten", "slack"): "winding in the slack of the cables",

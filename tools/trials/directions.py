@@ -14,7 +14,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from cdpr_profiles import Robot
-from cdpr_profiles.platform import Platform
+from cdpr_profiles.platform import NO_PLATFORM, Platform
 from cdpr_rt.arrays import FloatArray
 from cdpr_tools.errors import BadInputError
 
@@ -136,7 +136,7 @@ class Directions:
 def platform_of(robot: Robot) -> Platform:
     """Return a robot's platform; raises BadInputError for a robot that has none."""
     if robot.platform is None:
-        raise BadInputError(f"{robot.path}: has no platform; allowed: robots with a [platform]")
+        raise BadInputError(f"{robot.path}: {NO_PLATFORM}")
     return robot.platform
 
 

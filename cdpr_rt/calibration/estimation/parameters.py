@@ -14,6 +14,7 @@ from typing import Final, Literal, Self
 import numpy as np
 
 from cdpr_profiles import Robot
+from cdpr_profiles.platform import NO_PLATFORM
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.errors import InvalidRequestError
 from cdpr_rt.robots.kinematics.cable_kernel import ANCHOR, RADIUS
@@ -97,7 +98,7 @@ class CableGeometry:
         Elongation is left out where the file takes the cables for rigid.
         """
         if robot.platform is None:
-            raise InvalidRequestError(f"{robot.path}: has no platform, so no geometry to calibrate")
+            raise InvalidRequestError(f"{robot.path}: {NO_PLATFORM}")
         wanted = set(identified)
         if unknown := wanted - set(KINDS):
             allowed = ", ".join(KINDS)

@@ -9,6 +9,7 @@ from typing import Final
 import numpy as np
 
 from cdpr_profiles import Robot
+from cdpr_profiles.platform import NO_PLATFORM
 from cdpr_rt.arrays import FloatArray, IntArray
 from cdpr_rt.motion.path.description import Coordinates, PathDescription, PathError
 from cdpr_rt.motion.path.nodes import PathNodes, nodes_of
@@ -68,7 +69,7 @@ class PathPlanner:
         """Raises PathError for a robot without a platform."""
         platform = robot.platform
         if platform is None:
-            raise PathError(robot.path, 0, "has no platform; allowed: robots with a [platform]")
+            raise PathError(robot.path, 0, NO_PLATFORM)
         self.model: PlatformModel = platform_model_of(robot)
         self.platform = platform
         self.limits = PathLimits(self.model.speed, self.model.acceleration, self.model.jerk)

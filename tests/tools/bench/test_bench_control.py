@@ -53,5 +53,5 @@ def test_verdicts_are_those_of_the_printed_figures() -> None:
 def test_a_robot_without_a_platform_is_refused() -> None:
     done = run("--robot", "bench-2")
     assert done.returncode == 2
-    assert "bench-2: no [platform]; allowed: a robot with a platform" in done.stderr
+    assert "bench-2.toml: has no platform; allowed: robots with a [platform]" in done.stderr
     assert "Traceback" not in done.stderr

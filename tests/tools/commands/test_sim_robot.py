@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import json
 import time
+import types
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -15,8 +16,10 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from cdpr_drivers.camera.open_camera import open_camera
+from cdpr_profiles import ProfileError
 from cdpr_rt.core.clock import LockstepClock
 from cdpr_sim_bus.robot.logs.truth_log import HEADER_BYTES
+from cdpr_tools.client import client
 from cdpr_tools.commands.sim.sim_fault import InjectedFault, fault
 from cdpr_tools.errors import BadInputError, WorkFailedError
 from tests.tools.robot_rig import Simulator, simulated, unique
@@ -152,6 +155,29 @@ def test_a_cable_is_cut_while_the_robot_runs(
 def test_a_fault_that_cannot_be_is_refused(robot: Robot, what: tuple[Any, ...], reason: str):
     with pytest.raises(BadInputError, match=reason):
         robot.fault(*what)
+
+
+def test_a_fault_finds_the_robot_by_the_name_of_its_daemon(
+    robot: Robot, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    url = {"url": f"simbus:{robot.name}-can0"}
+    told = {"/description": {"reference": "planar-3"}, "/status": {"buses": {"can0": url}}}
+    asked: list[str | None] = []
+
+    @contextlib.contextmanager
+    def opened(name: str | None, *_: object) -> Iterator[Any]:
+        asked.append(name)
+        yield types.SimpleNamespace(get=told.__getitem__)
+
+    monkeypatch.setattr(client, "answers", lambda name, _: name == "mine")
+    monkeypatch.setattr(client, "open_daemon", opened)
+    fault("mine", InjectedFault.SLIP, "1", axis="lower")
+    assert capsys.readouterr().out == "lower: slip 1 mm\n"
+    assert set(asked) == {"mine"}
+    with pytest.raises(ProfileError, match="no profile named 'yours'"):
+        fault("yours", InjectedFault.SLIP)
+    with pytest.raises(ProfileError, match="no profile named 'mine'"):
+        fault("mine", InjectedFault.SLIP, bus=[f"simbus:{robot.name}"])
 
 
 def test_detached_motors_have_no_cable_to_cut() -> None:

@@ -184,8 +184,8 @@ def test_the_status_tells_where_a_platform_is_and_how_it_is_turned() -> None:
 # -- as it is typed
 
 
-def typed(monkeypatch: pytest.MonkeyPatch, told: Told, *words: str) -> Any:
-    """Run `cdpr move` with these words against a made-up daemon."""
+def typed(monkeypatch: pytest.MonkeyPatch, told: Told, *words: str, command: str = "move") -> Any:
+    """Run `cdpr move`, or another command, with these words against a made-up daemon."""
 
     @contextmanager
     def opened(*_where: Any) -> Iterator[Told]:
@@ -194,7 +194,7 @@ def typed(monkeypatch: pytest.MonkeyPatch, told: Told, *words: str) -> Any:
     monkeypatch.setattr(with_daemon, "open_daemon", opened)
     app = typer.Typer()
     app.add_typer(daemon_motion.app)
-    return CliRunner().invoke(app, ["move", *words])
+    return CliRunner().invoke(app, [command, *words])
 
 
 @pytest.mark.parametrize(
@@ -278,3 +278,20 @@ def test_a_platform_that_friction_keeps_away_is_told_and_there_all_the_same(
     assert result.exit_code == 0
     figures = json.loads(result.stdout.splitlines()[-1])
     assert figures["trouble"] == "the platform stands 1.2 mm from its target"
+
+
+def test_who_lets_the_platform_down_already_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    down = Told(ROOM)
+    held = {"program": "lower", "control": {"held": True, "client": "a@b"}}
+    monkeypatch.setattr(down, "get", lambda _: Told(ROOM).get("/status") | held)
+    result = typed(monkeypatch, down, command="lower")
+    assert isinstance(result.exception, WorkFailedError)
+    assert "is being let down already, by a@b" in str(result.exception)
+    assert not down.posted
+
+
+def test_a_robot_without_a_platform_is_told_so_and_what_moves_its_axes() -> None:
+    bare = Told(PLANE)
+    bare.platform = None  # type: ignore[assignment]
+    with pytest.raises(BadInputError, match=r"--to 1 2: .*has no platform; .* by AXIS=ANGLE"):
+        wanted(bare, "1 2")

@@ -73,7 +73,8 @@ def test_of_a_platform_that_fell_it_is_told_what_comes_before_it_is_tightened() 
     status["program_progress"]["fallen"] = True
     (line,) = (str(line) for line in status_text(status).renderables if "loose" in str(line))
     assert line.endswith(
-        "it has fallen: look at it, then `cdpr tighten --from home` where it stands there"
+        "it has fallen: look at it, then `cdpr tighten --from home` where it stands there, or "
+        "`--from lengths` where it stands upright elsewhere"
     )
 
 

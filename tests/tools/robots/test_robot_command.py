@@ -148,7 +148,7 @@ def test_a_loop_that_has_to_be_slow_is_told(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("arguments", "problem"),
     [
-        (["one-bus-8"], "this robot has none"),
+        (["one-bus-8"], "has no platform; allowed: robots with a [platform]"),
         (["planr-3"], "did you mean 'planar-3'?"),
         (["planar-3.tml"], "no such file: 'planar-3.tml'"),
         ([__file__.rpartition("/")[2]], "is no robot's file (TOML, its name ends in .toml)"),

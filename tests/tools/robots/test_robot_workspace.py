@@ -117,7 +117,7 @@ def test_a_centre_outside_is_refused_with_one_that_is_not() -> None:
 @pytest.mark.parametrize(
     ("arguments", "told"),
     [
-        (["bench-2"], "platform: this robot has none"),
+        (["bench-2"], "has no platform; allowed: robots with a [platform]"),
         (["point-4", "--rotate", "1", "2", "3"], "no angle of this platform is controlled"),
         (["planar-4", "--rotate", "-200"], "less than 180 deg"),
         (["planar-4", "--within", "180"], "less than 180 deg"),

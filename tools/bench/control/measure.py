@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from cdpr_profiles import Robot, load_robot
+from cdpr_profiles.platform import NO_PLATFORM
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.core.exchange import AxisFeedback, Setpoint
 from cdpr_rt.errors import GeometryError
@@ -90,7 +91,7 @@ def report(figures: dict[str, Any]) -> list[str]:
 def controls(robot: Robot) -> tuple[CableControl, BaselineCableControl]:
     """Return both controls of a robot, its platform standing in the middle of its box."""
     if robot.platform is None:
-        raise GeometryError(f"{robot.profile}: no [platform]; allowed: a robot with a platform")
+        raise GeometryError(f"{robot.path}: {NO_PLATFORM}")
     model, axes, n = platform_model_of(robot), list(robot.axes), len(robot.axes)
     torque_Nm = np.broadcast_to(limits_of(robot).torque_Nm, (n,)).astype(float)
     ours = CableControl(model, axes, torque_Nm, robot.sync_period_s)

@@ -15,6 +15,7 @@ from cdpr_profiles import Robot, load_robot
 from cdpr_profiles.calibration.geometry import geometry_sha256, write_text
 from cdpr_profiles.calibration.in_force import calibrated
 from cdpr_profiles.devices.camera import CameraIntrinsics, MarkerSheets
+from cdpr_profiles.platform import NO_PLATFORM
 from cdpr_profiles.reading.reader import Profile, read_json_model
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.calibration.markers.sighting import Sighting
@@ -47,7 +48,7 @@ def robot_of(daemon: Daemon, as_calibrated: bool = False) -> tuple[Robot, dict[s
     description = daemon.get("/description")
     robot = load_robot(description["reference"])
     if robot.platform is None:
-        raise BadInputError(f"{robot.path}: has no platform; allowed: robots with a [platform]")
+        raise BadInputError(f"{robot.path}: {NO_PLATFORM}")
     if as_calibrated:
         robot = calibrated(robot)
     elif description["calibration"] is not None:

@@ -18,10 +18,10 @@ from cdpr_tools.client.motion import (
     is_done,
     require_program,
 )
-from cdpr_tools.client.platform_move import PlatformMove, ReferenceFrame
+from cdpr_tools.client.platform_move import PlatformMove, ReferenceFrame, require_platform
 from cdpr_tools.client.refusals import in_typed_words
 from cdpr_tools.commands.daemon.with_daemon import with_daemon
-from cdpr_tools.errors import BadInputError
+from cdpr_tools.errors import BadInputError, WorkFailedError
 from cdpr_tools.number_options import numbers_command
 from cdpr_tools.output import Output
 from cdpr_tools.signals import HELD, stop_on_signals
@@ -241,7 +241,13 @@ def lower(
 ) -> None:
     """Let the platform down onto its stand; the power stays on, the cables are loose."""
     arguments = {"blind": True} if blind else {}
-    tight = (daemon.get("/status").get("program_progress") or {}).get("tight")
+    status = daemon.get("/status")
+    if status["program"] == "lower" and status["control"]["held"]:
+        raise WorkFailedError(
+            f"lower: the platform is being let down already, by {status['control']['client']}; "
+            "`cdpr status --watch` shows it"
+        )
+    tight = (status.get("program_progress") or {}).get("tight")
     where = "let down blind" if blind else "on its stand" if tight else "where it is"
     _carry_out(daemon, out, "lower", arguments, f"{where}, cables loose, power on")
 
@@ -269,9 +275,7 @@ def resume(daemon: Daemon, out: Output) -> None:
 
 
 def _require_platform(daemon: Daemon, what: str) -> None:
-    programs = daemon.get("/description").get("programs", [])
-    if "lower" not in programs:
-        raise BadInputError(f"{what}: only for robots whose platform is moved as a whole")
+    require_platform(daemon.get("/description"), what)
 
 
 def _carry_out(

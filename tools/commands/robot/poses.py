@@ -10,6 +10,7 @@ import numpy as np
 import typer
 
 from cdpr_profiles.calibration.in_force import load_calibrated
+from cdpr_profiles.platform import NO_PLATFORM
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.errors import GeometryError
 from cdpr_rt.robots.platform_model import PlatformModel, platform_model_of
@@ -73,7 +74,7 @@ def poses(
     out = Output(as_json)
     profile = load_calibrated(robot)
     if profile.platform is None:
-        raise BadInputError(f"{profile.path}: platform: this robot has none; allowed: one with it")
+        raise BadInputError(f"{profile.path}: {NO_PLATFORM}")
     if out_file is not None:
         checked_file(out_file)
     model = platform_model_of(profile)

@@ -12,7 +12,7 @@ import typer
 from cdpr_profiles import Robot, load_robot
 from cdpr_profiles.calibration.in_force import load_calibrated
 from cdpr_profiles.errors import ProfileError
-from cdpr_profiles.platform import Platform
+from cdpr_profiles.platform import NO_PLATFORM, Platform
 from cdpr_rt.robots.feasibility import checks
 from cdpr_rt.robots.persistence.calibration_state import mark_calibrated
 from cdpr_tools.calibrate.words import calibration_lines
@@ -37,8 +37,7 @@ def show(robot: RobotArgument, png: PngOption = None, as_json: JsonOption = Fals
     platform = profile.platform
     if platform is None:
         raise BadInputError(
-            f"{profile.path}: platform: this robot has none, its winches have nothing in common; "
-            f"`cdpr profiles show` tells what else there is"
+            f"{profile.path}: {NO_PLATFORM}; `cdpr profiles show` tells what else there is"
         )
     with out.stage(f"{profile.profile}: computing tensions, control and what cannot work"):
         figures = summary.figures(profile, platform)

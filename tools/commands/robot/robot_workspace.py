@@ -12,7 +12,7 @@ import typer
 
 from cdpr_profiles import Robot
 from cdpr_profiles.calibration.in_force import load_calibrated
-from cdpr_profiles.platform import FURTHEST_m, Platform
+from cdpr_profiles.platform import NO_PLATFORM, FURTHEST_m, Platform
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.robots.platform_model import directions_of
 from cdpr_rt.robots.statics import Box, view_of
@@ -165,9 +165,7 @@ def workspace(
     profile = load_calibrated(robot)
     platform = profile.platform
     if platform is None:
-        raise BadInputError(
-            f"{profile.path}: platform: this robot has none, its winches have nothing in common"
-        )
+        raise BadInputError(f"{profile.path}: {NO_PLATFORM}")
     typed = _Typed(rotate, within, centre, low, high)
     moving = 0.0 if static else platform.acceleration_m_s2
     criterion = criterion_of(profile, moving, typed.turns(platform), margin, contact_free)

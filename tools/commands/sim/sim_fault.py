@@ -10,7 +10,7 @@ import typer
 from cdpr_drivers.canopen.network import CanNetwork
 from cdpr_drivers.errors import BusError, SdoError
 from cdpr_drivers.robot.robot_buses import robot_urls
-from cdpr_profiles import Robot, RobotAxis, Winch, load_winch_or_robot
+from cdpr_profiles import ProfileError, Robot, RobotAxis, Winch, load_winch_or_robot
 from cdpr_profiles.eds.dictionary import load_dictionary
 from cdpr_profiles.robot import robot_of_winch
 from cdpr_rt.core.clock import PacedClock
@@ -54,7 +54,11 @@ app = typer.Typer()
 @app.command()
 def fault(
     machine: Annotated[
-        str, typer.Argument(help="Winch or robot that is simulated.", metavar="WINCH|ROBOT")
+        str,
+        typer.Argument(
+            help="Winch or robot that is simulated, or the name of its daemon.",
+            metavar="WINCH|ROBOT",
+        ),
     ],
     what: Annotated[
         InjectedFault, typer.Argument(help="What goes wrong, at once.", metavar="FAULT")
@@ -77,7 +81,7 @@ def fault(
 
     It writes object 2F00h, which no real drive has, beside whoever runs the robot.
     """
-    profile = load_winch_or_robot(machine)
+    profile, daemon = _profile(machine, by_daemon=not bus)
     robot = robot_of_winch(profile) if isinstance(profile, Winch) else profile
     chosen = _axis(robot, axis)
     injection = _INJECTIONS[what]
@@ -87,7 +91,7 @@ def fault(
             f"{what}: {robot.name} has no load cells, its tensions are estimated from torques; "
             "allowed: for a robot whose file names tension_sensors"
         )
-    url = robot_urls(robot, bus or _buses_of_daemon(profile.profile))[chosen.bus]
+    url = robot_urls(robot, bus or _buses_of_daemon(daemon))[chosen.bus]
     winch = chosen.winch
     with raised_as(BadInputError, BusError):
         network = CanNetwork(
@@ -101,6 +105,21 @@ def fault(
     finally:
         network.close()
     typer.echo(f"{chosen.name}: {what}{_amount_text(what, amount, injection)}")
+
+
+def _profile(machine: str, *, by_daemon: bool) -> tuple[Winch | Robot, str]:
+    """Return the machine of a profile or of a daemon of this name, and its daemon's name."""
+    try:
+        profile = load_winch_or_robot(machine)
+    except ProfileError:
+        # loaded here: a simulator without a daemon needs no client
+        from cdpr_tools.client.client import answers, open_daemon  # noqa: PLC0415
+
+        if not by_daemon or machine.endswith(".toml") or not answers(machine, None):
+            raise
+        with open_daemon(machine, None, None, None) as daemon:
+            return load_winch_or_robot(daemon.get("/description")["reference"]), machine
+    return profile, profile.profile
 
 
 def _buses_of_daemon(robot: str) -> list[str]:
