@@ -1,4 +1,4 @@
-"""The one error of this package."""
+"""The error of a profile, which names file, key and value, and how values are shown in it."""
 
 from pathlib import Path
 

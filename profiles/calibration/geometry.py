@@ -6,7 +6,7 @@ import hashlib
 import json
 import math
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
@@ -92,18 +92,18 @@ class GeometryCalibration(Profile):
         """Return what is further from the robot's file than errors of measuring."""
         exits = list(zip(self.exit_points_m, platform.exit_points_m, strict=True))
         anchors = zip(self.anchor_points_m or (), platform.anchor_points_m, strict=False)
-        moved_m = min(max(_apart_m(calibrated, file) for calibrated, file in exits), _FURTHEST_m)
+        moved_m = min(max(math.dist(calibrated, file) for calibrated, file in exits), _FURTHEST_m)
         for key, pairs, most_m in (
             ("exit_points_m", exits, _FURTHEST_m),
             ("anchor_points_m", anchors, _ANCHOR_m),
             ("home_m", [(self.home_m, platform.home_m)], platform.home_tolerance_m + moved_m),
         ):
             for i, (calibrated, file) in enumerate(pairs):
-                if not _apart_m(calibrated, file) <= most_m:  # nor what is not a number
+                if not math.dist(calibrated, file) <= most_m:  # nor what is not a number
                     yield f"{key}[{i}]", f"more than {most_m:.3g} m from the robot's file"
 
     def _far_values(self, platform: Platform) -> Iterator[tuple[str, str]]:
-        if not _apart_m(self.home_rotation_rad, platform.home_rotation_rad) <= _TURNED_rad:
+        if not math.dist(self.home_rotation_rad, platform.home_rotation_rad) <= _TURNED_rad:
             yield "home_rotation_rad", f"more than {_TURNED_rad:g} rad from the robot's file"
         values = [(f"drum_scales[{i}]", x, _DRUM) for i, x in enumerate(self.drum_scales)]
         for key, value, (low, high) in [
@@ -190,7 +190,3 @@ def write_text(path: Path, text: str) -> None:
         part.replace(path)
     except OSError as error:
         raise ProfileError(path, "", f"cannot be written: {error.strerror}") from None
-
-
-def _apart_m(calibrated: Sequence[float], reference: Sequence[float]) -> float:
-    return math.dist(calibrated, reference)

@@ -1,4 +1,4 @@
-"""The simulated lens: where a direction is seen, and in which direction a pixel looks."""
+"""A simulated camera: its lens model, and the images that it takes of a scene."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a CANopen slave's services and its device know of it: timers, callbacks, interfaces."""
+"""Interfaces between a CANopen slave, its services and its device: timers, callbacks, states."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The plant file of a simulated safety I/O: the truth about contactor, brakes and switches."""
+"""A simulated safety I/O: contactor, brakes, limit switches, and its plant file."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Whom a monitor takes the nodes of a bus for: by a drive's, a winch's or a robot's profile."""
+"""The nodes of a bus as a drive's, a winch's or a robot's profile tells them, for decoding."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A calibration in force, in words."""
+"""Text on the calibration in force."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the command line leaves to be said of a path's file."""
+"""Options of a path's file: origin, blending tolerance, words of G-code that are skipped."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What `cdpr path` tells of a path before anything moves."""
+"""The preview of a path before anything moves: its plan, figures and obstacles."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Why motions, and recordings, ended, out of what a recording tells."""
+"""The summary of a recording: figures, motions, events, and why they ended."""
 
 from __future__ import annotations
 

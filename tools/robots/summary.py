@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -91,15 +92,7 @@ def _of_tensions(
 def _of_free_rotation(model: PlatformModel) -> dict[str, float] | None:
     """Return how a platform swings that no cable keeps from turning; None where none can."""
     swings = free_rotation(model)
-    if swings is None:
-        return None
-    return {
-        "slowest_Hz": swings.slowest_Hz,
-        "fastest_Hz": swings.fastest_Hz,
-        "swing_rad": swings.swing_rad,
-        "swing_m": swings.swing_m,
-        "lasts_s": swings.lasts_s(SWINGS_m),
-    }
+    return None if swings is None else asdict(swings) | {"lasts_s": swings.lasts_s(SWINGS_m)}
 
 
 def _of_loop(robot: Robot, model: PlatformModel) -> dict[str, float] | None:

@@ -1,4 +1,4 @@
-"""What is known of a simulated robot's poses that no calibration uses: it is judged by it alone."""
+"""True and scanned poses of a simulated robot; they verify a calibration and are not in it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The measuring of a calibration: each pose is kept at once, and a run that ended goes on later."""
+"""Measures the poses of a calibration on a simulated robot; what is stored can be resumed."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Ways of a platform between the poses of a calibration: how fast, how long, and what ended one."""
+"""Motions between the poses of a calibration: speed, time allowed, and how they ended."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How a calibration of a simulated robot did: beside its scanner, and beside what was true.
+"""Compares the calibration of a simulated robot with its scanner and with the truth.
 
 None of it is known to the calibration; it is read when that is finished.
 """

@@ -1,4 +1,4 @@
-"""Options and what they mean that several commands of `cdpr calibrate` share."""
+"""Options that several commands of `cdpr calibrate` share, and their evaluation."""
 
 from __future__ import annotations
 

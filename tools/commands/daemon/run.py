@@ -148,24 +148,11 @@ def run(
     profile = load_calibrated(robot)
     refuse_simulated_calibration(profile, bus or ())
     settings = settings_for(
-        profile,
-        bus=bus,
-        plant=plant,
-        http=http,
-        unix=unix,
-        key_file=key_file,
-        record=record,
-        no_record=no_record,
-        keep_days=keep_days,
-        keep_gb=keep_gb,
-        live=live,
-        live_origin=live_origin,
-        stream=stream,
-        read_only=read_only,
-        safety_io=safety_io,
-        tension_port=tension_port,
-        commissioned=commissioned,
-    )
+        profile, bus=bus, plant=plant, http=http, unix=unix, key_file=key_file, record=record,
+        no_record=no_record, keep_days=keep_days, keep_gb=keep_gb, live=live,
+        live_origin=live_origin, stream=stream, read_only=read_only, safety_io=safety_io,
+        tension_port=tension_port, commissioned=commissioned,
+    )  # fmt: skip
     if camera is not None and not starts_own_simulator(bus or ()):
         raise BadInputError("--camera: only for a simulator that the command starts (simbus:)")
     _require_free(settings.socket)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import asdict
 from typing import Annotated, Any
 
 import typer
@@ -211,15 +212,7 @@ def _keep(
 
 
 def _as_dict(state: IoState) -> dict[str, Any]:
-    return {
-        "chain_ok": state.chain_ok,
-        "contactor_asked": state.contactor_asked,
-        "contactor_closed": state.contactor_closed,
-        "brakes_asked": state.brakes_asked,
-        "brakes_released": state.brakes_released,
-        "limits": list(state.limits),
-        "lights": state.lights,
-    }
+    return {key: value for key, value in asdict(state).items() if key != "at_s"}
 
 
 def _lines(state: IoState) -> list[str]:
