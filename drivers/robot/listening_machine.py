@@ -39,7 +39,7 @@ class ListeningMachine:
         self._urls = robot_urls(robot, buses)
         self.device: ListeningDevice | None = None
         """The axes that are heard, None until `open` and after `close`."""
-        self._patient_until_s = 0.0
+        self._sync_deadline_s = 0.0
 
     # -- slow
 
@@ -60,7 +60,7 @@ class ListeningMachine:
 
     def prepare(self) -> None:
         """Begin to wait for the other master's SYNC."""
-        self._patient_until_s = self.clock.now_s + _MASTER_S
+        self._sync_deadline_s = self.clock.now_s + _MASTER_S
 
     def acknowledge(self) -> None:
         """Do nothing: there is no guard here that latches."""
@@ -98,7 +98,7 @@ class ListeningMachine:
 
     def prepared(self) -> bool:
         """Whether a master runs the axes; raises MachineError after a while without."""
-        if not self._led and self.clock.now_s > self._patient_until_s:
+        if not self._led and self.clock.now_s > self._sync_deadline_s:
             raise MachineError(
                 f"no SYNC came for {_MASTER_S:g} s: no other master runs {self._robot.name}; "
                 "start it, then check again"
