@@ -16,7 +16,7 @@ ProfileKind = Literal[
 ]
 KINDS: tuple[ProfileKind, ...] = get_args(ProfileKind)
 SHIPPED = Path(__file__).resolve().parents[1]
-_OWN_KEYS: dict[ProfileKind, str] = {
+_DISTINCTIVE_KEYS: dict[ProfileKind, str] = {
     "motors": "torque_constant_Nm_per_Arms",
     "drives": "eds",
     "cables": "breaking_force_kgf",
@@ -91,7 +91,7 @@ def unknown_profile(
 def _is_of(kind: ProfileKind, path: Path) -> bool:
     """Whether a TOML file is of this kind, as far as its keys tell."""
     try:
-        return kind not in _OWN_KEYS or _OWN_KEYS[kind] in read_toml(path)
+        return kind not in _DISTINCTIVE_KEYS or _DISTINCTIVE_KEYS[kind] in read_toml(path)
     except ProfileError:
         return False
 

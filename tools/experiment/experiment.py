@@ -38,7 +38,7 @@ _SESSION_S: Final = 300.0
 
 
 def begin(settings: ExperimentSettings, folder: Path) -> None:
-    """Make the folder of an experiment, or find in it what was begun with the same wishes.
+    """Make the folder of an experiment, or find in it what was begun with the same settings.
 
     Raises BadInputError where the robot has no room for the pattern, or the folder holds another
     experiment.

@@ -73,12 +73,12 @@ class _NewSettings:
     activate_delay_s: float | None
 
     def __str__(self) -> str:
-        wishes = []
+        changes = []
         if self.node_id is not None:
-            wishes.append(f"node id {self.node_id}")
+            changes.append(f"node id {self.node_id}")
         if self.bitrate_bit_s is not None:
-            wishes.append(f"bit rate {self.bitrate_bit_s // 1000} kbit/s")
-        return " and ".join(wishes)
+            changes.append(f"bit rate {self.bitrate_bit_s // 1000} kbit/s")
+        return " and ".join(changes)
 
 
 @app.command()

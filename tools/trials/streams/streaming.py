@@ -41,7 +41,7 @@ class RandomHandMotion:
         self._phases = rng.uniform(0.0, math.tau, (3, reach.size))
         self._shift = np.zeros(reach.size)
         self._until_s = 0.0
-        self.mood = "waves"
+        self.activity = "waves"
 
     def at(self, time_s: float) -> FloatArray:
         """Return where the hand is, (d,), and choose what it is about to do."""
@@ -52,10 +52,10 @@ class RandomHandMotion:
 
     def _change(self, time_s: float) -> None:
         rng = self._rng
-        self.mood = str(rng.choice(["waves", "flick", "clutch", "silence"]))
+        self.activity = str(rng.choice(["waves", "flick", "clutch", "silence"]))
         lasts = {"clutch": _CLUTCH_S, "silence": _SILENCE_S}
-        self._until_s = time_s + lasts.get(self.mood, rng.uniform(*_PHASE_S))
-        if self.mood == "flick":
+        self._until_s = time_s + lasts.get(self.activity, rng.uniform(*_PHASE_S))
+        if self.activity == "flick":
             self._shift = rng.uniform(-0.5, 0.5, self._shift.size)
 
 
@@ -73,8 +73,8 @@ def drive(run: TrialRun, seconds: float) -> None:
     for cycle in range(cycles):
         if cycle % between == 0:
             place = way.at(rig.now_s)
-            if way.mood != "silence":
-                buttons = stream_buttons(way.mood == "clutch", 0)
+            if way.activity != "silence":
+                buttons = stream_buttons(way.activity == "clutch", 0)
                 sent_s = rig.now_s + _SENDER_AHEAD_s
                 position_m, quaternion = hand_pose(directions, place)
                 packet = hand.packet(sent_s, position_m, SCALE, buttons, quaternion)
