@@ -14,7 +14,11 @@ from cdpr_rt.jit import bound
 from cdpr_rt.robots.kinematics.kinematics import CableKinematics
 from cdpr_rt.robots.kinematics.pose import Pose
 from cdpr_rt.robots.rigid_body import G_m_s2
-from cdpr_rt.robots.tension.circuit_margin import MOST_NULL_DIRECTIONS, write_circuit_margins
+from cdpr_rt.robots.tension.circuit_margin import (
+    MOST_NULL_DIRECTIONS,
+    WrenchSets,
+    write_circuit_margins,
+)
 from cdpr_rt.robots.tension.null_space import null_spaces
 from cdpr_rt.robots.tension.tension_qp import write_margins
 
@@ -52,16 +56,19 @@ class CableWorkspace:
         is that of `TensionDistribution`.
         """
         self.kinematics, self.reserve_N = kinematics, reserve_N
-        sets = np.atleast_2d(np.asarray(wrenches, float))
-        added = np.zeros((0, sets.shape[1])) if generators is None else generators
-        self._sets, self._generators = np.ascontiguousarray(np.vstack([sets, added])), len(added)
-        self.wrenches = corners(sets, added)
+        first = np.atleast_2d(np.asarray(wrenches, float))
+        added = np.zeros((0, first.shape[1])) if generators is None else generators
+        self.wrenches = corners(first, added)
         """The corners of all these wrenches, (c, d)."""
         low, high = np.asarray(low_N, float) + reserve_N, np.asarray(high_N, float) - reserve_N
-        self._bounds = np.array([low, high, 0.5 * (low + high)])
-        self.low, self.high = self._bounds[0], self._bounds[1]
-        self._scale = np.array(wrench_scale, float)
-        self._centre = np.zeros(3) if centre_m is None else np.array(centre_m, float)
+        self.sets = WrenchSets(
+            np.zeros(3) if centre_m is None else np.array(centre_m, float),
+            np.ascontiguousarray(np.vstack([first, added])),
+            len(added),
+            np.array(wrench_scale, float),
+            np.array([low, high, 0.5 * (low + high)]),
+        )
+        self.low, self.high, _ = self.sets.bounds
         self._there = Pose(np.zeros(3))
 
     def prepared(self) -> CableWorkspace:
@@ -97,11 +104,11 @@ class CableWorkspace:
         if self.kinematics.n - len(self.kinematics.directions) > MOST_NULL_DIRECTIONS:
             return self.margins(poses)[0]
         matrices, margins = self.wrench_matrices(poses), np.zeros(len(poses))
-        (d, n), k = matrices.shape[1:], len(self._sets)
+        (d, n), k = matrices.shape[1:], len(self.sets.wrenches)
         side = max(n, 8)
         write_circuit_margins(
-            matrices, self._sets, self._generators, self._scale, self._bounds, least_N, margins,
-            np.zeros((k, n)), np.zeros((n + 1, n)), np.zeros((d, n + 1)), np.zeros((4, side, side)),
+            matrices, self.sets, least_N, margins, np.zeros((k, n)), np.zeros((n + 1, n)),
+            np.zeros((d, n + 1)), np.zeros((4, side, side)),
         )  # fmt: skip
         return margins
 
@@ -109,15 +116,10 @@ class CableWorkspace:
         """Return the W (m, d, n) by which tensions act at the poses, about the wrenches' point."""
         d, n = len(self.kinematics.directions), self.kinematics.n
         centred, matrices = np.array(poses, float), np.zeros((len(poses), d, n))
-        if self._centre.any():
-            centred[:, 0] += centred[:, 1:] @ self._centre
+        if self.sets.centre.any():
+            centred[:, 0] += centred[:, 1:] @ self.sets.centre
         self.kinematics.wrench_matrices(centred, matrices)
         return matrices
-
-    @property
-    def arrays(self) -> tuple[FloatArray, FloatArray, int, FloatArray, FloatArray]:
-        """The `centre` (3,), wrenches (k, d), how many of them are generators, scale, bounds."""
-        return self._centre, self._sets, self._generators, self._scale, self._bounds
 
     def is_feasible(self, pose: Pose) -> bool:
         """Return whether the platform is held at a pose; once `prepared` allocates no arrays."""
@@ -155,7 +157,7 @@ class _Pass:
 
     def __init__(self, workspace: CableWorkspace, m: int, most_N: float) -> None:
         kinematics, wrenches = workspace.kinematics, workspace.wrenches
-        centre, sets, generators, scale, bounds = workspace.arrays
+        centre, _, _, scale, bounds = sets = workspace.sets
         (k, d), n = wrenches.shape, kinematics.n
         self.poses = np.zeros((m, 4, 3))
         self._centre, self._aside, self._centred = centre, np.zeros((m, 3)), self.poses
@@ -176,8 +178,8 @@ class _Pass:
         self._circuits = None
         if n - d <= MOST_NULL_DIRECTIONS:
             self._circuits = bound(
-                write_circuit_margins, self.matrices, sets, generators, scale, bounds, 0.0,
-                self.margins, np.zeros((len(sets), n)), spaces[0], np.zeros((d, n + 1)), scratch,
+                write_circuit_margins, self.matrices, sets, 0.0, self.margins,
+                np.zeros((len(sets.wrenches), n)), spaces[0], np.zeros((d, n + 1)), scratch,
             )  # fmt: skip
 
     def run(self) -> None:

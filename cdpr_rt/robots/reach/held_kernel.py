@@ -32,7 +32,7 @@ from cdpr_rt.robots.kinematics.cable_kernel import (
     TINY,
     run_cables,
 )
-from cdpr_rt.robots.tension.circuit_margin import circuit_margin
+from cdpr_rt.robots.tension.circuit_margin import WrenchSets, circuit_margin
 from cdpr_rt.robots.tension.null_space import null_space, other_wrench
 
 LEAST_N: Final = 1e-3
@@ -47,22 +47,14 @@ _FORCE, _MOMENT = 0, 1
 
 @jit
 def held_until(
-    geometry: FloatArray,
-    centre: FloatArray,
-    chosen: IntArray,
-    wrenches: FloatArray,
-    generators: int,
-    scale: FloatArray,
-    bounds: FloatArray,
-    way: FloatArray,
-    until: float,
+    geometry: FloatArray, chosen: IntArray, sets: WrenchSets, way: FloatArray, until: float
 ) -> tuple[float, int]:
     """Return up to which share of the way, `until` at most, all wrenches are carried.
 
-    And how many places were looked at. `geometry` is that about the point `centre` (3,) of the
-    platform, about which the wrenches (k, d) act; `generators`, `scale` and `bounds` are those of
-    `circuit_margin`, `chosen` (d,) the controlled directions.
+    And how many places were looked at. `geometry` is that about the centre of the wrenches,
+    `chosen` (d,) are the controlled directions.
     """
+    centre, wrenches, generators, scale, bounds = sets
     d, n = scale.size, geometry.shape[1]
     cables, W, D = np.empty((CABLE_ROWS, n)), np.empty((d, n)), np.empty((6, n))
     space, scaled, side = np.zeros((n + 1, n)), np.empty((d, n + 1)), max(n, 8)

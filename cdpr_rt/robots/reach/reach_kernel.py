@@ -17,6 +17,7 @@ from cdpr_rt.robots.interference.contact_kernel import (
     first_contact,
 )
 from cdpr_rt.robots.reach.held_kernel import held_until
+from cdpr_rt.robots.tension.circuit_margin import WrenchSets
 
 WHOLE, CONTACT, NOT_HELD = range(3)
 """Why a way ends: at its target, at a contact, or where tensions are not feasible."""
@@ -30,18 +31,14 @@ def reach_all(
     chosen: IntArray,
     scene: Scene,
     centred: FloatArray,
-    centre: FloatArray,
-    wrenches: FloatArray,
-    generators: int,
-    scale: FloatArray,
-    bounds: FloatArray,
+    sets: WrenchSets,
     shares: FloatArray,
     why: IntArray,
 ) -> None:
     """Write for which share of each straight way a platform is held and clear, eq. (3.38).
 
     Ways lead from the position `start` (d,) to each of `ends` (m, d); all else is that of
-    `first_contact` and, about the point where wrenches act, of `held_until`.
+    `first_contact` and `held_until`, whose geometry `centred` is.
     """
     way = np.zeros((WAY_ROWS, 3))
     for k in range(3):
@@ -57,8 +54,6 @@ def reach_all(
         touches, pair, _, _ = first_contact(scene, way, MOST_LOOKS)
         until = min(touches, 1.0)
         why[j] = WHOLE if pair < 0 else CONTACT
-        shares[j], _ = held_until(
-            centred, centre, chosen, wrenches, generators, scale, bounds, way, until
-        )
+        shares[j], _ = held_until(centred, chosen, sets, way, until)
         if shares[j] < until:
             why[j] = NOT_HELD

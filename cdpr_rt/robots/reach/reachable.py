@@ -59,11 +59,8 @@ class Reach:
         if why_not:
             place = ", ".join(f"{x:.3f}" for x in there.p[: model.positions])
             raise GeometryError(f"the start at {place} m: {why_not}")
-        centre, wrenches, generators, scale, bounds = workspace.arrays
-        self._arrays = (
-            np.array(model.kinematics.directions), model.interference.scene,
-            model.about_centre_of_mass.geometry, centre, wrenches, generators, scale, bounds,
-        )  # fmt: skip
+        directions, geometry = model.kinematics.directions, model.about_centre_of_mass.geometry
+        self._arrays = np.array(directions), model.interference.scene, geometry, workspace.sets
 
     def shares(self, ends: FloatArray) -> tuple[FloatArray, IntArray]:
         """Return how much of the way to each of the positions (m, d) is reached, and why no more.

@@ -17,7 +17,7 @@ set is ever built.
 from __future__ import annotations
 
 import math
-from typing import Final
+from typing import Final, NamedTuple
 
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.jit import jit
@@ -28,13 +28,25 @@ _NO_CIRCUIT = 1e-9
 """Columns of N, whose rows are of length 1, that are parallel but for this have no determinant."""
 
 
+class WrenchSets(NamedTuple):
+    """Wrenches that tensions within bounds have to carry, about one point of the platform."""
+
+    centre: FloatArray
+    """That point in the platform's frame, (3,)."""
+    wrenches: FloatArray
+    """(k, d): w_0 of one or several sets of wrenches first, and last the g_k that all share."""
+    generators: int
+    """Number of the g_k."""
+    scale: FloatArray
+    """Scale of wrenches, (d,), as of `TensionDistribution`."""
+    bounds: FloatArray
+    """(3, n): lower bounds, upper bounds, and their middle."""
+
+
 @jit
 def write_circuit_margins(
     matrices: FloatArray,
-    wrenches: FloatArray,
-    generators: int,
-    scale: FloatArray,
-    bounds: FloatArray,
+    sets: WrenchSets,
     least: float,
     margins: FloatArray,
     carrying: FloatArray,
@@ -44,12 +56,12 @@ def write_circuit_margins(
 ) -> None:
     """Write the margins (m,) of m poses: of the worst wrench, N, -inf without a rank of d.
 
-    `matrices` (m, d, n) are the W, n at most d + 2. `wrenches` (k, d) has w_0 of one or several
-    sets of wrenches first and the g_k that all of them share, `generators` many, last. A margin
-    that is found to be below `least` may be less still: nothing more is looked for then.
+    `matrices` (m, d, n) are the W, n at most d + 2. A margin that is found to be below `least` may
+    be less still: nothing more is looked for then.
     `carrying` (k, n), `space` (n + 1, n), `scaled` (d, n + 1) and `scratch` as of `null_space` are
     overwritten.
     """
+    _, wrenches, generators, scale, bounds = sets
     d, n = scale.size, bounds.shape[1]
     for j in range(margins.size):
         rank = null_space(matrices[j], wrenches[0], scale, bounds, scaled, space, scratch)
