@@ -169,11 +169,7 @@ def run(
     else:
         _require_new(folder, runs.DATA, overwrite)
         source = source_of(
-            profile,
-            camera=camera,
-            redundancy=redundancy,
-            scanner=scanner,
-            points=points is not None,
+            profile, camera=camera, redundancy=redundancy, scanner=scanner, points=bool(points)
         )
         _require_camera(known, source)
         settings = runs.CalibrationRunSettings(
