@@ -121,6 +121,14 @@ class AxisExchange:
         self._alarms = self._end_answers()
         return self.n - self._missing
 
+    def let_other_buses_follow(self) -> None:
+        """Have time on all buses that this process leads come as far as on this one.
+
+        A cycle moves the time of its own bus alone, and the clock's is the earliest of all.
+        """
+        if isinstance(self._reader, SimulatedBus):
+            self.clock.sleep_until(self._reader.now_s)
+
     def _receive_until(self, until_s: float, silent_until_s: float) -> None:
         """Process what has come; wait for more only while an axis has not answered.
 

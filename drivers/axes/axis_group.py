@@ -249,7 +249,9 @@ class AxisGroup(AxisExchange):
             self.transmit()
             if answered == self.n and all(state in POWER_OFF for state in self.states()):
                 return True
-            if not self.lockstep:
+            if self.lockstep:
+                self.let_other_buses_follow()
+            else:
                 clock.sleep(self.period_s)
         return False
 

@@ -120,3 +120,16 @@ def test_a_stream_s_packets_are_taken_as_the_daemon_takes_them(robot):
     robot.run(1.5)
     assert robot.truth()["position_m"][1] == pytest.approx(HEIGHT + 0.098, abs=5e-3)
     assert robot.truth()["velocity_m_s"][1] == pytest.approx(0.0, abs=5e-3)
+
+
+def test_a_drive_that_stays_silent_does_not_keep_two_buses_from_being_left():
+    with LockstepRobot("bench-8") as robot:
+        robot.enable()
+        robot.inject_fault(axis=1, sub=6, value=65535)
+        robot.run(0.5)
+        begin_s = robot.machine.clock.now_s
+        left = robot.machine.close()
+        # one second of cycles, then by SDO, whose time runs out
+        assert 1.0 < robot.machine.clock.now_s - begin_s < 10.0
+    assert left.startswith("node 2: does not confirm that its power stage is off")
+    assert "node 1" not in left
