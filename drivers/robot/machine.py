@@ -210,19 +210,23 @@ class RobotMachine:
     def confirm_power_off(self) -> str:
         """See to it that no drive has power which does not answer; return what is uncertain."""
         device = self._booted
-        unconfirmed = []
+        unconfirmed, lost = [], dict[str, list[str]]()
         for axis, state in zip(self.robot.axes, device.states(), strict=True):
             if state in POWER_OFF:
                 continue
             try:
                 off = self.networks[axis.bus].switch_off(axis.node_id)
             except BusError as error:
-                unconfirmed.append(f"{axis.name}: not known to be without power: {error}")
+                lost.setdefault(str(error), []).append(axis.name)
                 continue
             if not off:
                 unconfirmed.append(
                     f"{axis.name}: does not confirm that its power is off; it was reset"
                 )
+        unconfirmed += [
+            f"{', '.join(names)}: not known to be without power: {why}"
+            for why, names in lost.items()
+        ]
         return "; ".join(unconfirmed)
 
     @_as_machine_error

@@ -31,6 +31,18 @@ def death_text(status: dict[str, Any]) -> str:
     )
 
 
+def after_stop_text(status: dict[str, Any]) -> str:
+    """Return that a daemon has ended, and what was known of the drives' power in its `status`."""
+    if status["state"] == DEAD:
+        return f"ended; its loop had died: {power_text(status)}; next: `cdpr run` starts it anew"
+    if status["read_only"]:
+        return f"ended: {power_text(status)}"
+    unheard = [str(axis.get("name")) for axis in status["axes"] if axis.get("alive") is False]
+    if not unheard:
+        return "stopped, power off"
+    return f"stopped; unheard, and not known to be without power: {', '.join(unheard)}"
+
+
 GO_ON = "`cdpr path --resume` goes on"
 FALLEN = (
     "; it has fallen: look at it, then `cdpr tighten --from home` where it stands there, or "

@@ -9,6 +9,7 @@ from rich.table import Table
 
 from cdpr_tools.client.motion import finish
 from cdpr_tools.client.status_text import (
+    after_stop_text,
     compensation_text,
     death_text,
     learnt_text,
@@ -159,3 +160,25 @@ def test_a_path_is_left_until_its_end() -> None:
     assert "path part.nc left at 50 %, line 7" in str(status_text(status).renderables[1])
     path["time_s"] = 10.0
     assert not any("part.nc" in str(line) for line in status_text(status).renderables)
+
+
+@pytest.mark.parametrize(
+    ("keys", "told"),
+    [
+        ({"axes": [{"name": "left", "alive": True}]}, "stopped, power off"),
+        ({"axes": []}, "stopped, power off"),  # before it had booted
+        (
+            {"axes": [{"name": "left", "alive": False}, {"name": "right", "alive": True}]},
+            "stopped; unheard, and not known to be without power: left",
+        ),
+        ({"read_only": True}, "ended: it only listened, and commanded no drive"),
+        (
+            {"state": "dead", "driving": True},
+            "ended; its loop had died: drives that",
+        ),
+    ],
+)
+def test_what_is_said_of_the_power_after_a_stop_is_what_is_known(
+    keys: dict[str, Any], told: str
+) -> None:
+    assert after_stop_text(status_of(**keys)).startswith(told)

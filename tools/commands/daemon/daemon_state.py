@@ -12,7 +12,7 @@ from rich.text import Text
 from cdpr_tools.client.client import Daemon, NoDaemonError, open_daemon
 from cdpr_tools.client.motion import ProgressNotes
 from cdpr_tools.client.refusals import DaemonRefusalError
-from cdpr_tools.client.status_text import DEAD, FALLEN, power_text, status_text
+from cdpr_tools.client.status_text import DEAD, FALLEN, after_stop_text, status_text
 from cdpr_tools.commands.daemon.with_daemon import with_daemon, with_daemon_at_once
 from cdpr_tools.commands.options import (
     JsonOption,
@@ -190,8 +190,7 @@ def stop(
 def _end(daemon: Daemon, out: Output) -> None:
     """Ask the daemon to end and wait for it; raises WorkFailedError where it does not."""
     status = daemon.get("/status")
-    had_died = status["state"] == DEAD
-    dead = f"ended; its loop had died: {power_text(status)}; next: `cdpr run` starts it anew"
+    had_died, ended = status["state"] == DEAD, after_stop_text(status)
     daemon.post("/shutdown")
     notes, deadline = ProgressNotes(out), time.monotonic() + _END_S
     if status["state"] == "active":
@@ -200,7 +199,7 @@ def _end(daemon: Daemon, out: Output) -> None:
         try:
             status = daemon.get("/status")
         except NoDaemonError:
-            out.say(dead if had_died else "stopped, power off")
+            out.say(ended)
             return
         if not had_died:
             notes(str(status["program"]), status.get("program_progress") or {})
