@@ -155,6 +155,9 @@ class RobotModel(Protocol):
 class MotorFit(Protocol):
     """Identification of motors' friction and cogging while cables are pulled tight at home."""
 
+    taken_up_N: FloatArray
+    """What winches usually take up of their cables' tensions at most, (n,)."""
+
     def prepare(self, tension_N: FloatArray) -> None:
         """Take the pretension (n,) that is pulled around."""
 

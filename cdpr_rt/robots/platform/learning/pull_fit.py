@@ -14,6 +14,7 @@ from cdpr_rt.robots.platform.learning import pull_kernel as kernel
 from cdpr_rt.robots.platform.learning.motor_learning import (
     COGGING_SHARE,
     FRICTION_SHARE,
+    MOST_SHARE,
     MotorLearning,
 )
 
@@ -33,6 +34,10 @@ _COUNTS = 2.0
 """Within which an encoder shows to and fro what stands."""
 _TURNED_rad = 0.005
 """How far a motor has to turn in both directions for what is found to be believed."""
+_SLID_rad = 3.0 * kernel.YIELD_rad
+"""How far a motor turns until its friction has all but turned round."""
+_TOLD = 0.7
+"""Standard deviation of friction, over what is usual, with which others of a kind tell it."""
 _MISFIT = 3.0
 """Residual over noise above which a fit is not believed, as where the platform has moved."""
 _SLOW_SHARE, _UNLIKE = 0.8, 0.25
@@ -43,8 +48,10 @@ class PullFit:
     """Friction, cogging and the angle at the pretension of each motor, while the platform stands.
 
     See `pull_kernel`; a least-squares fit of what all cycles tell, with what is usual of friction
-    and cogging (zero, with the standard deviations of `MotorLearning`). Nothing is found of motors
-    that are `known` (n,). What is found is where the `learning` begins, once it is to.
+    and cogging (zero, with the standard deviations of `MotorLearning`). Motors of a kind, with the
+    same gear, rub alike: what the others tell is expected of one whose own friction hardly turns
+    round. Nothing is found of motors that are `known` (n,). What is found is where the `learning`
+    begins, once it is to.
     """
 
     def __init__(
@@ -58,8 +65,13 @@ class PullFit:
         n = len(axes)
         self._known, self._learning, self._lengths_at_home = known, learning, lengths_at_home
         self._rated_Nm = np.array([axis.winch.motor.rated_torque_Nm for axis in axes])
+        kinds = [(axis.winch.motor.model, axis.winch.gear_ratio) for axis in axes]
+        self._of_a_kind = np.array([[one == other for other in kinds] for one in kinds])
         self._motors = np.ones((kernel.MOTOR_ROWS, n))
         self._motors[kernel.M_PER_RAD] = [axis.winch.cable_m_per_motor_rad for axis in axes]
+        rated_N = self._rated_Nm / np.abs(self._motors[kernel.M_PER_RAD])
+        self.taken_up_N = (MOST_SHARE + COGGING_SHARE) * rated_N
+        """What winches usually take up of their cables' tensions at most, (n,)."""
         self._motors[kernel.POLE_PAIRS] = [axis.winch.motor.pole_pairs for axis in axes]
         self._shares = np.linspace(_LEAST_SHARE, _MOST_SHARE, _SHARES)
         self._lengths = np.ones((2, _SHARES, n))
@@ -88,7 +100,7 @@ class PullFit:
             row[:] = self._lengths_at_home(share * tension_N) - at_tension
         slope = np.gradient(self._lengths[0], self._shares, axis=0)
         self._lengths[1] = -slope / pretension_N
-        self._fit()  # what numpy loads for it is not to be loaded in a cycle
+        self.end()  # what numpy loads for it is not to be loaded in a cycle
 
     def begin(self, position_rad: FloatArray) -> None:
         """Begin anew, at these angles (n,), to which the cables have been reeled in."""
@@ -102,9 +114,15 @@ class PullFit:
 
     def end(self) -> FloatArray:
         """Return the angles (n,) at which the cables have the pretension, nan where not known."""
-        misfit, x, covariance = self._fit()
+        zero, usual_Nm = np.zeros(self._rated_Nm.size), FRICTION_SHARE * self._rated_Nm
+        misfit, x, covariance = self._fit(zero, usual_Nm)
+        alone_Nm, variance = x[:, kernel.FRICTION], covariance[:, kernel.FRICTION, kernel.FRICTION]
+        told = ~self._known & (misfit < _MISFIT)
+        mean_Nm, spread_Nm = self._of_their_kind(told, alone_Nm, variance, usual_Nm)
+        misfit, x, covariance = self._fit(mean_Nm, spread_Nm)
         self.unknowns[:], self._covariance[:] = x, covariance
         turned = (self._turned >= _TURNED_rad).all(axis=0)
+        turned |= (self._turned >= _SLID_rad).any(axis=0) & (spread_Nm < _TOLD * usual_Nm)
         self._found[:] = ~self._known & turned & (misfit < _MISFIT)
         angle_rad = self._motors[kernel.ORIGIN] + self.unknowns[:, kernel.ANGLE]
         return np.where(self._found, angle_rad, np.nan)
@@ -127,10 +145,29 @@ class PullFit:
         covariance[:, [1, 2], [1, 2]] += np.where(less, usual_Nm**2, 0.0)[:, None]
         self._learning.begin_with(self._found, torques, covariance)
 
-    def _fit(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+    def _of_their_kind(
+        self, told: BoolArray, friction_Nm: FloatArray, variance: FloatArray, usual_Nm: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return how the others of each motor's kind rub, (n,): mean, and standard deviation.
+
+        From what was found of each of those that `told` (n,) alone, with friction usually 0 ±
+        `usual_Nm`, and its variance; that is returned where the others tell nothing.
+        """
+        others = self._of_a_kind & told & ~np.eye(told.size, dtype=np.bool_)
+        precision = np.maximum(1.0 / variance - usual_Nm**-2.0, 0.0)
+        weighted = friction_Nm / variance  # by the precision of what this motor has told
+        mean_Nm = (others @ weighted) / (others @ precision + usual_Nm**-2.0)
+        unlike = (_UNLIKE**2 * (mean_Nm**2 + usual_Nm**2))[:, None]
+        counts = others / (1.0 + precision * unlike)
+        known = (counts * precision).sum(axis=1) + usual_Nm**-2.0
+        return (counts * weighted).sum(axis=1) / known, np.sqrt(unlike[:, 0] + 1.0 / known)
+
+    def _fit(
+        self, friction_Nm: FloatArray, spread_Nm: FloatArray
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return of each motor residual over noise, (n,), what was found, (n, 5), its covariance.
 
-        Covariances are (n, 5, 5).
+        Its friction is expected to be `friction_Nm` ± `spread_Nm`, (n,). Covariances are (n, 5, 5).
         """
         rated_Nm, m = self._rated_Nm[:, None], kernel.UNKNOWNS
         alike_rad = _ALIKE_rad / self._motors[kernel.POLE_PAIRS]
@@ -140,9 +177,11 @@ class PullFit:
         shares = np.array([FRICTION_SHARE, COGGING_SHARE, COGGING_SHARE])
         usual = np.full((rated_Nm.size, m), [_ANYWHERE_rad, _STEEPER, 1.0, 1.0, 1.0])
         usual[:, kernel.FRICTION :] = shares * rated_Nm
+        usual[:, kernel.FRICTION], expected = spread_Nm, np.zeros_like(usual)
+        expected[:, kernel.FRICTION] = friction_Nm
         products, rest = sums[:, :m, :m], sums[:, :m, m]
         covariance = np.linalg.inv(products + np.eye(m) * usual[:, None] ** -2.0)
-        x = np.einsum("ijk,ik->ij", covariance, rest)
+        x = np.einsum("ijk,ik->ij", covariance, rest + expected / usual**2)
         left = sums[:, m, m] - 2.0 * np.einsum("ij,ij->i", x, rest)
         left += np.einsum("ij,ijk,ik->i", x, products, x)
         told = np.maximum(self._turned.sum(axis=0), _TURNED_rad) / alike_rad

@@ -26,7 +26,7 @@ UNKNOWNS = 5
 ANGLE, STEEPER, FRICTION, SINE, COSINE = range(UNKNOWNS)
 PRETENSION_N, M_PER_RAD, POLE_PAIRS, ORIGIN, PLAY, MOTOR_ROWS = range(6)
 """Rows of `motors` (5, n): P, c, p, the angle from which θ and θ_P are counted, the play, rad."""
-_YIELD_rad = 0.006
+YIELD_rad = 0.006
 """δ: what there is in motors of 1 to 4 Nm; twice or half of it finds much the same."""
 
 
@@ -55,7 +55,7 @@ def take(
         way = _farther(motors[PLAY, i], seen, theta, i)
         side = math.copysign(1.0, way)
         way = abs(way)
-        z = yielding[i] + way / _YIELD_rad * (side - yielding[i])
+        z = yielding[i] + way / YIELD_rad * (side - yielding[i])
         yielding[i] = min(max(z, -1.0), 1.0)
         at = (tension[i] / motors[PRETENSION_N, i] - shares[0]) / step
         if way == 0.0 or not 0.0 <= at < shares.size - 1:

@@ -41,13 +41,20 @@ def lengths() -> Callable[[np.ndarray], np.ndarray]:
 class Winches:
     """Motors with friction and cogging that pull at cables made fast at home, without inertia."""
 
-    def __init__(self, lengths: Callable[[np.ndarray], np.ndarray], gain: float = 1.0) -> None:
+    def __init__(
+        self,
+        lengths: Callable[[np.ndarray], np.ndarray],
+        gain: float = 1.0,
+        pretension_N: np.ndarray = PRETENSION_N,
+        friction_Nm: np.ndarray = FRICTION_Nm,
+    ) -> None:
         """Take what the motors exert over what is asked of them, `gain`."""
         self.tensions_N, self.gain = np.linspace(0.1, 300.0, 600), gain
+        self.pretension_N, self.friction_Nm = pretension_N, friction_Nm
         self.free_m = np.array([lengths(np.full(N, t)) for t in self.tensions_N])
         self.at_pretension_rad = np.full(N, START_rad)
         self.theta = self.at_pretension_rad + 4.0 * np.sign(CABLE_m)
-        self.zero_m = lengths(PRETENSION_N) - CABLE_m * self.at_pretension_rad
+        self.zero_m = lengths(pretension_N) - CABLE_m * self.at_pretension_rad
 
     def pull(self, tension_N: np.ndarray) -> None:
         """Turn each motor as far as its friction lets it."""
@@ -58,14 +65,15 @@ class Winches:
             )
             cogging = COGGING_Nm[i] * np.sin(POLE_PAIRS * turns + PHASE_rad[i])
             left = CABLE_m[i] * (held - self.gain * tension_N[i]) - cogging
-            stays = np.abs(left) <= FRICTION_Nm[i]
+            stays = np.abs(left) <= self.friction_Nm[i]
             self.theta[i] = turns[stays][np.abs(turns[stays] - self.theta[i]).argmin()]
 
 
 def pulled(fit: PullFit, winches: Winches, moved_m: float = 0.0) -> np.ndarray:
     """Return the angles that are found from the pretension to below, above, and back to it."""
-    fit.prepare(PRETENSION_N)
-    winches.pull(PRETENSION_N)
+    pretension_N = winches.pretension_N
+    fit.prepare(pretension_N)
+    winches.pull(pretension_N)
     fit.begin(winches.theta)
     shares = np.concatenate(
         [np.linspace(1.0, 0.5, 40), np.linspace(0.5, 1.5, 80), np.linspace(1.5, 1.0, 40)]
@@ -73,8 +81,8 @@ def pulled(fit: PullFit, winches: Winches, moved_m: float = 0.0) -> np.ndarray:
     for k, share in enumerate(shares):
         if k == 60:  # the platform moves along with its cables
             winches.zero_m += moved_m
-        winches.pull(share * PRETENSION_N)
-        fit.take(winches.theta, share * PRETENSION_N)
+        winches.pull(share * pretension_N)
+        fit.take(winches.theta, share * pretension_N)
     return fit.end()
 
 
@@ -131,6 +139,27 @@ def test_friction_is_found_of_cables_that_are_softer_or_stiffer_than_told(
     fit = PullFit(AXES, NOBODY, lengths, None)
     pulled(fit, Winches(true_lengths))
     np.testing.assert_allclose(fit.unknowns[:, FRICTION], FRICTION_Nm, atol=0.012)
+
+
+@pytest.mark.parametrize("alike", [True, False])
+def test_a_motor_whose_friction_does_not_turn_round_rubs_as_others_of_its_kind(
+    lengths: Callable[[np.ndarray], np.ndarray], alike: bool
+) -> None:
+    """Every other cable is pulled so little that its winch only ever gives way when wound in."""
+    little = np.arange(N) % 2 == 1
+    pretension_N = np.where(little, 26.0, 80.0)
+    winches = Winches(lengths, pretension_N=pretension_N, friction_Nm=np.linspace(0.15, 0.19, N))
+    gears = np.where(little & (not alike), 11.0, 10.0)
+    axes = [
+        replace(axis, winch=replace(axis.winch, gear_ratio=gear, drum_radius_m=gear / 100.0))
+        for axis, gear in zip(AXES, gears, strict=True)
+    ]
+    learning = MotorLearning(axes, NOBODY, np.ones(N), 500.0, 1e-3)
+    fit = PullFit(axes, NOBODY, lengths, learning)
+    assert (np.isfinite(pulled(fit, winches)) == (alike | ~little)).all()
+    fit.begin_learning()
+    expected_Nm = 0.8 * winches.friction_Nm if alike else np.zeros(N)
+    np.testing.assert_allclose(learning.friction_Nm[little], expected_Nm[little], atol=0.03)
 
 
 def test_a_torque_constant_that_is_off_is_not_taken_for_cogging(
