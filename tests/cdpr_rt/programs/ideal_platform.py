@@ -65,6 +65,8 @@ ROOM = Platform(
 class NothingFound:
     """A fit that finds nothing of any motor."""
 
+    taken_up_N = np.zeros(1)
+
     def prepare(self, tension_N: FloatArray) -> None:
         self._angle_rad = np.full(tension_N.size, np.nan)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from cdpr_rt.arrays import FloatArray
-from cdpr_rt.robots.interface import RobotModel, TensionOutcome
+from cdpr_rt.robots.interface import RobotModel, TensionDistribution, TensionOutcome
 from cdpr_rt.robots.kinematics.pose import Pose
 
 OVERSHOOT = 1.5
@@ -16,6 +16,10 @@ _HIGHEST = 0.9
 _PRESSING, _MODEST = (0.5, 0.25, 0.0), 0.4
 _FLOORS = (1.0, 0.75, 0.5, 0.25)
 """Shares of what is planned with on top of the least tension, the most that can be had first."""
+_PRESSED_LESS = (0.75, 0.5)
+"""Shares of the weight with which a platform is pressed down whose cables might stay slack else."""
+_CLEAR = 1.2
+"""Tension over what winches take up, below which a cable that is wound in may be all but slack."""
 
 
 class StandingTensions:
@@ -23,14 +27,20 @@ class StandingTensions:
 
     Their wrench is along the weight: it presses the platform down where the cables can without
     pulling hard, with none below the least tension, and as far above it as they can up to what is
-    planned with: friction leaves cables to sag. Else it carries 0.57 of the weight, too little
-    to lift the platform even at the overshoot, with each at 0.57 of what would carry it all, which
-    may be below the least tension. Friction makes the tensions differ from what is asked
-    for by some newtons, which a platform whose weight is all but carried does not stand still for.
+    planned with: friction leaves cables to sag. Where winches may take up all of that, it presses
+    with less than the weight, so that more can be pulled. Else it carries 0.57 of the weight, too
+    little to lift the platform even at the overshoot, with each at 0.57 of what would carry it all,
+    which may be below the least tension. Friction makes the tensions differ from what is asked for
+    by some newtons, which a platform whose weight is all but carried does not stand still for.
     """
 
-    def __init__(self, model: RobotModel, low_N: FloatArray, most_N: FloatArray) -> None:
-        """Take with what is planned at least, and what the motors can pull with, (n,) each."""
+    def __init__(
+        self, model: RobotModel, low_N: FloatArray, most_N: FloatArray, taken_up_N: FloatArray
+    ) -> None:
+        """Take with what is planned at least, and what the motors can pull with, (n,) each.
+
+        `taken_up_N` (n,) is what winches may take up of their cables' tensions.
+        """
         self._kinematics, self._weight = model.kinematics, model.weight()
         self._most_N = most_N / OVERSHOOT
         least_N = model.low_N
@@ -41,6 +51,13 @@ class StandingTensions:
         self._least = model.least_tensions(least_N, most)
         pressing = model.least_tensions(least_N, modest)
         self._pressed = [(model.least_tensions(floor_N, most), 1.0) for floor_N in floors_N]
+        self._clear_N = _CLEAR * taken_up_N
+        self._clear = [
+            (model.least_tensions(floor_N, most), share)
+            for share in _PRESSED_LESS
+            for floor_N in floors_N
+            if (floor_N >= self._clear_N).all()
+        ]
         self._pressed += [(self._least, 1.0)] + [(pressing, share) for share in _PRESSING]
         self._carrying = model.least_tensions(np.zeros(least_N.size), model.high_N)
         self._W, self._t = np.zeros((model.size, least_N.size)), np.zeros(least_N.size)
@@ -49,16 +66,22 @@ class StandingTensions:
         """Return the tensions (n,) at a pose, overwritten, and whether they leave it standing."""
         t = self._t
         self._kinematics.wrench_matrix(pose, self._W)
-        for tensions, share in self._pressed:
-            if tensions.solve(self._W, -share * self._weight, t) is TensionOutcome.FEASIBLE:
-                stays = True
-                break
-        else:
+        stays = self._press(self._pressed)
+        if stays and (t < self._clear_N).any():
+            stays = self._press(self._clear) or self._press(self._pressed)
+        elif not stays:
             stays = self._least.solve(self._W, self._weight, t) is TensionOutcome.FEASIBLE
             np.multiply(np.maximum(t, 0.0), _STANDING / OVERSHOOT, out=t)
         # less than was solved for has another wrench
         stays = stays and bool((t <= self._most_N).all())
         return np.minimum(t, self._most_N, out=t), stays
+
+    def _press(self, tensions: list[tuple[TensionDistribution, float]]) -> bool:
+        """Take the first that press the platform down by a share of its weight; whether any do."""
+        return any(
+            solver.solve(self._W, -share * self._weight, self._t) is TensionOutcome.FEASIBLE
+            for solver, share in tensions
+        )
 
     def carry(self, pose: Pose) -> bool:
         """Return whether tensions within their bounds, none of them a push, carry the weight."""

@@ -76,7 +76,9 @@ class TightenProgram(PlatformProgram):
         self._arrival = Arrival(parts.period_s, parts.near_m, _SETTLING_S)
         self._cable = np.array(cable_m)
         most_N = torque_Nm / np.abs(cable_m)
-        self._standing = StandingTensions(parts.model, parts.control.low_N, most_N)
+        self._standing = StandingTensions(
+            parts.model, parts.control.low_N, most_N, parts.control.pull_fit.taken_up_N
+        )
         self._home_pretension_N = self._standing.at(parts.model.home_pose)[0].copy()
         self._pretension_N = self._home_pretension_N.copy()
         self._from_N, self._to_N = self._pretension_N.copy(), self._pretension_N.copy()

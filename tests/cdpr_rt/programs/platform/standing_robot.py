@@ -28,9 +28,9 @@ HOME_m = np.array([0.0, 1.3])
 
 def home_pretension_N(parts: PlatformParts) -> np.ndarray:
     model, control = parts.model, parts.control
-    return StandingTensions(model, control.low_N, np.full(control.low_N.size, 1e3)).at(
-        model.home_pose
-    )[0]
+    most_N = np.full(control.low_N.size, 1e3)
+    standing = StandingTensions(model, control.low_N, most_N, control.pull_fit.taken_up_N)
+    return standing.at(model.home_pose)[0]
 
 
 class Standing:

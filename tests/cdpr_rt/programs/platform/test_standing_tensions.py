@@ -19,7 +19,8 @@ def test_no_cable_is_pulled_less_than_the_others_bounds_make_it(
     """
     machine = heavier(spatial(), mass_kg)
     model, low_N = machine.model(), machine.control().low_N
-    standing = StandingTensions(model, low_N, np.full(machine.n, machine.torque_Nm / 0.026))
+    most_N = np.full(machine.n, machine.torque_Nm / 0.026)
+    standing = StandingTensions(model, low_N, most_N, np.zeros(machine.n))
     tension_N, stays = standing.at(model.home_pose)
     W = np.zeros((model.size, machine.n))
     model.kinematics.wrench_matrix(model.home_pose, W)
@@ -28,3 +29,21 @@ def test_no_cable_is_pulled_less_than_the_others_bounds_make_it(
     assert tension_N.min() == pytest.approx(floor_N.min(), abs=1e-6)
     assert (OVERSHOOT * tension_N < machine.high_N).all()
     np.testing.assert_allclose(W @ tension_N, model.weight(), atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("mass_kg", "taken_up_N", "share"), [(14.0, 20.0, 1.0), (14.0, 23.0, 0.75), (18.0, 26.0, 0.5)]
+)
+def test_winches_that_may_take_up_all_pull_harder_and_press_the_platform_less(
+    mass_kg: float, taken_up_N: float, share: float
+) -> None:
+    """Else a cable hangs all but slack, as its winch is wound in, and its length is anything."""
+    machine = heavier(spatial(), mass_kg)
+    model, low_N = machine.model(), machine.control().low_N
+    most_N, taken_up = np.full(machine.n, 1e3), np.full(machine.n, taken_up_N)
+    tension_N, stays = StandingTensions(model, low_N, most_N, taken_up).at(model.home_pose)
+    W = np.zeros((model.size, machine.n))
+    model.kinematics.wrench_matrix(model.home_pose, W)
+    assert stays
+    assert (tension_N > taken_up_N).all()
+    np.testing.assert_allclose(W @ tension_N, share * model.weight(), atol=1e-6)
