@@ -43,7 +43,7 @@ from cdpr_tools.calibrate.synthetic_readings import (
     synthetic_readings,
 )
 from cdpr_tools.errors import BadInputError
-from cdpr_tools.jobs import cores, runner
+from cdpr_tools.processes.jobs import cores, runner
 
 VERIFIED, _AMONG = 10, 20
 THESIS: Final = ErrorBudget(

@@ -21,7 +21,7 @@ from cdpr_rt.calibration.error_model import (
 )
 from cdpr_rt.robots.platform_model import platform_model_of
 from cdpr_tools.errors import BadInputError
-from cdpr_tools.jobs import cores, runner
+from cdpr_tools.processes.jobs import cores, runner
 
 COUNTS: Final = (6, 10, 20, 50, 100, 150, 200, 300, 400)
 SHARES: Final = (0.05, 0.1, 0.25, 0.5, 1.0, 2.0, 4.0)

@@ -14,7 +14,7 @@ from typing import IO
 
 from cdpr_tools.compiling import NOTICE, compiling_until, pass_on
 from cdpr_tools.errors import BadInputError, WorkFailedError
-from cdpr_tools.module_process import end_by_stdin, module_command
+from cdpr_tools.processes.module_process import end_by_stdin, module_command
 
 # the first start on a machine compiles the physics, a slow one for minutes
 _START_TIMEOUT_S = 600.0

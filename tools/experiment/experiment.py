@@ -22,8 +22,8 @@ from cdpr_tools.experiment.points import Points, points_of_perfect_robot, points
 from cdpr_tools.experiment.report import lines
 from cdpr_tools.experiment.session import ExperimentSettings, run_session
 from cdpr_tools.experiment.statistics import rows, variance_analysis
-from cdpr_tools.jobs import processes
 from cdpr_tools.output import Output, to_json
+from cdpr_tools.processes.jobs import processes
 from cdpr_tools.recordings.stored_settings import load_settings
 from cdpr_tools.report.style import save_figure
 from cdpr_tools.trials.directions import platform_of

@@ -17,7 +17,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from cdpr_tools.errors import BadInputError, WorkFailedError, os_error_as
-from cdpr_tools.module_process import module_command
+from cdpr_tools.processes.module_process import module_command
 
 _STOP_S = (0.1, 5.0)
 _PAUSE_S = 1.5

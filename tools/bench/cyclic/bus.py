@@ -21,8 +21,8 @@ from cdpr_rt.runtime.realtime import one_core
 from cdpr_tools.bench.cyclic.echo_bus import ANSWERED, ASKED, FRAMES
 from cdpr_tools.bench.timing import Times, percentiles, timed
 from cdpr_tools.errors import WorkFailedError
-from cdpr_tools.module_process import end_by_stdin, module_command
 from cdpr_tools.output import Output
+from cdpr_tools.processes.module_process import end_by_stdin, module_command
 
 PERCENTILES = (50.0, 99.9)
 VCAN = "vcan0"

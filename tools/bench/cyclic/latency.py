@@ -18,8 +18,8 @@ from matplotlib.axes import Axes
 from cdpr_tools.bench.cyclic.wakeups import Times
 from cdpr_tools.bench.timing import percentiles
 from cdpr_tools.errors import BadInputError, WorkFailedError
-from cdpr_tools.module_process import module_command
 from cdpr_tools.output import Output
+from cdpr_tools.processes.module_process import module_command
 from cdpr_tools.report.style import COLOURS, canvas, legend_above
 
 VARIANTS = {"ordinary": "ordinary process", "realtime": "real-time settings"}

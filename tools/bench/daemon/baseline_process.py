@@ -22,7 +22,7 @@ from cdpr_rt.robots.robot_arrays import limits_of
 from cdpr_tools.bench.daemon.loop_daemon import answers_in_time
 from cdpr_tools.composition.simulator import OwnSimulator
 from cdpr_tools.errors import WorkFailedError
-from cdpr_tools.module_process import module_command
+from cdpr_tools.processes.module_process import module_command
 
 PROGRAM = "cdpr_tools.bench.daemon.loop_baseline"
 OF_PLATFORM = "cdpr_tools.bench.daemon.pose_baseline"

@@ -25,7 +25,7 @@ from cdpr_tools.daemon.processes.child import Child
 from cdpr_tools.daemon.processes.launcher import LOOP, SERVICE
 from cdpr_tools.daemon.settings import RunSettings
 from cdpr_tools.errors import WorkFailedError
-from cdpr_tools.module_process import end_by_stdin, module_command
+from cdpr_tools.processes.module_process import end_by_stdin, module_command
 
 _SCHEDULED = 2  # CPUCLOCK_SCHED: as the scheduler counts, to the nanosecond
 

@@ -19,8 +19,8 @@ from cdpr_tools.bench.daemon.loop_daemon import with_tolerant_limits
 from cdpr_tools.bench.timing import percentiles, verdict
 from cdpr_tools.client.client import Daemon, open_daemon
 from cdpr_tools.errors import WorkFailedError
-from cdpr_tools.module_process import module_command
 from cdpr_tools.output import Output
+from cdpr_tools.processes.module_process import module_command
 
 ROBOT = "bench-2"
 FLOODS: Final = {"alone": (0, 0), "flooded": (4, 0), "flooded_lowest": (4, 19)}

@@ -13,7 +13,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from cdpr_tools.daemon.settings import RunSettings
-from cdpr_tools.module_process import module_command
+from cdpr_tools.processes.module_process import module_command
 
 _PR_SET_PDEATHSIG = 1
 

@@ -13,8 +13,8 @@ from cdpr_rt.robots.workspace_analysis.criterion import Criterion
 from cdpr_rt.robots.workspace_analysis.grid import Grid, GridJob, WayJob, grid_points, shape_of
 from cdpr_rt.robots.workspace_analysis.rays import RayJob, Rays, directions
 from cdpr_tools.errors import BadInputError, WorkFailedError
-from cdpr_tools.jobs import Job, Runner, cores, runner
 from cdpr_tools.output import Output
+from cdpr_tools.processes.jobs import Job, Runner, cores, runner
 
 _CHECKS_A_JOB = 100_000
 _CHECKS_A_RAY = 80

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import pytest
 
 from cdpr_tools.errors import WorkFailedError
-from cdpr_tools.jobs import runner
+from cdpr_tools.processes.jobs import runner
 
 
 @dataclass(frozen=True)
