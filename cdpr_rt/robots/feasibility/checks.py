@@ -16,6 +16,7 @@ from cdpr_rt.core.shared_block import MOST_AXES
 from cdpr_rt.core.supervision.limits import Limits
 from cdpr_rt.errors import GeometryError
 from cdpr_rt.robots.feasibility.not_held import point_text, why_not_held
+from cdpr_rt.robots.feasibility.turned_by_friction import turned_by_friction
 from cdpr_rt.robots.interference.interference import in_words
 from cdpr_rt.robots.platform.loop_design import designed_loop
 from cdpr_rt.robots.rigid_body import in_space, is_point
@@ -276,6 +277,8 @@ def _loop(robot: Robot, statics: PlatformStatics) -> Iterator[Finding]:
             "lighter platform or a shorter sync_period_s help"
         )
         yield Finding("platform.mass_kg", text, impossible=False)
+    if text := turned_by_friction(statics, robot.axes, loop.gains):
+        yield Finding("axes[0].anchor_point_m", text, impossible=False)
 
 
 def _uncontrolled_rotation(platform: Platform) -> Iterator[Finding]:

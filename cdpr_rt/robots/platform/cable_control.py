@@ -146,13 +146,14 @@ class CableControl:
         """Fix the arrays of the kernels that find the platform's force by its `moves` (4, 6)."""
         model, motors = self.model, self._motors
         n, d = model.kinematics.n, model.size
-        self._state = np.zeros(2 * d + 1)
+        self._state = np.zeros(3 * d + 1)
         self._W, self._wrench, self._force = np.zeros((d, n)), np.zeros(d), np.zeros(d)
         scratch, J = np.zeros((7, 7, 7)), np.zeros((n, d))
+        self._friction_N, self._per_m = np.zeros(n), 1.0 / np.abs(motors[tracking.M_PER_RAD])
         self._correct = bound(
             loop.correct, self._settings, self._state, model.wrench_scale, body_of(model.platform),
             self._directions, self._cables, self._pose.array, moves, scratch,
-            J, self._W, self._wrench, self._force, then=(1.0, 1.0),
+            J, self._W, self._wrench, self._friction_N, self._force, then=(1.0, 1.0),
         )  # fmt: skip
         if self.learning is not None:
             self.learning.bind(
@@ -259,9 +260,20 @@ class CableControl:
         if learning is not None:
             learning.write(setpoint.velocity_rad_s)
             torque += learning.torque_Nm
+        self._write_friction()
         if cells is not None:
             cells.update(self.tension_N)
             torque += cells.torque_Nm
+
+    def _write_friction(self) -> None:
+        """Write what is made up for of each cable's friction in motion, (n,), N."""
+        friction = self._friction_N
+        friction[:] = 0.0
+        if self._compensation is not None:
+            self._compensation.write_friction(friction)
+        if self.learning is not None:
+            self.learning.add_friction(friction)
+        friction *= self._per_m
 
     def clear_compensation(self) -> None:
         """Have it said that nothing is added, while a program drives the winches itself."""

@@ -7,10 +7,14 @@ The proportional part is saturated, not the damping: far from its target the pla
 the speed at which both are equal. The integral part has a deadband where the error is within what
 cannot be told from friction, so that the platform stands still at its target. A sigmoid leads into
 it, with hysteresis as in Tremblay (thesis), fig. 2.3: it takes twice the error to leave it again.
+What it gains at rest holds against friction of unknown sign. In motion friction is made up for, so
+as much of that as friction can be is given back where motion begins: with both, a direction in
+which the cables' friction is large beside the loop's stiffness would leap.
 
 Arrays besides those of the kinematics' kernels: a loop's row of SETTINGS, and its STATE: the
-integral part (d,), N and Nm; behind it the share of its rate that the deadband leaves, 0 to 1; and
-the twist (d,), low-passed until an encoder's counts are no speed any more.
+integral part (d,), N and Nm; behind it the share of its rate that the deadband leaves, 0 to 1; the
+twist (d,), low-passed until an encoder's counts are no speed any more; and the integral part (d,)
+as the last motion left it.
 """
 
 from __future__ import annotations
@@ -154,6 +158,7 @@ def correct(
     J: FloatArray,
     W: FloatArray,
     wrench: FloatArray,
+    friction: FloatArray,
     force: FloatArray,
     share: float,
     rate_inconsistency_m_s: float,
@@ -161,7 +166,8 @@ def correct(
     """Write what acts on the platform besides its cables (d,), and the loop's correction (d,).
 
     `moves` (4, 6) has the rows above. `wrench` is known beforehand: weight, and what the wanted
-    motion takes. `force` is F of the law above. `share` is how much of the last cycle's force could
+    motion takes. `friction` (n,), N, is what is made up for of the winches' friction in motion.
+    `force` is F of the law above. `share` is how much of the last cycle's force could
     be had: while it was not all, nothing is integrated that asks for more. Where the cables' rates
     contradict each other by more than motion can explain, as of a cable that has broken, the force
     is not to follow them. `scale` (d,) is what of each direction counts as much as 1 N, or 1 m.
@@ -190,6 +196,8 @@ def correct(
     _damp(settings, A, M, both, De, y)
     _saturate(settings, scale, y)
     _damp(settings, A, M, both, v, De)
+    if moving:
+        _give_back(state, J, friction)
     _integrate(settings, state, scale, y, size, speed, moving, share)
     trust = min(1.0, (PLAUSIBLE_m_s / max(rate_inconsistency_m_s, PLAUSIBLE_m_s)) ** 2)
     for k in range(d):
@@ -237,6 +245,18 @@ def _saturate(settings: FloatArray, scale: FloatArray, proportional: FloatArray)
 
 
 @jit
+def _give_back(state: FloatArray, J: FloatArray, friction: FloatArray) -> None:
+    """Take from the integral part what it gained at rest, at most Σ |J_i| friction_i."""
+    n, d = J.shape
+    for k in range(d):
+        most = 0.0
+        for i in range(n):
+            most += abs(J[i, k]) * friction[i]
+        gained = state[k] - state[2 * d + 1 + k]
+        state[k] -= min(max(gained, -most), most)
+
+
+@jit
 def _integrate(
     settings: FloatArray,
     state: FloatArray,
@@ -260,6 +280,8 @@ def _integrate(
         step, most = gain * proportional[k], settings[MOST_N] * scale[k]
         if share >= 1.0 or step * state[k] < 0.0:
             state[k] = min(max(state[k] + step, -most), most)
+        if moving:
+            state[2 * d + 1 + k] = state[k]
 
 
 @jit

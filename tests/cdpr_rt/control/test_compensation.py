@@ -58,6 +58,24 @@ def test_cogging_is_what_averages_to_nothing_over_a_turn(velocity):
     assert cogging == pytest.approx(total - total.mean(), abs=1e-9)
 
 
+def test_friction_is_told_as_far_as_it_is_made_up_for():
+    rubbing = FrictionFeedforward(
+        coulomb_forward_Nm=0.3, coulomb_backward_Nm=0.2, stribeck_backward_Nm=0.15
+    )
+    axis = AxisCompensation(TABLE, rubbing, most_Nm=10.0)
+    compensation, out = Compensation([axis, None, axis], 1e-3), np.full(3, 9.0)
+    feedback, setpoint = at(n=3)
+    feedback.index_known[2] = False
+    for _ in range(100):
+        compensation.torque(feedback, setpoint, np.zeros(3))
+    compensation.write_friction(out)
+    assert out == pytest.approx([0.175, 0.0, 0.0])  # half faded in
+    for _ in range(200):
+        compensation.torque(feedback, setpoint, np.zeros(3))
+    compensation.write_friction(out)
+    assert out == pytest.approx([0.35, 0.0, 0.0])
+
+
 def test_hand_over_at_standstill_is_continuous():
     axis = AxisCompensation(TABLE, blend_speed_rad_s=0.02, most_Nm=10.0)
     got = [settled(axis, *at(angle=0.4, velocity=v)) for v in np.linspace(-0.03, 0.03, 61)]

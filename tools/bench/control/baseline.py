@@ -61,7 +61,7 @@ class BaselineCableControl:
         self.theta, self.omega, self.lagging, self.calm = np.zeros((4, n))
         self.at_zero, self.stretched_by, self.slow = np.zeros(n), self.low.copy(), self.low.copy()
         self.stretch = np.ones(n)
-        self.integral, self.calm_twist = np.zeros(d), np.zeros(d)
+        self.integral, self.moving_integral, self.calm_twist = np.zeros((3, d))
         self.awake, self.share = 0.0, 1.0
         self.learning = _Learning(axes, self.scale, model.reserve_N, period_s)
         self.position, self.velocity, self.acceleration = (
@@ -215,10 +215,16 @@ class BaselineCableControl:
         if not moving:
             speed = float(np.linalg.norm(self.scale * self.calm_twist))
             gain *= 1.0 + _BREAKING * math.exp(-min((speed / _STUCK_m_s) ** 2, 50.0))
+        if moving:
+            rubbing = np.abs(J).T @ (self.learning.x[: 3 * len(self.c) : 3] / np.abs(self.c))
+            gained = self.integral - self.moving_integral
+            self.integral = self.integral - np.clip(gained, -rubbing, rubbing)
         step, most = gain * pull, _MOST * self.span * self.scale
         taken = (self.share >= 1.0) | (step * self.integral < 0.0)
         integral = np.clip(self.integral + step, -most, most)
         self.integral = np.where(taken, integral, self.integral)
+        if moving:
+            self.moving_integral = self.integral
         return np.asarray(D @ (v_d[self.chosen] - twist) + pull + self.integral)
 
     def _split(

@@ -107,6 +107,10 @@ class MotorLearning:
         """Write `torque_Nm` for motors that are wanted at these speeds (n,)."""
         self._write(wanted_rad_s)
 
+    def add_friction(self, out: FloatArray) -> None:
+        """Add the dry friction of each motor as learnt, (n,), Nm."""
+        out += self._x[: kernel.TERMS * out.size : kernel.TERMS]
+
     def restart(self) -> None:
         """Begin anew after cycles without this control; what was learnt stays."""
         self._settling = self._cycles

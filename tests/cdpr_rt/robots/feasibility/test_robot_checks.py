@@ -329,3 +329,56 @@ def test_more_cables_than_a_daemon_runs_are_told(tmp_path: Path) -> None:
     more = [re.sub(r"node_id = .*", f"node_id = {20 + k}", axis) for k, axis in enumerate(more)]
     text = SUSPENDED + "\n".join(re.sub(r"4\.0\]", "3.5]", axis) for axis in more)
     assert findings_of(tmp_path, text)["axes"] == "24; allowed: up to 16, as many as a daemon runs"
+
+
+def on_seven(anchor_arm_m: float, winch: str) -> str:
+    """Return the file of a platform that four cables hold from above, three from below."""
+    x, y = 0.15 * anchor_arm_m / 0.18, 0.1 * anchor_arm_m / 0.18
+    ends = [(-1, -1, 1), (1, -1, 1), (1, 1, 1), (-1, 1, 1), (0, -1, -1), (1, 1, -1), (-1, 1, -1)]
+    axes = "".join(
+        f"""
+        [[axes]]
+        name = "{i}"
+        winch = "{winch}"
+        bus = "only"
+        node_id = {i + 1}
+        exit_point_m = [{a}.0, {b}.0, {1.0 + c}]
+        anchor_point_m = [{a * x}, {b * y}, {0.05 * c}]
+        """
+        for i, (a, b, c) in enumerate(ends)
+    )
+    return f"""
+        name = "Seven"
+        sync_period_s = 0.002
+        [[buses]]
+        name = "only"
+        url = "socketcan:can0"
+        [platform]
+        mass_kg = 2.0
+        home_m = [0.0, 0.0, 0.6]
+        workspace_min_m = [-0.1, -0.1, 0.8]
+        workspace_max_m = [0.1, 0.1, 1.0]
+        workspace_angle_rad = 0.01
+        angular_speed_rad_s = 0.3
+        angular_acceleration_rad_s2 = 1.0
+        speed_m_s = 0.3
+        acceleration_m_s2 = 1.0
+        [limits]
+        torque_Nm = 3.5
+        tension_min_N = 15.0
+        tension_max_N = 200.0
+        {axes}"""
+
+
+def test_friction_that_turns_a_platform_over_is_told(tmp_path: Path) -> None:
+    told = findings_of(tmp_path, on_seven(0.18, "winch-300n"))["axes[0].anchor_point_m"]
+    found = re.search(
+        r"friction of 12 N, .* by ([\d.]+) deg about rz .*1 mm in each cable is ([\d.]+) deg.*"
+        r"hold it turned by up to ([\d.]+) deg",
+        told,
+    )
+    assert found is not None, told
+    turned, per_mm, held = map(float, found.groups())
+    assert held < turned and 0.8 < per_mm < 1.2
+    # longer arms, by which cables tell the rotation and hold it
+    assert "axes[0].anchor_point_m" not in findings_of(tmp_path, on_seven(0.36, "winch-300n"))

@@ -10,6 +10,7 @@ import pytest
 
 from cdpr_profiles import Robot, load_robot
 from cdpr_profiles.platform import BoxFile
+from cdpr_rt.arrays import FloatArray
 from cdpr_rt.core.exchange import AxisFeedback, Setpoint
 from cdpr_rt.errors import GeometryError
 from cdpr_rt.robots.platform.cable_control import CableControl
@@ -326,3 +327,30 @@ def test_lengths_agree_under_the_tensions_with_which_the_platform_stands() -> No
     # what is planned with is kept
     control.begin(feedback)
     assert control.residual_m > 1e-3
+
+
+def test_friction_that_is_made_up_for_in_motion_takes_over_from_the_integral_part() -> None:
+    def step_of_torque(friction_Nm: float) -> FloatArray:
+        """Return by what the torques change where motion begins after a wait beside the target."""
+        control = planar().control()
+        feedback, setpoint, torque = AxisFeedback(3), Setpoint(3), np.zeros(3)
+        control.take_lengths(control.model.kinematics.lengths(control.model.home_pose), feedback)
+        control.begin(feedback)
+        control.stand_still()
+        control.reset()
+        assert control.learning is not None
+        found = np.zeros((3, 3))
+        found[:, 0] = friction_Nm
+        control.learning.begin_with(np.ones(3, np.bool_), found, np.tile(np.eye(3), (3, 1, 1)))
+        control.position[0] += 0.001
+        for _ in range(300):
+            control.update(feedback, setpoint, torque)
+        before = torque.copy()
+        control.velocity[0] = 1e-9  # too slow for friction to be added
+        control.update(feedback, setpoint, torque)
+        return torque - before
+
+    nothing, little, much = (np.abs(step_of_torque(f)).max() for f in (0.0, 0.005, 0.05))
+    assert nothing < 1e-3
+    assert 0.002 < little < 0.01
+    assert much > 2.0 * little

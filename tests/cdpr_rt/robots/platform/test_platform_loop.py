@@ -12,6 +12,7 @@ from scipy.linalg import expm, null_space
 
 from cdpr_profiles import RobotAxis, load_robot
 from cdpr_rt.arrays import FloatArray
+from cdpr_rt.robots.feasibility.turned_by_friction import loop_stiffness
 from cdpr_rt.robots.kinematics.cable_kernel import CABLE_ROWS, run_cables
 from cdpr_rt.robots.platform import loop_kernel as loop
 from cdpr_rt.robots.platform.body_kernel import body_of
@@ -114,7 +115,7 @@ class Loop:
         run_cables(kinematics.geometry, self.pose.array, self.cables)
         self.directions = np.array(kinematics.directions)
         self.moves, self.n, self.d = np.zeros((4, 6)), n, d
-        self.state = np.zeros(2 * d + 1)
+        self.state, self.friction = np.zeros(3 * d + 1), np.zeros(n)
         self.body = body_of(machine.platform)
         self.wrench = np.zeros(d)
 
@@ -123,7 +124,7 @@ class Loop:
         loop.correct(
             self.settings, self.state, self.model.wrench_scale, self.body, self.directions,
             self.cables, self.pose.array, self.moves, np.zeros((7, 7, 7)), np.zeros((n, d)),
-            np.zeros((d, n)), self.wrench, force, share, apart,
+            np.zeros((d, n)), self.wrench, self.friction, force, share, apart,
         )  # fmt: skip
         return force
 
@@ -148,6 +149,8 @@ def test_gains_are_positive_definite_and_each_mode_has_its_damping_ratio(name: s
         np.testing.assert_allclose(law.gain(1), D, rtol=1e-9, atol=1e-9 * np.abs(D).max())
         J = machine.model().kinematics.jacobian(law.pose)
         M = mass_matrix(machine, q) + gains.rotor_kg * J.T @ J
+        told_K = loop_stiffness(machine.model(), gains, q)
+        np.testing.assert_allclose(told_K, K, rtol=1e-8, atol=1e-8 * np.abs(K).max())
         for gain in (K, D):
             np.testing.assert_allclose(gain, gain.T, atol=1e-9 * np.abs(gain).max())
             assert np.linalg.eigvalsh(gain).min() > 0.0
@@ -223,6 +226,37 @@ def test_the_integral_part_sleeps_within_what_friction_hides_and_wakes_later() -
     law.moves[0, 0], law.moves[1, 1] = 0.0, 1e-3
     law.force()
     assert law.state[2] == 1.0
+
+
+def test_what_held_against_friction_at_rest_is_given_back_where_motion_begins() -> None:
+    """As much of it as friction can be; the last motion's integral part stays."""
+    machine = planar()
+    law = Loop(machine, loop_model(machine).design(), np.array([0.1, 1.9]))
+    law.settings[loop.INTEGRAL], law.settings[loop.DEADBAND] = 5.0, 1e-9
+    J = machine.model().kinematics.jacobian(law.pose)
+
+    def cycle(error: float, *, moving: bool, cycles: int = 1) -> FloatArray:
+        law.moves[0, 0], law.moves[1, 1] = error, 1e-3 if moving else 0.0
+        for _ in range(cycles):
+            law.force()
+        return law.state[:2].copy()
+
+    in_motion = cycle(0.01, moving=True, cycles=50)
+    at_rest = cycle(-0.02, moving=False, cycles=100)
+    assert (np.abs(at_rest - in_motion)[:2] > 0.1).all()
+    kept = law.state.copy()
+    assert cycle(0.0, moving=True) == pytest.approx(at_rest)  # nothing is made up for
+
+    law.state[:], law.friction[:] = kept, 1e6
+    assert cycle(0.0, moving=True) == pytest.approx(in_motion)
+    assert cycle(0.0, moving=True) == pytest.approx(in_motion)
+
+    law.state[:], law.friction[:] = kept, [0.02, 0.01, 0.03]
+    least = np.abs(J).T @ law.friction
+    expected = at_rest + np.sign(in_motion - at_rest) * least
+    assert (least < np.abs(at_rest - in_motion)).all()
+    assert cycle(0.0, moving=True) == pytest.approx(expected)
+    assert cycle(0.0, moving=True) == pytest.approx(expected)
 
 
 def test_a_heavier_platform_gets_a_slower_loop() -> None:
