@@ -196,6 +196,8 @@ def test_what_cannot_be_led_is_told(
         (("--device", "gamepad"), 2, "--device gamepad: none is plugged in"),
         ((*plays, "--scale", "1000:1"), 2, "--scale 1000:1: allowed: 0.001 to 100"),
         (("--device", "script"), 2, "--script: allowed: together with --device script"),
+        (("--turn-axes", "rx,ry,rz"), 2, "--turn-axes rx,ry,rz: allowed: together with --device g"),
+        ((*plays, "--axes", "ABS_X"), 2, "--axes ABS_X: allowed: together with --device gamepad"),
         ((*plays, "--via", "nowhere"), 2, "--via nowhere: allowed: HOST:PORT"),
         ((*plays, "--via", "a..b:7710"), 2, "set-points to a..b:7710: is no name of a host"),
         ((*plays, "--via", "127.0.0.1:9"), 1, "the robot has not answered for 0.5 s"),

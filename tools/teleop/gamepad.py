@@ -240,8 +240,9 @@ def stick_map(
     Axes that are not named are those of `AXES` and `TURN_AXES`.
     """
     k, about = directions
-    moves = _axes("--axes", axes or AXES[k], k)
-    turns = _axes("--turn-axes", turn_axes or TURN_AXES[len(about)], len(about))
+    moves = _axes("--axes", axes or AXES[k], "xyz"[:k])
+    turned = "".join("xyz"[axis] for axis in about)
+    turns = _axes("--turn-axes", turn_axes or TURN_AXES[len(about)], turned, "about ")
     named = [axis for axis, _ in (*moves, *turns)]
     if len(set(named)) < len(named):
         given = ",".join(filter(None, (axes or AXES[k], turn_axes or TURN_AXES[len(about)])))
@@ -252,10 +253,13 @@ def stick_map(
     return StickMap(moves, turns, about, held, pressed, dead_zone, speed_m_s)
 
 
-def _axes(option: str, text: str, count: int) -> tuple[SignedAxis, ...]:
+def _axes(option: str, text: str, directions: str, how: str = "") -> tuple[SignedAxis, ...]:
     names = [name for name in text.split(",") if name]
-    if len(names) != count:
-        raise BadInputError(f"{option} {text}: {len(names)} axes; allowed: {count} for this robot")
+    if len(names) != len(directions):
+        allowed = f"{len(directions)} for this robot"
+        if directions:
+            allowed += f", {how}{', '.join(directions)}"
+        raise BadInputError(f"{option} {text}: {len(names)} axes; allowed: {allowed}")
     return tuple(
         (_code(option, name.removeprefix("-"), "ABS_"), -1 if name.startswith("-") else 1)
         for name in names

@@ -250,9 +250,12 @@ def test_in_a_plane_the_second_stick_turns_to_its_side() -> None:
 
 def test_axes_that_do_not_fit_the_robot_are_refused() -> None:
     for axes, turns, told in (
-        ("ABS_X,ABS_Y", None, "--axes ABS_X,ABS_Y: 2 axes; allowed: 3"),
-        (None, "ABS_RX", "--turn-axes ABS_RX: 1 axes; allowed: 3"),
+        ("ABS_X,ABS_Y", None, "--axes ABS_X,ABS_Y: 2 axes; allowed: 3 for this robot, x, y, z"),
+        (None, "ABS_RX", "--turn-axes ABS_RX: 1 axes; allowed: 3 for this robot, about x, y, z"),
         (None, "ABS_X,ABS_RX,ABS_RY", "allowed: different ones"),
     ):
         with pytest.raises(BadInputError, match=told):
             stick_map(ROOM, axes, turns, "BTN_TR", "BTN_SOUTH", 0.1, 0.05)
+    for about, told in (((0, 1), "allowed: 2 for this robot, about x, y$"), ((), "robot$")):
+        with pytest.raises(BadInputError, match=told):
+            stick_map((3, about), None, "ABS_RX,ABS_RY,ABS_RZ", "BTN_TR", "BTN_SOUTH", 0.1, 0.05)

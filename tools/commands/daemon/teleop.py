@@ -127,6 +127,10 @@ def robot(
     lines = () if script is None else read_script(script, factor)
     if (device is Device.SCRIPT) != (script is not None):
         raise BadInputError("--script: allowed: together with --device script, and needed there")
+    of_gamepad = (("--input", input_path), ("--axes", axes), ("--turn-axes", turn_axes))
+    for option, given in of_gamepad if device is not Device.GAMEPAD else ():
+        if given is not None:
+            raise BadInputError(f"{option} {given}: allowed: together with --device gamepad")
 
     def open_device(directions: Directions) -> InputDevice:
         """Open the device, once all else is in order."""
