@@ -49,15 +49,22 @@ def rig(tmp_path_factory: pytest.TempPathFactory) -> Iterator[LoopRig]:
         yield made
 
 
+def hold(rig: LoopRig) -> None:
+    """Have the robot hold with power, whatever it did before."""
+    if rig.state is LoopState.READY:
+        rig.obeyed("enable")
+    rig.obeyed("hold")
+
+
 def test_it_is_carried_out_once_it_is_prepared(rig: LoopRig) -> None:
-    rig.obeyed("enable")
+    hold(rig)
     rig.obeyed("program", program="prepared", wanted={"what": "plan"})
     assert rig.loop.engine.program.name == "prepared"
     rig.obeyed("hold")
 
 
 def test_what_cannot_be_prepared_is_refused_and_changes_nothing(rig: LoopRig) -> None:
-    rig.obeyed("hold")
+    hold(rig)
     answer = rig.command("program", program="prepared", wanted={"what": "bad"})
     assert (answer["ok"], answer["text"]) == (False, "what: value 'bad'")
     assert rig.loop.engine.program.name == "hold"
@@ -65,7 +72,7 @@ def test_what_cannot_be_prepared_is_refused_and_changes_nothing(rig: LoopRig) ->
 
 @pytest.mark.parametrize("urgent", [False, True])
 def test_a_command_that_comes_meanwhile_ends_it(rig: LoopRig, urgent: bool) -> None:
-    rig.obeyed("hold")
+    hold(rig)
     asked = {"do": "program", "program": "prepared", "wanted": {"what": f"other {urgent}"}}
     number = rig.block.post_command({**asked, "right": rig.right})
     rig.turn(1)
@@ -81,8 +88,7 @@ def test_a_command_that_comes_meanwhile_ends_it(rig: LoopRig, urgent: bool) -> N
 
 def begun_in_a_jog(rig: LoopRig, what: str) -> int:
     """Jog, and ask for what takes until the next turn to be prepared; return the number."""
-    if rig.state is LoopState.READY:
-        rig.obeyed("enable")
+    hold(rig)
     rig.obeyed("program", program="jog", wanted=JOG)
     asked = {"do": "program", "program": "prepared", "wanted": {"what": what}, "right": rig.right}
     number = rig.block.post_command(asked)
