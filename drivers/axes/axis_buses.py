@@ -301,6 +301,8 @@ class AxisBuses:
                 return
             if not self.lockstep:
                 self.clock.sleep(self.period_s)
+            elif live:  # the time of a bus whose group has dropped out would stand still
+                live[0].let_other_buses_follow()
 
 
 def _has_power(group: AxisGroup) -> bool:

@@ -5,6 +5,8 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
+from cdpr_drivers.axes.axis_group import AxisGroup
+from cdpr_drivers.errors import BusError
 from cdpr_rt.core.states import LoopState
 from cdpr_rt.service.streams.stream_packet import Standing, StreamSession
 from cdpr_tools.errors import WorkFailedError
@@ -133,3 +135,23 @@ def test_a_drive_that_stays_silent_does_not_keep_two_buses_from_being_left():
         assert 1.0 < robot.machine.clock.now_s - begin_s < 10.0
     assert left.startswith("node 2: does not confirm that its power stage is off")
     assert "node 1" not in left
+
+
+def test_a_bus_that_is_not_exchanged_any_more_does_not_keep_the_others_from_being_left(monkeypatch):
+    usual = AxisGroup.sync
+    with LockstepRobot("bench-8") as robot:
+        robot.enable()
+        robot.inject_fault(axis=1, sub=6, value=65535)
+        robot.run(0.5)
+        dropped_out = robot.machine.device.groups[1]
+
+        def sync(group: AxisGroup) -> None:
+            if group is dropped_out:
+                raise BusError("the bus lives, and is not exchanged")
+            usual(group)
+
+        monkeypatch.setattr(AxisGroup, "sync", sync)
+        begin_s = robot.machine.clock.now_s
+        left = robot.machine.close()
+        assert 1.0 < robot.machine.clock.now_s - begin_s < 10.0
+    assert "node 2: does not confirm that its power stage is off" in left
