@@ -146,7 +146,7 @@ def made_runs(folder: Path, *processes: int) -> list[Run]:
 
 
 def differences(runs: list[Run]) -> dict[str, str | None]:
-    return {one.name: None if one.same is None else one.difference for one in compare(runs)}
+    return {one.file: None if one.same is None else one.difference for one in compare(runs)}
 
 
 def test_names_and_times_that_are_of_the_run_make_no_difference(tmp_path: Path) -> None:
