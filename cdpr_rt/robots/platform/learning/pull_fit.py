@@ -117,10 +117,11 @@ class PullFit:
         zero, usual_Nm = np.zeros(self._rated_Nm.size), FRICTION_SHARE * self._rated_Nm
         misfit, x, covariance = self._fit(zero, usual_Nm)
         alone_Nm, variance = x[:, kernel.FRICTION], covariance[:, kernel.FRICTION, kernel.FRICTION]
-        told = ~self._known & (misfit < _MISFIT)
+        told = (~self._known & (misfit < _MISFIT)) / _wider(misfit)
         mean_Nm, spread_Nm = self._of_their_kind(told, alone_Nm, variance, usual_Nm)
         misfit, x, covariance = self._fit(mean_Nm, spread_Nm)
-        self.unknowns[:], self._covariance[:] = x, covariance
+        self.unknowns[:] = x
+        self._covariance[:] = covariance * _wider(misfit)[:, None, None]
         turned = (self._turned >= _TURNED_rad).all(axis=0)
         turned |= (self._turned >= _SLID_rad).any(axis=0) & (spread_Nm < _TOLD * usual_Nm)
         self._found[:] = ~self._known & turned & (misfit < _MISFIT)
@@ -146,19 +147,20 @@ class PullFit:
         self._learning.begin_with(self._found, torques, covariance)
 
     def _of_their_kind(
-        self, told: BoolArray, friction_Nm: FloatArray, variance: FloatArray, usual_Nm: FloatArray
+        self, told: FloatArray, friction_Nm: FloatArray, variance: FloatArray, usual_Nm: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
         """Return how the others of each motor's kind rub, (n,): mean, and standard deviation.
 
-        From what was found of each of those that `told` (n,) alone, with friction usually 0 ±
-        `usual_Nm`, and its variance; that is returned where the others tell nothing.
+        From what was found of each alone, with friction usually 0 ± `usual_Nm`, and its variance.
+        What a motor tells beyond that counts `told` (n,) times, 0 to 1. Where the others tell
+        nothing it is 0 ± `usual_Nm`, and a quarter of it.
         """
-        others = self._of_a_kind & told & ~np.eye(told.size, dtype=np.bool_)
+        others = (self._of_a_kind & ~np.eye(told.size, dtype=np.bool_)) * told
         precision = np.maximum(1.0 / variance - usual_Nm**-2.0, 0.0)
         weighted = friction_Nm / variance  # by the precision of what this motor has told
         mean_Nm = (others @ weighted) / (others @ precision + usual_Nm**-2.0)
         unlike = (_UNLIKE**2 * (mean_Nm**2 + usual_Nm**2))[:, None]
-        counts = others / (1.0 + precision * unlike)
+        counts = others / (1.0 + others * precision * unlike)
         known = (counts * precision).sum(axis=1) + usual_Nm**-2.0
         return (counts * weighted).sum(axis=1) / known, np.sqrt(unlike[:, 0] + 1.0 / known)
 
@@ -188,4 +190,9 @@ class PullFit:
         misfit = np.maximum(left, 0.0) / told
         # cables that are softer show all torques larger
         x[:, kernel.FRICTION :] /= np.maximum(1.0 + x[:, [kernel.STEEPER]], _LEAST_STEEP)
-        return np.sqrt(misfit), x, covariance * np.maximum(misfit, 1.0)[:, None, None]
+        return np.sqrt(misfit), x, covariance
+
+
+def _wider(misfit: FloatArray) -> FloatArray:
+    """Return what variances are multiplied by for a residual over noise, at least 1."""
+    return np.maximum(misfit, 1.0) ** 2

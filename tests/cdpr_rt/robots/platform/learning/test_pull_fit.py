@@ -47,9 +47,11 @@ class Winches:
         gain: float = 1.0,
         pretension_N: np.ndarray = PRETENSION_N,
         friction_Nm: np.ndarray = FRICTION_Nm,
+        harmonic_Nm: float = 0.0,
     ) -> None:
-        """Take what the motors exert over what is asked of them, `gain`."""
+        """Take what the motors exert over what is asked of them, `gain`; and a third harmonic."""
         self.tensions_N, self.gain = np.linspace(0.1, 300.0, 600), gain
+        self.harmonic_Nm = harmonic_Nm
         self.pretension_N, self.friction_Nm = pretension_N, friction_Nm
         self.free_m = np.array([lengths(np.full(N, t)) for t in self.tensions_N])
         self.at_pretension_rad = np.full(N, START_rad)
@@ -64,6 +66,7 @@ class Winches:
                 -self.zero_m[i] - CABLE_m[i] * turns, -self.free_m[:, i], self.tensions_N
             )
             cogging = COGGING_Nm[i] * np.sin(POLE_PAIRS * turns + PHASE_rad[i])
+            cogging += self.harmonic_Nm * np.sin(3.0 * POLE_PAIRS * turns + i)
             left = CABLE_m[i] * (held - self.gain * tension_N[i]) - cogging
             stays = np.abs(left) <= self.friction_Nm[i]
             self.theta[i] = turns[stays][np.abs(turns[stays] - self.theta[i]).argmin()]
@@ -160,6 +163,19 @@ def test_a_motor_whose_friction_does_not_turn_round_rubs_as_others_of_its_kind(
     fit.begin_learning()
     expected_Nm = 0.8 * winches.friction_Nm if alike else np.zeros(N)
     np.testing.assert_allclose(learning.friction_Nm[little], expected_Nm[little], atol=0.03)
+
+
+def test_what_a_motor_takes_up_besides_does_not_have_the_others_of_its_kind_rub_more(
+    lengths: Callable[[np.ndarray], np.ndarray],
+) -> None:
+    """Fits that leave a rest tell little, and six of them no more than they found."""
+    friction_Nm = np.full(N, 0.12)
+    winches = Winches(
+        lengths, pretension_N=np.full(N, 50.0), friction_Nm=friction_Nm, harmonic_Nm=0.12
+    )
+    fit = PullFit(AXES, NOBODY, lengths, None)
+    assert np.isfinite(pulled(fit, winches)).all()
+    np.testing.assert_allclose(fit.unknowns[:, FRICTION], friction_Nm, atol=0.06)
 
 
 def test_a_torque_constant_that_is_off_is_not_taken_for_cogging(
