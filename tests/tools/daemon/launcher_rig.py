@@ -19,7 +19,7 @@ from cdpr_rt.core.shared_block import SharedBlock
 from cdpr_rt.core.states import CUT_SHORT
 from cdpr_tools.daemon.loop_file import POWER_OFF_SIGNAL
 from cdpr_tools.daemon.processes import launcher
-from cdpr_tools.daemon.processes.child import end_with_launcher
+from cdpr_tools.daemon.processes.child import POWER_UNCONFIRMED, end_with_launcher
 from cdpr_tools.daemon.processes.notify import ServiceManager
 from cdpr_tools.daemon.settings import RunSettings
 
@@ -97,6 +97,9 @@ def loop() -> None:
         _note(folder, "power taken")
         block.write_status({"state": "unconfigured", "reason": CUT_SHORT})
     _note(folder, "loop stopped")
+    if "unconfirmed" in plan:
+        block.write_status({"state": "unconfigured", "reason": plan["unconfirmed"]})
+        sys.exit(POWER_UNCONFIRMED)
 
 
 def service() -> None:

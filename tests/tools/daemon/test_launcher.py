@@ -217,6 +217,17 @@ def test_a_loop_that_dies_is_told_and_the_service_stays_to_say_so(start: Start) 
     assert daemon.ends() == 1
 
 
+def test_a_loop_that_ends_on_command_has_not_died_though_a_drive_may_have_power(
+    start: Start,
+) -> None:
+    why = "node 1: does not confirm that its power stage is off"
+    daemon = start({"unconfirmed": why})
+    daemon.line("ready")
+    (daemon.folder / "shutdown").touch()
+    assert daemon.line("reason")["reason"] == why
+    assert daemon.ends() == 1
+
+
 def test_a_fault_is_told_with_its_reason_once(start: Start) -> None:
     daemon = start()
     daemon.line("ready")

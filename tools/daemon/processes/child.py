@@ -11,9 +11,13 @@ import time
 from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
+from typing import Final
 
 from cdpr_tools.daemon.settings import RunSettings
 from cdpr_tools.processes.module_process import module_command
+
+POWER_UNCONFIRMED: Final = 3
+"""Exit status of a loop that ended on command, after which a drive may still have power."""
 
 _PR_SET_PDEATHSIG = 1
 

@@ -15,7 +15,7 @@ from cdpr_rt.core.shared_block import SharedBlock, SharedBlockError
 from cdpr_rt.core.states import CUT_SHORT
 from cdpr_tools.composition.simulator import OwnSimulator
 from cdpr_tools.daemon.loop_file import POWER_OFF_SIGNAL, LoopFile, started
-from cdpr_tools.daemon.processes.child import Child, move_to
+from cdpr_tools.daemon.processes.child import POWER_UNCONFIRMED, Child, move_to
 from cdpr_tools.daemon.processes.notify import ServiceManager
 from cdpr_tools.daemon.settings import RunSettings
 from cdpr_tools.errors import BAD_INPUT, DONE, FAILED
@@ -25,6 +25,8 @@ SERVICE: Final = "cdpr_tools.daemon.processes.service_process"
 DEAD: Final = "dead"
 """The state that is reported of a loop that has died; no state of a loop that lives."""
 
+_ON_COMMAND: Final = (DONE, POWER_UNCONFIRMED)
+"""Exit statuses of a loop that has not died."""
 _TURN_S = 0.2
 # a controlled stop from full speed, and brakes that follow, take less, besides a lowering
 _LOOP_STOP_S = 30.0
@@ -121,7 +123,7 @@ class Launcher:
         A loop that died while it was up does not end it: the service stays and says so.
         """
         code = self._loop.process.poll()
-        if code == DONE:
+        if code in _ON_COMMAND:
             return True
         if code is not None and not self._up:
             self._start_failed("loop", self._loop)
@@ -150,7 +152,7 @@ class Launcher:
 
     def _watch_loop(self) -> None:
         if self._loop.end:
-            if self._up and not self.reason and self._loop.process.returncode != DONE:
+            if self._up and not self.reason and self._loop.process.returncode not in _ON_COMMAND:
                 self.reason = f"the loop has died: {self._loop.end}"
                 self._block.write_status(
                     {**self._status(), "state": DEAD, "reason": self.reason, "reason_limit": None}
@@ -289,9 +291,9 @@ class Launcher:
             self._loop.process.kill()
             self._loop.process.wait()
             return f"the loop did not stop within {timeout_s:g} s and was killed"
-        if CUT_SHORT in (reason := str(self._status().get("reason", ""))):
+        code, reason = self._loop.process.returncode, str(self._status().get("reason", ""))
+        if CUT_SHORT in reason or code == POWER_UNCONFIRMED:
             return reason
-        code = self._loop.process.returncode
         # one that is asked while it loads has opened nothing yet
         loading = code == -signal.SIGTERM and not self._block.counters["loop_alive_ns"][0]
         return "" if code == DONE or loading else f"the loop {self._loop.end}"

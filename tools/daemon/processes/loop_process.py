@@ -31,9 +31,9 @@ from cdpr_rt.state_file import state_path
 from cdpr_tools.compiling import announce_compiling, compiling_notices_to
 from cdpr_tools.composition.loop_parts import description, loop_parts
 from cdpr_tools.daemon.loop_file import POWER_OFF_SIGNAL
-from cdpr_tools.daemon.processes.child import end_with_launcher
+from cdpr_tools.daemon.processes.child import POWER_UNCONFIRMED, end_with_launcher
 from cdpr_tools.daemon.settings import RunSettings
-from cdpr_tools.errors import BAD_INPUT, DONE, FAILED
+from cdpr_tools.errors import BAD_INPUT, DONE
 
 
 def main() -> int:
@@ -84,7 +84,7 @@ def main() -> int:
         signal.signal(POWER_OFF_SIGNAL, signal.SIG_IGN)
     if unconfirmed := loop.transitions.power_off_unconfirmed:
         print(f"cdpr: {unconfirmed}", file=sys.stderr)
-        return FAILED
+        return POWER_UNCONFIRMED
     return DONE
 
 
