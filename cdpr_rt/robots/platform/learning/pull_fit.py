@@ -182,7 +182,7 @@ class PullFit:
         usual[:, kernel.FRICTION], expected = spread_Nm, np.zeros_like(usual)
         expected[:, kernel.FRICTION] = friction_Nm
         products, rest = sums[:, :m, :m], sums[:, :m, m]
-        covariance = np.linalg.inv(products + np.eye(m) * usual[:, None] ** -2.0)
+        covariance = np.asarray(np.linalg.inv(products + np.eye(m) * usual[:, None] ** -2.0), float)
         x = np.einsum("ijk,ik->ij", covariance, rest + expected / usual**2)
         left = sums[:, m, m] - 2.0 * np.einsum("ij,ij->i", x, rest)
         left += np.einsum("ij,ijk,ik->i", x, products, x)
