@@ -103,8 +103,10 @@ class Cycle:
     def _await_deadline(self) -> None:
         period, clock = self.device.period_s, self.device.clock
         self._deadline_s += period
-        # a SYNC that met commands on the wire would be late by them, and so would all after it
-        begin_s = max(self._deadline_s, self._free_s)
+        # a SYNC that met commands on the wire would be late by them, and so would all after it;
+        # where that is so in every cycle, as with a silent drive, the rate is kept all the same
+        too_late_s = _TOO_LATE_SHARE * period
+        begin_s = min(max(self._deadline_s, self._free_s), self._deadline_s + too_late_s)
         now = clock.now_s
         if now < begin_s:
             clock.sleep_until(begin_s)
@@ -113,7 +115,7 @@ class Cycle:
             self._deadline_s = now
         self._no_deadline_yet = False
         self.late_s = now - self._deadline_s
-        if self.late_s > _TOO_LATE_SHARE * period:
+        if now - begin_s > too_late_s:
             self._deadline_s = now  # a new time base: the next cycles are not run in a hurry
         lateness = self.lateness
         lateness.cycles += 1

@@ -78,3 +78,20 @@ def test_no_sync_goes_out_while_commands_are_on_the_wire() -> None:
     assert drives.synced_s[2] == pytest.approx(50.0 + 2 * PERIOD_S + behind_s)
     assert drives.synced_s[4] == pytest.approx(50.0 + 4 * PERIOD_S)
     assert cycle.lateness.worst_s == pytest.approx(behind_s)
+
+
+def test_the_rate_is_kept_where_commands_are_late_in_every_cycle() -> None:
+    drives, cycle = synced([0.4e-3] * 100)
+    behind_s = drives.synced_s[-1] - (50.0 + 99 * PERIOD_S)
+    assert behind_s == pytest.approx(0.25 * PERIOD_S)
+    assert cycle.late_s == pytest.approx(behind_s)
+
+
+def test_after_a_pause_a_cycle_begins_at_once() -> None:
+    drives, cycle = synced([0.0])
+    cycle.begin()
+    drives.clock.time_s += 0.01
+    before_s = drives.clock.time_s
+    cycle.exchange()
+    assert drives.synced_s[-1] == before_s
+    assert cycle.late_s == 0.0

@@ -202,6 +202,8 @@ def _end(daemon: Daemon, out: Output) -> None:
             out.say(ended)
             return
         if not had_died:
+            if status["state"] != DEAD:  # a drive may have fallen silent meanwhile
+                ended = after_stop_text(status)
             notes(str(status["program"]), status.get("program_progress") or {})
         time.sleep(_WATCH_S)
     raise WorkFailedError(f"the daemon still runs {_END_S:g} s after it was asked to end")

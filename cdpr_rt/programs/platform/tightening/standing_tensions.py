@@ -52,11 +52,13 @@ class StandingTensions:
         pressing = model.least_tensions(least_N, modest)
         self._pressed = [(model.least_tensions(floor_N, most), 1.0) for floor_N in floors_N]
         self._clear_N = _CLEAR * taken_up_N
+        # of a winch that may take up more than is planned with, no more is to be had
+        clear_N = np.minimum(self._clear_N, floors_N[0])
         self._clear = [
             (model.least_tensions(floor_N, most), share)
             for share in _PRESSED_LESS
             for floor_N in floors_N
-            if (floor_N >= self._clear_N).all()
+            if (floor_N >= clear_N).all()
         ]
         self._pressed += [(self._least, 1.0)] + [(pressing, share) for share in _PRESSING]
         self._carrying = model.least_tensions(np.zeros(least_N.size), model.high_N)

@@ -47,3 +47,18 @@ def test_winches_that_may_take_up_all_pull_harder_and_press_the_platform_less(
     assert stays
     assert (tension_N > taken_up_N).all()
     np.testing.assert_allclose(W @ tension_N, share * model.weight(), atol=1e-6)
+
+
+def test_the_more_winches_may_take_up_the_harder_cables_are_pulled() -> None:
+    machine = heavier(spatial(), 14.0)
+    model, low_N = machine.model(), machine.control().low_N
+    least_N = []
+    for taken_up_N in (0.0, 20.0, 23.0, 30.0, 40.0):
+        most_N, taken_up = np.full(machine.n, 1e3), np.full(machine.n, taken_up_N)
+        taken_up[0] *= 2.0
+        standing = StandingTensions(model, low_N, most_N, taken_up)
+        tension_N, stays = standing.at(model.home_pose)
+        assert stays
+        least_N.append(tension_N.min())
+    assert least_N == sorted(least_N)
+    assert least_N[-1] > 1.5 * least_N[0]
