@@ -44,10 +44,6 @@ def after_stop_text(status: dict[str, Any]) -> str:
 
 
 GO_ON = "`cdpr path --resume` goes on"
-FALLEN = (
-    "; it has fallen: look at it, then `cdpr tighten --from home` where it stands there, or "
-    "`--from lengths` where it stands upright elsewhere"
-)
 _OPTIONS = {"live_view": "--live", "stream": "--stream"}
 _STAGES = {
     ("tighten", "slack"): "winding in the slack of the cables",
@@ -210,6 +206,16 @@ def stage_text(program: str, progress: dict[str, Any]) -> str:
     return _STAGES.get((program, stage), stage)
 
 
+def fallen_text(status: dict[str, Any]) -> str:
+    """Return what to do with a platform that has fallen, an empty text where it has not."""
+    if not (status.get("program_progress") or {}).get("fallen"):
+        return ""
+    text = "; it has fallen: look at it, then `cdpr tighten --from home` where it stands there"
+    if any(axis.get("cable_length_m") is None for axis in status["axes"]):
+        return f"{text}, upright"
+    return f"{text}, or `--from lengths` where it stands upright elsewhere"
+
+
 def tightness_text(status: dict[str, Any]) -> str:
     """Return whether the cables hold the platform, an empty text of robots without one."""
     tight = (status.get("program_progress") or {}).get("tight")
@@ -219,8 +225,7 @@ def tightness_text(status: dict[str, Any]) -> str:
         apart_mm = 1e3 * ((status["cycle"] or {}).get("lengths_disagree_m") or 0.0)
         agree = f", whose lengths agree within {apart_mm:.1f} mm" if apart_mm else ""
         return f"held by its cables{agree}"
-    fell = (status.get("program_progress") or {}).get("fallen")
-    return f"cables loose, power on{FALLEN if fell else ''}"
+    return f"cables loose, power on{fallen_text(status)}"
 
 
 def _listed(values: Iterable[float], factor: float, digits: int) -> str:

@@ -72,11 +72,14 @@ def test_of_a_platform_that_fell_it_is_told_what_comes_before_it_is_tightened() 
     status = status_of(state="active", program="hold", program_progress={"tight": False})
     assert "cables loose, power on" in [str(line) for line in status_text(status).renderables]
     status["program_progress"]["fallen"] = True
-    (line,) = (str(line) for line in status_text(status).renderables if "loose" in str(line))
-    assert line.endswith(
-        "it has fallen: look at it, then `cdpr tighten --from home` where it stands there, or "
-        "`--from lengths` where it stands upright elsewhere"
-    )
+    home = "it has fallen: look at it, then `cdpr tighten --from home` where it stands there, "
+    for length_m, told in (
+        (1.2, "or `--from lengths` where it stands upright elsewhere"),
+        (None, "upright"),  # lengths that were forgotten are refused
+    ):
+        status["axes"] = [{"name": "left", "cable_length_m": x} for x in (1.1, length_m)]
+        (line,) = (str(line) for line in status_text(status).renderables if "loose" in str(line))
+        assert line.endswith(home + told)
 
 
 def test_a_part_that_does_not_work_is_told_by_its_option() -> None:

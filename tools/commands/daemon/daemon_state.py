@@ -12,7 +12,7 @@ from rich.text import Text
 from cdpr_tools.client.client import Daemon, NoDaemonError, open_daemon
 from cdpr_tools.client.motion import ProgressNotes
 from cdpr_tools.client.refusals import DaemonRefusalError
-from cdpr_tools.client.status_text import DEAD, FALLEN, after_stop_text, status_text
+from cdpr_tools.client.status_text import DEAD, after_stop_text, fallen_text, status_text
 from cdpr_tools.commands.daemon.with_daemon import with_daemon, with_daemon_at_once
 from cdpr_tools.commands.options import (
     JsonOption,
@@ -112,9 +112,8 @@ def _next(status: dict[str, Any]) -> list[str]:
     progress = status.get("program_progress") or {}
     if progress.get("tight") is not False or status["program"] != "hold":
         return []
-    if progress.get("fallen"):
-        return [f"cables loose{FALLEN}"]
-    return ["cables loose; next: `cdpr tighten`, then it can be moved"]
+    fallen = fallen_text(status)
+    return [f"cables loose{fallen or '; next: `cdpr tighten`, then it can be moved'}"]
 
 
 def _booted(daemon: Daemon, out: Output) -> dict[str, Any]:
