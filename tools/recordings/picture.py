@@ -265,7 +265,9 @@ def pose_curves(columns: Columns) -> dict[str, Curves]:
     poses = columns["pose"], columns["pose_setpoint"]
     position = dict(zip("xyz", zip(*(pose[:, :3].T for pose in poses), strict=True), strict=True))
     turned = zip(*(_rotation_vectors(pose[:, 3:]).T for pose in poses), strict=True)
-    rotation = dict(zip(("rx", "ry", "rz"), turned, strict=True))
+    # in a plane, where the third coordinate is 0, directions are x, y and angle
+    names = ("rx", "ry", "rz" if np.nan_to_num(poses[0][:, 2]).any() else "angle")
+    rotation = dict(zip(names, turned, strict=True))
     panels = {
         "platform (m)": _moved(position),
         "turned (deg)": {

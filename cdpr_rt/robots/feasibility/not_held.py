@@ -25,7 +25,7 @@ def why_not_held(statics: PlatformStatics, position_m: FloatArray, turn_rad: Flo
     where = f"at {point_text(position_m)} m"
     reserve = float(statics.margin_N(position_m, 0.0, turn_rad))
     if turn_rad.any():
-        where += f", turned {_turn(turn_rad)}"
+        where += f", turned by {_turn(turn_rad, position_m.size)}"
     if not math.isfinite(reserve):
         return f"{where} {_singular(statics)}"
     needed = ", ".join(str(round(value)) for value in statics.tensions_N(position_m, turn_rad))
@@ -101,11 +101,13 @@ def _what_helps(statics: PlatformStatics, position_m: FloatArray, turn_rad: Floa
     return f"only a place further inside the exit points helps{others if turned else ''}"
 
 
-def _turn(turn_rad: FloatArray) -> str:
+def _turn(turn_rad: FloatArray, coordinates: int) -> str:
+    if coordinates == 2:
+        return f"{math.degrees(turn_rad[2]):.0f} deg"
     angle = float(np.linalg.norm(turn_rad))
     # + 0: a rounded -0 is shown as 0
     axis = ", ".join(f"{value:.2g}" for value in np.round(turn_rad / angle, 2) + 0.0)
-    return f"by {math.degrees(angle):.0f} deg about ({axis})"
+    return f"{math.degrees(angle):.0f} deg about ({axis})"
 
 
 def point_text(position_m: FloatArray | tuple[float, ...]) -> str:

@@ -195,6 +195,15 @@ def test_a_platform_s_pose_is_drawn_as_far_as_it_moves(tmp_path: Path) -> None:
     assert max(high for high, _ in sizes) < 1800, "more than a screen shows"
 
 
+def test_in_a_plane_a_platform_s_orientation_is_its_angle() -> None:
+    pose = np.zeros((50, 7))
+    pose[:, 3], pose[:, 6] = np.cos(np.linspace(0, 0.1)), np.sin(np.linspace(0, 0.1))
+    for height_m, name in ((0.0, "angle"), (2.0, "rz")):
+        pose[:, 2] = height_m
+        (curve,) = pose_curves({"pose": pose, "pose_setpoint": pose})["turned (deg)"]
+        assert curve == name
+
+
 def test_curves_with_single_unknown_values_keep_their_extremes() -> None:
     x = np.arange(30_000.0)
     y = np.sin(x / 500.0)

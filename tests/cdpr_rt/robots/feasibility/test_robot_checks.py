@@ -156,6 +156,13 @@ def test_orientations_that_cables_cannot_hold_are_told_with_the_angle_that_they_
     )
 
 
+def test_in_a_plane_an_orientation_is_one_angle(tmp_path: Path) -> None:
+    text = (SHIPPED / "robots" / "planar-4.toml").read_text()
+    text = re.sub(r"(workspace_angle_rad =) \S+", r"\1 0.7", text)
+    told = findings_of(tmp_path, text)["platform.workspace_min_m"]
+    assert re.search(r" m, turned by -?40 deg the cables ", told), told
+
+
 def test_a_turned_platform_that_meets_its_stand_is_told(tmp_path: Path) -> None:
     text = SUSPENDED.replace("[-2.6, -1.8, 0.75]", "[-2.6, -1.8, 0.6]")
     told = findings_of(tmp_path, text)["platform.workspace_angle_rad"]
