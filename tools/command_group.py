@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import inspect
 from collections.abc import Mapping
 from functools import cache
 from typing import Any
@@ -20,7 +21,17 @@ def load(module: str, name: str) -> Any:
     with loading_notice():
         app = importlib.import_module(f"cdpr_tools.commands.{module}").app
     group = typer.main.get_group(app)
-    return group if group.name == name else group.commands[name]
+    command = group if group.name == name else group.commands[name]
+    _unwrap(command)
+    return command
+
+
+def _unwrap(command: Any) -> None:
+    """Join the lines of each paragraph of the help, which a terminal wraps by its own width."""
+    paragraphs = inspect.cleandoc(command.help or "").split("\n\n")
+    command.help = "\n\n".join(paragraph.replace("\n", " ") for paragraph in paragraphs)
+    for other in getattr(command, "commands", {}).values():
+        _unwrap(other)
 
 
 def group_of(modules: Mapping[str, Mapping[str, str]]) -> type[TyperGroup]:

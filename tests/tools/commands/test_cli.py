@@ -9,6 +9,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
+from itertools import pairwise
 from pathlib import Path
 
 import can
@@ -63,6 +64,16 @@ def test_help_of_a_command(command: tuple[str, ...], told: tuple[str, ...]) -> N
     assert result.returncode == 0
     for word in told:
         assert word in result.stdout
+
+
+def test_paragraphs_of_a_help_are_as_wide_as_the_terminal(monkeypatch: pytest.MonkeyPatch) -> None:
+    for columns in (80, 140):
+        monkeypatch.setenv("COLUMNS", str(columns))
+        told = cdpr("robot", "new", "--help").stdout.partition("It describes")[2].partition("╭")[0]
+        lines = [line.strip() for line in f"It describes{told}".strip().splitlines()]
+        assert len(lines) > 1
+        for line, after in pairwise(lines):
+            assert len(line) + len(f" {after.split()[0]}") > columns - 4, line
 
 
 def test_profiles_are_listed_by_kind() -> None:
