@@ -315,14 +315,16 @@ def _degrees(low: float, high: float) -> Callable[[str, Answers], float]:
     return lambda text, answers: math.radians(read(text, answers))
 
 
-def _point(size: int) -> Callable[[str, Answers], tuple[float, ...]]:
+def _point(size: int, such_as: str = "") -> Callable[[str, Answers], tuple[float, ...]]:
+    example = such_as or _POINTS[size]
+
     def read(text: str, _: Answers) -> tuple[float, ...]:
         try:
             point = tuple(float(part) for part in text.replace(",", " ").split())
         except ValueError:
             point = ()
         if len(point) != size:
-            raise AnswerError(f"allowed: {_COUNTS[size]} numbers in m, such as `{_POINTS[size]}`")
+            raise AnswerError(f"allowed: {_COUNTS[size]} numbers in m, such as `{example}`")
         if not all(abs(x) <= WIDEST_m for x in point):
             raise AnswerError(f"allowed: up to {WIDEST_m:g} m each (in metres, not millimetres)")
         return point
@@ -332,7 +334,7 @@ def _point(size: int) -> Callable[[str, Answers], tuple[float, ...]]:
 
 def _size(kind: RobotKind) -> Callable[[str, Answers], tuple[float, ...]]:
     def read(text: str, answers: Answers) -> tuple[float, ...]:
-        size = _point(kind.size)(text, answers)
+        size = _point(kind.size, _text(kind.frame_m))(text, answers)
         if not all(x > 0.0 for x in size):
             raise AnswerError(f"allowed: {_COUNTS[kind.size]} numbers in m above 0")
         return size

@@ -83,6 +83,17 @@ def test_what_cannot_be_held_is_marked_and_ends_with_its_reason(tmp_path: Path) 
     assert "Traceback" not in run.stderr
 
 
+def test_a_cycle_that_does_not_fit_its_bus_is_told_as_the_daemon_refuses_it(tmp_path: Path) -> None:
+    path = tmp_path / "slow-bus.toml"
+    path.write_text(PLANAR.replace("[[buses]]", "[[buses]]\nbitrate_bit_s = 500000"))
+    shown = cdpr_here("robot", "show", path, "--json")
+    assert shown.returncode == 2
+    assert "impossible: sync_period_s: the cycle does not fit: bus can0: 3 drives" in shown.stderr
+    assert as_json(shown)["ok"] is False
+    run = cdpr_here("run", path, "--bus", "simbus:", "--json")
+    assert run.returncode == 2 and "the cycle does not fit: bus can0: 3 drives" in run.stderr
+
+
 def test_a_bar_that_swings_is_told_with_how_far_and_how_long() -> None:
     bar = Path(__file__).parents[2] / "hil" / "others" / "bar-1m.toml"
     shown = cdpr_here("robot", "show", bar, "--json")
@@ -368,6 +379,7 @@ def test_all_wrong_keys_are_named_with_those_of_the_kind(tmp_path: Path) -> None
         ("mass", "2", "--set mass: no such question; did you mean 'mass_kg'?"),
         ("mass_kg", "nan", "--set mass_kg: value 'nan'; allowed: a number from 0.01 to 10000"),
         ("exit_1_m", "1,2,3", "--set exit_1_m: value '1,2,3'; allowed: two numbers"),
+        ("frame_m", "3x2", "value '3x2'; allowed: two numbers in m, such as `4, 3`"),
         ("frame_m", "3000, 2000", "allowed: up to 300 m each (in metres, not millimetres)"),
         ("name", "two\nlines", "allowed: a text of one line"),
     ],
@@ -378,6 +390,14 @@ def test_wrong_answers_beforehand_are_refused(
     with pytest.raises(BadInputError) as caught:
         answers_of(tmp_path / "mine.toml", {key: value}, usual)
     assert problem in str(caught.value)
+
+
+def test_two_answers_to_one_question_are_refused(tmp_path: Path) -> None:
+    path = tmp_path / "twice.toml"
+    answers = "--set", "kind=planar-3", "--set", "kind=planar-4"
+    done = cdpr_here("robot", "new", path, "--yes", *answers)
+    assert done.returncode == 2 and not path.exists()
+    assert "--set kind: 'planar-3' and 'planar-4'; allowed: one of them" in done.stderr
 
 
 def test_what_cannot_work_is_told_and_not_written(tmp_path: Path) -> None:

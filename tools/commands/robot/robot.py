@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 from shlex import quote
@@ -9,6 +10,8 @@ from typing import Annotated
 
 import typer
 
+from cdpr_drivers.bus.budget import machine_budget
+from cdpr_drivers.robot.bus_fit import refusal
 from cdpr_profiles import Robot, load_robot
 from cdpr_profiles.calibration.in_force import load_calibrated
 from cdpr_profiles.errors import ProfileError
@@ -41,7 +44,7 @@ def show(robot: RobotArgument, png: PngOption = None, as_json: JsonOption = Fals
         )
     with out.stage(f"{profile.profile}: computing tensions, control and what cannot work"):
         figures = summary.figures(profile, platform)
-        found = checks.findings(profile)
+        found = [*checks.findings(profile), *_bus_findings(profile)]
     out.say(*summary.lines(profile, platform, figures))
     known = profile.calibration
     figures["calibration"] = None if known is None else known.summary()
@@ -60,6 +63,12 @@ def show(robot: RobotArgument, png: PngOption = None, as_json: JsonOption = Fals
     out.result({"ok": possible, **figures})
     if not possible:
         raise typer.Exit(BAD_INPUT)
+
+
+def _bus_findings(profile: Robot) -> list[checks.Finding]:
+    """Return that the cycle does not fit its buses, nothing where it does."""
+    reason = refusal(machine_budget(profile))
+    return [checks.Finding("sync_period_s", reason, impossible=True)] if reason else []
 
 
 @app.command("mark-calibrated")
@@ -105,7 +114,7 @@ def new(
         raise BadInputError(f"{path}: is never written over; allowed: a file that is not there yet")
     if path.suffix != ".toml" or not path.parent.is_dir():
         raise BadInputError(f"{path}: allowed: NAME.toml in a folder that is there")
-    given = dict(_key_and_value(text) for text in answers or ())
+    given = _given(answers or ())
     if "kind" not in given and not yes:
         typer.echo(SKETCH, err=True)
         for name, what in KINDS.items():
@@ -132,6 +141,15 @@ def new(
     out.say(f"next: cdpr robot show {path}")
     out.say(f"      cdpr run {path} --bus simbus:      # on simulated winches")
     out.result({"ok": True, "file": str(path)})
+
+
+def _given(answers: Sequence[str]) -> dict[str, str]:
+    given: dict[str, str] = {}
+    for key, value in map(_key_and_value, answers):
+        if key in given:
+            raise BadInputError(f"--set {key}: {given[key]!r} and {value!r}; allowed: one of them")
+        given[key] = value
+    return given
 
 
 def _key_and_value(text: str) -> tuple[str, str]:
