@@ -96,12 +96,17 @@ def test_a_slave_without_process_data_boots_as_far_as_it_goes(empty_bus: str) ->
         assert "node 1 did not boot (step K): no heartbeat came" in ended.stderr
         assert node.sdo[0x1A00][2].raw == 0x60640020  # configured it was
 
-        def restart(_id: int, data: bytearray, _time: float) -> None:
-            if data[0] in (129, 130):
-                node.nmt.send_command(130)
-                node.nmt.state = "PRE-OPERATIONAL"
+        def obey(can_id: int, data: bytearray, time_s: float) -> None:
+            if data[0] not in (129, 130):
+                node.nmt.on_command(can_id, data, time_s)
+                return
+            # between two threads one of its heartbeats would be a second boot-up message
+            node.nmt.stop_heartbeat()
+            node.nmt.send_command(130)
+            node.nmt.state = "PRE-OPERATIONAL"
 
-        network.subscribe(0, restart)
+        network.unsubscribe(0, node.nmt.on_command)
+        network.subscribe(0, obey)
         ended = cdpr("drive", "enable", WINCH, "--bus", bus)
         assert ended.returncode == 1
         assert "node 1: no answer to SYNC" in ended.stderr
