@@ -15,7 +15,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from scipy.spatial.transform import Rotation
 
-from cdpr_rt.arrays import FloatArray
+from cdpr_rt.arrays import FloatArray, IntArray
 from cdpr_rt.core.states import LoopState, Reaction
 from cdpr_rt.service.recordings.recording_reader import Columns, RecordingReader
 from cdpr_tools.errors import BadInputError, WorkFailedError, os_error_as
@@ -315,13 +315,28 @@ def _draw_times(ax: Axes, columns: Columns) -> None:
     legend_beside_title(ax, 3)
 
 
+def shades(state: IntArray, reaction: IntArray) -> IntArray:
+    """Return the kind of shade of each row, (c,), 0 for none, by its state and reaction, (c,).
+
+    The supervisor tells a reaction only as long as the limit is passed; a stop goes on until the
+    robot is active no more.
+    """
+    row, active = np.arange(state.size), state == LoopState.ACTIVE
+    kinds = np.where(active, 0, _POWERLESS)
+    kinds[reaction > Reaction.CLAMP] = _REACTING
+    stop, rest = (
+        np.maximum.accumulate(np.where(there, row, -1))
+        for there in (active & (reaction > Reaction.HOLD), ~active)
+    )
+    kinds[active & (stop > rest)] = _REACTING
+    kinds[state == LoopState.FAULT] = _FAULT
+    return kinds
+
+
 def _shade(ax: Axes, columns: Columns) -> None:
     """Colour what was not active; the first stretch of each kind carries its name."""
     elapsed: FloatArray = columns[ELAPSED]
-    state = columns["state"]
-    kinds = np.where(state == LoopState.ACTIVE, 0, _POWERLESS)
-    kinds[columns["reaction"] > Reaction.CLAMP] = _REACTING
-    kinds[state == LoopState.FAULT] = _FAULT
+    kinds = shades(columns["state"], columns["reaction"])
     edges = [0, *(np.flatnonzero(np.diff(kinds)) + 1), kinds.size]
     named = set()
     for a, b in pairwise(edges):

@@ -17,7 +17,7 @@ from cdpr_rt.core.cycle_row import Row
 from cdpr_rt.core.shared_block import RowWriter
 from cdpr_rt.core.states import LoopState, Reaction
 from cdpr_rt.service.recordings.recording import Recorder
-from cdpr_tools.recordings.picture import FIELDS, faults_of, pose_curves
+from cdpr_tools.recordings.picture import FIELDS, faults_of, pose_curves, shades
 from cdpr_tools.recordings.selection import Selection
 from cdpr_tools.recordings.summary import Reasons, _chosen, worth_telling
 from cdpr_tools.report.style import decimated
@@ -193,6 +193,18 @@ def test_a_platform_s_pose_is_drawn_as_far_as_it_moves(tmp_path: Path) -> None:
     (_, narrow), (_, wide) = sizes
     assert narrow < wide
     assert max(high for high, _ in sizes) < 1800, "more than a screen shows"
+
+
+def test_a_stop_is_shaded_until_the_robot_is_active_no_more() -> None:
+    """The limit may be passed for a moment only: the platform is let down for seconds then."""
+    ready, active, fault = LoopState.READY, LoopState.ACTIVE, LoopState.FAULT
+    state = np.array([ready, active, active, active, active, active, active, fault, ready, active])
+    reaction = np.zeros(state.size, int)
+    reaction[2], reaction[4] = Reaction.HOLD, Reaction.CONTROLLED_STOP
+    kinds = shades(state, reaction)
+    (reacting,) = {int(kind) for kind in kinds[[2, 4, 5, 6]]}
+    assert reacting != 0 and (kinds[[1, 3, 9]] == 0).all()
+    assert kinds[0] == kinds[8] and len({reacting, int(kinds[7]), int(kinds[8]), 0}) == 4
 
 
 def test_in_a_plane_a_platform_s_orientation_is_its_angle() -> None:
