@@ -98,6 +98,7 @@ def enable(
     """
     status = _booted(daemon, out)
     if status["state"] == "active":
+        _require_no_stop(status)
         out.say(f"has power already, program {status['program']}", *_next(status))
         out.result({"ok": True, "state": "active", "text": ""})
         return
@@ -105,6 +106,16 @@ def enable(
     with daemon.control() as control:
         answer = control.post("/enable", {"program": program})
     _show(out, answer, *_next(daemon.get("/status")))
+
+
+def _require_no_stop(status: dict[str, Any]) -> None:
+    """Raise WorkFailedError of a robot that is being stopped: what is asked for would be undone."""
+    if (reaction := str(status.get("reacting", "none"))) != "none":
+        reason = f": {status['reason']}" if status["reason"] else ""
+        raise WorkFailedError(
+            f"the robot is being stopped, {reaction} under way{reason}; `cdpr status` says when it "
+            "has ended"
+        )
 
 
 def _next(status: dict[str, Any]) -> list[str]:
@@ -159,8 +170,9 @@ def hold(daemon: Daemon, out: Output) -> None:
 @with_daemon
 def ack(daemon: Daemon, out: Output) -> None:
     """Acknowledge a fault whose cause is gone; nothing gets power by it."""
-    state = daemon.get("/status")["state"]
-    if state in ("ready", "active"):
+    status = daemon.get("/status")
+    if (state := status["state"]) in ("ready", "active"):
+        _require_no_stop(status)
         out.say("no fault to acknowledge")
         out.result({"ok": True, "state": state, "text": ""})
         return
