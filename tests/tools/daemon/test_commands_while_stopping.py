@@ -1,4 +1,4 @@
-"""`cdpr ack` and `cdpr enable` while a fault's reaction is under way: no success is told."""
+"""Commands that come while a robot is being stopped, or end one badly: no success is told."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
+from cdpr_tools.client.client import NoDaemonError
 from cdpr_tools.commands.daemon import daemon_state, with_daemon
 from cdpr_tools.errors import WorkFailedError
 
@@ -46,3 +47,35 @@ def test_while_a_robot_is_being_stopped_it_is_told_why(
     assert isinstance(error, WorkFailedError)
     assert "controlled stop under way: left: angle jumped" in str(error)
     assert done(monkeypatch, command).exit_code == 0
+
+
+class Dies:
+    """A daemon whose loop ends with an error once it is asked to end; asked again, all ends."""
+
+    def __init__(self) -> None:
+        self.asked = 0
+
+    def get(self, _path: str) -> dict[str, Any]:
+        if self.asked > 1:
+            raise NoDaemonError("nobody is there")
+        axes = [{"name": "top", "alive": False}]
+        state = ("fault", "dead")[self.asked]
+        return {**ACTIVE, "state": state, "reason": "it died", "axes": axes, "read_only": False}
+
+    def post(self, _path: str) -> None:
+        self.asked += 1
+
+
+def test_a_loop_that_dies_while_it_ends_keeps_nobody_waiting(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    @contextmanager
+    def opened(*_where: Any) -> Iterator[Dies]:
+        yield Dies()
+
+    monkeypatch.setattr(daemon_state, "open_daemon", opened)
+    app = typer.Typer()
+    app.add_typer(daemon_state.app)
+    error = CliRunner().invoke(app, ["stop"]).exception
+    assert isinstance(error, WorkFailedError)
+    assert str(error) == "stopped; unheard, and not known to be without power: top; it died"

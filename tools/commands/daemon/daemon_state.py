@@ -201,7 +201,7 @@ def stop(
 def _end(daemon: Daemon, out: Output) -> None:
     """Ask the daemon to end and wait for it; raises WorkFailedError where it does not."""
     status = daemon.get("/status")
-    had_died, ended = status["state"] == DEAD, after_stop_text(status)
+    had_died, ended, dies = status["state"] == DEAD, after_stop_text(status), ""
     daemon.post("/shutdown")
     notes, deadline = ProgressNotes(out), time.monotonic() + _END_S
     if status["state"] == "active":
@@ -210,8 +210,14 @@ def _end(daemon: Daemon, out: Output) -> None:
         try:
             status = daemon.get("/status")
         except NoDaemonError:
+            if dies:
+                raise WorkFailedError(f"{ended}; {dies}") from None
             out.say(ended)
             return
+        if status["state"] == DEAD and not had_died and not dies:
+            # one whose drives do not confirm ends with an error, and the service stays for that
+            dies = str(status["reason"])
+            daemon.post("/shutdown")
         if not had_died:
             if status["state"] != DEAD:  # a drive may have fallen silent meanwhile
                 ended = after_stop_text(status)
