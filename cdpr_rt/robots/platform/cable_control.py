@@ -21,7 +21,7 @@ from cdpr_rt.robots.free_rotation import rotation_of
 from cdpr_rt.robots.kinematics import pose_setpoint
 from cdpr_rt.robots.kinematics import pose_tracking as tracking
 from cdpr_rt.robots.kinematics.cable_kernel import CABLE_ROWS, run_cables
-from cdpr_rt.robots.kinematics.pose import Pose, place_text
+from cdpr_rt.robots.kinematics.pose import Pose
 from cdpr_rt.robots.platform import loop_kernel as loop
 from cdpr_rt.robots.platform.body_kernel import body_of
 from cdpr_rt.robots.platform.cell_feedback import CellFeedback
@@ -34,18 +34,18 @@ from cdpr_rt.robots.platform.control_rows import (
 from cdpr_rt.robots.platform.learning.motor_learning import MotorLearning
 from cdpr_rt.robots.platform.learning.pull_fit import PullFit
 from cdpr_rt.robots.platform.loop_design import designed_loop
+from cdpr_rt.robots.platform.place_checks import PlaceChecks
 from cdpr_rt.robots.platform.shaped_setpoint import ShapedSetpoint
 from cdpr_rt.robots.platform_model import PlatformModel
 from cdpr_rt.robots.tension.tension_distribution import TensionSolver, tension_distribution
 from cdpr_rt.robots.tension.tension_split import OK, split
-from cdpr_rt.robots.workspace import SHARES, infeasibility_text
+from cdpr_rt.robots.workspace import infeasibility_text
 
 _ON_STAND = 0.1  # of the integral part
 _SETTLING_STEPS, _LIFT_S = 60, 0.05
-_MOST_LOOKS = 200  # at the contacts of a way, between two cycles
 
 
-class CableControl:
+class CableControl(PlaceChecks):
     """A controller whose set-point is a platform's: position, velocity, acceleration, (d,) each.
 
     See `PlatformControl`. The tensions that carry the platform are those of the method that its
@@ -70,10 +70,8 @@ class CableControl:
         n = model.kinematics.n
         if len(axes) != n:
             raise GeometryError(f"{len(axes)} axes; allowed: {n}, one for each cable")
-        self.model, self._period_s = model, period_s
-        self.workspace = model.workspace().prepared()
-        """Where targets may lie."""
-        self._held, self._interference = model.workspace(0.0).prepared(), model.interference
+        super().__init__(model)
+        self._period_s, self._held = period_s, model.workspace(0.0).prepared()
         self.low_N, self.high_N = self.workspace.low, self.workspace.high
         """Between which the tensions are planned, (n,)."""
         self.least_N = model.low_N
@@ -119,10 +117,9 @@ class CableControl:
         """Fix the arrays of the kernels that find the pose and follow it, which write `moves`."""
         model, kinematics, motors = self.model, self.model.kinematics, self._motors
         n, self._up = kinematics.n, np.eye(3)[model.positions - 1]
-        self._directions = np.array(kinematics.directions)
-        self._home, self._pose = model.home_pose, Pose(np.zeros(3))
+        self._pose = Pose(np.zeros(3))
         self._pose.array[:] = self._home.array
-        self._wanted, self._to = Pose(np.zeros(3)), Pose(np.zeros(3))
+        self._wanted = Pose(np.zeros(3))
         self._scratch, self._cables = np.zeros((4, 3)), np.zeros((CABLE_ROWS, n))
         filters = tracking_filters(self.gains, self._period_s)
         self._swing, self._seven, position = np.zeros(tracking.SWING), np.zeros(7), np.zeros(n)
@@ -375,47 +372,3 @@ class CableControl:
         needed_N = t - np.linalg.pinv(W) @ (W @ t + self._wrench)
         margin_N = float(np.minimum(needed_N - low_N, high_N - needed_N).min())
         return f"for this motion, {infeasibility_text(margin_N, needed_N, low_N, high_N)}"
-
-    def is_feasible(self, position: FloatArray) -> bool:
-        """Return whether the platform can be held, and accelerated, at a position (d,)."""
-        self._turn_to(position)
-        return self.workspace.is_feasible(self._to)
-
-    def contact_ahead(self, position: FloatArray) -> int:
-        """Return a pair of things in contact on a short way from the set-point, -1 for none."""
-        return self._interference.contact_ahead(self.position, position)
-
-    def contact_at(self, position: FloatArray) -> int:
-        """Return a pair of things in contact at a position (d,), -1 for none."""
-        return self._interference.contact_at(self.position, position)
-
-    def contact(self, pair: int) -> str:
-        """Return in words that a pair is in contact."""
-        return self._interference.within_clearance(pair)
-
-    def infeasibility(self, position: FloatArray) -> str:
-        """Return why the platform cannot stand at a position (d,), an empty text where it can.
-
-        Tensions keep a reserve to their bounds there while it is accelerated in any direction.
-        """
-        self._turn_to(position)
-        return self.workspace.infeasibility(self._to)
-
-    def way_infeasibility(self, position: FloatArray, start: FloatArray | None = None) -> str:
-        """Return what is in the straight way to a position (d,), an empty text for nothing.
-
-        The way begins at `start` (d,), or where the set-point is.
-        """
-        share, begin = SHARES[:, None], self.position if start is None else start
-        poses = self.model.poses((1.0 - share) * begin + share * position)
-        obstacle = self.workspace.first_infeasible(poses)
-        if obstacle is None:
-            contact = self._interference.first_contact(np.array([begin, position]), _MOST_LOOKS)
-            return "" if contact is None else str(contact)
-        there, why = obstacle
-        k = self.model.positions
-        return f"{place_text(there.p[:k], k)}: {why}"
-
-    def _turn_to(self, position: FloatArray) -> None:
-        home, scratch = self._home.array, self._scratch
-        pose_setpoint.pose_of_coordinates(position, self._directions, home, scratch, self._to.array)
