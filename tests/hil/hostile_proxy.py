@@ -29,7 +29,7 @@ class Proxy:
         self._back = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._back.connect(("127.0.0.1", port))
         self.port = int(self._front.getsockname()[1])
-        self.came = self.passed = self.spoilt = 0
+        self.came = self.passed = self.spoilt = self._setpoints = 0
         self._over = threading.Event()
         self._thread = threading.Thread(target=self._run)
         self._thread.start()
@@ -74,7 +74,11 @@ class Proxy:
 
     def _spoil(self, data: bytes) -> bytes:
         """Make some set-points say NaN, or a metre from where the hand is."""
-        if data[_KIND_AT] != _SETPOINT or self._rng.random() >= self._altered:
+        if data[_KIND_AT] != _SETPOINT:
+            return data
+        self._setpoints += 1
+        # by count: of some tens of them chance spoils anything between none and many
+        if self.spoilt >= self._altered * self._setpoints:
             return data
         self.spoilt += 1
         (x,) = struct.unpack_from("<d", data, _POSITION_AT)

@@ -146,7 +146,7 @@ def test_a_script_leads_through_a_bad_network(daemon: RealDaemon, folder: Path) 
 def test_nan_and_steps_of_a_metre_carry_nothing_away(daemon: RealDaemon, folder: Path) -> None:
     begin = place(daemon)
     refused = daemon.status()["parts"]["stream"]["packets"]["tag"]
-    with hostile(port_of(daemon), seed=8, altered=0.1) as proxy:
+    with hostile(port_of(daemon), seed=8, altered=0.2) as proxy:
         via = f"127.0.0.1:{proxy.port}"
         play(daemon, folder, "0 0 0\n0.7 20 0\n1.5 -20 0\n2 0 0", "--scale", "2:1", "--via", via)
         assert proxy.spoilt > 5
