@@ -63,7 +63,14 @@ def test_one_bus_runs_at_nearly_all_it_carries(figures: dict[str, Any]) -> None:
     assert (full["rate_Hz"], full["limit_Hz"]) == (500.0, 524)
     assert 0.94 < full["share"] < 0.96
     assert full["cycles"] > 0.5 * SECONDS * 500
-    assert figures["reached"]["one_bus"] == (full["overruns"] == 0)
+    assert figures["reached"]["one_bus"] == (full["by_loop"] == 0)
+
+
+def test_syncs_that_meet_the_last_commands_are_counted() -> None:
+    stamp_ns = np.array([0, 2_000_000, 3_900_000, 6_200_000], np.int64)
+    rows = {"stamp_ns": stamp_ns, "exchange_s": np.full(4, 1.1e-3), "compute_s": np.full(4, 5e-5)}
+    assert loop_bench.early_syncs(rows, 0.76e-3) == 1
+    assert loop_bench.early_syncs(rows, 0.70e-3) == 0
 
 
 def test_a_platform_is_led_to_and_fro_by_both(tmp_path: Path, state_home: Path) -> None:

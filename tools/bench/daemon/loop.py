@@ -215,17 +215,22 @@ def _full_bus(robot: Robot, seconds: float, folder: Path) -> dict[str, Any]:
         before = query_status(bus)
         rows, processor_s = daemon.measure(seconds)
         after = query_status(bus)
-    began_s = 1e-9 * rows["stamp_ns"]
-    free_s = began_s + rows["exchange_s"] + rows["compute_s"] + budget.commands_s
     return {
         "axes": len(robot.axes),
         "rate_Hz": 1.0 / robot.sync_period_s,
         "limit_Hz": floor(budget.highest_rate_Hz),
         "share": round(1.0 / robot.sync_period_s / budget.highest_rate_Hz, 3),
         "overruns": after["overruns"] - before["overruns"],
-        "by_loop": int(np.sum(began_s[1:] < free_s[:-1])),
+        "by_loop": early_syncs(rows, budget.commands_s),
         **_combined([LoopRun.of(rows, processor_s)]),
     }
+
+
+def early_syncs(rows: Row, commands_s: float) -> int:
+    """Return how many SYNCs went out within `commands_s` of the last cycle's commands."""
+    began_s = 1e-9 * rows["stamp_ns"]
+    sent_s = began_s + rows["exchange_s"] + rows["compute_s"]
+    return int(np.sum(began_s[1:] < sent_s[:-1] + commands_s))
 
 
 def _combined(runs: Sequence[LoopRun]) -> dict[str, Any]:
