@@ -187,7 +187,10 @@ class Compensation:
         p = self._parameters
         forward = p[:, _COULOMB_FORWARD] + p[:, _STRIBECK_FORWARD]
         backward = p[:, _COULOMB_BACKWARD] + p[:, _STRIBECK_BACKWARD]
-        self._friction_Nm = np.maximum(forward, backward)
+        self.friction_Nm = np.maximum(forward, backward)
+        """Dry friction that is made up for at a low speed: its larger side, (n,)."""
+        self.faded_in: FloatArray = self._state[:, _FADE]
+        """Share of the compensation that has faded in, (n,); kept up to date."""
         self.cogging_Nm = np.zeros(n)
         """Cogging: the part of the last torque whose mean over a motor turn is 0, (n,)."""
         self.available: BoolArray = self._parameters[:, _AVAILABLE] != 0.0
@@ -220,10 +223,6 @@ class Compensation:
         known = self.available & feedback.index_known
         most = p[:, _BOUND]
         return np.where(known, np.clip(cogging + 0.5 * (forward - backward), -most, most), 0.0)
-
-    def write_friction(self, out: FloatArray) -> None:
-        """Write the dry friction that is made up for at a low speed, (n,), Nm: its larger side."""
-        np.multiply(self._friction_Nm, self._state[:, _FADE], out=out)
 
     def torque(self, feedback: AxisFeedback, setpoint: Setpoint, out: FloatArray) -> None:
         """Write the torque to add, (n,), Nm."""

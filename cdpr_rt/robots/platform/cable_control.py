@@ -146,17 +146,27 @@ class CableControl(PlaceChecks):
         self._state = np.zeros(3 * d + 1)
         self._W, self._wrench, self._force = np.zeros((d, n)), np.zeros(d), np.zeros(d)
         scratch, J = np.zeros((7, 7, 7)), np.zeros((n, d))
-        self._friction_N, self._per_m = np.zeros(n), 1.0 / np.abs(motors[tracking.M_PER_RAD])
         self._correct = bound(
             loop.correct, self._settings, self._state, model.wrench_scale, body_of(model.platform),
             self._directions, self._cables, self._pose.array, moves, scratch,
-            J, self._W, self._wrench, self._friction_N, self._force, then=(1.0, 1.0),
+            J, self._W, self._wrench, self._friction(), self._force, then=(1.0, 1.0),
         )  # fmt: skip
         if self.learning is not None:
             self.learning.bind(
                 motors[tracking.THETA], motors[tracking.OMEGA], J, scratch[loop.MASS],
                 scratch[loop.TWIST_ERROR][:d], self._force, self.compensation_Nm,
             )  # fmt: skip
+
+    def _friction(self) -> loop.WinchFriction:
+        """Return what is made up for of the winches' friction, which its owners keep up to date."""
+        known, learning = self._compensation, self.learning
+        nothing = np.zeros(self.model.kinematics.n)
+        return loop.WinchFriction(
+            nothing if known is None else known.friction_Nm,
+            nothing if known is None else known.faded_in,
+            nothing if learning is None else learning.friction_Nm,
+            1.0 / np.abs(self._motors[tracking.M_PER_RAD]),
+        )
 
     def _bind_tensions(self) -> None:
         """Fix the arrays of the kernels that have the cables exert the force, and the motors."""
@@ -257,20 +267,9 @@ class CableControl(PlaceChecks):
         if learning is not None:
             learning.write(setpoint.velocity_rad_s)
             torque += learning.torque_Nm
-        self._write_friction()
         if cells is not None:
             cells.update(self.tension_N)
             torque += cells.torque_Nm
-
-    def _write_friction(self) -> None:
-        """Write what is made up for of each cable's friction in motion, (n,), N."""
-        friction = self._friction_N
-        friction[:] = 0.0
-        if self._compensation is not None:
-            self._compensation.write_friction(friction)
-        if self.learning is not None:
-            self.learning.add_friction(friction)
-        friction *= self._per_m
 
     def clear_compensation(self) -> None:
         """Have it said that nothing is added, while a program drives the winches itself."""

@@ -20,6 +20,7 @@ as the last motion left it.
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 from cdpr_rt.arrays import FloatArray, IntArray
 from cdpr_rt.jit import jit
@@ -144,6 +145,17 @@ def write_gains(settings: FloatArray, J: FloatArray, scratch: FloatArray) -> Non
     factor(factored, d)
 
 
+class WinchFriction(NamedTuple):
+    """Friction of n winches that is made up for in motion, (n,) each."""
+
+    known_Nm: FloatArray
+    faded_in: FloatArray
+    """Share of `known_Nm` that is."""
+    learnt_Nm: FloatArray
+    rad_per_m: FloatArray
+    """Of motor angle to a metre of cable, positive."""
+
+
 @jit
 def correct(
     settings: FloatArray,
@@ -158,7 +170,7 @@ def correct(
     J: FloatArray,
     W: FloatArray,
     wrench: FloatArray,
-    friction: FloatArray,
+    friction: WinchFriction,
     force: FloatArray,
     share: float,
     rate_inconsistency_m_s: float,
@@ -166,8 +178,7 @@ def correct(
     """Write what acts on the platform besides its cables (d,), and the loop's correction (d,).
 
     `moves` (4, 6) has the rows above. `wrench` is known beforehand: weight, and what the wanted
-    motion takes. `friction` (n,), N, is what is made up for of the winches' friction in motion.
-    `force` is F of the law above. `share` is how much of the last cycle's force could
+    motion takes. `force` is F of the law above. `share` is how much of the last cycle's force could
     be had: while it was not all, nothing is integrated that asks for more. Where the cables' rates
     contradict each other by more than motion can explain, as of a cable that has broken, the force
     is not to follow them. `scale` (d,) is what of each direction counts as much as 1 N, or 1 m.
@@ -245,13 +256,14 @@ def _saturate(settings: FloatArray, scale: FloatArray, proportional: FloatArray)
 
 
 @jit
-def _give_back(state: FloatArray, J: FloatArray, friction: FloatArray) -> None:
+def _give_back(state: FloatArray, J: FloatArray, friction: WinchFriction) -> None:
     """Take from the integral part what it gained at rest, at most Σ |J_i| friction_i."""
     n, d = J.shape
     for k in range(d):
         most = 0.0
         for i in range(n):
-            most += abs(J[i, k]) * friction[i]
+            torque = friction.faded_in[i] * friction.known_Nm[i] + friction.learnt_Nm[i]
+            most += abs(J[i, k]) * torque * friction.rad_per_m[i]
         gained = state[k] - state[2 * d + 1 + k]
         state[k] -= min(max(gained, -most), most)
 

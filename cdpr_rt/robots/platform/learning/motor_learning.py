@@ -107,10 +107,6 @@ class MotorLearning:
         """Write `torque_Nm` for motors that are wanted at these speeds (n,)."""
         self._write(wanted_rad_s)
 
-    def add_friction(self, out: FloatArray) -> None:
-        """Add the dry friction of each motor as learnt, (n,), Nm."""
-        out += self._x[: kernel.TERMS * out.size : kernel.TERMS]
-
     def restart(self) -> None:
         """Begin anew after cycles without this control; what was learnt stays."""
         self._settling = self._cycles
@@ -149,8 +145,8 @@ class MotorLearning:
 
     @property
     def friction_Nm(self) -> FloatArray:
-        """Dry friction of each motor as learnt, (n,)."""
-        return np.array(self._x[: kernel.TERMS * len(self._cable) : kernel.TERMS])
+        """Dry friction of each motor as learnt, (n,); kept up to date."""
+        return self._x[: kernel.TERMS * len(self._cable) : kernel.TERMS]
 
     @property
     def cogging_Nm(self) -> FloatArray:

@@ -116,15 +116,20 @@ class Loop:
         self.directions = np.array(kinematics.directions)
         self.moves, self.n, self.d = np.zeros((4, 6)), n, d
         self.state, self.friction = np.zeros(3 * d + 1), np.zeros(n)
+        # a half is of what was known, a half learnt
+        self.winches = loop.WinchFriction(
+            self.friction, np.full(n, 0.25), np.zeros(n), np.full(n, 2.0)
+        )
         self.body = body_of(machine.platform)
         self.wrench = np.zeros(d)
 
     def force(self, share: float = 1.0, apart: float = 0.0) -> FloatArray:
         force, d, n = np.zeros(self.d), self.d, self.n
+        self.winches.learnt_Nm[:] = 0.25 * self.friction
         loop.correct(
             self.settings, self.state, self.model.wrench_scale, self.body, self.directions,
             self.cables, self.pose.array, self.moves, np.zeros((7, 7, 7)), np.zeros((n, d)),
-            np.zeros((d, n)), self.wrench, self.friction, force, share, apart,
+            np.zeros((d, n)), self.wrench, self.winches, force, share, apart,
         )  # fmt: skip
         return force
 

@@ -222,7 +222,7 @@ def test_what_is_known_of_a_motor_is_not_begun_anew(
     fit = PullFit(AXES, NOBODY, lengths, learning)
     pulled(fit, Winches(lengths))
     fit.begin_learning()
-    before_Nm, bounds_Nm = learning.friction_Nm, learning.most_Nm.copy()
+    before_Nm, bounds_Nm = learning.friction_Nm.copy(), learning.most_Nm.copy()
     fit.unknowns[:, FRICTION] *= 0.5
     fit.begin_learning()
     assert (learning.friction_Nm == before_Nm).all() and (learning.most_Nm == bounds_Nm).all()
