@@ -46,8 +46,9 @@ def platform_parts(
     if any(axis is not None for axis in model.compensation):
         known = Compensation(list(model.compensation), model.period_s)
     of_platform, control = platform_of(robot, limits, model.torque_Nm, known, learns=learns)
+    names = [axis.name for axis in robot.axes]
     return PlatformParts(
-        of_platform, control, estimator, model.period_s, known, limits.lengths_disagree_m
+        of_platform, control, estimator, model.period_s, known, limits.lengths_disagree_m, names
     )
 
 

@@ -14,6 +14,7 @@ import numpy as np
 
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.core.states import LoopState, Reaction
+from cdpr_rt.service.recordings.recording_events import FAILURE
 from cdpr_rt.service.recordings.recording_reader import CLOSED, Columns, RecordingReader
 from cdpr_tools.client.status_text import DEAD
 from cdpr_tools.output import Output
@@ -206,6 +207,7 @@ def summarise(path: Path, out: Output) -> dict[str, Any]:
         stamp_ns = event["log_time_ns"] - reader.offset_ns
         event["after_s"] = count.when_s(stamp_ns) if count.rows else None
     runs, why = _named_runs(count.runs, reader), why_while_active(reader, count.last_state)
+    _note_failures(runs, reader.events)
     if why == LOOP_ENDED:  # one that is still written may be well
         runs[-1].setdefault("cut_short_by", why)
     return {
@@ -239,13 +241,25 @@ def _named_runs(runs: list[dict[str, Any]], reader: RecordingReader) -> list[dic
             why = reasons.after(cut_ns, min(later, default=math.inf)) or "a fault"
             # where the power is taken at once the idle program has the last cycles
             cut = found[-1] if found and named == "idle" else named_run
-            cut.setdefault("cut_short_by", why)
+            if not cut["reaction"]:  # that has come to its end
+                cut.setdefault("cut_short_by", why)
         found.append(named_run)
     return [
         {key: value for key, value in one.items() if key != "cut_ns"}
         for run, one in zip(runs, found, strict=True)
         if run["program"] >= 0
     ]
+
+
+def _note_failures(runs: list[dict[str, Any]], events: Sequence[dict[str, Any]]) -> None:
+    """Write into runs why they failed; an event follows soon after the run, or within it."""
+    for event in (one for one in events if one.get("kind") == FAILURE):
+        name, _, why = event["text"].partition(": ")
+        before = [
+            run for run in runs if run["program"] == name and run["from_s"] <= event["after_s"]
+        ]
+        if before:
+            before[-1]["failed_by"] = why
 
 
 def _run_text(run: dict[str, Any], axes: Sequence[str]) -> str:
@@ -262,13 +276,19 @@ def _run_text(run: dict[str, Any], axes: Sequence[str]) -> str:
         angles = np.degrees(np.array(run["position_rad"], float))
         where = ", ".join(f"{name} {x:.1f}" for name, x in zip(axes, angles, strict=False)) + " deg"
     time = f"{run['from_s']:10.3f} s to {run['until_s']:9.3f} s"
-    why = f"cut short: {run['cut_short_by']}; then" if "cut_short_by" in run else "ended,"
+    why = f"failed: {run['failed_by']}; then" if "failed_by" in run else "ended,"
+    if "cut_short_by" in run:
+        why = f"cut short: {run['cut_short_by']}; then"
     return f"  {time}  {run['program']}: {why} {where}"
 
 
+def _is_wrong(event: dict[str, Any]) -> bool:
+    return is_reason(event) or is_fault(event) or event.get("kind") == FAILURE
+
+
 def _chosen(events: Sequence[dict[str, Any]], most: int) -> list[dict[str, Any]]:
-    """Return at most so many events: faults and their reasons first, then the newest others."""
-    wrong = [k for k, event in enumerate(events) if is_reason(event) or is_fault(event)][-most:]
+    """Return at most so many events: what went wrong and why first, then the newest others."""
+    wrong = [k for k, event in enumerate(events) if _is_wrong(event)][-most:]
     others = [k for k in range(len(events)) if k not in wrong]
     kept = {*wrong, *others[len(others) - (most - len(wrong)) :]}
     return [event for k, event in enumerate(events) if k in kept]

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
+from cdpr_profiles.robot import default_name
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.control.base import Controller
 from cdpr_rt.control.compensation import Compensation
@@ -77,10 +79,13 @@ class PlatformParts:
         period_s: float,
         compensation: Compensation | None = None,
         lengths_disagree_m: float = math.inf,
+        names: Sequence[str] = (),
     ) -> None:
         self.model, self.platform = model, model.platform
         self.lengths_allowed_m = min(model.platform.home_tolerance_m, lengths_disagree_m)
         """By how much the cables' lengths may disagree."""
+        self.names = tuple(names) or tuple(map(default_name, range(control.torque_Nm.size)))
+        """What messages call the cables, by their axes."""
         self.near_m = max(NEAR_m, NEAR_SHARE * exit_point_diagonal_m(model.platform))
         """How far from its set-point a platform has arrived."""
         self.compensation = compensation

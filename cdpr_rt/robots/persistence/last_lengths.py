@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
@@ -154,20 +155,14 @@ def off_index_m(
     return np.where(feedback.index_known, off, math.nan)
 
 
-def index_disagreement(
-    last: StoppedLengths,
-    length_m: FloatArray,
-    feedback: AxisFeedback,
-    cable_m: FloatArray,
-    allowed_m: float,
-) -> str:
-    """Return which index is by more than `allowed_m` off, see `off_index_m`; "" for none."""
-    off_m = np.nan_to_num(np.abs(off_index_m(last, length_m, feedback, cable_m)))
+def index_disagreement(off_m: FloatArray, allowed_m: float, names: Sequence[str]) -> str:
+    """Return whose index is by more than `allowed_m` off, by `off_index_m` (n,); "" for none."""
+    off_m = np.nan_to_num(np.abs(off_m))
     worst = int(off_m.argmax())
     if off_m[worst] <= allowed_m:
         return ""
     return (
-        f"cable {worst + 1}: its motor's index is {1e3 * off_m[worst]:.0f} mm from where the last "
+        f"{names[worst]}: its motor's index is {1e3 * off_m[worst]:.0f} mm from where the last "
         f"stop has it, {1e3 * allowed_m:.0f} mm allowed: lower, and tighten from home"
     )
 

@@ -14,6 +14,8 @@ from cdpr_rt.runtime.control_loop.transitions import Transitions
 _CHECK_NS = 500_000_000
 # a character may take a dozen bytes in JSON
 _MOST_TEXT = 500
+_AFTERWARDS = ("hold", "idle")
+"""What runs once another program has been ended."""
 
 
 class StatusPage:
@@ -32,6 +34,8 @@ class StatusPage:
         self._clock_ns = clock_ns
         self._checked_ns = 0
         self._written: dict[str, Any] = {}
+        self._failure = ""
+        """Program that failed last and why, until another one moves."""
 
     def update(self) -> None:
         """Publish what has changed; called every turn."""
@@ -59,6 +63,7 @@ class StatusPage:
         """
         less: dict[str, Any] = {
             "program_progress": {},
+            "failure": str(status["failure"])[:_MOST_TEXT],
             "buses": {},
             "notices": [],
             "check": {},
@@ -75,8 +80,18 @@ class StatusPage:
         except Exception as error:  # nor does a motion
             return {"error": f"{type(error).__name__}: {error}"}
 
+    def _note_failure(self, progress: Mapping[str, Any]) -> None:
+        """Keep why a program fails: its client ends it then, and its progress is gone."""
+        name, trouble = self._engine.program.name, progress.get("trouble")
+        if trouble and progress.get("done") != 1.0:
+            self._failure = f"{name}: {trouble}"
+        elif name not in _AFTERWARDS:
+            self._failure = ""
+
     def _status(self) -> dict[str, Any]:
         engine, life = self._engine, self._life
+        progress = self._progress()
+        self._note_failure(progress)
         lateness = None if engine.cycle is None else engine.cycle.lateness
         return {
             "state": life.state.label,
@@ -85,7 +100,8 @@ class StatusPage:
             "reason_limit": life.details,
             "program": engine.program.name,
             "program_number": engine.program_number,
-            "program_progress": self._progress(),
+            "program_progress": progress,
+            "failure": self._failure,
             "driving": engine.driving,
             "reacting": engine.reacting.label,
             "busy": self._runner.busy,

@@ -240,6 +240,8 @@ class Status(_Answer):
     program: str | None
     program_progress: dict[str, Any] = {}
     """What it tells of itself, such as `done`; of a platform `position_m`, `rotation_rad`, ..."""
+    failure: str = ""
+    """Program that failed last and why; empty from the next motion on."""
     reason: str
     """Why it left active, holds, or is not ready; stays until acknowledged or enabled again."""
     reason_limit: dict[str, Any] | None

@@ -252,7 +252,7 @@ class Recorder(Part):
         if is_new_file or lasting != self._told_status:
             channel.log(_text(lasting), log_time=self._wall(now_ns))
         self._told_status = lasting
-        if event := self._events.of_status(value):
+        for event in self._events.of_status(value):
             self._log_event(event, now_ns)
 
     def _take_rows(self, rows: Row) -> None:

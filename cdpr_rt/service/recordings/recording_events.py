@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from enum import IntEnum
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 
@@ -12,11 +12,15 @@ from cdpr_rt.core.cycle_row import Row
 from cdpr_rt.core.states import LoopState, Reaction
 from cdpr_rt.motion.stream_buttons import confirmation
 
+FAILURE: Final = "failure"
+"""Kind of the event that a program failed; its text begins with the program's name."""
 _WATCHED = ("state", "program", "reaction", "limit", "limit_axis", "stream_buttons")
 
 
 class EventDetector:
-    """Finds changes of state, program and reaction and confirmations in rows, reasons in a status.
+    """Finds changes of state, program and reaction and confirmations in rows.
+
+    In a status it finds reasons, and programs that failed.
 
     Clamping is no event: it may come and go with every cycle.
     """
@@ -26,19 +30,23 @@ class EventDetector:
         self._axes: list[str] = []
         self._last: tuple[int, ...] | None = None
         self._label = ""
-        self._reason = ""
+        self._reason = self._failure = ""
 
     def describe(self, description: dict[str, Any]) -> None:
         """Take over the names of programs and axes."""
         self._programs = list(description.get("programs", []))
         self._axes = [axis.get("name", "") for axis in description.get("axes", [])]
 
-    def of_status(self, status: dict[str, Any]) -> dict[str, Any] | None:
-        """Return the reason that `status` gives, where it is a new one."""
+    def of_status(self, status: dict[str, Any]) -> list[dict[str, Any]]:
+        """Return the failure and the reason that `status` gives, where they are new ones."""
         reason, self._reason = self._reason, str(status.get("reason") or "")
-        if not self._reason or self._reason == reason:
-            return None
-        return {"text": self._reason, "limit": status.get("reason_limit")}
+        failure, self._failure = self._failure, str(status.get("failure") or "")
+        events: list[dict[str, Any]] = []
+        if self._failure not in ("", failure):
+            events.append({"text": self._failure, "kind": FAILURE})
+        if self._reason not in ("", reason):
+            events.append({"text": self._reason, "limit": status.get("reason_limit")})
+        return events
 
     def of_state(self, status: dict[str, Any]) -> dict[str, Any] | None:
         """Return a change of state that only `status` tells; to be asked while no cycles run."""

@@ -102,8 +102,8 @@ class LiveView(Part):
             return  # nobody has said yet what the axes are called
         events = [(event["text"], stamp) for event, stamp in self._events.of_rows(rows)]
         status = self._changed("status")
-        if status and (reason := self._events.of_status(status)):
-            events.append((reason["text"], time.monotonic_ns()))
+        for event in self._events.of_status(status) if status else ():
+            events.append((event["text"], time.monotonic_ns()))
         for text, stamp_ns in events:
             self._topics.show_event(text, self._wall(stamp_ns))
         if rows.size:

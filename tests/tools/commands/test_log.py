@@ -2,6 +2,7 @@
 
 import json
 import shutil
+import time
 from pathlib import Path
 from typing import Any
 
@@ -338,6 +339,42 @@ def test_an_emergency_stop_is_named_where_it_cut_a_motion_short(tmp_path: Path) 
     selection = Selection([path], FIELDS)
     told = [text for _, text in faults_of(selection.readers, selection.columns())]
     assert told == [f"state fault: {why}"]
+
+
+def test_a_program_that_failed_has_not_just_ended(tmp_path: Path) -> None:
+    rows = made_rows(0, 1000)
+    rows["program"][:300], rows["program"][300:600], rows["program"][600:] = 1, 0, 1
+    rows["stamp_ns"] += time.monotonic_ns() - rows["stamp_ns"][599]
+    rows["stamp_ns"][600:] += 3600 * 10**9  # tightened again an hour later
+    block = block_with_clock()
+    axes = [{"name": "left"}, {"name": "right"}]
+    block.write_description({"robot": "bench", "axes": axes, "programs": ["hold", "tighten"]})
+    recorder, writer = Recorder(block, tmp_path, "bench", reserve_bytes=0), RowWriter(block)
+    recorder.begin()
+    for first, failure in ((0, ""), (300, "tighten: left: 9 mm reeled in"), (600, "")):
+        put(writer, rows[first : first + 300])
+        block.write_status({"state": "active", "reason": "", "failure": failure})
+        recorder.look()
+    recorder.finish()
+    (path,) = tmp_path.iterdir()
+    (figures,) = _done("info", path)["recordings"]
+    assert [run.get("failed_by") for run in figures["runs"]] == ["left: 9 mm reeled in", None, None]
+    _, shown, _ = _log("info", path)
+    assert "tighten: failed: left: 9 mm reeled in; then left" in shown
+    assert "tighten: ended, left" in shown
+    assert any(line.endswith("  tighten: left: 9 mm reeled in") for line in shown.splitlines())
+
+
+def test_a_lowering_by_which_a_robot_was_stopped_has_come_to_its_end(tmp_path: Path) -> None:
+    rows = made_rows(0, 1000)
+    rows["program"][:300], rows["program"][300:800], rows["program"][800:] = 1, 2, 0
+    rows["reaction"][300:320] = Reaction.CONTROLLED_STOP
+    rows["state"][803:] = LoopState.FAULT  # the idle program has the last cycles with power
+    axes = [{"name": "left"}, {"name": "right"}]
+    path = _recorded(tmp_path, rows, axes=axes, programs=["idle", "pose", "lower"])
+    _, shown, _ = _log("info", path)
+    assert "pose: cut short: a fault; then left" in shown
+    assert "lower: ended, left" in shown
 
 
 def test_a_fault_is_shown_whatever_has_happened_since() -> None:

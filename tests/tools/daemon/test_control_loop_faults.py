@@ -79,3 +79,26 @@ def test_a_program_that_fails_stops_the_drives_and_not_the_loop(lab: tuple[Path,
         assert State.OPERATION_ENABLED not in drive_states(rig.run(0.1))
         rig.obeyed("acknowledge")
         rig.obeyed("enable")
+
+
+def test_why_a_program_failed_is_told_until_another_moves(lab: tuple[Path, str]) -> None:
+    class Stuck(IdleProgram):
+        name = "stuck"
+        done = 0.0
+
+        def progress(self) -> dict[str, Any]:
+            return {"trouble": "no way on", "done": self.done}
+
+    model = model_of(load_robot(lab[0]).axes, PERIOD_S, [3e-3] * 2, limits_of(load_robot(lab[0])))
+    stuck = Stuck(model)
+    with simulated(lab[0]) as url, opened(lab[0], url, {"stuck": stuck}) as rig:
+        rig.obeyed("enable")
+        assert rig.status["failure"] == ""
+        rig.obeyed("program", program="stuck")
+        assert rig.status["failure"] == "stuck: no way on"
+        rig.obeyed("hold")
+        rig.turn_until(lambda: rig.status["program"] == "hold")
+        assert rig.status["failure"] == "stuck: no way on"
+        stuck.done = 1.0  # it has come to its end, with a remark
+        rig.obeyed("program", program="stuck")
+        assert rig.status["failure"] == ""

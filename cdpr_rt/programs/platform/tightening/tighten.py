@@ -27,7 +27,11 @@ from cdpr_rt.programs.platform.tightening.standing import (
     would_move,
 )
 from cdpr_rt.programs.platform.tightening.standing_tensions import OVERSHOOT, StandingTensions
-from cdpr_rt.robots.persistence.last_lengths import StoppedLengths, index_disagreement
+from cdpr_rt.robots.persistence.last_lengths import (
+    StoppedLengths,
+    index_disagreement,
+    off_index_m,
+)
 
 TAKE_UP_m_s = 0.05
 """Speed at which slack is taken up."""
@@ -337,7 +341,7 @@ class TightenProgram(PlatformProgram):
         allowed_m = self._once_tight_m if self._stage > 0 else _SLACK_m
         if moved_m[i] > allowed_m:
             return (
-                f"cable {i + 1}: {1e3 * moved_m[i]:.0f} mm reeled in and not tight, "
+                f"{self._parts.names[i]}: {1e3 * moved_m[i]:.0f} mm reeled in and not tight, "
                 f"{1e3 * allowed_m:.0f} mm allowed"
             )
         if self._cycles * self._parts.period_s > _TIGHT_WITHIN_S:
@@ -393,4 +397,5 @@ class TightenProgram(PlatformProgram):
             return ""
         parts = self._parts
         length_m, allowed_m = parts.estimator.estimate.cable_length_m, parts.lengths_allowed_m
-        return index_disagreement(self._last, length_m, self._feedback, self._cable, allowed_m)
+        off_m = off_index_m(self._last, length_m, self._feedback, self._cable)
+        return index_disagreement(off_m, allowed_m, parts.names)
