@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import tempfile
 import time
-from collections.abc import Callable, Sequence
-from contextlib import suppress
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from math import floor
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 
@@ -36,8 +34,6 @@ PERCENTILES = (50.0, 99.9, 100.0)
 _NAMES = ("p50", "p99.9", "worst")
 _SPEED_RAD_S = 1.0
 _SETTLE_S = 1.0
-_TRIES = 4
-_T = TypeVar("_T")
 
 
 @dataclass(frozen=True)
@@ -92,14 +88,14 @@ def measure(seconds: float, out: Output, name: str = "") -> dict[str, Any]:
         for k in range(ROUNDS):
             out.note(f"round {k + 1} of {ROUNDS}: the daemon, then the baseline loop ...")
             part = seconds / ROUNDS
-            alone, recorded = _retried(partial(_daemon, robot, part, Path(folder)))
+            alone, recorded = _daemon(robot, part, Path(folder))
             bare.append(alone)
             served.append(recorded)
             if bare_axes:
                 baseline.append(_baseline(robot, part))
             relaxed.append(_baseline(slow, part))
         out.note("eight axes on one bus ...")
-        full = _retried(partial(_full_bus, one_bus, seconds, Path(folder)))
+        full = _full_bus(one_bus, seconds, Path(folder))
     ours, unserved, unhurried = map(_combined, (served, bare, relaxed))
     period_us = 1e6 * robot.sync_period_s
     shares = {
@@ -168,14 +164,6 @@ def report(figures: dict[str, Any]) -> list[str]:
         f"while its commands could be on the wire: {full['by_loop']}, wanted none: "
         f"{verdicts['one_bus']}",
     ]
-
-
-def _retried(work: Callable[[], _T]) -> _T:
-    """Do `work`, anew a few times where a machine that is busy has ended it."""
-    for _ in range(_TRIES - 1):
-        with suppress(WorkFailedError):
-            return work()
-    return work()
 
 
 def _daemon(robot: Robot, seconds: float, folder: Path) -> tuple[LoopRun, LoopRun]:

@@ -42,7 +42,6 @@ _TIMEOUT_S = 60.0
 _STOP_S = 20.0
 _RIGHT_NS = 10**9
 _TO_AND_FRO_RAD = 10.0
-_CHECKS = 4
 _TURN_S = 0.05
 _LEG_S = 2.0
 _BOX_SHARE = 0.25
@@ -106,7 +105,7 @@ class BenchDaemon:
             answers_in_time(simulator)
             self.loop = Child(LOOP, self._settings(serving=False), (simulator.lifeline,))
             stack.callback(self.loop.stop, _STOP_S)
-            self._await_ready()
+            self._await("ready")
             self._leave_core(simulator.process.pid)
             self._keep_right_to_move()
             self._stack = stack.pop_all()
@@ -213,18 +212,6 @@ class BenchDaemon:
 
     def _keep_right_to_move(self) -> None:
         self._right.until(time.monotonic_ns() + _RIGHT_NS)
-
-    def _await_ready(self) -> None:
-        """Wait for the end of boot and check; on a machine that is busy the check may need more."""
-        for _ in range(_CHECKS):
-            try:
-                return self._await("ready")
-            except WorkFailedError:
-                if self.block.status().get("state") != "inactive":
-                    raise
-                self.block.post_command({"do": "check"})
-                time.sleep(_TURN_S)
-        return self._await("ready")
 
     def _await(self, state: str, program: str = "idle", *, done: bool = False) -> None:
         """Wait for this state and program in the loop's status; replies may go to the service."""
