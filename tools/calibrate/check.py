@@ -35,6 +35,7 @@ from cdpr_tools.calibrate.measuring.daemon_pose import (
 from cdpr_tools.calibrate.measuring.daemon_run import DaemonOperator, read_places
 from cdpr_tools.calibrate.measuring.places import chosen_places
 from cdpr_tools.calibrate.measuring.rig import simulated_rig
+from cdpr_tools.calibrate.measuring.run import DATA
 from cdpr_tools.calibrate.measuring.ways import StoppedError
 from cdpr_tools.client.client import Daemon
 from cdpr_tools.errors import BadInputError, WorkFailedError
@@ -91,6 +92,7 @@ def checked(
     Where it was calibrated with the camera, that looks as well. The readings are kept in the
     folder. Raises what the robot does, WorkFailedError.
     """
+    _require_other_folder(folder)
     robot, known = calibrated(file), before(out, file)
     return _judged(robot, known, _read(out, robot, plant, scanner, seed, folder, known))
 
@@ -102,6 +104,7 @@ def checked_running(
 
     It looks with the `camera` of a URL where there is one. Raises CommandError besides.
     """
+    _require_other_folder(folder)
     robot, description = robot_of(daemon, as_calibrated=True)
     if robot.path != file.path:
         raise BadInputError(f"{file.reference}: the daemon of this name runs {robot.reference}")
@@ -126,6 +129,12 @@ def checked_running(
         except StoppedError:
             raise WorkFailedError("stopped; nothing is said of the robot") from None
     return _judged(robot, known, kept.data)
+
+
+def _require_other_folder(folder: Path) -> None:
+    """Raise BadInputError for the folder of a calibration, whose files would be written over."""
+    if (folder / DATA).exists():
+        raise BadInputError(f"--out {folder}: has the poses of a calibration; allowed: another")
 
 
 def _judged(robot: Robot, known: Before | None, data: CalibrationData) -> Check:

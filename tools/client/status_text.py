@@ -37,10 +37,19 @@ def after_stop_text(status: dict[str, Any]) -> str:
         return f"ended; its loop had died: {power_text(status)}; next: `cdpr run` starts it anew"
     if status["read_only"]:
         return f"ended: {power_text(status)}"
-    unheard = [str(axis.get("name")) for axis in status["axes"] if axis.get("alive") is False]
-    if not unheard:
+    if not (unheard := unheard_axes(status)):
         return "stopped, power off"
     return f"stopped; unheard, and not known to be without power: {', '.join(unheard)}"
+
+
+def unheard_axes(status: dict[str, Any]) -> list[str]:
+    """Return the names of axes whose drives were not heard: whether they have power is not known.
+
+    None of a daemon that only listened, or whose loop had died.
+    """
+    if status["state"] == DEAD or status["read_only"]:
+        return []
+    return [str(axis.get("name")) for axis in status["axes"] if axis.get("alive") is False]
 
 
 GO_ON = "`cdpr path --resume` goes on"

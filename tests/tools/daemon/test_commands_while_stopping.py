@@ -49,6 +49,45 @@ def test_while_a_robot_is_being_stopped_it_is_told_why(
     assert done(monkeypatch, command).exit_code == 0
 
 
+class Ends:
+    """A daemon that ends once it is asked to; its drive of this axis is heard, or not."""
+
+    def __init__(self, alive: bool) -> None:
+        self.alive, self.asked = alive, False
+
+    def get(self, _path: str) -> dict[str, Any]:
+        if self.asked:
+            raise NoDaemonError("nobody is there")
+        axes = [{"name": "top", "alive": self.alive}]
+        return {**ACTIVE, "reason": "", "axes": axes, "read_only": False}
+
+    def post(self, _path: str) -> None:
+        self.asked = True
+
+
+@pytest.mark.parametrize(
+    ("alive", "status", "told"),
+    [
+        (True, 0, "stopped, power off"),
+        (False, 1, "stopped; unheard, and not known to be without power: top"),
+    ],
+)
+def test_a_script_learns_that_a_drive_was_not_heard(
+    monkeypatch: pytest.MonkeyPatch, alive: bool, status: int, told: str
+) -> None:
+    @contextmanager
+    def opened(*_where: Any) -> Iterator[Ends]:
+        yield Ends(alive)
+
+    monkeypatch.setattr(daemon_state, "open_daemon", opened)
+    app = typer.Typer()
+    app.add_typer(daemon_state.app)
+    ended = CliRunner().invoke(app, ["stop"])
+    error = ended.exception
+    assert (error.exit_status if isinstance(error, WorkFailedError) else ended.exit_code) == status
+    assert told in (str(error) if error else ended.output)
+
+
 class Dies:
     """A daemon whose loop ends with an error once it is asked to end; asked again, all ends."""
 

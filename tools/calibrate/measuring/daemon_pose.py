@@ -194,12 +194,31 @@ def _camera_setup(
     data: CalibrationData, intrinsics: Path | None, markers: Path | None
 ) -> CameraSetup:
     if data.camera is not None:
+        _require_same("--intrinsics", intrinsics, data.camera.intrinsics)
+        _require_same("--markers", markers, data.camera.sheets)
         return data.camera
     if data.poses:
         raise BadInputError("--camera: the poses before were read without; allowed: another --out")
     if intrinsics is None or markers is None:
         raise BadInputError("--camera: the first pose wants --intrinsics and --markers as well")
     return CameraSetup.of(CameraIntrinsics.load_file(intrinsics), MarkerSheets.load_file(markers))
+
+
+def _require_same(option: str, path: Path | None, kept: Profile) -> None:
+    """Raise BadInputError where a file says otherwise than that of the first pose; ProfileError."""
+    if path is None:
+        return
+    given = type(kept).load_file(path).model_dump()
+    other = [
+        f"{key} {given[key]!r}, {value!r} at the first pose"
+        for key, value in kept.model_dump().items()
+        if given[key] != value
+    ]
+    if other:
+        raise BadInputError(
+            f"{option} {path}: {'; '.join(other)}; allowed: the same, leave it out, or another "
+            "--out"
+        )
 
 
 def lines(robot: Robot, data: CalibrationData) -> list[str]:

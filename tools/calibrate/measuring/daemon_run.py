@@ -11,9 +11,10 @@ import numpy as np
 from cdpr_drivers.errors import DriverError
 from cdpr_profiles import Robot
 from cdpr_rt.arrays import FloatArray
-from cdpr_rt.errors import ControlError
+from cdpr_rt.errors import ControlError, TripError
 from cdpr_rt.procedures.calibration.measure_poses import (
     Measured,
+    NotThePoseError,
     PoseRefusedError,
     TargetNotReached,
     measure_poses,
@@ -91,13 +92,16 @@ class DaemonOperator(DaemonReader):
         directions, right = self._directions, self._right
         assert right is not None  # in control
         arguments = directions.arguments(place, speed_m_s(directions))
-        allowed_s = within_s(directions, self.place(), place)
-        self._program = ""
         try:
-            right.post("/program", {"program": "pose", "wanted": arguments})
-        except DaemonRefusalError as error:
-            self.status()  # raises where the motion is being ended
-            raise PoseRefusedError(str(error)) from None
+            allowed_s = within_s(directions, self.place(), place)
+            self._program = ""
+            try:
+                right.post("/program", {"program": "pose", "wanted": arguments})
+            except DaemonRefusalError as error:
+                self.status()  # raises where the motion is being ended
+                raise PoseRefusedError(str(error)) from None
+        except TripError as error:  # before it set out
+            raise NotThePoseError(str(error)) from None
         self.stay(RENEW_S)  # what a status tells at once may be of the program before
         self._program = "pose"
         progress = self._until(allowed_s)

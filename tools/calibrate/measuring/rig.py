@@ -20,6 +20,7 @@ from cdpr_rt.core.states import LoopState
 from cdpr_rt.errors import TripError
 from cdpr_rt.procedures.calibration.measure_poses import (
     Look,
+    NotThePoseError,
     PoseRefusedError,
     TargetNotReached,
 )
@@ -106,7 +107,7 @@ class RigOperator:
             rig.program("pose", **directions.arguments(place, speed_m_s(directions)))
         except CommandRefusedError as error:
             if rig.loop.busy or rig.state is not LoopState.ACTIVE:  # it is being ended, or was
-                raise self._trip(str(error)) from None
+                raise NotThePoseError(str(error)) from None
             raise PoseRefusedError(str(error)) from None
         allowed_s = within_s(directions, place_of(rig.progress), place)
         try:

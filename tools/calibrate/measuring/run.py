@@ -50,6 +50,8 @@ if TYPE_CHECKING:
     from cdpr_tools.calibrate.measuring.pose_camera import PoseCamera
 
 DATA, SETTINGS, OUTSIDE, IMAGES = "data.json", "run.json", "outside.json", "images"
+POINTS = "points.csv"
+"""Positions measured at the poses of `cdpr calibrate measure --ask`, or by hand."""
 COUNTED = "counted.json"
 """Of poses that `cdpr calibrate read` has read: it marks a folder of these."""
 _FIRST_S, _HELD_OUT_S = 8.0, 3.0

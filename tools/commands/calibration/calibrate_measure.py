@@ -58,7 +58,7 @@ def measure(
         from cdpr_tools.calibrate.measuring import daemon_pose, daemon_run  # noqa: PLC0415
         from cdpr_tools.calibrate.measuring.asked_points import AskedPoints, require_points_of  # noqa: PLC0415
         from cdpr_tools.calibrate.measuring.places import MOST_POSES, places_of, poses_wanted  # noqa: PLC0415
-        from cdpr_tools.calibrate.measuring.run import DATA, report_faults_only  # noqa: PLC0415  # slow to load
+        from cdpr_tools.calibrate.measuring.run import DATA, POINTS, report_faults_only  # noqa: PLC0415  # slow to load
         from cdpr_tools.trials.directions import platform_of  # noqa: PLC0415  # slow to load
 
         robot, description = daemon_pose.robot_of(daemon)
@@ -68,10 +68,12 @@ def measure(
         kept = daemon_pose.DaemonPoses(
             folder, daemon_pose.data_of(folder, robot, description["simulated"])
         )
-        points = folder / "points.csv"
+        points = folder / POINTS
         require_points_of(len(kept.data.poses), points)
         # refused before poses are chosen, which takes a while, and before a file is made
         kept.require_home(robot, daemon_pose.held_place(daemon, robot))
+        if ask or points.exists():
+            out.note(f"measured positions: {points}")
         places, most = places_of(robot, count, listed, seed), count or MOST_POSES
     with (
         stop_on_signals(HELD) as stop,

@@ -36,7 +36,7 @@ def read(
     Fifteen are the least. `cdpr calibrate measure` goes to them by itself.
     """
     from cdpr_tools.calibrate.measuring import daemon_pose  # noqa: PLC0415  # slow to load
-    from cdpr_tools.calibrate.measuring.run import DATA  # noqa: PLC0415  # slow to load
+    from cdpr_tools.calibrate.measuring.run import DATA, POINTS  # noqa: PLC0415  # slow to load
     from cdpr_tools.client.pose_reader import DaemonReader  # noqa: PLC0415  # slow to load
 
     robot, description = daemon_pose.robot_of(daemon)
@@ -48,8 +48,10 @@ def read(
     data = kept.data
     number = len(data.poses)
     out.say(*daemon_pose.lines(robot, data))
+    points = f" --points {out_dir / POINTS}" if (out_dir / POINTS).exists() else ""
+    out.say(f"{number} poses in {out_dir / DATA}")
     if number >= _ENOUGH:
-        out.say(f"fit them: cdpr calibrate fit {robot.reference} --data {out_dir}")
+        out.say(f"fit them: cdpr calibrate fit {robot.reference} --data {out_dir}{points}")
     reading = data.poses[-1]
     figures = {"pose": number, **reading.model_dump(include={"target", "length_m", "tension_N"})}
     out.result({"ok": True, **figures, "data": out_dir / DATA})

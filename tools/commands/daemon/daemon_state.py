@@ -12,7 +12,13 @@ from rich.text import Text
 from cdpr_tools.client.client import Daemon, NoDaemonError, open_daemon
 from cdpr_tools.client.motion import ProgressNotes
 from cdpr_tools.client.refusals import DaemonRefusalError
-from cdpr_tools.client.status_text import DEAD, after_stop_text, fallen_text, status_text
+from cdpr_tools.client.status_text import (
+    DEAD,
+    after_stop_text,
+    fallen_text,
+    status_text,
+    unheard_axes,
+)
 from cdpr_tools.commands.daemon.with_daemon import with_daemon, with_daemon_at_once
 from cdpr_tools.commands.options import (
     JsonOption,
@@ -187,7 +193,10 @@ def stop(
     key_file: KeyFileOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """End the daemon: the motion stops under control, the power goes off."""
+    """End the daemon: the motion stops under control, the power goes off.
+
+    Ends with status 1 where a drive was not heard, whose power may be on.
+    """
     out = Output(as_json)
     try:
         with open_daemon(robot, socket, url, key_file) as daemon:
@@ -201,7 +210,7 @@ def stop(
 def _end(daemon: Daemon, out: Output) -> None:
     """Ask the daemon to end and wait for it; raises WorkFailedError where it does not."""
     status = daemon.get("/status")
-    had_died, ended, dies = status["state"] == DEAD, after_stop_text(status), ""
+    had_died, ended, dies = status["state"] == DEAD, status, ""
     daemon.post("/shutdown")
     notes, deadline = ProgressNotes(out), time.monotonic() + _END_S
     if status["state"] == "active":
@@ -210,9 +219,10 @@ def _end(daemon: Daemon, out: Output) -> None:
         try:
             status = daemon.get("/status")
         except NoDaemonError:
-            if dies:
-                raise WorkFailedError(f"{ended}; {dies}") from None
-            out.say(ended)
+            told = "; ".join(filter(None, (after_stop_text(ended), dies)))
+            if dies or unheard_axes(ended):
+                raise WorkFailedError(told) from None
+            out.say(told)
             return
         if status["state"] == DEAD and not had_died and not dies:
             # one whose drives do not confirm ends with an error, and the service stays for that
@@ -220,7 +230,7 @@ def _end(daemon: Daemon, out: Output) -> None:
             daemon.post("/shutdown")
         if not had_died:
             if status["state"] != DEAD:  # a drive may have fallen silent meanwhile
-                ended = after_stop_text(status)
+                ended = status
             notes(str(status["program"]), status.get("program_progress") or {})
         time.sleep(_WATCH_S)
     raise WorkFailedError(f"the daemon still runs {_END_S:g} s after it was asked to end")

@@ -16,8 +16,8 @@ MODULES = {
         "rail": "Run a simulated rail until Ctrl-C; tells on standard output when it is up.",
     },
     "sim.sim_fault": {
-        "fault": "Break something on a simulated robot that runs: cut-cable, slip, encoder-jump, "
-        "...",
+        "fault": "Have something go wrong on a simulated robot that runs: a cable, an encoder, a "
+        "drive.",
     },
     "sim.sim_camera": {
         "camera": "Run a camera on a simulated platform until Ctrl-C; other commands know it as "

@@ -61,13 +61,19 @@ def fault(
         ),
     ],
     what: Annotated[
-        InjectedFault, typer.Argument(help="What goes wrong, at once.", metavar="FAULT")
+        str,  # a choice would be listed as its type as well, broken anywhere in a narrow terminal
+        typer.Argument(
+            help=f"What goes wrong, at once: {', '.join(InjectedFault)}.",
+            metavar="FAULT",
+        ),
     ],
     value: Annotated[
         str | None,
         typer.Argument(
-            help="How much: counts to jump, mm to slip, error code, ms of silence (65535: for "
-            "good), N that a load cell shows too much"
+            help="How much: mm to slip (100 by default), counts to jump (500), error code of the "
+            "drive (0x7305), ms of silence (65535: for good, by default), N that a load cell shows "
+            "too much (40).",
+            metavar="VALUE",
         ),
     ] = None,
     *,
@@ -77,16 +83,18 @@ def fault(
     ] = None,
     axis: Annotated[str, typer.Option(help="Axis by its name, or by its number from 1.")] = "1",
 ) -> None:
-    """Break something on a simulated robot that runs: cut-cable, slip, encoder-jump, ...
+    """Have something go wrong on a simulated robot that runs: a cable, an encoder, a drive.
 
     It writes object 2F00h, which no real drive has, beside whoever runs the robot.
     """
     profile, daemon = _profile(machine, by_daemon=not bus)
     robot = robot_of_winch(profile) if isinstance(profile, Winch) else profile
     chosen = _axis(robot, axis)
-    injection = _INJECTIONS[what]
+    if what not in _INJECTIONS:
+        raise BadInputError(f"FAULT {what!r}; allowed: {', '.join(InjectedFault)}")
+    injection = _INJECTIONS[InjectedFault(what)]
     amount = _amount(what, injection, value)
-    if what is InjectedFault.CELL_OFF and robot.tension_sensors is None:
+    if what == InjectedFault.CELL_OFF and robot.tension_sensors is None:
         raise BadInputError(
             f"{what}: {robot.name} has no load cells, its tensions are estimated from torques; "
             "allowed: for a robot whose file names tension_sensors"
@@ -135,13 +143,13 @@ def _buses_of_daemon(robot: str) -> list[str]:
     return [f"{name}={bus['url']}" for name, bus in buses.items()]
 
 
-def _amount_text(what: InjectedFault, amount: int, injection: _FaultInjection) -> str:
-    if what is InjectedFault.CUT_CABLE:
+def _amount_text(what: str, amount: int, injection: _FaultInjection) -> str:
+    if what == InjectedFault.CUT_CABLE:
         return ""
-    return f" {amount:#06x}" if what is InjectedFault.DRIVE_FAULT else f" {amount} {injection.unit}"
+    return f" {amount:#06x}" if what == InjectedFault.DRIVE_FAULT else f" {amount} {injection.unit}"
 
 
-def _amount(what: InjectedFault, injection: _FaultInjection, text: str | None) -> int:
+def _amount(what: str, injection: _FaultInjection, text: str | None) -> int:
     try:
         amount = injection.usual if text is None else int(text, 0)
     except ValueError:

@@ -82,10 +82,8 @@ def main() -> int:
         loop.run()
     finally:  # so that who finds the process while it ends knows that, and does it no harm
         signal.signal(POWER_OFF_SIGNAL, signal.SIG_IGN)
-    if unconfirmed := loop.transitions.power_off_unconfirmed:
-        print(f"cdpr: {unconfirmed}", file=sys.stderr)
-        return POWER_UNCONFIRMED
-    return DONE
+    # the launcher tells which drive, by the status
+    return POWER_UNCONFIRMED if loop.transitions.power_off_unconfirmed else DONE
 
 
 def _lengths_file(robot: Robot, settings: RunSettings) -> Path | None:

@@ -184,6 +184,13 @@ def test_an_image_goes_with_each_pose_and_the_files_with_the_first(
         look(folder, lens, None)
     look(folder, lens, sheets)
     look(folder, None, None)
+    differs = tmp_path / "other.toml"
+    differs.write_text("size_m = 0.2\n")
+    with pytest.raises(BadInputError, match=r"--markers .*: size_m 0.2, 0.1 at the first pose"):
+        look(folder, lens, differs)
+    differs.write_text(LENS.replace("width_px = 64", "width_px = 80"))
+    with pytest.raises(BadInputError, match=r"--intrinsics .*: width_px 80, 64 at the first pose"):
+        look(folder, differs, sheets)
     kept = json.loads((folder / "data.json").read_text())
     assert [one["image"]["markers"][0]["id"] for one in kept["poses"]] == [1, 2]
     assert kept["camera"]["intrinsics"]["width_px"] == 64

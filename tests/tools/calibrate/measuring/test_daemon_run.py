@@ -28,7 +28,7 @@ from cdpr_tools.client.refusals import DaemonRefusalError
 from cdpr_tools.errors import BadInputError, WorkFailedError
 from cdpr_tools.output import Output
 from tests.profiles.test_geometry_calibration import calibration
-from tests.tools.calibrate.measuring.test_daemon_pose import ROBOT, Told, kept_in
+from tests.tools.calibrate.measuring.test_daemon_pose import ROBOT, Told, kept_in, read
 
 pytestmark = pytest.mark.usefixtures("daemon_time")
 
@@ -188,7 +188,8 @@ def test_a_robot_that_is_being_stopped_ends_it_before_other_places_are_asked_for
     daemon.control = stopped_meanwhile  # type: ignore[method-assign]
     with pytest.raises(TripError, match=r"axis 1: slack \(controlled stop under way\)"):
         measurement.run()
-    assert daemon.rights == 2 and len(load_data(measurement.folder / "data.json").tried) == 1
+    # the platform has not set out for a place, which is gone to later
+    assert daemon.rights == 2 and load_data(measurement.folder / "data.json").tried == ()
     with pytest.raises(TripError):  # nor is anything read then
         measurement.run()
     assert len(load_data(measurement.folder / "data.json").poses) == 2
@@ -311,6 +312,18 @@ def test_a_robot_that_does_not_run_with_its_calibration_is_not_checked(
     with pytest.raises(BadInputError, match="or its calibration, has been changed"):
         checked_running(out, file, daemon, None, 1, folder)  # type: ignore[arg-type]
     assert not folder.exists() and daemon.rights == 0
+
+
+def test_a_check_does_not_write_over_what_a_calibration_has_read(
+    file: Robot, tmp_path: Path
+) -> None:
+    read(Told(), tmp_path)
+    daemon = Calibrated(calibrated(file), 0.0)
+    before = {path.name: path.read_bytes() for path in tmp_path.iterdir() if path.is_file()}
+    with pytest.raises(BadInputError, match="has the poses of a calibration; allowed: another"):
+        checked_running(Output(as_json=False), file, daemon, None, 1, tmp_path)  # type: ignore[arg-type]
+    assert before == {path.name: path.read_bytes() for path in tmp_path.iterdir() if path.is_file()}
+    assert daemon.rights == 0
 
 
 def test_a_platform_that_is_not_held_at_home_is_not_checked(file: Robot, tmp_path: Path) -> None:

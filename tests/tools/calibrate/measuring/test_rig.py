@@ -131,13 +131,31 @@ def test_an_emergency_stop_is_no_fault_of_the_pose(
             operator.go(places.middle)
 
 
-def test_a_drive_that_fails_on_the_way_is_held_against_the_pose() -> None:
+def test_a_drive_that_fails_on_the_way_is_held_against_the_pose(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    places = chosen_places(load_robot("planar-3"), 3, 3)
+    with simulated_rig("planar-3", plant=None, scanner=False) as operator:
+        operator.tighten()
+        measured, begin = Measured(lambda: None), operator.rig.program
+
+        def failing(name: str, **arguments: Any) -> None:
+            begin(name, **arguments)
+            operator.rig.inject_fault(1, 1, 0x2310)
+
+        monkeypatch.setattr(operator.rig, "program", failing)
+        with pytest.raises(TripError) as caught:
+            measure_poses(operator, places.chosen[:1], places.middle, measured, Notes())
+    assert not isinstance(caught.value, NotThePoseError)
+    assert measured.tried == [tuple(places.chosen[0].tolist())]
+
+
+def test_a_drive_that_fails_before_the_platform_has_set_out_is_not() -> None:
     places = chosen_places(load_robot("planar-3"), 3, 3)
     with simulated_rig("planar-3", plant=None, scanner=False) as operator:
         operator.tighten()
         measured = Measured(lambda: None)
         operator.rig.inject_fault(1, 1, 0x2310)
-        with pytest.raises(TripError) as caught:
+        with pytest.raises(NotThePoseError):
             measure_poses(operator, places.chosen[:1], places.middle, measured, Notes())
-    assert not isinstance(caught.value, NotThePoseError)
-    assert measured.tried == [tuple(places.chosen[0].tolist())]
+    assert measured.tried == []
