@@ -9,7 +9,7 @@ from functools import cache
 from typing import Any
 
 import typer
-from typer.core import TyperCommand, TyperGroup
+from typer.core import TyperArgument, TyperCommand, TyperGroup
 from typing_extensions import override
 
 from cdpr_tools.loading import loading_notice
@@ -27,7 +27,13 @@ def load(module: str, name: str) -> Any:
 
 
 def _unwrap(command: Any) -> None:
-    """Join the lines of each paragraph of the help, which a terminal wraps by its own width."""
+    """Join the lines of each paragraph of the help, which a terminal wraps by its own width.
+
+    Arguments that have no word of their own are called by their names, as capitals.
+    """
+    for param in command.params:
+        if isinstance(param, TyperArgument):
+            param.metavar = param.metavar or str(param.name).upper()
     paragraphs = inspect.cleandoc(command.help or "").split("\n\n")
     command.help = "\n\n".join(paragraph.replace("\n", " ") for paragraph in paragraphs)
     for other in getattr(command, "commands", {}).values():

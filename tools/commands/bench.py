@@ -195,7 +195,7 @@ def path(
 @app.command()
 def poses(
     ways: Annotated[int, typer.Option(min=1, help="Paths checked by brute force.")] = 10_000,
-    seed: Annotated[int, typer.Option(min=0)] = 1,
+    seed: SeedOption = 1,
     as_json: JsonOption = False,
 ) -> None:
     """Measure drawing reachable poses of spatial-8, and look at ways again by plain NumPy.
@@ -210,7 +210,12 @@ def poses(
 def soak(
     hours: Annotated[float, typer.Option(min=1e-4, max=1e4, help="Hours of bus time.")] = 1.0,
     wall_minutes: Annotated[
-        float, typer.Option(min=0.01, help="End after so many minutes on the clock.")
+        float,
+        typer.Option(
+            min=0.01,
+            help="End after so many minutes on the clock; not before --hours by default.",
+            show_default=False,
+        ),
     ] = math.inf,
     robot: Annotated[str, typer.Option(help="Robot profile: a name or a path.")] = "bench-8",
     rate: Annotated[

@@ -31,7 +31,7 @@ from cdpr_tools.busview.scan import (
     signs_of_a_master,
 )
 from cdpr_tools.busview.source import SimbusSource, open_source, running_bus
-from cdpr_tools.commands.options import JsonOption, YesOption
+from cdpr_tools.commands.options import JsonOption, WinchOrRobotArgument, YesOption
 from cdpr_tools.consent import require_consent
 from cdpr_tools.errors import BAD_INPUT, WorkFailedError
 from cdpr_tools.output import Output
@@ -252,9 +252,7 @@ _LOW, _HIGH = 1.0, 10_000.0
 
 @app.command()
 def budget(
-    machine: Annotated[
-        str, typer.Argument(help="Robot or winch profile: a name or the path of a file.")
-    ],
+    machine: WinchOrRobotArgument,
     rate: Annotated[
         float | None,
         typer.Option(min=_LOW, max=_HIGH, help="Cycles a second, instead of the profile's."),

@@ -166,7 +166,10 @@ def validate(
     cogging_profile: Annotated[Path, typer.Argument(help="Cogging profile of this motor.")],
     out_dir: _OutOption,
     bandwidth_Hz: Annotated[
-        float, typer.Option("--bandwidth-hz", min=1.0, max=100.0)
+        float,
+        typer.Option(
+            "--bandwidth-hz", min=1.0, max=100.0, help="Closed-loop bandwidth of the PID."
+        ),
     ] = DEFAULT_BANDWIDTH_HZ,
     overwrite: OverwriteOption = False,
     index: IndexOption = "homing",

@@ -85,7 +85,9 @@ def commission(
     out_dir: Annotated[
         Path | None,
         typer.Option(
-            "--out", help="Folder for raw data, profile and report; of a robot, one in it an axis."
+            "--out",
+            help="Folder for raw data, profile and report, of a robot one in it for each axis; "
+            "else out/commission-NAME.",
         ),
     ] = None,
     bandwidth_Hz: Annotated[

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from cdpr_tools.commands.options import JsonOption, OverwriteOption
+from cdpr_tools.commands.options import JsonOption
 from cdpr_tools.errors import FAILED, BadInputError, os_error_as
 from cdpr_tools.host.host_checks import HostFinding, look_around
 from cdpr_tools.output import Output
@@ -28,7 +28,9 @@ def doctor(
         list[str] | None,
         typer.Option("--robot", help="With --report: a robot's file to put in; may be repeated."),
     ] = None,
-    overwrite: OverwriteOption = False,
+    overwrite: Annotated[
+        bool, typer.Option("--overwrite", help="Replace the --report that is there already.")
+    ] = False,
     as_json: JsonOption = False,
 ) -> None:
     """Check this machine and tell what to fix before a robot runs on it.

@@ -23,10 +23,15 @@ _FilesArgument = Annotated[
     list[Path], typer.Argument(help="Recordings (*.mcap), or a folder of them.", metavar="FILE")
 ]
 _FromOption = Annotated[
-    float, typer.Option("--from", help="Seconds after the first cycle.", min=0.0)
+    float, typer.Option("--from", help="Begin so many seconds after the first cycle.", min=0.0)
 ]
 _UntilOption = Annotated[
-    float, typer.Option("--until", help="Seconds after the first cycle; the end by default.")
+    float,
+    typer.Option(
+        "--until",
+        help="End so many seconds after the first cycle; with the last one by default.",
+        show_default=False,
+    ),
 ]
 _EVENTS_SHOWN = 30
 

@@ -162,7 +162,8 @@ def calibrate(
         str | None, typer.Option(help="The load cell's cable; the first by default.")
     ] = None,
     out_dir: Annotated[
-        Path | None, typer.Option("--out", help="Folder for raw data and result.")
+        Path | None,
+        typer.Option("--out", help="Folder for raw data and result; else out/tension-WINCH."),
     ] = None,
     overwrite: OverwriteOption = False,
     speed_mm_s: Annotated[

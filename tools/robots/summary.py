@@ -57,6 +57,8 @@ def _of_tensions(
     lengths = np.array([statics.lengths(points, turn) for turn in turns])
     at_home_m, least_N = statics.lengths(home), statics.least_tensions_N(home)
     for figures, swings in zip(axes, corner_swings(robot), strict=True):
+        if not swings:
+            continue
         worst = max(swings, key=lambda swing: swing.swing_m)
         figures["broken"] = {
             "at_m": worst.position_m,
@@ -157,9 +159,11 @@ def _orientation_lines(platform: Platform) -> list[str]:
 
 def _broken_lines(axes: Sequence[dict[str, Any]]) -> list[str]:
     """Return a line for each cable on how far the platform gets when it breaks, at the worst."""
+    if any("broken" not in axis for axis in axes):
+        return []
     lines = [
-        f"if a cable breaks (predicted, worst corner): how far it swings within {SWING_S:g} s, "
-        "and how far",
+        "if a cable breaks (predicted, at the worst of the corners, or of the targets nearest to "
+        f"them): how far it swings within {SWING_S:g} s, and how far",
         "away and aside it is at most until the others have let it down to its ground:",
     ]
     for axis in axes:

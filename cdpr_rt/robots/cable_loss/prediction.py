@@ -30,6 +30,7 @@ from cdpr_rt.robots.platform_model import platform_model_of
 from cdpr_rt.robots.resonance import highest_rad_s
 from cdpr_rt.robots.rigid_body import free_directions, in_space, inertia_kg_m2, is_point
 from cdpr_rt.robots.robot_arrays import limits_of
+from cdpr_rt.robots.statics import statics_of
 
 SWING_S = 1.0
 """Time from the break that counts as the swing; afterwards the platform is lowered."""
@@ -70,12 +71,19 @@ class Swing:
 def corner_swings(robot: Robot) -> list[list[Swing]]:
     """Return for each cable what the platform does at each corner of the box of targets.
 
-    In the orientation of home. The robot has to have a platform.
+    In the orientation of home; where a corner is no target, at the target nearest to it on a grid.
+    Empty lists where there is none. The robot has to have a platform.
     """
-    loss, platform = CableLoss(robot), robot.platform
-    assert platform is not None  # asked for by who has one
-    corners = list(product(*zip(platform.workspace_min_m, platform.workspace_max_m, strict=True)))
-    return [[loss.swing(i, corner) for corner in corners] for i in range(len(robot.axes))]
+    loss, statics = CableLoss(robot), statics_of(robot)
+    points = statics.points()
+    targets = points[statics.is_target(points)]
+    box = zip(statics.platform.workspace_min_m, statics.platform.workspace_max_m, strict=True)
+    places = {_nearest(targets, corner): None for corner in product(*box) if len(targets)}
+    return [[loss.swing(i, place) for place in places] for i in range(len(robot.axes))]
+
+
+def _nearest(points: FloatArray, place: tuple[float, ...]) -> tuple[float, ...]:
+    return tuple(points[np.linalg.norm(points - place, axis=1).argmin()].tolist())
 
 
 class CableLoss:

@@ -69,7 +69,9 @@ def fit_data(
     hand_eye: HandEyeOption = None,
     identify: IdentifyOption = None,
     known_mm: KnownMmOption = None,
-    out_dir: Annotated[Path | None, typer.Option("--out", help="Folder for the result.")] = None,
+    out_dir: Annotated[
+        Path | None, typer.Option("--out", help="Folder for the result; else that of --data.")
+    ] = None,
     dry_run: DryRunOption = False,
     adopt: AdoptOption = False,
     as_json: JsonOption = False,
@@ -227,7 +229,8 @@ def check(
     camera: CameraUrlOption = None,
     seed: SeedOption = 1,
     out_dir: Annotated[
-        Path | None, typer.Option("--out", help="Folder for the readings, check.json.")
+        Path | None,
+        typer.Option("--out", help="Folder for the readings, check.json; else out/check-ROBOT."),
     ] = None,
     socket: SocketOption = None,
     url: UrlOption = None,

@@ -73,8 +73,8 @@ def calibrate(
     target: Annotated[Path, typer.Option("--out", help="File for the intrinsics.")],
     columns: Annotated[int, typer.Option(min=3, max=40, help="Columns of squares.")] = 9,
     rows: Annotated[int, typer.Option(min=3, max=40, help="Rows of squares.")] = 6,
-    square_mm: Annotated[float, typer.Option(min=2.0, max=1000.0, help="Square, measured.")] = 28.0,
-    marker_mm: Annotated[float, typer.Option(min=1.0, max=1000.0, help="Marker, measured.")] = 20.0,
+    square_mm: Annotated[float, typer.Option(min=2.0, max=1000.0, help="Side of a square.")] = 28.0,
+    marker_mm: Annotated[float, typer.Option(min=1.0, max=1000.0, help="Side of a marker.")] = 20.0,
     dictionary: Annotated[str, typer.Option(help="Set of the board's markers.")] = "5X5_100",
     count: Annotated[
         int, typer.Option(min=5, max=500, help="Images to take with a camera, one a second.")

@@ -77,10 +77,10 @@ def print_command(
 @app.command()
 def board(
     page: _PageOption = "A4",
-    columns: Annotated[int, typer.Option(min=3, max=40)] = 9,
-    rows: Annotated[int, typer.Option(min=3, max=40)] = 6,
-    square_mm: Annotated[float, typer.Option(min=2.0, max=1000.0)] = 28.0,
-    marker_mm: Annotated[float, typer.Option(min=1.0, max=1000.0)] = 20.0,
+    columns: Annotated[int, typer.Option(min=3, max=40, help="Columns of squares.")] = 9,
+    rows: Annotated[int, typer.Option(min=3, max=40, help="Rows of squares.")] = 6,
+    square_mm: Annotated[float, typer.Option(min=2.0, max=1000.0, help="Side of a square.")] = 28.0,
+    marker_mm: Annotated[float, typer.Option(min=1.0, max=1000.0, help="Side of a marker.")] = 20.0,
     dictionary: _DictionaryOption = "5X5_100",
     target: _PdfOption = Path("board.pdf"),
     overwrite: OverwriteOption = False,

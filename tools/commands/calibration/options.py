@@ -16,14 +16,15 @@ if TYPE_CHECKING:
 PointsOption = Annotated[
     Path | None,
     typer.Option(
-        help="Measured positions, CSV with these columns: pose (from 1),x_mm,y_mm,z_mm,sigma_mm.",
+        help="Measured positions, CSV with the columns pose (from 1), x_mm, y_mm, z_mm, sigma_mm.",
         metavar="FILE",
     ),
 ]
 IdentifyOption = Annotated[
     str | None,
     typer.Option(
-        help="What is identified: exit,offset,drum,elongation where left out; anchor, pulley too.",
+        help="What is identified, with commas between: exit, offset, drum, elongation (these by "
+        "default), anchor, pulley.",
         metavar="LIST",
     ),
 ]
@@ -31,8 +32,8 @@ KnownMmOption = Annotated[
     float | None,
     typer.Option(
         "--known-mm", min=0.1, max=500.0,
-        help="How well the exit points of the robot's file are known, one standard deviation; as "
-        "with a tape where left out.",
+        help="Standard deviation with which the exit points of the robot's file are known; 50 by "
+        "default, as with a tape.",
     ),
 ]  # fmt: skip
 CalibrationPlantOption = Annotated[
@@ -58,7 +59,10 @@ ScannerOption = Annotated[
     bool, typer.Option("--scanner", help="With poses that the simulated scanner measures.")
 ]
 OutDirOption = Annotated[
-    Path | None, typer.Option("--out", help="Folder for data, images, result and report.")
+    Path | None,
+    typer.Option(
+        "--out", help="Folder for data, images, result and report; else out/calibrate-ROBOT."
+    ),
 ]
 CameraUrlOption = Annotated[
     str | None,

@@ -217,8 +217,9 @@ def tighten(
         LengthSource | None,
         typer.Option(
             "--from",
-            help="Lengths of the cables: the platform stands at home, those of the last stop, or "
-            "those that the daemon knows; home where it knows none.",
+            help="From what the cables' lengths follow: the platform stands at home, they are "
+            "those of the last stop, or the lengths that the daemon knows. By default what it "
+            "knows, else home.",
         ),
     ] = None,
 ) -> None:

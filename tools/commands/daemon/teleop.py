@@ -75,7 +75,12 @@ def robot(
         typer.Option(metavar="ROBOT:HAND", help="Robot motion over hand motion; or a number."),
     ] = "1:1",
     script: Annotated[
-        Path | None, typer.Option(help="For --device script: lines of seconds, x and y in mm, ...")
+        Path | None,
+        typer.Option(
+            metavar="FILE",
+            help="For --device script; a line: SECONDS X_MM Y_MM [z=MM] [turn=RX,RY,RZ] [clutch] "
+            "[confirm].",
+        ),
     ] = None,
     via: Annotated[
         str | None,

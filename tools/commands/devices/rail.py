@@ -32,7 +32,11 @@ _RailArgument = Annotated[
 ]
 _BusOption = Annotated[
     str | None,
-    typer.Option("--bus", help="CAN bus of a rail on CiA 402: simbus:NAME, socketcan:can0, ..."),
+    typer.Option(
+        "--bus",
+        help="CAN bus of a rail on CiA 402: simbus:NAME, socketcan:can0, ...",
+        metavar="URL",
+    ),
 ]
 
 

@@ -102,7 +102,7 @@ def _state(network: CanNetwork, profile: Winch) -> State:
 def enable(
     winch: WinchOnBus,
     out: Output,
-    seconds: Annotated[float, typer.Option(min=0.1, max=600.0)] = 2.0,
+    seconds: Annotated[float, typer.Option(min=0.1, max=600.0, help="For how long.")] = 2.0,
 ) -> None:
     """Enable the drive in torque mode without torque for a while, then switch it off."""
     with winch.powered("the drive's power stage is switched on") as session:
@@ -155,7 +155,7 @@ def jog(
     speed_deg_s: Annotated[
         float, typer.Option("--speed-deg-s", help="Motor speed; its sign is the direction.")
     ] = 22.0,
-    seconds: Annotated[float, typer.Option(min=0.1, max=600.0)] = 3.0,
+    seconds: Annotated[float, typer.Option(min=0.1, max=600.0, help="For how long.")] = 3.0,
 ) -> None:
     """Turn the motor at a constant speed under the PID, then switch it off."""
     fastest = 0.1 * math.degrees(winch.profile.motor.rated_speed_rad_s)
@@ -234,7 +234,7 @@ def configure(
     winch: WinchOnBus,
     out: Output,
     store: Annotated[
-        bool, typer.Option("--store", help="have the drive keep it over a power cycle (1010h)")
+        bool, typer.Option("--store", help="Have the drive keep it over power-off (1010h).")
     ] = False,
 ) -> None:
     """Write into the drive what differs from its profile; nothing is enabled."""

@@ -83,7 +83,9 @@ class _NewSettings:
 
 @app.command()
 def lss(
-    bus: Annotated[str, typer.Option("--bus", help="simbus:NAME, socketcan:can0, ...")],
+    bus: Annotated[
+        str, typer.Option("--bus", help="simbus:NAME, socketcan:can0, ...", metavar="URL")
+    ],
     profile: Annotated[
         str | None,
         typer.Option(help="Drive profile: finds devices of this type, with a node id or without."),

@@ -71,7 +71,9 @@ def tension(
 
 @app.command()
 def hang(
-    mass_kg: Annotated[float, typer.Argument(min=0.0, max=_MOST_KG, metavar="MASS_KG")],
+    mass_kg: Annotated[
+        float, typer.Argument(min=0.0, max=_MOST_KG, metavar="MASS_KG", help="Mass, kg.")
+    ],
     board: Annotated[Path, typer.Option(help="Physics board of the simulator.")],
     axis: Annotated[int, typer.Option(min=1, help="Axis, counted from 1.")] = 1,
 ) -> None:

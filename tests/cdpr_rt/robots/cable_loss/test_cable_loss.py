@@ -13,6 +13,7 @@ from cdpr_profiles.platform import Platform
 from cdpr_rt.robots.cable_loss.prediction import SWING_S, CableLoss, corner_swings
 from cdpr_rt.robots.platform_model import platform_model, platform_model_of
 from cdpr_rt.robots.resonance import lowest_resonance_Hz
+from cdpr_rt.robots.statics import statics_of
 from tests.cdpr_rt.robots.pulley import over_a_pulley
 
 
@@ -54,6 +55,23 @@ def test_it_swings_from_all_corners_and_gets_as_far_away_as_to_the_ground(name: 
         for swing in swings:
             assert swing.swing_m <= swing.away_m and swing.aside_m <= swing.away_m
             assert swing.away_m > 0.9 * (swing.position_m[-1] - platform.home_m[-1])
+
+
+def test_nothing_is_said_of_corners_that_are_no_targets() -> None:
+    robot = load_robot("planar-3")
+    assert robot.platform is not None
+    high_m = (robot.platform.workspace_max_m[0], robot.platform.exit_points_m[0][1] - 0.1)
+    larger = dataclasses.replace(
+        robot, platform=dataclasses.replace(robot.platform, workspace_max_m=high_m)
+    )
+    statics = statics_of(larger)
+    assert not statics.is_target(np.array(high_m))
+    for swings in corner_swings(larger):
+        places = np.array([swing.position_m for swing in swings])
+        assert len(places) == 4 and statics.is_target(places).all()
+        assert robot.platform.workspace_min_m in map(tuple, places.tolist())
+    heavy = dataclasses.replace(robot, platform=dataclasses.replace(robot.platform, mass_kg=1000.0))
+    assert corner_swings(heavy) == [[], [], []]
 
 
 def test_a_place_lower_than_the_stand_is_not_in_the_ground() -> None:
