@@ -73,6 +73,11 @@ class PullFit:
         self.taken_up_N = (MOST_SHARE + COGGING_SHARE) * rated_N
         """What winches usually take up of their cables' tensions at most, (n,)."""
         self._motors[kernel.POLE_PAIRS] = [axis.winch.motor.pole_pairs for axis in axes]
+        self._alike_rad = _ALIKE_rad / self._motors[kernel.POLE_PAIRS]
+        usual = np.full((n, kernel.UNKNOWNS), [_ANYWHERE_rad, _STEEPER, np.inf, 1.0, 1.0])
+        usual[:, kernel.FRICTION + 1 :] = COGGING_SHARE * self._rated_Nm[:, None]
+        self._usual_precision = np.eye(kernel.UNKNOWNS) * usual[:, None] ** -2.0
+        """Of all but friction, (n, 5, 5)."""
         self._shares = np.linspace(_LEAST_SHARE, _MOST_SHARE, _SHARES)
         self._lengths = np.ones((2, _SHARES, n))
         size = kernel.UNKNOWNS + 1
@@ -115,11 +120,12 @@ class PullFit:
     def end(self) -> FloatArray:
         """Return the angles (n,) at which the cables have the pretension, nan where not known."""
         zero, usual_Nm = np.zeros(self._rated_Nm.size), FRICTION_SHARE * self._rated_Nm
-        misfit, x, covariance = self._fit(zero, usual_Nm)
+        sums = self._weighted_sums()
+        misfit, x, covariance = self._fit(sums, zero, usual_Nm)
         alone_Nm, variance = x[:, kernel.FRICTION], covariance[:, kernel.FRICTION, kernel.FRICTION]
         told = (~self._known & (misfit < _MISFIT)) / _wider(misfit)
         mean_Nm, spread_Nm = self._of_their_kind(told, alone_Nm, variance, usual_Nm)
-        misfit, x, covariance = self._fit(mean_Nm, spread_Nm)
+        misfit, x, covariance = self._fit(sums, mean_Nm, spread_Nm)
         self.unknowns[:] = x
         self._covariance[:] = covariance * _wider(misfit)[:, None, None]
         turned = (self._turned >= _TURNED_rad).all(axis=0)
@@ -164,29 +170,29 @@ class PullFit:
         known = (counts * precision).sum(axis=1) + usual_Nm**-2.0
         return (counts * weighted).sum(axis=1) / known, np.sqrt(unlike[:, 0] + 1.0 / known)
 
+    def _weighted_sums(self) -> FloatArray:
+        """Return the sums (n, 6, 6) over the variance of what else a motor takes up."""
+        sums = self._sums + np.swapaxes(np.tril(self._sums, -1), 1, 2)
+        noise = self._alike_rad * (NOISE_SHARE * self._rated_Nm) ** 2
+        return np.asarray(sums / noise[:, None, None])
+
     def _fit(
-        self, friction_Nm: FloatArray, spread_Nm: FloatArray
+        self, sums: FloatArray, friction_Nm: FloatArray, spread_Nm: FloatArray
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return of each motor residual over noise, (n,), what was found, (n, 5), its covariance.
 
         Its friction is expected to be `friction_Nm` ± `spread_Nm`, (n,). Covariances are (n, 5, 5).
         """
-        rated_Nm, m = self._rated_Nm[:, None], kernel.UNKNOWNS
-        alike_rad = _ALIKE_rad / self._motors[kernel.POLE_PAIRS]
-        noise = alike_rad * (NOISE_SHARE * self._rated_Nm) ** 2
-        sums = self._sums + np.swapaxes(np.tril(self._sums, -1), 1, 2)
-        sums /= noise[:, None, None]
-        shares = np.array([FRICTION_SHARE, COGGING_SHARE, COGGING_SHARE])
-        usual = np.full((rated_Nm.size, m), [_ANYWHERE_rad, _STEEPER, 1.0, 1.0, 1.0])
-        usual[:, kernel.FRICTION :] = shares * rated_Nm
-        usual[:, kernel.FRICTION], expected = spread_Nm, np.zeros_like(usual)
-        expected[:, kernel.FRICTION] = friction_Nm
+        m, f = kernel.UNKNOWNS, kernel.FRICTION
         products, rest = sums[:, :m, :m], sums[:, :m, m]
-        covariance = np.asarray(np.linalg.inv(products + np.eye(m) * usual[:, None] ** -2.0), float)
-        x = np.einsum("ijk,ik->ij", covariance, rest + expected / usual**2)
-        left = sums[:, m, m] - 2.0 * np.einsum("ij,ij->i", x, rest)
-        left += np.einsum("ij,ijk,ik->i", x, products, x)
-        told = np.maximum(self._turned.sum(axis=0), _TURNED_rad) / alike_rad
+        precision = products + self._usual_precision
+        precision[:, f, f] += spread_Nm**-2.0
+        known = rest.copy()
+        known[:, f] += friction_Nm / spread_Nm**2
+        covariance = np.asarray(np.linalg.inv(precision), float)
+        x = (covariance @ known[:, :, None])[:, :, 0]
+        left = sums[:, m, m] + (x * ((products @ x[:, :, None])[:, :, 0] - 2.0 * rest)).sum(axis=1)
+        told = np.maximum(self._turned.sum(axis=0), _TURNED_rad) / self._alike_rad
         misfit = np.maximum(left, 0.0) / told
         # cables that are softer show all torques larger
         x[:, kernel.FRICTION :] /= np.maximum(1.0 + x[:, [kernel.STEEPER]], _LEAST_STEEP)
