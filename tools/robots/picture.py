@@ -21,9 +21,13 @@ _WIDE_in = 7.4
 _SEEN_THROUGH = 0.6
 """Of the platform, which may cover all of the box of targets."""
 _NAMES = "xyz"
+_OUTLINE = 721
+"""Directions in which the furthest anchor point is one of the platform's outline."""
 
 # of their extent: exit points closer than this have names that would touch
 _CLOSE = 0.1
+# and those closer than this in x and y have names that would cover each other
+_TOGETHER = 0.02, 0.06
 
 _LOOKS, _PAD = 4, 3.0
 _FINE, _COARSE = (121, 95), (41, 31)
@@ -112,14 +116,15 @@ def _draw_workspace(
 def _draw_machine(ax: Axes, robot: Robot, platform: Platform, view: _View) -> None:
     all_exits, home = np.array(platform.exit_points_m), np.array(platform.home_m)[list(view)]
     exits, anchors = all_exits[:, view], home + np.array(platform.anchor_points_m)[:, view]
-    for axis, a, b in zip(robot.axes, exits, anchors, strict=True):
+    for a, b in zip(exits, anchors, strict=True):
         ax.plot(*zip(a, b, strict=True), color=_CABLE, lw=1.2)
-        if view == (0, 1):  # from the front names would lie on each other
-            _name(ax, axis.name, a, exits)
+    if view == (0, 1):  # from the front names would lie on each other
+        _name_all(ax, [axis.name for axis in robot.axes], exits)
     ax.plot([], [], color=_CABLE, lw=1.2, label="cables, at rest")
     ax.plot(*exits.T, "s", ms=6, color=_CABLE, label="exit points")
-    around = np.argsort(np.arctan2(*(anchors - anchors.mean(axis=0)).T[::-1]))
-    ax.add_patch(Polygon(anchors[around], color=_PLATFORM, alpha=_SEEN_THROUGH, zorder=3))
+    outward = np.linspace(0.0, 2.0 * np.pi, _OUTLINE)
+    furthest = (np.column_stack((np.cos(outward), np.sin(outward))) @ anchors.T).argmax(axis=1)
+    ax.add_patch(Polygon(anchors[furthest], color=_PLATFORM, alpha=_SEEN_THROUGH, zorder=3))
     ax.plot(*home, "o", ms=3, color=_PLATFORM, label="platform, at rest", zorder=3)
     low = np.array(platform.workspace_min_m)[list(view)]
     width, height = np.array(platform.workspace_max_m)[list(view)] - low
@@ -129,6 +134,16 @@ def _draw_machine(ax: Axes, robot: Robot, platform: Platform, view: _View) -> No
             label="box of targets",
         )
     )  # fmt: skip
+
+
+def _name_all(ax: Axes, names: list[str], exits_m: FloatArray) -> None:
+    """Write the names of exit points; in one where they lie above each other, or nearly so."""
+    close = np.multiply(_TOGETHER, np.ptp(exits_m, axis=0).max())
+    together = (np.abs(exits_m[:, None] - exits_m) <= close).all(axis=-1)
+    for i, exit_m in enumerate(exits_m):
+        alike = np.flatnonzero(together[i])
+        if alike[0] == i:
+            _name(ax, ", ".join(names[k] for k in alike), exit_m, exits_m)
 
 
 def _name(ax: Axes, name: str, exit_m: FloatArray, exits_m: FloatArray) -> None:

@@ -199,7 +199,7 @@ def _cable_speeds(robot: Robot, limits: Limits, statics: PlatformStatics) -> Ite
         reach_m = float(np.linalg.norm(statics.anchors_m, axis=1).max())
         angles = len(platform.controlled) - len(platform.home_m)
         cable_m_s += math.sqrt(angles) * platform.angular_speed_rad_s * reach_m
-        turning = " and about all"
+        turning = " and about"
     most_rad_s = np.broadcast_to(limits.speed_rad_s, arm_m.shape)
     i = int((arm_m * most_rad_s).argmin())
     share = float(arm_m[i] * most_rad_s[i]) / cable_m_s

@@ -14,6 +14,7 @@ import matplotlib.image
 import numpy as np
 import pytest
 from cdpr_here import cdpr_here
+from matplotlib.patches import Polygon
 
 from cdpr_profiles import ProfileError, load_robot
 from cdpr_profiles.reading.places import SHIPPED
@@ -262,6 +263,29 @@ def test_names_in_the_picture_are_clear_of_its_numbers(tmp_path: Path) -> None:
         (left, lower), (right, upper) = name.get_window_extent().get_points()
         assert inside.x0 <= left and right <= inside.x1, name
         assert inside.y0 <= lower and upper <= inside.y1, name
+
+
+def test_exit_points_above_each_other_share_a_name_and_the_platform_is_drawn_whole(
+    tmp_path: Path,
+) -> None:
+    path = tmp_path / "box.toml"
+    text = (SHIPPED / "robots" / "spatial-8.toml").read_text()
+    columns = iter([(x, y, z) for z in (0.8, 2.9) for x in (-1.7, 1.5) for y in (-2.2, 2.2)])
+    text = re.sub(r"exit_point_m = .*", lambda _: f"exit_point_m = {list(next(columns))}", text)
+    inner = "anchor_point_m = [0.03, -0.1, 0.05]"  # within the outline that the others have
+    path.write_text(text.replace("anchor_point_m = [0.1, -0.1, 0.3]", inner, 1))
+    robot = load_robot(path)
+    assert robot.platform is not None
+    figure = figure_of(robot, robot.platform)
+    (from_above,) = [ax for ax in figure.axes if ax.texts]
+    names = [text.get_text() for text in from_above.texts]
+    assert names == ["axis 1, axis 5", "axis 2, axis 6", "axis 3, axis 7", "axis 4, axis 8"]
+    for ax in figure.axes:
+        for outline in (patch for patch in ax.patches if isinstance(patch, Polygon)):
+            if outline.get_fill():
+                x, y = outline.get_xy().T
+                area = abs(np.dot(x[:-1], y[1:]) - np.dot(x[1:], y[:-1])) / 2.0
+                assert area == pytest.approx(np.ptp(x) * np.ptp(y))  # a rectangle from each side
 
 
 def test_the_stand_is_in_the_middle_of_a_frame_about_the_room_s_zero(tmp_path: Path) -> None:

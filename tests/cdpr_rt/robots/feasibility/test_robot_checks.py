@@ -224,6 +224,7 @@ def test_what_no_place_mends_is_not_laid_to_the_place(tmp_path: Path) -> None:
 def test_turning_takes_part_in_the_speed_of_the_cables(tmp_path: Path) -> None:
     text = SUSPENDED.replace("angular_speed_rad_s = 0.25", "angular_speed_rad_s = 0.6")
     told = findings_of(tmp_path, text)["platform.speed_m_s"]
+    assert "along and about all directions at once cables run at up to" in told
     found = re.search(
         r"up to (\S+) with angular_speed_rad_s up to (\S+), or limits.speed_rad_s from (\d+)$", told
     )
