@@ -301,8 +301,31 @@ def _clear_for(
         for b in range(2, 2 + others):
             left = apart - allowed + moves[a, 0] + moves[b, 0]
             g, h = moves[a, 1] + moves[b, 1], moves[a, 2] + moves[b, 2]
+            if a == 1 and b == 3 and pair[TRIMMED] & ANCHOR != 0:
+                g = min(g, _apart_at_anchor(scene, pair, way, rates))
             least = min(least, 2.0 * left / (g + math.sqrt(g * g + 2.0 * h * left) + TINY))
     return least
+
+
+@jit
+def _swings(rates: FloatArray, i: int, trim: float) -> float:
+    """Return a bound of how fast a point `trim` from an end of a cable moves about that end."""
+    return trim * 2.0 * (rates[_SPEED, i] + rates[_EXIT, i]) / rates[_FREE, i]
+
+
+@jit
+def _apart_at_anchor(scene: Scene, pair: IntArray, way: FloatArray, rates: FloatArray) -> float:
+    """Return how fast two cables that end in one point may come nearer there: that point is common.
+
+    Otherwise a way of many metres would take as many looks as its length has of what is left out.
+    """
+    speed = size_of(way[TURN]) * scene.clearance
+    for row in range(2):
+        i = pair[FIRST + row]
+        if 4.0 * scene.trim > rates[_FREE, i]:
+            return math.inf
+        speed += _swings(rates, i, scene.trim)
+    return speed
 
 
 @jit
@@ -329,6 +352,8 @@ def _write_moves(
                     speed = rates[_FAR, i]
         elif trimmed:
             speed = 2.0 * both
+            if 4.0 * trim <= rates[_FREE, i]:
+                speed = (rates[_SPEED, i] if end else rates[_EXIT, i]) + _swings(rates, i, trim)
         elif end == 0:
             speed = rates[_EXIT, i]
         else:

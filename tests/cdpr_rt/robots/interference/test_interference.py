@@ -241,3 +241,28 @@ def test_a_flat_platform_that_turns_is_proved_clear_in_a_few_looks() -> None:
     way = np.array([[-0.5, 1.0, 0.1], [0.5, 1.4, -0.1]])
     assert model.interference.first_contact(way, 40) is None
     assert model.interference.contact_ahead(way[0], way[0] + 0.05 * (way[1] - way[0])) < 0
+
+
+@pytest.mark.parametrize("shared", ["anchor points", "exit points"])
+def test_a_long_way_of_cables_that_share_a_point_is_proved_clear_in_a_few_looks(
+    shared: str,
+) -> None:
+    """A camera in a stadium, and a platform on three pairs of cables from a point each."""
+    if shared == "anchor points":
+        exits = np.array([(x, y, 30.0) for x in (-50.0, 50.0) for y in (-30.0, 30.0)])
+        anchors, directions = np.zeros((4, 3)), SPATIAL[:3]
+    else:
+        turned = np.radians(np.repeat((90.0, 210.0, 330.0), 2))
+        exits = 30.0 * np.column_stack((np.cos(turned), np.sin(turned), np.ones(6)))
+        turned += np.radians((-60.0, 60.0) * 3)
+        anchors = 6.0 * np.column_stack((np.cos(turned), np.sin(turned), np.zeros(6)))
+        directions = SPATIAL
+    interference = Interference(
+        CableKinematics(exits, anchors, directions), Pose(np.zeros(3)).array, 0.01, None, []
+    )
+    way = np.zeros((2, len(directions)))
+    way[:, :3] = (-5.0, -5.0, 0.0), (5.0, 5.0, 5.0)
+    assert interference.first_contact(way, 40) is None
+    places = way[0] + np.linspace(0.0, 1.0, 50)[:, None] * (way[1] - way[0])
+    poses = np.array([Pose(place[:3]).array for place in places])
+    assert interference.clearances(poses)[0].min() > 0.02
