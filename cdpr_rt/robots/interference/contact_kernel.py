@@ -310,7 +310,7 @@ def _clear_for(
 @jit
 def _swings(rates: FloatArray, i: int, trim: float) -> float:
     """Return a bound of how fast a point `trim` from an end of a cable moves about that end."""
-    return trim * 2.0 * (rates[_SPEED, i] + rates[_EXIT, i]) / rates[_FREE, i]
+    return trim * 2.0 * float(rates[_SPEED, i] + rates[_EXIT, i]) / float(rates[_FREE, i])
 
 
 @jit

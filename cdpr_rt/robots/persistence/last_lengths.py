@@ -19,6 +19,8 @@ from cdpr_rt.state_file import StateFileError, read_state, write_state
 
 _FIELDS = ("cable_length_m", "cable_at_index_m")
 _FLAGS = ("fallen", "displaced")
+_INDEX_TURNS = 0.05
+"""Share of a motor's turn by which its index may be off: a latched count is far more exact."""
 _MOST_OF_LONGEST = 2.0
 """A platform that was let down anywhere has its cables paid out further than in use."""
 
@@ -155,15 +157,21 @@ def off_index_m(
     return np.where(feedback.index_known, off, math.nan)
 
 
-def index_disagreement(off_m: FloatArray, allowed_m: float, names: Sequence[str]) -> str:
-    """Return whose index is by more than `allowed_m` off, by `off_index_m` (n,); "" for none."""
+def index_disagreement(
+    off_m: FloatArray, cable_m: FloatArray, allowed_m: float, names: Sequence[str]
+) -> str:
+    """Return whose index is too far off, by `off_index_m` (n,); "" for none.
+
+    Allowed are `allowed_m` and a share of a motor's turn: off by more than half a turn none can be.
+    """
     off_m = np.nan_to_num(np.abs(off_m))
-    worst = int(off_m.argmax())
-    if off_m[worst] <= allowed_m:
+    allowed = np.minimum(allowed_m, _INDEX_TURNS * math.tau * np.abs(cable_m))
+    worst = int((off_m - allowed).argmax())
+    if off_m[worst] <= allowed[worst]:
         return ""
     return (
-        f"{names[worst]}: its motor's index is {1e3 * off_m[worst]:.0f} mm from where the last "
-        f"stop has it, {1e3 * allowed_m:.0f} mm allowed: lower, and tighten from home"
+        f"{names[worst]}: its motor's index is {1e3 * off_m[worst]:.1f} mm from where the last "
+        f"stop has it, {1e3 * allowed[worst]:.1f} mm allowed: lower, and tighten from home"
     )
 
 

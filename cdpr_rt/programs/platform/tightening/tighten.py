@@ -398,4 +398,4 @@ class TightenProgram(PlatformProgram):
         parts = self._parts
         length_m, allowed_m = parts.estimator.estimate.cable_length_m, parts.lengths_allowed_m
         off_m = off_index_m(self._last, length_m, self._feedback, self._cable)
-        return index_disagreement(off_m, allowed_m, parts.names)
+        return index_disagreement(off_m, self._cable, allowed_m, parts.names)

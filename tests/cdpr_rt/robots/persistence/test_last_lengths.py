@@ -11,7 +11,7 @@ import pytest
 
 from cdpr_rt.core.estimate import AxisEstimate
 from cdpr_rt.core.exchange import AxisFeedback
-from cdpr_rt.robots.persistence.last_lengths import LastLengths, off_index_m
+from cdpr_rt.robots.persistence.last_lengths import LastLengths, index_disagreement, off_index_m
 from cdpr_rt.state_file import StateFileError
 
 CABLE_m = np.array([0.026, -0.026, 0.03])
@@ -156,6 +156,29 @@ def test_an_index_tells_what_a_cable_is_off_but_for_whole_turns(
     off = off_index_m(last, LENGTH_m + slip_m, feedback, CABLE_m)
     assert off[0] == pytest.approx(slip_m, abs=1e-9)
     assert np.isnan(off[1:]).all()
+
+
+@pytest.mark.parametrize("m_per_turn", [0.0188, 0.0628, 0.164])  # of gears of 20:1, 10:1, 4:1
+def test_a_motor_turned_by_a_part_of_a_turn_is_noticed_however_little_cable_that_is(
+    path: Path, m_per_turn: float
+):
+    last, feedback = stopped(path).lengths, AxisFeedback(3)
+    assert last is not None
+    cable_m = np.full(3, m_per_turn / math.tau)
+    feedback.index_known[:2] = True
+    here = (last.cable_at_index_m - LENGTH_m) / cable_m
+    feedback.index_rad[:] = here + np.radians((10.0, -10.0, 90.0))
+    names = ("left", "right", "top")
+    off_m = off_index_m(last, LENGTH_m, feedback, cable_m)
+    assert index_disagreement(off_m, cable_m, 0.03, names) == ""
+    feedback.index_rad[1] = here[1] + math.radians(400.0)
+    off_m = off_index_m(last, LENGTH_m, feedback, cable_m)
+    told = index_disagreement(off_m, cable_m, 0.03, names)
+    off_mm, allowed_mm = 1e3 * m_per_turn * 40.0 / 360.0, 1e3 * m_per_turn * 0.05
+    assert told == (
+        f"right: its motor's index is {off_mm:.1f} mm from where the last stop has it, "
+        f"{allowed_mm:.1f} mm allowed: lower, and tighten from home"
+    )
 
 
 def test_lengths_by_another_geometry_are_none(path: Path):
