@@ -40,6 +40,7 @@ class MadeUpLoop:
         self.commands: list[dict[str, Any]] = []
         self.answers = True
         self.turns = True
+        self._turning = threading.Lock()
         self.status: dict[str, Any] = {
             "state": "ready",
             "program": "idle",
@@ -58,8 +59,14 @@ class MadeUpLoop:
 
     def run(self, ended: threading.Event) -> None:
         while not ended.wait(0.002):
-            if self.turns:
-                self.turn()
+            with self._turning:
+                if self.turns:
+                    self.turn()
+
+    def stand_still(self) -> None:
+        """Turn no more from now on."""
+        with self._turning:
+            self.turns = False
 
     def turn(self) -> None:
         self.block.counters["loop_alive_ns"] = time.monotonic_ns()
@@ -107,9 +114,11 @@ class Rig:
         ]
 
     def start(self) -> None:
-        for thread in self._threads:
-            thread.start()
+        """Start the service, and the loop once all of its rows are seen."""
+        turning, serving = self._threads
+        serving.start()
         assert self._up.wait(60.0)
+        turning.start()
 
     def stop(self) -> None:
         self._ended.set()
@@ -163,7 +172,7 @@ class Rig:
 
     def client(self) -> httpx.Client:
         transport = httpx.HTTPTransport(uds=str(self.socket))
-        return httpx.Client(transport=transport, base_url="http://robot", timeout=10.0)
+        return httpx.Client(transport=transport, base_url="http://robot", timeout=60.0)
 
     @property
     def url(self) -> str:
@@ -217,6 +226,6 @@ def raw(rig: Rig, text: bytes, wait_s: float = 5.0, port: int = 0) -> bytes:
 
 def reachable(rig: Rig) -> bool:
     try:
-        return httpx.get(f"{rig.url}/status").status_code == 200
+        return httpx.get(f"{rig.url}/status", timeout=60.0).status_code == 200
     except httpx.HTTPError:
         return False
