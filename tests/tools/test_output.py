@@ -7,6 +7,7 @@ import os
 import pty
 import time
 from contextlib import redirect_stderr, suppress
+from types import SimpleNamespace
 
 import pytest
 
@@ -27,7 +28,17 @@ def test_no_bar_and_no_blank_line_in_a_pipe() -> None:
     assert errors.getvalue() == ""
 
 
+def test_what_is_done_is_told_in_a_pipe_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(output, "_TELL_S", (3600.0, 3600.0))
+    errors = io.StringIO()
+    with redirect_stderr(errors), Output(as_json=True).stage("winding"):
+        assert errors.getvalue() == "winding ...\n"
+    assert errors.getvalue() == "winding ...\n"
+
+
 def test_what_takes_longer_is_told_in_a_pipe_too(monkeypatch: pytest.MonkeyPatch) -> None:
+    now_s = 10.0
+    monkeypatch.setattr(output, "time", SimpleNamespace(monotonic=lambda: now_s))
     monkeypatch.setattr(output, "_TELL_S", (0.01, 0.01))
     out, errors = Output(as_json=True), io.StringIO()
 
@@ -37,17 +48,18 @@ def test_what_takes_longer_is_told_in_a_pipe_too(monkeypatch: pytest.MonkeyPatch
 
     with redirect_stderr(errors):
         with out.stage("winding"):
-            assert errors.getvalue() == "winding ...\n"
-            until("winding: for 0 s now")
+            now_s += 7.0
+            until("winding: for 7 s now")
         with out.progress("turns", 10.0) as advance:
             until("turns: 0 %")
+            now_s += 3.0
             advance(5.0)
-            until("turns: 50 %, about 0 s left")
+            until("turns: 50 %, about 3 s left")
         with out.progress("turning", 1e9) as advance:
             advance(1e-3)
             until("turning: 0 %")
     told = errors.getvalue()
-    assert told.count("left") == told.count("50 %, about 0 s left")
+    assert told.count("left") == told.count("50 %, about 3 s left")
     time.sleep(0.05)
     assert errors.getvalue() == told
 

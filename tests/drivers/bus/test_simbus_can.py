@@ -29,6 +29,7 @@ def test_frames_go_both_ways(simulator: Any) -> None:
             message(0x12345678, b"12345678"),
             can.Message(arbitration_id=0x701, is_remote_frame=True, dlc=1, is_extended_id=False),
         ]
+        begin_s = time.time()
         for entry in sent:
             one.send(entry)
         for entry in sent:
@@ -37,7 +38,7 @@ def test_frames_go_both_ways(simulator: Any) -> None:
             assert got.equals(
                 entry, timestamp_delta=None, check_channel=False, check_direction=False
             )
-            assert got.timestamp == pytest.approx(time.time(), abs=5.0)
+            assert begin_s - 1.0 < got.timestamp < time.time() + 1.0
             assert got.channel == simulator.name
         assert one.recv(0.02) is None
         assert one.state is can.BusState.ACTIVE
@@ -72,7 +73,7 @@ def test_notifier_and_periodic_sending(simulator: Any) -> None:
         reader = can.BufferedReader()
         notifier = can.Notifier(bus, [reader])
         task = master.send_periodic(message(0x80), 0.005)
-        seen = [reader.get_message(5.0) for _ in range(30)]
+        seen = [reader.get_message(60.0) for _ in range(30)]
         task.stop()
         notifier.stop()
     ids = [entry.arbitration_id for entry in seen if entry]

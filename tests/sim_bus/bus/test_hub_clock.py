@@ -180,6 +180,7 @@ def test_nodes_time_stands_between_syncs_and_runs_after_them(
     node = stub_node(5, sync_period_s=0.01, answers=(pack_frame(0x185),))
     member = start_bus(node).join()  # type: ignore[attr-defined]
     for _ in range(20):
+        started = time.monotonic()  # the last time before bus time is held for the last time
         member.send(0x205)
         member.send(0x80)
         assert member.recv_id() == 0x185
@@ -189,7 +190,6 @@ def test_nodes_time_stands_between_syncs_and_runs_after_them(
     assert rpdos[1:] == syncs[:-1]
     due = syncs[-1] + 0.05
     node.timers.append(due)
-    started = time.monotonic()
     assert member.recv_id() == 0x705
     waited = time.monotonic() - started
     assert waited > HOLD_S + 0.03

@@ -197,8 +197,8 @@ def test_the_wall_takes_over_from_a_leader_that_has_gone(
     member, other = bus.join(), bus.join()
     member.lead()
     member.go(2.0)
-    member.sock.close()
     started = time.monotonic()
+    member.sock.close()
     for _ in timers:
         assert other.recv() == beat(1)
     assert time.monotonic() - started > 0.25
@@ -248,10 +248,10 @@ def test_the_time_is_told_as_soon_as_the_master_reads_again(
     while not other.status()["dropped"]:
         for _ in range(1000):
             other.send(0x123)
-        assert time.monotonic() - started < 20.0
+        assert time.monotonic() - started < 300.0
     member.sock.send(GO.pack(b"bus-go\0\0", 1.0, 0.0))
     while not bus.hub.lead.time_pending:
-        assert time.monotonic() - started < 20.0
+        assert time.monotonic() - started < 300.0
         time.sleep(1e-3)
     frames, now_s, _ = member.until_time()
     assert len(frames) > 1000

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import fcntl
 import math
 import os
 import pty
+import sys
 import termios
 import time
 from pathlib import Path
@@ -193,11 +195,19 @@ def test_no_hand_goes_where_packets_are_refused() -> None:
 
 def read_soon(device: InputDevice, what: str) -> InputSample:
     """Read until something is true of the hand: terminals pass bytes on in their own time."""
-    end = time.monotonic() + 5.0
+    end = time.monotonic() + 60.0
     while not getattr(hand := device.read(time.monotonic()), what):
         assert time.monotonic() < end, hand
         time.sleep(0.005)
     return hand
+
+
+def wait_for_bytes(terminal: int, count: int) -> None:
+    """Wait until so many bytes that were typed can be read."""
+    end = time.monotonic() + 60.0
+    while int.from_bytes(fcntl.ioctl(terminal, termios.FIONREAD, bytes(4)), sys.byteorder) < count:
+        assert time.monotonic() < end
+        time.sleep(0.005)
 
 
 def test_a_terminal_leads_and_is_given_back_as_it_was() -> None:
@@ -207,12 +217,11 @@ def test_a_terminal_leads_and_is_given_back_as_it_was() -> None:
     during = termios.tcgetattr(its)
     assert not during[3] & (termios.ECHO | termios.ICANON)
     assert during[3] & termios.ISIG  # Ctrl-C stays what it is
-    os.write(ours, RIGHT.encode() + b" \n")  # before anybody listens
-    time.sleep(0.05)
+    typed = RIGHT.encode() + b" \n"
+    os.write(ours, typed)  # before anybody listens
+    wait_for_bytes(its, len(typed))
     assert device.read(time.monotonic()) == InputSample(clutch=False)
-    os.write(ours, RIGHT.encode())
-    time.sleep(0.05)
-    os.write(ours, b"\n")
+    os.write(ours, RIGHT.encode() + b"\n")
     hand = read_soon(device, "confirmed")
     assert hand.position_m[0] > 0.0
     assert not hand.clutch and hand.end is None

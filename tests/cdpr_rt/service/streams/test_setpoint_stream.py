@@ -11,10 +11,12 @@ import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from typing import Any
 
 import pytest
 
 from cdpr_rt.errors import ControlError
+from cdpr_rt.service.streams import stream_sessions
 from cdpr_rt.service.streams.setpoint_stream import (
     StreamError,
     is_loopback,
@@ -39,6 +41,14 @@ def test_a_client_streams_and_sees_the_robot(host: str, key: bytes | None) -> No
         robot(key, host) as there,
         StreamClient(host, there.port, key or there.give()) as client,
     ):
+        begin = time.monotonic()
+        told: dict[str, Any] = {}
+
+        def holds_it() -> bool:
+            """Who is not silent, as a machine may be that does other things, has the right."""
+            told.update(there.stream.status())
+            return told["holder"] is not None and there.until_ns > time.monotonic_ns()
+
         # the robot knows how long an answer took to come back once a packet has said so
         converse(
             client,
@@ -46,16 +56,15 @@ def test_a_client_streams_and_sees_the_robot(host: str, key: bytes | None) -> No
                 client.answered >= 5
                 and client.state is not None
                 and not math.isnan(client.state.round_trip_s)
+                and client.state.standing == Standing.ACCEPTED
+                and holds_it()
             ),
         )
         assert client.state is not None
-        assert client.state.standing == Standing.ACCEPTED
-        assert 0.0 < client.round_trip_s < 1.0
-        assert 0.0 <= client.state.round_trip_s < 1.0
+        passed_s = time.monotonic() - begin
+        assert 0.0 < client.round_trip_s < passed_s
+        assert 0.0 <= client.state.round_trip_s < passed_s
         assert there.posted >= 5
-        assert there.until_ns > time.monotonic_ns()
-        told = there.stream.status()
-        assert told["holder"] is not None
         assert told["round_trip_s"] is not None
         client.close()
         until(lambda: there.stream.status()["holder"] is None)
@@ -80,7 +89,8 @@ def test_a_client_goes_on_after_the_robot_was_away(monkeypatch: pytest.MonkeyPat
         again.stream.stop()
 
 
-def test_the_second_waits_for_the_first() -> None:
+def test_the_second_waits_for_the_first(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(stream_sessions, "SILENCE_NS", 10_000_000_000)  # a busy machine's
     with robot(KEY) as there, StreamClient("127.0.0.1", there.port, KEY) as second:
         with StreamClient("127.0.0.1", there.port, KEY) as first:
             converse(first, lambda: first.answered >= 2)
@@ -94,6 +104,7 @@ def test_nobody_else_on_this_machine_streams_or_gets_the_right_to_move() -> None
     """Whoever can reach the port but not the control interface, also as the holder falls silent."""
     with robot() as there, StreamClient("127.0.0.1", there.port, there.give()) as hand:
         converse(hand, lambda: hand.answered >= 2)
+        until(lambda: hand.receive() is not None and hand.answered == hand.sent)
         there.lease.release(there.token)
         posted = there.posted
         with (
