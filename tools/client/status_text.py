@@ -71,6 +71,8 @@ _STAGES = {
     ("path", "path"): "following the path",
 }
 """What a program is doing in each of its stages."""
+_SILENT_s: Final = 1.0
+"""A loop that has not turned for so long hangs: what is known of the robot is of then."""
 _COLOURS = {"active": "green", "fault": "red", "dead": "red", "ready": "cyan"}
 
 
@@ -90,6 +92,16 @@ def _lines(status: dict[str, Any]) -> list[Text]:
         "".join(f", {word}" for word in how),
     )
     lines = [first]
+    silent_s = status["loop"]["silent_s"]
+    if state != DEAD and silent_s > _SILENT_s:
+        lines.append(
+            Text(
+                f"the loop has not turned for {silent_s:.1f} s: what follows is of then",
+                style="red",
+            )
+        )
+        if not status["lockstep"]:  # there time stands still with it
+            lines.append(Text(power_text(status), style="red"))
     if status["reason"]:
         lines.append(Text(f"reason: {status['reason']}", style="yellow"))
     if state == DEAD:
@@ -126,9 +138,6 @@ def _loop_lines(status: dict[str, Any]) -> list[Text]:
                 f"{cycle['missed']} answers missed, {cycle['late_cycles']} cycles late"
             )
         )
-    if status["loop"]["silent_s"] > 1.0:
-        silent_s = status["loop"]["silent_s"]
-        lines.append(Text(f"the loop has not turned for {silent_s:.1f} s", style="red"))
     for part, option in _OPTIONS.items():
         if error := status["parts"].get(part, {}).get("error"):
             lines.append(Text(f"{option} does not work: {error}", style="red"))

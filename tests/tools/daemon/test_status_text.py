@@ -137,6 +137,17 @@ def test_of_a_dead_loop_nothing_is_told_as_if_it_were_known(
     assert power in death_text(status | told) and "next: `cdpr stop`" in death_text(status)
 
 
+def test_a_loop_that_hangs_is_told_before_all_that_is_of_the_time_before() -> None:
+    status = status_of(program="hold") | {"driving": True, "loop": {"silent_s": 13.6}}
+    lines = [str(line) for line in status_text(status).renderables[:-1]]
+    assert lines[1] == "the loop has not turned for 13.6 s: what follows is of then"
+    assert lines[2].startswith("drives that had power stop by themselves")
+    # in lockstep the simulated drives' time stands with it
+    lines = [str(line) for line in status_text(status | {"lockstep": True}).renderables[:-1]]
+    assert lines[1].startswith("the loop has not turned")
+    assert not any("by themselves" in line for line in lines)
+
+
 def test_a_stop_under_way_has_a_reason_also_where_the_loop_gives_none() -> None:
     class Stopping:
         def get(self, path: str) -> dict[str, Any]:
