@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 import shutil
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -268,6 +269,46 @@ def test_no_platform_is_dropped_by_a_word(healthy: LockstepRobot) -> None:
     with pytest.raises(WorkFailedError, match="the platform hangs on its cables; lower it first"):
         healthy.program("idle")
     assert healthy.loop.engine.program.name == "pose"
+
+
+def test_lengths_that_an_index_contradicts_neither_move_the_platform_nor_are_kept(
+    planar: Path, tmp_path: Path
+) -> None:
+    with LockstepRobot(planar) as robot:
+        last, machine = robot.loop.engine.parts.last_stop, robot.loop.engine.parts.estimator
+        assert last is not None
+        last.path = tmp_path / "lengths.json"
+        aloft(robot)
+        robot.carry_out("lower", 30.0)
+        robot.command("disable")
+        machine.forget_lengths()
+        last.take()
+        last.load(3, 3.0)
+        assert last.lengths is not None
+        # as if a motor had been turned by hand meanwhile, by 44 deg, which is 20 mm of cable
+        turned_m = np.array([0.0, 0.02, 0.0])
+        elsewhere = last.lengths.cable_at_index_m + turned_m
+        last.lengths = replace(last.lengths, cable_at_index_m=elsewhere)
+        robot.enable()
+        told = "cable 2: its motor's index is 20.* mm from where the last stop has it"
+        with pytest.raises(WorkFailedError, match=told):
+            robot.carry_out("tighten", 30.0, **{"from": "last"})
+        with pytest.raises(WorkFailedError, match=told):
+            robot.program("pose", position_m=list(HIGH))
+        with pytest.raises(WorkFailedError, match=told):
+            robot.program("tighten")
+        robot.carry_out("lower", 30.0)
+        with pytest.raises(WorkFailedError, match=told):
+            robot.program("tighten")
+        robot.command("disable")
+        last.lengths = None
+        last.load(3, 3.0)
+        assert last.lengths is None and last.displaced
+        aloft(robot, **{"from": "home"})
+        assert robot.truth()["position_m"][:2] == pytest.approx(HIGH, abs=0.01)
+        robot.shut_down()
+        last.load(3, 3.0)
+        assert last.lengths is not None and not last.displaced
 
 
 def test_a_stop_leaves_the_next_start_its_lengths_and_the_platform_on_its_stand(

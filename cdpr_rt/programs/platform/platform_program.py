@@ -158,6 +158,7 @@ class PlatformParts:
     def forget(self) -> None:
         """Forget where the platform is, as if it stood at home."""
         self.tight = self.last_stop.displaced = self.last_stop.fallen = False
+        self.last_stop.contradicted = ""
         self.estimator.forget_lengths()
         self.control.reset()
         self.follow_origins()
@@ -226,10 +227,11 @@ class PlatformProgram(CommandedProgram):
 
     def _require_pose(self) -> None:
         """Raise ProgramError where the platform is not to be moved to a pose."""
-        if self._parts.not_calibrated_reason:
-            why = {"why": self._parts.not_calibrated_reason}
+        parts = self._parts
+        if doubt := parts.not_calibrated_reason or parts.last_stop.contradicted:
+            why = {"why": doubt}
             raise ProgramError(CommandRefusal(RefusalCode.NOT_CALIBRATED, self.name, arguments=why))
-        if not self._parts.tight:
+        if not parts.tight:
             raise ProgramError(CommandRefusal(RefusalCode.NOT_TIGHT, self.name))
 
     @property

@@ -54,6 +54,8 @@ class LastLengths:
         """Reason why no lengths are known, "" where they are."""
         self.displaced = False
         """Whether the platform has been let go since, other than at home."""
+        self.contradicted = ""
+        """What contradicts the lengths that are in use, so that they are not kept; else empty."""
         self.fallen = False
         """Whether it hung, or may have, when the power was taken at once or a drive was lost."""
 
@@ -118,7 +120,7 @@ class LastLengths:
 
         Where they are not, and no cable has been wound since, those of the stop before are true.
         """
-        if estimate.length_known.all():
+        if estimate.length_known.all() and not self.contradicted:
             turned = feedback.index_rad - feedback.position_rad
             at_index = np.where(
                 feedback.index_known,

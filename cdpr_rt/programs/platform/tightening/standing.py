@@ -52,12 +52,13 @@ def source_refusal(
             "the platform was let go elsewhere, and where it stands is not known; stand it at home"
         )
         return bad_source(asked, why, "home")
-    if source == "lengths" and not parts.pose_known:
-        return bad_source(asked, "the cables' lengths are not known", "home")
+    if source == "lengths" and (last.contradicted or not parts.pose_known):
+        why = last.contradicted or "the cables' lengths are not known"
+        return bad_source(asked, why, "home")
     if source == "last" and last.lengths is None:
         return bad_source(asked, f"no lengths of the last stop: {last.why}")
     why = ""
-    if source == "home" and parts.pose_known and not parts.tight:
+    if source == "home" and parts.pose_known and not parts.tight and not last.contradicted:
         why = why_not_to_wind_in(parts, parts.estimator.estimate.cable_length_m)
     return bad_source(asked, why) if why else None
 

@@ -306,7 +306,8 @@ class TightenProgram(PlatformProgram):
         stopped, parts = self._parts.last_stop.lengths, self._parts
         if source == "last" and stopped is not None:
             return stopped.at(feedback.position_rad, self._cable)
-        return parts.estimator.estimate.cable_length_m if parts.pose_known else None
+        known = parts.pose_known and not parts.last_stop.contradicted
+        return parts.estimator.estimate.cable_length_m if known else None
 
     def _lengths(self, feedback: AxisFeedback) -> FloatArray:
         """Return the cables' lengths, (n,), as they are now."""
@@ -367,7 +368,7 @@ class TightenProgram(PlatformProgram):
             self._acceleration[:] = parts.acceleration
             self._speed[:] = parts.speeds(INDEX_m_s)
         else:
-            self._at_home.correct(self._feedback)
+            self._use_indices()
 
     def _needs_index(self) -> bool:
         """Whether an index is missing that compensation needs, or that checks the last lengths."""
@@ -387,15 +388,16 @@ class TightenProgram(PlatformProgram):
             if not found and not self._path:
                 self._failure = "a motor has not passed its index"
             if found:
-                self._at_home.correct(self._feedback)
-                self._failure = self._compare_indices()
+                self._use_indices()
         return False
 
-    def _compare_indices(self) -> str:
-        """Return which index contradicts the lengths of the last stop, or an empty text."""
-        if self._last is None:
-            return ""
-        parts = self._parts
-        length_m, allowed_m = parts.estimator.estimate.cable_length_m, parts.lengths_allowed_m
-        off_m = off_index_m(self._last, length_m, self._feedback, self._cable)
-        return index_disagreement(off_m, self._cable, allowed_m, parts.names)
+    def _use_indices(self) -> None:
+        """Correct the lengths by the indices; doubt those of the last stop where these differ."""
+        self._at_home.correct(self._feedback)
+        parts, last = self._parts, self._parts.last_stop
+        last.contradicted = ""
+        if self._last is not None:
+            length_m, allowed_m = parts.estimator.estimate.cable_length_m, parts.lengths_allowed_m
+            off_m = off_index_m(self._last, length_m, self._feedback, self._cable)
+            last.contradicted = index_disagreement(off_m, self._cable, allowed_m, parts.names)
+        self._failure, last.displaced = last.contradicted, bool(last.contradicted)
