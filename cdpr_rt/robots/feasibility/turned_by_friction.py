@@ -63,7 +63,7 @@ def turned_by_friction(
                 told = float(np.sqrt(np.linalg.inv(J.T @ J)[i, i])) * 1e-3
                 text = (
                     f"friction of {friction_N.max():.2g} N, usual in such winches, turns the "
-                    f"platform by {math.degrees(turned[i]):.2g} deg about {_name(model, i)} until "
+                    f"platform by {math.degrees(turned[i]):.2g} deg{_about(model, i)} until "
                     f"the control overcomes it (1 mm in each cable is {math.degrees(told):.2g} "
                     f"deg); at {point_text(q[:k])} m the cables hold it turned by up to "
                     f"{math.degrees(share * turned[i]):.2g} deg: anchor points that turn it with "
@@ -72,8 +72,9 @@ def turned_by_friction(
     return text
 
 
-def _name(model: PlatformModel, i: int) -> str:
-    return [name for name in DIRECTIONS[model.positions] if name in model.platform.controlled][i]
+def _about(model: PlatformModel, i: int) -> str:
+    names = [name for name in DIRECTIONS[model.positions] if name in model.platform.controlled]
+    return "" if model.platform.is_planar else f" about {names[i]}"
 
 
 def _held_share(

@@ -390,3 +390,10 @@ def test_friction_that_turns_a_platform_over_is_told(tmp_path: Path) -> None:
     assert held < turned and 0.8 < per_mm < 1.2
     # longer arms, by which cables tell the rotation and hold it
     assert "axes[0].anchor_point_m" not in findings_of(tmp_path, on_seven(0.36, "winch-300n"))
+
+
+def test_friction_that_turns_a_plate_over_names_no_axis_in_a_plane(tmp_path: Path) -> None:
+    plate = (SHIPPED / "robots" / "planar-4.toml").read_text()
+    text = plate.replace("anchor_point_m = [-0.2, -0.1]", "anchor_point_m = [0.0, 0.0]")
+    told = findings_of(tmp_path, text)["axes[0].anchor_point_m"]
+    assert re.search(r"turns the platform by [\d.]+ deg until the control overcomes it", told)
