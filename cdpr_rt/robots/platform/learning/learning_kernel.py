@@ -48,9 +48,9 @@ def write_learnt(
 ) -> None:
     """Write φ into `terms` (n, 3), and the torques (n,) that make up for what was learnt.
 
-    `reference` (n,) is the wanted speed of the motors, `most` (2, n) what friction and cogging are
-    at most. A little of the friction is left: with too much of it made up for, the platform
-    would run ahead.
+    `reference` (n,) is the wanted speed of the motors, `most` (3, n) what friction, cogging, and
+    both together are at most. A little of the friction is left: with too much of it made up for,
+    the platform would run ahead.
     """
     for i in range(torque.size):
         angle = pole_pairs[i] * (theta[i] + settings[LATENCY] * omega[i])
@@ -60,8 +60,8 @@ def write_learnt(
         sine, cosine = x[TERMS * i + 1], x[TERMS * i + 2]
         size = math.sqrt(sine * sine + cosine * cosine)
         share = 1.0 if size <= most[1, i] else most[1, i] / size
-        torque[i] = friction * terms[i, 0]
-        torque[i] += share * (sine * terms[i, 1] + cosine * terms[i, 2])
+        both = friction * terms[i, 0] + share * (sine * terms[i, 1] + cosine * terms[i, 2])
+        torque[i] = min(max(both, -most[2, i]), most[2, i])
 
 
 @jit
@@ -86,7 +86,7 @@ def learn(
 ) -> int:
     """Take in one cycle: `x` (m,) and their covariance `P` (m, m); return the next direction.
 
-    `most` (2, n) bounds friction and cogging. Of M (d, d) the lower half counts. `usable` is
+    `most` (3, n) bounds friction and cogging. Of M (d, d) the lower half counts. `usable` is
     whether the force was exerted. Where it was not, no motor has to turn, or neither friction nor
     cogging can be what is seen, nothing is learnt. `scratch` (2, m) is overwritten.
     """

@@ -23,6 +23,8 @@ WRENCH_SHARE, NOISE_SHARE = 0.25, 0.09
 """What the platform's wrench is off, and one cycle's equation, over the cables' rated tension."""
 REVERSAL_rad_s = 0.1
 MOTORS_FADING_S, WRENCH_FADING_S = 600.0, 30.0
+_UNSURE = 2.0
+"""By how many of its standard deviations friction in motion may be above what was found at rest."""
 _SETTLING_S = 0.3
 """Nothing is learnt after a change of programs, whose torques are handed over meanwhile."""
 
@@ -63,9 +65,9 @@ class MotorLearning:
             MOST_SHARE * rated_Nm, MOST_RESERVE_SHARE * reserve_N * np.abs(cable)
         )
         self._largest_Nm = MOST_SHARE * rated_Nm
-        self._together_Nm = 2.0 * MOST_RESERVE_SHARE * reserve_N * np.abs(cable)
-        self.most_Nm = np.zeros((2, n))
-        """What friction and cogging of each motor are at most, (2, n)."""
+        self.most_Nm = np.zeros((3, n))
+        """What friction, cogging, and both together of each motor are at most, (3, n)."""
+        self.most_Nm[2] = 2.0 * MOST_RESERVE_SHARE * reserve_N * np.abs(cable)
         self._x, self._P = np.zeros(m), np.zeros((m, m))
         self._terms, self._filters = np.zeros((n, kernel.TERMS)), np.zeros(4 * n + 2 * d)
         self._direction = 0
@@ -115,7 +117,7 @@ class MotorLearning:
     def forget(self) -> None:
         """Forget what was learnt, as where the encoders have begun anew."""
         self.restart()
-        self.most_Nm[:] = self._usual_Nm
+        self.most_Nm[:2] = self._usual_Nm
         self._x[:] = 0.0
         self._P[:] = np.diag(self._states[kernel.SIGMA] ** 2)
 
@@ -123,15 +125,16 @@ class MotorLearning:
         """Begin with what was `found` (n,) at rest of motors of which nothing is known yet.
 
         `torque_Nm` (n, 3) are friction, sine and cosine of the cogging, `covariance` (n, 3, 3).
-        Friction that was found may take what cogging leaves of what both are at most together.
+        Friction may be as much as was found and what that is unsure by, within what both are at
+        most together: a motor that all but stands tells what it rubs elsewhere, and loaded
+        otherwise, to a quarter at best.
         """
         terms = self._x[: kernel.TERMS * found.size].reshape(-1, kernel.TERMS)
         found = found & ~terms.any(axis=1)  # what was learnt in motion is better
-        friction, cogging = torque_Nm[:, 0], np.hypot(torque_Nm[:, 1], torque_Nm[:, 2])
-        left = np.minimum(self._together_Nm - cogging, self._largest_Nm)
-        most, room = self.most_Nm, np.maximum(np.minimum(friction, left), self._usual_Nm)
-        most[0] = np.where(found, room, most[0])
-        most[1] = np.where(found, np.minimum(self._usual_Nm, self._together_Nm - room), most[1])
+        friction = torque_Nm[:, 0] + _UNSURE * np.sqrt(covariance[:, 0, 0])
+        most = self.most_Nm
+        room = np.maximum(np.minimum(friction, self._largest_Nm), self._usual_Nm)
+        most[0] = np.where(found, np.minimum(room, most[2]), most[0])
         bounds = most[[0, 1, 1]].T
         for i in np.flatnonzero(found):
             motor = slice(kernel.TERMS * i, kernel.TERMS * (i + 1))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -69,6 +70,39 @@ def test_friction_is_found_from_the_force_that_it_takes() -> None:
             bound.run(1, 3.0 * signs)
     np.testing.assert_allclose(bound.learning.friction_Nm, true, atol=0.02)
     assert np.abs(bound.learning.cogging_Nm).max() < 0.02
+
+
+@pytest.mark.parametrize(("true_Nm", "learnt_Nm"), [(0.15, 0.15), (0.3, 0.2)])
+def test_friction_in_motion_may_be_above_what_was_found_at_rest(
+    true_Nm: float, learnt_Nm: float
+) -> None:
+    """By twice what that is unsure by: a motor that all but stands does not tell all of it."""
+    bound = Bound(reserve_N=16.0)  # of which a third are 0.14 Nm
+    found, covariance = np.array([0.1, 0.0, 0.0]), np.diag([0.05, 0.01, 0.01]) ** 2
+    everyone = np.ones(N, np.bool_)
+    bound.learning.begin_with(everyone, np.tile(found, (N, 1)), np.tile(covariance, (N, 1, 1)))
+    cable = np.array([axis.winch.cable_m_per_motor_rad for axis in ROBOT.axes])
+    for k in range(60):  # every combination of directions of turning, again and again
+        signs = np.where(np.array([k, k // 2, k // 4]) % 2, 1.0, -1.0)
+        for _ in range(400):
+            missing = true_Nm * signs - bound.learning.torque_Nm
+            bound.force[:] = bound.J.T @ (missing / cable)
+            bound.run(1, 3.0 * signs)
+    np.testing.assert_allclose(bound.learning.friction_Nm, learnt_Nm, atol=0.02)
+
+
+def test_friction_and_cogging_together_leave_the_tensions_a_third_of_their_reserve() -> None:
+    bound, reserve_N = Bound(reserve_N=16.0), 16.0
+    cable = np.array([abs(axis.winch.cable_m_per_motor_rad) for axis in ROBOT.axes])
+    third_Nm = reserve_N / 3.0 * cable
+    everyone, covariance = np.ones(N, np.bool_), np.tile(np.eye(3), (N, 1, 1))
+    found = np.stack([1.5 * third_Nm, 0.9 * third_Nm, np.zeros(N)], axis=-1)
+    bound.learning.begin_with(everyone, found, covariance)
+    largest_Nm = np.zeros(N)
+    for _ in range(800):  # over more than a period of the cogging
+        bound.run(1, np.full(N, 3.0), usable=False)
+        largest_Nm = np.maximum(largest_Nm, np.abs(bound.learning.torque_Nm))
+    np.testing.assert_allclose(largest_Nm, 2.0 * third_Nm, rtol=1e-9)
 
 
 def test_what_is_added_leaves_the_tensions_their_reserve() -> None:
