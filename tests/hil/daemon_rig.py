@@ -122,7 +122,7 @@ class RealDaemon:
     def connection(self) -> httpx.Client:
         """Return another connection to its control interface."""
         transport = httpx.HTTPTransport(uds=str(self.socket))
-        return httpx.Client(transport=transport, base_url="http://localhost", timeout=20.0)
+        return httpx.Client(transport=transport, base_url="http://localhost", timeout=PATIENCE_S)
 
     def _first_line(self) -> str:
         assert self.process.stdout is not None

@@ -220,13 +220,18 @@ def test_the_cause_is_told_before_what_follows_from_it(bus: str) -> None:
 
 def test_a_drive_that_goes_off_by_itself_is_not_enabled_again(rig: Rig) -> None:
     rig.enable()
-    with can.Bus(interface="simbus", channel=rig.bus[7:]) as other:
+    with (
+        can.Bus(interface="simbus", channel=rig.bus[7:]) as other,
+        can.Bus(interface="simbus", channel=rig.bus[7:]) as third,
+    ):
         rig.cycle()
         # somebody else's controlword comes after ours, and both before the next SYNC
         while (heard := other.recv(60.0)) is not None and heard.arbitration_id != 0x201:
             pass
         other.send(can.Message(arbitration_id=0x201, data=bytes(4), is_extended_id=False))
-        time.sleep(0.05)
+        while (heard := third.recv(60.0)) is not None and heard.data != bytes(4):
+            pass
+        assert heard is not None
         text, _ = rig.until_alarm(0.1)
     assert "left operation enabled by itself" in text
     rig.run(0.1, alarms=True)
@@ -278,8 +283,8 @@ def test_a_simulator_that_stands_for_a_while_changes_nothing() -> None:
             rig.enable()
             simulator.process.send_signal(signal.SIGSTOP)
             go_on = (simulator.process.send_signal, [signal.SIGCONT])
-            threading.Timer(1.5, *go_on).start()  # longer than any time-out of a drive
             stopped = time.monotonic()
+            threading.Timer(1.5, *go_on).start()  # longer than any time-out of a drive
             rig.run(0.5)
             assert time.monotonic() - stopped > 1.4
             assert rig.group.reached(State.OPERATION_ENABLED)

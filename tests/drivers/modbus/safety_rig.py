@@ -23,7 +23,7 @@ from cdpr_sim_bus.physics_board import PhysicsBoard
 CLOCK = PacedClock()
 """Whoever waits by it has the devices asked meanwhile."""
 PANEL = 247
-DEADLINE_S = 10.0
+DEADLINE_S = 60.0
 
 
 class SafetyIoProcess:
@@ -35,7 +35,7 @@ class SafetyIoProcess:
         self.ready = ready(self.process)
         self.port = int(self.ready["port"])
         self.reference = f"{profile}@127.0.0.1:{self.port}"
-        self._client = ModbusTcpClient("127.0.0.1", port=self.port, timeout=5)
+        self._client = ModbusTcpClient("127.0.0.1", port=self.port, timeout=60)
 
     def profile(self, **changes: Any) -> SafetyIoProfile:
         return load_safety_io(self.reference).model_copy(update=changes)
@@ -90,12 +90,19 @@ def wait_until(done: Callable[[], object], timeout_s: float = DEADLINE_S) -> flo
     return CLOCK.now_s - began_s
 
 
-def patient_profile(folder: Path, watchdog_s: float = 1.0) -> Path:
+def patient_profile(
+    folder: Path,
+    watchdog_s: float = 1.0,
+    answer_s: float = 0.2,
+    trip_s: float = 0.4,
+    follow_s: float = 0.3,
+) -> Path:
     """Return the shipped profile with times that suit a busy machine."""
     text = (SHIPPED / "safety_io" / "modbus-remote-io.toml").read_text()
-    for key, value in (("answer_timeout_s", 0.2), ("trip_timeout_s", 0.4)):
+    for key, value in (("answer_timeout_s", answer_s), ("trip_timeout_s", trip_s)):
         line = next(line for line in text.splitlines() if line.startswith(key))
         text = text.replace(line, f"{key} = {value}")
+    text = text.replace("\ntimeout_s = 0.3", f"\ntimeout_s = {follow_s}")
     text = text.replace("timeout_s = 0.5", f"timeout_s = {watchdog_s}")
     path = folder / "io.toml"
     path.write_text(text)
@@ -115,12 +122,17 @@ def board_file() -> Iterator[Path]:
 def io_device_on_board(
     folder: Path, axes: int = 2
 ) -> Iterator[tuple[SafetyIoProcess, PhysicsBoard]]:
-    """A simulated I/O whose board is the test's own, with limit switches at -90 and 90 deg."""
+    """A simulated I/O whose board is the test's own, with limit switches at -90 and 90 deg.
+
+    Whoever wants to see a time-out asks for a short one.
+    """
     plant = folder / "safety-plant.toml"
     switches = "[[axes]]\nlimit_negative_deg = -90.0\nlimit_positive_deg = 90.0\n"
     plant.write_text(switches)
     with board_file() as path, PhysicsBoard.create(path, axes) as board:
-        io_device = SafetyIoProcess(patient_profile(folder), "--board", path, "--plant", plant)
+        io_device = SafetyIoProcess(
+            patient_profile(folder, 60.0, 5.0, 5.0, 1.5), "--board", path, "--plant", plant
+        )
         try:
             yield io_device, board
         finally:

@@ -64,7 +64,7 @@ def device() -> Iterator[Babbler]:
 
 @pytest.fixture
 def client(device: Babbler) -> Iterator[ModbusTcp]:
-    opened = ModbusTcp("127.0.0.1", device.port, 1, 0.1, PacedClock())
+    opened = ModbusTcp("127.0.0.1", device.port, 1, 60.0, PacedClock())
     yield opened
     opened.close()
 

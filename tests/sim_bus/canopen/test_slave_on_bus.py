@@ -49,6 +49,7 @@ def site(request: pytest.FixtureRequest) -> Iterator[Site]:
     remote = network.add_node(NODE, str(GENERIC_EDS))
     try:
         thread.start()
+        remote.sdo.RESPONSE_TIMEOUT = 60.0
         network.connect(interface="simbus", channel=name)
         # the first frame on the bus is what the slave is switched on with
         assert remote.sdo[0x1000].raw

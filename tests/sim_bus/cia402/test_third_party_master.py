@@ -27,6 +27,11 @@ serve([drive], "simbus:" + sys.argv[1], mode=ClockMode(sys.argv[2]), until_stdin
 """
 
 
+LONGEST_S = 60.0
+PATIENCES = ("RESET_FAULT", "SWITCH_OP_MODE", "SWITCH_STATE_FINAL")
+"""What the package waits for, for parts of a second only."""
+
+
 @pytest.fixture(params=["paced", "lockstep"])
 def node(request: pytest.FixtureRequest) -> Iterator[BaseNode402]:
     name = f"third-party-{request.param}-{os.getpid()}"
@@ -41,6 +46,9 @@ def node(request: pytest.FixtureRequest) -> Iterator[BaseNode402]:
     try:
         network.connect(interface="simbus", channel=name)
         node = BaseNode402(NODE, str(EDS))
+        node.sdo.RESPONSE_TIMEOUT = LONGEST_S
+        for name in PATIENCES:
+            setattr(node, f"TIMEOUT_{name}", LONGEST_S)
         network.add_node(node)
         start(node)
         yield node
@@ -106,7 +114,7 @@ def test_boots_enables_homes_faults_and_resets(node: BaseNode402) -> None:
     assert not node.is_homed()
     node.sdo[0x6098].raw = 34
     node.sdo[0x6099][2].raw = 8192
-    assert node.homing(timeout=10)
+    assert node.homing(timeout=LONGEST_S)
     assert node.is_homed()
     # The zero is where the index is: 123.4° from where the rotor stood.
     # The two are read one after the other, so the rotor must have come to rest.
@@ -137,7 +145,7 @@ def test_moves_a_profile_position(node: BaseNode402) -> None:
 
 
 def test_lost_heartbeat_is_a_fault(node: BaseNode402) -> None:
-    node.sdo[0x1016][1].raw = 127 << 16 | 500  # ten times the gap: a busy machine is no fault
+    node.sdo[0x1016][1].raw = 127 << 16 | 4000  # 80 times the gap: a busy machine is no fault
     node.op_mode = "CYCLIC SYNCHRONOUS TORQUE"
     node.state = "OPERATION ENABLED"
     for _ in range(10):

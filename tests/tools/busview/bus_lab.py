@@ -55,7 +55,7 @@ class Lab:
         with self.join() as other:
             other.send(MARK)
         messages = []
-        while (message := ear.recv(10.0)) is not None and message.arbitration_id != 0x7FE:
+        while (message := ear.recv(60.0)) is not None and message.arbitration_id != 0x7FE:
             messages.append(message)
         assert message is not None
         return messages

@@ -29,8 +29,10 @@ NAME = "stand-in"
 def main(folder: Path) -> int:
     launcher.LOOP, launcher.SERVICE = "stand_in_loop", "stand_in_service"  # type: ignore[misc]
     launcher._RESTART_S = (0.1, 0.1, 0.1)  # type: ignore[misc]
-    launcher._LOOP_STALLED_S = launcher._SERVICE_STALLED_S = 1.0  # type: ignore[misc]
     plan = json.loads((folder / "plan.json").read_text())
+    stalled_s = plan.get("stalled_s", 60.0)
+    launcher._LOOP_STALLED_S = launcher._SERVICE_STALLED_S = stalled_s  # type: ignore[misc]
+    launcher._SAME_PRESS_S = plan.get("same_press_s", 0.2)  # type: ignore[misc]
     launcher._SERVICE_START_S = plan.get("service_start_s", 60.0)  # type: ignore[misc]
     block = SharedBlock.create(1, 0.1, 100.0)
     settings = RunSettings(

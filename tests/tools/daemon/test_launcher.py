@@ -22,6 +22,7 @@ from cdpr_tools.daemon.loop_file import LoopFile
 pytestmark = pytest.mark.long
 
 TIMEOUT_S = 60.0
+SAME_PRESS_S = 2.0
 
 
 class Daemon:
@@ -70,16 +71,32 @@ class Daemon:
                 while True:
                     other.sendto(b"X_OTHER=1", str(self.folder / "notify"))
 
+    def feeds(self, times: int = 2) -> None:
+        """Wait until the watchdog has been fed so often, counted from now on."""
+        self.drain()
+        for _ in range(times):
+            self.heard("WATCHDOG=1")
+
+    def drain(self) -> int:
+        """Take what systemd has not read yet; return how often the watchdog was fed in it."""
+        count = 0
+        self.manager.settimeout(0.0)
+        with suppress(BlockingIOError):
+            while True:
+                count += self.manager.recv(4096) == b"WATCHDOG=1"
+        return count
+
     def fed(self, seconds: float) -> int:
         """Return how often the watchdog is fed within `seconds`."""
-        count, end = 0, time.monotonic() + seconds
-        while (left := end - time.monotonic()) > 0.0:
-            self.manager.settimeout(left)
-            try:
-                count += self.manager.recv(4096) == b"WATCHDOG=1"
-            except TimeoutError:
-                break
-        return count
+        self.drain()
+        time.sleep(seconds)
+        return self.drain()
+
+    def starves(self) -> None:
+        """Wait until the watchdog is not fed any more."""
+        end = time.monotonic() + TIMEOUT_S
+        while self.fed(0.6):
+            assert time.monotonic() < end
 
     def pid(self, who: str) -> int:
         return int((self.folder / f"{who}.pid").read_text())
@@ -155,7 +172,7 @@ def test_what_systemd_has_no_room_for_is_told_until_it_is_taken(start: Start) ->
     told = daemon.heard("STATUS=fault: left: too fast")
     assert told.count("READY=1") == 1
     assert "STATUS=ready" not in told  # only the newest is worth a word
-    assert daemon.fed(0.8) >= 2
+    daemon.feeds()
     daemon.stuff()
     daemon.process.terminate()
     daemon.heard("STOPPING=1")
@@ -169,7 +186,7 @@ def test_what_systemd_has_no_room_for_is_told_until_it_is_taken(start: Start) ->
 def test_a_service_that_dies_or_hangs_is_started_again_and_the_loop_goes_on(
     start: Start, number: signal.Signals, told: str
 ) -> None:
-    daemon = start()
+    daemon = start({"stalled_s": 1.0 if number == signal.SIGSTOP else 60.0})
     daemon.line("ready")
     loop, service = daemon.pid("loop"), daemon.pid("service")
     os.kill(service, number)
@@ -238,42 +255,39 @@ def test_a_fault_is_told_with_its_reason_once(start: Start) -> None:
 
 
 def test_the_watchdog_is_fed_while_the_loop_turns_and_no_longer(start: Start) -> None:
-    daemon = start(watchdog_s=0.4)
+    daemon = start({"stalled_s": 1.0}, watchdog_s=0.4)
     daemon.line("ready")
-    assert daemon.fed(0.8) >= 2
+    daemon.feeds()
     loop = daemon.pid("loop")
     os.kill(loop, signal.SIGSTOP)
     assert "has not turned" in daemon.line("told")["told"]
-    daemon.fed(0.1)
-    assert daemon.fed(0.6) == 0
+    daemon.starves()
     os.kill(loop, signal.SIGCONT)
     assert "turns again" in daemon.line("told")["told"]
-    assert daemon.fed(0.8) >= 2
+    daemon.feeds()
 
 
 def test_in_lockstep_a_loop_that_stands_still_is_nothing_to_tell(start: Start) -> None:
-    daemon = start({"status": {"lockstep": True}}, watchdog_s=0.4)
+    daemon = start({"status": {"lockstep": True}, "stalled_s": 1.0}, watchdog_s=0.4)
     daemon.line("ready")
     loop = daemon.pid("loop")
     os.kill(loop, signal.SIGSTOP)
-    assert daemon.fed(1.4) > 0
-    assert daemon.fed(0.6) == 0  # it has been seen to stand still
+    daemon.heard("WATCHDOG=1")
+    daemon.starves()  # it has been seen to stand still
     os.kill(loop, signal.SIGCONT)
-    assert daemon.fed(0.8) >= 2
+    daemon.feeds()
     (daemon.folder / "fault").touch()
     assert daemon.line("told")["told"] == "fault: left: too fast", "and nothing before it"
 
 
 def test_a_loop_that_hangs_does_not_keep_the_daemon_from_ending(start: Start) -> None:
-    daemon = start()
+    daemon = start({"stalled_s": 1.0})
     daemon.line("ready")
     os.kill(daemon.pid("loop"), signal.SIGSTOP)
     assert "has not turned" in daemon.line("told")["told"]
-    began = time.monotonic()
     daemon.process.terminate()
     assert "was killed" in daemon.line("reason")["reason"]
     assert daemon.ends() == 1
-    assert time.monotonic() - began < 15.0
     assert daemon.log() == ["service stopped"]
 
 
@@ -281,7 +295,7 @@ def test_a_loop_that_hangs_does_not_keep_the_daemon_from_ending(start: Start) ->
 def test_a_second_request_to_end_takes_the_power_at_once(
     start: Start, number: signal.Signals
 ) -> None:
-    daemon = start({"stopping_s": 30.0, "lowering_s": 20.0})
+    daemon = start({"stopping_s": 600.0, "lowering_s": 20.0, "same_press_s": SAME_PRESS_S})
     daemon.line("ready")
     daemon.process.send_signal(number)
     daemon.process.send_signal(number)  # passed on by a program in between, it is the same one
@@ -289,7 +303,7 @@ def test_a_second_request_to_end_takes_the_power_at_once(
     assert "the platform is let down" in told
     assert "up to 50 s" in told
     assert "A second Ctrl-C takes the power at once" in told
-    time.sleep(0.5)
+    time.sleep(1.5 * SAME_PRESS_S)
     daemon.process.send_signal(signal.SIGHUP)  # a terminal that closes is not impatient
     time.sleep(0.5)
     assert not (daemon.folder / "log").exists()

@@ -18,7 +18,7 @@ from tests.tools.robot_rig import robot_file, simulated
 
 PERIOD_S = 2e-3
 JOG = {"program": "jog", "wanted": {"velocity_rad_s": [0.5], "timeout_s": 2.0}}
-WAIT_S = 20.0
+WAIT_S = 600.0
 
 
 @pytest.fixture(scope="module")
