@@ -21,11 +21,11 @@ def by_prompt(mass_kg: float, clock: Clock) -> None:
     Only Enter alone raises the mass: who types a word wants something else.
     """
     ending = (signal.SIGINT, signal.SIGTERM)
-    before = {number: signal.signal(number, signal.default_int_handler) for number in ending}
     question = (
         f"Hang {mass_kg:g} kg on the cable, standing on its support, take up the slack, and "
         "press Enter (Ctrl-C ends)"
     )
+    before = {number: signal.signal(number, signal.default_int_handler) for number in ending}
     try:
         # a person takes their time; the safety I/O is asked meanwhile
         while clock.run_blocking(partial(_typed, question)):

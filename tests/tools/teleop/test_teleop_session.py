@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -31,7 +32,7 @@ class Robot:
     def __init__(self) -> None:
         self.block = SharedBlock.create(3, 0.1, 1000.0)
         self.lease = Lease(PublishedRight(self.block))
-        self.token = self.lease.take("the operator", 2.0)
+        self.token = self.lease.take("the operator", 10.0)
         self.stream = SetpointStream(self.block, self.lease, listen_udp("127.0.0.1", 0))
         self.stream.start()
         self.run(POSE)
@@ -59,21 +60,31 @@ def robot() -> Iterator[Robot]:
 
 
 def teleoperate(
-    robot: Robot, device: InputDevice, after: tuple[float, Callable[[], None]] | None = None
+    robot: Robot, device: InputDevice, then: Callable[[], None] | None = None
 ) -> tuple[TeleopSession, End]:
-    """Lead to the end; have something happen after some seconds."""
-    timer = threading.Timer(*after) if after else None
+    """Lead to the end; have something happen once the hand leads."""
     given = robot.stream.sessions.issue(robot.token)
     with StreamClient(*robot.stream.address, given) as stream:
         session = TeleopSession(stream, device, SCALE, POSE)
-        if timer:
-            timer.start()
+        deadline_s = time.monotonic() + 120.0
+
+        def too_late() -> bool:
+            return time.monotonic() > deadline_s
+
+        def happen() -> None:
+            while not (session.leading or too_late()):
+                time.sleep(0.01)
+            if then is not None:
+                then()
+
+        happening = threading.Thread(target=happen)
+        if then is not None:
+            happening.start()
         try:
-            deadline_s = time.monotonic() + 120.0
-            return session, session.teleoperate(lambda: time.monotonic() > deadline_s)
+            return session, session.teleoperate(too_late)
         finally:
-            if timer:
-                timer.join()
+            if then is not None:
+                happening.join()
 
 
 class Still:
@@ -91,6 +102,24 @@ class Still:
         pass
 
 
+class Unhurried:
+    """A hand whose time goes on by a sample's at most between two: nothing holds it up."""
+
+    def __init__(self, device: ScriptDevice) -> None:
+        self._device = device
+        self._before_s, self._now_s = math.nan, 0.0
+        self.hint = device.hint
+
+    def read(self, now_s: float) -> InputSample:
+        if not math.isnan(self._before_s):
+            self._now_s += min(now_s - self._before_s, 1.0 / 60.0)
+        self._before_s = now_s
+        return self._device.read(self._now_s)
+
+    def close(self) -> None:
+        self._device.close()
+
+
 def test_what_the_hand_does_reaches_the_loop_and_its_answer_the_hand(robot: Robot) -> None:
     lines = (
         ScriptLine(0.0, (0.0, 0.0, 0.0)),
@@ -98,7 +127,7 @@ def test_what_the_hand_does_reaches_the_loop_and_its_answer_the_hand(robot: Robo
         ScriptLine(0.3, (0.01, -0.02, 0.0), (0.0, 0.4, 0.0), clutch=True),
         ScriptLine(0.4, (0.0, 0.0, 0.0), confirm=True),
     )
-    session, end = teleoperate(robot, ScriptDevice(lines))
+    session, end = teleoperate(robot, Unhurried(ScriptDevice(lines)))
     assert (end.failed, end.text) == (False, "the script is done")
     samples = robot.samples()
     assert np.all(samples["scale"] == SCALE)
@@ -119,36 +148,36 @@ def test_what_the_hand_does_reaches_the_loop_and_its_answer_the_hand(robot: Robo
 
 
 def test_a_hand_in_trouble_does_not_lead(robot: Robot) -> None:
-    session, _ = teleoperate(robot, Still("its cable is loose"), (0.4, lambda: robot.run(IDLE)))
+    session, _ = teleoperate(robot, Still("its cable is loose"), lambda: robot.run(IDLE))
     assert session.leading
     assert np.all(robot.samples()["buttons"] & CLUTCH)
 
 
 def test_a_program_that_has_ended_ends_it(robot: Robot) -> None:
-    session, end = teleoperate(robot, Still(), (0.3, lambda: robot.run(IDLE)))
+    session, end = teleoperate(robot, Still(), lambda: robot.run(IDLE))
     assert end.failed and end.text == "the robot does not follow the stream any more"
     assert session.leading
 
 
 def test_a_fault_ends_it(robot: Robot) -> None:
-    _, end = teleoperate(robot, Still(), (0.3, lambda: robot.run(POSE, LoopState.FAULT)))
+    _, end = teleoperate(robot, Still(), lambda: robot.run(POSE, LoopState.FAULT))
     assert end.failed
 
 
 def test_a_right_that_is_gone_ends_it(robot: Robot) -> None:
-    _, end = teleoperate(robot, Still(), (0.3, lambda: robot.lease.release(robot.token)))
+    _, end = teleoperate(robot, Still(), lambda: robot.lease.release(robot.token))
     assert end.failed and end.text.startswith("the right to move has ended")
 
 
 def test_a_robot_lost_on_its_way_to_the_end_of_a_script_is_told(robot: Robot) -> None:
     done = ScriptDevice((ScriptLine(0.0, (0.0, 0.0, 0.0)),))
-    _, end = teleoperate(robot, done, (0.3, lambda: robot.run(IDLE)))
+    _, end = teleoperate(robot, done, lambda: robot.run(IDLE))
     assert end.failed and end.text == "the robot does not follow the stream any more"
 
 
 def test_silence_ends_it(robot: Robot, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(session_module, "_SILENCE_S", 0.3)
-    _, end = teleoperate(robot, Still(), (0.3, robot.stream.stop))
+    _, end = teleoperate(robot, Still(), robot.stream.stop)
     assert end.failed and end.text == "the robot has not answered for 0.3 s"
     monkeypatch.setattr(session_module, "_GREET_S", 0.2)
     session, end = teleoperate(robot, Still())

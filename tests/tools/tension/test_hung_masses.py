@@ -16,8 +16,11 @@ import pytest
 from cdpr_rt.core.clock import Clock, LockstepClock, PacedClock
 from cdpr_rt.errors import InvalidRequestError
 from cdpr_rt.procedures.tension.masses import have_hung
+from cdpr_tools.tension import hanging
 from cdpr_tools.tension.hanging import by_prompt
 from tests.cdpr_rt.runtime.operating_rig import Inertias, powered
+
+LONGEST_S = 60.0
 
 
 @contextmanager
@@ -64,7 +67,7 @@ def test_a_question_left_open_does_not_spoil_the_end_of_the_process() -> None:
         assert process.stderr.read(9) == "Hang 5 kg"
         process.send_signal(signal.SIGINT)
         assert "nobody has hung 5 kg" in process.stdout.read()
-        assert process.wait(30) == 0
+        assert process.wait(60) == 0
 
 
 @pytest.mark.parametrize("clock", [LockstepClock, PacedClock])
@@ -73,10 +76,21 @@ def test_a_signal_ends_the_question(
     monkeypatch: pytest.MonkeyPatch, number: int, clock: Callable[[], Clock]
 ) -> None:
     outlet, inlet = os.pipe()
-    too_late = threading.Timer(10.0, os.write, (inlet, b"\n"))
-    sent = threading.Timer(0.1, os.kill, (os.getpid(), number))
+    asked, typed = threading.Event(), hanging._typed
+
+    def ask(question: str) -> str:
+        asked.set()
+        return typed(question)
+
+    def interrupt() -> None:
+        asked.wait(LONGEST_S)
+        os.kill(os.getpid(), number)
+
+    too_late = threading.Timer(LONGEST_S, os.write, (inlet, b"\n"))
+    sent = threading.Thread(target=interrupt)
     with os.fdopen(outlet) as answers, ignored(number):
         monkeypatch.setattr("sys.stdin", answers)
+        monkeypatch.setattr(hanging, "_typed", ask)
         too_late.start()
         sent.start()
         try:
@@ -90,7 +104,7 @@ def test_a_signal_ends_the_question(
 
 def test_a_signal_ends_the_question_while_cycles_run(monkeypatch: pytest.MonkeyPatch) -> None:
     outlet, inlet = os.pipe()
-    too_late = threading.Timer(10.0, os.write, (inlet, b"\n"))
+    too_late = threading.Timer(LONGEST_S, os.write, (inlet, b"\n"))
     with os.fdopen(outlet) as answers, ignored(signal.SIGINT), powered(Inertias(False)) as rig:
         monkeypatch.setattr("sys.stdin", answers)
         rig.operator.disable()

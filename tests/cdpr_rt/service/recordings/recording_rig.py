@@ -141,7 +141,7 @@ def stock_cycles(*paths: Path) -> list[int]:
     return [row["cycle"] for path in paths for _, row in stock_messages(path, "/cycle")]
 
 
-def wait_until(done: object, seconds: float = 20.0) -> None:
+def wait_until(done: object, seconds: float = 60.0) -> None:
     end = time.monotonic() + seconds
     while not done():  # type: ignore[operator]
         assert time.monotonic() < end
