@@ -50,7 +50,7 @@ class Lab:
         asked = [{"can_id": i + 1, "can_mask": 0x7FF} for i in (0x080, 0x580, 0x700)]
         self._network.bus.set_filters(asked)
         self.node = self._network.add_node(1, str(EDS))
-        self.node.sdo.RESPONSE_TIMEOUT = 5.0
+        self.node.sdo.RESPONSE_TIMEOUT = 60.0
 
     def reset(self) -> None:
         """Switch the drive off and on."""

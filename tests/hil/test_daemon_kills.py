@@ -99,7 +99,7 @@ def in_motion(daemon: RealDaemon) -> Iterator[Ear]:
     ear = Ear(daemon)
     try:
         try:
-            until(lambda: all(abs(speed_of(ear, n)) > 0.5 * SPEED_rad_s for n in NODES), 3.0)
+            until(lambda: all(abs(speed_of(ear, n)) > 0.5 * SPEED_rad_s for n in NODES))
         except AssertionError:
             raise AssertionError(f"no motion: {daemon.status()}") from None
         yield ear
@@ -153,9 +153,9 @@ def told_lost(ear: Ear, since_s: float) -> dict[int, float]:
 
 def expect_stop(ear: Ear, at_s: float) -> None:
     """Have the drives notice, within two heartbeats, that their master is gone, and let go."""
-    until(lambda: len(told_lost(ear, at_s)) == len(NODES), 5.0)
+    until(lambda: len(told_lost(ear, at_s)) == len(NODES))
     assert max(told_lost(ear, at_s).values()) < 2 * HEARTBEAT_S + SLACK_S
-    until(lambda: all(state in POWER_OFF for state in ask_drives(ear.bus)), 5.0)
+    until(lambda: all(state in POWER_OFF for state in ask_drives(ear.bus)))
     # nobody commands them meanwhile
     assert not ear.of(0x200 + NODES[0], at_s + SLACK_S)
 

@@ -54,7 +54,7 @@ def watch_live(daemon: RealDaemon) -> dict[str, Any]:
     url = until(lambda: daemon.status()["parts"]["live_view"]["url"])
     with connect(url, subprotocols=["foxglove.sdk.v1"]) as client:  # type: ignore[list-item]
         while True:
-            message = client.recv(timeout=20.0)
+            message = client.recv(timeout=60.0)
             if isinstance(message, bytes):
                 value: dict[str, Any] = json.loads(message[13:])
                 return value

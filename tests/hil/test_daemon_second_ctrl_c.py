@@ -29,7 +29,7 @@ MOST_S = 0.5
 def press_twice(daemon: RealDaemon) -> float:
     """Have it end, and lose patience while it does; return when that was."""
     daemon.process.send_signal(signal.SIGINT)
-    until(lambda: "A second Ctrl-C takes the power at once" in daemon.errors(), 5.0)
+    until(lambda: "A second Ctrl-C takes the power at once" in daemon.errors())
     time.sleep(0.3)  # less is one and the same press
     at_s = time.monotonic()
     daemon.process.send_signal(signal.SIGINT)

@@ -153,7 +153,7 @@ class Rails:
         return found
 
     def _modbus(self) -> ModbusTcpClient:
-        return ModbusTcpClient("127.0.0.1", port=self.modbus_port, timeout=5)
+        return ModbusTcpClient("127.0.0.1", port=self.modbus_port, timeout=60)
 
 
 @pytest.fixture(scope="module")
@@ -196,7 +196,7 @@ def await_motion(rails: Rails, kind: str, command: subprocess.Popen[str], past_m
         assert command.poll() is None, command.communicate()[1]
         return rails.position_m(kind) > past_m
 
-    wait_until(moves, 20)
+    wait_until(moves)
 
 
 def result(command: subprocess.Popen[str], status: int = 0) -> dict[str, Any]:
@@ -277,7 +277,7 @@ def test_a_winch_with_power_refuses_the_move_and_ends_it(rails: Rails) -> None:
     network.connect(interface="simbus", channel=bus)
     try:
         node = network.add_node(1, str(load_winch("winch-mpp0923d").drive.eds))
-        node.sdo.RESPONSE_TIMEOUT = 5.0
+        node.sdo.RESPONSE_TIMEOUT = 60.0
         slack = ("--cables-slack-checked", "--winch-bus", f"simbus:{bus}")
         command = rails.move("modbus", before + 0.5, *slack)
         await_motion(rails, "modbus", command, before + 0.005)
@@ -365,7 +365,7 @@ def test_the_emergency_stop_ends_a_move(rails: Rails) -> None:
     command = rails.move("cia402", before + 0.5)
     await_motion(rails, "cia402", command, before + 0.005)
     rails.io_device.press()
-    wait_until(lambda: rails.braked("cia402"), 2)
+    wait_until(lambda: rails.braked("cia402"))
     assert "the emergency-stop chain is open" in result(command, FAILED)["error"]
     rails.io_device.press(False)
     where = ["reset", "rail-cia402", "--bus", rails.bus, "--safety-io", rails.io_device.reference]

@@ -96,7 +96,7 @@ def winch(folder: Path, plant: str) -> Iterator[tuple[str, Path]]:
 
 def without_power(board: PhysicsBoard) -> None:
     """Wait for it: bus time stands still for half a second after the last SYNC."""
-    end = time.monotonic() + 10.0
+    end = time.monotonic() + 60.0
     while board.axis(0).state().power_on:
         assert time.monotonic() < end
         time.sleep(0.02)

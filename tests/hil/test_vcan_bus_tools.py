@@ -55,7 +55,7 @@ def test_scan_finds_a_third_partys_slave(slave: canopen.LocalNode) -> None:
 
 def frames_of(source: PythonCanSource, n: int) -> list[Frame]:
     found: list[Frame] = []
-    until = time.monotonic() + 5.0
+    until = time.monotonic() + 60.0
     while len(found) < n and time.monotonic() < until:
         source.receive(0.1)
         found += source.next_frames(100)
@@ -77,11 +77,12 @@ def test_monitor_sees_every_kind_of_frame_when_it_came() -> None:
         for frame in kinds:
             bus.send(frame.pack())
     found = frames_of(source, len(kinds))
+    after = time.time()
     source.close()
     assert [frame._replace(time_s=0.0) for frame in found] == kinds
     times = [frame.time_s for frame in found]
     assert times == sorted(times)
-    assert now - 0.1 < times[0] < now + 5.0
+    assert now - 0.1 < times[0] < after + 0.1
 
 
 def test_replay_sends_and_switches_off_at_the_end() -> None:

@@ -8,6 +8,7 @@ import fcntl
 import json
 import os
 import pty
+import select
 import signal
 import socket
 import struct
@@ -68,6 +69,7 @@ def test_the_kernel_stamps_when_a_frame_came() -> None:
     port.settimeout(60.0)
     before = time.time()
     peer.send(FRAME.pack(0x181, 0, b""))
+    assert select.select([port.fileno()], [], [], 60.0)[0]
     after = time.time()
     time.sleep(0.3)
     buffer = bytearray(16)
@@ -180,7 +182,7 @@ def test_a_full_transmit_queue_is_counted_and_told(stalled_adapter: tuple[int, s
         for _ in range(2000):
             port.send(frame)
     assert caught.value.errno == errno.ENOBUFS
-    assert time.monotonic() - started < 20.0
+    assert time.monotonic() - started < 300.0
     assert health.tx_full > 100
     assert f"transmit queue of {name} has been full" in str(port.lost(caught.value))
     counted = health.tx_full
@@ -192,7 +194,7 @@ def test_a_full_transmit_queue_is_counted_and_told(stalled_adapter: tuple[int, s
     assert told.startswith(f"socketcan:{name}: the transmit queue of {name} has been full for 1 s")
     # as soon as the adapter takes frames again the bus is usable
     os.set_blocking(host, False)
-    deadline = time.monotonic() + 5.0
+    deadline = time.monotonic() + 60.0
     while time.monotonic() < deadline:
         with contextlib.suppress(BlockingIOError):
             os.read(host, 65536)
