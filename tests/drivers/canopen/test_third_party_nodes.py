@@ -40,11 +40,16 @@ def stock(simulated_bus: str) -> Iterator[canopen.LocalNode]:
     del lean[0x1008]
     node = third_party.create_node(FOREIGN_NODE, lean)
 
-    def restart(_id: int, data: bytearray, _time: float) -> None:
-        if data[0] in (129, 130):
-            node.nmt.send_command(130)
-            node.nmt.state = "PRE-OPERATIONAL"  # it takes its heartbeats for boot-ups otherwise
+    def restart(can_id: int, data: bytearray, time_s: float) -> None:
+        if data[0] not in (129, 130):
+            node.nmt.on_command(can_id, data, time_s)
+            return
+        # between two threads one of its heartbeats would be a second boot-up message
+        node.nmt.stop_heartbeat()
+        node.nmt.send_command(130)
+        node.nmt.state = "PRE-OPERATIONAL"  # it takes its heartbeats for boot-ups otherwise
 
+    third_party.unsubscribe(0, node.nmt.on_command)
     third_party.subscribe(0, restart)
     node.nmt.state = "PRE-OPERATIONAL"
     try:
@@ -148,11 +153,13 @@ def test_a_transfer_that_goes_wrong_ends_with_a_reason(
     told: str,
 ) -> None:
     monkeypatch.setattr("cdpr_drivers.canopen.sdo._MOST_BYTES", 700)
-    monkeypatch.setattr("cdpr_drivers.canopen.sdo_access._TIMEOUT_S", 0.2)
+    waits = kind is SdoTimeoutError
+    monkeypatch.setattr("cdpr_drivers.canopen.sdo_access._TIMEOUT_S", 1.0 if waits else 60.0)
     with scripted(simulated_bus, FOREIGN_NODE, answer) as node:
         with pytest.raises(kind) as caught:
             network.read_bytes(FOREIGN_NODE, 0x1008)
         assert told in str(caught.value)
+        monkeypatch.setattr("cdpr_drivers.canopen.sdo_access._TIMEOUT_S", 60.0)
         node.answer = lambda request: [expedited(request, 4711)]
         assert network.read_int(FOREIGN_NODE, 0x1000) == 4711
 

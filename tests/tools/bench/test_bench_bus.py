@@ -34,7 +34,8 @@ def figures(result: subprocess.CompletedProcess[str]) -> dict[str, Any]:
 @pytest.mark.parametrize("way", ["ours", "python-can"])
 def test_each_way_on_each_bus(figures: dict[str, Any], bus: str, way: str) -> None:
     told = figures["buses"][bus][way]
-    assert told["frames_per_s"] > 100
+    mean_us = told["wall_us_per_frame"]["mean"]
+    assert told["frames_per_s"] == pytest.approx(1e6 / mean_us, rel=0.01)
     for key in ("cpu_us_per_frame", "wall_us_per_frame"):
         assert 0.0 < told[key]["p50"] <= told[key]["p99.9"]
 
@@ -49,7 +50,8 @@ def test_the_packed_path_is_the_cheaper_one(figures: dict[str, Any]) -> None:
     told = figures["buses"]["simbus"]
     ours, stock = (told[way]["cpu_us_per_frame"]["mean"] for way in ("ours", "python-can"))
     assert told["python_can_over_ours"] == pytest.approx(stock / ours, rel=0.05)
-    assert stock > ours
+    # of twenty exchanges one that is disturbed makes a mean of either
+    assert told["python-can"]["cpu_us_per_frame"]["p50"] > told["ours"]["cpu_us_per_frame"]["p50"]
 
 
 def test_the_table_has_a_line_for_each(

@@ -41,15 +41,18 @@ def test_a_loop_that_is_held_up_for_many_cycles_is_that_late() -> None:
         [sys.executable, "-m", "cdpr_tools.bench.cyclic.wakeups", *arguments],
         stdout=subprocess.PIPE,
     )
+    stopped_s = 0.0
     while probe.poll() is None:  # whenever it has loaded its libraries, one falls into its cycles
         time.sleep(0.5)
+        began_s = time.monotonic()
         probe.send_signal(signal.SIGSTOP)
         time.sleep(0.4)
         probe.send_signal(signal.SIGCONT)
+        stopped_s += time.monotonic() - began_s
     out, _ = probe.communicate(timeout=120)
     late_ns = np.frombuffer(out.partition(b"\n")[2], "<i8")
     assert late_ns.size == 1000
     assert late_ns.min() > -1000
     assert late_ns.max() > 0.3e9
     # all other cycles begin on time
-    assert np.median(late_ns) < 0.1e9
+    assert np.sum(late_ns > 0.1e9) * PERIOD_S < stopped_s
