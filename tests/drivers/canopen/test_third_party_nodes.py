@@ -28,7 +28,10 @@ def network(simulated_bus: str) -> Iterator[CanNetwork]:
 
 
 @pytest.fixture
-def stock(simulated_bus: str) -> Iterator[canopen.LocalNode]:
+def stock(simulated_bus: str, monkeypatch: pytest.MonkeyPatch) -> Iterator[canopen.LocalNode]:
+    # by the wall clock: a slave in this process may have to wait for a core
+    monkeypatch.setattr("cdpr_drivers.canopen.boot.boot._BOOT_UP_TIMEOUT_S", 60.0)
+    monkeypatch.setattr("cdpr_drivers.canopen.sdo_access._TIMEOUT_S", 60.0)
     third_party = canopen.Network()
     third_party.NOTIFIER_CYCLE = 0.02
     third_party.connect(interface="simbus", channel=simulated_bus[7:])
