@@ -103,20 +103,16 @@ class Program(ABC):
 class CommandedProgram(Program):
     """Base class of programs that take commands while they run, and brake on `stop`.
 
-    Subclasses override `_parsed` and `_take`.
+    Subclasses override `check` and `_apply`.
     """
 
     _stopping = False
     _at_rest = True
 
-    def check(self, arguments: Mapping[str, Any]) -> Any:
-        """Return checked arguments for `apply`; raises ProgramError."""
-        return self._parsed(arguments)
-
     def apply(self, checked: Any) -> None:
         """Apply a command that has been checked."""
         self._at_rest = False
-        self._take(checked)
+        self._apply(checked)
 
     def command(self, arguments: Mapping[str, Any]) -> None:
         """Check a command and apply it; raises ProgramError and changes nothing then."""
@@ -135,9 +131,5 @@ class CommandedProgram(Program):
         """Whether the set-point stands still and nothing is left to do."""
         return self._at_rest
 
-    def _parsed(self, arguments: Mapping[str, Any]) -> Any:
-        """Return parsed arguments for `_take`; raises ProgramError."""
-        return CommandArguments(self.name, arguments, ())
-
-    def _take(self, _parsed: Any) -> None:
-        """Apply a command's parsed arguments."""
+    def _apply(self, _checked: Any) -> None:
+        """Do what a command's checked arguments ask for."""

@@ -85,7 +85,7 @@ class PlatformStatics:
         self.anchors_m = (anchors @ home_rotation(platform).T)[:, :size]
         """Anchor points (n, dimensions) from the platform's origin, along the room's axes."""
         self.box = Box(platform.workspace_min_m, platform.workspace_max_m)
-        self.turns = model.kinematics.directions == PLANAR_POINT
+        self.turns_freely = model.kinematics.directions == PLANAR_POINT
         """Whether no cable controls the platform's orientation in its plane."""
         self.orientations = orientations(platform)
         """Rotation vectors (k, 3) from home that stand for those of all targets, none first."""
@@ -163,7 +163,9 @@ class PlatformStatics:
         return found.reshape(*np.shape(position_m)[:-1], n)
 
     def angle_rad(self, position_m: FloatArray) -> FloatArray:
-        """Return by how much a platform that `turns` does at rest, (...); nan where it turns over.
+        """Return by how much a platform that `turns_freely` turns at rest, (...).
+
+        nan where it turns over.
 
         No cable controls its orientation: it takes the one at which the tensions have no moment.
         """

@@ -10,7 +10,7 @@ import numpy as np
 
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.calibration.markers.sighting import Sighting
-from cdpr_rt.procedures.calibration.measure_poses import Look
+from cdpr_rt.procedures.calibration.measure_poses import Readings
 from cdpr_tools.client.client import Daemon
 from cdpr_tools.errors import WorkFailedError
 
@@ -41,21 +41,21 @@ class DaemonReader:
         progress = self.status()["program_progress"]
         return np.array([*progress["position_m"], *progress.get("rotation_rad", ())])
 
-    def stay(self, seconds: float) -> None:
+    def wait(self, seconds: float) -> None:
         """Let bus time pass."""
         self._rows(seconds)
 
-    def look(self, seconds: float) -> Look:
+    def read(self, seconds: float) -> Readings:
         """Let bus time pass and return what was read."""
         lengths, tensions, angles = self._rows(seconds).swapaxes(0, 1)
         if not np.isfinite([lengths, tensions]).all():
             raise WorkFailedError("not all lengths and tensions are known; run tighten first")
         self.counted_m = (lengths - self._m_per_rad * angles).mean(axis=0)
-        return Look(lengths, tensions)
+        return Readings(lengths, tensions)
 
     def image(self) -> Sighting | None:
         """Return what the camera sees, None without one."""
-        return self._image(self.stay)
+        return self._image(self.wait)
 
     def _rows(self, seconds: float) -> FloatArray:
         """Return lengths, tensions and angles (k, 3, n), two at least, while bus time passes."""

@@ -65,14 +65,14 @@ class RobotKind:
         return len(set(self.platform.anchor_points_m)) == 1
 
     @property
-    def turns(self) -> bool:
+    def controls_angles(self) -> bool:
         """Whether its cables control angles."""
         return len(self.platform.controlled) > self.size
 
     @property
     def turns_freely(self) -> bool:
         """Whether its platform has angles, and its cables control none of them."""
-        return not self.turns and not self.is_point
+        return not self.controls_angles and not self.is_point
 
     @property
     def sides(self) -> str:

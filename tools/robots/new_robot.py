@@ -154,7 +154,7 @@ def proposed_stand(answers: Answers) -> tuple[float, ...]:
     # to the cm, towards the room's zero: in its middle, where the box is but for half a cm
     aside = np.trunc(np.round(50.0 * (low + high)[:-1], 6)) / 100.0
     middle = np.array([*aside, below])
-    if not statics.turns:
+    if not statics.turns_freely:
         return _point(middle)
     xs = np.linspace(low[0], high[0], 41)
     xs = xs[np.argsort(np.abs(xs - middle[0]), kind="stable")]

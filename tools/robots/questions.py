@@ -54,7 +54,12 @@ def kind_question() -> Question:
 def questions(folder: Path, name: str, kind: RobotKind) -> list[Question]:
     """Return the questions about a kind in their order; files are looked for in `folder` first."""
     drives = _drives(folder, name, kind)
-    return [*drives, *_geometry(kind), *_limits(kind), *(_turning(kind) if kind.turns else [])]
+    return [
+        *drives,
+        *_geometry(kind),
+        *_limits(kind),
+        *(_turning(kind) if kind.controls_angles else []),
+    ]
 
 
 def _drives(folder: Path, name: str, kind: RobotKind) -> list[Question]:

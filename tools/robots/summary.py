@@ -85,7 +85,7 @@ def _of_tensions(
         "lowest_resonance_Hz": float(lowest_resonance_Hz(statics.model, robot.axes, points).min()),
     }
     of_all["loop"] = _of_loop(robot, statics.model)
-    if statics.turns:
+    if statics.turns_freely:
         of_all["turns_at_most_rad"] = _finite(np.abs(statics.angle_rad(points)).max())
         of_all["free_rotation"] = _of_free_rotation(statics.model)
     return of_all

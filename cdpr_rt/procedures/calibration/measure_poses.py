@@ -14,11 +14,11 @@ from cdpr_rt.calibration.readings.camera_data import ImageReading
 from cdpr_rt.calibration.readings.data import PoseReading
 from cdpr_rt.errors import TripError
 
-LOOK_S, SETTLE_S = 0.5, 1.0
+READING_S, SETTLE_S = 0.5, 1.0
 """Averaging time of a reading, and settling time before it."""
 _STILL_m = 1.5e-4
 """Change of a length within a reading beyond which the platform does not stand still."""
-_MOST_LOOKS = 10
+_MOST_READINGS = 10
 _MOST_FAILURES = 5
 
 
@@ -40,7 +40,7 @@ class TargetNotReached:
 
 
 @dataclass(frozen=True)
-class Look:
+class Readings:
     """Readings over some time."""
 
     length_m: FloatArray
@@ -56,10 +56,10 @@ class Look:
 class PoseReader(Protocol):
     """Reads a platform's cables and its camera; whatever robot and bus they are on."""
 
-    def stay(self, seconds: float) -> None:
+    def wait(self, seconds: float) -> None:
         """Let time pass; raises TripError where the motion is ended meanwhile."""
 
-    def look(self, seconds: float) -> Look:
+    def read(self, seconds: float) -> Readings:
         """Let time pass and return what was read; raises TripError."""
 
     def image(self) -> Sighting | None:
@@ -69,7 +69,7 @@ class PoseReader(Protocol):
 class PlatformOperator(PoseReader, Protocol):
     """Moves a platform as well."""
 
-    def go(self, place: FloatArray) -> TargetNotReached | None:
+    def move_to(self, place: FloatArray) -> TargetNotReached | None:
         """Take it to a place (d,); None where it has come there.
 
         Raises PoseRefusedError, TripError where motion is ended.
@@ -86,15 +86,17 @@ class PoseNotifier(Protocol):
 def read_pose(operator: PoseReader, target: FloatArray) -> PoseReading:
     """Wait until the platform stands still and return what is read there.
 
-    Raises PoseRefusedError where it does not come to rest within some ten looks.
+    Raises PoseRefusedError where it does not come to rest within some ten readings.
     """
-    operator.stay(SETTLE_S)
-    for _ in range(_MOST_LOOKS):
-        look = operator.look(LOOK_S)
-        half = len(look.length_m) // 2
-        moved = np.abs(look.length_m[:half].mean(axis=0) - look.length_m[half:].mean(axis=0)).max()
+    operator.wait(SETTLE_S)
+    for _ in range(_MOST_READINGS):
+        readings = operator.read(READING_S)
+        half = len(readings.length_m) // 2
+        moved = np.abs(
+            readings.length_m[:half].mean(axis=0) - readings.length_m[half:].mean(axis=0)
+        ).max()
         if moved < _STILL_m:
-            return _reading(look, target, operator.image())
+            return _reading(readings, target, operator.image())
     raise PoseRefusedError(
         f"the platform did not come to rest: a cable still moves by {1e3 * moved:.2f} mm"
     )
@@ -166,11 +168,11 @@ def _go(
     operator: PlatformOperator, place: FloatArray, between: FloatArray
 ) -> TargetNotReached | None:
     try:
-        return operator.go(place)
+        return operator.move_to(place)
     except PoseRefusedError:
-        held = operator.go(between)
+        held = operator.move_to(between)
         if held is None:
-            return operator.go(place)
+            return operator.move_to(place)
         return replace(held, why=f"on its way by {_listed(between)} {held.why}")
 
 
@@ -193,18 +195,18 @@ def _read(
     return "" if held is None else f"is read where the platform stands: {held.why}"
 
 
-def _reading(look: Look, target: FloatArray, seen: Sighting | None) -> PoseReading:
+def _reading(readings: Readings, target: FloatArray, seen: Sighting | None) -> PoseReading:
     rotation = None
-    if look.rotation is not None:
-        rotation = tuple(tuple(row) for row in look.rotation.tolist())
+    if readings.rotation is not None:
+        rotation = tuple(tuple(row) for row in readings.rotation.tolist())
     return PoseReading(
         target=tuple(np.asarray(target).tolist()),
-        length_m=tuple(look.length_m.mean(axis=0).tolist()),
-        tension_N=tuple(look.tension_N.mean(axis=0).tolist()),
-        position_m=None if look.position_m is None else tuple(look.position_m.tolist()),
-        position_std_m=look.position_std_m,
+        length_m=tuple(readings.length_m.mean(axis=0).tolist()),
+        tension_N=tuple(readings.tension_N.mean(axis=0).tolist()),
+        position_m=None if readings.position_m is None else tuple(readings.position_m.tolist()),
+        position_std_m=readings.position_std_m,
         rotation=rotation,
-        rotation_std_rad=look.rotation_std_rad,
+        rotation_std_rad=readings.rotation_std_rad,
         image=None if seen is None else ImageReading.of(seen),
     )
 

@@ -32,7 +32,7 @@ class AxisProgram(CommandedProgram):
     """Moves the axes' set-points within the model's bounds.
 
     By itself it is the program `hold`, which brakes what moves and holds the axes where they come
-    to stand. Subclasses override `_move`, and `_parsed` and `_take` for their commands.
+    to stand. Subclasses override `_move`, and `check` and `_apply` for their commands.
     """
 
     name = "hold"

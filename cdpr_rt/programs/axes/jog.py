@@ -57,7 +57,8 @@ class JogProgram(AxisProgram):
         done = min(1.0, self._cycles / self._duration)
         return {"velocity_rad_s": self._speed.tolist(), "left_s": left, "done": done}
 
-    def _parsed(self, arguments: Mapping[str, Any]) -> _Jog:
+    def check(self, arguments: Mapping[str, Any]) -> _Jog:
+        """Return checked arguments for `apply`; raises ProgramError."""
         keys = CommandArguments(
             self.name, arguments, ("velocity_rad_s", "cable_velocity_m_s", "timeout_s", _DURATION)
         )
@@ -73,8 +74,8 @@ class JogProgram(AxisProgram):
             duration = keys.number(_DURATION, shortest, LONGEST_S, LONGEST_S)
         return speed, timeout, duration
 
-    def _take(self, parsed: _Jog) -> None:
-        self._speed[:], timeout, duration = parsed
+    def _apply(self, checked: _Jog) -> None:
+        self._speed[:], timeout, duration = checked
         self._cycles_left = max(1, round(timeout / self._model.period_s))
         self._duration = (
             duration if duration == math.inf else round(duration / self._model.period_s)

@@ -43,7 +43,8 @@ class PidProgram(AxisProgram):
         done = self._motion.part_done(self._setpoint)
         return {"target_rad": self._motion.target_rad.tolist(), "done": done}
 
-    def _parsed(self, arguments: Mapping[str, Any]) -> _Target:
+    def check(self, arguments: Mapping[str, Any]) -> _Target:
+        """Return checked arguments for `apply`; raises ProgramError."""
         keys = CommandArguments(
             self.name, arguments, ("position_rad", "distance_rad", "cable_m", "speed_rad_s")
         )
@@ -59,8 +60,8 @@ class PidProgram(AxisProgram):
         speed = keys.number("speed_rad_s", _SLOWEST_RAD_S, fastest, fastest)
         return key, distance, np.minimum(limits, speed)
 
-    def _take(self, parsed: _Target) -> None:
-        key, distance, speed = parsed
+    def _apply(self, checked: _Target) -> None:
+        key, distance, speed = checked
         setpoint = self._setpoint
         position, velocity = setpoint.position_rad, setpoint.velocity_rad_s
         target = distance if key == "position_rad" else position + distance

@@ -56,15 +56,16 @@ class SweepProgram(AxisProgram):
         done = self._motion.part_done(self._setpoint)
         return {"leg": self._leg + 1, "legs": self._legs, "done": done}
 
-    def _parsed(self, arguments: Mapping[str, Any]) -> _Sweep:
+    def check(self, arguments: Mapping[str, Any]) -> _Sweep:
+        """Return checked arguments for `apply`; raises ProgramError."""
         keys = CommandArguments(self.name, arguments, ("distance_rad", "speed_rad_s", "legs"))
         distance = keys.axes("distance_rad", np.full(self._model.n, FURTHEST_RAD))
         fastest = min(_FASTEST_RAD_S, float(self._model.speed_rad_s.min()))
         speed = keys.number("speed_rad_s", _SLOWEST_RAD_S, fastest, DEFAULT_SPEED_RAD_S)
         return distance, speed, keys.whole("legs", 1, _MOST_LEGS, 2)
 
-    def _take(self, parsed: _Sweep) -> None:
-        self._distance[:], speed, self._legs = parsed
+    def _apply(self, checked: _Sweep) -> None:
+        self._distance[:], speed, self._legs = checked
         self._speed[:] = speed
         self._start[:] = self._setpoint.position_rad
         self._leg = 0

@@ -156,14 +156,15 @@ class LowerProgram(PlatformProgram):
             return {**super().progress(), **state}
         return {"tension_N": self._winches.tension_N.tolist(), **state}
 
-    def _parsed(self, arguments: Mapping[str, Any]) -> bool:
+    def check(self, arguments: Mapping[str, Any]) -> bool:
+        """Return checked arguments for `apply`; raises ProgramError."""
         CommandArguments(self.name, arguments, ("blind",))
         blind = arguments.get("blind", False)
         if not isinstance(blind, bool):
             raise ProgramError(f"lower: blind: value {blind!r}; allowed: true or false")
         return blind
 
-    def _take(self, blind: bool) -> None:
+    def _apply(self, blind: bool) -> None:
         self._without_pose = self._without_pose or blind
 
     def _carry_weight(self, torque_Nm: FloatArray) -> None:

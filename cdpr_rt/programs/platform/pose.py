@@ -131,7 +131,8 @@ class PoseProgram(PlatformProgram):
 
     # -- commands
 
-    def _parsed(self, arguments: Mapping[str, Any]) -> tuple[str, FloatArray | None, float]:
+    def check(self, arguments: Mapping[str, Any]) -> tuple[str, FloatArray | None, float]:
+        """Return checked arguments for `apply`; raises ProgramError."""
         allowed = [key for key in _KEYS if key != "rotation_rad" or self._about.size]
         keys = CommandArguments(self.name, arguments, allowed)
         fastest = float(self._parts.speed[0])
@@ -204,8 +205,8 @@ class PoseProgram(PlatformProgram):
             )
         return rotation
 
-    def _take(self, parsed: tuple[str, FloatArray | None, float]) -> None:
-        action, position, speed = parsed
+    def _apply(self, checked: tuple[str, FloatArray | None, float]) -> None:
+        action, position, speed = checked
         self._commanded_speed[:] = self._parts.speeds(speed)
         self._following = action == "stream"
         self._has_command = action in ("go", "resume")

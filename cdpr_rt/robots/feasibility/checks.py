@@ -68,7 +68,7 @@ def findings(robot: Robot, limits: Limits | None = None) -> list[Finding]:
         found += [*_tensions(statics), *_motors(robot, limits, statics)]
         found += [*_cable_speeds(robot, limits, statics), *_lengths(robot, limits, statics)]
         found += _sagging(robot, statics)
-        if statics.turns:
+        if statics.turns_freely:
             found += _free_rotation(statics)
         found += [*_loop(robot, statics), *_uncontrolled_rotation(robot.platform)]
         found += _stand_clearance(statics)

@@ -9,10 +9,10 @@ from cdpr_rt.arrays import FloatArray
 from cdpr_rt.calibration.markers.sighting import Sighting
 from cdpr_rt.errors import TripError
 from cdpr_rt.procedures.calibration.measure_poses import (
-    Look,
     Measured,
     NotThePoseError,
     PoseRefusedError,
+    Readings,
     TargetNotReached,
     measure_poses,
 )
@@ -37,7 +37,7 @@ class Operator:
         self.trip: TripError | None = None
         self.gone: list[float] = []
 
-    def go(self, place: FloatArray) -> TargetNotReached | None:
+    def move_to(self, place: FloatArray) -> TargetNotReached | None:
         straight = self.here[0] == BETWEEN[0] or place[0] == BETWEEN[0]
         if place[0] == self.refused or (place[0] == self.behind and not straight):
             raise PoseRefusedError("cable 2 would need 200 N")
@@ -52,7 +52,7 @@ class Operator:
             return None
         return TargetNotReached(self.here, "900 mm off after 14 s: cable 2 would need 200 N")
 
-    def stay(self, seconds: float) -> None:
+    def wait(self, seconds: float) -> None:
         assert seconds > 0.0
 
     def image(self) -> Sighting | None:
@@ -60,14 +60,14 @@ class Operator:
             return None
         return Sighting("now", {self.marker: np.arange(8.0).reshape(4, 2)}, repeated=(9,))
 
-    def look(self, seconds: float) -> Look:
+    def read(self, seconds: float) -> Readings:
         self.looks += 1
         if self.trip is not None:
             raise self.trip
         lengths = np.tile(np.append(self.here, 1.0), (50, 1))
         if self.here[0] == self.shaky:
             lengths[25:] += 0.01
-        return Look(lengths, np.full((50, 3), 40.0), np.append(self.here, 0.0), 0.001)
+        return Readings(lengths, np.full((50, 3), 40.0), np.append(self.here, 0.0), 0.001)
 
 
 class Notes:

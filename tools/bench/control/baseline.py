@@ -53,7 +53,9 @@ class BaselineCableControl:
         self.compliance = 1.0 / EA if platform.cable_model != "rigid" else np.zeros(len(axes))
         self.weight = weights if platform.cable_model == "catenary" else np.zeros(len(axes))
         self.chosen, self.scale = list(model.kinematics.directions), model.wrench_scale
-        self.turns = model.kinematics.directions == (0, 1) and bool(np.ptp(self.b, axis=0).any())
+        self.turns_freely = model.kinematics.directions == (0, 1) and bool(
+            np.ptp(self.b, axis=0).any()
+        )
         self.low, self.high = model.low_N + model.reserve_N, model.high_N - model.reserve_N
         self.span = float((model.high_N - model.low_N).min())
         self.p, self.Q = model.home_pose.p.copy(), model.home_pose.Q.copy()
@@ -121,7 +123,7 @@ class BaselineCableControl:
         self.lagging = self.lagging + w * (self.omega - self.lagging)
         self.calm = self.calm + w * (self.lagging - self.calm)
         measured = (self.at_zero + self.c * self.theta) * self.stretch
-        if self.turns:
+        if self.turns_freely:
             self._turn()
         for _ in range(10):
             rho, J = self._cables(self.p, self.Q)

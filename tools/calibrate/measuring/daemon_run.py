@@ -83,7 +83,7 @@ class DaemonOperator(DaemonReader):
         self._program = "hold"
         right.hold()
 
-    def go(self, place: FloatArray) -> TargetNotReached | None:
+    def move_to(self, place: FloatArray) -> TargetNotReached | None:
         """Take it to a place (d,), or hold it where it is once that takes too long.
 
         Raises PoseRefusedError, TripError, StoppedError, CommandError for what no pose has a part
@@ -102,7 +102,7 @@ class DaemonOperator(DaemonReader):
                 raise PoseRefusedError(str(error)) from None
         except TripError as error:  # before it set out
             raise NotThePoseError(str(error)) from None
-        self.stay(RENEW_S)  # what a status tells at once may be of the program before
+        self.wait(RENEW_S)  # what a status tells at once may be of the program before
         self._program = "pose"
         progress = self._until(allowed_s)
         if is_done(progress):
@@ -118,7 +118,7 @@ class DaemonOperator(DaemonReader):
             progress: dict[str, Any] = status["program_progress"]
             if is_done(progress) or status["cycle"]["time_s"] >= end_s:
                 return progress
-            self.stay(RENEW_S)
+            self.wait(RENEW_S)
 
     def status(self) -> dict[str, Any]:
         """Return the daemon's status, with the right renewed.

@@ -19,9 +19,9 @@ from cdpr_rt.core.clock import Clock
 from cdpr_rt.core.states import LoopState
 from cdpr_rt.errors import TripError
 from cdpr_rt.procedures.calibration.measure_poses import (
-    Look,
     NotThePoseError,
     PoseRefusedError,
+    Readings,
     TargetNotReached,
 )
 from cdpr_tools.calibrate.measuring.outside import OutsidePose
@@ -96,7 +96,7 @@ class RigOperator:
         self._finish(_TIGHTEN_S)
         return np.pad(np.array(platform.home_m), (0, self.directions.d - self.directions.k))
 
-    def go(self, place: FloatArray) -> TargetNotReached | None:
+    def move_to(self, place: FloatArray) -> TargetNotReached | None:
         """Take it to a place (d,), or hold it where it is once that takes too long.
 
         Raises PoseRefusedError, TripError, StoppedError.
@@ -152,7 +152,7 @@ class RigOperator:
         life = self.rig.loop.life
         return motion_ended(text, life.reason, life.details)
 
-    def stay(self, seconds: float) -> None:
+    def wait(self, seconds: float) -> None:
         """Let bus time pass; raises TripError where the motion is ended meanwhile."""
         rig = self.rig
         before = rig.loop.engine.program
@@ -169,7 +169,7 @@ class RigOperator:
         if self.rig.loop.engine.program is not program:
             raise self._trip(f"the motion was ended: {self.rig.state_text()}")
 
-    def look(self, seconds: float) -> Look:
+    def read(self, seconds: float) -> Readings:
         """Let bus time pass and return lengths, tensions, and what the scanner has measured.
 
         Raises TripError where the motion is ended meanwhile.
@@ -179,7 +179,7 @@ class RigOperator:
         self._require(before)
         lengths, tensions = np.array(rows["cable_length_m"]), np.array(rows["tension_N"])
         seen = self._scanned() if self._given else None
-        return Look(lengths, tensions) if seen is None else Look(lengths, tensions, *seen)
+        return Readings(lengths, tensions) if seen is None else Readings(lengths, tensions, *seen)
 
     def _scanned(self) -> tuple[FloatArray, float, FloatArray, float] | None:
         """Return the scanner's means since it stands, each with its deviation."""
@@ -197,7 +197,7 @@ class RigOperator:
         """Return what the camera sees, None without one; raises what `PoseCamera.see` does."""
         if self.camera is None:
             return None
-        return self.camera.see(self.number, self.stay)
+        return self.camera.see(self.number, self.wait)
 
     def outside(self) -> OutsidePose:
         """Return what is known of the pose by what the calibration does not use.

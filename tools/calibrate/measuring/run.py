@@ -329,7 +329,7 @@ class _Measuring:
         outside = operator.outside()
         try:
             if longer_s := _scanned_s(count - 1):
-                operator.stay(longer_s)
+                operator.wait(longer_s)
                 # a cable may slip or creep meanwhile: what was true counts when lengths were read
                 outside = operator.outside().with_truth_of(outside)
         finally:  # the pose is read, whatever ends the stay

@@ -130,7 +130,8 @@ class PathProgram(PlatformProgram):
             return None
         return partial(self.store.load, name)
 
-    def _parsed(self, arguments: Mapping[str, Any]) -> _Command:
+    def check(self, arguments: Mapping[str, Any]) -> _Command:
+        """Return checked arguments for `apply`; raises ProgramError."""
         keys = CommandArguments(self.name, arguments, _KEYS)
         feed = keys.number("feed", _SLOWEST, 1.0, self._feed or 1.0)
         self._require_pose()
@@ -187,7 +188,7 @@ class PathProgram(PlatformProgram):
             why = {"why": f"on the way to where it begins: {obstacle}"}
             raise ProgramError(CommandRefusal(RefusalCode.NOT_FEASIBLE, self.name, arguments=why))
 
-    def _take(self, command: _Command) -> None:
+    def _apply(self, command: _Command) -> None:
         self._feed = command.feed
         if command.what == "feed":
             return

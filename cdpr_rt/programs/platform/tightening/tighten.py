@@ -181,7 +181,8 @@ class TightenProgram(PlatformProgram):
     def _default_source(self) -> str:
         return "lengths" if self._parts.pose_known else "home"
 
-    def _parsed(self, arguments: Mapping[str, Any]) -> tuple[str, bool]:
+    def check(self, arguments: Mapping[str, Any]) -> tuple[str, bool]:
+        """Return checked arguments for `apply`; raises ProgramError."""
         CommandArguments(self.name, arguments, ("from",))
         source = arguments.get("from", self._default_source())
         if source not in _SOURCES:
@@ -209,7 +210,7 @@ class TightenProgram(PlatformProgram):
             raise ProgramError(bad_source(arguments, why))
         return True
 
-    def _take(self, checked: tuple[str, bool]) -> None:
+    def _apply(self, checked: tuple[str, bool]) -> None:
         self._source, self._hangs = checked
 
     def _hold_hanging(

@@ -24,9 +24,9 @@ from cdpr_rt.calibration.readings.data import CalibrationData, load_data
 from cdpr_rt.errors import TripError
 from cdpr_rt.procedures.calibration.measure_poses import (
     SETTLE_S,
-    Look,
     NotThePoseError,
     PoseRefusedError,
+    Readings,
     TargetNotReached,
 )
 from cdpr_tools.calibrate.measuring import run
@@ -59,7 +59,7 @@ class Rig:
         self.here = self.geometry.model.home.copy()
         self.gone: list[FloatArray] = []
         self.failed_at: FloatArray | None = None
-        self.stays: list[float] = []
+        self.waits: list[float] = []
         self.trip: TripError | None = None
         self.sees: dict[int, FloatArray] = {0: np.zeros((4, 2)), 1: np.ones((4, 2))}
         self._left, self._failure = fails_at, failure
@@ -68,7 +68,7 @@ class Rig:
     def tighten(self) -> FloatArray:
         return self.here
 
-    def go(self, place: FloatArray) -> TargetNotReached | None:
+    def move_to(self, place: FloatArray) -> TargetNotReached | None:
         self._left -= 1
         if self._failure is not None and self._left < 0:
             self.failed_at = place
@@ -83,17 +83,17 @@ class Rig:
         self.here = place
         return None
 
-    def stay(self, seconds: float) -> None:
-        self.stays.append(seconds)
+    def wait(self, seconds: float) -> None:
+        self.waits.append(seconds)
         if self.trip is not None and seconds != SETTLE_S:
             raise self.trip
 
-    def look(self, seconds: float) -> Look:
+    def read(self, seconds: float) -> Readings:
         tension = np.full(self.geometry.n, TENSION)
         pose = self.geometry.model.poses(self.here[None])
         lengths = lengths_told(self.geometry, pose, tension[None])[0] + self.offset
         lengths += self._chance.normal(0.0, 1e-4, lengths.shape)
-        return Look(np.tile(lengths, (20, 1)), np.tile(tension, (20, 1)), pose[0, 0], 1e-3)
+        return Readings(np.tile(lengths, (20, 1)), np.tile(tension, (20, 1)), pose[0, 0], 1e-3)
 
     def image(self) -> Sighting | None:
         return Sighting("now", self.sees)
@@ -242,9 +242,9 @@ def test_the_scanner_takes_its_time_at_the_first_pose_and_at_those_held_out(
     with pytest.raises(WorkFailedError):
         begin(tmp_path, settings())
     go_on(tmp_path, settings())
-    stays = [seconds for rig in made for seconds in rig.stays]
-    poses = np.cumsum(np.array(stays) == SETTLE_S)  # each is waited for before it is read
-    longer = [(int(pose), s) for pose, s in zip(poses, stays, strict=True) if s != SETTLE_S]
+    waits = [seconds for rig in made for seconds in rig.waits]
+    poses = np.cumsum(np.array(waits) == SETTLE_S)  # each is waited for before it is read
+    longer = [(int(pose), s) for pose, s in zip(poses, waits, strict=True) if s != SETTLE_S]
     assert [pose for pose, _ in longer] == [1, 5, 10, 15]
     assert longer[0][1] > max(s for _, s in longer[1:])
 
@@ -253,10 +253,10 @@ def test_what_was_true_is_that_of_the_reading_though_the_scanner_measures_longer
     tmp_path: Path, rigs: Callable[..., list[Rig]], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     rigs()
-    stay, outside = Rig.stay, Rig.outside
+    wait, outside = Rig.wait, Rig.outside
 
     def slips(rig: Rig, seconds: float) -> None:
-        stay(rig, seconds)
+        wait(rig, seconds)
         if seconds != SETTLE_S:
             rig.here = rig.here + 0.01
 
@@ -264,7 +264,7 @@ def test_what_was_true_is_that_of_the_reading_though_the_scanner_measures_longer
         seen = outside(rig)
         return seen.model_copy(update={"position_m": seen.true_position_m})
 
-    monkeypatch.setattr(Rig, "stay", slips)
+    monkeypatch.setattr(Rig, "wait", slips)
     monkeypatch.setattr(Rig, "outside", scanned)
     data = begin(tmp_path, settings())
     kept = OutsidePoses.load_file(tmp_path / run.OUTSIDE).poses

@@ -67,7 +67,7 @@ def test_somebody_who_wants_an_end_is_heard_between_two_cycles() -> None:
     ):
         operator.tighten()
         wanted.append(True)
-        operator.go(chosen_places(load_robot("planar-3"), 1, 3).middle)
+        operator.move_to(chosen_places(load_robot("planar-3"), 1, 3).middle)
 
 
 def test_a_pose_that_is_not_reached_in_time_is_read_where_the_platform_is_held(
@@ -107,7 +107,9 @@ def test_an_emergency_stop_is_no_fault_of_the_pose(
         operator.tighten()
         rig = operator.rig
         measured, pressed_s = Measured(lambda: None), list[float]()
-        name = {"on its way": "go", "before it is read": "stay", "while it is read": "look"}[when]
+        name = {"on its way": "move_to", "before it is read": "wait", "while it is read": "read"}[
+            when
+        ]
         told = getattr(operator, name)
 
         def pressing(what: Any) -> Any:
@@ -128,7 +130,7 @@ def test_an_emergency_stop_is_no_fault_of_the_pose(
         assert pressed_s and not measured.tried and not measured.readings
         monkeypatch.undo()
         with pytest.raises(NotThePoseError):  # in the fault, no pose is to blame for it either
-            operator.go(places.middle)
+            operator.move_to(places.middle)
 
 
 def test_a_drive_that_fails_on_the_way_is_held_against_the_pose(
