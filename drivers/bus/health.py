@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from enum import IntEnum
 
 ERR_FLAG = 0x20000000
@@ -58,13 +57,21 @@ class BusHealth:
         """Transmit and receive error counters, where the controller reports them."""
         self.text = ""
         """The last error in words, with the state; empty while there was none."""
-        self.changed_s = 0.0
-        """When `state` changed last, monotonic seconds."""
 
     @property
     def usable(self) -> bool:
         """Whether frames can go out: false while bus-off."""
         return self.state is not BusState.BUS_OFF
+
+    def counts(self) -> dict[str, int]:
+        """Return what a status tells of them: all that are not zero, by names that people read."""
+        counts = {
+            "error_frames": self.errors,
+            "transmit_queue_full": self.tx_full,
+            "frames_lost": self.rx_lost,
+            "bus_off": self.bus_offs,
+        }
+        return {name: count for name, count in counts.items() if count}
 
     def take_error(self, can_id: int, data: bytes) -> bool:
         """Process an error frame: its class bits and its 8 bytes; return whether `state` changed.
@@ -104,7 +111,6 @@ class BusHealth:
     def enter(self, state: BusState, reason: str = "") -> None:
         """Note that the controller is in `state`, and why where that is known."""
         if state is not self.state:
-            self.changed_s = time.monotonic()
             self.bus_offs += state is BusState.BUS_OFF
             self.restarts += self.state is BusState.BUS_OFF
             self.state = state

@@ -13,6 +13,7 @@ import numpy as np
 
 from cdpr_drivers.axes import touch_probe
 from cdpr_drivers.axes.axis_buses import AxisBuses
+from cdpr_drivers.bus.health import BusHealth
 from cdpr_drivers.bus.simulated_bus import open_clock
 from cdpr_drivers.canopen.boot.boot import BootReport
 from cdpr_drivers.canopen.network import CanNetwork
@@ -270,11 +271,15 @@ class RobotMachine:
         return {
             name: {
                 "url": str(url),
-                "state": str(self.networks[name].health.text) if name in self.networks else "",
+                "state": "" if (health := self._health(name)) is None else health.text,
+                "counts": {} if health is None else health.counts(),
                 "drives": self._drives.get(name, {}),
             }
             for name, url in self._urls.items()
         }
+
+    def _health(self, bus: str) -> BusHealth | None:
+        return self.networks[bus].health if bus in self.networks else None
 
     def _identities(self) -> dict[str, dict[str, dict[str, int]]]:
         """Return what tells the drives that have booted from others, by bus and axis."""

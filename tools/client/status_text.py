@@ -138,6 +138,10 @@ def _loop_lines(status: dict[str, Any]) -> list[Text]:
                 f"{cycle['missed']} answers missed, {cycle['late_cycles']} cycles late"
             )
         )
+    for name, bus in (status.get("buses") or {}).items():
+        if counts := bus.get("counts"):
+            words = ", ".join(f"{key.replace('_', ' ')} {n} times" for key, n in counts.items())
+            lines.append(Text(f"bus {name}: {words}; {bus['state']}", style="yellow"))
     for part, option in _OPTIONS.items():
         if error := status["parts"].get(part, {}).get("error"):
             lines.append(Text(f"{option} does not work: {error}", style="red"))

@@ -54,6 +54,18 @@ def test_a_held_platform_tells_how_well_its_lengths_agree(
     assert f"held by its cables{told}" in [str(line) for line in status_text(status).renderables]
 
 
+def test_what_was_counted_on_a_bus_is_shown() -> None:
+    counts = {"transmit_queue_full": 3, "bus_off": 1}
+    buses = {
+        "can0": {"url": "socketcan:can0", "state": "", "counts": {}},
+        "can1": {"url": "socketcan:can1", "state": "bus-off: bus error", "counts": counts},
+    }
+    lines = [str(line) for line in status_text(status_of(buses=buses)).renderables]
+    assert [line for line in lines if line.startswith("bus ")] == [
+        "bus can1: transmit queue full 3 times, bus off 1 times; bus-off: bus error"
+    ]
+
+
 def test_of_a_loop_that_is_loaded_no_axes_are_shown_yet() -> None:
     """Their names are not known before; what is compiled meanwhile stands in the notices."""
     notices = ["compiling the control loop goes on: 20 kernels so far"]
