@@ -11,12 +11,16 @@ import time
 from collections.abc import Iterator
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import can
 import pytest
+import typer
 from cdpr_here import cdpr_here
+from typer.core import TyperArgument
 
 from cdpr_profiles.reading.places import KINDS
+from cdpr_tools.cli import app
 from tests.tools.commands.cli_rig import OWN, WINCH, cdpr, done, refused
 
 
@@ -64,6 +68,34 @@ def test_help_of_a_command(command: tuple[str, ...], told: tuple[str, ...]) -> N
     assert result.returncode == 0
     for word in told:
         assert word in result.stdout
+
+
+def _commands(group: Any, words: tuple[str, ...] = ()) -> Iterator[tuple[str, Any]]:
+    """Yield all commands below a group, by what is typed."""
+    if not hasattr(group, "list_commands"):
+        yield " ".join(words), group
+        return
+    context = typer.Context(group)
+    for name in group.list_commands(context):
+        _, command, _ = group.resolve_command(context, [name])
+        yield from _commands(command, (*words, name))
+
+
+def test_every_option_and_argument_is_explained() -> None:
+    commands = dict(_commands(typer.main.get_group(app)))
+    assert "robot trial" in commands and len(commands) > 80
+    unexplained = [
+        f"{name}: {param.name}"
+        for name, command in commands.items()
+        for param in command.params
+        if not (param.help or "").strip()
+    ]
+    assert unexplained == []
+    for name, command in commands.items():
+        for param in command.params:
+            if isinstance(param, TyperArgument):
+                assert param.metavar, f"{name}: {param.name}"
+                assert param.metavar == param.metavar.upper(), f"{name}: {param.metavar}"
 
 
 def test_paragraphs_of_a_help_are_as_wide_as_the_terminal(monkeypatch: pytest.MonkeyPatch) -> None:
