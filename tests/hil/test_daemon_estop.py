@@ -26,6 +26,7 @@ from test_daemon_kills import (
     third_party,
 )
 
+from cdpr_drivers.bus import BusUrl
 from cdpr_drivers.cia402 import POWER_OFF, State, state_of
 from cdpr_tools.daemon import estop as emergency_stop
 from cdpr_tools.daemon.loop_file import POWER_OFF_SIGNAL, LoopFile, started
@@ -139,6 +140,23 @@ def test_a_drive_that_does_not_answer_is_not_called_stopped(
             assert state_of(word) in POWER_OFF
     finally:
         daemon.end()
+
+
+def test_a_drive_that_does_not_confirm_at_the_end_is_told_once(tmp_path: Path) -> None:
+    daemon = slow_daemon(tmp_path)
+    try:
+        assert cdpr("enable", *daemon.at).returncode == 0
+        with third_party(BusUrl.parse(f"{daemon.bus}-can0")) as network:
+            network.write(NODES[0], 0x2F00, SILENT, FOR_GOOD)
+        daemon.wait_for("fault")
+        stopped = cdpr("stop", *daemon.at)
+        assert stopped.returncode == 1
+        assert "unheard, and not known to be without power" in stopped.stderr
+    finally:
+        ended = daemon.end()
+    assert ended == 1
+    told = [line for line in daemon.errors().splitlines() if line.startswith("cdpr: ")]
+    assert len(told) == 1 and "does not confirm that its power stage is off" in told[0]
 
 
 def test_a_file_that_was_left_behind_names_nobody(tmp_path: Path) -> None:

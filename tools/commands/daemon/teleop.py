@@ -78,8 +78,8 @@ def robot(
         Path | None,
         typer.Option(
             metavar="FILE",
-            help="For --device script; a line: SECONDS X_MM Y_MM [z=MM] [turn=RX,RY,RZ] [clutch] "
-            "[confirm].",
+            help="For --device script; each line: SECONDS X_MM Y_MM, after these if wanted z=MM, "
+            "turn=RX,RY,RZ (deg), clutch, confirm.",
         ),
     ] = None,
     via: Annotated[
