@@ -359,3 +359,15 @@ def test_a_file_of_where_the_camera_sits_is_refused_where_it_is_of_no_use(tmp_pa
     done = cdpr_here(*run)
     assert done.returncode == 2 and "hand-eye.toml: position_mm" in done.stderr
     assert "Traceback" not in done.stderr and not (tmp_path / "run").exists()
+
+
+@pytest.mark.parametrize(
+    "given", [("--camera",), ("--scanner",), ("--plant", "p.toml"), ("--intrinsics", "c.toml")]
+)
+def test_a_run_that_goes_on_takes_no_options_of_its_beginning(
+    given: tuple[str, ...], tmp_path: Path
+) -> None:
+    where = ("--resume", "--out", tmp_path)
+    done = cdpr_here("calibrate", "run", "planar-4", *where, *given)
+    assert done.returncode == 2
+    assert f"{given[0]}: not with --resume, which goes on as the run was begun" in done.stderr

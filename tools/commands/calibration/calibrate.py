@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -163,6 +164,10 @@ def run(
 
     folder = out_dir or Path("out") / f"calibrate-{profile.profile}"
     if resume:
+        _require_as_begun({
+            "--camera": camera, "--redundancy": redundancy, "--scanner": scanner, "--plant": plant,
+            "--intrinsics": intrinsics, "--markers": markers,
+        })  # fmt: skip
         settings = runs.CalibrationRunSettings.load(folder).resumed(count, listed, points)
         if points is None and settings.points is not None:
             points = Path(settings.points)
@@ -194,6 +199,13 @@ def run(
         *(out, profile, data, points, geometry, folder / runs.DATA, folder, dry_run, adopt),
         runs.truth_comparison_of(profile, settings, folder),
     )
+
+
+def _require_as_begun(given: Mapping[str, object]) -> None:
+    """Raise BadInputError for options that only the beginning of a run takes."""
+    for option, value in given.items():
+        if value:
+            raise BadInputError(f"{option}: not with --resume, which goes on as the run was begun")
 
 
 def _require_camera(hand_eye: HandEye | None, source: str) -> None:
