@@ -290,7 +290,7 @@ def test_lengths_that_an_index_contradicts_neither_move_the_platform_nor_are_kep
         elsewhere = last.lengths.cable_at_index_m + turned_m
         last.lengths = replace(last.lengths, cable_at_index_m=elsewhere)
         robot.enable()
-        told = "cable 2: its motor's index is 20.* mm from where the last stop has it"
+        told = "upper right: its motor's index is 20.* mm from where the last stop has it"
         with pytest.raises(WorkFailedError, match=told):
             robot.carry_out("tighten", 30.0, **{"from": "last"})
         with pytest.raises(WorkFailedError, match=told):
