@@ -80,7 +80,8 @@ class CableRobot:
         motor["carriage_offset"] = winding.carriage_offset_m
         motor["carriage_distance"] = winding.carriage_distance_m
         motor["angle_start"] = motor["angle"]
-        motor["cable_start"] = self.distance_m(i) + self._plant.start.slack_m
+        slack_m = np.broadcast_to(self._plant.start.slack_m, self.n)
+        motor["cable_start"] = self.distance_m(i) + float(slack_m[i])
         return motor
 
     def step(self, i: int, until: float) -> MotorSample:

@@ -95,6 +95,9 @@ class WindingPlant(Profile):
     """Of gear and belt, at the drum."""
 
 
+_Slack_m = Annotated[float, Field(ge=0.0, le=10.0)]
+
+
 class StartPlant(Profile):
     """How the robot stands at power-up."""
 
@@ -104,8 +107,8 @@ class StartPlant(Profile):
     """Of a platform in a plane; the profile's at home where left out."""
     rotation_deg: Annotated[tuple[_Angle_deg, ...], Field(min_length=3, max_length=3)] | None = None
     """Rotation vector of a platform in space; likewise."""
-    slack_m: Annotated[float, Field(ge=0.0, le=10.0)] = 0.02
-    """Of every cable."""
+    slack_m: _Slack_m | tuple[_Slack_m, ...] = 0.02
+    """Of every cable, or of each."""
 
 
 class FloorPlant(Profile):
@@ -165,8 +168,14 @@ class RobotPlant(PlantFile):
             "geometry.exit_errors_m": geometry.exit_errors_m,
             "geometry.anchor_errors_m": geometry.anchor_errors_m,
         }
-        radii, motors = self.cables.drum_radius_errors, self.motors
-        for key, values in {**errors, "cables.drum_radius_errors": radii, "motors": motors}.items():
+        slack_m = self.start.slack_m
+        for_each = {
+            **errors,
+            "cables.drum_radius_errors": self.cables.drum_radius_errors,
+            "start.slack_m": slack_m if isinstance(slack_m, tuple) else (),
+            "motors": self.motors,
+        }
+        for key, values in for_each.items():
             if values and len(values) != n:
                 raise ValueError(f"{key}: {len(values)} entries; allowed: {n}, one for each axis")
         for k, slip in enumerate(self.cables.slips):

@@ -28,6 +28,7 @@ def test_each_motor_is_its_own() -> None:
     ("table", "reason"),
     [
         ({"motors": ({},)}, "motors: 1 entries; allowed: 3, one for each axis"),
+        ({"start": {"slack_m": (0.01, 0.02)}}, "start.slack_m: 2 entries; allowed: 3"),
         ({"cables": {"drum_radius_errors": (0.01,)}}, "cables.drum_radius_errors: 1 entries"),
         (
             {"geometry": {"exit_errors_m": ((0.0, 0.0), (0.0, 0.0), (0.0, 0.0, 0.1))}},

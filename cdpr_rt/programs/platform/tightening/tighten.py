@@ -15,6 +15,12 @@ from cdpr_rt.programs.platform.arrival import Arrival
 from cdpr_rt.programs.platform.platform_program import PlatformParts, PlatformProgram
 from cdpr_rt.programs.platform.tightening.home_lengths import LengthsAtHome
 from cdpr_rt.programs.platform.tightening.index_path import index_path
+from cdpr_rt.programs.platform.tightening.slack import (
+    TAKE_UP_SHARE,
+    SlackTakeUp,
+    Stillness,
+    TAKE_UP_m_s,
+)
 from cdpr_rt.programs.platform.tightening.standing import (
     bad_source,
     disagreement,
@@ -33,17 +39,11 @@ from cdpr_rt.robots.persistence.last_lengths import (
     off_index_m,
 )
 
-TAKE_UP_m_s = 0.05
-"""Speed at which slack is taken up."""
-TAKE_UP_SHARE = 0.4
-"""Tension while some cables are slack, as a share of the pretension."""
 INDEX_m_s = 0.1
 """Speed of the platform during the search for indices."""
 _SETTLING_S = 0.5
 _RISE_1_s = 1.0
 _FALL_S = 0.2
-_STILL_m = 0.0003
-_STILL_S = 0.3
 _HAND_OVER_S = 0.5
 _PULLED = 0.95
 _SLACK_m, _ONCE_TIGHT_m = 1.0, 0.05
@@ -93,16 +93,17 @@ class TightenProgram(PlatformProgram):
         self._checked = AxisFeedback(cable_m.size)
         inertia = np.full(cable_m.size, parts.control.inertia_kg_m2)
         self._winches = WinchSpeedLoop(inertia, cable_m, parts.period_s)
-        self._winches.paying_out_m_s[:] = -TAKE_UP_m_s
+        self._slack = SlackTakeUp(self._winches, parts, self._cable)
         # a long cable comes in by its sag rather than by its stretch, from where friction has it
         shares = np.array([0.0, 0.5 * TAKE_UP_SHARE, OVERSHOOT])[:, None]
         lengths_m = [parts.control.lengths_at_home(N) for N in shares * self._pretension_N]
         self._once_tight_m = _ONCE_TIGHT_m + float(np.ptp(lengths_m, axis=0).max())
-        self._start_rad, self._still_rad = np.zeros((2, cable_m.size))
+        self._start_rad = np.zeros(cable_m.size)
+        self._stillness = Stillness(self._cable, parts.period_s)
         self._at_home = LengthsAtHome(parts, cable_m, self._home_pretension_N)
         self._stage = 0
         self._share = 0.0
-        self._still = self._cycles = 0
+        self._cycles = self._handing_over_cycles = 0
         self._source = "home"
         self._last: StoppedLengths | None = None
         self._feedback = AxisFeedback(cable_m.size)
@@ -120,12 +121,14 @@ class TightenProgram(PlatformProgram):
         self._pretension_N[:] = self._from_N[:] = self._to_N[:] = self._home_pretension_N
         self._blend, self._hangs, self._hands_over = 1.0, False, False
         self._last = None
-        self._stage = self._still = self._cycles = 0
+        self._stage = self._cycles = 0
         if parts.tight:
             super().start(feedback, setpoint, torque_Nm)
             self._look_for_indices()
             return
-        self._start_rad[:] = self._still_rad[:] = feedback.position_rad
+        self._start_rad[:] = feedback.position_rad
+        self._stillness.begin(feedback.position_rad)
+        self._slack.begin(feedback.position_rad)
         self._winches.begin(feedback, parts.estimator.estimate.velocity_rad_s, torque_Nm)
         self._control.clear_compensation()
         self._control.clear_load_cell_fault()
@@ -149,7 +152,7 @@ class TightenProgram(PlatformProgram):
         self._share += min(max(goal - self._share, -step), step)
         self._blend = min(self._blend + self._parts.period_s * _RISE_1_s, 1.0)
         self._pretension_N[:] = self._from_N + self._blend * (self._to_N - self._from_N)
-        np.multiply(self._pretension_N, self._share, out=self._winches.high_N)
+        self._bound_tension(feedback)
         self._winches.update(feedback, torque_Nm)
         if self._source == "home" and self._stage >= _FITTED_FROM:
             self._control.pull_fit.take(feedback.position_rad, self._winches.tension_N)
@@ -158,7 +161,7 @@ class TightenProgram(PlatformProgram):
         self._cycles += 1
         if self._stopping:
             self._at_rest = self._share == 0.0
-        elif self._stands_still(feedback, self._share == goal and self._blend == 1.0):
+        elif self._stillness.lasts(feedback.position_rad, self._pulls()):
             self._next_stage(feedback, torque_Nm)
         else:
             self._fail_if(self._trouble(feedback))
@@ -227,28 +230,38 @@ class TightenProgram(PlatformProgram):
 
     # -- taking up slack
 
-    def _stands_still(self, feedback: AxisFeedback, pulling: bool) -> bool:
-        winches = self._winches
-        pulling = pulling and bool((winches.tension_N > _PULLED * winches.high_N).all())
-        moved_m = np.abs((feedback.position_rad - self._still_rad) * self._cable).max()
-        if not pulling or moved_m > _STILL_m:
-            self._still_rad[:] = feedback.position_rad
-            self._still = 0
-        self._still += 1
-        return self._still * self._parts.period_s > _STILL_S
+    def _bound_tension(self, feedback: AxisFeedback) -> None:
+        """Have the winches pull with a share of the pretension, or as their slack ended."""
+        high_N = self._winches.high_N
+        np.multiply(self._pretension_N, self._share, out=high_N)
+        self._winches.low_N[:], self._winches.paying_out_m_s[:] = 0.0, -TAKE_UP_m_s
+        if self._stage == 0 and not self._stopping:
+            share = self._share / TAKE_UP_SHARE
+            self._slack.update(feedback.position_rad, self._pretension_N, share)
+        elif not self._stopping:
+            np.maximum(high_N, self._slack.tight_N, out=high_N)
+
+    def _pulls(self) -> bool:
+        """Return whether all winches pull with what they are to by now."""
+        ready = self._share == _STAGES[self._stage][1] and self._blend == 1.0
+        ready = ready and (self._stage > 0 or self._slack.tight)
+        return ready and bool((self._winches.tension_N > _PULLED * self._winches.high_N).all())
 
     def _next_stage(self, feedback: AxisFeedback, torque_Nm: FloatArray) -> None:
-        self._still = 0
+        self._stillness.begin(feedback.position_rad)
         if self._stage == 0:
             self._start_rad[:] = feedback.position_rad
         if self._stage + 1 == len(_STAGES):
             self._end_tight(feedback, torque_Nm)
             return
-        self._fail_if(self._why_not_to_pull(feedback))
+        uneven = self._slack.uneven(self._once_tight_m) if self._stage == 0 else ""
+        self._fail_if(uneven or self._why_not_to_pull(feedback))
         if self._failure:
             return
         stage = _STAGES[self._stage][0]
-        if stage == "pull":
+        if stage == "slack":
+            self._share = 0.0  # up from what the cables are pulled with
+        elif stage == "pull":
             self._control.pull_fit.begin(feedback.position_rad)
         elif stage == "back":
             self._at_home.keep_rising(feedback)
@@ -269,7 +282,7 @@ class TightenProgram(PlatformProgram):
             self._control.begin(feedback)
             self._take_over(feedback, torque_Nm)
             self._hands_over, self._path = True, []
-            self._let_go_cycle = feedback.cycle
+            self._let_go_cycle, self._handing_over_cycles = feedback.cycle, 0
 
     def _let_go(self, feedback: AxisFeedback, setpoint: Setpoint, torque_Nm: FloatArray) -> None:
         """Blend out what the platform is pressed on its stand with; then it may be moved.
@@ -279,9 +292,9 @@ class TightenProgram(PlatformProgram):
         """
         self._control.stand_still(on_stand=True)
         self._loop.update(feedback, setpoint, torque_Nm)
-        self._still += 1
+        self._handing_over_cycles += 1
         self._let_go_cycle = feedback.cycle
-        if self._still * self._parts.period_s > _HAND_OVER_S:
+        if self._handing_over_cycles * self._parts.period_s > _HAND_OVER_S:
             self._finish(feedback, setpoint, torque_Nm)
 
     def _take_last(self) -> None:
@@ -338,6 +351,8 @@ class TightenProgram(PlatformProgram):
 
     def _trouble(self, feedback: AxisFeedback) -> str:
         moved_m = np.abs((feedback.position_rad - self._start_rad) * self._cable)
+        if dragged := self._slack.dragged():
+            return dragged
         i = int(moved_m.argmax())
         # what stands does not move once its cables are tight
         allowed_m = self._once_tight_m if self._stage > 0 else _SLACK_m

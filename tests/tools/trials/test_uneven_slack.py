@@ -1,0 +1,62 @@
+"""Cables some of which have much more slack than others do not pull the platform off its stand."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cdpr_profiles import load_robot
+from cdpr_tools.errors import WorkFailedError
+from cdpr_tools.trials.lockstep import LockstepRobot
+
+pytestmark = pytest.mark.long
+
+
+def plant(path: Path, slack_m: list[float]) -> Path:
+    path.write_text(f"[start]\nslack_m = {slack_m}\n")
+    return path
+
+
+def moved_mm(robot: LockstepRobot, name: str) -> tuple[float, float]:
+    """Return how far the platform truly is from home, mm, and how far it is turned, deg."""
+    platform, truth = load_robot(name).platform, robot.truth()
+    assert platform is not None
+    home_m = np.zeros(3)
+    home_m[: len(platform.home_m)] = platform.home_m
+    angle = np.arccos(np.clip(0.5 * (np.trace(truth["rotation"]) - 1.0), -1.0, 1.0))
+    return 1e3 * float(np.abs(truth["position_m"] - home_m).max()), float(np.degrees(angle))
+
+
+@pytest.mark.parametrize(
+    ("name", "slack_m"),
+    [
+        ("spatial-8", [0.02, 0.15, 0.04, 0.3, 0.01, 0.09, 0.2, 0.05]),
+        ("planar-3", [0.02, 0.15, 0.0]),
+        ("point-4", [0.25, 0.0, 0.1, 0.04]),
+    ],
+)
+def test_slack_is_taken_up_without_moving_the_platform(
+    name: str, slack_m: list[float], tmp_path: Path
+) -> None:
+    with LockstepRobot(name, plant=plant(tmp_path / "plant.toml", slack_m)) as robot:
+        robot.enable()
+        robot.program("tighten")
+        while robot.progress.get("stage") != "beyond":
+            robot.run(0.1)
+            assert not robot.progress.get("trouble")
+        position_mm, turned_deg = moved_mm(robot, name)
+    assert position_mm < 0.5
+    assert turned_deg < 0.1
+
+
+def test_a_platform_too_light_for_its_winches_is_told_to_have_moved(tmp_path: Path) -> None:
+    """What turns a winch of `planar-4` without load pulls its platform of 3 kg along."""
+    file = plant(tmp_path / "plant.toml", [0.0, 0.3, 0.3, 0.3])
+    with LockstepRobot("planar-4", plant=file) as robot:
+        robot.enable()
+        with pytest.raises(
+            WorkFailedError, match=r"mm more slack than .* pulls so light a platform"
+        ):
+            robot.carry_out("tighten", 60.0)
