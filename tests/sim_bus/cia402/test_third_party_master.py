@@ -28,7 +28,7 @@ serve([drive], "simbus:" + sys.argv[1], mode=ClockMode(sys.argv[2]), until_stdin
 
 
 LONGEST_S = 60.0
-PATIENCES = ("SWITCH_OP_MODE", "SWITCH_STATE_FINAL")
+PATIENCES = ("CHECK_TPDO", "SWITCH_OP_MODE", "SWITCH_STATE_FINAL")
 """What the package waits for, for parts of a second only."""
 
 

@@ -59,7 +59,7 @@ class LoopRig:
         with contextlib.suppress(LeaseError):
             self.lease.release(self.token)
 
-    def turn_until(self, done: Callable[[], bool], seconds: float = 30.0) -> None:
+    def turn_until(self, done: Callable[[], bool], seconds: float = 300.0) -> None:
         deadline = time.monotonic() + seconds
         while not done():
             assert time.monotonic() < deadline, self.block.status()
