@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, field
 from enum import StrEnum
 from typing import Any, Final
 
 _SHOWN = 60
+_PLACE_UNITS: Final = {"position_m": (1e3, "mm"), "rotation_rad": (math.degrees(1.0), "deg")}
 
 
 class RefusalCode(StrEnum):
@@ -71,7 +73,7 @@ class CommandRefusal:
         index = self.arguments.get("index")
         place = "" if index is None else f"[{index}]"
         return ", ".join(
-            key if value is True else f"{key}{place}: value {shown(value)}"
+            key if value is True else f"{key}{place}: value {_in_units_of_places(key, value)}"
             for key, value in self.asked.items()
         )
 
@@ -103,6 +105,14 @@ class CommandRefusal:
         if self.code is RefusalCode.OUT_OF_RANGE and not all(map(_is_number, asked.values())):
             return False
         return all(is_sound(arguments.get(key)) for key, is_sound in _ARGUMENTS[self.code].items())
+
+
+def _in_units_of_places(key: str, value: Any) -> str:
+    """Return a value as it is told; of places in the units in which reasons tell them."""
+    if key not in _PLACE_UNITS or not isinstance(value, list) or not all(map(_is_number, value)):
+        return shown(value)
+    factor, unit = _PLACE_UNITS[key]
+    return f"{shown([round(factor * x, 1) + 0.0 for x in value])} {unit}"
 
 
 def _is_number(value: Any) -> bool:

@@ -6,6 +6,7 @@ from itertools import combinations
 
 import numpy as np
 
+from cdpr_profiles.errors import value_text
 from cdpr_profiles.platform import DIRECTIONS, PlatformFile, WIDEST_m, controlled_by_default
 
 _LEAST_ARM_m = 0.01
@@ -38,7 +39,7 @@ def platform_faults(
                 yield f"axes[{i}].{name}", "missing; allowed: one for each axis of a platform"
             elif given is not None and len(given) != size:
                 found = True
-                problem = f"{len(given)} coordinates; allowed: {size}, as platform.home_m has"
+                problem = _of_another_length(given, f"{size} coordinates, as platform.home_m has")
                 yield f"axes[{i}].{name}", problem
     yield from _box_faults(file)
     yield from _body_faults(file, size)
@@ -59,7 +60,12 @@ def _count_faults(file: PlatformFile, size: int) -> Iterator[tuple[str, str]]:
         given = getattr(file, key)
         if given is not None and len(given) != allowed:
             where = "a plane" if size == 2 else "space"
-            yield f"platform.{key}", f"{len(given)} numbers; allowed: {allowed} in {where}"
+            many = "1 number" if allowed == 1 else f"{allowed} numbers"
+            yield f"platform.{key}", _of_another_length(given, f"{many} in {where}")
+
+
+def _of_another_length(given: Sequence[float], allowed: str) -> str:
+    return f"value {value_text(given)}; allowed: {allowed}"
 
 
 def _body_faults(file: PlatformFile, size: int) -> Iterator[tuple[str, str]]:
@@ -69,8 +75,8 @@ def _body_faults(file: PlatformFile, size: int) -> Iterator[tuple[str, str]]:
     for key, box in boxes:
         for name, point in (("min_m", box.min_m), ("max_m", box.max_m)):
             if len(point) != size:
-                problem = f"{len(point)} coordinates; allowed: {size}, as platform.home_m has"
-                yield f"{key}.{name}", problem
+                allowed = f"{size} coordinates, as platform.home_m has"
+                yield f"{key}.{name}", _of_another_length(point, allowed)
                 return
         for i, (low, high) in enumerate(zip(box.min_m, box.max_m, strict=True)):
             if not low < high:
@@ -182,7 +188,8 @@ def _box_faults(file: PlatformFile) -> Iterator[tuple[str, str]]:
     for key in ("workspace_min_m", "workspace_max_m"):
         point = getattr(file, key)
         if len(point) != size:
-            yield f"platform.{key}", f"{len(point)} coordinates; allowed: {size}, as home_m has"
+            allowed = f"{size} coordinates, as home_m has"
+            yield f"platform.{key}", _of_another_length(point, allowed)
             return
     box = zip(file.workspace_min_m, file.home_m, file.workspace_max_m, strict=True)
     for i, (low, home, high) in enumerate(box):

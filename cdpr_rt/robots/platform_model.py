@@ -9,15 +9,21 @@ from functools import cached_property
 import numpy as np
 
 from cdpr_profiles import Robot
-from cdpr_profiles.platform import DIRECTIONS, Platform
+from cdpr_profiles.platform import Platform
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.core.supervision.limits import Limits
 from cdpr_rt.robots.interference.interference import Interference, in_words
 from cdpr_rt.robots.kinematics.cable_kernel import ANCHOR, RADIUS
-from cdpr_rt.robots.kinematics.kinematics import PLANAR, SPATIAL, CableKinematics
+from cdpr_rt.robots.kinematics.kinematics import CableKinematics
 from cdpr_rt.robots.kinematics.pose import Pose
 from cdpr_rt.robots.kinematics.pose_setpoint import poses_of_coordinates
-from cdpr_rt.robots.rigid_body import G_m_s2, home_rotation, in_space, inertia_kg_m2
+from cdpr_rt.robots.rigid_body import (
+    G_m_s2,
+    directions_of,
+    home_rotation,
+    in_space,
+    inertia_kg_m2,
+)
 from cdpr_rt.robots.robot_arrays import limits_of
 from cdpr_rt.robots.tension.tension_distribution import TensionSolver, tension_distribution
 from cdpr_rt.robots.workspace import CableWorkspace, wrenches_in_motion
@@ -258,13 +264,6 @@ def _torque_limited_N(robot: Robot, limits: Limits, high_N: FloatArray) -> Float
         fastest += _arm_m(platform) * np.sqrt(d - k) * platform.angular_acceleration_rad_s2
     left = (torque_Nm - rotor * fastest / per_rad) / per_rad
     return np.asarray(np.minimum(high_N, left))
-
-
-def directions_of(platform: Platform) -> tuple[int, ...]:
-    """Return which components of the twist the cables control."""
-    names = DIRECTIONS[len(platform.home_m)]
-    places = SPATIAL if len(names) == len(SPATIAL) else PLANAR
-    return tuple(i for name, i in zip(names, places, strict=True) if name in platform.controlled)
 
 
 def _arm_m(platform: Platform) -> float:

@@ -65,15 +65,20 @@ def free_directions(platform: Platform) -> tuple[int, ...]:
     return tuple(range(size)) if is_point(platform) else _TWIST[size]
 
 
+def directions_of(platform: Platform) -> tuple[int, ...]:
+    """Return which components of the twist the cables control."""
+    size = len(platform.home_m)
+    names = zip(DIRECTIONS[size], _TWIST[size], strict=True)
+    return tuple(i for name, i in names if name in platform.controlled)
+
+
 def orientations(platform: Platform) -> FloatArray:
     """Return rotation vectors (k, 3) from home that stand for all that targets may have.
 
     None first; then those of the largest angle about each controlled axis, and, where several are
     controlled, about the diagonals between these.
     """
-    names = DIRECTIONS[len(platform.home_m)]
-    axes = [_TWIST[len(platform.home_m)][names.index(name)] - 3 for name in platform.controlled]
-    axes = [axis for axis in axes if axis >= 0]
+    axes = [i - 3 for i in directions_of(platform) if i >= 3]
     angle = platform.workspace_angle_rad
     if angle == 0.0 or not axes:
         return np.zeros((1, 3))

@@ -10,12 +10,11 @@ from typing import Any, Final
 import numpy as np
 
 from cdpr_profiles import Robot, RobotAxis
-from cdpr_profiles.calibration.geometry import GeometryCalibration
 from cdpr_profiles.devices.tension_sensor import load_tension_sensors
-from cdpr_profiles.platform import Platform
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.core.estimate import WinchArrays
 from cdpr_rt.core.supervision.limits import DEFAULT_REACTIONS, Limits, reactions_of
+from cdpr_rt.robots.length_disagreement import allowed_disagreement_m
 
 RATED_SPEED_SHARE: Final = 0.2
 """Default speed limit over the motors' rated speed."""
@@ -28,13 +27,6 @@ SLACK_SHARE: Final = 0.25
 FOLLOWING_m: Final = 0.15
 """Default following error of a platform's cables: three times the lag at which its set-point waits
 for it."""
-DISAGREE_SHARE: Final = 0.0075
-DISAGREE_m: Final = 0.03
-"""Default limit of the lengths' normalised residual: over the diagonal of the box around the exit
-points, and at most."""
-CALIBRATED_SHARE: Final = 1.0 / 3.0
-CALIBRATED_m: Final = 0.005
-"""Share of it once the geometry has been calibrated, and its least value then."""
 LOW_SHARE: Final = 0.5
 """Supervised over planned least tension, where tensions are estimated from torques."""
 
@@ -69,8 +61,9 @@ def limits_of(robot: Robot, *, calibration_in_doubt: bool = False) -> Limits:
         cable_m = np.array([axis.winch.cable_m_per_motor_rad for axis in axes])
         following = np.maximum(following, FOLLOWING_m / np.abs(cable_m))
     figures: dict[str, Any] = {key: one for key, one in file if isinstance(one, int | float)}
-    known = None if calibration_in_doubt else robot.calibration
-    figures.setdefault("lengths_disagree_m", _disagreement_m(robot.platform, known))
+    if robot.platform is not None:
+        known = None if calibration_in_doubt else robot.calibration
+        figures.setdefault("lengths_disagree_m", allowed_disagreement_m(robot.platform, known))
     return Limits(
         torque_Nm=torque_Nm,
         torque_rate_Nm_s=each(file.torque_rate_Nm_s, torque_Nm / TORQUE_RISE_S),
@@ -84,22 +77,6 @@ def limits_of(robot: Robot, *, calibration_in_doubt: bool = False) -> Limits:
         reactions=reactions_of(file.reactions, lowers=can_lower(robot)),
         **figures,
     )
-
-
-def exit_point_diagonal_m(platform: Platform) -> float:
-    """Return the diagonal of the box around a platform's exit points."""
-    return float(np.linalg.norm(np.ptp(np.array(platform.exit_points_m), axis=0)))
-
-
-def _disagreement_m(platform: Platform | None, calibration: GeometryCalibration | None) -> float:
-    """Return by how much lengths may disagree: on a small frame a slip tells less."""
-    if platform is None:
-        return DISAGREE_m
-    most_m = min(DISAGREE_m, DISAGREE_SHARE * exit_point_diagonal_m(platform))
-    if calibration is None:
-        return most_m
-    expected_m = 1e-3 * calibration.predicted_3_sigma_mm
-    return min(most_m, max(CALIBRATED_SHARE * most_m, CALIBRATED_m, expected_m))
 
 
 def supervisor_limits(limits: Limits, robot: Robot) -> Limits:

@@ -9,6 +9,7 @@ from typing import Annotated
 import numpy as np
 from pydantic import Field
 
+from cdpr_profiles.errors import value_text
 from cdpr_profiles.reading.reader import Profile
 from cdpr_profiles.winch import Winch
 from cdpr_sim_bus.camera.camera_plant import CameraPlant
@@ -189,7 +190,7 @@ class RobotPlant(PlantFile):
             points |= {f"{key}[{i}]": vector for i, vector in enumerate(vectors)}
         for key, point in points.items():
             if point is not None and len(point) != size:
-                raise ValueError(f"{key}: {len(point)} coordinates; allowed: {size}")
+                raise ValueError(f"{key}: value {value_text(point)}; allowed: {size} coordinates")
         if size == 2 and self.start.rotation_deg is not None:
             raise ValueError("start.rotation_deg: allowed: in space; in a plane start.angle_deg")
         if size == 3 and self.start.angle_deg is not None:

@@ -32,7 +32,17 @@ REFUSALS = [
         CommandRefusal(
             RefusalCode.NOT_FEASIBLE, "pose", {"position_m": [0.1, 2.0]}, {"why": "cable 1"}
         ),
-        "pose: position_m: value [0.1, 2.0]: cable 1",
+        "pose: position_m: value [100.0, 2000.0] mm: cable 1",
+    ),
+    (
+        CommandRefusal(
+            RefusalCode.NOT_FEASIBLE,
+            "pose",
+            {"position_m": [0.0, -0.2], "rotation_rad": [0.1]},
+            {"why": "on the way, at 0.0, -100.0 mm turned by 2.9 deg: cable 1"},
+        ),
+        "pose: position_m: value [0.0, -200.0] mm, rotation_rad: value [5.7] deg: on the way, at "
+        "0.0, -100.0 mm turned by 2.9 deg: cable 1",
     ),
     (
         CommandRefusal(

@@ -73,7 +73,11 @@ def test_what_the_file_says_arrives(tmp_path: Path) -> None:
     ("replaced", "key", "problem"),
     [
         (("exit_point_m = [0.0, 0.0]\n", ""), "axes[2].exit_point_m", "missing"),
-        (("[0.0, 0.0]", "[0.0, 0.0, 0.0]"), "axes[2].exit_point_m", "allowed: 2, as platform"),
+        (
+            ("[0.0, 0.0]", "[0.0, 0.0, 0.0]"),
+            "axes[2].exit_point_m",
+            "2 coordinates, as platform",
+        ),
         (("[0.0, 0.0]", "[0.0, 2000.0]"), "axes[2].exit_point_m[1]", "-1000 to 1000, in metres"),
         (("home_m = [0.0, 1.3]", "home_m = [0.7, 1.3]"), "platform.home_m[0]", "-0.6 to 0.6"),
         (("home_m = [0.0, 1.3]", "home_m = [0.0, 2.5]"), "platform.home_m[1]", "up to 2.4"),
@@ -110,14 +114,16 @@ HOME = "home_m = [0.0, 0.0, 0.5]"
     [
         (WALL, "= 0.05\n", "= 0.0\n", "platform.inertia_kg_m2", "all above 0"),
         (WALL, "= 0.05\n", "= 5e4\n", "platform.inertia_kg_m2", "is it in kg m2?"),
-        (WALL, "= 0.05\n", "= [1, 1]\n", "platform.inertia_kg_m2", "2 numbers; allowed: 1 in a"),
-        (HALL, INERTIA, "inertia_kg_m2 = 1.0", "platform.inertia_kg_m2", "allowed: 6 in space"),
+        (WALL, "= 0.05\n", "= [1, 1]\n", "platform.inertia_kg_m2",
+         "value [1.0, 1.0]; allowed: 1 number in a"),
+        (HALL, INERTIA, "inertia_kg_m2 = 1.0", "platform.inertia_kg_m2",
+         "value [1.0]; allowed: 6 numbers in space"),
         (HALL, "16.7, 0.0,", "16.7, 17.0,", "platform.inertia_kg_m2", "all above 0"),
         (HALL, "16.7, 0.0,", "40.0, 0.0,", "platform.inertia_kg_m2", "sum of the two others"),
         (HALL, HOME, HOME + "\nhome_rotation_rad = [0.0, 0.0, 90.0]",
          "platform.home_rotation_rad", "is it in degrees?"),
         (HALL, HOME, HOME + "\nhome_rotation_rad = 0.1", "platform.home_rotation_rad",
-         "3 in space"),
+         "value [0.1]; allowed: 3 numbers in space"),
         (HALL, HOME, HOME + "\nhome_rotation_rad = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]",
          "platform.home_rotation_rad", "value [[1, 0, 0], [0, 1, 0], [0, 0, 1]]; allowed: three n"),
         (HALL, INERTIA, "inertia_kg_m2 = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]",
@@ -223,7 +229,11 @@ def test_body_and_obstacles_are_boxes_of_the_robots_own_dimension(tmp_path: Path
     assert platform.clearance_m == 0.01
     for wrong, key, problem in (
         ("max_m = [0.1, -0.1]", "platform.obstacles[0].max_m[1]", "above 0"),
-        ("max_m = [0.1, 0.2, 0.3]", "platform.obstacles[0].max_m", "3 coordinates; allowed: 2"),
+        (
+            "max_m = [0.1, 0.2, 0.3]",
+            "platform.obstacles[0].max_m",
+            "3]; allowed: 2",
+        ),
         ("max_m = [0.1, 2000.0]", "platform.obstacles[0].max_m[1]", "in metres"),
         ("max = [0.1, 0.2]", "platform.obstacles[0].max", "did you mean 'max_m'?"),
     ):

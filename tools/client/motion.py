@@ -77,18 +77,25 @@ def is_done(progress: dict[str, Any]) -> bool:
 
 
 class ProgressNotes:
-    """Says how a motion goes on, each thing once: its stages, what holds it back, its progress."""
+    """Says how a motion goes on, each thing once: its stages, what holds it back, its progress.
 
-    def __init__(self, out: Output | None) -> None:
+    What is in a `status` of before is not said.
+    """
+
+    def __init__(self, out: Output | None, status: dict[str, Any] | None = None) -> None:
         self._out = out
         self._stage = self._held_back = ""
+        if status is not None:
+            progress = status.get("program_progress") or {}
+            self._stage = _stage(str(status["program"]), progress)
+            self._held_back = progress.get("held_back") or ""
         self._next_s = time.monotonic() + TELL_S
 
     def __call__(self, program: str, progress: dict[str, Any]) -> None:
         """Take in the progress of a program."""
         if self._out is None:
             return
-        stage = stage_text(program, progress) or target_text(progress)
+        stage = _stage(program, progress)
         if stage and stage != self._stage:
             self._out.note(f"{stage} ...")
             self._next_s = time.monotonic() + TELL_S
@@ -100,6 +107,10 @@ class ProgressNotes:
             self._next_s = time.monotonic() + TELL_S
             if text := _so_far(progress):
                 self._out.note(text)
+
+
+def _stage(program: str, progress: dict[str, Any]) -> str:
+    return stage_text(program, progress) or target_text(progress)
 
 
 def _so_far(progress: dict[str, Any]) -> str:

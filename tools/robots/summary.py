@@ -12,6 +12,7 @@ import numpy as np
 from cdpr_profiles import Robot
 from cdpr_profiles.platform import Platform
 from cdpr_rt.arrays import FloatArray
+from cdpr_rt.core.supervision.limits import Limits
 from cdpr_rt.errors import GeometryError
 from cdpr_rt.robots.cable_loss.prediction import SWING_S, corner_swings
 from cdpr_rt.robots.free_rotation import free_rotation
@@ -83,12 +84,19 @@ def _of_tensions(
         "reserve_at_rest_N": _finite(still.min()),
         "reserve_in_motion_N": _finite(moving.min()),
         "lowest_resonance_Hz": float(lowest_resonance_Hz(statics.model, robot.axes, points).min()),
+        "lengths_disagree_m": _lengths_disagree_m(limits, platform),
     }
     of_all["loop"] = _of_loop(robot, statics.model)
     if statics.turns_freely:
         of_all["turns_at_most_rad"] = _finite(np.abs(statics.angle_rad(points)).max())
         of_all["free_rotation"] = _of_free_rotation(statics.model)
     return of_all
+
+
+def _lengths_disagree_m(limits: Limits, platform: Platform) -> float | None:
+    """Return by how much lengths may disagree; None where no cable is redundant: they cannot."""
+    redundant = len(platform.exit_points_m) > len(platform.controlled)
+    return limits.lengths_disagree_m if redundant else None
 
 
 def _of_free_rotation(model: PlatformModel) -> dict[str, float] | None:
@@ -193,6 +201,7 @@ def _tension_lines(figures: dict[str, Any]) -> list[str]:
     lines.append(
         f"resonance  rotors against the platform over the cables at {lowest:.1f} Hz or more"
     )
+    lines.append(_disagreement_line(figures["lengths_disagree_m"]))
     if figures["loop"] is not None:
         lines += _loop_lines(figures["loop"])
     turns = figures.get("turns_at_most_rad", 0.0)
@@ -201,6 +210,13 @@ def _tension_lines(figures: dict[str, Any]) -> list[str]:
         lines.append(f"           it {turning} there, which no cable can prevent")
         lines += _free_rotation_lines(figures["free_rotation"])
     return lines
+
+
+def _disagreement_line(allowed_m: float | None) -> str:
+    if allowed_m is None:
+        return "lengths    cannot contradict each other: a cable that slips is not noticed"
+    apart_mm = 1e3 * allowed_m
+    return f"lengths    that contradict each other by more than {apart_mm:.1f} mm end a motion"
 
 
 def _loop_lines(loop: dict[str, float]) -> list[str]:

@@ -15,7 +15,7 @@ from pydantic import Field, model_validator
 
 from cdpr_profiles import Robot
 from cdpr_profiles.calibration.geometry import geometry_sha256, write_text
-from cdpr_profiles.errors import ProfileError
+from cdpr_profiles.errors import ProfileError, value_text
 from cdpr_profiles.reading.bounded_input import read_text
 from cdpr_profiles.reading.reader import Profile, read_json_model
 from cdpr_rt.arrays import FloatArray
@@ -60,7 +60,7 @@ class PoseReading(Profile):
         if (self.rotation is None) != (self.rotation_std_rad is None):
             raise ValueError("rotation and rotation_std_rad: allowed: both or none")
         if self.position_m is not None and len(self.position_m) != 3:
-            raise ValueError(f"position_m: {len(self.position_m)} numbers; allowed: 3")
+            raise ValueError(f"position_m: value {value_text(self.position_m)}; allowed: 3 numbers")
         if self.rotation is not None:
             if [len(row) for row in self.rotation] != [3, 3, 3]:
                 raise ValueError("rotation: allowed: 3 rows of 3 numbers")

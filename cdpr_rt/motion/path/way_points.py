@@ -12,7 +12,7 @@ from typing import Annotated, Any, Final
 import numpy as np
 from pydantic import Field
 
-from cdpr_profiles.errors import ProfileError
+from cdpr_profiles.errors import ProfileError, value_text
 from cdpr_profiles.reading.bounded_input import read_text
 from cdpr_profiles.reading.reader import Profile, read_toml_model
 from cdpr_rt.motion.path.description import (
@@ -83,7 +83,8 @@ def read_toml_points(path: Path, coordinates: Coordinates) -> PathDescription:
 
 def _require_count(path: Path, key: str, values: tuple[float, ...], count: int) -> None:
     if len(values) != count:
-        raise ProfileError(path, key, f"{len(values)} numbers; allowed: {count} for this robot")
+        allowed = f"{count} numbers for this robot"
+        raise ProfileError(path, key, f"value {value_text(values)}; allowed: {allowed}")
 
 
 def read_csv_points(

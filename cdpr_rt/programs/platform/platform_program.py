@@ -25,8 +25,8 @@ from cdpr_rt.refusal import CommandRefusal, RefusalCode
 from cdpr_rt.robots.interface import PlatformControl, RobotModel
 from cdpr_rt.robots.kinematics.free_rotation_kernel import SWINGS_m
 from cdpr_rt.robots.kinematics.pose_setpoint import pose_of_coordinates, write_quaternion
+from cdpr_rt.robots.length_disagreement import exit_point_diagonal_m
 from cdpr_rt.robots.persistence.last_lengths import LastLengths
-from cdpr_rt.robots.robot_arrays import exit_point_diagonal_m
 
 _SLOWED_m, _WAITING_m = 0.02, 0.05
 _LEAST_PACE = 1e-3
@@ -82,8 +82,10 @@ class PlatformParts:
         names: Sequence[str] = (),
     ) -> None:
         self.model, self.platform = model, model.platform
-        self.lengths_allowed_m = min(model.platform.home_tolerance_m, lengths_disagree_m)
+        self.lengths_allowed_m = lengths_disagree_m
         """By how much the cables' lengths may disagree."""
+        self.home_lengths_allowed_m = min(model.platform.home_tolerance_m, lengths_disagree_m)
+        """The same at home, where drums cannot have made them differ."""
         self.names = tuple(names) or tuple(map(default_name, range(control.torque_Nm.size)))
         """What messages call the cables, by their axes."""
         self.near_m = max(NEAR_m, NEAR_SHARE * exit_point_diagonal_m(model.platform))

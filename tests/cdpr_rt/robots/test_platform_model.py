@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 
 import numpy as np
 import pytest
@@ -15,7 +16,8 @@ from cdpr_profiles.platform import Platform
 from cdpr_profiles.robot import Robot
 from cdpr_rt.robots.interface import TensionOutcome
 from cdpr_rt.robots.platform.cable_control import CableControl
-from cdpr_rt.robots.platform_model import RESERVE, directions_of, platform_model_of
+from cdpr_rt.robots.platform_model import RESERVE, platform_model_of
+from cdpr_rt.robots.rigid_body import directions_of
 from cdpr_rt.robots.robot_arrays import limits_of
 from tests.profiles.test_geometry_calibration import calibration
 
@@ -86,19 +88,32 @@ def test_least_tensions_of_three_cables_have_the_least_sum(
         assert (t - model.low_N).min() == pytest.approx(0.0, abs=1e-7)
 
 
-@pytest.mark.parametrize(
-    ("size", "allowed_m"),
-    [(0.35, 0.01312), (1.0, 0.03), (3.0, 0.03)],
-    ids=["board", "wall", "hall"],
-)
-def test_lengths_may_disagree_by_less_on_a_smaller_frame(size: float, allowed_m: float) -> None:
-    assert PLANAR.platform is not None
-    exits = tuple(tuple(size * x for x in point) for point in PLANAR.platform.exit_points_m)
-    platform = dataclasses.replace(PLANAR.platform, exit_points_m=exits)
-    robot = dataclasses.replace(PLANAR, platform=platform)
-    assert limits_of(robot).lengths_disagree_m == pytest.approx(allowed_m, abs=1e-5)
+@pytest.mark.parametrize("name", ["planar-3", "planar-4", "point-4", "spatial-8", "suspended-8"])
+@pytest.mark.parametrize("size", [0.3, 1.0, 3.0])
+def test_lengths_may_disagree_by_what_tape_and_drums_do(name: str, size: float) -> None:
+    robot = _of_size(load_robot(name), size)
+    assert robot.platform is not None
+    frame_m = np.linalg.norm(np.ptp(np.array(robot.platform.exit_points_m), axis=0))
+    tape_m = min(0.022, 0.01 * float(frame_m))
+    drums_m = limits_of(robot).lengths_disagree_m - tape_m
+    assert drums_m == pytest.approx(3.0 * _residual_of_drums_m(robot, 0.003), rel=0.1)
     told = robot.limits.model_copy(update={"lengths_disagree_m": 0.05})
     assert limits_of(dataclasses.replace(robot, limits=told)).lengths_disagree_m == 0.05
+
+
+def test_lengths_of_a_facade_may_disagree_by_what_was_seen_there() -> None:
+    # 10 m x 6 m; exit points 5 mm and drums 0.3 % off, cables 30 % softer: 38 mm, nothing failed
+    facade = dataclasses.replace(
+        load_robot("planar-4").platform,
+        exit_points_m=((-5.0, 6.0), (5.0, 6.0), (5.0, 0.0), (-5.0, 0.0)),
+        anchor_points_m=((-0.4, 0.25), (0.4, 0.25), (0.4, -0.25), (-0.4, -0.25)),
+        controlled=("x", "y"),
+        home_m=(0.0, 1.5),
+        workspace_min_m=(-2.5, 1.7),
+        workspace_max_m=(2.5, 3.4),
+    )
+    robot = dataclasses.replace(load_robot("planar-4"), platform=facade)
+    assert 1.2 * 0.0381 < limits_of(robot).lengths_disagree_m < 0.06
 
 
 def test_a_slip_on_a_small_frame_is_noticed() -> None:
@@ -115,10 +130,19 @@ def test_a_slip_on_a_small_frame_is_noticed() -> None:
     assert (0.06 * _shares_of_a_slip(robot) > limits_of(robot).lengths_disagree_m).all()
 
 
-@pytest.mark.parametrize("name", ["planar-3", "planar-4", "point-4", "spatial-8", "suspended-8"])
-def test_a_slip_of_80_mm_is_more_than_lengths_may_disagree(name: str) -> None:
+@pytest.mark.parametrize(
+    ("name", "slip_m"),
+    [
+        ("planar-3", 0.06),
+        ("planar-4", 0.08),
+        ("point-4", 0.06),
+        ("spatial-8", 0.08),
+        ("suspended-8", 0.09),  # 19 m across: drums alone make 20 mm
+    ],
+)
+def test_a_slip_is_more_than_lengths_may_disagree(name: str, slip_m: float) -> None:
     robot = load_robot(name)
-    assert (0.08 * _shares_of_a_slip(robot) > limits_of(robot).lengths_disagree_m).all()
+    assert (slip_m * _shares_of_a_slip(robot) > limits_of(robot).lengths_disagree_m).all()
 
 
 @pytest.mark.parametrize("name", ["planar-3", "planar-4", "point-4", "spatial-8", "suspended-8"])
@@ -133,17 +157,63 @@ def test_on_a_calibrated_robot_a_slip_of_30_mm_is_more(name: str) -> None:
 
 @pytest.mark.parametrize(
     ("predicted_mm", "allowed_m"),
-    [(0.5, 0.005), (8.0, 0.008), (20.0, 0.01312)],
-    ids=["as finely as is judged", "as it was calibrated", "as without"],
+    [(0.5, 0.00545), (8.0, 0.008), (20.0, 0.01633)],
+    ids=["a third", "as it was calibrated", "as without"],
 )
 def test_a_calibration_on_a_small_frame_counts_as_far_as_it_is_good(
     predicted_mm: float, allowed_m: float
 ) -> None:
-    exits = tuple(tuple(0.35 * x for x in point) for point in PLANAR.platform.exit_points_m)
-    platform = dataclasses.replace(PLANAR.platform, exit_points_m=exits)
     known = calibration(PLANAR).model_copy(update={"predicted_3_sigma_mm": predicted_mm})
-    robot = dataclasses.replace(PLANAR, platform=platform, calibration=known)
-    assert limits_of(robot).lengths_disagree_m == pytest.approx(allowed_m, abs=1e-5)
+    robot = dataclasses.replace(_of_size(PLANAR, 0.28), calibration=known)
+    assert limits_of(robot).lengths_disagree_m == pytest.approx(allowed_m, abs=2e-5)
+
+
+def test_a_calibration_is_not_believed_finer_than_5_mm() -> None:
+    known = calibration(PLANAR).model_copy(update={"predicted_3_sigma_mm": 0.5})
+    robot = dataclasses.replace(_of_size(PLANAR, 0.2), calibration=known)
+    assert limits_of(robot).lengths_disagree_m == 0.005
+
+
+def _of_size(robot: Robot, size: float) -> Robot:
+    """Return a robot all of whose points are so many times as far from the origin."""
+    platform = robot.platform
+    assert platform is not None
+
+    def scaled(points: tuple[tuple[float, ...], ...]) -> tuple[tuple[float, ...], ...]:
+        return tuple(tuple(size * x for x in point) for point in points)
+
+    home, low, high = scaled((platform.home_m, platform.workspace_min_m, platform.workspace_max_m))
+    return dataclasses.replace(
+        robot,
+        platform=dataclasses.replace(
+            platform,
+            exit_points_m=scaled(platform.exit_points_m),
+            anchor_points_m=scaled(platform.anchor_points_m),
+            home_m=home,
+            workspace_min_m=low,
+            workspace_max_m=high,
+        ),
+    )
+
+
+def _residual_of_drums_m(robot: Robot, off: float) -> float:
+    """Return the standard deviation of a normalised residual at the worst corner, from draws."""
+    model = platform_model_of(robot)
+    kinematics, platform = model.kinematics, model.platform
+    shares = off * np.random.default_rng(5).standard_normal((2000, len(robot.axes)))
+    home_m = kinematics.lengths(model.home_pose).copy()
+    worst_m = 0.0
+    for corner in itertools.product(
+        *zip(platform.workspace_min_m, platform.workspace_max_m, strict=True)
+    ):
+        pose = model.pose(np.array(corner))
+        errors_m = shares * (kinematics.lengths(pose) - home_m)
+        J = kinematics.jacobian(pose)
+        fits = np.linalg.lstsq(J, errors_m.T, rcond=None)[0]
+        left_m = errors_m.T - J @ fits
+        redundancy = 1.0 - np.einsum("ij,ji->i", J, np.linalg.pinv(J))
+        worst_m = max(worst_m, float((left_m.std(axis=1) / np.sqrt(redundancy)).max()))
+    return worst_m
 
 
 def _shares_of_a_slip(robot: Robot) -> np.ndarray:

@@ -32,13 +32,13 @@ def test_each_motor_is_its_own() -> None:
         ({"cables": {"drum_radius_errors": (0.01,)}}, "cables.drum_radius_errors: 1 entries"),
         (
             {"geometry": {"exit_errors_m": ((0.0, 0.0), (0.0, 0.0), (0.0, 0.0, 0.1))}},
-            r"geometry.exit_errors_m\[2\]: 3 coordinates; allowed: 2",
+            r"geometry.exit_errors_m\[2\]: value \[0.0, 0.0, 0.1\]; allowed: 2",
         ),
         (
             {"cables": {"slips": ({"cable": 4, "at_s": 1.0, "slip_m": 0.01},)}},
             r"cables.slips\[0\].cable: 4; allowed: 1 to 3",
         ),
-        ({"start": {"position_m": (0.0, 1.0, 2.0)}}, "start.position_m: 3 coordinates"),
+        ({"start": {"position_m": (0.0, 1.0, 2.0)}}, r"start.position_m: value \[0.0, 1.0, 2.0\]"),
         ({"motor": {"load": {"kind": "hung_mass"}}}, "motor.load: allowed: inertia_kg_m2;"),
     ],
 )

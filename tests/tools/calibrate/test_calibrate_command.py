@@ -295,7 +295,7 @@ def test_a_cluster_that_is_not_there_is_told(more: tuple[str, ...]) -> None:
 @pytest.mark.parametrize(
     ("given", "named"),
     [
-        ({"position_m": (1.2,), "position_std_m": 0.001}, "1 numbers; allowed: 3"),
+        ({"position_m": (1.2,), "position_std_m": 0.001}, r"value \[1.2\]; allowed: 3 n"),
         ({"position_m": (1.0, 2.0, 3.0)}, "both or none"),
         ({"rotation": ((1.0, 0.0), (0.0, 1.0)), "rotation_std_rad": 0.01}, "3 rows"),
         ({"rotation": ((2.0, 0, 0), (0, 1.0, 0), (0, 0, 1.0)), "rotation_std_rad": 1}, "is none"),

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 from rich.table import Table
 
-from cdpr_tools.client.motion import finish
+from cdpr_tools.client.motion import ProgressNotes, finish
 from cdpr_tools.client.status_text import (
     after_stop_text,
     compensation_text,
@@ -208,3 +208,15 @@ def test_what_is_said_of_the_power_after_a_stop_is_what_is_known(
     keys: dict[str, Any], told: str
 ) -> None:
     assert after_stop_text(status_of(**keys)).startswith(told)
+
+
+def test_of_what_was_under_way_before_nothing_is_said(capsys: pytest.CaptureFixture[str]) -> None:
+    moved = {"target_m": [0.1, 0.2], "held_back": "friction"}
+    before = status_of(state="active", program="hold", program_progress=moved)
+    notes = ProgressNotes(Output(False), before)
+    notes("hold", moved)
+    assert not capsys.readouterr().err
+    notes("lower", {"stage": "home", "held_back": "friction"})
+    assert len(capsys.readouterr().err.splitlines()) == 1
+    ProgressNotes(Output(False))("hold", moved)
+    assert "moving to 100.0, 200.0 mm" in capsys.readouterr().err

@@ -26,3 +26,15 @@ def test_a_share_that_is_nearly_all_is_not_said_to_be_all() -> None:
     assert robot.platform is not None
     told = figures(robot, robot.platform) | {"target_share": 0.997}
     assert any("accepted in 99 % of it" in line for line in lines(robot, robot.platform, told))
+
+
+def test_it_is_said_whether_a_cable_that_slips_is_noticed() -> None:
+    for name, allowed, text in (
+        ("spatial-8", True, "more than 27.5 mm end a motion"),
+        ("suspended-6", False, "a cable that slips is not noticed"),
+    ):
+        robot = load_robot(name)
+        assert robot.platform is not None
+        told = figures(robot, robot.platform)
+        assert (told["lengths_disagree_m"] is not None) is allowed
+        assert any(text in line for line in lines(robot, robot.platform, told))

@@ -212,7 +212,7 @@ def _end(daemon: Daemon, out: Output) -> None:
     status = daemon.get("/status")
     had_died, ended, dies = status["state"] == DEAD, status, ""
     daemon.post("/shutdown")
-    notes, deadline = ProgressNotes(out), time.monotonic() + _END_S
+    notes, deadline = ProgressNotes(out, status), time.monotonic() + _END_S
     if status["state"] == "active":
         out.note("stopping: what moves is brought to rest, then the power goes off ...")
     while time.monotonic() < deadline:

@@ -14,7 +14,7 @@ from cdpr_profiles import Robot
 from cdpr_profiles.calibration.in_force import load_calibrated
 from cdpr_profiles.platform import NO_PLATFORM, FURTHEST_m, Platform
 from cdpr_rt.arrays import FloatArray
-from cdpr_rt.robots.platform_model import directions_of
+from cdpr_rt.robots.rigid_body import directions_of
 from cdpr_rt.robots.statics import Box, view_of
 from cdpr_rt.robots.workspace_analysis.criterion import criterion_of, turns_within
 from cdpr_tools.commands.options import (

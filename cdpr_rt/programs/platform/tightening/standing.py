@@ -71,7 +71,7 @@ def why_not_to_wind_in(parts: PlatformParts, length_m: FloatArray) -> str:
     not there, however slack they are. One may have slipped, as in `why_not_at_home`.
     """
     short_m = parts.control.lengths_at_home(np.zeros(length_m.size)) - length_m
-    allowed_m = parts.platform.home_tolerance_m + parts.lengths_allowed_m
+    allowed_m = parts.platform.home_tolerance_m + parts.home_lengths_allowed_m
     many = np.count_nonzero(short_m > allowed_m)
     if many <= 1:
         return ""
@@ -93,7 +93,7 @@ def why_not_at_home(
     """
     control = parts.control
     off_m = np.abs(length_m - control.lengths_at_home(tension_N))
-    allowed_m = parts.platform.home_tolerance_m + parts.lengths_allowed_m
+    allowed_m = parts.platform.home_tolerance_m + parts.home_lengths_allowed_m
     many = np.count_nonzero(off_m > allowed_m)
     if many > 1:
         return _not_at_home(
@@ -104,7 +104,7 @@ def why_not_at_home(
     control.begin(feedback, tension_N)
     here, home = control.estimated, parts.model.home
     near = distance_m(here, home, parts.scale_m) <= parts.platform.home_tolerance_m
-    if near or disagreement(parts):
+    if near or disagreement(parts, "home"):
         return ""
     return _not_at_home(f"it is {_place(here, parts.model.positions)}")
 
@@ -178,7 +178,7 @@ def why_not_to_hold(
     control, model = parts.control, parts.model
     control.take_lengths(length_m, feedback)
     control.begin(feedback)
-    why = _off(parts)
+    why = _off(parts, parts.lengths_allowed_m)
     carried = standing.carry(model.pose(control.estimated))
     if not why and (_turned_much(parts) or not carried):
         place = _place(control.estimated, model.positions)
@@ -205,14 +205,15 @@ def _not_pulled(here: FloatArray, k: int, why: str) -> str:
 
 def disagreement(parts: PlatformParts, source: str = "lengths") -> str:
     """Return by how much the lengths that the control has contradict each other, if too much."""
-    off = _off(parts)
-    if off and source == "home":
+    at_home = source == "home"
+    off = _off(parts, parts.home_lengths_allowed_m if at_home else parts.lengths_allowed_m)
+    if off and at_home:
         return f"{off}; it does not stand at home, or a point is not where the robot's file has it"
     return f"{off}; stand the platform at home and tighten from it" if off else ""
 
 
-def _off(parts: PlatformParts) -> str:
-    off_m, allowed_m = parts.control.residual_m, parts.lengths_allowed_m
+def _off(parts: PlatformParts, allowed_m: float) -> str:
+    off_m = parts.control.residual_m
     if off_m <= allowed_m:
         return ""
     return f"the cables' lengths disagree by {1e3 * off_m:.0f} mm, {1e3 * allowed_m:.0f} mm allowed"

@@ -69,7 +69,7 @@ def test_csv_that_is_refused(tmp_path, text, told):
 def test_toml_that_is_refused(tmp_path):
     file = tmp_path / "a.toml"
     file.write_text(TOML.replace("[0.1, 1.6]", "[0.1]"))
-    with pytest.raises(ProfileError, match=r"points\[2\].position_m: 1 numbers; allowed: 2"):
+    with pytest.raises(ProfileError, match=r"points\[2\].position_m: value \[0.1\]; allowed: 2 n"):
         read_path(file, PLANE, SETTINGS)
     file.write_text(TOML.replace("speed_m_s = 0.05", "sped_m_s = 0.05"))
     with pytest.raises(ProfileError, match="did you mean 'speed_m_s'"):

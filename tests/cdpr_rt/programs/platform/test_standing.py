@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.optimize import nnls
@@ -14,6 +16,7 @@ from cdpr_rt.core.exchange import AxisFeedback
 from cdpr_rt.programs.model import model_of
 from cdpr_rt.programs.platform.platform_program import PlatformParts
 from cdpr_rt.programs.platform.tightening.standing import (
+    disagreement,
     hangs,
     rests_at_home,
     why_not_at_home,
@@ -32,9 +35,11 @@ def parts(request: pytest.FixtureRequest) -> PlatformParts:
     return parts_of(request.param)
 
 
-def parts_of(name: str) -> PlatformParts:
+def parts_of(name: str, allowed_m: float | None = None) -> PlatformParts:
     robot = load_robot(name)
     n, limits = len(robot.axes), limits_of(robot)
+    if allowed_m is not None:
+        limits = replace(limits, lengths_disagree_m=allowed_m)
     model = model_of(robot.axes, PERIOD_S, [2.3e-3] * n, limits)
     made = platform_parts(robot, limits, model, Estimator(n, PERIOD_S, winches_of(robot.axes)))
     assert made is not None
@@ -122,3 +127,15 @@ def test_a_platform_that_rests_is_not_taken_to_hang_on_what_friction_leaves() ->
     raised = model.home + 2.0 * parts.platform.home_tolerance_m * np.eye(len(W))[2]
     raised_m = model.kinematics.lengths(model.pose(raised)) - home_m
     assert not rests_at_home(parts, length_m + raised_m, feedback)
+
+
+def test_of_a_large_frame_lengths_may_disagree_by_more_away_from_home() -> None:
+    parts = parts_of("spatial-8", 0.15)
+    control, feedback = parts.control, AxisFeedback(8)
+    feedback.valid[:] = True
+    slipped_m = control.lengths_at_home(control.low_N) + 0.2 * np.eye(8)[0]
+    control.take_lengths(slipped_m, feedback)
+    control.begin(feedback, control.low_N)
+    assert parts.platform.home_tolerance_m < control.residual_m < 0.15
+    assert not disagreement(parts, "last")
+    assert "50 mm allowed; it does not stand at home" in disagreement(parts, "home")
