@@ -16,7 +16,11 @@ from cdpr_rt.core.shared_block import MOST_AXES
 from cdpr_rt.core.supervision.limits import Limits
 from cdpr_rt.errors import GeometryError
 from cdpr_rt.robots.feasibility.not_held import point_text, why_not_held
-from cdpr_rt.robots.feasibility.turned_by_friction import turned_by_friction
+from cdpr_rt.robots.feasibility.turned_by_friction import (
+    moved_by_friction_m,
+    stretched_by_acceleration_m,
+    turned_by_friction,
+)
 from cdpr_rt.robots.interference.interference import in_words
 from cdpr_rt.robots.platform.loop_design import designed_loop
 from cdpr_rt.robots.rigid_body import in_space, is_point
@@ -271,10 +275,15 @@ def _loop(robot: Robot, statics: PlatformStatics) -> Iterator[Finding]:
         return  # said of the tensions
     slowest_Hz = loop.slowest_rad_s / math.tau
     if slowest_Hz < _SLOW_Hz:
+        off_mm = 1e3 * moved_by_friction_m(statics.model, robot.axes, loop.gains)
+        yield_mm = 1e3 * stretched_by_acceleration_m(statics.model, robot.axes)
         text = (
             f"a stable loop moves the platform's slowest mode at {slowest_Hz:.2g} Hz, so that it "
-            f"takes long to come to rest; {_SLOW_Hz:g} Hz and more wanted: stiffer cables, a "
-            "lighter platform or a shorter sync_period_s help"
+            "takes long to come to rest and runs over its targets: its cables yield by "
+            f"{yield_mm:.2g} mm as it is accelerated, and friction that is usual in such winches "
+            f"moves it by {off_mm:.2g} mm until the control overcomes it; {_SLOW_Hz:g} Hz and more "
+            "wanted: stiffer cables, less acceleration, a lighter platform or a shorter "
+            "sync_period_s help"
         )
         yield Finding("platform.mass_kg", text, impossible=False)
     if text := turned_by_friction(statics, robot.axes, loop.gains):

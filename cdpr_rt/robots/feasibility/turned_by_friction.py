@@ -36,6 +36,50 @@ def loop_stiffness(model: PlatformModel, gains: LoopGains, q: FloatArray) -> Flo
     return np.asarray(D @ np.linalg.solve(mass, D) / (4.0 * DAMPING_RATIO**2))
 
 
+def moved_by_friction_m(model: PlatformModel, axes: Sequence[RobotAxis], gains: LoopGains) -> float:
+    """Return how far usual friction moves the platform along a direction, as `turned_by_friction`.
+
+    One standard deviation, along the direction and at the place where it is most.
+    """
+    friction_N = _usual_friction_N(axes)
+    poses = design_poses(model)
+    return max(float(_moved(model, friction_N, gains, q)[: model.positions].max()) for q in poses)
+
+
+def stretched_by_acceleration_m(model: PlatformModel, axes: Sequence[RobotAxis]) -> float:
+    """Return how far cables yield along a direction while the platform is accelerated along all.
+
+    The most of K^-1 m a, with K = J^T diag(EA / l) J, over where the loop was designed.
+    """
+    k, kinematics = model.positions, model.kinematics
+    stiffness_N = np.array([axis.winch.cable.stiffness_N for axis in axes])
+    force = np.zeros(model.size)
+    force[:k] = model.platform.mass_kg * model.acceleration[:k]
+    most_m = 0.0
+    for q in design_poses(model):
+        pose = model.pose(q)
+        J = kinematics.jacobian(pose)
+        K = J.T * (stiffness_N / kinematics.lengths(pose)) @ J
+        most_m = max(most_m, float(np.abs(np.linalg.solve(K, force)[:k]).max()))
+    return most_m
+
+
+def _usual_friction_N(axes: Sequence[RobotAxis]) -> FloatArray:
+    """Return the standard deviation of the winches' friction in their cables, (n,)."""
+    winches = [axis.winch for axis in axes]
+    rated_N = [w.motor.rated_torque_Nm / abs(w.cable_m_per_motor_rad) for w in winches]
+    return np.asarray(FRICTION_SHARE * np.array(rated_N))
+
+
+def _moved(
+    model: PlatformModel, friction_N: FloatArray, gains: LoopGains, q: FloatArray
+) -> FloatArray:
+    """Return the standard deviation of K^-1 J^T f (d,) at a set-point (d,)."""
+    J = model.kinematics.jacobian(model.pose(q))
+    moved = np.linalg.solve(loop_stiffness(model, gains, q), J.T * friction_N)
+    return np.asarray(np.linalg.norm(moved, axis=1))
+
+
 def turned_by_friction(
     statics: PlatformStatics, axes: Sequence[RobotAxis], gains: LoopGains
 ) -> str:
@@ -46,16 +90,13 @@ def turned_by_friction(
     home.
     """
     model = statics.model
-    winches, k = [axis.winch for axis in axes], model.positions
-    rated_N = [w.motor.rated_torque_Nm / abs(w.cable_m_per_motor_rad) for w in winches]
-    friction_N = FRICTION_SHARE * np.array(rated_N)
+    friction_N, k = _usual_friction_N(axes), model.positions
     worst, text = 1.0, ""
     for q in design_poses(model):
         if q[k:].any():
             continue
         J = model.kinematics.jacobian(model.pose(q))
-        moved = np.linalg.solve(loop_stiffness(model, gains, q), J.T * friction_N)
-        turned = np.linalg.norm(moved, axis=1)
+        turned = _moved(model, friction_N, gains, q)
         for i in range(k, model.size):
             share = _held_share(statics, q[:k], model.kinematics.directions[i] - 3, turned[i])
             if share < worst:
