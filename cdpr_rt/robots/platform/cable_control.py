@@ -120,12 +120,12 @@ class CableControl(PlaceChecks):
         self._pose = Pose(np.zeros(3))
         self._pose.array[:] = self._home.array
         self._wanted = Pose(np.zeros(3))
-        self._scratch, self._cables = np.zeros((4, 3)), np.zeros((CABLE_ROWS, n))
+        self._scratch, (cables, self._cables) = np.zeros((4, 3)), np.zeros((2, CABLE_ROWS, n))
         filters = tracking_filters(self.gains, self._period_s)
         self._swing, self._seven, position = np.zeros(tracking.SWING), np.zeros(7), np.zeros(n)
         self._track = bound(
             tracking.track_pose, motors, filters, kinematics.geometry, self._up, self._pose.array,
-            self._cables, kinematics.solver, moves[loop.TWIST], rotation_of(model.platform),
+            cables, kinematics.solver, moves[loop.TWIST], rotation_of(model.platform),
             self._swing, kinematics.turns_freely, then=(position,),
         )  # fmt: skip
         self._write_coordinates = bound(
@@ -135,7 +135,7 @@ class CableControl(PlaceChecks):
         self._motor_references = bound(
             pose_setpoint.motor_references, self.setpoint.shaped, self._directions,
             self._home.array, self._period_s, kinematics.geometry, motors, self._pose.array,
-            self._scratch, self._wanted.array, np.zeros((CABLE_ROWS, n)), moves[loop.WANTED_TWIST],
+            self._scratch, self._wanted.array, self._cables, moves[loop.WANTED_TWIST],
             moves[loop.WANTED_ACCELERATION], moves[loop.POSE_ERROR], then=(position,) * 3,
         )  # fmt: skip
 
@@ -148,7 +148,7 @@ class CableControl(PlaceChecks):
         scratch, J = np.zeros((7, 7, 7)), np.zeros((n, d))
         self._correct = bound(
             loop.correct, self._settings, self._state, model.wrench_scale, body_of(model.platform),
-            self._directions, self._cables, self._pose.array, moves, scratch,
+            self._directions, self._cables, self._wanted.array, moves, scratch,
             J, self._W, self._wrench, self._friction(), self._force, then=(1.0, 1.0),
         )  # fmt: skip
         if self.learning is not None:

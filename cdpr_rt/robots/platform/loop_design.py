@@ -1,19 +1,12 @@
 """Design of a platform's loop from its rotors, cables, delays and mass, and its margins.
 
-Deviations are linear around a pose: the rotors' x (n,), as paid-out cable, and the platform's q
-(d,) hang together by cables of stiffness k_i = EA/ρ_i and damping b k_i,
-
-    m_r s² x = T - τ      M_p s² q = -J^T T      T = diag(k (1 + b s)) (J q - x)
-
-and the loop makes of x, late, the motors' pull τ = C(s) x. How far the eigenvalues of the return
-difference are from 0 is told by the largest singular value of the sensitivity (1 + C G)^-1, x =
--G τ: its inverse, the modulus margin μ, is a gain margin of at least 1/(1 - μ) and a phase margin
-of at least 2 asin(μ/2) (Skogestad and Postlethwaite, Multivariable Feedback Control, 2.4.3).
-
-All is taken along the modes of the platform without cables' stretch: J = Q R and R^-T M_p R^-1 =
-U λ U^T, so that the tensions' directions Q U are orthonormal, λ is what each mode has of mass, and
-the loop's damping and stiffness are diagonal. G is a sum over the modes of rotors and platform on
-their cables, whose damping is proportional to their stiffness: Σ φ φ^T/(s² + (1 + b s) ω²).
+The plant is that of `loop_plant`: x = -G τ, with the rotors' x as paid-out cable, and the loop
+makes of x, late, the motors' pull τ = C(s) x. Tensions and their directions are those of the
+set-point, so that what turns the platform away from it meets the geometric stiffness. How far the
+eigenvalues of the return difference are from 0 is told by the largest singular value of the
+sensitivity (1 + C G)^-1: its inverse, the modulus margin μ, is a gain margin of at least 1/(1 - μ)
+and a phase margin of at least 2 asin(μ/2) (Skogestad and Postlethwaite, Multivariable Feedback
+Control, 2.4.3).
 
 The drives' delay is assumed, the same for all robots: it is not read from their profiles.
 """
@@ -33,7 +26,7 @@ from cdpr_profiles import RobotAxis
 from cdpr_profiles.platform import Platform
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.errors import GeometryError
-from cdpr_rt.robots.platform.body_kernel import body_of, write_mass_matrix
+from cdpr_rt.robots.platform.loop_plant import linear_plant
 from cdpr_rt.robots.platform.margin_kernel import keeps_margin
 from cdpr_rt.robots.platform_model import PlatformModel
 
@@ -53,8 +46,9 @@ _LOOSE_SHARE = 0.075
 _INTEGRAL_RATE_1_s = 5.0
 _INTEGRAL_SHARES = (0.3, 0.15)
 """Rates of the integral part that are tried, over 2 ζ ω of the slowest mode."""
-_CABLE_DAMPING_s = 2e-3
 _SLOWEST_rad_s, _FASTEST_rad_s = 1.0, 80.0
+_TURNED_AWAY_SHARE = 0.5
+"""Of the loop's stiffness, the most that tensions may take from it."""
 _STEP, _REFINEMENTS = 1.3, 3
 _LOWEST_Hz, _HIGHEST_Hz, _FREQUENCIES = 0.3, 150.0, 64
 
@@ -148,42 +142,10 @@ class LoopModel:
         self.frequency_Hz = np.geomspace(_LOWEST_Hz, highest, _FREQUENCIES)
         self._s = s = 2j * np.pi * self.frequency_Hz
         self._late = np.exp(-s * latency_s(period_s)) / (1.0 + s / OBSERVER_rad_s) ** 2
-        m, d = len(self.poses), model.size
-        self._mass_kg = np.zeros((m, d))
-        self._plants = np.zeros((m, len(STIFFNESS_SHARES), len(s), d, d), complex)
-        for i, q in enumerate(self.poses):
-            self._take(i, model, q, rotors_kg, stiffness_N)
-
-    def _take(
-        self,
-        i: int,
-        model: PlatformModel,
-        q: FloatArray,
-        rotors_kg: FloatArray,
-        stiffness_N: FloatArray,
-    ) -> None:
-        """Fill in λ (d,), and G (stiffness, frequencies, d, d) along the modes, at pose `i`."""
-        pose, kinematics = model.pose(q), model.kinematics
-        M, scratch = np.zeros((6, 6)), np.zeros((4, 3))
-        write_mass_matrix(body_of(model.platform), pose.array, scratch, M)
-        M_p = M[np.ix_(kinematics.directions, kinematics.directions)]
-        J = kinematics.jacobian(pose)
-        if np.linalg.matrix_rank(J) < J.shape[1]:
-            raise GeometryError("the cables cannot hold one direction, whatever their tensions")
-        orthogonal, R = np.linalg.qr(J)
-        inverse = np.linalg.inv(R)
-        self._mass_kg[i], modes = np.linalg.eigh(inverse.T @ M_p @ inverse)
-        n, d = J.shape
-        per_root = np.zeros((d + n, d + n))  # of the mass, its Cholesky factor's inverse
-        per_root[:d, :d] = np.linalg.inv(np.linalg.cholesky(M_p))
-        per_root[d:, d:] = np.diag(rotors_kg**-0.5)
-        stretch = np.hstack([J, -np.eye(n)]) @ per_root.T
-        k = stiffness_N / kinematics.lengths(pose)
-        s = self._s[:, None]
-        for plant, share in zip(self._plants[i], STIFFNESS_SHARES, strict=True):
-            squares, shapes = np.linalg.eigh(stretch.T @ (share * k[:, None] * stretch))
-            P = (orthogonal @ modes).T @ (per_root.T @ shapes)[d:]
-            plant[:] = (P / (s**2 + (1.0 + _CABLE_DAMPING_s * s) * squares)[:, None]) @ P.T
+        plants = [
+            linear_plant(model, q, rotors_kg, stiffness_N, s, STIFFNESS_SHARES) for q in self.poses
+        ]
+        self._mass_kg, self._geometric_N_m, self._plants = map(np.array, zip(*plants, strict=True))
 
     def margins(self, gains: LoopGains) -> list[LoopMargins]:
         """Return the margins of a loop at each of the poses."""
@@ -229,33 +191,56 @@ class LoopModel:
     def design(self) -> LoopGains:
         """Return the loop that overcomes friction the soonest of those that keep LEAST_MARGIN.
 
-        They keep it at all poses, with all stiffness. Dry friction in the winches, about the same
-        in each, is what keeps a platform from its target, and the integral part what overcomes it:
-        in N/(m s) of cable, in the geometric mean over the modes.
+        They keep it at all poses, with all stiffness, with the least and the greatest tensions that
+        may be planned. Dry friction in the winches, about the same in each, is what keeps a
+        platform from its target, and the integral part what overcomes it: in N/(m s) of cable, in
+        the geometric mean over the modes.
+
+        Raises GeometryError where no loop is stiff enough for tensions that turn the platform away.
         """
         best, soonest = None, 0.0
         tried = itertools.product(_SMOOTHERS_Hz, _ROTOR_SHARES, _INTEGRAL_SHARES)
         for (smooth, smoother_Hz), share, integral in tried:
             gains = self._slowest(smooth, 2.0 * math.pi * smoother_Hz, share, integral)
+            if gains is None:
+                continue
             at_most = self._integral_N_m_s(self._with(gains, math.inf))
             if best is None or at_most > soonest:
                 found = self._quickest(gains)
                 if (integral := self._integral_N_m_s(found)) > soonest:
                     best, soonest = found, integral
-        assert best is not None
+        if best is None:
+            raise GeometryError("tensions turn the platform away that no stable loop holds")
         return best
 
     def _slowest(
         self, smooth: float, smoother_rad_s: float, share: float, integral_share: float
-    ) -> LoopGains:
-        """Return the slowest loop with this part of smooth velocity, and of a rotor's damping."""
+    ) -> LoopGains | None:
+        """Return the slowest loop with this part of smooth velocity, and of a rotor's damping.
+
+        Where tensions turn the platform away, from crossed cables, the slowest that is twice as
+        stiff as they are; None where it does not keep its margin.
+        """
         late_s = latency_s(self.period_s) + 2.0 / OBSERVER_rad_s
         most = self._lightest_kg / late_s / (1.0 - smooth)
         loose = _LOOSE_SHARE * most
         gains = LoopGains(
             0.0, share * most, smooth, smoother_rad_s, loose, integral_share, 0.0, self.rotor_kg
         )
-        return self._with(gains, _SLOWEST_rad_s)
+        gains = self._with(gains, _SLOWEST_rad_s)
+        if self._holds(gains):
+            return gains
+        while gains.bandwidth_rad_s < _FASTEST_rad_s:
+            gains = self._with(gains, gains.bandwidth_rad_s * _STEP)
+            if self._holds(gains):
+                return gains if self._keeps(gains) else None
+        return None
+
+    def _holds(self, gains: LoopGains) -> bool:
+        """Return whether the loop is stiff enough for tensions that turn the platform away."""
+        root = self._along_modes(gains)[1][:, None] ** -0.5
+        shares = root[..., None] * self._geometric_N_m * root[..., None, :]
+        return float(np.linalg.eigvalsh(shares).min()) >= -_TURNED_AWAY_SHARE
 
     def _quickest(self, gains: LoopGains) -> LoopGains:
         """Return the quickest loop from these gains on.
