@@ -17,7 +17,7 @@ import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,7 +26,7 @@ from cdpr_profiles import RobotAxis
 from cdpr_profiles.platform import Platform
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.errors import GeometryError
-from cdpr_rt.robots.platform.loop_plant import linear_plant
+from cdpr_rt.robots.platform.loop_plant import TENSIONS, linear_plant
 from cdpr_rt.robots.platform.margin_kernel import keeps_margin
 from cdpr_rt.robots.platform_model import PlatformModel
 
@@ -48,9 +48,13 @@ _INTEGRAL_SHARES = (0.3, 0.15)
 """Rates of the integral part that are tried, over 2 ζ ω of the slowest mode."""
 _SLOWEST_rad_s, _FASTEST_rad_s = 1.0, 80.0
 _TURNED_AWAY_SHARE = 0.5
-"""Of the loop's stiffness, the most that tensions may take from it."""
+"""Of the loop's stiffness, the most that tensions may take from the slowest that is tried."""
 _STEP, _REFINEMENTS = 1.3, 3
 _LOWEST_Hz, _HIGHEST_Hz, _FREQUENCIES = 0.3, 150.0, 64
+
+
+class UnstableError(GeometryError):
+    """A robot that no loop holds with LEAST_MARGIN."""
 
 
 @dataclass(frozen=True)
@@ -72,6 +76,8 @@ class LoopGains:
     integral_1_s: float
     rotor_kg: float
     """Mass of a rotor, as its cable feels it."""
+    follows_pose: bool = False
+    """Whether tensions are planned for where the platform is, not for where it is wanted."""
 
 
 @dataclass(frozen=True)
@@ -140,12 +146,24 @@ class LoopModel:
         self.poses = design_poses(model) if poses is None else poses
         highest = min(_HIGHEST_Hz, 0.3 / period_s)
         self.frequency_Hz = np.geomspace(_LOWEST_Hz, highest, _FREQUENCIES)
-        self._s = s = 2j * np.pi * self.frequency_Hz
+        self._s = s = (2j * np.pi * self.frequency_Hz).astype(np.complex128)
         self._late = np.exp(-s * latency_s(period_s)) / (1.0 + s / OBSERVER_rad_s) ** 2
         plants = [
-            linear_plant(model, q, rotors_kg, stiffness_N, s, STIFFNESS_SHARES) for q in self.poses
+            linear_plant(model, q, rotors_kg, stiffness_N, self._s, STIFFNESS_SHARES)
+            for q in self.poses
         ]
-        self._mass_kg, self._geometric_N_m, self._plants = map(np.array, zip(*plants, strict=True))
+        self._mass_kg, self._geometric_N_m, self._planned = map(np.array, zip(*plants, strict=True))
+
+    @cached_property
+    def _followed(self) -> ComplexArray:
+        """The plants with tensions that follow the platform: x = -G τ + G L K_G x, late."""
+        m, k, f, d, _ = self._planned.shape
+        G = self._planned.reshape(m, TENSIONS, k // TENSIONS, f, d, d)
+        fed = self._late[:, None, None] * self._geometric_N_m[:, :, None, None]
+        return np.linalg.solve(np.eye(d) - G @ fed, G).reshape(self._planned.shape)
+
+    def _plants(self, gains: LoopGains) -> ComplexArray:
+        return self._followed if gains.follows_pose else self._planned
 
     def margins(self, gains: LoopGains) -> list[LoopMargins]:
         """Return the margins of a loop at each of the poses."""
@@ -155,7 +173,7 @@ class LoopModel:
             of_speed[:, None] * damping[:, None, None]
             + of_place[:, None] * stiffness[:, None, None]
         )
-        difference = np.eye(C.shape[-1]) + C[..., None] * self._plants
+        difference = np.eye(C.shape[-1]) + C[..., None] * self._plants(gains)
         least = np.linalg.svd(difference, compute_uv=False)[..., -1].min(axis=1)
         return [
             LoopMargins(
@@ -184,9 +202,9 @@ class LoopModel:
 
     def _keeps(self, gains: LoopGains) -> bool:
         damping, stiffness, _ = self._along_modes(gains)
-        scratch = np.zeros((2, *self._plants.shape[-2:]), complex)
-        factors = self._factors(gains)
-        return keeps_margin(self._plants, *factors, damping, stiffness, LEAST_MARGIN, scratch)
+        plants, factors = self._plants(gains), self._factors(gains)
+        scratch = np.zeros((2, *plants.shape[-2:]), complex)
+        return keeps_margin(plants, *factors, damping, stiffness, LEAST_MARGIN, scratch)
 
     def design(self) -> LoopGains:
         """Return the loop that overcomes friction the soonest of those that keep LEAST_MARGIN.
@@ -196,12 +214,22 @@ class LoopModel:
         platform from its target, and the integral part what overcomes it: in N/(m s) of cable, in
         the geometric mean over the modes.
 
-        Raises GeometryError where no loop is stiff enough for tensions that turn the platform away.
+        Where none is stiff enough for tensions that turn the platform away, they follow its pose.
+        Raises UnstableError where none keeps the margin then.
         """
+        best = self._best(follows_pose=False) or self._best(follows_pose=True)
+        if best is None:
+            raise UnstableError(
+                "its tensions turn the platform away faster than a loop can hold it"
+            )
+        return best
+
+    def _best(self, *, follows_pose: bool) -> LoopGains | None:
         best, soonest = None, 0.0
         tried = itertools.product(_SMOOTHERS_Hz, _ROTOR_SHARES, _INTEGRAL_SHARES)
         for (smooth, smoother_Hz), share, integral in tried:
-            gains = self._slowest(smooth, 2.0 * math.pi * smoother_Hz, share, integral)
+            smoother = 2.0 * math.pi * smoother_Hz
+            gains = self._slowest(smooth, smoother, share, integral, follows_pose)
             if gains is None:
                 continue
             at_most = self._integral_N_m_s(self._with(gains, math.inf))
@@ -209,37 +237,49 @@ class LoopModel:
                 found = self._quickest(gains)
                 if (integral := self._integral_N_m_s(found)) > soonest:
                     best, soonest = found, integral
-        if best is None:
-            raise GeometryError("tensions turn the platform away that no stable loop holds")
         return best
 
     def _slowest(
-        self, smooth: float, smoother_rad_s: float, share: float, integral_share: float
+        self,
+        smooth: float,
+        smoother_rad_s: float,
+        share: float,
+        integral_share: float,
+        follows_pose: bool,
     ) -> LoopGains | None:
         """Return the slowest loop with this part of smooth velocity, and of a rotor's damping.
 
-        Where tensions turn the platform away, from crossed cables, the slowest that is twice as
-        stiff as they are; None where it does not keep its margin.
+        Where tensions turn the platform away, as those of crossed cables, the slowest that holds it
+        and keeps LEAST_MARGIN; None where none does.
         """
         late_s = latency_s(self.period_s) + 2.0 / OBSERVER_rad_s
         most = self._lightest_kg / late_s / (1.0 - smooth)
         loose = _LOOSE_SHARE * most
         gains = LoopGains(
-            0.0, share * most, smooth, smoother_rad_s, loose, integral_share, 0.0, self.rotor_kg
-        )
+            0.0, share * most, smooth, smoother_rad_s, loose, integral_share, 0.0, self.rotor_kg,
+            follows_pose,
+        )  # fmt: skip
         gains = self._with(gains, _SLOWEST_rad_s)
         if self._holds(gains):
             return gains
         while gains.bandwidth_rad_s < _FASTEST_rad_s:
             gains = self._with(gains, gains.bandwidth_rad_s * _STEP)
-            if self._holds(gains):
-                return gains if self._keeps(gains) else None
+            if self._holds(gains) and self._keeps(gains):
+                return gains
         return None
 
     def _holds(self, gains: LoopGains) -> bool:
-        """Return whether the loop is stiff enough for tensions that turn the platform away."""
-        root = self._along_modes(gains)[1][:, None] ** -0.5
-        shares = root[..., None] * self._geometric_N_m * root[..., None, :]
+        """Return whether the loop holds a platform that its tensions turn away.
+
+        Its stiffness has to, or where tensions follow the pose, late, its damping: what they then
+        take is their delay times K_G.
+        """
+        damping, held, _ = self._along_modes(gains)
+        taken = self._geometric_N_m
+        if gains.follows_pose:
+            held, taken = damping, (latency_s(self.period_s) + 2.0 / OBSERVER_rad_s) * taken
+        root = held[:, None] ** -0.5
+        shares = root[..., None] * taken * root[..., None, :]
         return float(np.linalg.eigvalsh(shares).min()) >= -_TURNED_AWAY_SHARE
 
     def _quickest(self, gains: LoopGains) -> LoopGains:
@@ -297,7 +337,8 @@ class _Robot:
 def designed_loop(model: PlatformModel, axes: Sequence[RobotAxis], period_s: float) -> DesignedLoop:
     """Return the loop of a robot with these axes, one for each of the n cables.
 
-    Raises GeometryError where the cables do not hold the platform.
+    Raises GeometryError where the cables do not hold the platform, UnstableError where no loop
+    does.
     """
     winches = [axis.winch for axis in axes]
     rotors_kg = [w.motor.rotor_inertia_kg_m2 / w.cable_m_per_motor_rad**2 for w in winches]

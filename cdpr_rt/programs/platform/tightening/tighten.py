@@ -288,7 +288,7 @@ class TightenProgram(PlatformProgram):
         """Blend out what the platform is pressed on its stand with; then it may be moved.
 
         Meanwhile its cables are stretched otherwise than the control has it, so that the set-point
-        stands wherever the control finds the platform: it is not pushed against its stand.
+        comes after where the control finds the platform: it is not pushed against its stand.
         """
         self._control.stand_still(on_stand=True)
         self._loop.update(feedback, setpoint, torque_Nm)
