@@ -105,16 +105,17 @@ class SlackTakeUp:
         self._reel_in(position_rad)
 
     def update(self, position_rad: FloatArray, pretension_N: FloatArray, share: float) -> None:
-        """Bound the winches' tensions and set their speeds, (n,) each.
+        """Raise the winches' bounds of tension and set their speeds, (n,) each.
 
-        Cables that are reeled in pull with a share, which grows to 1, of what they may.
+        Cables that are reeled in pull with a share, which grows to 1, of what they may; with more
+        only by the bounds that there are.
         """
         winches, most_N = self._winches, TAKE_UP_SHARE * pretension_N
         if not self._at_once:
             most_N = np.minimum(np.maximum(most_N, self._enough_N), pretension_N)
         reeled_m = (self._from_rad - position_rad) * self._cable
         now = self._tight_now(np.minimum(self._enough_N, _PULLED * most_N))
-        np.multiply(most_N, share, out=winches.high_N)
+        np.maximum(winches.high_N, min(share, 1.0) * most_N, out=winches.high_N)
         if self._left.all():
             self._pull_together(now, reeled_m)
             if not self._at_once and ((self.tight_N == 0.0) & (reeled_m > _LOOSE_m)).any():
@@ -146,7 +147,8 @@ class SlackTakeUp:
         winches.paying_out_m_s[leaving], winches.paying_out_m_s[self._left] = TAKE_UP_m_s, 0.0
 
     def _reel_in(self, position_rad: FloatArray) -> None:
-        self._from_rad[:] = position_rad
+        # one that only begins to turn, or is still pulled as it was before, is not tight by that
+        self._from_rad[:], self._speed_m_s[:] = position_rad, TAKE_UP_m_s
         self.tight_N[:] = 0.0
 
     def _tight_now(self, enough_N: FloatArray) -> BoolArray:

@@ -69,6 +69,35 @@ def test_tensions_grow_together_and_no_cable_is_jerked(robot: Standing):
     assert np.abs(uneven_N[:-1]).max() < 15.0
 
 
+@pytest.mark.parametrize("at_once", [False, True])
+def test_slack_is_taken_up_again_as_at_first(
+    robot: Standing, monkeypatch: pytest.MonkeyPatch, at_once: bool
+):
+    """What winches pulled with at the end of the time before makes no cable tight."""
+    slack = robot.programs["tighten"]._slack  # type: ignore[attr-defined]
+    monkeypatch.setattr(slack, "_at_once", at_once)
+    for slack_m in ((0.02, 0.005, 0.03), (0.06, 0.05, 0.07)):
+        robot.loosen(slack_m)
+        robot.switch("tighten")
+        before_m = robot.cable_m * robot.angle
+        robot.run(0.1)
+        assert (robot.cable_m * robot.angle - before_m).max() < 1e-3  # none is paid out
+        assert not robot.until_done(20.0)["trouble"]
+
+
+def test_cables_that_are_pulled_before_are_not_pulled_with_more_than_the_pretension(
+    robot: Standing,
+):
+    robot.loosen((0.0, 0.0, 0.0))
+    full_N = home_pretension_N(robot.parts)
+    robot.torque[:] = -full_N * robot.cable_m
+    robot.switch("tighten")
+    high_N = robot.program._winches.high_N  # type: ignore[attr-defined]
+    for _ in range(100):
+        robot.run(PERIOD_S)
+        assert (high_N <= full_N + 1e-9).all()
+
+
 def test_tensions_for_where_it_stands_are_not_stepped_to(robot: Standing):
     model = robot.parts.model
     there = model.pose(np.array([0.8, 1.6]))
