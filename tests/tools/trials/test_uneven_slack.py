@@ -33,6 +33,7 @@ def moved_mm(robot: LockstepRobot, name: str) -> tuple[float, float]:
     ("name", "slack_m"),
     [
         ("spatial-8", [0.02, 0.15, 0.04, 0.3, 0.01, 0.09, 0.2, 0.05]),
+        ("spatial-8", [0.0] * 8),
         ("planar-3", [0.02, 0.15, 0.0]),
         ("point-4", [0.25, 0.0, 0.1, 0.04]),
     ],

@@ -35,8 +35,9 @@ class SlackTakeUp:
     """Reels in n cables until all are tight, while the platform stands on something.
 
     One may have much more slack than another, and what a platform weighs holds it against some
-    newtons only. So each is reeled in until it is tight, and paid out a little again; once all have
-    been, they become tight together, and each is pulled with no more than what that took. A cable
+    newtons only. So each is paid out a little, reeled in until it is tight, and paid out a little
+    again; once all have been, they become tight together, and each is pulled with no more than what
+    that took. A cable
     is tight where its winch does not turn although it is pulled with what has turned it before, or
     with more than winches take up. Where a stand does not hold a platform so
     light against what turns a winch, the cables are reeled in together at once.
@@ -65,8 +66,8 @@ class SlackTakeUp:
         """Most that has turned each winch, what its cable weighs included."""
         self._leaving = np.zeros(n, np.int64)
         """Cycles for which a cable has been paid out again, 0 for others."""
-        self._left = np.zeros(n, np.bool_)
-        """Which have been tight and have a little slack now."""
+        self._been_tight, self._left = np.zeros((2, n), np.bool_)
+        """Which have been tight, and which of them have a little slack now."""
 
     @property
     def tight(self) -> bool:
@@ -96,12 +97,17 @@ class SlackTakeUp:
         )
 
     def begin(self, position_rad: FloatArray) -> None:
-        """Begin anew at these angles (n,), no cable being known as tight."""
+        """Begin anew at these angles (n,), no cable being known as tight.
+
+        All are paid out a little first: what a winch takes that never turns is not known.
+        """
         self._turned_N[:] = self._slack_m[:] = 0.0
         self._begin(position_rad)
+        self._leaving[:] = not self._at_once
 
     def _begin(self, position_rad: FloatArray) -> None:
-        self._left[:], self._leaving[:], self._dragged_m[:] = self._at_once, 0, 0.0
+        self._left[:] = self._been_tight[:] = self._at_once
+        self._leaving[:], self._dragged_m[:] = 0, 0.0
         self._reel_in(position_rad)
 
     def update(self, position_rad: FloatArray, pretension_N: FloatArray, share: float) -> None:
@@ -138,7 +144,9 @@ class SlackTakeUp:
         """Pay out cables that are tight `now` (n,), and hold those that have a little slack."""
         winches, leaving = self._winches, self._leaving > 0
         over = leaving & ((reeled_m < -_LEFT_m) | (self._leaving > self._leave_cycles))
-        self._left |= over
+        self._been_tight |= now
+        self._left |= over & self._been_tight
+        self._speed_m_s[over] = TAKE_UP_m_s  # what begins to turn only is not tight by that
         leaving = (leaving & ~over) | now
         self._leaving[:] = np.where(leaving, self._leaving + 1, 0)
         # those that wait are held: cogging would turn them
@@ -156,6 +164,8 @@ class SlackTakeUp:
         winches = self._winches
         reeling_m_s = -self._cable * winches.speed_rad_s
         self._speed_m_s += self._weight * (reeling_m_s - self._speed_m_s)
+        # one that breaks loose has turned before its mean tells
+        np.maximum(self._speed_m_s, reeling_m_s, out=self._speed_m_s)
         if not self._left.all():
             turns = ~self._left & (self._leaving == 0) & (reeling_m_s > 0.5 * TAKE_UP_m_s)
             np.maximum(self._turned_N, winches.tension_N, out=self._turned_N, where=turns)
