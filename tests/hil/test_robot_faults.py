@@ -293,6 +293,9 @@ def test_lengths_that_an_index_contradicts_neither_move_the_platform_nor_are_kep
         told = "upper right: its motor's index is 20.* mm from where the last stop has it"
         with pytest.raises(WorkFailedError, match=told):
             robot.carry_out("tighten", 30.0, **{"from": "last"})
+        robot.run(3.0)  # at rest, it has not done what it was to
+        assert robot.progress["done"] == 0.0
+        assert robot.status["failure"].startswith("tighten: upper right: its motor's index is 20")
         with pytest.raises(WorkFailedError, match=told):
             robot.program("pose", position_m=list(HIGH))
         with pytest.raises(WorkFailedError, match=told):

@@ -171,7 +171,7 @@ class TightenProgram(PlatformProgram):
         tight = self._parts.tight
         held = tight or self._hands_over
         stage = _STAGES[self._stage][0] if not held else "index" if self._path else "held"
-        done = tight and self._at_rest
+        done = tight and self._at_rest and not self._failure
         state = {"stage": stage, "tight": tight, "done": float(done), "trouble": self._failure}
         if tight:
             progress = super().progress()
