@@ -16,6 +16,8 @@ from cdpr_rt.service.events import EventLog
 from cdpr_rt.service.rows import plain
 
 DEAD: Final = "dead"
+ENDED: Final = "the loop has ended"
+"""Reason of a loop that is no more, unless the launcher says that it died."""
 STARTING: Final = "starting"
 _POLL_BUSY_S, _POLL_IDLE_S = 0.002, 0.05
 _MOST_PENDING = 32
@@ -97,7 +99,7 @@ class LoopLink:
         status = self.status()
         # the launcher sees the exit status and writes it down in the loop's place
         reason = str(status.get("reason", "")) if status.get("state") == DEAD else ""
-        return reason or "the loop has ended"
+        return reason or ENDED
 
     def silent_s(self) -> float:
         """Return how long ago the loop turned last, 0 before its first turn."""

@@ -11,6 +11,8 @@ from rich.table import Table
 from rich.text import Text
 
 DEAD: Final = "dead"
+ENDED: Final = "the loop has ended"
+"""Reason of a dead loop of which nobody has said, or not yet, that it failed."""
 """The state that such a daemon reports."""
 
 

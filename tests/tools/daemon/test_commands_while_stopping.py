@@ -10,6 +10,7 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
+from cdpr_rt.service.link import ENDED
 from cdpr_tools.client.client import NoDaemonError
 from cdpr_tools.commands.daemon import daemon_state, with_daemon
 from cdpr_tools.errors import WorkFailedError
@@ -118,3 +119,39 @@ def test_a_loop_that_dies_while_it_ends_keeps_nobody_waiting(
     error = CliRunner().invoke(app, ["stop"]).exception
     assert isinstance(error, WorkFailedError)
     assert str(error) == "stopped; unheard, and not known to be without power: top; it died"
+
+
+class EndsLoopFirst:
+    """A daemon whose loop ends as asked, a while before the service that is asked does."""
+
+    def __init__(self) -> None:
+        self.states = iter(["active", "active", "dead", "dead"])
+        self.asked = 0
+
+    def get(self, _path: str) -> dict[str, Any]:
+        if (state := next(self.states, "")) == "":
+            raise NoDaemonError("nobody is there")
+        axes = [{"name": "top", "alive": state != "dead"}]
+        reason = ENDED if state == "dead" else ""
+        return {**ACTIVE, "state": state, "reason": reason, "axes": axes, "read_only": False}
+
+    def post(self, _path: str) -> None:
+        self.asked += 1
+
+
+def test_a_loop_that_is_seen_to_have_ended_as_asked_is_no_failure(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    daemon = EndsLoopFirst()
+
+    @contextmanager
+    def opened(*_where: Any) -> Iterator[EndsLoopFirst]:
+        yield daemon
+
+    monkeypatch.setattr(daemon_state, "open_daemon", opened)
+    monkeypatch.setattr(daemon_state, "_WATCH_S", 0.0)
+    app = typer.Typer()
+    app.add_typer(daemon_state.app)
+    ended = CliRunner().invoke(app, ["stop"])
+    assert (ended.exit_code, daemon.asked) == (0, 1), ended.exception
+    assert ended.output.splitlines()[-1] == "stopped, power off"

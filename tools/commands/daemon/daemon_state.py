@@ -14,6 +14,7 @@ from cdpr_tools.client.motion import ProgressNotes
 from cdpr_tools.client.refusals import DaemonRefusalError
 from cdpr_tools.client.status_text import (
     DEAD,
+    ENDED,
     after_stop_text,
     fallen_text,
     status_text,
@@ -224,8 +225,10 @@ def _end(daemon: Daemon, out: Output) -> None:
                 raise WorkFailedError(told) from None
             out.say(told)
             return
-        if status["state"] == DEAD and not had_died and not dies:
-            # one whose drives do not confirm ends with an error, and the service stays for that
+        died = status["state"] == DEAD and status["reason"] != ENDED
+        if died and not had_died and not dies:
+            # one whose drives do not confirm ends with an error, and the service stays for that;
+            # one that ends as asked may be seen before the service ends as well
             dies = str(status["reason"])
             daemon.post("/shutdown")
         if not had_died:
