@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
-from pydantic import Field
+from pydantic import BeforeValidator, Field
 
 from cdpr_profiles.errors import value_text
 from cdpr_profiles.reading.reader import Profile
@@ -96,6 +96,10 @@ class WindingPlant(Profile):
     """Of gear and belt, at the drum."""
 
 
+def _one_or_each(value: Any) -> Any:
+    return value if isinstance(value, tuple) else (value,)
+
+
 _Slack_m = Annotated[float, Field(ge=0.0, le=10.0)]
 
 
@@ -108,8 +112,10 @@ class StartPlant(Profile):
     """Of a platform in a plane; the profile's at home where left out."""
     rotation_deg: Annotated[tuple[_Angle_deg, ...], Field(min_length=3, max_length=3)] | None = None
     """Rotation vector of a platform in space; likewise."""
-    slack_m: _Slack_m | tuple[_Slack_m, ...] = 0.02
-    """Of every cable, or of each."""
+    slack_m: Annotated[tuple[_Slack_m, ...], Field(min_length=1), BeforeValidator(_one_or_each)] = (
+        0.02,
+    )
+    """Of every cable (a number in the file), or of each."""
 
 
 class FloorPlant(Profile):
@@ -173,7 +179,7 @@ class RobotPlant(PlantFile):
         for_each = {
             **errors,
             "cables.drum_radius_errors": self.cables.drum_radius_errors,
-            "start.slack_m": slack_m if isinstance(slack_m, tuple) else (),
+            "start.slack_m": slack_m if len(slack_m) > 1 else (),
             "motors": self.motors,
         }
         for key, values in for_each.items():

@@ -49,6 +49,20 @@ def test_a_plant_that_does_not_fit_the_robot_is_refused(
         RobotPlant.model_validate(table).require_fit(3, 2)
 
 
+def test_slack_is_one_number_or_one_for_each(tmp_path: Path) -> None:
+    path = tmp_path / "plant.toml"
+    for text, read in (("0.1", (0.1,)), ("[0.1, 0.0, 0.2]", (0.1, 0.0, 0.2))):
+        path.write_text(f"start.slack_m = {text}\n")
+        plant = RobotPlant.load_file(path)
+        plant.require_fit(3, 2)
+        assert plant.start.slack_m == read
+    for text, where in (("-0.1", "slack_m[0]: value -0.1"), ("[0.1, 'a', 0]", "slack_m[1]: value")):
+        path.write_text(f"start.slack_m = {text}\n")
+        with pytest.raises(ProfileError, match=re.escape(f"plant.toml: start.{where}")) as caught:
+            RobotPlant.load_file(path)
+        assert len(str(caught.value).splitlines()) == 1
+
+
 def test_a_cable_slips_once_at_its_time() -> None:
     slips = (
         {"cable": 2, "at_s": 0.02, "slip_m": 0.012},
