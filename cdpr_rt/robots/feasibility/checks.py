@@ -127,19 +127,24 @@ def _shape(robot: Robot, statics: PlatformStatics) -> Iterator[Finding]:
         )
         yield Finding("axes[0].anchor_point_m", text, impossible=True)
         return
-    free_m = statics.free_lengths(statics.points()).reshape(-1, len(robot.axes))
-    for i, nearest in enumerate(free_m.min(axis=0)):
-        if nearest < _NEAREST_m:
-            text = (
-                f"the box of targets goes up to {nearest:.2g} m from the exit point of "
-                f"axes[{i}] ({robot.axes[i].name}); allowed: {_NEAREST_m:g} m and more"
-            )
-            yield Finding("platform.workspace_min_m", text, impossible=True)
+    box, home = statics.points(), np.array(statics.platform.home_m)
+    for points, key, what in (
+        (box, "workspace_min_m", "the box of targets goes"),
+        (home, "home_m", "the platform at rest comes"),
+    ):
+        free_m = statics.free_lengths(points).reshape(-1, n)
+        for i, nearest in enumerate(free_m.min(axis=0)):
+            if nearest < _NEAREST_m:
+                text = (
+                    f"{what} up to {nearest:.2g} m from the exit point of "
+                    f"axes[{i}] ({robot.axes[i].name}); allowed: {_NEAREST_m:g} m and more"
+                )
+                yield Finding(f"platform.{key}", text, impossible=True)
 
 
 def _tensions(statics: PlatformStatics) -> Iterator[Finding]:
     platform = statics.platform
-    home = np.array(platform.home_m)
+    home = np.array(statics.platform.home_m)
     way = np.linspace(home, np.clip(home, statics.box.low_m, statics.box.high_m), _GRID)
     for place, where in ((home[None], ""), (way, "on the way to the box of targets, ")):
         missing = ~statics.is_target(place)

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from cdpr_drivers.robot.bus_fit import require_fit
 from cdpr_profiles import load_robot
 from cdpr_rt.robots.feasibility.checks import refuse_impossible
 from cdpr_rt.robots.statics import statics_of
@@ -34,6 +35,7 @@ def _file_of(kind: str, path: Path) -> tuple[str, list[str]]:
 def _require_works(path: Path, head: str, axes: list[str]) -> None:
     path.write_text("\n[[axes]]\n".join([head, *axes]))
     robot = load_robot(path)
+    require_fit(robot)
     refuse_impossible(robot)
     assert robot.platform is not None and len(robot.axes) == len(axes)
     box = robot.platform.workspace_min_m, robot.platform.workspace_max_m
@@ -51,10 +53,12 @@ def test_one_more_cable_straight_below_or_above_the_middle(
     assert robot.platform is not None
     size = len(robot.platform.home_m)
     top_m = max(point[-1] for point in robot.platform.exit_points_m)
-    more = _point(axes[-1], "exit_point_m", (*(0.0,) * (size - 1), top_m if above else 0.0))
+    place_m = (*(0.0,) * (size - 1), top_m if above else robot.platform.home_m[-1] - 0.2)
+    more = _point(axes[-1], "exit_point_m", place_m)
     more = _point(more, "anchor_point_m", (0.0,) * size)
     more = re.sub(r"node_id = \d+", f"node_id = {len(axes) + 1}", more)
     more = re.sub(r"^name = .*", 'name = "middle"', more, flags=re.MULTILINE)
+    head = head.replace("sync_period_s = 0.001 ", "sync_period_s = 0.00125 ")
     _require_works(path, head, [*axes, more])
 
 

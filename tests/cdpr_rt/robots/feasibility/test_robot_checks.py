@@ -397,3 +397,11 @@ def test_friction_that_turns_a_plate_over_names_no_axis_in_a_plane(tmp_path: Pat
     text = plate.replace("anchor_point_m = [-0.2, -0.1]", "anchor_point_m = [0.0, 0.0]")
     told = findings_of(tmp_path, text)["axes[0].anchor_point_m"]
     assert re.search(r"turns the platform by [\d.]+ deg until the control overcomes it", told)
+
+
+def test_a_stand_on_an_exit_point_leaves_a_cable_that_tells_nothing(tmp_path: Path) -> None:
+    # the lower anchor point is 87 mm under the platform's origin
+    told = findings(robot_of(tmp_path, ("exit_point_m = [0.0, 0.0]", "exit_point_m = [0.0, 1.15]")))
+    about = [f for f in told if f.key == "platform.home_m" and f.impossible]
+    assert about and about[0].text.startswith("the platform at rest comes up to 0.063 m from")
+    assert "axes[2] (lower); allowed: 0.1 m and more" in about[0].text
