@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -39,12 +40,12 @@ class TrialRun:
         self.refused = 0
         """Places that the robot has refused, with its reason."""
         self._advance = advance
-        self._begun_s = rig.now_s
+        self._begun_s = math.inf
 
     @property
     def elapsed_s(self) -> float:
-        """Bus time since the trial began."""
-        return self.rig.now_s - self._begun_s
+        """Bus time since the trial began, 0 while the robot starts up for it."""
+        return max(0.0, self.rig.now_s - self._begun_s)
 
     def start_up(self) -> None:
         """Tighten the cables, go to the middle of the workspace and stay for a moment."""
