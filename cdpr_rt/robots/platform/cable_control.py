@@ -42,7 +42,7 @@ from cdpr_rt.robots.tension.tension_split import OK, split
 from cdpr_rt.robots.workspace import infeasibility_text
 
 _ON_STAND = 0.1  # of the integral part
-_SETTLING_STEPS, _LIFT_S, _STANDING_S = 60, 0.05, 0.1
+_SETTLING_STEPS, _LIFT_S = 60, 0.05
 
 
 class CableControl(PlaceChecks):
@@ -111,7 +111,7 @@ class CableControl(PlaceChecks):
         self.gains = designed_loop(model, axes, period_s).gains
         span_N = float((model.high_N - model.low_N).min())
         self._settings = loop_settings(self.gains, span_N, period_s)
-        self._on_stand = self._follows_stand = False
+        self._on_stand = False
         self._integral_N = float(self._settings[loop.MOST_N])
 
     def _bind_pose(self, moves: FloatArray) -> None:
@@ -201,7 +201,6 @@ class CableControl(PlaceChecks):
         """Forget what was integrated."""
         self._state[:] = 0.0
         self._state[self.model.size] = 1.0
-        self._follows_stand = False
         self._slow_N[:] = self.low_N
         self.share = 1.0
         if self._compensation is not None:
@@ -298,18 +297,16 @@ class CableControl(PlaceChecks):
         self._swing[:] = 0.0
         motors[tracking.TENSION] = planned_N
 
-    def stand_still(self, *, on_stand: bool = False) -> None:
-        """Have the set-point stand where the platform is.
+    def stand_still(self, *, on_stand: bool = False, within_s: float = 0.0) -> None:
+        """Have the set-point stand where the platform is, or come after it `within_s`.
 
         Until it moves, the integral part of one `on_stand` is bounded: it would press, and the
-        first way off the stand would begin against that. Called again and again on the stand, the
-        set-point comes after the platform with 0.1 s: at once, tensions would turn with it and not
-        hold it.
+        first way off the stand would begin against that. A set-point that is at once where the
+        platform is in every cycle has tensions that turn with it, and do not hold it.
         """
-        follows, self._follows_stand = on_stand and self._follows_stand, on_stand
-        left = self._period_s / (self._period_s + _STANDING_S) if follows else 1.0
+        share = self._period_s / (self._period_s + within_s)
         self._rest(on_stand=on_stand)
-        self.setpoint.stand_at(self.position + left * (self.estimated - self.position))
+        self.setpoint.stand_at(self.position + share * (self.estimated - self.position))
 
     def _rest(self, *, on_stand: bool) -> None:
         self._on_stand = on_stand

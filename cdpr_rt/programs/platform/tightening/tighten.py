@@ -44,7 +44,7 @@ INDEX_m_s = 0.1
 _SETTLING_S = 0.5
 _RISE_1_s = 1.0
 _FALL_S = 0.2
-_HAND_OVER_S = 0.5
+_HAND_OVER_S, _FOLLOWED_S = 0.5, 0.1
 _PULLED = 0.95
 _SLACK_m, _ONCE_TIGHT_m = 1.0, 0.05
 """How far a cable may be wound in while some are slack, and once all are tight, besides stretch."""
@@ -290,11 +290,14 @@ class TightenProgram(PlatformProgram):
         Meanwhile its cables are stretched otherwise than the control has it, so that the set-point
         comes after where the control finds the platform: it is not pushed against its stand.
         """
-        self._control.stand_still(on_stand=True)
+        begins = self._handing_over_cycles == 0
+        ends = self._handing_over_cycles * self._parts.period_s > _HAND_OVER_S
+        within_s = 0.0 if begins or ends else _FOLLOWED_S
+        self._control.stand_still(on_stand=True, within_s=within_s)
         self._loop.update(feedback, setpoint, torque_Nm)
         self._handing_over_cycles += 1
         self._let_go_cycle = feedback.cycle
-        if self._handing_over_cycles * self._parts.period_s > _HAND_OVER_S:
+        if ends:
             self._finish(feedback, setpoint, torque_Nm)
 
     def _take_last(self) -> None:
