@@ -26,3 +26,11 @@ def test_cogging_and_friction_at_the_start_are_not_taken_for_length() -> None:
     assert np.abs(off_mm).max() < 0.6
     # the simulated motors' is 0.08 Nm, 20 % this way and that, and 2 % of the cable's torque
     np.testing.assert_allclose(found_Nm, 0.08, atol=0.03)
+
+
+def test_six_cables_are_tightened_and_stand_where_they_are_held() -> None:
+    """Their platform is found elsewhere while what presses it on its stand is let go."""
+    with LockstepRobot("suspended-6") as robot:
+        robot.enable()
+        robot.carry_out("tighten")
+        assert not robot.progress["trouble"]

@@ -166,15 +166,16 @@ class SlackTakeUp:
         self._speed_m_s += self._weight * (reeling_m_s - self._speed_m_s)
         # one that breaks loose has turned before its mean tells
         np.maximum(self._speed_m_s, reeling_m_s, out=self._speed_m_s)
-        if not self._left.all():
-            turns = ~self._left & (self._leaving == 0) & (reeling_m_s > 0.5 * TAKE_UP_m_s)
+        reeled_in = (~self._left | self._left.all()) & (self._leaving == 0)
+        if not self._at_once:
+            turns = reeled_in & (reeling_m_s > 0.5 * TAKE_UP_m_s)
             np.maximum(self._turned_N, winches.tension_N, out=self._turned_N, where=turns)
-            least_N = np.where(self._turned_N > 0.0, self._turned_N, enough_N)
             enough_N = np.where(
-                self._left | (self._leaving > 0), np.inf, np.minimum(least_N, enough_N)
+                self._turned_N > 0.0, np.minimum(self._turned_N, enough_N), enough_N
             )
         slow = self._speed_m_s < _SLOW_SHARE * TAKE_UP_m_s
-        return np.asarray(slow & (winches.tension_N >= enough_N) & (self.tight_N == 0.0))
+        pulled = reeled_in & (winches.tension_N >= enough_N)
+        return np.asarray(slow & pulled & (self.tight_N == 0.0))
 
 
 class Stillness:
