@@ -50,7 +50,7 @@ class LastLengths:
         self.geometry = ""
         """Identity of the calibration by which lengths are known, empty for the robot's file."""
         self.lengths: StoppedLengths | None = None
-        self.why = "the robot has not been stopped with known lengths yet"
+        self.why = "the lengths at its last stop are not known"
         """Reason why no lengths are known, "" where they are."""
         self.displaced = False
         """Whether the platform has been let go since, other than at home."""

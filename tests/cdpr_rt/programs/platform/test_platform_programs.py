@@ -238,7 +238,7 @@ def test_holding_keeps_axes_before_and_the_platform_after(robot: Standing):
     [
         ({"from": "there"}, "from: value 'there'; allowed: home, lengths, last"),
         ({"from": "lengths"}, "lengths are not known; allowed: from home"),
-        ({"from": "last"}, "no lengths of the last stop: the robot has not been stopped"),
+        ({"from": "last"}, "no lengths of the last stop: the lengths at its last stop"),
         ({"to": "home"}, "key 'to'; allowed: from"),
     ],
 )
@@ -246,7 +246,7 @@ def test_lengths_that_are_not_there_are_refused(
     robot: Standing, wanted: dict[str, str], named: str
 ):
     robot.parts.last_stop.take()
-    robot.parts.last_stop.why = "the robot has not been stopped with known lengths yet"
+    robot.parts.last_stop.why = "the lengths at its last stop are not known"
     with pytest.raises(ProgramError, match=named):
         robot.programs["tighten"].check(wanted)
 

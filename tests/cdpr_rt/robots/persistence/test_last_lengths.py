@@ -70,7 +70,7 @@ def test_a_robot_that_was_stopped_with_slack_cables_has_not_fallen(path: Path):
     assert read(path).fallen
     last.keep(AxisEstimate(3), AxisFeedback(3))
     assert not read(path).fallen
-    assert "has not been stopped with known lengths" in read(path).why
+    assert "the lengths at its last stop are not known" in read(path).why
 
 
 @pytest.mark.parametrize("flag", ["fallen", "displaced"])
