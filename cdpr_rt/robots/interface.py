@@ -257,11 +257,8 @@ class PlatformControl(Controller, Protocol):
     def clear_compensation(self) -> None:
         """Set the recorded compensation to 0, while a program drives the winches itself."""
 
-    def stand_still(self, *, on_stand: bool = False, within_s: float = 0.0) -> None:
-        """Have the set-point stand where the platform is, or come after it `within_s`.
-
-        The platform may rest `on_stand`.
-        """
+    def stand_still(self, *, on_stand: bool = False) -> None:
+        """Have the set-point stand where the platform is, which may rest `on_stand`."""
 
     def lengths_at_home(self, tension_N: FloatArray) -> FloatArray:
         """Return the lengths without tension of cables that hold `tension_N` at home."""

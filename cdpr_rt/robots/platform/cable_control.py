@@ -110,8 +110,7 @@ class CableControl(PlaceChecks):
         self._motors[tracking.TENSION] = self.low_N
         self.gains = designed_loop(model, axes, period_s).gains
         span_N = float((model.high_N - model.low_N).min())
-        self._settings = loop_settings(self.gains, span_N, period_s)
-        self._on_stand = False
+        self._settings, self._on_stand = loop_settings(self.gains, span_N, period_s), False
         self._integral_N = float(self._settings[loop.MOST_N])
 
     def _bind_pose(self, moves: FloatArray) -> None:
@@ -121,15 +120,12 @@ class CableControl(PlaceChecks):
         self._pose = Pose(np.zeros(3))
         self._pose.array[:] = self._home.array
         self._wanted = Pose(np.zeros(3))
-        self._scratch, (found, wanted) = np.zeros((4, 3)), np.zeros((2, CABLE_ROWS, n))
-        # tensions that follow the pose would undo their own geometric stiffness, late
-        follows = self.gains.follows_pose
-        self._planned_at = (found, self._pose.array) if follows else (wanted, self._wanted.array)
+        self._scratch, self._cables = np.zeros((4, 3)), np.zeros((CABLE_ROWS, n))
         filters = tracking_filters(self.gains, self._period_s)
         self._swing, self._seven, position = np.zeros(tracking.SWING), np.zeros(7), np.zeros(n)
         self._track = bound(
             tracking.track_pose, motors, filters, kinematics.geometry, self._up, self._pose.array,
-            found, kinematics.solver, moves[loop.TWIST], rotation_of(model.platform),
+            self._cables, kinematics.solver, moves[loop.TWIST], rotation_of(model.platform),
             self._swing, kinematics.turns_freely, then=(position,),
         )  # fmt: skip
         self._write_coordinates = bound(
@@ -139,7 +135,7 @@ class CableControl(PlaceChecks):
         self._motor_references = bound(
             pose_setpoint.motor_references, self.setpoint.shaped, self._directions,
             self._home.array, self._period_s, kinematics.geometry, motors, self._pose.array,
-            self._scratch, self._wanted.array, wanted, moves[loop.WANTED_TWIST],
+            self._scratch, self._wanted.array, np.zeros((CABLE_ROWS, n)), moves[loop.WANTED_TWIST],
             moves[loop.WANTED_ACCELERATION], moves[loop.POSE_ERROR], then=(position,) * 3,
         )  # fmt: skip
 
@@ -152,7 +148,7 @@ class CableControl(PlaceChecks):
         scratch, J = np.zeros((7, 7, 7)), np.zeros((n, d))
         self._correct = bound(
             loop.correct, self._settings, self._state, model.wrench_scale, body_of(model.platform),
-            self._directions, *self._planned_at, moves, scratch,
+            self._directions, self._cables, self._pose.array, moves, scratch,
             J, self._W, self._wrench, self._friction(), self._force, then=(1.0, 1.0),
         )  # fmt: skip
         if self.learning is not None:
@@ -297,16 +293,14 @@ class CableControl(PlaceChecks):
         self._swing[:] = 0.0
         motors[tracking.TENSION] = planned_N
 
-    def stand_still(self, *, on_stand: bool = False, within_s: float = 0.0) -> None:
-        """Have the set-point stand where the platform is, or come after it `within_s`.
+    def stand_still(self, *, on_stand: bool = False) -> None:
+        """Have the set-point stand where the platform is.
 
         Until it moves, the integral part of one `on_stand` is bounded: it would press, and the
-        first way off the stand would begin against that. A set-point that is at once where the
-        platform is in every cycle has tensions that turn with it, and do not hold it.
+        first way off the stand would begin against that.
         """
-        share = self._period_s / (self._period_s + within_s)
         self._rest(on_stand=on_stand)
-        self.setpoint.stand_at(self.position + share * (self.estimated - self.position))
+        self.setpoint.stand_at(self.estimated)
 
     def _rest(self, *, on_stand: bool) -> None:
         self._on_stand = on_stand

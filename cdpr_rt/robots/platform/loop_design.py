@@ -1,12 +1,19 @@
 """Design of a platform's loop from its rotors, cables, delays and mass, and its margins.
 
-The plant is that of `loop_plant`: x = -G τ, with the rotors' x as paid-out cable, and the loop
-makes of x, late, the motors' pull τ = C(s) x. Tensions and their directions are those of the
-set-point, so that what turns the platform away from it meets the geometric stiffness. How far the
-eigenvalues of the return difference are from 0 is told by the largest singular value of the
-sensitivity (1 + C G)^-1: its inverse, the modulus margin μ, is a gain margin of at least 1/(1 - μ)
-and a phase margin of at least 2 asin(μ/2) (Skogestad and Postlethwaite, Multivariable Feedback
-Control, 2.4.3).
+Deviations are linear around a pose: the rotors' x (n,), as paid-out cable, and the platform's q
+(d,) hang together by cables of stiffness k_i = EA/ρ_i and damping b k_i,
+
+    m_r s² x = T - τ      M_p s² q = -J^T T      T = diag(k (1 + b s)) (J q - x)
+
+and the loop makes of x, late, the motors' pull τ = C(s) x. How far the eigenvalues of the return
+difference are from 0 is told by the largest singular value of the sensitivity (1 + C G)^-1, x =
+-G τ: its inverse, the modulus margin μ, is a gain margin of at least 1/(1 - μ) and a phase margin
+of at least 2 asin(μ/2) (Skogestad and Postlethwaite, Multivariable Feedback Control, 2.4.3).
+
+All is taken along the modes of the platform without cables' stretch: J = Q R and R^-T M_p R^-1 =
+U λ U^T, so that the tensions' directions Q U are orthonormal, λ is what each mode has of mass, and
+the loop's damping and stiffness are diagonal. G is a sum over the modes of rotors and platform on
+their cables, whose damping is proportional to their stiffness: Σ φ φ^T/(s² + (1 + b s) ω²).
 
 The drives' delay is assumed, the same for all robots: it is not read from their profiles.
 """
@@ -17,7 +24,7 @@ import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property, lru_cache
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,7 +33,7 @@ from cdpr_profiles import RobotAxis
 from cdpr_profiles.platform import Platform
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.errors import GeometryError
-from cdpr_rt.robots.platform.loop_plant import TENSIONS, linear_plant
+from cdpr_rt.robots.platform.body_kernel import body_of, write_mass_matrix
 from cdpr_rt.robots.platform.margin_kernel import keeps_margin
 from cdpr_rt.robots.platform_model import PlatformModel
 
@@ -46,15 +53,10 @@ _LOOSE_SHARE = 0.075
 _INTEGRAL_RATE_1_s = 5.0
 _INTEGRAL_SHARES = (0.3, 0.15)
 """Rates of the integral part that are tried, over 2 ζ ω of the slowest mode."""
+_CABLE_DAMPING_s = 2e-3
 _SLOWEST_rad_s, _FASTEST_rad_s = 1.0, 80.0
-_TURNED_AWAY_SHARE = 0.5
-"""Of the loop's stiffness, the most that tensions may take from the slowest that is tried."""
 _STEP, _REFINEMENTS = 1.3, 3
 _LOWEST_Hz, _HIGHEST_Hz, _FREQUENCIES = 0.3, 150.0, 64
-
-
-class UnstableError(GeometryError):
-    """A robot that no loop holds with LEAST_MARGIN."""
 
 
 @dataclass(frozen=True)
@@ -76,8 +78,6 @@ class LoopGains:
     integral_1_s: float
     rotor_kg: float
     """Mass of a rotor, as its cable feels it."""
-    follows_pose: bool = False
-    """Whether tensions are planned for where the platform is, not for where it is wanted."""
 
 
 @dataclass(frozen=True)
@@ -146,24 +146,44 @@ class LoopModel:
         self.poses = design_poses(model) if poses is None else poses
         highest = min(_HIGHEST_Hz, 0.3 / period_s)
         self.frequency_Hz = np.geomspace(_LOWEST_Hz, highest, _FREQUENCIES)
-        self._s = s = (2j * np.pi * self.frequency_Hz).astype(np.complex128)
+        self._s = s = 2j * np.pi * self.frequency_Hz
         self._late = np.exp(-s * latency_s(period_s)) / (1.0 + s / OBSERVER_rad_s) ** 2
-        plants = [
-            linear_plant(model, q, rotors_kg, stiffness_N, self._s, STIFFNESS_SHARES)
-            for q in self.poses
-        ]
-        self._mass_kg, self._geometric_N_m, self._planned = map(np.array, zip(*plants, strict=True))
+        m, d = len(self.poses), model.size
+        self._mass_kg = np.zeros((m, d))
+        self._plants = np.zeros((m, len(STIFFNESS_SHARES), len(s), d, d), complex)
+        for i, q in enumerate(self.poses):
+            self._take(i, model, q, rotors_kg, stiffness_N)
 
-    @cached_property
-    def _followed(self) -> ComplexArray:
-        """The plants with tensions that follow the platform: x = -G τ + G L K_G x, late."""
-        m, k, f, d, _ = self._planned.shape
-        G = self._planned.reshape(m, TENSIONS, k // TENSIONS, f, d, d)
-        fed = self._late[:, None, None] * self._geometric_N_m[:, :, None, None]
-        return np.linalg.solve(np.eye(d) - G @ fed, G).reshape(self._planned.shape)
-
-    def _plants(self, gains: LoopGains) -> ComplexArray:
-        return self._followed if gains.follows_pose else self._planned
+    def _take(
+        self,
+        i: int,
+        model: PlatformModel,
+        q: FloatArray,
+        rotors_kg: FloatArray,
+        stiffness_N: FloatArray,
+    ) -> None:
+        """Fill in λ (d,), and G (stiffness, frequencies, d, d) along the modes, at pose `i`."""
+        pose, kinematics = model.pose(q), model.kinematics
+        M, scratch = np.zeros((6, 6)), np.zeros((4, 3))
+        write_mass_matrix(body_of(model.platform), pose.array, scratch, M)
+        M_p = M[np.ix_(kinematics.directions, kinematics.directions)]
+        J = kinematics.jacobian(pose)
+        if np.linalg.matrix_rank(J) < J.shape[1]:
+            raise GeometryError("the cables cannot hold one direction, whatever their tensions")
+        orthogonal, R = np.linalg.qr(J)
+        inverse = np.linalg.inv(R)
+        self._mass_kg[i], modes = np.linalg.eigh(inverse.T @ M_p @ inverse)
+        n, d = J.shape
+        per_root = np.zeros((d + n, d + n))  # of the mass, its Cholesky factor's inverse
+        per_root[:d, :d] = np.linalg.inv(np.linalg.cholesky(M_p))
+        per_root[d:, d:] = np.diag(rotors_kg**-0.5)
+        stretch = np.hstack([J, -np.eye(n)]) @ per_root.T
+        k = stiffness_N / kinematics.lengths(pose)
+        s = self._s[:, None]
+        for plant, share in zip(self._plants[i], STIFFNESS_SHARES, strict=True):
+            squares, shapes = np.linalg.eigh(stretch.T @ (share * k[:, None] * stretch))
+            P = (orthogonal @ modes).T @ (per_root.T @ shapes)[d:]
+            plant[:] = (P / (s**2 + (1.0 + _CABLE_DAMPING_s * s) * squares)[:, None]) @ P.T
 
     def margins(self, gains: LoopGains) -> list[LoopMargins]:
         """Return the margins of a loop at each of the poses."""
@@ -173,7 +193,7 @@ class LoopModel:
             of_speed[:, None] * damping[:, None, None]
             + of_place[:, None] * stiffness[:, None, None]
         )
-        difference = np.eye(C.shape[-1]) + C[..., None] * self._plants(gains)
+        difference = np.eye(C.shape[-1]) + C[..., None] * self._plants
         least = np.linalg.svd(difference, compute_uv=False)[..., -1].min(axis=1)
         return [
             LoopMargins(
@@ -202,85 +222,40 @@ class LoopModel:
 
     def _keeps(self, gains: LoopGains) -> bool:
         damping, stiffness, _ = self._along_modes(gains)
-        plants, factors = self._plants(gains), self._factors(gains)
-        scratch = np.zeros((2, *plants.shape[-2:]), complex)
-        return keeps_margin(plants, *factors, damping, stiffness, LEAST_MARGIN, scratch)
+        scratch = np.zeros((2, *self._plants.shape[-2:]), complex)
+        factors = self._factors(gains)
+        return keeps_margin(self._plants, *factors, damping, stiffness, LEAST_MARGIN, scratch)
 
     def design(self) -> LoopGains:
         """Return the loop that overcomes friction the soonest of those that keep LEAST_MARGIN.
 
-        They keep it at all poses, with all stiffness, with the least and the greatest tensions that
-        may be planned. Dry friction in the winches, about the same in each, is what keeps a
-        platform from its target, and the integral part what overcomes it: in N/(m s) of cable, in
-        the geometric mean over the modes.
-
-        Where none is stiff enough for tensions that turn the platform away, they follow its pose.
-        Raises UnstableError where none keeps the margin then.
+        They keep it at all poses, with all stiffness. Dry friction in the winches, about the same
+        in each, is what keeps a platform from its target, and the integral part what overcomes it:
+        in N/(m s) of cable, in the geometric mean over the modes.
         """
-        best = self._best(follows_pose=False) or self._best(follows_pose=True)
-        if best is None:
-            raise UnstableError(
-                "its tensions turn the platform away faster than a loop can hold it"
-            )
-        return best
-
-    def _best(self, *, follows_pose: bool) -> LoopGains | None:
         best, soonest = None, 0.0
         tried = itertools.product(_SMOOTHERS_Hz, _ROTOR_SHARES, _INTEGRAL_SHARES)
         for (smooth, smoother_Hz), share, integral in tried:
-            smoother = 2.0 * math.pi * smoother_Hz
-            gains = self._slowest(smooth, smoother, share, integral, follows_pose)
-            if gains is None:
-                continue
+            gains = self._slowest(smooth, 2.0 * math.pi * smoother_Hz, share, integral)
             at_most = self._integral_N_m_s(self._with(gains, math.inf))
             if best is None or at_most > soonest:
                 found = self._quickest(gains)
                 if (integral := self._integral_N_m_s(found)) > soonest:
                     best, soonest = found, integral
+        assert best is not None
         return best
 
     def _slowest(
-        self,
-        smooth: float,
-        smoother_rad_s: float,
-        share: float,
-        integral_share: float,
-        follows_pose: bool,
-    ) -> LoopGains | None:
-        """Return the slowest loop with this part of smooth velocity, and of a rotor's damping.
-
-        Where tensions turn the platform away, as those of crossed cables, the slowest that holds it
-        and keeps LEAST_MARGIN; None where none does.
-        """
+        self, smooth: float, smoother_rad_s: float, share: float, integral_share: float
+    ) -> LoopGains:
+        """Return the slowest loop with this part of smooth velocity, and of a rotor's damping."""
         late_s = latency_s(self.period_s) + 2.0 / OBSERVER_rad_s
         most = self._lightest_kg / late_s / (1.0 - smooth)
         loose = _LOOSE_SHARE * most
         gains = LoopGains(
-            0.0, share * most, smooth, smoother_rad_s, loose, integral_share, 0.0, self.rotor_kg,
-            follows_pose,
-        )  # fmt: skip
-        gains = self._with(gains, _SLOWEST_rad_s)
-        if self._holds(gains):
-            return gains
-        while gains.bandwidth_rad_s < _FASTEST_rad_s:
-            gains = self._with(gains, gains.bandwidth_rad_s * _STEP)
-            if self._holds(gains) and self._keeps(gains):
-                return gains
-        return None
-
-    def _holds(self, gains: LoopGains) -> bool:
-        """Return whether the loop holds a platform that its tensions turn away.
-
-        Its stiffness has to, or where tensions follow the pose, late, its damping: what they then
-        take is their delay times K_G.
-        """
-        damping, held, _ = self._along_modes(gains)
-        taken = self._geometric_N_m
-        if gains.follows_pose:
-            held, taken = damping, (latency_s(self.period_s) + 2.0 / OBSERVER_rad_s) * taken
-        root = held[:, None] ** -0.5
-        shares = root[..., None] * taken * root[..., None, :]
-        return float(np.linalg.eigvalsh(shares).min()) >= -_TURNED_AWAY_SHARE
+            0.0, share * most, smooth, smoother_rad_s, loose, integral_share, 0.0, self.rotor_kg
+        )
+        return self._with(gains, _SLOWEST_rad_s)
 
     def _quickest(self, gains: LoopGains) -> LoopGains:
         """Return the quickest loop from these gains on.
@@ -337,8 +312,7 @@ class _Robot:
 def designed_loop(model: PlatformModel, axes: Sequence[RobotAxis], period_s: float) -> DesignedLoop:
     """Return the loop of a robot with these axes, one for each of the n cables.
 
-    Raises GeometryError where the cables do not hold the platform, UnstableError where no loop
-    does.
+    Raises GeometryError where the cables do not hold the platform.
     """
     winches = [axis.winch for axis in axes]
     rotors_kg = [w.motor.rotor_inertia_kg_m2 / w.cable_m_per_motor_rad**2 for w in winches]

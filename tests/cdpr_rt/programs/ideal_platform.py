@@ -127,7 +127,7 @@ class IdealControl:
 
     def update(self, feedback: AxisFeedback, setpoint: Setpoint, torque_Nm: FloatArray) -> None: ...
 
-    def stand_still(self, *, on_stand: bool = False, within_s: float = 0.0) -> None:
+    def stand_still(self, *, on_stand: bool = False) -> None:
         self.position[:] = self.estimated
         self.velocity[:] = self.acceleration[:] = self.off[:] = 0.0
 

@@ -43,8 +43,6 @@ class BaselineCableControl:
         platform = model.platform
         if any(platform.pulley_radius_m) or platform.tension_distribution != "minimum-deviation":
             raise GeometryError("pulleys, or tensions other than minimum-deviation; allowed: none")
-        if gains.follows_pose:
-            raise GeometryError("tensions that follow the pose; allowed: those of the set-point")
         self.model, self.gains, self.T, self.limit = model, gains, period_s, torque_Nm
         self.a = np.array([in_space(point) for point in platform.exit_points_m])
         self.b = np.array([in_space(point) for point in platform.anchor_points_m])
@@ -86,16 +84,15 @@ class BaselineCableControl:
 
     def update(self, feedback: AxisFeedback, setpoint: Setpoint, torque_Nm: FloatArray) -> None:
         """Write torques and the axes' set-points, (n,) each."""
-        twist = self._locate(feedback.position_rad)
+        J, twist = self._locate(feedback.position_rad)
         self.past = [*self.past[1:], np.array([self.position, self.velocity, self.acceleration])]
         position, Q, v_d, a_d = self._follow(np.mean(self.past, axis=0))
         rho, J_d = self._cables(position, Q)
-        J = J_d[:, self.chosen]
         setpoint.position_rad[:] = (rho / self.stretch - self.at_zero) / self.c
         setpoint.velocity_rad_s[:] = J_d @ v_d / self.c
         setpoint.acceleration_rad_s2[:] = J_d @ a_d / self.c
         error = np.concatenate([position - self.p, Rotation.from_matrix(Q @ self.Q.T).as_rotvec()])
-        M, known = self._body(Q, v_d, a_d)
+        M, known = self._body(v_d, a_d)
         force = self._force(J, M[np.ix_(self.chosen, self.chosen)], error, v_d, twist)
         late = self.theta + latency_s(self.T) * self.omega
         learnt = self.learning.update(
@@ -115,8 +112,8 @@ class BaselineCableControl:
         u = way / rho[:, None]
         return np.asarray(rho), np.hstack([u, np.cross(r, u)])
 
-    def _locate(self, theta: FloatArray) -> FloatArray:
-        """Observe the motors, find the pose by Gauss-Newton; return the twist (d,)."""
+    def _locate(self, theta: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Observe the motors, find the pose by Gauss-Newton; return J (n, d) and the twist (d,)."""
         T, gains = self.T, self.gains
         z, w = math.exp(-_OBSERVER_rad_s * T), 1.0 - math.exp(-gains.smoother_rad_s * T)
         predicted = self.theta + T * self.omega
@@ -141,7 +138,7 @@ class BaselineCableControl:
         self.stretch = rho / self._unstretched(np.sqrt(rho**2 - height**2), height)
         J = J[:, self.chosen]
         rate = self.c * (self.omega + gains.smooth * (self.calm - self.omega))
-        return np.asarray(np.linalg.lstsq(J, rate, rcond=None)[0], float)
+        return J, np.asarray(np.linalg.lstsq(J, rate, rcond=None)[0], float)
 
     def _unstretched(self, across: FloatArray, height: FloatArray) -> FloatArray:
         """Return the cables' lengths without tension (n,): elastic catenaries, (3.81) to (3.84)."""
@@ -186,11 +183,11 @@ class BaselineCableControl:
         twice = _left_jacobian(phi) @ slope + (after - spin) / self.T
         return x[0, :3], Q, np.concatenate([x[1, :3], spin]), np.concatenate([x[2, :3], twice])
 
-    def _body(self, Q: FloatArray, v: FloatArray, a: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def _body(self, v: FloatArray, a: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return the mass matrix (6, 6), and the wrench (6,) of weight and inertia."""
         platform = self.model.platform
-        m, r = platform.mass_kg, Q @ in_space(platform.centre_of_mass_m)
-        inertia = Q @ inertia_kg_m2(platform) @ Q.T
+        m, r = platform.mass_kg, self.Q @ in_space(platform.centre_of_mass_m)
+        inertia = self.Q @ inertia_kg_m2(platform) @ self.Q.T
         R, omega = _cross_matrix(r), v[3:]
         M = np.block([[m * np.eye(3), -m * R], [m * R, inertia - m * R @ R]])
         g = np.zeros(3)

@@ -44,7 +44,7 @@ INDEX_m_s = 0.1
 _SETTLING_S = 0.5
 _RISE_1_s = 1.0
 _FALL_S = 0.2
-_HAND_OVER_S, _FOLLOWED_S = 0.5, 0.1
+_HAND_OVER_S = 0.5
 _PULLED = 0.95
 _SLACK_m, _ONCE_TIGHT_m = 1.0, 0.05
 """How far a cable may be wound in while some are slack, and once all are tight, besides stretch."""
@@ -254,7 +254,9 @@ class TightenProgram(PlatformProgram):
         if self._stage + 1 == len(_STAGES):
             self._end_tight(feedback, torque_Nm)
             return
-        uneven = self._slack.uneven(self._once_tight_m) if self._stage == 0 else ""
+        # elsewhere than at home lengths tell where the platform is, wherever it is pulled to
+        matters = self._stage == 0 and self._source == "home"
+        uneven = self._slack.uneven(self._once_tight_m) if matters else ""
         self._fail_if(uneven or self._why_not_to_pull(feedback))
         if self._failure:
             return
@@ -288,16 +290,13 @@ class TightenProgram(PlatformProgram):
         """Blend out what the platform is pressed on its stand with; then it may be moved.
 
         Meanwhile its cables are stretched otherwise than the control has it, so that the set-point
-        comes after where the control finds the platform: it is not pushed against its stand.
+        stands wherever the control finds the platform: it is not pushed against its stand.
         """
-        begins = self._handing_over_cycles == 0
-        ends = self._handing_over_cycles * self._parts.period_s > _HAND_OVER_S
-        within_s = 0.0 if begins or ends else _FOLLOWED_S
-        self._control.stand_still(on_stand=True, within_s=within_s)
+        self._control.stand_still(on_stand=True)
         self._loop.update(feedback, setpoint, torque_Nm)
         self._handing_over_cycles += 1
         self._let_go_cycle = feedback.cycle
-        if ends:
+        if self._handing_over_cycles * self._parts.period_s > _HAND_OVER_S:
             self._finish(feedback, setpoint, torque_Nm)
 
     def _take_last(self) -> None:
@@ -354,7 +353,7 @@ class TightenProgram(PlatformProgram):
 
     def _trouble(self, feedback: AxisFeedback) -> str:
         moved_m = np.abs((feedback.position_rad - self._start_rad) * self._cable)
-        if dragged := self._slack.dragged():
+        if self._source == "home" and (dragged := self._slack.dragged()):
             return dragged
         i = int(moved_m.argmax())
         # what stands does not move once its cables are tight

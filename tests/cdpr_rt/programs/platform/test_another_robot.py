@@ -129,7 +129,7 @@ class BeltControl:
     def observe(self, feedback: AxisFeedback) -> None:
         self.estimated[:] = self.zero_m + BELT_m * feedback.position_rad
 
-    def stand_still(self, *, on_stand: bool = False, within_s: float = 0.0) -> None:
+    def stand_still(self, *, on_stand: bool = False) -> None:
         self.position[:] = self.estimated
         self.velocity[:] = self.acceleration[:] = 0.0
 
