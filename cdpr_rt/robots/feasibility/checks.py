@@ -144,7 +144,7 @@ def _shape(robot: Robot, statics: PlatformStatics) -> Iterator[Finding]:
 
 def _tensions(statics: PlatformStatics) -> Iterator[Finding]:
     platform = statics.platform
-    home = np.array(statics.platform.home_m)
+    home = np.array(platform.home_m)
     way = np.linspace(home, np.clip(home, statics.box.low_m, statics.box.high_m), _GRID)
     for place, where in ((home[None], ""), (way, "on the way to the box of targets, ")):
         missing = ~statics.is_target(place)

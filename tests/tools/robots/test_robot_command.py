@@ -1,12 +1,10 @@
-"""`cdpr robot show` and `new`: what they tell, draw, write and refuse."""
+"""`cdpr robot show`: what it tells, draws and refuses."""
 
 from __future__ import annotations
 
 import json
-import math
 import re
 import subprocess
-from itertools import combinations
 from pathlib import Path
 from typing import Any
 
@@ -16,16 +14,10 @@ import pytest
 from cdpr_here import cdpr_here
 from matplotlib.patches import Polygon
 
-from cdpr_profiles import ProfileError, load_robot
+from cdpr_profiles import load_robot
 from cdpr_profiles.reading.places import SHIPPED
 from cdpr_rt.robots.feasibility.checks import findings
-from cdpr_rt.robots.platform_model import RESERVE
-from cdpr_rt.robots.statics import statics_of
-from cdpr_tools.errors import BadInputError
-from cdpr_tools.robots.kinds import KINDS, kind_of
-from cdpr_tools.robots.new_robot import answers_of, write_robot
 from cdpr_tools.robots.picture import figure_of
-from cdpr_tools.robots.questions import Question
 
 PLANAR = (SHIPPED / "robots" / "planar-3.toml").read_text()
 
@@ -39,9 +31,6 @@ def as_json(done: subprocess.CompletedProcess[str]) -> dict[str, object]:
     told = json.loads(done.stdout.splitlines()[-1])
     assert isinstance(told, dict)
     return told
-
-
-# -- show
 
 
 def test_the_planar_robot_is_told_sketched_and_drawn(tmp_path: Path) -> None:
@@ -190,97 +179,6 @@ def test_what_cannot_be_shown_is_one_clear_line(arguments: list[str], problem: s
     assert line.startswith("cdpr: ") and problem in line
 
 
-# -- new
-
-
-def usual(question: Question, default: str, wrong: str) -> str:
-    assert not wrong
-    return default
-
-
-@pytest.mark.parametrize("kind", list(KINDS))
-def test_the_defaults_of_every_kind_are_a_robot_that_works(kind: str, tmp_path: Path) -> None:
-    path = tmp_path / "mine.toml"
-    robot = write_robot(answers_of(path, {"kind": kind}, usual), path)
-    assert findings(robot) == []
-    shipped = load_robot(kind)
-    assert robot.platform is not None and shipped.platform is not None
-    assert robot.platform.controlled == shipped.platform.controlled
-    assert robot.platform.workspace_angle_rad == pytest.approx(
-        shipped.platform.workspace_angle_rad, abs=1e-3
-    )
-    assert [len(robot.axes_on(bus.name)) for bus in robot.buses] == [
-        len(robot.axes) // len(robot.buses)
-    ] * len(robot.buses)
-
-
-FRAMES = [(kind, width_m) for kind in KINDS for width_m in (1.5, 3.0, 8.0, 15.0)]
-
-
-@pytest.mark.long
-@pytest.mark.parametrize(("kind", "widest_m"), FRAMES)
-def test_the_defaults_of_a_frame_of_any_size_are_a_robot_that_works(
-    kind: str, widest_m: float, tmp_path: Path
-) -> None:
-    usual_m = kind_of(kind).frame_m
-    scale = widest_m / max(usual_m)
-    frame = ", ".join(f"{scale * side:.3f}" for side in usual_m)
-    path = tmp_path / "mine.toml"
-    robot = write_robot(answers_of(path, {"kind": kind, "frame_m": frame}, usual), path)
-    assert findings(robot) == []
-    assert robot.platform is not None
-    side_m = max(math.dist(*pair) for pair in combinations(robot.platform.anchor_points_m, 2))
-    assert side_m == pytest.approx(scale * kind_of(kind).side_m, rel=0.02)
-
-
-def test_the_box_that_is_proposed_of_a_wide_and_low_frame_is_all_of_targets(tmp_path: Path) -> None:
-    path = tmp_path / "stadium.toml"
-    given = {"kind": "point-4", "frame_m": "80 50 20"}
-    told = findings(write_robot(answers_of(path, given, usual), path))
-    # the smallest winches that hold the platform are proposed, and cables of 50 m sag in their pull
-    assert [finding.key for finding in told] == ["limits.tension_min_N"]
-
-
-def test_a_platform_too_light_for_its_winches_is_told_what_would_do(tmp_path: Path) -> None:
-    path = tmp_path / "light.toml"
-    given = {"kind": "suspended-6", "frame_m": "1.5 1.5 1.5", "mass_kg": "1"}
-    with pytest.raises(ProfileError) as caught:
-        write_robot(answers_of(path, given, usual), path)
-    assert re.search(
-        r"a platform of \d+\.?\d* kg and more is possible there, or tension_min_N up to 0\.\d+ "
-        "with winches as small",
-        str(caught.value),
-    )
-
-
-def test_smaller_winches_and_a_smaller_frame_get_a_smaller_platform(tmp_path: Path) -> None:
-    path = tmp_path / "mine.toml"
-    given = {"kind": "suspended-8", "frame_m": "3 2 2", "winch": "winch-300n"}
-    robot = write_robot(answers_of(path, given, usual), path)
-    platform = robot.platform
-    assert findings(robot) == []
-    assert platform is not None and 20.0 < platform.mass_kg < 40.0
-    assert max(math.dist(*pair) for pair in combinations(platform.anchor_points_m, 2)) < 0.35
-    assert min(math.dist(*pair) for pair in combinations(platform.exit_points_m, 2)) > 0.149
-    np.testing.assert_allclose(np.ptp(platform.exit_points_m, axis=0)[:2], (3.0, 2.0), atol=0.02)
-
-
-def test_names_in_the_picture_are_clear_of_its_numbers(tmp_path: Path) -> None:
-    path = tmp_path / "mine.toml"
-    given = {"kind": "suspended-8", "frame_m": "3 2 2"}
-    robot = write_robot(answers_of(path, given, usual), path)
-    assert robot.platform is not None
-    figure = figure_of(robot, robot.platform)
-    figure.draw_without_rendering()
-    (from_above,) = [ax for ax in figure.axes if ax.texts]
-    assert len(from_above.texts) == 8
-    inside = from_above.get_window_extent()
-    for name in from_above.texts:
-        (left, lower), (right, upper) = name.get_window_extent().get_points()
-        assert inside.x0 <= left and right <= inside.x1, name
-        assert inside.y0 <= lower and upper <= inside.y1, name
-
-
 def test_exit_points_above_each_other_share_a_name_and_the_platform_is_drawn_whole(
     tmp_path: Path,
 ) -> None:
@@ -302,154 +200,3 @@ def test_exit_points_above_each_other_share_a_name_and_the_platform_is_drawn_who
                 x, y = outline.get_xy().T
                 area = abs(np.dot(x[:-1], y[1:]) - np.dot(x[1:], y[:-1])) / 2.0
                 assert area == pytest.approx(np.ptp(x) * np.ptp(y))  # a rectangle from each side
-
-
-def test_the_stand_is_in_the_middle_of_a_frame_about_the_room_s_zero(tmp_path: Path) -> None:
-    path = tmp_path / "mine.toml"
-    given = {"kind": "suspended-8", "frame_m": "3 2 2"}
-    platform = write_robot(answers_of(path, given, usual), path).platform
-    assert platform is not None
-    assert platform.home_m[:2] == (0.0, 0.0)
-
-
-def test_kinds_are_told_before_the_first_question(tmp_path: Path) -> None:
-    path = tmp_path / "mine.toml"
-    done = cdpr_here("robot", "new", path, stdin="planar-5\n\n")
-    assert done.returncode == 2 and not path.exists()
-    for kind, what in KINDS.items():
-        assert re.search(rf"{kind} +{re.escape(what)}", done.stderr)
-    assert "value 'planar-5'; allowed: planar-3, planar-4, point-4" in done.stderr
-
-
-def test_the_defaults_are_a_robot_that_works(tmp_path: Path) -> None:
-    path = tmp_path / "mine.toml"
-    done = cdpr_here("robot", "new", path, "--yes", "--json")
-    assert done.returncode == 0, done.stderr
-    assert as_json(done) == {"ok": True, "file": str(path)}
-    robot = load_robot(path)
-    assert robot.name == "mine" and findings(robot) == []
-    assert [axis.name for axis in robot.axes] == ["upper left", "upper right", "lower"]
-    platform, shipped = robot.platform, load_robot("planar-3").platform
-    assert platform is not None and shipped is not None
-    assert platform.exit_points_m == shipped.exit_points_m
-    np.testing.assert_allclose(platform.anchor_points_m, shipped.anchor_points_m, atol=1e-4)
-    statics = statics_of(robot)
-    spare = RESERVE * (statics.high_N - statics.low_N).min()
-    points = statics.box.grid(21, 21)
-    assert statics.margin_N(points, platform.acceleration_m_s2).min() > 0.85 * spare
-    again = cdpr_here("robot", "new", path, "--yes")
-    assert again.returncode == 2 and "not there yet" in again.stderr
-    assert load_robot(path) == robot
-
-
-def test_defaults_follow_from_where_the_cables_leave(tmp_path: Path) -> None:
-    given = {"exit_1_m": "-2, 0", "exit_2_m": "2, 0", "exit_3_m": "0.2, 3", "side_m": "0.2"}
-    path = tmp_path / "upright.toml"
-    robot = write_robot(answers_of(path, given, usual), path)
-    assert findings(robot) == []
-    platform = robot.platform
-    assert platform is not None
-    # one corner up, the others towards their exit points
-    (x1, y1), (x2, y2), (x3, y3) = platform.anchor_points_m
-    assert x1 < 0 < x2 and y1 < 0 and y2 < 0 and abs(x3) < 1e-9 and y3 > 0
-    assert platform.home_m[1] < platform.workspace_min_m[1]
-    assert [axis.name for axis in robot.axes] == ["cable 1", "cable 2", "cable 3"]
-
-
-def test_answers_are_asked_again_until_they_can_be(tmp_path: Path) -> None:
-    answers = [
-        "",
-        "Wall robot",
-        "winch-mpp0932d",
-        "",
-        "socketcan:can1",
-        "1, 1, 2",
-        "4 5 6",
-        "3, 2.5",
-    ]
-    answers += ["", "", "here", "0.1, 0.1", "-1", "0.2", "", "", "", "400", "4", "15"]
-    answers += ["10", "140", "1.5", "", "", "", "-5, 0", "0.3, 1.9", "9, 9", ""]
-    path = tmp_path / "wall.toml"
-    done = cdpr_here("robot", "new", path, stdin="\n".join(answers) + "\n")
-    assert done.returncode == 0, done.stderr
-    for problem in (
-        "did you mean 'winch-mpp0923d'?",
-        "allowed: 3 different numbers from 1 to 126",
-        "value 'here'; allowed: two numbers in m",
-        "allowed: a number from 0 to 10",
-        "allowed: a number from 0.001 to 11.55",
-        "allowed: a number from 15 to",
-        "allowed: above -0",
-        "allowed: x from -0",
-    ):
-        assert problem in done.stderr, problem
-    robot = load_robot(path)
-    platform = robot.platform
-    assert platform is not None
-    assert (robot.name, robot.buses[0].url) == ("Wall robot", "socketcan:can1")
-    assert [axis.node_id for axis in robot.axes] == [4, 5, 6]
-    assert platform.exit_points_m == ((-1.5, 2.5), (1.5, 2.5), (0.1, 0.1))
-    assert platform.workspace_max_m == (0.3, 1.9)
-    assert (robot.limits.tension_min_N, robot.limits.tension_max_N) == ((15.0,), (140.0,))
-    assert platform.mass_kg == 1.5
-
-
-def test_questions_nobody_answers_write_nothing(tmp_path: Path) -> None:
-    path = tmp_path / "mine.toml"
-    done = cdpr_here("robot", "new", path, stdin="\nMine\n\n")
-    assert done.returncode == 2
-    assert "no answer to 'bus' (--yes takes the defaults); nothing was written" in done.stderr
-    assert "Traceback" not in done.stderr and not path.exists()
-
-
-def test_all_wrong_keys_are_named_with_those_of_the_kind(tmp_path: Path) -> None:
-    given = {"kind": "planar-4", "width_m": "3", "height": "2"}
-    with pytest.raises(BadInputError) as caught:
-        answers_of(tmp_path / "mine.toml", given, usual)
-    text = str(caught.value)
-    assert text.startswith("--set width_m, height: no such question; allowed for planar-4: kind, ")
-    page = (Path(__file__).parents[3] / "docs" / "describing-your-robot.md").read_text()
-    for key in text.rpartition(": ")[2].split(", "):
-        assert f"`{key}`" in page or re.fullmatch(r"(exit|anchor)_[234]_m", key), key
-
-
-@pytest.mark.parametrize(
-    ("key", "value", "problem"),
-    [
-        ("mass", "2", "--set mass: no such question; did you mean 'mass_kg'?"),
-        ("mass_kg", "nan", "--set mass_kg: value 'nan'; allowed: a number from 0.01 to 10000"),
-        ("exit_1_m", "1,2,3", "--set exit_1_m: value '1,2,3'; allowed: two numbers"),
-        ("frame_m", "3x2", "value '3x2'; allowed: two numbers in m, such as `4, 3`"),
-        ("frame_m", "3000, 2000", "allowed: up to 300 m each (in metres, not millimetres)"),
-        ("name", "two\nlines", "allowed: a text of one line"),
-    ],
-)
-def test_wrong_answers_beforehand_are_refused(
-    tmp_path: Path, key: str, value: str, problem: str
-) -> None:
-    with pytest.raises(BadInputError) as caught:
-        answers_of(tmp_path / "mine.toml", {key: value}, usual)
-    assert problem in str(caught.value)
-
-
-def test_two_answers_to_one_question_are_refused(tmp_path: Path) -> None:
-    path = tmp_path / "twice.toml"
-    answers = "--set", "kind=planar-3", "--set", "kind=planar-4"
-    done = cdpr_here("robot", "new", path, "--yes", *answers)
-    assert done.returncode == 2 and not path.exists()
-    assert "--set kind: 'planar-3' and 'planar-4'; allowed: one of them" in done.stderr
-
-
-def test_what_cannot_work_is_told_and_not_written(tmp_path: Path) -> None:
-    path = tmp_path / "point.toml"
-    line = ["exit_1_m=-1,2", "exit_2_m=0,2", "exit_3_m=1,2", "side_m=0", 'name=A "line" é']
-    done = cdpr_here("robot", "new", path, "--yes", *(p for text in line for p in ("--set", text)))
-    assert done.returncode == 2
-    assert f"cdpr: {path}: platform." in done.stderr and not path.exists()
-    assert "--set side_m=0 --set 'name=A \"line\" é' --yes" in done.stderr
-
-
-def test_a_file_can_only_be_new_toml_in_a_folder(tmp_path: Path) -> None:
-    done = cdpr_here("robot", "new", tmp_path / "nowhere" / "mine.toml", "--yes")
-    assert done.returncode == 2
-    assert "allowed: NAME.toml in a folder that is there" in done.stderr

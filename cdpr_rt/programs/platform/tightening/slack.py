@@ -37,9 +37,8 @@ class SlackTakeUp:
     One may have much more slack than another, and what a platform weighs holds it against some
     newtons only. So each is paid out a little, reeled in until it is tight, and paid out a little
     again; once all have been, they become tight together, and each is pulled with no more than what
-    that took. A cable
-    is tight where its winch does not turn although it is pulled with what has turned it before, or
-    with more than winches take up. Where a stand does not hold a platform so
+    that took. A cable is tight where its winch does not turn although it is pulled with what has
+    turned it before, or with more than winches take up. Where a stand does not hold a platform so
     light against what turns a winch, the cables are reeled in together at once.
     """
 
