@@ -122,6 +122,7 @@ def _of_loop(robot: Robot, model: PlatformModel) -> dict[str, float] | None:
         "gain_margin": worst.gain,
         "phase_margin_rad": worst.phase_rad,
         "worst_at_Hz": worst.frequency_Hz,
+        "tensions_follow_pose": loop.gains.follows_pose,
     }
 
 
@@ -221,12 +222,17 @@ def _disagreement_line(allowed_m: float | None) -> str:
 
 def _loop_lines(loop: dict[str, float]) -> list[str]:
     slowest, fastest = loop["slowest_Hz"], loop["fastest_Hz"]
-    return [
+    lines = [
         f"loop       the platform's modes at {slowest:.1f} to {fastest:.1f} Hz; with cables up to "
         f"{_STIFFNESS_OFF:.0%} softer or stiffer",
         f"           gain margin {loop['gain_margin']:.1f}, phase margin "
         f"{math.degrees(loop['phase_margin_rad']):.0f} deg",
     ]
+    if not loop["tensions_follow_pose"]:
+        lines.append(
+            "           tensions are planned for where it is wanted: they hold it there like springs"
+        )
+    return lines
 
 
 def _free_rotation_lines(swings: dict[str, float] | None) -> list[str]:

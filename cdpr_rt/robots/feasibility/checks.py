@@ -22,7 +22,7 @@ from cdpr_rt.robots.feasibility.turned_by_friction import (
     turned_by_friction,
 )
 from cdpr_rt.robots.interference.interference import in_words
-from cdpr_rt.robots.platform.loop_design import designed_loop
+from cdpr_rt.robots.platform.loop_design import UnstableError, designed_loop
 from cdpr_rt.robots.rigid_body import in_space, is_point
 from cdpr_rt.robots.robot_arrays import limits_of
 from cdpr_rt.robots.statics import NONE_rad, PlatformStatics, statics_of
@@ -276,8 +276,13 @@ def _free_rotation(statics: PlatformStatics) -> Iterator[Finding]:
 def _loop(robot: Robot, statics: PlatformStatics) -> Iterator[Finding]:
     try:
         loop = designed_loop(statics.model, robot.axes, robot.sync_period_s)
-    except GeometryError:
-        return  # said of the tensions
+    except GeometryError as error:
+        if isinstance(error, UnstableError):
+            text = (
+                f"{error}: anchor points that lie towards their exit points, with longer arms, help"
+            )
+            yield Finding("axes[0].anchor_point_m", text, impossible=True)
+        return  # else said of the tensions
     slowest_Hz = loop.slowest_rad_s / math.tau
     if slowest_Hz < _SLOW_Hz:
         off_mm = 1e3 * moved_by_friction_m(statics.model, robot.axes, loop.gains)

@@ -138,6 +138,44 @@ class CableKinematics:
         """Write W (m, d, n) at the arrays of m poses (m, 4, 3); nan where a cable has no length."""
         cable_kernel.wrench_matrices(self.geometry, poses, self._chosen, self._cables, out)
 
+    def geometric_stiffness(self, pose: Pose, tension_N: FloatArray) -> FloatArray:
+        """Return ∂(J^T t)/∂(twist) (6, 6) of cables that hold tensions t (n,), all directions.
+
+        With b from the origin to an anchor, u the cable's direction, ρ its free length and n the
+        unit vector across its pulley's plane, h from the swivel axis,
+
+            Σ t B^T ((1 - u u^T - n n^T)/ρ + n n^T |axis × u|/h) B + t [u]× [b]×    B = (1, -[b]×)
+
+        the last about the axes alone; without a pulley the bracket is (1 - u u^T)/ρ. Behzadipour
+        and Khajepour, Stiffness of Cable-based Parallel Manipulators, J. Mech. Des. 128 (2006).
+        """
+        self._run(pose)
+        stiffness = np.zeros((6, 6))
+        for i, t in enumerate(tension_N):
+            u, free = self._cables[:3, i], self._cables[cable_kernel.FREE, i]
+            b = pose.Q @ self.geometry[cable_kernel.ANCHOR : cable_kernel.RADIUS, i]
+            bends = (np.eye(3) - np.outer(u, u)) / free
+            if self.geometry[cable_kernel.RADIUS, i] > 0.0:
+                bends += self._swivels(pose, b, i)
+            X = np.array([[0.0, -b[2], b[1]], [b[2], 0.0, -b[0]], [-b[1], b[0], 0.0]])
+            moved = np.hstack([np.eye(3), -X])
+            stiffness += t * moved.T @ bends @ moved
+            stiffness[3:, 3:] += t * (np.outer(b, u) - (u @ b) * np.eye(3))
+        return stiffness
+
+    def _swivels(self, pose: Pose, b: FloatArray, i: int) -> FloatArray:
+        """Return what a pulley adds to a cable's turn by its anchor, (3, 3): n n^T (|a×u|/h - 1/ρ).
+
+        Nothing where the cable leaves along the swivel axis.
+        """
+        axis, exit_m = self.geometry[cable_kernel.AXIS :, i], self.geometry[:3, i]
+        across = np.cross(axis, self._cables[:3, i])
+        size, h = np.linalg.norm(across), np.linalg.norm(np.cross(axis, pose.p + b - exit_m))
+        if not min(size, h) > 0.0:
+            return np.zeros((3, 3))
+        n = across / size
+        return np.asarray(np.outer(n, n) * (size / h - 1.0 / self._cables[cable_kernel.FREE, i]))
+
     def pose_from_lengths(
         self,
         lengths_m: FloatArray,

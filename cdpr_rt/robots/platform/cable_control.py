@@ -42,7 +42,7 @@ from cdpr_rt.robots.tension.tension_split import OK, split
 from cdpr_rt.robots.workspace import infeasibility_text
 
 _ON_STAND = 0.1  # of the integral part
-_SETTLING_STEPS, _LIFT_S = 60, 0.05
+_SETTLING_STEPS, _LIFT_S, _COMES_AFTER_S = 60, 0.05, 0.1
 
 
 class CableControl(PlaceChecks):
@@ -110,7 +110,8 @@ class CableControl(PlaceChecks):
         self._motors[tracking.TENSION] = self.low_N
         self.gains = designed_loop(model, axes, period_s).gains
         span_N = float((model.high_N - model.low_N).min())
-        self._settings, self._on_stand = loop_settings(self.gains, span_N, period_s), False
+        self._settings = loop_settings(self.gains, span_N, period_s)
+        self._on_stand = False
         self._integral_N = float(self._settings[loop.MOST_N])
 
     def _bind_pose(self, moves: FloatArray) -> None:
@@ -120,12 +121,14 @@ class CableControl(PlaceChecks):
         self._pose = Pose(np.zeros(3))
         self._pose.array[:] = self._home.array
         self._wanted = Pose(np.zeros(3))
-        self._scratch, self._cables = np.zeros((4, 3)), np.zeros((CABLE_ROWS, n))
+        self._scratch, (found, wanted) = np.zeros((4, 3)), np.zeros((2, CABLE_ROWS, n))
+        follows = self.gains.follows_pose
+        self._planned_at = (found, self._pose.array) if follows else (wanted, self._wanted.array)
         filters = tracking_filters(self.gains, self._period_s)
         self._swing, self._seven, position = np.zeros(tracking.SWING), np.zeros(7), np.zeros(n)
         self._track = bound(
             tracking.track_pose, motors, filters, kinematics.geometry, self._up, self._pose.array,
-            self._cables, kinematics.solver, moves[loop.TWIST], rotation_of(model.platform),
+            found, kinematics.solver, moves[loop.TWIST], rotation_of(model.platform),
             self._swing, kinematics.turns_freely, then=(position,),
         )  # fmt: skip
         self._write_coordinates = bound(
@@ -135,7 +138,7 @@ class CableControl(PlaceChecks):
         self._motor_references = bound(
             pose_setpoint.motor_references, self.setpoint.shaped, self._directions,
             self._home.array, self._period_s, kinematics.geometry, motors, self._pose.array,
-            self._scratch, self._wanted.array, np.zeros((CABLE_ROWS, n)), moves[loop.WANTED_TWIST],
+            self._scratch, self._wanted.array, wanted, moves[loop.WANTED_TWIST],
             moves[loop.WANTED_ACCELERATION], moves[loop.POSE_ERROR], then=(position,) * 3,
         )  # fmt: skip
 
@@ -148,7 +151,7 @@ class CableControl(PlaceChecks):
         scratch, J = np.zeros((7, 7, 7)), np.zeros((n, d))
         self._correct = bound(
             loop.correct, self._settings, self._state, model.wrench_scale, body_of(model.platform),
-            self._directions, self._cables, self._pose.array, moves, scratch,
+            self._directions, *self._planned_at, moves, scratch,
             J, self._W, self._wrench, self._friction(), self._force, then=(1.0, 1.0),
         )  # fmt: skip
         if self.learning is not None:
@@ -294,13 +297,17 @@ class CableControl(PlaceChecks):
         motors[tracking.TENSION] = planned_N
 
     def stand_still(self, *, on_stand: bool = False) -> None:
-        """Have the set-point stand where the platform is.
+        """Have the set-point stand where the platform is, which may rest `on_stand`.
 
         Until it moves, the integral part of one `on_stand` is bounded: it would press, and the
-        first way off the stand would begin against that.
+        first way off the stand would begin against that. Asked for again in every cycle, the
+        set-point comes after it where tensions may not turn with the platform: they would not hold
+        it.
         """
+        again = self._on_stand and on_stand and not self.gains.follows_pose
+        share = self._period_s / (self._period_s + _COMES_AFTER_S) if again else 1.0
         self._rest(on_stand=on_stand)
-        self.setpoint.stand_at(self.estimated)
+        self.setpoint.stand_at(self.position + share * (self.estimated - self.position))
 
     def _rest(self, *, on_stand: bool) -> None:
         self._on_stand = on_stand

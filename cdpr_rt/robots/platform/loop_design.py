@@ -1,19 +1,15 @@
 """Design of a platform's loop from its rotors, cables, delays and mass, and its margins.
 
-Deviations are linear around a pose: the rotors' x (n,), as paid-out cable, and the platform's q
-(d,) hang together by cables of stiffness k_i = EA/ρ_i and damping b k_i,
+The plant is that of `loop_plant`: x = -G τ, with the rotors' x as paid-out cable, and the loop
+makes of x, late, the motors' pull τ = C(s) x. How far the eigenvalues of the return difference are
+from 0 is told by the largest singular value of the sensitivity (1 + C G)^-1: its inverse, the
+modulus margin μ, is a gain margin of at least 1/(1 - μ) and a phase margin of at least 2 asin(μ/2)
+(Skogestad and Postlethwaite, Multivariable Feedback Control, 2.4.3).
 
-    m_r s² x = T - τ      M_p s² q = -J^T T      T = diag(k (1 + b s)) (J q - x)
-
-and the loop makes of x, late, the motors' pull τ = C(s) x. How far the eigenvalues of the return
-difference are from 0 is told by the largest singular value of the sensitivity (1 + C G)^-1, x =
--G τ: its inverse, the modulus margin μ, is a gain margin of at least 1/(1 - μ) and a phase margin
-of at least 2 asin(μ/2) (Skogestad and Postlethwaite, Multivariable Feedback Control, 2.4.3).
-
-All is taken along the modes of the platform without cables' stretch: J = Q R and R^-T M_p R^-1 =
-U λ U^T, so that the tensions' directions Q U are orthonormal, λ is what each mode has of mass, and
-the loop's damping and stiffness are diagonal. G is a sum over the modes of rotors and platform on
-their cables, whose damping is proportional to their stiffness: Σ φ φ^T/(s² + (1 + b s) ω²).
+Tensions that are planned where the platform is follow its pose: they take the geometric stiffness
+K_G away that they give it, late, L(s) being what of x comes through, and G' = (1 - G L K_G)^-1 G.
+Where cables' elasticity is not much more than that, they are planned at the set-point in place of
+it, and what turns the platform away meets K_G.
 
 The drives' delay is assumed, the same for all robots: it is not read from their profiles.
 """
@@ -33,7 +29,7 @@ from cdpr_profiles import RobotAxis
 from cdpr_profiles.platform import Platform
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.errors import GeometryError
-from cdpr_rt.robots.platform.body_kernel import body_of, write_mass_matrix
+from cdpr_rt.robots.platform.loop_plant import GREATEST, LEAST, NONE, linear_plant
 from cdpr_rt.robots.platform.margin_kernel import keeps_margin
 from cdpr_rt.robots.platform_model import PlatformModel
 
@@ -41,6 +37,8 @@ ComplexArray = NDArray[np.complex128]
 
 LEAST_MARGIN = 0.45
 """Modulus margin that the design keeps, with all stiffness in STIFFNESS_SHARES."""
+FOLLOWED_MARGIN = 0.4
+"""What a loop that is designed without tensions has to keep with those that follow the pose."""
 STIFFNESS_SHARES = (0.7, 1.0, 1.3)
 OBSERVER_rad_s = 2.0 * math.pi * 400.0
 DAMPING_RATIO = 0.55
@@ -53,10 +51,15 @@ _LOOSE_SHARE = 0.075
 _INTEGRAL_RATE_1_s = 5.0
 _INTEGRAL_SHARES = (0.3, 0.15)
 """Rates of the integral part that are tried, over 2 ζ ω of the slowest mode."""
-_CABLE_DAMPING_s = 2e-3
 _SLOWEST_rad_s, _FASTEST_rad_s = 1.0, 80.0
+_TURNED_AWAY_SHARE = 0.5
+"""Of the loop's stiffness, the most that tensions may take from the slowest that is tried."""
 _STEP, _REFINEMENTS = 1.3, 3
 _LOWEST_Hz, _HIGHEST_Hz, _FREQUENCIES = 0.3, 150.0, 64
+
+
+class UnstableError(GeometryError):
+    """A robot that no loop holds."""
 
 
 @dataclass(frozen=True)
@@ -78,6 +81,8 @@ class LoopGains:
     integral_1_s: float
     rotor_kg: float
     """Mass of a rotor, as its cable feels it."""
+    follows_pose: bool = False
+    """Whether tensions are planned for where the platform is, not for where it is wanted."""
 
 
 @dataclass(frozen=True)
@@ -146,44 +151,19 @@ class LoopModel:
         self.poses = design_poses(model) if poses is None else poses
         highest = min(_HIGHEST_Hz, 0.3 / period_s)
         self.frequency_Hz = np.geomspace(_LOWEST_Hz, highest, _FREQUENCIES)
-        self._s = s = 2j * np.pi * self.frequency_Hz
+        self._s = s = (2j * np.pi * self.frequency_Hz).astype(np.complex128)
         self._late = np.exp(-s * latency_s(period_s)) / (1.0 + s / OBSERVER_rad_s) ** 2
-        m, d = len(self.poses), model.size
-        self._mass_kg = np.zeros((m, d))
-        self._plants = np.zeros((m, len(STIFFNESS_SHARES), len(s), d, d), complex)
-        for i, q in enumerate(self.poses):
-            self._take(i, model, q, rotors_kg, stiffness_N)
-
-    def _take(
-        self,
-        i: int,
-        model: PlatformModel,
-        q: FloatArray,
-        rotors_kg: FloatArray,
-        stiffness_N: FloatArray,
-    ) -> None:
-        """Fill in λ (d,), and G (stiffness, frequencies, d, d) along the modes, at pose `i`."""
-        pose, kinematics = model.pose(q), model.kinematics
-        M, scratch = np.zeros((6, 6)), np.zeros((4, 3))
-        write_mass_matrix(body_of(model.platform), pose.array, scratch, M)
-        M_p = M[np.ix_(kinematics.directions, kinematics.directions)]
-        J = kinematics.jacobian(pose)
-        if np.linalg.matrix_rank(J) < J.shape[1]:
-            raise GeometryError("the cables cannot hold one direction, whatever their tensions")
-        orthogonal, R = np.linalg.qr(J)
-        inverse = np.linalg.inv(R)
-        self._mass_kg[i], modes = np.linalg.eigh(inverse.T @ M_p @ inverse)
-        n, d = J.shape
-        per_root = np.zeros((d + n, d + n))  # of the mass, its Cholesky factor's inverse
-        per_root[:d, :d] = np.linalg.inv(np.linalg.cholesky(M_p))
-        per_root[d:, d:] = np.diag(rotors_kg**-0.5)
-        stretch = np.hstack([J, -np.eye(n)]) @ per_root.T
-        k = stiffness_N / kinematics.lengths(pose)
-        s = self._s[:, None]
-        for plant, share in zip(self._plants[i], STIFFNESS_SHARES, strict=True):
-            squares, shapes = np.linalg.eigh(stretch.T @ (share * k[:, None] * stretch))
-            P = (orthogonal @ modes).T @ (per_root.T @ shapes)[d:]
-            plant[:] = (P / (s**2 + (1.0 + _CABLE_DAMPING_s * s) * squares)[:, None]) @ P.T
+        plants = [
+            linear_plant(model, q, rotors_kg, stiffness_N, self._s, STIFFNESS_SHARES)
+            for q in self.poses
+        ]
+        self._mass_kg, self._geometric_N_m, G = map(np.array, zip(*plants, strict=True))
+        fed = self._late[:, None, None] * self._geometric_N_m[:, 1:, None, None]
+        followed = np.linalg.solve(np.eye(model.size) - G[:, 1:] @ fed, G[:, 1:])
+        shape = (len(self.poses), -1, len(s), model.size, model.size)
+        self._elastic = G[:, NONE]
+        self._planned = G[:, [LEAST, GREATEST]].reshape(shape)
+        self._followed = followed.reshape(shape)
 
     def margins(self, gains: LoopGains) -> list[LoopMargins]:
         """Return the margins of a loop at each of the poses."""
@@ -193,7 +173,8 @@ class LoopModel:
             of_speed[:, None] * damping[:, None, None]
             + of_place[:, None] * stiffness[:, None, None]
         )
-        difference = np.eye(C.shape[-1]) + C[..., None] * self._plants
+        plants = self._followed if gains.follows_pose else self._planned
+        difference = np.eye(C.shape[-1]) + C[..., None] * plants
         least = np.linalg.svd(difference, compute_uv=False)[..., -1].min(axis=1)
         return [
             LoopMargins(
@@ -220,11 +201,11 @@ class LoopModel:
         of_speed = self._late * s * (1.0 - gains.smooth + gains.smooth * lowpassed)
         return of_speed, self._late * (1.0 + gains.integral_1_s / s)
 
-    def _keeps(self, gains: LoopGains) -> bool:
+    def _keeps(self, gains: LoopGains, plants: ComplexArray, least: float = LEAST_MARGIN) -> bool:
         damping, stiffness, _ = self._along_modes(gains)
-        scratch = np.zeros((2, *self._plants.shape[-2:]), complex)
+        scratch = np.zeros((2, *plants.shape[-2:]), complex)
         factors = self._factors(gains)
-        return keeps_margin(self._plants, *factors, damping, stiffness, LEAST_MARGIN, scratch)
+        return keeps_margin(plants, *factors, damping, stiffness, least, scratch)
 
     def design(self) -> LoopGains:
         """Return the loop that overcomes friction the soonest of those that keep LEAST_MARGIN.
@@ -232,20 +213,44 @@ class LoopModel:
         They keep it at all poses, with all stiffness. Dry friction in the winches, about the same
         in each, is what keeps a platform from its target, and the integral part what overcomes it:
         in N/(m s) of cable, in the geometric mean over the modes.
+
+        It is designed for elastic cables, and judged with tensions that follow the pose, from none
+        on to the greatest that may be planned. Where that takes too much of its margin it is
+        designed anew, for tensions of the set-point; and where none is stiff enough for those that
+        turn the platform away, for some that follow. Raises UnstableError where none holds it then.
         """
+        turning, late_s = self._geometric_N_m, latency_s(self.period_s) + 2.0 / OBSERVER_rad_s
+        elastic = self._best(self._elastic, np.zeros_like(turning), follows_pose=True)
+        if elastic and self._keeps(elastic, self._followed, FOLLOWED_MARGIN):
+            return elastic
+        # followed late, it takes of the damping what it would have taken of the stiffness
+        best = self._best(self._planned, turning, follows_pose=False) or self._best(
+            self._followed, late_s * turning, follows_pose=True
+        )
+        if best is None:
+            raise UnstableError(
+                "its tensions turn the platform away faster than a loop can hold it"
+            )
+        return best
+
+    def _best(
+        self, plants: ComplexArray, turning: FloatArray, *, follows_pose: bool
+    ) -> LoopGains | None:
         best, soonest = None, 0.0
         tried = itertools.product(_SMOOTHERS_Hz, _ROTOR_SHARES, _INTEGRAL_SHARES)
         for (smooth, smoother_Hz), share, integral in tried:
-            gains = self._slowest(smooth, 2.0 * math.pi * smoother_Hz, share, integral)
+            slow = self._slow(smooth, 2.0 * math.pi * smoother_Hz, share, integral)
+            gains = self._slowest(replace(slow, follows_pose=follows_pose), plants, turning)
+            if gains is None:
+                continue
             at_most = self._integral_N_m_s(self._with(gains, math.inf))
             if best is None or at_most > soonest:
-                found = self._quickest(gains)
+                found = self._quickest(gains, plants)
                 if (integral := self._integral_N_m_s(found)) > soonest:
                     best, soonest = found, integral
-        assert best is not None
         return best
 
-    def _slowest(
+    def _slow(
         self, smooth: float, smoother_rad_s: float, share: float, integral_share: float
     ) -> LoopGains:
         """Return the slowest loop with this part of smooth velocity, and of a rotor's damping."""
@@ -257,7 +262,30 @@ class LoopModel:
         )
         return self._with(gains, _SLOWEST_rad_s)
 
-    def _quickest(self, gains: LoopGains) -> LoopGains:
+    def _slowest(
+        self, gains: LoopGains, plants: ComplexArray, turning: FloatArray
+    ) -> LoopGains | None:
+        """Return the slowest loop from these gains on that holds the platform.
+
+        Where tensions turn it away, as those of crossed cables, by what is `turning` (..., d, d),
+        in N/m, or where they follow its pose N s/m, one that does more, and keeps LEAST_MARGIN;
+        None where none does.
+        """
+        if self._holds(gains, turning):
+            return gains
+        while gains.bandwidth_rad_s < _FASTEST_rad_s:
+            gains = self._with(gains, gains.bandwidth_rad_s * _STEP)
+            if self._holds(gains, turning) and self._keeps(gains, plants):
+                return gains
+        return None
+
+    def _holds(self, gains: LoopGains, turning: FloatArray) -> bool:
+        damping, stiffness, _ = self._along_modes(gains)
+        root = (damping if gains.follows_pose else stiffness)[:, None] ** -0.5
+        shares = root[..., None] * turning * root[..., None, :]
+        return float(np.linalg.eigvalsh(shares).min()) >= -_TURNED_AWAY_SHARE
+
+    def _quickest(self, gains: LoopGains, plants: ComplexArray) -> LoopGains:
         """Return the quickest loop from these gains on.
 
         From slow to quick: a loop that keeps its margin all the way from one that is stable for
@@ -266,7 +294,7 @@ class LoopModel:
         best, step, refinements = gains, _STEP, 0
         while best.bandwidth_rad_s < _FASTEST_rad_s and refinements < _REFINEMENTS:
             tried = self._with(best, best.bandwidth_rad_s * step)
-            if self._keeps(tried):
+            if self._keeps(tried, plants):
                 best = tried
             else:
                 step, refinements = math.sqrt(step), refinements + 1
@@ -312,7 +340,8 @@ class _Robot:
 def designed_loop(model: PlatformModel, axes: Sequence[RobotAxis], period_s: float) -> DesignedLoop:
     """Return the loop of a robot with these axes, one for each of the n cables.
 
-    Raises GeometryError where the cables do not hold the platform.
+    Raises GeometryError where the cables do not hold the platform, UnstableError where no loop
+    does.
     """
     winches = [axis.winch for axis in axes]
     rotors_kg = [w.motor.rotor_inertia_kg_m2 / w.cable_m_per_motor_rad**2 for w in winches]

@@ -182,7 +182,8 @@ def correct(
     be had: while it was not all, nothing is integrated that asks for more. Where the cables' rates
     contradict each other by more than motion can explain, as of a cable that has broken, the force
     is not to follow them. `scale` (d,) is what of each direction counts as much as 1 N, or 1 m.
-    `J` (n, d) and `W` (d, n) are written from `cables`.
+    `cables` and `pose` are those of the set-point, or of where the platform is where the loop was
+    designed so. `J` (n, d) and `W` (d, n) are written from `cables`.
     """
     d, n = W.shape
     for k in range(d):

@@ -43,6 +43,8 @@ class BaselineCableControl:
         platform = model.platform
         if any(platform.pulley_radius_m) or platform.tension_distribution != "minimum-deviation":
             raise GeometryError("pulleys, or tensions other than minimum-deviation; allowed: none")
+        if not gains.follows_pose:
+            raise GeometryError("tensions of the set-point; allowed: those that follow the pose")
         self.model, self.gains, self.T, self.limit = model, gains, period_s, torque_Nm
         self.a = np.array([in_space(point) for point in platform.exit_points_m])
         self.b = np.array([in_space(point) for point in platform.anchor_points_m])

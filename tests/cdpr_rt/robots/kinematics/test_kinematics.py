@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
+from cdpr_rt.arrays import FloatArray
 from cdpr_rt.errors import GeometryError
 from cdpr_rt.robots.kinematics.cable_model import CableModel
 from cdpr_rt.robots.kinematics.kinematics import (
@@ -306,3 +307,22 @@ def test_a_cable_that_does_not_carry_itself_is_told() -> None:
     )
     with pytest.raises(GeometryError, match="cable 1: does not carry itself"):
         robot.lengths(SPATIAL_8.home)
+
+
+@pytest.mark.parametrize("radius", [0.0, 0.05])
+def test_the_geometric_stiffness_is_how_the_tensions_wrench_turns_with_the_pose(
+    radius: float,
+) -> None:
+    rng = np.random.default_rng(11)
+    robot = CableKinematics(*made_up(SPATIAL, 7, rng), SPATIAL, pulley_radius_m=radius)
+    tension_N, pose = rng.uniform(10.0, 100.0, 7), Pose(np.array([0.1, -0.2, 1.1]))
+    pose.array[1:] = Rotation.from_rotvec([0.3, -0.2, 0.1]).as_matrix()
+
+    def wrench(step: FloatArray) -> FloatArray:
+        there = Pose(pose.p + step[:3], Rotation.from_rotvec(step[3:]).as_matrix() @ pose.Q)
+        return np.asarray(robot.jacobian(there).T @ tension_N)
+
+    steps = 1e-5 * np.eye(6)
+    expected = np.array([(wrench(step) - wrench(-step)) / 2e-5 for step in steps]).T
+    found = robot.geometric_stiffness(pose, tension_N)
+    np.testing.assert_allclose(found, expected, rtol=1e-6, atol=1e-6 * np.abs(expected).max())

@@ -18,6 +18,7 @@ from cdpr_rt.core.exchange import AxisFeedback, Setpoint
 from cdpr_rt.motion.approach import approach
 from cdpr_rt.robots.platform.cable_control import CableControl
 from cdpr_rt.robots.platform_model import PlatformModel, platform_model
+from cdpr_rt.robots.robot_arrays import limits_of
 from cdpr_sim_bus.cia402.drive import transmission_of
 from cdpr_sim_bus.robot import servo
 from cdpr_sim_bus.robot.cable_robot import CableRobot
@@ -102,6 +103,59 @@ def spatial() -> Machine:
         angular_acceleration_rad_s2=2.0,
     )
     return Machine(platform, (axis,) * 8, 20.0, 200.0, 6.0)
+
+
+def short_arms() -> Machine:
+    """A plate of 0.12 m on 8 cables in a frame of 4 x 3 x 2 m, all in one plane of it.
+
+    Turned about z it is held by its pretension, and hardly by its cables' elasticity.
+    """
+    corners = np.array([[-1.0, 1.0], [1.0, 1.0], [1.0, -1.0], [-1.0, -1.0]])
+    low, high = np.full((4, 1), 0.0), np.full((4, 1), 2.0)
+    across = corners * [2.0, 1.5]
+    exits = np.vstack([np.hstack([across, high]), np.hstack([across, low])])
+    anchors = np.tile(np.hstack([0.06 * corners, low]), (2, 1))
+    platform = Platform(
+        mass_kg=3.0,
+        home_m=(0.0, 0.0, 0.7),
+        home_tolerance_m=0.05,
+        workspace_min_m=(-0.4, -0.3, 0.8),
+        workspace_max_m=(0.4, 0.3, 1.2),
+        speed_m_s=0.5,
+        acceleration_m_s2=1.0,
+        exit_points_m=tuple(map(tuple, exits)),
+        anchor_points_m=tuple(map(tuple, anchors)),
+    )
+    return Machine(platform, (_PLANAR.axes[0],) * 8, 20.0, 200.0, 6.0)
+
+
+def crossed_rod() -> Machine:
+    """A rod of 0.6 m on 7 cables that cross: its pretension turns it away from upright."""
+    upper = [(-1.5, -1.2, 2.6), (1.5, -1.2, 2.6), (0.0, 1.6, 2.6)]
+    lower = [(-1.4, 1.3, 0.1), (1.4, 1.3, 0.1), (1.3, -1.4, 0.1), (-1.3, -1.4, 0.1)]
+    platform = Platform(
+        mass_kg=2.0,
+        home_m=(0.0, 0.0, 1.0),
+        home_tolerance_m=0.05,
+        inertia_kg_m2=(0.07, 0.07, 0.002, 0.0, 0.0, 0.0),
+        workspace_min_m=(-0.25, -0.2, 1.1),
+        workspace_max_m=(0.25, 0.2, 1.5),
+        speed_m_s=0.5,
+        acceleration_m_s2=1.5,
+        exit_points_m=(*upper, *lower),
+        anchor_points_m=((0.0, 0.0, -0.3),) * 3 + ((0.0, 0.0, 0.3),) * 4,
+        controlled=("x", "y", "z", "rx", "ry"),
+    )
+    return Machine(platform, (_PLANAR.axes[0],) * 7, 20.0, 150.0, 4.5)
+
+
+def shipped(name: str) -> Machine:
+    """Return a shipped robot."""
+    robot = load_robot(name)
+    assert robot.platform is not None
+    limits = limits_of(robot)
+    bounds = [float(np.min(b)) for b in (limits.tension_min_N, limits.tension_max_N)]
+    return Machine(robot.platform, tuple(robot.axes), *bounds, float(np.min(limits.torque_Nm)))
 
 
 class Physics:
