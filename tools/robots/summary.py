@@ -230,7 +230,7 @@ def _loop_lines(loop: dict[str, float]) -> list[str]:
     ]
     if not loop["tensions_follow_pose"]:
         lines.append(
-            "           tensions are planned for where it is wanted: they hold it there like springs"
+            "           tensions are planned where it is wanted, and hold it there as springs"
         )
     return lines
 
