@@ -15,12 +15,8 @@ from cdpr_rt.programs.platform.arrival import Arrival
 from cdpr_rt.programs.platform.platform_program import PlatformParts, PlatformProgram
 from cdpr_rt.programs.platform.tightening.home_lengths import LengthsAtHome
 from cdpr_rt.programs.platform.tightening.index_path import index_path
-from cdpr_rt.programs.platform.tightening.slack import (
-    TAKE_UP_SHARE,
-    SlackTakeUp,
-    Stillness,
-    TAKE_UP_m_s,
-)
+from cdpr_rt.programs.platform.tightening.slack import SlackTakeUp, Stillness
+from cdpr_rt.programs.platform.tightening.slack_kernel import PULLED, TAKE_UP_SHARE, TAKE_UP_m_s
 from cdpr_rt.programs.platform.tightening.standing import (
     bad_source,
     disagreement,
@@ -45,7 +41,6 @@ _SETTLING_S = 0.5
 _RISE_1_s = 1.0
 _FALL_S = 0.2
 _HAND_OVER_S = 0.5
-_PULLED = 0.95
 _SLACK_m, _ONCE_TIGHT_m = 1.0, 0.05
 """How far a cable may be wound in while some are slack, and once all are tight, besides stretch."""
 _TIGHT_WITHIN_S = 60.0
@@ -245,7 +240,7 @@ class TightenProgram(PlatformProgram):
         """Return whether all winches pull with what they are to by now."""
         ready = self._share == _STAGES[self._stage][1] and self._blend == 1.0
         ready = ready and (self._stage > 0 or self._slack.tight)
-        return ready and bool((self._winches.tension_N > _PULLED * self._winches.high_N).all())
+        return ready and bool((self._winches.tension_N > PULLED * self._winches.high_N).all())
 
     def _next_stage(self, feedback: AxisFeedback, torque_Nm: FloatArray) -> None:
         self._stillness.begin(feedback.position_rad)
@@ -353,7 +348,7 @@ class TightenProgram(PlatformProgram):
 
     def _trouble(self, feedback: AxisFeedback) -> str:
         moved_m = np.abs((feedback.position_rad - self._start_rad) * self._cable)
-        if self._source == "home" and (dragged := self._slack.dragged()):
+        if self._source == "home" and (dragged := self._slack.dragged(feedback.position_rad)):
             return dragged
         i = int(moved_m.argmax())
         # what stands does not move once its cables are tight

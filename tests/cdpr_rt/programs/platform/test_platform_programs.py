@@ -11,6 +11,7 @@ from cdpr_rt.core.estimate import Estimator
 from cdpr_rt.core.exchange import AxisFeedback
 from cdpr_rt.programs.arguments import ProgramError
 from cdpr_rt.programs.model import model_of
+from cdpr_rt.programs.platform.tightening import slack as slack_module
 from cdpr_rt.programs.platform.tightening import tighten as tighten_module
 from cdpr_rt.programs.platform.tightening.index_path import index_path
 from cdpr_rt.programs.registry import platform_parts
@@ -69,10 +70,10 @@ def test_tensions_grow_together_and_no_cable_is_jerked(robot: Standing):
     assert np.abs(uneven_N[:-1]).max() < 15.0
 
 
-def test_slack_is_taken_up_again_as_at_first(robot: Standing, monkeypatch: pytest.MonkeyPatch):
+def test_slack_is_taken_up_again_as_at_first(monkeypatch: pytest.MonkeyPatch):
     """What winches pulled with at the end of the time before makes no cable tight."""
-    slack = robot.programs["tighten"]._slack  # type: ignore[attr-defined]
-    monkeypatch.setattr(slack, "_at_once", True)
+    monkeypatch.setattr(slack_module, "_STAND_FRICTION", 0.0)  # reeled in together at once
+    robot = Standing()
     for slack_m in ((0.02, 0.005, 0.03), (0.06, 0.05, 0.07)):
         robot.loosen(slack_m)
         robot.switch("tighten")

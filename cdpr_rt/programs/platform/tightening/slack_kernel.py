@@ -1,0 +1,136 @@
+"""Kernel of a cycle in which slack is taken up: each cable's phase, and how its winch is driven."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from cdpr_rt.arrays import FloatArray, IntArray
+from cdpr_rt.jit import jit
+
+TAKE_UP_m_s = 0.05
+"""Speed at which slack is taken up."""
+TAKE_UP_SHARE = 0.4
+"""Tension while some cables are slack, as a share of the pretension."""
+LOOSE_m = 0.02
+"""How far cables may be reeled in together; of one that goes further, friction had been taken for
+tension, or the platform has moved."""
+PULLED = 0.95
+"""Share of its bound with which a winch pulls that is said to pull with all of it."""
+_SLOW_SHARE, _MEAN_S = 1.0 / 3.0, 0.04
+"""Below that share of the speed a cable may be tight, by its mean over this time."""
+_LEFT_m, _LEAVE_S = 0.005, 0.5
+"""Slack that a cable is left with until all have been tight, and how long that may take."""
+
+LOOSENED, PAID_OUT, WAITING, REELED_IN, CLOSING, TIGHT = range(6)
+"""Phases of a cable: paid out a little at first; paid out again, having been tight; held with that
+slack for the others; reeled in by itself; reeled in with all others; tight. All are in one of the
+last two, or none is."""
+FROM_rad, MEAN_m_s, TURNED_N, TIGHT_N, SLACK_m, CYCLES, STATE = range(7)
+"""State of a cable: the angle that it is reeled in or paid out from; its mean speed inwards; the
+most that has turned its winch, what the cable weighs included; what it is pulled with once tight,
+else 0; how far it was reeled in for that; cycles for which it has been paid out."""
+
+
+class Winches(NamedTuple):
+    """Speeds, tensions and bounds of n winches, (n,) each, as `WinchSpeedLoop` has them."""
+
+    period_s: float
+    at_once: bool
+    """Whether cables are reeled in together from the beginning."""
+    cable_m: FloatArray
+    enough_N: FloatArray
+    """Tensions at which none sticks."""
+    speed_rad_s: FloatArray
+    tension_N: FloatArray
+    low_N: FloatArray
+    high_N: FloatArray
+    paying_out_m_s: FloatArray
+
+
+@jit
+def enter(first: int, phase: IntArray, state: FloatArray, position: FloatArray) -> None:
+    """Have all cables begin the phase `first` at these angles (n,), none of them being tight."""
+    for i in range(phase.size):
+        phase[i] = first
+        # one that only begins to turn, or is still pulled as it was before, is not tight by that
+        state[i, FROM_rad], state[i, MEAN_m_s] = position[i], TAKE_UP_m_s
+        state[i, TIGHT_N] = state[i, CYCLES] = 0.0
+
+
+@jit
+def take_up(
+    w: Winches, phase: IntArray, state: FloatArray, position: FloatArray, pretension: FloatArray,
+    share: float,
+) -> int:  # fmt: skip
+    """Raise bounds and set speeds; return which tight cable was reeled in furthest on, if too far.
+
+    `state` is (n, 6), -1 stands for none. See `SlackTakeUp.update`.
+    """
+    dragged, dragged_m, loose, waiting = -1, LOOSE_m, False, True
+    for i in range(phase.size):
+        most = TAKE_UP_SHARE * pretension[i]
+        if not w.at_once:
+            most = min(max(most, w.enough_N[i]), pretension[i])
+        phase[i] = _next_phase(w, i, phase[i], state[i], position[i], PULLED * most)
+        w.high_N[i] = max(w.high_N[i], min(share, 1.0) * most)
+        _drive(w, i, phase[i], state[i])
+        reeled_m = (state[i, FROM_rad] - position[i]) * w.cable_m[i]
+        if phase[i] == TIGHT and reeled_m > dragged_m:
+            dragged, dragged_m = i, reeled_m
+        loose |= phase[i] == CLOSING and not w.at_once and reeled_m > LOOSE_m
+        waiting &= phase[i] == WAITING
+    if waiting or loose:
+        enter(CLOSING if waiting else REELED_IN, phase, state, position)
+        return -1
+    return dragged
+
+
+@jit
+def _next_phase(
+    w: Winches, i: int, phase: int, state: FloatArray, position: float, most: float
+) -> int:
+    """Return the phase of cable i from now on; `state` (6,) is its own."""
+    reeled_m = (state[FROM_rad] - position) * w.cable_m[i]
+    if phase in (LOOSENED, PAID_OUT):
+        state[CYCLES] += 1.0
+        if reeled_m >= -_LEFT_m and state[CYCLES] * w.period_s <= _LEAVE_S:
+            return phase
+        state[MEAN_m_s] = TAKE_UP_m_s  # what begins to turn only is not tight by that
+        return REELED_IN if phase == LOOSENED else WAITING
+    if phase == WAITING:
+        return phase
+    tight = _seems_tight(w, i, state, most)  # which tells what turns winches of tight cables, too
+    if not tight or phase == TIGHT:
+        return phase
+    state[FROM_rad], state[CYCLES] = position, 0.0
+    if phase == REELED_IN:
+        return PAID_OUT
+    state[TIGHT_N], state[SLACK_m] = w.tension_N[i], reeled_m
+    return TIGHT
+
+
+@jit
+def _seems_tight(w: Winches, i: int, state: FloatArray, most: float) -> bool:
+    """Return whether cable i, which is reeled in, is tight by its speed and tension."""
+    inwards_m_s, tension = -w.cable_m[i] * w.speed_rad_s[i], w.tension_N[i]
+    mean_m_s = state[MEAN_m_s] + w.period_s / _MEAN_S * (inwards_m_s - state[MEAN_m_s])
+    # one that breaks loose has turned before its mean tells
+    state[MEAN_m_s] = max(mean_m_s, inwards_m_s)
+    if not w.at_once and inwards_m_s > 0.5 * TAKE_UP_m_s:
+        state[TURNED_N] = max(state[TURNED_N], tension)
+    enough = min(w.enough_N[i], most)
+    if state[TURNED_N] > 0.0:
+        enough = min(enough, state[TURNED_N])
+    return bool(state[MEAN_m_s] < _SLOW_SHARE * TAKE_UP_m_s and tension >= enough)
+
+
+@jit
+def _drive(w: Winches, i: int, phase: int, state: FloatArray) -> None:
+    """Set bounds and speed of winch i, which reels in unless told otherwise."""
+    if phase == TIGHT:
+        w.high_N[i] = state[TIGHT_N]
+    elif phase in (LOOSENED, PAID_OUT):
+        w.low_N[i], w.paying_out_m_s[i] = -w.enough_N[i], TAKE_UP_m_s
+    elif phase == WAITING:  # held: cogging would turn it
+        w.low_N[i], w.paying_out_m_s[i] = -w.enough_N[i], 0.0
+        w.high_N[i] = min(w.high_N[i], w.enough_N[i])
