@@ -131,11 +131,6 @@ class PlatformParts:
         """Return speeds (d,) of positions up to `most_m_s`, of angles less in the same measure."""
         return self.speed * min(most_m_s / float(self.speed[0]), 1.0)
 
-    def index_missing(self, feedback: AxisFeedback) -> bool:
-        """Whether a motor's cogging is known, but not yet its index."""
-        known = self.compensation
-        return known is not None and bool((known.available & ~feedback.index_known).any())
-
     def notices(self) -> list[str]:
         """Return what an operator should know of the robot."""
         return [text for text in (self.control.load_cell_fault,) if text]

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from cdpr_rt.arrays import FloatArray
+from cdpr_rt.arrays import BoolArray, FloatArray
 from cdpr_rt.control.winch_speed_loop import WinchSpeedLoop
 from cdpr_rt.jit import bound
 from cdpr_rt.programs.platform.platform_program import PlatformParts
@@ -51,9 +51,9 @@ class SlackTakeUp:
         )  # fmt: skip
 
     @property
-    def tight(self) -> bool:
-        """Whether all cables are tight at once."""
-        return bool(self.tight_N.all())
+    def not_tight(self) -> BoolArray:
+        """Which cables are neither tight nor wait for others with a little slack, (n,)."""
+        return np.asarray((self._phase != kernel.TIGHT) & (self._phase != kernel.WAITING))
 
     def dragged(self, position_rad: FloatArray) -> str:
         """Return which tight cable was reeled in too far on, "" for none."""
@@ -104,6 +104,8 @@ class Stillness:
     def __init__(self, cable_m: FloatArray, period_s: float) -> None:
         self._cable, self._cycles = cable_m, math.ceil(_STILL_S / period_s)
         self._at_rad, self._still = np.zeros(cable_m.size), 0
+        self.moved_m = np.zeros(cable_m.size)
+        """How far each has moved since it last stood still."""
 
     def begin(self, position_rad: FloatArray) -> None:
         """Begin anew at these angles (n,)."""
@@ -111,7 +113,8 @@ class Stillness:
 
     def lasts(self, position_rad: FloatArray, pulled: bool) -> bool:
         """Take in a cycle; return whether they have stood still, and were pulled, for so long."""
-        if not pulled or np.abs((position_rad - self._at_rad) * self._cable).max() > _STILL_m:
+        np.abs((position_rad - self._at_rad) * self._cable, out=self.moved_m)
+        if not pulled or self.moved_m.max() > _STILL_m:
             self.begin(position_rad)
         self._still += 1
         return self._still > self._cycles

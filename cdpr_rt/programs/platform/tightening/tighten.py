@@ -7,14 +7,14 @@ from typing import Any
 
 import numpy as np
 
-from cdpr_rt.arrays import FloatArray
+from cdpr_rt.arrays import BoolArray, FloatArray
 from cdpr_rt.control.winch_speed_loop import WinchSpeedLoop
 from cdpr_rt.core.exchange import AxisFeedback, Setpoint
 from cdpr_rt.programs.arguments import CommandArguments, ProgramError
 from cdpr_rt.programs.platform.arrival import Arrival
 from cdpr_rt.programs.platform.platform_program import PlatformParts, PlatformProgram
-from cdpr_rt.programs.platform.tightening.home_lengths import LengthsAtHome
 from cdpr_rt.programs.platform.tightening.index_path import index_path
+from cdpr_rt.programs.platform.tightening.length_source import SOURCES, LengthSource
 from cdpr_rt.programs.platform.tightening.slack import SlackTakeUp, Stillness
 from cdpr_rt.programs.platform.tightening.slack_kernel import PULLED, TAKE_UP_SHARE, TAKE_UP_m_s
 from cdpr_rt.programs.platform.tightening.standing import (
@@ -29,11 +29,6 @@ from cdpr_rt.programs.platform.tightening.standing import (
     would_move,
 )
 from cdpr_rt.programs.platform.tightening.standing_tensions import OVERSHOOT, StandingTensions
-from cdpr_rt.robots.persistence.last_lengths import (
-    StoppedLengths,
-    index_disagreement,
-    off_index_m,
-)
 
 INDEX_m_s = 0.1
 """Speed of the platform during the search for indices."""
@@ -51,7 +46,6 @@ _STAGES = (
 )  # fmt: skip
 _FITTED_FROM = 2
 """Stage from which angles tell what motors take up: the first rise takes winches along."""
-_SOURCES = ("home", "lengths", "last")
 
 
 class TightenProgram(PlatformProgram):
@@ -95,12 +89,10 @@ class TightenProgram(PlatformProgram):
         self._once_tight_m = _ONCE_TIGHT_m + float(np.ptp(lengths_m, axis=0).max())
         self._start_rad = np.zeros(cable_m.size)
         self._stillness = Stillness(self._cable, parts.period_s)
-        self._at_home = LengthsAtHome(parts, cable_m, self._home_pretension_N)
+        self._source = LengthSource(parts, self._cable, self._home_pretension_N)
         self._stage = 0
         self._share = 0.0
         self._cycles = self._handing_over_cycles = 0
-        self._source = "home"
-        self._last: StoppedLengths | None = None
         self._feedback = AxisFeedback(cable_m.size)
         self._path: list[FloatArray] = []
         self._failure = ""
@@ -112,10 +104,9 @@ class TightenProgram(PlatformProgram):
         self._feedback = feedback
         self._failure = ""
         self._stopping = self._at_rest = False
-        self._source = self._default_source()
+        self._source.begin()
         self._pretension_N[:] = self._from_N[:] = self._to_N[:] = self._home_pretension_N
         self._blend, self._hangs, self._hands_over = 1.0, False, False
-        self._last = None
         self._stage = self._cycles = 0
         if parts.tight:
             super().start(feedback, setpoint, torque_Nm)
@@ -130,6 +121,7 @@ class TightenProgram(PlatformProgram):
         self._share = min(
             max(float(np.max(-torque_Nm / self._cable / self._pretension_N)), 0.0), 1.0
         )
+        np.multiply(self._pretension_N, self._share, out=self._winches.high_N)
 
     def update(self, feedback: AxisFeedback, setpoint: Setpoint, torque_Nm: FloatArray) -> None:
         """Write this cycle's set-point and torques, (n,) each, in place."""
@@ -142,20 +134,15 @@ class TightenProgram(PlatformProgram):
         if self._hands_over:
             self._let_go(feedback, setpoint, torque_Nm)
             return
-        goal = 0.0 if self._stopping else _STAGES[self._stage][1]
-        step = self._parts.period_s * (1.0 / _FALL_S if self._stopping else _RISE_1_s)
-        self._share += min(max(goal - self._share, -step), step)
-        self._blend = min(self._blend + self._parts.period_s * _RISE_1_s, 1.0)
-        self._pretension_N[:] = self._from_N + self._blend * (self._to_N - self._from_N)
         self._bound_tension(feedback)
         self._winches.update(feedback, torque_Nm)
-        if self._source == "home" and self._stage >= _FITTED_FROM:
+        if self._source.name == "home" and self._stage >= _FITTED_FROM:
             self._control.pull_fit.take(feedback.position_rad, self._winches.tension_N)
         setpoint.position_rad[:] = feedback.position_rad
         setpoint.velocity_rad_s[:] = setpoint.acceleration_rad_s2[:] = 0.0
         self._cycles += 1
         if self._stopping:
-            self._at_rest = self._share == 0.0
+            self._at_rest = not self._winches.high_N.any()
         elif self._stillness.lasts(feedback.position_rad, self._pulls()):
             self._next_stage(feedback, torque_Nm)
         else:
@@ -176,15 +163,12 @@ class TightenProgram(PlatformProgram):
 
     # -- commands
 
-    def _default_source(self) -> str:
-        return "lengths" if self._parts.pose_known else "home"
-
     def check(self, arguments: Mapping[str, Any]) -> tuple[str, bool]:
         """Return checked arguments for `apply`; raises ProgramError."""
         CommandArguments(self.name, arguments, ("from",))
-        source = arguments.get("from", self._default_source())
-        if source not in _SOURCES:
-            allowed = ", ".join(_SOURCES)
+        source = arguments.get("from", self._source.default)
+        if source not in SOURCES:
+            allowed = ", ".join(SOURCES)
             raise ProgramError(f"tighten: from: value {source!r}; allowed: {allowed}")
         if (refusal := source_refusal(self._parts, source, arguments)) is not None:
             raise ProgramError(refusal)
@@ -201,7 +185,7 @@ class TightenProgram(PlatformProgram):
         if parts.tight or handing_over or not hangs(parts):
             return False
         now.position_rad[:] = parts.estimator.position_rad
-        length_m = self._lengths_before(source, now)
+        length_m = self._source.before(source, now)
         if length_m is None or rests_at_home(parts, length_m, now):
             return False
         if why := why_not_to_hold(parts, self._standing, length_m, now):
@@ -209,7 +193,7 @@ class TightenProgram(PlatformProgram):
         return True
 
     def _apply(self, checked: tuple[str, bool]) -> None:
-        self._source, self._hangs = checked
+        self._source.name, self._hangs = checked
 
     def _hold_hanging(
         self, feedback: AxisFeedback, setpoint: Setpoint, torque_Nm: FloatArray
@@ -217,8 +201,7 @@ class TightenProgram(PlatformProgram):
         """Go over to holding the platform where the check of the command found it."""
         self._hangs = False
         self._control.observe(feedback)
-        self._take_last()
-        self._at_home.forget()
+        self._source.take_last()
         self._take_over(feedback, torque_Nm)
         self._control.stand_still()
         self._finish(feedback, setpoint, torque_Nm)
@@ -226,21 +209,36 @@ class TightenProgram(PlatformProgram):
     # -- taking up slack
 
     def _bound_tension(self, feedback: AxisFeedback) -> None:
-        """Have the winches pull with a share of the pretension, or as their slack ended."""
-        high_N = self._winches.high_N
-        np.multiply(self._pretension_N, self._share, out=high_N)
+        """Have the winches pull with a share of the pretension, or as their slack ended.
+
+        Once it is stopped they are let down from what they may pull with by then.
+        """
+        high_N, step = self._winches.high_N, self._parts.period_s * _RISE_1_s
         self._winches.low_N[:], self._winches.paying_out_m_s[:] = 0.0, -TAKE_UP_m_s
-        if self._stage == 0 and not self._stopping:
+        if self._stopping:
+            high_N -= self._pretension_N * (self._parts.period_s / _FALL_S)
+            np.maximum(high_N, 0.0, out=high_N)
+            return
+        self._share += min(max(_STAGES[self._stage][1] - self._share, -step), step)
+        self._blend = min(self._blend + step, 1.0)
+        self._pretension_N[:] = self._from_N + self._blend * (self._to_N - self._from_N)
+        np.multiply(self._pretension_N, self._share, out=high_N)
+        if self._stage == 0:
             share = self._share / TAKE_UP_SHARE
             self._slack.update(feedback.position_rad, self._pretension_N, share)
-        elif not self._stopping:
+        else:
             np.maximum(high_N, self._slack.tight_N, out=high_N)
 
     def _pulls(self) -> bool:
         """Return whether all winches pull with what they are to by now."""
         ready = self._share == _STAGES[self._stage][1] and self._blend == 1.0
-        ready = ready and (self._stage > 0 or self._slack.tight)
-        return ready and bool((self._winches.tension_N > PULLED * self._winches.high_N).all())
+        return ready and not self._not_tight().any()
+
+    def _not_tight(self) -> BoolArray:
+        """Return which cables are slack, or if none is, not pulled with what they may be, (n,)."""
+        if self._stage == 0 and (slack := self._slack.not_tight).any():
+            return slack
+        return np.asarray(self._winches.tension_N <= PULLED * self._winches.high_N)
 
     def _next_stage(self, feedback: AxisFeedback, torque_Nm: FloatArray) -> None:
         self._stillness.begin(feedback.position_rad)
@@ -250,7 +248,7 @@ class TightenProgram(PlatformProgram):
             self._end_tight(feedback, torque_Nm)
             return
         # elsewhere than at home lengths tell where the platform is, wherever it is pulled to
-        matters = self._stage == 0 and self._source == "home"
+        matters = self._stage == 0 and self._source.name == "home"
         uneven = self._slack.uneven(self._once_tight_m) if matters else ""
         self._fail_if(uneven or self._why_not_to_pull(feedback))
         if self._failure:
@@ -261,20 +259,20 @@ class TightenProgram(PlatformProgram):
         elif stage == "pull":
             self._control.pull_fit.begin(feedback.position_rad)
         elif stage == "back":
-            self._at_home.keep_rising(feedback)
+            self._source.at_home.keep_rising(feedback)
         self._stage += 1
 
     def _end_tight(self, feedback: AxisFeedback, torque_Nm: FloatArray) -> None:
         """Take the lengths, and hold the platform where they have it, unless they disagree."""
-        self._take_last()
-        self._control.take_lengths(self._lengths(feedback), feedback)
+        self._source.take_last()
+        self._control.take_lengths(self._source.now(feedback), feedback)
         estimate = self._parts.estimator.estimate
         tension_N = np.where(estimate.tension_measured, estimate.tension_N, self._pretension_N)
         # as they stand: what the cables press with may stretch them otherwise than what is planned
         self._control.begin(feedback, tension_N)
-        self._fail_if(disagreement(self._parts, self._source))
+        self._fail_if(disagreement(self._parts, self._source.name))
         if not self._failure:
-            if self._source == "home":  # elsewhere than told nothing right is found
+            if self._source.name == "home":  # elsewhere than told nothing right is found
                 self._control.pull_fit.begin_learning()
             self._control.begin(feedback)
             self._take_over(feedback, torque_Nm)
@@ -294,16 +292,12 @@ class TightenProgram(PlatformProgram):
         if self._handing_over_cycles * self._parts.period_s > _HAND_OVER_S:
             self._finish(feedback, setpoint, torque_Nm)
 
-    def _take_last(self) -> None:
-        last = self._parts.last_stop.take()
-        self._last = last if self._source == "last" else None
-
     def _why_not_to_pull(self, feedback: AxisFeedback) -> str:
         """Return why not to pull on; tensions for where it stands follow from known lengths."""
-        length_m, parts = self._lengths_before(self._source, feedback), self._parts
+        parts, length_m = self._parts, self._source.before(self._source.name, feedback)
         if length_m is None:
             return ""
-        if self._source == "home":
+        if self._source.name == "home":
             return why_not_at_home(parts, length_m, self._winches.high_N, feedback)
         why = why_not_to_pull(parts, length_m, self._winches.high_N, feedback)
         if why or self._stage > 0:
@@ -311,23 +305,6 @@ class TightenProgram(PlatformProgram):
         tensions_N, stays = self._standing.at(parts.model.pose(parts.control.estimated))
         self._to_N[:], self._blend = tensions_N, 0.0
         return "" if stays else would_move(parts)
-
-    def _lengths_before(self, source: str, feedback: AxisFeedback) -> FloatArray | None:
-        """Return the lengths (n,) by what was known of them before, None for nothing."""
-        stopped, parts = self._parts.last_stop.lengths, self._parts
-        if source == "last" and stopped is not None:
-            return stopped.at(feedback.position_rad, self._cable)
-        known = parts.pose_known and not parts.last_stop.contradicted
-        return parts.estimator.estimate.cable_length_m if known else None
-
-    def _lengths(self, feedback: AxisFeedback) -> FloatArray:
-        """Return the cables' lengths, (n,), as they are now."""
-        self._at_home.forget()
-        if self._source == "last" and self._last is not None:
-            return self._last.at(feedback.position_rad, self._cable)
-        if self._source == "lengths":
-            return self._parts.estimator.estimate.cable_length_m
-        return self._at_home.take(feedback)
 
     def _take_over(self, feedback: AxisFeedback, torque_Nm: FloatArray) -> None:
         """Begin to have the platform's control ask for the torques, from those of this cycle on."""
@@ -348,7 +325,7 @@ class TightenProgram(PlatformProgram):
 
     def _trouble(self, feedback: AxisFeedback) -> str:
         moved_m = np.abs((feedback.position_rad - self._start_rad) * self._cable)
-        if self._source == "home" and (dragged := self._slack.dragged(feedback.position_rad)):
+        if self._source.name == "home" and (dragged := self._slack.dragged(feedback.position_rad)):
             return dragged
         i = int(moved_m.argmax())
         # what stands does not move once its cables are tight
@@ -359,8 +336,21 @@ class TightenProgram(PlatformProgram):
                 f"{1e3 * allowed_m:.0f} mm allowed"
             )
         if self._cycles * self._parts.period_s > _TIGHT_WITHIN_S:
-            return f"not tight within {_TIGHT_WITHIN_S:g} s"
+            return self._late()
         return ""
+
+    def _late(self) -> str:
+        """Return which cables are not tight yet, and with what each is pulled."""
+        names, told = self._parts.names, f"not tight within {_TIGHT_WITHIN_S:g} s"
+        pull_N, may_N = self._winches.tension_N, self._winches.high_N
+        pulls = [
+            f"{names[i]} pulls with {pull_N[i]:.0f} N, {may_N[i]:.0f} N allowed"
+            for i in np.flatnonzero(self._not_tight())
+        ]
+        if not pulls:
+            i = int(self._stillness.moved_m.argmax())
+            pulls = [f"{names[i]} pulls with {pull_N[i]:.0f} N and does not stand still"]
+        return f"{told}: {'; '.join(pulls)}"
 
     def _fail_if(self, trouble: str) -> None:
         self._failure = trouble
@@ -372,7 +362,7 @@ class TightenProgram(PlatformProgram):
         """Start along a path on which all motors turn, where an index is needed."""
         parts, control = self._parts, self._control
         self._path = []
-        if self._needs_index():
+        if self._source.lacks_index(self._feedback).any():
             self._path = index_path(
                 parts.model, self._cable, lambda there: not control.infeasibility(there)
             )
@@ -381,36 +371,20 @@ class TightenProgram(PlatformProgram):
             self._acceleration[:] = parts.acceleration
             self._speed[:] = parts.speeds(INDEX_m_s)
         else:
-            self._use_indices()
-
-    def _needs_index(self) -> bool:
-        """Whether an index is missing that compensation needs, or that checks the last lengths."""
-        last, known = self._last, self._feedback.index_known
-        if last is not None and bool((np.isfinite(last.cable_at_index_m) & ~known).any()):
-            return True
-        return self._parts.index_missing(self._feedback)
+            self._failure = self._source.check_by_indices(self._feedback)
 
     def _move(self) -> bool:
         arrived = self._approach()
         if not self._path:
             return arrived
-        found = not self._needs_index()
+        lacks = self._source.lacks_index(self._feedback)
+        found = not lacks.any()
         if found or arrived:
             self._path = [] if found else self._path[1:]
             self._target[:] = self._path[0] if self._path else self._stopping_position()
             if not found and not self._path:
-                self._failure = "a motor has not passed its index"
+                names = (self._parts.names[i] for i in np.flatnonzero(lacks))
+                self._failure = f"motors that have not passed their index: {', '.join(names)}"
             if found:
-                self._use_indices()
+                self._failure = self._source.check_by_indices(self._feedback)
         return False
-
-    def _use_indices(self) -> None:
-        """Correct the lengths by the indices; doubt those of the last stop where these differ."""
-        self._at_home.correct(self._feedback)
-        parts, last = self._parts, self._parts.last_stop
-        last.contradicted = ""
-        if self._last is not None:
-            length_m, allowed_m = parts.estimator.estimate.cable_length_m, parts.lengths_allowed_m
-            off_m = off_index_m(self._last, length_m, self._feedback, self._cable)
-            last.contradicted = index_disagreement(off_m, self._cable, allowed_m, parts.names)
-        self._failure, last.displaced = last.contradicted, bool(last.contradicted)
