@@ -11,9 +11,14 @@ from rich.table import Table
 from rich.text import Text
 
 DEAD: Final = "dead"
+"""The state that such a daemon reports."""
 ENDED: Final = "the loop has ended"
 """Reason of a dead loop of which nobody has said, or not yet, that it failed."""
-"""The state that such a daemon reports."""
+
+
+def has_died(status: dict[str, Any]) -> bool:
+    """Return whether the control loop has died, other than as it was asked to end."""
+    return bool(status["state"] == DEAD and status["reason"] != ENDED)
 
 
 def power_text(status: dict[str, Any]) -> str:
@@ -35,7 +40,7 @@ def death_text(status: dict[str, Any]) -> str:
 
 def after_stop_text(status: dict[str, Any]) -> str:
     """Return that a daemon has ended, and what was known of the drives' power in its `status`."""
-    if status["state"] == DEAD:
+    if has_died(status):
         return f"ended; its loop had died: {power_text(status)}; next: `cdpr run` starts it anew"
     if status["read_only"]:
         return f"ended: {power_text(status)}"
@@ -49,7 +54,7 @@ def unheard_axes(status: dict[str, Any]) -> list[str]:
 
     None of a daemon that only listened, or whose loop had died.
     """
-    if status["state"] == DEAD or status["read_only"]:
+    if has_died(status) or status["read_only"]:
         return []
     return [str(axis.get("name")) for axis in status["axes"] if axis.get("alive") is False]
 

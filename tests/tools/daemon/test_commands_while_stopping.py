@@ -155,3 +155,25 @@ def test_a_loop_that_is_seen_to_have_ended_as_asked_is_no_failure(
     ended = CliRunner().invoke(app, ["stop"])
     assert (ended.exit_code, daemon.asked) == (0, 1), ended.exception
     assert ended.output.splitlines()[-1] == "stopped, power off"
+
+
+class DiedBefore(Ends):
+    """A daemon whose loop has died a while ago."""
+
+    def get(self, path: str) -> dict[str, Any]:
+        died = {"state": "dead", "reason": "the loop has died: killed by signal 9"}
+        return {**super().get(path), **died}
+
+
+def test_a_script_learns_that_the_loop_had_died(monkeypatch: pytest.MonkeyPatch) -> None:
+    @contextmanager
+    def opened(*_where: Any) -> Iterator[DiedBefore]:
+        yield DiedBefore(True)
+
+    monkeypatch.setattr(daemon_state, "open_daemon", opened)
+    app = typer.Typer()
+    app.add_typer(daemon_state.app)
+    error = CliRunner().invoke(app, ["stop"]).exception
+    assert isinstance(error, WorkFailedError)
+    assert error.exit_status == 1
+    assert str(error).startswith("ended; its loop had died: ")

@@ -14,9 +14,9 @@ from cdpr_tools.client.motion import ProgressNotes
 from cdpr_tools.client.refusals import DaemonRefusalError
 from cdpr_tools.client.status_text import (
     DEAD,
-    ENDED,
     after_stop_text,
     fallen_text,
+    has_died,
     status_text,
     unheard_axes,
 )
@@ -196,7 +196,8 @@ def stop(
 ) -> None:
     """End the daemon: the motion stops under control, the power goes off.
 
-    Ends with status 1 where a drive was not heard, whose power may be on.
+    Ends with status 0 where the drives have no power by it, or nothing ran; with 1 where its loop
+    had died, or dies meanwhile, a drive was not heard, whose power may be on, or it does not end.
     """
     out = Output(as_json)
     try:
@@ -211,7 +212,7 @@ def stop(
 def _end(daemon: Daemon, out: Output) -> None:
     """Ask the daemon to end and wait for it; raises WorkFailedError where it does not."""
     status = daemon.get("/status")
-    had_died, ended, dies = status["state"] == DEAD, status, ""
+    had_died, ended, dies = has_died(status), status, ""
     daemon.post("/shutdown")
     notes, deadline = ProgressNotes(out, status), time.monotonic() + _END_S
     if status["state"] == "active":
@@ -221,12 +222,11 @@ def _end(daemon: Daemon, out: Output) -> None:
             status = daemon.get("/status")
         except NoDaemonError:
             told = "; ".join(filter(None, (after_stop_text(ended), dies)))
-            if dies or unheard_axes(ended):
+            if had_died or dies or unheard_axes(ended):
                 raise WorkFailedError(told) from None
             out.say(told)
             return
-        died = status["state"] == DEAD and status["reason"] != ENDED
-        if died and not had_died and not dies:
+        if has_died(status) and not had_died and not dies:
             # one whose drives do not confirm ends with an error, and the service stays for that;
             # one that ends as asked may be seen before the service ends as well
             dies = str(status["reason"])
