@@ -150,13 +150,13 @@ def slack_watch(
     if sensors is None:
         if not checked:
             raise ConfigurationError(
-                "the cables must be slack: name load cells that measure it (--tension, "
+                "the cables must be slack: name load cells that measure it (--sensors, "
                 "--tension-port), or look, and say so with --cables-slack-checked"
             )
         yield lambda: ""
         return
     if port is None:
-        raise ConfigurationError("--tension: also name the serial line, --tension-port")
+        raise ConfigurationError("--sensors: also name the serial line, --tension-port")
     with TensionSampler(load_tension_sensors(sensors), port, clock) as sampler:
         sampler.await_readings(_FIRST_READINGS_S)
         exchange = sampler.exchange

@@ -31,7 +31,9 @@ def tension_watch(sensors: str | None, port: str | None) -> Watching:
     ModbusError for load cells that do not answer.
     """
     if (sensors is None) != (port is None):
-        raise ConfigurationError("--sensors and --port go together: the load cells and their line")
+        raise ConfigurationError(
+            "--sensors and --tension-port go together: the load cells and their line"
+        )
     if sensors is None or port is None:
         return no_watches
     profile = load_tension_sensors(sensors)

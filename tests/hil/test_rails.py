@@ -252,7 +252,7 @@ def test_a_drive_that_does_not_do_as_it_is_told_is_not_moved(
 @pytest.mark.alone  # load cells and who reads them live by the wall clock
 def test_tight_cables_refuse_the_move_and_end_it(rails: Rails) -> None:
     before = rails.position_m("cia402")
-    cells = ("--tension", "rtu-load-cell-1", "--tension-port", rails.tension_port)
+    cells = ("--sensors", "rtu-load-cell-1", "--tension-port", rails.tension_port)
     rails.pull(40.0)
     error = rails.refused("cia402", before + 0.3, *cells)
     assert "not moved unless the cables are slack: winch 1 has 4" in error
@@ -383,7 +383,7 @@ def test_the_emergency_stop_ends_a_move(rails: Rails) -> None:
         (("--to", "0.1", "--safety-io", "nobody"), "the cables must be slack"),
         (("--to", "0.1", "--cables-slack-checked"), "--safety-io: Rail 1"),
         (
-            ("--to", "0.1", "--safety-io", "nobody", "--tension", "rtu-load-cell-1"),
+            ("--to", "0.1", "--safety-io", "nobody", "--sensors", "rtu-load-cell-1"),
             "--tension-port",
         ),
     ],

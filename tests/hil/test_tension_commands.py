@@ -164,13 +164,17 @@ def tare(folder: Path, port: str) -> None:
     plain = folder / "plain.toml"
     plain.write_text(shipped[:start] + shipped[end:])
     seconds = ("--seconds", "0.3")
-    (cable,) = run("tension", "tare", "--sensors", plain, "--port", port, *seconds)["cables"]
+    (cable,) = run("tension", "tare", "--sensors", plain, "--tension-port", port, *seconds)[
+        "cables"
+    ]
     assert cable["zero_N"] == cable["before_N"] == pytest.approx(2.0, abs=1.5)
     plain.write_text(plain.read_text() + f"zero_N = {cable['zero_N']}\n")
-    (cable,) = run("tension", "tare", "--sensors", plain, "--port", port, *seconds)["cables"]
+    (cable,) = run("tension", "tare", "--sensors", plain, "--tension-port", port, *seconds)[
+        "cables"
+    ]
     assert cable["before_N"] == pytest.approx(0.0, abs=0.1)
     sensors = ("--sensors", "rtu-load-cell-1")
-    (cable,) = run("tension", "tare", *sensors, "--port", port, *seconds)["cables"]
+    (cable,) = run("tension", "tare", *sensors, "--tension-port", port, *seconds)["cables"]
     assert cable["after_N"] == pytest.approx(0.0, abs=0.1)
 
 
@@ -179,13 +183,13 @@ def watched_session(folder: Path, bus: str, cells: Simulator) -> None:
     tight = folder / "tight.toml"
     text = (SHIPPED / "tension_sensors" / "rtu-load-cell-1.toml").read_text()
     tight.write_text("stop_above_N = 50.0\n" + text + "zero_N = -100.0\n")
-    watched = (WINCH, "--bus", bus, "--seconds", "0.2", "--port", cells.port, "--sensors")
+    watched = (WINCH, "--bus", bus, "--seconds", "0.2", "--tension-port", cells.port, "--sensors")
     assert run("drive", "jog", *watched, "rtu-load-cell-1")["ok"]
     error = run("drive", "enable", *watched, tight, status=FAILED)["error"]
     assert re.fullmatch(r"winch 1: \d+\.\d N, 50 N allowed", error)
     cells.tell("broken-wire 1")
     home = ("drive", "home", WINCH, "--bus", bus, "--sensors", "rtu-load-cell-1")
-    error = run(*home, "--port", cells.port, status=FAILED)["error"]
+    error = run(*home, "--tension-port", cells.port, status=FAILED)["error"]
     assert error == "winch 1: tension sensor: broken wire"
     cells.tell("mend 1")
     assert "go together" in run(*home, status=BAD_INPUT)["error"]
@@ -200,7 +204,7 @@ def test_a_load_cell_gives_the_same(tmp_path: Path) -> None:
         winch(tmp_path, plant) as (bus, board),
         simulator("tension", sensors, "--board", board) as cells,
     ):
-        seen = run("tension", "watch", "--sensors", sensors, "--port", cells.port,
+        seen = run("tension", "watch", "--sensors", sensors, "--tension-port", cells.port,
                    "--seconds", "0.5")  # fmt: skip
         (cable,) = seen["cables"]
         assert cable["valid"] and cable["mean_N"] == pytest.approx(2.0, abs=1.5)
@@ -209,14 +213,15 @@ def test_a_load_cell_gives_the_same(tmp_path: Path) -> None:
         watched_session(tmp_path, bus, cells)
         result = run(
             *("tension", "calibrate", WINCH, "--bus", bus, "--sensors", sensors),
-            *("--port", cells.port, "--out", out),
+            *("--tension-port", cells.port, "--out", out),
             *("--speed-mm-s", "100", "--highest-n", "60"),
         )
         with PhysicsBoard.attach(board) as shared:
             without_power(shared)
             broken = subprocess.Popen(
-                cdpr("tension", "calibrate", WINCH, "--bus", bus, "--sensors", sensors, "--port",
-                     cells.port, "--out", tmp_path / "broken", "--speed-mm-s", "100", "--json"),
+                cdpr("tension", "calibrate", WINCH, "--bus", bus, "--sensors", sensors,
+                     "--tension-port", cells.port, "--out", tmp_path / "broken",
+                     "--speed-mm-s", "100", "--json"),
                 stdout=subprocess.PIPE, text=True,
             )  # fmt: skip
             while shared.axis(0).state().tension_N < 20.0:
@@ -245,8 +250,9 @@ def pull(folder: Path, *, disturbed: bool) -> bytes:
         simulator("tension", sensors, "--board", board) as cells,
     ):
         command = subprocess.Popen(
-            cdpr("tension", "calibrate", WINCH, "--bus", bus, "--sensors", sensors, "--port",
-                 cells.port, "--out", out, "--speed-mm-s", "100", "--highest-n", "60", "--json"),
+            cdpr("tension", "calibrate", WINCH, "--bus", bus, "--sensors", sensors,
+                 "--tension-port", cells.port, "--out", out, "--speed-mm-s", "100",
+                 "--highest-n", "60", "--json"),
             stdout=subprocess.PIPE,
         )  # fmt: skip
         with PhysicsBoard.attach(board) as shared:
@@ -274,16 +280,22 @@ def test_what_cannot_be_calibrated_is_refused(tmp_path: Path) -> None:
         (("--masses", "2,5"), "at least three different masses"),
         (("--masses", "2,5,50"), "up to 10.6 kg"),
         (
-            ("--sensors", "rtu-load-cell-1", "--port", "x", "--highest-n", "200"),
+            ("--sensors", "rtu-load-cell-1", "--tension-port", "x", "--highest-n", "200"),
             "up to 104 N",
         ),
         (("--masses", "nan,2,5"), "at least three different masses"),
         (("--masses", "2,5,5.0,9"), "at least three different masses"),
         (("--masses", "5,6,7"), "the heaviest must be at least 2 times the lightest"),
         (("--masses", "2;5;9"), "numbers in kg are wanted"),
-        (("--masses", "2,5,9", "--port", "x"), "--port and --cable go with --sensors"),
-        (("--sensors", "rtu-load-cell-1"), "--sensors needs --port"),
-        (("--sensors", "rtu-load-cell-1", "--port", "x", "--board", "b"), "--board goes with"),
+        (
+            ("--masses", "2,5,9", "--tension-port", "x"),
+            "--tension-port and --cable go with --sensors",
+        ),
+        (("--sensors", "rtu-load-cell-1"), "--sensors needs --tension-port"),
+        (
+            ("--sensors", "rtu-load-cell-1", "--tension-port", "x", "--board", "b"),
+            "--board goes with",
+        ),
         ((), "give either --masses or --sensors"),
     ):
         result = run(*calibrate, *more, status=BAD_INPUT)
@@ -363,7 +375,7 @@ def test_stopping_lowers_the_mass_and_a_dead_load_cell_stops_the_pull(tmp_path: 
 
         options = ("--board", board, "--fault", "silent 1")
         with simulator("tension", "rtu-load-cell-1", *options) as cells:
-            port = ("--port", cells.port)
+            port = ("--tension-port", cells.port)
             result = run("tension", "calibrate", WINCH, "--bus", bus, "--sensors",
                          "rtu-load-cell-1", *port, "--out", tmp_path / "dead",
                          status=FAILED)  # fmt: skip

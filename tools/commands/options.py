@@ -134,7 +134,7 @@ SensorsOption = Annotated[
     ),
 ]
 SensorsPortOption = Annotated[
-    str | None, typer.Option("--port", help="Serial port of the tension sensors' line.")
+    str | None, typer.Option("--tension-port", help="Serial port of the tension sensors' line.")
 ]
 
 RobotOption = Annotated[

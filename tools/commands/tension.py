@@ -50,7 +50,7 @@ _SensorsOption = Annotated[
     str, typer.Option("--sensors", help="Tension sensors: a name or a file.", metavar="SENSORS")
 ]
 _PortOption = Annotated[
-    str, typer.Option("--port", help="Serial port of the RS-485 line, as /dev/ttyUSB0.")
+    str, typer.Option("--tension-port", help="Serial port of the RS-485 line, as /dev/ttyUSB0.")
 ]
 _FIRST_READING_S = 2.0
 _STANDARD_GRAVITY = 9.80665
@@ -197,7 +197,7 @@ def calibrate(
     if (masses is None) == (sensors is None):
         raise BadInputError("give either --masses or --sensors")
     if sensors is None and (port is not None or cable is not None):
-        raise BadInputError("--port and --cable go with --sensors, not with --masses")
+        raise BadInputError("--tension-port and --cable go with --sensors, not with --masses")
     if board is not None and (sensors is not None or winch.url.starts_own_simulator):
         raise BadInputError("--board goes with --masses on a running simulator (simbus:NAME)")
     if masses is not None:
@@ -213,7 +213,7 @@ def calibrate(
         speed = speed_mm_s or _ANCHOR_SPEED_mm_s
         pull = plan_anchor(profile, lowest_N, highest_N, speed * 1e-3, travel_mm * 1e-3)
         if port is None:
-            raise BadInputError("--sensors needs --port, the serial port of the load cells")
+            raise BadInputError("--sensors needs --tension-port, the serial port of the load cells")
         # the others' cells are of no interest: they may be silent, and are not waited for
         cell = cells.model_copy(update={"sensors": (cells.sensors[number],)})
         run.prepare(overwrite, yes, "the made-fast cable is pulled by the winch")

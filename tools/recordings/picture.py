@@ -39,6 +39,8 @@ _LETTERS_PER_in: Final = 13
 _MOST_FAULTS, _PATH_POINTS = 8, 3000
 _LETTER = 0.015
 """Share of the picture's width that a letter takes."""
+_SEEN_ns: Final = 200_000_000
+"""How long after a reaction its reason may be seen, which recordings have by the loop's status."""
 _MOVED = 1e-6
 """A coordinate that differs by less over a recording is none of its robot's, m or rad."""
 _TIMES = {"answers in": "exchange_s", "computing": "compute_s", "late by": "lateness_s"}
@@ -188,7 +190,8 @@ def draw_programs(ax: Axes, columns: Columns, names: Sequence[str]) -> None:
 def faults_of(readers: Sequence[RecordingReader], columns: Columns) -> list[tuple[float, str]]:
     """Return when a limit made the loop react, and when its state became a fault, with words.
 
-    The loop's reason is told with the first of what it has led to.
+    The loop's reason is told with the first of what it has led to: it is seen some time after that,
+    when a cable that broke may have its winch run too fast.
     """
     stamped = [
         (event["log_time_ns"] - reader.offset_ns, event)
@@ -200,11 +203,13 @@ def faults_of(readers: Sequence[RecordingReader], columns: Columns) -> list[tupl
     reactions = [at_ns for at_ns, event in shown if event["reaction"] > Reaction.CLAMP]
     found, reasons, last = [], Reasons(stamped), ""
     for at_ns, event in shown:
-        later = [other_ns for other_ns in reactions if other_ns > at_ns]
+        later = [other_ns for other_ns in reactions if other_ns > at_ns + _SEEN_ns]
         found_reason = reasons.after(at_ns, min(later, default=math.inf))
         reason, last = "" if found_reason == last else found_reason, found_reason or last
         after_s = float(np.interp(at_ns, columns["stamp_ns"], columns[ELAPSED]))
-        found.append((after_s, str(event["text"]) + (f": {reason}" if reason else "")))
+        # it begins with the axis that the limit is of
+        text = str(event["text"]).removesuffix(f" of {reason.partition(':')[0]}")
+        found.append((after_s, text + (f": {reason}" if reason else "")))
     return found
 
 

@@ -35,8 +35,9 @@ from cdpr_tools.robots.questions import (
 
 Ask = Callable[[Question, str, str], str]
 """Takes a question, its default and what was wrong with the last answer; returns the answer."""
-_STAND_SHARE = 0.1
-"""Of the height in which targets could be taken, what is left between the stand and the box."""
+_STAND_SHARE, _STAND_m = 0.1, 0.5
+"""Of the height in which targets could be taken, what is left between the stand and the box; and of
+the frame's, up to so much, how high a platform stands above the floor where it could go there."""
 _SHRUNK = np.linspace(1.0, 0.5, 26)
 
 
@@ -84,13 +85,17 @@ def _answer(question: Question, answers: Answers, given: Mapping[str, str], ask:
 def proposed_box(answers: Answers) -> tuple[tuple[float, ...], tuple[float, ...]]:
     """Return the largest box of targets that the cables can hold, to the cm, or one to begin with.
 
-    Below it a tenth is left for the stand, and what a turned platform is lower. It is smaller where
-    the motors would not bear it for long.
+    Below it a tenth is left for the stand, and what a turned platform is lower. Platforms on cables
+    from above are held down to the floor: they stand higher, for what is below them. The box is
+    smaller where the motors would not bear it for long.
     """
     exits = np.array([answers[f"exit_{i + 1}_m"] for i in range(answers["kind"].cables)])
     least, most = exits.min(axis=0), exits.max(axis=0)
-    if least[-1] > 0.5 * most[-1]:
-        least[-1] = 0.0  # all cables come from above: it is held down to the floor
+    stand_m = -math.inf
+    if least[-1] > 0.5 * most[-1]:  # all cables come from above
+        least[-1] = 0.0
+        lowest_m = min(answers[f"anchor_{i + 1}_m"][-1] for i in range(answers["kind"].cables))
+        stand_m = min(_STAND_SHARE * most[-1], _STAND_m) - min(lowest_m, 0.0)
     middle, size = 0.5 * (least + most), most - least
     around = Box(_point(least), _point(most))
     statics = _statics_of(answers, around)
@@ -100,6 +105,7 @@ def proposed_box(answers: Answers) -> tuple[tuple[float, ...], tuple[float, ...]
             continue
         whole_m = found.high_m[-1] - found.low_m[-1]
         gap_m = max(_STAND_SHARE * whole_m, _lower_when_turned_m(answers, found))
+        gap_m += max(stand_m - found.low_m[-1], 0.0)
         low = np.array(found.low_m) + gap_m * np.eye(len(size))[-1]
         low, high = np.ceil(100.0 * low) / 100.0, np.floor(100.0 * np.array(found.high_m)) / 100.0
         if (low < high).all():

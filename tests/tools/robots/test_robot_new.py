@@ -265,3 +265,19 @@ def test_names_in_the_picture_are_clear_of_its_numbers(tmp_path: Path) -> None:
         (left, lower), (right, upper) = name.get_window_extent().get_points()
         assert inside.x0 <= left and right <= inside.x1, name
         assert inside.y0 <= lower and upper <= inside.y1, name
+
+
+@pytest.mark.parametrize(
+    ("given", "under_m"),
+    [
+        ({"kind": "suspended-6"}, 0.4),
+        ({"kind": "point-4"}, 0.4),
+        ({"kind": "point-4", "frame_m": "80 50 20"}, 0.5),
+    ],
+)
+def test_a_platform_that_cables_hold_down_to_the_floor_has_a_stand(
+    given: dict[str, str], under_m: float, tmp_path: Path
+) -> None:
+    answers = answers_of(tmp_path / "mine.toml", given, usual)
+    assert answers["home_m"][-1] >= under_m
+    assert answers["low_m"][-1] > answers["home_m"][-1]

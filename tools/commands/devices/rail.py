@@ -82,7 +82,7 @@ def move_(
     to_m: Annotated[float, typer.Option("--to", help="Where to, in m.", metavar="M")],
     bus: _BusOption = None,
     safety_io: SafetyIoOption = None,
-    tension: Annotated[
+    sensors: Annotated[
         str | None,
         typer.Option(help="Tension sensors that tell whether the cables are slack."),
     ] = None,
@@ -118,7 +118,7 @@ def move_(
     with (
         stop_on_signals() as stop_requested,
         rail_clock(profile, bus, winch_bus or ()) as clock,
-        slack_watch(profile, tension, tension_port, cables_slack_checked, clock) as cables_tight,
+        slack_watch(profile, sensors, tension_port, cables_slack_checked, clock) as cables_tight,
         power_watch(profile, bus, winch_bus or (), out, clock) as powered,
         open_rail(rail, profile, bus, safety_io, out, clock) as axis,
     ):
