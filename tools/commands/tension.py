@@ -156,7 +156,10 @@ def calibrate(
         str | None, typer.Option(help="Load cells in place of masses: a name or a file.")
     ] = None,
     port: Annotated[
-        str | None, typer.Option(help="Serial port of the load cells' line, as /dev/ttyUSB0.")
+        str | None,
+        typer.Option(
+            "--tension-port", help="Serial port of the load cells' line, as /dev/ttyUSB0."
+        ),
     ] = None,
     cable: Annotated[
         str | None, typer.Option(help="The load cell's cable; the first by default.")
