@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -14,15 +13,10 @@ from cdpr_profiles.platform import DIRECTIONS, Platform
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.core.shared_block import MOST_AXES
 from cdpr_rt.core.supervision.limits import Limits
-from cdpr_rt.errors import GeometryError
+from cdpr_rt.robots.feasibility.finding import Finding
+from cdpr_rt.robots.feasibility.loop_checks import loop_findings
 from cdpr_rt.robots.feasibility.not_held import point_text, why_not_held
-from cdpr_rt.robots.feasibility.turned_by_friction import (
-    moved_by_friction_m,
-    stretched_by_acceleration_m,
-    turned_by_friction,
-)
 from cdpr_rt.robots.interference.interference import in_words
-from cdpr_rt.robots.platform.loop_design import UnstableError, designed_loop
 from cdpr_rt.robots.rigid_body import in_space, is_point
 from cdpr_rt.robots.robot_arrays import limits_of
 from cdpr_rt.robots.statics import NONE_rad, PlatformStatics, statics_of
@@ -38,23 +32,11 @@ _SAGS_m_N = 0.01
 """Largest change of length by sag for a newton: a motor's friction is some newtons."""
 _ROUNDED_UP = 1.05
 """So that two digits are not less."""
-_SLOW_Hz = 0.5
-"""Slowest mode of a loop: it settles within 2 % in 2.3 s."""
 _FRICTION_SHARE = 0.06
 """Friction and cogging of a servo winch together over the motor's rated torque, at most."""
 _FAR_TURNED_deg, _TIPPED_deg = 10.0, 4.0
 _WIDE_ARMS = 0.5
 """Anchor points further apart than this share of the exit points are probably not in metres."""
-
-
-@dataclass(frozen=True)
-class Finding:
-    """Something about a key of a robot's file: what is wrong, and what to change."""
-
-    key: str
-    text: str
-    impossible: bool
-    """Whether the robot cannot work like this; else it can, less well than it seems."""
 
 
 def findings(robot: Robot, limits: Limits | None = None) -> list[Finding]:
@@ -74,7 +56,7 @@ def findings(robot: Robot, limits: Limits | None = None) -> list[Finding]:
         found += _sagging(robot, statics)
         if statics.turns_freely:
             found += _free_rotation(statics)
-        found += [*_loop(robot, statics), *_uncontrolled_rotation(robot.platform)]
+        found += [*loop_findings(robot, statics), *_uncontrolled_rotation(robot.platform)]
         found += _stand_clearance(statics)
         platform = robot.platform
         found += [*_contact(statics), *_anchors_off_body(platform), *_friction(robot, statics)]
@@ -270,33 +252,6 @@ def _free_rotation(statics: PlatformStatics) -> Iterator[Finding]:
             f"at {where} m the platform turns by {degrees.max():.0f} deg, which no cable can "
             "prevent; anchor points that lie towards their exit points let it turn less"
         )
-        yield Finding("axes[0].anchor_point_m", text, impossible=False)
-
-
-def _loop(robot: Robot, statics: PlatformStatics) -> Iterator[Finding]:
-    try:
-        loop = designed_loop(statics.model, robot.axes, robot.sync_period_s)
-    except GeometryError as error:
-        if isinstance(error, UnstableError):
-            text = (
-                f"{error}: anchor points that lie towards their exit points, with longer arms, help"
-            )
-            yield Finding("axes[0].anchor_point_m", text, impossible=True)
-        return  # else said of the tensions
-    slowest_Hz = loop.slowest_rad_s / math.tau
-    if slowest_Hz < _SLOW_Hz:
-        off_mm = 1e3 * moved_by_friction_m(statics.model, robot.axes, loop.gains)
-        yield_mm = 1e3 * stretched_by_acceleration_m(statics.model, robot.axes)
-        text = (
-            f"a stable loop moves the platform's slowest mode at {slowest_Hz:.2g} Hz, so that it "
-            "takes long to come to rest and runs over its targets: its cables yield by "
-            f"{yield_mm:.2g} mm as it is accelerated, and friction that is usual in such winches "
-            f"moves it by {off_mm:.2g} mm until the control overcomes it; {_SLOW_Hz:g} Hz and more "
-            "wanted: stiffer cables, less acceleration, a lighter platform or a shorter "
-            "sync_period_s help"
-        )
-        yield Finding("platform.mass_kg", text, impossible=False)
-    if text := turned_by_friction(statics, robot.axes, loop.gains):
         yield Finding("axes[0].anchor_point_m", text, impossible=False)
 
 

@@ -167,7 +167,7 @@ class LoopModel:
 
     def margins(self, gains: LoopGains) -> list[LoopMargins]:
         """Return the margins of a loop at each of the poses."""
-        damping, stiffness, modes = self._along_modes(gains)
+        damping, stiffness, _ = self._along_modes(gains)
         of_speed, of_place = self._factors(gains)
         C = (
             of_speed[:, None] * damping[:, None, None]
@@ -183,8 +183,18 @@ class LoopModel:
                 float(omega.min()),
                 float(omega.max()),
             )
-            for at, omega in zip(least, modes, strict=True)
+            for at, omega in zip(least, self._modes_rad_s(gains), strict=True)
         ]
+
+    def _modes_rad_s(self, gains: LoopGains) -> FloatArray:
+        """Return the platform's modes in closed loop, without delays, (m, d)."""
+        _, _, omega = self._along_modes(gains)
+        if gains.follows_pose:
+            return omega
+        root = (self._mass_kg + gains.rotor_kg) ** -0.5
+        squares = root[..., None] * self._geometric_N_m[:, LEAST] * root[:, None]
+        squares = squares + (omega**2)[..., None] * np.eye(omega.shape[1])
+        return np.asarray(np.sqrt(np.linalg.eigvalsh(squares)))
 
     def _along_modes(self, gains: LoopGains) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return the loop's damping and stiffness, and the platform's ω, of each mode (m, d)."""

@@ -17,6 +17,7 @@ from cdpr_profiles.calibration.in_force import load_calibrated
 from cdpr_profiles.errors import ProfileError
 from cdpr_profiles.platform import NO_PLATFORM, Platform
 from cdpr_rt.robots.feasibility import checks
+from cdpr_rt.robots.feasibility.finding import Finding
 from cdpr_rt.robots.persistence.calibration_state import mark_calibrated
 from cdpr_tools.calibrate.words import calibration_lines
 from cdpr_tools.commands.options import JsonOption, PngOption, RobotArgument
@@ -65,10 +66,10 @@ def show(robot: RobotArgument, png: PngOption = None, as_json: JsonOption = Fals
         raise typer.Exit(BAD_INPUT)
 
 
-def _bus_findings(profile: Robot) -> list[checks.Finding]:
+def _bus_findings(profile: Robot) -> list[Finding]:
     """Return that the cycle does not fit its buses, nothing where it does."""
     reason = refusal(machine_budget(profile))
-    return [checks.Finding("sync_period_s", reason, impossible=True)] if reason else []
+    return [Finding("sync_period_s", reason, impossible=True)] if reason else []
 
 
 @app.command("mark-calibrated")
@@ -177,7 +178,7 @@ def _ask(question: Question, default: str, problem: str) -> str:
         ) from None
 
 
-def _say_findings(out: Output, found: list[checks.Finding]) -> None:
+def _say_findings(out: Output, found: list[Finding]) -> None:
     for finding in found:
         kind = "impossible" if finding.impossible else "mind"
         out.say(f"{kind}: {finding.key}: {finding.text}")

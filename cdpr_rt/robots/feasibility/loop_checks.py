@@ -1,0 +1,49 @@
+"""What is impossible or doubtful about a robot's loop."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+from cdpr_profiles import Robot
+from cdpr_rt.errors import GeometryError
+from cdpr_rt.robots.feasibility.finding import Finding
+from cdpr_rt.robots.feasibility.turned_by_friction import (
+    moved_by_friction_m,
+    stretched_by_acceleration_m,
+    turned_by_friction,
+)
+from cdpr_rt.robots.platform.loop_design import UnstableError, designed_loop
+from cdpr_rt.robots.statics import PlatformStatics
+
+_SLOW_Hz = 0.5
+"""Slowest mode of a loop: it settles within 2 % in 2.3 s."""
+
+
+def loop_findings(robot: Robot, statics: PlatformStatics) -> Iterator[Finding]:
+    """Yield what is impossible or doubtful about the loop that is designed for a robot."""
+    try:
+        loop = designed_loop(statics.model, robot.axes, robot.sync_period_s)
+    except GeometryError as error:
+        if isinstance(error, UnstableError):
+            text = (
+                f"{error}: anchor points that lie towards their exit points, with longer arms, help"
+            )
+            yield Finding("axes[0].anchor_point_m", text, impossible=True)
+        return  # else said of the tensions
+    slowest_Hz = loop.slowest_rad_s / math.tau
+    if slowest_Hz < _SLOW_Hz:
+        off_mm = 1e3 * moved_by_friction_m(statics.model, robot.axes, loop.gains)
+        yield_mm = 1e3 * stretched_by_acceleration_m(statics.model, robot.axes)
+        text = (
+            f"a stable loop moves the platform's slowest mode at {slowest_Hz:.2g} Hz, so that it "
+            "takes long to come to rest and runs over its targets: its cables yield by "
+            f"{yield_mm:.2g} mm as it is accelerated, and friction that is usual in such winches "
+            f"moves it by {off_mm:.2g} mm until the control overcomes it; {_SLOW_Hz:g} Hz and more "
+            "wanted: stiffer cables, less acceleration, a lighter platform or a shorter "
+            "sync_period_s help"
+        )
+        yield Finding("platform.mass_kg", text, impossible=False)
+    # tensions of the set-point hold it there, wherever friction turns it
+    if loop.gains.follows_pose and (text := turned_by_friction(statics, robot.axes, loop.gains)):
+        yield Finding("axes[0].anchor_point_m", text, impossible=False)

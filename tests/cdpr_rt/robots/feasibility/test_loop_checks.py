@@ -1,0 +1,34 @@
+"""What is told of a robot whose tensions turn its platform away, or hold it as springs."""
+
+from __future__ import annotations
+
+import dataclasses
+
+from cdpr_profiles import Robot, load_robot
+from cdpr_rt.robots.feasibility.loop_checks import loop_findings
+from cdpr_rt.robots.statics import statics_of
+from tests.cdpr_rt.robots.platform.platform_physics import Machine, crossed_rod, short_arms
+
+
+def told(machine: Machine, low_N: float, high_N: float) -> list[str]:
+    """Return what is told of a robot with these bounds of tension."""
+    base = load_robot("spatial-8")
+    bounds = {"tension_min_N": (low_N,), "tension_max_N": (high_N,), "slack_N": (0.5 * low_N,)}
+    robot: Robot = dataclasses.replace(
+        base,
+        platform=machine.platform,
+        axes=list(machine.axes),
+        limits=base.limits.model_copy(update=bounds),
+    )
+    found = list(loop_findings(robot, statics_of(robot)))
+    return [f"{f.key}: {f.text}" for f in found if f.impossible]
+
+
+def test_a_platform_that_tensions_turn_away_faster_than_a_loop_can_hold_it_is_refused() -> None:
+    (text,) = told(crossed_rod(), 200.0, 800.0)
+    assert text.startswith("axes[0].anchor_point_m: its tensions turn the platform away")
+    assert told(crossed_rod(), 20.0, 150.0) == []
+
+
+def test_a_platform_that_tensions_hold_is_not_refused() -> None:
+    assert told(short_arms(), 200.0, 800.0) == []
