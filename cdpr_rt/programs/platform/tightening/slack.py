@@ -17,7 +17,8 @@ _ENOUGH = 1.25
 _STILL_m, _STILL_S = 0.0003, 0.3
 _USUAL_SHARE = 0.45
 """What usually turns a winch whose cable is slack, over the most that it may take up."""
-_STAND_FRICTION = 0.3
+_STAND_FRICTION, _ASIDE_SHARE = 0.3, 0.5
+"""Of the stand, over the platform's weight, and what one cable may pull at it with over that."""
 _REMEDY = "take up slack by hand, or hold the platform"
 
 
@@ -36,13 +37,16 @@ class SlackTakeUp:
         n, taken_up_N = cable_m.size, parts.control.pull_fit.taken_up_N
         weight_N = float(np.linalg.norm(parts.model.weight()[: parts.model.positions]))
         self._names, self._cable = parts.names, cable_m
-        self._at_once = bool(_USUAL_SHARE * taken_up_N.max() > _STAND_FRICTION * weight_N)
+        usual_N, stands_N = _USUAL_SHARE * taken_up_N, _STAND_FRICTION * weight_N
+        self._at_once = bool(usual_N.max() > stands_N)
         self._phase, self._state = np.zeros(n, np.int64), np.zeros((n, kernel.STATE))
         self.tight_N = self._state[:, kernel.TIGHT_N]
         """What each tight cable is pulled with, 0 for those that are not tight."""
         self._dragged = -1
         driven = kernel.Winches(
-            parts.period_s, self._at_once, cable_m, _ENOUGH * taken_up_N, winches.speed_rad_s,
+            parts.period_s, self._at_once, cable_m, _ENOUGH * taken_up_N,
+            np.maximum(usual_N, _ASIDE_SHARE * stands_N),
+            winches.speed_rad_s,
             winches.tension_N, winches.low_N, winches.high_N, winches.paying_out_m_s,
         )  # fmt: skip
         self._take_up = bound(
@@ -84,7 +88,7 @@ class SlackTakeUp:
 
         All are paid out a little first: what a winch takes that never turns is not known.
         """
-        self._state[:, kernel.TURNED_N] = self._state[:, kernel.SLACK_m] = 0.0
+        self._state[:, (kernel.MAY_N, kernel.TURNED_N, kernel.SLACK_m)] = 0.0
         self._dragged = -1
         first = kernel.CLOSING if self._at_once else kernel.LOOSENED
         kernel.enter(first, self._phase, self._state, position_rad)

@@ -18,6 +18,8 @@ PULLED = 0.95
 """Share of its bound with which a winch pulls that is said to pull with all of it."""
 _SLOW_SHARE, _MEAN_S = 1.0 / 3.0, 0.04
 """Below that share of the speed a cable may be tight, by its mean over this time."""
+_RAISED_1_s = 2.0
+"""How much more a winch that stands still pulls with after a second, over what none sticks at."""
 _LEFT_m, _LEAVE_S = 0.005, 0.5
 """Slack that a cable is left with until all have been tight, and how long that may take."""
 
@@ -25,10 +27,11 @@ LOOSENED, PAID_OUT, WAITING, REELED_IN, CLOSING, TIGHT = range(6)
 """Phases of a cable: paid out a little at first; paid out again, having been tight; held with that
 slack for the others; reeled in by itself; reeled in with all others; tight. All are in one of the
 last two, or none is."""
-FROM_rad, MEAN_m_s, TURNED_N, TIGHT_N, SLACK_m, CYCLES, STATE = range(7)
-"""State of a cable: the angle that it is reeled in or paid out from; its mean speed inwards; the
-most that has turned its winch, what the cable weighs included; what it is pulled with once tight,
-else 0; how far it was reeled in for that; cycles for which it has been paid out."""
+FROM_rad, MEAN_m_s, MAY_N, TURNED_N, TIGHT_N, SLACK_m, CYCLES, STATE = range(8)
+"""State of a cable: the angle that it is reeled in or paid out from; its mean speed inwards; what
+it may be reeled in with; the most that has turned its winch, what the cable weighs included; what
+it is pulled with once tight, else 0; how far it was reeled in for that; cycles for which it has
+been paid out."""
 
 
 class Winches(NamedTuple):
@@ -40,6 +43,8 @@ class Winches(NamedTuple):
     cable_m: FloatArray
     enough_N: FloatArray
     """Tensions at which none sticks."""
+    harmless_N: FloatArray
+    """Tensions with which one cable by itself does not move the platform on its stand."""
     speed_rad_s: FloatArray
     tension_N: FloatArray
     low_N: FloatArray
@@ -64,7 +69,7 @@ def take_up(
 ) -> int:  # fmt: skip
     """Raise bounds and set speeds; return which tight cable was reeled in furthest on, if too far.
 
-    `state` is (n, 6), -1 stands for none. See `SlackTakeUp.update`.
+    `state` is (n, STATE), -1 stands for none. See `SlackTakeUp.update`.
     """
     dragged, dragged_m, loose, waiting = -1, LOOSE_m, False, True
     for i in range(phase.size):
@@ -73,7 +78,7 @@ def take_up(
             most = min(max(most, w.enough_N[i]), pretension[i])
         phase[i] = _next_phase(w, i, phase[i], state[i], position[i], PULLED * most)
         w.high_N[i] = max(w.high_N[i], min(share, 1.0) * most)
-        _drive(w, i, phase[i], state[i])
+        _drive(w, i, phase[i], state[i], most)
         reeled_m = (state[i, FROM_rad] - position[i]) * w.cable_m[i]
         if phase[i] == TIGHT and reeled_m > dragged_m:
             dragged, dragged_m = i, reeled_m
@@ -89,7 +94,7 @@ def take_up(
 def _next_phase(
     w: Winches, i: int, phase: int, state: FloatArray, position: float, most: float
 ) -> int:
-    """Return the phase of cable i from now on; `state` (6,) is its own."""
+    """Return the phase of cable i from now on; `state` (STATE,) is its own."""
     reeled_m = (state[FROM_rad] - position) * w.cable_m[i]
     if phase in (LOOSENED, PAID_OUT):
         state[CYCLES] += 1.0
@@ -120,17 +125,25 @@ def _seems_tight(w: Winches, i: int, state: FloatArray, most: float) -> bool:
         state[TURNED_N] = max(state[TURNED_N], tension)
     enough = min(w.enough_N[i], most)
     if state[TURNED_N] > 0.0:
-        enough = min(enough, state[TURNED_N])
+        enough = min(enough, max(state[TURNED_N], w.harmless_N[i]))
     return bool(state[MEAN_m_s] < _SLOW_SHARE * TAKE_UP_m_s and tension >= enough)
 
 
 @jit
-def _drive(w: Winches, i: int, phase: int, state: FloatArray) -> None:
+def _drive(w: Winches, i: int, phase: int, state: FloatArray, most: float) -> None:
     """Set bounds and speed of winch i, which reels in unless told otherwise."""
     if phase == TIGHT:
         w.high_N[i] = state[TIGHT_N]
+    elif phase in (REELED_IN, CLOSING) and not w.at_once:
+        # a cable that becomes tight in motion is not to pull the platform along before it is seen
+        slow = -w.cable_m[i] * w.speed_rad_s[i] < 0.5 * TAKE_UP_m_s
+        if slow and w.tension_N[i] >= PULLED * state[MAY_N]:
+            raised = state[MAY_N] + _RAISED_1_s * w.period_s * w.enough_N[i]
+            state[MAY_N] = min(raised, most)
+        w.high_N[i] = state[MAY_N]
     elif phase in (LOOSENED, PAID_OUT):
         w.low_N[i], w.paying_out_m_s[i] = -w.enough_N[i], TAKE_UP_m_s
+        w.high_N[i] = 0.0  # two that are tight at once may move the platform
     elif phase == WAITING:  # held: cogging would turn it
         w.low_N[i], w.paying_out_m_s[i] = -w.enough_N[i], 0.0
         w.high_N[i] = min(w.high_N[i], w.enough_N[i])
