@@ -29,6 +29,7 @@ from cdpr_rt.robots.platform.control_rows import (
     cell_check,
     loop_settings,
     motor_rows,
+    slides_on_stand,
     tracking_filters,
 )
 from cdpr_rt.robots.platform.learning.motor_learning import MotorLearning
@@ -95,7 +96,9 @@ class CableControl(PlaceChecks):
         if learns and not known.all():
             scale, reserve_N = model.wrench_scale, model.reserve_N
             self.learning = MotorLearning(axes, known, scale, reserve_N, period_s)
-        self.pull_fit = PullFit(axes, known, self.lengths_at_home, self.learning)
+        self.pull_fit = PullFit(
+            axes, known, self.lengths_at_home, self.learning, slides_on_stand(model)
+        )
         self._cells: CellFeedback | None = None
         self._check = cell_check(model, axes, period_s)
         moves = np.zeros((4, 6))

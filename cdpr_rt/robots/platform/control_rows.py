@@ -19,6 +19,7 @@ _INTEGRAL_SHARE = 0.3
 _DEADBAND_m = 6e-5
 _STICTION_GAIN = 20.0
 _STICTION_m_s = 0.002
+_SPATIAL, _YAW = 3, 5
 
 
 def motor_rows(model: PlatformModel, axes: Sequence[RobotAxis]) -> FloatArray:
@@ -57,6 +58,19 @@ def loop_settings(gains: LoopGains, span_N: float, period_s: float) -> FloatArra
         _DEADBAND_m,
     )
     return row
+
+
+def slides_on_stand(model: PlatformModel) -> FloatArray:
+    """Return by how much cables become longer where the platform slides on its stand, (n, k).
+
+    Along the horizontal directions, and in space about the vertical axis where that is controlled,
+    in m for each m at the anchor points.
+    """
+    horizontal = list(range(model.positions - 1))
+    if model.positions == _SPATIAL:
+        horizontal += [i for i, k in enumerate(model.kinematics.directions) if k == _YAW]
+    J = -model.kinematics.wrench_matrix(model.home_pose).T
+    return np.asarray((J / model.wrench_scale)[:, horizontal])
 
 
 def cell_check(model: PlatformModel, axes: Sequence[RobotAxis], period_s: float) -> CellCheck:

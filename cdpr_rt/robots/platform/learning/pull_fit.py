@@ -40,6 +40,10 @@ _TOLD = 0.7
 """Standard deviation of friction, over what is usual, with which others of a kind tell it."""
 _MISFIT = 3.0
 """Residual over noise above which a fit is not believed, as where the platform has moved."""
+_SLIDE_m = 0.005
+"""By how much a platform may slide on its stand (standard deviation), at its anchor points."""
+_SLIDES = (10.8, 13.8, 16.3)
+"""Chi squared of one to three slides that noise exceeds once in a thousand."""
 _SLOW_SHARE, _UNLIKE = 0.8, 0.25
 """Friction in motion, over that of a motor that all but stands; and how unlike it may be."""
 
@@ -52,6 +56,11 @@ class PullFit:
     same gear, rub alike: what the others tell is expected of one whose own friction hardly turns
     round. Nothing is found of motors that are `known` (n,). What is found is where the `learning`
     begins, once it is to.
+
+    A platform that slides on its stand while it is pulled harder than before makes all cables
+    longer by `slides` Δ. Of Δ (k,) is believed what is significant: Δ^T C^-1 Δ, over the variance
+    that is left, above what noise alone exceeds once in a thousand (data snooping, as in Baarda,
+    1968). Else the platform has stood still.
     """
 
     def __init__(
@@ -60,9 +69,15 @@ class PullFit:
         known: BoolArray,
         lengths_at_home: Callable[[FloatArray], FloatArray],
         learning: MotorLearning | None,
+        slides: FloatArray,
     ) -> None:
-        """Take what the lengths without tension (n,) at home are for tensions (n,)."""
+        """Take what the lengths without tension (n,) at home are for tensions (n,).
+
+        `slides` (n, k), k up to 3, is what each cable is longer by for each way in which the
+        platform may slide, in m for each m at its anchor points.
+        """
         n = len(axes)
+        self._slides = slides
         self._known, self._learning, self._lengths_at_home = known, learning, lengths_at_home
         self._rated_Nm = np.array([axis.winch.motor.rated_torque_Nm for axis in axes])
         kinds = [(axis.winch.motor.model, axis.winch.gear_ratio) for axis in axes]
@@ -80,20 +95,19 @@ class PullFit:
         """Of all but friction, (n, 5, 5)."""
         self._shares = np.linspace(_LEAST_SHARE, _MOST_SHARE, _SHARES)
         self._lengths = np.ones((2, _SHARES, n))
-        size = kernel.UNKNOWNS + 1
         self._motors[kernel.PLAY] = [
             _COUNTS * math.tau / axis.winch.encoder_counts_per_turn for axis in axes
         ]
         self._seen, self._turned = np.zeros((2, 2, n))
         self._yielding = np.zeros(n)
-        self._sums = np.zeros((n, size, size))
+        self._sums = np.zeros((n, kernel.FACTORS, kernel.FACTORS))
         self.unknowns = np.zeros((n, kernel.UNKNOWNS))
         """What was found, (n, 5)."""
         self._found = np.zeros(n, np.bool_)
         self._covariance = np.zeros((n, kernel.UNKNOWNS, kernel.UNKNOWNS))
         self._take = bound(
             kernel.take, self._motors, self._shares, self._lengths, self._seen, self._yielding,
-            self._turned, self._sums, np.zeros(size), then=(np.zeros(n), np.zeros(n)),
+            self._turned, self._sums, np.zeros(kernel.FACTORS), then=(np.zeros(n), np.zeros(n)),
         )  # fmt: skip
 
     def prepare(self, tension_N: FloatArray) -> None:
@@ -110,6 +124,7 @@ class PullFit:
     def begin(self, position_rad: FloatArray) -> None:
         """Begin anew, at these angles (n,), to which the cables have been reeled in."""
         self._motors[kernel.ORIGIN] = position_rad
+        self._motors[kernel.MOST_SHARE] = 1.0
         self._seen[:] = self._turned[:] = self._sums[:] = 0.0
         self._yielding[:] = -np.sign(self._motors[kernel.M_PER_RAD])
 
@@ -119,12 +134,12 @@ class PullFit:
 
     def end(self) -> FloatArray:
         """Return the angles (n,) at which the cables have the pretension, nan where not known."""
-        zero, usual_Nm = np.zeros(self._rated_Nm.size), FRICTION_SHARE * self._rated_Nm
-        sums = self._weighted_sums()
-        misfit, x, covariance = self._fit(sums, zero, usual_Nm)
-        alone_Nm, variance = x[:, kernel.FRICTION], covariance[:, kernel.FRICTION, kernel.FRICTION]
-        told = (~self._known & (misfit < _MISFIT)) / _wider(misfit)
-        mean_Nm, spread_Nm = self._of_their_kind(told, alone_Nm, variance, usual_Nm)
+        usual_Nm, sums = FRICTION_SHARE * self._rated_Nm, self._weighted_sums()
+        mean_Nm, spread_Nm = self._expected(sums)
+        slide = self._slide(sums, mean_Nm, spread_Nm)
+        if slide.any():
+            sums = _moved_back(sums, self._slides @ slide)
+            mean_Nm, spread_Nm = self._expected(sums)
         misfit, x, covariance = self._fit(sums, mean_Nm, spread_Nm)
         self.unknowns[:] = x
         self._covariance[:] = covariance * _wider(misfit)[:, None, None]
@@ -152,6 +167,39 @@ class PullFit:
         covariance[:, [1, 2], [1, 2]] += np.where(less, usual_Nm**2, 0.0)[:, None]
         self._learning.begin_with(self._found, torques, covariance)
 
+    def _expected(self, sums: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return what friction is expected of each motor by what others tell, and its spread."""
+        zero, usual_Nm = np.zeros(self._rated_Nm.size), FRICTION_SHARE * self._rated_Nm
+        misfit, x, covariance = self._fit(sums, zero, usual_Nm)
+        alone_Nm, variance = x[:, kernel.FRICTION], covariance[:, kernel.FRICTION, kernel.FRICTION]
+        told = (~self._known & (misfit < _MISFIT)) / _wider(misfit)
+        return self._of_their_kind(told, alone_Nm, variance, usual_Nm)
+
+    def _slide(
+        self, sums: FloatArray, friction_Nm: FloatArray, spread_Nm: FloatArray
+    ) -> FloatArray:
+        """Return by how much the platform has slid, (k,), 0 where that is not significant.
+
+        What each motor is fitted by besides is eliminated: a_i and b_i are what is left of the
+        squares of the slide's factor, and of its product with what is measured.
+        """
+        m, slid, slides = kernel.UNKNOWNS, kernel.SLID, self._slides
+        none = np.zeros(slides.shape[1])
+        if not none.size:
+            return none
+        precision, known = self._with_usual(sums, friction_Nm, spread_Nm)
+        fitted = np.linalg.solve(precision, np.stack([sums[:, :m, slid], known], axis=2))
+        a, b = sums[:, slid, [slid, kernel.MEASURED]].T - np.einsum(
+            "ij,ijk->ki", sums[:, :m, slid], fitted
+        )
+        certain = (slides.T * a) @ slides + np.eye(none.size) * _SLIDE_m**-2.0
+        slide = np.asarray(np.linalg.solve(certain, slides.T @ b))
+        misfit = self._fit(_moved_back(sums, slides @ slide), friction_Nm, spread_Nm)[0]
+        told = self._told()
+        noise = max(float((misfit**2 * told).sum() / told.sum()), 1.0)
+        significant = slide @ certain @ slide > noise * _SLIDES[none.size - 1]
+        return slide if significant else none
+
     def _of_their_kind(
         self, told: FloatArray, friction_Nm: FloatArray, variance: FloatArray, usual_Nm: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
@@ -171,7 +219,7 @@ class PullFit:
         return (counts * weighted).sum(axis=1) / known, np.sqrt(unlike[:, 0] + 1.0 / known)
 
     def _weighted_sums(self) -> FloatArray:
-        """Return the sums (n, 6, 6) over the variance of what else a motor takes up."""
+        """Return the sums (n, 7, 7) over the variance of what else a motor takes up."""
         sums = self._sums + np.swapaxes(np.tril(self._sums, -1), 1, 2)
         noise = self._alike_rad * (NOISE_SHARE * self._rated_Nm) ** 2
         return np.asarray(sums / noise[:, None, None])
@@ -183,20 +231,41 @@ class PullFit:
 
         Its friction is expected to be `friction_Nm` ± `spread_Nm`, (n,). Covariances are (n, 5, 5).
         """
-        m, f = kernel.UNKNOWNS, kernel.FRICTION
-        products, rest = sums[:, :m, :m], sums[:, :m, m]
-        precision = products + self._usual_precision
-        precision[:, f, f] += spread_Nm**-2.0
-        known = rest.copy()
-        known[:, f] += friction_Nm / spread_Nm**2
+        m, y = kernel.UNKNOWNS, kernel.MEASURED
+        products, rest = sums[:, :m, :m], sums[:, :m, y]
+        precision, known = self._with_usual(sums, friction_Nm, spread_Nm)
         covariance = np.asarray(np.linalg.inv(precision), float)
         x = (covariance @ known[:, :, None])[:, :, 0]
-        left = sums[:, m, m] + (x * ((products @ x[:, :, None])[:, :, 0] - 2.0 * rest)).sum(axis=1)
-        told = np.maximum(self._turned.sum(axis=0), _TURNED_rad) / self._alike_rad
-        misfit = np.maximum(left, 0.0) / told
+        left = sums[:, y, y] + (x * ((products @ x[:, :, None])[:, :, 0] - 2.0 * rest)).sum(axis=1)
+        misfit = np.maximum(left, 0.0) / self._told()
         # cables that are softer show all torques larger
         x[:, kernel.FRICTION :] /= np.maximum(1.0 + x[:, [kernel.STEEPER]], _LEAST_STEEP)
         return np.sqrt(misfit), x, covariance
+
+
+    def _with_usual(
+        self, sums: FloatArray, friction_Nm: FloatArray, spread_Nm: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return the normal equations of each motor, (n, 5, 5) and (n, 5), with what is usual."""
+        m, f = kernel.UNKNOWNS, kernel.FRICTION
+        precision = sums[:, :m, :m] + self._usual_precision
+        precision[:, f, f] += spread_Nm**-2.0
+        known = sums[:, :m, kernel.MEASURED].copy()
+        known[:, f] += friction_Nm / spread_Nm**2
+        return precision, known
+
+    def _told(self) -> FloatArray:
+        """Return how many independent angles each motor has told, (n,)."""
+        return np.asarray(np.maximum(self._turned.sum(axis=0), _TURNED_rad) / self._alike_rad)
+
+
+def _moved_back(sums: FloatArray, longer_m: FloatArray) -> FloatArray:
+    """Return the sums (n, 7, 7) as they were had the cables not become longer, by (n,)."""
+    moved, slid, y = sums.copy(), sums[:, :, kernel.SLID] * longer_m[:, None], kernel.MEASURED
+    moved[:, :, y] -= slid
+    moved[:, y, :] = moved[:, :, y]
+    moved[:, y, y] = sums[:, y, y] - 2.0 * slid[:, y] + longer_m * slid[:, kernel.SLID]
+    return moved
 
 
 def _wider(misfit: FloatArray) -> FloatArray:

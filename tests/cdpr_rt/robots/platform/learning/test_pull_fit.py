@@ -29,6 +29,7 @@ PHASE_rad = np.array([0.3, 1.5, 2.6, 3.9, 5.0, 6.1])
 COGGING_Nm = np.array([0.06, 0.03, 0.0, 0.07, 0.05, 0.06])
 START_rad = 40.0
 NOBODY = np.zeros(N, np.bool_)
+STANDS = np.zeros((N, 0))
 
 
 @pytest.fixture(scope="module")
@@ -101,7 +102,7 @@ def test_lengths_are_found_without_friction_and_cogging(
 ) -> None:
     winches = Winches(lengths)
     learning = MotorLearning(AXES, NOBODY, np.ones(N), 500.0, 1e-3)
-    fit = PullFit(AXES, NOBODY, lengths, learning)
+    fit = PullFit(AXES, NOBODY, lengths, learning, STANDS)
     found = pulled(fit, winches)
     assert not learning.learnt_Nm.any()  # before it is sure that the platform stands at home
     fit.begin_learning()
@@ -123,7 +124,7 @@ def test_cogging_is_found_of_motors_that_turn_by_a_period(
         return loose_m - 4.0 * (loose_m - lengths(tension_N))
 
     learning = MotorLearning(AXES, NOBODY, np.ones(N), 500.0, 1e-3)
-    fit = PullFit(AXES, NOBODY, softer, learning)
+    fit = PullFit(AXES, NOBODY, softer, learning, STANDS)
     pulled(fit, Winches(softer))
     fit.begin_learning()
     cogging = np.stack([COGGING_Nm * np.cos(PHASE_rad), COGGING_Nm * np.sin(PHASE_rad)], axis=1)
@@ -139,7 +140,7 @@ def test_friction_is_found_of_cables_that_are_softer_or_stiffer_than_told(
     def true_lengths(tension_N: np.ndarray) -> np.ndarray:
         return loose_m - (loose_m - lengths(tension_N)) / stiffness
 
-    fit = PullFit(AXES, NOBODY, lengths, None)
+    fit = PullFit(AXES, NOBODY, lengths, None, STANDS)
     pulled(fit, Winches(true_lengths))
     np.testing.assert_allclose(fit.unknowns[:, FRICTION], FRICTION_Nm, atol=0.012)
 
@@ -158,7 +159,7 @@ def test_a_motor_whose_friction_does_not_turn_round_rubs_as_others_of_its_kind(
         for axis, gear in zip(AXES, gears, strict=True)
     ]
     learning = MotorLearning(axes, NOBODY, np.ones(N), 500.0, 1e-3)
-    fit = PullFit(axes, NOBODY, lengths, learning)
+    fit = PullFit(axes, NOBODY, lengths, learning, STANDS)
     assert (np.isfinite(pulled(fit, winches)) == (alike | ~little)).all()
     fit.begin_learning()
     expected_Nm = 0.8 * winches.friction_Nm if alike else np.zeros(N)
@@ -173,7 +174,7 @@ def test_what_a_motor_takes_up_besides_does_not_have_the_others_of_its_kind_rub_
     winches = Winches(
         lengths, pretension_N=np.full(N, 50.0), friction_Nm=friction_Nm, harmonic_Nm=0.12
     )
-    fit = PullFit(AXES, NOBODY, lengths, None)
+    fit = PullFit(AXES, NOBODY, lengths, None, STANDS)
     assert np.isfinite(pulled(fit, winches)).all()
     np.testing.assert_allclose(fit.unknowns[:, FRICTION], friction_Nm, atol=0.06)
 
@@ -183,7 +184,7 @@ def test_a_torque_constant_that_is_off_is_not_taken_for_cogging(
 ) -> None:
     """Nothing but a load cell knows of it: the pretension is truly 5 % more than was asked for."""
     winches = Winches(lengths, gain=1.05)
-    fit = PullFit(AXES, NOBODY, lengths, None)
+    fit = PullFit(AXES, NOBODY, lengths, None, STANDS)
     found = pulled(fit, winches)
     wrong_N = 0.05 * PRETENSION_N
     assert np.abs(np.abs(off_N(found, winches)) - wrong_N).max() < 2.5
@@ -192,7 +193,7 @@ def test_a_torque_constant_that_is_off_is_not_taken_for_cogging(
 def test_a_platform_that_moves_meanwhile_is_not_believed(
     lengths: Callable[[np.ndarray], np.ndarray],
 ) -> None:
-    fit = PullFit(AXES, NOBODY, lengths, None)
+    fit = PullFit(AXES, NOBODY, lengths, None, STANDS)
     assert np.isnan(pulled(fit, Winches(lengths), moved_m=0.02)).all()
 
 
@@ -201,7 +202,7 @@ def test_nothing_is_found_of_motors_that_are_known_or_do_not_turn(
 ) -> None:
     known = np.arange(N) % 2 == 0
     learning = MotorLearning(AXES, known, np.ones(N), 500.0, 1e-3)
-    fit = PullFit(AXES, known, lengths, learning)
+    fit = PullFit(AXES, known, lengths, learning, STANDS)
     assert (np.isnan(pulled(fit, Winches(lengths))) == known).all()
     fit.begin_learning()
     assert not learning.friction_Nm[known].any() and learning.friction_Nm[~known].all()
@@ -219,7 +220,7 @@ def test_what_is_known_of_a_motor_is_not_begun_anew(
 ) -> None:
     """As when cables are tightened again after motions that have taught more."""
     learning = MotorLearning(AXES, NOBODY, np.ones(N), 500.0, 1e-3)
-    fit = PullFit(AXES, NOBODY, lengths, learning)
+    fit = PullFit(AXES, NOBODY, lengths, learning, STANDS)
     pulled(fit, Winches(lengths))
     fit.begin_learning()
     before_Nm, bounds_Nm = learning.friction_Nm.copy(), learning.most_Nm.copy()
@@ -236,7 +237,7 @@ def test_what_is_found_leaves_the_tensions_a_third_of_their_reserve(
     lengths: Callable[[np.ndarray], np.ndarray], reserve_N: float
 ) -> None:
     learning = MotorLearning(AXES, NOBODY, np.ones(N), reserve_N, 1e-3)
-    fit = PullFit(AXES, NOBODY, lengths, learning)
+    fit = PullFit(AXES, NOBODY, lengths, learning, STANDS)
     pulled(fit, Winches(lengths))
     fit.begin_learning()
     added_Nm = learning.friction_Nm + np.linalg.norm(learning.cogging_Nm, axis=1)
