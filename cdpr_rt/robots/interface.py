@@ -111,6 +111,10 @@ class RobotModel(Protocol):
         """The pose at home."""
 
     @property
+    def tips_at(self) -> float:
+        """The horizontal pull over the weight at which it tips over on its stand, inf for never."""
+
+    @property
     def speed(self) -> FloatArray:
         """The highest speeds, (d,), in m/s and rad/s."""
 

@@ -32,6 +32,7 @@ RESERVE, _MARGIN_SHARE = 0.12, 0.4
 """Share of the span of tensions that is left to what no plan knows: loops, friction, swinging. At
 most this share of what the tensions in the middle of the box can keep from their bounds."""
 _LEAST_ARM_m = 1e-3
+_FLAT_m = 1e-6
 
 
 @dataclass(frozen=True)
@@ -81,6 +82,17 @@ class PlatformModel:
         anchors = self.kinematics.geometry[ANCHOR:RADIUS].T
         ends = np.array([anchors.min(axis=0), anchors.max(axis=0)])
         return np.array([ends[pick, range(3)] for pick in itertools.product((0, 1), repeat=3)])
+
+    @cached_property
+    def tips_at(self) -> float:
+        """The horizontal pull over the weight at which it tips over on its stand, inf for never.
+
+        Half the least width of the box around the anchor points over its height: it stands on the
+        lower face at home, its centre of mass in the middle, and is pulled at the upper one.
+        """
+        extent = np.ptp(self.corners @ self.home_pose.array[1:].T, axis=0)[: self.positions]
+        width, height = float(extent[:-1].min()), float(extent[-1])
+        return 0.5 * width / height if height > _FLAT_m else np.inf
 
     @property
     def speed(self) -> FloatArray:

@@ -29,15 +29,16 @@ class SlackTakeUp:
     newtons only. So each is paid out a little, reeled in until it is tight, and paid out a little
     again; once all have been, they become tight together, and each is pulled with no more than what
     that took. A cable is tight where its winch does not turn although it is pulled with what has
-    turned it before, or with more than winches take up. Where a stand does not hold a platform so
-    light against what turns a winch, the cables are reeled in together at once.
+    turned it before, or with more than winches take up. Where a platform so light slides or tips
+    over on its stand by what turns a winch, the cables are reeled in together at once.
     """
 
     def __init__(self, winches: WinchSpeedLoop, parts: PlatformParts, cable_m: FloatArray) -> None:
         n, taken_up_N = cable_m.size, parts.control.pull_fit.taken_up_N
         weight_N = float(np.linalg.norm(parts.model.weight()[: parts.model.positions]))
         self._names, self._cable = parts.names, cable_m
-        usual_N, stands_N = _USUAL_SHARE * taken_up_N, _STAND_FRICTION * weight_N
+        usual_N = _USUAL_SHARE * taken_up_N
+        stands_N = min(_STAND_FRICTION, parts.model.tips_at) * weight_N
         self._at_once = bool(usual_N.max() > stands_N)
         self._phase, self._state = np.zeros(n, np.int64), np.zeros((n, kernel.STATE))
         self.tight_N = self._state[:, kernel.TIGHT_N]
