@@ -69,6 +69,19 @@ def test_weight_and_wrench_scale_are_those_of_the_directions() -> None:
     assert suspended.poses(np.array([[1.0, 2.0, 3.0]]))[0] == pytest.approx(pose.array)
 
 
+def test_a_platform_tips_over_at_half_its_width_over_its_height() -> None:
+    spatial = platform_model_of(load_robot("spatial-8"))
+    anchors = np.array(spatial.platform.anchor_points_m)
+    half_width, height = 0.5 * np.ptp(anchors[:, :2], axis=0).min(), np.ptp(anchors[:, 2])
+    assert spatial.tips_at == pytest.approx(half_width / height)
+    lying = dataclasses.replace(spatial.platform, home_rotation_rad=(np.pi / 2, 0.0, 0.0))
+    turned = dataclasses.replace(spatial, platform=lying)
+    width = min(np.ptp(anchors[:, 0]), height)
+    assert turned.tips_at == pytest.approx(0.25 * width / half_width)
+    assert platform_model_of(PLANAR).tips_at == pytest.approx(0.577, abs=1e-3)
+    assert platform_model_of(load_robot("point-4")).tips_at == np.inf
+
+
 @settings(max_examples=100)
 @given(
     st.tuples(st.floats(-1.9, 1.9), st.floats(0.2, 2.9)),

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from cdpr_here import cdpr_here
 
 from cdpr_profiles import load_robot
 from cdpr_tools.errors import WorkFailedError
@@ -19,7 +20,7 @@ def plant(path: Path, slack_m: list[float]) -> Path:
     return path
 
 
-def moved_mm(robot: LockstepRobot, name: str) -> tuple[float, float]:
+def moved_mm(robot: LockstepRobot, name: str | Path) -> tuple[float, float]:
     """Return how far the platform truly is from home, mm, and how far it is turned, deg."""
     platform, truth = load_robot(name).platform, robot.truth()
     assert platform is not None
@@ -61,3 +62,18 @@ def test_a_platform_too_light_for_its_winches_is_told_to_have_moved(tmp_path: Pa
             WorkFailedError, match=r"mm more slack than .* pulls so light a platform"
         ):
             robot.carry_out("tighten", 60.0)
+
+
+def test_a_platform_that_would_tip_over_is_not_pulled_at_by_one_winch_alone(tmp_path: Path) -> None:
+    """A winch that turns without load pulls with 2.2 N, which does not slide 0.95 kg: 0.3 of it."""
+    name = tmp_path / "tall.toml"
+    asked = ("kind=spatial-8", "frame_m=1.5 1.5 1.5", "winch=winch-45n")
+    answers = [word for answer in asked for word in ("--set", answer)]
+    assert cdpr_here("robot", "new", str(name), *answers, "--yes").returncode == 0
+    file = plant(tmp_path / "plant.toml", [0.02] * 8)
+    with LockstepRobot(name, plant=file) as robot:
+        robot.enable()
+        robot.carry_out("tighten", 60.0)
+        position_mm, turned_deg = moved_mm(robot, name)
+    assert position_mm < 1.0
+    assert turned_deg < 1.0

@@ -242,7 +242,6 @@ class PullFit:
         x[:, kernel.FRICTION :] /= np.maximum(1.0 + x[:, [kernel.STEEPER]], _LEAST_STEEP)
         return np.sqrt(misfit), x, covariance
 
-
     def _with_usual(
         self, sums: FloatArray, friction_Nm: FloatArray, spread_Nm: FloatArray
     ) -> tuple[FloatArray, FloatArray]:

@@ -10,6 +10,7 @@ import pytest
 
 from cdpr_profiles import load_robot
 from cdpr_rt.robots.platform.cable_control import CableControl
+from cdpr_rt.robots.platform.control_rows import slides_on_stand
 from cdpr_rt.robots.platform.learning.motor_learning import MotorLearning
 from cdpr_rt.robots.platform.learning.pull_fit import PullFit
 from cdpr_rt.robots.platform.learning.pull_kernel import FRICTION
@@ -30,6 +31,7 @@ COGGING_Nm = np.array([0.06, 0.03, 0.0, 0.07, 0.05, 0.06])
 START_rad = 40.0
 NOBODY = np.zeros(N, np.bool_)
 STANDS = np.zeros((N, 0))
+SLIDES = slides_on_stand(platform_model_of(ROBOT))
 
 
 @pytest.fixture(scope="module")
@@ -73,7 +75,9 @@ class Winches:
             self.theta[i] = turns[stays][np.abs(turns[stays] - self.theta[i]).argmin()]
 
 
-def pulled(fit: PullFit, winches: Winches, moved_m: float = 0.0) -> np.ndarray:
+def pulled(
+    fit: PullFit, winches: Winches, moved_m: float | np.ndarray = 0.0, moved_at: int = 60
+) -> np.ndarray:
     """Return the angles that are found from the pretension to below, above, and back to it."""
     pretension_N = winches.pretension_N
     fit.prepare(pretension_N)
@@ -83,7 +87,7 @@ def pulled(fit: PullFit, winches: Winches, moved_m: float = 0.0) -> np.ndarray:
         [np.linspace(1.0, 0.5, 40), np.linspace(0.5, 1.5, 80), np.linspace(1.5, 1.0, 40)]
     )
     for k, share in enumerate(shares):
-        if k == 60:  # the platform moves along with its cables
+        if k == moved_at:  # the platform moves along with its cables
             winches.zero_m += moved_m
         winches.pull(share * pretension_N)
         fit.take(winches.theta, share * pretension_N)
@@ -195,6 +199,22 @@ def test_a_platform_that_moves_meanwhile_is_not_believed(
 ) -> None:
     fit = PullFit(AXES, NOBODY, lengths, None, STANDS)
     assert np.isnan(pulled(fit, Winches(lengths), moved_m=0.02)).all()
+
+
+@pytest.mark.parametrize(("slide_mm", "told"), [(4.0, True), (0.1, False)])
+def test_a_slide_on_the_stand_is_told_where_it_is_significant(
+    lengths: Callable[[np.ndarray], np.ndarray], slide_mm: float, told: bool
+) -> None:
+    """With 1.25 times the pretension it slides; the lengths of home are those before."""
+    slid_m = SLIDES @ (1e-3 * slide_mm * np.array([0.6, -0.8, 0.5]))
+    stood = Winches(lengths)
+    still_N = off_N(pulled(PullFit(AXES, NOBODY, lengths, None, SLIDES), stood), stood)
+    off = []
+    for slides in (SLIDES, STANDS):
+        winches = Winches(lengths)
+        fit = PullFit(AXES, NOBODY, lengths, None, slides)
+        off.append(np.abs(off_N(pulled(fit, winches, -slid_m, 100), winches) - still_N).max())
+    assert off[0] < 0.5 * off[1] if told else off[0] == off[1]
 
 
 def test_nothing_is_found_of_motors_that_are_known_or_do_not_turn(
