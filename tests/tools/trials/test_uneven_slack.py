@@ -14,6 +14,20 @@ from cdpr_tools.trials.lockstep import LockstepRobot
 
 pytestmark = pytest.mark.long
 
+WORSE_MOTORS = """
+[cables]
+friction_share = 0.04
+[variation]
+cogging = 0.3
+friction = 0.2
+[[motor.cogging]]
+order = 4
+amplitude_Nm = 0.036
+[motor.friction]
+coulomb_Nm = 0.062
+"""
+"""Half as much again as is usual of a motor of 1.2 Nm, each its own way."""
+
 
 def plant(path: Path, slack_m: list[float]) -> Path:
     path.write_text(f"[start]\nslack_m = {slack_m}\n")
@@ -71,6 +85,7 @@ def test_a_platform_that_would_tip_over_is_not_pulled_at_by_one_winch_alone(tmp_
     answers = [word for answer in asked for word in ("--set", answer)]
     assert cdpr_here("robot", "new", str(name), *answers, "--yes").returncode == 0
     file = plant(tmp_path / "plant.toml", [0.02] * 8)
+    file.write_text(file.read_text() + WORSE_MOTORS)
     with LockstepRobot(name, plant=file) as robot:
         robot.enable()
         robot.carry_out("tighten", 60.0)
