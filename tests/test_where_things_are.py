@@ -5,10 +5,12 @@ from __future__ import annotations
 import re
 from collections import Counter
 from pathlib import Path
+from pkgutil import resolve_name
 
 ROOT = Path(__file__).parents[1]
 PACKAGES = ("cdpr_rt", "drivers", "profiles", "sim_bus", "tools")
 PATHS = re.compile(rf"`((?:{'|'.join(PACKAGES)})/[\w/.]+)`")
+NAMES = re.compile(r"\bcdpr_(?:rt|drivers|profiles|sim_bus|tools)(?:\.[A-Za-z_]\w*)+")
 MOST_MODULES = 12
 """At the top of one package, its `__init__.py` among them."""
 
@@ -17,6 +19,14 @@ def test_each_path_exists() -> None:
     paths = PATHS.findall((ROOT / "docs/where-things-are.md").read_text())
     assert len(paths) > 50
     assert [path for path in paths if not (ROOT / path).exists()] == []
+
+
+def test_each_name_in_code_that_pages_tell_of_is_there() -> None:
+    pages = [ROOT / "README.md", *(ROOT / "docs").rglob("*.md")]
+    names = {name for page in pages for name in NAMES.findall(page.read_text())}
+    assert len(names) > 5
+    for name in names:
+        resolve_name(name)
 
 
 def test_no_package_has_too_many_modules() -> None:
