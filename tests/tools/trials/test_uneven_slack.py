@@ -67,6 +67,43 @@ def test_slack_is_taken_up_without_moving_the_platform(
     assert turned_deg < 0.1
 
 
+def test_a_cable_that_becomes_tight_in_motion_does_not_pull_the_platform_along(
+    tmp_path: Path,
+) -> None:
+    """Its winch pulls with what has turned it, and with more only while it stands still."""
+    slack_m = [0.057, 0.041, 0.028, 0.036, 0.043, 0.024, 0.017, 0.049]
+    file = plant(tmp_path / "plant.toml", slack_m)
+    file.write_text("seed = 101\n" + file.read_text())
+    with LockstepRobot("spatial-8", plant=file) as robot:
+        robot.enable()
+        robot.carry_out("tighten")
+        moved, turned_deg = moved_mm(robot, "spatial-8")
+        assert moved < 1.0
+        assert turned_deg < 0.2
+
+
+def test_cogging_that_turns_a_winch_is_not_taken_for_all_that_it_needs(tmp_path: Path) -> None:
+    """Where cogging turned it by itself, it stands still further on though its cable is slack."""
+    file = tmp_path / "plant.toml"
+    file.write_text(
+        """
+seed = 100
+start.slack_m = [0.016, 0.035, 0.014]
+variation = { friction = 0.3, cogging = 0.3, torque_constant = 0.05 }
+cables.friction_share = 0.04
+motor.friction.coulomb_Nm = 0.16
+motor.cogging = [
+  { order = 4, amplitude_Nm = 0.07, phase_deg = 40.0 },
+  { order = 30, amplitude_Nm = 0.03, phase_deg = 10.0 },
+]
+"""
+    )
+    with LockstepRobot("planar-3", plant=file) as robot:
+        robot.enable()
+        robot.carry_out("tighten")
+        assert moved_mm(robot, "planar-3")[0] < 1.0
+
+
 def test_a_platform_too_light_for_its_winches_is_told_to_have_moved(tmp_path: Path) -> None:
     """What turns a winch of `planar-4` without load pulls its platform of 3 kg along."""
     file = plant(tmp_path / "plant.toml", [0.0, 0.3, 0.3, 0.3])

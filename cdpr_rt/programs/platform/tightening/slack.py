@@ -28,8 +28,9 @@ class SlackTakeUp:
     One may have much more slack than another, and what a platform weighs holds it against some
     newtons only. So each is paid out a little, reeled in until it is tight, and paid out a little
     again; once all have been, they become tight together, and each is pulled with no more than what
-    that took. A cable is tight where its winch does not turn although it is pulled with what has
-    turned it before, or with more than winches take up. Where a platform so light slides or tips
+    that took. A winch may pull with more than has turned it only while it stands still. Its cable
+    is tight where it does although it is pulled with the most that has turned it, and with what the
+    stand surely holds, or with more than winches take up. Where a platform so light slides or tips
     over on its stand by what turns a winch, the cables are reeled in together at once.
     """
 
