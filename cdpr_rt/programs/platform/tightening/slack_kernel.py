@@ -143,7 +143,8 @@ def _drive(w: Winches, i: int, phase: int, state: FloatArray, most: float) -> No
         w.high_N[i] = state[MAY_N]
     elif phase in (LOOSENED, PAID_OUT):
         w.low_N[i], w.paying_out_m_s[i] = -w.enough_N[i], TAKE_UP_m_s
-        w.high_N[i] = 0.0  # two that are tight at once may move the platform
+        if phase == PAID_OUT:  # two that are tight at once may move the platform
+            w.high_N[i] = 0.0
     elif phase == WAITING:  # held: cogging would turn it
         w.low_N[i], w.paying_out_m_s[i] = -w.enough_N[i], 0.0
         w.high_N[i] = min(w.high_N[i], w.enough_N[i])
