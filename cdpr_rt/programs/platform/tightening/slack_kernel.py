@@ -104,7 +104,9 @@ def _next_phase(
         return REELED_IN if phase == LOOSENED else WAITING
     if phase == WAITING:
         return phase
-    tight = _seems_tight(w, i, state, most)  # which tells what turns winches of tight cables, too
+    # what was paid out by 5 mm has to be reeled in again, or one has stuck that is slack
+    returned = reeled_m >= (0.5 if phase == CLOSING else -0.5) * _LEFT_m
+    tight = _seems_tight(w, i, state, most, returned)  # of tight cables it tells what turns winches
     if not tight or phase == TIGHT:
         return phase
     state[FROM_rad], state[CYCLES] = position, 0.0
@@ -115,7 +117,7 @@ def _next_phase(
 
 
 @jit
-def _seems_tight(w: Winches, i: int, state: FloatArray, most: float) -> bool:
+def _seems_tight(w: Winches, i: int, state: FloatArray, most: float, returned: bool) -> bool:
     """Return whether cable i, which is reeled in, is tight by its speed and tension."""
     inwards_m_s, tension = -w.cable_m[i] * w.speed_rad_s[i], w.tension_N[i]
     mean_m_s = state[MEAN_m_s] + w.period_s / _MEAN_S * (inwards_m_s - state[MEAN_m_s])
@@ -124,7 +126,7 @@ def _seems_tight(w: Winches, i: int, state: FloatArray, most: float) -> bool:
     if not w.at_once and inwards_m_s > 0.5 * TAKE_UP_m_s:
         state[TURNED_N] = max(state[TURNED_N], tension)
     enough = min(w.enough_N[i], most)
-    if state[TURNED_N] > 0.0:
+    if returned and state[TURNED_N] > 0.0:
         enough = min(enough, max(state[TURNED_N], w.harmless_N[i]))
     return bool(state[MEAN_m_s] < _SLOW_SHARE * TAKE_UP_m_s and tension >= enough)
 

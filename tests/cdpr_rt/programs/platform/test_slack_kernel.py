@@ -1,0 +1,109 @@
+"""When a cable whose slack is taken up counts as tight, and what its winch may pull with."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+import pytest
+
+from cdpr_rt.arrays import FloatArray, IntArray
+from cdpr_rt.programs.platform.tightening import slack_kernel as kernel
+
+PERIOD_S, CABLE_m, ENOUGH_N, HARMLESS_N, PRETENSION_N = 1e-3, 0.026, 16.0, 7.0, 60.0
+
+
+def one(value: float) -> FloatArray:
+    return np.full(1, value)
+
+
+@dataclass
+class OneCable:
+    """A cable by itself, whose winch turns and pulls as it is told to."""
+
+    phase: IntArray = field(default_factory=lambda: np.zeros(1, np.int64))
+    state: FloatArray = field(default_factory=lambda: np.zeros((1, kernel.STATE)))
+    position: FloatArray = field(default_factory=lambda: one(0.0))
+    winch: kernel.Winches = field(
+        default_factory=lambda: kernel.Winches(
+            PERIOD_S,
+            False,
+            one(CABLE_m),
+            one(ENOUGH_N),
+            one(HARMLESS_N),
+            *(one(0.0) for _ in range(5)),
+        )
+    )
+
+    def enter(self, phase: int) -> None:
+        kernel.enter(phase, self.phase, self.state, self.position)
+
+    def run(self, seconds: float, tension_N: float, inwards_m_s: float = 0.0) -> int:
+        """Turn so fast, pulling so hard, until its phase changes; return the phase."""
+        before = self.phase[0]
+        self.winch.tension_N[0] = tension_N
+        self.winch.speed_rad_s[0] = -inwards_m_s / CABLE_m
+        for _ in range(round(seconds / PERIOD_S)):
+            self.position -= PERIOD_S * inwards_m_s / CABLE_m
+            self.winch.high_N[:] = self.winch.low_N[:] = 0.0
+            kernel.take_up(
+                self.winch, self.phase, self.state, self.position, one(PRETENSION_N), 1.0
+            )
+            if self.phase[0] != before:
+                break
+        return int(self.phase[0])
+
+
+def reeled_in(by_m: float, tension_N: float = 3.0) -> OneCable:
+    """Return a cable that has been reeled in so far since it was first paid out, with that."""
+    cable = OneCable()
+    cable.enter(kernel.LOOSENED)
+    cable.run(0.5, -3.0, -0.05)
+    assert cable.phase[0] == kernel.REELED_IN
+    cable.run(0.25, tension_N)
+    cable.run((by_m + 0.005) / 0.05, tension_N, 0.05)
+    assert cable.phase[0] == kernel.REELED_IN
+    return cable
+
+
+def test_a_cable_is_tight_where_what_has_turned_its_winch_turns_it_no_more() -> None:
+    assert reeled_in(0.03, 9.0).run(0.5, 8.0) == kernel.REELED_IN
+    assert reeled_in(0.03, 9.0).run(0.5, 9.0) == kernel.PAID_OUT
+
+
+def test_it_is_not_tight_with_less_than_the_stand_surely_holds() -> None:
+    """Cogging may have turned its winch by itself."""
+    assert reeled_in(0.03, 1.0).run(0.5, 0.9 * HARMLESS_N) == kernel.REELED_IN
+    assert reeled_in(0.03, 1.0).run(0.5, HARMLESS_N) == kernel.PAID_OUT
+
+
+def test_it_is_not_tight_while_it_is_further_out_than_it_was() -> None:
+    """Where it sticks, though more than winches take up pulls at it, it is."""
+    assert reeled_in(-0.004, 9.0).run(0.5, 12.0) == kernel.REELED_IN
+    assert reeled_in(-0.004, 9.0).run(0.5, ENOUGH_N) == kernel.PAID_OUT
+
+
+def test_nor_is_one_that_was_left_with_slack_until_it_is_reeled_in_again() -> None:
+    cable = reeled_in(0.03, 9.0)
+    cable.enter(kernel.CLOSING)
+    assert cable.run(0.5, 12.0) == kernel.CLOSING
+    cable.run(0.08, 9.0, 0.05)
+    assert cable.run(0.5, 9.0) == kernel.TIGHT
+    assert cable.winch.high_N[0] == cable.state[0, kernel.TIGHT_N] == pytest.approx(9.0)
+
+
+def test_a_winch_may_pull_with_more_only_while_it_stands_still() -> None:
+    cable = reeled_in(0.02, 5.0)
+    may_N = cable.winch.high_N[0]
+    assert 4.0 < may_N < 6.0
+    cable.run(0.2, may_N, 0.05)
+    assert cable.winch.high_N[0] == may_N
+    cable.run(0.03, may_N)
+    assert may_N < cable.winch.high_N[0] < may_N + 2.5 * 0.03 * ENOUGH_N
+
+
+def test_a_tight_cable_is_let_go_at_once() -> None:
+    cable = reeled_in(0.03, 9.0)
+    assert cable.winch.high_N[0] > 0.0
+    assert cable.run(0.5, 9.0) == kernel.PAID_OUT
+    assert cable.winch.high_N[0] == 0.0
