@@ -11,6 +11,10 @@ from cdpr_profiles.platform import DIRECTIONS, PlatformFile, WIDEST_m, controlle
 
 _LEAST_ARM_m = 0.01
 """Anchor points nearer together than this are meant to be one, or are in another unit."""
+_OFF_BODY_m = 0.03
+"""More than a calibration moves an anchor point that is on the platform's body."""
+_LEAST_OFF_m = 0.1
+"""By which the centre of mass may be off the box around even the smallest platform."""
 _ROUNDING = 1e-6
 
 
@@ -47,6 +51,7 @@ def platform_faults(
     if not found:
         yield from _direction_faults(file, [anchor or () for anchor in anchors])
         yield from _size_faults(file, [p or () for p in exits], [p or () for p in anchors])
+        yield from _reach_faults(file, [p or () for p in anchors])
 
 
 def _count_faults(file: PlatformFile, size: int) -> Iterator[tuple[str, str]]:
@@ -114,6 +119,45 @@ def _size_faults(
         yield "platform.home_rotation_rad", problem
     if file.inertia_kg_m2 is not None and len(file.inertia_kg_m2) in (1, 6):
         yield from _inertia_faults(file.inertia_kg_m2, file.mass_kg, frame_m)
+
+
+def _reach_faults(
+    file: PlatformFile, anchors: Sequence[tuple[float, ...]]
+) -> Iterator[tuple[str, str]]:
+    """Yield anchor points beside the body, and a centre of mass far beside the platform.
+
+    Without a body, the platform is the box around its anchor points; a point has no such box.
+    """
+    size, body, points = len(file.home_m), file.body, list(anchors)
+    if body is not None and len(body.min_m) == len(body.max_m) == size:
+        beside_m = [_beside_m(anchor, body.min_m, body.max_m) for anchor in anchors]
+        i = beside_m.index(max(beside_m))
+        if beside_m[i] > _OFF_BODY_m:
+            problem = (
+                f"value {list(anchors[i])}; {beside_m[i]:.3g} m beside platform.body; allowed: on "
+                f"it, or up to {_OFF_BODY_m:g} m beside it (does the body reach to all of them?)"
+            )
+            yield f"axes[{i}].anchor_point_m", problem
+        points += [body.min_m, body.max_m]
+    centre = file.centre_of_mass_m
+    low, high = (tuple(map(extreme, zip(*points, strict=True))) for extreme in (min, max))
+    if centre is None or len(centre) != size or low == high:
+        return
+    allowed_m = max(_LEAST_OFF_m, 0.5 * math.dist(low, high))
+    off_m = _beside_m(centre, low, high)
+    if off_m > allowed_m:
+        what = "anchor points" if body is None else "anchor points and body"
+        problem = (
+            f"value {list(centre)}; {off_m:.3g} m beside the box around {what}; allowed: in it, or "
+            f"up to {allowed_m:.3g} m beside it (platform.body says how far the platform reaches)"
+        )
+        yield "platform.centre_of_mass_m", problem
+
+
+def _beside_m(point: tuple[float, ...], low: tuple[float, ...], high: tuple[float, ...]) -> float:
+    """Return how far a point is off a box, 0 in it."""
+    sides = zip(point, low, high, strict=True)
+    return math.hypot(*(max(a - value, value - b, 0.0) for value, a, b in sides))
 
 
 def _widest(points: Sequence[tuple[float, ...]]) -> float:

@@ -78,17 +78,20 @@ class PlatformModel:
 
     @cached_property
     def corners(self) -> FloatArray:
-        """The corners (8, 3) of the box around the anchor points, in the platform's frame."""
-        anchors = self.kinematics.geometry[ANCHOR:RADIUS].T
+        """The corners (8, 3) of its body, or the box around its anchor points, in its frame."""
+        anchors, body = self.kinematics.geometry[ANCHOR:RADIUS].T, self.platform.body
         ends = np.array([anchors.min(axis=0), anchors.max(axis=0)])
+        if body is not None:
+            ends = np.array([in_space(body.min_m), in_space(body.max_m)])
         return np.array([ends[pick, range(3)] for pick in itertools.product((0, 1), repeat=3)])
 
     @cached_property
     def tips_at(self) -> float:
         """The horizontal pull over the weight at which it tips over on its stand, inf for never.
 
-        Half the least width of the box around the anchor points over its height: it stands on the
-        lower face at home, its centre of mass in the middle, and is pulled at the upper one.
+        Half the least width of its body, or of the box around the anchor points, over its height:
+        it stands on the lower face at home, its centre of mass in the middle, and is pulled at the
+        upper one.
         """
         extent = np.ptp(self.corners @ self.home_pose.array[1:].T, axis=0)[: self.positions]
         width, height = float(extent[:-1].min()), float(extent[-1])

@@ -105,6 +105,8 @@ def test_what_no_platform_can_be_is_refused(
 WALL = (SHIPPED / "robots" / "planar-4.toml").read_text()
 HALL = (SHIPPED / "robots" / "suspended-8.toml").read_text()
 CAMERA = (SHIPPED / "robots" / "point-4.toml").read_text()
+ROOM = (SHIPPED / "robots" / "spatial-8.toml").read_text()
+BODY = "body = { min_m = [-0.1, -0.1, -0.3], max_m = [0.1, 0.1, 0.3] }"
 INERTIA = "inertia_kg_m2 = [16.7, 16.7, 16.7, 0.0, 0.0, 0.0]"
 HOME = "home_m = [0.0, 0.0, 0.5]"
 
@@ -132,6 +134,12 @@ HOME = "home_m = [0.0, 0.0, 0.5]"
         (HALL, "exit_point_m = [", 'exit_point_m = 5.0 # ', "axes[0].exit_point_m", "an array"),
         (HALL, HOME, HOME + "\ncentre_of_mass_m = [0.0, 0.0, 500.0]",
          "platform.centre_of_mass_m", "not beyond the frame"),
+        (ROOM, BODY, BODY + "\ncentre_of_mass_m = [1.0, 0.0, 0.0]", "platform.centre_of_mass_m",
+         "0.9 m beside the box around anchor points and body; allowed: in it, or up to 0.332 m"),
+        (WALL, "mass_kg", "centre_of_mass_m = [0.0, -0.4]\nmass_kg", "platform.centre_of_mass_m",
+         "0.3 m beside the box around anchor points; allowed: in it, or up to 0.224 m"),
+        (ROOM, BODY, "body = { min_m = [-0.1, -0.1, -0.3], max_m = [0.06, 0.1, 0.3] }",
+         "axes[0].anchor_point_m", "0.04 m beside platform.body; allowed: on it, or up to 0.03 m"),
         (HALL, "angle_rad = 0.2618", "angle_rad = 15.0", "platform.workspace_angle_rad",
          "less than"),
         (HALL, "angular_speed_rad_s = 0.25\n", "", "platform.angular_speed_rad_s", "missing; "),
@@ -247,3 +255,13 @@ def test_a_clearance_below_the_cables_diameter_is_refused(tmp_path: Path) -> Non
     path = changed(tmp_path, ("mass_kg", "clearance_m = 0.002\nmass_kg"))
     with pytest.raises(ProfileError, match=r"platform.clearance_m: value 0.002; allowed: .*0.0048"):
         load_robot(path)
+
+
+def test_a_body_says_how_far_off_a_centre_of_mass_may_be(tmp_path: Path) -> None:
+    path = tmp_path / "mine.toml"
+    hung = ROOM.replace(BODY, "centre_of_mass_m = [0.0, 0.0, -0.8]\n" + BODY)
+    path.write_text(hung)
+    with pytest.raises(ProfileError, match="centre_of_mass_m"):
+        load_robot(path)
+    path.write_text(hung.replace(BODY, BODY.replace("-0.1, -0.3]", "-0.1, -0.9]")))
+    assert load_robot(path).platform is not None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -74,6 +75,7 @@ def true_geometry(robot: Robot, plant: Path | None) -> TrueGeometry:
 
 
 def _shape(robot: Robot, platform: Platform) -> RobotShape:
+    body = platform.body
     return RobotShape(
         exit_points_m=platform.exit_points_m,
         anchor_points_m=platform.anchor_points_m,
@@ -85,6 +87,7 @@ def _shape(robot: Robot, platform: Platform) -> RobotShape:
         centre_of_mass_m=platform.centre_of_mass_m,
         pulley_radii_m=platform.pulley_radius_m,
         pulley_axes=platform.pulley_axes,
+        feet_m=body and list(itertools.product(*zip(body.min_m, body.max_m, strict=True))),
     )
 
 

@@ -34,6 +34,10 @@ _ROUNDED_UP = 1.05
 """So that two digits are not less."""
 _FRICTION_SHARE = 0.06
 """Friction and cogging of a servo winch together over the motor's rated torque, at most."""
+_SHARES = np.linspace(0.95, 0.05, 19)
+"""Shares of an angle that are tried."""
+_TIPS_AT = 0.05
+"""Share of its weight that any cable which becomes tight pulls with."""
 _FAR_TURNED_deg, _TIPPED_deg = 10.0, 4.0
 _WIDE_ARMS = 0.5
 """Anchor points further apart than this share of the exit points are probably not in metres."""
@@ -58,8 +62,8 @@ def findings(robot: Robot, limits: Limits | None = None) -> list[Finding]:
             found += _free_rotation(statics)
         found += [*loop_findings(robot, statics), *_uncontrolled_rotation(robot.platform)]
         found += _stand_clearance(statics)
-        platform = robot.platform
-        found += [*_contact(statics), *_anchors_off_body(platform), *_friction(robot, statics)]
+        found += [*_contact(statics), *_angles(statics), *_upright(statics)]
+        found += _friction(robot, statics)
     return sorted(found, key=lambda finding: not finding.impossible)
 
 
@@ -347,17 +351,49 @@ def _contact(statics: PlatformStatics) -> Iterator[Finding]:
     yield Finding("platform.clearance_m", text, impossible=everywhere)
 
 
-def _anchors_off_body(platform: Platform) -> Iterator[Finding]:
-    """Look for cables that are made fast off the box that the platform is said to be."""
-    if platform.body is None or (platform.is_planar and not platform.obstacles):
-        return  # nothing is held against it: cables in a plane run in layers
-    anchors = np.array(platform.anchor_points_m)
-    on_body = np.clip(anchors, platform.body.min_m, platform.body.max_m)
-    beside_m = np.linalg.norm(anchors - on_body, axis=1)
-    i = int(beside_m.argmax())
-    if beside_m[i] > platform.clearance_m:
+def _angles(statics: PlatformStatics) -> Iterator[Finding]:
+    """Look for angles at which no place in the box takes a target, whichever way it is turned.
+
+    Either tensions do not hold it there, or something touches.
+    """
+    platform, interference = statics.platform, statics.model.interference
+    points, angle_rad = statics.points(), platform.workspace_angle_rad
+
+    def taken(turn_rad: FloatArray) -> bool:
+        held = statics.is_target(points, turn_rad).ravel()
+        clearances_m, _ = interference.clearances(statics.poses(points, turn_rad))
+        return bool((held & (clearances_m >= interference.clearance_m)).any())
+
+    if angle_rad == 0.0 or not taken(NONE_rad):
+        return  # said of the box, or of contact
+    names = platform.controlled[len(platform.home_m) :]
+    axes = dict(zip(names, statics.orientations[1::2], strict=False))  # diagonals follow
+
+    def refused(share: float) -> list[str]:
+        return [
+            name
+            for name, turn in axes.items()
+            if not taken(share * turn) and not taken(-share * turn)
+        ]
+
+    if nowhere := refused(1.0):
+        share = next((share for share in _SHARES if not refused(share)), 0.0)
+        about = "" if platform.is_planar else f" about {nowhere[0][-1]}"
         text = (
-            f"{beside_m[i]:.3g} m beside platform.body; what is between them is not looked at for "
-            "contact: a body that reaches to its anchor points helps"
+            f"value {angle_rad:g}; turned by {math.degrees(angle_rad):.0f} deg{about}, it is held "
+            "nowhere in the box, or something touches, so that no target is taken; allowed: up to "
+            f"{_rounded_down(share * angle_rad) if share else 0}"
         )
-        yield Finding(f"axes[{i}].anchor_point_m", text, impossible=False)
+        yield Finding("platform.workspace_angle_rad", text, impossible=True)
+
+
+def _upright(statics: PlatformStatics) -> Iterator[Finding]:
+    """Look whether it stands upright at home on next to nothing, as a rod does."""
+    tips_at = statics.model.tips_at
+    if tips_at < _TIPS_AT:
+        text = (
+            f"{100.0 * tips_at:.2g} % of its weight tip it over on its stand, and cables that "
+            "become tight one after the other pull with more: hold it until all are tight, or give "
+            "it a foot, which platform.body tells"
+        )
+        yield Finding("axes[0].anchor_point_m", text, impossible=False)

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from scipy.optimize import linprog
 
 from cdpr_profiles import load_robot
-from cdpr_profiles.platform import Platform
+from cdpr_profiles.platform import BoxFile, Platform
 from cdpr_profiles.robot import Robot
 from cdpr_rt.robots.interface import TensionOutcome
 from cdpr_rt.robots.platform.cable_control import CableControl
@@ -78,6 +78,10 @@ def test_a_platform_tips_over_at_half_its_width_over_its_height() -> None:
     turned = dataclasses.replace(spatial, platform=lying)
     width = min(np.ptp(anchors[:, 0]), height)
     assert turned.tips_at == pytest.approx(0.25 * width / half_width)
+    foot = BoxFile(min_m=(-0.3, -0.4, -0.35), max_m=(0.3, 0.4, 0.3))
+    on_foot = dataclasses.replace(spatial.platform, body=foot)
+    broad = dataclasses.replace(spatial, platform=on_foot)
+    assert broad.tips_at == pytest.approx(0.3 / 0.65)
     assert platform_model_of(PLANAR).tips_at == pytest.approx(0.577, abs=1e-3)
     assert platform_model_of(load_robot("point-4")).tips_at == np.inf
 

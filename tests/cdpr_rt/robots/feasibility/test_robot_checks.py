@@ -98,6 +98,7 @@ def test_cables_that_sag_are_told_with_the_tension_that_would_do(
         assert not any(f.key == "limits.tension_min_N" for f in findings(better))
 
 
+SPATIAL = (SHIPPED / "robots" / "spatial-8.toml").read_text()
 SUSPENDED = (SHIPPED / "robots" / "suspended-8.toml").read_text()
 
 
@@ -170,9 +171,6 @@ def test_a_turned_platform_that_meets_its_stand_is_told(tmp_path: Path) -> None:
     assert "from 0.68 m upward" in told
 
 
-SPATIAL = (SHIPPED / "robots" / "spatial-8.toml").read_text()
-
-
 BODY = "body = { min_m = [-0.1, -0.1, -0.3], max_m = [0.1, 0.1, 0.3] }"
 
 
@@ -199,12 +197,6 @@ def test_a_body_that_no_cable_passes_is_impossible(tmp_path: Path) -> None:
         ProfileError, match=r"clearance_m: value 0\.01; in 100 % of the box, .*touch"
     ):
         refuse_impossible(load_robot(path))
-
-
-def test_a_cable_that_is_made_fast_beside_the_body_is_told(tmp_path: Path) -> None:
-    narrow = BODY.replace("max_m = [0.1,", "max_m = [0.05,")
-    told = findings_of(tmp_path, SPATIAL.replace(BODY, narrow))
-    assert "0.05 m beside platform.body" in told["axes[0].anchor_point_m"]
 
 
 def test_winches_that_rub_by_more_than_is_kept_for_control_are_told(tmp_path: Path) -> None:
