@@ -87,7 +87,11 @@ def _shape(robot: Robot, platform: Platform) -> RobotShape:
         centre_of_mass_m=platform.centre_of_mass_m,
         pulley_radii_m=platform.pulley_radius_m,
         pulley_axes=platform.pulley_axes,
-        feet_m=body and list(itertools.product(*zip(body.min_m, body.max_m, strict=True))),
+        feet_m=(
+            None
+            if body is None
+            else list(itertools.product(*zip(body.min_m, body.max_m, strict=True)))
+        ),
     )
 
 
