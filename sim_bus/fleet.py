@@ -89,6 +89,7 @@ def serve_fleet(
     mode: ClockMode = ClockMode.LOCKSTEP,
     until_stdin_ends: bool = False,
     frame_log: FrameLog | None = None,
+    truth_log: str | None = None,
 ) -> None:
     """Run the nodes of all `buses` until SIGTERM or SIGINT, then close them.
 
@@ -105,6 +106,7 @@ def serve_fleet(
                 bus.url,
                 mode=mode,
                 bitrate=bus.bitrate_bit_s,
+                truth_log=truth_log,
             )
             for bus in buses
         }

@@ -56,14 +56,15 @@ class DetectedChange:
     std: FloatArray
     effect_m: float
     """Error of positions from lengths that it causes, at the worst of the poses."""
+    who: str
+    """Cable in words, and the others that it might be."""
     alike: tuple[int, ...] = ()
     """Other cables whose change of this kind would explain it nearly as well."""
 
     @property
     def text(self) -> str:
         """Change, its size, and advice, in words."""
-        others = ", ".join(str(other + 1) for other in self.alike)
-        who = f"cable {self.cable + 1}" + (f" (or {others})" if others else "")
+        who = self.who
         many = ", ".join(f"{1e3 * x:+.1f}" for x in self.size)
         sure = f"± {1e3 * float(self.std.max()):.1f} mm (1 sigma)"
         what = {
@@ -136,7 +137,8 @@ def check_geometry(geometry: CableGeometry, seen: Observations, wanted_m: float)
     while len(changes) < _MOST_CHANGES and (found := system.best(columns)) is not None:
         kind, cable, alike, own = found
         columns.append(own)
-        changes.append(DetectedChange(kind, cable, np.zeros(0), np.zeros(0), 0.0, alike))
+        who = geometry.cables_text(cable, alike)
+        changes.append(DetectedChange(kind, cable, np.zeros(0), np.zeros(0), 0.0, who, alike))
     changes = system.sized(changes, columns)
     off_m = there.length_residual_m * length_std_m(geometry, seen)
     rms = float(np.sqrt((off_m**2).sum() / max(int(seen.used.sum()), 1)))

@@ -18,6 +18,8 @@ from cdpr_tools.report.style import save_figure
 
 _CABLE, _PLATFORM, _TARGETS = "#444444", "#d1581a", "#7a3fa0"
 _WIDE_in = 7.4
+_LEAST_HIGH = 0.32
+"""Of its width, so that what is said of the colours has room beside it."""
 _SEEN_THROUGH = 0.6
 """Of the platform, which may cover all of the box of targets."""
 _NAMES = "xyz"
@@ -51,7 +53,7 @@ def figure_of(robot: Robot, platform: Platform) -> Figure:
     shown, statics = view_of(platform), statics_of(robot)
     size = np.subtract(shown.high_m, shown.low_m)
     views = [(0, 1)] if platform.is_planar else [(0, 2), (1, 2), (0, 1)]
-    heights = [float(size[j] / size[:2].max()) for _, j in views]
+    heights = [max(_LEAST_HIGH, float(size[j] / size[:2].max())) for _, j in views]
     figure = Figure(figsize=(_WIDE_in, _WIDE_in * sum(heights) * 0.9), layout="constrained")
     all_axes = figure.subplots(len(views), squeeze=False, height_ratios=heights)[:, 0]
     for ax, view in zip(all_axes, views, strict=True):

@@ -26,6 +26,7 @@ _ALIKE, _MAYBE = 0.8, 0.2
 _ENDS = 2
 """Poses at both ends where a jump cannot be told from an outlier."""
 _FAR = 3.0
+_UNSURE = ": lengths alone do not tell"
 
 
 @dataclass(frozen=True)
@@ -55,14 +56,16 @@ class Fault:
         }
 
 
-def without_slack(seen: Observations, slack_N: FloatArray) -> tuple[Observations, list[Fault]]:
+def without_slack(
+    geometry: CableGeometry, seen: Observations, slack_N: FloatArray
+) -> tuple[Observations, list[Fault]]:
     """Return observations without the lengths of cables that hung slack, by their tensions."""
     slack = seen.used & (seen.tension_N < slack_N)
     faults = [
         Fault(
             "slack", int(i), int(j), float(seen.tension_N[j, i]),
-            f"cable {i + 1} was slack at pose {j + 1} ({seen.tension_N[j, i]:.1f} N); its length "
-            "there is left out",
+            f"{geometry.cable_name(i)} was slack at pose {j + 1} ({seen.tension_N[j, i]:.1f} N); "
+            "its length there is left out",
         )
         for j, i in np.argwhere(slack)
     ]  # fmt: skip
@@ -80,7 +83,7 @@ def fit_without_faults(
     The length that contradicts all others most is left out, or where all later ones of its cable
     are off alike given an offset of its own, until none contradicts them.
     """
-    seen, faults = without_slack(seen, slack_N)
+    seen, faults = without_slack(geometry, seen, slack_N)
     found = fit(geometry, seen, camera=camera)
     gains: list[float] = []
     left_out: list[Fault] = []
@@ -152,9 +155,9 @@ def _with_size(fault: Fault, found: Fit) -> Fault:
     if fault.kind != "jump":
         return fault
     size = float(found.jumps_m[found.seen.jumps.index((fault.cable, fault.pose))])
+    who = found.geometry.cables_text(fault.cable, fault.alike, _UNSURE)
     text = (
-        f"{_cables(fault.cable, fault.alike)} is {1e3 * size:+.1f} mm off from pose "
-        f"{fault.pose + 1} on: "
+        f"{who} is {1e3 * size:+.1f} mm off from pose {fault.pose + 1} on: "
         "its encoder, coupling or drum slipped between that pose and the one before"
     )
     return replace(fault, size=size, text=text)
@@ -186,8 +189,9 @@ def _worst(found: Fit) -> Fault | None:
     size = float(residual[j, i] / weight[j, i] / redundancy[j, i])
     what = "slack or caught somewhere" if size > 0.0 else "longer than it was paid out"
     alike = _alike(single[j], int(i))
+    who = found.geometry.cables_text(int(i), alike, _UNSURE)
     text = (
-        f"{_cables(int(i), alike)} at pose {j + 1} is {1e3 * size:+.1f} mm off what all "
+        f"{who} at pose {j + 1} is {1e3 * size:+.1f} mm off what all "
         f"others say: {what}; its length there is left out"
     )
     return Fault("outlier", int(i), int(j), size, text, alike)
@@ -197,11 +201,6 @@ def _alike(gains: FloatArray, best: int, share: float = _ALIKE) -> tuple[int, ..
     """Return the cables that explain it nearly as well as the best one."""
     near = np.flatnonzero(gains > share * gains[best])
     return tuple(int(cable) for cable in near if cable != best)
-
-
-def _cables(cable: int, alike: tuple[int, ...]) -> str:
-    others = ", ".join(str(other + 1) for other in alike)
-    return f"cable {cable + 1}" + (f" (or {others}: lengths alone do not tell)" if others else "")
 
 
 def _hats(found: Fit) -> tuple[FloatArray, list[FloatArray], FloatArray]:
@@ -245,8 +244,8 @@ def parameter_faults(found: Fit) -> list[Fault]:
         for i, error in enumerate(geometry.cable[:, DRUM]):
             if abs(error) > _FAR * known.drum:
                 text = (
-                    f"cable {i + 1}: a turn of its motor pays out {100 * error:+.2f} % (± "
-                    f"{100 * std[i]:.2f} %, 1 sigma) of what the file says: check "
+                    f"{geometry.cable_name(i)}: a turn of its motor pays out {100 * error:+.2f} % "
+                    f"(± {100 * std[i]:.2f} %, 1 sigma) of what the file says: check "
                     "drum_radius_m and gear_ratio of its winch"
                 )
                 faults.append(Fault("drum", i, -1, float(error), text))

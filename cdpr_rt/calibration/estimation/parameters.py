@@ -15,6 +15,7 @@ import numpy as np
 
 from cdpr_profiles import Robot
 from cdpr_profiles.platform import NO_PLATFORM
+from cdpr_profiles.robot import default_name
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.errors import InvalidRequestError
 from cdpr_rt.robots.kinematics.cable_kernel import ANCHOR, RADIUS
@@ -85,6 +86,8 @@ class CableGeometry:
     knowledge: Knowledge = field(default_factory=Knowledge)
     cable: FloatArray = field(default_factory=lambda: np.zeros((0, CABLE_ROWS)))
     elongation: float = 0.0
+    cable_names: tuple[str, ...] = ()
+    """Names of their axes in the robot's file, "" where it gives none; empty: none at all."""
 
     @classmethod
     def of(
@@ -112,7 +115,11 @@ class CableGeometry:
             wanted -= {"elongation"}
         kinds = tuple(kind for kind in KINDS if kind in wanted)
         start = np.zeros((n, CABLE_ROWS))
-        return cls(model, soft, heavy, kinds, knowledge or Knowledge(), start)
+        named = tuple(
+            "" if axis.name == default_name(i) else axis.name for i, axis in enumerate(robot.axes)
+        )
+        known = knowledge or Knowledge()
+        return cls(model, soft, heavy, kinds, known, start, cable_names=named)
 
     @property
     def n(self) -> int:
@@ -183,6 +190,16 @@ class CableGeometry:
         """Return 1/EA of each cable with the identified elongation, (n,)."""
         return self.compliance_1_N * (1.0 + self.elongation)
 
+    def cable_name(self, cable: int) -> str:
+        """Return what a cable, counted from 0, is called in texts: its axis, or its number."""
+        named = self.cable_names[cable] if self.cable_names else ""
+        return named or f"cable {cable + 1}"
+
+    def cables_text(self, cable: int, alike: Iterable[int], why: str = "") -> str:
+        """Return the name of a cable, and in brackets those that it might be as well, and why."""
+        others = ", ".join(map(self.cable_name, alike))
+        return self.cable_name(cable) + (f" (or {others}{why})" if others else "")
+
     def names(self) -> list[str]:
         """Return the name of each parameter: cable, what of it, coordinate."""
         axes = "xyz"
@@ -190,5 +207,5 @@ class CableGeometry:
             *(f"exit point {x}" for x in axes), "length offset", "drum",
             *(f"anchor point {x}" for x in axes), "pulley radius",
         ]  # fmt: skip
-        cables = [f"cable {i + 1} {words[row]}" for i in range(self.n) for row in self.rows]
+        cables = [f"{self.cable_name(i)} {words[row]}" for i in range(self.n) for row in self.rows]
         return cables + ["elongation"] * self.shared

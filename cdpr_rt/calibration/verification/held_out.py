@@ -136,7 +136,7 @@ def hold_out(
     part = weighed_fit(part, weighed, part.seen)
     kept, index = np.flatnonzero(~held), np.flatnonzero(held)
     slipped = part.seen.jumps[len(seen.jumps) :]  # what the other poses have found
-    some, _ = without_slack(seen.some(index), slack_N)
+    some, _ = without_slack(geometry, seen.some(index), slack_N)
     jumps = tuple((cable, int((index < kept[pose]).sum())) for cable, pose in slipped)
     used = some.used.copy()
     for cable, pose in slipped:  # whether before or after these, the other poses do not tell

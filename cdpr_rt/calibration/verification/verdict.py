@@ -137,15 +137,18 @@ def _of_single_cables(
     names = geometry.names()
     for column in shown.T:
         most = np.argsort(-np.abs(column))[:2]
-        told = [names[i] for i in most if column[i] ** 2 > 0.15] or [names[most[0]]]
-        cables = sorted({name.split(" ")[1] for name in told if name.startswith("cable")})
+        chosen = [int(i) for i in most if column[i] ** 2 > 0.15] or [int(most[0])]
+        told = [names[i] for i in chosen]
+        of_cables = geometry.n * len(geometry.rows)
+        numbers = {i // len(geometry.rows) for i in chosen if i < of_cables}
+        cables = [geometry.cable_name(number) for number in sorted(numbers)]
         if told == ["elongation"]:
             advice = "add poses at which tensions differ more, or take the cable's data sheet"
         else:
             advice = "add poses further apart, where its length and direction change more"
             if len(geometry.free) > geometry.coordinates:
                 advice += ", and turned ones"
-            advice += f" (cable {', '.join(cables)})" if cables else ""
+            advice += f" ({', '.join(cables)})" if cables else ""
         rest = float(column @ variance @ column)
         found.append(OpenDirection(" with ".join(told), advice, rest))
     return found

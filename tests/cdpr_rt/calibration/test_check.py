@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from cdpr_profiles.reading.places import SHIPPED
 from cdpr_rt.calibration.check import Check, check_geometry
 from cdpr_rt.calibration.estimation.residuals import lengths_told
 from cdpr_rt.calibration.readings.observations import Observations
@@ -57,6 +59,14 @@ def test_the_exit_point_that_moved_is_named_with_its_way() -> None:
     assert (change.kind, change.cable) == ("exit", 1)
     np.testing.assert_allclose(change.size, (0.0, 0.0, 0.02), atol=0.006)
     assert "cable 2" in found.verdict()[1] and "pulley" in found.verdict()[1]
+
+
+def test_a_cable_whose_axis_has_a_name_is_told_by_it(tmp_path: Path) -> None:
+    text = (SHIPPED / "robots" / "spatial-8.toml").read_text()
+    named = tmp_path / "named.toml"
+    named.write_text(text.replace("[[axes]]", '[[axes]]\nname = "c1"', 1))
+    found = checked(str(named), cable=0, exit_m=(0.0, 0.0, 0.02))
+    assert found.verdict()[1].startswith("MOVED: the exit point of c1 (or cable 7) has moved")
 
 
 @pytest.mark.parametrize("robot", ["spatial-8", "planar-4"])

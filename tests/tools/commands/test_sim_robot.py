@@ -200,7 +200,7 @@ def test_a_robots_file_says_how_its_platform_stands_in_space(tmp_path: Path) -> 
     with (
         contextlib.closing(
             Simulator(str(file), "--bus", f"simbus:{name}", "--truth-log", str(log))
-        ),
+        ) as simulator,
         can.Bus(interface="simbus", channel=f"{name}-can0") as bus,
     ):
         for _ in range(5):
@@ -210,6 +210,7 @@ def test_a_robots_file_says_how_its_platform_stands_in_space(tmp_path: Path) -> 
         while not len(seen := records(log)):
             assert time.monotonic() < until
             time.sleep(0.01)
+    assert {bus["truth_log"] for bus in simulator.ready["buses"].values()} == {str(log)}
     assert np.allclose(seen[0]["rotation"], turned, atol=2e-3)
     assert np.allclose(seen[0]["position_m"], (0.0, 0.0, 0.5), atol=2e-3)
     assert seen.dtype["tension_N"].shape == (8,)

@@ -90,6 +90,7 @@ def up(
             mode=mode,
             until_stdin_ends=until_stdin_ends,
             frame_log=frame_log,
+            truth_log=str(truth_log) if truth_log else None,
         )
 
 

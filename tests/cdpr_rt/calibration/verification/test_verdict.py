@@ -93,6 +93,12 @@ def test_what_no_pose_tells_is_named_with_its_cable() -> None:
     opened = [one for one in open_directions(found) if "cable 6" in one.what]
     assert len(opened) >= 4
     assert all("cable 6" in one.advice for one in opened)
+    called = replace(what.file, cable_names=("",) * 5 + ("lower left", "", ""))
+    named = open_directions(fit(called, replace(seen, used=used)))
+    assert [one.what for one in named] == [
+        one.what.replace("cable 6", "lower left") for one in open_directions(found)
+    ]
+    assert sum("(lower left)" in one.advice for one in named) == len(opened)
 
 
 def test_too_few_poses_are_refused_with_how_many_are_missing() -> None:
