@@ -5,6 +5,8 @@ from __future__ import annotations
 import json
 import re
 import subprocess
+from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -200,3 +202,19 @@ def test_exit_points_above_each_other_share_a_name_and_the_platform_is_drawn_who
                 x, y = outline.get_xy().T
                 area = abs(np.dot(x[:-1], y[1:]) - np.dot(x[1:], y[:-1])) / 2.0
                 assert area == pytest.approx(np.ptp(x) * np.ptp(y))  # a rectangle from each side
+
+
+def test_colours_of_a_thin_robot_are_told_without_numbers_over_each_other() -> None:
+    robot = load_robot("spatial-8")
+    assert robot.platform is not None
+    thin = tuple((x, 0.03 * y, z) for x, y, z in robot.platform.exit_points_m)
+    platform = replace(robot.platform, exit_points_m=thin, workspace_min_m=(-0.15, -0.02, 1.4),
+                       workspace_max_m=(0.15, 0.1, 1.6))  # fmt: skip
+    figure = figure_of(replace(robot, platform=platform), platform)
+    figure.draw_without_rendering()
+    bars = [ax for ax in figure.axes if "distance of all tensions" in ax.get_ylabel()]
+    assert len(bars) == 3
+    for bar in bars:
+        extents = [text.get_window_extent() for text in bar.get_yticklabels() if text.get_text()]
+        for below, above in pairwise(extents):
+            assert below.y1 < above.y0
