@@ -298,6 +298,7 @@ class CableControl(PlaceChecks):
             self.observe(feedback)
         self._swing[:] = 0.0
         motors[tracking.TENSION] = planned_N
+        self._rest(on_stand=False)  # the set-point is of where it stood before
 
     def stand_still(self, *, on_stand: bool = False) -> None:
         """Have the set-point stand where the platform is, which may rest `on_stand`.

@@ -21,6 +21,7 @@ from tests.cdpr_rt.robots.platform.platform_physics import (
     PERIOD_S,
     Physics,
     planar,
+    short_arms,
     spatial,
     with_friction,
 )
@@ -310,6 +311,23 @@ def test_the_set_point_is_shaped_without_changing_where_it_ends() -> None:
         steps.append(control.shaped - start)
     assert np.diff(np.array(steps), axis=0) == pytest.approx(0.01 / 60, rel=1e-6)
     assert control.shaped == pytest.approx(start + 0.01, abs=1e-12)
+
+
+def test_a_set_point_on_a_stand_begins_where_the_platform_was_put_since() -> None:
+    """Where it comes after the platform, it does not come from where that stood before."""
+    control = short_arms().control()
+    assert not control.gains.follows_pose
+    kinematics, model, feedback = control.model.kinematics, control.model, AxisFeedback(8)
+    home_m = kinematics.lengths(model.home_pose)
+    control.take_lengths(home_m, feedback)
+    control.begin(feedback)
+    control.stand_still(on_stand=True)
+    elsewhere = model.home + [0.3, 0.0, 0.0, 0.0, 0.0, 0.0]
+    cable_m = np.array([axis.winch.cable_m_per_motor_rad for axis in short_arms().axes])
+    feedback.position_rad[:] = (kinematics.lengths(model.pose(elsewhere)) - home_m) / cable_m
+    control.begin(feedback)
+    control.stand_still(on_stand=True)
+    np.testing.assert_allclose(control.position, control.estimated, atol=1e-9)
 
 
 def test_lengths_agree_under_the_tensions_with_which_the_platform_stands() -> None:
