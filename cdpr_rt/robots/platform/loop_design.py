@@ -55,7 +55,9 @@ _SLOWEST_rad_s, _FASTEST_rad_s = 1.0, 80.0
 _TURNED_AWAY_SHARE = 0.5
 """Of the loop's stiffness, the most that tensions may take from the slowest that is tried."""
 _STEP, _REFINEMENTS = 1.3, 3
-_LOWEST_Hz, _HIGHEST_Hz, _FREQUENCIES = 0.3, 150.0, 64
+_LOW_Hz, _HIGHEST_Hz, _FREQUENCIES = 0.3, 150.0, 64
+_LOWEST_Hz, _BELOW = 0.02, 12
+"""Below the slowest modes: tensions that follow a softer platform may make it drift away."""
 
 
 class UnstableError(GeometryError):
@@ -150,7 +152,8 @@ class LoopModel:
         self._lightest_kg = float(rotors_kg.min())
         self.poses = design_poses(model) if poses is None else poses
         highest = min(_HIGHEST_Hz, 0.3 / period_s)
-        self.frequency_Hz = np.geomspace(_LOWEST_Hz, highest, _FREQUENCIES)
+        below = np.geomspace(_LOWEST_Hz, _LOW_Hz, _BELOW, endpoint=False)
+        self.frequency_Hz = np.append(below, np.geomspace(_LOW_Hz, highest, _FREQUENCIES))
         self._s = s = (2j * np.pi * self.frequency_Hz).astype(np.complex128)
         self._late = np.exp(-s * latency_s(period_s)) / (1.0 + s / OBSERVER_rad_s) ** 2
         plants = [

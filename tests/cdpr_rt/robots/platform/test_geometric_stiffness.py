@@ -116,3 +116,11 @@ def test_a_plate_with_short_arms_stands_and_moves_within_its_tensions() -> None:
     assert tension_N.max() < machine.high_N
     rotation_rad = np.array(physics.true[-500:])[:, 3:]
     assert np.ptp(rotation_rad, axis=0).max() < np.radians(0.2)
+
+
+def test_a_platform_on_softer_cables_does_not_drift_away_below_the_lowest_mode() -> None:
+    """Tensions that follow it do so by a stretch that is not its own, slower than 0.3 Hz."""
+    heavy = replace(short_arms().platform, mass_kg=11.7, inertia_kg_m2=(0.245,))
+    machine = replace(short_arms(), platform=heavy, low_N=6.0, high_N=32.0)
+    gains, q = loop_model(machine).design(), loop_model(machine).poses[1]
+    assert radius(machine, gains, q, 0.7, PERIOD_S) < 1.0
