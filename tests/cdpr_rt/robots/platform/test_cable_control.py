@@ -322,7 +322,7 @@ def test_a_set_point_on_a_stand_begins_where_the_platform_was_put_since() -> Non
     control.take_lengths(home_m, feedback)
     control.begin(feedback)
     control.stand_still(on_stand=True)
-    elsewhere = model.home + [0.3, 0.0, 0.0, 0.0, 0.0, 0.0]
+    elsewhere = model.home + 0.3 * np.eye(6)[0]
     cable_m = np.array([axis.winch.cable_m_per_motor_rad for axis in short_arms().axes])
     feedback.position_rad[:] = (kinematics.lengths(model.pose(elsewhere)) - home_m) / cable_m
     control.begin(feedback)
