@@ -18,6 +18,8 @@ from cdpr_rt.robots.statics import PlatformStatics
 
 _SLOW_Hz = 0.5
 """Slowest mode of a loop: it settles within 2 % in 2.3 s."""
+_LATE_s = 0.002
+"""Longest cycle at which loops beside tensions of the set-point have been stable."""
 
 
 def loop_findings(robot: Robot, statics: PlatformStatics) -> Iterator[Finding]:
@@ -44,6 +46,14 @@ def loop_findings(robot: Robot, statics: PlatformStatics) -> Iterator[Finding]:
             "sync_period_s help"
         )
         yield Finding("platform.mass_kg", text, impossible=False)
-    # tensions of the set-point hold it there, wherever friction turns it
-    if loop.gains.follows_pose and (text := turned_by_friction(statics, robot.axes, loop.gains)):
+    if not loop.gains.follows_pose:
+        # its tensions hold it, wherever friction turns it
+        if robot.sync_period_s > _LATE_s:
+            text = (
+                f"value {robot.sync_period_s:g}; the platform is held by its tensions more than by "
+                "its cables' elasticity, and a loop so late may drive it to swing there; allowed "
+                f"without that: up to {_LATE_s:g}"
+            )
+            yield Finding("sync_period_s", text, impossible=False)
+    elif text := turned_by_friction(statics, robot.axes, loop.gains):
         yield Finding("axes[0].anchor_point_m", text, impossible=False)

@@ -176,8 +176,7 @@ class LoopModel:
             of_speed[:, None] * damping[:, None, None]
             + of_place[:, None] * stiffness[:, None, None]
         )
-        plants = self._followed if gains.follows_pose else self._planned
-        difference = np.eye(C.shape[-1]) + C[..., None] * plants
+        difference = np.eye(C.shape[-1]) + C[..., None] * self._plants(gains)
         least = np.linalg.svd(difference, compute_uv=False)[..., -1].min(axis=1)
         return [
             LoopMargins(
@@ -188,6 +187,9 @@ class LoopModel:
             )
             for at, omega in zip(least, self._modes_rad_s(gains), strict=True)
         ]
+
+    def _plants(self, gains: LoopGains) -> ComplexArray:
+        return self._followed if gains.follows_pose else self._planned
 
     def _modes_rad_s(self, gains: LoopGains) -> FloatArray:
         """Return the platform's modes in closed loop, without delays, (m, d)."""
@@ -240,7 +242,7 @@ class LoopModel:
         best = self._best(self._planned, turning, follows_pose=False) or self._best(
             self._followed, late_s * turning, follows_pose=True
         )
-        if best is None:
+        if best is None or not self._keeps(best, self._plants(best), FOLLOWED_MARGIN):
             raise UnstableError(
                 "its tensions turn the platform away faster than a loop can hold it"
             )

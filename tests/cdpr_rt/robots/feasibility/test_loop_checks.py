@@ -10,7 +10,14 @@ from cdpr_rt.robots.statics import statics_of
 from tests.cdpr_rt.robots.platform.platform_physics import Machine, crossed_rod, short_arms
 
 
-def told(machine: Machine, low_N: float, high_N: float) -> list[str]:
+def told(
+    machine: Machine,
+    low_N: float,
+    high_N: float,
+    period_s: float = 1e-3,
+    *,
+    impossible: bool = True,
+) -> list[str]:
     """Return what is told of a robot with these bounds of tension."""
     base = load_robot("spatial-8")
     bounds = {"tension_min_N": (low_N,), "tension_max_N": (high_N,), "slack_N": (0.5 * low_N,)}
@@ -19,9 +26,10 @@ def told(machine: Machine, low_N: float, high_N: float) -> list[str]:
         platform=machine.platform,
         axes=list(machine.axes),
         limits=base.limits.model_copy(update=bounds),
+        sync_period_s=period_s,
     )
     found = list(loop_findings(robot, statics_of(robot)))
-    return [f"{f.key}: {f.text}" for f in found if f.impossible]
+    return [f"{f.key}: {f.text}" for f in found if f.impossible is impossible]
 
 
 def test_a_platform_that_tensions_turn_away_faster_than_a_loop_can_hold_it_is_refused() -> None:
@@ -32,3 +40,10 @@ def test_a_platform_that_tensions_turn_away_faster_than_a_loop_can_hold_it_is_re
 
 def test_a_platform_that_tensions_hold_is_not_refused() -> None:
     assert told(short_arms(), 200.0, 800.0) == []
+
+
+def test_cycles_in_which_a_loop_may_drive_what_tensions_hold_are_doubtful() -> None:
+    late = told(short_arms(), 20.0, 200.0, 4e-3, impossible=False)
+    assert any(text.startswith("sync_period_s: value 0.004; ") for text in late)
+    in_time = told(short_arms(), 20.0, 200.0, 2e-3, impossible=False)
+    assert not any(text.startswith("sync_period_s") for text in in_time)
