@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from cdpr_rt.arrays import FloatArray
+from cdpr_rt.arrays import BoolArray, FloatArray
 from cdpr_rt.core.exchange import AxisFeedback
 from cdpr_rt.jit import jit
 
@@ -36,6 +36,7 @@ def control_speed(
     integral_rate: float,
     position: FloatArray,
     last: FloatArray,
+    jumped: BoolArray,
     speed: FloatArray,
     integral: FloatArray,
     tension: FloatArray,
@@ -45,9 +46,11 @@ def control_speed(
     for i in range(position.size):
         raw = (position[i] - last[i]) / period
         last[i] = position[i]
-        # a jump of the encoder is no speed
-        if abs(cable[i] * raw) < _FASTEST_m_s:
+        # a jump of the encoder is no speed, and over in a cycle; a winch that runs away goes on
+        fast = abs(cable[i] * raw) >= _FASTEST_m_s
+        if not fast or jumped[i]:
             speed[i] += weight * (raw - speed[i])
+        jumped[i] = fast
         out = cable[i] * speed[i]
         # a loose cable must not be wound up ever faster
         least = low[i] * min(max(1.0 + out / fastest_in, 0.0), 1.0)
@@ -91,12 +94,12 @@ class WinchSpeedLoop:
         """Commanded tension of the last cycle."""
         self.speed_rad_s = np.zeros(n)
         """Filtered motor speed."""
-        self._last = np.zeros(n)
+        self._last, self._jumped = np.zeros(n), np.zeros(n, np.bool_)
         self._integral = np.zeros(n)
 
     def begin(self, feedback: AxisFeedback, speed_rad_s: FloatArray, torque_Nm: FloatArray) -> None:
         """Begin with the last cycle's torques at the motors' present speeds, (n,) each."""
-        self._last[:] = feedback.position_rad
+        self._last[:], self._jumped[:] = feedback.position_rad, False
         self.speed_rad_s[:] = speed_rad_s
         self._integral[:] = torque_Nm
 
@@ -105,6 +108,6 @@ class WinchSpeedLoop:
         control_speed(
             self._period_s, self._weight, self.low_N, self.high_N, self.paying_out_m_s,
             self.fastest_in_m_s, self._cable, self._gain, self.integral_rate_1_s,
-            feedback.position_rad, self._last, self.speed_rad_s, self._integral, self.tension_N,
-            torque_Nm,
+            feedback.position_rad, self._last, self._jumped, self.speed_rad_s, self._integral,
+            self.tension_N, torque_Nm,
         )  # fmt: skip

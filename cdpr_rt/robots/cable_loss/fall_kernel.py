@@ -77,6 +77,7 @@ def fall(
     pose, twist, cables = start.copy(), np.zeros(6), np.empty((CABLE_ROWS, n))
     length, rate, tension, pull = np.empty(n), np.zeros(n), np.zeros(n), winches["held_N"].copy()
     last, speed, integral, torque = np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n)
+    jumped = np.zeros(n, np.bool_)
     out, as_cable, scratch = np.full(n, c.paying_out_m_s), np.ones(n), np.zeros((4, 6, 6))
     run_cables(geometry, pose, cables)
     for i in range(n):
@@ -90,8 +91,8 @@ def fall(
         if cycle >= c.held_cycles:
             control_speed(
                 c.period_s, weight, winches["low_N"], winches["high_N"], out, c.fastest_in_m_s,
-                as_cable, winches["gain_N_s_m"], c.integral_rate_1_s, length, last, speed,
-                integral, pull, torque,
+                as_cable, winches["gain_N_s_m"], c.integral_rate_1_s, length, last, jumped,
+                speed, integral, pull, torque,
             )  # fmt: skip
         standing = False
         for _ in range(c.steps):

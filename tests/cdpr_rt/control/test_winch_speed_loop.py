@@ -1,0 +1,31 @@
+"""Velocity loops of the winches."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from cdpr_rt.control.winch_speed_loop import FASTEST_IN_m_s, HANGING_LOAD_1_s, WinchSpeedLoop
+from cdpr_rt.core.exchange import AxisFeedback
+
+PERIOD_s, INERTIA_kg_m2, CABLE_m = 0.001, 1.1e-4, 0.026
+LOW_N, HIGH_N, COULOMB_Nm = 5.0, 150.0, 0.08
+
+
+@pytest.mark.parametrize("begins_rad_s", [0.0, -150.0, -250.0])
+def test_a_winch_whose_cable_has_broken_does_not_run_away(begins_rad_s: float) -> None:
+    """It begins with 18 N, which nothing holds, and as what the loop is told of a jump: at rest."""
+    loop = WinchSpeedLoop(np.array([INERTIA_kg_m2]), np.array([CABLE_m]), PERIOD_s)
+    loop.low_N[:], loop.high_N[:], loop.paying_out_m_s[:] = LOW_N, HIGH_N, 0.15
+    loop.fastest_in_m_s, loop.integral_rate_1_s = FASTEST_IN_m_s, HANGING_LOAD_1_s
+    feedback, torque_Nm = AxisFeedback(1), np.array([-18.0 * CABLE_m])
+    loop.begin(feedback, np.zeros(1), torque_Nm)
+    speed_rad_s, fastest_rad_s = begins_rad_s, abs(begins_rad_s)
+    for _ in range(1000):
+        moving_Nm = torque_Nm[0] - COULOMB_Nm * np.sign(speed_rad_s)
+        speed_rad_s += PERIOD_s * moving_Nm / INERTIA_kg_m2
+        feedback.position_rad += PERIOD_s * speed_rad_s
+        fastest_rad_s = max(fastest_rad_s, abs(speed_rad_s))
+        loop.update(feedback, torque_Nm)
+    assert fastest_rad_s < abs(begins_rad_s) + 50.0
+    assert abs(speed_rad_s) * CABLE_m < FASTEST_IN_m_s
