@@ -60,9 +60,12 @@ def findings(robot: Robot, limits: Limits | None = None) -> list[Finding]:
         found += _sagging(robot, statics)
         if statics.turns_freely:
             found += _free_rotation(statics)
-        found += [*loop_findings(robot, statics), *_uncontrolled_rotation(robot.platform)]
-        found += _stand_clearance(statics)
-        found += [*_contact(statics), *_angles(statics), *_upright(statics)]
+        turned = list(_angles(statics))
+        if not turned:
+            # a loop is designed turned so far as well: that none holds it there says nothing more
+            found += loop_findings(robot, statics)
+        found += [*turned, *_uncontrolled_rotation(robot.platform), *_stand_clearance(statics)]
+        found += [*_contact(statics), *_upright(statics)]
         found += _friction(robot, statics)
     return sorted(found, key=lambda finding: not finding.impossible)
 
