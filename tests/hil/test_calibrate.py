@@ -79,7 +79,7 @@ def test_a_killed_run_goes_on_names_a_slip_after_it_and_its_calibration_is_check
     assert proof["mean_position_error_mm"] < 2.0 < proof["mean_position_error_before_mm"] + 2.0
     assert told["truth"]["mean_position_error_mm"] < 1.0
     errors = {row["name"]: row for row in told["truth"]["parameters"]}
-    assert abs(errors["cable 1 drum"]["error"]) < 4.0 * errors["cable 1 drum"]["std"]
+    assert abs(errors["upper left drum"]["error"]) < 4.0 * errors["upper left drum"]["std"]
     assert told["in_force"]["version"] == 1
     page = Path(told["report"]).read_text()
     assert page.count("<figure>") >= 3 and 'src="data:image/png' in page
