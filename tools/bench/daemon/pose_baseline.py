@@ -26,6 +26,8 @@ _TIGHTEN_S, _GO_S, _ROUND_S = 3.0, 4.0, 4.0
 _CARRIED, _BOX_SHARE = 0.5, 0.25
 _CALMING_1_s = 40.0
 """Damping of a motor that takes up slack, over its inertia."""
+_DESIGNED_S = 5e-3
+"""Longest cycle that a platform's loop is designed for."""
 
 
 class PoseBaseline(BaselineLoop):
@@ -35,8 +37,9 @@ class PoseBaseline(BaselineLoop):
 
     def __init__(self, given: Mapping[str, Any]) -> None:
         super().__init__(given)
-        robot = replace(load_robot(given["robot"]), sync_period_s=self.period_s)
-        ours, self.pose = controls(robot)
+        designed_s = min(self.period_s, _DESIGNED_S)
+        ours, self.pose = controls(replace(load_robot(given["robot"]), sync_period_s=designed_s))
+        self._slow_down(designed_s / self.period_s)
         model, platform = ours.model, ours.model.platform
         self.feedback, self.setpoint = AxisFeedback(self.n), Setpoint(self.n)
         self.pretension_N, self.tight_rad = np.zeros((2, self.n))
@@ -49,6 +52,17 @@ class PoseBaseline(BaselineLoop):
         self.middle = np.concatenate([box.mean(axis=0), turns])
         self.half = np.concatenate([_BOX_SHARE * (box[1] - box[0]), turns])
         self.tight = False
+
+    def _slow_down(self, share: float) -> None:
+        """Take a share of the gains, for a cycle longer by that than they are designed for."""
+        pose, gains = self.pose, self.pose.gains
+        pose.T = self.period_s
+        pose.gains = replace(
+            gains,
+            bandwidth_rad_s=share * gains.bandwidth_rad_s,
+            damping_N_s_m=share * gains.damping_N_s_m,
+            null_damping_N_s_m=share * gains.null_damping_N_s_m,
+        )
 
     def control(self, k: int, _start: Any, _speed_rad_s: float) -> None:
         """Tighten, then follow the set-point of this cycle; no torque where a limit is exceeded."""
