@@ -22,7 +22,7 @@ from cdpr_rt.robots.robot_arrays import limits_of
 from cdpr_rt.robots.statics import NONE_rad, PlatformStatics, statics_of
 
 _GRID = 25
-_LONGEST_PERIOD_s = 0.005
+LONGEST_PERIOD_s = 0.005
 """Longest cycle at which the platform's control is stiff enough to overcome friction."""
 _NEAREST_m = 0.1
 """An anchor point closer than this to an exit point is about to be pulled into it."""
@@ -87,9 +87,9 @@ def _cycle(robot: Robot) -> Iterator[Finding]:
     if len(robot.axes) > MOST_AXES:
         text = f"{len(robot.axes)}; allowed: up to {MOST_AXES}, as many as a daemon runs"
         yield Finding("axes", text, impossible=True)
-    if robot.sync_period_s > _LONGEST_PERIOD_s:
+    if robot.sync_period_s > LONGEST_PERIOD_s:
         text = (
-            f"value {robot.sync_period_s:g}; allowed: up to {_LONGEST_PERIOD_s:g} for a platform, "
+            f"value {robot.sync_period_s:g}; allowed: up to {LONGEST_PERIOD_s:g} for a platform, "
             "whose control would be too soft to overcome its winches' friction"
         )
         yield Finding("sync_period_s", text, impossible=True)

@@ -66,6 +66,17 @@ class Ends:
         self.asked = True
 
 
+def stopped(monkeypatch: pytest.MonkeyPatch, daemon: Ends) -> Any:
+    @contextmanager
+    def opened(*_where: Any) -> Iterator[Ends]:
+        yield daemon
+
+    monkeypatch.setattr(daemon_state, "open_daemon", opened)
+    app = typer.Typer()
+    app.add_typer(daemon_state.app)
+    return CliRunner().invoke(app, ["stop"])
+
+
 @pytest.mark.parametrize(
     ("alive", "status", "told"),
     [
@@ -76,14 +87,7 @@ class Ends:
 def test_a_script_learns_that_a_drive_was_not_heard(
     monkeypatch: pytest.MonkeyPatch, alive: bool, status: int, told: str
 ) -> None:
-    @contextmanager
-    def opened(*_where: Any) -> Iterator[Ends]:
-        yield Ends(alive)
-
-    monkeypatch.setattr(daemon_state, "open_daemon", opened)
-    app = typer.Typer()
-    app.add_typer(daemon_state.app)
-    ended = CliRunner().invoke(app, ["stop"])
+    ended = stopped(monkeypatch, Ends(alive))
     error = ended.exception
     assert (error.exit_status if isinstance(error, WorkFailedError) else ended.exit_code) == status
     assert told in (str(error) if error else ended.output)
@@ -166,14 +170,7 @@ class DiedBefore(Ends):
 
 
 def test_a_script_learns_that_the_loop_had_died(monkeypatch: pytest.MonkeyPatch) -> None:
-    @contextmanager
-    def opened(*_where: Any) -> Iterator[DiedBefore]:
-        yield DiedBefore(True)
-
-    monkeypatch.setattr(daemon_state, "open_daemon", opened)
-    app = typer.Typer()
-    app.add_typer(daemon_state.app)
-    error = CliRunner().invoke(app, ["stop"]).exception
+    error = stopped(monkeypatch, DiedBefore(True)).exception
     assert isinstance(error, WorkFailedError)
     assert error.exit_status == 1
     assert str(error).startswith("ended; its loop had died: ")

@@ -19,6 +19,9 @@ import numpy as np
 
 from cdpr_profiles import load_robot
 from cdpr_rt.core.exchange import AxisFeedback, Setpoint
+from cdpr_rt.robots.feasibility.checks import LONGEST_PERIOD_s
+from cdpr_rt.robots.platform.loop_design import LoopGains
+from cdpr_tools.bench.control.baseline import BaselineCableControl
 from cdpr_tools.bench.control.measure import controls
 from cdpr_tools.bench.daemon.loop_baseline import BaselineLoop, run
 
@@ -26,8 +29,6 @@ _TIGHTEN_S, _GO_S, _ROUND_S = 3.0, 4.0, 4.0
 _CARRIED, _BOX_SHARE = 0.5, 0.25
 _CALMING_1_s = 40.0
 """Damping of a motor that takes up slack, over its inertia."""
-_DESIGNED_S = 5e-3
-"""Longest cycle that a platform's loop is designed for."""
 
 
 class PoseBaseline(BaselineLoop):
@@ -37,9 +38,12 @@ class PoseBaseline(BaselineLoop):
 
     def __init__(self, given: Mapping[str, Any]) -> None:
         super().__init__(given)
-        designed_s = min(self.period_s, _DESIGNED_S)
-        ours, self.pose = controls(replace(load_robot(given["robot"]), sync_period_s=designed_s))
-        self._slow_down(designed_s / self.period_s)
+        # no loop is designed for longer cycles: gains are less by as much as this one is longer
+        robot, designed_s = load_robot(given["robot"]), min(self.period_s, LONGEST_PERIOD_s)
+        ours, _ = controls(replace(robot, sync_period_s=designed_s))
+        gains = _weaker(ours.gains, designed_s / self.period_s)
+        axes, torque_Nm = list(robot.axes), ours.torque_Nm
+        self.pose = BaselineCableControl(ours.model, axes, torque_Nm, self.period_s, gains)
         model, platform = ours.model, ours.model.platform
         self.feedback, self.setpoint = AxisFeedback(self.n), Setpoint(self.n)
         self.pretension_N, self.tight_rad = np.zeros((2, self.n))
@@ -52,17 +56,6 @@ class PoseBaseline(BaselineLoop):
         self.middle = np.concatenate([box.mean(axis=0), turns])
         self.half = np.concatenate([_BOX_SHARE * (box[1] - box[0]), turns])
         self.tight = False
-
-    def _slow_down(self, share: float) -> None:
-        """Take a share of the gains, for a cycle longer by that than they are designed for."""
-        pose, gains = self.pose, self.pose.gains
-        pose.T = self.period_s
-        pose.gains = replace(
-            gains,
-            bandwidth_rad_s=share * gains.bandwidth_rad_s,
-            damping_N_s_m=share * gains.damping_N_s_m,
-            null_damping_N_s_m=share * gains.null_damping_N_s_m,
-        )
 
     def control(self, k: int, _start: Any, _speed_rad_s: float) -> None:
         """Tighten, then follow the set-point of this cycle; no torque where a limit is exceeded."""
@@ -90,6 +83,15 @@ class PoseBaseline(BaselineLoop):
         self.pose.position = begin + 0.5 * way * (1.0 - math.cos(pace * t))
         self.pose.velocity = 0.5 * way * pace * math.sin(pace * t)
         self.pose.acceleration = 0.5 * way * pace**2 * math.cos(pace * t)
+
+
+def _weaker(gains: LoopGains, share: float) -> LoopGains:
+    return replace(
+        gains,
+        bandwidth_rad_s=share * gains.bandwidth_rad_s,
+        damping_N_s_m=share * gains.damping_N_s_m,
+        null_damping_N_s_m=share * gains.null_damping_N_s_m,
+    )
 
 
 if __name__ == "__main__":

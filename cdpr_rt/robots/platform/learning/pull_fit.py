@@ -185,7 +185,7 @@ class PullFit:
         """
         m, slid, slides = kernel.UNKNOWNS, kernel.SLID, self._slides
         none = np.zeros(slides.shape[1])
-        if not none.size or self._known.any():
+        if self._known.any():
             return none  # lengths of motors that are not fitted are those after it
         precision, known = self._with_usual(sums, friction_Nm, spread_Nm)
         fitted = np.linalg.solve(precision, np.stack([sums[:, :m, slid], known], axis=2))
