@@ -84,7 +84,7 @@ def _kernel_cache(folder: Path, folders: frozenset[Path]) -> str:
     return str(base / f"kernels-{digest.hexdigest()[:12]}")
 
 
-def jit(function: _F, *, nogil: bool = False) -> _F:
+def jit(function: _F, *, nogil: bool = False, forceinline: bool = False) -> _F:
     """Return `function` compiled by numba, cached on disk, with its type kept for the checker.
 
     It may call kernels of its own folder and those that its module imports from others: machine
@@ -102,12 +102,22 @@ def jit(function: _F, *, nogil: bool = False) -> _F:
     _SETTINGS.CACHE_DIR = _kernel_cache(folder, folders)
     try:
         # nothing calls them from C: the wrapper for that is a twentieth of the time to compile
-        compiled: Any = _NJIT(cache=True, nogil=nogil, no_cfunc_wrapper=True)(function)
+        compiled: Any = _NJIT(
+            cache=True, nogil=nogil, forceinline=forceinline, no_cfunc_wrapper=True
+        )(function)
     finally:
         _SETTINGS.CACHE_DIR = cache_of_all
     compiled.folders = folders
     compiled.get_call_template = partial(_call_template, compiled)
     return cast(_F, compiled)
+
+
+def jit_inlined(function: _F) -> _F:
+    """Return `function` compiled as by `jit`, and put into each kernel that calls it.
+
+    For what takes less time than a call: each array hands over nine numbers and is counted.
+    """
+    return jit(function, forceinline=True)
 
 
 def jit_unlocked(function: _F) -> _F:

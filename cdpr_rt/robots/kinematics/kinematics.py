@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.errors import GeometryError
+from cdpr_rt.jit import bound
 from cdpr_rt.robots.kinematics import cable_kernel, normal_equations, pose_search
 from cdpr_rt.robots.kinematics.cable_model import CableModel, write_unstretched_lengths
 from cdpr_rt.robots.kinematics.pose import Pose
@@ -192,7 +194,7 @@ class CableKinematics:
         found = self._solution
         pose_search.copy_pose(start.array, found.pose.array)
         if self.model.is_rigid:
-            self._search(np.asarray(lengths_m, float), restarts)
+            self._search(np.ascontiguousarray(lengths_m, float), restarts)
             return found
         tension = self._no_tension if tension_N is None else tension_N
         self._target[:] = 0.0
@@ -219,11 +221,16 @@ class CableKinematics:
         normal_equations.covariance(self._cables, self.solver, self.length_std_m**2, covariance)
         return covariance
 
+    @cached_property
+    def _find_pose(self) -> Callable[[FloatArray, FloatArray, int], tuple[int, int, float]]:
+        return bound(
+            pose_search.find_pose, self.geometry, self._cables, self.solver,
+            then=(self._target, self._solution.pose.array, 0),
+        )  # fmt: skip
+
     def _search(self, lengths_m: FloatArray, restarts: int) -> None:
         found = self._solution
-        status, found.steps, cost = pose_search.find_pose(
-            self.geometry, lengths_m, found.pose.array, self._cables, self.solver, restarts,
-        )  # fmt: skip
+        status, found.steps, cost = self._find_pose(lengths_m, found.pose.array, restarts)
         found.converged = status == pose_search.CONVERGED
         found.residual_m = math.sqrt(cost / self.n)
 

@@ -13,7 +13,7 @@ from __future__ import annotations
 import math
 
 from cdpr_rt.arrays import FloatArray
-from cdpr_rt.jit import jit
+from cdpr_rt.jit import jit, jit_inlined
 from cdpr_rt.robots.kinematics.cable_kernel import ANCHOR, ARC, ERROR, FREE, TINY
 
 FACTOR, GRADIENT, STEP, DIRECTIONS, ACCEPTED, SAVED_POSES, SOLVER_ROWS = 6, 12, 13, 14, 15, 16, 24
@@ -39,7 +39,7 @@ def assemble(cables: FloatArray, solver: FloatArray) -> None:
     _hold(solver)
 
 
-@jit
+@jit_inlined
 def _hold(solver: FloatArray) -> None:
     """Take directions that are not solved for out of N and the gradient."""
     for j in range(6):
@@ -85,7 +85,7 @@ def add_curvature(
     _hold(solver)
 
 
-@jit
+@jit_inlined
 def factorise(solver: FloatArray, damping: float) -> bool:
     """Write the FACTOR of N + damping · diag(N) = L D L^T; False where that is singular.
 
@@ -108,7 +108,7 @@ def factorise(solver: FloatArray, damping: float) -> bool:
     return True
 
 
-@jit
+@jit_inlined
 def substitute(solver: FloatArray, x: FloatArray) -> None:
     """Solve L D L^T x = g in place; `x` (6,) is g beforehand."""
     for j in range(6):
@@ -123,7 +123,7 @@ def substitute(solver: FloatArray, x: FloatArray) -> None:
         x[j] = entry
 
 
-@jit
+@jit_inlined
 def find_step(solver: FloatArray) -> tuple[float, float]:
     """Write the STEP for the gradient; return its size and by how much the cost is to fall."""
     x = solver[STEP]

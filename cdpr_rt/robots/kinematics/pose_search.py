@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from cdpr_rt.arrays import FloatArray
-from cdpr_rt.jit import jit
+from cdpr_rt.jit import jit, jit_inlined
 from cdpr_rt.robots.kinematics.cable_kernel import ARC, ERROR, FREE, compare, run_cables
 from cdpr_rt.robots.kinematics.normal_equations import (
     ACCEPTED,
@@ -32,7 +32,7 @@ _NEAR = 0.05
 _SLOW_SHARE = 0.1
 _AGREE = 1e-6
 _REGULAR_DAMPING = 1e-6
-_LEAST_SHARE = 0.85
+_LEAST_SHARE = 0.6
 _RELAXED_STEPS = 2
 _FAR_FROM_HOME_rad = 0.7
 _RESTART_TURN_rad = 1.0
@@ -91,7 +91,7 @@ def descend(
     return UNFINISHED, k, cost
 
 
-@jit
+@jit_inlined
 def _factorise_damped(cables: FloatArray, solver: FloatArray, damping: float) -> tuple[bool, float]:
     """Factorise the equations; return whether a direction is free, and the damping it has taken.
 
@@ -106,7 +106,7 @@ def _factorise_damped(cables: FloatArray, solver: FloatArray, damping: float) ->
     return singular, damping if factorise(solver, damping) else -1.0
 
 
-@jit
+@jit_inlined
 def _converged(size: float, before: float, cost: float) -> bool:
     """Return whether the remaining distance after a step of this size, and cost, is negligible.
 
@@ -119,10 +119,10 @@ def _converged(size: float, before: float, cost: float) -> bool:
 @jit
 def find_pose(
     geometry: FloatArray,
-    lengths: FloatArray,
-    pose: FloatArray,
     cables: FloatArray,
     solver: FloatArray,
+    lengths: FloatArray,
+    pose: FloatArray,
     restarts: int,
 ) -> tuple[int, int, float]:
     """Find the pose whose lengths are next to `lengths` (n,), from the start in `pose`.
@@ -232,7 +232,7 @@ def _centre(row: FloatArray) -> None:
         row[i] -= mean
 
 
-@jit
+@jit_inlined
 def move(pose: FloatArray, x: FloatArray) -> None:
     """Change the pose by `x` (6,): p + x_p, and Q turned by the Cayley map of x_φ.
 
@@ -251,7 +251,7 @@ def move(pose: FloatArray, x: FloatArray) -> None:
         pose[3, c] = qz + w * tz + i * ty - j * tx
 
 
-@jit
+@jit_inlined
 def copy_pose(pose: FloatArray, into: FloatArray) -> None:
     """Copy a pose."""
     for i in range(4):
@@ -259,7 +259,7 @@ def copy_pose(pose: FloatArray, into: FloatArray) -> None:
             into[i, j] = pose[i, j]
 
 
-@jit
+@jit_inlined
 def _orthonormalise(pose: FloatArray) -> None:
     """Take the rounding of many steps off the rotation: Q ← Q (3·1 - Q^T Q) / 2."""
     xx, xy, xz, yy, yz, zz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0

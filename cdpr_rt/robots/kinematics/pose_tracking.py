@@ -92,7 +92,7 @@ def track_pose(
     observe(motors, position, filters)
     if turns:
         _turn_to_equilibrium(motors, filters, geometry, pose, rotation, swing)
-    _, _, cost = find_pose(geometry, motors[LENGTH], pose, cables, solver, _NO_RESTARTS)
+    _, _, cost = find_pose(geometry, cables, solver, motors[LENGTH], pose, _NO_RESTARTS)
     stretch(motors, cables, up)
     n, residual, suspect = motors.shape[1], math.sqrt(cost), -1
     for i in range(n):

@@ -249,6 +249,16 @@ def test_a_bad_start_ends_at_the_truth() -> None:
     assert alone < 295, "no start was bad: this shows nothing"
 
 
+def test_lengths_may_be_a_column_of_a_table() -> None:
+    robot = CableKinematics(SPATIAL_8.exit_points_m, SPATIAL_8.anchor_points_m)
+    truth = SPATIAL_8.home.plus(np.array([0.1, -0.05, 0.08, 0.1, 0.2, -0.1]))
+    table = np.full((robot.n, 3), np.nan)
+    table[:, 1] = robot.lengths(truth)
+    found = robot.pose_from_lengths(table[:, 1], SPATIAL_8.home)
+    assert found.converged
+    assert np.abs(found.pose.minus(truth)).max() < 1e-9
+
+
 def test_what_cannot_be_found_says_so() -> None:
     robot = CableKinematics(SPATIAL_8.exit_points_m, SPATIAL_8.anchor_points_m)
     nan = robot.pose_from_lengths(np.full(8, math.nan), SPATIAL_8.home, restarts=9)
