@@ -215,7 +215,10 @@ def _tension_lines(figures: dict[str, Any]) -> list[str]:
 
 def _disagreement_line(allowed_m: float | None) -> str:
     if allowed_m is None:
-        return "lengths    cannot contradict each other: a cable that slips is not noticed"
+        return (
+            "lengths    cannot contradict each other: a cable that slips, and stays tight, is not "
+            "noticed"
+        )
     apart_mm = 1e3 * allowed_m
     return f"lengths    that contradict each other by more than {apart_mm:.1f} mm end a motion"
 

@@ -36,7 +36,7 @@ AXIS_HISTORY: Final = np.dtype(
         ("tight_rad", "<f8"),  # motor angle when it was
         ("low_armed", "<f8"),  # whether it was since enabling, or since this was noted last
         ("slack_armed", "<f8"),
-        ("mean_N", "<f8"),  # its tension, low-passed
+        ("mean_N", "<f8"),  # its tension, low-passed while it does not run in
         ("valid_count", "<f8"),  # valid angles since enabling, up to 2
         ("valid_rad", "<f8"),  # the last valid angle
         ("velocity_rad_s", "<f8"),  # then
@@ -155,13 +155,17 @@ def _watch_motion(
 
 @jit
 def _has_snapped(
-    limits: Any, history: Any, elapsed: float, tension: float, winding_in: float
+    limits: Any, history: Any, elapsed: float, tension: float, runs_in_m_s: float, too_fast: bool
 ) -> bool:
-    """Whether a cable that was tight comes in faster than it may and has lost its tension."""
+    """Whether a cable that was tight has lost its tension, and its winch runs away by that.
+
+    The winch's friction may be more than `slack_N`, and is what is left of a tension by torque.
+    """
     before = history["mean_N"]
-    if np.isfinite(tension):
+    # what it was before: friction alone, for as long as a weak winch takes, is no tension
+    if np.isfinite(tension) and not runs_in_m_s > 0.25 * limits["runs_in_m_s"]:
         history["mean_N"] += elapsed / (elapsed + _MEAN_S) * (tension - before)
-    runs_away = history["slack_armed"] != 0.0 and winding_in > limits["speed_rad_s"]
+    runs_away = history["slack_armed"] != 0.0 and (too_fast or runs_in_m_s > limits["runs_in_m_s"])
     return bool(runs_away and tension < _SNAPPED_SHARE * before)
 
 
@@ -238,10 +242,11 @@ def check_axes(
         position, velocity = signals.position[i], signals.velocity[i]
         tension, cable_m_per_rad = signals.tension[i], signals.cable_m_per_rad[i]
         _watch_jumps(i, limits, history, worst, elapsed, position)
-        mean_N = history["mean_N"]
-        if _has_snapped(limits, history, elapsed, tension, -velocity * np.sign(cable_m_per_rad)):
-            _exceeded(worst, _BROKEN_CABLE, i, tension, mean_N)
         paying_out = signals.setpoint_velocity[i] * cable_m_per_rad
+        mean_N, runs_in_m_s = history["mean_N"], paying_out - velocity * cable_m_per_rad
+        too_fast = -velocity * np.sign(cable_m_per_rad) > limits["speed_rad_s"]
+        if _has_snapped(limits, history, elapsed, tension, runs_in_m_s, too_fast):
+            _exceeded(worst, _BROKEN_CABLE, i, tension, mean_N)
         error = signals.setpoint[i] - position
         _watch_motion(i, limits, worst, error, velocity, signals.length[i], paying_out)
         if not signals.sensor_ok[i]:

@@ -31,7 +31,7 @@ def test_a_share_that_is_nearly_all_is_not_said_to_be_all() -> None:
 def test_it_is_said_whether_a_cable_that_slips_is_noticed() -> None:
     for name, allowed, text in (
         ("spatial-8", True, "more than 27.5 mm end a motion"),
-        ("suspended-6", False, "a cable that slips is not noticed"),
+        ("suspended-6", False, "a cable that slips, and stays tight, is not noticed"),
     ):
         robot = load_robot(name)
         assert robot.platform is not None

@@ -84,3 +84,54 @@ def test_a_broken_cable_is_told_once():
     cycle.estimate.tension_N[1] = 0.0
     told = [supervisor.limit for _ in range(300) if cycle.check(supervisor)]
     assert told == [Limit.BROKEN_CABLE]
+
+
+def runs_in(at_rad_s: float, tension_N: float, planned_rad_s: float = 0.0) -> Limit:
+    """Return what is told of a cable under 50 N that comes in so fast, with this tension left."""
+    limits = dataclasses.replace(
+        SAFE, speed_rad_s=200.0, following_error_rad=100.0, runs_in_m_s=1.0
+    )
+    supervisor, cycle = Supervisor(limits, 2, PERIOD_S), Cycle()
+    for _ in range(300):
+        cycle.check(supervisor)
+    cycle.setpoint.velocity_rad_s[1] = -planned_rad_s
+    for k in range(20):
+        share = (k + 1) / 20
+        cycle.estimate.velocity_rad_s[1] = -share * at_rad_s
+        cycle.estimate.tension_N[1] = 50.0 + share * (tension_N - 50.0)
+        if cycle.check(supervisor):
+            return supervisor.limit
+    return Limit.NONE
+
+
+def test_a_winch_that_runs_away_against_no_more_than_friction_has_lost_its_cable():
+    """What friction leaves of a tension by torque may be more than `slack_N`."""
+    assert runs_in(40.0, 24.0) is Limit.BROKEN_CABLE  # 1.04 m/s
+    assert runs_in(37.0, 24.0) is Limit.NONE
+    assert runs_in(60.0, 24.0, planned_rad_s=25.0) is Limit.NONE
+    # held, as by a platform that somebody pushes: its tension is left
+    assert runs_in(60.0, 35.0) is Limit.NONE
+
+
+def test_a_weak_winch_takes_long_to_run_away():
+    """Meanwhile what friction leaves is not taken for the tension that the cable had."""
+    limits = dataclasses.replace(
+        SAFE,
+        speed_rad_s=200.0,
+        following_error_rad=100.0,
+        runs_in_m_s=1.0,
+        tension_min_N=2.0,
+        slack_N=0.5,
+    )
+    supervisor, cycle = Supervisor(limits, 2, PERIOD_S), Cycle()
+    cycle.estimate.tension_N[1] = 10.0
+    for _ in range(600):
+        cycle.check(supervisor)
+    cycle.estimate.tension_N[1] = 4.0
+    told = []
+    for _ in range(100):
+        cycle.estimate.velocity_rad_s[1] -= 0.5  # 1 m/s after 77 ms
+        if cycle.check(supervisor):
+            told.append(supervisor.limit)
+            break
+    assert told == [Limit.BROKEN_CABLE]
