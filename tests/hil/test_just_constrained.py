@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from cdpr_profiles.limits.robot_limits import Limit
+from cdpr_tools.errors import WorkFailedError
 from cdpr_tools.trials.lockstep import LockstepRobot
 
 PLOTTER = Path(__file__).parent / "robots" / "plotter.toml"
@@ -26,3 +27,34 @@ def test_a_cable_that_is_cut_is_told_as_broken(axis: int, name: str) -> None:
         assert Limit(int(rows["limit"][first])) is Limit.BROKEN_CABLE
         assert first * robot.period_s < 0.05
         assert robot.status["reason"].startswith(f"{name}: the cable seems broken")
+
+
+def test_a_cable_that_was_slack_as_lengths_were_looked_for_is_told(tmp_path: Path) -> None:
+    """Friction and cogging keep its winch until it is pulled harder; the platform is off by 4 mm.
+
+    With the friction that winches usually have, or twice that, it is tight.
+    """
+    plant = tmp_path / "plant.toml"
+    plant.write_text(
+        """
+seed = 100
+start.slack_m = [0.016, 0.035]
+variation = { friction = 0.3, cogging = 0.3, torque_constant = 0.05 }
+cables.friction_share = 0.04
+motor.friction.coulomb_Nm = 0.16
+motor.cogging = [
+  { order = 4, amplitude_Nm = 0.07, phase_deg = 40.0 },
+  { order = 30, amplitude_Nm = 0.03, phase_deg = 10.0 },
+]
+"""
+    )
+    with LockstepRobot(PLOTTER, plant=plant) as robot:
+        robot.enable()
+        with pytest.raises(WorkFailedError, match=r"c1: came in by .* take up slack by hand"):
+            robot.carry_out("tighten")
+    plant.write_text(
+        "seed = 100\nmotor.friction.coulomb_Nm = 0.16\nstart.slack_m = [0.016, 0.035]\n"
+    )
+    with LockstepRobot(PLOTTER, plant=plant) as robot:
+        robot.enable()
+        robot.carry_out("tighten")

@@ -8,6 +8,10 @@ from cdpr_rt.arrays import FloatArray
 from cdpr_rt.core.exchange import AxisFeedback
 from cdpr_rt.programs.platform.platform_program import PlatformParts
 
+_CAME_IN_m = 0.003
+"""By how much more than twice its stretch a cable that was tight may come in, pulled harder: what
+friction had kept it from before, it stretches now."""
+
 
 class LengthsAtHome:
     """Lengths (n,) at home, by the tensions that load cells measure, or that motors are asked for.
@@ -37,6 +41,28 @@ class LengthsAtHome:
     def keep_rising(self, feedback: AxisFeedback) -> None:
         """Keep the angles at the pretension, which is come to from below."""
         self._rising_rad[:] = feedback.position_rad
+
+    def slack_before(self, feedback: AxisFeedback, harder: float) -> str:
+        """Return which cable was not tight as angles were kept, now pulled `harder`, "" for none.
+
+        A tight one comes in by its stretch. Where the lengths may contradict each other they tell.
+        """
+        parts, pull_N = self._parts, self._pretension_N
+        if self._cable.size > parts.model.size:
+            return ""
+        in_m = (self._rising_rad - feedback.position_rad) * self._cable
+        stretch_m = parts.control.lengths_at_home(pull_N)
+        stretch_m -= parts.control.lengths_at_home(harder * pull_N)
+        allowed_m = 2.0 * stretch_m + _CAME_IN_m
+        i = int((in_m - allowed_m).argmax())
+        if in_m[i] <= allowed_m[i]:
+            return ""
+        return (
+            f"{parts.names[i]}: came in by {1e3 * in_m[i]:.1f} mm as it was pulled with "
+            f"{harder * pull_N[i]:.0f} N in place of {pull_N[i]:.0f} N, {1e3 * allowed_m[i]:.1f} "
+            "mm allowed: what it was pulled with before did not overcome its winch's friction, or "
+            "the platform has moved on its stand; take up slack by hand, or hold the platform"
+        )
 
     def take(self, feedback: AxisFeedback) -> FloatArray:
         """Return the lengths (n,) at the pretension, which is come to from above."""

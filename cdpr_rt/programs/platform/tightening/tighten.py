@@ -260,6 +260,10 @@ class TightenProgram(PlatformProgram):
             self._control.pull_fit.begin(feedback.position_rad)
         elif stage == "back":
             self._source.at_home.keep_rising(feedback)
+        elif stage == "beyond" and self._source.name == "home":
+            self._fail_if(self._source.at_home.slack_before(feedback, OVERSHOOT))
+            if self._failure:
+                return
         self._stage += 1
 
     def _end_tight(self, feedback: AxisFeedback, torque_Nm: FloatArray) -> None:
