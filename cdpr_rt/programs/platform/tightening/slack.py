@@ -44,6 +44,7 @@ class SlackTakeUp:
         self._phase, self._state = np.zeros(n, np.int64), np.zeros((n, kernel.STATE))
         self.tight_N = self._state[:, kernel.TIGHT_N]
         """What each tight cable is pulled with, 0 for those that are not tight."""
+        self._loose, self._busy = np.zeros((2, n), np.bool_)
         self._dragged = -1
         driven = kernel.Winches(
             parts.period_s, self._at_once, cable_m, _ENOUGH * taken_up_N,
@@ -58,8 +59,10 @@ class SlackTakeUp:
 
     @property
     def not_tight(self) -> BoolArray:
-        """Which cables are neither tight nor wait for others with a little slack, (n,)."""
-        return np.asarray((self._phase != kernel.TIGHT) & (self._phase != kernel.WAITING))
+        """Which cables are neither tight nor wait for others with a little slack, (n,); reused."""
+        np.not_equal(self._phase, kernel.TIGHT, out=self._loose)
+        np.not_equal(self._phase, kernel.WAITING, out=self._busy)
+        return np.logical_and(self._loose, self._busy, out=self._loose)
 
     def dragged(self, position_rad: FloatArray) -> str:
         """Return which tight cable was reeled in too far on, "" for none."""

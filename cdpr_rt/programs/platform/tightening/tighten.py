@@ -88,6 +88,7 @@ class TightenProgram(PlatformProgram):
         lengths_m = [parts.control.lengths_at_home(N) for N in shares * self._pretension_N]
         self._once_tight_m = _ONCE_TIGHT_m + float(np.ptp(lengths_m, axis=0).max())
         self._start_rad = np.zeros(cable_m.size)
+        self._enough_N, self._weak = np.zeros(cable_m.size), np.zeros(cable_m.size, np.bool_)
         self._stillness = Stillness(self._cable, parts.period_s)
         self._source = LengthSource(parts, self._cable, self._home_pretension_N)
         self._stage = 0
@@ -238,7 +239,8 @@ class TightenProgram(PlatformProgram):
         """Return which cables are slack, or if none is, not pulled with what they may be, (n,)."""
         if self._stage == 0 and (slack := self._slack.not_tight).any():
             return slack
-        return np.asarray(self._winches.tension_N <= PULLED * self._winches.high_N)
+        np.multiply(self._winches.high_N, PULLED, out=self._enough_N)
+        return np.less_equal(self._winches.tension_N, self._enough_N, out=self._weak)
 
     def _next_stage(self, feedback: AxisFeedback, torque_Nm: FloatArray) -> None:
         self._stillness.begin(feedback.position_rad)

@@ -65,3 +65,14 @@ def test_where_all_pull_the_cable_that_does_not_stand_still_is_named(
     told = robot.until_done(1.0)["trouble"]
     assert told.startswith("not tight within 0 s: ")
     assert told.endswith(" N and does not stand still")
+
+
+@pytest.mark.parametrize("stage", ["slack", "pull"])
+def test_which_cables_are_tight_is_looked_at_without_new_arrays(
+    robot: Standing, stage: str
+) -> None:
+    until(robot, stage)
+    look = robot.program._not_tight  # type: ignore[attr-defined]
+    first = look()
+    assert first.size == 3
+    assert look() is first
