@@ -244,9 +244,7 @@ def _only_socket(robot: str | None) -> Path:
             what = f"is still starting, {doing}" if doing else "is starting, or ending"
             raise NoDaemonError(f"the daemon{whose} {what}: it does not answer")
         hint = f"; {where}" if (where := unsearched_folders()) else ""
-        raise NoDaemonError(
-            f"no daemon runs{whose}; `cdpr run {robot or 'ROBOT'}` starts one{hint}"
-        )
+        raise NoDaemonError(f"no daemon runs{whose}; `cdpr run ROBOT` starts one{hint}")
     if robot is not None:  # this user's before the system's
         return found[0]
     names = ", ".join(path.stem for path in found)

@@ -69,7 +69,9 @@ class TrialKind:
     minutes: float
     """How long it lasts, in bus time, where nothing else is wanted."""
     compares: bool = False
-    """Whether it is run with compensation and without, each as long as it lasts."""
+    """Whether it is run with compensation and without."""
+    at_speed: bool = False
+    """Whether it has a speed of its own, and lasts as long as its ways take at that."""
     as_calibrated: bool = True
     """Whether a calibration of the geometry counts that is in force."""
 
@@ -87,6 +89,7 @@ KINDS: Final = {
         lambda parts, _robot, settings: pictures.of_lines(parts, settings.speed_m_s),
         0.0,
         compares=True,
+        at_speed=True,
     ),
     "random": TrialKind(
         lambda run, settings: limits.drive(run, 60.0 * settings.minutes),
@@ -105,6 +108,7 @@ KINDS: Final = {
         lambda parts, robot, settings: path.judge(parts[_ONE], robot, settings.speed_m_s),
         lambda parts, robot, settings: pictures.of_path(parts[_ONE], robot, settings.speed_m_s),
         1.0,
+        at_speed=True,
     ),
     "tape": TrialKind(
         lambda run, settings: tape.drive(run, 60.0 * settings.minutes),
@@ -122,7 +126,7 @@ def perform(settings: TrialSettings, folder: Path, out: Output) -> dict[str, Any
     robot = load_robot(settings.robot)
     platform = platform_of(robot)
     refuse_impossible(robot)
-    if settings.speed_m_s > platform.speed_m_s:
+    if kind.at_speed and settings.speed_m_s > platform.speed_m_s:
         raise BadInputError(
             f"--speed-mm-s {1e3 * settings.speed_m_s:g}: allowed: up to "
             f"{1e3 * platform.speed_m_s:g}, speed_m_s of the robot's file"
@@ -171,6 +175,7 @@ def judge(folder: Path) -> dict[str, Any]:
     save_figure(kind.draw(parts, robot, settings), folder / PICTURE)
     result = {
         **asdict(settings),
+        "speed_m_s": settings.speed_m_s if kind.at_speed else None,
         "figures": {figure.key: figure.as_table() for figure in figures},
         "reached": all_reached(figures),
         "refused": {part: one.marked("end")[0]["refused"] for part, one in parts.items()},

@@ -47,6 +47,7 @@ def test_a_trial_that_is_told_to_end_says_so(tmp_path):
 
 def test_figures_are_those_of_the_files(trial):
     folder, told = trial
+    assert told["speed_m_s"] is None, "targets have none of their own"
     (recording,) = (folder / "run").glob("*.mcap")
     with recording.open("rb") as file:
         marks = [

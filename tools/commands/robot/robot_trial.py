@@ -96,10 +96,9 @@ def trial(
         if folder.exists() and any(folder.iterdir()):
             raise BadInputError(f"--out {folder}: holds something already; allowed: a new folder")
         default = trials.KINDS[kind]
-        fixed_duration = default.compares or kind is KindOfTrial.PATH
-        if minutes is not None and fixed_duration:
+        if minutes is not None and default.at_speed:
             raise BadInputError(f"--minutes {minutes:g}: {kind} lasts as long as it lasts")
-        if speed_mm_s is not None and kind not in (KindOfTrial.LINE, KindOfTrial.PATH):
+        if speed_mm_s is not None and not default.at_speed:
             raise BadInputError(f"--speed-mm-s {speed_mm_s:g}: allowed: with line and path")
         if speed_mm_s is None and kind is KindOfTrial.PATH and profile.platform is not None:
             speed_mm_s = 1e3 * profile.platform.speed_m_s
