@@ -10,8 +10,6 @@ Tensions that are planned where the platform is follow its pose: they take the g
 K_G away that they give it, late, L(s) being what of x comes through, and G' = (1 - G L K_G)^-1 G.
 Where cables' elasticity is not much more than that, they are planned at the set-point in place of
 it, and what turns the platform away meets K_G.
-
-The drives' delay is assumed, the same for all robots: it is not read from their profiles.
 """
 
 from __future__ import annotations
@@ -29,7 +27,14 @@ from cdpr_profiles import RobotAxis
 from cdpr_profiles.platform import Platform
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.errors import GeometryError
-from cdpr_rt.robots.platform.loop_plant import GREATEST, LEAST, NONE, linear_plant
+from cdpr_rt.robots.platform.loop_cycle import Mode, cycle_matrix, least_damped
+from cdpr_rt.robots.platform.loop_gains import (
+    DAMPING_RATIO,
+    LoopGains,
+    OBSERVER_rad_s,
+    latency_s,
+)
+from cdpr_rt.robots.platform.loop_plant import GREATEST, LEAST, LEVELS, NONE, linear_plant
 from cdpr_rt.robots.platform.margin_kernel import keeps_margin
 from cdpr_rt.robots.platform_model import PlatformModel
 
@@ -40,10 +45,6 @@ LEAST_MARGIN = 0.45
 FOLLOWED_MARGIN = 0.4
 """What a loop that is designed without tensions has to keep with those that follow the pose."""
 STIFFNESS_SHARES = (0.7, 1.0, 1.3)
-OBSERVER_rad_s = 2.0 * math.pi * 400.0
-DAMPING_RATIO = 0.55
-_DRIVE_LATENCY_s, _LATENCY_CYCLES = 0.8e-3, 1.5
-"""Assumed delay of any drive, whatever its profile has; cycles of transfer and of holding."""
 _SMOOTHERS_Hz = ((0.0, 25.0), (0.55, 25.0), (0.55, 12.0), (0.8, 12.0), (0.8, 8.0), (0.9, 12.0))
 """Shares of smooth velocity that are tried, each with the frequency of its low-pass."""
 _ROTOR_SHARES = (1.6, 0.8, 0.4)
@@ -62,29 +63,6 @@ _LOWEST_Hz, _BELOW = 0.02, 12
 
 class UnstableError(GeometryError):
     """A robot that no loop holds."""
-
-
-@dataclass(frozen=True)
-class LoopGains:
-    """What the loop goes by in a cycle; see `loop_kernel.SETTINGS`."""
-
-    bandwidth_rad_s: float
-    """Of each mode of the platform, or less where the damping would ask for too much."""
-    damping_N_s_m: float
-    """The most that is asked of a cable in each mode."""
-    smooth: float
-    """Share of the low-passed velocity in the velocity that is damped."""
-    smoother_rad_s: float
-    """Double pole of the low-pass."""
-    null_damping_N_s_m: float
-    """Damping of cables that pull against each other."""
-    integral_share: float
-    """Rate of the integral part over 2 ζ ω of the slowest mode, at most."""
-    integral_1_s: float
-    rotor_kg: float
-    """Mass of a rotor, as its cable feels it."""
-    follows_pose: bool = False
-    """Whether tensions are planned for where the platform is, not for where it is wanted."""
 
 
 @dataclass(frozen=True)
@@ -107,11 +85,6 @@ class LoopMargins:
     def phase_rad(self) -> float:
         """By how much the phase may at least be off: 2 asin(μ/2)."""
         return 2.0 * math.asin(0.5 * self.modulus)
-
-
-def latency_s(period_s: float) -> float:
-    """Return how late the loop acts: an assumed drive, transfer, and half a cycle of holding."""
-    return _DRIVE_LATENCY_s + _LATENCY_CYCLES * period_s
 
 
 def design_poses(model: PlatformModel) -> FloatArray:
@@ -156,11 +129,14 @@ class LoopModel:
         self.frequency_Hz = np.append(below, np.geomspace(_LOW_Hz, highest, _FREQUENCIES))
         self._s = s = (2j * np.pi * self.frequency_Hz).astype(np.complex128)
         self._late = np.exp(-s * latency_s(period_s)) / (1.0 + s / OBSERVER_rad_s) ** 2
-        plants = [
+        self._rotors_kg = rotors_kg
+        self._linear = [
             linear_plant(model, q, rotors_kg, stiffness_N, self._s, STIFFNESS_SHARES)
             for q in self.poses
         ]
-        self._mass_kg, self._geometric_N_m, G = map(np.array, zip(*plants, strict=True))
+        self._mass_kg = np.array([plant.mass_kg for plant in self._linear])
+        self._geometric_N_m = np.array([plant.geometric_N_m for plant in self._linear])
+        G = np.array([plant.response_m_N for plant in self._linear])
         fed = self._late[:, None, None] * self._geometric_N_m[:, 1:, None, None]
         followed = np.linalg.solve(np.eye(model.size) - G[:, 1:] @ fed, G[:, 1:])
         shape = (len(self.poses), -1, len(s), model.size, model.size)
@@ -186,6 +162,23 @@ class LoopModel:
                 float(omega.max()),
             )
             for at, omega in zip(least, self._modes_rad_s(gains), strict=True)
+        ]
+
+    def least_damped(self, gains: LoopGains) -> list[Mode]:
+        """Return the least damped mode of one cycle of robot and loop at each of the poses."""
+        damping, stiffness, _ = self._along_modes(gains)
+        return [
+            least_damped(
+                np.array(
+                    [
+                        cycle_matrix(plant, share, plant.geometric_N_m[level], self._rotors_kg, gains, d, k, self.period_s)
+                        for share in STIFFNESS_SHARES
+                        for level in range(LEAST, LEVELS)
+                    ]
+                ),
+                self.period_s,
+            )
+            for plant, d, k in zip(self._linear, damping, stiffness, strict=True)
         ]
 
     def _plants(self, gains: LoopGains) -> ComplexArray:

@@ -26,7 +26,8 @@ from cdpr_rt.arrays import FloatArray, IntArray
 from cdpr_rt.jit import jit
 from cdpr_rt.robots.platform.body_kernel import write_mass_matrix, write_wrench
 
-_STRETCH_SHARE = 0.2
+STRETCH_SHARE = 0.2
+"""By which the tensions that cables are taken to be stretched by follow the planned ones."""
 PLAUSIBLE_m_s = 0.15
 """By how much the cables' rates may contradict each other in motion."""
 _LOWPASS_S = 0.02
@@ -325,7 +326,7 @@ def drive(
     """
     n, limited = tensions.size, False
     for i in range(n):
-        stretching[i] += _STRETCH_SHARE * (feedforward_tensions[i] - stretching[i])
+        stretching[i] += STRETCH_SHARE * (feedforward_tensions[i] - stretching[i])
         effort[i] = tensions[i]
     for k in range(null_directions):
         against = 0.0

@@ -46,6 +46,10 @@ class LinearPlant(NamedTuple):
 
     mass_kg: FloatArray
     """λ of each mode, (d,)."""
+    pulls: FloatArray
+    """P, (n, d): by how much each cable becomes longer along each mode."""
+    stiffness_N_m: FloatArray
+    """k of each cable, (n,)."""
     geometric_N_m: FloatArray
     """K_G, (LEVELS, d, d)."""
     response_m_N: ComplexArray
@@ -111,7 +115,7 @@ def linear_plant(
         [_response(P, mass_kg, K_G, rotors_kg, share * k, s) for share in shares]
         for K_G in geometric
     ]
-    return LinearPlant(mass_kg, geometric, np.array(responses))
+    return LinearPlant(mass_kg, P, k, geometric, np.array(responses))
 
 
 def _response(

@@ -9,12 +9,8 @@ from scipy.spatial.transform import Rotation
 
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.robots.kinematics.pose import Pose
-from cdpr_rt.robots.platform.loop_design import (
-    DAMPING_RATIO,
-    LoopGains,
-    LoopModel,
-    OBSERVER_rad_s,
-)
+from cdpr_rt.robots.platform.loop_design import LoopModel
+from cdpr_rt.robots.platform.loop_gains import DAMPING_RATIO, LoopGains, OBSERVER_rad_s
 from cdpr_rt.robots.platform.loop_plant import planned_tensions
 from tests.cdpr_rt.robots.platform.platform_physics import PERIOD_S, Machine
 
