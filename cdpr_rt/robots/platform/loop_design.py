@@ -31,10 +31,11 @@ from cdpr_rt.robots.platform.loop_cycle import Mode, cycle_matrix, least_damped
 from cdpr_rt.robots.platform.loop_gains import (
     DAMPING_RATIO,
     LoopGains,
+    LoopMargins,
     OBSERVER_rad_s,
     latency_s,
 )
-from cdpr_rt.robots.platform.loop_plant import GREATEST, LEAST, LEVELS, NONE, linear_plant
+from cdpr_rt.robots.platform.loop_plant import BETWEEN, GREATEST, LEAST, NONE, linear_plant
 from cdpr_rt.robots.platform.margin_kernel import keeps_margin
 from cdpr_rt.robots.platform_model import PlatformModel
 
@@ -65,26 +66,8 @@ class UnstableError(GeometryError):
     """A robot that no loop holds."""
 
 
-@dataclass(frozen=True)
-class LoopMargins:
-    """What a loop keeps at one of several poses, the worst over the stiffness."""
-
-    modulus: float
-    frequency_Hz: float
-    """Where that is."""
-    slowest_rad_s: float
-    fastest_rad_s: float
-    """Of the platform's modes in closed loop, without delays."""
-
-    @property
-    def gain(self) -> float:
-        """By how much the gain may at least grow, or shrink to its inverse: 1/(1 - μ)."""
-        return 1.0 / (1.0 - self.modulus)
-
-    @property
-    def phase_rad(self) -> float:
-        """By how much the phase may at least be off: 2 asin(μ/2)."""
-        return 2.0 * math.asin(0.5 * self.modulus)
+class SwingsError(UnstableError):
+    """A robot with a mode that each loop drives to swing."""
 
 
 def design_poses(model: PlatformModel) -> FloatArray:
@@ -129,7 +112,8 @@ class LoopModel:
         self.frequency_Hz = np.append(below, np.geomspace(_LOW_Hz, highest, _FREQUENCIES))
         self._s = s = (2j * np.pi * self.frequency_Hz).astype(np.complex128)
         self._late = np.exp(-s * latency_s(period_s)) / (1.0 + s / OBSERVER_rad_s) ** 2
-        self._rotors_kg = rotors_kg
+        self._rotors_kg, self._hardest = rotors_kg, 0
+        self._swings: Mode | None = None
         self._linear = [
             linear_plant(model, q, rotors_kg, stiffness_N, self._s, STIFFNESS_SHARES)
             for q in self.poses
@@ -165,21 +149,26 @@ class LoopModel:
         ]
 
     def least_damped(self, gains: LoopGains) -> list[Mode]:
-        """Return the least damped mode of one cycle of robot and loop at each of the poses."""
+        """Return the least damped mode of a cycle of robot and loop at each of the poses."""
+        return [self._least_damped(gains, i) for i in range(len(self.poses))]
+
+    def _least_damped(self, gains: LoopGains, i: int) -> Mode:
         damping, stiffness, _ = self._along_modes(gains)
-        return [
-            least_damped(
-                np.array(
-                    [
-                        cycle_matrix(plant, share, plant.geometric_N_m[level], self._rotors_kg, gains, d, k, self.period_s)
-                        for share in STIFFNESS_SHARES
-                        for level in range(LEAST, LEVELS)
-                    ]
-                ),
-                self.period_s,
-            )
-            for plant, d, k in zip(self._linear, damping, stiffness, strict=True)
+        plant, law = self._linear[i], (gains, damping[i], stiffness[i], self.period_s)
+        cycles = [
+            cycle_matrix(plant, share, plant.geometric_N_m[level], self._rotors_kg, *law)
+            for share in STIFFNESS_SHARES
+            for level in (LEAST, BETWEEN, GREATEST)
         ]
+        return least_damped(np.array(cycles), self.period_s)
+
+    def _dies_down(self, gains: LoopGains) -> bool:
+        """Return whether all modes do at all poses, the one first where one did not before."""
+        for i in sorted(range(len(self.poses)), key=lambda i: i != self._hardest):
+            if (mode := self._least_damped(gains, i)).damping_ratio <= 0.0:
+                self._hardest, self._swings = i, mode
+                return False
+        return True
 
     def _plants(self, gains: LoopGains) -> ComplexArray:
         return self._followed if gains.follows_pose else self._planned
@@ -225,24 +214,49 @@ class LoopModel:
         It is designed for elastic cables, and judged with tensions that follow the pose, from none
         on to the greatest that may be planned. Where that takes too much of its margin it is
         designed anew, for tensions of the set-point; and where none is stiff enough for those that
-        turn the platform away, for some that follow. Raises UnstableError where none holds it then.
+        turn the platform away, for some that follow. In a cycle of robot and loop all modes die
+        down. Raises UnstableError where none holds it then, SwingsError where modes would not.
         """
         turning, late_s = self._geometric_N_m, latency_s(self.period_s) + 2.0 / OBSERVER_rad_s
         elastic = self._best(self._elastic, np.zeros_like(turning), follows_pose=True)
-        if elastic and self._keeps(elastic, self._followed, FOLLOWED_MARGIN):
+        keeps = elastic is not None and self._keeps(elastic, self._followed, FOLLOWED_MARGIN)
+        if elastic and keeps and self._dies_down(elastic):
             return elastic
         # followed late, it takes of the damping what it would have taken of the stiffness
-        best = self._best(self._planned, turning, follows_pose=False) or self._best(
+        best = self._held(self._planned, turning, follows_pose=False) or self._held(
             self._followed, late_s * turning, follows_pose=True
         )
-        if best is None or not self._keeps(best, self._plants(best), FOLLOWED_MARGIN):
+        if best is not None:
+            return best
+        if self._swings is None:
             raise UnstableError(
                 "its tensions turn the platform away faster than a loop can hold it"
             )
-        return best
+        place = ", ".join(f"{x:.2f}" for x in self.poses[self._hardest])
+        raise SwingsError(
+            f"whatever its gains, the loop drives a mode at {self._swings.frequency_Hz:.3g} Hz to "
+            f"swing where the platform is at ({place})"
+        )
+
+    def _held(
+        self, plants: ComplexArray, turning: FloatArray, *, follows_pose: bool
+    ) -> LoopGains | None:
+        """Return the best loop all of whose modes die down, None where none holds the platform."""
+        for calmed in (False, True):
+            best = self._best(plants, turning, follows_pose=follows_pose, calmed=calmed)
+            if best is None or not self._keeps(best, plants, FOLLOWED_MARGIN):
+                return None
+            if self._dies_down(best):
+                return best
+        return None
 
     def _best(
-        self, plants: ComplexArray, turning: FloatArray, *, follows_pose: bool
+        self,
+        plants: ComplexArray,
+        turning: FloatArray,
+        *,
+        follows_pose: bool,
+        calmed: bool = False,
     ) -> LoopGains | None:
         best, soonest = None, 0.0
         tried = itertools.product(_SMOOTHERS_Hz, _ROTOR_SHARES, _INTEGRAL_SHARES)
@@ -254,9 +268,19 @@ class LoopModel:
             at_most = self._integral_N_m_s(self._with(gains, math.inf))
             if best is None or at_most > soonest:
                 found = self._quickest(gains, plants)
-                if (integral := self._integral_N_m_s(found)) > soonest:
+                if calmed and self._integral_N_m_s(found) > soonest:
+                    found = self._calmed(found, gains.bandwidth_rad_s)
+                if found and (integral := self._integral_N_m_s(found)) > soonest:
                     best, soonest = found, integral
         return best
+
+    def _calmed(self, gains: LoopGains, slowest_rad_s: float) -> LoopGains | None:
+        """Return the loop slowed down until all its modes die down, None where they never do."""
+        while not self._dies_down(gains):
+            gains = self._with(gains, gains.bandwidth_rad_s / _STEP)
+            if gains.bandwidth_rad_s < slowest_rad_s:
+                return None
+        return gains
 
     def _slow(
         self, smooth: float, smoother_rad_s: float, share: float, integral_share: float

@@ -1,4 +1,4 @@
-"""What a platform's loop goes by in a cycle, and how late it acts.
+"""What a platform's loop goes by in a cycle, what it keeps, and how late it acts.
 
 The drives' delay is assumed, the same for all robots: it is not read from their profiles.
 """
@@ -35,6 +35,28 @@ class LoopGains:
     """Mass of a rotor, as its cable feels it."""
     follows_pose: bool = False
     """Whether tensions are planned for where the platform is, not for where it is wanted."""
+
+
+@dataclass(frozen=True)
+class LoopMargins:
+    """What a loop keeps at one of several poses, the worst over the stiffness."""
+
+    modulus: float
+    frequency_Hz: float
+    """Where that is."""
+    slowest_rad_s: float
+    fastest_rad_s: float
+    """Of the platform's modes in closed loop, without delays."""
+
+    @property
+    def gain(self) -> float:
+        """By how much the gain may at least grow, or shrink to its inverse: 1/(1 - μ)."""
+        return 1.0 / (1.0 - self.modulus)
+
+    @property
+    def phase_rad(self) -> float:
+        """By how much the phase may at least be off: 2 asin(μ/2)."""
+        return 2.0 * math.asin(0.5 * self.modulus)
 
 
 def latency_s(period_s: float) -> float:

@@ -35,7 +35,7 @@ ComplexArray = NDArray[np.complex128]
 CABLE_DAMPING_s = 2e-3
 _OF_LEAST = (0.0, 1 / 16, 1 / 8, 1 / 4, 1 / 2, 1.0, 0.875, 0.625, 0.0)
 _OF_GREATEST = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.125, 0.375, 1.0)
-NONE, LEAST, GREATEST, LEVELS = 0, 5, 8, 9
+NONE, LEAST, BETWEEN, GREATEST, LEVELS = 0, 5, 7, 8, 9
 """Tensions whose geometric stiffness is looked at: none, and from little to the greatest that may
 be planned at a pose, by some doubling a step: a loop that keeps its margin all the way from one
 that is stable without them is stable with them."""
