@@ -115,6 +115,7 @@ def _of_loop(robot: Robot, model: PlatformModel) -> dict[str, float] | None:
     except GeometryError:
         return None
     worst = min(loop.margins, key=lambda there: there.modulus)
+    least = min(loop.modes, key=lambda mode: mode.damping_ratio)
     return {
         "slowest_Hz": loop.slowest_rad_s / math.tau,
         "fastest_Hz": max(there.fastest_rad_s for there in loop.margins) / math.tau,
@@ -122,6 +123,8 @@ def _of_loop(robot: Robot, model: PlatformModel) -> dict[str, float] | None:
         "gain_margin": worst.gain,
         "phase_margin_rad": worst.phase_rad,
         "worst_at_Hz": worst.frequency_Hz,
+        "least_damped_Hz": least.frequency_Hz,
+        "least_damping_ratio": least.damping_ratio,
         "tensions_follow_pose": loop.gains.follows_pose,
     }
 
@@ -230,6 +233,8 @@ def _loop_lines(loop: dict[str, float]) -> list[str]:
         f"{_STIFFNESS_OFF:.0%} softer or stiffer",
         f"           gain margin {loop['gain_margin']:.1f}, phase margin "
         f"{math.degrees(loop['phase_margin_rad']):.0f} deg",
+        f"           least damped of all that swings: {loop['least_damped_Hz']:.1f} Hz, damping "
+        f"ratio {loop['least_damping_ratio']:.2g}",
     ]
     if not loop["tensions_follow_pose"]:
         lines.append(

@@ -6,20 +6,28 @@ import math
 from collections.abc import Iterator
 
 from cdpr_profiles import Robot
+from cdpr_rt.arrays import FloatArray
 from cdpr_rt.errors import GeometryError
 from cdpr_rt.robots.feasibility.finding import Finding
+from cdpr_rt.robots.feasibility.not_held import point_text
 from cdpr_rt.robots.feasibility.turned_by_friction import (
     moved_by_friction_m,
     stretched_by_acceleration_m,
     turned_by_friction,
 )
-from cdpr_rt.robots.platform.loop_design import UnstableError, designed_loop
+from cdpr_rt.robots.platform.loop_cycle import Mode
+from cdpr_rt.robots.platform.loop_design import (
+    SwingsError,
+    UnstableError,
+    design_poses,
+    designed_loop,
+)
 from cdpr_rt.robots.statics import PlatformStatics
 
 _SLOW_Hz = 0.5
 """Slowest mode of a loop: it settles within 2 % in 2.3 s."""
-_LATE_s = 0.002
-"""Longest cycle at which loops beside tensions of the set-point have been stable."""
+_SWINGS_s = 5.0
+"""Longest time in which a mode dies down to 2 %."""
 
 
 def loop_findings(robot: Robot, statics: PlatformStatics) -> Iterator[Finding]:
@@ -27,7 +35,10 @@ def loop_findings(robot: Robot, statics: PlatformStatics) -> Iterator[Finding]:
     try:
         loop = designed_loop(statics.model, robot.axes, robot.sync_period_s)
     except GeometryError as error:
-        if isinstance(error, UnstableError):
+        if isinstance(error, SwingsError):
+            text = f"value {robot.sync_period_s:g}; {error}: a shorter cycle, longer arms or less "
+            yield Finding("sync_period_s", text + "tension_max_N help", impossible=True)
+        elif isinstance(error, UnstableError):
             text = (
                 f"{error}: anchor points that lie towards their exit points, with longer arms, help"
             )
@@ -46,14 +57,23 @@ def loop_findings(robot: Robot, statics: PlatformStatics) -> Iterator[Finding]:
             "sync_period_s help"
         )
         yield Finding("platform.mass_kg", text, impossible=False)
-    if not loop.gains.follows_pose:
-        # its tensions hold it, wherever friction turns it
-        if robot.sync_period_s > _LATE_s:
-            text = (
-                f"value {robot.sync_period_s:g}; the platform is held by its tensions more than by "
-                "its cables' elasticity, and a loop so late may drive it to swing there; allowed "
-                f"without that: up to {_LATE_s:g}"
-            )
-            yield Finding("sync_period_s", text, impossible=False)
-    elif text := turned_by_friction(statics, robot.axes, loop.gains):
+    if loop.gains.follows_pose:
+        if text := turned_by_friction(statics, robot.axes, loop.gains):
+            yield Finding("axes[0].anchor_point_m", text, impossible=False)
+        return
+    # its tensions hold it, wherever friction turns it
+    mode, place = min(zip(loop.modes, design_poses(statics.model), strict=True), key=_damping)
+    if mode.dies_down_s > _SWINGS_s:
+        text = (
+            f"held by its tensions as by springs, with the platform at "
+            f"{point_text(place[: statics.model.positions])} m it may swing at "
+            f"{mode.frequency_Hz:.2g} Hz, with {100.0 * mode.damping_ratio:.1g} % of critical "
+            f"damping, for {mode.dies_down_s:.2g} s after it has moved, besides what winches rub; "
+            f"up to {_SWINGS_s:g} s wanted: longer arms, less tension_max_N or a shorter "
+            "sync_period_s help"
+        )
         yield Finding("axes[0].anchor_point_m", text, impossible=False)
+
+
+def _damping(at: tuple[Mode, FloatArray]) -> float:
+    return at[0].damping_ratio

@@ -38,6 +38,12 @@ class Mode(NamedTuple):
     damping_ratio: float
     """ζ, negative where it grows."""
 
+    @property
+    def dies_down_s(self) -> float:
+        """After which 2 % are left of it."""
+        rate = self.damping_ratio * math.tau * self.frequency_Hz
+        return math.log(50.0) * math.sqrt(1.0 - self.damping_ratio**2) / rate
+
 
 def least_damped(cycle: FloatArray, period_s: float) -> Mode:
     """Return the least damped mode of cycles (..., size, size) of a period."""

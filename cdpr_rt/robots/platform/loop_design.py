@@ -267,9 +267,10 @@ class LoopModel:
                 continue
             at_most = self._integral_N_m_s(self._with(gains, math.inf))
             if best is None or at_most > soonest:
-                found = self._quickest(gains, plants)
-                if calmed and self._integral_N_m_s(found) > soonest:
-                    found = self._calmed(found, gains.bandwidth_rad_s)
+                quickest = self._quickest(gains, plants)
+                found: LoopGains | None = quickest
+                if calmed and self._integral_N_m_s(quickest) > soonest:
+                    found = self._calmed(quickest, gains.bandwidth_rad_s)
                 if found and (integral := self._integral_N_m_s(found)) > soonest:
                     best, soonest = found, integral
         return best
@@ -351,6 +352,8 @@ class DesignedLoop:
 
     gains: LoopGains
     margins: tuple[LoopMargins, ...]
+    modes: tuple[Mode, ...]
+    """The least damped mode of robot and loop at each of them."""
 
     @property
     def slowest_rad_s(self) -> float:
@@ -386,4 +389,4 @@ def _designed(robot: _Robot) -> DesignedLoop:
     rotors_kg, stiffness_N = np.array(robot.rotors_kg), np.array(robot.stiffness_N)
     loop = LoopModel(robot.model, rotors_kg, stiffness_N, robot.period_s)
     gains = loop.design()
-    return DesignedLoop(gains, tuple(loop.margins(gains)))
+    return DesignedLoop(gains, tuple(loop.margins(gains)), tuple(loop.least_damped(gains)))

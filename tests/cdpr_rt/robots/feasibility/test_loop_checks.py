@@ -3,9 +3,15 @@
 from __future__ import annotations
 
 import dataclasses
+import math
+import re
+
+import pytest
 
 from cdpr_profiles import Robot, load_robot
+from cdpr_rt.robots.feasibility import loop_checks
 from cdpr_rt.robots.feasibility.loop_checks import loop_findings
+from cdpr_rt.robots.platform.loop_design import SwingsError
 from cdpr_rt.robots.statics import statics_of
 from tests.cdpr_rt.robots.platform.platform_physics import Machine, crossed_rod, short_arms
 
@@ -42,8 +48,27 @@ def test_a_platform_that_tensions_hold_is_not_refused() -> None:
     assert told(short_arms(), 200.0, 800.0) == []
 
 
-def test_cycles_in_which_a_loop_may_drive_what_tensions_hold_are_doubtful() -> None:
-    late = told(short_arms(), 20.0, 200.0, 4e-3, impossible=False)
-    assert any(text.startswith("sync_period_s: value 0.004; ") for text in late)
-    in_time = told(short_arms(), 20.0, 200.0, 2e-3, impossible=False)
-    assert not any(text.startswith("sync_period_s") for text in in_time)
+def test_what_tensions_hold_and_swings_for_long_is_doubtful() -> None:
+    (late,) = told(short_arms(), 20.0, 200.0, 4e-3, impossible=False)
+    found = re.match(
+        r"axes\[0\]\.anchor_point_m: held by its tensions .* at \(.*\) m it may swing at (\d+) Hz, "
+        r"with (0\.\d+) % of critical damping, for ([\d.]+) s ",
+        late,
+    )
+    assert found is not None, late
+    frequency_Hz, damping, lasts_s = map(float, found.groups())
+    assert lasts_s > 5.0
+    # 2 % are left; the damping has one digit
+    assert lasts_s * frequency_Hz * damping == pytest.approx(100 * math.log(50) / math.tau, rel=0.2)
+    assert told(short_arms(), 20.0, 200.0, 2e-3, impossible=False) == []
+
+
+def test_a_robot_that_every_loop_drives_is_refused_by_its_cycle(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def refuse(*_: object) -> None:
+        raise SwingsError("the loop drives a mode")
+
+    monkeypatch.setattr(loop_checks, "designed_loop", refuse)
+    (text,) = told(short_arms(), 20.0, 200.0, 4e-3)
+    assert text.startswith("sync_period_s: value 0.004; the loop drives a mode: a shorter cycle")
