@@ -15,10 +15,10 @@ from cdpr_profiles.platform import Platform
 from cdpr_profiles.reading.reader import closest
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.robots.feasibility.checks import (
-    lower_when_turned_m,
     refuse_impossible,
     standing_tensions_N,
 )
+from cdpr_rt.robots.feasibility.turning_checks import lower_when_turned_m
 from cdpr_rt.robots.platform_model import platform_model
 from cdpr_rt.robots.statics import Box, PlatformStatics
 from cdpr_tools.errors import BadInputError

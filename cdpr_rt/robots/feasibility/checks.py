@@ -9,15 +9,14 @@ import numpy as np
 
 from cdpr_profiles import ProfileError, Robot
 from cdpr_profiles.limits.motor_bounds import MOST_SPEED_RATIO
-from cdpr_profiles.platform import DIRECTIONS, Platform
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.core.shared_block import MOST_AXES
 from cdpr_rt.core.supervision.limits import Limits
-from cdpr_rt.robots.feasibility.finding import Finding
+from cdpr_rt.robots.feasibility import turning_checks as turning
+from cdpr_rt.robots.feasibility.finding import Finding, rounded_down
 from cdpr_rt.robots.feasibility.loop_checks import loop_findings
 from cdpr_rt.robots.feasibility.not_held import point_text, why_not_held
 from cdpr_rt.robots.interference.interference import in_words
-from cdpr_rt.robots.rigid_body import in_space, is_point
 from cdpr_rt.robots.robot_arrays import limits_of
 from cdpr_rt.robots.statics import NONE_rad, PlatformStatics, statics_of
 
@@ -34,11 +33,6 @@ _ROUNDED_UP = 1.05
 """So that two digits are not less."""
 _FRICTION_SHARE = 0.06
 """Friction and cogging of a servo winch together over the motor's rated torque, at most."""
-_SHARES = np.linspace(0.95, 0.05, 19)
-"""Shares of an angle that are tried."""
-_TIPS_AT = 0.05
-"""Share of its weight that any cable which becomes tight pulls with."""
-_FAR_TURNED_deg, _TIPPED_deg = 10.0, 4.0
 _WIDE_ARMS = 0.5
 """Anchor points further apart than this share of the exit points are probably not in metres."""
 
@@ -59,13 +53,17 @@ def findings(robot: Robot, limits: Limits | None = None) -> list[Finding]:
         found += [*_cable_speeds(robot, limits, statics), *_lengths(robot, limits, statics)]
         found += _sagging(robot, statics)
         if statics.turns_freely:
-            found += _free_rotation(statics)
-        turned = list(_angles(statics))
+            found += turning.free_rotation(statics)
+        turned = list(turning.angles(statics))
         if not turned:
             # a loop is designed turned so far as well: that none holds it there says nothing more
             found += loop_findings(robot, statics)
-        found += [*turned, *_uncontrolled_rotation(robot.platform), *_stand_clearance(statics)]
-        found += [*_contact(statics), *_upright(statics)]
+        found += [
+            *turned,
+            *turning.uncontrolled_rotation(robot.platform),
+            *turning.stand_clearance(statics),
+        ]
+        found += [*_contact(statics), *turning.upright(statics)]
         found += _friction(robot, statics)
     return sorted(found, key=lambda finding: not finding.impossible)
 
@@ -205,21 +203,15 @@ def _cable_speeds(robot: Robot, limits: Limits, statics: PlatformStatics) -> Ite
         text = (
             f"value {platform.speed_m_s:g}; along{turning} all directions at once cables run at "
             f"up to {cable_m_s:.3g} m/s, axes[{i}] at {share * cable_m_s:.3g} m/s by its limit of "
-            f"speed; allowed: up to {_rounded_down(share * platform.speed_m_s)}"
+            f"speed; allowed: up to {rounded_down(share * platform.speed_m_s)}"
         )
         if turning:
-            angular = _rounded_down(share * platform.angular_speed_rad_s)
+            angular = rounded_down(share * platform.angular_speed_rad_s)
             text += f" with angular_speed_rad_s up to {angular}"
         needed = cable_m_s / arm_m[i]
         if needed <= MOST_SPEED_RATIO * winches[i].motor.rated_speed_rad_s:
             text += f", or limits.speed_rad_s from {math.ceil(needed)}"
         yield Finding("platform.speed_m_s", text, impossible=True)
-
-
-def _rounded_down(value: float) -> str:
-    """Return a value to three digits, none of which makes it larger."""
-    digits = 2 - math.floor(math.log10(value))
-    return f"{math.floor(value * 10.0**digits) / 10.0**digits:g}"
 
 
 def _friction(robot: Robot, statics: PlatformStatics) -> Iterator[Finding]:
@@ -232,69 +224,6 @@ def _friction(robot: Robot, statics: PlatformStatics) -> Iterator[Finding]:
             "over its targets; smaller winches, or a mass for tensions mid of their bounds, help"
         )
         yield Finding("platform.mass_kg", text, impossible=False)
-
-
-def _free_rotation(statics: PlatformStatics) -> Iterator[Finding]:
-    home = np.array(statics.platform.home_m)
-    places = np.concatenate([home[None], statics.points().reshape(-1, 2)])
-    angle = np.where(statics.is_target(places), statics.angle_rad(places), 0.0)
-    if np.isnan(angle).any():
-        where = point_text(places[int(np.isnan(angle).argmax())])
-        text = (
-            f"at {where} m the cables would turn the platform over; each cable should be made fast "
-            "on the side of the platform that faces its exit point"
-        )
-        yield Finding("axes[0].anchor_point_m", text, impossible=True)
-        return
-    degrees = np.abs(np.degrees(angle))
-    if degrees[0] > _TIPPED_deg:
-        text = (
-            f"there the cables would turn the platform by {degrees[0]:.0f} deg, and may tip it on "
-            "its stand; where it turns less, lengths learnt from there are better"
-        )
-        yield Finding("platform.home_m", text, impossible=False)
-    if degrees.max() > _FAR_TURNED_deg:
-        where = point_text(places[int(degrees.argmax())])
-        text = (
-            f"at {where} m the platform turns by {degrees.max():.0f} deg, which no cable can "
-            "prevent; anchor points that lie towards their exit points let it turn less"
-        )
-        yield Finding("axes[0].anchor_point_m", text, impossible=False)
-
-
-def _uncontrolled_rotation(platform: Platform) -> Iterator[Finding]:
-    angles = DIRECTIONS[3][3:]
-    left = [name for name in angles if name not in platform.controlled]
-    if not platform.is_planar and left and not is_point(platform):
-        text = (
-            f"{', '.join(left)} left out: the platform swings about these axes, and is taken "
-            "to be turned as it is at home"
-        )
-        yield Finding("platform.controlled", text, impossible=False)
-
-
-def lower_when_turned_m(statics: PlatformStatics) -> float:
-    """Return how much lower than at home the lowest anchor point of a turned platform may be, m."""
-    platform, up = statics.platform, statics.model.positions - 1
-    angle = platform.workspace_angle_rad
-    b = np.array([in_space(point) for point in platform.anchor_points_m])
-    b = b @ statics.model.home_pose.Q.T
-    height, aside = b[:, up], np.linalg.norm(b[:, :up], axis=1)
-    return float(height.min() - (math.cos(angle) * height - math.sin(angle) * aside).min())
-
-
-def _stand_clearance(statics: PlatformStatics) -> Iterator[Finding]:
-    """Look whether a turned platform meets, at the bottom of its box, what it stands on at home."""
-    platform, up = statics.platform, statics.model.positions - 1
-    angle, lower_m = platform.workspace_angle_rad, lower_when_turned_m(statics)
-    above_m = platform.workspace_min_m[up] - platform.home_m[up]
-    if angle > 0.0 and lower_m > above_m:
-        text = (
-            f"turned so, the lowest anchor point is {lower_m:.2f} m lower, and the box begins "
-            f"{above_m:.2f} m above home: the platform may meet what it stands on; a box from "
-            f"{platform.home_m[up] + lower_m:.2f} m upward helps"
-        )
-        yield Finding("platform.workspace_angle_rad", text, impossible=False)
 
 
 def _lengths(robot: Robot, limits: Limits, statics: PlatformStatics) -> Iterator[Finding]:
@@ -352,51 +281,3 @@ def _contact(statics: PlatformStatics) -> Iterator[Finding]:
         for turn in statics.orientations
     )
     yield Finding("platform.clearance_m", text, impossible=everywhere)
-
-
-def _angles(statics: PlatformStatics) -> Iterator[Finding]:
-    """Look for angles at which no place in the box takes a target, whichever way it is turned.
-
-    Either tensions do not hold it there, or something touches.
-    """
-    platform, interference = statics.platform, statics.model.interference
-    points, angle_rad = statics.points(), platform.workspace_angle_rad
-
-    def taken(turn_rad: FloatArray) -> bool:
-        held = statics.is_target(points, turn_rad).ravel()
-        clearances_m, _ = interference.clearances(statics.poses(points, turn_rad))
-        return bool((held & (clearances_m >= interference.clearance_m)).any())
-
-    if angle_rad == 0.0 or not taken(NONE_rad):
-        return  # said of the box, or of contact
-    names = platform.controlled[len(platform.home_m) :]
-    axes = dict(zip(names, statics.orientations[1::2], strict=False))  # diagonals follow
-
-    def refused(share: float) -> list[str]:
-        return [
-            name
-            for name, turn in axes.items()
-            if not taken(share * turn) and not taken(-share * turn)
-        ]
-
-    if nowhere := refused(1.0):
-        share = next((share for share in _SHARES if not refused(share)), 0.0)
-        about = "" if platform.is_planar else f" about {nowhere[0][-1]}"
-        text = (
-            f"value {angle_rad:g}; turned by {math.degrees(angle_rad):.0f} deg{about}, it is held "
-            "nowhere in the box, or something touches, so that no target is taken; allowed: up to "
-            f"{_rounded_down(share * angle_rad) if share else 0}"
-        )
-        yield Finding("platform.workspace_angle_rad", text, impossible=True)
-
-
-def _upright(statics: PlatformStatics) -> Iterator[Finding]:
-    """Look whether it stands upright at home on next to nothing, as a rod does."""
-    tips_at = statics.model.tips_at
-    if tips_at < _TIPS_AT:
-        text = (
-            f"{100.0 * tips_at:.2g} % of its weight tip it over on its stand, and cables that "
-            "become tight one after the other pull with more: hold it until all are tight, or give "
-            "it a foot, which platform.body tells"
-        )
-        yield Finding("axes[0].anchor_point_m", text, impossible=False)

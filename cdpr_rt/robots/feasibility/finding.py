@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 
@@ -13,3 +14,9 @@ class Finding:
     text: str
     impossible: bool
     """Whether the robot cannot work like this; else it can, less well than it seems."""
+
+
+def rounded_down(value: float) -> str:
+    """Return a value to three digits, none of which makes it larger."""
+    digits = 2 - math.floor(math.log10(value))
+    return f"{math.floor(value * 10.0**digits) / 10.0**digits:g}"
