@@ -22,7 +22,9 @@ tension off by a share of the reserve that tensions are planned with."""
 WRENCH_SHARE, NOISE_SHARE = 0.25, 0.09
 """What the platform's wrench is off, and one cycle's equation, over the cables' rated tension."""
 REVERSAL_rad_s = 0.1
-MOTORS_FADING_S, WRENCH_FADING_S = 600.0, 30.0
+MOTORS_FADING_S, WRENCH_FADING_S = 600.0, 300.0
+"""Of the wrench so long that within a second it changes by less than friction turns round by, 2 %
+of the cables' rated tension: what changes its sign with the motion is not laid to it."""
 _UNSURE = 2.0
 """By how many of its standard deviations friction in motion may be above what was found at rest."""
 _SETTLING_S = 0.3

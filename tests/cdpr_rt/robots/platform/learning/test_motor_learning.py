@@ -72,6 +72,22 @@ def test_friction_is_found_from_the_force_that_it_takes() -> None:
     assert np.abs(bound.learning.cogging_Nm).max() < 0.02
 
 
+def test_friction_is_found_within_six_short_ways_beside_a_wrench_that_stays() -> None:
+    """What turns round with the motion is friction, also where the platform rests in between."""
+    bound, true_Nm, stays_N = Bound(), 0.1, np.array([0.0, 10.0])
+    cable = np.array([axis.winch.cable_m_per_motor_rad for axis in ROBOT.axes])
+    for k in range(6):
+        way = np.array([[0.1, 0.1], [-0.1, -0.1], [0.1, -0.1], [-0.1, 0.1]][k % 4])
+        speed = bound.J @ way / cable
+        for _ in range(600):
+            missing = true_Nm * np.sign(speed) - bound.learning.torque_Nm
+            bound.force[:] = bound.J.T @ (missing / cable) + stays_N
+            bound.run(1, speed)
+        bound.force[:] = stays_N
+        bound.run(2000, np.zeros(N))
+    np.testing.assert_allclose(bound.learning.friction_Nm, true_Nm, atol=0.01)
+
+
 @pytest.mark.parametrize(("true_Nm", "learnt_Nm"), [(0.15, 0.15), (0.3, 0.2)])
 def test_friction_in_motion_may_be_above_what_was_found_at_rest(
     true_Nm: float, learnt_Nm: float
