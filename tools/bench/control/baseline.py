@@ -273,7 +273,7 @@ class _Learning:
         self.pairs = np.array([axis.winch.motor.pole_pairs for axis in axes])
         force_N = float((rated / np.abs(self.g)).mean())
         self.sigma = np.concatenate([np.outer(rated, _USUAL).ravel(), _WRENCH * force_N * scale])
-        self.keep = 1.0 - period_s / np.repeat([600.0, 30.0], [3 * n, d])
+        self.keep = 1.0 - period_s / np.repeat([600.0, 300.0], [3 * n, d])
         self.noise = _NOISE * force_N * scale
         self.most = np.minimum(_ODD * rated, reserve_N / 3.0 * np.abs(self.g))
         self.settling = round(0.3 / period_s)
