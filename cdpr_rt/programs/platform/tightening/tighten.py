@@ -28,7 +28,7 @@ from cdpr_rt.programs.platform.tightening.standing import (
     why_not_to_pull,
     would_move,
 )
-from cdpr_rt.programs.platform.tightening.standing_tensions import OVERSHOOT, StandingTensions
+from cdpr_rt.robots.standing_tensions import OVERSHOOT, StandingTensions
 
 INDEX_m_s = 0.1
 """Speed of the platform during the search for indices."""

@@ -14,7 +14,7 @@ from cdpr_rt.core.shared_block import SharedBlock
 from cdpr_rt.programs.base import Program
 from cdpr_rt.programs.model import model_of
 from cdpr_rt.programs.platform.platform_program import PlatformParts
-from cdpr_rt.programs.platform.tightening.standing_tensions import StandingTensions
+from cdpr_rt.robots.standing_tensions import StandingTensions
 from cdpr_rt.programs.registry import build_programs, platform_parts, warm_up_programs
 from cdpr_rt.robots.robot_arrays import limits_of, winches_of
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cdpr_rt.programs.platform.tightening.standing_tensions import OVERSHOOT, StandingTensions
+from cdpr_rt.robots.standing_tensions import OVERSHOOT, StandingTensions
 from tests.cdpr_rt.robots.platform.platform_physics import heavier, spatial
 
 

@@ -11,15 +11,17 @@ from cdpr_rt.robots.kinematics.pose import Pose
 OVERSHOOT = 1.5
 """Tension over pretension, for a moment: on the way back friction acts in the other direction, so
 that its effect on the angles cancels out."""
-_STANDING = 0.85
+_CARRIED = 0.85 / OVERSHOOT
+"""Share of the weight that tensions carry which do not press the platform down."""
 _HIGHEST = 0.9
 _PRESSING, _MODEST = (0.5, 0.25, 0.0), 0.4
 _FLOORS = (1.0, 0.75, 0.5, 0.25)
 """Shares of what is planned with on top of the least tension, the most that can be had first."""
-_PRESSED_LESS = (0.75, 0.5)
+_PRESSED_LESS, _SHARES = (0.75, 0.5), (1.0, 0.75, 0.5, 0.25, 0.0)
 """Shares of the weight with which a platform is pressed down whose cables might stay slack else."""
-_CLEAR = 1.2
-"""Tension over what winches take up, below which a cable that is wound in may be all but slack."""
+_CLEAR, _CLEARED = 1.2, (1.0, 0.75, 0.5)
+"""Tension over what winches take up, below which a cable that is wound in may be all but slack; and
+shares of it that are looked for, the most that can be had first."""
 
 
 class StandingTensions:
@@ -28,9 +30,10 @@ class StandingTensions:
     Their wrench is along the weight: it presses the platform down where the cables can without
     pulling hard, with none below the least tension, and as far above it as they can up to what is
     planned with: friction leaves cables to sag. Where winches may take up all of that, it presses
-    with less than the weight, so that more can be pulled. Else it carries 0.57 of the weight, too
-    little to lift the platform even at the overshoot, with each at 0.57 of what would carry it all,
-    which may be below the least tension. Friction makes the tensions differ from what is asked for
+    with less than the weight, so that more can be pulled, and with more than is planned with where
+    even that may be taken up. Else it carries 0.57 of the weight, too little to lift the platform
+    even at the overshoot, with what winches may take up exceeded as far as it can be, or with each
+    at 0.57 of what would carry it all, which may be below the least tension. Friction makes the tensions differ from what is asked for
     by some newtons, which a platform whose weight is all but carried does not stand still for.
     """
 
@@ -52,13 +55,16 @@ class StandingTensions:
         pressing = model.least_tensions(least_N, modest)
         self._pressed = [(model.least_tensions(floor_N, most), 1.0) for floor_N in floors_N]
         self._clear_N = _CLEAR * taken_up_N
-        # of a winch that may take up more than is planned with, no more is to be had
-        clear_N = np.minimum(self._clear_N, floors_N[0])
         self._clear = [
             (model.least_tensions(floor_N, most), share)
             for share in _PRESSED_LESS
             for floor_N in floors_N
-            if (floor_N >= clear_N).all()
+            if (floor_N >= self._clear_N).all()
+        ]
+        # what winches take up is to be exceeded, with more than is planned with if need be
+        self._harder = [
+            (part, model.least_tensions(np.clip(part * self._clear_N, least_N, most), most))
+            for part in _CLEARED
         ]
         self._pressed += [(self._least, 1.0)] + [(pressing, share) for share in _PRESSING]
         self._carrying = model.least_tensions(np.zeros(least_N.size), model.high_N)
@@ -70,13 +76,31 @@ class StandingTensions:
         self._kinematics.wrench_matrix(pose, self._W)
         stays = self._press(self._pressed)
         if stays and (t < self._clear_N).any():
-            stays = self._press(self._clear) or self._press(self._pressed)
+            exceeded = float(np.min(t / self._clear_N))
+            stays = self._press(self._clear) or any(
+                self._press([(solver, share) for share in _SHARES])
+                for part, solver in self._harder
+                if part > exceeded
+            )
+            stays = stays or self._press(self._pressed)
         elif not stays:
-            stays = self._least.solve(self._W, self._weight, t) is TensionOutcome.FEASIBLE
-            np.multiply(np.maximum(t, 0.0), _STANDING / OVERSHOOT, out=t)
+            stays = self._carry()
         # less than was solved for has another wrench
         stays = stays and bool((t <= self._most_N).all())
         return np.minimum(t, self._most_N, out=t), stays
+
+    def _carry(self) -> bool:
+        """Take tensions that carry a share of the weight; whether there are any."""
+        t = self._t
+        stays = self._least.solve(self._W, self._weight, t) is TensionOutcome.FEASIBLE
+        np.multiply(np.maximum(t, 0.0), _CARRIED, out=t)
+        if (t >= self._clear_N).all():
+            return stays
+        least_N, carried = t.copy(), [(solver, -_CARRIED) for _, solver in self._harder]
+        if self._press(carried):
+            return True
+        t[:] = least_N
+        return stays
 
     def _press(self, tensions: list[tuple[TensionDistribution, float]]) -> bool:
         """Take the first that press the platform down by a share of its weight; whether any do."""
