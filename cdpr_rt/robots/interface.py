@@ -161,6 +161,8 @@ class MotorFit(Protocol):
 
     taken_up_N: FloatArray
     """What winches usually take up of their cables' tensions at most, (n,)."""
+    count_rad: FloatArray
+    """Resolution of each motor's encoder, (n,)."""
 
     def prepare(self, tension_N: FloatArray) -> None:
         """Take the pretension (n,) that is pulled around."""

@@ -16,6 +16,7 @@ from cdpr_rt.robots.feasibility import turning_checks as turning
 from cdpr_rt.robots.feasibility.finding import Finding, rounded_down
 from cdpr_rt.robots.feasibility.loop_checks import loop_findings
 from cdpr_rt.robots.feasibility.not_held import point_text, why_not_held
+from cdpr_rt.robots.feasibility.stand_checks import stand_findings
 from cdpr_rt.robots.interference.interference import in_words
 from cdpr_rt.robots.robot_arrays import limits_of
 from cdpr_rt.robots.statics import NONE_rad, PlatformStatics, statics_of
@@ -64,7 +65,7 @@ def findings(robot: Robot, limits: Limits | None = None) -> list[Finding]:
             *turning.stand_clearance(statics),
         ]
         found += [*_contact(statics), *turning.upright(statics)]
-        found += _friction(robot, statics)
+        found += [*_friction(robot, statics), *stand_findings(robot, limits, statics)]
     return sorted(found, key=lambda finding: not finding.impossible)
 
 

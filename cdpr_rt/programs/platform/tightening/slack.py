@@ -14,11 +14,17 @@ from cdpr_rt.programs.platform.tightening import slack_kernel as kernel
 
 _ENOUGH = 1.25
 """Tension over what winches usually take up, at which none sticks."""
-_STILL_m, _STILL_S = 0.0003, 0.3
+_STILL_m, _STILL_S, _STILL_COUNTS = 0.0003, 0.3, 2.5
+_TURNED_m = 0.005
+"""How far a winch has turned that has not just stuck."""
+_WEAK_S = 0.04
+"""For how long a motor whose encoder has shown a count or two may pull with less."""
 _USUAL_SHARE = 0.45
 """What usually turns a winch whose cable is slack, over the most that it may take up."""
 _STAND_FRICTION, _ASIDE_SHARE = 0.3, 0.5
 """Of the stand, over the platform's weight, and what one cable may pull at it with over that."""
+_HANGING_SHARES = np.linspace(0.05, 1.0, 96)[:, None]
+"""Of the pretension, at which it is looked how far cables still come in."""
 _REMEDY = "take up slack by hand, or hold the platform"
 
 
@@ -34,12 +40,21 @@ class SlackTakeUp:
     over on its stand by what turns a winch, the cables are reeled in together at once.
     """
 
-    def __init__(self, winches: WinchSpeedLoop, parts: PlatformParts, cable_m: FloatArray) -> None:
+    def __init__(
+        self,
+        winches: WinchSpeedLoop,
+        parts: PlatformParts,
+        cable_m: FloatArray,
+        pretension_N: FloatArray,
+    ) -> None:
+        """Take the pretension at home, (n,)."""
         n, taken_up_N = cable_m.size, parts.control.pull_fit.taken_up_N
         weight_N = float(np.linalg.norm(parts.model.weight()[: parts.model.positions]))
-        self._names, self._cable = parts.names, cable_m
+        self._names, self._cable, self._winches = parts.names, cable_m, winches
         usual_N = _USUAL_SHARE * taken_up_N
         stands_N = min(_STAND_FRICTION, parts.model.tips_at) * weight_N
+        self._lengths_at_home = parts.control.lengths_at_home
+        hanging_N = _hanging_N(parts, pretension_N)
         self._at_once = bool(usual_N.max() > stands_N)
         self._phase, self._state = np.zeros(n, np.int64), np.zeros((n, kernel.STATE))
         self.tight_N = self._state[:, kernel.TIGHT_N]
@@ -49,6 +64,7 @@ class SlackTakeUp:
         driven = kernel.Winches(
             parts.period_s, self._at_once, cable_m, _ENOUGH * taken_up_N,
             np.maximum(usual_N, _ASIDE_SHARE * stands_N),
+            np.where(hanging_N > 0.0, hanging_N + usual_N, 0.0),
             winches.speed_rad_s,
             winches.tension_N, winches.low_N, winches.high_N, winches.paying_out_m_s,
         )  # fmt: skip
@@ -64,6 +80,14 @@ class SlackTakeUp:
         np.not_equal(self._phase, kernel.WAITING, out=self._busy)
         return np.logical_and(self._loose, self._busy, out=self._loose)
 
+    def pulls(self, which: BoolArray) -> str:
+        """Return with what cables `which` (n,) are pulled, and may be, by name."""
+        pull_N, may_N = self._winches.tension_N, self._winches.high_N
+        return "; ".join(
+            f"{self._names[i]} pulls with {pull_N[i]:.1f} N, up to {may_N[i]:.1f} N asked for"
+            for i in np.flatnonzero(which)
+        )
+
     def dragged(self, position_rad: FloatArray) -> str:
         """Return which tight cable was reeled in too far on, "" for none."""
         i = self._dragged
@@ -71,20 +95,32 @@ class SlackTakeUp:
             return ""
         reeled_m = (self._state[i, kernel.FROM_rad] - position_rad[i]) * self._cable[i]
         return (
-            f"{self._names[i]}: {1e3 * reeled_m:.0f} mm reeled in since it was tight, "
-            f"{1e3 * kernel.LOOSE_m:.0f} mm allowed: the platform has moved on its stand; {_REMEDY}"
+            f"{self._names[i]}: {1e3 * reeled_m:.1f} mm reeled in since it was tight, "
+            f"{1e3 * kernel.LOOSE_m:.1f} mm allowed: the platform has moved on its stand; {_REMEDY}"
         )
 
-    def uneven(self, allowed_m: float) -> str:
-        """Return whose slack was so much more that the platform may have moved, "" for none."""
-        slack_m = self._state[:, kernel.SLACK_m]
-        i, j = int(slack_m.argmax()), int(slack_m.argmin())
-        more_m = slack_m[i] - slack_m[j]
-        if not self._at_once or more_m <= allowed_m:
+    def uneven(self, position_rad: FloatArray, pulled: bool) -> str:
+        """Return whose slack was so much more that the platform may have moved, "" for none.
+
+        Slack is how far a cable has come in until now, but for its stretch. What did not turn its
+        winch as the others became tight may turn it only once all are `pulled` harder.
+        """
+        if not self._at_once:
+            return ""
+        state, on_rad = self._state, self._state[:, kernel.FROM_rad] - position_rad
+        stretch_m = self._lengths_at_home(self.tight_N) - self._lengths_at_home(
+            self._winches.high_N
+        )
+        slack_m = state[:, kernel.SLACK_m] + on_rad * self._cable - stretch_m
+        told = pulled | (np.abs(slack_m) > _TURNED_m)
+        i = int(np.where(told, slack_m, -np.inf).argmax())
+        j = int(np.where(told, slack_m, np.inf).argmin())
+        more_m, allowed_m = slack_m[i] - slack_m[j], kernel.LOOSE_m
+        if more_m <= allowed_m:
             return ""
         return (
-            f"{self._names[i]} had {1e3 * more_m:.0f} mm more slack than {self._names[j]}, "
-            f"{1e3 * allowed_m:.0f} mm allowed: what turns its winches pulls so light a platform "
+            f"{self._names[i]} had {1e3 * more_m:.1f} mm more slack than {self._names[j]}, "
+            f"{1e3 * allowed_m:.1f} mm allowed: what turns its winches pulls so light a platform "
             f"along; {_REMEDY}"
         )
 
@@ -107,12 +143,28 @@ class SlackTakeUp:
         self._dragged = self._take_up(position_rad, pretension_N, share)
 
 
-class Stillness:
-    """Whether n cables have stood still for a while."""
+def _hanging_N(parts: PlatformParts, pretension_N: FloatArray) -> FloatArray:
+    """Return the tensions (n,) up to which cables come in by their sag rather, 0 for none.
 
-    def __init__(self, cable_m: FloatArray, period_s: float) -> None:
+    From there to the pretension a straight one comes in as it stretches at the pretension.
+    """
+    tensions_N = _HANGING_SHARES * pretension_N
+    lengths_m = np.array([parts.control.lengths_at_home(tension_N) for tension_N in tensions_N])
+    steps = np.arange(_HANGING_SHARES.size)[::-1, None]
+    straight_m = lengths_m[-1] + steps * (lengths_m[-2] - lengths_m[-1])
+    # a heavy cable that is hardly pulled has no length that reaches
+    hangs = ~(lengths_m - straight_m <= 0.5 * kernel.LOOSE_m)
+    return np.asarray(np.max(np.where(hangs, tensions_N, 0.0), axis=0))
+
+
+class Stillness:
+    """Whether n cables have stood still for a while, within what encoders show to and fro."""
+
+    def __init__(self, cable_m: FloatArray, count_rad: FloatArray, period_s: float) -> None:
         self._cable, self._cycles = cable_m, math.ceil(_STILL_S / period_s)
-        self._at_rad, self._still = np.zeros(cable_m.size), 0
+        self._weak_cycles = math.ceil(_WEAK_S / period_s)
+        self._still_m = np.maximum(_STILL_m, _STILL_COUNTS * count_rad * np.abs(cable_m))
+        self._at_rad, self._still, self._weak = np.zeros(cable_m.size), 0, 0
         self.moved_m = np.zeros(cable_m.size)
         """How far each has moved since it last stood still."""
 
@@ -121,9 +173,13 @@ class Stillness:
         self._at_rad[:], self._still = position_rad, 0
 
     def lasts(self, position_rad: FloatArray, pulled: bool) -> bool:
-        """Take in a cycle; return whether they have stood still, and were pulled, for so long."""
+        """Take in a cycle; return whether they have stood still, and were pulled, for so long.
+
+        A count in a cycle is a speed at which a winch pulls with less for a moment.
+        """
         np.abs((position_rad - self._at_rad) * self._cable, out=self.moved_m)
-        if not pulled or self.moved_m.max() > _STILL_m:
+        self._weak = 0 if pulled else self._weak + 1
+        if self._weak > self._weak_cycles or (self.moved_m > self._still_m).any():
             self.begin(position_rad)
         self._still += 1
         return self._still > self._cycles

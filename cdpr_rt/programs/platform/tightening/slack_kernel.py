@@ -45,6 +45,8 @@ class Winches(NamedTuple):
     """Tensions at which none sticks."""
     harmless_N: FloatArray
     """Tensions with which one cable by itself does not move the platform on its stand."""
+    hangs_N: FloatArray
+    """Tensions with which a cable hangs through by its own weight, up to which it is not tight."""
     speed_rad_s: FloatArray
     tension_N: FloatArray
     low_N: FloatArray
@@ -75,7 +77,8 @@ def take_up(
     for i in range(phase.size):
         most = TAKE_UP_SHARE * pretension[i]
         if not w.at_once:
-            most = min(max(most, w.enough_N[i]), pretension[i])
+            most = max(most, w.enough_N[i])
+        most = min(max(most, w.hangs_N[i]), pretension[i])
         phase[i] = _next_phase(w, i, phase[i], state[i], position[i], PULLED * most)
         w.high_N[i] = max(w.high_N[i], min(share, 1.0) * most)
         _drive(w, i, phase[i], state[i], most)
@@ -128,6 +131,7 @@ def _seems_tight(w: Winches, i: int, state: FloatArray, most: float, returned: b
     enough = min(w.enough_N[i], most)
     if returned and state[TURNED_N] > 0.0:
         enough = min(enough, max(state[TURNED_N], w.harmless_N[i]))
+    enough = max(enough, PULLED * min(w.hangs_N[i], most))
     return bool(state[MEAN_m_s] < _SLOW_SHARE * TAKE_UP_m_s and tension >= enough)
 
 

@@ -15,6 +15,7 @@ from cdpr_rt.programs.platform.arrival import Arrival
 from cdpr_rt.programs.platform.platform_program import PlatformParts, PlatformProgram
 from cdpr_rt.programs.platform.tightening.index_path import index_path
 from cdpr_rt.programs.platform.tightening.length_source import SOURCES, LengthSource
+from cdpr_rt.programs.platform.tightening.letting_go import LettingGo
 from cdpr_rt.programs.platform.tightening.slack import SlackTakeUp, Stillness
 from cdpr_rt.programs.platform.tightening.slack_kernel import PULLED, TAKE_UP_SHARE, TAKE_UP_m_s
 from cdpr_rt.programs.platform.tightening.standing import (
@@ -82,15 +83,16 @@ class TightenProgram(PlatformProgram):
         self._checked = AxisFeedback(cable_m.size)
         inertia = np.full(cable_m.size, parts.control.inertia_kg_m2)
         self._winches = WinchSpeedLoop(inertia, cable_m, parts.period_s)
-        self._slack = SlackTakeUp(self._winches, parts, self._cable)
+        self._slack = SlackTakeUp(self._winches, parts, self._cable, self._home_pretension_N)
         # a long cable comes in by its sag rather than by its stretch, from where friction has it
         shares = np.array([0.0, 0.5 * TAKE_UP_SHARE, OVERSHOOT])[:, None]
         lengths_m = [parts.control.lengths_at_home(N) for N in shares * self._pretension_N]
         self._once_tight_m = _ONCE_TIGHT_m + float(np.ptp(lengths_m, axis=0).max())
         self._start_rad = np.zeros(cable_m.size)
         self._enough_N, self._weak = np.zeros(cable_m.size), np.zeros(cable_m.size, np.bool_)
-        self._stillness = Stillness(self._cable, parts.period_s)
+        self._stillness = Stillness(self._cable, parts.control.pull_fit.count_rad, parts.period_s)
         self._source = LengthSource(parts, self._cable, self._home_pretension_N)
+        self._letting_go = LettingGo(parts, self._cable, self._home_pretension_N)
         self._stage = 0
         self._share = 0.0
         self._cycles = self._handing_over_cycles = 0
@@ -250,12 +252,12 @@ class TightenProgram(PlatformProgram):
             self._end_tight(feedback, torque_Nm)
             return
         # elsewhere than at home lengths tell where the platform is, wherever it is pulled to
-        matters = self._stage == 0 and self._source.name == "home"
-        uneven = self._slack.uneven(self._once_tight_m) if matters else ""
+        stage = _STAGES[self._stage][0]
+        matters = stage in ("slack", "pull") and self._source.name == "home"
+        uneven = self._slack.uneven(feedback.position_rad, stage == "pull") if matters else ""
         self._fail_if(uneven or self._why_not_to_pull(feedback))
         if self._failure:
             return
-        stage = _STAGES[self._stage][0]
         if stage == "slack":
             self._share = 0.0  # up from what the cables are pulled with
         elif stage == "pull":
@@ -295,8 +297,23 @@ class TightenProgram(PlatformProgram):
         self._loop.update(feedback, setpoint, torque_Nm)
         self._handing_over_cycles += 1
         self._let_go_cycle = feedback.cycle
-        if self._handing_over_cycles * self._parts.period_s > _HAND_OVER_S:
+        over = self._handing_over_cycles * self._parts.period_s > _HAND_OVER_S
+        slack = self._letting_go.runs_in()
+        if over and not slack and self._source.name == "home":
+            slack = self._letting_go.disagree()
+        if slack:
+            self._let_down(feedback, torque_Nm, slack)
+        elif over:
             self._finish(feedback, setpoint, torque_Nm)
+
+    def _let_down(self, feedback: AxisFeedback, torque_Nm: FloatArray, slack: str) -> None:
+        """Have the winches let cables down that are slack, whose lengths are not those taken."""
+        self._hands_over = False
+        self._parts.estimator.forget_lengths()
+        speed_rad_s = self._parts.estimator.estimate.velocity_rad_s
+        self._winches.begin(feedback, speed_rad_s, torque_Nm)
+        np.maximum(-torque_Nm / self._cable, 0.0, out=self._winches.high_N)
+        self._fail_if(slack)
 
     def _why_not_to_pull(self, feedback: AxisFeedback) -> str:
         """Return why not to pull on; tensions for where it stands follow from known lengths."""
@@ -338,8 +355,8 @@ class TightenProgram(PlatformProgram):
         allowed_m = self._once_tight_m if self._stage > 0 else _SLACK_m
         if moved_m[i] > allowed_m:
             return (
-                f"{self._parts.names[i]}: {1e3 * moved_m[i]:.0f} mm reeled in and not tight, "
-                f"{1e3 * allowed_m:.0f} mm allowed"
+                f"{self._parts.names[i]}: {1e3 * moved_m[i]:.1f} mm reeled in and not tight, "
+                f"{1e3 * allowed_m:.1f} mm allowed"
             )
         if self._cycles * self._parts.period_s > _TIGHT_WITHIN_S:
             return self._late()
@@ -347,16 +364,11 @@ class TightenProgram(PlatformProgram):
 
     def _late(self) -> str:
         """Return which cables are not tight yet, and with what each is pulled."""
-        names, told = self._parts.names, f"not tight within {_TIGHT_WITHIN_S:g} s"
-        pull_N, may_N = self._winches.tension_N, self._winches.high_N
-        pulls = [
-            f"{names[i]} pulls with {pull_N[i]:.0f} N, {may_N[i]:.0f} N allowed"
-            for i in np.flatnonzero(self._not_tight())
-        ]
-        if not pulls:
-            i = int(self._stillness.moved_m.argmax())
-            pulls = [f"{names[i]} pulls with {pull_N[i]:.0f} N and does not stand still"]
-        return f"{told}: {'; '.join(pulls)}"
+        told, weak = f"not tight within {_TIGHT_WITHIN_S:g} s", self._not_tight()
+        if not weak.any():
+            weak[self._stillness.moved_m.argmax()] = True
+            told = f"{told}, does not stand still"
+        return f"{told}: {self._slack.pulls(weak)}"
 
     def _fail_if(self, trouble: str) -> None:
         self._failure = trouble

@@ -95,9 +95,9 @@ class PullFit:
         """Of all but friction, (n, 5, 5)."""
         self._shares = np.linspace(_LEAST_SHARE, _MOST_SHARE, _SHARES)
         self._lengths = np.ones((2, _SHARES, n))
-        self._motors[kernel.PLAY] = [
-            _COUNTS * math.tau / axis.winch.encoder_counts_per_turn for axis in axes
-        ]
+        self.count_rad = np.array([math.tau / axis.winch.encoder_counts_per_turn for axis in axes])
+        """Resolution of each encoder, (n,)."""
+        self._motors[kernel.PLAY] = _COUNTS * self.count_rad
         self._seen, self._turned = np.zeros((2, 2, n))
         self._yielding = np.zeros(n)
         self._sums = np.zeros((n, kernel.FACTORS, kernel.FACTORS))

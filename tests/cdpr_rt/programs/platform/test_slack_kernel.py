@@ -31,7 +31,7 @@ class OneCable:
             one(CABLE_m),
             one(ENOUGH_N),
             one(HARMLESS_N),
-            *(one(0.0) for _ in range(5)),
+            *(one(0.0) for _ in range(6)),
         )
     )
 
