@@ -33,8 +33,9 @@ class StandingTensions:
     with less than the weight, so that more can be pulled, and with more than is planned with where
     even that may be taken up. Else it carries 0.57 of the weight, too little to lift the platform
     even at the overshoot, with what winches may take up exceeded as far as it can be, or with each
-    at 0.57 of what would carry it all, which may be below the least tension. Friction makes the tensions differ from what is asked for
-    by some newtons, which a platform whose weight is all but carried does not stand still for.
+    at 0.57 of what would carry it all, which may be below the least tension. Friction makes the
+    tensions differ from what is asked for by some newtons, which a platform whose weight is all but
+    carried does not stand still for.
     """
 
     def __init__(

@@ -9,6 +9,7 @@ import pytest
 from cdpr_here import cdpr_here
 
 from cdpr_profiles import load_robot
+from cdpr_profiles.reading.places import SHIPPED
 from cdpr_tools.errors import WorkFailedError
 from cdpr_tools.trials.lockstep import LockstepRobot
 
@@ -129,3 +130,26 @@ def test_a_platform_that_would_tip_over_is_not_pulled_at_by_one_winch_alone(tmp_
         position_mm, turned_deg = moved_mm(robot, name)
     assert position_mm < 1.0
     assert turned_deg < 1.0
+
+
+def test_winches_that_rub_more_than_the_least_tension_leave_no_cable_slack(tmp_path: Path) -> None:
+    """They are pulled on the stand with more than they rub, 16 N, and not with 8 N."""
+    name, file = tmp_path / "heavy.toml", tmp_path / "plant.toml"
+    text = (SHIPPED / "robots" / "planar-4.toml").read_text()
+    for old, new in (
+        ("mass_kg = 3.0", "mass_kg = 20.0"),
+        ("tension_min_N = 20.0", "tension_min_N = 8.0"),
+        ("tension_max_N = 230.0", "tension_max_N = 150.0"),
+    ):
+        assert old in text
+        text = text.replace(old, new)
+    name.write_text(text)
+    file.write_text("start.slack_m = 0.02\nmotor.friction.coulomb_Nm = 0.16\n")
+    with LockstepRobot(name, plant=file) as robot:
+        robot.enable()
+        robot.program("tighten")
+        while robot.progress.get("stage") != "beyond":
+            robot.run(0.1)
+            assert not robot.progress.get("trouble")
+        assert robot.truth()["tension_N"].min() > 10.0
+        assert moved_mm(robot, name)[0] < 1.0

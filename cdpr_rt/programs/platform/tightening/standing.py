@@ -11,9 +11,9 @@ import numpy as np
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.core.exchange import AxisFeedback
 from cdpr_rt.programs.platform.platform_program import PlatformParts, distance_m
-from cdpr_rt.robots.standing_tensions import StandingTensions
 from cdpr_rt.refusal import CommandRefusal, RefusalCode
 from cdpr_rt.robots.rigid_body import G_m_s2
+from cdpr_rt.robots.standing_tensions import StandingTensions
 
 _TURNED_MORE_rad = math.radians(30.0)
 """A platform may stand turned by so much more than it turns in use."""

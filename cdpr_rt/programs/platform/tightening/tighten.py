@@ -311,7 +311,9 @@ class TightenProgram(PlatformProgram):
         self._hands_over = False
         self._parts.estimator.forget_lengths()
         speed_rad_s = self._parts.estimator.estimate.velocity_rad_s
-        self._winches.begin(feedback, speed_rad_s, torque_Nm)
+        # what drives a winch that runs in already holds nothing
+        runs_in = speed_rad_s * self._cable < -TAKE_UP_m_s
+        self._winches.begin(feedback, speed_rad_s, np.where(runs_in, 0.0, torque_Nm))
         np.maximum(-torque_Nm / self._cable, 0.0, out=self._winches.high_N)
         self._fail_if(slack)
 

@@ -14,9 +14,9 @@ from cdpr_rt.core.shared_block import SharedBlock
 from cdpr_rt.programs.base import Program
 from cdpr_rt.programs.model import model_of
 from cdpr_rt.programs.platform.platform_program import PlatformParts
-from cdpr_rt.robots.standing_tensions import StandingTensions
 from cdpr_rt.programs.registry import build_programs, platform_parts, warm_up_programs
 from cdpr_rt.robots.robot_arrays import limits_of, winches_of
+from cdpr_rt.robots.standing_tensions import StandingTensions
 
 PERIOD_S = 1e-3
 CABLE_m = np.full(3, -0.026)

@@ -93,3 +93,23 @@ def test_other_programs_meanwhile_go_on_without_a_step(robot: Standing, name: st
     if name == "lower":
         assert robot.program.at_rest
         assert not robot.torque.any()
+
+
+@pytest.mark.parametrize(("slack_m_s", "told"), [(4.0, "its winch runs in"), (0.04, "disagree by")])
+def test_a_cable_that_was_slack_is_let_down_and_its_length_forgotten(
+    robot: Standing, slack_m_s: float, told: str
+):
+    """Its winch is stopped before it runs away, and no length that it has made is believed."""
+    handing_over(robot)
+    fastest_m_s = 0.0
+    while not robot.program.progress()["trouble"]:
+        robot.slack_m[1] += slack_m_s * PERIOD_S
+        robot.run(PERIOD_S)
+        fastest_m_s = max(fastest_m_s, np.abs(robot.speed * robot.cable_m).max())
+        assert not robot.parts.tight
+    assert told in robot.program.progress()["trouble"]
+    robot.run(1.0)
+    assert robot.program.at_rest
+    assert not robot.torque.any()
+    assert fastest_m_s < 1.0
+    assert not robot.parts.tight and not robot.parts.pose_known

@@ -9,6 +9,7 @@ import pytest
 
 from cdpr_rt.arrays import FloatArray, IntArray
 from cdpr_rt.programs.platform.tightening import slack_kernel as kernel
+from cdpr_rt.programs.platform.tightening.slack import Stillness
 
 PERIOD_S, CABLE_m, ENOUGH_N, HARMLESS_N, PRETENSION_N = 1e-3, 0.026, 16.0, 7.0, 60.0
 
@@ -107,3 +108,23 @@ def test_a_tight_cable_is_let_go_at_once() -> None:
     assert cable.winch.high_N[0] > 0.0
     assert cable.run(0.5, 9.0) == kernel.PAID_OUT
     assert cable.winch.high_N[0] == 0.0
+
+
+def test_it_is_not_tight_with_what_its_own_weight_pulls() -> None:
+    cable = reeled_in(0.03, 9.0)
+    cable.winch.hangs_N[:] = 40.0
+    assert cable.run(0.5, 1.1 * ENOUGH_N) == kernel.REELED_IN
+    assert cable.run(0.5, 40.0) == kernel.PAID_OUT
+
+
+def test_a_motor_that_dithers_by_a_count_stands_still() -> None:
+    """A count in a cycle is a speed at which its winch pulls with less for some cycles."""
+    count_rad = one(1.5 * 0.0001 / CABLE_m)
+    for still_for, far in ((3, 1.0), (60, 1.0), (3, 4.0)):
+        stillness = Stillness(one(CABLE_m), count_rad, PERIOD_S)
+        stillness.begin(one(0.0))
+        lasted = [
+            stillness.lasts(far * count_rad * (cycle // 80 % 2), cycle % 80 >= still_for)
+            for cycle in range(1000)
+        ]
+        assert any(lasted) == (still_for == 3 and far == 1.0)

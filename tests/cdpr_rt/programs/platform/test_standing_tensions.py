@@ -62,3 +62,19 @@ def test_the_more_winches_may_take_up_the_harder_cables_are_pulled() -> None:
         least_N.append(tension_N.min())
     assert least_N == sorted(least_N)
     assert least_N[-1] > 1.5 * least_N[0]
+
+
+@pytest.mark.parametrize(("taken_up_N", "pulled_N"), [(28.0, 33.6), (44.0, 39.6), (1e3, 0.0)])
+def test_they_are_pulled_with_more_than_is_planned_with_where_winches_take_that_up(
+    taken_up_N: float, pulled_N: float
+) -> None:
+    """Up to their bounds: 1.2 times what winches take up, or three quarters of that."""
+    machine = heavier(spatial(), 14.0)
+    model, low_N = machine.model(), np.full(machine.n, 20.0)
+    standing = StandingTensions(
+        model, low_N, np.full(machine.n, 1e3), np.full(machine.n, taken_up_N)
+    )
+    tension_N, stays = standing.at(model.home_pose)
+    assert stays
+    assert tension_N.min() > pulled_N - 1e-6
+    assert (OVERSHOOT * tension_N < machine.high_N).all()
