@@ -367,10 +367,11 @@ class TightenProgram(PlatformProgram):
     def _late(self) -> str:
         """Return which cables are not tight yet, and with what each is pulled."""
         told, weak = f"not tight within {_TIGHT_WITHIN_S:g} s", self._not_tight()
-        if not weak.any():
-            weak[self._stillness.moved_m.argmax()] = True
-            told = f"{told}, does not stand still"
-        return f"{told}: {self._slack.pulls(weak)}"
+        if weak.any():
+            return f"{told}: {self._slack.pulls(weak)}"
+        i = int(self._stillness.moved_m.argmax())
+        pull_N = self._winches.tension_N[i]
+        return f"{told}: {self._parts.names[i]} pulls with {pull_N:.1f} N and does not stand still"
 
     def _fail_if(self, trouble: str) -> None:
         self._failure = trouble
