@@ -74,7 +74,7 @@ def test_slack_is_taken_up_again_as_at_first(monkeypatch: pytest.MonkeyPatch):
     """What winches pulled with at the end of the time before makes no cable tight."""
     monkeypatch.setattr(slack_module, "_STAND_FRICTION", 0.0)  # reeled in together at once
     robot = Standing()
-    for slack_m in ((0.02, 0.012, 0.03), (0.06, 0.055, 0.07)):
+    for slack_m in ((0.02, 0.015, 0.03), (0.06, 0.055, 0.07)):
         robot.loosen(slack_m)
         robot.switch("tighten")
         assert not robot.until_done(20.0)["trouble"]
