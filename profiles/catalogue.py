@@ -152,11 +152,15 @@ def _platform(file: RobotFile, axes: Sequence[RobotAxis]) -> Platform | None:
     values = {key: value for key, value in file.platform if value is not None}
     up = (*(0.0 for _ in file.platform.home_m[1:]), 1.0)
     values.setdefault("clearance_m", max(CLEARANCE_m, _thickest_m(axes)))
+    hangs = file.platform.cable_model == "catenary"
     return Platform(
         **values,
         exit_points_m=tuple(axis.exit_point_m or () for axis in file.axes),
         anchor_points_m=tuple(axis.anchor_point_m or () for axis in file.axes),
         pulley_radius_m=tuple(axis.pulley_radius_m for axis in file.axes),
+        cable_weights_N_m=tuple(
+            axis.winch.cable.weight_per_length_N_m if hangs else 0.0 for axis in axes
+        ),
         pulley_axes=tuple(axis.pulley_axis or up for axis in file.axes),
     )
 

@@ -180,6 +180,8 @@ class Platform:
     """Boxes in the room."""
     pulley_radius_m: tuple[float, ...] = ()
     """One for each axis; 0 for an eye."""
+    cable_weights_N_m: tuple[float, ...] = ()
+    """Weight per length that counts in lengths and tensions, one for each axis; 0: of none."""
     pulley_axes: tuple[tuple[float, ...], ...] = ()
     """Unit vectors along which the cables come up to their pulleys, one for each axis."""
 
@@ -194,6 +196,7 @@ class Platform:
             "home_rotation_rad": self.home_rotation_rad or (0.0,) * (1 if size == 2 else 3),
             "controlled": tuple(name for name in DIRECTIONS[size] if name in controlled),
             "pulley_radius_m": self.pulley_radius_m or (0.0,) * n,
+            "cable_weights_N_m": self.cable_weights_N_m or (0.0,) * n,
             "pulley_axes": self.pulley_axes or (up,) * n,
             "angular_speed_rad_s": self.angular_speed_rad_s or self.speed_m_s / arm_m,
             "angular_acceleration_rad_s2": (

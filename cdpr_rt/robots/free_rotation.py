@@ -125,6 +125,7 @@ def _standing(
     t, rotation = np.zeros(model.kinematics.n), rotation_of(model.platform)
     found = np.zeros((len(flat), 4))
     poses = model.poses(flat)
+    wrenches = wrenches + still.hanging_wrenches(poses)
     for k, W in enumerate(still.wrench_matrices(poses)):
         planned.solve(W, wrenches[k], t)
         found[k, 0] = kernel.turn_to_rest(model.kinematics.geometry, t, poses[k], rotation)

@@ -244,6 +244,7 @@ def cable_kinematics(platform: Platform, centre_m: FloatArray | float = 0.0) -> 
         directions_of(platform),
         pulley_radius_m=np.array(platform.pulley_radius_m),
         swivel_axes=np.array([in_space(axis) for axis in platform.pulley_axes]),
+        weights_N_m=np.array(platform.cable_weights_N_m),
         home=_home_pose(platform),
     )
 
@@ -266,7 +267,8 @@ def _torque_limited_N(robot: Robot, limits: Limits, high_N: FloatArray) -> Float
     """Return the upper bounds (n,) of tensions that motors can hold while rotors accelerate.
 
     t = (τ - J a/r)/r with rotor inertia J, cable per radian r, and the largest acceleration a of an
-    anchor point.
+    anchor point. Bounds hold at the winches: where the cables' weight counts, tensions in their
+    middle are less by half the weight of a cable to the lowest place of its anchor.
     """
     platform = robot.platform
     assert platform is not None  # asked for by who has one
@@ -278,7 +280,19 @@ def _torque_limited_N(robot: Robot, limits: Limits, high_N: FloatArray) -> Float
     if d > k:
         fastest += _arm_m(platform) * np.sqrt(d - k) * platform.angular_acceleration_rad_s2
     left = (torque_Nm - rotor * fastest / per_rad) / per_rad
-    return np.asarray(np.minimum(high_N, left))
+    return np.asarray(np.minimum(high_N, left) - _largest_rise_N(platform))
+
+
+def _largest_rise_N(platform: Platform) -> FloatArray:
+    """Return by how much tensions at the winches are above those in the middle at most, (n,).
+
+    Half the weight of each cable, as long as a cable to the lowest place may be, times the sine of
+    its slope: half the weight per length times the height of the exit.
+    """
+    reach = max(float(np.linalg.norm(anchor)) for anchor in platform.anchor_points_m)
+    exits_m = np.array([point[-1] for point in platform.exit_points_m])
+    height_m = exits_m - (min(platform.workspace_min_m[-1], platform.home_m[-1]) - reach)
+    return np.asarray(0.5 * np.array(platform.cable_weights_N_m) * np.maximum(height_m, 0.0))
 
 
 def _arm_m(platform: Platform) -> float:

@@ -155,10 +155,11 @@ class PlatformStatics:
         n, low = self.model.kinematics.n, self.low_N + reserve_N
         still = self.model.workspace(0.0)
         least, weight = self.model.least_tensions(low, np.full(n, _ANY_N)), still.wrenches[0]
-        t, matrices = np.zeros(n), still.wrench_matrices(self.poses(position_m))
+        t, poses = np.zeros(n), self.poses(position_m)
+        matrices, hanging = still.wrench_matrices(poses), still.hanging_wrenches(poses)
         found = np.full((len(matrices), n), np.nan)
         for k, W in enumerate(matrices):
-            if least.solve(W, weight, t) is TensionOutcome.FEASIBLE:
+            if least.solve(W, weight + hanging[k], t) is TensionOutcome.FEASIBLE:
                 found[k] = t
         return found.reshape(*np.shape(position_m)[:-1], n)
 

@@ -104,10 +104,11 @@ class CableWorkspace:
         if self.kinematics.n - len(self.kinematics.directions) > MOST_NULL_DIRECTIONS:
             return self.margins(poses)[0]
         matrices, margins = self.wrench_matrices(poses), np.zeros(len(poses))
+        hanging = self.hanging_wrenches(poses)
         (d, n), k = matrices.shape[1:], len(self.sets.wrenches)
         side = max(n, 8)
         write_circuit_margins(
-            matrices, self.sets, least_N, margins, np.zeros((k, n)), np.zeros((n + 1, n)),
+            matrices, hanging, self.sets, least_N, margins, np.zeros((k, n)), np.zeros((n + 1, n)),
             np.zeros((d, n + 1)), np.zeros((4, side, side)),
         )  # fmt: skip
         return margins
@@ -115,11 +116,20 @@ class CableWorkspace:
     def wrench_matrices(self, poses: FloatArray) -> FloatArray:
         """Return the W (m, d, n) by which tensions act at the poses, about the wrenches' point."""
         d, n = len(self.kinematics.directions), self.kinematics.n
-        centred, matrices = np.array(poses, float), np.zeros((len(poses), d, n))
+        matrices = np.zeros((len(poses), d, n))
+        self.kinematics.wrench_matrices(self._centred(poses), matrices)
+        return matrices
+
+    def hanging_wrenches(self, poses: FloatArray) -> FloatArray:
+        """Return what the cables' own weight adds to the wrenches at the poses, (m, d)."""
+        return self.kinematics.hanging_wrenches(self._centred(poses))
+
+    def _centred(self, poses: FloatArray) -> FloatArray:
+        """Return the poses (m, 4, 3) of the wrenches' point."""
+        centred = np.array(poses, float)
         if self.sets.centre.any():
             centred[:, 0] += centred[:, 1:] @ self.sets.centre
-        self.kinematics.wrench_matrices(centred, matrices)
-        return matrices
+        return centred
 
     def is_feasible(self, pose: Pose) -> bool:
         """Return whether the platform is held at a pose; once `prepared` allocates no arrays."""
@@ -165,10 +175,11 @@ class _Pass:
             self._centred = np.zeros((m, 4, 3))
         self.margins, self.tensions = np.zeros(m), np.zeros((m, n))
         self._kinematics, self.matrices = kinematics, np.zeros((m, d, n))
+        self._hanging = np.zeros((m, d))
         spaces, particular = np.zeros((m, n + 1, n)), np.zeros((m, k, n))
         null_directions, scratch = np.zeros(m, np.int64), np.zeros((4, max(n, 8), max(n, 8)))
         self._null_spaces = bound(
-            null_spaces, self.matrices, wrenches, scale, bounds,
+            null_spaces, self.matrices, self._hanging, wrenches, scale, bounds,
             spaces, particular, null_directions, np.zeros((d, n + 1)), scratch,
         )  # fmt: skip
         self._write_margins = bound(
@@ -178,7 +189,7 @@ class _Pass:
         self._circuits = None
         if n - d <= MOST_NULL_DIRECTIONS:
             self._circuits = bound(
-                write_circuit_margins, self.matrices, sets, 0.0, self.margins,
+                write_circuit_margins, self.matrices, self._hanging, sets, 0.0, self.margins,
                 np.zeros((len(sets.wrenches), n)), spaces[0], np.zeros((d, n + 1)), scratch,
             )  # fmt: skip
 
@@ -202,6 +213,7 @@ class _Pass:
             np.matmul(self.poses[:, 1:], self._centre, out=self._aside)
             self._centred[:, 0] += self._aside
         self._kinematics.wrench_matrices(self._centred, self.matrices)
+        self._kinematics.write_hanging_wrenches(self._centred, self._hanging)
 
 
 def infeasibility_text(

@@ -334,7 +334,7 @@ class BoardLink:
         self._axis = axis
         self._state_machine = state_machine
         self._board = board
-        self._tension = axis.motor["tension"]
+        self._tension = axis.motor["winch_tension"]
         self._brake_Nm = axis.plant.motor.brake_torque_Nm
         self._released, self._power_on = True, False
         self._applied_s = axis.time

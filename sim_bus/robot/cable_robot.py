@@ -117,7 +117,7 @@ class CableRobot:
     @property
     def tension_N(self) -> FloatArray:
         """True tension of each cable at its winch, (n,)."""
-        return np.array(self.motors["tension"])
+        return np.array(self.motors["winch_tension"])
 
     def cut(self, i: int) -> None:
         """Cut cable `i` for good."""

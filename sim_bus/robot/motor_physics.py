@@ -130,7 +130,7 @@ def turn_loaded(m: Any, h: float, A: float, B: float) -> float:
         v = min(m.mass_velocity + h * m.gravity, landing)
     m.mass_velocity = v
     m.mass_position += h * v
-    m.tension = tension
+    m.tension = m.winch_tension = tension
     m.load_friction = m.winch_friction + m.friction_share * tension
     return w
 
@@ -189,8 +189,11 @@ def wind(m: Any, h: float, A: float, B: float) -> float:
 
     The platform stands still during the step: it is heavy, and moved afterwards by the tension
     found here. The spring acts from where it is (symplectic Euler), damping is implicit. What gear
-    and belt yield comes on top of the cable's stretch. Creep is a strain that follows a share of
-    the elastic one, d(creep)/dt = (share · t / EA - creep) / time: a chain of Kelvin and Voigt.
+    and belt yield comes on top of the cable's stretch. Of what hangs free, a cable of potential
+    energy -w L drop/2, the platform bears half of its weight, `hung_load`, and the winch w drop/2
+    more than the tension halfway: a cable that is paid out goes down. Creep is a strain that
+    follows a share of the elastic one, d(creep)/dt = (share · t / EA - creep) / time: a chain of
+    Kelvin and Voigt.
     """
     length, c = paid_out(m)
     hanging = m.weight * length * m.far_level
@@ -199,12 +202,14 @@ def wind(m: Any, h: float, A: float, B: float) -> float:
     crept = length * (1.0 + m.creep[0] + m.creep[1])
     pull, slope = cable_force(m.far_distance - crept, stiffness, sag, m.tension)
     d = m.damping_time * slope
-    w = braked(m, A + c * d * c, B + c * (pull + d * m.far_rate))
+    more = 0.5 * m.weight * m.far_drop
+    w = braked(m, A + c * d * c, B + c * (pull + more + d * m.far_rate))
     tension = pull + d * (m.far_rate - c * w)
     if tension <= 0.0:
         tension = 0.0
-        w = braked(m, A, B)
-    m.tension = tension
+        w = braked(m, A, B + c * more)
+    m.tension, m.winch_tension = tension, max(0.0, tension + more)
+    m.hung_load = 0.5 * m.weight * max(0.0, length - m.far_wound)
     m.load_friction = m.winch_friction + m.friction_share * tension
     for k in range(CREEPS):
         m.creep[k] += h * m.creep_rate[k] * (m.creep_share[k] * tension / m.rigidity - m.creep[k])

@@ -91,11 +91,15 @@ _CABLE = [
     ("far_distance", _F8),  # m, from exit to anchor point
     ("far_rate", _F8),  # m/s
     ("far_level", _F8),  # horizontal share of the way
+    ("far_wound", _F8),  # m, of it on the pulley
+    ("far_drop", _F8),  # m, how far along gravity the anchor point is from where the cable is free
     # state
     ("mass", _F8),  # kg
     ("mass_position", _F8),  # m, downward from power-up
     ("mass_velocity", _F8),  # m/s
-    ("tension", _F8),  # N
+    ("tension", _F8),  # N; of a cable with weight that leads to a platform, halfway
+    ("hung_load", _F8),  # N, the half of its weight that its far end bears
+    ("winch_tension", _F8),  # N, at the winch
     ("creep", _F8, (CREEPS,)),  # strain of a cable that leads to a platform
     ("load_friction", _F8),  # Nm, level of the dry friction that the load adds
 ]
@@ -214,7 +218,7 @@ def remove_cable(motor: MotorArray) -> bool:
     m: Any = motor[0]
     had_one = bool(m["load_kind"] != LOAD_KINDS.index("none"))
     m["load_kind"] = LOAD_KINDS.index("none")
-    m["tension"] = m["load_friction"] = 0.0
+    m["tension"] = m["winch_tension"] = m["load_friction"] = 0.0
     return had_one
 
 
@@ -273,7 +277,7 @@ def _set_cable(m: Any, plant: Plant, transmission: Transmission) -> None:
     m["winch_friction"] = load.winch_friction_Nm
     m["friction_share"] = load.friction_share * abs(gain)
     m["mass"] = load.mass_kg
-    m["tension"] = tension
+    m["tension"] = m["winch_tension"] = tension
     m["load_friction"] = load.winch_friction_Nm + float(m["friction_share"]) * tension
 
 

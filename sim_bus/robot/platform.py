@@ -70,6 +70,8 @@ def update_cable_ends(p: Any, motors: Any) -> None:
         m.far_distance = free + wound
         m.far_rate = -(vx * way[0] + vy * way[1] + vz * way[2])
         m.far_level = math.sqrt(max(0.0, level2))
+        m.far_wound = wound
+        m.far_drop = 0.0 if g == 0.0 else -free * rise / g
         if wound > 0.0:  # only what is free sags, by the cube of its length
             m.far_level *= (free / (free + wound)) ** 1.5
 
@@ -131,9 +133,12 @@ def step_platform(p: Any, motors: Any, h: float) -> None:
     fz = p.mass * p.gravity[2] - p.air * p.velocity[2]
     drag = p.air * p.reach * p.reach
     tx, ty, tz = -drag * p.spin[0], -drag * p.spin[1], -drag * p.spin[2]
+    g = math.sqrt(p.gravity[0] ** 2 + p.gravity[1] ** 2 + p.gravity[2] ** 2)
     for i in range(p.cables):
-        t = motors[i].tension
-        x, y, z = t * p.way[i, 0], t * p.way[i, 1], t * p.way[i, 2]
+        t, load = motors[i].tension, 0.0 if g == 0.0 else motors[i].hung_load / g
+        x = t * p.way[i, 0] + load * p.gravity[0]
+        y = t * p.way[i, 1] + load * p.gravity[1]
+        z = t * p.way[i, 2] + load * p.gravity[2]
         r = p.arm[i]
         fx += x
         fy += y

@@ -35,7 +35,7 @@ from cdpr_rt.calibration.estimation.parameters import (
 )
 from cdpr_rt.calibration.markers.geometry.rotations import cross_matrices
 from cdpr_rt.calibration.readings.observations import Observations
-from cdpr_rt.robots.kinematics.cable_kernel import ANCHOR, ARC, AXIS, FREE, run_poses
+from cdpr_rt.robots.kinematics.cable_kernel import ANCHOR, ARC, AXIS, FREE, WEIGHT, run_poses
 from cdpr_rt.robots.kinematics.cable_kernel import CABLE_ROWS as KERNEL_ROWS
 from cdpr_rt.robots.kinematics.cable_model import write_unstretched_lengths
 from cdpr_rt.robots.rigid_body import G_m_s2, in_space
@@ -142,7 +142,7 @@ def _closure(
     each[..., OFFSET] = stretch
     each[..., DRUM] = paid_out * stretch
     each[..., ANCHORS] = -np.einsum("jka,jik->jia", poses[:, 1:], u)
-    theta = np.arccos(np.clip(np.einsum("jik,ki->ji", u, kernel[AXIS:]), -1.0, 1.0))
+    theta = np.arccos(np.clip(np.einsum("jik,ki->ji", u, kernel[AXIS:WEIGHT]), -1.0, 1.0))
     each[..., CABLE_ROWS - 1] = np.sin(theta) - theta
     each *= weight[..., None]
     q = len(rows)

@@ -45,7 +45,8 @@ def path_tensions(model: PlatformModel, timed: TimedPath) -> PathTensions:
     weight = np.zeros(6)
     weight[model.positions - 1] = -model.platform.mass_kg * G_m_s2
     others = weight[list(model.kinematics.directions)] - InertialWrenches(model, q).of(v, a)
-    matrices = model.workspace(0.0, 0.0).wrench_matrices(model.poses(q))
+    workspace, poses = model.workspace(0.0, 0.0), model.poses(q)
+    matrices, others = workspace.wrench_matrices(poses), others + workspace.hanging_wrenches(poses)
     tension, carried = np.zeros((len(q), model.kinematics.n)), np.zeros(len(q), bool)
     for i, W in enumerate(matrices):
         outcome = distribution.solve(W, others[i], tension[i])

@@ -5,8 +5,9 @@ origin and its angular velocity, both along the axes of the room; a small change
 Arrays, all of float64:
 
     pose      (4, 3)      position p, and below it the rotation matrix Q
-    geometry  (10, n)     rows EXIT, ANCHOR (in the platform's frame), RADIUS of a swivel pulley,
-                          AXIS of its swivelling: unit vector along which the cable comes up to it
+    geometry  (13, n)     rows EXIT, ANCHOR (in the platform's frame), RADIUS of a swivel pulley,
+                          AXIS of its swivelling: unit vector along which the cable comes up to it;
+                          WEIGHT per length as a vector in the room, N/m, 0 of weightless cables
     cables    (9, n)      J transposed (6, n), then rows FREE, ARC, ERROR
 """
 
@@ -14,10 +15,12 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from cdpr_rt.arrays import FloatArray, IntArray
 from cdpr_rt.jit import jit
 
-ANCHOR, RADIUS, AXIS, GEOMETRY_ROWS = 3, 6, 7, 10
+ANCHOR, RADIUS, AXIS, WEIGHT, GEOMETRY_ROWS = 3, 6, 7, 10, 13
 FREE, ARC, ERROR, CABLE_ROWS = 6, 7, 8, 9
 TINY = 1e-300
 
@@ -71,6 +74,63 @@ def wrench_matrices(
         for i in range(W.shape[2]):
             for k in range(W.shape[1]):
                 W[j, k, i] = -cables[chosen[k], i] if cables[FREE, i] > 0.0 else math.nan
+
+
+@jit
+def hang(geometry: FloatArray, pose: FloatArray, cables: FloatArray, wrench: FloatArray) -> None:
+    """Add the wrench (6,) of the cables' own weight on the platform to `wrench`.
+
+    To second order of weight over tension, a cable of weight w per length (a vector) and free
+    length ρ, whose tension in the middle is t, pulls the platform with t towards its exit and with
+    half of its weight, ρ w/2, at Q b from the platform's origin: a parabola, with no derivative of
+    t in it. The winch feels t + `tension_rise`. `cables` are those at the pose.
+    """
+    for i in range(geometry.shape[1]):
+        half = 0.5 * cables[FREE, i]
+        fx, fy = half * geometry[WEIGHT, i], half * geometry[WEIGHT + 1, i]
+        fz = half * geometry[WEIGHT + 2, i]
+        if fx == 0.0 and fy == 0.0 and fz == 0.0:
+            continue
+        bx, by, bz = geometry[3, i], geometry[4, i], geometry[5, i]
+        rx = pose[1, 0] * bx + pose[1, 1] * by + pose[1, 2] * bz
+        ry = pose[2, 0] * bx + pose[2, 1] * by + pose[2, 2] * bz
+        rz = pose[3, 0] * bx + pose[3, 1] * by + pose[3, 2] * bz
+        wrench[0] += fx
+        wrench[1] += fy
+        wrench[2] += fz
+        wrench[3] += ry * fz - rz * fy
+        wrench[4] += rz * fx - rx * fz
+        wrench[5] += rx * fy - ry * fx
+
+
+@jit
+def tension_rise(geometry: FloatArray, cables: FloatArray, i: int) -> float:
+    """Return by how much tension at a cable's exit is above that in its middle: ρ u·w/2, N.
+
+    With u from exit to anchor: half of the weight times how far the exit is above the anchor. At
+    the platform it is as much below.
+    """
+    along = 0.0
+    for k in range(3):
+        along += cables[k, i] * geometry[WEIGHT + k, i]
+    return float(0.5 * cables[FREE, i] * along)
+
+
+@jit
+def hanging_wrenches(
+    geometry: FloatArray, poses: FloatArray, chosen: IntArray, cables: FloatArray, out: FloatArray
+) -> None:
+    """Write the wrench of the cables' weight, as `hang`, into `out` (m, d) at poses (m, 4, 3).
+
+    `cables` is overwritten.
+    """
+    whole = np.empty(6)
+    for j in range(out.shape[0]):
+        run_cables(geometry, poses[j], cables)
+        whole[:] = 0.0
+        hang(geometry, poses[j], cables, whole)
+        for k in range(out.shape[1]):
+            out[j, k] = whole[chosen[k]]
 
 
 @jit

@@ -56,14 +56,17 @@ class CableKinematics:
         model: CableModel | None = None,
         pulley_radius_m: FloatArray | float = 0.0,
         swivel_axes: FloatArray | None = None,
+        weights_N_m: FloatArray | float = 0.0,
         home: Pose | None = None,
         length_std_m: float = 1e-3,
     ) -> None:
         """Take exit points in the room, anchor points on the platform: (n, 3), in a plane (n, 2).
 
         Up is the last coordinate. `swivel_axes` (n, 3) are unit vectors along which cables come up
-        to their pulleys (default: up). `home` has the rotation around which the platform is turned
-        at all, which restarts make use of; `length_std_m` is the standard deviation of a length.
+        to their pulleys (default: up). `weights_N_m` are the cables' weights per length as far as
+        they count in equilibrium, see `hanging_wrenches`. `home` has the rotation around which the
+        platform is turned at all, which restarts make use of; `length_std_m` is the standard
+        deviation of a length.
         Raises GeometryError for what is no robot.
         """
         a, b = _points(exit_points_m, "exit points"), _points(anchor_points_m, "anchor points")
@@ -79,7 +82,11 @@ class CableKinematics:
         self.geometry[cable_kernel.ANCHOR : cable_kernel.RADIUS] = b.T
         self.geometry[cable_kernel.RADIUS] = pulley_radius_m
         axes = self._up if swivel_axes is None else np.asarray(swivel_axes, float)
-        self.geometry[cable_kernel.AXIS :] = np.broadcast_to(axes, (self.n, 3)).T
+        self.geometry[cable_kernel.AXIS : cable_kernel.WEIGHT] = np.broadcast_to(
+            axes, (self.n, 3)
+        ).T
+        self.geometry[cable_kernel.WEIGHT :] = np.outer(-self._up, np.ones(self.n) * weights_N_m)
+        self._hangs = bool(self.geometry[cable_kernel.WEIGHT :].any())
         _check_pulleys(self.geometry)
         if not 0.0 < length_std_m < math.inf:
             raise GeometryError(f"length_std_m: value {length_std_m:g}; allowed: above 0")
@@ -140,6 +147,21 @@ class CableKinematics:
         """Write W (m, d, n) at the arrays of m poses (m, 4, 3); nan where a cable has no length."""
         cable_kernel.wrench_matrices(self.geometry, poses, self._chosen, self._cables, out)
 
+    def hanging_wrenches(self, poses: FloatArray) -> FloatArray:
+        """Return the wrench (m, d) of the cables' weight on the platform at poses (m, 4, 3).
+
+        Half of each cable's, at its anchor point; then W t + w_e = 0 holds for the tensions t in
+        the middle of the cables where w_e has it, see `cable_kernel.hang`.
+        """
+        out = np.zeros((len(poses), len(self.directions)))
+        self.write_hanging_wrenches(poses, out)
+        return out
+
+    def write_hanging_wrenches(self, poses: FloatArray, out: FloatArray) -> None:
+        """Write these into `out` (m, d), which stays as it is where the cables are weightless."""
+        if self._hangs:
+            cable_kernel.hanging_wrenches(self.geometry, poses, self._chosen, self._cables, out)
+
     def geometric_stiffness(self, pose: Pose, tension_N: FloatArray) -> FloatArray:
         """Return ∂(J^T t)/∂(twist) (6, 6) of cables that hold tensions t (n,), all directions.
 
@@ -170,7 +192,8 @@ class CableKinematics:
 
         Nothing where the cable leaves along the swivel axis.
         """
-        axis, exit_m = self.geometry[cable_kernel.AXIS :, i], self.geometry[:3, i]
+        axis = self.geometry[cable_kernel.AXIS : cable_kernel.WEIGHT, i]
+        exit_m = self.geometry[:3, i]
         across = np.cross(axis, self._cables[:3, i])
         size, h = np.linalg.norm(across), np.linalg.norm(np.cross(axis, pose.p + b - exit_m))
         if not min(size, h) > 0.0:
@@ -275,7 +298,8 @@ def _checked_directions(given: Sequence[int], n: int) -> tuple[int, ...]:
 
 
 def _check_pulleys(geometry: FloatArray) -> None:
-    radius, axes = geometry[cable_kernel.RADIUS], geometry[cable_kernel.AXIS :]
+    radius = geometry[cable_kernel.RADIUS]
+    axes = geometry[cable_kernel.AXIS : cable_kernel.WEIGHT]
     if not (radius >= 0.0).all() or not np.isfinite(radius).all():
         raise GeometryError(f"pulley radius {radius.min():g} m; allowed: 0 and above")
     size = np.linalg.norm(axes, axis=0)

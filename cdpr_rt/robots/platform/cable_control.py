@@ -151,11 +151,12 @@ class CableControl(PlaceChecks):
         n, d = model.kinematics.n, model.size
         self._state = np.zeros(3 * d + 1)
         self._W, self._wrench, self._force = np.zeros((d, n)), np.zeros(d), np.zeros(d)
+        self._rise_N = np.zeros(n)
         scratch, J = np.zeros((7, 7, 7)), np.zeros((n, d))
         self._correct = bound(
             loop.correct, self._settings, self._state, model.wrench_scale, body_of(model.platform),
-            self._directions, *self._planned_at, moves, scratch,
-            J, self._W, self._wrench, self._friction(), self._force, then=(1.0, 1.0),
+            self._directions, model.kinematics.geometry, *self._planned_at, moves, scratch,
+            J, self._W, self._rise_N, self._wrench, self._friction(), self._force, then=(1.0, 1.0),
         )  # fmt: skip
         if self.learning is not None:
             self.learning.bind(
@@ -193,7 +194,7 @@ class CableControl(PlaceChecks):
         self._drive = bound(
             loop.drive, self._settings, motors[tracking.M_PER_RAD], motors[tracking.INERTIA],
             motors[tracking.OMEGA], motors[tracking.TENSION], self.tension_N, self._feedforward_N,
-            space[1:], self.compensation_Nm, self.torque_Nm, self.effort_Nm,
+            self._rise_N, space[1:], self.compensation_Nm, self.torque_Nm, self.effort_Nm,
             then=(0, position, position),
         )  # fmt: skip
 
@@ -230,7 +231,7 @@ class CableControl(PlaceChecks):
         learnt_Nm = np.zeros(len(tension_N)) if self.learning is None else self.learning.torque_Nm
         self._cells = CellFeedback(
             tension_N, measured, self._motors[tracking.M_PER_RAD], self.model.reserve_N,
-            self._period_s, self._check, self._W, self._wrench, learnt_Nm,
+            self._period_s, self._check, self._W, self._wrench, learnt_Nm, self._rise_N,
         )  # fmt: skip
 
     @property

@@ -50,6 +50,7 @@ def compare(
     scale: FloatArray,
     measured_N: FloatArray,
     measured: BoolArray,
+    rise: FloatArray,
     asked: FloatArray,
     correction: FloatArray,
     W: FloatArray,
@@ -60,6 +61,7 @@ def compare(
 ) -> int:
     """Take in one cycle; return which cell is off the furthest, -1 where none is told apart.
 
+    A cell at a winch shows `rise` (n,) more than z, which is in the middle of its cable as t is.
     `asked` (n,) are the tensions asked for, as late as readings are, `correction` (n,) what is
     added to them. Of `found` (2, n), written, are a and SIGMAS σ_a of each cell; `difference` (n,)
     and `balance` (d,) are z - τ and W z + w, low-passed.
@@ -68,15 +70,15 @@ def compare(
     share, square, whole = period_s / (_LOWPASS_S + period_s), 0.0, True
     for i in range(n):
         if measured[i]:
-            off = measured_N[i] - asked[i] - correction[i]
+            off = measured_N[i] - rise[i] - asked[i] - correction[i]
             difference[i] += share * (off - difference[i])
-            square += measured_N[i] ** 2
+            square += (measured_N[i] - rise[i]) ** 2
         else:
             whole, difference[i] = False, 0.0
     for k in range(d):
         off = wrench[k]
         for i in range(n):
-            off += W[k, i] * measured_N[i]
+            off += W[k, i] * (measured_N[i] - rise[i])
         balance[k] = balance[k] + share * (off - balance[k]) if whole else 0.0
     worst, most = -1, 1.0
     for i in range(n):
@@ -121,6 +123,7 @@ class CellCheck:
         self,
         measured_N: FloatArray,
         measured: BoolArray,
+        rise_N: FloatArray,
         asked_N: FloatArray,
         correction_N: FloatArray,
         W: FloatArray,
@@ -129,7 +132,7 @@ class CellCheck:
         """Fix the arrays of readings, tensions asked for, and of the platform; see `compare`."""
         self._compare = bound(
             compare, self._period_s, self._rated_N, self._std_N, self._scale, measured_N,
-            measured, asked_N, correction_N, W, wrench, self._difference, self._balance,
+            measured, rise_N, asked_N, correction_N, W, wrench, self._difference, self._balance,
             self._found,
         )  # fmt: skip
 

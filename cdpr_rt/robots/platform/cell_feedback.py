@@ -33,6 +33,7 @@ def follow(
     reserve_N: float,
     measured_N: FloatArray,
     measured: BoolArray,
+    rise: FloatArray,
     m_per_rad: FloatArray,
     learnt: FloatArray,
     lagging: FloatArray,
@@ -45,14 +46,16 @@ def follow(
 
     They stay within a share of the reserve, and return to 0 while there is no reading; the torques
     together with those that were `learnt` (n,) within a larger one. What that leaves of the
-    corrections is `applied` (n,), N, written. Returns whether there is any reading.
+    corrections is `applied` (n,), N, written. Cells sit at the winches, where tensions are by
+    `rise` (n,) above those asked for, which are those in the middle of the cables. Returns whether
+    there is any reading.
     """
     read, most_N = False, SHARE * reserve_N
     for i in range(asked.size):
         lagging[i] += period_s / (LAG_S + period_s) * (asked[i] - lagging[i])
         read = read or measured[i]
         if measured[i]:
-            correction[i] += RATE_1_s * period_s * (lagging[i] - measured_N[i])
+            correction[i] += RATE_1_s * period_s * (lagging[i] + rise[i] - measured_N[i])
             correction[i] = min(max(correction[i], -most_N), most_N)
         else:
             correction[i] -= period_s / FALL_BACK_S * correction[i]
@@ -77,23 +80,25 @@ class CellFeedback:
         W: FloatArray,
         wrench: FloatArray,
         learnt_Nm: FloatArray,
+        rise_N: FloatArray,
     ) -> None:
         """Take the arrays of readings (n,), which are written elsewhere, and whether they hold.
 
         `reserve_N` is what planned tensions keep from their bounds. W (d, n) and the `wrench` (d,)
         besides the cables' are those of the cycle, by which `check` holds the readings; `learnt_Nm`
-        (n,) is what is added besides for what was learnt of the motors.
+        (n,) is what is added besides for what was learnt of the motors, `rise_N` (n,) by what
+        tensions at the winches are above those in the middle of their cables.
         """
         n = m_per_rad.size
         self.torque_Nm = np.zeros(n)
         """What is added for it, (n,)."""
         self._lagging, self._correction, applied = np.zeros((3, n))
         self._follow = bound(
-            follow, period_s, reserve_N, measured_N, measured, m_per_rad, learnt_Nm, self._lagging,
-            self._correction, self.torque_Nm, applied, then=(np.zeros(n),),
+            follow, period_s, reserve_N, measured_N, measured, rise_N, m_per_rad, learnt_Nm,
+            self._lagging, self._correction, self.torque_Nm, applied, then=(np.zeros(n),),
         )  # fmt: skip
         self.check = check
-        check.bind(measured_N, measured, self._lagging, applied, W, wrench)
+        check.bind(measured_N, measured, rise_N, self._lagging, applied, W, wrench)
 
     def restart(self, asked_N: FloatArray) -> None:
         """Begin anew, with tensions asked for (n,)."""

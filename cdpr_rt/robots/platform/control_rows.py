@@ -30,8 +30,7 @@ def motor_rows(model: PlatformModel, axes: Sequence[RobotAxis]) -> FloatArray:
     rows[tracking.INERTIA] = [axis.winch.motor.rotor_inertia_kg_m2 for axis in axes]
     if platform.cable_model != "rigid":
         rows[tracking.COMPLIANCE] = [1.0 / axis.winch.cable.stiffness_N for axis in axes]
-    if platform.cable_model == "catenary":
-        rows[tracking.WEIGHT] = [axis.winch.cable.weight_per_length_N_m for axis in axes]
+    rows[tracking.WEIGHT] = platform.cable_weights_N_m
     rows[tracking.STRETCH] = 1.0
     return rows
 

@@ -24,6 +24,7 @@ from typing import NamedTuple
 
 from cdpr_rt.arrays import FloatArray, IntArray
 from cdpr_rt.jit import jit
+from cdpr_rt.robots.kinematics.cable_kernel import hang, tension_rise
 from cdpr_rt.robots.platform.body_kernel import write_mass_matrix, write_wrench
 
 STRETCH_SHARE = 0.2
@@ -164,12 +165,14 @@ def correct(
     scale: FloatArray,
     body: FloatArray,
     directions: IntArray,
+    geometry: FloatArray,
     cables: FloatArray,
     pose: FloatArray,
     moves: FloatArray,
     scratch: FloatArray,
     J: FloatArray,
     W: FloatArray,
+    rise: FloatArray,
     wrench: FloatArray,
     friction: WinchFriction,
     force: FloatArray,
@@ -178,23 +181,28 @@ def correct(
 ) -> None:
     """Write what acts on the platform besides its cables (d,), and the loop's correction (d,).
 
-    `moves` (4, 6) has the rows above. `wrench` is known beforehand: weight, and what the wanted
-    motion takes. `force` is F of the law above. `share` is how much of the last cycle's force could
-    be had: while it was not all, nothing is integrated that asks for more. Where the cables' rates
+    `moves` (4, 6) has the rows above. `wrench` is known beforehand: weight, that of the cables, and
+    what the wanted motion takes. `force` is F of the law above. `share` is how much of the last
+    cycle's force could be had: while it was not all, nothing is integrated that asks for more.
+    Where the cables' rates
     contradict each other by more than motion can explain, as of a cable that has broken, the force
     is not to follow them. `scale` (d,) is what of each direction counts as much as 1 N, or 1 m.
     `cables` and `pose` are those of the set-point, or of where the platform is where the loop was
-    designed so. `J` (n, d) and `W` (d, n) are written from `cables`.
+    designed so. `J` (n, d), `W` (d, n) and `rise` (n,), by which tensions at the winches are above
+    those in the cables' middle, are written from `cables`.
     """
     d, n = W.shape
     for k in range(d):
         for i in range(n):
             J[i, k] = cables[directions[k], i]
             W[k, i] = -J[i, k]
+    for i in range(n):
+        rise[i] = tension_rise(geometry, cables, i)
     whole, all_of_it = scratch[4, :6, :6], scratch[6, 0, :6]
     write_mass_matrix(body, pose, scratch[5, :4, :3], whole)
     twist, acceleration = moves[WANTED_TWIST], moves[WANTED_ACCELERATION]
     write_wrench(body, whole, scratch[5, :4, :3], twist, acceleration, all_of_it)
+    hang(geometry, pose, cables, all_of_it)
     e, v, De, y = scratch[6, 1, :d], scratch[6, 2, :d], scratch[6, 3, :d], scratch[6, 4, :d]
     for k in range(d):
         wrench[k] = all_of_it[directions[k]]
@@ -307,6 +315,7 @@ def drive(
     stretching: FloatArray,
     tensions: FloatArray,
     feedforward_tensions: FloatArray,
+    rise: FloatArray,
     null: FloatArray,
     compensation: FloatArray,
     most: FloatArray,
@@ -320,14 +329,15 @@ def drive(
     Returns whether a motor's limit was reached.
 
     `feedforward_tensions` lack the loop's correction, which is there to overcome friction in the
-    winches: with those the cables are stretched. The rows of `null` are tensions that move nothing:
+    winches: with those the cables are stretched. Winches pull by `rise` (n,) more than is wanted in
+    the middle of their cables. The rows of `null` are tensions that move nothing:
     damping along them prevents null-space oscillation of cables that pull against each other. A
     cable is asked for its tension whatever its speed: the mechanism is back-drivable.
     """
     n, limited = tensions.size, False
     for i in range(n):
         stretching[i] += STRETCH_SHARE * (feedforward_tensions[i] - stretching[i])
-        effort[i] = tensions[i]
+        effort[i] = tensions[i] + rise[i]
     for k in range(null_directions):
         against = 0.0
         for i in range(n):

@@ -64,6 +64,7 @@ def planned_tensions(model: PlatformModel, pose: Pose) -> FloatArray:
     low, high = model.low_N + model.reserve_N, model.high_N - model.reserve_N
     W, planned = model.kinematics.wrench_matrix(pose), np.zeros((2, model.kinematics.n))
     weight = _weight(model, pose)[0][list(model.kinematics.directions)]
+    weight += model.kinematics.hanging_wrenches(pose.array[None])[0]
     for wanted, t in zip((low, high), planned, strict=True):
         scale = model.wrench_scale
         tension_distribution("minimum-deviation", low, high, scale, wanted).solve(W, weight, t)

@@ -10,7 +10,9 @@ first s + second s²/2, no entry of δ is larger than m, and so t + δ within bo
 with g = l + m a, h = k + m b, where l, a are the largest row sums of |W⁺D| with tensions and
 without, and k, b those of |W⁺| times the bound of what is left. The margin is that of the worst
 wrench, so one such s is right for all of them. W⁺ = W'(W W')⁻¹ does not depend on the units of its
-rows. See `contact_kernel` for the way.
+rows. Where cables have weight the wrench changes too, by half that of what becomes free of each:
+by no more than a bound of first order, which then is added to E (t + δ). See `contact_kernel` for
+the way.
 """
 
 from __future__ import annotations
@@ -30,6 +32,8 @@ from cdpr_rt.robots.kinematics.cable_kernel import (
     FREE,
     RADIUS,
     TINY,
+    WEIGHT,
+    hang,
     run_cables,
 )
 from cdpr_rt.robots.tension.circuit_margin import WrenchSets, circuit_margin
@@ -61,12 +65,15 @@ def held_until(
     scratch, inverse, unit = np.zeros((4, side, side)), np.zeros((6, n)), np.zeros(d)
     carrying, left = np.zeros((wrenches.shape[0], n)), np.zeros((2, 2, 2))
     pose, twist, turns = np.empty((4, 3)), np.empty((2, 3)), np.empty((4, 3))
+    whole, shifted = np.zeros(6), wrenches.shape[0] - generators
     share, looks = 0.0, 0
     while share < until:
         place_on(way, share, turns, pose, twist)
         looks += 1
         _about(pose, twist, centre)
         run_cables(geometry, pose, cables)
+        whole[:] = 0.0
+        hang(geometry, pose, cables, whole)
         for k in range(d):
             for i in range(n):
                 W[k, i] = -cables[chosen[k], i]
@@ -80,7 +87,8 @@ def held_until(
             for i in range(n):
                 carrying[j, i] = 0.0
                 for k in range(d):
-                    carrying[j, i] -= inverse[chosen[k], i] * wrenches[j, k]
+                    acting = wrenches[j, k] + (whole[chosen[k]] if j < shifted else 0.0)
+                    carrying[j, i] -= inverse[chosen[k], i] * acting
         margin = circuit_margin(space, n - d, bounds, carrying, generators, LEAST_N)
         if not margin >= LEAST_N or looks > _MOST_LOOKS:
             break
@@ -118,9 +126,10 @@ def _write_changes(
     """Write the derivative `D` (6, n) of W, and bounds of what is left; return how far they hold.
 
     `left` (2, 2, 2) is summed over the cables: of forces and of moments, that of first and that of
-    second order, as it is and times the highest tension. With the anchor's speed v and acceleration
-    h over a length l the direction u changes by v/l, and its change by h/l + 3 v²/l². Over a pulley
-    beside whose axis the anchor is by e only a first bound is taken, v/l + v/e.
+    second order, as it is and times the highest tension, to which what changes of the cables'
+    weight is added. With the anchor's speed v and acceleration h over a length l the direction u
+    changes by v/l, and its change by h/l + 3 v²/l². Over a pulley beside whose axis the anchor is
+    by e only a first bound is taken, v/l + v/e.
     """
     step, turn = size_of(way[STEP]), size_of(way[TURN])
     left[:] = 0.0
@@ -131,6 +140,10 @@ def _write_changes(
         whole = math.sqrt((bx + centre[0]) ** 2 + (by + centre[1]) ** 2 + (bz + centre[2]) ** 2)
         speed, bend, free = step + turn * whole, turn * turn * whole, cables[FREE, i]
         radius, first, second = geometry[RADIUS, i], 0.0, 0.0
+        half = 0.5 * size_of(geometry[WEIGHT : WEIGHT + 3, i])
+        longer = half * speed * (1.0 + 2.0 * radius / (free + TINY))
+        left[_FORCE, 0, 1] += longer
+        left[_MOMENT, 0, 1] += arm * (longer + turn * half * free * _CLOSER)
         if radius > 0.0:
             least = min(free, _beside(geometry, pose, i))
             reach = min(reach, _SHARE_OF_LENGTH * least / (speed * (1.0 + 2.0 * radius / free)))

@@ -21,7 +21,7 @@ from typing import Final, NamedTuple
 
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.jit import jit
-from cdpr_rt.robots.tension.null_space import null_space, other_wrench
+from cdpr_rt.robots.tension.null_space import add, null_space, other_wrench
 
 MOST_NULL_DIRECTIONS: Final = 2
 _NO_CIRCUIT = 1e-9
@@ -46,6 +46,7 @@ class WrenchSets(NamedTuple):
 @jit
 def write_circuit_margins(
     matrices: FloatArray,
+    hanging: FloatArray,
     sets: WrenchSets,
     least: float,
     margins: FloatArray,
@@ -56,22 +57,27 @@ def write_circuit_margins(
 ) -> None:
     """Write the margins (m,) of m poses: of the worst wrench, N, -inf without a rank of d.
 
-    `matrices` (m, d, n) are the W, n at most d + 2. A margin that is found to be below `least` may
+    `matrices` (m, d, n) are the W, n at most d + 2; `hanging` (m, d) is what acts besides the
+    wrenches of each set. A margin that is found to be below `least` may
     be less still: nothing more is looked for then.
     `carrying` (k, n), `space` (n + 1, n), `scaled` (d, n + 1) and `scratch` as of `null_space` are
     overwritten.
     """
     _, wrenches, generators, scale, bounds = sets
     d, n = scale.size, bounds.shape[1]
+    whole, shifted = scratch[3, 0, :d], wrenches.shape[0] - generators
     for j in range(margins.size):
-        rank = null_space(matrices[j], wrenches[0], scale, bounds, scaled, space, scratch)
+        add(wrenches[0], hanging[j], whole)
+        rank = null_space(matrices[j], whole, scale, bounds, scaled, space, scratch)
         if rank < d:
             margins[j] = -math.inf
             continue
         for i in range(n):
             carrying[0, i] = space[0, i]
         for k in range(1, wrenches.shape[0]):
-            other_wrench(wrenches[k], scale, scaled, scratch, carrying[k])
+            add(wrenches[k], hanging[j], whole)
+            acting = whole if k < shifted else wrenches[k]
+            other_wrench(acting, scale, scaled, scratch, carrying[k])
         margins[j] = circuit_margin(space, n - d, bounds, carrying, generators, least)
 
 

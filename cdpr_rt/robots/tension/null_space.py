@@ -61,6 +61,7 @@ def null_space(
 @jit
 def null_spaces(
     matrices: FloatArray,
+    hanging: FloatArray,
     wrenches: FloatArray,
     scale: FloatArray,
     bounds: FloatArray,
@@ -72,21 +73,32 @@ def null_spaces(
 ) -> None:
     """Write the tensions that carry each of k wrenches (k, d) at each of m poses.
 
-    `matrices` (m, d, n) are the W of the poses; `spaces` (m, n + 1, n) as of `null_space` for the
+    `matrices` (m, d, n) are the W of the poses, `hanging` (m, d) what besides acts at each of them
+    under every wrench; `spaces` (m, n + 1, n) as of `null_space` for the
     first wrench, `particular` (m, k, n) the t0 of every one, `null_directions` (m,) how many there
     are, -1 where W is not finite or has not full rank. `scaled` (d, n + 1) and `scratch` are
     overwritten.
     """
     m, d, n = matrices.shape
+    whole = scratch[3, 0, :d]
     for j in range(m):
-        rank = null_space(matrices[j], wrenches[0], scale, bounds, scaled, spaces[j], scratch)
+        add(wrenches[0], hanging[j], whole)
+        rank = null_space(matrices[j], whole, scale, bounds, scaled, spaces[j], scratch)
         null_directions[j] = n - rank if rank == d else -1
         if rank < d:
             continue
         for i in range(n):
             particular[j, 0, i] = spaces[j, 0, i]
         for k in range(1, wrenches.shape[0]):
-            other_wrench(wrenches[k], scale, scaled, scratch, particular[j, k])
+            add(wrenches[k], hanging[j], whole)
+            other_wrench(whole, scale, scaled, scratch, particular[j, k])
+
+
+@jit
+def add(wrench: FloatArray, other: FloatArray, both: FloatArray) -> None:
+    """Write the sum of two wrenches into `both`, (d,) each."""
+    for i in range(both.size):
+        both[i] = wrench[i] + other[i]
 
 
 @jit

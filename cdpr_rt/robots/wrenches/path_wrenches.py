@@ -43,7 +43,8 @@ class AvailableWrenches:
 
 def available_wrenches(model: PlatformModel, positions: FloatArray) -> AvailableWrenches:
     """Return the wrenches at positions (m, d), for tensions with the model's reserve to bounds."""
-    matrices = model.workspace(0.0, 0.0).wrench_matrices(model.poses(positions))
+    workspace, poses = model.workspace(0.0, 0.0), model.poses(positions)
+    matrices, hanging = workspace.wrench_matrices(poses), workspace.hanging_wrenches(poses)
     m, d, n = matrices.shape
     chosen = np.array(list(itertools.combinations(range(n), d - 1)), np.int64)
     normals = np.zeros((m, len(chosen), d))
@@ -53,6 +54,7 @@ def available_wrenches(model: PlatformModel, positions: FloatArray) -> Available
     weight = np.zeros(6)
     weight[model.positions - 1] = -model.platform.mass_kg * G_m_s2
     rest = normals @ weight[list(model.kinematics.directions)]
+    rest += np.matmul(normals, hanging[:, :, None])[..., 0]
     return AvailableWrenches(normals, lower + rest, upper + rest)
 
 

@@ -73,7 +73,7 @@ def fill_record(rows: Any, platform: Any, motors: Any) -> None:
             row.rotation[k, j] = R[k, j]
     for i in range(p.cables):
         m = motors[i]
-        row.tension_N[i] = m.tension
+        row.tension_N[i] = m.winch_tension
         row.motor_rad[i] = m.angle
         row.torque_Nm[i] = m.true_gain * m.current
 

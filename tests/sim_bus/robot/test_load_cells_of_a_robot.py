@@ -59,4 +59,8 @@ def test_each_cell_reads_the_tension_of_its_cable(tmp_path: Path) -> None:
     assert np.ptp(true) > 20.0, "no two cables are alike"
     assert np.allclose(read, true, rtol=2e-3, atol=0.1)
     p = body.platform[0]
-    assert np.allclose(true @ p["way"][:n], (0.0, 0.0, 980.665), atol=1.0)
+    # halfway a cable's tension is less than at its winch, and the platform bears half of each cable
+    weight_N_m, motors = 0.5, body.motors
+    halfway = true - 0.5 * weight_N_m * motors["far_drop"]
+    carried_N = 980.665 + 0.5 * weight_N_m * motors["far_distance"].sum()
+    assert np.allclose(halfway @ p["way"][:n], (0.0, 0.0, carried_N), atol=1.0)

@@ -100,9 +100,10 @@ class BaselineCableControl:
         learnt = self.learning.update(
             J, self.mass, v_d[self.chosen] - twist, force, late, setpoint.velocity_rad_s
         )
-        t, carried, N = self._split(-J.T, known[self.chosen], force)
+        hanging, rise = self._hang()
+        t, carried, N = self._split(-J.T, (known + hanging)[self.chosen], force)
         self.stretched_by = self.stretched_by + _STRETCHING * (carried - self.stretched_by)
-        pull = t + self.gains.null_damping_N_s_m * N @ (N.T @ (self.c * self.omega))
+        pull = t + rise + self.gains.null_damping_N_s_m * N @ (N.T @ (self.c * self.omega))
         effort = self.rotor * setpoint.acceleration_rad_s2 - self.c * pull
         torque_Nm[:] = np.clip(effort + learnt, -self.limit, self.limit)
 
@@ -113,6 +114,16 @@ class BaselineCableControl:
         rho = np.linalg.norm(way, axis=1)
         u = way / rho[:, None]
         return np.asarray(rho), np.hstack([u, np.cross(r, u)])
+
+    def _hang(self) -> tuple[FloatArray, FloatArray]:
+        """Return the wrench (6,) of the cables' weight, and by what tensions rise to exits (n,)."""
+        r = self.b @ self.Q.T
+        way = self.p + r - self.a
+        w = np.zeros_like(way)
+        w[:, self.model.positions - 1] = -self.weight
+        half = 0.5 * np.linalg.norm(way, axis=1)[:, None] * w
+        wrench = np.concatenate([half, np.cross(r, half)], axis=1).sum(axis=0)
+        return wrench, 0.5 * (way * w).sum(axis=1)
 
     def _locate(self, theta: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Observe the motors, find the pose by Gauss-Newton; return J (n, d) and the twist (d,)."""

@@ -70,6 +70,7 @@ class Loop:
         ):  # fmt: skip
             self.settings[key] = value
         self.pose, self.cables = model.pose(q), np.zeros((CABLE_ROWS, n))
+        self.geometry = kinematics.geometry
         run_cables(kinematics.geometry, self.pose.array, self.cables)
         self.directions = np.array(kinematics.directions)
         self.moves, self.n, self.d = np.zeros((4, 6)), n, d
@@ -86,8 +87,9 @@ class Loop:
         self.winches.learnt_Nm[:] = 0.25 * self.friction
         loop.correct(
             self.settings, self.state, self.model.wrench_scale, self.body, self.directions,
-            self.cables, self.pose.array, self.moves, np.zeros((7, 7, 7)), np.zeros((n, d)),
-            np.zeros((d, n)), self.wrench, self.winches, force, share, apart,
+            self.geometry, self.cables, self.pose.array, self.moves, np.zeros((7, 7, 7)),
+            np.zeros((n, d)), np.zeros((d, n)), np.zeros(n), self.wrench, self.winches, force,
+            share, apart,
         )  # fmt: skip
         return force
 

@@ -1,0 +1,68 @@
+"""A point mass on elastic catenaries: where it stands, and how cables pull at both their ends."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.optimize import fsolve
+
+G_m_s2 = 9.80665
+
+
+class Standing(NamedTuple):
+    """An equilibrium."""
+
+    position_m: NDArray[np.float64]
+    winch_N: NDArray[np.float64]
+    """Tensions at the exits, (3,)."""
+    platform_N: NDArray[np.float64]
+    """Tensions at the mass."""
+
+
+def standing(
+    exits_m: ArrayLike,
+    mass_kg: float,
+    weight_N_m: float,
+    stiffness_N: float,
+    *,
+    lengths_m: ArrayLike | None = None,
+    position_m: ArrayLike | None = None,
+    guess_m: ArrayLike = (0.0, 0.0, 0.0),
+) -> Standing:
+    """Return how a mass hangs on three cables of given unstretched lengths, or at a given place.
+
+    Irvine, Cable Structures (1981): of a cable of unstretched length L with H beside and V upward
+    at its lower end, the upper one is H L/EA + H/w (asinh((V + wL)/H) - asinh(V/H)) beside and
+    (V L + w L²/2)/EA + (√(H² + (V + wL)²) - √(H² + V²))/w above.
+    """
+    exits, w, EA = np.asarray(exits_m, float), weight_N_m, stiffness_N
+
+    def parts(x: NDArray[np.float64]) -> tuple[NDArray[np.float64], ...]:
+        H, V = x[:3], x[3:6]
+        if position_m is None:
+            return H, V, np.asarray(lengths_m, float), x[6:]
+        return H, V, x[6:], np.asarray(position_m, float)
+
+    def off(x: NDArray[np.float64]) -> NDArray[np.float64]:
+        H, V, L, p = parts(x)
+        way = exits - p
+        across = np.linalg.norm(way[:, :2], axis=1)
+        top = V + w * L
+        beside = H * L / EA + H / w * (np.arcsinh(top / H) - np.arcsinh(V / H))
+        above = (V * L + 0.5 * w * L**2) / EA + (np.hypot(H, top) - np.hypot(H, V)) / w
+        force = np.array([*(H / across @ way[:, :2]), V.sum() - mass_kg * G_m_s2])
+        return np.concatenate([beside - across, above - way[:, 2], force / mass_kg])
+
+    way = exits - np.asarray(guess_m if position_m is None else position_m, float)
+    far = np.linalg.norm(way, axis=1)
+    pulls = np.linalg.solve((way / far[:, None]).T, [0.0, 0.0, mass_kg * G_m_s2])
+    beside = pulls * np.linalg.norm(way[:, :2], axis=1) / far
+    rest = np.asarray(guess_m, float) if position_m is None else far
+    x, _, found, why = fsolve(
+        off, np.concatenate([beside, pulls * way[:, 2] / far, rest]), full_output=True, xtol=1e-12
+    )
+    assert found == 1, why
+    H, V, L, p = parts(x)
+    return Standing(p, np.hypot(H, V + w * L), np.hypot(H, V))
