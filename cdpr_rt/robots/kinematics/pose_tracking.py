@@ -4,7 +4,7 @@ Arrays besides those of `cable_kernel` and `normal_equations`, of float64:
 
     motors    (13, n)  THETA, OMEGA observed angle and velocity; LOWPASSED_ONCE, LOWPASSED
                        velocity, by one pole and by both; LENGTH of the cable to its anchor,
-                       RATE of it; TENSION by which it is taken to be stretched; STRETCH, its
+                       RATE of it; TENSION in its middle by which it is stretched; STRETCH, its
                        length over that without tension; AT_ZERO, length without tension at the
                        motor's zero; and what does not change: M_PER_RAD paid out, COMPLIANCE
                        1/EA, WEIGHT in N/m, INERTIA of the motor in kg m2
@@ -120,9 +120,10 @@ def stretch(motors: FloatArray, cables: FloatArray, up: FloatArray) -> None:
         sine = 0.0
         for k in range(3):
             sine += cables[k, i] * up[k]
-        free, tension, compliance = cables[FREE, i], motors[TENSION, i], motors[COMPLIANCE, i]
+        free, weight, compliance = cables[FREE, i], motors[WEIGHT, i], motors[COMPLIANCE, i]
+        tension = motors[TENSION, i] + 0.5 * weight * free * sine  # at the platform
         across = free * math.sqrt(max(1.0 - sine * sine, 0.0))
-        length = unstretched_length(across, free * sine, tension, compliance, motors[WEIGHT, i])
+        length = unstretched_length(across, free * sine, tension, compliance, weight)
         length += cables[ARC, i] / (1.0 + tension * compliance)
         if length > 0.0:
             motors[STRETCH, i] = (free + cables[ARC, i]) / length

@@ -155,7 +155,8 @@ class BaselineCableControl:
 
     def _unstretched(self, across: FloatArray, height: FloatArray) -> FloatArray:
         """Return the cables' lengths without tension (n,): elastic catenaries, (3.81) to (3.84)."""
-        t, w, c = self.stretched_by, self.weight, self.compliance
+        w, c = self.weight, self.compliance
+        t = self.stretched_by + 0.5 * w * height
         if not w.any():
             return np.hypot(across, height) / (1.0 + t * c)
         beside = above = c + 1.0 / t

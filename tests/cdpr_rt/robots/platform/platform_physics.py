@@ -168,7 +168,7 @@ class Physics:
             platform.anchor_points_m,
             platform.mass_kg,
             platform.home_m,
-            [0.122] * n,
+            platform.cable_weights_N_m if any(platform.cable_weights_N_m) else [0.122] * n,
             platform.home_rotation_rad,
             platform.inertia_kg_m2,
             platform.centre_of_mass_m,
