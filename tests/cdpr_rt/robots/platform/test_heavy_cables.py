@@ -7,6 +7,7 @@ import pytest
 
 from cdpr_profiles import load_robot
 from cdpr_profiles.platform import Platform
+from cdpr_rt.robots.reach.reachable import Reach
 from cdpr_rt.robots.statics import PlatformStatics
 from cdpr_sim_bus.robot.robot_plant import RobotPlant
 from tests.cdpr_rt.robots.platform.platform_physics import Machine, Physics
@@ -61,6 +62,25 @@ def test_planned_tensions_are_those_of_catenaries(place_m: tuple[float, ...]) ->
     ):  # fmt: skip
         np.testing.assert_allclose(planned_N + rise_N(place_m[2]), true.winch_N, rtol=5e-3)
         np.testing.assert_allclose(planned_N - rise_N(place_m[2]), true.platform_N, rtol=5e-3)
+
+
+def test_ways_end_where_tensions_with_the_cables_weight_do() -> None:
+    model = heavy().model()
+    start, rng = np.array([0.0, 0.0, 2.0]), np.random.default_rng(3)
+    ways = rng.normal(size=(40, 3))
+    ends = start + 8.0 * ways / np.linalg.norm(ways, axis=1)[:, None]
+    shares, _ = Reach(model, start).shares(ends)
+    assert (shares < 1.0).all() and shares.min() > 0.0
+    workspace = model.workspace()
+    for share in np.linspace(0.0, 1.0, 9):
+        inside = start + (share * shares)[:, None] * (ends - start)
+        assert workspace.margins(model.poses(inside))[0].min() >= 0.0
+    beyond = start + (shares + 2e-3)[:, None] * (ends - start)
+    assert workspace.margins(model.poses(beyond))[0].max() < 0.0
+    np.testing.assert_allclose(
+        workspace.capacity_margins(model.poses(beyond)),
+        workspace.margins(model.poses(beyond))[0], rtol=1e-6, atol=1e-6,
+    )  # fmt: skip
 
 
 def test_a_platform_that_is_held_has_the_planned_tensions_and_the_loop_adds_nothing() -> None:

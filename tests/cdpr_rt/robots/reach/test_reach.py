@@ -176,6 +176,7 @@ def test_a_robot_with_three_cables_too_many_is_refused() -> None:
         anchor_points_m=(*platform.anchor_points_m, (0.0, 0.0), (0.0, 0.0)),
         pulley_radius_m=(),
         pulley_axes=(),
+        cable_weights_N_m=(),
     )
     with pytest.raises(GeometryError, match="5 cables; allowed: up to 4 to control 2 directions"):
         Reach(platform_model(more, np.full(5, 20.0), np.full(5, 200.0)))
