@@ -110,7 +110,7 @@ def cable_geometry(model: PlatformModel) -> CableGeometry:
 def predicted_deviation_m(geometry: FloatArray, poses: FloatArray) -> float:
     """Return the deviation of exit points' coordinates after poses (m, 4, 3), root mean square.
 
-    `geometry` (10, n) is that of `cable_kernel`.
+    `geometry` (13, n) is that of `cable_kernel`.
     """
     rows = information_rows(geometry, poses)
     before = np.diag([EXIT_m**-2] * 3 + [OFFSET_m**-2])

@@ -179,7 +179,7 @@ class CableGeometry:
         return np.append(each, [self.knowledge.elongation] * self.shared)
 
     def kernel_geometry(self) -> FloatArray:
-        """Return the array that the kernels of the kinematics take, (10, n)."""
+        """Return the array that the kernels of the kinematics take, (13, n)."""
         geometry = self.model.kinematics.geometry.copy()
         geometry[:ANCHOR] += self.cable[:, EXIT].T
         geometry[ANCHOR:RADIUS] += self.cable[:, ANCHORS].T
