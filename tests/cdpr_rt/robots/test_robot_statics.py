@@ -190,4 +190,8 @@ def test_a_mass_beside_the_origin_is_held_by_other_tensions() -> None:
     W = other.model.kinematics.wrench_matrix(pose)
     weight = np.array([0.0, 0.0, -9.80665 * aside.mass_kg])
     wrench = np.concatenate([weight, np.cross([0.2, 0.0, 0.0], weight)])
+    # of each of its steel cables, 0.64 N/m, it bears half
+    for exit_m, anchor_m in zip(aside.exit_points_m, aside.anchor_points_m, strict=True):
+        half = np.array([0.0, 0.0, -0.32 * np.linalg.norm(p + anchor_m - exit_m)])
+        wrench += np.concatenate([half, np.cross(anchor_m, half)])
     np.testing.assert_allclose(W @ t + wrench, 0.0, atol=1e-6)
