@@ -212,12 +212,15 @@ class CableKinematics:
 
         Directions that are not controlled stay as in `start`. With `restarts` above 0 it is tried
         from so many other poses as well where the lengths do not agree within 3 length_std_m, for
-        a start that is not known well; in a cycle, 0. Nothing is raised: see `converged`.
+        a start that is not known well; in a cycle, 0. That none is found raises nothing: see
+        `converged`. Raises GeometryError for what are not n lengths.
         """
-        found = self._solution
+        found, lengths_m = self._solution, np.ascontiguousarray(lengths_m, float)
+        if lengths_m.shape != (self.n,):  # compiled code would read on behind them
+            raise GeometryError(f"lengths {lengths_m.shape}; allowed: ({self.n},)")
         pose_search.copy_pose(start.array, found.pose.array)
         if self.model.is_rigid:
-            self._search(np.ascontiguousarray(lengths_m, float), restarts)
+            self._search(lengths_m, restarts)
             return found
         tension = self._no_tension if tension_N is None else tension_N
         self._target[:] = 0.0

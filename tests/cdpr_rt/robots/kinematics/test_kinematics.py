@@ -259,6 +259,13 @@ def test_lengths_may_be_a_column_of_a_table() -> None:
     assert np.abs(found.pose.minus(truth)).max() < 1e-9
 
 
+@pytest.mark.parametrize("shape", [(7,), (9,), (8, 1), ()])
+def test_what_are_not_the_lengths_of_its_cables_is_refused(shape: tuple[int, ...]) -> None:
+    robot = CableKinematics(SPATIAL_8.exit_points_m, SPATIAL_8.anchor_points_m)
+    with pytest.raises(GeometryError, match=r"^lengths \(.*\); allowed: \(8,\)$"):
+        robot.pose_from_lengths(np.full(shape, 3.0), SPATIAL_8.home)
+
+
 def test_what_cannot_be_found_says_so() -> None:
     robot = CableKinematics(SPATIAL_8.exit_points_m, SPATIAL_8.anchor_points_m)
     nan = robot.pose_from_lengths(np.full(8, math.nan), SPATIAL_8.home, restarts=9)
