@@ -6,7 +6,6 @@ import math
 from collections.abc import Iterator
 
 from cdpr_profiles import Robot
-from cdpr_rt.arrays import FloatArray
 from cdpr_rt.errors import GeometryError
 from cdpr_rt.robots.feasibility.finding import Finding
 from cdpr_rt.robots.feasibility.not_held import point_text
@@ -15,8 +14,8 @@ from cdpr_rt.robots.feasibility.turned_by_friction import (
     stretched_by_acceleration_m,
     turned_by_friction,
 )
-from cdpr_rt.robots.platform.loop_cycle import Mode
 from cdpr_rt.robots.platform.loop_design import (
+    DesignedLoop,
     SwingsError,
     UnstableError,
     design_poses,
@@ -57,23 +56,26 @@ def loop_findings(robot: Robot, statics: PlatformStatics) -> Iterator[Finding]:
             "sync_period_s help"
         )
         yield Finding("platform.mass_kg", text, impossible=False)
-    if loop.gains.follows_pose:
-        if text := turned_by_friction(statics, robot.axes, loop.gains):
-            yield Finding("axes[0].anchor_point_m", text, impossible=False)
-        return
-    # its tensions hold it, wherever friction turns it
-    mode, place = min(zip(loop.modes, design_poses(statics.model), strict=True), key=_damping)
-    if mode.dies_down_s > _SWINGS_s:
-        text = (
-            f"held by its tensions as by springs, with the platform at "
-            f"{point_text(place[: statics.model.positions])} m it may swing at "
-            f"{mode.frequency_Hz:.2g} Hz, with {100.0 * mode.damping_ratio:.1g} % of critical "
-            f"damping, for {mode.dies_down_s:.2g} s after it has moved, besides what winches rub; "
-            f"up to {_SWINGS_s:g} s wanted: longer arms, less tension_max_N or a shorter "
-            "sync_period_s help"
-        )
+    if loop.gains.follows_pose and (text := turned_by_friction(statics, robot.axes, loop.gains)):
         yield Finding("axes[0].anchor_point_m", text, impossible=False)
+    yield from _swinging(loop, statics)
 
 
-def _damping(at: tuple[Mode, FloatArray]) -> float:
-    return at[0].damping_ratio
+def _swinging(loop: DesignedLoop, statics: PlatformStatics) -> Iterator[Finding]:
+    """Look whether a platform swings for long somewhere."""
+    at_poses = zip(loop.modes, design_poses(statics.model), strict=True)
+    mode, place = max(at_poses, key=lambda at: at[0].dies_down_s)
+    if mode.dies_down_s <= _SWINGS_s:
+        return
+    if loop.gains.follows_pose:
+        key, held, helps = "platform.mass_kg", "", "stiffer cables, a lighter platform"
+    else:  # wherever friction turns it
+        key, held = "axes[0].anchor_point_m", "held by its tensions as by springs, "
+        helps = "longer arms, less tension_max_N"
+    text = (
+        f"{held}with the platform at {point_text(place[: statics.model.positions])} m it may "
+        f"swing at {mode.frequency_Hz:.2g} Hz, with {100.0 * mode.damping_ratio:.1g} % of critical "
+        f"damping, for {mode.dies_down_s:.2g} s after it has moved, besides what winches rub; "
+        f"up to {_SWINGS_s:g} s wanted: {helps} or a shorter sync_period_s help"
+    )
+    yield Finding(key, text, impossible=False)

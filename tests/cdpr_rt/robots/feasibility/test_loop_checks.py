@@ -63,6 +63,25 @@ def test_what_tensions_hold_and_swings_for_long_is_doubtful() -> None:
     assert told(short_arms(), 20.0, 200.0, 2e-3, impossible=False) == []
 
 
+def test_a_platform_that_swings_for_long_on_soft_cables_is_doubtful() -> None:
+    """Its tensions follow its pose: what it is told of tensions that hold others is not true."""
+    robot = load_robot("suspended-8")
+    assert list(loop_findings(robot, statics_of(robot))) == []
+    axes = []
+    for axis in robot.axes:
+        softer = 3.0 * axis.winch.cable.elongation_percent_per_N
+        cable = axis.winch.cable.model_copy(update={"elongation_percent_per_N": softer})
+        axes.append(dataclasses.replace(axis, winch=dataclasses.replace(axis.winch, cable=cable)))
+    robot = dataclasses.replace(robot, axes=axes)
+    (found,) = loop_findings(robot, statics_of(robot))
+    assert (found.key, found.impossible) == ("platform.mass_kg", False)
+    lasts = re.search(r"swing at ([\d.]+) Hz, with (\d) % of .* for ([\d.]+) s ", found.text)
+    assert lasts is not None, found.text
+    frequency_Hz, percent, lasts_s = map(float, lasts.groups())
+    assert lasts_s > 5.0
+    assert lasts_s * frequency_Hz * percent == pytest.approx(100 * math.log(50) / math.tau, rel=0.2)
+
+
 def test_a_robot_that_every_loop_drives_is_refused_by_its_cycle(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
