@@ -105,6 +105,7 @@ class LoopModel:
         Raises GeometryError where the cables do not hold the platform at one of them.
         """
         self.period_s, self.rotor_kg = period_s, float(rotors_kg.mean())
+        self._positions = model.positions
         self._lightest_kg = float(rotors_kg.min())
         self.poses = design_poses(model) if poses is None else poses
         highest = min(_HIGHEST_Hz, 0.3 / period_s)
@@ -232,10 +233,12 @@ class LoopModel:
             raise UnstableError(
                 "its tensions turn the platform away faster than a loop can hold it"
             )
-        place = ", ".join(f"{x:.2f}" for x in self.poses[self._hardest])
+        q = [f"{x:.2f}" for x in self.poses[self._hardest]]
+        place, turn = ", ".join(q[: self._positions]), ", ".join(q[self._positions :])
         raise SwingsError(
             f"whatever its gains, the loop drives a mode at {self._swings.frequency_Hz:.3g} Hz to "
-            f"swing where the platform is at ({place})"
+            f"swing where the platform is at ({place}) m"
+            + (f", turned by ({turn}) rad" if turn else "")
         )
 
     def _held(

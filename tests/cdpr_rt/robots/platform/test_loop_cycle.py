@@ -161,7 +161,8 @@ def test_a_loop_that_keeps_its_margin_and_swings_is_designed_again(
 def test_a_robot_that_every_loop_drives_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     """As cables would have it that take nothing out of a swing."""
     monkeypatch.setattr(loop_cycle, "CABLE_DAMPING_s", 0.0)
-    with pytest.raises(SwingsError, match=r"drives a mode at [\d.]+ Hz to swing where .* at \("):
+    where = r"at \(0\.00, -?\d\.\d\d, \d\.\d\d\) m, turned by \((-?\d\.\d\d(, )?){3}\) rad$"
+    with pytest.raises(SwingsError, match=r"drives a mode at [\d.]+ Hz to swing where .* " + where):
         late_plate().design()
 
 
