@@ -14,7 +14,7 @@ from cdpr_rt.robots.feasibility.turned_by_friction import (
     stretched_by_acceleration_m,
     turned_by_friction,
 )
-from cdpr_rt.robots.platform.loop_design import (
+from cdpr_rt.robots.platform.design.loop_design import (
     DesignedLoop,
     SwingsError,
     UnstableError,

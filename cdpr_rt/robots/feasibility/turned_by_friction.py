@@ -12,9 +12,9 @@ from cdpr_profiles.platform import DIRECTIONS
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.robots.feasibility.not_held import point_text
 from cdpr_rt.robots.platform.body_kernel import body_of, write_mass_matrix
+from cdpr_rt.robots.platform.design.loop_design import design_poses
+from cdpr_rt.robots.platform.design.loop_gains import DAMPING_RATIO, LoopGains
 from cdpr_rt.robots.platform.learning.motor_learning import FRICTION_SHARE
-from cdpr_rt.robots.platform.loop_design import design_poses
-from cdpr_rt.robots.platform.loop_gains import DAMPING_RATIO, LoopGains
 from cdpr_rt.robots.platform_model import PlatformModel
 from cdpr_rt.robots.statics import PlatformStatics
 

@@ -11,7 +11,7 @@ from cdpr_rt.arrays import FloatArray
 from cdpr_rt.robots.kinematics import pose_tracking as tracking
 from cdpr_rt.robots.platform import loop_kernel as loop
 from cdpr_rt.robots.platform.cell_check import CellCheck, balance_std_N
-from cdpr_rt.robots.platform.loop_gains import DAMPING_RATIO, LoopGains, OBSERVER_rad_s
+from cdpr_rt.robots.platform.design.loop_gains import DAMPING_RATIO, LoopGains, OBSERVER_rad_s
 from cdpr_rt.robots.platform_model import PlatformModel
 
 _REGULATOR_SHARE = 0.25

@@ -14,7 +14,7 @@ from cdpr_profiles import RobotAxis
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.core.exchange import AxisFeedback, Setpoint
 from cdpr_rt.errors import GeometryError
-from cdpr_rt.robots.platform.loop_gains import LoopGains, latency_s
+from cdpr_rt.robots.platform.design.loop_gains import LoopGains, latency_s
 from cdpr_rt.robots.platform_model import PlatformModel
 from cdpr_rt.robots.rigid_body import in_space, inertia_kg_m2
 

@@ -20,7 +20,7 @@ import numpy as np
 from cdpr_profiles import load_robot
 from cdpr_rt.core.exchange import AxisFeedback, Setpoint
 from cdpr_rt.robots.feasibility.checks import LONGEST_PERIOD_s
-from cdpr_rt.robots.platform.loop_gains import LoopGains
+from cdpr_rt.robots.platform.design.loop_gains import LoopGains
 from cdpr_tools.bench.control.baseline import BaselineCableControl
 from cdpr_tools.bench.control.measure import controls
 from cdpr_tools.bench.daemon.loop_baseline import BaselineLoop, run

@@ -340,20 +340,24 @@ def _summary(status: dict[str, Any]) -> str:
 
 @contextmanager
 def _recorded_signals(noted: list[tuple[int, float]]) -> Iterator[int]:
-    """Note what asks the daemon to end, and yield a descriptor that can be read after each."""
+    """Note what asks the daemon to end, and yield a descriptor that can be read after each.
+
+    Afterwards it ends already: who asks once more is not to take its exit status from it.
+    """
 
     def note(number: int, _frame: FrameType | None) -> None:
         noted.append((number, time.monotonic()))
 
     reader, writer = os.pipe2(os.O_NONBLOCK | os.O_CLOEXEC)
     asked = (signal.SIGTERM, signal.SIGINT, signal.SIGHUP)
-    before = {number: signal.signal(number, note) for number in asked}
+    for number in asked:
+        signal.signal(number, note)
     wakeup = signal.set_wakeup_fd(writer, warn_on_full_buffer=False)
     try:
         yield reader
     finally:
         signal.set_wakeup_fd(wakeup)
-        for number, handler in before.items():
-            signal.signal(number, handler)
+        for number in asked:
+            signal.signal(number, signal.SIG_IGN)
         os.close(reader)
         os.close(writer)

@@ -9,8 +9,8 @@ import numpy as np
 from cdpr_profiles import RobotAxis
 from cdpr_rt.arrays import BoolArray, FloatArray
 from cdpr_rt.jit import bound
+from cdpr_rt.robots.platform.design.loop_gains import latency_s
 from cdpr_rt.robots.platform.learning import learning_kernel as kernel
-from cdpr_rt.robots.platform.loop_gains import latency_s
 
 POLE_rad_s = 19.0
 """Of the low-pass: below the platform's swinging on its cables, above most of its own motion."""

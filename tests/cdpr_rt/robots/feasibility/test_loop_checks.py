@@ -11,7 +11,7 @@ import pytest
 from cdpr_profiles import Robot, load_robot
 from cdpr_rt.robots.feasibility import loop_checks
 from cdpr_rt.robots.feasibility.loop_checks import loop_findings
-from cdpr_rt.robots.platform.loop_design import SwingsError
+from cdpr_rt.robots.platform.design.loop_design import SwingsError
 from cdpr_rt.robots.statics import statics_of
 from tests.cdpr_rt.robots.platform.platform_physics import Machine, crossed_rod, short_arms
 

@@ -9,9 +9,9 @@ from scipy.spatial.transform import Rotation
 
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.robots.kinematics.pose import Pose
-from cdpr_rt.robots.platform.loop_design import LoopModel
-from cdpr_rt.robots.platform.loop_gains import DAMPING_RATIO, LoopGains, OBSERVER_rad_s
-from cdpr_rt.robots.platform.loop_plant import planned_tensions
+from cdpr_rt.robots.platform.design.loop_design import LoopModel
+from cdpr_rt.robots.platform.design.loop_gains import DAMPING_RATIO, LoopGains, OBSERVER_rad_s
+from cdpr_rt.robots.platform.design.loop_plant import planned_tensions
 from tests.cdpr_rt.robots.platform.platform_physics import PERIOD_S, Machine
 
 _LATE_S, _CABLE_DAMPING_S = 0.8e-3, 2e-3

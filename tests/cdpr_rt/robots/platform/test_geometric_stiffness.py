@@ -7,13 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cdpr_rt.robots.platform.loop_design import (
+from cdpr_rt.robots.platform.design.loop_design import (
     FOLLOWED_MARGIN,
     LEAST_MARGIN,
     LoopModel,
     UnstableError,
 )
-from cdpr_rt.robots.platform.loop_plant import geometric_stiffness, planned_tensions
+from cdpr_rt.robots.platform.design.loop_plant import geometric_stiffness, planned_tensions
 from cdpr_sim_bus.robot.robot_plant import RobotPlant
 from tests.cdpr_rt.robots.platform.linear_cycle import (
     loop_model,

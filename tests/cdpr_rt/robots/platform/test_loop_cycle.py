@@ -10,16 +10,20 @@ import numpy as np
 import pytest
 
 from cdpr_rt.arrays import FloatArray
-from cdpr_rt.robots.platform import loop_cycle
-from cdpr_rt.robots.platform.loop_cycle import Mode, cycle_matrix, least_damped
-from cdpr_rt.robots.platform.loop_design import (
+from cdpr_rt.robots.platform.design import loop_cycle
+from cdpr_rt.robots.platform.design.loop_cycle import Mode, cycle_matrix, least_damped
+from cdpr_rt.robots.platform.design.loop_design import (
     STIFFNESS_SHARES,
     LoopModel,
     SwingsError,
     design_poses,
 )
-from cdpr_rt.robots.platform.loop_gains import LoopGains
-from cdpr_rt.robots.platform.loop_plant import geometric_stiffness, linear_plant, planned_tensions
+from cdpr_rt.robots.platform.design.loop_gains import LoopGains
+from cdpr_rt.robots.platform.design.loop_plant import (
+    geometric_stiffness,
+    linear_plant,
+    planned_tensions,
+)
 from cdpr_sim_bus.robot.plant import Plant
 from cdpr_sim_bus.robot.robot_plant import CablesPlant, PlatformPlant, RobotPlant, WindingPlant
 from tests.cdpr_rt.robots.platform.linear_cycle import (

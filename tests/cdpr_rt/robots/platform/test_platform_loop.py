@@ -15,14 +15,14 @@ from cdpr_rt.robots.feasibility.turned_by_friction import loop_stiffness
 from cdpr_rt.robots.kinematics.cable_kernel import CABLE_ROWS, run_cables
 from cdpr_rt.robots.platform import loop_kernel as loop
 from cdpr_rt.robots.platform.body_kernel import body_of
-from cdpr_rt.robots.platform.loop_design import (
+from cdpr_rt.robots.platform.design.loop_design import (
     FOLLOWED_MARGIN,
     LEAST_MARGIN,
     STIFFNESS_SHARES,
     LoopModel,
 )
-from cdpr_rt.robots.platform.loop_gains import DAMPING_RATIO, LoopGains
-from cdpr_rt.robots.platform.loop_plant import planned_tensions
+from cdpr_rt.robots.platform.design.loop_gains import DAMPING_RATIO, LoopGains
+from cdpr_rt.robots.platform.design.loop_plant import planned_tensions
 from tests.cdpr_rt.robots.platform.linear_cycle import (
     loop_model,
     mass_matrix,

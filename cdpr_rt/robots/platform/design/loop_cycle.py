@@ -23,9 +23,9 @@ from typing import NamedTuple
 import numpy as np
 
 from cdpr_rt.arrays import FloatArray
-from cdpr_rt.robots.platform.loop_gains import DRIVE_LATENCY_s, LoopGains, OBSERVER_rad_s
+from cdpr_rt.robots.platform.design.loop_gains import DRIVE_LATENCY_s, LoopGains, OBSERVER_rad_s
+from cdpr_rt.robots.platform.design.loop_plant import CABLE_DAMPING_s, LinearPlant
 from cdpr_rt.robots.platform.loop_kernel import STRETCH_SHARE
-from cdpr_rt.robots.platform.loop_plant import CABLE_DAMPING_s, LinearPlant
 
 _TERMS, _MOST_NORM = 13, 0.5
 """Of the exponential's series, and of what it is summed for: exact to 1e-15."""

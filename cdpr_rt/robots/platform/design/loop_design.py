@@ -27,16 +27,16 @@ from cdpr_profiles import RobotAxis
 from cdpr_profiles.platform import Platform
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.errors import GeometryError
-from cdpr_rt.robots.platform.loop_cycle import Mode, cycle_matrix, least_damped
-from cdpr_rt.robots.platform.loop_gains import (
+from cdpr_rt.robots.platform.design.loop_cycle import Mode, cycle_matrix, least_damped
+from cdpr_rt.robots.platform.design.loop_gains import (
     DAMPING_RATIO,
     LoopGains,
     LoopMargins,
     OBSERVER_rad_s,
     latency_s,
 )
-from cdpr_rt.robots.platform.loop_plant import BETWEEN, GREATEST, LEAST, NONE, linear_plant
-from cdpr_rt.robots.platform.margin_kernel import keeps_margin
+from cdpr_rt.robots.platform.design.loop_plant import BETWEEN, GREATEST, LEAST, NONE, linear_plant
+from cdpr_rt.robots.platform.design.margin_kernel import keeps_margin
 from cdpr_rt.robots.platform_model import PlatformModel
 
 ComplexArray = NDArray[np.complex128]

@@ -1,0 +1,1 @@
+"""How a platform's loop is designed: plant, margins in frequency, a cycle in time, gains."""
