@@ -235,6 +235,10 @@ def stage_text(program: str, progress: dict[str, Any]) -> str:
     return _STAGES.get((program, stage), stage)
 
 
+_LOOSE_N = 1.0
+"""Tension below which a cable is called loose."""
+
+
 def fallen_text(status: dict[str, Any]) -> str:
     """Return what to do with a platform that has fallen, an empty text where it has not."""
     if not (status.get("program_progress") or {}).get("fallen"):
@@ -254,7 +258,10 @@ def tightness_text(status: dict[str, Any]) -> str:
         apart_mm = 1e3 * ((status["cycle"] or {}).get("lengths_disagree_m") or 0.0)
         agree = f", whose lengths agree within {apart_mm:.1f} mm" if apart_mm else ""
         return f"held by its cables{agree}"
-    return f"cables loose, power on{fallen_text(status)}"
+    most_N = max((axis.get("tension_N") or 0.0 for axis in status["axes"]), default=0.0)
+    # as where `tighten` was stopped: a hold keeps what the cables are pulled with
+    cables = f"not tight, pulled with up to {most_N:.0f} N" if most_N >= _LOOSE_N else "loose"
+    return f"cables {cables}, power on{fallen_text(status)}"
 
 
 def _listed(values: Iterable[float], factor: float, digits: int) -> str:

@@ -80,6 +80,16 @@ def test_it_is_told_who_has_the_right_to_move() -> None:
     assert "the right to move: hand" in [str(line) for line in held.renderables]
 
 
+def test_cables_that_are_pulled_and_not_tight_are_not_called_loose() -> None:
+    status = status_of(state="active", program="hold", program_progress={"tight": False})
+    status["axes"] = [{"name": "left", "tension_N": N} for N in (0.4, 65.7)]
+    lines = [str(line) for line in status_text(status).renderables]
+    assert "cables not tight, pulled with up to 66 N, power on" in lines
+    status["axes"][1]["tension_N"] = None
+    lines = [str(line) for line in status_text(status).renderables]
+    assert "cables loose, power on" in lines
+
+
 def test_of_a_platform_that_fell_it_is_told_what_comes_before_it_is_tightened() -> None:
     status = status_of(state="active", program="hold", program_progress={"tight": False})
     assert "cables loose, power on" in [str(line) for line in status_text(status).renderables]
