@@ -42,6 +42,8 @@ class Machine:
     low_N: float
     high_N: float
     torque_Nm: float
+    learns: bool = True
+    """Whether its control learns what motors take up."""
 
     @property
     def n(self) -> int:
@@ -54,7 +56,7 @@ class Machine:
 
     def control(self) -> CableControl:
         torque_Nm = np.full(self.n, self.torque_Nm)
-        return CableControl(self.model(), list(self.axes), torque_Nm, PERIOD_S)
+        return CableControl(self.model(), list(self.axes), torque_Nm, PERIOD_S, learns=self.learns)
 
 
 def planar() -> Machine:

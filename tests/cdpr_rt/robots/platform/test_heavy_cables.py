@@ -43,7 +43,7 @@ def heavy() -> Machine:
         cable_model="catenary",
         cable_weights_N_m=(WEIGHT_N_m,) * 3,
     )
-    return Machine(platform, (axis,) * 3, 20.0, 200.0, 6.0)
+    return Machine(platform, (axis,) * 3, 20.0, 200.0, 6.0, learns=False)
 
 
 def rise_N(height_m: float) -> float:
@@ -87,7 +87,7 @@ def test_a_platform_that_is_held_has_the_planned_tensions_and_the_loop_adds_noth
     machine = heavy()
     physics = Physics(machine, RobotPlant.model_validate(SMOOTH))
     physics.go(PLACE_m)
-    physics.run(4.0)
+    physics.run(8.0)  # friction that is left is made up for by the integral part
     statics = PlatformStatics(machine.model())
     winch_N = np.mean(physics.tension_N[-1000:], axis=0)
     planned_N = statics.tensions_N(np.array(PLACE_m)) + rise_N(PLACE_m[2])
@@ -103,6 +103,6 @@ def test_a_platform_that_is_held_has_the_planned_tensions_and_the_loop_adds_noth
     np.testing.assert_allclose(control._feedforward_N, planned_N, rtol=2e-3)
     # and what winches pull more, 7 N upward, is not left to the loop
     upward = control.model.kinematics.wrench_matrix(control.model.pose(np.array(PLACE_m)))[2]
-    assert abs(upward @ (control.tension_N - planned_N)) < 2.0
+    assert abs(upward @ (control.tension_N - planned_N)) < 1.0
     cable_m = np.array([axis.winch.cable_m_per_motor_rad for axis in machine.axes])
     np.testing.assert_allclose(-physics.torque / cable_m, true.winch_N, rtol=0.02)
