@@ -27,7 +27,7 @@ SLACK_SHARE: Final = 0.25
 FOLLOWING_m: Final = 0.15
 """Default following error of a platform's cables: three times the lag at which its set-point waits
 for it."""
-RUNS_IN_m_s: Final = 0.75
+RUNAWAY_m_s: Final = 0.75
 """Speed beyond the set-point's at which a cable has broken, where no other's length tells: a
 platform that is held would have to be thrown, a rotor alone reaches it within 10 to 50 ms."""
 LOW_SHARE: Final = 0.5
@@ -67,7 +67,7 @@ def limits_of(robot: Robot, *, calibration_in_doubt: bool = False) -> Limits:
     if robot.platform is not None:
         known = None if calibration_in_doubt else robot.calibration
         if len(axes) == len(robot.platform.controlled):
-            figures["runs_in_m_s"] = RUNS_IN_m_s
+            figures["runaway_m_s"] = RUNAWAY_m_s
         figures.setdefault("lengths_disagree_m", allowed_disagreement_m(robot.platform, known))
     return Limits(
         torque_Nm=torque_Nm,

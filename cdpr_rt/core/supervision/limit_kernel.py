@@ -155,7 +155,7 @@ def _watch_motion(
 
 @jit
 def _has_snapped(
-    limits: Any, history: Any, elapsed: float, tension: float, runs_in_m_s: float, too_fast: bool
+    limits: Any, history: Any, elapsed: float, tension: float, runaway_m_s: float, too_fast: bool
 ) -> bool:
     """Whether a cable that was tight has lost its tension, and its winch runs away by that.
 
@@ -163,9 +163,9 @@ def _has_snapped(
     """
     before = history["mean_N"]
     # what it was before: friction alone, for as long as a weak winch takes, is no tension
-    if np.isfinite(tension) and not runs_in_m_s > 0.25 * limits["runs_in_m_s"]:
+    if np.isfinite(tension) and not runaway_m_s > 0.25 * limits["runaway_m_s"]:
         history["mean_N"] += elapsed / (elapsed + _MEAN_S) * (tension - before)
-    runs_away = history["slack_armed"] != 0.0 and (too_fast or runs_in_m_s > limits["runs_in_m_s"])
+    runs_away = history["slack_armed"] != 0.0 and (too_fast or runaway_m_s > limits["runaway_m_s"])
     return bool(runs_away and tension < _SNAPPED_SHARE * before)
 
 
@@ -243,9 +243,9 @@ def check_axes(
         tension, cable_m_per_rad = signals.tension[i], signals.cable_m_per_rad[i]
         _watch_jumps(i, limits, history, worst, elapsed, position)
         paying_out = signals.setpoint_velocity[i] * cable_m_per_rad
-        mean_N, runs_in_m_s = history["mean_N"], paying_out - velocity * cable_m_per_rad
+        mean_N, runaway_m_s = history["mean_N"], paying_out - velocity * cable_m_per_rad
         too_fast = -velocity * np.sign(cable_m_per_rad) > limits["speed_rad_s"]
-        if _has_snapped(limits, history, elapsed, tension, runs_in_m_s, too_fast):
+        if _has_snapped(limits, history, elapsed, tension, runaway_m_s, too_fast):
             _exceeded(worst, _BROKEN_CABLE, i, tension, mean_N)
         error = signals.setpoint[i] - position
         _watch_motion(i, limits, worst, error, velocity, signals.length[i], paying_out)

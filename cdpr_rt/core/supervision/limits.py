@@ -61,7 +61,7 @@ class Limits:
     """For how long a tension may be below `tension_min_N`, and below `slack_N`."""
     broken_within_s: float = 0.0
     """A cable that goes from `tension_min_N` to below `slack_N` faster than this has broken."""
-    runs_in_m_s: float = math.inf
+    runaway_m_s: float = math.inf
     """A cable that comes in faster than its set-point by more, without its tension, has broken."""
     missed_in_window: int = 1 << 30
     window_cycles: int = 1

@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -246,6 +247,10 @@ class CableKinematics:
         cable_kernel.run_cables(self.geometry, pose.array, self._cables)
         normal_equations.covariance(self._cables, self.solver, self.length_std_m**2, covariance)
         return covariance
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return what is pickled: all but machine code that is bound to this object's arrays."""
+        return {name: value for name, value in self.__dict__.items() if name != "_find_pose"}
 
     @cached_property
     def _find_pose(self) -> Callable[[FloatArray, FloatArray, int], tuple[int, int, float]]:

@@ -117,6 +117,8 @@ class BaselineCableControl:
 
     def _hang(self) -> tuple[FloatArray, FloatArray]:
         """Return the wrench (6,) of the cables' weight, and by what tensions rise to exits (n,)."""
+        if not self.weight.any():
+            return np.zeros(6), np.zeros(len(self.a))
         r = self.b @ self.Q.T
         way = self.p + r - self.a
         w = np.zeros_like(way)

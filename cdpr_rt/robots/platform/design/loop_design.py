@@ -223,6 +223,7 @@ class LoopModel:
         keeps = elastic is not None and self._keeps(elastic, self._followed, FOLLOWED_MARGIN)
         if elastic and keeps and self._dies_down(elastic):
             return elastic
+        self._swings = None  # what that loop drives says nothing of those that are designed now
         # followed late, it takes of the damping what it would have taken of the stiffness
         best = self._held(self._planned, turning, follows_pose=False) or self._held(
             self._followed, late_s * turning, follows_pose=True

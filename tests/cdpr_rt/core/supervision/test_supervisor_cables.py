@@ -89,7 +89,7 @@ def test_a_broken_cable_is_told_once():
 def runs_in(at_rad_s: float, tension_N: float, planned_rad_s: float = 0.0) -> Limit:
     """Return what is told of a cable under 50 N that comes in so fast, with this tension left."""
     limits = dataclasses.replace(
-        SAFE, speed_rad_s=200.0, following_error_rad=100.0, runs_in_m_s=1.0
+        SAFE, speed_rad_s=200.0, following_error_rad=100.0, runaway_m_s=1.0
     )
     supervisor, cycle = Supervisor(limits, 2, PERIOD_S), Cycle()
     for _ in range(300):
@@ -119,7 +119,7 @@ def test_a_weak_winch_takes_long_to_run_away():
         SAFE,
         speed_rad_s=200.0,
         following_error_rad=100.0,
-        runs_in_m_s=1.0,
+        runaway_m_s=1.0,
         tension_min_N=2.0,
         slack_N=0.5,
     )

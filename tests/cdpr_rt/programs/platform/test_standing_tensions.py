@@ -64,7 +64,7 @@ def test_the_more_winches_may_take_up_the_harder_cables_are_pulled() -> None:
     assert least_N[-1] > 1.5 * least_N[0]
 
 
-@pytest.mark.parametrize(("taken_up_N", "pulled_N"), [(28.0, 33.6), (44.0, 39.6), (1e3, 0.0)])
+@pytest.mark.parametrize(("taken_up_N", "pulled_N"), [(28.0, 33.6), (44.0, 39.6)])
 def test_they_are_pulled_with_more_than_is_planned_with_where_winches_take_that_up(
     taken_up_N: float, pulled_N: float
 ) -> None:

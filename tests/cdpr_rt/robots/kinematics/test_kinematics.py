@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import pickle
 
 import numpy as np
 import pytest
@@ -264,6 +265,16 @@ def test_what_are_not_the_lengths_of_its_cables_is_refused(shape: tuple[int, ...
     robot = CableKinematics(SPATIAL_8.exit_points_m, SPATIAL_8.anchor_points_m)
     with pytest.raises(GeometryError, match=r"^lengths \(.*\); allowed: \(8,\)$"):
         robot.pose_from_lengths(np.full(shape, 3.0), SPATIAL_8.home)
+
+
+def test_another_process_may_have_a_robot_that_has_searched() -> None:
+    robot = CableKinematics(SPATIAL_8.exit_points_m, SPATIAL_8.anchor_points_m)
+    truth = SPATIAL_8.home.plus(np.array([0.1, -0.05, 0.08, 0.1, 0.2, -0.1]))
+    robot.pose_from_lengths(robot.lengths(truth), SPATIAL_8.home)
+    other = pickle.loads(pickle.dumps(robot))
+    robot.pose_from_lengths(robot.lengths(SPATIAL_8.home), SPATIAL_8.home)
+    found = other.pose_from_lengths(robot.lengths(truth), SPATIAL_8.home)
+    assert np.abs(found.pose.minus(truth)).max() < 1e-9
 
 
 def test_what_cannot_be_found_says_so() -> None:
