@@ -29,6 +29,8 @@ class Cable(Profile):
     weight_per_length_N_m: float = Field(ge=1e-6, le=1e3)
     elongation_percent_per_N: float = Field(ge=1e-9, le=10)
     elongation_measured_up_to_N: Positive | None = None
+    damping_s: float = Field(default=2e-3, ge=0, le=0.05)
+    """Damping over stiffness, T = EA (strain + damping_s rate); assumed where it is left out."""
     breaking_force_kgf: float = Field(ge=0.1, le=1e6)
     min_tension_N: float = Field(ge=0)
     data_sheet_code: str | None = None

@@ -290,7 +290,10 @@ class SimDrive(SlaveApplication):
 
 def transmission_of(winch: Winch) -> Transmission:
     """Return what leads from a winch's motor to its cable, by its profile."""
-    return Transmission(winch.cable_m_per_motor_rad, winch.cable.stiffness_N, winch.gear_ratio)
+    cable = winch.cable
+    return Transmission(
+        winch.cable_m_per_motor_rad, cable.stiffness_N, winch.gear_ratio, cable.damping_s
+    )
 
 
 def _only(allowed: Callable[[Any], bool]) -> Callable[[Value], None]:

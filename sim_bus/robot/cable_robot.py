@@ -65,7 +65,8 @@ class CableRobot:
         motor["cable_gain"] = gain
         motor["rigidity"] = transmission.cable_stiffness_N * (1.0 + plant.stiffness_error)
         motor["weight"] = self._weights[i] if plant.sag else 0.0
-        motor["damping_time"] = plant.damping_s
+        known_s, true_s = transmission.cable_damping_s, plant.damping_s
+        motor["damping_time"] = known_s if true_s is None else true_s
         motor["creep_share"] = plant.creep_shares
         motor["creep_rate"] = 1.0 / np.array(plant.creep_times_s)
         motor["winch_friction"] = plant.winch_friction_Nm

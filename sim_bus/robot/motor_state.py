@@ -197,6 +197,8 @@ class Transmission:
     """Axial stiffness EA of the cable."""
     gear_ratio: float = 4.0
     """Motor turns per turn of the drum."""
+    cable_damping_s: float = 0.002
+    """The cable's damping over its stiffness."""
 
 
 def build_motor(

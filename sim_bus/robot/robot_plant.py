@@ -61,8 +61,8 @@ class CablesPlant(Profile):
 
     stiffness_error: _Relative = 0.0
     """Relative: true EA = that of the cable's profile × (1 + this)."""
-    damping_s: Annotated[float, Field(ge=0.0, le=0.05)] = 0.002
-    """Damping over stiffness."""
+    damping_s: Annotated[float, Field(ge=0.0, le=0.05)] | None = None
+    """Damping over stiffness; that of the cable's profile where left out."""
     creep_shares: tuple[_Share, _Share] = (0.01, 0.01)
     """Strain that follows the elastic one, as shares of it; a fast part and a slow one."""
     creep_times_s: tuple[_Time_s, _Time_s] = (0.5, 60.0)

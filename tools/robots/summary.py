@@ -17,7 +17,8 @@ from cdpr_rt.errors import GeometryError
 from cdpr_rt.robots.cable_loss.prediction import SWING_S, corner_swings
 from cdpr_rt.robots.free_rotation import free_rotation
 from cdpr_rt.robots.kinematics.free_rotation_kernel import SWINGS_m
-from cdpr_rt.robots.platform.design.loop_design import STIFFNESS_SHARES, designed_loop
+from cdpr_rt.robots.platform.design.designed_loop import designed_loop
+from cdpr_rt.robots.platform.design.loop_design import STIFFNESS_SHARES
 from cdpr_rt.robots.platform_model import PlatformModel
 from cdpr_rt.robots.resonance import lowest_resonance_Hz
 from cdpr_rt.robots.robot_arrays import limits_of

@@ -14,13 +14,13 @@ from cdpr_rt.robots.feasibility.turned_by_friction import (
     stretched_by_acceleration_m,
     turned_by_friction,
 )
+from cdpr_rt.robots.platform.design.designed_loop import DesignedLoop, designed_loop
 from cdpr_rt.robots.platform.design.loop_design import (
-    DesignedLoop,
     SwingsError,
     UnstableError,
     design_poses,
-    designed_loop,
 )
+from cdpr_rt.robots.platform.design.loop_plant import LITTLE_DAMPING_s
 from cdpr_rt.robots.statics import PlatformStatics
 
 _SLOW_Hz = 0.5
@@ -59,6 +59,8 @@ def loop_findings(robot: Robot, statics: PlatformStatics) -> Iterator[Finding]:
     if loop.gains.follows_pose and (text := turned_by_friction(statics, robot.axes, loop.gains)):
         yield Finding("axes[0].anchor_point_m", text, impossible=False)
     yield from _swinging(loop, statics)
+    if loop.growing:
+        yield _growing(loop, robot, statics)
 
 
 def _swinging(loop: DesignedLoop, statics: PlatformStatics) -> Iterator[Finding]:
@@ -79,3 +81,17 @@ def _swinging(loop: DesignedLoop, statics: PlatformStatics) -> Iterator[Finding]
         f"up to {_SWINGS_s:g} s wanted: {helps} or a shorter sync_period_s help"
     )
     yield Finding(key, text, impossible=False)
+
+
+def _growing(loop: DesignedLoop, robot: Robot, statics: PlatformStatics) -> Finding:
+    """Say where a mode grows if cables damp little."""
+    at_poses = zip(loop.growing, design_poses(statics.model), strict=True)
+    mode, place = min(at_poses, key=lambda at: at[0].damping_ratio)
+    text = (
+        f"value {robot.sync_period_s:g}; the loop leans on what the cables are assumed to take out "
+        f"of a swing (damping_s of their profile): with {1e3 * LITTLE_DAMPING_s:g} ms a mode at "
+        f"{mode.frequency_Hz:.2g} Hz grows with the platform at "
+        f"{point_text(place[: statics.model.positions])} m; a shorter cycle helps, or that value "
+        "measured, which the loop is designed for then"
+    )
+    return Finding("sync_period_s", text, impossible=False)

@@ -32,7 +32,7 @@ from cdpr_rt.robots.platform.control_rows import (
     slides_on_stand,
     tracking_filters,
 )
-from cdpr_rt.robots.platform.design.loop_design import designed_loop
+from cdpr_rt.robots.platform.design.designed_loop import designed_loop
 from cdpr_rt.robots.platform.learning.motor_learning import MotorLearning
 from cdpr_rt.robots.platform.learning.pull_fit import PullFit
 from cdpr_rt.robots.platform.place_checks import PlaceChecks

@@ -24,9 +24,10 @@ import numpy as np
 
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.robots.platform.design.loop_gains import DRIVE_LATENCY_s, LoopGains, OBSERVER_rad_s
-from cdpr_rt.robots.platform.design.loop_plant import CABLE_DAMPING_s, LinearPlant
+from cdpr_rt.robots.platform.design.loop_plant import LinearPlant
 from cdpr_rt.robots.platform.loop_kernel import STRETCH_SHARE
 
+_GROWN = 1e12
 _TERMS, _MOST_NORM = 13, 0.5
 """Of the exponential's series, and of what it is summed for: exact to 1e-15."""
 
@@ -54,6 +55,23 @@ def least_damped(cycle: FloatArray, period_s: float) -> Mode:
     return Mode(abs(float(rate[i].imag)) / (math.tau * period_s), float(ratio[i]))
 
 
+def dies_down(cycle: FloatArray) -> bool:
+    """Return whether all modes of cycles (..., size, size) do: |z| < 1 where a power's norm is < 1.
+
+    By squaring, a fifth of the time that eigenvalues take. A mode that takes more than 2^18 cycles
+    is counted as one that does not.
+    """
+    power = cycle
+    for _ in range(18):
+        power = power @ power
+        norms = np.abs(power).sum(axis=-1).max(axis=-1)
+        if norms.max() < 1.0:
+            return True
+        if norms.max() > _GROWN:
+            return False
+    return False
+
+
 def cycle_matrix(
     plant: LinearPlant,
     share: float,
@@ -63,15 +81,16 @@ def cycle_matrix(
     damping: FloatArray,
     stiffness: FloatArray,
     period_s: float,
+    cable_damping_s: float,
 ) -> FloatArray:
     """Return the matrix of one cycle (size, size) with this share of the cables' stiffness.
 
     K_G (d, d) is that of some tensions, rotors' masses (n,); D' and K' (d,) are the loop's
-    `damping` and `stiffness` along the modes.
+    `damping` and `stiffness` along the modes; cables' own damping is this over their stiffness.
     """
     P, k = plant.pulls, plant.stiffness_N_m
     n, d = P.shape
-    late, rest, held = _motion(plant, share * k, K_G, rotors_kg, period_s)
+    late, rest, held = _motion(plant, share * k, K_G, rotors_kg, period_s, cable_damping_s)
     size, follows = 2 * (d + n), gains.follows_pose
     widths = [size, n, n, d, d, d, *[d, d] * follows, *[n] * (held + 1)]
     state, x, v, once, calm, integral, *rows = np.split(np.eye(sum(widths)), np.cumsum(widths)[:-1])
@@ -103,7 +122,12 @@ def cycle_matrix(
 
 
 def _motion(
-    plant: LinearPlant, k: FloatArray, K_G: FloatArray, rotors_kg: FloatArray, period_s: float
+    plant: LinearPlant,
+    k: FloatArray,
+    K_G: FloatArray,
+    rotors_kg: FloatArray,
+    period_s: float,
+    cable_damping_s: float,
 ) -> tuple[FloatArray, FloatArray, int]:
     """Return what a cycle's two parts make of the plant and a torque (size, size + n).
 
@@ -121,7 +145,7 @@ def _motion(
     # velocities in m per cycle, so that the exponential's series is short
     F[: d + n, d + n : size] = np.eye(d + n)
     F[d + n : size, : d + n] = -(period_s**2) * stiff / mass
-    F[d + n : size, d + n : size] = -period_s * CABLE_DAMPING_s * elastic / mass
+    F[d + n : size, d + n : size] = -period_s * cable_damping_s * elastic / mass
     F[d + n + d : size, size:] = -np.diag(period_s**2 / rotors_kg)
     cycles, part = divmod(DRIVE_LATENCY_s / period_s, 1.0)
     return _exponential(F * part)[:size], _exponential(F * (1.0 - part))[:size], 1 + int(cycles)

@@ -16,18 +16,19 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
-from functools import lru_cache
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from cdpr_profiles import RobotAxis
-from cdpr_profiles.platform import Platform
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.errors import GeometryError
-from cdpr_rt.robots.platform.design.loop_cycle import Mode, cycle_matrix, least_damped
+from cdpr_rt.robots.platform.design.loop_cycle import (
+    Mode,
+    cycle_matrix,
+    dies_down,
+    least_damped,
+)
 from cdpr_rt.robots.platform.design.loop_gains import (
     DAMPING_RATIO,
     LoopGains,
@@ -35,7 +36,14 @@ from cdpr_rt.robots.platform.design.loop_gains import (
     OBSERVER_rad_s,
     latency_s,
 )
-from cdpr_rt.robots.platform.design.loop_plant import BETWEEN, GREATEST, LEAST, NONE, linear_plant
+from cdpr_rt.robots.platform.design.loop_plant import (
+    BETWEEN,
+    GREATEST,
+    LEAST,
+    NONE,
+    CABLE_DAMPING_s,
+    linear_plant,
+)
 from cdpr_rt.robots.platform.design.margin_kernel import keeps_margin
 from cdpr_rt.robots.platform_model import PlatformModel
 
@@ -57,6 +65,8 @@ _SLOWEST_rad_s, _FASTEST_rad_s = 1.0, 80.0
 _TURNED_AWAY_SHARE = 0.5
 """Of the loop's stiffness, the most that tensions may take from the slowest that is tried."""
 _STEP, _REFINEMENTS = 1.3, 3
+_CALMING_STEP, _LEAST_SHARE = 0.93, 0.2
+"""Of a loop's damping, by which and to what share it is weakened until its modes die down."""
 _LOW_Hz, _HIGHEST_Hz, _FREQUENCIES = 0.3, 150.0, 64
 _LOWEST_Hz, _BELOW = 0.02, 12
 """Below the slowest modes: tensions that follow a softer platform may make it drift away."""
@@ -99,12 +109,17 @@ class LoopModel:
         stiffness_N: FloatArray,
         period_s: float,
         poses: FloatArray | None = None,
+        cable_damping_s: float = CABLE_DAMPING_s,
     ) -> None:
         """Take rotors' masses (n,) as the cables feel them, EA (n,), and set-points (m, d).
+
+        Cables' damping over their stiffness counts where it is less than CABLE_DAMPING_s, which
+        margins are computed with.
 
         Raises GeometryError where the cables do not hold the platform at one of them.
         """
         self.period_s, self.rotor_kg = period_s, float(rotors_kg.mean())
+        self.cable_damping_s = cable_damping_s
         self._positions = model.positions
         self._lightest_kg = float(rotors_kg.min())
         self.poses = design_poses(model) if poses is None else poses
@@ -114,7 +129,7 @@ class LoopModel:
         self._s = s = (2j * np.pi * self.frequency_Hz).astype(np.complex128)
         self._late = np.exp(-s * latency_s(period_s)) / (1.0 + s / OBSERVER_rad_s) ** 2
         self._rotors_kg, self._hardest = rotors_kg, 0
-        self._swings: Mode | None = None
+        self._swings: LoopGains | None = None
         self._linear = [
             linear_plant(model, q, rotors_kg, stiffness_N, self._s, STIFFNESS_SHARES)
             for q in self.poses
@@ -149,25 +164,32 @@ class LoopModel:
             for at, omega in zip(least, self._modes_rad_s(gains), strict=True)
         ]
 
-    def least_damped(self, gains: LoopGains) -> list[Mode]:
-        """Return the least damped mode of a cycle of robot and loop at each of the poses."""
-        return [self._least_damped(gains, i) for i in range(len(self.poses))]
+    def least_damped(self, gains: LoopGains, cable_damping_s: float) -> tuple[Mode, ...]:
+        """Return the least damped mode of a cycle of robot and loop at each of the poses.
 
-    def _least_damped(self, gains: LoopGains, i: int) -> Mode:
+        The cables' damping is this over their stiffness.
+        """
+        return tuple(self._least_damped(gains, i, cable_damping_s) for i in range(len(self.poses)))
+
+    def _least_damped(self, gains: LoopGains, i: int, cable_damping_s: float) -> Mode:
+        return least_damped(self._cycles(gains, i, cable_damping_s), self.period_s)
+
+    def _cycles(self, gains: LoopGains, i: int, cable_damping_s: float) -> FloatArray:
         damping, stiffness, _ = self._along_modes(gains)
-        plant, law = self._linear[i], (gains, damping[i], stiffness[i], self.period_s)
+        plant = self._linear[i]
+        law = gains, damping[i], stiffness[i], self.period_s, cable_damping_s
         cycles = [
             cycle_matrix(plant, share, plant.geometric_N_m[level], self._rotors_kg, *law)
             for share in STIFFNESS_SHARES
             for level in (LEAST, BETWEEN, GREATEST)
         ]
-        return least_damped(np.array(cycles), self.period_s)
+        return np.array(cycles)
 
-    def _dies_down(self, gains: LoopGains) -> bool:
+    def dies_down(self, gains: LoopGains, cable_damping_s: float) -> bool:
         """Return whether all modes do at all poses, the one first where one did not before."""
         for i in sorted(range(len(self.poses)), key=lambda i: i != self._hardest):
-            if (mode := self._least_damped(gains, i)).damping_ratio <= 0.0:
-                self._hardest, self._swings = i, mode
+            if not dies_down(self._cycles(gains, i, cable_damping_s)):
+                self._hardest, self._swings = i, gains
                 return False
         return True
 
@@ -208,6 +230,21 @@ class LoopModel:
     def design(self) -> LoopGains:
         """Return the loop that overcomes friction the soonest of those that keep LEAST_MARGIN.
 
+        Where the cables are known to damp less than was assumed, weaker ones whose modes die down
+        all the same are looked for. Raises UnstableError where none holds the platform, SwingsError
+        where modes would grow.
+        """
+        best, others = self._soonest()
+        if self.cable_damping_s >= CABLE_DAMPING_s:
+            return best
+        calm = self._calmed(others, self.cable_damping_s)
+        if calm is None or not self._keeps(calm, self._plants(calm), FOLLOWED_MARGIN):
+            raise self._swinging(self.cable_damping_s)
+        return calm
+
+    def _soonest(self) -> tuple[LoopGains, list[LoopGains]]:
+        """Return the loop for cables that damp as assumed, and those that it is the best of.
+
         They keep it at all poses, with all stiffness. Dry friction in the winches, about the same
         in each, is what keeps a platform from its target, and the integral part what overcomes it:
         in N/(m s) of cable, in the geometric mean over the modes.
@@ -216,76 +253,79 @@ class LoopModel:
         on to the greatest that may be planned. Where that takes too much of its margin it is
         designed anew, for tensions of the set-point; and where none is stiff enough for those that
         turn the platform away, for some that follow. In a cycle of robot and loop all modes die
-        down. Raises UnstableError where none holds it then, SwingsError where modes would not.
+        down.
         """
         turning, late_s = self._geometric_N_m, latency_s(self.period_s) + 2.0 / OBSERVER_rad_s
-        elastic = self._best(self._elastic, np.zeros_like(turning), follows_pose=True)
-        keeps = elastic is not None and self._keeps(elastic, self._followed, FOLLOWED_MARGIN)
-        if elastic and keeps and self._dies_down(elastic):
-            return elastic
+        loops = self._loops(self._elastic, np.zeros_like(turning), follows_pose=True)
+        keeps = bool(loops) and self._keeps(loops[0], self._followed, FOLLOWED_MARGIN)
+        if keeps and self.dies_down(loops[0], CABLE_DAMPING_s):
+            return loops[0], loops
         self._swings = None  # what that loop drives says nothing of those that are designed now
         # followed late, it takes of the damping what it would have taken of the stiffness
-        best = self._held(self._planned, turning, follows_pose=False) or self._held(
-            self._followed, late_s * turning, follows_pose=True
-        )
-        if best is not None:
-            return best
+        for plants, turned, follows in (
+            (self._planned, turning, False),
+            (self._followed, late_s * turning, True),
+        ):
+            loops = self._loops(plants, turned, follows_pose=follows)
+            if not loops or not self._keeps(loops[0], plants, FOLLOWED_MARGIN):
+                continue
+            best = self._calmed(loops, CABLE_DAMPING_s)
+            if best is not None and self._keeps(best, plants, FOLLOWED_MARGIN):
+                return best, loops
         if self._swings is None:
             raise UnstableError(
                 "its tensions turn the platform away faster than a loop can hold it"
             )
+        raise self._swinging(CABLE_DAMPING_s)
+
+    def _swinging(self, cable_damping_s: float) -> SwingsError:
         q = [f"{x:.2f}" for x in self.poses[self._hardest]]
         place, turn = ", ".join(q[: self._positions]), ", ".join(q[self._positions :])
-        raise SwingsError(
-            f"whatever its gains, the loop drives a mode at {self._swings.frequency_Hz:.3g} Hz to "
+        assert self._swings is not None
+        mode = self._least_damped(self._swings, self._hardest, cable_damping_s)
+        return SwingsError(
+            f"whatever its gains, the loop drives a mode at {mode.frequency_Hz:.3g} Hz to "
             f"swing where the platform is at ({place}) m"
             + (f", turned by ({turn}) rad" if turn else "")
         )
 
-    def _held(
+    def _loops(
         self, plants: ComplexArray, turning: FloatArray, *, follows_pose: bool
-    ) -> LoopGains | None:
-        """Return the best loop all of whose modes die down, None where none holds the platform."""
-        for calmed in (False, True):
-            best = self._best(plants, turning, follows_pose=follows_pose, calmed=calmed)
-            if best is None or not self._keeps(best, plants, FOLLOWED_MARGIN):
-                return None
-            if self._dies_down(best):
-                return best
-        return None
-
-    def _best(
-        self,
-        plants: ComplexArray,
-        turning: FloatArray,
-        *,
-        follows_pose: bool,
-        calmed: bool = False,
-    ) -> LoopGains | None:
-        best, soonest = None, 0.0
+    ) -> list[LoopGains]:
+        """Return the quickest loop of each kind that holds the platform, the soonest first."""
+        found = []
         tried = itertools.product(_SMOOTHERS_Hz, _ROTOR_SHARES, _INTEGRAL_SHARES)
         for (smooth, smoother_Hz), share, integral in tried:
             slow = self._slow(smooth, 2.0 * math.pi * smoother_Hz, share, integral)
             gains = self._slowest(replace(slow, follows_pose=follows_pose), plants, turning)
-            if gains is None:
-                continue
-            at_most = self._integral_N_m_s(self._with(gains, math.inf))
-            if best is None or at_most > soonest:
-                quickest = self._quickest(gains, plants)
-                found: LoopGains | None = quickest
-                if calmed and self._integral_N_m_s(quickest) > soonest:
-                    found = self._calmed(quickest, gains.bandwidth_rad_s)
-                if found and (integral := self._integral_N_m_s(found)) > soonest:
-                    best, soonest = found, integral
+            if gains is not None:
+                found.append(self._quickest(gains, plants))
+        return sorted(found, key=self._integral_N_m_s, reverse=True)
+
+    def _calmed(self, loops: list[LoopGains], cable_damping_s: float) -> LoopGains | None:
+        """Return the soonest of the loops, the soonest first, weakened until all modes die down.
+
+        None where no loop's do.
+        """
+        best, soonest = None, 0.0
+        for gains in loops:
+            share, weak = 1.0, gains
+            while share >= _LEAST_SHARE and self._integral_N_m_s(weak) > soonest:
+                if self.dies_down(weak, cable_damping_s):
+                    best, soonest = weak, self._integral_N_m_s(weak)
+                    break
+                share *= _CALMING_STEP
+                weak = self._weakened(gains, share)
         return best
 
-    def _calmed(self, gains: LoopGains, slowest_rad_s: float) -> LoopGains | None:
-        """Return the loop slowed down until all its modes die down, None where they never do."""
-        while not self._dies_down(gains):
-            gains = self._with(gains, gains.bandwidth_rad_s / _STEP)
-            if gains.bandwidth_rad_s < slowest_rad_s:
-                return None
-        return gains
+    def _weakened(self, gains: LoopGains, share: float) -> LoopGains:
+        """Return the loop with this share of its damping."""
+        weak = replace(
+            gains,
+            damping_N_s_m=share * gains.damping_N_s_m,
+            null_damping_N_s_m=share * gains.null_damping_N_s_m,
+        )
+        return self._with(weak, share * gains.bandwidth_rad_s)
 
     def _slow(
         self, smooth: float, smoother_rad_s: float, share: float, integral_share: float
@@ -348,49 +388,3 @@ class LoopModel:
     def _integral_N_m_s(self, gains: LoopGains) -> float:
         stiffness = np.exp(np.log(self._along_modes(gains)[1]).mean())
         return gains.integral_1_s * float(stiffness)
-
-
-@dataclass(frozen=True)
-class DesignedLoop:
-    """The loop of a robot, and what it keeps at each of `design_poses`."""
-
-    gains: LoopGains
-    margins: tuple[LoopMargins, ...]
-    modes: tuple[Mode, ...]
-    """The least damped mode of robot and loop at each of them."""
-
-    @property
-    def slowest_rad_s(self) -> float:
-        """Of the platform's modes in closed loop, at all poses."""
-        return min(there.slowest_rad_s for there in self.margins)
-
-
-@dataclass(frozen=True)
-class _Robot:
-    """What a loop is designed from; that of one robot is designed once."""
-
-    platform: Platform
-    rotors_kg: tuple[float, ...]
-    stiffness_N: tuple[float, ...]
-    period_s: float
-    model: PlatformModel = field(compare=False)
-
-
-def designed_loop(model: PlatformModel, axes: Sequence[RobotAxis], period_s: float) -> DesignedLoop:
-    """Return the loop of a robot with these axes, one for each of the n cables.
-
-    Raises GeometryError where the cables do not hold the platform, UnstableError where no loop
-    does.
-    """
-    winches = [axis.winch for axis in axes]
-    rotors_kg = [w.motor.rotor_inertia_kg_m2 / w.cable_m_per_motor_rad**2 for w in winches]
-    stiffness_N = [w.cable.stiffness_N for w in winches]
-    return _designed(_Robot(model.platform, tuple(rotors_kg), tuple(stiffness_N), period_s, model))
-
-
-@lru_cache(maxsize=4)
-def _designed(robot: _Robot) -> DesignedLoop:
-    rotors_kg, stiffness_N = np.array(robot.rotors_kg), np.array(robot.stiffness_N)
-    loop = LoopModel(robot.model, rotors_kg, stiffness_N, robot.period_s)
-    gains = loop.design()
-    return DesignedLoop(gains, tuple(loop.margins(gains)), tuple(loop.least_damped(gains)))

@@ -32,7 +32,8 @@ from cdpr_rt.robots.tension.tension_distribution import tension_distribution
 
 ComplexArray = NDArray[np.complex128]
 
-CABLE_DAMPING_s = 2e-3
+CABLE_DAMPING_s, LITTLE_DAMPING_s = 2e-3, 5e-4
+"""b, as it is assumed, and of cables that damp little: 5 % of critical at 30 Hz."""
 _OF_LEAST = (0.0, 1 / 16, 1 / 8, 1 / 4, 1 / 2, 1.0, 0.875, 0.625, 0.0)
 _OF_GREATEST = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.125, 0.375, 1.0)
 NONE, LEAST, BETWEEN, GREATEST, LEVELS = 0, 5, 7, 8, 9

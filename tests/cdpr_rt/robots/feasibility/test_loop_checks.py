@@ -49,7 +49,7 @@ def test_a_platform_that_tensions_hold_is_not_refused() -> None:
 
 
 def test_what_tensions_hold_and_swings_for_long_is_doubtful() -> None:
-    (late,) = told(short_arms(), 20.0, 200.0, 4e-3, impossible=False)
+    late, leans = told(short_arms(), 20.0, 200.0, 4e-3, impossible=False)
     found = re.match(
         r"axes\[0\]\.anchor_point_m: held by its tensions .* at \(.*\) m it may swing at (\d+) Hz, "
         r"with (0\.\d+) % of critical damping, for ([\d.]+) s ",
@@ -60,7 +60,14 @@ def test_what_tensions_hold_and_swings_for_long_is_doubtful() -> None:
     assert lasts_s > 5.0
     # 2 % are left; the damping has one digit
     assert lasts_s * frequency_Hz * damping == pytest.approx(100 * math.log(50) / math.tau, rel=0.2)
-    assert told(short_arms(), 20.0, 200.0, 2e-3, impossible=False) == []
+    assert re.search(
+        r"^sync_period_s: value 0\.004; the loop leans on what the cables are assumed .*damping_s "
+        r".*: with 0\.5 ms a mode at [34]\d Hz grows with the platform at \(.*\) m; ",
+        leans,
+    )
+    (leans,) = told(short_arms(), 20.0, 200.0, 2e-3, impossible=False)
+    assert leans.startswith("sync_period_s: value 0.002; the loop leans on")
+    assert told(short_arms(), 20.0, 200.0, 1e-3, impossible=False) == []
 
 
 def test_a_platform_that_swings_for_long_on_soft_cables_is_doubtful() -> None:

@@ -12,13 +12,18 @@ from cdpr_rt.robots.kinematics.pose import Pose
 from cdpr_rt.robots.platform.design.loop_design import LoopModel
 from cdpr_rt.robots.platform.design.loop_gains import DAMPING_RATIO, LoopGains, OBSERVER_rad_s
 from cdpr_rt.robots.platform.design.loop_plant import planned_tensions
+from cdpr_rt.robots.platform_model import PlatformModel
 from tests.cdpr_rt.robots.platform.platform_physics import PERIOD_S, Machine
 
-_LATE_S, _CABLE_DAMPING_S = 0.8e-3, 2e-3
+_LATE_S = 0.8e-3
 
 
 def loop_model(machine: Machine, period_s: float = PERIOD_S) -> LoopModel:
-    return LoopModel(machine.model(), rotors(machine), rigidity(machine), period_s)
+    return LoopModel(*robot_of(machine), period_s)
+
+
+def robot_of(machine: Machine) -> tuple[PlatformModel, FloatArray, FloatArray]:
+    return machine.model(), rotors(machine), rigidity(machine)
 
 
 def rotors(machine: Machine) -> FloatArray:
@@ -96,6 +101,7 @@ def radius_at(
     share: float,
     period_s: float,
     tension_N: FloatArray,
+    cable_damping_s: float = 2e-3,
 ) -> float:
     """Return the largest eigenvalue's magnitude of one cycle of robot and loop.
 
@@ -120,7 +126,7 @@ def radius_at(
     F = np.zeros((size + n, size + n))
     F[: d + n, d + n : size] = np.eye(d + n)
     F[d + n : size, : d + n] = -np.linalg.solve(mass, elastic + geometric)
-    F[d + n : size, d + n : size] = -_CABLE_DAMPING_S * np.linalg.solve(mass, elastic)
+    F[d + n : size, d + n : size] = -cable_damping_s * np.linalg.solve(mass, elastic)
     F[d + n : size, size:] = pull
     early, rest = expm(F * _LATE_S), expm(F * (period_s - _LATE_S))
     M = M_p + gains.rotor_kg * J.T @ J

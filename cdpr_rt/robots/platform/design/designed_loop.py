@@ -1,0 +1,72 @@
+"""The loop of a robot file, designed once, and what it keeps."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import lru_cache
+
+import numpy as np
+
+from cdpr_profiles import RobotAxis
+from cdpr_profiles.platform import Platform
+from cdpr_rt.robots.platform.design.loop_cycle import Mode
+from cdpr_rt.robots.platform.design.loop_design import LoopModel
+from cdpr_rt.robots.platform.design.loop_gains import LoopGains, LoopMargins
+from cdpr_rt.robots.platform.design.loop_plant import LITTLE_DAMPING_s
+from cdpr_rt.robots.platform_model import PlatformModel
+
+
+@dataclass(frozen=True)
+class DesignedLoop:
+    """The loop of a robot, and what it keeps at each of `design_poses`."""
+
+    gains: LoopGains
+    margins: tuple[LoopMargins, ...]
+    modes: tuple[Mode, ...]
+    """The least damped mode of robot and loop at each of them."""
+    growing: tuple[Mode, ...]
+    """The same if they damped little, where a mode grows then; else none."""
+
+    @property
+    def slowest_rad_s(self) -> float:
+        """Of the platform's modes in closed loop, at all poses."""
+        return min(there.slowest_rad_s for there in self.margins)
+
+
+@dataclass(frozen=True)
+class _Robot:
+    """What a loop is designed from; that of one robot is designed once."""
+
+    platform: Platform
+    rotors_kg: tuple[float, ...]
+    stiffness_N: tuple[float, ...]
+    cable_damping_s: float
+    period_s: float
+    model: PlatformModel = field(compare=False)
+
+
+def designed_loop(model: PlatformModel, axes: Sequence[RobotAxis], period_s: float) -> DesignedLoop:
+    """Return the loop of a robot with these axes, one for each of the n cables.
+
+    Raises GeometryError where the cables do not hold the platform, UnstableError where no loop
+    does.
+    """
+    winches = [axis.winch for axis in axes]
+    rotors_kg = [w.motor.rotor_inertia_kg_m2 / w.cable_m_per_motor_rad**2 for w in winches]
+    stiffness_N = [w.cable.stiffness_N for w in winches]
+    damping_s = min(w.cable.damping_s for w in winches)
+    known = tuple(rotors_kg), tuple(stiffness_N), damping_s, period_s
+    return _designed(_Robot(model.platform, *known, model))
+
+
+@lru_cache(maxsize=4)
+def _designed(robot: _Robot) -> DesignedLoop:
+    rotors_kg, stiffness_N = np.array(robot.rotors_kg), np.array(robot.stiffness_N)
+    damping_s = robot.cable_damping_s
+    loop = LoopModel(robot.model, rotors_kg, stiffness_N, robot.period_s, cable_damping_s=damping_s)
+    gains = loop.design()
+    modes = loop.least_damped(gains, damping_s)
+    grows = damping_s > LITTLE_DAMPING_s and not loop.dies_down(gains, LITTLE_DAMPING_s)
+    growing = loop.least_damped(gains, LITTLE_DAMPING_s) if grows else ()
+    return DesignedLoop(gains, tuple(loop.margins(gains)), modes, growing)
