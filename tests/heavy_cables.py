@@ -1,4 +1,4 @@
-"""A point mass on elastic catenaries: where it stands, and how cables pull at both their ends."""
+"""Elastic catenaries: a point mass on them, and how one between two points pulls at its ends."""
 
 from __future__ import annotations
 
@@ -66,3 +66,37 @@ def standing(
     assert found == 1, why
     H, V, L, p = parts(x)
     return Standing(p, np.hypot(H, V + w * L), np.hypot(H, V))
+
+
+class Cable(NamedTuple):
+    """An elastic catenary between two points."""
+
+    length_m: float
+    """Its length without tension."""
+    pull_N: NDArray[np.float64]
+    """Force on the anchor point, (3,)."""
+
+
+def cable_with(
+    exit_m: ArrayLike, anchor_m: ArrayLike, weight_N_m: float, stiffness_N: float, exit_N: float
+) -> Cable:
+    """Return the cable whose tension at its exit is `exit_N`, which may be above or below.
+
+    The formulae are those of `standing`.
+    """
+    way, w, EA = np.subtract(exit_m, anchor_m), weight_N_m, stiffness_N
+    across, above = float(np.hypot(*way[:2])), float(way[2])
+    far = float(np.linalg.norm(way))
+
+    def off(x: NDArray[np.float64]) -> list[float]:
+        H, V, L = x
+        top = V + w * L
+        beside = H * L / EA + H / w * (np.arcsinh(top / H) - np.arcsinh(V / H))
+        rise = (V * L + 0.5 * w * L**2) / EA + (np.hypot(H, top) - np.hypot(H, V)) / w
+        return [beside - across, rise - above, (np.hypot(H, top) - exit_N) / w]
+
+    guess = [exit_N * across / far, exit_N * above / far - 0.5 * w * far, far]
+    x, info, _, why = fsolve(off, guess, full_output=True, xtol=1e-13)
+    assert np.abs(info["fvec"]).max() < 1e-6, why
+    H, V, L = x
+    return Cable(float(L), np.array([*(H / across * way[:2]), V]))

@@ -48,6 +48,12 @@ class Kinematics(Protocol):
     def wrench_matrix(self, pose: Pose, out: FloatArray | None = None) -> FloatArray:
         """Return W = -J^T (d, n) at a pose, about the platform's origin; raises GeometryError."""
 
+    def hanging(self, pose: Pose) -> tuple[FloatArray, FloatArray]:
+        """Return the wrench (d,) of the cables' weight at a pose, and the rise (n,) at the winches.
+
+        Tensions there are by the rise above those in the middle of the cables, W being for these.
+        """
+
 
 class TensionDistribution(Protocol):
     """Tensions that carry a wrench within their bounds."""
@@ -254,7 +260,8 @@ class PlatformControl(Controller, Protocol):
     def begin(self, feedback: AxisFeedback, tension_N: FloatArray | None = None) -> None:
         """Take the motors to stand where they are, and the platform where its cables have it.
 
-        Cables that stand with `tension_N` (n,), which may be far from what is planned with.
+        Cables that stand with `tension_N` (n,) at their winches, which may be far from what is
+        planned with.
         """
 
     def observe(self, feedback: AxisFeedback) -> None:
@@ -267,7 +274,7 @@ class PlatformControl(Controller, Protocol):
         """Have the set-point stand where the platform is, which may rest `on_stand`."""
 
     def lengths_at_home(self, tension_N: FloatArray) -> FloatArray:
-        """Return the lengths without tension of cables that hold `tension_N` at home."""
+        """Return the lengths without tension of cables with `tension_N` at their winches, at home."""
 
     def take_lengths(self, length_m: FloatArray, feedback: AxisFeedback) -> None:
         """Take the cables to have these lengths without tension at the motors' angles."""

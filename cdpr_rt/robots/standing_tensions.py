@@ -25,7 +25,7 @@ shares of it that are looked for, the most that can be had first."""
 
 
 class StandingTensions:
-    """Tensions (n,) under which a platform stays where it stands.
+    """Tensions (n,) at the winches under which a platform stays where it stands.
 
     Their wrench is along the weight: it presses the platform down where the cables can without
     pulling hard, with none below the least tension, and as far above it as they can up to what is
@@ -35,7 +35,8 @@ class StandingTensions:
     even at the overshoot, with what winches may take up exceeded as far as it can be, or with each
     at 0.57 of what would carry it all, which may be below the least tension. Friction makes the
     tensions differ from what is asked for by some newtons, which a platform whose weight is all but
-    carried does not stand still for.
+    carried does not stand still for. The weight of cables that have some presses and is carried
+    with the platform's.
     """
 
     def __init__(
@@ -70,11 +71,12 @@ class StandingTensions:
         self._pressed += [(self._least, 1.0)] + [(pressing, share) for share in _PRESSING]
         self._carrying = model.least_tensions(np.zeros(least_N.size), model.high_N)
         self._W, self._t = np.zeros((model.size, least_N.size)), np.zeros(least_N.size)
+        self._hanging, self._rise_N = np.zeros(model.size), np.zeros(least_N.size)
 
     def at(self, pose: Pose) -> tuple[FloatArray, bool]:
         """Return the tensions (n,) at a pose, overwritten, and whether they leave it standing."""
         t = self._t
-        self._kinematics.wrench_matrix(pose, self._W)
+        self._look(pose)
         stays = self._press(self._pressed)
         if stays and (t < self._clear_N).any():
             exceeded = float(np.min(t / self._clear_N))
@@ -86,6 +88,7 @@ class StandingTensions:
             stays = stays or self._press(self._pressed)
         elif not stays:
             stays = self._carry()
+        t += self._rise_N
         # less than was solved for has another wrench
         stays = stays and bool((t <= self._most_N).all())
         return np.minimum(t, self._most_N, out=t), stays
@@ -93,12 +96,13 @@ class StandingTensions:
     def _carry(self) -> bool:
         """Take tensions that carry a share of the weight; whether there are any."""
         t = self._t
-        stays = self._least.solve(self._W, self._weight, t) is TensionOutcome.FEASIBLE
+        carried = self._weight + self._hanging
+        stays = self._least.solve(self._W, carried, t) is TensionOutcome.FEASIBLE
         np.multiply(np.maximum(t, 0.0), _CARRIED, out=t)
         if (t >= self._clear_N).all():
             return stays
-        least_N, carried = t.copy(), [(solver, -_CARRIED) for _, solver in self._harder]
-        if self._press(carried):
+        least_N, harder = t.copy(), [(solver, -_CARRIED) for _, solver in self._harder]
+        if self._press(harder):
             return True
         t[:] = least_N
         return stays
@@ -106,12 +110,18 @@ class StandingTensions:
     def _press(self, tensions: list[tuple[TensionDistribution, float]]) -> bool:
         """Take the first that press the platform down by a share of its weight; whether any do."""
         return any(
-            solver.solve(self._W, -share * self._weight, self._t) is TensionOutcome.FEASIBLE
+            solver.solve(self._W, self._hanging - share * self._weight, self._t)
+            is TensionOutcome.FEASIBLE
             for solver, share in tensions
         )
 
     def carry(self, pose: Pose) -> bool:
         """Return whether tensions within their bounds, none of them a push, carry the weight."""
-        self._kinematics.wrench_matrix(pose, self._W)
-        outcome = self._carrying.solve(self._W, self._weight, self._t)
+        self._look(pose)
+        outcome = self._carrying.solve(self._W, self._weight + self._hanging, self._t)
         return outcome is TensionOutcome.FEASIBLE
+
+    def _look(self, pose: Pose) -> None:
+        """Take the wrench matrix and the cables' weight at a pose."""
+        self._kinematics.wrench_matrix(pose, self._W)
+        self._hanging[:], self._rise_N[:] = self._kinematics.hanging(pose)

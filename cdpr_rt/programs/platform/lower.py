@@ -174,8 +174,11 @@ class LowerProgram(PlatformProgram):
         for the estimated pose, which follows a cable that runs in or an encoder that jumps.
         """
         self._there.array[:] = self._parts.model.poses(self._control.shaped[None])[0]
-        self._parts.model.kinematics.wrench_matrix(self._there, self._W)
-        self._weight_only.solve(self._W, self._weight, self._weight_tension_N)
+        kinematics = self._parts.model.kinematics
+        kinematics.wrench_matrix(self._there, self._W)
+        hanging, rise_N = kinematics.hanging(self._there)
+        self._weight_only.solve(self._W, self._weight + hanging, self._weight_tension_N)
+        self._weight_tension_N += rise_N
         torque_Nm[:] = -self._cable * np.maximum(self._weight_tension_N, self._drum_tension_N)
 
     def _pay_out(

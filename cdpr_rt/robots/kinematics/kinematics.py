@@ -158,6 +158,16 @@ class CableKinematics:
         self.write_hanging_wrenches(poses, out)
         return out
 
+    def hanging(self, pose: Pose) -> tuple[FloatArray, FloatArray]:
+        """Return the wrench (d,) of the cables' weight at a pose, and the winches' rise (n,), N.
+
+        That is by how much tensions at the exits are above those in the middle of the cables, see
+        `cable_kernel.tension_rise`. Raises GeometryError as `jacobian` does.
+        """
+        self._run(pose)
+        rise = [cable_kernel.tension_rise(self.geometry, self._cables, i) for i in range(self.n)]
+        return self.hanging_wrenches(pose.array[None])[0], np.array(rise)
+
     def write_hanging_wrenches(self, poses: FloatArray, out: FloatArray) -> None:
         """Write these into `out` (m, d), which stays as it is where the cables are weightless."""
         if self._hangs:

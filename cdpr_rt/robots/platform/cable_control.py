@@ -20,7 +20,7 @@ from cdpr_rt.jit import bound
 from cdpr_rt.robots.free_rotation import rotation_of
 from cdpr_rt.robots.kinematics import pose_setpoint
 from cdpr_rt.robots.kinematics import pose_tracking as tracking
-from cdpr_rt.robots.kinematics.cable_kernel import CABLE_ROWS, run_cables
+from cdpr_rt.robots.kinematics.cable_kernel import CABLE_ROWS, run_cables, tension_rise
 from cdpr_rt.robots.kinematics.pose import Pose
 from cdpr_rt.robots.platform import loop_kernel as loop
 from cdpr_rt.robots.platform.body_kernel import body_of
@@ -125,6 +125,7 @@ class CableControl(PlaceChecks):
         self._pose.array[:] = self._home.array
         self._wanted = Pose(np.zeros(3))
         self._scratch, (found, wanted) = np.zeros((4, 3)), np.zeros((2, CABLE_ROWS, n))
+        self._found = found
         follows = self.gains.follows_pose
         self._planned_at = (found, self._pose.array) if follows else (wanted, self._wanted.array)
         filters = tracking_filters(self.gains, self._period_s)
@@ -287,15 +288,18 @@ class CableControl(PlaceChecks):
     def begin(self, feedback: AxisFeedback, tension_N: FloatArray | None = None) -> None:
         """Take the motors to stand where they are, and the platform where its cables have it.
 
-        Cables that stand with `tension_N` (n,), which may be far from what is planned with.
+        Cables that stand with `tension_N` (n,) at their winches, which may be far from what is
+        planned with.
         """
         motors = self._motors
         motors[tracking.THETA] = feedback.position_rad
         motors[[tracking.OMEGA, tracking.LOWPASSED_ONCE, tracking.LOWPASSED]] = 0.0
         planned_N = np.maximum(motors[tracking.TENSION], self.low_N)
-        motors[tracking.TENSION] = planned_N if tension_N is None else tension_N
+        motors[tracking.TENSION] = planned_N
         self._pose.array[:] = self._home.array
         for _ in range(_SETTLING_STEPS):
+            if tension_N is not None:
+                motors[tracking.TENSION] = tension_N - self._rises_N(self._found)
             self.observe(feedback)
         self._swing[:] = 0.0
         motors[tracking.TENSION] = planned_N
@@ -325,13 +329,19 @@ class CableControl(PlaceChecks):
         self._write_coordinates()
 
     def lengths_at_home(self, tension_N: FloatArray) -> FloatArray:
-        """Return the lengths (n,) without tension of cables that hold `tension_N` (n,) at home."""
+        """Return lengths (n,) without tension at home, of cables with `tension_N` at the winches."""
         kinematics, motors = self.model.kinematics, np.array(self._motors)
         cables = np.zeros((CABLE_ROWS, kinematics.n))
         run_cables(kinematics.geometry, self._home.array, cables)
-        motors[tracking.TENSION], motors[tracking.STRETCH] = tension_N, 1.0
+        motors[tracking.TENSION] = tension_N - self._rises_N(cables)
+        motors[tracking.STRETCH] = 1.0
         tracking.stretch(motors, cables, self._up)
         return np.asarray(kinematics.lengths(self._home) / motors[tracking.STRETCH])
+
+    def _rises_N(self, cables: FloatArray) -> FloatArray:
+        """Return by how much tensions at the winches are above those in the cables' middle, (n,)."""
+        geometry = self.model.kinematics.geometry
+        return np.array([tension_rise(geometry, cables, i) for i in range(cables.shape[1])])
 
     def take_lengths(self, length_m: FloatArray, feedback: AxisFeedback) -> None:
         """Take the cables to have these lengths without tension at the motors' angles, (n,).

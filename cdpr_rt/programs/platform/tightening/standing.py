@@ -162,8 +162,10 @@ def rests_at_home(parts: PlatformParts, length_m: FloatArray, feedback: AxisFeed
     here = control.estimated
     if distance_m(here, model.home, parts.scale_m) > parts.platform.home_tolerance_m:
         return False
-    tension_N = np.nan_to_num(parts.estimator.estimate.tension_N)
-    carried_N = (model.kinematics.wrench_matrix(model.pose(here)) @ tension_N)[model.positions - 1]
+    pose, up = model.pose(here), model.positions - 1
+    hanging, rise_N = model.kinematics.hanging(pose)
+    tension_N = np.nan_to_num(parts.estimator.estimate.tension_N) - rise_N
+    carried_N = (model.kinematics.wrench_matrix(pose) @ tension_N + hanging)[up]
     return bool(carried_N < _CARRIED_SHARE * parts.platform.mass_kg * G_m_s2)
 
 
