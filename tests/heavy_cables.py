@@ -8,6 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import fsolve
 
+from cdpr_profiles.platform import Platform
+
 G_m_s2 = 9.80665
 
 
@@ -100,3 +102,17 @@ def cable_with(
     assert np.abs(info["fvec"]).max() < 1e-6, why
     H, V, L = x
     return Cable(float(L), np.array([*(H / across * way[:2]), V]))
+
+
+def cables_on(
+    platform: Platform, position_m: ArrayLike, stiffness_N: ArrayLike, exit_N: ArrayLike
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return lengths (n,) of the cables of an upright platform, and their wrench (6,) on it."""
+    lengths_m, wrench, arms = [], np.zeros(6), np.array(platform.anchor_points_m)
+    each = zip(platform.exit_points_m, arms, platform.cable_weights_N_m, strict=True)
+    pulls = zip(each, np.asarray(stiffness_N, float), np.asarray(exit_N, float), strict=True)
+    for (exit_m, arm, weight_N_m), EA, pull_N in pulls:
+        cable = cable_with(exit_m, np.add(position_m, arm), weight_N_m, EA, pull_N)
+        lengths_m.append(cable.length_m)
+        wrench += np.concatenate([cable.pull_N, np.cross(arm, cable.pull_N)])
+    return np.array(lengths_m), wrench

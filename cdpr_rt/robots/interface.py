@@ -274,7 +274,7 @@ class PlatformControl(Controller, Protocol):
         """Have the set-point stand where the platform is, which may rest `on_stand`."""
 
     def lengths_at_home(self, tension_N: FloatArray) -> FloatArray:
-        """Return the lengths without tension of cables with `tension_N` at their winches, at home."""
+        """Return lengths without tension at home, with `tension_N` at the winches."""
 
     def take_lengths(self, length_m: FloatArray, feedback: AxisFeedback) -> None:
         """Take the cables to have these lengths without tension at the motors' angles."""

@@ -14,7 +14,14 @@ import numpy as np
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.control.winch_speed_loop import FILTER_S, control_speed
 from cdpr_rt.jit import jit
-from cdpr_rt.robots.kinematics.cable_kernel import ARC, CABLE_ROWS, FREE, run_cables
+from cdpr_rt.robots.kinematics.cable_kernel import (
+    ARC,
+    CABLE_ROWS,
+    FREE,
+    hang,
+    run_cables,
+    tension_rise,
+)
 from cdpr_rt.robots.kinematics.pose import exponential
 from cdpr_rt.robots.platform.body_kernel import write_mass_matrix, write_wrench
 from cdpr_rt.robots.platform.loop_kernel import factor, solve
@@ -69,7 +76,7 @@ def fall(
     """Write the poses (c, 4, 3) after each of c cycles into `path`; return how many it took.
 
     The platform rests at `start` (4, 3). `body` is that of `body_kernel`, `free` (6,) has 1 for
-    each component of the twist that there is, 0 otherwise; `geometry` (10, n) is that of
+    each component of the twist that there is, 0 otherwise; `geometry` (13, n) is that of
     `cable_kernel`, `feet` (k, 3) are what can touch the ground, m, in the platform's frame.
     """
     c, n = parameters[0], winches.size
@@ -81,7 +88,8 @@ def fall(
     out, as_cable, scratch = np.full(n, c.paying_out_m_s), np.ones(n), np.zeros((4, 6, 6))
     run_cables(geometry, pose, cables)
     for i in range(n):
-        length[i] = cables[FREE, i] + cables[ARC, i] - pull[i] / winches[i].stiffness_N_m
+        middle_N = pull[i] - tension_rise(geometry, cables, i)
+        length[i] = cables[FREE, i] + cables[ARC, i] - middle_N / winches[i].stiffness_N_m
     still = 0
     for cycle in range(path.shape[0]):
         if cycle == c.held_cycles:
@@ -97,9 +105,11 @@ def fall(
         standing = False
         for _ in range(c.steps):
             run_cables(geometry, pose, cables)
-            _wind(h, winches, cables, twist, pull, length, rate, tension)
+            _wind(h, winches, geometry, cables, twist, pull, length, rate, tension)
             tension[c.cut] = -c.misled_N if cycle < c.held_cycles else 0.0
-            standing = _step(h, c, body, free, cables, tension, feet, pose, twist, scratch)
+            standing = _step(
+                h, c, body, free, geometry, cables, tension, feet, pose, twist, scratch
+            )
         path[cycle] = pose
         slow = math.sqrt(twist[0] ** 2 + twist[1] ** 2 + twist[2] ** 2) < _STILL_m_s
         still = still + 1 if standing and slow else 0
@@ -112,6 +122,7 @@ def fall(
 def _wind(
     h: float,
     winches: Any,
+    geometry: FloatArray,
     cables: FloatArray,
     twist: FloatArray,
     pull: FloatArray,
@@ -119,7 +130,7 @@ def _wind(
     rate: FloatArray,
     tension: FloatArray,
 ) -> None:
-    """Write the cables' tensions (n,), and advance their rotors by `h` s."""
+    """Write the tensions (n,) in the cables' middle, and advance their rotors by `h` s."""
     for i in range(winches.size):
         w = winches[i]
         stretch, growing = cables[FREE, i] + cables[ARC, i] - length[i], -rate[i]
@@ -127,7 +138,8 @@ def _wind(
             growing += cables[k, i] * twist[k]
         carried = w.stiffness_N_m * stretch + w.damping_N_s_m * growing
         tension[i] = max(carried, 0.0) if stretch > 0.0 else 0.0
-        unbraked = rate[i] + h * (tension[i] - pull[i]) / w.rotor_kg
+        at_winch = tension[i] + tension_rise(geometry, cables, i)
+        unbraked = rate[i] + h * (at_winch - pull[i]) / w.rotor_kg
         braked = max(abs(unbraked) - h * w.friction_N / w.rotor_kg, 0.0)
         rate[i] = math.copysign(braked, unbraked)
         length[i] += h * rate[i]
@@ -139,6 +151,7 @@ def _step(
     c: Any,
     body: FloatArray,
     free: FloatArray,
+    geometry: FloatArray,
     cables: FloatArray,
     tension: FloatArray,
     feet: FloatArray,
@@ -155,6 +168,7 @@ def _step(
     write_mass_matrix(body, pose, about, M)
     rest[:] = 0.0
     write_wrench(body, M, about, twist, rest, wrench)
+    hang(geometry, pose, cables, wrench)
     for i in range(tension.size):
         for k in range(6):
             wrench[k] -= cables[k, i] * tension[i]

@@ -95,8 +95,9 @@ class CableLoss:
       the span of tensions. With the broken cable's tension t, its rotor's mass m at the cable and
       the highest speed v of the limits, that lasts 1.5 m v/t + 15 ms, 0.25 s at most.
     - Then the winches let it down as the program `lower` does where the pose is not known.
-    - Cables are elastic, without weight. Winches rub with 0, 3 or 6 % of the motor's rated torque,
-      whichever gets a figure the largest: what rubs may keep the platform or turn it over.
+    - Cables are elastic. Where their weight counts, half of it is on the platform, and winches hold
+      what hangs from them; they do not sag. Winches rub with 0, 3 or 6 % of the motor's rated
+      torque, whichever gets a figure the largest: what rubs may keep the platform or turn it over.
     - The ground is level, as high as the platform stands at home, or where that is lower, as it
       is when the cable breaks: nothing begins in the ground, whose spring would fling it.
     """
@@ -148,10 +149,11 @@ class CableLoss:
         model, winches = self._model, self._winches
         W, tension_N = np.zeros((model.size, len(winches))), np.zeros(len(winches))
         model.kinematics.wrench_matrix(start, W)
-        self._resting.solve(W, model.weight(), tension_N)
-        winches["held_N"] = tension_N
-        self._weight_only.solve(W, model.weight(), tension_N)
-        winches["weight_N"] = tension_N
+        hanging, rise_N = model.kinematics.hanging(start)
+        self._resting.solve(W, model.weight() + hanging, tension_N)
+        winches["held_N"] = tension_N + rise_N
+        self._weight_only.solve(W, model.weight() + hanging, tension_N)
+        winches["weight_N"] = tension_N + rise_N
         cables = np.empty((CABLE_ROWS, len(winches)))
         run_cables(model.kinematics.geometry, start.array, cables)
         winches["stiffness_N_m"] = self._EA_N / np.maximum(cables[FREE] + cables[ARC], _NEAREST_m)

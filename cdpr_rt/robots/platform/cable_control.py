@@ -329,7 +329,7 @@ class CableControl(PlaceChecks):
         self._write_coordinates()
 
     def lengths_at_home(self, tension_N: FloatArray) -> FloatArray:
-        """Return lengths (n,) without tension at home, of cables with `tension_N` at the winches."""
+        """Return lengths (n,) without tension at home, with `tension_N` (n,) at the winches."""
         kinematics, motors = self.model.kinematics, np.array(self._motors)
         cables = np.zeros((CABLE_ROWS, kinematics.n))
         run_cables(kinematics.geometry, self._home.array, cables)
@@ -339,7 +339,7 @@ class CableControl(PlaceChecks):
         return np.asarray(kinematics.lengths(self._home) / motors[tracking.STRETCH])
 
     def _rises_N(self, cables: FloatArray) -> FloatArray:
-        """Return by how much tensions at the winches are above those in the cables' middle, (n,)."""
+        """Return by how much tensions at the winches are above those in the middle, (n,)."""
         geometry = self.model.kinematics.geometry
         return np.array([tension_rise(geometry, cables, i) for i in range(cables.shape[1])])
 

@@ -16,7 +16,7 @@ from cdpr_rt.programs.platform.tightening.standing import rests_at_home
 from cdpr_rt.robots.robot_arrays import winches_of
 from cdpr_rt.robots.standing_tensions import StandingTensions
 from tests.cdpr_rt.robots.platform.platform_physics import PERIOD_S, Machine, shipped, spatial
-from tests.heavy_cables import cable_with
+from tests.heavy_cables import cables_on
 
 G_m_s2 = 9.80665
 
@@ -30,19 +30,8 @@ def heavy(machine: Machine, weight_N_m: float) -> Machine:
 
 def truth(machine: Machine, winch_N: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return the true lengths (n,) at home, and the wrench (6,) of all cables on the platform."""
-    platform, lengths_m, wrench = machine.platform, [], np.zeros(6)
-    for i, axis in enumerate(machine.axes):
-        b = np.array(platform.anchor_points_m[i])  # it stands upright
-        cable = cable_with(
-            platform.exit_points_m[i],
-            b + platform.home_m,
-            platform.cable_weights_N_m[i],
-            axis.winch.cable.stiffness_N,
-            winch_N[i],
-        )
-        lengths_m.append(cable.length_m)
-        wrench += np.concatenate([cable.pull_N, np.cross(b, cable.pull_N)])
-    return np.array(lengths_m), wrench
+    stiffness_N = [axis.winch.cable.stiffness_N for axis in machine.axes]
+    return cables_on(machine.platform, machine.platform.home_m, stiffness_N, winch_N)
 
 
 def parts_of(machine: Machine) -> PlatformParts:

@@ -15,6 +15,7 @@ from cdpr_rt.robots.platform_model import platform_model, platform_model_of
 from cdpr_rt.robots.resonance import lowest_resonance_Hz
 from cdpr_rt.robots.statics import statics_of
 from tests.cdpr_rt.robots.pulley import over_a_pulley
+from tests.heavy_cables import G_m_s2, cables_on
 
 
 def hung(exits: tuple[tuple[float, ...], ...], anchors: tuple[tuple[float, ...], ...]) -> Platform:
@@ -109,6 +110,19 @@ def test_a_loss_that_is_noticed_late_flings_the_platform_more() -> None:
         moved_m.append(np.linalg.norm(path[: round(0.1 / one.sync_period_s), 0] - start.p, axis=1))
     early_m, late_m = (moved.max() for moved in moved_m)
     assert late_m > 1.2 * early_m
+
+
+def test_it_falls_from_where_winches_carry_the_cables_too() -> None:
+    robot, place_m = load_robot("suspended-8"), (0.4, -0.3, 1.2)
+    assert robot.platform is not None
+    platform = dataclasses.replace(robot.platform, cable_weights_N_m=(4.0,) * 8)
+    loss = CableLoss(dataclasses.replace(robot, platform=platform))
+    loss.path(0, loss._model.pose(np.array(place_m)))
+    stiffness_N = [axis.winch.cable.stiffness_N for axis in robot.axes]
+    weight_N = platform.mass_kg * G_m_s2
+    for pulled, within in (("held_N", 2e-3), ("weight_N", 0.02)):
+        wrench = cables_on(platform, place_m, stiffness_N, loss._winches[pulled])[1]
+        assert wrench[2] == pytest.approx(weight_N, rel=within)
 
 
 def test_one_rotor_and_a_mass_swing_at_the_textbook_frequency() -> None:

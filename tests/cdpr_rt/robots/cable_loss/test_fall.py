@@ -10,7 +10,7 @@ import pytest
 
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.robots.cable_loss.fall_kernel import PARAMETERS, WINCHES, fall
-from cdpr_rt.robots.kinematics.cable_kernel import ANCHOR, GEOMETRY_ROWS
+from cdpr_rt.robots.kinematics.cable_kernel import ANCHOR, GEOMETRY_ROWS, WEIGHT
 from cdpr_rt.robots.platform.body_kernel import CENTRE, GRAVITY, INERTIA, MASS, body_of
 from tests.cdpr_rt.robots.cable_loss.test_cable_loss import hung
 
@@ -30,6 +30,7 @@ def fallen(
     ground_m: float = -1e3,
     held_s: float = 1e3,
     misled_N: float = 0.0,
+    weight_N_m: float = 0.0,
     **winch: float,
 ) -> FloatArray:
     """Return the poses after each cycle of 1 ms; a second cable, straight up, is the broken one."""
@@ -59,6 +60,7 @@ def fallen(
     geometry = np.zeros((GEOMETRY_ROWS, 2))
     geometry[:3] = np.transpose([exit_m, (start_m[0], start_m[1], start_m[2] + 1.0)])
     geometry[ANCHOR : ANCHOR + 3, 0] = anchor_m
+    geometry[WEIGHT + 2, 0] = -weight_N_m
     pose = np.vstack([start_m, np.eye(3)])
     path = np.empty((round(seconds / PERIOD_S), 4, 3))
     cycles = fall(parameters, winches, body, free, geometry, np.zeros((1, 3)), pose, path)
@@ -106,6 +108,18 @@ def test_a_motor_gives_way_to_what_is_above_its_torque(friction_N: float, braked
     )
     acceleration = (MASS_kg * G_m_s2 - 10.0 - braked_N) / (MASS_kg + 3.0)
     assert -path[-1, 0, 2] == pytest.approx(acceleration * 0.5**2 / 2.0, rel=0.02)
+
+
+def test_a_cable_that_weighs_something_pulls_itself_out_with_all_its_weight() -> None:
+    # half of it on the platform, half at the winch: (M + m) s" = M g - T + w (s + l), l at first
+    rotor_kg, held_N, w, length_m, seconds = 3.0, 10.0, 4.0, 2.0, 0.5
+    path = fallen(
+        (0.0, 0.0, 0.0), (0.0, 0.0, length_m), seconds, rotor_kg=rotor_kg, held_N=held_N,
+        weight_N_m=w,
+    )  # fmt: skip
+    rate = math.sqrt(w / (MASS_kg + rotor_kg))
+    first = (MASS_kg * G_m_s2 - held_N) / w + length_m
+    assert -path[-1, 0, 2] == pytest.approx(first * (math.cosh(rate * seconds) - 1.0), rel=0.02)
 
 
 def test_a_winch_that_rubs_enough_keeps_its_load() -> None:
