@@ -149,8 +149,9 @@ def _drive(w: Winches, i: int, phase: int, state: FloatArray, most: float) -> No
         w.high_N[i] = state[MAY_N]
     elif phase in (LOOSENED, PAID_OUT):
         w.low_N[i], w.paying_out_m_s[i] = -w.enough_N[i], TAKE_UP_m_s
-        if phase == PAID_OUT:  # two that are tight at once may move the platform
-            w.high_N[i] = 0.0
+        if phase == PAID_OUT:
+            # two that are tight at once may move the platform; a heavy cable would run out
+            w.high_N[i] = w.hangs_N[i]
     elif phase == WAITING:  # held: cogging would turn it
         w.low_N[i], w.paying_out_m_s[i] = -w.enough_N[i], 0.0
-        w.high_N[i] = min(w.high_N[i], w.enough_N[i])
+        w.high_N[i] = min(w.high_N[i], max(w.enough_N[i], w.hangs_N[i]))

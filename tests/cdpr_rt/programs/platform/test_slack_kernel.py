@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 
 from cdpr_rt.arrays import FloatArray, IntArray
+from cdpr_rt.control.winch_speed_loop import WinchSpeedLoop
+from cdpr_rt.core.exchange import AxisFeedback
 from cdpr_rt.programs.platform.tightening import slack_kernel as kernel
 from cdpr_rt.programs.platform.tightening.slack import Stillness
 
@@ -128,3 +130,30 @@ def test_a_motor_that_dithers_by_a_count_stands_still() -> None:
             for cycle in range(1000)
         ]
         assert any(lasted) == (still_for == 3 and far == 1.0)
+
+
+def test_a_heavy_cable_is_paid_out_a_little_and_held_against_what_it_pulls() -> None:
+    """With no more than what keeps light ones from sticking it would run out."""
+    pulls_N, inertia_kg_m2 = 2.5 * ENOUGH_N, 2.3e-4
+    cable, feedback, torque_Nm = OneCable(), AxisFeedback(1), np.zeros(1)
+    loop = WinchSpeedLoop(one(inertia_kg_m2), one(CABLE_m), PERIOD_S)
+    cable.winch.hangs_N[:] = 3.5 * ENOUGH_N
+    cable.enter(kernel.PAID_OUT)
+    torque_Nm[:] = -CABLE_m * pulls_N
+    loop.begin(feedback, one(0.0), torque_Nm)
+    speed_rad_s, w = 0.0, cable.winch
+    for _ in range(1000):
+        w.high_N[:], w.low_N[:], w.paying_out_m_s[:] = 0.0, 0.0, -kernel.TAKE_UP_m_s
+        w.speed_rad_s[:], w.tension_N[:] = loop.speed_rad_s, loop.tension_N
+        kernel.take_up(w, cable.phase, cable.state, feedback.position_rad, one(PRETENSION_N), 1.0)
+        if cable.phase[0] != kernel.PAID_OUT:
+            break
+        loop.high_N[:], loop.low_N[:] = w.high_N, w.low_N
+        loop.paying_out_m_s[:] = w.paying_out_m_s
+        loop.update(feedback, torque_Nm)
+        speed_rad_s += PERIOD_S / inertia_kg_m2 * float(torque_Nm[0] + CABLE_m * pulls_N)
+        feedback.position_rad += PERIOD_S * speed_rad_s
+    assert cable.phase[0] == kernel.CLOSING  # having waited for no others
+    assert w.high_N[0] >= pulls_N
+    assert CABLE_m * feedback.position_rad[0] == pytest.approx(0.005, abs=0.001)
+    assert CABLE_m * speed_rad_s == pytest.approx(kernel.TAKE_UP_m_s, rel=0.3)
