@@ -2,7 +2,7 @@
 
 For cable i at pose j, with what the encoder says of its length without tension l_ij, offset o_i,
 drum error s_i about the length l_i0 at the start, and stretch S_ij = straight length over length
-without tension under the tension t_ij, loop closure (Tremblay, eqs. (3.16) to (3.18)) is
+without tension under the tension t_ij at the winch, loop closure (Tremblay, (3.16) to (3.18)) is
 
     f_ij = (l_ij + o_i + s_i (l_ij - l_i0)) S_ij - ρ(a_i, b_i, r_i, x_j)
 
@@ -100,7 +100,11 @@ def lengths_told(geometry: CableGeometry, poses: FloatArray, tension_N: FloatArr
 
 
 def _stretch(geometry: CableGeometry, tension_N: FloatArray, cables: FloatArray) -> FloatArray:
-    """Return straight length over length without tension, (N, n)."""
+    """Return straight length over length without tension, (N, n).
+
+    Tensions are told at the winches; at the platform that of a cable is by the weight of a piece as
+    long as its exit is above its anchor point less.
+    """
     soft = geometry.compliance()
     if not geometry.weight_N_m.any():
         return np.asarray(1.0 + soft * tension_N)
@@ -108,9 +112,10 @@ def _stretch(geometry: CableGeometry, tension_N: FloatArray, cables: FloatArray)
     straight = cables[:, FREE] + cables[:, ARC]
     lengths = np.empty_like(straight)
     most_weight, most_soft = float(geometry.weight_N_m.max()), float(soft.mean())
+    at_platform = tension_N + most_weight * cables[:, FREE] * (up @ cables[:, :3])
     for j in range(len(cables)):
         write_unstretched_lengths(
-            cables[j, :3], cables[j, FREE], cables[j, ARC], up, tension_N[j],
+            cables[j, :3], cables[j, FREE], cables[j, ARC], up, at_platform[j],
             most_soft, most_weight, lengths[j],
         )  # fmt: skip
     return np.where(lengths > 0.0, straight / lengths, 1.0 + soft * tension_N)

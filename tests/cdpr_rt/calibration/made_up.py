@@ -68,8 +68,8 @@ def made_up(
         exits, anchors, model.kinematics.directions,
         model=CableModel(1.0 / soft if soft else np.inf, float(file.weight_N_m[0])),
     )  # fmt: skip
-    lengths = np.zeros((poses, n))
-    held = []
+    lengths, told = np.zeros((2, poses, n))
+    held, up = [], file.coordinates - 1
     for j, array in enumerate(model.poses(places)):
         pose = Pose(array[0], array[1:])
         if file.turns_freely:
@@ -78,12 +78,15 @@ def made_up(
             tension[j] = _holding(true, pose, tension[j])
         held.append(pose)
         lengths[j] = truly.lengths(pose, tension[j])
+        # winches tell what their cables weigh more from there to the platform, where tension acts
+        height = (exits - pose.p - anchors @ pose.Q.T)[:, up]
+        told[j] = tension[j] + file.weight_N_m * height
     # what the encoders say: offset and drum taken away again
     reference = lengths[0] - cable[:, 3]
     reading = (lengths - cable[:, 3] + cable[:, 4] * reference) / (1.0 + cable[:, 4])
     reading += rng.normal(0.0, 1.0, reading.shape) * noise_m
     start = model.poses(places)
-    seen = Observations.of_lengths(reading, tension, start)
+    seen = Observations.of_lengths(reading, told, start)
     return MadeUp(file, true, held, replace(seen, reference_m=reference))
 
 
