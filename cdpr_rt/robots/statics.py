@@ -14,7 +14,7 @@ from cdpr_rt.arrays import BoolArray, FloatArray
 from cdpr_rt.core.supervision.limits import Limits
 from cdpr_rt.robots.free_rotation import rotation_of
 from cdpr_rt.robots.interface import TensionOutcome
-from cdpr_rt.robots.kinematics.cable_kernel import ARC, CABLE_ROWS, FREE, run_poses
+from cdpr_rt.robots.kinematics.cable_kernel import ARC, CABLE_ROWS, FREE, WEIGHT, run_poses
 from cdpr_rt.robots.kinematics.free_rotation_kernel import STEEPNESS, turn_to_rest
 from cdpr_rt.robots.kinematics.kinematics import PLANAR_POINT
 from cdpr_rt.robots.platform_model import PlatformModel, platform_model, platform_model_of
@@ -102,6 +102,14 @@ class PlatformStatics:
     def free_lengths(self, position_m: FloatArray) -> FloatArray:
         """Return the lengths (..., n), m, from pulley or exit point to anchor point."""
         return self._cables(position_m, NONE_rad)[..., FREE, :]
+
+    def rises_N(self, position_m: FloatArray) -> FloatArray:
+        """Return by how much tensions at winches are above those in the middle of cables, (..., n).
+
+        N, in the orientation of home; see `cable_kernel.tension_rise`.
+        """
+        cables, weight = self._cables(position_m, NONE_rad), self.model.kinematics.geometry[WEIGHT:]
+        return np.asarray(0.5 * cables[..., FREE, :] * (cables[..., :3, :] * weight).sum(axis=-2))
 
     def _cables(self, position_m: FloatArray, turn_rad: FloatArray) -> FloatArray:
         """Return the rows of `cable_kernel` (..., 9, n)."""

@@ -16,7 +16,7 @@ from cdpr_rt.robots.feasibility import turning_checks as turning
 from cdpr_rt.robots.feasibility.finding import Finding, rounded_down
 from cdpr_rt.robots.feasibility.loop_checks import loop_findings
 from cdpr_rt.robots.feasibility.not_held import point_text, why_not_held
-from cdpr_rt.robots.feasibility.stand_checks import stand_findings
+from cdpr_rt.robots.feasibility.stand_checks import stand_findings, unwinding
 from cdpr_rt.robots.interference.interference import in_words
 from cdpr_rt.robots.robot_arrays import limits_of
 from cdpr_rt.robots.statics import NONE_rad, PlatformStatics, statics_of
@@ -66,6 +66,7 @@ def findings(robot: Robot, limits: Limits | None = None) -> list[Finding]:
         ]
         found += [*_contact(statics), *turning.upright(statics)]
         found += [*_friction(robot, statics), *stand_findings(robot, limits, statics)]
+        found += unwinding(robot, statics)
     return sorted(found, key=lambda finding: not finding.impossible)
 
 
@@ -155,10 +156,11 @@ def _tensions(statics: PlatformStatics) -> Iterator[Finding]:
 
 
 def standing_tensions_N(statics: PlatformStatics) -> FloatArray:
-    """Return the greatest tensions (n,), N, with which the platform stands in its box."""
+    """Return the greatest tensions (n,) at winches, N, with which it stands in its box."""
     points = statics.points()
     taken = points[statics.is_target(points)]
     held_N = statics.least_tensions_N(taken, reserve_N=statics.model.reserve_N)
+    held_N += statics.rises_N(taken)
     return np.asarray(held_N.max(axis=0, initial=0.0))
 
 

@@ -1,4 +1,4 @@
-"""Whether cables around a platform that stands at home can be pulled with more than winches rub."""
+"""Whether winches of a platform that stands at home can pull more than they rub, and hold ropes."""
 
 from __future__ import annotations
 
@@ -8,10 +8,15 @@ from dataclasses import replace
 import numpy as np
 
 from cdpr_profiles import Robot
-from cdpr_rt.arrays import FloatArray
+from cdpr_profiles.devices.safety_io import load_safety_io
+from cdpr_rt.arrays import BoolArray, FloatArray
 from cdpr_rt.core.supervision.limits import Limits
 from cdpr_rt.robots.feasibility.finding import Finding
-from cdpr_rt.robots.platform.learning.motor_learning import COGGING_SHARE, MOST_SHARE
+from cdpr_rt.robots.platform.learning.motor_learning import (
+    COGGING_SHARE,
+    FRICTION_SHARE,
+    MOST_SHARE,
+)
 from cdpr_rt.robots.platform_model import PlatformModel
 from cdpr_rt.robots.standing_tensions import StandingTensions
 from cdpr_rt.robots.statics import PlatformStatics, statics_of
@@ -19,6 +24,8 @@ from cdpr_rt.robots.statics import PlatformStatics, statics_of
 _RUBS = 0.6
 """Share of what winches may take up that the pretension is to exceed: 1.3 times what usually turns
 a winch without load."""
+_RUBS_LITTLE = 0.5
+"""Over what winches usually rub with, what some do."""
 _TIMES = 1.1 ** np.arange(1, 15)
 """How much higher the highest tensions and torques are tried."""
 
@@ -57,3 +64,33 @@ def stand_findings(robot: Robot, limits: Limits, statics: PlatformStatics) -> It
             remedy += "winches that rub less"
             break
     yield Finding("limits.tension_max_N", f"{text}; {remedy}", impossible=False)
+
+
+def unwinding(robot: Robot, statics: PlatformStatics) -> Iterator[Finding]:
+    """Look whether slack cables may turn their drums without power by their own weight.
+
+    A slack cable pulls at its exit with the weight of a piece as long as that is above its anchor.
+    """
+    platform = statics.platform
+    hangs_N = 2.0 * np.maximum(statics.rises_N(np.array(platform.home_m)), 0.0)
+    winches = [axis.winch for axis in robot.axes]
+    rated_N = np.array([w.motor.rated_torque_Nm / abs(w.cable_m_per_motor_rad) for w in winches])
+    rubs_N = _RUBS_LITTLE * FRICTION_SHARE * rated_N
+    unwinds = (hangs_N > rubs_N) & ~_braked(robot)
+    if not unwinds.any():
+        return
+    i = int(np.where(unwinds, hangs_N / rubs_N, 0.0).argmax())
+    names = ", ".join(robot.axes[j].name for j in np.flatnonzero(unwinds))
+    text = (
+        f"without power the weight of a slack cable, up to {hangs_N[i]:.2g} N, may unwind the "
+        f"drums of {names}, which may rub with no more than {rubs_N[i]:.2g} N; a brake for each "
+        "(safety_io) keeps them"
+    )
+    yield Finding(f"axes[{i}].winch", text, impossible=False)
+
+
+def _braked(robot: Robot) -> BoolArray:
+    """Return which axes have a brake on the safety I/O, (n,)."""
+    points = () if robot.safety_io is None else load_safety_io(robot.safety_io).axes
+    nodes = {point.node_id for point in points if point.brake is not None}
+    return np.array([axis.node_id in nodes for axis in robot.axes])

@@ -291,7 +291,8 @@ class CommandDispatcher:
     def _occupied(self) -> str:
         """Return what keeps the loop from taking a command at the moment."""
         if self._engine.reacting:
-            return "the robot is being stopped, a platform let down; the power goes off then"
+            why = f" ({reason})" if (reason := self._life.reason) else ""
+            return f"the robot is being stopped{why}, a platform let down; the power goes off then"
         return "another command is being carried out"
 
     def _require_running(self, what: str) -> None:

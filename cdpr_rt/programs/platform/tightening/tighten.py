@@ -359,7 +359,7 @@ class TightenProgram(PlatformProgram):
             return (
                 f"{self._parts.names[i]}: {1e3 * moved_m[i]:.1f} mm reeled in and not tight, "
                 f"{1e3 * allowed_m:.1f} mm allowed"
-                + (": is its cable broken, or unhooked?" if self._stage == 0 else "")
+                + (": is its cable broken, unhooked, or wound off?" if self._stage == 0 else "")
             )
         if self._cycles * self._parts.period_s > _TIGHT_WITHIN_S:
             return self._late()

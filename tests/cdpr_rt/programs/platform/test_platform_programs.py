@@ -121,7 +121,7 @@ def test_a_cable_that_ends_nowhere_is_told_and_all_are_let_go(robot: Standing):
     robot.switch("tighten")
     told = robot.until_done(60.0)
     assert told["trouble"].startswith("upper right: 1000.0 mm reeled in and not tight")
-    assert told["trouble"].endswith("is its cable broken, or unhooked?")
+    assert told["trouble"].endswith("is its cable broken, unhooked, or wound off?")
     robot.run(0.5)
     assert robot.program.at_rest
     assert not robot.torque.any()
