@@ -168,6 +168,18 @@ class CableKinematics:
         rise = [cable_kernel.tension_rise(self.geometry, self._cables, i) for i in range(self.n)]
         return self.hanging_wrenches(pose.array[None])[0], np.array(rise)
 
+    def sag_N3_m(self, pose: Pose) -> FloatArray:
+        """Return (w a)² ρ/12 of each cable, (n,): by that over t³ it becomes shorter for a newton.
+
+        By what the sag of a flat parabola of weight w per length and free length ρ, a of it across,
+        changes with its tension t. 0 of weightless cables.
+        """
+        self._run(pose)
+        u, free = self._cables[:3], self._cables[cable_kernel.FREE]
+        weight = self.geometry[cable_kernel.WEIGHT :]
+        across = (weight**2).sum(axis=0) - (u * weight).sum(axis=0) ** 2
+        return np.asarray(across * free**3 / 12.0)
+
     def write_hanging_wrenches(self, poses: FloatArray, out: FloatArray) -> None:
         """Write these into `out` (m, d), which stays as it is where the cables are weightless."""
         if self._hangs:

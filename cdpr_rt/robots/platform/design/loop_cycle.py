@@ -75,6 +75,7 @@ def dies_down(cycle: FloatArray) -> bool:
 def cycle_matrix(
     plant: LinearPlant,
     share: float,
+    k: FloatArray,
     K_G: FloatArray,
     rotors_kg: FloatArray,
     gains: LoopGains,
@@ -83,12 +84,12 @@ def cycle_matrix(
     period_s: float,
     cable_damping_s: float,
 ) -> FloatArray:
-    """Return the matrix of one cycle (size, size) with this share of the cables' stiffness.
+    """Return the matrix of one cycle (size, size) with this share of the cables' stiffness k (n,).
 
-    K_G (d, d) is that of some tensions, rotors' masses (n,); D' and K' (d,) are the loop's
-    `damping` and `stiffness` along the modes; cables' own damping is this over their stiffness.
+    That and K_G (d, d) are those of some tensions, rotors' masses (n,); D' and K' (d,) are the
+    loop's `damping` and `stiffness` along the modes; cables' own damping is this over k.
     """
-    P, k = plant.pulls, plant.stiffness_N_m
+    P = plant.pulls
     n, d = P.shape
     late, rest, held = _motion(plant, share * k, K_G, rotors_kg, period_s, cable_damping_s)
     size, follows = 2 * (d + n), gains.follows_pose

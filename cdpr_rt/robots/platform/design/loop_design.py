@@ -179,7 +179,14 @@ class LoopModel:
         plant = self._linear[i]
         law = gains, damping[i], stiffness[i], self.period_s, cable_damping_s
         cycles = [
-            cycle_matrix(plant, share, plant.geometric_N_m[level], self._rotors_kg, *law)
+            cycle_matrix(
+                plant,
+                share,
+                plant.stiffness_N_m[level],
+                plant.geometric_N_m[level],
+                self._rotors_kg,
+                *law,
+            )
             for share in STIFFNESS_SHARES
             for level in (LEAST, BETWEEN, GREATEST)
         ]

@@ -50,7 +50,7 @@ class LinearPlant(NamedTuple):
     pulls: FloatArray
     """P, (n, d): by how much each cable becomes longer along each mode."""
     stiffness_N_m: FloatArray
-    """k of each cable, (n,)."""
+    """k of each cable, with its sag where it weighs something, (LEVELS, n)."""
     geometric_N_m: FloatArray
     """K_G, (LEVELS, d, d)."""
     response_m_N: ComplexArray
@@ -112,12 +112,32 @@ def linear_plant(
     )
     shares_of = zip(_OF_LEAST, _OF_GREATEST, strict=True)
     geometric = np.array([a * least + b * greatest for a, b in shares_of])
-    k = stiffness_N / kinematics.lengths(pose)
+    stiffness = cable_stiffness(model, pose, stiffness_N)
     responses = [
         [_response(P, mass_kg, K_G, rotors_kg, share * k, s) for share in shares]
-        for K_G in geometric
+        for K_G, k in zip(geometric, stiffness, strict=True)
     ]
-    return LinearPlant(mass_kg, P, k, geometric, np.array(responses))
+    return LinearPlant(mass_kg, P, stiffness, geometric, np.array(responses))
+
+
+def cable_stiffness(model: PlatformModel, pose: Pose, stiffness_N: FloatArray) -> FloatArray:
+    """Return k of cables of EA `stiffness_N` (n,) at the tensions of all levels, (LEVELS, n).
+
+    EA/ρ, and in series, where cables have a weight w per length that counts, what a flat parabola
+    yields under its tension t: 12 t³/((w a)² ρ) with a across (Ernst, 1965). Below the least
+    tensions, which no cable is planned with, that of the least.
+    """
+    kinematics = model.kinematics
+    elastic = stiffness_N / kinematics.lengths(pose)
+    least, greatest = planned_tensions(model, pose)
+    sag = kinematics.sag_N3_m(pose)
+    levels = [least] * LEAST
+    levels += [a * least + b * greatest for a, b in zip(_OF_LEAST, _OF_GREATEST, strict=True)][
+        LEAST:
+    ]
+    if not sag.any():
+        return np.tile(elastic, (LEVELS, 1))
+    return np.array([1.0 / (1.0 / elastic + sag / np.maximum(t, 1.0) ** 3) for t in levels])
 
 
 def _response(

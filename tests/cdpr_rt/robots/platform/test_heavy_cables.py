@@ -2,16 +2,27 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from cdpr_profiles import load_robot
 from cdpr_profiles.platform import Platform
+from cdpr_rt.robots.platform.design.loop_design import LEAST_MARGIN
+from cdpr_rt.robots.platform.design.loop_plant import (
+    GREATEST,
+    LEAST,
+    cable_stiffness,
+    planned_tensions,
+)
 from cdpr_rt.robots.reach.reachable import Reach
+from cdpr_rt.robots.resonance import lowest_resonance_Hz
 from cdpr_rt.robots.statics import PlatformStatics
 from cdpr_sim_bus.robot.robot_plant import RobotPlant
+from tests.cdpr_rt.robots.platform.linear_cycle import loop_model, rigidity, rotors
 from tests.cdpr_rt.robots.platform.platform_physics import Machine, Physics
-from tests.heavy_cables import standing
+from tests.heavy_cables import cable_with, standing
 
 MASS_kg, WEIGHT_N_m, EXIT_HEIGHT_m = 20.0, 0.8, 10.0
 EXITS_m = ((0.0, 9.0, EXIT_HEIGHT_m), (-7.794, -4.5, EXIT_HEIGHT_m), (7.794, -4.5, EXIT_HEIGHT_m))
@@ -106,3 +117,69 @@ def test_a_platform_that_is_held_has_the_planned_tensions_and_the_loop_adds_noth
     assert abs(upward @ (control.tension_N - planned_N)) < 1.0
     cable_m = np.array([axis.winch.cable_m_per_motor_rad for axis in machine.axes])
     np.testing.assert_allclose(-physics.torque / cable_m, true.winch_N, rtol=0.02)
+
+
+def heaviest() -> Machine:
+    """A point of 110 kg on ropes of 4 N/m, which sag by more than they stretch."""
+    (axis, *_) = load_robot("suspended-8").axes
+    platform = replace(
+        heavy().platform,
+        mass_kg=110.0,
+        workspace_min_m=(-1.5, -1.5, 1.2),
+        workspace_max_m=(1.5, 1.5, 3.5),
+        cable_weights_N_m=(4.0,) * 3,
+    )
+    return Machine(platform, (axis,) * 3, 150.0, 1000.0, 4.0)
+
+
+def test_stiffness_of_ropes_that_sag_is_that_of_catenaries() -> None:
+    machine = heaviest()
+    model, EA = machine.model(), rigidity(machine)
+    pose = model.pose(np.array([1.5, 1.5, 1.2]))
+    found = cable_stiffness(model, pose, EA)
+    for level, at in ((LEAST, 0), (GREATEST, 1)):
+        t = planned_tensions(model, pose)[at]
+        for i, exit_m in enumerate(machine.platform.exit_points_m):
+            winch_N = t[i] + 0.5 * 4.0 * (exit_m[2] - 1.2)
+            shorter_m = [
+                cable_with(exit_m, pose.p, 4.0, EA[i], winch_N + more_N).length_m
+                for more_N in (-0.5, 0.5)
+            ]
+            assert found[level, i] == pytest.approx(1.0 / -np.diff(shorter_m)[0], rel=0.03)
+    assert (found < 0.5 * EA / model.kinematics.lengths(pose)).any()
+
+
+def test_a_loop_keeps_its_margin_whether_its_ropes_sag_or_not() -> None:
+    """In a fast motion their own inertia keeps them from it."""
+    machine = heaviest()
+    light = replace(
+        machine, platform=replace(machine.platform, cable_weights_N_m=(0.0,) * machine.n)
+    )
+    sagging, elastic = loop_model(machine), loop_model(light)
+    of_light = elastic.design()
+    assert min(there.modulus for there in sagging.margins(of_light)) < 0.9 * LEAST_MARGIN
+    gains = sagging.design()
+    for model in (sagging, elastic):
+        assert min(there.modulus for there in model.margins(gains)) > 0.95 * LEAST_MARGIN
+        assert min(mode.damping_ratio for mode in model.least_damped(gains)) > 0.05
+
+
+def test_rotors_and_platform_swing_over_ropes_that_sag() -> None:
+    machine, place_m = heaviest(), np.array([1.2, -0.6, 1.5])
+    model, EA = machine.model(), rigidity(machine)
+    pose = model.pose(place_m)
+    t = planned_tensions(model, pose)[0]
+    k = []
+    for i, exit_m in enumerate(machine.platform.exit_points_m):
+        winch_N = t[i] + 0.5 * 4.0 * (exit_m[2] - place_m[2])
+        longer, shorter = (
+            cable_with(exit_m, place_m, 4.0, EA[i], winch_N + more_N).length_m
+            for more_N in (-0.5, 0.5)
+        )
+        k.append(1.0 / (longer - shorter))
+    J = model.kinematics.jacobian(pose)
+    stretch = np.hstack([J, -np.eye(3)])
+    masses = np.concatenate([[110.0] * 3, rotors(machine)])
+    squares = np.linalg.eigvals((stretch.T * k @ stretch) / masses[:, None]).real
+    lowest = np.sqrt(np.sort(squares)[3]) / (2.0 * np.pi)  # three move rotors and platform together
+    assert lowest_resonance_Hz(model, machine.axes, place_m) == pytest.approx(lowest, rel=0.02)

@@ -72,7 +72,7 @@ def cycle_of(
     inertial = 2.0 * 0.55 * gains.bandwidth_rad_s * mass
     damping = 1.0 / (1.0 / inertial + 1.0 / gains.damping_N_s_m)
     law = gains, damping, damping**2 / (4.0 * 0.55**2 * mass), period_s, CABLE_DAMPING_s
-    return cycle_matrix(plant, share, K_G, rotors(machine), *law)
+    return cycle_matrix(plant, share, plant.stiffness_N_m[0], K_G, rotors(machine), *law)
 
 
 @pytest.mark.parametrize("period_s", [1e-3, LATE_S])
