@@ -23,6 +23,8 @@ _LEAST_HIGH = 0.32
 _SEEN_THROUGH = 0.6
 """Of the platform, which may cover all of the box of targets."""
 _NAMES = "xyz"
+_SEEN_FROM = "from the side", "from the front", "from above"
+"""Along each axis."""
 _OUTLINE = 721
 """Directions in which the furthest anchor point is one of the platform's outline."""
 
@@ -63,13 +65,21 @@ def figure_of(robot: Robot, platform: Platform) -> Figure:
         ax.set(xlabel=f"{_NAMES[i]} (m)", ylabel=f"{_NAMES[j]} (m)", aspect="equal")
         ax.set(xlim=(shown.low_m[i], shown.high_m[i]), ylim=(shown.low_m[j], shown.high_m[j]))
         ax.grid(visible=False)
-    all_axes[0].set(title=robot.name)
+        if not platform.is_planar:
+            ax.set_title(_section(platform, view), fontsize="medium")
+    figure.suptitle(robot.name)
     handles, labels = all_axes[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=3)
     for _ in range(_LOOKS):
         if _has_room(figure, all_axes[-1]):
             break
     return figure
+
+
+def _section(platform: Platform, view: _View) -> str:
+    (k,) = {0, 1, 2} - set(view)
+    middle_m = 0.5 * (platform.workspace_min_m[k] + platform.workspace_max_m[k])
+    return f"{_SEEN_FROM[k]}; workspace at {_NAMES[k]} = {middle_m:.2f} m"
 
 
 def _has_room(figure: Figure, ax: Axes) -> bool:
