@@ -117,6 +117,13 @@ def tension_rise(geometry: FloatArray, cables: FloatArray, i: int) -> float:
 
 
 @jit
+def write_tension_rises(geometry: FloatArray, cables: FloatArray, rise: FloatArray) -> None:
+    """Write `tension_rise` of each cable into `rise` (n,)."""
+    for i in range(rise.size):
+        rise[i] = tension_rise(geometry, cables, i)
+
+
+@jit
 def hanging_wrenches(
     geometry: FloatArray, poses: FloatArray, chosen: IntArray, cables: FloatArray, out: FloatArray
 ) -> None:

@@ -165,8 +165,9 @@ class CableKinematics:
         `cable_kernel.tension_rise`. Raises GeometryError as `jacobian` does.
         """
         self._run(pose)
-        rise = [cable_kernel.tension_rise(self.geometry, self._cables, i) for i in range(self.n)]
-        return self.hanging_wrenches(pose.array[None])[0], np.array(rise)
+        rise_N = np.empty(self.n)
+        cable_kernel.write_tension_rises(self.geometry, self._cables, rise_N)
+        return self.hanging_wrenches(pose.array[None])[0], rise_N
 
     def sag_N3_m(self, pose: Pose) -> FloatArray:
         """Return (w a)² ρ/12 of each cable, (n,): by that over t³ it becomes shorter for a newton.

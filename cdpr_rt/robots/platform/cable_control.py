@@ -20,7 +20,7 @@ from cdpr_rt.jit import bound
 from cdpr_rt.robots.free_rotation import rotation_of
 from cdpr_rt.robots.kinematics import pose_setpoint
 from cdpr_rt.robots.kinematics import pose_tracking as tracking
-from cdpr_rt.robots.kinematics.cable_kernel import CABLE_ROWS, run_cables, tension_rise
+from cdpr_rt.robots.kinematics.cable_kernel import CABLE_ROWS, run_cables, write_tension_rises
 from cdpr_rt.robots.kinematics.pose import Pose
 from cdpr_rt.robots.platform import loop_kernel as loop
 from cdpr_rt.robots.platform.body_kernel import body_of
@@ -125,7 +125,7 @@ class CableControl(PlaceChecks):
         self._pose.array[:] = self._home.array
         self._wanted = Pose(np.zeros(3))
         self._scratch, (found, wanted) = np.zeros((4, 3)), np.zeros((2, CABLE_ROWS, n))
-        self._found = found
+        self._found, self._rise_N = found, np.zeros(n)
         follows = self.gains.follows_pose
         self._planned_at = (found, self._pose.array) if follows else (wanted, self._wanted.array)
         filters = tracking_filters(self.gains, self._period_s)
@@ -339,9 +339,9 @@ class CableControl(PlaceChecks):
         return np.asarray(kinematics.lengths(self._home) / motors[tracking.STRETCH])
 
     def _rises_N(self, cables: FloatArray) -> FloatArray:
-        """Return by how much tensions at the winches are above those in the middle, (n,)."""
-        geometry = self.model.kinematics.geometry
-        return np.array([tension_rise(geometry, cables, i) for i in range(cables.shape[1])])
+        """Return by how much tensions at winches are above those in the middle, (n,); reused."""
+        write_tension_rises(self.model.kinematics.geometry, cables, self._rise_N)
+        return self._rise_N
 
     def take_lengths(self, length_m: FloatArray, feedback: AxisFeedback) -> None:
         """Take the cables to have these lengths without tension at the motors' angles, (n,).

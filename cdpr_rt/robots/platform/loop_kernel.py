@@ -24,7 +24,7 @@ from typing import NamedTuple
 
 from cdpr_rt.arrays import FloatArray, IntArray
 from cdpr_rt.jit import jit
-from cdpr_rt.robots.kinematics.cable_kernel import hang, tension_rise
+from cdpr_rt.robots.kinematics.cable_kernel import hang, write_tension_rises
 from cdpr_rt.robots.platform.body_kernel import write_mass_matrix, write_wrench
 
 STRETCH_SHARE = 0.2
@@ -196,8 +196,7 @@ def correct(
         for i in range(n):
             J[i, k] = cables[directions[k], i]
             W[k, i] = -J[i, k]
-    for i in range(n):
-        rise[i] = tension_rise(geometry, cables, i)
+    write_tension_rises(geometry, cables, rise)
     whole, all_of_it = scratch[4, :6, :6], scratch[6, 0, :6]
     write_mass_matrix(body, pose, scratch[5, :4, :3], whole)
     twist, acceleration = moves[WANTED_TWIST], moves[WANTED_ACCELERATION]

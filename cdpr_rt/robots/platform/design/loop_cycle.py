@@ -27,7 +27,8 @@ from cdpr_rt.robots.platform.design.loop_gains import DRIVE_LATENCY_s, LoopGains
 from cdpr_rt.robots.platform.design.loop_plant import LinearPlant
 from cdpr_rt.robots.platform.loop_kernel import STRETCH_SHARE
 
-_GROWN = 1e12
+_SQUARINGS, _GROWN = 18, 1e12
+"""Of a cycle, to a power of 2^18; and norm of a power that does not vanish any more."""
 _TERMS, _MOST_NORM = 13, 0.5
 """Of the exponential's series, and of what it is summed for: exact to 1e-15."""
 
@@ -62,7 +63,7 @@ def dies_down(cycle: FloatArray) -> bool:
     is counted as one that does not.
     """
     power = cycle
-    for _ in range(18):
+    for _ in range(_SQUARINGS):
         power = power @ power
         norms = np.abs(power).sum(axis=-1).max(axis=-1)
         if norms.max() < 1.0:

@@ -241,10 +241,10 @@ class LoopModel:
         all the same are looked for. Raises UnstableError where none holds the platform, SwingsError
         where modes would grow.
         """
-        best, others = self._soonest()
+        best, loops = self._soonest()
         if self.cable_damping_s >= CABLE_DAMPING_s:
             return best
-        calm = self._calmed(others, self.cable_damping_s)
+        calm = self._calmed(loops, self.cable_damping_s)
         if calm is None or not self._keeps(calm, self._plants(calm), FOLLOWED_MARGIN):
             raise self._swinging(self.cable_damping_s)
         return calm

@@ -34,6 +34,8 @@ ComplexArray = NDArray[np.complex128]
 
 CABLE_DAMPING_s, LITTLE_DAMPING_s = 2e-3, 5e-4
 """b, as it is assumed, and of cables that damp little: 5 % of critical at 30 Hz."""
+_TAUT_N = 1.0
+"""Least tension at which a cable's sag is taken for a flat parabola."""
 _OF_LEAST = (0.0, 1 / 16, 1 / 8, 1 / 4, 1 / 2, 1.0, 0.875, 0.625, 0.0)
 _OF_GREATEST = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.125, 0.375, 1.0)
 NONE, LEAST, BETWEEN, GREATEST, LEVELS = 0, 5, 7, 8, 9
@@ -129,15 +131,13 @@ def cable_stiffness(model: PlatformModel, pose: Pose, stiffness_N: FloatArray) -
     """
     kinematics = model.kinematics
     elastic = stiffness_N / kinematics.lengths(pose)
-    least, greatest = planned_tensions(model, pose)
     sag = kinematics.sag_N3_m(pose)
-    levels = [least] * LEAST
-    levels += [a * least + b * greatest for a, b in zip(_OF_LEAST, _OF_GREATEST, strict=True)][
-        LEAST:
-    ]
     if not sag.any():
         return np.tile(elastic, (LEVELS, 1))
-    return np.array([1.0 / (1.0 / elastic + sag / np.maximum(t, 1.0) ** 3) for t in levels])
+    least, greatest = planned_tensions(model, pose)
+    shares_of = zip(_OF_LEAST[LEAST:], _OF_GREATEST[LEAST:], strict=True)
+    levels = [least] * LEAST + [a * least + b * greatest for a, b in shares_of]
+    return np.array([1.0 / (1.0 / elastic + sag / np.maximum(t, _TAUT_N) ** 3) for t in levels])
 
 
 def _response(
