@@ -26,6 +26,7 @@ from cdpr_rt.robots.cable_loss.fall_kernel import PARAMETERS, WINCHES, fall
 from cdpr_rt.robots.kinematics.cable_kernel import ARC, CABLE_ROWS, FREE, run_cables
 from cdpr_rt.robots.kinematics.pose import Pose
 from cdpr_rt.robots.platform.body_kernel import body_of
+from cdpr_rt.robots.platform.design.loop_plant import CABLE_DAMPING_s
 from cdpr_rt.robots.platform_model import platform_model_of
 from cdpr_rt.robots.resonance import highest_rad_s
 from cdpr_rt.robots.rigid_body import free_directions, in_space, inertia_kg_m2, is_point
@@ -42,7 +43,6 @@ _MISLED_SHARE = 0.25
 """Force of the misled control over the span of tensions, where its proportional part saturates."""
 _FRICTIONS = (0.0, 0.03, 0.06)
 """Friction of the winches over the motors' rated torques; each is simulated."""
-_CABLE_DAMPING_S = 2e-3
 _NEAREST_m = 1e-3
 _STEP_rad = 0.2
 """Phase of the fastest oscillation, of rotors and platform or a foot on the ground, in a step."""
@@ -95,9 +95,10 @@ class CableLoss:
       the span of tensions. With the broken cable's tension t, its rotor's mass m at the cable and
       the highest speed v of the limits, that lasts 1.5 m v/t + 15 ms, 0.25 s at most.
     - Then the winches let it down as the program `lower` does where the pose is not known.
-    - Cables are elastic. Where their weight counts, half of it is on the platform, and winches hold
-      what hangs from them; they do not sag. Winches rub with 0, 3 or 6 % of the motor's rated
-      torque, whichever gets a figure the largest: what rubs may keep the platform or turn it over.
+    - Cables are elastic, and damp as their profiles say, by 2 ms of their stiffness at most. Where
+      their weight counts, half of it is on the platform, and winches hold what hangs from them;
+      they do not sag. Winches rub with 0, 3 or 6 % of the motor's rated torque, whichever gets a
+      figure the largest: what rubs may keep the platform or turn it over.
     - The ground is level, as high as the platform stands at home, or where that is lower, as it
       is when the cable breaks: nothing begins in the ground, whose spring would fling it.
     """
@@ -112,6 +113,9 @@ class CableLoss:
         self._rated_N = np.array([motor.rated_torque_Nm for motor in motors]) / per_rad
         self._fastest_m_s = np.broadcast_to(limits.speed_rad_s, (n,)) * per_rad
         self._EA_N = np.array([winch.cable.stiffness_N for winch in winches])
+        # steps are short enough for no more
+        damping_s = [min(winch.cable.damping_s, CABLE_DAMPING_s) for winch in winches]
+        self._damping_s = np.array(damping_s)
         self._winches = np.zeros(n, WINCHES)
         rotor_kg = np.array([motor.rotor_inertia_kg_m2 for motor in motors]) / per_rad**2
         self._winches["rotor_kg"] = rotor_kg
@@ -157,7 +161,7 @@ class CableLoss:
         cables = np.empty((CABLE_ROWS, len(winches)))
         run_cables(model.kinematics.geometry, start.array, cables)
         winches["stiffness_N_m"] = self._EA_N / np.maximum(cables[FREE] + cables[ARC], _NEAREST_m)
-        winches["damping_N_s_m"] = _CABLE_DAMPING_S * winches["stiffness_N_m"]
+        winches["damping_N_s_m"] = self._damping_s * winches["stiffness_N_m"]
         winches["friction_N"] = friction * self._rated_N
         path = np.empty((math.ceil(_LONGEST_S / self._period_s), 4, 3))
         cycles = fall(

@@ -125,6 +125,23 @@ def test_it_falls_from_where_winches_carry_the_cables_too() -> None:
         assert wrench[2] == pytest.approx(weight_N, rel=within)
 
 
+def test_cables_damp_a_fall_as_their_profile_has_it_but_for_no_more_than_steps_allow() -> None:
+    robot, place_m = load_robot("planar-3"), np.array([0.0, 1.8])
+    start = platform_model_of(robot).pose(place_m)
+    paths = []
+    for damping_s in (2e-3, 2e-4, 0.05):
+        axes = []
+        for axis in robot.axes:
+            cable = axis.winch.cable.model_copy(update={"damping_s": damping_s})
+            winch = dataclasses.replace(axis.winch, cable=cable)
+            axes.append(dataclasses.replace(axis, winch=winch))
+        loss = CableLoss(dataclasses.replace(robot, axes=tuple(axes)))
+        paths.append(loss.path(2, start)[:100])
+    assumed, little, much = paths
+    assert np.abs(little[:, 0] - assumed[:, 0]).max() > 1e-5
+    np.testing.assert_array_equal(much, assumed)
+
+
 def test_one_rotor_and_a_mass_swing_at_the_textbook_frequency() -> None:
     robot = load_robot("point-4")
     assert robot.platform is not None
