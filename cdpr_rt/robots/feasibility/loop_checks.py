@@ -59,7 +59,8 @@ def loop_findings(robot: Robot, statics: PlatformStatics) -> Iterator[Finding]:
     if loop.gains.follows_pose and (text := turned_by_friction(statics, robot.axes, loop.gains)):
         yield Finding("axes[0].anchor_point_m", text, impossible=False)
     yield from _swinging(loop, statics)
-    if loop.growing:
+    assumed = any("damping_s" not in axis.winch.cable.model_fields_set for axis in robot.axes)
+    if assumed and loop.growing:
         yield _growing(loop, robot, statics)
 
 
