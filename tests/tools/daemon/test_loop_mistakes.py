@@ -66,6 +66,14 @@ def test_where_a_limit_ends_it_the_drives_brake_by_themselves(rig: LoopRig) -> N
     assert all(state in POWER_OFF for state in rig.machine._booted.states())
 
 
+def test_a_command_that_comes_while_it_is_being_stopped_is_told_why_that_is(rig: LoopRig) -> None:
+    rig.loop.life.set_reason("axis 1: slack")
+    rig.loop.safe_stop.stop(Reaction.CONTROLLED_STOP, LoopState.FAULT)
+    answer = rig.command("hold")
+    assert not answer["ok"]
+    assert "the robot is being stopped (axis 1: slack), " in answer["text"]
+
+
 def test_a_program_that_cannot_tell_of_itself_goes_on(rig: LoopRig) -> None:
     rig.turn(10)
     assert rig.status["program"] == "careless"
