@@ -107,6 +107,8 @@ class PlatformParts:
         """How far an anchor point moves with each direction, (d,): 1, and for angles an arm."""
         self.not_calibrated_reason = ""
         """Why the geometry may not be believed, as after a rail has moved; else empty."""
+        self.off_home = ""
+        """How far it may stand from where its lengths say, as it was taken for at home."""
         self.cycle = -2
         """The last cycle in which one of the programs moved the platform."""
         self.tight = False
@@ -133,7 +135,7 @@ class PlatformParts:
 
     def notices(self) -> list[str]:
         """Return what an operator should know of the robot."""
-        return [text for text in (self.control.load_cell_fault,) if text]
+        return [text for text in (self.control.load_cell_fault, self.off_home) if text]
 
     def lengths_disagree(self) -> tuple[float, int]:
         """Return how far the lengths are from agreeing, and which cable's is off; 0 while slack."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -28,6 +29,28 @@ amplitude_Nm = 0.036
 coulomb_Nm = 0.062
 """
 """Half as much again as is usual of a motor of 1.2 Nm, each its own way."""
+
+
+MUCH_COGGING = """
+[cables]
+friction_share = 0.04
+[variation]
+friction = 0.3
+cogging = 0.3
+torque_constant = 0.05
+[motor.friction]
+coulomb_Nm = 0.16
+[[motor.cogging]]
+order = 4
+amplitude_Nm = 0.07
+phase_deg = 40.0
+[[motor.cogging]]
+order = 30
+amplitude_Nm = 0.03
+phase_deg = 10.0
+"""
+SLACK_m = [0.016, 0.035, 0.04, 0.011, 0.017, 0.056, 0.014, 0.016]
+"""By chance, between 10 and 60 mm."""
 
 
 def plant(path: Path, slack_m: list[float]) -> Path:
@@ -103,6 +126,36 @@ motor.cogging = [
         robot.enable()
         robot.carry_out("tighten")
         assert moved_mm(robot, "planar-3")[0] < 1.0
+
+
+def test_cables_that_become_tight_at_the_same_time_do_not_turn_the_platform(tmp_path: Path) -> None:
+    """One is reeled in after the other: winches that rub and cog much pull with some newtons."""
+    file = plant(tmp_path / "plant.toml", SLACK_m)
+    file.write_text("seed = 100\n" + file.read_text() + MUCH_COGGING)
+    with LockstepRobot("spatial-8", plant=file) as robot:
+        robot.enable()
+        robot.carry_out("tighten")
+        moved, turned_deg = moved_mm(robot, "spatial-8")
+        assert not robot.status["notices"]
+    assert moved < 2.0
+    assert turned_deg < 1.0
+
+
+def test_how_far_slack_lets_a_light_platform_be_pulled_along_is_told(tmp_path: Path) -> None:
+    """At most what is told, and no less than a third of it."""
+    file = plant(tmp_path / "plant.toml", SLACK_m[:4])
+    file.write_text("seed = 100\n" + file.read_text())
+    with LockstepRobot("planar-4", plant=file) as robot:
+        robot.enable()
+        robot.carry_out("tighten")
+        (told,) = robot.status["notices"]
+        most_mm = float(re.search(r"may stand up to (\d+) mm from where", told)[1])  # type: ignore[index]
+        assert most_mm / 3.0 < moved_mm(robot, "planar-4")[0] < most_mm
+    file.write_text("start.slack_m = 0.02\n")
+    with LockstepRobot("planar-4", plant=file) as robot:
+        robot.enable()
+        robot.carry_out("tighten")
+        assert not robot.status["notices"]
 
 
 def test_a_platform_too_light_for_its_winches_is_told_to_have_moved(tmp_path: Path) -> None:

@@ -25,6 +25,13 @@ _STAND_FRICTION, _ASIDE_SHARE = 0.3, 0.5
 """Of the stand, over the platform's weight, and what one cable may pull at it with over that."""
 _HANGING_SHARES = np.linspace(0.05, 1.0, 96)[:, None]
 """Of the pretension, at which it is looked how far cables still come in."""
+_MOVED_m, _MOVED_TIMES, _TOO_FAR_m = 0.005, 2.0, 0.015
+"""By how much a cable may be tight elsewhere than it was by itself; over that, how far off the
+platform may be; and from where on it is not pulled at."""
+_ALONG_m = 1.5 * kernel.LOOSE_m
+"""How far a light platform may have been pulled along that is told."""
+_DIRECTIONS, _ASIDE = 16, 0.2
+"""Horizontal directions that are looked at, and how much a cable has to point there to pull."""
 _REMEDY = "take up slack by hand, or hold the platform"
 
 
@@ -56,14 +63,18 @@ class SlackTakeUp:
         self._lengths_at_home = parts.control.lengths_at_home
         hanging_N = _hanging_N(parts, pretension_N)
         self._at_once = bool(usual_N.max() > stands_N)
+        self._usual_N, self._enough_N = usual_N, _ENOUGH * taken_up_N
+        self._towards = _towards_exits(parts)
         self._phase, self._state = np.zeros(n, np.int64), np.zeros((n, kernel.STATE))
         self.tight_N = self._state[:, kernel.TIGHT_N]
         """What each tight cable is pulled with, 0 for those that are not tight."""
+        self.off_home = ""
+        """How far the platform may stand from home, as a notice."""
         self._loose, self._busy = np.zeros((2, n), np.bool_)
-        self._dragged = -1
+        self._dragged, self._progress = -1, 0
         driven = kernel.Winches(
-            parts.period_s, self._at_once, cable_m, _ENOUGH * taken_up_N,
-            np.maximum(usual_N, _ASIDE_SHARE * stands_N),
+            parts.period_s, self._at_once, cable_m, self._enough_N,
+            np.maximum(usual_N, _ASIDE_SHARE * stands_N), np.full(n, stands_N),
             np.where(hanging_N > 0.0, hanging_N + usual_N, 0.0),
             winches.speed_rad_s,
             winches.tension_N, winches.low_N, winches.high_N, winches.paying_out_m_s,
@@ -99,29 +110,94 @@ class SlackTakeUp:
             f"{1e3 * kernel.LOOSE_m:.1f} mm allowed: the platform has moved on its stand; {_REMEDY}"
         )
 
-    def uneven(self, position_rad: FloatArray, pulled: bool) -> str:
+    def why_moved(self, position_rad: FloatArray, pulled: bool) -> str:
+        """Return why the platform is not at home any more, "" where it may be; tell `off_home`.
+
+        Either all cables have just become tight, or they are `pulled` with their pretension since.
+        """
+        if self._at_once:
+            self.off_home = self._along(position_rad) if pulled else ""
+            return self._uneven(position_rad, pulled)
+        if pulled:
+            return ""
+        why, self.off_home = self._moved()
+        return why
+
+    def _uneven(self, position_rad: FloatArray, pulled: bool) -> str:
         """Return whose slack was so much more that the platform may have moved, "" for none.
 
         Slack is how far a cable has come in until now, but for its stretch. What did not turn its
         winch as the others became tight may turn it only once all are `pulled` harder.
         """
-        if not self._at_once:
-            return ""
-        state, on_rad = self._state, self._state[:, kernel.FROM_rad] - position_rad
-        stretch_m = self._lengths_at_home(self.tight_N) - self._lengths_at_home(
-            self._winches.high_N
-        )
-        slack_m = state[:, kernel.SLACK_m] + on_rad * self._cable - stretch_m
+        slack_m = self._slack_m(position_rad)
         told = pulled | (np.abs(slack_m) > _TURNED_m)
         i = int(np.where(told, slack_m, -np.inf).argmax())
         j = int(np.where(told, slack_m, np.inf).argmin())
         more_m, allowed_m = slack_m[i] - slack_m[j], kernel.LOOSE_m
         if more_m <= allowed_m:
             return ""
+        if slack_m[j] < _TURNED_m and self._winches.high_N[j] < self._enough_N[j]:
+            return (
+                f"{self._names[j]}: {self._winches.high_N[j]:.0f} N have not reeled it in, as "
+                f"{self._names[i]} was by {1e3 * slack_m[i]:.1f} mm: its winch may rub with up to "
+                f"{self._enough_N[j] / _ENOUGH:.0f} N, and its cable be slack; have the cables "
+                "pulled with more: see `cdpr robot show`"
+            )
         return (
             f"{self._names[i]} had {1e3 * more_m:.1f} mm more slack than {self._names[j]}, "
             f"{1e3 * allowed_m:.1f} mm allowed: what turns its winches pulls so light a platform "
             f"along; {_REMEDY}"
+        )
+
+    def _slack_m(self, position_rad: FloatArray) -> FloatArray:
+        """Return how far each cable has come in until now, (n,), but for its stretch."""
+        on_m = (self._state[:, kernel.FROM_rad] - position_rad) * self._cable
+        stretch_m = self._lengths_at_home(self.tight_N) - self._lengths_at_home(
+            self._winches.high_N
+        )
+        return np.asarray(self._state[:, kernel.SLACK_m] + on_m - stretch_m)
+
+    def _moved(self) -> tuple[str, str]:
+        """Return why not to pull at a platform that has moved on its stand, and what to tell of it.
+
+        Both are "" for nothing. A cable that is tight elsewhere than it was first by itself, but
+        for its stretch and what friction makes of it, tells that the platform has moved meanwhile.
+        """
+        state, length_m = self._state, self._lengths_at_home
+        in_m = (state[:, kernel.FIRST_rad] - state[:, kernel.FROM_rad]) * self._cable
+        in_m -= length_m(state[:, kernel.FIRST_N]) - length_m(self.tight_N)
+        rubbed_m = length_m(self.tight_N) - length_m(self.tight_N + self._usual_N)
+        off_m = np.abs(in_m) - rubbed_m
+        i = int(off_m.argmax())
+        if not off_m[i] > _MOVED_m:
+            return "", ""
+        why = (
+            f"{self._names[i]}: tight {1e3 * abs(in_m[i]):.0f} mm further "
+            f"{'in' if in_m[i] > 0.0 else 'out'} than it was by itself: its winch has pulled the "
+            "platform along on its stand"
+        )
+        if off_m[i] > _TOO_FAR_m:
+            return f"{why}; put it back to its home, and {_REMEDY}", ""
+        return "", f"{why}, which may stand up to {_up_to(_MOVED_TIMES * off_m[i])}"
+
+    def _along(self, position_rad: FloatArray) -> str:
+        """Return how far a light platform may stand from its home, "" for not far.
+
+        Cables that are reeled in together pull it along until all of those that point there have
+        been tight from the beginning: t = min s_i/(u_i e), s_i being the slack of a cable along
+        u_i, in the horizontal direction e in which that is the furthest.
+        """
+        slack_m = np.maximum(self._slack_m(position_rad), 0.0)
+        ways_m = np.where(
+            self._towards > _ASIDE, slack_m / np.maximum(self._towards, _ASIDE), np.inf
+        )
+        least_m = ways_m.min(axis=1)
+        most_m = float(least_m[np.isfinite(least_m)].max(initial=0.0))
+        if most_m <= _ALONG_m:
+            return ""
+        return (
+            "what turns its winches pulls so light a platform along on its stand: by its cables' "
+            f"slack it may stand up to {_up_to(most_m)}"
         )
 
     def begin(self, position_rad: FloatArray) -> None:
@@ -129,18 +205,36 @@ class SlackTakeUp:
 
         All are paid out a little first: what a winch takes that never turns is not known.
         """
-        self._state[:, (kernel.MAY_N, kernel.TURNED_N, kernel.SLACK_m)] = 0.0
-        self._dragged = -1
+        self._state[:, (kernel.MAY_N, kernel.TURNED_N, kernel.FREE_N, kernel.SLACK_m)] = 0.0
+        self._state[:, kernel.FIRST_rad] = np.nan
+        self._dragged, self._progress, self.off_home = -1, 0, ""
         first = kernel.CLOSING if self._at_once else kernel.LOOSENED
         kernel.enter(first, self._phase, self._state, position_rad)
 
-    def update(self, position_rad: FloatArray, pretension_N: FloatArray, share: float) -> None:
-        """Raise the winches' bounds of tension and set their speeds, (n,) each.
+    def update(self, position_rad: FloatArray, pretension_N: FloatArray, share: float) -> bool:
+        """Raise the winches' bounds of tension and set speeds, (n,); return whether it goes on.
 
         Cables that are reeled in pull with a share, which grows to 1, of what they may; with more
         only by the bounds that there are.
         """
         self._dragged = self._take_up(position_rad, pretension_N, share)
+        progress, most = int(self._phase.sum()), self._progress
+        self._progress = max(progress, most)
+        return progress > most
+
+
+def _up_to(distance_m: float) -> str:
+    return f"{1e3 * distance_m:.0f} mm from where its lengths say; {_REMEDY}"
+
+
+def _towards_exits(parts: PlatformParts) -> FloatArray:
+    """Return how much shorter each cable is for each m along horizontal directions, (m, n)."""
+    model, aside = parts.model, parts.model.positions - 1
+    angles = np.linspace(0.0, 2.0 * np.pi, _DIRECTIONS, endpoint=False)
+    if aside == 1:
+        angles = np.array([0.0, np.pi])
+    e = np.column_stack([np.cos(angles), np.sin(angles)])[:, :aside]
+    return np.asarray(e @ model.kinematics.wrench_matrix(model.home_pose)[:aside])
 
 
 def _hanging_N(parts: PlatformParts, pretension_N: FloatArray) -> FloatArray:

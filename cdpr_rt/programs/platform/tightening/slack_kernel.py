@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
+
+import numpy as np
 
 from cdpr_rt.arrays import FloatArray, IntArray
 from cdpr_rt.jit import jit
@@ -23,15 +26,20 @@ _RAISED_1_s = 2.0
 _LEFT_m, _LEAVE_S = 0.005, 0.5
 """Slack that a cable is left with until all have been tight, and how long that may take."""
 
-LOOSENED, PAID_OUT, WAITING, REELED_IN, CLOSING, TIGHT = range(6)
-"""Phases of a cable: paid out a little at first; paid out again, having been tight; held with that
-slack for the others; reeled in by itself; reeled in with all others; tight. All are in one of the
-last two, or none is."""
-FROM_rad, MEAN_m_s, MAY_N, TURNED_N, TIGHT_N, SLACK_m, CYCLES, STATE = range(8)
+LOOSENED, NEXT, REELED_IN, PAID_OUT, WAITING, CLOSING, TIGHT = range(7)
+"""Phases of a cable: paid out a little at first; held until it is its turn; reeled in by itself;
+paid out again, having been tight; held with that slack for the others; reeled in with all others;
+tight, in the order that they have but for those that begin anew. All are in one of the last two, or
+none is."""
+(
+    FROM_rad, MEAN_m_s, MAY_N, TURNED_N, FREE_N, TIGHT_N, SLACK_m, CYCLES, FIRST_rad, FIRST_N,
+    STATE,
+) = range(11)  # fmt: skip
 """State of a cable: the angle that it is reeled in or paid out from; its mean speed inwards; what
-it may be reeled in with; the most that has turned its winch, what the cable weighs included; what
-it is pulled with once tight, else 0; how far it was reeled in for that; cycles for which it has
-been paid out."""
+it may be reeled in with; the most that has turned its winch, what the cable weighs included, and
+that while it surely was slack; what it is pulled with once tight, else 0; how far it was reeled in
+for that; cycles for which it has been paid out; the angle at which it first was tight by itself,
+nan until then, and what it was pulled with."""
 
 
 class Winches(NamedTuple):
@@ -45,6 +53,9 @@ class Winches(NamedTuple):
     """Tensions at which none sticks."""
     harmless_N: FloatArray
     """Tensions with which one cable by itself does not move the platform on its stand."""
+    stands_N: FloatArray
+    """With how much the platform stands: more than that, over what turns a winch whose cable surely
+    is slack, only drags it along."""
     hangs_N: FloatArray
     """Tensions with which a cable hangs through by its own weight, up to which it is not tight."""
     speed_rad_s: FloatArray
@@ -74,23 +85,47 @@ def take_up(
     `state` is (n, STATE), -1 stands for none. See `SlackTakeUp.update`.
     """
     dragged, dragged_m, loose, waiting = -1, LOOSE_m, False, True
+    turn = _whose_turn(phase)
+    if turn >= 0:
+        phase[turn], state[turn, MEAN_m_s] = REELED_IN, TAKE_UP_m_s
     for i in range(phase.size):
         most = TAKE_UP_SHARE * pretension[i]
         if not w.at_once:
             most = max(most, w.enough_N[i])
-        most = min(max(most, w.hangs_N[i]), pretension[i])
+        most = max(most, w.hangs_N[i])
+        if not w.at_once and state[i, FREE_N] > 0.0:
+            # else the winch that drags the platform along would be thought to need what that takes
+            free = max(state[i, FREE_N], w.harmless_N[i])
+            most = min(most, max(free + w.stands_N[i], w.hangs_N[i]))
+        most = min(most, pretension[i])
         phase[i] = _next_phase(w, i, phase[i], state[i], position[i], PULLED * most)
         w.high_N[i] = max(w.high_N[i], min(share, 1.0) * most)
         _drive(w, i, phase[i], state[i], most)
         reeled_m = (state[i, FROM_rad] - position[i]) * w.cable_m[i]
         if phase[i] == TIGHT and reeled_m > dragged_m:
             dragged, dragged_m = i, reeled_m
-        loose |= phase[i] == CLOSING and not w.at_once and reeled_m > LOOSE_m
+        if phase[i] == CLOSING and not w.at_once and reeled_m > LOOSE_m:
+            loose, state[i, FIRST_rad] = True, np.nan
         waiting &= phase[i] == WAITING
     if waiting or loose:
-        enter(CLOSING if waiting else REELED_IN, phase, state, position)
+        enter(CLOSING if waiting else LOOSENED, phase, state, position)
         return -1
     return dragged
+
+
+@jit
+def _whose_turn(phase: IntArray) -> int:
+    """Return which cable is reeled in by itself from now on, -1 for none.
+
+    Two that become tight at the same time would turn the platform, which one does not move.
+    """
+    turn = -1
+    for i in range(phase.size):
+        if phase[i] in (LOOSENED, REELED_IN, PAID_OUT):
+            return -1
+        if turn < 0 and phase[i] == NEXT:
+            turn = i
+    return turn
 
 
 @jit
@@ -103,9 +138,8 @@ def _next_phase(
         state[CYCLES] += 1.0
         if reeled_m >= -_LEFT_m and state[CYCLES] * w.period_s <= _LEAVE_S:
             return phase
-        state[MEAN_m_s] = TAKE_UP_m_s  # what begins to turn only is not tight by that
-        return REELED_IN if phase == LOOSENED else WAITING
-    if phase == WAITING:
+        return NEXT if phase == LOOSENED else WAITING
+    if phase in (NEXT, WAITING):
         return phase
     # what was paid out by 5 mm has to be reeled in again, or one has stuck that is slack
     returned = reeled_m >= (0.5 if phase == CLOSING else -0.5) * _LEFT_m
@@ -114,6 +148,8 @@ def _next_phase(
         return phase
     state[FROM_rad], state[CYCLES] = position, 0.0
     if phase == REELED_IN:
+        if math.isnan(state[FIRST_rad]):
+            state[FIRST_rad], state[FIRST_N] = position, w.tension_N[i]
         return PAID_OUT
     state[TIGHT_N], state[SLACK_m] = w.tension_N[i], reeled_m
     return TIGHT
@@ -128,6 +164,8 @@ def _seems_tight(w: Winches, i: int, state: FloatArray, most: float, returned: b
     state[MEAN_m_s] = max(mean_m_s, inwards_m_s)
     if not w.at_once and inwards_m_s > 0.5 * TAKE_UP_m_s:
         state[TURNED_N] = max(state[TURNED_N], tension)
+        if not returned:
+            state[FREE_N] = state[TURNED_N]
     enough = min(w.enough_N[i], most)
     if returned and state[TURNED_N] > 0.0:
         enough = min(enough, max(state[TURNED_N], w.harmless_N[i]))
@@ -152,6 +190,6 @@ def _drive(w: Winches, i: int, phase: int, state: FloatArray, most: float) -> No
         if phase == PAID_OUT:
             # two that are tight at once may move the platform; a heavy cable would run out
             w.high_N[i] = w.hangs_N[i]
-    elif phase == WAITING:  # held: cogging would turn it
+    elif phase in (NEXT, WAITING):  # held: cogging would turn it
         w.low_N[i], w.paying_out_m_s[i] = -w.enough_N[i], 0.0
         w.high_N[i] = min(w.high_N[i], max(w.enough_N[i], w.hangs_N[i]))

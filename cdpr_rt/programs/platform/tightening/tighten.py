@@ -228,7 +228,8 @@ class TightenProgram(PlatformProgram):
         np.multiply(self._pretension_N, self._share, out=high_N)
         if self._stage == 0:
             share = self._share / TAKE_UP_SHARE
-            self._slack.update(feedback.position_rad, self._pretension_N, share)
+            if self._slack.update(feedback.position_rad, self._pretension_N, share):
+                self._cycles = 0
         else:
             np.maximum(high_N, self._slack.tight_N, out=high_N)
 
@@ -254,8 +255,9 @@ class TightenProgram(PlatformProgram):
         # elsewhere than at home lengths tell where the platform is, wherever it is pulled to
         stage = _STAGES[self._stage][0]
         matters = stage in ("slack", "pull") and self._source.name == "home"
-        uneven = self._slack.uneven(feedback.position_rad, stage == "pull") if matters else ""
-        self._fail_if(uneven or self._why_not_to_pull(feedback))
+        moved = self._slack.why_moved(feedback.position_rad, stage == "pull") if matters else ""
+        self._parts.off_home = self._slack.off_home
+        self._fail_if(moved or self._why_not_to_pull(feedback))
         if self._failure:
             return
         if stage == "slack":

@@ -14,6 +14,7 @@ from cdpr_rt.programs.platform.tightening import slack_kernel as kernel
 from cdpr_rt.programs.platform.tightening.slack import Stillness
 
 PERIOD_S, CABLE_m, ENOUGH_N, HARMLESS_N, PRETENSION_N = 1e-3, 0.026, 16.0, 7.0, 60.0
+STANDS_N = 8.0
 
 
 def one(value: float) -> FloatArray:
@@ -34,6 +35,7 @@ class OneCable:
             one(CABLE_m),
             one(ENOUGH_N),
             one(HARMLESS_N),
+            one(STANDS_N),
             *(one(0.0) for _ in range(6)),
         )
     )
@@ -61,8 +63,8 @@ def reeled_in(by_m: float, tension_N: float = 3.0) -> OneCable:
     """Return a cable that has been reeled in so far since it was first paid out, with that."""
     cable = OneCable()
     cable.enter(kernel.LOOSENED)
-    cable.run(0.5, -3.0, -0.05)
-    assert cable.phase[0] == kernel.REELED_IN
+    assert cable.run(0.5, -3.0, -0.05) == kernel.NEXT
+    assert cable.run(0.5, 0.0) == kernel.REELED_IN
     cable.run(0.25, tension_N)
     cable.run((by_m + 0.005) / 0.05, tension_N, 0.05)
     assert cable.phase[0] == kernel.REELED_IN
@@ -103,6 +105,25 @@ def test_a_winch_may_pull_with_more_only_while_it_stands_still() -> None:
     assert cable.winch.high_N[0] == may_N
     cable.run(0.03, may_N)
     assert may_N < cable.winch.high_N[0] < may_N + 2.5 * 0.03 * ENOUGH_N
+
+
+def test_its_winch_does_not_pull_with_what_only_drags_the_platform() -> None:
+    """Nor does what turned it as it dragged the platform count as what it needs without load."""
+    cable = reeled_in(0.02, 1.0)
+    cable.winch.stands_N[0] = 2.0
+    for _ in range(20):
+        cable.run(0.1, cable.winch.high_N[0])
+        cable.run(0.02, cable.winch.high_N[0], 0.05)
+    assert cable.winch.high_N[0] <= HARMLESS_N + 2.0
+
+
+def test_one_cable_after_the_other_is_reeled_in() -> None:
+    phase = np.array([kernel.PAID_OUT, kernel.NEXT, kernel.NEXT])
+    assert kernel._whose_turn(phase) == -1
+    phase[0] = kernel.WAITING
+    assert kernel._whose_turn(phase) == 1
+    phase[1] = kernel.REELED_IN
+    assert kernel._whose_turn(phase) == -1
 
 
 def test_a_tight_cable_is_let_go_at_once() -> None:
