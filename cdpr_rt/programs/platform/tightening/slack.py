@@ -92,11 +92,11 @@ class SlackTakeUp:
         return np.logical_and(self._loose, self._busy, out=self._loose)
 
     def pulls(self, which: BoolArray) -> str:
-        """Return with what cables `which` (n,) are pulled, and may be, by name."""
+        """Return with what those of `which` (n,) whose turn it is are pulled, and may be."""
         pull_N, may_N = self._winches.tension_N, self._winches.high_N
         return "; ".join(
             f"{self._names[i]} pulls with {pull_N[i]:.1f} N, up to {may_N[i]:.1f} N asked for"
-            for i in np.flatnonzero(which)
+            for i in np.flatnonzero(which & (self._phase != kernel.NEXT))
         )
 
     def dragged(self, position_rad: FloatArray) -> str:
