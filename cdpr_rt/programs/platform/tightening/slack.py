@@ -25,13 +25,14 @@ _STAND_FRICTION, _ASIDE_SHARE = 0.3, 0.5
 """Of the stand, over the platform's weight, and what one cable may pull at it with over that."""
 _HANGING_SHARES = np.linspace(0.05, 1.0, 96)[:, None]
 """Of the pretension, at which it is looked how far cables still come in."""
-_MOVED_m, _MOVED_TIMES, _TOO_FAR_m = 0.005, 2.0, 0.015
-"""By how much a cable may be tight elsewhere than it was by itself; over that, how far off the
-platform may be; and from where on it is not pulled at."""
+_MOVED_m, _ALONE_m = 0.005, 0.0025
+"""By how much a cable may be tight elsewhere than it was by itself; within which all others are
+where only its winch had stuck."""
 _ALONG_m = 1.5 * kernel.LOOSE_m
 """How far a light platform may have been pulled along that is told."""
-_DIRECTIONS, _ASIDE = 16, 0.2
-"""Horizontal directions that are looked at, and how much a cable has to point there to pull."""
+_DIRECTIONS, _POINTS, _ABOUT_UP = 16, 0.2, 5
+"""Horizontal directions that are looked at, how much a cable has to point there to pull, and which
+component of a twist turns about the vertical."""
 _REMEDY = "take up slack by hand, or hold the platform"
 
 
@@ -64,7 +65,8 @@ class SlackTakeUp:
         hanging_N = _hanging_N(parts, pretension_N)
         self._at_once = bool(usual_N.max() > stands_N)
         self._usual_N, self._enough_N = usual_N, _ENOUGH * taken_up_N
-        self._towards = _towards_exits(parts)
+        self._aside = _towards_exits(parts)
+        self._about_up, self._arm_m = _turned(parts)
         self._phase, self._state = np.zeros(n, np.int64), np.zeros((n, kernel.STATE))
         self.tight_N = self._state[:, kernel.TIGHT_N]
         """What each tight cable is pulled with, 0 for those that are not tight."""
@@ -111,7 +113,10 @@ class SlackTakeUp:
         )
 
     def why_moved(self, position_rad: FloatArray, pulled: bool) -> str:
-        """Return why the platform is not at home any more, "" where it may be; tell `off_home`.
+        """Return why the platform is not at home any more, "" where it may be.
+
+        Where it may be a little off, as a light one that slack lets be pulled along, that is told
+        as `off_home`.
 
         Either all cables have just become tight, or they are `pulled` with their pretension since.
         """
@@ -158,10 +163,11 @@ class SlackTakeUp:
         return np.asarray(self._state[:, kernel.SLACK_m] + on_m - stretch_m)
 
     def _moved(self) -> tuple[str, str]:
-        """Return why not to pull at a platform that has moved on its stand, and what to tell of it.
+        """Return why not to pull at it, and what to tell of it, either "" for nothing.
 
-        Both are "" for nothing. A cable that is tight elsewhere than it was first by itself, but
-        for its stretch and what friction makes of it, tells that the platform has moved meanwhile.
+        A cable that is tight elsewhere than it was first by itself, but for its stretch and what
+        friction makes of it, tells that the platform has moved meanwhile. Where only one is, and
+        further in, its winch may have stuck: a platform that moves concerns several.
         """
         state, length_m = self._state, self._lengths_at_home
         in_m = (state[:, kernel.FIRST_rad] - state[:, kernel.FROM_rad]) * self._cable
@@ -171,33 +177,35 @@ class SlackTakeUp:
         i = int(off_m.argmax())
         if not off_m[i] > _MOVED_m:
             return "", ""
-        why = (
-            f"{self._names[i]}: tight {1e3 * abs(in_m[i]):.0f} mm further "
-            f"{'in' if in_m[i] > 0.0 else 'out'} than it was by itself: its winch has pulled the "
-            "platform along on its stand"
+        told = (
+            f"{self._names[i]}: tight {1e3 * abs(in_m[i]):.1f} mm further "
+            f"{'in' if in_m[i] > 0.0 else 'out'} than it was by itself, "
+            f"{1e3 * (rubbed_m[i] + _MOVED_m):.1f} mm allowed"
         )
-        if off_m[i] > _TOO_FAR_m:
-            return f"{why}; put it back to its home, and {_REMEDY}", ""
-        return "", f"{why}, which may stand up to {_up_to(_MOVED_TIMES * off_m[i])}"
+        if in_m[i] > 0.0 and np.count_nonzero(off_m > _ALONE_m) == 1:
+            return "", f"{told}: its winch had stuck, or the platform may stand about so far off"
+        return (
+            f"{told}: a winch has pulled the platform along on its stand; put it back to its "
+            f"home, and {_REMEDY}"
+        ), ""
 
     def _along(self, position_rad: FloatArray) -> str:
         """Return how far a light platform may stand from its home, "" for not far.
 
         Cables that are reeled in together pull it along until all of those that point there have
         been tight from the beginning: t = min s_i/(u_i e), s_i being the slack of a cable along
-        u_i, in the horizontal direction e in which that is the furthest.
+        u_i, in the horizontal direction e in which that is the furthest; and so they turn it.
         """
         slack_m = np.maximum(self._slack_m(position_rad), 0.0)
-        ways_m = np.where(
-            self._towards > _ASIDE, slack_m / np.maximum(self._towards, _ASIDE), np.inf
-        )
-        least_m = ways_m.min(axis=1)
-        most_m = float(least_m[np.isfinite(least_m)].max(initial=0.0))
-        if most_m <= _ALONG_m:
+        aside_m, turned_m = _most_m(self._aside, slack_m), _most_m(self._about_up, slack_m)
+        if max(aside_m, turned_m) <= _ALONG_m:
             return ""
+        turned_deg = math.degrees(turned_m / self._arm_m)
+        turned = f", and be turned by up to about {turned_deg:.0f} degrees" if turned_m else ""
         return (
             "what turns its winches pulls so light a platform along on its stand: by its cables' "
-            f"slack it may stand up to {_up_to(most_m)}"
+            f"slack it may stand up to about {1e3 * aside_m:.0f} mm from where its lengths say"
+            f"{turned}; {_REMEDY}"
         )
 
     def begin(self, position_rad: FloatArray) -> None:
@@ -223,8 +231,14 @@ class SlackTakeUp:
         return progress > most
 
 
-def _up_to(distance_m: float) -> str:
-    return f"{1e3 * distance_m:.0f} mm from where its lengths say; {_REMEDY}"
+def _most_m(towards: FloatArray, slack_m: FloatArray) -> float:
+    """Return how far slack (n,) lets it go in the direction, of m, in which that is the furthest.
+
+    `towards` (m, n) is how much shorter each cable is for each m; 0 where no cable points.
+    """
+    points = towards > _POINTS
+    ways_m = np.where(points, slack_m / np.maximum(towards, _POINTS), np.inf).min(axis=1)
+    return float(ways_m[np.isfinite(ways_m)].max(initial=0.0))
 
 
 def _towards_exits(parts: PlatformParts) -> FloatArray:
@@ -235,6 +249,19 @@ def _towards_exits(parts: PlatformParts) -> FloatArray:
         angles = np.array([0.0, np.pi])
     e = np.column_stack([np.cos(angles), np.sin(angles)])[:, :aside]
     return np.asarray(e @ model.kinematics.wrench_matrix(model.home_pose)[:aside])
+
+
+def _turned(parts: PlatformParts) -> tuple[FloatArray, float]:
+    """Return the same as it is turned about the vertical, for each m at an arm, (m, n); the arm.
+
+    No directions where it is not: in a vertical plane its weight keeps it on its stand.
+    """
+    model = parts.model
+    if model.positions < 3 or _ABOUT_UP not in model.kinematics.directions:
+        return np.zeros((0, len(parts.names))), 1.0
+    i = model.kinematics.directions.index(_ABOUT_UP)
+    per_m = model.kinematics.wrench_matrix(model.home_pose)[i] / parts.scale_m[i]
+    return np.array([per_m, -per_m]), float(parts.scale_m[i])
 
 
 def _hanging_N(parts: PlatformParts, pretension_N: FloatArray) -> FloatArray:
