@@ -28,6 +28,8 @@ _HANGING_SHARES = np.linspace(0.05, 1.0, 96)[:, None]
 _MOVED_m, _ALONE_m = 0.005, 0.0025
 """By how much a cable may be tight elsewhere than it was by itself; within which all others are
 where only its winch had stuck."""
+_LEAST_SHARE = 0.2
+"""Of its pull, the least tension of a cable whose winch's friction is as much."""
 _ALONG_m = 1.5 * kernel.LOOSE_m
 """How far a light platform may have been pulled along that is told."""
 _DIRECTIONS, _POINTS, _ABOUT_UP = 16, 0.2, 5
@@ -73,7 +75,7 @@ class SlackTakeUp:
         self.off_home = ""
         """How far the platform may stand from home, as a notice."""
         self._loose, self._busy = np.zeros((2, n), np.bool_)
-        self._dragged, self._progress = -1, 0
+        self._dragged, self._furthest = -1, 0
         driven = kernel.Winches(
             parts.period_s, self._at_once, cable_m, self._enough_N,
             np.maximum(usual_N, _ASIDE_SHARE * stands_N), np.full(n, stands_N),
@@ -172,8 +174,11 @@ class SlackTakeUp:
         state, length_m = self._state, self._lengths_at_home
         in_m = (state[:, kernel.FIRST_rad] - state[:, kernel.FROM_rad]) * self._cable
         in_m -= length_m(state[:, kernel.FIRST_N]) - length_m(self.tight_N)
-        rubbed_m = length_m(self.tight_N) - length_m(self.tight_N + self._usual_N)
-        off_m = np.abs(in_m) - rubbed_m
+        # of what it is pulled with, friction may hold as much
+        true_N = np.maximum(self.tight_N - self._usual_N, _LEAST_SHARE * self.tight_N)
+        rubbed_m = length_m(true_N) - length_m(self.tight_N)
+        # one that hangs through where it was tight first had no length there
+        off_m = np.nan_to_num(np.abs(in_m) - rubbed_m, nan=-np.inf)
         i = int(off_m.argmax())
         if not off_m[i] > _MOVED_m:
             return "", ""
@@ -215,7 +220,7 @@ class SlackTakeUp:
         """
         self._state[:, (kernel.MAY_N, kernel.TURNED_N, kernel.FREE_N, kernel.SLACK_m)] = 0.0
         self._state[:, kernel.FIRST_rad] = np.nan
-        self._dragged, self._progress, self.off_home = -1, 0, ""
+        self._dragged, self._furthest, self.off_home = -1, 0, ""
         first = kernel.CLOSING if self._at_once else kernel.LOOSENED
         kernel.enter(first, self._phase, self._state, position_rad)
 
@@ -226,9 +231,9 @@ class SlackTakeUp:
         only by the bounds that there are.
         """
         self._dragged = self._take_up(position_rad, pretension_N, share)
-        progress, most = int(self._phase.sum()), self._progress
-        self._progress = max(progress, most)
-        return progress > most
+        phases, furthest = int(self._phase.sum()), self._furthest
+        self._furthest = max(phases, furthest)
+        return phases > furthest
 
 
 def _most_m(towards: FloatArray, slack_m: FloatArray) -> float:

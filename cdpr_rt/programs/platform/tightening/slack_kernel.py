@@ -21,6 +21,8 @@ PULLED = 0.95
 """Share of its bound with which a winch pulls that is said to pull with all of it."""
 _SLOW_SHARE, _MEAN_S = 1.0 / 3.0, 0.04
 """Below that share of the speed a cable may be tight, by its mean over this time."""
+_HELD = 0.9
+"""Share of what a cable hangs through with that holds it, with which it does not count as tight."""
 _RAISED_1_s = 2.0
 """How much more a winch that stands still pulls with after a second, over what none sticks at."""
 _LEFT_m, _LEAVE_S = 0.005, 0.5
@@ -143,6 +145,9 @@ def _next_phase(
         return phase
     # what was paid out by 5 mm has to be reeled in again, or one has stuck that is slack
     returned = reeled_m >= (0.5 if phase == CLOSING else -0.5) * _LEFT_m
+    # while it surely is slack
+    if phase == REELED_IN and not returned and not w.at_once and _turns(w, i):
+        state[FREE_N] = max(state[FREE_N], w.tension_N[i])
     tight = _seems_tight(w, i, state, most, returned)  # of tight cables it tells what turns winches
     if not tight or phase == TIGHT:
         return phase
@@ -162,15 +167,19 @@ def _seems_tight(w: Winches, i: int, state: FloatArray, most: float, returned: b
     mean_m_s = state[MEAN_m_s] + w.period_s / _MEAN_S * (inwards_m_s - state[MEAN_m_s])
     # one that breaks loose has turned before its mean tells
     state[MEAN_m_s] = max(mean_m_s, inwards_m_s)
-    if not w.at_once and inwards_m_s > 0.5 * TAKE_UP_m_s:
+    if not w.at_once and _turns(w, i):
         state[TURNED_N] = max(state[TURNED_N], tension)
-        if not returned:
-            state[FREE_N] = state[TURNED_N]
     enough = min(w.enough_N[i], most)
     if returned and state[TURNED_N] > 0.0:
         enough = min(enough, max(state[TURNED_N], w.harmless_N[i]))
     enough = max(enough, PULLED * min(w.hangs_N[i], most))
     return bool(state[MEAN_m_s] < _SLOW_SHARE * TAKE_UP_m_s and tension >= enough)
+
+
+@jit
+def _turns(w: Winches, i: int) -> bool:
+    """Return whether winch i reels in by half of the speed and more."""
+    return bool(-w.cable_m[i] * w.speed_rad_s[i] > 0.5 * TAKE_UP_m_s)
 
 
 @jit
@@ -180,11 +189,11 @@ def _drive(w: Winches, i: int, phase: int, state: FloatArray, most: float) -> No
         w.high_N[i] = state[TIGHT_N]
     elif phase in (REELED_IN, CLOSING) and not w.at_once:
         # a cable that becomes tight in motion is not to pull the platform along before it is seen
-        slow = -w.cable_m[i] * w.speed_rad_s[i] < 0.5 * TAKE_UP_m_s
-        if slow and w.tension_N[i] >= PULLED * state[MAY_N]:
+        if not _turns(w, i) and w.tension_N[i] >= PULLED * state[MAY_N]:
             raised = state[MAY_N] + _RAISED_1_s * w.period_s * w.enough_N[i]
             state[MAY_N] = min(raised, most)
-        w.high_N[i] = state[MAY_N]
+        # one that hangs would run out, held with less than it weighs
+        w.high_N[i] = max(state[MAY_N], _HELD * min(w.hangs_N[i], most))
     elif phase in (LOOSENED, PAID_OUT):
         w.low_N[i], w.paying_out_m_s[i] = -w.enough_N[i], TAKE_UP_m_s
         if phase == PAID_OUT:

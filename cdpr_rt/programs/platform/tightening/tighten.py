@@ -256,7 +256,8 @@ class TightenProgram(PlatformProgram):
         stage = _STAGES[self._stage][0]
         matters = stage in ("slack", "pull") and self._source.name == "home"
         moved = self._slack.why_moved(feedback.position_rad, stage == "pull") if matters else ""
-        self._parts.off_home = self._slack.off_home
+        if self._source.name == "home":  # else lengths are still those that it was told of
+            self._parts.off_home = self._slack.off_home
         self._fail_if(moved or self._why_not_to_pull(feedback))
         if self._failure:
             return
@@ -369,7 +370,7 @@ class TightenProgram(PlatformProgram):
 
     def _late(self) -> str:
         """Return which cables are not tight yet, and with what each is pulled."""
-        told, weak = f"not tight within {_TIGHT_WITHIN_S:g} s", self._not_tight()
+        told, weak = f"no further cable tight within {_TIGHT_WITHIN_S:g} s", self._not_tight()
         if weak.any():
             return f"{told}: {self._slack.pulls(weak)}"
         i = int(self._stillness.moved_m.argmax())

@@ -114,7 +114,24 @@ def test_its_winch_does_not_pull_with_what_only_drags_the_platform() -> None:
     for _ in range(20):
         cable.run(0.1, cable.winch.high_N[0])
         cable.run(0.02, cable.winch.high_N[0], 0.05)
-    assert cable.winch.high_N[0] <= HARMLESS_N + 2.0
+    most_N = HARMLESS_N + 2.0
+    assert cable.winch.high_N[0] <= most_N
+    for _ in range(3):  # nor as it is reeled in once more, what dragged it being known
+        cable.enter(kernel.CLOSING)
+        cable.run(0.02, 1.0, 0.05)
+        for _ in range(20):
+            cable.run(0.1, cable.winch.high_N[0])
+            cable.run(0.02, cable.winch.high_N[0], 0.05)
+        assert cable.winch.high_N[0] <= most_N
+
+
+def test_a_heavy_cable_whose_turn_it_is_does_not_run_out() -> None:
+    cable = OneCable()
+    hangs_N = 3.0 * ENOUGH_N
+    cable.winch.hangs_N[:] = hangs_N
+    cable.enter(kernel.NEXT)
+    assert cable.run(0.002, hangs_N) == kernel.REELED_IN
+    assert 0.85 * hangs_N < cable.winch.high_N[0] < 0.95 * hangs_N
 
 
 def test_one_cable_after_the_other_is_reeled_in() -> None:

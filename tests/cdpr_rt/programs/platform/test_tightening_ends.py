@@ -52,7 +52,7 @@ def test_cables_that_are_not_tight_in_time_are_named_with_what_they_pull(
     robot.slack_m[1] += 0.4
     robot.switch("tighten")
     told = robot.until_done(5.0)["trouble"]
-    assert told.startswith("not tight within 2 s: upper right pulls with ")
+    assert told.startswith("no further cable tight within 2 s: upper right pulls with ")
     assert 0.0 < float(told.split("with ")[1].split(" N")[0]) < 20.0
     assert "left" not in told and "lower" not in told
 
@@ -63,7 +63,7 @@ def test_where_all_pull_the_cable_that_does_not_stand_still_is_named(
     until(robot, "pull")
     monkeypatch.setattr(tighten_module, "_TIGHT_WITHIN_S", 0.0)
     told = robot.until_done(1.0)["trouble"]
-    assert told.startswith("not tight within 0 s: ")
+    assert told.startswith("no further cable tight within 0 s: ")
     assert told.endswith(" N and does not stand still")
 
 
