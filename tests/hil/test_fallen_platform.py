@@ -63,7 +63,7 @@ def fallen(
 def test_one_that_has_turned_over_is_not_pulled_at(folder: Path) -> None:
     with fallen(folder, [-0.45, -0.3, 1.7], [0.18, 0.18, 0.0]) as robot:
         assert turned_deg(robot) > 60.0
-        with pytest.raises(CommandRefusedError, match="it has fallen, may have turned over"):
+        with pytest.raises(CommandRefusedError, match="it has come down, may have turned over"):
             robot.program("tighten")
         since = robot.cycle + robot.sync_offset
         with pytest.raises(CommandRefusedError, match=r"\d cables are up to \d+ mm too short"):
@@ -144,5 +144,5 @@ def test_drives_that_lose_their_power_together_let_it_fall_as_well(folder: Path)
         assert robot.state is LoopState.FAULT
         robot.command("acknowledge")
         robot.enable()
-        with pytest.raises(CommandRefusedError, match="it has fallen, may have turned over"):
+        with pytest.raises(CommandRefusedError, match="it has come down, may have turned over"):
             robot.program("tighten")

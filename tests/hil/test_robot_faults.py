@@ -123,6 +123,9 @@ def test_the_winches_that_are_left_let_the_platform_down(
     assert hanging.state is LoopState.FAULT
     for text in told:
         assert text in hanging.loop.life.reason
+    mend = [text for text in hanging.status["notices"] if "mend the cable" in text]
+    assert len(mend) == ("broken" in told[0])
+    assert all(text.startswith(told[0]) for text in mend)
     # how far its cables are out is not known any more, but after the fault of a drive
     assert hanging.loop.engine.parts.estimator.estimate.length_known.all() == (told == ("7305h",))
     records = truth.read()

@@ -240,10 +240,10 @@ _LOOSE_N = 1.0
 
 
 def fallen_text(status: dict[str, Any]) -> str:
-    """Return what to do with a platform that has fallen, an empty text where it has not."""
+    """Return what to do with a platform that has come down, an empty text where it has not."""
     if not (status.get("program_progress") or {}).get("fallen"):
         return ""
-    text = "; it has fallen: look at it, then `cdpr tighten --from home` where it stands there"
+    text = "; it has come down: look at it, then `cdpr tighten --from home` where it stands there"
     if any(axis.get("cable_length_m") is None for axis in status["axes"]):
         return f"{text}, upright"
     return f"{text}, or `--from lengths` where it stands upright elsewhere"

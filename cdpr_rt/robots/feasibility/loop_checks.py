@@ -20,7 +20,7 @@ from cdpr_rt.robots.platform.design.loop_design import (
     UnstableError,
     design_poses,
 )
-from cdpr_rt.robots.platform.design.loop_plant import LITTLE_DAMPING_s
+from cdpr_rt.robots.platform.design.loop_plant import CABLE_DAMPING_s, LITTLE_DAMPING_s
 from cdpr_rt.robots.statics import PlatformStatics
 
 _SLOW_Hz = 0.5
@@ -36,7 +36,8 @@ def loop_findings(robot: Robot, statics: PlatformStatics) -> Iterator[Finding]:
     except GeometryError as error:
         if isinstance(error, SwingsError):
             text = f"value {robot.sync_period_s:g}; {error}: a shorter cycle, longer arms or less "
-            yield Finding("sync_period_s", text + "tension_max_N help", impossible=True)
+            text += f"tension_max_N help{_known_damping(robot)}"
+            yield Finding("sync_period_s", text, impossible=True)
         elif isinstance(error, UnstableError):
             text = (
                 f"{error}: anchor points that lie towards their exit points, with longer arms, help"
@@ -62,6 +63,14 @@ def loop_findings(robot: Robot, statics: PlatformStatics) -> Iterator[Finding]:
     assumed = any("damping_s" not in axis.winch.cable.model_fields_set for axis in robot.axes)
     if assumed and loop.growing:
         yield _growing(loop, robot, statics)
+
+
+def _known_damping(robot: Robot) -> str:
+    """Return that the cables' profile has them damp less than was assumed, "" where not."""
+    least_s = min(axis.winch.cable.damping_s for axis in robot.axes)
+    if least_s >= CABLE_DAMPING_s:
+        return ""
+    return f"; damping_s of the cables' profile is {1e3 * least_s:g} ms"
 
 
 def _swinging(loop: DesignedLoop, statics: PlatformStatics) -> Iterator[Finding]:

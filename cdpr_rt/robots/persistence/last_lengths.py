@@ -58,6 +58,8 @@ class LastLengths:
         """What contradicts the lengths that are in use, so that they are not kept; else empty."""
         self.fallen = False
         """Whether it hung, or may have, when the power was taken at once or a drive was lost."""
+        self.broken = ""
+        """Which cable seemed broken since it was tightened last, and by what; else empty."""
 
     def load(self, n: int, longest_m: float) -> None:
         """Read the file of a robot with n axes; one that is damaged leaves none.

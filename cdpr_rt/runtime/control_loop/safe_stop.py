@@ -91,6 +91,8 @@ class SafeStop:
                 engine.hold(reason, supervisor.details())
             return
         self._life.set_reason(reason, supervisor.details())
+        if (last := engine.parts.last_stop) and supervisor.limit is Limit.BROKEN_CABLE:
+            last.broken = reason
         if state is LoopState.ACTIVE:
             self.stop(reaction, LoopState.FAULT, torque_Nm)
         else:

@@ -94,7 +94,7 @@ def test_of_a_platform_that_fell_it_is_told_what_comes_before_it_is_tightened() 
     status = status_of(state="active", program="hold", program_progress={"tight": False})
     assert "cables loose, power on" in [str(line) for line in status_text(status).renderables]
     status["program_progress"]["fallen"] = True
-    home = "it has fallen: look at it, then `cdpr tighten --from home` where it stands there, "
+    home = "it has come down: look at it, then `cdpr tighten --from home` where it stands there, "
     for length_m, told in (
         (1.2, "or `--from lengths` where it stands upright elsewhere"),
         (None, "upright"),  # lengths that were forgotten are refused

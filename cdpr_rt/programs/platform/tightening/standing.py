@@ -21,7 +21,7 @@ _MOST_LOOKS = 200
 _CARRIED_SHARE = 0.8
 """Sum of the tensions over the weight, below which the cables do not carry the platform."""
 _FALLEN = (
-    "the platform hung when the power was taken, or a drive lost: it has fallen, "
+    "the platform hung when the power was taken, or a drive or cable lost: it has come down, "
     "may have turned over, and cables may lie around it. Look at it. Where it stands at home, "
     "upright, all cables free: tighten from home"
 )

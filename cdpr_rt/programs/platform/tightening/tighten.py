@@ -345,6 +345,7 @@ class TightenProgram(PlatformProgram):
         parts = self._parts
         parts.cycle, parts.tight = feedback.cycle, True
         parts.last_stop.displaced = parts.last_stop.fallen = False
+        parts.last_stop.broken = ""
         super().start(feedback, setpoint, torque_Nm)
         if stopping:
             self.stop()
