@@ -268,7 +268,8 @@ def load_winch_or_robot(name: str | Path) -> Winch | Robot:
     robot = find("robots", name, None)
     if robot is None:
         if find("winches", name, None) is None:
-            raise unknown_profile("winches", name, None, _names("robots"))
+            unknown = unknown_profile("winches", name, None, _names("robots"))
+            raise ProfileError("winches and robots", "", unknown.problem)
         return load_winch(name)
     if find("winches", name, None) == robot and not {"axes", "buses"} & set(read_toml(robot)):
         return load_winch(name)
