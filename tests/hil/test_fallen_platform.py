@@ -71,7 +71,7 @@ def test_one_that_has_turned_over_is_not_pulled_at(folder: Path) -> None:
         robot.run(0.5)
         assert highest_N(robot, since) < LOOSE_N
         robot.program("tighten", **{"from": "lengths"})
-        robot.finish()
+        robot.finish(120.0)  # each cable by itself is reeled in by decimetres, at 50 mm/s
         assert re.search(r"turned by \d+ deg.*: it is not pulled at", robot.progress["trouble"])
         assert robot.progress["stage"] == "slack" and not robot.progress["tight"]
         assert highest_N(robot, since) < TAKES_UP_N
