@@ -10,6 +10,9 @@ from cdpr_profiles.reading.units import N_PER_KGF
 
 Positive = Annotated[float, Field(gt=0)]
 
+ASSUMED_DAMPING_s = 2e-3
+"""Of a cable over its stiffness, where nobody has measured it."""
+
 
 class ElongationPoint(Profile):
     """Elastic elongation at a share of the breaking force."""
@@ -29,7 +32,7 @@ class Cable(Profile):
     weight_per_length_N_m: float = Field(ge=1e-6, le=1e3)
     elongation_percent_per_N: float = Field(ge=1e-9, le=10)
     elongation_measured_up_to_N: Positive | None = None
-    damping_s: float = Field(default=2e-3, ge=0, le=0.05)
+    damping_s: float = Field(default=ASSUMED_DAMPING_s, ge=0, le=0.05)
     """Damping over stiffness, T = EA (strain + damping_s rate); assumed where it is left out."""
     breaking_force_kgf: float = Field(ge=0.1, le=1e6)
     min_tension_N: float = Field(ge=0)

@@ -84,9 +84,14 @@ def test_one_that_still_stands_upright_is_tightened_where_it_is(folder: Path) ->
         assert robot.progress["fallen"]
         with pytest.raises(CommandRefusedError, match="allowed: from home, lengths"):
             robot.program("tighten")
+        last = robot.loop.engine.parts.last_stop
+        assert last is not None
+        last.broken = "axis 1: the cable seems broken"
+        assert any("mend the cable" in notice for notice in robot.status["notices"])
         robot.carry_out("tighten", **{"from": "lengths"})
         assert robot.progress["tight"], robot.progress["trouble"]
         assert "fallen" not in robot.progress
+        assert not any("mend the cable" in notice for notice in robot.status["notices"])
         here_m, true_m = robot.progress["position_m"], robot.truth()["position_m"]
         assert here_m == pytest.approx(np.ravel(true_m), abs=0.01)
         robot.carry_out("lower")

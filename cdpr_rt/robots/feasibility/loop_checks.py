@@ -14,7 +14,7 @@ from cdpr_rt.robots.feasibility.turned_by_friction import (
     stretched_by_acceleration_m,
     turned_by_friction,
 )
-from cdpr_rt.robots.platform.design.designed_loop import DesignedLoop, designed_loop
+from cdpr_rt.robots.platform.design.designed_loop import DesignedLoop, designed_loop, growing_modes
 from cdpr_rt.robots.platform.design.loop_design import (
     SwingsError,
     UnstableError,
@@ -61,8 +61,8 @@ def loop_findings(robot: Robot, statics: PlatformStatics) -> Iterator[Finding]:
         yield Finding("axes[0].anchor_point_m", text, impossible=False)
     yield from _swinging(loop, statics)
     assumed = any("damping_s" not in axis.winch.cable.model_fields_set for axis in robot.axes)
-    if assumed and loop.growing:
-        yield _growing(loop, robot, statics)
+    if assumed:
+        yield from _growing(loop, robot, statics)
 
 
 def _known_damping(robot: Robot) -> str:
@@ -93,9 +93,12 @@ def _swinging(loop: DesignedLoop, statics: PlatformStatics) -> Iterator[Finding]
     yield Finding(key, text, impossible=False)
 
 
-def _growing(loop: DesignedLoop, robot: Robot, statics: PlatformStatics) -> Finding:
-    """Say where a mode grows if cables damp little."""
-    at_poses = zip(loop.growing, design_poses(statics.model), strict=True)
+def _growing(loop: DesignedLoop, robot: Robot, statics: PlatformStatics) -> Iterator[Finding]:
+    """Look whether a mode grows somewhere if cables damp little."""
+    modes = growing_modes(statics.model, robot.axes, robot.sync_period_s, loop.gains)
+    if not modes:
+        return
+    at_poses = zip(modes, design_poses(statics.model), strict=True)
     mode, place = min(at_poses, key=lambda at: at[0].damping_ratio)
     text = (
         f"value {robot.sync_period_s:g}; the loop leans on what the cables are assumed to take out "
@@ -104,4 +107,4 @@ def _growing(loop: DesignedLoop, robot: Robot, statics: PlatformStatics) -> Find
         f"{point_text(place[: statics.model.positions])} m; a shorter cycle helps, or that value "
         "measured, which the loop is designed for then"
     )
-    return Finding("sync_period_s", text, impossible=False)
+    yield Finding("sync_period_s", text, impossible=False)

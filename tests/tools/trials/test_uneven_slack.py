@@ -160,7 +160,9 @@ def test_how_far_slack_lets_a_light_platform_be_pulled_along_is_told(tmp_path: P
         robot.enable()
         robot.carry_out("tighten")
         (told,) = robot.status["notices"]
-        most_mm = float(re.search(r"may stand up to about (\d+) mm from where", told)[1])  # type: ignore[index]
+        stands = re.search(r"may stand up to about (\d+) mm from where", told)
+        assert stands is not None, told
+        most_mm = float(stands[1])
         assert most_mm / 3.0 < moved_mm(robot, "planar-4")[0] < most_mm
     file.write_text("start.slack_m = 0.02\n")
     with LockstepRobot("planar-4", plant=file) as robot:

@@ -270,8 +270,6 @@ class Launcher:
         if self._service is not None and not self._service.stop(_SERVICE_STOP_S):
             self._say("the service did not end by itself and was killed")
         self._manager.retry()
-        if self._up and not self.reason:
-            self._say("ended: the drives confirm that their power is off")
         return self._failure if self.reason else DONE
 
     def _stop_loop(self) -> str:

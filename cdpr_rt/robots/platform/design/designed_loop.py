@@ -25,8 +25,6 @@ class DesignedLoop:
     margins: tuple[LoopMargins, ...]
     modes: tuple[Mode, ...]
     """The least damped mode of robot and loop at each of them."""
-    growing: tuple[Mode, ...]
-    """The same if they damped little, where a mode grows then; else none."""
 
     @property
     def slowest_rad_s(self) -> float:
@@ -52,21 +50,43 @@ def designed_loop(model: PlatformModel, axes: Sequence[RobotAxis], period_s: flo
     Raises GeometryError where the cables do not hold the platform, UnstableError where no loop
     does.
     """
+    return _designed(_robot(model, axes, period_s))
+
+
+def growing_modes(
+    model: PlatformModel, axes: Sequence[RobotAxis], period_s: float, gains: LoopGains
+) -> tuple[Mode, ...]:
+    """Return the least damped modes of a loop at the poses if cables damped by LITTLE_DAMPING_s.
+
+    None where no mode grows then, or they do damp no more.
+    """
+    robot = _robot(model, axes, period_s)
+    if robot.cable_damping_s <= LITTLE_DAMPING_s:
+        return ()
+    loop = _loop_model(robot)
+    if loop.dies_down(gains, LITTLE_DAMPING_s):
+        return ()
+    return loop.least_damped(gains, LITTLE_DAMPING_s)
+
+
+def _robot(model: PlatformModel, axes: Sequence[RobotAxis], period_s: float) -> _Robot:
     winches = [axis.winch for axis in axes]
     rotors_kg = [w.motor.rotor_inertia_kg_m2 / w.cable_m_per_motor_rad**2 for w in winches]
     stiffness_N = [w.cable.stiffness_N for w in winches]
     damping_s = min(w.cable.damping_s for w in winches)
     known = tuple(rotors_kg), tuple(stiffness_N), damping_s, period_s
-    return _designed(_Robot(model.platform, *known, model))
+    return _Robot(model.platform, *known, model)
+
+
+def _loop_model(robot: _Robot) -> LoopModel:
+    rotors_kg, stiffness_N = np.array(robot.rotors_kg), np.array(robot.stiffness_N)
+    damping_s = robot.cable_damping_s
+    return LoopModel(robot.model, rotors_kg, stiffness_N, robot.period_s, cable_damping_s=damping_s)
 
 
 @lru_cache(maxsize=4)
 def _designed(robot: _Robot) -> DesignedLoop:
-    rotors_kg, stiffness_N = np.array(robot.rotors_kg), np.array(robot.stiffness_N)
-    damping_s = robot.cable_damping_s
-    loop = LoopModel(robot.model, rotors_kg, stiffness_N, robot.period_s, cable_damping_s=damping_s)
+    loop = _loop_model(robot)
     gains = loop.design()
-    modes = loop.least_damped(gains, damping_s)
-    grows = damping_s > LITTLE_DAMPING_s and not loop.dies_down(gains, LITTLE_DAMPING_s)
-    growing = loop.least_damped(gains, LITTLE_DAMPING_s) if grows else ()
-    return DesignedLoop(gains, tuple(loop.margins(gains)), modes, growing)
+    modes = loop.least_damped(gains, robot.cable_damping_s)
+    return DesignedLoop(gains, tuple(loop.margins(gains)), modes)

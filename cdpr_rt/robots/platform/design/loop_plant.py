@@ -23,6 +23,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from cdpr_profiles.cable import ASSUMED_DAMPING_s
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.errors import GeometryError
 from cdpr_rt.robots.kinematics.pose import Pose
@@ -32,7 +33,7 @@ from cdpr_rt.robots.tension.tension_distribution import tension_distribution
 
 ComplexArray = NDArray[np.complex128]
 
-CABLE_DAMPING_s, LITTLE_DAMPING_s = 2e-3, 5e-4
+CABLE_DAMPING_s, LITTLE_DAMPING_s = ASSUMED_DAMPING_s, 5e-4
 """b, as it is assumed, and of cables that damp little: 5 % of critical at 30 Hz."""
 _TAUT_N = 1.0
 """Least tension at which a cable's sag is taken for a flat parabola."""
