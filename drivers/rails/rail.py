@@ -101,7 +101,7 @@ def move(
     try:
         axis.set_brake(False)
         pushed_m = _test_brake(rail, axis, clock)
-        mark_not_calibrated(rail.robot, f"{rail.name} was moved from {start_m:.4f} m")
+        _void_calibration(rail, clock, f"{rail.name} was moved from {start_m:.4f} m")
         axis.enable()
         axis.set_brake(True)
         try:
@@ -120,6 +120,11 @@ def move(
             f"wanted ({rail.tolerance_m:g} m allowed): does the brake hold?"
         )
     return MoveResult(start_m, end_m, pushed_m)
+
+
+def _void_calibration(rail: RailProfile, clock: Clock, why: str) -> None:
+    """Write it down while the drive goes on hearing its master: a disk may take a second."""
+    clock.run_blocking(lambda: mark_not_calibrated(rail.robot, why))
 
 
 def _refuse(rail: RailProfile, conditions: MoveConditions) -> None:
@@ -148,7 +153,7 @@ def _test_brake(rail: RailProfile, axis: RailAxis, clock: Clock) -> float | None
             clock.sleep(_LOOK_S)
     axis.push(0.0)
     if moved > check.allowed_m:
-        mark_not_calibrated(rail.robot, f"{rail.name} slipped by {moved * 1e3:.2f} mm on its brake")
+        _void_calibration(rail, clock, f"{rail.name} slipped by {moved * 1e3:.2f} mm on its brake")
         raise RailError(
             f"{rail.name}: the applied brake does not hold: pushed with {check.torque_percent:g} % "
             f"of the rated torque the carriage moved {moved * 1e3:.2f} mm "

@@ -17,6 +17,7 @@ from typing import Any
 
 import canopen
 import pytest
+from click.testing import Result
 from pymodbus.client import ModbusTcpClient
 from typer.testing import CliRunner
 
@@ -37,6 +38,7 @@ from cdpr_drivers.modbus.safety_io import SafetyIoError
 from cdpr_drivers.rails.rail import RailError
 from cdpr_drivers.rails.rail_modbus import ModbusRailAxis
 from cdpr_profiles import load_winch
+from cdpr_profiles.catalogue import load_rail_drive
 from cdpr_profiles.devices.rail import load_rail
 from cdpr_profiles.reading.places import SHIPPED
 from cdpr_sim_bus.devices.sim_rail import RailFault
@@ -82,10 +84,14 @@ class Rails:
     def move(self, kind: str, to_m: float, *slack: str) -> subprocess.Popen[str]:
         return self.begin(*self._move(kind, to_m, slack))
 
-    def refused(self, kind: str, to_m: float, *slack: str) -> str:
-        """Ask for a move in this process, which is quicker; return why it was refused."""
+    def moved(self, kind: str, to_m: float, *slack: str) -> Result:
+        """Move in this process, which is quicker."""
         runner = CliRunner(env={"XDG_STATE_HOME": str(self.home)})
-        outcome = runner.invoke(rail_commands.app, list(self._move(kind, to_m, slack)))
+        return runner.invoke(rail_commands.app, list(self._move(kind, to_m, slack)))
+
+    def refused(self, kind: str, to_m: float, *slack: str) -> str:
+        """Ask for a move in this process; return why it was refused."""
+        outcome = self.moved(kind, to_m, *slack)
         assert isinstance(outcome.exception, DriverError), outcome.output
         return str(outcome.exception)
 
@@ -216,6 +222,22 @@ def test_a_move_arrives_and_voids_the_calibration(rails: Rails, kind: str) -> No
     assert rails.braked(kind)
     state = rails.calibration()
     assert state["calibrated"] is False and "was moved from" in state["why"]
+
+
+def test_the_drive_hears_its_master_while_a_slow_disk_is_written(
+    rails: Rails, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def slow(fd: int) -> None:  # a busy disk cannot be had here
+        time.sleep(2.0 * load_rail_drive("rail-cia402", rail.cia402).heartbeat_consumer_s)
+        slowed.append(fd)
+
+    rail, slowed = load_rail("rail-cia402"), list[int]()
+    assert rail.cia402 is not None
+    monkeypatch.setattr(os, "fsync", slow)
+    target = rails.position_m("cia402") + 0.005
+    outcome = rails.moved("cia402", target)
+    assert outcome.exit_code == 0, outcome.exception
+    assert slowed and abs(rails.position_m("cia402") - target) < 5e-4
 
 
 @pytest.mark.parametrize("kind", ["cia402", "modbus"])
