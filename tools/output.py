@@ -157,7 +157,9 @@ class Advance:
         self._begun_s = time.monotonic()
 
     def __call__(self, time_s: float) -> None:
-        """Take it that `time_s` seconds are done."""
+        """Take it that `time_s` seconds are done; at 0 the work begins, whatever it waited for."""
+        if not time_s:
+            self._begun_s = time.monotonic()
         self.done = time_s
         self.on_change()
 

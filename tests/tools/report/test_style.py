@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from matplotlib.text import Text
 
-from cdpr_tools.report.style import canvas, legend_beside_title
+from cdpr_tools.report.style import canvas, legend_above, legend_beside_title
 
 
 @pytest.mark.parametrize(
@@ -25,3 +25,15 @@ def test_a_title_without_room_for_the_legend_goes_above_it(words: str, same_line
     assert not written.overlaps(box)
     assert bool(written.y0 < box.y1) is same_line
     assert written.y1 < figure.bbox.y1
+
+
+@pytest.mark.parametrize("names", ["abcdefgh", "abcdef", "abc"])
+def test_a_legend_is_read_row_by_row(names: str) -> None:
+    figure, (ax,) = canvas(1, 1)
+    for name in names:
+        ax.plot([0.0, 1.0], label=name)
+    legend_above(figure, ax, columns=4)
+    figure.draw_without_rendering()
+    (legend,) = figure.legends
+    places = {text.get_text(): text.get_window_extent() for text in legend.get_texts()}
+    assert sorted(places, key=lambda name: (-round(places[name].y0), places[name].x0)) == [*names]
