@@ -138,22 +138,31 @@ class PlatformStatics:
         targets may be turned. The least over all `turns_rad` (k, 3) too. -inf where no tensions
         hold some direction.
         """
-        turns = np.reshape(turns_rad, (-1, 3))
-        return np.asarray(
-            np.min([self._at(position_m, acceleration_m_s2, turn)[0] for turn in turns], axis=0)
-        )
+        workspace = self.model.workspace(acceleration_m_s2, 0.0)
+        margins = [
+            workspace.capacity_margins(self.poses(position_m, turn))
+            for turn in np.reshape(turns_rad, (-1, 3))
+        ]
+        return np.asarray(np.min(margins, axis=0)).reshape(np.shape(position_m)[:-1])
 
     def is_target(self, position_m: FloatArray, turns_rad: FloatArray = NONE_rad) -> BoolArray:
         """Return where the platform can be held and accelerated with the controller's reserve.
 
         At every one of the turns (k, 3).
         """
-        moving_N = self.margin_N(position_m, self.platform.acceleration_m_s2, turns_rad)
-        return np.asarray(moving_N >= self.model.reserve_N)
+        moving = self.model.workspace(self.platform.acceleration_m_s2, 0.0)
+        reserve_N, places = self.model.reserve_N, np.reshape(position_m, (-1, self.model.positions))
+        held = np.ones(len(places), bool)
+        for turn in np.reshape(turns_rad, (-1, 3)):
+            left = np.flatnonzero(held)
+            margins_N = moving.capacity_margins(self.poses(places[left], turn), reserve_N)
+            held[left] = margins_N >= reserve_N
+        return held.reshape(np.shape(position_m)[:-1])
 
     def tensions_N(self, position_m: FloatArray, turn_rad: FloatArray = NONE_rad) -> FloatArray:
         """Return the tensions (..., n) at rest that stay furthest from their bounds."""
-        return self._at(position_m, 0.0, turn_rad)[1]
+        _, tensions = self.model.workspace(0.0, 0.0).margins(self.poses(position_m, turn_rad))
+        return tensions.reshape(*np.shape(position_m)[:-1], -1)
 
     def least_tensions_N(self, position_m: FloatArray, reserve_N: float = 0.0) -> FloatArray:
         """Return the tensions (..., n) at rest nearest to the lower bounds and a reserve above.
@@ -227,15 +236,6 @@ class PlatformStatics:
             return None
         low, high = (points[tuple(side[end] for side in found)] for end in (0, 1))
         return Box(tuple(low.tolist()), tuple(high.tolist()))
-
-    def _at(
-        self, position_m: FloatArray, acceleration_m_s2: float, turn_rad: FloatArray
-    ) -> tuple[FloatArray, FloatArray]:
-        """Return margins (...) and tensions (..., n)."""
-        shape = np.shape(position_m)[:-1]
-        workspace = self.model.workspace(acceleration_m_s2, 0.0)
-        margins, tensions = workspace.margins(self.poses(position_m, turn_rad))
-        return margins.reshape(shape), tensions.reshape(*shape, -1)
 
 
 def _slabs(

@@ -156,9 +156,9 @@ def test_a_killed_simulator_ends_what_waits_and_time_goes_on(while_waiting: bool
                 network.read_int(1, 0x1000)
             assert "gone away" in network.alarm_text
             at_s = clock.now_s
-            clock.sleep(3600.0)
-            assert clock.now_s == pytest.approx(at_s + 3600.0)
-            assert time.monotonic() - began < 600.0
+            clock.sleep(300.0)
+            assert clock.now_s == pytest.approx(at_s + 300.0)
+            assert time.monotonic() - began < 300.0
     finally:
         simulator.stop()
 
