@@ -228,7 +228,7 @@ def platform_model(
     without = PlatformModel(platform, kinematics, about_centre_of_mass, low, high, 0.0, left)
     box = np.array([platform.workspace_min_m, platform.workspace_max_m])
     middle = without.poses(box.mean(axis=0)[None])
-    margin_N = float(without.workspace(0.0).margins(middle)[0][0])
+    margin_N = float(without.workspace(0.0).capacity_margins(middle)[0])
     reserve_N = min(RESERVE * float((high - low).min()), max(_MARGIN_SHARE * margin_N, 0.0))
     return replace(without, reserve_N=reserve_N)
 

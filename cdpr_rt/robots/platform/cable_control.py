@@ -168,9 +168,10 @@ class CableControl(PlaceChecks):
     def _friction(self) -> loop.WinchFriction:
         """Return what is made up for of the winches' friction, which its owners keep up to date."""
         known, learning = self._compensation, self.learning
-        nothing = np.zeros(self.model.kinematics.n)
+        n = self.model.kinematics.n
+        nothing = np.zeros((n, 2))[:, 0]  # with gaps, as theirs have: one machine code serves all
         return loop.WinchFriction(
-            nothing if known is None else known.friction_Nm,
+            np.zeros(n) if known is None else known.friction_Nm,
             nothing if known is None else known.faded_in,
             nothing if learning is None else learning.friction_Nm,
             1.0 / np.abs(self._motors[tracking.M_PER_RAD]),

@@ -154,7 +154,7 @@ class ObjectDictionary:
         except Exception as error:
             raise DictionaryError(f"{path}: not a readable EDS: {error}") from error
         od.bitrates = frozenset(parsed.device_information.allowed_baudrates)
-        od.dummies = frozenset(index for index in parsed if index < min(COMMUNICATION))
+        od.dummies = frozenset(index for index in parsed if index < COMMUNICATION.start)
         for record in parsed.values():
             if record.index in od.dummies:
                 continue

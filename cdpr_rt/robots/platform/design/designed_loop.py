@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import numpy as np
 
@@ -22,9 +22,17 @@ class DesignedLoop:
     """The loop of a robot, and what it keeps at each of `design_poses`."""
 
     gains: LoopGains
-    margins: tuple[LoopMargins, ...]
-    modes: tuple[Mode, ...]
-    """The least damped mode of robot and loop at each of them."""
+    _loop: LoopModel = field(repr=False)
+
+    @cached_property
+    def margins(self) -> list[LoopMargins]:
+        """Its margins there."""
+        return self._loop.margins(self.gains)
+
+    @cached_property
+    def modes(self) -> tuple[Mode, ...]:
+        """The least damped mode of robot and loop there."""
+        return self._loop.least_damped(self.gains, self._loop.cable_damping_s)
 
     @property
     def slowest_rad_s(self) -> float:
@@ -37,6 +45,8 @@ class _Robot:
     """What a loop is designed from; that of one robot is designed once."""
 
     platform: Platform
+    bounds_N: tuple[tuple[float, ...], ...]
+    """Of the tensions, which turn the platform: least, greatest."""
     rotors_kg: tuple[float, ...]
     stiffness_N: tuple[float, ...]
     cable_damping_s: float
@@ -74,10 +84,12 @@ def _robot(model: PlatformModel, axes: Sequence[RobotAxis], period_s: float) -> 
     rotors_kg = [w.motor.rotor_inertia_kg_m2 / w.cable_m_per_motor_rad**2 for w in winches]
     stiffness_N = [w.cable.stiffness_N for w in winches]
     damping_s = min(w.cable.damping_s for w in winches)
-    known = tuple(rotors_kg), tuple(stiffness_N), damping_s, period_s
+    bounds_N = tuple(tuple(bound.tolist()) for bound in (model.low_N, model.high_N))
+    known = bounds_N, tuple(rotors_kg), tuple(stiffness_N), damping_s, period_s
     return _Robot(model.platform, *known, model)
 
 
+@lru_cache(maxsize=4)
 def _loop_model(robot: _Robot) -> LoopModel:
     rotors_kg, stiffness_N = np.array(robot.rotors_kg), np.array(robot.stiffness_N)
     damping_s = robot.cable_damping_s
@@ -87,6 +99,4 @@ def _loop_model(robot: _Robot) -> LoopModel:
 @lru_cache(maxsize=4)
 def _designed(robot: _Robot) -> DesignedLoop:
     loop = _loop_model(robot)
-    gains = loop.design()
-    modes = loop.least_damped(gains, robot.cable_damping_s)
-    return DesignedLoop(gains, tuple(loop.margins(gains)), modes)
+    return DesignedLoop(loop.design(), loop)

@@ -6,12 +6,15 @@ import dataclasses
 import math
 import re
 
+import numpy as np
 import pytest
 
 from cdpr_profiles import Robot, load_robot
 from cdpr_rt.robots.feasibility import loop_checks
 from cdpr_rt.robots.feasibility.loop_checks import loop_findings
+from cdpr_rt.robots.platform.design.designed_loop import designed_loop
 from cdpr_rt.robots.platform.design.loop_design import SwingsError
+from cdpr_rt.robots.platform_model import platform_model
 from cdpr_rt.robots.statics import statics_of
 from tests.cdpr_rt.robots.platform.platform_physics import Machine, crossed_rod, short_arms
 
@@ -51,6 +54,17 @@ def test_a_platform_that_tensions_turn_away_faster_than_a_loop_can_hold_it_is_re
     (text,) = told(crossed_rod(), 200.0, 800.0)
     assert text.startswith("axes[0].anchor_point_m: its tensions turn the platform away")
     assert told(crossed_rod(), 20.0, 150.0) == []
+
+
+def test_a_loop_is_not_taken_for_that_of_other_bounds_of_tension() -> None:
+    arms = short_arms()
+    bounds = [
+        (np.full(len(arms.axes), low), np.full(len(arms.axes), low + 80.0)) for low in (5, 90)
+    ]
+    one, other = (
+        designed_loop(platform_model(arms.platform, *both), arms.axes, 1e-3) for both in bounds
+    )
+    assert one.margins != other.margins
 
 
 def test_a_platform_that_tensions_hold_is_not_refused() -> None:
