@@ -6,6 +6,7 @@ import contextlib
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -170,6 +171,7 @@ def standstill_gains(design: PidDesign, period_s: float) -> PidDesign:
     return found
 
 
+@lru_cache(maxsize=64)
 def design_pid(
     inertia_kg_m2: float, latency_s: float, bandwidth_Hz: float, period_s: float = 1e-3
 ) -> PidDesign:

@@ -19,7 +19,7 @@ _TWIST = {2: (0, 1, 5), 3: (0, 1, 2, 3, 4, 5)}
 
 def in_space(vector: tuple[float, ...]) -> FloatArray:
     """Return a position of a plane or of space as (3,)."""
-    return np.pad(np.asarray(vector, float), (0, 3 - len(vector)))
+    return np.array((*vector, 0.0)[:3], float)
 
 
 def rotation(vector_rad: FloatArray) -> FloatArray:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -11,6 +12,7 @@ from cdpr_profiles import load_robot
 from cdpr_rt.core.estimate import Estimator
 from cdpr_rt.core.exchange import AxisFeedback, Setpoint
 from cdpr_rt.core.shared_block import SharedBlock
+from cdpr_rt.jit import jit
 from cdpr_rt.programs.base import Program
 from cdpr_rt.programs.model import model_of
 from cdpr_rt.programs.platform.platform_program import PlatformParts
@@ -31,6 +33,28 @@ def home_pretension_N(parts: PlatformParts) -> np.ndarray:
     most_N = np.full(control.low_N.size, 1e3)
     standing = StandingTensions(model, control.low_N, most_N, control.pull_fit.taken_up_N)
     return standing.at(model.home_pose)[0]
+
+
+@jit
+def _turn(
+    torque_Nm: np.ndarray,
+    cable_m: np.ndarray,
+    slack_m: np.ndarray,
+    inertia_kg_m2: float,
+    angle: np.ndarray,
+    speed: np.ndarray,
+    tension_N: np.ndarray,
+) -> None:
+    """Advance the rotors by a cycle, in ten steps."""
+    h = PERIOD_S / 10
+    for i in range(angle.size):
+        for _ in range(10):
+            stretched_m = -(slack_m[i] + cable_m[i] * angle[i])
+            tension_N[i] = max(STIFFNESS_N_m * stretched_m, 0.0)
+            friction = COULOMB_Nm * math.tanh(speed[i] / 0.2)
+            torque = torque_Nm[i] + cable_m[i] * tension_N[i] - friction - 2e-3 * speed[i]
+            speed[i] += h / inertia_kg_m2 * torque
+            angle[i] += h * speed[i]
 
 
 class Standing:
@@ -84,16 +108,10 @@ class Standing:
                 cogging_Nm=controller.cogging_Nm,
             )
             self.program.update(self.feedback, self.setpoint, self.torque)
-            for _ in range(10):
-                self._step(PERIOD_S / 10)
-
-    def _step(self, h: float) -> None:
-        stretched = -(self.slack_m + self.cable_m * self.angle)
-        self.tension_N = np.maximum(STIFFNESS_N_m * stretched, 0.0)
-        friction = COULOMB_Nm * np.tanh(self.speed / 0.2)
-        force = self.torque + self.cable_m * self.tension_N - friction - 2e-3 * self.speed
-        self.speed += h / self.inertia * force
-        self.angle += h * self.speed
+            _turn(
+                self.torque, self.cable_m, self.slack_m, self.inertia,
+                self.angle, self.speed, self.tension_N,
+            )  # fmt: skip
 
     def until_done(self, within_s: float) -> dict[str, Any]:
         for _ in range(round(within_s / 0.1)):
