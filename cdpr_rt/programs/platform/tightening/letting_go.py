@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from cdpr_rt.arrays import FloatArray
-from cdpr_rt.programs.platform.platform_program import PlatformParts
+from cdpr_rt.programs.platform.platform_program import PlatformParts, distance_m
 
 _AGREE_m = 0.002
 """By how much lengths that were just taken may disagree, besides what friction stretches."""
+_OFF_HOME_m = 0.006
+"""How far from home lengths that were just taken there may have the platform, and nobody is told:
+friction on its stand makes up to 4 mm, which ends as winches turn."""
 _RUNS_IN_m_s = 0.2
 """Speed that no winch has whose cable is tight while the platform stands."""
 _REMEDY = (
@@ -58,4 +63,23 @@ class LettingGo:
             f"the cables' lengths, just taken at home, disagree by {1e3 * control.residual_m:.1f} "
             f"mm{most}; {1e3 * self._allowed_m:.1f} mm allowed, which friction may make: a cable "
             f"was slack, or the platform has moved on its stand; {_REMEDY}"
+        )
+
+    def off_home(self) -> str:
+        """Return how far from home lengths taken there have the platform, "" for not far.
+
+        Cables that all sag more than is believed do not contradict each other: what heavy ones are
+        pulled with may not overcome what their winches rub.
+        """
+        parts = self._parts
+        here, home, k = parts.control.estimated, parts.model.home, parts.model.positions
+        off_m = distance_m(here, home, parts.scale_m)
+        if off_m <= _OFF_HOME_m:
+            return ""
+        off = f"{1e3 * float(np.linalg.norm(here[:k] - home[:k])):.0f} mm from there"
+        if here.size > k:
+            off += f", turned by {math.degrees(np.linalg.norm(here[k:])):.1f} deg"
+        return (
+            f"by the cables' lengths, just taken at home, the platform is {off}: targets will be "
+            f"as far off, or further; cables sagged or were slack, or it has moved; {_REMEDY}"
         )

@@ -113,3 +113,23 @@ def test_a_cable_that_was_slack_is_let_down_and_its_length_forgotten(
     assert not robot.torque.any()
     assert fastest_m_s < 1.0
     assert not robot.parts.tight and not robot.parts.pose_known
+
+
+@pytest.mark.parametrize(("up_m", "told"), [(0.0, False), (0.003, False), (0.02, True)])
+def test_lengths_that_agree_on_a_place_off_home_are_told(robot: Standing, up_m: float, told: bool):
+    """All cables that are slack alike contradict nothing but the stand."""
+    handing_over(robot)
+    model = robot.parts.model
+    shorter_m = up_m * model.kinematics.wrench_matrix(model.home_pose)[1]
+    for _ in range(400):
+        robot.slack_m += shorter_m / 400
+        robot.run(PERIOD_S)
+    assert robot.until_done(10.0)["done"]
+    notices = robot.parts.notices()
+    assert bool(notices) is told
+    if told:
+        off_mm = float(notices[0].split("the platform is ")[1].split(" mm")[0])
+        assert off_mm == pytest.approx(1e3 * up_m, abs=3.0)
+    robot.loosen((0.0, 0.0, 0.0))
+    handing_over(robot).until_done(10.0)
+    assert not robot.parts.notices()
