@@ -74,7 +74,7 @@ def save_figure(figure: Figure, path: Path, tight: bool = False) -> None:
 
 
 def legend_above(figure: Figure, *axes: Axes, columns: int = 4) -> None:
-    """Name what is labelled in `axes` above the whole figure, row by row, where it hides nothing."""
+    """Name what is labelled in `axes` above the figure, row by row, where it hides nothing."""
     named = [pair for ax in axes for pair in zip(*ax.get_legend_handles_labels(), strict=True)]
     by_columns = [pair for column in range(columns) for pair in named[column::columns]]
     handles, labels = zip(*by_columns, strict=True)
