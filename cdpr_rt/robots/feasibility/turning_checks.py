@@ -16,6 +16,8 @@ from cdpr_rt.robots.statics import NONE_rad, PlatformStatics
 
 _SHARES = np.linspace(0.95, 0.05, 19)
 """Shares of an angle that are tried."""
+_LOOKED_AT = (1.0, 0.75, 0.5, 0.25)
+"""Shares that are looked at of any."""
 _TIPS_AT = 0.05
 """Share of its weight that any cable which becomes tight pulls with."""
 _FAR_TURNED_deg, _TIPPED_deg = 10.0, 4.0
@@ -65,7 +67,8 @@ def uncontrolled_rotation(platform: Platform) -> Iterator[Finding]:
 def angles(statics: PlatformStatics) -> Iterator[Finding]:
     """Look for angles at which no place in the box takes a target, whichever way it is turned.
 
-    Either tensions do not hold it there, or something touches.
+    Either tensions do not hold it there, or something touches; crossed cables may do so at small
+    angles alone.
     """
     platform, interference = statics.platform, statics.model.interference
     points, angle_rad = statics.points(), platform.workspace_angle_rad
@@ -80,19 +83,20 @@ def angles(statics: PlatformStatics) -> Iterator[Finding]:
     names = platform.controlled[len(platform.home_m) :]
     axes = dict(zip(names, statics.orientations[1::2], strict=False))  # diagonals follow
 
-    def refused(share: float) -> list[str]:
-        return [
-            name
-            for name, turn in axes.items()
-            if not taken(share * turn) and not taken(-share * turn)
-        ]
+    def refused(most: float) -> str:
+        """Return the first turn that is refused of those by shares of the angle up to `most`."""
+        for share in most * np.array(_LOOKED_AT):
+            for name, turn in axes.items():
+                if not taken(share * turn) and not taken(-share * turn):
+                    about = "" if platform.is_planar else f" about {name[-1]}"
+                    return f"{math.degrees(share * angle_rad):.0f} deg{about}"
+        return ""
 
     if nowhere := refused(1.0):
         share = next((share for share in _SHARES if not refused(share)), 0.0)
-        about = "" if platform.is_planar else f" about {nowhere[0][-1]}"
         text = (
-            f"value {angle_rad:g}; turned by {math.degrees(angle_rad):.0f} deg{about}, it is held "
-            "nowhere in the box, or something touches, so that no target is taken; allowed: up to "
+            f"value {angle_rad:g}; turned by {nowhere}, it is held nowhere in the box, or "
+            "something touches, so that no target is taken; allowed: up to "
             f"{rounded_down(share * angle_rad) if share else 0}"
         )
         yield Finding("platform.workspace_angle_rad", text, impossible=True)

@@ -116,7 +116,9 @@ def test_a_cable_that_was_slack_is_let_down_and_its_length_forgotten(
 
 
 @pytest.mark.parametrize(("up_m", "told"), [(0.0, False), (0.003, False), (0.02, True)])
-def test_lengths_that_agree_on_a_place_off_home_are_told(robot: Standing, up_m: float, told: bool):
+def test_lengths_that_agree_on_a_place_off_home_are_told(
+    robot: Standing, up_m: float, told: bool
+) -> None:
     """All cables that are slack alike contradict nothing but the stand."""
     handing_over(robot)
     model = robot.parts.model

@@ -16,6 +16,33 @@ SPATIAL = (SHIPPED / "robots" / "spatial-8.toml").read_text()
 WALL = (SHIPPED / "robots" / "planar-4.toml").read_text()
 BODY = "body = { min_m = [-0.1, -0.1, -0.3], max_m = [0.1, 0.1, 0.3] }"
 
+CROSSED_m = {
+    "exit_point_m": [
+        *([x, y, 0.469] for x, y in ((-1.5, -1.131), (-1.5, 1.131), (1.5, 1.131), (1.5, -1.131))),
+        *([x, y, 3.0] for x, y in ((-1.489, -1.5), (-1.489, 1.5), (1.489, 1.5), (1.489, -1.5))),
+    ],
+    "anchor_point_m": [
+        *([0.2, -0.2, 0.2], [0.2, 0.2, -0.2], [-0.2, 0.2, 0.2], [-0.2, -0.2, -0.2]),
+        *([0.2, -0.2, -0.2], [0.2, 0.2, 0.2], [-0.2, 0.2, -0.2], [-0.2, -0.2, 0.2]),
+    ],
+}
+
+
+def crossed() -> str:
+    """Return the robot with cables that touch each other at small angles alone."""
+    text = SPATIAL.replace(BODY, "")
+    for key, value in (
+        ("home_m", [0.0, 0.0, 1.1]),
+        ("workspace_min_m", [-0.25, -0.25, 1.2]),
+        ("workspace_max_m", [0.25, 0.25, 1.6]),
+        ("tension_min_N", 5.0),
+    ):
+        text = re.sub(rf"\n({key} =) [^#\n]*", rf"\n\1 {value}", text)
+    for key, points in CROSSED_m.items():
+        place = iter(points)
+        text = re.sub(rf"({key} =) [^#\n]*", lambda m, at=place: f"{m[1]} {next(at)}", text)
+    return text
+
 
 def test_an_angle_that_is_held_nowhere_in_the_box_is_impossible(tmp_path: Path) -> None:
     path = tmp_path / "turning.toml"
@@ -30,6 +57,18 @@ def test_an_angle_that_is_held_nowhere_in_the_box_is_impossible(tmp_path: Path) 
         path.write_text(re.sub(r"(workspace_angle_rad =) \S+", rf"\1 {allowed}", shipped))
         told = [f.key for f in findings(load_robot(path)) if f.impossible]
         assert "platform.workspace_angle_rad" not in told
+
+
+def test_smaller_angles_at_which_cables_touch_everywhere_are_not_passed_over(
+    tmp_path: Path,
+) -> None:
+    path = tmp_path / "crossed.toml"
+    for angle, refused in ((0.1, False), (0.12, True), (0.5, True)):
+        text = re.sub(r"(workspace_angle_rad =) \S+", rf"\1 {angle}", crossed())
+        path.write_text(text)
+        found = {f.key: f.text for f in findings(load_robot(path)) if f.impossible}
+        told = found.get("platform.workspace_angle_rad", "")
+        assert ("turned by 7 deg about x" in told) is refused
 
 
 def test_an_upright_rod_has_to_be_held_or_needs_a_foot(tmp_path: Path) -> None:
