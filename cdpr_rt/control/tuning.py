@@ -171,7 +171,6 @@ def standstill_gains(design: PidDesign, period_s: float) -> PidDesign:
     return found
 
 
-@lru_cache(maxsize=64)
 def design_pid(
     inertia_kg_m2: float, latency_s: float, bandwidth_Hz: float, period_s: float = 1e-3
 ) -> PidDesign:
@@ -188,6 +187,13 @@ def design_pid(
         bandwidth_Hz=bandwidth_Hz,
         period_s=period_s,
     )
+    return _designed(inertia_kg_m2, latency_s, bandwidth_Hz, period_s)
+
+
+@lru_cache(maxsize=64)
+def _designed(
+    inertia_kg_m2: float, latency_s: float, bandwidth_Hz: float, period_s: float
+) -> PidDesign:
     low, high = 0.2 * bandwidth_Hz, 1.2 * bandwidth_Hz
     design = None
     for _ in range(40):

@@ -102,6 +102,9 @@ def move(
         axis.set_brake(False)
         pushed_m = _test_brake(rail, axis, clock)
         _void_calibration(rail, clock, f"{rail.name} was moved from {start_m:.4f} m")
+        _refuse(rail, conditions)  # all may have changed while the disk took its time
+        axis.check()
+        _stop_on_request(rail, conditions)
         axis.enable()
         axis.set_brake(True)
         try:
@@ -134,6 +137,13 @@ def _refuse(rail: RailProfile, conditions: MoveConditions) -> None:
     powered = conditions.powered()
     if powered:
         raise RailError(f"{rail.name}: not moved while a winch has power: {powered}")
+
+
+def _stop_on_request(rail: RailProfile, conditions: MoveConditions) -> None:
+    if conditions.stop_requested():
+        raise RailStoppedError(
+            f"{rail.name}: stopped on request; the robot is not calibrated any more"
+        )
 
 
 def _test_brake(rail: RailProfile, axis: RailAxis, clock: Clock) -> float | None:
@@ -171,10 +181,7 @@ def _follow(
     while not axis.arrived():
         axis.check()
         conditions.progress(axis.position_m())
-        if conditions.stop_requested():
-            raise RailStoppedError(
-                f"{rail.name}: stopped on request; the robot is not calibrated any more"
-            )
+        _stop_on_request(rail, conditions)
         cables_tight = conditions.cables_tight()
         if cables_tight:
             raise RailError(

@@ -36,6 +36,7 @@ from safety_rig import (
 from cdpr_drivers.errors import DriverError
 from cdpr_drivers.modbus.safety_io import SafetyIoError
 from cdpr_drivers.rails.rail import RailError
+from cdpr_drivers.rails.rail_cia402 import Cia402RailAxis
 from cdpr_drivers.rails.rail_modbus import ModbusRailAxis
 from cdpr_profiles import load_winch
 from cdpr_profiles.catalogue import load_rail_drive
@@ -224,20 +225,34 @@ def test_a_move_arrives_and_voids_the_calibration(rails: Rails, kind: str) -> No
     assert state["calibrated"] is False and "was moved from" in state["why"]
 
 
-def test_the_drive_hears_its_master_while_a_slow_disk_is_written(
-    rails: Rails, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize("stopped", [False, True])
+def test_while_a_slow_disk_is_written_the_drive_hears_its_master_and_ctrl_c_is_heard(
+    rails: Rails, monkeypatch: pytest.MonkeyPatch, stopped: bool
 ) -> None:
-    def slow(fd: int) -> None:  # a busy disk cannot be had here
+    def slow(_fd: int) -> None:  # a busy disk cannot be had here
+        if stopped:
+            os.kill(os.getpid(), signal.SIGINT)
         time.sleep(2.0 * load_rail_drive("rail-cia402", rail.cia402).heartbeat_consumer_s)
-        slowed.append(fd)
 
-    rail, slowed = load_rail("rail-cia402"), list[int]()
+    def enable(axis: Cia402RailAxis) -> None:
+        enabled.append(axis)
+        really_enable(axis)
+
+    enabled, really_enable = list[Cia402RailAxis](), Cia402RailAxis.enable
+    rail = load_rail("rail-cia402")
     assert rail.cia402 is not None
     monkeypatch.setattr(os, "fsync", slow)
-    target = rails.position_m("cia402") + 0.005
-    outcome = rails.moved("cia402", target)
-    assert outcome.exit_code == 0, outcome.exception
-    assert slowed and abs(rails.position_m("cia402") - target) < 5e-4
+    monkeypatch.setattr(Cia402RailAxis, "enable", enable)
+    before = rails.position_m("cia402")
+    outcome = rails.moved("cia402", before + 0.005)
+    moved_m = rails.position_m("cia402") - before
+    if stopped:
+        assert "stopped on request" in str(outcome.exception)
+        assert abs(moved_m) < 2e-4 and rails.braked("cia402")  # its brake's play
+        assert not enabled
+    else:
+        assert outcome.exit_code == 0, outcome.exception
+        assert abs(moved_m - 0.005) < 5e-4
 
 
 @pytest.mark.parametrize("kind", ["cia402", "modbus"])

@@ -14,7 +14,7 @@ from cdpr_rt.robots.feasibility.turned_by_friction import (
     stretched_by_acceleration_m,
     turned_by_friction,
 )
-from cdpr_rt.robots.platform.design.designed_loop import DesignedLoop, designed_loop, growing_modes
+from cdpr_rt.robots.platform.design.designed_loop import DesignedLoop, designed_loop
 from cdpr_rt.robots.platform.design.loop_design import (
     SwingsError,
     UnstableError,
@@ -62,7 +62,7 @@ def loop_findings(robot: Robot, statics: PlatformStatics) -> Iterator[Finding]:
     yield from _swinging(loop, statics)
     assumed = any("damping_s" not in axis.winch.cable.model_fields_set for axis in robot.axes)
     if assumed:
-        yield from _growing(loop, robot, statics)
+        yield from _growing(loop, robot.sync_period_s, statics)
 
 
 def _known_damping(robot: Robot) -> str:
@@ -93,15 +93,14 @@ def _swinging(loop: DesignedLoop, statics: PlatformStatics) -> Iterator[Finding]
     yield Finding(key, text, impossible=False)
 
 
-def _growing(loop: DesignedLoop, robot: Robot, statics: PlatformStatics) -> Iterator[Finding]:
+def _growing(loop: DesignedLoop, period_s: float, statics: PlatformStatics) -> Iterator[Finding]:
     """Look whether a mode grows somewhere if cables damp little."""
-    modes = growing_modes(statics.model, robot.axes, robot.sync_period_s, loop.gains)
-    if not modes:
+    if not loop.growing_modes:
         return
-    at_poses = zip(modes, design_poses(statics.model), strict=True)
+    at_poses = zip(loop.growing_modes, design_poses(statics.model), strict=True)
     mode, place = min(at_poses, key=lambda at: at[0].damping_ratio)
     text = (
-        f"value {robot.sync_period_s:g}; the loop leans on what the cables are assumed to take out "
+        f"value {period_s:g}; the loop leans on what the cables are assumed to take out "
         f"of a swing (damping_s of their profile): with {1e3 * LITTLE_DAMPING_s:g} ms a mode at "
         f"{mode.frequency_Hz:.2g} Hz grows with the platform at "
         f"{point_text(place[: statics.model.positions])} m; a shorter cycle helps, or that value "

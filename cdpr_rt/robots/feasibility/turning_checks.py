@@ -9,15 +9,13 @@ import numpy as np
 
 from cdpr_profiles.platform import DIRECTIONS, Platform
 from cdpr_rt.arrays import FloatArray
-from cdpr_rt.robots.feasibility.finding import Finding, rounded_down
+from cdpr_rt.robots.feasibility.finding import Finding
 from cdpr_rt.robots.feasibility.not_held import point_text
 from cdpr_rt.robots.rigid_body import in_space, is_point
 from cdpr_rt.robots.statics import NONE_rad, PlatformStatics
 
-_SHARES = np.linspace(0.95, 0.05, 19)
-"""Shares of an angle that are tried."""
-_LOOKED_AT = (1.0, 0.75, 0.5, 0.25)
-"""Shares that are looked at of any."""
+_TURNED_rad = np.concatenate([[0.01, 0.02, 0.03], 0.04 * np.arange(1, 80)])
+"""Angles by which a platform is looked at turned: its cables may touch at small ones alone."""
 _TIPS_AT = 0.05
 """Share of its weight that any cable which becomes tight pulls with."""
 _FAR_TURNED_deg, _TIPPED_deg = 10.0, 4.0
@@ -83,23 +81,24 @@ def angles(statics: PlatformStatics) -> Iterator[Finding]:
     names = platform.controlled[len(platform.home_m) :]
     axes = dict(zip(names, statics.orientations[1::2], strict=False))  # diagonals follow
 
-    def refused(most: float) -> str:
-        """Return the first turn that is refused of those by shares of the angle up to `most`."""
-        for share in most * np.array(_LOOKED_AT):
-            for name, turn in axes.items():
-                if not taken(share * turn) and not taken(-share * turn):
-                    about = "" if platform.is_planar else f" about {name[-1]}"
-                    return f"{math.degrees(share * angle_rad):.0f} deg{about}"
-        return ""
+    def refused(share: float) -> str | None:
+        for name, turn in axes.items():
+            if not taken(share * turn) and not taken(-share * turn):
+                return "" if platform.is_planar else f" about {name[-1]}"
+        return None
 
-    if nowhere := refused(1.0):
-        share = next((share for share in _SHARES if not refused(share)), 0.0)
-        text = (
-            f"value {angle_rad:g}; turned by {nowhere}, it is held nowhere in the box, or "
-            "something touches, so that no target is taken; allowed: up to "
-            f"{rounded_down(share * angle_rad) if share else 0}"
-        )
-        yield Finding("platform.workspace_angle_rad", text, impossible=True)
+    allowed_rad = 0.0
+    for at_rad in (*_TURNED_rad[_TURNED_rad < angle_rad], angle_rad):
+        about = refused(at_rad / angle_rad)
+        if about is not None:
+            text = (
+                f"value {angle_rad:g}; turned by {math.degrees(at_rad):.3g} deg{about}, it is held "
+                "nowhere in the box, or something touches, so that no target is taken; allowed: "
+                f"up to {allowed_rad:.2g}"
+            )
+            yield Finding("platform.workspace_angle_rad", text, impossible=True)
+            return
+        allowed_rad = at_rad
 
 
 def lower_when_turned_m(statics: PlatformStatics) -> float:

@@ -158,7 +158,7 @@ def test_a_killed_simulator_ends_what_waits_and_time_goes_on(while_waiting: bool
             at_s = clock.now_s
             clock.sleep(300.0)
             assert clock.now_s == pytest.approx(at_s + 300.0)
-            assert time.monotonic() - began < 300.0
+            assert time.monotonic() - began < 50.0
     finally:
         simulator.stop()
 

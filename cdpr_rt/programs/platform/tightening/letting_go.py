@@ -80,6 +80,6 @@ class LettingGo:
         if here.size > k:
             off += f", turned by {math.degrees(np.linalg.norm(here[k:])):.1f} deg"
         return (
-            f"by the cables' lengths, just taken at home, the platform is {off}: targets will be "
+            f"by the cables' lengths, taken at home, the platform is {off}: targets will be "
             f"as far off, or further; cables sagged or were slack, or it has moved; {_REMEDY}"
         )

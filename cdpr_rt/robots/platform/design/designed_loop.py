@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
+from typing import NamedTuple
 
 import numpy as np
 
@@ -18,40 +19,62 @@ from cdpr_rt.robots.platform_model import PlatformModel
 
 
 @dataclass(frozen=True)
+class _Robot:
+    """What a loop is designed from; that of one robot is designed once."""
+
+    platform: Platform
+    bounds_N: tuple[tuple[float, ...], ...]
+    """Of the tensions, which turn the platform: least, greatest; what is kept from them."""
+    rotors_kg: tuple[float, ...]
+    stiffness_N: tuple[float, ...]
+    cable_damping_s: float
+    period_s: float
+    model: PlatformModel = field(compare=False)
+
+
+class _Kept(NamedTuple):
+    margins: list[LoopMargins]
+    modes: tuple[Mode, ...]
+    growing: tuple[Mode, ...]
+
+
+@dataclass(frozen=True)
 class DesignedLoop:
     """The loop of a robot, and what it keeps at each of `design_poses`."""
 
     gains: LoopGains
-    _loop: LoopModel = field(repr=False)
+    _robot: _Robot = field(repr=False)
 
-    @cached_property
+    @property
     def margins(self) -> list[LoopMargins]:
         """Its margins there."""
-        return self._loop.margins(self.gains)
+        return self._kept.margins
 
-    @cached_property
+    @property
     def modes(self) -> tuple[Mode, ...]:
         """The least damped mode of robot and loop there."""
-        return self._loop.least_damped(self.gains, self._loop.cable_damping_s)
+        return self._kept.modes
+
+    @property
+    def growing_modes(self) -> tuple[Mode, ...]:
+        """These modes if cables damped by LITTLE_DAMPING_s.
+
+        None where no mode grows then, or they do damp no more.
+        """
+        return self._kept.growing
 
     @property
     def slowest_rad_s(self) -> float:
         """Of the platform's modes in closed loop, at all poses."""
         return min(there.slowest_rad_s for there in self.margins)
 
-
-@dataclass(frozen=True)
-class _Robot:
-    """What a loop is designed from; that of one robot is designed once."""
-
-    platform: Platform
-    bounds_N: tuple[tuple[float, ...], ...]
-    """Of the tensions, which turn the platform: least, greatest."""
-    rotors_kg: tuple[float, ...]
-    stiffness_N: tuple[float, ...]
-    cable_damping_s: float
-    period_s: float
-    model: PlatformModel = field(compare=False)
+    @cached_property
+    def _kept(self) -> _Kept:
+        """What only people are told, of a model made anew: tens of megabytes are not kept."""
+        loop, gains, damping_s = _loop_model(self._robot), self.gains, self._robot.cable_damping_s
+        calm = damping_s <= LITTLE_DAMPING_s or loop.dies_down(gains, LITTLE_DAMPING_s)
+        growing = () if calm else loop.least_damped(gains, LITTLE_DAMPING_s)
+        return _Kept(loop.margins(gains), loop.least_damped(gains, damping_s), growing)
 
 
 def designed_loop(model: PlatformModel, axes: Sequence[RobotAxis], period_s: float) -> DesignedLoop:
@@ -63,33 +86,16 @@ def designed_loop(model: PlatformModel, axes: Sequence[RobotAxis], period_s: flo
     return _designed(_robot(model, axes, period_s))
 
 
-def growing_modes(
-    model: PlatformModel, axes: Sequence[RobotAxis], period_s: float, gains: LoopGains
-) -> tuple[Mode, ...]:
-    """Return the least damped modes of a loop at the poses if cables damped by LITTLE_DAMPING_s.
-
-    None where no mode grows then, or they do damp no more.
-    """
-    robot = _robot(model, axes, period_s)
-    if robot.cable_damping_s <= LITTLE_DAMPING_s:
-        return ()
-    loop = _loop_model(robot)
-    if loop.dies_down(gains, LITTLE_DAMPING_s):
-        return ()
-    return loop.least_damped(gains, LITTLE_DAMPING_s)
-
-
 def _robot(model: PlatformModel, axes: Sequence[RobotAxis], period_s: float) -> _Robot:
     winches = [axis.winch for axis in axes]
     rotors_kg = [w.motor.rotor_inertia_kg_m2 / w.cable_m_per_motor_rad**2 for w in winches]
     stiffness_N = [w.cable.stiffness_N for w in winches]
     damping_s = min(w.cable.damping_s for w in winches)
-    bounds_N = tuple(tuple(bound.tolist()) for bound in (model.low_N, model.high_N))
+    bounds_N = tuple(model.low_N.tolist()), tuple(model.high_N.tolist()), (model.reserve_N,)
     known = bounds_N, tuple(rotors_kg), tuple(stiffness_N), damping_s, period_s
     return _Robot(model.platform, *known, model)
 
 
-@lru_cache(maxsize=4)
 def _loop_model(robot: _Robot) -> LoopModel:
     rotors_kg, stiffness_N = np.array(robot.rotors_kg), np.array(robot.stiffness_N)
     damping_s = robot.cable_damping_s
@@ -98,5 +104,4 @@ def _loop_model(robot: _Robot) -> LoopModel:
 
 @lru_cache(maxsize=4)
 def _designed(robot: _Robot) -> DesignedLoop:
-    loop = _loop_model(robot)
-    return DesignedLoop(loop.design(), loop)
+    return DesignedLoop(_loop_model(robot).design(), robot)

@@ -58,13 +58,15 @@ def test_a_platform_that_tensions_turn_away_faster_than_a_loop_can_hold_it_is_re
 
 def test_a_loop_is_not_taken_for_that_of_other_bounds_of_tension() -> None:
     arms = short_arms()
-    bounds = [
-        (np.full(len(arms.axes), low), np.full(len(arms.axes), low + 80.0)) for low in (5, 90)
+    n = len(arms.axes)
+    bounds = [(np.full(n, low), np.full(n, low + 80.0)) for low in (5.0, 90.0)]
+    weak = (*bounds[0], np.full(n, 40.0))  # by what the motors hold
+    loops = [
+        designed_loop(platform_model(arms.platform, *both), arms.axes, 1e-3)
+        for both in (*bounds, weak)
     ]
-    one, other = (
-        designed_loop(platform_model(arms.platform, *both), arms.axes, 1e-3) for both in bounds
-    )
-    assert one.margins != other.margins
+    assert loops[0].margins != loops[1].margins
+    assert loops[0] is not loops[2]
 
 
 def test_a_platform_that_tensions_hold_is_not_refused() -> None:
