@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import subprocess
 import sys
 import threading
@@ -195,8 +196,10 @@ def test_many_who_ask_for_hold_at_once_are_one_command(
     command = rig.service.link.command
 
     async def counted(do: str, wait_s: float, **fields: Any) -> Any:
+        answer = asyncio.create_task(command(do, 10.0 * wait_s, **fields))
+        await asyncio.sleep(0.0)  # it is on its way before the loop may answer
         asked.append(do)
-        return await command(do, 10.0 * wait_s, **fields)
+        return await answer
 
     monkeypatch.setattr(rig.service.link, "command", counted)
 
