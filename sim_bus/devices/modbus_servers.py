@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import gc
 import json
 import logging
 import os
@@ -118,7 +119,7 @@ async def serve_units(
         raise BusSetupError(f"port {port} of 127.0.0.1 cannot be opened; choose another") from None
     listening: Any = server.transport
     where = {"host": "127.0.0.1", "port": listening.sockets[0].getsockname()[1]}
-    print(json.dumps({"ready": {**where, "pid": os.getpid(), **details}}), flush=True)
+    _say_ready({**where, "pid": os.getpid(), **details})
     while step is not None and not ended.is_set():
         step()
         with contextlib.suppress(TimeoutError):
@@ -126,6 +127,12 @@ async def serve_units(
     await ended.wait()
     shutdown: Any = server.shutdown
     await shutdown()
+
+
+def _say_ready(ready: dict[str, Any]) -> None:
+    gc.collect()
+    gc.freeze()  # or the collector goes through all registers, for 0.1 s, while somebody waits
+    print(json.dumps({"ready": ready}), flush=True)
 
 
 def _end_with_stdin(loop: asyncio.AbstractEventLoop, ended: asyncio.Event) -> None:
@@ -186,7 +193,7 @@ class RtuServer:
             loop.add_reader(self._outside, self._to_server)
             loop.add_reader(self._inside, self._to_master, loop)
             ready = {"port": path, "pid": os.getpid(), "units": list(self._units), **details}
-            print(json.dumps({"ready": ready}), flush=True)
+            _say_ready(ready)
             await self._ended.wait()
         finally:
             shutdown: Any = server.shutdown

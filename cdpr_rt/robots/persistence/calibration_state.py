@@ -64,8 +64,8 @@ def not_calibrated_reason(robot: str) -> str:
         return ""
     since = f" since {state.date}" if state.date else ""
     return (
-        f"robot {robot!r} is not calibrated{since}: {state.why}; calibrate it or say that it is, "
-        "and enable again"
+        f"robot {robot!r} is not calibrated{since}: {state.why}; calibrate it, or say that it is "
+        f"(`cdpr robot mark-calibrated {robot}`), and enable again"
     )
 
 
