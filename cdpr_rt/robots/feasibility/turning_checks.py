@@ -94,7 +94,7 @@ def angles(statics: PlatformStatics) -> Iterator[Finding]:
             text = (
                 f"value {angle_rad:g}; turned by {math.degrees(at_rad):.3g} deg{about}, it is held "
                 "nowhere in the box, or something touches, so that no target is taken; allowed: "
-                f"up to {allowed_rad:.2g}"
+                f"up to {allowed_rad:.3g}"
             )
             yield Finding("platform.workspace_angle_rad", text, impossible=True)
             return

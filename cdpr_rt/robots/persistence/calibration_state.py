@@ -65,7 +65,7 @@ def not_calibrated_reason(robot: str) -> str:
     since = f" since {state.date}" if state.date else ""
     return (
         f"robot {robot!r} is not calibrated{since}: {state.why}; calibrate it, or say that it is "
-        f"(`cdpr robot mark-calibrated {robot}`), and enable again"
+        f"(`cdpr robot mark-calibrated {robot} --why ...`), and enable again"
     )
 
 
