@@ -58,6 +58,20 @@ def state_home(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
         yield folder
 
 
+@pytest.fixture(autouse=True)
+def signals_as_before() -> Iterator[None]:
+    """Have every test and what it starts take signals as the first one did.
+
+    A command that ends on request ignores further Ctrl-C; where it has run in this process, so
+    would all processes that are started from it afterwards.
+    """
+    numbers = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+    before = [(number, signal.getsignal(number)) for number in numbers]
+    yield
+    for number, handler in before:
+        signal.signal(number, handler)
+
+
 class _ByFile(LoadScopeScheduling):
     """One process for each file, for all in the guest kernel's single boot, and for all daemons.
 
