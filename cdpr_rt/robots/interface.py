@@ -250,12 +250,11 @@ class PlatformControl(Controller, Protocol):
     def measure_tensions(self, tension_N: FloatArray, measured: BoolArray) -> None:
         """Hold the cables' tensions by readings (n,), kept up to date by others, where valid."""
 
-    @property
-    def load_cell_fault(self) -> str:
-        """Load cell that disagrees and by how much, in words; "" for none. Latched."""
+    def notices(self) -> list[str]:
+        """Return what an operator should know of load cells and loop, in words. Latched."""
 
-    def clear_load_cell_fault(self) -> None:
-        """Clear the latched load cell fault."""
+    def clear_notices(self) -> None:
+        """Clear the latched notices."""
 
     def begin(self, feedback: AxisFeedback, tension_N: FloatArray | None = None) -> None:
         """Take the motors to stand where they are, and the platform where its cables have it.

@@ -197,12 +197,14 @@ def test_whose_power_is_taken_is_named_where_several_run(tmp_path: Path) -> None
         status, told = estop(**env)
         assert (status, "name one of left, right" in told["error"]) == (2, True)
         assert estop("left", "--all", **env)[0] == 2
+        assert estop("left", "--robot", "right", **env)[0] == 2
         assert one.status()["state"] == "ready"  # nothing was done
         status, told = estop("--all", **env)
         assert (status, len(told["robots"])) == (0, 2)
         one.wait_for("fault")
-        status, told = estop("left", **env)
-        assert (status, len(told["robots"])) == (0, 1)
+        for words in (("left",), ("--robot", "left"), ("left", "--robot", "left")):
+            status, told = estop(*words, **env)
+            assert (status, len(told["robots"])) == (0, 1)
 
 
 def test_nothing_is_loaded_from_the_working_directory(tmp_path: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -57,16 +58,16 @@ def figure_of(robot: Robot, platform: Platform) -> Figure:
     views = [(0, 1)] if platform.is_planar else [(0, 2), (1, 2), (0, 1)]
     heights = [max(_LEAST_HIGH, float(size[j] / size[:2].max())) for _, j in views]
     figure = Figure(figsize=(_WIDE_in, _WIDE_in * sum(heights) * 0.9), layout="constrained")
-    all_axes = figure.subplots(len(views), squeeze=False, height_ratios=heights)[:, 0]
+    all_axes = list(figure.subplots(len(views), squeeze=False, height_ratios=heights)[:, 0])
+    _draw_workspace(figure, all_axes, [_Section.of(statics, shown, view) for view in views])
     for ax, view in zip(all_axes, views, strict=True):
-        _draw_workspace(figure, ax, statics, shown, view)
         _draw_machine(ax, robot, platform, view)
         i, j = view
         ax.set(xlabel=f"{_NAMES[i]} (m)", ylabel=f"{_NAMES[j]} (m)", aspect="equal")
         ax.set(xlim=(shown.low_m[i], shown.high_m[i]), ylim=(shown.low_m[j], shown.high_m[j]))
         ax.grid(visible=False)
         if not platform.is_planar:
-            ax.set_title(_section(platform, view), fontsize="medium")
+            ax.set_title(_title(platform, view), fontsize="medium")
     figure.suptitle(robot.name)
     handles, labels = all_axes[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=3)
@@ -76,7 +77,7 @@ def figure_of(robot: Robot, platform: Platform) -> Figure:
     return figure
 
 
-def _section(platform: Platform, view: _View) -> str:
+def _title(platform: Platform, view: _View) -> str:
     (k,) = {0, 1, 2} - set(view)
     middle_m = 0.5 * (platform.workspace_min_m[k] + platform.workspace_max_m[k])
     return f"{_SEEN_FROM[k]}; workspace at {_NAMES[k]} = {middle_m:.2f} m"
@@ -97,32 +98,57 @@ def _has_room(figure: Figure, ax: Axes) -> bool:
     return bool((least >= low).all() and (most <= high).all())
 
 
-def _draw_workspace(
-    figure: Figure, ax: Axes, statics: PlatformStatics, shown: Box, view: _View
-) -> None:
-    platform = statics.platform
-    i, j = view
-    counts = _FINE if platform.is_planar else _COARSE
-    plane = Box((shown.low_m[i], shown.low_m[j]), (shown.high_m[i], shown.high_m[j]))
-    cells = plane.grid(*counts)
-    middle = np.add(platform.workspace_min_m, platform.workspace_max_m) / 2.0
-    points = np.empty((*cells.shape[:2], len(middle)))
-    points[:] = middle
-    points[..., view] = cells
-    xs, ys = cells[0, :, 0], cells[:, 0, 1]
-    still = np.nan_to_num(statics.margin_N(points), neginf=-1e3)
-    acceleration, kept_N = platform.acceleration_m_s2, statics.model.reserve_N
-    moving = statics.margin_N(points, acceleration, statics.orientations) - kept_N
-    moving = np.nan_to_num(moving, neginf=-1e3)
-    if still.max() > 0.0:
-        levels = MaxNLocator(9).tick_values(0.0, float(still.max()))
-        filled = ax.contourf(xs, ys, still, levels, cmap="YlGnBu", alpha=0.75)
-        bar = figure.colorbar(filled, ax=ax, shrink=0.8, format="%g")
+@dataclass(frozen=True)
+class _Section:
+    """What tensions allow in one view: `xs_m` to the right, `ys_m` upward, a value for each."""
+
+    xs_m: FloatArray
+    ys_m: FloatArray
+    still_N: FloatArray
+    """By how far tensions can stay from their bounds at rest, in home's orientation."""
+    moving_N: FloatArray
+    """The same for targets, with their acceleration and reserve, in any of their orientations."""
+
+    @classmethod
+    def of(cls, statics: PlatformStatics, shown: Box, view: _View) -> _Section:
+        platform = statics.platform
+        i, j = view
+        counts = _FINE if platform.is_planar else _COARSE
+        plane = Box((shown.low_m[i], shown.low_m[j]), (shown.high_m[i], shown.high_m[j]))
+        cells = plane.grid(*counts)
+        middle = np.add(platform.workspace_min_m, platform.workspace_max_m) / 2.0
+        points = np.empty((*cells.shape[:2], len(middle)))
+        points[:] = middle
+        points[..., view] = cells
+        acceleration, kept_N = platform.acceleration_m_s2, statics.model.reserve_N
+        moving = statics.margin_N(points, acceleration, statics.orientations) - kept_N
+        return cls(
+            cells[0, :, 0],
+            cells[:, 0, 1],
+            np.nan_to_num(statics.margin_N(points), neginf=-1e3),
+            np.nan_to_num(moving, neginf=-1e3),
+        )
+
+
+def _draw_workspace(figure: Figure, all_axes: list[Axes], sections: list[_Section]) -> None:
+    """Draw the sections in the same colours, and once what these are."""
+    most_N = max(float(section.still_N.max()) for section in sections)
+    levels, filled = MaxNLocator(9).tick_values(0.0, most_N), None
+    for ax, section in zip(all_axes, sections, strict=True):
+        xs, ys = section.xs_m, section.ys_m
+        if section.still_N.max() > 0.0:
+            filled = ax.contourf(xs, ys, section.still_N, levels, cmap="YlGnBu", alpha=0.75)
+        if section.moving_N.max() > 0.0:
+            ax.contour(
+                xs, ys, section.moving_N, [0.0],
+                colors=_CABLE, linestyles="dotted", linewidths=1.0,
+            )  # fmt: skip
+    if filled is not None:
+        bar = figure.colorbar(filled, ax=all_axes, shrink=0.8 / len(sections), format="%g")
         bar.set_label("distance of all tensions\nfrom their limits, at rest (N)")
         bar.outline.set_visible(False)
-    if moving.max() > 0.0:
-        ax.contour(xs, ys, moving, [0.0], colors=_CABLE, linestyles="dotted", linewidths=1.0)
-        ax.plot([], [], ":", color=_CABLE, lw=1.0, label="targets can be taken")
+    if any(section.moving_N.max() > 0.0 for section in sections):
+        all_axes[0].plot([], [], ":", color=_CABLE, lw=1.0, label="targets can be taken")
 
 
 def _draw_machine(ax: Axes, robot: Robot, platform: Platform, view: _View) -> None:

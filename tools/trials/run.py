@@ -153,7 +153,7 @@ def trial_run(
             "begin", sync_offset=rig.sync_offset, robot=robot, seed=seed, home_rotation_rad=home_rad
         )
         yield run
-        run.mark("end", refused=run.refused)
+        run.mark("end", refused=run.refused, notices=rig.status["notices"])
         rig.turn()  # the last cycle is in the recording as well
     recorder = rig.recorder
     if recorder is not None and (status := recorder.status())["error"]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
+from itertools import chain
 from pathlib import Path
 from typing import Any, Final
 
@@ -172,17 +173,23 @@ def judge(folder: Path) -> dict[str, Any]:
     kind, robot = KINDS[settings.kind], load_robot(settings.robot)
     parts = {part: Recorded(folder / part) for part in settings.parts}
     figures = kind.judge(parts, robot, settings)
+    ends = {part: one.marked("end")[0] for part, one in parts.items()}
+    notices = {part: end.get("notices", []) for part, end in ends.items()}
     save_figure(kind.draw(parts, robot, settings), folder / PICTURE)
     result = {
         **asdict(settings),
         "speed_m_s": settings.speed_m_s if kind.at_speed else None,
         "figures": {figure.key: figure.as_table() for figure in figures},
         "reached": all_reached(figures),
-        "refused": {part: one.marked("end")[0]["refused"] for part, one in parts.items()},
+        "refused": {part: end["refused"] for part, end in ends.items()},
+        "notices": notices,
         "recordings": [str(path) for path in sorted(folder.glob("*/*.mcap"))],
         "truth": [str(path) for path in sorted(folder.glob("*/truth.log"))],
         "picture": str(folder / PICTURE),
-        "lines": [figure.line() for figure in figures],
+        "lines": [
+            *(figure.line() for figure in figures),
+            *(f"note: {text}" for text in dict.fromkeys(chain(*notices.values()))),
+        ],
     }
     kept = {key: value for key, value in result.items() if key != "lines"}
     (folder / FIGURES).write_text(to_json(kept, indent=1), encoding="utf-8")

@@ -137,7 +137,7 @@ class PlatformParts:
         """Return what an operator should know of the robot."""
         broken = self.last_stop.broken
         mend = f"{broken}: mend the cable, then `cdpr tighten --from home`" if broken else ""
-        return [text for text in (mend, self.control.load_cell_fault, self.off_home) if text]
+        return [text for text in (mend, *self.control.notices(), self.off_home) if text]
 
     def lengths_disagree(self) -> tuple[float, int]:
         """Return how far the lengths are from agreeing, and which cable's is off; 0 while slack."""

@@ -35,6 +35,7 @@ from cdpr_rt.robots.platform.control_rows import (
 from cdpr_rt.robots.platform.design.designed_loop import designed_loop
 from cdpr_rt.robots.platform.learning.motor_learning import MotorLearning
 from cdpr_rt.robots.platform.learning.pull_fit import PullFit
+from cdpr_rt.robots.platform.oscillation import Oscillation
 from cdpr_rt.robots.platform.place_checks import PlaceChecks
 from cdpr_rt.robots.platform.shaped_setpoint import ShapedSetpoint
 from cdpr_rt.robots.platform_model import PlatformModel
@@ -105,6 +106,10 @@ class CableControl(PlaceChecks):
         self._bind_pose(moves)
         self._bind_force(moves)
         self._bind_tensions()
+        self._oscillation = Oscillation(
+            [axis.name for axis in axes], model.reserve_N, self.tension_N, self._feedforward_N,
+            period_s,
+        )  # fmt: skip
 
     def _design(self, axes: Sequence[RobotAxis]) -> None:
         """Design the loop for the platform and its motors."""
@@ -236,14 +241,14 @@ class CableControl(PlaceChecks):
             self._period_s, self._check, self._W, self._wrench, learnt_Nm, self._rise_N,
         )  # fmt: skip
 
-    @property
-    def load_cell_fault(self) -> str:
-        """Which load cell is off and by how much; stays until `clear_load_cell_fault`."""
-        return self._check.trouble
+    def notices(self) -> list[str]:
+        """Return which load cell is off, and whether the loop oscillates; until `clear_notices`."""
+        return [text for text in (self._check.trouble, self._oscillation.trouble) if text]
 
-    def clear_load_cell_fault(self) -> None:
-        """Forget which load cell was off."""
+    def clear_notices(self) -> None:
+        """Forget what was found of load cells and loop."""
         self._check.clear()
+        self._oscillation.clear()
 
     def update(self, feedback: AxisFeedback, setpoint: Setpoint, torque_Nm: FloatArray) -> None:
         """Write torques and the axes' set-points for the platform's present set-point."""
@@ -261,6 +266,7 @@ class CableControl(PlaceChecks):
             self._distribution.solve(self._W, self._wrench, self._feedforward_N)
         self.outcome, self.share, null_directions = self._split()
         self._limited = self._drive(null_directions, slope, torque_Nm)
+        self._oscillation.update()
 
     def _was_exerted(self) -> bool:
         """Return whether the last cycle's force was had from the cables, all of it."""

@@ -112,11 +112,13 @@ class IdealControl:
     def pose(self) -> FloatArray:
         return seven(self.model, self.estimated)
 
-    load_cell_fault = ""
     learnt_Nm = None
     pull_fit = NothingFound()
 
-    def clear_load_cell_fault(self) -> None: ...
+    def notices(self) -> list[str]:
+        return []
+
+    def clear_notices(self) -> None: ...
 
     def measure_tensions(self, tension_N: FloatArray, measured: BoolArray) -> None: ...
     def forget_motors(self) -> None: ...

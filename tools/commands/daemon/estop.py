@@ -25,6 +25,9 @@ def estop(
         str | None,
         typer.Argument(metavar="[ROBOT]", help="Which robot, where several daemons run."),
     ] = None,
+    named: Annotated[
+        str | None, typer.Option("--robot", help="ROBOT, as the other commands are told.")
+    ] = None,
     every: Annotated[
         bool, typer.Option("--all", help="Every robot whose daemon is found.")
     ] = False,
@@ -38,7 +41,8 @@ def estop(
     status 1. It is no emergency stop in the sense of a safety standard: the button is.
     """
     out = Output(as_json)
-    stops = [EmergencyStop(path) for path in _chosen(robot, every, socket)]  # all, then wait
+    # all, then wait
+    stops = [EmergencyStop(path) for path in _chosen((robot, named), every, socket)]
     outcomes = []
     for one in stops:
         with closing(one):
@@ -52,10 +56,12 @@ def estop(
         raise typer.Exit(FAILED)
 
 
-def _chosen(robot: str | None, every: bool, socket: Path | None) -> list[Path]:
+def _chosen(robots: tuple[str | None, ...], every: bool, socket: Path | None) -> list[Path]:
     """Return the files of the loops that are meant; raises BadInputError, WorkFailedError."""
-    if sum((robot is not None, every, socket is not None)) > 1:
+    named = {name for name in robots if name is not None}
+    if len(named) + every + (socket is not None) > 1:
         raise BadInputError("ROBOT, --all and --socket: one of them")
+    robot = named.pop() if named else None
     if socket is not None:
         return [LoopFile.beside(socket)]
     found = find_loop_files(robot)

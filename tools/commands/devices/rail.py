@@ -47,7 +47,7 @@ def show(rail: _RailArgument, bus: _BusOption = None, as_json: JsonOption = Fals
     profile = load_rail(rail)
     position = position_of(rail, profile, bus)
     state = calibration_state(profile.robot)
-    out.say(f"{profile.name}: {position:.4f} m")
+    out.say(f"{profile.name}: {position:z.4f} m")
     known = "calibrated" if state.calibrated else "NOT calibrated"
     since = f" since {state.date}" if state.date else ""
     out.say(f"robot {state.robot}: {known}{since}: {state.why}")
@@ -137,7 +137,7 @@ def move_(
                     lambda here: advance(abs(here - begun) / profile.speed_m_s),
                 ),
             )
-    out.say(f"{profile.name}: from {done.from_m:.4f} m to {done.to_m:.4f} m, braked")
+    out.say(f"{profile.name}: from {done.from_m:z.4f} m to {done.to_m:z.4f} m, braked")
     if done.brake_moved_m is None:
         out.say("the brake could not be tried: this drive cannot push")
     out.say(f"robot {profile.robot} is not calibrated any more")

@@ -19,7 +19,7 @@ from cdpr_tools.trials.streams import streaming
 _AXES = (
     "#2f6fb0", "#d1581a", "#3b8f5a", "#7a3fa0", "#1f8a8a", "#b03a5b", "#8a6d1f", "#8a8f98",
 )  # fmt: skip
-_TRUE, _SETPOINT, _BOUND = "#2f6fb0", "#d1581a", "#b02f2f"
+_TRUE, _SETPOINT, _BOUND, _BOX = "#2f6fb0", "#d1581a", "#b02f2f", "#7a3fa0"
 _STYLES = {"solid": "-", "dashed": "--", "dotted": ":"}
 _EXCERPT_S = 12.0
 _VIEWS = {2: ((0, 1),), 3: ((0, 1), (0, 2))}
@@ -43,7 +43,7 @@ def of_targets(recorded: Recorded) -> Figure:
     axes[1].set_title("targets")
     if len(turned):
         _orientations(axes[-2], axes[-1], recorded, turned)
-    legend_above(figure, *axes[:2], columns=5)
+    legend_above(figure, *axes[:2], columns=3)
     return figure
 
 
@@ -235,7 +235,9 @@ def _ways(ax: Axes, recorded: Recorded, view: tuple[int, int]) -> None:
     name, other = (directions.names[i] for i in view)
     ax.plot(*recorded.true_m[::20, view].T, color="#bbbbbb", lw=0.4, label="way of the platform")
     low, high = directions.low_m[list(view)], directions.high_m[list(view)]
-    ax.add_patch(Rectangle((low[0], low[1]), *(high - low), fill=False, color="#777777", ls="--"))
+    box = Rectangle((low[0], low[1]), *(high - low), fill=False, color=_BOX, ls="--")
+    box.set_label("box of targets")
+    ax.add_patch(box)
     ax.set_aspect("equal", "datalim")
     ax.autoscale_view()
     ax.set(xlabel=f"{name} (m)", ylabel=f"{other} (m)")

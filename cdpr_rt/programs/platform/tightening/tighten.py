@@ -120,7 +120,7 @@ class TightenProgram(PlatformProgram):
         self._slack.begin(feedback.position_rad)
         self._winches.begin(feedback, parts.estimator.estimate.velocity_rad_s, torque_Nm)
         self._control.clear_compensation()
-        self._control.clear_load_cell_fault()
+        self._control.clear_notices()
         self._share = min(
             max(float(np.max(-torque_Nm / self._cable / self._pretension_N)), 0.0), 1.0
         )

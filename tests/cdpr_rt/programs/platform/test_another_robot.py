@@ -99,7 +99,7 @@ class Carriage:
 class BeltControl:
     """A PD loop for each motor; a post stands where the carriage may not go."""
 
-    load_cell_fault, learnt_Nm = "", None
+    learnt_Nm = None
     swing_rad = swing_m = 0.0
 
     def __init__(self) -> None:
@@ -114,9 +114,12 @@ class BeltControl:
     def pose(self) -> FloatArray:
         return np.array([*self.estimated, 0.0, 1.0, 0.0, 0.0, 0.0])
 
+    def notices(self) -> list[str]:
+        return []
+
     def reset(self) -> None: ...
     def forget_motors(self) -> None: ...
-    def clear_load_cell_fault(self) -> None: ...
+    def clear_notices(self) -> None: ...
     def clear_compensation(self) -> None: ...
 
     pull_fit = NothingFound()

@@ -1,0 +1,38 @@
+"""Drives whose answers are older than their profile says make a loop oscillate: it is told."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cdpr_rt.core.states import LoopState
+from cdpr_tools.trials.lockstep import LockstepRobot
+
+pytestmark = pytest.mark.long
+
+
+@pytest.mark.parametrize(("answer_s", "oscillates"), [(0.0005, False), (0.0055, True)])
+def test_it_is_told_while_it_runs(tmp_path: Path, answer_s: float, oscillates: bool) -> None:
+    plant = tmp_path / "plant.toml"
+    plant.write_text(f"[motor.drive]\nfeedback_delay_s = {answer_s}\n")
+    with LockstepRobot("planar-4", plant=plant) as robot:
+        robot.enable()
+        robot.carry_out("tighten")
+        robot.carry_out("pose", position_m=[0.0, 1.96])
+        tension_N = []
+        for _ in range(900):
+            robot.turn(2)
+            tension_N.append(robot.truth()["tension_N"].copy())
+        assert robot.state is LoopState.ACTIVE, robot.state_text()
+        told = robot.status["notices"]
+        assert bool(np.ptp(tension_N, axis=0).max() > 25.0) is oscillates
+        if not oscillates:
+            assert not told
+            return
+        (notice,) = told
+        assert notice.startswith("the platform's loop oscillates by itself, at 3")
+        robot.carry_out("lower")
+        robot.program("tighten")  # begins with what is known then
+        assert not robot.status["notices"]
