@@ -16,6 +16,8 @@ _LOOK_S: Final = 0.01
 _SETTLE_S: Final = 0.3
 _EXTRA_TIME_S: Final = 3.0
 """Time that a move may take beyond twice its nominal time."""
+_ANSWERS_S: Final = 0.2
+_VOIDED: Final = "; the robot is not calibrated any more"
 
 
 class RailError(DriverError):
@@ -101,8 +103,12 @@ def move(
     try:
         axis.set_brake(False)
         pushed_m = _test_brake(rail, axis, clock)
+        _stop_on_request(rail, conditions, voided="")
         _void_calibration(rail, clock, f"{rail.name} was moved from {start_m:.4f} m")
-        _refuse(rail, conditions)  # all may have changed while the disk took its time
+        # what is known of others is as old as the disk was slow: ask, and wait for the answers
+        _refuse(rail, conditions, voided=_VOIDED)
+        clock.sleep(_ANSWERS_S)
+        _refuse(rail, conditions, voided=_VOIDED)
         axis.check()
         _stop_on_request(rail, conditions)
         axis.enable()
@@ -130,20 +136,16 @@ def _void_calibration(rail: RailProfile, clock: Clock, why: str) -> None:
     clock.run_blocking(lambda: mark_not_calibrated(rail.robot, why))
 
 
-def _refuse(rail: RailProfile, conditions: MoveConditions) -> None:
-    cables_tight = conditions.cables_tight()
-    if cables_tight:
-        raise RailError(f"{rail.name}: not moved unless the cables are slack: {cables_tight}")
-    powered = conditions.powered()
-    if powered:
-        raise RailError(f"{rail.name}: not moved while a winch has power: {powered}")
+def _refuse(rail: RailProfile, conditions: MoveConditions, voided: str = "") -> None:
+    if tight := conditions.cables_tight():
+        raise RailError(f"{rail.name}: not moved unless the cables are slack: {tight}{voided}")
+    if powered := conditions.powered():
+        raise RailError(f"{rail.name}: not moved while a winch has power: {powered}{voided}")
 
 
-def _stop_on_request(rail: RailProfile, conditions: MoveConditions) -> None:
+def _stop_on_request(rail: RailProfile, conditions: MoveConditions, voided: str = _VOIDED) -> None:
     if conditions.stop_requested():
-        raise RailStoppedError(
-            f"{rail.name}: stopped on request; the robot is not calibrated any more"
-        )
+        raise RailStoppedError(f"{rail.name}: stopped on request{voided}")
 
 
 def _test_brake(rail: RailProfile, axis: RailAxis, clock: Clock) -> float | None:

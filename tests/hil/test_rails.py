@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 import os
 import signal
 import subprocess
@@ -11,20 +10,16 @@ import sys
 import time
 import uuid
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import canopen
 import pytest
-from click.testing import Result
-from pymodbus.client import ModbusTcpClient
+from rails_rig import Rails, another_winch
 from typer.testing import CliRunner
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "drivers" / "modbus"))
 from safety_rig import (
     CLOCK,
-    PANEL,
     SafetyIoProcess,
     board_file,
     patient_profile,
@@ -33,134 +28,21 @@ from safety_rig import (
     wait_until,
 )
 
-from cdpr_drivers.errors import DriverError
 from cdpr_drivers.modbus.safety_io import SafetyIoError
 from cdpr_drivers.rails.rail import RailError
 from cdpr_drivers.rails.rail_cia402 import Cia402RailAxis
 from cdpr_drivers.rails.rail_modbus import ModbusRailAxis
-from cdpr_profiles import load_winch
 from cdpr_profiles.catalogue import load_rail_drive
 from cdpr_profiles.devices.rail import load_rail
 from cdpr_profiles.reading.places import SHIPPED
 from cdpr_sim_bus.devices.sim_rail import RailFault
 from cdpr_sim_bus.devices.sim_safety_io import SafetyIoFault
-from cdpr_sim_bus.physics_board import BoardAxis, PhysicsBoard
+from cdpr_sim_bus.physics_board import PhysicsBoard
 from cdpr_tools import cli
 from cdpr_tools.commands.devices import rail as rail_commands
 from cdpr_tools.errors import BAD_INPUT, BadInputError
 
 FAILED = 1
-M_PER_RAD = 0.02 / math.tau
-
-
-@dataclass
-class Rails:
-    """A rail on CiA 402 with its safety I/O, one on Modbus, and the load cell of a winch."""
-
-    bus: str
-    io_device: SafetyIoProcess
-    winch: BoardAxis
-    rail: BoardAxis
-    modbus: Path
-    modbus_port: int
-    tension_port: str
-    home: Path
-
-    def pull(self, tension_N: float) -> None:
-        """Have the winch's cable carry this tension for half a second of its board's time."""
-        begun_s = self.winch.time_s
-        for step in range(1, 501):
-            self.winch.publish(begun_s + 1e-3 * step, tension_N, 0.0, 0.0, False)
-
-    def begin(self, *arguments: str | Path) -> subprocess.Popen[str]:
-        return subprocess.Popen(
-            [sys.executable, "-m", "cdpr_tools.cli", "rail", *map(str, arguments), "--json"],
-            env={**os.environ, "XDG_STATE_HOME": str(self.home)},
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            text=True,
-        )
-
-    def move(self, kind: str, to_m: float, *slack: str) -> subprocess.Popen[str]:
-        return self.begin(*self._move(kind, to_m, slack))
-
-    def moved(self, kind: str, to_m: float, *slack: str) -> Result:
-        """Move in this process, which is quicker."""
-        runner = CliRunner(env={"XDG_STATE_HOME": str(self.home)})
-        return runner.invoke(rail_commands.app, list(self._move(kind, to_m, slack)))
-
-    def refused(self, kind: str, to_m: float, *slack: str) -> str:
-        """Ask for a move in this process; return why it was refused."""
-        outcome = self.moved(kind, to_m, *slack)
-        assert isinstance(outcome.exception, DriverError), outcome.output
-        return str(outcome.exception)
-
-    def _move(self, kind: str, to_m: float, slack: tuple[str, ...]) -> tuple[str, ...]:
-        slack = slack or ("--cables-slack-checked",)
-        if kind == "modbus":
-            return ("move", str(self.modbus), "--to", str(to_m), "--yes", *slack)
-        where = ("--bus", self.bus, "--safety-io", self.io_device.reference)
-        return ("move", "rail-cia402", "--to", str(to_m), *where, *slack)
-
-    def position_m(self, kind: str) -> float:
-        """The truth, and not what a command tells."""
-        if kind == "cia402":
-            return self.rail.state().motor_rad * M_PER_RAD
-        high, low = self._registers(104, 2)
-        return (high << 16 | low) * 1e-5
-
-    def speed_at_braking(self) -> float:
-        """Wait for the brake of the CiA 402 rail; return the last speed before it closed."""
-        speed, deadline = math.inf, time.monotonic() + 60.0
-        while self.rail.brake_released:
-            speed = self.rail.state().motor_rad_s * M_PER_RAD
-            assert time.monotonic() < deadline
-            time.sleep(0.001)
-        return speed
-
-    def braked(self, kind: str) -> bool:
-        """Whether the rail stands without power on an applied brake."""
-        if kind == "cia402":
-            return not self.rail.brake_released and not self.rail.state().power_on
-        return not self._registers(111, 1)[0] & 0b10011
-
-    def wear_brake(self, kind: str) -> None:
-        if kind == "cia402":
-            self.io_device.break_(SafetyIoFault.BRAKES_WORN)
-        else:
-            self.break_modbus(RailFault.BRAKE_WORN)
-
-    def break_modbus(self, fault: RailFault) -> None:
-        with self._modbus() as panel:
-            panel.write_register(1, int(fault), device_id=PANEL)
-
-    def calibration(self) -> dict[str, Any]:
-        held: dict[str, Any] = json.loads(self._state_file().read_text())
-        return held
-
-    def forget(self) -> None:
-        """Have the robot calibrated."""
-        self._state_file().parent.mkdir(parents=True, exist_ok=True)
-        told = {"robot": "spatial-8", "calibrated": True, "why": "camera", "date": "2020-01-01"}
-        self._state_file().write_text(json.dumps(told))
-
-    def acknowledge_trip(self) -> None:
-        name = f"safety-io.io.127.0.0.1.{self.io_device.port}.json"
-        (self.home / "cdpr-rt" / name).unlink()
-
-    def _state_file(self) -> Path:
-        return self.home / "cdpr-rt" / "calibration.spatial-8.json"
-
-    def _registers(self, address: int, count: int) -> list[int]:
-        with self._modbus() as drive:  # or its connections stay, hundreds while a move is awaited
-            found: list[int] = drive.read_holding_registers(
-                address, count=count, device_id=1
-            ).registers
-        return found
-
-    def _modbus(self) -> ModbusTcpClient:
-        return ModbusTcpClient("127.0.0.1", port=self.modbus_port, timeout=60)
 
 
 @pytest.fixture(scope="module")
@@ -225,34 +107,58 @@ def test_a_move_arrives_and_voids_the_calibration(rails: Rails, kind: str) -> No
     assert state["calibrated"] is False and "was moved from" in state["why"]
 
 
-@pytest.mark.parametrize("stopped", [False, True])
-def test_while_a_slow_disk_is_written_the_drive_hears_its_master_and_ctrl_c_is_heard(
-    rails: Rails, monkeypatch: pytest.MonkeyPatch, stopped: bool
+@pytest.mark.parametrize("meanwhile", ["nothing", "Ctrl-C", "power"])
+def test_while_a_slow_disk_is_written_the_drive_hears_its_master_and_all_is_looked_at_again(
+    rails: Rails, monkeypatch: pytest.MonkeyPatch, meanwhile: str
 ) -> None:
     def slow(_fd: int) -> None:  # a busy disk cannot be had here
-        if stopped:
+        if meanwhile == "Ctrl-C" and not written:
             os.kill(os.getpid(), signal.SIGINT)
+        if meanwhile == "power":
+            power()
+        written.append(_fd)
         time.sleep(2.0 * load_rail_drive("rail-cia402", rail.cia402).heartbeat_consumer_s)
 
     def enable(axis: Cia402RailAxis) -> None:
         enabled.append(axis)
         really_enable(axis)
 
-    enabled, really_enable = list[Cia402RailAxis](), Cia402RailAxis.enable
+    enabled, really_enable, written = list[Cia402RailAxis](), Cia402RailAxis.enable, list[int]()
     rail = load_rail("rail-cia402")
     assert rail.cia402 is not None
-    monkeypatch.setattr(os, "fsync", slow)
     monkeypatch.setattr(Cia402RailAxis, "enable", enable)
     before = rails.position_m("cia402")
-    outcome = rails.moved("cia402", before + 0.005)
+    with another_winch() as (bus, power):
+        monkeypatch.setattr(os, "fsync", slow)
+        slack = ("--cables-slack-checked", "--winch-bus", bus)
+        outcome = rails.moved("cia402", before + 0.005, *slack)
     moved_m = rails.position_m("cia402") - before
-    if stopped:
-        assert "stopped on request" in str(outcome.exception)
-        assert abs(moved_m) < 2e-4 and rails.braked("cia402")  # its brake's play
-        assert not enabled
-    else:
+    if meanwhile == "nothing":
         assert outcome.exit_code == 0, outcome.exception
         assert abs(moved_m - 0.005) < 5e-4
+        return
+    why = f"not moved while a winch has power: node 1 on {bus} is" if meanwhile == "power" else ""
+    said = str(outcome.exception)
+    assert (why or "stopped on request") in said
+    assert said.endswith("; the robot is not calibrated any more")
+    assert abs(moved_m) < 2e-4 and rails.braked("cia402")  # its brake's play
+    assert not enabled
+
+
+def test_a_stop_before_the_carriage_moves_leaves_the_calibration(
+    rails: Rails, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def push(axis: Cia402RailAxis, share: float) -> bool:
+        if not pushed:
+            os.kill(os.getpid(), signal.SIGINT)
+        pushed.append(share)
+        return really_push(axis, share)
+
+    pushed, really_push = list[float](), Cia402RailAxis.push
+    monkeypatch.setattr(Cia402RailAxis, "push", push)
+    error = rails.refused("cia402", rails.position_m("cia402") + 0.3)
+    assert error.endswith("stopped on request") and pushed
+    assert rails.calibration()["calibrated"] is True and rails.braked("cia402")
 
 
 @pytest.mark.parametrize("kind", ["cia402", "modbus"])
@@ -307,31 +213,19 @@ def test_tight_cables_refuse_the_move_and_end_it(rails: Rails) -> None:
 
 def test_a_winch_with_power_refuses_the_move_and_ends_it(rails: Rails) -> None:
     before = rails.position_m("modbus")
-    bus = f"winches-{os.getpid()}-{uuid.uuid4().hex[:6]}"
-    winch = start("up", "winch-mpp0923d", "--bus", f"simbus:{bus}", "--paced")
-    ready(winch)
-    network = canopen.Network()
-    network.connect(interface="simbus", channel=bus)
-    try:
-        node = network.add_node(1, str(load_winch("winch-mpp0923d").drive.eds))
-        node.sdo.RESPONSE_TIMEOUT = 60.0
-        slack = ("--cables-slack-checked", "--winch-bus", f"simbus:{bus}")
+    with another_winch() as (bus, power):
+        slack = ("--cables-slack-checked", "--winch-bus", bus)
         command = rails.move("modbus", before + 0.5, *slack)
         await_motion(rails, "modbus", command, before + 0.005)
-        node.sdo[0x6060].raw = 4
-        for word in (6, 7, 15):
-            node.sdo[0x6040].raw = word
+        power()
         error = result(command, FAILED)["error"]
-        assert f"a winch may have power: node 1 on simbus:{bus} is" in error
+        assert f"a winch may have power: node 1 on {bus} is" in error
         assert rails.braked("modbus")
         assert rails.position_m("modbus") < before + 0.4
         before = rails.position_m("modbus")
         error = rails.refused("modbus", before + 0.1, *slack)
-        assert f"not moved while a winch has power: node 1 on simbus:{bus} is" in error
+        assert f"not moved while a winch has power: node 1 on {bus} is" in error
         assert rails.position_m("modbus") == before
-    finally:
-        network.disconnect()
-        winch.communicate(b"", timeout=120)
 
 
 def test_a_rail_on_modbus_heeds_the_safety_io_and_one_command(rails: Rails) -> None:

@@ -29,13 +29,13 @@ from cdpr_rt.robots.platform.control_rows import (
     cell_check,
     loop_settings,
     motor_rows,
+    oscillation,
     slides_on_stand,
     tracking_filters,
 )
 from cdpr_rt.robots.platform.design.designed_loop import designed_loop
 from cdpr_rt.robots.platform.learning.motor_learning import MotorLearning
 from cdpr_rt.robots.platform.learning.pull_fit import PullFit
-from cdpr_rt.robots.platform.oscillation import Oscillation
 from cdpr_rt.robots.platform.place_checks import PlaceChecks
 from cdpr_rt.robots.platform.shaped_setpoint import ShapedSetpoint
 from cdpr_rt.robots.platform_model import PlatformModel
@@ -106,10 +106,7 @@ class CableControl(PlaceChecks):
         self._bind_pose(moves)
         self._bind_force(moves)
         self._bind_tensions()
-        self._oscillation = Oscillation(
-            [axis.name for axis in axes], model.reserve_N, self.tension_N, self._feedforward_N,
-            period_s,
-        )  # fmt: skip
+        self._oscillation = oscillation(model, axes, self._motors, self.velocity, period_s)
 
     def _design(self, axes: Sequence[RobotAxis]) -> None:
         """Design the loop for the platform and its motors."""

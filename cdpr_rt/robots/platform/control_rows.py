@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -12,6 +13,7 @@ from cdpr_rt.robots.kinematics import pose_tracking as tracking
 from cdpr_rt.robots.platform import loop_kernel as loop
 from cdpr_rt.robots.platform.cell_check import CellCheck, balance_std_N
 from cdpr_rt.robots.platform.design.loop_gains import DAMPING_RATIO, LoopGains, OBSERVER_rad_s
+from cdpr_rt.robots.platform.oscillation import LEAST_COUNTS, RESERVE_SHARE, Oscillation
 from cdpr_rt.robots.platform_model import PlatformModel
 
 _REGULATOR_SHARE = 0.25
@@ -70,6 +72,32 @@ def slides_on_stand(model: PlatformModel) -> FloatArray:
         horizontal += [i for i, k in enumerate(model.kinematics.directions) if k == _YAW]
     J = -model.kinematics.wrench_matrix(model.home_pose).T
     return np.asarray((J / model.wrench_scale)[:, horizontal])
+
+
+def oscillation(
+    model: PlatformModel,
+    axes: Sequence[RobotAxis],
+    motors: FloatArray,
+    velocity: FloatArray,
+    period_s: float,
+) -> Oscillation:
+    """Return what tells that the loop swings the winches of these `motors`, rows as above.
+
+    `velocity` (d,) is the set-point's.
+    """
+    stiffness_N_m = [a.winch.cable.stiffness_N for a in axes] / model.kinematics.lengths(
+        model.home_pose
+    )
+    counts_m = [
+        math.tau * abs(a.winch.cable_m_per_motor_rad) / a.winch.encoder_counts_per_turn
+        for a in axes
+    ]
+    threshold_m = np.maximum(
+        RESERVE_SHARE * model.reserve_N / stiffness_N_m, LEAST_COUNTS * np.array(counts_m)
+    )
+    m_per_rad, theta_rad = motors[tracking.M_PER_RAD], motors[tracking.THETA]
+    names = [axis.name for axis in axes]
+    return Oscillation(names, threshold_m, m_per_rad, theta_rad, velocity, period_s)
 
 
 def cell_check(model: PlatformModel, axes: Sequence[RobotAxis], period_s: float) -> CellCheck:

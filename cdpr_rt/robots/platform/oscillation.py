@@ -1,14 +1,14 @@
-"""Whether the platform's loop oscillates by itself.
+"""Whether the platform's loop oscillates by itself at rest.
 
-A loop that works uses the reserve between planned tensions and their bounds for friction and
-errors, which change slowly. One that is not stable, as its cables damp less than they were taken
-to, its platform weighs otherwise, or answers come later, asks a cable for much more and for much
-less in turn, for as long as it has power. What it asks for is bounded; what cables truly pull with
-is not.
+Where files have damping, stiffness, mass or delays wrong, a loop that was designed to be stable may
+swing its winches to and fro for as long as it has power. What it asks for is bounded, so that
+nothing trips; what the cables truly pull with is not. It is told from the motors' angles, which
+noise and cogging do not move, and only while the set-point rests: in motion they may be driven.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -16,43 +16,50 @@ import numpy as np
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.jit import bound, jit
 
-RESERVE_SHARE = 0.5
-"""Of the reserve, how far from their mean tensions have to go to either side."""
-LEAST_Hz, LASTS_S = 5.0, 1.0
-"""From which frequency on, and for how long without a pause, they have to alternate."""
+RESERVE_SHARE, LEAST_COUNTS = 0.5, 4.0
+"""How far a winch has to swing to either side of its mean: what changes its cable's tension by this
+share of the reserve, where the platform stands still, and no less than so many counts."""
+LEAST_Hz, LASTS_S = 5.0, 3.0
+"""From which frequency on, and for how long without a pause: what rings out is none."""
 MEAN, SIDE, SINCE, CHANGES, LASTING, ROWS = range(6)
-"""Of each cable: mean of what the loop asks for, N; the side on which it was last, ±1; how long
-ago it changed sides, s; how often it has since it alternates, and for how long that is, s."""
+"""Of each motor: mean angle, rad; the side on which it was last, ±1; how long ago it changed sides,
+s; how often it has since it swings, and for how long that is, s."""
 
 
 @jit
-def alternating(
+def swinging(
     period_s: float,
-    threshold_N: float,
-    tension: FloatArray,
-    feedforward: FloatArray,
+    threshold_rad: FloatArray,
+    position_rad: FloatArray,
+    velocity: FloatArray,
     rows: FloatArray,
 ) -> int:
-    """Take in one cycle; return which cable's tension alternates, -1 for none.
+    """Take in one cycle; return which motor swings the furthest of those that do, -1 for none.
 
-    What the loop asks for are the tensions (n,) beyond those that carry the platform. `rows`
+    `threshold_rad` and `position_rad` are (n,), `velocity` (d,) is the set-point's. `rows`
     (ROWS, n) are kept from cycle to cycle.
     """
-    found, share = -1, LEAST_Hz * period_s / (1.0 + LEAST_Hz * period_s)
-    for i in range(tension.size):
-        asked_N = tension[i] - feedforward[i]
-        rows[MEAN, i] += share * (asked_N - rows[MEAN, i])
-        off_N = asked_N - rows[MEAN, i]
+    found, most, share = -1, 0.0, LEAST_Hz * period_s / (1.0 + LEAST_Hz * period_s)
+    moves = False
+    for k in range(velocity.size):
+        moves = moves or velocity[k] != 0.0
+    for i in range(position_rad.size):
+        if moves:
+            rows[MEAN, i] = position_rad[i]
+            rows[SIDE, i] = rows[SINCE, i] = rows[CHANGES, i] = rows[LASTING, i] = 0.0
+            continue
+        rows[MEAN, i] += share * (position_rad[i] - rows[MEAN, i])
+        off = (position_rad[i] - rows[MEAN, i]) / threshold_rad[i]
         rows[SINCE, i] += period_s
         rows[LASTING, i] += period_s
         if rows[SINCE, i] > 0.5 / LEAST_Hz:
             rows[SIDE, i] = rows[CHANGES, i] = rows[LASTING, i] = 0.0
-        if abs(off_N) > threshold_N and off_N * rows[SIDE, i] <= 0.0:
-            rows[SIDE, i] = 1.0 if off_N > 0.0 else -1.0
+        if abs(off) > 1.0 and off * rows[SIDE, i] <= 0.0:
+            rows[SIDE, i] = math.copysign(1.0, off)
             rows[SINCE, i] = 0.0
             rows[CHANGES, i] += 1.0
-        if rows[LASTING, i] >= LASTS_S:
-            found = i
+        if rows[LASTING, i] >= LASTS_S and abs(off) > most:
+            found, most = i, abs(off)
     return found
 
 
@@ -62,22 +69,28 @@ class Oscillation:
     def __init__(
         self,
         names: Sequence[str],
-        reserve_N: float,
-        tension_N: FloatArray,
-        feedforward_N: FloatArray,
+        threshold_m: FloatArray,
+        m_per_rad: FloatArray,
+        position_rad: FloatArray,
+        velocity: FloatArray,
         period_s: float,
     ) -> None:
-        """Take the cables' names, and the arrays of tensions (n,) that others write."""
-        self._names, self._threshold_N = tuple(names), RESERVE_SHARE * reserve_N
+        """Take the cables' names, and the arrays of angles (n,) and of the set-point's velocity.
+
+        `threshold_m` (n,) is how far each has to swing, in metres of its cable, of which a rad of
+        the motor winds `m_per_rad` (n,).
+        """
+        self._names, self._threshold_m = tuple(names), threshold_m
         self._rows = np.zeros((ROWS, len(names)))
         self._named, self._frequency_Hz = -1, 0.0
-        self._alternating = bound(
-            alternating, period_s, self._threshold_N, tension_N, feedforward_N, self._rows
+        threshold_rad = threshold_m / np.abs(m_per_rad)
+        self._swinging = bound(
+            swinging, period_s, threshold_rad, position_rad, velocity, self._rows
         )
 
     def update(self) -> None:
         """Take in one cycle."""
-        found = self._alternating()
+        found = self._swinging()
         if found >= 0 and self._named < 0:
             self._named = found
             changes, lasting_s = self._rows[CHANGES, found], self._rows[LASTING, found]
@@ -85,14 +98,15 @@ class Oscillation:
 
     @property
     def trouble(self) -> str:
-        """Which cable's tension alternates and how, an empty text for none; until `clear`."""
+        """Which winch swings and how, an empty text for none; until `clear`."""
         if self._named < 0:
             return ""
         return (
-            f"the platform's loop oscillates by itself, at {self._frequency_Hz:.0f} Hz: for "
-            f"{LASTS_S:g} s it has asked {self._names[self._named]} for {self._threshold_N:.0f} N "
-            "more and less than on average, and true tensions may leave their bounds: take the "
-            "power; do cables stretch and damp, platform weigh and drives answer as files say?"
+            f"{self._names[self._named]}: the platform's loop swings this winch by itself, for "
+            f"{LASTS_S:g} s at {self._frequency_Hz:.0f} Hz by more than "
+            f"{1e3 * self._threshold_m[self._named]:.2f} mm of cable to either side, and tensions "
+            "may leave their bounds: take the power; do cables stretch and damp, the platform "
+            "weigh and drives answer as their files say?"
         )
 
     def clear(self) -> None:

@@ -73,6 +73,7 @@ def test_figures_are_those_of_the_files(trial):
     assert [figures["mean_x_mm"], figures["mean_y_mm"]] == pytest.approx(np.abs(mean))
     assert [figures["three_sigma_x_mm"], figures["three_sigma_y_mm"]] == pytest.approx(3 * sigma)
     assert figures["worst_mm"] < 10.0
+    assert marks[-1]["mark"] == "end" and marks[-1]["notices"] == []
     assert (folder / "trial.png").read_bytes().startswith(b"\x89PNG")
 
 
@@ -83,6 +84,21 @@ def test_it_can_be_judged_again(trial, capsys):
     assert again["figures"] == told["figures"]
     with pytest.raises(BadInputError, match="holds a trial of targets, not line"):
         robot_trial.trial("planar-3", KindOfTrial.LINE, out_dir=folder, again=True)
+
+
+def test_what_the_status_tells_at_the_end_is_told(
+    trial: tuple[Path, dict[str, Any]], monkeypatch: pytest.MonkeyPatch, capsys
+):
+    def marked(recorded: Recorded, what: str) -> list[dict[str, Any]]:
+        return [mark | {"notices": ["winch 1 swings"]} for mark in really_marked(recorded, what)]
+
+    (folder, told), really_marked = trial, Recorded.marked
+    assert told["notices"] == {"run": []}
+    monkeypatch.setattr(Recorded, "marked", marked)
+    robot_trial.trial("planar-3", KindOfTrial.TARGETS, out_dir=folder, again=True, as_json=True)
+    out = capsys.readouterr()
+    assert "note: winch 1 swings" in out.out + out.err
+    assert json.loads(out.out.splitlines()[-1])["notices"] == {"run": ["winch 1 swings"]}
 
 
 @pytest.mark.parametrize("by", [1, -30])

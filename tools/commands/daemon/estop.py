@@ -25,9 +25,7 @@ def estop(
         str | None,
         typer.Argument(metavar="[ROBOT]", help="Which robot, where several daemons run."),
     ] = None,
-    named: Annotated[
-        str | None, typer.Option("--robot", help="ROBOT, as the other commands are told.")
-    ] = None,
+    named: Annotated[str | None, typer.Option("--robot", help="The same as ROBOT.")] = None,
     every: Annotated[
         bool, typer.Option("--all", help="Every robot whose daemon is found.")
     ] = False,
@@ -60,7 +58,11 @@ def _chosen(robots: tuple[str | None, ...], every: bool, socket: Path | None) ->
     """Return the files of the loops that are meant; raises BadInputError, WorkFailedError."""
     named = {name for name in robots if name is not None}
     if len(named) + every + (socket is not None) > 1:
-        raise BadInputError("ROBOT, --all and --socket: one of them")
+        raise BadInputError(
+            f"{', '.join(sorted(named))}: allowed: one robot, --all or --socket"
+            if len(named) > 1
+            else "ROBOT, --all and --socket: one of them"
+        )
     robot = named.pop() if named else None
     if socket is not None:
         return [LoopFile.beside(socket)]

@@ -308,7 +308,8 @@ class TightenProgram(PlatformProgram):
             self._let_down(feedback, torque_Nm, slack)
         elif over:
             if self._source.name == "home":
-                self._parts.off_home = self._letting_go.off_home() or self._parts.off_home
+                found = self._parts.off_home, self._letting_go.off_home()
+                self._parts.off_home = "; ".join(filter(None, found))
             self._finish(feedback, setpoint, torque_Nm)
 
     def _let_down(self, feedback: AxisFeedback, torque_Nm: FloatArray, slack: str) -> None:

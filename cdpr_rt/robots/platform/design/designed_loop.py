@@ -32,7 +32,7 @@ class _Robot:
     model: PlatformModel = field(compare=False)
 
 
-class _Kept(NamedTuple):
+class _Judged(NamedTuple):
     margins: list[LoopMargins]
     modes: tuple[Mode, ...]
     growing: tuple[Mode, ...]
@@ -48,12 +48,12 @@ class DesignedLoop:
     @property
     def margins(self) -> list[LoopMargins]:
         """Its margins there."""
-        return self._kept.margins
+        return self._judged.margins
 
     @property
     def modes(self) -> tuple[Mode, ...]:
         """The least damped mode of robot and loop there."""
-        return self._kept.modes
+        return self._judged.modes
 
     @property
     def growing_modes(self) -> tuple[Mode, ...]:
@@ -61,7 +61,7 @@ class DesignedLoop:
 
         None where no mode grows then, or they do damp no more.
         """
-        return self._kept.growing
+        return self._judged.growing
 
     @property
     def slowest_rad_s(self) -> float:
@@ -69,12 +69,12 @@ class DesignedLoop:
         return min(there.slowest_rad_s for there in self.margins)
 
     @cached_property
-    def _kept(self) -> _Kept:
-        """What only people are told, of a model made anew: tens of megabytes are not kept."""
+    def _judged(self) -> _Judged:
+        """What only people are told. The `LoopModel` is made anew, and its megabytes go again."""
         loop, gains, damping_s = _loop_model(self._robot), self.gains, self._robot.cable_damping_s
         calm = damping_s <= LITTLE_DAMPING_s or loop.dies_down(gains, LITTLE_DAMPING_s)
         growing = () if calm else loop.least_damped(gains, LITTLE_DAMPING_s)
-        return _Kept(loop.margins(gains), loop.least_damped(gains, damping_s), growing)
+        return _Judged(loop.margins(gains), loop.least_damped(gains, damping_s), growing)
 
 
 def designed_loop(model: PlatformModel, axes: Sequence[RobotAxis], period_s: float) -> DesignedLoop:

@@ -49,6 +49,20 @@ def moved(physics: Physics, targets: tuple[tuple[float, ...], ...]) -> Moved:
     return physics, legs
 
 
+def test_winches_that_swing_at_rest_are_told_until_that_is_cleared() -> None:
+    physics = Physics(planar(), RobotPlant())
+    control, feedback = physics.control, physics.feedback
+    at_rest_rad = feedback.position_rad.copy()
+    for k in range(4000):
+        turn = np.sin(2.0 * np.pi * 20.0 * k * PERIOD_S)
+        feedback.position_rad[:] = at_rest_rad + 0.2 * turn
+        control.update(feedback, physics.setpoint, physics.torque)
+    (told,) = control.notices()
+    assert "the platform's loop swings this winch by itself, for 3 s at 20 Hz" in told
+    control.clear_notices()
+    assert not control.notices()
+
+
 @pytest.fixture(scope="module")
 def in_a_plane() -> Moved:
     """A robot whose motors are unknown, after targets."""
