@@ -7,6 +7,8 @@ import pytest
 
 from cdpr_rt.programs.arguments import ProgramError
 from cdpr_rt.programs.platform.platform_program import PlatformParts
+from cdpr_rt.programs.platform.tightening.letting_go import LettingGo
+from tests.cdpr_rt.programs.ideal_platform import ROOM, IdealPlatform
 from tests.cdpr_rt.programs.platform.standing_robot import PERIOD_S, Standing
 
 
@@ -135,3 +137,16 @@ def test_lengths_that_agree_on_a_place_off_home_are_told(
     robot.loosen((0.0, 0.0, 0.0))
     handing_over(robot).until_done(10.0)
     assert not robot.parts.notices()
+
+
+def test_a_turned_platform_is_as_far_off_home_as_its_anchor_points():
+    ideal = IdealPlatform(ROOM, 10.0, 6000.0)
+    ideal.control.position[:] = ideal.model.home
+    letting_go = LettingGo(ideal.parts, np.full(8, -0.01), np.full(8, 300.0))
+    ideal.control.off[5] = np.radians(0.2)  # by 2 mm
+    assert not letting_go.off_home()
+    ideal.control.off[5] = np.radians(4.0)
+    told = letting_go.off_home()
+    assert "the platform is 0 mm from there, turned by 4.0 deg" in told
+    ideal.control.off[:] = 0.0, 0.0, 0.02, 0.0, 0.0, 0.0
+    assert "the platform is 20 mm from there, turned by 0.0 deg" in letting_go.off_home()
