@@ -27,7 +27,7 @@ CONVERGED, UNFINISHED, SINGULAR, STALLED = 0, 1, 2, 3
 TOLERANCE = 1e-9
 """A search ends where what is left to go, in m and rad, is less."""
 MOST_STEPS = 30
-_SMALL_STEP = 3.5e-5
+_SMALL_STEP = 3e-5
 _NEAR = 0.05
 _SLOW_SHARE = 0.1
 _AGREE = 1e-6
