@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from types import FrameType
 
 _STOPPING = "stopping under control; a second Ctrl-C takes the power at once"
-HELD = "the motion stops and is held, with power; `cdpr disable` or `cdpr stop` takes that"
+HELD = "the motion stops and is held, with power, which `cdpr disable` and `cdpr stop` take"
 """What a Ctrl-C does to a command that has a daemon move something."""
 
 

@@ -198,6 +198,8 @@ def test_whose_power_is_taken_is_named_where_several_run(tmp_path: Path) -> None
         assert (status, "name one of left, right" in told["error"]) == (2, True)
         assert estop("left", "--all", **env)[0] == 2
         assert estop("left", "--robot", "right", **env)[0] == 2
+        status, told = estop("letf", **env)
+        assert (status, "what runs: left, right; --all stops it" in told["error"]) == (1, True)
         assert one.status()["state"] == "ready"  # nothing was done
         status, told = estop("--all", **env)
         assert (status, len(told["robots"])) == (0, 2)

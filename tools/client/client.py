@@ -243,8 +243,10 @@ def _only_socket(robot: str | None) -> Path:
         if doing is not None:
             what = f"is still starting, {doing}" if doing else "is starting, or ending"
             raise NoDaemonError(f"the daemon{whose} {what}: it does not answer")
-        hint = f"; {where}" if (where := unsearched_folders()) else ""
-        raise NoDaemonError(f"no daemon runs{whose}; `cdpr run ROBOT` starts one{hint}")
+        others = ", ".join(path.stem for path in find_sockets() if _is_alive(path))
+        hints = others and f"what runs: {others}", unsearched_folders()
+        told = "".join(f"; {hint}" for hint in hints if hint)
+        raise NoDaemonError(f"no daemon runs{whose}; `cdpr run ROBOT` starts one{told}")
     if robot is not None:  # this user's before the system's
         return found[0]
     names = ", ".join(path.stem for path in found)

@@ -159,7 +159,7 @@ def finish(
     if status.get("reacting", "none") != "none":
         raise WorkFailedError(f"{ended_text(daemon, status)} ({status['reacting']} under way)")
     if stopped:
-        raise WorkFailedError("stopped on request; the axes hold where they are")
+        raise WorkFailedError("stopped on request, and held there")
     angles = {axis["name"]: axis.get("position_rad") for axis in status["axes"]}
     there = {"state": status["state"], "program": status["program"], "position_rad": angles}
     progress = status.get("program_progress") or {}

@@ -201,11 +201,11 @@ def faults_of(readers: Sequence[RecordingReader], columns: Columns) -> list[tupl
     first_ns, last_ns = columns["stamp_ns"][0], columns["stamp_ns"][-1]
     shown = [one for one in stamped if first_ns <= one[0] <= last_ns and is_fault(one[1])]
     reactions = [at_ns for at_ns, event in shown if event["reaction"] > Reaction.CLAMP]
-    found, reasons, last = [], Reasons(stamped), ""
+    found, reasons, told_ns = list[tuple[float, str]](), Reasons(stamped), -1
     for at_ns, event in shown:
         later = [other_ns for other_ns in reactions if other_ns > at_ns + _SEEN_ns]
-        found_reason = reasons.after(at_ns, min(later, default=math.inf))
-        reason, last = "" if found_reason == last else found_reason, found_reason or last
+        seen_ns, reason = reasons.stamped_after(at_ns, min(later, default=math.inf))
+        reason, told_ns = "" if seen_ns == told_ns else reason, max(seen_ns, told_ns)
         after_s = float(np.interp(at_ns, columns["stamp_ns"], columns[ELAPSED]))
         # it begins with the axis that the limit is of
         text = str(event["text"]).removesuffix(f" of {reason.partition(':')[0]}")
@@ -283,7 +283,7 @@ def pose_curves(columns: Columns) -> dict[str, Curves]:
     found = {label: curves for label, curves in panels.items() if curves}
     if panels["platform (m)"]:
         off = np.linalg.norm(poses[0][:, :3] - poses[1][:, :3], axis=1)
-        found["off its target (mm)"] = {"distance": (1e3 * off, np.full(off.size, np.nan))}
+        found["off its set-point (mm)"] = {"distance": (1e3 * off, np.full(off.size, np.nan))}
     return found
 
 

@@ -45,10 +45,14 @@ class Reasons:
 
         A state that follows on a reaction has that one's reason.
         """
+        return self.stamped_after(at_ns, next_ns)[1]
+
+    def stamped_after(self, at_ns: int, next_ns: float = float("inf")) -> tuple[int, str]:
+        """Return the same with its stamp, -1 for none, which tells two of the same text apart."""
         k = bisect_left(self._stamped, (at_ns - _EARLY_ns, ""))
         if k < len(self._stamped) and self._stamped[k][0] < next_ns - _EARLY_ns:
-            return self._stamped[k][1]
-        return ""
+            return self._stamped[k]
+        return -1, ""
 
 
 def is_reason(event: dict[str, Any]) -> bool:
@@ -271,7 +275,7 @@ def _run_text(run: dict[str, Any], axes: Sequence[str]) -> str:
         where = f"platform at {at} mm"
         if np.isfinite(setpoint).all():
             off_mm = 1e3 * float(np.linalg.norm(pose[:3] - setpoint[:3]))
-            where += f", {off_mm:.1f} mm from its target"
+            where += f", {off_mm:.1f} mm from its set-point"
     else:
         angles = np.degrees(np.array(run["position_rad"], float))
         where = ", ".join(f"{name} {x:.1f}" for name, x in zip(axes, angles, strict=False)) + " deg"

@@ -211,12 +211,13 @@ class _Report:
         time_s = max((ramp.time_s for ramp in ramps.values()), key=len)
         of = "true angle" if self._true else "angle on the encoder"
         drawn = (
-            ("position_error_deg", "position error (deg)", "rms_position_error_deg", "floor (rms)",
+            ("position_error_deg", "position error (deg)", "rms_position_error_deg",
+             "floor (rms, deg)",
              f"Deviation of the {of} from the ramp, increasing angle (thesis, figure 1.9)."),
-            ("effort_Nm", "PID effort (Nm)", "peak_pid_effort_Nm", "floor (peak)",
+            ("effort_Nm", "PID effort (Nm)", "peak_pid_effort_Nm", "floor (peak, Nm)",
              "What the PID had to do beside the compensation, about its mean (thesis, 1.9)."),
             ("velocity_error_deg_s", "velocity error (deg/s)", "peak_velocity_error_deg_s",
-             "floor (peak)",
+             "floor (peak, deg/s)",
              f"Deviation of the velocity of the {of} from 22 deg/s, through a 50 Hz low-pass "
              "(thesis, figure 1.10)."),
         )  # fmt: skip

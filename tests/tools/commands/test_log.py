@@ -181,7 +181,7 @@ def test_a_platform_s_pose_is_drawn_as_far_as_it_moves(tmp_path: Path) -> None:
     rows["pose"][:10] = np.nan
     curves = pose_curves({name: rows[name] for name in ("pose", "pose_setpoint")})
     assert {label: list(each) for label, each in curves.items()} == {
-        "platform (m)": ["y"], "turned (deg)": ["ry"], "off its target (mm)": ["distance"],
+        "platform (m)": ["y"], "turned (deg)": ["ry"], "off its set-point (mm)": ["distance"],
     }  # fmt: skip
     is_there, wanted = curves["turned (deg)"]["ry"]
     assert np.isnan(is_there[:10]).all()
@@ -304,7 +304,7 @@ def test_what_ran_and_what_went_wrong_are_told_with_their_times(tmp_path: Path) 
     assert [run["program"] for run in figures["runs"]] == ["hold", "pose", "hold"]
     assert [run.get("cut_short_by") for run in figures["runs"]] == [None, None, "a fault"]
     _, shown, _ = _log("info", path)
-    assert "pose: ended, platform at 300.6, 2000.0 mm, 0.6 mm from its target" in shown
+    assert "pose: ended, platform at 300.6, 2000.0 mm, 0.6 mm from its set-point" in shown
 
     selection = Selection([path], FIELDS)
     columns = selection.columns()

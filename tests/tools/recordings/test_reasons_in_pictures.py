@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import time
 from pathlib import Path
+
+import pytest
 
 from cdpr_profiles.limits.robot_limits import Limit
 from cdpr_rt.core.shared_block import RowWriter
@@ -39,3 +42,28 @@ def test_the_reason_is_told_with_the_cable_that_broke_not_with_the_winch_that_ra
         f"controlled stop by broken cable: {why}",
         "controlled stop by speed of right",
     ]
+
+
+def test_a_reason_that_comes_again_is_told_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    why = "emergency stop by cdpr estop"
+    rows = made_rows(0, 1000)
+    for begin, end, state in ((0, 300, "ACTIVE"), (300, 500, "FAULT"), (500, 700, "ACTIVE")):
+        rows["state"][begin:end] = LoopState[state]
+    rows["state"][700:] = LoopState.FAULT
+    block = block_with_clock()
+    block.write_description({"robot": "bench", "axes": [{"name": "left"}], "programs": ["hold"]})
+    recorder, writer = Recorder(block, tmp_path, "bench", reserve_bytes=0), RowWriter(block)
+    recorder.begin()
+    for begin, end, reason in ((0, 310, why), (310, 510, ""), (510, 710, why), (710, 1000, why)):
+        put(writer, rows[begin:end])
+        now_ns = int(rows["stamp_ns"][end - 1])
+        monkeypatch.setattr(time, "monotonic_ns", lambda at_ns=now_ns: at_ns)
+        block.write_status({"state": "fault" if reason else "active", "reason": reason})
+        recorder.look()
+    recorder.finish()
+    (path,) = tmp_path.iterdir()
+    selection = Selection([path], FIELDS)
+    told = [text for _, text in faults_of(selection.readers, selection.columns())]
+    assert told == [f"state fault: {why}", f"state fault: {why}"]

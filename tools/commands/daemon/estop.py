@@ -58,10 +58,9 @@ def _chosen(robots: tuple[str | None, ...], every: bool, socket: Path | None) ->
     """Return the files of the loops that are meant; raises BadInputError, WorkFailedError."""
     named = {name for name in robots if name is not None}
     if len(named) + every + (socket is not None) > 1:
+        given = [*sorted(named), *["--all"] * every, *["--socket"] * (socket is not None)]
         raise BadInputError(
-            f"{', '.join(sorted(named))}: allowed: one robot, --all or --socket"
-            if len(named) > 1
-            else "ROBOT, --all and --socket: one of them"
+            f"{', '.join(given)}: nothing was stopped; allowed: one robot, --all or --socket"
         )
     robot = named.pop() if named else None
     if socket is not None:
@@ -69,8 +68,10 @@ def _chosen(robots: tuple[str | None, ...], every: bool, socket: Path | None) ->
     found = find_loop_files(robot)
     if not found:
         whose = "" if robot is None else f" for {robot}"
-        hint = f"; {where}" if (where := unsearched_folders()) else ""
-        raise WorkFailedError(f"no daemon's loop was found{whose}: nothing was stopped{hint}")
+        others = ", ".join(path.stem for path in find_loop_files() if _lives(path))
+        hints = others and f"what runs: {others}; --all stops it", unsearched_folders()
+        told = "".join(f"; {hint}" for hint in hints if hint)
+        raise WorkFailedError(f"no daemon's loop was found{whose}: nothing was stopped{told}")
     if every or robot is not None or len(found) == 1:
         return found
     live = [path for path in found if _lives(path)]
