@@ -133,9 +133,7 @@ def load_robot(name: str | Path) -> Robot:
         path=resolved(path),
         axes=tuple(axes),
         safety_io=_device(path, "safety_io", load_safety_io, file.safety_io),
-        tension_sensors=_device(
-            path, "tension_sensors", load_tension_sensors, file.tension_sensors
-        ),
+        tension_sensors=_tension_sensors(path, file),
         rails=tuple(_beside(path, name) for name in file.rails),
         **{
             key: getattr(file, key)
@@ -247,6 +245,18 @@ def _device(robot: Path, key: str, load: Callable[[str], object], name: str | No
         if Path(error.file).is_absolute():
             raise
         raise ProfileError(robot, key, error.problem) from None
+    return reference
+
+
+def _tension_sensors(robot: Path, file: RobotFile) -> str | None:
+    """Return the reference to the load cells that a robot's file names; raises ProfileError."""
+    key, axes = "tension_sensors", len(file.axes)
+    reference = _device(robot, key, load_tension_sensors, file.tension_sensors)
+    if reference is not None:
+        count = len(load_tension_sensors(reference).sensors)
+        if count > axes:
+            named = f"{file.tension_sensors} has {count} sensors"
+            raise ProfileError(robot, key, f"{named}; allowed: up to {axes}, one for each axis")
     return reference
 
 

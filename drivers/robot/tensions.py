@@ -31,11 +31,6 @@ class RobotTensions:
                 f"--tension-port {port}: {robot.path} names no sensors (key tension_sensors)"
             )
         self._profile = load_tension_sensors(robot.tension_sensors)
-        sensors, axes = len(self._profile.sensors), len(robot.axes)
-        if sensors > axes:
-            raise ConfigurationError(
-                f"{robot.tension_sensors}: {sensors} sensors; allowed: up to {axes}"
-            )
 
     def open(self, stack: ExitStack, clock: Clock) -> None:
         """Begin to read, until `stack` ends it; raises ModbusError for a sensor that is silent."""

@@ -106,10 +106,14 @@ def test_devices_beside_the_drives_are_found_from_anywhere(tmp_path: Path):
     robot = load_robot(robot_file(tmp_path, top=top, node=1))
     assert robot.safety_io == f"{tmp_path / 'io.toml'}@127.0.0.1:1502"
     assert robot.rails == ("rail-modbus", str(tmp_path / "sub/mine.toml"))
-    named = robot_file(tmp_path, top='tension_sensors = "rtu-load-cells-8"')
-    assert load_robot(named).tension_sensors == "rtu-load-cells-8"
+    named = robot_file(tmp_path, top='tension_sensors = "rtu-load-cell-1"')
+    assert load_robot(named).tension_sensors == "rtu-load-cell-1"
     wrong = robot_file(tmp_path, top='tension_sensors = "rtu-load-cell-8"')
     with pytest.raises(ProfileError, match="did you mean 'rtu-load-cells-8'") as caught:
+        load_robot(wrong)
+    assert (caught.value.file, caught.value.key) == (str(wrong), "tension_sensors")
+    wrong = robot_file(tmp_path, top='tension_sensors = "rtu-load-cells-8"')
+    with pytest.raises(ProfileError, match="8 sensors; allowed: up to 2, one for each") as caught:
         load_robot(wrong)
     assert (caught.value.file, caught.value.key) == (str(wrong), "tension_sensors")
 

@@ -147,17 +147,30 @@ def trial_run(
         robot, plant=plant, record=folder, truth_log=folder / TRUTH, **options
     ) as rig:
         run = TrialRun(rig, np.random.default_rng(seed), advance)
-        run.start_up()
+        with _with_notices(rig):
+            run.start_up()
         home_rad = platform_of(rig.robot).home_rotation_rad
         run.mark(
             "begin", sync_offset=rig.sync_offset, robot=robot, seed=seed, home_rotation_rad=home_rad
         )
-        yield run
+        with _with_notices(rig):
+            yield run
         run.mark("end", refused=run.refused, notices=rig.status["notices"])
         rig.turn()  # the last cycle is in the recording as well
     recorder = rig.recorder
     if recorder is not None and (status := recorder.status())["error"]:
         raise WorkFailedError(str(status["error"]))
+
+
+@contextmanager
+def _with_notices(rig: LockstepRobot) -> Iterator[None]:
+    """Have what ends the block tell what the robot's status would have told besides."""
+    try:
+        yield
+    except WorkFailedError as error:
+        for text in rig.status["notices"]:
+            error.add_note(text)
+        raise
 
 
 def _require_empty(folder: Path) -> None:

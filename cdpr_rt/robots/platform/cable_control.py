@@ -263,7 +263,7 @@ class CableControl(PlaceChecks):
             self._distribution.solve(self._W, self._wrench, self._feedforward_N)
         self.outcome, self.share, null_directions = self._split()
         self._limited = self._drive(null_directions, slope, torque_Nm)
-        self._oscillation.update()
+        self._oscillation.update(setpoint.position_rad)
 
     def _was_exerted(self) -> bool:
         """Return whether the last cycle's force was had from the cables, all of it."""

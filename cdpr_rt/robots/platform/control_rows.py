@@ -13,7 +13,7 @@ from cdpr_rt.robots.kinematics import pose_tracking as tracking
 from cdpr_rt.robots.platform import loop_kernel as loop
 from cdpr_rt.robots.platform.cell_check import CellCheck, balance_std_N
 from cdpr_rt.robots.platform.design.loop_gains import DAMPING_RATIO, LoopGains, OBSERVER_rad_s
-from cdpr_rt.robots.platform.oscillation import LEAST_COUNTS, RESERVE_SHARE, Oscillation
+from cdpr_rt.robots.platform.oscillation import LEAST_COUNTS, RESERVE_SHARES, Oscillation
 from cdpr_rt.robots.platform_model import PlatformModel
 
 _REGULATOR_SHARE = 0.25
@@ -93,7 +93,7 @@ def oscillation(
         for a in axes
     ]
     threshold_m = np.maximum(
-        RESERVE_SHARE * model.reserve_N / stiffness_N_m, LEAST_COUNTS * np.array(counts_m)
+        np.outer(RESERVE_SHARES, model.reserve_N / stiffness_N_m), LEAST_COUNTS * np.array(counts_m)
     )
     m_per_rad, theta_rad = motors[tracking.M_PER_RAD], motors[tracking.THETA]
     names = [axis.name for axis in axes]

@@ -1,9 +1,9 @@
-"""Whether the platform's loop oscillates by itself at rest.
+"""Whether the platform's loop oscillates by itself.
 
 Where files have damping, stiffness, mass or delays wrong, a loop that was designed to be stable may
-swing its winches to and fro for as long as it has power. What it asks for is bounded, so that
+swing its winches to and fro for as long as it has power. What it asks for is bounded, so that often
 nothing trips; what the cables truly pull with is not. It is told from the motors' angles, which
-noise and cogging do not move, and only while the set-point rests: in motion they may be driven.
+noise does not move. In motion cogging drives them too: they have to swing further there.
 """
 
 from __future__ import annotations
@@ -16,51 +16,60 @@ import numpy as np
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.jit import bound, jit
 
-RESERVE_SHARE, LEAST_COUNTS = 0.5, 4.0
-"""How far a winch has to swing to either side of its mean: what changes its cable's tension by this
-share of the reserve, where the platform stands still, and no less than so many counts."""
-LEAST_Hz, LASTS_S = 5.0, 3.0
-"""From which frequency on, and for how long without a pause: what rings out is none."""
+AT_REST, ALWAYS = 0, 1
+"""While the set-point rests, and whatever it does."""
+RESERVE_SHARES, LEAST_COUNTS = (0.5, 1.5), 4.0
+"""How far a winch has to swing to either side of its mean, in each case: what changes its cable's
+tension by this share of the reserve, where the platform stands still; and no less than so many
+counts."""
+LEAST_Hz, LASTS_S = 5.0, (3.0, 1.0)
+"""From which frequency on, and for how long without a pause in each case: what rings out after a
+motion is none."""
 MEAN, SIDE, SINCE, CHANGES, LASTING, ROWS = range(6)
-"""Of each motor: mean angle, rad; the side on which it was last, ±1; how long ago it changed sides,
-s; how often it has since it swings, and for how long that is, s."""
+"""Of each motor: mean distance from its set-point, rad; the side on which it was last, ±1; how long
+ago it changed sides, s; how often it has since it swings, and for how long that is, s."""
 
 
 @jit
 def swinging(
     period_s: float,
+    lasts_s: tuple[float, float],
     threshold_rad: FloatArray,
     position_rad: FloatArray,
     velocity: FloatArray,
     rows: FloatArray,
-) -> int:
-    """Take in one cycle; return which motor swings the furthest of those that do, -1 for none.
+    setpoint_rad: FloatArray,
+) -> tuple[int, int]:
+    """Take in one cycle; return the case and the motor that swings the furthest, -1 for none.
 
-    `threshold_rad` and `position_rad` are (n,), `velocity` (d,) is the set-point's. `rows`
-    (ROWS, n) are kept from cycle to cycle.
+    `position_rad` and `setpoint_rad` are (n,), `velocity` (d,) is the set-point's.
+    `threshold_rad` (2, n) and `rows` (2, ROWS, n), kept from cycle to cycle, are those of each
+    case.
     """
-    found, most, share = -1, 0.0, LEAST_Hz * period_s / (1.0 + LEAST_Hz * period_s)
-    moves = False
+    share = LEAST_Hz * period_s / (1.0 + LEAST_Hz * period_s)
+    case, found, most, moves = ALWAYS, -1, 0.0, False
     for k in range(velocity.size):
         moves = moves or velocity[k] != 0.0
-    for i in range(position_rad.size):
-        if moves:
-            rows[MEAN, i] = position_rad[i]
-            rows[SIDE, i] = rows[SINCE, i] = rows[CHANGES, i] = rows[LASTING, i] = 0.0
-            continue
-        rows[MEAN, i] += share * (position_rad[i] - rows[MEAN, i])
-        off = (position_rad[i] - rows[MEAN, i]) / threshold_rad[i]
-        rows[SINCE, i] += period_s
-        rows[LASTING, i] += period_s
-        if rows[SINCE, i] > 0.5 / LEAST_Hz:
-            rows[SIDE, i] = rows[CHANGES, i] = rows[LASTING, i] = 0.0
-        if abs(off) > 1.0 and off * rows[SIDE, i] <= 0.0:
-            rows[SIDE, i] = math.copysign(1.0, off)
-            rows[SINCE, i] = 0.0
-            rows[CHANGES, i] += 1.0
-        if rows[LASTING, i] >= LASTS_S and abs(off) > most:
-            found, most = i, abs(off)
-    return found
+    for j in range(2):
+        for i in range(position_rad.size):
+            off = position_rad[i] - setpoint_rad[i]
+            if moves and j == AT_REST:
+                rows[j, :, i] = 0.0
+                rows[j, MEAN, i] = off
+                continue
+            rows[j, MEAN, i] += share * (off - rows[j, MEAN, i])
+            off = (off - rows[j, MEAN, i]) / threshold_rad[j, i]
+            rows[j, SINCE, i] += period_s
+            rows[j, LASTING, i] += period_s
+            if rows[j, SINCE, i] > 0.5 / LEAST_Hz:
+                rows[j, SIDE, i] = rows[j, CHANGES, i] = rows[j, LASTING, i] = 0.0
+            if abs(off) > 1.0 and off * rows[j, SIDE, i] <= 0.0:
+                rows[j, SIDE, i] = math.copysign(1.0, off)
+                rows[j, SINCE, i] = 0.0
+                rows[j, CHANGES, i] += 1.0
+            if rows[j, LASTING, i] >= lasts_s[j] and abs(off) > most:
+                case, found, most = j, i, abs(off)
+    return case, found
 
 
 class Oscillation:
@@ -77,39 +86,40 @@ class Oscillation:
     ) -> None:
         """Take the cables' names, and the arrays of angles (n,) and of the set-point's velocity.
 
-        `threshold_m` (n,) is how far each has to swing, in metres of its cable, of which a rad of
-        the motor winds `m_per_rad` (n,).
+        `threshold_m` (2, n) is how far each has to swing at rest, and always, in metres of its
+        cable, of which a rad of the motor winds `m_per_rad` (n,).
         """
         self._names, self._threshold_m = tuple(names), threshold_m
-        self._rows = np.zeros((ROWS, len(names)))
-        self._named, self._frequency_Hz = -1, 0.0
+        self._rows = np.zeros((2, ROWS, len(names)))
         threshold_rad = threshold_m / np.abs(m_per_rad)
         self._swinging = bound(
-            swinging, period_s, threshold_rad, position_rad, velocity, self._rows
-        )
+            swinging, period_s, LASTS_S, threshold_rad, position_rad, velocity, self._rows,
+            then=(position_rad,),
+        )  # fmt: skip
+        self._found: tuple[int, int, float] | None = None
 
-    def update(self) -> None:
-        """Take in one cycle."""
-        found = self._swinging()
-        if found >= 0 and self._named < 0:
-            self._named = found
-            changes, lasting_s = self._rows[CHANGES, found], self._rows[LASTING, found]
-            self._frequency_Hz = 0.5 * float(changes / lasting_s)
+    def update(self, setpoint_rad: FloatArray) -> None:
+        """Take in one cycle, with the motors' set-points (n,)."""
+        case, found = self._swinging(setpoint_rad)
+        if found >= 0 and self._found is None:
+            changes, lasting_s = self._rows[case, [CHANGES, LASTING], found]
+            self._found = case, found, 0.5 * float(changes / lasting_s)
 
     @property
     def trouble(self) -> str:
         """Which winch swings and how, an empty text for none; until `clear`."""
-        if self._named < 0:
+        if self._found is None:
             return ""
+        case, i, frequency_Hz = self._found
         return (
-            f"{self._names[self._named]}: the platform's loop swings this winch by itself, for "
-            f"{LASTS_S:g} s at {self._frequency_Hz:.0f} Hz by more than "
-            f"{1e3 * self._threshold_m[self._named]:.2f} mm of cable to either side, and tensions "
+            f"{self._names[i]}: the platform's loop swings this winch by itself, for "
+            f"{LASTS_S[case]:g} s at {frequency_Hz:.0f} Hz by more than "
+            f"{1e3 * self._threshold_m[case, i]:.2f} mm of cable to either side, and tensions "
             "may leave their bounds: take the power; do cables stretch and damp, the platform "
             "weigh and drives answer as their files say?"
         )
 
     def clear(self) -> None:
         """Forget that it did."""
-        self._named = -1
+        self._found = None
         self._rows[:] = 0.0

@@ -32,7 +32,7 @@ def test_it_is_told_while_it_runs(tmp_path: Path, answer_s: float, oscillates: b
             assert not told
             return
         (notice,) = told
-        assert ": the platform's loop swings this winch by itself, for 3 s at 3" in notice
+        assert ": the platform's loop swings this winch by itself, for 1 s at 3" in notice
         robot.carry_out("lower")
         robot.program("tighten")  # begins with what is known then
         assert not robot.status["notices"]

@@ -141,3 +141,16 @@ def test_an_earlier_trial_is_not_written_over(trial):
     folder, _ = trial
     with pytest.raises(BadInputError, match="holds something already"):
         robot_trial.trial("planar-3", KindOfTrial.TARGETS, minutes=0.1, out_dir=folder)
+
+
+def test_angles_of_motors_that_swing_fast_may_be_old(trial):
+    recorded = Recorded(trial[0] / "run")
+    time_s, rad_s = recorded.time_s[:, None], 2.0 * np.pi * 36.0
+    recorded.truth["motor_rad"] = 0.2 * np.sin(rad_s * time_s)
+    for age_s in (0.0005, 0.005):
+        recorded.cycles["position_rad"] = 0.2 * np.sin(rad_s * (time_s - age_s))
+        recorded._require_alignment()
+    for age_s in (-0.002, 0.012, 0.05):
+        recorded.cycles["position_rad"] = 0.2 * np.sin(rad_s * (time_s - age_s))
+        with pytest.raises(WorkFailedError, match="do not belong together"):
+            recorded._require_alignment()

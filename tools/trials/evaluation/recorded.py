@@ -124,7 +124,7 @@ class Recorded:
         """Raise WorkFailedError where the motors' angles are not those that were true then.
 
         A drive's angle is a little old when SYNC latches it, and never from the future: what
-        angles lack in proportion to speed is that age.
+        angles lack in proportion to speed is that age. Of motors that swing fast they lack more.
         """
         measured, true = self.cycles["position_rad"], self.truth["motor_rad"]
         speed = np.gradient(true, self.period_s, axis=0)
@@ -135,7 +135,8 @@ class Recorded:
         rest = rms((off - age_s * speed).ravel())
         uncertain_s = 0.25 * self.period_s + 5.0 * rest / np.sqrt(moved)
         old = -uncertain_s <= age_s <= _OLDEST_S + uncertain_s
-        if not old or not rest < _MISFIT_rad:
+        swings_rad = age_s**2 * rms(np.gradient(speed, self.period_s, axis=0).ravel())
+        if not old or not rest < _MISFIT_rad + swings_rad:
             raise WorkFailedError(
                 f"{self.folder}: recording and {TRUTH} do not belong together: the motors' angles "
                 "are not those of the same SYNCs"

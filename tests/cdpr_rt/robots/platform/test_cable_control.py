@@ -58,7 +58,7 @@ def test_winches_that_swing_at_rest_are_told_until_that_is_cleared() -> None:
         feedback.position_rad[:] = at_rest_rad + 0.2 * turn
         control.update(feedback, physics.setpoint, physics.torque)
     (told,) = control.notices()
-    assert "the platform's loop swings this winch by itself, for 3 s at 20 Hz" in told
+    assert "the platform's loop swings this winch by itself, for 1 s at 20 Hz" in told
     control.clear_notices()
     assert not control.notices()
 
