@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import os
+import struct
 import subprocess
 import sys
 import time
@@ -153,11 +154,13 @@ def another_winch() -> Iterator[tuple[str, Callable[[], None]]]:
     network.connect(interface="simbus", channel=bus)
     node = network.add_node(1, str(load_winch("winch-mpp0923d").drive.eds))
     node.sdo.RESPONSE_TIMEOUT = 60.0
+    node.sdo[0x6060].raw = 4
 
-    def power() -> None:
-        node.sdo[0x6060].raw = 4
+    def power() -> None:  # by PDO: who is asked for power by SDO has one channel for all
+        node.nmt.state = "OPERATIONAL"
         for word in (6, 7, 15):
-            node.sdo[0x6040].raw = word
+            network.send_message(0x201, struct.pack("<Hh", word, 0))
+            network.sync.transmit()
 
     try:
         yield f"simbus:{bus}", power
