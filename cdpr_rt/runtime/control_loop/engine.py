@@ -23,6 +23,8 @@ from cdpr_rt.runtime.right import RightToMove
 IDLE: Final = "idle"
 HOLD: Final = "hold"
 TURN_S: Final = 0.005
+_TOO_OLD_ns: Final = 100_000_000
+"""Age of answers from which on no torque is sent that was computed from them."""
 """Duration of a turn while no cycles run."""
 
 Judge = Callable[[Cycle, FloatArray], int]
@@ -142,6 +144,8 @@ class Engine:
             self.program_error = f"program {program.name}: {type(error).__name__}: {error}"
         self.asked_Nm[:] = torque
         self.reaction = judge(cycle, torque)
+        if not device.lockstep and time.monotonic_ns() - came_ns > _TOO_OLD_ns:
+            torque[:] = 0.0  # of a process that was stopped meanwhile, whose drives have let go
         try:
             cycle.transmit()
         except machine.failures as error:

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import time
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from cdpr_rt.arrays import FloatArray
 from cdpr_rt.control.proportional import Proportional
-from cdpr_rt.core.exchange import Setpoint
+from cdpr_rt.core.exchange import AxisFeedback, Setpoint
 from cdpr_rt.core.states import LoopState
 from cdpr_rt.errors import InterruptedMotionError, RawLogError, TripError
 from cdpr_rt.identification.rawlog import read_raw_log
@@ -368,3 +370,32 @@ def test_a_cycle_that_is_held_up_is_counted_and_makes_none_run_in_a_hurry() -> N
         # the cycle after it begins late, and those that follow need their time: none is made up for
         syncs = device.syncs[device.held :]
         assert syncs[-1] - syncs[0] > 0.05 + (len(syncs) - 3) * device.period_s
+
+
+def test_a_torque_that_was_computed_from_old_answers_is_not_sent() -> None:
+    class Sends(Inertias):
+        def __init__(self) -> None:
+            super().__init__(lockstep=False)
+            self.sent: dict[int, float] = {}
+
+        def transmit(self) -> None:
+            super().transmit()
+            self.sent[self.feedback.cycle] = float(self.command.torque_Nm[0])
+
+    class Stopped(Proportional):
+        """Its process stands still in one cycle, as one that was sent SIGSTOP."""
+
+        at = 0
+
+        def update(self, feedback: AxisFeedback, setpoint: Setpoint, torque_Nm: FloatArray) -> None:
+            torque_Nm[:] = 0.01
+            if feedback.cycle == self.at:
+                time.sleep(0.15)
+
+    device = Sends()
+    with powered(device) as rig:
+        stopped = Stopped(np.zeros(2), np.zeros(2))
+        stopped.at = rig.began + 30
+        with suppress(TripError):  # late as it is
+            rig.follow(by=stopped)
+    assert [device.sent[stopped.at - k] for k in (2, 1, 0)] == [0.01, 0.01, 0.0]
