@@ -117,7 +117,7 @@ def test_while_a_slow_disk_is_written_the_drive_hears_its_master_and_all_is_look
             power()
         written.append(_fd)
         # longer than drives wait for their master, and who asks winches for an answer
-        time.sleep(5.0)
+        time.sleep(3.0)
 
     def enable(axis: Cia402RailAxis) -> None:
         enabled.append(axis)

@@ -26,8 +26,8 @@ from cdpr_tools.daemon.paths import (
     LAUNCHER_SUFFIX,
     find_launcher_files,
     find_sockets,
+    found_instead,
     is_trusted,
-    unsearched_folders,
 )
 from cdpr_tools.daemon.settings import read_key
 from cdpr_tools.errors import BadInputError, CommandError, WorkFailedError
@@ -243,10 +243,8 @@ def _only_socket(robot: str | None) -> Path:
         if doing is not None:
             what = f"is still starting, {doing}" if doing else "is starting, or ending"
             raise NoDaemonError(f"the daemon{whose} {what}: it does not answer")
-        others = ", ".join(path.stem for path in find_sockets() if _is_alive(path))
-        hints = others and f"what runs: {others}", unsearched_folders()
-        told = "".join(f"; {hint}" for hint in hints if hint)
-        raise NoDaemonError(f"no daemon runs{whose}; `cdpr run ROBOT` starts one{told}")
+        others = found_instead(filter(_is_alive, find_sockets()))
+        raise NoDaemonError(f"no daemon runs{whose}; `cdpr run ROBOT` starts one{others}")
     if robot is not None:  # this user's before the system's
         return found[0]
     names = ", ".join(path.stem for path in found)

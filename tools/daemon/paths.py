@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import stat
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Final
 
@@ -59,6 +60,16 @@ def unsearched_folders() -> str:
     if _SYSTEM.is_dir() and not os.access(_SYSTEM, os.R_OK | os.X_OK):
         reasons.append(f"{_SYSTEM} is closed to this user, try it with `sudo`")
     return "; ".join(reasons)
+
+
+def found_instead(running: Iterable[Path], remark: str = "") -> str:
+    """Return in words which daemons run besides one that was not found, and what was not searched.
+
+    `running` are files of theirs, `remark` is said of them; empty where there is nothing to say.
+    """
+    names = ", ".join(path.stem for path in running)
+    hints = names and f"what runs: {names}{remark}", unsearched_folders()
+    return "".join(f"; {hint}" for hint in hints if hint)
 
 
 def is_trusted(path: Path, owner: int) -> bool:

@@ -106,7 +106,9 @@ class CableControl(PlaceChecks):
         self._bind_pose(moves)
         self._bind_force(moves)
         self._bind_tensions()
-        self._oscillation = oscillation(model, axes, self._motors, self.velocity, period_s)
+        self._oscillation = oscillation(
+            model, axes, self._motors, self.pull_fit.count_rad, self.velocity, period_s
+        )
 
     def _design(self, axes: Sequence[RobotAxis]) -> None:
         """Design the loop for the platform and its motors."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -78,24 +77,22 @@ def oscillation(
     model: PlatformModel,
     axes: Sequence[RobotAxis],
     motors: FloatArray,
+    count_rad: FloatArray,
     velocity: FloatArray,
     period_s: float,
 ) -> Oscillation:
     """Return what tells that the loop swings the winches of these `motors`, rows as above.
 
-    `velocity` (d,) is the set-point's.
+    `count_rad` (n,) is what their encoders tell apart, `velocity` (d,) the set-point's.
     """
+    m_per_rad, theta_rad = motors[tracking.M_PER_RAD], motors[tracking.THETA]
     stiffness_N_m = [a.winch.cable.stiffness_N for a in axes] / model.kinematics.lengths(
         model.home_pose
     )
-    counts_m = [
-        math.tau * abs(a.winch.cable_m_per_motor_rad) / a.winch.encoder_counts_per_turn
-        for a in axes
-    ]
     threshold_m = np.maximum(
-        np.outer(RESERVE_SHARES, model.reserve_N / stiffness_N_m), LEAST_COUNTS * np.array(counts_m)
+        np.outer(RESERVE_SHARES, model.reserve_N / stiffness_N_m),
+        LEAST_COUNTS * count_rad * np.abs(m_per_rad),
     )
-    m_per_rad, theta_rad = motors[tracking.M_PER_RAD], motors[tracking.THETA]
     names = [axis.name for axis in axes]
     return Oscillation(names, threshold_m, m_per_rad, theta_rad, velocity, period_s)
 

@@ -52,19 +52,16 @@ def distribute(
     rank = null_space(W, w_e, scale, bounds, scaled, space, scratch) if t.size == n else -1
     if rank < 0:
         return REFUSED, NO_LIMIT
-    outcome, r = _FEASIBLE, n - rank
-    if method != CLOSED_FORM or not closed_form(space, r, bounds, t, scratch):
+    r = n - rank
+    own = found = method == CLOSED_FORM and closed_form(space, r, bounds, t, scratch)
+    if not found:
         found = project(space, r, bounds, t, scratch)
-        of_polygon = found and method <= CENTROID
-        if method == CLOSED_FORM or (
-            of_polygon and not choose(space, r, bounds, method, t, scratch)
-        ):
-            outcome = _SUBSTITUTED
-        if not found:
-            outcome = _NEAREST
-    limit = nearest_wrench(scaled, bounds, scale, outcome != _NEAREST, t, missing, scratch)
+        own = method == MINIMUM_DEVIATION
+        if found and method <= CENTROID:
+            own = choose(space, r, bounds, method, t, scratch)
+    limit = nearest_wrench(scaled, bounds, scale, found, t, missing, scratch)
     if rank < scale.size:
         return _SINGULAR, limit
     if limit != NO_LIMIT:
         return _NEAREST, limit
-    return (_FEASIBLE if outcome == _NEAREST else outcome), limit
+    return (_SUBSTITUTED if found and not own else _FEASIBLE), limit

@@ -23,7 +23,7 @@ from cdpr_rt.runtime.right import RightToMove
 IDLE: Final = "idle"
 HOLD: Final = "hold"
 TURN_S: Final = 0.005
-_TOO_OLD_ns: Final = 100_000_000
+_TOO_OLD_S: Final = 0.1
 """Age of answers from which on no torque is sent that was computed from them."""
 """Duration of a turn while no cycles run."""
 
@@ -122,7 +122,7 @@ class Engine:
             self.answered = cycle.exchange()
         except machine.failures as error:
             self.lost_bus = str(error)
-        came_ns = time.monotonic_ns()
+        came_ns, came_s = time.monotonic_ns(), machine.clock.now_s
         self.exchange_s = (came_ns - cycle.began_ns) * 1e-9
         self.missed += device.n - self.answered
         estimator = self.parts.estimator
@@ -144,7 +144,7 @@ class Engine:
             self.program_error = f"program {program.name}: {type(error).__name__}: {error}"
         self.asked_Nm[:] = torque
         self.reaction = judge(cycle, torque)
-        if not device.lockstep and time.monotonic_ns() - came_ns > _TOO_OLD_ns:
+        if machine.clock.now_s - came_s > _TOO_OLD_S:
             torque[:] = 0.0  # of a process that was stopped meanwhile, whose drives have let go
         try:
             cycle.transmit()

@@ -12,7 +12,7 @@ import typer
 from cdpr_tools.commands.options import JsonOption, SocketOption
 from cdpr_tools.daemon.estop import EmergencyStop
 from cdpr_tools.daemon.loop_file import LoopFile
-from cdpr_tools.daemon.paths import find_loop_files, unsearched_folders
+from cdpr_tools.daemon.paths import find_loop_files, found_instead
 from cdpr_tools.errors import FAILED, BadInputError, WorkFailedError
 from cdpr_tools.output import Output
 
@@ -68,10 +68,8 @@ def _chosen(robots: tuple[str | None, ...], every: bool, socket: Path | None) ->
     found = find_loop_files(robot)
     if not found:
         whose = "" if robot is None else f" for {robot}"
-        others = ", ".join(path.stem for path in find_loop_files() if _lives(path))
-        hints = others and f"what runs: {others}; --all stops it", unsearched_folders()
-        told = "".join(f"; {hint}" for hint in hints if hint)
-        raise WorkFailedError(f"no daemon's loop was found{whose}: nothing was stopped{told}")
+        others = found_instead(filter(_lives, find_loop_files()), "; --all stops it")
+        raise WorkFailedError(f"no daemon's loop was found{whose}: nothing was stopped{others}")
     if every or robot is not None or len(found) == 1:
         return found
     live = [path for path in found if _lives(path)]

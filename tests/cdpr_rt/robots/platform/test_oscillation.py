@@ -1,4 +1,4 @@
-"""A loop that swings winches at rest is told; what moves, rings out or is noise is not."""
+"""A loop that swings winches by itself is told; what moves, rings out or is noise is not."""
 
 from __future__ import annotations
 
