@@ -114,6 +114,8 @@ def test_a_slave_without_process_data_boots_as_far_as_it_goes(empty_bus: str) ->
 
         network.unsubscribe(0, node.nmt.on_command)
         network.subscribe(0, obey)
+        # else a heartbeat sent before it obeys the next reset would be a boot-up message too many
+        node.nmt.state = "PRE-OPERATIONAL"
         ended = cdpr("drive", "enable", WINCH, "--bus", bus)
         assert ended.returncode == 1
         assert "node 1: no answer to SYNC" in ended.stderr
