@@ -124,6 +124,7 @@ _WORDS = (
     (r"Value error, (.*) is not one of (.*)\.", r"\1; allowed: \2"),
 )
 """What the library says of a value that is not allowed, and how it is said here."""
+_UsageError: Any = BadParameter.__base__  # typer does not export it
 
 
 class _Commands(group_of(MODULES)):  # type: ignore[misc]
@@ -133,10 +134,17 @@ class _Commands(group_of(MODULES)):  # type: ignore[misc]
     def invoke(self, ctx: Any) -> Any:
         try:
             return super().invoke(ctx)
-        except BadParameter as error:
-            for pattern, words in _WORDS:
-                error.message = re.sub(pattern, words, error.message)
+        except _UsageError as error:
+            if isinstance(error, BadParameter):
+                for pattern, words in _WORDS:
+                    error.message = re.sub(pattern, words, error.message)
+            elif "unexpected extra argument" in error.message and _names_robot(error.ctx.command):
+                error.message += "; a robot is named by --robot"
             raise
+
+
+def _names_robot(command: Any) -> bool:
+    return any("--robot" in param.opts for param in command.params)
 
 
 app = typer.Typer(

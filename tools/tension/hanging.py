@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import os
-import signal
+import select
 import sys
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
@@ -13,6 +14,9 @@ import typer
 from cdpr_rt.core.clock import Clock
 from cdpr_rt.procedures.tension.masses import Hang, not_hung
 from cdpr_sim_bus.physics_board import PhysicsBoard
+from cdpr_tools.signals import stop_on_signals
+
+_POLL_S = 0.05
 
 
 def by_prompt(mass_kg: float, clock: Clock) -> None:
@@ -20,36 +24,35 @@ def by_prompt(mass_kg: float, clock: Clock) -> None:
 
     Only Enter alone raises the mass: who types a word wants something else.
     """
-    ending = (signal.SIGINT, signal.SIGTERM)
     question = (
         f"Hang {mass_kg:g} kg on the cable, standing on its support, take up the slack, and "
         "press Enter (Ctrl-C ends)"
     )
-    before = {number: signal.signal(number, signal.default_int_handler) for number in ending}
-    try:
+    with stop_on_signals() as stop_requested:
+        stop_requested.closing()  # a second Ctrl-C has nothing else to end
         # a person takes their time; the safety I/O is asked meanwhile
-        while clock.run_blocking(partial(_typed, question)):
+        while (
+            line := clock.run_blocking(partial(_typed, question, stop_requested))
+        ).strip() and line.endswith("\n"):
             typer.echo("Enter alone, please.", err=True)
-    except (EOFError, KeyboardInterrupt):
-        raise not_hung(mass_kg) from None
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
+    if not line.endswith("\n"):
+        raise not_hung(mass_kg)
 
 
-def _typed(question: str) -> str:
-    """Ask, and return the line that is typed; raises EOFError where no more can come.
+def _typed(question: str, stop_requested: Callable[[], bool]) -> str:
+    """Ask, and return what is typed: a line, or less where no more can come or none is wanted.
 
-    Not by `input`: a thread that is still there when the process ends would hold the buffer's lock.
+    Not by `input`, which no question can end.
     """
     typer.echo(f"{question}: ", nl=False, err=True)
     line = b""
-    while not line.endswith(b"\n"):
-        byte = os.read(sys.stdin.fileno(), 1)
-        if not byte:
-            raise EOFError
-        line += byte
-    return line.decode(errors="replace").strip()
+    while not line.endswith(b"\n") and not stop_requested():
+        if select.select([sys.stdin], [], [], _POLL_S)[0]:
+            byte = os.read(sys.stdin.fileno(), 1)
+            if not byte:
+                break
+            line += byte
+    return line.decode(errors="replace")
 
 
 def on_board(board: Path) -> Hang:

@@ -108,10 +108,7 @@ def _refuse_another_mass(points: Sequence[TorquePoint], mass_kg: float, gain_m2_
 
 def have_hung(session: Operator, mass_kg: float, hang: Hang) -> None:
     """Ask for a mass to be hung; cycles go on meanwhile, and the winch stays supervised."""
-    try:
-        session.run_task(lambda: hang(mass_kg, session.device.clock))
-    except KeyboardInterrupt:  # which comes where the cycles run
-        raise not_hung(mass_kg) from None
+    session.run_task(lambda: hang(mass_kg, session.device.clock))
 
 
 def hoist_tolerance(plan: HoistPlan) -> Tolerance:

@@ -26,6 +26,7 @@ from cdpr_tools.client.client import (
 from cdpr_tools.commands.robot.path import robot_by_name
 from cdpr_tools.daemon.loop_file import named_launcher
 from cdpr_tools.errors import BadInputError
+from tests.cdpr_here import cdpr_here
 
 
 @pytest.fixture
@@ -56,6 +57,17 @@ def test_several_daemons_must_be_told_apart(listening: list[Path]) -> None:
     with pytest.raises(BadInputError, match=r"choose one by --robot \(left, right\)"):
         where(None)
     assert where("right") == str(listening[1])
+
+
+@pytest.mark.parametrize(
+    ("words", "hint"), [(("status", "planar-3"), True), (("run", "planar-3", "more"), False)]
+)
+def test_a_robot_that_is_named_without_its_option_is_told_how(
+    words: tuple[str, ...], hint: bool
+) -> None:
+    told = " ".join(cdpr_here(*words).stderr.split())
+    assert "unexpected extra argument" in told
+    assert ("a robot is named by --robot" in told) == hint
 
 
 def test_what_a_killed_daemon_left_behind_is_none(listening: list[Path], folder: Path) -> None:

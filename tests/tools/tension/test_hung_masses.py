@@ -78,9 +78,9 @@ def test_a_signal_ends_the_question(
     outlet, inlet = os.pipe()
     asked, typed = threading.Event(), hanging._typed
 
-    def ask(question: str) -> str:
+    def ask(question: str, stop_requested: Callable[[], bool]) -> str:
         asked.set()
-        return typed(question)
+        return typed(question, stop_requested)
 
     def interrupt() -> None:
         asked.wait(LONGEST_S)
