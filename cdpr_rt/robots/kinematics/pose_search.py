@@ -216,20 +216,13 @@ def _relax(geometry: FloatArray, lengths: FloatArray, pose: FloatArray, cables: 
         cables[ERROR, i] = 0.5 * (free * free - wanted * wanted)
         for k in range(6):
             cables[k, i] *= free
-    for k in range(6):
-        _centre(cables[k])
-    _centre(cables[ERROR])
-
-
-@jit
-def _centre(row: FloatArray) -> None:
-    """Take the mean off."""
-    mean = 0.0
-    for i in range(row.size):
-        mean += row[i]
-    mean /= row.size
-    for i in range(row.size):
-        row[i] -= mean
+    for k in (0, 1, 2, 3, 4, 5, ERROR):
+        mean = 0.0
+        for i in range(n):
+            mean += cables[k, i]
+        mean /= n
+        for i in range(n):
+            cables[k, i] -= mean
 
 
 @jit_inlined
