@@ -61,7 +61,7 @@ def findings(robot: Robot, limits: Limits | None = None) -> list[Finding]:
             found += loop_findings(robot, statics)
         found += [
             *turned,
-            *turning.uncontrolled_rotation(robot.platform),
+            *turning.uncontrolled_rotation(statics, limits.lengths_disagree_m),
             *turning.stand_clearance(statics),
         ]
         found += [*_contact(statics), *turning.upright(statics)]
