@@ -103,11 +103,7 @@ def move(
         axis.set_brake(False)
         pushed_m = _test_brake(rail, axis, clock)
         _stop_on_request(rail, conditions, voided="")
-        asking = clock.start(lambda: _keep_asking(clock, conditions))
-        try:
-            _void_calibration(rail, clock, f"{rail.name} was moved from {start_m:.4f} m")
-        finally:
-            clock.cancel(asking)
+        _void_calibration(rail, clock, f"{rail.name} was moved from {start_m:.4f} m")
         _refuse(rail, conditions, voided=_VOIDED)  # the disk may have taken its time
         axis.check()
         _stop_on_request(rail, conditions)
@@ -134,13 +130,6 @@ def move(
 def _void_calibration(rail: RailProfile, clock: Clock, why: str) -> None:
     """Write it down while the drive goes on hearing its master: a disk may take a second."""
     clock.run_blocking(lambda: mark_not_calibrated(rail.robot, why))
-
-
-def _keep_asking(clock: Clock, conditions: MoveConditions) -> None:
-    """Ask winches for their power without end: else what is known is as old as a disk is slow."""
-    while True:
-        conditions.powered()
-        clock.sleep(_LOOK_S)
 
 
 def _refuse(rail: RailProfile, conditions: MoveConditions, voided: str = "") -> None:

@@ -28,6 +28,7 @@ from cdpr_rt.procedures.winch_operator import Notifier
 # nothing is exchanged with SYNC; the drive only needs some period
 _SYNC_PERIOD_S = 0.01
 _FIRST_READINGS_S = 3.0
+_ASK_S = 0.05
 
 
 @contextmanager
@@ -136,7 +137,17 @@ def power_watch(
             if seen
             else "no winch's drive was asked whether it has power (--winch-bus)"
         )
+        asking = clock.start(lambda: _keep_asking(clock, watches))
+        stack.callback(clock.cancel, asking)
         yield lambda: next((text for watch in watches if (text := watch.reason())), "")
+
+
+def _keep_asking(clock: Clock, watches: Sequence[PowerWatch]) -> None:
+    """Ask without end: what is known is as old as a drive is slow to boot, or a disk to write."""
+    while True:
+        for watch in watches:
+            watch.reason()
+        clock.sleep(_ASK_S)
 
 
 @contextmanager

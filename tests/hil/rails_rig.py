@@ -19,6 +19,7 @@ from typing import Any
 import canopen
 from click.testing import Result
 from pymodbus.client import ModbusTcpClient
+from tolerant_drive import write_tolerant_drive
 from typer.testing import CliRunner
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "drivers" / "modbus"))
@@ -26,12 +27,15 @@ from safety_rig import PANEL, SafetyIoProcess, ready, start
 
 from cdpr_drivers.errors import DriverError
 from cdpr_profiles import load_winch
+from cdpr_profiles.reading.places import SHIPPED
 from cdpr_sim_bus.devices.sim_rail import RailFault
 from cdpr_sim_bus.devices.sim_safety_io import SafetyIoFault
 from cdpr_sim_bus.physics_board import BoardAxis
 from cdpr_tools.commands.devices import rail as rail_commands
 
 M_PER_RAD = 0.02 / math.tau
+ANSWER_S, MASTER_S = 2.0, 2.0
+"""How long a device may take to answer, and its master to be heard, on a busy machine."""
 
 
 @dataclass
@@ -42,6 +46,7 @@ class Rails:
     io_device: SafetyIoProcess
     winch: BoardAxis
     rail: BoardAxis
+    cia402: Path
     modbus: Path
     modbus_port: int
     tension_port: str
@@ -82,7 +87,7 @@ class Rails:
         if kind == "modbus":
             return ("move", str(self.modbus), "--to", str(to_m), "--yes", *slack)
         where = ("--bus", self.bus, "--safety-io", self.io_device.reference)
-        return ("move", "rail-cia402", "--to", str(to_m), *where, *slack)
+        return ("move", str(self.cia402), "--to", str(to_m), *where, *slack)
 
     def position_m(self, kind: str) -> float:
         """The truth, and not what a command tells."""
@@ -142,6 +147,22 @@ class Rails:
 
     def _modbus(self) -> ModbusTcpClient:
         return ModbusTcpClient("127.0.0.1", port=self.modbus_port, timeout=60)
+
+
+def patient_rail(folder: Path, kind: str, port: int = 502) -> Path:
+    """Write the shipped rail with times that suit a busy machine, and a port; return it."""
+    text = (SHIPPED / "rails" / f"rail-{kind}.toml").read_text()
+    drive = write_tolerant_drive(folder, 0.5 * MASTER_S, MASTER_S)
+    for before, after in (
+        ('"generic-cia402"', f'"{drive}"'),
+        ("port = 502\n", f"port = {port}\nanswer_timeout_s = {ANSWER_S}\n"),
+        ("brake_timeout_s = 0.5", f"brake_timeout_s = {ANSWER_S}"),
+        ("\ntimeout_s = 0.5", f"\ntimeout_s = {MASTER_S}"),
+    ):
+        text = text.replace(before, after)
+    path = folder / f"rail-{kind}.toml"
+    path.write_text(text)
+    return path
 
 
 @contextmanager

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from rails_rig import Rails, another_winch
+from rails_rig import ANSWER_S, MASTER_S, Rails, another_winch, patient_rail
 from typer.testing import CliRunner
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "drivers" / "modbus"))
@@ -33,7 +33,6 @@ from cdpr_drivers.rails.rail import RailError
 from cdpr_drivers.rails.rail_cia402 import Cia402RailAxis
 from cdpr_drivers.rails.rail_modbus import ModbusRailAxis
 from cdpr_profiles.devices.rail import load_rail
-from cdpr_profiles.reading.places import SHIPPED
 from cdpr_sim_bus.devices.sim_rail import RailFault
 from cdpr_sim_bus.devices.sim_safety_io import SafetyIoFault
 from cdpr_sim_bus.physics_board import PhysicsBoard
@@ -48,23 +47,23 @@ FAILED = 1
 def parts(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Rails]:
     folder = tmp_path_factory.mktemp("rails")
     bus = f"simbus:rails-{os.getpid()}-{uuid.uuid4().hex[:6]}"
-    modbus = folder / "rail-modbus.toml"
+    cia402, modbus = (patient_rail(folder, kind) for kind in ("cia402", "modbus"))
     with board_file() as on_rail, board_file() as on_winch:
-        drive = start("rail", "rail-cia402", "--bus", bus, "--board", on_rail)
-        other = start("rail", "rail-modbus", "--port", "0")
+        drive = start("rail", cia402, "--bus", bus, "--board", on_rail)
+        other = start("rail", modbus, "--port", "0")
         with PhysicsBoard.create(on_winch, 1) as winch:
             ready(drive)
             cells = start("tension", "rtu-load-cell-1", "--board", on_winch)
             port = int(ready(other)["port"])
-            text = (SHIPPED / "rails" / "rail-modbus.toml").read_text()
-            modbus.write_text(text.replace("port = 502", f"port = {port}"))
+            modbus = patient_rail(folder, "modbus", port)
             io_device = SafetyIoProcess(
-                patient_profile(folder, 3.0), "--board", on_winch, "--board", on_rail
+                patient_profile(folder, 3.0 * MASTER_S, ANSWER_S, ANSWER_S, ANSWER_S),
+                *("--board", on_winch, "--board", on_rail),
             )
             with PhysicsBoard.attach(on_rail) as rail:
                 tty = ready(cells)["port"]
-                axes = winch.axis(0), rail.axis(0)
-                yield Rails(bus, io_device, *axes, modbus, port, tty, folder / "state")
+                axes, home = (winch.axis(0), rail.axis(0)), folder / "state"
+                yield Rails(bus, io_device, *axes, cia402, modbus, port, tty, home)
             io_device.close()
             for process in (drive, other, cells):
                 process.communicate(b"", timeout=120)
@@ -117,7 +116,7 @@ def test_while_a_slow_disk_is_written_the_drive_hears_its_master_and_all_is_look
             power()
         written.append(_fd)
         # longer than drives wait for their master, and who asks winches for an answer
-        time.sleep(3.0)
+        time.sleep(1.5 * MASTER_S)
 
     def enable(axis: Cia402RailAxis) -> None:
         enabled.append(axis)
@@ -174,9 +173,9 @@ def test_a_brake_that_does_not_hold_is_found_before_the_move(rails: Rails, kind:
     [
         (RailFault.TARGET_LOST, "holding register 100 was set to"),
         (RailFault.DRIVE_FAULT, "the drive is in fault"),
-        (RailFault.BRAKE_STUCK, "the brake is not released 0.5 s after it was told to"),
+        (RailFault.BRAKE_STUCK, f"the brake is not released {ANSWER_S:g} s after it was told to"),
         (RailFault.TRUNCATED, "the answer was cut off after"),
-        (RailFault.SILENT, "no answer within 0.2 s from unit 1"),
+        (RailFault.SILENT, f"no answer within {ANSWER_S:g} s from unit 1"),
     ],
 )
 def test_a_drive_that_does_not_do_as_it_is_told_is_not_moved(
@@ -297,7 +296,8 @@ def test_the_emergency_stop_ends_a_move(rails: Rails) -> None:
     wait_until(lambda: rails.braked("cia402"))
     assert "the emergency-stop chain is open" in result(command, FAILED)["error"]
     rails.io_device.press(False)
-    where = ["reset", "rail-cia402", "--bus", rails.bus, "--safety-io", rails.io_device.reference]
+    on = ["--bus", rails.bus, "--safety-io", rails.io_device.reference]
+    where = ["reset", str(rails.cia402), *on]
     runner = CliRunner(env={"XDG_STATE_HOME": str(rails.home)})
     with pytest.raises(SafetyIoError, match="tripped on"):
         runner.invoke(rail_commands.app, where, catch_exceptions=False)

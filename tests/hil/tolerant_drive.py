@@ -11,18 +11,24 @@ MASTER_HEARTBEAT_S = 6.0
 _WINCH = "winch-mpp0923d"
 
 
-def write_tolerant_drive(folder: Path) -> None:
-    """Write the shipped drive that lets itself and its master be held up for seconds."""
+def write_tolerant_drive(folder: Path, producer_s: float = 5.0, consumer_s: float = 10.0) -> Path:
+    """Write the shipped drive that lets itself and its master be held up for seconds; return it.
+
+    The heartbeats are its own, and how long it waits for those of its master.
+    """
     shipped = Path(cdpr_profiles.__file__).parent / "drives" / "generic-cia402.toml"
     text = shipped.read_text()
     for before, after in (
-        ("heartbeat_producer_s = 0.1 ", "heartbeat_producer_s = 5.0 "),
-        ("heartbeat_consumer_s = 0.5", "heartbeat_consumer_s = 10.0"),
+        ("mode_display_timeout_s = 0.5", "mode_display_timeout_s = 5.0"),
+        ("heartbeat_producer_s = 0.1 ", f"heartbeat_producer_s = {producer_s} "),
+        ("heartbeat_consumer_s = 0.5", f"heartbeat_consumer_s = {consumer_s}"),
         ('eds = "generic-cia402.eds"', f'eds = "{shipped.with_suffix(".eds")}"'),
     ):
         assert before in text
         text = text.replace(before, after)
-    (folder / f"{NAME}.toml").write_text(text)
+    path = folder / f"{NAME}.toml"
+    path.write_text(text)
+    return path
 
 
 def write_tolerant_robot(path: Path, text: str) -> None:
