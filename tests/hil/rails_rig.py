@@ -8,7 +8,6 @@ import os
 import struct
 import subprocess
 import sys
-import time
 import uuid
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -96,14 +95,9 @@ class Rails:
         high, low = self._registers(104, 2)
         return (high << 16 | low) * 1e-5
 
-    def speed_at_braking(self) -> float:
-        """Wait for the brake of the CiA 402 rail; return the last speed before it closed."""
-        speed, deadline = math.inf, time.monotonic() + 60.0
-        while self.rail.brake_released:
-            speed = self.rail.state().motor_rad_s * M_PER_RAD
-            assert time.monotonic() < deadline
-            time.sleep(0.001)
-        return speed
+    def speed_m_s(self) -> float:
+        """The true speed of the CiA 402 rail."""
+        return self.rail.state().motor_rad_s * M_PER_RAD
 
     def braked(self, kind: str) -> bool:
         """Whether the rail stands without power on an applied brake."""

@@ -254,12 +254,34 @@ def test_an_interrupted_move_is_stopped_and_braked_and_voids_the_calibration(
     command = rails.move(kind, before + 0.5)
     await_motion(rails, kind, command, before + 0.005)
     command.send_signal(signal.SIGINT)
-    if kind == "cia402":
-        assert abs(rails.speed_at_braking()) < 0.2 * 0.05  # of the move's speed
     assert "stopped on request" in result(command, FAILED)["error"]
     assert rails.braked(kind)
     assert rails.position_m(kind) < before + 0.4
     assert rails.calibration()["calibrated"] is False
+
+
+def test_an_interrupted_move_comes_to_rest_before_it_is_braked(
+    rails: Rails, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    before, speeds = rails.position_m("cia402"), list[float]()
+
+    def arrived(axis: Cia402RailAxis) -> bool:
+        if not speeds and rails.position_m("cia402") > before + 0.005:
+            speeds.append(rails.speed_m_s())
+            os.kill(os.getpid(), signal.SIGINT)
+        return really_arrived(axis)
+
+    def set_brake(axis: Cia402RailAxis, released: bool) -> None:
+        if speeds and not released:
+            speeds.append(rails.speed_m_s())
+        really_set_brake(axis, released)
+
+    really_arrived, really_set_brake = Cia402RailAxis.arrived, Cia402RailAxis.set_brake
+    monkeypatch.setattr(Cia402RailAxis, "arrived", arrived)
+    monkeypatch.setattr(Cia402RailAxis, "set_brake", set_brake)
+    assert "stopped on request" in rails.refused("cia402", before + 0.5)
+    in_motion, *braked = map(abs, speeds)
+    assert in_motion > 0.8 * 0.05 and max(braked) < 0.2 * 0.05  # of the move's speed
 
 
 @pytest.mark.parametrize("kind", ["cia402", "modbus"])
