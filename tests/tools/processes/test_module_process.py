@@ -3,7 +3,6 @@
 import signal
 import subprocess
 import sys
-import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -63,11 +62,13 @@ def test_a_child_of_it_that_keeps_its_pipes_is_not_waited_for() -> None:
             subprocess.run(["kill", str(child)], check=True)
 
 
-def test_an_interrupt_does_not_leave_it_behind() -> None:
+def test_an_interrupt_does_not_leave_it_behind(monkeypatch: pytest.MonkeyPatch) -> None:
     with _running(STAYS) as process:
         _out(process).readline()
-        press = threading.Timer(0.5, signal.pthread_kill, (threading.get_ident(), signal.SIGINT))
-        press.start()
+        # while it is waited for: at another moment it would end the tests
+        monkeypatch.setattr(
+            process, "communicate", lambda timeout: signal.raise_signal(signal.SIGINT)
+        )
         with pytest.raises(KeyboardInterrupt):
             end_by_stdin(process, 300.0)
         assert process.wait(60.0) == -signal.SIGKILL
