@@ -32,6 +32,8 @@ from cdpr_tools.daemon import estop as emergency_stop
 from cdpr_tools.daemon.loop_file import POWER_OFF_SIGNAL, LoopFile, started
 
 SILENT, FOR_GOOD = 6, 0xFFFF  # of 2F00h
+paced = pytest.mark.alone
+"""Of tests with drives that do not wait for the loop, nor for their own process."""
 
 
 def estop(*arguments: str | Path, **env: str) -> tuple[int, dict[str, Any]]:
@@ -55,6 +57,7 @@ def daemon(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RealDaemon]:
     made.end()
 
 
+@paced
 def test_it_takes_the_power_at_once_and_a_fault_stays_though_the_service_hangs(
     daemon: RealDaemon,
 ) -> None:
@@ -76,6 +79,7 @@ def test_it_takes_the_power_at_once_and_a_fault_stays_though_the_service_hangs(
     assert cdpr("ack", *daemon.at).returncode == 0
 
 
+@paced
 def test_a_loop_that_stands_still_is_killed_and_that_is_not_called_confirmed(
     tmp_path: Path,
 ) -> None:
@@ -98,6 +102,7 @@ def test_a_loop_that_stands_still_is_killed_and_that_is_not_called_confirmed(
         daemon.end()
 
 
+@paced
 def test_a_listener_stops_nothing_and_says_of_the_drives_what_it_hears(
     daemon: RealDaemon, tmp_path: Path
 ) -> None:
@@ -120,6 +125,7 @@ def test_a_listener_stops_nothing_and_says_of_the_drives_what_it_hears(
     assert cdpr("ack", *daemon.at).returncode == 0
 
 
+@paced
 def test_a_drive_that_does_not_answer_is_not_called_stopped(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -142,6 +148,7 @@ def test_a_drive_that_does_not_answer_is_not_called_stopped(
         daemon.end()
 
 
+@paced
 def test_a_drive_that_does_not_confirm_at_the_end_is_told_once(tmp_path: Path) -> None:
     daemon = slow_daemon(tmp_path)
     try:
