@@ -28,6 +28,8 @@ import can
 import canopen
 import pytest
 from canopen.profiles.p402 import BaseNode402
+from tolerant_drive import NAME as TOLERANT
+from tolerant_drive import write_tolerant_drive
 
 from cdpr_profiles import load_winch
 from cdpr_sim_bus.bus.hub import Hub
@@ -91,16 +93,32 @@ def empty_bus() -> Iterator[str]:
         hub.close()
 
 
-def test_a_slave_without_process_data_boots_as_far_as_it_goes(empty_bus: str) -> None:
+def write_patient_winch(folder: Path, period_s: float) -> Path:
+    """Write the shipped winch, whose drive sends two heartbeats a second; return it."""
+    write_tolerant_drive(folder, 0.5, 1.0)
+    path, text = folder / "patient.toml", PROFILE.path.read_text()
+    for before, after in (
+        ("sync_period_s = 0.001", f"sync_period_s = {period_s}"),
+        ('"generic-cia402"', f'"{TOLERANT}"'),
+    ):
+        assert before in text
+        text = text.replace(before, after)
+    path.write_text(text)
+    return path
+
+
+def test_a_slave_without_process_data_boots_as_far_as_it_goes(
+    empty_bus: str, tmp_path: Path
+) -> None:
     """`LocalNode` answers SDO, but after a reset its heartbeats are boot-up messages."""
-    bus = f"simbus:{empty_bus}"
+    bus, winch = f"simbus:{empty_bus}", str(write_patient_winch(tmp_path, period_s=0.001))
     with third_party_on(empty_bus) as network:
         node = network.create_node(1, EDS)
         node.nmt.state = "PRE-OPERATIONAL"
         told = cdpr("drive", "info", WINCH, "--bus", bus, "--json")
         assert told.returncode == 0, told.stderr
         assert json.loads(told.stdout.splitlines()[-1])["profile_fits"] is True
-        ended = cdpr("drive", "enable", WINCH, "--bus", bus)
+        ended = cdpr("drive", "enable", winch, "--bus", bus)
         assert ended.returncode == 1
         assert "node 1 did not boot (step K): no heartbeat came" in ended.stderr
         assert node.sdo[0x1A00][2].raw == 0x60640020  # configured it was
@@ -118,7 +136,7 @@ def test_a_slave_without_process_data_boots_as_far_as_it_goes(empty_bus: str) ->
         network.subscribe(0, obey)
         # else a heartbeat sent before it obeys the next reset would be a boot-up message too many
         node.nmt.state = "PRE-OPERATIONAL"
-        ended = cdpr("drive", "enable", WINCH, "--bus", bus)
+        ended = cdpr("drive", "enable", winch, "--bus", bus)
         assert ended.returncode == 1
         assert "node 1: no answer to SYNC" in ended.stderr
         assert "its TPDOs are off" in ended.stderr
@@ -179,10 +197,8 @@ class ThirdPartyServo:
 
 
 def test_a_third_partys_servo_is_enabled_and_switched_off(empty_bus: str, tmp_path: Path) -> None:
-    winch = tmp_path / "slow.toml"
-    text = PROFILE.path.read_text()
-    assert "sync_period_s = 0.001" in text
-    winch.write_text(text.replace("sync_period_s = 0.001", "sync_period_s = 0.04"))
+    # in cycles that it keeps up where it has to wait for a core
+    winch = write_patient_winch(tmp_path, period_s=0.2)
     with third_party_on(empty_bus) as network:
         servo = ThirdPartyServo(network, 1)
         words = ("drive", "enable", str(winch), "--bus", f"simbus:{empty_bus}", "--seconds", "0.3")
