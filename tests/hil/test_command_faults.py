@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import queue
 import re
 import resource
 import signal
@@ -63,17 +64,19 @@ class Lab:
             time.sleep(0.02)
 
     def state(self) -> int:
-        word = self._statusword()
+        word = self.read(0x6041)
         return int(word & (0x6F if word & 0x20 else 0x4F))
 
-    def _statusword(self) -> int:
-        """Ask for 6041h; what a command has asked before it ended may be answered first."""
-        while True:
-            try:
-                return int(self.node.sdo[0x6041].raw)
-            except canopen.SdoCommunicationError as error:
-                if "instead" not in str(error):  # said of an answer about another object
-                    raise
+    def read(self, index: int) -> int:
+        """Ask for an object; what a command has asked before it ended may be answered first."""
+        client, asked = self.node.sdo, index.to_bytes(2, "little") + b"\0"
+        client.responses = queue.Queue()
+        client.send_request(b"\x40" + asked + bytes(4))
+        while (answer := client.responses.get(timeout=60.0))[0] & 0xE3 != 0x43 or (
+            answer[1:4] != asked
+        ):
+            pass
+        return int.from_bytes(answer[4 : 8 - (answer[0] >> 2 & 3)], "little", signed=True)
 
     def inject_fault(self, sub: int, value: int) -> None:
         self.node.sdo[0x2F00][sub].raw = value
@@ -299,7 +302,7 @@ def test_a_stop_in_mid_sweep(lab: Lab, tmp_path: Path, number: signal.Signals) -
     assert lab.state() == OFF
     # braked, not dropped: it stands where it was when the recording ended
     log = read_raw_log(tmp_path / "raw" / "sweep-0.raw")
-    stands_rad = lab.node.sdo[0x6064].raw * 2 * np.pi / 8192
+    stands_rad = lab.read(0x6064) * 2 * np.pi / 8192
     assert abs(np.degrees(stands_rad - log.column("position_rad")[-1])) < 1.0
     assert rows_of(tmp_path) > 2000
 
@@ -344,5 +347,5 @@ def test_the_next_command_finds_the_drive_well(lab: Lab) -> None:
         _, errors = command.communicate(timeout=120)
         assert command.returncode == 0, errors
     time.sleep(1.5)  # longer than a drive waits for a heartbeat
-    assert lab.node.sdo[0x1001].raw == 0
+    assert lab.read(0x1001) == 0
     assert lab.node.emcy.active == []
