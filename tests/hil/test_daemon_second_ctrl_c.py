@@ -17,6 +17,8 @@ import cdpr_profiles
 from cdpr_drivers.cia402 import POWER_OFF, state_of
 from cdpr_tools.composition.simulator import OwnSimulator
 
+pytestmark = pytest.mark.alone
+
 SHIPPED = Path(cdpr_profiles.__file__).parent / "robots" / "planar-3.toml"
 PERIOD_S = 0.004
 NODES = (1, 2, 3)
