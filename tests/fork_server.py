@@ -74,28 +74,35 @@ _connections: dict[int, socket.socket] = {}
 _address: list[str] = []
 _own: list[socket.socket] = []
 """Of a launcher: the way to its own server."""
+_asking = threading.Lock()
+"""Whose request it is, its answer is."""
 
 
 def _ask(request: dict[str, Any], descriptors: Sequence[int] = ()) -> int:
     """Return the server's answer to `request`; the server is started when first needed."""
-    if not _address:
-        _address.append(f"\0cdpr-tests/{os.getpid()}")
-        listener = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
-        listener.bind(_address[0])
-        listener.listen()
-        lifeline, kept = os.pipe()
-        os.set_inheritable(kept, False)  # open for as long as this process lives
-        numbers = [listener.fileno(), lifeline]
-        _Popen([*_STARTED_BY, *map(str, numbers), _ROOM], pass_fds=numbers)
-        listener.close()
-        os.close(lifeline)
-    pid = os.getpid()
-    if pid not in _connections:
-        _connections[pid] = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
-        _connections[pid].connect(_address[0])
-    message = json.dumps(request | {"address": _address[0]}).encode()
-    socket.send_fds(_connections[pid], [message], list(descriptors))
-    return int(_connections[pid].recv(64))
+    with _asking:
+        if not _address:
+            _start_server()
+        pid = os.getpid()
+        if pid not in _connections:
+            _connections[pid] = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+            _connections[pid].connect(_address[0])
+        message = json.dumps(request | {"address": _address[0]}).encode()
+        socket.send_fds(_connections[pid], [message], list(descriptors))
+        return int(_connections[pid].recv(64))
+
+
+def _start_server() -> None:
+    _address.append(f"\0cdpr-tests/{os.getpid()}")
+    listener = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+    listener.bind(_address[0])
+    listener.listen()
+    lifeline, kept = os.pipe()
+    os.set_inheritable(kept, False)  # open for as long as this process lives
+    numbers = [listener.fileno(), lifeline]
+    _Popen([*_STARTED_BY, *map(str, numbers), _ROOM], pass_fds=numbers)
+    listener.close()
+    os.close(lifeline)
 
 
 class ForkingPopen(_Popen):  # type: ignore[type-arg]
@@ -163,10 +170,16 @@ class ForkingPopen(_Popen):  # type: ignore[type-arg]
     def _internal_poll(self, *given: Any, **more: Any) -> int | None:
         if not self._forked:
             return super()._internal_poll(*given, **more)  # type: ignore[misc,no-any-return]
-        if self.returncode is None:
-            pid, status = self._try_wait(os.WNOHANG)
-            if pid == self.pid:
-                self._handle_exitstatus(status)  # type: ignore[attr-defined]
+        # as in Popen: of two threads one alone asks how it has ended; and not the collector, which
+        # may come in the middle of a question
+        if self.returncode is None and not more and self._waitpid_lock.acquire(False):
+            try:
+                if self.returncode is None:
+                    pid, status = self._try_wait(os.WNOHANG)
+                    if pid == self.pid:
+                        self._handle_exitstatus(status)  # type: ignore[attr-defined]
+            finally:
+                self._waitpid_lock.release()
         return self.returncode
 
 
