@@ -195,6 +195,8 @@ def test_a_master_in_its_transfers_is_not_disturbed(lab: Lab) -> None:
         assert "--force" in refused.stderr
         forced = scan(lab, "--nodes", "1", "--force")
         task.stop()
+        task.thread.join()
+        lab.passed(bus)  # what it has sent is no other master's to whoever listens next
     assert forced[1]["serial"] == 1
     assert forced[1]["problems"] == []  # answers to the other are no second node
     assert "SDO requests" in forced[0]["warning"]
