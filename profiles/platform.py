@@ -114,7 +114,7 @@ class PlatformFile(Profile):
     """In the platform's frame; its origin if left out."""
     home_rotation_rad: _Rotation | None = None
     """Rotation vector from the room's axes to the platform's at home, an angle in a plane."""
-    workspace_angle_rad: float = Field(default=0.0, ge=0, lt=math.pi)
+    workspace_angle_rad: float = Field(default=0.0, ge=0)
     """Largest angle from the orientation at home in which targets may lie."""
     angular_speed_rad_s: float | None = Field(default=None, gt=0, le=100)
     angular_acceleration_rad_s2: float | None = Field(default=None, gt=0, le=10_000)

@@ -117,6 +117,9 @@ def _size_faults(
         size = math.hypot(*file.home_rotation_rad)
         problem = f"{size:.4g} rad long; allowed: up to pi (is it in degrees?)"
         yield "platform.home_rotation_rad", problem
+    if file.workspace_angle_rad >= math.pi:
+        problem = f"value {file.workspace_angle_rad:g}; allowed: below pi (is it in degrees?)"
+        yield "platform.workspace_angle_rad", problem
     if file.inertia_kg_m2 is not None and len(file.inertia_kg_m2) in (1, 6):
         yield from _inertia_faults(file.inertia_kg_m2, file.mass_kg, frame_m)
 

@@ -19,7 +19,7 @@ _MASTER_LOST_CODES = (0x8130, 0x8250)
 def alarm_text(axes: Sequence[AxisConfig], ints: Ints) -> str:
     """Return the alarms of all axes in words, the likeliest cause of each axis' first."""
     raised = [int(i) for i in np.flatnonzero(ints[codec.ALARM])]
-    return "; ".join(f"node {axes[i].node_id}: {_axis_text(axes[i], ints[:, i])}" for i in raised)
+    return "; ".join(f"{axes[i].label}: {_axis_text(axes[i], ints[:, i])}" for i in raised)
 
 
 def _axis_text(axis: AxisConfig, column: Ints) -> str:

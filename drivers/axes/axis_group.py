@@ -64,9 +64,7 @@ class AxisGroup(AxisExchange):
         if state == State.OPERATION_ENABLED:
             for axis, faulted in zip(self.axes, self.faulted(), strict=True):
                 if faulted:
-                    raise DriveFaultError(
-                        f"node {axis.node_id}: acknowledge its fault before enabling it"
-                    )
+                    raise DriveFaultError(f"{axis.label}: acknowledge its fault before enabling it")
             if not self.mode_confirmed():
                 raise self.unconfirmed_mode()
         self._ints[codec.TARGET] = state
@@ -125,11 +123,11 @@ class AxisGroup(AxisExchange):
         for i, (axis, mode) in enumerate(zip(self.axes, requested, strict=True)):
             if self._ints[codec.STATE, i] == State.OPERATION_ENABLED:
                 raise ModeRefusedError(
-                    f"node {axis.node_id}: the mode is not changed while the drive is enabled"
+                    f"{axis.label}: the mode is not changed while the drive is enabled"
                 )
             if not supports(axis.supported_modes, mode):
                 raise ModeRefusedError(
-                    f"node {axis.node_id}: mode {mode_name(mode)} is not among the modes "
+                    f"{axis.label}: mode {mode_name(mode)} is not among the modes "
                     f"the drive supports (6502h = {axis.supported_modes:08X}h)"
                 )
         self._ints[codec.MODE_REQUESTED] = NO_MODE
@@ -147,7 +145,7 @@ class AxisGroup(AxisExchange):
             self._ints[codec.MODE_DISPLAYED, i] = self.network.read_int(node, 0x6061)
         except SdoError as error:
             raise ModeRefusedError(
-                f"node {node}: mode {mode_name(mode)} was refused: {error}"
+                f"{self.axes[i].label}: mode {mode_name(mode)} was refused: {error}"
             ) from error
 
     def mode_confirmed(self) -> bool:
@@ -164,13 +162,13 @@ class AxisGroup(AxisExchange):
         """Return the error that names the first axis whose mode is not what was asked for."""
         displayed, requested = self._ints[codec.MODE_DISPLAYED], self._ints[codec.MODE_REQUESTED]
         i = int(np.flatnonzero(displayed != requested)[0])
-        node = self.axes[i].node_id
+        label = self.axes[i].label
         if requested[i] == NO_MODE:
             return ModeRefusedError(
-                f"node {node}: no mode of operation was asked for yet, or the last was refused"
+                f"{label}: no mode of operation was asked for yet, or the last was refused"
             )
         return ModeRefusedError(
-            f"node {node}: asked for mode {mode_name(int(requested[i]))}, "
+            f"{label}: asked for mode {mode_name(int(requested[i]))}, "
             f"but the drive reports {mode_name(int(displayed[i]))} (6061h); it was not enabled"
         )
 
@@ -225,15 +223,14 @@ class AxisGroup(AxisExchange):
         try:
             if self._switch_off_by_cycles():
                 return ""
-            left = [a.node_id for a in self.axes if not self.network.switch_off(a.node_id)]
+            left = [a.label for a in self.axes if not self.network.switch_off(a.node_id)]
         except BusError as error:
-            nodes = ", ".join(str(axis.node_id) for axis in self.axes)
-            return f"node {nodes}: not known to be without power: {error}"
+            nodes = ", ".join(axis.label for axis in self.axes)
+            return f"{nodes}: not known to be without power: {error}"
         if not left:
             return ""
-        nodes = ", ".join(str(node) for node in left)
         return (
-            f"node {nodes}: does not confirm that its power stage is off; it was reset (NMT), "
+            f"{', '.join(left)}: does not confirm that its power stage is off; it was reset (NMT), "
             "but see to it that it has no power"
         )
 

@@ -50,10 +50,12 @@ class AxisConfig:
     supported_modes: int
     """6502h, or the profile's modes in its place."""
     torque_limit_Nm: float
+    name: str = ""
+    """What the robot's file calls it."""
 
     @classmethod
     def from_boot(
-        cls, drive: DriveProfile, report: BootReport, torque_limit_Nm: float
+        cls, drive: DriveProfile, report: BootReport, torque_limit_Nm: float, name: str = ""
     ) -> AxisConfig:
         """Return the axis of a drive that has booted."""
         return cls(
@@ -63,7 +65,13 @@ class AxisConfig:
             report.counts_per_turn,
             report.supported_modes,
             torque_limit_Nm,
+            name,
         )
+
+    @property
+    def label(self) -> str:
+        """Its node id, and its name in brackets, for messages."""
+        return f"node {self.node_id}" + (f" ({self.name})" if self.name else "")
 
     @property
     def rad_per_count(self) -> float:

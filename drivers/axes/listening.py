@@ -48,11 +48,12 @@ class MonitoredBus:
     axis_numbers: Sequence[int]
 
 
-def monitored_axis(winch: Winch, node_id: int) -> AxisConfig:
+def monitored_axis(winch: Winch, node_id: int, name: str = "") -> AxisConfig:
     """Return the axis of a drive that cannot be asked, from its profiles alone."""
     motor = winch.motor
     torque_Nm = motor.rated_torque_Nm
-    return AxisConfig(node_id, winch.drive, torque_Nm, winch.encoder_counts_per_turn, 0, torque_Nm)
+    counts = winch.encoder_counts_per_turn
+    return AxisConfig(node_id, winch.drive, torque_Nm, counts, 0, torque_Nm, name)
 
 
 class ListeningDevice:

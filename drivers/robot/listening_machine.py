@@ -49,9 +49,8 @@ class ListeningMachine:
         buses = []
         for name, url in self._urls.items():
             axis_numbers = robot.axes_on(name)
-            axes = [
-                monitored_axis(robot.axes[i].winch, robot.axes[i].node_id) for i in axis_numbers
-            ]
+            on_bus = [robot.axes[i] for i in axis_numbers]
+            axes = [monitored_axis(axis.winch, axis.node_id, axis.name) for axis in on_bus]
             buses.append(MonitoredBus(name, url, axes, axis_numbers))
         try:
             self.device = ListeningDevice(buses, robot.sync_period_s, self.clock)

@@ -137,7 +137,9 @@ def device_of(
         if not booted_axes:
             continue
         configs = [
-            AxisConfig.from_boot(robot.axes[i].winch.drive, booted[i], torque_Nm[i])
+            AxisConfig.from_boot(
+                robot.axes[i].winch.drive, booted[i], torque_Nm[i], robot.axes[i].name
+            )
             for i in booted_axes
         ]
         axis_numbers = [place_of[i] for i in booted_axes]
@@ -160,7 +162,7 @@ def boot_notes(
     notes = []
     for i, report in booted.items():
         axis = robot.axes[i]
-        notes.append(_lacking_guards(f"bus {axis.bus} node {axis.node_id}", report))
+        notes.append(_lacking_guards(f"bus {axis.bus} node {axis.node_id} ({axis.name})", report))
     notes += [
         f"{robot.axes[i].name} (optional) is left out: {reason}" for i, reason in absent.items()
     ]
@@ -181,5 +183,5 @@ def faults_text(
         except (SdoError, BusError):
             why = "the drive does not say why"
         if why not in known:
-            texts.append(f"bus {axis.bus} node {axis.node_id}: {why}")
+            texts.append(f"bus {axis.bus} node {axis.node_id} ({axis.name}): {why}")
     return "; ".join(texts)

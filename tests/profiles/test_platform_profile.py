@@ -141,7 +141,7 @@ HOME = "home_m = [0.0, 0.0, 0.5]"
         (ROOM, BODY, "body = { min_m = [-0.1, -0.1, -0.3], max_m = [0.06, 0.1, 0.3] }",
          "axes[0].anchor_point_m", "0.04 m beside platform.body; allowed: on it, or up to 0.03 m"),
         (HALL, "angle_rad = 0.2618", "angle_rad = 15.0", "platform.workspace_angle_rad",
-         "less than"),
+         "value 15; allowed: below pi (is it in degrees?)"),
         (HALL, "angular_speed_rad_s = 0.25\n", "", "platform.angular_speed_rad_s", "missing; "),
         (HALL, HOME, HOME + '\ncontrolled = ["x", "y"]', "platform.controlled", "x, y, z, and any"),
         (HALL, HOME, HOME + '\ncontrolled = ["x", "x", "y", "z"]', "platform.controlled",

@@ -263,10 +263,10 @@ def _free_rotation_lines(swings: dict[str, float] | None) -> list[str]:
 def _table(axes: Sequence[dict[str, Any]]) -> list[str]:
     coordinates = len(axes[0]["exit_point_m"])
     a, b = 9 * coordinates, 10 * coordinates
-    rows = [f"{'axis':16}{'exit point, m':>{a}}{'anchor point, m':>{b}}"]
+    rows = [f"{'cable, axis':19}{'exit point, m':>{a}}{'anchor point, m':>{b}}"]
     rows[0] += f"{'cable, m':>16}{'tension, N':>14}{'torque, Nm':>16}"
-    for axis in axes:
-        row = f"{axis['name']:16}{_point(axis['exit_point_m']):>{a}}"
+    for number, axis in enumerate(axes, 1):
+        row = f"{number:>2} {axis['name']:16}{_point(axis['exit_point_m']):>{a}}"
         row += f"{_point(axis['anchor_point_m'], 3):>{b}}"
         cable = "{:.2f} to {:.2f}".format(*axis["cable_m"])
         tension = "{:g} to {:g}".format(*axis["tension_N"])

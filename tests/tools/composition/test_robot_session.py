@@ -126,14 +126,14 @@ def test_axes_may_alternate_between_buses(tmp_path: Path):
 
 def test_a_fault_on_one_bus_stops_the_axes_of_both(bus: str):
     with (
-        pytest.raises(TripError, match=r"bus can1: node 6: .* 7305h incremental encoder"),
+        pytest.raises(TripError, match=r"bus can1: node 6 \(axis 6\): .* 7305h incremental"),
         open_robot(EIGHT, [bus], OUT) as opened,
     ):
         opened.enable()
         opened.machine.networks["can1"].write(6, 0x2F00, 1, 0x7305)
         hold(opened, 10.0)
     with (
-        pytest.raises(ControlError, match=r"^bus can1: node 6: "),
+        pytest.raises(ControlError, match=r"^bus can1: node 6 \(axis 6\): "),
         open_robot(EIGHT, [bus], OUT) as opened,
     ):
         pytest.fail("opened with a drive in fault")
@@ -148,7 +148,7 @@ def test_what_one_bus_refuses_enables_no_drive_of_the_other(session: Session):
     device = session.device
     device.groups[1].ask_mode(Mode.HOMING)
     session.idle(0.001)
-    with pytest.raises(ModeRefusedError, match="node 5: asked for mode 6"):
+    with pytest.raises(ModeRefusedError, match=r"node 5 \(axis 5\): asked for mode 6"):
         device.request(State.OPERATION_ENABLED)
     session.idle(0.05)
     assert all(state == State.SWITCH_ON_DISABLED for state in device.states())

@@ -37,7 +37,7 @@ def test_a_drive_that_stays_deaf_keeps_the_fault(lab: tuple[Path, str]) -> None:
         assert not answer["ok"]
         assert "node 2" in answer["text"]
         assert rig.state is LoopState.FAULT
-        assert "node 2" in rig.status["reason"]
+        assert "node 2 (axis 2)" in rig.status["reason"]
 
 
 def test_a_bus_that_is_gone_and_comes_back(lab: tuple[Path, str]) -> None:

@@ -133,7 +133,7 @@ def test_a_drive_that_stays_silent_does_not_keep_two_buses_from_being_left():
         left = robot.machine.close()
         # one second of cycles, then by SDO, whose time runs out
         assert 1.0 < robot.machine.clock.now_s - begin_s < 10.0
-    assert left.startswith("node 2: does not confirm that its power stage is off")
+    assert left.startswith("node 2 (axis 2): does not confirm that its power stage is off")
     assert "node 1" not in left
 
 
@@ -154,4 +154,4 @@ def test_a_bus_that_is_not_exchanged_any_more_does_not_keep_the_others_from_bein
         begin_s = robot.machine.clock.now_s
         left = robot.machine.close()
         assert 1.0 < robot.machine.clock.now_s - begin_s < 10.0
-    assert "node 2: does not confirm that its power stage is off" in left
+    assert "node 2 (axis 2): does not confirm that its power stage is off" in left

@@ -109,7 +109,11 @@ def move(
     """Move axes or the platform to positions and wait; Ctrl-C holds and exits with 1."""
     if to is not None or rotate is not None:
         if axes or cable:
-            raise BadInputError("--to, --rotate: not together with axes or --cable")
+            given = ", ".join(axes or ["--cable"])
+            raise BadInputError(
+                f"--to, --rotate: not together with axes or --cable: {given}; allowed: plain "
+                "numbers, of mm and deg"
+            )
         _move_platform(daemon, out, PlatformMove(to, rotate, relative, frame, speed))
         return
     if frame is not ReferenceFrame.ROOM:
