@@ -34,7 +34,7 @@ import subprocess
 import sys
 import threading
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -88,8 +88,12 @@ def _ask(request: dict[str, Any], descriptors: Sequence[int] = ()) -> int:
             _connections[pid] = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
             _connections[pid].connect(_address[0])
         message = json.dumps(request | {"address": _address[0]}).encode()
-        socket.send_fds(_connections[pid], [message], list(descriptors))
-        return int(_connections[pid].recv(64))
+        try:
+            socket.send_fds(_connections[pid], [message], list(descriptors))
+            return int(_connections[pid].recv(64))
+        except BaseException:  # an answer that comes yet is not to be taken for the next one's
+            _connections.pop(pid).close()
+            raise
 
 
 def _start_server() -> None:
@@ -170,9 +174,10 @@ class ForkingPopen(_Popen):  # type: ignore[type-arg]
     def _internal_poll(self, *given: Any, **more: Any) -> int | None:
         if not self._forked:
             return super()._internal_poll(*given, **more)  # type: ignore[misc,no-any-return]
-        # as in Popen: of two threads one alone asks how it has ended; and not the collector, which
-        # may come in the middle of a question
-        if self.returncode is None and not more and self._waitpid_lock.acquire(False):
+        if more and _asking.locked():
+            return None  # the collector has come in the middle of a question
+        # as in Popen: of two threads one alone asks how it has ended
+        if self.returncode is None and self._waitpid_lock.acquire(False):
             try:
                 if self.returncode is None:
                     pid, status = self._try_wait(os.WNOHANG)
@@ -270,7 +275,8 @@ def _obey(client: socket.socket, selector: selectors.BaseSelector, kernels: Any)
             _become(request, descriptors)
         for descriptor in descriptors:
             os.close(descriptor)
-    client.send(str(answer).encode())
+    with suppress(ConnectionError):  # whose question was interrupted has gone
+        client.send(str(answer).encode())
     return True
 
 

@@ -24,7 +24,7 @@ CALIBRATED_SHARE: Final = 1.0 / 3.0
 CALIBRATED_m: Final = 0.005
 """Share of all that once the geometry has been calibrated, and its least value then."""
 _LEAST_LENGTH_m = 1e-6
-_LEAST_REDUNDANCY = 1e-4
+LEAST_REDUNDANCY = 1e-4
 """A cable whose redundancy number is less contradicts no other."""
 
 
@@ -62,7 +62,7 @@ def _of_drums_m(platform: Platform) -> float:
         lengths_m, J = _cables(platform, corner)
         P = np.eye(len(J)) - J @ np.linalg.pinv(J)
         redundancy = np.diag(P)
-        seen = redundancy > _LEAST_REDUNDANCY
+        seen = redundancy > LEAST_REDUNDANCY
         variance = P[seen] ** 2 @ (DRUM_SHARE * (lengths_m - home_m)) ** 2 / redundancy[seen]
         worst = max(worst, float(variance.max(initial=0.0)))
     return float(np.sqrt(worst))

@@ -147,12 +147,16 @@ def patient_rail(folder: Path, kind: str, port: int = 502) -> Path:
     """Write the shipped rail with times that suit a busy machine, and a port; return it."""
     text = (SHIPPED / "rails" / f"rail-{kind}.toml").read_text()
     drive = write_tolerant_drive(folder, 0.5 * MASTER_S, MASTER_S)
-    for before, after in (
-        ('"generic-cia402"', f'"{drive}"'),
-        ("port = 502\n", f"port = {port}\nanswer_timeout_s = {ANSWER_S}\n"),
-        ("brake_timeout_s = 0.5", f"brake_timeout_s = {ANSWER_S}"),
-        ("\ntimeout_s = 0.5", f"\ntimeout_s = {MASTER_S}"),
-    ):
+    changes = {
+        "cia402": (('"generic-cia402"', f'"{drive}"'),),
+        "modbus": (
+            ("port = 502\n", f"port = {port}\nanswer_timeout_s = {ANSWER_S}\n"),
+            ("brake_timeout_s = 0.5", f"brake_timeout_s = {ANSWER_S}"),
+            ("\ntimeout_s = 0.5", f"\ntimeout_s = {MASTER_S}"),
+        ),
+    }
+    for before, after in changes[kind]:
+        assert before in text
         text = text.replace(before, after)
     path = folder / f"rail-{kind}.toml"
     path.write_text(text)

@@ -72,10 +72,9 @@ class Lab:
         client, asked = self.node.sdo, index.to_bytes(2, "little") + b"\0"
         client.responses = queue.Queue()
         client.send_request(b"\x40" + asked + bytes(4))
-        while (answer := client.responses.get(timeout=60.0))[0] & 0xE3 != 0x43 or (
-            answer[1:4] != asked
-        ):
-            pass
+        while (answer := client.responses.get(timeout=60.0))[1:4] != asked:
+            continue
+        assert answer[0] & 0xE3 == 0x43, answer.hex(" ")  # and no abort
         return int.from_bytes(answer[4 : 8 - (answer[0] >> 2 & 3)], "little", signed=True)
 
     def inject_fault(self, sub: int, value: int) -> None:

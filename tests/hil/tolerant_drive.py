@@ -14,7 +14,8 @@ _WINCH = "winch-mpp0923d"
 def write_tolerant_drive(folder: Path, producer_s: float = 5.0, consumer_s: float = 10.0) -> Path:
     """Write the shipped drive that lets itself and its master be held up for seconds; return it.
 
-    The heartbeats are its own, and how long it waits for those of its master.
+    It sends a heartbeat every `producer_s`, waits `consumer_s` for its master's, and may take 5 s
+    to show a mode.
     """
     shipped = Path(cdpr_profiles.__file__).parent / "drives" / "generic-cia402.toml"
     text = shipped.read_text()

@@ -35,7 +35,7 @@ def by_prompt(mass_kg: float, clock: Clock) -> None:
             line := clock.run_blocking(partial(_typed, question, stop_requested))
         ).strip() and line.endswith("\n"):
             typer.echo("Enter alone, please.", err=True)
-    if not line.endswith("\n"):
+    if stop_requested() or not line.endswith("\n"):
         raise not_hung(mass_kg)
 
 

@@ -17,6 +17,7 @@ from cdpr_rt.robots.feasibility.finding import Finding, rounded_down
 from cdpr_rt.robots.feasibility.loop_checks import loop_findings
 from cdpr_rt.robots.feasibility.not_held import point_text, why_not_held
 from cdpr_rt.robots.feasibility.stand_checks import stand_findings, unwinding
+from cdpr_rt.robots.feasibility.uncontrolled_rotation import uncontrolled_rotation
 from cdpr_rt.robots.interference.interference import in_words
 from cdpr_rt.robots.robot_arrays import limits_of
 from cdpr_rt.robots.statics import NONE_rad, PlatformStatics, statics_of
@@ -61,7 +62,7 @@ def findings(robot: Robot, limits: Limits | None = None) -> list[Finding]:
             found += loop_findings(robot, statics)
         found += [
             *turned,
-            *turning.uncontrolled_rotation(statics, limits.lengths_disagree_m),
+            *uncontrolled_rotation(statics, limits.lengths_disagree_m),
             *turning.stand_clearance(statics),
         ]
         found += [*_contact(statics), *turning.upright(statics)]

@@ -7,12 +7,10 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from cdpr_profiles.platform import DIRECTIONS
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.robots.feasibility.finding import Finding
 from cdpr_rt.robots.feasibility.not_held import point_text
-from cdpr_rt.robots.kinematics.cable_kernel import CABLE_ROWS, hanging_wrenches, run_poses
-from cdpr_rt.robots.rigid_body import G_m_s2, LEAST_ARM_m, in_space, is_point, rotation
+from cdpr_rt.robots.rigid_body import in_space
 from cdpr_rt.robots.statics import NONE_rad, PlatformStatics
 
 _TURNED_rad = np.concatenate([[0.01, 0.02, 0.03], 0.04 * np.arange(1, 80)])
@@ -20,7 +18,6 @@ _TURNED_rad = np.concatenate([[0.01, 0.02, 0.03], 0.04 * np.arange(1, 80)])
 _TIPS_AT = 0.05
 """Share of its weight that any cable which becomes tight pulls with."""
 _FAR_TURNED_deg, _TIPPED_deg = 10.0, 4.0
-_STEP_rad, _SIX = 1e-5, 6
 
 
 def free_rotation(statics: PlatformStatics) -> Iterator[Finding]:
@@ -50,102 +47,6 @@ def free_rotation(statics: PlatformStatics) -> Iterator[Finding]:
             "prevent; anchor points that lie towards their exit points let it turn less"
         )
         yield Finding("axes[0].anchor_point_m", text, impossible=False)
-
-
-def uncontrolled_rotation(statics: PlatformStatics, disagree_m: float) -> Iterator[Finding]:
-    """Look how a platform in space turns about axes that `controlled` leaves out.
-
-    Under the tensions that are planned where it is not turned, cables and weight have a moment m
-    about these axes and a stiffness K = -∂m/∂φ: it rests turned by φ = K^-1 m, and turns over where
-    K is not positive definite. Taken for not turned, it seems to be J_c^+ J_u φ away, by lengths
-    that disagree by the rest of J_u φ; `disagree_m` is allowed.
-    """
-    platform, directions = statics.platform, statics.model.kinematics.directions
-    left = [i for i in (3, 4, 5) if i not in directions]
-    if platform.is_planar or not left or is_point(platform):
-        return
-    axes = _axes_that_move(statics, left)
-    if not axes.size:
-        return  # those of a rod
-    home = np.array(platform.home_m)
-    places = np.concatenate([home[None], statics.points().reshape(-1, 3)])
-    t = statics.least_tensions_N(places, statics.model.reserve_N)
-    held = np.isfinite(t).all(axis=1) & statics.is_target(places)
-    if not held.any():
-        return  # said of the tensions
-    places, t = places[held], t[held]
-    moments, K, W = _moments(statics, statics.poses(places), t, axes)
-    least = np.linalg.eigvalsh(0.5 * (K + K.mT))[:, 0]
-    n, names = t.shape[1], ", ".join(DIRECTIONS[3][i] for i in left)
-    mend = f"its {n} cables can control them" if n >= _SIX else "to control them takes six cables"
-    mend += "; anchor points nearer together, far above the centre of mass, help"
-    if least.min() <= 0.0:
-        where = point_text(places[least.argmin()])
-        what, impossible = f"at {where} m cables and weight turn the platform over", True
-    else:
-        turns = (axes @ np.linalg.solve(K, moments[..., None]))[..., 0]
-        what, impossible = _hanging(places, turns, -W.mT, directions, disagree_m)
-    yield Finding("platform.controlled", f"{names} left out: {what}; {mend}", impossible)
-
-
-def _hanging(
-    places: FloatArray,
-    turns: FloatArray,
-    J: FloatArray,
-    directions: tuple[int, ...],
-    disagree_m: float,
-) -> tuple[str, bool]:
-    """Return in words how it hangs where that is worst, and whether it is impossible.
-
-    At places (m, 3) it is turned by rotation vectors (m, 3); `J` (m, n, 6) is of all directions.
-    """
-    longer_m, Jc = J[..., 3:] @ turns[..., None], J[..., directions]
-    off_m = np.linalg.pinv(Jc) @ longer_m
-    rest_m = np.abs(longer_m - Jc @ off_m).max(axis=(1, 2))
-    impossible, angle = bool(rest_m.max() > disagree_m), np.linalg.norm(turns, axis=1)
-    k = int((rest_m if impossible else angle).argmax())
-    text = (
-        f"at {point_text(places[k])} m the platform hangs turned by {math.degrees(angle[k]):.2g} "
-        "deg about these axes, and is taken to be turned as at home: "
-    )
-    if impossible:
-        wrong = f"lengths disagree by {1e3 * rest_m[k]:.3g} mm, {1e3 * disagree_m:.3g} mm allowed"
-        return text + wrong, True
-    return f"{text}{1e3 * np.linalg.norm(off_m[k, :3]):.3g} mm off, besides what it swings", False
-
-
-def _axes_that_move(statics: PlatformStatics, left: list[int]) -> FloatArray:
-    """Return the axes (3, k) about which turning moves anchors or centre of mass, of those left."""
-    platform = statics.platform
-    points = [*platform.anchor_points_m, platform.centre_of_mass_m]
-    arms = np.array([in_space(point) for point in points]) @ statics.model.home_pose.Q.T
-    about = np.eye(3)[[i - 3 for i in left]]
-    moved = np.cross(about[:, None], arms[None]).reshape(len(left), -1).T
-    _, size, turns = np.linalg.svd(moved, full_matrices=False)
-    return np.asarray(about.T @ turns[size > LEAST_ARM_m].T)
-
-
-def _moments(
-    statics: PlatformStatics, poses: FloatArray, t: FloatArray, axes: FloatArray
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return moments (m, k) about `axes` (3, k), their stiffness (m, k, k), and W (m, 6, n)."""
-    platform, geometry = statics.platform, statics.model.kinematics.geometry
-    cables, hanging = np.empty((len(poses), CABLE_ROWS, t.shape[1])), np.empty((len(poses), 6))
-    centre = in_space(platform.centre_of_mass_m)
-    weight = np.array([0.0, 0.0, -platform.mass_kg * G_m_s2])
-
-    def moment(turn: FloatArray) -> tuple[FloatArray, FloatArray]:
-        turned = poses.copy()
-        turned[:, 1:] = rotation(turn) @ poses[:, 1:]
-        hanging_wrenches(geometry, turned, np.arange(6), cables[0], hanging)
-        run_poses(geometry, turned, cables)
-        W = -cables[:, :6]
-        pulled = (W @ t[..., None])[:, 3:, 0] + hanging[:, 3:]
-        return (pulled + np.cross(turned[:, 1:] @ centre, weight)) @ axes, W
-
-    m, W = moment(NONE_rad)
-    slopes = [moment(_STEP_rad * a)[0] - moment(-_STEP_rad * a)[0] for a in axes.T]
-    return m, -np.stack(slopes, axis=-1) / (2.0 * _STEP_rad), W
 
 
 def angles(statics: PlatformStatics) -> Iterator[Finding]:

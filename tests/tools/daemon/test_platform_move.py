@@ -225,7 +225,7 @@ def test_options_take_all_numbers_that_follow(
     [
         (["--to"], "requires an argument"),
         (["--to", "1", "2", "left=3"], "not together with axes"),
-        (["--to", "1", "2mm"], "2mm; allowed: plain numbers, of mm and deg"),
+        (["--to", "1", "2mm"], "2mm; allowed: numbers without a unit, of mm and deg"),
         (["--frame", "platform", "left=3"], "--frame platform: allowed: together with"),
         (["--to", "1", "2"], "2 numbers; allowed: 3, X Y Z in mm"),
     ],

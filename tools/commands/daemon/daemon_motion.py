@@ -109,11 +109,11 @@ def move(
     """Move axes or the platform to positions and wait; Ctrl-C holds and exits with 1."""
     if to is not None or rotate is not None:
         if axes or cable:
-            given = ", ".join(axes or ["--cable"])
-            raise BadInputError(
-                f"--to, --rotate: not together with axes or --cable: {given}; allowed: plain "
-                "numbers, of mm and deg"
-            )
+            given = ", ".join([*(axes or []), *["--cable"] * cable])
+            text = f"--to, --rotate: not together with axes or --cable: {given}"
+            if any("=" not in axis for axis in axes or []):
+                text += "; allowed: numbers without a unit, of mm and deg"
+            raise BadInputError(text)
         _move_platform(daemon, out, PlatformMove(to, rotate, relative, frame, speed))
         return
     if frame is not ReferenceFrame.ROOM:
