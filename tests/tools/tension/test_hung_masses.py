@@ -102,6 +102,16 @@ def test_a_signal_ends_the_question(
     os.close(inlet)
 
 
+def test_a_signal_beside_enter_ends_it_too(monkeypatch: pytest.MonkeyPatch) -> None:
+    def typed(_question: str, _stop_requested: Callable[[], bool]) -> str:
+        signal.raise_signal(signal.SIGINT)
+        return "\n"
+
+    monkeypatch.setattr(hanging, "_typed", typed)
+    with pytest.raises(InvalidRequestError, match="nobody has hung 5 kg"):
+        by_prompt(5.0, LockstepClock())
+
+
 def test_a_signal_ends_the_question_while_cycles_run(monkeypatch: pytest.MonkeyPatch) -> None:
     outlet, inlet = os.pipe()
     too_late = threading.Timer(LONGEST_S, os.write, (inlet, b"\n"))
