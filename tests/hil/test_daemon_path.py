@@ -130,6 +130,7 @@ def test_paused_faulted_and_killed_it_is_taken_up_where_it_was_left(folder: Path
         break_a_drive(daemon)
         with following(daemon, "--resume") as path:
             seen = until_time(daemon, told(daemon)["time_s"] + 0.2)
+            assert seen["feed"] == 0.5  # as it was left
             os.kill(daemon.children()["loop"], signal.SIGKILL)
             path.communicate()
         assert path.returncode == 1

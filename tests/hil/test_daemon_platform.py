@@ -138,6 +138,7 @@ def test_after_a_rail_has_moved_it_goes_nowhere_until_somebody_says_where_it_is(
         if "run tighten first" in why:
             return
         assert "'planar' is not calibrated since 20" in why and "rail 2 was moved" in why
+        assert any("is not calibrated" in notice for notice in daemon.status()["notices"])
         assert cdpr("robot", "mark-calibrated", daemon.robot, "--why", "laser").returncode == 0
     pytest.fail(why)
 

@@ -35,8 +35,10 @@ Opened = AbstractContextManager[Daemon]
 BACK: Final = "`cdpr path --back MM` steps back"
 
 
-def follow(opened: Opened, out: Output, file: Path, options: PathOptions, feed: float) -> None:
-    """Have the daemon plan a file's path, and follow it to its end."""
+def follow(
+    opened: Opened, out: Output, file: Path, options: PathOptions, feed: float | None
+) -> None:
+    """Have the daemon plan a file's path, and follow it to its end; `feed` is up to 1."""
     body: dict[str, Any] = {
         "name": plain_name(file),
         "text": read_text(file, _MOST_BYTES),
@@ -53,7 +55,7 @@ def follow(opened: Opened, out: Output, file: Path, options: PathOptions, feed: 
             f"{file.name}: {planned['length_m']:.3f} m in {time_text(planned['duration_s'])}, "
             f"{planned['gain']:.1f} times as fast as at one speed throughout"
         )
-        arguments = {"plan": planned["plan"], "feed": feed}
+        arguments = {"plan": planned["plan"]} | _feed(feed)
         _run(daemon, out, arguments, planned_s=planned["duration_s"])
 
 
@@ -64,14 +66,16 @@ def plain_name(file: Path) -> str:
     return f"{stem or 'path'}{suffix}"
 
 
-def resume_path(opened: Opened, out: Output, back_mm: float | None, feed: float) -> None:
-    """Go on with the path that was left, or step back along it."""
+def resume_path(opened: Opened, out: Output, back_mm: float | None, feed: float | None) -> None:
+    """Go on with the path that was left, or step back along it; without a feed at its own."""
     with opened as daemon:
         _require_platform(daemon, out)
-        arguments: dict[str, Any] = {"resume": True, "feed": feed}
-        if back_mm is not None:
-            arguments = {"back_m": 1e-3 * back_mm, "feed": feed}
-        _run(daemon, out, arguments)
+        where = {"resume": True} if back_mm is None else {"back_m": 1e-3 * back_mm}
+        _run(daemon, out, where | _feed(feed))
+
+
+def _feed(feed: float | None) -> dict[str, Any]:
+    return {} if feed is None else {"feed": feed}
 
 
 def _planned(daemon: Daemon, body: dict[str, Any]) -> dict[str, Any]:

@@ -137,7 +137,8 @@ class PlatformParts:
         """Return what an operator should know of the robot."""
         broken = self.last_stop.broken
         mend = f"{broken}: mend the cable, then `cdpr tighten --from home`" if broken else ""
-        return [text for text in (mend, *self.control.notices(), self.off_home) if text]
+        told = (self.not_calibrated_reason, mend, *self.control.notices(), self.off_home)
+        return [text for text in told if text]
 
     def lengths_disagree(self) -> tuple[float, int]:
         """Return how far the lengths are from agreeing, and which cable's is off; 0 while slack."""

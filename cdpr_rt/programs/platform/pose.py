@@ -69,6 +69,8 @@ class PoseProgram(PlatformProgram):
         self._clutched = False
         self._commanded: FloatArray | None = None
         """The last position commanded and not reached, where `resume` goes."""
+        self._asked_m_s = float(parts.speed[0])
+        """The speed it was commanded with, at which `resume` goes on unless asked otherwise."""
         self._has_command = False
         self._stops_feasibly = False
         self._commanded_speed = np.array(parts.speed)
@@ -136,7 +138,8 @@ class PoseProgram(PlatformProgram):
         allowed = [key for key in _KEYS if key != "rotation_rad" or self._about.size]
         keys = CommandArguments(self.name, arguments, allowed)
         fastest = float(self._parts.speed[0])
-        speed = keys.number("speed_m_s", _SLOWEST_m_s, fastest, fastest)
+        default = self._asked_m_s if "resume" in keys else fastest
+        speed = keys.number("speed_m_s", _SLOWEST_m_s, fastest, default)
         self._require_pose()
         if not arguments:
             return "stay", None, speed
@@ -217,7 +220,7 @@ class PoseProgram(PlatformProgram):
             self._commanded = None
             self._deadband_weight = 0.0
         if self._has_command and position is not None:
-            self._commanded = np.array(position)
+            self._commanded, self._asked_m_s = np.array(position), speed
             self._set_out(self._commanded)
             return
         self._brake()

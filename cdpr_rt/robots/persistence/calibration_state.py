@@ -65,7 +65,8 @@ def not_calibrated_reason(robot: str) -> str:
     since = f" since {state.date}" if state.date else ""
     return (
         f"robot {robot!r} is not calibrated{since}: {state.why}; calibrate it, or say that it is "
-        "(`cdpr robot mark-calibrated ROBOT --why ...`, ROBOT as it is run), and enable again"
+        "(`cdpr robot mark-calibrated ROBOT --why ...`, ROBOT as it is run), and give it power "
+        "anew: `cdpr disable`, `cdpr enable`, `cdpr tighten`"
     )
 
 

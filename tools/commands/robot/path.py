@@ -77,8 +77,13 @@ def path(
         typer.Option(min=0.1, help="Step back by so many mm along the path that was left."),
     ] = None,
     feed: Annotated[
-        float, typer.Option(min=1.0, max=100.0, help="Percent of the planned speed.")
-    ] = 100.0,
+        float | None,
+        typer.Option(
+            min=1.0,
+            max=100.0,
+            help="Percent of the planned speed: 100, or what it was left with.",
+        ),
+    ] = None,
     keep: Annotated[
         bool, typer.Option("--keep", help="Leave the plan to the robot's daemon, by a name.")
     ] = False,
@@ -100,6 +105,7 @@ def path(
     if hint := options.metres_hint():
         out.note(hint)
     follows = run or resume or back is not None
+    share = None if feed is None else 0.01 * feed
     if sum((run, resume, back is not None)) > 1:
         raise BadInputError("--run, --resume, --back: allowed: one of them")
     looks = ["--png"] * (picture is not None) + ["--keep"] * keep
@@ -113,9 +119,9 @@ def path(
     if follows:
         opened = open_daemon(robot, socket, url, key_file)
         if file is not None:
-            following.follow(opened, out, file, options, 0.01 * feed)
+            following.follow(opened, out, file, options, share)
         else:
-            following.resume_path(opened, out, back, 0.01 * feed)
+            following.resume_path(opened, out, back, share)
         return
     assert file is not None  # see above
     if robot is None:

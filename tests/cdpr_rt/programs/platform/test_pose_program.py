@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from cdpr_rt.motion.stream_buttons import CLUTCH
 from cdpr_rt.programs.arguments import ProgramError
 from tests.cdpr_rt.programs.platform.led_platform import (
+    PERIOD_S,
     ROBOT,
     LedPlatform,
     SPEED_m_s,
@@ -248,6 +249,25 @@ def test_resume_goes_on_to_the_target_that_was_left(robot: LedPlatform) -> None:
     assert robot.control.position == pytest.approx([0.5, 2.2])
     with pytest.raises(ProgramError, match="no target has been left"):
         robot.program.command({"resume": True})
+
+
+def test_resume_goes_on_at_the_speed_that_was_asked_for(robot: LedPlatform) -> None:
+    def fastest_m_s() -> float:
+        begin = len(robot.path)
+        robot.until_rest()
+        path = np.array(robot.path[begin:])
+        return float(np.abs(np.diff(path, axis=0)).max()) / PERIOD_S
+
+    robot.program.command({"position_m": [0.5, 2.2], "speed_m_s": 0.05})
+    robot.run(0.3)
+    robot.program.stop()
+    robot.until_rest()
+    robot.program.start(robot.feedback, robot.setpoint, robot.torque)
+    robot.program.command({})
+    robot.program.command({"resume": True})
+    assert fastest_m_s() == pytest.approx(0.05, rel=0.02)
+    robot.program.command({"position_m": [0.0, 2.0]})
+    assert fastest_m_s() > 0.2
 
 
 def test_a_hand_leads_by_its_scale(robot: LedPlatform) -> None:
