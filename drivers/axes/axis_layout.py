@@ -51,7 +51,7 @@ class AxisConfig:
     """6502h, or the profile's modes in its place."""
     torque_limit_Nm: float
     name: str = ""
-    """What the robot's file calls it."""
+    """What messages call it beside its node id, if anything."""
 
     @classmethod
     def from_boot(

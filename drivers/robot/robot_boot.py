@@ -132,14 +132,14 @@ def device_of(
     place_of = {i: place for place, i in enumerate(booted)}
     buses = []
     commands_s = {budget.bus: budget.commands_s for budget in machine_budget(robot)}
+    # of a single one it says nothing
+    names = [axis.name if len(robot.axes) > 1 else "" for axis in robot.axes]
     for name, network in networks.items():
         booted_axes = [i for i in robot.axes_on(name) if i in booted]
         if not booted_axes:
             continue
         configs = [
-            AxisConfig.from_boot(
-                robot.axes[i].winch.drive, booted[i], torque_Nm[i], robot.axes[i].name
-            )
+            AxisConfig.from_boot(robot.axes[i].winch.drive, booted[i], torque_Nm[i], names[i])
             for i in booted_axes
         ]
         axis_numbers = [place_of[i] for i in booted_axes]
