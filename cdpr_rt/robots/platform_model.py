@@ -10,8 +10,9 @@ import numpy as np
 
 from cdpr_profiles import Robot
 from cdpr_profiles.platform import Platform
-from cdpr_rt.arrays import FloatArray
+from cdpr_rt.arrays import BoolArray, FloatArray
 from cdpr_rt.core.supervision.limits import Limits
+from cdpr_rt.robots.interface import TensionOutcome
 from cdpr_rt.robots.interference.interference import Interference, in_words
 from cdpr_rt.robots.kinematics.cable_kernel import ANCHOR, RADIUS
 from cdpr_rt.robots.kinematics.kinematics import CableKinematics
@@ -190,6 +191,26 @@ class PlatformModel:
     def least_tensions(self, low_N: FloatArray, high_N: FloatArray) -> TensionSolver:
         """Return the distribution that deviates least from the lower bounds (n,), in squares."""
         return tension_distribution("minimum-deviation", low_N, high_N, self.wrench_scale, low_N)
+
+    def planned_tensions(
+        self, poses: FloatArray, others: FloatArray
+    ) -> tuple[FloatArray, BoolArray]:
+        """Return the tensions (m, n) that the file's distribution plans, and whether they carry.
+
+        At poses (m, 4, 3), against wrenches (m, d) of all but the cables about the centre of mass,
+        their weight left out; within what the motors' torque leaves, and the control's reserve.
+        """
+        low, high = self.low_N + self.reserve_N, self.torque_limited_N - self.reserve_N
+        method = self.platform.tension_distribution
+        wanted = low if method == "minimum-deviation" else None
+        distribution = tension_distribution(method, low, high, self.wrench_scale, wanted)
+        workspace = self.workspace(0.0, 0.0)
+        others = others + workspace.hanging_wrenches(poses)
+        tensions, carried = np.zeros((len(poses), self.kinematics.n)), np.zeros(len(poses), bool)
+        for i, W in enumerate(workspace.wrench_matrices(poses)):
+            outcome = distribution.solve(W, others[i], tensions[i])
+            carried[i] = outcome is TensionOutcome.FEASIBLE
+        return tensions, carried
 
     def pose(self, position: FloatArray) -> Pose:
         """Return the pose at a position (d,) or (k,)."""

@@ -9,10 +9,8 @@ import numpy as np
 
 from cdpr_rt.arrays import BoolArray, FloatArray, IntArray
 from cdpr_rt.motion.path.time_scaling import TimedPath
-from cdpr_rt.robots.interface import TensionOutcome
 from cdpr_rt.robots.platform_model import PlatformModel
 from cdpr_rt.robots.rigid_body import G_m_s2
-from cdpr_rt.robots.tension.tension_distribution import tension_distribution
 from cdpr_rt.robots.wrenches.path_wrenches import InertialWrenches
 
 _MOST: Final = 20_000
@@ -39,16 +37,8 @@ def path_tensions(model: PlatformModel, timed: TimedPath) -> PathTensions:
     chosen = np.arange(0, len(timed.samples), step)
     q, v, a = (np.ascontiguousarray(timed.samples[chosen, i]) for i in range(3))
     low, high = model.low_N + model.reserve_N, model.torque_limited_N - model.reserve_N
-    method = model.platform.tension_distribution
-    wanted = low if method == "minimum-deviation" else None
-    distribution = tension_distribution(method, low, high, model.wrench_scale, wanted)
     weight = np.zeros(6)
     weight[model.positions - 1] = -model.platform.mass_kg * G_m_s2
     others = weight[list(model.kinematics.directions)] - InertialWrenches(model, q).of(v, a)
-    workspace, poses = model.workspace(0.0, 0.0), model.poses(q)
-    matrices, others = workspace.wrench_matrices(poses), others + workspace.hanging_wrenches(poses)
-    tension, carried = np.zeros((len(q), model.kinematics.n)), np.zeros(len(q), bool)
-    for i, W in enumerate(matrices):
-        outcome = distribution.solve(W, others[i], tension[i])
-        carried[i] = outcome is TensionOutcome.FEASIBLE
+    tension, carried = model.planned_tensions(model.poses(q), others)
     return PathTensions(chosen, tension, low, high, carried)

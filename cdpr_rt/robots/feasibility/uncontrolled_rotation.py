@@ -7,19 +7,17 @@ from collections.abc import Iterator
 import numpy as np
 
 from cdpr_profiles.platform import DIRECTIONS
-from cdpr_rt.arrays import BoolArray, FloatArray
+from cdpr_rt.arrays import FloatArray
 from cdpr_rt.robots.feasibility.finding import Finding
 from cdpr_rt.robots.feasibility.not_held import point_text
-from cdpr_rt.robots.interface import TensionOutcome
 from cdpr_rt.robots.kinematics.cable_kernel import CABLE_ROWS, hanging_wrenches, run_poses
+from cdpr_rt.robots.kinematics.pose import Pose
 from cdpr_rt.robots.length_disagreement import LEAST_REDUNDANCY
+from cdpr_rt.robots.platform.design.loop_plant import weight_at, whole_stiffness
 from cdpr_rt.robots.platform_model import PlatformModel
-from cdpr_rt.robots.rigid_body import G_m_s2, LEAST_ARM_m, in_space, is_point, rotation
+from cdpr_rt.robots.rigid_body import LEAST_ARM_m, in_space, is_point
 from cdpr_rt.robots.statics import PlatformStatics
-from cdpr_rt.robots.tension.tension_distribution import tension_distribution
 
-_STEP = 1e-5
-"""Of a small motion, m and rad."""
 _ENOUGH_CABLES = 6
 _LEAST_deg, _LEAST_mm = 0.1, 0.1
 _FAR_TURNED_deg = 30.0
@@ -41,7 +39,8 @@ def uncontrolled_rotation(statics: PlatformStatics, disagree_m: float) -> Iterat
         return
     names = ", ".join(DIRECTIONS[3][i] for i in left)
     places, poses = _targets(statics)
-    t, carried = _planned_N(model, poses)
+    weight = np.tile(model.workspace(0.0, 0.0).wrenches[0], (len(poses), 1))
+    t, carried = model.planned_tensions(poses, weight)
     if not carried.any():
         return  # said of the tensions
     places, poses, t = places[carried], poses[carried], t[carried]
@@ -74,7 +73,7 @@ def _hanging(
         return "its weight swings about these axes, of which no cable tells" if hangs else "", False
     N = N @ axes
     stiffness = N.mT @ K @ N
-    least = np.linalg.eigvalsh(0.5 * (stiffness + stiffness.mT))[:, 0]
+    least = np.linalg.eigvalsh(stiffness)[:, 0]
     n = t.shape[1]
     mend = (
         "its cables can control them" if n >= _ENOUGH_CABLES else "to control them takes 6 cables"
@@ -87,23 +86,36 @@ def _hanging(
     redundancy = 1.0 - np.einsum("mnd,mdn->mn", held, inverse)
     apart_m = np.abs(J @ x[..., None])[..., 0] / np.sqrt(np.maximum(redundancy, LEAST_REDUNDANCY))
     apart_m = np.where(redundancy > LEAST_REDUNDANCY, apart_m, 0.0).max(axis=1)
+    what, impossible = _in_words(places, x, apart_m, disagree_m)
+    return what + mend, impossible
+
+
+def _in_words(
+    places: FloatArray, x: FloatArray, apart_m: FloatArray, disagree_m: float
+) -> tuple[str, bool]:
+    """Return the worst of the motions (m, 6) into rest, at places (m, 3), in words.
+
+    `apart_m` (m,) is the largest normalised residual there.
+    """
     angle_deg = np.degrees(np.linalg.norm(x[:, 3:], axis=1))
     off_mm = 1e3 * np.linalg.norm(x[:, :3], axis=1)
     if angle_deg.max() > _FAR_TURNED_deg:
         where = point_text(places[angle_deg.argmax()])
-        return f"at {where} m the platform turns by more than {_FAR_TURNED_deg:g} deg{mend}", True
-    contradicting = apart_m.max() > disagree_m
+        return f"at {where} m the platform turns by more than {_FAR_TURNED_deg:g} deg", True
+    contradicting = bool(apart_m.max() > disagree_m)
+    if not contradicting and angle_deg.max() < _LEAST_deg and off_mm.max() < _LEAST_mm:
+        return "the platform swings about these axes", False
     k = int((apart_m if contradicting else off_mm).argmax())
-    if max(angle_deg[k] / _LEAST_deg, off_mm[k] / _LEAST_mm) < 1.0 and not contradicting:
-        return f"the platform swings about these axes{mend}", False
-    text = f"at {point_text(places[k])} m the platform hangs turned by {angle_deg[k]:.1f} deg"
-    if contradicting:
-        text += f", which is not computed with: its lengths disagree by {1e3 * apart_m[k]:.1f} mm, "
-        return f"{text}{1e3 * disagree_m:.1f} mm allowed{mend}", True
-    text += (
-        f", which is not computed with, {off_mm[k]:.1f} mm from where it seems to be, and swings"
+    text = (
+        f"at {point_text(places[k])} m the platform hangs turned by {angle_deg[k]:.1f} deg, which "
+        "is not computed with"
     )
-    return f"{text}{mend}", False
+    if contradicting:
+        apart_mm, allowed_mm = 1e3 * apart_m[k], 1e3 * disagree_m
+        text += f": its lengths disagree by {apart_mm:.1f} mm, {allowed_mm:.1f} mm allowed"
+    else:
+        text += f", {off_mm[k]:.1f} mm from where it seems to be, and swings"
+    return text, contradicting
 
 
 def _targets(statics: PlatformStatics) -> tuple[FloatArray, FloatArray]:
@@ -117,42 +129,21 @@ def _targets(statics: PlatformStatics) -> tuple[FloatArray, FloatArray]:
     return np.concatenate(places), np.concatenate(poses)
 
 
-def _planned_N(model: PlatformModel, poses: FloatArray) -> tuple[FloatArray, BoolArray]:
-    """Return the tensions (m, n) that the control plans at rest, and where there are any (m,)."""
-    low, high = model.low_N + model.reserve_N, model.torque_limited_N - model.reserve_N
-    method = model.platform.tension_distribution
-    wanted = low if method == "minimum-deviation" else None
-    distribution = tension_distribution(method, low, high, model.wrench_scale, wanted)
-    still = model.workspace(0.0, 0.0)
-    wrenches = still.wrenches[0] + still.hanging_wrenches(poses)
-    t, carried = np.zeros((len(poses), model.kinematics.n)), np.zeros(len(poses), bool)
-    for k, W in enumerate(still.wrench_matrices(poses)):
-        carried[k] = distribution.solve(W, wrenches[k], t[k]) is TensionOutcome.FEASIBLE
-    return t, carried
-
-
 def _stiffness(
     model: PlatformModel, poses: FloatArray, t: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return the wrench (m, 6) of tensions and weight, K = -∂w/∂x (m, 6, 6), and J (m, n, 6)."""
     geometry = model.kinematics.geometry
-    centre = in_space(model.platform.centre_of_mass_m)
-    weight = np.array([0.0, 0.0, -model.platform.mass_kg * G_m_s2])
     cables, wrench = np.empty((len(poses), CABLE_ROWS, t.shape[1])), np.empty((len(poses), 6))
-
-    def at(x: FloatArray) -> FloatArray:
-        moved = poses.copy()
-        moved[:, 0] += x[:3]
-        moved[:, 1:] = rotation(x[3:]) @ poses[:, 1:]
-        hanging_wrenches(geometry, moved, np.arange(6), cables[0], wrench)
-        run_poses(geometry, moved, cables)
-        wrench[:, :3] += weight
-        wrench[:, 3:] += np.cross(moved[:, 1:] @ centre, weight)
-        return np.asarray(wrench - (cables[:, :6] @ t[..., None])[..., 0])
-
-    slopes = [at(step) - at(-step) for step in _STEP * np.eye(6)]
-    here = at(np.zeros(6))
-    return here, np.stack(slopes, axis=-1) / (-2.0 * _STEP), cables[:, :6].mT.copy()
+    hanging_wrenches(geometry, poses, np.arange(6), cables[0], wrench)
+    run_poses(geometry, poses, cables)
+    wrench -= (cables[:, :6] @ t[..., None])[..., 0]
+    K = np.empty((len(poses), 6, 6))
+    for k, array in enumerate(poses):
+        pose = Pose(array[0], array[1:])
+        wrench[k] += weight_at(model, pose)[0]
+        K[k] = whole_stiffness(model, pose, t[k])
+    return wrench, K, cables[:, :6].mT
 
 
 def _moved(pose: FloatArray, points_m: FloatArray, motions: FloatArray) -> FloatArray:

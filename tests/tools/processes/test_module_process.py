@@ -3,6 +3,7 @@
 import signal
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -65,10 +66,16 @@ def test_a_child_of_it_that_keeps_its_pipes_is_not_waited_for() -> None:
 def test_an_interrupt_does_not_leave_it_behind(monkeypatch: pytest.MonkeyPatch) -> None:
     with _running(STAYS) as process:
         _out(process).readline()
-        # while it is waited for: at another moment it would end the tests
-        monkeypatch.setattr(
-            process, "communicate", lambda timeout: signal.raise_signal(signal.SIGINT)
-        )
+        waited = process.communicate
+
+        def communicate(timeout: float) -> tuple[str, str]:
+            # once, and begun here: one that came before it is waited for would end the tests
+            monkeypatch.undo()
+            press = signal.pthread_kill, (threading.get_ident(), signal.SIGINT)
+            threading.Timer(0.2, *press).start()
+            return waited(timeout=timeout)
+
+        monkeypatch.setattr(process, "communicate", communicate)
         with pytest.raises(KeyboardInterrupt):
             end_by_stdin(process, 300.0)
         assert process.wait(60.0) == -signal.SIGKILL

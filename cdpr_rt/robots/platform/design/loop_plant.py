@@ -67,7 +67,7 @@ def planned_tensions(model: PlatformModel, pose: Pose) -> FloatArray:
     """
     low, high = model.low_N + model.reserve_N, model.high_N - model.reserve_N
     W, planned = model.kinematics.wrench_matrix(pose), np.zeros((2, model.kinematics.n))
-    weight = _weight(model, pose)[0][list(model.kinematics.directions)]
+    weight = weight_at(model, pose)[0][list(model.kinematics.directions)]
     weight += model.kinematics.hanging_wrenches(pose.array[None])[0]
     for wanted, t in zip((low, high), planned, strict=True):
         scale = model.wrench_scale
@@ -76,16 +76,22 @@ def planned_tensions(model: PlatformModel, pose: Pose) -> FloatArray:
 
 
 def geometric_stiffness(model: PlatformModel, pose: Pose, tension_N: FloatArray) -> FloatArray:
-    """Return K_G = ∂(J^T t - w)/∂q (d, d) of a platform that stands under tensions t (n,).
-
-    In N/m, N/rad, Nm/m and Nm/rad: that of the cables, and of the weight m g at r from the origin,
-    -[m g]× [r]× about the axes. Symmetric where t carries the weight, and made so elsewhere.
-    """
+    """Return `whole_stiffness` of the controlled directions, K_G (d, d)."""
     directions = list(model.kinematics.directions)
+    return whole_stiffness(model, pose, tension_N)[np.ix_(directions, directions)]
+
+
+def whole_stiffness(model: PlatformModel, pose: Pose, tension_N: FloatArray) -> FloatArray:
+    """Return ∂(J^T t - w)/∂x (6, 6) of a platform that stands under tensions t (n,).
+
+    In N/m, N/rad, Nm/m and Nm/rad, of all directions: that of the cables, and of the weight m g at
+    r from the origin, -[m g]× [r]× about the axes. Symmetric where t carries the weight, and made
+    so elsewhere.
+    """
     K = model.kinematics.geometric_stiffness(pose, tension_N)
-    weight, r = _weight(model, pose)
+    weight, r = weight_at(model, pose)
     K[3:, 3:] -= np.outer(r, weight[:3]) - (weight[:3] @ r) * np.eye(3)
-    return np.asarray(0.5 * (K + K.T)[np.ix_(directions, directions)])
+    return np.asarray(0.5 * (K + K.T))
 
 
 def linear_plant(
@@ -167,7 +173,7 @@ def _mass_matrix(model: PlatformModel, pose: Pose) -> tuple[FloatArray, FloatArr
     return M, about
 
 
-def _weight(model: PlatformModel, pose: Pose) -> tuple[FloatArray, FloatArray]:
+def weight_at(model: PlatformModel, pose: Pose) -> tuple[FloatArray, FloatArray]:
     """Return the wrench of the weight (6,), and the centre of mass from the origin r (3,)."""
     M, about = _mass_matrix(model, pose)
     wrench, rest = np.zeros(6), np.zeros(6)
