@@ -2,8 +2,11 @@
 PYTHON ?= python3
 VENV := .venv
 STAMP := $(VENV)/.installed
+COMPILED := $(VENV)/.compiled
+# what decides which kernels there are, and with which types they are called
+SOURCES := $(shell find cdpr_rt drivers profiles sim_bus tools/composition tools/host/kernels.py -name "*.py")
 BIN := $(VENV)/bin
-# two more than there are cores: some tests wait for time-outs, or for a kernel that another test compiles
+# two more than there are cores: some tests wait for time-outs
 JOBS ?= $(shell expr $$(nproc) + 2)
 SOAK_MINUTES ?= 10
 # tests that are not about the wall clock, which one after another runs at the end
@@ -21,7 +24,7 @@ test-all: $(STAMP)  ## every check and every test; needs nothing but Python
 	@$(MAKE) -j 2 check tests WHICH="not alone"
 	$(BIN)/python -m pytest -m alone $$(grep -rl "mark\.alone" tests --include="test_*.py")
 
-tests: $(STAMP)
+tests: $(COMPILED)
 	$(BIN)/python -m pytest -n $(JOBS) --max-worker-restart 0 --dist loadscope --no-loadscope-reorder -m "$(WHICH)"
 
 soak: $(STAMP)  ## ten minutes of hours of bus time with eight drives: no leak, no lost frame
@@ -50,6 +53,12 @@ $(STAMP): requirements.lock pyproject.toml
 	@$(BIN)/python -m compileall -qq -j 0 -x '/(ray|tests?)/' $(VENV)/lib || true
 	$(BIN)/python -m pip install -q --disable-pip-version-check --no-deps --no-build-isolation -e .
 	@touch $(STAMP)
+	$(BIN)/cdpr doctor --compile
+	@touch $(COMPILED)
+
+$(COMPILED): $(STAMP) $(SOURCES)
+	$(BIN)/cdpr doctor --compile
+	@touch $(COMPILED)
 
 clean:
 	rm -rf $(VENV) build out

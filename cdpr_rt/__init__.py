@@ -1,1 +1,77 @@
-"""Runtime of the controller: control loop, controllers, identification; knows no bus."""
+"""Controller of cable-driven parallel robots, and the Python interface to run one.
+
+    import cdpr_rt as cdpr
+
+    with cdpr.simulate("planar-3") as robot:
+        robot.enable()
+        robot.tighten()
+        robot.move_to([0.3, 2.0])
+
+`simulate`, `connect` and `run` return a `Robot`. They need simulator, drivers and daemon, which the
+controller itself does not import: names are loaded when they are first used. `load` returns the
+`Model` of a robot for offline work.
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from cdpr_rt.offline import Model, load
+    from cdpr_rt.platform.own_controller import Controller, State, Target
+    from cdpr_rt.robot import (
+        AlreadyRunning,
+        Error,
+        Faulted,
+        InvalidArgument,
+        InvalidRobot,
+        MotionEnded,
+        NotRunning,
+        Refused,
+        Robot,
+    )
+    from cdpr_tools.client.daemon_robot import connect, run
+    from cdpr_tools.simulated_robot import simulate
+
+__all__ = [
+    "AlreadyRunning",
+    "Controller",
+    "Error",
+    "Faulted",
+    "InvalidArgument",
+    "InvalidRobot",
+    "Model",
+    "MotionEnded",
+    "NotRunning",
+    "Refused",
+    "Robot",
+    "State",
+    "Target",
+    "connect",
+    "load",
+    "run",
+    "simulate",
+]
+
+_HOMES = {
+    "Controller": "cdpr_rt.platform.own_controller",
+    "Model": "cdpr_rt.offline",
+    "connect": "cdpr_tools.client.daemon_robot",
+    "load": "cdpr_rt.offline",
+    "run": "cdpr_tools.client.daemon_robot",
+    "simulate": "cdpr_tools.simulated_robot",
+    "State": "cdpr_rt.platform.own_controller",
+    "Target": "cdpr_rt.platform.own_controller",
+}
+"""Modules of these names; all others are in `cdpr_rt.robot`."""
+
+
+def __getattr__(name: str) -> Any:
+    if name not in __all__:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    home = _HOMES.get(name, "cdpr_rt.robot")
+    value = globals()[name] = getattr(import_module(home), name)
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

@@ -2,11 +2,11 @@
 
 
 class ControlError(Exception):
-    """Something the runtime was asked for could not be done."""
+    """An operation of the runtime failed."""
 
 
 class InvalidRequestError(ControlError):
-    """A procedure cannot be begun or go on as it was asked for; no motor has power."""
+    """A procedure cannot begin or go on as requested; no motor has power."""
 
 
 class TripError(ControlError):

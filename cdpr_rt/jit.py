@@ -1,137 +1,53 @@
 """Compile the numeric kernels of the cycle to machine code."""
 
-import hashlib
-import importlib
-import logging
-import sys
 from collections.abc import Callable
-from functools import cache, partial
+from functools import partial
 from pathlib import Path
 from typing import Any, TypeVar, TypeVarTuple, cast
 
 import numba
-from numba.core import cgutils, config, event, types
+from numba.core import cgutils, types
 from numba.extending import intrinsic
-from typing_extensions import override
 
-COMPILING = logging.getLogger("cdpr.compiling")
-"""Logger, at level INFO, of each kernel of which no machine code is cached on this machine."""
+from cdpr_profiles.jit import jit as compiled
 
-_SETTINGS: Any = config
-_NJIT: Any = numba.njit  # whose types do not know all of its options
-_T = TypeVar("_T")
 _F = TypeVar("_F", bound=Callable[..., Any])
+_T = TypeVar("_T")
 _Objects = TypeVarTuple("_Objects")
 
 
-def _skip_blas() -> None:
-    """Have numba load what it knows of arrays without scipy.linalg, 0.2 s of each process's start.
-
-    It looks for scipy's BLAS to know whether kernels may call np.cov and np.corrcoef. Others of
-    its functions of linear algebra look for it when they are compiled.
-    """
-    blas = "scipy.linalg.cython_blas"
-    if blas not in sys.modules:
-        sys.modules[blas] = cast(Any, None)  # makes its import fail
-        try:
-            importlib.import_module("numba.np.arraymath")
-        finally:
-            del sys.modules[blas]
+def jit(function: _F) -> _F:
+    """Return `function` compiled by numba, see `cdpr_profiles.jit`."""
+    return compiled(function)
 
 
-_skip_blas()
-
-
-class _CompileListener(event.Listener):
-    """Logs kernels that are compiled because no machine code is cached."""
-
-    @override
-    def on_start(self, event: Any) -> None:
-        if event.data["dispatcher"].stats.cache_path is not None:
-            COMPILING.info("%s", event.data["dispatcher"].__name__)
-
-    @override
-    def on_end(self, event: Any) -> None:
-        """Nobody waits for it."""
-
-
-_listen: Callable[[str, event.Listener], None] = event.register
-_listen("numba:compile", _CompileListener())
-
-
-def _call_template(dispatcher: Any, args: Any, kws: Any) -> Any:
-    """Have `dispatcher` compile one machine code for a number, be it constant or not."""
-    general: Callable[[Any], Any] = types.unliteral
-    template: Callable[..., Any] = type(dispatcher).get_call_template
-    return template(
-        dispatcher, tuple(map(general, args)), {key: general(value) for key, value in kws.items()}
-    )
-
-
-@cache
-def _kernel_cache(folder: Path, folders: frozenset[Path]) -> str:
-    """Return a cache directory of `folder` for this state of the kernels' sources in `folders`.
-
-    numba looks only at the file of the function it compiles, not at those of the functions that
-    one calls, and would go on using machine code of an older callee.
-    """
-    digest = hashlib.sha256()
-    for source in sorted(source for one in folders for source in one.glob("*.py")):
-        text = source.read_bytes()
-        if b"from cdpr_rt.jit import" in text:
-            digest.update(text)
-    base = Path(_SETTINGS.CACHE_DIR or folder / "__pycache__")
-    return str(base / f"kernels-{digest.hexdigest()[:12]}")
-
-
-def jit(function: _F, *, nogil: bool = False, forceinline: bool = False) -> _F:
-    """Return `function` compiled by numba, cached on disk, with its type kept for the checker.
-
-    It may call kernels of its own folder and those that its module imports from others: machine
-    code that is kept belongs to the state of all of these.
-    """
-    # by whichever of the paths that lead to it: numba keeps machine code for each by itself
-    source = Path(function.__code__.co_filename).resolve()
-    function.__code__ = function.__code__.replace(co_filename=str(source))
-    folder = source.parent
-    called: Any = function.__globals__
-    folders = frozenset({folder}).union(
-        *(getattr(kernel, "folders", ()) for kernel in called.values())
-    )
-    cache_of_all = _SETTINGS.CACHE_DIR
-    _SETTINGS.CACHE_DIR = _kernel_cache(folder, folders)
-    try:
-        # nothing calls them from C: the wrapper for that is a twentieth of the time to compile
-        compiled: Any = _NJIT(
-            cache=True, nogil=nogil, forceinline=forceinline, no_cfunc_wrapper=True
-        )(function)
-    finally:
-        _SETTINGS.CACHE_DIR = cache_of_all
-    compiled.folders = folders
-    compiled.get_call_template = partial(_call_template, compiled)
-    return cast(_F, compiled)
+def machine_code_folder() -> Path | None:
+    """Return the folder of this machine's compiled kernels, None if there is none."""
+    kernel: Any = jit(lambda: None)
+    kept = kernel.stats.cache_path
+    return None if kept is None else Path(kept)
 
 
 def jit_inlined(function: _F) -> _F:
     """Return `function` compiled as by `jit`, and put into each kernel that calls it.
 
-    For what takes less time than a call: each array hands over nine numbers and is counted.
+    For functions that take less time than a call, which passes nine numbers per array.
     """
-    return jit(function, forceinline=True)
+    return compiled(function, forceinline=True)
 
 
 def jit_unlocked(function: _F) -> _F:
     """Return `function` compiled as by `jit`; other threads run while it waits for the system."""
-    return jit(function, nogil=True)
+    return compiled(function, nogil=True)
 
 
 def bound(kernel: Callable[..., _T], *arrays: Any, then: tuple[Any, ...] = ()) -> Callable[..., _T]:
     """Return the compiled `kernel` with its first arguments fixed.
 
-    Which machine code serves the arguments' types, an ordinary call finds out anew for each of
-    them, at a cost above that of most kernels; here it is found out once. `then` has an example of
-    each argument that is left, whose type is not looked at any more: an array has to have the same
-    type and be as contiguous. Compiles what is not compiled yet.
+    An ordinary call looks up the machine code for the types of its arguments every time, which
+    costs more than most kernels. Here it is looked up once. `then` has an example of each remaining
+    argument; their types are not checked any more, so an array must have the same type and
+    contiguity as its example. Compiles the kernel if necessary.
     """
     dispatcher: Any = kernel
     type_of: Callable[[Any], Any] = numba.typeof
@@ -140,10 +56,10 @@ def bound(kernel: Callable[..., _T], *arrays: Any, then: tuple[Any, ...] = ()) -
 
 
 def bound_to(bind: Callable[[*_Objects], _F]) -> Callable[[*_Objects], _F]:
-    """Return `bind` that is called only where an argument is another object than the last time.
+    """Return `bind`, called only if an argument is another object than in the last call.
 
     For kernels `bound` to the arrays of up to four objects that stay the same from cycle to cycle;
-    what it returned last is returned again.
+    otherwise the last result is returned again.
     """
     # four names in place of a tuple: this is called several times a cycle
     last_a: Any = None

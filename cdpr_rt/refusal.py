@@ -1,4 +1,4 @@
-"""Why a command was refused: a code and its arguments for programs, words for people."""
+"""Why a command was refused: a code and its arguments for programs, text for people."""
 
 from __future__ import annotations
 
@@ -9,18 +9,23 @@ from enum import StrEnum
 from typing import Any, Final
 
 _SHOWN = 60
-_PLACE_UNITS: Final = {"position_m": (1e3, "mm"), "rotation_rad": (math.degrees(1.0), "deg")}
+_PLACE_UNITS: Final = {
+    "position_m": (1e3, "mm"),
+    "distance_m": (1e3, "mm"),
+    "rotation_rad": (math.degrees(1.0), "deg"),
+    "turn_rad": (math.degrees(1.0), "deg"),
+}
 
 
 class RefusalCode(StrEnum):
-    """Reason of a refusal; in brackets the arguments beside what was asked for."""
+    """Reason of a refusal; in brackets its arguments, besides the refused values."""
 
     NOT_IN_STATE = "not_in_state"
     """The loop's state does not allow it (`state`, `allowed`: names of states)."""
     OUT_OF_RANGE = "out_of_range"
     """A number is out of its bounds (`index` in a list or None, `low`, `high`)."""
     NOT_FEASIBLE = "not_feasible"
-    """The platform cannot be at a place, or on the way to it (`why`)."""
+    """The platform cannot be at a place, or on the way to it (`why`; `outside` its workspace)."""
     NOTHING_LEFT = "nothing_left"
     """There is nothing to go on with (`left`: target or path, `instead`: what to ask for)."""
     NOT_TIGHT = "not_tight"
@@ -33,16 +38,16 @@ class RefusalCode(StrEnum):
 
 @dataclass(frozen=True)
 class CommandRefusal:
-    """Why a command was refused, for programs; as text for people.
+    """Why a command was refused, for programs; `str` gives the text for people.
 
-    An error of the loop that is raised with it, in place of a text, carries it to the reply.
+    An error of the loop that is raised with it instead of a text carries it to the reply.
     """
 
     code: RefusalCode
     command: str
     """The command, or the program that it was for."""
     asked: Mapping[str, Any] = field(default_factory=dict)
-    """The refused keys and their values, empty where the command is refused whatever it asks."""
+    """The refused keys and their values; empty if the command is refused whatever its arguments."""
     arguments: Mapping[str, Any] = field(default_factory=dict)
 
     def __str__(self) -> str:
@@ -52,7 +57,7 @@ class CommandRefusal:
         return ": ".join(part for part in parts if part)
 
     def reason(self, **others: Any) -> str:
-        """Return the words for what is in the way; `others` stand in for arguments."""
+        """Return the text of the reason; `others` replace arguments."""
         arguments = {"numbers": "", "unit": "", "option": "", **self.arguments, **others}
         match self.code:
             case RefusalCode.NOT_IN_STATE:
@@ -83,7 +88,7 @@ class CommandRefusal:
 
     @classmethod
     def from_json(cls, value: Any) -> CommandRefusal | None:
-        """Return what an answer holds, None where it is not a refusal as it is known here."""
+        """Return the refusal in an answer, None if it is none or has an unknown form."""
         try:
             refusal = cls(**{**value, "code": RefusalCode(value["code"])})
         except (TypeError, KeyError, ValueError):
@@ -91,9 +96,9 @@ class CommandRefusal:
         return refusal if refusal._is_sound() else None
 
     def _is_sound(self) -> bool:
-        """Return whether its members are of their types, and all arguments of its code are there.
+        """Return whether its members have their types, and all arguments of its code are there.
 
-        Further arguments, as of a newer daemon, do not matter.
+        Further arguments, for example from a newer daemon, do not matter.
         """
         asked, arguments = self.asked, self.arguments
         if not (
@@ -108,7 +113,7 @@ class CommandRefusal:
 
 
 def _in_units_of_places(key: str, value: Any) -> str:
-    """Return a value as it is told; of places in the units in which reasons tell them."""
+    """Return a value as text; places in the units that the reasons use."""
     if key not in _PLACE_UNITS or not isinstance(value, list) or not all(map(_is_number, value)):
         return shown(value)
     factor, unit = _PLACE_UNITS[key]
@@ -140,16 +145,16 @@ _ARGUMENTS: Final[Mapping[RefusalCode, Mapping[str, Callable[[Any], bool]]]] = {
     RefusalCode.NOT_CALIBRATED: {"why": _is_text},
     RefusalCode.BAD_SOURCE: {"why": _is_text, "allowed": _are_texts},
 }
-"""By the code: what goes with it, and what holds of that."""
+"""By the code: its arguments, and the check of each."""
 
 
 def shown(value: Any) -> str:
-    """Return a value as it is told, cut where it is long."""
+    """Return a value as text, shortened if it is long."""
     text = repr(value)
     return text if len(text) <= _SHOWN else f"{text[:_SHOWN]} ..."
 
 
 def refusal_of(error: Exception) -> CommandRefusal | None:
-    """Return the refusal that an error of the loop carries, None where it has only words."""
+    """Return the refusal that an error of the loop carries, None if it has only a text."""
     first = error.args[0] if error.args else None
     return first if isinstance(first, CommandRefusal) else None

@@ -7,18 +7,31 @@ import json
 import os
 import re
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
+from cdpr_profiles.bounded_input import read_json
 from cdpr_profiles.errors import FileMissingError, ProfileError
-from cdpr_profiles.reading.bounded_input import read_json
+from cdpr_profiles.user_folders import state_folder
 from cdpr_rt.errors import ControlError
-from cdpr_rt.private_files import FILE_MODE, make_private_folder
+
+# Files that the programs write for themselves: only their user needs access.
+
+FILE_MODE: Final = 0o600
+FOLDER_MODE: Final = 0o700
+
+
+def make_private_folder(folder: Path) -> None:
+    """Make a folder for this user only, and its missing parents; raises OSError."""
+    missing = [one for one in (folder, *folder.parents) if not one.exists()]
+    for one in reversed(missing):
+        one.mkdir(mode=FOLDER_MODE, exist_ok=True)
+
 
 _MOST_BYTES = 1 << 16
 
 
 class StateFileError(ControlError):
-    """A state file cannot be read, written or understood; names the file."""
+    """A state file cannot be read, written or understood; the message names the file."""
 
 
 def state_path(kind: str, name: str) -> Path:
@@ -26,14 +39,12 @@ def state_path(kind: str, name: str) -> Path:
 
     It lies in $XDG_STATE_HOME/cdpr-rt, by default ~/.local/state/cdpr-rt.
     """
-    base = os.environ.get("XDG_STATE_HOME", "")
-    folder = Path(base) if base.startswith("/") else Path.home() / ".local" / "state"
     safe = re.sub(r"[^A-Za-z0-9_.-]", "-", name)
-    return folder / "cdpr-rt" / f"{kind}.{safe}.json"
+    return state_folder() / f"{kind}.{safe}.json"
 
 
 def read_state(path: Path) -> dict[str, Any] | None:
-    """Return the file's content, None where there is no file; raises StateFileError."""
+    """Return the file's content, None if there is no file; raises StateFileError."""
     try:
         held = read_json(path, _MOST_BYTES)
     except FileMissingError:
@@ -46,7 +57,7 @@ def read_state(path: Path) -> dict[str, Any] | None:
 
 
 def write_state(path: Path, state: dict[str, Any]) -> None:
-    """Replace the file as a whole, so that power lost at any time leaves the old or the new one.
+    """Replace the file as a whole, so that a power loss at any time leaves the old or the new one.
 
     Raises StateFileError.
     """

@@ -78,12 +78,12 @@ STATE_TABLE: Final = _state_of_low_byte()
 
 
 def state_of(statusword: int) -> State:
-    """Return the state a statusword (6041h) reports."""
+    """Return the state that a statusword (6041h) reports."""
     return State(int(STATE_TABLE[statusword & 0x7F]))
 
 
 POWER_OFF: Final = (State.NOT_READY, State.SWITCH_ON_DISABLED, State.READY, State.FAULT)
-"""States in which the power stage is off; in switched on it may have voltage."""
+"""States in which the power stage is off; "switched on" may have voltage."""
 
 TARGETS: Final = (
     State.SWITCH_ON_DISABLED,
@@ -92,18 +92,18 @@ TARGETS: Final = (
     State.OPERATION_ENABLED,
     State.QUICK_STOP,
 )
-"""States that may be asked of a drive."""
+"""States that a drive can be asked for."""
 
 
 def _next_word(target: State, state: State) -> int:
     """Return the controlword of one step from `state` towards `target`; CiA 402-2, transitions."""
     if target == State.SWITCH_ON_DISABLED or state not in TARGETS:
-        return DISABLE_VOLTAGE  # also the answer in a fault, so that bit 7 has a rising edge later
+        return DISABLE_VOLTAGE  # also the answer to a fault, so that bit 7 has a rising edge later
     if target == State.QUICK_STOP:
         stopping = state in (State.OPERATION_ENABLED, State.QUICK_STOP)
         return QUICK_STOP_COMMAND if stopping else DISABLE_VOLTAGE
     if state == State.QUICK_STOP:
-        return DISABLE_VOLTAGE  # leaving a quick stop upwards is optional in the standard
+        return DISABLE_VOLTAGE  # the standard makes enabling from a quick stop optional
     if target == State.READY or state == State.SWITCH_ON_DISABLED:
         return SHUTDOWN
     if target == State.SWITCHED_ON or state == State.READY:
@@ -162,7 +162,7 @@ def mode_bits(modes: Iterable[int]) -> int:
 
 
 def supported_modes(supported_drive_modes: int) -> list[int]:
-    """Return the modes of operation which 6502h announces."""
+    """Return the modes of operation that 6502h announces."""
     return [m for m, bit in _SUPPORTED_BITS.items() if supported_drive_modes >> bit & 1]
 
 
@@ -226,7 +226,7 @@ _FAULT_GROUPS: Final = (
 
 
 def fault_text(code: int) -> str:
-    """Return an error code (603Fh, EMCY) in words, with the number."""
+    """Return an error code (603Fh, EMCY) as text, with the number."""
     text = _FAULTS.get(code)
     if text is None:
         text = next((t for mask, value, t in _FAULT_GROUPS if code & mask == value), "unknown")

@@ -37,9 +37,9 @@ def acceleration_unit_rad_s2(drive: DriveProfile, counts_per_turn: int) -> float
 def torque_settings(
     drive: DriveProfile, rated_torque_Nm: float, limit_Nm: float
 ) -> Iterator[tuple[int, int]]:
-    """Yield object index and value of what bounds the torque: limit and, where given, slope.
+    """Yield index and value of the objects that limit the torque: limit and, if given, slope.
 
-    A limit that is no whole number of units is rounded down.
+    A limit that is not a whole number of units is rounded down.
     """
     unit = torque_unit_Nm(drive, rated_torque_Nm)
     yield 0x6072, min(whole_units(limit_Nm, unit), 0xFFFF) if unit > 0.0 else 0

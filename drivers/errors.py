@@ -1,8 +1,40 @@
-"""Errors of the master side; messages say what happened, where, and what helps."""
+"""Errors of the master side; messages say what happened, where, and what to do."""
 
 from __future__ import annotations
 
-from cdpr_drivers.canopen.sdo_abort import abort_text
+from typing import Final
+
+_MORE_ABORTS: Final = {
+    0x06010003: "sub-index cannot be written, sub-index 0 must be 0 first",
+    0x06010004: "complete access is not supported for this object",
+}
+"""Codes that CiA 301 defines and the `canopen` package does not."""
+_ABORT_GROUPS: Final = {
+    0x0503: "toggle bit error",
+    0x0504: "SDO protocol error",
+    0x0601: "unsupported access",
+    0x0602: "object does not exist",
+    0x0604: "mapping or compatibility error",
+    0x0606: "hardware error",
+    0x0607: "length error",
+    0x0609: "value error",
+    0x060A: "resource not available",
+    0x0800: "general error",
+}
+
+
+def abort_text(code: int) -> str:
+    """Return an SDO abort code (CiA 301) as text, with the number."""
+    # imported at the first error: the import takes longer than most commands need to start
+    from canopen.sdo.exceptions import SdoAbortedError  # noqa: PLC0415
+
+    text = _MORE_ABORTS.get(code) or SdoAbortedError.CODES.get(code)
+    if text is None:
+        group = _ABORT_GROUPS.get(code >> 16)
+        text = f"{group}, of a kind no standard names" if group else "a code no standard has"
+    elif text[1].islower():
+        text = text[0].lower() + text[1:]
+    return f"{text} ({code:08X}h)"
 
 
 class DriverError(Exception):
@@ -10,11 +42,11 @@ class DriverError(Exception):
 
 
 class ConfigurationError(DriverError):
-    """What was asked for, the robot's file and its buses do not go together; nothing has power."""
+    """Request, robot file and buses are inconsistent; nothing has power."""
 
 
 class BusError(DriverError):
-    """The CAN bus cannot be named, opened or used any more."""
+    """The CAN bus cannot be named or opened, or is no longer usable."""
 
 
 class SdoError(DriverError):
@@ -56,8 +88,8 @@ class RobotBootError(DriverError):
 
 
 class DriveFaultError(DriverError):
-    """A drive reports a fault or did not reach the state that was asked for."""
+    """A drive reports a fault or did not reach the requested state."""
 
 
 class ModeRefusedError(DriverError):
-    """A drive does not take the mode of operation that was asked for."""
+    """A drive rejects the requested mode of operation."""

@@ -4,14 +4,14 @@ from typing import Annotated, Any, Self
 
 from pydantic import Field, model_validator
 
-from cdpr_profiles.reading.reader import Profile
-from cdpr_profiles.reading.table import records
-from cdpr_profiles.reading.units import N_PER_KGF
+from cdpr_profiles.motor import records
+from cdpr_profiles.reader import Profile
 
 Positive = Annotated[float, Field(gt=0)]
+N_PER_KGF = 9.80665
 
 ASSUMED_DAMPING_s = 2e-3
-"""Of a cable over its stiffness, where nobody has measured it."""
+"""Damping of a cable over its stiffness if it was not measured."""
 
 
 class ElongationPoint(Profile):
@@ -22,7 +22,7 @@ class ElongationPoint(Profile):
 
 
 class Cable(Profile):
-    """One cable; `elongation_percent_per_N` holds for the tensions it was measured at."""
+    """One cable; `elongation_percent_per_N` is valid for the tensions of its measurement."""
 
     name: str = Field(min_length=1)
     material: str
@@ -33,7 +33,7 @@ class Cable(Profile):
     elongation_percent_per_N: float = Field(ge=1e-9, le=10)
     elongation_measured_up_to_N: Positive | None = None
     damping_s: float = Field(default=ASSUMED_DAMPING_s, ge=0, le=0.05)
-    """Damping over stiffness, T = EA (strain + damping_s rate); assumed where it is left out."""
+    """Damping over stiffness, T = EA (strain + damping_s rate); assumed by default."""
     breaking_force_kgf: float = Field(ge=0.1, le=1e6)
     min_tension_N: float = Field(ge=0)
     data_sheet_code: str | None = None

@@ -1,4 +1,4 @@
-"""Find profiles by name or path and load them, references included."""
+"""Find profiles by name or path and load them with the profiles they name."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
@@ -6,17 +6,13 @@ from functools import lru_cache
 from pathlib import Path
 from typing import TypeVar
 
+from cdpr_profiles.bounded_input import is_file, path_of, read_toml, resolved
 from cdpr_profiles.cable import Cable, CableSeries
-from cdpr_profiles.devices.rail import Cia402Rail, load_rail
-from cdpr_profiles.devices.safety_io import load_safety_io
-from cdpr_profiles.devices.tension_sensor import load_tension_sensors
 from cdpr_profiles.drive import DriveProfile
 from cdpr_profiles.errors import ProfileError
-from cdpr_profiles.limits.motor_bounds import MOST_SPEED_RATIO
 from cdpr_profiles.motor import Motor, MotorRatings, MotorSeries
-from cdpr_profiles.platform import CLEARANCE_m, Platform
-from cdpr_profiles.reading.bounded_input import is_file, path_of, read_toml, resolved
-from cdpr_profiles.reading.places import (
+from cdpr_profiles.motor_bounds import MOST_SPEED_RATIO
+from cdpr_profiles.places import (
     KINDS,
     SERIES,
     SHIPPED,
@@ -26,7 +22,9 @@ from cdpr_profiles.reading.places import (
     require,
     unknown_profile,
 )
-from cdpr_profiles.reading.reader import read_toml_model
+from cdpr_profiles.platform import CLEARANCE_m, Platform
+from cdpr_profiles.rail import Cia402Rail, load_rail
+from cdpr_profiles.reader import read_toml_model
 from cdpr_profiles.robot import (
     Robot,
     RobotAxis,
@@ -35,6 +33,8 @@ from cdpr_profiles.robot import (
     robot_of_winch,
     with_heartbeat_timeout,
 )
+from cdpr_profiles.safety_io import load_safety_io
+from cdpr_profiles.tension_sensor import load_tension_sensors
 from cdpr_profiles.winch import Winch, WinchFile
 from cdpr_profiles.winch_calibration import WinchCalibration
 
@@ -42,9 +42,9 @@ _T = TypeVar("_T")
 
 
 def load_motor(name: str | Path, beside: Path | None = None) -> Motor:
-    """Return a motor by name ("MPP0923D") or path; `beside` is a folder that is searched first.
+    """Return a motor by name ("MPP0923D") or path; the folder `beside` is searched first.
 
-    Raises ProfileError, also for a motor whose source gives its ratings only.
+    Raises ProfileError, also for a motor whose source has only its ratings.
     """
     path = find("motors", name, beside)
     if path is not None:
@@ -82,7 +82,7 @@ def load_drive(name: str | Path, beside: Path | None = None) -> DriveProfile:
 
 
 def load_rail_drive(name: str | Path, rail: Cia402Rail) -> DriveProfile:
-    """Return the drive that a rail's file names, looked for beside it first; ProfileError."""
+    """Return the drive named in a rail's file, searched beside it first; raises ProfileError."""
     return load_drive(rail.drive, require("rails", name).parent)
 
 
@@ -94,7 +94,7 @@ def load_cable(name: str | Path, beside: Path | None = None) -> Cable:
 def load_winch(name: str | Path, beside: Path | None = None) -> Winch:
     """Return a winch by name or path with the motor, drive and cable it names.
 
-    These are looked for beside the winch's own file first. Raises ProfileError.
+    These are searched beside the winch's file first. Raises ProfileError.
     """
     path = require("winches", name, beside)
     file = read_toml_model(path, WinchFile)
@@ -116,7 +116,7 @@ def load_winch(name: str | Path, beside: Path | None = None) -> Winch:
 def load_robot(name: str | Path) -> Robot:
     """Return a robot by name or path with the winches it names; raises ProfileError.
 
-    The winches are looked for beside the robot's own file first. Where `name` is that of a winch,
+    The winches are searched beside the robot's file first. If `name` is that of a winch,
     the robot has this one axis.
     """
     path = find("robots", name)
@@ -202,7 +202,7 @@ def _axes(path: Path, file: RobotFile) -> list[RobotAxis]:
 
 
 def _calibration(robot: Path, axis: int, name: str | None, winch: Winch) -> WinchCalibration | None:
-    """Return the calibration that an axis names, a path from the robot's file."""
+    """Return the calibration that an axis names; its path is relative to the robot's file."""
     if name is None:
         return None
     path = path_of(robot.parent, name)
@@ -213,7 +213,7 @@ def _calibration(robot: Path, axis: int, name: str | None, winch: Winch) -> Winc
 
 
 def _limit_faults(file: RobotFile, axes: Sequence[RobotAxis]) -> Iterator[tuple[str, str]]:
-    """Yield (key, problem) for limits that motors or cables do not bear."""
+    """Yield (key, problem) for limits beyond the ratings of motors or cables."""
     for key, ratings, of in (
         ("torque_Nm", [a.winch.motor.peak_torque_Nm for a in axes], "the motor's peak torque"),
         (
@@ -239,12 +239,7 @@ def _device(robot: Path, key: str, load: Callable[[str], object], name: str | No
     if name is None:
         return None
     reference = _beside(robot, name)
-    try:
-        load(reference)
-    except ProfileError as error:
-        if Path(error.file).is_absolute():
-            raise
-        raise ProfileError(robot, key, error.problem) from None
+    _load_reference(robot, key, load, reference)
     return reference
 
 
@@ -261,7 +256,7 @@ def _tension_sensors(robot: Path, file: RobotFile) -> str | None:
 
 
 def _beside(file: Path, name: str) -> str:
-    """Return `name`, or where it is a path that from the folder of `file` as an absolute one."""
+    """Return `name`; if it is a path relative to the folder of `file`, as an absolute path."""
     text, at, place = name.partition("@")
     if "/" not in text and not text.endswith(".toml"):
         return name
@@ -269,7 +264,7 @@ def _beside(file: Path, name: str) -> str:
 
 
 def _path_from(file: Path, text: str) -> Path:
-    """Return a path in a profile, which is relative to its own folder."""
+    """Return a path from a profile, which is relative to the profile's folder."""
     return resolved(path_of(file.parent, text))
 
 
@@ -287,12 +282,12 @@ def load_winch_or_robot(name: str | Path) -> Winch | Robot:
 
 
 def list_profiles() -> dict[ProfileKind, tuple[str, ...]]:
-    """Return the names of all profiles by kind; motors include every one of a series."""
+    """Return the names of all profiles by kind, including every motor of a series."""
     return {kind: tuple(sorted(_names(kind))) for kind in KINDS}
 
 
 def load_profile(kind: ProfileKind, name: str) -> object:
-    """Return a profile by its kind and name, of a motor without a size sheet its ratings.
+    """Return a profile by its kind and name; the ratings for a motor without a size sheet.
 
     Raises ProfileError.
     """
@@ -305,7 +300,7 @@ def load_profile(kind: ProfileKind, name: str) -> object:
 def load_all() -> dict[str, dict[str, object]]:
     """Read and validate every profile that `list_profiles` names; raises ProfileError.
 
-    The sizes of a series of cables are among them.
+    This includes the sizes of a series of cables.
     """
     _motor_series.cache_clear()
     everything: dict[str, dict[str, object]] = {
@@ -330,12 +325,10 @@ def _names(kind: ProfileKind) -> set[str]:
     return names
 
 
-def _load_reference(
-    file: Path, key: str, load: Callable[[str, Path], _T], name: str, folder: Path
-) -> _T:
-    """Load the profile that a file's key names; errors name that file and key."""
+def _load_reference(file: Path, key: str, load: Callable[..., _T], *named: str | Path) -> _T:
+    """Load the profile that a file's key names; errors about its name give that file and key."""
     try:
-        return load(name, folder)
+        return load(*named)
     except ProfileError as error:
         if error.file in KINDS:
             raise ProfileError(file, key, error.problem) from None

@@ -1,11 +1,11 @@
-"""Servo drives: PDOs, units, signs, time-outs and quirks of a drive type as data."""
+"""Servo drives: PDOs, units, signs, timeouts and quirks of a drive type as data."""
 
 from pathlib import Path
 from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from cdpr_profiles.reading.reader import Profile, one_of
+from cdpr_profiles.reader import Profile, one_of
 
 Sign = Annotated[int, one_of(-1, 1)]
 Unsigned8 = Annotated[int, Field(ge=0, le=0xFF)]
@@ -37,7 +37,7 @@ class PdoEntry(Profile):
 
 
 class Pdo(Profile):
-    """One PDO as the master configures it; times of 0 leave the function off."""
+    """One PDO as the master configures it; a time of 0 turns its function off."""
 
     number: int = Field(ge=1, le=512)
     cob_id_offset: int = Field(ge=0x180, le=0x500)
@@ -59,20 +59,20 @@ class Pdo(Profile):
 
 
 class Quirks(Profile):
-    """Departures of a drive from the state machine of CiA 402.
+    """Deviations of a drive from the state machine of CiA 402.
 
-    The mode of an enabled drive is never changed, so that no key is needed for drives which
-    refuse that.
+    The mode of an enabled drive is never changed, so drives that reject such changes need
+    no key.
     """
 
     halt_before_mode_change: bool = False
-    """6060h is taken only while bit 8 of the controlword (halt) is set."""
+    """6060h is accepted only while bit 8 of the controlword (halt) is set."""
     homing_done_by_bit_12_alone: bool = False
-    """Bit 10 of the statusword is without meaning in homing mode; bit 12 comes once at rest."""
+    """Bit 10 of the statusword has no meaning in homing mode; bit 12 is set once at rest."""
 
 
 class Evidence(Profile):
-    """How well one fact of a profile is known."""
+    """Evidence for one fact of a profile."""
 
     status: Literal["verified", "manual", "assumed"]
     how: str = Field(min_length=1)
@@ -81,20 +81,20 @@ class Evidence(Profile):
 class DriveProfile(Profile):
     """One CiA 402 drive type.
 
-    `eds` is the path of its electronic data sheet. Objects that the EDS lacks are not asked for:
-    without 6076h the motor's rated torque holds, without 608Fh the winch's encoder resolution and
-    without 6502h `supported_modes`.
+    `eds` is the path of its electronic data sheet. Objects missing in the EDS are not read: without
+    6076h the motor's rated torque applies, without 608Fh the winch's encoder resolution and without
+    6502h `supported_modes`.
 
-    `torque_unit`, `velocity_unit` and `acceleration_unit` are the units of the drive's objects. The
-    signs turn the drive's directions into the motor's, each for itself: `position_sign` is -1 where
-    6064h falls while the motor turns forward, `torque_sign` where a positive 6071h drives it
-    backward, `homing_sign` where method 34 seeks the index backward.
+    `torque_unit`, `velocity_unit` and `acceleration_unit` are units of the drive's objects. Each
+    sign turns one of the drive's directions into the motor's. `position_sign` is -1 if 6064h falls
+    while the motor turns forward, `torque_sign` if a positive 6071h drives it backward, and
+    `homing_sign` if method 34 seeks the index backward.
 
-    `torque_slope_Nm_s` is written to 6087h, which modes with a torque ramp (PT, 4) need: as steep
-    as the drive takes it, since a ramp is a lag in the loop. `torque_delay_s` is the nominal lag of
-    its current loop, `feedback_delay_s` the nominal age of the position it reports. `rpdos` must
-    carry 6040h and 6071h, in one PDO or in two; `tpdos` 6041h, 6064h and 6077h, in any number of
-    PDOs that answer every SYNC (transmission type 1).
+    `torque_slope_Nm_s` is written to 6087h for modes with a torque ramp (PT, 4). It should be as
+    steep as the drive accepts, because a ramp is a lag in the loop. `torque_delay_s` is the
+    nominal lag of its current loop, `feedback_delay_s` the nominal age of the reported position.
+    `rpdos` must carry 6040h and 6071h, in one PDO or in two; `tpdos` 6041h, 6064h and 6077h, in
+    any number of PDOs that answer every SYNC (transmission type 1).
     """
 
     name: str = Field(min_length=1)

@@ -1,9 +1,24 @@
-"""The error of a profile, which names file, key and value, and how values are shown in it."""
+"""Profile errors with file, key and value, and the formatting of values in them."""
 
+import re
 from pathlib import Path
 
 _MOST_CHARS = 200
 _MOST_LINE_CHARS = 1000
+
+
+# C0 except tab and line end, DEL, C1, bidirectional marks, lone surrogates
+_ACTING = re.compile(
+    "[\x00-\x08\x0b-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069\ud800-\udfff]"
+)
+
+
+def printable(text: str) -> str:
+    """Return a text that is safe for a terminal: control characters are shown as escapes.
+
+    Names and texts come from files, drives and other users.
+    """
+    return _ACTING.sub(lambda found: repr(found[0])[1:-1], text)
 
 
 def brief(text: str, most: int = _MOST_CHARS) -> str:
@@ -22,9 +37,9 @@ def _as_lists(value: object) -> object:
 
 
 class ProfileError(Exception):
-    """A profile cannot be used; the text names the file, the key, the value and what is allowed.
+    """A profile cannot be used; the text has the file, the key, the value and what is allowed.
 
-    `file` and `key` (dotted, "" for the file as a whole) are also there for programs.
+    `file` and `key` (dotted, "" for the file as a whole) are available to programs.
     """
 
     def __init__(self, file: Path | str, key: str, problem: str) -> None:
@@ -36,4 +51,4 @@ class ProfileError(Exception):
 
 
 class FileMissingError(ProfileError):
-    """There is no such file."""
+    """The file does not exist."""

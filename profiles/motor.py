@@ -1,20 +1,37 @@
-"""Motors: a single one as a controller needs it, and the manufacturer's tables of a series."""
+"""Motors: a single one with the values a controller needs, and a maker's tables of a series."""
 
+import math
 from typing import Annotated, Any, Self
 
 from pydantic import Field, model_validator
 
-from cdpr_profiles.reading.reader import Profile
-from cdpr_profiles.reading.table import dash_to_none, records
-from cdpr_profiles.reading.units import RAD_S_PER_RPM
+from cdpr_profiles.reader import Profile
 
 Positive = Annotated[float, Field(gt=0)]
 Plausible = Annotated[float, Field(ge=1e-9, le=1e6)]
 """A plausible value of a motor in its unit; others are typing errors."""
 Dashed = Annotated[float, Field(gt=0)] | None
 
+RAD_S_PER_RPM = 2.0 * math.pi / 60.0
+_DASH = "—"
 _TORQUE_RATIO = 2.0
-"""By which the rated torque may differ from torque constant times rated current."""
+"""Largest factor between the rated torque and torque constant times rated current."""
+
+
+def dash_to_none(value: Any) -> Any:
+    """Return None if the source has a dash, else the value."""
+    return None if value == _DASH else value
+
+
+def records(columns: tuple[Any, ...], rows: tuple[Any, ...]) -> tuple[dict[str, Any], ...]:
+    """Return the rows keyed by column name; raises ValueError for a row of another length."""
+    for number, row in enumerate(rows):
+        if not isinstance(row, tuple) or len(row) != len(columns):
+            raise ValueError(f"row {number} is {row!r}; allowed: {len(columns)} values, as columns")
+    return tuple(
+        {str(name): dash_to_none(value) for name, value in zip(columns, row, strict=True)}
+        for row in rows
+    )
 
 
 class Motor(Profile):
@@ -76,7 +93,7 @@ class Motor(Profile):
 
 
 class MotorRatings(Profile):
-    """One row of a series' table of all models, as printed; None where the source has a dash."""
+    """One row of a series' table of all models, as printed; None if the source has a dash."""
 
     model: str
     rated_speed_rpm: Positive
@@ -115,7 +132,7 @@ class RatingsTable(Profile):
 
 
 class MotorDetail(Profile):
-    """One column of a size sheet, as printed; None where the source has NA."""
+    """One column of a size sheet, as printed; None if the source has NA."""
 
     stall_torque_Nm: Positive
     stall_torque_in_lb: Positive
@@ -146,7 +163,7 @@ class MotorDetail(Profile):
 
 
 class CommonSpecifications(Profile):
-    """What holds for every model of a series."""
+    """Specifications common to all models of a series."""
 
     poles: int = Field(ge=2, multiple_of=2)
     ambient_temperature_at_rating_degC: float
@@ -181,7 +198,7 @@ class MotorSeries(Profile):
         return low | high
 
     def motor(self, name: str) -> Motor | None:
-        """Return a motor by its full name, or None where the series has no size sheet for it."""
+        """Return a motor by its full name, or None if the series has no size sheet for it."""
         row = self.names()[name]
         sheet = self.detail.get(row.model)
         if sheet is None:

@@ -1,20 +1,21 @@
 """The platform of a cable robot: mass, exit and anchor points, workspace, limits."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from itertools import product
-from typing import Annotated, Any, Final, Literal, get_args
+from itertools import combinations, product
+from typing import Annotated, Any, Final, Literal
 
+import numpy as np
 from pydantic import AfterValidator, BeforeValidator, Field
 
 from cdpr_profiles.errors import value_text
-from cdpr_profiles.reading.reader import Profile
+from cdpr_profiles.reader import Profile
 
 FURTHEST_m = 1000.0
-"""Largest coordinate that is allowed."""
+"""Largest allowed coordinate."""
 WIDEST_m: Final = 300.0
-"""Largest distance of two exit points; most stadiums are less wide, most frames in mm are more."""
+"""Largest distance of two exit points: more than most stadiums, less than most frames in mm."""
 
 
 def _in_metres(value: float) -> float:
@@ -34,7 +35,7 @@ def _direction(values: tuple[float, ...]) -> tuple[float, ...]:
 
 
 def _one_or_several(allowed: str) -> BeforeValidator:
-    """Take a single number as an array of one, and refuse matrices and texts by what is allowed."""
+    """Accept a single number as an array of one; reject matrices and texts with `allowed`."""
 
     def check(value: Any) -> Any:
         if isinstance(value, int | float) and not isinstance(value, bool):
@@ -51,7 +52,7 @@ Point = Annotated[tuple[_Coordinate, ...], Field(min_length=2, max_length=3)]
 Direction = Annotated[
     tuple[float, ...], Field(min_length=2, max_length=3), AfterValidator(_direction)
 ]
-"""A direction in the room; its length does not matter, and is 1 once read."""
+"""A direction in the room; its length does not matter, and is 1 after reading."""
 _Inertia = Annotated[
     tuple[float, ...],
     _one_or_several("six numbers Ixx Iyy Izz Ixy Ixz Iyz, not a matrix; in a plane one number"),
@@ -62,11 +63,7 @@ _Rotation = Annotated[
 ]
 """A single number is an array of one."""
 
-TensionMethod = Literal[
-    "minimum-norm", "minimum-deviation", "closed-form",
-    "polygon-1-norm", "polygon-2-norm", "polygon-centroid",
-]  # fmt: skip
-TENSION_METHODS: Final[tuple[str, ...]] = get_args(TensionMethod)
+TensionMethod = Literal["minimum-norm", "minimum-deviation", "closed-form", "polygon-centroid"]
 """Methods of tension distribution."""
 CableModelName = Literal["rigid", "elastic", "catenary"]
 DirectionName = Literal["x", "y", "z", "angle", "rx", "ry", "rz"]
@@ -74,18 +71,18 @@ DIRECTIONS: Final[dict[int, tuple[DirectionName, ...]]] = {
     2: ("x", "y", "angle"),
     3: ("x", "y", "z", "rx", "ry", "rz"),
 }
-"""Directions of a platform by how many coordinates it has: positions, then angles."""
+"""Directions of a platform by its number of coordinates: positions, then angles."""
 NO_PLATFORM: Final = "has no platform; allowed: robots with a [platform]"
-"""Said, after its name or path, of a robot that is asked for what only a platform has."""
+"""Error text, after its name or path, for a robot without the required platform."""
 _LEAST_ARM_m = 0.1
 _RISE_S = 0.1
-"""In which the acceleration is reached where no jerk is given."""
+"""Default time in which the acceleration is reached, if no jerk is given."""
 CLEARANCE_m: Final = 0.01
-"""Between centre lines of cables, where a robot's file says no other and none is thicker."""
+"""Default distance between centre lines of cables; thicker cables increase it."""
 
 
 class BoxFile(Profile):
-    """A box by two opposite corners; edges along the axes of the frame that it is given in."""
+    """A box by two opposite corners, with edges along the axes of its frame."""
 
     min_m: Point
     max_m: Point
@@ -101,7 +98,7 @@ class PlatformFile(Profile):
     home_m: Point
     """Position of its origin at rest on its stand, where sessions begin and end."""
     home_tolerance_m: float = Field(default=0.05, gt=0, le=1)
-    """Largest deviation from there."""
+    """Largest deviation from `home_m`."""
     workspace_min_m: Point
     workspace_max_m: Point
     """The box in which targets may lie."""
@@ -111,38 +108,38 @@ class PlatformFile(Profile):
     inertia_kg_m2: _Inertia | None = None
     """Ixx Iyy Izz Ixy Ixz Iyz about the centre of mass in the platform's frame; one in a plane."""
     centre_of_mass_m: Point | None = None
-    """In the platform's frame; its origin if left out."""
+    """In the platform's frame; by default its origin."""
     home_rotation_rad: _Rotation | None = None
     """Rotation vector from the room's axes to the platform's at home, an angle in a plane."""
     workspace_angle_rad: float = Field(default=0.0, ge=0)
-    """Largest angle from the orientation at home in which targets may lie."""
+    """Largest angle of targets from the orientation at home."""
     angular_speed_rad_s: float | None = Field(default=None, gt=0, le=100)
     angular_acceleration_rad_s2: float | None = Field(default=None, gt=0, le=10_000)
     """About each axis."""
     jerk_m_s3: float | None = Field(default=None, gt=0, le=100_000)
     angular_jerk_rad_s3: float | None = Field(default=None, gt=0, le=10_000_000)
-    """Along and about each direction, on paths; such as reach the acceleration in 0.1 s."""
+    """Along and about each direction, on paths; by default the acceleration is reached in 0.1 s."""
     controlled: tuple[DirectionName, ...] | None = None
-    """Directions that the cables control; what they can if left out."""
+    """Directions that the cables control; by default all that they can."""
     tension_distribution: TensionMethod = "minimum-deviation"
     cable_model: CableModelName = "elastic"
     clearance_m: float | None = Field(default=None, gt=0, le=1)
-    """Nearer than this, two cables by their centre lines, or a cable and a box, are in contact."""
+    """Two cables (centre lines), or a cable and a box, are in contact if nearer than this."""
     body: BoxFile | None = None
     """The platform's body, in its own frame."""
     obstacles: tuple[BoxFile, ...] = Field(default=(), max_length=100)
-    """Boxes of the frame and of what stands about, in the room."""
+    """Boxes of the frame and of objects around it, in the room."""
 
 
 @dataclass(frozen=True)
 class Platform:
     """A platform on the cables of a robot's axes; points in the order of the axes.
 
-    `exit_points_m` are in the room, `anchor_points_m` in the platform's frame, whose origin is what
-    `home_m` and targets speak of. What is left out (empty, or 0 of an angular speed,
-    acceleration or jerk) is filled in: angular speed and acceleration are then those with which the
-    furthest anchor point, 0.1 m away at least, moves with `speed_m_s` and `acceleration_m_s2`.
-    Jerks that are left out reach these accelerations in 0.1 s.
+    Fields of `PlatformFile` have the same meaning here. `exit_points_m` are in the room,
+    `anchor_points_m` in the platform's frame, whose origin `home_m` and targets refer to.
+    Missing values (empty, or 0 for an angular speed, acceleration or jerk) get defaults. With the
+    default angular speed and acceleration, the furthest anchor point, at least 0.1 m away,
+    moves with `speed_m_s` and `acceleration_m_s2`. Default jerks reach the accelerations in 0.1 s.
     """
 
     mass_kg: float
@@ -155,38 +152,29 @@ class Platform:
     exit_points_m: tuple[tuple[float, ...], ...]
     anchor_points_m: tuple[tuple[float, ...], ...]
     inertia_kg_m2: tuple[float, ...] | None = None
-    """Ixx Iyy Izz Ixy Ixz Iyz about the centre of mass, platform's frame; one number in a plane."""
     centre_of_mass_m: tuple[float, ...] = ()
-    """In the platform's frame."""
     home_rotation_rad: tuple[float, ...] = ()
-    """Rotation vector from the room's axes to the platform's; one number in a plane."""
     workspace_angle_rad: float = 0.0
-    """Largest angle from the orientation at home in which targets may lie."""
     angular_speed_rad_s: float = 0.0
     angular_acceleration_rad_s2: float = 0.0
-    """About each axis."""
     jerk_m_s3: float = 0.0
     angular_jerk_rad_s3: float = 0.0
-    """Along and about each direction, on paths."""
     controlled: tuple[str, ...] = ()
-    """Names out of DIRECTIONS, in their order."""
+    """Some of DIRECTIONS, in their order."""
     tension_distribution: str = "minimum-deviation"
     cable_model: str = "elastic"
     clearance_m: float = CLEARANCE_m
-    """Nearer than this, two cables by their centre lines, or a cable and a box, are in contact."""
     body: BoxFile | None = None
-    """Of the platform, in its own frame."""
     obstacles: tuple[BoxFile, ...] = ()
-    """Boxes in the room."""
     pulley_radius_m: tuple[float, ...] = ()
     """One for each axis; 0 for an eye."""
     cable_weights_N_m: tuple[float, ...] = ()
-    """Weight per length that counts in lengths and tensions, one for each axis; 0: of none."""
+    """Weight per length in lengths and tensions, one for each axis; 0: neglected."""
     pulley_axes: tuple[tuple[float, ...], ...] = ()
-    """Unit vectors along which the cables come up to their pulleys, one for each axis."""
+    """Unit vectors along which the cables come to their pulleys, one for each axis."""
 
     def __post_init__(self) -> None:
-        """Fill in what was left out."""
+        """Fill in the defaults."""
         size, n = len(self.home_m), len(self.exit_points_m)
         up = (0.0,) * (size - 1) + (1.0,)
         arm_m = max(_LEAST_ARM_m, *(math.hypot(*anchor) for anchor in self.anchor_points_m))
@@ -227,9 +215,251 @@ class Platform:
 def controlled_by_default(anchor_points_m: Sequence[tuple[float, ...]]) -> tuple[str, ...]:
     """Return the directions that the cables of a platform with these anchor points can control.
 
-    The positions; and the angles, but where all cables end in one point, and of up to three cables
-    in a plane, which leave the platform free to turn.
+    They control the positions. They control the angles unless all cables end in one point, or at
+    most three cables hold a platform in a plane: these leave it free to turn.
     """
     size = len(anchor_points_m[0])
     free = len(set(anchor_points_m)) == 1 or (size == 2 and len(anchor_points_m) <= 3)
     return DIRECTIONS[size][: size if free else None]
+
+
+# Faults of the table [platform] of a robot's file, as far as the file alone shows them.
+
+_PLATFORM_FAULTS_LEAST_ARM_m = 0.01
+"""Anchor points closer than this probably are the same, or are in another unit."""
+_OFF_BODY_m = 0.03
+"""More than a calibration moves an anchor point on the platform's body."""
+_LEAST_OFF_m = 0.1
+"""Allowed distance of the centre of mass from the box around even the smallest platform."""
+_ROUNDING = 1e-6
+
+
+def platform_faults(
+    file: PlatformFile | None,
+    exits: Sequence[tuple[float, ...] | None],
+    anchors: Sequence[tuple[float, ...] | None],
+    pulley_axes: Sequence[tuple[float, ...] | None],
+) -> Iterator[tuple[str, str]]:
+    """Yield (key, problem) for implausible values in [platform] and its points on the axes."""
+    if file is None:
+        for i, points in enumerate(zip(exits, anchors, strict=True)):
+            if points != (None, None):
+                yield f"axes[{i}]", "exit_point_m, anchor_point_m: allowed: along with [platform]"
+        return
+    size = len(file.home_m)
+    found = False
+    for name, points_m in (
+        ("exit_point_m", exits),
+        ("anchor_point_m", anchors),
+        ("pulley_axis", pulley_axes),
+    ):
+        for i, given in enumerate(points_m):
+            if given is None and name != "pulley_axis":
+                found = True
+                yield f"axes[{i}].{name}", "missing; allowed: one for each axis of a platform"
+            elif given is not None and len(given) != size:
+                found = True
+                problem = _of_another_length(given, f"{size} coordinates, as platform.home_m has")
+                yield f"axes[{i}].{name}", problem
+    yield from _box_faults(file)
+    yield from _body_faults(file, size)
+    yield from _count_faults(file, size)
+    if not found:
+        yield from _direction_faults(file, [anchor or () for anchor in anchors])
+        yield from _size_faults(file, [p or () for p in exits], [p or () for p in anchors])
+        yield from _reach_faults(file, [p or () for p in anchors])
+
+
+def _count_faults(file: PlatformFile, size: int) -> Iterator[tuple[str, str]]:
+    """Yield keys with the wrong number of values for a plane or space."""
+    angles, inertia = (1, 1) if size == 2 else (3, 6)
+    for key, allowed in (
+        ("inertia_kg_m2", inertia),
+        ("centre_of_mass_m", size),
+        ("home_rotation_rad", angles),
+    ):
+        given = getattr(file, key)
+        if given is not None and len(given) != allowed:
+            where = "a plane" if size == 2 else "space"
+            many = "1 number" if allowed == 1 else f"{allowed} numbers"
+            yield f"platform.{key}", _of_another_length(given, f"{many} in {where}")
+
+
+def _of_another_length(given: Sequence[float], allowed: str) -> str:
+    return f"value {value_text(given)}; allowed: {allowed}"
+
+
+def _body_faults(file: PlatformFile, size: int) -> Iterator[tuple[str, str]]:
+    """Yield faults of the boxes of platform and room."""
+    boxes = [] if file.body is None else [("platform.body", file.body)]
+    boxes += [(f"platform.obstacles[{i}]", box) for i, box in enumerate(file.obstacles)]
+    for key, box in boxes:
+        for name, point in (("min_m", box.min_m), ("max_m", box.max_m)):
+            if len(point) != size:
+                allowed = f"{size} coordinates, as platform.home_m has"
+                yield f"{key}.{name}", _of_another_length(point, allowed)
+                return
+        for i, (low, high) in enumerate(zip(box.min_m, box.max_m, strict=True)):
+            if not low < high:
+                yield f"{key}.max_m[{i}]", f"value {high:g}; allowed: above {low:g}"
+
+
+def _size_faults(
+    file: PlatformFile,
+    exits: Sequence[tuple[float, ...]],
+    anchors: Sequence[tuple[float, ...]],
+) -> Iterator[tuple[str, str]]:
+    """Yield points, rotations and inertias of an implausible size, as if in another unit."""
+    frame_m, platform_m = _widest(exits), _widest(anchors)
+    if frame_m > WIDEST_m:
+        problem = (
+            f"exit points are up to {frame_m:g} m apart; allowed: up to {WIDEST_m:g} m "
+            "(are they in millimetres?)"
+        )
+        yield "axes[0].exit_point_m", problem
+    if 0.0 < platform_m < _PLATFORM_FAULTS_LEAST_ARM_m:
+        problem = (
+            f"anchor points are {platform_m:g} m apart at most; allowed: all alike, or "
+            f"{_PLATFORM_FAULTS_LEAST_ARM_m:g} m and more (which unit are they in?)"
+        )
+        yield "axes[0].anchor_point_m", problem
+    if file.centre_of_mass_m is not None and math.hypot(*file.centre_of_mass_m) > frame_m:
+        problem = (
+            f"{math.hypot(*file.centre_of_mass_m):g} m off the origin; allowed: on the platform, "
+            f"not beyond the frame, whose exit points are {frame_m:g} m apart"
+        )
+        yield "platform.centre_of_mass_m", problem
+    if file.home_rotation_rad is not None and math.hypot(*file.home_rotation_rad) > math.pi:
+        size = math.hypot(*file.home_rotation_rad)
+        problem = f"{size:.4g} rad long; allowed: up to pi (is it in degrees?)"
+        yield "platform.home_rotation_rad", problem
+    if file.workspace_angle_rad >= math.pi:
+        problem = f"value {file.workspace_angle_rad:g}; allowed: below pi (is it in degrees?)"
+        yield "platform.workspace_angle_rad", problem
+    if file.inertia_kg_m2 is not None and len(file.inertia_kg_m2) in (1, 6):
+        yield from _inertia_faults(file.inertia_kg_m2, file.mass_kg, frame_m)
+
+
+def _reach_faults(
+    file: PlatformFile, anchors: Sequence[tuple[float, ...]]
+) -> Iterator[tuple[str, str]]:
+    """Yield anchor points off the body, and a centre of mass far off the platform.
+
+    Without a body, the platform is the box around its anchor points; a point has no such box.
+    """
+    size, body, points = len(file.home_m), file.body, list(anchors)
+    if body is not None and len(body.min_m) == len(body.max_m) == size:
+        beside_m = [_beside_m(anchor, body.min_m, body.max_m) for anchor in anchors]
+        i = beside_m.index(max(beside_m))
+        if beside_m[i] > _OFF_BODY_m:
+            problem = (
+                f"value {list(anchors[i])}; {beside_m[i]:.3g} m beside platform.body; allowed: on "
+                f"it, or up to {_OFF_BODY_m:g} m beside it (does the body reach to all of them?)"
+            )
+            yield f"axes[{i}].anchor_point_m", problem
+        points += [body.min_m, body.max_m]
+    centre = file.centre_of_mass_m
+    low, high = (tuple(map(extreme, zip(*points, strict=True))) for extreme in (min, max))
+    if centre is None or len(centre) != size or low == high:
+        return
+    allowed_m = max(_LEAST_OFF_m, 0.5 * math.dist(low, high))
+    off_m = _beside_m(centre, low, high)
+    if off_m > allowed_m:
+        what = "anchor points" if body is None else "anchor points and body"
+        problem = (
+            f"value {list(centre)}; {off_m:.3g} m beside the box around {what}; allowed: in it, or "
+            f"up to {allowed_m:.3g} m beside it (platform.body says how far the platform reaches)"
+        )
+        yield "platform.centre_of_mass_m", problem
+
+
+def _beside_m(point: tuple[float, ...], low: tuple[float, ...], high: tuple[float, ...]) -> float:
+    """Return the distance of a point from a box, 0 inside."""
+    sides = zip(point, low, high, strict=True)
+    return math.hypot(*(max(a - value, value - b, 0.0) for value, a, b in sides))
+
+
+def _widest(points: Sequence[tuple[float, ...]]) -> float:
+    return max((math.dist(a, b) for a, b in combinations(points, 2)), default=0.0)
+
+
+def _inertia_faults(
+    given: tuple[float, ...], mass_kg: float, frame_m: float
+) -> Iterator[tuple[str, str]]:
+    """Yield faults of an inertia: impossible for any body, or too large for the frame."""
+    key = "platform.inertia_kg_m2"
+    moments = np.array(given)
+    if len(given) == 6:
+        xx, yy, zz, xy, xz, yz = given
+        moments = np.linalg.eigvalsh([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    shown = ", ".join(f"{moment:.4g}" for moment in moments)
+    if not moments.min() > 0.0:
+        yield key, f"principal moments {shown}; allowed: all above 0"
+    elif len(moments) == 3 and moments[2] > (1.0 + _ROUNDING) * (moments[0] + moments[1]):
+        problem = f"principal moments {shown}; allowed: none above the sum of the two others"
+        yield key, problem
+    elif math.sqrt(moments.max() / mass_kg) > 0.5 * frame_m:
+        problem = (
+            f"with {mass_kg:g} kg a radius of gyration of {math.sqrt(moments.max() / mass_kg):.3g} "
+            f"m; allowed: up to half the {frame_m:.3g} m between exit points (is it in kg m2?)"
+        )
+        yield key, problem
+
+
+def _direction_faults(
+    file: PlatformFile, anchors: Sequence[tuple[float, ...]]
+) -> Iterator[tuple[str, str]]:
+    """Yield faults of controlled directions, compared with the cables and required values."""
+    size, n = len(file.home_m), len(anchors)
+    known = DIRECTIONS[size]
+    given = controlled_by_default(anchors) if file.controlled is None else file.controlled
+    controlled = set(given)
+    twice = len(controlled) < len(given)
+    if twice or controlled - set(known) or not set(known[:size]) <= controlled:
+        positions, angles = ", ".join(known[:size]), ", ".join(known[size:])
+        problem = f"value {list(given)}; allowed: {positions}, and any of {angles}, each once"
+        yield "platform.controlled", problem
+        return
+    if len(controlled) > n:
+        problem = f"{n}; allowed: {len(controlled)} and more to control {', '.join(given)}"
+        if size == 3 and len(controlled) == 6:
+            problem += ", or all anchor points alike: a point in space takes 3"
+        yield "axes", problem
+    if len(set(anchors)) == 1 and len(controlled) > size:
+        problem = f"value {list(controlled)}; allowed: no angle where all anchor points are alike"
+        yield "platform.controlled", problem
+    if file.workspace_angle_rad > 0.0:
+        if len(controlled) == size:
+            problem = f"value {file.workspace_angle_rad:g}; allowed: 0 where no angle is controlled"
+            yield "platform.workspace_angle_rad", problem
+        else:
+            for key in ("angular_speed_rad_s", "angular_acceleration_rad_s2"):
+                if getattr(file, key) is None:
+                    allowed = "allowed: given where workspace_angle_rad is above 0"
+                    yield f"platform.{key}", f"missing; {allowed}"
+    if file.tension_distribution == "polygon-centroid" and n > len(controlled) + 2:
+        problem = (
+            f"value {file.tension_distribution!r}; allowed: for up to {len(controlled) + 2} cables "
+            f"where {len(controlled)} directions are controlled, not {n}"
+        )
+        yield "platform.tension_distribution", problem
+
+
+def _box_faults(file: PlatformFile) -> Iterator[tuple[str, str]]:
+    """Yield faults of the workspace; home may be below it, not beside or above it."""
+    size = len(file.home_m)
+    for key in ("workspace_min_m", "workspace_max_m"):
+        point = getattr(file, key)
+        if len(point) != size:
+            allowed = f"{size} coordinates, as home_m has"
+            yield f"platform.{key}", _of_another_length(point, allowed)
+            return
+    box = zip(file.workspace_min_m, file.home_m, file.workspace_max_m, strict=True)
+    for i, (low, home, high) in enumerate(box):
+        if not low < high:
+            yield f"platform.workspace_max_m[{i}]", f"value {high:g}; allowed: above {low:g}"
+        elif i == size - 1 and home > high:
+            problem = f"value {home:g}; allowed: up to {high:g} (the last coordinate is upward)"
+            yield f"platform.home_m[{i}]", problem
+        elif i < size - 1 and not low <= home <= high:
+            yield f"platform.home_m[{i}]", f"value {home:g}; allowed: {low:g} to {high:g}"

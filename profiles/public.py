@@ -1,4 +1,4 @@
-"""What `from cdpr_profiles import ...` offers."""
+"""Names for `from cdpr_profiles import ...`."""
 
 from cdpr_profiles.cable import Cable
 from cdpr_profiles.catalogue import (
@@ -14,9 +14,9 @@ from cdpr_profiles.catalogue import (
 )
 from cdpr_profiles.drive import DriveProfile, Pdo, PdoEntry
 from cdpr_profiles.errors import ProfileError
-from cdpr_profiles.limits.robot_limits import RobotLimits
 from cdpr_profiles.motor import Motor, MotorRatings
 from cdpr_profiles.robot import Robot, RobotAxis, RobotBus
+from cdpr_profiles.robot_limits import RobotLimits
 from cdpr_profiles.winch import Winch
 
 __all__ = [

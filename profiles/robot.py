@@ -1,4 +1,4 @@
-"""Robots: winches on one bus or several, run as one device."""
+"""Robots: winches on one or several buses, run as one device."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
@@ -7,11 +7,10 @@ from typing import TYPE_CHECKING, Annotated
 
 from pydantic import Field
 
-from cdpr_profiles.limits.robot_limits import RobotLimits
-from cdpr_profiles.platform import Direction, Platform, PlatformFile, Point
-from cdpr_profiles.platform_faults import platform_faults
-from cdpr_profiles.reading.places import reference
-from cdpr_profiles.reading.reader import Profile, one_of
+from cdpr_profiles.places import reference
+from cdpr_profiles.platform import Direction, Platform, PlatformFile, Point, platform_faults
+from cdpr_profiles.reader import Profile, one_of
+from cdpr_profiles.robot_limits import RobotLimits
 from cdpr_profiles.winch import BITRATES_bit_s, Winch
 from cdpr_profiles.winch_calibration import WinchCalibration
 
@@ -19,7 +18,7 @@ if TYPE_CHECKING:
     from cdpr_profiles.calibration.geometry import GeometryCalibration
 
 HEARTBEAT_TIMEOUT_PERIODS = 1.75
-"""Heartbeat time-out of the drives in periods of the master's heartbeat: fewer than two."""
+"""Heartbeat timeout of the drives in periods of the master's heartbeat: fewer than two."""
 
 
 class RobotBus(Profile):
@@ -43,13 +42,13 @@ class AxisFile(Profile):
     commissioned: str | None = Field(default=None, min_length=1)
     """Folder in which `cdpr commission` wrote its motor's profile, or the profile's file."""
     exit_point_m: Point | None = None
-    """Where its cable leaves for the platform."""
+    """Point where its cable leaves for the platform."""
     anchor_point_m: Point | None = None
-    """Where its cable is made fast, in the platform's frame."""
+    """Point where its cable is fixed, in the platform's frame."""
     pulley_radius_m: float = Field(default=0.0, ge=0, le=1)
-    """Of the pulley over which its cable leaves; 0 for an eye."""
+    """Radius of the pulley over which its cable leaves; 0 for an eye."""
     pulley_axis: Direction | None = None
-    """Direction in which the cable comes up to that pulley, about which it swivels; up if not."""
+    """Direction in which the cable comes to that pulley, the swivel axis; by default up."""
 
 
 class RobotFile(Profile):
@@ -133,7 +132,7 @@ class RobotFile(Profile):
 
 
 def default_name(axis: int) -> str:
-    """Return the name of the axis at this place, from 0, where the file gives none: from 1."""
+    """Return the default name of the axis with this index from 0; names count from 1."""
     return f"axis {axis + 1}"
 
 
@@ -141,8 +140,8 @@ def default_name(axis: int) -> str:
 class RobotAxis:
     """One axis: its winch, with bit rate, cycle, node ids and heartbeat of the robot.
 
-    `name` is what messages call it; `calibration` its measured tension-to-torque gain,
-    `commissioned` where its motor's cogging profile is: a file, or the folder that holds it.
+    `name` is its name in messages, `calibration` its measured tension-to-torque gain,
+    `commissioned` the path of its motor's cogging profile: a file, or the folder that holds it.
     """
 
     winch: Winch
@@ -156,11 +155,11 @@ class RobotAxis:
 
 @dataclass(frozen=True)
 class Robot:
-    """A robot with the winches it names; axes keep the order of its file on whatever bus.
+    """A robot with the winches it names; axes keep the order of its file on all buses.
 
-    `safety_io`, `tension_sensors` and `rails` are what their own loaders take. The master's
-    heartbeat goes out every `master_heartbeat_s`; the drives stop by themselves (1016h, 6007h)
-    when they miss it for `HEARTBEAT_TIMEOUT_PERIODS` of that.
+    `safety_io`, `tension_sensors` and `rails` are arguments of their loaders. The master sends its
+    heartbeat every `master_heartbeat_s`; the drives stop (1016h, 6007h) when they miss it for
+    `HEARTBEAT_TIMEOUT_PERIODS` of that time.
     """
 
     profile: str
@@ -177,15 +176,15 @@ class Robot:
     master_heartbeat_s: float = 0.1
     limits: RobotLimits = field(default_factory=RobotLimits)
     platform: Platform | None = None
-    """The platform that the axes hold; None for independent winches."""
+    """The platform on the axes; None for independent winches."""
     calibration: "GeometryCalibration | None" = None
-    """The calibration whose geometry the platform and the winches have; None for the file's."""
+    """The calibration applied to the platform and the winches; None for the file's geometry."""
     is_winch: bool = False
     """Whether it is a single winch, run as a robot of one axis; its file is that of the winch."""
 
     @property
     def geometry_identity(self) -> str:
-        """Which calibration its geometry is, empty for that of its file."""
+        """Identity of the calibration of its geometry, empty for that of its file."""
         return "" if self.calibration is None else self.calibration.identity
 
     @property
@@ -194,12 +193,12 @@ class Robot:
         return reference("winches" if self.is_winch else "robots", self.path)
 
     def axes_on(self, bus: str) -> tuple[int, ...]:
-        """Return which axes, counted from 0, are on the bus of this name."""
+        """Return the axes, counted from 0, on the bus of this name."""
         return tuple(i for i, axis in enumerate(self.axes) if axis.bus == bus)
 
 
 def robot_of_winch(winch: Winch) -> Robot:
-    """Return a winch as the robot of one axis that it is, with a robot's limits and heartbeat."""
+    """Return a winch as a robot of one axis, with a robot's limits and heartbeat."""
     heartbeat_s = max(0.1, 2 * winch.sync_period_s)
     bus = RobotBus(name="can0", bitrate_bit_s=winch.bitrate_bit_s)
     axis = RobotAxis(
@@ -224,7 +223,7 @@ def robot_of_winch(winch: Winch) -> Robot:
 
 
 def with_heartbeat_timeout(winch: Winch, master_heartbeat_s: float) -> Winch:
-    """Return `winch` with the drive's heartbeat time-out set by the master's heartbeat."""
+    """Return `winch` with the drive's heartbeat timeout derived from the master's heartbeat."""
     timeout_s = HEARTBEAT_TIMEOUT_PERIODS * master_heartbeat_s
     drive = winch.drive.model_copy(update={"heartbeat_consumer_s": timeout_s})
     return replace(winch, drive=drive)

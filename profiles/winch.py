@@ -9,10 +9,10 @@ from pydantic import Field
 from cdpr_profiles.cable import Cable
 from cdpr_profiles.drive import DriveProfile
 from cdpr_profiles.motor import Motor
-from cdpr_profiles.reading.places import reference
-from cdpr_profiles.reading.reader import Profile, one_of
+from cdpr_profiles.places import reference
+from cdpr_profiles.reader import Profile, one_of
 
-# Those of CiA 301.
+# Bit rates of CiA 301.
 BITRATES_bit_s = (10_000, 20_000, 50_000, 125_000, 250_000, 500_000, 800_000, 1_000_000)
 
 
@@ -38,8 +38,8 @@ class WinchFile(Profile):
 class Winch:
     """A winch with the profiles it names.
 
-    `gear_ratio` is motor turns per drum turn; `drum_radius_m` is effective, belt and rope included;
-    `cable_sign` is +1 where a positive motor angle pays cable out.
+    `gear_ratio` is motor turns per drum turn; `drum_radius_m` is effective, with belt and rope;
+    `cable_sign` is +1 if a positive motor angle pays cable out.
     """
 
     profile: str

@@ -8,17 +8,18 @@ from typing import Literal
 
 from pydantic import Field
 
+from cdpr_profiles.bounded_input import replacing
 from cdpr_profiles.errors import ProfileError
-from cdpr_profiles.limits.motor_bounds import Faults, MotorBounds, within
-from cdpr_profiles.reading.reader import Profile
+from cdpr_profiles.motor_bounds import Faults, MotorBounds, within
+from cdpr_profiles.reader import Profile
 from cdpr_profiles.winch import Winch
 
 
 class WinchCalibration(Profile):
     """Winding torque = gain × tension + bias ± (friction + friction_per_N × tension).
 
-    Plus while the cable is wound in, minus while it is paid out. Torques are those asked of the
-    drive, so an error of its torque constant is within the gain. Half-widths are of 95 %
+    Plus while the cable is wound in, minus while it is paid out. Torques are those requested from
+    the drive, so the gain includes an error of the torque constant. Half-widths belong to 95 %
     confidence intervals.
     """
 
@@ -74,10 +75,9 @@ class WinchCalibration(Profile):
         return self.toml_text("Tension-to-torque gain and friction of one winch, as measured.")
 
     def save(self, path: Path) -> None:
-        """Write the file; raises ProfileError naming it."""
-        part = path.with_suffix(path.suffix + ".part")
+        """Write the file; raises ProfileError with its name."""
         try:
-            part.write_text(self.to_toml(), encoding="utf-8")
-            part.replace(path)
+            with replacing(path) as file:
+                file.write(self.to_toml().encode())
         except OSError as error:
             raise ProfileError(path, "", f"cannot be written: {error.strerror}") from None

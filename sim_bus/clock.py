@@ -1,4 +1,4 @@
-"""Bus time: one clock for everything that is timed on a bus."""
+"""Bus time: one clock for all timed events on a bus."""
 
 from __future__ import annotations
 
@@ -14,27 +14,27 @@ class ClockMode(Enum):
     PACED = "paced"
     """Bus time is wall time."""
     LOCKSTEP = "lockstep"
-    """SYNC and the master that leads the bus move bus time; without a leader, wall time too."""
+    """SYNC and the master that leads the bus advance bus time; without leader, wall time also."""
 
 
 class BusClock:
     """Bus time in seconds since the bus was started; wall times are monotonic seconds.
 
-    A paced clock runs with wall time. One in lockstep is stopped at 0 at first.
+    A paced clock runs with wall time. A lockstep clock is initially stopped at 0.
     """
 
     def __init__(self, mode: ClockMode, wall_s: float) -> None:
         self.mode = mode
         self.stopped = mode is ClockMode.LOCKSTEP
-        """Whether bus time changes by `move` and `sync` only."""
+        """Whether only `move` and `sync` change bus time."""
         self.held = False
-        """Whether bus time waits for the next SYNC, for `HOLD_S` of wall time at the most."""
+        """Whether bus time waits for the next SYNC, for at most `HOLD_S` of wall time."""
         self._base_s = 0.0
         self._base_wall_s = wall_s
         self._last_s = 0.0
 
     def now(self, wall_s: float) -> float:
-        """Return bus time at `wall_s`; never less than what was returned before."""
+        """Return bus time at `wall_s`; never less than a value returned before."""
         if self.stopped or (self.held and wall_s < self._base_wall_s):
             return self._base_s
         self.held = False
@@ -63,17 +63,17 @@ class BusClock:
             self.stopped = False
 
     def sync(self, wall_s: float, period_s: float) -> float:
-        """Take a SYNC into account and return the bus time of it.
+        """Process a SYNC and return its bus time.
 
-        In lockstep, with `period_s` > 0, bus time moves by exactly `period_s`; a clock that had
-        run with the wall clock is held then.
+        In lockstep, with `period_s` > 0, bus time moves by exactly `period_s`; a clock that was
+        running with the wall clock is then held.
         """
         if self.mode is ClockMode.PACED or period_s <= 0.0:
             return self.now(wall_s)
         if self.stopped:
             self.move(self._base_s + period_s)
             return self._base_s
-        # while held, the wall time kept is that from which bus time would run again
+        # while held, the stored wall time is the one from which bus time would run again
         before = self._base_s if self.held and wall_s < self._base_wall_s else self.now(wall_s)
         self._base_s = self._last_s = before + period_s
         self._base_wall_s = wall_s + HOLD_S
@@ -81,7 +81,7 @@ class BusClock:
         return self._base_s
 
     def wall_wait(self, wall_s: float, event_s: float) -> float:
-        """Return how much wall time until bus time `event_s`, or until a held clock runs."""
+        """Return the wall time until bus time `event_s`, or until a held clock runs."""
         if self.held:
             return max(self._base_wall_s - wall_s, 0.0)
         return max(event_s - self.peek(wall_s), 0.0)

@@ -1,4 +1,4 @@
-"""Errors of the simulator; every message names what was wrong and what is allowed."""
+"""Errors of the simulator; every message names the error and the allowed values."""
 
 
 class SimulatorError(Exception):

@@ -1,4 +1,4 @@
-"""CAN frames as the bus carries them: packing, arbitration, time on the wire; and a log of all."""
+"""CAN frames on the bus: packing, arbitration, time on the wire; and a log of all frames."""
 
 from __future__ import annotations
 
@@ -9,6 +9,9 @@ import math
 import struct
 import sys
 from pathlib import Path
+
+from cdpr_profiles.bounded_input import may_replace
+from cdpr_profiles.errors import printable
 
 FRAME_BYTES = 16
 EFF_FLAG = 0x80000000
@@ -30,7 +33,7 @@ def pack_frame(can_id: int, data: bytes = b"") -> bytes:
 
 
 def worst_case_bits(n: int, *, extended: bool = False) -> int:
-    """Return the bits a frame with `n` data bytes can take at most, interframe space included.
+    """Return the maximum number of bits of a frame with `n` data bytes, with interframe space.
 
     From start of frame to the CRC a stuff bit may follow after the first 4 bits and then after
     every 4 more (each stuff bit starts the next run of five); 13 bits (CRC delimiter,
@@ -56,9 +59,9 @@ def bits_by_length(can_id: int) -> tuple[int, ...]:
 
 
 def arbitration_key(can_id: int) -> int:
-    """Return a number that orders frames as arbitration does: the smallest wins the bus.
+    """Return a number that orders frames by arbitration: the smallest wins the bus.
 
-    The 11 leading bits of the identifier go first; at equal leading bits a standard data frame
+    The 11 leading bits of the identifier are sent first; if they are equal, a standard data frame
     beats a standard remote frame, which beats the extended ones (recessive SRR and IDE bits).
     """
     remote = 1 if can_id & RTR_FLAG else 0
@@ -78,14 +81,19 @@ _MOST_WAITING = 1 << 18
 
 
 class FrameLog:
-    """Writes the frames of its listeners by bus time, at one instant in the order of the buses.
+    """Writes the frames of its listeners by bus time; at the same time, in the order of the buses.
 
-    So the order does not depend on which of several buses the simulator looked at first. A file
-    that cannot be written on ends, and says so; the buses go on.
+    So the order does not depend on which bus the simulator polled first. If the file can no longer
+    be written, the log ends with a message and the buses continue.
     """
 
     def __init__(self, path: Path) -> None:
-        """Create the file; raises OSError, also where another simulator writes it."""
+        """Create the file, replacing an earlier log; raises OSError.
+
+        Bus time begins at zero, so a recording of real time cannot be mistaken for a simulator's.
+        """
+        if not may_replace(path, b"(0000"):
+            raise FileExistsError(errno.EEXIST, "is there already and is no log of a simulator")
         self._file = path.open("ab", buffering=0)
         try:
             fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -104,20 +112,20 @@ class FrameLog:
         return listener
 
     def count(self) -> None:
-        """Count one more frame that waits to be written."""
+        """Count one more waiting frame."""
         self._waiting += 1
         if self._waiting % _WRITTEN_AT == 0:
-            # a bus that stands behind the others for ever does not fill the memory
+            # a bus that permanently lags behind the others must not fill the memory
             over = self._waiting >= _MOST_WAITING
             self._write(math.inf if over else min(listener.now_s for listener in self._listeners))
 
     def close(self) -> None:
-        """Write what waits and close the file; safe to repeat."""
+        """Write the waiting frames and close the file; safe to repeat."""
         self._write(math.inf)
         self._file.close()
 
     def _write(self, before_s: float) -> None:
-        """Write the frames of the time before `before_s`, when no bus can add to them any more."""
+        """Write the frames before `before_s`, to which no bus can add any more."""
         parts = [listener.take(before_s) for listener in self._listeners]
         self._waiting -= sum(map(len, parts))
         lines = heapq.merge(*parts, key=lambda entry: entry[0])
@@ -126,7 +134,8 @@ class FrameLog:
             while data and not self._file.closed:
                 data = data[self._file.write(data) :]
         except OSError as error:
-            print(f"frame log {self._file.name}: {error.strerror}; it ends here", file=sys.stderr)
+            name = printable(self._file.name)
+            print(f"frame log {name}: {error.strerror}; it ends here", file=sys.stderr)
             self._file.close()
 
 
@@ -140,31 +149,31 @@ class FrameListener:
     def __init__(self, log: FrameLog, channel: str) -> None:
         self.outbox: list[bytes] = []
         self.now_s = 0.0
-        """Bus time that the bus has come to."""
+        """Bus time that the bus has reached."""
         self._log = log
         self._channel = channel.encode()
         self._frames: list[tuple[float, bytes, bytes]] = []
 
     def receive(self, frame: bytes, now: float) -> None:
-        """Keep a frame for the log."""
+        """Store a frame for the log."""
         self.now_s = now
         self._frames.append((now, self._channel, frame))
         self._log.count()
 
     def advance(self, now: float) -> None:
-        """Note how far the bus is."""
+        """Store the bus time reached."""
         self.now_s = now
 
     def next_event(self) -> float:
-        """Return that nothing is due, ever."""
+        """Return that no event is ever due."""
         return math.inf
 
     def close(self) -> None:
-        """Complete the log, as no frames follow."""
+        """Complete the log, because no frames follow."""
         self._log.close()
 
     def take(self, before_s: float) -> list[tuple[float, bytes, bytes]]:
-        """Remove and return time, channel and frame of what came before `before_s`."""
+        """Remove and return time, channel and frame of the frames before `before_s`."""
         frames = self._frames
         count = len(frames)
         while count and frames[count - 1][0] >= before_s:

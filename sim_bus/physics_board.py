@@ -1,7 +1,7 @@
 """The physics board: a small shared file through which simulated devices interact.
 
-The simulated drives write what really happens to motor and cable; simulated sensors, safety
-devices and operators, each in a process of its own, read it and write power, brake and mass.
+The simulated drives write the true state of motor and cable. Simulated sensors, safety
+devices and operators, each in a separate process, read it and write power, brake and mass.
 """
 
 from __future__ import annotations
@@ -23,32 +23,32 @@ _T = TypeVar("_T")
 _HEADER = struct.Struct("<8sIII")
 _MAGIC = b"cdprPHB2"
 _MAX_AXES = 256
-# other processors let a reader see a sequence number before what it counts
+# other processors may show a reader a sequence number before the data that it protects
 _IN_ORDER = ("x86_64", "i686", "i386")
-# each 8 bytes: the drive's own part first, behind its sequence number, then what others write
+# each 8 bytes: first the drive's own part, after its sequence number, then the inputs of others
 _SEQUENCE, _TIME, _TENSION, _ANGLE, _SPEED, _POWER_ON, _COUNT = range(7)
 _POWER_FROM, _POWER_UNTIL, _BRAKE_FROM, _BRAKE_UNTIL, _MASS = range(7, 12)
-# history of the tension behind it, a ring buffer of times and tensions, by the drive as well
+# then the tension history, a ring buffer of times and tensions, also written by the drive
 _SAMPLES, _SPACING_S = 512, 0.9e-3
 _RING = 16
 _WORDS = _RING + 2 * _SAMPLES
-# in the board's own part, behind its header: the platform's sequence number, time and motion
+# in the board's own part, after its header: the platform's sequence number, time and motion
 _PLATFORM, _MOTION = 8, 1 + 3 + 9 + 3 + 3
 _ALWAYS, _NEVER = (-math.inf, math.inf), (-math.inf, -math.inf)
 _SPINS, _TRIES = 100, 1000
 _PAUSE_S = 5e-4
 
 Window = tuple[float, float]
-"""Bus times from which on, and before which, something is so."""
+"""Bus times at which a condition begins and ends."""
 
 
 class BoardState(NamedTuple):
-    """What a drive last wrote of its axis; all figures belong to one instant."""
+    """State of an axis as last written by its drive; all values belong to one instant."""
 
     time_s: float
     """Bus time."""
     tension_N: float
-    """True tension of the cable, 0 where it is slack."""
+    """True tension of the cable; 0 if it is slack."""
     motor_rad: float
     """True mechanical angle of the motor over all turns."""
     motor_rad_s: float
@@ -57,7 +57,7 @@ class BoardState(NamedTuple):
 
 
 class PlatformState(NamedTuple):
-    """How a platform truly is, its frame's origin in the room; all belong to one instant."""
+    """True state of a platform, with its frame's origin in the room; all at one instant."""
 
     time_s: float
     """Bus time."""
@@ -66,17 +66,17 @@ class PlatformState(NamedTuple):
     """From the platform's frame to the room, row by row, 9 numbers."""
     velocity_m_s: tuple[float, ...]
     spin_rad_s: tuple[float, ...]
-    """Along the axes of the room."""
+    """Components along the axes of the room."""
 
 
 class BoardPlatform:
-    """The platform of a board, for devices that it carries. The robot publishes, all may read."""
+    """The platform of a board, for devices that it carries. The robot publishes; all may read."""
 
     def __init__(self, words: memoryview[int], numbers: memoryview[float]) -> None:
         self._words, self._numbers = words, numbers
 
     def publish(self, state: PlatformState) -> None:
-        """Write how the platform is; for its robot alone."""
+        """Write the platform's state; only its robot may call it."""
         words, numbers = self._words, self._numbers
         sequence = words[0] | 1
         words[0] = sequence
@@ -86,7 +86,7 @@ class BoardPlatform:
         words[0] = (sequence + 1) & 0xFFFFFFFFFFFFFFFF
 
     def state(self) -> PlatformState | None:
-        """Return what was published last, None where there is no platform."""
+        """Return the last published state; None if there is no platform."""
         flat = _consistent(self._words, 0, self._numbers[1 : 1 + _MOTION].tolist)
         if not self._words[0]:
             return None
@@ -97,8 +97,8 @@ class BoardPlatform:
 class BoardAxis:
     """One axis of a board. The drive calls `publish`; other devices call the setters; all may read.
 
-    Every field has one writer. Reads of the drive's part are consistent: they are repeated while a
-    write is under way (a sequence lock; it relies on stores becoming visible in order: `attach`).
+    Every field has one writer. Reads of the drive's part are consistent: they are repeated during
+    a write (a sequence lock, which relies on stores becoming visible in order: see `attach`).
     """
 
     def __init__(self, words: memoryview[int], numbers: memoryview[float]) -> None:
@@ -106,7 +106,7 @@ class BoardAxis:
         self._numbers = numbers
         self._sample_s = -math.inf
 
-    # -- what the drive writes
+    # -- written by the drive
 
     def publish(
         self,
@@ -116,9 +116,9 @@ class BoardAxis:
         motor_rad_s: float,
         power_on: bool,
     ) -> None:
-        """Write the state of the axis; for its drive alone."""
+        """Write the state of the axis; only its drive may call it."""
         words, numbers = self._words, self._numbers
-        # odd while the figures are being changed, also after a writer that died in the middle
+        # odd while the data change, also after a writer that died during a write
         sequence = words[_SEQUENCE] | 1
         words[_SEQUENCE] = sequence
         numbers[_TIME] = time_s
@@ -136,19 +136,19 @@ class BoardAxis:
 
     @property
     def time_s(self) -> float:
-        """Bus time up to which the drive has come."""
+        """Bus time that the drive has reached."""
         return self._numbers[_TIME]
 
     def state(self) -> BoardState:
-        """Return what the drive wrote last, as it is where the writer died in the middle."""
+        """Return the last state that the drive wrote; possibly incomplete if the drive died."""
         numbers = _consistent(self._words, _SEQUENCE, self._numbers[_TIME : _POWER_ON + 1].tolist)
         time_s, tension, angle, speed, power = numbers
         return BoardState(time_s, tension, angle, speed, power != 0.0)
 
     def tension_history(self, after: int) -> tuple[int, list[Window]]:
-        """Return how many samples of the tension there have been, and those that came `after`.
+        """Return the number of tension samples so far, and the samples after number `after`.
 
-        A sample is (bus time, tension in N), one a millisecond at the most; only the last
+        A sample is (bus time, tension in N), at most one a millisecond; only the last
         `_SAMPLES` are kept.
         """
         count, ring = _consistent(
@@ -159,7 +159,7 @@ class BoardAxis:
         places = (2 * (i % _SAMPLES) for i in range(max(after, count - _SAMPLES), count))
         return count, [(ring[at], ring[at + 1]) for at in places]
 
-    # -- what others write
+    # -- written by other devices
 
     @property
     def power_allowed(self) -> bool:
@@ -171,7 +171,7 @@ class BoardAxis:
         self.allow_power(_ALWAYS if allowed else _NEVER)
 
     def allow_power(self, when: Window) -> None:
-        """Allow the drive its power for a time; what changes later is written beforehand."""
+        """Allow the drive power during `when`; later changes are written in advance."""
         self._numbers[_POWER_FROM], self._numbers[_POWER_UNTIL] = when
 
     def allows_power(self, at_s: float) -> bool:
@@ -180,7 +180,7 @@ class BoardAxis:
 
     @property
     def brake_released(self) -> bool:
-        """Whether the rotor is free of its brake."""
+        """Whether the brake is released, so that the rotor can turn."""
         return self.releases_brake(self.time_s)
 
     @brake_released.setter
@@ -188,21 +188,21 @@ class BoardAxis:
         self.release_brake(_ALWAYS if released else _NEVER)
 
     def release_brake(self, when: Window) -> None:
-        """Have the rotor free of its brake for a time."""
+        """Release the brake during `when`."""
         self._numbers[_BRAKE_FROM], self._numbers[_BRAKE_UNTIL] = when
 
     def releases_brake(self, at_s: float) -> bool:
-        """Return whether the rotor is free of its brake at a bus time."""
+        """Return whether the brake is released at a bus time."""
         return self._numbers[_BRAKE_FROM] <= at_s < self._numbers[_BRAKE_UNTIL]
 
     def next_change_s(self, after_s: float) -> float:
-        """Return the next bus time at which power or brake change, as far as is known."""
+        """Return the next known bus time at which power or brake change."""
         changes = self._numbers[_POWER_FROM:_MASS]
         return min([at_s for at_s in changes if at_s > after_s], default=math.inf)
 
     @property
     def hung_mass_kg(self) -> float:
-        """Mass that hangs on the cable, where the plant's load is a hung mass."""
+        """Mass on the cable, if the plant's load is a hung mass."""
         return float(self._numbers[_MASS])
 
     @hung_mass_kg.setter
@@ -211,38 +211,38 @@ class BoardAxis:
 
 
 def _consistent(words: memoryview[int], sequence: int, read: Callable[[], _T]) -> _T:
-    """Return what `read` returns while nobody writes, as `words[sequence]` tells."""
+    """Return a result of `read` during which no process wrote, as `words[sequence]` shows."""
     for attempt in range(_TRIES):
         before = words[sequence]
         value = read()
         if not before & 1 and words[sequence] == before:
             break
-        if attempt > _SPINS:  # its process waits for a core, perhaps for ours
+        if attempt > _SPINS:  # the writer waits for a core, perhaps for this one
             time.sleep(_PAUSE_S)
     return value
 
 
 class PhysicsBoard:
-    """A board for n axes in a file, best in /dev/shm; power is allowed and brakes are released."""
+    """A board for n axes in a file, best in /dev/shm; it starts with power and released brakes."""
 
     def __init__(self, path: Path, memory: mmap.mmap, axes: int, lockstep: bool) -> None:
-        """Use `create` or `attach`."""
+        """Do not call; use `create` or `attach`."""
         self.path = path
         self.axes = axes
         self.lockstep = lockstep
-        """Whether its bus time is moved by a master; the clock runs along with it otherwise."""
+        """Whether a master moves its bus time; else bus time follows the clock."""
         self._memory = memory
         self._owned = False
         self._views: list[memoryview[Any]] = []
 
     @classmethod
     def create(cls, path: str | Path, axes: int, *, lockstep: bool = False) -> Self:
-        """Make the file anew; `close` removes it. Raises BusSetupError where it cannot be made."""
+        """Create the file; `close` removes it. Raises BusSetupError if it cannot be created."""
         if not 1 <= axes <= _MAX_AXES:
             raise ValueError(f"axes = {axes}; allowed: 1 to {_MAX_AXES}")
         path = Path(path)
         if path.exists():
-            cls.attach(path).close()  # one that a killed simulator left is replaced, no other file
+            cls.attach(path).close()  # replace only a killed simulator's board, no other file
         fresh = path.with_name(f".{path.name}.{os.getpid()}")
         words = bytearray(8 * _WORDS * (1 + axes))
         _HEADER.pack_into(words, 0, _MAGIC, axes, _WORDS, lockstep)
@@ -262,9 +262,9 @@ class PhysicsBoard:
 
     @classmethod
     def attach(cls, path: str | Path) -> Self:
-        """Open a board that a simulator made. Raises BusSetupError.
+        """Open a board that a simulator created. Raises BusSetupError.
 
-        Also on a processor that may show another process stores out of order.
+        Also raised on a processor that may show another process stores out of order.
         """
         if (machine := platform.machine()) not in _IN_ORDER:
             raise BusSetupError(
@@ -300,14 +300,14 @@ class PhysicsBoard:
 
     @property
     def platform(self) -> BoardPlatform:
-        """The platform that moves on the axes' cables."""
+        """The platform that the axes' cables move."""
         part = memoryview(self._memory)[8 * _PLATFORM : 8 * (_PLATFORM + 1 + _MOTION)]
         words, numbers = part.cast("Q"), part.cast("d")
         self._views += [words, numbers, part]
         return BoardPlatform(words, numbers)
 
     def close(self) -> None:
-        """Let go of the file, and remove it where it was made here."""
+        """Close the file, and remove it if it was created here."""
         for view in self._views:
             view.release()
         self._views.clear()
@@ -324,9 +324,9 @@ class PhysicsBoard:
 
 
 def common_time(boards: Sequence[PhysicsBoard]) -> Callable[[], float] | None:
-    """Return a function that gives the bus time of boards in lockstep, None for paced ones.
+    """Return a function for the bus time of boards in lockstep; None for paced ones.
 
-    Raises BusSetupError where some of them are in lockstep and others not.
+    Raises BusSetupError if some of them are in lockstep and others are not.
     """
     kinds = {board.lockstep for board in boards}
     if len(kinds) > 1:

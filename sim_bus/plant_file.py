@@ -1,20 +1,20 @@
-"""Plant files: what is true of something simulated, which no controller may read."""
+"""Plant files: the true behaviour of a simulated device, which no controller may read."""
 
 from __future__ import annotations
 
 from pathlib import Path
 from typing import Self
 
-from cdpr_profiles.reading.reader import Profile
+from cdpr_profiles.reader import Profile
 
 
 class PlantFile(Profile):
-    """What one plant file says; what it leaves out is as the defaults have it."""
+    """Content of one plant file; missing keys have their defaults."""
 
     @classmethod
     def load_file(cls, path: str | Path | None) -> Self:
-        """Return what a file says, the defaults for None.
+        """Return the content of a file; the defaults for None.
 
-        Raises cdpr_profiles.errors.ProfileError naming file, key, value and what is allowed.
+        Raises cdpr_profiles.errors.ProfileError with file, key, value and the allowed values.
         """
         return cls() if path is None else super().load_file(path)

@@ -88,12 +88,63 @@ def _of_a_daemon(nodeid: str) -> bool:
     return "/hil/test_daemon_" in nodeid
 
 
-def pytest_configure(config: pytest.Config) -> None:
-    """Where tests run, compile no kernel that another process compiles."""
-    if hasattr(config, "workerinput") or not config.getoption("numprocesses", None):
-        import kernel_locks  # noqa: PLC0415  not for the process that only shares tests out
+_ROOT = Path(__file__).parents[1]
+_KEPT = pytest.StashKey[set[Path]]()
+_OURS: set[str] = set()
+"""Kernels that test processes have compiled. They are excused, even if a command needs them too:
+tests call some kernels with arrays that no command has."""
 
-        kernel_locks.install()
+
+def _kept_kernels() -> set[Path]:
+    """Return the files of machine code beside the product's kernels."""
+    folders = ("cdpr_rt", "drivers", "profiles", "sim_bus", "tools")
+    return {file for one in folders for file in (_ROOT / one).rglob("*.nbc")}
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """Add the option that `make` gives, which has compiled all kernels before."""
+    parser.addoption(
+        "--compiled", action="store_true", help="fail where a command compiles a kernel"
+    )
+
+
+def pytest_sessionstart(session: pytest.Session) -> None:
+    """Note which kernels are compiled before any test runs."""
+    session.stash[_KEPT] = _kept_kernels() if session.config.getoption("--compiled") else set()
+
+
+def pytest_testnodedown(node: Any) -> None:
+    """Take over what a process that has run tests has compiled."""
+    _OURS.update(getattr(node, "workeroutput", {}).get("compiled", ()))
+
+
+@pytest.hookimpl(trylast=True)
+def pytest_sessionfinish(session: pytest.Session) -> None:
+    """Fail if commands had to compile kernels, because the installation should have done it.
+
+    Delete their machine code, so that the next run fails too.
+    """
+    modules = [module for name, module in sys.modules.items() if name.startswith("cdpr_")]
+    ours = {
+        Path(value._cache._cache_file._index_path).stem
+        for module in modules
+        for value in vars(module).values()
+        if hasattr(value, "py_func") and value.stats.cache_misses
+    }
+    if hasattr(session.config, "workeroutput"):
+        session.config.workeroutput["compiled"] = sorted(ours)
+    elif session.config.getoption("--compiled"):
+        if os.environ.get("NUMBA_CACHE_DIR"):
+            print("\nNUMBA_CACHE_DIR is set: not checked whether commands compile kernels")
+            return
+        late = _kept_kernels() - session.stash[_KEPT]
+        late = {file for file in late if file.name.rpartition("-")[0] not in _OURS | ours}
+        if late:
+            names = sorted(file.name for file in late)
+            print("\ncompiled by commands, missing in cdpr_tools.host.kernels:", *names)
+            for file in late:
+                file.unlink(missing_ok=True)
+            session.exitstatus = pytest.ExitCode.TESTS_FAILED
 
 
 @pytest.hookimpl(trylast=True)

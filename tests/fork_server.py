@@ -46,8 +46,8 @@ _SCRIPT = "-c"
 _LAUNCHER_RIG = "launcher_rig"
 """A launcher of stand-ins, which PYTHONPATH leads to."""
 _OF_A_LAUNCHER = {
-    "cdpr_tools.daemon.processes.loop_process",
-    "cdpr_tools.daemon.processes.service_process",
+    "cdpr_tools.daemon.loop_process",
+    "cdpr_tools.daemon.service_process",
     "stand_in_loop",
     "stand_in_service",
 }
@@ -231,12 +231,8 @@ def install() -> None:
 
 def _serve(listener: socket.socket, lifeline: int) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    sys.path.append(str(Path(__file__).parent))
-    kernel_locks = importlib.import_module("kernel_locks")
-    sys.path.pop()
-    kernel_locks.install()
     _import_all()
-    kernels = kernel_locks.Kernels()
+    kernels = _Kernels()
     gc.collect()
     selector = selectors.DefaultSelector()
     selector.register(listener, selectors.EVENT_READ)
@@ -286,6 +282,34 @@ def _received(client: socket.socket) -> tuple[bytes, list[int]]:
     except ConnectionError:
         return b"", []
     return message, descriptors
+
+
+class _Kernels:
+    """The kernels of the modules that are loaded, and which of their machine code is."""
+
+    def __init__(self) -> None:
+        dispatcher = importlib.import_module("numba.core.dispatcher").Dispatcher
+        ours = [module for name, module in sys.modules.items() if name.startswith("cdpr_")]
+        found = {id(value): value for module in ours for value in vars(module).values()}
+        self._seen_ns: dict[Any, int] = {}
+        for kernel in found.values():
+            # of a kernel that is kept nowhere on this machine there is nothing to load
+            if isinstance(kernel, dispatcher) and hasattr(kernel._cache, "open"):
+                kernel._cache.open()
+                self._seen_ns[kernel] = 0
+
+    def load(self) -> None:
+        """Load what there is on disk by now."""
+        for kernel, seen_ns in self._seen_ns.items():
+            file = kernel._cache._cache_file
+            try:
+                changed_ns = Path(file._index_path).stat().st_mtime_ns
+            except FileNotFoundError:
+                continue
+            if changed_ns != seen_ns:
+                for signature, *_ in file._load_index():
+                    kernel.compile(signature)
+                self._seen_ns[kernel] = changed_ns
 
 
 def _import_all() -> None:

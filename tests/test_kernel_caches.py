@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import shutil
+import os
 import subprocess
 import sys
 from pathlib import Path
 
-import cdpr_sim_bus
+import pytest
 
 CALLEE = "from cdpr_rt.jit import jit\n\n@jit\ndef inner(x):\n    return x + {added}\n"
 CALLER = """
@@ -20,12 +20,12 @@ def outer(x):
 
 print(outer(1.0), sum(outer.stats.cache_hits.values()))
 """
-KERNEL_CACHE = "from cdpr_sim_bus import jit; print(jit._CACHE)"
 
 
 def told(folder: Path, *words: str) -> list[str]:
+    # without bytecode, which is not renewed for a source that changes twice in a second
     done = subprocess.run(
-        [sys.executable, *words], cwd=folder, capture_output=True, text=True, check=True
+        [sys.executable, "-B", *words], cwd=folder, capture_output=True, text=True, check=True
     )
     return done.stdout.split()
 
@@ -68,11 +68,182 @@ def test_machine_code_is_kept_once_by_whichever_path_its_source_is_found(tmp_pat
         assert told(tmp_path, "-c", f"import sys; sys.path.insert(0, {folder!r}); {ask}") == [found]
 
 
-def test_the_simulators_kernels_have_a_cache_for_each_state_of_them(tmp_path: Path) -> None:
-    package = tmp_path / "cdpr_sim_bus"
-    shutil.copytree(Path(cdpr_sim_bus.__file__).resolve().parent, package)
-    before = told(tmp_path, "-c", KERNEL_CACHE)
-    assert told(tmp_path, "-c", KERNEL_CACHE) == before
-    kernel = package / "robot" / "motor_physics.py"
-    kernel.write_text(kernel.read_text() + "# changed\n")
-    assert told(tmp_path, "-c", KERNEL_CACHE) != before
+CONSTANTS = """
+from cdpr_profiles.jit import jit
+import numbers_of_ours as ours
+from numbers_of_ours import FACTOR, TABLE
+
+@jit
+def scaled(x):
+    return FACTOR * x
+
+@jit
+def moved(x):
+    return x + ours.OFFSET * TABLE[0]
+
+@jit
+def both(x):
+    return scaled(x) + moved(x)
+
+both(1.0)
+print(*(sum(one.stats.cache_hits.values()) for one in (scaled, moved, both)))
+print(scaled(1.0), moved(1.0), both(1.0))
+"""
+NUMBERS = """
+import numpy as np
+FACTOR, OFFSET, TABLE = {factor}, {offset}, np.array([{one}, 7])
+"""
+
+
+def test_a_constant_that_changes_has_only_the_kernels_compiled_that_use_it(tmp_path: Path) -> None:
+    """Wherever it comes from; what is written besides code changes nothing."""
+    numbers, kernels = tmp_path / "numbers_of_ours.py", tmp_path / "kernels.py"
+    kernels.write_text(CONSTANTS)
+    numbers.write_text(NUMBERS.format(factor=2.0, offset=1.0, one=1))
+    told(tmp_path, "kernels.py")
+    kernels.write_text("# a remark\n" + CONSTANTS)
+    assert told(tmp_path, "kernels.py")[2:] == ["1", "2.0", "2.0", "4.0"]
+    for factor, offset, one, found in (
+        (3.0, 1.0, 1, ["0", "1", "0", "3.0", "2.0", "5.0"]),
+        (3.0, 2.0, 1, ["1", "0", "0", "3.0", "3.0", "6.0"]),
+        (3.0, 2.0, 2, ["1", "0", "0", "3.0", "5.0", "8.0"]),
+    ):
+        numbers.write_text(NUMBERS.format(factor=factor, offset=offset, one=one))
+        assert told(tmp_path, "kernels.py") == found
+
+
+UNWRITABLE = """
+from pathlib import Path
+from cdpr_profiles import user_folders
+user_folders.temporary_folder = lambda: Path({temporary!r})
+from cdpr_rt.jit import jit
+import shutil, sys
+
+@jit
+def kernel(x):
+    return x + 1.0
+
+for spoilt in sys.argv[1:]:
+    shutil.rmtree(spoilt)
+    Path(spoilt).touch()
+print(kernel(1.0), sum(kernel.stats.cache_hits.values()))
+"""
+
+
+def without_folders(
+    folder: Path, temporary: str, *words: str | Path
+) -> subprocess.CompletedProcess[str]:
+    """Run a kernel whose folder, and whose user's home, nobody can write."""
+    script = folder / "kernel.py"
+    script.write_text(UNWRITABLE.format(temporary=temporary))
+    (folder / "__pycache__").touch()  # where numba wants a folder
+    given = {"HOME": "/proc/nowhere", "PYTHONDONTWRITEBYTECODE": "1"}
+    env = {k: v for k, v in os.environ.items() if k not in ("NUMBA_CACHE_DIR", "XDG_CACHE_HOME")}
+    return subprocess.run(
+        [sys.executable, str(script), *map(str, words)],
+        env=env | given, capture_output=True, text=True, check=True,
+    )  # fmt: skip
+
+
+def test_machine_code_that_can_be_kept_nowhere_else_is_kept_in_a_temporary_folder(
+    tmp_path: Path,
+) -> None:
+    for found in ("0", "1"):
+        done = without_folders(tmp_path, str(tmp_path / "own"))
+        assert done.stdout.split() == ["2.0", found]
+        assert done.stderr.count("\n") == 1
+        assert f"compiled kernels are kept in {tmp_path / 'own' / 'kernels'}" in done.stderr
+    assert (tmp_path / "own").stat().st_mode & 0o777 == 0o700
+
+
+@pytest.mark.parametrize("taken", [False, True])
+def test_kernels_work_though_their_machine_code_can_be_kept_nowhere(
+    tmp_path: Path, taken: bool
+) -> None:
+    temporary = tmp_path / "of-others"
+    temporary.mkdir(mode=0o777)
+    temporary.chmod(0o777)  # who writes there could have us run what he likes
+    where = str(temporary) if taken else "/proc/nowhere/own"
+    done = without_folders(tmp_path, where)
+    assert done.stdout.split() == ["2.0", "0"]
+    assert done.stderr.count("\n") == 1 and "set NUMBA_CACHE_DIR" in done.stderr
+    assert not list(temporary.iterdir())
+
+
+def test_kernels_work_though_their_cache_cannot_be_used_any_more(tmp_path: Path) -> None:
+    done = without_folders(tmp_path, str(tmp_path / "own"), tmp_path / "own" / "kernels")
+    assert done.stdout.split() == ["2.0", "0"]
+
+
+HITS = """
+from cdpr_profiles import user_folders
+from pathlib import Path
+user_folders.temporary_folder = lambda: Path("/proc/nowhere/own")
+from cdpr_rt.jit import jit
+
+@jit
+def kernel(x):
+    return x + 1.0
+
+print(kernel(1.0), sum(kernel.stats.cache_hits.values()))
+"""
+
+
+@pytest.mark.parametrize("home", ["home", "/proc/nowhere"])
+def test_machine_code_beside_its_source_is_read_by_users_who_cannot_write_there(
+    tmp_path: Path, home: str
+) -> None:
+    script = tmp_path / "tree" / "kernel.py"
+    script.parent.mkdir()
+    script.write_text(HITS)
+    assert told(tmp_path, str(script)) == ["2.0", "0"]
+    folders = [one for one in (script.parent, *script.parent.rglob("*")) if one.is_dir()]
+    for folder in folders:
+        folder.chmod(0o555)
+    # root may write there nevertheless, unless it has lost the right to
+    weak = ["setpriv", "--bounding-set=-dac_override"] if os.geteuid() == 0 else []
+    env = {k: v for k, v in os.environ.items() if k not in ("NUMBA_CACHE_DIR", "XDG_CACHE_HOME")}
+    done = subprocess.run(
+        [*weak, sys.executable, str(script)],
+        env=env | {"HOME": str(tmp_path / home)}, capture_output=True, text=True, check=True,
+    )  # fmt: skip
+    for folder in folders:
+        folder.chmod(0o755)
+    assert (done.stdout.split(), done.stderr) == (["2.0", "1"], "")
+
+
+AT_ONCE = """
+import os, sys, time
+from pathlib import Path
+from cdpr_rt.jit import jit
+
+@jit
+def kernel(x):
+    return x + x
+
+mine, other = sys.argv[1:]
+replace = os.replace
+
+def slow_replace(source, target):
+    if target.endswith(".nbi"):  # the index is about to be written
+        Path(mine).touch()
+        for _ in range(100):
+            if Path(other).exists():
+                time.sleep(0.5)
+                break
+            time.sleep(0.05)
+    replace(source, target)
+
+os.replace = slow_replace
+kernel(1.0 if mine == "float" else 1)
+print(sum(kernel.stats.cache_hits.values()))
+"""
+
+
+def test_two_processes_that_compile_one_kernel_for_other_types_keep_both(tmp_path: Path) -> None:
+    """Each waits, before it writes the index, until the other one is about to write it too."""
+    (tmp_path / "at_once.py").write_text(AT_ONCE)
+    both = [["at_once.py", "float", "int"], ["at_once.py", "int", "float"]]
+    running = [subprocess.Popen([sys.executable, *words], cwd=tmp_path) for words in both]
+    assert [one.wait(60) for one in running] == [0, 0]
+    assert [told(tmp_path, *words) for words in both] == [["1"], ["1"]]

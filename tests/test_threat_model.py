@@ -7,7 +7,7 @@ import re
 from pathlib import Path
 
 TESTS = Path(__file__).parent
-PAGE = TESTS.parent / "docs" / "threat-model.md"
+PAGE = TESTS.parent / "docs" / "reference" / "threat-model.md"
 
 
 def test_each_test_that_the_page_names_is_there_and_each_row_names_one() -> None:

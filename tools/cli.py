@@ -7,6 +7,7 @@ import json
 import re
 import signal
 import sys
+from contextlib import suppress
 from typing import Annotated, Any, NoReturn
 
 import typer
@@ -14,106 +15,113 @@ from typer import BadParameter
 from typing_extensions import override
 
 from cdpr_drivers.errors import ConfigurationError, DriverError
-from cdpr_profiles.errors import ProfileError
+from cdpr_profiles.errors import ProfileError, printable
 from cdpr_rt.errors import ControlError, InvalidRequestError
 from cdpr_sim_bus.errors import BusSetupError, SimulatorError
 from cdpr_tools.command_group import group_of
 from cdpr_tools.compiling import announce_compiling
 from cdpr_tools.errors import BAD_INPUT, DONE, FAILED, CommandError
+from cdpr_tools.streams import OutputLostError, guard_streams
 
 MODULES = {
     "commission": {
         "commission": "Measure, identify, validate and report motors, each detached from its load.",
     },
     "doctor": {
-        "doctor": "Check this machine and tell what to fix before a robot runs on it.",
+        "doctor": "Check this machine, and say what to fix before it runs a robot.",
     },
-    "daemon.estop": {
-        "estop": "Take the power from a robot's drives at once: no braking, no lowering; brakes "
-        "are applied.",
+    "estop": {
+        "estop": "Remove the power from a robot's drives immediately: no braking, no lowering.",
     },
-    "daemon.run": {
-        "run": "Run a robot's control loop as a daemon; it stands ready, without power, until "
-        "enabled.",
+    "run": {
+        "run": "Start a robot's control loop as a daemon. It gives no power until you enable it.",
     },
-    "daemon.service_unit": {
-        "service-unit": "Print a systemd unit that runs the robot's daemon; takes the options of "
-        "`cdpr run` as well.",
+    "service_unit": {
+        "service-unit": "Print a systemd unit that runs the robot's daemon.",
     },
-    "daemon.daemon_motion": {
-        "jog": "Turn axes at a speed for a while; they stop when this command does, however it "
-        "ends.",
-        "move": "Move axes or the platform to positions and wait; Ctrl-C holds and exits with 1.",
-        "controller": "Change over to a program and stay with it until it is done; hold follows "
-        "then.",
-        "tighten": "Take up the slack of a platform's cables and learn where it is; it is held "
-        "then.",
-        "lower": "Let the platform down onto its stand; the power stays on, the cables are loose.",
-        "pause": "Stop the platform and hold it there; `resume` goes on.",
-        "resume": "Go on to the position, or along the path, that was left when it was paused.",
+    "daemon_motion": {
+        "jog": "Turn axes at a constant speed for a while.",
+        "move": "Move axes or the platform to a position and wait until they are there.",
+        "controller": "Run a program (a controller with its motion) until it is done, then hold.",
+        "tighten": "Tighten the cables, measure where the platform is, and hold it.",
+        "lower": "Lower the platform onto its stand and slacken the cables; the power stays on.",
+        "pause": "Stop a motion and hold; `cdpr resume` continues it.",
+        "resume": "Continue the move or path that was paused.",
     },
-    "daemon.daemon_state": {
-        "status": "Show the state of a daemon and its robot; changes nothing.",
-        "check": "Boot the drives anew and check the bus without power; ready afterwards.",
-        "enable": "Give the drives power; they hold where they are.",
-        "disable": "Stop the motion under control, then take the power off.",
-        "hold": "Stop the motion and stay there, whoever moves; the power stays on.",
-        "ack": "Acknowledge a fault whose cause is gone; nothing gets power by it.",
-        "stop": "End the daemon: the motion stops under control, the power goes off.",
+    "daemon_state": {
+        "status": "Show the state of the daemon and its robot.",
+        "check": "Boot the drives again and check the bus, without power.",
+        "enable": "Switch the drives on; they hold their position.",
+        "disable": "Stop the motion under control, then switch the drives off.",
+        "hold": "Stop the motion and hold the position; the power stays on.",
+        "ack": "Acknowledge a fault after its cause has been removed; gives no power.",
+        "stop": "Stop the motion under control, switch the drives off and end the daemon.",
     },
     "bench": {
-        "bench": "Measure this project's own cost on this machine.",
+        "bench": "Measure the cost of this software on this machine.",
     },
     "bus": {
-        "bus": "Look at a CAN bus.",
+        "bus": "Look at the traffic and the devices of a CAN bus.",
     },
-    "calibration.calibrate": {
+    "calibrate": {
         "calibrate": "Calibrate a robot's geometry, drums and elongation.",
     },
-    "calibration.camera": {
-        "camera": "Cameras: images, and intrinsics.",
+    "camera": {
+        "camera": "Take images with a camera and calibrate its lens.",
     },
     "cogging": {
-        "cogging": "Cogging: sweep, fit, validate, report.",
+        "cogging": "Identify, check and report the cogging torque of a motor.",
     },
-    "drive.group": {
-        "drive": "One drive on the bus.",
+    "groups": {
+        "drive": "Set up and try one drive.",
+        "robot": "Describe a cable robot, check it, and try it in simulation.",
+        "sim": "Simulate drives, robots, cameras and faults.",
     },
-    "devices.io": {
-        "io": "The safety I/O beside the drives.",
+    "io": {
+        "io": "Show and test the safety I/O.",
     },
     "log": {
-        "log": "The daemon's recordings: what is in them, as tables and pictures.",
+        "log": "List, plot and export recordings.",
     },
-    "calibration.markers": {
-        "markers": "Printed markers: sheets, and maps of them.",
+    "markers": {
+        "markers": "Print camera markers and measure a map of them.",
     },
-    "robot.poses": {
-        "poses": "Draw poses that a robot reaches straight from home, or from another place.",
+    "poses": {
+        "poses": "Draw random poses that a robot can reach.",
     },
-    "robot.path": {
-        "path": "Preview a path, follow it on the running daemon, resume it.",
+    "path": {
+        "path": "Preview, run and resume paths from G-code or way points.",
     },
     "profiles": {
-        "profiles": "Profiles of motors, drives, cables, winches and robots.",
+        "profiles": "List and show the profiles of motors, drives, cables, winches and robots.",
     },
-    "devices.rail": {
-        "rail": "The rails on which winches stand.",
+    "rail": {
+        "rail": "Move the rails that carry the winches.",
     },
-    "robot.group": {
-        "robot": "Describe a cable robot, look at it, try it.",
-    },
-    "sim.sim": {
-        "sim": "Simulated winches on a CAN bus.",
-    },
-    "daemon.teleop": {
-        "teleop": "Lead a robot by hand: `cdpr teleop ROBOT` means `cdpr teleop robot ROBOT`.",
+    "teleop": {
+        "teleop": "Move a robot by keyboard, gamepad or script.",
     },
     "tension": {
-        "tension": "Cable tensions: watch, tare, calibrate.",
+        "tension": "Read, tare and calibrate load cells.",
     },
 }
+PANELS = {
+    "Run": ("run", "status", "check", "enable", "ack", "service-unit"),
+    "Move": ("tighten", "move", "jog", "path", "controller", "teleop", "resume"),
+    "Stop": ("hold", "pause", "lower", "disable", "stop", "estop"),
+    "Look": ("log", "bus"),
+    "Describe": ("robot", "profiles"),
+    "Commission": ("commission", "drive", "cogging", "tension", "io", "rail"),
+    "Calibrate": ("calibrate", "camera", "markers", "poses"),
+    "Simulate": ("sim",),
+    "Machine": ("doctor",),
+}
+"""Which commands the help shows, and under which headings; it hides the others."""
+ALIASES = {"goto": "move", "clear": "ack", "reset": "ack", "start": "run"}
+"""Names that users of other controllers type."""
 _INTERRUPTED = 130
+_MOST_CHARS = 10_000
+"""Longest message of an error."""
 _BAD_INPUTS = (ProfileError, BusSetupError, ConfigurationError, InvalidRequestError)
 
 _WORDS = (
@@ -123,12 +131,12 @@ _WORDS = (
     (r"Input should be a valid number.*", "allowed: a number"),
     (r"Value error, (.*) is not one of (.*)\.", r"\1; allowed: \2"),
 )
-"""What the library says of a value that is not allowed, and how it is said here."""
+"""The library's texts for values that are not allowed, and their replacements here."""
 _UsageError: Any = BadParameter.__base__  # typer does not export it
 
 
-class _Commands(group_of(MODULES)):  # type: ignore[misc]
-    """All commands; what is wrong with their arguments is told as everything else is."""
+class _Commands(group_of(MODULES, PANELS, ALIASES)):  # type: ignore[misc]
+    """All commands; errors in their arguments are reported like all other errors."""
 
     @override
     def invoke(self, ctx: Any) -> Any:
@@ -140,6 +148,7 @@ class _Commands(group_of(MODULES)):  # type: ignore[misc]
                     error.message = re.sub(pattern, words, error.message)
             elif "unexpected extra argument" in error.message and _names_robot(error.ctx.command):
                 error.message += "; a robot is named by --robot"
+            error.message = printable(error.message)
             raise
 
 
@@ -158,7 +167,7 @@ app = typer.Typer(
 
 def _tell_version(asked: bool) -> None:
     if asked:
-        # loaded here: it takes longer than the help
+        # imported here: it takes longer than the help
         from importlib.metadata import version  # noqa: PLC0415
 
         print(f"cdpr {version('cdpr-rt')}")
@@ -178,7 +187,7 @@ def _group(
 
 
 def exit_status(error: BaseException) -> int:
-    """Return with what the command ends that `error` has ended."""
+    """Return the exit status of a command that `error` has ended."""
     if isinstance(error, CommandError):
         return error.exit_status
     return BAD_INPUT if isinstance(error, _BAD_INPUTS) else FAILED
@@ -186,9 +195,15 @@ def exit_status(error: BaseException) -> int:
 
 def main() -> None:
     """Run the command line; a known error is one line on standard error, never a traceback."""
+    guard_streams()
     announce_compiling()
     try:
-        app(standalone_mode=True)
+        try:
+            app(standalone_mode=True)
+        finally:
+            sys.stdout.flush()  # here a failure can still be reported
+    except BrokenPipeError:
+        sys.exit(FAILED)
     except (CommandError, ControlError, DriverError, ProfileError, SimulatorError) as error:
         notes = getattr(error, "__notes__", ())
         _end("; ".join([str(error), *notes]), exit_status(error))
@@ -197,23 +212,26 @@ def main() -> None:
             raise
         extra = "camera" if error.name == "cv2" else "daemon"
         _end(f"needs {error.name}, which comes with: pip install 'cdpr-rt[{extra}]'", FAILED)
-    except KeyboardInterrupt:  # while libraries are loaded
+    except KeyboardInterrupt:  # while libraries are loading
         _end("interrupted", FAILED)
     except SystemExit as end:
-        # how the command line library passes an interrupt on
+        # the form in which the command line library reports an interrupt
         if end.code == _INTERRUPTED:
             _end("interrupted", FAILED)
         raise
     finally:
-        # all is done or told: a Ctrl-C while the interpreter ends would end in its traceback
+        # all work is done: a Ctrl-C while the interpreter ends would only show a traceback
         atexit.register(signal.signal, signal.SIGINT, signal.SIG_IGN)
     sys.exit(DONE)
 
 
 def _end(message: str, status: int) -> NoReturn:
-    print(f"cdpr: {message}", file=sys.stderr)
+    message = message if len(message) <= _MOST_CHARS else f"{message[:_MOST_CHARS]}..."
+    print(f"cdpr: {printable(message)}", file=sys.stderr)
     if "--json" in sys.argv:
-        print(json.dumps({"ok": False, "error": message, "exit_status": status}))
+        with suppress(OutputLostError, BrokenPipeError):
+            result = {"ok": False, "error": message, "exit_status": status}
+            print(json.dumps(result), flush=True)
     sys.exit(status)
 
 

@@ -1,10 +1,11 @@
-"""Groups of commands that import the module of a command when it is asked for."""
+"""Groups of commands that import the module of a command on first use."""
 
 from __future__ import annotations
 
 import importlib
 import inspect
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from difflib import get_close_matches
 from functools import cache
 from typing import Any
 
@@ -13,6 +14,9 @@ from typer.core import TyperArgument, TyperCommand, TyperGroup
 from typing_extensions import override
 
 from cdpr_tools.loading import loading_notice
+
+HARMLESS = frozenset({"Look", "Describe", "Simulate", "Machine"})
+"""Headings of commands that neither move anything nor switch power."""
 
 
 @cache
@@ -27,9 +31,9 @@ def load(module: str, name: str) -> Any:
 
 
 def _unwrap(command: Any) -> None:
-    """Join the lines of each paragraph of the help, which a terminal wraps by its own width.
+    """Join the lines of each paragraph of the help, so that a terminal can wrap them.
 
-    Arguments that have no word of their own are called by their names, as capitals.
+    Arguments without a metavariable are shown by their names, in capitals.
     """
     for param in command.params:
         if isinstance(param, TyperArgument):
@@ -40,37 +44,66 @@ def _unwrap(command: Any) -> None:
         _unwrap(other)
 
 
-def group_of(modules: Mapping[str, Mapping[str, str]]) -> type[TyperGroup]:
+def group_of(
+    modules: Mapping[str, Mapping[str, str]],
+    panels: Mapping[str, Sequence[str]] | None = None,
+    aliases: Mapping[str, str] | None = None,
+) -> type[TyperGroup]:
     """Return the class of a group of commands.
 
-    `modules` has for each module of cdpr_tools.commands the names and first lines of its commands.
-    The group's own help shows these lines and imports none of the modules: each brings libraries
-    along.
+    `modules` has, for each module of cdpr_tools.commands, the names and first lines of its
+    commands. The group's own help shows these lines without importing the modules' libraries.
+    With `panels` the help sorts the commands under headings and hides those that have none.
+    `aliases` are further names of commands. For a mistyped name, only commands under a heading of
+    `HARMLESS` are suggested, never one that moves or cuts power.
     """
     module_of = {name: module for module, lines in modules.items() for name in lines}
+    names = [name for some in panels.values() for name in some] if panels else list(module_of)
+    hidden = [name for name in module_of if name not in names]
+    panel_of = {name: panel for panel, some in (panels or {}).items() for name in some}
+    suggested = [name for name in names if panel_of.get(name) in HARMLESS]
+    line_of = {name: line for lines in modules.values() for name, line in lines.items()}
 
     class _Group(TyperGroup):
         def __init__(self, **settings: Any) -> None:
-            super().__init__(**settings)
-            for lines in modules.values():
-                for name, line in lines.items():
-                    self.add_command(TyperCommand(name, help=line))
+            super().__init__(**{**settings, "suggest_commands": False})
+            for name in (*names, *hidden):
+                self.add_command(
+                    TyperCommand(
+                        name,
+                        help=line_of[name],
+                        rich_help_panel=panel_of.get(name),
+                        hidden=name in hidden,
+                    )
+                )
+
+        @override
+        def list_commands(self, ctx: Any) -> list[str]:
+            return [*names, *hidden]  # in the order of the help, not alphabetical
 
         @override
         def resolve_command(self, ctx: Any, args: list[str]) -> Any:
-            if (name := args[0]) in module_of:
+            name = (aliases or {}).get(args[0], args[0])
+            if name in module_of:
                 self.add_command(load(module_of[name], name))
-            return super().resolve_command(ctx, args)
+            elif not ctx.resilient_parsing and not name.startswith("-"):
+                near = get_close_matches(name, suggested)
+                asked = f"{ctx.command_path} --help"
+                hint = (
+                    f"Did you mean {' or '.join(map(repr, near))}?" if near else f"See `{asked}`."
+                )
+                ctx.fail(f"No such command '{name}'. {hint}")
+            return super().resolve_command(ctx, [name, *args[1:]])
 
     return _Group
 
 
 def lazy_group(name: str, line: str, modules: Mapping[str, Mapping[str, str]]) -> typer.Typer:
-    """Return the group `name` of such commands; `line` is what its help says of it."""
+    """Return the group `name` of such commands; `line` is its text in the help."""
     app = typer.Typer(name=name, cls=group_of(modules), help=line, no_args_is_help=True)
 
     @app.callback()
     def group() -> None:
-        """Have typer make a group where it knows of no command."""
+        """Make typer create a group although it has no command yet."""
 
     return app

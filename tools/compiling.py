@@ -1,4 +1,4 @@
-"""Say that kernels are compiled: the first time on a machine this takes minutes."""
+"""Report that kernels are compiled: the first time on a machine this takes minutes."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ import socket
 import sys
 import threading
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 
 from typing_extensions import override
 
 NOTICE = "compiling"
-"""What each line begins with: a command that hides what its simulator says passes these on."""
+"""Start of each notice line: a command that hides its simulator's output forwards these."""
 
 _EVERY_S = 5.0
 _LOG = logging.getLogger("cdpr.compiling")
@@ -22,17 +22,17 @@ _LOG = logging.getLogger("cdpr.compiling")
 _listeners: list[Callable[[str], None]] = []
 
 _NAME = "CDPR_COMPILING_TOLD"
-"""Variable with the name of a socket that has room for one: who gets in tells of compiling."""
+"""Variable with the name of a socket with room for one: who connects reports the compiling."""
 _sockets: list[socket.socket] = []
-"""Kept open as long as the process lasts."""
+"""Kept open until the process ends."""
 
 
 @contextmanager
 def compiling_notices_to(listener: Callable[[str], None]) -> Iterator[None]:
-    """Call `listener` with how far it is for each kernel that the block compiles.
+    """Call `listener` with the progress for each kernel that the block compiles.
 
-    In the thread that compiles, and with each notice of another process that is passed on.
-    Only where `announce_compiling` is in force.
+    It is called in the compiling thread, and for each forwarded notice of another process.
+    It works only after `announce_compiling`.
     """
     _listeners.append(listener)
     try:
@@ -42,7 +42,7 @@ def compiling_notices_to(listener: Callable[[str], None]) -> Iterator[None]:
 
 
 def pass_on(line: str) -> None:
-    """Say a notice of another process, a whole line, in the place of that process."""
+    """Print a notice of another process, a whole line, on its behalf."""
     print(line, end="", file=sys.stderr, flush=True)
     _tell_listeners(line)
 
@@ -53,22 +53,22 @@ def _tell_listeners(text: str) -> None:
 
 
 def _first_to_tell() -> bool:
-    """Whether no other process of the command, and none that it has started, has told of it."""
+    """Return whether no other process of the command has reported the compiling yet."""
     visitor = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
     visitor.setblocking(False)
     try:
         visitor.connect("\0" + os.environ.get(_NAME, ""))
     except BlockingIOError:
         return False
-    except OSError:  # the command that has started this process has ended
+    except OSError:  # the command that started this process has ended
         pass
     finally:
-        visitor.close()  # it stays in the queue, which nobody serves
+        visitor.close()  # it stays in the queue, which nobody empties
     return True
 
 
 def _share_with_children() -> None:
-    """Make the socket that this process and those that it starts share."""
+    """Create the socket that this process and its children share."""
     if _NAME in os.environ:
         return
     name, listener = f"cdpr-compiling-{os.getpid()}", socket.socket(socket.AF_UNIX)
@@ -83,7 +83,7 @@ def _share_with_children() -> None:
 
 
 class _Notice(logging.Handler):
-    """Says it once in a command, then how far each of its processes is; on standard error."""
+    """Reports once per command, then the progress of each process; on standard error."""
 
     def __init__(self, what: str) -> None:
         super().__init__()
@@ -102,7 +102,7 @@ class _Notice(logging.Handler):
             self._teller.start()
 
     def _go_on_telling(self) -> None:
-        """Tell now and then how many kernels there are, as long as there are more and more."""
+        """Report the number of kernels from time to time while it grows."""
         noted, never = 0, threading.Event()
         while noted != self._kernels:
             noted = self._kernels
@@ -119,40 +119,8 @@ class _Notice(logging.Handler):
 
 
 def announce_compiling(what: str = "the numerics") -> None:
-    """Say from now on when kernels have to be compiled; `what` names them all."""
+    """Report from now on when kernels must be compiled; `what` names them all."""
     _share_with_children()
     _LOG.handlers[:] = [_Notice(what)]
     _LOG.propagate = False
     _LOG.setLevel(logging.INFO)
-
-
-class _NotWantedError(Exception):
-    """What is compiled is not wanted any more."""
-
-
-class _EndsCompiling(logging.Handler):
-    """Raises where the next kernel would be compiled, once that is not wanted any more."""
-
-    def __init__(self, ended: Callable[[], bool]) -> None:
-        super().__init__()
-        self._ended = ended
-
-    @override
-    def emit(self, record: logging.LogRecord) -> None:
-        if self._ended():
-            raise _NotWantedError
-
-
-@contextmanager
-def compiling_until(ended: Callable[[], bool]) -> Iterator[None]:
-    """Leave the block before the next kernel that it compiles once `ended` says so.
-
-    Only where `announce_compiling` is in force: nothing else tells of each kernel.
-    """
-    handler = _EndsCompiling(ended)
-    _LOG.addHandler(handler)
-    try:
-        with suppress(_NotWantedError):
-            yield
-    finally:
-        _LOG.removeHandler(handler)

@@ -1,4 +1,4 @@
-"""How a command ends when it cannot do its work, and what the shell is told."""
+"""How a command ends if it cannot do its work, and its exit status."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -7,24 +7,24 @@ DONE, FAILED, BAD_INPUT = 0, 1, 2
 
 
 class CommandError(Exception):
-    """A command ends early; `exit_status` goes to the shell, the message to the user."""
+    """A command ends early; `exit_status` is for the shell, the message for the user."""
 
     exit_status = FAILED
 
 
 class WorkFailedError(CommandError):
-    """The work was begun and failed: a drive fault, a limit, a lost bus."""
+    """The work was started and failed: a drive fault, a limit, a lost bus."""
 
 
 class BadInputError(CommandError):
-    """The command cannot begin: a wrong argument, file, profile or bus."""
+    """The command cannot start: a wrong argument, file, profile or bus."""
 
     exit_status = BAD_INPUT
 
 
 @contextmanager
 def os_error_as(kind: type[CommandError], what: str) -> Iterator[None]:
-    """Raise a `kind` that says of `what` why the system refuses it, in place of an OSError."""
+    """Raise a `kind` with `what` and the system's reason instead of an OSError."""
     try:
         yield
     except OSError as error:
@@ -33,7 +33,7 @@ def os_error_as(kind: type[CommandError], what: str) -> Iterator[None]:
 
 @contextmanager
 def raised_as(kind: type[CommandError], error: type[Exception]) -> Iterator[None]:
-    """Raise a `kind` in place of such an error, with its text."""
+    """Raise a `kind` with the text of such an error instead of the error."""
     try:
         yield
     except error as raised:

@@ -1,4 +1,4 @@
-"""Say on a terminal that libraries are being loaded, where that takes a moment."""
+"""Show on a terminal that libraries are loading, if that takes a moment."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 _SOON_S = 0.2
-"""What ends before needs no word."""
+"""Shorter loading is not reported."""
 _TEXT, _WIPE = "loading ...", "\r\x1b[K"
 
 
 @contextmanager
 def loading_notice() -> Iterator[None]:
-    """Say so on a terminal soon after the block begins, and wipe it out at its end."""
-    # a shell that asks for completions has its line there
+    """Show it on a terminal soon after the block begins, and erase it at the end."""
+    # a shell that requests completions has its line there
     if not sys.stderr.isatty() or "_CDPR_COMPLETE" in os.environ or os.getenv("TERM") == "dumb":
         yield
         return

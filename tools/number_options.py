@@ -13,12 +13,12 @@ from cdpr_tools.errors import BadInputError
 
 
 def numbers_command(*options: str) -> type[TyperCommand]:
-    """Return the class of a command whose `options` take all the numbers that follow them."""
+    """Return the class of a command whose `options` take all following numbers."""
 
     class _NumbersCommand(TyperCommand):
         @override
         def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-            """Join each of these options with its numbers, negative ones too."""
+            """Join each of these options with its numbers, including negative ones."""
             joined: list[str] = []
             takes = False
             for word in args:

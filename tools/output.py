@@ -1,4 +1,4 @@
-"""What a command shows: text for people, one JSON line for programs, progress on standard error."""
+"""Output of a command: text for people, one JSON line for programs, progress on standard error."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from rich.console import Console
+from rich.console import Console, ConsoleOptions, RenderableType
 from rich.progress import (
     BarColumn,
     Progress,
@@ -21,16 +21,20 @@ from rich.progress import (
     TimeElapsedColumn,
     TimeRemainingColumn,
 )
+from rich.segment import Segment
+from typing_extensions import override
+
+from cdpr_profiles.errors import printable
 
 _SLOW_S = 2.0
 _ESTIMATED_FROM = 0.005
-"""Share of the work from which on it is told how long the rest may take."""
+"""Share of the work after which the remaining time is shown."""
 _TELL_S = (2.0, 5.0)
-"""Where nothing can be drawn over again: when work is first told of to go on, then how often."""
+"""Without a terminal: time of the first report of continuing work, then the interval."""
 
 
 def _plain(value: Any) -> Any:
-    """Turn numpy values and non-finite numbers into what JSON knows."""
+    """Convert numpy values and non-finite numbers to JSON values."""
     if isinstance(value, dict):
         return {str(k): _plain(v) for k, v in value.items()}
     if isinstance(value, list | tuple):
@@ -49,37 +53,54 @@ def to_json(result: dict[str, Any], indent: int | None = None) -> str:
     return json.dumps(_plain(result), indent=indent, allow_nan=False)
 
 
+class _Terminal(Console):
+    """A console on which only styles and bars control the terminal, never text."""
+
+    def __init__(self, *, stderr: bool) -> None:
+        super().__init__(stderr=stderr, highlight=False, emoji=False, markup=False)
+
+    @override
+    def render(
+        self, renderable: RenderableType, options: ConsoleOptions | None = None
+    ) -> Iterator[Segment]:
+        for segment in super().render(renderable, options):
+            if segment.control:
+                yield segment
+            else:
+                yield Segment(printable(segment.text), segment.style)
+
+
 class Output:
-    """Where a command writes; `as_json` keeps standard output for the one JSON line."""
+    """Output of a command; `as_json` reserves standard output for the single JSON line."""
 
     def __init__(self, as_json: bool) -> None:
         self.as_json = as_json
-        self.notes = Console(stderr=True, highlight=False, emoji=False)
-        self.text = self.notes if as_json else Console(highlight=False, emoji=False)
+        self.notes = _Terminal(stderr=True)
+        self.text = self.notes if as_json else _Terminal(stderr=False)
         self._bar: Progress | None = None
 
     def say(self, *lines: str) -> None:
         """Write lines for people."""
         for line in lines:
-            self.text.print(line, markup=False, soft_wrap=True)
+            self.text.print(printable(line), soft_wrap=True)
 
     def note(self, text: str) -> None:
-        """Write a line on what is going on, to standard error."""
-        self.notes.print(text, markup=False, style="dim", soft_wrap=True)
+        """Write a line about the present work to standard error."""
+        self.notes.print(printable(text), style="dim", soft_wrap=True)
 
     def result(self, result: dict[str, Any]) -> None:
-        """Write the JSON line, when it is wanted; it is the last line of standard output."""
+        """Write the JSON line if requested; it is the last line of standard output."""
         if self.as_json:
             print(to_json(result), flush=True)
 
     @contextmanager
     def progress(self, what: str, total_s: float) -> Iterator[Advance]:
-        """Show how far it is over `total_s` seconds of bus time while the block runs.
+        """Show the progress over `total_s` seconds of bus time while the block runs.
 
-        A bar on a terminal; elsewhere, where nothing can be drawn over again, a line now and then.
+        It shows a bar on a terminal, otherwise a line from time to time.
         """
         columns = (
-            TextColumn("{task.description}"),
+            TextColumn("{task.description}", markup=False),
             BarColumn(),
             TimeElapsedColumn(),
             TimeRemainingColumn(),
@@ -89,19 +110,23 @@ class Output:
 
     @contextmanager
     def stage(self, what: str, quick: bool = False) -> Iterator[None]:
-        """Say at once what is being done, and that it still is while the block runs.
+        """Show the present work immediately, and that it continues while the block runs.
 
-        What is `quick` on most machines is told at once on a terminal only, where it leaves none.
+        `quick` work is shown immediately only on a terminal, where it is erased at the end.
         """
         if not quick and not self.notes.is_interactive:
             self.note(f"{what} ...")
-        columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
+        columns = (
+            SpinnerColumn(),
+            TextColumn("{task.description}", markup=False),
+            TimeElapsedColumn(),
+        )
         with self._shown(columns, Advance(what, None), True):
             yield
 
     @contextmanager
     def paused(self) -> Iterator[None]:
-        """Draw nothing while the block runs, so that somebody can type."""
+        """Draw nothing while the block runs, so that the user can type."""
         bar = self._bar
         if bar is None:
             yield
@@ -149,7 +174,7 @@ class Output:
 
 
 class Advance:
-    """How far work has come; call it with the seconds of bus time that have passed."""
+    """Progress of work; call it with the seconds of bus time that have passed."""
 
     def __init__(self, what: str, total: float | None) -> None:
         self.what, self.total, self.done = what, total, 0.0
@@ -157,18 +182,18 @@ class Advance:
         self._begun_s = time.monotonic()
 
     def __call__(self, time_s: float) -> None:
-        """Take it that `time_s` seconds are done; at 0 the work begins, whatever it waited for."""
+        """Set the progress to `time_s` seconds; 0 starts the work after any wait."""
         if not time_s:
             self._begun_s = time.monotonic()
         self.done = time_s
         self.on_change()
 
     def text(self) -> str:
-        """Return in words how far it is, and how long it may still take."""
+        """Return the progress as text, and the estimated remaining time."""
         elapsed_s = time.monotonic() - self._begun_s
         if not self.total:
             return f"{self.what}: for {elapsed_s:.0f} s now"
-        # a file that is still written to grows beyond what it was
+        # a file that is still being written grows beyond its initial size
         share = min(self.done / self.total, 1.0)
         if share < _ESTIMATED_FROM:
             return f"{self.what}: 0 %"

@@ -1,4 +1,4 @@
-"""Folders that hold the recordings of a measurement: no loss, and named when something fails."""
+"""Folders for the recordings of a measurement: never lost, and named in error messages."""
 
 from __future__ import annotations
 
@@ -7,12 +7,14 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from cdpr_drivers.errors import ConfigurationError, DriverError
+from cdpr_profiles.bounded_input import may_replace
 from cdpr_rt.errors import ControlError, InvalidRequestError
+from cdpr_rt.identification.rawlog import RAW_LOG
 from cdpr_tools.errors import BadInputError, WorkFailedError
 
 
 def refuse_loss(folder: Path, raw: Path, overwrite: bool) -> None:
-    """Raise BadInputError where earlier recordings in `raw` would be lost from --out `folder`."""
+    """Raise BadInputError if earlier recordings in `raw` would be lost from --out `folder`."""
     if raw.is_dir() and any(raw.iterdir()) and not overwrite:
         raise BadInputError(
             f"--out {folder}: holds the data of an earlier run; choose another folder, or "
@@ -20,9 +22,20 @@ def refuse_loss(folder: Path, raw: Path, overwrite: bool) -> None:
         )
 
 
+def discard_raw_data(raw: Path) -> bool:
+    """Remove the recordings of an earlier run from `raw`; return whether there were any.
+
+    Other files in the folder stay. Raises OSError.
+    """
+    ours = [path for path in raw.glob("*.raw") if path.is_file() and may_replace(path, RAW_LOG)]
+    for path in ours:
+        path.unlink()
+    return bool(ours)
+
+
 @contextmanager
 def keeping_raw_data(raw: Path) -> Iterator[None]:
-    """Add to the message of what failed where the recordings made so far are."""
+    """Add the place of the recordings made so far to the message of a failure."""
     try:
         yield
     except (ConfigurationError, InvalidRequestError):

@@ -1,24 +1,27 @@
-"""Ctrl-C and SIGTERM as a question that a loop asks, instead of an exception in its middle."""
+"""Ctrl-C and SIGTERM as a flag that a loop polls, instead of an exception inside it."""
 
 from __future__ import annotations
 
-import os
 import signal
-import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from types import FrameType
 
-_STOPPING = "stopping under control; a second Ctrl-C takes the power at once"
-HELD = "the motion stops and is held, with power, which `cdpr disable` and `cdpr stop` take"
-"""What a Ctrl-C does to a command that has a daemon move something."""
+from cdpr_tools.streams import write_notice
+
+_STOPPING = "stopping under control; press Ctrl-C again to remove the power immediately"
+HELD = (
+    "the motion stops and the motors hold it under power; `cdpr disable` or `cdpr stop` removes "
+    "the power"
+)
+"""Effect of a Ctrl-C on a command that moves something through a daemon."""
 
 
 class StopRequest:
-    """Whether the user wants an end: asked once it is to be looked at, asked twice it interrupts.
+    """Whether the user requests an end: the first request sets a flag, the second interrupts.
 
-    It interrupts once, by KeyboardInterrupt: what comes later would keep the power from being
-    switched off.
+    It interrupts only once, by KeyboardInterrupt: later ones would prevent the power from
+    being switched off.
     """
 
     def __init__(self, notice: str = "") -> None:
@@ -26,23 +29,22 @@ class StopRequest:
         self._times = 0
         self._interrupts = True
         self.energised = False
-        """Whether the user is told at the first request what a second one does."""
+        """Whether the first request prints the effect of a second one."""
 
     def __call__(self) -> bool:
-        """Whether an end is wanted."""
+        """Whether an end is requested."""
         return self._times > 0
 
     def closing(self) -> None:
-        """Have nothing interrupted any more, since the power is being switched off."""
+        """Interrupt nothing from now on, because the power is being switched off."""
         self._interrupts = False
 
     def note(self, _number: int, _frame: FrameType | None) -> None:
-        """Take a signal."""
+        """Handle a signal."""
         self._times += 1
         notice = _STOPPING if self.energised else self._notice
         if self._times == 1 and notice and self._interrupts:
-            # printing is not allowed to interrupt itself
-            os.write(sys.stderr.fileno(), f"{notice}\n".encode())
+            write_notice(notice)  # print is not reentrant
         if self._times > 1 and self._interrupts:
             self._interrupts = False
             raise KeyboardInterrupt
@@ -50,7 +52,7 @@ class StopRequest:
 
 @contextmanager
 def interrupted_by_sigterm() -> Iterator[None]:
-    """Have SIGTERM end what is done in the block as a Ctrl-C does: by KeyboardInterrupt."""
+    """Make SIGTERM end the block as a Ctrl-C does: by KeyboardInterrupt."""
 
     def interrupt(_number: int, _frame: FrameType | None) -> None:
         raise KeyboardInterrupt
@@ -64,10 +66,10 @@ def interrupted_by_sigterm() -> Iterator[None]:
 
 @contextmanager
 def stop_on_signals(notice: str = "") -> Iterator[StopRequest]:
-    """Yield what tells whether the user wants an end; asked a second time it is an interrupt.
+    """Yield the stop request of the user; a second request is an interrupt.
 
-    `notice` is said at the first request. After a Ctrl-C in the block further ones change nothing:
-    the command ends already.
+    `notice` is printed at the first request. After a Ctrl-C in the block further ones are ignored:
+    the command is ending.
     """
     request = StopRequest(notice)
     numbers = (signal.SIGINT, signal.SIGTERM)
@@ -75,6 +77,6 @@ def stop_on_signals(notice: str = "") -> Iterator[StopRequest]:
     try:
         yield request
     finally:
-        # in one step: an interrupt in between would end the interpreter while it takes itself apart
+        # in one step: an interrupt in between would hit the interpreter while it shuts down
         signal.signal(signal.SIGINT, signal.SIG_IGN if request() else before[signal.SIGINT])
         signal.signal(signal.SIGTERM, before[signal.SIGTERM])

@@ -1,1 +1,1 @@
-"""Calibration of a robot's geometry: what it observes, the fit, and how good it is."""
+"""Calibration of a robot's geometry: parameters, fit, faults, verdict."""

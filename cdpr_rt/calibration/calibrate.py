@@ -1,36 +1,49 @@
-"""From observations to a calibration that has verified itself."""
+"""Make a calibration from observations, verify it, and put it in the frame of the file."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from typing import Final
 
 import numpy as np
 
 from cdpr_profiles import Robot
 from cdpr_rt.arrays import FloatArray
-from cdpr_rt.calibration.camera.camera_faults import map_faults, moved_or_slipped, told_right
-from cdpr_rt.calibration.camera.camera_start import camera_start
-from cdpr_rt.calibration.estimation.faults import Fault, fit_without_faults, parameter_faults
-from cdpr_rt.calibration.estimation.fit import Fit
-from cdpr_rt.calibration.estimation.noise import fit_with_noise_seen
-from cdpr_rt.calibration.estimation.parameters import CableGeometry
-from cdpr_rt.calibration.markers.coverage import coverage
+from cdpr_rt.calibration.camera_model import UNKNOWN_HAND_EYE_STD, CameraKnowledge, CameraModel
+from cdpr_rt.calibration.camera_start import camera_start
+from cdpr_rt.calibration.faults import (
+    Fault,
+    fit_without_faults,
+    hand_eye_fault,
+    map_faults,
+    moved_or_slipped,
+    parameter_faults,
+    place_faults,
+    told_right,
+    without_points,
+    without_slipped_points,
+)
+from cdpr_rt.calibration.fit import Fit, fit, fit_with_noise_seen, locate
+from cdpr_rt.calibration.markers.geometry import exponentials, logarithms
 from cdpr_rt.calibration.markers.map_fit import MapFit
-from cdpr_rt.calibration.markers.sighting import laid_out
+from cdpr_rt.calibration.markers.marker_map import best_fit, coverage, laid_out
 from cdpr_rt.calibration.outcome import LEAST_POINTS, CalibrationMethod, Outcome
-from cdpr_rt.calibration.readings.camera_data import Images
-from cdpr_rt.calibration.readings.observations import Observations
-from cdpr_rt.calibration.verification.held_out import LEAST_POSES, held_out, hold_out
-from cdpr_rt.calibration.verification.more_poses import with_more_poses
-from cdpr_rt.calibration.verification.verdict import (
+from cdpr_rt.calibration.parameters import DRUM, EXIT, CableGeometry
+from cdpr_rt.calibration.readings import Images, Observations
+from cdpr_rt.calibration.residuals import lengths_told
+from cdpr_rt.calibration.verdict import (
+    Predicted3Sigma,
+    absolute_3_sigma,
     change_of,
     open_directions,
-    predicted_std,
+    predicted_3_sigma,
     require_enough,
 )
+from cdpr_rt.calibration.verification import LEAST_POSES, held_out, hold_out, with_more_poses
 from cdpr_rt.errors import InvalidRequestError
-from cdpr_rt.robots.robot_arrays import limits_of
+from cdpr_rt.model.cable_kernel import ANCHOR, RADIUS
+from cdpr_rt.model.robot_arrays import limits_of
 
 _GRID = 4
 _SLACK_SHARE = 0.5
@@ -43,16 +56,16 @@ def calibrate(
     method: CalibrationMethod,
     images: Images | None = None,
 ) -> Outcome:
-    """Return the calibration that observations support; raises InvalidRequestError for too few.
+    """Return the calibration that observations support; raise InvalidRequestError for too few.
 
-    With images it is fitted together with camera and markers. It is fitted to all poses, with what
-    is at fault left out, and anew without one pose in five, which verify it: these count for
-    nothing there, not even to find what is at fault.
+    With images, camera and markers are fitted too. One fit uses all poses except faulty readings; a
+    second fit also leaves out one pose in five. Those poses verify the second fit, which does not
+    use them at all, not even to find faults. Measured points that the fit to all poses has found
+    wrong do not verify either; the outcome gives their number.
     """
     if seen.poses < LEAST_POSES:
         raise InvalidRequestError(
-            f"{seen.poses} poses; allowed: {LEAST_POSES} and more, some of which verify what the "
-            "others tell"
+            f"{seen.poses} poses; allowed: {LEAST_POSES} and more, some verify what the others tell"
         )
     slack = _SLACK_SHARE * np.asarray(limits_of(robot).slack_N, float)
     if images is None:
@@ -60,69 +73,116 @@ def calibrate(
     else:
         all_of_it = _with_camera(geometry, seen, slack, images)
     found, first_map = all_of_it.fit, all_of_it.map
-    known_room = all_of_it.known_room or bool(seen.measured.sum() >= LEAST_POINTS)
-    unused = hold_out(geometry, all_of_it.weighed, all_of_it.seen, slack, found, first_map, images)
+    known_room = all_of_it.known_room or bool(all_of_it.seen.measured.sum() >= LEAST_POINTS)
+    unused = hold_out(
+        geometry, all_of_it.weighed, all_of_it.seen, slack, found, first_map, all_of_it.images
+    )
+    grid = _grid(found.geometry)
     birge = unused.birge_ratio()
     larger = max(birge, 1.0) if known_room and math.isfinite(birge) else 1.0
-    sigma_mm, with_more_mm = (
-        larger * _three_sigma_mm(one, known_room) for one in (found, with_more_poses(found))
-    )
-    change = change_of(found, _grid(found.geometry), not known_room, larger)
+    known = predicted_3_sigma(found, grid, not known_room, larger)
+    with_more = predicted_3_sigma(with_more_poses(found), grid, not known_room, larger)
+    absolute = absolute_3_sigma(found, grid, larger)
+    if known_room or all_of_it.seen.measured.any():
+        absolute = absolute.with_shared_scale(grid[:, 0, : geometry.coordinates])
+    else:  # only the file determines the frame
+        exits_mm = math.sqrt(max(absolute.position_mm**2 - known.position_mm**2, 0.0))
+        framed = in_frame_of_file(found, geometry, grid, 1e-3 * exits_mm / 3.0)
+        part = in_frame_of_file(unused.part, geometry, grid, 1e-3 * exits_mm / 3.0).found
+        found, unused, absolute = framed.found, replace(unused, part=part), framed.known_to(known)
+    change = change_of(found, grid, not known_room, larger)
     cover = None
     if images is not None:
         cover = coverage(images.sightings, images.setup.sheets.placed)
     return Outcome(
         robot, found, method, all_of_it.faults, open_directions(found),
         unused.verified(), unused.before(geometry), int((~unused.seen.used).sum()),
-        sigma_mm, with_more_mm, known_room, unused, change, birge, cover=cover,
+        known, with_more.position_mm, absolute, known_room,
+        position_shift(found, geometry, grid), unused, change, birge, cover=cover,
+        verifying_points_left_out=all_of_it.verifying_left_out,
     )  # fmt: skip
 
 
 @dataclass(frozen=True)
 class _Whole:
-    """The fit to all poses, and what was wrong with them."""
+    """The fit to all poses, and the faults found in the observations."""
 
     fit: Fit
     weighed: CableGeometry
-    """The robot's file with readings as good as they have shown to be."""
+    """The robot's file with the accuracy of readings that the fit has found."""
     faults: list[Fault]
     seen: Observations
-    """Observations of the fit, before any was left out."""
+    """Observations of the fit before lengths are left out, but without wrong points."""
+    verifying_left_out: int
+    """Number of wrong points at poses that would have verified the fit."""
     map: MapFit | None = None
     known_room: bool = False
     """Whether places of markers are known in the room."""
+    images: Images | None = None
+    """With only those known places that agree with each other."""
 
 
 def _of_cables(geometry: CableGeometry, seen: Observations, slack_N: FloatArray) -> _Whole:
-    require_enough(geometry, seen.some(~held_out(seen.poses)))
+    require_enough(geometry, seen.some(~held_out(seen)))
+    seen, of_points = without_slipped_points(geometry, seen, slack_N)
     found, faults = fit_without_faults(geometry, seen, slack_N)
     found, weighed = fit_with_noise_seen(found, geometry)
-    return _Whole(found, weighed, faults, seen)
+    faults = of_points + faults
+    left_out = _verifying_left_out(seen, faults)
+    return _Whole(found, weighed, faults, without_points(seen, faults), left_out)
+
+
+def _verifying_left_out(seen: Observations, faults: list[Fault]) -> int:
+    """Return how many of the wrong points are at poses that `seen`, with them, would hold out."""
+    held = held_out(seen)
+    return sum(bool(held[fault.pose]) for fault in faults if fault.kind == "point")
 
 
 def _with_camera(
     geometry: CableGeometry, seen: Observations, slack_N: FloatArray, images: Images
 ) -> _Whole:
     start = camera_start(geometry, seen, images.setup, images.sightings)
-    require_enough(geometry, start.seen.some(~held_out(seen.poses)))
-    found, faults = fit_without_faults(geometry, start.seen, slack_N, start.camera)
+    require_enough(geometry, start.seen.some(~held_out(start.seen)))
+    known, of_points = without_slipped_points(geometry, start.seen, slack_N)
+    told = start.camera.knowledge
+    # the given place of the camera counts only after it agrees with the readings: a wrong place
+    # would look like faults of cables, and hide them
+    unknown = start.camera.with_hand_eye(
+        told.position_m, told.rotation, np.array(UNKNOWN_HAND_EYE_STD)
+    )
+    found, faults = fit_without_faults(geometry, known, slack_N, unknown)
+    misplaced = None
+    if images.setup.hand_eye is not None:
+        misplaced = hand_eye_fault(found, told)
+        if misplaced is None:
+            found = _with_hand_eye(geometry, found, told)
     found, wrong = told_right(geometry, found, start.map)
-    # drums that were told wrong are not held where the file has them
+    if misplaced is not None and wrong and hand_eye_fault(found, told, wrong) is None:
+        misplaced, found = None, _with_hand_eye(geometry, found, told)
+    # if the file's drums are wrong, do not hold the fit to them
     believed = replace(geometry, knowledge=found.geometry.knowledge)
     found, weighed = fit_with_noise_seen(found, believed)
     readings = [one for one in faults if one.kind not in ("drum", "elongation")]
     of_map = map_faults(start.map, laid_out(images.sightings, images.setup.sheets.placed))
-    told = {(one.kind, one.cable) for one in wrong}
-    others = [one for one in parameter_faults(found) if (one.kind, one.cable) not in told]
-    faults = [*of_map, *readings, *moved_or_slipped(readings), *wrong, *others]
-    return _Whole(found, weighed, faults, start.seen, start.map, start.known_room)
+    of_wrong = {(one.kind, one.cable) for one in wrong}
+    others = [one for one in parameter_faults(found) if (one.kind, one.cable) not in of_wrong]
+    faults = [
+        *of_points, *place_faults(start), *of_map, *readings, *moved_or_slipped(readings),
+        *([] if misplaced is None else [misplaced]), *wrong, *others,
+    ]  # fmt: skip
+    left_out = _verifying_left_out(known, faults)
+    known = without_points(known, faults)
+    used = replace(images, setup=start.setup)
+    return _Whole(found, weighed, faults, known, left_out, start.map, start.known_room, used)
 
 
-def _three_sigma_mm(found: Fit, known_room: bool) -> float:
-    """Return what positions in the workspace are known to, the worst coordinate's rms."""
-    geometry = found.geometry
-    predicted = predicted_std(found, _grid(geometry), relative=not known_room)
-    return 3e3 * float(np.sqrt((predicted[:, : geometry.coordinates] ** 2).mean(axis=0).max()))
+def _with_hand_eye(geometry: CableGeometry, found: Fit, told: CameraKnowledge) -> Fit:
+    """Return the fit with the camera's place on the platform from the hand-eye file."""
+    assert found.camera is not None
+    camera = found.camera.with_hand_eye(told.position_m, told.rotation, told.hand_eye_std)
+    known = replace(geometry, knowledge=found.geometry.knowledge)
+    seen = replace(found.seen, start=found.poses)
+    return fit(known, seen, start=found.geometry, camera=camera)
 
 
 def _grid(geometry: CableGeometry) -> FloatArray:
@@ -134,3 +194,106 @@ def _grid(geometry: CableGeometry) -> FloatArray:
     ]
     places = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, len(axes))
     return geometry.model.poses(places)
+
+
+# The frame of a calibration. Lengths, and markers of unknown place, determine positions relative
+# to each other, but not the robot's place in its room. They fit equally well if all exit points
+# and poses move together. Then only the robot's file determines the frame.
+
+STAND_m: Final = 0.005
+STAND_rad: Final = 0.005
+"""Standard deviations of the platform's place on its stand, where encoders start to count."""
+
+
+@dataclass(frozen=True)
+class FrameOfFile:
+    """A fit in the frame of the robot's file, and how well that frame is known."""
+
+    found: Fit
+    share: float
+    """Weight of the frame given by home; the exit points' frame has the rest."""
+
+    def known_to(self, relative: Predicted3Sigma) -> Predicted3Sigma:
+        """Return how well poses are known in this frame; `relative` is between poses."""
+        turned = relative.orientation_deg
+        stand_mm, stand_deg = (
+            3.0 * math.sqrt(self.share) * std for std in (1e3 * STAND_m, math.degrees(STAND_rad))
+        )
+        return Predicted3Sigma(
+            math.hypot(relative.position_mm, stand_mm),
+            None if turned is None else math.hypot(turned, stand_deg),
+        )
+
+
+def in_frame_of_file(
+    found: Fit, file: CableGeometry, poses: FloatArray, exits_std_m: float
+) -> FrameOfFile:
+    """Return a fit moved as a whole into the frame of the robot's file.
+
+    The file determines the frame twice. First by its exit points: the fit displaces them least as a
+    whole, so that they determine the frame to `exits_std_m`. Second by home, where lengths are
+    counted from: fit and file turn the same lengths into platforms near `poses` (M, 4, 3). The
+    motion that takes one to the other (least squares over anchor points) is known to `STAND_m`.
+    The result weighs both by their variances.
+    """
+    geometry = found.geometry
+    if "exit" not in geometry.identified:
+        return FrameOfFile(found, 0.0)
+    by_fit, by_file = _by_both(found, file, poses)
+    turn, shift = best_fit(_anchors(geometry, by_fit), _anchors(geometry, by_file))
+    share = exits_std_m**2 / (exits_std_m**2 + STAND_m**2)
+    middle = by_fit[:, 0].mean(axis=0)
+    moved = share * (turn @ middle + shift - middle)
+    turn = exponentials(share * logarithms(turn))[0]
+    shift = middle + moved - turn @ middle
+    exits = geometry.kernel_geometry()[:3].T
+    cable = geometry.cable.copy()
+    cable[:, EXIT] += exits @ turn.T + shift - exits
+    camera = None if found.camera is None else _moved_camera(found.camera, turn, shift)
+    there = replace(
+        found, geometry=replace(geometry, cable=cable), camera=camera,
+        poses=_moved(found.poses, turn, shift),
+    )  # fmt: skip
+    return FrameOfFile(there, share)
+
+
+def position_shift(found: Fit, file: CableGeometry, poses: FloatArray) -> FloatArray:
+    """Return by how much a fit displaces positions at `poses` (M, 4, 3) on average, m, (k,)."""
+    by_fit, by_file = _by_both(found, file, poses)
+    return np.asarray((by_fit - by_file)[:, 0, : file.coordinates].mean(axis=0))
+
+
+def _by_both(found: Fit, file: CableGeometry, poses: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the platform's poses, by fit and by file, for encoder lengths near `poses`."""
+    geometry, seen = found.geometry, found.seen
+    tension = np.tile(np.median(seen.tension_N, axis=0), (len(poses), 1))
+    drum = geometry.cable[:, DRUM]
+    length = lengths_told(geometry, poses, tension)
+    length = (length + drum * seen.reference_m) / (1.0 + drum)
+    there = replace(Observations.of_lengths(length, tension, poses), reference_m=seen.reference_m)
+    by_fit, by_file = (locate(one, there).poses for one in (geometry, file))
+    return by_fit, by_file
+
+
+def _anchors(geometry: CableGeometry, poses: FloatArray) -> FloatArray:
+    """Return all anchor points of platforms at poses (M, 4, 3), (M n, 3)."""
+    anchors = geometry.kernel_geometry()[ANCHOR:RADIUS]
+    return np.asarray((poses[:, :1] + (poses[:, 1:] @ anchors).transpose(0, 2, 1)).reshape(-1, 3))
+
+
+def _moved(poses: FloatArray, turn: FloatArray, shift: FloatArray) -> FloatArray:
+    out = turn @ poses[:, 1:]
+    place = poses[:, 0] @ turn.T + shift
+    return np.concatenate([place[:, None], out], axis=1)
+
+
+def _moved_camera(camera: CameraModel, turn: FloatArray, shift: FloatArray) -> CameraModel:
+    known = camera.knowledge
+    known = replace(
+        known, marker_position_m=known.marker_position_m @ turn.T + shift,
+        marker_rotation=turn @ known.marker_rotation,
+    )  # fmt: skip
+    return replace(
+        camera, knowledge=known, marker_position_m=camera.marker_position_m @ turn.T + shift,
+        marker_rotation=turn @ camera.marker_rotation,
+    )  # fmt: skip

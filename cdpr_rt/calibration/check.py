@@ -1,77 +1,89 @@
-"""Whether a calibrated robot is still as it was, from a few poses; which cable has changed, how.
+"""Check with a few poses whether a calibrated robot has changed, and which cable changed how.
 
-At the poses that lengths, and a camera or scanner where there is one, tell by the calibrated
-geometry, what residuals are left is explained by changes of single cables, each linearised:
+The calibrated geometry gives the poses by lengths and, if available, by camera or scanner. The
+remaining residuals are explained by changes of single cables, each linearised:
 
     r + P_⊥ (A θ + N ξ) ≈ 0
 
-with P_⊥ taking out what poses explain, A the derivatives by a cable's exit point, length or drum,
-and N those by the platform's place at home, from which lengths are counted. The change that lowers
-the sum of squares most is taken first.
+P_⊥ takes out what poses explain. A are the derivatives by a cable's exit point, length or drum, and
+N those by the platform's place at home, from which lengths are counted. The search first takes the
+change that lowers the sum of squares most.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import product
 
 import numpy as np
 
 from cdpr_rt.arrays import FloatArray, IntArray
-from cdpr_rt.calibration.estimation.fit import fit
-from cdpr_rt.calibration.estimation.parameters import DRUM, EXIT, OFFSET, CableGeometry
-from cdpr_rt.calibration.estimation.residuals import Linearised, length_std_m, linearise
-from cdpr_rt.calibration.readings.observations import Observations
-from cdpr_rt.robots.kinematics.cable_kernel import CABLE_ROWS as KERNEL_ROWS
-from cdpr_rt.robots.kinematics.cable_kernel import run_poses
+from cdpr_rt.calibration.fit import fit
+from cdpr_rt.calibration.parameters import DRUM, EXIT, OFFSET, CableGeometry
+from cdpr_rt.calibration.readings import Observations
+from cdpr_rt.calibration.residuals import Linearised, length_std_m, linearise
+from cdpr_rt.errors import InvalidRequestError
+from cdpr_rt.model.cable_kernel import CABLE_ROWS as KERNEL_ROWS
+from cdpr_rt.model.cable_kernel import run_poses
 
 _HOME_m, _HOME_rad = 0.002, 0.004
-"""By how much the platform may stand elsewhere at home without anything having changed."""
+"""Standard deviation of the platform's place at home if nothing has changed."""
 _GAIN = 30.0
-"""By which a change has to lower the sum of squares, in units of their variance."""
+"""Least reduction of the sum of squares by a change, in units of their variance."""
 _EACH_PARAMETER = 6.0
-"""Further, for each number that describes it."""
+"""Additional reduction for each number that describes the change."""
 _LEAST_NOISE = 0.1
-"""Variance of readings at the least, over that which is taken for known."""
+"""Least variance of readings, relative to the assumed one."""
 _ALIKE = 0.8
 _MOST_CHANGES = 3
+_LARGEST = {"exit": 0.1, "length": 0.1, "drum": 0.03, "slip": 0.1}
+"""Prior standard deviation of a change of each kind, m; relative for a drum."""
 _MISFIT = 9.0
+_NO_SPARE_LENGTH = (
+    "lengths alone cannot check a robot with as many cables as degrees of freedom, because any "
+    "lengths agree with some pose; check it with a camera or --scanner"
+)
 _ADVICE = {
     "exit": "look at its pulley, at what that is fixed to, and at its rail",
     "length": "its cable has slipped on the drum or at the platform, or its encoder has",
     "drum": "look at its drum, its belt and how its cable is wound",
+    "slip": "it slipped during this check: tighten at home and check again",
 }
 
 
 @dataclass(frozen=True)
 class DetectedChange:
-    """Something that is not as it was when the robot was calibrated."""
+    """A change of the robot since it was calibrated."""
 
     kind: str
-    """exit, length or drum."""
+    """exit, length, drum, or slip: a change of length from one pose of the check on."""
     cable: int
     """Counted from 0."""
     size: FloatArray
-    """(k,) m, of a drum relative."""
+    """(k,) m; relative for a drum."""
     std: FloatArray
     effect_m: float
-    """Error of positions from lengths that it causes, at the worst of the poses."""
+    """Largest error over the poses that it causes in positions computed from lengths."""
     who: str
-    """Cable in words, and the others that it might be."""
+    """The cable as text, with the others that it might be."""
     alike: tuple[int, ...] = ()
-    """Other cables whose change of this kind would explain it nearly as well."""
+    """Other cables whose change of this kind would fit nearly as well."""
+    pose: int = 0
+    """The first pose after a slip, counted from 0 (home)."""
 
     @property
     def text(self) -> str:
-        """Change, its size, and advice, in words."""
+        """Change, its size, and advice, as text."""
         who = self.who
         many = ", ".join(f"{1e3 * x:+.1f}" for x in self.size)
-        sure = f"± {1e3 * float(self.std.max()):.1f} mm (1 sigma)"
+        sure = f"± {3e3 * float(self.std.max()):.1f} mm (3 sigma)"
         what = {
             "exit": f"the exit point of {who} has moved by ({many}) {sure}",
             "length": f"{who} is {many} {sure} longer than it is taken for",
+            "slip": f"{who} is {many} {sure} longer than it is taken for from pose {self.pose} on",
             "drum": f"a turn of the motor of {who} pays out {100 * float(self.size[0]):+.2f} ± "
-            f"{100 * float(self.std[0]):.2f} % (1 sigma) of what it did",
+            f"{300 * float(self.std[0]):.2f} % (3 sigma) of what it did",
         }[self.kind]
         effect = f"positions are off by up to {1e3 * self.effect_m:.1f} mm"
         return f"{what}; {effect}: {_ADVICE[self.kind]}"
@@ -86,6 +98,7 @@ class DetectedChange:
             "std": self.std.tolist(),
             "effect_mm": 1e3 * self.effect_m,
             "text": self.text,
+            **({"from_pose": self.pose} if self.kind == "slip" else {}),
         }
 
 
@@ -95,9 +108,9 @@ class Check:
 
     poses: int
     residual_m: float
-    """Root mean square of what lengths are off, at poses that they are to tell."""
+    """Root mean square of the residuals of lengths, at the poses that they determine."""
     misfit: float
-    """Mean square of what is left over its variance once the changes are taken out."""
+    """Mean square of the remaining residuals over their variance, without the changes."""
     changes: tuple[DetectedChange, ...]
     wanted_m: float
 
@@ -108,11 +121,11 @@ class Check:
 
     @property
     def moved(self) -> bool:
-        """Whether the robot is not as it was, as far as it matters."""
+        """Whether the robot has changed by more than is acceptable."""
         return self.effect_m > self.wanted_m or self.misfit > _MISFIT
 
     def verdict(self) -> list[str]:
-        """Return it in words."""
+        """Return the result as lines of text."""
         off = f"lengths at {self.poses} poses are off by {1e3 * self.residual_m:.2f} mm rms"
         if not self.moved:
             small = [f"harmless so far: {change.text}" for change in self.changes]
@@ -123,10 +136,17 @@ class Check:
         return [off, *told]
 
 
-def check_geometry(geometry: CableGeometry, seen: Observations, wanted_m: float) -> Check:
-    """Return whether readings agree with a geometry, the first of them at home.
+def require_spare_length(geometry: CableGeometry) -> None:
+    """Raise InvalidRequestError if lengths alone cannot check the robot."""
+    directions = sum(i < 6 for i in geometry.free)
+    if geometry.n + int(geometry.turns_freely) <= directions:
+        raise InvalidRequestError(_NO_SPARE_LENGTH)
 
-    `wanted_m` is the error of positions from which on a change matters.
+
+def check_geometry(geometry: CableGeometry, seen: Observations, wanted_m: float) -> Check:
+    """Return whether readings agree with a geometry; the first reading is at home.
+
+    `wanted_m` is the error of positions above which a change matters.
     """
     whole = replace(geometry, identified=("exit", "offset", "drum"))
     there = fit(replace(geometry, identified=()), seen, robust=False)
@@ -135,10 +155,10 @@ def check_geometry(geometry: CableGeometry, seen: Observations, wanted_m: float)
     changes: list[DetectedChange] = []
     columns: list[IntArray] = []
     while len(changes) < _MOST_CHANGES and (found := system.best(columns)) is not None:
-        kind, cable, alike, own = found
+        kind, cable, pose, alike, own = found
         columns.append(own)
         who = geometry.cables_text(cable, alike)
-        changes.append(DetectedChange(kind, cable, np.zeros(0), np.zeros(0), 0.0, who, alike))
+        changes.append(DetectedChange(kind, cable, np.zeros(0), np.zeros(0), 0.0, who, alike, pose))
     changes = system.sized(changes, columns)
     off_m = there.length_residual_m * length_std_m(geometry, seen)
     rms = float(np.sqrt((off_m**2).sum() / max(int(seen.used.sum()), 1)))
@@ -146,7 +166,7 @@ def check_geometry(geometry: CableGeometry, seen: Observations, wanted_m: float)
 
 
 class _System:
-    """Residuals that poses do not explain, and the columns of all changes that may."""
+    """Residuals that poses do not explain, and the columns of all possible changes."""
 
     def __init__(self, geometry: CableGeometry, at: Linearised, poses: FloatArray) -> None:
         self._geometry, self._at = geometry, at
@@ -154,18 +174,30 @@ class _System:
         free = np.eye(at.residual.shape[1]) - at.by_pose @ inverse
         count, rows, size = at.by_parameter.shape
         self._residual = np.einsum("jab,jb->ja", free, at.residual).ravel()
-        self._columns = (free @ at.by_parameter).reshape(count * rows, size)
-        self._freedom = max(
-            int((at.by_pose != 0.0).any(axis=2).sum()) - inverse.shape[1] * count, 1
-        )
+        self._freedom = int((at.by_pose != 0.0).any(axis=2).sum()) - inverse.shape[1] * count
+        if self._freedom <= 0:
+            raise InvalidRequestError(_NO_SPARE_LENGTH)
         q = len(geometry.rows)
         self._own = {
-            ("exit", i): np.array([i * q + k for k, r in enumerate(geometry.rows) if r < EXIT.stop])
+            ("exit", i, 0): np.array(
+                [i * q + k for k, r in enumerate(geometry.rows) if r < EXIT.stop]
+            )
             for i in range(geometry.n)
         }
         for kind, row in (("length", OFFSET), ("drum", DRUM)):
             place = geometry.rows.index(row)
-            self._own |= {(kind, i): np.array([i * q + place]) for i in range(geometry.n)}
+            self._own |= {(kind, i, 0): np.array([i * q + place]) for i in range(geometry.n)}
+        slips: list[FloatArray] = []
+        place = geometry.rows.index(OFFSET)
+        for i, pose in product(range(geometry.n), range(1, count)):
+            self._own["slip", i, pose] = np.array([size + len(slips)])
+            after = np.arange(count)[:, None] >= pose
+            slips.append(np.where(after, at.by_parameter[:, :, i * q + place], 0.0))
+        self._by_parameter = np.concatenate([at.by_parameter, np.stack(slips, axis=2)], axis=2)
+        self._columns = (free @ self._by_parameter).reshape(count * rows, -1)
+        self._prior = np.zeros(self._columns.shape[1])
+        for (kind, _, _), own in self._own.items():
+            self._prior[own] = _LARGEST[kind] ** -2.0
         self._nuisance, self._known = self._of_home(poses[0])
 
     def _of_home(self, home: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -174,15 +206,15 @@ class _System:
         cables = np.empty((1, KERNEL_ROWS, geometry.n))
         run_poses(geometry.kernel_geometry(), home[None], cables)
         chosen = [i for i in geometry.free if i < 6]
-        offsets = np.concatenate([self._own["length", i] for i in range(geometry.n)])
+        offsets = np.concatenate([self._own["length", i, 0] for i in range(geometry.n)])
         known = np.where(np.array(chosen) < 3, _HOME_m, _HOME_rad)
         return self._columns[:, offsets] @ cables[0, chosen].T * known, known
 
     def _solve(self, columns: Sequence[IntArray]) -> tuple[FloatArray, FloatArray, float]:
-        """Return changes, their covariance, and the sum of squares that is left."""
+        """Return changes, their covariance, and the remaining sum of squares."""
         own = np.concatenate(columns) if columns else np.zeros(0, int)
         A = np.hstack([self._columns[:, own], self._nuisance])
-        prior = np.append(np.zeros(len(own)), np.ones(self._nuisance.shape[1]))
+        prior = np.append(self._prior[own], np.ones(self._nuisance.shape[1]))
         normal = A.T @ A + np.diag(prior)
         inverse = np.linalg.pinv(normal, hermitian=True)
         x = -inverse @ (A.T @ self._residual)
@@ -191,33 +223,35 @@ class _System:
         return x[: len(own)], inverse[: len(own), : len(own)], cost
 
     def misfit(self, columns: Sequence[IntArray]) -> float:
-        """Return the mean square of what is left."""
+        """Return the mean square of the remaining residuals."""
         used = sum(len(own) for own in columns)
         return self._solve(columns)[2] / float(max(self._freedom - used, 1))
 
     def _noise(self, columns: Sequence[IntArray]) -> float:
-        """Return the variance of what is left, which is no larger than readings are known to."""
+        """Return the variance of the remaining residuals, at most the assumed one of readings."""
         return min(max(self.misfit(columns), _LEAST_NOISE), 1.0)
 
     def best(
         self, columns: Sequence[IntArray]
-    ) -> tuple[str, int, tuple[int, ...], IntArray] | None:
-        """Return the change that explains most beside those taken; None where none is sure."""
+    ) -> tuple[str, int, int, tuple[int, ...], IntArray] | None:
+        """Return the change that explains most besides those taken; None if none is certain."""
         before = self._solve(columns)[2]
         gains = {}
         for key, own in self._own.items():
             tried = [*columns, own]
             gain = (before - self._solve(tried)[2]) / self._noise(tried)
             gains[key] = gain - _EACH_PARAMETER * len(own)
-        kind, cable = max(gains, key=lambda key: gains[key])
-        if gains[kind, cable] < _GAIN:
+        kind, cable, pose = max(gains, key=lambda key: gains[key])
+        if gains[kind, cable, pose] < _GAIN:
             return None
         alike = tuple(
             other
-            for (same, other), gain in gains.items()
-            if same == kind and other != cable and gain > _ALIKE * gains[kind, cable]
+            for (same, other, at), gain in gains.items()
+            if (same, at) == (kind, pose)
+            and other != cable
+            and gain > _ALIKE * gains[kind, cable, pose]
         )
-        return kind, cable, alike, self._own[kind, cable]
+        return kind, cable, pose, alike, self._own[kind, cable, pose]
 
     def sized(
         self, changes: list[DetectedChange], columns: Sequence[IntArray]
@@ -234,11 +268,11 @@ class _System:
         return out
 
     def _effect_m(self, own: IntArray, size: FloatArray) -> float:
-        """Return by how much poses that lengths tell are off by a change, at the worst."""
+        """Return the largest error that a change causes in positions computed from lengths."""
         at = self._at
-        # of a platform that turns freely the balance of its moments tells the angle, not lengths
+        # if a platform turns freely, the balance of moments gives the angle, not the lengths
         rows = self._geometry.n + int(self._geometry.turns_freely)
         x = at.by_pose[:, :rows]
-        moved = np.einsum("jra,a->jr", at.by_parameter[:, :rows, own], size)
+        moved = np.einsum("jra,a->jr", self._by_parameter[:, :rows, own], size)
         step = np.einsum("jdr,jr->jd", np.linalg.pinv(x), moved)
         return float(np.linalg.norm(step[:, : self._geometry.coordinates], axis=1).max())

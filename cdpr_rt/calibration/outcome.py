@@ -1,4 +1,4 @@
-"""A calibration that has verified itself: its verdict in words, in JSON and as a file."""
+"""A verified calibration: its verdict as text, in JSON and as a file."""
 
 from __future__ import annotations
 
@@ -15,35 +15,46 @@ from cdpr_profiles import Robot
 from cdpr_profiles.calibration.geometry import GeometryCalibration, geometry_sha256
 from cdpr_profiles.platform import Platform
 from cdpr_rt.arrays import FloatArray
-from cdpr_rt.calibration.camera.camera_faults import UNDECIDED
-from cdpr_rt.calibration.estimation.faults import Fault
-from cdpr_rt.calibration.estimation.fit import Fit
-from cdpr_rt.calibration.estimation.parameters import DRUM
-from cdpr_rt.calibration.markers.coverage import Coverage, listed
-from cdpr_rt.calibration.verification.held_out import Unused
-from cdpr_rt.calibration.verification.more_poses import MORE
-from cdpr_rt.calibration.verification.verdict import (
+from cdpr_rt.calibration.faults import UNDECIDED, Fault
+from cdpr_rt.calibration.fit import Fit
+from cdpr_rt.calibration.markers.marker_map import Coverage, listed
+from cdpr_rt.calibration.parameters import DRUM
+from cdpr_rt.calibration.verdict import (
+    SHARED_SCALE_STD,
     CalibrationChange,
     OpenDirection,
+    Predicted3Sigma,
     camera_table,
     parameter_table,
 )
-from cdpr_rt.calibration.verification.verification import Verification
+from cdpr_rt.calibration.verification import LEAST_VERIFYING, MORE, Unused, Verification
 
 CalibrationMethod = Literal["points", "redundancy", "camera"]
 _WANTED_mm_PER_m = 0.3
 """1.5 mm for 5 m of frame, 3 sigma."""
+_WANTED_deg = 0.15
+"""3 sigma, as for a trial's targets."""
 _MOST_OVER_WANTED = 3.0
 """Ratio of predicted to wanted error above which a calibration is not adopted."""
 _MISFIT = 9.0
 LEAST_POINTS = 3
-"""Poses that have to be measured to tell where the robot is in its room."""
+"""Least number of measured poses that determine where the robot is in its room."""
 _MOST_LEFT_OUT = 0.1
+_MOST_POINTS_LEFT_OUT = 0.25
+
+
+@dataclass(frozen=True)
+class CalibrationFiles:
+    """Files from which a calibration was made."""
+
+    raw_data: str
+    points: str = ""
+    hand_eye: str = ""
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """A calibration: the fit, what was wrong, what stays open, and how it did on other poses."""
+    """A calibration: the fit, faults, undetermined directions, and errors at other poses."""
 
     robot: Robot
     found: Fit
@@ -52,38 +63,60 @@ class Outcome:
     open_directions: list[OpenDirection]
     verified: Verification
     before: Verification
-    """Verification of the robot's file, whose lengths are those at the start."""
+    """Verification of the robot's file, with its lengths at the start."""
     verified_left_out: int
-    """Readings at those poses of cables that hung slack, or next to a slip, which are left out."""
-    predicted_3_sigma_mm: float
-    """Of a position in the workspace; without measured points, of its shape. Errors at poses not
-    used that are larger than predicted have made it larger by as much."""
+    """Readings left out at those poses, because the cable was slack or next to a slip."""
+    predicted: Predicted3Sigma
+    """In the workspace; of positions relative to each other if nothing determines the room's frame.
+    It is increased if errors at unused poses are larger than predicted."""
     with_more_3_sigma_mm: float
-    """The same with ten more poses that tell as much as those so far."""
+    """The same for positions with ten more poses that are as informative as those so far."""
+    absolute: Predicted3Sigma
+    """In the frame, with the uncertainty of the frame included."""
     known_room: bool
     """Whether anything was measured in the room: points, or places of markers."""
+    shift_m: FloatArray
+    """Mean displacement of absolute positions in the workspace, (k,)."""
     unused: Unused
     change: CalibrationChange
     """Change of the robot's file."""
     birge_ratio: float
     """Ratio of errors at unused measured points to predicted ones (Birge); nan without points."""
     adopt: bool = False
-    """Whether it is to be taken over even where its changes are not significant."""
+    """Whether to adopt it even if its changes are not significant."""
+    verifying_points_left_out: int = 0
+    """Measured points at poses for verification that contradict all other readings."""
     cover: Coverage | None = None
-    """Connection of the images; None without any."""
+    """Connection of the images; None without images."""
+
+    @property
+    def predicted_3_sigma_mm(self) -> float:
+        """3 sigma of positions, predicted."""
+        return self.predicted.position_mm
+
+    @property
+    def told_from_file(self) -> bool:
+        """Whether the readings show a difference from the robot's file.
+
+        Parameters change by more than noise, and the change matters: positions or orientations
+        move by more than their uncertainty, or poses not used are predicted much better.
+        """
+        if self.change.by_noise:
+            return False
+        return self.change.exceeds(self.predicted) or self.verified.much_better_than(self.before)
 
     @property
     def worse(self) -> bool:
-        """Whether errors at poses held out are larger than before, and not by noise alone."""
+        """Whether errors at held-out poses are larger than before, and not only by noise."""
         return self.verified.worse_than(self.before)
 
     @property
     def good(self) -> bool:
-        """Whether there is nothing that speaks against taking it over."""
+        """Whether there is no objection to adopting it."""
         return not self.objections()
 
     def objections(self) -> list[str]:
-        """Return what speaks against taking it over, each with what to do."""
+        """Return the objections to adopting it, each with what to do."""
         found, told = self.found, []
         if not found.converged:
             told.append("the fit did not settle: the start is too far off, or data contradict")
@@ -92,39 +125,63 @@ class Outcome:
                 f"lengths disagree {math.sqrt(found.variance_factor):.1f} times as much as they "
                 "should: something moves that is taken to be fixed (an anchor, a pulley, a frame)"
             )
-        told += [fault.text for fault in self.faults if fault.text.startswith(UNDECIDED)]
+        told += [
+            fault.text
+            for fault in self.faults
+            if fault.kind == "points" or fault.text.startswith(UNDECIDED)
+        ]
         if found.corner_factor > _MISFIT:
             told.append(
                 f"corners fit {math.sqrt(found.corner_factor):.1f} times worse together with the "
-                "cables than by themselves: the camera moved on the platform, or the platform "
+                "cables than alone: the camera moved on the platform, or the platform "
                 "while images were taken"
             )
         left_out = [fault for fault in self.faults if fault.kind in ("outlier", "slack", "jump")]
         if len(left_out) > _MOST_LEFT_OUT * found.seen.used.size:
-            told.append(f"{len(left_out)} readings contradict the others: measure anew")
+            told.append(f"{len(left_out)} readings contradict the others: measure again")
         most_mm = _MOST_OVER_WANTED * wanted_mm(self.robot)
-        if self.predicted_3_sigma_mm > most_mm:
+        slipped = any(fault.kind == "points" for fault in self.faults)
+        if self.predicted_3_sigma_mm > most_mm and not slipped:
             told.append(
                 f"positions would be known to {self.predicted_3_sigma_mm:.1f} mm only (3 sigma, "
                 f"predicted; allowed: {most_mm:.1f} mm): measure points, or say how well the exit "
                 "points of the robot's file are known (--known-mm)"
             )
-        if self.worse and (self.change.significant or self.adopt):
+        if self.worse and (self.told_from_file or self.adopt):
             told.append(
-                "poses that the fit had not seen are told worse than by the robot's file, and not "
-                "by noise alone: take more poses, further apart"
+                "at the poses kept for verification the errors are significantly larger than with "
+                "the robot's file: take more poses, further apart"
             )
         if self.method == "camera" and self.verified.kind == "none":
             told.append(
                 "no three of the poses not used show two markers of the map, so nothing verifies "
                 "it: take more poses, or lay more sheets"
             )
-        return told + self._islands() + self._impossible()
+        return told + self._points() + self._islands() + self._impossible()
+
+    def _points(self) -> list[str]:
+        """Return objections to the measured points: too many are wrong, or too few verify."""
+        kinds = [fault.kind for fault in self.faults]
+        wrong, used = kinds.count("point"), int(self.found.seen.measured.sum())
+        told = []
+        if wrong > _MOST_POINTS_LEFT_OUT * (wrong + used):
+            told.append(
+                f"{wrong} of {wrong + used} measured points contradict the others: measure again"
+            )
+        verifying = len(self.verified.errors_m)
+        by_points = self.method == "points" or self.verifying_points_left_out > 0
+        if by_points and "points" not in kinds and verifying < LEAST_VERIFYING:
+            told.append(
+                f"not verified: the position was measured at {verifying} of the poses that the "
+                f"fit has not used, {LEAST_VERIFYING} are needed: measure all coordinates at "
+                f"{2 * LEAST_VERIFYING} poses or more, far apart"
+            )
+        return told
 
     def _islands(self) -> list[str]:
-        """Return which markers no image connects with the others, as the thesis' 3.7.3 looks for.
+        """Return the markers that no image connects with the others, as in the thesis' 3.7.3.
 
-        The map leaves them out, and poses of which only they were seen have no image then.
+        The map leaves them out. Poses at which only they were seen then have no image.
         """
         if self.cover is None or not self.cover.apart:
             return []
@@ -134,28 +191,35 @@ class Outcome:
         ]
 
     def insignificance(self) -> str | None:
-        """Return why nothing is to be changed though nothing is wrong; None where it is."""
+        """Return why there is no significant change; None if there is one."""
         change = self.change
-        if change.significant:
+        if self.told_from_file:
             return None
+        moved = f"positions would move by {1e3 * change.moved_m:.2f} mm (root mean square)"
+        if change.by_noise:
+            return (
+                f"not significant: noise alone changes parameters as much as this in "
+                f"{100.0 * change.chance:.0f} % of cases; {moved}, and the robot's file may be "
+                "right already"
+            )
         return (
-            f"not significant: noise alone changes parameters as much as this in "
-            f"{100.0 * change.chance:.0f} % of cases; positions would move by "
-            f"{1e3 * change.moved_m:.2f} mm (root mean square), and the robot's file may be right "
-            "already"
+            f"not significant: {moved}, which is less than they are known to by the calibration, "
+            "and poses not used are not told much better; the robot's file may be right already"
         )
 
     def _impossible(self) -> list[str]:
-        """Return which values cannot be of this robot."""
+        """Return identified values that are impossible for this robot."""
         try:
-            faults = calibration_of(self, 1, "", simulated=False).faults(self.robot)
+            faults = calibration_of(self, 1, CalibrationFiles(""), simulated=False).faults(
+                self.robot
+            )
         except ValidationError as error:
             return [f"the result is no geometry: {error.errors()[0]['msg']}"]
         what = "is something of the robot's file wrong, or was pose 1 not home?"
         return [f"{key}: {problem}: {what}" for key, problem in faults]
 
     def advice(self) -> str:
-        """Return what more poses would bring."""
+        """Return the benefit of more poses."""
         return (
             f"{MORE} more poses would bring {self.predicted_3_sigma_mm:.2f} mm to "
             f"{self.with_more_3_sigma_mm:.2f} mm (3 sigma, predicted)"
@@ -167,25 +231,60 @@ class Outcome:
         return 1.0 - self.with_more_3_sigma_mm / max(self.predicted_3_sigma_mm, 1e-9)
 
     def verdict(self) -> list[str]:
-        """Return the calibration in words."""
+        """Return the calibration as text."""
         against = self.objections()
         lines = [fault.text for fault in self.faults if fault.text not in against]
         lines += [f"NOT GOOD: {text}" for text in against]
         if (little := self.insignificance()) and not against:
             lines.append(little)
-        wanted = wanted_mm(self.robot)
         if not against:
-            enough = self.predicted_3_sigma_mm <= wanted
-            lines.append(
-                f"positions are known to {self.predicted_3_sigma_mm:.2f} mm (3 sigma, predicted)"
-                + (": good" if enough else f", {wanted:.2f} mm wanted: {self.advice()}")
-            )
+            lines.append(self.accuracy())
+            lines.append(self.frame())
         lines += self.proof()
         lines += [] if self.cover is None else self.cover.lines()
         return lines + [f"not known: {one.what}; {one.advice}" for one in self.open_directions]
 
+    def accuracy(self) -> str:
+        """Return the accuracy of positions and orientations as text, and whether it suffices."""
+        wanted, known = wanted_mm(self.robot), self.predicted
+        relative = "" if self.known_room else " against each other"
+        text = f"positions are known to {known.position_mm:.2f} mm{relative}"
+        enough = known.position_mm <= wanted
+        if known.orientation_deg is not None:
+            text += f", orientations to {known.orientation_deg:.3f} deg against each other"
+            enough &= known.orientation_deg <= _WANTED_deg
+        text += " (3 sigma, predicted)"
+        if enough:
+            return f"{text}: good"
+        turned = "" if known.orientation_deg is None else f" and {_WANTED_deg:.2f} deg"
+        return f"{text}, {wanted:.2f} mm{turned} wanted: {self.advice()}"
+
+    def frame(self) -> str:
+        """Return the shift of absolute positions, and their accuracy, as text."""
+        axes = ", ".join(
+            f"{1e3 * moved:+.2f} mm in {axis}"
+            for axis, moved in zip("xyz", self.shift_m.tolist(), strict=False)
+        )
+        text = (
+            f"absolute positions move by {axes} on the average, and are known to "
+            f"{self.absolute.position_mm:.1f} mm"
+        )
+        if (turned := self.absolute.orientation_deg) is not None:
+            text += f", absolute orientations to {turned:.2f} deg"
+        text += f" (3 sigma, predicted) in the frame of {frame_of(self)}"
+        if self.known_room:
+            return (
+                f"{text}, if the scale of what was measured in the room is right to "
+                f"{300.0 * SHARED_SCALE_STD:.1f} % (3 sigma); no other figure contains an error "
+                "that all points share (scale, origin, axes)"
+            )
+        return (
+            f"{text}: nothing that was measured tells where the robot is in its room "
+            "(measured points or known markers do)"
+        )
+
     def proof(self) -> list[str]:
-        """Return in words how it does at the poses that verify it."""
+        """Return the errors at the poses that verify it, as text."""
         lines = []
         if self.verified.errors_m.size:
             lines.append(
@@ -194,10 +293,15 @@ class Outcome:
                 f"{self.verified.reference} (by the robot's file: {self.before.mean_mm:.2f} and "
                 f"{self.before.worst_mm:.2f})"
             )
+        if count := self.verifying_points_left_out:
+            lines.append(
+                f"the verification leaves out {count} of the measured points at its poses, "
+                "because they contradict all other readings"
+            )
         if math.isfinite(self.verified.scale.factor):
             lines.append(
                 f"distances between them are {self.verified.scale.text} times those that lengths "
-                f"tell (1 sigma; by the robot's file: {self.before.scale.text})"
+                f"tell (± is 3 sigma; by the robot's file: {self.before.scale.text})"
             )
         if self.verified.turn_errors_rad.size:
             lines.append(
@@ -223,7 +327,7 @@ class Outcome:
             "verdict": self.verdict(),
             "objections": self.objections(),
             "change": {
-                "significant": self.change.significant,
+                "significant": self.told_from_file,
                 "chance": self.change.chance,
                 "chi_squared": self.change.chi_squared,
                 "parameters_told": self.change.degrees_of_freedom,
@@ -233,6 +337,10 @@ class Outcome:
             "converged": self.found.converged,
             "variance_factor": self.found.variance_factor,
             "predicted_3_sigma_mm": self.predicted_3_sigma_mm,
+            "predicted_3_sigma_deg": self.predicted.orientation_deg,
+            "absolute_3_sigma_mm": self.absolute.position_mm,
+            "absolute_3_sigma_deg": self.absolute.orientation_deg,
+            "absolute_shift_mm": (1e3 * self.shift_m).tolist(),
             "with_10_more_poses_3_sigma_mm": self.with_more_3_sigma_mm,
             "frame": frame_of(self),
             "corner_factor": self.found.corner_factor,
@@ -245,6 +353,7 @@ class Outcome:
             "verification": {
                 "poses": self.verified.poses,
                 "readings_left_out": self.verified_left_out,
+                "points_left_out": self.verifying_points_left_out,
                 "mean_position_error_mm": number_or_none(self.verified.mean_mm),
                 "worst_position_error_mm": number_or_none(self.verified.worst_mm),
                 "mean_position_error_before_mm": number_or_none(self.before.mean_mm),
@@ -270,18 +379,23 @@ def number_or_none(value: float) -> float | None:
 
 
 def frame_of(outcome: Outcome) -> str:
-    """Return in words what the identified coordinates are relative to."""
+    """Return the frame of the identified coordinates, as text."""
     if outcome.found.seen.measured.sum() >= LEAST_POINTS:
         return "the room in which the platform was measured"
     if outcome.known_room:
         return "the room in which places of markers are known"
-    return "the exit points of the robot's file, taken together: moved and turned least"
+    return "the robot's file, as its exit points and its home tell it"
 
 
 def calibration_of(
-    outcome: Outcome, version: int, raw_data: str, *, simulated: bool, distrusted_before: str = ""
+    outcome: Outcome,
+    version: int,
+    files: CalibrationFiles,
+    *,
+    simulated: bool,
+    distrusted_before: str = "",
 ) -> GeometryCalibration:
-    """Return the file of a calibration; raises ValidationError of pydantic for what is none."""
+    """Return the file of a calibration; raises pydantic's ValidationError for invalid values."""
     robot, found = outcome.robot, outcome.found
     platform = robot.platform
     assert platform is not None  # the fit was of one
@@ -313,10 +427,17 @@ def calibration_of(
         poses=found.seen.poses,
         exit_std_m=tuple(std[:, exits].max(axis=1).tolist()),
         predicted_3_sigma_mm=outcome.predicted_3_sigma_mm,
+        predicted_3_sigma_deg=outcome.predicted.orientation_deg,
+        absolute_3_sigma_mm=outcome.absolute.position_mm,
+        absolute_3_sigma_deg=outcome.absolute.orientation_deg,
         verified_poses=verified.poses,
         verified_mean_mm=number_or_none(verified.mean_mm),
         verified_worst_mm=number_or_none(verified.worst_mm),
-        raw_data=raw_data,
+        raw_data=files.raw_data,
+        points_file=files.points,
+        hand_eye_file=files.hand_eye,
+        identified=geometry.identified,
+        known_exit_m=geometry.knowledge.exit_m,
     )
 
 
@@ -335,7 +456,7 @@ def _home(platform: Platform, pose: FloatArray) -> tuple[tuple[float, ...], tupl
 
 
 def wanted_mm(robot: Robot) -> float:
-    """Return what is wanted of positions, by the longest side of the box around exit points."""
+    """Return the wanted accuracy of positions, by the longest side of the exit points' box."""
     assert robot.platform is not None
     frame_m = float(np.ptp(np.array(robot.platform.exit_points_m), axis=0).max())
     return _WANTED_mm_PER_m * frame_m

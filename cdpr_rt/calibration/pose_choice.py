@@ -1,6 +1,6 @@
-"""Choice among many poses: spread out, or those that tell most about the geometry.
+"""Choose from many poses: those spread out most, or those most informative about the geometry.
 
-Both take one pose after the other, each the best beside those that are taken already.
+Both take one pose after the other, each the best in addition to those already taken.
 """
 
 from __future__ import annotations
@@ -8,22 +8,22 @@ from __future__ import annotations
 import numpy as np
 
 from cdpr_rt.arrays import FloatArray, IntArray
-from cdpr_rt.calibration.estimation.parameters import (
+from cdpr_rt.calibration.parameters import (
     CABLE_ROWS,
     CableGeometry,
     Knowledge,
     ParameterKind,
 )
-from cdpr_rt.calibration.estimation.residuals import lengths_told, linearise
-from cdpr_rt.calibration.readings.observations import Observations
-from cdpr_rt.robots.kinematics.cable_kernel import CABLE_ROWS as KERNEL_ROWS
-from cdpr_rt.robots.kinematics.cable_kernel import run_poses
-from cdpr_rt.robots.platform_model import PlatformModel
+from cdpr_rt.calibration.readings import Observations
+from cdpr_rt.calibration.residuals import lengths_told, linearise
+from cdpr_rt.model.cable_kernel import CABLE_ROWS as KERNEL_ROWS
+from cdpr_rt.model.cable_kernel import run_poses
+from cdpr_rt.model.platform_model import PlatformModel
 
 EXIT_m = OFFSET_m = 0.1
 """Prior standard deviation of exit points and initial lengths: a tape measure's."""
 LENGTH_m, POSITION_m, ROTATION_rad = 1e-3, 5e-3, 5e-3
-"""Standard deviations of what is measured at a pose: lengths, and by a camera the pose."""
+"""Standard deviations of measurements at a pose: of lengths, and of the pose by a camera."""
 HAND_EYE_m, HAND_EYE_rad = 0.1, 0.2
 """Prior standard deviation of the camera's place on its platform."""
 _AT_ONCE = 64
@@ -32,8 +32,8 @@ _AT_ONCE = 64
 def spread(positions: FloatArray, arms: FloatArray, count: int) -> IntArray:
     """Return which `count` of the positions (m, d) lie furthest from each other.
 
-    The first one is the furthest from their middle, each further one the one whose nearest among
-    those taken is furthest (Gonzalez, 1985: no choice has twice its least distance). A distance is
+    The first is the furthest from the middle. Each further one has the largest distance to the
+    nearest one taken (Gonzalez, 1985: no choice has twice its least distance). A distance is
     the norm of differences times `arms` (d,), which makes angles lengths.
     """
     scaled = np.asarray(positions, float) * arms
@@ -47,11 +47,11 @@ def spread(positions: FloatArray, arms: FloatArray, count: int) -> IntArray:
 
 
 def informative(geometry: CableGeometry, poses: FloatArray, count: int) -> IntArray:
-    """Return which `count` of the poses (m, 4, 3) tell most of a geometry, by cables and camera.
+    """Return which `count` of the poses (m, 4, 3) are most informative, by cables and camera.
 
-    Greedily D-optimal: each raises log det of the information most, beside those before. That of
-    a pose is R^T R, see `pose_rows`. What a pose adds falls as others are taken, so that only those
-    are looked at anew that may still be the best (Minoux, 1978).
+    Greedily D-optimal: each raises log det of the information most, given those before. That of
+    a pose is R^T R, see `pose_rows`. The gain of a pose falls as others are taken, so only poses
+    that may still be the best are computed again (Minoux, 1978).
     """
     rows = pose_rows(geometry, poses)
     covariance = np.eye(rows.shape[2])
@@ -71,17 +71,17 @@ def informative(geometry: CableGeometry, poses: FloatArray, count: int) -> IntAr
 
 
 def _gains(rows: FloatArray, covariance: FloatArray) -> FloatArray:
-    """Return by how much each pose's rows (m, r, P) raise log det, (m,)."""
+    """Return the gain of log det by each pose's rows (m, r, P), (m,)."""
     inner = np.eye(rows.shape[1]) + rows @ covariance @ np.swapaxes(rows, 1, 2)
     return np.asarray(np.linalg.slogdet(inner)[1])
 
 
 def pose_rows(geometry: CableGeometry, poses: FloatArray) -> FloatArray:
-    """Return what lengths and a camera tell at poses (m, 4, 3), R (m, n + 6, P).
+    """Return the information of lengths and a camera at poses (m, 4, 3), R (m, n + 6, P).
 
-    The parameters are those of `geometry` and then the camera's place on the platform, in units of
-    what is known of them before. With derivatives J_x by the pose, which is unknown, and J_p by
-    the parameters, R = (1 - J_x (J_x^T J_x)^-1 J_x^T) J_p. The camera tells its own pose.
+    The parameters are those of `geometry`, then the camera's place on the platform, in units of
+    prior deviations. With derivatives J_x by the pose, which is unknown, and J_p by
+    the parameters, R = (1 - J_x (J_x^T J_x)^-1 J_x^T) J_p. The camera measures its own pose.
     """
     m, n, size, free = len(poses), geometry.n, geometry.size, list(geometry.free)
     tension = np.tile(0.5 * (geometry.model.low_N + geometry.model.high_N), (m, 1))
@@ -100,7 +100,7 @@ def pose_rows(geometry: CableGeometry, poses: FloatArray) -> FloatArray:
 
 
 def cable_geometry(model: PlatformModel) -> CableGeometry:
-    """Return what poses are to tell of a robot: exit points, offsets and drums of rigid cables."""
+    """Return the geometry to identify: exit points, offsets and drums of rigid cables."""
     none = np.zeros(model.kinematics.n)
     start = np.zeros((none.size, CABLE_ROWS))
     kinds: tuple[ParameterKind, ...] = ("exit", "offset", "drum")
@@ -119,7 +119,7 @@ def predicted_deviation_m(geometry: FloatArray, poses: FloatArray) -> float:
 
 
 def information_rows(geometry: FloatArray, poses: FloatArray) -> FloatArray:
-    """Return what each pose tells of each cable, (m, n, 4), over its standard deviation."""
+    """Return the rows of each pose for each cable, (m, n, 4), over their standard deviation."""
     cables = np.empty((len(poses), KERNEL_ROWS, geometry.shape[1]))
     run_poses(geometry, poses, cables)
     turned = (cables[:, 3:6] ** 2).sum(axis=1)

@@ -16,7 +16,7 @@ class Controller(Protocol):
     compensation_Nm: FloatArray
     """Feed-forward torque from the model of the motor, or its cable's tension, (n,)."""
     motor_loss_Nm: FloatArray
-    """Part of it that the motor's cogging and friction take up, (n,)."""
+    """Part of the compensation that the motor's cogging and friction take up, (n,)."""
     cogging_Nm: FloatArray
     """Cogging: the part of `motor_loss_Nm` whose mean over a motor turn is 0, (n,)."""
 
@@ -24,18 +24,18 @@ class Controller(Protocol):
         """Forget the past, before a motion starts."""
 
     def update(self, feedback: AxisFeedback, setpoint: Setpoint, torque_Nm: FloatArray) -> None:
-        """Write the torque to ask of each axis, (n,), Nm."""
+        """Write the torque to command for each axis, (n,), Nm."""
 
 
 class Idle:
-    """Asks for no torque; used while drives are enabled or disabled."""
+    """Commands no torque; used while drives are enabled or disabled."""
 
     def __init__(self, n: int) -> None:
         self.effort_Nm = np.zeros(n)
         self.compensation_Nm = self.motor_loss_Nm = self.cogging_Nm = np.zeros(n)
 
     def reset(self) -> None:
-        """Nothing is remembered."""
+        """Do nothing: there is no state."""
 
     def update(self, _feedback: AxisFeedback, _setpoint: Setpoint, torque_Nm: FloatArray) -> None:
         """Write zeros."""

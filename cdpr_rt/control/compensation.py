@@ -47,8 +47,8 @@ class AxisCompensation:
     mean instant at which the torque computed from it acts. Angle and velocity are the set-point's
     plus the deviation from it and the deviation's rate, both from a tracking observer with a double
     pole of time constant `observer_s` (0: the encoder's reading and the set-point's velocity).
-    Friction is evaluated at that velocity, for the set-point's direction: where it falls with
-    speed, this takes away the negative damping that makes a rotor stick and slip.
+    Friction is evaluated at that velocity, for the set-point's direction. If it falls with speed,
+    this removes the negative damping that makes a rotor stick and slip.
     """
 
     table_Nm: FloatArray
@@ -65,9 +65,9 @@ class AxisCompensation:
 def _observe(
     state: FloatArray, pole: float, period: float, deviation: float
 ) -> tuple[float, float]:
-    """Return the deviation from the set-point and its rate as one axis' tracking observer has them.
+    """Return the deviation from the set-point and its rate by one axis' tracking observer.
 
-    Its `pole` is in the z-plane; with 0.0 they are the deviation read, and 0.0.
+    Its `pole` is in the z-plane; with 0.0 the results are the measured deviation, and 0.0.
     """
     if state[_STARTED] == 0.0:
         state[_STARTED] = 1.0
@@ -135,7 +135,7 @@ def _torque(
         total = 0.5 * (1.0 + side) * forward + 0.5 * (1.0 - side) * backward
         total += parameters[i, _VISCOUS] * moving
         bound = parameters[i, _BOUND]
-        # written so that what is not a number stays none: the supervisor looks for it
+        # written so that nan stays nan: the supervisor checks for it
         if total > bound:
             total = bound
         elif total < -bound:
@@ -165,8 +165,8 @@ class Compensation:
     """Cogging and friction torque of n axes from their profiles (Tremblay, figure 1.8).
 
     Linear interpolation in the tables; the direction comes from the set-point's velocity, with a
-    linear hand-over around standstill; the torque fades in over 0.2 s once the axis' index
-    is known and is zero while it is not, or where the axis has no profile (None).
+    linear transition around standstill. The torque fades in over 0.2 s once the axis' index is
+    known; it is zero before, and if the axis has no profile (None).
     All tables must have the same length. Raises ValueError for tables of another shape.
     """
 
@@ -188,7 +188,7 @@ class Compensation:
         forward = p[:, _COULOMB_FORWARD] + p[:, _STRIBECK_FORWARD]
         backward = p[:, _COULOMB_BACKWARD] + p[:, _STRIBECK_BACKWARD]
         self.friction_Nm = np.maximum(forward, backward)
-        """Dry friction that is made up for at a low speed: its larger side, (n,)."""
+        """Dry friction that is compensated at a low speed: the larger of both directions, (n,)."""
         self.faded_in: FloatArray = self._state[:, _FADE]
         """Share of the compensation that has faded in, (n,); kept up to date."""
         self.cogging_Nm = np.zeros(n)
@@ -200,13 +200,13 @@ class Compensation:
         self._kernel = bound_to(self._bind)
 
     def reset(self) -> None:
-        """Fade in anew and forget the deviation from the set-point."""
+        """Fade in again and forget the deviation from the set-point."""
         self._state[:] = 0.0
 
     def standing_Nm(self, position_rad: FloatArray, feedback: AxisFeedback) -> FloatArray:
-        """Return what motors at these angles take up of a torque, (n,), mean of both directions.
+        """Return the torque that motors at these angles take up, (n,), mean of both directions.
 
-        That is cogging, and half of what friction differs by. 0 where there is no profile or no
+        That is cogging, and half of the difference in friction. 0 if there is no profile or no
         index is known.
         """
         angle = np.where(feedback.index_known, position_rad - feedback.index_rad, 0.0)

@@ -1,4 +1,4 @@
-"""PID position controller with derivative filter, anti-windup and feed-forward torque."""
+"""Position controllers of axes: PID with anti-windup, and proportional for cogging sweeps."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from cdpr_rt.control.compensation import Compensation
 from cdpr_rt.core.exchange import AxisFeedback, Setpoint
 from cdpr_rt.jit import bound, bound_to, jit
 
-# the last state of an axis: whether its controller runs, or what its integral begins with
+# the last state of an axis: whether its controller runs, or starts with a given integral
 _RUNNING, _BUMPLESS_START = 1.0, 2.0
-# speed and share of motion that an axis follows are smoothed over so long, the share kept so long
-# after the motion: friction goes on creeping while the rotor comes to rest
+# filter time of speed and share followed, and how long the share is kept after the motion:
+# friction continues to creep while the rotor comes to rest
 _SPEED_S, _FOLLOWS_S, _KEPT_S = 0.05, 0.05, 1.0
-# slower set-points count as standing: a reading that flickers by a count would follow them
+# slower set-points count as standing, or they would follow a reading that flickers by a count
 _STANDS_RAD_S = 0.05
-# a larger error adds no more: it is a load's that swings, not what friction and cogging leave
+# a larger error has no more effect: it comes from a swinging load, not friction and cogging
 _MOST_FOLLOWING_RAD = math.radians(1.0)
 
 
@@ -33,14 +33,14 @@ class PidGains:
     derivative_Nms_rad: float
     derivative_filter_s: float
     following_Nm_rad_s: float = 0.0
-    """Added to the integral gain by the share of the set-point's motion that the axis follows."""
+    """Added to the integral gain, times the share of the set-point's motion that is followed."""
 
 
 @jit
 def _follow(state: FloatArray, period: float, position: float, speed: float) -> float:
     """Return the share of the set-point's speed that an axis follows, 0 to 1; `state` is (3,).
 
-    It is none for an axis that something holds, whatever the set-point does.
+    It is 0 for an axis that something blocks, whatever the set-point does.
     """
     state[1] += ((position - state[0]) / period - state[1]) * period / (_SPEED_S + period)
     state[0] = position
@@ -68,12 +68,12 @@ def _update(
     for i in range(limit.size):
         kp, ki, kd, filter_s = gains[i, 0], gains[i, 1], gains[i, 2], gains[i, 3]
         error = reference[i] - position[i]
-        if state[i, 3] != _RUNNING:  # no error before this one to differentiate
+        if state[i, 3] != _RUNNING:  # no earlier error to differentiate
             state[i, 1] = error
             state[i, 4] = position[i]
             state[i, 5] = state[i, 6] = 0.0
             if state[i, 3] == _BUMPLESS_START:
-                # what the error and the feed-forward torque do not account for is the integral's
+                # the integral provides what the error and the feed-forward torque do not
                 state[i, 0] -= (kp + ki * period) * error + feedforward[i]
             state[i, 3] = _RUNNING
         slope = (filter_s * state[i, 2] + error - state[i, 1]) / (filter_s + period)
@@ -86,7 +86,7 @@ def _update(
         total = u + feedforward[i]
         limited = min(max(total, -limit[i]), limit[i])
         if limited != total and (total - limited) * error > 0.0:
-            # the integrator would only push further into the limit: keep it where it was
+            # the integrator would only push further into the limit, so keep its value
             integral = state[i, 0]
             u = kp * error + integral + kd * slope
             limited = min(max(u + feedforward[i], -limit[i]), limit[i])
@@ -101,9 +101,9 @@ class Pid:
     """PID on position plus an optional compensation, saturated (Tremblay, figure 1.8).
 
     The derivative is filtered by a first-order lag (backward difference); integration stops
-    while it would drive the torque further beyond its limit. While an axis follows a set-point that
-    moves, and shortly after, the integral may be quicker, so that it keeps up with cogging and
-    friction; an axis that is held follows nothing. Shapes: `gains` one per axis, `limit_Nm` (n,).
+    while it would drive the torque further beyond its limit. While an axis follows a moving
+    set-point, and shortly after, the integral may be quicker to keep up with cogging and friction;
+    a blocked axis does not count as following. Shapes: `gains` one per axis, `limit_Nm` (n,).
     """
 
     def __init__(
@@ -136,15 +136,15 @@ class Pid:
         self._kernel = bound_to(self._bind)
 
     def reset(self) -> None:
-        """Start anew: integral and slope zero."""
+        """Restart with integral and slope zero."""
         self._state[:] = 0.0
         if self._compensation is not None:
             self._compensation.reset()
 
     def take_over(self, torque_Nm: FloatArray) -> None:
-        """Start anew with the torques (n,) that the first `update` is to write, within the limits.
+        """Restart so that the first `update` writes the torques (n,), within the limits.
 
-        Whatever the error is then, the integral makes up for it: a controller that held a load is
+        The integral compensates for any error at that time, so a controller that held a load is
         followed by one that holds it.
         """
         self.reset()
@@ -164,4 +164,54 @@ class Pid:
             _update, self._gains, self._limit, self._period_s, self._state,
             feedback.position_rad, setpoint.position_rad, setpoint.velocity_rad_s,
             self.compensation_Nm, self.effort_Nm, torque_Nm,
+        )  # fmt: skip
+
+
+# The high-gain proportional controller of the cogging sweep.
+
+
+@jit
+def _act(
+    gain: FloatArray,
+    limit: FloatArray,
+    position: FloatArray,
+    reference: FloatArray,
+    effort: FloatArray,
+    torque: FloatArray,
+) -> None:
+    for i in range(gain.size):
+        u = gain[i] * (reference[i] - position[i])
+        u = min(max(u, -limit[i]), limit[i])
+        effort[i] = u
+        torque[i] = u
+
+
+class Proportional:
+    """Torque in proportion to the position error, limited (Tremblay, section 1.3, figure 1.2).
+
+    Without integral action the torque keeps the sign of the ramp's slope as long as friction
+    prevails, so that each recording belongs to one direction of motion.
+    Parameters, shapes (n,): `gain_Nm_rad`, `limit_Nm`.
+    """
+
+    def __init__(self, gain_Nm_rad: FloatArray, limit_Nm: FloatArray) -> None:
+        self._gain = np.array(gain_Nm_rad, float)
+        self._limit = np.array(limit_Nm, float)
+        self.effort_Nm = np.zeros_like(self._gain)
+        self.compensation_Nm = self.motor_loss_Nm = self.cogging_Nm = np.zeros_like(self._gain)
+        self._kernel = bound_to(self._bind)
+
+    def reset(self) -> None:
+        """Do nothing: there is no state."""
+
+    def update(self, feedback: AxisFeedback, setpoint: Setpoint, torque_Nm: FloatArray) -> None:
+        """Write the limited proportional torque."""
+        self._kernel(feedback, setpoint, torque_Nm)()
+
+    def _bind(
+        self, feedback: AxisFeedback, setpoint: Setpoint, torque_Nm: FloatArray
+    ) -> Callable[[], None]:
+        return bound(
+            _act, self._gain, self._limit, feedback.position_rad, setpoint.position_rad,
+            self.effort_Nm, torque_Nm,
         )  # fmt: skip

@@ -23,39 +23,39 @@ MAX_SENSITIVITY = 2.0
 DERIVATIVE_FILTER_RATIO = 10.0
 """The derivative's filter pole lies at this multiple of the crossover frequency."""
 INERTIA_RATIO = 50.0
-"""Inertia that a firm loop bears over the rotor's, as of a mass on the cable."""
+"""Inertia that a firm loop tolerates over the rotor's, for example with a mass on the cable."""
 SWEEP_PHASE = 0.3
 """Phase in radians that the latency may take at the sweep's natural frequency."""
 _MOST_FACTOR = 8.0
 
 
 class TuningError(ControlError):
-    """The loop that was asked for cannot be had with this motor and latency."""
+    """The requested loop is impossible with this motor and latency."""
 
 
 @dataclass(frozen=True)
 class PidDesign:
-    """Gains and what they achieve on the rigid rotor with the whole latency."""
+    """Gains and their performance on the rigid rotor with the whole latency."""
 
     gains: PidGains
     inertia_kg_m2: float
     latency_s: float
     bandwidth_Hz: float
-    """Closed loop, set-point to angle, where the response last falls through -3 dB."""
+    """Frequency at which the closed loop, set-point to angle, last falls through -3 dB."""
     crossover_Hz: float
     phase_margin_deg: float
     gain_margin_dB: float
     """Upwards, towards instability from more gain."""
     gain_reduction_dB: float
-    """Downwards: how much gain the loop may lose before integral action makes it unstable."""
+    """Downwards: reduction of the gain at which integral action makes the loop unstable."""
     sensitivity_peak: float
 
 
 def sweep_gain(inertia_kg_m2: float, latency_s: float) -> float:
     """Return the proportional gain of the cogging sweep, Nm/rad.
 
-    Nothing but friction damps the rotor under a proportional controller, and the latency feeds
-    the oscillation by its phase sqrt(kp/J)·latency: this holds that phase at `SWEEP_PHASE`.
+    Only friction damps the rotor under a proportional controller, and the latency feeds the
+    oscillation by its phase sqrt(kp/J)·latency. The gain sets that phase to `SWEEP_PHASE`.
     """
     _check_positive(inertia_kg_m2=inertia_kg_m2, latency_s=latency_s)
     return inertia_kg_m2 * (SWEEP_PHASE / latency_s) ** 2
@@ -67,8 +67,8 @@ def loop_response(
     """Return the open loop's frequency response at `omega` (k,), rad/s.
 
     The controller is the sampled one, term by term; the plant 1/(J s²) is driven through a
-    zero-order hold. `latency_s` reaches from the instant an angle was true to the middle of the
-    cycle in which its torque acts, so half a period of the hold is already in it.
+    zero-order hold. `latency_s` is from the instant an angle was true to the middle of the cycle
+    in which its torque acts, so it already includes half a period of the hold.
     """
     back = np.exp(-1j * omega * period_s)
     slope = (1.0 - back) / (gains.derivative_filter_s + period_s - gains.derivative_filter_s * back)
@@ -87,7 +87,7 @@ def analyse(
 ) -> PidDesign:
     """Compute bandwidth and margins of a PID loop from its frequency response.
 
-    Raises TuningError where the loop is not stable or has no crossover below half the rate.
+    Raises TuningError if the loop is unstable or has no crossover below half the rate.
     """
     top = 0.98 * math.pi / period_s
     omega = np.geomspace(1e-2, top, 6000)
@@ -130,7 +130,7 @@ def stiffest_pid(
 ) -> PidDesign:
     """Return the PID of the first of some bandwidths, highest first, that keeps its margins.
 
-    Raises TuningError, with what can be had, where none does.
+    Raises TuningError, with the possible margins, if none does.
     """
     for bandwidth in bandwidths_Hz[:-1]:
         with contextlib.suppress(TuningError):
@@ -139,18 +139,18 @@ def stiffest_pid(
 
 
 def standstill_gains(design: PidDesign, period_s: float) -> PidDesign:
-    """Return a design with as much gain at standstill as `MAX_SENSITIVITY` leaves.
+    """Return a design with as much gain at standstill as `MAX_SENSITIVITY` allows.
 
-    A rotor stands where the loop is stiffer than its cogging is steep. Phase margin is given away
-    for that: the proportional gain grows by a factor, the integral by its square, as far as the
-    loop still bears `INERTIA_RATIO` times the inertia.
+    A rotor stands still if the stiffness of the loop exceeds the slope of its cogging. This trades
+    phase margin for stiffness: the proportional gain grows by a factor, the integral by its
+    square, as far as the loop still tolerates `INERTIA_RATIO` times the inertia.
     """
     gains, inertia = design.gains, design.inertia_kg_m2
 
     def firmer(factor: float) -> PidDesign:
         proportional = factor * gains.proportional_Nm_rad
         # the slow part of the loop, J·s³ + kd·s² + kp·s + ki, is stable below kd·kp/J; half of it
-        # is left to the latency
+        # is reserved for the latency
         most = gains.derivative_Nms_rad * proportional / (2.0 * INERTIA_RATIO * inertia)
         integral = min(factor * factor * gains.integral_Nm_rad_s, most)
         firm = replace(gains, proportional_Nm_rad=proportional, integral_Nm_rad_s=integral)
@@ -177,9 +177,9 @@ def design_pid(
     """Design the PID of a free rotor for a wanted closed-loop bandwidth, by margins.
 
     The controller has a double real zero, a derivative filter `DERIVATIVE_FILTER_RATIO` above
-    the crossover, and exactly `PHASE_MARGIN_deg` of phase margin: a wider margin than asked for
-    would only give integral gain away. Raises TuningError, with what can be had, where
-    `GAIN_MARGIN_dB` or `MAX_SENSITIVITY` cannot be kept at that bandwidth.
+    the crossover, and exactly `PHASE_MARGIN_deg` of phase margin: a wider margin would only cost
+    integral gain. Raises TuningError, with the possible margins, if `GAIN_MARGIN_dB` or
+    `MAX_SENSITIVITY` cannot be kept at that bandwidth.
     """
     _check_positive(
         inertia_kg_m2=inertia_kg_m2,
@@ -222,13 +222,13 @@ def _designed(
 def _at_crossover(
     inertia: float, latency: float, crossover_Hz: float, period: float
 ) -> PidDesign | None:
-    """Return the loop with the wanted phase margin at that crossover, None where there is none."""
+    """Return the loop with the wanted phase margin at that crossover, None if there is none."""
     omega = 2.0 * math.pi * crossover_Hz
     filter_s = 1.0 / (DERIVATIVE_FILTER_RATIO * omega)
     at = np.array([omega])
 
     def gains(ratio: float, scale: float = 1.0) -> PidGains:
-        # (s + z)²/s with z = omega/ratio, the filter left to the derivative alone
+        # (s + z)²/s with z = omega/ratio; only the derivative is filtered
         zero = omega / ratio
         return PidGains(2.0 * zero * scale, zero * zero * scale, scale, filter_s)
 
@@ -250,7 +250,7 @@ def _at_crossover(
 
 
 def _falling(x: FloatArray, y: FloatArray, level: float) -> float | None:
-    """Return where y last falls through the level, None if nowhere."""
+    """Return where y last falls through the level, None if it does not."""
     places = np.flatnonzero((y[:-1] >= level) & (y[1:] < level))
     if not places.size:
         return None

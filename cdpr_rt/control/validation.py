@@ -29,7 +29,7 @@ class ValidationMetrics:
 
 @dataclass(frozen=True)
 class Ratios:
-    """Factor by which each figure decreased; None where it was and stays zero."""
+    """Factor by which each figure decreased; None if it was and stays zero."""
 
     rms_position_error: float
     peak_pid_effort: float
@@ -59,9 +59,9 @@ def evaluate(
 ) -> ValidationMetrics:
     """Judge one run in one direction.
 
-    All arrays have shape (k,); `effort_Nm` is what the PID alone asked for. `judged` marks the
-    samples that count, whole turns after the lead-in; the low-pass sees the others too.
-    Raises ControlError for arrays of different length or where nothing is to be judged.
+    All arrays have shape (k,); `effort_Nm` is the torque of the PID alone. `judged` marks the
+    samples that count, whole turns after the lead-in; the low-pass uses the others too.
+    Raises ControlError for arrays of different length or if no sample counts.
     """
     sizes = {a.size for a in (angle_rad, setpoint_rad, setpoint_velocity_rad_s, effort_Nm)}
     if len(sizes) != 1:
@@ -114,12 +114,12 @@ def floor(
     torque_step_Nm: float,
     samples: int = 16000,
 ) -> ValidationMetrics:
-    """Return what quantised readings and torques alone leave on the true angle, friction aside.
+    """Return the figures that quantised readings and torques alone cause, without friction.
 
     Both roundings count as white noise of their step over √12; the rounding's residual,
     carried to the next cycle, shapes the torque's by 1 - z⁻¹. The noises pass the loop of
     `tuning.loop_response`; a peak is the expected largest of as many Gaussian values as there are
-    independent ones in `samples` cycles. Stick-slip comes on top and is not part of this.
+    independent ones in `samples` cycles. Stick-slip adds to this and is not included.
     """
     omega = np.linspace(2.0 * math.pi / (samples * period_s), math.pi / period_s, samples // 2)
     loop = loop_response(gains, inertia_kg_m2, latency_s, period_s, omega)
@@ -146,6 +146,6 @@ def floor(
 
 
 def _independent(power: FloatArray, samples: int) -> float:
-    """Return about how many independent values a noise of this spectrum takes."""
+    """Return the approximate number of independent values of a noise with this spectrum."""
     share = float(np.sum(power) ** 2 / (power.size * np.sum(power**2)))
     return max(2.0, share * samples)

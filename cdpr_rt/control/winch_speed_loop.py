@@ -12,15 +12,19 @@ BANDWIDTH_rad_s = 100.0
 FILTER_S = 0.005
 _FASTEST_m_s = 5.0
 FIXED_END_1_s = 60.0
-"""Integral rate where the cables' ends are fixed."""
+"""Integral rate of a rotor without a load: the cable's end is fixed, or the cable is slack."""
 HANGING_LOAD_1_s = 4.0
 """Integral rate under a load ten times the rotor's mass at the cable, without oscillation."""
 UNKNOWN_POSE_m_s = 0.15
-"""Speed at which the cables let a platform down whose pose is not known."""
+"""Speed at which the cables lower a platform whose pose is not known."""
 FASTEST_IN_m_s = 0.5
-"""Speed at which they take in slack meanwhile."""
+"""Speed at which they take in slack during that lowering."""
 DRUM_TENSION_SHARE = 0.25
-"""Tension that keeps a cable on its drum meanwhile, over the least tension."""
+"""Tension that keeps a cable on its drum during that lowering, over the least tension."""
+SPARE_m = 0.05
+"""Cable paid out there in addition to what the stand needs: the largest lag of a platform."""
+PUSH_SHARE = 2.0
+"""Push that turns a winch outwards against its friction, over its largest usual friction."""
 
 
 @jit
@@ -34,6 +38,8 @@ def control_speed(
     cable: FloatArray,
     gain: FloatArray,
     integral_rate: float,
+    left: FloatArray,
+    push: FloatArray,
     position: FloatArray,
     last: FloatArray,
     jumped: BoolArray,
@@ -46,16 +52,24 @@ def control_speed(
     for i in range(position.size):
         raw = (position[i] - last[i]) / period
         last[i] = position[i]
-        # a jump of the encoder is no speed, and over in a cycle; a winch that runs away goes on
+        # a jump of the encoder lasts one cycle and is no speed; a winch that runs away goes on
         fast = abs(cable[i] * raw) >= _FASTEST_m_s
         if not fast or jumped[i]:
             speed[i] += weight * (raw - speed[i])
         jumped[i] = fast
         out = cable[i] * speed[i]
-        # a loose cable must not be wound up ever faster
-        least = low[i] * min(max(1.0 + out / fastest_in, 0.0), 1.0)
+        rate = integral_rate
+        if left[i] > 0.0:
+            left[i] -= period * out
+        if left[i] > 0.0:
+            least = -push[i]
+            if cable[i] * integral[i] > 0.0:  # it turns against its friction alone
+                rate = FIXED_END_1_s
+        else:
+            # a loose cable must not be wound up ever faster
+            least = low[i] * min(max(1.0 + out / fastest_in, 0.0), 1.0)
         error = paying_out[i] / cable[i] - speed[i]
-        integral[i] += gain[i] * integral_rate * period * error
+        integral[i] += gain[i] * rate * period * error
         demand = gain[i] * error + integral[i]
         tension[i] = min(max(-demand / cable[i], least), max(high[i], least))
         torque[i] = -cable[i] * tension[i]
@@ -66,8 +80,9 @@ class WinchSpeedLoop:
     """A PI velocity loop for each winch, its tension limited to [low_N, high_N]; arrays are (n,).
 
     A slack cable is reeled in at the commanded speed, a tight one pulled with `high_N`; a loaded
-    cable is paid out at the commanded speed, held with at most `high_N`. Anti-windup by
-    back-calculation.
+    cable is paid out at the commanded speed, held with at most `high_N`. While `left_m` of a cable
+    is above 0, its motor also pays out without a load, against friction of up to `push_N`.
+    Anti-windup by back-calculation.
     """
 
     def __init__(
@@ -90,8 +105,12 @@ class WinchSpeedLoop:
         self.fastest_in_m_s = 0.1
         """Reeling-in speed at which `low_N` has faded to zero."""
         self.integral_rate_1_s = FIXED_END_1_s
+        self.left_m = np.zeros(n)
+        """Length of cable still to be paid out, whether a load pulls it or not."""
+        self.push_N = np.zeros(n)
+        """The largest force with which a motor pushes outwards for that, at the cable."""
         self.tension_N = np.zeros(n)
-        """Commanded tension of the last cycle."""
+        """Commanded tension of the last cycle; negative if the motor pushes outwards."""
         self.speed_rad_s = np.zeros(n)
         """Filtered motor speed."""
         self._last, self._jumped = np.zeros(n), np.zeros(n, np.bool_)
@@ -107,7 +126,7 @@ class WinchSpeedLoop:
         """Write the torques of this cycle."""
         control_speed(
             self._period_s, self._weight, self.low_N, self.high_N, self.paying_out_m_s,
-            self.fastest_in_m_s, self._cable, self._gain, self.integral_rate_1_s,
-            feedback.position_rad, self._last, self._jumped, self.speed_rad_s, self._integral,
-            self.tension_N, torque_Nm,
+            self.fastest_in_m_s, self._cable, self._gain, self.integral_rate_1_s, self.left_m,
+            self.push_N, feedback.position_rad, self._last, self._jumped, self.speed_rad_s,
+            self._integral, self.tension_N, torque_Nm,
         )  # fmt: skip

@@ -1,1 +1,1 @@
-"""Exchange, cycle, clock, estimate, limits, supervisor and recorded row of every robot."""
+"""Exchange, cycle, clock, estimate, limits, supervisor and recorded row, for every robot."""

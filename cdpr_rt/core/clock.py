@@ -1,4 +1,4 @@
-"""A robot's one clock: the time, waiting for it, and the tasks that share its thread."""
+"""A robot's only clock: the time, waiting for it, and the tasks that share its thread."""
 
 from __future__ import annotations
 
@@ -11,17 +11,84 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import Future
 from contextlib import suppress
-from typing import Any, Protocol, TypeVar
+from typing import Any, Generic, Protocol, TypeVar, cast
 
-from cdpr_rt.core.task import Condition, Task
+from greenlet import getcurrent, greenlet
+
+# Cooperative tasks: ordinary sequential code that yields while it waits.
 
 _T = TypeVar("_T")
+Condition = Callable[[], object]
+
+
+class TaskCancelled(BaseException):
+    """Raised in a waiting task to cancel it."""
+
+
+class Task(Generic[_T]):
+    """One call of `work` with its own stack; `Clock.start` makes tasks and advances them."""
+
+    def __init__(self, work: Callable[[], _T]) -> None:
+        self.done = False
+        """Whether the call has returned, or was cancelled."""
+        self.wake_s = -math.inf
+        """Latest time at which it continues, by its clock."""
+        self._condition: Condition | None = None
+        self._work = work
+        self._result: Any = None
+        self._error: BaseException | None = None
+        self._greenlet = greenlet(self._run)
+
+    def _run(self) -> None:
+        try:
+            self._result = self._work()
+        except (Exception, TaskCancelled) as error:
+            self._error = error
+        except BaseException as error:  # an interrupt is for the caller that advances the tasks
+            self._error = error
+            raise
+        finally:
+            self.done = True
+
+    def is_due(self, now_s: float) -> bool:
+        """Return whether the task can go on."""
+        return now_s >= self.wake_s or (self._condition is not None and bool(self._condition()))
+
+    def advance(self) -> None:
+        """Run the task until it waits or ends; raises what interrupts the process."""
+        self._greenlet.parent = getcurrent()
+        self._greenlet.switch()
+
+    def suspend(self, condition: Condition | None, wake_s: float) -> None:
+        """Suspend the task, from within, until its condition holds or its time has come."""
+        self._condition, self.wake_s = condition, wake_s
+        parent = self._greenlet.parent
+        assert parent is not None  # a task runs only when it is advanced
+        parent.switch()
+
+    def cancel(self) -> None:
+        """End the task where it waits; its cleanup may wait once more."""
+        if self.done:
+            return
+        if self._greenlet:
+            self._greenlet.parent = getcurrent()
+            self._greenlet.throw(TaskCancelled)
+        else:  # it has not begun
+            self._error, self.done = TaskCancelled(), True
+
+    def result(self) -> _T:
+        """Return what the call returned, or raise what it raised; the task has ended."""
+        if self._error is not None:
+            raise self._error
+        return cast(_T, self._result)
+
+
 _BLOCKING_POLL_S = 0.002
 """Period of polling work in another thread."""
 _MADE_UP_S = 0.02
-"""Most of simulated time's lag behind wall-clock time that is made up for."""
+"""Largest lag of simulated time behind wall-clock time that is caught up."""
 _LONGEST_GRANT_S = 0.1
-"""Bus time goes on by so much at a time, so that a request to end is seen between."""
+"""Longest step of bus time, so that a request to end is noticed in between."""
 
 
 class Readable(Protocol):
@@ -35,39 +102,39 @@ class EventSource(Readable, Protocol):
     """Source of events, such as a port on a bus; none of its methods waits."""
 
     def poll(self) -> bool:
-        """Process what has come; return whether there was anything."""
+        """Process what has arrived; return whether there was anything."""
 
     def tick(self, now_s: float) -> float:
-        """Do what is due at `now_s`; return when to be called next at the latest."""
+        """Do what is due at `now_s`; return the latest time of the next call."""
 
 
 class SteppedBus(Protocol):
-    """A simulated bus whose time goes on only as far as this process lets it."""
+    """A simulated bus whose time advances only when this process allows it."""
 
     now_s: float
     next_s: float
-    """When something happens there next by itself, as far as is known."""
+    """Time of the next event there, as far as is known."""
     gone: bool
-    """Whether it is lost, and its time with it."""
+    """Whether the bus is lost, and its time with it."""
 
     def go(self, until_s: float) -> bool:
-        """Have the bus work off what was sent, then go on to `until_s` or until a frame comes.
+        """Make the bus process what was sent, then advance to `until_s` or until a frame comes.
 
-        Takes in the frames that come; returns whether there were any. A time that has passed
-        moves nothing: all that was sent has been answered then.
+        Takes in the frames that come; returns whether there were any. With a time in the past the
+        bus does not advance, but everything that was sent has been answered afterwards.
         """
 
 
 class Clock(ABC):
-    """The time of one robot, asked by everything in its process that counts time.
+    """The time of one robot, used by everything in its process that measures time.
 
-    All waiting is done here: in a task it suspends that for the others, elsewhere it polls
-    the sources and advances the tasks, in the order in which they were started. For one
-    thread only, which is the only one that touches a bus.
+    All waiting happens here. In a task it suspends the task for the others; elsewhere it polls the
+    sources and advances the tasks, in the order in which they were started. For one thread only,
+    which is the only one that touches a bus.
     """
 
     lockstep = False
-    """Whether time is that of simulated buses and moves only when they are granted more."""
+    """Whether time is that of simulated buses and advances only when this process grants it."""
 
     def __init__(self) -> None:
         self._sources: list[EventSource] = []
@@ -80,29 +147,29 @@ class Clock(ABC):
         """The time in seconds since an arbitrary instant; never goes back."""
 
     def close(self) -> None:
-        """Listen to nothing any more, and drop the tasks."""
+        """Remove all sources and tasks."""
         self._sources, self._tasks = [], []
 
-    # -- what is listened to
+    # -- sources
 
     def add(self, source: EventSource) -> None:
         """Listen to `source` in all waits from now on."""
         self._sources.append(source)
 
     def remove(self, source: EventSource) -> None:
-        """Listen to `source` no longer; one that was removed before is no error."""
+        """Stop listening to `source`; idempotent."""
         self._sources = [other for other in self._sources if other is not source]
 
     # -- waiting
 
     def sleep(self, seconds: float) -> None:
-        """Wait for so long."""
+        """Wait for a duration."""
         self.wait(None, self.now_s + seconds)
 
     def wait(self, condition: Condition | None, until_s: float = math.inf) -> bool:
         """Wait until `condition` is true, at most until `until_s`; return whether it is.
 
-        It is asked again whenever something has come or a task has gone on; None is never true.
+        The condition is checked whenever something has come or a task has run; None is never true.
         """
         while True:
             if condition is not None and condition():
@@ -115,7 +182,7 @@ class Clock(ABC):
                 self._wait_once(until_s)
 
     def poll(self) -> None:
-        """Process what has come already, so that what comes later is newer."""
+        """Process what has come already, so that later events are newer."""
         for source in self._sources:
             source.poll()
 
@@ -129,7 +196,7 @@ class Clock(ABC):
     def _wait_once(self, until_s: float) -> None:
         due_s = self._tick()
         if self._advance():
-            until_s = self.now_s  # what was waited for may have happened
+            until_s = self.now_s  # the condition may have become true
         self._listen(min([until_s, due_s, *(task.wake_s for task in self._tasks)]))
 
     def _tick(self) -> float:
@@ -138,11 +205,11 @@ class Clock(ABC):
 
     @abstractmethod
     def _listen(self, until_s: float) -> None:
-        """Poll the sources; where nothing has come, wait for it up to `until_s`."""
+        """Poll the sources; if nothing has come, wait for it up to `until_s`."""
 
     @abstractmethod
     def sleep_until(self, until_s: float) -> None:
-        """Do nothing at all until then: a cycle's deadline is not to depend on what comes."""
+        """Do nothing until then, so that events do not affect a cycle's deadline."""
 
     # -- tasks
 
@@ -155,7 +222,7 @@ class Clock(ABC):
     def gather(self, works: Iterable[Callable[[], _T]]) -> list[Task[_T]]:
         """Run several works as tasks side by side, and return them once all have ended.
 
-        Whatever else ends the wait (an interrupt, being cancelled) ends them as well.
+        If anything else ends the wait (an interrupt, a cancellation), the tasks are cancelled.
         """
         tasks = [self.start(work) for work in works]
         try:
@@ -166,7 +233,7 @@ class Clock(ABC):
         return tasks
 
     def cancel(self, task: Task[Any]) -> None:
-        """Have a task end where it waits; what it does on its way out may wait once more."""
+        """End a task where it waits; its cleanup may wait once more."""
         running = self._running
         try:
             task.cancel()
@@ -174,21 +241,21 @@ class Clock(ABC):
             self._running = running
 
     def run_tasks(self) -> None:
-        """Give every task that can go on its turn, without waiting; for once a cycle."""
+        """Run every task that can continue, without waiting; for one call per cycle."""
         now_s = self.now_s
         for source in self._sources:
             source.tick(now_s)
         if self._tasks:
             self._advance()
-            # what they have sent is answered before the next SYNC goes out on any bus
+            # what they have sent must be answered before the next SYNC goes out on any bus
             self._listen(self.now_s)
 
     def _advance(self) -> bool:
-        """Run the tasks that can go on, each until it waits; return whether there was one."""
+        """Run the tasks that can continue, each until it waits; return whether there was one."""
         if self._running is not None or not self._tasks:
             return False
         now_s, ran = self.now_s, False
-        for task in self._tasks:  # those which are started meanwhile have their turn as well
+        for task in self._tasks:  # tasks started meanwhile have their turn too
             if not task.done and task.is_due(now_s):
                 self._running, ran = task, True
                 try:
@@ -199,9 +266,9 @@ class Clock(ABC):
         return ran
 
     def run_blocking(self, work: Callable[[], _T]) -> _T:
-        """Return what `work` does, which touches no bus and may take its time, such as a file.
+        """Return the result of `work`, which touches no bus and may take long, such as file access.
 
-        Beside this thread where time is wall-clock time, at once where it stands still meanwhile.
+        Runs in another thread in wall-clock time, else immediately: simulated time stands still.
         """
         return work()
 
@@ -211,7 +278,7 @@ class PacedClock(Clock):
 
     def __init__(self) -> None:
         super().__init__()
-        # of the process before its loop takes a core for itself
+        # cores of the process before its loop takes one for itself
         self._cores = os.sched_getaffinity(0)
 
     @property
@@ -242,11 +309,11 @@ class PacedClock(Clock):
                 source.poll()
 
     def run_blocking(self, work: Callable[[], _T]) -> _T:
-        """Return what `work` does in a thread of its own, on all cores the process may use."""
+        """Return the result of `work`, run in another thread on all cores the process may use."""
         future: Future[_T] = Future()
 
         def run() -> None:
-            with suppress(OSError):  # cores that have been taken away since
+            with suppress(OSError):  # cores may have been taken away since
                 os.sched_setaffinity(0, self._cores)
             try:
                 future.set_result(work())
@@ -260,11 +327,11 @@ class PacedClock(Clock):
 
 
 class LockstepClock(Clock):
-    """The time of simulated buses which this process leads; it goes on in waits only.
+    """The time of simulated buses which this process leads; it advances only in waits.
 
-    All buses are kept at the same instant. Without any, time passes as soon as it is waited for.
-    With `real_time` it goes no faster than wall-clock time: a process held up finds it slower,
-    never later.
+    All buses are kept at the same instant. Without any bus, time passes as soon as something waits.
+    With `real_time` it is no faster than wall-clock time: if the process is delayed, time is slower
+    but no cycle is late.
     """
 
     lockstep = True
@@ -278,24 +345,25 @@ class LockstepClock(Clock):
 
     @property
     def now_s(self) -> float:
-        """The time of the buses, the earliest where another client's frame has held one up."""
+        """The earliest time of all buses; once all are lost, it continues from the latest."""
         buses = self._buses
         if len(buses) == 1 and not buses[0].gone:
             return buses[0].now_s
-        return min([bus.now_s for bus in buses if not bus.gone], default=self._alone_s)
+        led_s = [bus.now_s for bus in buses if not bus.gone]
+        return min(led_s) if led_s else max([self._alone_s, *(bus.now_s for bus in buses)])
 
     def sleep_until(self, until_s: float) -> None:
-        """Have time go on until then."""
+        """Advance time until then."""
         self.wait(None, until_s)
 
     def run_tasks(self) -> None:
-        """See `Clock.run_tasks`; the next cycle is not to be early either."""
+        """See `Clock.run_tasks`; in real time the next cycle must not be early either."""
         super().run_tasks()
         if self._real_time:
             self._await_wall()
 
     def _await_wall(self) -> None:
-        """Wait until the wall clock has come as far; little of what it is ahead is made up for."""
+        """Wait until wall-clock time has caught up; only a small lag behind it is made up for."""
         if not self._real_time:
             return
         now_s, wall_s = self.now_s, time.monotonic()
@@ -305,8 +373,8 @@ class LockstepClock(Clock):
             time.sleep(left_s)
 
     def _listen(self, until_s: float) -> None:
-        buses = self._buses = [bus for bus in self._buses if not bus.gone]
         now_s = self._alone_s = self.now_s
+        buses = self._buses = [bus for bus in self._buses if not bus.gone]
         until_s = min(until_s, now_s + _LONGEST_GRANT_S)
         if not buses:
             self._alone_s = max(until_s, now_s)

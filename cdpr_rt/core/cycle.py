@@ -1,4 +1,4 @@
-"""One cycle of a device, whoever runs it: its deadline, the exchange, alarms, the last command."""
+"""One cycle of a device: its deadline, the exchange, alarms, the last command."""
 
 from __future__ import annotations
 
@@ -8,22 +8,20 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from cdpr_rt.core.exchange import AxisDevice
+from cdpr_rt.core.fault import Fault
 
 _LATE_SHARE = 0.1
 _TOO_LATE_SHARE = 0.25
 
 
 class Watch(Protocol):
-    """Something beside the axes that may end their motion, such as safety I/O.
+    """Something other than the axes that may end their motion, such as safety I/O."""
 
-    Both are asked every cycle and cost next to nothing while all is well.
-    """
+    def fault(self) -> Fault | None:
+        """Return why the motion must end, None if it need not; cheap, called every cycle.
 
-    def alarm(self) -> str:
-        """Return why the torque must go at once, or an empty text."""
-
-    def stop_reason(self) -> str:
-        """Return why the motion must be braked to its end, or an empty text."""
+        Its limit is `SAFETY_ALARM` if the torque must go immediately, else `SAFETY_STOP`.
+        """
 
 
 @dataclass
@@ -39,8 +37,8 @@ class Lateness:
 class Cycle:
     """Exchanges a device once a cycle and sends one command in each.
 
-    On a lockstep device the next SYNC goes out as soon as `exchange` is called; otherwise each has
-    an absolute deadline.
+    On a lockstep device the next SYNC goes out as soon as `exchange` is called; otherwise each SYNC
+    has an absolute deadline.
     """
 
     def __init__(self, device: AxisDevice, watches: Sequence[Watch] = ()) -> None:
@@ -52,15 +50,15 @@ class Cycle:
         self.began_ns = 0
         """CLOCK_MONOTONIC when this cycle's SYNC went out."""
         self.elapsed_s = device.period_s
-        """From the last SYNC to this one; one period where cycles begin, or run in lockstep."""
+        """From the last SYNC to this one; one period in lockstep and in the first cycle."""
         self._no_elapsed_yet = True
         self._deadline_s = 0.0
         self._no_deadline_yet = True
         self._free_s = 0.0
-        """When the last cycle's commands are off the wire at the latest."""
+        """Time at which the last cycle's commands are off the wire at the latest."""
 
     def begin(self) -> None:
-        """Tell that no cycles have run for a while: the next one is not late by it."""
+        """Note that no cycles have run for a while, so that the next one does not count as late."""
         self._no_deadline_yet = self._no_elapsed_yet = True
 
     def exchange(self) -> int:
@@ -78,21 +76,9 @@ class Cycle:
         if not device.lockstep:
             self._free_s = device.clock.now_s + device.commands_s
 
-    def watch_alarm(self) -> str:
-        """Return for what cause beside the axes the torque must go at once, or an empty text."""
-        for watch in self.watches:
-            reason = watch.alarm()
-            if reason:
-                return reason
-        return ""
-
-    def stop_reason(self) -> str:
-        """Return why the motion must be braked to its end, or an empty text."""
-        for watch in self.watches:
-            reason = watch.stop_reason()
-            if reason:
-                return reason
-        return ""
+    def watch_faults(self) -> list[Fault]:
+        """Return why the motion must end, for causes other than the axes."""
+        return [fault for watch in self.watches if (fault := watch.fault()) is not None]
 
     def _measure_elapsed(self) -> None:
         device, now_ns = self.device, time.monotonic_ns()
@@ -103,8 +89,8 @@ class Cycle:
     def _await_deadline(self) -> None:
         period, clock = self.device.period_s, self.device.clock
         self._deadline_s += period
-        # a SYNC that met commands on the wire would be late by them, and so would all after it;
-        # where that is so in every cycle, as with a silent drive, the rate is kept all the same
+        # a SYNC that met commands on the wire would be late, and so would all after it; if that
+        # happens in every cycle, as with a silent drive, the rate is kept all the same
         too_late_s = _TOO_LATE_SHARE * period
         begin_s = min(max(self._deadline_s, self._free_s), self._deadline_s + too_late_s)
         now = clock.now_s
@@ -116,7 +102,7 @@ class Cycle:
         self._no_deadline_yet = False
         self.late_s = now - self._deadline_s
         if now - begin_s > too_late_s:
-            self._deadline_s = now  # a new time base: the next cycles are not run in a hurry
+            self._deadline_s = now  # a new time base: the next cycles do not catch up
         lateness = self.lateness
         lateness.cycles += 1
         lateness.late += self.late_s > _LATE_SHARE * period

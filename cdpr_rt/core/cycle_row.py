@@ -1,7 +1,7 @@
-"""One cycle as a row of fixed size: everything that is recorded, shown or streamed of it.
+"""One cycle as a row of fixed size: all its values that are recorded, shown or streamed.
 
-A quantity is declared here and nowhere else: the row's type, what is written into it, recordings,
-their schemas, the status, the live view and the metrics follow from these tables.
+A quantity is declared only here: the row's type, its source, recordings, their schemas, the
+status, the live view and the metrics follow from these tables.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from cdpr_profiles.limits.robot_limits import Limit
+from cdpr_profiles.robot_limits import Limit
 from cdpr_rt.core.states import LoopState, Reaction
 
 Row = NDArray[np.void]
@@ -31,11 +31,11 @@ class CycleField:
     """Path of attributes to its value, from the engine."""
     meaning: str
     wall: bool = False
-    """Whether it tells of the machine that ran the loop; all else follows from the bus."""
+    """Whether it describes the machine that ran the loop; all else follows from the bus."""
     status: bool = False
-    """Whether the status shows it of each axis; it shows all that there is once a cycle."""
+    """Whether the status shows it for each axis; scalars are always shown."""
     live: bool = False
-    """Whether the live view shows it: angles in degrees, wall times in ms, the longest of each."""
+    """Whether the live view shows it: angles in degrees, the longest of each wall time in ms."""
     metric: str = ""
     """Name in Prometheus without prefix, "" for none; wall times are histograms."""
     labels: type[LoopState] | type[Reaction] | None = None
@@ -148,7 +148,7 @@ SCALAR_FIELDS: Final = (
         metric="lengths_disagree_metres",
     ),
 )
-"""One value a cycle."""
+"""One value per cycle."""
 
 AXIS_FIELDS: Final = (
     CycleField(
@@ -275,7 +275,7 @@ POSE_FIELDS: Final = (
         "pose_setpoint", "<f8", "program.pose_setpoint", f"where the platform should be: {_SEVEN}"
     ),
 )
-"""Seven values, nan in a row where they are not known."""
+"""Seven values, nan if they are not known."""
 
 FIELDS: Final = {field.name: field for field in (*SCALAR_FIELDS, *AXIS_FIELDS, *POSE_FIELDS)}
 """All fields of a row by name, in its order."""

@@ -10,12 +10,13 @@ from typing import Any
 import numpy as np
 
 from cdpr_rt.arrays import BoolArray, FloatArray
-from cdpr_rt.core.exchange import AxisFeedback
-from cdpr_rt.core.tension_feedback import TensionFeedback
+from cdpr_rt.core.exchange import AxisFeedback, TensionFeedback
 from cdpr_rt.jit import bound, bound_to, jit
 
 FILTER_S = 0.01
-"""Speed and torque are judged over this: one encoder step a cycle is hundreds a second."""
+"""Filter time of speed and torque: one encoder step per cycle would be hundreds a second."""
+_AT_ONCE_S = 0.001
+"""Filter time for a tension that rises within some ms."""
 _FRICTION_FULL_rad_s = 0.1
 _M_PER_RAD, _GAIN, _BIAS, _FRICTION, _FRICTION_PER_N, _INERTIA = range(6)
 """The rows of `WinchArrays.table`."""
@@ -23,10 +24,11 @@ _M_PER_RAD, _GAIN, _BIAS, _FRICTION, _FRICTION_PER_N, _INERTIA = range(6)
 _STATE = np.dtype(
     [
         ("position", "<f8"),
-        ("torque", "<f8"),  # low-passed, less what is known to turn the motor alone
-        ("elapsed", "<f8"),  # since the position was last heard
+        ("torque", "<f8"),  # low-passed, without the part that turns the motor alone
+        ("elapsed", "<f8"),  # since the last valid position
         ("started", "<f8"),
-        ("length_at_zero", "<f8"),  # cable length at motor angle 0; nan where it is not known
+        ("fast_velocity", "<f8"),  # of the motor, low-passed lightly
+        ("length_at_zero", "<f8"),  # cable length at motor angle 0; nan if unknown
     ]
 )
 
@@ -36,18 +38,18 @@ class WinchArrays:
     """Parameters of n winches for the estimate; shapes are (n,).
 
     Winding torque = gain·tension + bias ± (friction + friction_per_N·tension), plus while the
-    cable is wound in, as a winch's calibration has it.
+    cable is wound in, as in a winch's calibration.
     """
 
     cable_m_per_rad: FloatArray
-    """Cable paid out per radian of the motor, with its sign; 0 where there is no cable."""
+    """Cable paid out per radian of the motor, with its sign; 0 without a cable."""
     gain_m: FloatArray
     """Nm at the motor per N of tension (K_t of Tremblay, section 3.6.2)."""
     bias_Nm: FloatArray
     friction_Nm: FloatArray
     friction_per_N_m: FloatArray
     inertia_kg_m2: FloatArray
-    """Inertia that the motor accelerates besides the cable."""
+    """Inertia that the motor accelerates, without the cable."""
 
     @classmethod
     def bare(cls, n: int) -> WinchArrays:
@@ -55,7 +57,7 @@ class WinchArrays:
         return cls(*(np.zeros(n) for _ in range(6)))
 
     def table(self) -> FloatArray:
-        """Return all of it as (6, n), a row for each attribute in their order."""
+        """Return all parameters as (6, n), one row for each attribute in their order."""
         return np.array(
             [
                 self.cable_m_per_rad,
@@ -78,15 +80,17 @@ class AxisEstimate:
         self.velocity_rad_s: FloatArray = np.zeros(n)
         self.cable_m_per_rad: FloatArray = np.zeros(n)
         self.cable_length_m: FloatArray = np.full(n, np.nan)
-        """Beyond the drum, as wound off; nan where it is not known."""
+        """Length beyond the drum, by the cable wound off; nan if it is not known."""
         self.length_known: BoolArray = np.zeros(n, np.bool_)
         self.tension_N: FloatArray = np.full(n, np.nan)
-        """Measured, or estimated from the torque; nan where neither can be."""
+        """Measured, or estimated from the torque; nan if neither is possible."""
+        self.tension_at_once_N: FloatArray = np.full(n, np.nan)
+        """The same by the torque, filtered over 1 ms only: noisy, but it shows a snatch."""
         self.slack_allowed = False
-        """Whether cables are being tightened or let go, so that none is missed."""
+        """Whether cables are being tightened or slackened, so that a slack one is no fault."""
         self.tension_measured: BoolArray = np.zeros(n, np.bool_)
         self.sensor_ok: BoolArray = np.ones(n, np.bool_)
-        """False where there is a tension sensor whose reading is not valid."""
+        """False if there is a tension sensor whose reading is not valid."""
 
 
 @jit
@@ -96,6 +100,7 @@ def _update(
     velocity: FloatArray,
     length: FloatArray,
     tension: FloatArray,
+    at_once: FloatArray,
     position: FloatArray,
     torque: FloatArray,
     valid: BoolArray,
@@ -108,23 +113,28 @@ def _update(
         state["elapsed"] += elapsed
         if not valid[i]:
             continue
-        # a measured friction of the winch has the motor's in it, but not its cogging
+        # a measured friction of the winch includes the motor's, but not its cogging
         net_torque = torque[i] - (loss[i] if winch[_FRICTION, i] == 0.0 else cogging[i])
         if state["started"] == 0.0:
             state["position"], state["torque"] = position[i], net_torque
-            state["started"], velocity[i] = 1.0, 0.0
+            state["started"], velocity[i], state["fast_velocity"] = 1.0, 0.0, 0.0
         dt = state["elapsed"]
+        fast = dt / (dt + _AT_ONCE_S)
+        fast *= (position[i] - state["position"]) / dt - state["fast_velocity"]
+        state["fast_velocity"] += fast
         weight = dt / (dt + FILTER_S)
         change = weight * ((position[i] - state["position"]) / dt - velocity[i])
         velocity[i] += change
         state["torque"] += weight * (net_torque - state["torque"])
         state["position"], state["elapsed"] = position[i], 0.0
         length[i] = state["length_at_zero"] + winch[_M_PER_RAD, i] * position[i]
-        tension[i] = np.nan
+        tension[i] = at_once[i] = np.nan
         if winch[_GAIN, i] > 0.0:
-            # what the torque does not spend on accelerating the motor is on the cable
+            # torque that does not accelerate the motor acts on the cable
             cable_torque = state["torque"] - winch[_INERTIA, i] * change / dt
             tension[i] = _tension(winch[:, i], cable_torque, velocity[i])
+            cable_torque = net_torque - winch[_INERTIA, i] * fast / dt
+            at_once[i] = _tension(winch[:, i], cable_torque, state["fast_velocity"])
 
 
 @jit
@@ -151,7 +161,7 @@ def _take_sensors(
 
 
 class Estimator:
-    """Brings an `AxisEstimate` up to date once a cycle; allocates nothing.
+    """Updates an `AxisEstimate` once per cycle; allocates nothing.
 
     Readings of tension are those of the first axes.
     """
@@ -159,7 +169,7 @@ class Estimator:
     def __init__(self, n: int, period_s: float, winches: WinchArrays | None = None) -> None:
         self.estimate = AxisEstimate(n)
         self.origins_lost = 0
-        """Number of times that lengths were forgotten, as the angles' origins were lost."""
+        """Number of times that lengths were forgotten because the angles' origins were lost."""
         self._period_s = period_s
         self._winch = (winches or WinchArrays.bare(n)).table()
         self.estimate.cable_m_per_rad[:] = self._winch[_M_PER_RAD]
@@ -169,21 +179,21 @@ class Estimator:
         self._kernel = bound_to(self._bind)
 
     def reset(self) -> None:
-        """Forget speeds, torques and tensions, after cycles did not run; lengths stay known."""
+        """Forget speeds, torques and tensions after a pause of the cycles; lengths stay known."""
         for field in ("position", "torque", "elapsed", "started"):
             self._state[field] = 0.0
         self.estimate.velocity_rad_s[:] = 0.0
-        self.estimate.tension_N[:] = np.nan
+        self.estimate.tension_N[:] = self.estimate.tension_at_once_N[:] = np.nan
         self.estimate.tension_measured[:] = False
         self.estimate.sensor_ok[:] = True
 
     @property
     def position_rad(self) -> FloatArray:
-        """The motors' angles as last heard, (n,)."""
+        """The motors' angles as last received, (n,)."""
         return np.asarray(self._state["position"])
 
     def set_lengths(self, position_rad: FloatArray, length_m: FloatArray) -> None:
-        """Take the cables to have `length_m` (n,) at the motor angles; nan leaves one as it is."""
+        """Set the cables' lengths (n,) at these motor angles; nan leaves one as it is."""
         for i, length in enumerate(length_m):
             if math.isfinite(length) and self._winch[_M_PER_RAD, i] != 0.0:
                 self._state["length_at_zero"][i] = (
@@ -193,7 +203,7 @@ class Estimator:
         np.isfinite(self._state["length_at_zero"], out=self.estimate.length_known)
 
     def forget_lengths(self) -> None:
-        """Take no length for known any more, such as after the drives have lost their origins."""
+        """Mark all lengths as unknown, for example after the drives have lost their origins."""
         self.origins_lost += 1
         self._state["length_at_zero"] = np.nan
         self.estimate.length_known[:] = False
@@ -208,9 +218,9 @@ class Estimator:
     ) -> None:
         """Take in this cycle's feedback and the tensions as last read.
 
-        `elapsed_s` is from the last SYNC to this one, where it was not one period; `motor_loss_Nm`
+        `elapsed_s` is from the last SYNC to this one, if it was not one period; `motor_loss_Nm`
         (n,) is the part of the torque that the motors' own cogging and friction take up,
-        `cogging_Nm` (n,) what cogging alone does.
+        `cogging_Nm` (n,) the part of cogging alone.
         """
         estimate = self.estimate
         estimate.elapsed_s = elapsed_s or self._period_s
@@ -229,6 +239,6 @@ class Estimator:
         estimate = self.estimate
         return bound(
             _update, self._winch, self._state, estimate.velocity_rad_s, estimate.cable_length_m,
-            estimate.tension_N, feedback.position_rad, feedback.torque_Nm, feedback.valid, loss,
-            cogging, then=(0.0,),
+            estimate.tension_N, estimate.tension_at_once_N, feedback.position_rad,
+            feedback.torque_Nm, feedback.valid, loss, cogging, then=(0.0,),
         )  # fmt: skip

@@ -1,25 +1,31 @@
-"""Exchange of one cycle between the controller and n axes: feedback, command, set-point."""
+"""Exchange of one cycle between the controller and n axes: feedback, command, measured tensions."""
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
+from enum import IntEnum
 from typing import Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
+from cdpr_profiles.robot_limits import Limit
 from cdpr_rt.arrays import BoolArray, FloatArray, WordArray
 from cdpr_rt.core.clock import Clock
+from cdpr_rt.core.fault import LOAD_CELL, LOAD_CELL_HIGH, Fault
 
 
 class AxisFeedback:
     """State of n axes as latched by the drives at one SYNC; overwritten in place every cycle.
 
-    Shapes are (n,). Angles are motor angles in the drive's own origin; `index_rad` is where the
-    encoder index lies on that scale, meaningful where `index_known`.
+    Shapes are (n,). Angles are motor angles in the drive's own origin; `index_rad` is the position
+    of the encoder index on that scale, valid if `index_known`.
     """
 
     def __init__(self, n: int) -> None:
         self.cycle = 0
-        """SYNCs since the cyclic exchange was started."""
+        """Number of SYNCs since the cyclic exchange was started."""
         self.time_s = 0.0
         """Bus time of the SYNC, counted from the first cycle."""
         self.position_rad: FloatArray = np.zeros(n)
@@ -29,9 +35,9 @@ class AxisFeedback:
         self.valid: BoolArray = np.zeros(n, np.bool_)
         """Whether the axis answered this SYNC."""
         self.alive: BoolArray = np.zeros(n, np.bool_)
-        """Whether its drive is heard and operational, as of the end of the last cycle."""
+        """Whether its drive was heard and operational at the end of the last cycle."""
         self.rate_ok: BoolArray = np.zeros(n, np.bool_)
-        """Whether its answers come once to each SYNC: just now, and hardly ever not before."""
+        """Whether it answers once per SYNC: just now, and with rare exceptions before."""
         self.index_rad: FloatArray = np.zeros(n)
         self.index_known: BoolArray = np.zeros(n, np.bool_)
 
@@ -56,7 +62,7 @@ class Setpoint:
 
 
 class AxisDevice(Protocol):
-    """A group of n axes that is exchanged once per cycle.
+    """A group of n axes exchanged once per cycle.
 
     Order in a cycle: `sync`, `receive`, then the controller writes `command`, then `transmit`.
     """
@@ -66,7 +72,7 @@ class AxisDevice(Protocol):
     lockstep: bool
     """Whether the next SYNC goes out as soon as the last one has been answered."""
     commands_s: float
-    """How long the commands of a cycle are on the wire at most, on the slowest bus."""
+    """Longest time that the commands of a cycle are on the wire, on the slowest bus."""
     feedback: AxisFeedback
     command: AxisCommand
 
@@ -83,5 +89,130 @@ class AxisDevice(Protocol):
     def transmit(self) -> None:
         """Encode `command` and send it, to act from the next SYNC on."""
 
-    def alarm(self) -> str:
-        """Return why the drives must not go on being driven, or an empty text; cheap to call."""
+    def faults(self) -> Sequence[Fault]:
+        """Return why the drives must not be driven any longer, one fault for each failed axis.
+
+        The fault of a bus has axis -1. Cheap to call.
+        """
+
+
+# Measured cable tensions as arrays beside the axis feedback, whoever measures them.
+
+
+class TensionFault(IntEnum):
+    """Reason why a tension is not valid."""
+
+    NONE = 0
+    NO_READING = 1
+    """Nothing was read yet."""
+    STALE = 2
+    """The last reading is too old: the sensor has stopped answering."""
+    OVER_RANGE = 3
+    BROKEN_WIRE = 4
+
+    @property
+    def label(self) -> str:
+        """Name as text."""
+        return self.name.lower().replace("_", " ")
+
+
+class TensionFeedback:
+    """Tensions of n cables as last measured; overwritten in place by `TensionExchange.update`.
+
+    Shapes are (n,). Times are those of the robot's clock.
+    """
+
+    def __init__(self, n: int) -> None:
+        self.tension_N: FloatArray = np.zeros(n)
+        self.time_s: FloatArray = np.full(n, -np.inf)
+        """Time at which the reading was requested."""
+        self.age_s: FloatArray = np.full(n, np.inf)
+        self.valid: BoolArray = np.zeros(n, np.bool_)
+        self.fault: NDArray[np.uint8] = np.full(n, TensionFault.NO_READING, np.uint8)
+        """`TensionFault`, NONE if `valid`."""
+
+
+class TensionExchange:
+    """Passes readings from the task that samples to the cycle, which may run in between."""
+
+    def __init__(self, cables: Sequence[str], stale_after_s: float, clock: Clock) -> None:
+        n = len(cables)
+        self.n = n
+        self.cables = tuple(cables)
+        self.stale_after_s = stale_after_s
+        self.feedback = TensionFeedback(n)
+        self._clock = clock
+        self._fault = self.feedback.fault.copy()
+        self._stale: BoolArray = np.zeros(n, np.bool_)
+
+    def publish(self, cable: int, tension_N: float, time_s: float, fault: TensionFault) -> None:
+        """Store one reading; a reading with a fault keeps its value for diagnosis."""
+        feedback = self.feedback
+        feedback.tension_N[cable] = tension_N
+        feedback.time_s[cable] = time_s
+        self._fault[cable] = fault
+
+    def update(self) -> None:
+        """Update `feedback`; for the cycle: allocates no array."""
+        feedback = self.feedback
+        np.subtract(self._clock.now_s, feedback.time_s, out=feedback.age_s)
+        np.copyto(feedback.fault, self._fault)
+        np.greater(feedback.age_s, self.stale_after_s, out=self._stale)
+        # before the first reading the fault already says so, and the age is infinite
+        np.logical_and(
+            self._stale, np.isfinite(feedback.age_s, out=feedback.valid), out=self._stale
+        )
+        np.putmask(feedback.fault, self._stale, TensionFault.STALE)
+        np.equal(feedback.fault, TensionFault.NONE, out=feedback.valid)
+
+    def reason(self) -> str:
+        """Return why the tensions are unreliable, after `update`, or an empty text."""
+        feedback = self.feedback
+        if feedback.valid.all():
+            return ""
+        i = int(np.argmin(feedback.valid))
+        fault = TensionFault(int(feedback.fault[i]))
+        text = f"{self.cables[i]}: tension sensor: {fault.label}"
+        if fault is TensionFault.STALE:
+            return (
+                f"{text}, last read {feedback.age_s[i]:.2f} s ago, {self.stale_after_s:g} s allowed"
+            )
+        if fault is TensionFault.OVER_RANGE:
+            return f"{text} ({feedback.tension_N[i]:.1f} N)"
+        return text
+
+
+class TensionWatch:
+    """Brakes a winch whose tension is too high or no longer known (a watch of the loop).
+
+    No cable may exceed `stop_above_N`.
+    """
+
+    def __init__(self, exchange: TensionExchange, stop_above_N: float = math.inf) -> None:
+        self._exchange = exchange
+        self._stop_above_N = stop_above_N
+
+    def fault(self) -> Fault | None:
+        """Return why the motion must be braked, None if it need not.
+
+        It never removes the torque immediately, because slack cables drop the platform.
+        """
+        exchange = self._exchange
+        exchange.update()
+        feedback = exchange.feedback
+        if reason := exchange.reason():
+            return self._fault(int(np.argmin(feedback.valid)), LOAD_CELL, detail=reason)
+        most = int(feedback.tension_N.argmax())
+        tension_N = float(feedback.tension_N[most])
+        if tension_N <= self._stop_above_N:
+            return None
+        return self._fault(most, LOAD_CELL_HIGH, tension_N, self._stop_above_N)
+
+    def _fault(
+        self, cable: int, code: str, value: float = math.nan, allowed: float = math.nan,
+        detail: str = "",
+    ) -> Fault:  # fmt: skip
+        cables = self._exchange.cables
+        axis = cable if len(cables) == 1 else -1  # several are not those of a single winch
+        source = f"load cell {cables[cable]}"
+        return Fault(Limit.SAFETY_STOP, axis, code, source, value, allowed, detail)

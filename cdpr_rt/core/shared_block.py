@@ -1,7 +1,7 @@
 """The memory that the loop's process shares with the others: rows out, commands in, no lock.
 
-Each part has one writer. A counter next to it tells readers what is complete; who reads twice the
-same counter around its copy has copied something whole. Neither side ever waits for the other.
+Each part has one writer. A counter next to it shows readers what is complete: a reader that finds
+the same counter before and after its copy has a consistent copy. Neither side waits for the other.
 """
 
 from __future__ import annotations
@@ -22,20 +22,19 @@ from cdpr_rt.errors import ControlError
 
 MAGIC: Final = 0x63647072_72743033
 MOST_AXES: Final = 16
-# other processors let a reader see a counter before what it counts
+# other processors may let a reader see a counter before the data that it counts
 _IN_ORDER: Final = ("x86_64", "i686", "i386")
 DESCRIPTION_BYTES: Final = 1 << 17
-STATUS_BYTES: Final = 1 << 14
+STATUS_BYTES: Final = 1 << 15
 MESSAGE_BYTES: Final = 1 << 12
 MESSAGES: Final = 64
 URGENT_MESSAGES: Final = 16
 SAMPLES: Final = 64
-# who shortened the file would kill everybody who reads behind its end (SIGBUS)
+# shortening the file would kill every process that reads behind its end (SIGBUS)
 _SEALS: Final = fcntl.F_SEAL_SHRINK | fcntl.F_SEAL_GROW | fcntl.F_SEAL_SEAL
 
 PATH: Final = np.dtype([("name", "S32"), ("time_s", "<f8"), ("over", "<i8")])
-"""A planned path, up to what time of it the platform has come, and whether nothing is left of it.
-"""
+"""A planned path, the time up to which the platform has followed it, and whether it is finished."""
 _COUNTERS: Final = np.dtype(
     [
         ("magic", "<u8"),
@@ -48,21 +47,21 @@ _COUNTERS: Final = np.dtype(
         ("loop_alive_ns", "<i8"),  # CLOCK_MONOTONIC of the loop's last turn, cycling or not
         ("service_alive_ns", "<i8"),  # of the service's last turn, 0 before the first
         ("right_number", "<u8"),  # grows with every grant of the right to move
-        ("right_until_ns", "<i8"),  # until when the newest grant holds, 0 where it has ended
-        ("mover", "<u8"),  # number of the grant on whose behalf the loop moves, 0 for nobody's
+        ("right_until_ns", "<i8"),  # expiry of the newest grant, 0 if it has ended
+        ("mover", "<u8"),  # number of the grant under which the loop moves, 0 for none
         ("rows", "<u8"),  # rows written since the beginning
-        ("recorded", "<u8"),  # of them, those that are safe in the recording
+        ("recorded", "<u8"),  # those of them that are safe in the recording
         ("description", "<u8"),  # versions of the texts; odd while one is being written
         ("status", "<u8"),
         ("commands", "<u8"),  # messages written since the beginning, and those taken
         ("commands_taken", "<u8"),
-        ("commands_void", "<u8"),  # commands up to this number may not start motion any more
-        ("urgent", "<u8"),  # stops: looked at before commands
+        ("commands_void", "<u8"),  # commands up to this number must not start motion any more
+        ("urgent", "<u8"),  # stops: read before commands
         ("urgent_taken", "<u8"),
         ("replies", "<u8"),
         ("replies_taken", "<u8"),
         ("samples", "<u8"),
-        ("path", PATH),  # the loop's
+        ("path", PATH),  # written by the loop
     ]
 )
 SAMPLE: Final = np.dtype(
@@ -82,21 +81,21 @@ SAMPLE: Final = np.dtype(
 
 
 class SharedBlockError(ControlError):
-    """The shared memory is not what it should be, or a text does not fit into it."""
+    """The shared memory has a wrong format, or a text does not fit into it."""
 
 
 class SharedBlock:
     """All parts as arrays over one file descriptor; `create` makes it, `attach` joins it.
 
-    The descriptor is inherited by child processes; when the last has ended, nothing is left. Over
-    one that was opened for reading only, nothing can be written.
+    The descriptor is inherited by child processes; when the last has ended, nothing is left. A
+    descriptor opened for reading only gives read-only arrays.
     """
 
     def __init__(self, fd: int, n: int, capacity: int) -> None:
         self.fd = fd
         self.n = n
         self.capacity = capacity
-        """Rows that are kept; a reader further behind has lost some."""
+        """Number of rows kept; a reader further behind has lost some."""
         sizes = _sizes(n, capacity)
         reads_only = fcntl.fcntl(fd, fcntl.F_GETFL) & os.O_ACCMODE == os.O_RDONLY
         access = mmap.ACCESS_READ if reads_only else mmap.ACCESS_WRITE
@@ -106,7 +105,7 @@ class SharedBlock:
             views.append(np.frombuffer(self._map, np.uint8, size, first))
             first += size
         self.counters: Row = views[0][: _COUNTERS.itemsize].view(_COUNTERS)
-        """One row; `counters["rows"][0]` and so on. Who writes which is said at its type."""
+        """One row; `counters["rows"][0]` and so on. Its type names the writers."""
         self._description, self._status = views[1], views[2]
         self._commands = views[3].reshape(MESSAGES, MESSAGE_BYTES)
         self._urgent = views[4].reshape(URGENT_MESSAGES, MESSAGE_BYTES)
@@ -118,7 +117,7 @@ class SharedBlock:
     def create(cls, n: int, seconds: float, rate_Hz: float) -> SharedBlock:
         """Make a block for n axes whose ring holds `seconds` of cycles at `rate_Hz`.
 
-        Raises SharedBlockError for more axes than a loop runs.
+        Raises SharedBlockError if there are more axes than a loop can run.
         """
         if not 1 <= n <= MOST_AXES:
             raise SharedBlockError(f"{n} axes; allowed: 1 to {MOST_AXES}")
@@ -136,7 +135,7 @@ class SharedBlock:
     def attach(cls, fd: int) -> SharedBlock:
         """Join the block behind an inherited descriptor; raises SharedBlockError.
 
-        Also on a processor that may show another process stores out of order.
+        Also raised on a processor that may show stores to another process out of order.
         """
         if (machine := platform.machine()) not in _IN_ORDER:
             raise SharedBlockError(
@@ -148,7 +147,7 @@ class SharedBlock:
             raise SharedBlockError("the shared memory is empty")
         try:
             sealed = fcntl.fcntl(fd, fcntl.F_GET_SEALS) & _SEALS == _SEALS
-        except OSError:  # not of a kind that can be sealed
+        except OSError:  # a file that cannot be sealed
             sealed = False
         if not sealed:
             raise SharedBlockError("the shared memory can be resized by others")
@@ -168,15 +167,15 @@ class SharedBlock:
         self._write_text("description", self._description, value)
 
     def write_status(self, value: Mapping[str, Any]) -> None:
-        """Publish what changes now and then: state, program, reasons, notices."""
+        """Publish what changes occasionally: state, program, reasons, notices."""
         self._write_text("status", self._status, value)
 
     def description(self) -> dict[str, Any]:
-        """Return what was published last, an empty table before that."""
+        """Return the last published description, an empty table before the first."""
         return self._read_text("description", self._description)
 
     def status(self) -> dict[str, Any]:
-        """Return what was published last, an empty table before that."""
+        """Return the last published status, an empty table before the first."""
         return self._read_text("status", self._status)
 
     def _write_text(self, name: str, area: NDArray[np.uint8], value: Mapping[str, Any]) -> None:
@@ -210,11 +209,11 @@ class SharedBlock:
         return self._post("commands", self._commands, value)
 
     def take_command(self) -> dict[str, Any] | None:
-        """Return the next command, None where there is none."""
+        """Return the next command, None if there is none."""
         return self._take("commands", self._commands)
 
     def void_commands(self) -> None:
-        """Have no command that has been queued so far start motion: somebody asks for a stop."""
+        """Prevent all commands queued so far from starting motion, because of a stop request."""
         self.counters["commands_void"][0] = self.counters["commands"][0]
 
     def post_urgent(self, value: Mapping[str, Any]) -> int:
@@ -225,15 +224,15 @@ class SharedBlock:
         return self._post("urgent", self._urgent, value, sign=-1)
 
     def take_urgent(self) -> dict[str, Any] | None:
-        """Return the next stop, None where there is none; its number is negative."""
+        """Return the next stop, None if there is none; its number is negative."""
         return self._take("urgent", self._urgent)
 
     def post_reply(self, value: Mapping[str, Any]) -> int:
-        """Queue a reply. Raises SharedBlockError where nobody takes them."""
+        """Queue a reply. Raises SharedBlockError if nobody takes them."""
         return self._post("replies", self._replies, value)
 
     def take_reply(self) -> dict[str, Any] | None:
-        """Return the next reply, None where there is none."""
+        """Return the next reply, None if there is none."""
         return self._take("replies", self._replies)
 
     def _post(
@@ -272,12 +271,12 @@ class SharedBlock:
 
 
 class RowReader:
-    """Follows the ring of rows from now on; any number of readers, at their own pace."""
+    """Follows the ring of rows from now on; any number of readers, each at its own pace."""
 
     def __init__(self, block: SharedBlock) -> None:
         self._block = block
         self.next = int(block.counters["rows"][0])
-        """Number of the row to be read next."""
+        """Number of the next row to read."""
         self.lost = 0
         """Rows that were overwritten before they were read."""
 
@@ -293,7 +292,7 @@ class RowReader:
         last = min(head, self.next + most)
         numbers = np.arange(self.next, last, dtype=np.int64) % capacity
         rows = block.rows[numbers]
-        # the writer may have come round while they were copied; it may be inside one row
+        # the writer may have overtaken the copy, and may be inside one row
         overwritten = int(block.counters["rows"][0]) - capacity + 1
         stale = min(max(0, overwritten - self.next), rows.size)
         self.lost += stale
@@ -302,7 +301,7 @@ class RowReader:
 
 
 class RowWriter:
-    """Writes rows into the ring; never waits for a reader, overwrites the oldest."""
+    """Writes rows into the ring; never waits for a reader, and overwrites the oldest."""
 
     def __init__(self, block: SharedBlock) -> None:
         self._rows = block.rows

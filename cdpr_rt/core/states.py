@@ -18,16 +18,16 @@ class LoopState(IntEnum):
     ACTIVE = 3
     """The drives have power and a program runs."""
     FAULT = 4
-    """Something ended the motion; it stays until it is acknowledged."""
+    """Something ended the motion; the state lasts until it is acknowledged."""
 
     @property
     def label(self) -> str:
-        """Name in words."""
+        """Name as text."""
         return self.name.lower()
 
 
-CUT_SHORT: Final = "the power was taken at once while the loop was ending"
-"""Reason of a fault: power was taken at once, on a second request, while the loop ended."""
+CUT_SHORT: Final = "the power was removed while the loop was ending"
+"""Reason of a fault: a second request removed the power immediately while the loop ended."""
 
 
 class Transition(IntEnum):
@@ -47,7 +47,7 @@ ALLOWED: Final[dict[Transition, tuple[LoopState, ...]]] = {
     Transition.DISABLE: (LoopState.READY, LoopState.ACTIVE),
     Transition.ACKNOWLEDGE: (LoopState.FAULT,),
 }
-"""The states in which each may be asked for; in all others it is refused."""
+"""The states in which each transition is allowed; in all others it is refused."""
 
 
 class Reaction(IntEnum):
@@ -59,13 +59,13 @@ class Reaction(IntEnum):
     HOLD = 2
     """The set-point stops where it is; the drives keep their power."""
     CONTROLLED_STOP = 3
-    """The motion is braked under its controller, then the power goes."""
+    """The motion is braked under its controller, then the power is removed."""
     QUICK_STOP = 4
-    """The drives brake by themselves (CiA 402 quick stop), then the power goes."""
+    """The drives brake on their own (CiA 402 quick stop), then the power is removed."""
     TORQUE_OFF = 5
-    """Torque and power go at once, brakes are applied."""
+    """Torque and power are removed immediately, brakes are applied."""
 
     @property
     def label(self) -> str:
-        """Name in words."""
+        """Name as text."""
         return self.name.lower().replace("_", " ")

@@ -12,14 +12,15 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
+from cdpr_profiles.bounded_input import replacing
 from cdpr_profiles.drive import Unsigned32
 from cdpr_profiles.errors import ProfileError
-from cdpr_profiles.limits.motor_bounds import MotorBounds
-from cdpr_profiles.reading.reader import read_json_model
+from cdpr_profiles.motor_bounds import MotorBounds
+from cdpr_profiles.reader import read_json_model
 from cdpr_rt.control.compensation import AxisCompensation, FrictionFeedforward
 from cdpr_rt.errors import ControlError
-from cdpr_rt.identification.cogging.result import HarmonicResult
-from cdpr_rt.identification.cogging.thesis import ThesisResult
+from cdpr_rt.identification.result import HarmonicResult
+from cdpr_rt.identification.thesis import ThesisResult
 
 CompensationMethod = Literal["thesis", "better"]
 
@@ -60,7 +61,7 @@ class StoredFriction(_Part):
 
     @property
     def biases_Nm(self) -> tuple[float, float]:
-        """Half the difference between forward and backward: fast, and at standstill."""
+        """Half the difference of forward and backward friction: at speed, and at standstill."""
         coulomb = 0.5 * (self.coulomb_forward_Nm - self.coulomb_backward_Nm)
         stribeck = 0.5 * (self.stribeck_forward_Nm - self.stribeck_backward_Nm)
         return coulomb, coulomb + stribeck
@@ -75,7 +76,7 @@ class StoredFriction(_Part):
 
 
 class StoredHarmonic(_Part):
-    """One order of the cogging; half-widths are of 95 % confidence intervals."""
+    """One order of the cogging; half-widths belong to 95 % confidence intervals."""
 
     order: Annotated[int, Field(gt=0)]
     amplitude_Nm: float
@@ -95,7 +96,7 @@ class StoredMethod(_Part):
     observer_s: Annotated[float, Field(ge=0.0, le=_LONGEST_s)]
 
     def faults(self, bounds: MotorBounds) -> Iterator[tuple[str, str]]:
-        """Yield (key, problem) for what cannot be true of a motor with these bounds."""
+        """Yield (key, problem) for values that are impossible for a motor with these bounds."""
         forward, backward = (max(map(abs, row)) for row in self.table_Nm)
         for i, peak in enumerate((forward, backward)):
             yield from bounds.compensation(f"table_Nm[{i}]", peak)
@@ -115,7 +116,7 @@ class StoredMethod(_Part):
         )
 
     def compensation(self, bounds: MotorBounds) -> AxisCompensation:
-        """Return what an axis' compensation needs."""
+        """Return the compensation of an axis."""
         return AxisCompensation(
             table_Nm=np.array(self.table_Nm, float),
             most_Nm=bounds.compensation_Nm,
@@ -142,19 +143,18 @@ class CoggingProfile(_Part):
     coverage: _Share
     thesis: StoredMethod
     harmonic: StoredMethod = Field(alias="better")
-    """Of the harmonic model; its key in the file is `better`, as it is given to this class."""
+    """Of the harmonic model; its key is `better`, both in the file and for this class."""
 
     def save(self, path: Path) -> None:
-        """Write the profile; a file of that name is replaced at once or not at all."""
-        part = path.with_suffix(path.suffix + ".part")
-        part.write_text(self.model_dump_json(by_alias=True, indent=1) + "\n", encoding="utf-8")
-        part.replace(path)
+        """Write the profile atomically; it replaces a file of that name."""
+        with replacing(path) as file:
+            file.write(self.model_dump_json(by_alias=True, indent=1).encode() + b"\n")
 
     @classmethod
     def load(cls, path: Path) -> CoggingProfile:
         """Read a profile.
 
-        Raises CoggingProfileError naming file, key and value for anything but a sound profile.
+        Raises CoggingProfileError with file, key and value if the profile is not sound.
         """
         try:
             profile = read_json_model(path, cls)
@@ -170,9 +170,9 @@ class CoggingProfile(_Part):
         return profile
 
     def require_true_of(self, bounds: MotorBounds) -> None:
-        """Raise CoggingProfileError where it is of another motor, or cannot be true of this one.
+        """Raise CoggingProfileError if it belongs to another motor, or is impossible for this one.
 
-        The message names key, value and what is allowed.
+        The message gives key, value and allowed values.
         """
         motor = bounds.motor.model
         if motor != self.motor:
@@ -191,10 +191,10 @@ class CoggingProfile(_Part):
     def compensation(
         self, method: CompensationMethod, identity: DriveIdentity, bounds: MotorBounds
     ) -> AxisCompensation:
-        """Return what the axis' compensation needs.
+        """Return the compensation of the axis.
 
-        Raises CoggingProfileError where motor or drive differ from those at commissioning, or where
-        it cannot be true of the motor.
+        Raises CoggingProfileError if motor or drive differ from those at commissioning, or if
+        the profile is impossible for the motor.
         """
         self.require_true_of(bounds)
         for key, mine in self.identity.model_dump().items():
@@ -202,7 +202,7 @@ class CoggingProfile(_Part):
             if other != mine:
                 raise CoggingProfileError(
                     f"the cogging profile is of a drive with {key} = {mine}, "
-                    f"this axis has {other}: commission it anew"
+                    f"this axis has {other}: commission it again"
                 )
         return (self.thesis if method == "thesis" else self.harmonic).compensation(bounds)
 
@@ -212,18 +212,18 @@ OBSERVER_s = 0.003
 
 
 def stored_thesis(result: ThesisResult) -> StoredMethod:
-    """Return the thesis' curves as stored: read off at the encoder's angle, without look-ahead."""
+    """Return the thesis' curves for storage: applied at the encoder's angle, without look-ahead."""
     return _stored(result.tables(TABLE_SAMPLES), result.friction, 0.0, 0.0)
 
 
 def stored_harmonic_model(result: HarmonicResult) -> StoredMethod:
-    """Return the harmonic model's tables, friction and timing as stored."""
+    """Return the harmonic model's tables, friction and timing for storage."""
     ahead = max(0.0, result.latency_s.value)
     return _stored(result.tables(TABLE_SAMPLES), result.friction, ahead, OBSERVER_s)
 
 
 def stored_harmonics(result: HarmonicResult) -> list[StoredHarmonic]:
-    """Return the orders found, as stored."""
+    """Return the identified orders for storage."""
     return [
         StoredHarmonic(
             order=h.order,

@@ -1,7 +1,7 @@
 """Raw measurement files: a JSON line that describes the columns, then rows of float64.
 
-A file is readable at any length: what was written before a crash, a full disk or a copy cut
-short is kept row by row.
+A file is readable at any length: after a crash, a full disk or an incomplete copy, all rows that
+were written remain.
 """
 
 from __future__ import annotations
@@ -9,17 +9,19 @@ from __future__ import annotations
 import json
 from dataclasses import dataclass
 from pathlib import Path
-from typing import IO, Any
+from typing import IO, Any, Final
 
 import numpy as np
 
+from cdpr_profiles.bounded_input import parse_json, read_bytes
 from cdpr_profiles.errors import ProfileError, brief
-from cdpr_profiles.reading.bounded_input import parse_json, read_bytes
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.core.cycle_row import Row
 from cdpr_rt.errors import RawLogError
 
 _FORMAT = "cdpr-rt raw log"
+RAW_LOG: Final = _FORMAT.encode()
+"""At the beginning of each file."""
 _VERSION = 1
 _HEADER_BYTES = 4096
 _MOST_BYTES = 1 << 30
@@ -33,7 +35,7 @@ class RawLog:
     header: dict[str, Any]
     rows: FloatArray
     complete: bool
-    """Whether the file holds as many rows as its writer meant to leave."""
+    """Whether the file holds as many rows as its writer recorded at the end."""
 
     def column(self, name: str, axis: int = 0) -> FloatArray:
         """Return one column, (samples,); raises RawLogError when the file has no such column."""
@@ -46,7 +48,7 @@ class RawLog:
 
 
 class RawLogWriter:
-    """Writes rows to a file as they come; raises RawLogError when the disk does not take them."""
+    """Writes rows to a file as they arrive; raises RawLogError if the disk does not accept them."""
 
     def __init__(self, path: Path, columns: list[str], meta: dict[str, Any]) -> None:
         self.path = path
@@ -83,7 +85,7 @@ class RawLogWriter:
         self._rows += len(rows)
 
     def close(self) -> None:
-        """Note the number of rows in the header and close the file."""
+        """Write the number of rows to the header and close the file."""
         try:
             self._file.seek(0)
             self._write(self._header(self._rows))
@@ -93,9 +95,9 @@ class RawLogWriter:
 
 
 def read_raw_log(path: Path) -> RawLog:
-    """Read a raw log; a last row cut short is dropped.
+    """Read a raw log; drop an incomplete last row.
 
-    Raises RawLogError when the file is missing, is not a raw log, or holds no whole row.
+    Raises RawLogError if the file is missing, is not a raw log, or holds no complete row.
     """
     try:
         data = read_bytes(path, _MOST_BYTES)
@@ -113,7 +115,7 @@ def read_raw_log(path: Path) -> RawLog:
     samples = (len(data) - _HEADER_BYTES) // (8 * len(columns))
     if samples == 0:
         raise RawLogError(f"{path}: holds no whole row of measurements")
-    # in place: a sweep's file is large, and so is what is computed from it
+    # without a copy: a sweep's file is large, and so are the arrays computed from it
     values = np.frombuffer(data, "<f8", samples * len(columns), offset=_HEADER_BYTES)
     rows = values.reshape(samples, len(columns))
     return RawLog(path, header, rows, complete=header.get("rows") == samples)
@@ -140,7 +142,7 @@ def column_names(n: int) -> list[str]:
 
 
 def raw_rows(rows: Row) -> FloatArray:
-    """Return the rows of cycles (samples,) as those of a raw log, (samples, columns)."""
+    """Return the rows of cycles (samples,) as rows of a raw log, (samples, columns)."""
     n, width = rows["position_rad"].shape[1], len(AXIS_COLUMNS)
     raw = np.empty((len(rows), 2 + n * width))
     raw[:, 0], raw[:, 1] = rows["cycle"], rows["time_s"]

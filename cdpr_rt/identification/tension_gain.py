@@ -9,34 +9,34 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 
-from cdpr_profiles.limits.motor_bounds import MOST_GAIN_ERROR
+from cdpr_profiles.motor_bounds import MOST_GAIN_ERROR
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.errors import ControlError
-from cdpr_rt.identification.confidence import ConfidenceInterval
+from cdpr_rt.identification.result import ConfidenceInterval
 
 CONFIDENCE = 0.95
 MOST_UNCERTAINTY = 0.05
-"""Relative half-width of the gain beyond which a calibration is refused."""
+"""Relative half-width of the gain above which a calibration is rejected."""
 LEAST_LEVELS = 3
-"""Different tensions that are needed each way."""
+"""Least number of different tensions in each direction."""
 LEAST_SPAN = 2.0
-"""Highest tension over the lowest."""
+"""Least ratio of the highest to the lowest tension."""
 
 
 class CalibrationRefusedError(ControlError):
-    """The measurements do not support a calibration; the message says why and what would help."""
+    """The measurements do not support a calibration; the message says why and what helps."""
 
 
 @dataclass(frozen=True)
 class TorquePoint:
-    """The winding torque at one tension while the winch moved in one direction, or came from it."""
+    """The winding torque at one tension, while or after the winch moved in one direction."""
 
     tension_N: float
     torque_Nm: float
-    """Positive where it winds the cable in."""
+    """Positive if it winds the cable in."""
     winding_in: bool
     angle_rad: float = math.nan
-    """Motor angle, where the torque was measured at one and not over whole turns."""
+    """Motor angle if the torque was measured at one angle; nan if over whole turns."""
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,7 @@ class TensionGain:
     friction_per_N_m: ConfidenceInterval
     residual_rms_Nm: float
     cogging_Nm: float
-    """Amplitude of the order that was fitted along with it, 0 where none was."""
+    """Amplitude of the cogging order that was also fitted, 0 without."""
     lowest_N: float
     highest_N: float
 
@@ -60,10 +60,10 @@ def identify_tension_gain(
     """Fit both directions' lines through the points by least squares.
 
     The mean of the two slopes is the gain K_t by which tensions become torques (Tremblay, section
-    3.6.2, after eq. (3.80)); half their difference is the part of friction that grows with
-    tension, half the difference of the intercepts the part that does not. Friction that differs
-    with direction goes into the bias and leaves the gain alone. With `cogging_order`, cogging of
-    that many periods per motor turn is fitted too, and the points are taken as a time series
+    3.6.2, after eq. (3.80)). Half their difference is the part of friction that grows with
+    tension; half the difference of the intercepts is the constant part. Friction that differs
+    between directions changes the bias, not the gain. With `cogging_order`, cogging of this
+    number of periods per motor turn is fitted too, and the points are treated as a time series
     with correlated errors. Raises CalibrationRefusedError.
     """
     _refuse_few(points)

@@ -1,4 +1,4 @@
-"""A platform's target as a hand moves it, within the workspace and the way it takes to stop."""
+"""A platform's target that follows a hand, within the workspace and the braking distance."""
 
 from __future__ import annotations
 
@@ -6,12 +6,50 @@ import math
 
 from cdpr_rt.arrays import FloatArray, IntArray
 from cdpr_rt.jit import jit
-from cdpr_rt.motion.rotations import multiply, to_quaternion, to_rotation_vector
+
+# Rotation vectors and unit quaternions (w x y z), compiled.
+
+_SMALL_rad = 1e-9
+
+
+@jit
+def to_quaternion(phi: FloatArray, q: FloatArray) -> None:
+    """Write the quaternion `q` (4,) of the rotation by the vector `phi` (3,), rad."""
+    angle = math.sqrt(phi[0] ** 2 + phi[1] ** 2 + phi[2] ** 2)
+    share = math.sin(0.5 * angle) / angle if angle > _SMALL_rad else 0.5
+    q[0] = math.cos(0.5 * angle)
+    for i in range(3):
+        q[1 + i] = share * phi[i]
+
+
+@jit
+def to_rotation_vector(q: FloatArray, phi: FloatArray) -> None:
+    """Write the rotation vector `phi` (3,), rad, up to π long, of the quaternion `q` (4,)."""
+    size = math.sqrt(q[1] ** 2 + q[2] ** 2 + q[3] ** 2)
+    sign = 1.0 if q[0] >= 0.0 else -1.0
+    share = 2.0
+    if size > _SMALL_rad:
+        share = 2.0 * math.atan2(size, sign * q[0]) / size
+    for i in range(3):
+        phi[i] = sign * share * q[1 + i]
+
+
+@jit
+def multiply(p: FloatArray, q: FloatArray, inverted: bool, out: FloatArray) -> None:
+    """Write p q, or with `inverted` p q*, into `out` (4,), which is neither: first q, then p."""
+    w, x, y, z = q[0], q[1], q[2], q[3]
+    if inverted:
+        x, y, z = -x, -y, -z
+    out[0] = p[0] * w - p[1] * x - p[2] * y - p[3] * z
+    out[1] = p[0] * x + p[1] * w + p[2] * z - p[3] * y
+    out[2] = p[0] * y - p[1] * z + p[2] * w + p[3] * x
+    out[3] = p[0] * z + p[1] * y - p[2] * x + p[3] * w
+
 
 FREE, AT_EDGE, ON_STAND = 0, 1, 2
-"""Reason why a target does not follow the hand."""
+"""Reasons why a target does not follow the hand."""
 LEAD_S = 0.3
-"""Longest time for which a platform that is slower than the hand may run on after it."""
+"""Longest time for which a platform slower than the hand may continue after the hand stops."""
 _BELOW_m = 1e-3
 
 
@@ -25,7 +63,7 @@ def _turn(
     scratch: FloatArray,
     goal: FloatArray,
 ) -> None:
-    """Write the target's rotation, turned as the hand was about the room's axes `about`."""
+    """Write the target's rotation, turned like the hand about the room's axes `about`."""
     delta, vector, here, there = scratch[0], scratch[1], scratch[2], scratch[3]
     multiply(pose[3:], last[3:], True, delta)
     to_rotation_vector(delta, here[:3])
@@ -43,7 +81,7 @@ def _turn(
 
 @jit
 def _limit_turn(k: int, angle: float, target: FloatArray, goal: FloatArray) -> int:
-    """Keep the rotation vector in `goal` within `angle`, or what it is beyond that already."""
+    """Limit the rotation vector in `goal` to `angle`, or to the target's if that is larger."""
     turned = had = 0.0
     for i in range(k, goal.size):
         turned += goal[i] ** 2
@@ -72,11 +110,11 @@ def lead(
     scratch: FloatArray,
     goal: FloatArray,
 ) -> int:
-    """Write into `goal` the target (d,) moved as the hand was since `last`; return what limits it.
+    """Write into `goal` the target (d,) moved with the hand since `last`; return what limits it.
 
     The coordinates (k,) move by `scale` times the hand's displacement, within the box from `low` to
     `high`; the rotation vector (d - k,) turns with it, within `angle`. `pose` and `last` are the
-    hand's poses (7,), the last one is overwritten; `about` (d - k,) which axes are turned about;
+    hand's poses (7,); `last` is overwritten. `about` (d - k,) are the axes of rotation.
     `scratch` (4, 4) is overwritten.
     """
     k, up, edge = low.size, low.size - 1, FREE
@@ -87,7 +125,7 @@ def lead(
         _turn(k, about, pose, last, target, scratch, goal)
     for i in range(k):
         moved = scale * (pose[i] - last[i])
-        # on its stand the platform is not dragged sideways
+        # do not drag the platform sideways on its stand
         if stands and i != up:
             edge = ON_STAND if moved != 0.0 else edge
             moved = 0.0
@@ -99,7 +137,7 @@ def lead(
         reach = speed[i] * (0.5 * speed[i] / acceleration[i] + LEAD_S)
         goal[i] = min(max(goal[i], position[i] - reach), position[i] + reach)
     for i in range(k):
-        # outside the box, as the stand may be, it is not pulled into it
+        # do not pull it into the box if it is outside, for example on its stand
         least, most = min(low[i], target[i]), max(high[i], target[i])
         if goal[i] < least or goal[i] > most:
             edge = max(edge, AT_EDGE)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import Protocol
 
@@ -24,7 +25,7 @@ def _fill(
     t: float,
 ) -> None:
     end = cruise_s + 2.0 * ramp_s
-    # travelled and shape are in units of the cruising velocity: one profile serves all axes
+    # `travelled` and `shape` are in units of the cruising velocity, so one profile serves all axes
     if t <= 0.0:
         travelled, shape, slope = 0.0, 0.0, 0.0
     elif t < ramp_s:
@@ -52,14 +53,14 @@ class Motion(Protocol):
         """Write the set-point at `time_s` after the start."""
 
     def brake(self, time_s: float) -> Motion:
-        """Return the motion whose second half stops from the state at `time_s`; skip its first."""
+        """Return a motion whose second half stops from the state at `time_s`; skip the first."""
 
 
 class TrapezoidalMove:
     """A move of n axes at constant velocity, with a linear velocity ramp before and after.
 
     Parameters: `start_rad` (n,) and `velocity_rad_s` (n,), signed; `cruise_s` seconds at full
-    velocity; `ramp_s` seconds for each ramp, positive; `settle_s` for which it stays at its end.
+    velocity; `ramp_s` seconds for each ramp, positive; `settle_s` seconds of rest at the end.
     """
 
     def __init__(
@@ -88,11 +89,11 @@ class TrapezoidalMove:
         return bound(_fill, *own, *setpoint.arrays, then=(0.0,))
 
     def end_rad(self) -> FloatArray:
-        """Return where the move ends, (n,)."""
+        """Return the final position, (n,)."""
         return self.start_rad + self.velocity_rad_s * (self.cruise_s + self.ramp_s)
 
     def brake(self, time_s: float) -> TrapezoidalMove:
-        """Return the move whose second ramp, from `ramp_s` on, stops the motion at `time_s`."""
+        """Return a move whose second ramp, from `ramp_s` on, stops the motion at `time_s`."""
         now = Setpoint(self.start_rad.size)
         self.fill(time_s, now)
         start = now.position_rad - 0.5 * self.ramp_s * now.velocity_rad_s
@@ -105,3 +106,121 @@ class Hold(TrapezoidalMove):
     def __init__(self, position_rad: FloatArray, duration_s: float) -> None:
         half = 0.5 * duration_s
         super().__init__(position_rad, np.zeros_like(np.asarray(position_rad, float)), 0.0, half)
+
+
+# Trapezoidal set-points that are planned again in every cycle. Speed and acceleration keep their
+# bounds even if the target changes at any time. The velocity changes linearly within a
+# cycle, so that the position is its exact integral.
+
+_EXACT = 1e-11
+_STEEPNESS, _MOST_STEEP = 8.0, 50.0
+
+
+@jit
+def approach(
+    target: FloatArray,
+    speed: FloatArray,
+    acceleration: FloatArray,
+    period: float,
+    position: FloatArray,
+    velocity: FloatArray,
+    slope: FloatArray,
+) -> bool:
+    """Advance one cycle towards `target`, to stop there; return whether all have stopped there.
+
+    The trapezoidal profile of Tremblay (thesis), eq. (2.10) to (2.12), for each axis alone, with
+    the stopping distance of whole cycles: nothing overshoots, unless the target moves nearer
+    than that. All arrays are (n,): bounds `speed` and `acceleration` are positive, `position` and
+    `velocity` are updated in place, `slope` is the acceleration of this cycle.
+    """
+    arrived = True
+    for i in range(target.size):
+        v = velocity[i]
+        step = acceleration[i] * period
+        left = target[i] - position[i]
+        close = _EXACT * (1.0 + abs(target[i]))
+        if abs(left) < close and abs(v) * period < close:
+            position[i] = target[i]
+            velocity[i] = 0.0
+            slope[i] = 0.0
+            continue
+        arrived = False
+        # the distance that remains after this cycle's share of the present velocity
+        rest = left - 0.5 * v * period
+        goal = 0.0
+        if math.isfinite(rest):
+            # k cycles of full deceleration from k·step cover k·(k + 1)/2 times step·period
+            share = abs(rest) / (step * period)
+            k = max(1.0, math.ceil(0.5 * (math.sqrt(1.0 + 8.0 * share) - 1.0)))
+            goal = min(abs(rest) / (k * period) + 0.5 * step * (k - 1.0), speed[i])
+            if rest < 0.0:
+                goal = -goal
+        new = min(max(goal, v - step), v + step)
+        position[i] += 0.5 * (v + new) * period
+        velocity[i] = new
+        slope[i] = (new - v) / period
+    return arrived
+
+
+@jit
+def ramp_velocity(
+    target_velocity: FloatArray,
+    acceleration: FloatArray,
+    period: float,
+    position: FloatArray,
+    velocity: FloatArray,
+    slope: FloatArray,
+) -> bool:
+    """Ramp the velocity to `target_velocity` for one cycle; return whether all stand still.
+
+    All arrays are (n,), as for `approach`.
+    """
+    at_rest = True
+    for i in range(target_velocity.size):
+        v = velocity[i]
+        step = acceleration[i] * period
+        new = min(max(target_velocity[i], v - step), v + step)
+        position[i] += 0.5 * (v + new) * period
+        velocity[i] = new
+        slope[i] = (new - v) / period
+        at_rest = at_rest and new == 0.0 and v == 0.0
+    return at_rest
+
+
+@jit
+def soft_deadband(
+    target: FloatArray,
+    position: FloatArray,
+    scale: FloatArray,
+    weight: float,
+    threshold_m: float,
+    goal: FloatArray,
+) -> float:
+    """Write a goal between position and target: a dead band with soft edges and hysteresis.
+
+    goal = position + w·(target - position), with the two sigmoids of Tremblay (thesis), fig. 2.3:
+    w rises around the distance `threshold_m` while at rest, and around a tenth of it while moving.
+    Arrays are (n,); `scale` is how many metres each entry counts for. Returns w, the `weight` of
+    the next cycle.
+    """
+    size = 0.0
+    for i in range(target.size):
+        size += (scale[i] * (target[i] - position[i])) ** 2
+    size = math.sqrt(size)
+    threshold = threshold_m * (1.0 - 0.9 * weight)
+    weight = 1.0 / (1.0 + math.exp(max(-_STEEPNESS * (size / threshold - 1.0), -_MOST_STEEP)))
+    for i in range(target.size):
+        goal[i] = position[i] + weight * (target[i] - position[i])
+    return weight
+
+
+@jit
+def stopping_position(
+    position: FloatArray, velocity: FloatArray, acceleration: FloatArray, rest: FloatArray
+) -> None:
+    """Write the positions where full deceleration from now on ends; all are (n,).
+
+    rest = position + velocity·|velocity| / (2·acceleration)
+    """
+    for i in range(rest.size):
+        rest[i] = position[i] + 0.5 * velocity[i] * abs(velocity[i]) / acceleration[i]

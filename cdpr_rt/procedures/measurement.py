@@ -6,17 +6,23 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
 from cdpr_rt.arrays import BoolArray, FloatArray
 from cdpr_rt.control.base import Controller
 from cdpr_rt.errors import RawLogError
-from cdpr_rt.identification.cogging.sweep import SweepData
 from cdpr_rt.identification.rawlog import RawLog, RawLogWriter, column_names
+from cdpr_rt.identification.windows import SweepData
+from cdpr_rt.loop.operating import Operator
 from cdpr_rt.motion.trajectory import TrapezoidalMove
-from cdpr_rt.runtime.operating import Operator
+
+Index = Literal["homing", "probe"]
+"""How the encoder index is found: by homing, or by the touch probe during ordinary motion."""
+
+# the rotor trails the set-point by friction over gain; both directions' trail fits in here
+SWEEP_LEAD_IN_RAD = math.radians(30.0)
 
 
 @dataclass(frozen=True)

@@ -4,25 +4,102 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Final
+
+import numpy as np
 
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.control.base import Controller
 from cdpr_rt.core.exchange import AxisFeedback, Setpoint
-from cdpr_rt.programs.arguments import CommandArguments, ProgramError
+from cdpr_rt.errors import ControlError
+from cdpr_rt.jit import jit
+from cdpr_rt.refusal import CommandRefusal, RefusalCode, shown
+
+# Arguments of a command to a program: typed, bounded, rejected with a message.
+
+
+class ProgramError(ControlError):
+    """A command that a program refuses; the message names the key and value."""
+
+
+class CommandArguments:
+    """The keys and values that came with a command; raises ProgramError for keys not `allowed`."""
+
+    def __init__(self, program: str, arguments: Mapping[str, Any], allowed: Sequence[str]) -> None:
+        self._program = program
+        self._arguments = arguments
+        for key in arguments:
+            if key not in allowed:
+                words = ", ".join(allowed) if allowed else "none: it takes no set-point"
+                raise ProgramError(f"{program}: key {shown(key)}; allowed: {words}")
+
+    def __contains__(self, key: str) -> bool:
+        return key in self._arguments
+
+    def one_of(self, *keys: str) -> str:
+        """Return which one of the keys was given; raises ProgramError for none or several."""
+        given = [key for key in keys if key in self._arguments]
+        if len(given) != 1:
+            found = " and ".join(given) if given else "none of them"
+            raise ProgramError(f"{self._program}: {found}; allowed: one of {', '.join(keys)}")
+        return given[0]
+
+    def number(self, key: str, low: float, high: float, default: float) -> float:
+        """Return a number from `low` to `high`, the default if none was given."""
+        value = self._arguments.get(key, default)
+        return self._checked(key, None, value, low, high)
+
+    def whole(self, key: str, low: int, high: int, default: int) -> int:
+        """Return a whole number from `low` to `high`, the default if none was given."""
+        value = self.number(key, low, high, default)
+        if value != round(value):
+            raise self._refused(key, value, f"a whole number from {low} to {high}")
+        return round(value)
+
+    def axes(
+        self, key: str, limit: FloatArray, optional: bool = False, each: str = "an axis"
+    ) -> FloatArray:
+        """Return one number per axis, (n,), of magnitude up to `limit` (n,).
+
+        With `optional` an axis may have no number (null), which is nan in the result. `each` is the
+        text for a refusal that says what the numbers are for, unless they are for axes.
+        """
+        value = self._arguments.get(key)
+        if not isinstance(value, Sequence) or isinstance(value, str) or len(value) != limit.size:
+            raise self._refused(key, value, f"a list of {limit.size}, one number {each}")
+        numbers = np.full(limit.size, math.nan)
+        for i, entry in enumerate(value):
+            if entry is not None or not optional:
+                high = float(limit[i])
+                numbers[i] = self._checked(key, i, entry, -high, high)
+        return numbers
+
+    def _checked(self, key: str, index: int | None, value: Any, low: float, high: float) -> float:
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            entry = key if index is None else f"{key}[{index}]"
+            raise self._refused(entry, value, f"a number from {low:g} to {high:g}")
+        if not low <= value <= high:  # this also rejects nan
+            bounds = {"index": index, "low": low, "high": high}
+            code = RefusalCode.OUT_OF_RANGE
+            raise ProgramError(CommandRefusal(code, self._program, {key: value}, bounds))
+        return float(value)
+
+    def _refused(self, key: str, value: Any, allowed: str) -> ProgramError:
+        return ProgramError(f"{self._program}: {key}: value {shown(value)}; allowed: {allowed}")
+
 
 REST_S: Final = 5.0
-"""The longest that a set-point within its bounds takes to come to rest."""
+"""The longest time that a set-point within its bounds takes to come to rest."""
 
 
 class Program(ABC):
     """A set-point over time and the controller that follows it.
 
     One program runs at a time. The next one goes on from the set-point and the torque that the
-    last one left, so that neither steps. `update` allocates nothing, does no I/O and knows no
-    clock: time passes by one period a call. What is not abstract is that of a program without
-    arguments, platform and stream.
+    last one left, so that neither steps. `update` allocates nothing, does no I/O and reads no
+    clock: time advances by one period per call. The methods that are not abstract suit a program
+    without arguments, platform and stream.
     """
 
     name: str
@@ -38,15 +115,15 @@ class Program(ABC):
     def preparation(self, _arguments: Mapping[str, Any]) -> Callable[[], None] | None:
         """Return the preparation of a command with these arguments, None for nothing.
 
-        It may take its time, as reading a file does, and is called in another thread; what it
-        raises refuses the command.
+        It may take long, for example to read a file, and is called in another thread. If it raises,
+        the command is refused.
         """
         return None
 
     def check(self, arguments: Mapping[str, Any]) -> Any:
         """Return checked arguments for `apply`; raises ProgramError, and changes nothing.
 
-        The program need not run.
+        The program need not be running.
         """
         return CommandArguments(self.name, arguments, ())
 
@@ -77,22 +154,22 @@ class Program(ABC):
 
     @property
     def pose(self) -> FloatArray | None:
-        """Pose of the platform as this program knows it, (7,), None where it knows none."""
+        """Pose of the platform as this program knows it, (7,), None if unknown."""
         return None
 
     @property
     def pose_setpoint(self) -> FloatArray | None:
-        """Pose where the platform is to be, (7,), None where it does not say."""
+        """Commanded pose of the platform, (7,), None if the program commands none."""
         return None
 
     @property
     def stream_age_s(self) -> float:
-        """Age of the newest sample that it follows, s, nan where it follows none."""
+        """Age of the newest sample that it follows, s, nan if it follows none."""
         return math.nan
 
     @property
     def stream_buttons(self) -> int:
-        """Buttons of the sample that it plays, 0 where it follows none."""
+        """Buttons of the sample that it plays, 0 if it follows none."""
         return 0
 
     def progress(self) -> dict[str, Any]:
@@ -118,7 +195,7 @@ class CommandedProgram(Program):
         """Check a command and apply it; raises ProgramError and changes nothing then."""
         checked = self.check(arguments)
         if self._stopping:
-            raise ProgramError(f"{self.name}: it is being stopped; start it anew")
+            raise ProgramError(f"{self.name}: it is being stopped; start it again")
         self.apply(checked)
 
     def stop(self) -> None:
@@ -132,4 +209,51 @@ class CommandedProgram(Program):
         return self._at_rest
 
     def _apply(self, _checked: Any) -> None:
-        """Do what a command's checked arguments ask for."""
+        """Carry out a command with checked arguments."""
+
+
+# Bumpless transfer to a controller without an integral part.
+
+_FADE_S = 0.2
+
+
+@jit
+def _fade(
+    difference: FloatArray, share: float, first: bool, limit: FloatArray, torque: FloatArray
+) -> None:
+    for i in range(torque.size):
+        if first:
+            difference[i] -= torque[i]
+        torque[i] = min(max(torque[i] + share * difference[i], -limit[i]), limit[i])
+
+
+class BumplessTransfer:
+    """Adds to a controller's torque the difference to the last one's, faded out over 0.2 s.
+
+    torque = u + s·(torque_0 - u_0), s from 1 to 0; `limit_Nm` (n,) bounds the sum.
+    """
+
+    def __init__(self, controller: Controller, limit_Nm: FloatArray, period_s: float) -> None:
+        self.controller = controller
+        self._limit = np.array(limit_Nm, float)
+        self._difference = np.zeros_like(self._limit)
+        self._cycles = max(1, round(_FADE_S / period_s))
+        self._cycle = 0
+
+    def take_over(self, _feedback: AxisFeedback, torque_Nm: FloatArray) -> None:
+        """Begin with the torques (n,) of the last cycle."""
+        self.controller.reset()
+        self._difference[:] = torque_Nm
+        self._cycle = 0
+
+    def update(self, feedback: AxisFeedback, setpoint: Setpoint, torque_Nm: FloatArray) -> None:
+        """Write the torques of this cycle, (n,)."""
+        self.controller.update(feedback, setpoint, torque_Nm)
+        share = 1.0 - self._cycle / self._cycles
+        _fade(self._difference, share, self._cycle == 0, self._limit, torque_Nm)
+        self._cycle = min(self._cycle + 1, self._cycles)
+
+    @property
+    def done(self) -> bool:
+        """Whether the difference has faded out completely."""
+        return self._cycle >= self._cycles

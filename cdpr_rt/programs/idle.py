@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from cdpr_rt.arrays import FloatArray
-from cdpr_rt.control.base import Idle
+from cdpr_rt.control.base import Controller, Idle
 from cdpr_rt.core.exchange import AxisFeedback, Setpoint
 from cdpr_rt.jit import jit
-from cdpr_rt.programs.base import Program
-from cdpr_rt.programs.bumpless_transfer import BumplessTransfer
+from cdpr_rt.programs.base import BumplessTransfer, Program
 from cdpr_rt.programs.model import AxesModel
 
 _FILTER_S = 0.01
@@ -33,7 +32,7 @@ def _track_axes(
 class IdleProgram(Program):
     """Fades the torque out; the set-point tracks the axes' angles and filtered speeds.
 
-    The program that comes next thus begins at the speed at which an axis turns.
+    The next program thus begins at the speed at which an axis turns.
     """
 
     name = "idle"
@@ -64,9 +63,42 @@ class IdleProgram(Program):
         self._loop.update(feedback, setpoint, torque_Nm)
 
     def stop(self) -> None:
-        """Nothing is to be braked."""
+        """Do nothing: there is nothing to brake."""
 
     @property
     def at_rest(self) -> bool:
         """Whether no torque is left."""
         return self._loop.done
+
+
+# Zero torque immediately, without a fade.
+
+
+class ZeroTorqueProgram(Program):
+    """Commands zero torque from its first cycle on; for bare rotors, and cables made fast.
+
+    It serves as `idle`, and as `hold` if there is nothing to hold.
+    """
+
+    name = "idle"
+    needs_lease = False
+
+    def __init__(self, n: int) -> None:
+        self.controller: Controller = Idle(n)
+
+    def start(self, _feedback: AxisFeedback, _setpoint: Setpoint, _torque_Nm: FloatArray) -> None:
+        """Take over nothing."""
+
+    def update(self, feedback: AxisFeedback, setpoint: Setpoint, torque_Nm: FloatArray) -> None:
+        """Write no torques (n,), and the axes' own angles as the set-point."""
+        setpoint.position_rad[:] = feedback.position_rad
+        setpoint.velocity_rad_s[:] = setpoint.acceleration_rad_s2[:] = 0.0
+        self.controller.update(feedback, setpoint, torque_Nm)
+
+    def stop(self) -> None:
+        """Do nothing: there is nothing to brake."""
+
+    @property
+    def at_rest(self) -> bool:
+        """Always true: nothing is left to do."""
+        return True

@@ -12,37 +12,37 @@ from cdpr_rt.arrays import FloatArray
 from cdpr_rt.control.compensation import AxisCompensation
 from cdpr_rt.control.pid import PidGains
 from cdpr_rt.control.tuning import PidDesign, standstill_gains, stiffest_pid, sweep_gain
-from cdpr_rt.core.supervision.limits import Limits
+from cdpr_rt.core.supervisor import Limits
 
 BANDWIDTHS_Hz = (30.0, 25.0, 20.0, 15.0, 12.0, 10.0, 8.0, 6.0, 5.0, 4.0, 3.0, 2.0, 1.0, 0.5)
-"""Bandwidths of the position loops that are tried, the stiffest first."""
+"""Bandwidths that are tried for the position loops, the stiffest first."""
 CABLE_ACCELERATION_M_S2 = 1.0
 """Acceleration of cable set-points."""
 SETPOINT_SPEED_SHARE = 0.8
-"""Fastest set-point over the supervisor's speed limit: axes overshoot their set-points."""
+"""Fastest set-point over the supervisor's speed limit, because axes overshoot set-points."""
 FOLLOWING_SHARE = 0.2
-"""Rate of a following axis' quicker integral over kp/kd, the corner of its loop."""
+"""Rate of the quicker integral of a following axis over kp/kd, the corner of its loop."""
 
 
 @dataclass(frozen=True)
 class AxesModel:
-    """Bounds and gains of a robot's axes as arrays (n,), and what holds for all, motor side."""
+    """Bounds and gains of a robot's axes as arrays (n,), on the motor side, and common values."""
 
     period_s: float
     torque_Nm: FloatArray
-    """The most that the controllers may command."""
+    """The highest torque that the controllers may command."""
     speed_rad_s: FloatArray
-    """The fastest that a set-point moves."""
+    """The highest speed of a set-point."""
     acceleration_rad_s2: FloatArray
-    """The most by which its speed changes."""
+    """The highest acceleration of a set-point."""
     cable_m_per_rad: FloatArray
     """Cable paid out per radian, with its sign."""
     gains: tuple[PidGains, ...]
-    """Gains of the position loops, one an axis."""
+    """Gains of the position loops, one per axis."""
     sweep_gain_Nm_rad: FloatArray
     """Gain of the cogging sweep's proportional controller, (n,)."""
     compensation: tuple[AxisCompensation | None, ...] = ()
-    """Cogging and friction of each motor where they are known; empty where none is."""
+    """Cogging and friction of each motor, None if unknown; empty if all are unknown."""
 
     @property
     def n(self) -> int:
@@ -53,7 +53,7 @@ class AxesModel:
 def position_loop(inertia_kg_m2: float, latency_s: float, period_s: float) -> PidDesign:
     """Return the position loop of a bare rotor; raises TuningError.
 
-    The margins are those of an axis that stands. While it follows a set-point its integral is
+    The margins are those of an axis at rest. While it follows a set-point its integral is
     quicker by `FOLLOWING_SHARE`.
     """
     design = stiffest_pid(inertia_kg_m2, latency_s, BANDWIDTHS_Hz, period_s)
@@ -73,8 +73,8 @@ def model_of(
     """Return the model of axes whose loops are as stiff as the latency of each allows.
 
     `latency_s` (n,) is from the instant an angle was true to the middle of the cycle in which its
-    torque acts; `compensation` (n,) or empty what is known of each motor. The loops are those of
-    the bare rotors. Raises TuningError where a latency is too long for any loop.
+    torque acts; `compensation` (n,), or empty, is what is known of each motor. The loops are those
+    of the bare rotors. Raises TuningError if a latency is too long for any loop.
     """
     cable = np.array([axis.winch.cable_m_per_motor_rad for axis in axes])
     inertia = [axis.winch.motor.rotor_inertia_kg_m2 for axis in axes]

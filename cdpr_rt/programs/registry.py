@@ -10,24 +10,24 @@ from cdpr_rt.control.compensation import Compensation
 from cdpr_rt.core.estimate import Estimator
 from cdpr_rt.core.exchange import AxisFeedback, Setpoint
 from cdpr_rt.core.shared_block import SharedBlock
-from cdpr_rt.core.supervision.limits import Limits
+from cdpr_rt.core.supervisor import Limits
+from cdpr_rt.model.platform_model import platform_model_of
 from cdpr_rt.motion.pose_stream import PoseStream
-from cdpr_rt.programs.axes.axis_program import AxisProgram
-from cdpr_rt.programs.axes.follow import FollowProgram
-from cdpr_rt.programs.axes.jog import JogProgram
-from cdpr_rt.programs.axes.pid import PidProgram
-from cdpr_rt.programs.axes.position_loop import PositionLoop
-from cdpr_rt.programs.axes.sweep import SweepProgram
+from cdpr_rt.platform.cable_control import CableControl
+from cdpr_rt.programs.axis_program import AxisProgram, PositionLoop
 from cdpr_rt.programs.base import Program
+from cdpr_rt.programs.follow import FollowProgram
 from cdpr_rt.programs.idle import IdleProgram
+from cdpr_rt.programs.jog import JogProgram
+from cdpr_rt.programs.lower import LowerProgram
 from cdpr_rt.programs.model import AxesModel
-from cdpr_rt.programs.platform.lower import LowerProgram
-from cdpr_rt.programs.platform.paths.path import PathProgram
-from cdpr_rt.programs.platform.platform_axes import PlatformHold, PlatformIdle, PlatformJog
-from cdpr_rt.programs.platform.platform_program import PlatformParts
-from cdpr_rt.programs.platform.pose import PoseProgram
-from cdpr_rt.programs.platform.tightening.tighten import TightenProgram
-from cdpr_rt.robots.selection import platform_of
+from cdpr_rt.programs.path import PathProgram
+from cdpr_rt.programs.pid import PidProgram
+from cdpr_rt.programs.platform_axes import PlatformHold, PlatformIdle, PlatformJog
+from cdpr_rt.programs.platform_program import PlatformParts
+from cdpr_rt.programs.pose import PoseProgram
+from cdpr_rt.programs.sweep import SweepProgram
+from cdpr_rt.programs.tighten import TightenProgram
 
 _WARM_UP_CYCLES = 5
 
@@ -37,15 +37,18 @@ def platform_parts(
 ) -> PlatformParts | None:
     """Return the shared parts of a platform's programs; None without a platform.
 
-    `learns`: of motors that were not commissioned, friction and cogging are learnt in motion.
-    Raises GeometryError where its tensions have no bounds to hold it by.
+    `learns`: learn friction and cogging of motors in motion that were not commissioned.
+    Raises GeometryError if its tensions have no bounds to hold it with.
     """
     if robot.platform is None:
         return None
     known = None
     if any(axis is not None for axis in model.compensation):
         known = Compensation(list(model.compensation), model.period_s)
-    of_platform, control = platform_of(robot, limits, model.torque_Nm, known, learns=learns)
+    of_platform = platform_model_of(robot, limits)
+    control = CableControl(
+        of_platform, robot.axes, model.torque_Nm, robot.sync_period_s, known, learns=learns
+    )
     names = [axis.name for axis in robot.axes]
     return PlatformParts(
         of_platform, control, estimator, model.period_s, known, limits.lengths_disagree_m, names
@@ -57,7 +60,7 @@ def build_programs(
 ) -> dict[str, Program]:
     """Return a robot's programs by name, in the order of their numbers in its description.
 
-    `block` is where the set-point stream comes from, `parts` is of a robot whose platform is moved.
+    `block` has the set-point stream; `parts` are given if the robot's platform is moved.
     """
     loop = PositionLoop(model)
     stream = PoseStream(block, model.period_s)

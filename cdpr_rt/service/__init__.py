@@ -1,1 +1,1 @@
-"""Service: the control loop's interfaces to people and programs, in a process of its own."""
+"""Service: the control loop's interfaces to people and programs, in a separate process."""

@@ -1,4 +1,4 @@
-"""The right to move: one client at a time holds it, and loses it by silence."""
+"""The right to move: one client at a time holds it, and loses it if it is silent."""
 
 from __future__ import annotations
 
@@ -11,18 +11,18 @@ from dataclasses import dataclass
 from typing import Final
 
 from cdpr_rt.errors import ControlError
-from cdpr_rt.runtime.right import LONGEST_S, PublishedRight
+from cdpr_rt.loop.right import LONGEST_S, PublishedRight
 
 SHORTEST_S: Final = 0.2
 
 
 class LeaseError(ControlError):
-    """The right to move is not this client's; the message says whose it is."""
+    """The right to move is not this client's; the message names the holder."""
 
 
 @dataclass(frozen=True)
 class Holder:
-    """Who may move, and for how long without another sign of life."""
+    """Holder of the right to move, and how long it may stay silent."""
 
     client: str
     left_s: float
@@ -33,16 +33,16 @@ class LeaseRenewal:
     """Renewal of a lease."""
 
     number: int
-    """Number of the grant; commands with it count under this grant only."""
+    """Number of the grant; commands with it are valid under this grant only."""
     ttl_s: float
 
 
 class Lease:
     """Given to one client under a token; any thread may use it.
 
-    `right` tells the loop the number of the grant and the instant (CLOCK_MONOTONIC) until which it
-    holds. The loop compares that instant with its own clock: it needs nobody to tell it that the
-    holder, or this whole process, has fallen silent.
+    `right` gives the loop the number of the grant and its expiry (CLOCK_MONOTONIC). The loop
+    compares the expiry with its own clock, so it notices without a message that the holder, or
+    this whole process, has fallen silent.
     """
 
     def __init__(
@@ -58,7 +58,7 @@ class Lease:
     def take(self, client: str, ttl_s: float) -> str:
         """Give the right to `client` for `ttl_s` at a time; return the token that renews it.
 
-        Raises LeaseError where another holds it, whatever it calls itself.
+        Raises LeaseError if another client holds it, even under the same name.
         """
         if not SHORTEST_S <= ttl_s <= LONGEST_S:
             raise LeaseError(f"ttl_s {ttl_s:g}; allowed: {SHORTEST_S:g} to {LONGEST_S:g} s")
@@ -77,7 +77,7 @@ class Lease:
     def renew(self, token: str | None) -> LeaseRenewal:
         """Extend it by its whole time; return the number of its grant and that time.
 
-        Raises LeaseError where `token` is not, or is no longer, that of the holder.
+        Raises LeaseError if `token` is not, or is no longer, that of the holder.
         """
         with self._lock:
             self._require(token)
@@ -86,7 +86,7 @@ class Lease:
             return LeaseRenewal(self._right.number, self._ttl_ns * 1e-9)
 
     def release(self, token: str | None) -> None:
-        """Give it back; a program that moves on somebody's behalf holds then. As `renew`."""
+        """Release it; a program that moves under it then holds. Raises like `renew`."""
         with self._lock:
             self._require(token)
             self._token = ""
@@ -94,7 +94,7 @@ class Lease:
             self._right.until(0)
 
     def holder(self) -> Holder | None:
-        """Return who holds it, None where nobody does."""
+        """Return the holder, None if there is none."""
         with self._lock:
             left_s = self._left_s()
             return Holder(self._client, left_s) if left_s > 0.0 else None
@@ -124,7 +124,7 @@ class Lease:
             who = f"{self._client} holds it" if held else "nobody holds it"
             raise LeaseError(f"this needs the right to move; {who}")
         if not hmac.compare_digest(token.encode(), self._token.encode()):
-            who = f"{self._client} holds it" if held else "it was given back or taken over"
+            who = f"{self._client} holds it" if held else "it was released or taken over"
             raise LeaseError(f"the right to move is not this client's; {who}")
         if not held:
             raise LeaseError(

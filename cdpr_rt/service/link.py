@@ -1,39 +1,87 @@
-"""The service's end of the shared memory: what the loop says, and commands to it."""
+"""The service's end of the shared memory: the loop's texts, and commands to it."""
 
 from __future__ import annotations
 
 import asyncio
 import os
 import select
+import threading
 import time
+from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
+from datetime import UTC, datetime
 from typing import Any, Final
 
 from cdpr_rt.core.shared_block import MESSAGE_BYTES, SharedBlock, SharedBlockError
 from cdpr_rt.errors import ControlError
-from cdpr_rt.service.events import EventLog
-from cdpr_rt.service.rows import plain
+from cdpr_rt.loop.stop_socket import STOPS
+from cdpr_rt.service.rows import PublishedText, WallClock
+
+# Event log of the daemon: states, reasons, commands, faults of its own parts.
+
+_KEPT: Final = 512
+_LONGEST: Final = 1000
+
+
+class EventLog:
+    """The last events; any thread adds and reads. Repeated events are counted, not stored again."""
+
+    def __init__(self, wall_ns: Callable[[], int]) -> None:
+        self._wall_ns = wall_ns
+        self._events: deque[dict[str, Any]] = deque(maxlen=_KEPT)
+        self._number = 0
+        self._lock = threading.Lock()
+        self.listeners: list[Callable[..., None]] = []
+        """Called with the text, and the kind and the detail by name, for every event."""
+
+    def add(self, kind: str, text: str, **detail: Any) -> None:
+        """Add an event of a kind ("state", "reason", "command", "control", the name of a part)."""
+        text = text[:_LONGEST]
+        time = datetime.fromtimestamp(self._wall_ns() * 1e-9, UTC).isoformat("T", "milliseconds")
+        with self._lock:
+            last = self._events[-1] if self._events else {}
+            same = (last.get("kind"), last.get("text")) == (kind, text)
+            self._number += 1
+            if same:
+                self._events.pop()
+            self._events.append(
+                {
+                    "number": self._number,
+                    "time": time,
+                    "kind": kind,
+                    "text": text,
+                    "times": last["times"] + 1 if same else 1,
+                    "detail": detail,
+                }
+            )
+        for listener in self.listeners:
+            listener(text, kind=kind, detail=detail)
+
+    def since(self, number: int = 0, most: int = _KEPT) -> list[dict[str, Any]]:
+        """Return the events after a number, oldest first, at most the newest `most`."""
+        with self._lock:
+            found = [dict(event) for event in self._events if event["number"] > number]
+        return found[len(found) - min(most, len(found)) :]
+
 
 DEAD: Final = "dead"
 ENDED: Final = "the loop has ended"
-"""Reason of a loop that is no more, unless the launcher says that it died."""
+"""Reason of a loop that has ended, unless the launcher reports that it died."""
 STARTING: Final = "starting"
 _POLL_BUSY_S, _POLL_IDLE_S = 0.002, 0.05
 _MOST_PENDING = 32
 _SILENT_S = 5.0
-URGENT: Final = frozenset({"hold", "disable", "shutdown"})
-"""Stops: for everybody, never refused for want of room, before what waits for the loop already."""
-_COALESCED: Final = URGENT | {"acknowledge", "configure", "check"}
-"""Commands that say nothing but their name: asked for twice at once, they are sent once."""
+_COALESCED: Final = STOPS | {"acknowledge", "configure", "check"}
+"""Commands without arguments: if two clients send one at the same time, it is sent once."""
 
 
 class LoopGoneError(ControlError):
-    """No loop takes commands: it has not begun, has ended, or does not turn."""
+    """No loop takes commands: it has not begun, has ended, or hangs."""
 
 
 class LoopBusyError(ControlError):
-    """The loop takes no more commands for now, or has not answered in time."""
+    """The loop accepts no more commands at present, or has not answered in time."""
 
 
 class CommandTooLongError(ControlError):
@@ -48,11 +96,11 @@ class Reply:
     text: str
     state: str
     refusal: dict[str, Any] | None = None
-    """Refusal as `CommandRefusal.as_json`, None where there are only words."""
+    """Refusal as `CommandRefusal.as_json`, None if there is only a text."""
 
 
 class LoopLink:
-    """Commands with their replies, the loop's texts, and whether it lives.
+    """Commands with their replies, the loop's texts, and whether the loop is alive.
 
     All of it belongs to one asyncio loop, in which `watch` runs; other threads may read `status`,
     `description`, `state` and `wall_ns`.
@@ -61,24 +109,27 @@ class LoopLink:
     def __init__(self, block: SharedBlock) -> None:
         self.block = block
         self.events = EventLog(self.wall_ns)
-        self._texts: dict[str, tuple[int, dict[str, Any]]] = {}
+        self._status = PublishedText(block, "status")
+        self._description = PublishedText(block, "description")
         self._pending: dict[int, asyncio.Future[Reply]] = {}
         self._coalesced: dict[str, asyncio.Future[Reply]] = {}
         self._wake = asyncio.Event()
         self._loop = _ProcessWatch()
         self._told = ("", "")
-        while block.take_reply() is not None:  # to a service that is no more
+        while block.take_reply() is not None:  # to a service that has ended
             pass
 
-    # -- what the loop says
+    # -- from the loop
 
     def status(self) -> dict[str, Any]:
         """Return the loop's own status, {} before its first."""
-        return self._text("status", self.block.status)
+        self._status.update()
+        return self._status.value
 
     def description(self) -> dict[str, Any]:
         """Return the robot's description, {} before the loop has published it."""
-        return self._text("description", self.block.description)
+        self._description.update()
+        return self._description.value
 
     def state(self) -> str:
         """Return the loop's state by name, or "starting", or "dead"."""
@@ -88,43 +139,27 @@ class LoopLink:
 
     @property
     def dead(self) -> bool:
-        """Whether a loop has been there and is no more."""
+        """Whether a loop has run and has ended."""
         return self._loop.ended(int(self.block.counters["loop_pid"][0]))
 
     @property
     def ended_how(self) -> str:
-        """Reason of the loop's end, "" while it lives."""
+        """Reason of the loop's end, "" while it is alive."""
         if not self.dead:
             return ""
         status = self.status()
-        # the launcher sees the exit status and writes it down in the loop's place
+        # the launcher sees the exit status and writes it in place of the loop
         reason = str(status.get("reason", "")) if status.get("state") == DEAD else ""
         return reason or ENDED
 
     def silent_s(self) -> float:
-        """Return how long ago the loop turned last, 0 before its first turn."""
+        """Return the time since the loop's last turn, 0 before its first."""
         alive_ns = int(self.block.counters["loop_alive_ns"][0])
         return max(0.0, (time.monotonic_ns() - alive_ns) * 1e-9) if alive_ns else 0.0
 
     def wall_ns(self) -> int:
-        """Return the time of day, ns since 1970, unmoved by a clock that is set meanwhile."""
-        counters = self.block.counters
-        start_ns = int(counters["start_realtime_ns"][0])
-        if start_ns == 0:
-            return time.time_ns()
-        return start_ns + time.monotonic_ns() - int(counters["start_monotonic_ns"][0])
-
-    def _text(self, name: str, read: Callable[[], dict[str, Any]]) -> dict[str, Any]:
-        version = int(self.block.counters[name][0])
-        known = self._texts.get(name, (-1, {}))
-        if version == known[0]:
-            return known[1]
-        try:
-            value: dict[str, Any] = plain(read())
-        except (SharedBlockError, ValueError):  # its writer ended in the middle of it
-            return known[1]
-        self._texts[name] = version, value
-        return value
+        """Return the time of day, ns since 1970; setting the system clock later has no effect."""
+        return WallClock(self.block)(time.monotonic_ns())
 
     # -- commands
 
@@ -135,8 +170,8 @@ class LoopLink:
         CommandTooLongError.
         """
         self._require_loop()
-        if do in URGENT:
-            # in this order: one that is not answered yet is done after all that may still start
+        if do in STOPS:
+            # in this order: a stop that is not answered yet comes after all that may still start
             self.block.void_commands()
             self._take_replies()
         future = self._coalesced.get(do)
@@ -158,7 +193,7 @@ class LoopLink:
             raise LoopGoneError(f"the loop has not turned for {self.silent_s():.1f} s")
 
     def _send(self, do: str, fields: dict[str, Any]) -> asyncio.Future[Reply]:
-        urgent = do in URGENT
+        urgent = do in STOPS
         if not urgent and len(self._pending) >= _MOST_PENDING:
             raise LoopBusyError(f"{_MOST_PENDING} commands wait for the loop already")
         post = self.block.post_urgent if urgent else self.block.post_command
@@ -181,12 +216,12 @@ class LoopLink:
         if self._coalesced.get(do) is done:
             del self._coalesced[do]
         if not done.cancelled():
-            done.exception()  # seen, also where nobody waits any more
+            done.exception()  # retrieved even if nobody waits any more
 
-    # -- the work in the background
+    # -- background tasks
 
     async def watch(self) -> None:
-        """Take replies and note what changes, until cancelled."""
+        """Take replies and record changes, until cancelled."""
         looked_s = 0.0
         while True:
             self._take_replies()
@@ -226,7 +261,7 @@ class LoopLink:
 
 
 class _ProcessWatch:
-    """Whether the loop's process runs, by a descriptor that names it and no successor."""
+    """Whether the loop's process runs, by a descriptor that cannot refer to a successor."""
 
     def __init__(self) -> None:
         self._pid = self._fd = 0

@@ -1,39 +1,42 @@
-"""Sockets to listen at, apart from what is served there."""
+"""Sockets to listen at, independent of the servers."""
 
 from __future__ import annotations
 
-import errno
+import ipaddress
 import os
 import socket
 import stat
+import struct
 from pathlib import Path
 
 from cdpr_rt.errors import ControlError
 
+_CREDENTIALS = struct.Struct("iII")
+
 
 class ListenError(ControlError):
-    """An address cannot be listened at; the message says which and why."""
+    """Listening at an address failed; the message says which and why."""
 
 
 def listen_unix(path: Path) -> socket.socket:
-    """Return a socket at `path` that this user alone may connect to; raises ListenError.
+    """Return a socket at `path` to which only this user may connect; raises ListenError.
 
-    What a daemon that was killed has left there is replaced, a daemon that answers is not.
+    The socket of a daemon that was killed is replaced, that of a daemon that answers is not.
     """
     try:
         if path.exists() or path.is_symlink():
             if not stat.S_ISSOCK(path.lstat().st_mode):
                 raise ListenError(f"socket {path}: is something else than a socket")
-            if _answers(path):
+            if listener_pid(path) is not None:
                 raise ListenError(f"socket {path}: another daemon listens there")
             path.unlink()
-    except OSError as error:  # somebody else's, in a folder where all may write
+    except OSError as error:  # another user's, in a folder where all may write
         raise ListenError(f"socket {path}: {error.strerror or error}") from None
     listener = socket.socket(socket.AF_UNIX)
     mask = os.umask(0o177)
     try:
         listener.bind(str(path))
-        listener.listen()  # whoever sees the socket can connect
+        listener.listen()  # as soon as the socket is visible, clients can connect
     except OSError as error:
         listener.close()
         raise ListenError(f"socket {path}: {error.strerror or error}") from None
@@ -44,16 +47,8 @@ def listen_unix(path: Path) -> socket.socket:
 
 def listen_tcp(host: str, port: int) -> socket.socket:
     """Return a socket at one address of `host`; raises ListenError."""
+    listener = _bound(host, port, socket.SOCK_STREAM)
     try:
-        family, kind, proto, _, address = socket.getaddrinfo(
-            host, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE
-        )[0]
-        listener = socket.socket(family, kind, proto)
-    except OSError as error:
-        raise ListenError(f"{host}:{port}: {error.strerror or error}") from None
-    listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-    try:
-        listener.bind(address)
         listener.listen()  # before that, another could bind the same
     except OSError as error:
         listener.close()
@@ -61,8 +56,54 @@ def listen_tcp(host: str, port: int) -> socket.socket:
     return listener
 
 
-def _answers(path: Path) -> bool:
+def listen_udp(host: str, port: int, *, has_key: bool = False) -> socket.socket:
+    """Return a socket for a set-point stream at `host` and `port` (0: any free one).
+
+    The stream's holder may be given a second socket at the same address. Raises ListenError, also
+    for an address that others can reach if there is no key.
+    """
+    sock = _bound(host, port, socket.SOCK_DGRAM)
+    if not has_key and not ipaddress.ip_address(sock.getsockname()[0]).is_loopback:
+        sock.close()
+        raise ListenError(f"{host}:{port}: others can reach it; give a key, or listen at 127.0.0.1")
+    # only now, so that nobody else who listens there goes unnoticed
+    sock.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEPORT, 1)
+    return sock
+
+
+def _bound(host: str, port: int, kind: socket.SocketKind) -> socket.socket:
+    try:
+        family, _, proto, _, address = socket.getaddrinfo(
+            host, port, type=kind, flags=socket.AI_PASSIVE
+        )[0]
+        # asyncio sends without delay only if the socket says that it is TCP
+        sock = socket.socket(family, kind, proto)
+    except (OSError, UnicodeError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise ListenError(f"{host}:{port}: {reason}") from None
+    if kind is socket.SOCK_STREAM:
+        sock.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    try:
+        sock.bind(address)
+    except OSError as error:
+        sock.close()
+        raise ListenError(f"{host}:{port}: {error.strerror or error}") from None
+    return sock
+
+
+def listener_pid(path: Path) -> int | None:
+    """Return the process that listens at the Unix socket `path`, None if none does.
+
+    It is 0 if the process is unknown: no right to connect, or too many clients waiting to.
+    """
     with socket.socket(socket.AF_UNIX) as probe:
         probe.settimeout(1.0)
-        failed = probe.connect_ex(str(path))
-    return failed not in (errno.ECONNREFUSED, errno.ENOENT)
+        try:
+            probe.connect(str(path))
+        except (ConnectionRefusedError, FileNotFoundError):
+            return None
+        except OSError:
+            return 0
+        credentials = probe.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, _CREDENTIALS.size)
+    pid, _, _ = _CREDENTIALS.unpack(credentials)
+    return int(pid)

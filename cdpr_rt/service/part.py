@@ -1,4 +1,4 @@
-"""Base class of what runs beside the control interface: recorder, live view, stream."""
+"""Base class of services beside the control interface: recorder, live view, stream."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ from typing import Any
 
 
 class Part(ABC):
-    """Something with a thread of its own that the service starts, shows and stops.
+    """Part with its own thread that the service starts, shows and stops.
 
-    None of them may hold up the others: what one cannot do it says, and leaves it at that. `ended`
-    is told why it ended, where it did other than by `stop`.
+    A part must not delay the others: it reports what it cannot do and continues without it. `ended`
+    is called with the reason if it ends without `stop`.
     """
 
     name: str
-    """A short word; its figures are shown under it."""
+    """A short word under which its figures are shown."""
 
     def __init__(self, thread_name: str, ended: Callable[[str], None] | None) -> None:
         self._ended = ended
@@ -25,18 +25,18 @@ class Part(ABC):
         self._thread = threading.Thread(target=self._run, name=thread_name, daemon=True)
 
     def start(self) -> None:
-        """Begin; raises an error where it cannot, and the service goes on without it."""
+        """Begin; raises an error on failure, and the service continues without the part."""
         self._thread.start()
 
     def stop(self) -> None:
-        """End within a second or two, with everything that is to be kept on the disk."""
+        """End within a second or two, with all data to keep on the disk."""
         self._end.set()
         if self._thread.is_alive():
             self._thread.join()
 
     @abstractmethod
     def status(self) -> dict[str, Any]:
-        """Return what a person would want to know of it, as JSON; its numbers become metrics.
+        """Return what users need to know about it, as JSON; its numbers become metrics.
 
         Called from another thread, several times a second: no waiting, no I/O.
         """

@@ -3,27 +3,104 @@
 from __future__ import annotations
 
 import asyncio
+import json
 import logging
+import tempfile
 import time
 from collections.abc import Awaitable, Callable, Coroutine, Sequence
 from contextlib import suppress
+from pathlib import Path
 from typing import Any, Final
 
-from cdpr_rt.core.cycle_row import AXIS_FIELDS, SCALARS
+from cdpr_profiles.errors import brief
 from cdpr_rt.core.shared_block import SharedBlock
-from cdpr_rt.runtime.right import PublishedRight
-from cdpr_rt.service.http.tickets import Tickets
+from cdpr_rt.errors import ControlError
+from cdpr_rt.loop.right import PublishedRight
+from cdpr_rt.loop.stop_socket import STOPS
+from cdpr_rt.service.access_control import Tickets
 from cdpr_rt.service.lease import Lease, LeaseError
-from cdpr_rt.service.link import URGENT, LoopLink, Reply
+from cdpr_rt.service.link import LoopLink, Reply
 from cdpr_rt.service.part import Part
-from cdpr_rt.service.path_planner import PathPlanRunner
-from cdpr_rt.service.rows import newest_row, plain, row_table
-from cdpr_rt.service.streams.setpoint_stream import SetpointStream, StreamError
+from cdpr_rt.service.rows import cycle_figures, plain
+from cdpr_rt.service.setpoint_stream import SetpointStream, StreamError
+
+# Planning of paths, in a separate process so that the service is not delayed.
+
+_MOST_CHARS: Final = 2000
+"""Longest text of an error, because every `GET /path` repeats it."""
+
+Plan = Callable[[Path, dict[str, Any]], Awaitable[tuple[int, str]]]
+"""Plans a file with the given options; returns the exit status and a JSON text."""
+
+
+class PlannerBusyError(ControlError):
+    """No path can be planned now."""
+
+
+class PathPlanRunner:
+    """Plans one path at a time; clients read `job` until it is not `planning`."""
+
+    def __init__(self) -> None:
+        self.work: Plan | None = None
+        """Set by the owner of the robot's file; without it nothing can be planned."""
+        self.job: dict[str, Any] = {"number": 0, "planning": False, "error": None, "plan": None}
+        """The last job: `error` says why the robot cannot follow it, `plan` is its name if it can.
+        """
+        self._task: asyncio.Task[None] | None = None
+        self._cancelled = ""
+
+    def begin(self, request: dict[str, Any]) -> dict[str, Any]:
+        """Begin to plan a file; return the job. Raises PlannerBusyError while one is planned."""
+        if self.work is None:
+            raise PlannerBusyError("this daemon plans no paths")
+        if self.job["planning"]:
+            raise PlannerBusyError("another path is being planned")
+        number = self.job["number"] + 1
+        self.job = {"number": number, "planning": True, "error": None, "plan": None}
+        self._cancelled = ""
+        self._task = asyncio.create_task(self._plan(self.work, request))
+        return self.job
+
+    def cancel(self, why: str) -> None:
+        """Discard the path that is being planned, because of a stop request since."""
+        if self.job["planning"]:
+            self._cancelled = why
+
+    async def _plan(self, work: Plan, request: dict[str, Any]) -> None:
+        answer: dict[str, Any] = {"error": "planning was ended"}
+        try:
+            with tempfile.TemporaryDirectory(prefix="cdpr-path-") as folder:
+                file = Path(folder) / request["name"]
+                await asyncio.to_thread(file.write_text, request["text"], encoding="utf-8")
+                status, text = await work(file, request)
+            answer = _read(status, text.replace(str(file), request["name"]))
+            if self._cancelled:
+                answer = {"error": f"not followed: {self._cancelled} while it was planned"}
+        except TimeoutError:  # a kind of OSError, but without a text
+            answer = {"error": "cannot be planned: takes too long; divide the path"}
+        except OSError as error:
+            answer = {"error": f"cannot be planned: {error.strerror}"}
+        finally:
+            self.job = {**answer, "number": self.job["number"], "planning": False}
+            self.job.setdefault("plan", None)
+            self.job.setdefault("error", None)
+
+
+def _read(status: int, text: str) -> dict[str, Any]:
+    """Return the result of the process."""
+    try:
+        answer = json.loads(text)
+    except ValueError:
+        answer = None
+    if not isinstance(answer, dict):
+        return {"error": f"planning ended with status {status}: out of memory? divide the path"}
+    if status:
+        return {"error": brief(str(answer.get("error", "refused")), _MOST_CHARS)}
+    return answer
+
 
 _TURN_S = 0.2
 _LOG = logging.getLogger("cdpr.service")
-_AXIS_FIELDS: Final = tuple(field.name for field in AXIS_FIELDS if field.status)
-_DESCRIBED: Final = ("name", "bus", "node_id", "winch", "commissioned")
 WAIT_S: Final = {
     "configure": 60.0,
     "check": 30.0,
@@ -33,7 +110,7 @@ WAIT_S: Final = {
     "shutdown": 30.0,
     "program": 15.0,
 }
-"""Time-outs of replies; all others come within a few cycles."""
+"""Time-outs of replies; all other replies come within a few cycles."""
 _WAIT_S = 3.0
 
 
@@ -50,26 +127,29 @@ class Service:
         self.parts: list[Part] = []
         self._unstarted: dict[str, str] = {}
         self.planner = PathPlanRunner()
-        """Plans paths, in a process of its own."""
+        """Plans paths in a separate process."""
         self.stream: SetpointStream | None = None
-        """The running set-point stream, None where none is received."""
+        """The running set-point stream, None if none is received."""
         self.counts = {"refused": 0, "live_clients": 0, "slow_clients_dropped": 0}
         """Figures of the service itself, shown as the part `service`."""
         self.background: list[Callable[[], Coroutine[Any, Any, None]]] = []
         """Further coroutines that run while the service does, until cancelled."""
         self.http: tuple[str, int] | None = None
-        """Address at which it listens on TCP, None where it does not."""
+        """Address at which it listens on TCP, None if it does not."""
         self.end_daemon: Callable[[], None] = lambda: None
-        """Ends the daemon where its loop has died, and no command can reach it."""
+        """Ends the daemon if its loop has died and no command can reach it."""
+        self.wake_launcher: Callable[[], None] = lambda: None
+        """Resumes the launcher if it was stopped (SIGSTOP, Ctrl-Z)."""
         self._held_by = ""
         self._noted: Reply | None = None
+        self._stops_taken = int(self.link.status().get("stops", {}).get("taken", 0))
 
     def count_refusal(self) -> None:
         """Count a request that was refused by the access control."""
         self.counts["refused"] += 1
 
     def start_parts(self, parts: Sequence[Part]) -> None:
-        """Start each; of one that cannot start, status and events say why."""
+        """Start each part; if one cannot start, status and events give the reason."""
         for part in parts:
             try:
                 part.start()
@@ -82,12 +162,12 @@ class Service:
                     self.stream = part
 
     def note_failure(self, part: str, text: str) -> None:
-        """Say in the events, and on standard error, that a part does not work; from any thread."""
+        """Report in the events and on standard error that a part has failed; from any thread."""
         self.events.add(part, text)
         _LOG.error("%s", text)
 
     def stop_parts(self) -> None:
-        """End all that have started, whatever becomes of one."""
+        """End all started parts, even if one fails to end."""
         for part in reversed(self.parts):
             try:
                 part.stop()
@@ -97,7 +177,7 @@ class Service:
     def issue_stream_session(self, token: str | None) -> dict[str, Any]:
         """Give the holder of the right to move a session of the stream, as `models.StreamAccess`.
 
-        Raises LeaseError, and StreamError where no stream is received.
+        Raises LeaseError, and StreamError if no stream is received.
         """
         if self.stream is None:
             raise StreamError(
@@ -117,57 +197,63 @@ class Service:
         gone: Callable[[], Awaitable[bool]],
         **fields: Any,
     ) -> Reply:
-        """Send a command that needs the right to move; keep that right alive while it is done.
+        """Send a command that needs the right to move; renew that right while it is carried out.
 
-        It lapses when the client has `gone` meanwhile. Raises LeaseError and what
-        `LoopLink.command` raises.
+        The right expires if the client has `gone` meanwhile. Raises LeaseError and the errors of
+        `LoopLink.command`.
         """
         right = self.lease.renew(token).number
         keeping = asyncio.create_task(self._keep_right(token, gone))
         try:
-            # begun here and now, so that what the client asks for next comes after it
+            # begun here, so that the client's next request comes after it
             return await self.command(do, client, right=right, **fields)
         finally:
             keeping.cancel()
 
     async def _keep_right(self, token: str | None, gone: Callable[[], Awaitable[bool]]) -> None:
-        with suppress(LeaseError):  # given back meanwhile, by the same client
+        with suppress(LeaseError):  # the same client has released it meanwhile
             while not await gone():
                 self.lease.renew(token)
                 await asyncio.sleep(_TURN_S)
 
     async def command(self, do: str, client: str, **fields: Any) -> Reply:
-        """Send a command that anybody may give; raises what `LoopLink.command` raises.
+        """Send a command that anybody may give; raises the errors of `LoopLink.command`.
 
-        A daemon whose loop has died is ended by `shutdown` as well: its drives have stopped by
-        themselves.
+        If the loop has died, `shutdown` also ends the daemon: the drives have stopped without the
+        loop.
         """
         if do == "shutdown" and self.link.dead:
             self.events.add("command", f"{do} by {client}")
             self.end_daemon()
+            self.wake_launcher()
             return Reply(True, self.link.ended_how, self.link.state())
-        if do in URGENT:
+        if do in STOPS:
             self.planner.cancel(f"{do} by {client}")
-        reply = await self.link.command(do, WAIT_S.get(do, _WAIT_S), client=client, **fields)
+        try:
+            reply = await self.link.command(do, WAIT_S.get(do, _WAIT_S), client=client, **fields)
+        finally:
+            if do == "shutdown":  # the loop needs no launcher to stop
+                self.wake_launcher()
         if reply is self._noted:
-            return reply  # many have asked for the same at once
+            return reply  # many clients have sent the same
         self._noted = reply
         if do != "set" or not reply.ok:
             result = "" if reply.ok else f": refused: {reply.text}"
             self.events.add("command", f"{do} by {client}{result}")
         return reply
 
-    # -- what there is to see
+    # -- status
 
     def status(self) -> dict[str, Any]:
-        """Return everything at a glance, as `models.Status`."""
+        """Return the complete status, as `models.Status`."""
         link = self.link
         of_loop = link.status()
-        row = newest_row(self.block)
         counters = self.block.counters
         return {
             "program": None,
+            "commanded": "",
             "reason_limit": None,
+            "faults": [],
             "read_only": False,
             "lockstep": False,
             "notices": [],
@@ -181,20 +267,20 @@ class Service:
                 "silent_s": link.silent_s(),
             },
             "control": self.control(),
-            "cycle": None if row is None else row_table(row, SCALARS),
-            "axes": self._axes(row),
+            **cycle_figures(self.block, link.description()),
+            "calibration": link.description().get("calibration"),
             "parts": self.part_figures(),
         }
 
     def control(self) -> dict[str, Any]:
-        """Return who holds the right to move."""
+        """Return the holder of the right to move."""
         holder = self.lease.holder()
         if holder is None:
             return {"held": False, "client": None, "left_s": 0.0}
         return {"held": True, "client": holder.client, "left_s": holder.left_s}
 
     def part_figures(self) -> dict[str, dict[str, Any]]:
-        """Return what each part tells of itself, and the service's own figures."""
+        """Return the figures of each part, and of the service itself."""
         where = None if self.http is None else f"{self.http[0]}:{self.http[1]}"
         figures: dict[str, dict[str, Any]] = {"service": {"http": where, **self.counts}}
         figures |= {name: {"error": text} for name, text in self._unstarted.items()}
@@ -205,21 +291,10 @@ class Service:
                 figures[part.name] = {"error": str(error)}
         return figures
 
-    def _axes(self, row: Any) -> list[dict[str, Any]]:
-        described = self.link.description().get("axes") or [{} for _ in range(self.block.n)]
-        axes = [{key: axis.get(key) for key in _DESCRIBED} for axis in described]
-        if row is None:
-            return axes
-        table = row_table(row, _AXIS_FIELDS)
-        return [
-            {**axis, **{name: table[name][number] for name in _AXIS_FIELDS}}
-            for number, axis in enumerate(axes[: self.block.n])
-        ]
-
     # -- in the background
 
     async def watch(self) -> None:
-        """Follow the loop and who holds the right to move, until cancelled."""
+        """Follow the loop and the holder of the right to move, until cancelled."""
         async with asyncio.TaskGroup() as tasks:
             for work in (self.link.watch, self._watch_holder, *self.background):
                 tasks.create_task(work())
@@ -227,8 +302,21 @@ class Service:
     async def _watch_holder(self) -> None:
         while True:
             self._note_holder()
+            self._note_stop()
             self.block.counters["service_alive_ns"][0] = time.monotonic_ns()
             await asyncio.sleep(_TURN_S / 4)
+
+    def _note_stop(self) -> None:
+        """Record a stop that the loop took from its own socket, as one through the service."""
+        stops = self.link.status().get("stops") or {}
+        if (taken := stops.get("taken", 0)) == self._stops_taken:
+            return
+        self._stops_taken = taken
+        text = f"{stops['do']} by {stops['client']}"
+        self.planner.cancel(text)
+        self.events.add("command", text)
+        if stops["do"] == "shutdown":  # the loop needs no launcher to stop
+            self.wake_launcher()
 
     def _note_holder(self) -> None:
         holder = self.lease.holder()

@@ -1,1 +1,1 @@
-"""The group of axes that is exchanged once per cycle, its homing and its shutdown."""
+"""The group of axes exchanged once per cycle, its homing and its shutdown."""

@@ -9,19 +9,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cdpr_drivers.axes.axis_group import AxisGroup
+from cdpr_drivers.axes.axis_group import AxisGroup, StateArrays
 from cdpr_drivers.axes.axis_layout import AxisConfig
-from cdpr_drivers.axes.axis_state import StateArrays
 from cdpr_drivers.canopen.network import CanNetwork
 from cdpr_drivers.cia402 import POWER_OFF, State
 from cdpr_drivers.errors import BusError, DriverError, ModeRefusedError
 from cdpr_rt.arrays import BoolArray
 from cdpr_rt.core.clock import Clock
 from cdpr_rt.core.exchange import AxisCommand, AxisFeedback
+from cdpr_rt.core.fault import Fault
 
 _STOP_TIMEOUT_S = 1.0
 _SHORTEST_SLEEP_S = 5e-5
-"""Shorter waits are left to the sockets."""
+"""Shorter waits are done by the sockets."""
 _RISE, _FALL = 0.1, 0.995
 
 
@@ -34,18 +34,18 @@ class BusAxes:
     axes: Sequence[AxisConfig]
     axis_numbers: Sequence[int]
     commands_s: float
-    """How long the commands of a cycle are on the wire at most."""
+    """Longest time that the commands of a cycle take on the wire."""
 
 
 class AxisBuses:
     """n axes on several buses; implements `cdpr_rt.core.exchange.AxisDevice` as `AxisGroup` does.
 
-    Where the axes are numbered bus by bus, the arrays of each bus are slices of the whole, and
-    nothing is copied; otherwise their values are moved once a cycle. What goes wrong on one bus
-    keeps none of the others from being exchanged, or from being switched off at the end.
+    If the axes are numbered bus by bus, the arrays of each bus are slices of the whole and
+    nothing is copied; otherwise their values are copied once a cycle. A failure on one bus does
+    not keep the others from being exchanged, or from being switched off at the end.
 
-    Raises BusError when some buses keep time in lockstep and some do not, and DriverError for a PDO
-    map that does not serve torque control.
+    Raises BusError if some buses keep time in lockstep and some do not, and DriverError for a PDO
+    map that does not support torque control.
     """
 
     def __init__(self, buses: Sequence[BusAxes], period_s: float) -> None:
@@ -71,7 +71,6 @@ class AxisBuses:
                 group.close()
             raise
         self.commands_s = max(bus.commands_s for bus in buses)
-        self._names = {group: bus.name for group, bus in zip(self.groups, buses, strict=True)}
         self.axes: tuple[AxisConfig, ...] = tuple(self._by_axis(lambda group: group.axes))
         self.feedback, self.command = arrays.feedback, arrays.command
         self._reordering = AxisReordering(order, self.feedback, self.command)
@@ -80,15 +79,18 @@ class AxisBuses:
         self._single_group = (
             self.groups[0] if len(self.groups) == 1 and not self._reordering.needed else None
         )
-        if self._single_group is not None:  # it counts the cycles
+        if self._single_group is not None:  # the group counts the cycles
             self.feedback, self.command = self._single_group.feedback, self._single_group.command
         self.transmits = 0
-        """How often commands went out on all buses."""
+        """Number of times that commands were sent on all buses."""
         self._answers = AnswerWait(self.clock, self.groups[0].paced_wait_s)
         self._sync_s = 0.0
         self._failed = [False] * len(self.groups)
         """Which buses have failed in this cycle."""
         self._failure: BusError | None = None
+        self._found: list[tuple[Fault, ...]] = [()] * len(self.groups)
+        self._placed: list[tuple[Fault, ...]] = [()] * len(self.groups)
+        """The faults in `_found` as the groups last reported them, numbered in the whole device."""
         self._closed = False
 
     def _common_clock(self) -> bool:
@@ -105,9 +107,9 @@ class AxisBuses:
     # -- one cycle
 
     def sync(self) -> None:
-        """Send the SYNC that opens the cycle, on one bus right after the other.
+        """Send the SYNC that opens the cycle, on one bus immediately after the other.
 
-        Where one of several fails, `receive` raises, once the others have answered.
+        If one of several buses fails, `receive` raises after the others have answered.
         """
         self._failure = None
         if not self.lockstep:
@@ -162,7 +164,7 @@ class AxisBuses:
         return answered
 
     def _mark_failed(self, i: int, error: BusError) -> None:
-        """Note that a bus has failed, and that the feedback of its axes is not valid."""
+        """Mark a bus as failed and the feedback of its axes as invalid."""
         self._failed[i] = True
         self._failure = self._failure or error
         feedback = self.groups[i].feedback
@@ -189,33 +191,36 @@ class AxisBuses:
             raise failure
         self.transmits += 1
 
-    def alarm(self) -> str:
-        """Return why the drives of all buses have to be stopped, or an empty text."""
-        for group in self.groups:
-            text = group.alarm()
-            if text:
-                return f"bus {self._names[group]}: {text}"
-        return ""
+    def faults(self) -> tuple[Fault, ...]:
+        """Return why the drives of all buses must be stopped, in the order of the buses."""
+        found: tuple[Fault, ...] = ()
+        for i, group in enumerate(self.groups):
+            faults = group.faults()
+            if faults is not self._found[i]:
+                bus = self.buses[i]
+                self._found[i], self._placed[i] = faults, placed(faults, bus.name, bus.axis_numbers)
+            found += self._placed[i]
+        return found
 
     @property
     def missed(self) -> int:
-        """Answers that did not come in time since the beginning, over all axes."""
+        """Answers that did not arrive in time since the beginning, over all axes."""
         return sum(group.missed for group in self.groups)
 
     # -- between cycles
 
     def stop_cycling(self) -> None:
-        """Tell that no cycles run for a while; see `AxisGroup.stop_cycling`."""
+        """Announce that no cycles run for a while; see `AxisGroup.stop_cycling`."""
         for group in self.groups:
             group.stop_cycling()
 
     def tolerate_silence(self, cycles: int) -> None:
-        """Bridge so many cycles without an answer; see `AxisGroup.tolerate_silence`."""
+        """Bridge this number of cycles without an answer; see `AxisGroup.tolerate_silence`."""
         for group in self.groups:
             group.tolerate_silence(cycles)
 
     def request(self, state: State) -> None:
-        """Ask all axes for a state; see `AxisGroup.request`. Where one refuses, none is enabled."""
+        """Request a state of all axes; if one refuses, none is enabled. See `AxisGroup.request`."""
         try:
             for group in self.groups:
                 group.request(state)
@@ -229,7 +234,7 @@ class AxisBuses:
         return all(group.reached(state) for group in self.groups)
 
     def states(self) -> list[State]:
-        """Return the state each axis reported last."""
+        """Return the last state that each axis reported."""
         return self._by_axis(AxisGroup.states)
 
     def faulted(self) -> BoolArray:
@@ -241,28 +246,33 @@ class AxisBuses:
         for group in self.groups:
             group.acknowledge_fault()
 
+    def switch_off_lost(self) -> None:
+        """Start to cut the power of drives that do not follow the cycle; see `AxisGroup`."""
+        for group in self.groups:
+            group.switch_off_lost()
+
     @property
     def torque_modes(self) -> list[int]:
-        """Return the mode in which each drive obeys a torque, by its profile."""
+        """Return the mode in which each drive accepts torques, from its profile."""
         return self._by_axis(lambda group: group.torque_modes)
 
     def ask_mode(self, modes: int | Sequence[int]) -> None:
-        """Ask for a mode of operation, one for all or one each; see `AxisGroup.ask_mode`."""
+        """Request a mode of operation, one for all or one each; see `AxisGroup.ask_mode`."""
         each = [modes] * self.n if isinstance(modes, int) else list(modes)
         for group, bus in zip(self.groups, self.buses, strict=True):
             group.ask_mode([each[number] for number in bus.axis_numbers])
 
     def mode_confirmed(self) -> bool:
-        """Return whether every axis reports the mode it was asked for; raises SdoError."""
+        """Return whether every axis reports its requested mode; raises SdoError."""
         return all(group.mode_confirmed() for group in self.groups)
 
     def unconfirmed_mode(self) -> ModeRefusedError:
-        """Return the error that names the first axis whose mode is not what was asked for."""
+        """Return the error that names the first axis whose mode is not the requested one."""
         groups = (group for group in self.groups if not group.mode_confirmed())
         return next(groups, self.groups[0]).unconfirmed_mode()
 
     def group_of(self, axis: int) -> tuple[AxisGroup, int]:
-        """Return the group that an axis belongs to, and its number there."""
+        """Return the group of an axis, and its number in that group."""
         return self._location[axis]
 
     def _by_axis(self, ask: Callable[[AxisGroup], Any]) -> list[Any]:
@@ -273,9 +283,9 @@ class AxisBuses:
     # -- the end
 
     def close(self) -> str:
-        """Take torque and power from the drives of all buses; a second time does nothing.
+        """Remove torque and power from the drives of all buses; a second call does nothing.
 
-        Returns which drives have not confirmed that their power stage is off, else an empty text.
+        Returns which drives have not confirmed that their power stage is off; else an empty text.
         """
         if self._closed:
             return ""
@@ -283,7 +293,7 @@ class AxisBuses:
         try:
             self._stop_together()
         finally:
-            # those with power last: they may take seconds, while the others' heartbeats go on
+            # those with power last: they may take seconds, while the others' heartbeats continue
             unconfirmed = [group.close() for group in sorted(self.groups, key=_has_power)]
         return "; ".join(text for text in unconfirmed if text)
 
@@ -299,10 +309,24 @@ class AxisBuses:
                 live = [group for group in live if _succeeds(group, step)]
             if not any(_has_power(group) for group in live):
                 return
+            for group in live:
+                group.switch_off_lost()
+            self.clock.run_tasks()
             if not self.lockstep:
                 self.clock.sleep(self.period_s)
             elif live:  # the time of a bus whose group has dropped out would stand still
                 live[0].let_other_buses_follow()
+
+
+def placed(faults: Sequence[Fault], bus: str, axis_numbers: Sequence[int]) -> tuple[Fault, ...]:
+    """Return faults of the axes of one bus with their numbers in the whole device."""
+    return tuple(
+        fault._replace(
+            axis=axis_numbers[fault.axis] if fault.axis >= 0 else -1,
+            source=f"bus {bus} {fault.source}".strip(),
+        )
+        for fault in faults
+    )
 
 
 def _has_power(group: AxisGroup) -> bool:
@@ -323,7 +347,7 @@ def _succeeds(group: AxisGroup, step: Any) -> bool:
 
 
 class AxisReordering:
-    """Copies values between arrays in the order of the buses and in the order of the axes."""
+    """Copies values between arrays in bus order and arrays in axis order."""
 
     def __init__(self, order: Sequence[int], feedback: AxisFeedback, command: AxisCommand) -> None:
         n = len(order)
@@ -339,26 +363,26 @@ class AxisReordering:
         self._bus_command = command
 
     def gather(self) -> None:
-        """Copy the feedback of the buses to the device's."""
+        """Copy the feedback of the buses to the device."""
         for in_bus_order, in_axis_order in self._pairs:
             np.take(in_bus_order, self._columns, out=in_axis_order, mode="clip")
 
     def scatter(self) -> None:
-        """Copy the commanded torques to those of the buses."""
+        """Copy the commanded torques to the buses."""
         in_axis_order, in_bus_order = self.command.torque_Nm, self._bus_command.torque_Nm
         np.take(in_axis_order, self._numbers, out=in_bus_order, mode="clip")
 
     def gather_sent(self) -> None:
-        """Copy the torques that were sent."""
+        """Copy the sent torques from the buses to the device."""
         sent, in_axis_order = self._bus_command.sent_torque_Nm, self.command.sent_torque_Nm
         np.take(sent, self._columns, out=in_axis_order, mode="clip")
 
 
 class AnswerWait:
-    """Sleeps until the answers have usually come, and adapts that time from cycle to cycle.
+    """Sleeps until the answers have usually arrived, and adapts that time from cycle to cycle.
 
-    Waking up costs the host more than reading the frames of a whole cycle. `most_s` bounds the
-    sleep, from SYNC on.
+    A wake-up costs the host more than reading the frames of a whole cycle. `most_s` limits the
+    sleep, counted from SYNC.
     """
 
     def __init__(self, clock: Clock, most_s: float) -> None:
@@ -366,15 +390,15 @@ class AnswerWait:
         self._expected_s = 0.0
 
     def sleep(self, since_s: float) -> None:
-        """Sleep until the answers to the SYNC of `since_s` have usually come."""
+        """Sleep until the answers to the SYNC sent at `since_s` have usually arrived."""
         until_s = since_s + self._expected_s
         if until_s - self._clock.now_s > _SHORTEST_SLEEP_S:
             self._clock.sleep_until(until_s)
 
     def learn(self, took_s: float, too_early: bool) -> None:
-        """Adapt to how long all answers took and whether some were missing after the sleep."""
+        """Adapt to the time that all answers took and to whether some were late after the sleep."""
         if too_early:
             took_s = min(took_s, self._most_s)
             self._expected_s += _RISE * (took_s - self._expected_s)
-        else:  # they may have come earlier, which only an earlier look can show
+        else:  # they may have arrived earlier, which only an earlier wake-up can show
             self._expected_s *= _FALL

@@ -1,7 +1,7 @@
 """Compiled kernels between CAN frames and arrays over axes.
 
-The state of a group lies in a few two-dimensional arrays, one row per quantity and one column per
-axis, since every array handed to a kernel costs time in each cycle; the names below are the rows.
+The state of a group is in a few two-dimensional arrays, one row per quantity and one column per
+axis, because every array passed to a kernel costs time in each cycle. The names below are the rows.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ MAX_FIELDS = 8
 # columns of `command_offsets`
 CONTROLWORD_FRAME, CONTROLWORD, TORQUE_FRAME, TARGET_TORQUE = range(4)
 
-# rows of `ints`; the first ones are filled from TPDOs as they come
+# rows of `ints`; the first ones are filled from TPDOs when they arrive
 (
     STATUSWORD,
     RAW_POSITION,
@@ -83,6 +83,11 @@ FAULT, LEFT_ENABLED, WRONG_MODE, NOT_FINITE, SILENT, NO_HEARTBEAT, RESTARTED, NO
     1 << bit for bit in range(8)
 )
 EMERGENCY_MESSAGE, UNSTEADY, FLOODING = 1 << 8, 1 << 9, 1 << 10
+LOST = WRONG_MODE | RESTARTED | NOT_OPERATIONAL
+"""Alarms of an axis that cannot be relied on to accept torques from the cycle.
+
+An axis that is only silent may still obey; it brakes or lowers with the others.
+"""
 
 _SWITCH_ON_DISABLED, _SWITCHED_ON, _ENABLED, _REACTION, _FAULT = 1, 3, 4, 6, 7
 _PROBE_LATCHED = 0x02
@@ -93,7 +98,7 @@ _CYCLE_OVER = 1 << 62
 """Bit of TPDOS_RECEIVED from the end of a cycle to the next SYNC."""
 _MEMORY_CYCLES = 64.0
 _FAIR_SHARE, _WORST_SHARE = 0.05, 0.4
-"""Share of cycles without exactly one answer, above which the rate is bad or a trip."""
+"""Share of cycles without exactly one answer above which the rate is bad, or the loop trips."""
 _MOST_EXTRA_FRAMES = 400
 
 
@@ -109,7 +114,7 @@ def _number(frame: NDArray[np.uint8], start: int, size: int, signed: int) -> int
 
 @jit
 def _difference(new: int, old: int) -> int:
-    """Return new − old of two 32-bit counters that wrap round, as the nearest signed number."""
+    """Return new − old of two 32-bit counters that wrap around, as the nearest signed number."""
     return (new - old + 0x80000000) % 0x100000000 - 0x80000000
 
 
@@ -126,12 +131,12 @@ def decode(
     others: Ints,
     last: int,
 ) -> int:
-    """Take the first `last` of `frames` (k, 16 or more) into the state of n axes.
+    """Decode the first `last` of `frames` (k, 16 or more) into the state of n axes.
 
     `slots` (2048, 2) and `fields` (n, 8, 5) are those of `GroupLayout`; `state_table` (128,) gives
     the state by statusword; `ints`, `floats` and `flags` have the rows named above, `words` (1, n)
-    is the statusword. Returns how many more axes have answered. `others` (k + 1,) gets the rows of
-    frames that are no TPDOs of these axes: their number, then each.
+    is the statusword. Returns how many more axes have answered. Frames that are not TPDOs of these
+    axes are listed in `others` (k + 1,): their number, then the row of each.
     """
     answered = others[0] = 0
     for f in range(last):
@@ -139,7 +144,7 @@ def decode(
         # byte 3 holds the flags of extended, remote and error frames
         identifier = np.int64(frame[0]) | np.int64(frame[1]) << 8
         known = identifier <= 0x7FF and not frame[2] and not frame[3]
-        slot = identifier if known else 0  # that of no axis
+        slot = identifier if known else 0  # the slot of no axis
         i, kind = slots[slot, 0], slots[slot, 1]
         if i < 0 or kind >= EMCY:
             others[0] += 1
@@ -202,7 +207,7 @@ def _take_tpdo(
         flags[INDEX_KNOWN, i] = True
         ints[PROBE_ARMED, i] = 0
     if fields_came >> RAW_POSITION & 1:
-        # 6064h has 32 bits: counted on beyond them
+        # 6064h has 32 bits; the position continues beyond them
         ints[POSITION, i] += _difference(ints[RAW_POSITION, i], ints[LAST_RAW_POSITION, i])
         ints[LAST_RAW_POSITION, i] = ints[RAW_POSITION, i]
         floats[POSITION_RAD, i] = ints[POSITION, i] * floats[RAD_PER_COUNT, i]
@@ -211,7 +216,7 @@ def _take_tpdo(
     if fields_came >> STATUSWORD & 1:
         words[0, i] = ints[STATUSWORD, i]
         _follow_state(i, state_table[ints[STATUSWORD, i] & 0x7F], ints)
-    # of two of the same the later one counts: the first may be late from the cycle before
+    # of two equal TPDOs the later one counts: the first may be a late one of the previous cycle
     expected = ints[TPDOS_EXPECTED, i]
     ints[EXTRA, i] += (ints[TPDOS_RECEIVED, i] & expected) >> pdo & 1
     ints[TPDOS_RECEIVED, i] |= 1 << pdo
@@ -236,7 +241,7 @@ def _follow_state(i: int, now: int, ints: Ints) -> None:
     ints[WAS_ENABLED, i] = 0
     if now in (_REACTION, _FAULT):
         if not ints[ACKNOWLEDGE, i]:
-            # a fault takes the request away: only a new one enables again
+            # a fault cancels the request: only a new request enables the drive again
             ints[TARGET, i] = _SWITCH_ON_DISABLED
             ints[FAULTED, i] = 1
             ints[ALARM, i] |= FAULT
@@ -251,10 +256,10 @@ def _follow_state(i: int, now: int, ints: Ints) -> None:
 
 @jit
 def end_answers(ints: Ints, floats: FloatArray, flags: BoolArray) -> int:
-    """Evaluate the answers of a cycle once no more of them are awaited.
+    """Evaluate the answers of a cycle after the wait for them has ended.
 
-    Counts silent cycles, irregular answers, frames and heartbeat ages of n axes, and brings `alive`
-    and `rate_ok` up to date. Returns the alarm bits of all axes.
+    Count silent cycles, irregular answers, frames and heartbeat ages of n axes, and update `alive`
+    and `rate_ok`. Returns the alarm bits of all axes.
     """
     alarms = 0
     for i in range(ints.shape[1]):
@@ -273,7 +278,7 @@ def encode(
 ) -> int:
     """Write controlword and target torque of n axes into their RPDOs `frames` (k, 16).
 
-    `command_offsets` (n, 4) holds frame and first byte of either, `controlwords` (9, 9) the word by
+    `command_offsets` (n, 4) holds frame and first byte of each, `controlwords` (9, 9) the word by
     target and present state. Returns the alarm bits of all axes.
     """
     alarms = 0
@@ -318,14 +323,16 @@ def _watch(i: int, ints: Ints, floats: FloatArray, flags: BoolArray) -> None:
         ints[ALARM, i] |= NO_HEARTBEAT
     operational = ints[NMT_STATE, i] == _OPERATIONAL or ints[NMT_STATE, i] == _NOT_HEARD
     flags[ALIVE, i] = heard and operational and not ints[ALARM, i] & RESTARTED
+    if ints[ALARM, i] & LOST:
+        ints[TARGET, i] = _SWITCH_ON_DISABLED
 
 
 @jit
 def _torque_units(i: int, ints: Ints, floats: FloatArray) -> int:
     """Return 6071h for an axis.
 
-    What rounding leaves over is carried into the next cycle (first-order error feedback), so that
-    the mean is right to far less than one unit.
+    The rounding remainder is carried into the next cycle (first-order error feedback), so that
+    the error of the mean is far below one unit.
     """
     torque_Nm = floats[COMMAND_NM, i]
     if not np.isfinite(torque_Nm):

@@ -1,4 +1,4 @@
-"""Layout of a group's frames: where each axis' values lie, and their units in SI."""
+"""Layout of a group's frames: positions of each axis' values, and their units in SI."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from cdpr_drivers.axes import axis_codec as codec
 from cdpr_drivers.bus import FrameBuffer
-from cdpr_drivers.canopen.boot.boot import BootReport
+from cdpr_drivers.canopen.boot import BootReport
 from cdpr_drivers.drive_units import acceleration_unit_rad_s2, torque_unit_Nm, velocity_unit_rad_s
 from cdpr_drivers.errors import DriverError
 from cdpr_profiles import DriveProfile, Pdo
@@ -34,24 +34,24 @@ _RPDO_FIELDS = {
 }
 _EVERY_SYNC = 1
 _OBJECTS = 0x1000
-"""First index that is no data type; those map as dummies (CiA 301)."""
+"""First index that is not a data type; data types are mapped as dummies (CiA 301)."""
 
 
 @dataclass(frozen=True)
 class AxisConfig:
-    """One axis of a group, with the ratings that its drive reported while it booted."""
+    """One axis of a group, with the ratings that its drive reported at boot."""
 
     node_id: int
     drive: DriveProfile
     rated_torque_Nm: float
-    """6076h: what a relative torque unit refers to."""
+    """6076h: the reference of a relative torque unit."""
     counts_per_turn: int
-    """608Fh, or the winch's where the drive has none."""
+    """608Fh, or the winch's value if the drive has none."""
     supported_modes: int
-    """6502h, or the profile's modes in its place."""
+    """6502h, or the profile's modes instead."""
     torque_limit_Nm: float
     name: str = ""
-    """What messages call it beside its node id, if anything."""
+    """Name in messages beside its node id; may be empty."""
 
     @classmethod
     def from_boot(
@@ -70,7 +70,7 @@ class AxisConfig:
 
     @property
     def label(self) -> str:
-        """Its node id, and its name in brackets, for messages."""
+        """Node id, with the name in brackets, for messages."""
         return f"node {self.node_id}" + (f" ({self.name})" if self.name else "")
 
     @property
@@ -84,25 +84,25 @@ class AxisConfig:
         return self.drive.torque_sign * torque_unit_Nm(self.drive, self.rated_torque_Nm)
 
     def speed_units(self, speed_rad_s: float) -> int:
-        """Return a speed as 6099h has it, at least one unit."""
+        """Return a speed in units of 6099h, at least one."""
         unit = velocity_unit_rad_s(self.drive, self.counts_per_turn)
         return max(1, round(speed_rad_s / unit))
 
     def acceleration_units(self, acceleration_rad_s2: float) -> int:
-        """Return an acceleration as 609Ah has it, at least one unit."""
+        """Return an acceleration in units of 609Ah, at least one."""
         unit = acceleration_unit_rad_s2(self.drive, self.counts_per_turn)
         return max(1, round(acceleration_rad_s2 / unit))
 
     @property
     def expected_tpdos(self) -> int:
-        """The TPDOs that make the answer to a SYNC, as bits by their place in the profile."""
+        """The TPDOs that form the answer to a SYNC, as bits by their place in the profile."""
         return sum({1 << pdo for pdo in _feedback_tpdos(self.drive).values()})
 
 
 class GroupLayout:
-    """The frames of n axes, as the tables that the compiled kernels work on.
+    """The frames of n axes, as the tables that the compiled kernels use.
 
-    Raises DriverError for a profile whose PDO map does not serve torque control.
+    Raises DriverError for a profile whose PDO map does not support torque control.
     """
 
     def __init__(self, axes: Sequence[AxisConfig]) -> None:
@@ -176,7 +176,7 @@ class GroupLayout:
 
 
 def _feedback_tpdos(drive: DriveProfile) -> dict[int, int]:
-    """Return which TPDO, by its place in the profile, answers every SYNC with what object."""
+    """Return which TPDO, by its place in the profile, answers every SYNC with each object."""
     found: dict[int, int] = {}
     for index in _EVERY_CYCLE:
         for number, pdo in enumerate(drive.tpdos):
@@ -192,9 +192,9 @@ def _feedback_tpdos(drive: DriveProfile) -> dict[int, int]:
 
 
 def _command_rpdos(drive: DriveProfile) -> list[Pdo]:
-    """Return the RPDOs that carry controlword and target torque, and nothing else but gaps.
+    """Return the RPDOs that carry controlword and target torque, and otherwise only gaps.
 
-    Another object in them, as mode of operation or torque limit, would be set to 0 every cycle.
+    Other objects in them, such as mode of operation or torque limit, would become 0 each cycle.
     """
     found: dict[int, Pdo] = {}
     for index in _RPDO_FIELDS:
@@ -217,7 +217,7 @@ def _command_rpdos(drive: DriveProfile) -> list[Pdo]:
 
 
 def _places(pdo: Pdo) -> Iterator[tuple[int, int, int]]:
-    """Yield object index, first byte and number of bytes of what a PDO maps."""
+    """Yield object index, first byte and number of bytes of each object that a PDO maps."""
     start = 0
     for entry in pdo.entries:
         yield entry.index, start, entry.bits // 8

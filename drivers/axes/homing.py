@@ -1,4 +1,4 @@
-"""Homing of one axis as CiA 402 has it, advanced once per cycle."""
+"""Find the encoder index: CiA 402 homing of one axis, or touch probe during ordinary motion."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from cdpr_drivers.errors import DriveFaultError
 _REACHED, _ATTAINED, _ERROR = 1 << 10, 1 << 12, 1 << 13
 _SPEED_RAD_S = math.radians(30.0)
 _ACCELERATION_RAD_S2 = math.radians(360.0)
-# by then a drive has seen the start bit, so that its status is that of this homing
+# after this time a drive has seen the start bit, so its status belongs to this homing
 _ANSWER_S = 0.02
-# CiA 402-2: limit switches, home switch from either side, home switch between limits, index alone;
+# CiA 402-2: limit switches, home switch from either side, home switch between limits, index only;
 # 17 to 30 are 1 to 14 without the index
 _WITH_INDEX = ((1, 2), (3, 5), (4, 6), (7, 11), (8, 12), (9, 13), (10, 14))
 _PAIRS = (*_WITH_INDEX, *((a + 16, b + 16) for a, b in _WITH_INDEX), (33, 34))
 MIRRORED = dict(_PAIRS) | {b: a for a, b in _PAIRS}
-"""The homing method that does the same in the other direction."""
+"""The homing method that does the same in the opposite direction."""
 _FINDING_INDEX = (*range(1, 15), 33, 34)
 
 
@@ -35,9 +35,9 @@ class HomingStep(Enum):
 class Homing:
     """The homing mode's handshake: start bit, then statusword bits 13, 12 and 10.
 
-    `configure` before cycles run; then, with the axis enabled in homing mode, `update` in every
-    cycle. Methods 33 and 34 turn the motor to its index in negative or positive direction, by a
-    turn at most. Raises DriveFaultError for a method that is not in the drive's profile.
+    Call `configure` before cycles run; then, with the axis enabled in homing mode, call `update` in
+    every cycle. Methods 33 and 34 turn the motor to its index in negative or positive direction, by
+    one turn at most. Raises DriveFaultError for a method that is not in the drive's profile.
     """
 
     def __init__(self, group: AxisGroup, axis: int, method: int, timeout_s: float = 30.0) -> None:
@@ -60,7 +60,7 @@ class Homing:
         self._done = self._telling & ~_ERROR
 
     def configure(self) -> None:
-        """Write method, speeds and, where the drive has them, acceleration and offset by SDO.
+        """Write method, speeds and, if the drive has them, acceleration and offset by SDO.
 
         Raises SdoError.
         """
@@ -76,7 +76,7 @@ class Homing:
                 network.write(self._node_id, index, 0, value)
 
     def _drive_method(self) -> int:
-        """Return the method as this drive counts directions."""
+        """Return the method for the direction in which this drive counts."""
         if self._group.axes[self._axis].drive.homing_sign > 0:
             return self._method
         return MIRRORED.get(self._method, self._method)
@@ -84,8 +84,8 @@ class Homing:
     def update(self) -> bool:
         """Advance by one cycle, after its `receive`; return whether homing is done.
 
-        Raises DriveFaultError when the drive reports a homing error or takes longer than the
-        time-out of bus time; the motion has then been halted.
+        Raises DriveFaultError if the drive reports a homing error or exceeds the time-out in bus
+        time; the motion has then been halted.
         """
         now = self._group.feedback.time_s
         if self.step is HomingStep.READY:
@@ -99,7 +99,7 @@ class Homing:
     def _look(self, word: int, elapsed_s: float) -> None:
         bits = word & self._telling
         self._seen_running |= bits == 0
-        # before that, the bits may tell of an earlier homing
+        # before that, the bits may belong to an earlier homing
         current = self._seen_running or elapsed_s > _ANSWER_S
         if bits & _ERROR and current:
             self._fail(f"the drive reports a homing error (statusword {word:04X}h)")
@@ -119,7 +119,41 @@ class Homing:
         )
 
     def abort(self) -> None:
-        """Take the start bit back and halt the motion; the caller disables the drive."""
+        """Clear the start bit and halt the motion; the caller disables the drive."""
         if self.step is not HomingStep.DONE:
             self.step = HomingStep.FAILED
             self._group.set_extra_bits(self._axis, HALT)
+
+
+# Finding the encoder index during ordinary motion, with the drive's touch probe.
+
+_OFF = 0
+# CiA 402-2, 60B8h: probe 1 on, first event only, zero pulse as trigger, positive edge
+_NEXT_ZERO_PULSE = 0x15
+_ON, _LATCHED = 0x01, 0x02
+
+
+def arm(group: AxisGroup, axis: int) -> None:
+    """Have the drive latch its position at the next zero pulse.
+
+    The position arrives in a TPDO in any cycle after it is latched, and `feedback.index_known`
+    reports it; no SDO is needed then. Raises DriveFaultError if the drive does not arm or its
+    PDOs do not carry the result, SdoError if it rejects the request.
+    """
+    node = group.axes[axis].node_id
+    if 0x60B8 not in group.network.dictionary(node):
+        raise DriveFaultError(
+            f"node {node}: the drive has no touch probe (60B8h is not in its EDS); find its index "
+            "by homing"
+        )
+    write = group.network.write
+    group.expect_index(axis, False)
+    write(node, 0x60B8, 0, _OFF)
+    write(node, 0x60B8, 0, _NEXT_ZERO_PULSE)
+    status = group.network.read_int(node, 0x60B9)
+    if not status & _ON or (status & _LATCHED and not group.feedback.valid[axis]):
+        raise DriveFaultError(
+            f"node {node}: the touch probe did not arm (60B9h = {status:04X}h after 60B8h = "
+            f"{_NEXT_ZERO_PULSE:04X}h)"
+        )
+    group.expect_index(axis, True)

@@ -10,32 +10,32 @@ from typing import Self
 import numpy as np
 
 from cdpr_drivers.axes import axis_codec as codec
-from cdpr_drivers.axes.axis_alarms import alarm_text
-from cdpr_drivers.axes.axis_buses import AxisReordering
+from cdpr_drivers.axes.axis_buses import AxisReordering, placed
+from cdpr_drivers.axes.axis_group import StateArrays, axis_faults
 from cdpr_drivers.axes.axis_layout import AxisConfig, GroupLayout
-from cdpr_drivers.axes.axis_state import StateArrays
 from cdpr_drivers.bus import BusHealth, BusUrl, FrameBuffer, open_port
 from cdpr_drivers.cia402 import STATE_TABLE, State
 from cdpr_profiles import Winch
 from cdpr_rt.arrays import BoolArray
 from cdpr_rt.core.clock import PacedClock
 from cdpr_rt.core.exchange import AxisCommand, AxisFeedback
+from cdpr_rt.core.fault import Fault
 
 _SYNC_ID = 0x080
 _SYNC_HEAD = bytes([_SYNC_ID, 0, 0, 0])
 _SYNC_WAIT_S = 0.05
-"""How long one cycle waits for a SYNC before it ends without."""
+"""Longest wait of one cycle for a SYNC; then it ends without."""
 _PAUSE_S = 0.5
-"""After so long without a SYNC the alarms are cleared with the next one."""
+"""After this time without a SYNC, the next one clears the alarms."""
 _ANSWER_SHARE = 1.0
 _LOCKSTEP_ANSWER_S = 0.2
 _SETTLE_SHARE = 0.25
-"""Of a period, after a cycle's answers: by then its SYNC has come on all buses."""
+"""Share of a period after a cycle's answers: by then its SYNC has arrived on all buses."""
 _LOCKSTEP_SETTLE_S = 0.005
 _MOST_CYCLES_AHEAD = 8
 _FRAMES_PER_AXIS, _SPARE_FRAMES = 8, 64
 _OTHER_MASTERS_ALARMS = codec.WRONG_MODE | codec.LEFT_ENABLED
-"""Alarms about the states and modes that the other master commands, which are none here."""
+"""Alarms about states and modes, which here the other master commands; ignored here."""
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,7 @@ class MonitoredBus:
 
 
 def monitored_axis(winch: Winch, node_id: int, name: str = "") -> AxisConfig:
-    """Return the axis of a drive that cannot be asked, from its profiles alone."""
+    """Return the axis of a drive that cannot be queried, from its profiles alone."""
     motor = winch.motor
     torque_Nm = motor.rated_torque_Nm
     counts = winch.encoder_counts_per_turn
@@ -60,18 +60,18 @@ class ListeningDevice:
     """n axes on several buses, received only; implements `cdpr_rt.core.exchange.AxisDevice`.
 
     Time comes from the SYNC of the master that runs them: `sync` waits for the next one, up to
-    0.05 s. The cycles of further buses are matched to those of the first,
-    again also after some were lost. Torques are in the unit that the profiles say, since the
-    drives are not asked for their rated torque.
+    0.05 s. The cycles of further buses are matched to those of the first, and matched again
+    after lost cycles. Torques use the unit of the profiles, because the drives are not asked
+    for their rated torque.
 
-    Raises BusError when a bus cannot be opened, and DriverError for a PDO map that does not serve
+    Raises BusError if a bus cannot be opened, and DriverError for a PDO map that does not support
     torque control.
     """
 
     lockstep = True
     """The next cycle begins with the other master's SYNC, not at a deadline of this process."""
     commands_s = 0.0
-    """It sends none."""
+    """It sends no commands."""
 
     def __init__(self, buses: Sequence[MonitoredBus], period_s: float, clock: PacedClock) -> None:
         self.buses = tuple(buses)
@@ -104,13 +104,13 @@ class ListeningDevice:
 
     @property
     def silent_s(self) -> float:
-        """Return for how long no SYNC has come."""
+        """Return the time since the last SYNC."""
         return self.clock.now_s - self._last_sync_s
 
     # -- one cycle
 
     def sync(self) -> None:
-        """Wait for the SYNC of the other master; raises BusError when a bus is gone."""
+        """Wait for the SYNC of the other master; raises BusError if a bus is gone."""
         first, *others = self._monitors
         if others:
             self._align_buses()
@@ -140,13 +140,13 @@ class ListeningDevice:
         return answered
 
     def _align_buses(self) -> None:
-        """Skip a cycle of those buses that stay ahead of others, which have lost one.
+        """Skip a cycle of those buses that stay ahead of others, which have lost a cycle.
 
-        Only after several cycles, since SYNC does not come on all buses at the same instant.
+        Only after several cycles, because SYNC does not arrive on all buses at the same instant.
         """
         deadline_s = self.clock.now_s + self._settle_s
         ahead = [monitor for monitor in self._monitors if monitor.sync_waiting(deadline_s)]
-        if 0 < len(ahead) < len(self._monitors):  # it may have come at that very time
+        if 0 < len(ahead) < len(self._monitors):  # it may have arrived at that very time
             deadline_s = self.clock.now_s + self._settle_s
             ahead = [monitor for monitor in self._monitors if monitor.sync_waiting(deadline_s)]
         self._cycles_ahead += 1 if 0 < len(ahead) < len(self._monitors) else -1
@@ -157,28 +157,30 @@ class ListeningDevice:
                 monitor.skip_cycle()
 
     def transmit(self) -> None:
-        """Send nothing, whatever `command` says."""
+        """Send nothing, regardless of `command`."""
         self.command.sent_torque_Nm.fill(0.0)
 
-    def alarm(self) -> str:
-        """Return what is wrong with an axis as far as its frames show, or an empty text.
+    def faults(self) -> tuple[Fault, ...]:
+        """Return the faults of the axes, as far as their frames show them.
 
-        That no master runs the axes is no alarm; see `silent_s`.
+        A missing master is not a fault; see `silent_s`.
         """
-        for monitor in self._monitors:
+        found: tuple[Fault, ...] = ()
+        for monitor, bus in zip(self._monitors, self.buses, strict=True):
             if monitor.alarms:
-                return f"bus {monitor.name}: {alarm_text(monitor.axes, monitor.ints)}"
-        return ""
+                faults = axis_faults(monitor.axes, monitor.ints)
+                found += placed(faults, bus.name, bus.axis_numbers)
+        return found
 
     def forget_alarms(self) -> None:
         """Forget latched alarms."""
         for monitor in self._monitors:
             monitor.forget_alarms()
 
-    # -- what is known of the axes
+    # -- what the frames show of the axes
 
     def states(self) -> list[State]:
-        """Return the state each axis reported last."""
+        """Return the last state that each axis reported."""
         return [State(int(state)) for state in self._row(codec.STATE)]
 
     def faulted(self) -> BoolArray:
@@ -187,7 +189,7 @@ class ListeningDevice:
 
     @property
     def missed(self) -> int:
-        """Answers that did not come since the beginning, over all axes."""
+        """Answers that did not arrive since the beginning, over all axes."""
         return int(sum(monitor.ints[codec.MISSED].sum() for monitor in self._monitors))
 
     def _row(self, row: int) -> codec.Ints:
@@ -196,7 +198,7 @@ class ListeningDevice:
     # -- the end
 
     def close(self) -> str:
-        """Leave the buses; returns an empty text, as no drive is to be switched off."""
+        """Leave the buses; return an empty text, because no drive needs to be switched off."""
         for monitor in self._monitors:
             monitor.close()
         return ""
@@ -214,7 +216,6 @@ class _BusMonitor:
     def __init__(
         self, bus: MonitoredBus, period_s: float, arrays: StateArrays, clock: PacedClock
     ) -> None:
-        self.name = bus.name
         self.axes = tuple(bus.axes)
         self._clock = clock
         self.health = BusHealth()
@@ -238,36 +239,36 @@ class _BusMonitor:
         self._port.drain()
 
     def _compile(self) -> None:
-        """Have the kernels compiled before there is a cycle to be late for."""
+        """Compile the kernels before a cycle could be late because of it."""
         self._decode(0)
         self.end_cycle()
         self.ints[codec.MISSED] = self.ints[codec.SILENT_CYCLES] = 0
         self.forget_alarms()
 
     def forget_alarms(self) -> None:
-        """Forget latched alarms and what irregularities have been noted."""
+        """Forget latched alarms and recorded irregularities."""
         for row in (codec.ALARM, codec.FAULTED, codec.SILENT_CYCLES, codec.HEARTBEAT_AGE):
             self.ints[row] = 0
         for row in (codec.FRAMES, codec.FLOOD, codec.EXTRA, codec.EMERGENCY):
             self.ints[row] = 0
         self._floats[codec.IRREGULAR] = 0.0
-        # the first index that the other master has latched counts as the axis' index
+        # the first index that the other master has latched is taken as the axis' index
         known = self._flags[codec.INDEX_KNOWN]
         self.ints[codec.PROBE_ARMED] = self._layout.probe_mapped & ~known
         self.alarms = 0
 
     def sync_waiting(self, deadline: float) -> bool:
-        """Decode what waits, or comes until `deadline`; return whether the next SYNC has come."""
+        """Decode frames until `deadline`; return whether the next SYNC has arrived."""
         if not self._sync_pending:
             self._sync_pending = self._listen(deadline)
         return self._sync_pending
 
     def skip_cycle(self) -> None:
-        """Pass over the SYNC that has come; the answers to it are late then."""
+        """Skip the SYNC that has arrived; the answers to it then count as late."""
         self._sync_pending = False
 
     def await_sync(self, deadline: float) -> bool:
-        """Wait for the next SYNC and begin its cycle; return whether it came in time."""
+        """Wait for the next SYNC and begin its cycle; return whether it arrived in time."""
         self.valid.fill(False)
         if not self._sync_pending and not self._listen(deadline):
             return False
@@ -277,7 +278,7 @@ class _BusMonitor:
         return True
 
     def collect_answers(self, deadline: float) -> int:
-        """Receive answers until all have come, time is up or the next SYNC; return how many."""
+        """Receive answers until all or the next SYNC arrived, or time is up; return how many."""
         awaited_before = self._missing
         if awaited_before:
             self._sync_pending = self._listen(deadline)
@@ -285,9 +286,9 @@ class _BusMonitor:
         return answered
 
     def _listen(self, deadline: float) -> bool:
-        """Receive frames until a SYNC (true), the last answer awaited, or `deadline` (false).
+        """Receive frames until a SYNC (true), the last expected answer, or `deadline` (false).
 
-        While answers are awaited, their coming ends it as well.
+        While answers are expected, their arrival also ends the wait.
         """
         recv_into, rows = self._port.recv_into, self._rx.rows
         awaited = self._missing > 0
@@ -322,7 +323,7 @@ class _BusMonitor:
         )  # fmt: skip
 
     def end_cycle(self) -> None:
-        """Count who was silent, irregular or without heartbeat."""
+        """Count which axes were silent, irregular or without heartbeat."""
         codec.end_answers(self.ints, self._floats, self._flags)
         alarms = self.ints[codec.ALARM]
         alarms &= ~_OTHER_MASTERS_ALARMS

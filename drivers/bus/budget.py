@@ -1,9 +1,9 @@
-"""Bus budget: whether the frames of a cycle fit into its period, at worst-case bit stuffing."""
+"""Bus budget: do the frames of a cycle fit into its period with worst-case bit stuffing."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from cdpr_profiles import DriveProfile, Pdo, Robot, Winch
@@ -12,12 +12,12 @@ _SYNC_BYTES, _HEARTBEAT_BYTES, _FULL_BYTES = 0, 1, 8
 _COMMAND_OBJECTS = (0x6040, 0x6071)
 _AT_EVERY_SYNC = range(1, 241)
 _ON_REQUEST = (252, 253)
-# heartbeats of the master within the time that a drive tolerates without one
+# number of master heartbeats sent within the time that a drive tolerates without one
 HEARTBEATS_IN_TOLERANCE = 4
 
 
 def worst_case_bits(n: int) -> int:
-    """Return the bits a frame with an 11-bit identifier and `n` data bytes takes at most.
+    """Return the maximum number of bits of a frame with an 11-bit identifier and `n` data bytes.
 
     The 34 + 8n bits from start of frame to the CRC may be stuffed: once after five equal bits,
     then, since a stuff bit counts as the first of the next five, after every four. 13 more bits,
@@ -27,39 +27,39 @@ def worst_case_bits(n: int) -> int:
 
 
 def bare_bits(n: int) -> int:
-    """Return the bits of such a frame when nothing in it has to be stuffed."""
+    """Return the bits of such a frame without stuff bits."""
     return 8 * n + 47
 
 
 @dataclass(frozen=True)
 class BusBudget:
-    """What one bus of a machine has to carry, in seconds on the wire."""
+    """Load of one bus of a machine, in seconds on the wire."""
 
     bus: str
     bitrate_bit_s: int
     nodes: tuple[int, ...]
     period_s: float
     cycle_s: float
-    """SYNC and every PDO of a cycle, stuffed as badly as can be."""
+    """SYNC and every PDO of a cycle, with worst-case bit stuffing."""
     bare_cycle_s: float
-    """The same without a single stuff bit."""
+    """The same without stuff bits."""
     commands_s: float
-    """What the master sends of it, SYNC not included."""
+    """Part of the cycle that the master sends, without SYNC."""
     heartbeat_share: float
-    """Share of the wire that heartbeats (and PDOs limited by their own times) take."""
+    """Share of the wire used by heartbeats (and by PDOs limited by their own times)."""
     changes_s: float
-    """PDOs that drives send on a change, all of them at once; they wait for gaps."""
+    """PDOs that drives send on a change, all at the same time; they wait for gaps."""
     longest_wait_s: float
-    """For how long SYNC may have to wait for a frame that has begun."""
+    """Longest time that SYNC may wait for a frame that has begun."""
 
     @property
     def margin_s(self) -> float:
-        """What a cycle leaves to SDO, EMCY and PDOs sent on a change, and to computing."""
+        """Time in a cycle that remains for SDO, EMCY, PDOs sent on a change, and computing."""
         return self.period_s * (1.0 - self.heartbeat_share) - self.cycle_s
 
     @property
     def fits(self) -> bool:
-        """Whether the cycle can go on for ever, heartbeats included."""
+        """Whether the cycles can continue indefinitely, heartbeats included."""
         return self.margin_s >= -1e-12
 
     @property
@@ -74,13 +74,13 @@ class BusBudget:
 
     @property
     def sdo_transfers_s(self) -> float:
-        """Expedited SDO transfers (request and answer) a second that fit beside the cycles."""
+        """Expedited SDO transfers (request and answer) per second that fit beside the cycles."""
         transfer_s = 2 * worst_case_bits(_FULL_BYTES) / self.bitrate_bit_s
         return max(0.0, self.margin_s) / self.period_s / transfer_s
 
     @property
     def recovery_cycles(self) -> float:
-        """Cycles until all drives have sent their PDOs on a change; inf without margin."""
+        """Cycles until all drives have sent their PDOs on a change; inf if there is no margin."""
         if self.changes_s == 0.0:
             return 0.0
         return math.inf if self.margin_s <= 0.0 else math.ceil(self.changes_s / self.margin_s)
@@ -106,25 +106,24 @@ def bus_budget(
 ) -> BusBudget:
     """Return the budget of a bus with `drives`, each a node id and its profile.
 
-    `master_heartbeat_s` follows from what the drives tolerate where it is left out.
+    By default, `master_heartbeat_s` follows from the times that the drives tolerate.
     """
-    every, commands, waiting = _Frames(), _Frames(), _Frames()
-    every.add(_SYNC_BYTES)
+    # bytes of each frame
+    every = [_SYNC_BYTES]
+    commands = [_bytes(pdo) for _, drive in drives for pdo in command_pdos(drive)]
+    waiting: list[int] = []
     share_bit_s = 0.0
     last = max(
         (pdo.cob_id(node) for node, drive in drives for pdo in _cyclic_pdos(drive)), default=0
     )
     for node, drive in drives:
-        for pdo in _cyclic_pdos(drive):
-            every.add(_bytes(pdo))
-        for pdo in command_pdos(drive):
-            commands.add(_bytes(pdo))
+        every += [_bytes(pdo) for pdo in _cyclic_pdos(drive)]
         for pdo in _pdos_on_change(drive):
             if pdo.cob_id(node) < last:
-                # it wins arbitration against a PDO of the cycle, so it may come in every one
-                every.add(_bytes(pdo))
+                # it wins arbitration against a PDO of the cycle, so every cycle may contain it
+                every.append(_bytes(pdo))
                 continue
-            waiting.add(_bytes(pdo))
+            waiting.append(_bytes(pdo))
             pause_s = pdo.inhibit_time_s or pdo.event_timer_s
             share_bit_s += worst_case_bits(_bytes(pdo)) / pause_s if pause_s else 0.0
         share_bit_s += worst_case_bits(_HEARTBEAT_BYTES) / drive.heartbeat_producer_s
@@ -137,11 +136,11 @@ def bus_budget(
         bitrate_bit_s=bitrate_bit_s,
         nodes=tuple(node for node, _ in drives),
         period_s=period_s,
-        cycle_s=every.worst / bitrate_bit_s,
-        bare_cycle_s=every.bare / bitrate_bit_s,
-        commands_s=commands.worst / bitrate_bit_s,
+        cycle_s=_worst_bits(every) / bitrate_bit_s,
+        bare_cycle_s=sum(map(bare_bits, every)) / bitrate_bit_s,
+        commands_s=_worst_bits(commands) / bitrate_bit_s,
         heartbeat_share=share_bit_s / bitrate_bit_s,
-        changes_s=waiting.worst / bitrate_bit_s,
+        changes_s=_worst_bits(waiting) / bitrate_bit_s,
         longest_wait_s=worst_case_bits(_FULL_BYTES) / bitrate_bit_s,
     )
 
@@ -164,24 +163,17 @@ def machine_budget(machine: Winch | Robot, period_s: float | None = None) -> lis
     ]
 
 
-class _Frames:
-    """Bits of some frames."""
-
-    def __init__(self) -> None:
-        self.worst = self.bare = 0
-
-    def add(self, n: int) -> None:
-        self.worst += worst_case_bits(n)
-        self.bare += bare_bits(n)
+def _worst_bits(lengths: Iterable[int]) -> int:
+    return sum(worst_case_bits(n) for n in lengths)
 
 
 def command_pdos(drive: DriveProfile) -> list[Pdo]:
-    """Return what the master sends to a drive in every cycle."""
+    """Return the PDOs that the master sends to a drive in every cycle."""
     return [p for p in drive.rpdos if any(e.index in _COMMAND_OBJECTS for e in p.entries)]
 
 
 def answer_pdos(drive: DriveProfile) -> list[Pdo]:
-    """Return what a drive answers to SYNC, to every one or to every so many."""
+    """Return the PDOs with which a drive answers every SYNC or every n-th SYNC."""
     return [p for p in drive.tpdos if p.transmission_type in _AT_EVERY_SYNC]
 
 

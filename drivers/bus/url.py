@@ -1,9 +1,14 @@
-"""Bus URLs: one text that names a CAN bus."""
+"""Bus URLs, and the lock for the one master of the bus that a URL names."""
 
 from __future__ import annotations
 
+import hashlib
 import re
+import socket
+import struct
 from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Self
 from urllib.parse import parse_qsl, quote
 
 import can
@@ -34,7 +39,7 @@ class BusUrl:
         """Parse `text`.
 
         Raises:
-            BusError: the text names no bus; the message tells what is allowed.
+            BusError: the text names no bus; the message lists the allowed forms.
         """
         match = _URL.fullmatch(text.strip())
         if match is None:
@@ -62,7 +67,7 @@ class BusUrl:
 
     @property
     def starts_own_simulator(self) -> bool:
-        """Whether the command has to start a simulator of its own (`simbus:` without a name)."""
+        """Whether the command must start its own simulator (`simbus:` without a name)."""
         return self.interface == "simbus" and not self.channel
 
     @property
@@ -125,3 +130,79 @@ def _value(text: str) -> Option:
         except ValueError:
             continue
     return text
+
+
+_PREFIX = "\0cdpr-rt/master/"
+_LONGEST_NAME = 80
+_CREDENTIALS = struct.Struct("iII")
+
+
+class MasterLock:
+    """The right of this process to command the nodes on `url`, until `close` or process end.
+
+    It is an abstract socket, so that a killed process leaves nothing behind. Programs in
+    containers with their own network, and on other machines, do not see it; boot listens
+    for those. Raises BusError, with the other process, if another one has the lock.
+    """
+
+    def __init__(self, url: BusUrl) -> None:
+        self._sock = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+        try:
+            self._sock.bind(_address(url))
+            self._sock.listen()
+        except OSError as error:
+            self._sock.close()
+            raise BusError(f"{url}: {_taken(url) or error.strerror}") from None
+
+    def close(self) -> None:
+        """Release the lock for other processes; a second call does nothing."""
+        self._sock.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+
+def refuse_second_master(url: BusUrl) -> None:
+    """Raise BusError if a process of this machine commands the nodes on `url`."""
+    taken = _taken(url)
+    if taken:
+        raise BusError(f"{url}: {taken}")
+
+
+def _taken(url: BusUrl) -> str:
+    """Return which process commands the bus; empty if none of this machine does."""
+    with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as caller:
+        caller.setblocking(False)
+        try:
+            caller.connect(_address(url))
+        except ConnectionRefusedError:
+            return ""
+        except OSError:
+            return "another process runs the drives on this bus"  # and accepts no more connections
+        credentials = caller.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, _CREDENTIALS.size)
+    pid, _, _ = _CREDENTIALS.unpack(credentials)
+    return f"process {pid}{_command_of(pid)} runs the drives on this bus; end that first"
+
+
+def _command_of(pid: int) -> str:
+    try:
+        words = Path(f"/proc/{pid}/cmdline").read_bytes().decode(errors="replace").split("\0")
+    except OSError:
+        return ""
+    command = " ".join(" ".join([Path(words[0]).name, *words[1:]]).split())
+    return f" ({command[:_LONGEST_NAME]})" if command else ""
+
+
+def _address(url: BusUrl) -> str:
+    """Return the lock's name: the same for all spellings of a bus that is one wire here."""
+    channel = url.channel
+    if channel.startswith("/"):
+        channel = str(Path(channel).resolve())
+    host = f"//{url.options['host']}:{url.options['port']}/" if "host" in url.options else ""
+    name = f"{url.interface}:{host}{channel}"
+    if len(name.encode()) > _LONGEST_NAME:
+        name = hashlib.sha256(name.encode()).hexdigest()
+    return _PREFIX + name

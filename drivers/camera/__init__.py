@@ -1,1 +1,1 @@
-"""Cameras: one interface, and what is behind it."""
+"""Cameras: one interface and its implementations."""

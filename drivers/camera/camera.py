@@ -1,19 +1,21 @@
-"""What every camera can do, and the image it gives."""
+"""The interface of all cameras, the images they return, and how to open one by its name."""
 
 from __future__ import annotations
 
+import importlib
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from cdpr_drivers.errors import DriverError
+from cdpr_rt.core.clock import Clock
 
 
 class CameraError(DriverError):
-    """A camera cannot be found, opened or used any more; the message names it and what helps."""
+    """A camera cannot be found, opened or used; the message names it and says what to do."""
 
 
 @dataclass(frozen=True)
@@ -21,31 +23,31 @@ class Image:
     """One image and when it was taken."""
 
     pixels: NDArray[np.uint8]
-    """Grey levels (height, width), row by row from above."""
+    """Grey levels (height, width), rows from top to bottom."""
     time_s: float
-    """By the clock that the camera was given, when the image had come."""
+    """When the image arrived, by the clock given to the camera."""
     device_time_s: float | None
-    """By the camera's own clock, where it has one: bus time of a simulated one."""
+    """By the camera's own clock, if it has one; bus time for a simulated camera."""
     name: str
-    """Of the image, for messages: a file's, or a number."""
+    """Name of the image for messages: a file name, or a number."""
 
 
 class Camera(ABC):
-    """A source of images; open it with `cdpr_drivers.camera.open_camera.open_camera`."""
+    """A source of images; open it with `cdpr_drivers.camera.camera.open_camera`."""
 
     name: str
-    """What it was opened by."""
+    """The URL with which it was opened."""
 
     @abstractmethod
     def grab(self) -> Image | None:
-        """Return an image taken after the call; None where a folder has no further one.
+        """Return an image taken after the call; None at the end of a folder.
 
-        Raises CameraError where none comes.
+        Raises CameraError if no image arrives.
         """
 
     @abstractmethod
     def close(self) -> None:
-        """Let go of the camera; safe to repeat."""
+        """Close the camera; safe to repeat."""
 
     def __enter__(self) -> Self:
         return self
@@ -67,3 +69,37 @@ def grey(pixels: NDArray[np.uint8], name: str) -> NDArray[np.uint8]:
         return np.ascontiguousarray(pixels[:, :, 0])
     levels: NDArray[np.float64] = pixels[:, :, :3] @ np.array([0.114, 0.587, 0.299])
     return np.rint(levels).astype(np.uint8)
+
+
+# Opening a camera by its name on the command line and in files.
+
+_KINDS = {
+    "opencv": ("opencv_camera", "OpencvCamera", "opencv:0 or opencv:rtsp://HOST/PATH"),
+    "folder": ("folder_camera", "FolderCamera", "folder:DIRECTORY"),
+    "genicam": ("genicam_camera", "GenicamCamera", "genicam:PRODUCER.cti, with #SERIAL of one"),
+    "sim": ("sim_camera", "SimulatedCamera", "sim:SOCKET"),
+}
+_EXTRAS = {"cv2": "camera", "harvesters": "genicam", "genicam": "genicam"}
+
+
+def open_camera(url: str, clock: Clock) -> Camera:
+    """Return the opened camera of a URL; `clock` stamps its images. Raises CameraError.
+
+    Only the library of the requested kind is imported.
+    """
+    kind, colon, place = url.partition(":")
+    if not colon or kind not in _KINDS or not place:
+        known = "; ".join(example for _, _, example in _KINDS.values())
+        raise CameraError(f"camera {url!r}; allowed: {known}")
+    module, name, _ = _KINDS[kind]
+    try:
+        made: Any = getattr(importlib.import_module(f"cdpr_drivers.camera.{module}"), name)
+    except ModuleNotFoundError as error:
+        extra = _EXTRAS.get((error.name or "").partition(".")[0])
+        if extra is None:
+            raise
+        raise CameraError(
+            f"camera {url}: needs {error.name}, which comes with: pip install 'cdpr-rt[{extra}]'"
+        ) from None
+    camera: Camera = made(place, clock)
+    return camera

@@ -1,8 +1,11 @@
-"""A folder of image files as a camera: each grab reads the next, in the order of their names."""
+"""A folder of image files as a camera: each grab reads the next file, in name order."""
 
 from __future__ import annotations
 
+import io
+import math
 import re
+import warnings
 from contextlib import suppress
 from functools import cached_property
 from pathlib import Path
@@ -10,25 +13,31 @@ from typing import Any
 
 import cv2
 import numpy as np
+import PIL.Image
 from numpy.typing import NDArray
 
 from cdpr_drivers.camera.camera import Camera, CameraError, Image
+from cdpr_profiles.bounded_input import read_bytes
+from cdpr_profiles.errors import ProfileError
 from cdpr_rt.core.clock import Clock
 
 _READ = cv2.IMREAD_GRAYSCALE | cv2.IMREAD_ANYDEPTH | cv2.IMREAD_IGNORE_ORIENTATION
-"""As the sensor had it: intrinsics are of the sensor, however a telephone was held."""
+"""In sensor orientation: intrinsics belong to the sensor, however a telephone was held."""
 _DEPTHS = 8, 10, 12, 14, 16
-"""Bits of a grey level that files of 16 bits are written with."""
+"""Possible bits of a grey level in 16-bit files."""
 _SINGLE = 99.99
-"""Percentile of an image's levels: single pixels that are defective tell no depth."""
+"""Percentile of an image's levels that decides the depth; it ignores single defective pixels."""
+_MOST_IMAGES = 20_000
+_MOST_BYTES = 1 << 28
+_MOST_PIXELS = 120_000_000
 _SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".pgm")
 
 
 class FolderCamera(Camera):
-    """Names are ordered with their numbers as numbers: 9.png comes before 10.png."""
+    """Numbers in names are ordered as numbers: 9.png comes before 10.png."""
 
     def __init__(self, place: str, clock: Clock) -> None:
-        """List the folder; raises CameraError where there is no image in it."""
+        """List the folder; raises CameraError if it has no image."""
         self.name = f"folder:{place}"
         self._clock = clock
         folder = Path(place).expanduser()
@@ -36,6 +45,8 @@ class FolderCamera(Camera):
             found = [path for path in folder.iterdir() if path.suffix.lower() in _SUFFIXES]
         except OSError as error:
             raise CameraError(f"folder {folder}: {error.strerror}") from None
+        if len(found) > _MOST_IMAGES:
+            raise CameraError(f"folder {folder}: {len(found)} images; allowed: {_MOST_IMAGES}")
         if not found:
             allowed = ", ".join(_SUFFIXES)
             raise CameraError(f"folder {folder}: holds no image; allowed: {allowed}")
@@ -48,7 +59,7 @@ class FolderCamera(Camera):
             return None
         path = self.files[self._next]
         self._next += 1
-        levels = self._eight_bits(_decoded(path), f"image {path}")
+        levels = self._eight_bits(decoded_image(path), f"image {path}")
         return Image(levels, self._clock.now_s, None, path.name)
 
     def close(self) -> None:
@@ -56,7 +67,7 @@ class FolderCamera(Camera):
         self._next = len(self.files)
 
     def _eight_bits(self, pixels: NDArray[Any], name: str) -> NDArray[np.uint8]:
-        """Return grey levels of 8 bits, of 16-bit ones the upper 8 of those in use."""
+        """Return grey levels of 8 bits; of 16-bit levels, the upper 8 of the bits in use."""
         if pixels.dtype == np.uint8:
             return np.asarray(pixels, np.uint8)
         if pixels.dtype != np.uint16:
@@ -65,32 +76,54 @@ class FolderCamera(Camera):
 
     @cached_property
     def _bits(self) -> int:
-        """Bits in use of files of 16: the brightest image of the folder tells, for all alike.
+        """Bits in use in 16-bit files: the brightest image of the folder decides for all.
 
-        One that is dark would be made as bright as the others by a depth of its own.
+        With a separate depth, a dark image would become as bright as the others.
         """
         top = 0
         for path in self.files:
-            with suppress(CameraError):  # is told once it is that file's turn
-                pixels = _decoded(path)
+            with suppress(CameraError):  # reported when this file is read
+                pixels = decoded_image(path)
                 if pixels.dtype == np.uint16:
                     top = max(top, int(np.percentile(pixels, _SINGLE)))
         return next(depth for depth in _DEPTHS if top < 1 << depth)
 
 
-def _decoded(path: Path) -> NDArray[Any]:
-    """Return the pixels of a file; raises CameraError."""
+def decoded_image(path: Path) -> NDArray[Any]:
+    """Return the grey levels of a file, (height, width).
+
+    Raises CameraError, also if the path is no regular file or the image is too large to decode.
+    """
     try:
-        data = np.frombuffer(path.read_bytes(), np.uint8)
-    except OSError as error:
-        raise CameraError(f"image {path}: {error.strerror}") from None
+        data = read_bytes(path, _MOST_BYTES)
+    except ProfileError as error:
+        raise CameraError(f"image {error}") from None
+    _require_size(data, path)
     try:
-        pixels = cv2.imdecode(data, _READ) if data.size else None
-    except cv2.error as error:  # more pixels than the library takes
+        pixels = cv2.imdecode(np.frombuffer(data, np.uint8), _READ)
+    except cv2.error as error:
         raise CameraError(f"image {path}: cannot be decoded: {error}") from None
     if pixels is None:
         raise CameraError(f"image {path}: cannot be decoded")
     return np.asarray(pixels)
+
+
+def _require_size(data: bytes, path: Path) -> None:
+    """Raise CameraError if the header of an image, the only part read here, gives too many pixels.
+
+    OpenCV cannot read only the header. Pillow is installed with Matplotlib.
+    """
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", PIL.Image.DecompressionBombWarning)
+        try:
+            with PIL.Image.open(io.BytesIO(data)) as image:
+                count = math.prod(image.size)
+        except PIL.Image.DecompressionBombError:
+            count = _MOST_PIXELS + 1
+        except (OSError, ValueError, SyntaxError):
+            raise CameraError(f"image {path}: cannot be decoded") from None
+    if count > _MOST_PIXELS:
+        raise CameraError(f"image {path}: too many pixels; allowed: up to {_MOST_PIXELS}")
 
 
 def _order(path: Path) -> list[tuple[int, str]]:

@@ -1,8 +1,8 @@
-"""Industrial cameras over GenICam (GigE Vision, USB3 Vision) by the library harvesters.
+"""Industrial cameras over GenICam (GigE Vision, USB3 Vision) with the library harvesters.
 
-Not tried with a camera, but with the simulated ones of the library's own producer, viky.cti. It
-needs the vendor's GenTL producer, a file that ends in .cti. Mono8 is set where the camera has it,
-and the software trigger, so that an image is taken after it is asked for.
+Not tested with a camera, only with the simulated ones of the library's own producer, viky.cti. It
+needs the vendor's GenTL producer, a file that ends in .cti. If the camera supports them, it uses
+Mono8 and the software trigger, so that an image is taken after the request.
 """
 
 from __future__ import annotations
@@ -27,12 +27,12 @@ _TO_GREY = {
     "RGB8": cv2.COLOR_RGB2GRAY, "BGR8": cv2.COLOR_BGR2GRAY,
     "RGBa8": cv2.COLOR_RGBA2GRAY, "BGRa8": cv2.COLOR_BGRA2GRAY,
 }  # fmt: skip
-"""By the names of the Pixel Format Naming Convention; Bayer formats by the colours that the first
-row begins with."""
+"""By the names of the Pixel Format Naming Convention; Bayer formats by the first colours of the
+first row."""
 
 
 class GenicamCamera(Camera):
-    """`genicam:/opt/vendor/producer.cti`, or with #SERIAL the camera of this serial number."""
+    """`genicam:/opt/vendor/producer.cti`, or with #SERIAL the camera with this serial number."""
 
     def __init__(self, place: str, clock: Clock) -> None:
         """Open the camera; raises CameraError."""
@@ -52,14 +52,14 @@ class GenicamCamera(Camera):
             self._require_one(serial)
             selection = {"serial_number": serial} if serial else 0
             self._acquirer: Any = self._harvester.create(selection)
-            with suppress(Exception):  # what it gives otherwise is told with the image
+            with suppress(Exception):  # another format is reported with the image
                 self._acquirer.remote_device.node_map.PixelFormat.value = "Mono8"
             self._triggered = self._use_software_trigger()
             self._acquirer.start()
         except CameraError:
             self._harvester.reset()
             raise
-        except Exception as error:  # each producer has errors of its own
+        except Exception as error:  # each producer has its own errors
             self._harvester.reset()
             raise CameraError(
                 f"camera {self.name} cannot be opened: {error}; is it used by another program?"
@@ -82,7 +82,7 @@ class GenicamCamera(Camera):
             nodes.TriggerSelector.value = "FrameStart"
             nodes.TriggerSource.value = "Software"
             nodes.TriggerMode.value = "On"
-        except Exception:  # a camera without it runs free
+        except Exception:  # a camera without a trigger runs freely
             return False
         return True
 
@@ -104,11 +104,11 @@ class GenicamCamera(Camera):
                 component = buffer.payload.components[0]
                 pixels = _grey(component, f"camera {self.name}")
                 stamp = None
-                with suppress(Exception):  # some producers tell no time
+                with suppress(Exception):  # some producers give no time
                     stamp = buffer.timestamp_ns
         except CameraError:
             raise
-        except Exception as error:  # each producer has errors of its own
+        except Exception as error:  # each producer has its own errors
             raise CameraError(
                 f"camera {self.name} gives no image: {str(error) or type(error).__name__}; is it "
                 "unplugged, or used by another program?"
@@ -119,7 +119,7 @@ class GenicamCamera(Camera):
 
     def close(self) -> None:
         """See `Camera.close`."""
-        with suppress(Exception):  # it may have gone already
+        with suppress(Exception):  # it may be gone already
             self._acquirer.stop()
             self._acquirer.destroy()
         self._harvester.reset()

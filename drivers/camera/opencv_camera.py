@@ -7,21 +7,21 @@ import cv2
 from cdpr_drivers.camera.camera import Camera, CameraError, Image, grey
 from cdpr_rt.core.clock import Clock
 
-# what is wrong is told by the errors here, not by lines of the library's own on standard error
+# errors are raised here, so the library need not print its own lines on standard error
 cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
 
 _STREAMS = ("rtsp://", "rtsps://", "rtmp://", "udp://", "rtp://")
 _STALE = 4
-"""Images that a V4L2 device may have waiting from before."""
+"""Maximum number of old images that a V4L2 device may have waiting."""
 _FRESH_S, _MOST_STALE = 0.005, 200
-"""An image for which a stream lets wait so long had not come before."""
+"""An image that a stream delivers only after this time is a new one."""
 
 
 class OpencvCamera(Camera):
-    """`opencv:0` is /dev/video0; anything that is no number is a path or URL for OpenCV."""
+    """`opencv:0` is /dev/video0; anything that is not a number is a path or URL for OpenCV."""
 
     def __init__(self, place: str, clock: Clock) -> None:
-        """Open it; raises CameraError."""
+        """Open the camera; raises CameraError."""
         self.name = f"opencv:{place}"
         self._clock = clock
         self._number = 0
@@ -35,7 +35,7 @@ class OpencvCamera(Camera):
         if not self._capture.isOpened():
             hint = "; `ls /dev/video*` shows those there are" if device else ""
             raise CameraError(f"camera {self.name} cannot be opened{hint}")
-        # by default a driver hands out images from some time before
+        # by default a driver returns older images first
         self._capture.set(cv2.CAP_PROP_BUFFERSIZE, 1)
 
     def grab(self) -> Image:
@@ -52,7 +52,7 @@ class OpencvCamera(Camera):
         return Image(grey(pixels.astype("uint8"), name), self._clock.now_s, None, name)
 
     def _drop_stale(self) -> None:
-        """Take what had come before; a stream may have any number waiting."""
+        """Discard old images; a stream may have any number waiting."""
         if self._device:
             for _ in range(_STALE):
                 self._capture.grab()

@@ -1,4 +1,4 @@
-"""Client of the simulated camera, a process of its own that answers on a Unix socket."""
+"""Client of the simulated camera, a separate process that answers on a Unix socket."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ import socket
 import numpy as np
 
 from cdpr_drivers.camera.camera import Camera, CameraError, Image
+from cdpr_profiles.bounded_input import parse_json
 from cdpr_profiles.errors import ProfileError
-from cdpr_profiles.reading.bounded_input import parse_json
 from cdpr_rt.core.clock import Clock
 
 _TIMEOUT_S = 60.0
@@ -16,7 +16,7 @@ _MOST_HEADER, _MOST_PIXELS = 4096, 100_000_000
 
 
 class SimulatedCamera(Camera):
-    """Asks one image at a time; its own time is the time of the simulated bus."""
+    """Requests one image at a time; its own time is the time of the simulated bus."""
 
     def __init__(self, place: str, clock: Clock) -> None:
         """Connect; raises CameraError."""

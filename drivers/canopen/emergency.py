@@ -12,7 +12,7 @@ LENGTH = 8
 _LAYOUT = struct.Struct("<HB5s")
 _KEPT = 256
 _FLOOD, _FLOOD_WINDOW_S = 100, 1.0
-"""More messages of one node than this within the window are a flood."""
+"""More messages of one node within the window than this are a flood."""
 _REGISTER_BITS = (
     "generic",
     "current",
@@ -26,21 +26,21 @@ _REGISTER_BITS = (
 
 
 def register_text(register: int) -> str:
-    """Return the classes of error that an error register (1001h) shows, in words."""
+    """Return the classes of error in an error register (1001h), as text."""
     words = [name for bit, name in enumerate(_REGISTER_BITS) if register >> bit & 1]
     return ", ".join(words) or "no error"
 
 
 @dataclass(frozen=True)
 class Emergency:
-    """One EMCY message and when it came."""
+    """One EMCY message and its time of arrival."""
 
     node_id: int
     code: int
     register: int
     vendor: bytes
     at_s: float
-    """When it came, by the robot's clock."""
+    """Time of arrival, by the robot's clock."""
 
     @classmethod
     def from_frame(cls, node_id: int, data: bytes, at_s: float) -> Emergency:
@@ -53,13 +53,17 @@ class Emergency:
         """Whether it reports that an error is gone (error codes 00xxh)."""
         return not self.code >> 8
 
-    def __str__(self) -> str:
+    @property
+    def text(self) -> str:
+        """The message without its sender."""
         what = "error reset" if self.is_reset else fault_text(self.code)
-        text = f"node {self.node_id}: {what} (error register {self.register:02X}h"
-        text += f": {register_text(self.register)}"
+        text = f"{what}; error register {self.register:02X}h ({register_text(self.register)})"
         if any(self.vendor):
-            text += f"; manufacturer's bytes {self.vendor.hex(' ')}"
-        return text + ")"
+            text += f"; manufacturer {self.vendor.hex(' ').upper()}"
+        return text
+
+    def __str__(self) -> str:
+        return f"node {self.node_id}: {self.text}"
 
 
 @dataclass(frozen=True)
@@ -84,13 +88,13 @@ class EmergencyLog:
         self._recent: dict[int, tuple[float, int]] = {}
 
     def add(self, emergency: Emergency) -> str:
-        """Keep a message; return a complaint where the node sends too many, else an empty text."""
+        """Store a message; if too many came, return how many and the last; else ""."""
         self.kept.append(emergency)
         standing = self._standing.setdefault(emergency.node_id, {})
         if not emergency.is_reset:
             standing[emergency.code] = emergency
         else:
-            # the register tells which classes of error remain; bit 0 stands for any of them
+            # the register shows which classes of error remain; bit 0 stands for any of them
             remain = emergency.register & ~1
             for code in [c for c, e in standing.items() if not e.register & remain]:
                 if remain or not emergency.register:
@@ -106,7 +110,7 @@ class EmergencyLog:
         return list(self._standing.get(node_id, {}).values())
 
     def of(self, node_id: int) -> list[Emergency]:
-        """Return the messages kept of one node, oldest first."""
+        """Return the stored messages of one node, oldest first."""
         return [emergency for emergency in list(self.kept) if emergency.node_id == node_id]
 
     def _flood(self, emergency: Emergency) -> str:
@@ -119,6 +123,6 @@ class EmergencyLog:
         if count <= _FLOOD:
             return ""
         return (
-            f"node {node_id} floods the bus: {count} emergency messages within "
-            f"{_FLOOD_WINDOW_S:g} s, the last {fault_text(emergency.code)}"
+            f"{count} emergency messages within {_FLOOD_WINDOW_S:g} s, the last "
+            f"{fault_text(emergency.code)}"
         )

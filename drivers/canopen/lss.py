@@ -1,18 +1,43 @@
-"""LSS master of CiA 305: find drives by their identity, give them a node id and a bit rate.
+"""LSS master of CiA 305: find drives by their identity, set their node id and bit rate.
 
-The `canopen` package's master is not used, since it takes any frame for the answer to the request
-before it: with several drives without a node id its fastscan can put together an identity that
-none of them has. It also waits 0.2 s for each number of an address and drops the error codes.
+The `canopen` package's master is not used, because it accepts any frame as the answer to the last
+request: with several drives without a node id its fastscan can assemble an identity that none
+of them has. It also waits 0.2 s for each number of an address and drops the error codes.
 """
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
+from functools import partial
 from typing import Self
 
-from cdpr_drivers.canopen.lss_link import LssError, LssLink
-from cdpr_drivers.errors import BusError
+from cdpr_drivers.bus.frames import EFF_FLAG, FRAME, RTR_FLAG
+from cdpr_drivers.bus.url import BusUrl
+from cdpr_drivers.canopen.network import BusMember
+from cdpr_drivers.canopen.sdo import ANSWER, REQUEST, SdoClient
+from cdpr_drivers.errors import BusError, DriverError, SdoAbortError, SdoTimeoutError
+from cdpr_rt.core.clock import Clock
+
+# Frames between the LSS master and the devices on one bus: requests, answers, time-outs.
+
+_MASTER, _SLAVE = 0x7E5, 0x7E4
+_NMT, _HEARTBEAT = 0x000, 0x700
+_EXACT_ID_MASK = 0x7FF | EFF_FLAG | RTR_FLAG
+_ANY_NODE = 0x780 | EFF_FLAG | RTR_FLAG
+_RESET_COMMUNICATION = 130
+_SETTLE_S = 0.005
+_SDO_TIMEOUTS = 3.0
+_SDO_BYTES = 8
+_LONGEST_DRAIN_S = 0.3
+_MOST_WAITING = 1024
+
+
+class LssError(DriverError):
+    """A device refused a setting or did not answer over LSS; names the setting and the reason."""
+
 
 __all__ = [
     "BITRATE_INDEX",
@@ -24,9 +49,9 @@ __all__ = [
 ]
 
 UNCONFIGURED = 255
-"""Node id of a device that has none."""
+"""Node id of a device without one."""
 NODE_ID_UNKNOWN = 0
-"""Node id of a device that does not report it, as early ones."""
+"""Node id of a device that does not report it, such as early ones."""
 
 BITRATE_INDEX = {
     1_000_000: 0,
@@ -57,13 +82,13 @@ _VENDOR_SPECIFIC = 255
 
 _SEARCHES = 4
 _NEVER_USED = 127
-"""Node id that stands in a device during a search, and is taken out before it could count."""
+"""Node id that a device has during a search; it is removed before it could take effect."""
 _ALL = (0, 0xFFFFFFFF)
 
 
 @dataclass(frozen=True, order=True)
 class LssAddress:
-    """The four numbers of 1018h, which together belong to one device only."""
+    """The four numbers of 1018h, which together identify a single device."""
 
     vendor_id: int
     product_code: int
@@ -80,13 +105,128 @@ class LssAddress:
         return f"vendor {vendor}, product {product}, revision {revision}, serial {self.serial}"
 
 
-class LssMaster(LssLink):
+class LssMaster(BusMember):
     """LSS on one bus; a context manager that leaves every device in the waiting state.
 
-    `timeout_s` is how long a device may take to answer. Silence is an answer too (fastscan asks
-    bit by bit), so it also decides how long a search takes. Raises BusError when the bus cannot
-    be opened, or is lost later.
+    `timeout_s` is the longest time that a device may take to answer. Silence is also an answer
+    (fastscan asks bit by bit), so it also determines the duration of a search. Raises BusError if
+    the bus cannot be opened, or is lost later.
     """
+
+    def __init__(self, url: BusUrl, clock: Clock, timeout_s: float = 0.1) -> None:
+        self.timeout_s = timeout_s
+        self._frames: deque[tuple[int, bytes]] = deque(maxlen=_MOST_WAITING)
+        self._lost: BusError | None = None
+        self._clients: dict[int, SdoClient] = {}
+        self._answering: set[int] = set()
+        heard = [(_SLAVE, _EXACT_ID_MASK), (ANSWER, _ANY_NODE), (_HEARTBEAT, _ANY_NODE)]
+        super().__init__(url, clock, heard)
+        self._settle_s = _SETTLE_S
+
+    def on_loss(self, error: BusError) -> None:
+        """End transfers and waits with the error."""
+        self._lost = error
+        for client in self._clients.values():
+            client.fail(error)
+
+    def take_frame(self, frame: memoryview) -> None:
+        """Queue a frame for the waiting request."""
+        identifier, length, data = FRAME.unpack_from(frame)
+        client = self._clients.get(identifier - ANSWER)
+        if client is None:
+            self._frames.append((identifier, data[:length]))
+        elif length == _SDO_BYTES:
+            self._answering.add(identifier - ANSWER)
+            client.on_answer(data)
+
+    # -- other nodes of the bus
+
+    def node_id_in_use(self, node_id: int, listen_s: float = 0.5) -> str:
+        """Return the evidence that a node uses `node_id`; else an empty text."""
+        self._collect(0, 0.0)
+        self._answering.discard(node_id)
+        with suppress(SdoAbortError, SdoTimeoutError):
+            self._upload(node_id, 0x1000)
+        if node_id in self._answering:  # whichever node it answers
+            return "it answers to SDO"
+        deadline = self.clock.now_s + listen_s
+        while (frame := self._receive(deadline)) is not None:
+            if frame[0] == _HEARTBEAT + node_id:
+                return "its heartbeat is on the bus"
+        return ""
+
+    def read_object(self, node_id: int, index: int) -> int:
+        """Return an unsigned object by SDO; raises SdoAbortError, SdoTimeoutError, BusError."""
+        return int.from_bytes(self._upload(node_id, index), "little")
+
+    def _upload(self, node_id: int, index: int) -> bytes:
+        if node_id not in self._clients:
+            send = partial(self.send, REQUEST + node_id)
+            self._clients[node_id] = SdoClient(send, self.clock)
+        timeout_s = _SDO_TIMEOUTS * self.timeout_s
+        with suppress(SdoTimeoutError):
+            return self._clients[node_id].upload(index, 0, timeout_s)
+        return self._clients[node_id].upload(index, 0, timeout_s)
+
+    def reset_communication(self, node_id: int) -> None:
+        """Restart a node's communication by NMT, so that its new node id takes effect."""
+        self.send(_NMT, bytes([_RESET_COMMUNICATION, node_id]))
+
+    def wait_for_boot_up(self, node_id: int, timeout_s: float = 2.0) -> bool:
+        """Return whether a node's boot-up message or heartbeat arrives in time."""
+        deadline = self.clock.now_s + timeout_s
+        while (frame := self._receive(deadline)) is not None:
+            if frame[0] == _HEARTBEAT + node_id:
+                return True
+        return False
+
+    # -- frames
+
+    def _ask_single(self, question: bytes, specifier: int) -> bytes:
+        """Return the answer of the one device in the configuration state; raises LssError."""
+        answer = self._ask(question, specifier)
+        if answer is None:
+            raise LssError(f"no device answers (LSS command {question[0]:02X}h)")
+        answers = [answer, *self._collect(specifier, self._settle_s)]
+        if len(answers) > 1:
+            raise LssError(
+                f"{len(answers)} devices answer: connect one at a time, or name one by its "
+                "profile and serial number"
+            )
+        return answers[0]
+
+    def _ask(self, question: bytes, specifier: int) -> bytes | None:
+        self._collect(specifier, 0.0)
+        self._send(question)
+        deadline = self.clock.now_s + self.timeout_s
+        while (frame := self._receive(deadline)) is not None:
+            if frame[0] == _SLAVE and frame[1][:1] == bytes([specifier]):
+                return frame[1].ljust(8, b"\0")
+        return None
+
+    def _collect(self, specifier: int, wait_s: float) -> list[bytes]:
+        """Return the answers that arrive within `wait_s`; with 0.0 discard waiting frames."""
+        deadline = self.clock.now_s + wait_s
+        answers = []
+        while (frame := self._receive(deadline)) is not None:
+            if frame[0] == _SLAVE and frame[1][:1] == bytes([specifier]):
+                answers.append(frame[1].ljust(8, b"\0"))
+        return answers
+
+    def _receive(self, deadline: float) -> tuple[int, bytes] | None:
+        """Return the next frame, even one that waits after the deadline; None without one."""
+        if deadline - self.clock.now_s < -_LONGEST_DRAIN_S:
+            return None  # otherwise a babbling node would block this loop
+        self.poll()
+        self.clock.wait(lambda: self._frames or self._lost, deadline)
+        if self._lost is not None:
+            raise self._lost
+        return self._frames.popleft() if self._frames else None
+
+    def _send(self, data: bytes) -> None:
+        self.send(_MASTER, data.ljust(8, b"\0"))
+
+    # -- context
 
     def __enter__(self) -> Self:
         self.release()
@@ -101,27 +241,27 @@ class LssMaster(LssLink):
         finally:
             self.close()
 
-    # -- finding
+    # -- searching
 
     def release(self) -> None:
-        """Return all devices to the waiting state; one that got its first node id boots now."""
+        """Return all devices to the waiting state; one with its first node id boots now."""
         self._send(bytes([_SWITCH_GLOBAL, _WAITING]))
 
     def has_unconfigured(self) -> bool:
-        """Tell whether a device without a node id is on the bus (not all know this question)."""
+        """Return whether a device without a node id is on the bus (not all know this request)."""
         return bool(self._ask(bytes([_IDENTIFY_UNCONFIGURED]), _UNCONFIGURED_IDENTIFIED))
 
     def unconfigured(self) -> list[LssAddress]:
         """Return the devices without a node id, by fastscan, sorted.
 
-        Raises LssError when they do not answer in a way that makes sense.
+        Raises LssError if their answers are inconsistent.
         """
         for _ in range(_SEARCHES):
             found = self._fastscan_all()
             if found is not None and all(self._confirms(address) for address in found):
                 self.release()
                 return sorted(found)
-            self._settle_s *= 2.0  # answers of several devices ran into the next question
+            self._settle_s *= 2.0  # answers of several devices overlapped the next request
         raise LssError(
             "the devices without a node id do not answer the fastscan in a way that makes sense; "
             "give them a longer --timeout, or connect one at a time"
@@ -137,7 +277,7 @@ class LssMaster(LssLink):
     ) -> list[LssAddress]:
         """Return the devices of one type, with a node id or without, in inclusive ranges.
 
-        `usual_revision` is asked for first, which saves a search for each device that has it.
+        `usual_revision` is tried first, which saves a search for each device that has it.
         """
         kind = vendor_id, product_code
         found = []
@@ -156,9 +296,9 @@ class LssMaster(LssLink):
         return found
 
     def select(self, address: LssAddress) -> int:
-        """Put one device into the configuration state and return its node id, or one of the above.
+        """Put one device into the configuration state; return its node id, or a constant above.
 
-        Raises LssError when it does not answer.
+        Raises LssError if it does not answer.
         """
         self.release()
         for part, number in enumerate(address.numbers):
@@ -170,9 +310,9 @@ class LssMaster(LssLink):
         return self._node_id()
 
     def select_only(self) -> tuple[LssAddress, int]:
-        """Put the only device on the bus into the configuration state; return who it is.
+        """Put the only device on the bus into the configuration state; return address and node id.
 
-        Raises LssError when none answers, or more than one.
+        Raises LssError if none answers, or more than one.
         """
         self._send(bytes([_SWITCH_GLOBAL, _CONFIGURATION]))
         return LssAddress(*self._inquire()), self._node_id()
@@ -196,7 +336,7 @@ class LssMaster(LssLink):
     def _bisect(
         self, whole: tuple[int, int], any_in: Callable[[tuple[int, int]], bool]
     ) -> list[int]:
-        """Return the numbers of a range that devices have; `any_in` asks for any in a part."""
+        """Return the numbers in a range that devices have; `any_in` tests a part of the range."""
         found: list[int] = []
         parts = [whole]
         while parts:
@@ -211,7 +351,7 @@ class LssMaster(LssLink):
         return found
 
     def _fastscan_all(self) -> set[LssAddress] | None:
-        """Return what repeated fastscans find, None when one does not complete."""
+        """Return the devices found by repeated fastscans; None if a scan does not complete."""
         self.release()
         found: set[LssAddress] = set()
         silenced: set[LssAddress] = set()
@@ -225,8 +365,8 @@ class LssMaster(LssLink):
                         f"{address} takes part in the fastscan after it has been found, which "
                         "hides others: connect it alone and use --alone"
                     )
-                # it is in configuration state now, so that the next scan passes it by; CANopenNode
-                # waits for a node id besides
+                # it is in configuration state now, so that the next scan skips it; CANopenNode
+                # also waits for a node id
                 if address in found or silenced:
                     self._prepare_node_id(_NEVER_USED)
                     silenced = found | {address}
@@ -246,7 +386,7 @@ class LssMaster(LssLink):
         return LssAddress(*numbers)
 
     def _prepare_node_id(self, node_id: int) -> None:
-        """Give all devices in the configuration state a node id that counts from `release` on."""
+        """Give all devices in the configuration state a node id that takes effect at `release`."""
         self._ask(bytes([_SET_NODE_ID, node_id]), _SET_NODE_ID)
         self._collect(_SET_NODE_ID, self._settle_s)
 
@@ -257,7 +397,7 @@ class LssMaster(LssLink):
             return False
 
     def _scan_number(self, part: int) -> int | None:
-        """Return one number of the lowest address, None when no device confirms it."""
+        """Return one number of the lowest address; None if no device confirms it."""
         number = 0
         for bit in range(31, -1, -1):
             if not self._scan(number, bit, part, part):
@@ -268,11 +408,11 @@ class LssMaster(LssLink):
         question = bytes([_FASTSCAN]) + number.to_bytes(4, "little")
         if not self._ask(question + bytes([bit, part, following]), _IDENTIFIED):
             return False
-        # each device that fits answers, and not all are equally quick
+        # each matching device answers, and their delays differ
         self._collect(_IDENTIFIED, self._settle_s)
         return True
 
-    # -- asking the device in the configuration state
+    # -- requests to the device in the configuration state
 
     def _inquire(self) -> tuple[int, int, int, int]:
         numbers = []
@@ -289,24 +429,24 @@ class LssMaster(LssLink):
     def set_node_id(self, node_id: int) -> None:
         """Give the selected device a node id, 1 to 127 or 255; raises LssError if refused.
 
-        It counts from the next reset of communication on, for good when stored.
+        It takes effect at the next communication reset, and permanently if stored.
         """
         self._set(_SET_NODE_ID, bytes([node_id]), f"node id {node_id}")
 
     def set_bitrate(self, bitrate_bit_s: int) -> None:
         """Give the selected device a bit rate of `BITRATE_INDEX`; raises LssError if refused.
 
-        It counts from `activate_bitrate` on, or when stored from the next power-on.
+        It takes effect at `activate_bitrate` or, if stored, at the next power-on.
         """
         table = bytes([0, BITRATE_INDEX[bitrate_bit_s]])
         self._set(_SET_BIT_TIMING, table, f"a bit rate of {bitrate_bit_s // 1000} kbit/s")
 
     def store(self) -> None:
-        """Have the selected device keep node id and bit rate; raises LssError if it cannot."""
+        """Let the selected device store node id and bit rate; raises LssError if it cannot."""
         self._set(_STORE, b"", "to store its settings")
 
     def activate_bitrate(self, delay_s: float) -> None:
-        """Have the selected device change over: `delay_s` of silence before and after."""
+        """Let the selected device switch: `delay_s` of silence before and after."""
         self._send(bytes([_ACTIVATE]) + round(delay_s * 1e3).to_bytes(2, "little"))
 
     def _set(self, command: int, content: bytes, what: str) -> None:

@@ -1,4 +1,4 @@
-"""SDO client of one node (CiA 301): one transfer at a time, which may be cancelled."""
+"""SDO client of one node (CiA 301): one transfer at a time, which can be cancelled."""
 
 from __future__ import annotations
 
@@ -7,13 +7,72 @@ from binascii import crc_hqx
 from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import NoReturn
+from typing import Final, NoReturn
 
-from cdpr_drivers.canopen import sdo_abort
-from cdpr_drivers.canopen import sdo_frames as frames
-from cdpr_drivers.canopen.sdo_frames import BLOCK_UPLOAD, DOWNLOAD, UPLOAD
 from cdpr_drivers.errors import BusError, SdoAbortError, SdoCancelledError, SdoTimeoutError
 from cdpr_rt.core.clock import Clock
+
+# Frames of SDO transfers (CiA 301), built and matched by a client; no waiting.
+
+REQUEST: Final = 0x600
+ANSWER: Final = 0x580
+"""Base identifiers of requests and answers, to which the node id is added."""
+UPLOAD, DOWNLOAD, BLOCK_UPLOAD = 2, 3, 6
+"""Meaning of the top three bits of an answer to the first request."""
+
+ABORT: Final = 0x80
+"""First byte of a frame that ends a transfer."""
+# abort codes
+TIMED_OUT: Final = 0x05040000
+UNKNOWN_COMMAND: Final = 0x05040001
+CRC: Final = 0x05040004
+OUT_OF_MEMORY: Final = 0x05040005
+LENGTH: Final = 0x06070010
+NO_SUBINDEX: Final = 0x06090011
+GENERAL: Final = 0x08000000
+NO_DATA: Final = 0x08000024
+ABSENT: Final = (0x06020000, NO_SUBINDEX, NO_DATA)
+"""Codes by which a node reports that the object does not exist or is empty."""
+
+_FIRST = struct.Struct("<BHB4s")
+
+
+def multiplexer(index: int, sub: int) -> bytes:
+    """Return the 3 bytes that identify an object in frames."""
+    return struct.pack("<HB", index, sub)
+
+
+def request_frame(command: int, index: int, sub: int, data: bytes = b"") -> bytes:
+    """Return the first request of a transfer; `data` are the last 4 bytes, padded with zeros."""
+    return _FIRST.pack(command, index, sub, data)
+
+
+def upload_request(index: int, sub: int) -> bytes:
+    """Return the request for an object's value."""
+    return request_frame(0x40, index, sub)
+
+
+def answers(frame: bytes, what: bytes, *kinds: int) -> bool:
+    """Return whether a frame answers the first request for the object of this multiplexer."""
+    return len(frame) == 8 and frame[0] >> 5 in kinds and frame[1:4] == what
+
+
+def abort_code(frame: bytes) -> int | None:
+    """Return the code of a frame that aborts a transfer; None for any other frame."""
+    return int.from_bytes(frame[4:8], "little") if frame[0] == ABORT else None
+
+
+def expedited(frame: bytes) -> bytes | None:
+    """Return the value in the answer to an upload request; None if it is sent in segments."""
+    if not frame[0] & 0x02:
+        return None
+    return frame[4 : 8 - (frame[0] >> 2 & 0x03) if frame[0] & 0x01 else 8]
+
+
+def segment(frame: bytes) -> tuple[bytes, bool]:
+    """Return the data of a segment, and whether it is the last."""
+    return frame[1 : 8 - (frame[0] >> 1 & 0x07)], bool(frame[0] & 0x01)
+
 
 Send = Callable[[bytes], None]
 Accept = Callable[[bytes], bool]
@@ -21,24 +80,26 @@ Accept = Callable[[bytes], bool]
 _END = struct.Struct("<BH")
 _BLOCK_SEGMENTS = 127
 _MOST_WAITING = 1024
-"""Frames kept for a transfer; a node that floods its SDO identifier fills no memory."""
+"""Maximum number of frames kept for a transfer, so that a flood cannot fill the memory."""
 _MOST_BYTES = 1 << 18
-"""An upload that goes on and on is given up after so many."""
+"""Size at which an endless upload is aborted."""
 
 
 class SdoClient:
     """Transfers to and from one node; `send` puts a request of 8 bytes on the bus.
 
-    Of several tasks the next one begins when the one before has ended.
+    If several tasks transfer, each waits until the previous transfer has ended.
 
-    An answer that belongs to no request (a duplicate, another client's, a second device's) is
+    An answer to no request (a duplicate, another client's, a second device's) is
     discarded and counted. Uploads and downloads raise SdoAbortError, SdoTimeoutError,
     SdoCancelledError and BusError, all without naming node and object.
     """
 
-    def __init__(self, send: Send, clock: Clock) -> None:
+    def __init__(self, send: Send, clock: Clock, most_bytes: int = _MOST_BYTES) -> None:
+        """Give an upload up after `most_bytes`."""
+        self._most_bytes = most_bytes
         self.unexpected = 0
-        """Answers to no request, since it was set to 0 or a request timed out."""
+        """Answers without a request since it was set to 0 or a request timed out."""
         self._send = send
         self._clock = clock
         self._answers: deque[bytes] = deque()
@@ -49,19 +110,19 @@ class SdoClient:
         self._timeout_s = 0.0
 
     def on_answer(self, data: bytes) -> None:
-        """Take an answer of 8 bytes from the bus."""
+        """Process an answer of 8 bytes from the bus."""
         if len(self._answers) < _MOST_WAITING:
             self._answers.append(data)
 
     def await_unexpected(self, seconds: float) -> int:
-        """Return the number of unexpected answers, after waiting for more of them."""
+        """Wait for more unexpected answers; return their number."""
         with self._exclusive():
             self._clock.wait(lambda: self._lost, self._clock.now_s + seconds)
             self._discard_unexpected()
             return self.unexpected
 
     def cancel(self) -> bool:
-        """Have the transfer that runs end with SdoCancelledError; return whether one runs.
+        """End the running transfer with SdoCancelledError; return whether one runs.
 
         The node gets an abort (08000000h).
         """
@@ -69,13 +130,13 @@ class SdoClient:
         return self._busy
 
     def fail(self, error: BusError) -> None:
-        """Have transfers end at once, now and later: the bus has gone away."""
+        """End transfers immediately, now and later, because the bus is gone."""
         self._lost = error
 
     def upload(self, index: int, sub: int, timeout_s: float, *, block: bool = False) -> bytes:
-        """Return the data of an object; `timeout_s` is that of each answer.
+        """Return the data of an object; `timeout_s` applies to each answer.
 
-        With `block` a node may answer with many segments at a time; one that cannot is read in
+        With `block` a node may answer with many segments at a time; a node that cannot is read in
         single segments.
         """
         with self._transfer(index, sub, timeout_s):
@@ -83,7 +144,7 @@ class SdoClient:
                 try:
                     return self._block_upload()
                 except SdoAbortError as error:
-                    if error.code != sdo_abort.UNKNOWN_COMMAND:
+                    if error.code != UNKNOWN_COMMAND:
                         raise
             return self._plain_upload(self._initiate(0x40, bytes(4), UPLOAD))
 
@@ -107,22 +168,22 @@ class SdoClient:
     # -- the kinds of upload
 
     def _plain_upload(self, answer: bytes) -> bytes:
-        value = frames.expedited(answer)
+        value = expedited(answer)
         if value is not None:
             return value
         size = int.from_bytes(answer[4:8], "little") if answer[0] & 0x01 else None
         data = bytearray()
         toggle = 0
-        for _ in range(_MOST_BYTES // 7):
-            frame = self._ask(frames.segment_request(toggle), _segment(0, toggle))
-            part, last = frames.segment(frame)
+        for _ in range(self._most_bytes // 7):
+            frame = self._ask(bytes([0x60 | toggle << 4]), _segment(0, toggle))
+            part, last = segment(frame)
             data += part
             if size is not None and (len(data) > size or (last and len(data) < size)):
-                self._abort(sdo_abort.LENGTH)
+                self._abort(LENGTH)
             if last:
                 return bytes(data)
             toggle ^= 1
-        return self._abort(sdo_abort.OUT_OF_MEMORY)
+        return self._abort(OUT_OF_MEMORY)
 
     def _block_upload(self) -> bytes:
         answer = self._initiate(0xA4, bytes([_BLOCK_SEGMENTS]), BLOCK_UPLOAD, UPLOAD)
@@ -133,8 +194,8 @@ class SdoClient:
         request = b"\xa3"
         last = False
         while not last:
-            if len(data) > _MOST_BYTES:
-                self._abort(sdo_abort.OUT_OF_MEMORY)
+            if len(data) > self._most_bytes:
+                self._abort(OUT_OF_MEMORY)
             self._request(request)
             in_order, last = self._block(data)
             request = bytes([0xA2, in_order, _BLOCK_SEGMENTS])
@@ -142,14 +203,14 @@ class SdoClient:
         command, checksum = _END.unpack_from(end)
         del data[len(data) - (command >> 2 & 0x07) :]
         if checked and crc_hqx(data, 0) != checksum:
-            self._abort(sdo_abort.CRC)
+            self._abort(CRC)
         self._request(b"\xa1")
         return bytes(data)
 
     def _block(self, data: bytearray) -> tuple[int, bool]:
-        """Take the segments of one block; return how many came in order, and if the last did.
+        """Process the segments of one block; return how many arrived in order, and if the last did.
 
-        What follows a lost segment is discarded: the node sends it again.
+        Segments after a lost one are discarded: the node sends them again.
         """
         in_order = 0
         while True:
@@ -181,13 +242,13 @@ class SdoClient:
     @contextmanager
     def _transfer(self, index: int, sub: int, timeout_s: float) -> Iterator[None]:
         with self._exclusive():
-            self._object, self._multiplexer = (index, sub), frames.multiplexer(index, sub)
+            self._object, self._multiplexer = (index, sub), multiplexer(index, sub)
             self._timeout_s = timeout_s
             yield
 
     def _initiate(self, command: int, data: bytes, *kinds: int) -> bytes:
-        request = frames.request(command, *self._object, data)
-        return self._ask(request, lambda frame: frames.answers(frame, self._multiplexer, *kinds))
+        request = request_frame(command, *self._object, data)
+        return self._ask(request, lambda frame: answers(frame, self._multiplexer, *kinds))
 
     def _ask(self, request: bytes, accept: Accept) -> bytes:
         self._clock.poll()
@@ -214,14 +275,15 @@ class SdoClient:
         self._send(request.ljust(8, b"\0"))
 
     def _next(self, deadline: float) -> bytes | None:
-        """Return the next frame of the node, None when none came; raises what ends the transfer."""
+        """Return the next frame of the node, or None; raises the error that ends the transfer."""
         self._clock.wait(lambda: self._answers or self._cancelled or self._lost, deadline)
         self._raise_if_ended()
         if not self._answers:
             return None
         frame = self._answers.popleft()
-        code = frames.abort_code(frame)
-        if code is not None and frames.aborts(frame, self._multiplexer):
+        code = abort_code(frame)
+        # some nodes do not name the object
+        if code is not None and frame[1:4] in (self._multiplexer, bytes(3)):
             raise SdoAbortError(code)
         return frame
 
@@ -229,23 +291,24 @@ class SdoClient:
         if self._lost is not None:
             raise BusError(str(self._lost))
         if self._cancelled:
-            self._send_abort(sdo_abort.GENERAL)
+            self._send_abort(GENERAL)
             raise SdoCancelledError("the transfer was cancelled")
 
     def _time_out(self, others: int = 0) -> NoReturn:
-        self._send_abort(sdo_abort.TIMED_OUT)
-        self.unexpected = 0  # the answer may still come: then it is late
+        self._send_abort(TIMED_OUT)
+        self.unexpected = 0  # the answer may still arrive: then it is late
         what = f" (frames that do not answer the request: {others})" if others else ""
         raise SdoTimeoutError(f"no answer within {self._timeout_s:g} s{what}")
 
     def _abort(self, code: int) -> NoReturn:
-        """Abort the transfer from this side; raises SdoAbortError."""
+        """Abort the transfer; raises SdoAbortError."""
         self._send_abort(code)
         raise SdoAbortError(code)
 
     def _send_abort(self, code: int) -> None:
-        self._send(frames.abort_request(*self._object, code))
+        self._send(request_frame(ABORT, *self._object, code.to_bytes(4, "little")))
 
 
 def _segment(kind: int, toggle: int) -> Accept:
-    return lambda frame: frames.is_segment(frame, kind, toggle)
+    """Accept a frame that is (0) or confirms (1) the segment with this toggle bit."""
+    return lambda frame: frame[0] >> 4 & 0x0F == kind << 1 | toggle

@@ -1,8 +1,7 @@
 """Decoding of CANopen frames for monitors, logs and captures; it never sends."""
 
-from cdpr_drivers.decode.candump import LogEntry, LogError, format_line, parse_line, read_log
+from cdpr_drivers.decode.candump import Frame, LogEntry, LogError, format_line, parse_line, read_log
 from cdpr_drivers.decode.decoder import Decoder, KnownNode, Record
-from cdpr_drivers.decode.frame import Frame
 
 __all__ = [
     "Decoder",

@@ -1,8 +1,4 @@
-"""Log files of candump (`candump -l`, `-L`) in and out, without loss.
-
-python-can's reader and writer of the same format drop the classes of error frames and the length
-of remote frames, so they serve as an independent reference in the tests only.
-"""
+"""CAN frames with their time, and reading and writing candump log files (`candump -l`, `-L`)."""
 
 from __future__ import annotations
 
@@ -10,9 +6,57 @@ import re
 from collections.abc import Iterable, Iterator
 from typing import NamedTuple
 
-from cdpr_drivers.bus.frames import ERR_FLAG
-from cdpr_drivers.decode.frame import EFF_MASK, Frame
+from cdpr_drivers.bus.frames import EFF_FLAG, EFF_MASK, ERR_FLAG, FRAME, RTR_FLAG, SFF_MASK
 from cdpr_drivers.errors import DriverError
+
+_MOST_BYTES = 8
+
+
+class Frame(NamedTuple):
+    """A classic CAN frame; `time_s` counts from the epoch in whole microseconds."""
+
+    time_s: float
+    can_id: int
+    """Identifier without flags; in an error frame, the error classes of Linux."""
+    data: bytes
+    extended: bool = False
+    remote: bool = False
+    error: bool = False
+    length: int = 0
+    """Length that a remote frame requests; 0 in others."""
+
+    @classmethod
+    def unpack(cls, time_s: float, packet: bytes | bytearray) -> Frame:
+        """Return the frame in a 16-byte `struct can_frame`; a length above 8 counts as 8."""
+        word, length, data = FRAME.unpack(packet)
+        length = min(length, _MOST_BYTES)
+        error = bool(word & ERR_FLAG)
+        # the other flags have no meaning in an error frame
+        remote = bool(word & RTR_FLAG) and not error
+        extended = bool(word & EFF_FLAG) and not error
+        return cls(
+            round(time_s, 6),
+            word & (EFF_MASK if extended or error else SFF_MASK),
+            b"" if remote else data[:length],
+            extended,
+            remote,
+            error,
+            length if remote else 0,
+        )
+
+    def pack(self) -> bytes:
+        """Return the frame as a 16-byte `struct can_frame`."""
+        word = self.can_id
+        word |= EFF_FLAG if self.extended else 0
+        word |= RTR_FLAG if self.remote else 0
+        word |= ERR_FLAG if self.error else 0
+        return FRAME.pack(word, self.length or len(self.data), self.data)
+
+    @property
+    def id_text(self) -> str:
+        """The identifier as CAN tools write it: 3 hexadecimal digits, 8 with 29 bits."""
+        return f"{self.can_id:08X}" if self.extended or self.error else f"{self.can_id:03X}"
+
 
 _LINE = re.compile(
     r"\((?P<time>[0-9]{1,12}(?:\.[0-9]{1,12})?)\)\s+(?P<channel>\S+)\s+"
@@ -29,7 +73,7 @@ class LogError(DriverError):
 
 
 class LogEntry(NamedTuple):
-    """A frame of a log file, with the name of the bus it was on."""
+    """A frame of a log file, with the name of its bus."""
 
     channel: str
     frame: Frame
@@ -56,7 +100,7 @@ def parse_line(text: str) -> LogEntry:
         raise ValueError(f"{shown!r} is not of the form (1699999999.123456) can0 123#DEADBEEF")
     identifier, wide = int(match["id"], 16), len(match["id"]) > 3
     error = wide and bool(identifier & ERR_FLAG)
-    if not error and identifier > (EFF_MASK if wide else 0x7FF):
+    if not error and identifier > (EFF_MASK if wide else SFF_MASK):
         raise ValueError(f"the identifier {match['id']} has more than {29 if wide else 11} bits")
     frame = Frame(
         round(float(match["time"]), 6),
@@ -71,12 +115,12 @@ def parse_line(text: str) -> LogEntry:
 
 
 def read_log(name: str, lines: Iterable[str]) -> Iterator[LogEntry]:
-    """Yield the frames of a log file; empty lines and comments are passed over.
+    """Yield the frames of a log file; skip empty lines and comments.
 
-    A last line without its end, which a logger leaves that was cut off, counts as not written.
+    A last line without line end, left by an interrupted logger, is ignored.
 
     Raises:
-        LogError: a line is no line of candump; the message has `name` and the line's number.
+        LogError: a line is not a candump line; the message has `name` and the line's number.
     """
     for number, line in enumerate(lines, 1):
         if not line.strip() or line.lstrip().startswith("#"):

@@ -1,4 +1,4 @@
-"""SDO transfers of one node followed frame by frame (CiA 301): expedited, segmented and block."""
+"""Follow the SDO transfers of one node by frame (CiA 301): expedited, segmented and block."""
 
 from __future__ import annotations
 
@@ -7,39 +7,40 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from enum import Enum, auto
 
+from cdpr_drivers.canopen.sdo import abort_code, expedited, segment
+
 _MULTIPLEXOR = struct.Struct("<HB")
 _SEGMENT_BYTES = 7
-_ABORT = 0x80
 
 
 class Step(Enum):
-    """What an SDO frame does in its transfer."""
+    """Role of an SDO frame in its transfer."""
 
     ASK_READ = auto()
     ASK_WRITE = auto()
     ANNOUNCE = auto()
     """The server announces a value of `size` bytes."""
     VALUE = auto()
-    """The server has delivered the last of a value; `data` is all of it where all was seen."""
+    """The server has delivered the end of a value; `data` is all of it if all was seen."""
     WRITTEN = auto()
-    """The server has confirmed a write; `data` is what was written where it was seen."""
+    """The server has confirmed a write; `data` is the written value if it was seen."""
     SEGMENT = auto()
     CONTROL = auto()
     ABORT = auto()
     UNEXPECTED = auto()
-    """It does not belong to the transfer as far as that was seen."""
+    """It does not belong to the transfer, as far as that was seen."""
 
 
 @dataclass(frozen=True)
 class SdoEvent:
-    """One decoded SDO frame; `index` is None where no transfer is known."""
+    """One decoded SDO frame; `index` is None if the transfer is unknown."""
 
     step: Step
     index: int | None = None
     sub: int = 0
     data: bytes | None = None
     size: int | None = None
-    """Bytes announced, or so far."""
+    """Bytes announced, or seen so far."""
     code: int = 0
     """Abort code."""
     note: str = ""
@@ -51,7 +52,7 @@ class _Transfer:
     sub: int
     data: bytearray = field(default_factory=bytearray)
     whole: bool = True
-    """Whether nothing of it was missed."""
+    """Whether no part of it was missed."""
     block_size: int = 127
     block: list[bytes] = field(default_factory=list)
     """Segments of the present block, in order."""
@@ -61,53 +62,59 @@ class _Transfer:
 
 
 class SdoDecoder:
-    """Decodes the transfers between any client and one server; takes any bytes."""
+    """Decodes the transfers between any client and one server; accepts any bytes."""
 
     def __init__(self) -> None:
         self._transfer: _Transfer | None = None
         self._streams: str = ""
-        """Who sends block segments now, without command specifiers: "client" or "server"."""
-        self._from_client: dict[int, _Reader] = {
-            0: self._segment,
-            1: self._ask_download,
-            2: self._ask_upload,
-            3: self._ask_segment,
-            5: self._block_upload_control,
-            6: self._block_download_control,
+        """Sender of block segments, which lack command specifiers: "client" or "server"."""
+        self._readers: dict[tuple[str, int], Callable[[bytes], SdoEvent]] = {
+            ("client", 0): self._segment,
+            ("client", 1): self._ask_download,
+            ("client", 2): self._ask_upload,
+            ("client", 3): lambda _: self._event(Step.CONTROL, note="next segment"),
+            ("client", 5): self._block_upload_control,
+            ("client", 6): self._block_download_control,
+            ("server", 0): self._upload_segment,
+            ("server", 1): self._segment_taken,
+            ("server", 2): self._upload_begins,
+            ("server", 3): self._download_confirmed,
+            ("server", 5): self._block_download_answer,
+            ("server", 6): self._block_upload_answer,
         }
-        self._from_server: dict[int, _Reader] = {
-            0: self._upload_segment,
-            1: self._segment_taken,
-            2: self._upload_begins,
-            3: self._download_confirmed,
-            5: self._block_download_answer,
-            6: self._block_upload_answer,
-        }
+        """Handler by sender and command specifier."""
 
     def request(self, data: bytes) -> SdoEvent:
-        """Take a frame of the client (600h + node)."""
-        return self._take(data, "client", self._from_client)
+        """Process a frame of the client (600h + node)."""
+        return self._take(data, "client")
 
     def response(self, data: bytes) -> SdoEvent:
-        """Take a frame of the server (580h + node)."""
-        return self._take(data, "server", self._from_server)
+        """Process a frame of the server (580h + node)."""
+        return self._take(data, "server")
 
-    def _take(self, data: bytes, sender: str, readers: dict[int, _Reader]) -> SdoEvent:
+    def _take(self, data: bytes, sender: str) -> SdoEvent:
         if len(data) != 8:
             return SdoEvent(Step.UNEXPECTED, note=f"{len(data)} bytes, not 8")
-        if data[0] == _ABORT:
-            self._transfer, self._streams = None, ""
-            index, sub = _MULTIPLEXOR.unpack_from(data, 1)
-            return SdoEvent(Step.ABORT, index, sub, code=int.from_bytes(data[4:], "little"))
+        code = abort_code(data)
+        if code is not None:
+            self._end()
+            return SdoEvent(Step.ABORT, *_object(data), code=code)
         if self._streams == sender:
             return self._block_segment(data)
-        reader = readers.get(data[0] >> 5)
+        reader = self._readers.get((sender, data[0] >> 5))
         return reader(data) if reader else SdoEvent(Step.UNEXPECTED, note="no such command")
 
     def _begin(self, data: bytes) -> _Transfer:
-        index, sub = _MULTIPLEXOR.unpack_from(data, 1)
-        self._transfer, self._streams = _Transfer(index, sub), ""
+        self._transfer, self._streams = _Transfer(*_object(data)), ""
         return self._transfer
+
+    def _end(self) -> None:
+        self._transfer, self._streams = None, ""
+
+    def _announced(self, step: Step, data: bytes, size_bit: int, note: str = "") -> SdoEvent:
+        """Return the event of a frame that names an object, and its size if a bit is set."""
+        size = int.from_bytes(data[4:], "little") if data[0] & size_bit else None
+        return SdoEvent(step, *_object(data), size=size, note=note)
 
     def _event(self, step: Step, *, data: bytes | None = None, note: str = "") -> SdoEvent:
         transfer = self._transfer
@@ -119,11 +126,11 @@ class SdoDecoder:
 
     def _ask_download(self, data: bytes) -> SdoEvent:
         transfer = self._begin(data)
-        if data[0] & 0x02:
-            transfer.data += _expedited(data)
-            return self._event(Step.ASK_WRITE, data=bytes(transfer.data))
-        size = int.from_bytes(data[4:], "little") if data[0] & 0x01 else None
-        return SdoEvent(Step.ASK_WRITE, transfer.index, transfer.sub, size=size)
+        value = expedited(data)
+        if value is not None:
+            transfer.data += value
+            return self._event(Step.ASK_WRITE, data=value)
+        return self._announced(Step.ASK_WRITE, data, 0x01)
 
     def _segment_taken(self, _: bytes) -> SdoEvent:
         if self._transfer is not None and self._transfer.last:
@@ -131,7 +138,7 @@ class SdoDecoder:
         return self._event(Step.CONTROL, note="segment taken")
 
     def _download_confirmed(self, data: bytes) -> SdoEvent:
-        index, sub = _MULTIPLEXOR.unpack_from(data, 1)
+        index, sub = _object(data)
         transfer = self._transfer
         if transfer is None or (transfer.index, transfer.sub) != (index, sub):
             return SdoEvent(Step.WRITTEN, index, sub)
@@ -146,16 +153,12 @@ class SdoDecoder:
         return self._event(Step.ASK_READ)
 
     def _upload_begins(self, data: bytes) -> SdoEvent:
-        index, sub = _MULTIPLEXOR.unpack_from(data, 1)
-        if data[0] & 0x02:
-            self._transfer, self._streams = None, ""
-            return SdoEvent(Step.VALUE, index, sub, _expedited(data))
+        value = expedited(data)
+        if value is not None:
+            self._end()
+            return SdoEvent(Step.VALUE, *_object(data), value)
         self._begin(data)
-        size = int.from_bytes(data[4:], "little") if data[0] & 0x01 else None
-        return SdoEvent(Step.ANNOUNCE, index, sub, size=size)
-
-    def _ask_segment(self, _: bytes) -> SdoEvent:
-        return self._event(Step.CONTROL, note="next segment")
+        return self._announced(Step.ANNOUNCE, data, 0x01)
 
     def _upload_segment(self, data: bytes) -> SdoEvent:
         event = self._segment(data)
@@ -172,15 +175,16 @@ class SdoDecoder:
         toggle = data[0] >> 4 & 1
         if toggle != transfer.toggle or transfer.last:
             transfer.whole = False  # sent again, or one was missed
-        transfer.toggle, transfer.last = 1 - toggle, bool(data[0] & 1)
-        transfer.data += data[1 : 8 - (data[0] >> 1 & 7)]
+        part, transfer.last = segment(data)
+        transfer.toggle = 1 - toggle
+        transfer.data += part
         return self._event(Step.SEGMENT, note="last" if transfer.last else "")
 
     def _end_transfer(self, step: Step) -> SdoEvent:
         transfer = self._transfer
-        assert transfer is not None  # asked by those who have one
+        assert transfer is not None  # guaranteed by the callers
         event = self._event(step, data=bytes(transfer.data) if transfer.whole else None)
-        self._transfer, self._streams = None, ""
+        self._end()
         return event
 
     # -- block transfer
@@ -214,7 +218,7 @@ class SdoDecoder:
         return self._event(Step.CONTROL, note=f"segments up to {data[1]} taken{again}")
 
     def _drop_padding(self, data: bytes) -> None:
-        """Drop the padding of the last segment; the end of a block transfer has its length."""
+        """Drop the padding of the last segment; the end of a block transfer gives its length."""
         unused = data[0] >> 2 & 7
         if self._transfer is not None and unused:
             del self._transfer.data[-unused:]
@@ -224,9 +228,8 @@ class SdoDecoder:
             self._streams = ""
             self._drop_padding(data)
             return self._event(Step.CONTROL, note="end of block transfer")
-        transfer = self._begin(data)
-        size = int.from_bytes(data[4:], "little") if data[0] & 0x02 else None
-        return SdoEvent(Step.ASK_WRITE, transfer.index, transfer.sub, size=size, note="in blocks")
+        self._begin(data)
+        return self._announced(Step.ASK_WRITE, data, 0x02, "in blocks")
 
     def _block_download_answer(self, data: bytes) -> SdoEvent:
         what = data[0] & 3
@@ -253,8 +256,7 @@ class SdoDecoder:
             return self._event(Step.CONTROL, note="go on")
         if what == 2:
             return self._acknowledged(data, "server")
-        if self._transfer is not None:
-            self._transfer, self._streams = None, ""
+        self._end()
         return self._event(Step.CONTROL, note="end of block transfer taken")
 
     def _block_upload_answer(self, data: bytes) -> SdoEvent:
@@ -263,16 +265,12 @@ class SdoDecoder:
             self._drop_padding(data)
             if self._transfer is None:
                 return self._event(Step.VALUE)
-            # the client still says that it has taken the end
+            # the client still has to confirm the end
             return self._end_transfer(Step.VALUE)
-        index, sub = _MULTIPLEXOR.unpack_from(data, 1)
-        size = int.from_bytes(data[4:], "little") if data[0] & 0x02 else None
-        return SdoEvent(Step.ANNOUNCE, index, sub, size=size, note="in blocks")
+        return self._announced(Step.ANNOUNCE, data, 0x02, "in blocks")
 
 
-_Reader = Callable[[bytes], SdoEvent]
-
-
-def _expedited(data: bytes) -> bytes:
-    """Return the value of an expedited transfer; without its size given, all 4 bytes."""
-    return data[4 : 8 - (data[0] >> 2 & 3)] if data[0] & 1 else data[4:]
+def _object(data: bytes) -> tuple[int, int]:
+    """Return index and sub-index of the object that a frame names."""
+    index, sub = _MULTIPLEXOR.unpack_from(data, 1)
+    return index, sub

@@ -1,17 +1,94 @@
-"""Values of objects in words and SI units, as far as a drive's profile and ratings are known."""
+"""Values of objects as text and in SI units, as far as the drive's profile and ratings allow."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cache, lru_cache
+from pathlib import Path
+from typing import Any
+
+import canopen
+from canopen.objectdictionary import ODVariable, datatypes
 
 from cdpr_drivers.canopen.emergency import register_text
 from cdpr_drivers.cia402 import fault_text, mode_name, state_of, supported_modes
-from cdpr_drivers.decode.names import ObjectNames
 from cdpr_drivers.drive_units import torque_unit_Nm, velocity_unit_rad_s
-from cdpr_profiles import DriveProfile
+from cdpr_profiles import DriveProfile, load_drive
+from cdpr_profiles.eds import load_dictionary
+
+# Names and types of objects, from electronic data sheets.
+
+_STANDARD_DRIVE = "generic-cia402"
+_SIGNED = frozenset(datatypes.SIGNED_TYPES)
+_INTEGERS = frozenset(datatypes.INTEGER_TYPES)
+_LONGEST_INTEGER = 8
+
+
+class ObjectNames:
+    """Names of objects from an EDS; for objects it lacks, from the generic CiA 402 EDS."""
+
+    def __init__(self, eds: Path | None = None) -> None:
+        self._device = _dictionary(eds) if eds is not None else None
+        self._standard = _standard()
+
+    def name(self, index: int, sub: int) -> str:
+        """Return an object's name; "" if no data sheet has it."""
+        for dictionary in (self._device, self._standard):
+            entry = dictionary.get(index) if dictionary is not None else None
+            if entry is None:
+                continue
+            if isinstance(entry, ODVariable):
+                return str(entry.name)
+            part = _part(entry, sub)
+            if part is None or str(part.name).startswith(str(entry.name)):
+                return str((part or entry).name)
+            return f"{entry.name}: {part.name}"
+        return ""
+
+    def decode(self, index: int, sub: int, raw: bytes) -> Any:
+        """Return an object's value by its type; an integer if no data sheet has it.
+
+        Bytes that do not fit the type are returned unchanged.
+        """
+        variable = self._variable(index, sub)
+        if variable is not None and variable.data_type not in _INTEGERS:
+            try:
+                return variable.decode_raw(raw)
+            except canopen.ObjectDictionaryError:
+                return raw
+        if not 0 < len(raw) <= _LONGEST_INTEGER:
+            return raw
+        signed = variable is not None and variable.data_type in _SIGNED
+        return int.from_bytes(raw, "little", signed=signed)
+
+    def _variable(self, index: int, sub: int) -> ODVariable | None:
+        for dictionary in (self._device, self._standard):
+            entry = dictionary.get(index) if dictionary is not None else None
+            found = entry if isinstance(entry, ODVariable) or entry is None else _part(entry, sub)
+            if found is not None:
+                return found
+        return None
+
+
+def _part(entry: Any, sub: int) -> ODVariable | None:
+    """Return a member of a record or array; the library's arrays create members on demand."""
+    try:
+        return entry[sub]  # type: ignore[no-any-return]
+    except KeyError:
+        return None
+
+
+@lru_cache(maxsize=32)
+def _dictionary(eds: Path) -> Any:
+    return load_dictionary(eds)
+
+
+@cache
+def _standard() -> Any:
+    return _dictionary(load_drive(_STANDARD_DRIVE).eds)
+
 
 _POSITIONS = frozenset(
     (0x6062, 0x6064, 0x6067, 0x607A, 0x607C, 0x60E4, 0x60F4, *range(0x60BA, 0x60BE))
@@ -41,7 +118,7 @@ class DecodedValue:
     name: str
     raw: bytes
     value: float | str
-    """In `unit`; text where the object is a word of bits or a name."""
+    """In `unit`; as text if the object is a word of bits or a name."""
     unit: str
     text: str
 
@@ -51,7 +128,7 @@ class DecodedValue:
 
 @dataclass
 class NodeView:
-    """What is known of one node, extended by its traffic."""
+    """Knowledge about one node, extended by its traffic."""
 
     node_id: int
     names: ObjectNames
@@ -61,7 +138,7 @@ class NodeView:
     mode: int | None = None
 
     def torque_Nm(self) -> float | None:
-        """Motor torque of one unit of 6077h, with the drive's sign; None where not known."""
+        """Motor torque of one unit of 6077h, with the drive's sign; None if unknown."""
         if self.drive is None:
             return None
         if self.rated_torque_Nm is None and self.drive.torque_unit in _RELATIVE_TORQUE_UNITS:
@@ -69,13 +146,13 @@ class NodeView:
         return self.drive.torque_sign * torque_unit_Nm(self.drive, self.rated_torque_Nm or 0.0)
 
     def position_rad(self) -> float | None:
-        """Motor angle of one unit of 6064h, with the drive's sign; None where not known."""
+        """Motor angle of one unit of 6064h, with the drive's sign; None if unknown."""
         if self.drive is None or not self.counts_per_turn:
             return None
         return self.drive.position_sign * math.tau / self.counts_per_turn
 
     def velocity_rad_s(self) -> float | None:
-        """Motor speed of one unit of 606Ch, with the drive's sign; None where not known."""
+        """Motor speed of one unit of 606Ch, with the drive's sign; None if unknown."""
         if self.drive is None or not (self.counts_per_turn or self.drive.velocity_unit == "rpm"):
             return None
         unit = velocity_unit_rad_s(self.drive, self.counts_per_turn or 1)
@@ -83,12 +160,12 @@ class NodeView:
 
 
 def read_field(node: NodeView, index: int, sub: int, raw: bytes) -> DecodedValue:
-    """Return what the bytes of an object mean on this node; any bytes are taken."""
+    """Return the meaning of an object's bytes on this node; accepts any bytes."""
     name = node.names.name(index, sub)
-    if not raw or len(raw) > 8 or node.names.is_other(index, sub):
-        text = _other(node.names.plain(index, sub, raw))
+    number = node.names.decode(index, sub, raw)
+    if type(number) is not int:
+        text = _other(number)
         return DecodedValue(index, sub, name, raw, text, "", text)
-    number = int.from_bytes(raw, "little", signed=node.names.is_signed(index, sub))
     quantity = _quantity(node, index, sub)
     if quantity is not None:
         scale, unit, digits = quantity
@@ -116,7 +193,7 @@ def _other(value: object) -> str:
 
 
 def _quantity(node: NodeView, index: int, sub: int) -> tuple[float, str, int] | None:
-    """Return scale, unit and digits to show of an object that is a physical quantity."""
+    """Return scale, unit and number of digits of an object that is a physical quantity."""
     if _within(index, _PDO_PARAMETERS):
         return _PDO_TIMES.get(sub)
     if index in _POSITIONS:
@@ -159,7 +236,7 @@ def _within(index: int, ranges: tuple[tuple[int, int], ...]) -> bool:
 
 
 def _words(node: NodeView, index: int, sub: int, number: int) -> str | None:
-    """Return an object that is a word of bits or a code, in words; None for another object."""
+    """Return the text of an object that is a word of bits or a code; None for other objects."""
     known = _WORDS.get(index)
     if known is not None:
         return known(number)
@@ -207,7 +284,7 @@ _STATUS_BITS = ((7, "warning"), (10, "target reached"), (11, "internal limit"))
 
 @lru_cache(maxsize=4096)
 def statusword_text(word: int, mode: int | None = None) -> str:
-    """Return a statusword in words; bits that depend on the mode need `mode` (6061h)."""
+    """Return a statusword as text; bits that depend on the mode need `mode` (6061h)."""
     words = [state_of(word).label]
     words += [name for bit, name in _STATUS_BITS if word >> bit & 1]
     if not word >> 9 & 1:
@@ -222,7 +299,7 @@ def statusword_text(word: int, mode: int | None = None) -> str:
 
 @lru_cache(maxsize=4096)
 def controlword_text(word: int, mode: int | None = None) -> str:
-    """Return the command in a controlword in words."""
+    """Return the command in a controlword as text."""
     if word & 0x80:
         command = "fault reset"
     elif not word & 0x02:

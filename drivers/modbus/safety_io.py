@@ -1,40 +1,286 @@
-"""A safety I/O polled beside the cycle: trips on its inputs, and on missing polls."""
+"""A safety I/O polled beside the cycle: it trips on its inputs and on missing polls."""
 
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
 from datetime import UTC, datetime
 from functools import partial
 from pathlib import Path
 from typing import Final, Self
 
 from cdpr_drivers.errors import DriverError
-from cdpr_drivers.modbus.io_link import IoLink
-from cdpr_drivers.modbus.io_rules import IoState, Rules, interpret
-from cdpr_drivers.modbus.tcp import ModbusError
-from cdpr_profiles.devices.safety_io import Brake, SafetyIoProfile
-from cdpr_rt.core.clock import Clock
-from cdpr_rt.core.task import Task
+from cdpr_drivers.modbus.channel import ModbusError, ModbusTcp
+from cdpr_profiles.safety_io import (
+    Brake,
+    Contactor,
+    DigitalInput,
+    DigitalOutput,
+    SafetyIoProfile,
+)
+from cdpr_rt.core.clock import Clock, Task
 from cdpr_rt.state_file import StateFileError, read_state, remove_state, write_state
 
+# State of a safety I/O from one poll, and the rules that derive alarms from it.
+
+_OVERWRITTEN_POLLS = 2
+"""Successive polls in which an output differs from the written value before an alarm."""
+
+
+class Trip(str):
+    """Why a motion must end, as text, with the kind of trip and the axis from the profile."""
+
+    code: str
+    axis: str
+
+    def __new__(cls, text: str = "", code: str = "", axis: str = "") -> Self:
+        """Return the text with its kind and its axis; "" if unset."""
+        trip = super().__new__(cls, text)
+        trip.code, trip.axis = code, axis
+        return trip
+
+
+NO_TRIP: Final = Trip()
+
+
+@dataclass(frozen=True)
+class IoState:
+    """State of the I/O at one good poll."""
+
+    at_s: float
+    """Time of the robot's clock at which the poll began."""
+    chain_ok: bool
+    contactor_asked: bool
+    contactor_closed: bool
+    brakes_asked: dict[str, bool]
+    brakes_released: dict[str, bool]
+    """By axis, from the feedback contacts."""
+    limits: tuple[Trip, ...]
+    """Limit switches that are active."""
+    lights: dict[str, bool]
+
+
+def reads(point: DigitalInput, image: dict[int, bool]) -> bool:
+    """Return whether the input is active; accounts for inversion."""
+    return image[point.input] != point.inverted
+
+
+def described(point: DigitalInput, image: dict[int, bool]) -> str:
+    """Return the input with its raw value, for messages."""
+    return f"input {point.input} reads {int(image[point.input])}"
+
+
+def interpret(
+    profile: SafetyIoProfile, inputs: dict[int, bool], coils: dict[int, bool], at_s: float
+) -> IoState:
+    """Return the state given by the images of inputs and coils."""
+    braked = [(axis.axis, axis.brake) for axis in profile.axes if axis.brake is not None]
+    return IoState(
+        at_s=at_s,
+        chain_ok=reads(profile.chain, inputs),
+        contactor_asked=_on(profile.contactor.output, coils),
+        contactor_closed=reads(profile.contactor.feedback, inputs),
+        brakes_asked={axis: _on(brake.output, coils) for axis, brake in braked},
+        brakes_released={axis: reads(brake.feedback, inputs) for axis, brake in braked},
+        limits=tuple(
+            Trip(
+                f"{axis.axis} stands on its {name} limit switch ({described(point, inputs)})",
+                "limit_switch",
+                axis.axis,
+            )
+            for axis in profile.axes
+            for name, point in axis.limits()
+            if reads(point, inputs)
+        ),
+        lights={colour: _on(output, coils) for colour, output in profile.lights.items()},
+    )
+
+
+def _on(output: DigitalOutput, coils: dict[int, bool]) -> bool:
+    return coils[output.coil] != output.inverted
+
+
+class FeedbackMonitor:
+    """Monitors that a feedback contact follows its output in time, and stays there."""
+
+    def __init__(self, what: str, device: Contactor | Brake, on: str, off: str) -> None:
+        self._name, self._device = what, device
+        self._names = {True: on, False: off}
+        self._commanded = False
+        self._since_s = 0.0
+        self.confirmed = False
+        """Whether the feedback has followed the output's last change."""
+
+    def check(self, commanded: bool, inputs: dict[int, bool], now_s: float) -> str:
+        """Return the device's fault, or an empty text."""
+        if commanded != self._commanded:
+            self._commanded, self._since_s, self.confirmed = commanded, now_s, False
+        feedback = self._device.feedback
+        expected, output = self._names[commanded], self._device.output.coil
+        if reads(feedback, inputs) == commanded:
+            self.confirmed = True
+            return ""
+        if self.confirmed:
+            return (
+                f"{self._name} did not stay {expected}: output {output} is {int(commanded)}, but "
+                f"{described(feedback, inputs)}"
+            )
+        waited = now_s - self._since_s
+        if waited <= self._device.timeout_s:
+            return ""
+        return (
+            f"{self._name} is not {expected} {waited:.2f} s after output {output} was set "
+            f"to {int(commanded)} ({self._device.timeout_s:g} s allowed): "
+            f"{described(feedback, inputs)}"
+            f"{'' if commanded else self._stuck()}"
+        )
+
+    def restart(self, now_s: float) -> None:
+        """Restart the feedback's time-out, after the fault was acknowledged."""
+        self._since_s, self.confirmed = now_s, False
+
+    def _stuck(self) -> str:
+        return "; is it welded?" if isinstance(self._device, Contactor) else "; is it stuck?"
+
+
+class Rules:
+    """Checks each poll against the commanded outputs."""
+
+    def __init__(self, profile: SafetyIoProfile) -> None:
+        self._profile = profile
+        self._overwritten_polls: dict[int, int] = {}
+        self.contactor = FeedbackMonitor("the contactor", profile.contactor, "closed", "open")
+        self.brakes = {
+            axis.axis: FeedbackMonitor(
+                f"the brake of {axis.axis}", axis.brake, "released", "applied"
+            )
+            for axis in profile.axes
+            if axis.brake is not None
+        }
+
+    def alarm(
+        self,
+        state: IoState,
+        inputs: dict[int, bool],
+        outputs: dict[int, bool],
+        overwritten: dict[int, bool],
+    ) -> Trip:
+        """Return why the torque must be removed immediately, by the most likely cause, or "".
+
+        `outputs` are the coils as written, `overwritten` those that read back a different value.
+        """
+        profile, now = self._profile, state.at_s
+        closed = outputs[profile.contactor.output.coil]
+        trips = [Trip(self._chain(state, inputs), "chain_open")]
+        trips.append(Trip(self.contactor.check(closed, inputs, now), "contactor"))
+        for axis in profile.axes:
+            if axis.brake is not None:
+                commanded = outputs[axis.brake.output.coil]
+                text = self.brakes[axis.axis].check(commanded, inputs, now)
+                trips.append(Trip(text, "brake", axis.axis))
+        trips.append(Trip(self._overwritten(outputs, overwritten), "output"))
+        return next((trip for trip in trips if trip), NO_TRIP)
+
+    def _chain(self, state: IoState, inputs: dict[int, bool]) -> str:
+        if state.chain_ok:
+            return ""
+        return f"the emergency-stop chain is open ({described(self._profile.chain, inputs)})"
+
+    def _overwritten(self, outputs: dict[int, bool], overwritten: dict[int, bool]) -> str:
+        self._overwritten_polls = {
+            coil: self._overwritten_polls.get(coil, 0) + 1 for coil in overwritten
+        }
+        for coil, polls in self._overwritten_polls.items():
+            if polls >= _OVERWRITTEN_POLLS:
+                return (
+                    f"output {coil} was set to {int(outputs[coil])} and reads "
+                    f"{int(overwritten[coil])}: the device's own watchdog or another "
+                    "master has changed it"
+                )
+        return ""
+
+    def restart(self, now_s: float) -> None:
+        """Start again after an acknowledgement."""
+        self._overwritten_polls.clear()
+        for monitor in (self.contactor, *self.brakes.values()):
+            monitor.restart(now_s)
+
+
+# Reads and writes of a safety I/O in the layout of its profile, one request for each image.
+
+
+class IoLink:
+    """A connection to one safety I/O; every method raises ModbusError."""
+
+    def __init__(self, profile: SafetyIoProfile, clock: Clock) -> None:
+        self.profile = profile
+        self.clock = clock
+        place = (profile.host, profile.port, profile.unit)
+        self._client = ModbusTcp(*place, profile.answer_timeout_s, clock)
+        self.name = f"safety I/O {self._client.name}"
+        self._inputs = _span(point.input for _, point in profile.inputs())
+        self._coils = _span(point.coil for _, point in profile.outputs())
+        self._count = 0
+
+    def read(self) -> tuple[dict[int, bool], dict[int, bool]]:
+        """Return the discrete inputs and the coils by address."""
+        start, count = self._inputs
+        inputs = dict(enumerate(self._client.inputs(start, count), start))
+        start, count = self._coils
+        return inputs, dict(enumerate(self._client.coils(start, count), start))
+
+    def state(self) -> IoState:
+        """Return the state that the I/O reports now."""
+        began_s = self.clock.now_s
+        return interpret(self.profile, *self.read(), began_s)
+
+    def write(self, coil: int, on: bool) -> None:
+        """Set one coil."""
+        self._client.write_coil(coil, on)
+
+    def set_watchdog(self) -> None:
+        """Set the time without requests after which the device must drop its outputs."""
+        watchdog = self.profile.watchdog
+        if watchdog is not None and watchdog.timeout_register is not None:
+            time_units = round(watchdog.timeout_s / watchdog.timeout_unit_s)
+            self._client.write_registers(watchdog.timeout_register, [time_units])
+
+    def feed_watchdog(self) -> None:
+        """Reset the device's watchdog."""
+        watchdog = self.profile.watchdog
+        if watchdog is not None and watchdog.trigger_register is not None:
+            self._count = (self._count + 1) & 0xFFFF
+            self._client.write_registers(watchdog.trigger_register, [self._count])
+
+    def close(self) -> None:
+        """Disconnect from the device."""
+        self._client.close()
+
+
+def _span(addresses: Iterable[int]) -> tuple[int, int]:
+    """Return start and count of the shortest span over all addresses."""
+    known = sorted(addresses)
+    return known[0], known[-1] - known[0] + 1
+
+
 _STOP_GRACE_S: Final = 2.0
-"""Longest time that a controlled stop may take before power is taken all the same."""
+"""Longest time of a controlled stop; then the power is cut in any case."""
 _STATE_COLOURS: Final = ("red", "yellow", "green")
 
 
 class SafetyIoError(DriverError):
-    """The safety I/O forbids a request or did not carry it out; names the point and its value."""
+    """The safety I/O forbids a request or did not execute it; names the point and its value."""
 
 
 class SafetyIo:
-    """One safety I/O; implements `cdpr_rt.core.cycle.Watch`.
+    """One safety I/O.
 
-    A task of `clock` polls and writes. `stop_reason` checks the age of the last good poll itself,
-    so that a task that waits for an answer trips as well. While nobody waits by the clock nor runs
-    cycles there are no polls: then the device's own watchdog opens the contactor and applies the
-    brakes. A trip stays, also in the file `latch`, until
-    `acknowledge`. The contactor closes only by `energise`. Leaving the block applies the brakes and
+    A task of `clock` polls and writes. `stop_reason` checks the age of the last good poll, so that
+    it also trips while the task waits for an answer. While no task waits by the clock and no cycles
+    run, there are no polls: then the device's own watchdog opens the contactor and applies the
+    brakes. A trip stays until `acknowledge`, also in the file `latch`.
+    The contactor closes only by `energise`. Leaving the block applies the brakes and
     opens the contactor.
     """
 
@@ -52,7 +298,8 @@ class SafetyIo:
         self._written: dict[int, bool] = {}
         self._lights: dict[int, bool] = {}
         self._armed = self._trip_saved = False
-        self._alarm = self._stop = self._error = ""
+        self._alarm = self._stop = NO_TRIP
+        self._error = ""
         self._stop_at_s = 0.0
         self._timeout_s = profile.trip_timeout_s
         self._last_poll_s = self._last_check_s = 0.0
@@ -60,23 +307,23 @@ class SafetyIo:
         self._state: IoState | None = None
         self._task: Task[None] | None = None
 
-    # -- what the loop asks every cycle
+    # -- queried by the loop every cycle
 
-    def alarm(self) -> str:
-        """Return why the torque must go at once, or an empty text."""
+    def alarm(self) -> Trip:
+        """Return why the torque must be removed immediately, or an empty text."""
         return self._alarm
 
-    def stop_reason(self) -> str:
-        """Return why the motion must be braked to its end, or an empty text."""
+    def stop_reason(self) -> Trip:
+        """Return why the motion must be braked to a standstill, or an empty text."""
         now = self.clock.now_s
         last_poll_s, timeout = self._last_poll_s, self._timeout_s
         if now - last_poll_s > timeout and self._armed and not self._stop:
-            # cycles that begin after a pause without polls are no silence yet: the time-out is
+            # cycles that start after a pause without polls do not count as silence: the time-out is
             # extended once for each good poll
             if now - self._last_check_s > timeout and last_poll_s != self._extended_poll_s:
                 self._extended_poll_s, self._extended_at_s = last_poll_s, now
             elif last_poll_s != self._extended_poll_s or now - self._extended_at_s > timeout:
-                self._trip(stop=self._silence_reason())
+                self._trip(stop=Trip(self._silence_reason(), "no_poll"))
         self._last_check_s = now
         return self._stop
 
@@ -84,14 +331,14 @@ class SafetyIo:
 
     @property
     def state(self) -> IoState:
-        """State at the last good poll, which is that of `IoState.at_s`."""
+        """State at the last good poll, taken at `IoState.at_s`."""
         assert self._state is not None  # `open` has polled
         return self._state
 
     def open(self) -> Self:
-        """Connect, set all outputs safe, and begin to poll.
+        """Connect, set all outputs to safe, and start to poll.
 
-        Raises ModbusError, and SafetyIoError for an I/O whose outputs somebody else has set.
+        Raises ModbusError, and SafetyIoError if another client has set the I/O's outputs.
         """
         try:
             self._refuse_in_use(self._link.state())
@@ -104,7 +351,7 @@ class SafetyIo:
         return self
 
     def energise(self) -> None:
-        """Close the contactor and watch from now on; raises SafetyIoError where that is refused."""
+        """Close the contactor and monitor from now on; raises SafetyIoError if that is refused."""
         tripped = self._tripped or self._saved_trip()
         if tripped:
             raise SafetyIoError(f"{tripped}; see to it, then acknowledge it: cdpr io ack")
@@ -114,28 +361,28 @@ class SafetyIo:
         self._await(lambda state: state.contactor_closed, self.profile.contactor.timeout_s)
 
     def release_brakes(self, *axes: str) -> None:
-        """Have brakes released (all, where none is named), as `brakes_released` confirms.
+        """Release brakes (default: all); `brakes_released` confirms it.
 
-        Raises SafetyIoError for an axis without brake.
+        Raises SafetyIoError for an axis without a brake.
         """
         self._set_brakes(axes, True)
 
     def apply_brakes(self, *axes: str) -> None:
-        """Have brakes applied (all, where none is named)."""
+        """Apply brakes (default: all)."""
         self._set_brakes(axes, False)
 
     def brakes_released(self) -> bool:
-        """Return whether every brake's feedback says released."""
+        """Return whether every brake's feedback reports released."""
         return all(self.state.brakes_released.values())
 
     def await_brakes(self, released: bool, *axes: str) -> None:
-        """Wait until the feedback of brakes says `released` (or not); raises SafetyIoError."""
+        """Wait until the brakes' feedback equals `released`; raises SafetyIoError."""
         names = axes or tuple(self._brakes)
         longest = max((self._brake(name).timeout_s for name in names), default=0.0)
         self._await(lambda s: all(s.brakes_released[n] == released for n in names), longest)
 
     def de_energise(self) -> str:
-        """Apply the brakes, open the contactor; return which did not follow, else an empty text."""
+        """Apply the brakes, open the contactor; return which did not follow; else an empty text."""
         self._armed = False
         if self._task is not None and self._task.done:  # an interrupt may have ended it
             self._task = self.clock.start(self._run)
@@ -147,9 +394,9 @@ class SafetyIo:
         return "; ".join(dict.fromkeys(text for text in (unconfirmed, opened) if text))
 
     def acknowledge(self) -> None:
-        """Forget a trip whose cause is gone; raises SafetyIoError while it is not."""
+        """Clear a trip whose cause is gone; raises SafetyIoError while it is not."""
         self._refuse(self._obstacle(self._next(), limits=False))
-        self._alarm = self._stop = ""
+        self._alarm = self._stop = NO_TRIP
         self._trip_saved = False
         self._written.clear()
         self._rules.restart(self.clock.now_s)
@@ -195,7 +442,7 @@ class SafetyIo:
             except ModbusError as error:
                 self._error = str(error)
             except Exception as error:
-                # a task that ended could switch nothing off any more; this counts as silence
+                # a task that has ended could not switch off anything; this counts as silence
                 self._error = f"{type(error).__name__}: {error}"
             self._save_trip()
 
@@ -211,9 +458,9 @@ class SafetyIo:
         alarm = self._rules.alarm(state, inputs, outputs, overwritten)
         armed = self._armed
         if armed and alarm:
-            self._trip(alarm=f"{self.name}: {alarm}")
+            self._trip(alarm=self._named(alarm))
         elif armed and state.limits:
-            self._trip(stop=f"{self.name}: {state.limits[0]}")
+            self._trip(stop=self._named(state.limits[0]))
         if self._alarm or (self._stop and began - self._stop_at_s > _STOP_GRACE_S):
             self._switch_off()
         self._light(state)
@@ -227,7 +474,7 @@ class SafetyIo:
         return outputs
 
     def _switch_off(self) -> None:
-        """Apply all brakes and open the contactor, without waiting for the next poll."""
+        """Apply all brakes and open the contactor now, without waiting for the next poll."""
         self._outputs = dict.fromkeys(self._outputs, False)
         self._write()
 
@@ -243,28 +490,33 @@ class SafetyIo:
     # -- trips
 
     @property
-    def _tripped(self) -> str:
+    def _tripped(self) -> Trip:
         return self._alarm or self._stop
 
-    def _trip(self, alarm: str = "", stop: str = "") -> None:
+    def _named(self, trip: Trip) -> Trip:
+        return Trip(f"{self.name}: {trip}", trip.code, trip.axis)
+
+    def _trip(self, alarm: Trip = NO_TRIP, stop: Trip = NO_TRIP) -> None:
         self._alarm = self._alarm or alarm
         if stop and not self._stop:
             self._stop, self._stop_at_s = stop, self.clock.now_s
 
     def _save_trip(self) -> None:
-        """Save a new trip for later commands; never in the control cycle, as disks block."""
+        """Save a new trip for later commands; never in the control cycle, because disks block."""
         reason, latch = self._tripped, self._latch_file
         if not reason or self._trip_saved or latch is None:
             return
         self._trip_saved = True
         date = datetime.now(UTC).isoformat(timespec="seconds")
         try:
-            self.clock.run_blocking(partial(write_state, latch, {"reason": reason, "date": date}))
+            self.clock.run_blocking(
+                partial(write_state, latch, {"reason": str(reason), "date": date})
+            )
         except StateFileError as error:
-            self._alarm = f"{reason} ({error})"
+            self._alarm = Trip(f"{reason} ({error})", reason.code, reason.axis)
 
     def _saved_trip(self) -> str:
-        """Return the trip that an earlier command has left, or an empty text."""
+        """Return the trip stored by an earlier command, or an empty text."""
         if self._latch_file is None:
             return ""
         try:
@@ -281,7 +533,7 @@ class SafetyIo:
         )
 
     def _obstacle(self, state: IoState, limits: bool = True) -> str:
-        """Return what forbids to energise, or an empty text."""
+        """Return the reason not to energise, or an empty text."""
         if not state.chain_ok:
             return (
                 f"the emergency-stop chain is open (input {self.profile.chain.input}): release "
@@ -330,11 +582,11 @@ class SafetyIo:
         return brake
 
     def _next(self) -> IoState:
-        """Return the state at a poll begun from now on; raises SafetyIoError without one."""
+        """Return the state at a poll that begins after now; raises SafetyIoError without one."""
         return self._await(lambda _: True, 0.0)
 
     def _await(self, done: Callable[[IoState], bool], timeout_s: float) -> IoState:
-        """Wait until `done` holds at a poll begun from now on; raises SafetyIoError."""
+        """Wait until `done` holds at a poll that begins after now; raises SafetyIoError."""
         clock, asked_s = self.clock, self.clock.now_s
 
         def settled() -> bool:
@@ -342,7 +594,7 @@ class SafetyIo:
                 self.state.at_s > asked_s and done(self.state)
             )
 
-        # the rules know better what is wrong, a poll after the same time
+        # the rules find the cause more precisely, in a poll after the same time
         followed = clock.wait(settled, asked_s + timeout_s + self._timeout_s)
         state = self.state
         if self._armed and self._tripped:

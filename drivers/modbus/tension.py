@@ -6,9 +6,8 @@ import struct
 from dataclasses import dataclass
 from typing import Final, Self
 
-from cdpr_drivers.modbus.line import LineError, ModbusLine
-from cdpr_drivers.modbus.tcp import ModbusError
-from cdpr_profiles.devices.tension_sensor import (
+from cdpr_drivers.modbus.channel import LineError, ModbusError, ModbusLine
+from cdpr_profiles.tension_sensor import (
     MOST_REGISTERS,
     REGISTERS,
     Amplifier,
@@ -17,9 +16,8 @@ from cdpr_profiles.devices.tension_sensor import (
     TensionSensors,
     ValueMap,
 )
-from cdpr_rt.core.clock import Clock
-from cdpr_rt.core.task import Task
-from cdpr_rt.core.tension_feedback import TensionExchange, TensionFault
+from cdpr_rt.core.clock import Clock, Task
+from cdpr_rt.core.exchange import TensionExchange, TensionFault
 
 _FORMATS: Final[dict[DataType, str]] = {
     "int16": ">h",
@@ -48,7 +46,7 @@ def raw_value(value: ValueMap, registers: list[int]) -> float:
 
 
 class LoadCells:
-    """The load cells of a profile on an open line; reads and tares them one by one.
+    """The load cells of a profile on an open line; reads and tares them individually.
 
     Methods raise ModbusError. For one task of `clock` at a time.
     """
@@ -83,13 +81,13 @@ class LoadCells:
         over = None if status is None else status.over_range_bit
         fault = TensionFault.NONE
         if raw != raw or raw in value.broken_wire_raw or _is_set(bits, broken):  # noqa: PLR0124
-            fault = TensionFault.BROKEN_WIRE  # a value that is no number is none of a load cell
+            fault = TensionFault.BROKEN_WIRE  # a NaN is no value of a load cell
         elif _is_set(bits, over) or not amplifier.lowest_N <= tension <= amplifier.highest_N:
             fault = TensionFault.OVER_RANGE
         return Reading(sensor.cable, tension, fault)
 
     def tare(self, number: int) -> None:
-        """Have one amplifier take its present reading as zero; needs `amplifier.tare`."""
+        """Set an amplifier's present reading as its zero; needs `amplifier.tare`."""
         tare = self.profile.amplifier.tare
         assert tare is not None
         self.line.write_register(self.profile.sensors[number].unit, tare.address, tare.value)
@@ -104,7 +102,7 @@ def _is_set(bits: int, bit: int | None) -> bool:
 
 
 def _requests(amplifier: Amplifier) -> list[tuple[RegisterKind, int, int]]:
-    """Return (kind, start, count) of what must be read: one request where one reaches all."""
+    """Return (kind, start, count) of the reads: a single request if it covers all."""
     value, status = amplifier.value, amplifier.status
     size = REGISTERS[value.type]
     if status is None:
@@ -117,10 +115,10 @@ def _requests(amplifier: Amplifier) -> list[tuple[RegisterKind, int, int]]:
 
 
 class TensionSampler:
-    """Reads all load cells in turn in a task of `clock` and publishes them.
+    """Read all load cells in turn in a task of `clock` and publish the readings.
 
-    `exchange` is what the cycle reads. Sensors that fail are asked again in turn, a port that is
-    gone is opened again; what went wrong last stands in `errors`, by sensor.
+    The cycle reads `exchange`. Failed sensors are polled again in turn; a lost port is opened
+    again; `errors` has the last error of each sensor.
     """
 
     def __init__(self, profile: TensionSensors, port: str, clock: Clock) -> None:
@@ -135,13 +133,13 @@ class TensionSampler:
         self._task: Task[None] | None = None
 
     def start(self) -> Self:
-        """Open the line and begin to sample. Raises LineError for a port that does not open."""
+        """Open the line and start to sample. Raises LineError if the port does not open."""
         self._cells.line.open()
         self._task = self._clock.start(self._run)
         return self
 
     def await_readings(self, timeout_s: float) -> None:
-        """Wait until every sensor was read at least once; raises ModbusError."""
+        """Wait until every sensor has been read at least once; raises ModbusError."""
         if not self._clock.wait(lambda: all(self.readings), self._clock.now_s + timeout_s):
             missing = self.readings.index(0)
             cable = self.exchange.cables[missing]
@@ -169,10 +167,10 @@ class TensionSampler:
             clock.wait(None, due_s)
 
     def _round(self) -> float:
-        """Read every sensor once; return how long to wait at least before the next round.
+        """Read every sensor once; return the minimum wait before the next round.
 
-        Of those that failed last time only one is asked, and once, so that silent ones do not
-        make the readings of the others old.
+        Only one of the sensors that failed last time is polled, and only once, so that silent
+        sensors do not make the readings of the others old.
         """
         failing = [number for number, error in enumerate(self.errors) if error]
         again = failing[self._rounds % len(failing)] if failing else -1

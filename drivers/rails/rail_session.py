@@ -2,30 +2,116 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
+from typing import Final
 
-from cdpr_drivers.bus import BusUrl
-from cdpr_drivers.bus.simulated_bus import open_clock
-from cdpr_drivers.canopen.boot.boot import BootSettings, boot
+from cdpr_drivers.bus import open_port
+from cdpr_drivers.bus.frames import FRAME, FrameReader
+from cdpr_drivers.bus.simbus import open_clock
+from cdpr_drivers.bus.url import BusUrl
+from cdpr_drivers.canopen import sdo as frames
+from cdpr_drivers.canopen.boot import BootSettings, boot
 from cdpr_drivers.canopen.network import CanNetwork
-from cdpr_drivers.canopen.power_watch import PowerWatch
+from cdpr_drivers.cia402 import POWER_OFF, state_of
 from cdpr_drivers.errors import BusError, ConfigurationError
 from cdpr_drivers.modbus.safety_io import SafetyIo
 from cdpr_drivers.modbus.tension import TensionSampler
-from cdpr_drivers.rails.rail import RailAxis
-from cdpr_drivers.rails.rail_cia402 import Cia402RailAxis
-from cdpr_drivers.rails.rail_modbus import ModbusRailAxis
+from cdpr_drivers.rails.rail import Cia402RailAxis, ModbusRailAxis, RailAxis
 from cdpr_drivers.robot.safety import CLOSED, connect
 from cdpr_profiles import DriveProfile
 from cdpr_profiles.catalogue import load_rail_drive
-from cdpr_profiles.devices.rail import Cia402Rail, RailProfile
-from cdpr_profiles.devices.tension_sensor import load_tension_sensors
-from cdpr_profiles.eds.dictionary import load_dictionary
+from cdpr_profiles.eds import load_dictionary
+from cdpr_profiles.rail import Cia402Rail, RailProfile
+from cdpr_profiles.tension_sensor import load_tension_sensors
 from cdpr_rt.core.clock import Clock, PacedClock
-from cdpr_rt.procedures.winch_operator import Notifier
+from cdpr_rt.loop.operating import Notifier
 
-# nothing is exchanged with SYNC; the drive only needs some period
+# Checks by SDO, without booting any drive, whether a drive on a bus has power.
+
+_FUNCTION: Final = 0x780
+_UPLOAD: Final = frames.upload_request(0x6041, 0)
+_STATUSWORD: Final = frames.multiplexer(0x6041, 0)
+_ROUNDS: Final = 2
+_WAIT_S: Final = 0.2
+"""Time to wait for answers after the last request."""
+_ASK_EVERY_S: Final = 0.25
+_ANSWER_TIMEOUT_S: Final = 2.0
+
+
+class PowerWatch:
+    """Polls the statuswords (6041h) of all drives on a bus except `exclude`.
+
+    Nodes that do not answer, or refuse, do not count as drives with power: their control supply
+    is off, or they are other devices. Methods raise BusError.
+    """
+
+    def __init__(self, url: BusUrl, clock: Clock, exclude: Collection[int]) -> None:
+        """Query all node ids and wait for the answers."""
+        self.url = url
+        self._clock = clock
+        self._exclude = frozenset(exclude)
+        self._heard_s: dict[int, float] = {}
+        self._words: dict[int, int] = {}
+        self._reader = FrameReader(open_port(url, [(frames.ANSWER, _FUNCTION)]))
+        self._reader.take = self._take
+        try:
+            for _ in range(_ROUNDS):
+                self._ask([node for node in range(1, 128) if node not in exclude])
+                clock.sleep(_WAIT_S)
+                self._reader.settle()
+        except BaseException:
+            self._reader.close()
+            raise
+        self._asked_at_s = clock.now_s
+
+    @property
+    def nodes(self) -> list[int]:
+        """The drives that have answered."""
+        return sorted(self._words)
+
+    def reason(self) -> str:
+        """Return which drive has power or no longer answers; else an empty text. Never waits."""
+        now_s = self._clock.now_s
+        self._reader.settle()
+        if now_s - self._asked_at_s > _ASK_EVERY_S:
+            self._asked_at_s = now_s
+            self._ask(self.nodes)
+        for node, word in sorted(self._words.items()):
+            state = state_of(word)
+            if state not in POWER_OFF:
+                return f"node {node} on {self.url} is {state.label}, which is with power"
+            if now_s - self._heard_s[node] > _ANSWER_TIMEOUT_S:
+                return f"node {node} on {self.url} does not answer any more: has it power?"
+        return ""
+
+    def close(self) -> None:
+        """Leave the bus."""
+        self._reader.close()
+
+    def _ask(self, nodes: Collection[int]) -> None:
+        port = self._reader.port
+        try:
+            for node in nodes:
+                port.send(FRAME.pack(frames.REQUEST + node, 8, _UPLOAD))
+        except OSError as error:
+            raise port.lost(error) from error
+
+    def _take(self, last: int) -> None:
+        for row in self._reader.frames.rows[:last]:
+            can_id, length, data = FRAME.unpack_from(row)
+            node = can_id - frames.ANSWER
+            if node in self._exclude:
+                continue  # answers to another master
+            # other transfers on the bus are ignored
+            if frames.answers(data[:length], _STATUSWORD, frames.UPLOAD):
+                value = frames.expedited(data)
+                if value is not None:
+                    self._words[node] = int.from_bytes(value[:2], "little")
+                    self._heard_s[node] = self._clock.now_s
+
+
+# there is no exchange with SYNC; the drive only needs some period
 _SYNC_PERIOD_S = 0.01
 _FIRST_READINGS_S = 3.0
 _ASK_S = 0.05
@@ -52,10 +138,10 @@ def open_rail(
     out: Notifier,
     clock: Clock,
 ) -> Iterator[RailAxis]:
-    """Get a rail ready to move; however the block ends, its drive has no power afterwards.
+    """Open a rail, ready to move; however the block ends, its drive has no power afterwards.
 
-    Raises ConfigurationError for what the rail's kind needs and was not given, and the drivers'
-    errors.
+    Raises ConfigurationError for options that the rail's kind needs and that are missing, and the
+    drivers' errors.
     """
     with ExitStack() as stack:
         if rail.cia402 is None:
@@ -68,7 +154,7 @@ def open_rail(
         require_options(rail, bus, safety_io)
         url = _bus_of(rail, bus)
         safety = stack.enter_context(_open_safety(safety_io, out, clock))
-        assert safety is not None  # one was named
+        assert safety is not None  # checked by require_options
         drive = load_rail_drive(reference, rail.cia402)
         network = stack.enter_context(_network(rail.cia402, drive, url, clock))
         settings = BootSettings(
@@ -76,12 +162,12 @@ def open_rail(
         )
         report = boot(network, rail.cia402.node_id, drive, settings)
         stack.callback(network.release, rail.cia402.node_id)
-        network.start_heartbeat()  # should we die, the drive stops
+        network.start_heartbeat()  # if this process dies, the drive stops
         yield Cia402RailAxis(rail, drive, network, report, safety)
 
 
 def require_options(rail: RailProfile, bus: str | None, safety_io: str | None) -> None:
-    """Raise ConfigurationError for what the rail's kind needs and was not given."""
+    """Raise ConfigurationError for options that the rail's kind needs and that are missing."""
     if rail.cia402 is None:
         return
     _bus_of(rail, bus)
@@ -92,7 +178,7 @@ def require_options(rail: RailProfile, bus: str | None, safety_io: str | None) -
 
 
 def position_of(reference: str, rail: RailProfile, bus: str | None) -> float:
-    """Return where the carriage is, in m; nothing is written to the drive."""
+    """Return the position of the carriage in m; writes nothing to the drive."""
     if rail.cia402 is None:
         axis = ModbusRailAxis(rail, PacedClock())
         try:
@@ -112,7 +198,7 @@ def position_of(reference: str, rail: RailProfile, bus: str | None) -> float:
 def power_watch(
     rail: RailProfile, bus: str | None, winch_buses: Sequence[str], out: Notifier, clock: Clock
 ) -> Iterator[Callable[[], str]]:
-    """Yield what tells which winch has power, of those on the rail's own bus and on `winch_buses`.
+    """Yield a function that returns which winch has power, on the rail's bus and `winch_buses`.
 
     Raises ConfigurationError for a bus that cannot be opened.
     """
@@ -143,7 +229,7 @@ def power_watch(
 
 
 def _keep_asking(clock: Clock, watches: Sequence[PowerWatch]) -> None:
-    """Ask without end: what is known is as old as a drive is slow to boot, or a disk to write."""
+    """Poll without end, so that the answers stay fresh while a drive boots or a disk writes."""
     while True:
         for watch in watches:
             watch.reason()
@@ -154,9 +240,9 @@ def _keep_asking(clock: Clock, watches: Sequence[PowerWatch]) -> None:
 def slack_watch(
     rail: RailProfile, sensors: str | None, port: str | None, checked: bool, clock: Clock
 ) -> Iterator[Callable[[], str]]:
-    """Yield what tells which cable is tight: by load cells, or never where the user has looked.
+    """Yield a function that returns which cable is tight: by load cells, or "" if the user checked.
 
-    Raises ConfigurationError where neither is given, ModbusError for load cells that do not answer.
+    Raises ConfigurationError if neither is given, ModbusError if load cells do not answer.
     """
     if sensors is None:
         if not checked:
@@ -217,10 +303,10 @@ def _network(
 
 @contextmanager
 def _open_safety(reference: str | None, out: Notifier, clock: Clock) -> Iterator[SafetyIo | None]:
-    """Connect to a safety I/O and close its contactor, for as long as the block runs.
+    """Connect to a safety I/O and keep its contactor closed while the block runs.
 
-    None where none is named. Raises ModbusError for an I/O that does not answer and SafetyIoError
-    where it forbids to energise, or did not open its contactor at the end.
+    Yields None if none is named. Raises ModbusError if the I/O does not answer and SafetyIoError
+    if it forbids to energise, or did not open its contactor at the end.
     """
     if reference is None:
         yield None

@@ -1,1 +1,1 @@
-"""A robot's drives put together from its file: buses, boot, devices beside them, the machine."""
+"""A robot's drives, assembled from its file: buses, boot, additional devices, the machine."""

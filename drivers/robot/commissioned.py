@@ -1,4 +1,4 @@
-"""What commissioning has learnt of a robot's motors: found, checked, ready for the control."""
+"""Commissioning results of a robot's motors: found, checked, ready for the control."""
 
 from __future__ import annotations
 
@@ -10,26 +10,26 @@ from pathlib import Path
 
 import numpy as np
 
-from cdpr_drivers.canopen.boot.boot import BootReport
+from cdpr_drivers.canopen.boot import BootReport
 from cdpr_drivers.errors import ConfigurationError
 from cdpr_profiles import Robot, RobotAxis
-from cdpr_profiles.limits.motor_bounds import MotorBounds
+from cdpr_profiles.motor_bounds import MotorBounds
 from cdpr_rt.control.compensation import AxisCompensation
-from cdpr_rt.core.supervision.limits import Limits
+from cdpr_rt.core.supervisor import Limits
 from cdpr_rt.identification.cogging_profile import (
     CoggingProfile,
     CoggingProfileError,
     DriveIdentity,
 )
-from cdpr_rt.procedures.commissioning.commission_files import Paths
-from cdpr_rt.robots.robot_arrays import limits_of
+from cdpr_rt.model.robot_arrays import limits_of
+from cdpr_rt.procedures.commissioning_results import Paths
 
 CoggingProfiles = tuple[CoggingProfile | None, ...]
-"""One for each axis of a robot, None where its motor has not been commissioned."""
+"""One for each axis of a robot; None if its motor has not been commissioned."""
 
 
 def identity_of(report: BootReport) -> DriveIdentity:
-    """Return what a cogging profile is bound to, besides the motor, of a drive that has booted."""
+    """Return the identity of a booted drive to which a cogging profile is bound."""
     return DriveIdentity(
         vendor_id=report.vendor_id,
         product_code=report.product_code,
@@ -40,7 +40,7 @@ def identity_of(report: BootReport) -> DriveIdentity:
 
 
 def folder_of(axis: RobotAxis) -> str:
-    """Return the name of the folder of an axis in that of its robot's commissioning."""
+    """Return the name of an axis' folder within the folder of its robot's commissioning."""
     return folder_called(axis.name, axis.node_id)
 
 
@@ -50,15 +50,15 @@ def folder_called(name: str, node_id: int) -> str:
 
 
 def with_commissioned(robot: Robot, folder: Path | None) -> Robot:
-    """Return `robot` with the profiles that lie in `folder`, a subfolder for each axis.
+    """Return `robot` with the profiles found in `folder`, which has a subfolder for each axis.
 
-    Axes without one there keep what the robot's file says; None leaves all as they are. Raises
-    ConfigurationError for a folder that holds none at all.
+    Axes without a profile there keep the one of the robot's file; None leaves all unchanged. Raises
+    ConfigurationError for a folder without any profile.
     """
     if folder is None:
         return robot
     found = {i: folder / folder_of(axis) for i, axis in enumerate(robot.axes)}
-    # what lies there and is no file is refused when it is read, and not taken for nothing
+    # a path that exists but is no file is rejected when it is read, not treated as missing
     there = {i: path for i, path in found.items() if os.path.lexists(Paths(path).profile)}
     found = {i: path.resolve() for i, path in there.items()}
     if not found:
@@ -72,7 +72,7 @@ def with_commissioned(robot: Robot, folder: Path | None) -> Robot:
 
 
 def uncommissioned_text(robot: Robot) -> str:
-    """Return which axes have no profile though others do, an empty text where it is all or none."""
+    """Return which axes have no profile although others do; empty if all or none have one."""
     names = [axis.name for axis in robot.axes if axis.commissioned is None]
     if len(names) in (0, len(robot.axes)):
         return ""
@@ -80,7 +80,7 @@ def uncommissioned_text(robot: Robot) -> str:
 
 
 def without_commissioned(robot: Robot) -> Robot:
-    """Return `robot` as if no motor had been commissioned."""
+    """Return `robot` with all commissioning profiles removed."""
     return _with_paths(robot, {})
 
 
@@ -92,10 +92,10 @@ def _with_paths(robot: Robot, paths: Mapping[int, Path | None]) -> Robot:
 def load_profiles(robot: Robot, limits: Limits | None = None) -> CoggingProfiles:
     """Return the cogging profiles that the axes name.
 
-    They are held against the torques of `limits`, those of the robot's file if left out.
+    They are checked against the torques of `limits` (default: those of the robot's file).
 
-    Raises ConfigurationError, naming axis and file, for one that cannot be read, is of another
-    motor or cannot be true of it.
+    Raises ConfigurationError, naming axis and file, for a profile that cannot be read, belongs to
+    another motor or is impossible for this one.
     """
     found = tuple(map(_load, robot.axes, _bounds(robot, limits)))
     lengths = {len(one.harmonic.table_Nm[0]): i for i, one in enumerate(found) if one is not None}
@@ -125,7 +125,7 @@ def _load(axis: RobotAxis, bounds: MotorBounds) -> CoggingProfile | None:
 def load_profile(path: Path, bounds: MotorBounds, whose: str = "") -> CoggingProfile:
     """Return the cogging profile of a motor; raises ConfigurationError, which begins with `whose`.
 
-    It names file, key and value of what cannot be true of the motor.
+    The error names file, key and value of whatever is impossible for the motor.
     """
     try:
         profile = CoggingProfile.load(path)
@@ -141,9 +141,9 @@ def load_profile(path: Path, bounds: MotorBounds, whose: str = "") -> CoggingPro
 def compensation_of(
     robot: Robot, profiles: Sequence[CoggingProfile | None], limits: Limits | None = None
 ) -> tuple[AxisCompensation | None, ...]:
-    """Return what the control compensates of each motor: the harmonic model and its friction.
+    """Return the compensation of each motor: its harmonic model and its friction.
 
-    Within the torques of `limits`, those of the robot's file if left out.
+    Torques stay within `limits` (default: those of the robot's file).
     """
     pairs = zip(profiles, _bounds(robot, limits), strict=True)
     return tuple(None if p is None else p.harmonic.compensation(bounds) for p, bounds in pairs)
@@ -152,10 +152,10 @@ def compensation_of(
 def check_drive_identities(
     robot: Robot, profiles: Sequence[CoggingProfile | None], reports: Sequence[BootReport]
 ) -> None:
-    """Raise CoggingProfileError, naming the axis, where a profile is of another drive.
+    """Raise CoggingProfileError, naming the axis, if a profile belongs to another drive.
 
-    ConfigurationError where a winch's calibration is, as the torque constant of its drive is in it;
-    of drives without a serial number (0) nothing can be said.
+    Raise ConfigurationError if a winch's calibration does, because it contains the torque constant
+    of its drive. Drives without a serial number (0) cannot be checked.
     """
     bounds = _bounds(robot)
     for i, report in enumerate(reports):
@@ -164,7 +164,7 @@ def check_drive_identities(
         if of and report.serial not in (0, of):
             raise ConfigurationError(
                 f"{robot.path}: axes[{i}].calibration: is of a winch whose drive has serial {of}, "
-                f"that of axis {axis.name} has {report.serial}; calibrate it anew"
+                f"that of axis {axis.name} has {report.serial}; calibrate it again"
             )
         if profile is None:
             continue

@@ -1,4 +1,4 @@
-"""The daemon's machine where another master runs the robot: it listens, and sends nothing."""
+"""The daemon's machine if another master runs the robot: it listens and sends nothing."""
 
 from __future__ import annotations
 
@@ -12,17 +12,18 @@ from cdpr_drivers.robot.robot_buses import robot_urls
 from cdpr_profiles import Robot
 from cdpr_rt.core.clock import PacedClock
 from cdpr_rt.core.cycle import Watch
-from cdpr_rt.core.tension_feedback import TensionFeedback
-from cdpr_rt.runtime.machine import MachineError
+from cdpr_rt.core.exchange import TensionFeedback
+from cdpr_rt.core.fault import Fault
+from cdpr_rt.loop.machine import MachineError
 
 _MASTER_S: Final = 1.0
 _NOTICE: Final = "read-only: nothing is sent; another master runs the drives"
 
 
 class ListeningMachine:
-    """All axes of `robot`, heard on the buses given with --bus; implements `Machine`.
+    """All axes of `robot`, received from the buses given with --bus; implements `Machine`.
 
-    What would have to be sent is refused, or left undone where it is part of an ending.
+    Operations that would send are rejected, or skipped if they are part of closing.
     """
 
     failures: tuple[type[Exception], ...] = (BusError,)
@@ -31,14 +32,14 @@ class ListeningMachine:
     watches: Sequence[Watch] = ()
     notices: Sequence[str] = (_NOTICE,)
     safety = ""
-    """The other master's affair."""
+    """Left to the other master."""
 
     def __init__(self, robot: Robot, buses: Sequence[str]) -> None:
         self.clock = PacedClock()
         self._robot = robot
         self._urls = robot_urls(robot, buses)
         self.device: ListeningDevice | None = None
-        """The axes that are heard, None until `open` and after `close`."""
+        """The monitored axes; None until `open` and after `close`."""
         self._sync_deadline_s = 0.0
 
     # -- slow
@@ -58,25 +59,25 @@ class ListeningMachine:
             raise MachineError(str(error)) from error
 
     def prepare(self) -> None:
-        """Begin to wait for the other master's SYNC."""
+        """Start to wait for the other master's SYNC."""
         self._sync_deadline_s = self.clock.now_s + _MASTER_S
 
     def acknowledge(self) -> None:
-        """Do nothing: there is no guard here that latches."""
+        """Do nothing: no safety I/O latches here."""
 
     def pause(self) -> None:
         """Do nothing: the drives do not notice."""
 
-    def confirm_power_off(self) -> str:
-        """Return an empty text: the power is the other master's affair."""
-        return ""
+    def confirm_power_off(self) -> Sequence[Fault]:
+        """Return nothing: the other master controls the power."""
+        return ()
 
-    def explain(self, reason: str) -> str:
-        """Return `reason`; the drives are not asked for more."""
-        return reason
+    def explain(self) -> Sequence[Fault]:
+        """Return nothing: the drives are not queried."""
+        return ()
 
     def close(self) -> str:
-        """Leave the buses; return an empty text, as nothing is uncertain."""
+        """Leave the buses; return an empty text, because nothing is uncertain."""
         device, self.device = self.device, None
         return "" if device is None else device.close()
 
@@ -87,7 +88,7 @@ class ListeningMachine:
         return None
 
     def bus_state(self) -> dict[str, Any]:
-        """Return where each bus is found, and whether a master is heard."""
+        """Return the URL of each bus, and whether a master sends on it."""
         state = "closed" if self.device is None else "listening" if self._led else "no master"
         return {name: {"url": str(url), "state": state} for name, url in self._urls.items()}
 
@@ -96,7 +97,7 @@ class ListeningMachine:
         return self.device is not None and self.device.silent_s < _MASTER_S
 
     def prepared(self) -> bool:
-        """Whether a master runs the axes; raises MachineError after a while without."""
+        """Whether a master runs the axes; raises MachineError after a while without one."""
         if not self._led and self.clock.now_s > self._sync_deadline_s:
             raise MachineError(
                 f"no SYNC came for {_MASTER_S:g} s: no other master runs {self._robot.name}; "
@@ -105,15 +106,18 @@ class ListeningMachine:
         return self._led
 
     def unprepared(self) -> str:
-        """Return that no other master was heard."""
+        """Return the text that no other master was detected."""
         return f"no other master runs {self._robot.name}"
 
     def power_on(self) -> None:
-        """Refuse, by MachineError."""
+        """Raise MachineError: this machine only listens."""
         raise MachineError(_NOTICE)
 
     def power_off(self) -> None:
-        """Do nothing: the power is the other master's affair."""
+        """Do nothing: the other master controls the power."""
+
+    def switch_off_lost(self) -> None:
+        """Do nothing, as `power_off`."""
 
     def quick_stop(self) -> None:
         """Do nothing, as `power_off`."""
@@ -123,7 +127,7 @@ class ListeningMachine:
         return False
 
     def unpowered(self) -> bool:
-        """Whether no drive that can be heard has power."""
+        """Whether all drives that answer report no power."""
         return self.device is None or all(state in POWER_OFF for state in self.device.states())
 
     def reset_faults(self) -> None:
@@ -148,7 +152,7 @@ class ListeningMachine:
         return True
 
     def states(self) -> list[str]:
-        """Return what each drive says of itself, in the standard's words."""
+        """Return the state that each drive reports, under its name in the standard."""
         if self.device is None:
             return []
         return [

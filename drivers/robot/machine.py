@@ -11,33 +11,91 @@ from typing import Any, Concatenate, Final, ParamSpec, TypeVar
 
 import numpy as np
 
-from cdpr_drivers.axes import touch_probe
+from cdpr_drivers.axes import homing
 from cdpr_drivers.axes.axis_buses import AxisBuses
 from cdpr_drivers.bus.health import BusHealth
-from cdpr_drivers.bus.simulated_bus import open_clock
-from cdpr_drivers.canopen.boot.boot import BootReport
+from cdpr_drivers.bus.simbus import open_clock
+from cdpr_drivers.canopen.boot import BootReport
 from cdpr_drivers.canopen.network import CanNetwork
 from cdpr_drivers.cia402 import POWER_OFF, State, state_of
-from cdpr_drivers.errors import BusError, DriverError
+from cdpr_drivers.errors import BusError, ConfigurationError, DriverError
+from cdpr_drivers.modbus.tension import TensionSampler
 from cdpr_drivers.robot.commissioned import check_drive_identities, identity_of, load_profiles
 from cdpr_drivers.robot.robot_boot import (
     boot_notes,
     boot_robot,
     device_of,
-    faults_text,
+    drive_source,
     open_networks,
+    reported_errors,
 )
 from cdpr_drivers.robot.robot_buses import robot_urls
 from cdpr_drivers.robot.safety import SessionSafety, connect
-from cdpr_drivers.robot.tensions import RobotTensions
 from cdpr_profiles import Robot
 from cdpr_profiles.errors import ProfileError
+from cdpr_profiles.robot_limits import Limit
+from cdpr_profiles.tension_sensor import load_tension_sensors
+from cdpr_rt.core.clock import Clock
 from cdpr_rt.core.cycle import Watch
-from cdpr_rt.core.supervision.limits import Limits
-from cdpr_rt.core.tension_feedback import TensionFeedback
+from cdpr_rt.core.exchange import TensionFeedback
+from cdpr_rt.core.fault import POWER_UNCONFIRMED, POWER_UNKNOWN, Fault
+from cdpr_rt.core.supervisor import Limits
 from cdpr_rt.errors import ControlError
-from cdpr_rt.robots.robot_arrays import limits_of
-from cdpr_rt.runtime.machine import MachineError
+from cdpr_rt.loop.machine import MachineError
+from cdpr_rt.model.robot_arrays import limits_of
+
+# A robot's tension sensors, read beside its control loop.
+
+_FIRST_READINGS_S = 3.0
+
+
+class RobotTensions:
+    """The load cells of a robot, read beside the cycle while they are open.
+
+    Without a `port`, tensions are estimated from torques instead. Raises ConfigurationError for a
+    port without configured sensors, and for more sensors than axes.
+    """
+
+    def __init__(self, robot: Robot, port: str | None) -> None:
+        self._profile, self._port = None, port
+        self._sampler: TensionSampler | None = None
+        if port is None:
+            return
+        if robot.tension_sensors is None:
+            raise ConfigurationError(
+                f"--tension-port {port}: {robot.path} names no sensors (key tension_sensors)"
+            )
+        self._profile = load_tension_sensors(robot.tension_sensors)
+
+    def open(self, stack: ExitStack, clock: Clock) -> None:
+        """Start to read, until `stack` ends it; raises ModbusError for a silent sensor."""
+        if self._profile is None or self._port is None:
+            return
+        self._sampler = stack.enter_context(TensionSampler(self._profile, self._port, clock))
+        stack.callback(self._forget)
+        self._sampler.await_readings(_FIRST_READINGS_S)
+
+    def _forget(self) -> None:
+        self._sampler = None
+
+    def read(self) -> TensionFeedback | None:
+        """Return the last tensions, or None if there are no sensors; for the cycle."""
+        sampler = self._sampler
+        if sampler is None:
+            return None
+        sampler.exchange.update()
+        return sampler.exchange.feedback
+
+    def trouble(self) -> str:
+        """Return why the tensions are unreliable, or an empty text."""
+        return "" if self._sampler is None else self._sampler.exchange.reason()
+
+    def missing(self, robot: Robot) -> str:
+        """Return a note about sensors that are not read, or an empty text."""
+        if self._profile is not None or robot.tension_sensors is None:
+            return ""
+        return f"{robot.tension_sensors} is not read: give --tension-port to have it measure"
+
 
 _P = ParamSpec("_P")
 _T = TypeVar("_T")
@@ -47,7 +105,7 @@ _ERRORS: Final = (DriverError, ProfileError, ControlError, OSError)
 def _as_machine_error(
     work: Callable[Concatenate[RobotMachine, _P], _T],
 ) -> Callable[Concatenate[RobotMachine, _P], _T]:
-    """Have everything that goes wrong in `work` raised as MachineError."""
+    """Convert every error of `work` to MachineError."""
 
     @wraps(work)
     def wrapped(machine: RobotMachine, /, *args: _P.args, **kwargs: _P.kwargs) -> _T:
@@ -63,11 +121,11 @@ def _as_machine_error(
 class RobotMachine:
     """All axes of `robot` on the buses given with --bus; implements `Machine`.
 
-    There is power only while the `safety_io` allows it: the robot's own where none is named, unless
-    all buses are simulated. Tensions are measured where their sensors are at a `tension_port`.
-    Simulated buses in lockstep go on as fast as they can, in `real_time` no faster than wall time.
-    Axes that are not mandatory are left out where they do not boot, if they may be `optional`.
-    Its `limits` are those of its file if left out.
+    Power is possible only while the `safety_io` allows it; by default it is the robot's own, unless
+    all buses are simulated. Tensions are measured if their sensors are at a `tension_port`.
+    Simulated buses in lockstep run as fast as they can; with `real_time`, no faster than wall time.
+    If `optional` is set, non-mandatory axes that do not boot are left out.
+    By default its `limits` are those of its file.
     """
 
     failures: tuple[type[Exception], ...] = (BusError,)
@@ -85,7 +143,7 @@ class RobotMachine:
         limits: Limits | None = None,
     ) -> None:
         self.robot = robot
-        """Its axes are those which have booted, once they have."""
+        """After the boot, it has only the axes that booted."""
         self._optional = optional
         limits = limits or limits_of(robot)
         self._torque_Nm = np.broadcast_to(limits.torque_Nm, (len(robot.axes),)).tolist()
@@ -97,11 +155,11 @@ class RobotMachine:
         self._tensions = RobotTensions(robot, tension_port)
         self._reference = safety_io or (robot.safety_io if real else None)
         self.device: AxisBuses | None = None
-        """The booted axes, None until `open` and after `close`."""
+        """The booted axes; None until `open` and after `close`."""
         self.watches: Sequence[Watch] = ()
         self.notices: Sequence[str] = ()
         self.networks: dict[str, CanNetwork] = {}
-        """The buses, by the robot's names of them, once the drives have booted."""
+        """The buses, by their names in the robot's file; filled after the boot."""
         self.reports: Sequence[BootReport] = ()
         """What each drive reported when it booted, in the order of the axes."""
         self._drives: dict[str, dict[str, dict[str, int]]] = {}
@@ -112,7 +170,7 @@ class RobotMachine:
 
     @_as_machine_error
     def open(self) -> None:
-        """Open the buses and boot the drives; they are left without power."""
+        """Open the buses and boot the drives; they stay without power."""
         with ExitStack() as stack:
             self._safety = self._open_safety(stack)
             self._tensions.open(stack, self.clock)
@@ -125,10 +183,10 @@ class RobotMachine:
             reports = list(booted.values())
             check_drive_identities(self.robot, self._profiles, reports)
             stack.callback(device.close)
-            # the supervisor judges silence before the device does
+            # the supervisor must detect the silence before the device does
             device.tolerate_silence(self._missed_cycles + 1)
             unsought = self._seek_indices(device)
-            # the collector keeps every thread waiting: it looks at what stays now, and never again
+            # a collection blocks every thread: collect now and exempt the remaining objects
             gc.collect()
             gc.freeze()
             for network in networks.values():
@@ -138,11 +196,11 @@ class RobotMachine:
         self._drives = self._identities()
         notices += [self._tensions.missing(self.robot), *unsought, self._idle_brakes()]
         self.notices = [notice for notice in notices if notice]
-        self.watches = () if self._safety is None else (self._safety.io,)
+        self.watches = () if self._safety is None else (self._safety,)
         self.device = device
 
     def _leave_out(self, absent: Mapping[int, str]) -> None:
-        """Go on as a robot without the axes that have not booted; raises MachineError."""
+        """Continue as a robot without the axes that did not boot; raises MachineError."""
         if not self._optional:
             raise MachineError(
                 "; ".join(f"{self.robot.axes[i].name}: {reason}" for i, reason in absent.items())
@@ -152,22 +210,24 @@ class RobotMachine:
         self._profiles = tuple(self._profiles[i] for i in present)
         self._torque_Nm = [self._torque_Nm[i] for i in present]
         self.robot = replace(self.robot, axes=tuple(self.robot.axes[i] for i in present))
+        if self._safety is not None:
+            self._safety.node_ids = [axis.node_id for axis in self.robot.axes]
 
     def _seek_indices(self, device: AxisBuses) -> list[str]:
-        """Have each drive latch its encoder's index in whatever motion comes (touch probe).
+        """Let each drive latch its encoder's index in any later motion (touch probe).
 
-        It must, where a cogging profile counts from it. A daemon seeks all others as well: they
-        show whether a platform's motors were turned while no loop ran, and sweeps count from them;
-        returns why one of them is not sought.
+        This is required if a cogging profile counts from the index. A daemon also seeks the other
+        indices: they show whether motors were turned while no loop ran, and sweeps count from them.
+        Returns a note for each of these that is not sought.
         """
         notes = []
         for i, (axis, profile) in enumerate(zip(self.robot.axes, self._profiles, strict=True)):
             group, place = device.group_of(i)
             if profile is not None:
-                touch_probe.arm(group, place)
+                homing.arm(group, place)
             elif not self._optional and group.reports_probe(place):
                 try:
-                    touch_probe.arm(group, place)
+                    homing.arm(group, place)
                 except DriverError as error:
                     notes.append(f"{axis.name}: its encoder's index is not sought: {error}")
         return notes
@@ -186,7 +246,7 @@ class RobotMachine:
 
     @_as_machine_error
     def prepare(self) -> None:
-        """Close the contactor and have each drive take torques."""
+        """Close the contactor and request the torque mode of each drive."""
         self._tensions.read()
         if trouble := self._tensions.trouble():
             raise MachineError(trouble)
@@ -197,51 +257,45 @@ class RobotMachine:
 
     @_as_machine_error
     def acknowledge(self) -> None:
-        """Forget what the safety I/O has latched, whose cause is gone."""
-        if self._safety is not None and self._safety.tripped:
-            self._safety.io.de_energise()  # it acknowledges while it does not watch
+        """Acknowledge a trip of the safety I/O whose cause is gone."""
+        if self._safety is not None and self._safety.fault():
+            self._safety.io.de_energise()  # it can be acknowledged only while it does not monitor
             self._safety.io.acknowledge()
 
     @_as_machine_error
     def pause(self) -> None:
-        """Leave the drives, which have no power, for a while without cycles."""
+        """Suspend the cycles while the drives have no power."""
         self._booted.stop_cycling()
 
     @_as_machine_error
-    def confirm_power_off(self) -> str:
-        """See to it that no drive has power which does not answer; return what is uncertain."""
-        device = self._booted
-        unconfirmed, lost = [], dict[str, list[str]]()
-        for axis, state in zip(self.robot.axes, device.states(), strict=True):
+    def confirm_power_off(self) -> list[Fault]:
+        """Ensure that drives which do not answer have no power; return what remains uncertain."""
+        device, uncertain = self._booted, list[Fault]()
+        for i, (axis, state) in enumerate(zip(self.robot.axes, device.states(), strict=True)):
             if state in POWER_OFF:
                 continue
+            code, why = POWER_UNCONFIRMED, ""
             try:
-                off = self.networks[axis.bus].switch_off(axis.node_id)
+                if self.networks[axis.bus].switch_off(axis.node_id):
+                    continue
             except BusError as error:
-                lost.setdefault(str(error), []).append(axis.name)
-                continue
-            if not off:
-                unconfirmed.append(
-                    f"{axis.name}: does not confirm that its power is off; it was reset"
-                )
-        unconfirmed += [
-            f"{', '.join(names)}: not known to be without power: {why}"
-            for why, names in lost.items()
-        ]
-        return "; ".join(unconfirmed)
+                code, why = POWER_UNKNOWN, str(error)
+            uncertain.append(Fault(Limit.DRIVE, i, code, drive_source(axis), detail=why))
+        return uncertain
 
     @_as_machine_error
-    def explain(self, reason: str) -> str:
-        """Return `reason` with what drives and safety I/O say of it."""
-        device = self.device
-        if device is not None and device.faulted().any():
-            faults = faults_text(self.robot.axes, device, self.networks, reason)
-            reason = f"{reason}: {faults}" if faults else reason
-        return reason if self._safety is None else self._safety.cause(reason)
+    def explain(self) -> list[Fault]:
+        """Return the errors that drives in fault and the safety I/O report now."""
+        device, safety = self.device, self._safety
+        errors = [] if device is None else reported_errors(self.robot.axes, device, self.networks)
+        found = list(errors)
+        if safety is not None and (trip := safety.await_trip()):
+            found.append(trip)
+        return found
 
     @_as_machine_error
     def close(self) -> str:
-        """Take the power from the drives and leave the buses; return what stayed uncertain."""
+        """Switch the drives off and leave the buses; return what remains uncertain."""
         device, self.device = self.device, None
         self.watches = ()
         unconfirmed = ""
@@ -263,11 +317,11 @@ class RobotMachine:
     # -- in a cycle
 
     def read_tension(self) -> TensionFeedback | None:
-        """Return the tensions as last read, None where none are measured."""
+        """Return the last tensions; None if none are measured."""
         return self._tensions.read()
 
     def bus_state(self) -> dict[str, Any]:
-        """Return what is known of each bus, by its name."""
+        """Return the known state of each bus, by its name."""
         return {
             name: {
                 "url": str(url),
@@ -282,7 +336,7 @@ class RobotMachine:
         return self.networks[bus].health if bus in self.networks else None
 
     def _identities(self) -> dict[str, dict[str, dict[str, int]]]:
-        """Return what tells the drives that have booted from others, by bus and axis."""
+        """Return the identities of the booted drives, by bus and axis."""
         drives: dict[str, dict[str, dict[str, int]]] = {}
         for axis, report in zip(self.robot.axes, self.reports, strict=True):
             drives.setdefault(axis.bus, {})[axis.name] = identity_of(report).model_dump()
@@ -290,51 +344,56 @@ class RobotMachine:
 
     @property
     def safety(self) -> str:
-        """Name of the safety I/O, which guards the power besides the bus; empty without one."""
+        """Name of the safety I/O, which monitors the power in addition; empty without one."""
         return "" if self._safety is None else self._safety.io.name
 
     @_as_machine_error
     def prepared(self) -> bool:
-        """Whether the drives confirm the mode in which they take torques."""
+        """Whether the drives confirm the mode in which they accept torques."""
         return self._booted.mode_confirmed()
 
     def unprepared(self) -> str:
-        """Return which drive does not confirm its mode, and what it says in place of it."""
+        """Return which drive does not confirm its mode, and which mode it reports instead."""
         return str(self._booted.unconfirmed_mode())
 
     @_as_machine_error
     def power_on(self) -> None:
-        """Ask all drives for their power."""
+        """Request that all drives switch on their power."""
         self._booted.request(State.OPERATION_ENABLED)
 
     def power_off(self) -> None:
-        """Take torque and power from all drives with this cycle's command."""
+        """Remove torque and power from all drives with this cycle's command."""
         if self.device is not None:
             self.device.request(State.SWITCH_ON_DISABLED)
 
+    def switch_off_lost(self) -> None:
+        """Start to cut the power of drives that do not follow the cycle, without waiting."""
+        if self.device is not None:
+            self.device.switch_off_lost()
+
     def quick_stop(self) -> None:
-        """Have all drives brake by themselves, then switch off, from this cycle's command on."""
+        """Let all drives brake on their own ramp, then switch off, from this cycle's command on."""
         if self.device is not None:
             self.device.request(State.QUICK_STOP)
 
     def powered(self) -> bool:
-        """Whether all drives have their power and obey."""
+        """Whether all drives have power and follow their commands."""
         return self.device is not None and self.device.reached(State.OPERATION_ENABLED)
 
     def unpowered(self) -> bool:
-        """Whether no drive that can be heard has power, by what it said last.
+        """Whether all drives that answer last reported no power.
 
-        An answer that is missing says nothing: a quick stop would be cut short by it.
+        A single missing answer does not count: it would cut a quick stop short.
         """
         device = self.device
         if device is None:
             return True
         reported = zip(device.feedback.statusword, device.feedback.alive, strict=True)
-        # one that has never answered reads as not ready
+        # an axis that has never answered has the state not ready
         return all(state_of(int(word)) in POWER_OFF or not alive for word, alive in reported)
 
     def reset_faults(self) -> None:
-        """Forget latched alarms and have faults reset in the cycles that follow."""
+        """Clear latched alarms and let the following cycles reset faults."""
         if self.device is not None:
             self.device.acknowledge_fault()
 
@@ -352,13 +411,13 @@ class RobotMachine:
 
     @_as_machine_error
     def set_brakes(self, released: bool) -> None:
-        """Have the brakes released or applied; does not wait for them."""
+        """Release or apply the brakes; does not wait for them."""
         if self._safety is not None and self._safety.braked:
             move = self._safety.io.release_brakes if released else self._safety.io.apply_brakes
             move(*self._safety.braked)
 
     def brakes_are(self, released: bool) -> bool:
-        """Whether the brakes have followed; true where there are none."""
+        """Whether the brakes have followed; true if there are none."""
         if self._safety is None or not self._safety.braked:
             return True
         brakes = self._safety.io.state.brakes_released
@@ -371,7 +430,7 @@ class RobotMachine:
         return len(braked) == len(self.robot.axes)
 
     def states(self) -> list[str]:
-        """Return what each drive says of itself, in the standard's words."""
+        """Return the state that each drive reports, under its name in the standard."""
         if self.device is None:
             return []
         return [

@@ -1,17 +1,19 @@
-"""A robot's drives booted on its buses, as one device: what every session begins with."""
+"""Boot a robot's drives on its buses as one device; every session begins with this."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
+
+import numpy as np
 
 from cdpr_drivers.axes.axis_buses import AxisBuses, BusAxes
 from cdpr_drivers.axes.axis_layout import AxisConfig
 from cdpr_drivers.bus import BusUrl
 from cdpr_drivers.bus.budget import machine_budget
-from cdpr_drivers.bus.master_lock import MasterLock
-from cdpr_drivers.canopen.boot.boot import BootReport, BootReports, BootSettings, boot_all
+from cdpr_drivers.bus.url import MasterLock
+from cdpr_drivers.canopen.boot import BootReport, BootReports, BootSettings, boot_all
 from cdpr_drivers.canopen.network import CanNetwork
 from cdpr_drivers.cia402 import fault_text
 from cdpr_drivers.errors import (
@@ -23,20 +25,21 @@ from cdpr_drivers.errors import (
     SdoError,
 )
 from cdpr_profiles import Robot, RobotAxis, Winch
-from cdpr_profiles.eds.dictionary import load_dictionary
+from cdpr_profiles.eds import load_dictionary
+from cdpr_profiles.robot_limits import Limit
 from cdpr_rt.core.clock import Clock
+from cdpr_rt.core.fault import Fault
 
-# what makes a drive stop by itself once nobody leads it, and bounds its torque until then
+# objects that make a drive stop without a master, and that limit its torque until then
 _GUARDS = ("1016h", "6007h", "605Ah", "6072h")
 
 
 def open_networks(
     stack: ExitStack, robot: Robot, urls: Mapping[str, BusUrl], clock: Clock
 ) -> dict[str, CanNetwork]:
-    """Open the buses of `robot` as their only master here; `stack` closes them.
+    """Open the buses of `robot` as the only master on this machine; `stack` closes them.
 
-    Raises ConfigurationError, also where another process of this machine runs drives on one of
-    them.
+    Raises ConfigurationError, also if another process of this machine runs drives on one of them.
     """
     networks: dict[str, CanNetwork] = {}
     for name, url in urls.items():
@@ -58,11 +61,10 @@ def open_networks(
 def boot_robot(
     stack: ExitStack, robot: Robot, networks: Mapping[str, CanNetwork], torque_Nm: Sequence[float]
 ) -> tuple[dict[int, BootReport], dict[int, str]]:
-    """Boot all buses at the same time; return reports, and why optional axes did not, by axis.
+    """Boot all buses at the same time; return reports, and why optional axes are missing, by axis.
 
     Each drive's torque is limited (6072h) to `torque_Nm`, one for each axis of the robot. `stack`
-    leaves the drives alone again. Raises RobotBootError for a mandatory one that does not
-    boot.
+    releases the drives. Raises RobotBootError if a mandatory drive does not boot.
     """
 
     bitrates = {bus.name: bus.bitrate_bit_s for bus in robot.buses}
@@ -106,7 +108,7 @@ def _error_text(error: DriverError) -> str:
 
 
 def boot_settings(winch: Winch, torque_Nm: float) -> BootSettings:
-    """Return what the master wants of a winch's drive besides its profile, 6072h `torque_Nm`."""
+    """Return the master's settings for a winch's drive besides its profile, 6072h `torque_Nm`."""
     return BootSettings(
         winch.master_node_id,
         winch.sync_period_s,
@@ -118,7 +120,7 @@ def boot_settings(winch: Winch, torque_Nm: float) -> BootSettings:
 
 def _settings(robot: Robot, axis: RobotAxis, torque_Nm: float) -> BootSettings:
     settings = boot_settings(axis.winch, torque_Nm)
-    # the robot's rate may have been changed since its file was read
+    # the robot's rate may have changed since its file was read
     return replace(settings, sync_period_s=robot.sync_period_s, mandatory=axis.mandatory)
 
 
@@ -132,7 +134,7 @@ def device_of(
     place_of = {i: place for place, i in enumerate(booted)}
     buses = []
     commands_s = {budget.bus: budget.commands_s for budget in machine_budget(robot)}
-    # of a single one it says nothing
+    # a single axis needs no name
     names = [axis.name if len(robot.axes) > 1 else "" for axis in robot.axes]
     for name, network in networks.items():
         booted_axes = [i for i in robot.axes_on(name) if i in booted]
@@ -148,7 +150,7 @@ def device_of(
 
 
 def _lacking_guards(node: str, report: BootReport) -> str:
-    """Return what to look at where a drive lacks what makes it stop by itself, else nothing."""
+    """Return what to check if a drive lacks objects that stop it without a master; else ""."""
     lacking = [name for name in report.absent if name.startswith(_GUARDS)]
     if not lacking:
         return ""
@@ -158,7 +160,7 @@ def _lacking_guards(node: str, report: BootReport) -> str:
 def boot_notes(
     robot: Robot, booted: Mapping[int, BootReport], absent: Mapping[int, str]
 ) -> list[str]:
-    """Return what people should know of the drives that have booted, and of those that have not."""
+    """Return notes about the drives that have booted, and about those that have not."""
     notes = []
     for i, report in booted.items():
         axis = robot.axes[i]
@@ -169,19 +171,21 @@ def boot_notes(
     return [note for note in notes if note]
 
 
-def faults_text(
-    axes: Sequence[RobotAxis], device: AxisBuses, networks: Mapping[str, CanNetwork], known: str
-) -> str:
-    """Return what each drive in fault says of it, asked by SDO, where that is not `known`."""
-    texts = []
-    for axis, faulted in zip(axes, device.faulted(), strict=True):
-        if not faulted:
-            continue
+def reported_errors(
+    axes: Sequence[RobotAxis], device: AxisBuses, networks: Mapping[str, CanNetwork]
+) -> Iterator[Fault]:
+    """Yield the error code (603Fh) of each drive in fault that has one, read by SDO."""
+    for i in np.flatnonzero(device.faulted()).tolist():
+        axis = axes[i]
         try:
-            code = networks[axis.bus].read_int(axis.node_id, 0x603F)
-            why = fault_text(code) if code else "no code given (603Fh = 0)"
+            number = networks[axis.bus].read_int(axis.node_id, 0x603F)
         except (SdoError, BusError):
-            why = "the drive does not say why"
-        if why not in known:
-            texts.append(f"bus {axis.bus} node {axis.node_id} ({axis.name}): {why}")
-    return "; ".join(texts)
+            continue
+        if number:
+            code, _, meaning = fault_text(number).partition(" ")
+            yield Fault(Limit.DRIVE, i, code, drive_source(axis), detail=meaning)
+
+
+def drive_source(axis: RobotAxis) -> str:
+    """Return the bus and node of a drive, as the source of a fault."""
+    return f"bus {axis.bus} node {axis.node_id}"

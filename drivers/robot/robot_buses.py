@@ -1,13 +1,14 @@
-"""Which real or simulated bus each bus of a robot is, from the file and the command line."""
+"""Map each bus of a robot to a real or simulated bus, from the file and the command line."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Sequence
 
-from cdpr_drivers.bus import BusUrl
+from cdpr_drivers.bus.budget import BusBudget, machine_budget
+from cdpr_drivers.bus.url import BusUrl
 from cdpr_drivers.errors import BusError, ConfigurationError
-from cdpr_profiles import Robot
+from cdpr_profiles import Robot, Winch
 
 _ASSIGNMENT = re.compile(r"(?P<bus>[A-Za-z0-9_-]+)=(?P<url>.+)", re.DOTALL)
 
@@ -18,15 +19,15 @@ def simulated_url(name: str, bus: str) -> str:
 
 
 def starts_own_simulator(texts: Sequence[str]) -> bool:
-    """Whether the command has to start a simulator of its own."""
+    """Whether the command must start its own simulator."""
     return list(texts) == ["simbus:"]
 
 
 def robot_urls(robot: Robot, texts: Sequence[str]) -> dict[str, BusUrl]:
     """Return the URL of each bus of `robot`, by its name there.
 
-    `texts` are what was given with --bus: `simbus:NAME`, which stands for simbus:NAME-BUS for
-    every bus, or BUS=URL for some; the others are where the robot's file says. Raises
+    `texts` are the values of --bus: `simbus:NAME`, which stands for simbus:NAME-BUS on every bus,
+    or BUS=URL for some buses; for the others the robot's file counts. Raises
     ConfigurationError.
     """
     names = [bus.name for bus in robot.buses]
@@ -54,13 +55,19 @@ def robot_urls(robot: Robot, texts: Sequence[str]) -> dict[str, BusUrl]:
     return urls
 
 
+def real_buses(robot: Robot, texts: Sequence[str]) -> list[str]:
+    """Return the URLs of the real buses. Raises ConfigurationError as `robot_urls` does."""
+    if starts_own_simulator(texts):
+        return []
+    return [str(url) for url in robot_urls(robot, texts).values() if not url.is_simulated]
+
+
 def refuse_simulated_calibration(robot: Robot, texts: Sequence[str]) -> None:
-    """Raise ConfigurationError where a calibration of a simulated robot would move a real one."""
+    """Raise ConfigurationError if a calibration of a simulated robot would move a real one."""
     known = robot.calibration
-    if known is None or not known.simulated or starts_own_simulator(texts):
+    if known is None or not known.simulated:
         return
-    real = [str(url) for url in robot_urls(robot, texts).values() if not url.is_simulated]
-    if real:
+    if real := real_buses(robot, texts):
         raise ConfigurationError(
             f"{robot.path}: calibration {known.version} was measured on a simulated robot; "
             f"allowed: simbus, not {' and '.join(real)}; take it back: "
@@ -105,3 +112,22 @@ def _parse(text: str) -> BusUrl:
         return BusUrl.parse(text)
     except BusError as error:
         raise ConfigurationError(str(error)) from error
+
+
+# Reject a machine whose cycle cannot fit its buses, before anything is opened.
+
+
+def refusal(budgets: Sequence[BusBudget]) -> str:
+    """Return why the cycle does not fit its buses; empty if it does."""
+    tight = [str(budget) for budget in budgets if not budget.fits]
+    return "the cycle does not fit: " + "; ".join(tight) if tight else ""
+
+
+def require_fit(machine: Winch | Robot) -> None:
+    """Raise ConfigurationError with the figure if a bus of `machine` cannot carry its cycle."""
+    reason = refusal(machine_budget(machine))
+    if reason:
+        raise ConfigurationError(
+            f"{machine.path}: sync_period_s: {machine.sync_period_s:g}: {reason}; "
+            "`cdpr bus budget` shows the parts"
+        )

@@ -1,56 +1,66 @@
-"""A safety I/O beside a session on a bus: power only behind it, brakes with the power stage."""
+"""A safety I/O beside a session on a bus: it must allow power; brakes follow the power stage."""
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Final
 
 from cdpr_drivers.modbus.safety_io import SafetyIo
-from cdpr_profiles.devices.safety_io import load_safety_io
+from cdpr_profiles.robot_limits import Limit
+from cdpr_profiles.safety_io import load_safety_io
 from cdpr_rt.core.clock import Clock
+from cdpr_rt.core.fault import Fault
 from cdpr_rt.state_file import StateFileError, read_state, state_path
 
 CLOSED: Final = "the chain is closed, the contactor is on"
 
 
 class SessionSafety:
-    """The safety I/O of a session and the axes whose brakes belong to it."""
+    """The safety I/O of a session and the axes whose brakes it controls; a watch of the loop."""
 
-    def __init__(self, io: SafetyIo, node_ids: Collection[int]) -> None:
+    def __init__(self, io: SafetyIo, node_ids: Sequence[int]) -> None:
         self.io = io
-        nodes = set(node_ids)
+        self.node_ids = node_ids
+        """Nodes of the axes, in their order."""
         self.braked: Final = tuple(
             axis.axis
             for axis in io.profile.axes
-            if axis.brake is not None and axis.node_id in nodes
+            if axis.brake is not None and axis.node_id in node_ids
         )
 
     def drop_brakes(self) -> None:
-        """Have the brakes applied as soon as the session ends, without waiting for them."""
+        """Apply the brakes as soon as the session ends, without waiting for them."""
         if self.braked:
             self.io.apply_brakes(*self.braked)
 
-    @property
-    def tripped(self) -> str:
-        """Why the safety I/O ends the motion, or an empty text."""
-        return self.io.alarm() or self.io.stop_reason()
+    def fault(self) -> Fault | None:
+        """Return why the safety I/O ends the motion; None if it does not."""
+        limit, trip = Limit.SAFETY_ALARM, self.io.alarm()
+        if not trip:
+            limit, trip = Limit.SAFETY_STOP, self.io.stop_reason()
+        if not trip:
+            return None
+        nodes = {axis.axis: axis.node_id for axis in self.io.profile.axes}
+        node = nodes.get(trip.axis)
+        found = [i for i, known in enumerate(self.node_ids) if known == node]
+        i = found[0] if len(found) == 1 else -1  # with several buses a node id is ambiguous
+        return Fault(limit, i, trip.code, self.io.name, detail=trip)
 
-    def cause(self, reason: str) -> str:
-        """Return why a motion ended, for which the bus gives `reason`.
+    def await_trip(self) -> Fault | None:
+        """Poll the safety I/O, then return why it ends the motion; None if it does not.
 
-        An open chain takes the drives' power, so that their faults are heard before the next poll.
+        An open chain cuts the drives' power, so their faults arrive before the next poll.
         """
         clock = self.io.clock
-        clock.wait(lambda: self.tripped, clock.now_s + 3.0 * self.io.profile.poll_period_s)
-        tripped = self.tripped
-        return reason if not tripped or tripped in reason else f"{tripped} (besides: {reason})"
+        clock.wait(self.fault, clock.now_s + 3.0 * self.io.profile.poll_period_s)
+        return self.fault()
 
 
 def trip_file(reference: str) -> Path:
-    """Return the file in which a safety I/O's trip is kept until it is acknowledged.
+    """Return the file that keeps a safety I/O's trip until it is acknowledged.
 
-    One for each place, as the same profile may be that of several devices. Raises ProfileError.
+    One for each place, because several devices may share a profile. Raises ProfileError.
     """
     profile = load_safety_io(reference)
     name = Path(reference.partition("@")[0]).stem
@@ -58,7 +68,7 @@ def trip_file(reference: str) -> Path:
 
 
 def kept_trip(reference: str) -> dict[str, Any] | None:
-    """Return the trip that is kept (reason, date), None where there is none; tolerates damage."""
+    """Return the stored trip (reason, date), or None if there is none; tolerates damage."""
     try:
         return read_state(trip_file(reference))
     except StateFileError as error:
@@ -66,5 +76,5 @@ def kept_trip(reference: str) -> dict[str, Any] | None:
 
 
 def connect(reference: str, clock: Clock) -> SafetyIo:
-    """Return the safety I/O that `reference` names, not opened yet; raises ProfileError."""
+    """Return the safety I/O that `reference` names, not yet opened; raises ProfileError."""
     return SafetyIo(load_safety_io(reference), clock, trip_file(reference))

@@ -1,4 +1,4 @@
-"""The calibrated geometry of a robot: what is taken in place of what its file says."""
+"""The calibrated geometry of a robot, which replaces that of its file."""
 
 from __future__ import annotations
 
@@ -14,60 +14,73 @@ from typing import Any, Literal
 
 from pydantic import Field
 
+from cdpr_profiles.bounded_input import replacing
 from cdpr_profiles.errors import ProfileError
 from cdpr_profiles.platform import NO_PLATFORM, Platform, Point
-from cdpr_profiles.reading.reader import Profile
+from cdpr_profiles.reader import Profile
 from cdpr_profiles.robot import Robot, RobotAxis
 
 _HASH_CHARS = 12
 _FURTHEST_m, _ANCHOR_m = 0.2, 0.05
-"""A calibration that moves an exit or anchor point by more is of another robot."""
+"""If an exit or anchor point moves by more, the calibration belongs to another robot."""
 _TURNED_rad = 0.2
 _DRUM, _ELONGATION = (0.9, 1.1), (0.1, 10.0)
 
 
 class GeometryCalibration(Profile):
-    """Exit points, home, drums and elongation of a robot as calibrated; the rest is its file's."""
+    """Exit points, home, drums and elongation of a robot as calibrated; the file has the rest."""
 
     robot: str
     geometry_sha256: str
-    """Of what it replaces and scales, as loaded: a robot of which that has changed is another."""
+    """Hash of the replaced and scaled values as loaded: if it changed, the robot is another one."""
     simulated: bool
-    """Whether it was measured on a simulated robot: it counts for none on another bus."""
+    """Whether it was measured on a simulated robot: it is not valid on another bus."""
     distrusted_before: str = ""
-    """Why the geometry before it was not believed when it was taken over, empty where it was."""
+    """Why the previous geometry was not trusted at the takeover, empty if it was."""
     version: int = Field(ge=1)
     date: datetime
     method: Literal["points", "redundancy", "camera"]
     frame: str
-    """What the coordinates are relative to, in words."""
+    """Frame of the coordinates, as text."""
     exit_points_m: tuple[Point, ...]
     anchor_points_m: tuple[Point, ...] | None = None
     home_m: Point
-    """Where the platform stands on its stand."""
+    """Position of the platform on its stand."""
     home_rotation_rad: tuple[float, ...]
     drum_scales: tuple[float, ...]
-    """Cable paid out by a turn of each motor over what the file says."""
+    """Cable paid out by a turn of each motor, over the file's value."""
     elongation_scale: float
     poses: int = Field(ge=1)
     exit_std_m: tuple[float, ...]
     """Predicted standard deviation of each exit point, its worst coordinate."""
     predicted_3_sigma_mm: float = Field(ge=0)
-    """Of a position in the workspace, by what the fit does not know."""
+    """Of a position in the workspace, by the uncertainty of the fit."""
+    predicted_3_sigma_deg: float | None = Field(default=None, ge=0)
+    """Of relative orientations; None for platforms whose orientation is not estimated."""
+    absolute_3_sigma_mm: float | None = Field(default=None, ge=0)
+    """Of an absolute position, with the uncertainty of the frame included."""
+    absolute_3_sigma_deg: float | None = Field(default=None, ge=0)
     verified_poses: int = Field(ge=0)
     verified_mean_mm: float | None = None
-    """On poses that the fit had not seen, against what was measured there; none without points."""
+    """At poses that the fit did not use, against measurements there; None without points."""
     verified_worst_mm: float | None = None
     raw_data: str
+    points_file: str = ""
+    """Additional measured positions, empty without."""
+    hand_eye_file: str = ""
+    """The given place of the camera on its platform, empty if the raw data have it."""
+    identified: tuple[str, ...] = ("exit", "offset", "drum", "elongation")
+    known_exit_m: float = Field(default=0.05, gt=0)
+    """Assumed standard deviation of exit points in the robot's file."""
 
     @property
     def identity(self) -> str:
-        """Short hash of everything it says."""
+        """Short hash of its whole content."""
         text = self.model_dump_json().encode()
         return hashlib.sha256(text).hexdigest()[:_HASH_CHARS]
 
     def faults(self, robot: Robot) -> list[tuple[str, str]]:
-        """Return (key, problem) for what cannot be of `robot`."""
+        """Return (key, problem) for values that cannot belong to `robot`."""
         platform = robot.platform
         if platform is None:
             return [("robot", f"{robot.profile}: {NO_PLATFORM}")]
@@ -89,7 +102,7 @@ class GeometryCalibration(Profile):
         return found or [*self._far_points(platform), *self._far_values(platform)]
 
     def _far_points(self, platform: Platform) -> Iterator[tuple[str, str]]:
-        """Return what is further from the robot's file than errors of measuring."""
+        """Return points that differ from the robot's file by more than measurement errors."""
         exits = list(zip(self.exit_points_m, platform.exit_points_m, strict=True))
         anchors = zip(self.anchor_points_m or (), platform.anchor_points_m, strict=False)
         moved_m = min(max(math.dist(calibrated, file) for calibrated, file in exits), _FURTHEST_m)
@@ -99,7 +112,7 @@ class GeometryCalibration(Profile):
             ("home_m", [(self.home_m, platform.home_m)], platform.home_tolerance_m + moved_m),
         ):
             for i, (calibrated, file) in enumerate(pairs):
-                if not math.dist(calibrated, file) <= most_m:  # nor what is not a number
+                if not math.dist(calibrated, file) <= most_m:  # true also for nan
                     yield f"{key}[{i}]", f"more than {most_m:.3g} m from the robot's file"
 
     def _far_values(self, platform: Platform) -> Iterator[tuple[str, str]]:
@@ -145,7 +158,7 @@ class GeometryCalibration(Profile):
         )
 
     def summary(self) -> dict[str, Any]:
-        """Return what descriptions and recordings tell of it."""
+        """Return the data for descriptions and recordings."""
         return {
             "version": self.version,
             "identity": self.identity,
@@ -153,14 +166,18 @@ class GeometryCalibration(Profile):
             "method": self.method,
             "frame": self.frame,
             "simulated": self.simulated,
+            "poses": self.poses,
             "predicted_3_sigma_mm": self.predicted_3_sigma_mm,
+            "predicted_3_sigma_deg": self.predicted_3_sigma_deg,
+            "absolute_3_sigma_mm": self.absolute_3_sigma_mm,
+            "absolute_3_sigma_deg": self.absolute_3_sigma_deg,
             "verified_mean_mm": self.verified_mean_mm,
             "verified_worst_mm": self.verified_worst_mm,
         }
 
 
 def geometry_sha256(robot: Robot) -> str:
-    """Return the hash of what a calibration replaces or scales, as the robot's files have it."""
+    """Return the hash of the values that a calibration replaces or scales, by the robot's files."""
     platform = robot.platform
     points: tuple[Any, ...] = ()
     if platform is not None:
@@ -176,17 +193,15 @@ def geometry_sha256(robot: Robot) -> str:
 
 
 def write_text(path: Path, text: str) -> None:
-    """Replace a file as a whole, so that power lost leaves the old or the new one.
+    """Replace a file as a whole, so that a power failure leaves the old or the new one.
 
-    Raises ProfileError naming it.
+    Raises ProfileError with its name.
     """
-    part = path.with_name(f"{path.name}.{os.getpid()}.part")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        with part.open("w", encoding="utf-8") as file:
-            file.write(text)
+        with replacing(path) as file:
+            file.write(text.encode())
             file.flush()
             os.fsync(file.fileno())
-        part.replace(path)
     except OSError as error:
         raise ProfileError(path, "", f"cannot be written: {error.strerror}") from None

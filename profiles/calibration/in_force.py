@@ -1,7 +1,7 @@
-"""Which calibration of a robot's geometry is in force: found beside its file, taken over, undone.
+"""The calibration in force of a robot's geometry: find it beside its file, take over, undo.
 
-The one in force is NAME.calibration beside NAME.toml, those before it NAME.calibration.1 and so on,
-those taken back NAME.calibration.undone.2; of a shipped robot they lie in the user's own folder.
+The one in force is NAME.calibration beside NAME.toml; earlier ones are NAME.calibration.1 and so
+on, undone ones NAME.calibration.undone.2. Those of a shipped robot are in the user's own folder.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ import re
 from collections.abc import Iterator
 from pathlib import Path
 
+from cdpr_profiles.bounded_input import is_file, is_there
 from cdpr_profiles.calibration.geometry import (
     GeometryCalibration,
     geometry_sha256,
@@ -18,8 +19,7 @@ from cdpr_profiles.calibration.geometry import (
 )
 from cdpr_profiles.catalogue import load_robot
 from cdpr_profiles.errors import ProfileError
-from cdpr_profiles.reading.bounded_input import is_file
-from cdpr_profiles.reading.places import SHIPPED, user_folder
+from cdpr_profiles.places import SHIPPED, user_folder
 from cdpr_profiles.robot import Robot
 
 _SUFFIX = ".calibration"
@@ -27,7 +27,7 @@ _BEFORE, _ALL = r"\.", r"\.(?:undone\.)?"
 
 
 def calibration_file(robot: Robot) -> Path:
-    """Return where the calibration in force of a robot is, or would be."""
+    """Return the path of a robot's calibration in force, whether it exists or not."""
     shipped = robot.path.parent == SHIPPED / "robots"
     folder = user_folder() / "robots" if shipped else robot.path.parent
     return folder / (robot.path.stem + _SUFFIX)
@@ -39,9 +39,9 @@ def load_calibrated(robot: str | Path) -> Robot:
 
 
 def calibrated(robot: Robot) -> Robot:
-    """Return `robot` with the calibration that is in force, as its file says where there is none.
+    """Return `robot` with the calibration in force; without one, as in its file.
 
-    Raises ProfileError for one that is damaged, or was made for another state of the robot's files.
+    Raises ProfileError if it is damaged, or was made for another state of the robot's files.
     """
     found = in_force(robot)
     if found is None:
@@ -51,18 +51,19 @@ def calibrated(robot: Robot) -> Robot:
 
 
 def in_force(robot: Robot) -> GeometryCalibration | None:
-    """Return what is in force now, of this state of the robot's files or not; raises ProfileError.
+    """Return the calibration in force, even for another state of the files; raises ProfileError.
 
-    None where the robot's file counts.
+    None if the robot's file applies. A calibration that cannot be read, such as a link to a share
+    that is not mounted, is an error: otherwise the robot would move by another geometry unnoticed.
     """
     path = calibration_file(robot)
-    if robot.platform is None or robot.is_winch or not is_file(path):
+    if robot.platform is None or robot.is_winch or not is_there(path):
         return None
     return GeometryCalibration.load_file(path)
 
 
 def next_version(robot: Robot) -> int:
-    """Return the number that the next calibration of a robot has; none is used twice."""
+    """Return the number of the next calibration of a robot; no number is used twice."""
     path = calibration_file(robot)
     known = in_force(robot)
     return max(_newest(path), 0 if known is None else known.version) + 1
@@ -72,7 +73,7 @@ def take_over(robot: Robot, found: GeometryCalibration) -> Path:
     """Put a calibration in force and keep the one before it; raises ProfileError."""
     path = calibration_file(robot)
     _require_of(robot, found, path)
-    if is_file(path):
+    if is_there(path):
         before = GeometryCalibration.load_file(path)
         write_text(_numbered(path, before.version), before.to_toml())
     write_text(path, found.to_toml())
@@ -80,23 +81,25 @@ def take_over(robot: Robot, found: GeometryCalibration) -> Path:
 
 
 def undo(robot: Robot) -> GeometryCalibration | None:
-    """Put the calibration before the one in force back; return it, None for the robot's file.
+    """Restore the calibration before the one in force; return it, None for the robot's file.
 
-    One of another state of the robot's files is passed over. Raises ProfileError where none is in
-    force.
+    Calibrations of another state of the robot's files are skipped. Raises ProfileError if none is
+    in force.
     """
     path = calibration_file(robot)
-    if not is_file(path):
+    if not is_there(path):
         raise ProfileError(path, "", "there is no calibration in force, so none to undo")
+    if not is_file(path):
+        raise ProfileError(path, "", "is no file, so it cannot be taken back; move it away")
     older, before = _last_before(robot, path)
     try:
         version = GeometryCalibration.load_file(path).version
-    except ProfileError:  # a damaged one is taken back as well
+    except ProfileError:  # a damaged calibration can be undone too
         version = _newest(path) + 1
     undone = path.with_name(f"{path.name}.undone.{version}")
     try:
         undone.unlink(missing_ok=True)
-        undone.hardlink_to(path)  # it stays in force until the other is in its place
+        undone.hardlink_to(path)  # it stays in force until the other one replaces it
         if older is None:
             path.unlink()
         else:
@@ -107,13 +110,13 @@ def undo(robot: Robot) -> GeometryCalibration | None:
 
 
 def _require_of(robot: Robot, found: GeometryCalibration, path: Path) -> None:
-    """Raise ProfileError where a calibration is not of this robot as its files are now."""
+    """Raise ProfileError if a calibration does not fit the present files of this robot."""
     if found.geometry_sha256 != geometry_sha256(robot):
         raise ProfileError(
             path,
             "geometry_sha256",
             f"{robot.path}, or a file of its winches, has been changed since this calibration of "
-            f"{found.date:%Y-%m-%d %H:%M}; allowed: calibrate anew, or take the files as they are: "
+            f"{found.date:%Y-%m-%d %H:%M}; allowed: recalibrate, or take the files as they are: "
             f"cdpr calibrate undo {robot.reference}",
         )
     for key, problem in found.faults(robot):
@@ -136,12 +139,12 @@ def _numbered(path: Path, number: int) -> Path:
 
 
 def _newest(path: Path) -> int:
-    """Return the highest number of those that are kept, those taken back too; 0 for none."""
+    """Return the highest number of the stored ones, including undone ones; 0 for none."""
     return max((number for number, _ in _versions(path, _ALL)), default=0)
 
 
 def _versions(path: Path, between: str) -> Iterator[tuple[int, Path]]:
-    """Return numbers and files of the calibrations that are kept beside the one in force."""
+    """Return numbers and files of the calibrations that are stored beside the one in force."""
     for old in path.parent.glob(glob.escape(path.name) + ".*"):
         if match := re.fullmatch(between + r"(\d+)", old.name[len(path.name) :]):
             yield int(match[1]), old

@@ -2,31 +2,266 @@
 
 from __future__ import annotations
 
+import contextlib
+import errno
 import functools
+import json
 import math
+import os
 import select
 import socket
+import struct
 import time
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from cdpr_sim_bus.bus.client import PACKET_BYTES, Client, Listener
-from cdpr_sim_bus.bus.control import Lead, frames_of, handle, is_go
-from cdpr_sim_bus.bus.switch import Contention, LocalNode, Route, Switch
-from cdpr_sim_bus.bus.watcher import Watcher
+from cdpr_profiles.bounded_input import parse_json
+from cdpr_profiles.errors import ProfileError
+from cdpr_sim_bus.bus.client import (
+    PACKET_BYTES,
+    BusLoad,
+    Client,
+    Contention,
+    Listener,
+    LocalNode,
+    Route,
+)
 from cdpr_sim_bus.clock import HOLD_S, BusClock, ClockMode
 from cdpr_sim_bus.errors import SimulatorError
-from cdpr_sim_bus.frame import FRAME_BYTES, HEADER
+from cdpr_sim_bus.frame import FRAME_BYTES, HEADER, RTR_FLAG
+
+FINE_WAIT_S = 0.01
+"""Waits shorter than this need finer resolution than epoll's whole milliseconds."""
+_EVENTS = 64
+
+
+class Watcher:
+    """An epoll with a handler for each descriptor, and a way to wake it from other threads."""
+
+    def __init__(self) -> None:
+        self._poller = select.epoll()
+        self.handlers: dict[int, Callable[[], None]] = {}
+        """Handlers by descriptor."""
+        self.looked_s = 0.0
+        """Monotonic time just before the last poll; everything sent before it has been found."""
+        self._wake = os.eventfd(0, os.EFD_NONBLOCK | os.EFD_CLOEXEC)
+        self.add(self._wake, lambda: None)
+
+    def add(self, descriptor: int, handler: Callable[[], None]) -> None:
+        """Call `handler` whenever `descriptor` is readable."""
+        self._poller.register(descriptor, select.EPOLLIN)
+        self.handlers[descriptor] = handler
+
+    def remove(self, descriptor: int) -> None:
+        """Stop watching `descriptor`."""
+        del self.handlers[descriptor]
+        self._poller.unregister(descriptor)
+
+    def wake(self) -> None:
+        """End the present or next wait; may be called from a signal handler or a thread."""
+        os.eventfd_write(self._wake, 1)
+
+    def fileno(self) -> int:
+        """Return the descriptor that is readable when a watched descriptor is."""
+        return self._poller.fileno()
+
+    def readable(self, wait_s: float | None, *, exactly: bool) -> list[tuple[int, int]]:
+        """Return the readable descriptors, each with its events.
+
+        Wait up to `wait_s` (None: indefinitely) for one; with `exactly`, check once more after the
+        wait, at `looked_s`.
+        """
+        if wait_s != 0.0 and (exactly or (wait_s is not None and wait_s < FINE_WAIT_S)):
+            select.select([self._poller], [], [], wait_s)
+            wait_s = 0.0
+        self.looked_s = time.monotonic()
+        return self._poller.poll(wait_s, _EVENTS)
+
+    def close(self) -> None:
+        """Close its own descriptors."""
+        self._poller.close()
+        os.close(self._wake)
+
+
+# Control messages, JSON packets beside the frames; and the client that leads the bus.
+
+_PACKET = struct.Struct("<8sdd")
+_GO, _TIME, _FRAMES = b"bus-go\0\0", b"bus-time", b"bus-data"
+_STEPS_A_TURN = 16
+_MOST_HELD = 128
+
+
+def frames_of(packet: bytes) -> list[bytes]:
+    """Return the frames of a packet that has several of them; an empty list for any other."""
+    if not packet.startswith(_FRAMES) or (len(packet) - _PACKET.size) % FRAME_BYTES:
+        return []
+    return [packet[at : at + FRAME_BYTES] for at in range(_PACKET.size, len(packet), FRAME_BYTES)]
+
+
+def is_go(packet: bytes) -> bool:
+    """Return whether a packet is a time grant ("bus-go")."""
+    return len(packet) == _PACKET.size and packet.startswith(_GO)
+
+
+class Lead:
+    """The leading client of a bus, and the time grant in progress."""
+
+    def __init__(self, hub: Hub, clock: BusClock) -> None:
+        self._hub = hub
+        self._clock = clock
+        self.leader: Client | None = None
+        self.until_s: float | None = None
+        """Bus time up to which a grant runs; None without a grant."""
+        self.time_pending = False
+        """Whether a time packet waits for room in the leader's socket."""
+        self._held: list[bytes] = []
+        """Frames for the leader, to be sent with the next time packet."""
+
+    def take(self, client: Client) -> dict[str, Any]:
+        """Make `client` the leader; return the answer for it."""
+        clock = self._clock
+        if clock.mode is ClockMode.PACED:
+            return {"error": "lead: this bus is paced, its time is the clock's"}
+        if self.leader not in (None, client):
+            return {"error": "lead: another client leads this bus"}
+        clock.stop(time.monotonic())
+        now_s = clock.now(0.0)
+        self._hub.advance(now_s)
+        self._hub.settle()
+        self.leader = client
+        client.send = self._hold
+        client.delivered = False
+        next_s = self._hub.next_event_s()
+        return {"lead": {"now_s": now_s, "next_s": None if next_s == math.inf else next_s}}
+
+    def release(self, client: Client) -> None:
+        """End the lead of `client`; bus time stands until a client sends or leads."""
+        if client is self.leader:
+            client.send = client.sock.send
+            with contextlib.suppress(OSError):  # it does not read
+                self._send_held(client)
+            self._end()
+
+    def lose(self, client: Client) -> None:
+        """Let bus time run with wall time if the disconnected `client` was the leader."""
+        if client is self.leader:
+            self._end()
+            self._clock.run(time.monotonic())
+
+    def _end(self) -> None:
+        self.leader = self.until_s = None
+        self.time_pending = False
+        self._held.clear()
+
+    def _hold(self, frame: bytes) -> None:
+        """Keep a frame for the leader; if many wait, send them now if there is room."""
+        held = self._held
+        if len(held) == _MOST_HELD and self.leader is not None:
+            self._send_held(self.leader)
+        held.append(frame)
+
+    def _send_held(self, leader: Client) -> None:
+        if self._held:
+            leader.sock.send(_PACKET.pack(_FRAMES, 0.0, 0.0) + b"".join(self._held))
+            self._held.clear()
+
+    def go(self, packet: bytes) -> None:
+        """Accept a grant of the leader; `go_on` executes it. A grant without a finite time only
+        requests a time packet."""
+        until_s = _PACKET.unpack(packet)[1]
+        self.until_s = until_s if math.isfinite(until_s) else -math.inf
+
+    def go_on(self) -> None:
+        """Advance bus time from event to event up to the grant, some events in each call.
+
+        First send a pending time packet.
+        """
+        leader, until_s, hub, clock = self.leader, self.until_s, self._hub, self._clock
+        if self.time_pending:
+            self.send_time()
+        if leader is None or until_s is None:
+            return
+        for _ in range(_STEPS_A_TURN):
+            now_s = clock.now(0.0)
+            if leader.delivered or until_s <= now_s:
+                self.until_s = None
+                self.send_time()
+                return
+            step_s = max(now_s, min(hub.next_event_s(), until_s))
+            clock.move(step_s)
+            hub.advance(step_s)
+            hub.settle()
+
+    def send_time(self) -> None:
+        """Send the leader a time packet, now or as soon as its socket has room."""
+        leader = self.leader
+        if leader is None:
+            return
+        packet = _PACKET.pack(_TIME, self._clock.now(0.0), self._hub.next_event_s())
+        self.time_pending = False
+        try:
+            leader.sock.send(packet + b"".join(self._held))
+            self._held.clear()
+            leader.delivered = False
+        except BlockingIOError:
+            self.time_pending = True
+        except OSError:
+            # it has disconnected, which reading from it shows
+            return
+
+
+_KEYS = "filters, lead, more_filters, status"
+
+
+def encode(message: dict[str, Any]) -> bytes:
+    """Return `message` as a packet: JSON, padded so that its length is not that of a frame."""
+    text = json.dumps(message, separators=(",", ":")).encode()
+    return text + b" " if len(text) == FRAME_BYTES else text
+
+
+class _RefusedError(Exception):
+    """A request that the bus rejects, with the reason."""
+
+
+def _request(packet: bytes) -> tuple[str, Any]:
+    """Return key and value of a message."""
+    if len(packet) == PACKET_BYTES:
+        raise _RefusedError(f"a control message has less than {PACKET_BYTES} bytes; send several")
+    if is_go(packet):
+        raise _RefusedError("go: only the client that leads the bus moves its time")
+    try:
+        ((key, value),) = parse_json(packet, "message").items()
+    except (ProfileError, ValueError, AttributeError):
+        raise _RefusedError(
+            f"neither a frame of {FRAME_BYTES} bytes nor a JSON object with one key of: {_KEYS}"
+        ) from None
+    return key, value
+
+
+def _filters(key: str, value: object) -> list[tuple[int, int]]:
+    filters = []
+    for pair in value if isinstance(value, list) else [None]:
+        match pair:
+            case [int(identifier), int(mask)] if min(pair) >= 0 and max(pair) < 1 << 32:
+                filters.append((identifier, mask))
+            case _:
+                raise _RefusedError(
+                    f"{key}: expected a list of [identifier, mask], 32-bit numbers each"
+                )
+    return filters
+
 
 _BURST = 64
+_MOST_ROUTES = 4096
+_MOST_ANSWERS = 64
 _FULL_S = 0.01
 
 
-class Hub(Switch):
-    """A CAN bus in one thread: its clients, bus time, and the loop that drives all.
+class Hub:
+    """A CAN bus in one thread: its clients, bus time, and the loop that runs everything.
 
     Frames that wait together are sent in the order of arbitration: those of the nodes after one
-    SYNC, and those of several clients found waiting at the same moment.
+    SYNC, and those of several clients that wait at the same moment.
     """
 
     def __init__(
@@ -39,26 +274,37 @@ class Hub(Switch):
         truth_log: str | None = None,
     ) -> None:
         paced = mode is ClockMode.PACED
-        super().__init__(nodes, bitrate, paced=paced)
+        self.nodes = tuple(nodes)
+        self.load = BusLoad(bitrate, lockstep=not paced)
+        self.sync_count = 0
+        self.dropped = 0
+        self._paced = paced
+        self._clients: dict[int, Client] = {}
+        self._routes: dict[int, Route] = {}
+        self._accepts = [node.accepts for node in self.nodes]
+        # bus time 0 switches the nodes on
+        self._now_s = -1.0
+        self._leftover = False
+        self._batch: list[tuple[int, int, int, Route, bytes, LocalNode]] = []
         self.name = name
         self.truth_log = truth_log
         self.clock = BusClock(mode, time.monotonic())
         self.lead = Lead(self, self.clock)
         self.malformed = 0
         self.robot_hubs: Sequence[Hub] = (self,)
-        """The hubs of one robot, this one included; their wall time begins together."""
+        """The hubs of one robot, including this one; their wall time begins together."""
         self.buses_before: Sequence[Hub] = ()
-        """Those of `robot_hubs` to which the master sends its SYNC before it does to this one."""
+        """Those of `robot_hubs` to which the master sends its SYNC before it sends to this one."""
         self._waiting = Contention(paced=paced, bitrate=bitrate)
         self._just_synced = False
         self._watcher = Watcher()
         self.stopping = False
-        """Whether the loop is to end."""
+        """Whether the loop must end."""
         self._failure: str | None = None
         self._listener: Listener | None = None
 
     def status(self) -> dict[str, Any]:
-        """Return the status of the bus; docs/wire.md lists the keys."""
+        """Return the status of the bus; docs/reference/wire.md lists the keys."""
         now_s = self.clock.peek(time.monotonic())
         return {
             "name": self.name,
@@ -77,7 +323,7 @@ class Hub(Switch):
             "nodes": [node.node_id for node in self.nodes if node.node_id],
         }
 
-    # -- what the loop listens to
+    # -- descriptors of the loop
 
     def watch(self, descriptor: int, handler: Callable[[], None]) -> None:
         """Call `handler` whenever `descriptor` is readable."""
@@ -93,14 +339,14 @@ class Hub(Switch):
         self.watch(self._listener.fileno(), self._accept)
 
     def attach(self, sock: socket.socket, *, essential: bool = False) -> None:
-        """Let the peer of `sock` take part; the end of an essential one ends the hub."""
+        """Add the peer of `sock` as a client; the end of an essential one ends the hub."""
         client = Client(sock, essential=essential, stamped=self._paced)
         descriptor = sock.fileno()
         self._clients[descriptor] = client
         self._routes.clear()
         self.watch(descriptor, functools.partial(self._serve_client, client))
         if essential:
-            # a real interface cannot be led
+            # a real interface cannot be a led bus
             self._begin()
 
     def _accept(self) -> None:
@@ -141,16 +387,16 @@ class Hub(Switch):
         self.check()
 
     def check(self) -> None:
-        """Raise SimulatorError when an essential client has disconnected."""
+        """Raise SimulatorError if an essential client has disconnected."""
         if self._failure is not None:
             raise SimulatorError(self._failure)
 
     def fileno(self) -> int:
-        """Return the descriptor that is readable when a turn has something to do."""
+        """Return the descriptor that is readable when a turn has work."""
         return self._watcher.fileno()
 
     def turn(self, wait_s: float | None) -> None:
-        """Wait up to `wait_s` for something to do (None: for ever), then do it."""
+        """Wait up to `wait_s` for work (None: indefinitely), then do it."""
         events = self._watcher.readable(wait_s, exactly=self._paced)
         self._just_synced = False
         if self.lead.until_s is not None:
@@ -160,7 +406,7 @@ class Hub(Switch):
         elif events:
             self._watcher.handlers[events[0][0]]()
         if self._paced:
-            # while frames wait time goes on with them, so that none comes too late
+            # while frames wait, time advances with them, so that none comes too late
             if not events and not self._waiting.heads:
                 self._tick(self.clock.now(self._watcher.looked_s))
         elif self.clock.stopped:
@@ -183,7 +429,7 @@ class Hub(Switch):
         self._watcher.close()
 
     def wait_s(self) -> float | None:
-        """Return for how long the next turn may wait, None for ever."""
+        """Return how long the next turn may wait; None without limit."""
         if self._leftover or self._waiting.heads or self.lead.until_s is not None:
             return 0.0
         if self._just_synced:
@@ -194,7 +440,7 @@ class Hub(Switch):
         return None if wait_s == math.inf else wait_s
 
     def _begin(self) -> None:
-        """Let bus time run with the wall clock: a client sends and none leads."""
+        """Let bus time run with the wall clock: a client sends and no client leads."""
         self.advance(self.clock.now(0.0))
         wall_s = time.monotonic()
         for hub in self.robot_hubs:
@@ -212,9 +458,9 @@ class Hub(Switch):
         return [event for event in events if event[0] != descriptor]
 
     def _follow(self, now_s: float) -> None:
-        """Run the nodes' timers, each at its time, until `now_s`, a limited number in each call.
+        """Run the nodes' timers, each at its time, until `now_s`, a limited number per call.
 
-        What the nodes do does not depend on when wall-clock time is looked at.
+        The nodes' actions do not depend on when the wall clock is read.
         """
         for _ in range(_BURST):
             event_s = self.next_event_s()
@@ -223,7 +469,7 @@ class Hub(Switch):
             self.advance(max(event_s, self._now_s))
 
     def _tick(self, now_s: float) -> bool:
-        """Let the nodes' timers run when one is due; return whether one was."""
+        """Run the nodes' timers if one is due; return whether one was."""
         due = any(node.next_event() <= now_s for node in self.nodes)
         if due:
             self.advance(now_s)
@@ -239,7 +485,7 @@ class Hub(Switch):
     # -- frames from clients
 
     def _serve_all(self, events: list[tuple[int, int]]) -> None:
-        """Serve several descriptors; clients with frames waiting contend for the bus."""
+        """Serve several descriptors; clients with waiting frames contend for the bus."""
         contending = []
         for descriptor, _ in events:
             client = self._clients.get(descriptor)
@@ -255,7 +501,7 @@ class Hub(Switch):
             if not waiting.heads:
                 return
             winner, frame = waiting.pop()
-            # the sender of a SYNC waits for the answers, unless time has passed meanwhile
+            # the sender of a SYNC waits for the answers, unless time has moved since
             if not self._take(frame, winner) or self._paced or winner.queued:
                 self._fetch(winner)
 
@@ -278,9 +524,9 @@ class Hub(Switch):
         self._waiting.add(client, queued.popleft())
 
     def _serve_client(self, client: Client) -> None:
-        """Take the frames of one client until none waits or a SYNC has been answered.
+        """Process the frames of one client until none waits or a SYNC has been answered.
 
-        The sender of a SYNC waits for the answers, so looking for more would only cost a call.
+        The sender of a SYNC waits for the answers, so another read would only cost a call.
         """
         try:
             for _ in range(_BURST):
@@ -297,27 +543,45 @@ class Hub(Switch):
         except BlockingIOError:
             return
         except ConnectionResetError:
-            return  # it left with frames unread; what it had sent comes next, then the end
+            return  # it left unread frames; its sent frames come next, then the end
         except OSError as error:
             self._remove(client, f"lost: {error.strerror}")
 
     def _control(self, client: Client, packet: bytes) -> bool:
-        """Obey a control message; return False if the client has left or waits for its grant."""
+        """Execute a control message; return False if the client has left or waits for its grant."""
         if not packet:
             self._remove(client, "lost: connection closed")
             return False
         if is_go(packet) and client is self.lead.leader:
             self.lead.go(packet)
             return False
-        answer = handle(self.lead, self.status, client, packet)
+        try:
+            answer = self._obey(client, *_request(packet))
+        except _RefusedError as error:
+            answer = {"error": str(error)}
         if answer is None:
             self._routes.clear()
         else:
             try:
-                client.sock.send(answer)
+                client.sock.send(encode(answer))
             except OSError as error:
                 self._lose(client, error)
         return True
+
+    def _obey(self, client: Client, key: str, value: Any) -> dict[str, Any] | None:
+        """Execute a request and return the answer; None if it has no answer."""
+        if key == "status" and value is True:
+            return {"status": self.status()}
+        if key == "lead" and isinstance(value, bool):
+            if value:
+                return self.lead.take(client)
+            self.lead.release(client)
+            return None
+        if key in ("filters", "more_filters"):
+            filters = _filters(key, value)
+            client.filters = filters if key == "filters" else (client.filters or []) + filters
+            return None
+        raise _RefusedError(f"unknown request {key!r}; known: {_KEYS}")
 
     def _take(self, frame: bytes, source: Client) -> bool:
         """Carry one frame of a client; return whether it was a SYNC."""
@@ -362,11 +626,11 @@ class Hub(Switch):
                 self.settle()
 
     def _sync(self, frame: bytes, source: Client, route: Route, length: int) -> None:
-        """Move bus time, let the nodes come up to it, then let all see the SYNC.
+        """Move bus time, advance the nodes to it, then deliver the SYNC to all.
 
-        On a bus that a client leads only that client's SYNC moves time, and what it has sent to the
-        buses before this one comes first, even where it was sent since they were looked at: the
-        drives of all buses share their physics.
+        On a bus that a client leads, only that client's SYNC moves time. Frames that it sent to the
+        buses before this one are processed first, even if they arrived after the last poll of
+        those buses, because the drives of all buses share their physics.
         """
         nodes = self.nodes
         leader = self.lead.leader
@@ -382,7 +646,7 @@ class Hub(Switch):
         self._just_synced = self.clock.held
         for node in nodes:
             node.advance(now_s)
-        # timers that ran out before the SYNC send before it
+        # timers that expired before the SYNC send before it
         self._flush()
         self._count_sync(now_s, route.bits[length])
         for peer in route.clients:
@@ -396,3 +660,108 @@ class Hub(Switch):
                 self.settle()
             if leader is source:
                 self.lead.send_time()
+
+    # -- frames of nodes
+
+    def next_event_s(self) -> float:
+        """Return the bus time of the next timer of a node; `math.inf` if none runs."""
+        next_s = math.inf
+        for node in self.nodes:
+            next_s = min(next_s, node.next_event())
+        return next_s
+
+    def advance(self, now_s: float) -> None:
+        """Advance all nodes to bus time `now_s` and send their frames."""
+        self._now_s = now_s
+        for node in self.nodes:
+            node.advance(now_s)
+        self._check_accepts()
+        self._flush()
+
+    def settle(self) -> None:
+        """Deliver the nodes' answers to each other's frames, for a limited number of rounds."""
+        for _ in range(_MOST_ANSWERS):
+            if not self._leftover:
+                return
+            self._flush()
+
+    def _check_accepts(self) -> None:
+        for i, node in enumerate(self.nodes):
+            if node.accepts is not self._accepts[i]:
+                self._accepts[i] = node.accepts
+                self._routes.clear()
+
+    def _count_sync(self, now_s: float, bits: int) -> None:
+        self.sync_count += 1
+        self.load.sync(now_s)
+        self.load.cycle_bits += bits
+        if self._paced:
+            self.load.occupy(now_s, bits)
+
+    def _deliver(self, frame: bytes, peer: Client) -> None:
+        peer.delivered = True
+        try:
+            peer.send(frame)
+        except OSError as error:
+            self._lose(peer, error)
+
+    def _lose(self, peer: Client, error: OSError) -> None:
+        """Count a packet that `peer` could not receive; remove a peer whose socket has failed."""
+        if isinstance(error, BlockingIOError):
+            # a client that does not read loses frames; the bus does not wait for it
+            peer.dropped += 1
+            self.dropped += 1
+        elif error.errno not in (errno.EPIPE, errno.ECONNRESET) or peer.essential:
+            self._remove(peer, f"lost: {error.strerror}")
+
+    def _route(self, can_id: int) -> Route:
+        if len(self._routes) >= _MOST_ROUTES:
+            self._routes.clear()
+        clients = [client for client in self._clients.values() if client.wants(can_id)]
+        # a remote frame has the identifier of the frame that it requests
+        plain = can_id & ~RTR_FLAG
+        nodes = [node for node in self.nodes if node.accepts is None or plain in node.accepts]
+        self._routes[can_id] = route = Route(can_id, clients, nodes)
+        return route
+
+    def _flush(self) -> None:
+        """Send the frames in the outboxes in the order of arbitration.
+
+        Frames with which other nodes of this process answer wait for the next call, so that
+        nodes that answer each other in a ring cannot lock out the clients.
+        """
+        batch = self._batch
+        self._leftover = False
+        for node in self.nodes:
+            if node.outbox:
+                for frame in node.outbox:
+                    can_id, length = HEADER.unpack_from(frame)
+                    route = self._routes.get(can_id) or self._route(can_id)
+                    if route.merges and any(other[4] == frame for other in batch):
+                        continue
+                    batch.append((route.key, len(batch), length, route, frame, node))
+                node.outbox.clear()
+        if not batch:
+            return
+        batch.sort()
+        for _, _, length, route, frame, node in batch:
+            self._emit(frame, length, route, node)
+        batch.clear()
+
+    def _emit(self, frame: bytes, length: int, route: Route, source: LocalNode) -> None:
+        load = self.load
+        load.frames += 1
+        if route.sync:
+            self._count_sync(self._now_s, route.bits[length])
+        elif route.acyclic:
+            load.acyclic_bits += route.bits[length]
+        else:
+            load.cycle_bits += route.bits[length]
+            if self._paced:
+                load.occupy(self._now_s, route.bits[length])
+        for peer in route.clients:
+            self._deliver(frame, peer)
+        for node in route.nodes:
+            if node is not source:
+                node.receive(frame, self._now_s)
+                self._leftover = self._leftover or bool(node.outbox)

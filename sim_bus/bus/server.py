@@ -1,21 +1,23 @@
-"""Run nodes on a bus of their own, or on a real one, until told to stop."""
+"""Run nodes on simulated buses started here, or on real buses, until a stop signal."""
 
 from __future__ import annotations
 
 import gc
 import json
 import os
+import select
 import signal
 import sys
 import threading
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
+from dataclasses import dataclass
 from typing import Any, Protocol
 
-from cdpr_sim_bus.bus.adapters.gateway import Gateway
-from cdpr_sim_bus.bus.client import raw_can_socket
-from cdpr_sim_bus.bus.hub import Hub
-from cdpr_sim_bus.bus.switch import LocalNode
+from cdpr_profiles.errors import printable
+from cdpr_sim_bus.bus.client import LocalNode, raw_can_socket
+from cdpr_sim_bus.bus.gateways import Gateway
+from cdpr_sim_bus.bus.hub import FINE_WAIT_S, Hub
 from cdpr_sim_bus.clock import ClockMode
 from cdpr_sim_bus.errors import BusSetupError
 from cdpr_sim_bus.frame import FrameLog
@@ -25,7 +27,7 @@ _CHANNEL = "can0"
 
 
 class Loop(Protocol):
-    """Event loop of one bus or several."""
+    """Event loop of one or several buses."""
 
     def run(self) -> None:
         """Carry frames until `stop` is called."""
@@ -51,21 +53,20 @@ def serve(
 ) -> None:
     """Run `nodes` on `bus` until SIGTERM or SIGINT, then close them.
 
-    `bus` is simbus:NAME, which is opened here, or socketcan:IFACE, which must exist. When all is
-    up, one line of JSON goes to standard output: {"ready": {"bus", "pid", and the bus status}}; a
-    terminal gets a few readable lines instead.
-    With `until_stdin_ends` the end of standard input (a pipe whose other end the parent holds)
-    stops it too, so that a simulator never outlives the command that started it. All frames go to
-    `frame_log`, as those of can0.
+    `bus` is simbus:NAME, which is opened here, or socketcan:IFACE, which must exist. When all
+    is ready, one line of JSON goes to standard output: {"ready": {"bus", "pid", and the bus
+    status}}; a terminal gets a few readable lines instead. With `until_stdin_ends`, the end of
+    standard input (a pipe whose other end the parent holds) also stops it, so that a simulator
+    never outlives the command that started it. `frame_log` receives all frames, as those of can0.
 
     A simbus can also be reached through a serial CAN adapter (`slcan`) on a pseudo-terminal and by
-    the socketcand protocol on a port of 127.0.0.1 (0: any that is free); "ready" then holds
-    "slcan", the terminal's path, "slcan_pid", the process to kill as one pulls the adapter out, and
+    the socketcand protocol on a port of 127.0.0.1 (0: any free port). "ready" then contains
+    "slcan", the terminal's path, "slcan_pid", the process to kill to unplug the adapter, and
     "socketcand", the URL, with "socketcand_pid".
 
     Raises:
-        BusSetupError: the bus cannot be opened, or a gateway to it.
-        SimulatorError: a real interface went away while running.
+        BusSetupError: the bus or a gateway to it cannot be opened.
+        SimulatorError: a real interface was lost while running.
     """
     if not bus.startswith("simbus:") and (slcan or socketcand_port is not None):
         raise BusSetupError(f"bus {bus!r}: --slcan and --socketcand are for simbus:NAME only")
@@ -93,7 +94,7 @@ def open_hub(
     bitrate: int,
     truth_log: str | None = None,
 ) -> Hub:
-    """Return the hub of `bus`, closed with `stack`; raises BusSetupError."""
+    """Return the hub of `bus`, which `stack` closes; raises BusSetupError."""
     interface, _, channel = bus.partition(":")
     name = channel if interface == "simbus" else bus
     hub = Hub(nodes, mode=mode, bitrate=bitrate, name=name, truth_log=truth_log)
@@ -112,13 +113,13 @@ def run_until_stopped(
 ) -> None:
     """Print `ready`, then run `loop` until SIGTERM or SIGINT.
 
-    Raises BusSetupError when standard input cannot be watched, and what the loop raises.
+    Raises BusSetupError if standard input cannot be watched, and the errors of the loop.
     """
     with _stopped_by_signals(loop):
         if until_stdin_ends:
             _stop_with_stdin(loop)
         print_ready(ready)
-        # what lives from here on is never garbage, so it need not be searched
+        # objects that exist now are never garbage, so the collector need not search them
         gc.collect()
         gc.freeze()
         if mode is ClockMode.LOCKSTEP:
@@ -136,15 +137,11 @@ def _open_gateways(
         raise BusSetupError(f"bus {hub.name!r}: --slcan and --socketcand are for simbus:NAME only")
     report: dict[str, Any] = {}
     if slcan:
-        adapter = Gateway(
-            "cdpr_sim_bus.bus.adapters.serial_adapter", hub.name, str(hub.load.bitrate)
-        )
+        adapter = Gateway("slcan", hub.name, str(hub.load.bitrate))
         stack.callback(adapter.close)
         report |= {"slcan": adapter.report["path"], "slcan_pid": adapter.pid}
     if socketcand_port is not None:
-        server = Gateway(
-            "cdpr_sim_bus.bus.adapters.socketcand_server", hub.name, str(socketcand_port)
-        )
+        server = Gateway("socketcand", hub.name, str(socketcand_port))
         stack.callback(server.close)
         url = f"socketcand://127.0.0.1:{server.report['port']}/{hub.name}"
         report |= {"socketcand": url, "socketcand_pid": server.pid}
@@ -154,14 +151,14 @@ def _open_gateways(
 def _use_batch_scheduling() -> None:
     """Use SCHED_BATCH: do not preempt a master on the same core at each frame.
 
-    Saves two changes of context a cycle; a scheduling class that the user chose is kept.
+    This saves two context switches a cycle; a scheduling class chosen by the user is kept.
     """
     if os.sched_getscheduler(0) == os.SCHED_OTHER:
         os.sched_setscheduler(0, os.SCHED_BATCH, os.sched_param(0))
 
 
 def _raise_priority() -> None:
-    """Run at real-time priority, as a drive's own processor would, where that is allowed."""
+    """Run at real-time priority, as a drive's processor would, if that is allowed."""
     if os.sched_getscheduler(0) == os.SCHED_OTHER:
         with suppress(PermissionError):
             os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(_PRIORITY))
@@ -205,7 +202,7 @@ def print_ready(ready: dict[str, Any]) -> None:
         print(json.dumps({"ready": ready}), flush=True)
         return
     for line in _lines(ready):
-        print(line)
+        print(printable(line))
     print("up; Ctrl-C ends it", flush=True)
 
 
@@ -218,3 +215,107 @@ def _lines(ready: dict[str, Any]) -> Iterator[str]:
     buses = ready.get("buses")
     for bus in buses.values() if isinstance(buses, dict) else ():
         yield from _lines(bus)
+
+
+# Several buses of one robot in one process and one thread.
+
+
+@dataclass(frozen=True)
+class FleetBus:
+    """One bus and its nodes; `url` is simbus:NAME or socketcan:IFACE."""
+
+    name: str
+    url: str
+    bitrate_bit_s: int
+    nodes: Sequence[LocalNode]
+
+
+class Fleet:
+    """Event loop of several hubs, each with its own bus time."""
+
+    def __init__(self, hubs: Sequence[Hub]) -> None:
+        self._hubs = {hub.fileno(): hub for hub in hubs}
+        self._first = hubs[0]
+        for number, hub in enumerate(hubs):
+            hub.robot_hubs, hub.buses_before = hubs, hubs[:number]
+        self._poller = select.epoll()
+        for descriptor in self._hubs:
+            self._poller.register(descriptor, select.EPOLLIN)
+
+    def watch(self, descriptor: int, handler: Callable[[], None]) -> None:
+        """Call `handler` whenever `descriptor` is readable."""
+        self._first.watch(descriptor, handler)
+
+    def stop(self) -> None:
+        """End `run` soon; may be called from a signal handler or another thread."""
+        self._first.stop()
+
+    def run(self) -> None:
+        """Carry frames on all buses until `stop` is called.
+
+        Raises SimulatorError if one of them is lost.
+        """
+        hubs = self._hubs
+        while not any(hub.stopping for hub in hubs.values()):
+            self._turn()
+        for hub in hubs.values():
+            hub.check()
+
+    def _turn(self) -> None:
+        """Run a turn of the hubs that have frames or whose wait is over."""
+        waits = {hub: hub.wait_s() for hub in self._hubs.values()}
+        shortest = min((wait for wait in waits.values() if wait is not None), default=None)
+        if shortest and shortest < FINE_WAIT_S:
+            select.select([self._poller], [], [], shortest)
+        ready = dict(
+            self._poller.poll(0.0 if shortest is not None and shortest < FINE_WAIT_S else shortest)
+        )
+        # always in the same order, because the drives of all buses may share their physics
+        for descriptor, hub in self._hubs.items():
+            if descriptor in ready:
+                hub.turn(0.0)
+                waits.pop(hub)
+        # if one bus has frames, no time has passed on the others
+        expired = 0.0 if ready else shortest
+        for hub, wait in waits.items():
+            if wait is not None and expired is not None and wait <= expired:
+                hub.turn(0.0)
+
+    def close(self) -> None:
+        """Close the loop's own descriptors."""
+        self._poller.close()
+
+
+def serve_fleet(
+    robot: str,
+    buses: Sequence[FleetBus],
+    *,
+    mode: ClockMode = ClockMode.LOCKSTEP,
+    until_stdin_ends: bool = False,
+    frame_log: FrameLog | None = None,
+    truth_log: str | None = None,
+) -> None:
+    """Run the nodes of all `buses` until SIGTERM or SIGINT, then close them.
+
+    When everything is ready, one line of JSON goes to standard output: {"ready": {"robot", "pid",
+    "buses": {name: {"bus", and the bus status}}}}. With `until_stdin_ends`, the end of standard
+    input also stops it. `frame_log` receives all frames, under the names of the buses. Raises
+    BusSetupError if a bus cannot be opened, SimulatorError if a real interface was lost.
+    """
+    with ExitStack() as stack:
+        hubs = {
+            bus.name: open_hub(
+                stack,
+                with_frame_log(bus.nodes, frame_log, bus.name),
+                bus.url,
+                mode=mode,
+                bitrate=bus.bitrate_bit_s,
+                truth_log=truth_log,
+            )
+            for bus in buses
+        }
+        fleet = Fleet(list(hubs.values()))
+        stack.callback(fleet.close)
+        report = {bus.name: {"bus": bus.url, **hubs[bus.name].status()} for bus in buses}
+        ready = {"robot": robot, "pid": os.getpid(), "buses": report}
+        run_until_stopped(fleet, ready, mode, until_stdin_ends)

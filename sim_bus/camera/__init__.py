@@ -1,1 +1,1 @@
-"""A simulated camera on a simulated platform: what it sees of markers, rendered."""
+"""A simulated camera on a simulated platform, which renders images of markers."""

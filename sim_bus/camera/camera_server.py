@@ -1,13 +1,13 @@
-"""Serves a simulated camera on a Unix socket, in a process of its own beside the bus.
+"""Serves a simulated camera on a Unix socket, in a separate process beside the bus.
 
-A client sends lines of JSON and gets one line of JSON for each:
+A client sends lines of JSON and receives one line of JSON for each:
 
     {"do": "about"}   {"width": 1280, "height": 1024}
     {"do": "grab"}    {"width": 1280, "height": 1024, "time_s": 12.5, "number": 3, "bytes": 1310720}
-                      and so many bytes after it: grey levels, row by row
+                      followed by that number of bytes: grey levels, row by row
     anything else     {"error": "..."}
 
-A client is hung up on while the camera is unplugged by its plant. `time_s` is bus time in the
+Clients are disconnected while the plant file unplugs the camera. `time_s` is bus time in the
 middle of the exposure.
 """
 
@@ -15,12 +15,12 @@ from __future__ import annotations
 
 import json
 import os
-import selectors
 import signal
-import socket
+import socketserver
 import sys
-from collections.abc import Callable
-from contextlib import ExitStack, suppress
+import threading
+from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -32,92 +32,66 @@ _MOST_REQUEST = 4096
 _FAULTS = "dark, defocus PIXELS, mend, unplug"
 
 
+class _EndedError(Exception):
+    """The camera is unplugged, or its process was asked to end."""
+
+
 class CameraServer:
     """Answers clients until SIGTERM, SIGINT or `unplug`; one request at a time.
 
-    Lines on standard input break and mend things: `dark`, `defocus 6`, `mend`, `unplug`; each is
-    answered by a line of JSON on standard output.
+    Lines on standard input create and mend faults: `dark`, `defocus 6`, `mend`, `unplug`; each is
+    answered with a line of JSON on standard output.
     """
 
     def __init__(self, camera: SimCamera, platform: BoardPlatform, path: Path) -> None:
         self._camera, self._platform, self._path = camera, platform, path
-        self._selector = selectors.DefaultSelector()
-        self._clients: dict[socket.socket, bytearray] = {}
-        self._ended = False
+        self._busy = threading.Lock()
 
     def serve(self, until_stdin_ends: bool, details: dict[str, Any]) -> None:
-        """Serve; prints {"ready": ...} when up. Raises BusSetupError for a path that is taken."""
-        with ExitStack() as stack:
-            stack.callback(self._selector.close)
-            listener = stack.enter_context(self._listener())
-            stack.callback(self._path.unlink, missing_ok=True)
-            stack.callback(self._drop_all)
-            woken = self._wake_on_signals(stack)
-            self._selector.register(listener, selectors.EVENT_READ, lambda: self._accept(listener))
-            self._selector.register(woken, selectors.EVENT_READ, self._end)
-            self._watch_stdin(until_stdin_ends)
-            ready = {"camera": f"sim:{self._path}", "pid": os.getpid(), **details}
-            print(json.dumps({"ready": ready}), flush=True)
-            while not self._ended:
-                for key, _ in self._selector.select():
-                    if not self._ended:
-                        key.data()
-
-    def _listener(self) -> socket.socket:
-        listener = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+        """Serve; print {"ready": ...} when ready. Raises BusSetupError if the path is taken."""
         try:
-            listener.bind(str(self._path))
-            listener.listen()
+            listener = socketserver.ThreadingUnixStreamServer(str(self._path), self._handler())
         except OSError as error:
-            listener.close()
             reason = error.strerror or error
             raise BusSetupError(f"camera's socket {self._path}: {reason}") from None
-        return listener
-
-    def _wake_on_signals(self, stack: ExitStack) -> socket.socket:
-        inner, outer = socket.socketpair()
-        stack.enter_context(inner)
-        stack.enter_context(outer)
-        outer.setblocking(False)
-        signal.set_wakeup_fd(outer.fileno())
-        stack.callback(signal.set_wakeup_fd, -1)
-        for number in (signal.SIGINT, signal.SIGTERM):
-            signal.signal(number, lambda *_: None)
-        return inner
-
-    def _end(self) -> None:
-        self._ended = True
+        listener.daemon_threads, listener.block_on_close = True, False
+        try:
+            for number in (signal.SIGINT, signal.SIGTERM):
+                signal.signal(number, _end)
+            threading.Thread(target=listener.serve_forever, daemon=True).start()
+            ready = {"camera": f"sim:{self._path}", "pid": os.getpid(), **details}
+            print(json.dumps({"ready": ready}), flush=True)
+            self._obey()
+            while not until_stdin_ends:
+                signal.pause()
+        except _EndedError:
+            pass
+        finally:
+            self._busy.acquire()  # nothing reads the platform any more
+            self._path.unlink(missing_ok=True)
+            listener.server_close()
 
     # -- clients
 
-    def _accept(self, listener: socket.socket) -> None:
-        client, _ = listener.accept()
-        self._clients[client] = bytearray()
-        self._selector.register(client, selectors.EVENT_READ, lambda: self._hear(client))
+    def _handler(self) -> type[socketserver.StreamRequestHandler]:
+        answers = self._answers
 
-    def _drop(self, client: socket.socket) -> None:
-        self._selector.unregister(client)
-        del self._clients[client]
-        client.close()
+        class Handler(socketserver.StreamRequestHandler):
+            def handle(self) -> None:
+                with suppress(OSError):  # the client or the camera is gone
+                    for answer in answers(iter(lambda: self.rfile.readline(_MOST_REQUEST), b"")):
+                        self.wfile.write(answer)
 
-    def _drop_all(self) -> None:
-        for client in list(self._clients):
-            with suppress(OSError):
-                client.close()
+        return Handler
 
-    def _hear(self, client: socket.socket) -> None:
-        heard = self._clients[client]
-        try:
-            data = client.recv(_MOST_REQUEST)
-            heard += data
-            while b"\n" in heard:
-                line, _, rest = heard.partition(b"\n")
-                heard[:] = rest
-                client.sendall(self._answer(bytes(line)))
-        except OSError:  # it has gone, or the camera has
-            data = b""
-        if not data or len(heard) > _MOST_REQUEST:
-            self._drop(client)
+    def _answers(self, lines: Iterator[bytes]) -> Iterator[bytes]:
+        """Yield the answer to each line; disconnect a client that sends no lines."""
+        for line in lines:
+            if not line.endswith(b"\n"):
+                return
+            with self._busy:
+                answer = self._answer(line)
+            yield answer
 
     def _answer(self, line: bytes) -> bytes:
         lens = self._camera.plant.lens
@@ -139,18 +113,11 @@ class CameraServer:
 
     # -- faults
 
-    def _watch_stdin(self, until_it_ends: bool) -> None:
-        reader: Callable[[], None] = lambda: self._read_stdin(until_it_ends)  # noqa: E731
-        with suppress(OSError, ValueError):  # a file, or none, says nothing
-            self._selector.register(sys.stdin.fileno(), selectors.EVENT_READ, reader)
-
-    def _read_stdin(self, until_it_ends: bool) -> None:
-        data = os.read(sys.stdin.fileno(), _MOST_REQUEST)
-        if not data:
-            self._selector.unregister(sys.stdin.fileno())
-            self._ended = self._ended or until_it_ends
-        for line in data.decode(errors="replace").splitlines():
-            print(json.dumps(self._break(line.split())), flush=True)
+    def _obey(self) -> None:
+        """Execute the lines of standard input until it ends."""
+        with suppress(OSError, ValueError):  # a closed input has no lines
+            for line in sys.stdin or ():
+                print(json.dumps(self._break(line.split())), flush=True)
 
     def _break(self, words: list[str]) -> dict[str, Any]:
         camera = self._camera
@@ -162,7 +129,8 @@ class CameraServer:
             case ["mend"]:
                 camera.dark, camera.defocus_px = False, 0.0
             case ["unplug"]:
-                self._ended = True
+                print(json.dumps({"done": "unplug"}), flush=True)
+                raise _EndedError
             case _:
                 return {"error": f"{' '.join(words)!r}; allowed: {_FAULTS}"}
         return {"done": " ".join(words)}
@@ -174,3 +142,7 @@ def _requested(line: bytes) -> str:
     except ValueError:
         return ""
     return str(asked.get("do", "")) if isinstance(asked, dict) else ""
+
+
+def _end(*_: object) -> None:
+    raise _EndedError

@@ -1,11 +1,11 @@
-"""Draws one sheet as a camera sees it: several rays through each pixel (compiled)."""
+"""Draws one sheet as a camera sees it, with several rays through each pixel (compiled)."""
 
 from __future__ import annotations
 
 import math
 from typing import Any
 
-from cdpr_sim_bus.jit import jit
+from cdpr_profiles.jit import jit
 
 _BEND_STEPS = 3
 _FLAT = 1e-6
@@ -13,7 +13,7 @@ _FLAT = 1e-6
 
 @jit
 def texel(texture: Any, x: float, y: float) -> float:
-    """Return the texture at x, y, between its texels; these are counted from their middles."""
+    """Return the interpolated texture at x, y, counted in texels from their centres."""
     rows, columns = texture.shape
     x = min(max(x, 0.0), columns - 1.000001)
     y = min(max(y, 0.0), rows - 1.000001)
@@ -28,7 +28,7 @@ def texel(texture: Any, x: float, y: float) -> float:
 def look(
     sheet: Any, texture: Any, origins: Any, turns: Any, x: float, y: float, time: float
 ) -> float:
-    """Return what a ray meets, 0 to 1, or -1 where it misses the sheet.
+    """Return the level, 0 to 1, that a ray sees, or -1 if it misses the sheet.
 
     `sheet` is (half width, half height, curvature). The ray starts at the camera, in the sheet's
     frame at origins[0] + time origins[1], and has the direction that the first, second and third
@@ -72,7 +72,7 @@ def look(
 def _corners(
     sheet: Any, texture: Any, origins: Any, turns: Any, ray: Any, right: Any, down: Any
 ) -> tuple[float, float]:
-    """Return the least and the most that a pixel's corners see."""
+    """Return the minimum and the maximum that a pixel's corners see."""
     lowest, highest = math.inf, -math.inf
     for k in range(4):
         a, b = (k % 2) - 0.5, (k // 2) - 0.5
@@ -98,8 +98,8 @@ def draw_sheet(
     """Draw a sheet over `image` (rows, columns) within `region` (left, top, right, bottom).
 
     `rays` (rows, columns, 2) has the pixels' directions. `offsets` (n, 3) are the rays through each
-    pixel: right and down of its middle, in pixels, and time in the exposure, s. A pixel whose
-    corners see the same needs no more than those where nothing moves.
+    pixel: right and down of its centre, in pixels, and time in the exposure, s. If nothing
+    moves, a pixel whose corners see the same level needs only the rays of the corners.
     """
     left, top, right, bottom = region
     rows, columns, _ = rays.shape

@@ -1,4 +1,4 @@
-"""What stands around a simulated camera: printed sheets where they truly are."""
+"""The surroundings of a simulated camera: printed sheets at their true places."""
 
 from __future__ import annotations
 
@@ -10,7 +10,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from cdpr_sim_bus.camera.camera_plant import (
+from cdpr_sim_bus.errors import SimulatorError
+from cdpr_sim_bus.robot.camera_plant import (
     DEFAULT_SCENE,
     BoardPlant,
     CameraPlant,
@@ -18,12 +19,11 @@ from cdpr_sim_bus.camera.camera_plant import (
     MarkerPlant,
     PrintPlant,
 )
-from cdpr_sim_bus.errors import SimulatorError
-from cdpr_sim_bus.robot.logs.platform_record import rotation_of
+from cdpr_sim_bus.robot.platform import rotation_of
 
 FloatArray = NDArray[np.float64]
 _TEXELS = 24
-"""Of a texture to each square of a marker."""
+"""Texels of a texture per square of a marker."""
 _MARGIN = 1
 """Squares of white paper around a marker."""
 _INK, _PAPER = 0.0, 1.0
@@ -35,18 +35,18 @@ class Sheet:
 
     name: str
     texture: NDArray[np.float32]
-    """From 0, ink, to 1, paper; (rows, columns), the uppermost first."""
+    """From 0, ink, to 1, paper; (rows, columns), top row first."""
     half_m: tuple[float, float]
-    """Half its width and height, true."""
+    """Half of its true width and height."""
     bend_1_m: float
-    """Curvature about its upright axis."""
+    """Curvature about its vertical axis."""
     position_m: FloatArray
     rotation: FloatArray
     moves_after_image: int | None = None
     moves_m: tuple[float, ...] = (0.0, 0.0, 0.0)
 
     def place(self, images_taken: int) -> FloatArray:
-        """Return where its middle is, (3,), for the next image."""
+        """Return the position of its centre, (3,), for the next image."""
         if self.moves_after_image is None or images_taken < self.moves_after_image:
             return self.position_m
         return np.add(self.position_m, self.moves_m)

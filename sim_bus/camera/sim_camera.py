@@ -1,18 +1,20 @@
-"""A simulated camera: its lens model, and the images that it takes of a scene."""
+"""A simulated camera: its lens model, images of a scene, and random poses."""
 
 from __future__ import annotations
 
+import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from cdpr_sim_bus.camera.camera_plant import CameraFaultPlant, CameraPlant, LensPlant
 from cdpr_sim_bus.camera.render_kernel import draw_sheet
 from cdpr_sim_bus.camera.scene import Sheet, build_scene
 from cdpr_sim_bus.physics_board import PlatformState
-from cdpr_sim_bus.robot.logs.platform_record import rotation_of
+from cdpr_sim_bus.robot.camera_plant import CameraFaultPlant, CameraPlant, LensPlant
+from cdpr_sim_bus.robot.platform import rotation_of
 
 FloatArray = NDArray[np.float64]
 _ITERATIONS = 25
@@ -30,9 +32,9 @@ def distorted(x: FloatArray, y: FloatArray, lens: LensPlant) -> tuple[FloatArray
 
 
 def seen_at(points: FloatArray, lens: LensPlant) -> FloatArray:
-    """Return the pixels (n, 2) at which points (n, 3) of the camera's frame are seen.
+    """Return the pixels (n, 2) at which points (n, 3) of the camera's frame appear.
 
-    nan where a point is behind the camera, or further out than a lens like this can show.
+    nan for a point behind the camera, or outside the range of such a lens.
     """
     z = np.where(points[:, 2] > 1e-3, points[:, 2], np.nan)
     x, y = points[:, 0] / z, points[:, 1] / z
@@ -45,7 +47,7 @@ def seen_at(points: FloatArray, lens: LensPlant) -> FloatArray:
 
 
 def ray_table(lens: LensPlant) -> FloatArray:
-    """Return X/Z and Y/Z of every pixel's middle, (height, width, 2), by fixed-point iteration."""
+    """Return X/Z and Y/Z of every pixel's centre, (height, width, 2), by fixed-point iteration."""
     u, v = np.meshgrid(
         np.arange(lens.width_px, dtype=float), np.arange(lens.height_px, dtype=float)
     )
@@ -62,14 +64,14 @@ def ray_table(lens: LensPlant) -> FloatArray:
 
 
 _STILL_px = 0.02
-"""A motion of less in the whole exposure and readout is none."""
+"""A smaller motion during exposure and readout counts as none."""
 _PLASTIC = np.array([0.8191725134, 0.6710436067, 0.5497004779])
 """Steps of an evenly spread sequence in three dimensions (inverse powers of 1.2207)."""
 
 
 @dataclass(frozen=True)
 class Pose:
-    """A camera in the room, and how it moves."""
+    """Pose of a camera in the room, and its motion."""
 
     position_m: FloatArray
     rotation: FloatArray
@@ -78,37 +80,37 @@ class Pose:
 
 
 class SimCamera:
-    """Renders images; the noise of each depends on the plant's seed and its number alone."""
+    """Renders images; the noise of each depends only on the plant's seed and the image number."""
 
     def __init__(self, plant: CameraPlant) -> None:
         """Build the scene; raises SimulatorError."""
         self.plant = plant
         self.taken = 0
-        """Images so far."""
+        """Images taken so far."""
         self.dark = False
         """Whether its light is off."""
         self.defocus_px = 0.0
-        """Blur on top of the lens'."""
+        """Blur in addition to the lens'."""
         self.sheets = build_scene(plant)
         self._rays = ray_table(plant.lens)
         steps = np.arange(1, plant.samples + 1)[:, None] * _PLASTIC % 1.0
-        steps[:, :2] -= steps[:, :2].mean(axis=0)  # a pixel's middle is where it looks on average
+        steps[:, :2] -= steps[:, :2].mean(axis=0)  # on average, a pixel looks at its centre
         steps[:, 2] = (steps[:, 2] - steps[:, 2].mean()) * plant.sensor.exposure_s
         self._offsets = np.ascontiguousarray(steps)
         self._light = self._light_field()
 
     def skip_unplugged(self) -> bool:
-        """Return whether it is unplugged at the next image, which is not taken then."""
+        """Return whether it is unplugged at the next image, which is then skipped."""
         unplugged = bool(self._faults("unplugged"))
         self.taken += unplugged
         return unplugged
 
     def _faults(self, kind: str) -> list[CameraFaultPlant]:
-        """Return what is wrong with the next image, as far as it is of a kind."""
+        """Return the faults of one kind in the next image."""
         return [one for one in self.plant.faults if one.kind == kind and one.holds(self.taken)]
 
     def camera_pose(self, platform: PlatformState) -> Pose:
-        """Return where the camera is on a platform."""
+        """Return the camera's pose on a platform."""
         mount = self.plant.mount
         turn = np.array(platform.rotation).reshape(3, 3)
         lever = turn @ np.array(mount.position_m)
@@ -123,7 +125,7 @@ class SimCamera:
     def grab(self, platform: PlatformState) -> NDArray[np.uint8]:
         """Return the next image (height, width), grey levels, from a pose of the platform.
 
-        Its middle row has the middle of its exposure at the instant of `platform`.
+        The middle of its middle row's exposure is at the instant of `platform`.
         """
         pose = self.camera_pose(platform)
         light = self.plant.light
@@ -183,12 +185,12 @@ class SimCamera:
         )
 
     def _span_s(self) -> float:
-        """Return from when to when light falls on any row."""
+        """Return the times between which light falls on any row."""
         sensor = self.plant.sensor
         return sensor.exposure_s + (sensor.readout_s if sensor.shutter == "rolling" else 0.0)
 
     def _occlude(self, image: FloatArray, pose: Pose) -> None:
-        """Cover what is behind balls; these count as nearer than all sheets."""
+        """Cover the parts behind balls, which count as nearer than all sheets."""
         for ball in self.plant.occluders:
             at = (np.array(ball.position_m) - pose.position_m) @ pose.rotation
             seen = seen_at(at[None], self.plant.lens)[0]
@@ -203,10 +205,37 @@ class SimCamera:
         return np.asarray(light.white * fall * (1.0 + 0.5 * light.gradient * u))
 
     def _exposed(self, image: FloatArray, share: float) -> NDArray[np.uint8]:
-        """Return grey levels with a share of the light, noise and steps."""
+        """Return grey levels with a share of the light, noise and quantisation."""
         sensor = self.plant.sensor
         chance = np.random.default_rng([self.plant.seed, 12, self.taken])
         level = image * self._light * share
         sigma = np.sqrt(sensor.noise**2 + sensor.shot_noise**2 * level / 255.0)
         level = level + sigma * chance.standard_normal(level.shape, dtype=np.float32)
         return np.rint(level).clip(0, 255).astype(np.uint8)
+
+
+# Random poses in a box, for images without a robot.
+
+_STILL = (0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class Box:
+    """Limits of a platform's position, and of its rotation about any axis."""
+
+    low_m: tuple[float, float, float]
+    high_m: tuple[float, float, float]
+    turn_deg: float
+
+
+def random_poses(box: Box, count: int, seed: int) -> Iterator[PlatformState]:
+    """Yield platforms at rest: positions uniform in the box, rotations up to its angle."""
+    chance = np.random.default_rng([seed, 13])
+    for k in range(count):
+        position = chance.uniform(box.low_m, box.high_m)
+        axis = chance.standard_normal(3)
+        turn = axis / np.linalg.norm(axis) * chance.uniform(0.0, math.radians(box.turn_deg))
+        yield PlatformState(
+            *(float(k), tuple(position.tolist()), tuple(rotation_of(turn).ravel().tolist())),
+            *(_STILL, _STILL),
+        )

@@ -35,7 +35,7 @@ class Abort(IntEnum):
 
 
 class SdoAbort(Exception):  # noqa: N818 - the name CiA 301 gives it
-    """Refusal of an access to the object dictionary; `code` goes to the client."""
+    """Rejected access to the object dictionary; `code` is sent to the client."""
 
     def __init__(self, code: int) -> None:
         super().__init__(f"SDO abort {code:08X}h")

@@ -5,12 +5,16 @@ from __future__ import annotations
 import struct
 from collections import deque
 from collections.abc import Callable
+from typing import TYPE_CHECKING
 
-from cdpr_sim_bus.canopen import cob_ids
+from cdpr_sim_bus.canopen import slave as cob_ids
 from cdpr_sim_bus.canopen.abort import Abort, SdoAbort
-from cdpr_sim_bus.canopen.dictionary.datatypes import Value
-from cdpr_sim_bus.canopen.slave import NmtState, Slave
+from cdpr_sim_bus.canopen.od import Value
+from cdpr_sim_bus.canopen.slave import NmtState
 from cdpr_sim_bus.frame import pack_frame
+
+if TYPE_CHECKING:
+    from cdpr_sim_bus.canopen.node import CanopenSlave
 
 SYNC_LENGTH = 0x8240
 HEARTBEAT = 0x8130
@@ -21,7 +25,7 @@ RPDO_TIMEOUT = 0x8250
 COMMUNICATION_BIT = 0x10
 """Communication error in 1001h."""
 COMMUNICATION = "communication"
-"""Source of errors that the communication part detects; the application's is ""."""
+"""Source of errors that the communication part detects; the application's source is ""."""
 
 _INVALID = 0x80000000
 _QUEUE_LENGTH = 16
@@ -31,7 +35,7 @@ _LAYOUT = struct.Struct("<HB5s")
 class EmergencyProducer:
     """Active errors, their EMCY messages and their history."""
 
-    def __init__(self, slave: Slave) -> None:
+    def __init__(self, slave: CanopenSlave) -> None:
         self._slave = slave
         self._od = od = slave.od
         self._active: dict[int, int] = {}
@@ -52,9 +56,9 @@ class EmergencyProducer:
     def raise_error(
         self, code: int, register_bits: int, vendor: bytes = b"", source: str = ""
     ) -> None:
-        """Report an error once, until each `source` that raised it has cleared it.
+        """Report an error once, until every `source` that raised it has cleared it.
 
-        `register_bits` are its bits in 1001h, `vendor` up to 5 bytes for the EMCY frame.
+        `register_bits` are its bits in 1001h, `vendor` is up to 5 bytes for the EMCY frame.
         """
         self._sources.setdefault(code, set()).add(source)
         if code in self._active:
@@ -68,7 +72,7 @@ class EmergencyProducer:
     def clear(self, code: int | None = None, source: str = "") -> None:
         """Clear one error of `source`, or all errors of all sources.
 
-        Error code 0000h goes out, with the register that remains, once no source holds it.
+        Error code 0000h is sent, with the remaining register, once no source holds it.
         """
         if code is None:
             standing = bool(self._active)
@@ -83,7 +87,7 @@ class EmergencyProducer:
             self._enqueue(0, b"")
 
     def reset_communication(self) -> None:
-        """Forget unsent frames and communication errors; the application's errors stand."""
+        """Forget unsent frames and communication errors; keep the application's errors."""
         for sources in self._sources.values():
             sources.discard(COMMUNICATION)
         self._active = {c: bits for c, bits in self._active.items() if self._sources.get(c)}
@@ -100,7 +104,7 @@ class EmergencyProducer:
         self._update_register()
 
     def flush(self, now: float) -> None:
-        """Send what had to wait for the NMT state."""
+        """Send the frames that had to wait for the NMT state."""
         if self._queue:
             self._send(now)
 

@@ -2,17 +2,23 @@
 
 from __future__ import annotations
 
-from cdpr_sim_bus.canopen import cob_ids, emcy
+from typing import TYPE_CHECKING
+
+from cdpr_sim_bus.canopen import emcy
+from cdpr_sim_bus.canopen import slave as cob_ids
 from cdpr_sim_bus.canopen.abort import Abort, SdoAbort
-from cdpr_sim_bus.canopen.dictionary.datatypes import Value
-from cdpr_sim_bus.canopen.slave import NmtState, Slave
+from cdpr_sim_bus.canopen.od import Value
+from cdpr_sim_bus.canopen.slave import NmtState
 from cdpr_sim_bus.frame import pack_frame
+
+if TYPE_CHECKING:
+    from cdpr_sim_bus.canopen.node import CanopenSlave
 
 
 class HeartbeatProducer:
     """Sends the NMT state every 1017h ms, the first one a period after the boot-up message."""
 
-    def __init__(self, slave: Slave) -> None:
+    def __init__(self, slave: CanopenSlave) -> None:
         self._slave = slave
         self._timer = slave.timers.add(self._beat)
         self._period_s = 0.0
@@ -22,7 +28,7 @@ class HeartbeatProducer:
             slave.od.on_write(0x1017, 0, lambda value: self._start(int(value)))
 
     def boot(self) -> None:
-        """Send the boot-up message and take the period from 1017h."""
+        """Send the boot-up message and read the period from 1017h."""
         slave = self._slave
         slave.outbox.append(pack_frame(cob_ids.ERROR_CONTROL + slave.node_id, b"\x00"))
         self._toggle = 0
@@ -57,7 +63,7 @@ class HeartbeatProducer:
 class _Consumer:
     """Monitor of one node, configured by one sub-index of 1016h."""
 
-    def __init__(self, owner: HeartbeatConsumers, slave: Slave) -> None:
+    def __init__(self, owner: HeartbeatConsumers, slave: CanopenSlave) -> None:
         self._owner = owner
         self._timer = slave.timers.add(lambda _now: self._lose())
         self.node = 0
@@ -66,14 +72,14 @@ class _Consumer:
         self.lost = False
 
     def configure(self, value: int) -> None:
-        """Take a value of 1016h (node << 16 | ms); monitoring begins with a heartbeat."""
+        """Apply a value of 1016h (node << 16 | ms); monitoring begins with a heartbeat."""
         self.node = value >> 16 & 0x7F
         self.period_s = (value & 0xFFFF) * 1e-3
         self.running = self.lost = False
         self._timer.stop()
 
     def receive(self, frame: bytes, now: float) -> None:
-        """Take a heartbeat or boot-up message of the node."""
+        """Process a heartbeat or boot-up message of the node."""
         if frame[4] != 1:
             return
         if frame[8] == 0:
@@ -94,13 +100,13 @@ class _Consumer:
 
 
 class HeartbeatConsumers:
-    """Watch the nodes of 1016h: silence or a restart of one is error 8130h and ends as 1029h says.
+    """Monitor the nodes of 1016h: silence or restart is error 8130h, with the reaction of 1029h.
 
-    Monitoring of a node starts with its first heartbeat, and again with the first one after it
-    was lost, which takes the error back.
+    Monitoring of a node starts with its first heartbeat, and again with the first one after a
+    loss, which clears the error.
     """
 
-    def __init__(self, slave: Slave) -> None:
+    def __init__(self, slave: CanopenSlave) -> None:
         self._slave = slave
         self._consumers: list[_Consumer] = []
         for entry in slave.od.subs(0x1016):
@@ -109,13 +115,13 @@ class HeartbeatConsumers:
             entry.hook = lambda value, consumer=consumer: self._write(consumer, value)
 
     def configure(self) -> None:
-        """Take 1016h as it stands in the dictionary."""
+        """Apply the present value of 1016h in the dictionary."""
         for consumer, entry in zip(self._consumers, self._slave.od.subs(0x1016), strict=True):
             value = entry.value
             consumer.configure(value if isinstance(value, int) else 0)
 
     def handlers(self) -> dict[int, cob_ids.Handler]:
-        """Frame handlers by identifier for the nodes watched now."""
+        """Frame handlers by identifier for the nodes monitored now."""
         return {
             cob_ids.ERROR_CONTROL + consumer.node: consumer.receive
             for consumer in self._consumers
@@ -123,10 +129,10 @@ class HeartbeatConsumers:
         }
 
     def node_lost(self, node: int) -> None:
-        """React to the loss of a node: EMCY, NMT state by 1029h:01, the application."""
+        """React to the loss of a node: EMCY, NMT state from 1029h:01, the application."""
         slave = self._slave
         slave.communication_error(emcy.HEARTBEAT, bytes([node]))
-        # the application first: it knows the loss for what it is, not for a change of NMT state
+        # the application first: it must see the loss itself, not a change of NMT state
         slave.app.on_heartbeat_lost(node)
         behaviour = slave.od.get_int(0x1029, 1, 0)
         if behaviour == 0 and slave.nmt_state == NmtState.OPERATIONAL:
@@ -135,7 +141,7 @@ class HeartbeatConsumers:
             slave.set_nmt_state(NmtState.STOPPED)
 
     def recovered(self) -> None:
-        """Take the error back once no node is missing."""
+        """Clear the error when no node is missing."""
         if not any(consumer.lost for consumer in self._consumers):
             self._slave.communication_error_clear(emcy.HEARTBEAT)
 

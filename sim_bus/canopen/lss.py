@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import TYPE_CHECKING
 
-from cdpr_sim_bus.canopen import cob_ids
+from cdpr_sim_bus.canopen import slave as cob_ids
 from cdpr_sim_bus.canopen.abort import SdoAbort
-from cdpr_sim_bus.canopen.slave import Slave
 from cdpr_sim_bus.frame import pack_frame
 
+if TYPE_CHECKING:
+    from cdpr_sim_bus.canopen.node import CanopenSlave
+
 UNCONFIGURED = 255
-"""Node id of a node that has none."""
+"""Node id of a node without one."""
 
 BIT_RATES = {
     0: 1_000_000,
@@ -32,11 +35,11 @@ _STORE_FAILED = 2
 class LssSlave:
     """One LSS slave; the LSS address is 1018h. It listens in every NMT state."""
 
-    def __init__(self, slave: Slave) -> None:
+    def __init__(self, slave: CanopenSlave) -> None:
         self._slave = slave
         self._configuration = False
         self.pending_node_id = slave.node_id
-        """Node id that counts from the next reset of communication on."""
+        """Node id that takes effect at the next communication reset."""
         self._pending_bitrate = slave.bitrate
         self._selection: dict[int, int] = {}
         self._scan_position = 0
@@ -63,7 +66,7 @@ class LssSlave:
             self._commands[command] = self._identify
 
     def receive(self, frame: bytes, _now: float) -> None:
-        """Take a frame of the LSS master; unknown commands are ignored."""
+        """Process a frame of the LSS master; unknown commands are ignored."""
         command = self._commands.get(frame[8])
         if frame[4] == 8 and command is not None:
             command(frame[8:16])
@@ -145,7 +148,7 @@ class LssSlave:
         self._send(bytes([0x13, 0 if valid else _OUT_OF_RANGE]))
 
     def _activate_bit_timing(self, data: bytes) -> None:
-        """Keep silent for two switch delays, then use the new bit rate, which the bus may lack."""
+        """Stay silent for two switch delays, then use the new rate, even if the bus has another."""
         if self._configuration:
             delay_s = int.from_bytes(data[1:3], "little") * 1e-3
             self._slave.muted = True

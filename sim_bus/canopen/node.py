@@ -1,24 +1,99 @@
-"""CANopen slave: one node of CiA 301 and CiA 305 without an application of its own."""
+"""CANopen slave: one node of CiA 301 and CiA 305 without an application."""
 
 from __future__ import annotations
 
 import struct
 
-from cdpr_sim_bus.canopen import cob_ids, emcy
-from cdpr_sim_bus.canopen.dictionary.od import APPLICATION, COMMUNICATION, ObjectDictionary
-from cdpr_sim_bus.canopen.dictionary.store import (
+from cdpr_sim_bus.canopen import emcy
+from cdpr_sim_bus.canopen import slave as cob_ids
+from cdpr_sim_bus.canopen.abort import Abort, SdoAbort
+from cdpr_sim_bus.canopen.emcy import EmergencyProducer
+from cdpr_sim_bus.canopen.heartbeat import HeartbeatConsumers, HeartbeatProducer
+from cdpr_sim_bus.canopen.lss import UNCONFIGURED, LssSlave
+from cdpr_sim_bus.canopen.od import APPLICATION, COMMUNICATION, ObjectDictionary, Value
+from cdpr_sim_bus.canopen.pdo import PdoService
+from cdpr_sim_bus.canopen.sdo import SdoServer
+from cdpr_sim_bus.canopen.slave import NmtState, SlaveApplication, Timers
+from cdpr_sim_bus.canopen.store import (
     ConfigurationStamp,
     ParameterStore,
     add_store_objects,
 )
-from cdpr_sim_bus.canopen.emcy import EmergencyProducer
-from cdpr_sim_bus.canopen.heartbeat import HeartbeatConsumers, HeartbeatProducer
-from cdpr_sim_bus.canopen.lss import UNCONFIGURED, LssSlave
-from cdpr_sim_bus.canopen.pdos.pdo import PdoService
-from cdpr_sim_bus.canopen.sdo import SdoServer
-from cdpr_sim_bus.canopen.slave import NmtState, SlaveApplication, Timers
-from cdpr_sim_bus.canopen.sync import SyncConsumer
 from cdpr_sim_bus.frame import RTR_FLAG
+
+# SYNC consumer: 1005h identifier, 1006h period, 1007h window, 1019h counter.
+
+_PRODUCER = 0x40000000
+_MAX_COUNTER = 240
+
+
+class SyncConsumer:
+    """Processes SYNC in PRE-OPERATIONAL and OPERATIONAL."""
+
+    def __init__(self, slave: CanopenSlave) -> None:
+        self._slave = slave
+        self.counted = False
+        """Whether SYNC carries a counter (1019h not 0)."""
+        self.identifier = 0x80
+        self._operational = False
+        self._length_error = False
+        od = slave.od
+        for index, hook in (
+            (0x1005, self._write_cob_id),
+            (0x1006, lambda value: self._store(0x1006, int(value))),
+            (0x1007, lambda value: self._store(0x1007, int(value))),
+            (0x1019, self._write_overflow),
+        ):
+            if (index, 0) in od:
+                od.on_write(index, 0, hook)
+
+    def configure(self) -> None:
+        """Read the parameters from the dictionary."""
+        slave, od = self._slave, self._slave.od
+        self.identifier = od.get_int(0x1005, 0, 0x80) & 0x7FF
+        self.counted = od.get_int(0x1019, 0, 0) > 1
+        slave.sync_period_s = od.get_int(0x1006, 0, 0) * 1e-6
+        slave.pdo.window_s = od.get_int(0x1007, 0, 0) * 1e-6
+        self._length_error = False
+
+    def set_state(self) -> None:
+        """Adapt to the NMT state."""
+        self._operational = self._slave.nmt_state == NmtState.OPERATIONAL
+
+    def receive(self, frame: bytes, now: float) -> None:
+        """Process a SYNC frame."""
+        if frame[4] != self.counted:
+            self._length_error = True
+            self._slave.communication_error(emcy.SYNC_LENGTH)
+            return
+        if self._length_error:
+            self._length_error = False
+            self._slave.communication_error_clear(emcy.SYNC_LENGTH)
+        slave = self._slave
+        slave.app.before_sync(now)
+        if self._operational:
+            slave.pdo.at_sync(now, frame[8])
+
+    def _write_cob_id(self, value: Value) -> None:
+        new = int(value)
+        if new & _PRODUCER or cob_ids.is_restricted(new & 0x1FFFFFFF) or new & 0x20000000:
+            raise SdoAbort(Abort.INVALID_VALUE)
+        self._store(0x1005, new)
+        self._slave.rebuild_handlers()
+
+    def _write_overflow(self, value: Value) -> None:
+        new = int(value)
+        if new == 1 or new > _MAX_COUNTER:
+            raise SdoAbort(Abort.INVALID_VALUE)
+        if self._slave.od.get_int(0x1006, 0, 0):
+            raise SdoAbort(Abort.DEVICE_STATE)
+        self._store(0x1019, new)
+        self._slave.pdo.set_state()
+
+    def _store(self, index: int, value: int) -> None:
+        self._slave.od.set(index, 0, value)
+        self.configure()
+
 
 _IDENTIFIER = struct.Struct("<I").unpack_from
 _NMT_COMMANDS = {
@@ -33,10 +108,10 @@ _RESET_COMMUNICATION = 130
 class CanopenSlave:
     """Communication part of a simulated device; all times are bus time in seconds.
 
-    The first `advance` boots it. `outbox` is one list for good: whoever sends its frames
-    empties it with `clear()`. A node id stored by LSS wins over `node_id`; 255 starts it
-    unconfigured, with LSS only. `bitrate` is that of the bus; one that LSS set to another does
-    not hear it. Raises DictionaryError when the EDS cannot be served.
+    The first `advance` boots it. `outbox` always stays the same list: the sender of its frames
+    empties it with `clear()`. A node id stored by LSS overrides `node_id`; 255 starts it
+    unconfigured, with LSS only. `bitrate` is that of the bus; a node that LSS set to another rate
+    receives nothing. Raises DictionaryError if the EDS cannot be used.
     """
 
     def __init__(
@@ -53,7 +128,7 @@ class CanopenSlave:
         self.store = store or ParameterStore()
         self.store.check(od)
         self.node_id = self.store.node_id or node_id
-        """Active node id, 255 while unconfigured."""
+        """Active node id; 255 while unconfigured."""
         self.bus_bitrate = bitrate
         self.bitrate = self.store.bitrate or bitrate
         self.nmt_state = NmtState.INITIALISING
@@ -66,7 +141,7 @@ class CanopenSlave:
         self.now = 0.0
         """Bus time of the last call."""
         self.muted = self.bitrate != self.bus_bitrate
-        """Whether it neither sends nor listens: another bit timing, or LSS is switching it."""
+        """Whether it neither sends nor receives: its bit timing differs, or LSS is switching it."""
         self.timers = Timers()
         self.timers.add(self._boot).arm(0.0)
         self._handlers: dict[int, cob_ids.Handler] = {}
@@ -83,7 +158,7 @@ class CanopenSlave:
         self.pdo = PdoService(self)
 
     def receive(self, frame: bytes, now: float) -> None:
-        """Take a frame (16 bytes, struct can_frame) seen on the bus."""
+        """Process a frame (16 bytes, struct can_frame) seen on the bus."""
         self.now = now
         handler = self._handlers.get(_IDENTIFIER(frame)[0])
         if handler is not None:
@@ -92,7 +167,7 @@ class CanopenSlave:
                 self.pdo.offer_events(now)
 
     def advance(self, now: float) -> None:
-        """Run what was due until `now`, and see whether event-driven TPDOs have news."""
+        """Run the timers due until `now`, and check event-driven TPDOs for changes."""
         self.now = now
         if now >= self.timers.next_due:
             self.timers.run(now)
@@ -102,15 +177,15 @@ class CanopenSlave:
             self.pdo.offer_events(now)
 
     def next_event(self) -> float:
-        """Bus time at which `advance` should be called at the latest, math.inf if none."""
+        """Latest bus time at which `advance` must be called; math.inf if none."""
         return self.timers.next_due
 
     def emergency(self, code: int, register_bits: int, vendor: bytes = b"") -> None:
-        """Report an error: EMCY frame, 1001h (bit 0 is added), 1003h; nothing while it stands."""
+        """Report an error: EMCY frame, 1001h (bit 0 is added), 1003h; nothing if it is active."""
         self._emcy.raise_error(code, register_bits, vendor)
 
     def emergency_clear(self, code: int | None = None) -> None:
-        """Take back one error, or all; sends the EMCY error reset if there was any."""
+        """Clear one error, or all; send the EMCY error reset if there was any."""
         self._emcy.clear(code)
 
     def communication_error(self, code: int, vendor: bytes = b"") -> None:
@@ -118,11 +193,11 @@ class CanopenSlave:
         self._emcy.raise_error(code, emcy.COMMUNICATION_BIT, vendor, emcy.COMMUNICATION)
 
     def communication_error_clear(self, code: int) -> None:
-        """Take back an error of the communication; the application may hold it still."""
+        """Clear a communication error; the application may still hold it."""
         self._emcy.clear(code, emcy.COMMUNICATION)
 
     def set_nmt_state(self, state: NmtState) -> None:
-        """Change the NMT state, by command or for a reason of the application's own (6007h)."""
+        """Change the NMT state, by command or because of the application (6007h)."""
         if state == self.nmt_state:
             return
         self.nmt_state = state
@@ -144,7 +219,7 @@ class CanopenSlave:
         self.reset_communication()
 
     def reset_communication(self) -> None:
-        """Restart communication with its power-on values and the node id LSS may have set."""
+        """Restart communication with its power-on values and the node id that LSS may have set."""
         self.set_nmt_state(NmtState.INITIALISING)
         self.node_id = self._lss.pending_node_id
         self.store.load(self.od)
@@ -162,7 +237,7 @@ class CanopenSlave:
         self.set_nmt_state(NmtState.PRE_OPERATIONAL)
 
     def rebuild_handlers(self) -> None:
-        """Work out anew which identifiers are listened to."""
+        """Recompute the identifiers that the node receives."""
         handlers: dict[int, cob_ids.Handler] = {}
         state = self.nmt_state
         if state != NmtState.INITIALISING:
@@ -181,7 +256,7 @@ class CanopenSlave:
         self.accepts = frozenset(identifier & ~RTR_FLAG for identifier in handlers)
 
     def close(self) -> None:
-        """End; nothing is held open."""
+        """End; no file is open."""
 
     def _boot(self, _now: float) -> None:
         self.reset_node()

@@ -6,24 +6,24 @@ import struct
 from binascii import crc_hqx
 from typing import TYPE_CHECKING
 
-from cdpr_sim_bus.canopen import cob_ids
+from cdpr_sim_bus.canopen import slave as cob_ids
 from cdpr_sim_bus.canopen.abort import Abort, SdoAbort
-from cdpr_sim_bus.canopen.slave import Slave
 from cdpr_sim_bus.frame import pack_frame
 
 if TYPE_CHECKING:
-    from cdpr_sim_bus.canopen.dictionary.od import Entry
+    from cdpr_sim_bus.canopen.node import CanopenSlave
+    from cdpr_sim_bus.canopen.od import Entry
 
 
 MAX_TRANSFER_BYTES = 1 << 20
-"""Largest block of data taken in one download."""
+"""Largest amount of data accepted in one download."""
 
 _TOGGLE = 0x10
 _LAST = 0x01
 
 
 class SegmentedUpload:
-    """Upload in segments of 7 bytes, each asked for by the client."""
+    """Upload in segments of 7 bytes; the client requests each."""
 
     def __init__(self, server: SdoServer, entry: Entry, data: bytes) -> None:
         self.index, self.sub = entry.index, entry.sub
@@ -33,7 +33,7 @@ class SegmentedUpload:
         self._toggle = 0
 
     def handles(self, command: int) -> bool:
-        """Take upload segment requests."""
+        """Accept upload segment requests."""
         return command >> 5 == 3
 
     def step(self, data: bytes) -> None:
@@ -62,7 +62,7 @@ class SegmentedDownload:
         self._toggle = 0
 
     def handles(self, command: int) -> bool:
-        """Take download segments."""
+        """Accept download segments."""
         return command >> 5 == 0
 
     def step(self, data: bytes) -> None:
@@ -80,7 +80,7 @@ class SegmentedDownload:
 
 
 def announced_size(entry: Entry, data: bytes, flag: int) -> int | None:
-    """Size a download announces, None when it does not; raises SdoAbort when it cannot fit."""
+    """Return the size that a download announces, or None; raises SdoAbort if it is too large."""
     if not data[0] & flag:
         return None
     size = int.from_bytes(data[4:8], "little")
@@ -91,7 +91,7 @@ def announced_size(entry: Entry, data: bytes, flag: int) -> int | None:
 
 
 def check_size(entry: Entry, received: int, announced: int | None, *, complete: bool) -> None:
-    """Compare what a download brought with what it announced; raises SdoAbort."""
+    """Compare the received length of a download with the announced one; raises SdoAbort."""
     limit = announced if announced is not None else entry.codec.size
     if received > (MAX_TRANSFER_BYTES if limit is None else limit):
         raise SdoAbort(Abort.OUT_OF_MEMORY if limit is None else Abort.LENGTH_TOO_HIGH)
@@ -100,7 +100,7 @@ def check_size(entry: Entry, received: int, announced: int | None, *, complete: 
 
 
 BLOCK_SIZE = 127
-"""Segments in a block that this server asks for in a download."""
+"""Segments per block that this server requests in a download."""
 
 _CRC_SUPPORTED = 0x04
 _LAST_BLOCK = 0x80
@@ -126,11 +126,11 @@ class BlockUpload:
         server.send(_LONG.pack(0xC2 | self._crc, entry.index, entry.sub, len(data)))
 
     def handles(self, command: int) -> bool:
-        """Take the other block upload requests."""
+        """Accept the other block upload requests."""
         return command >> 5 == 5 and command & 0x03 != 0
 
     def step(self, data: bytes) -> None:
-        """Start, continue or end."""
+        """Start, continue or end the transfer."""
         request = data[0] & 0x03
         if request == 3 and self._state == "start":
             self._state = "block"
@@ -184,11 +184,11 @@ class BlockDownload:
         server.send(_LONG.pack(0xA0 | self._crc, entry.index, entry.sub, BLOCK_SIZE))
 
     def handles(self, command: int) -> bool:
-        """Take every frame while segments come, then only the end request."""
+        """Accept every frame while segments arrive, then only the end request."""
         return not self._complete or command & 0xE3 == 0xC1
 
     def step(self, data: bytes) -> None:
-        """Take a segment or the end request."""
+        """Process a segment or the end request."""
         if self._complete:
             self._end(data)
             return
@@ -200,7 +200,7 @@ class BlockDownload:
             self._sequence = number
             self._data += data[1:]
             self._complete = last
-            # The last segment's padding is known only at the end request.
+            # The length of the last segment's padding is known only at the end request.
             check_size(self._entry, len(self._data) - 7, self._size, complete=False)
         if last or number == BLOCK_SIZE:
             self._server.send(bytes([0xA2, self._sequence, BLOCK_SIZE]))
@@ -218,24 +218,24 @@ class BlockDownload:
 
 
 TIMEOUT_S = 5.0
-"""Bus time after which a transfer is aborted when the client keeps silent."""
+"""Bus time after which a transfer is aborted if the client is silent."""
 
 ABORT_COMMAND = 0x80
 _MULTIPLEXER = struct.Struct("<BHB")
 Transfer = SegmentedUpload | SegmentedDownload | BlockUpload | BlockDownload
-"""Of more than one request."""
+"""A transfer of more than one request."""
 
 
 class SdoServer:
-    """The default SDO server; one transfer at a time, a new one displaces the old."""
+    """The default SDO server; one transfer at a time, a new one replaces the old one."""
 
-    def __init__(self, slave: Slave) -> None:
+    def __init__(self, slave: CanopenSlave) -> None:
         self._slave = slave
         self._transfer: Transfer | None = None
         self._timer = slave.timers.add(self._time_out)
 
     def receive(self, frame: bytes, now: float) -> None:
-        """Take a request frame; a frame that is not 8 bytes long is not SDO."""
+        """Process a request frame; a frame that is not 8 bytes long is not SDO."""
         if frame[4] != 8:
             return
         data = frame[8:16]
@@ -266,7 +266,7 @@ class SdoServer:
         self._slave.outbox.append(pack_frame(cob_id, data.ljust(8, b"\x00")))
 
     def write(self, entry: Entry, data: bytes) -> None:
-        """Write what a permitted download carried; raises SdoAbort."""
+        """Write the data of a permitted download; raises SdoAbort."""
         before = entry.value
         entry.write_bytes(data)
         self._slave.stamp.written(entry, before)

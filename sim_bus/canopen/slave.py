@@ -1,17 +1,13 @@
-"""Interfaces between a CANopen slave, its services and its device: timers, callbacks, states."""
+"""Shared parts of a CANopen slave, its services and device: timers, states, callbacks, COB-IDs."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
 from enum import IntEnum
-from typing import Protocol
-
-from cdpr_sim_bus.canopen.dictionary.od import ObjectDictionary
-from cdpr_sim_bus.canopen.dictionary.store import ConfigurationStamp, ParameterStore
 
 _TOLERANCE_S = 1e-9
-"""Bus time is a sum of floats: what is due now may lie this much ahead."""
+"""Bus time is a sum of floats: an event due now may lie this far ahead."""
 
 
 class Timer:
@@ -31,7 +27,7 @@ class Timer:
         timers.next_due = min(timers.next_due, due)
 
     def stop(self) -> None:
-        """Let it not fire."""
+        """Cancel it."""
         self.due = math.inf
 
 
@@ -49,7 +45,7 @@ class Timers:
         return timer
 
     def run(self, now: float) -> None:
-        """Fire what is due at `now` (s)."""
+        """Fire the timers due at `now` (s)."""
         for timer in self._all:
             if timer.due <= now:
                 timer.due = math.inf
@@ -58,7 +54,7 @@ class Timers:
 
 
 class NmtState(IntEnum):
-    """NMT states with the values a heartbeat carries (CiA 301)."""
+    """NMT states with their values in a heartbeat (CiA 301)."""
 
     INITIALISING = 0
     STOPPED = 4
@@ -67,7 +63,7 @@ class NmtState(IntEnum):
 
 
 class SlaveApplication:
-    """Base of a device: override what concerns it. `now` is bus time in seconds.
+    """Base of a device: override the needed methods. `now` is bus time in seconds.
 
     At a SYNC in OPERATIONAL the order is `before_sync`, synchronous RPDOs written into the
     dictionary (hooks of `on_write` run), `after_rpdo`, synchronous TPDOs sampled. In
@@ -78,82 +74,47 @@ class SlaveApplication:
         """Handle a SYNC: latch feedback here."""
 
     def after_rpdo(self, now: float) -> None:
-        """Take new targets: at every SYNC in OPERATIONAL, and after each event-driven RPDO."""
+        """Apply new targets: at every SYNC in OPERATIONAL, and after each event-driven RPDO."""
 
     def on_nmt(self, state: NmtState) -> None:
-        """Learn of a new NMT state (also INITIALISING during a reset)."""
+        """Handle a new NMT state (also INITIALISING during a reset)."""
 
     def on_reset_node(self) -> None:
-        """Restart the application: the dictionary holds its power-on values again."""
+        """Restart the application: the dictionary has its power-on values again."""
 
     def on_heartbeat_lost(self, node: int) -> None:
-        """Learn that a monitored node (1016h) fell silent or restarted."""
+        """Handle the silence or restart of a monitored node (1016h)."""
 
     def on_rpdo_timeout(self, number: int) -> None:
-        """Learn that RPDO `number` (from 1) missed its deadline (1400h:05)."""
+        """Handle a missed deadline (1400h:05) of RPDO `number` (from 1)."""
 
 
-class SyncService(Protocol):
-    """The SYNC consumer as PDOs know it."""
+# COB-IDs of the predefined connection set (CiA 301) and the type of the frame handlers.
 
-    counted: bool
-    """Whether SYNC carries a counter (1019h)."""
+FRAME_HEAD = "<IB3x"
+"""Identifier and length. The kernel's structure is in host order; all supported hosts are little
+endian, so a single `struct` call can pack head and data."""
 
+NMT_COMMAND = 0x000
+EMCY = 0x080
+SDO_RESPONSE = 0x580
+SDO_REQUEST = 0x600
+ERROR_CONTROL = 0x700
+LSS_MASTER = 0x7E5
+LSS_SLAVE = 0x7E4
 
-class PdoTransfers(Protocol):
-    """All PDOs of a node as a single one, and SYNC, know them."""
-
-    window_s: float
-
-    def set_state(self) -> None:
-        """Start or stop with the NMT state."""
-
-    def collect(self) -> None:
-        """Sort the PDOs in use anew."""
-
-    def at_sync(self, now: float, counter: int) -> None:
-        """Handle a SYNC in OPERATIONAL."""
-
-    def report_faults(self) -> None:
-        """Report RPDOs of a wrong length, or take the report back."""
+Handler = Callable[[bytes, float], None]
+"""Processes a frame, given the bus time (s) at which it was seen."""
 
 
-class Slave(Protocol):
-    """A node, of which its services are parts; `cdpr_sim_bus.canopen.node` has the one there is."""
-
-    od: ObjectDictionary
-    app: SlaveApplication
-    store: ParameterStore
-    stamp: ConfigurationStamp
-    timers: Timers
-    node_id: int
-    bus_bitrate: int
-    bitrate: int
-    nmt_state: NmtState
-    sync_period_s: float
-    outbox: list[bytes]
-    now: float
-    muted: bool
-
-    @property
-    def sync(self) -> SyncService:
-        """Its SYNC consumer."""
-
-    @property
-    def pdo(self) -> PdoTransfers:
-        """Its PDOs."""
-
-    def communication_error(self, code: int, vendor: bytes = b"") -> None:
-        """Report an error of the communication itself."""
-
-    def communication_error_clear(self, code: int) -> None:
-        """Take back an error of the communication."""
-
-    def set_nmt_state(self, state: NmtState) -> None:
-        """Change the NMT state."""
-
-    def reset_communication(self) -> None:
-        """Restart communication with its power-on values."""
-
-    def rebuild_handlers(self) -> None:
-        """Work out anew which identifiers are listened to."""
+def is_restricted(identifier: int) -> bool:
+    """Whether CiA 301 reserves an identifier for other services (or it is not an 11-bit one)."""
+    return (
+        identifier > 0x7FF
+        or identifier <= 0x07F
+        or 0x101 <= identifier <= 0x180
+        or 0x581 <= identifier <= 0x5FF
+        or 0x601 <= identifier <= 0x67F
+        or 0x6E0 <= identifier <= 0x6FF
+        or identifier >= 0x701
+    )

@@ -1,17 +1,17 @@
-"""One motor under the drive's firmware: objects of the dictionary in, feedback out."""
+"""One motor under the drive's firmware: reads objects of the dictionary, writes feedback."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
 
-from cdpr_sim_bus.canopen.dictionary.od import ObjectDictionary
+from cdpr_profiles.jit import bound
+from cdpr_sim_bus.canopen.abort import Abort, SdoAbort
+from cdpr_sim_bus.canopen.od import Entry, ObjectDictionary, Value
 from cdpr_sim_bus.cia402.drive_quirks import DriveQuirks
-from cdpr_sim_bus.jit import bound
 from cdpr_sim_bus.robot import servo
 from cdpr_sim_bus.robot.cable_robot import MotorSample, RobotMember
-from cdpr_sim_bus.robot.motor import run
-from cdpr_sim_bus.robot.motor_physics import restart_counter
+from cdpr_sim_bus.robot.motor import INDEX_FELL, INDEX_ROSE, restart_counter, run
 from cdpr_sim_bus.robot.motor_state import (
     MotorRatings,
     Transmission,
@@ -32,7 +32,7 @@ def to_int32(value: int) -> int:
 class Axis:
     """Power stage, inner loops and feedback of one motor.
 
-    Positions here are encoder counts from power-up; `position_offset` leads to those of the
+    Positions here are encoder counts from power-up; `position_offset` converts them to those of the
     dictionary (position actual = counter + offset). Inner loops work in counts; `velocity` reads
     objects in the drive's own unit (see `quirks`).
     """
@@ -62,15 +62,15 @@ class Axis:
         self.kind = servo.OFF
         self.target = 0.0
         self.setpoint: Callable[[], float] | None = None
-        """Gives the target of every step anew, where a mode follows an object."""
+        """Returns the target for every step, if a mode follows an object."""
         self.time = 0.0
         self.flags = 0
         self.cell_off_N = 0.0
-        """What the cable's load cell shows beyond the tension."""
+        """Deviation of the cable's load cell from the tension."""
         self.position_offset = 0
         self._lowest, self._highest = -math.inf, math.inf
         self.clipped = False
-        """Whether a software limit (607Dh) holds the target back."""
+        """Whether a software limit (607Dh) limits the target."""
         self._position = od.entry(0x6064)
         self._torque = od.entry(0x6077)
         self.sample = self._run(0.0)
@@ -102,7 +102,7 @@ class Axis:
         return self.kind, self.target
 
     def drive(self, kind: int, target: float) -> None:
-        """Switch the power stage on under a kind of control (named in `servo`)."""
+        """Switch the power stage on in a kind of control (named in `servo`)."""
         self.kind = kind
         self.target = target
         self.setpoint = None
@@ -113,7 +113,7 @@ class Axis:
         self.drive(servo.OFF, 0.0)
 
     def reboot(self) -> None:
-        """Start as at power-up, the rotor where it stands: an incremental encoder forgets."""
+        """Restart as at power-up, at the same angle: an incremental encoder loses its position."""
         self.switch_off()
         restart_counter(self.motor)
         self.position_offset = 0
@@ -122,18 +122,18 @@ class Axis:
         self.configure()
 
     def jump(self, counts: int) -> None:
-        """Have the encoder miscount once; its index pulse stays where it is on the rotor."""
+        """Make the encoder miscount once; its index pulse keeps its place on the rotor."""
         self.motor["zero"] -= counts
 
     def cut_cable(self) -> bool:
-        """Cut the cable for good; return whether there is one."""
+        """Cut the cable permanently; return whether there is one."""
         if self._robot is not None:
             self._robot.cut()
             return True
         return remove_cable(self.motor)
 
     def slip_cable(self, metres: float) -> bool:
-        """Let so much cable slip through its fastening on the drum; return whether there is one."""
+        """Let a length of cable slip at its fastening on the drum; return whether there is one."""
         if self._robot is not None:
             self._robot.slip(metres)
             return True
@@ -144,15 +144,15 @@ class Axis:
         return float(self.motor[field][0])
 
     def object(self, index: int, sub: int = 0) -> int:
-        """Return an integer object."""
+        """Return the value of an integer object."""
         return self.od.get_int(index, sub)
 
     def velocity(self, index: int, sub: int = 0) -> float:
-        """Return an object that holds a velocity or an acceleration, in counts/s or counts/s²."""
+        """Return the value of a velocity or acceleration object, in counts/s or counts/s²."""
         return self.od.get_int(index, sub) * self.velocity_unit
 
     def configure(self) -> None:
-        """Take limits and windows from the dictionary."""
+        """Read limits and windows from the dictionary."""
         get, m = self.od.get_int, self.motor
         unit = self.quirks.torque_unit_Nm or get(0x6076) * 1e-6
         m["torque_unit"] = unit
@@ -175,7 +175,7 @@ class Axis:
 
     @property
     def speed_limit(self) -> float:
-        """Highest velocity a profile may ask for, counts/s."""
+        """Highest velocity that a profile may request, counts/s."""
         return min(self.velocity(0x607F), self.read("speed_limit"))
 
     def set_ramps(self, acceleration: float, deceleration: float) -> None:
@@ -184,7 +184,7 @@ class Axis:
         self.motor["deceleration"] = min(deceleration, self.velocity(0x60C6))
 
     def set_steps(self) -> None:
-        """Let velocity references act without a ramp."""
+        """Make velocity references act without a ramp."""
         self.motor["acceleration"] = self.motor["deceleration"] = math.inf
 
     def set_torque_slope(self, units_s: float) -> None:
@@ -197,7 +197,7 @@ class Axis:
         self.motor["target_window_time"] = time_s
 
     def clip_position(self, position: float) -> float:
-        """Hold a target position of the dictionary within 607Dh; return it as counter value."""
+        """Limit a target position of the dictionary to 607Dh; return it as counter value."""
         clipped = max(self._lowest, min(self._highest, position))
         self.clipped = clipped != position
         return float(clipped - self.position_offset)
@@ -226,3 +226,109 @@ class Axis:
         for index, getter in dictionary.items():
             if (index, 0) in od:
                 od.on_read(index, 0, getter)
+
+
+# Touch probes (60B8h to 60BDh), both on the encoder's zero pulse.
+
+_ENABLE = 0x01
+_CONTINUOUS = 0x02
+_SOURCE = 0x0C
+_ZERO_PULSE = 0x04
+_SOURCE_OBJECT = 0x08
+_EDGES = 0x30
+_ZERO_PULSE_IN_60D0 = {5, 6}
+_TOGGLES = 0xC0
+_PULSE_EDGES = (
+    (INDEX_ROSE, 0, "rise_count"),
+    (INDEX_FELL, 1, "fall_count"),
+)
+
+
+class TouchProbes:
+    """Latches the position at edges of the zero pulse.
+
+    Low byte of 60B8h: bit 0 enable, bit 1 continuous (else the first event only), bits 3 and 2
+    the source (01 zero pulse, 10 as in 60D0h), bits 4 and 5 the positive and negative edge; high
+    byte the same for probe 2. In 60B9h bit 0 shows enabled, bits 1 and 2 a stored positive and
+    negative edge; bits 6 and 7 of a continuous probe toggle with every positive and negative
+    edge. The positive edge is the beginning of the pulse, in either direction of motion.
+    """
+
+    def __init__(self, axis: Axis) -> None:
+        self._axis = axis
+        self._status: Entry = axis.od.entry(0x60B9)
+        self._latches = [[axis.od.entry(0x60BA + 2 * k + edge) for edge in (0, 1)] for k in (0, 1)]
+        self._function = 0
+        axis.od.on_write(0x60B8, 0, self._command)
+        for sub in (1, 2):
+            if (0x60D0, sub) in axis.od:
+                axis.od.on_write(0x60D0, sub, self._source_writer(sub))
+        self.watching = 0
+        """Flags of `motor.run` that matter now."""
+
+    def reset(self) -> None:
+        """Disable both probes."""
+        self._apply(0)
+
+    def latch(self, edges: int) -> None:
+        """Store the position of the index edges that occurred in the last step."""
+        motor, status = self._axis.motor, int(self._status.value)
+        for bit, edge, field in _PULSE_EDGES:
+            if not edges & bit:
+                continue
+            position = to_int32(int(motor[field][0]) + self._axis.position_offset)
+            for k in (0, 1):
+                setting = self._function >> 8 * k & 0xFF
+                if not setting & _ENABLE or not setting & (0x10 << edge):
+                    continue
+                stored = 0x02 << edge + 8 * k
+                if setting & _CONTINUOUS:
+                    status ^= 0x40 << edge + 8 * k
+                elif status & stored:
+                    continue
+                status |= stored
+                self._latches[k][edge].value = position
+        self._status.value = status
+
+    def _command(self, value: Value) -> None:
+        function = int(value)
+        if function == self._function:
+            return
+        for k in (0, 1):
+            setting = function >> 8 * k & 0xFF
+            if setting & _ENABLE and not self._uses_pulse(k, setting):
+                raise SdoAbort(Abort.INVALID_VALUE)
+        self._apply(function)
+
+    def _uses_pulse(self, k: int, setting: int) -> bool:
+        source = setting & _SOURCE
+        if source == _SOURCE_OBJECT:
+            return self._axis.od.get_int(0x60D0, k + 1, 0) in _ZERO_PULSE_IN_60D0
+        return source == _ZERO_PULSE
+
+    def _apply(self, function: int) -> None:
+        status, watching = int(self._status.value), 0
+        for k in (0, 1):
+            new, old = function >> 8 * k & 0xFF, self._function >> 8 * k & 0xFF
+            if not new & _ENABLE:
+                status &= ~(0xFF << 8 * k)
+                continue
+            # Removing an edge from the function, or enabling the probe, arms that edge again.
+            going_on = old & new & _EDGES if old & _ENABLE else 0
+            kept = going_on >> 3 | (_TOGGLES if going_on else 0)
+            status = status & ~((0xFF & ~kept) << 8 * k) | _ENABLE << 8 * k
+            watching |= self._edges(new)
+        self._status.value = status
+        self._function = function
+        self.watching = watching
+
+    @staticmethod
+    def _edges(setting: int) -> int:
+        return (INDEX_ROSE if setting & 0x10 else 0) | (INDEX_FELL if setting & 0x20 else 0)
+
+    def _source_writer(self, sub: int) -> Callable[[Value], None]:
+        def write(_value: Value) -> None:
+            if self._function >> 8 * (sub - 1) & _ENABLE:
+                raise SdoAbort(Abort.DEVICE_STATE)
+
+        return write

@@ -10,18 +10,12 @@ from typing import Any, Protocol, Self
 from typing_extensions import override
 
 from cdpr_profiles.winch import Winch
-from cdpr_sim_bus.canopen import (
-    Abort,
-    CanopenSlave,
-    Entry,
-    NmtState,
-    ObjectDictionary,
-    ParameterStore,
-    SdoAbort,
-    SlaveApplication,
-)
-from cdpr_sim_bus.canopen.dictionary.datatypes import Value
-from cdpr_sim_bus.cia402.axis import Axis
+from cdpr_sim_bus.canopen.abort import Abort, SdoAbort
+from cdpr_sim_bus.canopen.node import CanopenSlave
+from cdpr_sim_bus.canopen.od import Entry, ObjectDictionary, Value
+from cdpr_sim_bus.canopen.slave import NmtState, SlaveApplication
+from cdpr_sim_bus.canopen.store import ParameterStore
+from cdpr_sim_bus.cia402.axis import Axis, TouchProbes
 from cdpr_sim_bus.cia402.drive_quirks import (
     IN_ACCELERATION_UNITS,
     IN_VELOCITY_UNITS,
@@ -29,23 +23,201 @@ from cdpr_sim_bus.cia402.drive_quirks import (
     add_missing_objects,
     quirks_of,
 )
-from cdpr_sim_bus.cia402.fault_injection import FaultInjection
-from cdpr_sim_bus.cia402.homing import IN_PLACE, METHODS
+from cdpr_sim_bus.cia402.modes import IN_PLACE, METHODS
 from cdpr_sim_bus.cia402.state_machine import StateMachine
-from cdpr_sim_bus.cia402.touch_probe import TouchProbes
 from cdpr_sim_bus.cia402.words import ErrorCode
+from cdpr_sim_bus.frame import pack_frame
 from cdpr_sim_bus.physics_board import BoardAxis
 from cdpr_sim_bus.robot import servo
 from cdpr_sim_bus.robot.cable_robot import RobotMember
-from cdpr_sim_bus.robot.logs.truth_log import NO_SYNC, TruthLog
 from cdpr_sim_bus.robot.motor_state import MotorRatings, Transmission
 from cdpr_sim_bus.robot.plant import Plant
+from cdpr_sim_bus.robot.truth_log import NO_SYNC, TruthLog
+
+# Fault injection through object 2F00h, to test a master's reactions over the bus.
+
+_RAISE_FAULT, _DROP_TPDOS, _REFUSE_MODES, _SHOW_MODE, _MUTE_HEARTBEAT = 1, 2, 3, 4, 5
+_FALL_SILENT, _DOUBLE_TPDOS, _DELAY_TPDOS, _BABBLE, _VANISH_IN_SDO = 6, 7, 8, 9, 10
+_JUMP, _CUT_CABLE, _SLIP, _CELL_OFF = 11, 12, 13, 14
+_COUNTED = (_DROP_TPDOS, _DOUBLE_TPDOS, _DELAY_TPDOS, _VANISH_IN_SDO)
+_DEFAULT_TPDO = (0x180, 0x280, 0x380, 0x480)
+_ERROR_CONTROL, _SDO_ANSWER, _EMCY = 0x700, 0x580, 0x080
+_FUNCTION, _NODE = 0x780, 0x07F
+_FOR_GOOD_MS = 0xFFFF
+_BABBLE_FRAME = b"\x00\xff\x81BABBL"
+"""EMCY FF00h (device specific)."""
+
+
+class FaultInjection:
+    """Object 2F00h, which real drives do not have; an EDS may lack all or part of it."""
+
+    def __init__(
+        self, od: ObjectDictionary, state_machine: StateMachine, outbox: list[bytes]
+    ) -> None:
+        self._od = od
+        self._state_machine = state_machine
+        self._axis = state_machine.axis
+        self._outbox = outbox
+        self._left = dict.fromkeys(_COUNTED, 0)
+        """Remaining number of frames that each counted fault affects."""
+        self._late: list[bytes] = []
+        self._muted = False
+        self._babble = 0
+        self._last_babble_ms = 0
+        self._now = 0.0
+        self._silent_until = 0.0
+        self._silence_ms = _FOR_GOOD_MS
+        self.active = False
+        """Whether frames of the outbox must be altered."""
+        writers: dict[int, Callable[[Any], None]] = {
+            _RAISE_FAULT: self._raise_fault,
+            _REFUSE_MODES: self._refuse_modes,
+            _SHOW_MODE: self._show_mode,
+            _MUTE_HEARTBEAT: self._mute,
+            _FALL_SILENT: self._silence_after_the_answer,
+            _BABBLE: self._set_babble,
+            _JUMP: lambda counts: self._axis.jump(int(counts)),
+            _CUT_CABLE: self._cut_cable,
+            _SLIP: self._slip,
+            _CELL_OFF: self._set_cell_off,
+        }
+        writers |= {sub: self._counter(sub) for sub in _COUNTED}
+        for sub, writer in writers.items():
+            if (0x2F00, sub) in od:
+                od.on_write(0x2F00, sub, writer)
+
+    def reset(self) -> None:
+        """End all faults."""
+        self._left = dict.fromkeys(_COUNTED, 0)
+        self._late.clear()
+        self._muted = False
+        self._babble = 0
+        self._refuse_modes(0)
+        self._show_mode(0)
+        self._update_active()
+
+    def is_silent(self, now: float) -> bool:
+        """Return whether the drive neither receives nor sends at bus time `now`."""
+        return now < self._silent_until
+
+    def alter_outbox(self, now: float) -> None:
+        """Drop, delay, double or add frames of the outbox, as the active faults require."""
+        self._now = now
+        if now < self._silent_until:
+            self._outbox.clear()
+            return
+        self._do_babble()
+        frames, late = list(self._outbox), self._late
+        self._outbox.clear()
+        for frame in frames:
+            if late and _is_tpdo(frame):
+                # the delayed frame comes before the one that is on time
+                self._outbox += late
+                late.clear()
+            self._filter_frame(frame)
+        for sub, count in self._left.items():
+            if (0x2F00, sub) in self._od:
+                self._od.set(0x2F00, sub, count)
+        self._update_active()
+
+    def _filter_frame(self, frame: bytes) -> None:
+        identifier = int.from_bytes(frame[:4], "little")
+        if self._muted and identifier & _FUNCTION == _ERROR_CONTROL:
+            return
+        if identifier & _FUNCTION == _SDO_ANSWER and self._consume(_VANISH_IN_SDO):
+            if not self._left[_VANISH_IN_SDO]:
+                self._fall_silent()
+        elif _is_tpdo(frame):
+            if self._consume(_DROP_TPDOS):
+                return
+            if self._consume(_DELAY_TPDOS):
+                self._late.append(frame)
+                return
+            if self._consume(_DOUBLE_TPDOS):
+                self._outbox.append(frame)
+        self._outbox.append(frame)
+
+    def _consume(self, sub: int) -> bool:
+        if not self._left[sub]:
+            return False
+        self._left[sub] -= 1
+        return True
+
+    def _do_babble(self) -> None:
+        ms = int(self._now * 1e3)
+        if self._babble and ms != self._last_babble_ms:
+            self._last_babble_ms = ms
+            node_id = self._od.get_int(0x1014, 0, _EMCY) & _NODE
+            self._outbox += [pack_frame(_EMCY + node_id, _BABBLE_FRAME)] * self._babble
+
+    def _update_active(self) -> None:
+        self.active = bool(
+            any(self._left.values())
+            or self._late
+            or self._muted
+            or self._babble
+            or self._now < self._silent_until
+        )
+
+    def _counter(self, sub: int) -> Callable[[Value], None]:
+        def set_count(count: Value) -> None:
+            self._left[sub] = int(count)
+            if count and sub == _VANISH_IN_SDO:
+                self._left[sub] += 1  # the answer to the SDO request itself is not affected
+                self._silence_ms = _FOR_GOOD_MS
+            self._update_active()
+
+        return set_count
+
+    def _raise_fault(self, code: Value) -> None:
+        if code:
+            self._state_machine.trip(int(code))
+
+    def _cut_cable(self, cut: Value) -> None:
+        if cut and not self._axis.cut_cable():
+            raise SdoAbort(Abort.HARDWARE_ERROR)
+
+    def _slip(self, millimetres: Value) -> None:
+        if millimetres and not self._axis.slip_cable(int(millimetres) * 1e-3):
+            raise SdoAbort(Abort.HARDWARE_ERROR)
+
+    def _set_cell_off(self, newton: Value) -> None:
+        self._axis.cell_off_N = float(newton)
+
+    def _mute(self, on: Value) -> None:
+        self._muted = bool(on)
+        self._update_active()
+
+    def _set_babble(self, frames_per_ms: Value) -> None:
+        self._babble = int(frames_per_ms)
+        self._update_active()
+
+    def _silence_after_the_answer(self, ms: Value) -> None:
+        self._silence_ms = int(ms)
+        self._left[_VANISH_IN_SDO] = 1
+        self._update_active()
+
+    def _fall_silent(self) -> None:
+        ms = self._silence_ms
+        self._silent_until = self._now + (math.inf if ms == _FOR_GOOD_MS else ms * 1e-3)
+
+    def _refuse_modes(self, how: Value) -> None:
+        self._state_machine.ignore_modes = int(how)
+
+    def _show_mode(self, mode: Value) -> None:
+        self._state_machine.displayed_mode = int(mode)
+        self._state_machine.update()
+
+
+def _is_tpdo(frame: bytes) -> bool:
+    return int.from_bytes(frame[:4], "little") & _FUNCTION in _DEFAULT_TPDO
+
 
 TICK_S = 1e-3
 """Longest step between two ticks of the state machine."""
 _IDLE_STEP_S = 0.1
 _LOG_STEP_S = 0.02
-"""Bus time without SYNC after which a record is due all the same."""
+"""Bus time without SYNC after which a record is written anyway."""
 _SYNC_ID = b"\x80\x00\x00\x00"
 _EDS_COUNTS_PER_TURN = 8192
 
@@ -63,16 +235,16 @@ _POSITIONS = ((0x6065, 0), (0x6067, 0), (0x6092, 1))
 
 
 class MotionLog(Protocol):
-    """Takes a record at every SYNC, and at intervals without one."""
+    """Stores a record at every SYNC, and at intervals without SYNC."""
 
     def append(self, sync_index: int, time_s: float, truth: tuple[float, ...]) -> None:
-        """Append the true figures at the end of a `motor.Sample`; `sync_index` may be NO_SYNC."""
+        """Append the true values at the end of a `motor.Sample`; `sync_index` may be NO_SYNC."""
 
     def flush(self) -> None:
-        """Write what is buffered."""
+        """Write the buffered records."""
 
     def close(self) -> None:
-        """Write the rest; nothing follows."""
+        """Write the remaining records; nothing follows."""
 
 
 class SimDrive(SlaveApplication):
@@ -94,9 +266,9 @@ class SimDrive(SlaveApplication):
     ) -> None:
         """Build the drive, switched on at bus time 0.
 
-        `truth_log` and `store` (what 1010h and LSS keep) are files to write; `serial` is 1018h:4
-        where it is not the EDS's; `robot` is what its motor moves together with others. Raises
-        DictionaryError for an EDS that lacks objects, StoreError for a damaged store, OSError when
+        `truth_log` and `store` (memory of 1010h and LSS) are files to write; `serial` is 1018h:4
+        if it differs from the EDS; `robot` is what its motor moves together with others. Raises
+        DictionaryError if the EDS lacks objects, StoreError if the store is damaged, OSError if
         the truth log cannot be created.
         """
         ratings = ratings or MotorRatings()
@@ -136,7 +308,7 @@ class SimDrive(SlaveApplication):
         serial: int | None = None,
         robot: RobotMember | None = None,
     ) -> Self:
-        """Build the drive of a winch's profile, which also fills in what `plant` leaves out."""
+        """Build the drive of a winch's profile, which also provides values that `plant` omits."""
         motor = winch.motor
         ratings = MotorRatings(
             rated_torque_Nm=motor.rated_torque_Nm,
@@ -160,11 +332,11 @@ class SimDrive(SlaveApplication):
         )
 
     def record_with(self, log: MotionLog) -> None:
-        """Use `log` instead of a truth log; it is closed with the drive."""
+        """Use `log` instead of a truth log; it is closed together with the drive."""
         self._log = log
 
     def connect(self, board: BoardAxis) -> None:
-        """Share the physics: write the truth to the board, take power and brake from there."""
+        """Share the physics: write the truth to the board, read power and brake from it."""
         self._board = BoardLink(self.axis, self.state_machine, board)
 
     # -- LocalNode
@@ -176,12 +348,12 @@ class SimDrive(SlaveApplication):
 
     @property
     def sync_period_s(self) -> float:
-        """Communication cycle period (1006h), 0 while not set."""
+        """Communication cycle period (1006h); 0 while not set."""
         return self._slave.sync_period_s
 
     @property
     def accepts(self) -> frozenset[int]:
-        """Identifiers the drive listens to."""
+        """Identifiers that the drive receives."""
         return self._slave.accepts
 
     def advance(self, now: float) -> None:
@@ -207,7 +379,7 @@ class SimDrive(SlaveApplication):
             self.fault_injection.alter_outbox(now)
 
     def receive(self, frame: bytes, now: float) -> None:
-        """Take a frame seen on the bus."""
+        """Process a frame seen on the bus."""
         if frame[:4] == _SYNC_ID:
             if self._log is not None:
                 self._log.append(self.sync_count, now, self.axis.sample[4:])
@@ -221,7 +393,7 @@ class SimDrive(SlaveApplication):
             self.fault_injection.alter_outbox(now)
 
     def next_event(self) -> float:
-        """Return the bus time at which `advance` is due at the latest."""
+        """Return the latest bus time at which `advance` is due."""
         axis = self.axis
         active = axis.kind != servo.OFF or abs(axis.sample[5]) >= 1e-3
         if active or self.state_machine.needs_tick(axis.flags):
@@ -239,34 +411,35 @@ class SimDrive(SlaveApplication):
         if self._log is not None:
             self._log.close()
 
-    # -- what the slave tells
+    # -- callbacks of the slave
 
     @override
     def after_rpdo(self, now: float) -> None:
-        """Take the set-points of a new cycle."""
+        """Apply the set-points of a new cycle."""
         self.state_machine.sync()
 
     @override
     def on_nmt(self, state: NmtState) -> None:
         """React to the loss of control by the master."""
-        if state in (NmtState.STOPPED, NmtState.INITIALISING):
+        left = state is NmtState.PRE_OPERATIONAL and self.axis.plant.drive.off_when_pre_operational
+        if left or state in (NmtState.STOPPED, NmtState.INITIALISING):
             self.state_machine.abort_connection(ErrorCode.COMMUNICATION)
 
     @override
     def on_reset_node(self) -> None:
-        """Reboot: the rotor stays where it is, the counter starts again."""
+        """Reboot: the rotor does not move, the counter starts again."""
         self.fault_injection.reset()
         self.probes.reset()
         self.state_machine.restart()
 
     @override
     def on_heartbeat_lost(self, node: int) -> None:
-        """React to a silent master as 6007h says."""
+        """React to a silent master as 6007h specifies."""
         self.state_machine.abort_connection(ErrorCode.HEARTBEAT)
 
     @override
     def on_rpdo_timeout(self, number: int) -> None:
-        """React to missing commands as 6007h says."""
+        """React to missing commands as 6007h specifies."""
         self.state_machine.abort_connection(ErrorCode.RPDO_TIMEOUT)
 
     # -- objects
@@ -289,7 +462,7 @@ class SimDrive(SlaveApplication):
 
 
 def transmission_of(winch: Winch) -> Transmission:
-    """Return what leads from a winch's motor to its cable, by its profile."""
+    """Return the transmission from a winch's motor to its cable, from its profile."""
     cable = winch.cable
     return Transmission(
         winch.cable_m_per_motor_rad, cable.stiffness_N, winch.gear_ratio, cable.damping_s
@@ -309,7 +482,7 @@ def _fixed(entry: Entry) -> Callable[[Value], None]:
 
 
 def _adapt(od: ObjectDictionary, quirks: DriveQuirks, plant: Plant, ratings: MotorRatings) -> None:
-    """Give the dictionary the defaults that follow from motor and encoder."""
+    """Set the defaults of the dictionary that follow from motor and encoder."""
     counts = plant.encoder.counts_per_turn
     rates = () if quirks.velocity_in_rpm else IN_VELOCITY_UNITS + IN_ACCELERATION_UNITS
     for index, sub in (*_POSITIONS, *rates):
@@ -331,7 +504,7 @@ def _default(entry: Entry, value: int) -> None:
 
 
 class BoardLink:
-    """Publishes one drive's true state on the board and applies what other devices write there."""
+    """Publishes one drive's true state on the board and applies other devices' inputs."""
 
     def __init__(self, axis: Axis, state_machine: StateMachine, board: BoardAxis) -> None:
         self._axis = axis
@@ -346,7 +519,7 @@ class BoardLink:
         self.publish()
 
     def apply_inputs(self, now_s: float) -> None:
-        """Take power, brake and mass as the board has them at bus time `now_s`."""
+        """Apply power, brake and mass from the board at bus time `now_s`."""
         board = self._board
         self._applied_s = now_s
         power, released = board.allows_power(now_s), board.releases_brake(now_s)
@@ -364,7 +537,7 @@ class BoardLink:
         return self._board.next_change_s(self._applied_s)
 
     def publish(self) -> None:
-        """Write tension and motion as they are now."""
+        """Write the present tension and motion."""
         axis = self._axis
         angle, speed = axis.sample[4], axis.sample[5]
         self._power_on = axis.kind != servo.OFF
@@ -372,6 +545,6 @@ class BoardLink:
         self._board.publish(axis.time, shown_N, angle, speed, self._power_on)
 
     def publish_power(self) -> None:
-        """Publish where power has changed, as bus time may stand still for long afterwards."""
+        """Publish a change of power now, because bus time may then stand still for long."""
         if self._power_on != (self._axis.kind != servo.OFF):
             self.publish()

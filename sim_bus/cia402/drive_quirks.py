@@ -1,7 +1,7 @@
-"""Quirks of the simulated drives: where each maker's firmware departs from CiA 402.
+"""Quirks of the simulated drives: deviations of each maker's firmware from CiA 402.
 
-Chosen by the drive's identity (1018h), and independent of the profiles that a master reads, so that
-an error in a profile shows on the bus.
+They are chosen by the drive's identity (1018h), independently of the profiles that a master reads,
+so that an error in a profile shows on the bus.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from pathlib import Path
 
 import cdpr_profiles
 from cdpr_sim_bus.canopen.abort import Abort, SdoAbort
-from cdpr_sim_bus.canopen.dictionary.od import APPLICATION, Entry, ObjectDictionary
+from cdpr_sim_bus.canopen.od import APPLICATION, Entry, ObjectDictionary
 from cdpr_sim_bus.cia402.words import ModeNumber
 
 _STANDARD_EDS = Path(cdpr_profiles.__file__).parent / "drives" / "generic-cia402.eds"
@@ -33,9 +33,9 @@ class ModeChange(Enum):
 
     ANY_TIME = auto()
     NOT_ENABLED = auto()
-    """Refuses 6060h while enabled."""
+    """Rejects 6060h while enabled."""
     HALTED = auto()
-    """Refuses it while enabled, and ignores it unless the controlword's halt bit is set."""
+    """Rejects it while enabled, and ignores it unless the controlword's halt bit is set."""
 
 
 @dataclass(frozen=True)
@@ -49,29 +49,29 @@ class DriveQuirks:
     modes: frozenset[int] | None = None
     """Modes of operation; None: those of 6502h."""
     homing_methods: frozenset[int] | None = None
-    """None: all that the firmware knows."""
+    """None: all methods of the firmware."""
     mode_change: ModeChange = ModeChange.ANY_TIME
     homing_reversed: bool = False
-    """Each homing method goes the other way than the standard has it."""
+    """Each homing method moves in the direction opposite to the standard."""
     bit_10_in_homing: bool = True
-    """Target reached is shown in homing mode; else bit 12 comes once the motor stands."""
+    """Target reached is shown in homing mode; else bit 12 is set when the motor stands."""
     statusword_set: int = 0
     """Bits that are always set."""
     statusword_clear: int = 0
     """Bits that are never set."""
     mode_display_delay_s: float = 0.0
-    """Least time from a write to 6060h until 6061h shows the mode."""
+    """Minimum time from a write to 6060h until 6061h shows the mode."""
     enable_delay_s: float = 0.0
-    """Least time from the command to enable operation until the state is reached."""
+    """Minimum time from the enable operation command until the state is reached."""
 
     def supported_modes(self, announced: int) -> frozenset[int]:
-        """Return the modes that 6060h may be set to, 0 (no mode) included."""
+        """Return the modes to which 6060h may be set, including 0 (no mode)."""
         if self.modes is not None:
             return self.modes | {0}
         return frozenset({0}) | {n for n in ModeNumber if n and announced >> n - 1 & 1}
 
     def accepts_mode(self, enabled: bool, halted: bool) -> bool:
-        """Return whether a write to 6060h counts now; raises SdoAbort when it is refused."""
+        """Return whether a write to 6060h takes effect now; raises SdoAbort if it is rejected."""
         if self.mode_change is ModeChange.ANY_TIME:
             return True
         if enabled:

@@ -6,11 +6,11 @@ import math
 from typing import Any
 
 from cdpr_sim_bus.canopen.abort import Abort, SdoAbort
-from cdpr_sim_bus.canopen.dictionary.datatypes import Value
+from cdpr_sim_bus.canopen.node import CanopenSlave
+from cdpr_sim_bus.canopen.od import Value
 from cdpr_sim_bus.cia402 import modes
 from cdpr_sim_bus.cia402.axis import Axis
-from cdpr_sim_bus.cia402.homing import Homing
-from cdpr_sim_bus.cia402.modes import Mode
+from cdpr_sim_bus.cia402.modes import Homing, Mode
 from cdpr_sim_bus.cia402.words import (
     ALWAYS_WATCHED,
     FAULT_RESET,
@@ -23,7 +23,6 @@ from cdpr_sim_bus.cia402.words import (
     VOLTAGE_ENABLED,
     WARNING,
     ErrorCode,
-    ErrorReporter,
     ModeNumber,
     State,
     error_register_bits,
@@ -31,9 +30,9 @@ from cdpr_sim_bus.cia402.words import (
 from cdpr_sim_bus.robot import servo
 
 BOOT_S = 0.002
-"""From power-up until the drive can be switched on."""
+"""Time from power-up until the drive can be switched on."""
 _REACTION_LIMIT_S = 2.0
-"""A fault reaction that cannot bring the motor to rest ends after this time."""
+"""Time after which a fault reaction ends even if the motor is not at rest."""
 _COASTING = (
     State.NOT_READY_TO_SWITCH_ON,
     State.SWITCH_ON_DISABLED,
@@ -47,10 +46,10 @@ class StateMachine:
     """State machine of one drive.
 
     `command` is the hook of the controlword; `tick` follows every step of the axis for which
-    `needs_tick` says so. Both leave the statusword in the dictionary.
+    `needs_tick` returns true. Both write the statusword to the dictionary.
     """
 
-    def __init__(self, axis: Axis, reporter: ErrorReporter) -> None:
+    def __init__(self, axis: Axis, slave: CanopenSlave) -> None:
         od = axis.od
         self.axis = axis
         self.state = State.NOT_READY_TO_SWITCH_ON
@@ -70,14 +69,14 @@ class StateMachine:
         }
         self.mode = self._modes[ModeNumber.NONE]
         self.ignore_modes = 0
-        """Fault injection: 1 refuses every mode change, 2 accepts it and never makes it."""
+        """Fault injection: 1 rejects every mode change, 2 accepts it but never changes the mode."""
         self.displayed_mode = 0
-        """Fault injection: mode displayed in place of the real one, 0 for none."""
+        """Fault injection: mode displayed instead of the real one; 0 for none."""
         self.configuration_changed = True
         """Whether limits, windows or ramps of the dictionary have changed."""
         self.power_allowed = True
-        """Whether the safe-torque-off input lets the power stage work."""
-        self._reporter = reporter
+        """Whether the safe-torque-off input enables the power stage."""
+        self._slave = slave
         self._quirks = axis.quirks
         plant = axis.plant.drive
         self._mode_delay_s = max(plant.mode_display_delay_s, axis.quirks.mode_display_delay_s)
@@ -91,7 +90,7 @@ class StateMachine:
         od.on_write(0x6060, 0, self.request_mode)
 
     def restart(self) -> None:
-        """Start as at power-up."""
+        """Restart as at power-up."""
         self.word = 0
         self._halted = False
         self._stop_to: State | None = None
@@ -112,7 +111,7 @@ class StateMachine:
     # -- controlword
 
     def command(self, value: Value) -> None:
-        """Take a controlword."""
+        """Process a controlword."""
         word: Any = value
         if word == self.word:
             return
@@ -223,7 +222,7 @@ class StateMachine:
             self.mode.resume()
 
     def _brake(self, option: int) -> None:
-        """Bring the motor to rest: 1 slow-down ramp, 2 quick-stop ramp, 3 and 4 at the limit."""
+        """Brake to rest: 1 slow-down ramp, 2 quick-stop ramp, 3 and 4 at the limit."""
         axis = self.axis
         if option == 1 and self.mode.torque_mode:
             axis.set_torque_slope(axis.object(0x6087))
@@ -242,7 +241,7 @@ class StateMachine:
     # -- modes
 
     def request_mode(self, value: Value) -> None:
-        """Take a mode of operation; raises SdoAbort for one the drive does not support."""
+        """Request a mode of operation; raises SdoAbort if the drive does not support it."""
         number: Any = value
         if number == self._requested_mode:
             return
@@ -265,7 +264,7 @@ class StateMachine:
     # -- faults
 
     def trip(self, code: int, *, severe: bool = False) -> None:
-        """Raise a fault; a severe one takes the power off at once, whatever 605Eh says."""
+        """Raise a fault; a severe one cuts the power immediately, regardless of 605Eh."""
         if self.state in (State.FAULT, State.FAULT_REACTION_ACTIVE):
             return
         self._fault_code = code
@@ -278,11 +277,11 @@ class StateMachine:
             self._brake(option)
             self._stop_to = State.FAULT
             self._reaction_due = self.axis.time + _REACTION_LIMIT_S
-        self._reporter.emergency(code, error_register_bits(code))
+        self._slave.emergency(code, error_register_bits(code))
         self.update()
 
     def abort_connection(self, code: int) -> None:
-        """React to a lost master as 6007h says, while operation is enabled."""
+        """React to a lost master as 6007h specifies, while operation is enabled."""
         if self.state is not State.OPERATION_ENABLED:
             return
         option = self.axis.object(0x6007)
@@ -292,9 +291,9 @@ class StateMachine:
             self.command(0x0000 if option == 2 else 0x0002)
 
     def allow_power(self, allowed: bool) -> None:
-        """Follow the safe-torque-off input: without power the torque is off at once.
+        """Follow the safe-torque-off input: if it removes the power, the torque is off immediately.
 
-        A drive that was enabled goes to fault; one that was not cannot be made ready meanwhile.
+        A drive that was enabled goes to fault; one that was not cannot become ready until then.
         """
         self.power_allowed = allowed
         if allowed:
@@ -313,7 +312,7 @@ class StateMachine:
             return
         self._enter(State.SWITCH_ON_DISABLED)
         self._error.value = 0
-        self._reporter.emergency_clear(self._fault_code)
+        self._slave.emergency_clear(self._fault_code)
 
     # -- time
 
@@ -327,7 +326,7 @@ class StateMachine:
         )
 
     def tick(self) -> None:
-        """Act on the step that has just ended."""
+        """Evaluate the step that has just ended."""
         if self.configuration_changed:
             self._reconfigure()
         now, flags = self.axis.time + 1e-9, self.axis.flags
@@ -363,7 +362,7 @@ class StateMachine:
         return flags & both == both
 
     def sync(self) -> None:
-        """Take the set-points of a new cycle, where the mode is a cyclic one."""
+        """Apply the set-points of a new cycle, if the mode is a cyclic one."""
         if self.mode.cyclic and self._running:
             self.mode.sync()
 
@@ -372,7 +371,7 @@ class StateMachine:
         return self.state is State.OPERATION_ENABLED and self._stop_to is None and not self._halted
 
     def update(self) -> None:
-        """Set statusword and mode display, and the flags that the next steps are watched for."""
+        """Set statusword and mode display, and the flags to watch for in the next steps."""
         flags = self.axis.flags
         word = self.state | REMOTE | (VOLTAGE_ENABLED if self.power_allowed else 0)
         if flags & servo.I2T_WARNING:

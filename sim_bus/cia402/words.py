@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from enum import IntEnum
-from typing import Protocol
 
 from cdpr_sim_bus.robot import servo
 
 
 class State(IntEnum):
-    """States of the drive; the value is what the state contributes to the statusword."""
+    """States of the drive; the value is the state's part of the statusword."""
 
     NOT_READY_TO_SWITCH_ON = 0x00
     SWITCH_ON_DISABLED = 0x40
@@ -42,7 +41,7 @@ HALT = 1 << 8
 
 
 class ModeNumber(IntEnum):
-    """Modes of operation (6060h) that this drive knows."""
+    """Modes of operation (6060h) that this drive has."""
 
     NONE = 0
     PROFILE_POSITION = 1
@@ -55,7 +54,7 @@ class ModeNumber(IntEnum):
 
 
 class ErrorCode(IntEnum):
-    """Error codes (603Fh, EMCY) that this drive raises by itself."""
+    """Error codes (603Fh, EMCY) that this drive raises."""
 
     OVERCURRENT = 0x2310
     LOAD_LEVEL = 0x2350
@@ -90,15 +89,5 @@ FAULTS = (
     (servo.FOLLOWING_ERROR, ErrorCode.FOLLOWING_ERROR, False),
 )
 LASTING = servo.OVERCURRENT | servo.OVERSPEED | servo.I2T_WARNING
-"""What refuses a fault reset; an overload must have cooled down to below the warning."""
+"""Flags that prevent a fault reset; an overload must have cooled below the warning."""
 ALWAYS_WATCHED = LASTING | servo.I2T_TRIP | servo.FOLLOWING_ERROR
-
-
-class ErrorReporter(Protocol):
-    """Interface through which the state machine reports errors."""
-
-    def emergency(self, code: int, register_bits: int) -> None:
-        """Report an error."""
-
-    def emergency_clear(self, code: int | None = None) -> None:
-        """Take an error back."""

@@ -1,6 +1,6 @@
-"""Real Modbus servers for simulated devices: TCP, and RTU behind a pseudo-terminal.
+"""Real Modbus servers for simulated devices: TCP, and RTU on a pseudo-terminal.
 
-The first has a panel for buttons and faults, the second stands in for a serial adapter.
+The TCP server has a panel for buttons and faults; the RTU server replaces a serial adapter.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ _STEP_S = 0.002
 _UNIT_AT = 6
 _PANEL_UNITS = (247, 246)
 END_OF_ANSWER = bytes.fromhex("0000 ffff 0002 0000")
-"""Sent by devices in lockstep where an answer is missing or cut off: nothing more will come."""
+"""Sent by devices in lockstep if an answer is missing or cut off: nothing more will come."""
 
 
 class AnswerFaults:
@@ -43,7 +43,7 @@ class AnswerFaults:
         self.wrong_unit = False
 
     def corrupt(self, sending: bool, data: bytes) -> bytes:
-        """Return the bytes that go out in place of an answer."""
+        """Return the bytes to send instead of an answer."""
         ours = len(data) > _UNIT_AT and (data[_UNIT_AT] == self._unit or not self._unit)
         if not sending or not ours or data[_UNIT_AT] in _PANEL_UNITS:
             return data
@@ -58,7 +58,7 @@ class Panel:
     """Holding registers of a separate unit, to press buttons and inject faults."""
 
     def __init__(self, unit: int, registers: dict[int, Callable[[int], None]]) -> None:
-        """Offer `registers`: what is called with the value written to each address from 0 on."""
+        """Provide `registers`: functions called with the value written to addresses from 0 on."""
         self.unit = _PANEL_UNITS[0] if unit != _PANEL_UNITS[0] else _PANEL_UNITS[1]
         self._registers = registers
 
@@ -98,18 +98,13 @@ async def serve_units(
     details: dict[str, Any],
     until_stdin_ends: bool,
 ) -> None:
-    """Serve `units` on 127.0.0.1:port (0: any that is free) until SIGTERM or SIGINT.
+    """Serve `units` on 127.0.0.1:port (0: any free port) until SIGTERM or SIGINT.
 
-    `step` is called every 2 ms, where there is one. When all is up, one line of JSON goes to
-    standard output: {"ready": {"host", "port", "pid", and `details`}}. Raises BusSetupError for a
-    port in use.
+    `step`, if given, is called every 2 ms. When everything is ready, one line of JSON goes to
+    standard output: {"ready": {"host", "port", "pid", and `details`}}. Raises BusSetupError if the
+    port is in use.
     """
-    loop = asyncio.get_running_loop()
-    ended = asyncio.Event()
-    for number in (signal.SIGINT, signal.SIGTERM):
-        loop.add_signal_handler(number, ended.set)
-    if until_stdin_ends:
-        _end_with_stdin(loop, ended)
+    ended = _end_event(until_stdin_ends)
     if not any(unit.id == 0 for unit in units):
         units = [*units, _other_units()]
     server = ModbusTcpServer(units, address=("127.0.0.1", port), trace_packet=line.corrupt)
@@ -131,38 +126,60 @@ async def serve_units(
 
 def _say_ready(ready: dict[str, Any]) -> None:
     gc.collect()
-    gc.freeze()  # or the collector goes through all registers, for 0.1 s, while somebody waits
+    gc.freeze()  # otherwise the collector scans all registers, for 0.1 s, while a client waits
     print(json.dumps({"ready": ready}), flush=True)
 
 
-def _end_with_stdin(loop: asyncio.AbstractEventLoop, ended: asyncio.Event) -> None:
+def _end_event(
+    until_stdin_ends: bool, obey: Callable[[list[str]], None] | None = None
+) -> asyncio.Event:
+    """Return an event set by SIGTERM, SIGINT and, if wanted, the end of standard input.
+
+    The words of each line on standard input are passed to `obey`.
+    """
+    loop, ended, rest = asyncio.get_running_loop(), asyncio.Event(), b""
+    for number in (signal.SIGINT, signal.SIGTERM):
+        loop.add_signal_handler(number, ended.set)
+    if not until_stdin_ends and obey is None:
+        return ended
     descriptor = sys.stdin.fileno()
 
     def read() -> None:
-        if not os.read(descriptor, 4096):
-            ended.set()
+        nonlocal rest
+        data = os.read(descriptor, _CHUNK)
+        if not data:
+            loop.remove_reader(descriptor)
+            if until_stdin_ends:
+                ended.set()
+            return
+        *lines, rest = (rest + data).split(b"\n")
+        for line in lines:
+            if obey is not None:
+                obey(line.decode(errors="replace").split())
 
     try:
         loop.add_reader(descriptor, read)
     except PermissionError:
-        raise BusSetupError("standard input must be a pipe to be watched for its end") from None
+        if until_stdin_ends:
+            raise BusSetupError("standard input must be a pipe to be watched for its end") from None
+    return ended
 
 
 _CHUNK = 4096
 _CRC_BYTES = 2
-# what a device takes to answer, besides the time on the wire
+# time that a device needs to answer, besides the time on the wire
 _TURNAROUND_S = 0.001
 
-# a device says nothing about what its masters ask wrongly
+# a device does not report wrong requests of its masters
 logging.getLogger("pymodbus").setLevel(logging.CRITICAL)
 
 
 class RtuServer:
     """Serves `units` on a pseudo-terminal until SIGTERM, SIGINT or `unplug`.
 
-    Lines on standard input, where it is a pipe or a terminal, break and mend things:
+    Lines on standard input, if it is a pipe or a terminal, create and mend faults:
     `over-range 3`, `broken-wire all`, `silent 2`, `truncated 1`, `wrong-crc 1`, `wrong-unit 1`,
-    `mend all`, `unplug`; each is answered by a line of JSON on standard output.
+    `mend all`, `unplug`; each is answered with a line of JSON on standard output.
     """
 
     def __init__(
@@ -171,18 +188,14 @@ class RtuServer:
         self._units = {unit.unit: unit for unit in units}
         self._byte_s = bits_per_byte / baudrate
         self._lockstep = lockstep
-        self._ended = asyncio.Event()
-        self._input = b""
         self._descriptors: list[int] = []
         self._outside = self._inside = -1
         self._asked = 0
 
     async def serve(self, details: dict[str, Any], until_stdin_ends: bool) -> None:
-        """Serve; when all is up one line {"ready": {"port", "pid", and `details`}} is printed."""
+        """Serve; when ready, print one line {"ready": {"port", "pid", and `details`}}."""
         loop = asyncio.get_running_loop()
-        for number in (signal.SIGINT, signal.SIGTERM):
-            loop.add_signal_handler(number, self._ended.set)
-        self._listen_to_stdin(loop, until_stdin_ends)
+        self._ended = _end_event(until_stdin_ends, lambda words: self._obey(loop, words))
         path, server_end = self._open_terminals()
         devices = [unit.device() for unit in self._units.values()]
         server = ModbusSerialServer(
@@ -212,7 +225,7 @@ class RtuServer:
             tty.setraw(terminal)
             os.set_blocking(controller, False)
             setattr(self, side, controller)
-            # an end that stays open here keeps the terminal alive while no client has it open
+            # one end stays open here: it keeps the terminal alive while no client has it open
             self._descriptors += [controller, terminal]
             paths.append(os.ttyname(terminal))
         return paths[0], paths[1]
@@ -225,15 +238,15 @@ class RtuServer:
 
     def _to_master(self, loop: asyncio.AbstractEventLoop) -> None:
         data = self._read(self._inside)
-        if self._lockstep:  # who has asked lets bus time pass, as long as it takes on the wire
+        if self._lockstep:  # the client lets bus time pass for the time on the wire
             self._deliver(data)
-        elif data:  # question and answer take their time on the wire
+        elif data:  # question and answer take their real time on the wire
             wire_s = (self._asked + len(data)) * self._byte_s
             self._asked = 0
             loop.call_later(wire_s + _TURNAROUND_S, self._deliver, data)
 
     def _deliver(self, data: bytes) -> None:
-        with contextlib.suppress(OSError):  # closed meanwhile, or not read
+        with contextlib.suppress(OSError):  # closed in the meantime, or not read
             os.write(self._outside, data)
 
     @staticmethod
@@ -244,12 +257,12 @@ class RtuServer:
             return b""
 
     def _corrupt(self, sending: bool, data: bytes) -> bytes:
-        """Return the bytes that go out in place of an answer."""
+        """Return the bytes to send instead of an answer."""
         unit = self._units.get(data[0]) if data else None
         if not sending:
             return data
         end = END_OF_ANSWER if self._lockstep else b""
-        # the server answers for units that are not there; on a line nobody does
+        # the server also answers for missing units; on a real line nobody does
         if unit is None or unit.fault is TensionFault.SILENT:
             return end
         if unit.fault is TensionFault.TRUNCATED:
@@ -262,28 +275,6 @@ class RtuServer:
         return data
 
     # -- fault injection
-
-    def _listen_to_stdin(self, loop: asyncio.AbstractEventLoop, until_stdin_ends: bool) -> None:
-        descriptor = sys.stdin.fileno()
-
-        def read() -> None:
-            data = os.read(descriptor, _CHUNK)
-            if not data:
-                loop.remove_reader(descriptor)
-                if until_stdin_ends:
-                    self._ended.set()
-                return
-            *lines, self._input = (self._input + data).split(b"\n")
-            for line in lines:
-                self._obey(loop, line.decode(errors="replace").split())
-
-        try:
-            loop.add_reader(descriptor, read)
-        except PermissionError:
-            if until_stdin_ends:
-                raise BusSetupError(
-                    "standard input must be a pipe to be watched for its end"
-                ) from None
 
     def _obey(self, loop: asyncio.AbstractEventLoop, words: list[str]) -> None:
         if words == ["unplug"]:
@@ -300,7 +291,7 @@ class RtuServer:
         print(json.dumps(answer), flush=True)
 
     def set_fault(self, words: list[str]) -> None:
-        """Set what [fault, unit or "all"] says; raises BusSetupError for what there is not."""
+        """Set the fault given by [fault, unit or "all"]; raises BusSetupError if it is unknown."""
         known = {fault.value: fault for fault in TensionFault}
         whose = words[1] if len(words) > 1 else "all"
         units = [u for u in self._units.values() if whose in ("all", str(u.unit))]
@@ -323,9 +314,9 @@ async def serve_rtu(
     details: dict[str, Any],
     until_stdin_ends: bool,
 ) -> None:
-    """Serve `units` as RtuServer does, with these `faults` from the start.
+    """Serve `units` as RtuServer does, with `faults` from the start.
 
-    Answers take their time on the wire unless the units are in `lockstep`.
+    Answers take their real time on the wire unless the units are in `lockstep`.
     """
     server = RtuServer(units, baudrate, bits_per_byte, lockstep=lockstep)
     for words in faults:

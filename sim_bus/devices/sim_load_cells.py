@@ -12,13 +12,13 @@ from pydantic import Field
 from pymodbus.constants import ExcCodes
 from pymodbus.simulator import DataType, SimData, SimDevice
 
-from cdpr_profiles.devices.tension_sensor import REGISTERS, Sensor, TensionSensors, ValueMap
+from cdpr_profiles.tension_sensor import REGISTERS, Sensor, TensionSensors, ValueMap
 from cdpr_sim_bus.physics_board import BoardAxis
 from cdpr_sim_bus.plant_file import PlantFile
 
 _HOLDING_CODES = (3, 6, 16, 22, 23)
 _BEYOND = 1.02
-"""A converter's range is a little more than the specified one."""
+"""A converter's range is slightly larger than the specified range."""
 
 
 class AmplifierPlant(PlantFile):
@@ -26,19 +26,19 @@ class AmplifierPlant(PlantFile):
 
     seed: Annotated[int, Field(ge=0, lt=2**32)] = 7
     filter_Hz: Annotated[float, Field(gt=0.0, le=1000.0)] = 15.0
-    """Both poles of the low-pass filter before the converter."""
+    """Frequency of both poles of the low-pass filter before the converter."""
     noise_N: Annotated[float, Field(ge=0.0, le=100.0)] = 0.1
     """Standard deviation of a reading."""
     bits: Annotated[int, Field(ge=12, le=24)] = 18
-    """Of the converter, over the range from lowest_N to highest_N."""
+    """Bits of the converter, over the range from lowest_N to highest_N."""
     gain_error: Annotated[float, Field(ge=-0.5, le=0.5)] = 0.001
-    """Relative, of every load cell."""
+    """Relative error of every load cell."""
     zero_spread_N: Annotated[float, Field(ge=0.0, le=1000.0)] = 0.5
     """Standard deviation of the zeros of the load cells."""
 
 
 class TensionFault(Enum):
-    """What a simulated amplifier or its line can be made to show; the values name them."""
+    """Fault that a simulated amplifier or its line can show; the values are their names."""
 
     NONE = "mend"
     OVER_RANGE = "over-range"
@@ -50,10 +50,10 @@ class TensionFault(Enum):
 
 
 class SimAmplifier:
-    """One amplifier: follows the true tension of its cable, answers as `device`.
+    """One amplifier: follows the true tension of its cable and answers as `device`.
 
-    Its time is the bus time of its cable's drive: the filter has followed the tension up to there
-    whenever it is read, and the noise depends on the number of the reading only.
+    Its time is the bus time of its cable's drive: at each reading the filter has followed the
+    tension up to then, and the noise depends only on the number of the reading.
     """
 
     def __init__(
@@ -75,7 +75,7 @@ class SimAmplifier:
         self._quantum_N = span / 2.0**plant.bits
 
     def _follow(self) -> None:
-        """Have the filter follow the tension up to the present bus time."""
+        """Advance the filter to the present bus time."""
         self._samples, tension_history = self._axis.tension_history(self._samples)
         rate = -2.0 * math.pi * self._plant.filter_Hz
         for time_s, tension_N in tension_history:
@@ -102,7 +102,7 @@ class SimAmplifier:
         return SimDevice(self.unit, (spare, list(spare), holding, inputs), action=self._act)
 
     def _size(self, kind: str) -> int:
-        """Return how many registers of a kind there are."""
+        """Return the number of registers of a kind."""
         value, status, tare = self._map.value, self._map.status, self._map.tare
         ends = [1]
         if value.kind == kind:
@@ -144,7 +144,7 @@ class SimAmplifier:
         return None
 
     def _show(self) -> tuple[list[int], int]:
-        """Return the registers of the value as they are now, and the status."""
+        """Return the present value registers, and the status."""
         map_ = self._map
         value, status = map_.value, map_.status
         reading = self.measured_N() - self._tare_N
@@ -166,7 +166,7 @@ def _bit(number: int | None) -> int:
 
 
 def _registers(raw: float, value: ValueMap) -> list[int]:
-    """Return a number as the registers of a value show it, saturated."""
+    """Return a number in the format of a value's registers, saturated."""
     if value.type == "float32":
         packed = struct.pack(">f", raw)
     else:

@@ -10,18 +10,18 @@ from enum import IntFlag
 from pymodbus.constants import ExcCodes
 from pymodbus.simulator import DataType, SimData, SimDevice
 
-from cdpr_profiles.devices.rail import ModbusRail, RailProfile
+from cdpr_profiles.rail import ModbusRail, RailProfile
 from cdpr_sim_bus.devices.modbus_servers import AnswerFaults, Panel
 
 _STEP_S = 1e-3
 _BRAKE_S = 0.05
 _ENABLE_S = 0.03
 _SLIP_M_S = 0.01
-"""How fast a carriage with a worn brake is pushed at full torque."""
+"""Speed of a carriage with a worn brake, pushed at full torque."""
 
 
 class RailFault(IntFlag):
-    """Register 1 of the panel: what is broken."""
+    """Register 1 of the panel: active faults."""
 
     SILENT = 1
     TRUNCATED = 2
@@ -29,17 +29,17 @@ class RailFault(IntFlag):
     BRAKE_STUCK = 8
     DRIVE_FAULT = 16
     TARGET_LOST = 32
-    """The target register takes 0 whatever is written."""
+    """The target register stores 0 whatever is written."""
 
 
 class SimRail:
-    """The positioning drive, its brake and carriage; panel registers: 0 none, 1 faults.
+    """The positioning drive, its brake and carriage; panel registers: 0 unused, 1 faults.
 
-    It lives by `bus_time`, that of a bus in lockstep, or by CLOCK_MONOTONIC, in steps of 1 ms.
+    It runs on `bus_time`, that of a bus in lockstep, or on CLOCK_MONOTONIC, in steps of 1 ms.
     """
 
     def __init__(self, rail: RailProfile, bus_time: Callable[[], float] | None = None) -> None:
-        assert rail.modbus is not None  # the command has looked
+        assert rail.modbus is not None  # checked by the command
         self._rail, self._map, self._clock = rail, rail.modbus, bus_time or time.monotonic
         self.line = AnswerFaults(self._map.unit, lockstep=bus_time is not None)
         self.fault = RailFault(0)
@@ -65,7 +65,7 @@ class SimRail:
     # -- physics
 
     def step(self) -> None:
-        """Advance to now in steps of 1 ms, so that it does not depend on when it is called."""
+        """Advance to now in steps of 1 ms, so that the time of the call has no effect."""
         now = self._clock()
         while (time_s := self._start + (self._steps + 1) * _STEP_S) <= now:
             self._steps += 1

@@ -12,8 +12,8 @@ from pydantic import Field
 from pymodbus.constants import ExcCodes
 from pymodbus.simulator import DataType, SimData, SimDevice
 
-from cdpr_profiles.devices.safety_io import DigitalInput, SafetyIoProfile
-from cdpr_profiles.reading.reader import Profile
+from cdpr_profiles.reader import Profile
+from cdpr_profiles.safety_io import DigitalInput, SafetyIoProfile
 from cdpr_sim_bus.devices.modbus_servers import AnswerFaults, Panel
 from cdpr_sim_bus.physics_board import BoardAxis, Window
 from cdpr_sim_bus.plant_file import PlantFile
@@ -22,12 +22,12 @@ Delay = Annotated[float, Field(ge=0.0, le=10.0)]
 
 
 class SafetyAxisPlant(Profile):
-    """Where the limit switches of one axis stand, on the motor's true angle over all turns."""
+    """Positions of one axis' limit switches, by the motor's true angle over all turns."""
 
     limit_negative_deg: float | None = None
-    """Reached below."""
+    """Active below this angle."""
     limit_positive_deg: float | None = None
-    """Reached above."""
+    """Active above this angle."""
 
 
 class SafetyPlant(PlantFile):
@@ -45,7 +45,7 @@ _READ_COILS, _READ_INPUTS, _WRITE_COIL, _WRITE_COILS = 1, 2, 5, 15
 
 
 class SafetyIoFault(IntFlag):
-    """Register 1 of the panel: what is broken."""
+    """Register 1 of the panel: active faults."""
 
     SILENT = 1
     TRUNCATED = 2
@@ -53,11 +53,11 @@ class SafetyIoFault(IntFlag):
     EXCEPTIONS = 8
     CONTACTOR_WELDED = 16
     FEEDBACK_STUCK = 32
-    """The contactor's feedback stays as it is."""
+    """The contactor's feedback does not change."""
     BRAKES_WORN = 64
-    """Brakes whose feedback says applied do not hold."""
+    """Brakes do not hold although their feedback reports applied."""
     BRAKES_STUCK = 128
-    """Brakes stay as they are, and their feedback with them."""
+    """Brakes and their feedback do not change."""
 
 
 class DelayedContact:
@@ -81,7 +81,7 @@ class DelayedContact:
             self.on, self._until = coil, None
 
     def window(self, drop_s: float) -> Window:
-        """Return from when until when it will be on where the coil drops at `drop_s`, if it is."""
+        """Return from when until when the contact is on if the coil drops at `drop_s`."""
         if self.stuck:
             return (-math.inf, math.inf if self.on else -math.inf)
         since = -math.inf if self.on else math.inf
@@ -94,11 +94,11 @@ class DelayedContact:
 
 
 class SimSafetyIo:
-    """The safety I/O and what it switches; axes of the profile are `axes` of the board in order.
+    """The safety I/O and its outputs; the profile's axes are `axes` of the board, in order.
 
-    It lives by `bus_time`, that of the axes' buses in lockstep, or by CLOCK_MONOTONIC. In lockstep
-    it acts on requests only, while bus time stands still: what happens until the next request is
-    written to the board beforehand, with its bus time.
+    It runs on `bus_time`, that of the axes' buses in lockstep, or on CLOCK_MONOTONIC. In lockstep
+    it acts only on requests, while bus time stands still: changes until the next request are
+    written to the board in advance, with their bus times.
     """
 
     def __init__(
@@ -152,7 +152,7 @@ class SimSafetyIo:
     def step(self) -> None:
         """Advance contactor, brakes and inputs to now, and write them to the board."""
         now, drop_s = self._clock(), self._watchdog_drop_s
-        if now > drop_s:  # it accepts no outputs either until it is fed again
+        if now > drop_s:  # it accepts no outputs until it is fed again
             if not self._dropped:
                 self._switch(drop_s)
             self._coils = [False] * len(self._coils)
@@ -165,7 +165,7 @@ class SimSafetyIo:
 
     @property
     def _watchdog_drop_s(self) -> float:
-        """When the device's own watchdog drops the outputs unless it is fed."""
+        """Return when the device's own watchdog drops the outputs unless it is fed."""
         return self._fed_at + self._watchdog_s
 
     def _switch(self, at_s: float) -> None:
@@ -183,7 +183,7 @@ class SimSafetyIo:
         return self._coils[self._profile.contactor.output.coil] and not self._pressed
 
     def _publish(self, now: float) -> None:
-        """Write power and brakes to the board, in lockstep with the changes that are due."""
+        """Write power and brakes to the board; in lockstep, with the changes that are due."""
         power = _NEVER if self._pressed else self._contactor.window(self._watchdog_drop_s)
         worn = SafetyIoFault.BRAKES_WORN in self.fault
         for place, axis, brake in zip(self._board, self._profile.axes, self._brakes, strict=False):
@@ -193,13 +193,13 @@ class SimSafetyIo:
                 if axis.brake is not None:
                     place.brake_released = free[0] <= now < free[1]
                 continue
-            ahead_s = place.time_s - now  # of buses whose times differ
+            ahead_s = place.time_s - now  # the times of the buses differ
             place.allow_power((power[0] + ahead_s, power[1] + ahead_s))
             if axis.brake is not None:
                 place.release_brake((free[0] + ahead_s, free[1] + ahead_s))
 
     def switch_off(self) -> None:
-        """Lose the supply: the contactor opens, the brakes hold."""
+        """Remove the supply: the contactor opens, the brakes hold."""
         for i, place in enumerate(self._board[: len(self._profile.axes)]):
             place.power_allowed = False
             if self._profile.axes[i].brake is not None:
@@ -283,7 +283,7 @@ class SimSafetyIo:
 
 
 def _fill(registers: list[int], bits: list[bool]) -> None:
-    """Write bits into the words that the server answers from."""
+    """Write bits into the words from which the server answers."""
     for word in range((len(bits) + 15) // 16):
         part = bits[16 * word : 16 * word + 16]
         registers[word] = sum(1 << i for i, bit in enumerate(part) if bit)

@@ -1,1 +1,1 @@
-"""Physics: motors, cables, platform, and the logs of what is true."""
+"""Physics: motors, cables and platform, and logs of their true state."""

@@ -5,16 +5,93 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from cdpr_profiles.jit import jit
+from cdpr_sim_bus.robot import motor as motor_physics
 from cdpr_sim_bus.robot import servo
-from cdpr_sim_bus.robot.logs.platform_record import RobotShape, build_platform
 from cdpr_sim_bus.robot.motor import sample_of
-from cdpr_sim_bus.robot.motor_state import LOAD_KINDS, MOTOR_DTYPE, MotorArray, Transmission
-from cdpr_sim_bus.robot.robot_motion import run_together, update_ends
+from cdpr_sim_bus.robot.motor_state import (
+    CONTROL_STEP_S,
+    LOAD_KINDS,
+    MOTOR_DTYPE,
+    MotorArray,
+    Transmission,
+)
+from cdpr_sim_bus.robot.platform import RobotShape, build_platform, step_platform, update_cable_ends
 from cdpr_sim_bus.robot.robot_plant import RobotPlant
+
+# Motors, cables and platform of one robot, advanced together (compiled).
+
+_TIME, _RINGING, _DYING = 1e-12, 0.15, 0.4
+_MOST_STEPS = 400
+
+
+@jit
+def update_ends(platform: Any, motors: Any) -> None:
+    """Update the position of the far end of each motor's cable; see `update_cable_ends`."""
+    update_cable_ends(platform[0], motors)
+
+
+@jit
+def stable_steps(motors: Any, p: Any, h: float) -> int:
+    """Return the number of steps in `h` that keeps the integration of the stiffest cable stable.
+
+    A rotor on a cable oscillates at sqrt(EA c² / (l J)), c the cable paid out per radian. The
+    platform on all cables and its feet oscillates at sqrt(mobility EA / l); the mobility (1/kg) is
+    its acceleration per unit of cable force. Their damping must not stop it more than once a step.
+    """
+    most, stiffness, damping = 1, 0.0, 0.0
+    if p.standing:
+        stiffness, damping = p.feet * p.floor_stiffness, p.feet * p.floor_damping
+    for m in motors:
+        length, gain = motor_physics.paid_out(m)
+        k = m.rigidity / length
+        stiffness += k
+        damping += k * m.damping_time
+        swing = math.sqrt(k * gain * gain / m.inertia)
+        most = max(most, m.steps_per_control, math.ceil(swing * h / _RINGING))
+    most = max(most, math.ceil(math.sqrt(stiffness * p.mobility) * h / _RINGING))
+    return int(min(_MOST_STEPS, max(most, math.ceil(damping * p.mobility * h / _DYING))))
+
+
+@jit
+def run_together(
+    motors: Any, platform: Any, until: float, kinds: Any, targets: Any, flags: Any
+) -> None:
+    """Advance all motors and the platform to bus time `until`; OR their flags into `flags`."""
+    p = platform[0]
+    dt = until - motors[0].time
+    if dt <= _TIME:
+        return
+    n = max(1, math.ceil(dt / CONTROL_STEP_S - 1e-6))
+    h = dt / n
+    start = motors[0].time
+    for i in range(p.cables):
+        motor_physics.warm_up(motors[i], dt, kinds[i] != servo.OFF)
+    for k in range(n):
+        for i in range(p.cables):
+            flags[i] |= servo.control(motors[i], kinds[i], targets[i], h)
+        parts = stable_steps(motors, p, h)
+        for _ in range(parts):
+            update_cable_ends(p, motors)
+            for i in range(p.cables):
+                m = motors[i]
+                motor_physics.step_rotor(m, h / parts, m.torque_demand, kinds[i] != servo.OFF)
+                flags[i] |= motor_physics.step_disc(m)
+            step_platform(p, motors, h / parts)
+        for i in range(p.cables):
+            m = motors[i]
+            m.time = start + (k + 1) * h
+            motor_physics.remember_angle(m)
+            servo.observe(m, motor_physics.read_counter(m, m.angle), h)
+    for i in range(p.cables):
+        motors[i].time = until
+        flags[i] |= servo.watch(motors[i], kinds[i], targets[i], dt)
+
 
 _LONGEST_STEP_S = 1e-3
 _SAME_TIME_S = 1e-12
@@ -22,13 +99,13 @@ FloatArray = NDArray[np.float64]
 MotorSample = tuple[int, int, int, int, float, float, float, float, float, float]
 """A `motor.Sample` as the kernels return it."""
 MotorCommand = Callable[[], tuple[int, float]]
-"""Returns a kind of control, named in `servo`, and its target, as a power stage is set now."""
+"""Returns the present kind of control of a power stage, named in `servo`, and its target."""
 
 
 class CableRobot:
     """Motors, cables and platform; each drive advances it and reads its own motor.
 
-    The first drive that asks for an instant advances all, with every power stage as it is then.
+    The first drive that requests a time advances all, with every power stage as it is then.
     """
 
     def __init__(
@@ -36,7 +113,7 @@ class CableRobot:
     ) -> None:
         self.n = n = len(transmissions)
         self.motors: MotorArray = np.zeros(n, MOTOR_DTYPE)
-        """Taken over by `adopt`, one record each."""
+        """One record per motor, filled by `adopt`."""
         self.kinds: NDArray[np.int64] = np.full(n, servo.OFF, np.int64)
         self.targets: FloatArray = np.zeros(n)
         self._flags: NDArray[np.int64] = np.zeros(n, np.int64)
@@ -46,7 +123,7 @@ class CableRobot:
         self._weights = list(shape.weights_N_m)
         self._slips = sorted(plant.cables.slips, key=lambda slip: slip.at_s)
         self.platform = build_platform(shape, plant, n, self._rng)
-        # have it compiled now, before the clock runs
+        # compile now, before the clock runs
         run_together(self.motors, self.platform, 0.0, self.kinds, self.targets, self._flags)
         self.commands: list[MotorCommand] = [lambda: (servo.OFF, 0.0)] * n
         """Returns the present command of each power stage."""
@@ -86,7 +163,7 @@ class CableRobot:
         return motor
 
     def step(self, i: int, until: float) -> MotorSample:
-        """Advance all to `until`, return the `motor.Sample` of motor `i`."""
+        """Advance all to `until`; return the `motor.Sample` of motor `i`."""
         now = float(self.motors["time"][i])
         if until - now > _SAME_TIME_S:
             for k, command in enumerate(self.commands):
@@ -121,16 +198,16 @@ class CableRobot:
         return np.array(self.motors["winch_tension"])
 
     def cut(self, i: int) -> None:
-        """Cut cable `i` for good."""
+        """Cut cable `i` permanently."""
         self.motors["rigidity"][i] = 1e-9
         self.motors["weight"][i] = 0.0
 
     def slip(self, i: int, metres: float) -> None:
-        """Let so much of cable `i` slip through its fastening on the drum."""
+        """Let this length of cable `i` slip through its fastening on the drum."""
         self.motors["cable_start"][i] += metres
 
     def distance_m(self, i: int) -> float:
-        """Return the way of cable `i` from its exit to its anchor point, over its pulley, m."""
+        """Return the distance of cable `i` from exit to anchor point, over its pulley, m."""
         update_ends(self.platform, self.motors)
         return float(self.motors["far_distance"][i])
 

@@ -1,4 +1,4 @@
-"""Memory of one motor and its inner loops: a record that the compiled kernels work on in place."""
+"""Memory of one motor and its inner loops: a record that the compiled kernels modify in place."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ CONTROL_STEP_S = 5e-5
 """Period of the inner loops, and the longest step of the physics."""
 DELAY_SLOTS = 256
 CREEPS = 2
-"""Parts of a cable's creep, each with a time of its own."""
+"""Parts of a cable's creep, each with its own time constant."""
 LINE_COUNTS = 4
 """Counts per line of the encoder's disc."""
 
 LOAD_KINDS = ("none", "hung_mass", "fixed_anchor", "platform")
-"""Names of `load_kind`: their places here are its values. The last is that of a `CableRobot`."""
+"""Names of `load_kind`, whose values are the positions here. The last belongs to a `CableRobot`."""
 _F8 = np.float64
 _PHYSICS = [
     # parameters
@@ -40,15 +40,15 @@ _PHYSICS = [
     ("rise_limit", _F8),  # K
     ("steps_per_control", np.int64),
     ("n_torque", np.int64),  # the torque-additive harmonics come first,
-    ("n_cogging", np.int64),  # the current-offset ones after them
+    ("n_cogging", np.int64),  # then the current-offset ones
     ("order", _F8, (MAX_COGGING_TERMS,)),
     ("amplitude", _F8, (MAX_COGGING_TERMS,)),
     ("phase", _F8, (MAX_COGGING_TERMS,)),
-    ("ripple_order", _F8),  # periods per turn of the sixth torque ripple, the twelfth has twice
+    ("ripple_order", _F8),  # periods per turn of the sixth torque ripple; twelfth: double
     ("ripple_phase", _F8),
     ("sixth", _F8),  # shares of the torque
     ("twelfth", _F8),
-    ("rubbing", _F8),  # share of the dry friction that comes and goes once a turn
+    ("rubbing", _F8),  # share of the dry friction that varies once a turn
     ("rubbing_phase", _F8),
     # state
     ("time", _F8),  # s, bus time
@@ -56,9 +56,9 @@ _PHYSICS = [
     ("velocity", _F8),  # rad/s
     ("bristle", _F8),  # rad
     ("current", _F8),  # true current, in Nm at the nominal torque constant
-    ("sensed", _F8),  # the same as the drive's sensors show it
+    ("sensed", _F8),  # the same as measured by the drive's sensors
     ("rise", _F8),  # K above ambient
-    ("true_gain", _F8),  # torque gain with its ripple, as the last step saw it
+    ("true_gain", _F8),  # torque gain with its ripple in the last step
     ("cogging_Nm", _F8),  # likewise
     ("friction_Nm", _F8),
 ]
@@ -68,7 +68,7 @@ _CABLE = [
     ("cable_gain", _F8),  # m/rad, cable paid out per motor angle, signed
     ("cable_stiffness", _F8),  # N/m
     ("cable_damping", _F8),  # N s/m
-    ("cable_start", _F8),  # m, elongation at power-up, negative where slack
+    ("cable_start", _F8),  # m, elongation at power-up, negative if slack
     ("angle_start", _F8),  # rad, motor angle at power-up
     ("floor", _F8),  # m, position of a mass that stands on it
     ("gravity", _F8),
@@ -80,28 +80,28 @@ _CABLE = [
     ("damping_time", _F8),  # s, its damping over its stiffness
     ("creep_share", _F8, (CREEPS,)),  # of its elastic strain
     ("creep_rate", _F8, (CREEPS,)),  # 1/s
-    ("gear_yield", _F8),  # m/N, of gear and belt at the drum
+    ("gear_yield", _F8),  # m/N, compliance of gear and belt at the drum
     ("drum_gain", _F8),  # turn of its drum per motor angle
     ("run_out", _F8),  # m, of the drum
     ("run_out_phase", _F8),  # rad, at power-up
     ("lag", _F8),  # m, of the carriage that guides the cable, per radian of the drum
     ("carriage_offset", _F8),  # m, off its cable at power-up
     ("carriage_distance", _F8),  # m, from the drum
-    # where its far end is, written by the platform's physics before every step
+    # its far end, written by the platform's physics before every step
     ("far_distance", _F8),  # m, from exit to anchor point
     ("far_rate", _F8),  # m/s
-    ("far_level", _F8),  # horizontal share of the way
-    ("far_wound", _F8),  # m, of it on the pulley
-    ("far_drop", _F8),  # m, how far along gravity the anchor point is from where the cable is free
+    ("far_level", _F8),  # horizontal share of the distance
+    ("far_wound", _F8),  # m, part of it on the pulley
+    ("far_drop", _F8),  # m, from the start of the free cable to the anchor point, along gravity
     # state
     ("mass", _F8),  # kg
     ("mass_position", _F8),  # m, downward from power-up
     ("mass_velocity", _F8),  # m/s
-    ("tension", _F8),  # N; of a cable with weight that leads to a platform, halfway
-    ("hung_load", _F8),  # N, the half of its weight that its far end bears
+    ("tension", _F8),  # N; halfway along a cable with weight that leads to a platform
+    ("hung_load", _F8),  # N, half of the cable's weight, borne by its far end
     ("winch_tension", _F8),  # N, at the winch
     ("creep", _F8, (CREEPS,)),  # strain of a cable that leads to a platform
-    ("load_friction", _F8),  # Nm, level of the dry friction that the load adds
+    ("load_friction", _F8),  # Nm, level of the additional dry friction of the load
 ]
 _ENCODER = [
     ("counts_per_rad", _F8),
@@ -112,9 +112,9 @@ _ENCODER = [
     ("eccentric_zero", _F8),  # counts, its error at the index
     ("interpolation", _F8),  # counts
     ("delay", _F8),  # s
-    ("jitter", _F8),  # s, by which it differs at most
+    ("jitter", _F8),  # s, largest deviation from it
     ("random", np.uint64),
-    ("zero", np.int64),  # disc position at power-up, where the counter starts at 0
+    ("zero", np.int64),  # disc position at power-up, the counter's zero
     ("disc", np.int64),  # disc position now, noise-free
     ("index", np.int64),  # disc position of the index pulse
     ("index_present", np.int64),
@@ -123,7 +123,7 @@ _ENCODER = [
     ("slot", np.int64),
     ("slot_time", _F8, (DELAY_SLOTS,)),
     ("slot_angle", _F8, (DELAY_SLOTS,)),
-    ("switch_negative", _F8),  # rad; ±inf where there is no such switch
+    ("switch_negative", _F8),  # rad; ±inf if there is no such switch
     ("switch_positive", _F8),
     ("home_from", _F8),
     ("home_to", _F8),
@@ -137,7 +137,7 @@ _SERVO = [
     ("display_rate", _F8),  # rad/s, filter of the displayed velocity
     ("torque_unit", _F8),  # Nm, of one unit of target and measured torque
     ("limit_positive", _F8),  # Nm
-    ("limit_negative", _F8),  # Nm, a positive figure
+    ("limit_negative", _F8),  # Nm, a positive number
     ("torque_slope", _F8),  # Nm/s
     ("torque_offset", _F8),  # Nm, feed-forward of the position and velocity loops
     ("speed_limit", _F8),  # counts/s
@@ -177,7 +177,7 @@ MotorArray = NDArray[np.void]
 
 @dataclass(frozen=True)
 class MotorRatings:
-    """Nameplate figures that the drive is set up for."""
+    """Nameplate values for which the drive is configured."""
 
     rated_torque_Nm: float = 3.00
     peak_torque_Nm: float = 11.55
@@ -189,7 +189,7 @@ class MotorRatings:
 
 @dataclass(frozen=True)
 class Transmission:
-    """What leads from the motor to the cable, by the winch's profile."""
+    """Transmission from the motor to the cable, from the winch's profile."""
 
     cable_m_per_rad: float = 0.104 / 4.0
     """Cable paid out per radian of the motor, signed."""
@@ -204,7 +204,7 @@ class Transmission:
 def build_motor(
     plant: Plant, ratings: MotorRatings, transmission: Transmission | None = None
 ) -> MotorArray:
-    """Return the record of a motor at rest, its power off; shape (1,), dtype MOTOR_DTYPE."""
+    """Return the record of a motor at rest without power; shape (1,), dtype MOTOR_DTYPE."""
     motor: MotorArray = np.zeros(1, MOTOR_DTYPE)
     m: Any = motor[0]
     _set_physics(m, plant)
@@ -253,7 +253,7 @@ def _set_physics(m: Any, plant: Plant) -> None:
     m["heating_rate"] = 1.0 / thermal.time_constant_s
     m["rise_limit"] = thermal.rise_K
     m["angle"] = math.radians(plant.motor.initial_angle_deg)
-    # A stiff bristle on a light rotor rings; a fifth of a radian a step resolves it.
+    # A stiff bristle on a light rotor oscillates; a fifth of a radian a step resolves it.
     ringing = math.sqrt(friction.sigma0_Nm_rad / plant.inertia_kg_m2) * CONTROL_STEP_S
     m["steps_per_control"] = min(20, max(1, math.ceil(ringing / 0.2)))
 
@@ -325,8 +325,8 @@ def _angle(degrees: float | None, absent: float) -> float:
 
 def _set_servo(m: Any, plant: Plant, ratings: MotorRatings) -> None:
     drive = plant.drive
-    # Half the phase at the velocity loop's crossover is spent on observer, current loop and
-    # integrator together; these ratios leave some 50 degrees of margin.
+    # Half the phase at the velocity loop's crossover is shared by observer, current loop and
+    # integrator; these ratios leave about 50 degrees of margin.
     crossover = 2.0 * math.pi * min(50.0, drive.current_loop_bandwidth_Hz / 10.0)
     m["velocity_gain"] = plant.inertia_kg_m2 * crossover
     m["integral_rate"] = crossover / 4.0

@@ -6,13 +6,13 @@ from typing import Annotated, Any, Literal, Self, TypeVar
 
 from pydantic import Field, model_validator
 
-from cdpr_profiles.reading.reader import Profile
+from cdpr_profiles.reader import Profile
 from cdpr_profiles.winch import Winch
 from cdpr_sim_bus.plant_file import PlantFile
 
 MAX_COGGING_TERMS = 32
 _RATED_Nm, _PEAK_Arms = 3.00, 22.8
-"""Of the MPP0923D, whose figures the defaults are."""
+"""Data of the MPP0923D, from which the defaults are taken."""
 _Angle_deg = Annotated[float, Field(ge=-1e6, le=1e6)]
 _Section = TypeVar("_Section", bound=Profile)
 
@@ -26,7 +26,7 @@ class MotorPlant(Profile):
     initial_angle_deg: Annotated[float, Field(ge=-36000.0, le=36000.0)] = 0.0
     """Mechanical angle at power-up; the encoder counts from zero there."""
     brake_torque_Nm: Annotated[float, Field(gt=0.0, le=1000.0)] = 8.0
-    """What the holding brake holds; it is released unless a physics board says otherwise."""
+    """Torque of the holding brake; it is released unless a physics board applies it."""
 
 
 class CoggingTerm(Profile):
@@ -48,7 +48,7 @@ class RipplePlant(Profile):
 
     pole_pairs: Annotated[int, Field(ge=1, le=500)] = 4
     sixth: Annotated[float, Field(ge=0.0, le=0.2)] = 0.005
-    """Of the torque."""
+    """Share of the torque."""
     twelfth: Annotated[float, Field(ge=0.0, le=0.2)] = 0.0025
     phase_deg: Annotated[float, Field(ge=-360.0, le=360.0)] = 25.0
 
@@ -58,7 +58,7 @@ class FrictionPlant(Profile):
 
     coulomb_Nm: Annotated[float, Field(ge=0.0, le=100.0)] = 0.08
     breakaway_Nm: Annotated[float, Field(ge=0.0, le=200.0)] = 0.10
-    """At least `coulomb_Nm`; 1.25 times that where only `coulomb_Nm` is given."""
+    """At least `coulomb_Nm`; 1.25 times `coulomb_Nm` if only that is given."""
     stribeck_rad_s: Annotated[float, Field(ge=1e-4, le=100.0)] = 0.2
     viscous_Nms_rad: Annotated[float, Field(ge=0.0, le=10.0)] = 5e-4
     sigma0_Nm_rad: Annotated[float, Field(gt=0.0, le=1e6)] = 20.0
@@ -68,7 +68,7 @@ class FrictionPlant(Profile):
     direction_asymmetry: Annotated[float, Field(ge=-1.5, le=1.5)] = 0.1
     """Relative: forward friction × (1 + a/2), backward × (1 − a/2)."""
     angle_share: Annotated[float, Field(ge=0.0, le=0.9)] = 0.03
-    """Of the dry friction: it is × (1 + this · sin(angle + phase)), once a turn."""
+    """Variation of the dry friction once a turn: × (1 + this · sin(angle + phase))."""
     angle_phase_deg: Annotated[float, Field(ge=-360.0, le=360.0)] = 70.0
 
     @model_validator(mode="before")
@@ -97,15 +97,15 @@ class EncoderPlant(Profile):
     index_deg: Annotated[float, Field(ge=-360.0, le=360.0)] = 123.4
     """Mechanical angle of the index pulse."""
     index_present: bool = True
-    """False: the index pulse never comes."""
+    """False: there is no index pulse."""
     noise_counts: Annotated[float, Field(ge=0.0, le=1000.0)] = 0.3
-    """Standard deviation of the reading before it is rounded."""
+    """Standard deviation of the reading before rounding."""
     eccentricity_rad: Annotated[float, Field(ge=0.0, le=0.1)] = 1.5e-4
-    """Error once a turn of a disc that is off the rotor's axis; none at the index."""
+    """Error once a turn of a disc that is off the rotor's axis; zero at the index."""
     eccentricity_phase_deg: Annotated[float, Field(ge=-360.0, le=360.0)] = 50.0
-    """From the index."""
+    """Phase from the index."""
     interpolation_error: Annotated[float, Field(ge=0.0, le=0.25)] = 0.02
-    """Error once a line, which has four counts, as a share of it."""
+    """Error once a line (four counts), as a share of the line."""
 
 
 class DrivePlant(Profile):
@@ -115,50 +115,52 @@ class DrivePlant(Profile):
     feedback_delay_s: Annotated[float, Field(ge=0.0, le=0.01)] = 0.0005
     """Age of the encoder reading that a SYNC latches."""
     feedback_jitter_s: Annotated[float, Field(ge=0.0, le=0.001)] = 2e-5
-    """By which that age differs from one SYNC to the next, uniform within plus and minus this."""
+    """Variation of that age from one SYNC to the next, uniform within plus and minus this."""
     mode_display_delay_s: Annotated[float, Field(ge=0.0, le=10.0)] = 0.005
-    """From writing 6060h until the mode acts and 6061h shows it."""
+    """Time from writing 6060h until the mode acts and 6061h shows it."""
     enable_delay_s: Annotated[float, Field(ge=0.0, le=10.0)] = 0.002
-    """From the command to enable operation until the state is reached."""
+    """Time from the enable operation command until the state is reached."""
     i2t_time_constant_s: Annotated[float, Field(ge=0.01, le=1000.0)] = 10.0
     overcurrent_Arms: Annotated[float, Field(gt=0.0, le=1000.0)] = 30.0
-    """Current that trips the overcurrent fault."""
+    """Current that raises the overcurrent fault."""
     overspeed_ratio: Annotated[float, Field(ge=1.0, le=10.0)] = 1.2
-    """Overspeed fault at this multiple of the maximum motor speed (6080h)."""
+    """Multiple of the maximum motor speed (6080h) that raises the overspeed fault."""
+    off_when_pre_operational: bool = False
+    """Whether 6007h also acts in NMT state pre-operational; else the last torque stays."""
 
 
 class ThermalPlant(Profile):
-    """Warming of an energised drive from power-up, where the other sections' figures hold."""
+    """Warming of an energised drive from power-up, at which the other sections' values apply."""
 
     cogging_per_K: Annotated[float, Field(ge=-0.01, le=0.01)] = -0.001
     friction_per_K: Annotated[float, Field(ge=-0.01, le=0.01)] = -0.004
     time_constant_s: Annotated[float, Field(ge=1.0, le=1e6)] = 600.0
     rise_K: Annotated[float, Field(ge=0.0, le=80.0)] = 10.0
-    """Temperature rise that an energised drive settles at."""
+    """Final temperature rise of an energised drive."""
 
 
 class LoadPlant(Profile):
-    """What the motor turns, and what hangs on the cable."""
+    """The load on the motor and on the cable."""
 
     inertia_kg_m2: Annotated[float, Field(ge=0.0, le=100.0)] = 0.0
     """Inertia of the load on the motor side, rigidly coupled."""
     kind: Literal["none", "hung_mass", "fixed_anchor"] = "none"
-    """No cable; a mass that stands on the floor or hangs; the cable's end made fast."""
+    """No cable; a mass that stands on the floor or hangs; a cable with a fixed end."""
     mass_kg: Annotated[float, Field(ge=0.0, le=1000.0)] = 5.0
     height_m: Annotated[float, Field(ge=0.0, le=100.0)] = 0.0
-    """How far above the floor the mass hangs at power-up; 0: it stands there."""
+    """Height of the mass above the floor at power-up; 0: it stands on the floor."""
     slack_m: Annotated[float, Field(ge=0.0, le=100.0)] = 0.0
     """Slack of the cable at power-up."""
     pretension_N: Annotated[float, Field(ge=0.0, le=1e5)] = 0.0
     """Tension of a fixed cable at power-up."""
     cable_m: Annotated[float, Field(ge=0.01, le=1000.0)] = 3.0
-    """Free length of the cable at power-up; its stiffness stays that of this length."""
+    """Free length of the cable at power-up; its stiffness remains that of this length."""
     cable_stiffness_N: Annotated[float, Field(ge=1.0, le=1e9)] | None = None
-    """Axial stiffness EA; that of the cable's profile where left out."""
+    """Axial stiffness EA; by default that of the cable's profile."""
     cable_damping_s: Annotated[float, Field(ge=0.0, le=1.0)] = 0.002
     """Damping of the cable over its stiffness."""
     anchor_stiffness_N_m: Annotated[float, Field(ge=1.0, le=1e9)] | None = None
-    """Of a spring between cable and fixed anchor."""
+    """Stiffness of a spring between cable and fixed anchor."""
     drum_radius_error: Annotated[float, Field(ge=-0.5, le=0.5)] = 0.0
     """Relative: true drum radius = that of the winch's profile × (1 + this)."""
     winch_friction_Nm: Annotated[float, Field(ge=0.0, le=100.0)] = 0.0
@@ -177,7 +179,7 @@ class LoadPlant(Profile):
 
 
 class LimitsPlant(Profile):
-    """Mechanical angles of the switches, over several turns; a switch left out does not exist."""
+    """Mechanical angles of the switches, over several turns; an omitted switch does not exist."""
 
     negative_deg: _Angle_deg | None = None
     """Negative limit switch: active below."""
@@ -185,7 +187,7 @@ class LimitsPlant(Profile):
     """Positive limit switch: active above."""
     home_from_deg: _Angle_deg | None = None
     home_to_deg: _Angle_deg | None = None
-    """Home switch: active between the two; one given alone leaves the other side open."""
+    """Home switch: active between the two; if only one is given, the other side is open."""
 
     @model_validator(mode="after")
     def _ordered(self) -> Self:
@@ -197,7 +199,7 @@ class LimitsPlant(Profile):
 
 
 def _filled(section: _Section, values: dict[str, float]) -> _Section:
-    """Return a section with those values of its keys that it was not given."""
+    """Return a section, with `values` for the keys that it was not given."""
     left_out = {k: v for k, v in values.items() if k not in section.model_fields_set}
     return section.model_copy(update=left_out)
 
@@ -219,10 +221,10 @@ class Plant(PlantFile):
     limits: LimitsPlant = LimitsPlant()
 
     def of(self, winch: Winch) -> Plant:
-        """Return this plant with what was left out as a winch's motor and encoder have it.
+        """Return this plant with omitted values taken from a winch's motor and encoder.
 
-        Inertia, counts and the current that trips are the profile's; cogging and friction grow
-        with the rated torque. What was said, and what this has filled in once, stays.
+        Inertia, counts and overcurrent come from the profile; cogging and friction scale with
+        the rated torque. Given values, and values that this has once filled in, stay.
         """
         motor = winch.motor
         size = motor.rated_torque_Nm / _RATED_Nm
@@ -232,7 +234,7 @@ class Plant(PlantFile):
             self.friction,
             {k: size * getattr(self.friction, k) for k in (*rubbing, "sigma1_Nms_rad")},
         )
-        if friction.breakaway_Nm < friction.coulomb_Nm:  # one of them was said
+        if friction.breakaway_Nm < friction.coulomb_Nm:  # only one of them was given
             friction = friction.model_copy(update={"coulomb_Nm": friction.breakaway_Nm})
         filled: dict[str, object] = {
             "motor": _filled(

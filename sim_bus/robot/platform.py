@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from cdpr_sim_bus.jit import jit
+from cdpr_profiles.jit import jit
+from cdpr_sim_bus.robot.robot_plant import FloorPlant, PlatformPlant, RobotPlant, StartPlant
 
 MOST_CABLES = 16
 MOST_FEET = 16
@@ -18,31 +21,31 @@ PLATFORM_DTYPE = np.dtype(
         # parameters
         ("cables", np.int64),
         ("feet", np.int64),
-        ("planar", np.int64),  # 1: moves in x and y and turns about z only
+        ("planar", np.int64),  # 1: moves only in x and y and turns only about z
         ("mass", _F8),
         ("inertia", _F8, (3, 3)),  # kg m2, about the centre of mass, in the platform's frame
         ("inverse_inertia", _F8, (3, 3)),
         ("gravity", _F8, (3,)),  # m/s2
         ("air", _F8),  # N s/m, and N m s/rad times `reach` squared
         ("reach", _F8),  # m
-        ("mobility", _F8),  # 1/kg, how much a force along any cable accelerates its anchor point
+        ("mobility", _F8),  # 1/kg, acceleration of an anchor point by a unit force along its cable
         ("exit", _F8, (MOST_CABLES, 3)),  # m, in the room
         ("pulley_radius", _F8, (MOST_CABLES,)),  # m; 0: a point
         ("pulley_axis", _F8, (MOST_CABLES, 3)),  # unit vector along which a cable comes to it
         ("com", _F8, (3,)),  # m, centre of mass from the origin, in the platform's frame
         ("anchor", _F8, (MOST_CABLES, 3)),  # m, from the centre of mass, in the platform's frame
-        ("foot", _F8, (MOST_FEET, 3)),  # m, likewise; what stands on the floor
+        ("foot", _F8, (MOST_FEET, 3)),  # m, likewise; a foot that stands on the floor
         ("floor", _F8),  # m, height of the floor against gravity; -inf without
         ("floor_stiffness", _F8),  # N/m of each foot
         ("floor_damping", _F8),  # N s/m
         ("standing", np.int64),  # whether a foot touched the floor in the last step
-        ("floor_friction", _F8),  # share of the load that a foot resists sliding with
+        ("floor_friction", _F8),  # friction coefficient of a foot on the floor
         # state
         ("position", _F8, (3,)),  # m, of the centre of mass
         ("velocity", _F8, (3,)),
         ("rotation", _F8, (3, 3)),  # from the platform's frame to the room
         ("spin", _F8, (3,)),  # rad/s, in the room
-        ("bent", _F8, (MOST_FEET, 3)),  # m, by how much feet that stick are off where they stand
+        ("bent", _F8, (MOST_FEET, 3)),  # m, spring deflection of feet that stick
         ("arm", _F8, (MOST_CABLES, 3)),  # m, anchor points from the centre of mass, in the room
         ("way", _F8, (MOST_CABLES, 3)),  # unit vectors from anchor points along the cables
     ]
@@ -72,20 +75,20 @@ def update_cable_ends(p: Any, motors: Any) -> None:
         m.far_level = math.sqrt(max(0.0, level2))
         m.far_wound = wound
         m.far_drop = 0.0 if g == 0.0 else -free * rise / g
-        if wound > 0.0:  # only what is free sags, by the cube of its length
+        if wound > 0.0:  # only the free part sags, by the cube of its length
             m.far_level *= (free / (free + wound)) ** 1.5
 
 
 @jit
 def lead_cable(p: Any, i: int) -> tuple[float, float]:
-    """Update the way of cable i; return what is free of it and what lies on its pulley, m.
+    """Update the direction of cable i; return its free length and the length on its pulley, m.
 
     The pulley swivels about the axis along which the cable comes, so that it points at the anchor
-    point. Seen from its middle, the cable comes at -r along the axis, and the anchor point at a
-    distance D lies at an angle φ from the axis: wound are θ = φ + asin(r / D), free are
-    sqrt(D² - r²) along the tangent at θ. Moving the anchor point along that lengthens the free
-    part alone, moving it across turns the tangent point by as much as it takes: the way is the
-    slope of the whole length, and a pulley makes no energy.
+    point. Relative to its centre, the cable comes at -r along the axis, and the anchor point at a
+    distance D lies at an angle φ from the axis. The wound angle is θ = φ + asin(r / D), the free
+    length sqrt(D² - r²) along the tangent at θ. Moving the anchor point along the tangent changes
+    only the free length; moving it across turns the tangent point accordingly. So the direction is
+    the slope of the whole length, and a pulley creates no energy.
     """
     r = p.pulley_radius[i]
     way = p.way[i]
@@ -126,7 +129,7 @@ def anchor_velocity(p: Any, i: int) -> tuple[float, float, float]:
 def step_platform(p: Any, motors: Any, h: float) -> None:
     """Advance the platform by `h` seconds under the tensions of its motors' last step.
 
-    Symplectic Euler; the rotation is advanced along the spin exactly, so that it stays a rotation.
+    Symplectic Euler; the rotation follows the spin exactly, so that it stays a rotation.
     """
     fx = p.mass * p.gravity[0] - p.air * p.velocity[0]
     fy = p.mass * p.gravity[1] - p.air * p.velocity[1]
@@ -187,7 +190,7 @@ def turn(p: Any, h: float, tx: float, ty: float, tz: float) -> None:
 
 @jit
 def rotate(p: Any, h: float) -> None:
-    """Turn the platform by its spin during `h`: Rodrigues' formula, a column at a time."""
+    """Turn the platform by its spin during `h` with Rodrigues' formula, one column at a time."""
     sx, sy, sz = p.spin[0], p.spin[1], p.spin[2]
     speed = math.sqrt(sx * sx + sy * sy + sz * sz)
     angle = h * speed
@@ -208,8 +211,8 @@ def rotate(p: Any, h: float) -> None:
 def floor_force(p: Any, h: float) -> tuple[float, float, float, float, float, float]:
     """Return force and moment of the floor over the next `h` s: each foot on a damped spring.
 
-    Along the floor it is one as well, as long as dry friction holds it: a foot that sticks stays
-    where it is, one that slides drags its spring along.
+    A second spring acts along the floor while dry friction holds the foot: a foot that sticks stays
+    in place, one that slides drags its spring along.
     """
     g = math.sqrt(p.gravity[0] ** 2 + p.gravity[1] ** 2 + p.gravity[2] ** 2)
     fx, fy, fz, tx, ty, tz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
@@ -249,3 +252,173 @@ def floor_force(p: Any, h: float) -> tuple[float, float, float, float, float, fl
         ty += rz * x - rx * z
         tz += rx * y - ry * x
     return fx, fy, fz, tx, ty, tz
+
+
+# The true record of a platform: its profile, with a plant's errors added.
+
+_EVEN_m = 1e-6
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class RobotShape:
+    """Nominal robot from its profile; points are (n, 2) in a plane or (n, 3), m.
+
+    In a plane, rotation vectors and inertias have one number, about the axis across the plane.
+    """
+
+    exit_points_m: ArrayLike
+    anchor_points_m: ArrayLike
+    """In the platform's frame."""
+    mass_kg: float
+    home_m: Sequence[float]
+    """Position of the platform's origin at power-up, unless the plant gives another."""
+    weights_N_m: Sequence[float]
+    """Weight of each cable."""
+    home_rotation_rad: Sequence[float] = (0.0,)
+    """Rotation vector of the platform's frame at power-up, likewise."""
+    inertia_kg_m2: Sequence[float] | None = None
+    """Ixx Iyy Izz Ixy Ixz Iyz about the centre of mass, in the platform's frame; by default that of
+    a plate whose corners are the anchor points."""
+    centre_of_mass_m: Sequence[float] = (0.0, 0.0)
+    """In the platform's frame."""
+    pulley_radii_m: Sequence[float] | None = None
+    """Radius of the pulley at each exit point; by default points."""
+    pulley_axes: ArrayLike | None = None
+    """Unit vector along which each cable comes to its pulley, which swivels about it; by default
+    upward."""
+    feet_m: ArrayLike | None = None
+    """Feet of the platform, in its frame; by default the corners of a box around its anchor
+    points."""
+
+
+def build_platform(
+    shape: RobotShape, plant: RobotPlant, n: int, chance: np.random.Generator
+) -> PlatformArray:
+    """Return the record of a platform on `n` cables at rest; shape (1,), dtype PLATFORM_DTYPE.
+
+    Raises ValueError if there is not one point for each axis.
+    """
+    exits = _points(shape.exit_points_m, n, "exit points")
+    anchors = _points(shape.anchor_points_m, n, "anchor points")
+    planar = np.shape(shape.exit_points_m)[1] == 2
+    errors = plant.geometry
+    exits = _with_errors(exits, errors.exit_errors_m, errors.exit_sigma_m, planar, chance)
+    anchors = _with_errors(anchors, errors.anchor_errors_m, errors.anchor_sigma_m, planar, chance)
+    platform: PlatformArray = np.zeros(1, PLATFORM_DTYPE)
+    p: Any = platform[0]
+    p["cables"], p["planar"] = n, planar
+    p["gravity"] = (0.0, -9.80665, 0.0) if planar else (0.0, 0.0, -9.80665)
+    com = p["com"] = _vector(plant.platform.centre_of_mass_m or shape.centre_of_mass_m)
+    p["exit"][:n] = exits
+    p["anchor"][:n] = anchors - com
+    p["pulley_radius"][:n] = 0.0 if shape.pulley_radii_m is None else shape.pulley_radii_m
+    up = -p["gravity"] / np.linalg.norm(p["gravity"])
+    p["pulley_axis"][:n] = (
+        up if shape.pulley_axes is None else _points(shape.pulley_axes, n, "pulley axes")
+    )
+    _put_mass(p, shape, plant.platform, anchors)
+    _put_start(p, shape, plant.start)
+    feet = _default_feet(anchors) if shape.feet_m is None else _points(shape.feet_m, None, "feet")
+    _put_floor(p, feet, up, plant.floor)
+    return platform
+
+
+def _put_mass(p: Any, shape: RobotShape, plant: PlatformPlant, anchors: FloatArray) -> None:
+    """Set mass and inertia; a given inertia scales with the mass."""
+    p["mass"] = shape.mass_kg * (1.0 + plant.mass_error)
+    if plant.radius_of_gyration_m is None and shape.inertia_kg_m2 is not None:
+        p["inertia"] = (1.0 + plant.mass_error) * _tensor(shape.inertia_kg_m2)
+    else:
+        reach = plant.radius_of_gyration_m or _plate_radius(anchors)
+        p["inertia"] = p["mass"] * reach**2 * np.eye(3)
+    p["inverse_inertia"] = np.linalg.inv(p["inertia"])
+    smallest = float(np.linalg.eigvalsh(p["inertia"])[0])
+    p["reach"], p["air"] = math.sqrt(np.trace(p["inertia"]) / 3.0 / p["mass"]), plant.air_Ns_m
+    longest = float(np.linalg.norm(p["anchor"], axis=1).max())
+    p["mobility"] = 1.0 / p["mass"] + longest**2 / smallest
+
+
+def _put_start(p: Any, shape: RobotShape, plant: StartPlant) -> None:
+    """Set the pose at power-up."""
+    turn = list(shape.home_rotation_rad)
+    if plant.rotation_deg is not None:
+        turn = [math.radians(angle) for angle in plant.rotation_deg]
+    elif plant.angle_deg is not None:
+        turn = [math.radians(plant.angle_deg)]
+    p["rotation"] = rotation_of((0.0, 0.0, turn[0]) if len(turn) == 1 else turn)
+    p["position"] = _vector(plant.position_m or shape.home_m) + p["rotation"] @ p["com"]
+
+
+def _put_floor(p: Any, feet: FloatArray, up: FloatArray, plant: FloorPlant) -> None:
+    p["feet"] = len(feet)
+    p["foot"][: len(feet)] = feet - p["com"]
+    heights = (p["position"] + p["foot"][: len(feet)] @ p["rotation"].T) @ up
+    carried_by = np.count_nonzero(heights < heights.min() + _EVEN_m)
+    weight = p["mass"] * np.linalg.norm(p["gravity"])
+    sunk = weight / (carried_by * plant.stiffness_N_m)
+    p["floor"] = heights.min() + sunk if plant.height_m is None else plant.height_m
+    if not plant.present:
+        p["floor"] = -math.inf
+    p["floor_stiffness"], p["floor_damping"] = plant.stiffness_N_m, plant.damping_Ns_m
+    p["floor_friction"] = plant.friction
+
+
+def _with_errors(
+    points: FloatArray,
+    errors: Sequence[Sequence[float]],
+    sigma: float,
+    planar: bool,
+    chance: np.random.Generator,
+) -> FloatArray:
+    drawn = chance.normal(0.0, sigma, points.shape)
+    if planar:
+        drawn[:, 2] = 0.0
+    known = _points(errors, len(points), "errors") if errors else np.zeros_like(points)
+    return points + known + drawn
+
+
+def _points(values: ArrayLike, n: int | None, what: str) -> FloatArray:
+    points = np.asarray(values, float)
+    most = MOST_CABLES if n is not None else MOST_FEET
+    if points.ndim != 2 or points.shape[1] not in (2, 3) or not 0 < len(points) <= most:
+        raise ValueError(f"{what}: {points.shape}; allowed: (n, 2) or (n, 3), n up to {most}")
+    if n is not None and len(points) != n:
+        raise ValueError(f"{what}: {len(points)}; allowed: one for each of {n} axes")
+    return np.pad(points, ((0, 0), (0, 3 - points.shape[1])))
+
+
+def _default_feet(points: FloatArray) -> FloatArray:
+    low, high = points.min(axis=0), points.max(axis=0)
+    corners = [np.where(pick, high, low) for pick in np.ndindex(2, 2, 2)]
+    return np.unique(corners, axis=0)
+
+
+def _vector(values: Sequence[float]) -> FloatArray:
+    return np.pad(np.asarray(values, float), (0, 3 - len(values)))
+
+
+def _tensor(values: Sequence[float]) -> FloatArray:
+    """Return an inertia of six numbers, or one about the axis across a plane, as a matrix."""
+    if len(values) == 1:
+        return values[0] * np.eye(3)
+    xx, yy, zz, xy, xz, yz = values
+    return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+
+
+def rotation_of(vector: ArrayLike) -> FloatArray:
+    """Return the matrix of a rotation vector, by Rodrigues' formula."""
+    v = np.asarray(vector, float)
+    angle = float(np.linalg.norm(v))
+    if angle == 0.0:
+        return np.eye(3)
+    x, y, z = v / angle
+    across = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    matrix = np.eye(3) + math.sin(angle) * across + (1.0 - math.cos(angle)) * across @ across
+    return np.asarray(matrix)
+
+
+def _plate_radius(anchors: FloatArray) -> float:
+    """Return the radius of gyration of a plate about its centre, from its corners' distance."""
+    spread = float(np.sqrt(np.mean(np.sum((anchors - anchors.mean(axis=0)) ** 2, axis=1))))
+    return max(0.01, spread / 2.0)

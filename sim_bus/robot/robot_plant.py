@@ -10,10 +10,10 @@ import numpy as np
 from pydantic import BeforeValidator, Field
 
 from cdpr_profiles.errors import value_text
-from cdpr_profiles.reading.reader import Profile
+from cdpr_profiles.reader import Profile
 from cdpr_profiles.winch import Winch
-from cdpr_sim_bus.camera.camera_plant import CameraPlant
 from cdpr_sim_bus.plant_file import PlantFile
+from cdpr_sim_bus.robot.camera_plant import CameraPlant
 from cdpr_sim_bus.robot.plant import CoggingTerm, LoadPlant, Plant
 
 Vector = tuple[Annotated[float, Field(ge=-1000.0, le=1000.0)], ...]
@@ -29,15 +29,15 @@ class PlatformPlant(Profile):
     mass_error: _Relative = 0.0
     """Relative: true mass = that of the profile × (1 + this)."""
     centre_of_mass_m: Annotated[Vector, Field(min_length=2, max_length=3)] | None = None
-    """In the platform's frame; that of the profile where left out."""
+    """In the platform's frame; by default that of the profile."""
     radius_of_gyration_m: Annotated[float, Field(gt=0.0, le=10.0)] | None = None
-    """About every axis; the profile's inertia where left out, and without one that of a plate whose
+    """About every axis; by default the profile's inertia or, without one, that of a plate whose
     corners are the anchor points."""
     air_Ns_m: Annotated[float, Field(ge=0.0, le=1000.0)] = 0.5
 
 
 class GeometryPlant(Profile):
-    """Where points truly are: first a vector for each cable, then chance on top."""
+    """True positions of points: first a vector for each cable, then a random error."""
 
     exit_errors_m: tuple[Vector, ...] = ()
     anchor_errors_m: tuple[Vector, ...] = ()
@@ -49,28 +49,28 @@ class SlipPlant(Profile):
     """A cable that slips through its fastening on the drum, once."""
 
     cable: Annotated[int, Field(ge=1, le=64)]
-    """Its number, from 1."""
+    """Number of the cable, from 1."""
     at_s: Annotated[float, Field(ge=0.0, le=1e6)]
     """Bus time."""
     slip_m: Annotated[float, Field(ge=-1.0, le=1.0)]
-    """How much longer it is then."""
+    """Length by which it becomes longer then."""
 
 
 class CablesPlant(Profile):
-    """The cables and what winds them."""
+    """The cables and their winches."""
 
     stiffness_error: _Relative = 0.0
     """Relative: true EA = that of the cable's profile × (1 + this)."""
     damping_s: Annotated[float, Field(ge=0.0, le=0.05)] | None = None
-    """Damping over stiffness; that of the cable's profile where left out."""
+    """Damping over stiffness; by default that of the cable's profile."""
     creep_shares: tuple[_Share, _Share] = (0.01, 0.01)
     """Strain that follows the elastic one, as shares of it; a fast part and a slow one."""
     creep_times_s: tuple[_Time_s, _Time_s] = (0.5, 60.0)
-    """After which 63 % of it have come."""
+    """Time after which 63 % of the creep has occurred."""
     sag: bool = True
     """Whether cables have weight."""
     drum_radius_errors: tuple[_Relative, ...] = ()
-    """Relative, one for each axis or none."""
+    """Relative, one for each axis or empty."""
     drum_radius_sigma: Annotated[float, Field(ge=0.0, le=0.1)] = 0.0
     winch_friction_Nm: Annotated[float, Field(ge=0.0, le=100.0)] = 0.0
     """Dry friction of gear and drum without tension, on the motor side."""
@@ -80,20 +80,20 @@ class CablesPlant(Profile):
 
 
 class WindingPlant(Profile):
-    """How the cables lie on their drums, whose carriages guide them to and fro."""
+    """Winding of the cables on their drums; carriages guide them to and fro."""
 
     run_out_m: Annotated[float, Field(ge=0.0, le=0.01)] = 3e-5
-    """How far a drum's middle is off its axis: so much more and less cable once a turn."""
+    """Eccentricity of a drum: the cable is longer and shorter by this once a turn."""
     pitch_m: Annotated[float, Field(ge=0.0, le=0.2)] = 0.006
-    """From one turn on the drum to the next."""
+    """Distance from one turn on the drum to the next."""
     carriage_error: Annotated[float, Field(ge=0.0, le=1.0)] = 0.02
-    """Share of its way along the drum by which a carriage lags behind; 1: it stands still."""
+    """Share of its way along the drum by which a carriage lags behind; 1: it does not move."""
     carriage_offset_m: Annotated[float, Field(ge=-0.5, le=0.5)] = 0.002
-    """How far it is off its cable at power-up."""
+    """Offset of the carriage from its cable at power-up."""
     carriage_distance_m: Annotated[float, Field(gt=0.0, le=10.0)] = 0.3
-    """From the drum."""
+    """Distance from the drum."""
     gear_stiffness_Nm_rad: Annotated[float, Field(ge=100.0, le=1e9)] = 10_000.0
-    """Of gear and belt, at the drum."""
+    """Stiffness of gear and belt, at the drum."""
 
 
 def _one_or_each(value: Any) -> Any:
@@ -104,25 +104,25 @@ _Slack_m = Annotated[float, Field(ge=0.0, le=10.0)]
 
 
 class StartPlant(Profile):
-    """How the robot stands at power-up."""
+    """State of the robot at power-up."""
 
     position_m: Vector | None = None
-    """Of the platform's origin; the profile's home where left out."""
+    """Position of the platform's origin; by default the profile's home."""
     angle_deg: _Angle_deg | None = None
-    """Of a platform in a plane; the profile's at home where left out."""
+    """Angle of a platform in a plane; by default the profile's at home."""
     rotation_deg: Annotated[tuple[_Angle_deg, ...], Field(min_length=3, max_length=3)] | None = None
     """Rotation vector of a platform in space; likewise."""
     slack_m: Annotated[tuple[_Slack_m, ...], Field(min_length=1), BeforeValidator(_one_or_each)] = (
         0.02,
     )
-    """Of every cable (a number in the file), or of each."""
+    """One value for every cable (a number in the file), or one for each."""
 
 
 class FloorPlant(Profile):
-    """What the platform stands on."""
+    """The floor under the platform."""
 
     height_m: Annotated[float, Field(ge=-1000.0, le=1000.0)] | None = None
-    """Where left out, such that the platform stands at rest where it is at power-up."""
+    """By default such that the platform stands at rest in its pose at power-up."""
     present: bool = True
     stiffness_N_m: Annotated[float, Field(gt=0.0, le=1e7)] = 1e6
     damping_Ns_m: Annotated[float, Field(ge=0.0, le=1e5)] = 500.0
@@ -130,28 +130,28 @@ class FloorPlant(Profile):
 
 
 class VariationPlant(Profile):
-    """How much the motors differ from the one in [motor]: uniform within plus and minus these."""
+    """Differences of the motors from the one in [motor]: uniform within plus and minus these."""
 
     cogging: Annotated[float, Field(ge=0.0, le=0.9)] = 0.2
-    """Of each amplitude, relative; phases are anything at all."""
+    """Of each amplitude, relative; phases are random."""
     friction: Annotated[float, Field(ge=0.0, le=0.9)] = 0.2
     torque_constant: Annotated[float, Field(ge=0.0, le=0.3)] = 0.03
 
 
 class ScannerPlant(Profile):
-    """What measures the platform's pose from outside, where there is such a device."""
+    """An external device that measures the platform's pose, if there is one."""
 
     position_sigma_m: Annotated[float, Field(ge=0.0, le=0.1)] = 0.002
     """Standard deviation of each coordinate."""
     rotation_sigma_rad: Annotated[float, Field(ge=0.0, le=0.1)] = 0.002
-    """Of each component of the rotation vector by which it errs."""
+    """Of each component of the rotation vector of its error."""
     rate_Hz: Annotated[float, Field(gt=0.0, le=1000.0)] = 10.0
 
 
 class RobotPlant(PlantFile):
     """All sections of a robot's plant file; every key has a default.
 
-    `motor` is the plant of one motor as for a single winch, `motors`, where given, one each.
+    `motor` is the plant of one motor as for a single winch; `motors`, if given, has one each.
     """
 
     seed: Annotated[int, Field(ge=0, lt=2**32)] = 7
@@ -164,12 +164,12 @@ class RobotPlant(PlantFile):
     variation: VariationPlant = VariationPlant()
     scanner: ScannerPlant = ScannerPlant()
     camera: CameraPlant = CameraPlant()
-    """What the platform carries, where the robot is simulated with a camera."""
+    """The camera on the platform, if the robot is simulated with one."""
     motor: Plant = Plant()
     motors: tuple[Plant, ...] = ()
 
     def require_fit(self, n: int, size: int) -> None:
-        """Raise ValueError where the plant does not fit a robot of n axes and 2 or 3 directions."""
+        """Raise ValueError if the plant does not fit a robot of n axes and 2 or 3 directions."""
         geometry = self.geometry
         errors = {
             "geometry.exit_errors_m": geometry.exit_errors_m,
@@ -207,7 +207,7 @@ class RobotPlant(PlantFile):
                 raise ValueError(f"{where}: allowed: inertia_kg_m2; the platform is the load")
 
     def motor_plants(self, n: int, winches: Sequence[Winch] = ()) -> list[Plant]:
-        """Return the plant of each of n motors; `winches`, where given, are theirs."""
+        """Return the plant of each of n motors; `winches`, if given, belong to them."""
         plants = list(self.motors) or [self.motor] * n
         if winches:
             plants = [plant.of(winch) for plant, winch in zip(plants, winches, strict=True)]
@@ -253,7 +253,7 @@ class RobotPlant(PlantFile):
 
 
 def _turned(plant: Plant, rng: np.random.Generator) -> Plant:
-    """Return a plant whose errors that come once a turn and more begin anywhere."""
+    """Return a plant whose periodic errors (once a turn and more) have random phases."""
     ripple, friction, encoder = rng.uniform(-180.0, 180.0, 3).tolist()
     return plant.model_copy(
         update={

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from cdpr_sim_bus.jit import jit
+from cdpr_profiles.jit import jit
 
 OFF = 0
 """Power stage off: the motor coasts."""
@@ -19,7 +19,7 @@ VELOCITY = 2
 PROFILE_POSITION = 3
 """Target in counts, along a trapezoidal velocity profile."""
 FOLLOW_POSITION = 4
-"""Target in counts, reached along a straight line when the interpolation time is over."""
+"""Target in counts, reached along a straight line at the end of the interpolation time."""
 
 LIMITED = 1 << 2
 STANDSTILL = 1 << 3
@@ -74,7 +74,7 @@ def ramp_velocity(m: Any, goal: float, h: float) -> None:
     braking = v * (goal - v) < 0.0
     step = (m.deceleration if braking else m.acceleration) * h
     if braking and v * goal < 0.0:
-        goal = 0.0  # a reversal passes through rest: the acceleration may differ beyond it
+        goal = 0.0  # a reversal passes through rest, where the acceleration may change
     new = _approach(v, goal, step)
     m.reference_acceleration = 0.0 if math.isinf(step) else (new - v) / h
     m.reference_velocity = new
@@ -83,7 +83,7 @@ def ramp_velocity(m: Any, goal: float, h: float) -> None:
 
 @jit
 def profile_position(m: Any, target: float, h: float) -> None:
-    """Advance the trapezoidal profile: the speed from which the target can just be braked for."""
+    """Advance the trapezoidal profile: use the highest speed that can still brake at the target."""
     distance = target - m.reference_position
     d = m.deceleration
     half = 0.5 * d * h
@@ -99,7 +99,7 @@ def profile_position(m: Any, target: float, h: float) -> None:
 
 @jit
 def follow_position(m: Any, target: float, h: float) -> None:
-    """Move the reference on a straight line that ends at the target in time."""
+    """Move the reference on a straight line that reaches the target in time."""
     if m.interpolation_left > h * 1.000001:
         m.reference_velocity = (target - m.reference_position) / m.interpolation_left
         m.reference_position += h * m.reference_velocity
@@ -120,7 +120,7 @@ def motion_torque(m: Any, kind: int, h: float) -> float:
     if kind != VELOCITY:
         lag = m.reference_position - m.observed_position
         velocity += m.position_gain * lag
-        # Within a count of rest the integrator would only hunt across the stiction.
+        # Within one count of rest, the integrator would only hunt because of stiction.
         frozen = abs(lag) <= 1.0 and m.reference_velocity == 0.0
     else:
         frozen = False
@@ -133,7 +133,7 @@ def motion_torque(m: Any, kind: int, h: float) -> float:
 
 @jit
 def torque_mode_torque(m: Any, target: float, h: float) -> float:
-    """Return the torque demand along the slope, held back at the speed limit, Nm."""
+    """Return the torque demand along the slope, reduced at the speed limit, Nm."""
     goal = target * m.torque_unit
     m.torque_demand = _approach(m.torque_demand, goal, m.torque_slope * h)
     gain = m.velocity_gain / m.counts_per_rad
@@ -167,7 +167,7 @@ def control(m: Any, kind: int, target: float, h: float) -> int:
     if demand == free:
         return 0
     if kind != TORQUE:
-        # Anti-windup: take back what the integrator added beyond the limit.
+        # Anti-windup: remove the amount that the integrator added beyond the limit.
         m.integral += (demand - unlimited) / m.velocity_gain * min(1.0, h * m.integral_rate * 4.0)
     return LIMITED
 

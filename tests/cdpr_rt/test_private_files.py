@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from foxglove import Context
 
-from cdpr_rt.service.recordings.recording_file import RecordingFile
+from cdpr_rt.service.recording_file import RecordingFile
 from cdpr_rt.state_file import write_state
 
 

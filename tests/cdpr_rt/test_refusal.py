@@ -9,8 +9,8 @@ from typing import Any
 import pytest
 
 from cdpr_rt.errors import ControlError
+from cdpr_rt.loop.engine import RefusedError
 from cdpr_rt.refusal import CommandRefusal, RefusalCode, refusal_of
-from cdpr_rt.runtime.control_loop.lifecycle import RefusedError
 
 RANGE = {"index": 1, "low": -2.0, "high": 2.0}
 STATE = {"state": "fault", "allowed": ["ready", "active"]}

@@ -14,13 +14,14 @@ import canopen
 from cdpr_drivers.axes.axis_group import AxisGroup
 from cdpr_drivers.axes.axis_layout import AxisConfig
 from cdpr_drivers.bus import BusUrl
-from cdpr_drivers.bus.simulated_bus import open_clock
-from cdpr_drivers.canopen.boot.boot import BootReport, BootSettings, boot_all
+from cdpr_drivers.bus.simbus import open_clock
+from cdpr_drivers.canopen.boot import BootReport, BootSettings, boot_all
 from cdpr_drivers.canopen.network import CanNetwork
 from cdpr_drivers.cia402 import Mode, State
 from cdpr_profiles import DriveProfile, load_drive
 from cdpr_rt.core.clock import PacedClock
 from cdpr_tools.composition.simulator import OwnSimulator
+from tests.fault_texts import alarm
 
 MASTER = 127
 PERIOD_S = 1e-3
@@ -92,7 +93,7 @@ class Rig:
             done = until()
             self.group.transmit()
             if not alarms:
-                assert self.group.alarm() == ""
+                assert alarm(self.group) == ""
             if done:
                 break
         return self.group.feedback.time_s - begin
@@ -113,8 +114,8 @@ class Rig:
 
     def until_alarm(self, seconds: float) -> tuple[str, float]:
         """Run until the group raises an alarm; return its text and the bus time it took."""
-        elapsed = self.run(seconds, lambda: bool(self.group.alarm()), alarms=True)
-        return self.group.alarm(), elapsed
+        elapsed = self.run(seconds, lambda: bool(alarm(self.group)), alarms=True)
+        return alarm(self.group), elapsed
 
     def misbehave(self, sub: int, value: int, node: int = 1) -> None:
         self.network.write(node, 0x2F00, sub, value)

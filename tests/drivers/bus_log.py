@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 
-from cdpr_drivers.bus.adapters.simbus_socket import connect, exchange
+from cdpr_drivers.bus.simbus import connect, exchange
 
 _FRAME = struct.Struct("=IB3x8s")
 _SYNC = 0x080

@@ -31,9 +31,9 @@ def simulated_bus() -> Iterator[str]:
 @pytest.fixture(autouse=True)
 def brief_waits(monkeypatch: pytest.MonkeyPatch) -> None:
     """Simulated drives are there at once: do not wait as long as for real ones."""
-    monkeypatch.setattr("cdpr_drivers.canopen.boot.boot._BOOT_UP_TIMEOUT_S", 0.4)
-    monkeypatch.setattr("cdpr_drivers.canopen.boot.boot._LISTEN_SHARE", 0.1)
-    monkeypatch.setattr("cdpr_drivers.canopen.boot.boot._LISTEN_LEAST_S", 0.05)
+    monkeypatch.setattr("cdpr_drivers.canopen.boot._BOOT_UP_TIMEOUT_S", 0.4)
+    monkeypatch.setattr("cdpr_drivers.canopen.boot._LISTEN_SHARE", 0.1)
+    monkeypatch.setattr("cdpr_drivers.canopen.boot._LISTEN_LEAST_S", 0.05)
     monkeypatch.setattr("cdpr_drivers.canopen.network._LOOK_S", 0.02)
     monkeypatch.setattr("cdpr_drivers.axes.axis_group._POWER_OFF_TIMEOUT_S", 0.4)
 

@@ -42,8 +42,6 @@ node_id = 2
 """
 NAME, PERIOD_S = "slow-2", 0.01
 PATIENCE_S = 60.0
-# the first start on a machine compiles the loop's kernels and the physics
-START_S = 300.0
 _RIGHT_S = 10.0
 _names = itertools.count()
 
@@ -89,6 +87,7 @@ class RealDaemon:
         robot: Path | None = None,
         cwd: Path | None = None,
         paced: bool = False,
+        stderr: int | None = None,
     ) -> None:
         self.socket = folder / "control.sock"
         self.at = ("--socket", str(self.socket))
@@ -105,7 +104,7 @@ class RealDaemon:
             self.process = subprocess.Popen(
                 [*command, *options],
                 stdout=subprocess.PIPE,
-                stderr=errors,
+                stderr=errors if stderr is None else stderr,
                 text=True,
                 env={**os.environ, **(env or {})},
                 cwd=cwd,
@@ -126,7 +125,7 @@ class RealDaemon:
 
     def _first_line(self) -> str:
         assert self.process.stdout is not None
-        readable, _, _ = select.select([self.process.stdout], [], [], START_S)
+        readable, _, _ = select.select([self.process.stdout], [], [], PATIENCE_S)
         line = self.process.stdout.readline() if readable else ""
         assert line, self.errors()
         return line
@@ -214,9 +213,11 @@ def held_right(daemon: RealDaemon, client: str) -> Iterator[httpx.Headers]:
     assert daemon.http.delete("/control", headers=headers).status_code == 200
 
 
-def cdpr(*arguments: str | Path, typed: str = "") -> subprocess.CompletedProcess[str]:
+def cdpr(
+    *arguments: str | Path, typed: str = "", timeout_s: float = PATIENCE_S
+) -> subprocess.CompletedProcess[str]:
     """Run a command to its end; `typed` is its standard input."""
     command = [sys.executable, "-m", "cdpr_tools.cli", *map(str, arguments)]
     return subprocess.run(
-        command, input=typed, capture_output=True, text=True, timeout=PATIENCE_S, check=False
+        command, input=typed, capture_output=True, text=True, timeout=timeout_s, check=False
     )

@@ -15,7 +15,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 LOSS, COPIES, JITTER_S = 0.2, 0.05, 0.05
-_SETPOINT, _KIND_AT, _POSITION_AT = 3, 5, 48  # as docs/setpoint-stream.md has it
+_SETPOINT, _KIND_AT, _POSITION_AT = 3, 5, 48  # as docs/reference/setpoint-stream.md has it
 
 
 class Proxy:

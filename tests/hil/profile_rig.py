@@ -14,11 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 import cdpr_profiles
-from cdpr_drivers.robot.session import Session
 from cdpr_profiles import Winch, load_winch
 from cdpr_sim_bus.bus.server import serve
 from cdpr_sim_bus.cia402.drive import SimDrive
 from cdpr_sim_bus.robot.plant import Plant
+from cdpr_tools.composition.session import Session
 from cdpr_tools.recordings.truth import NO_SYNC
 
 SHIPPED = Path(cdpr_profiles.__file__).parent

@@ -26,11 +26,11 @@ from safety_rig import PANEL, SafetyIoProcess, ready, start
 
 from cdpr_drivers.errors import DriverError
 from cdpr_profiles import load_winch
-from cdpr_profiles.reading.places import SHIPPED
+from cdpr_profiles.places import SHIPPED
 from cdpr_sim_bus.devices.sim_rail import RailFault
 from cdpr_sim_bus.devices.sim_safety_io import SafetyIoFault
 from cdpr_sim_bus.physics_board import BoardAxis
-from cdpr_tools.commands.devices import rail as rail_commands
+from cdpr_tools.commands import rail as rail_commands
 
 M_PER_RAD = 0.02 / math.tau
 ANSWER_S, MASTER_S = 2.0, 2.0

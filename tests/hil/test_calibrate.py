@@ -13,8 +13,8 @@ from pathlib import Path
 import pytest
 from cdpr_here import cdpr_here
 
-from cdpr_profiles.reading.places import SHIPPED
-from cdpr_rt.calibration.readings.data import load_data
+from cdpr_profiles.places import SHIPPED
+from cdpr_rt.calibration.readings import load_data
 
 _PLANT = """
 [geometry]
@@ -91,20 +91,4 @@ def test_a_killed_run_goes_on_names_a_slip_after_it_and_its_calibration_is_check
     assert other.returncode == 1, other.stderr
     change = json.loads(other.stdout.splitlines()[-1])["changes"][0]
     assert change["kind"] == "drum" and 3 in (change["cable"], *change["or_cables"])
-    assert "look at its drum" in other.stderr and "calibrate anew" in other.stderr
-
-
-def test_a_cable_that_slips_during_a_run_is_named_and_survived(tmp_path: Path) -> None:
-    plant = tmp_path / "plant.toml"
-    plant.write_text(_PLANT.format(drum=0.0) + _SLIP.format(cable=3, at_s=60.0, slip_m=0.012))
-    words = ["calibrate", "run", "planar-4", "--scanner", "--poses", "20", "--plant", str(plant)]
-    done = cdpr_here(*words, "--out", tmp_path / "out", "--json")
-    assert done.returncode == 0, done.stderr
-    told = json.loads(done.stdout.splitlines()[-1])
-    jumps = [fault for fault in told["faults"] if fault["kind"] == "jump"]
-    assert [jump["cable"] for jump in jumps] == [3], done.stderr
-    assert jumps[0]["size"] == pytest.approx(0.012, abs=0.002)
-    before_mm = told["verification"]["mean_position_error_before_mm"]
-    assert told["truth"]["mean_position_error_mm"] < 0.5 * before_mm
-    # the slip is the readings' fault, not that of the robot's file
-    assert before_mm < 12.0
+    assert "look at its drum" in other.stderr and "recalibrate" in other.stderr

@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 from cdpr_here import cdpr_here
 
-from cdpr_profiles.reading.places import SHIPPED
-from cdpr_rt.calibration.readings.data import load_data
+from cdpr_profiles.places import SHIPPED
+from cdpr_rt.calibration.readings import load_data
 
 _PLANT = """
 seed = 3

@@ -207,7 +207,7 @@ def test_a_node_in_fault_is_told_in_words(lab: Lab) -> None:
     lab.inject_fault(1, 0x3210)
     told = fails("drive", "enable", WINCH, "--bus", lab.bus)
     assert "node 1" in told
-    assert "3210h DC link over-voltage" in told
+    assert "3210h (DC link over-voltage)" in told
     assert lab.state() == FAULT
 
 
@@ -257,7 +257,7 @@ def test_an_emergency_in_mid_sweep(lab: Lab, tmp_path: Path) -> None:
         assert lab.state() == ENABLED
         lab.inject_fault(1, 0x7305)
         told = complaint(command, FAILED)
-    assert "7305h incremental encoder 1" in told
+    assert "7305h (incremental encoder 1)" in told
     assert str(tmp_path / "raw") in told
     assert lab.state() == FAULT
     assert rows_of(tmp_path) > 2000

@@ -97,7 +97,7 @@ def test_a_loop_that_stands_still_is_killed_and_that_is_not_called_confirmed(
             expect_stop(ear, at_s)
         status, told = estop(*daemon.at)
         assert status == 1
-        assert "its loop has ended; drives that had power from it stop by themselves" in str(told)
+        assert "its loop has ended; drives that had power from it stop without" in str(told)
     finally:
         daemon.end()
 

@@ -21,7 +21,7 @@ from cdpr_drivers.bus.frames import FRAME
 from cdpr_drivers.canopen.network import CanNetwork
 from cdpr_drivers.cia402 import POWER_OFF, State, state_of
 from cdpr_profiles import load_drive
-from cdpr_profiles.eds.dictionary import load_dictionary
+from cdpr_profiles.eds import load_dictionary
 from cdpr_rt.core.clock import PacedClock
 
 pytestmark = pytest.mark.alone

@@ -22,7 +22,8 @@ from daemon_lab import KEY, with_key
 from daemon_rig import RealDaemon, cdpr, until
 from test_daemon_stream import port_of
 
-from cdpr_rt.service.streams.stream_packet import StreamSetpoint
+from cdpr_rt.loop.stop_socket import send_stop
+from cdpr_rt.service.stream_packet import StreamSetpoint
 from cdpr_tools.daemon.loop_file import POWER_OFF_SIGNAL, LoopFile
 
 NOBODY = 65534
@@ -82,6 +83,10 @@ def connect(path: Path) -> None:
         sock.connect(str(path))
 
 
+def ask_to_hold(path: Path) -> None:
+    send_stop(path, "hold", "nobody", 5.0)
+
+
 def loop_of(daemon: RealDaemon) -> LoopFile:
     return LoopFile.read(daemon.socket.with_suffix(".loop"))
 
@@ -91,6 +96,8 @@ def test_what_the_daemon_writes_and_listens_at_is_closed_to_others(daemon: RealD
     until(lambda: any((folder / "rec").iterdir()))
     (recording,) = (folder / "rec").iterdir()
     assert is_denied(daemon.socket, lambda: connect(daemon.socket))
+    stops = daemon.socket.with_suffix(".stop")
+    assert is_denied(stops, lambda: ask_to_hold(stops))
     for path in (recording, daemon.socket.with_suffix(".loop"), folder / "key"):
         assert is_denied(path, path.read_bytes), path
     assert is_denied(folder / "rec", lambda: list((folder / "rec").iterdir()))

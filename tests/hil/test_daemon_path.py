@@ -102,9 +102,9 @@ def lead(daemon: RealDaemon) -> None:
         assert until(lambda: told(daemon)["waiting"] == "paused")
         assert told(daemon)["feed"] == 0.2
         along_m = until(lambda: _still(daemon))
-        ask("/set", wanted={"back_m": 0.05, "feed": 1.0})
+        ask("/set", wanted={"back_m": 0.02, "feed": 1.0})
         until(lambda: told(daemon)["waiting"] == "stepped back")
-        assert told(daemon)["along_m"] == pytest.approx(along_m - 0.05, abs=2e-3)
+        assert told(daemon)["along_m"] == pytest.approx(along_m - 0.02, abs=2e-3)
 
 
 def break_a_drive(daemon: RealDaemon) -> None:
@@ -144,3 +144,16 @@ def test_paused_faulted_and_killed_it_is_taken_up_where_it_was_left(folder: Path
         done = cdpr("path", "--resume", *daemon.at)
         assert done.returncode in (1, 2)
         assert "--resume: no path has been left; allowed: --run with a path's FILE" in done.stderr
+
+
+def test_a_path_of_several_plans_is_followed_to_its_end(folder: Path) -> None:
+    count = 26_000
+    lines = "".join(f"X{-100.0 + 200.0 * i / count:.3f}\n" for i in range(1, count + 1))
+    (folder / "long.nc").write_text(f"G21 G90\nG0 X-100 Y0\nG1 F6000\n{lines}M2\n")
+    with running(folder) as daemon:
+        with following(daemon, folder / "long.nc", "--run", "--origin=0 1700", "--json") as path:
+            out, errors = path.communicate()
+        assert path.returncode == 0, errors
+        progress = json.loads(out.splitlines()[-1])["path"]
+        assert (progress["name"], progress["line"]) == ("long.nc", count + 3)
+        assert errors.count("long.nc: 0.") == 2  # the figures of both

@@ -16,10 +16,10 @@ from daemon_rig import RealDaemon, cdpr, until
 
 import cdpr_profiles
 from cdpr_profiles import load_robot
-from cdpr_rt.calibration.estimation.parameters import CableGeometry
-from cdpr_rt.calibration.estimation.residuals import lengths_told
-from cdpr_rt.calibration.readings.data import load_data
-from cdpr_rt.robots.persistence.calibration_state import mark_not_calibrated
+from cdpr_rt.calibration.parameters import CableGeometry
+from cdpr_rt.calibration.readings import load_data
+from cdpr_rt.calibration.residuals import lengths_told
+from cdpr_rt.model.calibration_state import mark_not_calibrated
 
 PERIOD_S = 0.004
 SHIPPED = Path(cdpr_profiles.__file__).parent / "robots"
@@ -199,7 +199,9 @@ def test_it_goes_to_the_poses_of_a_calibration_by_itself(
     status, why = refused(turning, *command, "--out", str(folder))
     assert (status, "not held on its cables" in why, folder.exists()) == (1, True, False)
     told(turning, "tighten")
-    done = cdpr(*command, *turning.at, "--out", folder, typed="0 1000\n\n\n0 1450 0.5\n")
+    typed = "0 1000\n\n\n0 1450 0.5\n"
+    # fifteen poses, and a fit
+    done = cdpr(*command, *turning.at, "--out", folder, typed=typed, timeout_s=240.0)
     assert done.stderr.count("measured x y in mm") == 5, done.stderr  # what is typed ends there
     assert "the platform is held at the last pose" in done.stdout
     data = load_data(folder / "data.json")

@@ -17,9 +17,9 @@ from hostile_proxy import hostile
 
 from cdpr_profiles import load_winch
 from cdpr_rt.core.states import LoopState
-from cdpr_rt.service.recordings.recording_reader import RecordingReader
-from cdpr_rt.service.streams.stream_client import StreamClient
-from cdpr_rt.service.streams.stream_packet import Standing, StreamSession, StreamSetpoint
+from cdpr_rt.service.recording_reader import RecordingReader
+from cdpr_rt.service.stream_client import StreamClient
+from cdpr_rt.service.stream_packet import Standing, StreamSession, StreamSetpoint
 
 WINCH = load_winch("winch-mpp0923d")
 PERIOD_S = 0.01

@@ -23,9 +23,9 @@ from typer.testing import CliRunner
 import cdpr_profiles
 from cdpr_profiles import load_robot
 from cdpr_rt.core.states import LoopState
-from cdpr_rt.motion.stream_buttons import confirmation
-from cdpr_rt.service.recordings.recording_reader import RecordingReader
-from cdpr_tools.commands.daemon.teleop import app
+from cdpr_rt.motion.pose_stream import confirmation
+from cdpr_rt.service.recording_reader import RecordingReader
+from cdpr_tools.commands.teleop import app
 from cdpr_tools.errors import BadInputError, CommandError
 from cdpr_tools.teleop import session as session_module
 

@@ -18,22 +18,21 @@ import pytest
 from numpy.typing import NDArray
 from profile_rig import DRIVES, PLANT, Motion, bus_name, write_winch
 
-from cdpr_drivers.axes import touch_probe
+from cdpr_drivers.axes import homing as touch_probe
 from cdpr_drivers.cia402 import POWER_OFF, Mode, State, state_of, supported_modes
 from cdpr_drivers.errors import DriveFaultError, ModeRefusedError, SdoError
-from cdpr_drivers.robot.session import Session
 from cdpr_profiles import DriveProfile, load_winch
 from cdpr_rt.control.tuning import design_pid
 from cdpr_rt.identification.rawlog import read_raw_log
-from cdpr_rt.procedures.commissioning.commission_files import Paths
-from cdpr_rt.procedures.commissioning.procedure import Commissioning
-from cdpr_rt.procedures.commissioning.winch_passes import Measurement
+from cdpr_rt.loop.engine import RefusedError
+from cdpr_rt.procedures.commissioning_results import Paths
 from cdpr_rt.procedures.measurement import both_ways, recording
-from cdpr_rt.runtime.control_loop.lifecycle import RefusedError
-from cdpr_tools.commands.drive.drive import info
-from cdpr_tools.composition.session import open_bus, open_winch
+from cdpr_tools.commands.drive import info
+from cdpr_tools.commission.commissioning import Commissioning, Measurement
+from cdpr_tools.composition.session import Session, open_bus, open_winch
 from cdpr_tools.composition.simulator import OwnSimulator
 from cdpr_tools.output import Output
+from tests.fault_texts import alarm
 
 # the plant's truth, which the master does not know
 TRUE_OVER_NOMINAL, COGGING_NM = 1.04, 0.06
@@ -263,7 +262,7 @@ def test_a_fault_takes_the_torque_and_stays_until_it_is_acknowledged(booted: Boo
     true = booted.motion.push(2.8, 8)
     assert max(true["motor_Nm"]) > 2.0
     assert device.states() == [State.FAULT]
-    assert "2310h" in device.alarm()
+    assert "2310h" in alarm(device)
     now = booted.motion.truth(device.feedback.cycle, device.feedback.cycle)
     assert now["motor_Nm"][0] == pytest.approx(0.0, abs=1e-6)
     with pytest.raises(DriveFaultError, match="acknowledge its fault"):
@@ -282,7 +281,7 @@ def test_a_master_that_falls_silent_loses_the_torque(booted: BootedDrive) -> Non
     while state_of(booted.shown(0x6041)) not in POWER_OFF:
         assert clock.now_s < deadline_s
         clock.sleep(0.02)
-    assert "8130h" in booted.session.device.alarm()
+    assert "8130h" in alarm(booted.session.device)
     booted.session.network.start(booted.session.winch.node_id)  # CiA 301, 1029h: it had left it
 
 

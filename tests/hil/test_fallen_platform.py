@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from cdpr_profiles.reading.places import SHIPPED
+from cdpr_profiles.places import SHIPPED
 from cdpr_rt.core.states import LoopState
-from cdpr_tools.trials.evaluation.pose_log import read_pose_log
 from cdpr_tools.trials.lockstep import CommandRefusedError, LockstepRobot
+from cdpr_tools.trials.pose_log import read_pose_log
 
 LOOSE_N, TAKES_UP_N = 15.0, 40.0
 """What no winch pulls with that is not told to, and what slack is taken up with, and friction."""
@@ -22,13 +22,13 @@ LOOSE_N, TAKES_UP_N = 15.0, 40.0
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The shipped robots with half as many cycles a second, which take half the time."""
+    """The shipped robots with a quarter of the cycles a second, which take less time."""
     place = tmp_path_factory.mktemp("robots")
     for name in ("spatial-8", "suspended-8"):
         shipped = (SHIPPED / "robots" / f"{name}.toml").read_text()
         assert "sync_period_s = 0.001" in shipped
         (place / f"{name}.toml").write_text(
-            shipped.replace("sync_period_s = 0.001", "sync_period_s = 0.002")
+            shipped.replace("sync_period_s = 0.001", "sync_period_s = 0.004")
         )
     return place
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from cdpr_profiles.limits.robot_limits import Limit
+from cdpr_profiles.robot_limits import Limit
 from cdpr_tools.errors import WorkFailedError
 from cdpr_tools.trials.lockstep import LockstepRobot
 

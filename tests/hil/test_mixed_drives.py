@@ -13,11 +13,12 @@ from profile_rig import DRIVES, MixedSimulator, write_winch
 from cdpr_drivers.axes.axis_group import AxisGroup
 from cdpr_drivers.axes.axis_layout import AxisConfig
 from cdpr_drivers.bus import BusUrl
-from cdpr_drivers.bus.simulated_bus import open_clock
-from cdpr_drivers.canopen.boot.boot import BootSettings, boot_all
+from cdpr_drivers.bus.simbus import open_clock
+from cdpr_drivers.canopen.boot import BootSettings, boot_all
 from cdpr_drivers.canopen.network import CanNetwork
 from cdpr_drivers.cia402 import Mode, State
 from cdpr_drivers.errors import ModeRefusedError
+from tests.fault_texts import alarm
 
 MASTER, PERIOD_S, HEARTBEAT_S = 127, 1e-3, 0.1
 
@@ -50,7 +51,7 @@ def _cycles(group: AxisGroup, count: int, torques_Nm: list[float]) -> None:
         assert group.receive() == group.n
         group.command.torque_Nm[:] = torques_Nm
         group.transmit()
-        assert group.alarm() == ""
+        assert alarm(group) == ""
 
 
 def _until(group: AxisGroup, state: State) -> None:

@@ -9,9 +9,10 @@ import pytest
 
 from cdpr_profiles import load_robot
 from cdpr_rt.core.states import LoopState
-from cdpr_rt.robots.cable_loss.prediction import SWING_S, CableLoss
-from cdpr_tools.trials.evaluation.pose_log import read_pose_log
+from cdpr_rt.diagnosis.predictions import SWING_S, CableLoss
+from cdpr_rt.diagnosis.subject import Subject
 from cdpr_tools.trials.lockstep import LockstepRobot
+from cdpr_tools.trials.pose_log import read_pose_log
 
 CUT = 12
 MOST = 1.3
@@ -35,7 +36,7 @@ def test_a_platform_swings_and_gets_as_far_as_predicted(
     text = robot.read_text()
     assert text.count("sync_period_s") == 1
     slower.write_text(text.replace("sync_period_s = 0.001", "sync_period_s = 0.002"))
-    predicted = CableLoss(load_robot(slower)).swing(cable, place_m)
+    predicted = CableLoss(Subject(load_robot(slower))).swing(cable, place_m)
     with LockstepRobot(slower) as rig:
         rig.enable()
         rig.carry_out("tighten")

@@ -29,15 +29,13 @@ from safety_rig import (
 )
 
 from cdpr_drivers.modbus.safety_io import SafetyIoError
-from cdpr_drivers.rails.rail import RailError
-from cdpr_drivers.rails.rail_cia402 import Cia402RailAxis
-from cdpr_drivers.rails.rail_modbus import ModbusRailAxis
-from cdpr_profiles.devices.rail import load_rail
+from cdpr_drivers.rails.rail import Cia402RailAxis, ModbusRailAxis, RailError
+from cdpr_profiles.rail import load_rail
 from cdpr_sim_bus.devices.sim_rail import RailFault
 from cdpr_sim_bus.devices.sim_safety_io import SafetyIoFault
 from cdpr_sim_bus.physics_board import PhysicsBoard
 from cdpr_tools import cli
-from cdpr_tools.commands.devices import rail as rail_commands
+from cdpr_tools.commands import rail as rail_commands
 from cdpr_tools.errors import BAD_INPUT, BadInputError
 
 FAILED = 1

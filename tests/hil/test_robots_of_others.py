@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cdpr_rt.robots.feasibility.checks import refuse_impossible
-from cdpr_rt.robots.statics import statics_of
+from cdpr_rt.diagnosis.checks import refuse_impossible
+from cdpr_rt.model.statics import statics_of
 from cdpr_tools.trials.lockstep import LockstepRobot
 
 OTHERS = sorted((Path(__file__).parent / "others").glob("*.toml"))

@@ -27,8 +27,8 @@ from cdpr_profiles import load_winch
 from cdpr_rt.errors import ControlError
 from cdpr_sim_bus.devices.sim_safety_io import SafetyIoFault
 from cdpr_sim_bus.physics_board import BoardAxis, PhysicsBoard
-from cdpr_tools.commands.devices import io as io_commands
-from cdpr_tools.commands.drive import drive as drive_commands
+from cdpr_tools.commands import drive as drive_commands
+from cdpr_tools.commands import io as io_commands
 from cdpr_tools.errors import BadInputError, WorkFailedError
 
 WINCH = "winch-mpp0923d"
@@ -230,7 +230,9 @@ def test_watching_tells_what_changes_and_changes_nothing(lab: Lab) -> None:
     assert watching.stdout is not None
     lines = [watching.stdout.readline() for _ in range(6)]
     lab.io_device.press()
-    lines.append(watching.stdout.readline())
+    while not lines[-1].strip().endswith("chain  OPEN"):
+        lines.append(watching.stdout.readline())
+        assert lines[-1], "it ended before it showed the open chain"
     watching.send_signal(signal.SIGINT)
     more, errors = watching.communicate(timeout=120)
     assert (watching.returncode, more) == (0, ""), errors  # once each, and the change

@@ -19,7 +19,7 @@ from typing import Any
 import pytest
 
 from cdpr_profiles import load_winch
-from cdpr_profiles.reading.places import SHIPPED
+from cdpr_profiles.places import SHIPPED
 from cdpr_profiles.winch_calibration import WinchCalibration
 from cdpr_sim_bus.physics_board import PhysicsBoard
 from cdpr_tools.cli import main
@@ -186,11 +186,11 @@ def watched_session(folder: Path, bus: str, cells: Simulator) -> None:
     watched = (WINCH, "--bus", bus, "--seconds", "0.2", "--tension-port", cells.port, "--sensors")
     assert run("drive", "jog", *watched, "rtu-load-cell-1")["ok"]
     error = run("drive", "enable", *watched, tight, status=FAILED)["error"]
-    assert re.fullmatch(r"winch 1: \d+\.\d N, 50 N allowed", error)
+    assert re.fullmatch(r"axis 1: load cell winch 1: \d+\.\d N, 50 N allowed", error)
     cells.tell("broken-wire 1")
     home = ("drive", "home", WINCH, "--bus", bus, "--sensors", "rtu-load-cell-1")
     error = run(*home, "--tension-port", cells.port, status=FAILED)["error"]
-    assert error == "winch 1: tension sensor: broken wire"
+    assert error == "axis 1: winch 1: tension sensor: broken wire"
     cells.tell("mend 1")
     assert "go together" in run(*home, status=BAD_INPUT)["error"]
 

@@ -138,8 +138,8 @@ def test_a_slave_without_process_data_boots_as_far_as_it_goes(
         node.nmt.state = "PRE-OPERATIONAL"
         ended = cdpr("drive", "enable", winch, "--bus", bus)
         assert ended.returncode == 1
-        assert "node 1: no answer to SYNC" in ended.stderr
-        assert "its TPDOs are off" in ended.stderr
+        assert "node 1) has not answered SYNC" in ended.stderr
+        assert "its TPDOs were changed" in ended.stderr
         assert len(ended.stderr.strip().splitlines()) == 1
 
 

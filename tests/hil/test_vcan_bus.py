@@ -8,7 +8,7 @@ import time
 import can
 import pytest
 
-from cdpr_drivers.bus.adapters.socketcan import open_socketcan
+from cdpr_drivers.bus.socketcan import open_socketcan
 from cdpr_drivers.bus.url import BusUrl
 from cdpr_drivers.errors import BusError
 

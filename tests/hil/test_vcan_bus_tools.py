@@ -11,9 +11,9 @@ import pytest
 from cdpr_drivers.bus import BusUrl
 from cdpr_drivers.decode import Frame
 from cdpr_profiles import load_winch
+from cdpr_tools.busview.monitor import FrameSource
 from cdpr_tools.busview.replay import Sender
 from cdpr_tools.busview.scan import Scan, entry, responding
-from cdpr_tools.busview.source import PythonCanSource, open_source
 
 pytestmark = pytest.mark.vcan
 
@@ -53,7 +53,7 @@ def test_scan_finds_a_third_partys_slave(slave: canopen.LocalNode) -> None:
     assert not scan.traffic.sdo_requests  # our own requests are not taken for a master's
 
 
-def frames_of(source: PythonCanSource, n: int) -> list[Frame]:
+def frames_of(source: FrameSource, n: int) -> list[Frame]:
     found: list[Frame] = []
     until = time.monotonic() + 60.0
     while len(found) < n and time.monotonic() < until:
@@ -63,8 +63,7 @@ def frames_of(source: PythonCanSource, n: int) -> list[Frame]:
 
 
 def test_monitor_sees_every_kind_of_frame_when_it_came() -> None:
-    source = open_source(URL)
-    assert isinstance(source, PythonCanSource)
+    source = FrameSource(URL)
     now = time.time()
     kinds = [
         Frame(0.0, 0x181, bytes(8)),

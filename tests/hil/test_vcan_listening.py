@@ -13,6 +13,7 @@ from cdpr_drivers.bus import BusUrl, open_port
 from cdpr_drivers.bus.frames import FRAME
 from cdpr_profiles import load_winch
 from cdpr_rt.core.clock import PacedClock
+from tests.fault_texts import alarm
 
 pytestmark = pytest.mark.vcan
 
@@ -35,7 +36,7 @@ def test_what_is_said_is_heard_and_nothing_added() -> None:
             device.transmit()
             turned = 100 * k / winch.encoder_counts_per_turn * math.tau
             assert device.feedback.position_rad[0] == pytest.approx(turned)
-        assert device.alarm() == ""
+        assert alarm(device) == ""
         device.forget_alarms()
     talker.close()
     assert int(SENT.read_text()) - before == 200

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import pytest
 from fork_server import FORKED
 
-from cdpr_drivers.bus import BusUrl, FrameBuffer, open_port, open_python_can
+from cdpr_drivers.bus import BusUrl, FrameBuffer, open_port
 from cdpr_drivers.bus.frames import FRAME
 from cdpr_drivers.errors import BusError
 
@@ -63,11 +63,12 @@ def test_cycles_over_vcan(simulator: subprocess.Popen[bytes]) -> None:
     port.settimeout(0.05)
     with pytest.raises(BlockingIOError):
         port.recv_into(rx.rows[0])
-    with open_python_can(url, [(0x280, 0x780)]) as acyclic:
-        port.send(tx.rows[1])
-        message = acyclic.recv(60.0)
-        assert message is not None
-        assert (message.arbitration_id, bytes(message.data)) == (0x281, b"other")
+    acyclic = open_port(url, [(0x280, 0x780)])
+    acyclic.settimeout(60.0)
+    port.send(tx.rows[1])
+    acyclic.recv_into(rx.rows[0])
+    assert bytes(rx.rows[0]) == FRAME.pack(0x281, 5, b"other")
+    acyclic.close()
     assert port.drain() == 1
     port.close()
 

@@ -19,9 +19,8 @@ from cdpr_drivers.bus import BusUrl
 from cdpr_drivers.canopen.lss import LssAddress, LssMaster
 from cdpr_profiles import load_drive
 from cdpr_rt.core.clock import PacedClock
-from cdpr_sim_bus.bus.client import raw_can_socket
+from cdpr_sim_bus.bus.client import LocalNode, raw_can_socket
 from cdpr_sim_bus.bus.hub import Hub
-from cdpr_sim_bus.bus.switch import LocalNode
 from cdpr_sim_bus.canopen import CanopenSlave, ObjectDictionary, SlaveApplication
 from cdpr_sim_bus.canopen.lss import UNCONFIGURED
 from cdpr_sim_bus.cia402.drive import SimDrive

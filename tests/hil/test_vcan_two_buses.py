@@ -16,7 +16,7 @@ from tolerant_drive import write_tolerant_robot
 
 import cdpr_profiles
 from cdpr_profiles import load_robot
-from cdpr_rt.control.proportional import Proportional
+from cdpr_rt.control.pid import Proportional
 from cdpr_rt.motion.trajectory import TrapezoidalMove
 from cdpr_tools.composition.session import open_robot
 from cdpr_tools.output import Output

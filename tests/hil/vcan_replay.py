@@ -2,30 +2,20 @@
 
 import json
 import os
-import subprocess
 import sys
 import tempfile
 from collections.abc import Iterator, Sequence
-from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
 import pytest
 import vcan_guest
-from fork_server import FORKED
 from vcan_guest import NoGuestError
 
 REPOSITORY = Path(__file__).parents[2]
 GUEST_CACHE = REPOSITORY / "build" / "vcan-guest"
 REPORTS_VARIABLE = "CDPR_VCAN_REPORTS"
-_COMPILING_S = 300.0
-_LOOPS = """
-from cdpr_tools.trials.lockstep import LockstepRobot
-for robot in ("bench-2", "bench-8"):
-    with LockstepRobot(robot):
-        pass
-"""
 # memory that is given back comes in again page by page, and a page fault is dear in a guest kernel
 _KEEP_MEMORY = {"MALLOC_MMAP_THRESHOLD_": str(32 << 20), "MALLOC_TRIM_THRESHOLD_": str(1 << 30)}
 
@@ -54,22 +44,11 @@ def run_in_guest(names: Sequence[str]) -> Outcome:
         }
         try:
             guest = vcan_guest.obtain(GUEST_CACHE)
-            _compile_kernels()
             run = vcan_guest.run(guest, command, REPOSITORY, environment, Path(scratch))
         except NoGuestError as error:
             return Outcome({}, "", str(error))
         text = written.read_text(encoding="utf-8") if written.exists() else ""
     return Outcome(parse(text), f"{run.output}\nexit code {run.exit_code}")
-
-
-def _compile_kernels() -> None:
-    """Start loops out here, which compiles their kernels: a guest is slow at it, and keeps none.
-
-    A robot whose axes are on two buses has other machine code for its frames than on one. What
-    fails here is told by the test that does the same in the guest.
-    """
-    with suppress(subprocess.TimeoutExpired):
-        subprocess.run([*FORKED, _LOOPS], capture_output=True, timeout=_COMPILING_S, check=False)
 
 
 def parse(text: str) -> dict[str, list[dict[str, Any]]]:

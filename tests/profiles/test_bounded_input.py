@@ -10,9 +10,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from cdpr_profiles import ProfileError, load_motor
+from cdpr_profiles.bounded_input import parse_json, read_toml
 from cdpr_profiles.motor import Motor
-from cdpr_profiles.reading.bounded_input import parse_json, read_toml
-from cdpr_profiles.reading.reader import validated
+from cdpr_profiles.reader import validated
 
 
 @pytest.mark.parametrize(

@@ -1,6 +1,5 @@
 """The shipped drives' data sheets are well formed and say what their profiles say."""
 
-import logging
 from collections.abc import Iterator
 from configparser import RawConfigParser
 from pathlib import Path
@@ -41,32 +40,6 @@ def _mappings(od: canopen.ObjectDictionary) -> Iterator[int]:
     return (i for i in od if 0x1600 <= i < 0x1800 or 0x1A00 <= i < 0x1C00)
 
 
-def test_the_library_reads_it_without_a_warning(drive, caplog, recwarn):
-    with caplog.at_level(logging.DEBUG):
-        canopen.import_od(str(drive.eds), NODE_ID)
-    assert not caplog.records
-    assert not recwarn.list
-
-
-def test_identity_is_the_profiles(drive, od):
-    assert od[0x1018][1].default == drive.vendor_id == od.device_information.vendor_number
-    assert od[0x1018][2].default == drive.product_code == od.device_information.product_number
-    assert od[0x1018][3].default == drive.revision == od.device_information.revision_number
-    assert od[0x1000].default == od[0x67FF].default == 0x00020192
-
-
-def test_modes_and_homing_methods_are_the_profiles(drive, od):
-    bits = {1: 0, 2: 1, 3: 2, 4: 3, 6: 5, 7: 6, 8: 7, 9: 8, 10: 9}
-    if 0x6502 in od:
-        assert od[0x6502].default == sum(1 << bits[mode] for mode in drive.supported_modes)
-    if 0x60E3 in od:
-        methods = od[0x60E3]
-        assert tuple(methods[i].default for i in range(1, methods[0].default + 1)) == (
-            drive.homing_methods
-        )
-    assert od[0x6098].default in drive.homing_methods
-
-
 def test_the_profiles_pdos_can_be_mapped(drive, od):
     for base, pdos in ((0x1400, drive.rpdos), (0x1800, drive.tpdos)):
         for pdo in pdos:
@@ -96,40 +69,11 @@ def test_every_default_mapping_names_a_mappable_object_of_its_length(od):
         assert 0 < total <= 64
 
 
-def test_maps_hold_as_many_objects_as_they_say(od):
-    for index in _mappings(od):
-        assert od[index][0].max == len(od[index]) - 1
-        assert index - 0x200 in od, "a map without communication parameters"
-
-
-def test_pdos_of_the_device_information_are_there(od):
-    info = od.device_information
-    assert sum(0x1600 <= i < 0x1800 for i in od) == info.nr_of_RXPDO
-    assert sum(0x1A00 <= i < 0x1C00 for i in od) == info.nr_of_TXPDO
-
-
 def test_identifiers_of_pdos_that_exist_are_the_predefined_ones(od):
     for base, first in ((0x1400, 0x200), (0x1800, 0x180)):
         for number in range(4):
             cob_id = od[base + number][1].default
             assert cob_id & 0x7FF == first + 0x100 * number + NODE_ID
-
-
-def test_generic_default_pdos_are_the_profiles(generic):
-    for base, pdos in ((0x1400, GENERIC.rpdos), (0x1800, GENERIC.tpdos)):
-        for pdo in pdos:
-            communication, mapping = (
-                generic[base + pdo.number - 1],
-                generic[base + 0x1FF + pdo.number],
-            )
-            assert communication[1].default == pdo.cob_id(NODE_ID)
-            count = mapping[0].default
-            assert [mapping[i].default for i in range(1, count + 1)] == [
-                e.mapping for e in pdo.entries
-            ]
-        for number in range(1, 5):
-            off = bool(generic[base + number - 1][1].default & 1 << 31)
-            assert off == (number not in {pdo.number for pdo in pdos})
 
 
 def test_defaults_lie_within_their_limits(variables):

@@ -21,7 +21,7 @@ from cdpr_profiles.calibration.in_force import (
     take_over,
     undo,
 )
-from cdpr_profiles.reading.places import SHIPPED
+from cdpr_profiles.places import SHIPPED
 
 
 @pytest.fixture
@@ -174,3 +174,31 @@ def test_that_of_another_name_is_not_taken_for_a_version(tmp_path: Path) -> None
     for version in (1, 2):
         take_over(load_robot(other), calibration(load_robot(other), version))
     assert next_version(load_robot(named)) == 1
+
+
+def test_a_calibration_that_cannot_be_read_is_not_taken_for_none(robot: Robot) -> None:
+    path = take_over(robot, calibration(robot))
+    elsewhere = path.with_name("share")
+    path.rename(elsewhere)
+    path.symlink_to(elsewhere)
+    assert calibrated(robot).calibration is not None, "a link to a file is as good as the file"
+    elsewhere.rename(elsewhere.with_name("unmounted"))
+    for refused in (calibrated, next_version, undo):
+        with pytest.raises(ProfileError, match=r"is a link to .*, which is not there; mount or"):
+            refused(robot)
+    path.unlink()
+    path.mkdir()
+    for refused in (calibrated, undo):
+        with pytest.raises(ProfileError, match="is no"):
+            refused(robot)
+
+
+def test_a_folder_of_calibrations_that_is_not_mounted_is_not_taken_for_none(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
+    shipped = load_robot("planar-4")
+    assert calibrated(shipped) is shipped
+    (tmp_path / "cdpr-rt").symlink_to(tmp_path / "share")
+    with pytest.raises(ProfileError, match=r"cdpr-rt is a link to .*share, which is not there"):
+        calibrated(shipped)

@@ -9,10 +9,10 @@ import math
 import pytest
 
 from cdpr_profiles import load_motor, load_motor_ratings
-from cdpr_profiles.motor import Motor, MotorDetail, MotorRatings, MotorSeries
-from cdpr_profiles.reading.places import SHIPPED
-from cdpr_profiles.reading.reader import read_toml_model
-from cdpr_profiles.reading.units import RAD_S_PER_RPM, kg_m2_PER_lb_in_s2
+from cdpr_profiles.cable import N_PER_KGF
+from cdpr_profiles.motor import RAD_S_PER_RPM, Motor, MotorDetail, MotorRatings, MotorSeries
+from cdpr_profiles.places import SHIPPED
+from cdpr_profiles.reader import read_toml_model
 
 SERIES = read_toml_model(SHIPPED / "motors" / "parker-mpp-mpj.series.toml", MotorSeries)
 ROWS_230 = SERIES.ratings.models_230_VAC
@@ -21,6 +21,7 @@ ROWS = {row.model: row for row in ROWS_230 + ROWS_460}
 
 # Factors with which the source was evidently computed.
 LB_IN_PER_NM = 8.85
+kg_m2_PER_lb_in_s2 = 0.45359237 * N_PER_KGF * 0.0254
 KW_PER_HP = 0.75
 PEAK_OVER_STALL_CURRENT = 3.16
 

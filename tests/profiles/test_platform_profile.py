@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from cdpr_profiles import ProfileError, load_robot
-from cdpr_profiles.reading.places import SHIPPED
+from cdpr_profiles.places import SHIPPED
 
 PLANAR = (SHIPPED / "robots" / "planar-3.toml").read_text()
 

@@ -14,15 +14,15 @@ from hypothesis import strategies as st
 
 from cdpr_drivers.bus.budget import machine_budget
 from cdpr_profiles import ProfileError, load_robot
-from cdpr_profiles.limits.robot_limits import Limit, Reactions, RobotLimits
+from cdpr_profiles.bounded_input import read_toml
+from cdpr_profiles.places import SHIPPED
 from cdpr_profiles.platform import PlatformFile
-from cdpr_profiles.reading.bounded_input import read_toml
-from cdpr_profiles.reading.places import SHIPPED
-from cdpr_profiles.reading.reader import validated
+from cdpr_profiles.reader import validated
+from cdpr_profiles.robot_limits import Limit, Reactions, RobotLimits
 from cdpr_profiles.winch_calibration import WinchCalibration
 from cdpr_rt.core.states import Reaction
-from cdpr_rt.core.supervision.limits import DEFAULT_REACTIONS
-from cdpr_rt.robots.robot_arrays import described, limits_of, winches_of
+from cdpr_rt.core.supervisor import DEFAULT_REACTIONS
+from cdpr_rt.model.robot_arrays import described, limits_of, winches_of
 
 FILE = """
 name = "Two"
@@ -289,7 +289,7 @@ DOCS = Path(__file__).parents[2] / "docs"
 
 
 def test_the_documented_robot_is_one(tmp_path: Path) -> None:
-    text = (DOCS / "describing-your-robot.md").read_text()
+    text = (DOCS / "how-to" / "describing-your-robot.md").read_text()
     robot, _devices, platform, limits = re.findall(r"```toml\n(.*?)```", text, re.DOTALL)
     winch = (SHIPPED / "winches" / "winch-mpp0923d.toml").read_text()
     (tmp_path / "my-winch.toml").write_text(winch)
@@ -317,6 +317,13 @@ def test_the_documented_robot_is_one(tmp_path: Path) -> None:
 
 
 def test_the_documented_reactions_are_the_defaults() -> None:
-    text = (DOCS / "supervisor.md").read_text()
+    text = (DOCS / "reference" / "supervisor.md").read_text()
     rows = re.findall(r"^\| `(\w+)` \|.*\| ([a-z ]+) \|$", text, re.M)
     assert rows == [(limit.key, reaction.label) for limit, reaction in DEFAULT_REACTIONS.items()]
+
+
+def test_each_text_takes_value_and_allowed_value() -> None:
+    """A limit without a text is told by whoever found it."""
+    for limit in Limit:
+        assert limit.text.count("{") <= 2
+        limit.text.format(1.0, 2.0)

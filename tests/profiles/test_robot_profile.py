@@ -91,16 +91,14 @@ def test_a_machine_is_a_winch_or_a_robot(tmp_path: Path):
     assert isinstance(load_winch_or_robot("spatial-8"), Robot)
     assert isinstance(load_winch_or_robot(robot_file(tmp_path)), Robot)
     winch = tmp_path / "winch.toml"
-    winch.write_text(
-        (cdpr_profiles.reading.places.SHIPPED / "winches/winch-mpp0923d.toml").read_text()
-    )
+    winch.write_text((cdpr_profiles.places.SHIPPED / "winches/winch-mpp0923d.toml").read_text())
     assert isinstance(load_winch_or_robot(winch), Winch)
     with pytest.raises(ProfileError, match="did you mean 'spatial-8'"):
         load_winch_or_robot("spatial8")
 
 
 def test_devices_beside_the_drives_are_found_from_anywhere(tmp_path: Path):
-    shipped = cdpr_profiles.reading.places.SHIPPED / "safety_io/modbus-remote-io.toml"
+    shipped = cdpr_profiles.places.SHIPPED / "safety_io/modbus-remote-io.toml"
     (tmp_path / "io.toml").write_text(shipped.read_text())
     top = 'safety_io = "./io.toml@127.0.0.1:1502"\nrails = ["rail-modbus", "sub/mine.toml"]'
     robot = load_robot(robot_file(tmp_path, top=top, node=1))

@@ -98,7 +98,7 @@ def test_a_bus_that_stands_for_ever_fills_no_memory(
 
 def test_two_simulators_do_not_write_one_file(tmp_path: Path) -> None:
     path = tmp_path / "frames.log"
-    path.write_text("of before")
+    path.write_text("(0000000001.000000) can0 080#\n")
     log = FrameLog(path)
     with pytest.raises(OSError, match="another simulator writes it"):
         FrameLog(path)
@@ -107,6 +107,14 @@ def test_two_simulators_do_not_write_one_file(tmp_path: Path) -> None:
     assert path.read_text() == "(0000000000.500000) can0 080#\n"
     FrameLog(path).close()
     assert path.read_text() == ""
+
+
+def test_a_recording_of_a_real_bus_is_not_overwritten(tmp_path: Path) -> None:
+    path = tmp_path / "frames.log"
+    path.write_text("(1764335419.123456) can0 080#\n")
+    with pytest.raises(OSError, match="is no log of a simulator"):
+        FrameLog(path)
+    assert path.read_text() == "(1764335419.123456) can0 080#\n"
 
 
 def test_a_full_disk_ends_the_log_and_not_the_bus(capsys: pytest.CaptureFixture[str]) -> None:

@@ -34,10 +34,10 @@ from pathlib import Path
 import numpy as np
 from cdpr_profiles import load_winch
 from cdpr_sim_bus.robot.cable_robot import CableRobot
-from cdpr_sim_bus.robot.logs.platform_record import RobotShape
+from cdpr_sim_bus.robot.platform import RobotShape
 from cdpr_sim_bus.cia402.drive import SimDrive, transmission_of
-from cdpr_sim_bus.fleet import FleetBus, serve_fleet
-from cdpr_sim_bus.robot.logs.pose_logs import PoseLog
+from cdpr_sim_bus.bus.server import FleetBus, serve_fleet
+from cdpr_sim_bus.robot.truth_log import PoseLog
 from cdpr_sim_bus.robot.robot_plant import RobotPlant
 from dataclasses import replace
 

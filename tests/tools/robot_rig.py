@@ -15,9 +15,9 @@ from pathlib import Path
 import numpy as np
 
 import cdpr_profiles
-from cdpr_drivers.robot.session import Session
-from cdpr_rt.control.proportional import Proportional
+from cdpr_rt.control.pid import Proportional
 from cdpr_rt.motion.trajectory import TrapezoidalMove
+from cdpr_tools.composition.session import Session
 from cdpr_tools.output import Output
 
 OUT = Output(as_json=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import subprocess
 import sys
@@ -13,7 +14,7 @@ from cdpr_tools.compiling import NOTICE
 
 KERNELS = """
 from cdpr_tools.compiling import announce_compiling
-from {module} import jit
+from cdpr_profiles.jit import jit
 
 announce_compiling("the test")
 
@@ -29,15 +30,14 @@ print(outer(1.0, 2), len(inner.signatures))
 """
 
 
-@pytest.mark.parametrize("module", ["cdpr_rt.jit", "cdpr_sim_bus.jit"])
 def test_kernels_of_which_nothing_is_kept_are_told_once_and_compiled_once(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, module: str
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """One machine code serves constants and numbers that are not known beforehand."""
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "kept"))
     monkeypatch.delenv("CDPR_COMPILING_TOLD", raising=False)  # by a command in this process
     script = tmp_path / "kernels.py"
-    script.write_text(KERNELS.format(module=module))
+    script.write_text(KERNELS)
     first, again = (
         subprocess.run([sys.executable, str(script)], capture_output=True, text=True, check=True)
         for _ in range(2)
@@ -124,3 +124,50 @@ def test_who_listens_is_told_of_each_kernel_and_of_what_is_passed_on() -> None:
         f"{NOTICE} the drives goes on: 5 kernels so far",
     ]
     assert f"{NOTICE} the drives goes on: 5 kernels so far ...\n" in done.stderr
+
+
+TASKS = """
+from cdpr_profiles import load_robot
+from cdpr_tools.host.kernels import compile_with
+
+def needs(name):
+    raise ModuleNotFoundError(name=name)
+
+compile_with("a task", lambda: print(len(load_robot("planar-3").axes)))
+compile_with("a task", lambda: needs("fastapi.responses"))
+try:
+    compile_with("a task", lambda: needs("cdpr_rt.gone"))
+except ModuleNotFoundError as error:
+    print(error.name)
+"""
+
+
+def test_kernels_are_compiled_with_shipped_robots_and_without_optional_modules_only(
+    tmp_path: Path,
+) -> None:
+    own = tmp_path / "cdpr-rt" / "profiles" / "robots" / "planar-3.toml"
+    own.parent.mkdir(parents=True)
+    own.write_text("axes = []\n")
+    done = subprocess.run(
+        [sys.executable, "-c", TASKS],
+        env=os.environ | {"XDG_CONFIG_HOME": str(tmp_path)},
+        capture_output=True, text=True, check=True,
+    )  # fmt: skip
+    assert done.stdout.split() == ["3", "cdpr_rt.gone"]
+
+
+def test_doctor_compiles_nothing_if_machine_code_can_be_kept_nowhere() -> None:
+    # numba looks for a folder only for functions of a notebook
+    nowhere = os.environ | {"NUMBA_CACHE_LOCATOR_CLASSES": "IPythonCacheLocator"}
+    program = (
+        "from cdpr_profiles import user_folders; from pathlib import Path\n"
+        "user_folders.temporary_folder = lambda: Path('/proc/nowhere/own')\n"
+        "from cdpr_tools.cli import main; main()"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", program, "doctor", "--compile"],
+        env=nowhere, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == 1 and done.stdout == ""
+    assert done.stderr.count("\n") == 1
+    assert "/proc/nowhere/own; set NUMBA_CACHE_DIR to a folder that can be written" in done.stderr

@@ -6,10 +6,11 @@ import io
 import os
 import pty
 import time
-from contextlib import redirect_stderr, suppress
+from contextlib import redirect_stderr, redirect_stdout, suppress
 from types import SimpleNamespace
 
 import pytest
+from rich.table import Table
 
 from cdpr_tools import output
 from cdpr_tools.output import Output
@@ -77,3 +78,31 @@ def test_a_bar_on_a_terminal(monkeypatch: pytest.MonkeyPatch) -> None:
             shown += piece
     assert b"winding" in shown
     os.close(ours)
+
+
+ACTING = "\x1b]0;owned\x07 \x9b31m \x7f \u202etxt.exe \r \udc9b [red]"
+SHOWN = "\\x1b]0;owned\\x07 \\x9b31m \\x7f \\u202etxt.exe \\r \\udc9b [red]"
+
+
+@pytest.mark.parametrize("as_json", [False, True])
+def test_no_text_acts_on_the_terminal(as_json: bool) -> None:
+    told, noted = io.StringIO(), io.StringIO()
+    with redirect_stdout(told), redirect_stderr(noted):
+        out = Output(as_json)
+        out.say(ACTING)
+        out.note(ACTING)
+        table = Table(ACTING, box=None)
+        table.add_row(ACTING)
+        out.text.print(table)
+        with out.stage(ACTING):
+            pass
+    assert set("\x1b\x07\x9b\x7f\u202e\r\udc9b").isdisjoint(told.getvalue() + noted.getvalue())
+    assert SHOWN in (noted if as_json else told).getvalue() and SHOWN in noted.getvalue()
+
+
+def test_styles_still_reach_a_terminal(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("FORCE_COLOR", "1")
+    noted = io.StringIO()
+    with redirect_stderr(noted):
+        Output(as_json=False).note("on \x1b[5m")
+    assert noted.getvalue().startswith("\x1b[2m") and "on \\x1b[5m" in noted.getvalue()

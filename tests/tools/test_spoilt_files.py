@@ -18,38 +18,37 @@ from hypothesis import given, seed, settings
 from hypothesis import strategies as st
 
 from cdpr_drivers.errors import DriverError
-from cdpr_drivers.robot.bus_fit import require_fit
 from cdpr_drivers.robot.commissioned import load_profile
+from cdpr_drivers.robot.robot_buses import require_fit
 from cdpr_profiles import load_motor, load_robot
-from cdpr_profiles.devices.rail import load_rail
-from cdpr_profiles.devices.safety_io import load_safety_io
-from cdpr_profiles.devices.tension_sensor import load_tension_sensors
-from cdpr_profiles.eds.dictionary import load_dictionary
-from cdpr_profiles.eds.eds_check import read_eds
+from cdpr_profiles.eds import load_dictionary
 from cdpr_profiles.errors import ProfileError
-from cdpr_profiles.limits.motor_bounds import MotorBounds
 from cdpr_profiles.motor import Motor
-from cdpr_profiles.reading.places import SHIPPED
-from cdpr_profiles.reading.reader import dotted
+from cdpr_profiles.motor_bounds import MotorBounds
+from cdpr_profiles.places import SHIPPED
+from cdpr_profiles.rail import load_rail
+from cdpr_profiles.reader import dotted
+from cdpr_profiles.safety_io import load_safety_io
+from cdpr_profiles.tension_sensor import load_tension_sensors
 from cdpr_profiles.winch_calibration import WinchCalibration
 from cdpr_rt.control.tuning import design_pid
 from cdpr_rt.errors import ControlError, InvalidRequestError
 from cdpr_rt.identification.rawlog import RawLogWriter, column_names, read_raw_log
-from cdpr_rt.procedures.commissioning.commission_files import Paths
-from cdpr_rt.procedures.commissioning.results import read_run
+from cdpr_rt.model.last_lengths import LastLengths
+from cdpr_rt.model.robot_arrays import described, limits_of, winches_of
+from cdpr_rt.procedures.commissioning_results import Paths, read_run
 from cdpr_rt.procedures.measurement import recording
-from cdpr_rt.robots.persistence.last_lengths import LastLengths
-from cdpr_rt.robots.robot_arrays import described, limits_of, winches_of
-from cdpr_sim_bus.canopen.dictionary.od import ObjectDictionary
+from cdpr_sim_bus.canopen.od import ObjectDictionary
 from cdpr_sim_bus.cia402.drive import SimDrive
 from cdpr_sim_bus.devices.sim_load_cells import AmplifierPlant
 from cdpr_sim_bus.devices.sim_safety_io import SafetyPlant
 from cdpr_sim_bus.errors import SimulatorError
 from cdpr_sim_bus.robot.plant import Plant
 from cdpr_sim_bus.robot.robot_plant import RobotPlant
+from cdpr_tools.commission.page import bus_facts
 from cdpr_tools.errors import CommandError
 from cdpr_tools.recordings.stored_settings import load_settings
-from cdpr_tools.report import tables, words
+from cdpr_tools.report.page import number
 from cdpr_tools.teleop.script import read_script
 from cdpr_tools.trials.trial import TrialSettings
 from tests.profiles.test_robot_limits import calibration
@@ -121,8 +120,9 @@ def use_lengths(path: Path) -> None:
 
 
 def tell_of_run(run: dict[str, Any]) -> None:
-    assert words.loop_words(run["pid"][0])
-    assert tables.bus(run["bus"])
+    assert all(number(value) for key, value in run["pid"][0].items() if key != "gains")
+    assert all(number(value) for value in run["pid"][0]["gains"].values())
+    assert bus_facts(run["bus"])
 
 
 def use_store(path: Path) -> None:
@@ -169,7 +169,6 @@ def profiles(folder: Path) -> dict[str, Kind]:
         "tension sensors": Kind(folder / sensors, lambda: load_tension_sensors(folder / sensors)),
         "safety I/O": Kind(folder / io, lambda: load_safety_io(folder / io)),
         "rail": Kind(folder / rail, lambda: load_rail(folder / rail)),
-        "EDS, checked": Kind(eds, lambda: read_eds(eds)),
         "EDS, the master's": Kind(eds, lambda: load_dictionary(eds, 5)),
         "EDS, the simulator's": Kind(eds, lambda: ObjectDictionary.from_eds(eds, 5)),
     }
@@ -248,7 +247,7 @@ NAMES = (
     *("robot", "winch", "motor", "drive", "cable", "calibration", "calibration alone"),
     *("cogging profile", "lengths", "stored parameters", "run", "trial", "script"),
     *("plant", "robot's plant", "safety plant", "tension plant", "tension sensors", "safety I/O"),
-    *("rail", "EDS, checked", "EDS, the master's", "EDS, the simulator's", "raw log"),
+    *("rail", "EDS, the master's", "EDS, the simulator's", "raw log"),
 )
 
 

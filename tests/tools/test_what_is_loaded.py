@@ -9,9 +9,7 @@ import pytest
 
 from cdpr_tools import cli
 from cdpr_tools.command_group import load
-from cdpr_tools.commands.drive import group as drive
-from cdpr_tools.commands.robot import group as robot
-from cdpr_tools.commands.sim import sim
+from cdpr_tools.commands import groups
 
 
 def _loaded(code: str) -> set[str]:
@@ -27,7 +25,7 @@ def _loaded(code: str) -> set[str]:
 
 @pytest.mark.parametrize(
     "modules",
-    [cli.MODULES, sim.MODULES, drive.MODULES, robot.MODULES],
+    [cli.MODULES, groups.SIM, groups.DRIVE, groups.ROBOT],
     ids=["cdpr", "sim", "drive", "robot"],
 )
 def test_the_lines_of_help_are_those_of_the_commands(modules: dict[str, dict[str, str]]) -> None:
@@ -41,24 +39,23 @@ def test_help_loads_no_command() -> None:
     asked = "from cdpr_tools import cli; import sys; sys.argv = ['cdpr', '--help']\n"
     loaded = _loaded(asked + "try: cli.main()\nexcept SystemExit: pass")
     assert "cdpr_tools.cli" in loaded
-    assert not {"numpy", "pydantic", "numba", "can", "cdpr_tools.commands.daemon.run"} & loaded
+    assert not {"numpy", "pydantic", "numba", "can", "cdpr_tools.commands.run"} & loaded
 
 
 def test_a_command_that_is_not_asked_for_is_not_loaded() -> None:
-    loaded = _loaded("from cdpr_tools.command_group import load; load('sim.sim_up', 'up')")
+    loaded = _loaded("from cdpr_tools.command_group import load; load('sim_up', 'up')")
     assert not {"pymodbus", "matplotlib", "fastapi", "httpx"} & loaded
 
 
-@pytest.mark.parametrize("module", ["cdpr_rt.jit", "cdpr_sim_bus.jit"])
-def test_kernels_do_not_load_scipys_linear_algebra_nor_spoil_it(module: str) -> None:
+def test_kernels_do_not_load_scipys_linear_algebra_nor_spoil_it() -> None:
     call = "import numba; assert numba.njit(lambda x: 2.0 * x)(2.0) == 4.0"
-    loaded = _loaded(f"import {module}; {call}")
+    loaded = _loaded(f"import cdpr_profiles.jit; {call}")
     assert "scipy.linalg" not in loaded
-    assert "scipy.linalg.cython_blas" in _loaded(f"import {module}, scipy.optimize")
+    assert "scipy.linalg.cython_blas" in _loaded("import cdpr_profiles.jit, scipy.optimize")
 
 
 @pytest.mark.parametrize(
-    "module", ["bus", "cogging", "commission", "profiles", "sim.sim", "tension"]
+    "module", ["bus", "cogging", "commission", "profiles", "groups", "tension"]
 )
 def test_what_commissions_and_simulates_does_without_the_packages_of_the_daemon(
     module: str,

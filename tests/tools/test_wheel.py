@@ -48,6 +48,11 @@ def test_a_wheel_runs_beside_folders_of_the_same_names(tmp_path: Path) -> None:
         *(path.name for path in (REPOSITORY / "src").iterdir() if path.is_symlink()),
     }
 
+    templates = target / "cdpr_tools" / "report" / "templates"
+    assert {path.name for path in templates.iterdir()} == {
+        path.name for path in (REPOSITORY / "tools" / "report" / "templates").iterdir()
+    }
+
     def run(*words: str) -> str:
         done = subprocess.run(
             [str(target / "bin" / "cdpr"), *words],

@@ -1,1 +1,1 @@
-"""Measurements of the project's own cost, each against something that anyone can check it by."""
+"""Benchmarks of the project's own cost, each compared with something that anyone can check."""

@@ -1,1 +1,1 @@
-"""What the `cdpr bus` commands do: scan, monitor, replay."""
+"""Implementation of the `cdpr bus` commands: scan, monitor, replay."""

@@ -1,30 +1,109 @@
-"""Show, log and count the frames of a bus, live or from a file; and what passed over it in all."""
+"""Frames of a bus, live or from a file: stored, decoded, shown, logged and counted."""
 
 from __future__ import annotations
 
 import os
 import queue
+import select
 import threading
 import time
-from collections import Counter
-from collections.abc import Callable, Iterable
+from collections import Counter, deque
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TextIO
 
+import can
+
+from cdpr_drivers.bus import BusUrl, Filters, open_port, query_status
 from cdpr_drivers.bus.budget import worst_case_bits
-from cdpr_drivers.decode import Decoder, Frame, Record, format_line
-from cdpr_tools.busview.source import FrameSource
-from cdpr_tools.errors import BadInputError, WorkFailedError, os_error_as
+from cdpr_drivers.bus.frames import EFF_FLAG, FRAME_BYTES
+from cdpr_drivers.decode import Decoder, Frame, KnownNode, Record, format_line
+from cdpr_drivers.errors import BusError
+from cdpr_profiles import Robot, load_drive, load_robot, load_winch
+from cdpr_profiles.bounded_input import may_replace
+from cdpr_profiles.errors import printable
+from cdpr_tools.errors import BadInputError, WorkFailedError, os_error_as, raised_as
+from cdpr_tools.streams import OutputLostError
+
+_MOST_WAITING = 1 << 20
+"""Frames kept for decoding; further frames stay in the bus' own buffer."""
+_AT_ONCE = 1000
+
+
+class FrameSource:
+    """A bus to listen to: frames are kept with their time of arrival until they are decoded.
+
+    Raises BadInputError for a bus that cannot be opened.
+    """
+
+    def __init__(self, url: BusUrl, filters: Filters | None = None) -> None:
+        self.name = url.channel.rpartition("/")[2]
+        """Name of the bus in log files."""
+        self.lost: BusError | None = None
+        """Why no more frames arrive."""
+        self.seen = 0
+        """Frames received so far."""
+        self._url = url
+        with raised_as(BadInputError, BusError):
+            self._port = open_port(url, filters, receive_errors=True)
+        self._port.settimeout(0)
+        self._readable = select.poll()
+        self._readable.register(self._port.fileno(), select.POLLIN)
+        self._waiting: deque[tuple[float, bytes]] = deque()
+
+    def receive(self, timeout_s: float) -> None:
+        """Keep arrived frames, waiting up to `timeout_s`; if the bus is lost, `lost` is set."""
+        if self.lost or len(self._waiting) >= _MOST_WAITING:
+            return
+        if not self._readable.poll(timeout_s * 1e3):
+            return
+        packet = bytearray(FRAME_BYTES)
+        port, receive, keep = self._port, self._port.recv_into, self._waiting.append
+        try:
+            for _ in range(_AT_ONCE):
+                if not receive(packet):
+                    self.lost = port.lost()
+                    return
+                keep((port.arrival_s(), bytes(packet)))
+                self.seen += 1
+        except BlockingIOError:
+            return
+        except OSError as error:
+            self.lost = port.lost(error)
+
+    def next_frames(self, most: int) -> list[Frame]:
+        """Return received frames, the oldest first."""
+        count = min(most, len(self._waiting))
+        return [Frame.unpack(*self._waiting.popleft()) for _ in range(count)]
+
+    def ask(self) -> dict[str, float] | None:
+        """Return the report of a simulated bus, None for any other bus; raises BusError.
+
+        `frames` and `bus_time_s` since this client joined, and whether it is `led`.
+        """
+        before = self._port.status
+        if not before:
+            return None
+        if self.lost is not None:
+            raise self.lost
+        now = query_status(self._url.channel)
+        passed = {key: now[key] - before[key] for key in ("frames", "bus_time_s")}
+        return passed | {"led": now["led"]}
+
+    def close(self) -> None:
+        """Leave the bus."""
+        self._port.close()
+
 
 _MORE_BITS_EXTENDED = 25
-"""20 bits of the identifier and the 5 that they may have stuffed."""
+"""20 bits of the identifier, and up to 5 stuff bits."""
 
 
 @dataclass
 class Summary:
-    """Counts what it is given; `bitrate_bit_s` is what the load is relative to."""
+    """Counts records; the load is relative to `bitrate_bit_s`."""
 
     bitrate_bit_s: int
     frames: int = 0
@@ -33,13 +112,13 @@ class Summary:
     first_s: float | None = None
     last_s: float = 0.0
     time_s: float | None = None
-    """What the traffic took, where something else than its time stamps tells."""
+    """Duration of the traffic, if it is known from another source than the time stamps."""
     untimed: bool = False
-    """Whether the time stamps are not those of the traffic and nothing else tells its time."""
+    """Whether the time stamps are not those of the traffic and its duration is unknown."""
     missed: int | None = None
-    """Frames that went past the monitor, where that is known."""
+    """Frames that the monitor missed, if known."""
     led: bool | None = None
-    """Whether a master leads the bus at the end, where that is known."""
+    """Whether a master leads the bus at the end, if known."""
     _by_id: Counter[tuple[str, str, int | None]] = field(default_factory=Counter)
 
     def add(self, record: Record) -> None:
@@ -55,14 +134,14 @@ class Summary:
 
     @property
     def duration_s(self) -> float:
-        """Return what the traffic took: as reported, or from the first frame to the last."""
+        """Return the duration of the traffic: as reported, or from the first frame to the last."""
         if self.time_s is not None:
             return self.time_s
         return 0.0 if self.first_s is None else self.last_s - self.first_s
 
     @property
     def load(self) -> float | None:
-        """Return the share of time that the wire was in use at most; None for a moment only."""
+        """Return the share of time that the wire was busy at most; None without a duration."""
         return self.bits / self.bitrate_bit_s / self.duration_s if self._has_rates else None
 
     @property
@@ -79,7 +158,7 @@ class Summary:
         return rows
 
     def table(self) -> dict[str, Any]:
-        """Return the summary for programs."""
+        """Return the summary as data for programs."""
         return {
             "frames": self.frames,
             "duration_s": self.duration_s,
@@ -92,14 +171,14 @@ class Summary:
         }
 
     def lines(self) -> list[str]:
-        """Return the summary for people."""
+        """Return the summary as readable lines."""
         whose = " of bus time" if self.time_s is not None else ""
         what = "1 frame" if self.frames == 1 else f"{self.frames} frames"
         totals = [f"{what} in {self.duration_s:.3f} s{whose}"]
         if self.load is not None:
             rate = f"{self.bitrate_bit_s / 1e3:g} kbit/s"
             totals.append(f"bus load {100 * self.load:.1f} % of {rate}, stuffed as badly as can be")
-        totals.append(f"{self.problems} told of trouble (marked !)")
+        totals.append(f"{self.problems} with a problem (marked !)")
         lines = ["; ".join(totals)]
         if self.missed:
             lines.append(
@@ -126,13 +205,13 @@ def _bits(frame: Frame) -> int:
 _BATCH = 200
 _WAIT_S = 0.1
 _MOST_BLOCKS = 10_000
-"""Blocks of lines that may wait for a reader before the monitor waits for it too."""
+"""Blocks of lines that may wait for a reader before the monitor waits too."""
 
 
 class LineWriter:
-    """Writes blocks of lines from a thread of its own, so that a slow reader delays nobody else.
+    """Writes blocks of lines in a separate thread, so that a slow reader delays nothing else.
 
-    Use it as a context; at its end all that was handed over is written.
+    Use it as a context; at its end all lines passed to it are written.
     """
 
     def __init__(self, out: TextIO) -> None:
@@ -140,12 +219,13 @@ class LineWriter:
         self._blocks: queue.Queue[str | None] = queue.Queue(_MOST_BLOCKS)
         self._thread = threading.Thread(target=self._run, name="lines", daemon=True)
         self.closed = False
-        """Whether nobody reads the lines any more."""
+        """Whether the reader is gone."""
+        self._failure: OutputLostError | None = None
 
     def write(self, lines: list[str]) -> None:
-        """Hand lines over."""
+        """Pass lines to the writer."""
         if lines and not self.closed:
-            self._blocks.put("\n".join(lines) + "\n")
+            self._blocks.put(printable("\n".join(lines)) + "\n")
 
     def _run(self) -> None:
         while (block := self._blocks.get()) is not None:
@@ -154,9 +234,11 @@ class LineWriter:
             try:
                 self._out.write(block)
                 self._out.flush()
+            except OutputLostError as error:
+                self.closed, self._failure = True, error
             except OSError:
                 self.closed = True
-                # what is left in the buffer is not to be complained of at the interpreter's end
+                # the rest of the buffer must not cause an error message at the interpreter's end
                 with suppress(OSError, ValueError):
                     os.dup2(os.open(os.devnull, os.O_WRONLY), self._out.fileno())
 
@@ -167,12 +249,14 @@ class LineWriter:
     def __exit__(self, *_: object) -> None:
         self._blocks.put(None)
         self._thread.join()
+        if self._failure is not None:
+            raise self._failure
 
 
 class Viewer:
-    """Decodes frames, hands on a line for each that is shown, and keeps the summary.
+    """Decodes frames, writes a line for each shown frame, and updates the summary.
 
-    SYNC without a counter says nothing and is counted only.
+    SYNC without a counter has no content and is only counted.
     """
 
     def __init__(self, decoder: Decoder, summary: Summary, out: LineWriter, *, raw: bool) -> None:
@@ -184,7 +268,7 @@ class Viewer:
 
     @property
     def closed(self) -> bool:
-        """Whether nobody reads the lines any more."""
+        """Whether the reader is gone."""
         return self._out.closed
 
     def show(self, channel: str, frames: Iterable[Frame]) -> None:
@@ -203,10 +287,12 @@ class Viewer:
 
 
 class LogFile:
-    """A candump log that is written while frames come; raises BadInputError, WorkFailedError."""
+    """A candump log, written as frames arrive; raises BadInputError, WorkFailedError."""
 
     def __init__(self, path: Path) -> None:
         self._path = path
+        if not may_replace(path):
+            raise BadInputError(f"--log {path}: is there already; allowed: another name")
         with os_error_as(BadInputError, f"--log {path}: cannot be written"):
             self._file = path.open("w", encoding="ascii")
 
@@ -231,9 +317,9 @@ def watch(
     seconds: float | None,
     stop_requested: Callable[[], bool],
 ) -> None:
-    """Show what comes until the time is up, the user wants an end, or the bus is lost.
+    """Show frames until the time is up, the user requests an end, or the bus is lost.
 
-    Frames that have arrived are received before any is decoded, so that a fast bus fills our
+    Received frames are stored before any is decoded, so that a fast bus fills this process's
     memory and not the bus' buffer, where they would be lost.
     """
     deadline = None if seconds is None else time.monotonic() + seconds
@@ -250,3 +336,135 @@ def watch(
             log.write(source.name, frames)
         viewer.show(source.name, frames)
         more = len(frames) == _BATCH
+
+
+# User input: a bus, the nodes on it, identifiers.
+
+
+def running_bus(text: str) -> BusUrl:
+    """Return the bus that `text` names, which must exist; raises BadInputError."""
+    with raised_as(BadInputError, BusError):
+        url = BusUrl.parse(text)
+    if url.starts_own_simulator:
+        found = can.detect_available_configs(interfaces=["simbus"])
+        running = ", ".join(f"simbus:{config['channel']}" for config in found) or "none"
+        raise BadInputError(
+            f"--bus {text}: the name is missing; running on this machine: {running}"
+        )
+    return url
+
+
+# The nodes of a bus according to a drive's, a winch's or a robot's profile, for decoding.
+
+_USUAL_BITRATE_bit_s = 1_000_000
+
+
+@dataclass(frozen=True)
+class KnownBus:
+    """Knowledge about a bus before any frame arrives."""
+
+    nodes: dict[int, KnownNode] = field(default_factory=dict)
+    others: KnownNode | None = None
+    bitrate_bit_s: int = _USUAL_BITRATE_bit_s
+
+    def decoder(self) -> Decoder:
+        """Return a decoder for a session on this bus."""
+        return Decoder(self.nodes, self.others)
+
+
+def known_bus(
+    url: BusUrl | None, drive: str | None, winch: str | None, robot: str | None
+) -> KnownBus:
+    """Return the content of the named profile for a bus; `url` is None for a file.
+
+    Raises BadInputError, ProfileError.
+    """
+    if sum(name is not None for name in (drive, winch, robot)) > 1:
+        raise BadInputError("--profile, --winch, --robot: one of them says who is on the bus")
+    if winch is not None:
+        one = load_winch(winch)
+        nodes = {one.node_id: KnownNode.of_winch(one)}
+        return KnownBus(nodes, bitrate_bit_s=_bitrate(url, one.bitrate_bit_s))
+    if robot is not None:
+        name, _, bus = robot.partition(":")
+        return _of_robot(load_robot(name), bus, url)
+    others = None if drive is None else KnownNode(load_drive(drive))
+    return KnownBus(others=others, bitrate_bit_s=_bitrate(url, _USUAL_BITRATE_bit_s))
+
+
+def _bitrate(url: BusUrl | None, otherwise: int) -> int:
+    bitrate = url.options.get("bitrate") if url is not None else None
+    return bitrate if isinstance(bitrate, int) and bitrate > 0 else otherwise
+
+
+def _of_robot(robot: Robot, name: str, url: BusUrl | None) -> KnownBus:
+    """Return one bus of a robot, or all if no node id identifies one."""
+    buses = {bus.name: bus for bus in robot.buses}
+    if name and name not in buses:
+        allowed = " or ".join(f"--robot {robot.reference}:{one}" for one in buses)
+        raise BadInputError(f"--robot {robot.reference}:{name}: no such bus; allowed: {allowed}")
+    axes = [axis for axis in robot.axes if axis.bus == (name or _bus_at(robot, url) or axis.bus)]
+    nodes = {axis.node_id: KnownNode.of_winch(axis.winch) for axis in axes}
+    if len(nodes) < len(axes):
+        choice = " or ".join(f"--robot {robot.reference}:{one}" for one in buses)
+        raise BadInputError(
+            f"--robot {robot.reference}: its buses have node ids in common: choose {choice}"
+        )
+    return KnownBus(nodes, bitrate_bit_s=_bitrate(url, buses[axes[0].bus].bitrate_bit_s))
+
+
+def _bus_at(robot: Robot, url: BusUrl | None) -> str:
+    """Return the name of the robot's bus with this URL, real or simulated; "" if none has it."""
+    for bus in robot.buses:
+        if url is not None and (bus.url == str(url) or f"-{url.channel}".endswith(f"-{bus.name}")):
+            return bus.name
+    return ""
+
+
+# Lists of identifiers and node ids as the user types them.
+
+_LAST = 0x7FF
+_LAST_NODE = 127
+
+
+def parse_identifiers(text: str) -> frozenset[int]:
+    """Return the 11-bit identifiers in a list as `181,700-77F`, hexadecimal; BadInputError."""
+    allowed = "no identifier; write them hexadecimal up to 7FF, as in 181,700-77F"
+    return frozenset(_numbers("--ids", text, 16, range(_LAST + 1), allowed))
+
+
+def parse_node_ids(text: str) -> list[int]:
+    """Return the node ids in a list as `1,5,20-23`, decimal, in their order; BadInputError."""
+    allowed = "no node id; allowed: 1 to 127, as in 1,5,20-23"
+    return sorted(_numbers("--nodes", text, 10, range(1, _LAST_NODE + 1), allowed))
+
+
+def _numbers(option: str, text: str, base: int, known: range, allowed: str) -> set[int]:
+    found: set[int] = set()
+    for part in map(str.strip, text.split(",")):
+        first, dash, last = part.partition("-")
+        try:
+            low = int(first, base)
+            high = int(last, base) if dash else low
+        except ValueError:
+            low, high = 1, 0
+        written = (first + last).isalnum()  # int() also accepts signs, blanks and underscores
+        if not (written and low in known and high in known and low <= high):
+            raise BadInputError(f"{option} {text}: {part!r} is {allowed}")
+        found |= set(range(low, high + 1))
+    return found
+
+
+def filters(identifiers: frozenset[int]) -> list[tuple[int, int]]:
+    """Return the fewest pairs (identifier, mask) that pass exactly these 11-bit identifiers."""
+    return list(_blocks(identifiers, 0, _LAST + 1))
+
+
+def _blocks(identifiers: frozenset[int], start: int, size: int) -> Iterator[tuple[int, int]]:
+    """Yield the aligned power-of-two blocks that lie entirely in `identifiers`."""
+    inside = sum(1 for i in range(start, start + size) if i in identifiers)
+    if inside == size:
+        yield start, (_LAST & ~(size - 1)) | EFF_FLAG
+    elif inside:
+        yield from _blocks(identifiers, start, size // 2)
+        yield from _blocks(identifiers, start + size // 2, size // 2)

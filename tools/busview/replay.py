@@ -1,28 +1,32 @@
-"""Recorded sessions: read from a file, paced as they were, sent to a bus."""
+"""Recorded sessions: read from a file, paced as recorded, sent to a bus."""
 
 from __future__ import annotations
 
 import os
 import sys
 import time
+import zlib
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
+from functools import partial
 from pathlib import Path
+from struct import Struct
 
 import can
 
 from cdpr_drivers.bus import BusUrl, FramePort, open_port
+from cdpr_drivers.bus.simbus_can import packet_of
 from cdpr_drivers.decode import Frame, LogEntry, read_log
 from cdpr_drivers.errors import BusError
+from cdpr_profiles.bounded_input import open_regular
 from cdpr_profiles.errors import ProfileError
-from cdpr_profiles.reading.bounded_input import open_regular
 from cdpr_tools.busview.monitor import Viewer
-from cdpr_tools.busview.source import frame_of
 from cdpr_tools.errors import BadInputError, WorkFailedError, raised_as
 
 _LOOK_S = 0.1
+_MOST_LINE = 4096
 BLOCK = 200
-"""Frames to show at once where a long file is to be read fast."""
+"""Frames to show together, so that a long file is read fast."""
 _DISABLE_VOLTAGE = bytes.fromhex("2B40600000000000")
 """SDO request that writes 0 to the controlword (6040h)."""
 _SDO_REQUEST, _NODE, _FUNCTION = 0x600, 0x07F, 0x780
@@ -33,8 +37,8 @@ _CANDUMP = (".log", ".txt", ".candump", "")
 def read_frames(path: Path, channel: str | None) -> Iterator[LogEntry]:
     """Yield the frames of one bus in a file; `-` is standard input.
 
-    Files of candump are read by their own format, others (.asc, .blf, .trc, ...) by python-can.
-    Raises BadInputError for a file that cannot be read or holds several buses, LogError.
+    Candump files are read by this package, others (.asc, .blf, .trc, ...) by python-can.
+    Raises BadInputError for a file that cannot be read or contains several buses, LogError.
     """
     read_channel = channel
     there: set[str] = set()
@@ -52,9 +56,9 @@ def read_frames(path: Path, channel: str | None) -> Iterator[LogEntry]:
 
 
 def check(path: Path, channel: str | None) -> None:
-    """Read a file to its end, so that nothing of one that is broken is sent; see `read_frames`.
+    """Read a file to its end, so that nothing of a broken file is sent; see `read_frames`.
 
-    Standard input can be read only once: there is nothing to check before it is sent.
+    Standard input can be read only once: it cannot be checked before it is sent.
     """
     if str(path) != "-":
         for _ in read_frames(path, channel):
@@ -67,9 +71,14 @@ def _frames(path: Path) -> Iterator[LogEntry]:
             yield from read_log("standard input", sys.stdin)
         elif path.suffix.lower() in _CANDUMP:
             with os.fdopen(open_regular(path), encoding="ascii", errors="replace") as lines:
-                yield from read_log(str(path), lines)
+                # a line without end is not a candump line; do not read it as a whole to detect that
+                yield from read_log(str(path), iter(partial(lines.readline, _MOST_LINE), ""))
         else:
-            os.close(open_regular(path))  # python-can opens what has this name, of any kind
+            if path.suffix.lower() == ".gz":  # it may expand to any amount of data
+                raise BadInputError(f"{path}: is packed; allowed: what is in it, unpacked")
+            os.close(open_regular(path))  # python-can would open a file of any kind
+            if path.suffix.lower() == ".blf":
+                _require_bounded_blf(path)
             yield from _python_can_frames(path)
     except ProfileError as error:
         raise BadInputError(str(error)) from None
@@ -79,21 +88,90 @@ def _frames(path: Path) -> Iterator[LogEntry]:
         raise BadInputError("standard input: is no text, so no log of candump") from error
 
 
+# python-can unpacks a container of a BLF file as a whole, and joins objects across containers.
+# These layouts are those of its reader: file header, header of an object, of a container.
+
+_FILE_HEADER, _OBJECT, _CONTAINER = Struct("<4sL136x"), Struct("<4sHHLL"), Struct("<H6xL4x")
+_CONTAINER_TYPE, _DEFLATED = 10, 2
+_MOST_HEADER, _MOST_CONTAINER, _MOST_OBJECT = 4096, 1 << 24, 1 << 20
+_CHUNK = 1 << 16
+
+
+def _require_bounded_blf(path: Path) -> None:
+    """Raise BadInputError for a BLF file with parts that are too large for python-can."""
+    objects = _ObjectSizes(path)
+    with path.open("rb") as file:
+        head = file.read(_FILE_HEADER.size)
+        if len(head) < _FILE_HEADER.size or not head.startswith(b"LOGG"):
+            return  # python-can reports the error
+        _require_size(path, "header", _FILE_HEADER.unpack(head)[1], _MOST_HEADER)
+        file.seek(_FILE_HEADER.unpack(head)[1])
+        while len(head := file.read(_OBJECT.size)) == _OBJECT.size:
+            _, _, _, size, kind = _OBJECT.unpack(head)
+            _require_size(path, "container", size, _MOST_CONTAINER)
+            data = file.read(size - _OBJECT.size)
+            file.seek(size % 4, os.SEEK_CUR)
+            if kind == _CONTAINER_TYPE and len(data) >= _CONTAINER.size:
+                method, packed = _CONTAINER.unpack_from(data)[0], data[_CONTAINER.size :]
+                for chunk in _unpacked(path, packed) if method == _DEFLATED else (packed,):
+                    objects.read(chunk)
+
+
+def _require_size(path: Path, what: str, size: int, most: int, least: int = _OBJECT.size) -> None:
+    if not least <= size <= most:
+        raise BadInputError(f"{path}: {what} of {size} bytes; allowed: {least} to {most}")
+
+
+def _unpacked(path: Path, packed: bytes) -> Iterator[bytes]:
+    """Yield the content of a container, chunk by chunk; raises BadInputError above its limit."""
+    inflater, unpacked = zlib.decompressobj(), 0
+    with suppress(zlib.error):  # python-can reports the error
+        while packed and not inflater.eof:
+            chunk = inflater.decompress(packed, _CHUNK)
+            packed, unpacked = inflater.unconsumed_tail, unpacked + len(chunk)
+            if unpacked > _MOST_CONTAINER:
+                raise BadInputError(
+                    f"{path}: container of more than {_MOST_CONTAINER} bytes, unpacked; allowed: "
+                    f"up to {_MOST_CONTAINER}"
+                )
+            yield chunk
+
+
+class _ObjectSizes:
+    """Follows the objects within containers; an object may continue in the next container."""
+
+    def __init__(self, path: Path) -> None:
+        self._path, self._skip, self._tail = path, 0, b""
+
+    def read(self, chunk: bytes) -> None:
+        """Process the next bytes; raises BadInputError for an object that is too large."""
+        skipped = min(self._skip, len(chunk))
+        self._skip -= skipped
+        data, at = self._tail + chunk[skipped:], 0
+        while (found := data.find(b"LOBJ", at, at + 8)) >= 0 and found + _OBJECT.size <= len(data):
+            size = _OBJECT.unpack_from(data, found)[3]
+            _require_size(self._path, "object", size, _MOST_OBJECT)
+            at = found + size
+        self._skip += max(at - len(data), 0)
+        self._tail = data[at : at + _CHUNK]  # python-can rejects data that is not an object
+
+
 def _python_can_frames(path: Path) -> Iterator[LogEntry]:
-    """Yield the frames of a file that python-can knows."""
+    """Yield the frames of a file in a format of python-can."""
     try:
         with can.LogReader(path) as reader:
             for message in reader:
                 if not message.is_fd:
-                    yield LogEntry(str(message.channel), frame_of(message))
+                    frame = Frame.unpack(message.timestamp, packet_of(message))
+                    yield LogEntry(str(message.channel), frame)
     except OSError:
         raise
-    except Exception as error:  # whatever a reader of python-can makes of a broken file
+    except Exception as error:  # python-can's readers raise various errors for a broken file
         raise BadInputError(f"{path}: python-can cannot read it: {error}") from error
 
 
 class Pacer:
-    """Waits as long as passed between the frames when they were recorded."""
+    """Waits between frames as long as in the recording."""
 
     def __init__(self, speed: float | None, stop_requested: Callable[[], bool]) -> None:
         self._speed = speed
@@ -101,7 +179,7 @@ class Pacer:
         self._first: tuple[float, float] | None = None
 
     def wait_for(self, frame: Frame) -> None:
-        """Return when the frame is due, or the user wants an end."""
+        """Return when the frame is due, or the user requests an end."""
         if self._speed is None:
             return
         if self._first is None:
@@ -113,9 +191,9 @@ class Pacer:
 
 
 class Sender:
-    """Sends recorded frames to a bus; leaves no node under power that they may have enabled.
+    """Sends recorded frames to a bus; leaves no node with power that the frames may have enabled.
 
-    Power is asked off when the recording was not sent to its end, and on a real bus in any case.
+    It requests power-off if the recording was not sent completely, and always on a real bus.
     """
 
     def __init__(self, url: BusUrl, note: Callable[[str], None]) -> None:
@@ -131,7 +209,7 @@ class Sender:
             self._port: FramePort = open_port(url, [])
 
     def send(self, frame: Frame) -> None:
-        """Send a frame as it was; raises WorkFailedError when the bus does not take it."""
+        """Send a frame as recorded; raises WorkFailedError if the bus does not accept it."""
         if frame.error:
             self.not_sent += 1
             return
@@ -145,10 +223,10 @@ class Sender:
             self._commanded.add(node_id)
 
     def _power_off(self) -> None:
-        """Ask every node that was commanded to take its power off."""
+        """Request power-off of every node that was commanded."""
         asked = []
         for node_id in sorted(self._commanded):
-            # a bus that is gone carries nothing; the drives watch for that
+            # a lost bus carries nothing; the drives monitor for that
             with suppress(OSError):
                 self._port.send(Frame(0.0, _SDO_REQUEST + node_id, _DISABLE_VOLTAGE).pack())
                 asked.append(str(node_id))
@@ -166,7 +244,7 @@ class Sender:
 
 
 def filtered(log: Iterable[LogEntry], identifiers: frozenset[int] | None) -> Iterator[LogEntry]:
-    """Yield what of a log has one of these 11-bit identifiers; everything for None."""
+    """Yield the entries with one of these 11-bit identifiers; all for None."""
     for logged in log:
         frame = logged.frame
         if identifiers is None or (not frame.extended and frame.can_id in identifiers):
@@ -181,9 +259,9 @@ def play(
     sender: Sender | None = None,
     block: int = 1,
 ) -> None:
-    """Show, and send, a recording until its end or the user's; so many frames at once.
+    """Show, and send, a recording until it or the user ends it, `block` frames at a time.
 
-    Raises WorkFailedError when sending ended early.
+    Raises WorkFailedError if sending ended early.
     """
     pending: list[LogEntry] = []
     try:

@@ -1,125 +1,230 @@
-"""Scan of a bus: listening, reading objects of all nodes at once, and a table of what was found."""
+"""Scan of a bus: listen, read objects of all nodes in parallel, and print a table."""
 
 from __future__ import annotations
 
-import time
+from collections import Counter, defaultdict
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any
 
-from cdpr_drivers.bus import BusUrl, FramePort, open_port
+from cdpr_drivers.bus import BusUrl
+from cdpr_drivers.bus.frames import FRAME
 from cdpr_drivers.canopen.emergency import register_text
+from cdpr_drivers.canopen.error_control import NMT_STATES, STOPPED
+from cdpr_drivers.canopen.network import BusMember
+from cdpr_drivers.canopen.sdo import (
+    ABORT,
+    ANSWER,
+    REQUEST,
+    UPLOAD,
+    SdoClient,
+    abort_code,
+    expedited,
+    multiplexer,
+)
 from cdpr_drivers.cia402 import fault_text, mode_name, state_of, supported_modes
-from cdpr_drivers.decode import Frame
-from cdpr_drivers.decode.messages import NMT_STATES
-from cdpr_drivers.errors import BusError
+from cdpr_drivers.errors import BusError, SdoAbortError, SdoTimeoutError
 from cdpr_profiles import DriveProfile, ProfileError, list_profiles, load_drive
-from cdpr_profiles.reading.bounded_input import read_toml
-from cdpr_tools.busview.node_reader import SETTLE_S, NodeInfo, NodeReader
+from cdpr_profiles.bounded_input import read_toml
+from cdpr_rt.core.clock import PacedClock
 from cdpr_tools.errors import BadInputError, raised_as
 
+_CIA_402 = 402
+_TIMEOUT_S = 0.4
+_ATTEMPTS = 2
+SETTLE_S = 0.15
+"""Time in which a second node may still answer after the first one."""
+
+Object = tuple[int, int]
+FIRST: Object = (0x1000, 0)
+ALWAYS: tuple[Object, ...] = (
+    (0x1018, 1),
+    (0x1018, 2),
+    (0x1018, 3),
+    (0x1018, 4),
+    (0x1001, 0),
+    (0x1008, 0),
+    (0x1017, 0),
+)
+DRIVE: tuple[Object, ...] = ((0x6502, 0), (0x6041, 0), (0x6061, 0), (0x603F, 0))
+_NAMES = {multiplexer(*what): f"{what[0]:04X}h" for what in (FIRST, *ALWAYS, *DRIVE)}
+_NAMES |= {multiplexer(index, sub): f"{index:04X}h:{sub}" for index, sub in ALWAYS if sub}
+_SEGMENT = b""
+"""Represents the next segment of a value in the counts of objects."""
+
+
+@dataclass
+class NodeInfo:
+    """Observations about one node id."""
+
+    node_id: int
+    nmt_state: int | None = None
+    """State in its latest heartbeat."""
+    heartbeats: int = 0
+    answers: bool = False
+    """Whether it answers SDO requests."""
+    in_segments: bool = False
+    """Whether this scan's last request was for a segment."""
+    objects: dict[Object, bytes] = field(default_factory=dict)
+    asked: Counter[bytes] = field(default_factory=Counter)
+    """Number of requests of each object, by its multiplexer."""
+    answered: defaultdict[bytes, list[bytes]] = field(default_factory=lambda: defaultdict(list))
+    """The answers to these requests, from any device."""
+    is_shared: bool = False
+    """Whether another client makes transfers with it, so that answers may belong to those."""
+
+    @property
+    def repeated(self) -> set[bytes]:
+        """Objects with more answers than requests: several nodes have this id."""
+        if self.is_shared:
+            return set()
+        return {what for what, came in self.answered.items() if len(came) > self.asked[what]}
+
+    @property
+    def differing(self) -> list[str]:
+        """Those of the repeated objects whose answers differ."""
+        objects = self.repeated - {_SEGMENT}
+        return sorted(_NAMES[what] for what in objects if len(set(self.answered[what])) > 1)
+
+    def note_answer(self, data: bytes) -> None:
+        """Count an SDO answer to a request of this scan."""
+        what = data[1:4]
+        if data[0] >> 5 == 0:
+            what = _SEGMENT
+        elif abort_code(data) is not None:
+            came = self.answered.get(what, [])
+            if any(one[0] >> 5 == UPLOAD and expedited(one) is None for one in came):
+                return  # it continues a value in segments, whose first answer has been counted
+        elif data[0] >> 5 != UPLOAD:
+            return
+        if self.asked[what]:
+            self.answered[what].append(data)
+
+    def number(self, index: int, sub: int = 0) -> int | None:
+        """Return an unsigned object; None if it was not received."""
+        raw = self.objects.get((index, sub))
+        return int.from_bytes(raw, "little") if raw else None
+
+    def text(self, index: int) -> str | None:
+        """Return a text object; None if it was not received."""
+        raw = self.objects.get((index, 0))
+        if raw is None:
+            return None
+        printed = raw.decode("ascii", "replace").rstrip("\0 ")
+        return "".join(c if c.isprintable() else "?" for c in printed)  # no escapes to a terminal
+
+    @property
+    def is_drive(self) -> bool:
+        """Whether its device type (1000h) is that of CiA 402."""
+        return (self.number(0x1000) or 0) & 0xFFFF == _CIA_402
+
+
 LISTEN_S = 1.2
-"""Long enough for heartbeats of a second."""
+"""Long enough for heartbeats with a period of 1 s."""
 _IN_FLIGHT = 64
-_POLL_S = 0.005
-_FRAME_BYTES, _CONTROL_BYTES = 16, 4096
-_REQUEST, _ANSWER, _HEARTBEAT = 0x600, 0x580, 0x700
+_HEARTBEAT = 0x700
 _NODE, _FUNCTION = 0x07F, 0x780
 _RPDOS = (0x200, 0x300, 0x400, 0x500)
 _FILTERS = [(0x000, 0x7FF), (0x080, 0x7FF)]
-_FILTERS += [(base, _FUNCTION) for base in (*_RPDOS, _ANSWER, _REQUEST, _HEARTBEAT)]
-_AT_ONCE = 100
+_FILTERS += [(base, _FUNCTION) for base in (*_RPDOS, ANSWER, REQUEST, _HEARTBEAT)]
+_LAST_STANDARD_ID = 0x7FF
+_NEXT_SEGMENT = 0x60
+_MOST_BYTES = 1024
+"""No object that is read here is longer."""
 
 
 @dataclass
 class Traffic:
-    """What others say on the bus."""
+    """Traffic of other nodes on the bus."""
 
     sdo_requests: set[int] = field(default_factory=set)
     """Nodes that another SDO client reads or writes."""
     heard: set[str] = field(default_factory=set)
-    """SYNC, NMT, RPDO: signs of a master at work."""
+    """SYNC, NMT, RPDO: signs of an active master."""
 
 
-class Scan:
-    """A visit to a bus; `listen` sends nothing, `ask` reads and never writes.
+class Scan(BusMember):
+    """A connection to a bus; `listen` sends nothing, `ask` reads and never writes.
 
-    Raises BadInputError for a bus that cannot be opened, BusError when it is lost.
+    Raises BadInputError for a bus that cannot be opened, BusError if it is lost.
     """
 
     def __init__(self, url: BusUrl, node_ids: Iterable[int]) -> None:
         self.traffic = Traffic()
         self.found = {node_id: NodeInfo(node_id) for node_id in node_ids}
-        self._asking: dict[int, NodeReader] = {}
-        self._packet = bytearray(_CONTROL_BYTES)
+        self._clients: dict[int, SdoClient] = {}
+        self._loss: BusError | None = None
         with raised_as(BadInputError, BusError):
-            self._port: FramePort = open_port(url, _FILTERS)
-        self._port.settimeout(_POLL_S)
+            super().__init__(url, PacedClock(), _FILTERS)
+
+    def on_loss(self, error: BusError) -> None:
+        """End the transfers and the wait."""
+        self._loss = error
+        for client in self._clients.values():
+            client.fail(error)
 
     def listen(self, seconds: float) -> None:
-        """Receive for so long without sending."""
-        deadline = time.monotonic() + seconds
-        while time.monotonic() < deadline:
-            self._receive()
+        """Receive for this time without sending."""
+        self.clock.wait(lambda: self._loss, self.clock.now_s + seconds)
+        if self._loss is not None:
+            raise self._loss
 
     def ask(self) -> None:
-        """Read the objects of all nodes, many at once, and note who answers one request twice."""
-        waiting = [NodeReader(found) for found in self.found.values()]
-        waiting.reverse()
-        self._asking = {asking.found.node_id: asking for asking in waiting}
-        active: list[NodeReader] = []
-        while waiting or active:
-            while waiting and len(active) < _IN_FLIGHT:
-                active.append(waiting.pop())
-            now = time.monotonic()
-            for asking in active:
-                self._send(asking.found.node_id, asking.due(now))
-            active = [asking for asking in active if not asking.done]
-            for _ in range(_AT_ONCE):
-                if not self._receive():
-                    break
+        """Read the objects of all nodes, many in parallel; note repeated answers."""
+        waiting = list(self.found.values())
+        for start in range(0, len(waiting), _IN_FLIGHT):
+            reads = [partial(self._read, found) for found in waiting[start : start + _IN_FLIGHT]]
+            for task in self.clock.gather(reads):
+                task.result()
         self.listen(SETTLE_S)
         for node_id in self.traffic.sdo_requests & self.found.keys():
-            # another client may have asked for what came
-            self.found[node_id].repeated.clear()
-            self.found[node_id].differing.clear()
+            self.found[node_id].is_shared = True
 
-    def _send(self, node_id: int, data: bytes | None) -> None:
-        if data is None:
+    def _read(self, found: NodeInfo) -> None:
+        """Read the objects of one node; skip those that it rejects or does not return."""
+        client = SdoClient(partial(self._request, found), self.clock, _MOST_BYTES)
+        self._clients[found.node_id] = client
+        self._read_object(client, found, FIRST)
+        if found.answers:
+            for what in ALWAYS + (DRIVE if found.is_drive else ()):
+                self._read_object(client, found, what)
+
+    @staticmethod
+    def _read_object(client: SdoClient, found: NodeInfo, what: Object) -> None:
+        for _ in range(_ATTEMPTS):
+            try:
+                found.objects[what] = client.upload(*what, _TIMEOUT_S)
+            except SdoTimeoutError:
+                continue
+            except SdoAbortError:
+                pass  # it has no such object
+            found.answers = True
             return
-        try:
-            self._port.send(Frame(0.0, _REQUEST + node_id, data).pack())
-        except OSError as error:
-            raise self._port.lost(error) from error
 
-    def _receive(self) -> bool:
-        """Receive and process one frame, or wait a little for it; return whether one came."""
-        try:
-            length = self._port.recv_into(self._packet)
-        except BlockingIOError:
-            return False
-        except OSError as error:
-            raise self._port.lost(error) from error
-        if length == 0:
-            raise self._port.lost()
-        if length == _FRAME_BYTES:
-            frame = Frame.unpack(0.0, self._packet[:_FRAME_BYTES])
-            if not (frame.error or frame.extended or frame.remote):
-                self._take(frame.can_id, frame.data)
-        return True
+    def _request(self, found: NodeInfo, data: bytes) -> None:
+        if data[0] == ABORT and not found.in_segments:
+            return  # it could only end another master's transfer
+        found.in_segments = data[0] & 0xEF == _NEXT_SEGMENT
+        found.asked[data[1:4] if data[0] == 0x40 else _SEGMENT] += data[0] != ABORT
+        self.send(REQUEST + found.node_id, data)
 
-    def _take(self, identifier: int, data: bytes) -> None:
+    def take_frame(self, frame: memoryview) -> None:
+        """Process one frame; ignore it if it is not an 11-bit data frame."""
+        identifier, length, data = FRAME.unpack_from(frame)
+        if identifier > _LAST_STANDARD_ID:
+            return
         node_id, function = identifier & _NODE, identifier & _FUNCTION
-        if function == _HEARTBEAT and node_id in self.found and len(data) == 1:
+        if function == _HEARTBEAT and node_id in self.found and length == 1:
             found = self.found[node_id]
             found.heartbeats += 1
             found.nmt_state = data[0] & 0x7F
-        elif function == _ANSWER and len(data) == 8:
-            asking = self._asking.get(node_id)
-            if asking is not None:
-                self._send(node_id, asking.take(data, time.monotonic()))
-        elif function == _REQUEST and node_id:
+        elif function == ANSWER and length == 8:
+            if node_id in self._clients:
+                self.found[node_id].note_answer(data)
+                self._clients[node_id].on_answer(data)
+        elif function == REQUEST and node_id:
             self.traffic.sdo_requests.add(node_id)
         elif identifier == 0x080:
             self.traffic.heard.add("SYNC")
@@ -132,13 +237,13 @@ class Scan:
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._port.close()
+        self.close()
 
 
 def drive_profiles(folder: Path | None) -> dict[str, DriveProfile]:
     """Return the shipped drives by name, and those in a folder by path.
 
-    Raises BadInputError for a folder that is none, ProfileError for a broken drive file.
+    Raises BadInputError if `folder` is not a folder, ProfileError for a broken drive file.
     """
     drives = {name: load_drive(name) for name in list_profiles()["drives"]}
     if folder is None:
@@ -146,7 +251,7 @@ def drive_profiles(folder: Path | None) -> dict[str, DriveProfile]:
     if not folder.is_dir():
         raise BadInputError(f"--profiles {folder}: is no folder")
     for path in sorted(folder.glob("*.toml")):
-        if "eds" in read_toml(path):  # motors, winches and cables may lie beside the drives
+        if "eds" in read_toml(path):  # motors, winches and cables may be in the same folder
             drives[str(path)] = load_drive(path)
     if not any(Path(name).parent == folder for name in drives):
         raise ProfileError(folder, "", "holds no drive profile")
@@ -154,7 +259,7 @@ def drive_profiles(folder: Path | None) -> dict[str, DriveProfile]:
 
 
 def matching_profiles(found: NodeInfo, drives: dict[str, DriveProfile]) -> list[str]:
-    """Return the names of the profiles that are for a node, noting where the revision differs."""
+    """Return the names of the profiles that match a node; note if the revision differs."""
     names = []
     for name, drive in drives.items():
         identity = (found.number(0x1018, 1), found.number(0x1018, 2))
@@ -170,11 +275,10 @@ def matching_profiles(found: NodeInfo, drives: dict[str, DriveProfile]) -> list[
 
 _MODES = {1: "PP", 2: "VL", 3: "PV", 4: "PT", 6: "HM", 7: "IP", 8: "CSP", 9: "CSV", 10: "CST"}
 _TITLES = ("id", "NMT state", "device", "profile", "CiA 402 state", "modes")
-_STOPPED = 4
 
 
 def entry(found: NodeInfo, drives: dict[str, DriveProfile]) -> dict[str, Any]:
-    """Return one node for programs."""
+    """Return one node as data for programs."""
     status, modes = found.number(0x6041), found.number(0x6502)
     state = found.nmt_state
     return {
@@ -201,15 +305,15 @@ def entry(found: NodeInfo, drives: dict[str, DriveProfile]) -> dict[str, Any]:
 
 
 def problems(found: NodeInfo) -> list[str]:
-    """Return what is wrong with a node, in words."""
+    """Return the problems of a node."""
     texts = []
     if found.repeated:
         texts.append(
             "several nodes have this id: two answers to one request"
-            + (f", differing for {', '.join(sorted(found.differing))}" if found.differing else "")
+            + (f", differing for {', '.join(found.differing)}" if found.differing else "")
         )
     if not found.answers:
-        closed = "; a stopped node never does" if found.nmt_state == _STOPPED else ""
+        closed = "; a stopped node never does" if found.nmt_state == STOPPED else ""
         texts.append(f"heartbeats only, it answers no SDO (a master?{closed})")
     elif not found.is_drive:
         device = found.number(0x1000)
@@ -236,12 +340,12 @@ def _error(code: int | None) -> str | None:
 
 
 def responding(found: dict[int, NodeInfo]) -> list[NodeInfo]:
-    """Return the nodes that have shown themselves."""
+    """Return the nodes that have sent or answered anything."""
     return [one for one in found.values() if one.answers or one.heartbeats]
 
 
 def lines(entries: Sequence[dict[str, Any]]) -> list[str]:
-    """Return a table for people: a row for each node, below it who it is and what is wrong."""
+    """Return a readable table: a row for each node, below it its identity and its problems."""
     rows = [_TITLES, *(_row(node) for node in entries)]
     widths = [max(len(row[i]) for row in rows) for i in range(len(_TITLES))]
     table: list[str] = []
@@ -284,7 +388,7 @@ def _details(node: dict[str, Any]) -> list[str]:
 
 
 def signs_of_a_master(traffic: Traffic) -> str:
-    """Return what tells of a master at work, "" where nothing does."""
+    """Return the signs of an active master; "" if there are none."""
     signs = sorted(traffic.heard)
     if traffic.sdo_requests:
         nodes = ", ".join(map(str, sorted(traffic.sdo_requests)))

@@ -1,7 +1,9 @@
-"""`cdpr calibrate check`: ten poses of a calibrated robot, and whether it is as it was."""
+"""`cdpr calibrate check`: read ten poses of a calibrated robot and report what has changed."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -10,99 +12,139 @@ import numpy as np
 
 from cdpr_profiles import Robot
 from cdpr_profiles.calibration.in_force import calibrated, in_force
-from cdpr_rt.calibration.camera.seen_poses import with_seen_poses
-from cdpr_rt.calibration.check import Check, check_geometry
-from cdpr_rt.calibration.estimation.fit import Fit
-from cdpr_rt.calibration.estimation.parameters import CableGeometry
+from cdpr_profiles.errors import FileMissingError, ProfileError
+from cdpr_rt.calibration.camera_start import with_seen_poses
+from cdpr_rt.calibration.check import Check, check_geometry, require_spare_length
+from cdpr_rt.calibration.fit import Fit
 from cdpr_rt.calibration.outcome import wanted_mm
-from cdpr_rt.calibration.readings.camera_data import CameraSetup
-from cdpr_rt.calibration.readings.data import CalibrationData, load_data
+from cdpr_rt.calibration.parameters import CableGeometry, Knowledge
+from cdpr_rt.calibration.readings import CalibrationData, CameraSetup, HandEye, load_data
 from cdpr_rt.core.clock import Clock
-from cdpr_rt.procedures.calibration.measure_poses import (
-    Measured,
-    PoseRefusedError,
-    measure_poses,
-    read_pose,
-)
-from cdpr_tools.calibrate.finish import identified
-from cdpr_tools.calibrate.measuring.daemon_pose import (
+from cdpr_tools.calibrate.daemon_run import (
     DaemonPoses,
-    held_place,
     image_taker,
     no_poses,
+    read_places,
     robot_of,
 )
-from cdpr_tools.calibrate.measuring.daemon_run import DaemonOperator, read_places
-from cdpr_tools.calibrate.measuring.places import chosen_places
-from cdpr_tools.calibrate.measuring.rig import simulated_rig
-from cdpr_tools.calibrate.measuring.run import DATA
-from cdpr_tools.calibrate.measuring.ways import StoppedError
+from cdpr_tools.calibrate.finish import identified, with_hand_eye
+from cdpr_tools.calibrate.places import chosen_places
+from cdpr_tools.calibrate.pose_operator import PoseOperator, StoppedError
+from cdpr_tools.calibrate.rig import simulated_rig
+from cdpr_tools.calibrate.run import DATA
 from cdpr_tools.client.client import Daemon
+from cdpr_tools.client.daemon_robot import commanded
 from cdpr_tools.errors import BadInputError, WorkFailedError
 from cdpr_tools.output import Output
-from cdpr_tools.robots.poses.choice import Choose
+from cdpr_tools.robots.pose_choice import Choose
 from cdpr_tools.signals import HELD, stop_on_signals
 
 if TYPE_CHECKING:
-    from cdpr_tools.calibrate.measuring.pose_camera import PoseCamera
+    from cdpr_tools.calibrate.pose_camera import PoseCamera
 
 POSES = 10
 CHECK, IMAGES = "check.json", "images"
 _LEAST = 5
+_SAME_mm = 0.01
+"""Exit points of a repeated fit that differ by no more than this count as unchanged."""
 _SHARE = 1.0 / 3.0
-"""Of the error that is wanted at most: what has changed by less does not matter yet."""
+"""Share of the largest acceptable error; a change with a smaller effect does not matter yet."""
 
 
 @dataclass(frozen=True)
 class Before:
-    """What a calibration with the camera has left: its data and its fit."""
+    """Data and fit of an earlier calibration with the camera."""
 
     data: CalibrationData
     found: Fit
 
     @property
     def setup(self) -> CameraSetup:
-        """The camera's."""
+        """Return the setup of the camera."""
         assert self.data.camera is not None  # see `before`
         return self.data.camera
 
 
 def before(out: Output, file: Robot) -> Before | None:
-    """Return the data of the calibration in force and their fit; None where no camera had a part.
+    """Return the data of the calibration in force and their fit; None if it used no camera.
 
-    Says where the data are gone. Raises ProfileError for data that cannot be read,
-    InvalidRequestError for such of another robot.
+    The fit is repeated with the same settings. If that is no longer possible, a note says why.
+    Raises ProfileError for unreadable data, InvalidRequestError for data of another robot.
     """
     known = in_force(file)
     if known is None or known.method != "camera":
         return None
-    if not Path(known.raw_data).exists():
-        out.note(f"{known.raw_data}: is gone, and the map with it; the camera is left aside")
+    points, hand_eye = (Path(x) if x else None for x in (known.points_file, known.hand_eye_file))
+    for path in filter(None, (Path(known.raw_data), points, hand_eye)):
+        if not path.exists():
+            out.note(f"{path}: is gone, and the map with it; the camera is left aside")
+            return None
+    data = with_hand_eye(
+        load_data(Path(known.raw_data)), None if hand_eye is None else HandEye.load_file(hand_eye)
+    )
+    knowledge = Knowledge(exit_m=known.known_exit_m)
+    geometry = CableGeometry.of(file, known.identified, knowledge)
+    found = identified(file, data, points, geometry).found
+    k = found.geometry.coordinates
+    exits = found.geometry.kernel_geometry()[:k].T
+    off_mm = 1e3 * float(np.abs(exits - np.array(known.exit_points_m)).max())
+    if off_mm > _SAME_mm:
+        out.note(
+            f"{known.raw_data}: exit points come out up to {off_mm:.2f} mm from those of the "
+            "calibration in force: files or software have changed since; the camera is left aside"
+        )
         return None
-    data = load_data(Path(known.raw_data))
-    outcome = identified(file, data, None, CableGeometry.of(file))
-    return Before(data, outcome.found)
+    return Before(data, found)
 
 
 def checked(
     out: Output, file: Robot, plant: Path | None, scanner: bool, seed: int, folder: Path
 ) -> Check:
-    """Take a simulated robot, with its calibration in force, to ten poses and look at it.
+    """Move a simulated robot, with its calibration in force, to ten poses and check it.
 
-    Where it was calibrated with the camera, that looks as well. The readings are kept in the
-    folder. Raises what the robot does, WorkFailedError.
+    If it was calibrated with the camera, the check uses the camera too. The readings are stored
+    in the folder. Raises the robot's errors and WorkFailedError.
     """
     _require_other_folder(folder)
     robot, known = calibrated(file), before(out, file)
-    return _judged(robot, known, _read(out, robot, plant, scanner, seed, folder, known))
+    if known is None and not scanner:
+        require_spare_length(CableGeometry.of(robot))  # before the robot moves
+    places = chosen_places(robot, POSES, seed, Choose.SPREAD)
+    out.note(f"{robot.profile}: starting the simulated robot ...")
+
+    def camera(url: str, clock: Clock) -> PoseCamera:
+        from cdpr_tools.calibrate.pose_camera import (  # noqa: PLC0415  # needs an extra
+            PoseCamera,
+        )
+
+        assert known is not None  # only used if `known` is set
+        setup, images = known.setup, folder / IMAGES
+        return PoseCamera(url, clock, setup.intrinsics, setup.sheets, images, out.note)
+
+    kept = _nothing_read(folder, robot, known, simulated=True)
+    with (
+        stop_on_signals("the robot is brought to rest and switched off") as stop,
+        _stopped(),
+        simulated_rig(
+            str(robot.path),
+            plant=plant,
+            scanner=scanner,
+            camera=None if known is None else camera,
+            stop=stop,
+            as_calibrated=True,
+        ) as operator,
+    ):
+        operator.tighten()
+        read_places(out, robot, operator, kept, places, POSES + 1)
+    return _judged(robot, known, kept.data)
 
 
 def checked_running(
     out: Output, file: Robot, daemon: Daemon, camera: str | None, seed: int, folder: Path
 ) -> Check:
-    """Do the same with the robot that a daemon runs with that calibration, from home.
+    """Check the robot that a daemon runs with that calibration, starting at home.
 
-    It looks with the `camera` of a URL where there is one. Raises CommandError besides.
+    `camera` is the URL of a camera, if there is one. Also raises CommandError.
     """
     _require_other_folder(folder)
     robot, description = robot_of(daemon, as_calibrated=True)
@@ -114,27 +156,48 @@ def checked_running(
     if known is not None and camera is None:
         out.note("--camera is left out: lengths alone are looked at")
         known = None
-    kept = DaemonPoses(folder, no_poses(robot, description["simulated"]), CHECK)
-    kept.require_home(robot, held_place(daemon, robot))  # before what takes a while
+    if known is None:
+        require_spare_length(CableGeometry.of(robot))
+    kept = _nothing_read(folder, robot, known, description["simulated"])
+    with commanded(daemon) as running:  # before the slow choice of poses
+        kept.require_home(robot, PoseOperator(running, robot).place())
     places = chosen_places(robot, POSES, seed, Choose.SPREAD)
-    if known is not None:
-        kept.data = kept.data.model_copy(update={"camera": known.setup})
     with (
         stop_on_signals(HELD) as stop,
         image_taker(camera, None, None, kept, out.note) as image,
+        _stopped(),
+        commanded(daemon, in_control=True) as running,
     ):
-        try:
-            operator = DaemonOperator(daemon, robot, image, stop)
-            read_places(out, robot, operator, kept, places, POSES + 1)
-        except StoppedError:
-            raise WorkFailedError("stopped; nothing is said of the robot") from None
+        operator = PoseOperator(running, robot, image, stop)
+        read_places(out, robot, operator, kept, places, POSES + 1)
     return _judged(robot, known, kept.data)
 
 
+def _nothing_read(folder: Path, robot: Robot, known: Before | None, simulated: bool) -> DaemonPoses:
+    """Return the empty data of a new check, in its folder."""
+    camera = None if known is None else known.setup
+    data = no_poses(robot, simulated).model_copy(update={"camera": camera})
+    return DaemonPoses(folder, data, CHECK)
+
+
+@contextmanager
+def _stopped() -> Iterator[None]:
+    try:
+        yield
+    except StoppedError:
+        raise WorkFailedError("stopped; nothing is said of the robot") from None
+
+
 def _require_other_folder(folder: Path) -> None:
-    """Raise BadInputError for the folder of a calibration, whose files would be written over."""
+    """Raise BadInputError if files in the folder that are not a check's would be overwritten."""
     if (folder / DATA).exists():
         raise BadInputError(f"--out {folder}: has the poses of a calibration; allowed: another")
+    try:
+        load_data(folder / CHECK)
+    except FileMissingError:
+        return
+    except ProfileError as error:
+        raise BadInputError(f"{error}; allowed: another --out, or move it away") from None
 
 
 def _judged(robot: Robot, known: Before | None, data: CalibrationData) -> Check:
@@ -147,74 +210,8 @@ def _judged(robot: Robot, known: Before | None, data: CalibrationData) -> Check:
     return check_geometry(geometry, seen, _SHARE * 1e-3 * wanted_mm(robot))
 
 
-def _read(
-    out: Output,
-    robot: Robot,
-    plant: Path | None,
-    scanner: bool,
-    seed: int,
-    folder: Path,
-    known: Before | None,
-) -> CalibrationData:
-    """Return readings at home and at ten poses far from each other, all over the workspace."""
-    places = chosen_places(robot, POSES, seed, Choose.SPREAD)
-    out.note(f"{robot.profile}: starting the simulated robot ...")
-
-    def camera(url: str, clock: Clock) -> PoseCamera:
-        from cdpr_tools.calibrate.measuring.pose_camera import (  # noqa: PLC0415  # needs an extra
-            PoseCamera,
-        )
-
-        assert known is not None  # asked for with one alone
-        setup, images = known.setup, folder / IMAGES
-        return PoseCamera(url, clock, setup.intrinsics, setup.sheets, images, out.note)
-
-    def keep() -> None:
-        count = len(measured.readings)
-        operator.number = count + 1
-        advance(float(count))
-        out.note(f"pose {count - 1} of {len(places.chosen)}" if count > 1 else "home is read")
-
-    measured = Measured(keep)
-    try:
-        with (
-            stop_on_signals("the robot is brought to rest and switched off") as stop,
-            out.progress(f"reading {POSES + 1} poses", float(POSES + 1)) as advance,
-            simulated_rig(
-                str(robot.path),
-                plant=plant,
-                scanner=scanner,
-                camera=None if known is None else camera,
-                stop=stop,
-                as_calibrated=True,
-            ) as operator,
-        ):
-            operator.number = 1
-            measured.add(read_pose(operator, operator.tighten()))
-            for batch in places.batches():
-                measure_poses(operator, batch, places.middle, measured, out)
-    except StoppedError:
-        raise WorkFailedError("stopped; nothing is said of the robot") from None
-    except PoseRefusedError as error:
-        raise WorkFailedError(f"{robot.profile}: at home: {error}") from error
-    return _kept(robot, measured, known, folder)
-
-
-def _kept(robot: Robot, measured: Measured, known: Before | None, folder: Path) -> CalibrationData:
-    """Return what was read, which is in the folder then."""
-    data = no_poses(robot, simulated=True).model_copy(
-        update={
-            "left_out": tuple(measured.refused),
-            "camera": None if known is None else known.setup,
-            "poses": tuple(measured.readings),
-        }
-    )
-    data.save(folder / CHECK)
-    return data
-
-
 def lines(found: Check, robot: Robot) -> list[str]:
-    """Return what the check says, and what to do."""
+    """Return the verdict of the check and what to do, as lines of text."""
     verdict = found.verdict()
     known = calibrated(robot).calibration
     against = (
@@ -223,7 +220,7 @@ def lines(found: Check, robot: Robot) -> list[str]:
     verdict[0] = f"{robot.profile} against {against}: {verdict[0]}"
     if found.moved:
         verdict.append(
-            f"mend what moved, or calibrate anew: cdpr calibrate run {robot.reference}; until then "
+            f"mend what moved, or recalibrate: cdpr calibrate run {robot.reference}; until then "
             "positions are off by what is said above"
         )
     return verdict

@@ -1,4 +1,4 @@
-"""What follows once a calibration is measured: identify, tell, report, take over what is good."""
+"""Finish a measured calibration: identify, print, report, and put a good result in force."""
 
 from __future__ import annotations
 
@@ -14,32 +14,36 @@ from cdpr_profiles.calibration.geometry import GeometryCalibration
 from cdpr_profiles.calibration.in_force import in_force, next_version, take_over
 from cdpr_profiles.errors import ProfileError
 from cdpr_rt.calibration.calibrate import calibrate
-from cdpr_rt.calibration.estimation.parameters import CableGeometry
-from cdpr_rt.calibration.outcome import CalibrationMethod, Outcome, calibration_of
-from cdpr_rt.calibration.readings.camera_data import HandEye, Images
-from cdpr_rt.calibration.readings.data import CalibrationData, with_points
+from cdpr_rt.calibration.outcome import (
+    CalibrationFiles,
+    CalibrationMethod,
+    Outcome,
+    calibration_of,
+)
+from cdpr_rt.calibration.parameters import CableGeometry
+from cdpr_rt.calibration.readings import CalibrationData, HandEye, Images, with_points
+from cdpr_rt.diagnosis.checks import refuse_impossible
 from cdpr_rt.errors import ControlError, InvalidRequestError
-from cdpr_rt.robots.feasibility.checks import refuse_impossible
-from cdpr_rt.robots.persistence.calibration_state import (
+from cdpr_rt.model.calibration_state import (
     mark_calibrated,
     mark_not_calibrated,
     not_calibrated_reason,
 )
-from cdpr_tools.calibrate.measuring.begin import points_of
-from cdpr_tools.calibrate.measuring.run import COUNTED
-from cdpr_tools.errors import BadInputError, WorkFailedError
+from cdpr_tools.calibrate.run import COUNTED, points_of
+from cdpr_tools.errors import BadInputError, WorkFailedError, os_error_as
 from cdpr_tools.output import Output
+from cdpr_tools.report.save import require_own
 
 if TYPE_CHECKING:
-    from cdpr_tools.calibrate.report.truth_comparison import TruthComparison
+    from cdpr_tools.calibrate.truth_comparison import TruthComparison
 
 _PICTURE, _REPORT, _IMAGES = "calibration.png", "calibration.html", "images"
 _LEAST_JUDGED = 20
 _LITTLE = 0.1
-"""What ten more poses have to bring at least, relative, for it to be worth it."""
+"""Least relative gain for which ten more poses are worth the time."""
 
 CompareWithTruth = Callable[[Outcome], "TruthComparison"]
-"""Compares an outcome with what a simulator knows, once it is there."""
+"""Compares an outcome with the truth that a simulator knows."""
 
 
 def identified(
@@ -49,7 +53,7 @@ def identified(
     geometry: CableGeometry,
     so_far: bool = False,
 ) -> Outcome:
-    """Return what data and measured points tell; `so_far` leaves points of later poses aside.
+    """Return the calibration of data and points; `so_far` ignores points of poses not yet read.
 
     Raises InvalidRequestError, ProfileError.
     """
@@ -66,9 +70,9 @@ def identified(
 
 
 def with_hand_eye(data: CalibrationData, known: HandEye | None) -> CalibrationData:
-    """Return data with where the camera sits on the platform, where that is told.
+    """Return the data with a known hand-eye transform, or unchanged if it is None.
 
-    Raises BadInputError where there was no camera.
+    Raises BadInputError if no camera was used.
     """
     if known is None:
         return data
@@ -83,7 +87,7 @@ def with_hand_eye(data: CalibrationData, known: HandEye | None) -> CalibrationDa
 def stop_criterion(
     out: Output, robot: Robot, points: Path | None, geometry: CableGeometry
 ) -> Callable[[CalibrationData], str | None]:
-    """Return what a run asks after each batch of poses: what is wrong, and whether it is enough."""
+    """Return the check after each batch of poses: it reports faults and says if they suffice."""
     named: set[str] = set()
 
     def check(data: CalibrationData) -> str | None:
@@ -91,7 +95,7 @@ def stop_criterion(
             return None
         try:
             outcome = identified(robot, data, points, geometry, so_far=True)
-        except ControlError:  # what is missing so far is said at the end if it still is
+        except ControlError:  # more poses may help; if not, the fit at the end reports it
             return None
         for fault in outcome.faults:
             who = " ".join([fault.kind, *fault.text.split()[:2]])  # sizes change with each fit
@@ -105,6 +109,13 @@ def stop_criterion(
     return check
 
 
+def refuse_foreign_report(folder: Path) -> None:
+    """Raise BadInputError if a report would replace files in `folder` that no calibration wrote."""
+    for path in (folder / _REPORT, folder / _PICTURE):
+        with os_error_as(BadInputError, str(path)):
+            require_own(path)
+
+
 def finish(
     out: Output,
     robot: Robot,
@@ -116,14 +127,18 @@ def finish(
     dry_run: bool,
     adopt: bool,
     compare: CompareWithTruth | None = None,
+    hand_eye: Path | None = None,
 ) -> None:
-    """Identify, tell, report, and take over what is good; `source` is the file of the data.
+    """Identify, print, report, and put a good calibration in force; `source` is the data file.
 
-    What changes nothing significantly is taken over only to `adopt`, and not where it tells poses
-    not used worse than the robot's file does, by more than noise.
+    `hand_eye` is the file of the hand-eye transform, if it does not come from the data.
 
-    Raises typer.Exit with status 1 where nothing was taken over because it is not good.
+    A calibration without significant changes is put in force only with `adopt`, and not if it
+    predicts held-out poses worse than the robot's file does, by more than noise.
+
+    Raises typer.Exit with status 1 if the calibration is not good.
     """
+    refuse_foreign_report(folder)
     with out.stage(f"fitting {len(data.poses)} poses"):
         outcome = replace(identified(robot, data, points, geometry), adopt=adopt)
         known = None if compare is None else compare(outcome)
@@ -137,7 +152,8 @@ def finish(
     taken: dict[str, Any] | None = None
     more = [f"nothing was taken over: {why_not}"]
     if why_not is None:
-        taken, more = _taken(outcome, source, data.simulated)
+        files = CalibrationFiles(*(_path_text(path) for path in (source, points, hand_eye)))
+        taken, more = _taken(outcome, source, files, data.simulated)
     measured = "" if points is None else f" --points {points}"
     more.append(
         f"fit it again: cdpr calibrate fit {robot.reference} --data {source.parent}{measured}"
@@ -151,24 +167,32 @@ def finish(
 
 
 def _why_not(outcome: Outcome, dry_run: bool) -> str | None:
-    """Return why a calibration is not taken over, None where it is."""
+    """Return why a calibration is not put in force, None if it is."""
     if dry_run:
         return "--dry-run"
     if not outcome.good:
         return "it is not good"
-    if outcome.adopt or outcome.change.significant:
+    if outcome.adopt or outcome.told_from_file:
         return None
     if outcome.worse:
-        return "its changes are not significant, and poses not used are told worse with them"
+        return (
+            "its changes are not significant, and it predicts unused poses worse than the file does"
+        )
     return "its changes are not significant (--adopt takes it over all the same)"
 
 
-def _taken(outcome: Outcome, source: Path, simulated: bool) -> tuple[dict[str, Any], list[str]]:
-    """Take a good calibration over; return it for JSON, and what there is to say and do."""
+def _path_text(path: Path | None) -> str:
+    return "" if path is None else str(path.resolve())
+
+
+def _taken(
+    outcome: Outcome, source: Path, files: CalibrationFiles, simulated: bool
+) -> tuple[dict[str, Any], list[str]]:
+    """Put a good calibration in force; return it for JSON, and the lines to print."""
     robot = outcome.robot
-    found, path = _take_over(outcome, str(source.resolve()), simulated)
+    found, path = _take_over(outcome, files, simulated)
     if not simulated or source.with_name(COUNTED).exists():
-        how = "--running, once it runs anew, tight and at home"
+        how = "--running, once it runs again, tight and at home"
     else:
         how = "--plant FILE, where the run had one"
     check = f"cdpr calibrate check {robot.reference} {how}"
@@ -194,29 +218,25 @@ def _reported(
     images: Path,
 ) -> dict[str, str]:
     """Write picture and report; return their paths for JSON. Raises WorkFailedError."""
-    from cdpr_tools.calibrate.report.page import write_report  # noqa: PLC0415
-    from cdpr_tools.calibrate.report.picture import found_figure  # noqa: PLC0415  # slow to load
+    from cdpr_tools.calibrate.page import found_figure, write_report  # noqa: PLC0415  # slow to load
     from cdpr_tools.report.style import save_figure  # noqa: PLC0415
 
     report, path = folder / _REPORT, folder / _PICTURE
     advice = dict.fromkeys(one.advice for one in outcome.open_directions)
     next_steps = [*advice, outcome.advice(), *more]
     write_report(report, outcome, data, comparison, next_steps, images)
-    try:
-        save_figure(found_figure(outcome), path)
-    except OSError as error:
-        raise WorkFailedError(f"{path}: cannot be written: {error.strerror}") from error
+    save_figure(found_figure(outcome), path)
     return {"picture": str(path), "report": str(report)}
 
 
 def _take_over(
-    outcome: Outcome, raw_data: str, simulated: bool
+    outcome: Outcome, files: CalibrationFiles, simulated: bool
 ) -> tuple[GeometryCalibration, Path]:
     """Put a good calibration in force, if the robot can work with it; raises ProfileError."""
     robot = outcome.robot
     before = "" if simulated else not_calibrated_reason(robot.profile)
     found = calibration_of(
-        outcome, next_version(robot), raw_data, simulated=simulated, distrusted_before=before
+        outcome, next_version(robot), files, simulated=simulated, distrusted_before=before
     )
     refuse_impossible(found.applied(robot))
     path = take_over(robot, found)
@@ -226,7 +246,7 @@ def _take_over(
 
 
 def distrust_again(robot: Robot) -> None:
-    """Have the geometry not believed where it was not before the calibration in force."""
+    """Mark the robot as not calibrated again if it was so before the calibration in force."""
     try:
         known = in_force(robot)
     except ProfileError:
@@ -238,14 +258,14 @@ def distrust_again(robot: Robot) -> None:
 
 
 def _lines(outcome: Outcome, data: CalibrationData) -> list[str]:
-    """Return the outcome for people."""
+    """Return the outcome as lines of text."""
     result = outcome.as_json()
     lines = [f"{outcome.robot.name}: {result['poses']} poses, in the frame of {result['frame']}"]
     if data.left_out:
         lines.append(f"{len(data.left_out)} poses were refused, the last: {data.left_out[-1]}")
-    lines.append("changes to the robot's file, ± 1 sigma (predicted):")
+    lines.append("changes to the robot's file, ± 3 sigma (predicted):")
     lines += [
-        f"  {row['name']:26}{row['change']:+9.2f} ± {row['std']:.2f} {row['unit']}"
+        f"  {row['name']:26}{row['change']:+9.2f} ± {3.0 * row['std']:.2f} {row['unit']}"
         for row in result["parameters"]
     ]
     return lines + outcome.verdict()

@@ -1,7 +1,8 @@
-"""The daemon as a client sees it: over its Unix socket, or over TCP with the key; and its start."""
+"""Client of the daemon, over its Unix socket or over TCP with the key; and the daemon's start."""
 
 from __future__ import annotations
 
+import errno
 import getpass
 import os
 import socket
@@ -15,18 +16,19 @@ from typing import Any, Final
 
 import httpx
 
+from cdpr_profiles.bounded_input import parse_json
 from cdpr_profiles.errors import ProfileError, brief
-from cdpr_profiles.reading.bounded_input import parse_json
-from cdpr_profiles.reading.places import reference
+from cdpr_rt.loop.stop_socket import STOP_SUFFIX, StopUnansweredError, send_stop
 from cdpr_rt.refusal import CommandRefusal
 from cdpr_tools.client.refusals import DaemonRefusalError
 from cdpr_tools.client.status_text import DEAD, death_text
-from cdpr_tools.daemon.loop_file import launcher_does
+from cdpr_tools.daemon.loop_file import LoopFile, launcher_does
 from cdpr_tools.daemon.paths import (
     LAUNCHER_SUFFIX,
     find_launcher_files,
     find_sockets,
     found_instead,
+    is_file_of,
     is_trusted,
 )
 from cdpr_tools.daemon.settings import read_key
@@ -36,7 +38,7 @@ from cdpr_tools.output import Output
 _CONNECT_S, _ANSWER_S = 5.0, 70.0
 _BAD_INPUT: Final = frozenset({400, 401, 403, 404, 405, 413, 422})
 _LEASE_S = 2.0
-_STOPS: Final = frozenset({"/hold", "/disable", "/shutdown"})
+_STOP_WAIT_S: Final = {"/hold": 3.0, "/disable": 30.0, "/shutdown": 30.0}
 _STOP_TRIES, _STOP_AGAIN_S = 50, 0.02
 
 
@@ -48,55 +50,94 @@ class ConnectionLostError(NoDaemonError):
     """The connection ended before the answer."""
 
 
-class Daemon:
-    """Requests to one daemon; a refusal is raised as the command's error."""
+class UnansweredError(NoDaemonError):
+    """The answer has not arrived in time."""
 
-    def __init__(self, http: httpx.Client, where: str) -> None:
+
+class CrowdedError(NoDaemonError):
+    """The daemon has too many connections and has not read the request."""
+
+
+class ServiceRefusalError(WorkFailedError):
+    """The service has refused a command, for example because another client may move the robot."""
+
+
+class LoopEndedError(WorkFailedError):
+    """The daemon's control loop has ended."""
+
+
+class Daemon:
+    """Requests to one daemon; a refusal is raised as the command's error.
+
+    Stops go to the loop's own socket `stops`, if this client can reach one.
+    """
+
+    def __init__(self, http: httpx.Client, where: str, stops: Path | None = None) -> None:
         self._http = http
         self.where = where
+        self._stops = stops
         self.name = f"{_user()}@{socket.gethostname()}"[:64]
 
     def get(self, path: str) -> dict[str, Any]:
-        """Return what is at `path`."""
+        """Return the answer of a GET request for `path`."""
         return self._ask("GET", path)
 
     def post(
         self, path: str, body: dict[str, Any] | None = None, token: str | None = None
     ) -> dict[str, Any]:
-        """Send a command in this user's name; return the answer.
+        """Send a command under this user's name; return the answer.
 
-        A stop whose connection is lost, as under too many connections, is sent again.
+        A stop over HTTP that is lost because of too many connections is sent again.
         """
+        if path in _STOP_WAIT_S and (answer := self._stop(path)) is not None:
+            return answer
         body = {"client": self.name, **(body or {})}
-        tries = _STOP_TRIES if path in _STOPS else 1
+        tries = _STOP_TRIES if path in _STOP_WAIT_S else 1
         for left in reversed(range(tries)):
             try:
                 return self._ask("POST", path, body, token)
-            except ConnectionLostError:
+            except (ConnectionLostError, CrowdedError):
                 if not left:
                     raise
                 time.sleep(_STOP_AGAIN_S)
         raise AssertionError("there is one try at least")
 
-    @contextmanager
-    def control(self) -> Iterator[HeldRight]:
-        """Hold the right to move in the block; where the block fails, motion is held first."""
-        token = str(self.post("/control", {"ttl_s": _LEASE_S})["token"])
-        control = HeldRight(self, token)
+    def _stop(self, path: str) -> dict[str, Any] | None:
+        """Request a stop directly from the loop; return its answer, None if it has no socket."""
+        if self._stops is None:
+            return None
+        do = path.removeprefix("/")
         try:
-            yield control
-        except BaseException:
-            if control.obeyed:
-                with suppress(CommandError):
-                    control.hold()
-            raise
+            answer = send_stop(_trusted(self._stops), do, self.name, _STOP_WAIT_S[path])
+        except PermissionError:
+            return None
+        except StopUnansweredError as error:
+            raise WorkFailedError(
+                f"{do}: {error}; `cdpr status` shows its state, `cdpr estop` removes the power"
+            ) from None
+        if answer is None or answer["ok"]:
+            return answer
+        if (refusal := CommandRefusal.from_json(answer.get("refusal"))) is not None:
+            raise DaemonRefusalError.of(refusal)
+        raise DaemonRefusalError(str(answer["text"]))
+
+    @contextmanager
+    def control(self) -> Iterator[str]:
+        """Hold the right to move in the block; yield its token. It is not renewed here."""
+        token = str(self.post("/control", {"ttl_s": _LEASE_S})["token"])
+        try:
+            yield token
         finally:
             with suppress(CommandError):
-                self._ask("DELETE", "/control", token=token)
+                self.release(token)
 
     def renew(self, token: str) -> None:
         """Renew the right to move."""
         self._ask("PUT", "/control", token=token)
+
+    def release(self, token: str) -> None:
+        """Release the right to move."""
+        self._ask("DELETE", "/control", token=token)
 
     def _ask(
         self,
@@ -114,6 +155,8 @@ class Daemon:
             ) from None
         except (httpx.ReadError, httpx.WriteError, httpx.RemoteProtocolError) as error:
             raise ConnectionLostError(f"{self.where}: {error or type(error).__name__}") from None
+        except httpx.TimeoutException as error:
+            raise UnansweredError(f"{self.where}: {error or type(error).__name__}") from None
         except (httpx.HTTPError, httpx.InvalidURL) as error:
             raise NoDaemonError(f"{self.where}: {error or type(error).__name__}") from None
         try:
@@ -121,6 +164,8 @@ class Daemon:
         except ProfileError:
             answer = None
         if not isinstance(answer, dict):
+            if response.status_code == HTTPStatus.SERVICE_UNAVAILABLE:
+                raise CrowdedError(f"{self.where}: has too many connections; try again")
             raise WorkFailedError(f"{self.where}: does not answer as a daemon does")
         if response.is_success:
             return answer
@@ -128,11 +173,12 @@ class Daemon:
         if response.status_code in _BAD_INPUT:
             raise BadInputError(message)
         if answer.get("state") == DEAD:
-            raise WorkFailedError(death_text(self.get("/status")))
+            raise LoopEndedError(death_text(self.get("/status")))
         if (refusal := CommandRefusal.from_json(answer.get("refusal"))) is not None:
             raise DaemonRefusalError.of(refusal)
-        if response.status_code == HTTPStatus.CONFLICT and answer.get("state"):
-            raise DaemonRefusalError(message)  # the loop's, in words alone
+        if response.status_code == HTTPStatus.CONFLICT:
+            refused = DaemonRefusalError if answer.get("state") else ServiceRefusalError
+            raise refused(message)  # as text, whether from the loop or the service
         raise WorkFailedError(message)
 
 
@@ -143,30 +189,6 @@ def _user() -> str:
         return f"#{os.getuid()}"
 
 
-class HeldRight:
-    """The right to move, while it is held."""
-
-    def __init__(self, daemon: Daemon, token: str) -> None:
-        self.daemon = daemon
-        self.token = token
-        self.obeyed = False
-        """Whether a command has been carried out."""
-
-    def post(self, path: str, body: dict[str, Any]) -> dict[str, Any]:
-        """Send a command that needs the right."""
-        answer = self.daemon.post(path, body, self.token)
-        self.obeyed = True
-        return answer
-
-    def renew(self) -> None:
-        """Renew the right."""
-        self.daemon.renew(self.token)
-
-    def hold(self) -> None:
-        """Stop the motion, stay there."""
-        self.daemon.post("/hold")
-
-
 @contextmanager
 def open_daemon(
     robot: str | None,
@@ -175,9 +197,9 @@ def open_daemon(
     key_file: Path | None,
     answer_s: float = _ANSWER_S,
 ) -> Iterator[Daemon]:
-    """Yield the daemon that the options name, the only one there is where they name none.
+    """Yield the daemon that the options name; without options, the only one.
 
-    It is to answer each request within `answer_s`.
+    It must answer each request within `answer_s`.
     Raises BadInputError and NoDaemonError.
     """
     timeout = httpx.Timeout(_CONNECT_S, read=answer_s)
@@ -188,7 +210,7 @@ def open_daemon(
         if key_file is not None:
             headers["Authorization"] = f"Bearer {read_key(key_file).decode()}"
         try:
-            # TLS is not spoken here, and its certificates take 20 ms to read
+            # TLS is not used here, and loading its certificates takes 20 ms
             http = httpx.Client(
                 base_url=url, headers=headers, timeout=timeout, trust_env=False, verify=False
             )
@@ -204,16 +226,22 @@ def open_daemon(
     with httpx.Client(
         transport=transport, base_url="http://daemon", timeout=timeout, verify=False
     ) as http:
-        daemon = Daemon(http, str(path))
+        daemon = Daemon(http, str(path), path.with_suffix(STOP_SUFFIX))
         if robot is not None and robot.endswith(".toml"):
             _require_file(daemon, Path(robot).resolve())
         yield daemon
 
 
 def _require_file(daemon: Daemon, path: Path) -> None:
-    """Raise BadInputError where a daemon runs another robot than that of a file of its name."""
-    runs = str(daemon.get("/description").get("reference"))
-    if runs not in (reference("robots", path), reference("winches", path)):
+    """Raise BadInputError if a daemon of this name runs another file than the given one.
+
+    The loop's file says which; this works even if the service hangs.
+    """
+    try:
+        runs = LoopFile.read(LoopFile.beside(Path(daemon.where))).reference
+    except WorkFailedError:
+        runs = str(daemon.get("/description").get("reference"))
+    if not is_file_of(runs, path):
         raise BadInputError(
             f"--robot {path}: the daemon of this name runs {runs}; allowed: that file, or --socket"
         )
@@ -221,16 +249,21 @@ def _require_file(daemon: Daemon, path: Path) -> None:
 
 def _trusted(path: Path) -> Path:
     """Return the path of a socket that this user or root owns; raises BadInputError."""
-    with suppress(OSError):  # what is not there does not answer either
+    with suppress(OSError):  # a missing file does not answer either
         owner = path.lstat().st_uid
         if not is_trusted(path, owner):
-            raise BadInputError(f"--socket {path}: was put there by user {owner}, not by you")
+            raise BadInputError(f"--socket {path}: belongs to user {owner}, not to you or root")
     return path
 
 
 def answers(robot: str | None, unix: Path | None) -> bool:
-    """Whether a daemon of the robot, of any, or at this socket, can be connected to."""
+    """Whether a daemon of this robot, of any robot, or at this socket accepts a connection."""
     return any(map(_is_alive, find_sockets(robot) if unix is None else [unix]))
+
+
+def is_starting(robot: str) -> bool:
+    """Whether a daemon of the robot is starting or ending."""
+    return _launcher_does(find_launcher_files(robot)) is not None
 
 
 def _only_socket(robot: str | None) -> Path:
@@ -252,20 +285,21 @@ def _only_socket(robot: str | None) -> Path:
 
 
 def _launcher_does(marks: list[Path]) -> str | None:
-    """Return what the first of these launchers that runs is doing, None where none runs."""
+    """Return the step of the first of these launchers that runs; None if none runs."""
     return next((doing for doing in map(launcher_does, marks) if doing is not None), None)
 
 
 def _is_alive(path: Path) -> bool:
     with socket.socket(socket.AF_UNIX) as probe:
         probe.settimeout(1.0)
-        return probe.connect_ex(str(path)) == 0
+        # EAGAIN: it runs, but too many connections wait
+        return probe.connect_ex(str(path)) in (0, errno.EAGAIN)
 
 
 def axis_values(texts: list[str], axes: list[dict[str, Any]], unit: str) -> dict[int, float]:
-    """Return the numbers given as AXIS=NUMBER, by the axis' place; raises BadInputError.
+    """Return the numbers given as AXIS=NUMBER, by the axis' index; raises BadInputError.
 
-    A number alone is for the robot's only axis.
+    A number without an axis is for the robot's only axis.
     """
     names = [str(axis.get("name")) for axis in axes]
     values: dict[int, float] = {}
@@ -288,7 +322,7 @@ def axis_values(texts: list[str], axes: list[dict[str, Any]], unit: str) -> dict
 
 
 def key_values(texts: list[str]) -> dict[str, Any]:
-    """Return what was given as KEY=VALUE, the value as JSON; raises BadInputError."""
+    """Return the values given as KEY=VALUE, with the value as JSON; raises BadInputError."""
     values: dict[str, Any] = {}
     for text in texts:
         key, equals, value = text.partition("=")
@@ -301,14 +335,14 @@ def key_values(texts: list[str]) -> dict[str, Any]:
     return values
 
 
-# the first start on a machine compiles the control loop, a slow one for minutes
+# the first start on a machine compiles the control loop, which takes minutes if it is slow
 _START_S, _ASK_S, _TELL_S = 600.0, 0.2, 10.0
 
 
 def await_socket(robot: str | None, unix: Path | None, out: Output) -> None:
-    """Wait until a daemon whose launcher runs can be connected to; not where none does.
+    """Wait until a daemon accepts a connection; do not wait if no launcher runs.
 
-    Raises WorkFailedError where it takes too long.
+    Raises WorkFailedError if it takes too long.
     """
     waiting = _Waiting(out)
     while not answers(robot, unix):
@@ -316,14 +350,14 @@ def await_socket(robot: str | None, unix: Path | None, out: Output) -> None:
         if unix is not None:
             marks = [unix.with_suffix(LAUNCHER_SUFFIX)]
         if (doing := _launcher_does(marks)) is None:
-            return  # nor is one to be expected
+            return  # and none is expected
         waiting.go_on(doing or "its simulated drives and its processes come up")
 
 
 def await_start(daemon: Daemon, out: Output) -> None:
-    """Wait until the drives have booted for the first time, or why they have not is known.
+    """Wait until the drives have booted for the first time, or the reason of a failure is known.
 
-    Raises WorkFailedError where it takes too long, or where the control loop has died.
+    Raises WorkFailedError if it takes too long, or if the control loop has died.
     """
     waiting = _Waiting(out)
     while what := _startup_stage(status := daemon.get("/status"), waiting.waited):
@@ -333,7 +367,7 @@ def await_start(daemon: Daemon, out: Output) -> None:
 
 
 class _Waiting:
-    """Tells now and then that a daemon is still starting."""
+    """Reports from time to time that a daemon is still starting."""
 
     def __init__(self, out: Output) -> None:
         self._out = out
@@ -341,7 +375,7 @@ class _Waiting:
         self.waited = False
 
     def go_on(self, what: str) -> None:
-        """Wait a moment for `what`; raises WorkFailedError where it takes too long."""
+        """Wait a moment for `what`; raises WorkFailedError if it takes too long."""
         self.waited = True
         now_s = time.monotonic()
         taken_s = now_s - self._began_s
@@ -355,9 +389,9 @@ class _Waiting:
 
 
 def _startup_stage(status: dict[str, Any], waited: bool) -> str:
-    """Return what is going on in a daemon that is not up yet, "" in one that is.
+    """Return the present step of a daemon that is starting; "" if it is ready.
 
-    One that has been waited for goes on to check its bus; another may stay inactive.
+    If the command waits for the daemon, it goes on to check its bus; else it may stay inactive.
     """
     if status.get("state") == "starting":
         notices = "; ".join(status.get("notices") or ())

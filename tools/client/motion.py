@@ -1,165 +1,129 @@
-"""Waiting for the end of a motion that a daemon carries out."""
+"""Motions that a command runs on a daemon's robot: shown, ended by Ctrl-C, and reported."""
 
 from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from typing import Any
 
-from cdpr_tools.client.client import Daemon, HeldRight
+from cdpr_profiles.platform import NO_PLATFORM
+from cdpr_rt.robot import Robot, end_text, is_at_rest
+from cdpr_tools.client.client import Daemon
+from cdpr_tools.client.daemon_robot import commanded
 from cdpr_tools.client.status_text import (
     DEAD,
+    ProgressNotes,
     death_text,
-    place_text,
     platform_text,
-    stage_text,
-    target_text,
     tightness_text,
 )
-from cdpr_tools.errors import WorkFailedError
+from cdpr_tools.errors import BadInputError, WorkFailedError
 from cdpr_tools.output import Output
+from cdpr_tools.signals import HELD, stop_on_signals
 
-RENEW_S = 0.1
-TELL_S = 2.0
-"""How often a motion says how far it has come."""
+LOOK_S = 0.1
 _SETTLE_S = 2.0
-_REST_RAD, _REST_RAD_S = math.radians(0.5), math.radians(2.0)
 
 
-def require_program(daemon: Daemon, name: str) -> dict[str, Any]:
-    """Return the status; raises WorkFailedError where the program does not run any more."""
-    status = daemon.get("/status")
-    if status["state"] != "active" or status["program"] != name:
-        raise WorkFailedError(f"{name} was ended: {ended_text(daemon, status)} ({status['state']})")
-    return status
+class _OverError(Exception):
+    """The user requested the end of the motion, or its time is over."""
 
 
-def ended_text(daemon: Daemon, status: dict[str, Any]) -> str:
-    """Return why a program does not run any more."""
-    if status["state"] == DEAD:
-        return death_text(status)
-    if status["reason"]:
-        return str(status["reason"])
-    # what was asked of the daemon last, and by whom
-    asked = [one["text"] for one in daemon.get("/events")["events"] if one["kind"] == "command"]
-    return str(asked[-1]) if asked else "another program runs"
+@dataclass
+class Outcome:
+    """How a motion has ended."""
+
+    stopped: bool = False
+    """Whether the user has stopped it."""
+    ended: dict[str, Any] | None = None
+    """Its progress at its regular end; None if it was ended earlier."""
 
 
-def await_end(
-    control: HeldRight,
-    name: str,
-    stop_requested: Callable[[], bool],
-    seconds: float,
-    out: Output | None = None,
-) -> dict[str, Any] | None:
-    """Renew the right to move until the program is done; return its progress, else None.
+def carry_out(
+    daemon: Daemon,
+    out: Output,
+    motion: Callable[[Robot], object],
+    *,
+    seconds: float = math.inf,
+    notice: str = HELD,
+) -> Outcome:
+    """Run a motion on the daemon's robot; Ctrl-C ends it, and the robot holds.
 
-    How it goes on, and what holds it back meanwhile, is told in `out`.
+    It also ends after some seconds. Raises the command's errors if something else ends it.
     """
-    deadline, notes = time.monotonic() + seconds, ProgressNotes(out)
-    while not stop_requested() and time.monotonic() < deadline:
-        time.sleep(RENEW_S)
-        control.renew()
-        progress: dict[str, Any]
-        progress = require_program(control.daemon, name).get("program_progress", {})
-        if progress.get("trouble") and progress.get("done") != 1.0:
-            raise WorkFailedError(f"{name}: {progress['trouble']}")
-        notes(name, progress)
-        if is_done(progress):
-            return progress
-    return None
+    outcome, notes, deadline = Outcome(), ProgressNotes(out), time.monotonic() + seconds
+
+    def look(status: Mapping[str, Any]) -> None:
+        if stop_requested() or time.monotonic() > deadline:
+            raise _OverError
+        progress = status.get("program_progress") or {}
+        notes(str(status["program"]), progress)
+        outcome.ended = progress
+
+    with stop_on_signals(notice) as stop_requested, commanded(daemon) as robot:
+        robot.on_status = look
+        try:
+            motion(robot)
+        except _OverError as over:
+            outcome.ended = None
+            if failed := getattr(over, "__notes__", []):
+                raise WorkFailedError("; ".join(failed)) from None
+        outcome.stopped = stop_requested()
+    return outcome
 
 
-def is_done(progress: dict[str, Any]) -> bool:
-    """Whether a program has come to its end, of a sweep that of its last leg."""
-    return progress.get("done") == 1.0 and progress.get("leg") == progress.get("legs")
+def run_to_end(
+    daemon: Daemon,
+    out: Output,
+    program: str,
+    arguments: Mapping[str, Any],
+    where: str = "",
+    **figures: Any,
+) -> None:
+    """Run a program to its end, hold, and report where the robot is, or `where`."""
 
+    def motion(robot: Robot) -> None:
+        robot.run(program, **arguments)
+        robot.hold()
 
-class ProgressNotes:
-    """Says how a motion goes on, each thing once: its stages, what holds it back, its progress.
-
-    What is in a `status` of before is not said.
-    """
-
-    def __init__(self, out: Output | None, status: dict[str, Any] | None = None) -> None:
-        self._out = out
-        self._stage = self._held_back = ""
-        if status is not None:
-            progress = status.get("program_progress") or {}
-            self._stage = _stage(str(status["program"]), progress)
-            self._held_back = progress.get("held_back") or ""
-        self._next_s = time.monotonic() + TELL_S
-
-    def __call__(self, program: str, progress: dict[str, Any]) -> None:
-        """Take in the progress of a program."""
-        if self._out is None:
-            return
-        stage = _stage(program, progress)
-        if stage and stage != self._stage:
-            self._out.note(f"{stage} ...")
-            self._next_s = time.monotonic() + TELL_S
-        held_back = progress.get("held_back") or ""
-        if held_back and not self._held_back:
-            self._out.note(held_back)
-        self._stage, self._held_back = stage, held_back
-        if not is_done(progress) and time.monotonic() >= self._next_s:
-            self._next_s = time.monotonic() + TELL_S
-            if text := _so_far(progress):
-                self._out.note(text)
-
-
-def _stage(program: str, progress: dict[str, Any]) -> str:
-    return stage_text(program, progress) or target_text(progress)
-
-
-def _so_far(progress: dict[str, Any]) -> str:
-    """Return how far a motion has come: where the platform is, else the share that is done."""
-    if place := place_text(progress):
-        return place
-    if not (done := progress.get("done")):
-        return ""
-    leg = f"leg {progress['leg']} of {progress['legs']}, " if "legs" in progress else ""
-    return f"{leg}{100.0 * done:.0f} %"
-
-
-def _at_rest(axis: dict[str, Any]) -> bool:
-    angle, setpoint = axis.get("position_rad"), axis.get("setpoint_rad")
-    speed = axis.get("velocity_rad_s")
-    if angle is None or setpoint is None or speed is None:
-        return True
-    return bool(abs(speed) < _REST_RAD_S and abs(angle - setpoint) < _REST_RAD)
+    finish(daemon, out, carry_out(daemon, out, motion), where, **figures)
 
 
 def finish(
     daemon: Daemon,
     out: Output,
-    stopped: bool,
-    ended: dict[str, Any] | None = None,
+    outcome: Outcome,
     where: str = "",
     **figures: Any,
 ) -> None:
-    """Say where the platform or the axes are once they have settled, or have not for a while.
+    """Report where the platform or the axes are, once they have settled or a wait is over.
 
-    `ended` is the progress of what came to its end, `where` the words for that. Raises
-    WorkFailedError where the user has stopped it, or a fault has ended it or is about to.
+    `where` is the text for the place at the regular end. Raises WorkFailedError if the user
+    has stopped the motion, or a fault has ended it or is about to.
     """
+    stopped, ended = outcome.stopped, outcome.ended
     deadline = time.monotonic() + _SETTLE_S
     status = daemon.get("/status")
-    while not all(map(_at_rest, status["axes"])) and time.monotonic() < deadline:
-        time.sleep(RENEW_S)
+    while not all(map(is_at_rest, status["axes"])) and time.monotonic() < deadline:
+        time.sleep(LOOK_S)
         status = daemon.get("/status")
+    if status["state"] == DEAD:
+        raise WorkFailedError(death_text(status))
     if status["state"] == "active":
         out.say(*_where(status, where if ended and not stopped else ""))
     if trouble := (ended or {}).get("trouble"):
         figures["trouble"] = trouble
         out.say(str(trouble))
     if status["state"] != "active":
-        raise WorkFailedError(f"{ended_text(daemon, status)} ({status['state']})")
+        raise WorkFailedError(f"{end_text(status)} ({status['state']})")
     if status.get("reacting", "none") != "none":
-        raise WorkFailedError(f"{ended_text(daemon, status)} ({status['reacting']} under way)")
+        raise WorkFailedError(f"{end_text(status)} ({status['reacting']} under way)")
     if stopped:
-        raise WorkFailedError("stopped on request, and held there")
+        held = status["program"] == "hold"
+        rest = "and held there" if held else f"but {status['program']} runs"
+        raise WorkFailedError(f"stopped on request, {rest}")
     angles = {axis["name"]: axis.get("position_rad") for axis in status["axes"]}
     there = {"state": status["state"], "program": status["program"], "position_rad": angles}
     progress = status.get("program_progress") or {}
@@ -169,7 +133,7 @@ def finish(
 
 
 def _where(status: dict[str, Any], where: str) -> list[str]:
-    """Return where everything has ended: a platform as a whole, else axis by axis."""
+    """Return where the motion has ended: a platform as a whole, else each axis."""
     if where:
         return [where]
     tightness = tightness_text(status)
@@ -183,3 +147,12 @@ def _where(status: dict[str, Any], where: str) -> list[str]:
         lines.append(f"{axis['name']}: {shown}")
     held = "held there, with power" if status["program"] == "hold" else f"runs {status['program']}"
     return [*lines, *([place] if place else []), tightness or held]
+
+
+def require_platform(description: dict[str, Any], asked: str, instead: str = "") -> None:
+    """Raise BadInputError if a daemon's description is of a robot without a platform.
+
+    The message begins with the request `asked` and ends with the alternative `instead`.
+    """
+    if description.get("platform") is None:
+        raise BadInputError(f"{asked}: {description.get('robot')}: {NO_PLATFORM}{instead}")

@@ -1,4 +1,4 @@
-"""Refusals of a daemon's loop, and how they are told in the words and units that were typed."""
+"""Refusals of a daemon's loop, reported with the names and units that the user typed."""
 
 from __future__ import annotations
 
@@ -18,10 +18,11 @@ _KEYS: Final = {
     "distance_rad": (_DEG, "deg", ""),
     "cable_m": (_MM, "mm", ""),
     "speed_rad_s": (_DEG, "deg/s", "--speed"),
+    "speed_m_s": (_MM, "mm/s", "--speed"),
     "duration_s": (1.0, "s", "--seconds"),
     "back_m": (_MM, "mm", "--back"),
 }
-"""By the key of a program: factor and unit of the command line, and the option, if it is one."""
+"""By the key of a program: factor and unit of the command line, and the option, if any."""
 # what to do in a state in which a command was refused
 _REMEDIES: Final = {
     "unconfigured": "`cdpr status` says why, `cdpr check` tries again",
@@ -32,20 +33,20 @@ _REMEDIES: Final = {
 
 
 class DaemonRefusalError(WorkFailedError):
-    """The loop has refused a command; `refusal` says why by a code, None where only words do."""
+    """The loop has refused a command; `refusal` has the code, None if there is only text."""
 
     def __init__(self, text: str, refusal: CommandRefusal | None = None) -> None:
-        super().__init__(text)  # the one argument: pickle and type(error)(text) make it anew by it
+        super().__init__(text)  # the only argument: pickle and type(error)(text) need no other
         self.refusal = refusal
 
     @classmethod
     def of(cls, refusal: CommandRefusal, text: str = "") -> Self:
-        """Return the error of a refusal, in its own words or in `text`, with what is to be done."""
+        """Return the error of a refusal, as its own text or `text`, with the remedy."""
         return cls((text or str(refusal)) + _remedy(refusal), refusal)
 
 
 def _remedy(refusal: CommandRefusal) -> str:
-    """Return what is to be done about a refusal, to be appended to it, "" where that is unknown."""
+    """Return the remedy of a refusal, to be appended to it; "" if it is unknown."""
     if refusal.code is not RefusalCode.NOT_IN_STATE:
         return ""
     state, allowed = refusal.arguments["state"], list(refusal.arguments["allowed"])
@@ -58,10 +59,10 @@ def _remedy(refusal: CommandRefusal) -> str:
 def in_typed_words(
     command: str, asked: str = "", axes: Sequence[str] = (), **words: str
 ) -> Iterator[None]:
-    """Raise refusals in the block as what was typed: `command`, or the options in `asked`.
+    """Raise refusals in the block in terms of the typed `command`, or of the options in `asked`.
 
-    `axes` are their names, `words` stand in for arguments of the refusal. A number out of its
-    bounds is raised as BadInputError.
+    `axes` are their names, `words` replace arguments of the refusal. A number out of bounds
+    or a target outside the workspace is raised as BadInputError.
     """
     try:
         yield
@@ -74,7 +75,10 @@ def in_typed_words(
                 raise
             raise BadInputError(_out_of_range(refusal, axes)) from None
         typed = asked if refusal.asked and asked else command
-        raise DaemonRefusalError.of(refusal, f"{typed}: {refusal.reason(**words)}") from None
+        text = f"{typed}: {refusal.reason(**words)}"
+        if refusal.arguments.get("outside"):
+            raise BadInputError(text) from None
+        raise DaemonRefusalError.of(refusal, text) from None
 
 
 def _out_of_range(refusal: CommandRefusal, axes: Sequence[str]) -> str:

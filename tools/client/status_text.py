@@ -1,8 +1,9 @@
-"""A daemon's status for people, and what is known of one whose control loop has died."""
+"""Readable status of a daemon, and the known facts if its control loop has died."""
 
 from __future__ import annotations
 
 import math
+import time
 from collections.abc import Iterable
 from typing import Any, Final
 
@@ -10,38 +11,42 @@ from rich.console import Group
 from rich.table import Table
 from rich.text import Text
 
+from cdpr_rt.robot import is_done
+from cdpr_tools.output import Output, time_text
+from cdpr_tools.robots.calibration_text import calibration_text
+
 DEAD: Final = "dead"
-"""The state that such a daemon reports."""
+"""The state that a daemon reports if its loop has died."""
 ENDED: Final = "the loop has ended"
-"""Reason of a dead loop of which nobody has said, or not yet, that it failed."""
+"""Reason of a dead loop for which no failure has been reported, or not yet."""
 
 
 def has_died(status: dict[str, Any]) -> bool:
-    """Return whether the control loop has died, other than as it was asked to end."""
+    """Return whether the control loop has died, rather than ended on request."""
     return bool(status["state"] == DEAD and status["reason"] != ENDED)
 
 
 def power_text(status: dict[str, Any]) -> str:
-    """Return what is known of the drives' power since the loop has died."""
+    """Return the known state of the drives' power since the loop died."""
     if status.get("read_only"):
         return "it only listened, and commanded no drive"
     if not status.get("driving") and not status.get("busy"):  # busy with giving or taking it
         return "its drives had been told to have no power"
-    return "drives that had power stop by themselves without its heartbeat: check that they have"
+    return "drives that had power stop without its heartbeat: check that they have"
 
 
 def death_text(status: dict[str, Any]) -> str:
-    """Return that the control loop has died, of the drives' power, and the next command."""
+    """Return that the control loop has died, the state of the drives' power, the next command."""
     return (
         f"{status['reason']}; {power_text(status)}; next: `cdpr stop` ends what is left of the "
-        "daemon, then `cdpr run` starts it anew"
+        "daemon, then `cdpr run` starts it again"
     )
 
 
 def after_stop_text(status: dict[str, Any]) -> str:
-    """Return that a daemon has ended, and what was known of the drives' power in its `status`."""
+    """Return that a daemon has ended, and the drives' power according to its last `status`."""
     if has_died(status):
-        return f"ended; its loop had died: {power_text(status)}; next: `cdpr run` starts it anew"
+        return f"ended; its loop had died: {power_text(status)}; next: `cdpr run` starts it again"
     if status["read_only"]:
         return f"ended: {power_text(status)}"
     if not (unheard := unheard_axes(status)):
@@ -50,9 +55,9 @@ def after_stop_text(status: dict[str, Any]) -> str:
 
 
 def unheard_axes(status: dict[str, Any]) -> list[str]:
-    """Return the names of axes whose drives were not heard: whether they have power is not known.
+    """Return the names of axes whose drives were not heard, so that their power is unknown.
 
-    None of a daemon that only listened, or whose loop had died.
+    Empty for a daemon that only listened, or whose loop had died.
     """
     if has_died(status) or status["read_only"]:
         return []
@@ -77,14 +82,14 @@ _STAGES = {
     ("path", "to the path"): "moving to where the path is taken up",
     ("path", "path"): "following the path",
 }
-"""What a program is doing in each of its stages."""
+"""Text for each stage of a program."""
 _SILENT_s: Final = 1.0
-"""A loop that has not turned for so long hangs: what is known of the robot is of then."""
+"""A loop that has not turned for this time hangs: its data about the robot are old."""
 _COLOURS = {"active": "green", "fault": "red", "dead": "red", "ready": "cyan"}
 
 
 def status_text(status: dict[str, Any]) -> Group:
-    """Return what `cdpr status` shows."""
+    """Return the output of `cdpr status`."""
     described = any(axis.get("name") for axis in status["axes"])  # not before the loop is loaded
     return Group(*_lines(status), *[_axes(status)] * described)
 
@@ -107,20 +112,25 @@ def _lines(status: dict[str, Any]) -> list[Text]:
                 style="red",
             )
         )
-        if not status["lockstep"]:  # there time stands still with it
+        if not status["lockstep"]:  # in lockstep, time stands still with the loop
             lines.append(Text(power_text(status), style="red"))
     if status["reason"]:
         lines.append(Text(f"reason: {status['reason']}", style="yellow"))
     if state == DEAD:
         return [*lines, *_of_dead(status)]
     platform = "; ".join(filter(None, (platform_text(status), tightness_text(status))))
-    motors = compensation_text(status["axes"]), learnt_text(status)
+    motors = compensation_text(status["axes"]), learnt_text(status), _calibration(status)
     lines += [Text(text) for text in (platform, _left_path(status), *motors) if text]
     return [
         *lines,
         *_loop_lines(status),
         *(Text(f"note: {x}", style="dim") for x in status["notices"]),
     ]
+
+
+def _calibration(status: dict[str, Any]) -> str:
+    known = status["calibration"]
+    return "" if known is None else calibration_text(known)
 
 
 def _left_path(status: dict[str, Any]) -> str:
@@ -131,7 +141,7 @@ def _left_path(status: dict[str, Any]) -> str:
 
 
 def _loop_lines(status: dict[str, Any]) -> list[Text]:
-    """Return who may move the robot, and how the loop and its parts fare."""
+    """Return who may move the robot, and the state of the loop and its parts."""
     lines = []
     control = status["control"]
     if control["held"]:
@@ -159,18 +169,18 @@ def _loop_lines(status: dict[str, Any]) -> list[Text]:
 
 
 def _of_dead(status: dict[str, Any]) -> list[Text]:
-    """Return what is known of a robot whose control loop has died, and what to do next."""
+    """Return the known facts of a robot whose control loop has died, and what to do next."""
     place = place_text(status.get("program_progress") or {})
     last = f"; {place} then, where it is now is not known" if place else ""
     return [
         Text(power_text(status)),
-        Text("next: `cdpr stop` ends what is left of the daemon, `cdpr run` starts it anew"),
+        Text("next: `cdpr stop` ends what is left of the daemon, `cdpr run` starts it again"),
         Text(f"what follows is of {status['loop']['silent_s']:.0f} s ago{last}", style="dim"),
     ]
 
 
 def platform_text(status: dict[str, Any]) -> str:
-    """Return where the platform is and what is in its way, an empty text of robots without."""
+    """Return where the platform is and its obstacles; empty for robots without a platform."""
     progress = status.get("program_progress") or {}
     target = _place(progress, "target_")
     words = [text for text in (place_text(progress), target and f"target {target}") if text]
@@ -182,7 +192,7 @@ def platform_text(status: dict[str, Any]) -> str:
 
 
 def learnt_text(status: dict[str, Any]) -> str:
-    """Return what is estimated of motors that were not commissioned, an empty text for nothing."""
+    """Return the estimates for motors that were not commissioned; empty if there are none."""
     progress = status.get("program_progress") or {}
     parts = []
     for what in ("friction", "cogging"):
@@ -193,23 +203,23 @@ def learnt_text(status: dict[str, Any]) -> str:
 
 
 def left_text(path: dict[str, Any]) -> str:
-    """Return where a path was left that can be taken up again."""
+    """Return where a path was left that can be resumed."""
     return f"path {path['name']} left at {percent_text(path)}, line {path['line']}"
 
 
 def percent_text(path: dict[str, Any]) -> str:
-    """Return how much of a path is done."""
+    """Return the completed share of a path."""
     return f"{100.0 * path['time_s'] / max(path['duration_s'], 1e-9):.0f} %"
 
 
 def place_text(progress: dict[str, Any]) -> str:
-    """Return where the platform is, an empty text where that is not known."""
+    """Return where the platform is; empty if that is unknown."""
     place = _place(progress)
     return place and f"platform at {place}"
 
 
 def target_text(progress: dict[str, Any]) -> str:
-    """Return where the platform or the axes go, an empty text where nowhere."""
+    """Return the target of the platform or the axes; empty if there is none."""
     target = _place(progress, "target_")
     if not target and progress.get("target_rad"):
         target = f"{_listed(progress['target_rad'], math.degrees(1.0), 1)} deg"
@@ -217,7 +227,7 @@ def target_text(progress: dict[str, Any]) -> str:
 
 
 def _place(progress: dict[str, Any], of: str = "") -> str:
-    """Return a place and the rotation there in mm and deg, an empty text where there is none."""
+    """Return a place and the rotation there in mm and deg; empty if there is none."""
     place, turned = progress.get(f"{of or 'position_'}m"), progress.get(f"{of}rotation_rad")
     text = f"{_listed(place, 1e3, 1)} mm" if place else ""
     if text and turned:
@@ -226,11 +236,11 @@ def _place(progress: dict[str, Any], of: str = "") -> str:
 
 
 def stage_text(program: str, progress: dict[str, Any]) -> str:
-    """Return what a program that goes by stages is doing, an empty text for others."""
+    """Return the present stage of a program that has stages; empty for others."""
     stage = str(progress.get("stage") or "")
-    if progress.get("was_tight") is False and stage in ("home", "down"):  # it may well stand
+    if progress.get("was_tight") is False and stage in ("home", "down"):  # it may be standing
         return "letting the cables out; a platform that hangs on them comes down"
-    if stage == "home" and progress.get("blind"):  # nobody knows the way there
+    if stage == "home" and progress.get("blind"):  # the way there is unknown
         stage = "down"
     return _STAGES.get((program, stage), stage)
 
@@ -240,7 +250,7 @@ _LOOSE_N = 1.0
 
 
 def fallen_text(status: dict[str, Any]) -> str:
-    """Return what to do with a platform that has come down, an empty text where it has not."""
+    """Return what to do with a platform that has come down; empty if it has not."""
     if not (status.get("program_progress") or {}).get("fallen"):
         return ""
     text = "; it has come down: look at it, then `cdpr tighten --from home` where it stands there"
@@ -250,7 +260,7 @@ def fallen_text(status: dict[str, Any]) -> str:
 
 
 def tightness_text(status: dict[str, Any]) -> str:
-    """Return whether the cables hold the platform, an empty text of robots without one."""
+    """Return whether the cables hold the platform; empty for robots without one."""
     tight = (status.get("program_progress") or {}).get("tight")
     if tight is None or status["state"] != "active":
         return ""
@@ -259,7 +269,7 @@ def tightness_text(status: dict[str, Any]) -> str:
         agree = f", whose lengths agree within {apart_mm:.1f} mm" if apart_mm else ""
         return f"held by its cables{agree}"
     most_N = max((axis.get("tension_N") or 0.0 for axis in status["axes"]), default=0.0)
-    # as where `tighten` was stopped: a hold keeps what the cables are pulled with
+    # as after an interrupted `tighten`: a hold keeps the tension of the cables
     cables = f"not tight, pulled with up to {most_N:.0f} N" if most_N >= _LOOSE_N else "loose"
     return f"cables {cables}, power on{fallen_text(status)}"
 
@@ -305,7 +315,7 @@ def _trouble(axis: dict[str, Any]) -> Text:
 
 
 def compensation_text(axes: list[dict[str, Any]]) -> str:
-    """Return which motors' cogging is compensated, an empty text where none has been learnt."""
+    """Return which motors' cogging is compensated; empty if none is known."""
     parts = []
     for known, words in ((True, "compensated"), (False, "not compensated before its index passes")):
         names = [
@@ -326,3 +336,63 @@ def _figure(value: float | None, digits: int, factor: float = 1.0) -> str:
 
 def _us(seconds: float | None) -> str:
     return "-" if seconds is None else f"{1e6 * seconds:.0f} us"
+
+
+_TELL_S: Final = 2.0
+"""Interval at which a motion reports its progress."""
+
+
+class ProgressNotes:
+    """Reports the progress of a motion, each thing once: its stages, delays and progress.
+
+    Facts that were in an earlier `status` are not reported.
+    """
+
+    def __init__(self, out: Output | None, status: dict[str, Any] | None = None) -> None:
+        self._out = out
+        self._stage = self._held_back = ""
+        if status is not None:
+            progress = status.get("program_progress") or {}
+            self._stage = _motion_stage(str(status["program"]), progress)
+            self._held_back = progress.get("held_back") or ""
+        self._next_s = time.monotonic() + _TELL_S
+
+    def __call__(self, program: str, progress: dict[str, Any]) -> None:
+        """Process the progress of a program."""
+        if self._out is None:
+            return
+        stage = _motion_stage(program, progress)
+        if stage and stage != self._stage:
+            self._out.note(f"{stage} ...")
+            self._next_s = time.monotonic() + _TELL_S
+        held_back = progress.get("held_back") or ""
+        if held_back and not self._held_back:
+            self._out.note(held_back)
+        self._stage, self._held_back = stage, held_back
+        if not is_done(progress) and time.monotonic() >= self._next_s:
+            self._next_s = time.monotonic() + _TELL_S
+            if text := _so_far(program, progress):
+                self._out.note(text)
+
+
+def _motion_stage(program: str, progress: dict[str, Any]) -> str:
+    if program == "path":
+        return stage_text(program, progress.get("path") or {})
+    return stage_text(program, progress) or target_text(progress)
+
+
+def _so_far(program: str, progress: dict[str, Any]) -> str:
+    """Return the progress of a motion: the place on a path, or the share done."""
+    path = progress.get("path") or {}
+    if program == "path" and path.get("stage") == "path":
+        left_s = (path["duration_s"] - path["time_s"]) / max(path["feed"], 0.01)
+        return (
+            f"{path['name']}: {percent_text(path)}, line {path['line']}, "
+            f"{time_text(left_s)} left at {100.0 * path['feed']:.0f} % feed"
+        )
+    if place := place_text(progress):
+        return place
+    if not (done := progress.get("done")):
+        return ""
+    leg = f"leg {progress['leg']} of {progress['legs']}, " if "legs" in progress else ""
+    return f"{leg}{100.0 * done:.0f} %"

@@ -1,4 +1,4 @@
-"""`cdpr bus`: look at a CAN bus: who is there, what is said, whether it fits."""
+"""`cdpr bus`: show the nodes and the traffic of a CAN bus, and check its load."""
 
 from __future__ import annotations
 
@@ -12,14 +12,25 @@ from typing import Annotated, Any
 
 import typer
 
-from cdpr_drivers.bus import BusUrl, Filters
+from cdpr_drivers.bus import BusUrl
 from cdpr_drivers.bus.budget import BusBudget, machine_budget
 from cdpr_drivers.errors import BusError
-from cdpr_drivers.robot.bus_fit import refusal
+from cdpr_drivers.robot.robot_buses import refusal
 from cdpr_profiles import DriveProfile, load_winch_or_robot
-from cdpr_tools.busview.identifiers import filters, parse_identifiers, parse_node_ids
-from cdpr_tools.busview.known import known_bus
-from cdpr_tools.busview.monitor import LineWriter, LogFile, Summary, Viewer, watch
+from cdpr_profiles.errors import printable
+from cdpr_tools.busview.monitor import (
+    FrameSource,
+    LineWriter,
+    LogFile,
+    Summary,
+    Viewer,
+    filters,
+    known_bus,
+    parse_identifiers,
+    parse_node_ids,
+    running_bus,
+    watch,
+)
 from cdpr_tools.busview.replay import BLOCK, Pacer, Sender, check, filtered, play, read_frames
 from cdpr_tools.busview.scan import (
     LISTEN_S,
@@ -30,17 +41,18 @@ from cdpr_tools.busview.scan import (
     responding,
     signs_of_a_master,
 )
-from cdpr_tools.busview.source import SimbusSource, open_source, running_bus
 from cdpr_tools.commands.options import JsonOption, WinchOrRobotArgument, YesOption
 from cdpr_tools.consent import require_consent
 from cdpr_tools.errors import BAD_INPUT, WorkFailedError
 from cdpr_tools.output import Output
 from cdpr_tools.signals import stop_on_signals
 
-app = typer.Typer(name="bus", help="Look at a CAN bus.", no_args_is_help=True)
+app = typer.Typer(
+    name="bus", help="Look at the traffic and the devices of a CAN bus.", no_args_is_help=True
+)
 
 _LATE_S = 0.05
-"""For how long frames that the bus has counted may be under way to us."""
+"""How long frames that the bus has counted may take to arrive here."""
 
 
 _ProfileOption = Annotated[
@@ -78,7 +90,7 @@ def monitor(
     raw: _RawOption = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Show what is said on a bus, decoded, until Ctrl-C; only listens."""
+    """Show the decoded traffic of a bus until Ctrl-C; only listens."""
     out = Output(as_json)
     url = running_bus(bus)
     known = known_bus(url, profile, winch, robot)
@@ -87,13 +99,12 @@ def monitor(
         stack.callback(_show, out, summary)
         lines = stack.enter_context(LineWriter(sys.stderr if as_json else sys.stdout))
         viewer = Viewer(known.decoder(), summary, lines, raw=raw)
-        source = open_source(url, _filters(ids))
+        source = FrameSource(url, None if ids is None else filters(parse_identifiers(ids)))
         stack.callback(source.close)
         file = None if log is None else stack.enter_context(LogFile(log))
         stop_requested = stack.enter_context(stop_on_signals())
         watch(source, viewer, file, seconds, stop_requested)
-        if isinstance(source, SimbusSource):
-            _ask_bus(source, summary)
+        _ask_bus(source, summary, all_seen=ids is None)
     if source.lost is not None:
         raise source.lost
     if not summary.frames:
@@ -156,21 +167,20 @@ def replay(
     out.result({"ok": True, "file": file, **sent, **summary.table()})
 
 
-def _filters(ids: str | None) -> Filters | None:
-    return None if ids is None else filters(parse_identifiers(ids))
+def _ask_bus(source: FrameSource, summary: Summary, *, all_seen: bool) -> None:
+    """Add to the summary what a simulated bus reports: its time, and the missed frames.
 
-
-def _ask_bus(source: SimbusSource, summary: Summary) -> None:
-    """Complete the summary by what a simulated bus tells: its time, and what we missed."""
+    `all_seen` means that no filter removed frames.
+    """
     try:
-        if source.lost is not None:
-            raise source.lost
         passed = source.ask()
     except BusError:
-        summary.untimed = True  # it has ended, and its time with it
+        summary.untimed = True  # the bus has ended, so its time is unknown
+        return
+    if passed is None:
         return
     summary.time_s, summary.led = passed["bus_time_s"], bool(passed["led"])
-    if source.seen is None:
+    if not all_seen:
         return
     before = -1
     while before < source.seen < passed["frames"]:
@@ -225,14 +235,14 @@ _NOBODY = "nobody answers: check power, wiring, termination, bit rate and node i
 def _visit(
     url: BusUrl, node_ids: list[int], drives: dict[str, DriveProfile], force: bool
 ) -> dict[str, Any]:
-    """Scan one bus; raises WorkFailedError where another master is in the way."""
+    """Scan one bus; raises WorkFailedError if another master uses it."""
     begun = time.monotonic()
     with Scan(url, node_ids) as scan_:
         scan_.listen(LISTEN_S)
         if scan_.traffic.sdo_requests and not force:
             raise WorkFailedError(
                 f"{url}: another master is busy with {signs_of_a_master(scan_.traffic)}: "
-                "answers to our requests would reach it as well, in the middle of its own "
+                "it would also get the answers to our requests, in the middle of its "
                 "transfers; wait until it is done, or use --force"
             )
         scan_.ask()
@@ -271,7 +281,7 @@ def budget(
     reason = refusal(budgets)
     figures = {"rate_Hz": 1.0 / budgets[0].period_s, "buses": [_figures(b) for b in budgets]}
     if reason:
-        typer.echo(f"cdpr: {profile.path}: {reason}", err=True)
+        typer.echo(printable(f"cdpr: {profile.path}: {reason}"), err=True)
         out.result({"ok": False, "error": reason, "exit_status": BAD_INPUT, **figures})
         raise typer.Exit(BAD_INPUT)
     out.result({"ok": True, **figures})
@@ -314,7 +324,7 @@ def _report(name: str, budgets: list[BusBudget]) -> list[str]:
 
 
 def _explanation(b: BusBudget) -> str:
-    """Say what the time left over has to serve."""
+    """Return what the remaining time is needed for."""
     text = (
         f"{b.bus}: heartbeats take {b.heartbeat_share * b.period_s * _US:.1f} us a cycle; what is "
         f"left is for computing, EMCY and {b.sdo_transfers_s:.0f} SDO transfers a second"

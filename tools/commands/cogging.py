@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from contextlib import suppress
 from pathlib import Path
 from typing import Annotated
 
@@ -11,15 +10,22 @@ import typer
 
 from cdpr_drivers.robot.commissioned import load_profile
 from cdpr_profiles import Winch, load_robot, load_winch
-from cdpr_profiles.limits.motor_bounds import MotorBounds
+from cdpr_profiles.motor_bounds import MotorBounds
 from cdpr_rt.errors import RawLogError
 from cdpr_rt.identification.cogging_profile import CoggingProfileError, DriveIdentity
 from cdpr_rt.identification.rawlog import read_raw_log
-from cdpr_rt.procedures.commissioning.commission_files import Paths
-from cdpr_rt.procedures.commissioning.evaluation import METHODS, compare
-from cdpr_rt.procedures.commissioning.identified import identify, store_profile, validation_name
-from cdpr_rt.procedures.commissioning.procedure import DEFAULT_BANDWIDTH_HZ, Commissioning, Plan
-from cdpr_rt.procedures.commissioning.results import assemble, identification, read_run
+from cdpr_rt.procedures.commissioning_results import (
+    METHODS,
+    Paths,
+    assemble,
+    compare,
+    identification,
+    identify,
+    read_run,
+    store_profile,
+    validation_name,
+)
+from cdpr_rt.robot import Robot
 from cdpr_tools.commands.commission import prepare
 from cdpr_tools.commands.options import (
     IndexOption,
@@ -31,18 +37,19 @@ from cdpr_tools.commands.options import (
     YesOption,
 )
 from cdpr_tools.commands.with_winch import WinchOnBus, with_winch
-from cdpr_tools.commission import summary
+from cdpr_tools.commission import axis_sweep, build, summary
+from cdpr_tools.commission.commissioning import DEFAULT_BANDWIDTH_HZ, Commissioning, Plan
 from cdpr_tools.composition.session import confirm_motion, open_winch
 from cdpr_tools.consent import require_consent
-from cdpr_tools.errors import BadInputError, CommandError
+from cdpr_tools.errors import BadInputError, WorkFailedError
 from cdpr_tools.output import Output
 from cdpr_tools.raw_data import keeping_raw_data
 from cdpr_tools.recordings.truth import true_angle
-from cdpr_tools.report import build
-from cdpr_tools.signals import stop_on_signals
 
 app = typer.Typer(
-    name="cogging", help="Cogging: sweep, fit, validate, report.", no_args_is_help=True
+    name="cogging",
+    help="Identify, check and report the cogging torque of a motor.",
+    no_args_is_help=True,
 )
 
 _OutOption = Annotated[Path, typer.Option("--out", help="Folder for the recordings.")]
@@ -93,33 +100,33 @@ def sweep_axis(
     yes: YesOption = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Have this machine's daemon turn a motor as `sweep` does, for `fit`, without ending it.
+    """Turn a motor as `sweep` does, for `fit`, through this machine's running daemon.
 
-    Its programs turn the motor and its recording holds the data; the other axes hold. Ctrl-C stops
-    the motor, and its drives have no power afterwards, however the command ends.
+    The daemon's programs turn the motor and its recording holds the data; the other axes hold.
+    Ctrl-C stops the motor. The drives have no power afterwards, however the command ends.
     """
-    # what commissions a winch alone does without the packages of the daemon
-    from cdpr_tools.client.axis_sweep import AxisSweep, SweptAxis, write_passes  # noqa: PLC0415
+    # imported here: commissioning a single winch does not need the packages of the daemon
     from cdpr_tools.client.client import open_daemon  # noqa: PLC0415
+    from cdpr_tools.client.motion import carry_out  # noqa: PLC0415
 
     out = Output(as_json)
     with open_daemon(robot, socket, None, None) as daemon:
-        swept = SweptAxis.of(daemon, axis, load_robot(daemon.get("/description")["reference"]))
+        description = daemon.get("/description")
+        profile = load_robot(description["reference"])
+        swept = axis_sweep.SweptAxis.of(description, daemon.get("/status"), axis, profile)
         paths = prepare(out_dir, overwrite)
         what = f"the sweep turns the motor of {axis}: its cable has to be off the drum."
         require_consent(what, yes or swept.is_simulated)
-        with stop_on_signals() as stop_requested, daemon.control() as control:
-            control.post("/enable", {})
-            try:
-                speed_rad_s = math.radians(speed_deg_s)
-                span = AxisSweep(control, swept, stop_requested, out).run(turns, speed_rad_s)
-            except BaseException:
-                with suppress(CommandError):  # where a fault has taken the power already
-                    daemon.post("/disable")
-                raise
-            daemon.post("/disable")
-    out.note("reading the recording ...")
-    recorded = [str(path) for path in write_passes(span.rows(), swept, paths)]
+        recorded: list[str] = []
+
+        def measure(moved: Robot) -> None:
+            axis_sweep.sweep(moved, swept, turns, math.radians(speed_deg_s), out)
+            out.note("reading the recording ...")
+            rows = moved.log(*axis_sweep.FIELDS)
+            recorded.extend(map(str, axis_sweep.write_passes(rows, swept, paths)))
+
+        if carry_out(daemon, out, measure, notice="").stopped and not recorded:
+            raise WorkFailedError(f"{axis}: stopped on request")
     for path in recorded:
         out.say(f"recorded {path}")
     out.result({"ok": True, "recorded": recorded})
@@ -145,7 +152,7 @@ def fit(
 
 
 def _recorded_identity(paths: Paths) -> tuple[str, DriveIdentity, float | None]:
-    """Return the winch, its drive, and its latency, which older recordings do not tell."""
+    """Return the winch, its drive, and its latency, which older recordings do not contain."""
     sweeps = paths.passes("sweep")
     if not sweeps:
         raise BadInputError(f"{paths.out}: holds no recorded sweep (raw/sweep-0.raw, ...)")
@@ -205,7 +212,7 @@ def report(
     folder: Annotated[Path, typer.Argument(help="The --out folder of a commissioning.")],
     as_json: JsonOption = False,
 ) -> None:
-    """Make the report anew from the files of a commissioning."""
+    """Make the report again from the files of a commissioning."""
     out = Output(as_json)
     paths = Paths(folder)
     run = read_run(paths)

@@ -1,28 +1,23 @@
-"""`cdpr commission`: motors from drives that are off to validated cogging profiles."""
+"""`cdpr commission`: take motors from disabled drives to validated cogging profiles."""
 
 from __future__ import annotations
 
-import shutil
-from collections.abc import Sequence
-from dataclasses import dataclass
+import os
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
 from cdpr_drivers.bus import BusUrl
-from cdpr_profiles import Robot, Winch, load_winch_or_robot
-from cdpr_rt.procedures.commissioning.commission_files import Paths
-from cdpr_rt.procedures.commissioning.finding_index import Index
-from cdpr_rt.procedures.commissioning.identified import identify
-from cdpr_rt.procedures.commissioning.procedure import (
-    DEFAULT_BANDWIDTH_HZ,
-    QUICK,
-    THOROUGH,
-    Commissioning,
-    Plan,
-)
-from cdpr_rt.procedures.commissioning.results import assemble
+from cdpr_drivers.robot.commissioned import folder_of
+from cdpr_drivers.robot.robot_buses import require_fit, robot_urls, starts_own_simulator
+from cdpr_profiles import Robot, RobotAxis, Winch, load_winch_or_robot
+from cdpr_rt.loop.realtime import one_core
+from cdpr_rt.procedures.commissioning_results import Paths, assemble, identify
+from cdpr_rt.procedures.measurement import Index
 from cdpr_tools.commands.options import (
     IndexOption,
     JsonOption,
@@ -32,24 +27,93 @@ from cdpr_tools.commands.options import (
     WinchOrRobotArgument,
     YesOption,
 )
-from cdpr_tools.commission import summary
-from cdpr_tools.commission.robot_commissioning import (
-    MotorOfRobot,
-    chosen_axes,
-    detached_motors,
-    lines_for_robot,
+from cdpr_tools.commission import build, summary
+from cdpr_tools.commission.commissioning import (
+    DEFAULT_BANDWIDTH_HZ,
+    QUICK,
+    THOROUGH,
+    Commissioning,
+    Plan,
 )
 from cdpr_tools.composition.session import confirm_motion, open_bus, open_winch
+from cdpr_tools.composition.simulator import OwnSimulator
 from cdpr_tools.errors import BadInputError, WorkFailedError, os_error_as
 from cdpr_tools.output import Output, to_json
-from cdpr_tools.raw_data import keeping_raw_data, refuse_loss
+from cdpr_tools.raw_data import discard_raw_data, keeping_raw_data, refuse_loss
 from cdpr_tools.recordings.truth import true_angle
-from cdpr_tools.report import build
 
 _TURNS = "turns the motor for about 20 minutes"
 
 
 app = typer.Typer()
+
+
+@dataclass(frozen=True)
+class _MotorOfRobot:
+    """The motor of one axis, as a single winch, and the paths of its files."""
+
+    axis: RobotAxis
+    winch: Winch
+    paths: Paths
+
+
+def chosen_axes(
+    robot: Robot, names: Sequence[str], every: bool, folder: Path
+) -> tuple[_MotorOfRobot, ...]:
+    """Return the motors of the axes called `names`, or of all; files go into `folder`.
+
+    Raises BadInputError for an unknown name, and unless exactly one of names and all is given.
+    """
+    known = {axis.name: axis for axis in robot.axes}
+    allowed = ", ".join(repr(name) for name in known)
+    if every == bool(names):
+        raise BadInputError(f"{robot.name}: give --axis NAME ({allowed}) or --all, one of them")
+    for name in names:
+        if name not in known:
+            raise BadInputError(f"--axis {name}: no axis of {robot.name}; allowed: {allowed}")
+    chosen = list(known.values()) if every else [known[name] for name in dict.fromkeys(names)]
+    return tuple(_motor(robot, axis, folder) for axis in chosen)
+
+
+def _motor(robot: Robot, axis: RobotAxis, folder: Path) -> _MotorOfRobot:
+    winch = replace(axis.winch, name=f"{robot.name}, axis {axis.name}")
+    return _MotorOfRobot(axis, winch, Paths(folder / folder_of(axis)))
+
+
+@contextmanager
+def _detached_motors(
+    robot: Robot,
+    buses: Sequence[str],
+    motors: Sequence[_MotorOfRobot],
+    out: Output,
+    plant: Path | None,
+) -> Iterator[list[BusUrl]]:
+    """Yield the bus of each of `motors`; `simbus:` without a name starts drives without cables.
+
+    Raises ConfigurationError for a robot that does not fit its buses, and for unknown buses.
+    """
+    require_fit(robot)
+    with ExitStack() as stack:
+        if starts_own_simulator(buses):
+            name = f"simbus:own-{os.getpid()}"
+            out.note(f"starting simulated drives without cables: {len(robot.axes)} ...")
+            simulator = OwnSimulator(robot.reference, name, plant, detached=True)
+            stack.callback(simulator.stop)
+            stack.enter_context(one_core(simulator.process.pid))
+            buses = [name]
+        elif plant is not None:
+            raise BadInputError("--plant: only for a simulator that the command starts (simbus:)")
+        urls = robot_urls(robot, buses)
+        yield [urls[motor.axis.bus] for motor in motors]
+
+
+def _lines_for_robot(robot: Robot, motors: Sequence[_MotorOfRobot]) -> list[str]:
+    """Return lines of text that show how the robot's file refers to the new profiles."""
+    folder = motors[0].paths.out.parent
+    lines = [f"to compensate them: cdpr run {robot.reference} --commissioned {folder}"]
+    lines.append("or in the robot's file, under [[axes]]:")
+    lines += [f'  {m.axis.name}: commissioned = "{m.paths.out.absolute()}"' for m in motors]
+    return lines
 
 
 @dataclass(frozen=True)
@@ -69,7 +133,7 @@ def commission(
         list[str] | None,
         typer.Option(
             "--bus",
-            help="simbus: (starts simulated drives of its own), simbus:NAME, socketcan:can0, ...; "
+            help="simbus: (starts simulated drives), simbus:NAME, socketcan:can0, ...; "
             "for a robot also BUS=URL, or as its file says.",
             metavar="URL",
         ),
@@ -114,7 +178,7 @@ def commission(
         motors = chosen_axes(profile, axis or (), every, folder)
         for motor in motors:
             prepare(motor.paths.out, overwrite)
-        with detached_motors(profile, bus or (), motors, out, plant) as urls:
+        with _detached_motors(profile, bus or (), motors, out, plant) as urls:
             _ask(motors, urls, yes)
             out.result(_commission_robot(profile, motors, urls, request, out))
         return
@@ -132,7 +196,7 @@ def _only(buses: Sequence[str] | None) -> str:
     return buses[0]
 
 
-def _ask(motors: Sequence[MotorOfRobot], urls: Sequence[BusUrl], yes: bool) -> None:
+def _ask(motors: Sequence[_MotorOfRobot], urls: Sequence[BusUrl], yes: bool) -> None:
     for motor, url in zip(motors, urls, strict=True):
         what = f"commissioning axis {motor.axis.name} {_TURNS}: its cable has to be off the drum"
         confirm_motion(url, yes, what)
@@ -140,17 +204,17 @@ def _ask(motors: Sequence[MotorOfRobot], urls: Sequence[BusUrl], yes: bool) -> N
 
 def _commission_robot(
     robot: Robot,
-    motors: Sequence[MotorOfRobot],
+    motors: Sequence[_MotorOfRobot],
     urls: Sequence[BusUrl],
     request: _Request,
     out: Output,
 ) -> dict[str, Any]:
-    """Commission one motor after the other; return what the command ends with."""
+    """Commission one motor after the other; return the result of the command."""
     results = {}
     for motor, url in zip(motors, urls, strict=True):
         out.say(f"axis {motor.axis.name}, node {motor.axis.node_id} on {url}")
         results[motor.axis.name] = _commission(motor.winch, url, motor.paths, request, out)
-    out.say(*lines_for_robot(robot, motors))
+    out.say(*_lines_for_robot(robot, motors))
     folder = motors[0].paths.out.parent
     return {"ok": True, "robot": robot.reference, "commissioned": str(folder), "axes": results}
 
@@ -163,7 +227,7 @@ def _commission(
     out: Output,
     plant: Path | None = None,
 ) -> dict[str, Any]:
-    """Commission the motor of `winch`; return what was found, as the report tells it."""
+    """Commission the motor of `winch`; return the results for the report."""
     with keeping_raw_data(paths.raw_folder):
         with open_winch(winch, url, out, plant, paths.truth, request.safety_io) as session:
             run = Commissioning(session, out, paths, request.plan).run(
@@ -178,7 +242,7 @@ def _commission(
 
 
 def prepare(folder: Path, overwrite: bool) -> Paths:
-    """Return the paths in `folder`; raises BadInputError where an earlier run would be lost."""
+    """Return the paths in `folder`; raises BadInputError if an earlier run would be lost."""
     paths = Paths(folder)
     raw = paths.raw_folder
     refuse_loss(folder, raw, overwrite)
@@ -187,16 +251,15 @@ def prepare(folder: Path, overwrite: bool) -> Paths:
             f"--out {folder}: holds other things; choose a new folder, or put a commissioning "
             "beside them with --overwrite"
         )
-    if raw.is_dir() and any(raw.iterdir()):
-        shutil.rmtree(raw)
-        for path in (paths.run, paths.results, paths.page, paths.profile, paths.truth):
-            path.unlink(missing_ok=True)
-    with os_error_as(BadInputError, f"--out {folder}: cannot be created"):
+    with os_error_as(BadInputError, f"--out {folder}: cannot be written"):
+        if discard_raw_data(raw):
+            for path in (paths.run, paths.results, paths.page, paths.profile, paths.truth):
+                path.unlink(missing_ok=True)
         raw.mkdir(parents=True, exist_ok=True)
     return paths
 
 
 def write(path: Path, text: str) -> None:
-    """Write a small file; raises WorkFailedError naming it."""
+    """Write a small file; raises WorkFailedError that names it."""
     with os_error_as(WorkFailedError, f"{path}: cannot be written"):
         path.write_text(text + "\n", encoding="utf-8")

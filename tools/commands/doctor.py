@@ -1,17 +1,20 @@
-"""`cdpr doctor`: what this machine can and cannot do for the controller, and how to mend it."""
+"""`cdpr doctor`: check whether this machine can run the controller, and how to fix it."""
 
 from __future__ import annotations
 
+import os
 from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from cdpr_profiles.user_folders import temporary_folder
 from cdpr_tools.commands.options import JsonOption
-from cdpr_tools.errors import FAILED, BadInputError, os_error_as
+from cdpr_tools.errors import FAILED, BadInputError, WorkFailedError, os_error_as
 from cdpr_tools.host.host_checks import HostFinding, look_around
 from cdpr_tools.output import Output
+from cdpr_tools.report.save import require_free
 
 app = typer.Typer()
 
@@ -31,25 +34,48 @@ def doctor(
     overwrite: Annotated[
         bool, typer.Option("--overwrite", help="Replace the --report that is there already.")
     ] = False,
+    compile_all: Annotated[
+        bool,
+        typer.Option(
+            "--compile",
+            help="Only compile all numeric kernels, for minutes; no command does it later.",
+        ),
+    ] = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Check this machine and tell what to fix before a robot runs on it.
+    """Check this machine, and say what to fix before it runs a robot.
 
-    Changes nothing. A `problem` must be mended, a `note` makes cycles more punctual. With --report
-    versions, findings, robot files and the end of the last recording go into a text file.
+    Changes no setting. A `problem` must be fixed; a `note` would make cycles more punctual.
+    --report writes versions, findings, robot files and the end of the last recording to a file.
     """
     out = Output(as_json)
+    if compile_all:
+        # imported here: it needs all packages that a robot needs
+        from cdpr_rt.jit import machine_code_folder  # noqa: PLC0415
+
+        if machine_code_folder() is None:
+            raise WorkFailedError(
+                "--compile: compiled kernels cannot be kept: neither the program's folder nor the "
+                f"user's cache can be written, nor can {temporary_folder()}; set NUMBA_CACHE_DIR "
+                "to a folder that can be written"
+            )
+        from cdpr_tools.host.kernels import compile_kernels  # noqa: PLC0415
+
+        compile_kernels(len(os.sched_getaffinity(0)))
+        out.say("all kernels are compiled")
+        out.result({"ok": True})
+        return
     if robot and report is None:
         raise BadInputError("--robot: only with --report")
-    if report is not None and report.exists() and not overwrite:
-        raise BadInputError(f"--report {report}: is there already; replace it with --overwrite")
-    if report is not None and not report.parent.is_dir():
-        raise BadInputError(f"--report {report}: allowed: a file in a folder that is there")
+    if report is not None:
+        require_free("--report", report, overwrite)
+        if not report.parent.is_dir():
+            raise BadInputError(f"--report {report}: allowed: a file in a folder that is there")
     findings = list(look_around())
     for f in findings:
         out.say(*lines_of(f))
     if report is not None:
-        # loaded here: reading recordings takes libraries that the checks do without
+        # imported here: reading recordings needs libraries that the checks do not
         from cdpr_tools.host.fault_report import fault_report  # noqa: PLC0415
 
         found = [line for f in findings for line in lines_of(f)]
@@ -63,6 +89,6 @@ def doctor(
 
 
 def lines_of(finding: HostFinding) -> list[str]:
-    """Return a finding as lines for people."""
+    """Return a finding as lines of text."""
     lines = [f"{finding.level:8}{finding.what:22}{finding.found}"]
     return lines + [f"{'':8}{'':22}-> {finding.remedy}"] * bool(finding.remedy)

@@ -1,26 +1,39 @@
-"""`cdpr log`: what is in the daemon's recordings, as figures, tables and pictures."""
+"""`cdpr log`: show the daemon's recordings as figures, tables and pictures."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
+from cdpr_rt.service.retention import size_text
 from cdpr_tools.commands.options import JsonOption, written_as
+from cdpr_tools.daemon.paths import default_recordings
+from cdpr_tools.errors import BadInputError, os_error_as
 from cdpr_tools.output import Output
-from cdpr_tools.recordings.export import check_target, export
-from cdpr_tools.recordings.selection import Selection, fields_of, files_of
+from cdpr_tools.recordings.selection import (
+    Selection,
+    check_target,
+    export,
+    fields_of,
+    files_of,
+    sessions,
+)
 from cdpr_tools.recordings.summary import summarise, summary_lines
 
 app = typer.Typer(
     name="log",
-    help="The daemon's recordings: what is in them, as tables and pictures.",
+    help="List, plot and export recordings.",
     no_args_is_help=True,
 )
 
 _FilesArgument = Annotated[
-    list[Path], typer.Argument(help="Recordings (*.mcap), or a folder of them.", metavar="FILE")
+    list[Path],
+    typer.Argument(
+        help="Recordings (*.mcap), a folder of them, or a session that `cdpr log list` names.",
+        metavar="FILE",
+    ),
 ]
 _FromOption = Annotated[
     float, typer.Option("--from", help="Begin so many seconds after the first cycle.", min=0.0)
@@ -34,6 +47,34 @@ _UntilOption = Annotated[
     ),
 ]
 _EVENTS_SHOWN = 30
+
+
+@app.command("list")
+def list_command(
+    folder: Annotated[
+        Path | None,
+        typer.Argument(
+            help="Folder of recordings; that of `cdpr run` by default.", metavar="[FOLDER]"
+        ),
+    ] = None,
+    as_json: JsonOption = False,
+) -> None:
+    """List the recorded sessions, newest last."""
+    out = Output(as_json)
+    where = folder or default_recordings()
+    found: list[dict[str, Any]] = []
+    if folder is None and not any(where.glob("*.mcap")):
+        out.say(f"no recordings in {where}")
+        out.result({"ok": True, "folder": where, "sessions": found})
+        return
+    for name, files in sessions(files_of([where])).items():
+        with os_error_as(BadInputError, f"{where}: cannot be read"):
+            size = sum(path.stat().st_size for path in files)
+        count = f"{len(files)} file{'s' if len(files) > 1 else ''}"
+        out.say(f"{name:40}  {count:>9}  {size_text(size):>9}")
+        found.append({"session": name, "files": files, "bytes": size})
+    out.say(f"in {where}")
+    out.result({"ok": True, "folder": where, "sessions": found})
 
 
 @app.command()
@@ -78,18 +119,30 @@ def plot(
             "--png",
             "--out",
             metavar="FILE",
-            help="Draw it into NAME.png; beside FILE by default.",
+            help="Draw it into NAME.png; beside the recording by default.",
             callback=written_as(".png"),
         ),
     ] = None,
     axis: Annotated[list[str] | None, typer.Option(help="Only this axis; may be repeated.")] = None,
+    every: Annotated[
+        bool, typer.Option("--all", help="Draw all sessions, not the newest.")
+    ] = False,
     from_s: _FromOption = 0.0,
     until_s: _UntilOption = float("inf"),
     as_json: JsonOption = False,
 ) -> None:
-    """Draw motion, torques, tensions and the timing of the cycles into a picture."""
+    """Draw motion, torques, tensions and the timing of the cycles into a picture.
+
+    If there are several sessions, it draws the newest.
+    """
     out = Output(as_json)
-    path = target or files_of(files)[0].with_suffix(".png")
+    found = sessions(files_of(files))
+    name = list(found)[-1]
+    if len(found) > 1 and not every:
+        out.note(f"draws {name}, the newest of {len(found)} sessions; --all draws all")
+        found = {name: found[name]}
+    files = [path for some in found.values() for path in some]
+    path = target or files[0].with_name(f"{name if len(files) > 1 else files[0].stem}.png")
     with out.stage("loading what draws", quick=True):
         from cdpr_tools.recordings.picture import FIELDS, draw  # noqa: PLC0415  # slow to load
 

@@ -12,17 +12,20 @@ from typing import Annotated, Any
 
 import typer
 
-from cdpr_rt.procedures.commissioning.finding_index import Index
+from cdpr_profiles.bounded_input import may_replace
+from cdpr_rt.procedures.measurement import Index
 from cdpr_tools.errors import BadInputError
+from cdpr_tools.report.save import OWN_MARK
 
 
 def shares(
     options: Callable[..., AbstractContextManager[tuple[Any, ...]]],
 ) -> Callable[[Callable[..., None]], Callable[..., None]]:
-    """Return a decorator of commands for typer that adds the parameters of `options` to theirs.
+    """Return a decorator for typer commands that adds the parameters of `options` to their own.
 
-    The command runs inside of the context that `options` returns; what that yields are its first
-    arguments, its own it gets by keyword. Parameters that must be given come before all of its own.
+    The command runs inside the context that `options` returns. The values that it yields are the
+    command's first arguments; the command's own parameters are passed by keyword. Required
+    parameters of `options` come before the command's own.
     """
 
     def parameters(function: Callable[..., Any]) -> list[Parameter]:
@@ -47,10 +50,13 @@ def shares(
     return decorate
 
 
-def written_as(*endings: str) -> Callable[[typer.CallbackParam, Path | None], Path | None]:
-    """Return the callback of an option that names a file to write, whose name ends in one of these.
+def written_as(
+    *endings: str, mark: bytes = OWN_MARK
+) -> Callable[[typer.CallbackParam, Path | None], Path | None]:
+    """Return the callback of an option for a file to write, whose name has one of these endings.
 
-    What could not be written at the end is refused before the work: BadInputError.
+    It raises BadInputError before the work if the file could not be written afterwards, or if it
+    exists and `mark` is not at its beginning.
     """
 
     def checked(param: typer.CallbackParam, value: Path | None) -> Path | None:
@@ -61,6 +67,10 @@ def written_as(*endings: str) -> Callable[[typer.CallbackParam, Path | None], Pa
             raise BadInputError(f"{typed}: allowed: a name that ends in {', '.join(endings)}")
         if value.is_dir() or not value.parent.is_dir() or not os.access(value.parent, os.W_OK):
             raise BadInputError(f"{typed}: allowed: a file in a folder that can be written to")
+        if not may_replace(value, mark):
+            raise BadInputError(
+                f"{typed}: is there already and was not written by cdpr; allowed: another name"
+            )
         return value
 
     return checked
@@ -93,7 +103,7 @@ BusOption = Annotated[
     str,
     typer.Option(
         "--bus",
-        help="simbus: (starts a simulated drive of its own), simbus:NAME, socketcan:can0, ...",
+        help="simbus: (starts a simulated drive), simbus:NAME, socketcan:can0, ...",
         metavar="URL",
     ),
 ]
@@ -180,7 +190,7 @@ RobotBusOption = Annotated[
     list[str] | None,
     typer.Option(
         "--bus",
-        help="simbus: (a simulator of its own), simbus:NAME, or BUS=URL once for each bus.",
+        help="simbus: (starts a simulator), simbus:NAME, or BUS=URL once for each bus.",
         metavar="URL",
     ),
 ]

@@ -1,4 +1,4 @@
-"""`cdpr profiles`: what is known of motors, drives, cables, winches and robots."""
+"""`cdpr profiles`: list and show profiles of motors, drives, cables, winches and robots."""
 
 from __future__ import annotations
 
@@ -12,21 +12,21 @@ from pydantic import BaseModel
 import cdpr_profiles as catalogue
 from cdpr_profiles import RobotAxis
 from cdpr_profiles.catalogue import load_profile
-from cdpr_profiles.reading.reader import closest
+from cdpr_profiles.reader import closest
 from cdpr_tools.commands.options import JsonOption
 from cdpr_tools.errors import BadInputError
 from cdpr_tools.output import Output
 
 app = typer.Typer(
     name="profiles",
-    help="Profiles of motors, drives, cables, winches and robots.",
+    help="List and show the profiles of motors, drives, cables, winches and robots.",
     no_args_is_help=True,
 )
 
 
 @app.command("list")
 def list_(as_json: JsonOption = False) -> None:
-    """List the profiles by kind: those shipped, and your own."""
+    """List the profiles by kind: shipped ones, and your own."""
     out = Output(as_json)
     names = catalogue.list_profiles()
     for kind, of_kind in names.items():
@@ -40,7 +40,7 @@ def show(
     name: Annotated[str, typer.Argument(help="A name from `cdpr profiles list`.")],
     as_json: JsonOption = False,
 ) -> None:
-    """Show everything that a profile says."""
+    """Show all values of a profile."""
     out = Output(as_json)
     kinds = [kind for kind, names in catalogue.list_profiles().items() if name in names]
     if not kinds:
@@ -58,10 +58,10 @@ def show(
 def _plain(profile: object) -> dict[str, Any]:
     if isinstance(profile, BaseModel):
         return profile.model_dump(mode="json")
-    assert dataclasses.is_dataclass(profile)  # the catalogue holds nothing else
+    assert dataclasses.is_dataclass(profile)  # the catalogue has no other types
     values = {f.name: getattr(profile, f.name) for f in dataclasses.fields(profile)}
     if isinstance(profile, RobotAxis):
-        values["winch"] = profile.winch.reference  # which has a page of its own
+        values["winch"] = profile.winch.reference  # `cdpr profiles show` shows it separately
     return {key: _plain_value(value) for key, value in values.items()}
 
 

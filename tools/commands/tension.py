@@ -13,19 +13,9 @@ import typer
 from cdpr_drivers.bus import BusUrl
 from cdpr_drivers.modbus.tension import LoadCells, TensionSampler
 from cdpr_profiles import Winch, load_winch
-from cdpr_profiles.devices.tension_sensor import TensionSensors, load_tension_sensors
+from cdpr_profiles.tension_sensor import TensionSensors, load_tension_sensors
 from cdpr_profiles.winch_calibration import WinchCalibration
 from cdpr_rt.core.clock import Clock, PacedClock
-from cdpr_rt.procedures.tension import calibration
-from cdpr_rt.procedures.tension.anchor import TOLERANCE, AnchorPlan, measure_anchored, plan_anchor
-from cdpr_rt.procedures.tension.hoist import HoistPlan
-from cdpr_rt.procedures.tension.masses import (
-    Hang,
-    check_masses,
-    hoist_tolerance,
-    measure_masses,
-    plan_hoist,
-)
 from cdpr_tools.commands.options import (
     JsonOption,
     OverwriteOption,
@@ -39,12 +29,23 @@ from cdpr_tools.errors import BadInputError, WorkFailedError, os_error_as
 from cdpr_tools.output import Output
 from cdpr_tools.raw_data import keeping_raw_data, refuse_loss
 from cdpr_tools.signals import stop_on_signals
+from cdpr_tools.tension import calibration as tension_calibration
 from cdpr_tools.tension import watch as watching
-from cdpr_tools.tension.hanging import by_prompt, on_board
-
-app = typer.Typer(
-    name="tension", help="Cable tensions: watch, tare, calibrate.", no_args_is_help=True
+from cdpr_tools.tension.calibration import (
+    TOLERANCE,
+    AnchorPlan,
+    Hang,
+    HoistPlan,
+    check_masses,
+    hoist_tolerance,
+    measure_anchored,
+    measure_masses,
+    plan_anchor,
+    plan_hoist,
 )
+from cdpr_tools.tension.watch import by_prompt, on_board
+
+app = typer.Typer(name="tension", help="Read, tare and calibrate load cells.", no_args_is_help=True)
 
 _SensorsOption = Annotated[
     str, typer.Option("--sensors", help="Tension sensors: a name or a file.", metavar="SENSORS")
@@ -67,7 +68,7 @@ def watch(
     ] = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Show the tensions as they come, and their figures at the end; reads only."""
+    """Show the tensions live, and their figures at the end; reads only."""
     out = Output(as_json)
     profile = load_tension_sensors(sensors)
     clock = PacedClock()
@@ -94,8 +95,8 @@ def tare(
 ) -> None:
     """Make the present readings zero; every cable must be slack.
 
-    By the amplifiers where the profile says how, otherwise the zeros to write into the sensors'
-    file are shown.
+    The amplifiers are tared if the profile says how; otherwise the command shows the zeros to write
+    into the sensors' file.
     """
     out = Output(as_json)
     profile = load_tension_sensors(sensors)
@@ -217,7 +218,7 @@ def calibrate(
         pull = plan_anchor(profile, lowest_N, highest_N, speed * 1e-3, travel_mm * 1e-3)
         if port is None:
             raise BadInputError("--sensors needs --tension-port, the serial port of the load cells")
-        # the others' cells are of no interest: they may be silent, and are not waited for
+        # use this cell only: the others may be silent and must not delay it
         cell = cells.model_copy(update={"sensors": (cells.sensors[number],)})
         run.prepare(overwrite, yes, "the made-fast cable is pulled by the winch")
         run.by_load_cell(pull, cell, port)
@@ -226,19 +227,19 @@ def calibrate(
 
 @dataclass(frozen=True)
 class _Run:
-    """One calibration: where it measures and where it leaves its files."""
+    """One calibration: its winch, its bus and its files."""
 
     winch: WinchOnBus
     folder: Path
     safety_io: str | None
 
     def prepare(self, overwrite: bool, yes: bool, what: str) -> None:
-        """Make room for recordings and ask before a real motor is energised."""
-        refuse_loss(self.folder, calibration.raw_folder(self.folder), overwrite)
+        """Prepare the folder for recordings, and ask before a real motor is energised."""
+        refuse_loss(self.folder, tension_calibration.raw_folder(self.folder), overwrite)
         confirm_motion(self.winch.url, yes, what)
         with os_error_as(BadInputError, f"--out {self.folder}: cannot be written"):
-            calibration.discard(self.folder)
-            calibration.raw_folder(self.folder).mkdir(parents=True, exist_ok=True)
+            tension_calibration.discard(self.folder)
+            tension_calibration.raw_folder(self.folder).mkdir(parents=True, exist_ok=True)
 
     def by_masses(
         self, plan: HoistPlan, masses_kg: list[float], gravity: float, board: Path | None
@@ -247,43 +248,43 @@ class _Run:
         winch, out = self.winch.profile, self.winch.out
         with ExitStack() as stack:
             url, hang = _bus_and_hanging(stack, self.winch, board)
-            stack.enter_context(keeping_raw_data(calibration.raw_folder(self.folder)))
+            stack.enter_context(keeping_raw_data(tension_calibration.raw_folder(self.folder)))
             tolerance = hoist_tolerance(plan)
             opened = open_winch(winch, url, out, safety_io=self.safety_io, tolerance=tolerance)
             session = stack.enter_context(opened)
-            raw = calibration.raw_folder(self.folder)
+            raw = tension_calibration.raw_folder(self.folder)
             measure_masses(session, out, raw, plan, masses_kg, hang, gravity)
 
     def by_load_cell(self, plan: AnchorPlan, cell: TensionSensors, port: str) -> None:
-        """Record the pull at a made-fast cable."""
+        """Record the pull at a fastened cable."""
         at, out = self.winch, self.winch.out
         with ExitStack() as stack:
-            stack.enter_context(keeping_raw_data(calibration.raw_folder(self.folder)))
+            stack.enter_context(keeping_raw_data(tension_calibration.raw_folder(self.folder)))
             opened = open_winch(
                 at.profile, at.url, out, at.plant, safety_io=self.safety_io, tolerance=TOLERANCE
             )
             session = stack.enter_context(opened)
             sampler = stack.enter_context(TensionSampler(cell, port, session.device.clock))
             session.run_task(lambda: sampler.await_readings(_FIRST_READING_S))
-            path = calibration.pull_file(self.folder)
+            path = tension_calibration.pull_file(self.folder)
             measure_anchored(session, out, path, plan, sampler.exchange)
 
 
 @app.command()
 def fit(
-    folder: Annotated[Path, typer.Argument(help="The --out folder of a calibration.")],
+    folder: Annotated[Path, typer.Argument(help="The --out folder of a tension_calibration.")],
     winch: RecordedWinchOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Identify again from the recordings of a calibration."""
+    """Identify again from the recordings of a tension_calibration."""
     out = Output(as_json)
-    _finish(out, folder, load_winch(winch or calibration.recorded_winch(folder)))
+    _finish(out, folder, load_winch(winch or tension_calibration.recorded_winch(folder)))
 
 
 def _finish(out: Output, folder: Path, winch: Winch) -> None:
-    with keeping_raw_data(calibration.raw_folder(folder)):
-        found, points = calibration.calibrate(folder, winch)
-    path, picture = folder / calibration.FILE_NAME, folder / calibration.PICTURE
+    with keeping_raw_data(tension_calibration.raw_folder(folder)):
+        found, points = tension_calibration.calibrate(folder, winch)
+    path, picture = folder / tension_calibration.FILE_NAME, folder / tension_calibration.PICTURE
     from cdpr_tools.tension.picture import draw_calibration  # noqa: PLC0415  # slow to load
 
     with os_error_as(WorkFailedError, f"{picture}: cannot be written"):
@@ -303,7 +304,7 @@ def _masses(text: str) -> list[float]:
 def _bus_and_hanging(
     stack: ExitStack, winch: WinchOnBus, board: Path | None
 ) -> tuple[BusUrl, Hang]:
-    """Return the bus and what hangs masses there, with a simulator of our own for `simbus:`."""
+    """Return the bus and the function that hangs masses; `simbus:` starts a simulator."""
     url, plant = winch.url, winch.plant
     if url.starts_own_simulator:
         place = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="cdpr-tension-")))
@@ -316,7 +317,7 @@ def _bus_and_hanging(
 
 
 def show(out: Output, found: WinchCalibration, path: Path) -> None:
-    """Say what was found."""
+    """Print the calibration."""
     gain, half = found.gain_m * 1e3, found.gain_half_width_m * 1e3
     apart = 100.0 * (found.gain_m / found.nominal_gain_m - 1.0)
     out.say(f"gain K_t         {gain:.3f} ± {half:.3f} mNm/N ({apart:+.1f} % from the geometry)")

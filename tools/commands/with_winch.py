@@ -9,10 +9,8 @@ from pathlib import Path
 
 from cdpr_drivers.bus import BusUrl
 from cdpr_drivers.canopen.network import CanNetwork
-from cdpr_drivers.robot.session import Session
-from cdpr_drivers.robot.session_watch import Watching, no_watches, tension_watch
 from cdpr_profiles import Winch, load_winch
-from cdpr_rt.procedures.winch_operator import Tolerance
+from cdpr_rt.loop.operating import Tolerance
 from cdpr_tools.commands.options import (
     BusOption,
     JsonOption,
@@ -24,18 +22,27 @@ from cdpr_tools.commands.options import (
     YesOption,
     shares,
 )
-from cdpr_tools.composition.session import confirm_motion, open_bus, open_network, open_winch
+from cdpr_tools.composition.session import (
+    Session,
+    Watching,
+    confirm_motion,
+    no_watches,
+    open_bus,
+    open_network,
+    open_winch,
+    tension_watch,
+)
 from cdpr_tools.output import Output
 
 
 @dataclass(frozen=True)
 class WinchOnBus:
-    """What the options of a command about a winch name."""
+    """The winch and bus that the options of a command name."""
 
     profile: Winch
     url: BusUrl
     plant: Path | None
-    """Of a simulator that the command starts."""
+    """Plant file of a simulator that the command starts."""
     out: Output
     yes: bool = False
     safety_io: str | None = None
@@ -48,7 +55,7 @@ class WinchOnBus:
     def powered(
         self, what: str, tolerance: Tolerance | None = None
     ) -> AbstractContextManager[Session]:
-        """Ask whether `what` may happen, then boot the drive; see `open_winch`."""
+        """Ask the user to allow `what`, then boot the drive; see `open_winch`."""
         confirm_motion(self.url, self.yes, what)
         return open_winch(
             self.profile,
@@ -66,7 +73,7 @@ class WinchOnBus:
 def with_winch(
     winch: WinchArgument, bus: BusOption, plant: PlantOption = None, as_json: JsonOption = False
 ) -> Iterator[tuple[WinchOnBus, Output]]:
-    """Give a command the winch that these options name, and where to write to."""
+    """Pass the winch that these options name, and the output, to a command."""
     out = Output(as_json)
     yield WinchOnBus(load_winch(winch), open_bus(bus), plant, out), out
 
@@ -83,6 +90,6 @@ def with_powered_winch(
     yes: YesOption = False,
     as_json: JsonOption = False,
 ) -> Iterator[tuple[WinchOnBus, Output]]:
-    """Give a command the winch that it energises, and where to write to."""
+    """Pass the winch that the command energises, and the output, to the command."""
     out, watching = Output(as_json), tension_watch(sensors, port)
     yield WinchOnBus(load_winch(winch), open_bus(bus), plant, out, yes, safety_io, watching), out

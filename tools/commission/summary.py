@@ -1,4 +1,4 @@
-"""The table with which a commissioning ends on the terminal."""
+"""The table that a commissioning prints at its end."""
 
 from __future__ import annotations
 
@@ -6,14 +6,14 @@ from typing import Any
 
 from rich.table import Table
 
-from cdpr_rt.procedures.commissioning.evaluation import METHODS
+from cdpr_rt.procedures.commissioning_results import METHODS
 from cdpr_tools.output import Output
 
 _NAMES = {"none": "no compensation", "thesis": "thesis' method", "better": "harmonic model"}
 
 
 def show(out: Output, results: dict[str, Any]) -> None:
-    """Print what was identified and how the methods compare."""
+    """Print the identified model and the comparison of the methods."""
     show_identified(out, results["identification"])
     show_validation(out, results["validation"], results["bandwidth_Hz"])
     _show_shortfall(out, results["validation"])
@@ -30,7 +30,7 @@ def show(out: Output, results: dict[str, Any]) -> None:
 
 
 def show_identified(out: Output, found: dict[str, Any]) -> None:
-    """Print what was identified."""
+    """Print the identified model."""
     table = Table(title="identified cogging", title_justify="left")
     for name in ("order", "amplitude", "95 %", "likely cause"):
         table.add_column(name, justify="left" if name == "likely cause" else "right")
@@ -51,7 +51,7 @@ def show_identified(out: Output, found: dict[str, Any]) -> None:
 
 
 def show_validation(out: Output, validation: dict[str, Any], bandwidth_Hz: float) -> None:
-    """Print how the methods compare on the ramps of one bandwidth."""
+    """Print the comparison of the methods on the ramps of one bandwidth."""
     title = (
         f"ramp of 22 deg/s under one PID of {bandwidth_Hz:g} Hz closed-loop bandwidth, "
         f"judged on the {validation['judged_on']} (times smaller than without)"

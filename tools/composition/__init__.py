@@ -1,1 +1,1 @@
-"""Puts a robot together from its file: buses, drives, devices, loop."""
+"""Assembles a robot from its file: buses, drives, devices, loop."""

@@ -1,7 +1,8 @@
-"""From a robot's file to its control loop: estimate, programs, limits, and what is told of them."""
+"""Build the control loop from a robot's file: estimator, programs, limits, and description."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import asdict
 from typing import Any
 
@@ -13,31 +14,59 @@ from cdpr_profiles.errors import ProfileError
 from cdpr_profiles.platform import Platform
 from cdpr_rt.core.estimate import Estimator
 from cdpr_rt.core.shared_block import SharedBlock
-from cdpr_rt.core.supervision.limits import Limits
-from cdpr_rt.core.supervision.supervisor import Supervisor
+from cdpr_rt.core.supervisor import Limits, Supervisor, no_suspects
+from cdpr_rt.loop.engine import LoopParts, Lowering
+from cdpr_rt.loop.loop import ControlLoop
+from cdpr_rt.loop.machine import Machine
+from cdpr_rt.loop.realtime import enable_realtime
+from cdpr_rt.loop.stop_socket import StopSocket
+from cdpr_rt.loop.warm_up import warm_up_supervision
+from cdpr_rt.model.calibration_state import not_calibrated_reason
+from cdpr_rt.model.robot_arrays import described, supervisor_limits, winches_of
+from cdpr_rt.platform.own_controller import Controller
+from cdpr_rt.programs.lower import LowerProgram, lowering_s
 from cdpr_rt.programs.model import model_of
-from cdpr_rt.programs.platform.lower import LowerProgram, lowering_s
-from cdpr_rt.programs.platform.platform_program import PlatformParts
+from cdpr_rt.programs.platform_program import PlatformParts
 from cdpr_rt.programs.registry import (
     build_programs,
     platform_parts,
     warm_up_programs,
 )
-from cdpr_rt.robots.persistence.calibration_state import not_calibrated_reason
-from cdpr_rt.robots.robot_arrays import described, supervisor_limits, winches_of
-from cdpr_rt.runtime.control_loop.loop_parts import LoopParts, Lowering
-from cdpr_rt.runtime.realtime import enable_realtime
-from cdpr_rt.runtime.warm_up import warm_up_supervision
 
-_OTHER_CALIBRATION = "a calibration was taken over or undone; start the daemon anew"
+_OTHER_CALIBRATION = "a calibration was taken over or undone; start the daemon again"
+
+
+def control_loop(
+    robot: Robot,
+    limits: Limits,
+    block: SharedBlock,
+    machine: Machine,
+    parts: LoopParts,
+    clock_ns: Callable[[], int] | None = None,
+    stops: StopSocket | None = None,
+    **described: Any,
+) -> ControlLoop:
+    """Return the loop that runs `machine` with `parts`; its description is then in `block`.
+
+    `described` are additional entries of the description. The right to move expires by `clock_ns`,
+    by default CLOCK_MONOTONIC. Local clients stop the motion through `stops`.
+    """
+    block.write_description({**description(robot, limits, parts), **described})
+    return ControlLoop(block, machine, parts, clock_ns, stops)
 
 
 def loop_parts(
-    robot: Robot, limits: Limits, block: SharedBlock, *, learns: bool = True
+    robot: Robot,
+    limits: Limits,
+    block: SharedBlock,
+    *,
+    learns: bool = True,
+    controller: Controller | None = None,
 ) -> LoopParts:
-    """Return what the loop of `robot` runs within `limits`, compiled and ready.
+    """Return the parts that the loop of `robot` runs within `limits`, compiled and ready.
 
-    `learns`: of a platform's motors that were not commissioned, it learns in motion what they do.
+    `learns`: it learns cogging and friction of a platform's uncommissioned motors in motion.
+    The user's `controller` replaces the built-in one of the platform.
     """
     axes, n, period_s = robot.axes, len(robot.axes), robot.sync_period_s
     latencies = [axis.winch.latency_s for axis in axes]
@@ -49,12 +78,13 @@ def loop_parts(
     lowering = None
     if platform is not None:
         lowering = Lowering(LowerProgram.name, lowering_s(platform.platform))
-    names = [axis.name for axis in axes]
     parts = LoopParts(
         programs=programs,
-        supervisor=Supervisor(supervisor_limits(limits, robot), n, period_s, names),
+        supervisor=Supervisor(supervisor_limits(limits, robot), n, period_s),
         estimator=estimator,
+        axis_names=[axis.name for axis in axes],
         lengths_disagree=None if platform is None else platform.lengths_disagree,
+        length_suspects=no_suspects if platform is None else platform.control.suspects,
         lowering=lowering,
         last_stop=None if platform is None else platform.last_stop,
         paths=None if platform is None else platform.paths,
@@ -64,11 +94,14 @@ def loop_parts(
     )
     warm_up_programs(programs, n, platform)
     warm_up_supervision(estimator, parts.supervisor, n)
+    if controller is not None:
+        assert platform is not None  # the callers have one
+        platform.control.use(controller)
     return parts
 
 
 def look_at_calibration(robot: Robot, platform: PlatformParts | None) -> None:
-    """Have the programs refuse targets where the geometry may not be believed."""
+    """Make the programs refuse targets if the geometry cannot be trusted."""
     if platform is None:
         return
     try:
@@ -82,7 +115,7 @@ def look_at_calibration(robot: Robot, platform: PlatformParts | None) -> None:
 
 
 def description(robot: Robot, limits: Limits, parts: LoopParts) -> dict[str, Any]:
-    """Return what people and programs should know of a robot that is run."""
+    """Return the data about a running robot for people and programs."""
     return {
         "robot": robot.name,
         "reference": robot.reference,

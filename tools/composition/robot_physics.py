@@ -1,4 +1,4 @@
-"""What a robot's simulator simulates: its cables, platform and motors, and their true geometry."""
+"""The simulated parts of a robot: cables, platform and motors, and their true geometry."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from cdpr_profiles import Robot
 from cdpr_profiles.platform import Platform
 from cdpr_sim_bus.cia402.drive import SimDrive, transmission_of
 from cdpr_sim_bus.robot.cable_robot import CableRobot
-from cdpr_sim_bus.robot.logs.platform_record import RobotShape
 from cdpr_sim_bus.robot.motor_state import Transmission
 from cdpr_sim_bus.robot.plant import Plant
+from cdpr_sim_bus.robot.platform import RobotShape
 from cdpr_sim_bus.robot.robot_plant import RobotPlant
 from cdpr_tools.errors import BadInputError
 
@@ -24,9 +24,9 @@ from cdpr_tools.errors import BadInputError
 def physics_of(
     robot: Robot, plant: Path | None, detached: bool
 ) -> tuple[CableRobot | None, Sequence[Plant]]:
-    """Return what the axes move together, None where nothing, and the plant of each motor.
+    """Return what the axes move together (None if nothing) and the plant of each motor.
 
-    Raises BadInputError for a plant file that is not of such a robot.
+    Raises BadInputError if the plant file does not fit the robot.
     """
     n, platform = len(robot.axes), robot.platform
     if platform is None:
@@ -45,21 +45,21 @@ def physics_of(
 
 @dataclass(frozen=True)
 class TrueGeometry:
-    """What a simulated robot's geometry truly is, for those who judge a calibration of it."""
+    """The true geometry of a simulated robot, to evaluate a calibration."""
 
     exit_points_m: NDArray[np.float64]
     """(n, 3)"""
     drum_errors: NDArray[np.float64]
-    """Relative, of the cable that a turn of each motor pays out, (n,)."""
+    """Relative error of the cable paid out by one turn of each motor, (n,)."""
     elongation_error: float
-    """Relative, of the cables' elongation without creep."""
+    """Relative error of the cables' elongation without creep."""
 
 
 def true_geometry(robot: Robot, plant: Path | None) -> TrueGeometry:
     """Return the truth of a robot's simulator; raises BadInputError."""
     assert robot.platform is not None  # callers calibrate its cables
     body, plants = physics_of(robot, plant, detached=False)
-    assert body is not None  # a platform is on the cables
+    assert body is not None  # there is a platform on the cables
     drives = [
         SimDrive.for_winch(axis.winch, plant, robot=member)
         for axis, plant, member in zip(robot.axes, plants, body.members(), strict=True)

@@ -1,35 +1,314 @@
-"""Drives opened for a command, with a simulator of its own where it asks for one."""
+"""Booted drives, run by a loop for a command; however it ends, they are without power."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import ExitStack, contextmanager
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
+from typing import Any, Final
 
+import numpy as np
+
+from cdpr_drivers.axes import homing as touch_probe
+from cdpr_drivers.axes.axis_buses import AxisBuses
+from cdpr_drivers.axes.homing import Homing
 from cdpr_drivers.bus import BusUrl
 from cdpr_drivers.bus.budget import HEARTBEATS_IN_TOLERANCE
-from cdpr_drivers.bus.simulated_bus import open_clock
+from cdpr_drivers.bus.simbus import open_clock, query_status
+from cdpr_drivers.canopen.boot import BootReport
 from cdpr_drivers.canopen.network import CanNetwork
-from cdpr_drivers.errors import BusError
-from cdpr_drivers.robot.bus_fit import require_fit
-from cdpr_drivers.robot.robot_buses import starts_own_simulator
+from cdpr_drivers.cia402 import Mode
+from cdpr_drivers.errors import BusError, ConfigurationError, DriveFaultError
+from cdpr_drivers.modbus.tension import TensionSampler
+from cdpr_drivers.robot.commissioned import identity_of
+from cdpr_drivers.robot.machine import RobotMachine
+from cdpr_drivers.robot.robot_buses import require_fit, starts_own_simulator
 from cdpr_drivers.robot.safety import CLOSED
-from cdpr_drivers.robot.session import Session, booted
-from cdpr_drivers.robot.session_watch import Watching, no_watches
 from cdpr_profiles import Robot, Winch
-from cdpr_profiles.eds.dictionary import load_dictionary
+from cdpr_profiles.eds import load_dictionary
 from cdpr_profiles.robot import robot_of_winch
-from cdpr_rt.procedures.winch_operator import Tolerance
-from cdpr_rt.runtime.realtime import one_core
-from cdpr_rt.runtime.warm_up import warm_up
+from cdpr_profiles.robot_limits import Limit
+from cdpr_profiles.tension_sensor import load_tension_sensors
+from cdpr_rt.core.clock import Clock
+from cdpr_rt.core.cycle import Watch
+from cdpr_rt.core.estimate import Estimator
+from cdpr_rt.core.exchange import TensionWatch
+from cdpr_rt.core.shared_block import SharedBlock
+from cdpr_rt.core.states import Reaction
+from cdpr_rt.core.supervisor import Limits, Supervisor
+from cdpr_rt.errors import NotInTimeError
+from cdpr_rt.identification.cogging_profile import DriveIdentity
+from cdpr_rt.loop.engine import HOLD, IDLE, LoopParts
+from cdpr_rt.loop.loop import ControlLoop
+from cdpr_rt.loop.machine import MachineError
+from cdpr_rt.loop.operating import Operator, Tolerance
+from cdpr_rt.loop.realtime import one_core, paced_realtime
+from cdpr_rt.loop.warm_up import warm_up
+from cdpr_rt.model.robot_arrays import RATED_SPEED_SHARE, limits_of
+from cdpr_rt.programs.idle import ZeroTorqueProgram
+from cdpr_rt.programs.track import TrackProgram
 from cdpr_tools.composition.simulator import OwnSimulator
 from cdpr_tools.consent import require_consent
 from cdpr_tools.errors import BadInputError, raised_as
 from cdpr_tools.output import Output
 from cdpr_tools.signals import StopRequest, stop_on_signals
+
+# Load cells that monitor a session: too much tension, or an unknown one, brakes the motion.
+
+_FIRST_READINGS_S = 2.0
+
+
+Watching = Callable[[Clock], AbstractContextManager[Sequence[Watch]]]
+"""Opens watches of a session with its clock, for the duration of the block."""
+
+
+def no_watches(_: Clock) -> AbstractContextManager[Sequence[Watch]]:
+    """Open nothing."""
+    return nullcontext(())
+
+
+def tension_watch(sensors: str | None, port: str | None) -> Watching:
+    """Return a function that opens the tensions as a session's watch; none without `sensors`.
+
+    Raises ConfigurationError if one of them is missing, and ProfileError; opening them raises
+    ModbusError if load cells do not answer.
+    """
+    if (sensors is None) != (port is None):
+        raise ConfigurationError(
+            "--sensors and --tension-port go together: the load cells and their line"
+        )
+    if sensors is None or port is None:
+        return no_watches
+    profile = load_tension_sensors(sensors)
+
+    @contextmanager
+    def watching(clock: Clock) -> Iterator[Sequence[Watch]]:
+        with TensionSampler(profile, port, clock) as sampler:
+            sampler.await_readings(_FIRST_READINGS_S)
+            yield (TensionWatch(sampler.exchange, profile.stop_above_N),)
+
+    return watching
+
+
+_RING_S: Final = 8.0
+_INDEX_TIMEOUT_S: Final = 30.0
+_BRIDGED_CYCLES: Final = 2
+_MISSED_CYCLES: Final = 3
+# any failure removes the torque immediately, because the motors hold no load; a watch may brake
+_REACTIONS: Final[Mapping[Limit, Reaction]] = {
+    limit: Reaction.TORQUE_OFF
+    for limit in Limit
+    if limit not in (Limit.TORQUE, Limit.TORQUE_RATE, Limit.SAFETY_STOP)
+}
+
+
+class Session(Operator):
+    """Booted drives, of one winch or of a robot, and the loop that runs them for a command."""
+
+    def __init__(
+        self,
+        robot: Robot,
+        machine: RobotMachine,
+        loop: ControlLoop,
+        track: TrackProgram,
+        stop_requested: Callable[[], bool],
+    ) -> None:
+        super().__init__(loop, track, loop.turn, stop_requested)
+        self.robot = robot
+        self.machine = machine
+        self.boot_s = 0.0
+        """Bus time from the first frame until the last drive is operational."""
+        self.simulator_pid: int | None = None
+        """Process of the simulator that the command started."""
+
+    @property
+    def device(self) -> AxisBuses:
+        """The booted axes."""
+        device = self.machine.device
+        assert device is not None  # true until the session is closed
+        return device
+
+    def set_mode(self, modes: int | Sequence[int]) -> None:
+        """Request a mode of operation, one for all or one each, and wait until all confirm it.
+
+        Raises ModeRefusedError if one does not.
+        """
+        device = self.device
+        self.between_cycles(lambda: device.ask_mode(modes))
+        timeout_s = max(axis.winch.drive.mode_display_timeout_s for axis in self.robot.axes)
+        try:
+            self.wait(device.mode_confirmed, timeout_s, "the modes' confirmation")
+        except NotInTimeError as error:
+            if device.mode_confirmed():
+                raise
+            raise device.unconfirmed_mode() from error
+
+    def find_index(self, method: int = 34) -> None:
+        """Find the first axis' encoder index by homing, which turns the motor by at most one turn.
+
+        Afterwards the drive is in its torque mode again, without power.
+        """
+        homing = Homing(*self.device.group_of(0), method, _INDEX_TIMEOUT_S)
+        self.run_task(homing.configure)
+        self.set_mode(Mode.HOMING)
+        try:
+            # the procedure has its own time-out; this one is for a drive that stops responding
+            self.let_drive(homing.update, 2.0 * _INDEX_TIMEOUT_S, "the encoder index (homing)")
+        except BaseException:
+            homing.abort()
+            raise
+        self.set_mode(self.device.torque_modes)
+
+    def expect_index(self) -> None:
+        """Let the first drive latch its index in the ordinary motion that follows."""
+        group, place = self.device.group_of(0)
+        self.run_task(lambda: touch_probe.arm(group, place))
+
+    def bus_status(self) -> dict[str, dict[str, Any]]:
+        """Return the status of each simulated bus, by its name in the robot's file."""
+        return {
+            name: query_status(network.url.channel)
+            for name, network in self.machine.networks.items()
+            if network.url.is_simulated
+        }
+
+    def sync_offset(self) -> int:
+        """Return how many SYNCs a simulated bus had seen before the first cycle."""
+        status = next(iter(self.bus_status().values()), {})
+        return int(status.get("sync_count", 0)) - self.device.feedback.cycle
+
+    # -- of one winch
+
+    @property
+    def winch(self) -> Winch:
+        """The first axis' winch."""
+        return self.robot.axes[0].winch
+
+    @property
+    def network(self) -> CanNetwork:
+        """The first axis' bus."""
+        return self.machine.networks[self.robot.axes[0].bus]
+
+    @property
+    def boot(self) -> BootReport:
+        """The report of the first axis' drive at boot."""
+        return self.machine.reports[0]
+
+    @property
+    def drive_identity(self) -> DriveIdentity:
+        """The drive identity to which a cogging profile is bound, besides the motor."""
+        return identity_of(self.boot)
+
+    @property
+    def identity(self) -> dict[str, Any]:
+        """Origin of raw data: winch, motor, drive."""
+        whose = {"winch": self.winch.reference, "motor": self.winch.motor.model}
+        return whose | self.drive_identity.model_dump()
+
+    @property
+    def torque_step_Nm(self) -> float:
+        """The smallest torque step that can be commanded to the first drive."""
+        return abs(self.device.axes[0].Nm_per_unit)
+
+    @property
+    def is_simulated(self) -> bool:
+        """Whether the first axis' bus is simulated, so that no real motor turns."""
+        return self.network.url.is_simulated
+
+    def bus_record(self) -> dict[str, Any]:
+        """Return the data about the first axis' bus for reports."""
+        status = self.bus_status().get(self.robot.axes[0].bus, {})
+        known = {key: status[key] for key in ("load", "peak_cycle_load", "overruns") if status}
+        return {"url": str(self.network.url), "missed": self.device.missed, **known}
+
+
+@contextmanager
+def booted(
+    robot: Robot,
+    buses: Sequence[str],
+    stop_requested: Callable[[], bool],
+    safety_io: str | None = None,
+    watching: Watching = no_watches,
+    tolerance: Tolerance | None = None,
+) -> Iterator[Session]:
+    """Boot the drives of `robot` on `buses`, the values of --bus, with a loop to run them.
+
+    The watches that `watching` opens are checked every cycle. However the block ends, the
+    drives have no power afterwards; raises DriveFaultError if that is not certain, and the errors
+    of `RobotMachine` and `watching`.
+    """
+    with ExitStack() as stack:
+        machine = RobotMachine(robot, buses, safety_io, optional=True)
+        stack.callback(machine.clock.close)
+        warm_up(len(robot.axes), robot.sync_period_s)  # compiling later would delay a poll
+        loop, track = _loop_of(stack, machine, tolerance or Tolerance())
+        watches = stack.enter_context(watching(machine.clock))
+        begun_s = machine.clock.now_s
+        stack.enter_context(_powered_off_at_last(machine))
+        boot_s = machine.clock.now_s - begun_s
+        if len(machine.robot.axes) < len(robot.axes):
+            loop, track = _loop_of(stack, machine, tolerance or Tolerance())
+        session = Session(machine.robot, machine, loop, track, stop_requested)
+        session.boot_s = boot_s
+        session.device.tolerate_silence(_BRIDGED_CYCLES)
+        machine.watches = (*machine.watches, *watches)
+        yield session
+
+
+def _loop_of(
+    stack: ExitStack, machine: RobotMachine, tolerance: Tolerance
+) -> tuple[ControlLoop, TrackProgram]:
+    """Return the loop of the machine's axes, and its program."""
+    robot, n, period_s = machine.robot, len(machine.robot.axes), machine.robot.sync_period_s
+    block = SharedBlock.create(n, _RING_S, 1.0 / period_s)
+    stack.callback(os.close, block.fd)
+    track, limp = TrackProgram(n, period_s), ZeroTorqueProgram(n)
+    parts = LoopParts(
+        programs={IDLE: limp, HOLD: limp, track.name: track},
+        supervisor=Supervisor(_limits(robot, tolerance), n, period_s),
+        estimator=Estimator(n, period_s),
+        axis_names=[axis.name for axis in robot.axes],
+        enable_realtime=lambda: stack.enter_context(paced_realtime()),
+    )
+    return ControlLoop(block, machine, parts), track
+
+
+@contextmanager
+def _powered_off_at_last(machine: RobotMachine) -> Iterator[None]:
+    """Boot the drives; cut their power at the end, and report if that is not certain."""
+    try:
+        machine.open()
+    except MachineError as error:
+        if error.__cause__ is None:
+            raise
+        raise error.__cause__  # noqa: B904  # the cause decides how the command ends
+    try:
+        yield
+    except BaseException as error:
+        try:
+            unconfirmed = machine.close()
+        except MachineError as another:
+            unconfirmed = str(another)
+        if unconfirmed:
+            error.add_note(unconfirmed)
+        raise
+    if unconfirmed := machine.close():
+        raise DriveFaultError(unconfirmed)
+
+
+def _limits(robot: Robot, tolerance: Tolerance) -> Limits:
+    rated = np.array([axis.winch.motor.rated_speed_rad_s for axis in robot.axes])
+    speed = RATED_SPEED_SHARE * rated if tolerance.speed_rad_s is None else tolerance.speed_rad_s
+    torque_Nm = limits_of(robot).torque_Nm
+    return Limits(
+        torque_Nm, speed, tolerance.following_error_rad, _MISSED_CYCLES, reactions=_REACTIONS
+    )
+
+
+# Sessions as commands open them, with their own simulator if `simbus:` has no name.
 
 
 def open_bus(text: str) -> BusUrl:
@@ -39,7 +318,7 @@ def open_bus(text: str) -> BusUrl:
 
 
 def confirm_motion(url: BusUrl, yes: bool, what: str) -> None:
-    """Ask before a real motor is energised; raises BadInputError when nobody agrees."""
+    """Ask before a real motor gets power; raises BadInputError if the user does not agree."""
     require_consent(f"{what} on {url}: the motor will turn.", yes or url.is_simulated)
 
 
@@ -47,7 +326,7 @@ def confirm_motion(url: BusUrl, yes: bool, what: str) -> None:
 def open_network(
     winch: Winch, url: BusUrl, out: Output, plant: Path | None = None
 ) -> Iterator[CanNetwork]:
-    """Join the bus for acyclic work, with a simulator of its own where `simbus:` has no name.
+    """Join the bus for acyclic work, with its own simulator if `simbus:` has no name.
 
     Raises ConfigurationError for a cycle that does not fit the bus, and BadInputError for a bus
     that cannot be opened.
@@ -77,25 +356,25 @@ def open_winch(
     tolerance: Tolerance | None = None,
     reset: bool = False,
 ) -> Iterator[Session]:
-    """Boot the winch's drive on `url` and get ready to run its axis, in its torque mode.
+    """Boot the winch's drive on `url` and prepare to run its axis, in its torque mode.
 
-    With `safety_io`, the profile of a safety I/O, there is power only while that allows it;
-    what `watching` opens by the robot's clock is asked every cycle besides. A drive in fault is
-    refused, or acknowledged with `reset`. Whatever ends the block, the drive's power stage is off
-    afterwards. Raises ConfigurationError for a bus that cannot be opened, what `watching` and the
-    safety I/O raise, and the drivers' errors for a drive that does not boot.
+    With `safety_io`, the profile of a safety I/O, power is possible only while it allows it; the
+    watches that `watching` opens are also checked every cycle. A drive in fault is
+    rejected, or acknowledged with `reset`. However the block ends, the drive's power stage is off
+    afterwards. Raises ConfigurationError if the bus cannot be opened, the errors of `watching` and
+    the safety I/O, and the drivers' errors if the drive does not boot.
     """
     require_fit(winch)
     with ExitStack() as stack:
         stop_requested = stack.enter_context(stop_on_signals())
         robot = robot_of_winch(winch)
         bus, pid = find_bus(stack, winch, url, out, plant, truth_log, _compiled(robot))
-        axis = replace(robot.axes[0], winch=winch)  # whose drive waits as long as its profile says
+        axis = replace(robot.axes[0], winch=winch)  # the drive waits as long as its profile says
         robot = replace(robot, axes=(axis,), master_heartbeat_s=_heartbeat_s(winch))
         session = stack.enter_context(
             booted(robot, [str(bus)], stop_requested, safety_io, watching, tolerance)
         )
-        stack.callback(stop_requested.closing)  # before the power is taken
+        stack.callback(stop_requested.closing)  # before the power is cut
         session.simulator_pid = pid
         _prepare(session, stop_requested, out, reset)
         yield session
@@ -110,10 +389,10 @@ def open_robot(
     safety_io: str | None = None,
     reset: bool = False,
 ) -> Iterator[Session]:
-    """Boot all drives of `robot`, and get ready to run its axes as `open_winch` does.
+    """Boot all drives of `robot`, and prepare to run its axes as `open_winch` does.
 
-    `buses` are what was given with --bus; `simbus:` alone starts a simulator of all buses. Where
-    no `safety_io` is named the robot's own counts, unless all buses are simulated.
+    `buses` are the values of --bus; `simbus:` alone starts a simulator of all buses. By default
+    `safety_io` is the robot's own, unless all buses are simulated.
     """
     require_fit(robot)
     with ExitStack() as stack:
@@ -123,14 +402,14 @@ def open_robot(
             out.note(f"starting simulated drives: {len(robot.axes)} ...")
             buses, pid = _own_simulator(stack, robot.reference, meanwhile=_compiled(robot))
         session = stack.enter_context(booted(robot, buses, stop_requested, safety_io))
-        stack.callback(stop_requested.closing)  # before the power is taken
+        stack.callback(stop_requested.closing)  # before the power is cut
         session.simulator_pid = pid
         _prepare(session, stop_requested, out, reset)
         yield session
 
 
 def _prepare(session: Session, stop_requested: StopRequest, out: Output, reset: bool) -> None:
-    """Check the cycles of a booted session, and tell what is to be known of its drives."""
+    """Check the cycles of a booted session, and report notes about its drives."""
     stop_requested.energised = True
     session.check(reset)
     for notice in (*session.machine.notices, *session.loop.engine.notices):
@@ -140,12 +419,12 @@ def _prepare(session: Session, stop_requested: StopRequest, out: Output, reset: 
 
 
 def _compiled(robot: Robot) -> Callable[[], None]:
-    """Return what compiles the master's cycle: worth doing while a simulator compiles physics."""
+    """Return a function that compiles the master's cycle while a simulator compiles physics."""
     return partial(warm_up, len(robot.axes), robot.sync_period_s)
 
 
 def _heartbeat_s(winch: Winch) -> float:
-    """Return how often the master is heard within what the drive tolerates."""
+    """Return a period of the master's heartbeat that the drive tolerates."""
     return winch.drive.heartbeat_consumer_s / HEARTBEATS_IN_TOLERANCE
 
 
@@ -159,9 +438,9 @@ def find_bus(
     meanwhile: Callable[[], None] | None = None,
     board: Path | None = None,
 ) -> tuple[BusUrl, int | None]:
-    """Return the winch's bus, and the process of its simulator where one was to be started.
+    """Return the winch's bus, and the process of its simulator if one was started.
 
-    What is to be done `meanwhile` is done while that starts.
+    `meanwhile` is called while the simulator starts.
     """
     if url.starts_own_simulator:
         out.note("starting the simulated drive ...")

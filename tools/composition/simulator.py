@@ -1,4 +1,4 @@
-"""A simulator that belongs to a command: its own process, ended with the command."""
+"""A simulator that belongs to a command: a separate process that ends with the command."""
 
 from __future__ import annotations
 
@@ -12,38 +12,37 @@ from itertools import count
 from pathlib import Path
 from typing import IO
 
-from cdpr_tools.compiling import NOTICE, compiling_until, pass_on
+from cdpr_tools.compiling import NOTICE, pass_on
 from cdpr_tools.errors import BadInputError, WorkFailedError
-from cdpr_tools.processes.module_process import end_by_stdin, module_command
+from cdpr_tools.processes import end_by_stdin, module_command
 
-# the first start on a machine compiles the physics, a slow one for minutes
+# if installation has not compiled the physics, the first start does; it may take minutes
 _START_TIMEOUT_S = 600.0
-# one that is only held up completes its logs
+# a process that is only delayed still completes its logs
 _STOP_TIMEOUT_S = 60.0
 
 _numbers = count(1)
 
 
 class _OwnProcess:
-    """A command of ours that runs until its standard input closes, so also when we die."""
+    """A command of this package that runs until its standard input closes, also if we die."""
 
     def __init__(self, *command: str, meanwhile: Callable[[], None] | None = None) -> None:
-        """Run it, and wait until it is ready; raises BadInputError and WorkFailedError as it does.
+        """Run it and wait until it is ready; raises its BadInputError and WorkFailedError.
 
-        It says that it is ready in one line of JSON: `ready`. What is to be done `meanwhile` is
-        done here while it starts; of that no more is compiled once the process has ended.
+        It reports that it is ready in one line of JSON: `ready`. `meanwhile` is called while it
+        starts.
         """
         self.process = subprocess.Popen(
             module_command("cdpr_tools.cli", *command, "--exit-with-stdin"),
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
-            start_new_session=True,  # a Ctrl-C at the terminal is ours to handle, not its
+            start_new_session=True,  # a Ctrl-C at the terminal is handled here, not there
         )
         try:
             if meanwhile is not None:
-                with compiling_until(lambda: self.process.poll() is not None):
-                    meanwhile()
+                meanwhile()
             self.ready = self._await_ready()
         except BaseException:
             self.stop()
@@ -79,11 +78,11 @@ class _OwnProcess:
 
     @property
     def lifeline(self) -> int:
-        """Descriptor as long as which is open, here or in a child, the simulator stays."""
+        """Descriptor that keeps the simulator alive while it is open, here or in a child."""
         return self._pipe(self.process.stdin).fileno()
 
     def stop(self) -> None:
-        """End it; what it logs is complete afterwards."""
+        """End it; its logs are complete afterwards."""
         end_by_stdin(self.process, _STOP_TIMEOUT_S)
 
 
@@ -93,14 +92,14 @@ class OwnLoadCells(_OwnProcess):
     def __init__(self, sensors: str, board: Path) -> None:
         super().__init__("sim", "tension", sensors, "--board", str(board))
         self.port = str(json.loads(self.ready)["ready"]["port"])
-        """Where its serial line is."""
+        """Path of its serial line."""
 
 
 class OwnSimulator(_OwnProcess):
     """A running `cdpr sim up`.
 
-    Where the environment has CDPR_SIM_FRAME_LOG=FILE, it logs all frames there, those of further
-    simulators of this process in FILE with -2, -3 and so on at the end of its name.
+    If the environment has CDPR_SIM_FRAME_LOG=FILE, it logs all frames there; further simulators of
+    this process log to FILE with -2, -3 and so on appended to its name.
     """
 
     def __init__(
@@ -145,7 +144,7 @@ class OwnCamera(_OwnProcess):
 
 
 def _without_notices(output: str) -> str:
-    """Return what is told besides that kernels are compiled, which is passed on by whole lines."""
+    """Return output other than notices about compiled kernels, which are forwarded by lines."""
     kept = ""
     for line in output.splitlines(keepends=True):
         if line.startswith(NOTICE) and line.endswith("\n"):

@@ -1,1 +1,1 @@
-"""The daemon's composition: its processes and what each is given."""
+"""The daemon's composition: its processes and their settings."""

@@ -1,4 +1,4 @@
-"""Emergency stop by a signal to the loop's process, and the end of a daemon without a service."""
+"""Emergency stop by a signal to the loop's process, and the end of a daemon without service."""
 
 from __future__ import annotations
 
@@ -9,24 +9,27 @@ import signal
 import time
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 from cdpr_drivers.cia402 import POWER_OFF, state_of
 from cdpr_profiles.errors import brief
+from cdpr_rt.core.cycle_row import Row
 from cdpr_rt.core.shared_block import SharedBlock, SharedBlockError
 from cdpr_rt.core.states import LoopState
-from cdpr_tools.daemon.loop_file import POWER_OFF_SIGNAL, LoopFile
-from cdpr_tools.daemon.paths import find_loop_files
-from cdpr_tools.errors import BadInputError, WorkFailedError
+from cdpr_rt.service.rows import newest_row
+from cdpr_tools.daemon.child import loop_stop_s
+from cdpr_tools.daemon.loop_file import POWER_OFF_SIGNAL, LoopFile, find_loops, launcher_pid
+from cdpr_tools.daemon.paths import LAUNCHER_SUFFIX, find_launcher_files
+from cdpr_tools.errors import BadInputError, WorkFailedError, os_error_as
 
 _LOOK_S = 0.02
-# the drives are asked over and over, and once more by SDO, where one does not confirm
+# a drive that does not confirm is asked repeatedly, finally by SDO
 _CONFIRM_S: Final = 15.0
-# the loop turns at every cycle, or some ten times a second where no cycles run
+# the loop turns at every cycle, or about ten times a second without cycles
 _STALLED_S: Final = 1.0
 _KILLED_S: Final = 2.0
 _UNHEARD_S: Final = 1.0
-# a daemon that only listens sees the effect of a signal sent to the master at the same time
+# a daemon that only listens sees the effect if the master gets a signal at the same time
 _LISTENS_S: Final = 2.0
 
 
@@ -41,10 +44,10 @@ class EmergencyStopResult:
 
 
 class EmergencyStop:
-    """Signals one robot's loop to remove the power when made; `outcome` waits for the drives."""
+    """Signals one robot's loop to cut the power when created; `outcome` waits for the drives."""
 
     def __init__(self, path: Path) -> None:
-        """Tell the loop that the file at `path` names."""
+        """Signal the loop that the file at `path` names."""
         self._robot = path.stem
         self._pidfd = -1
         self._block: SharedBlock | None = None
@@ -52,7 +55,7 @@ class EmergencyStop:
         self._asked_ns = time.monotonic_ns()
 
     def _signal_loop(self, path: Path) -> EmergencyStopResult | None:
-        """Send the signal; return what is known without waiting, None where there is to wait."""
+        """Send the signal; return the result if it is known without waiting, else None."""
         try:
             found = self._found = LoopFile.read(path)
             self._robot = found.robot
@@ -62,7 +65,7 @@ class EmergencyStop:
         if pidfd is None:
             return self._failed(f"its loop has ended; {_own_stop_notice(found)}")
         self._pidfd = pidfd
-        try:  # to one that only listens as well: only its memory says so, and it lets it be
+        try:  # also sent to a loop that only listens: only its memory shows that; it ignores it
             signal.pidfd_send_signal(pidfd, POWER_OFF_SIGNAL)
         except PermissionError:
             whose = _user(found.uid)
@@ -78,10 +81,10 @@ class EmergencyStop:
             self._pidfd = -1
 
     def outcome(self) -> EmergencyStopResult:
-        """Wait until every drive has confirmed, or it is known that some will not.
+        """Wait until every drive has confirmed, or it is certain that some will not.
 
-        A loop that does not turn is killed: its drives stop by themselves without its heartbeat.
-        One that only listens is left alone.
+        A loop that does not turn is killed: its drives stop when its heartbeat ends.
+        A loop that only listens is left alone.
         """
         if self._known is not None:
             return self._known
@@ -103,12 +106,12 @@ class EmergencyStop:
         return EmergencyStopResult(self._robot, True, off)
 
     def _failure_reason(self) -> str:
-        """Return why waiting ends without a confirmation, empty until then."""
+        """Return why the wait ends without a confirmation; empty until then."""
         since_s = self._since_s(self._asked_ns)
         if self._listens():
             waits = since_s <= _LISTENS_S
             return "" if waits else "this daemon only listens: stop the master that runs its drives"
-        if since_s > _UNHEARD_S and not self._cycling():
+        if since_s > _UNHEARD_S and self._cycling() is None:
             return "its drives are not heard, and are not given power"
         if since_s > _CONFIRM_S:
             return f"not every drive has confirmed within {_CONFIRM_S:g} s that its power is off"
@@ -132,33 +135,28 @@ class EmergencyStop:
     def _since_s(then_ns: int) -> float:
         return (time.monotonic_ns() - then_ns) * 1e-9
 
-    def _cycling(self) -> bool:
-        """Whether a cycle has begun since the power was to be taken."""
-        block = self._block
-        assert block is not None  # attached
-        rows = int(block.counters["rows"][0])
-        return (
-            rows > 0 and int(block.rows[(rows - 1) % block.capacity]["stamp_ns"]) > self._asked_ns
-        )
+    def _cycling(self) -> Row | None:
+        """Return the row of the newest cycle if it began after the request to cut the power."""
+        assert self._block is not None  # attached
+        row = newest_row(self._block)
+        return row if row is not None and int(row["stamp_ns"]) > self._asked_ns else None
 
     def _power_is_off(self) -> str:
-        """Return that every drive confirms in a cycle begun since, as text; empty until then."""
-        block = self._block
-        assert block is not None  # attached
-        if not self._cycling():
+        """Return the text that every drive confirms in a later cycle; empty until then."""
+        row = self._cycling()
+        if row is None:
             return ""
-        row = block.rows[(int(block.counters["rows"][0]) - 1) % block.capacity]
         off = all(state_of(int(word)) in POWER_OFF for word in row["statusword"])
         if row["state"] == LoopState.ACTIVE or not off or not row["alive"].all():
             return ""
         return f"power is off, every drive says so ({self._reported_state()})"
 
     def _listens(self) -> bool:
-        """Whether the loop only listens, and commands no drive."""
+        """Whether the loop only listens and commands no drive."""
         assert self._block is not None  # attached
         try:
             return self._block.status().get("read_only") is True
-        except SharedBlockError:  # it died in the middle of writing
+        except SharedBlockError:  # the loop died while writing
             return False
 
     def _reported_state(self) -> str:
@@ -171,15 +169,34 @@ class EmergencyStop:
         return brief(f"{state}: {reason}" if reason else state)
 
 
+def status_in_memory(found: LoopFile) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Return the part of a loop's status about its drives, and its description.
+
+    Raises OSError and SharedBlockError.
+    """
+    block = _attach(found)
+    status, description = block.status(), block.description()
+    row = newest_row(block)
+    alive = () if row is None else row["alive"]
+    names = [str(axis.get("name")) for axis in description.get("axes", ())]
+    axes = [{"name": name, "alive": bool(one)} for name, one in zip(names, alive, strict=False)]
+    if not status:
+        raise SharedBlockError("the loop has not published its status yet")
+    return {**status, "axes": axes}, description
+
+
 def _attach(found: LoopFile) -> SharedBlock:
-    # read only, and not waiting where the descriptor is no shared memory (a FIFO, a terminal)
+    # read only; do not block if the descriptor is not shared memory (a FIFO, a terminal)
     flags = os.O_RDONLY | os.O_NONBLOCK | os.O_NOCTTY | os.O_CLOEXEC
-    return SharedBlock.attach(os.open(f"/proc/{found.pid}/fd/{found.block_fd}", flags))
+    block = SharedBlock.attach(os.open(f"/proc/{found.pid}/fd/{found.block_fd}", flags))
+    if int(block.counters["loop_pid"][0]) != found.pid:
+        raise SharedBlockError("the shared memory is another loop's")
+    return block
 
 
 def _own_stop_notice(found: LoopFile) -> str:
     return (
-        "drives that had power from it stop by themselves, without its heartbeat, within "
+        "drives that had power from it stop without its heartbeat within "
         f"{found.drives_stop_s:g} s: check that they have"
     )
 
@@ -191,35 +208,100 @@ def _user(uid: int) -> str:
         return f"#{uid}"
 
 
-_END_S: Final = 90.0
-"""A platform is let down in less."""
+_LAUNCHER_S: Final = 10.0
+"""Once the loop has ended, a working launcher ends within this time."""
+_STARTING_S: Final = 60.0
+"""A launcher ends the processes that it is starting within this time; none has power."""
+
+
+def launcher_left(socket: Path) -> str:
+    """Return that the launcher of the daemon at `socket` runs and what to do; "" if it ended."""
+    pid = launcher_pid(socket.with_suffix(LAUNCHER_SUFFIX))
+    if pid is None:
+        return ""
+    return f"its launcher, process {pid}, does not respond: end it with `kill -9 {pid}`"
 
 
 def end_leftover_processes(robot: str | None, socket: Path | None) -> list[str]:
-    """Have a loop that runs without a service stop under control; return what was done, as lines.
+    """End a daemon whose service does not answer; return the actions, as lines.
 
-    Nothing is done, and no line returned, where none runs. Raises BadInputError where several do
-    and none was named, WorkFailedError where it is another user's or does not end.
+    A loop without a service stops under control. A daemon that is starting ends as by Ctrl-C.
+    If neither runs, do nothing and return no line. Raises BadInputError if several run
+    and none was named, WorkFailedError if it belongs to another user or does not end.
     """
-    paths = find_loop_files(robot) if socket is None else [LoopFile.beside(socket)]
-    found = [LoopFile.read(path) for path in paths if path.exists()]
-    running = [one for one in found if one.runs()]
+    paths = find_loops(robot) if socket is None else [LoopFile.beside(socket)]
+    found = [(path, LoopFile.read(path)) for path in paths if _is_there(path)]
+    running = [(path, one) for path, one in found if one.runs()]
     if len(running) > 1 and robot is None:
-        names = ", ".join(one.robot for one in running)
+        names = ", ".join(one.robot for _, one in running)
         raise BadInputError(f"{len(running)} loops run: choose one by --robot ({names})")
-    return [_end(one) for one in running[:1]]
+    if running:
+        return [_end(*running[0])]
+    locks = find_launcher_files(robot) if socket is None else [socket.with_suffix(LAUNCHER_SUFFIX)]
+    launchers = [(path, pid) for path in locks if (pid := launcher_pid(path)) is not None]
+    if len(launchers) > 1 and robot is None:
+        names = ", ".join(path.stem for path, _ in launchers)
+        raise BadInputError(f"{len(launchers)} daemons start: choose one by --robot ({names})")
+    return [_end_start(path, pid) for path, pid in launchers[:1]]
 
 
-def _end(loop: LoopFile) -> str:
+def _is_there(path: Path) -> bool:
+    with os_error_as(WorkFailedError, f"{path}: cannot be looked at"):
+        return path.exists()
+
+
+def end_starting(socket: Path) -> list[str]:
+    """End a daemon that is starting, as by Ctrl-C; return the action, no line if none runs."""
+    path = socket.with_suffix(LAUNCHER_SUFFIX)
+    pid = launcher_pid(path)
+    return [] if pid is None else [_end_start(path, pid)]
+
+
+def _end_start(path: Path, pid: int) -> str:
+    """End a launcher whose loop does not run; it ends the processes that it has started."""
+    done = f"{path.stem}: its daemon was starting; it has ended"
+    try:
+        pidfd = os.pidfd_open(pid)
+    except ProcessLookupError:
+        return done
+    try:
+        if launcher_pid(path) == pid:  # and its number does not belong to another process by now
+            signal.pidfd_send_signal(pidfd, signal.SIGTERM)
+        if not select.select([pidfd], [], [], _STARTING_S)[0]:
+            raise WorkFailedError(
+                f"{path.stem}: its launcher, process {pid}, still runs {_STARTING_S:g} s after "
+                f"SIGTERM: end it with `kill -9 {pid}`"
+            )
+    except PermissionError:
+        raise WorkFailedError(f"{path.stem}: its launcher, process {pid}, is another user's") from (
+            None
+        )
+    except ProcessLookupError:  # it has ended
+        pass
+    finally:
+        os.close(pidfd)
+    return done
+
+
+def _end(path: Path, loop: LoopFile) -> str:
     pidfd = loop.open()
     if pidfd is None:
         return f"{loop.robot}: its loop has ended"
     try:
         signal.pidfd_send_signal(pidfd, signal.SIGTERM)
-        if not select.select([pidfd], [], [], _END_S)[0]:
-            raise WorkFailedError(f"{loop.robot}: its loop still runs {_END_S:g} s after SIGTERM")
+        end_s = loop_stop_s(_attach(loop))
+        if not select.select([pidfd], [], [], end_s)[0]:
+            raise WorkFailedError(f"{loop.robot}: its loop still runs {end_s:g} s after SIGTERM")
     except PermissionError:
         raise WorkFailedError(f"{loop.robot}: its loop is another user's") from None
+    except (OSError, SharedBlockError):  # it has ended already
+        pass
     finally:
         os.close(pidfd)
-    return f"{loop.robot}: its service did not answer; its loop was stopped under control"
+    done = f"{loop.robot}: its service did not answer; its loop was stopped under control"
+    deadline_s = time.monotonic() + _LAUNCHER_S
+    while left := launcher_left(path):
+        if time.monotonic() > deadline_s:
+            raise WorkFailedError(f"{done}; {left}")
+        time.sleep(_LOOK_S)
+    return done

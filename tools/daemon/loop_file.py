@@ -1,58 +1,69 @@
 """The files that name a daemon's loop and its launcher, beside the daemon's socket.
 
-By that of the loop a signal can have its process take the power: the launcher writes it once the
-loop obeys `POWER_OFF_SIGNAL`.
-What it says is believed of its owner's own processes only: who reads it may be root.
+With the loop's file, a signal can make its process cut the power. The launcher writes the file
+once the loop obeys `POWER_OFF_SIGNAL`. The launcher's file is also the robot's lock.
+Its content is trusted only for processes of its owner, because the reader may be root.
 """
 
 from __future__ import annotations
 
+import fcntl
 import os
 import select
 import signal
+import stat
 import tempfile
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from pathlib import Path
-from typing import Annotated, Final
+from typing import Annotated, Final, Self
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
 
+from cdpr_profiles.bounded_input import open_regular, parse_json
 from cdpr_profiles.errors import ProfileError, brief
-from cdpr_profiles.reading.bounded_input import open_regular, parse_json
-from cdpr_tools.daemon.paths import LAUNCHER_SUFFIX, LOOP_SUFFIX, is_trusted
-from cdpr_tools.errors import WorkFailedError
+from cdpr_rt.loop.stop_socket import STOP_SUFFIX
+from cdpr_tools.daemon.paths import (
+    LAUNCHER_SUFFIX,
+    LOOP_SUFFIX,
+    find_loop_files,
+    is_file_of,
+    is_trusted,
+    short_name,
+)
+from cdpr_tools.errors import BadInputError, WorkFailedError, os_error_as
 
 POWER_OFF_SIGNAL: Final = signal.SIGUSR1
-"""Has a loop take torque and power from its drives at once and latch a fault."""
-_MOST_BYTES = 4096
+"""Makes a loop remove torque and power from its drives immediately and latch a fault."""
+_MOST_BYTES = 16384
 _MOST_PID = 1 << 22
 _MOST_FD = 1 << 20
 
 
 class LoopFile(BaseModel):
-    """Which process runs a robot's loop, and where its shared memory is."""
+    """Names the process that runs a robot's loop, and its shared memory."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
     robot: Annotated[str, AfterValidator(brief)]
+    reference: str = ""
+    """How the robot was loaded: a name, or the path of its file."""
     uid: int = Field(ge=0)
-    """User id of the process, who owns the file as well."""
+    """User id of the process, who also owns the file."""
     pid: int = Field(gt=1, le=_MOST_PID)
     started: int = Field(ge=0)
-    """When it was started, in clock ticks since the machine was: no other process has both."""
+    """Start time in clock ticks since boot; with the pid it identifies one process."""
     block_fd: int = Field(ge=0, le=_MOST_FD)
     """The descriptor of the shared memory, in that process."""
     drives_stop_s: float = Field(ge=0.0, allow_inf_nan=False)
-    """Within what time the drives stop by themselves once the loop is silent."""
+    """Time within which the drives stop after the loop falls silent."""
 
     @staticmethod
     def beside(socket: Path) -> Path:
-        """Return where the file of the daemon with this socket lies."""
+        """Return the path of the file for the daemon with this socket."""
         return socket.with_suffix(LOOP_SUFFIX)
 
     def write(self, path: Path) -> None:
-        """Put the file there, for this user only, whole or not at all. Raises OSError."""
+        """Write the file, for this user only, completely or not at all. Raises OSError."""
         fd, fresh = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)  # mode 0600
         try:
             with os.fdopen(fd, "w") as file:
@@ -63,20 +74,24 @@ class LoopFile(BaseModel):
             raise
 
     def remove(self, path: Path) -> None:
-        """Take the file away where it still says this and not what another daemon wrote."""
+        """Remove the file, and the remaining socket of a killed loop, unless it is another's."""
         with suppress(WorkFailedError, OSError):
             if LoopFile.read(path) == self:
                 path.unlink()
+                path.with_suffix(STOP_SUFFIX).unlink(missing_ok=True)
 
     @classmethod
     def read(cls, path: Path) -> LoopFile:
-        """Return what is in the file; raises WorkFailedError, also for another user's."""
+        """Return the content of the file; raises WorkFailedError, also if it is another user's."""
         try:
             with os.fdopen(open_regular(path, links=False), "rb") as file:
                 owner = os.fstat(file.fileno()).st_uid
                 data = file.read(_MOST_BYTES)
             if not is_trusted(path, owner):
-                raise WorkFailedError(f"{path}: was put there by user {owner}: it is not believed")
+                raise WorkFailedError(
+                    f"{path}: belongs to user {owner} and is ignored; remove it, or choose another "
+                    "--socket"
+                )
             found = cls.model_validate(parse_json(data, path))
         except ProfileError as error:
             raise WorkFailedError(str(error)) from None
@@ -90,19 +105,19 @@ class LoopFile(BaseModel):
         return found
 
     def open(self) -> int | None:
-        """Return a pidfd of the process, None where it has ended or its loop has turned last.
+        """Return a pidfd of the process; None if it has ended or its loop has turned last.
 
-        Raises WorkFailedError where it is another user's, or `POWER_OFF_SIGNAL` would end it.
+        Raises WorkFailedError if it is another user's, or `POWER_OFF_SIGNAL` would end it.
         """
         try:
             pidfd = os.pidfd_open(self.pid)
         except ProcessLookupError:
             return None
-        # looked at while the pidfd holds the process
+        # compare the start time while the pidfd holds the process
         is_it = started(self.pid) == self.started
         if is_it and self._does_with_signal("SigCgt"):
             return pidfd
-        ending = self._does_with_signal("SigIgn")  # a loop ignores it once it has turned last
+        ending = self._does_with_signal("SigIgn")  # a loop ignores the signal after its last turn
         ended = not is_it or ending or bool(select.select([pidfd], [], [], 0.0)[0])
         os.close(pidfd)
         if ended:
@@ -119,7 +134,7 @@ class LoopFile(BaseModel):
         return True
 
     def _does_with_signal(self, what: str) -> bool:
-        """Whether the process is all its user's and catches (SigCgt) or ignores (SigIgn) it."""
+        """Whether the process belongs to its user and catches (SigCgt) or ignores (SigIgn) it."""
         try:
             lines = Path(f"/proc/{self.pid}/status").read_text().splitlines()
         except OSError:
@@ -129,8 +144,28 @@ class LoopFile(BaseModel):
         return set(fields["Uid"].split()) == {str(self.uid)} and bool(does)
 
 
+def find_loops(robot: str | None) -> list[Path]:
+    """Return the files that name the loops of this robot, by name or file, or of any robot.
+
+    A loop has the name of its robot, as its socket does. For a file, it must run that very file.
+    """
+    paths = find_loop_files()
+    return paths if robot is None else [path for path in paths if _is_of(path, robot)]
+
+
+def _is_of(path: Path, robot: str) -> bool:
+    name = short_name(robot)
+    try:
+        found = LoopFile.read(path)
+    except WorkFailedError:  # the function that reads it reports the reason
+        return path.stem == name
+    if name not in (path.stem, found.robot):
+        return False
+    return name == robot or is_file_of(found.reference, Path(robot))
+
+
 def started(pid: int) -> int:
-    """Return when a process was started, in clock ticks since the machine was; 0 for none."""
+    """Return the start time of a process in clock ticks since boot; 0 if it does not exist."""
     try:
         return int(Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[19])
     except OSError:
@@ -141,41 +176,112 @@ _MOST_DOING: Final = 160
 _MOST_LAUNCHER_BYTES: Final = 64 + _MOST_DOING
 
 
-@contextmanager
-def named_launcher(socket: Path) -> Iterator[Callable[[str], None]]:
-    """Name this process as the launcher of the daemon with this socket, while the block runs.
+class LauncherLock:
+    """The right of this process to run the daemon at this socket; its file names the launcher.
 
-    Yields a function that tells clients what the launcher is doing, up to 160 characters.
-    Nobody is told where the file cannot be written: clients only do not wait then.
+    The kernel keeps the lock until all processes that inherit `fd` have ended, however they end.
     """
-    path = socket.with_suffix(LAUNCHER_SUFFIX)
-    name = f"{os.getpid()} {started(os.getpid())}\n".encode()
 
-    def tell(text: str) -> None:
-        with suppress(OSError):  # in one write, which leaves the name as it is
-            os.pwrite(
-                fd, text[:_MOST_DOING].ljust(_MOST_DOING).encode("ascii", "replace"), len(name)
-            )
+    def __init__(self, socket: Path) -> None:
+        """Take the lock; raises BadInputError if another process has it."""
+        self._path = socket.with_suffix(LAUNCHER_SUFFIX)
+        with os_error_as(BadInputError, f"--socket {socket}: {self._path}: cannot be locked"):
+            self.fd = self._locked(socket)
+            self._name = f"{os.getpid()} {started(os.getpid())}\n".encode()
+            os.ftruncate(self.fd, 0)
+            os.pwrite(self.fd, self._name, 0)
+        self._remove_loop_file(socket)
 
-    fd = -1
-    with suppress(OSError):
-        path.unlink(missing_ok=True)  # of one that was killed
-        fd = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o600)
-        os.write(fd, name)
-    try:
-        yield tell
-    finally:
+    def _remove_loop_file(self, socket: Path) -> None:
+        """Remove the file of a killed loop; refuse if the loop runs and only its lock is gone."""
+        path = LoopFile.beside(socket)
+        with suppress(WorkFailedError):  # it does not exist or is not trusted
+            if LoopFile.read(path).runs():
+                os.close(self.fd)
+                raise _taken(socket, None)
         with suppress(OSError):
             path.unlink()
-        with suppress(OSError):
+
+    def _locked(self, socket: Path) -> int:
+        flags = os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW | os.O_NONBLOCK
+        while True:
+            fd = os.open(self._path, flags, 0o600)
+            try:
+                self._take(fd, socket)
+                if self._is_at_path(fd):  # and was not removed by the launcher that had the lock
+                    return fd
+            except BaseException:
+                os.close(fd)
+                raise
             os.close(fd)
+
+    def _take(self, fd: int, socket: Path) -> None:
+        found = os.fstat(fd)
+        if not stat.S_ISREG(found.st_mode) or not is_trusted(self._path, found.st_uid):
+            raise BadInputError(
+                f"--socket {socket}: {self._path} is no file of yours; remove it, or choose "
+                "another --socket"
+            )
+        try:
+            fcntl.flock(fd, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            raise _taken(socket, launcher_pid(self._path)) from None
+
+    def _is_at_path(self, fd: int) -> bool:
+        try:
+            return os.path.samestat(os.fstat(fd), self._path.lstat())
+        except FileNotFoundError:
+            return False
+
+    def tell(self, text: str) -> None:
+        """Show clients the launcher's present step, in up to 160 characters."""
+        words = text[:_MOST_DOING].ljust(_MOST_DOING).encode("ascii", "replace")
+        with suppress(OSError):  # in one write, so that the name stays intact
+            os.pwrite(self.fd, words, len(self._name))
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Release the lock; remove the file unless another process has inherited the lock."""
+        ours = os.fstat(self.fd)
+        os.close(self.fd)
+        with suppress(OSError):
+            fd = os.open(self._path, os.O_RDWR | os.O_CLOEXEC | os.O_NOFOLLOW | os.O_NONBLOCK)
+            try:
+                fcntl.flock(fd, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                if os.path.samestat(ours, os.fstat(fd)) and self._is_at_path(fd):
+                    self._path.unlink()
+            finally:
+                os.close(fd)
+
+
+def _taken(socket: Path, pid: int | None) -> BadInputError:
+    whose = "" if pid is None else f", process {pid}"
+    return BadInputError(
+        f"--socket {socket}: a daemon runs there already{whose}; `cdpr stop` ends it"
+    )
 
 
 def launcher_does(path: Path) -> str | None:
-    """Return what the launcher that the file names is doing, as far as it tells.
+    """Return the present step of the launcher that the file names, as far as it reports it.
 
-    None where it does not run, or where the file cannot be believed.
+    None if the launcher does not run, or if the file is not trusted.
     """
+    named = _named_launcher(path)
+    return None if named is None else named[1]
+
+
+def launcher_pid(path: Path) -> int | None:
+    """Return the pid of the launcher that the file names; None as for `launcher_does`."""
+    named = _named_launcher(path)
+    return None if named is None else named[0]
+
+
+def _named_launcher(path: Path) -> tuple[int, str] | None:
     try:
         with os.fdopen(open_regular(path, links=False), "rb") as file:
             name, _, doing = file.read(_MOST_LAUNCHER_BYTES).decode("ascii").partition("\n")
@@ -183,4 +289,5 @@ def launcher_does(path: Path) -> str | None:
         pid, since = map(int, name.split())
     except (OSError, ValueError, ProfileError):
         return None
-    return brief(doing.strip()) if trusted and since > 0 and started(pid) == since else None
+    runs = trusted and since > 0 and started(pid) == since
+    return (pid, brief(doing.strip())) if runs else None

@@ -1,4 +1,4 @@
-"""What a daemon is asked to do, checked once and handed to its processes as JSON."""
+"""The settings of a daemon, checked once and passed to its processes as JSON."""
 
 from __future__ import annotations
 
@@ -6,18 +6,20 @@ import fcntl
 import ipaddress
 import os
 import re
+import socket
 import stat
 import sys
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Self
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 
+from cdpr_profiles.bounded_input import open_regular, path_of
 from cdpr_profiles.errors import ProfileError
-from cdpr_profiles.reading.bounded_input import open_regular
-from cdpr_rt.service.listening import ListenError, listen_tcp
-from cdpr_rt.service.recordings.retention import Retention
-from cdpr_rt.service.streams.setpoint_stream import StreamError, listen_udp
+from cdpr_rt.service.listening import ListenError, listen_tcp, listen_udp
+from cdpr_rt.service.retention import Retention
 from cdpr_tools.errors import BadInputError, WorkFailedError
 
 _SECRET_CHARS, _MOST_KEY_BYTES = 16, 4096
@@ -37,7 +39,7 @@ def is_loopback(host: str) -> bool:
 
 
 def checked_origin(origin: str) -> str:
-    """Return the origin of a web page; raises BadInputError for what no browser names so."""
+    """Return the origin of a web page; raises BadInputError if it is not a browser's origin."""
     if not _ORIGIN.fullmatch(origin):
         raise BadInputError(
             f"--live-origin {origin}: allowed: where a web page is from, such as "
@@ -56,9 +58,9 @@ class Address(BaseModel):
 
     @classmethod
     def parse(cls, option: str, text: str) -> Address:
-        """Return what `option` was given as HOST:PORT, [HOST]:PORT or PORT alone (loopback).
+        """Parse the value of `option`: HOST:PORT, [HOST]:PORT or PORT alone (loopback).
 
-        Port 0 is any that is free. Raises BadInputError.
+        Port 0 is any free port. Raises BadInputError.
         """
         host, _, port = text.rpartition(":")
         host = host.removeprefix("[").removesuffix("]") or "127.0.0.1"
@@ -77,58 +79,62 @@ class Address(BaseModel):
 
 
 def _absolute(path: Path) -> Path:
-    return path.expanduser().absolute()
+    return path_of(Path(), str(path)).absolute()
 
 
 _Path = Annotated[Path, AfterValidator(_absolute)]
 
 
 class RunSettings(BaseModel):
-    """One daemon: its robot, its buses, and how it is reached.
+    """One daemon: its robot, its buses, and its addresses.
 
-    The launcher makes it of the command line; both child processes get it as their only argument.
+    The launcher makes it from the command line; both child processes get it as only argument.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", ser_json_inf_nan="constants")
 
     robot: str
-    """What `load_robot` finds the robot by."""
+    """The reference with which `load_robot` finds the robot."""
     name: str
-    """The robot's short name, in the names of its socket and its recordings."""
+    """The robot's short name, part of the names of its socket and its recordings."""
     buses: tuple[str, ...] = ()
-    """What was given with --bus; never `simbus:` alone, its simulator has a name already."""
+    """Values of --bus; never `simbus:` alone, because its simulator already has a name."""
     simulated: bool = False
-    """Whether all buses are simulated; what such a robot leaves for later is kept by itself."""
+    """Whether all buses are simulated; files that such a robot leaves are kept separately."""
     own_simulator: bool = False
-    """Whether the drives are a simulator's that begins and ends with this daemon."""
+    """Whether the drives belong to a simulator that starts and ends with this daemon."""
     read_only: bool = False
     commissioned: _Path | None = None
     """Folder with the cogging profiles of the axes' motors."""
+    controller: str | None = None
+    """The user's own controller of the platform: FILE.py:CLASS or MODULE:CLASS."""
     safety_io: str | None = None
     tension_port: str | None = None
-    """Serial port at which the robot's tension sensors are."""
+    """Serial port of the robot's tension sensors."""
     socket: _Path
     http: Address | None = None
     key_file: _Path | None = None
     record: _Path | None = None
-    """Folder for recordings, None to record nothing."""
+    """Folder for recordings; None to record nothing."""
     keep: Retention = Retention()
-    """Which recordings stay in that folder."""
+    """Rules for the recordings that stay in that folder."""
     live: int | None = Field(default=None, ge=0, le=_HIGHEST_PORT)
     """Port of the live view, on loopback."""
     live_origins: tuple[str, ...] = ()
-    """Web pages that may look at the live view, as `Origin` names them."""
+    """Web pages that may use the live view, in the form of `Origin`."""
     stream: Address | None = None
-    """Where the set-point stream is received."""
+    """Address of the set-point stream."""
     launcher_pid: int = 0
     block_fd: int = -1
     """The shared memory's descriptor, inherited under the same number."""
+    lock_fd: int = -1
+    """Lock that marks the robot as in use, held until the last process that inherits it ends."""
     key_fd: int = -1
-    """The key's descriptor, inherited by the service alone, in place of `key_file`."""
+    """The key's descriptor, inherited only by the service, instead of `key_file`."""
     http_fd: int = -1
     stream_fd: int = -1
     live_fd: int = -1
-    """Sockets at `http`, `stream` and `live`, which the service inherits as well."""
+    """Sockets at `http`, `stream` and `live`, also inherited by the service."""
 
     @model_validator(mode="after")
     def _reachable_with_key_only(self) -> Self:
@@ -148,10 +154,10 @@ class RunSettings(BaseModel):
         return self.key_file is not None or self.key_fd >= 0
 
     def with_key_loaded(self) -> RunSettings:
-        """Return settings that do not need the key's file: it is read now, once.
+        """Return settings that do not need the key's file: the file is read now, once.
 
-        Processes that are started later inherit the key in sealed memory, whatever becomes of the
-        file. Raises BadInputError.
+        Processes started later inherit the key in sealed memory, even if the file changes.
+        Raises BadInputError.
         """
         if self.key_file is None:
             return self
@@ -162,42 +168,45 @@ class RunSettings(BaseModel):
         return self.model_copy(update={"key_file": None, "key_fd": fd})
 
     def with_ports_bound(self) -> RunSettings:
-        """Return settings with sockets at `http`, `stream` and `live`: they are bound now, once.
+        """Return settings with sockets at `http`, `stream` and `live`, which are bound now, once.
 
-        Between two services nobody else gets a port that clients trust. Raises WorkFailedError.
+        So no other process can take a trusted port between two services. Raises WorkFailedError.
         """
-        http_fd = stream_fd = live_fd = -1
-        option = "--http"
-        try:
-            if self.http is not None:
-                http_fd = listen_tcp(self.http.host, self.http.port).detach()
-            option = "--live"
-            if self.live is not None:
-                live_fd = listen_tcp(_LIVE_HOST, self.live).detach()
-            if self.stream is not None:
-                host, port = self.stream.host, self.stream.port
-                stream_fd = listen_udp(host, port, self.has_key).detach()
-        except ListenError as error:
-            raise WorkFailedError(f"{option} {error}") from None
-        except StreamError as error:
-            raise WorkFailedError(f"--stream: {error}") from None
-        return self.model_copy(
-            update={"http_fd": http_fd, "stream_fd": stream_fd, "live_fd": live_fd}
-        )
+        asked: list[tuple[str, str, Address | None, Callable[[str, int], socket.socket]]] = [
+            ("--http", "http_fd", self.http, listen_tcp),
+            ("--live", "live_fd", self._live_address, listen_tcp),
+            ("--stream", "stream_fd", self.stream, partial(listen_udp, has_key=self.has_key)),
+        ]
+        bound: dict[str, int] = {}
+        for option, key, at, listen in asked:
+            try:
+                bound[key] = -1 if at is None else listen(at.host, at.port).detach()
+            except ListenError as error:
+                raise WorkFailedError(f"{option} {error}") from None
+        return self.model_copy(update=bound)
+
+    @property
+    def _live_address(self) -> Address | None:
+        return None if self.live is None else Address(host=_LIVE_HOST, port=self.live)
+
+    @property
+    def shared_fds(self) -> tuple[int, ...]:
+        """The descriptors that loop and service inherit."""
+        return tuple(fd for fd in (self.block_fd, self.lock_fd) if fd >= 0)
 
     @property
     def service_fds(self) -> tuple[int, ...]:
-        """The descriptors that each service inherits, beside the shared memory's."""
+        """The descriptors that each service inherits, besides the shared memory's."""
         fds = (self.key_fd, self.http_fd, self.stream_fd, self.live_fd)
         return tuple(fd for fd in fds if fd >= 0)
 
     def key(self) -> bytes | None:
-        """Return the shared key that the launcher has kept, None where there is none."""
+        """Return the shared key stored by the launcher; None if there is none."""
         return None if self.key_fd < 0 else os.pread(self.key_fd, _MOST_KEY_BYTES, 0)
 
     @classmethod
     def from_argv(cls) -> RunSettings:
-        """Return what the launcher gave this process."""
+        """Return the settings that the launcher passed to this process."""
         return cls.model_validate_json(sys.argv[1])
 
 

@@ -1,1 +1,1 @@
-"""The teleoperation experiment: a modelled operator leads a robot along a path of targets."""
+"""The teleoperation experiment: a simulated operator leads a robot along a path of targets."""

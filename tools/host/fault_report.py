@@ -1,4 +1,4 @@
-"""What a report of a fault should have, as one text: versions, host, robots, the last recording."""
+"""A fault report as one text: versions, host, robots, the last recording."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from datetime import UTC, datetime
 from importlib.metadata import distributions
 
 from cdpr_profiles import load_robot
+from cdpr_profiles.bounded_input import MOST_TOML_BYTES, is_file, read_text
 from cdpr_profiles.calibration.in_force import calibration_file
 from cdpr_tools.daemon.paths import default_recordings, find_loop_files
 from cdpr_tools.errors import BadInputError
@@ -23,9 +24,9 @@ _PACKAGES = (
 
 
 def fault_report(findings: Sequence[str], robots: Sequence[str]) -> str:
-    """Return the report; `findings` are those of the host, `robots` names or paths of files.
+    """Return the report; `findings` are about the host, `robots` are names or paths of files.
 
-    Nothing that it takes in holds keys. Raises ProfileError for a robot that cannot be read.
+    No part of it contains keys. Raises ProfileError for a robot that cannot be read.
     """
     now = datetime.now(UTC).isoformat(timespec="seconds")
     daemons = [path.stem for path in find_loop_files()] or ["none found"]
@@ -50,11 +51,11 @@ def _versions() -> Iterator[str]:
 def _robot(name: str) -> list[str]:
     robot = load_robot(name)
     known = calibration_file(robot)
-    files = [robot.path, *([known] if known.is_file() else [])]
+    files = [robot.path, *([known] if is_file(known) else [])]
     return [
         line
         for path in files
-        for line in (str(path), *path.read_text(encoding="utf-8", errors="replace").splitlines())
+        for line in (str(path), *read_text(path, MOST_TOML_BYTES).splitlines())
     ]
 
 

@@ -1,31 +1,38 @@
-"""What can be found out about this machine for a control loop, each finding with its remedy."""
+"""Checks whether this machine suits a control loop; each finding has its remedy."""
 
 from __future__ import annotations
 
 import gzip
+import json
 import os
 import platform
 import re
 import resource
+import shutil
 import socket
-import struct
+import subprocess
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
+
+from cdpr_profiles.user_folders import can_write, state_folder, temporary_folder
+from cdpr_tools.daemon.paths import runtime_folder
 
 _MEMLOCK_BYTES = 512 << 20
 _CPUS = Path("/sys/devices/system/cpu")
 _CLOCKS = Path("/sys/devices/system/clocksource/clocksource0")
-# a cycle of 16 axes, its acyclic traffic and heartbeats, with as much again to spare
+# a cycle of 16 axes with its acyclic traffic and heartbeats, times two
 _QUEUE_FRAMES = 128
 _GOOD_CLOCKS = ("tsc", "kvm-clock", "hyperv_clocksource_tsc_page", "arch_sys_counter")
+_IP_S = 10.0
 _LIMITS_FILE = "/etc/security/limits.d/realtime.conf"
 
 
 @dataclass(frozen=True)
 class HostFinding:
-    """One thing looked at: `level` is ok, note (works, but) or problem (will not work)."""
+    """One check: `level` is ok, note (works, but) or problem (will not work)."""
 
     what: str
     level: str
@@ -34,9 +41,10 @@ class HostFinding:
 
 
 def look_around() -> Iterator[HostFinding]:
-    """Yield everything that can be found out without changing anything."""
+    """Yield all findings; changes nothing."""
     for check in _CHECKS:
         yield check()
+    yield from _folders()
     for interface in list_interfaces():
         yield can_interface(interface)
 
@@ -55,12 +63,15 @@ def _socketcan() -> HostFinding:
     except OSError as error:
         remedy = "load the modules: modprobe can_raw vcan; simbus: works without"
         return HostFinding("SocketCAN", "note", error.strerror or "not available", remedy)
+    if shutil.which("ip") is None:
+        remedy = "install iproute2, which shows the CAN interfaces"
+        return HostFinding("SocketCAN", "note", "interfaces unknown: no command `ip`", remedy)
     names = ", ".join(interface.name for interface in list_interfaces())
     return HostFinding("SocketCAN", "ok", f"interfaces: {names or 'none yet'}")
 
 
 def can_interface(interface: CanInterface) -> HostFinding:
-    """Judge one CAN interface: is it up, does its queue hold a cycle, how is its controller."""
+    """Check one CAN interface: is it up, does its queue hold a cycle, how is its controller."""
     name = interface.name
     what = f"CAN {name}"
     found = f"{interface.state}, queue of {interface.queue_frames} frames"
@@ -79,6 +90,28 @@ def can_interface(interface: CanInterface) -> HostFinding:
         remedy = f"a burst of commands may not fit: ip link set {name} txqueuelen 1000"
         return HostFinding(what, "note", found, remedy)
     return HostFinding(what, "ok", found)
+
+
+def _folders() -> Iterator[HostFinding]:
+    # imported here: the other checks do not need numba
+    from cdpr_rt.jit import machine_code_folder  # noqa: PLC0415
+
+    kept = machine_code_folder()
+    what, remedy = "compiled kernels", "set NUMBA_CACHE_DIR to a folder that is yours and stays"
+    if kept is None:
+        yield HostFinding(what, "note", "new ones are kept nowhere: compiled at each start", remedy)
+    elif kept.is_relative_to(temporary_folder()):
+        yield HostFinding(what, "note", f"kept until the next restart only: {kept}", remedy)
+    else:
+        yield HostFinding(what, "ok", f"kept in {kept}")
+    for what, folder, remedy in (
+        ("state, recordings", state_folder(), "set XDG_STATE_HOME to a folder that is yours"),
+        ("sockets", runtime_folder(), "set XDG_RUNTIME_DIR, or give --socket to each command"),
+    ):
+        if can_write(folder):
+            yield HostFinding(what, "ok", f"in {folder}")
+        else:
+            yield HostFinding(what, "note", f"{folder} cannot be written", remedy)
 
 
 def _serial_ports() -> HostFinding:
@@ -118,7 +151,7 @@ def _scheduling() -> HostFinding:
 
 
 def _fifo_refused() -> str:
-    """Try it for a moment, as what the limits allow a control group may still forbid."""
+    """Try it briefly, because a control group may forbid what the limits allow."""
     before = os.sched_getscheduler(0), os.sched_getparam(0)
     try:
         os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(1))
@@ -169,7 +202,7 @@ def _kernel() -> HostFinding:
 def preemption(version: str, realtime: str, command_line: str) -> str:
     """Return the kind of preemption by the kernel's version, /sys/kernel/realtime, /proc/cmdline.
 
-    The mode of a kernel that can change it is included where the command line sets one.
+    If the command line sets the mode of a kernel that can change it, the result includes it.
     """
     named = re.search(r"\bPREEMPT\w*", version)
     if realtime == "1":
@@ -180,7 +213,7 @@ def preemption(version: str, realtime: str, command_line: str) -> str:
 
 
 def _preemption_built_in(release: str) -> str:
-    """Return the default mode of a kernel that can change it; empty if not known."""
+    """Return the default mode of a kernel that can change it; empty if unknown."""
     try:
         text = gzip.decompress(Path("/proc/config.gz").read_bytes()).decode()
     except OSError:
@@ -258,25 +291,9 @@ _CHECKS: tuple[Callable[[], HostFinding], ...] = (
 )
 
 
-# linux/rtnetlink.h, linux/if_link.h, linux/if_arp.h, linux/can/netlink.h
-_RTM_NEWLINK, _RTM_GETLINK, _NLMSG_DONE = 16, 18, 3
-_REQUEST_DUMP = 0x301
-_TXQLEN, _IFNAME, _LINKINFO = 13, 3, 18
-_INFO_KIND, _INFO_DATA = 1, 2
-_BITTIMING, _STATE = 1, 4
-_ARPHRD_CAN, _IFF_UP = 280, 1
-_STATES = ("error-active", "error-warning", "error-passive", "bus-off", "stopped", "sleeping")
-_NESTED = 0x3FFF  # without the flags of an attribute's type
-
-_MESSAGE = struct.Struct("=IHHII")
-_LINK = struct.Struct("=BxHiII")
-_ATTRIBUTE = struct.Struct("=HH")
-_U32 = struct.Struct("=I")
-
-
 @dataclass(frozen=True)
 class CanInterface:
-    """One CAN interface; `state` is down, up where a controller has none to tell, or its own."""
+    """One CAN interface; `state` is the controller's if it reports one, else up or down."""
 
     name: str
     is_up: bool
@@ -285,64 +302,23 @@ class CanInterface:
     state: str
     bitrate_bit_s: int = 0
 
+    @classmethod
+    def of(cls, link: Mapping[str, Any]) -> CanInterface:
+        """Return the interface from an entry of `ip -details -json link`."""
+        info = link.get("linkinfo", {})
+        data, is_up = info.get("info_data", {}), "UP" in link["flags"]
+        state = str(data.get("state", "up")).lower() if is_up else "down"
+        bitrate = data.get("bittiming", {}).get("bitrate", 0)
+        is_virtual = info.get("info_kind") != "can"
+        return cls(link["ifname"], is_up, is_virtual, link.get("txqlen", 0), state, bitrate)
+
 
 def list_interfaces() -> list[CanInterface]:
-    """Return the CAN interfaces there are, by rtnetlink; none where the kernel cannot be asked."""
+    """Return the CAN interfaces that `ip` shows; none if the machine lacks this command."""
+    command = ("ip", "-details", "-json", "link", "show")
     try:
-        with socket.socket(socket.AF_NETLINK, socket.SOCK_RAW, socket.NETLINK_ROUTE) as kernel:
-            size = _MESSAGE.size + _LINK.size
-            head = _MESSAGE.pack(size, _RTM_GETLINK, _REQUEST_DUMP, 1, 0)
-            kernel.send(head + _LINK.pack(socket.AF_UNSPEC, 0, 0, 0, 0))
-            return list(_answers(kernel))
-    except OSError:
+        done = subprocess.run(command, capture_output=True, timeout=_IP_S, check=True)
+        links = json.loads(done.stdout)
+    except (OSError, subprocess.SubprocessError, ValueError):
         return []
-
-
-def _answers(kernel: socket.socket) -> Iterator[CanInterface]:
-    while True:
-        data = kernel.recv(1 << 17)
-        while len(data) >= _MESSAGE.size:
-            size, kind, *_ = _MESSAGE.unpack_from(data)
-            if kind != _RTM_NEWLINK:
-                return
-            interface = parse_link(data[_MESSAGE.size : size])
-            if interface is not None:
-                yield interface
-            data = data[size + -size % 4 :]
-
-
-def parse_link(data: bytes) -> CanInterface | None:
-    """Return what an RTM_NEWLINK message tells, without its header; None unless it is CAN."""
-    _, kind, _, flags, _ = _LINK.unpack_from(data)
-    if kind != _ARPHRD_CAN:
-        return None
-    found = _attributes(data[_LINK.size :])
-    info = _attributes(found.get(_LINKINFO, b""))
-    can_data = _attributes(info.get(_INFO_DATA, b""))
-    is_up = bool(flags & _IFF_UP)
-    state = "up" if is_up else "down"
-    if is_up and _STATE in can_data:
-        state = _STATES[min(_number(can_data[_STATE]), len(_STATES) - 1)]
-    return CanInterface(
-        name=found.get(_IFNAME, b"").rstrip(b"\0").decode(errors="replace"),
-        is_up=is_up,
-        is_virtual=info.get(_INFO_KIND, b"").rstrip(b"\0") != b"can",
-        queue_frames=_number(found.get(_TXQLEN, b"")),
-        state=state,
-        bitrate_bit_s=_number(can_data.get(_BITTIMING, b"")),
-    )
-
-
-def _number(data: bytes) -> int:
-    return int(_U32.unpack_from(data)[0]) if len(data) >= _U32.size else 0
-
-
-def _attributes(data: bytes) -> dict[int, bytes]:
-    found: dict[int, bytes] = {}
-    while len(data) >= _ATTRIBUTE.size:
-        size, kind = _ATTRIBUTE.unpack_from(data)
-        if size < _ATTRIBUTE.size:
-            break
-        found[kind & _NESTED] = data[_ATTRIBUTE.size : size]
-        data = data[size + -size % 4 :]
-    return found
+    return [CanInterface.of(link) for link in links if link.get("link_type") == "can"]

@@ -1,1 +1,1 @@
-"""What `cdpr log` does with recordings."""
+"""The recordings of `cdpr log`: select, summarise, draw and export them."""

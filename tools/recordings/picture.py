@@ -1,4 +1,4 @@
-"""A recording as one picture: motion, torques, tensions and the timing of the cycles."""
+"""Draw a recording as one picture: motion, torques, tensions and cycle times."""
 
 from __future__ import annotations
 
@@ -17,36 +17,41 @@ from scipy.spatial.transform import Rotation
 
 from cdpr_rt.arrays import FloatArray, IntArray
 from cdpr_rt.core.states import LoopState, Reaction
-from cdpr_rt.service.recordings.recording_reader import Columns, RecordingReader
-from cdpr_tools.errors import BadInputError, WorkFailedError, os_error_as
+from cdpr_rt.service.recording_reader import Columns, RecordingReader
+from cdpr_tools.errors import BadInputError
 from cdpr_tools.recordings.selection import ELAPSED, Selection
 from cdpr_tools.recordings.summary import WHILE_ACTIVE, Reasons, is_fault, why_while_active
-from cdpr_tools.report.style import decimated, legend_above, legend_beside_title, save_figure
+from cdpr_tools.report.style import (
+    SERIES,
+    decimated,
+    legend_above,
+    legend_beside_title,
+    save_figure,
+)
 
 FIELDS = (
     "setpoint_rad", "position_rad", "velocity_rad_s", "torque_sent_Nm", "tension_N",
     "lateness_s", "exchange_s", "compute_s", "state", "pose", "pose_setpoint",
     "program", "reaction", "stamp_ns",
 )  # fmt: skip
-_COLOURS = (
-    "#2f6fb0", "#d1581a", "#3b8f5a", "#7a3fa0", "#1f8a8a", "#b03a5b", "#8a6d1f", "#8a8f98",
-)  # fmt: skip
 _TENSION = "tension (N)"
 _STRIP_in, _PANEL_in, _NARROW_in, _WIDE_in = 0.25, 1.7, 7.4, 12.0
 _PATH_ROWS: Final = 2
 _LETTERS_PER_in: Final = 13
-"""Of what is told below the picture, in a line."""
+"""Letters per inch in a line of text below the picture."""
 _MOST_FAULTS, _PATH_POINTS = 8, 3000
 _LETTER = 0.015
-"""Share of the picture's width that a letter takes."""
+"""Width of a letter as a share of the picture's width."""
 _SEEN_ns: Final = 200_000_000
-"""How long after a reaction its reason may be seen, which recordings have by the loop's status."""
+"""Longest delay from a reaction to its reason, which recordings take from the loop's status."""
 _MOVED = 1e-6
-"""A coordinate that differs by less over a recording is none of its robot's, m or rad."""
+"""A coordinate that varies by less over a recording is not one of the robot's, m or rad."""
 _TIMES = {"answers in": "exchange_s", "computing": "compute_s", "late by": "lateness_s"}
 _POWERLESS, _REACTING, _FAULT = range(1, 4)
+_GAP_S, _NOT_RECORDED = 0.5, "not recorded"
+"""Rows further apart in time than this are not joined by a line."""
 _BEYOND, _ENDED = 0.02, "not recorded any more"
-"""The share of the time that is shown beyond the end of what ends while active, and its name."""
+"""Extra share of time drawn after a recording that ends while active, and its label."""
 _SHADES = {
     _POWERLESS: ("#e3e5e8", "without power"),
     _REACTING: ("#f6dfae", "reaction to a fault"),
@@ -55,7 +60,7 @@ _SHADES = {
 
 
 def axes_of(names: Sequence[str], asked: Sequence[str] | None) -> list[int]:
-    """Return the numbers of the axes in `asked`, all without. Raises BadInputError."""
+    """Return the numbers of the axes in `asked`, of all axes if None. Raises BadInputError."""
     for name in asked or ():
         if name not in names:
             raise BadInputError(f"--axis {name}: allowed: {', '.join(names)}")
@@ -65,7 +70,7 @@ def axes_of(names: Sequence[str], asked: Sequence[str] | None) -> list[int]:
 def draw(selection: Selection, columns: Columns, axes: Sequence[str] | None, path: Path) -> int:
     """Draw the columns of a selection into a PNG file; return the number of their rows.
 
-    Raises BadInputError for what there is not, WorkFailedError where it cannot be written.
+    Raises BadInputError for unknown axes, WorkFailedError if the file cannot be written.
     """
     count = columns["position_rad"].shape[1]
     names = selection.readers[-1].axes[:count]
@@ -87,9 +92,9 @@ def draw(selection: Selection, columns: Columns, axes: Sequence[str] | None, pat
     grid = _Grid.of(len(panels), len(poses) + 1) if beside else _Grid.of(len(panels) + 1, 0)
     for ax, (label, values) in zip(grid.timed, panels, strict=False):
         for k in chosen:
-            colour, line = _COLOURS[k % len(_COLOURS)], "-" if k < len(_COLOURS) else "--"
-            x, y = decimated(columns[ELAPSED], values[:, k])
-            ax.plot(x, y, color=colour, ls=line, marker=dot, label=_as_it_is(names[k]))
+            colour, line = SERIES[k % len(SERIES)], "-" if k < len(SERIES) else "--"
+            style: dict[str, Any] = {"color": colour, "ls": line, "marker": dot}
+            _plot(ax, columns[ELAPSED], values[:, k], label=_as_it_is(names[k]), **style)
         ax.set_ylabel(label.replace(" (", "\n("))
         if label == _TENSION:
             _draw_limits(ax, description, chosen)
@@ -103,19 +108,38 @@ def draw(selection: Selection, columns: Columns, axes: Sequence[str] | None, pat
     if panels:
         legend_above(grid.figure, grid.timed[0], columns=10 if beside else 4)
     grid.figure.align_ylabels()
-    with os_error_as(WorkFailedError, f"{path}: cannot be written"):
-        path.parent.mkdir(parents=True, exist_ok=True)
-        save_figure(grid.figure, path)
+    save_figure(grid.figure, path)
     return int(columns["state"].size)
 
 
-def _draw_what_happened(grid: _Grid, selection: Selection, columns: Columns) -> None:
-    """Name the programs, shade what was not active, and tell when and why faults came.
+def recorded_stretches(elapsed: FloatArray) -> list[tuple[int, int]]:
+    """Return first row and end (exclusive) of each stretch without a gap in time."""
+    gaps = np.flatnonzero(np.diff(elapsed) > _GAP_S) + 1
+    return list(pairwise([0, *gaps.tolist(), elapsed.size]))
 
-    Where the recording ends while the robot is active, mark and tell that.
+
+def _plot(ax: Axes, elapsed: FloatArray, values: FloatArray, label: str = "", **style: Any) -> None:
+    """Draw a curve (k,) with a limited number of points, interrupted at gaps in the recording."""
+    for a, b in recorded_stretches(elapsed):
+        ax.plot(*decimated(elapsed[a:b], values[a:b]), label=label, **style)
+        label = ""
+
+
+def _shade_gaps(ax: Axes, elapsed: FloatArray) -> None:
+    label = _NOT_RECORDED
+    for (_, b), (a, _) in pairwise(recorded_stretches(elapsed)):
+        ax.axvspan(elapsed[b - 1], elapsed[a], fc="white", ec="#d5d8dc", hatch="..", label=label)
+        label = ""
+
+
+def _draw_what_happened(grid: _Grid, selection: Selection, columns: Columns) -> None:
+    """Name the programs, shade the times without activity, and list when and why faults occurred.
+
+    If the recording ends while the robot is active, mark and list that too.
     """
     for ax in (*grid.strips, *grid.timed):
         _shade(ax, columns)
+        _shade_gaps(ax, columns[ELAPSED])
     for strip in grid.strips:
         draw_programs(strip, columns, selection.readers[-1].description.get("programs", []))
     happened, ended = faults_of(selection.readers, columns), end_while_active(selection, columns)
@@ -139,7 +163,7 @@ def _draw_what_happened(grid: _Grid, selection: Selection, columns: Columns) -> 
 
 @dataclass(frozen=True)
 class _Grid:
-    """Where things are drawn: panels over one time, each column of them below a strip."""
+    """Layout of the picture: columns of panels over a common time, each below a strip."""
 
     figure: Figure
     strips: list[Axes]
@@ -150,7 +174,7 @@ class _Grid:
 
     @classmethod
     def of(cls, left: int, right: int) -> _Grid:
-        """Return one with so many panels in the left and the right column, which may be none."""
+        """Return a layout with these numbers of panels in both columns; `right` may be 0."""
         rows = max(left, right + _PATH_ROWS if right else 0)
         width = _WIDE_in if right else _NARROW_in
         figure = Figure(figsize=(width, _STRIP_in + _PANEL_in * rows), layout="constrained")
@@ -171,7 +195,7 @@ class _Grid:
 
 
 def draw_programs(ax: Axes, columns: Columns, names: Sequence[str]) -> None:
-    """Name the program that runs at each moment, where there is room for it."""
+    """Name the program that runs at each moment, if there is room for its name."""
     elapsed, program = columns[ELAPSED], columns["program"]
     ax.set_yticks([])
     ax.tick_params(bottom=False)
@@ -188,10 +212,10 @@ def draw_programs(ax: Axes, columns: Columns, names: Sequence[str]) -> None:
 
 
 def faults_of(readers: Sequence[RecordingReader], columns: Columns) -> list[tuple[float, str]]:
-    """Return when a limit made the loop react, and when its state became a fault, with words.
+    """Return when a limit made the loop react, and when its state became a fault, with texts.
 
-    The loop's reason is told with the first of what it has led to: it is seen some time after that,
-    when a cable that broke may have its winch run too fast.
+    The loop's reason is given with the first event that it caused. It is recorded some time later,
+    when further limits may be exceeded, such as the speed of a winch whose cable broke.
     """
     stamped = [
         (event["log_time_ns"] - reader.offset_ns, event)
@@ -207,14 +231,14 @@ def faults_of(readers: Sequence[RecordingReader], columns: Columns) -> list[tupl
         seen_ns, reason = reasons.stamped_after(at_ns, min(later, default=math.inf))
         reason, told_ns = "" if seen_ns == told_ns else reason, max(seen_ns, told_ns)
         after_s = float(np.interp(at_ns, columns["stamp_ns"], columns[ELAPSED]))
-        # it begins with the axis that the limit is of
+        # the reason already begins with the axis of the limit
         text = str(event["text"]).removesuffix(f" of {reason.partition(':')[0]}")
         found.append((after_s, text + (f": {reason}" if reason else "")))
     return found
 
 
 def end_while_active(selection: Selection, columns: Columns) -> list[tuple[float, str]]:
-    """Return when the recording ended, and why, where its robot was active; else nothing."""
+    """Return when and why the recording ended if its robot was active; else an empty list."""
     last_s = float(columns[ELAPSED][-1])
     why = why_while_active(selection.readers[-1], int(columns["state"][-1]))
     if not why or last_s < selection.ends_s:
@@ -233,13 +257,16 @@ def _draw_limits(ax: Axes, description: dict[str, Any], chosen: Sequence[int]) -
 
 
 def _draw_path(ax: Axes, columns: Columns) -> None:
-    """Draw the platform's way seen from the front, its target dashed."""
+    """Draw the platform's way from the front, and its set-point dashed."""
     pose, setpoint = columns["pose"], columns["pose_setpoint"]
     upward = 1 if _flat(pose[:, 2]) else 2
     step = max(1, len(pose) // _PATH_POINTS)
     for values, style, label in ((pose, "-", "platform"), (setpoint, "--", "target")):
-        known = 1e3 * values[::step]
-        ax.plot(known[:, 0], known[:, upward], style, color=_COLOURS[style == "--"], label=label)
+        colour, shown = SERIES[style == "--"], label
+        for a, b in recorded_stretches(columns[ELAPSED]):
+            known = 1e3 * values[a:b:step]
+            ax.plot(known[:, 0], known[:, upward], style, color=colour, label=shown)
+            shown = ""
     ax.set_xlabel("x (mm)")
     ax.set_ylabel(f"{'xyz'[upward]} (mm)")
     ax.set_aspect("equal", adjustable="datalim")
@@ -252,25 +279,25 @@ def _flat(values: FloatArray) -> bool:
 
 
 Curves = dict[str, tuple[FloatArray, FloatArray]]
-"""By the name of a coordinate where the platform is and where it should be, (c,) each."""
+"""The platform's value and set-point by the name of a coordinate, (c,) each."""
 
 
 def _draw_pose(ax: Axes, elapsed: FloatArray, curves: Curves, dot: str | None) -> None:
-    for (name, (is_there, setpoint)), colour in zip(curves.items(), _COLOURS, strict=False):
-        ax.plot(*decimated(elapsed, is_there), color=colour, marker=dot, label=name)
-        ax.plot(*decimated(elapsed, setpoint), color=colour, ls="--", lw=0.8)
+    for (name, (is_there, setpoint)), colour in zip(curves.items(), SERIES, strict=False):
+        _plot(ax, elapsed, is_there, color=colour, marker=dot, label=name)
+        _plot(ax, elapsed, setpoint, color=colour, ls="--", lw=0.8)
     legend_beside_title(ax, 3)
 
 
 def pose_curves(columns: Columns) -> dict[str, Curves]:
-    """Return by panel the platform's coordinates that move, each with its set-point, (c,).
+    """Return for each panel the platform's coordinates that move, each with its set-point, (c,).
 
-    Rotation vectors are from the room's axes.
+    Rotation vectors are relative to the room's axes.
     """
     poses = columns["pose"], columns["pose_setpoint"]
     position = dict(zip("xyz", zip(*(pose[:, :3].T for pose in poses), strict=True), strict=True))
     turned = zip(*(_rotation_vectors(pose[:, 3:]).T for pose in poses), strict=True)
-    # in a plane, where the third coordinate is 0, directions are x, y and angle
+    # a third coordinate of 0 means a robot in a plane, whose directions are x, y and angle
     names = ("rx", "ry", "rz" if np.nan_to_num(poses[0][:, 2]).any() else "angle")
     rotation = dict(zip(names, turned, strict=True))
     panels = {
@@ -297,7 +324,7 @@ def _moved(curves: Curves) -> Curves:
 
 
 def _rotation_vectors(quaternion: FloatArray) -> FloatArray:
-    """Return the rotation vectors (c, 3) of quaternions w x y z, nan where they are not known."""
+    """Return the rotation vectors (c, 3) of quaternions w x y z, nan if they are not known."""
     vectors = np.full((len(quaternion), 3), np.nan)
     known = np.isfinite(quaternion).all(axis=1)
     if known.any():
@@ -307,24 +334,22 @@ def _rotation_vectors(quaternion: FloatArray) -> FloatArray:
 
 
 def _as_it_is(name: str) -> str:
-    """Return a label that shows `name`, whatever it begins with or has in it."""
+    """Return a label that shows `name` literally, with any first letter or special character."""
     return f" {name}".replace("$", r"\$")
 
 
 def _draw_times(ax: Axes, columns: Columns) -> None:
-    for (label, name), colour in zip(_TIMES.items(), _COLOURS, strict=False):
-        ax.plot(
-            *decimated(columns[ELAPSED], 1e3 * columns[name]), color=colour, label=label, lw=0.8
-        )
+    for (label, name), colour in zip(_TIMES.items(), SERIES, strict=False):
+        _plot(ax, columns[ELAPSED], 1e3 * columns[name], color=colour, label=label, lw=0.8)
     ax.set_ylabel("of a cycle\n(ms)")
     legend_beside_title(ax, 3)
 
 
 def shades(state: IntArray, reaction: IntArray) -> IntArray:
-    """Return the kind of shade of each row, (c,), 0 for none, by its state and reaction, (c,).
+    """Return the kind of shade of each row, (c,), 0 for none, from its state and reaction, (c,).
 
-    The supervisor tells a reaction only as long as the limit is passed; a stop goes on until the
-    robot is active no more.
+    The supervisor reports a reaction only while the limit is exceeded; a stop lasts until the
+    robot is no longer active.
     """
     row, active = np.arange(state.size), state == LoopState.ACTIVE
     kinds = np.where(active, 0, _POWERLESS)
@@ -339,7 +364,7 @@ def shades(state: IntArray, reaction: IntArray) -> IntArray:
 
 
 def _shade(ax: Axes, columns: Columns) -> None:
-    """Colour what was not active; the first stretch of each kind carries its name."""
+    """Shade the times without normal activity; label the first stretch of each kind."""
     elapsed: FloatArray = columns[ELAPSED]
     kinds = shades(columns["state"], columns["reaction"])
     edges = [0, *(np.flatnonzero(np.diff(kinds)) + 1), kinds.size]

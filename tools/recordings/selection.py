@@ -1,40 +1,72 @@
-"""Which files, fields and stretch of time of a recording a command works on."""
+"""Select the files, fields and time range of recordings that a command works on."""
 
 from __future__ import annotations
 
+import contextlib
+import json
+import re
 from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
+from typing import IO, Any
 
 import numpy as np
+import pyarrow as pa  # type: ignore[import-untyped]
+from pyarrow import csv, parquet
 
+from cdpr_profiles.bounded_input import replacing
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.core.cycle_row import FIELDS
-from cdpr_rt.service.recordings.recording_file import RecordingError
-from cdpr_rt.service.recordings.recording_reader import Columns, RecordingReader
-from cdpr_tools.errors import BadInputError, os_error_as, raised_as
+from cdpr_rt.service.recording_file import RecordingError
+from cdpr_rt.service.recording_reader import Columns, RecordingReader
+from cdpr_tools.daemon.paths import default_recordings
+from cdpr_tools.errors import BadInputError, WorkFailedError, os_error_as, raised_as
+from cdpr_tools.report.save import require_free
 
 ELAPSED = "elapsed_s"
-"""The column that is added: seconds since the first row, over all files."""
+"""Name of an added column: seconds since the first row, over all files."""
 
 _BYTES_PER_S = 3e6
+_MOST_BYTES = 1_000_000_000
+_NAME = re.compile(r"(.+)-([0-9]{8}T[0-9]{6}Z)-[0-9]{3,}")
+"""Robot and date in the name of a recording."""
 
 
 def files_of(paths: Sequence[Path]) -> list[Path]:
-    """Return the recordings that `paths` name: files, or all in a folder. Raises BadInputError."""
+    """Return the recordings that `paths` name: files, all in a folder, or those of a session.
+
+    Sessions are searched by name in the folder where `cdpr run` records. Raises BadInputError.
+    """
     found: list[Path] = []
     for path in paths:
         with os_error_as(BadInputError, f"{path}: cannot be read"):
             inside = sorted(path.glob("*.mcap")) if path.is_dir() else [path]
+            if not path.exists() and path.name == str(path):
+                inside = sorted(default_recordings().glob(f"{path.name}-*.mcap")) or inside
         if not inside:
             raise BadInputError(f"{path}: no recordings (*.mcap) in this folder")
         found += inside
     return found
 
 
+def sessions(files: Sequence[Path]) -> dict[str, list[Path]]:
+    """Return the files of each session by its name (ROBOT-DATE), the newest session last.
+
+    A session is one run of a daemon. A file with any other name is a session alone and comes first.
+    """
+    found: dict[tuple[str, str], list[Path]] = {}
+    for path in files:
+        name = _NAME.fullmatch(path.stem)
+        found.setdefault((name[2], name[1]) if name else ("", path.stem), []).append(path)
+    return {
+        f"{robot}-{date}" if date else robot: sorted(found[date, robot])
+        for date, robot in sorted(found)
+    }
+
+
 def fields_of(text: str | None) -> list[str] | None:
-    """Return the names in a list with commas, None for all. Raises BadInputError."""
+    """Return the names in a comma-separated list, None for all. Raises BadInputError."""
     if text is None:
         return None
     names = [name.strip() for name in text.split(",") if name.strip()]
@@ -48,7 +80,7 @@ def fields_of(text: str | None) -> list[str] | None:
 
 @dataclass
 class _Time:
-    """Bus time as one scale; where cycles began anew, the gap is that of the stamps."""
+    """Bus time on one scale; if cycles restart, the gap is taken from the stamps."""
 
     offset_s: float | None = None
     last_s: float = 0.0
@@ -69,7 +101,7 @@ class _Time:
 
 
 class Selection:
-    """The rows of several files between two instants; `readers` tell the rest afterwards."""
+    """The rows of several files between two times; after reading, `readers` have the other data."""
 
     def __init__(
         self,
@@ -83,22 +115,22 @@ class Selection:
         self._from_s, self._until_s = from_s, until_s
         self._robot: tuple[str | None, str | None] | None = None
         self.advance: Callable[[float], None] = lambda _seconds: None
-        """Called with how far reading has come, out of `reading_s`."""
+        """Called with the progress of reading, from 0 to `reading_s`."""
         self.ends_s = 0.0
-        """When the last row was, be it selected or not; known once all have been read."""
+        """Time of the last row, selected or not; known after all rows have been read."""
         if until_s <= from_s:
             raise BadInputError(f"--until {until_s:g}: allowed: more than --from {from_s:g}")
 
     @property
     def reading_s(self) -> float:
-        """About how long it takes to read all of it."""
+        """Approximate time to read all files."""
         paths = (reader.path for reader in self.readers)
         return sum(path.stat().st_size for path in paths if path.is_file()) / _BYTES_PER_S
 
     def rows(self) -> Iterator[Columns]:
-        """Yield the rows with `ELAPSED`, some hundred at a time.
+        """Yield the rows with `ELAPSED`, some hundreds at a time.
 
-        Raises BadInputError for a file that is no recording.
+        Raises BadInputError for a file that is not a recording.
         """
         needed = None if self._fields is None else {*self._fields, "time_s", "stamp_ns"}
         time = _Time()
@@ -115,7 +147,7 @@ class Selection:
                     yield {ELAPSED: elapsed[in_range], **chosen}
 
     def _check_robot(self, reader: RecordingReader) -> None:
-        """Raise BadInputError where a file is not of the robot of those before it."""
+        """Raise BadInputError if a file is not of the same robot as the files before it."""
         robot = (reader.metadata.get("robot"), reader.metadata.get("axes"))
         first = self._robot = self._robot or robot
         if robot != first:
@@ -125,8 +157,16 @@ class Selection:
             )
 
     def columns(self) -> Columns:
-        """Return all of them as whole columns; raises BadInputError where there are none."""
-        parts = list(self.rows())
+        """Return all rows as whole columns; raises BadInputError for none or too many."""
+        parts, size = [], 0
+        for part in self.rows():
+            size += sum(column.nbytes for column in part.values())
+            if size > _MOST_BYTES:
+                raise BadInputError(
+                    f"{self.readers[0].path}: more than {_MOST_BYTES / 1e9:g} GB of columns; "
+                    "allowed: less, by --from and --until"
+                )
+            parts.append(part)
         if not parts:
             names = ", ".join(str(reader.path) for reader in self.readers)
             raise BadInputError(f"{names}: no cycles in what was asked for")
@@ -136,3 +176,64 @@ class Selection:
 def _readable(reader: RecordingReader, fields: Collection[str] | None) -> Iterator[Columns]:
     with raised_as(BadInputError, RecordingError):
         yield from reader.cycles(fields)
+
+
+# Recordings as tables for other programs: CSV or Parquet.
+
+FORMATS = (".csv", ".parquet")
+
+
+def check_target(path: Path, overwrite: bool) -> None:
+    """Raise BadInputError if `path` is not a valid target."""
+    if path.suffix not in FORMATS:
+        raise BadInputError(f"--out {path}: allowed: a name that ends in {' or '.join(FORMATS)}")
+    require_free("--out", path, overwrite)
+
+
+def export(selection: Selection, path: Path) -> int:
+    """Write the rows to `path`, one column for each field and axis; return their number.
+
+    Raises BadInputError if there are none, WorkFailedError if the file cannot be written.
+    """
+    with os_error_as(WorkFailedError, f"{path}: cannot be written"):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with replacing(path) as file:
+            return _write(selection, file, path.suffix)
+
+
+def _write(selection: Selection, file: IO[bytes], suffix: str) -> int:
+    count, writer = 0, None
+    try:
+        for columns in selection.rows():
+            table = _table(columns)
+            if writer is None and suffix == ".csv":
+                writer = csv.CSVWriter(file, table.schema)
+            elif writer is None:
+                writer = parquet.ParquetWriter(file, table.schema, compression="zstd")
+            writer.write_table(table)
+            count += table.num_rows
+        if writer is None:
+            names = ", ".join(str(reader.path) for reader in selection.readers)
+            raise BadInputError(f"{names}: no cycles in what was asked for")
+        if suffix == ".parquet":
+            described = json.dumps(selection.readers[-1].description)
+            writer.add_key_value_metadata({"description": described})
+        writer.close()
+    except BaseException:
+        if writer is not None:
+            with contextlib.suppress(Exception):  # else it fails later because the file is closed
+                writer.close()
+        raise
+    return count
+
+
+def _table(columns: Columns) -> Any:
+    """Return flat columns, `name[0]` and so on for arrays; unknown values are null."""
+    flat: dict[str, Any] = {}
+    for name, values in columns.items():
+        if values.ndim == 1:
+            flat[name] = pa.array(values, from_pandas=True)
+        else:
+            for k in range(values.shape[1]):
+                flat[f"{name}[{k}]"] = pa.array(values[:, k], from_pandas=True)
+    return pa.table(flat)

@@ -1,4 +1,4 @@
-"""Settings of a command, stored beside what it measured and read again later."""
+"""Settings of a command, stored beside its measurements and read again later."""
 
 from __future__ import annotations
 
@@ -7,16 +7,16 @@ from typing import TypeVar
 
 from pydantic import TypeAdapter, ValidationError
 
+from cdpr_profiles.bounded_input import read_json
 from cdpr_profiles.errors import ProfileError, brief
-from cdpr_profiles.reading.bounded_input import read_json
-from cdpr_profiles.reading.reader import dotted
+from cdpr_profiles.reader import dotted
 from cdpr_tools.errors import BadInputError
 
 _T = TypeVar("_T")
 
 
 def load_settings(path: Path, kind: type[_T]) -> _T:
-    """Return the JSON file of a dataclass; raises BadInputError, which names file, key, value."""
+    """Return a dataclass from its JSON file; raises BadInputError that names file, key, value."""
     try:
         return TypeAdapter(kind).validate_python(read_json(path))
     except ProfileError as error:

@@ -1,4 +1,4 @@
-"""The summary of a recording: figures, motions, events, and why they ended."""
+"""Summarise a recording: figures, motions and why they ended, and events."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ import numpy as np
 
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.core.states import LoopState, Reaction
-from cdpr_rt.service.recordings.recording_events import FAILURE
-from cdpr_rt.service.recordings.recording_reader import CLOSED, Columns, RecordingReader
+from cdpr_rt.service.recording import FAILURE
+from cdpr_rt.service.recording_reader import CLOSED, Columns, RecordingReader
 from cdpr_tools.client.status_text import DEAD
 from cdpr_tools.output import Output
 from cdpr_tools.recordings.selection import ELAPSED, Selection
 
 _EARLY_ns: Final = 50_000_000
-"""A reason may be stamped so long before the row in which its reaction is seen."""
+"""A reason may be stamped this long before the row that shows its reaction."""
 
 WHILE_ACTIVE: Final = "the recording ends while the robot was active"
 LOOP_ENDED: Final = "the control loop ended without a stop"
@@ -29,9 +29,9 @@ _WRITER_ENDED: Final = "its writer was ended, or still writes"
 
 
 class Reasons:
-    """The reasons that a loop gave, each stamped when its status was seen: soon after it reacted.
+    """The reasons that a loop gave, each stamped when its status was read, soon after the reaction.
 
-    Stamps are of CLOCK_MONOTONIC, ns.
+    Stamps are CLOCK_MONOTONIC, in ns.
     """
 
     def __init__(self, events: Iterable[tuple[int, dict[str, Any]]]) -> None:
@@ -41,14 +41,14 @@ class Reasons:
         )
 
     def after(self, at_ns: int, next_ns: float = float("inf")) -> str:
-        """Return the reason of a reaction at `at_ns`, the next one being at `next_ns`; "" for none.
+        """Return the reason of a reaction at `at_ns`, "" for none; the next one is at `next_ns`.
 
-        A state that follows on a reaction has that one's reason.
+        A state that follows a reaction has the same reason.
         """
         return self.stamped_after(at_ns, next_ns)[1]
 
     def stamped_after(self, at_ns: int, next_ns: float = float("inf")) -> tuple[int, str]:
-        """Return the same with its stamp, -1 for none, which tells two of the same text apart."""
+        """Return the reason with its stamp, -1 for none; stamps distinguish equal texts."""
         k = bisect_left(self._stamped, (at_ns - _EARLY_ns, ""))
         if k < len(self._stamped) and self._stamped[k][0] < next_ns - _EARLY_ns:
             return self._stamped[k]
@@ -56,24 +56,24 @@ class Reasons:
 
 
 def is_reason(event: dict[str, Any]) -> bool:
-    """Whether an event is a reason: one of the service, or one seen in the loop's status."""
+    """Return whether an event is a reason, from the service or from the loop's status."""
     return event.get("kind") == "reason" or ("limit" in event and "cycle" not in event)
 
 
 def is_fault(event: dict[str, Any]) -> bool:
-    """Whether an event is a limit's reaction, or a state that became a fault."""
+    """Return whether an event is the reaction to a limit, or a change of state to fault."""
     of_row = "reaction" in event and "cycle" in event
     return of_row and (event["reaction"] > Reaction.CLAMP or "state fault" in event["text"])
 
 
 def why_while_active(reader: RecordingReader, last_state: int) -> str:
-    """Return why a recording, all of it read, ends in a row of state `last_state` that has power.
+    """Return why a completely read recording ends while active, in a row of state `last_state`.
 
-    "" where that is none, or another file goes on from there.
+    "" if that state is not active, or another file continues the recording.
     """
     if last_state != LoopState.ACTIVE:
         return ""
-    if any(status.get("state") == DEAD for status in reader.status):
+    if DEAD in reader.states:
         return LOOP_ENDED
     next_name = f"{reader.metadata.get('session')}-{reader.part + 1:03d}.mcap"
     if reader.ended == CLOSED or reader.path.with_name(next_name).exists():
@@ -101,7 +101,7 @@ _EVERY = 20
 
 @dataclass
 class _Count:
-    """Figures of one file, gathered as its rows come."""
+    """Figures of one file, accumulated while its rows are read."""
 
     rows: int = 0
     missing_cycles: int = 0
@@ -115,12 +115,12 @@ class _Count:
     last_state: int = LoopState.UNCONFIGURED
     stamps_ns: list[FloatArray] = field(default_factory=list)
     elapsed_s: list[FloatArray] = field(default_factory=list)
-    """When some of the rows were, by the wall clock and by the bus'."""
+    """Times of some of the rows, in monotonic time and in bus time."""
     runs: list[dict[str, Any]] = field(default_factory=list)
-    """What ran one after the other: program, seconds, where axes and platform were at its end."""
+    """The runs in order: program, seconds, and the positions of axes and platform at the end."""
 
     def add(self, rows: Columns) -> None:
-        """Take in some rows."""
+        """Add some rows."""
         elapsed, cycle = rows[ELAPSED], rows["cycle"]
         for kept, column in ((self.stamps_ns, "stamp_ns"), (self.elapsed_s, ELAPSED)):
             kept += [rows[column][::_EVERY], rows[column][-1:]]
@@ -156,7 +156,7 @@ class _Count:
             found = np.flatnonzero(reacts[begin : end + 1])
             stamps_ns = rows["stamp_ns"][begin + found[:1]]
             if not self.runs or self.runs[-1]["program"] != kind[begin]:
-                reaction = bool(reacts[begin])  # it belongs to what ends the run before
+                reaction = bool(reacts[begin])  # a reaction here ended the previous run
                 if self.runs and reaction:
                     self._cut_short(stamps_ns)
                 at_s = float(elapsed[begin])
@@ -169,9 +169,9 @@ class _Count:
             self.runs[-1] |= {"until_s": float(elapsed[end]), "position_rad": angles, **last}
 
     def _cut_short(self, stamps_ns: FloatArray) -> None:
-        """Note when the last run was cut short, unless it is part of a reaction, or there is none.
+        """Note when the last run was cut short, unless it is itself part of a reaction.
 
-        Takes the stamps of rows with a reaction.
+        `stamps_ns` are the stamps of rows with a reaction; none means it was not cut short.
         """
         run = self.runs[-1]
         if stamps_ns.size and not run["reaction"]:
@@ -181,12 +181,12 @@ class _Count:
         """Return the recording's time, as `cdpr log plot` counts it, at a wall-clock time."""
         stamps_ns, elapsed_s = np.concatenate(self.stamps_ns), np.concatenate(self.elapsed_s)
         at_s = float(np.interp(stamp_ns, stamps_ns, elapsed_s)) - self.first_s
-        # before the first row and after the last one only the wall clock goes on
+        # before the first row and after the last one only the wall clock is known
         before_s, after_s = stamps_ns[0] - stamp_ns, stamp_ns - stamps_ns[-1]
         return at_s + 1e-9 * float(max(after_s, 0.0) - max(before_s, 0.0))
 
     def result(self) -> dict[str, Any]:
-        """Return the figures for people and programs."""
+        """Return the figures of the file."""
         counted = {name: self.last[name] - self.began[name] for name in self.began}
         return {
             "rows": self.rows,
@@ -200,7 +200,7 @@ class _Count:
 
 
 def summarise(path: Path, out: Output) -> dict[str, Any]:
-    """Return the figures of one file. Raises BadInputError where it is no recording."""
+    """Return the figures of one file. Raises BadInputError if it is not a recording."""
     selection = Selection([path], _FIELDS)
     count = _Count()
     with out.progress(path.name, selection.reading_s) as selection.advance:
@@ -212,7 +212,7 @@ def summarise(path: Path, out: Output) -> dict[str, Any]:
         event["after_s"] = count.when_s(stamp_ns) if count.rows else None
     runs, why = _named_runs(count.runs, reader), why_while_active(reader, count.last_state)
     _note_failures(runs, reader.events)
-    if why == LOOP_ENDED:  # one that is still written may be well
+    if why == LOOP_ENDED:  # a file that is still being written may be fine
         runs[-1].setdefault("cut_short_by", why)
     return {
         "file": str(path),
@@ -231,7 +231,7 @@ def summarise(path: Path, out: Output) -> dict[str, Any]:
 
 
 def _named_runs(runs: list[dict[str, Any]], reader: RecordingReader) -> list[dict[str, Any]]:
-    """Return what ran with power, by the names of the programs, and why it was cut short."""
+    """Return the runs with power, with their programs' names and why they were cut short."""
     programs = reader.description.get("programs", [])
     reasons = Reasons((event["log_time_ns"] - reader.offset_ns, event) for event in reader.events)
     cuts = [run["cut_ns"] for run in runs if "cut_ns" in run]
@@ -243,9 +243,9 @@ def _named_runs(runs: list[dict[str, Any]], reader: RecordingReader) -> list[dic
         if cut_ns is not None:
             later = [other for other in cuts if other > cut_ns]
             why = reasons.after(cut_ns, min(later, default=math.inf)) or "a fault"
-            # where the power is taken at once the idle program has the last cycles
+            # if the power is removed immediately, the last cycles belong to the idle program
             cut = found[-1] if found and named == "idle" else named_run
-            if not cut["reaction"]:  # that has come to its end
+            if not cut["reaction"]:  # a reaction itself is not cut short
                 cut.setdefault("cut_short_by", why)
         found.append(named_run)
     return [
@@ -256,7 +256,7 @@ def _named_runs(runs: list[dict[str, Any]], reader: RecordingReader) -> list[dic
 
 
 def _note_failures(runs: list[dict[str, Any]], events: Sequence[dict[str, Any]]) -> None:
-    """Write into runs why they failed; an event follows soon after the run, or within it."""
+    """Write into runs why they failed; the event comes during the run or soon after it."""
     for event in (one for one in events if one.get("kind") == FAILURE):
         name, _, why = event["text"].partition(": ")
         before = [
@@ -267,10 +267,10 @@ def _note_failures(runs: list[dict[str, Any]], events: Sequence[dict[str, Any]])
 
 
 def _run_text(run: dict[str, Any], axes: Sequence[str]) -> str:
-    """Return when a program ran, what cut it short, and where platform or axes were at its end."""
+    """Return when a program ran, why it was cut short, and the final position, as text."""
     pose, setpoint = np.array(run["pose"], float), np.array(run["pose_setpoint"], float)
     if np.isfinite(pose).all():
-        size = 3 if pose[2] else 2  # in a plane its third coordinate is none
+        size = 3 if pose[2] else 2  # in a plane the third coordinate is 0
         at = ", ".join(f"{x:z.1f}" for x in 1e3 * pose[:size])
         where = f"platform at {at} mm"
         if np.isfinite(setpoint).all():
@@ -291,7 +291,7 @@ def _is_wrong(event: dict[str, Any]) -> bool:
 
 
 def _chosen(events: Sequence[dict[str, Any]], most: int) -> list[dict[str, Any]]:
-    """Return at most so many events: what went wrong and why first, then the newest others."""
+    """Return at most `most` events: failures and reasons first, then the newest of the others."""
     wrong = [k for k, event in enumerate(events) if _is_wrong(event)][-most:]
     others = [k for k in range(len(events)) if k not in wrong]
     kept = {*wrong, *others[len(others) - (most - len(wrong)) :]}
@@ -299,9 +299,9 @@ def _chosen(events: Sequence[dict[str, Any]], most: int) -> list[dict[str, Any]]
 
 
 def worth_telling(events: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
-    """Return events without who may move and which program runs, which the motions tell.
+    """Return events without grants and program changes, which the list of motions shows.
 
-    What is refused over and over is told once.
+    Repeated refusals are counted in one event.
     """
     found: list[dict[str, Any]] = []
     for event in events:
@@ -323,7 +323,7 @@ def _alike(text: str, last: str) -> bool:
 
 
 def summary_lines(figures: dict[str, Any], most_events: int) -> Sequence[str]:
-    """Return the figures of one file as lines for people."""
+    """Return the figures of one file as lines of text."""
     end = {
         "closed": "",
         "not closed": ", not closed by its writer, or not yet",

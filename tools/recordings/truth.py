@@ -1,4 +1,4 @@
-"""Reads the simulator's log of the true motion; the report alone uses it."""
+"""Read the simulator's log of the true motion; only the report uses it."""
 
 from __future__ import annotations
 
@@ -10,24 +10,24 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from cdpr_profiles.bounded_input import open_regular, parse_json
 from cdpr_profiles.errors import ProfileError
-from cdpr_profiles.reading.bounded_input import open_regular, parse_json
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.identification.rawlog import RawLog
-from cdpr_rt.procedures.commissioning.evaluation import AngleOf
+from cdpr_rt.procedures.commissioning_results import AngleOf
 from cdpr_rt.procedures.measurement import Recording
 from cdpr_tools.errors import BadInputError
 
 _HEADER_BYTES = 1024
 _FORMAT = "cdpr-rt truth log 1"
 NO_SYNC = 0xFFFFFFFF
-"""Number of a record that was made where no SYNC came."""
+"""SYNC number of a record that was made without a SYNC."""
 
 
 class Truth:
-    """The log of the true motion, read where it is asked for, since it may be long.
+    """The log of the true motion; only the needed records are read, because it may be long.
 
-    Raises BadInputError when `path` is no such log.
+    Raises BadInputError if `path` is no such log.
     """
 
     def __init__(self, path: Path) -> None:
@@ -41,22 +41,22 @@ class Truth:
         except (ProfileError, OSError, ValueError, KeyError, TypeError) as error:
             raise BadInputError(f"{path}: not a log of the simulator: {error}") from error
         self._at_sync: NDArray[np.intp] = np.zeros(0, np.intp)
-        """Numbers of the records that were made at a SYNC, of the `_searched` first ones."""
+        """Numbers of the records made at a SYNC, among the first `_searched` records."""
         self._searched = 0
 
     def angle_of(self, log: RawLog, run: Recording) -> FloatArray:
-        """Return the true angle of a recorded pass, (samples,); raises as `angle_at`."""
+        """Return the true angle of a recorded pass, (samples,); raises the errors of `angle_at`."""
         return self.angle_at(run.cycle + log.header["sync_offset"] - 1, run.sweep.angle_rad)
 
     def angle_at(self, sync_index: FloatArray, measured_rad: FloatArray) -> FloatArray:
-        """Return the true angle from the index at given SYNCs, rising, (k,).
+        """Return the true angle from the index at given SYNCs in rising order, (k,).
 
         The index comes once a turn, and the drive may have latched another one than the simulator
-        counts from: whole turns are chosen so that the angle lies at the measured one, (k,).
-        Raises BadInputError where a SYNC is missing.
+        counts from: whole turns are added so that the angle agrees with the measured one, (k,).
+        Raises BadInputError if a SYNC is missing.
         """
         first, last = int(sync_index[0]), int(sync_index[-1])
-        # one record a SYNC, counted from zero
+        # one record per SYNC, counted from zero
         records = self._records_at_sync(max(first, 0), last)
         place = sync_index.astype(np.int64) - first
         if records.size != last - first + 1 or not np.array_equal(
@@ -70,7 +70,7 @@ class Truth:
         return angle + turns * math.tau
 
     def _records_at_sync(self, first: int, last: int) -> NDArray[np.void]:
-        """Return the records of the SYNCs that are there; the log may have grown meanwhile."""
+        """Return the available records of these SYNCs; the log may have grown meanwhile."""
         whole = (self._path.stat().st_size - _HEADER_BYTES) // self._dtype.itemsize
         records = np.memmap(self._path, self._dtype, "r", _HEADER_BYTES, (whole,))
         found = np.flatnonzero(records["sync_index"][self._searched :] != NO_SYNC)
@@ -80,5 +80,5 @@ class Truth:
 
 
 def true_angle(path: Path) -> AngleOf | None:
-    """Return what gives the true angle of a pass by the log at `path`, None where there is none."""
+    """Return a function for the true angle of a pass from the log at `path`, None without a log."""
     return Truth(path).angle_of if path.exists() else None

@@ -1,60 +1,44 @@
-"""Checks what the report is made of, and writes its files."""
+"""Write reports and pictures atomically; never overwrite a file of somebody else."""
 
 from __future__ import annotations
 
-import contextlib
+import errno
 from pathlib import Path
-from typing import Any
+from typing import Final
 
-from cdpr_tools.errors import BadInputError, WorkFailedError
+from cdpr_profiles.bounded_input import may_replace, replacing
+from cdpr_tools.errors import BadInputError, WorkFailedError, os_error_as
 
-_FIGURES = ("rms_position_error_deg", "peak_pid_effort_Nm", "peak_velocity_error_deg_s")
-_RATIOS = ("rms_position_error", "peak_pid_effort", "peak_velocity_error")
-_TOP = (
-    "winch", "drive", "date", "bus", "pid", "latency_s", "bandwidth_Hz", "bandwidths_Hz",
-    "encoder_counts_per_turn", "rated_torque_Nm", "torque_step_Nm",
-)  # fmt: skip
-_IDENTIFICATION = (
-    "orders", "amplitudes_Nm", "confidence_Nm", "phases_deg", "per_pole_pair", "hints",
-    "residual_rms_Nm", "repaired_fraction", "coverage", "excluded_fraction", "held_back_error_Nm",
-)  # fmt: skip
+OWN_MARK: Final = b"cdpr-rt"
+"""Mark at the beginning of each report and picture; a file with it may be replaced."""
 
 
-def save(path: Path, text: str) -> None:
-    """Write a file at once or not at all; raises WorkFailedError where it cannot be written."""
-    part = path.with_name(path.name + ".part")
-    try:
+def require_own(path: Path) -> None:
+    """Raise FileExistsError if `path` holds something that was not written by this project."""
+    if not may_replace(path, OWN_MARK):
+        text = "is there already and was not written by cdpr; move it, or choose another name"
+        raise FileExistsError(errno.EEXIST, text)
+
+
+def require_free(option: str, path: Path, overwrite: bool) -> None:
+    """Raise BadInputError if a file, or files in a folder, exist and `overwrite` is not given."""
+    with os_error_as(BadInputError, f"{option} {path}: cannot be written"):
+        occupied = any(path.iterdir()) if path.is_dir() else path.exists()
+    if occupied and not overwrite:
+        raise BadInputError(
+            f"{option} {path}: is there already; choose another name, or replace it with "
+            "--overwrite"
+        )
+
+
+def save(path: Path, content: str | bytes) -> None:
+    """Write a file completely or not at all; raise WorkFailedError if it cannot be written.
+
+    A page or a picture replaces only a file that this project wrote.
+    """
+    with os_error_as(WorkFailedError, f"{path}: cannot be written"):
+        if path.suffix in (".html", ".png"):
+            require_own(path)
         path.parent.mkdir(parents=True, exist_ok=True)
-        part.write_text(text, encoding="utf-8")
-        part.replace(path)
-    except OSError as error:
-        with contextlib.suppress(OSError):  # the first error tells what is wrong
-            part.unlink(missing_ok=True)
-        raise WorkFailedError(
-            f"{path}: the report cannot be written: {error.strerror or error}; the raw data are "
-            "kept, and the report can be made from them again"
-        ) from error
-
-
-def check(results: Any, path: Path) -> None:
-    """Raise BadInputError naming the first key that a report needs and `results` has not."""
-    for keys in _needed():
-        value = results
-        for depth, key in enumerate(keys):
-            if not isinstance(value, dict) or key not in value:
-                missing = ".".join(keys[: depth + 1])
-                raise BadInputError(f"{path}: not the results of a commissioning: no {missing}")
-            value = value[key]
-
-
-def _needed() -> list[tuple[str, ...]]:
-    needed: list[tuple[str, ...]] = [(key,) for key in _TOP]
-    needed += [("identification", key) for key in _IDENTIFICATION]
-    judged: list[tuple[str, ...]] = [("validation", "judged_on"), ("validation", "bandwidths")]
-    for method in ("none", "thesis", "better"):
-        for where in (("validation",), ("validation", "encoder")):
-            judged += [(*where, method, key) for key in _FIGURES]
-            judged += [(*where, method, "ratios", key) for key in _RATIOS]
-    for method in ("thesis", "better"):
-        judged += [("validation", "targets", method, key) for key in _RATIOS]
-    return needed + judged + [("validation", "floor", key) for key in _FIGURES]
+        with replacing(path) as file:
+            file.write(content.encode() if isinstance(content, str) else content)

@@ -1,9 +1,8 @@
-"""How the report's pictures look."""
+"""Style of the reports' pictures."""
 
 from __future__ import annotations
 
 import base64
-import contextlib
 import io
 from collections.abc import Sequence
 from pathlib import Path
@@ -12,9 +11,12 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
 from matplotlib.figure import Figure
+from matplotlib.patches import Rectangle
 
 from cdpr_rt.arrays import FloatArray
+from cdpr_tools.report.save import OWN_MARK, save
 
 COLOURS = {"none": "#8a8f98", "thesis": "#2f6fb0", "better": "#d1581a", "floor": "#3b8f5a"}
 LABELS = {
@@ -23,6 +25,11 @@ LABELS = {
     "better": "harmonic model",
     "floor": "floor: encoder and torque steps",
 }
+SERIES = (
+    "#2f6fb0", "#d1581a", "#3b8f5a", "#7a3fa0", "#1f8a8a", "#b03a5b", "#8a6d1f", "#8a8f98",
+)  # fmt: skip
+"""Colours of axes, coordinates and other numbered curves."""
+BOUND, BOX, LINES = "#b02f2f", "#7a3fa0", "#444444"
 FORWARD, BACKWARD = "#7a3fa0", "#1f8a8a"
 REPAIRED = "#f3c623"
 DIRECTIONS = ("increasing angle", "decreasing angle")
@@ -51,30 +58,67 @@ mpl.rcParams.update(
 def canvas(
     rows: int = 1, columns: int = 1, height: float = 3.0, sharex: bool = False, sharey: bool = False
 ) -> tuple[Figure, list[Axes]]:
-    """Return a figure of the report's width and its axes, row by row; `height` in inch a row."""
+    """Return a figure of the report's width and its axes, row by row; `height` in inch per row."""
     figure = Figure(figsize=(7.4, height * rows), layout="constrained")
     axes = figure.subplots(rows, columns, squeeze=False, sharex=sharex, sharey=sharey)
     return figure, [ax for row in axes for ax in row]
 
 
 def save_figure(figure: Figure, path: Path, tight: bool = False) -> None:
-    """Write a PNG as a whole or not at all, as on a disk that is full; raises OSError.
+    """Write a PNG as `save` does; if `tight`, its size includes everything outside the layout."""
+    drawn = io.BytesIO()
+    figure.savefig(
+        drawn,
+        format="png",
+        bbox_inches="tight" if tight else None,
+        metadata={"Software": OWN_MARK.decode()},
+    )
+    save(path, drawn.getvalue())
 
-    `tight`: as large as what is drawn, whatever the layout left outside.
-    """
-    drawn, part = io.BytesIO(), path.with_name(f"{path.name}.part")
-    figure.savefig(drawn, format="png", bbox_inches="tight" if tight else None)
-    try:
-        part.write_bytes(drawn.getvalue())
-        part.replace(path)
-    except OSError:
-        with contextlib.suppress(OSError):  # the first error tells what is wrong
-            part.unlink(missing_ok=True)
-        raise
+
+def label_view(ax: Axes, view: Sequence[int]) -> None:
+    """Label the axes with the room's coordinates in m, and set equal scales."""
+    i, j = view
+    ax.set(xlabel=f"{'xyz'[i]} (m)", ylabel=f"{'xyz'[j]} (m)", aspect="equal")
+
+
+def box_of_targets(
+    ax: Axes,
+    low_m: Sequence[float] | FloatArray,
+    high_m: Sequence[float] | FloatArray,
+    view: Sequence[int],
+) -> None:
+    """Draw in a view the box in which a robot's targets lie."""
+    i, j = view
+    size = high_m[i] - low_m[i], high_m[j] - low_m[j]
+    box = Rectangle((low_m[i], low_m[j]), *size, fill=False, ec=BOX, lw=1.2, ls="--")
+    box.set_label("box of targets")
+    ax.add_patch(box)
+
+
+def colour_bar(
+    figure: Figure,
+    shades: ScalarMappable,
+    ax: Axes | Sequence[Axes],
+    label: str,
+    shrink: float = 0.8,
+) -> None:
+    """Add a colour bar with a label beside `ax`."""
+    axes = ax if isinstance(ax, Axes) else list(ax)
+    bar = figure.colorbar(shades, ax=axes, shrink=shrink, format="%g")
+    bar.set_label(label)
+    bar.outline.set_visible(False)
+
+
+def legend_below(figure: Figure, *axes: Axes, columns: int) -> None:
+    """Add a legend of `axes` below the figure."""
+    named = [pair for ax in axes for pair in zip(*ax.get_legend_handles_labels(), strict=True)]
+    handles, labels = zip(*named, strict=True)
+    figure.legend(handles, labels, loc="outside lower center", ncols=columns)
 
 
 def legend_above(figure: Figure, *axes: Axes, columns: int = 4) -> None:
-    """Name what is labelled in `axes` above the figure, row by row, where it hides nothing."""
+    """Add a legend of `axes` above the figure, row by row, so that it hides nothing."""
     named = [pair for ax in axes for pair in zip(*ax.get_legend_handles_labels(), strict=True)]
     by_columns = [pair for column in range(columns) for pair in named[column::columns]]
     handles, labels = zip(*by_columns, strict=True)
@@ -84,9 +128,9 @@ def legend_above(figure: Figure, *axes: Axes, columns: int = 4) -> None:
 def legend_beside_title(
     ax: Axes, columns: int = 3, handles: Sequence[Artist] | None = None
 ) -> None:
-    """Name what is labelled in `ax` at the right in its title's line, where it hides nothing.
+    """Add a legend of `ax`, or of `handles`, to the right of its title, so that it hides nothing.
 
-    Or only some `handles`. A title, to be set before, that leaves too little room goes above it.
+    Set the title first: if there is too little room, it moves above the legend.
     """
     legend = ax.legend(
         handles=handles or ax.get_legend_handles_labels()[0],
@@ -98,14 +142,14 @@ def legend_beside_title(
     title = ax.set_title(words)
     figure = ax.get_figure(root=True)
     assert figure is not None
-    figure.draw_without_rendering()  # only then it is known how much room there is
+    figure.draw_without_rendering()  # only then are the sizes known
     named = legend.get_window_extent()
     if title.get_window_extent().overlaps(named):
         ax.set_title(words, pad=mpl.rcParams["axes.titlepad"] + 72.0 * named.height / figure.dpi)
 
 
 def data_uri(figure: Figure) -> str:
-    """Return the figure as the text of an image source that needs no file beside the page."""
+    """Return the figure as a data URI, so that the page needs no other file."""
     buffer = io.BytesIO()
     figure.savefig(buffer, format="png")
     figure.clear()
@@ -113,9 +157,9 @@ def data_uri(figure: Figure) -> str:
 
 
 def decimated(x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return a curve (k,) with few enough points to draw, both extremes of each stretch kept.
+    """Return a curve (k,) reduced for drawing; both extremes of each stretch are kept.
 
-    A gap (nan) is kept where it fills a stretch.
+    A gap (nan) is kept if it fills a stretch.
     """
     step = -(-2 * y.size // _POINTS)
     if step <= 2:

@@ -1,1 +1,1 @@
-"""A cable robot as its file describes it: what its cables can hold, checked, drawn, written."""
+"""A cable robot as its file describes it: check its statics, draw it, and write new files."""

@@ -1,8 +1,7 @@
-"""A new robot's file, made of answers."""
+"""Write a new robot's file from the user's answers."""
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -12,18 +11,19 @@ import numpy as np
 from cdpr_drivers.robot.commissioned import folder_called
 from cdpr_profiles import ProfileError, Robot, Winch, load_robot
 from cdpr_profiles.platform import Platform
-from cdpr_profiles.reading.reader import closest
+from cdpr_profiles.reader import closest
 from cdpr_rt.arrays import FloatArray
-from cdpr_rt.robots.feasibility.checks import (
+from cdpr_rt.diagnosis.checks import (
     refuse_impossible,
     standing_tensions_N,
 )
-from cdpr_rt.robots.feasibility.turning_checks import lower_when_turned_m
-from cdpr_rt.robots.platform_model import platform_model
-from cdpr_rt.robots.statics import Box, PlatformStatics
+from cdpr_rt.diagnosis.turning_checks import lower_when_turned_m
+from cdpr_rt.model.platform_model import platform_model
+from cdpr_rt.model.statics import Box, PlatformStatics
 from cdpr_tools.errors import BadInputError
-from cdpr_tools.robots.kinds import KINDS
+from cdpr_tools.report.page import rendered
 from cdpr_tools.robots.questions import (
+    KINDS,
     AnswerError,
     Answers,
     Question,
@@ -34,17 +34,17 @@ from cdpr_tools.robots.questions import (
 )
 
 Ask = Callable[[Question, str, str], str]
-"""Takes a question, its default and what was wrong with the last answer; returns the answer."""
+"""Takes a question, its default and the error in the last answer; returns the answer."""
 _STAND_SHARE, _STAND_m = 0.1, 0.5
-"""Of the height in which targets could be taken, what is left between the stand and the box; and of
-the frame's, up to so much, how high a platform stands above the floor where it could go there."""
+"""Gap between stand and box, as a share of the height in which targets are possible. Also the
+height of a stand that could be on the floor, as a share of the frame's, up to `_STAND_m`."""
 _SHRUNK = np.linspace(1.0, 0.5, 26)
 
 
 def answers_of(path: Path, given: Mapping[str, str], ask: Ask) -> Answers:
-    """Return what is to be known of the robot that `path` will describe.
+    """Return all answers about the robot that `path` will describe.
 
-    What is in `given` is not asked; raises BadInputError for what is wrong there.
+    Answers in `given` are not asked for; raises BadInputError if one of them is invalid.
     """
     first = kind_question()
     answers: Answers = {first.key: _answer(first, {}, given, ask)}
@@ -83,11 +83,11 @@ def _answer(question: Question, answers: Answers, given: Mapping[str, str], ask:
 
 
 def proposed_box(answers: Answers) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    """Return the largest box of targets that the cables can hold, to the cm, or one to begin with.
+    """Return the largest box of targets that the cables can hold, to the cm, or a first guess.
 
-    Below it a tenth is left for the stand, and what a turned platform is lower. Platforms on cables
-    from above are held down to the floor: they stand higher, for what is below them. The box is
-    smaller where the motors would not bear it for long.
+    A gap below it, of a tenth or the depth of a turned platform, is left for the stand. Cables from
+    above can lower a platform to the floor: its stand is higher, to leave room below. The box is
+    smaller if the motors could not hold the platform continuously.
     """
     exits = np.array([answers[f"exit_{i + 1}_m"] for i in range(answers["kind"].cables)])
     least, most = exits.min(axis=0), exits.max(axis=0)
@@ -99,7 +99,7 @@ def proposed_box(answers: Answers) -> tuple[tuple[float, ...], tuple[float, ...]
     middle, size = 0.5 * (least + most), most - least
     around = Box(_point(least), _point(most))
     statics = _statics_of(answers, around)
-    # where no box keeps the reserve of its own middle when turned, some of it can be reached
+    # if no box keeps the reserve at all orientations, take one that is at least held
     for found in (statics.largest_box(around), statics.largest_held(around)):
         if found is None:
             continue
@@ -115,7 +115,7 @@ def proposed_box(answers: Answers) -> tuple[tuple[float, ...], tuple[float, ...]
 
 
 def _settled(answers: Answers, box: Box) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    """Return the largest box within that is all of targets, to the cm, as its middle has moved."""
+    """Return the largest box of targets inside, to the cm: the middle of the box has moved."""
     found = _statics_of(answers, box).largest_box(box) or box
     low, high = np.ceil(100.0 * np.array(found.low_m)), np.floor(100.0 * np.array(found.high_m))
     return (
@@ -126,14 +126,14 @@ def _settled(answers: Answers, box: Box) -> tuple[tuple[float, ...], tuple[float
 
 
 def _lower_when_turned_m(answers: Answers, box: Box) -> float:
-    """Return how far above its stand the platform may be turned, to the cm."""
+    """Return how much lower the platform reaches when turned, to the cm."""
     return math.ceil(100.0 * lower_when_turned_m(_statics_of(answers, box))) / 100.0
 
 
 def _bearable(
     answers: Answers, low: FloatArray, high: FloatArray
 ) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    """Return the box, shrunk until the motors bear for long to hold the platform all over it."""
+    """Return the box, shrunk until the motors can hold the platform continuously throughout."""
     winch: Winch = answers["winch"][1]
     rated_N = winch.motor.rated_torque_Nm / abs(winch.cable_m_per_motor_rad)
     for share in _SHRUNK:
@@ -149,15 +149,15 @@ def _bearable(
 def proposed_stand(answers: Answers) -> tuple[float, ...]:
     """Return a place under the middle of the box of targets.
 
-    A platform that is free to turn has it where the cables turn it least: where they turn it they
-    might tip it on its stand, and lengths learnt there are wrong by that.
+    For a platform that turns freely it is where the cables turn it least: otherwise they might
+    tilt it on its stand, and the lengths measured there would be wrong.
     """
     low, high = np.array(answers["low_m"]), np.array(answers["high_m"])
     below_m = _STAND_SHARE / (1.0 - _STAND_SHARE) * (high[-1] - low[-1])
     box = Box(answers["low_m"], answers["high_m"])
     statics = _statics_of(answers, box)
     below = low[-1] - max(math.floor(100.0 * below_m) / 100.0, _lower_when_turned_m(answers, box))
-    # to the cm, towards the room's zero: in its middle, where the box is but for half a cm
+    # round to the cm towards the room's origin: 0 if the box is centred to within half a cm
     aside = np.trunc(np.round(50.0 * (low + high)[:-1], 6)) / 100.0
     middle = np.array([*aside, below])
     if not statics.turns_freely:
@@ -167,7 +167,7 @@ def proposed_stand(answers: Answers) -> tuple[float, ...]:
     places = np.stack([xs, np.full(xs.size, middle[1])], axis=-1)
     turned = np.where(statics.is_target(places), np.abs(statics.angle_rad(places)), math.inf)
     turned = np.where(np.isnan(turned), math.inf, turned)
-    # what differs by less than anybody sees is alike, and the first of them is in the middle
+    # round away differences that nobody sees, so that the place nearest to the middle is chosen
     return _point(places[int(np.round(turned, 2).argmin())])
 
 
@@ -201,10 +201,10 @@ def _point(point_m: FloatArray) -> tuple[float, ...]:
 
 
 def write_robot(answers: Answers, path: Path) -> Robot:
-    """Write what was answered into a new file and return the robot that it describes.
+    """Write the answers into a new file and return the robot that it describes.
 
-    Raises BadInputError where there is such a file already or none can be written, ProfileError
-    for what contradicts itself or cannot work; there is no file then.
+    Raises BadInputError if the file exists or cannot be written, ProfileError if the robot is
+    inconsistent or cannot work; the file is removed then.
     """
     text = text_of(answers)
     try:
@@ -225,124 +225,42 @@ def write_robot(answers: Answers, path: Path) -> Robot:
 
 def text_of(answers: Answers) -> str:
     """Return the answers as a robot's file, with comments."""
-    winch, _ = answers["winch"]
     kind, names = answers["kind"], axis_names(answers)
     on_each = -(-kind.cables // kind.buses)
     axes = [
-        _AXIS.format(
-            name=_quoted(names[i]),
-            winch=_quoted(winch),
-            bus=i // on_each,
-            node=answers["nodes"][i],
-            commissioned=_quoted(f"motors/{folder_called(names[i], answers['nodes'][i])}"),
-            exit=_array(answers[f"exit_{i + 1}_m"]),
-            anchor=_array(answers[f"anchor_{i + 1}_m"]),
-        )
-        for i in range(kind.cables)
+        {
+            "name": name,
+            "bus": i // on_each,
+            "node": answers["nodes"][i],
+            "folder": f"motors/{folder_called(name, answers['nodes'][i])}",
+            "exit_m": answers[f"exit_{i + 1}_m"],
+            "anchor_m": answers[f"anchor_{i + 1}_m"],
+        }
+        for i, name in enumerate(names)
     ]
-    buses = [answers["bus"], answers.get("bus_2")]
-    head = _HEAD.format(
-        name=_quoted(answers["name"]),
+    text = rendered(
+        "robot.toml.j2",
+        answers=answers,
+        kind=kind,
         what=KINDS[kind.name],
-        axes="x to the right, y upward" if kind.size == 2 else "z upward",
-        buses="".join(
-            _BUS.format(number=i, url=_quoted(url)) for i, url in enumerate(buses[: kind.buses])
-        ),
-        turning=_turning(answers),
-        speed_limit=_speed_limit(answers),
-        home=_array(answers["home_m"]),
-        low=_array(answers["low_m"]),
-        high=_array(answers["high_m"]),
-        **{
-            key: f"{float(answers[key])!r}"
-            for key in (
-                "mass_kg",
-                "speed_m_s",
-                "acceleration_m_s2",
-                "torque_Nm",
-                "tension_min_N",
-                "tension_max_N",
-            )
-        },
+        buses=[answers["bus"], answers.get("bus_2")][: kind.buses],
+        axes=axes,
+        angle_deg=math.degrees(answers.get("angle_deg", 0.0)),
+        speed_rad_s=_speed_limit(answers),
     )
-    return "\n".join(_aligned(line) for line in (head + "".join(axes)).splitlines()) + "\n"
+    return "\n".join(map(_aligned, text.splitlines())) + "\n"
 
 
-def _turning(answers: Answers) -> str:
-    if answers.get("angle_deg", 0.0) <= 0.0:
-        return ""
-    return _TURNING.format(
-        angle=round(answers["angle_deg"], 6),
-        degrees=f"{math.degrees(answers['angle_deg']):.3g}",
-        speed=round(answers["angular_speed_deg_s"], 6),
-        acceleration=round(answers["angular_acceleration_deg_s2"], 6),
-    )
-
-
-def _speed_limit(answers: Answers) -> str:
-    """Return the shipped robot's limit of the motors' speed as a line, where its winch is taken."""
+def _speed_limit(answers: Answers) -> float | None:
+    """Return the shipped robot's motor speed limit if the new robot uses the same winch."""
     robot = answers["kind"].robot
     most = robot.limits.speed_rad_s
     if most is None or answers["winch"][0] != robot.axes[0].winch.profile:
-        return ""
-    return f"speed_rad_s = {most[0]!r}\n"
+        return None
+    return float(most[0])
 
 
 def _aligned(line: str) -> str:
-    """Return a line with what is said of its key where that of the others is."""
+    """Return a line with its comment aligned with those of the other lines."""
     key, mark, said = line.partition("  # ")
     return f"{key:36}  # {said}" if mark else line
-
-
-def _quoted(text: str) -> str:
-    return json.dumps(text, ensure_ascii=False)
-
-
-def _array(point_m: tuple[float, ...]) -> str:
-    return f"[{', '.join(repr(float(x)) for x in point_m)}]"
-
-
-_HEAD = """\
-# A cable robot: {what}.
-# Points are in m, {axes}.
-# `cdpr robot show` draws and checks it, `cdpr run` runs it.
-name = {name}
-sync_period_s = 0.001  # the control cycle
-
-{buses}[platform]
-mass_kg = {mass_kg}
-home_m = {home}  # where its middle is while it stands, at start and end
-# home_tolerance_m = 0.05  # how far from there it may really be
-workspace_min_m = {low}  # the box in which targets may lie
-workspace_max_m = {high}
-speed_m_s = {speed_m_s}  # along each direction
-acceleration_m_s2 = {acceleration_m_s2}
-{turning}
-[limits]
-torque_Nm = {torque_Nm}  # at the motor
-{speed_limit}tension_min_N = {tension_min_N}
-tension_max_N = {tension_max_N}
-# slack_N = 5.0  # a quarter of tension_min_N if left out
-"""
-_BUS = """\
-[[buses]]
-name = "can{number}"
-url = {url}
-
-"""
-_TURNING = """\
-workspace_angle_rad = {angle}  # {degrees} deg: how far targets may be turned
-angular_speed_rad_s = {speed}  # about each axis
-angular_acceleration_rad_s2 = {acceleration}
-"""
-_AXIS = """
-[[axes]]
-name = {name}
-winch = {winch}
-bus = "can{bus}"
-node_id = {node}
-exit_point_m = {exit}  # where its cable leaves the frame
-anchor_point_m = {anchor}  # where it ends, from the platform's middle
-# cable_sign = 1  # 1: a positive motor angle pays out; -1: it winds in
-# commissioned = {commissioned}  # what `cdpr commission` learnt of this motor
-"""

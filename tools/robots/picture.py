@@ -1,4 +1,4 @@
-"""The picture of a robot: exit points, cables, platform, and where they can hold it."""
+"""The picture of a robot: exit points, cables, platform, and its workspace."""
 
 from __future__ import annotations
 
@@ -8,50 +8,56 @@ from pathlib import Path
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.patches import Polygon, Rectangle
+from matplotlib.patches import Polygon
 from matplotlib.ticker import MaxNLocator
 
 from cdpr_profiles import Robot
 from cdpr_profiles.platform import Platform
 from cdpr_rt.arrays import FloatArray
-from cdpr_rt.robots.statics import Box, PlatformStatics, statics_of, view_of
-from cdpr_tools.report.style import save_figure
+from cdpr_rt.model.statics import Box, PlatformStatics, statics_of, view_of
+from cdpr_tools.report.style import (
+    LINES,
+    box_of_targets,
+    colour_bar,
+    label_view,
+    legend_below,
+    save_figure,
+)
 
-_CABLE, _PLATFORM, _TARGETS = "#444444", "#d1581a", "#7a3fa0"
+_PLATFORM = "#d1581a"
 _WIDE_in = 7.4
 _LEAST_HIGH = 0.32
-"""Of its width, so that what is said of the colours has room beside it."""
+"""Least height of a view over its width, so that the colour bar's label has room beside it."""
 _SEEN_THROUGH = 0.6
-"""Of the platform, which may cover all of the box of targets."""
-_NAMES = "xyz"
+"""Opacity of the platform, which may cover the whole box of targets."""
 _SEEN_FROM = "from the side", "from the front", "from above"
-"""Along each axis."""
+"""The viewpoint along each axis."""
 _OUTLINE = 721
-"""Directions in which the furthest anchor point is one of the platform's outline."""
+"""Number of directions; the furthest anchor point in each belongs to the platform's outline."""
 
-# of their extent: exit points closer than this have names that would touch
+# shares of the exit points' extent: names of points closer than this would touch
 _CLOSE = 0.1
-# and those closer than this in x and y have names that would cover each other
+# and names of points closer than this in x and y would cover each other
 _TOGETHER = 0.02, 0.06
 
 _LOOKS, _PAD = 4, 3.0
 _FINE, _COARSE = (121, 95), (41, 31)
 
 _View = tuple[int, int]
-"""Which coordinates are to the right and upward."""
+"""The coordinates to the right and upward."""
 
 
 def draw_robot(robot: Robot, platform: Platform, path: Path) -> None:
-    """Write the picture of a robot as PNG; raises OSError."""
+    """Write the picture of a robot as PNG."""
     save_figure(figure_of(robot, platform), path, tight=True)
 
 
 def figure_of(robot: Robot, platform: Platform) -> Figure:
     """Return the picture of a robot.
 
-    A robot in space is seen from the front, from the side and from above, cut through the middle of
-    the box of targets. The workspace that tensions allow is coloured by how far they can stay from
-    their bounds in home's orientation; dotted is where targets are taken at any of theirs.
+    A robot in space is seen from the front, from the side and from above; the workspace is cut
+    through the middle of the box of targets. Its colour shows how far tensions can stay from their
+    bounds in home's orientation; a dotted line encloses targets accepted in all orientations.
     """
     shown, statics = view_of(platform), statics_of(robot)
     size = np.subtract(shown.high_m, shown.low_m)
@@ -63,14 +69,13 @@ def figure_of(robot: Robot, platform: Platform) -> Figure:
     for ax, view in zip(all_axes, views, strict=True):
         _draw_machine(ax, robot, platform, view)
         i, j = view
-        ax.set(xlabel=f"{_NAMES[i]} (m)", ylabel=f"{_NAMES[j]} (m)", aspect="equal")
+        label_view(ax, view)
         ax.set(xlim=(shown.low_m[i], shown.high_m[i]), ylim=(shown.low_m[j], shown.high_m[j]))
         ax.grid(visible=False)
         if not platform.is_planar:
             ax.set_title(_title(platform, view), fontsize="medium")
     figure.suptitle(robot.name)
-    handles, labels = all_axes[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=3)
+    legend_below(figure, all_axes[0], columns=3)
     for _ in range(_LOOKS):
         if _has_room(figure, all_axes[-1]):
             break
@@ -80,13 +85,13 @@ def figure_of(robot: Robot, platform: Platform) -> Figure:
 def _title(platform: Platform, view: _View) -> str:
     (k,) = {0, 1, 2} - set(view)
     middle_m = 0.5 * (platform.workspace_min_m[k] + platform.workspace_max_m[k])
-    return f"{_SEEN_FROM[k]}; workspace at {_NAMES[k]} = {middle_m:.2f} m"
+    return f"{_SEEN_FROM[k]}; workspace at {'xyz'[k]} = {middle_m:.2f} m"
 
 
 def _has_room(figure: Figure, ax: Axes) -> bool:
-    """Whether the names at exit points are within what is shown, outside of which are its numbers.
+    """Return whether the names of exit points lie inside the axes; outside are the tick labels.
 
-    Where not, it is widened: it gets smaller by that and the names do not.
+    If not, widen the axes' limits: the drawing shrinks and the names do not.
     """
     figure.draw_without_rendering()
     names = np.array([text.get_window_extent().padded(_PAD).get_points() for text in ax.texts])
@@ -100,14 +105,14 @@ def _has_room(figure: Figure, ax: Axes) -> bool:
 
 @dataclass(frozen=True)
 class _Section:
-    """What tensions allow in one view: `xs_m` to the right, `ys_m` upward, a value for each."""
+    """Tension margins in one view, on the grid of `xs_m` to the right and `ys_m` upward."""
 
     xs_m: FloatArray
     ys_m: FloatArray
     still_N: FloatArray
-    """By how far tensions can stay from their bounds at rest, in home's orientation."""
+    """How far tensions can stay from their bounds at rest, in home's orientation."""
     moving_N: FloatArray
-    """The same for targets, with their acceleration and reserve, in any of their orientations."""
+    """The same for targets, with their acceleration and reserve, in all their orientations."""
 
     @classmethod
     def of(cls, statics: PlatformStatics, shown: Box, view: _View) -> _Section:
@@ -131,7 +136,7 @@ class _Section:
 
 
 def _draw_workspace(figure: Figure, all_axes: list[Axes], sections: list[_Section]) -> None:
-    """Draw the sections in the same colours, and once what these are."""
+    """Draw the sections with a common colour scale and one colour bar."""
     most_N = max(float(section.still_N.max()) for section in sections)
     levels, filled = MaxNLocator(9).tick_values(0.0, most_N), None
     for ax, section in zip(all_axes, sections, strict=True):
@@ -141,41 +146,33 @@ def _draw_workspace(figure: Figure, all_axes: list[Axes], sections: list[_Sectio
         if section.moving_N.max() > 0.0:
             ax.contour(
                 xs, ys, section.moving_N, [0.0],
-                colors=_CABLE, linestyles="dotted", linewidths=1.0,
+                colors=LINES, linestyles="dotted", linewidths=1.0,
             )  # fmt: skip
     if filled is not None:
-        bar = figure.colorbar(filled, ax=all_axes, shrink=0.8 / len(sections), format="%g")
-        bar.set_label("distance of all tensions\nfrom their limits, at rest (N)")
-        bar.outline.set_visible(False)
+        label = "distance of all tensions\nfrom their limits, at rest (N)"
+        colour_bar(figure, filled, all_axes, label, 0.8 / len(sections))
     if any(section.moving_N.max() > 0.0 for section in sections):
-        all_axes[0].plot([], [], ":", color=_CABLE, lw=1.0, label="targets can be taken")
+        all_axes[0].plot([], [], ":", color=LINES, lw=1.0, label="targets can be taken")
 
 
 def _draw_machine(ax: Axes, robot: Robot, platform: Platform, view: _View) -> None:
     all_exits, home = np.array(platform.exit_points_m), np.array(platform.home_m)[list(view)]
     exits, anchors = all_exits[:, view], home + np.array(platform.anchor_points_m)[:, view]
     for a, b in zip(exits, anchors, strict=True):
-        ax.plot(*zip(a, b, strict=True), color=_CABLE, lw=1.2)
-    if view == (0, 1):  # from the front names would lie on each other
+        ax.plot(*zip(a, b, strict=True), color=LINES, lw=1.2)
+    if view == (0, 1):  # in the other views names would cover each other
         _name_all(ax, [axis.name for axis in robot.axes], exits)
-    ax.plot([], [], color=_CABLE, lw=1.2, label="cables, at rest")
-    ax.plot(*exits.T, "s", ms=6, color=_CABLE, label="exit points")
+    ax.plot([], [], color=LINES, lw=1.2, label="cables, at rest")
+    ax.plot(*exits.T, "s", ms=6, color=LINES, label="exit points")
     outward = np.linspace(0.0, 2.0 * np.pi, _OUTLINE)
     furthest = (np.column_stack((np.cos(outward), np.sin(outward))) @ anchors.T).argmax(axis=1)
     ax.add_patch(Polygon(anchors[furthest], color=_PLATFORM, alpha=_SEEN_THROUGH, zorder=3))
     ax.plot(*home, "o", ms=3, color=_PLATFORM, label="platform, at rest", zorder=3)
-    low = np.array(platform.workspace_min_m)[list(view)]
-    width, height = np.array(platform.workspace_max_m)[list(view)] - low
-    ax.add_patch(
-        Rectangle(
-            (low[0], low[1]), width, height, fill=False, ec=_TARGETS, lw=1.4, ls="--",
-            label="box of targets",
-        )
-    )  # fmt: skip
+    box_of_targets(ax, platform.workspace_min_m, platform.workspace_max_m, view)
 
 
 def _name_all(ax: Axes, names: list[str], exits_m: FloatArray) -> None:
-    """Write the names of exit points; in one where they lie above each other, or nearly so."""
+    """Write the names of exit points; those that nearly coincide share one label."""
     close = np.multiply(_TOGETHER, np.ptp(exits_m, axis=0).max())
     together = (np.abs(exits_m[:, None] - exits_m) <= close).all(axis=-1)
     for i, exit_m in enumerate(exits_m):
@@ -185,7 +182,7 @@ def _name_all(ax: Axes, names: list[str], exits_m: FloatArray) -> None:
 
 
 def _name(ax: Axes, name: str, exit_m: FloatArray, exits_m: FloatArray) -> None:
-    """Write a name beside its exit point: outward, and aside from another that is close by."""
+    """Write a name beside its exit point: outward, and away from a close neighbour."""
     away = exits_m - exit_m
     apart = np.linalg.norm(away, axis=1)
     apart[apart == 0.0] = np.inf

@@ -1,37 +1,148 @@
-"""What must be known of a new cable robot: questions, defaults that follow from the answers."""
+"""The questions about a new cable robot, with defaults that follow from earlier answers."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import combinations
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from cdpr_profiles import ProfileError, Winch, load_winch
-from cdpr_profiles.platform import WIDEST_m
-from cdpr_tools.robots.kinds import KINDS, RobotKind, kind_of
+from cdpr_profiles import ProfileError, Robot, Winch, load_robot, load_winch
+from cdpr_profiles.platform import Platform, WIDEST_m
+
+# Kinds of cable robots that `cdpr robot new` describes; each is modelled on a shipped robot.
+
+KINDS = {
+    "planar-3": "in a plane, x and y: 3 cables, two to hold and one to pull tight; it turns freely",
+    "planar-4": "in a plane, x, y and angle: 4 cables, one more than directions, to pull tight",
+    "point-4": "a point in space, x, y, z: 4 cables from above; 3 would do for a small place",
+    "suspended-6": "a platform in space on 6 cables from above, as few as its 6 directions take",
+    "suspended-8": "a platform in space on 8 cables from above: a larger place, and larger angles",
+    "spatial-8": "a platform in space, 8 cables from above and below: pulled tight from all sides",
+}
+"""By name: a description, and the reason for the number of cables."""
+SKETCH = r"""
+planar-3       planar-4       point-4        suspended-6, -8   spatial-8
+o         o    o         o    o         o    o  o     o  o     o  o     o  o
+ \       /      \       /      \       /      \  \   /  /       \  \   /  /
+  \#####/        \#####/        \     /         \#####/           \#####/
+   #####          #####          \   /           #####             #####
+     |           /     \           *                            /  /   \  \
+     o          o       o                                       o  o     o  o
+"""
+"""Sketches of the kinds: o is a winch, # the platform."""
+_BUS_DRIVES = 4
+"""Largest number of drives on a bus of 1 Mbit/s at 1 kHz."""
+_APART_m = 0.15
+"""Least distance of two proposed exit points: two winches side by side."""
+
+
+@dataclass(frozen=True)
+class RobotKind:
+    """A kind of robot, with the shipped robot whose figures are its defaults."""
+
+    name: str
+    robot: Robot
+    platform: Platform
+
+    @property
+    def cables(self) -> int:
+        """Number of cables."""
+        return len(self.robot.axes)
+
+    @property
+    def size(self) -> int:
+        """Number of coordinates of a point."""
+        return len(self.platform.home_m)
+
+    @property
+    def buses(self) -> int:
+        """Number of buses for its drives."""
+        return -(-self.cables // _BUS_DRIVES)
+
+    @property
+    def is_point(self) -> bool:
+        """Whether all its cables meet in one point."""
+        return len(set(self.platform.anchor_points_m)) == 1
+
+    @property
+    def controls_angles(self) -> bool:
+        """Whether its cables control angles."""
+        return len(self.platform.controlled) > self.size
+
+    @property
+    def turns_freely(self) -> bool:
+        """Whether its platform has an orientation that the cables do not control."""
+        return not self.controls_angles and not self.is_point
+
+    @property
+    def sides(self) -> str:
+        """Names of the numbers of a frame's size."""
+        return "width, height" if self.size == 2 else "width, depth, height"
+
+    @property
+    def frame_m(self) -> tuple[float, ...]:
+        """Size of its frame: the extent of the exit points; the height is from the floor."""
+        exits = np.array(self.platform.exit_points_m)
+        spans = exits.max(axis=0) - exits.min(axis=0)
+        return (*(float(span) for span in spans[:-1]), float(exits[:, -1].max()))
+
+    @property
+    def side_m(self) -> float:
+        """Greatest distance of two anchor points."""
+        return max(math.dist(*pair) for pair in combinations(self.platform.anchor_points_m, 2))
+
+    def exits_m(self, frame_m: tuple[float, ...]) -> list[tuple[float, ...]]:
+        """Return the exit points with the frame scaled to another size, to the mm.
+
+        Points that would be too close to each other are moved apart within the frame.
+        """
+        exits = np.array(self.platform.exit_points_m) * np.array(frame_m) / self.frame_m
+        low, high = exits.min(axis=0), exits.max(axis=0)
+        for i, j in combinations(range(self.cables), 2):
+            way = exits[j] - exits[i]
+            if (distance := float(np.linalg.norm(way))) < _APART_m:
+                pair = 0.5 * (exits[i] + exits[j]) + np.outer([-0.5, 0.5], way) * (
+                    _APART_m / distance
+                )
+                pair += np.maximum(low - pair.min(axis=0), 0.0)
+                exits[[i, j]] = pair + np.minimum(high - pair.max(axis=0), 0.0)
+        return [tuple(round(float(x), 3) + 0.0 for x in point) for point in exits]
+
+    def scale(self, frame_m: tuple[float, ...]) -> float:
+        """Return the least ratio of a frame side to that of the shipped robot."""
+        return min(size_m / usual_m for size_m, usual_m in zip(frame_m, self.frame_m, strict=True))
+
+
+def kind_of(name: str) -> RobotKind:
+    """Return the kind of this name, which must be in KINDS."""
+    robot = load_robot(name)
+    assert robot.platform is not None
+    return RobotKind(name, robot, robot.platform)
+
 
 Answers = dict[str, Any]
-"""What was answered, by key, of the type that the key's question gives it; SI."""
+"""The answers by key, in SI units, with the type that `Question.read` returns."""
 _COUNTS = ("no", "one", "two", "three", "four", "five", "six", "seven", "eight")
 _POINTS = {2: "-2, 3", 3: "-2, 1.5, 3"}
 _TORQUE_RESERVE = 0.85
-"""Share of the torque that tensions may take; the rest is for friction and for control."""
+"""Share of the torque available for tensions; the rest is for friction and control."""
 
 
 class AnswerError(ValueError):
-    """An answer that cannot be; the text says what is allowed."""
+    """An invalid answer; the text says what is allowed."""
 
 
 @dataclass(frozen=True)
 class Question:
-    """One question: its key, its text, what it is taken for, and its usual answer.
+    """One question: its key, its text, how its answer is read, and its default.
 
-    `read` turns a text into the value, given the answers so far, or raises AnswerError; `default`
-    gives a text that `read` takes.
+    `read` converts a text into the value, given the answers so far, or raises AnswerError;
+    `default` returns a text that `read` accepts.
     """
 
     key: str
@@ -52,7 +163,7 @@ def kind_question() -> Question:
 
 
 def questions(folder: Path, name: str, kind: RobotKind) -> list[Question]:
-    """Return the questions about a kind in their order; files are looked for in `folder` first."""
+    """Return the questions about a kind in order; `folder` is the first to search for files."""
     drives = _drives(folder, name, kind)
     return [
         *drives,
@@ -84,7 +195,7 @@ def _drives(folder: Path, name: str, kind: RobotKind) -> list[Question]:
 
 
 def _geometry(kind: RobotKind) -> list[Question]:
-    """Return the questions on where the cables leave the frame and end on the platform."""
+    """Return the questions on the frame, the exit points and the anchor points."""
     return [
         Question("frame_m", f"Frame: {kind.sides} (m)", _size(kind), lambda _: _text(kind.frame_m)),
         *(_exit(i, kind) for i in range(kind.cables)),
@@ -104,7 +215,7 @@ def _limits(kind: RobotKind) -> list[Question]:
     )  # fmt: skip
 
     def usual(value: float, otherwise: Callable[[Answers], str]) -> Callable[[Answers], str]:
-        """Have the figure of the shipped robot, where its winch is taken and it is not first."""
+        """Default to the shipped robot's value if it has the same winch and is not the first."""
 
         def default(answers: Answers) -> str:
             same = answers["winch"][0] == kind.robot.axes[0].winch.profile
@@ -140,11 +251,11 @@ def _limits(kind: RobotKind) -> list[Question]:
 
 
 def _turning(kind: RobotKind) -> list[Question]:
-    """Return the questions on targets that are turned; angles are asked in degrees."""
+    """Return the questions on turned targets; angles are asked in degrees."""
     platform = kind.platform
 
     def share(answers: Answers) -> float:
-        """Return how much slower than the shipped one a larger platform is to turn."""
+        """Return the share of the shipped robot's angular speed for a larger platform."""
         side_m: float = answers["side_m"]
         return _speed_share(answers) * min(kind.side_m / side_m, 1.0)
 
@@ -167,7 +278,7 @@ def _turning(kind: RobotKind) -> list[Question]:
 
 
 def _speed_share(answers: Answers) -> float:
-    """Return how much slower the winches are than those of the shipped robot; 1.0 if faster."""
+    """Return the winches' speed over that of the shipped robot's winches, at most 1.0."""
     winches: tuple[Winch, Winch] = (answers["winch"][1], answers["kind"].robot.axes[0].winch)
     taken, usual = (
         abs(winch.cable_m_per_motor_rad) * winch.motor.rated_speed_rad_s for winch in winches
@@ -183,7 +294,7 @@ def places(
 ) -> list[Question]:
     """Return the questions on the box of targets and the place of rest.
 
-    The box is a proposal, `stand` makes one for the place of rest under the box that was answered.
+    `low_m` and `high_m` are the proposed box; `stand` proposes a place of rest under the final box.
     """
     point = _point(kind.size)
     names = ", ".join("xyz"[: kind.size])
@@ -206,7 +317,7 @@ def places(
 
 def _exit(i: int, kind: RobotKind) -> Question:
     def default(answers: Answers) -> str:
-        """Return the shipped robot's exit point, its frame stretched to the size that is wanted."""
+        """Return the shipped robot's exit point, with its frame scaled to the answered size."""
         return _text(kind.exits_m(answers["frame_m"])[i])
 
     names = ", ".join("xyz"[: kind.size])
@@ -223,7 +334,7 @@ def _side(kind: RobotKind) -> Question:
     least = 0.0 if kind.turns_freely else 0.01
 
     def default(answers: Answers) -> str:
-        """Return the shipped robot's, as much larger or smaller as the frame is."""
+        """Return the shipped robot's value, scaled with the frame."""
         return _figure(min(kind.scale(answers["frame_m"]) * kind.side_m, 10.0))
 
     return Question("side_m", text, _number(least, 10.0), default)
@@ -231,12 +342,12 @@ def _side(kind: RobotKind) -> Question:
 
 def _anchor(i: int, kind: RobotKind) -> Question:
     def facing(answers: Answers) -> str:
-        """Return the corner that faces the exit point, the cables in their order around."""
+        """Return the corner that faces the exit point; the cables keep their order around."""
         n = kind.cables
         exits = np.array([answers[f"exit_{j + 1}_m"] for j in range(n)])
         away = exits - exits.mean(axis=0)
         order = np.argsort(np.arctan2(away[:, 1], away[:, 0]))
-        # the triangle stands as its first corner has it: below the middle, or above it
+        # the exit point furthest up or down fixes the triangle's first corner: above or below
         lone = int(np.argmax(np.abs(away[:, 1])))
         first = math.copysign(math.pi / 2, away[lone, 1])
         turn = int(np.where(order == i)[0][0]) - int(np.where(order == lone)[0][0])
@@ -258,7 +369,7 @@ def _anchor(i: int, kind: RobotKind) -> Question:
 
 
 def axis_names(answers: Answers) -> list[str]:
-    """Return what to call the axes, after where their cables leave."""
+    """Return names for the axes, after the positions of their exit points."""
     kind = answers["kind"]
     exits = [answers[f"exit_{i + 1}_m"] for i in range(kind.cables)]
     if kind.turns_freely:
@@ -391,5 +502,5 @@ def _home(size: int) -> Callable[[str, Answers], tuple[float, ...]]:
 
 
 def _text(point_m: tuple[float, ...], digits: int = 3) -> str:
-    # 0.0 is added so that nothing is told as -0
+    # adding 0.0 avoids -0
     return ", ".join(f"{round(value, digits) + 0.0:g}" for value in point_m)

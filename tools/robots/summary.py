@@ -1,4 +1,4 @@
-"""A cable robot in words, figures and a sketch made of letters."""
+"""A cable robot as text, figures and a sketch made of letters."""
 
 from __future__ import annotations
 
@@ -9,27 +9,30 @@ from typing import Any
 
 import numpy as np
 
-from cdpr_profiles import Robot
 from cdpr_profiles.platform import Platform
-from cdpr_rt.arrays import FloatArray
-from cdpr_rt.core.supervision.limits import Limits
+from cdpr_rt.diagnosis.predictions import (
+    FRICTIONS,
+    SWING_S,
+    Loss,
+    Swing,
+    corner_swings,
+    free_rotation,
+    lowest_resonance_Hz,
+    slips,
+)
+from cdpr_rt.diagnosis.subject import Subject, point_text
 from cdpr_rt.errors import GeometryError
-from cdpr_rt.robots.cable_loss.prediction import SWING_S, corner_swings
-from cdpr_rt.robots.free_rotation import free_rotation
-from cdpr_rt.robots.kinematics.free_rotation_kernel import SWINGS_m
-from cdpr_rt.robots.platform.design.designed_loop import designed_loop
-from cdpr_rt.robots.platform.design.loop_design import STIFFNESS_SHARES
-from cdpr_rt.robots.platform_model import PlatformModel
-from cdpr_rt.robots.resonance import lowest_resonance_Hz
-from cdpr_rt.robots.robot_arrays import limits_of
-from cdpr_rt.robots.statics import statics_of, view_of
+from cdpr_rt.model.free_rotation_kernel import SWINGS_m
+from cdpr_rt.model.statics import PlatformStatics, view_of
+from cdpr_rt.platform.loop_design import STIFFNESS_SHARES
 
 _COLUMNS, _ROWS = 65, 23
 _STIFFNESS_OFF = max(STIFFNESS_SHARES) - 1.0
 
 
-def figures(robot: Robot, platform: Platform) -> dict[str, Any]:
-    """Return what can be said of the robot in numbers, SI, as JSON has it."""
+def figures(s: Subject) -> dict[str, Any]:
+    """Return the figures of a robot for JSON, in SI units."""
+    robot, platform = s.robot, s.platform
     figures: dict[str, Any] = {
         "robot": robot.profile,
         "mass_kg": platform.mass_kg,
@@ -45,22 +48,22 @@ def figures(robot: Robot, platform: Platform) -> dict[str, Any]:
             )
         ],
     }
-    return figures | _of_tensions(robot, platform, figures["axes"])
+    return figures | _of_tensions(s, figures["axes"])
 
 
-def _of_tensions(
-    robot: Robot, platform: Platform, axes: Sequence[dict[str, Any]]
-) -> dict[str, Any]:
-    statics, limits = statics_of(robot), limits_of(robot)
+def _of_tensions(s: Subject, axes: Sequence[dict[str, Any]]) -> dict[str, Any]:
+    statics, platform = s.statics, s.platform
     home, points, turns = np.array(platform.home_m), statics.points(), statics.orientations
     still = np.array([statics.margin_N(points, 0.0, turn) for turn in turns])
     acceleration = platform.acceleration_m_s2
     moving = np.array([statics.margin_N(points, acceleration, turn) for turn in turns])
     lengths = np.array([statics.lengths(points, turn) for turn in turns])
     at_home_m, least_N = statics.lengths(home), statics.least_tensions_N(home)
-    for figures, swings in zip(axes, corner_swings(robot), strict=True):
+    of_drives = corner_swings(s, Loss.DRIVE)
+    for figures, swings, of_drive in zip(axes, corner_swings(s), of_drives, strict=True):
         if not swings:
             continue
+        figures["lowered_after"] = {"cable": _lowered(swings), "drive": _lowered(of_drive)}
         worst = max(swings, key=lambda swing: swing.swing_m)
         figures["broken"] = {
             "at_m": worst.position_m,
@@ -74,9 +77,8 @@ def _of_tensions(
         figures["least_tension_at_home_N"] = _finite(least_N[i])
         figures["cable_m"] = [float(lengths[..., i].min()), float(lengths[..., i].max())]
         figures["tension_N"] = [float(statics.low_N[i]), float(statics.high_N[i])]
-        gain = abs(robot.axes[i].winch.cable_m_per_motor_rad)
-        figures["torque_at_most_Nm"] = float(statics.high_N[i]) * gain
-        figures["torque_limit_Nm"] = float(np.broadcast_to(limits.torque_Nm, (len(axes),))[i])
+        figures["torque_at_most_Nm"] = float(statics.high_N[i] * s.arm_m[i])
+        figures["torque_limit_Nm"] = float(s.torque_Nm[i])
     of_all: dict[str, Any] = {
         "held_share": float(np.mean(still >= 0.0)),
         "target_share": float(np.mean(moving >= statics.model.reserve_N)),
@@ -84,35 +86,43 @@ def _of_tensions(
         "reserve_at_home_N": _finite(float(statics.margin_N(home))),
         "reserve_at_rest_N": _finite(still.min()),
         "reserve_in_motion_N": _finite(moving.min()),
-        "lowest_resonance_Hz": float(lowest_resonance_Hz(statics.model, robot.axes, points).min()),
-        "lengths_disagree_m": _lengths_disagree_m(limits, platform),
+        "lowest_resonance_Hz": float(lowest_resonance_Hz(s.model, s.axes, points).min()),
+        # without a redundant cable lengths cannot disagree
+        "lengths_disagree_m": s.limits.lengths_disagree_m if s.n > s.model.size else None,
     }
-    of_all["loop"] = _of_loop(robot, statics.model)
+    (of_lengths,) = corner_swings(s, Loss.LENGTHS)
+    of_all["lowered_after_lengths"] = _lowered(of_lengths)
+    most_N = np.broadcast_to(s.limits.tension_max_N, (s.n,))
+    for i, slip in enumerate(slips(s)):
+        axes[i]["slip"] = {key: _finite(value) for key, value in asdict(slip).items()}
+        axes[i]["slip"]["allowed_N"] = _finite(most_N[i])
+    of_all["loop"] = _of_loop(s)
     if statics.turns_freely:
         of_all["turns_at_most_rad"] = _finite(np.abs(statics.angle_rad(points)).max())
-        of_all["free_rotation"] = _of_free_rotation(statics.model)
+        turning = free_rotation(s.model)
+        of_all["free_rotation"] = (
+            None if turning is None else asdict(turning) | {"lasts_s": turning.lasts_s(SWINGS_m)}
+        )
     return of_all
 
 
-def _lengths_disagree_m(limits: Limits, platform: Platform) -> float | None:
-    """Return by how much lengths may disagree; None where no cable is redundant: they cannot."""
-    redundant = len(platform.exit_points_m) > len(platform.controlled)
-    return limits.lengths_disagree_m if redundant else None
+def _lowered(swings: Sequence[Swing]) -> dict[str, float] | None:
+    """Return the fastest descent and the height at which friction may hold it; None if unknown."""
+    if not swings:
+        return None
+    return {
+        "fastest_m_s": max(swing.fastest_m_s for swing in swings),
+        "hangs_m": max(swing.hangs_m for swing in swings),
+    }
 
 
-def _of_free_rotation(model: PlatformModel) -> dict[str, float] | None:
-    """Return how a platform swings that no cable keeps from turning; None where none can."""
-    swings = free_rotation(model)
-    return None if swings is None else asdict(swings) | {"lasts_s": swings.lasts_s(SWINGS_m)}
+def _of_loop(s: Subject) -> dict[str, float] | None:
+    """Return the control loop's stability margins at its worst pose and stiffness.
 
-
-def _of_loop(robot: Robot, model: PlatformModel) -> dict[str, float] | None:
-    """Return what the control's loop keeps at the worst of its poses and stiffnesses.
-
-    None where the cables do not hold the platform.
+    None if the cables do not hold the platform.
     """
     try:
-        loop = designed_loop(model, robot.axes, robot.sync_period_s)
+        loop = s.loop
     except GeometryError:
         return None
     worst = min(loop.margins, key=lambda there: there.modulus)
@@ -134,23 +144,28 @@ def _finite(value: float) -> float | None:
     return float(value) if math.isfinite(value) else None
 
 
-def lines(robot: Robot, platform: Platform, figures: dict[str, Any]) -> list[str]:
-    """Return the same as lines for people; lengths in m, angles in degrees."""
+def lines(s: Subject, figures: dict[str, Any]) -> list[str]:
+    """Return the figures as lines of text; lengths in m, angles in degrees."""
+    robot, platform = s.robot, s.platform
     text = [
         f"{robot.name} ({robot.profile})",
         f"platform   {platform.mass_kg:g} kg, {platform.speed_m_s:g} m/s and "
         f"{platform.acceleration_m_s2:g} m/s2 along each direction",
-        f"at rest    {_point(platform.home_m)} m, within {platform.home_tolerance_m:g} m",
-        f"targets    {_point(platform.workspace_min_m)} to {_point(platform.workspace_max_m)} m",
+        f"at rest    {point_text(platform.home_m)} m, within {platform.home_tolerance_m:g} m",
+        f"targets    {point_text(platform.workspace_min_m)} to "
+        f"{point_text(platform.workspace_max_m)} m",
         *_orientation_lines(platform),
         *_tension_lines(figures),
         "",
         *_table(figures["axes"]),
         "",
         *_broken_lines(figures["axes"]),
+        *_lowered_lines(figures),
+        "",
+        *_slip_lines(figures["axes"]),
     ]
     if platform.is_planar:
-        text += ["", *_sketch(robot, platform)]
+        text += ["", *_sketch(s.statics, platform)]
     return text
 
 
@@ -171,7 +186,7 @@ def _orientation_lines(platform: Platform) -> list[str]:
 
 
 def _broken_lines(axes: Sequence[dict[str, Any]]) -> list[str]:
-    """Return a line for each cable on how far the platform gets when it breaks, at the worst."""
+    """Return a line for each cable: how far the platform moves at worst if the cable breaks."""
     if any("broken" not in axis for axis in axes):
         return []
     lines = [
@@ -181,9 +196,8 @@ def _broken_lines(axes: Sequence[dict[str, Any]]) -> list[str]:
     ]
     for axis in axes:
         broken = axis["broken"]
-        line = (
-            f"{axis['name']:16} at {_point(broken['at_m'])} m it swings {broken['swing_m']:.2f} m"
-        )
+        line = f"{axis['name']:16} at {point_text(broken['at_m'])} m it swings "
+        line += f"{broken['swing_m']:.2f} m"
         if broken["turn_rad"] > math.radians(1.0):
             line += f" and turns by {math.degrees(broken['turn_rad']):.0f} deg"
         line += f"; {broken['away_m']:.2f} m away, {broken['aside_m']:.2f} m aside"
@@ -191,8 +205,55 @@ def _broken_lines(axes: Sequence[dict[str, Any]]) -> list[str]:
     return lines
 
 
+def _lowered_lines(figures: dict[str, Any]) -> list[str]:
+    """Return a line for each loss: how the platform is lowered in the worst case."""
+    of_lengths = figures["lowered_after_lengths"]
+    if of_lengths is None:
+        return []
+    rows = [("no lengths", of_lengths)]
+    for axis in figures["axes"]:
+        rows += [(f"{what} {axis['name']}", found) for what, found in axis["lowered_after"].items()]
+    lines = [
+        "",
+        "if a cable, a drive or the lengths are lost (predicted, at the worst corner, for winches "
+        f"that rub with up to {100.0 * FRICTIONS[-1]:.0f} %",
+        "of the rated torque): how fast the platform comes down, and whether it comes down at all:",
+    ]
+    for name, found in rows:
+        line = f"{name:24} up to {found['fastest_m_s']:.2f} m/s; "
+        if found["hangs_m"] > 0.0:
+            line += f"friction may keep it {found['hangs_m']:.2f} m above its stand, without power"
+        else:
+            line += "comes down"
+        lines.append(line)
+    return lines
+
+
+def _slip_lines(axes: Sequence[dict[str, Any]]) -> list[str]:
+    """Return a line for each cable: the effect of unnoticed slip, and the tension afterwards."""
+    lines = [
+        "if a cable slips at rest (predicted, at the worst of home and the same places): the "
+        "largest slip that the lengths do not show",
+        "(suddenly; slowly, and by how much the platform is off then), and the highest tension as "
+        "the cable is taut again:",
+    ]
+    for axis in axes:
+        slip = axis["slip"]
+        if slip["unnoticed_m"] is None:
+            seen = f"none is shown, {slip['off_per_m']:.2f} mm off for each mm"
+        else:
+            seen = f"{1e3 * slip['sudden_m']:.0f} mm; {1e3 * slip['unnoticed_m']:.0f} mm, "
+            seen += f"{1e3 * slip['off_m']:.0f} mm off"
+        peak = f"{slip['peak_N']:.0f} N"
+        if slip["allowed_N"] is not None:
+            above = slip["peak_N"] > slip["allowed_N"]
+            peak += f", more than the {slip['allowed_N']:g} N allowed" if above else ""
+        lines.append(f"{axis['name']:16} {seen}; {peak}")
+    return lines
+
+
 def _tension_lines(figures: dict[str, Any]) -> list[str]:
-    # 99.9 % is not all
+    # round down: 99.9 % is not 100 %
     held, taken = (math.floor(100.0 * figures[key]) for key in ("held_share", "target_share"))
     reserve, kept = figures["reserve_in_motion_N"], figures["kept_for_control_N"]
     least = "" if reserve is None or reserve < 0.0 else f" ({reserve:.0f} N at the worst place)"
@@ -210,7 +271,7 @@ def _tension_lines(figures: dict[str, Any]) -> list[str]:
     if figures["loop"] is not None:
         lines += _loop_lines(figures["loop"])
     turns = figures.get("turns_at_most_rad", 0.0)
-    if turns != 0.0:  # as that of a point is
+    if turns != 0.0:  # it is 0 for a point
         turning = "turns over" if turns is None else f"turns by up to {math.degrees(turns):.1f} deg"
         lines.append(f"           it {turning} there, which no cable can prevent")
         lines += _free_rotation_lines(figures["free_rotation"])
@@ -266,8 +327,8 @@ def _table(axes: Sequence[dict[str, Any]]) -> list[str]:
     rows = [f"{'cable, axis':19}{'exit point, m':>{a}}{'anchor point, m':>{b}}"]
     rows[0] += f"{'cable, m':>16}{'tension, N':>14}{'torque, Nm':>16}"
     for number, axis in enumerate(axes, 1):
-        row = f"{number:>2} {axis['name']:16}{_point(axis['exit_point_m']):>{a}}"
-        row += f"{_point(axis['anchor_point_m'], 3):>{b}}"
+        row = f"{number:>2} {axis['name']:16}{point_text(axis['exit_point_m']):>{a}}"
+        row += f"{point_text(axis['anchor_point_m'], 3):>{b}}"
         cable = "{:.2f} to {:.2f}".format(*axis["cable_m"])
         tension = "{:g} to {:g}".format(*axis["tension_N"])
         torque = f"{axis['torque_at_most_Nm']:.3g} of {axis['torque_limit_Nm']:g}"
@@ -275,8 +336,8 @@ def _table(axes: Sequence[dict[str, Any]]) -> list[str]:
     return rows
 
 
-def _sketch(robot: Robot, platform: Platform) -> list[str]:
-    """Return the plane as letters: exit points, home, box of targets, where it can be held."""
+def _sketch(statics: PlatformStatics, platform: Platform) -> list[str]:
+    """Return the plane as letters: exit points, home, box of targets and workspace."""
     shown = view_of(platform)
     low, size = np.array(shown.low_m), np.subtract(shown.high_m, shown.low_m)
     # a letter is about twice as high as it is wide
@@ -285,7 +346,6 @@ def _sketch(robot: Robot, platform: Platform) -> list[str]:
     cells, points = np.full((rows, columns), " "), shown.grid(columns, rows)
     box = (points >= np.array(platform.workspace_min_m)).all(axis=-1)
     box &= (points <= np.array(platform.workspace_max_m)).all(axis=-1)
-    statics = statics_of(robot)
     cells[statics.margin_N(points) >= 0.0] = "."
     cells[box] = np.where(statics.is_target(points[box], statics.orientations), "#", "!")
 
@@ -296,11 +356,6 @@ def _sketch(robot: Robot, platform: Platform) -> list[str]:
     for i, position_m in enumerate(platform.exit_points_m):
         put(position_m, str((i + 1) % 10))
     put(platform.home_m, "o")
-    legend = "1, 2 ... exit points   o at rest   # targets   . held as well   "
+    legend = "1, 2 ... exit points   o at rest   # targets   . also held   "
     legend += "! targets that are not taken"
     return ["".join(row).rstrip() for row in cells[::-1]] + [legend]
-
-
-def _point(position_m: Sequence[float] | FloatArray, digits: int = 2) -> str:
-    # 0.0 is added so that nothing is told as -0
-    return "(" + ", ".join(f"{round(value, digits) + 0.0:.{digits}f}" for value in position_m) + ")"

@@ -1,1 +1,1 @@
-"""Leading a robot by hand: what the hand holds, the stream it sends, what it is shown."""
+"""Lead a robot by hand: input devices, the set-point stream, and the operator's view."""

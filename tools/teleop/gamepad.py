@@ -1,6 +1,6 @@
-"""A gamepad by evdev: found, read without waiting, and found again when it was unplugged.
+"""A gamepad through evdev: found, read without waiting, and found again after unplugging.
 
-And what its events do to a hand: sticks, a button to be held, one to confirm.
+Also how its events act on a hand: sticks, a button to hold, one to confirm.
 """
 
 from __future__ import annotations
@@ -24,49 +24,49 @@ if TYPE_CHECKING:
     EvdevDevice = InputDevice[str]
 
 SignedAxis = tuple[int, int]
-"""An axis, and -1 where it is turned round: sticks count downward."""
+"""An axis, and -1 if it is reversed: sticks count downward."""
 
 
 @dataclass(frozen=True)
 class AxisRange:
-    """The values that an axis of a stick has, as the kernel tells them."""
+    """The range of values of a stick's axis, as the kernel reports it."""
 
     least: int
     most: int
 
     def part(self, value: int) -> float:
-        """Return a value as a part of the way from the middle, -1 to 1."""
+        """Return a value as a share of the way from the middle, -1 to 1."""
         half = 0.5 * (self.most - self.least)
         return min(max((value - self.least) / half - 1.0, -1.0), 1.0) if half > 0.0 else 0.0
 
 
 @dataclass(frozen=True)
 class StickMap:
-    """Which axes and buttons mean what, by the numbers of evdev, and how they act."""
+    """Functions of axes and buttons, by their evdev numbers, and their settings."""
 
     moves: tuple[SignedAxis, ...]
-    """Axes that move the hand along x, y, z; z may be left out."""
+    """Axes that move the hand along x, y, z; z may be missing."""
     turns: tuple[SignedAxis, ...]
-    """Axes that turn it, about those of the room's axes that `about` says."""
+    """Axes that turn it about the room's axes in `about`."""
     about: tuple[int, ...]
     dead_man: int
     confirm: int
     dead_zone: float
-    """Part of the way, in any direction, in which a stick does nothing."""
+    """Share of the way, in any direction, in which a stick does nothing."""
     speed_m_s: float
-    """Of the hand, with a stick at its end; it turns `TURN_RAD_PER_m` times as fast."""
+    """Speed of the hand with a fully pushed stick; it turns `TURN_RAD_PER_m` times as fast."""
 
     @property
     def axes(self) -> tuple[int, ...]:
-        """Return all axes that are used."""
+        """Return all axes in use."""
         return tuple(axis for axis, _ in (*self.moves, *self.turns))
 
 
 class Stick(Hand):
     """A hand that moves as fast as sticks are pushed, while the dead man's button is held.
 
-    The speed grows with the square of the way from the dead zone's edge, so that it can be slow.
-    Only a press that is seen counts: a button that was held before leads nobody.
+    The speed grows with the square of the way from the dead zone's edge, to allow slow motion.
+    Only a press that is seen counts: a button that was already held does not move the robot.
     """
 
     def __init__(self, stick_map: StickMap, scale: float) -> None:
@@ -80,35 +80,35 @@ class Stick(Hand):
         self.confirmed = 0
 
     def begin(self, ranges: dict[int, AxisRange], values: dict[int, int]) -> None:
-        """Go on with a device that has these ranges, its axes at these values; nothing is held."""
+        """Start with a device that has these ranges and axis values; no button counts as held."""
         self._ranges = ranges
         self.held = False
         for axis, value in values.items():
             self.move_axis(axis, value)
 
     def reset(self) -> None:
-        """Take back what was confirmed so far."""
+        """Discard confirmations so far."""
         self.confirmed = 0
 
     def release(self) -> None:
-        """Take the hand off: the device is gone, or what it did is not known."""
+        """Release the hand: the device is gone, or its state is unknown."""
         self.held = False
         self._parts = dict.fromkeys(self._parts, 0.0)
 
     def move_axis(self, axis: int, value: int) -> None:
-        """Note where an axis stands."""
+        """Store the position of an axis."""
         if axis in self._parts:
             self._parts[axis] = self._ranges[axis].part(value)
 
     def press(self, key: int, down: bool) -> None:
-        """Note a button that goes down or up."""
+        """Process a button that goes down or up."""
         if key == self._map.dead_man:
             self.held = down
         elif key == self._map.confirm and down:
             self.confirmed += 1
 
     def advance(self, now_s: float, longest_s: float) -> None:
-        """Move the hand on to `now_s`, in one go by no more than `longest_s` takes it."""
+        """Advance the hand to `now_s`, at most by the motion of `longest_s` in one call."""
         passed_s = min(now_s - self._before_s, longest_s)
         self._before_s = now_s
         if not self.held or not passed_s > 0.0:
@@ -122,7 +122,7 @@ class Stick(Hand):
         self.turn((vector[0], vector[1], vector[2]))
 
     def _pushed(self, axes: tuple[SignedAxis, ...]) -> list[float]:
-        """Return how fast each of the axes is to go, -1 to 1; the first two are one stick."""
+        """Return the speed of each axis, -1 to 1; the first two belong to one stick."""
         values = [sign * self._parts[axis] for axis, sign in axes]
         dead, speeds = self._map.dead_zone, []
         for stick in (values[:2], values[2:]):
@@ -135,20 +135,20 @@ class Stick(Hand):
 _EV_SYN, _EV_KEY, _EV_ABS = 0, 1, 3
 _SYN_DROPPED = 3
 _REPEATED = 2
-"""A key's value while the kernel repeats it: no press."""
+"""A key's value while the kernel repeats it; it is not a press."""
 _SEEK_S: Final = 1.0
 _LONGEST_S: Final = 0.1
 _EVERY_DEVICE: Final = Path("/dev/input")
 AXES: Final = {2: "ABS_X,-ABS_Y", 3: "ABS_X,-ABS_Y,-ABS_HAT0Y"}
 """Left stick, and the directional pad upward: they move the hand along x, y, z."""
 TURN_AXES: Final = {0: "", 1: "-ABS_RX", 2: "ABS_RY,ABS_RX", 3: "ABS_RY,ABS_RX,-ABS_HAT0X"}
-"""Right stick, and the directional pad to the left: they turn it, by how many angles there are."""
+"""Right stick, and the directional pad to the left: they turn it, by the number of angles."""
 
 
 class Gamepad:
-    """Sticks and two buttons of a gamepad; unplugged, it holds the robot until it is back."""
+    """Sticks and two buttons of a gamepad; if unplugged, it holds the robot until it is back."""
 
-    hint = "hold the dead man's button and push a stick; let go to stop; Ctrl-C ends"
+    hint = "hold the dead man's button and push a stick; release it to stop; Ctrl-C ends"
 
     def __init__(self, finder: EvdevFinder, stick_map: StickMap, scale: float) -> None:
         device = finder.find()
@@ -162,7 +162,7 @@ class Gamepad:
         self._attach(device)
 
     def read(self, now_s: float) -> InputSample:
-        """Return where the hand is."""
+        """Return the present sample of the hand."""
         stick = self._stick
         if self._device is None:
             self._seek(now_s)
@@ -170,7 +170,7 @@ class Gamepad:
             self._drain(self._device)
         if self._first:
             self._first = False
-            stick.reset()  # what was pressed before anybody listened
+            stick.reset()  # presses before the first read do not count
         stick.advance(now_s, _LONGEST_S)
         trouble = "" if self._device is not None else "the gamepad is gone: plug it in again"
         return InputSample(
@@ -199,7 +199,7 @@ class Gamepad:
             if device is not None:
                 self._attach(device)
         except (BadInputError, OSError):
-            return  # gone again, or not ready yet
+            return  # gone again, or not yet ready
 
     def _drain(self, device: EvdevDevice) -> None:
         try:
@@ -220,7 +220,7 @@ class Gamepad:
             if value != _REPEATED:
                 self._stick.press(code, value != 0)
         elif kind == _EV_SYN and code == _SYN_DROPPED:
-            # events were lost, perhaps the one that let go
+            # events were lost, perhaps the release of the button
             self._stick.release()
             for axis in self._map.axes:
                 self._stick.move_axis(axis, device.absinfo(axis).value)
@@ -235,9 +235,9 @@ def stick_map(
     dead_zone: float,
     speed_m_s: float,
 ) -> StickMap:
-    """Return the map that names such as "ABS_X,-ABS_Y" and "BTN_TR" make; raises BadInputError.
+    """Return the map for names such as "ABS_X,-ABS_Y" and "BTN_TR"; raises BadInputError.
 
-    Axes that are not named are those of `AXES` and `TURN_AXES`.
+    By default the axes are those of `AXES` and `TURN_AXES`.
     """
     k, about = directions
     moves = _axes("--axes", axes or AXES[k], "xyz"[:k])
@@ -269,7 +269,7 @@ def _axes(option: str, text: str, directions: str, how: str = "") -> tuple[Signe
 class EvdevFinder:
     """Finds the device at `path`, or the first that has the axes and buttons of `used`.
 
-    Raises BadInputError where the library for gamepads is missing.
+    Raises BadInputError if the library for gamepads is missing.
     """
 
     def __init__(self, path: Path | None, used: StickMap) -> None:
@@ -277,7 +277,7 @@ class EvdevFinder:
         self._path, self._used = path, used
 
     def find(self) -> EvdevDevice | None:
-        """Open it; raises BadInputError where it may not be read, or has not what is needed."""
+        """Open it; raises BadInputError if it is not readable or lacks a needed axis or button."""
         path, refused = self._path, ""
         for node in [path] if path is not None else sorted(_EVERY_DEVICE.glob("event*")):
             try:
@@ -301,7 +301,7 @@ class EvdevFinder:
         return None
 
     def missing_text(self) -> str:
-        """Say in what way it is not there."""
+        """Return the text that says why no device was found."""
         if self._path is not None:
             return f"--input {self._path}: is no input device; allowed: /dev/input/event0 and so on"
         return (
@@ -310,7 +310,7 @@ class EvdevFinder:
         )
 
     def _missing(self, device: EvdevDevice) -> str:
-        """Return the names of what a device does not have, "" where it has everything."""
+        """Return the names of the parts that a device lacks; "" if it has all."""
         names, used = self._evdev.ecodes, self._used
         has = device.capabilities(absinfo=False)
         lacks = [names.ABS[axis] for axis in used.axes if axis not in has.get(_EV_ABS, ())]

@@ -6,18 +6,18 @@ import math
 from dataclasses import dataclass
 from typing import Final, Protocol
 
-from cdpr_rt.service.streams.stream_packet import LARGEST_SCALE, REACH_M
+from cdpr_rt.service.stream_packet import LARGEST_SCALE, REACH_M
 from cdpr_tools.errors import BadInputError
 
 SMALLEST_SCALE: Final = 1e-3
 _REACH_USED: Final = 0.9
 TURN_RAD_PER_m: Final = math.radians(100.0)
-"""How far a hand turns by what would move it a metre: a tenth of a degree for a millimetre."""
+"""Rotation of a hand for the input of one metre: a tenth of a degree for a millimetre."""
 
 Vector = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]
 Directions = tuple[int, tuple[int, ...]]
-"""How many coordinates a platform has, and which of the room's axes it is turned about."""
+"""Number of coordinates of a platform, and the room's axes about which it turns."""
 
 
 @dataclass(frozen=True)
@@ -26,9 +26,9 @@ class End:
 
     text: str
     failed: bool = False
-    """Whether it ends by a failure."""
+    """Whether it ends because of a failure."""
     arrive: bool = False
-    """Whether the robot is to reach its last target first; it brakes at once otherwise."""
+    """Whether the robot first moves to its last target; otherwise it brakes immediately."""
 
 
 @dataclass(frozen=True)
@@ -36,7 +36,7 @@ class InputSample:
     """One sample of an input device."""
 
     position_m: Vector = (0.0, 0.0, 0.0)
-    """Displacement since the start, unscaled; in a plane the last one counts for nothing."""
+    """Displacement since the start, unscaled; in a plane the last coordinate is ignored."""
     quaternion: Quaternion = (1.0, 0.0, 0.0, 0.0)
     """Rotation since the start, w x y z, about the room's axes."""
     clutch: bool = True
@@ -44,7 +44,7 @@ class InputSample:
     confirmed: int = 0
     """Number of targets confirmed so far."""
     trouble: str = ""
-    """Why the device gives no position just now; the robot holds meanwhile."""
+    """Why the device has no position at present; the robot holds meanwhile."""
     end: End | None = None
 
 
@@ -53,29 +53,29 @@ class InputDevice(Protocol):
 
     @property
     def hint(self) -> str:
-        """Return how to use it, in a line."""
+        """Return a line on how to use it."""
 
     def read(self, now_s: float) -> InputSample:
-        """Return the sample at `now_s`, which only grows."""
+        """Return the sample at `now_s`, which never decreases."""
 
     def close(self) -> None:
         """Restore terminal or device."""
 
 
 class Hand:
-    """A position that is moved within what packets may carry at a scale, and a rotation."""
+    """A position, limited to what packets can carry at a scale, and a rotation."""
 
     def __init__(self, scale: float) -> None:
         self._reach_m = _REACH_USED * REACH_M / max(scale, 1.0)
         self.go_back()
 
     def go_back(self) -> None:
-        """Put it where it began."""
+        """Return it to its start."""
         self.position_m: Vector = (0.0, 0.0, 0.0)
         self.quaternion: Quaternion = (1.0, 0.0, 0.0, 0.0)
 
     def move(self, way_m: Vector) -> None:
-        """Move it by so much."""
+        """Move it by this vector."""
         reach_m = self._reach_m
         x, y, z = (
             min(max(at + by, -reach_m), reach_m)
@@ -84,7 +84,7 @@ class Hand:
         self.position_m = (x, y, z)
 
     def turn(self, vector_rad: Vector) -> None:
-        """Turn it on by a rotation vector along the room's axes."""
+        """Turn it further by a rotation vector along the room's axes."""
         self.quaternion = product(from_vector(vector_rad), self.quaternion)
 
 
@@ -97,7 +97,7 @@ def from_vector(vector_rad: Vector) -> Quaternion:
 
 
 def product(p: Quaternion, q: Quaternion) -> Quaternion:
-    """Return the rotation by `q`, then `p`, of length 1."""
+    """Return the rotation by `q`, then by `p`, normalised."""
     w = p[0] * q[0] - p[1] * q[1] - p[2] * q[2] - p[3] * q[3]
     x = p[0] * q[1] + p[1] * q[0] + p[2] * q[3] - p[3] * q[2]
     y = p[0] * q[2] - p[1] * q[3] + p[2] * q[0] + p[3] * q[1]
@@ -107,7 +107,7 @@ def product(p: Quaternion, q: Quaternion) -> Quaternion:
 
 
 def parse_scale(text: str) -> float:
-    """Return how many metres the robot moves for a metre of the hand: 8 for "8:1", or a number.
+    """Return the robot's motion in metres for one metre of the hand: 8 for "8:1", or a number.
 
     Raises BadInputError.
     """

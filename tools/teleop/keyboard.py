@@ -1,4 +1,4 @@
-"""Leading by the keys of a terminal: each press, and each repeat of a key held, is one step."""
+"""Lead a robot by the keys of a terminal: each press, and each repeat, is one step."""
 
 from __future__ import annotations
 
@@ -41,9 +41,9 @@ _UNFINISHED = re.compile(r"\x1b(\[[0-9;]*|O)?$")
 
 
 class Keys(Hand):
-    """What keys do to a hand; knows characters, but no terminal.
+    """Effect of keys on a hand; knows characters, but no terminal.
 
-    There is no motion without keys that come: who lets go, or is gone, stops the hand.
+    The hand moves only when keys arrive: it stops if the user releases them or is gone.
     """
 
     def __init__(self, scale: float) -> None:
@@ -56,14 +56,14 @@ class Keys(Hand):
 
     @property
     def step_m(self) -> float:
-        """Return how far one press moves the hand."""
+        """Return the motion of the hand for one press."""
         return STEPS_mm[self._step] * 1e-3
 
     def press(self, text: str, passed_s: float) -> None:
-        """Take the characters that came within the last `passed_s`.
+        """Process the characters that arrived within the last `passed_s`.
 
-        Of more steps than keys repeat in that time, and of those that had to wait for long, only
-        the first few count: they were pasted, or typed while nobody listened.
+        If there are more steps than keys can repeat in that time, or they waited for long, only
+        the first few count: they were pasted, or typed before the program listened.
         """
         most = 1 + int(_FASTEST_Hz * min(passed_s, _LONGEST_S))
         text = self._left + text
@@ -88,7 +88,7 @@ class Keys(Hand):
             self.turn((x, y, z))
 
     def reset(self) -> None:
-        """Undo what keys have done so far, except a request to end."""
+        """Undo the effect of all keys so far, except a request to end."""
         self.go_back()
         self._step = _FIRST_STEP
         self.clutch = False
@@ -108,9 +108,9 @@ class Keys(Hand):
 
 
 class Keyboard:
-    """The terminal behind a descriptor, without echo and without waiting for whole lines.
+    """The terminal of a descriptor, without echo and without waiting for whole lines.
 
-    Ctrl-C and Ctrl-Z stay what they are. Raises BadInputError where there is no terminal.
+    Ctrl-C and Ctrl-Z keep their effect. Raises BadInputError if there is no terminal.
     """
 
     def __init__(self, scale: float, fd: int = 0, directions: Directions = (2, ())) -> None:
@@ -125,7 +125,7 @@ class Keyboard:
         try:
             self._before = termios.tcgetattr(fd)
             tty.setcbreak(fd, termios.TCSANOW)
-            termios.tcflush(fd, termios.TCIFLUSH)  # what was typed before leads nobody
+            termios.tcflush(fd, termios.TCIFLUSH)  # earlier input must not move the robot
         except (termios.error, OSError) as error:
             raise BadInputError(
                 f"--device keyboard: standard input is no terminal ({error.args[-1]})"
@@ -133,16 +133,16 @@ class Keyboard:
 
     @property
     def hint(self) -> str:
-        """Say which keys do what."""
+        """Return a line on what each key does."""
         return (
             f"arrows or wasd: {self._keys.step_m * 1e3:g} mm of the hand, held to go on"
             f"{self._more}; + and -: longer, shorter; space: hold; Enter: confirm; q: end"
         )
 
     def read(self, now_s: float) -> InputSample:
-        """Return where the hand is; it has ended where the terminal is gone.
+        """Return the present sample; it reports the end if the terminal is gone.
 
-        What was typed before it is first asked has led nobody, and does not afterwards.
+        Keys typed before the first call have no effect.
         """
         keys, first = self._keys, math.isnan(self._read_s)
         passed_s, self._read_s = (0.0 if first else now_s - self._read_s), now_s
@@ -173,7 +173,7 @@ class Keyboard:
             self._gone = "the terminal is gone"
 
     def close(self) -> None:
-        """Give the terminal back as it was."""
+        """Restore the terminal's settings."""
         try:
             termios.tcsetattr(self._fd, termios.TCSAFLUSH, self._before)
         except (termios.error, OSError):

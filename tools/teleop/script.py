@@ -6,9 +6,9 @@ import math
 from dataclasses import dataclass
 from pathlib import Path
 
+from cdpr_profiles.bounded_input import read_text
 from cdpr_profiles.errors import ProfileError, brief
-from cdpr_profiles.reading.bounded_input import read_text
-from cdpr_rt.service.streams.stream_packet import REACH_M
+from cdpr_rt.service.stream_packet import REACH_M
 from cdpr_tools.errors import BadInputError
 from cdpr_tools.teleop.input_device import End, InputSample, Vector, from_vector
 
@@ -22,23 +22,23 @@ _MOST_BYTES = 1 << 20
 
 @dataclass(frozen=True)
 class ScriptLine:
-    """Where the hand is at a time, in s and m, and what it does from then on."""
+    """Position of the hand at a time, in s and m, and its state from then on."""
 
     time_s: float
     position_m: Vector
     turn_rad: Vector = (0.0, 0.0, 0.0)
     """Rotation vector."""
     clutch: bool = False
-    """Open until the next line."""
+    """Whether the clutch is open until the next line."""
     confirm: bool = False
-    """Pressed once, at this time."""
+    """Whether it confirms once, at this time."""
 
 
 def read_script(path: Path, scale: float = 1.0) -> tuple[ScriptLine, ...]:
     """Return the lines of a script; raises BadInputError, which names file and line.
 
-    `#` begins a comment. Between two lines the hand moves straight and at constant speed. No line
-    leads a robot further than set-points may at `scale`.
+    `#` begins a comment. Between two lines the hand moves straight at constant speed. No line
+    leads a robot further than set-points can at `scale`.
     """
     try:
         text = read_text(path, _MOST_BYTES)
@@ -105,7 +105,7 @@ def _numbers(where: str, word: str, text: str, count: int) -> list[float]:
 
 
 class ScriptDevice:
-    """Plays a script from when it is first read on; positions count from its first line's."""
+    """Plays a script from the first read on; positions are relative to its first line."""
 
     hint = "a script leads; Ctrl-C ends"
 
@@ -114,7 +114,7 @@ class ScriptDevice:
         self._begin_s = math.nan
 
     def read(self, now_s: float) -> InputSample:
-        """Return where the hand is; it has ended after the last line."""
+        """Return the present sample; it reports the end after the last line."""
         if math.isnan(self._begin_s):
             self._begin_s = now_s
         lines, time_s = self._lines, now_s - self._begin_s
@@ -143,4 +143,4 @@ class ScriptDevice:
         )
 
     def close(self) -> None:
-        """There is nothing to be left."""
+        """Do nothing: nothing is open."""

@@ -1,4 +1,4 @@
-"""One hand that leads one robot: set-points out, answers in, until one of them ends."""
+"""One hand leads one robot: set-points out, answers in, until one of them ends."""
 
 from __future__ import annotations
 
@@ -13,21 +13,21 @@ from typing import Any, Final
 import numpy as np
 
 from cdpr_rt.core.states import LoopState
-from cdpr_rt.motion.stream_buttons import stream_buttons
-from cdpr_rt.service.streams.stream_client import StreamClient
-from cdpr_rt.service.streams.stream_packet import Standing, StreamAnswer
+from cdpr_rt.motion.pose_stream import stream_buttons
+from cdpr_rt.service.stream_client import StreamClient
+from cdpr_rt.service.stream_packet import Standing, StreamAnswer
 from cdpr_tools.teleop.input_device import End, InputDevice, InputSample
 
 RATE_Hz: Final = 60.0
 _GREET_S: Final = 3.0
 _SILENCE_S: Final = 2.5
-"""Longer than the right to move lasts unasked: the robot holds by then."""
+"""Longer than the right to move lasts without renewal: by then the robot holds."""
 _TAKEN_AWAY_S: Final = 0.4
 _STILL_m: Final = 2e-5
 _STILL_S: Final = 0.6
 _ARRIVE_S: Final = 15.0
 _UNSEEN_S: Final = 1.0
-"""Where the robot does not say where it is: longer than what has come waits to be played."""
+"""Limit without a position of the robot: longer than received data wait to be played."""
 _MOST_KEPT: Final = 36_000
 _NEVER_ANSWERED: Final = ": its stream cannot be reached there"
 _WHY_NOT: Final = {
@@ -38,7 +38,7 @@ _WHY_NOT: Final = {
 
 @dataclass(frozen=True)
 class Confirmation:
-    """What was known when the hand confirmed; places are (x, y) or (x, y, z) in m, or nan."""
+    """State at a confirmation of the hand; places are (x, y) or (x, y, z) in m, or nan."""
 
     number: int
     time_s: float
@@ -51,8 +51,8 @@ class Confirmation:
 class TeleopSession:
     """Leads through `stream` with `device` at `scale`, while program number `program` runs.
 
-    The hand leads from the first set-point on that the robot has taken; its motion before counts
-    for nothing.
+    The hand leads from the first set-point that the robot has accepted; its earlier motion
+    is ignored.
     """
 
     def __init__(
@@ -69,7 +69,7 @@ class TeleopSession:
         self.leading = False
         self.confirmations: list[Confirmation] = []
         self.round_trips_s: deque[float] = deque(maxlen=_MOST_KEPT)
-        """Of the newest answers, the last one's at the end."""
+        """Round trips of the newest answers, the last one at the end."""
         self._program = program
         self._begin_s = self._heard_s = self._fine_s = time.monotonic()
 
@@ -80,17 +80,17 @@ class TeleopSession:
 
     @property
     def silent_s(self) -> float:
-        """Return for how long no answer has come."""
+        """Return the time since the last answer."""
         return time.monotonic() - self._heard_s
 
     @property
     def pose_m(self) -> tuple[float, ...]:
-        """Return where the platform is as the robot knows it."""
+        """Return the platform's position as the robot reports it."""
         return self._place(None if self.answer is None else self.answer.pose)
 
     @property
     def turn_rad(self) -> tuple[float, ...]:
-        """Return the rotation vector by which the platform is turned, the angle in a plane."""
+        """Return the platform's rotation vector, or its angle in a plane."""
         pose = () if self.answer is None else self.answer.pose
         vector = [math.nan] * 3
         if pose:
@@ -101,7 +101,7 @@ class TeleopSession:
 
     @property
     def setpoint_m(self) -> tuple[float, ...]:
-        """Return where the platform is to be now."""
+        """Return the platform's present set-point."""
         return self._place(None if self.answer is None else self.answer.pose_setpoint)
 
     def teleoperate(self, stop_requested: Callable[[], bool]) -> End:
@@ -117,7 +117,7 @@ class TeleopSession:
         return self._arrive(end, stop_requested) if end.arrive else end
 
     def figures(self) -> dict[str, Any]:
-        """Return what was sent and answered, delays there and back, and the confirmations."""
+        """Return counts of set-points and answers, delays in both directions, and confirmations."""
         trips = np.array(self.round_trips_s)
         quantiles = np.quantile(trips, (0.5, 0.99, 1.0)) if trips.size else np.full(3, np.nan)
         return {
@@ -143,7 +143,7 @@ class TeleopSession:
         self.stream.send(hand.position_m, hand.quaternion, self.scale, buttons)
 
     def _listen(self, until_s: float) -> None:
-        """Take answers as they come, so that the delay is that of the network."""
+        """Receive answers when they arrive, so that the delay is that of the network."""
         poll = select.poll()
         poll.register(self.stream.fileno(), select.POLLIN)
         while (left_s := until_s - time.monotonic()) > 0.0:
@@ -154,14 +154,14 @@ class TeleopSession:
                 self.round_trips_s.append(self.stream.round_trip_s)
 
     def _runs(self) -> bool:
-        """Return whether the robot takes set-points and its program follows them."""
+        """Return whether the robot accepts set-points and its program follows them."""
         answer = self.answer
         if answer is None or answer.standing in _WHY_NOT:
             return False
         return (answer.state, answer.program) == (LoopState.ACTIVE, self._program)
 
     def _lost(self, now_s: float) -> End | None:
-        """Say why the robot does not follow, where that has lasted."""
+        """Return why the robot does not follow, if that has lasted."""
         timeout_s = _SILENCE_S if self.leading else _GREET_S
         if now_s - self._heard_s > timeout_s:
             hint = "" if self.stream.answered else _NEVER_ANSWERED
@@ -188,9 +188,9 @@ class TeleopSession:
         )
 
     def _arrive(self, end: End, stop_requested: Callable[[], bool]) -> End:
-        """Keep the hand where it is until the robot has come to where it was led.
+        """Keep the hand in place until the robot has reached its last target.
 
-        Returns `end`, or what has ended it before that.
+        Returns `end`, or the reason if something ended it earlier.
         """
         begin_s = since_s = time.monotonic()
         place = self._setpoint

@@ -1,4 +1,4 @@
-"""`cdpr teleop ROBOT`: from the daemon's address to the robot that holds again."""
+"""`cdpr teleop ROBOT`: from the daemon's address until the robot holds again."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from urllib.parse import urlsplit
 
 from rich.live import Live
 
-from cdpr_rt.service.streams.stream_client import StreamClient
-from cdpr_rt.service.streams.stream_packet import StreamSession
+from cdpr_rt.service.stream_client import StreamClient
+from cdpr_rt.service.stream_packet import StreamSession
 from cdpr_tools.client.client import Daemon, open_daemon
 from cdpr_tools.daemon.settings import Address
 from cdpr_tools.errors import BadInputError, CommandError, WorkFailedError
@@ -40,19 +40,19 @@ class TeleopSettings:
 
     robot: str
     open_device: Callable[[Directions], InputDevice]
-    """Opens the input device for a robot of these directions."""
+    """Opens the input device for a robot with these directions."""
     scale: float
     via: str | None
-    """HOST:PORT of the stream, None for the daemon's own."""
+    """HOST:PORT of the stream; None for the daemon's own."""
     socket: Path | None
     url: str | None
     key_file: Path | None
 
 
 def teleoperate(settings: TeleopSettings, out: Output) -> None:
-    """Run a teleoperation until it ends; the robot holds then.
+    """Run a teleoperation until it ends; then the robot holds.
 
-    Raises BadInputError, and WorkFailedError where it was not the user who ended it.
+    Raises BadInputError, and WorkFailedError if anything but the user ended it.
     """
     name = Path(settings.robot).stem
     known = settings.url is None and settings.socket is None
@@ -68,10 +68,10 @@ def teleoperate(settings: TeleopSettings, out: Output) -> None:
         with (
             _ended_by_signals() as ended,
             closing(settings.open_device(directions)) as device,
-            daemon.control() as control,
-            _stream(host, port, daemon, control.token) as stream,
+            daemon.control() as token,
+            _stream(host, port, daemon, token) as stream,
         ):
-            control.post("/program", {"program": program, "wanted": arguments})
+            daemon.post("/program", {"program": program, "wanted": arguments}, token)
             number = description["programs"].index(program)
             session = TeleopSession(stream, device, settings.scale, number, directions[0])
             out.note(f"leading {name} over {host}:{port}; {device.hint}")
@@ -80,9 +80,13 @@ def teleoperate(settings: TeleopSettings, out: Output) -> None:
                     session, View(session, description, status["reason"]), daemon, out, ended
                 )
                 if session.silent_s > _UNHEARD_S:  # the next answer may take as long
-                    out.note(f"{end.text}; it is asked to hold, and holds by itself")
-                with suppress(CommandError) if end.failed else nullcontext():  # it tells why itself
-                    control.hold()
+                    out.note(f"{end.text}; it is asked to hold")
+                with suppress(CommandError) if end.failed else nullcontext():  # `end` says why
+                    daemon.post("/hold")
+            except BaseException:
+                with suppress(CommandError):
+                    daemon.post("/hold")
+                raise
             finally:
                 _tell_figures(session, out)
         _tell(session, end, daemon, status["reason"], out)
@@ -101,7 +105,7 @@ def _stream(host: str, port: int, daemon: Daemon, token: str) -> StreamClient:
 def _shown(
     session: TeleopSession, view: View, daemon: Daemon, out: Output, ended: Callable[[], bool]
 ) -> End:
-    """Run it, with a view where there is a terminal."""
+    """Run it, with a view if there is a terminal."""
     if not out.notes.is_terminal:
         return session.teleoperate(ended)
     live = Live(
@@ -121,9 +125,9 @@ def _shown(
 
 @contextmanager
 def _ended_by_signals() -> Iterator[Callable[[], bool]]:
-    """Yield what tells whether the user wants an end, or has closed the terminal.
+    """Yield a function that returns whether the user requested an end or closed the terminal.
 
-    The latter would end the process at once.
+    A closed terminal would otherwise end the process immediately.
     """
     gone: list[int] = []
 
@@ -140,7 +144,7 @@ def _ended_by_signals() -> Iterator[Callable[[], bool]]:
 
 @contextmanager
 def _watched(view: View, daemon: Daemon) -> Iterator[None]:
-    """Give the view the daemon's status several times a second, asked for beside the stream."""
+    """Give the view the daemon's status several times a second, read beside the stream."""
     over = threading.Event()
 
     def watch() -> None:
@@ -148,7 +152,7 @@ def _watched(view: View, daemon: Daemon) -> Iterator[None]:
             try:
                 view.tell(daemon.get("/status"))
             except CommandError:
-                continue  # the stream itself tells when nobody answers any more
+                continue  # the stream itself reports missing answers
 
     thread = threading.Thread(target=watch, name="status", daemon=True)
     thread.start()
@@ -156,11 +160,11 @@ def _watched(view: View, daemon: Daemon) -> Iterator[None]:
         yield
     finally:
         over.set()
-        thread.join(_STATUS_S)  # no longer for one who does not answer
+        thread.join(_STATUS_S)  # do not wait longer for a daemon that does not answer
 
 
 def stream_address(status: dict[str, Any], settings: TeleopSettings) -> tuple[str, int]:
-    """Return where set-points go; raises BadInputError where the daemon takes none."""
+    """Return the address for set-points; raises BadInputError if the daemon accepts none."""
     if settings.via is not None:
         address = Address.parse("--via", settings.via)
         return address.host, address.port
@@ -177,7 +181,7 @@ def stream_address(status: dict[str, Any], settings: TeleopSettings) -> tuple[st
 
 
 def directions_of(description: dict[str, Any]) -> Directions:
-    """Return in which directions a robot is led; one without a platform by two cables."""
+    """Return the directions in which a robot is led; without a platform, two cables."""
     platform = description.get("platform") or {"home_m": (0.0, 0.0)}
     names = platform.get("controlled", ())
     return len(platform["home_m"]), tuple(_ABOUT[name] for name in names if name in _ABOUT)
@@ -194,11 +198,11 @@ def _program_of(description: dict[str, Any]) -> tuple[str, dict[str, Any]]:
 
 
 def _tell_figures(session: TeleopSession, out: Output) -> None:
-    """Say what was confirmed, and what became of what was sent."""
+    """Report what was confirmed, and the fate of the sent set-points."""
     figures = session.figures()
     trip = figures["round_trip_ms"]
     delay = f"; round trip {trip['p50']:.1f} ms, {trip['p99']:.1f} ms at most in 99 of 100"
-    with suppress(OSError):  # nobody reads it any more
+    with suppress(OSError):  # the reader is gone
         for one in session.confirmations:
             place = " ".join(f"{1e3 * value:+.2f}" for value in one.pose_m)
             where = f": platform {place} mm" if math.isfinite(one.pose_m[0]) else ""
@@ -210,9 +214,9 @@ def _tell_figures(session: TeleopSession, out: Output) -> None:
 
 
 def _tell(session: TeleopSession, end: End, daemon: Daemon, before: str, out: Output) -> None:
-    """Say how it ended; raises WorkFailedError where it failed.
+    """Report how it ended; raises WorkFailedError if it failed.
 
-    `before` is the robot's reason from before it was led.
+    `before` is the robot's reason before it was led.
     """
     try:
         status = daemon.get("/status")

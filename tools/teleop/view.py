@@ -1,4 +1,4 @@
-"""What the operator sees in the terminal: the robot in its plane, and the link to it."""
+"""The operator's view in the terminal: the robot in its plane, and the link to it."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from cdpr_tools.teleop.session import TeleopSession
 
 _WIDTH, _HEIGHT, _LEAST_HEIGHT = 64, 22, 8
 _WRAPPED = 3
-"""Lines that may be needed where texts are wider than the terminal."""
+"""Additional lines if texts are wider than the terminal."""
 _MARGIN_m = 0.1
 _SHOWN_TRIPS = 120
 _SILENT_S: Final = 0.5
-"""Longer than any usable round trip; what is shown is stale by then."""
+"""Longer than any usable round trip; older data are stale."""
 _STALE_S: Final = 2.0
 _MARKS: Final = {"target": ("+", "bold cyan"), "platform": ("o", "bold green")}
 
@@ -26,9 +26,9 @@ Point = tuple[float, float]
 
 
 class View:
-    """Draws a session again whenever it is asked to.
+    """Draws a session on each request.
 
-    `reason` is why the robot was held or stopped before, which is no news.
+    `reason` is why the robot was held or stopped before; it is not shown again.
     """
 
     def __init__(
@@ -42,7 +42,7 @@ class View:
         self._last_status: tuple[float, dict[str, Any]] = -math.inf, {}
 
     def tell(self, status: dict[str, Any]) -> None:
-        """Have it show the daemon's status, until that is too old to be true."""
+        """Show the daemon's status until it is too old."""
         self._last_status = time.monotonic(), status
 
     @property
@@ -51,7 +51,7 @@ class View:
         return status if time.monotonic() - received_s < _STALE_S else {}
 
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
-        """Yield the picture, where the plane is known and there is room, and the figures."""
+        """Yield the picture, if the plane is known and there is room, and the figures."""
         lines = self._lines()
         height = min(_HEIGHT, console.height - _WRAPPED - len(lines))
         if self._platform is not None and height >= _LEAST_HEIGHT:
@@ -167,7 +167,7 @@ _BLANK = 0x2800
 class Canvas:
     """`width` times `height` characters that show the plane from `low` to `high`, both (2,) in m.
 
-    x goes to the right, y upward, both in one scale; the picture is in the middle.
+    x points right, y upward, both at the same scale; the picture is centred.
     """
 
     def __init__(
@@ -183,7 +183,7 @@ class Canvas:
         self._marks: dict[tuple[int, int], tuple[str, str]] = {}
 
     def line(self, begin: tuple[float, float], end: tuple[float, float]) -> None:
-        """Draw a straight line; what lies outside is left out."""
+        """Draw a straight line; omit the parts outside."""
         points = [self._dot(begin), self._dot(end)]
         if not all(math.isfinite(value) for point in points for value in point):
             return
@@ -202,7 +202,7 @@ class Canvas:
             self.line(begin, end)
 
     def mark(self, at: tuple[float, float], letter: str, style: str) -> None:
-        """Put a letter over what is there; one outside is left out."""
+        """Put a letter over the present character; omit it if it is outside."""
         x, y = self._dot(at)
         if not (math.isfinite(x) and math.isfinite(y)):
             return

@@ -1,1 +1,1 @@
-"""Cable tensions at the terminal: watched, and what a calibration by them needs and shows."""
+"""Cable tensions at the terminal: watch them, and calibrate a winch with them."""

@@ -1,4 +1,4 @@
-"""The picture of a winch's calibration: torque over tension, and what the fit leaves."""
+"""The picture of a winch's calibration: torque over tension, and the residuals of the fit."""
 
 from __future__ import annotations
 

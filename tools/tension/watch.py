@@ -1,11 +1,17 @@
-"""Show cable tensions as they come: bars at a terminal, figures at the end."""
+"""Show cable tensions live: bars at a terminal, figures at the end."""
 
 from __future__ import annotations
 
+import os
+import select
+import sys
 from collections.abc import Callable
+from functools import partial
+from pathlib import Path
 from typing import Any
 
 import numpy as np
+import typer
 from rich.console import Group
 from rich.live import Live
 from rich.progress_bar import ProgressBar
@@ -14,8 +20,11 @@ from rich.table import Table
 from cdpr_drivers.modbus.tension import TensionSampler
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.core.clock import Clock
-from cdpr_rt.core.tension_feedback import TensionFault
+from cdpr_rt.core.exchange import TensionFault
+from cdpr_sim_bus.physics_board import PhysicsBoard
 from cdpr_tools.output import Output
+from cdpr_tools.signals import stop_on_signals
+from cdpr_tools.tension.calibration import Hang, not_hung
 
 _LOOK_S = 0.02
 _SHOW_HZ = 8.0
@@ -43,7 +52,7 @@ def watch(
     seconds: float,
     stop_requested: Callable[[], bool],
 ) -> list[dict[str, Any]]:
-    """Look at the tensions for `seconds`, or until a stop is asked for; return their figures."""
+    """Watch the tensions for `seconds`, or until a stop is requested; return their figures."""
     exchange = sampler.exchange
     sums = _Sums(exchange.n)
     begun_s = shown_s = clock.now_s
@@ -102,3 +111,54 @@ def _figures(
         "highest_N": float(read.max()),
         "age_s": float(feedback.age_s[i]),
     }
+
+
+# Masses on a cable: hung by a person on request, or through the simulator's physics board.
+
+_POLL_S = 0.05
+
+
+def by_prompt(mass_kg: float, clock: Clock) -> None:
+    """Ask the person at the winch; the drive has no power, so Ctrl-C may end this immediately.
+
+    Only Enter alone raises the mass: a person who types a word wants something else.
+    """
+    question = (
+        f"Hang {mass_kg:g} kg on the cable, standing on its support, take up the slack, and "
+        "press Enter (Ctrl-C ends)"
+    )
+    with stop_on_signals() as stop_requested:
+        stop_requested.closing()  # a second Ctrl-C has nothing else to end
+        # a person may take long; the safety I/O is monitored meanwhile
+        while (
+            line := clock.run_blocking(partial(typed_line, question, stop_requested))
+        ).strip() and line.endswith("\n"):
+            typer.echo("Enter alone, please.", err=True)
+    if stop_requested() or not line.endswith("\n"):
+        raise not_hung(mass_kg)
+
+
+def typed_line(question: str, stop_requested: Callable[[], bool]) -> str:
+    """Ask, and return the typed line, or part of it if the input ends or a stop is requested.
+
+    A request to stop cannot interrupt `input`, so it is not used.
+    """
+    typer.echo(f"{question}: ", nl=False, err=True)
+    line = b""
+    while not line.endswith(b"\n") and not stop_requested():
+        if select.select([sys.stdin], [], [], _POLL_S)[0]:
+            byte = os.read(sys.stdin.fileno(), 1)
+            if not byte:
+                break
+            line += byte
+    return line.decode(errors="replace")
+
+
+def on_board(board: Path) -> Hang:
+    """Return a function that hangs masses on a simulator's first cable, through its board."""
+
+    def hang(mass_kg: float, _: Clock) -> None:
+        with PhysicsBoard.attach(board) as shared:
+            shared.axis(0).hung_mass_kg = mass_kg
+
+    return hang

@@ -1,1 +1,1 @@
-"""Trials of a whole robot on its simulator: what it was told, what it did, what was true."""
+"""Trials of a whole robot on its simulator: its commands, its motion and the truth."""

@@ -1,4 +1,4 @@
-"""The directions in which a robot's platform is controlled, and true poses as coordinates in them.
+"""The controlled directions of a platform, and true poses as coordinates in these directions.
 
 A place is (d,): k coordinates of the platform's origin, m, and then the controlled entries of the
 rotation vector from the orientation at home, rad. A pose is a position (3,) and a rotation (3, 3).
@@ -23,7 +23,7 @@ _ABOUT = {"rx": 0, "ry": 1, "rz": 2, "angle": 2}
 
 @dataclass(frozen=True)
 class Directions:
-    """What a platform's places are made of, and within which bounds they lie."""
+    """The controlled directions of a platform, and the bounds of its places."""
 
     names: tuple[str, ...]
     """A name for each direction, positions first."""
@@ -40,7 +40,7 @@ class Directions:
 
     @classmethod
     def of(cls, platform: Platform) -> Directions:
-        """Return those of a platform."""
+        """Return the directions of a platform."""
         k, turns = len(platform.home_m), len(platform.controlled) - len(platform.home_m)
         home = np.array(platform.home_rotation_rad)
         return cls(
@@ -57,17 +57,17 @@ class Directions:
 
     @property
     def k(self) -> int:
-        """How many coordinates the origin has."""
+        """Number of coordinates of the origin."""
         return len(self.low_m)
 
     @property
     def d(self) -> int:
-        """How many directions are controlled."""
+        """Number of controlled directions."""
         return len(self.names)
 
     @property
     def turns(self) -> tuple[int, ...]:
-        """Which directions are angles; none where the platform's angles are not controlled."""
+        """Indices of the directions that are angles; empty if no angles are controlled."""
         return tuple(range(self.k, self.d))
 
     @property
@@ -76,7 +76,7 @@ class Directions:
         return np.pad(0.5 * (self.low_m + self.high_m), (0, self.d - self.k))
 
     def arguments(self, place: FloatArray, speed_m_s: float | None = None) -> dict[str, Any]:
-        """Return what the program `pose` is told to go to a place."""
+        """Return the arguments with which the program `pose` moves to a place."""
         arguments: dict[str, Any] = {"position_m": place[: self.k].tolist()}
         if self.angle_rad > 0.0:
             arguments["rotation_rad"] = place[self.k :].tolist()
@@ -85,14 +85,14 @@ class Directions:
         return arguments
 
     def marked(self, place: FloatArray, prefix: str) -> dict[str, list[float]]:
-        """Return a place as a recording's mark holds it."""
+        """Return a place in the form of a recording's mark."""
         place_marked = {f"{prefix}_m": place[: self.k].tolist()}
         if self.turns:
             place_marked[f"{prefix}_rotation_rad"] = place[self.k :].tolist()
         return place_marked
 
     def place(self, mark: Mapping[str, Any], prefix: str) -> FloatArray:
-        """Return a place out of a mark, (d,)."""
+        """Return the place (d,) from a mark."""
         return np.array([*mark[f"{prefix}_m"], *mark.get(f"{prefix}_rotation_rad", ())], float)
 
     def rotations(self, places: FloatArray) -> FloatArray:
@@ -110,9 +110,9 @@ class Directions:
     def turn_between(self, from_rotation: FloatArray, to_rotation: FloatArray) -> FloatArray:
         """Return the rotation vectors of R_to R_from^T, (m, 3), in rad along the room's axes.
 
-        Where angles are not controlled, what the platform turns about their axes is left out: about
-        one, a rotation vector is that of the shortest turn between both directions of that axis,
-        which the platform carries with it; about two, its entries along them are 0.
+        Rotation about uncontrolled axes is left out. With one such axis, the result is the
+        shortest turn between the two directions of the axis, which moves with the platform. With
+        two, the entries along them are 0.
         """
         if len(self._free) == 1:
             carried = self.home_rotation.T[:, self._free[0]]
@@ -124,17 +124,17 @@ class Directions:
 
     @property
     def _free(self) -> list[int]:
-        """Which entries of a rotation vector are not controlled; none in a plane."""
+        """Indices of the rotation vector's uncontrolled entries; empty in a plane."""
         return [] if self.k == 2 else [i for i in range(3) if i not in self.about]
 
     @property
     def about(self) -> list[int]:
-        """Which entries of a rotation vector are controlled."""
+        """Indices of the rotation vector's controlled entries."""
         return [_ABOUT[name] for name in self.names[self.k :]]
 
 
 def platform_of(robot: Robot) -> Platform:
-    """Return a robot's platform; raises BadInputError for a robot that has none."""
+    """Return a robot's platform; raises BadInputError for a robot without one."""
     if robot.platform is None:
         raise BadInputError(f"{robot.path}: {NO_PLATFORM}")
     return robot.platform
@@ -146,7 +146,7 @@ def rotations_of(quaternion: FloatArray) -> FloatArray:
 
 
 def _shortest_turns(from_axis: FloatArray, to_axis: FloatArray) -> FloatArray:
-    """Return the rotation vectors (m, 3) that turn unit vectors into others the shortest way."""
+    """Return the rotation vectors (m, 3) of the shortest turns from unit vectors to others."""
     across = np.cross(from_axis, to_axis)
     sine = np.linalg.norm(across, axis=-1, keepdims=True)
     angle = np.arctan2(sine, np.sum(from_axis * to_axis, axis=-1, keepdims=True))

@@ -9,35 +9,35 @@ import numpy as np
 
 from cdpr_profiles import Robot
 from cdpr_rt.arrays import FloatArray
-from cdpr_rt.robots.robot_arrays import limits_of
-from cdpr_tools.trials.evaluation.figures import Figure
-from cdpr_tools.trials.evaluation.recorded import Recorded
+from cdpr_rt.model.robot_arrays import limits_of
+from cdpr_tools.trials.figures import Figure
+from cdpr_tools.trials.recorded import Recorded
 from cdpr_tools.trials.run import TrialRun
 
 OVERSHOOT_mm: Final = 2.0
 SWING_mm: Final = 2.0
-"""A platform whose origin is no farther from its target does not swing any more."""
+"""A platform whose origin stays this close to its target no longer swings."""
 SWING_S: Final = 2.0
 SMOOTHED_S: Final = 0.06
-"""Over which a controller may average its set-point."""
+"""Longest time over which a controller may average its set-point."""
 RESTED_S: Final = 0.5
-"""Where it has been so long at rest, the end of its leg is where it came to rest."""
+"""After this time at rest, the end of the leg counts as the place where it came to rest."""
 _FINISHED_SHARE: Final = 0.7
 _REST_S: Final = (0.0, 1.0)
 _LONG_REST_S: Final = 4.0
 _LONG_EVERY: Final = 5
-"""Of this many moves that are finished, one is followed by a long rest."""
+"""One in this many finished moves is followed by a long rest."""
 _CHANGED_AFTER_S: Final = (0.05, 1.2)
 _MOVED: Final = 2e-3
 """m or rad"""
 _THERE: Final = 1e-5
-"""A set-point as near to its target stands at it, m or rad."""
+"""A set-point this near to its target counts as standing there, m or rad."""
 _TORQUE_STEP_SHARE: Final = 1e-3
-"""Torque crosses the bus in per mille of the rated one."""
+"""Torque is sent over the bus in per mille of the rated torque."""
 
 
 def drive(run: TrialRun, seconds: float) -> None:
-    """Head for one target after the other; nearly a third are given up on the way."""
+    """Move to one target after another; nearly a third are abandoned on the way."""
     rng, finished = run.rng, 0
     while run.elapsed_s < seconds:
         target = run.start_random_move()
@@ -53,9 +53,9 @@ def drive(run: TrialRun, seconds: float) -> None:
 
 @dataclass(frozen=True)
 class TargetLeg:
-    """The rows of one leg, where it began, its target, and where it could be stopped, (d,) each.
+    """The rows of one leg, its origin, its target, and where it could stop, (d,) each.
 
-    The set-point stands at the target in the last rows, `stood`.
+    The set-point stands at the target in the last `stood` rows.
     """
 
     rows: slice
@@ -65,14 +65,14 @@ class TargetLeg:
     stood: int
 
     def overshoot(self, true: FloatArray) -> FloatArray:
-        """Return how far the platform (c, d) was beyond its target at most, in each direction.
+        """Return the largest distance of the platform (c, d) beyond its target, per direction.
 
-        A direction in which it had hardly to move has none.
+        It is 0 in a direction in which the leg hardly moves.
         """
         return self._beyond(true, self.target)
 
     def overshoot_of_rest(self, true: FloatArray, rested: int) -> FloatArray | None:
-        """Return the same beyond where it came to rest, None where it was not `rested` for long."""
+        """Return the same beyond the place of rest, None if it stood for less than `rested`."""
         return None if self.stood < rested else self._beyond(true, true[self.rows][-1])
 
     def _beyond(self, true: FloatArray, place: FloatArray) -> FloatArray:
@@ -83,7 +83,7 @@ class TargetLeg:
         return np.where(np.abs(way) > _MOVED, np.maximum(beyond, 0.0), 0.0)
 
     def off_m(self, true_m: FloatArray) -> float:
-        """Return how far it was, in a direction, out of the box that beginning and target span."""
+        """Return the largest distance in a direction from the box between origin and target."""
         k = true_m.shape[1]
         corners = np.array([self.origin, self.target, self.stop])[:, :k]
         true = true_m[self.rows]
@@ -94,9 +94,9 @@ class TargetLeg:
 def legs(recorded: Recorded) -> list[TargetLeg]:
     """Return all legs of a trial.
 
-    Where a target was changed half-way the set-point still moves: `stop` is where it turns, in
-    each direction, which may lie beyond the new target; but no farther than where the acceleration
-    stops a set-point that smoothing lets run on for a moment.
+    If a target was changed half-way, the set-point still moves. `stop` is where it turns in each
+    direction, perhaps beyond the new target, but no farther than the acceleration limit and the
+    delay of smoothing allow.
     """
     acceleration, found = recorded.directions.acceleration, []
     for mark, rows in _legs(recorded):
@@ -111,13 +111,13 @@ def legs(recorded: Recorded) -> list[TargetLeg]:
 
 
 def _stood(recorded: Recorded, target: FloatArray, rows: slice) -> int:
-    """Return in how many of a leg's last rows the set-point stood at the target."""
+    """Return the number of last rows of a leg in which the set-point stood at the target."""
     coming = np.abs(recorded.setpoint_places[rows] - target).max(axis=1) > _THERE
     return coming.size if not coming.any() else int(coming[::-1].argmax())
 
 
 def _legs(recorded: Recorded) -> list[tuple[FloatArray, slice]]:
-    """Return target and rows of each leg."""
+    """Return the target and the rows of each leg."""
     marks = recorded.marked("leg")
     first = [recorded.row(mark["cycle"]) for mark in marks]
     ends = zip(first, [*first[1:], len(recorded.truth)], strict=True)
@@ -128,8 +128,8 @@ def _legs(recorded: Recorded) -> list[tuple[FloatArray, slice]]:
 def swings_s(recorded: Recorded) -> FloatArray:
     """Return how long the platform took to stay within `SWING_mm` of each target, (m,).
 
-    From when the set-point stood there, of those legs whose rest was long enough to tell; where it
-    does not stay there at all, all of the rest.
+    Time counts from when the set-point stood there; legs with too short a rest are left out. If
+    the platform does not stay there, it is the whole rest.
     """
     found = []
     for target, rows in _legs(recorded):
@@ -174,7 +174,7 @@ def judge(recorded: Recorded, robot: Robot) -> list[Figure]:
 
 
 def held_figures(recorded: Recorded, robot: Robot) -> list[Figure]:
-    """Return the extremes of the true tensions and of the torques, and what is allowed."""
+    """Return the extremes of the true tensions and of the torques, with their limits."""
     limits = limits_of(robot)
     tension, torque = recorded.truth["tension_N"], recorded.truth["torque_Nm"]
     low, high = np.asarray(limits.tension_min_N), np.asarray(limits.tension_max_N)

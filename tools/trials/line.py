@@ -1,4 +1,4 @@
-"""The trial of lines and turns at a steady speed: 10 mm/s are 22 deg/s at the thesis' motors."""
+"""The trial of lines and turns at constant speed: 10 mm/s is 22 deg/s at the thesis' motors."""
 
 from __future__ import annotations
 
@@ -9,17 +9,17 @@ import numpy as np
 
 from cdpr_rt.arrays import FloatArray, rms
 from cdpr_tools.trials.directions import Directions
-from cdpr_tools.trials.evaluation.figures import Figure
-from cdpr_tools.trials.evaluation.recorded import Recorded
+from cdpr_tools.trials.figures import Figure
+from cdpr_tools.trials.recorded import Recorded
 from cdpr_tools.trials.run import TrialRun
 
 SPEED_m_s: Final = 0.01
 LENGTH_m: Final = 0.6
-"""Of each line, or half of what the workspace offers there; motors turn several times in it."""
+"""Of each line, but at most half the workspace; motors make several turns along it."""
 RATIO: Final = 3.0
-"""Wanted at `SPEED_m_s`."""
+"""Least ratio at `SPEED_m_s`."""
 SETPOINT_mm: Final = 2.0
-"""Wanted at other speeds."""
+"""Largest distance from the set-point at other speeds."""
 WITH, WITHOUT = "with", "without"
 NAMES: Final = {WITH: "with compensation", WITHOUT: "without"}
 
@@ -27,7 +27,7 @@ NAMES: Final = {WITH: "with compensation", WITHOUT: "without"}
 def lines(directions: Directions) -> list[tuple[FloatArray, FloatArray]]:
     """Return the ends (d,) of a line along each direction through the middle of the workspace.
 
-    Along an angle it is a turn, from half of what is allowed on one side to half on the other.
+    Along an angle it is a turn, from half the allowed angle on one side to half on the other.
     """
     middle, size = directions.middle, directions.high_m - directions.low_m
     reach = np.minimum(0.5 * LENGTH_m, 0.25 * size)
@@ -36,7 +36,7 @@ def lines(directions: Directions) -> list[tuple[FloatArray, FloatArray]]:
 
 
 def drive(run: TrialRun, speed_m_s: float) -> None:
-    """Move along each line once; to its beginning at full speed."""
+    """Move along each line once, and at full speed to its beginning."""
     directions = run.directions
     for start, end in lines(directions):
         run.go(start)
@@ -48,19 +48,19 @@ def drive(run: TrialRun, speed_m_s: float) -> None:
 
 @dataclass(frozen=True)
 class LineErrors:
-    """What was recorded along one line, or turn: errors in mm and degrees, one row a cycle."""
+    """Recorded errors along one line, or turn, in mm and degrees, one row per cycle."""
 
     direction: int
-    """Which direction it is along."""
+    """Index of its direction."""
     is_turn: bool
     way: FloatArray
     """Along the line, m or rad, (c,)."""
     across_mm: FloatArray
-    """True distance from the line at right angles to it, (c, k - 1); (c, 0) of a turn."""
+    """True distance from the line at right angles to it, (c, k - 1); (c, 0) for a turn."""
     off_mm: FloatArray
     """True distance from the set-point of the same cycle, (c, k)."""
     off_deg: FloatArray
-    """True rotation from it, (c, 3), or (c, 0) where angles are not controlled."""
+    """True rotation from that set-point, (c, 3); (c, 0) if angles are not controlled."""
 
 
 def line_errors(recorded: Recorded) -> list[LineErrors]:
@@ -88,7 +88,7 @@ def line_errors(recorded: Recorded) -> list[LineErrors]:
 
 
 def _at_right_angles(along: FloatArray) -> FloatArray:
-    """Return unit vectors (k, k - 1) at right angles to one; (k, 0) where there is none."""
+    """Return unit vectors (k, k - 1) at right angles to a vector; (k, 0) if it is zero."""
     if not along.any():
         return np.zeros((along.size, 0))
     found: list[FloatArray] = [along / np.linalg.norm(along)]
@@ -100,10 +100,10 @@ def _at_right_angles(along: FloatArray) -> FloatArray:
 
 
 def rms_mm(recorded: Recorded, less_mean: bool = False) -> tuple[float, float]:
-    """Return the root mean square over all lines: of the distance from them, from the set-point.
+    """Return the RMS distance over all lines, from the line and from the set-point.
 
-    With `less_mean` that of what is left of each line's errors without their mean, which does not
-    tell how a motor runs but how well the start is known.
+    With `less_mean` the mean of each line's errors is subtracted first: it shows how well the
+    start is known, not how a motor runs.
     """
     straight = [one for one in line_errors(recorded) if not one.is_turn]
     return (
@@ -119,7 +119,7 @@ def _rms(errors: list[FloatArray], less_mean: bool = False) -> float:
 
 
 def judge(parts: dict[str, Recorded], speed_m_s: float) -> list[Figure]:
-    """Return the errors of each part, and what compensation has made of them."""
+    """Return the errors of each part, and the gain by compensation."""
     figures, ratios = [], []
     slow = speed_m_s == SPEED_m_s
     for less_mean in (False, True):
@@ -140,12 +140,12 @@ def judge(parts: dict[str, Recorded], speed_m_s: float) -> list[Figure]:
 
 
 def best(parts: dict[str, Recorded]) -> str:
-    """Return the part of which most is wanted."""
+    """Return the part with the strictest limits."""
     return WITH if WITH in parts else WITHOUT
 
 
 def _orientation(parts: dict[str, Recorded]) -> list[Figure]:
-    """Return the errors in orientation on lines and in turns, where angles are controlled."""
+    """Return the orientation errors on lines and in turns, if angles are controlled."""
     figures = []
     for part, recorded in parts.items():
         found, name = line_errors(recorded), NAMES[part]

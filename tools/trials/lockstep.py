@@ -1,8 +1,7 @@
-"""A robot's daemon in the present process, on simulated drives, cycle by cycle in bus time.
+"""A robot's daemon in this process, on simulated drives, cycle by cycle in bus time.
 
-The loop, its programs, its supervisor and the bus are those of `cdpr run`; only the clock that
-leases and streams count by is the bus' own, so that minutes of motion pass as fast as the machine
-computes them.
+The loop, its programs, its supervisor and the bus are those of `cdpr run`. Only leases and streams
+use bus time as their clock, so that minutes of motion pass as fast as the machine computes them.
 """
 
 from __future__ import annotations
@@ -11,13 +10,15 @@ import os
 import tempfile
 import time
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from dataclasses import replace
 from itertools import count
 from pathlib import Path
-from typing import Any, Final, Self
+from typing import TYPE_CHECKING, Any, Final, Self
 
-from cdpr_drivers.bus import query_status
+import numpy as np
+
+from cdpr_drivers.bus.simbus import query_status
 from cdpr_drivers.robot.commissioned import with_commissioned, without_commissioned
 from cdpr_drivers.robot.machine import RobotMachine
 from cdpr_drivers.robot.robot_buses import robot_urls
@@ -27,17 +28,146 @@ from cdpr_rt.core.clock import Clock
 from cdpr_rt.core.cycle_row import Row
 from cdpr_rt.core.shared_block import RowReader, SharedBlock
 from cdpr_rt.core.states import LoopState
+from cdpr_rt.loop.engine import LoopParts
+from cdpr_rt.loop.loop import ControlLoop
+from cdpr_rt.loop.realtime import one_core
+from cdpr_rt.loop.right import PublishedRight
+from cdpr_rt.model.robot_arrays import limits_of
+from cdpr_rt.platform.own_controller import Controller
 from cdpr_rt.programs.base import Program
-from cdpr_rt.robots.robot_arrays import limits_of
-from cdpr_rt.runtime.control_loop.loop import ControlLoop
-from cdpr_rt.runtime.realtime import one_core
-from cdpr_rt.service.recordings.recording import Recorder
-from cdpr_tools.composition.loop_parts import description, loop_parts
+from cdpr_rt.refusal import CommandRefusal
+from cdpr_rt.service.lease import Lease, LeaseError
+from cdpr_rt.service.rows import cycle_figures
+from cdpr_rt.service.setpoint_stream import Address, StreamSessionManager
+from cdpr_rt.service.stream_packet import (
+    StreamAnswer,
+    StreamSession,
+    StreamSetpoint,
+    parse,
+    seal,
+)
+from cdpr_tools.composition.loop_parts import control_loop, loop_parts
 from cdpr_tools.composition.simulator import OwnLoadCells, OwnSimulator
 from cdpr_tools.errors import WorkFailedError
-from cdpr_tools.trials.evaluation.pose_log import PoseLogTail
-from cdpr_tools.trials.right import RightInBusTime
-from cdpr_tools.trials.streams.stream import StreamInBusTime
+from cdpr_tools.trials.pose_log import PoseLogTail
+
+if TYPE_CHECKING:
+    from cdpr_rt.service.recording import Recorder
+
+# The right to move, granted and lost in bus time.
+
+_TTL_S: Final = 2.0
+_RENEWED_NS: Final = 500_000_000
+
+
+class RightInBusTime:
+    """The daemon's lease on a clock that stands still between cycles.
+
+    A right taken here is kept until `drop` or `fall_silent`; a stream has a separate right.
+    """
+
+    def __init__(self, block: SharedBlock, clock_ns: Callable[[], int]) -> None:
+        self._clock_ns = clock_ns
+        self.token: str | None = None
+        """The token of the right held here, None if it is not held."""
+        self.number = 0
+        """The number of the newest grant here, which commands carry."""
+        self._renewed_ns = 0
+        self.lease = Lease(PublishedRight(block), clock_ns)
+
+    def take(self, client: str) -> str:
+        """Take the right and keep it; return the token. Raises LeaseError if another has it."""
+        self.token = self.lease.take(client, _TTL_S)
+        self._renew(self.token)
+        return self.token
+
+    def drop(self) -> None:
+        """Release the right."""
+        token, self.token = self.token, None
+        with suppress(LeaseError):  # it has expired
+            self.lease.release(token)
+
+    def fall_silent(self) -> None:
+        """Stop renewing the right, so that it expires."""
+        self.token = None
+
+    def look(self) -> None:
+        """Renew the right if that is due; called every cycle."""
+        if self.token is not None and abs(self._clock_ns() - self._renewed_ns) >= _RENEWED_NS:
+            self._renew(self.token)
+
+    def _renew(self, token: str) -> None:
+        self._renewed_ns = self._clock_ns()
+        self.number = self.lease.renew(token).number
+
+
+# A set-point stream in bus time: packets as on the wire, received as by the daemon.
+
+_LOOPBACK: Final[Address] = ("127.0.0.1", 1)
+_LOOK_NS: Final = 10_000_000
+
+
+class StreamInBusTime:
+    """Passes packets to the session manager behind the daemon's socket, in bus time."""
+
+    def __init__(
+        self, block: SharedBlock, right: RightInBusTime, clock_ns: Callable[[], int]
+    ) -> None:
+        self.sessions = StreamSessionManager(block, right.lease)
+        self._right = right
+        self._clock_ns = clock_ns
+        self._look_ns = 0
+
+    def sender(self) -> StreamSender:
+        """Return a sender under the right held here; it replaces any earlier sender.
+
+        Raises LeaseError if the right is not held.
+        """
+        return StreamSender(self.sessions.issue(self._right.token))
+
+    def take(self, data: bytes, address: Address = _LOOPBACK) -> bytes | None:
+        """Receive one packet now; return the answer, None if none is due."""
+        return self.sessions.receive(data, address, self._clock_ns())
+
+    def look(self) -> None:
+        """Free the stream of a sender that is silent; called every cycle."""
+        now_ns = self._clock_ns()
+        if now_ns >= self._look_ns:
+            self._look_ns = now_ns + _LOOK_NS
+            self.sessions.expire(now_ns)
+
+
+class StreamSender:
+    """The packets of one session, numbered and stamped."""
+
+    def __init__(self, session: StreamSession) -> None:
+        self._session = session
+        self._sequence = 0
+
+    def packet(
+        self,
+        sent_s: float,
+        position_m: Sequence[float],
+        scale: float = 1.0,
+        buttons: int = 0,
+        quaternion: Sequence[float] = (1.0, 0.0, 0.0, 0.0),
+    ) -> bytes:
+        """Return the bytes of the next set-point, sent at `sent_s` by the sender's clock."""
+        self._sequence += 1
+        x, y, z = position_m
+        w, i, j, k = quaternion
+        setpoint = StreamSetpoint(
+            self._session.number, self._sequence, round(sent_s * 1e9), (x, y, z), (w, i, j, k),
+            scale, buttons,
+        )  # fmt: skip
+        return seal(setpoint, self._session.key)
+
+    def answer_of(self, data: bytes) -> StreamAnswer:
+        """Return the robot's answer; raises PacketError for a packet of another session."""
+        packet = parse(data, self._session.key)
+        assert isinstance(packet, StreamAnswer)  # the manager sends no other kind
+        return packet
+
 
 RING_S: Final = 30.0
 _LOOK_CYCLES: Final = 512
@@ -47,22 +177,25 @@ _names = count()
 class CommandRefusedError(WorkFailedError):
     """A command was refused or failed, for the reason given."""
 
+    refusal: CommandRefusal | None = None
+    """The reason in machine-readable form, None if there is only a text."""
+
 
 class LockstepRobot:
-    """One robot, booted and checked, that moves on only when it is turned; a context manager.
+    """One robot, booted and checked, whose time passes only in `turn`; a context manager.
 
-    `robot` is a profile's name or file. `plant` is the simulator's plant file. `truth_log` is where
-    the simulator logs the true pose, a file of its own where left out; `record` a folder for the
-    recording (MCAP), none where left out. `programs` are run besides the robot's own.
-    `commissioned` is the folder of what commissioning has learnt of the motors, where the robot's
-    file does not name it; nothing is made of it where the robot is not to be `compensated`, and of
-    the others nothing is learnt in motion where it `learns` nothing. The
-    calibration of its geometry in force is left aside where it is not to be run `as_calibrated`,
-    and believed less where it is `calibration_in_doubt`.
-    `scanner` is where a simulated device outside logs the poses that it measures, `camera` the
-    socket to make of a simulated camera on the platform. The
-    right to move is held from the beginning, see `right`. Raises CommandError, DriverError and
-    ProfileError as `cdpr run` does, WorkFailedError where the robot does not get ready.
+    `robot` is a profile's name or file, `plant` the simulator's plant file. The simulator logs the
+    true pose to `truth_log`, by default a temporary file. `record` is a folder for the recording
+    (MCAP); without it nothing is recorded. `programs` are added to the robot's own.
+    `commissioned` is the folder with the commissioning results of the motors, if the robot's file
+    does not name it. Unless `compensated`, they are not used; unless `learns`, the control does
+    not learn the other motors. Unless `as_calibrated`, the calibration in force is not used; with
+    `calibration_in_doubt` limits are those of a robot without one.
+    `scanner` is the file in which a simulated external scanner logs the poses it measures,
+    `camera` the socket of a simulated camera on the platform. Rows of the last `ring_s` are kept.
+    If `pinned`, the simulator and all of this process share one core. The right to move is held
+    from the beginning, see `right`. Raises CommandError, DriverError and ProfileError as `cdpr
+    run` does, WorkFailedError if the robot does not get ready.
     """
 
     def __init__(
@@ -73,6 +206,7 @@ class LockstepRobot:
         truth_log: Path | None = None,
         record: Path | None = None,
         programs: Mapping[str, Program] | None = None,
+        controller: Controller | None = None,
         commissioned: Path | None = None,
         compensated: bool = True,
         learns: bool = True,
@@ -80,6 +214,8 @@ class LockstepRobot:
         calibration_in_doubt: bool = False,
         scanner: Path | None = None,
         camera: Path | None = None,
+        ring_s: float = RING_S,
+        pinned: bool = True,
     ) -> None:
         loaded = load_robot(robot)
         self.robot = with_commissioned(
@@ -91,7 +227,9 @@ class LockstepRobot:
         self._reference = str(robot)
         self._plant, self._truth_path, self._record = plant, truth_log, record
         self._scanner, self._camera, self._learns = scanner, camera, learns
+        self._ring_s, self._pinned = ring_s, pinned
         self._more_programs = dict(programs or {})
+        self._controller = controller
         self._limits = limits_of(self.robot, calibration_in_doubt=calibration_in_doubt)
         self._stack = ExitStack()
         self._turns = self._status_seen = 0
@@ -100,6 +238,8 @@ class LockstepRobot:
         self.loop: ControlLoop
         self.right: RightInBusTime
         """The right to move, and who holds it."""
+        self.folder: Path
+        """For the robot's temporary files, while it is open."""
         self.stream: StreamInBusTime
         """Takes the packets of set-point streams."""
         self.cells: OwnLoadCells
@@ -114,16 +254,29 @@ class LockstepRobot:
         return self
 
     def __exit__(self, *_: object) -> None:
-        """Remove the power at once, wherever the platform is; `shut_down` lowers it first."""
+        """Remove the power immediately, wherever the platform is; `shut_down` lowers it first."""
         self._stack.close()
+
+    def _parts(self) -> LoopParts:
+        return loop_parts(
+            self.robot,
+            self._limits,
+            self.block,
+            learns=self._learns,
+            controller=self._controller,
+        )
 
     def _start(self, stack: ExitStack) -> None:
         robot, n = self.robot, len(self.robot.axes)
         bus = f"simbus:trial-{os.getpid()}-{next(_names)}"
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="cdpr-trial-")))
+        self.folder = folder
         if self._truth_path is None and robot.platform is not None:
             self._truth_path = folder / "truth.log"
         board = None if robot.tension_sensors is None else folder / "board"
+        self.block = block = SharedBlock.create(n, self._ring_s, 1.0 / self.period_s)
+        stack.callback(os.close, block.fd)
+        limits, made = self._limits, list[LoopParts]()
         simulator = OwnSimulator(
             self._reference,
             bus,
@@ -132,39 +285,40 @@ class LockstepRobot:
             board=board,
             scanner=self._scanner,
             camera=self._camera,
+            meanwhile=lambda: made.append(self._parts()),
         )
         stack.callback(simulator.stop)
-        self.simulator, port = simulator, None
+        self.simulator, port, parts = simulator, None, made[0]
         if board is not None:
             self.cells = OwnLoadCells(str(robot.tension_sensors), board)
             stack.callback(self.cells.stop)
             port = self.cells.port
-        self.block = block = SharedBlock.create(n, RING_S, 1.0 / self.period_s)
-        stack.callback(os.close, block.fd)
         block.counters["start_monotonic_ns"] = time.monotonic_ns()
         block.counters["start_realtime_ns"] = time.time_ns()
-        limits = self._limits
         self.machine = RobotMachine(robot, [bus], tension_port=port, limits=limits)
         stack.callback(self.machine.clock.close)
         stack.callback(self.machine.close)
-        parts = loop_parts(robot, limits, block, learns=self._learns)
         programs = {**parts.programs, **self._more_programs}
-        # whether the user's own robot may be believed is nothing to a trial of a simulated one
+        # doubts about the calibration of a real robot do not concern a simulated one
         parts = replace(parts, programs=programs, before_power=lambda: None)
-        block.write_description(description(robot, limits, parts))
-        self.loop = ControlLoop(block, self.machine, parts, lambda: self.now_ns)
+        self.loop = control_loop(robot, limits, block, self.machine, parts, lambda: self.now_ns)
+        self._description = block.description()
         self.right = RightInBusTime(block, lambda: self.now_ns)
         self.stream = StreamInBusTime(block, self.right, lambda: self.now_ns)
         self._reader = RowReader(block)
         self._channels = [url.channel for url in robot_urls(robot, (bus,)).values()]
         if self._record is not None:
+            # imported here: a robot that does not record needs no package of the daemon
+            from cdpr_rt.service.recording import Recorder  # noqa: PLC0415
+
             self.recorder = Recorder(block, self._record, robot.profile)
             stack.callback(self._end_recording)
             self.recorder.begin()
         self._boot()
         if self._truth_path is not None:
             self._truth = stack.enter_context(PoseLogTail(self._truth_path))
-        stack.enter_context(one_core(simulator.process.pid))
+        if self._pinned:
+            stack.enter_context(one_core(simulator.process.pid))
 
     def _boot(self) -> None:
         loop = self.loop
@@ -183,13 +337,13 @@ class LockstepRobot:
 
     @property
     def cycle(self) -> int:
-        """SYNCs since cycles began, as the recording counts them."""
+        """Number of SYNCs since cycles began, as in the recording."""
         device = self.machine.device
         return 0 if device is None else device.feedback.cycle
 
     @property
     def now_s(self) -> float:
-        """Bus time since cycles began, as the recording has it."""
+        """Bus time since cycles began, as in the recording."""
         return self.cycle * self.period_s
 
     @property
@@ -198,7 +352,7 @@ class LockstepRobot:
         return round(self.now_s * 1e9)
 
     def turn(self, turns: int = 1) -> None:
-        """Run so many cycles."""
+        """Run `turns` cycles."""
         loop, right, stream, recorder = self.loop, self.right, self.stream, self.recorder
         status = self.block.counters["status"]
         for _ in range(turns):
@@ -219,9 +373,9 @@ class LockstepRobot:
         return self.rows()
 
     def until(self, done: Callable[[], bool], within_s: float, what: str = "the end") -> None:
-        """Run cycles until `done`; raises WorkFailedError where that takes longer than `within_s`.
+        """Run cycles until `done`; raises WorkFailedError if that takes longer than `within_s`.
 
-        It fails at once where the drives have lost their power meanwhile.
+        It fails immediately if the drives lose their power meanwhile.
         """
         driven = self.loop.engine.driving
 
@@ -234,7 +388,7 @@ class LockstepRobot:
             raise WorkFailedError(f"{what}: {self.loop.life.reason or 'the power was taken'}")
 
     def _turn_until(self, done: Callable[[], bool], within_s: float, what: str) -> None:
-        clock = self.machine.clock  # bus time goes on without cycles too, as in a boot
+        clock = self.machine.clock  # bus time also passes without cycles, as in a boot
         end_s = clock.now_s + within_s
         while not done():
             if clock.now_s > end_s:
@@ -244,9 +398,9 @@ class LockstepRobot:
     # -- commands
 
     def command(self, do: str, within_s: float = 60.0, **what: Any) -> dict[str, Any]:
-        """Send a command as the service does and turn until the reply, in bus time.
+        """Send a command as the service does, and run cycles until the reply arrives.
 
-        `what` are its keys: program, wanted. Raises CommandRefusedError where it fails.
+        `what` are the command's keys: program, wanted. Raises CommandRefusedError if it fails.
         """
         right = self.right.number
         number = self.block.post_command({"do": do, "client": "trial", "right": right, **what})
@@ -260,19 +414,21 @@ class LockstepRobot:
 
         self._turn_until(answered, within_s, do)
         if not answers[0]["ok"]:
-            raise CommandRefusedError(f"{do}: {answers[0]['text']}")
+            refused = CommandRefusedError(f"{do}: {answers[0]['text']}")
+            refused.refusal = CommandRefusal.from_json(answers[0].get("refusal"))
+            raise refused
         return answers[0]
 
     def enable(self, program: str = "hold", **arguments: Any) -> None:
-        """Give the drives power and run `program`."""
+        """Enable the drives and run `program`."""
         self.command("enable", program=program, wanted=arguments)
 
     def program(self, name: str, **arguments: Any) -> None:
-        """Change to a program with these arguments; returns at once."""
+        """Change to a program with these arguments; returns immediately."""
         self.command("program", program=name, wanted=arguments)
 
     def carry_out(self, name: str, within_s: float = 60.0, **arguments: Any) -> None:
-        """Run a program until nothing is left for it to do; raises WorkFailedError otherwise."""
+        """Run a program until it has finished; raises WorkFailedError if it does not succeed."""
         self.program(name, **arguments)
         program = self.loop.engine.program
         self.finish(within_s)
@@ -280,7 +436,7 @@ class LockstepRobot:
             raise WorkFailedError(f"{name}: {trouble}")
 
     def finish(self, within_s: float = 60.0) -> None:
-        """Run cycles until the present program has nothing left to do."""
+        """Run cycles until the running program has finished."""
         program = self.loop.engine.program
 
         def over() -> bool:
@@ -297,23 +453,38 @@ class LockstepRobot:
         networks[where.bus].write(where.node_id, 0x2F00, sub, value)
 
     def shut_down(self) -> None:
-        """End as `cdpr run` does when it is told to stop: under control, then without power."""
+        """End as `cdpr run` does when it is stopped: under control, then without power."""
         self.loop.request_stop()
         self._turn_until(lambda: self.loop.ended, 120.0, "the end")
 
     def die(self, seconds: float) -> None:
-        """Leave the drives without SYNC and heartbeat, as a killed process does, for so long.
+        """Send neither SYNC nor heartbeat for this time, like a killed process.
 
-        The simulator's log goes on, in records without SYNC.
+        The simulator's log continues, with records without SYNC.
         """
-        Clock.close(self.machine.clock)  # nothing is listened to or sent; the lead is kept
+        Clock.close(self.machine.clock)  # nothing is received or sent, but we keep leading the bus
         self.machine.clock.sleep(seconds)
 
-    # -- what is known
+    # -- state and data
+
+    @property
+    def description(self) -> dict[str, Any]:
+        """The description that the daemon would publish."""
+        return self._description
 
     def rows(self) -> Row:
-        """Return the rows since the last call, at most those of the last `RING_S`."""
+        """Return the rows since the last call, but no more than those of the last `ring_s`."""
         return self._reader.read()
+
+    @property
+    def rows_written(self) -> int:
+        """Number of rows so far."""
+        return int(self.block.counters["rows"][0])
+
+    def kept_rows(self, since: int = 0) -> Row:
+        """Return the rows of the last `ring_s`, (cycles,), from row number `since` on."""
+        written, capacity = self.rows_written, self.block.capacity
+        return self.block.rows[np.arange(max(since, written - capacity), written) % capacity]
 
     @property
     def row(self) -> Any:
@@ -322,19 +493,19 @@ class LockstepRobot:
         return self.block.rows[(written - 1) % self.block.capacity]
 
     def truth(self) -> Any:
-        """Return what was true at the last SYNC, a record of the pose log."""
-        assert self._truth is not None  # of a robot with a platform
+        """Return the truth at the last SYNC, a record of the pose log."""
+        assert self._truth is not None  # only for a robot with a platform
         return self._truth.last()
 
     @property
     def truth_log(self) -> Path:
         """The file of the pose log."""
-        assert self._truth_path is not None  # of a robot with a platform
+        assert self._truth_path is not None  # only for a robot with a platform
         return self._truth_path
 
     @property
     def sync_offset(self) -> int:
-        """How many SYNCs the simulator had seen before our first cycle."""
+        """Number of SYNCs that the simulator received before our first cycle."""
         return int(query_status(self._channels[0]).get("sync_count", 0)) - self.cycle
 
     @property
@@ -344,14 +515,14 @@ class LockstepRobot:
 
     @property
     def progress(self) -> dict[str, Any]:
-        """Progress of the running program."""
+        """The progress of the running program."""
         return self.loop.engine.program.progress()
 
     @property
     def status(self) -> dict[str, Any]:
-        """The status that the daemon would publish now."""
+        """The status that the daemon would publish now, with the newest cycle."""
         self.loop.status.publish()
-        return self.block.status()
+        return self.block.status() | cycle_figures(self.block, self.description)
 
     def state_text(self) -> str:
         """Return state, program and reason, for messages."""
@@ -360,5 +531,5 @@ class LockstepRobot:
         return f"{life.state.label}, {self.loop.engine.program.name}{reason}"
 
     def recordings(self) -> Sequence[Path]:
-        """Return the files recorded so far, in their order."""
+        """Return the files recorded so far, oldest first."""
         return [] if self._record is None else sorted(self._record.glob("*.mcap"))

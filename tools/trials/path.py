@@ -1,4 +1,4 @@
-"""The trial of a path: lines, arcs and cut corners out of a G-code file, at speed."""
+"""The trial of a path: lines, arcs and cut corners from a G-code file, at speed."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from scipy.spatial import KDTree
 from cdpr_profiles import Robot
 from cdpr_rt.arrays import FloatArray, rms
 from cdpr_rt.motion.path.gcode import GcodeSettings, read_gcode
-from cdpr_rt.motion.path.pieces import pieces_of
-from cdpr_rt.procedures.path.planning import PathPlan, PathPlanner
-from cdpr_rt.programs.platform.paths.path_store import write_plan
+from cdpr_rt.motion.path.nodes import pieces_of
+from cdpr_rt.procedures.path_planning import PathPlan, PathPlanner
+from cdpr_rt.programs.path_store import write_plan
 from cdpr_tools.errors import WorkFailedError
 from cdpr_tools.trials.directions import Directions
-from cdpr_tools.trials.evaluation.figures import Figure
-from cdpr_tools.trials.evaluation.recorded import Recorded
+from cdpr_tools.trials.figures import Figure
+from cdpr_tools.trials.recorded import Recorded
 from cdpr_tools.trials.run import TrialRun
 
 FILE: Final = "path.nc"
@@ -28,7 +28,7 @@ LATE: Final = 0.01
 """Share of the planned duration."""
 _LAPS: Final = 3
 _SHARE: Final = 0.35
-"""Of the workspace on either side of its middle."""
+"""Share of the workspace on either side of its middle."""
 _STEP_m: Final = 5e-4
 _LETTERS: Final = {"rx": "A", "ry": "B", "rz": "C", "angle": "C"}
 _STANDING_m: Final = 1e-6
@@ -36,10 +36,10 @@ _WITHIN_S: Final = 600.0
 
 
 def gcode(directions: Directions, speed_m_s: float) -> str:
-    """Return the file: three laps of lines, an arc and a diagonal, turned on the way."""
+    """Return the file: three laps of lines, an arc and a diagonal, with turns on the way."""
     half = 1e3 * _SHARE * (directions.high_m - directions.low_m)
     x, y = half[0], half[1]
-    # the arc stays in the box, however wide that is
+    # the arc must stay in the box, however wide the box is
     left = 1e3 * (0.5 - _SHARE) * (directions.high_m - directions.low_m)[1]
     height = min((2.0 - np.sqrt(3.0)) * x, 0.9 * left)
     radius = (x**2 + height**2) / (2.0 * height)
@@ -60,7 +60,7 @@ def gcode(directions: Directions, speed_m_s: float) -> str:
 
 
 def plan_of(planner: PathPlanner, directions: Directions, speed_m_s: float) -> PathPlan:
-    """Return the plan of the trial's path; raises WorkFailedError where there is none."""
+    """Return the plan of the trial's path; raises WorkFailedError if there is none."""
     origin = 0.5 * (directions.low_m + directions.high_m)
     settings = GcodeSettings(origin, 0.0)
     path = read_gcode(gcode(directions, speed_m_s), FILE, planner.coordinates, settings)
@@ -79,7 +79,7 @@ def drive(run: TrialRun, speed_m_s: float) -> None:
     planner = PathPlanner(rig.robot)
     plan = plan_of(planner, run.directions, speed_m_s)
     paths = rig.loop.engine.parts.paths
-    assert plan.timed is not None and paths is not None  # of a robot with a platform
+    assert plan.timed is not None and paths is not None  # the robot has a platform
     paths.open(folder / "plans")
     lines = plan.nodes.line[plan.timed.node]
     name = write_plan(folder / "plans", plan.timed, lines, FILE, planner.model)
@@ -92,7 +92,7 @@ def drive(run: TrialRun, speed_m_s: float) -> None:
 
 @dataclass(frozen=True)
 class PathErrors:
-    """What was recorded along the path, one row a cycle."""
+    """Recorded errors along the path, one row per cycle."""
 
     time_s: FloatArray
     true_m: FloatArray
@@ -112,7 +112,7 @@ class PathErrors:
 
 
 def errors_of(recorded: Recorded, robot: Robot, speed_m_s: float) -> PathErrors:
-    """Return the errors of a trial; paths are computed anew, from the file."""
+    """Return the errors of a trial; the path is planned again, from the file."""
     (mark,), (end,) = recorded.marked("path"), recorded.marked("path end")
     rows = slice(recorded.row(mark["cycle"]), recorded.row(end["cycle"]) + 1)
     k = recorded.directions.k
@@ -135,7 +135,7 @@ def errors_of(recorded: Recorded, robot: Robot, speed_m_s: float) -> PathErrors:
 
 
 def _away_mm(points_m: FloatArray, places_m: FloatArray) -> FloatArray:
-    """Return how far each place is from the next of some points, (m,)."""
+    """Return the distance of each place from the nearest of some points, (m,)."""
     away_m, _ = KDTree(points_m).query(places_m)
     return 1e3 * np.asarray(away_m)
 
@@ -162,7 +162,7 @@ def _described(plan: PathPlan) -> FloatArray:
 
 
 def judge(recorded: Recorded, robot: Robot, speed_m_s: float) -> list[Figure]:
-    """Return how far from the path the platform was, its corners, and the time that it took."""
+    """Return the distances from the path, the deviation in corners, and the time taken."""
     errors = errors_of(recorded, robot, speed_m_s)
     late = abs(errors.taken_s / errors.planned_s - 1.0)
     speed = np.linalg.norm(np.diff(errors.true_m, axis=0), axis=1) / recorded.period_s

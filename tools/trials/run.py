@@ -1,4 +1,4 @@
-"""A robot under trial: started up, moved to places, marks written into its recording."""
+"""Start a robot under trial, move it to places, and write marks into its recording."""
 
 from __future__ import annotations
 
@@ -14,21 +14,21 @@ from cdpr_profiles import load_robot
 from cdpr_rt.arrays import FloatArray
 from cdpr_tools.errors import BadInputError, WorkFailedError
 from cdpr_tools.trials.directions import Directions, platform_of
-from cdpr_tools.trials.evaluation.recorded import TRUTH
 from cdpr_tools.trials.lockstep import CommandRefusedError, LockstepRobot
+from cdpr_tools.trials.recorded import TRUTH
 
 _TIGHTEN_S, _MOVE_S = 180.0, 60.0
 _SETTLE_S = 2.0
 _TRIES = 100
 _CORNER_SHARE = 0.3
 _BORDER = 1.0 - 1e-9
-"""Share of the largest angle; all of it might be refused for its rounding."""
+"""Share of the largest angle; rounding might make the full angle too large."""
 
 
 class TrialRun:
-    """A robot under trial whose platform is held, in the middle of its workspace.
+    """A robot under trial; `start_up` tightens it and moves it to the middle of its workspace.
 
-    `rng` decides, `advance` is told the bus time that has passed.
+    `rng` makes all random choices; `advance` receives the elapsed bus time.
     """
 
     def __init__(
@@ -38,13 +38,13 @@ class TrialRun:
         self.directions = Directions.of(platform_of(rig.robot))
         self.rng = rng
         self.refused = 0
-        """Places that the robot has refused, with its reason."""
+        """Number of random places that the robot has refused."""
         self._advance = advance
         self._begun_s = math.inf
 
     @property
     def elapsed_s(self) -> float:
-        """Bus time since the trial began, 0 while the robot starts up for it."""
+        """Bus time since the trial began, 0 while the robot starts up."""
         return max(0.0, self.rig.now_s - self._begun_s)
 
     def start_up(self) -> None:
@@ -57,15 +57,15 @@ class TrialRun:
         self._begun_s = rig.now_s
 
     def mark(self, what: str, **values: Any) -> None:
-        """Write down among the recording's events what happens in this cycle."""
+        """Write an event of this cycle into the recording."""
         recorder = self.rig.recorder
-        assert recorder is not None  # trials are recorded
+        assert recorder is not None  # all trials are recorded
         recorder.remark(f"trial: {what}", mark=what, cycle=self.rig.cycle, **values)
 
     def random_place(self) -> FloatArray:
-        """Return a place of the workspace, (d,): any, in part on its border or in its corners.
+        """Return a random place of the workspace, (d,), sometimes on its border or in a corner.
 
-        Angles are about any axis, and as large as they may be at the border.
+        Angles are about a random axis, and sometimes as large as allowed.
         """
         low, high = self.directions.low_m, self.directions.high_m
         rng, k = self.rng, self.directions.k
@@ -85,12 +85,12 @@ class TrialRun:
         return np.asarray(share * self.directions.angle_rad * axis / np.linalg.norm(axis))
 
     def start_move(self, place: FloatArray, speed_m_s: float | None = None) -> None:
-        """Have the platform go to a place (d,); returns at once. Raises CommandRefusedError."""
+        """Start a move to a place (d,); returns immediately. Raises CommandRefusedError."""
         self.rig.program("pose", **self.directions.arguments(place, speed_m_s))
         self._advance(self.elapsed_s)
 
     def start_random_move(self, speed_m_s: float | None = None) -> FloatArray:
-        """Have the platform go to some place that the robot does not refuse; return it, (d,)."""
+        """Start a move to a random place that the robot does not refuse; return it, (d,)."""
         for _ in range(_TRIES):
             place = self.random_place()
             try:
@@ -104,7 +104,7 @@ class TrialRun:
         raise WorkFailedError(f"{_TRIES} places in the workspace were refused, the last: {reason}")
 
     def go(self, place: FloatArray, speed_m_s: float | None = None) -> None:
-        """Take the platform to a place (d,); its set-point stands there then."""
+        """Move to a place (d,) and wait until the set-point stands there."""
         self.start_move(place, speed_m_s)
         self.arrive(self._time_s(place, speed_m_s))
 
@@ -113,14 +113,14 @@ class TrialRun:
         self.rig.finish(_MOVE_S + longer_s)
 
     def stay(self, seconds: float) -> None:
-        """Run cycles; raises WorkFailedError where the motion is ended meanwhile."""
+        """Run cycles; raises WorkFailedError if the motion is ended meanwhile."""
         self.rig.turn(round(seconds / self.rig.period_s))
         if self.rig.loop.engine.program.name != "pose":
             raise WorkFailedError(f"the motion was ended: {self.rig.state_text()}")
         self._advance(self.elapsed_s)
 
     def _time_s(self, place: FloatArray, speed_m_s: float | None) -> float:
-        """Return how long the way to a place takes at least, by its slowest direction."""
+        """Return the least time to reach a place, from its slowest direction."""
         directions, truth = self.directions, self.rig.truth()
         place_now = directions.places(truth["position_m"][None], truth["rotation"][None])[0]
         share = 1.0 if speed_m_s is None else speed_m_s / directions.speed[0]
@@ -137,9 +137,9 @@ def trial_run(
     advance: Callable[[float], None],
     **options: Any,
 ) -> Iterator[TrialRun]:
-    """Open a robot, start it up, and record the block in `folder` with what was true.
+    """Open a robot, start it up, and record the block in `folder`, with the truth.
 
-    The block is all that counts: it stands between the marks `begin` and `end`.
+    Only the block is judged: it lies between the marks `begin` and `end`.
     """
     platform_of(load_robot(robot))
     _require_empty(folder)
@@ -150,13 +150,15 @@ def trial_run(
         with _with_notices(rig):
             run.start_up()
         home_rad = platform_of(rig.robot).home_rotation_rad
+        known = rig.robot.calibration
         run.mark(
-            "begin", sync_offset=rig.sync_offset, robot=robot, seed=seed, home_rotation_rad=home_rad
-        )
+            "begin", sync_offset=rig.sync_offset, robot=robot, seed=seed,
+            home_rotation_rad=home_rad, calibration=None if known is None else known.summary(),
+        )  # fmt: skip
         with _with_notices(rig):
             yield run
         run.mark("end", refused=run.refused, notices=rig.status["notices"])
-        rig.turn()  # the last cycle is in the recording as well
+        rig.turn()  # so that the recording contains the last cycle
     recorder = rig.recorder
     if recorder is not None and (status := recorder.status())["error"]:
         raise WorkFailedError(str(status["error"]))
@@ -164,7 +166,7 @@ def trial_run(
 
 @contextmanager
 def _with_notices(rig: LockstepRobot) -> Iterator[None]:
-    """Have what ends the block tell what the robot's status would have told besides."""
+    """Add the notices of the robot's status to an error of the block."""
     try:
         yield
     except WorkFailedError as error:

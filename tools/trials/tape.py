@@ -1,7 +1,7 @@
-"""The trial of a robot whose geometry was taken with a tape measure (Tremblay, section 3.6).
+"""The trial of a robot whose geometry was measured with a tape (Tremblay, section 3.6).
 
-A robot has to be taken to the poses of its calibration before it is calibrated. Errors of its
-geometry must then cost accuracy only: no cable may be torn or hang slack.
+A robot must reach the poses of its calibration before it is calibrated. Until then, errors of
+its geometry may only reduce accuracy: no cable may break or hang slack.
 """
 
 from __future__ import annotations
@@ -13,28 +13,28 @@ from typing import Final
 import numpy as np
 
 from cdpr_profiles import Robot
-from cdpr_profiles.reading.bounded_input import read_toml
+from cdpr_profiles.bounded_input import read_toml
 from cdpr_rt.arrays import rms
 from cdpr_tools.trials.directions import platform_of
-from cdpr_tools.trials.evaluation.figures import Figure
-from cdpr_tools.trials.evaluation.recorded import Recorded
+from cdpr_tools.trials.figures import Figure
 from cdpr_tools.trials.limits import held_figures
+from cdpr_tools.trials.recorded import Recorded
 from cdpr_tools.trials.run import TrialRun
 
 OFF_M: Final = (0.02, 0.05)
-"""How far each exit point truly is from where the robot's file has it, at least and at most."""
+"""Least and largest distance of each true exit point from that of the robot's file."""
 POSES: Final = 100
 SPEED_SHARE: Final = 0.25
-"""Of the speed of the robot's file: a robot that nobody has calibrated yet is not hurried."""
+"""Share of the speed in the robot's file: a robot that is not calibrated yet moves slowly."""
 STAY_S: Final = 1.0
 _TIME_OVER: Final = "time over"
-"""The mark of a trial whose minutes ended before its poses did."""
+"""The mark of a trial whose time ended before all poses were reached."""
 
 
 def plant_text(robot: Robot, plant: Path | None, seed: int) -> str:
-    """Return the plant file of the trial: a given one with exit points moved by chance.
+    """Return the plant file of the trial: the given one with randomly moved exit points.
 
-    One that has a table [geometry] of its own is taken as it is. Raises ProfileError.
+    A file that already has a table [geometry] is used unchanged. Raises ProfileError.
     """
     known = {} if plant is None else read_toml(plant)
     text = "" if plant is None else plant.read_text(encoding="utf-8")
@@ -48,7 +48,7 @@ def plant_text(robot: Robot, plant: Path | None, seed: int) -> str:
 
 
 def drive(run: TrialRun, seconds: float) -> None:
-    """Go out to random poses and back to the middle, unhurried."""
+    """Move slowly to random poses and back to the middle."""
     speed_m_s = SPEED_SHARE * float(run.directions.speed[0])
     for _ in range(POSES):
         if run.elapsed_s >= seconds:
@@ -63,9 +63,9 @@ def drive(run: TrialRun, seconds: float) -> None:
 
 
 def judge(recorded: Recorded, robot: Robot) -> list[Figure]:
-    """Return the extremes of tension and torque, and how far off the poses were.
+    """Return the extremes of tension and torque, and the errors at the poses.
 
-    How many poses there are is not the robot's doing where the time was over before.
+    If the time ended first, the robot is not to blame for the missing poses: one is enough.
     """
     directions, marks = recorded.directions, recorded.marked("pose")
     rows = [recorded.row(mark["cycle"]) for mark in marks]

@@ -1,4 +1,4 @@
-"""The trial of the robot alone at its targets: where it truly stands when it should be there."""
+"""The trial of accuracy at targets: the true position when the platform should be there."""
 
 from __future__ import annotations
 
@@ -7,23 +7,23 @@ from typing import Any, Final
 import numpy as np
 
 from cdpr_rt.arrays import FloatArray
-from cdpr_tools.trials.evaluation.figures import Figure
-from cdpr_tools.trials.evaluation.recorded import Recorded
+from cdpr_tools.trials.figures import Figure
+from cdpr_tools.trials.recorded import Recorded
 from cdpr_tools.trials.run import TrialRun
 
 SETTLE_S: Final = 1.5
-"""From the end of the set-point's motion until the platform is looked at."""
+"""From the end of the set-point's motion until the platform's position is evaluated."""
 LOOK_S: Final = 0.1
 """The thesis takes the mean of ten samples at 100 Hz (section 2.5.2)."""
 MEAN_mm: Final = {2: 0.3, 3: 0.5}
-"""Wanted, by how many coordinates a position has."""
+"""Limit, by the number of coordinates of a position."""
 THREE_SIGMA_mm: Final = {2: 1.0, 3: 1.5}
 MEAN_deg: Final = 0.05
 THREE_SIGMA_deg: Final = 0.15
 
 
 def drive(run: TrialRun, seconds: float) -> None:
-    """Go from target to target, stay for a moment at each."""
+    """Move from target to target, and stay for a moment at each."""
     while run.elapsed_s < seconds:
         target = run.directions.marked(run.start_random_move(), "target")
         run.mark("target", **target)
@@ -33,7 +33,7 @@ def drive(run: TrialRun, seconds: float) -> None:
 
 
 def errors_mm(recorded: Recorded) -> tuple[FloatArray, FloatArray]:
-    """Return the targets in m and what the true position was off there in mm, (m, k) each."""
+    """Return the targets in m and the true position errors there in mm, (m, k) each."""
     k = recorded.directions.k
     targets = _targets(recorded)[:, :k]
     true = [recorded.true_m[rows].mean(axis=0) for rows in _looked(recorded)]
@@ -43,7 +43,7 @@ def errors_mm(recorded: Recorded) -> tuple[FloatArray, FloatArray]:
 def errors_deg(recorded: Recorded) -> FloatArray:
     """Return the rotation vectors of R_true R_target^T, (m, 3) in degrees.
 
-    (0, 3) where the platform's angles are not controlled.
+    (0, 3) if the platform's angles are not controlled.
     """
     directions = recorded.directions
     if not directions.turns:
@@ -67,14 +67,14 @@ def _targets(recorded: Recorded) -> FloatArray:
 
 
 def _looked(recorded: Recorded) -> list[slice]:
-    """Return the rows of each target over which the mean is taken."""
+    """Return for each target the rows over which the mean is taken."""
     looked = max(1, round(LOOK_S / recorded.period_s))
     rows = [recorded.row(mark["cycle"]) for mark in _measured(recorded)]
     return [slice(row - looked + 1, row + 1) for row in rows]
 
 
 def judge(recorded: Recorded) -> list[Figure]:
-    """Return mean and 3 sigma of the errors in all directions."""
+    """Return mean and 3 sigma of the errors in each direction."""
     names, k = recorded.directions.names, recorded.directions.k
     targets, errors = errors_mm(recorded)
     mean, spread = errors.mean(axis=0), 3.0 * errors.std(axis=0, ddof=1)
@@ -93,7 +93,7 @@ def judge(recorded: Recorded) -> list[Figure]:
 def _orientation(errors: FloatArray) -> list[Figure]:
     """Return the figures of the rotation vectors (m, 3) from wanted to true orientation.
 
-    The mean is that of the vectors, as of positions; 3 sigma that of the worst axis.
+    The mean is the length of the mean vector; 3 sigma is that of the worst axis.
     """
     if not len(errors):
         return []

@@ -1,4 +1,4 @@
-"""Trials by name: run one on a simulator of its own, and judge what it has recorded."""
+"""Trials by name: run a trial on its own simulator, and judge its recording."""
 
 from __future__ import annotations
 
@@ -13,19 +13,17 @@ from matplotlib.figure import Figure as Picture
 from cdpr_drivers.robot.commissioned import uncommissioned_text, with_commissioned
 from cdpr_profiles import Robot, load_robot
 from cdpr_profiles.calibration.in_force import calibrated
-from cdpr_rt.robots.feasibility.checks import refuse_impossible
-from cdpr_tools.calibrate.words import geometry_note
+from cdpr_rt.diagnosis.checks import refuse_impossible
 from cdpr_tools.errors import BadInputError
 from cdpr_tools.output import Output, to_json
 from cdpr_tools.recordings.stored_settings import load_settings
 from cdpr_tools.report.style import save_figure
-from cdpr_tools.trials import limits, line, path, tape, targets
+from cdpr_tools.robots.calibration_text import calibration_text
+from cdpr_tools.trials import limits, line, path, pictures, streaming, tape, targets
 from cdpr_tools.trials.directions import platform_of
-from cdpr_tools.trials.evaluation import pictures
-from cdpr_tools.trials.evaluation.figures import Figure, all_reached
-from cdpr_tools.trials.evaluation.recorded import Recorded
+from cdpr_tools.trials.figures import Figure, all_reached
+from cdpr_tools.trials.recorded import Recorded
 from cdpr_tools.trials.run import TrialRun, trial_run
-from cdpr_tools.trials.streams import streaming
 
 SETTINGS, PICTURE, FIGURES, PLANT = "trial.json", "trial.png", "figures.json", "plant.toml"
 _ONE: Final = "run"
@@ -35,7 +33,7 @@ Parts = dict[str, Recorded]
 
 @dataclass(frozen=True)
 class TrialSettings:
-    """What a trial was asked for; kept beside its recordings."""
+    """Settings of a trial; stored beside its recordings."""
 
     kind: str
     robot: str
@@ -45,16 +43,16 @@ class TrialSettings:
     commissioned: str | None
     compensated: bool
     speed_m_s: float = line.SPEED_m_s
-    """Of lines and paths."""
+    """Speed of lines and paths."""
 
     @classmethod
     def load(cls, folder: Path) -> TrialSettings:
-        """Return what the trial in `folder` was asked for; raises BadInputError."""
+        """Return the settings of the trial in `folder`; raises BadInputError."""
         return load_settings(folder / SETTINGS, cls)
 
     @property
     def parts(self) -> Sequence[str]:
-        """Folders of the recordings, one for each time that the robot was started."""
+        """Folders of the recordings, one for each start of the robot."""
         if not KINDS[self.kind].compares:
             return (_ONE,)
         return (line.WITH, line.WITHOUT) if self.compensated else (line.WITHOUT,)
@@ -68,13 +66,13 @@ class TrialKind:
     judge: Callable[[Parts, Robot, TrialSettings], list[Figure]]
     draw: Callable[[Parts, Robot, TrialSettings], Picture]
     minutes: float
-    """How long it lasts, in bus time, where nothing else is wanted."""
+    """Default duration, in bus time."""
     compares: bool = False
-    """Whether it is run with compensation and without."""
+    """Whether it runs with and without compensation."""
     at_speed: bool = False
-    """Whether it has a speed of its own, and lasts as long as its ways take at that."""
+    """Whether it has a speed setting, which determines its duration."""
     as_calibrated: bool = True
-    """Whether a calibration of the geometry counts that is in force."""
+    """Whether it uses the calibration in force."""
 
 
 KINDS: Final = {
@@ -122,7 +120,7 @@ KINDS: Final = {
 
 
 def perform(settings: TrialSettings, folder: Path, out: Output) -> dict[str, Any]:
-    """Run a trial, recorded in `folder`, and judge it; return what `judge` does."""
+    """Run a trial, record it in `folder` and judge it; return the result of `judge`."""
     kind = KINDS[settings.kind]
     robot = load_robot(settings.robot)
     platform = platform_of(robot)
@@ -135,15 +133,15 @@ def perform(settings: TrialSettings, folder: Path, out: Output) -> dict[str, Any
     knows = settings.commissioned is not None or any(axis.commissioned for axis in robot.axes)
     if kind.compares and settings.compensated and not knows:
         raise BadInputError(
-            f"{settings.kind}: compares motion with compensation and without, and nothing is known "
-            "of the motors; allowed: --commissioned DIR, what `cdpr commission "
+            f"{settings.kind}: compares motion with compensation and without, and the motors "
+            "are not identified; allowed: --commissioned DIR, what `cdpr commission "
             f"{settings.robot} --all` has left, or --without-compensation"
         )
     text = uncommissioned_text(with_commissioned(robot, _path(settings.commissioned)))
     if settings.compensated and text:
         out.note(text)
-    if kind.as_calibrated and (geometry := geometry_note(calibrated(robot))):
-        out.note(geometry)
+    if kind.as_calibrated and (known := calibrated(robot).calibration) is not None:
+        out.note(calibration_text(known.summary()))
     plant = _plant(settings, robot, folder)
     for part in settings.parts:
         compensated = settings.compensated and part != line.WITHOUT
@@ -168,12 +166,14 @@ def perform(settings: TrialSettings, folder: Path, out: Output) -> dict[str, Any
 
 
 def judge(folder: Path) -> dict[str, Any]:
-    """Compute a trial's figures from its recordings and from what was true; draw its picture."""
+    """Compute a trial's figures from its recordings and the truth; draw its picture."""
     settings = TrialSettings.load(folder)
     kind, robot = KINDS[settings.kind], load_robot(settings.robot)
     parts = {part: Recorded(folder / part) for part in settings.parts}
     figures = kind.judge(parts, robot, settings)
     ends = {part: one.marked("end")[0] for part, one in parts.items()}
+    begins = [one.marked("begin")[0] for one in parts.values()]
+    calibration = begins[0].get("calibration")  # the same in all parts
     notices = {part: end.get("notices", []) for part, end in ends.items()}
     save_figure(kind.draw(parts, robot, settings), folder / PICTURE)
     result = {
@@ -181,12 +181,14 @@ def judge(folder: Path) -> dict[str, Any]:
         "speed_m_s": settings.speed_m_s if kind.at_speed else None,
         "figures": {figure.key: figure.as_table() for figure in figures},
         "reached": all_reached(figures),
+        "calibration": calibration,
         "refused": {part: end["refused"] for part, end in ends.items()},
         "notices": notices,
         "recordings": [str(path) for path in sorted(folder.glob("*/*.mcap"))],
         "truth": [str(path) for path in sorted(folder.glob("*/truth.log"))],
         "picture": str(folder / PICTURE),
         "lines": [
+            *([] if calibration is None else [calibration_text(calibration)]),
             *(figure.line() for figure in figures),
             *(f"note: {text}" for text in dict.fromkeys(chain(*notices.values()))),
         ],
@@ -197,7 +199,7 @@ def judge(folder: Path) -> dict[str, Any]:
 
 
 def _plant(settings: TrialSettings, robot: Robot, folder: Path) -> Path | None:
-    """Return the plant file of a trial; that of `tape` is written into its folder."""
+    """Return the plant file of a trial; `tape` writes its own into the trial's folder."""
     given = _path(settings.plant)
     if settings.kind != "tape":
         return given

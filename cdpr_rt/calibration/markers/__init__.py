@@ -1,1 +1,1 @@
-"""Maps of printed markers from images of a camera that moves among them."""
+"""Marker maps: detection, bundle adjustment, diagnosis."""

@@ -1,42 +1,304 @@
-"""Bundle adjustment: the map, the camera's poses and, where asked, the lens that fit all corners.
+"""Bundle adjustment: fit the map, the camera's poses and, on request, the lens to all corners.
 
-Levenberg's and Marquardt's method on the normal equations, which the sparse Jacobian makes cheap:
-100 images with 40 markers are 840 unknowns. Corners that do not fit lose weight w = 1/(1 + (r/c)²),
-Cauchy's, of which the width c follows the spread of the residuals as they shrink.
+Levenberg's and Marquardt's method on normal equations from which the poses are eliminated. Corners
+that do not fit lose weight w = 1/(1 + (r/c)²), Cauchy's, whose width c follows the spread of the
+residuals as they shrink.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from scipy.linalg import LinAlgError, cho_factor, cho_solve
-from scipy.sparse import diags_array
+from scipy.sparse import csr_array
 
-from cdpr_rt.arrays import FloatArray, IntArray, rms
-from cdpr_rt.calibration.markers.geometry.rotations import cross_matrices
-from cdpr_rt.calibration.markers.reprojection import (
-    LENS_PARAMETERS,
-    Estimate,
-    residuals,
-    residuals_and_jacobian,
+from cdpr_rt.arrays import BoolArray, FloatArray, IntArray, rms
+from cdpr_rt.calibration.markers.geometry import (
+    cross_matrices,
+    exponentials,
+    project,
+    project_with_derivatives,
 )
-from cdpr_rt.calibration.markers.seen_markers import SeenMarkers
-from cdpr_rt.calibration.markers.sheet_errors import SheetErrors, sheet_errors
+from cdpr_rt.calibration.markers.marker_map import MarkerMap, SeenMarkers
 from cdpr_rt.errors import ControlError
+
+# Expected corners in images. Cameras and markers change like poses of the platform:
+# (position + x_p, exp(x_φ) rotation), both along the axes of the map.
+
+LENS_PARAMETERS = 9
+_NEAR_m = 1e-3
+
+
+@dataclass(frozen=True)
+class CornerTerms:
+    """n markers in images: residuals of their corners, and blocks of derivatives."""
+
+    residual: FloatArray
+    """Expected less seen corners, to the right and down, (n, 8)."""
+    by_pose: FloatArray
+    """By the pose of the camera, or of the platform that carries it, (n, 8, 6)."""
+    by_shared: FloatArray
+    """By parameters that all images share, such as the lens, (n, 8, C)."""
+    by_marker: FloatArray
+    """(n, 8, 6)"""
+
+
+@dataclass(frozen=True)
+class Views:
+    """n markers of a map and the cameras that see them; a row is one marker in one image."""
+
+    corners_m: FloatArray
+    """In the marker's frame, (n, 4, 3)."""
+    corners_px: FloatArray
+    """(n, 4, 2)."""
+    marker_position_m: FloatArray
+    marker_rotation: FloatArray
+    camera_position_m: FloatArray
+    camera_rotation: FloatArray
+
+    def _points(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return corners from markers' middles, from cameras, and in their frames, (n, 4, 3)."""
+        turned = self.corners_m @ self.marker_rotation.transpose(0, 2, 1)
+        away = turned + (self.marker_position_m - self.camera_position_m)[:, None]
+        return turned, away, away @ self.camera_rotation
+
+    def off_px(self, lens: FloatArray) -> FloatArray:
+        """Return expected less seen corners, (n, 4, 2); inf behind the camera."""
+        flat = self._points()[2].reshape(-1, 3)
+        behind = flat[:, 2] < _NEAR_m
+        safe = np.where(behind[:, None], (0.0, 0.0, 1.0), flat)
+        expected = np.where(behind[:, None], np.inf, project(safe, lens))
+        return expected.reshape(-1, 4, 2) - self.corners_px
+
+    def terms(self, lens: FloatArray) -> CornerTerms:
+        """Return the terms in px; shared are the lens (9) and the sheets' relative size (1)."""
+        n = len(self.corners_px)
+        turned, away, points = self._points()
+        expected, by_point, by_lens = project_with_derivatives(points.reshape(-1, 3), lens)
+        to_camera = self.camera_rotation.transpose(0, 2, 1)
+        by_room = by_point.reshape(n, 4, 2, 3) @ to_camera[:, None]
+        by_size = by_room @ turned[..., None]
+        by_camera = np.concatenate([-by_room, by_room @ cross_matrices(away)], axis=3)
+        by_marker = np.concatenate([by_room, -by_room @ cross_matrices(turned)], axis=3)
+        shared = [by_lens.reshape(n, 8, LENS_PARAMETERS), by_size.reshape(n, 8, 1)]
+        return CornerTerms(
+            (expected.reshape(n, 4, 2) - self.corners_px).reshape(n, 8),
+            by_camera.reshape(n, 8, 6),
+            np.concatenate(shared, axis=2),
+            by_marker.reshape(n, 8, 6),
+        )
+
+
+# Normal equations in blocks: parameters, and poses, each coupled only to itself. Poses are
+# eliminated: S = H - Σ E_j C_j^-1 E_j^T (Schur).
+
+_WEAK, _SINGULAR = 1e-6, 1e-10
+
+
+@dataclass(frozen=True)
+class PoseBlocks:
+    """Normal equations of P parameters and N poses of d directions."""
+
+    H: FloatArray
+    """(P, P)"""
+    E: FloatArray
+    """(N, P, d)"""
+    C: FloatArray
+    """(N, d, d)"""
+    by_parameter: FloatArray
+    """Gradients, (P,) and (N, d)."""
+    by_pose: FloatArray
+
+    def only(self, parameters: IntArray) -> PoseBlocks:
+        """Return the equations of some of the parameters, with all others held."""
+        H = self.H[np.ix_(parameters, parameters)]
+        return replace(
+            self, H=H, E=self.E[:, parameters], by_parameter=self.by_parameter[parameters]
+        )
+
+    def pose_covariance(self, damping: float = 0.0) -> FloatArray:
+        """Return C^-1 of each pose, (N, d, d); 0 in directions that no row determines."""
+        C, d = self.C.copy(), self.C.shape[1]
+        if damping > 0.0:
+            diagonal = C[:, range(d), range(d)]
+            level = np.maximum(diagonal, _WEAK * (1.0 + diagonal.max()))
+            C[:, range(d), range(d)] += damping * level
+            return np.asarray(np.linalg.inv(C))
+        return np.asarray(np.linalg.pinv(C, rcond=_SINGULAR, hermitian=True))
+
+    def reduced(self, damping: float = 0.0) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return S (P, P), E C^-1 and C^-1."""
+        inverse = self.pose_covariance(damping)
+        EC = self.E @ inverse
+        S = self.H - np.tensordot(EC, self.E, axes=([0, 2], [0, 2]))
+        P = len(S)
+        S[range(P), range(P)] += damping * np.diag(self.H)
+        return S, EC, inverse
+
+    def step(self, damping: float) -> tuple[FloatArray, FloatArray]:
+        """Return the changes of parameters (P,), 0 if undetermined, and of poses (N, d)."""
+        S, EC, inverse = self.reduced(damping)
+        right = -self.by_parameter + np.einsum("jpd,jd->p", EC, self.by_pose)
+        try:
+            change = cho_solve(cho_factor(S), right) if len(S) else right
+        except LinAlgError:
+            change = np.zeros(len(S))
+        moves = -(self.by_pose + np.einsum("jpd,p->jd", self.E, change))
+        return change, np.einsum("jde,je->jd", inverse, moves)
+
+
+def corner_blocks(
+    seen: SeenMarkers, terms: CornerTerms, weights: FloatArray, poses: int
+) -> PoseBlocks:
+    """Return Σ J^T w J and Σ J^T w r; each marker in an image fills only a few of their blocks.
+
+    The parameters are the shared ones, then 6 of each marker.
+    """
+    root = np.repeat(np.sqrt(weights), 2, axis=1)[..., None]
+    J = np.concatenate([terms.by_pose, terms.by_shared, terms.by_marker], axis=2) * root
+    JT = np.swapaxes(J, 1, 2)
+    G, g = JT @ J, (JT @ (terms.residual[..., None] * root))[..., 0]
+    markers, shared = len(seen.ids), terms.by_shared.shape[2]
+    size, last = shared + 6 * markers, 6 + shared
+    H, E, gradient = np.zeros((size, size)), np.zeros((poses, size, 6)), np.zeros(size)
+    E[:, :shared] = _sum(seen.image, poses, G[:, 6:last, :6])
+    of_markers = E[:, shared:].reshape(poses, markers, 6, 6)
+    of_markers[seen.image, seen.marker] = G[:, last:, :6]
+    across = _sum(seen.marker, markers, G[:, last:, 6:])
+    H[:shared, :shared] = G[:, 6:last, 6:last].sum(axis=0)
+    H[shared:, :shared] = across[..., :shared].reshape(-1, shared)
+    H[:shared, shared:] = H[shared:, :shared].T
+    own, each = H[shared:, shared:].reshape(markers, 6, markers, 6), np.arange(markers)
+    own[each, :, each] = across[..., shared:]
+    gradient[:shared] = g[:, 6:last].sum(axis=0)
+    gradient[shared:] = _sum(seen.marker, markers, g[:, last:]).ravel()
+    C, by_pose = _sum(seen.image, poses, G[:, :6, :6]), _sum(seen.image, poses, g[:, :6])
+    return PoseBlocks(H, E, C, gradient, by_pose)
+
+
+def _sum(number: IntArray, count: int, blocks: FloatArray) -> FloatArray:
+    """Return the sums (count, ...) of blocks (n, ...) with the same number."""
+    n = len(number)
+    picks: Any = csr_array((np.ones(n), (number, np.arange(n))), shape=(count, n))
+    return np.asarray(picks @ blocks.reshape(n, -1)).reshape(count, *blocks.shape[1:])
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A map together with the lens through which it is seen."""
+
+    map: MarkerMap
+    lens: FloatArray
+
+    @property
+    def parameters(self) -> int:
+        """Number of parameters besides the camera's poses: 9 of the lens, 6 of each marker."""
+        return LENS_PARAMETERS + 6 * len(self.map.ids)
+
+    def changed(self, step: FloatArray, moves: FloatArray | None = None) -> Estimate:
+        """Return the estimate with changes `step` (parameters,) and moves of poses (k, 6)."""
+        marker = step[LENS_PARAMETERS:].reshape(-1, 6)
+        moved = replace(
+            self.map,
+            position_m=self.map.position_m + marker[:, :3],
+            rotation=exponentials(marker[:, 3:]) @ self.map.rotation,
+        )
+        if moves is not None:
+            moved = replace(
+                moved,
+                camera_position_m=self.map.camera_position_m + moves[:, :3],
+                camera_rotation=exponentials(moves[:, 3:]) @ self.map.camera_rotation,
+            )
+        return Estimate(moved, self.lens + step[:LENS_PARAMETERS])
+
+    def views(self, seen: SeenMarkers) -> Views:
+        """Return the expected views of `seen`."""
+        map_ = self.map
+        return Views(
+            seen.corners_m,
+            seen.corners_px,
+            map_.position_m[seen.marker],
+            map_.rotation[seen.marker],
+            map_.camera_position_m[seen.image],
+            map_.camera_rotation[seen.image],
+        )
+
+    def off_px(self, seen: SeenMarkers) -> FloatArray:
+        """Return `Views.off_px`."""
+        return self.views(seen).off_px(self.lens)
+
+
+# Errors of printed sheets, relative to squares of their nominal size, and a map's covariance with
+# them. Noise differs in each image; a sheet's errors (scale of the printer, paper that is not
+# flat) are the same in all. They do not average out, and a covariance that treats them as noise
+# is too small.
+
+_SEEN_SHARE, _NOISE_SHARE = 8.0 / 2.0, 5.0 / 2.0
+"""A sheet's errors have 8 coordinates at 4 corners. Seen from about one direction its pose absorbs
+6 of them, from many only 3: position and rotation in its plane. The first estimates the size of
+the errors, the second the share of noise alone: in both cases the larger value."""
+_SIGMAS = 3.0
+
+
+@dataclass(frozen=True)
+class SheetErrors:
+    """Common part of the corners' residuals over images, on their sheets."""
+
+    sigma_m: float
+    """Standard deviation of a coordinate of a corner on its sheet; 0 if not significant."""
+    inflation: float
+    """Factor of the covariance over the one by noise alone: 1 + (n - 1) r for markers
+    that are seen in n images, with the correlation r of a corner's residuals (design effect)."""
+
+
+def sheet_errors(estimate: Estimate, seen: SeenMarkers, weight: FloatArray) -> SheetErrors:
+    """Return the sheets' errors by an analysis of variance; `weight` (n, 4) is the fit's.
+
+    With n images of a marker, the mean squares between corners and within them are at most
+    (n s² + 2.5 v) / 4 and v, where s² is the sheets' variance and v the noise's.
+    """
+    terms, n = estimate.views(seen).terms(estimate.lens), len(seen)
+    by_place = terms.by_marker[..., :3].reshape(n, 4, 2, 3)
+    on_sheet = by_place @ estimate.map.rotation[seen.marker][:, None, :, :2]
+    shift = np.linalg.solve(on_sheet, terms.residual.reshape(n, 4, 2, 1))[..., 0]
+    shift = np.where((weight > 0.5)[..., None], shift, 0.0)
+    between, within, freedom, markers, images = 0.0, 0.0, 0, 0, []
+    for marker in np.unique(seen.marker):
+        own = shift[seen.marker == marker]
+        if len(own) < 2:
+            continue
+        mean = own.mean(axis=0)
+        between += len(own) * float((mean**2).sum())
+        within += float(((own - mean) ** 2).sum())
+        freedom += 8 * (len(own) - 1)
+        markers += 1
+        images.append(len(own))
+    if not freedom or within == 0.0:
+        return SheetErrors(0.0, 1.0)
+    noise, common = within / freedom, _SEEN_SHARE * between / (8 * markers)
+    chance = _SIGMAS * np.sqrt(2.0 / (5.0 * markers))
+    if common / noise < _NOISE_SHARE * (1.0 + chance):
+        return SheetErrors(0.0, 1.0)
+    count = float(np.mean(images))
+    variance = (common - _NOISE_SHARE * noise) / count
+    share = variance / (variance + noise)
+    return SheetErrors(float(np.sqrt(variance)), 1.0 + (count - 1.0) * share)
+
 
 _STEPS = 60
 _END = 1e-7
-"""Relative fall of the cost that is none any more."""
+"""Relative decrease of the cost that ends the search."""
 _LEAST_SIGMA_px = 0.02
 _WIDTH = 3.0
 """Width of the loss, in standard deviations."""
 _LOSS_BIAS = 0.926
 """Weighted standard deviation over the true one, of normal residuals: (9 (1 - w) / 2 w)^½ with the
-mean weight w = 4.5 e^4.5 E1(4.5) = 0.840. That of the estimates, with weights in the normal matrix,
-is within 2 % without it."""
+mean weight w = 4.5 e^4.5 E1(4.5) = 0.840. The standard deviation of the estimates, with weights in
+the normal matrix, is within 2 % without it."""
 _MOST_DAMPING = 1e10
-_NORMAL_MEDIAN = 1.1774
+NORMAL_MEDIAN = 1.1774
 """Median of the length of a vector of two normal numbers of deviation 1."""
 
 
@@ -52,14 +314,13 @@ class Bundle:
     off_px: FloatArray
     """Distance of each corner from its prediction, (n, 4)."""
     weight: FloatArray
-    """Weight of each corner in the fit, (n, 4), 1 for one that fits."""
+    """Weight of each corner in the fit, (n, 4); 1 for a corner that fits."""
     sigma_px: float
     """Standard deviation of a coordinate of a corner, from the weighted residuals."""
     covariance: FloatArray
-    """Covariance of all parameters (p, p) in the order of `reprojection`, 0 for fixed ones."""
+    """Covariance of the parameters of the estimate, (p, p), 0 for held ones."""
     sheets: SheetErrors
-    """Errors of the sheets themselves, which the covariance contains."""
-    steps: int
+    """Errors of the sheets, which the covariance contains."""
 
     @property
     def rms_px(self) -> float:
@@ -67,24 +328,28 @@ class Bundle:
         return rms(self.off_px[self.weight > 0.5])
 
     @property
+    def marker_covariance_m2(self) -> FloatArray:
+        """Covariances of each marker's position along the map's axes, (m, 3, 3)."""
+        m = len(self.estimate.map.ids)
+        blocks = self.covariance[LENS_PARAMETERS:, LENS_PARAMETERS:].reshape(m, 6, m, 6)
+        return np.asarray(blocks[np.arange(m), :3, np.arange(m), :3])
+
+    @property
     def marker_sigma_m(self) -> FloatArray:
         """Standard deviations of the markers' positions along the map's axes, (m, 3)."""
-        start = 6 * len(self.estimate.map.names)
-        variance = np.diag(self.covariance)[start : start + 6 * len(self.estimate.map.ids)]
-        return np.sqrt(variance.reshape(-1, 6)[:, :3])
+        return np.sqrt(np.diagonal(self.marker_covariance_m2, axis1=1, axis2=2))
 
     @property
     def shape_sigma_m(self) -> FloatArray:
         """Standard deviations of the markers' positions, (m, 3), in the frame that fits all best.
 
-        What is left of their covariance C once the map may move and turn as a whole: P C P with
-        P = 1 - G (G^T G)^-1 G^T, G the positions' derivatives by the six rigid motions. That of
-        one marker's frame has in it how badly one sheet tells its own tilt, times the distance.
+        The part of their covariance C that is left when the map may move and turn as a whole: P C P
+        with P = 1 - G (G^T G)^-1 G^T, G the positions' derivatives by the six rigid motions. In one
+        marker's frame, the uncertain tilt of its sheet would add in proportion to the distance.
         """
         placed = np.flatnonzero(self.estimate.map.placed)
         at = self.estimate.map.position_m[placed]
-        start = 6 * len(self.estimate.map.names)
-        rows = (start + 6 * placed[:, None] + np.arange(3)).ravel()
+        rows = (LENS_PARAMETERS + 6 * placed[:, None] + np.arange(3)).ravel()
         unit = np.broadcast_to(np.eye(3), (len(at), 3, 3))
         G = np.concatenate([unit, -cross_matrices(at - at.mean(axis=0))], axis=2).reshape(-1, 6)
         Q, _ = np.linalg.qr(G)
@@ -98,129 +363,105 @@ class Bundle:
 def adjust(
     start: Estimate, seen: SeenMarkers, fixed: tuple[int, ...], *, free_lens: bool = False
 ) -> Bundle:
-    """Return the best fit from `start` with the markers `fixed`, ids, held: they are the gauge.
+    """Return the best fit from `start`; the markers with ids `fixed` are held as the gauge.
 
-    Raises BundleError where nothing is fixed, or what was seen does not determine the rest.
+    Raises BundleError if no marker is fixed, or if the images do not determine the rest.
     """
     usable = start.map.placed[seen.marker] & start.map.located[seen.image]
-    # a marker that the first map has behind the camera cannot find its way to the front
-    before_camera = np.isfinite(residuals(start, seen.keep(usable))).all(axis=(1, 2))
+    # the fit cannot bring a marker that starts behind the camera to the front
+    before_camera = np.isfinite(start.off_px(seen.keep(usable))).all(axis=(1, 2))
     usable[usable] = before_camera
     used = seen.keep(usable)
     free = _free_parameters(start, used, fixed, free_lens)
-    cameras = len(np.unique(used.image))
     now, damping = start, 1e-4
-    sigma = _spread(residuals(now, used))
-    cost = _cost(residuals(now, used), sigma)
-    steps = 0
-    for steps in range(1, _STEPS + 1):  # noqa: B007 - is told
-        normal, gradient, scale = _normal_equations(now, used, free, sigma)
-        before = cost
+    off = now.off_px(used)
+    sigma = _spread(off)
+    cost = cauchy_cost(off, sigma)
+    for _ in range(_STEPS):
+        blocks, before = _blocks(now, used, free, sigma), cost
         while damping < _MOST_DAMPING:
             step = np.zeros(now.parameters)
-            damped = normal + damping * np.diag(scale)
-            step[free] = _solve(damped, -gradient[:, None], cameras)[:, 0]
-            trial = now.changed(step)
-            trial_cost = _cost(residuals(trial, used), sigma)
-            if trial_cost < cost:
-                now, cost, damping = trial, trial_cost, max(damping / 10.0, 1e-12)
+            step[free], moves = blocks.step(damping)
+            trial = now.changed(step, moves)
+            trial_off = trial.off_px(used)
+            if (trial_cost := cauchy_cost(trial_off, sigma)) < cost:
+                now, off, cost, damping = trial, trial_off, trial_cost, max(damping / 10.0, 1e-12)
                 break
             damping *= 10.0
-        small = _spread(residuals(now, used))
+        small = _spread(off)
         shrinking = small < 0.98 * sigma
         if not shrinking and before - cost < _END * before:
             break
         if shrinking:
-            sigma, cost = small, _cost(residuals(now, used), small)
+            sigma, cost = small, cauchy_cost(off, small)
         damping = min(damping, 1e3)
-    return _finish(now, seen, used, usable, free, steps)
+    return _finish(now, off, seen, used, usable, free)
 
 
 def _free_parameters(
     start: Estimate, used: SeenMarkers, fixed: tuple[int, ...], free_lens: bool
 ) -> IntArray:
-    k = len(start.map.names)
+    """Return which parameters are free; raises BundleError if no fixed marker is in use."""
     held = [start.map.ids.index(marker) for marker in fixed]
-    markers = [i for i in np.unique(used.marker) if i not in held]
-    blocks = [*np.unique(used.image), *(k + i for i in markers)]
     if not held or not len(used):
         raise BundleError("no image shows a marker whose place is known")
-    free = [6 * block + i for block in blocks for i in range(6)]
-    if free_lens:
-        free += range(start.parameters - LENS_PARAMETERS, start.parameters)
-    return np.array(free)
+    free = np.zeros(start.parameters, bool)
+    free[:LENS_PARAMETERS] = free_lens
+    of_markers = free[LENS_PARAMETERS:].reshape(-1, 6)
+    of_markers[used.marker], of_markers[held] = True, False
+    return np.flatnonzero(free)
 
 
 def _spread(off: FloatArray) -> float:
     """Return the standard deviation of a coordinate, by the median of the distances."""
     distance = np.linalg.norm(off, axis=-1)
-    return max(float(np.median(distance)) / _NORMAL_MEDIAN, _LEAST_SIGMA_px)
+    return max(float(np.median(distance)) / NORMAL_MEDIAN, _LEAST_SIGMA_px)
 
 
-def _weights(off: FloatArray, sigma: float) -> FloatArray:
-    """Return the weight of each corner, (n, 4), of residuals (n, 4, 2)."""
+def cauchy_weights(off: FloatArray, sigma: float) -> FloatArray:
+    """Return the weight of each corner, (n, 4), of residuals (n, 4, 2) with deviation `sigma`."""
     return np.asarray(1.0 / (1.0 + (off**2).sum(axis=-1) / (_WIDTH * sigma) ** 2))
 
 
-def _cost(off: FloatArray, sigma: float) -> float:
+def cauchy_cost(off: FloatArray, sigma: float) -> float:
+    """Return the robust sum of squares, Σ c² log(1 + (r/c)²) with c = 3 `sigma`."""
     squares = (off**2).sum(axis=-1) / (_WIDTH * sigma) ** 2
-    return float(np.log1p(squares).sum()) if np.isfinite(squares).all() else float("inf")
+    if not np.isfinite(squares).all():
+        return float("inf")
+    return float(np.log1p(squares).sum()) * (_WIDTH * sigma) ** 2
 
 
-def _normal_equations(
-    now: Estimate, used: SeenMarkers, free: IntArray, sigma: float
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    off, jacobian = residuals_and_jacobian(now, used)
-    weight = np.repeat(_weights(off.reshape(-1, 4, 2), sigma).ravel(), 2)
-    weighted = jacobian.T @ diags_array(weight)
-    normal = (weighted @ jacobian).toarray()[np.ix_(free, free)]
-    return normal, (weighted @ off)[free], np.maximum(np.diag(normal), 1e-12)
-
-
-def _solve(normal: FloatArray, right: FloatArray, cameras: int) -> FloatArray:
-    """Return normal^-1 right, by the Schur complement of the first 6 `cameras` unknowns.
-
-    These come in blocks of 6 that know nothing of each other. 0 where there is no inverse.
-    """
-    end = 6 * cameras
-    each = np.arange(cameras)
-    blocks = normal[:end, :end].reshape(cameras, 6, cameras, 6)[each, :, each]
-    across, columns = normal[:end, end:], right.shape[1]
-    try:
-        both = np.concatenate([across, right[:end]], axis=1).reshape(cameras, 6, -1)
-        solved = np.linalg.solve(blocks, both).reshape(end, -1)
-        by_across, by_right = solved[:, : across.shape[1]], solved[:, across.shape[1] :]
-        rest = cho_factor(normal[end:, end:] - across.T @ by_across)
-    except (LinAlgError, ValueError):
-        return np.zeros_like(right)
-    others = cho_solve(rest, right[end:] - across.T @ by_right)
-    first = by_right - by_across @ others
-    return np.concatenate([first, others]).reshape(-1, columns)
+def _blocks(now: Estimate, used: SeenMarkers, free: IntArray, sigma: float) -> PoseBlocks:
+    terms = now.views(used).terms(now.lens)
+    terms = replace(terms, by_shared=terms.by_shared[..., :LENS_PARAMETERS])
+    weights = cauchy_weights(terms.residual.reshape(-1, 4, 2), sigma)
+    return corner_blocks(used, terms, weights, len(used.names)).only(free)
 
 
 def _finish(
     now: Estimate,
+    off: FloatArray,
     seen: SeenMarkers,
     used: SeenMarkers,
-    usable: np.ndarray[tuple[int], np.dtype[np.bool_]],
+    usable: BoolArray,
     free: IntArray,
-    steps: int,
 ) -> Bundle:
-    off = residuals(now, used)
     sigma = _spread(off)
-    weights = _weights(off, sigma)
-    normal, _, scale = _normal_equations(now, used, free, sigma)
-    freedom = max(2.0 * float(weights.sum()) - len(free), 1.0)
-    variance = float((weights[..., None] * off**2).sum()) / freedom
-    root = np.sqrt(scale)
-    covariance = np.zeros((now.parameters, now.parameters))
-    inverse = _solve(normal / np.outer(root, root), np.eye(len(free)), len(np.unique(used.image)))
-    if not inverse.any():
-        raise BundleError("what the images show leaves open where a marker or the camera is")
+    weights = cauchy_weights(off, sigma)
+    unknowns = len(free) + 6 * len(np.unique(used.image))
+    variance = float((weights[..., None] * off**2).sum())
+    variance /= max(2.0 * float(weights.sum()) - unknowns, 1.0)
+    S = _blocks(now, used, free, sigma).reduced()[0]
+    root = np.sqrt(np.maximum(np.diag(S), 1e-12))
+    try:
+        inverse = cho_solve(cho_factor(S / np.outer(root, root)), np.diag(1.0 / root)).T / root
+    except LinAlgError:
+        raise BundleError(
+            "what the images show leaves open where a marker or the camera is"
+        ) from None
     sheets = sheet_errors(now, used, weights)
-    covariance[np.ix_(free, free)] = sheets.inflation * variance * inverse / np.outer(root, root)
+    covariance = np.zeros((now.parameters, now.parameters))
+    covariance[np.ix_(free, free)] = sheets.inflation * variance * inverse
     distance, weight = np.full((len(seen), 4), np.nan), np.zeros((len(seen), 4))
     distance[usable], weight[usable] = np.linalg.norm(off, axis=-1), weights
-    return Bundle(
-        now, distance, weight, float(np.sqrt(variance)) / _LOSS_BIAS, covariance, sheets, steps
-    )
+    return Bundle(now, distance, weight, float(np.sqrt(variance)) / _LOSS_BIAS, covariance, sheets)

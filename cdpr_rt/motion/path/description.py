@@ -1,27 +1,33 @@
-"""A path as its file has it: moves one after the other, each with its line in the file."""
+"""A path as in its file: moves one after the other, each with its line in the file."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Final
 
 import numpy as np
 
+from cdpr_profiles.errors import brief
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.errors import InvalidRequestError
 
 MOST_MOVES: Final = 200_000
+_MOST_CHARS: Final = 1000
+_MOST_PROBLEMS: Final = 40
+"""Most lines of an error message, one for each problem."""
 LONGEST_DWELL_s: Final = 3600.0
 
 
 class PathError(InvalidRequestError):
-    """A path that cannot be followed; names file and line, the value and what is allowed."""
+    """A path that cannot be followed; the message has file, line, value and allowed values."""
 
     def __init__(self, source: Path | str, line: int, problem: str) -> None:
-        self.source, self.line, self.problem = str(source), line, problem
+        lines = problem.split("\n")[:_MOST_PROBLEMS]
+        self.source, self.line = str(source), line
+        self.problem = "\n".join(brief(text, _MOST_CHARS) for text in lines)
         where = f"{self.source}:{line}" if line else self.source
-        super().__init__(f"{where}: {problem}")
+        super().__init__(f"{where}: {self.problem}")
 
 
 @dataclass(frozen=True)
@@ -29,7 +35,7 @@ class Coordinates:
     """Entries of a position (d,) of a path by name, coordinates first."""
 
     names: tuple[str, ...]
-    """Out of x y z rx ry rz, or x y angle; rotations are the vector from the one at home."""
+    """Some of x y z rx ry rz, or x y angle; rotations are the vector from the one at home."""
     reference: FloatArray
     """Target of G28, (d,)."""
 
@@ -41,12 +47,21 @@ class Coordinates:
 
 @dataclass(frozen=True)
 class Arc:
-    """A part of a circle in the plane of the first two coordinates; all others change evenly."""
+    """A part of a circle around an axis; coordinates outside its plane change evenly."""
 
     centre_m: FloatArray
-    """(2,)"""
+    """A point of the axis, (3,), or (2,) if the axis is along z."""
     angle_rad: float
-    """Positive counter-clockwise."""
+    """Positive counter-clockwise, seen against the normal; more than a turn is several turns."""
+    normal: FloatArray = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))
+    """Direction of the axis, a unit vector (3,)."""
+
+    def arm_m(self, start: FloatArray) -> FloatArray:
+        """Return the vector (3,) from the axis to the arc's start, a position of 2 or 3 entries."""
+        size = min(len(self.centre_m), len(start))
+        arm = np.zeros(3)
+        arm[:size] = start[:size] - self.centre_m[:size]
+        return np.asarray(arm - (arm @ self.normal) * self.normal)
 
 
 @dataclass(frozen=True)
@@ -58,13 +73,13 @@ class Move:
     end: FloatArray
     """(d,), m and rad."""
     speed: float
-    """Wanted at most, m/s; of a move that only turns rad/s. Infinite: what the robot allows."""
+    """Largest wanted speed, m/s; rad/s for a pure rotation. Infinite: as the robot allows."""
     blend_m: float = 0.0
     """The corner at its end may be cut within this distance of it."""
     dwell_s: float = 0.0
     """Time at rest at its end."""
     waits: bool = False
-    """Whether it waits at its end until it is told to go on."""
+    """Whether it waits at its end for a command to continue."""
     arc: Arc | None = None
 
 
@@ -78,9 +93,13 @@ class PathDescription:
     """(d,)"""
     start_line: int
     moves: list[Move] = field(default_factory=list)
+    notices: list[str] = field(default_factory=list)
+    """Notes for the user about how the file was read."""
+    in_room: bool = False
+    """Whether the file names positions in the room (G53), not from its own zero."""
 
     def add(self, move: Move) -> None:
-        """Append a move; raises PathError for one too many or none that can be."""
+        """Append a move; raises PathError if there are too many or it is impossible."""
         if len(self.moves) >= MOST_MOVES:
             raise PathError(self.source, move.line, f"too many moves; allowed: {MOST_MOVES}")
         if not np.isfinite(move.end).all():
@@ -89,10 +108,27 @@ class PathDescription:
 
     @property
     def points(self) -> FloatArray:
-        """All positions that are named, (m + 1, d), the first one included."""
+        """All named positions, (m + 1, d), including the first one."""
         return np.array([self.start, *(move.end for move in self.moves)])
 
     @property
     def lines(self) -> list[int]:
         """Their lines in the file."""
         return [self.start_line, *(move.line for move in self.moves)]
+
+    def index_of(self, line: int) -> int:
+        """Return the first move from a line of the file on; raises PathError for no move."""
+        for i, move in enumerate(self.moves):
+            if move.line >= line:
+                return i
+        raise PathError(self.source, line, "nothing moves from this line on")
+
+    def part(self, begin: int, end: int) -> PathDescription:
+        """Return the path of the moves begin to end - 1, from the end of the move before."""
+        start, line = (
+            (self.moves[begin - 1].end, self.moves[begin - 1].line)
+            if begin
+            else (self.start, self.start_line)
+        )
+        moves = self.moves[begin:end]
+        return replace(self, start=start, start_line=line, moves=moves)

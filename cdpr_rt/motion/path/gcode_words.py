@@ -1,18 +1,57 @@
-"""The words of a G-code file: letters with numbers, comments taken out."""
+"""The lines of a G-code file: codes and words, without comments and words without meaning here.
+
+All faults of a file are collected in `Findings`, so that they are reported together.
+"""
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Final
 
 from cdpr_rt.motion.path.description import PathError
 
-_COMMENT: Final = re.compile(r"\([^()]*\)")
-_WORD: Final = re.compile(r"\s*([A-Za-z])\s*([+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+))")
+_WORD: Final = re.compile(r"\s*([A-Za-z])\s*((?:[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+))?)")
+_EXPONENT: Final = re.compile(r"[eE][+-]?[0-9]")
+_CODE: Final = re.compile(r"[GM]\s*[0-9]", re.IGNORECASE)
+_FIRST_CODE: Final = re.compile(r"(?:[NT]\s*[0-9]+\s*)*M\s*0*([0-9]+)(?![0-9.])", re.IGNORECASE)
+_FULL_SPEED: Final = re.compile(r"S\s*100(\.0*)?(?![0-9.])", re.IGNORECASE)
+_CHECKSUM: Final = re.compile(r"\*\s*[0-9]+\s*$")
+_LINE_END: Final = re.compile(r"\r\n|\r|\n")
+_PROGRAM_NUMBER: Final = re.compile(r"[O:]\s*[0-9]+$", re.IGNORECASE)
+_QUERIES: Final = frozenset(("$", "$$", "$#", "$G", "$I", "$N", "$X", "?"))
+"""Commands to grbl that do not move the machine."""
 _MOST_DIGITS: Final = 40
+_LARGEST_VALUE: Final = 1e9
+_MOST_CHARS: Final = 4096
+"""Of a line, and ..."""
+_MOST_LINES: Final = 1_000_000
+"""... lines of a file."""
+_MOST_TEXTS: Final = 20
 _REPEATED: Final = frozenset("GM")
+
+IDLE_LETTERS: Final = frozenset("STHDE")
+_IDLE_CODES: Final = frozenset(
+    ("G43", "M1", "M3", "M4", "M5", "M6", "M7", "M8", "M9", "M10", "M11", "M48", "M49")
+)
+"""For tools, spindles and coolants: they may share a line with a motion."""
+_ALONE: Final = frozenset(("M10", "M11", "M48", "M49"))
+"""Codes of clamps and overrides. Words beside them without a G code are not a motion."""
+_TEXTS: Final = frozenset(("M117", "M118"))
+_IDLE_LINES: Final = _TEXTS | {
+    f"M{number}"
+    for number in (
+        17, 18, 20, 21, 27, 31, 42, 73, *range(75, 79), *range(80, 86), 92, *range(104, 117), 119,
+        140, 141, 150, 155, 190, 191, *range(200, 206), 207, 208, 209, 211, 300, 301, 302, 304,
+        221, 400, *range(500, 505), 569, 572, 593, 900, 905, 906, 907, 913, 914,
+    )
+}  # fmt: skip
+"""For printers: heaters, fans, displays, and limits of another machine."""
+_NEVER: Final = frozenset(("M2", "M30", "M97", "M98", "M99", "M206"))
+"""Codes that end a file, call another or move its zero."""
+_WORDS_OF_MOTIONS: Final = frozenset("FGIJKLMNOPQR")
 
 
 @dataclass(frozen=True)
@@ -23,59 +62,215 @@ class Block:
     codes: tuple[str, ...]
     """Such as G1, G20, M2; in their order."""
     words: dict[str, float]
-    """By letter, in the units of the file."""
+    """By letter, in the units of the file; nan for a letter without a number."""
 
 
-def blocks(text: str, source: str, ignored: frozenset[str] = frozenset()) -> Iterator[Block]:
-    """Yield the lines that say something, up to the end of the program.
+@dataclass
+class Findings:
+    """Faults of a file, ignored parts, and notes for the user."""
 
-    `ignored` are letters or codes that are skipped, such as S or M3. Raises PathError for what is
-    no word, and for a file that was cut short: one without M2, M30 or its second %.
+    source: str
+    problems: dict[str, list[int]] = field(default_factory=dict)
+    """Lines by problem, in the order in which they were found."""
+    ignored: dict[str, list[int]] = field(default_factory=dict)
+    notes: list[str] = field(default_factory=list)
+
+    def refuse(self, line: int, problem: str) -> None:
+        """Record that a line cannot be followed."""
+        self.problems.setdefault(problem, []).append(line)
+
+    def ignore(self, line: int, what: str) -> None:
+        """Record that something in a line is ignored."""
+        self.ignored.setdefault(what, []).append(line)
+
+    def require_none(self) -> None:
+        """Raise PathError with all problems, each with the first line that has it."""
+        if not self.problems:
+            return
+        texts = [
+            (lines[0], problem + (f" ({len(lines)} lines)" if len(lines) > 1 else ""))
+            for problem, lines in self.problems.items()
+        ]
+        (line, text), *others = sorted(texts[:_MOST_TEXTS], key=lambda one: one[0])
+        text += "".join(f"\n{self.source}:{number}: {other}" for number, other in others)
+        if len(texts) > _MOST_TEXTS:
+            text += f"\n{self.source}: and {len(texts) - _MOST_TEXTS} more problems"
+        raise PathError(self.source, line, text)
+
+    def notices(self) -> list[str]:
+        """Return notes for the user, with all ignored parts in one text."""
+        if not self.ignored:
+            return self.notes
+        listed = [
+            f"{what} (line {lines[0]})" if len(lines) == 1 else f"{what} ({len(lines)} lines)"
+            for what, lines in self.ignored.items()
+        ]
+        if len(listed) > _MOST_TEXTS:
+            listed[_MOST_TEXTS:] = [f"{len(listed) - _MOST_TEXTS} more"]
+        return [f"ignored: {', '.join(listed)}", *self.notes]
+
+
+def require_ignorable(source: str, ignored: frozenset[str], axes: list[str]) -> None:
+    """Raise PathError for a word or code that changes the meaning of other lines."""
+    for name in sorted(ignored):
+        if len(name) == 1 and (name in axes or name in _WORDS_OF_MOTIONS):
+            raise PathError(source, 0, f"--ignore {name}: the path depends on it")
+        if len(name) > 1 and name[0] not in "GM":
+            raise PathError(source, 0, f"--ignore {name}: allowed: {name[0]}, without a number")
+        if name in _NEVER or (name[0] == "G" and len(name) > 1 and name not in _IDLE_CODES):
+            raise PathError(source, 0, f"--ignore {name}: other lines depend on it")
+
+
+def blocks(text: str, findings: Findings, ignored: frozenset[str] = frozenset()) -> Iterator[Block]:
+    """Yield the lines with content, up to the end of the program.
+
+    `ignored` are letters that are dropped and M codes whose lines are skipped, in addition to those
+    without meaning for a platform. Unreadable lines are recorded as problems, not yielded.
     """
     percents = 0
-    for number, full in enumerate(text.split("\n"), 1):
-        line = _COMMENT.sub(" ", full.partition(";")[0]).strip()
+    for number, full in enumerate(_LINE_END.split(text.removeprefix("\ufeff")), 1):
+        if number > _MOST_LINES:
+            findings.refuse(number, f"the file has more lines than {_MOST_LINES}: divide it")
+            return
+        if len(full) > _MOST_CHARS:
+            findings.refuse(number, f"the line is longer than {_MOST_CHARS} characters")
+            continue
+        line = _without_comments(full, number, findings)
         if line.startswith("%"):
             percents += 1
             if percents == 2:
                 return
             continue
-        if "(" in line or ")" in line:
-            raise PathError(source, number, "a comment is not closed; allowed: ( ... ) in one line")
-        if not line:
+        if line.startswith("/"):
+            line = line[1:].lstrip()
+            findings.ignore(number, "/ (the line is followed)")
+        block = _block(line, number, findings, ignored)
+        if block is None:
             continue
-        block = _block(line.removeprefix("/"), number, source, ignored)
         yield block
         if "M2" in block.codes or "M30" in block.codes:
             return
-    last = text.rstrip().count("\n") + 1
-    raise PathError(
-        source, last, "ends without M2, M30 or a second %: was it cut short? allowed: end with M2"
-    )
+    findings.notes.append("the file ends without M2 or M30: is it complete?")
 
 
-def _block(line: str, number: int, source: str, ignored: frozenset[str]) -> Block:
+def _without_comments(line: str, number: int, findings: Findings) -> str:
+    """Return a line without comments: ( ... ), which may be nested, and all after a semicolon."""
+    kept, depth = [], 0
+    for part in re.split(r"([();])", line):
+        if part == "(":
+            depth += 1
+            kept.append(" ")
+        elif part == ")" and depth:
+            depth -= 1
+        elif part == ";" and not depth:
+            break
+        elif not depth:
+            kept.append(part)
+    if depth:
+        findings.refuse(number, "a comment is not closed; allowed: ( ... ) in one line")
+        return ""
+    return "".join(kept).strip()
+
+
+def _block(line: str, number: int, findings: Findings, ignored: frozenset[str]) -> Block | None:
+    """Return the content of a line; None for an empty line or one that cannot be read."""
+    if line.upper() in _QUERIES:
+        findings.ignore(number, line.upper())
+    elif line and not _PROGRAM_NUMBER.match(line):
+        if _CHECKSUM.search(line):
+            findings.ignore(number, "checksums")
+            line = _CHECKSUM.sub("", line).rstrip()
+        if not line:
+            return None
+        if not _is_skipped(line, number, findings, ignored):
+            if not (problem := _unreadable(line)):
+                return _words(line, number, findings, ignored)
+            findings.refuse(number, problem)
+    return None
+
+
+def _is_skipped(line: str, number: int, findings: Findings, ignored: frozenset[str]) -> bool:
+    """Return whether a line begins with an M code for which the whole line is skipped."""
+    first = _FIRST_CODE.match(line)
+    name = "" if first is None else f"M{int(first[1])}"
+    if name in _TEXTS:
+        findings.ignore(number, f"{name} with its text")
+        return True
+    if first is None or not _skips_line(name, line, ignored):
+        return False
+    if other := _CODE.search(line, first.end()):
+        code = line[other.start() :].split(maxsplit=1)[0]
+        findings.refuse(number, f"{name} and {code[:8]} share a line: divide it")
+    else:
+        findings.ignore(number, f"the line of {name}")
+    return True
+
+
+def _skips_line(name: str, line: str, ignored: frozenset[str]) -> bool:
+    """Return whether an M code uses all words of its line, and has no meaning here."""
+    if name == "M220":
+        return name in ignored or _FULL_SPEED.search(line) is not None
+    return name in _IDLE_LINES or (name in ignored and name not in _IDLE_CODES)
+
+
+def _unreadable(line: str) -> str:
+    """Return why a line is not made of plain words; an empty text if it may be."""
+    if "#" in line or "[" in line:
+        return "parameters and expressions (#, [ ]) are not supported; allowed: numbers"
+    if line[0] in "Oo":
+        return "O-words (subroutines, branches, loops) are not supported; allowed: plain lines"
+    if line[0] == "$":
+        return f"{line[:20]}: a command to a controller, not G-code"
+    return ""
+
+
+def _words(line: str, number: int, findings: Findings, ignored: frozenset[str]) -> Block | None:
     codes: list[str] = []
     words: dict[str, float] = {}
-    at = 0
+    at, alone = 0, ""
     while at < len(line):
         match = _WORD.match(line, at)
-        if match is None or len(match[2]) > _MOST_DIGITS:
+        # a letter without a number, as in printers' G28 X Y
+        bare = match is not None and not match[2] and "G28" not in codes
+        if match is None or bare or len(match[2]) > _MOST_DIGITS:
             rest = line[at:].strip()
-            if not rest:
-                break
-            raise PathError(
-                source, number, f"{rest[:20]!r}: allowed: words such as X12.5; no expressions"
-            )
+            findings.refuse(number, f"{rest[:20]!r}: allowed: words such as X12.5")
+            return None
         at = match.end()
-        letter, value = match[1].upper(), float(match[2])
+        letter = match[1].upper()
+        if match[2] and _EXPONENT.match(line, at):
+            whole = line[match.start() :].split(maxsplit=1)[0]
+            findings.refuse(
+                number, f"{whole[:20]}: allowed: numbers without exponent; a space before a word E"
+            )
+            return None
+        value = float(match[2]) if match[2] else math.nan
+        if abs(value) > _LARGEST_VALUE:
+            findings.refuse(
+                number, f"{letter}: the number is too large; allowed: up to {_LARGEST_VALUE:g}"
+            )
+            return None
         name = f"{letter}{value:g}"
-        if letter in ("N", "O") or letter in ignored or name in ignored:
+        if letter == "N":
             continue
-        if letter in _REPEATED:
+        seconds = letter == "S" and "G4" in codes
+        if (letter in IDLE_LETTERS and not seconds) or letter in ignored:
+            findings.ignore(number, letter)
+        elif name in _IDLE_CODES:
+            findings.ignore(number, name)
+            alone = name if name in _ALONE else alone
+        elif name in ignored or name in _IDLE_LINES:
+            findings.refuse(number, f"{name} shares a line with other words: divide it")
+        elif letter in _REPEATED:
             codes.append(name)
         elif letter in words:
-            raise PathError(source, number, f"{letter} stands twice in this line")
+            findings.refuse(number, f"{letter} stands twice in this line")
+            return None
         else:
             words[letter] = value
+    if alone and words.keys() - {"F"} and not any(code[0] == "G" for code in codes):
+        findings.refuse(
+            number, f"{alone}: {next(iter(words))} has no meaning with it; put it on its own line"
+        )
+        return None
     return Block(number, tuple(codes), words)

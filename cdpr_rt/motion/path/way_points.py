@@ -12,9 +12,9 @@ from typing import Annotated, Any, Final
 import numpy as np
 from pydantic import Field
 
-from cdpr_profiles.errors import ProfileError, value_text
-from cdpr_profiles.reading.bounded_input import read_text
-from cdpr_profiles.reading.reader import Profile, read_toml_model
+from cdpr_profiles.bounded_input import read_bytes, read_text
+from cdpr_profiles.errors import ProfileError, brief, value_text
+from cdpr_profiles.reader import Profile, read_toml_model
 from cdpr_rt.motion.path.description import (
     Coordinates,
     LONGEST_DWELL_s,
@@ -22,6 +22,7 @@ from cdpr_rt.motion.path.description import (
     PathDescription,
     PathError,
 )
+from cdpr_rt.motion.path.gcode import GcodeSettings, read_gcode
 
 _HEADS: Final = re.compile(r"^\s*\[\[\s*points\s*\]\]", re.MULTILINE)
 _UNITS: Final = {
@@ -29,14 +30,14 @@ _UNITS: Final = {
 }  # fmt: skip
 _SPEEDS: Final = {"speed_m_s": 1.0, "speed_mm_s": 1e-3}
 _BOM: Final = "\ufeff"
-"""With which spreadsheets begin a text in UTF-8."""
+"""Spreadsheets begin texts in UTF-8 with it."""
 _BLENDS: Final = {"blend_m": 1.0, "blend_mm": 1e-3}
 _Speed = Annotated[float, Field(gt=0, le=100)]
 _Blend = Annotated[float, Field(ge=0, le=10)]
 
 
 class _PointTable(Profile):
-    """One way point; what is left out is as at the last one, or at home."""
+    """One way point; missing values are those of the previous one, or of home."""
 
     position_m: tuple[float, ...]
     rotation_rad: tuple[float, ...] | None = None
@@ -47,7 +48,7 @@ class _PointTable(Profile):
 
 
 class _PathTable(Profile):
-    """A path through way points; speed and blending radius of those that have none of their own."""
+    """A path through way points; speed and blending radius are defaults for the points."""
 
     speed_m_s: _Speed | None = None
     blend_m: _Blend = 0.0
@@ -73,7 +74,8 @@ def read_toml_points(path: Path, coordinates: Coordinates) -> PathDescription:
         end = np.concatenate([point.position_m, rotation])
         if found is None:
             found = PathDescription(str(path), coordinates, end, line)
-            continue
+            if not (point.dwell_s or point.wait):
+                continue
         speed = point.speed_m_s or table.speed_m_s or math.inf
         blend_m = table.blend_m if point.blend_m is None else point.blend_m
         found.add(Move(line, end, speed, blend_m, point.dwell_s, point.wait))
@@ -93,8 +95,8 @@ def read_csv_points(
     """Return the path through the rows of a CSV file, whose first line names its columns.
 
     Columns are coordinates with their unit (x_m or x_mm, rx_rad or rx_deg, ...), speed_m_s,
-    blend_m, dwell_s, wait (0 or 1). An empty cell is as in the row before, as is a
-    coordinate without a column, unless `all_columns` are to be there. Raises PathError.
+    blend_m, dwell_s, wait (0 or 1). An empty cell repeats the row before, and so does a coordinate
+    without a column, unless `all_columns` are required. Raises PathError.
     """
     if not text.endswith("\n"):
         last = text.count("\n") + 1
@@ -123,7 +125,8 @@ def read_csv_points(
         end = np.array([kept[name] for name in coordinates.names[:d]])
         if found is None:
             found = PathDescription(source, coordinates, end, line)
-            continue
+            if not (kept["dwell"] or kept["wait"]):
+                continue
         found.add(Move(line, end, kept["speed"], kept["blend"], kept["dwell"], kept["wait"] != 0.0))
     if found is None or not found.moves:
         raise PathError(source, 0, "holds less than two way points")
@@ -131,7 +134,7 @@ def read_csv_points(
 
 
 def _rows(rows: Any, source: str) -> Iterator[tuple[int, list[str]]]:
-    """Yield rows with their lines; raises PathError for what is no CSV."""
+    """Yield rows with their lines; raises PathError for invalid CSV."""
     try:
         for row in rows:
             yield rows.line_num, row
@@ -168,7 +171,7 @@ _BOUNDS: Final = {
 def _cells(
     source: str, line: int, row: list[str], columns: list[tuple[str, float]]
 ) -> dict[str, float]:
-    """Return what a row says, in SI."""
+    """Return the values of a row, in SI units."""
     if len(row) != len(columns):
         raise PathError(source, line, f"{len(row)} cells; allowed: {len(columns)}, as in line 1")
     values = {}
@@ -181,6 +184,57 @@ def _cells(
             raise PathError(source, line, f"{key}: value {cell[:40]!r}: no number") from None
         low, high = _BOUNDS.get(key, (-1e6, 1e6))
         if not low <= value <= high:
-            raise PathError(source, line, f"{key}: value {cell}; allowed: {low:g} to {high:g}")
+            raise PathError(
+                source, line, f"{key}: value {brief(cell, 40)}; allowed: {low:g} to {high:g}"
+            )
         values[key] = value
     return values
+
+
+# Reading a path's file, whose suffix gives its kind.
+
+MOST_BYTES: Final = 1 << 24
+GCODE: Final = (".nc", ".ngc", ".gcode", ".tap", ".cnc")
+_POINTS: Final = (".toml", ".csv")
+
+
+def require_kind(path: Path) -> str:
+    """Return the file's suffix in lower case; raises PathError if it is not one of a path."""
+    suffix = path.suffix.lower()
+    if suffix not in (*_POINTS, *GCODE):
+        raise PathError(
+            path,
+            0,
+            f"no kind of path's file; allowed: way points {' '.join(_POINTS)}, "
+            f"G-code {' '.join(GCODE)}",
+        )
+    return suffix
+
+
+def read_source(path: Path, most_bytes: int = MOST_BYTES) -> str:
+    """Return the text of a path's file; raises PathError and ProfileError.
+
+    G-code that is not UTF-8 is read as Latin-1, as in comments of older CAM programs.
+    """
+    if require_kind(path) in _POINTS:
+        return read_text(path, most_bytes)
+    data = read_bytes(path, most_bytes)
+    try:
+        return data.decode("utf-8")
+    except UnicodeDecodeError:
+        return data.decode("latin-1")
+
+
+def read_path(path: Path, coordinates: Coordinates, settings: GcodeSettings) -> PathDescription:
+    """Return the path that a file describes; raises PathError and ProfileError.
+
+    .toml and .csv contain way points; .nc, .ngc, .gcode, .tap and .cnc contain G-code. Only G-code
+    uses `settings`.
+    """
+    suffix = require_kind(path)
+    if suffix == ".toml":
+        return read_toml_points(path, coordinates)
+    text = read_source(path)
+    if suffix == ".csv":
+        return read_csv_points(text, str(path), coordinates)
+    return read_gcode(text, str(path), coordinates, settings)

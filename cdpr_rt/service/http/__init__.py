@@ -1,1 +1,1 @@
-"""The interface over HTTP and WebSocket, and who may use it."""
+"""The interface over HTTP and WebSocket, and its access control."""

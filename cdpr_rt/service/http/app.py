@@ -1,33 +1,251 @@
-"""The control interface: its routes, and how errors are answered."""
+"""The control interface: its routes, and the answers to errors."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import asyncio
+import math
+import re
+from collections.abc import Iterator, Mapping
+from html import escape
 from http import HTTPStatus
 from typing import Annotated, Any, Final
 
+import numpy as np
 from fastapi import FastAPI, Header, Query, Request, Response
 from fastapi.exceptions import RequestValidationError
+from prometheus_client import CollectorRegistry, generate_latest
+from prometheus_client.core import (
+    CounterMetricFamily,
+    GaugeMetricFamily,
+    HistogramMetricFamily,
+    Metric,
+)
+from prometheus_client.registry import Collector
 from starlette.exceptions import HTTPException
-from starlette.responses import JSONResponse
+from starlette.responses import HTMLResponse, JSONResponse
 
+from cdpr_rt.arrays import FloatArray
+from cdpr_rt.core.cycle_row import AXIS_FIELDS, SCALAR_FIELDS, CycleField, Row
+from cdpr_rt.core.shared_block import RowReader
+from cdpr_rt.core.states import LoopState
+from cdpr_rt.service.access_control import VALID_S
 from cdpr_rt.service.http import models
-from cdpr_rt.service.http.docs_page import docs_page
-from cdpr_rt.service.http.metrics import MetricsCollector
-from cdpr_rt.service.http.tickets import VALID_S
 from cdpr_rt.service.http.websocket_routes import WebSocketRoutes
 from cdpr_rt.service.lease import LeaseError
-from cdpr_rt.service.link import CommandTooLongError, LoopBusyError, LoopGoneError, Reply
-from cdpr_rt.service.path_planner import PlannerBusyError
-from cdpr_rt.service.service import Service
-from cdpr_rt.service.streams.setpoint_stream import StreamError
+from cdpr_rt.service.link import (
+    DEAD,
+    STARTING,
+    CommandTooLongError,
+    LoopBusyError,
+    LoopGoneError,
+    Reply,
+)
+from cdpr_rt.service.rows import newest_row
+from cdpr_rt.service.service import PlannerBusyError, Service
+from cdpr_rt.service.setpoint_stream import StreamError
+
+# Figures for Prometheus.
+
+_READ_S = 0.2
+_MOST_ROWS = 2000
+_BOUNDS_S: Final = np.array(
+    [2e-5, 5e-5, 1e-4, 2e-4, 3e-4, 4e-4, 5e-4, 7e-4, 1e-3, 2e-3, 5e-3, 1e-2, 0.1]
+)
+_SCALARS: Final = tuple(field for field in SCALAR_FIELDS if field.metric)
+_TIMES: Final = tuple(field for field in _SCALARS if field.is_wall_time)
+_NUMBERS: Final = tuple(field for field in _SCALARS if field.kind == "<f8" and not field.wall)
+_COUNTS: Final = tuple(field for field in _SCALARS if field.kind != "<f8")
+_AXES: Final = tuple(field for field in AXIS_FIELDS if field.metric)
+
+
+class _Histogram:
+    """Counts of a duration by size, over all cycles."""
+
+    def __init__(self) -> None:
+        self.counts = np.zeros(_BOUNDS_S.size + 1, np.int64)
+        self.sum_s = 0.0
+
+    def add(self, values_s: FloatArray) -> None:
+        finite = values_s[np.isfinite(values_s)]
+        places = np.searchsorted(_BOUNDS_S, finite)
+        self.counts += np.bincount(places, minlength=self.counts.size)
+        self.sum_s += float(finite.sum())
+
+    def buckets(self) -> list[tuple[str, float]]:
+        names = [*(f"{bound:g}" for bound in _BOUNDS_S), "+Inf"]
+        return list(zip(names, np.cumsum(self.counts).astype(float).tolist(), strict=True))
+
+
+class MetricsCollector(Collector):
+    """Collects durations while `watch` runs, and all other figures on request."""
+
+    def __init__(self, service: Service) -> None:
+        self._service = service
+        self._rows = RowReader(service.block)
+        self._times = {field.name: _Histogram() for field in _TIMES}
+        self._registry = CollectorRegistry()
+        self._registry.register(self)
+
+    def text(self) -> bytes:
+        """Return everything in Prometheus' text format."""
+        return generate_latest(self._registry)
+
+    async def watch(self) -> None:
+        """Count durations of all cycles, until cancelled."""
+        while True:
+            rows = self._rows.read(_MOST_ROWS)
+            for name, histogram in self._times.items():
+                histogram.add(rows[name])
+            await asyncio.sleep(0.0 if rows.size == _MOST_ROWS else _READ_S)
+
+    def describe(self) -> list[Metric]:
+        """Return nothing: the figures are only known when they are collected."""
+        return []
+
+    def collect(self) -> Iterator[Metric]:
+        """Return all present figures."""
+        yield from self._of_loop()
+        for field in _TIMES:
+            histogram = self._times[field.name]
+            name = f"cdpr_cycle_{field.metric}_seconds"
+            yield HistogramMetricFamily(name, _about(field), histogram.buckets(), histogram.sum_s)
+        row = newest_row(self._service.block)
+        if row is not None:
+            yield from self._of_row(row)
+        yield self._of_parts()
+
+    def _of_loop(self) -> Iterator[Metric]:
+        service = self._service
+        state = GaugeMetricFamily("cdpr_state", "1 for the state the loop is in", labels=["state"])
+        now = service.link.state()
+        for label in (*(one.label for one in LoopState), STARTING, DEAD):
+            state.add_metric([label], float(label == now))
+        yield state
+        yield GaugeMetricFamily(
+            "cdpr_loop_silent_seconds", "Since the loop's last turn", service.link.silent_s()
+        )
+        held = float(service.lease.holder() is not None)
+        yield GaugeMetricFamily("cdpr_control_held", "1 while somebody may move", held)
+        yield CounterMetricFamily(
+            "cdpr_rows_not_seen", "Cycles missing in the histograms", self._rows.lost
+        )
+
+    def _of_row(self, row: Row) -> Iterator[Metric]:
+        for field in _COUNTS:
+            yield CounterMetricFamily(f"cdpr_{field.metric}", _about(field), int(row[field.name]))
+        for field in _NUMBERS:
+            if math.isfinite(value := float(row[field.name])):
+                yield GaugeMetricFamily(f"cdpr_{field.metric}", _about(field), value)
+        axes = self._service.link.description().get("axes") or []
+        names = [str(axis.get("name", number)) for number, axis in enumerate(axes)]
+        for field in _AXES:
+            family = GaugeMetricFamily(f"cdpr_axis_{field.metric}", _about(field), labels=["axis"])
+            for name, value in zip(names, row[field.name].tolist(), strict=False):
+                if math.isfinite(value):
+                    family.add_metric([name], value)
+            yield family
+
+    def _of_parts(self) -> Metric:
+        family = GaugeMetricFamily(
+            "cdpr_part_figure", "What the service's parts tell", labels=["part", "figure"]
+        )
+        for part, figures in self._service.part_figures().items():
+            for name, value in _numbers(figures):
+                family.add_metric([part, name], value)
+        return family
+
+
+def _about(field: CycleField) -> str:
+    """Return a field's description; no metric is null, unknown values are omitted."""
+    about = field.meaning.partition("; null")[0]
+    return about[0].upper() + about[1:]
+
+
+def _numbers(figures: dict[str, Any], before: str = "") -> Iterator[tuple[str, float]]:
+    for name, value in figures.items():
+        if isinstance(value, bool | int | float):
+            yield before + name, float(value)
+        elif isinstance(value, dict):
+            yield from _numbers(value, f"{before}{name}_")
+
+
+# The interface's description as a page without scripts and external content.
+
+_POLICY: Final = "default-src 'none'; style-src 'unsafe-inline'; frame-ancestors 'none'"
+_STYLE: Final = """
+body { font: 16px/1.5 system-ui, sans-serif; max-width: 60rem; margin: 2rem auto; padding: 0 1rem; }
+h2 { margin: 2rem 0 .3rem; font-size: 1.1rem; } code, h2 { font-family: ui-monospace, monospace; }
+table { border-collapse: collapse; } td, th { padding: .1rem .8rem .1rem 0; text-align: left;
+vertical-align: top; } .method { color: #205493; } .about { white-space: pre-line; }
+"""
+
+
+def docs_page(openapi: dict[str, Any]) -> HTMLResponse:
+    """Return the page for an OpenAPI description."""
+    about = openapi["info"]
+    parts = [
+        f"<h1>{escape(about['title'])}</h1>",
+        f'<p class="about">{_marked(about["description"])}</p>',
+        '<p>For programs: <a href="/openapi.json">openapi.json</a>. WebSockets: <code>/live</code> '
+        "and <code>/control</code>.</p>",
+    ]
+    schemas = openapi["components"]["schemas"]
+    for path, methods in openapi["paths"].items():
+        for method, operation in methods.items():
+            parts += _operation(path, method, operation, schemas)
+    page = (
+        '<!doctype html><html lang="en"><meta charset="utf-8">'
+        f"<title>{escape(about['title'])}</title><style>{_STYLE}</style>{''.join(parts)}</html>"
+    )
+    return HTMLResponse(page, headers={"content-security-policy": _POLICY})
+
+
+def _operation(
+    path: str, method: str, operation: dict[str, Any], schemas: dict[str, Any]
+) -> list[str]:
+    parts = [
+        f'<h2><span class="method">{method.upper()}</span> {escape(path)}</h2>',
+        f"<p>{_marked(operation.get('description', ''))}</p>",
+    ]
+    rows = [
+        (f"{one['name']} ({one['in']})", one.get("description", ""), one["schema"])
+        for one in operation.get("parameters", ())
+    ]
+    body = operation.get("requestBody", {}).get("content", {}).get("application/json", {})
+    for name in _references(body.get("schema", {})):
+        for key, schema in schemas[name].get("properties", {}).items():
+            rows.append((key, schema.get("description", ""), schema))
+    if rows:
+        lines = [
+            f"<tr><td><code>{escape(name)}</code><td>{escape(_kind(schema))}<td>{escape(text)}"
+            for name, text, schema in rows
+        ]
+        parts.append(f"<table>{''.join(lines)}</table>")
+    return parts
+
+
+def _marked(text: str) -> str:
+    return re.sub(r"`([^`]+)`", r"<code>\1</code>", escape(text))
+
+
+def _references(schema: dict[str, Any]) -> list[str]:
+    found = [schema, *schema.get("anyOf", [])]
+    return [one["$ref"].rpartition("/")[2] for one in found if "$ref" in one]
+
+
+def _kind(schema: dict[str, Any]) -> str:
+    kind = schema.get("type") or " or ".join(one.get("type", "") for one in schema.get("anyOf", ()))
+    default = f", {schema['default']!r} by default" if "default" in schema else ""
+    return f"{kind}{default}"
+
 
 _ABOUT = """State, motion and figures of one robot's control loop.
 
 Reading needs nothing but the connection. `enable`, `program` and `set` need the right to move:
 `POST /control` gives it to one client at a time, the token goes into the header `X-Control-Token`.
-`hold`, `disable` and `shutdown` are for everybody let in, and never refused for being one too many:
-all who ask at once get one answer. What was asked for before them, and waits still, does not start.
+`hold`, `disable` and `shutdown` are for everybody let in; no limit of requests is for them. With
+too many connections over TCP any request gets status 503 and plain text: then send the stop again.
+Clients that ask at the same time get one answer. Commands that still wait do not start.
 """
 _STATUS: Final[dict[type[Exception], HTTPStatus]] = {
     LeaseError: HTTPStatus.CONFLICT,
@@ -74,7 +292,7 @@ class _LoopRefusedError(Exception):
 
 
 def create_app(service: Service) -> FastAPI:
-    """Return the application that serves `service`; it listens nowhere yet."""
+    """Return the application that serves `service`; it does not listen yet."""
     app = FastAPI(
         title="cdpr-rt",
         summary="The control loop of a cable robot",
@@ -95,8 +313,8 @@ def create_app(service: Service) -> FastAPI:
 
 
 def _add_key(app: FastAPI) -> None:
-    """Describe the key: `AccessControl` asks for it before any request comes here."""
-    described = app.openapi()  # kept by the application
+    """Describe the key: `AccessControl` requires it before any request comes here."""
+    described = app.openapi()  # the application caches it
     described["components"]["securitySchemes"] = {
         "key": {
             "type": "http",
@@ -125,8 +343,7 @@ def _add_errors(app: FastAPI, service: Service) -> None:
         first = error.errors()[0]
         if first["type"] == "json_invalid":
             return _error(HTTPStatus.BAD_REQUEST, f"the body is not JSON: {first['ctx']['error']}")
-        where = ".".join(str(part) for part in first["loc"])
-        return _error(HTTPStatus.UNPROCESSABLE_ENTITY, f"{where}: {first['msg']}")
+        return _error(HTTPStatus.UNPROCESSABLE_ENTITY, models.fault_text(first))
 
     async def http(_: Request, error: Exception) -> Response:
         assert isinstance(error, HTTPException)
@@ -142,7 +359,7 @@ def _add_errors(app: FastAPI, service: Service) -> None:
 def _error(
     status: int, text: str, headers: Mapping[str, str] | None = None, /, **of_loop: Any
 ) -> Response:
-    readable = text.encode("utf-8", "backslashreplace").decode()  # it may repeat what was sent
+    readable = text.encode("utf-8", "backslashreplace").decode()  # it may repeat the request
     body = {"error": readable, "state": None, **of_loop}
     return JSONResponse(body, status, headers)
 
@@ -152,7 +369,7 @@ def _add_reading(app: FastAPI, service: Service) -> None:
 
     @app.get("/status")
     async def status() -> models.Status:
-        """Everything at a glance; needs no key, wherever it is asked from."""
+        """The complete status; needs no key from any address."""
         return models.Status.model_validate(service.status())
 
     @app.get("/description")
@@ -167,7 +384,7 @@ def _add_reading(app: FastAPI, service: Service) -> None:
         ] = 0,
         most: Annotated[int, Query(ge=1, le=512, description="Only the newest of them.")] = 100,
     ) -> models.Events:
-        """What happened: states, reasons with their values, commands, who may move."""
+        """Events: states, reasons with their values, commands, who may move."""
         return models.Events.model_validate({"events": service.events.since(after, most)})
 
     @app.get("/metrics", response_class=Response, responses={200: {"content": {"text/plain": {}}}})
@@ -191,24 +408,24 @@ def _add_control(app: FastAPI, service: Service) -> None:
 
     @app.post("/control", responses=_REFUSALS)
     async def take(body: models.TakeControl) -> models.ControlTaken:
-        """Take the right to move; it lapses `ttl_s` after the last request that shows the token."""
+        """Take the right to move; it expires `ttl_s` after the last request with the token."""
         token = service.lease.take(body.client, body.ttl_s)
         return models.ControlTaken(token=token, ttl_s=body.ttl_s)
 
     @app.put("/control", responses=_REFUSALS)
     async def renew(token: Token = None) -> models.Renewed:
-        """Keep the right to move."""
+        """Renew the right to move."""
         return models.Renewed(ttl_s=service.lease.renew(token).ttl_s)
 
     @app.delete("/control", responses=_REFUSALS)
     async def release(token: Token = None) -> models.Control:
-        """Give the right to move back; what moves on somebody's behalf holds."""
+        """Release the right to move; a motion under it holds."""
         service.lease.release(token)
         return models.Control.model_validate(service.control())
 
     @app.post("/ticket")
     async def ticket() -> models.Ticket:
-        """Get what opens one WebSocket without the key: `/live?ticket=T`, `/control?ticket=T`.
+        """Get a ticket for one WebSocket without the key: `/live?ticket=T`, `/control?ticket=T`.
 
         For browsers, which send no `Authorization` with those.
         """
@@ -216,7 +433,7 @@ def _add_control(app: FastAPI, service: Service) -> None:
 
     @app.post("/stream", responses={**_REFUSALS, **_NO_STREAM})
     async def stream(token: Token = None) -> models.StreamAccess:
-        """Get a session of the set-point stream, in place of the one before.
+        """Get a session of the set-point stream, which replaces the one before.
 
         It lasts as long as the right to move; `session` and `key` sign the packets.
         """
@@ -267,25 +484,25 @@ def _add_motion(app: FastAPI, service: Service) -> None:
     async def program(
         body: models.ProgramRequest, request: Request, token: Token = None
     ) -> models.Done:
-        """Change over to a program, without a bump."""
+        """Change to a program, without a torque step."""
         fields = {"program": body.program, "wanted": body.wanted}
         return await ask("program", body, token, request, **fields)
 
     @app.post("/set", responses=_REFUSALS)
     async def change(body: models.Set, request: Request, token: Token = None) -> models.Done:
-        """Tell the running program what it is to do."""
+        """Change arguments of the running program."""
         return await ask("set", body, token, request, wanted=body.wanted)
 
     @app.post("/lengths", responses=_REFUSALS)
     async def lengths(body: models.Set, request: Request, token: Token = None) -> models.Done:
-        """Tell how long the cables are now: `cable_length_m`, one for each axis or null."""
+        """Set the present lengths of the cables: `cable_length_m`, one for each axis or null."""
         return await ask("lengths", body, token, request, wanted=body.wanted)
 
 
 def _add_path(app: FastAPI, service: Service) -> None:
     @app.post("/path", responses=_REFUSALS)
     async def plan_path(body: models.PathFile) -> models.Planned:
-        """Begin to plan a path for the robot; `GET /path` tells when it is planned."""
+        """Begin to plan a path for the robot; `GET /path` shows when it is planned."""
         return models.Planned.model_validate(service.planner.begin(body.model_dump()))
 
     @app.get("/path")

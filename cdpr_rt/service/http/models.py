@@ -5,10 +5,12 @@ from __future__ import annotations
 import re
 from typing import Annotated, Any, Final
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, WithJsonSchema
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, WithJsonSchema, model_validator
+from pydantic_core import ErrorDetails
 
+from cdpr_profiles.errors import brief
+from cdpr_rt.loop.right import LONGEST_S
 from cdpr_rt.refusal import RefusalCode
-from cdpr_rt.runtime.right import LONGEST_S
 from cdpr_rt.service.lease import SHORTEST_S
 
 _MOST_KEYS, _MOST_NUMBERS, _LARGEST = 32, 64, 1e9
@@ -31,7 +33,7 @@ _WANTED: Final[dict[str, Any]] = {
 
 def _check_scalar(key: str, value: Any) -> None:
     if isinstance(value, int | float):
-        good = abs(value) <= _LARGEST  # a whole number of any length too, which no float holds
+        good = abs(value) <= _LARGEST  # also rejects whole numbers beyond the range of a float
     else:
         good = value is None or (isinstance(value, str) and re.fullmatch(_TEXT, value) is not None)
     if not good:
@@ -42,7 +44,7 @@ def _check_scalar(key: str, value: Any) -> None:
 
 
 def _checked(arguments: dict[str, Any]) -> dict[str, Any]:
-    """Raise ValueError for what no program can want; it is said in `_WANTED` as well."""
+    """Raise ValueError for arguments that no program accepts; `_WANTED` states the same."""
     if len(arguments) > _MOST_KEYS:
         raise ValueError(f"{len(arguments)} keys; allowed: {_MOST_KEYS}")
     for key, value in arguments.items():
@@ -54,6 +56,12 @@ def _checked(arguments: dict[str, Any]) -> dict[str, Any]:
         for one in values:
             _check_scalar(key, one)
     return arguments
+
+
+def fault_text(fault: ErrorDetails) -> str:
+    """Return the error and its place, in a text of bounded length."""
+    where = ".".join(brief(str(part), 60) for part in fault["loc"])
+    return f"{where}: {brief(fault['msg'])}"
 
 
 _Name = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_-]{0,31}$", description="A program's name.")]
@@ -79,15 +87,24 @@ _Wanted = Annotated[
 class _Body(BaseModel):
     model_config = ConfigDict(extra="forbid")
 
+    @model_validator(mode="before")
+    @classmethod
+    def _keep_one_unknown_key(cls, body: Any) -> Any:
+        """Remove all unknown keys but the first: each would be reported, and one is enough."""
+        if not isinstance(body, dict) or len(body) <= len(cls.model_fields):
+            return body
+        unknown = next(key for key in body if key not in cls.model_fields)
+        return {key: body[key] for key in (*cls.model_fields, unknown) if key in body}
+
 
 class ClientRequest(_Body):
-    """Who asks, for the record of events; the whole body may be left out."""
+    """The client's name, for the record of events; the whole body may be omitted."""
 
     client: _Client = "somebody"
 
 
 class TakeControl(_Body):
-    """Who wants to move, and how long it may be silent."""
+    """The client that wants to move, and how long it may be silent."""
 
     client: _Client
     ttl_s: Annotated[
@@ -97,21 +114,21 @@ class TakeControl(_Body):
 
 
 class Enable(ClientRequest):
-    """What runs from the first moment with power."""
+    """The program that runs from the first moment with power."""
 
     program: _Name = "hold"
     wanted: _Wanted = {}
 
 
 class ProgramRequest(ClientRequest):
-    """What is to run from now on."""
+    """The program to run from now on."""
 
     program: _Name
     wanted: _Wanted = {}
 
 
 class PathFile(ClientRequest):
-    """A path's file, to be planned."""
+    """A path's file to plan."""
 
     name: Annotated[
         str,
@@ -124,7 +141,10 @@ class PathFile(ClientRequest):
     text: Annotated[str, Field(max_length=1 << 21, description="What is in it.")]
     origin_mm: Annotated[
         str | None,
-        Field(pattern=r"^[-+.0-9 ]{1,64}$", description="Where G-code's zero is in the room."),
+        Field(
+            pattern=r"^[-+.0-9G ]{1,200}$",
+            description="Where G-code's zero is in the room, then those of G55 to G59.",
+        ),
     ] = None
     blend_mm: Annotated[
         float, Field(ge=0, le=1000, description="Within which G-code's corners may be cut.")
@@ -132,10 +152,22 @@ class PathFile(ClientRequest):
     ignore: Annotated[
         str, Field(pattern=r"^[A-Za-z0-9. ]{0,64}$", description="Words of G-code to be skipped.")
     ] = ""
+    z_mm: Annotated[
+        float | None, Field(ge=-1e6, le=1e6, description="Z of G-code that names none.")
+    ] = None
+    scale: Annotated[float, Field(ge=1e-3, le=1e3, description="Factor of G-code's lengths.")] = 1.0
+    rotate_deg: Annotated[
+        float, Field(ge=-360, le=360, description="By how much G-code is turned around Z.")
+    ] = 0.0
+    mirror: Annotated[
+        str, Field(pattern="^(x|y)?$", description="Axis whose sign G-code changes, if any.")
+    ] = ""
+    dwell: Annotated[str, Field(pattern="^(s|ms)$", description="Unit of P of G4.")] = "s"
+    line: Annotated[int, Field(ge=0, le=1 << 24, description="Line of the file to begin with.")] = 0
 
 
 class Set(ClientRequest):
-    """What the running program is to do now."""
+    """New arguments of the running program."""
 
     wanted: _Wanted
 
@@ -153,7 +185,7 @@ class Refusal(_Answer):
     asked: dict[str, Any]
     """The refused keys of `wanted` and their values."""
     arguments: dict[str, Any]
-    """What goes with the code, such as `low` and `high`."""
+    """Arguments of the code, such as `low` and `high`."""
 
 
 class Error(_Answer):
@@ -161,45 +193,45 @@ class Error(_Answer):
 
     error: str
     state: str | None = None
-    """The loop's state, where it was the loop that refused or where no loop takes commands."""
+    """The loop's state, if the loop refused or no loop takes commands."""
     refusal: Refusal | None = None
-    """The loop's reason, where it has a code."""
+    """The loop's reason, if it has a code."""
 
 
 class Done(_Answer):
-    """The loop has done it."""
+    """The loop has carried out the command."""
 
     text: str
     state: str
 
 
 class Planned(_Answer):
-    """A path that is planned, or was."""
+    """A path that is being planned, or was planned last."""
 
     number: int
-    """One more for each."""
+    """One more for each path."""
     planning: bool
     error: str | None
-    """Where the robot cannot follow it: the first place, by line and coordinates, and why."""
+    """Why the robot cannot follow it, with the first place by line and coordinates."""
     plan: str | None
-    """What the program `path` knows it by."""
+    """The name of the plan for the program `path`."""
 
 
 class ControlTaken(_Answer):
-    """The right to move, for whoever shows the token."""
+    """The right to move, for the client that shows the token."""
 
     token: str
     ttl_s: float
 
 
 class Renewed(_Answer):
-    """The right to move goes on."""
+    """The right to move is renewed."""
 
     ttl_s: float
 
 
 class Ticket(_Answer):
-    """What opens one WebSocket, as `ticket=` of its query."""
+    """A ticket that opens one WebSocket, as `ticket=` of its query."""
 
     ticket: str
     valid_s: float
@@ -228,23 +260,28 @@ class LoopLife(_Answer):
     pid: int
     alive: bool
     silent_s: float
-    """How long ago it turned last."""
+    """Time since its last turn."""
 
 
 class Status(_Answer):
-    """Everything at a glance."""
+    """The complete status."""
 
     robot: str
     state: str
     """unconfigured, inactive, ready, active, fault; starting, dead."""
     program: str | None
+    commanded: str = ""
+    """The last command that decided what runs, and its sender; empty before the first."""
     program_progress: dict[str, Any] = {}
-    """What it tells of itself, such as `done`; of a platform `position_m`, `rotation_rad`, ..."""
+    """Progress of the program, such as `done`; for a platform `position_m`, `rotation_rad`, ..."""
     failure: str = ""
     """Program that failed last and why; empty from the next motion on."""
     reason: str
     """Why it left active, holds, or is not ready; stays until acknowledged or enabled again."""
     reason_limit: dict[str, Any] | None
+    """The first of `faults` and the reaction to it, null if the reason is not a fault."""
+    faults: list[dict[str, Any]]
+    """All failures, the cause first: `limit`, `axis` (from 0), `name`, `code`, `text`, ..."""
     read_only: bool
     lockstep: bool
     notices: list[str]
@@ -253,6 +290,8 @@ class Status(_Answer):
     cycle: dict[str, Any] | None
     """Figures of the newest cycle, null before the first."""
     axes: list[dict[str, Any]]
+    calibration: dict[str, Any] | None
+    """Calibration of the geometry in use, null for the robot's file."""
     parts: dict[str, dict[str, Any]]
     """Recorder, live view, set-point stream and the service's own figures."""
 
@@ -266,7 +305,7 @@ class Event(_Answer):
     kind: str
     text: str
     times: int
-    """How often it happened in a row."""
+    """Number of times that it happened in succession."""
     detail: dict[str, Any]
 
 

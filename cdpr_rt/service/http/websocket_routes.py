@@ -1,4 +1,4 @@
-"""WebSockets: figures as they come, and the right to move for as long as a connection lives."""
+"""WebSockets: live figures, and the right to move for as long as a connection lives."""
 
 from __future__ import annotations
 
@@ -6,18 +6,199 @@ import asyncio
 import json
 import time
 from collections.abc import AsyncIterator, Iterator
-from contextlib import asynccontextmanager
-from typing import Annotated, Any, Final
+from contextlib import asynccontextmanager, suppress
+from typing import Annotated, Any, Final, Literal
 
 from fastapi import FastAPI, Query, WebSocket
+from pydantic import Field, TypeAdapter, ValidationError
 from starlette.websockets import WebSocketDisconnect
 
 from cdpr_rt.core.cycle_row import FIELDS
-from cdpr_rt.runtime.right import LONGEST_S
-from cdpr_rt.service.http.control_socket import BUSY, REFUSED, UNFIT, ControlSocket, reason, send
+from cdpr_rt.errors import ControlError
+from cdpr_rt.loop.right import LONGEST_S
+from cdpr_rt.service.access_control import TokenBuckets
+from cdpr_rt.service.http import models
 from cdpr_rt.service.lease import SHORTEST_S, LeaseError
+from cdpr_rt.service.link import Reply
 from cdpr_rt.service.rows import newest_row, row_table
 from cdpr_rt.service.service import Service
+
+# The WebSocket of `/control`: the right to move for as long as the connection lives.
+
+BUSY, REFUSED, SILENT, UNFIT = 1013, 4409, 4408, 1008
+"""Codes with which a connection is closed, in addition to the usual ones."""
+_MESSAGES_PER_S = 100.0
+_MOST_WAITING = 100
+_SLOW_S = 1.0
+_MOST_REASON_BYTES = 123  # RFC 6455, 5.5
+
+
+class Order(models.ClientRequest):
+    """Message of the holder of the right to move."""
+
+    do: Literal["renew", "hold", "program", "set"]
+    program: str = ""
+    wanted: dict[str, Any] = Field(default_factory=dict)
+    id: int | None = None
+
+
+_PROGRAM: Final = TypeAdapter(models.ProgramRequest)
+_SET: Final = TypeAdapter(models.Set)
+
+
+class ControlSocket:
+    """One accepted connection of `client`, which holds the right under `token`.
+
+    Orders are carried out one after the other, except `hold`: it overtakes all of them, and those
+    sent before it that have not begun are refused.
+    """
+
+    def __init__(
+        self, service: Service, socket: WebSocket, client: str, token: str, ttl_s: float
+    ) -> None:
+        self._service = service
+        self._socket = socket
+        self._client, self._token, self._ttl_s = client, token, ttl_s
+        self._orders: asyncio.Queue[Order] = asyncio.Queue(_MOST_WAITING)
+        self._is_working = False
+        self._holds: set[asyncio.Task[None]] = set()
+        self._reading: asyncio.Task[tuple[int, str] | None] | None = None
+
+    async def run(self) -> None:
+        """Obey until the client is gone, silent or sends too much; then release the right."""
+        held = {"kind": "held", "token": self._token, "ttl_s": self._ttl_s}
+        working = asyncio.create_task(self._work())
+        try:
+            await send(self._socket, json.dumps(held))
+            reading = self._reading = asyncio.create_task(self._read())
+            await asyncio.wait({reading, working}, return_when=asyncio.FIRST_COMPLETED)
+        except (TimeoutError, WebSocketDisconnect):
+            return
+        finally:
+            tasks = [working, *self._holds, *([self._reading] if self._reading else [])]
+            unfinished = [task for task in tasks if task.cancel()]
+            with suppress(LeaseError):  # it has expired, or belongs to another client by now
+                self._service.lease.release(self._token)
+            await asyncio.gather(*unfinished, return_exceptions=True)
+        if working not in unfinished:
+            working.result()  # raises the exception that ended it
+        if reading in unfinished or reading.cancelled():
+            return
+        if end := reading.result():
+            await self._socket.close(*end)
+
+    async def _read(self) -> tuple[int, str] | None:
+        """Take messages until the end; return code and reason to close a live connection with."""
+        messages = TokenBuckets(_MESSAGES_PER_S, _MESSAGES_PER_S)
+        while True:
+            try:
+                async with asyncio.timeout(self._ttl_s):
+                    message = await self._socket.receive()
+            except TimeoutError:
+                if self._is_working or self._holds:  # the client waits for its answer
+                    continue
+                return SILENT, f"nothing came for {self._ttl_s:g} s"
+            if message["type"] != "websocket.receive":
+                return None
+            if not messages.take("", time.monotonic()):
+                return UNFIT, f"more than {_MESSAGES_PER_S:g} messages a second"
+            await self._take(message.get("text") or "")
+
+    async def _take(self, text: str) -> None:
+        try:
+            order = Order.model_validate_json(text)
+        except ValidationError as error:
+            await self._refuse(None, _first_of(error))
+            return
+        if order.do == "hold":
+            before = [self._orders.get_nowait() for _ in range(self._orders.qsize())]
+            hold = asyncio.create_task(self._carry_out(order))
+            self._holds.add(hold)
+            hold.add_done_callback(self._holds.discard)
+            for one in before:
+                await self._refuse(one.id, f"{one.do}: a stop was asked for after it")
+        elif self._orders.full():
+            await self._refuse(order.id, f"{_MOST_WAITING} orders wait already")
+        else:
+            self._orders.put_nowait(order)
+
+    async def _work(self) -> None:
+        while True:
+            order = await self._orders.get()
+            self._is_working = True
+            await self._carry_out(order)
+            self._is_working = False
+
+    async def _carry_out(self, order: Order) -> None:
+        try:
+            state, refused = await self._do(order)
+        except ValidationError as error:
+            await self._refuse(order.id, _first_of(error))
+        except ControlError as error:
+            await self._refuse(order.id, str(error))
+        else:
+            if refused is None:
+                await self._reply(id=order.id, ok=True, error=None, state=state)
+            else:
+                why: dict[str, Any] = {"error": refused.text or "refused", "state": state}
+                why |= {"refusal": refused.refusal} if refused.refusal else {}
+                await self._reply(id=order.id, ok=False, **why)
+
+    async def _do(self, order: Order) -> tuple[str, Reply | None]:
+        """Return the loop's state, and its refusal if it refused."""
+        service, client, token = self._service, self._client, self._token
+        if order.do == "renew":
+            service.lease.renew(token)
+            return service.link.state(), None
+        if order.do == "hold":
+            with suppress(LeaseError):  # a client that has lost the right may still stop
+                service.lease.renew(token)
+            reply = await service.command("hold", client)
+        elif order.do == "program":
+            program = _PROGRAM.validate_python({"program": order.program, "wanted": order.wanted})
+            fields = {"program": program.program, "wanted": program.wanted}
+            reply = await service.command_with_right("program", client, token, _is_here, **fields)
+        else:
+            change = _SET.validate_python({"wanted": order.wanted})
+            wanted = {"wanted": change.wanted}
+            reply = await service.command_with_right("set", client, token, _is_here, **wanted)
+        return reply.state, None if reply.ok else reply
+
+    async def _refuse(self, number: int | None, why: str) -> None:
+        await self._reply(id=number, ok=False, error=why)
+
+    async def _reply(self, **answer: Any) -> None:
+        try:
+            await send(self._socket, json.dumps({"kind": "reply", **answer}))
+        except TimeoutError:
+            if self._reading is not None:
+                self._reading.cancel()  # ends the connection
+        except WebSocketDisconnect:  # the reader notices it too
+            return
+
+
+def reason(text: str) -> str:
+    """Return why a connection is closed, shortened to fit into a close frame."""
+    return text.encode("ascii", "backslashreplace")[:_MOST_REASON_BYTES].decode()
+
+
+async def send(socket: WebSocket, text: str) -> None:
+    """Send; raises TimeoutError if the other side does not read."""
+    async with asyncio.timeout(_SLOW_S):
+        try:
+            await socket.send_text(text)
+        except RuntimeError:  # the server has closed it, because a ping was not answered
+            raise WebSocketDisconnect from None
+
+
+def _first_of(error: ValidationError) -> str:
+    return models.fault_text(error.errors()[0])
+
+
+async def _is_here() -> bool:
+    """Return False, not gone: if the client leaves, its pending requests are cancelled."""
+    return False
+
 
 FASTEST_HZ: Final = 50.0
 _MOST_LIVE = 16
@@ -44,7 +225,7 @@ class WebSocketRoutes:
             unknown = [name for name in wanted if name not in FIELDS]
             await socket.accept()
             if unknown:
-                await socket.close(UNFIT, reason(f"fields: {unknown[0]} is none of a cycle's"))
+                await socket.close(UNFIT, reason(f"fields: {unknown[0]} is not a field of a cycle"))
             elif self._service.counts["live_clients"] >= _MOST_LIVE:
                 await socket.close(BUSY, f"{_MOST_LIVE} others look on already")
             else:
@@ -62,11 +243,9 @@ class WebSocketRoutes:
             except LeaseError as error:
                 await socket.close(REFUSED, reason(str(error)))
                 return
-            # who holds the right is not kept waiting by those who ask without
-            socket.state.connection.note_authenticated()
             await ControlSocket(self._service, socket, client, token, ttl_s).run()
 
-    # -- looking on
+    # -- viewers
 
     async def _show(self, socket: WebSocket, rate_Hz: float, fields: tuple[str, ...]) -> None:
         updates = _Updates(self._service)
@@ -81,7 +260,7 @@ class WebSocketRoutes:
 
     @asynccontextmanager
     async def _viewing(self, socket: WebSocket) -> AsyncIterator[asyncio.Task[None]]:
-        """Count one that looks on; drop it when it reads too slowly or talks too much."""
+        """Count a viewer; disconnect it if it reads too slowly or sends too much."""
         counts = self._service.counts
         counts["live_clients"] += 1
         gone = asyncio.create_task(_discard_incoming(socket))
@@ -90,7 +269,6 @@ class WebSocketRoutes:
         except TimeoutError:
             counts["slow_clients_dropped"] += 1
             self._service.events.add("live", "a client that read too slowly was dropped")
-            socket.state.abort()
         except WebSocketDisconnect:
             pass
         finally:
@@ -98,13 +276,13 @@ class WebSocketRoutes:
             gone.cancel()
 
     def _cycle(self, updates: _Updates, fields: tuple[str, ...]) -> str:
-        """Return the newest cycle as text, "" where it has been shown already."""
+        """Return the newest cycle as text, "" if it has been sent already."""
         rows = int(self._service.block.counters["rows"][0])
         if rows == updates.rows:
             return ""
         skipped, updates.rows = rows - updates.rows - 1, rows
         key = (rows, fields)
-        if self._cached[0] != key:  # many may look at the same
+        if self._cached[0] != key:  # many clients may view the same
             row = newest_row(self._service.block)
             table = {} if row is None else row_table(row, fields)
             self._cached = key, json.dumps(table)[1:]
@@ -140,7 +318,7 @@ class _Updates:
 
 
 async def _discard_incoming(socket: WebSocket) -> None:
-    """Take what a client that only looks on sends; return when it has gone, or says too much."""
+    """Discard messages of a viewer; return when it has gone, or sends too much."""
     for _ in range(1000):
         message = await socket.receive()
         if message["type"] == "websocket.disconnect":

@@ -7,11 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from cdpr_profiles import Robot, load_robot
-from cdpr_rt.calibration.camera.camera_start import CameraStart, camera_start
-from cdpr_rt.calibration.estimation.parameters import USUAL, CableGeometry, Knowledge
-from cdpr_rt.calibration.readings.camera_data import Images
-from cdpr_rt.calibration.readings.observations import Observations
-from cdpr_tools.calibrate.synthetic_readings import (
+from cdpr_rt.calibration.camera_start import CameraStart, camera_start
+from cdpr_rt.calibration.parameters import USUAL, CableGeometry, Knowledge
+from cdpr_rt.calibration.readings import Images, Observations
+from tests.cdpr_rt.calibration.synthetic_readings import (
     ErrorBudget,
     SheetLayout,
     SyntheticReadings,
@@ -58,7 +57,7 @@ def camera_robot(
     targets[0] = model.home
     made = synthetic_readings(
         robot, targets, model.poses(targets), errors or ErrorBudget(), layout, seed,
-        of_data=poses, hand_eye_known=hand_eye_known,
+        hand_eye_known=hand_eye_known,
     )  # fmt: skip
     assert made.data.camera is not None
     images = Images(made.data.camera, made.data.sightings())

@@ -9,14 +9,13 @@ from scipy.optimize import brentq
 
 from cdpr_profiles import load_robot
 from cdpr_rt.arrays import FloatArray
-from cdpr_rt.calibration.estimation.parameters import USUAL, CableGeometry
-from cdpr_rt.calibration.readings.observations import Observations
-from cdpr_rt.robots.kinematics.cable_kernel import CABLE_ROWS, run_poses
-from cdpr_rt.robots.kinematics.cable_model import CableModel
-from cdpr_rt.robots.kinematics.kinematics import CableKinematics
-from cdpr_rt.robots.kinematics.pose import Pose
-from cdpr_rt.robots.platform_model import PlatformModel
-from cdpr_rt.robots.rigid_body import G_m_s2
+from cdpr_rt.calibration.parameters import USUAL, CableGeometry
+from cdpr_rt.calibration.readings import Observations
+from cdpr_rt.model.cable_kernel import CABLE_ROWS, CableModel, run_poses
+from cdpr_rt.model.kinematics import CableKinematics
+from cdpr_rt.model.platform_model import PlatformModel
+from cdpr_rt.model.pose import Pose
+from cdpr_rt.model.rigid_body import G_m_s2
 
 
 @dataclass(frozen=True)

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from cdpr_profiles.reading.places import SHIPPED
-from cdpr_rt.calibration.check import Check, check_geometry
-from cdpr_rt.calibration.estimation.residuals import lengths_told
-from cdpr_rt.calibration.readings.observations import Observations
+from cdpr_profiles import load_robot
+from cdpr_profiles.places import SHIPPED
+from cdpr_rt.calibration.check import Check, check_geometry, require_spare_length
+from cdpr_rt.calibration.parameters import CableGeometry
+from cdpr_rt.calibration.readings import Observations
+from cdpr_rt.calibration.residuals import lengths_told
+from cdpr_rt.errors import InvalidRequestError
 from tests.cdpr_rt.calibration.made_up import made_up
 
 
@@ -23,6 +27,8 @@ def checked(
     drum: float = 0.0,
     home_m: tuple[float, ...] = (0.0, 0.0, 0.0),
     scanner_m: float | None = None,
+    slip_m: float = 0.0,
+    slip_from: int = 0,
 ) -> Check:
     """Return the check of a robot as its file has it but for what is said."""
     what = made_up(robot, 11, 4, exit_m=0.0, drum=0.0, elongation=0.0, home_first=True)
@@ -36,6 +42,7 @@ def checked(
     # encoders count from what the lengths at home are taken for
     paid_out = (true - true[0]) / (1.0 + changed[:, 4]) + rng.normal(0.0, 1.5e-4, true.shape)
     told = lengths_told(what.file, what.seen.start[:1], tension[:1])[0] + paid_out
+    told[slip_from:, cable] -= slip_m
     seen = Observations.of_lengths(told, tension, what.seen.start)
     if scanner_m is not None:
         p = poses[:, 0] + rng.normal(0.0, scanner_m, (len(poses), 3))
@@ -89,3 +96,29 @@ def test_of_a_platform_that_turns_freely_its_moments_tell_how_far_positions_are_
     (change,) = checked("planar-3", drum=-0.008).changes
     assert (change.kind, change.cable) == ("drum", 0)
     assert change.effect_m == pytest.approx(4.3e-3, rel=0.3)
+
+
+def test_a_cable_that_slips_during_the_check_is_named_alone_with_its_pose() -> None:
+    found = checked("spatial-8", cable=1, slip_m=0.01, slip_from=6)
+    (change,) = found.changes
+    assert (change.kind, change.cable, change.pose) == ("slip", 1, 6)
+    assert not change.alike
+    assert abs(change.size[0]) == pytest.approx(0.01, abs=0.002)
+    assert "cable 2 is" in found.verdict()[1] and "from pose 6 on" in found.verdict()[1]
+
+
+def test_lengths_alone_cannot_check_a_robot_with_as_many_cables_as_degrees_of_freedom() -> None:
+    with pytest.raises(InvalidRequestError, match="check it with a camera or --scanner"):
+        checked("suspended-6")
+    assert not checked("suspended-6", scanner_m=1e-3).moved
+
+
+@pytest.mark.parametrize(
+    ("robot", "spare"),
+    [("suspended-6", False), ("spatial-8", True), ("planar-3", True), ("point-4", True)],
+)
+def test_a_robot_that_lengths_cannot_check_is_known_before_it_moves(
+    robot: str, spare: bool
+) -> None:
+    with nullcontext() if spare else pytest.raises(InvalidRequestError, match="cannot check"):
+        require_spare_length(CableGeometry.of(load_robot(robot)))

@@ -10,8 +10,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from cdpr_profiles import load_robot
-from cdpr_rt.calibration.estimation.fit import moved
-from cdpr_rt.calibration.estimation.residuals import lengths_told
+from cdpr_rt.calibration.fit import moved
 from cdpr_rt.calibration.pose_choice import (
     HAND_EYE_m,
     HAND_EYE_rad,
@@ -25,10 +24,11 @@ from cdpr_rt.calibration.pose_choice import (
     predicted_deviation_m,
     spread,
 )
-from cdpr_rt.robots.kinematics.cable_kernel import RADIUS
-from cdpr_rt.robots.platform_model import PlatformModel, platform_model_of
-from cdpr_rt.robots.reach.reachable import Reach
-from tests.cdpr_rt.robots.pulley import over_a_pulley
+from cdpr_rt.calibration.residuals import lengths_told
+from cdpr_rt.model.cable_kernel import RADIUS
+from cdpr_rt.model.platform_model import PlatformModel, platform_model_of
+from cdpr_rt.model.reachable import Reach
+from tests.cdpr_rt.model.pulley import over_a_pulley
 
 
 def candidates(count: int) -> tuple[np.ndarray, np.ndarray, PlatformModel, np.ndarray]:

@@ -10,7 +10,7 @@ import pytest
 
 from cdpr_profiles import ProfileError, Winch, load_winch
 from cdpr_profiles.catalogue import list_profiles, load_motor
-from cdpr_profiles.limits.motor_bounds import MotorBounds
+from cdpr_profiles.motor_bounds import MotorBounds
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.control.compensation import Compensation
 from cdpr_rt.control.pid import Pid

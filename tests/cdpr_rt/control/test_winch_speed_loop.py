@@ -29,3 +29,29 @@ def test_a_winch_whose_cable_has_broken_does_not_run_away(begins_rad_s: float) -
         loop.update(feedback, torque_Nm)
     assert fastest_rad_s < abs(begins_rad_s) + 50.0
     assert abs(speed_rad_s) * CABLE_m < FASTEST_IN_m_s
+
+
+@pytest.mark.parametrize("friction_N", [0.5, 8.0, 12.0])
+def test_a_slack_cable_is_paid_out_against_friction_up_to_the_push(friction_N: float) -> None:
+    """As far as it is asked for; a winch that rubs more than that stands still."""
+    push_N, left_m = 10.0, 0.1
+    loop = WinchSpeedLoop(np.array([INERTIA_kg_m2]), np.array([CABLE_m]), PERIOD_s)
+    loop.high_N[:], loop.paying_out_m_s[:] = HIGH_N, 0.15
+    loop.left_m[:], loop.push_N[:] = left_m, push_N
+    loop.integral_rate_1_s = HANGING_LOAD_1_s
+    feedback, torque_Nm, speed_rad_s = AxisFeedback(1), np.zeros(1), 0.0
+    loop.begin(feedback, np.zeros(1), torque_Nm)
+    for _ in range(2000):
+        unbraked_rad_s = speed_rad_s + PERIOD_s * torque_Nm[0] / INERTIA_kg_m2
+        braked_rad_s = abs(unbraked_rad_s) - PERIOD_s * friction_N * CABLE_m / INERTIA_kg_m2
+        speed_rad_s = float(np.copysign(max(braked_rad_s, 0.0), unbraked_rad_s))
+        feedback.position_rad += PERIOD_s * speed_rad_s
+        loop.update(feedback, torque_Nm)
+        assert loop.tension_N[0] >= -push_N
+    paid_out_m = CABLE_m * feedback.position_rad[0]
+    if friction_N > push_N:
+        assert paid_out_m == 0.0
+        assert loop.tension_N[0] == -push_N
+    else:
+        assert paid_out_m == pytest.approx(left_m, abs=0.01)
+        assert speed_rad_s == 0.0 and loop.tension_N[0] >= 0.0

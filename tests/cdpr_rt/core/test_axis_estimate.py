@@ -7,13 +7,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from cdpr_profiles.limits.robot_limits import Limit
+from cdpr_profiles.robot_limits import Limit
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.core.estimate import FILTER_S, Estimator, WinchArrays
-from cdpr_rt.core.exchange import AxisFeedback, Setpoint
-from cdpr_rt.core.supervision.limits import Limits
-from cdpr_rt.core.supervision.supervisor import Supervisor
-from cdpr_rt.core.tension_feedback import TensionFault, TensionFeedback
+from cdpr_rt.core.exchange import AxisFeedback, Setpoint, TensionFault, TensionFeedback
+from cdpr_rt.core.supervisor import Limits, Supervisor
 
 PERIOD_S = 1e-3
 COUNT_rad = 2.0 * np.pi / 8192

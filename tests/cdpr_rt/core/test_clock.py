@@ -13,8 +13,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cdpr_rt.core.clock import Clock, LockstepClock, PacedClock
-from cdpr_rt.core.task import TaskCancelled
+from cdpr_rt.core.clock import Clock, LockstepClock, PacedClock, TaskCancelled
 
 
 class Line:

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from cdpr_rt.core.tension_feedback import TensionExchange, TensionFault, TensionWatch
+from cdpr_profiles.robot_limits import Limit
+from cdpr_rt.core.exchange import TensionExchange, TensionFault, TensionWatch
+from cdpr_rt.core.fault import LOAD_CELL, LOAD_CELL_HIGH, fault_text
 
 
 class Clock:
@@ -45,8 +47,8 @@ def test_a_reading_has_its_time_and_grows_old() -> None:
     both.update()
     np.testing.assert_array_equal(told.valid, [False, True, False])
     assert both.reason() == ("winch 1: tension sensor: stale, last read 0.36 s ago, 0.25 s allowed")
-    assert TensionWatch(both).stop_reason() == both.reason()
-    assert TensionWatch(both).alarm() == ""
+    found = TensionWatch(both).fault()
+    assert found is not None and (found.limit, found.detail) == (Limit.SAFETY_STOP, both.reason())
 
 
 def test_a_fault_is_told_with_its_cable_and_goes_when_it_is_mended() -> None:
@@ -73,8 +75,25 @@ def test_a_watch_stops_what_pulls_too_hard() -> None:
     watch = TensionWatch(both, 80.0)
     for i, tension in enumerate((20.0, 79.9, 50.0)):
         both.publish(i, tension, 100.0, TensionFault.NONE)
-    assert watch.stop_reason() == ""
+    assert watch.fault() is None
     both.publish(1, 80.1, 100.0, TensionFault.NONE)
-    assert watch.stop_reason() == "winch 2: 80.1 N, 80 N allowed"
+    assert told(watch) == "load cell winch 2: 80.1 N, 80 N allowed"
     both.publish(0, 0.0, 100.0, TensionFault.BROKEN_WIRE)
-    assert watch.stop_reason() == "winch 1: tension sensor: broken wire"
+    assert told(watch) == "winch 1: tension sensor: broken wire"
+
+
+def test_a_watch_of_one_load_cell_names_the_axis_and_the_kind_of_fault() -> None:
+    one = exchange(Clock(), 1)
+    watch = TensionWatch(one, 80.0)
+    one.publish(0, 80.1, 100.0, TensionFault.NONE)
+    high = watch.fault()
+    one.publish(0, 0.0, 100.0, TensionFault.BROKEN_WIRE)
+    dead = watch.fault()
+    assert high is not None and dead is not None
+    assert (high.axis, high.code, high.value, high.allowed) == (0, LOAD_CELL_HIGH, 80.1, 80.0)
+    assert (dead.axis, dead.code) == (0, LOAD_CELL)
+
+
+def told(watch: TensionWatch) -> str:
+    fault = watch.fault()
+    return "" if fault is None else fault_text(fault, ())

@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from cdpr_rt.motion.approach import approach, ramp_velocity, soft_deadband, stopping_position
+from cdpr_rt.motion.trajectory import approach, ramp_velocity, soft_deadband, stopping_position
 
 PERIOD_S = 1e-3
 pairs = st.lists(st.floats(-20, 20), min_size=2, max_size=2).map(np.array)

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from cdpr_rt.arrays import FloatArray
-from cdpr_rt.calibration.markers.sighting import Sighting
+from cdpr_rt.calibration.markers.marker_map import Sighting
 from cdpr_rt.errors import TripError
-from cdpr_rt.procedures.calibration.measure_poses import (
+from cdpr_rt.procedures.measure_poses import (
     Measured,
     NotThePoseError,
     PoseRefusedError,

@@ -15,11 +15,11 @@ from cdpr_rt.arrays import BoolArray, FloatArray
 from cdpr_rt.core.estimate import Estimator
 from cdpr_rt.core.exchange import AxisFeedback, Setpoint
 from cdpr_rt.core.shared_block import SAMPLE, SharedBlock
+from cdpr_rt.model.platform_model import PlatformModel, platform_model
+from cdpr_rt.model.workspace import SHARES
 from cdpr_rt.motion.pose_stream import PoseStream
-from cdpr_rt.programs.platform.platform_program import PlatformParts, PlatformProgram
-from cdpr_rt.programs.platform.pose import PoseProgram
-from cdpr_rt.robots.platform_model import PlatformModel, platform_model
-from cdpr_rt.robots.workspace import SHARES
+from cdpr_rt.programs.platform_program import PlatformParts, PlatformProgram
+from cdpr_rt.programs.pose import PoseProgram
 
 PERIOD_S = 1e-3
 PLANE = Platform(
@@ -94,6 +94,7 @@ class IdealControl:
         self.effort_Nm, self.compensation_Nm = np.zeros((2, n))
         self.motor_loss_Nm, self.cogging_Nm = np.zeros((2, n))
         self.inertia_kg_m2, self.residual_m, self.suspect = np.full(n, 1e-4), 0.0, -1
+        self.jump_m, self.jumped = 0.0, -1
         self.free_lengths_m = np.zeros(n)
         self.swing_rad = self.swing_m = 0.0
         self._there = model.pose(model.home)
@@ -116,6 +117,9 @@ class IdealControl:
     pull_fit = NothingFound()
 
     def notices(self) -> list[str]:
+        return []
+
+    def suspects(self, jump: bool = False) -> list[int]:
         return []
 
     def clear_notices(self) -> None: ...

@@ -11,12 +11,12 @@ from hypothesis import strategies as st
 from ideal_platform import PERIOD_S, PLANE, ROOM, IdealPlatform, home_rotation, rotation_of, seven
 from scipy.spatial.transform import Rotation
 
-from cdpr_rt.motion.rotations import multiply, to_quaternion, to_rotation_vector
-from cdpr_rt.motion.stream_buttons import CLUTCH
-from cdpr_rt.programs.arguments import ProgramError
-from cdpr_rt.programs.platform.lower import LowerProgram, lowering_s
-from cdpr_rt.programs.platform.platform_program import PlatformProgram
-from cdpr_rt.programs.platform.tightening.index_path import index_path
+from cdpr_rt.motion.hand_target import multiply, to_quaternion, to_rotation_vector
+from cdpr_rt.motion.pose_stream import CLUTCH
+from cdpr_rt.programs.base import ProgramError
+from cdpr_rt.programs.lower import LowerProgram, lowering_s
+from cdpr_rt.programs.platform_program import PlatformProgram
+from cdpr_rt.programs.tighten import index_path
 
 PLATFORMS = {3: (PLANE, 20.0, 200.0), 6: (ROOM, 10.0, 2000.0)}
 AWAY = {3: [0.1, 0.05, 0.15], 6: [0.1, -0.05, 0.2, 0.1, -0.05, 0.15]}
@@ -53,6 +53,48 @@ def test_all_directions_arrive_together_on_a_straight_line(robot: IdealPlatform)
     assert (np.diff(share, axis=0) > -1e-9).all()
     # one direction is as fast as it may be at some time, or as accelerated
     assert (np.abs(robot.paces).max(axis=0) / robot.model.speed).max() > 0.5
+
+
+@pytest.mark.parametrize("frame", ["room", "platform"])
+def test_a_relative_motion_goes_along_and_about_the_axes_of_its_frame(
+    robot: IdealPlatform, frame: str
+) -> None:
+    position, rotation = split(robot)
+    robot.pose.command({"position_m": position, "rotation_rad": rotation})
+    robot.until_rest()
+    k, before = robot.model.positions, np.array([*position, *rotation])
+    way = np.array([0.03, -0.02, 0.01])[:k]
+    angles = [0.02, -0.03, 0.04] if robot.model.size == 6 else [0.04]
+    robot.pose.command({"distance_m": way.tolist(), "turn_rad": angles, "frame": frame})
+    robot.until_rest()
+    from_home = rotation_of(robot.model, before)
+    axes = from_home * home_rotation(robot.model) if frame == "platform" else Rotation.identity()
+    room = Rotation.from_rotvec(axes.apply([0.0] * (3 - len(angles)) + angles))
+    after = robot.path[-1]
+    assert after[:k] - before[:k] == pytest.approx(axes.apply([*way, 0.0][:3])[:k], abs=1e-9)
+    turned = rotation_of(robot.model, after) * (room * from_home).inv()
+    assert turned.magnitude() < 1e-9
+
+
+def test_relative_motions_add_up_while_the_platform_moves(robot: IdealPlatform) -> None:
+    begun, k = robot.path[0], robot.model.positions
+    for _ in range(2):
+        robot.pose.command({"distance_m": [0.05] * k})
+        robot.run(0.05)
+    robot.until_rest()
+    assert robot.path[-1][:k] - begun[:k] == pytest.approx(np.full(k, 0.1), abs=1e-9)
+
+
+def test_a_relative_motion_out_of_the_workspace_is_refused(robot: IdealPlatform) -> None:
+    k = robot.model.positions
+    with pytest.raises(ProgramError, match=r"distance_m: .*leads to x \d+ mm; allowed: -\d+ to"):
+        robot.pose.command({"distance_m": [1.5] + [0.0] * (k - 1)})
+    with pytest.raises(ProgramError, match=r"turn_rad: .* deg from the orientation at home"):
+        robot.pose.command({"turn_rad": [0.0] * (robot.model.size - k - 1) + [0.5]})
+    with pytest.raises(ProgramError, match="position_m: allowed: without distance_m"):
+        robot.pose.command({"distance_m": [0.0] * k, "position_m": [0.0] * k})
+    with pytest.raises(ProgramError, match="frame: value 'home'; allowed: room, platform"):
+        robot.pose.command({"distance_m": [0.0] * k, "frame": "home"})
 
 
 def test_poses_are_those_of_independent_rotations(robot: IdealPlatform) -> None:
@@ -106,10 +148,14 @@ def test_a_platform_that_stands_turned_too_far_is_turned_back_into_what_is_allow
 @pytest.mark.parametrize(
     ("key", "value", "told"),
     [
-        ("rotation_rad", "far", r"rotation_rad: value .*, \S+ rad from the orientation at home; "),
+        ("rotation_rad", "far", r"rotation_rad: value .* deg from the orientation at home; "),
         ("rotation_rad", "nan", r"rotation_rad\[0\]: value nan"),
         ("rotation_rad", "many", "rotation_rad: value .* allowed: a list of [13], one number"),
-        ("position_m", "far", r"position_m\[0\]: value 5 m; allowed: -\S+ to \S+ m, the workspace"),
+        (
+            "position_m",
+            "far",
+            r"position_m: value .* 5000 mm; allowed: .* mm, the workspace",
+        ),
         ("position_m", "many", "position_m: value .* allowed: a list of [23], one number"),
     ],
 )
@@ -130,8 +176,8 @@ def test_what_is_not_allowed_is_refused_by_its_name(
 def test_the_allowed_angle_is_told(robot: IdealPlatform) -> None:
     rotation = np.zeros(len(split(robot)[1]))
     rotation[-1] = -0.5
-    allowed = re.escape(f"allowed: up to {robot.model.angle_rad:g} rad")
-    with pytest.raises(ProgramError, match=f"0.5 rad from the orientation at home; {allowed}"):
+    allowed = re.escape(f"allowed: up to {np.degrees(robot.model.angle_rad):.4g} deg")
+    with pytest.raises(ProgramError, match=f"28.65 deg from the orientation at home; {allowed}"):
         robot.pose.command({"rotation_rad": rotation.tolist()})
 
 

@@ -6,7 +6,7 @@ import tracemalloc
 import numpy as np
 import pytest
 
-from cdpr_rt.programs.arguments import ProgramError
+from cdpr_rt.programs.base import ProgramError
 from tests.cdpr_rt.programs.program_rig import PERIOD_S, COULOMB_Nm, N, ProgramRig
 
 

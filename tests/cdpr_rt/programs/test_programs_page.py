@@ -11,14 +11,13 @@ import pytest
 from cdpr_profiles import load_robot
 from cdpr_rt.core.estimate import Estimator
 from cdpr_rt.core.shared_block import SharedBlock
-from cdpr_rt.programs.arguments import ProgramError
-from cdpr_rt.programs.base import Program
+from cdpr_rt.model.robot_arrays import limits_of, winches_of
+from cdpr_rt.programs.base import Program, ProgramError
 from cdpr_rt.programs.model import model_of
 from cdpr_rt.programs.registry import build_programs, platform_parts
-from cdpr_rt.robots.robot_arrays import limits_of, winches_of
 
-PAGE = Path(__file__).parents[3] / "docs" / "programs.md"
-OF_ANGLES = {"rotation_rad"}
+PAGE = Path(__file__).parents[3] / "docs" / "reference" / "programs.md"
+OF_ANGLES = {"rotation_rad", "turn_rad"}
 """Keys that programs know where angles are controlled, which `planar-3` does not."""
 
 

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from cdpr_rt.service.bounded_log import BoundedLog
+from cdpr_tools.daemon.service_process import BoundedLog
 
 
 class Log:

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from cdpr_rt.core.shared_block import SharedBlock
-from cdpr_rt.runtime.right import PublishedRight
+from cdpr_rt.loop.right import PublishedRight
 from cdpr_rt.service.lease import Lease, LeaseError
 
 BLOCK = SharedBlock.create(1, 0.1, 100.0)

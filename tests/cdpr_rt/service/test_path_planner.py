@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from cdpr_rt.service.path_planner import PathPlanRunner, PlannerBusyError
+from cdpr_rt.service.service import PathPlanRunner, PlannerBusyError
 
 WANTED = {"name": "part.nc", "text": "M2\n"}
 
@@ -57,3 +57,9 @@ def test_a_stop_while_it_is_planned_leaves_nothing_to_follow():
 def test_without_the_robot_nothing_is_planned():
     with pytest.raises(PlannerBusyError):
         PathPlanRunner().begin(WANTED)
+
+
+def test_a_long_error_is_cut_before_every_look_repeats_it():
+    job = planned(2, json.dumps({"error": "FILE:3: " + "x" * 900_000}))
+    assert job["error"].startswith("part.nc:3: x")
+    assert len(job["error"]) <= 2000

@@ -11,8 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from cdpr_drivers.axes import axis_codec as codec
+from cdpr_drivers.axes.axis_group import StateArrays
 from cdpr_drivers.axes.axis_layout import AxisConfig, GroupLayout
-from cdpr_drivers.axes.axis_state import StateArrays
 from cdpr_drivers.cia402 import CONTROLWORD_TABLE, STATE_TABLE, State
 from cdpr_drivers.errors import DriverError
 from tests.drivers.axis_rig import DRIVE, PERIOD_S

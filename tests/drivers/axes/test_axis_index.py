@@ -8,11 +8,11 @@ from pathlib import Path
 
 import pytest
 
-from cdpr_drivers.axes import touch_probe
+from cdpr_drivers.axes import homing as touch_probe
 from cdpr_drivers.axes.homing import MIRRORED, Homing, HomingStep
 from cdpr_drivers.cia402 import Mode, State
 from cdpr_drivers.errors import DriveFaultError
-from cdpr_sim_bus.cia402.homing import METHODS
+from cdpr_sim_bus.cia402.modes import METHODS
 from tests.drivers.axis_rig import DRIVE, Rig, open_rig, start_simulator
 
 COUNT_RAD = math.tau / 8192

@@ -11,9 +11,11 @@ from collections.abc import Iterator
 
 import pytest
 
-from cdpr_drivers.bus import member, open_shared_port
+from cdpr_drivers.bus import AdapterPort
+from cdpr_drivers.canopen import network
 from cdpr_drivers.cia402 import Mode, State, state_of
 from tests.drivers.axis_rig import DRIVE, Rig, open_network
+from tests.fault_texts import alarm
 
 pytestmark = pytest.mark.alone
 
@@ -40,12 +42,12 @@ def rig(
     paced_bus: str, request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch
 ) -> Iterator[Rig]:
     if request.param == "python-can":
-        monkeypatch.setattr(member, "open_port", open_shared_port)
-    with open_network(paced_bus, [1, 2]) as network:
+        monkeypatch.setattr(network, "open_port", AdapterPort)
+    with open_network(paced_bus, [1, 2]) as opened:
         for node in (1, 2):
-            network.reset(node)
-            assert network.read_int(node, 0x1001) == 0
-        rig = Rig(paced_bus, network, DRIVE, [1, 2], period_s=PERIOD_S)
+            opened.reset(node)
+            assert opened.read_int(node, 0x1001) == 0
+        rig = Rig(paced_bus, opened, DRIVE, [1, 2], period_s=PERIOD_S)
         with rig.group:
             yield rig
 
@@ -63,7 +65,7 @@ def _cycles(rig: Rig, count: int, patience_s: float = 1.0) -> list[str]:
         rig.group.sync()
         rig.group.receive(time.monotonic() + patience_s)
         rig.group.transmit()
-        alarms.append(rig.group.alarm())
+        alarms.append(alarm(rig.group))
     return alarms
 
 
@@ -109,7 +111,7 @@ def test_two_lost_answers_are_bridged_and_the_third_is_an_alarm(rig: Rig) -> Non
     rig.misbehave(2, 200, node=2)
     alarms = [text for text in _cycles(rig, 5, 0.02) if text]
     assert alarms
-    assert "node 2: no answer to SYNC for 3 cycles" in alarms[0]
+    assert "(node 2) has not answered SYNC for 3 cycles" in alarms[0]
     rig.misbehave(2, 0, node=2)
 
 

@@ -12,8 +12,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from cdpr_drivers.axes import axis_codec as codec
+from cdpr_drivers.axes.axis_group import StateArrays
 from cdpr_drivers.axes.axis_layout import AxisConfig, GroupLayout
-from cdpr_drivers.axes.axis_state import StateArrays
 from cdpr_drivers.cia402 import CONTROLWORD_TABLE, STATE_TABLE, State
 from cdpr_drivers.errors import DriverError
 from cdpr_profiles import DriveProfile, Pdo, load_drive
@@ -104,7 +104,8 @@ def test_each_axis_is_commanded_in_its_own_frames_and_units() -> None:
     ints = pair.state.ints
     ints[codec.MODE_REQUESTED] = ints[codec.MODE_DISPLAYED] = [4, 10]
     ints[codec.TARGET] = State.OPERATION_ENABLED
-    pair.take((0x181, struct.pack("<Hi", ENABLED, 0)), (0x182, struct.pack("<Hih", ENABLED, 0, 0)))
+    halves = (0x181, struct.pack("<Hi", ENABLED, 0)), (0x381, struct.pack("<hi", 0, 0))
+    pair.take(*halves, (0x182, struct.pack("<Hih", ENABLED, 0, 0)))
     pair.state.command.torque_Nm[:] = [0.123, -0.123]
     assert pair.give() == {
         0x201: struct.pack("<H", 0x0F),
@@ -124,7 +125,8 @@ def test_one_axis_waits_for_its_own_mode_while_the_other_goes_on() -> None:
     ints[codec.MODE_REQUESTED] = [4, 10]
     ints[codec.MODE_DISPLAYED] = [4, 4]
     ints[codec.TARGET] = State.OPERATION_ENABLED
-    pair.take((0x181, struct.pack("<Hi", 0x23, 0)), (0x182, struct.pack("<Hih", 0x23, 0, 0)))
+    halves = (0x181, struct.pack("<Hi", 0x23, 0)), (0x381, struct.pack("<hi", 0, 0))
+    pair.take(*halves, (0x182, struct.pack("<Hih", 0x23, 0, 0)))
     frames = pair.give()
     assert frames[0x201] == struct.pack("<H", 0x0F)
     assert frames[0x202][:2] == struct.pack("<H", 0x07)

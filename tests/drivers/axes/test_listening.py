@@ -20,13 +20,14 @@ import pytest
 
 from cdpr_drivers.axes.listening import ListeningDevice, MonitoredBus, monitored_axis
 from cdpr_drivers.bus import BusUrl
-from cdpr_drivers.bus.adapters.simbus_socket import connect, exchange
+from cdpr_drivers.bus.simbus import connect, exchange
 from cdpr_drivers.cia402 import State
 from cdpr_drivers.errors import BusError
 from cdpr_profiles import load_winch
 from cdpr_rt.core.clock import PacedClock, Readable
 from cdpr_sim_bus.bus.hub import Hub
 from tests.drivers.bus_log import BusLog, logged
+from tests.fault_texts import alarm
 
 WINCH = load_winch("winch-mpp0923d")
 COUNTS = WINCH.encoder_counts_per_turn
@@ -163,9 +164,9 @@ def test_feedback_is_what_the_drives_say(stage: Stage) -> None:
         assert feedback.valid.all() and feedback.alive.all() and feedback.rate_ok.all()
         assert ears.states() == [State.OPERATION_ENABLED, State.FAULT]
         assert ears.faulted().tolist() == [False, True]
-        assert "node 2: the drive is in fault" in ears.alarm()
+        assert "node 2) is in fault" in alarm(ears)
         ears.forget_alarms()
-        assert (ears.alarm(), ears.faulted().tolist()) == ("", [False, False])
+        assert (alarm(ears), ears.faulted().tolist()) == ("", [False, False])
         assert ears.command.sent_torque_Nm.tolist() == [0.0, 0.0]
 
 
@@ -203,7 +204,7 @@ def test_without_a_master_a_cycle_ends_soon_and_says_so(stage: Stage) -> None:
             assert cycle(ears) == 0
         assert time.monotonic() - begin > 0.1
         assert ears.feedback.cycle == 0
-        assert (ears.alarm(), ears.missed, ears.silent_s > 0.5) == ("", 0, True)
+        assert (alarm(ears), ears.missed, ears.silent_s > 0.5) == ("", 0, True)
         assert not ears.feedback.valid[0]
         begin = time.monotonic()
         stage.says(0x080)
@@ -221,12 +222,12 @@ def test_silence_of_a_drive_is_an_alarm_until_the_master_begins_anew(
     monkeypatch.setattr("cdpr_drivers.axes.listening._LOCKSTEP_ANSWER_S", 0.01)
     with device([stage], [[1, 2]]) as ears:
         for _ in range(3):
-            assert ears.alarm() == ""
+            assert alarm(ears) == ""
             stage.says(0x080)
             stage.answers(2, 0)
             stage.settle()
             assert cycle(ears) == 1
-        assert "node 1: no answer to SYNC for 3 cycles" in ears.alarm()
+        assert "node 1) has not answered SYNC for 3 cycles" in alarm(ears)
         assert ears.missed == 3
         assert ears.feedback.valid.tolist() == [False, True]
         time.sleep(0.6)
@@ -235,7 +236,7 @@ def test_silence_of_a_drive_is_an_alarm_until_the_master_begins_anew(
         stage.answers(2, 0)
         stage.settle()
         assert cycle(ears) == 2
-        assert ears.alarm() == ""
+        assert alarm(ears) == ""
 
 
 def test_what_the_other_master_does_with_its_drives_is_no_alarm(stage: Stage) -> None:
@@ -246,7 +247,7 @@ def test_what_the_other_master_does_with_its_drives_is_no_alarm(stage: Stage) ->
             stage.says(0x281, struct.pack("<bHi", mode, 0, 0))
             stage.settle()
             assert cycle(ears) == 1
-            assert ears.alarm() == ""
+            assert alarm(ears) == ""
 
 
 def test_an_index_that_the_master_latches_is_known_here_too(stage: Stage) -> None:

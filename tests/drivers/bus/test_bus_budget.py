@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from cdpr_drivers.bus.budget import bare_bits, bus_budget, machine_budget, worst_case_bits
 from cdpr_drivers.errors import ConfigurationError
-from cdpr_drivers.robot.bus_fit import require_fit
+from cdpr_drivers.robot.robot_buses import require_fit
 from cdpr_profiles import load_drive, load_robot, load_winch
 from cdpr_sim_bus.frame import SFF_BITS
 
@@ -78,24 +78,6 @@ def test_the_bound_is_attained_by_bits_of_ones_own_choice(n: int):
     m = 34 + 8 * n
     worst = [0] + [(k // 4) % 2 for k in range(m - 1)]
     assert bare_bits(n) + stuff_bits(worst) == worst_case_bits(n)
-
-
-def worst_data(identifier: int, n: int) -> bytes:
-    """Return the data in which every bit repeats the one on the wire before it."""
-    sent = [0, *bits_of(identifier, 11), 0, 0, 0, *bits_of(n, 4)]
-    chosen: list[int] = []
-    for _ in range(8 * n):
-        stuffed = stuff_bits(sent + chosen) > stuff_bits((sent + chosen)[:-1])
-        chosen.append(1 - (sent + chosen)[-1] if stuffed else (sent + chosen)[-1])
-    text = "".join(map(str, chosen)) or "0"
-    return int(text, 2).to_bytes(n, "big")
-
-
-@pytest.mark.parametrize("n", range(9))
-def test_frames_come_near_the_bound(n: int):
-    """Length code, reserved bits and CRC are not free: real frames end a few bits below."""
-    longest = max(on_the_wire(i, worst_data(i, n)) for i in range(0, 0x800, 5))
-    assert worst_case_bits(n) - 4 <= longest <= worst_case_bits(n)
 
 
 def test_the_figures_are_those_of_the_simulated_bus():

@@ -13,13 +13,13 @@ import pytest
 from fork_server import FORKED
 
 from cdpr_drivers.bus import BusUrl
-from cdpr_drivers.bus.master_lock import MasterLock, refuse_second_master
+from cdpr_drivers.bus.url import MasterLock, refuse_second_master
 from cdpr_drivers.errors import BusError
 
 HOLDER = """
 import sys
 from cdpr_drivers.bus import BusUrl
-from cdpr_drivers.bus.master_lock import MasterLock
+from cdpr_drivers.bus.url import MasterLock
 lock = MasterLock(BusUrl.parse(sys.argv[1]))
 print(flush=True)
 sys.stdin.read()

@@ -11,9 +11,6 @@ from typing import Any
 import can
 import pytest
 
-from cdpr_drivers.bus import BusUrl, open_python_can
-from cdpr_drivers.errors import BusError
-
 
 def message(can_id: int, data: bytes = b"") -> can.Message:
     return can.Message(arbitration_id=can_id, data=data, is_extended_id=can_id > 0x7FF)
@@ -65,21 +62,6 @@ def test_filters_are_applied_and_can_change(simulator: Any) -> None:
         assert got.is_extended_id
 
 
-def test_notifier_and_periodic_sending(simulator: Any) -> None:
-    with (
-        can.Bus(interface="simbus", channel=simulator.name) as bus,
-        can.Bus(interface="simbus", channel=simulator.name) as master,
-    ):
-        reader = can.BufferedReader()
-        notifier = can.Notifier(bus, [reader])
-        task = master.send_periodic(message(0x80), 0.005)
-        seen = [reader.get_message(60.0) for _ in range(30)]
-        task.stop()
-        notifier.stop()
-    ids = [entry.arbitration_id for entry in seen if entry]
-    assert ids == [0x80, 0x181, 0x281] * 10
-
-
 def test_the_stock_logger_in_another_process(simulator: Any) -> None:
     command = [sys.executable, "-u", "-m", "can.logger", "-i", "simbus", "-c", simulator.name]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as logger:
@@ -129,17 +111,3 @@ def test_running_buses_are_found(simulator: Any) -> None:
 def test_no_bus_is_one_clear_error() -> None:
     with pytest.raises(can.CanInitializationError, match="simbus:nobody-home"):
         can.Bus(interface="simbus", channel="nobody-home")
-    with pytest.raises(BusError, match="no simulated bus of that name"):
-        open_python_can(BusUrl.parse("simbus:nobody-home"))
-
-
-def test_opened_by_url_with_filters(simulator: Any) -> None:
-    url = BusUrl.parse(f"simbus:{simulator.name}")
-    bus = open_python_can(url, [(0x280, 0x780)])
-    with open_python_can(url) as other:
-        time.sleep(0.05)
-        other.send(message(0x80))
-        got = bus.recv(60.0)
-        assert got is not None
-        assert got.arbitration_id == 0x281
-    bus.shutdown()

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 import pytest
 
 from cdpr_drivers.bus.frames import FRAME, Batch, FrameBuffer
-from cdpr_drivers.bus.simulated_bus import LedPort, SimulatedBus
+from cdpr_drivers.bus.simbus import LedPort, SimulatedBus
 from cdpr_drivers.bus.url import BusUrl
 from cdpr_drivers.errors import BusError
 

@@ -13,7 +13,7 @@ from contextlib import ExitStack, closing
 import pytest
 
 from cdpr_drivers.bus import BusUrl, query_status
-from cdpr_drivers.bus.simulated_bus import SimulatedBusClock, open_clock
+from cdpr_drivers.bus.simbus import SimulatedBusClock, open_clock
 from cdpr_drivers.canopen.network import CanNetwork
 from cdpr_drivers.errors import BusError, SdoTimeoutError
 from cdpr_rt.core.clock import LockstepClock, PacedClock
@@ -29,6 +29,7 @@ from tests.drivers.axis_rig import (
     start_simulator,
 )
 from tests.drivers.bus_log import BusLog, logged
+from tests.fault_texts import alarm
 
 NODES = [1, 2]
 Process = subprocess.Popen[bytes]
@@ -163,6 +164,26 @@ def test_a_killed_simulator_ends_what_waits_and_time_goes_on(while_waiting: bool
         simulator.stop()
 
 
+def test_time_does_not_go_back_when_the_bus_dies_between_two_cycles() -> None:
+    simulator = start_simulator()
+    try:
+        with open_network(simulator.bus, [1]) as network:
+            rig = Rig(simulator.bus, network, DRIVE, [1])
+            rig.enable()
+            for _ in range(100):
+                rig.cycle()
+            before_s = network.clock.now_s
+            simulator.process.kill()
+            simulator.process.wait()
+            with pytest.raises(BusError, match="gone away"):
+                rig.cycle()
+            assert network.clock.now_s >= before_s
+            network.clock.sleep(1.0)
+            assert network.clock.now_s >= before_s + 1.0
+    finally:
+        simulator.stop()
+
+
 def test_a_bus_that_comes_back_is_led_again_and_time_goes_on() -> None:
     simulator = start_simulator()
     url = BusUrl.parse(simulator.bus)
@@ -195,7 +216,7 @@ def test_a_cycle_is_a_period_where_the_drives_have_forgotten_it(bus: str) -> Non
         for _ in range(100):
             rig.cycle()
         assert network.clock.now_s - begin_s == pytest.approx(100 * PERIOD_S)
-        assert "restarted" in rig.group.alarm()
+        assert "restarted" in alarm(rig.group)
         rig.group.close()
 
 

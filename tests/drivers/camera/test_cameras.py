@@ -14,14 +14,13 @@ import cv2
 import numpy as np
 import pytest
 
-from cdpr_drivers.camera.camera import CameraError, grey
-from cdpr_drivers.camera.open_camera import open_camera
+from cdpr_drivers.camera.camera import CameraError, grey, open_camera
 from cdpr_drivers.camera.opencv_camera import OpencvCamera
 from cdpr_rt.core.clock import LockstepClock
-from cdpr_sim_bus.camera.camera_plant import CameraFaultPlant, CameraPlant, LensPlant
 from cdpr_sim_bus.camera.camera_server import CameraServer
 from cdpr_sim_bus.camera.sim_camera import SimCamera
 from cdpr_sim_bus.physics_board import PhysicsBoard, PlatformState
+from cdpr_sim_bus.robot.camera_plant import CameraFaultPlant, CameraPlant, LensPlant
 
 TINY = CameraPlant(
     samples=4,

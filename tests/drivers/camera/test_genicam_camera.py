@@ -17,8 +17,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from cdpr_drivers.camera.camera import Camera, CameraError
-from cdpr_drivers.camera.open_camera import open_camera
+from cdpr_drivers.camera.camera import Camera, CameraError, open_camera
 from cdpr_rt.core.clock import LockstepClock
 
 RED, GREEN, BLUE = 200, 100, 20

@@ -9,6 +9,7 @@ import pytest
 from cdpr_drivers.canopen.network import CanNetwork
 from cdpr_drivers.errors import BusError, SdoError
 from tests.drivers.axis_rig import Rig, open_network, start_simulator
+from tests.fault_texts import alarm
 
 
 @pytest.fixture
@@ -76,7 +77,7 @@ def test_several_tasks_may_use_it_at_once(rig: Rig) -> None:
         rig.cycle()
         rig.network.clock.run_tasks()
     assert all(task.result() for task in tasks)
-    assert rig.group.alarm() == ""
+    assert alarm(rig.group) == ""
 
 
 def test_emergencies_between_cycles_are_kept_and_raise_the_alarm(rig: Rig) -> None:

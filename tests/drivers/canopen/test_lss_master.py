@@ -15,7 +15,7 @@ import canopen
 import pytest
 
 from cdpr_drivers.bus import BusUrl
-from cdpr_drivers.bus.simulated_bus import open_clock
+from cdpr_drivers.bus.simbus import open_clock
 from cdpr_drivers.canopen.lss import UNCONFIGURED, LssAddress, LssError, LssMaster
 from cdpr_drivers.errors import BusError, SdoAbortError, SdoTimeoutError
 from cdpr_profiles import load_drive
@@ -34,7 +34,7 @@ TIMEOUT_S = 0.02
 @pytest.fixture(autouse=True)
 def quick(monkeypatch: pytest.MonkeyPatch) -> None:
     """Devices of one process answer together, so that little time has to pass for the last."""
-    monkeypatch.setattr("cdpr_drivers.canopen.lss_link._SETTLE_S", 0.001)
+    monkeypatch.setattr("cdpr_drivers.canopen.lss._SETTLE_S", 0.001)
 
 
 def device(
@@ -195,7 +195,7 @@ def test_the_only_device_needs_no_name_and_two_are_refused() -> None:
         assert master.select_only() == (address(1), 4)
     with (
         master_of(device(1, 4), device(2)) as master,
-        pytest.raises(LssError, match="2 devices answer at once"),
+        pytest.raises(LssError, match="2 devices answer: connect"),
     ):
         master.select_only()
 

@@ -16,6 +16,7 @@ import pytest
 from cdpr_drivers.errors import BusError
 from tests.drivers.axis_rig import DRIVE, Rig, open_network
 from tests.drivers.bus_log import logged
+from tests.fault_texts import alarm
 
 pytestmark = pytest.mark.alone
 
@@ -76,7 +77,7 @@ def test_a_missing_answer_is_bridged_and_told_as_data(rig: Rig) -> None:
     cycles.run(10)
     rig.misbehave(DROP, 1, node=2)
     cycles.run(10)
-    assert rig.group.alarm() == ""
+    assert alarm(rig.group) == ""
     missing = cycles.valid.index(False, 10)
     assert not cycles.rate_ok[missing]
     assert rig.group.missed >= 1
@@ -88,7 +89,7 @@ def test_an_answer_that_is_a_cycle_late_is_not_taken_for_the_next_one(rig: Rig) 
     rig.misbehave(DELAY, 1, node=2)
     with logged(rig.bus) as log:
         cycles.run(30)
-    assert rig.group.alarm() == ""
+    assert alarm(rig.group) == ""
     assert False in cycles.valid[10:]
     # it came together with the next cycle's own, which was decoded last
     assert rig.group.repeated >= 1

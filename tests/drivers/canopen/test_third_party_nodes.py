@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator
 import canopen
 import pytest
 
-from cdpr_drivers.canopen.boot.boot import boot
+from cdpr_drivers.canopen.boot import boot
 from cdpr_drivers.canopen.network import CanNetwork
 from cdpr_drivers.errors import BootError, SdoAbortError, SdoTimeoutError
 from tests.drivers.axis_rig import DRIVE, SETTINGS, dictionary, open_network
@@ -30,8 +30,8 @@ def network(simulated_bus: str) -> Iterator[CanNetwork]:
 @pytest.fixture
 def stock(simulated_bus: str, monkeypatch: pytest.MonkeyPatch) -> Iterator[canopen.LocalNode]:
     # by the wall clock: a slave in this process may have to wait for a core
-    monkeypatch.setattr("cdpr_drivers.canopen.boot.boot._BOOT_UP_TIMEOUT_S", 60.0)
-    monkeypatch.setattr("cdpr_drivers.canopen.sdo_access._TIMEOUT_S", 60.0)
+    monkeypatch.setattr("cdpr_drivers.canopen.boot._BOOT_UP_TIMEOUT_S", 60.0)
+    monkeypatch.setattr("cdpr_drivers.canopen.network.TIMEOUT_S", 60.0)
     third_party = canopen.Network()
     third_party.NOTIFIER_CYCLE = 0.02
     third_party.connect(interface="simbus", channel=simulated_bus[7:])
@@ -157,12 +157,12 @@ def test_a_transfer_that_goes_wrong_ends_with_a_reason(
 ) -> None:
     monkeypatch.setattr("cdpr_drivers.canopen.sdo._MOST_BYTES", 700)
     waits = kind is SdoTimeoutError
-    monkeypatch.setattr("cdpr_drivers.canopen.sdo_access._TIMEOUT_S", 1.0 if waits else 60.0)
+    monkeypatch.setattr("cdpr_drivers.canopen.network.TIMEOUT_S", 1.0 if waits else 60.0)
     with scripted(simulated_bus, FOREIGN_NODE, answer) as node:
         with pytest.raises(kind) as caught:
             network.read_bytes(FOREIGN_NODE, 0x1008)
         assert told in str(caught.value)
-        monkeypatch.setattr("cdpr_drivers.canopen.sdo_access._TIMEOUT_S", 60.0)
+        monkeypatch.setattr("cdpr_drivers.canopen.network.TIMEOUT_S", 60.0)
         node.answer = lambda request: [expedited(request, 4711)]
         assert network.read_int(FOREIGN_NODE, 0x1000) == 4711
 

@@ -271,7 +271,7 @@ def test_layer_setting(third_party: tuple[canopen.Network, can.BusABC]) -> None:
         "-> store the configuration",
         "-> tell your node id",
         "-> tell your vendor",
-        "-> fast scan: start anew",
+        "-> fast scan: start again",
     ]
     assert decoded(0x7E4, "5A 019ACD00 000000").text == "<- vendor is 00CD9A01h"
     assert decoded(0x7E4, "11 00 00 0000000000").text == "<- node id: done"
@@ -286,7 +286,11 @@ def test_layer_setting(third_party: tuple[canopen.Network, can.BusABC]) -> None:
         (0x040, "", "bus-off"),
         (0x004, "0030", "controller: receive error-passive, transmit error-passive"),
         (0x204, "0008000000006000", "controller: transmit warning; error counters: transmit 96"),
-        (0x00C, "00010400", "controller: receive overflow; protocol violation: stuffing"),
+        (
+            0x00C,
+            "00010400",
+            "controller: receive overflow, frames lost; protocol violation: stuffing",
+        ),
         (0x020, "", "no acknowledge"),
     ],
 )

@@ -118,7 +118,7 @@ def test_transfers_in_words(client: canopen.RemoteNode, overhear: Overhear) -> N
     assert "-> write 6072h Max torque = 1.5000 Nm" in told
     assert "<- 1018h:2 Identity object: Product code = 00000402h" in told
     assert "<- 1008h Manufacturer device name = 'Generic CiA 402 torque servo'" in told
-    assert told[-1] == "<- abort 5FFFh:3: Object does not exist (06020000h)"
+    assert told[-1] == "<- abort 5FFFh:3: object does not exist (06020000h)"
 
 
 def test_an_abort_is_marked(client: canopen.RemoteNode, overhear: Overhear) -> None:
@@ -128,7 +128,7 @@ def test_an_abort_is_marked(client: canopen.RemoteNode, overhear: Overhear) -> N
     asked, refused = texts(overhear())
     assert not asked.problem
     assert refused.problem
-    assert "Attempt to write a read only object (06010002h)" in refused.text
+    assert "attempt to write a read only object (06010002h)" in refused.text
 
 
 def test_a_missed_segment_gives_no_wrong_value(

@@ -14,8 +14,8 @@ from typing import Any
 
 from pymodbus.client import ModbusTcpClient
 
-from cdpr_profiles.devices.safety_io import SafetyIoProfile, load_safety_io
-from cdpr_profiles.reading.places import SHIPPED
+from cdpr_profiles.places import SHIPPED
+from cdpr_profiles.safety_io import SafetyIoProfile, load_safety_io
 from cdpr_rt.core.clock import PacedClock
 from cdpr_sim_bus.devices.sim_safety_io import SafetyIoFault
 from cdpr_sim_bus.physics_board import PhysicsBoard

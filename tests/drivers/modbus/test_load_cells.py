@@ -11,12 +11,11 @@ import numpy as np
 import pytest
 import serial
 
-from cdpr_drivers.modbus.line import LineError
-from cdpr_drivers.modbus.tcp import ModbusError
+from cdpr_drivers.modbus.channel import LineError, ModbusError
 from cdpr_drivers.modbus.tension import LoadCells, TensionSampler, raw_value
-from cdpr_profiles.devices.tension_sensor import TensionSensors, ValueMap, load_tension_sensors
+from cdpr_profiles.tension_sensor import TensionSensors, ValueMap, load_tension_sensors
 from cdpr_rt.core.clock import PacedClock
-from cdpr_rt.core.tension_feedback import TensionFault
+from cdpr_rt.core.exchange import TensionFault
 from tests.drivers.modbus.load_cell_rig import LoadCellRig
 
 # amplifiers answer within 0.05 s of wall time, from a process of their own

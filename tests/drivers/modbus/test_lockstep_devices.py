@@ -22,11 +22,10 @@ import pytest
 
 from cdpr_drivers.modbus.safety_io import SafetyIo, SafetyIoError
 from cdpr_drivers.modbus.tension import TensionSampler
-from cdpr_drivers.rails.rail import MoveConditions, move
-from cdpr_drivers.rails.rail_modbus import ModbusRailAxis
-from cdpr_profiles.devices.rail import load_rail
-from cdpr_profiles.devices.tension_sensor import load_tension_sensors
-from cdpr_profiles.reading.places import SHIPPED
+from cdpr_drivers.rails.rail import ModbusRailAxis, MoveConditions, move
+from cdpr_profiles.places import SHIPPED
+from cdpr_profiles.rail import load_rail
+from cdpr_profiles.tension_sensor import load_tension_sensors
 from cdpr_rt.core.clock import LockstepClock
 from cdpr_sim_bus.devices.sim_safety_io import SafetyIoFault
 from cdpr_sim_bus.physics_board import BoardAxis, PhysicsBoard

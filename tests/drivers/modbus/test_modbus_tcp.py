@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator
 
 import pytest
 
-from cdpr_drivers.modbus.tcp import ModbusError, ModbusTcp
+from cdpr_drivers.modbus.channel import ModbusError, ModbusTcp
 from cdpr_rt.core.clock import PacedClock
 
 Answer = Callable[[bytes], bytes]

@@ -11,11 +11,10 @@ from pathlib import Path
 
 import pytest
 
-from cdpr_drivers.modbus.io_link import IoLink
-from cdpr_drivers.modbus.safety_io import SafetyIo, SafetyIoError
-from cdpr_drivers.modbus.tcp import ModbusError
+from cdpr_drivers.modbus.channel import ModbusError
+from cdpr_drivers.modbus.safety_io import IoLink, SafetyIo, SafetyIoError
 from cdpr_drivers.robot.safety import trip_file
-from cdpr_profiles.devices.safety_io import SafetyIoProfile
+from cdpr_profiles.safety_io import SafetyIoProfile
 from cdpr_sim_bus.devices.sim_safety_io import SafetyIoFault
 from cdpr_sim_bus.physics_board import BoardAxis, PhysicsBoard
 from tests.drivers.modbus.safety_rig import CLOCK, SafetyIoProcess, io_device_on_board, wait_until

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from cdpr_drivers.canopen.boot.boot import BootReport
+from cdpr_drivers.canopen.boot import BootReport
 from cdpr_drivers.errors import ConfigurationError
 from cdpr_drivers.robot.commissioned import (
     check_drive_identities,
@@ -119,6 +119,6 @@ def test_a_calibration_of_a_winch_with_another_drive_is_refused(
     drive = robot.axes[0].winch.drive
     report = BootReport(node_id=1, vendor_id=drive.vendor_id, serial=booted)
     axes = (replace(robot.axes[0], calibration=calibration()), *robot.axes[1:])
-    told = r"axes\[0\]\.calibration: .*serial 1, that of axis upper left has 77; calibrate it anew"
+    told = r"axes\[0\]\.calibration: .*serial 1, that of axis upper left has 77; calibrate it again"
     with pytest.raises(ConfigurationError, match=told) if refused else nullcontext():
         check_drive_identities(replace(robot, axes=axes), (None,) * 3, [report])

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from cdpr_sim_bus.bus.switch import BusLoad
+from cdpr_sim_bus.bus.client import BusLoad
 from cdpr_sim_bus.clock import HOLD_S, BusClock, ClockMode
 from cdpr_sim_bus.frame import LONGEST_FRAME_BITS, pack_frame
 

@@ -11,8 +11,8 @@ from collections.abc import Callable
 from typing import Any
 
 from cdpr_sim_bus.bus.hub import Hub
+from cdpr_sim_bus.bus.server import Fleet
 from cdpr_sim_bus.clock import HOLD_S, ClockMode
-from cdpr_sim_bus.fleet import Fleet
 from cdpr_sim_bus.frame import pack_frame
 
 StartBus = Callable[..., Any]

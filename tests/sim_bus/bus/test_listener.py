@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 
-from cdpr_drivers.bus.adapters import simbus_socket
+from cdpr_drivers.bus import query_status
 from cdpr_drivers.errors import BusError
 
 NOBODY = 65534
@@ -27,7 +27,7 @@ def join_as_nobody(name: str) -> str:
         try:
             if os.geteuid() == 0:
                 os.setresuid(NOBODY, NOBODY, NOBODY)
-            simbus_socket.query_status(name)
+            query_status(name)
         except BusError as error:
             told = str(error)
         finally:

@@ -9,7 +9,11 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from cdpr_sim_bus.camera.camera_plant import (
+from cdpr_sim_bus.camera.scene import build_scene
+from cdpr_sim_bus.camera.sim_camera import SimCamera, ray_table, seen_at
+from cdpr_sim_bus.errors import SimulatorError
+from cdpr_sim_bus.physics_board import PlatformState
+from cdpr_sim_bus.robot.camera_plant import (
     CameraPlant,
     LensPlant,
     MarkerPlant,
@@ -18,10 +22,6 @@ from cdpr_sim_bus.camera.camera_plant import (
     PrintPlant,
     SensorPlant,
 )
-from cdpr_sim_bus.camera.scene import build_scene
-from cdpr_sim_bus.camera.sim_camera import SimCamera, ray_table, seen_at
-from cdpr_sim_bus.errors import SimulatorError
-from cdpr_sim_bus.physics_board import PlatformState
 
 LENS = LensPlant(
     width_px=320, height_px=256, focal_px=(280.0, 282.0), centre_px=(158.0, 130.0), blur_px=0.5

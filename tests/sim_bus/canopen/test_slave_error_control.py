@@ -7,7 +7,7 @@ import struct
 import canopen
 import pytest
 
-from cdpr_sim_bus.canopen import NmtState, SlaveApplication
+from cdpr_sim_bus.canopen import NmtState
 from tests.sim_bus.canopen.slave_bench import MASTER, NODE, RTR, Bench
 
 HEARTBEAT = 0x700 + NODE
@@ -235,13 +235,3 @@ def test_application_survives_a_reset_with_its_errors_cleared(bench: Bench) -> N
     assert bench.od.get(0x1001) == 0x81
     bench.nmt(129)
     assert (bench.od.get(0x1001), bench.od.get(0x1003)) == (0, 0)
-
-
-def test_default_application_needs_no_method_of_its_own() -> None:
-    bench = Bench(app=SlaveApplication()).boot().start()
-    watch_master(bench, 50)
-    beat(bench)
-    bench.sync()
-    bench.run_to(1.0)
-    bench.nmt(129)
-    assert bench.sdo(SDO_READ_1000)[0] == 0x43

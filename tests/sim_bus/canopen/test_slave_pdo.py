@@ -310,35 +310,6 @@ def test_sync_identifier_can_be_moved(running: Bench) -> None:
     assert 0x80 not in running.slave.accepts
 
 
-def test_a_third_partys_remapping_reaches_the_slave(bench: Bench) -> None:
-    remote = bench.remote
-    remote.tpdo.read()
-    remote.rpdo.read()
-    assert [v.index for v in remote.tpdo[1]] == [0x6041, 0x6064, 0x6077]
-    tpdo = remote.tpdo[3]
-    tpdo.clear()
-    tpdo.add_variable(0x6061)
-    tpdo.add_variable(0x6041)
-    tpdo.trans_type = 1
-    tpdo.enabled = True
-    tpdo.save()
-    rpdo = remote.rpdo[2]
-    rpdo.clear()
-    rpdo.add_variable(0x60FF)
-    rpdo.trans_type = 1
-    rpdo.enabled = True
-    rpdo.save()
-    bench.od.set(0x6061, 0, 9)
-    bench.od.set(0x6041, 0, 0x237)
-    bench.start()
-    rpdo[0x60FF].raw = -1234
-    rpdo.transmit()
-    remote.network.sync.transmit()
-    assert remote.tpdo[3][0x6041].raw == 0x237
-    assert remote.tpdo[3][0x6061].raw == 9
-    assert bench.od.get(0x60FF) == -1234
-
-
 NUMBERS = {
     0x6040: "H",
     0x6060: "b",

@@ -7,7 +7,6 @@ import sys
 from types import FrameType
 from typing import Any
 
-import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -104,11 +103,3 @@ def test_cost_of_a_sync_stays_small() -> None:
     finally:
         sys.settrace(before)
     assert 0 < lines < 300 * cycles
-
-
-@pytest.mark.parametrize("node_id", [1, 127])
-def test_node_ids_at_the_ends_of_the_range(node_id: int) -> None:
-    bench = Bench(node_id=node_id)
-    bench.slave.advance(0.0)
-    assert bench.take() == [(0x700 + node_id, b"\0")]
-    assert bench.read(0x1400, 1) == (0x200 + node_id).to_bytes(4, "little")

@@ -73,6 +73,14 @@ def test_storage_that_fails_is_a_hardware_error(tmp_path: Path) -> None:
     assert caught.value.code == 0x06060000
 
 
+def test_storing_leaves_the_other_files_of_the_folder_alone(tmp_path: Path) -> None:
+    path, other = tmp_path / "drive.json", tmp_path / "drive.json.part"
+    other.write_text("of the user")
+    power_cycle(path).write(0x1010, 1, b"save")
+    assert other.read_text() == "of the user"
+    assert sorted(tmp_path.iterdir()) == [path, other]
+
+
 @pytest.mark.parametrize(
     "content",
     ["", "[]", "{}", '{"values": {"zz": 1}, "node_id": 1, "bitrate": 1}', '{"values": 3}'],

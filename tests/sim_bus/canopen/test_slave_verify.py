@@ -50,12 +50,6 @@ def test_a_refused_write_changes_nothing(bench: Bench) -> None:
     assert _stamp(bench) == (15000, 1234567)
 
 
-def test_segmented_downloads_count_too(odd_bench: Bench) -> None:
-    _write_stamp(odd_bench)
-    odd_bench.write(0x2F10, 0, b"any bytes, more than four")
-    assert _stamp(odd_bench) == (0, 0)
-
-
 def test_it_is_stored_and_restored_with_the_parameters(bench: Bench) -> None:
     bench.write(0x1017, 0, struct.pack("<H", 100))
     _write_stamp(bench)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 
+from cdpr_sim_bus.robot.plant import Plant
 from tests.sim_bus.cia402.drive_rig import NODE, Rig, SdoRefusedError
 
 SOD, RTSO, SO, OE, QSA, FRA, FAULT = 0x40, 0x21, 0x23, 0x27, 0x07, 0x0F, 0x08
@@ -196,48 +197,6 @@ class TestModes:
 
 
 class TestMisbehaviour:
-    def test_refuses_or_ignores_modes(self, rig: Rig) -> None:
-        rig.write(0x2F00, 1, 3)
-        with pytest.raises(SdoRefusedError):
-            rig.write(0x6060, 10)
-        rig.write(0x2F00, 2, 3)
-        rig.write(0x6060, 10)
-        rig.run(0.1)
-        assert rig.read(0x6061) == 0
-        rig.write(0x2F00, 0, 3)
-        rig.write(0x6060, 10)
-        rig.run(0.1)
-        assert rig.read(0x6061) == 10
-
-    def test_shows_another_mode(self, rig: Rig) -> None:
-        rig.write(0x2F00, 8, 4)
-        rig.write(0x6060, 10)
-        rig.run(0.1)
-        assert rig.read(0x6061) == 8
-
-    def test_drops_tpdos(self, rig: Rig) -> None:
-        rig.enable(10)
-        rig.write(0x2F00, 3, 2)
-        answers = [any(cob == 0x180 + NODE for cob, _ in rig.cycle()) for _ in range(6)]
-        assert answers == [False, False, False, True, True, True]
-        assert rig.read(0x2F00, 2) == 0
-
-    def test_mutes_the_heartbeat(self, rig: Rig) -> None:
-        def beats() -> int:
-            heard = 0
-            for _ in range(50):
-                rig.now += 1e-3
-                rig.drive.advance(rig.now)
-                heard += sum(cob == 0x700 + NODE for cob, _ in rig.collect())
-            return heard
-
-        rig.write(0x1017, 10)
-        assert beats() == 5
-        rig.write(0x2F00, 1, 5)
-        assert beats() == 0
-        rig.write(0x2F00, 0, 5)
-        assert beats() == 5
-
     def test_node_reset_ends_it(self, rig: Rig) -> None:
         rig.write(0x2F00, 8, 4)
         rig.write(0x2F00, 2, 3)
@@ -279,6 +238,20 @@ class TestConnection:
         rig.nmt(128)
         assert rig.state == FAULT
 
+    @pytest.mark.parametrize(("drops", "end"), [(False, OE), (True, SOD)])
+    def test_pre_operational_keeps_the_torque_or_drops_the_power(
+        self, drops: bool, end: int
+    ) -> None:
+        rig = Rig(Plant.model_validate({"drive": {"off_when_pre_operational": drops}}))
+        rig.write(0x6007, 2)
+        rig.enable(10)
+        rig.torque = 200
+        rig.cycles(20)
+        rig.nmt(128)
+        rig.run(0.05)
+        assert rig.state == end
+        assert (rig.read(0x6077, signed=True) == 0) == drops
+
     def test_missed_rpdo_deadline(self, rig: Rig) -> None:
         rig.map_pdos()
         rig.nmt(128)
@@ -306,6 +279,36 @@ class TestConnection:
         moved = rig.truth[0]
         assert abs(moved) > 0.1
         assert abs(rig.read(0x6064, signed=True)) < 8192 * 8
+
+    def test_the_error_stands_until_master_is_back_and_fault_is_reset(self, rig: Rig) -> None:
+        lose_master(rig)
+        assert rig.state == FAULT
+        assert rig.emergencies == [(0x8130, 0x11)]
+        rig.send(0x77F, b"\x05")  # the master is back, but the drive is still in fault
+        assert rig.read(0x1001) == 0x11
+        assert rig.emergencies == [(0x8130, 0x11)]
+        rig.write(0x6040, 0x80)
+        rig.run(0.01)
+        assert rig.read(0x1001) == 0
+        assert rig.emergencies == [(0x8130, 0x11), (0, 0)]
+
+    def test_a_reset_fault_leaves_the_error_while_the_master_is_missing(self, rig: Rig) -> None:
+        lose_master(rig)
+        rig.write(0x6040, 0x80)
+        rig.run(0.01)
+        assert (rig.read(0x603F), rig.read(0x1001)) == (0, 0x11)
+        rig.send(0x77F, b"\x05")
+        assert rig.read(0x1001) == 0
+        assert rig.emergencies[-1] == (0, 0)
+
+
+def lose_master(rig: Rig) -> None:
+    """Enable the drive, which then misses the heartbeats of its master."""
+    rig.write(0x6007, 1)
+    rig.write(0x1016, 127 << 16 | 50, 1)
+    rig.enable(10)
+    rig.send(0x77F, b"\x05")
+    rig.run(0.2)
 
 
 class TestFixedObjects:

@@ -133,29 +133,6 @@ def test_boots_enables_homes_faults_and_resets(node: BaseNode402) -> None:
     node.state = "SWITCH ON DISABLED"
 
 
-def test_moves_a_profile_position(node: BaseNode402) -> None:
-    node.op_mode = "PROFILED POSITION"
-    node.state = "OPERATION ENABLED"
-    node.sdo[0x607A].raw = 4096
-    node.controlword = 0x1F
-    assert wait_for(lambda: bool(node.statusword & 0x1000))
-    node.controlword = 0x0F
-    assert wait_for(lambda: bool(node.statusword & 0x0400))
-    assert abs(node.tpdo[1][0x6064].raw - 4096) <= 20
-
-
-def test_lost_heartbeat_is_a_fault(node: BaseNode402) -> None:
-    node.sdo[0x1016][1].raw = 127 << 16 | 4000  # 80 times the gap: a busy machine is no fault
-    node.op_mode = "CYCLIC SYNCHRONOUS TORQUE"
-    node.state = "OPERATION ENABLED"
-    for _ in range(10):
-        node.network.send_message(0x77F, b"\x05")
-        time.sleep(0.05)
-    assert node.sdo[0x6041].raw & 0x6F == 0x27
-    assert wait_for(lambda: node.sdo[0x6041].raw & 0x4F == 0x08)
-    assert node.sdo[0x603F].raw == 0x8130
-
-
 def test_serves_a_master_that_changes_no_mapping(node: BaseNode402) -> None:
     """As it is shipped: no PDO is remapped, the library's own set-up is all there is."""
     node.network.sync.stop()

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import math
-import struct
 
 import pytest
 
 from cdpr_sim_bus.robot.plant import Plant
-from tests.sim_bus.cia402.drive_rig import NODE, Rig, SdoRefusedError
+from tests.sim_bus.cia402.drive_rig import Rig, SdoRefusedError
 
 INDEX_DEG = 123.4
 ENABLE, CONTINUOUS, ZERO, POSITIVE, NEGATIVE = 0x01, 0x02, 0x04, 0x10, 0x20
@@ -92,17 +91,6 @@ def test_disabling_clears_the_status(turning: Rig) -> None:
     assert turning.read(0x60B9) == 0
     turn(turning, -6000)
     assert turning.read(0x60B9) == 0
-
-
-def test_event_arrives_by_tpdo(turning: Rig) -> None:
-    turning.write(0x60B8, ENABLE | ZERO | POSITIVE)
-    turning.write(0x60FF, 16_000)
-    events = []
-    for _ in range(600):
-        events += [data for cob, data in turning.cycle() if cob == 0x280 + NODE]
-    decoded = [struct.unpack("<bHi", data) for data in events]
-    assert (9, 0x0003, FIRST) in decoded
-    assert len(decoded) <= 3
 
 
 def test_position_is_that_of_the_dictionary(turning: Rig) -> None:

@@ -11,9 +11,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from cdpr_sim_bus.robot import servo
 from cdpr_sim_bus.robot.cable_robot import CableRobot
-from cdpr_sim_bus.robot.logs.platform_record import RobotShape
 from cdpr_sim_bus.robot.motor_state import MotorRatings, Transmission, build_motor
 from cdpr_sim_bus.robot.plant import Plant
+from cdpr_sim_bus.robot.platform import RobotShape
 from cdpr_sim_bus.robot.robot_plant import RobotPlant
 
 SIDE_m = 0.15

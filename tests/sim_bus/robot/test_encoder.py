@@ -10,7 +10,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from cdpr_sim_bus.robot import motor_physics, servo
+from cdpr_sim_bus.robot import motor as motor_physics
+from cdpr_sim_bus.robot import servo
 from cdpr_sim_bus.robot.motor import Motor
 from cdpr_sim_bus.robot.plant import Plant
 

@@ -7,12 +7,12 @@ from pathlib import Path
 import numpy as np
 
 from cdpr_profiles import load_robot
-from cdpr_profiles.devices.tension_sensor import load_tension_sensors
+from cdpr_profiles.tension_sensor import load_tension_sensors
 from cdpr_sim_bus.cia402.drive import SimDrive, transmission_of
 from cdpr_sim_bus.devices.sim_load_cells import AmplifierPlant, SimAmplifier
 from cdpr_sim_bus.physics_board import PhysicsBoard
 from cdpr_sim_bus.robot.cable_robot import CableRobot
-from cdpr_sim_bus.robot.logs.platform_record import RobotShape
+from cdpr_sim_bus.robot.platform import RobotShape
 from cdpr_sim_bus.robot.robot_plant import RobotPlant
 
 SENSORS = "rtu-load-cells-8"

@@ -9,7 +9,7 @@ import pytest
 from scipy.optimize import brentq
 
 from cdpr_sim_bus.robot import servo
-from cdpr_sim_bus.robot.motor_physics import cable_force
+from cdpr_sim_bus.robot.motor import cable_force
 from tests.sim_bus.robot.body_lab import ANCHORS_m, EXITS_m, body, energy_J, free_length_m, run
 
 ROOM_EXITS_m = [(x, y, z) for z in (0.0, 3.0) for x in (-2.5, 2.5) for y in (-2.0, 2.0)]

@@ -9,8 +9,7 @@ import pytest
 from cdpr_drivers.bus import BusUrl
 from cdpr_drivers.decode import Frame
 from cdpr_profiles import list_profiles, load_robot
-from cdpr_tools.busview.identifiers import filters, parse_identifiers, parse_node_ids
-from cdpr_tools.busview.known import known_bus
+from cdpr_tools.busview.monitor import filters, known_bus, parse_identifiers, parse_node_ids
 from cdpr_tools.errors import BadInputError
 
 ROBOT = list_profiles()["robots"][0]

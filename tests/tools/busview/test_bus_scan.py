@@ -14,7 +14,7 @@ import pytest
 from cdpr_here import cdpr_here
 
 from cdpr_profiles import load_winch
-from cdpr_tools.busview import node_reader
+from cdpr_tools.busview import scan as node_reader
 from cdpr_tools.commands import bus as bus_commands
 from tests.tools.busview.bus_lab import WINCH, Lab, last_json
 

@@ -5,9 +5,11 @@ from __future__ import annotations
 import os
 import re
 import signal
+import struct
 import subprocess
 import sys
 import time
+import zlib
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -108,7 +110,7 @@ def test_monitor_sums_up(session: Session) -> None:
     head, _, *rows = session.errors.splitlines()
     assert re.fullmatch(
         r"\d+ frames in \d+\.\d{3} s of bus time; bus load \d+\.\d % of 1000 kbit/s, stuffed as "
-        r"badly as can be; 0 told of trouble \(marked !\)",
+        r"badly as can be; 0 with a problem \(marked !\)",
         head,
     )
     assert "went by unseen" not in session.errors
@@ -146,6 +148,22 @@ def test_replay_of_a_log_of_python_can(session: Session, tmp_path: Path) -> None
         assert [line[15:] for line in told] == [line[15:] for line in session.lines], name
         times = [[float(line[:12]) for line in lines] for lines in (told, session.lines)]
         assert times[0] == pytest.approx(times[1], abs=1.1e-3), name  # .blf has whole milliseconds
+
+
+@pytest.mark.parametrize("bomb", ["container", "object"])
+def test_a_blf_file_that_unpacks_to_too_much_is_refused(tmp_path: Path, bomb: str) -> None:
+    path, most = tmp_path / "bomb.blf", 1 << 24
+    with can.Logger(path) as logger:
+        logger(can.Message(arbitration_id=0x123, data=b"\x01"))
+    header = path.read_bytes()[:144]
+    # an object that says it is as long as all that follows, or a container of zeros
+    content = struct.pack("<4sHHLL", b"LOBJ", 16, 1, most, 1).ljust(1 << 16)
+    packed = zlib.compress(content if bomb == "object" else bytes(most + 1))
+    container = struct.pack("<H6xL4x", 2, len(content)) + packed
+    start = struct.pack("<4sHHLL", b"LOBJ", 16, 1, 16 + len(container), 10)
+    path.write_bytes(header + start + container)
+    what = "container of more than 16777216" if bomb == "container" else "object of 16777216"
+    assert f"bomb.blf: {what} bytes" in complaint("replay", path)
 
 
 def test_raw_lines_are_a_log_again(session: Session) -> None:

@@ -9,20 +9,16 @@ import pytest
 
 from cdpr_profiles import load_robot
 from cdpr_rt.arrays import FloatArray
-from cdpr_rt.calibration.error_model import (
-    Noise,
-    predicted_errors,
-    predicted_spread,
-    simulated_errors,
-)
 from cdpr_tools.calibrate.study import (
     BOUNDS,
     FIGURES,
     Trials,
-    case_row,
     cases,
     held_poses,
     plateaus,
+    predicted_errors,
+    predicted_spread,
+    simulated_errors,
 )
 
 
@@ -35,7 +31,7 @@ def known(count: int) -> tuple[FloatArray, FloatArray, FloatArray]:
 
 @pytest.mark.parametrize("kind", list(BOUNDS))
 def test_the_error_model_has_the_spread_of_each_parameter(kind: str) -> None:
-    given = *known(100), BOUNDS[kind].scaled(0.5)
+    given = *known(100), 0.5 * BOUNDS[kind]
     rng = np.random.default_rng(3)
     tried = [simulated_errors(*given, rng.normal(size=(100, 14))) for _ in range(1000)]
     root_mean_square = np.sqrt((np.array(tried) ** 2).mean(axis=0))
@@ -45,22 +41,25 @@ def test_the_error_model_has_the_spread_of_each_parameter(kind: str) -> None:
 
 
 @pytest.mark.parametrize(
-    "bias", [Noise(length_m=3e-3), Noise(position_m=3e-3), Noise(rotation_rad=math.radians(0.1))]
+    "bias", [(3e-3, 0.0, 0.0), (0.0, 3e-3, 0.0), (0.0, 0.0, math.radians(0.1))]
 )
-def test_a_bias_is_propagated_to_each_parameter(bias: Noise) -> None:
+def test_a_bias_is_propagated_to_each_parameter(bias: tuple[float, float, float]) -> None:
     unit = np.tile([1.0] * 11 + [0.3, 0.6, 0.7], (100, 1))
-    told, tried = (of(*known(100), bias, unit) for of in (predicted_errors, simulated_errors))
+    told, tried = (
+        of(*known(100), np.array(bias), unit) for of in (predicted_errors, simulated_errors)
+    )
     # what is left of a turn is of second order
     np.testing.assert_allclose(tried, told, atol=0.02 * float(np.abs(told).max()))
-    if not bias.rotation_rad:
-        true = np.tile([*[bias.position_m] * 3, -bias.length_m], (8, 1))
+    length_m, position_m, rotation_rad = bias
+    if not rotation_rad:
+        true = np.tile([*[position_m] * 3, -length_m], (8, 1))
         np.testing.assert_allclose(tried, true, atol=1e-9)
 
 
 def test_the_plateau_is_at_some_200_poses_with_the_noise_of_figure_3_8() -> None:
     counted = [case for case in cases() if case.figure in FIGURES and case.poses in (200, 400)]
     given = known(800)
-    rows = [case_row(case, *Trials(case, *given, 60, k).run()) for k, case in enumerate(counted)]
+    rows = [Trials(case, *given, 60, k).run() for k, case in enumerate(counted)]
     lengths_alone, all_kinds = plateaus(rows)
     for key in ("exit_poses", "offset_poses"):
         assert 140.0 < all_kinds[key] < 280.0

@@ -19,8 +19,8 @@ import typer
 from cdpr_here import cdpr_here
 from typer.core import TyperArgument
 
-from cdpr_profiles.reading.places import KINDS
-from cdpr_tools.cli import app
+from cdpr_profiles.places import KINDS
+from cdpr_tools.cli import ALIASES, MODULES, PANELS, app
 from tests.tools.commands.cli_rig import OWN, WINCH, cdpr, done, refused
 
 
@@ -45,29 +45,38 @@ def lab() -> Iterator[str]:
 # -- what needs no bus
 
 
-def test_help_names_every_command() -> None:
+def test_help_sorts_every_command_but_bench_under_a_heading() -> None:
     result = cdpr("--help")
     assert result.returncode == 0
-    for name in ("bench", "bus", "cogging", "commission", "doctor", "drive", "profiles", "sim"):
-        assert re.search(rf"^│ {name} ", result.stdout, re.MULTILINE), name
+    shown = [name for names in PANELS.values() for name in names]
+    assert sorted([*shown, "bench"]) == sorted(name for some in MODULES.values() for name in some)
+    assert re.findall(r"^│ ([a-z][a-z-]*) ", result.stdout, re.MULTILINE) == shown
 
 
 @pytest.mark.parametrize(
-    ("command", "told"),
+    ("typed", "answer"),
     [
-        (("commission",), ("--plant", "--out", "--bandwidth-hz", "--quick", "--yes", "--json")),
-        (("cogging",), ("sweep", "fit", "validate", "report")),
-        (("drive",), ("info", "enable", "home", "jog", "od")),
-        (("sim", "up"), ("--lockstep", "--paced", "--plant")),
-        (("doctor",), ("--json",)),
+        ("robt", "Did you mean 'robot'?"),
+        ("hld", "No such command 'hld'. "),
+        ("enabel", "No such command 'enabel'. "),
+        ("mov", "No such command 'mov'. "),
+        ("calibrat", "No such command 'calibrat'. "),
     ],
-    ids=lambda value: " ".join(value) if isinstance(value, tuple) else value,
 )
-def test_help_of_a_command(command: tuple[str, ...], told: tuple[str, ...]) -> None:
-    result = cdpr_here(*command, "--help")
-    assert result.returncode == 0
-    for word in told:
-        assert word in result.stdout
+def test_a_typo_never_leads_to_a_command_that_moves_or_switches_power(
+    typed: str, answer: str
+) -> None:
+    result = cdpr_here(typed)
+    assert result.returncode == 2
+    assert answer in result.stderr
+    assert "Did you mean" not in result.stderr or "Did you mean" in answer
+
+
+@pytest.mark.parametrize("alias", ALIASES)
+def test_an_alias_is_the_command_itself(alias: str) -> None:
+    told = cdpr_here(alias, "--help")
+    assert told.returncode == 0
+    assert f"cdpr {ALIASES[alias]} [" in told.stdout
 
 
 def _commands(group: Any, words: tuple[str, ...] = ()) -> Iterator[tuple[str, Any]]:
@@ -213,7 +222,9 @@ def test_ctrl_c_over_and_over_takes_the_power_at_once_and_is_confirmed(lab: str)
             assert process.poll() is None
     assert process.stderr is not None
     process.send_signal(signal.SIGINT)
-    while "a second Ctrl-C takes the power at once" not in (line := process.stderr.readline()):
+    while "press Ctrl-C again to remove the power immediately" not in (
+        line := process.stderr.readline()
+    ):
         assert line
     for _ in range(10):  # as somebody does who is afraid
         process.send_signal(signal.SIGINT)

@@ -18,11 +18,10 @@ from unittest import mock
 import can
 import canopen
 import pytest
-import typer
 
 from cdpr_drivers.errors import DriverError
 from cdpr_profiles import ProfileError, load_drive
-from cdpr_tools.commands.drive.group import app
+from cdpr_tools.command_group import load
 from cdpr_tools.errors import CommandError
 
 WINCH = "winch-mpp0923d"
@@ -34,7 +33,7 @@ TYPE = ("--profile", "generic-cia402")
 @pytest.fixture(autouse=True)
 def quick(monkeypatch: pytest.MonkeyPatch) -> None:
     """Devices of one process answer together, so that little time has to pass for the last."""
-    monkeypatch.setattr("cdpr_drivers.canopen.lss_link._SETTLE_S", 0.001)
+    monkeypatch.setattr("cdpr_drivers.canopen.lss._SETTLE_S", 0.001)
 
 
 @contextmanager
@@ -55,7 +54,7 @@ def simulator(*options: str | Path) -> Iterator[str]:
         process.communicate(timeout=120)
 
 
-COMMAND = typer.main.get_command(app)
+COMMAND = load("groups", "drive")
 
 
 def lss(bus: str, *arguments: str) -> tuple[int, str, str]:

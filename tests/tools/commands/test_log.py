@@ -2,7 +2,6 @@
 
 import json
 import shutil
-import time
 from pathlib import Path
 from typing import Any
 
@@ -11,18 +10,19 @@ import pyarrow.csv
 import pyarrow.parquet
 import pytest
 from cdpr_here import cdpr_here
+from matplotlib.figure import Figure
 from matplotlib.image import imread
 
-from cdpr_profiles.limits.robot_limits import Limit
+from cdpr_profiles.calibration.geometry import write_text
 from cdpr_rt.core.cycle_row import Row
 from cdpr_rt.core.shared_block import RowWriter
 from cdpr_rt.core.states import LoopState, Reaction
-from cdpr_rt.service.recordings.recording import Recorder
-from cdpr_tools.recordings.picture import FIELDS, faults_of, pose_curves, shades
-from cdpr_tools.recordings.selection import Selection
-from cdpr_tools.recordings.summary import Reasons, _chosen, worth_telling
-from cdpr_tools.report.style import decimated
-from tests.cdpr_rt.service.recordings.recording_rig import block_with_clock, made_rows, put
+from cdpr_rt.service.recording import Recorder
+from cdpr_tools.recordings.picture import pose_curves, recorded_stretches, shades
+from cdpr_tools.report.save import save
+from cdpr_tools.report.style import save_figure
+from tests.cdpr_rt.service.recording_rig import block_with_clock, made_rows, put
+from tests.tools.recordings.made_recording import record
 
 
 def _log(*arguments: str | Path) -> tuple[int, str, str]:
@@ -101,6 +101,23 @@ def test_exports_are_the_rows_that_were_written(folder: Path, tmp_path: Path) ->
     assert not list(tmp_path.glob("*.part"))
 
 
+def test_a_file_of_the_user_that_ends_in_part_is_kept(folder: Path, tmp_path: Path) -> None:
+    names = ("some.csv", "page.html", "curve.png", "left.toml")
+    for name in names:
+        (tmp_path / f"{name}.part").write_text("of the user")
+    _done("export", folder, "--out", tmp_path / names[0], "--fields", "cycle")
+    save(tmp_path / names[1], "<!-- cdpr-rt -->")
+    save_figure(Figure(), tmp_path / names[2])
+    write_text(tmp_path / names[3], "a = 1")
+    assert sorted(path.name for path in tmp_path.iterdir()) == sorted(
+        [*names, *(f"{name}.part" for name in names)]
+    )
+    assert all((tmp_path / f"{name}.part").read_text() == "of the user" for name in names)
+    usual = tmp_path / "usual"
+    usual.touch()
+    assert {(tmp_path / name).stat().st_mode for name in names} == {usual.stat().st_mode}
+
+
 def test_export_of_some_fields_and_a_stretch(folder: Path, tmp_path: Path) -> None:
     target = tmp_path / "some.csv"
     arguments = ("--fields", "cycle,tension_N", "--from", "1.9995", "--until", "2.1")
@@ -115,11 +132,7 @@ def test_time_goes_on_where_cycles_begin_anew(tmp_path: Path) -> None:
     # as after a fault that made the drives boot again
     again = made_rows(0, 500)
     again["stamp_ns"] += 2_000_000_000
-    block = block_with_clock()
-    recorder = Recorder(block, tmp_path, "bench", reserve_bytes=0)
-    put(RowWriter(block), np.concatenate([made_rows(0, 500), again]))
-    recorder.start()
-    recorder.stop()
+    record(tmp_path, np.concatenate([made_rows(0, 500), again]))
     target = tmp_path / "both.parquet"
     _done("export", tmp_path, "--out", target, "--fields", "cycle")
     elapsed = pyarrow.parquet.read_table(target)["elapsed_s"].to_numpy()
@@ -142,20 +155,73 @@ def test_plot_draws_a_picture(folder: Path, tmp_path: Path) -> None:
     assert Path(copied).with_suffix(".png").exists()
 
 
-def _recorded(folder: Path, rows: Row, n: int = 2, **described: Any) -> Path:
-    block = block_with_clock(n=n)
-    block.write_description({"robot": "bench", **described})
-    recorder = Recorder(block, folder, "bench")
-    put(RowWriter(block), rows)
-    recorder.start()
-    recorder.stop()
-    return Path(recorder.status()["file"])
+@pytest.fixture
+def three_sessions(folder: Path, tmp_path: Path) -> Path:
+    """A folder with a session of two files between one that is older and one of another robot."""
+    one, two = sorted(folder.iterdir())
+    for name, source in (
+        ("bench-20260101T000000Z-001", two),
+        ("bench-20260102T000000Z-001", one),
+        ("bench-20260102T000000Z-002", two),
+        ("other-20250101T000000Z-001", one),
+    ):
+        shutil.copy(source, tmp_path / f"{name}.mcap")
+    return tmp_path
+
+
+def test_list_names_the_sessions_the_newest_last(three_sessions: Path) -> None:
+    found = _done("list", three_sessions)["sessions"]
+    assert [(one["session"], len(one["files"])) for one in found] == [
+        ("other-20250101T000000Z", 1),
+        ("bench-20260101T000000Z", 1),
+        ("bench-20260102T000000Z", 2),
+    ]
+
+
+def test_list_tells_where_there_are_no_recordings(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
+    status, out, errors = _log("list")
+    assert (status, errors) == (0, "")
+    assert out.strip() == f"no recordings in {tmp_path / 'cdpr-rt' / 'recordings'}"
+    assert _done("list")["sessions"] == []
+    for folder, told in ((tmp_path, "no recordings"), (tmp_path / "absent", "No such file")):
+        status, _, errors = _log("list", folder)
+        assert status == 2
+        assert str(folder) in errors and told in errors and "Traceback" not in errors
+
+
+def test_a_session_is_found_by_the_name_that_list_shows(
+    three_sessions: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    usual = three_sessions / "cdpr-rt" / "recordings"
+    usual.mkdir(parents=True)
+    for path in three_sessions.glob("*.mcap"):
+        path.rename(usual / path.name)
+    monkeypatch.setenv("XDG_STATE_HOME", str(three_sessions))
+    name = _done("list")["sessions"][-1]["session"]
+    files = [Path(one["file"]).stem for one in _done("info", name)["recordings"]]
+    assert files == [f"{name}-001", f"{name}-002"]
+
+
+def test_plot_draws_the_newest_session_and_names_the_picture_after_it(
+    three_sessions: Path,
+) -> None:
+    told = _done("plot", *sorted(three_sessions.glob("*.mcap")))
+    assert (told["out"], told["rows"]) == (str(three_sessions / "bench-20260102T000000Z.png"), 3990)
+
+
+def test_curves_are_interrupted_where_nothing_wasrecord() -> None:
+    elapsed = np.array([0.0, 0.1, 0.2, 440.0, 440.1])
+    assert recorded_stretches(elapsed) == [(0, 3), (3, 5)]
+    assert recorded_stretches(elapsed[:3]) == [(0, 3)]
 
 
 @pytest.mark.filterwarnings("error")
 def test_a_single_cycle_and_odd_names_are_drawn(tmp_path: Path) -> None:
     axes = [{"name": "_left"}, {"name": r"$\frac{$"}]
-    path = _recorded(tmp_path, made_rows(0, 1), axes=axes)
+    path = record(tmp_path, made_rows(0, 1), axes=axes)
     assert _done("plot", path)["rows"] == 1
     one = imread(path.with_suffix(".png"))
     assert _done("plot", path, "--axis", "_left")["rows"] == 1
@@ -167,13 +233,13 @@ def test_a_recording_of_nothing_known_is_drawn(tmp_path: Path) -> None:
     rows = made_rows(0, 100)
     for name in ("position_rad", "setpoint_rad", "velocity_rad_s", "torque_sent_Nm", "tension_N"):
         rows[name] = np.nan
-    assert _done("plot", _recorded(tmp_path, rows))["rows"] == 100
+    assert _done("plot", record(tmp_path, rows))["rows"] == 100
 
 
 @pytest.mark.filterwarnings("error")
 def test_a_platform_s_pose_is_drawn_as_far_as_it_moves(tmp_path: Path) -> None:
     rows = made_rows(0, 200)
-    plain = _recorded(tmp_path / "plain", rows)
+    plain = record(tmp_path / "plain", rows)
     share = np.linspace(0.0, 1.0, 200)
     rows["pose"] = rows["pose_setpoint"] = [0.0, 0.0, 2.0, 1.0, 0.0, 0.0, 0.0]
     rows["pose"][:, 1] = 0.3 * share
@@ -187,7 +253,7 @@ def test_a_platform_s_pose_is_drawn_as_far_as_it_moves(tmp_path: Path) -> None:
     assert np.isnan(is_there[:10]).all()
     assert is_there[10:] == pytest.approx(np.degrees(0.2 * share[10:]))
     assert (wanted == 0.0).all()
-    moved = _recorded(tmp_path / "moved", rows)
+    moved = record(tmp_path / "moved", rows)
     _done("plot", plain)
     _done("plot", moved)
     sizes = [imread(path.with_suffix(".png")).shape[:2] for path in (plain, moved)]
@@ -217,23 +283,11 @@ def test_in_a_plane_a_platform_s_orientation_is_its_angle() -> None:
         assert curve == name
 
 
-def test_curves_with_single_unknown_values_keep_their_extremes() -> None:
-    x = np.arange(30_000.0)
-    y = np.sin(x / 500.0)
-    y[::7] = np.nan
-    y[10_000:12_000] = np.nan
-    y[20_001] = 9.0
-    at, kept = decimated(x, y)
-    assert kept.size < 9000 and np.nanmax(kept) == 9.0
-    assert np.isnan(kept[(at > 10_100) & (at < 11_900)]).all()
-    assert np.isfinite(kept).mean() > 0.9
-
-
 def test_recordings_of_several_robots_make_no_table(
     tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    _recorded(tmp_path, made_rows(0, 100))
-    second = _recorded(tmp_path, made_rows(0, 100, 3), 3)
+    record(tmp_path, made_rows(0, 100))
+    second = record(tmp_path, made_rows(0, 100, 3), 3)
     for command, name in (("export", "x.csv"), ("export", "x.parquet"), ("plot", "x.png")):
         status, _, errors = _log(command, tmp_path, "--out", tmp_path / name)
         assert status == 2 and errors.count("\n") == 1
@@ -255,7 +309,7 @@ def test_recordings_of_several_robots_make_no_table(
             "cannot be written: File name too long",
         ),
         (("export", "FOLDER", "--out", "x.txt"), "allowed: a name that ends in .csv or .parquet"),
-        (("export", "FOLDER", "--out", "there.csv"), "there.csv: exists already"),
+        (("export", "FOLDER", "--out", "there.csv"), "there.csv: is there already"),
         (("export", "FOLDER", "--out", "x.csv", "--fields", "speed"), "--fields speed: allowed:"),
         (("export", "FOLDER", "--out", "x.csv", "--fields", ","), "names none"),
         (("export", "FOLDER", "--out", "x.csv", "--from", "99"), "no cycles in what was asked"),
@@ -288,123 +342,3 @@ def test_where_nothing_can_be_written_it_is_said(folder: Path) -> None:
         status, _, errors = _log(command, folder, "--out", f"/proc/{name}")
         assert status == 1
         assert f"/proc/{name}: cannot be written" in errors
-
-
-def test_what_ran_and_what_went_wrong_are_told_with_their_times(tmp_path: Path) -> None:
-    rows = made_rows(0, 1000)
-    rows["program"][:300], rows["program"][300:600], rows["program"][600:] = 0, 1, 0
-    rows["state"][:] = LoopState.ACTIVE
-    rows["pose"] = rows["pose_setpoint"] = [0.3, 2.0, 0.0, 1.0, 0.0, 0.0, 0.0]
-    rows["pose"][:, 0] += 1e-3 * np.linspace(0.0, 1.0, 1000)
-    rows["reaction"][700:], rows["limit"][700:] = Reaction.CONTROLLED_STOP, Limit.BROKEN_CABLE
-    rows["limit_axis"][700:], rows["state"][900:] = 1, LoopState.FAULT
-    axes = [{"name": "left"}, {"name": "right"}]
-    path = _recorded(tmp_path, rows, axes=axes, programs=["hold", "pose"])
-    (figures,) = _done("info", path)["recordings"]
-    assert [run["program"] for run in figures["runs"]] == ["hold", "pose", "hold"]
-    assert [run.get("cut_short_by") for run in figures["runs"]] == [None, None, "a fault"]
-    _, shown, _ = _log("info", path)
-    assert "pose: ended, platform at 300.6, 2000.0 mm, 0.6 mm from its set-point" in shown
-
-    selection = Selection([path], FIELDS)
-    columns = selection.columns()
-    (after_s, text), (fault_s, _) = faults_of(selection.readers, columns)
-    assert after_s == pytest.approx(0.7, abs=1e-3) and fault_s == pytest.approx(0.9, abs=1e-3)
-    assert text == "controlled stop by broken cable of right"
-    assert _done("plot", path)["rows"] == 1000
-
-
-def test_an_emergency_stop_is_named_where_it_cut_a_motion_short(tmp_path: Path) -> None:
-    why = "emergency stop by cdpr estop"
-    rows = made_rows(0, 1000)
-    rows["state"][:], rows["program"][:] = LoopState.ACTIVE, 2
-    rows["program"][:200] = 1
-    rows["program"][600:] = 0  # the power goes at once, no supervisor reacts
-    rows["state"][603:] = LoopState.FAULT
-    block = block_with_clock()
-    axes = [{"name": "left"}, {"name": "right"}]
-    block.write_description({"robot": "bench", "axes": axes, "programs": ["idle", "pose", "path"]})
-    recorder, writer = Recorder(block, tmp_path, "bench", reserve_bytes=0), RowWriter(block)
-    recorder.begin()
-    put(writer, rows[:620])
-    block.write_status({"state": "fault", "reason": why, "reason_limit": None})
-    recorder.look()
-    put(writer, rows[620:])
-    recorder.finish()
-    (path,) = tmp_path.iterdir()
-    _, shown, _ = _log("info", path)
-    assert f"path: cut short: {why}; then left" in shown
-    assert "pose: ended, left" in shown
-
-    selection = Selection([path], FIELDS)
-    told = [text for _, text in faults_of(selection.readers, selection.columns())]
-    assert told == [f"state fault: {why}"]
-
-
-def test_a_program_that_failed_has_not_just_ended(tmp_path: Path) -> None:
-    rows = made_rows(0, 1000)
-    rows["program"][:300], rows["program"][300:600], rows["program"][600:] = 1, 0, 1
-    rows["stamp_ns"] += time.monotonic_ns() - rows["stamp_ns"][599]
-    rows["stamp_ns"][600:] += 3600 * 10**9  # tightened again an hour later
-    block = block_with_clock()
-    axes = [{"name": "left"}, {"name": "right"}]
-    block.write_description({"robot": "bench", "axes": axes, "programs": ["hold", "tighten"]})
-    recorder, writer = Recorder(block, tmp_path, "bench", reserve_bytes=0), RowWriter(block)
-    recorder.begin()
-    for first, failure in ((0, ""), (300, "tighten: left: 9 mm reeled in"), (600, "")):
-        put(writer, rows[first : first + 300])
-        block.write_status({"state": "active", "reason": "", "failure": failure})
-        recorder.look()
-    recorder.finish()
-    (path,) = tmp_path.iterdir()
-    (figures,) = _done("info", path)["recordings"]
-    assert [run.get("failed_by") for run in figures["runs"]] == ["left: 9 mm reeled in", None, None]
-    _, shown, _ = _log("info", path)
-    assert "tighten: failed: left: 9 mm reeled in; then left" in shown
-    assert "tighten: ended, left" in shown
-    assert any(line.endswith("  tighten: left: 9 mm reeled in") for line in shown.splitlines())
-
-
-def test_a_lowering_by_which_a_robot_was_stopped_has_come_to_its_end(tmp_path: Path) -> None:
-    rows = made_rows(0, 1000)
-    rows["program"][:300], rows["program"][300:800], rows["program"][800:] = 1, 2, 0
-    rows["reaction"][300:320] = Reaction.CONTROLLED_STOP
-    rows["state"][803:] = LoopState.FAULT  # the idle program has the last cycles with power
-    axes = [{"name": "left"}, {"name": "right"}]
-    path = _recorded(tmp_path, rows, axes=axes, programs=["idle", "pose", "lower"])
-    _, shown, _ = _log("info", path)
-    assert "pose: cut short: a fault; then left" in shown
-    assert "lower: ended, left" in shown
-
-
-def test_a_fault_is_shown_whatever_has_happened_since() -> None:
-    fault = {"text": "state fault", "cycle": 7, "reaction": 0}
-    reason = {"text": "emergency stop", "limit": None}
-    program = {"text": "program path", "cycle": 9, "reaction": 0}
-    moves = [{"text": f"hold by me {k}", "kind": "command"} for k in range(50)]
-    kept = _chosen(worth_telling([fault, reason, program, *moves]), 10)
-    texts = [event["text"] for event in kept]
-    assert texts == ["state fault", "emergency stop", *(f"hold by me {k}" for k in range(42, 50))]
-
-
-def test_each_reaction_has_the_reason_that_came_with_it() -> None:
-    reasons = Reasons(
-        [
-            (10**9, {"text": "slack", "limit": None}),
-            (3 * 10**9, {"text": "too fast", "kind": "reason"}),
-            (2 * 10**9, {"text": "state fault", "cycle": 1, "limit": 3}),
-            (2 * 10**9, {"text": "a command", "kind": "command"}),
-        ]
-    )
-    assert reasons.after(10**9 + 20_000_000) == "slack"
-    assert reasons.after(2 * 10**9) == "too fast"
-    assert reasons.after(2 * 10**9, 25 * 10**8) == ""
-    assert reasons.after(4 * 10**9) == ""
-
-
-def test_who_may_move_and_refusals_over_and_over_do_not_fill_the_list() -> None:
-    texts = ["pose by me: refused: a", "pose by me: refused: b", "state fault"]
-    events = [{"text": text, "kind": "command"} for text in texts]
-    events.insert(0, {"text": "me may move", "kind": "control"})
-    told = worth_telling(events)
-    assert [(event["text"], event["times"]) for event in told] == [(texts[0], 2), (texts[2], 1)]

@@ -12,10 +12,9 @@ import pytest
 from cdpr_here import cdpr_here
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
-from cdpr_profiles.devices.camera import CameraIntrinsics, MarkerSheets
-from cdpr_rt.calibration.markers.images.charuco import Board
-from cdpr_rt.calibration.markers.images.detection import MarkerDetector
-from cdpr_tools.markers.sheets import board_page, marker_page
+from cdpr_profiles.camera import CameraIntrinsics, MarkerSheets
+from cdpr_rt.calibration.markers.detection import Board, MarkerDetector
+from cdpr_tools.commands.markers import board_page, marker_page
 
 SCENE = """
 samples = 8

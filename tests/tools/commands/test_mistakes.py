@@ -13,43 +13,46 @@ from cdpr_here import cdpr_here
 
 import cdpr_profiles
 
-PAGE = Path(__file__).resolve().parents[3] / "docs" / "mistakes.md"
+PAGE = Path(__file__).resolve().parents[3] / "docs" / "reference" / "mistakes.md"
 SHIPPED = Path(cdpr_profiles.__file__).parent / "robots" / "planar-3.toml"
 WRITE = "CDPR_WRITE_PAGES"
 """Where this is in the environment the page is written instead of compared."""
 MISTAKES = (
-    ("A command misspelt", "cdpr comission planar-3"),
-    ("An option misspelt", "cdpr doctor --jsn"),
-    ("A robot misspelt", "cdpr robot show planar3"),
-    ("A key misspelt in a robot's file", "cdpr robot show misspelt.toml"),
-    ("A bus that the robot's file has not", "cdpr robot show other-bus.toml"),
-    ("An interface without its kind", "cdpr run planar-3 --bus can0"),
-    ("No bus named", "cdpr drive info winch-mpp0923d"),
-    ("A simulated bus that nobody runs", "cdpr drive info winch-mpp0923d --bus simbus:lab"),
-    ("No daemon runs", "cdpr move --to 300 2000"),
-    ("A folder in use already", "cdpr commission winch-mpp0923d --bus simbus: --out used"),
-    ("Which motor of the robot?", "cdpr commission planar-3 --bus simbus:"),
-    ("An axis that is not there", "cdpr commission planar-3 --bus simbus: --axis left"),
-    ("A speed out of range", "cdpr drive jog winch-mpp0923d --bus simbus: --speed-deg-s 99999"),
-    ("A number below its least", "cdpr drive jog winch-mpp0923d --bus simbus: --seconds 0"),
-    ("A choice that is none", "cdpr tighten --from nowhere"),
-    ("Motors that were not commissioned", "cdpr run planar-3 --bus simbus: --commissioned used"),
+    ("Misspelt command", "cdpr comission planar-3"),
+    ("Misspelt option", "cdpr doctor --jsn"),
+    ("Misspelt robot", "cdpr robot show planar3"),
+    ("Misspelt key in a robot's file", "cdpr robot show misspelt.toml"),
+    ("Unknown bus in a robot's file", "cdpr robot show other-bus.toml"),
+    ("Bus without its kind", "cdpr run planar-3 --bus can0"),
+    ("Missing bus", "cdpr drive info winch-mpp0923d"),
+    ("Simulated bus that is not running", "cdpr drive info winch-mpp0923d --bus simbus:lab"),
+    ("No daemon is running", "cdpr move --to 300 2000"),
+    ("Output folder already used", "cdpr commission winch-mpp0923d --bus simbus: --out used"),
+    ("Motor not chosen", "cdpr commission planar-3 --bus simbus:"),
+    ("Unknown axis", "cdpr commission planar-3 --bus simbus: --axis left"),
+    ("Speed out of range", "cdpr drive jog winch-mpp0923d --bus simbus: --speed-deg-s 99999"),
+    ("Number below its minimum", "cdpr drive jog winch-mpp0923d --bus simbus: --seconds 0"),
+    ("Unknown choice", "cdpr tighten --from nowhere"),
+    ("Folder without commissioning results", "cdpr run planar-3 --bus simbus: --commissioned used"),
     ("Open to the network without a key", "cdpr run planar-3 --bus simbus: --http 0.0.0.0:8080"),
-    ("No folder for recordings", "cdpr run planar-3 --bus simbus: --record notes.mcap"),
-    ("A key that others may read", "cdpr status --url http://robot:8080 --key-file key"),
-    ("A robot's file that exists", "cdpr robot new misspelt.toml"),
-    ("No recording", "cdpr log info notes.mcap"),
-    ("A file that holds no path", "cdpr path notes.mcap --run"),
-    ("A picture of another format", "cdpr log plot notes.mcap --png run.jpg"),
+    (
+        "File instead of a folder for recordings",
+        "cdpr run planar-3 --bus simbus: --record notes.mcap",
+    ),
+    ("Key file that others can read", "cdpr status --url http://robot:8080 --key-file key"),
+    ("Robot's file that already exists", "cdpr robot new misspelt.toml"),
+    ("File that is not a recording", "cdpr log info notes.mcap"),
+    ("File that contains no path", "cdpr path notes.mcap --run"),
+    ("Unsupported picture format", "cdpr log plot notes.mcap --png run.jpg"),
 )
 HEAD = """\
-# The commonest mistakes, and what is said
+# Common mistakes and their messages
 
-Each was made, and this is what the command answered. Exit status 2 is bad input: nothing was done,
-and nothing had power. 1 means that the work failed. Where a file is concerned the message names
-file, key, value and what is allowed.
+Each row shows a command with a mistake and the message that it prints. Exit status 2 means invalid
+input: nothing was done, and nothing had power. Exit status 1 means that the work failed. A message
+about a file names the file, the key, the value and the allowed values.
 
-| mistake | command | answer | exit |
+| mistake | command | message | exit status |
 |---|---|---|---|
 """
 

@@ -15,12 +15,13 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from cdpr_drivers.camera.open_camera import open_camera
+from cdpr_drivers.camera.camera import open_camera
 from cdpr_profiles import ProfileError
 from cdpr_rt.core.clock import LockstepClock
-from cdpr_sim_bus.robot.logs.truth_log import HEADER_BYTES
+from cdpr_sim_bus.robot.truth_log import HEADER_BYTES
 from cdpr_tools.client import client
-from cdpr_tools.commands.sim.sim_fault import InjectedFault, fault
+from cdpr_tools.commands.sim_fault import fault
+from cdpr_tools.composition.fault_injection import InjectedFault
 from cdpr_tools.errors import BadInputError, WorkFailedError
 from tests.tools.robot_rig import Simulator, simulated, unique
 
@@ -138,6 +139,15 @@ def test_a_cable_is_cut_while_the_robot_runs(
     # by its number, more cable than was taut
     robot.fault(InjectedFault.SLIP, "500", axis="1")
     assert robot.sync(0.05)["tension_N"][0] < 0.5
+
+
+def test_a_drive_is_sent_to_pre_operational(
+    robot: Robot, capsys: pytest.CaptureFixture[str]
+) -> None:
+    robot.fault(InjectedFault.PRE_OPERATIONAL, axis="upper right")
+    assert capsys.readouterr().out == "upper right: pre-operational\n"
+    seen = list(iter(lambda: robot.bus.recv(1.0), None))
+    assert [bytes(frame.data) for frame in seen if frame.arbitration_id == 0] == [b"\x80\x02"]
 
 
 @pytest.mark.parametrize(

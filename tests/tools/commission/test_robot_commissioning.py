@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from cdpr_profiles import load_robot
-from cdpr_tools.commission.robot_commissioning import chosen_axes
+from cdpr_tools.commands.commission import chosen_axes
 from cdpr_tools.errors import BadInputError
 
 

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from cdpr_drivers.axes.listening import ListeningDevice, MonitoredBus, monitored_axis
-from cdpr_drivers.bus.adapters.simbus_socket import connect, exchange
+from cdpr_drivers.bus.simbus import connect, exchange
 from cdpr_drivers.robot.robot_buses import robot_urls
 from cdpr_profiles import Robot, load_robot
 from cdpr_rt.core.clock import PacedClock

@@ -15,11 +15,10 @@ import pytest
 import cdpr_profiles
 from cdpr_drivers.cia402 import POWER_OFF, Mode, State, state_of
 from cdpr_drivers.errors import BusError, ConfigurationError, ModeRefusedError, RobotBootError
-from cdpr_drivers.robot.session import Session
 from cdpr_profiles import Robot, load_robot
 from cdpr_rt.errors import ControlError, TripError
-from cdpr_tools.bench.soak import Counts, compare
-from cdpr_tools.composition.session import open_robot
+from cdpr_tools.bench.soak import bus_counts, compare
+from cdpr_tools.composition.session import Session, open_robot
 from tests.tools.robot_rig import (
     OUT,
     Simulator,
@@ -126,14 +125,20 @@ def test_axes_may_alternate_between_buses(tmp_path: Path):
 
 def test_a_fault_on_one_bus_stops_the_axes_of_both(bus: str):
     with (
-        pytest.raises(TripError, match=r"bus can1: node 6 \(axis 6\): .* 7305h incremental"),
+        pytest.raises(
+            TripError, match=r"axis 6: the drive \(bus can1 node 6\) reports error 7305h \(incr"
+        ),
         open_robot(EIGHT, [bus], OUT) as opened,
     ):
         opened.enable()
         opened.machine.networks["can1"].write(6, 0x2F00, 1, 0x7305)
-        hold(opened, 10.0)
+        try:
+            hold(opened, 10.0)
+        finally:
+            (fault,) = opened.device.faults()
+            assert opened.device.faults()[0] is fault  # the same object in every cycle
     with (
-        pytest.raises(ControlError, match=r"^bus can1: node 6 \(axis 6\): "),
+        pytest.raises(ControlError, match=r"^axis 6: the drive \(bus can1 node 6\) "),
         open_robot(EIGHT, [bus], OUT) as opened,
     ):
         pytest.fail("opened with a drive in fault")
@@ -243,20 +248,20 @@ def test_drives_of_different_makes_run_side_by_side(tmp_path: Path):
     with simulated(path) as url, open_robot(robot, [url], OUT) as opened:
         opened.enable()
         hold(opened, 0.3)
-        before = Counts.all(opened)
+        before = bus_counts(opened)
         start = opened.device.feedback.position_rad.copy()
         speeds = np.array([2.0, -3.0, 4.0])
         hold(opened, 1.0, speeds)
         moved = opened.device.feedback.position_rad - start
         np.testing.assert_allclose(moved, 0.9 * speeds, atol=0.2)
-        after = Counts.all(opened)
+        after = bus_counts(opened)
         for bus, commands, answers in (("a", 3, 3), ("b", 1, 1)):
             verdict = compare(bus, opened, before[bus], after[bus])
-            assert verdict.lost == 0
-            cycles = after[bus].cycles - before[bus].cycles
+            assert verdict["lost"] == 0
+            cycles = after[bus]["cycles"] - before[bus]["cycles"]
             expected = cycles * (1 + commands + answers)
-            assert verdict.frames_counted == pytest.approx(expected, abs=60)
-            assert verdict.frames_expected == pytest.approx(verdict.frames_counted, abs=10)
+            assert verdict["frames_counted"] == pytest.approx(expected, abs=60)
+            assert verdict["frames_expected"] == pytest.approx(verdict["frames_counted"], abs=10)
         opened.disable()
 
 

@@ -6,6 +6,7 @@ status, and load within a fraction of a second. Who did what, in order, is in th
 
 from __future__ import annotations
 
+import errno
 import json
 import os
 import select
@@ -14,13 +15,14 @@ import socket
 import sys
 import time
 from pathlib import Path
+from typing import Any
 
 from cdpr_rt.core.shared_block import SharedBlock
 from cdpr_rt.core.states import CUT_SHORT
-from cdpr_tools.daemon.loop_file import POWER_OFF_SIGNAL
-from cdpr_tools.daemon.processes import launcher
-from cdpr_tools.daemon.processes.child import POWER_UNCONFIRMED, end_with_launcher
-from cdpr_tools.daemon.processes.notify import ServiceManager
+from cdpr_tools.daemon import child, launcher
+from cdpr_tools.daemon.child import POWER_UNCONFIRMED, end_with_launcher
+from cdpr_tools.daemon.launcher import ServiceManager
+from cdpr_tools.daemon.loop_file import POWER_OFF_SIGNAL, LauncherLock
 from cdpr_tools.daemon.settings import RunSettings
 
 NAME = "stand-in"
@@ -34,23 +36,42 @@ def main(folder: Path) -> int:
     launcher._LOOP_STALLED_S = launcher._SERVICE_STALLED_S = stalled_s  # type: ignore[misc]
     launcher._SAME_PRESS_S = plan.get("same_press_s", 0.2)  # type: ignore[misc]
     launcher._SERVICE_START_S = plan.get("service_start_s", 60.0)  # type: ignore[misc]
+    child._STOP_S = plan.get("stop_s", 30.0)  # type: ignore[misc]
     block = SharedBlock.create(1, 0.1, 100.0)
+    lock = LauncherLock(folder / "control.sock")
     settings = RunSettings(
         robot=str(folder),
         name=NAME,
         socket=folder / "control.sock",
+        lock_fd=lock.fd,
         launcher_pid=os.getpid(),
         block_fd=block.fd,
     )
 
     def tell(text: str) -> None:
+        if "mistake" in plan:
+            raise RuntimeError(plan["mistake"])
         print(json.dumps({"told": text, "status": block.status()}), flush=True)
 
     def ready(status: dict[str, object]) -> None:
         print(json.dumps({"ready": status}), flush=True)
 
+    if "no_service" in plan:  # as where the machine has no room for another process
+
+        def child_but_no_service(module: str, *more: Any) -> child.Child:
+            if module == launcher.SERVICE:
+                while not block.counters["loop_alive_ns"][0]:
+                    time.sleep(0.01)
+                raise BlockingIOError(errno.EAGAIN, os.strerror(errno.EAGAIN))
+            return child.Child(module, *more)
+
+        launcher.Child = child_but_no_service  # type: ignore[misc, assignment]
+
     daemon = launcher.Launcher(settings, block, tell, ready, ServiceManager())
-    code = daemon.run()
+    try:
+        code = daemon.run()
+    finally:
+        lock.close()
     print(json.dumps({"reason": daemon.reason, "status": block.status()}), flush=True)
     return code
 
@@ -95,9 +116,13 @@ def loop() -> None:
         if (folder / "fault").exists():
             (folder / "fault").unlink()
             block.write_status({"state": "fault", "reason": "left: too fast", "since_ns": 1})
-    if select.select([power_off], [], [], plan.get("stopping_s", 0.0))[0]:
-        _note(folder, "power taken")
-        block.write_status({"state": "unconfigured", "reason": CUT_SHORT})
+    end_s = time.monotonic() + plan.get("stopping_s", 0.0)
+    while time.monotonic() < end_s:
+        block.counters["loop_alive_ns"] = time.monotonic_ns()
+        if select.select([power_off], [], [], 0.02)[0]:
+            _note(folder, "power taken")
+            block.write_status({"state": "unconfigured", "reason": CUT_SHORT})
+            break
     _note(folder, "loop stopped")
     if "unconfirmed" in plan:
         block.write_status({"state": "unconfigured", "reason": plan["unconfirmed"]})
@@ -124,6 +149,7 @@ def service() -> None:
     settings.socket.unlink(missing_ok=True)
     with socket.socket(socket.AF_UNIX) as listening:
         listening.bind(str(settings.socket))
+        listening.listen()
         while not select.select([end], [], [], 0.02)[0]:
             block.counters["service_alive_ns"] = time.monotonic_ns()
     _note(folder, "service stopped")

@@ -15,10 +15,11 @@ from cdpr_profiles import load_robot
 from cdpr_rt.core.cycle_row import Row
 from cdpr_rt.core.shared_block import RowReader, SharedBlock
 from cdpr_rt.core.states import LoopState
+from cdpr_rt.loop.loop import ControlLoop
+from cdpr_rt.loop.right import LONGEST_S, PublishedRight
+from cdpr_rt.loop.stop_socket import StopSocket
+from cdpr_rt.model.robot_arrays import limits_of
 from cdpr_rt.programs.base import Program
-from cdpr_rt.robots.robot_arrays import limits_of
-from cdpr_rt.runtime.control_loop.loop import ControlLoop
-from cdpr_rt.runtime.right import LONGEST_S, PublishedRight
 from cdpr_rt.service.lease import Lease, LeaseError
 from cdpr_tools.composition.loop_parts import loop_parts
 
@@ -31,7 +32,12 @@ class LoopRig:
     """
 
     def __init__(
-        self, path: Path | str, url: str, programs: Mapping[str, Program] | None = None, **more: Any
+        self,
+        path: Path | str,
+        url: str,
+        programs: Mapping[str, Program] | None = None,
+        stops: StopSocket | None = None,
+        **more: Any,
     ) -> None:
         self.robot = load_robot(path)
         n, rate_Hz = len(self.robot.axes), 1.0 / self.robot.sync_period_s
@@ -42,7 +48,7 @@ class LoopRig:
         self.machine = RobotMachine(self.robot, url.split(), **more)
         parts = loop_parts(self.robot, limits_of(self.robot), self.block)
         parts = replace(parts, programs={**parts.programs, **(programs or {})})
-        self.loop = ControlLoop(self.block, self.machine, parts, lambda: self.now_ns)
+        self.loop = ControlLoop(self.block, self.machine, parts, lambda: self.now_ns, stops)
         self._rows = RowReader(self.block)
 
     def boot(self) -> None:

@@ -1,176 +1,259 @@
-"""Commands that come while a robot is being stopped, or end one badly: no success is told."""
+"""Commands to a robot that is being stopped, has stopped or ends badly: no success is told."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import json
+import os
+import subprocess
+import sys
+import threading
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
 
 import pytest
 import typer
 from typer.testing import CliRunner
 
+from cdpr_rt.refusal import CommandRefusal, RefusalCode
 from cdpr_rt.service.link import ENDED
-from cdpr_tools.client.client import NoDaemonError
-from cdpr_tools.commands.daemon import daemon_state, with_daemon
+from cdpr_tools.client import daemon_end
+from cdpr_tools.client.client import NoDaemonError, ServiceRefusalError
+from cdpr_tools.client.motion import carry_out
+from cdpr_tools.client.refusals import DaemonRefusalError
+from cdpr_tools.commands import daemon_state, with_daemon
+from cdpr_tools.daemon.loop_file import LauncherLock, LoopFile, started
 from cdpr_tools.errors import WorkFailedError
+from cdpr_tools.output import Output
 
-ACTIVE = {"state": "active", "program": "lower", "reason": "", "axes": [], "notices": []}
-
-
-class Answers:
-    """A daemon whose status this is, and which takes no command."""
-
-    def __init__(self, status: dict[str, Any]) -> None:
-        self.status = status
-
-    def get(self, _path: str) -> dict[str, Any]:
-        return self.status
-
-
-def done(monkeypatch: pytest.MonkeyPatch, command: str, **status: str) -> Any:
-    @contextmanager
-    def opened(*_where: Any) -> Iterator[Answers]:
-        yield Answers({**ACTIVE, **status})
-
-    monkeypatch.setattr(with_daemon, "open_daemon", opened)
-    app = typer.Typer()
-    app.add_typer(daemon_state.app)
-    return CliRunner().invoke(app, [command])
+LOOP = """
+import signal, sys, time
+signal.signal(signal.SIGUSR1, lambda *_: None)
+print("named", flush=True)
+time.sleep(2)
+"""
+ACTIVE = {
+    "state": "active", "program": "lower", "reason": "", "axes": [], "notices": [],
+    "read_only": False,
+}  # fmt: skip
 
 
-@pytest.mark.parametrize("command", ["ack", "enable"])
-def test_while_a_robot_is_being_stopped_it_is_told_why(
-    monkeypatch: pytest.MonkeyPatch, command: str
-) -> None:
-    stopping = {"reacting": "controlled stop", "reason": "left: angle jumped"}
-    error = done(monkeypatch, command, **stopping).exception
-    assert isinstance(error, WorkFailedError)
-    assert "controlled stop under way: left: angle jumped" in str(error)
-    assert done(monkeypatch, command).exit_code == 0
+class Daemon:
+    """A daemon whose status follows from how often it was asked to end; None: nobody answers."""
 
-
-class Ends:
-    """A daemon that ends once it is asked to; its drive of this axis is heard, or not."""
-
-    def __init__(self, alive: bool) -> None:
-        self.alive, self.asked = alive, False
+    def __init__(
+        self,
+        status: Callable[[int], dict[str, Any] | None],
+        where: str | Path = "/nowhere/control.sock",
+        refusal: Exception | None = None,
+    ) -> None:
+        self.status, self.where, self.refusal, self.asked = status, str(where), refusal, 0
 
     def get(self, _path: str) -> dict[str, Any]:
-        if self.asked:
+        told = self.status(self.asked)
+        if told is None:
             raise NoDaemonError("nobody is there")
-        axes = [{"name": "top", "alive": self.alive}]
-        return {**ACTIVE, "reason": "", "axes": axes, "read_only": False}
-
-    def post(self, _path: str) -> None:
-        self.asked = True
-
-
-def stopped(monkeypatch: pytest.MonkeyPatch, daemon: Ends) -> Any:
-    @contextmanager
-    def opened(*_where: Any) -> Iterator[Ends]:
-        yield daemon
-
-    monkeypatch.setattr(daemon_state, "open_daemon", opened)
-    app = typer.Typer()
-    app.add_typer(daemon_state.app)
-    return CliRunner().invoke(app, ["stop"])
-
-
-@pytest.mark.parametrize(
-    ("alive", "status", "told"),
-    [
-        (True, 0, "stopped, power off"),
-        (False, 1, "stopped; unheard, and not known to be without power: top"),
-    ],
-)
-def test_a_script_learns_that_a_drive_was_not_heard(
-    monkeypatch: pytest.MonkeyPatch, alive: bool, status: int, told: str
-) -> None:
-    ended = stopped(monkeypatch, Ends(alive))
-    error = ended.exception
-    assert (error.exit_status if isinstance(error, WorkFailedError) else ended.exit_code) == status
-    assert told in (str(error) if error else ended.output)
-
-
-class Dies:
-    """A daemon whose loop ends with an error once it is asked to end; asked again, all ends."""
-
-    def __init__(self) -> None:
-        self.asked = 0
-
-    def get(self, _path: str) -> dict[str, Any]:
-        if self.asked > 1:
-            raise NoDaemonError("nobody is there")
-        axes = [{"name": "top", "alive": False}]
-        state = ("fault", "dead")[self.asked]
-        return {**ACTIVE, "state": state, "reason": "it died", "axes": axes, "read_only": False}
+        return {**ACTIVE, **told}
 
     def post(self, _path: str) -> None:
         self.asked += 1
+        if self.refusal is not None:
+            raise self.refusal
 
 
-def test_a_loop_that_dies_while_it_ends_keeps_nobody_waiting(
-    monkeypatch: pytest.MonkeyPatch,
+def ends(alive: bool, **status: str) -> Callable[[int], dict[str, Any] | None]:
+    """A daemon that ends once it is asked to; its drive is heard, or not."""
+    told = {"axes": [{"name": "top", "alive": alive}], **status}
+    return lambda asked: None if asked else told
+
+
+@pytest.fixture
+def run(monkeypatch: pytest.MonkeyPatch) -> Callable[..., Any]:
+    """Runs a command against a daemon; returns its result."""
+
+    def invoke(daemon: Daemon, *words: str) -> Any:
+        @contextmanager
+        def opened(*_where: Any) -> Iterator[Daemon]:
+            yield daemon
+
+        for module in (with_daemon, daemon_state):
+            monkeypatch.setattr(module, "open_daemon", opened)
+        app = typer.Typer()
+        app.add_typer(daemon_state.app)
+        return CliRunner().invoke(app, words)
+
+    return invoke
+
+
+Run = Callable[..., Any]
+
+
+@pytest.mark.parametrize("command", ["ack", "enable"])
+def test_while_a_robot_is_being_stopped_it_is_told_why(run: Run, command: str) -> None:
+    stopping = {"reacting": "controlled stop", "reason": "left: angle jumped"}
+    error = run(Daemon(lambda _: stopping), command).exception
+    assert isinstance(error, WorkFailedError)
+    assert "controlled stop under way: left: angle jumped" in str(error)
+
+
+def refusing(state: str) -> Daemon:
+    states = {"state": state, "allowed": ["ready", "active"]}
+    refusal = CommandRefusal(RefusalCode.NOT_IN_STATE, "disable", arguments=states)
+    status = {"state": state, "reason": "cable 2 broke"}
+    return Daemon(lambda _: status, refusal=DaemonRefusalError.of(refusal))
+
+
+def test_in_fault_there_is_nothing_to_disable(run: Run) -> None:
+    result = run(refusing("fault"), "disable", "--json")
+    assert result.exit_code == 0, result.exception
+    told = json.loads(result.stdout.splitlines()[-1])
+    assert told == {"ok": True, "state": "fault", "text": "cable 2 broke"}
+    assert "cdpr ack" in result.output
+
+
+def test_disabling_where_no_drive_has_booted_is_an_error(run: Run) -> None:
+    assert isinstance(run(refusing("unconfigured"), "disable").exception, DaemonRefusalError)
+
+
+DIED = "the loop has died: killed by signal 9"
+
+
+@pytest.mark.parametrize(
+    ("status", "exit_status", "told"),
+    [
+        (ends(True), 0, "stopped, power off"),
+        (ends(False), 1, "stopped; unheard, and not known to be without power: top"),
+        (ends(True, state="dead", reason=DIED), 1, "ended; its loop had died: "),
+    ],
+)
+def test_a_script_learns_what_is_known_of_the_power(
+    run: Run, status: Callable[[int], dict[str, Any] | None], exit_status: int, told: str
 ) -> None:
-    @contextmanager
-    def opened(*_where: Any) -> Iterator[Dies]:
-        yield Dies()
+    ended = run(Daemon(status), "stop")
+    error = ended.exception
+    found = error.exit_status if isinstance(error, WorkFailedError) else ended.exit_code
+    assert found == exit_status
+    assert told in (str(error) if error else ended.output)
 
-    monkeypatch.setattr(daemon_state, "open_daemon", opened)
-    app = typer.Typer()
-    app.add_typer(daemon_state.app)
-    error = CliRunner().invoke(app, ["stop"]).exception
+
+def test_a_daemon_elsewhere_that_falls_silent_is_not_said_to_have_ended(run: Run) -> None:
+    for asked in (0, 1):  # also where nothing has answered from the beginning
+        daemon = Daemon(ends(True))
+        daemon.asked = asked
+        ended = run(daemon, "stop", "--url", "http://elsewhere:8000")
+        assert isinstance(ended.exception, WorkFailedError)
+        assert ("whether it has is not known" in str(ended.exception)) is not bool(asked)
+        assert not ended.stdout
+
+
+@pytest.mark.parametrize("takes", [True, False])
+def test_a_loop_that_runs_on_without_a_service_is_waited_for(
+    run: Run, tmp_path: Path, takes: bool
+) -> None:
+    with subprocess.Popen([sys.executable, "-c", LOOP], stdout=subprocess.PIPE) as loop:
+        assert loop.stdout is not None
+        loop.stdout.readline()
+        named = LoopFile(
+            robot="r", uid=os.geteuid(), pid=loop.pid, started=started(loop.pid), block_fd=0,
+            drives_stop_s=0.1,
+        )  # fmt: skip
+        named.write(tmp_path / "control.loop")
+        reaping = threading.Thread(target=loop.wait)
+        reaping.start()
+        silent = None if takes else NoDaemonError("timed out")
+        try:
+            ended = run(Daemon(ends(True), tmp_path / "control.sock", silent), "stop")
+            assert not (takes and named.runs())
+        finally:
+            loop.kill()
+            reaping.join()
+    assert ended.exit_code == 0, ended.exception
+    told = "stopped, power off" if takes else "its loop was stopped under control"
+    assert told in ended.output
+
+
+def test_a_loop_that_dies_while_it_ends_keeps_nobody_waiting(run: Run) -> None:
+    def dies(asked: int) -> dict[str, Any] | None:
+        axes = [{"name": "top", "alive": False}]
+        state = ("fault", "dead", None)[asked]
+        return None if state is None else {"state": state, "reason": "it died", "axes": axes}
+
+    error = run(Daemon(dies), "stop").exception
     assert isinstance(error, WorkFailedError)
     assert str(error) == "stopped; unheard, and not known to be without power: top; it died"
 
 
-class EndsLoopFirst:
-    """A daemon whose loop ends as asked, a while before the service that is asked does."""
-
-    def __init__(self) -> None:
-        self.states = iter(["active", "active", "dead", "dead"])
-        self.asked = 0
-
-    def get(self, _path: str) -> dict[str, Any]:
-        if (state := next(self.states, "")) == "":
-            raise NoDaemonError("nobody is there")
-        axes = [{"name": "top", "alive": state != "dead"}]
-        reason = ENDED if state == "dead" else ""
-        return {**ACTIVE, "state": state, "reason": reason, "axes": axes, "read_only": False}
-
-    def post(self, _path: str) -> None:
-        self.asked += 1
-
-
 def test_a_loop_that_is_seen_to_have_ended_as_asked_is_no_failure(
-    monkeypatch: pytest.MonkeyPatch,
+    run: Run, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    daemon = EndsLoopFirst()
+    states = iter(["active", "active", "dead", "dead"])
 
-    @contextmanager
-    def opened(*_where: Any) -> Iterator[EndsLoopFirst]:
-        yield daemon
+    def ends_before_its_service(_asked: int) -> dict[str, Any] | None:
+        if (state := next(states, "")) == "":
+            return None
+        axes = [{"name": "top", "alive": state != "dead"}]
+        return {"state": state, "reason": ENDED if state == "dead" else "", "axes": axes}
 
-    monkeypatch.setattr(daemon_state, "open_daemon", opened)
-    monkeypatch.setattr(daemon_state, "_WATCH_S", 0.0)
-    app = typer.Typer()
-    app.add_typer(daemon_state.app)
-    ended = CliRunner().invoke(app, ["stop"])
+    monkeypatch.setattr(daemon_end, "_WATCH_S", 0.0)
+    daemon = Daemon(ends_before_its_service)
+    ended = run(daemon, "stop")
     assert (ended.exit_code, daemon.asked) == (0, 1), ended.exception
     assert ended.output.splitlines()[-1] == "stopped, power off"
 
 
-class DiedBefore(Ends):
-    """A daemon whose loop has died a while ago."""
+@pytest.mark.long
+def test_a_launcher_that_hangs_is_named_with_what_is_known_of_the_power(
+    run: Run, tmp_path: Path
+) -> None:
+    control = tmp_path / "control.sock"
+    daemon = Daemon(lambda asked: {"state": "dead", "reason": ENDED} if asked else {}, control)
+    with LauncherLock(control):
+        error = run(daemon, "stop").exception
+    assert isinstance(error, WorkFailedError)
+    pid = os.getpid()
+    assert str(error) == (
+        f"{ENDED}; its drives had been told to have no power; its launcher, process {pid}, does "
+        f"not respond: end it with `kill -9 {pid}`"
+    )
+
+
+class UnheldDaemon:
+    """A daemon whose service does not take a hold any more. A stand-in: a real one always does."""
+
+    where = "nowhere"
 
     def get(self, path: str) -> dict[str, Any]:
-        died = {"state": "dead", "reason": "the loop has died: killed by signal 9"}
-        return {**super().get(path), **died}
+        if path == "/description":
+            return {"robot": "bench", "axes": [{"name": "left"}], "platform": None, "programs": []}
+        return {
+            **ACTIVE,
+            "program": "jog",
+            "lockstep": False,
+            "reacting": "none",
+            "cycle": {"time_s": 1.0},
+            "loop": {"silent_s": 0.0},
+            "parts": {},
+            "program_progress": {},
+        }
+
+    def post(self, path: str, *_: Any) -> dict[str, Any]:
+        if path == "/hold":
+            raise ServiceRefusalError("the service is busy")
+        return {"token": "mine"}
+
+    def renew(self, token: str) -> None:
+        pass
+
+    def release(self, token: str) -> None:
+        pass
 
 
-def test_a_script_learns_that_the_loop_had_died(monkeypatch: pytest.MonkeyPatch) -> None:
-    error = stopped(monkeypatch, DiedBefore(True)).exception
-    assert isinstance(error, WorkFailedError)
-    assert error.exit_status == 1
-    assert str(error).startswith("ended; its loop had died: ")
+def test_a_motion_that_cannot_be_held_at_its_end_is_not_reported_as_held() -> None:
+    with pytest.raises(WorkFailedError, match="could not be held: the service is busy"):
+        carry_out(
+            UnheldDaemon(),  # type: ignore[arg-type]
+            Output(True),
+            lambda robot: robot.run("jog", velocity_rad_s=[1.0]),
+            seconds=0.0,
+        )

@@ -8,13 +8,13 @@ from typing import Any
 
 import pytest
 
-from cdpr_drivers.cia402 import State
+from cdpr_drivers.cia402 import POWER_OFF, State
 from cdpr_profiles import load_robot
 from cdpr_rt.core.states import LoopState
+from cdpr_rt.model.robot_arrays import limits_of
 from cdpr_rt.programs.idle import IdleProgram
 from cdpr_rt.programs.model import model_of
-from cdpr_rt.robots.robot_arrays import limits_of
-from tests.tools.daemon.loop_rig import opened
+from tests.tools.daemon.loop_rig import LoopRig, opened
 from tests.tools.daemon.test_control_loop import PERIOD_S, SILENT_MS, drive_states
 from tests.tools.robot_rig import Simulator, robot_file, simulated, unique
 
@@ -37,7 +37,7 @@ def test_a_drive_that_stays_deaf_keeps_the_fault(lab: tuple[Path, str]) -> None:
         assert not answer["ok"]
         assert "node 2" in answer["text"]
         assert rig.state is LoopState.FAULT
-        assert "node 2 (axis 2)" in rig.status["reason"]
+        assert "axis 2: the drive (bus can0 node 2)" in rig.status["reason"]
 
 
 def test_a_bus_that_is_gone_and_comes_back(lab: tuple[Path, str]) -> None:
@@ -102,3 +102,82 @@ def test_why_a_program_failed_is_told_until_another_moves(lab: tuple[Path, str])
         stuck.done = 1.0  # it has come to its end, with a remark
         rig.obeyed("program", program="stuck")
         assert rig.status["failure"] == ""
+
+
+# Drives that are in fault when the loop begins or checks.
+
+FAULT_CODE = 1
+JOG = {"velocity_rad_s": [2.0, 2.0], "timeout_s": 2.0}
+
+
+def unpowered(rig: LoopRig) -> bool:
+    return all(state in POWER_OFF for state in rig.machine._booted.states())
+
+
+def test_a_loop_that_begins_with_a_drive_in_fault(lab: tuple[Path, str]) -> None:
+    with opened(*lab) as rig:
+        rig.inject_fault(0, FAULT_CODE, 0x7305)
+        rig.turn_until(lambda: rig.state is LoopState.FAULT)
+    with opened(*lab) as rig:
+        # a start resets nothing by itself; somebody who asks for a check does
+        assert rig.state is LoopState.INACTIVE
+        assert "7305h" in rig.status["reason"]
+        assert rig.status["reason_limit"]["axis"] == 0
+        rig.obeyed("check")
+        assert rig.state is LoopState.READY
+        assert unpowered(rig)
+        rig.obeyed("enable")
+
+
+def test_a_fault_while_one_is_acknowledged(lab: tuple[Path, str]) -> None:
+    with opened(*lab) as rig:
+        rig.inject_fault(0, FAULT_CODE, 0x7305)
+        rig.turn_until(lambda: rig.state is LoopState.FAULT and not rig.loop.busy)
+        rig.block.post_command({"do": "acknowledge"})
+        rig.turn_until(lambda: rig.state is LoopState.INACTIVE and rig.loop.engine.cycling)
+        rig.turn(40)
+        rig.inject_fault(1, FAULT_CODE, 0x7305)
+        rig.turn_until(lambda: not rig.loop.busy)
+        assert rig.state is LoopState.FAULT
+        assert "node 2" in rig.status["reason"]
+        assert rig.status["reason"].count("before") == 1
+        rig.block.take_reply()
+        rig.obeyed("acknowledge")
+        assert rig.state is LoopState.READY
+        assert unpowered(rig)
+
+
+def test_a_drive_that_restarted_needs_a_new_boot(lab: tuple[Path, str]) -> None:
+    with opened(*lab) as rig:
+        rig.block.post_command({"do": "check"})
+        rig.turn(30)
+        assert rig.state is LoopState.INACTIVE
+        rig.machine.networks["can0"].reset(2)
+        rig.turn_until(lambda: not rig.loop.busy)
+        for _ in range(2):
+            answer = rig.command("check")
+            assert not answer["ok"]
+            assert "restarted" in answer["text"]
+        rig.obeyed("configure")
+        rig.obeyed("check")
+        assert rig.state is LoopState.READY
+
+
+def test_who_asks_for_hold_while_the_power_comes_gets_no_motion(lab: tuple[Path, str]) -> None:
+    with opened(*lab) as rig:
+        rig.block.post_command(
+            {"do": "enable", "right": rig.right, "program": "jog", "wanted": JOG}
+        )
+        rig.turn(2)
+        assert rig.loop.busy
+        rig.obeyed("hold")
+        rig.turn_until(lambda: not rig.loop.busy)
+        rows = rig.run(0.3)
+        assert rig.state is LoopState.ACTIVE
+        assert rig.status["program"] == "hold"
+        assert not rows["setpoint_velocity_rad_s"].any()
+        rig.obeyed("program", program="jog", wanted=JOG)
+        rig.obeyed("disable")
+        rig.block.take_reply()
+        rig.obeyed("enable", program="jog", wanted=JOG)
+        assert rig.status["program"] == "jog"

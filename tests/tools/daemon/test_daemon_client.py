@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import os
+import pwd
 import socket
 import sys
 import threading
@@ -12,19 +14,21 @@ from http.server import BaseHTTPRequestHandler, HTTPServer
 from pathlib import Path
 from typing import Any
 
+import httpx
 import pytest
 
 from cdpr_profiles.errors import ProfileError
 from cdpr_tools.cli import main
 from cdpr_tools.client.client import (
     ConnectionLostError,
+    Daemon,
     NoDaemonError,
     axis_values,
     key_values,
     open_daemon,
 )
-from cdpr_tools.commands.robot.path import robot_by_name
-from cdpr_tools.daemon.loop_file import named_launcher
+from cdpr_tools.commands.path import robot_by_name
+from cdpr_tools.daemon.loop_file import LauncherLock
 from cdpr_tools.errors import BadInputError
 from tests.cdpr_here import cdpr_here
 
@@ -78,7 +82,7 @@ def test_what_a_killed_daemon_left_behind_is_none(listening: list[Path], folder:
     with pytest.raises(NoDaemonError, match="no daemon runs for dead"):
         where("dead")
     starting = pytest.raises(NoDaemonError, match="the daemon for dead is starting, or ending")
-    with named_launcher(folder / "dead.sock"), starting:
+    with LauncherLock(folder / "dead.sock"), starting:
         where("dead")
 
 
@@ -222,3 +226,14 @@ def test_a_command_waits_for_a_daemon_that_is_still_starting(
     told = capsys.readouterr().err
     assert asked == ["/status"] * 5 + ["/description"] and ended.value.code == 2
     assert told.count("the daemon is still starting: its control loop is loaded, ") == 1
+
+
+def test_a_user_without_a_name_can_command_too(monkeypatch: pytest.MonkeyPatch) -> None:
+    def unknown(uid: int) -> None:
+        raise KeyError(f"getpwuid(): uid not found: {uid}")
+
+    for variable in ("LOGNAME", "USER", "LNAME", "USERNAME"):
+        monkeypatch.delenv(variable, raising=False)
+    monkeypatch.setattr(pwd, "getpwuid", unknown)
+    with httpx.Client() as http:
+        assert Daemon(http, "here").name.startswith(f"#{os.getuid()}@")

@@ -10,10 +10,10 @@ from cdpr_drivers.robot.robot_buses import refuse_simulated_calibration
 from cdpr_profiles import load_robot
 from cdpr_profiles.calibration.in_force import load_calibrated, take_over, undo
 from cdpr_profiles.catalogue import list_profiles
-from cdpr_rt.robots.persistence.calibration_state import mark_calibrated
-from cdpr_rt.robots.robot_arrays import limits_of
-from cdpr_tools.calibrate.words import geometry_note
+from cdpr_rt.model.calibration_state import mark_calibrated
+from cdpr_rt.model.robot_arrays import limits_of
 from cdpr_tools.composition.loop_parts import description, look_at_calibration
+from cdpr_tools.robots.calibration_text import calibration_text
 from tests.profiles.test_geometry_calibration import calibration
 
 
@@ -32,10 +32,11 @@ def test_a_daemon_takes_targets_with_the_calibration_in_force_only(tmp_path, mon
     before, platform = load_calibrated("planar-4"), SimpleNamespace(not_calibrated_reason="")
     take_over(before, calibration(before))
     mark_calibrated("planar-4", "calibration 1")
-    assert geometry_note(before) == ""
-    assert geometry_note(load_calibrated("planar-4")).startswith("geometry calibrated 20")
+    known = load_calibrated("planar-4").calibration
+    assert known is not None
+    assert calibration_text(known.summary()).startswith("calibration 1 ")
     look_at_calibration(before, platform)  # type: ignore[arg-type]
-    assert "start the daemon anew" in platform.not_calibrated_reason
+    assert "start the daemon again" in platform.not_calibrated_reason
     now = load_calibrated("planar-4")
     look_at_calibration(now, platform)  # type: ignore[arg-type]
     assert platform.not_calibrated_reason == ""

@@ -17,7 +17,8 @@ from typing import Any
 import launcher_rig
 import pytest
 
-from cdpr_tools.daemon.loop_file import LoopFile
+from cdpr_tools.daemon.loop_file import LauncherLock, LoopFile
+from cdpr_tools.errors import BadInputError
 
 pytestmark = pytest.mark.long
 
@@ -291,6 +292,18 @@ def test_a_loop_that_hangs_does_not_keep_the_daemon_from_ending(start: Start) ->
     assert daemon.log() == ["service stopped"]
 
 
+def test_a_loop_that_turns_again_has_its_time_to_end(start: Start) -> None:
+    daemon = start({"stalled_s": 2.0, "stopping_s": 4.0})
+    daemon.line("ready")
+    os.kill(daemon.pid("loop"), signal.SIGSTOP)
+    assert "has not turned" in daemon.line("told")["told"]
+    daemon.process.terminate()
+    os.kill(daemon.pid("loop"), signal.SIGCONT)
+    assert daemon.line("reason")["reason"] == ""
+    assert daemon.ends() == 0
+    assert daemon.log() == ["loop stopped", "service stopped"]
+
+
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_second_request_to_end_takes_the_power_at_once(
     start: Start, number: signal.Signals
@@ -300,18 +313,66 @@ def test_a_second_request_to_end_takes_the_power_at_once(
     daemon.process.send_signal(number)
     daemon.process.send_signal(number)  # passed on by a program in between, it is the same one
     told = daemon.line("told")["told"]
-    assert "the platform is let down" in told
+    assert "the platform is lowered" in told
     assert "up to 50 s" in told
-    assert "A second Ctrl-C takes the power at once" in told
+    assert "Press Ctrl-C again to remove the power immediately" in told
     time.sleep(1.5 * SAME_PRESS_S)
     daemon.process.send_signal(signal.SIGHUP)  # a terminal that closes is not impatient
     time.sleep(0.5)
     assert not (daemon.folder / "log").exists()
     daemon.process.send_signal(number)
-    assert daemon.line("told")["told"] == "the power is taken at once"
-    assert "the power was taken at once" in daemon.line("reason")["reason"]
+    assert daemon.line("told")["told"] == "the power is removed now"
+    assert "the power was removed" in daemon.line("reason")["reason"]
     assert daemon.ends() == 1
     assert daemon.log() == ["power taken", "loop stopped", "service stopped"]
+
+
+def test_a_mistake_of_the_launcher_leaves_the_loop_the_time_to_lower(start: Start) -> None:
+    plan = {"mistake": "in the middle of it", "stopping_s": 3.0, "lowering_s": 30.0, "stop_s": 1.0}
+    daemon = start(plan)
+    daemon.line("ready")
+    daemon.process.terminate()  # and its notice of that fails
+    assert daemon.ends() == 1
+    assert daemon.log() == ["loop stopped", "service stopped"]
+
+
+def test_where_the_service_cannot_be_started_the_loop_is_ended_first(start: Start) -> None:
+    daemon = start({"no_service": True, "stopping_s": 1.0})
+    assert daemon.ends() == 1
+    assert daemon.log() == ["loop stopped"]
+    assert not (daemon.folder / "control.launcher").exists()
+
+
+def test_a_socket_of_somebody_else_does_not_make_a_daemon_ready(
+    start: Start, tmp_path: Path
+) -> None:
+    with socket.socket(socket.AF_UNIX) as other:
+        other.bind(str(tmp_path / "control.sock"))
+        other.listen()
+        daemon = start({"refuse_service": 1})
+        assert daemon.process.stdout is not None
+        told = [json.loads(line) for line in daemon.process.stdout]
+    assert not any("ready" in line for line in told)
+    assert "the service could not begin" in told[-1]["reason"]
+    assert daemon.ends() == 1
+
+
+def test_the_robot_is_locked_until_the_loop_of_a_killed_launcher_has_ended(start: Start) -> None:
+    daemon = start({"stopping_s": 2.0})
+    daemon.line("ready")
+    loop, control = daemon.pid("loop"), daemon.folder / "control.sock"
+    with pytest.raises(BadInputError, match=f"runs there already, process {daemon.process.pid};"):
+        LauncherLock(control)
+    daemon.process.kill()
+    daemon.process.wait()
+    assert _is_child(loop)
+    end = time.monotonic() + TIMEOUT_S
+    while time.monotonic() < end:
+        with suppress(BadInputError), LauncherLock(control):
+            assert not _is_child(loop)
+            assert not LoopFile.beside(control).exists()  # which named the loop that has ended
+            return
+    raise AssertionError("it stays locked")
 
 
 def test_the_loop_is_named_beside_the_socket_for_this_user_while_it_runs(start: Start) -> None:

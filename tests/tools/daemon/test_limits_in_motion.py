@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from cdpr_drivers.cia402 import STATE_TABLE, State
-from cdpr_profiles.limits.robot_limits import Limit
-from cdpr_profiles.reading.places import SHIPPED
+from cdpr_profiles.places import SHIPPED
+from cdpr_profiles.robot_limits import Limit
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.control.base import Idle
 from cdpr_rt.core.cycle_row import Row

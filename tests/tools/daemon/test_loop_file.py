@@ -13,10 +13,11 @@ from typing import Any
 
 import pytest
 
+from cdpr_rt.core.shared_block import SharedBlock
 from cdpr_tools.daemon.estop import EmergencyStop, EmergencyStopResult
-from cdpr_tools.daemon.loop_file import LoopFile, started
-from cdpr_tools.daemon.paths import find_loop_files, find_sockets, is_trusted, unsearched_folders
-from cdpr_tools.errors import WorkFailedError
+from cdpr_tools.daemon.loop_file import LauncherLock, LoopFile, find_loops, started
+from cdpr_tools.daemon.paths import find_sockets, is_trusted, unsearched_folders
+from cdpr_tools.errors import BadInputError, WorkFailedError
 
 NOBODY = 65534
 OBEYS = "import signal, sys; signal.signal(signal.SIGUSR1, print); print(1, flush=True); input()"
@@ -159,16 +160,55 @@ def test_a_folder_that_another_has_made_is_not_looked_into(
     folder = tmp_path / "cdpr-rt"
     folder.mkdir(mode=0o700)
     (folder / "r.loop").write_text(json.dumps(named(process.pid)))
-    assert find_loop_files("r") == [folder / "r.loop"]
+    assert find_loops("r") == [folder / "r.loop"]
     assert unsearched_folders() == ""
     give_away(folder)
-    assert find_loop_files("r") == find_sockets("r") == []
+    assert find_loops("r") == find_sockets("r") == []
     for command in (("estop",), ("estop", "r"), ("status",), ("disable",)):
         told = cdpr(*command)
         assert told.returncode == 1
         assert f"{folder} is open to others or not this user's" in told.stderr
         assert "Traceback" not in told.stderr
     assert process.poll() is None
+
+
+@pytest.mark.parametrize(
+    ("asked", "found"),
+    [
+        ("left", True),  # the robot's own name
+        ("r", True),  # that of its socket
+        ("right", False),
+        ("left.toml", True),
+        ("elsewhere/left.toml", False),
+    ],
+)
+def test_the_loop_of_a_robot_is_that_which_runs_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, asked: str, found: bool
+) -> None:
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+    monkeypatch.chdir(tmp_path)
+    path = tmp_path / "cdpr-rt" / "r.loop"
+    path.parent.mkdir(mode=0o700)
+    runs = str(tmp_path / "left.toml")
+    path.write_text(json.dumps(named(os.getpid(), robot="left", reference=runs)))
+    assert find_loops(asked) == [path] * found
+
+
+def test_what_other_drives_say_confirms_nothing(tmp_path: Path) -> None:
+    """The memory is that of the loop that was signalled, or no answer."""
+    block = SharedBlock.create(1, 0.1, 100.0)
+    block.counters["loop_pid"] = os.getpid()
+    command = [sys.executable, "-c", OBEYS]
+    with subprocess.Popen(
+        command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, pass_fds=[block.fd]
+    ) as loop:
+        assert loop.stdout is not None and loop.stdout.readline() == b"1\n"
+        path = tmp_path / "r.loop"
+        path.write_text(json.dumps(named(loop.pid, block_fd=block.fd)))
+        outcome = stopped(path)
+        loop.kill()
+    assert not outcome.confirmed
+    assert "the shared memory is another loop's" in outcome.text
 
 
 def test_a_strangers_socket_is_not_spoken_to(tmp_path: Path) -> None:
@@ -178,7 +218,7 @@ def test_a_strangers_socket_is_not_spoken_to(tmp_path: Path) -> None:
         os.chown(path, NOBODY, NOBODY)
         told = cdpr("disable", "--socket", path)
         assert told.returncode == 2
-        assert f"{path}: was put there by user {NOBODY}, not by you" in told.stderr
+        assert f"{path}: belongs to user {NOBODY}, not to you or root" in told.stderr
     told = cdpr("disable", "--socket", tmp_path / "none.sock")
     assert told.returncode == 1
     assert "no daemon answers" in told.stderr
@@ -196,3 +236,18 @@ def test_a_second_daemon_does_not_take_the_place_of_one_whose_service_is_startin
     told = cdpr(*run, tmp_path / "r.sock")
     assert told.returncode == 2
     assert "a daemon runs there already" in told.stderr
+
+
+def test_the_lock_of_a_process_that_is_left_stays_on_a_file(tmp_path: Path) -> None:
+    control, file = tmp_path / "control.sock", tmp_path / "control.launcher"
+    with LauncherLock(control) as lock:
+        child = subprocess.Popen(
+            [sys.executable, "-c", "input()"], stdin=subprocess.PIPE, pass_fds=[lock.fd]
+        )
+    assert file.exists()
+    with pytest.raises(BadInputError, match="a daemon runs there already"):
+        LauncherLock(control)
+    child.communicate(b"\n", timeout=60)
+    with LauncherLock(control):
+        pass
+    assert not file.exists()

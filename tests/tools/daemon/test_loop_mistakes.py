@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import io
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -13,11 +15,11 @@ from cdpr_drivers.robot.machine import RobotMachine
 from cdpr_profiles import load_robot
 from cdpr_rt.core.shared_block import SharedBlock
 from cdpr_rt.core.states import LoopState, Reaction
-from cdpr_rt.programs.axes.axis_program import AxisProgram
+from cdpr_rt.model.robot_arrays import limits_of
+from cdpr_rt.programs.axis_program import AxisProgram
 from cdpr_rt.programs.idle import IdleProgram
 from cdpr_rt.programs.model import model_of
 from cdpr_rt.programs.registry import build_programs
-from cdpr_rt.robots.robot_arrays import limits_of
 from tests.tools.daemon.loop_rig import LoopRig, opened
 from tests.tools.robot_rig import robot_file, simulated
 
@@ -66,6 +68,25 @@ def test_where_a_limit_ends_it_the_drives_brake_by_themselves(rig: LoopRig) -> N
     assert all(state in POWER_OFF for state in rig.machine._booted.states())
 
 
+@pytest.mark.parametrize("way", ["command", "limit"])
+def test_its_traceback_is_printed_after_the_power_is_removed(
+    rig: LoopRig, monkeypatch: pytest.MonkeyPatch, way: str
+) -> None:
+    had_power = []
+
+    class Terminal(io.StringIO):
+        def write(self, text: str) -> int:
+            had_power.append(rig.loop.engine.driving)
+            return super().write(text)
+
+    monkeypatch.setattr(sys, "stderr", Terminal())
+    if way == "command":
+        rig.command("disable")
+    else:
+        rig.loop.safe_stop.stop(Reaction.CONTROLLED_STOP, LoopState.FAULT)
+    assert had_power and not any(had_power)
+
+
 def test_a_command_that_comes_while_it_is_being_stopped_is_told_why_that_is(rig: LoopRig) -> None:
     rig.loop.life.set_reason("axis 1: slack")
     rig.loop.safe_stop.stop(Reaction.CONTROLLED_STOP, LoopState.FAULT)
@@ -97,6 +118,19 @@ def test_a_status_that_cannot_be_written_ends_no_loop(
     if what != "everything":
         assert rig.block.status()["state"] == before
     rig.obeyed("hold")
+
+
+def test_a_long_error_of_a_program_leaves_the_faults_in_the_status(
+    rig: LoopRig, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(*_: object) -> None:
+        raise ValueError("\u00e9" * 20000)
+
+    monkeypatch.setattr(rig.loop.engine.program, "update", fail)
+    rig.turn_until(lambda: rig.state is LoopState.FAULT and not rig.loop.busy)
+    (fault,) = rig.block.status()["faults"]
+    assert fault["code"] == "program"
+    assert "ValueError: \u00e9" in fault["text"]
 
 
 def test_long_words_are_answered(rig: LoopRig) -> None:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from cdpr_tools.daemon.processes import service_process
+from cdpr_tools.daemon import service_process
 
 
 def test_a_file_does_not_take_more_memory_than_it_is_given(

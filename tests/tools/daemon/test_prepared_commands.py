@@ -7,12 +7,13 @@ from typing import Any
 
 import pytest
 
-from cdpr_profiles.limits.robot_limits import Limit
+from cdpr_profiles.robot_limits import Limit
+from cdpr_rt.core.fault import BUS_LOST, Fault
 from cdpr_rt.core.states import LoopState
-from cdpr_rt.programs.arguments import ProgramError
+from cdpr_rt.model.robot_arrays import limits_of
+from cdpr_rt.programs.base import ProgramError
 from cdpr_rt.programs.idle import IdleProgram
 from cdpr_rt.programs.model import model_of
-from cdpr_rt.robots.robot_arrays import limits_of
 from tests.tools.daemon.loop_rig import LoopRig, opened
 from tests.tools.robot_rig import robot_file, simulated
 
@@ -110,12 +111,13 @@ def test_what_the_supervisor_finds_meanwhile_ends_it(
 ) -> None:
     number = begun_in_a_jog(rig, f"with {limit}")
     supervisor = rig.loop.engine.parts.supervisor
+    fault = Fault(limit, 0, BUS_LOST, detail="this was found")
     with monkeypatch.context() as found:
-        found.setattr(supervisor, "check", lambda *_: supervisor.report(limit, "this was found"))
+        found.setattr(supervisor, "check", lambda *_: supervisor.report(fault))
         rig.turn(1)
-    assert answer_to(rig, number) == "given up: this was found"
+    assert answer_to(rig, number) == "given up: axis 1: this was found"
     rig.turn_until(lambda: not rig.loop.busy)
-    assert rig.status["reason"].startswith("this was found")
+    assert rig.status["reason"].startswith("axis 1: this was found")
     faulty = limit is Limit.DRIVE
     assert rig.loop.engine.program.name == ("idle" if faulty else "hold")
     assert rig.state is (LoopState.FAULT if faulty else LoopState.ACTIVE)

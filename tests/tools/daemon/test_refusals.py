@@ -5,13 +5,14 @@ from __future__ import annotations
 import pickle
 import socket
 import threading
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from cdpr_rt.refusal import CommandRefusal, RefusalCode
-from cdpr_tools.client.client import open_daemon
+from cdpr_tools.client.client import CrowdedError, ServiceRefusalError, open_daemon
 from cdpr_tools.client.refusals import DaemonRefusalError, in_typed_words
 from cdpr_tools.errors import BadInputError, WorkFailedError
 
@@ -122,7 +123,7 @@ def test_the_error_goes_from_process_to_process_and_takes_other_words() -> None:
             "its words",
         ),
         (b'"ready"', b"null", DaemonRefusalError, "its words"),
-        (b"null", b"null", WorkFailedError, "its words"),  # the service's, such as of the right
+        (b"null", b"null", ServiceRefusalError, "its words"),  # the service's, such as of the right
     ],
 )
 def test_a_daemon_s_answer_is_raised_with_its_code(
@@ -148,3 +149,27 @@ def test_a_daemon_s_answer_is_raised_with_its_code(
         thread.join()
     assert type(raised.value) is kind
     assert str(raised.value) == words
+
+
+def test_a_stop_is_sent_again_to_a_service_with_too_many_connections() -> None:
+    crowded = b"HTTP/1.1 503 Service Unavailable\r\nContent-Length: 19\r\nConnection: close\r\n\r\n"
+    held = b'{"state": "active", "text": ""}'
+    head = b"HTTP/1.1 200 OK\r\nContent-Length: %d\r\nConnection: close\r\n\r\n" % len(held)
+    answers = [crowded + b"Service Unavailable"] * 3 + [head + held]
+
+    def serve() -> None:
+        for answer in answers:
+            connection, _ = served.accept()
+            with connection:
+                connection.recv(1 << 16)
+                connection.sendall(answer)
+
+    with socket.create_server(("127.0.0.1", 0)) as served:
+        served.settimeout(10.0)
+        url = f"http://127.0.0.1:{served.getsockname()[1]}"
+        with open_daemon(None, None, url, None) as daemon, ThreadPoolExecutor(1) as pool:
+            served_all = pool.submit(serve)
+            with pytest.raises(CrowdedError, match="too many connections"):
+                daemon.post("/program")
+            assert daemon.post("/hold")["state"] == "active"
+            served_all.result()

@@ -17,8 +17,8 @@ import pytest
 
 from cdpr_rt.core.states import LoopState
 from cdpr_rt.service.lease import LeaseError
-from cdpr_rt.service.streams.stream_packet import Bye, StreamSession, StreamSetpoint, seal
-from cdpr_rt.service.streams.stream_sessions import StreamSessionManager
+from cdpr_rt.service.setpoint_stream import StreamSessionManager
+from cdpr_rt.service.stream_packet import Bye, StreamSession, StreamSetpoint, seal
 from tests.tools.daemon.loop_rig import LoopRig, opened
 from tests.tools.robot_rig import robot_file, simulated
 

@@ -15,9 +15,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from cdpr_profiles import load_robot
-from cdpr_tools.commands.daemon.service_unit import service_unit
+from cdpr_tools.commands.service_unit import service_unit
+from cdpr_tools.daemon.launcher import ServiceManager
 from cdpr_tools.daemon.paths import default_socket, find_sockets
-from cdpr_tools.daemon.processes.notify import ServiceManager
 from cdpr_tools.daemon.settings import Address, RunSettings, is_loopback, read_key
 from cdpr_tools.errors import BadInputError
 

@@ -3,18 +3,25 @@
 from __future__ import annotations
 
 import os
+import signal
 import socket
+import socketserver
+import subprocess
+import sys
 import tempfile
+import threading
 from collections.abc import Iterator
+from http.server import BaseHTTPRequestHandler
 from pathlib import Path
 
 import pytest
 from typing_extensions import override
 
 from cdpr_tools.client.client import NoDaemonError, await_socket, open_daemon
-from cdpr_tools.daemon.loop_file import launcher_does, named_launcher, started
+from cdpr_tools.daemon.loop_file import LauncherLock, launcher_does, started
 from cdpr_tools.daemon.paths import LAUNCHER_SUFFIX, default_socket
 from cdpr_tools.output import Output
+from tests.cdpr_here import cdpr_here
 
 
 @pytest.fixture
@@ -48,7 +55,7 @@ class ComesUp(Output):
 @pytest.mark.parametrize("named", [True, False])
 def test_a_daemon_whose_launcher_runs_is_waited_for(path: Path, named: bool) -> None:
     out = ComesUp(path)
-    with named_launcher(path), out.server:
+    with LauncherLock(path), out.server:
         await_socket("mine" if named else None, None if named else path, out)
     assert out.told == [
         "the daemon is still starting: its simulated drives and its processes come up ..."
@@ -58,10 +65,10 @@ def test_a_daemon_whose_launcher_runs_is_waited_for(path: Path, named: bool) -> 
 
 def test_it_is_told_what_a_daemon_that_starts_is_doing(path: Path) -> None:
     mark, out = path.with_suffix(LAUNCHER_SUFFIX), ComesUp(path)
-    with named_launcher(path) as tell, out.server:
+    with LauncherLock(path) as lock, out.server:
         assert launcher_does(mark) == ""
         for text in ("compiling the numerics, with many words", "compiling: 7 kernels so far"):
-            tell(text)
+            lock.tell(text)
             assert launcher_does(mark) == text  # nothing is left of a longer one before
         with pytest.raises(NoDaemonError, match=r"mine is still starting, compiling: 7 kernels so"):
             where("mine")
@@ -82,3 +89,46 @@ def test_nobody_waits_for_one_that_nobody_starts(path: Path) -> None:
     os.mkfifo(mark)
     assert launcher_does(mark) is None
     assert out.told == []
+
+
+class StillStarting(BaseHTTPRequestHandler):
+    """Answers as the service of a daemon whose loop is still loaded."""
+
+    def do_GET(self) -> None:
+        content = b'{"state": "starting"}'
+        self.send_response(200)
+        self.send_header("Content-Length", str(len(content)))
+        self.end_headers()
+        self.wfile.write(content)
+
+    @override
+    def log_message(self, *_: object) -> None:
+        pass
+
+    @override
+    def address_string(self) -> str:
+        return ""
+
+
+@pytest.mark.parametrize("answers", [False, True])
+def test_stop_ends_a_daemon_that_is_starting(path: Path, answers: bool) -> None:
+    if answers:
+        server = socketserver.UnixStreamServer(str(path), StillStarting)
+        threading.Thread(target=server.serve_forever, daemon=True).start()
+    starts = (
+        "import signal, sys; from pathlib import Path\n"
+        "from cdpr_tools.daemon.loop_file import LauncherLock\n"
+        "lock = LauncherLock(Path(sys.argv[1])); print(flush=True); signal.pause()"
+    )
+    command = [sys.executable, "-c", starts, path]
+    with subprocess.Popen(command, stdout=subprocess.PIPE) as launcher:
+        assert launcher.stdout is not None and launcher.stdout.readline()
+        done = cdpr_here("stop", "--robot", "mine")
+        launcher.kill()
+    assert (done.returncode, done.stdout) == (0, "mine: its daemon was starting; it has ended\n")
+    assert launcher.returncode == -signal.SIGTERM
+    if answers:
+        server.shutdown()
+        server.server_close()
+        path.unlink()
+    assert cdpr_here("stop", "--robot", "mine").stdout == "nothing runs\n"

@@ -7,8 +7,10 @@ from typing import Any
 import pytest
 from rich.table import Table
 
-from cdpr_tools.client.motion import ProgressNotes, finish
+from cdpr_profiles import load_robot
+from cdpr_tools.client.motion import Outcome, finish
 from cdpr_tools.client.status_text import (
+    ProgressNotes,
     after_stop_text,
     compensation_text,
     death_text,
@@ -18,6 +20,7 @@ from cdpr_tools.client.status_text import (
 )
 from cdpr_tools.errors import WorkFailedError
 from cdpr_tools.output import Output
+from tests.profiles.test_geometry_calibration import calibration
 
 
 def status_of(**keys: Any) -> dict[str, Any]:
@@ -30,6 +33,7 @@ def status_of(**keys: Any) -> dict[str, Any]:
         "reason": "",
         "notices": [],
         "axes": [{"name": "left"}],
+        "calibration": None,
         "cycle": None,
         "control": {"held": False},
         "loop": {"silent_s": 0.0},
@@ -52,6 +56,19 @@ def test_a_held_platform_tells_how_well_its_lengths_agree(
         "late_cycles": 0, "lengths_disagree_m": disagree_m,
     }  # fmt: skip
     assert f"held by its cables{told}" in [str(line) for line in status_text(status).renderables]
+
+
+def test_the_calibration_in_force_is_shown_with_how_well_it_knows_positions() -> None:
+    shown = [str(line) for line in status_text(status_of()).renderables]
+    assert not any("calibration" in line for line in shown)
+    known = calibration(load_robot("planar-4")).model_copy(
+        update={"predicted_3_sigma_deg": 0.12, "absolute_3_sigma_mm": 14.6}
+    )
+    shown = [str(line) for line in status_text(status_of(calibration=known.summary())).renderables]
+    (line,) = (line for line in shown if "calibration" in line)
+    assert line.startswith(f"calibration 1 ({known.identity}) of 2026-03-04 05:06 UTC is in force")
+    for figure in ("0.50 mm", "0.120 deg", "absolute positions are known to 14.6 mm", "3 sigma"):
+        assert figure in line
 
 
 def test_what_was_counted_on_a_bus_is_shown() -> None:
@@ -136,8 +153,8 @@ def test_what_was_learnt_of_the_motors_is_told_once_it_is_something() -> None:
 @pytest.mark.parametrize(
     ("told", "power"),
     [
-        ({"driving": True}, "drives that had power stop by themselves"),
-        ({"busy": True}, "drives that had power stop by themselves"),
+        ({"driving": True}, "drives that had power stop without its heartbeat"),
+        ({"busy": True}, "drives that had power stop without its heartbeat"),
         ({}, "its drives had been told to have no power"),
         ({"read_only": True, "driving": True}, "it only listened"),
     ],
@@ -163,23 +180,23 @@ def test_a_loop_that_hangs_is_told_before_all_that_is_of_the_time_before() -> No
     status = status_of(program="hold") | {"driving": True, "loop": {"silent_s": 13.6}}
     lines = [str(line) for line in status_text(status).renderables[:-1]]
     assert lines[1] == "the loop has not turned for 13.6 s: what follows is of then"
-    assert lines[2].startswith("drives that had power stop by themselves")
+    assert lines[2].startswith("drives that had power stop without its heartbeat")
     # in lockstep the simulated drives' time stands with it
     lines = [str(line) for line in status_text(status | {"lockstep": True}).renderables[:-1]]
     assert lines[1].startswith("the loop has not turned")
-    assert not any("by themselves" in line for line in lines)
+    assert not any("stop without" in line for line in lines)
 
 
 def test_a_stop_under_way_has_a_reason_also_where_the_loop_gives_none() -> None:
     class Stopping:
-        def get(self, path: str) -> dict[str, Any]:
-            if path == "/events":
-                texts = [("command", "disable by eve@lab"), ("state", "active")]
-                return {"events": [{"kind": kind, "text": text} for kind, text in texts]}
-            return status_of(state="active", program="lower", reacting="controlled stop")
+        def get(self, _path: str) -> dict[str, Any]:
+            return status_of(
+                state="active", program="lower", reacting="controlled stop",
+                commanded="disable by eve@lab",
+            )  # fmt: skip
 
     with pytest.raises(WorkFailedError, match=r"^disable by eve@lab \(controlled stop under way"):
-        finish(Stopping(), Output(False), stopped=False)  # type: ignore[arg-type]
+        finish(Stopping(), Output(False), Outcome())  # type: ignore[arg-type]
 
 
 def test_a_platform_of_unknown_pose_is_not_told_to_be_taken_home() -> None:

@@ -14,10 +14,13 @@ import pytest
 
 from cdpr_tools.errors import BadInputError, WorkFailedError
 from cdpr_tools.experiment import experiment
-from cdpr_tools.experiment.model.parameters import OperatorParameters, Station
-from cdpr_tools.experiment.points import points_of_session
-from cdpr_tools.experiment.session import ExperimentSettings, run_session
-from cdpr_tools.experiment.trial import Condition
+from cdpr_tools.experiment.operator import OperatorParameters, Station
+from cdpr_tools.experiment.trial import (
+    Condition,
+    ExperimentSettings,
+    points_of_session,
+    run_session,
+)
 from cdpr_tools.output import Output
 
 pytestmark = pytest.mark.long
@@ -36,7 +39,7 @@ def session(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Two targets with motors of which nothing is known, and an operator who is soon content."""
     folder = tmp_path_factory.mktemp("experiment") / "A-350ms-1"
     with pytest.MonkeyPatch.context() as patch:
-        short = "cdpr_tools.experiment.session.targets_m"
+        short = "cdpr_tools.experiment.trial.targets_m"
         patch.setattr(short, lambda centre: centre + np.array(OFFSETS_M))
         run_session(SETTINGS, [CONDITION], folder)
     return folder
@@ -130,7 +133,7 @@ def test_the_operator_alone_as_one_line_of_json() -> None:
 def test_bad_input_is_one_message(arguments: list[str], message: str, tmp_path: Path) -> None:
     from typer.testing import CliRunner  # noqa: PLC0415
 
-    from cdpr_tools.commands.daemon.teleop import app  # noqa: PLC0415
+    from cdpr_tools.commands.teleop import app  # noqa: PLC0415
 
     where = [] if "--out" in arguments or "--again" in arguments else ["--out", str(tmp_path / "x")]
     result = CliRunner().invoke(app, ["experiment", *arguments, *where])

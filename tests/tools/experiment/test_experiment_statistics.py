@@ -5,10 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cdpr_tools.experiment import figures, thesis
-from cdpr_tools.experiment.points import POINT
-from cdpr_tools.experiment.report import lines
-from cdpr_tools.experiment.statistics import rows, run_times_s, variance_analysis
+from cdpr_tools.experiment import tables
+from cdpr_tools.experiment.tables import PLACE, SCALE, lines, rows, run_times_s, variance_analysis
+from cdpr_tools.experiment.trial import POINT
 
 
 def made_up(sigma_mm: dict[float, float], runs: int = 30) -> np.ndarray:
@@ -37,49 +36,41 @@ def row(variable: str, level: str) -> dict:
 
 
 def test_means_and_three_sigma_of_each_level() -> None:
-    of_scale = row(thesis.SCALE, "8:1")
+    of_scale = row(SCALE, "8:1")
     assert of_scale["mean_mm"] == pytest.approx([0.2, -0.1], abs=0.12)
     assert of_scale["three_sigma_mm"] == pytest.approx([2.7, 2.7], rel=0.1)
     assert of_scale["targets"] == 600
     assert of_scale["runs"] == 60
     both = np.sqrt((0.3**2 + 0.9**2) / 2.0)
-    assert row(thesis.PLACE, "A")["three_sigma_mm"] == pytest.approx([3 * both] * 2, rel=0.1)
+    assert row(PLACE, "A")["three_sigma_mm"] == pytest.approx([3 * both] * 2, rel=0.1)
 
 
 def test_half_of_the_thesis_is_what_counts() -> None:
-    assert row(thesis.SCALE, "2:1")["reached"]  # 0.9 mm: at most 1.66 and 1.195
-    assert not row(thesis.SCALE, "8:1")["reached"]  # 2.7 mm: at most 2.65 and 2.435
-    assert row(thesis.SCALE, "8:1")["share_of_thesis"][1] == pytest.approx(2.7 / 4.87, rel=0.1)
-    assert row(thesis.OPERATION, "350 ms")["thesis"]["level"] == "on site"
-    assert row(thesis.OPERATION, "730 ms")["thesis"]["level"] == "remote"
+    assert row(SCALE, "2:1")["reached"]  # 0.9 mm: at most 1.66 and 1.195
+    assert not row(SCALE, "8:1")["reached"]  # 2.7 mm: at most 2.65 and 2.435
+    assert row(SCALE, "8:1")["share_of_thesis"][1] == pytest.approx(2.7 / 4.87, rel=0.1)
+    assert row(tables.OPERATION, "350 ms")["thesis"]["level"] == "on site"
+    assert row(tables.OPERATION, "730 ms")["thesis"]["level"] == "remote"
 
 
 def test_time_is_that_of_whole_runs() -> None:
     assert sorted(set(run_times_s(POINTS))) == [100.0, 101.0]
-    assert row(thesis.OPERATION, "350 ms")["time_s"] == pytest.approx(101.0)
-    assert row(thesis.PLACE, "B")["time_sigma_s"] == pytest.approx(0.5, rel=0.05)
-
-
-def test_the_thesis_rows_are_those_of_its_tables() -> None:
-    assert len(thesis.ROWS) == 9
-    assert max(max(r.three_sigma_mm) for r in thesis.ROWS) == 5.30
+    assert row(tables.OPERATION, "350 ms")["time_s"] == pytest.approx(101.0)
+    assert row(PLACE, "B")["time_sigma_s"] == pytest.approx(0.5, rel=0.05)
 
 
 def test_variance_analysis_finds_what_differs_and_nothing_else() -> None:
     found = {one["variable"]: one for one in variance_analysis(POINTS)}
-    assert found[thesis.SCALE]["differs"]
-    assert found[thesis.SCALE]["degrees_of_freedom"] == [1, 1198]
-    assert not found[thesis.PLACE]["differs"]
+    assert found[SCALE]["differs"]
+    assert found[SCALE]["degrees_of_freedom"] == [1, 1198]
+    assert not found[PLACE]["differs"]
     norms = 1e3 * np.linalg.norm(POINTS["error_m"], axis=1)
     groups = [norms[POINTS["scale"] == scale] for scale in (2.0, 8.0)]
     between = sum(len(g) * (g.mean() - norms.mean()) ** 2 for g in groups)
     within = sum(((g - g.mean()) ** 2).sum() for g in groups) / (len(norms) - 2)
-    assert found[thesis.SCALE]["F"] == pytest.approx(between / within)
-
-
-def test_a_variable_with_one_level_has_no_analysis() -> None:
+    assert found[SCALE]["F"] == pytest.approx(between / within)
     alone = POINTS[POINTS["scale"] == 2.0]
-    assert thesis.SCALE not in {one["variable"] for one in variance_analysis(alone)}
+    assert SCALE not in {one["variable"] for one in variance_analysis(alone)}
 
 
 def test_the_text_names_the_rows_above_half() -> None:
@@ -93,10 +84,10 @@ def test_the_text_names_the_rows_above_half() -> None:
 
 
 def test_pictures_show_every_error_and_the_thesis_bars(tmp_path) -> None:
-    drawn = figures.draw(POINTS, POINTS, tmp_path)
+    drawn = tables.draw(POINTS, tmp_path)
     assert [path.name for path in drawn] == [
-        "figure-2.10.png", "figure-2.11.png", "figure-2.12.png", "parts.png",
+        "figure-2.10.png", "figure-2.11.png", "figure-2.12.png",
     ]  # fmt: skip
     assert all(path.stat().st_size > 10_000 for path in drawn)
-    cloud = figures.errors(POINTS, thesis.SCALE, "").axes[0]
+    cloud = tables.errors(POINTS, tables.VARIABLES[SCALE]).axes[0]
     assert sum(len(line.get_xdata()) for line in cloud.lines) == len(POINTS)

@@ -11,14 +11,23 @@ from scipy import signal
 from cdpr_profiles import load_robot
 from cdpr_tools.errors import BadInputError, WorkFailedError
 from cdpr_tools.experiment import trial
-from cdpr_tools.experiment.model.hand_model import HandModel, PositionFilter
-from cdpr_tools.experiment.model.parameters import OperatorParameters, Station
-from cdpr_tools.experiment.model.plants import PerfectRobot
-from cdpr_tools.experiment.model.vision import VisionModel
-from cdpr_tools.experiment.path import PLACES, centre_m, place_of, plane_of, targets_m
-from cdpr_tools.experiment.points import points_of_perfect_robot
-from cdpr_tools.experiment.statistics import spread_mm
-from cdpr_tools.experiment.trial import PACKET_S, SHARE_THERE, Condition, run_trial
+from cdpr_tools.experiment.operator import (
+    HandModel,
+    OperatorParameters,
+    Station,
+)
+from cdpr_tools.experiment.tables import spread_mm
+from cdpr_tools.experiment.trial import (
+    PACKET_S,
+    Condition,
+    PerfectRobot,
+    centre_m,
+    place_of,
+    plane_of,
+    points_of_perfect_robot,
+    run_trial,
+    targets_m,
+)
 from cdpr_tools.trials.directions import Directions, platform_of
 
 ROBOT = load_robot("planar-3")
@@ -62,39 +71,6 @@ def test_a_hand_at_rest_trembles_between_8_and_12_hertz_and_wanders_slowly() -> 
     assert np.sqrt(power[frequency < 2.0].sum()) == pytest.approx(OPERATOR.drift_m, rel=0.25)
 
 
-def test_the_master_knows_only_its_steps() -> None:
-    steps = hand_at_rest(5.0) / OPERATOR.master_step_m
-    assert np.abs(steps - np.round(steps)).max() < 1e-6
-    assert len(np.unique(np.round(steps[:, 0]))) > 2
-
-
-def test_a_steadied_hand_trembles_less_and_ends_where_the_hand_ends() -> None:
-    raw = hand_at_rest(60.0, drift_m=1e-9)
-    steady = PositionFilter(PACKET_S)
-    smooth = np.array([steady.update(x) for x in raw])
-    assert smooth[100:].std() < 0.3 * raw[100:].std()
-    way = np.linspace(0.0, 0.1, 25)[:, None] * [1.0, -0.5]
-    steady = PositionFilter(PACKET_S)
-    for place in (*way, *[way[-1]] * 100):
-        last = steady.update(place)
-    assert last == pytest.approx(way[-1], abs=1e-6)
-
-
-def test_pictures_come_late_and_in_pixels() -> None:
-    exact = replace(OPERATOR, sight_pixel_m=1e-9)
-    vision = VisionModel(exact, 0.3, np.random.default_rng(1))
-    for k in range(40):
-        vision.show(k * PACKET_S, np.array([k * 1e-3, 0.0]))
-    newest = vision.seen[-1]
-    assert 39 * PACKET_S - newest.taken_s >= 0.3 - 1e-9
-    assert 39 * PACKET_S - newest.taken_s < 0.3 + OPERATOR.frame_s
-    target = np.array([0.03, 0.0])
-    assert vision.judge([newest], target) == pytest.approx(target - newest.platform_m, abs=1e-7)
-    coarse = VisionModel(OPERATOR, 0.3, np.random.default_rng(1))
-    judged = [coarse.judge([newest], target) for _ in range(4000)]
-    assert np.std(judged, axis=0) == pytest.approx(OPERATOR.sight_pixel_m, rel=0.05)
-
-
 def test_all_targets_are_reached_in_their_order_and_the_parts_make_the_error() -> None:
     found = points()
     assert found["target"].tolist() == [*range(10)] * 2
@@ -109,7 +85,7 @@ def test_with_the_clutch_the_hand_moves_nothing_between_look_and_confirmation() 
 
 
 def test_without_clutch_the_hand_is_that_of_the_thesis() -> None:
-    """There the variance grows by (0.18 mm * scale)^2 (docs/experiment.md); here alike."""
+    """There the variance grows by (0.18 mm * scale)^2 (docs/how-to/experiment.md); here alike."""
     spread_at = {
         scale: spread_mm(points(scale, 0.0, OF_THE_THESIS)["hand_m"]).mean() for scale in (2, 8)
     }
@@ -132,22 +108,8 @@ def test_the_same_seed_gives_the_same_run() -> None:
     assert not np.array_equal(other["error_m"], once["error_m"])
 
 
-def test_packets_arrive_after_their_share_of_the_round_trip() -> None:
-    delays_s: list[float] = []
-
-    class Noting(PerfectRobot):
-        def send(self, sent_s: float, *rest: object) -> None:  # type: ignore[override]
-            delays_s.append(self.now_s - sent_s)
-            super().send(sent_s, *rest)  # type: ignore[arg-type]
-
-    robot = Noting(PLATFORM, CENTRE)
-    condition = Condition("A", 4.0, 0.8, 0)
-    run_trial(robot, condition, targets_m(CENTRE)[:1], OPERATOR, OURS, 1)
-    assert delays_s == pytest.approx([SHARE_THERE * 0.8] * len(delays_s), abs=6e-3)
-
-
 def test_a_robot_that_does_not_move_is_given_up(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(trial, "_LONGEST_S", 20.0)
+    monkeypatch.setattr(trial, "LONGEST_S", 20.0)
 
     class Stuck(PerfectRobot):
         def send(self, *_: object) -> None:
@@ -162,18 +124,6 @@ def test_a_robot_that_does_not_move_is_given_up(monkeypatch: pytest.MonkeyPatch)
             OURS,
             1,
         )
-
-
-def test_the_path_spans_the_pattern_right_half_first() -> None:
-    path = (targets_m(CENTRE) - CENTRE) * 1e3
-    assert len(path) == 10
-    assert np.ptp(path, axis=0) == pytest.approx([600.0, 300.0])
-    assert np.all(path[:4, 0] > 0.0) and np.all(path[5:9, 0] < 0.0)
-    assert path[-1] == pytest.approx([0.0, 0.0])
-    low, high = np.array(PLATFORM.workspace_min_m), np.array(PLATFORM.workspace_max_m)
-    for place in PLACES:
-        inside = targets_m(centre_m(ROBOT, place))
-        assert np.all(inside > low) and np.all(inside < high)
 
 
 def test_no_room_for_the_pattern_is_told() -> None:

@@ -2,88 +2,61 @@
 
 from __future__ import annotations
 
-import socket
-import struct
+import json
+import os
 from pathlib import Path
 
 import pytest
 
 from cdpr_tools.host import host_checks
 from cdpr_tools.host.host_checks import (
-    CanInterface,
-    HostFinding,
     can_interface,
     list_interfaces,
     look_around,
-    parse_link,
     preemption,
 )
 
-LOOPBACK = 772  # ARPHRD_LOOPBACK
-CAN = 280
-UP = 1
 
-
-def attribute(kind: int, data: bytes) -> bytes:
-    return struct.pack("=HH", 4 + len(data), kind) + data + bytes(-len(data) % 4)
-
-
-def link(state: int | None, flags: int = UP, kind: bytes = b"can", queue: int = 10) -> bytes:
-    """Return an RTM_NEWLINK message as linux/if_link.h and linux/can/netlink.h lay it out."""
-    own = b""
-    if state is not None:
-        bit_timing = struct.pack("=8I", 500_000, 875, 125, 6, 7, 2, 1, 5)
-        own = attribute(1, bit_timing) + attribute(4, struct.pack("=I", state))
-    info = attribute(1, kind + b"\0") + (attribute(2 | 0x8000, own) if own else b"")
-    head = struct.pack("=BxHiII", socket.AF_UNSPEC, CAN, 7, flags, 0)
-    named = attribute(3, b"can0\0") + attribute(13, struct.pack("=I", queue))
-    return head + named + attribute(18 | 0x8000, info)
-
-
-def judged(message: bytes) -> HostFinding:
-    interface = parse_link(message)
-    assert interface is not None
-    return can_interface(interface)
+def link(state: str | None, flags: str = "UP", kind: str = "can", queue: int = 10) -> str:
+    """Return what `ip -details -json link show` prints of a CAN interface and a loopback."""
+    own = {"state": state, "bittiming": {"bitrate": 500_000, "sample_point": "0.875"}}
+    info = {"info_kind": kind} | ({} if state is None else {"info_data": own})
+    can = {"ifname": "can0", "flags": ["NOARP", flags], "txqlen": queue, "link_type": "can"}
+    loopback = {"ifname": "lo", "flags": ["UP"], "txqlen": 1000, "link_type": "loopback"}
+    return json.dumps([loopback, {**can, "linkinfo": info}])
 
 
 @pytest.mark.parametrize(
-    ("message", "level", "words"),
+    ("shown", "level", "words"),
     [
-        (link(0, queue=1000), "ok", "error-active, queue of 1000 frames, 500 kbit/s"),
-        (link(0), "note", "ip link set can0 txqueuelen 1000"),
-        (link(1, queue=1000), "note", "termination"),
-        (link(2, queue=1000), "note", "error-passive"),
-        (link(3, queue=1000), "problem", "ip link set can0 type can restart"),
-        (link(4, flags=0), "note", "ip link set can0 up type can bitrate"),
-        (link(None, kind=b"vcan", queue=1000), "ok", "up, queue of 1000 frames"),
-        (link(None, flags=0, kind=b"vcan"), "note", "ip link set can0 up"),
+        (link("ERROR-ACTIVE", queue=1000), "ok", "error-active, queue of 1000 frames, 500 kbit/s"),
+        (link("ERROR-ACTIVE"), "note", "ip link set can0 txqueuelen 1000"),
+        (link("ERROR-WARNING", queue=1000), "note", "termination"),
+        (link("ERROR-PASSIVE", queue=1000), "note", "error-passive"),
+        (link("BUS-OFF", queue=1000), "problem", "ip link set can0 type can restart"),
+        (link("STOPPED", flags=""), "note", "ip link set can0 up type can bitrate"),
+        (link(None, kind="vcan", queue=1000), "ok", "up, queue of 1000 frames"),
+        (link(None, flags="", kind="vcan"), "note", "ip link set can0 up"),
     ],
 )
-def test_a_can_interface_is_judged_by_what_the_kernel_tells(
-    message: bytes, level: str, words: str
+def test_a_can_interface_is_judged_by_what_ip_shows(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, shown: str, level: str, words: str
 ) -> None:
-    finding = judged(message)
-    assert (finding.what, finding.level) == ("CAN can0", level)
-    assert words in f"{finding.found} {finding.remedy}"
+    program = tmp_path / "ip"
+    program.write_text(f"#!/bin/sh\ncat <<'END'\n{shown}\nEND\n")
+    program.chmod(0o700)
+    monkeypatch.setenv("PATH", f"{tmp_path}:{os.environ['PATH']}")
+    (found,) = map(can_interface, list_interfaces())
+    assert (found.what, found.level) == ("CAN can0", level)
+    assert words in f"{found.found} {found.remedy}"
 
 
-def test_the_kernel_answers_in_the_same_words(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Every machine has a loopback; only its type tells it from a CAN interface."""
-    assert all(interface.name != "lo" for interface in list_interfaces())
-    monkeypatch.setattr(host_checks, "_ARPHRD_CAN", LOOPBACK)
-    (loopback,) = list_interfaces()
-    queue = int(Path("/sys/class/net/lo/tx_queue_len").read_text())
-    is_up = bool(int(Path("/sys/class/net/lo/flags").read_text(), 16) & UP)
-    assert loopback == CanInterface("lo", is_up, True, queue, "up" if is_up else "down")
-
-
-def test_what_is_cut_or_mangled_is_read_as_far_as_it_goes() -> None:
-    whole = link(0)
-    for end in range(16, len(whole)):
-        parse_link(whole[:end])
-        mangled = bytearray(whole)
-        mangled[end] ^= 0xFF
-        parse_link(bytes(mangled))
+def test_without_the_command_ip_doctor_asks_for_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("PATH", "/nowhere")
+    assert list_interfaces() == []
+    (found,) = (one for one in look_around() if one.what == "SocketCAN")
+    assert found.level == "note"
+    assert "iproute2" in found.remedy or "modprobe" in found.remedy  # a kernel without CAN
 
 
 @pytest.mark.parametrize(
@@ -134,3 +107,13 @@ def test_machines_of_another_kind(
     assert found.level == level
     assert remedy in found.remedy
     assert bool(found.remedy) == (level != "ok")
+
+
+def test_folders_that_cannot_be_written_are_reported(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("XDG_STATE_HOME", "XDG_RUNTIME_DIR"):
+        monkeypatch.setenv(name, "/proc/nowhere")
+    found = {one.what: one for one in look_around()}
+    assert found["compiled kernels"].level == "ok"
+    for what in ("state, recordings", "sockets"):
+        assert found[what].level == "note"
+        assert "/proc/nowhere/cdpr-rt" in found[what].found and found[what].remedy

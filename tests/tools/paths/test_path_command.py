@@ -11,9 +11,8 @@ from PIL import Image
 
 from cdpr_profiles import load_robot
 from cdpr_profiles.calibration.in_force import load_calibrated, take_over
-from cdpr_rt.programs.platform.paths.path_progress import paths_folder
-from cdpr_rt.programs.platform.paths.path_store import PathStore
-from cdpr_rt.robots.platform_model import platform_model_of
+from cdpr_rt.model.platform_model import platform_model_of
+from cdpr_rt.programs.path_store import PathStore, paths_folder
 from tests.profiles.test_geometry_calibration import calibration
 
 ORIGIN = "--origin=-150 100 1550"
@@ -57,8 +56,9 @@ def test_a_preview_with_picture_and_a_plan_for_the_daemon(file, tmp_path, monkey
     [
         (("Y100 Z50", "Y100 Z250"), [ORIGIN], "part.nc:4: at "),
         (("G21", "G20"), [ORIGIN], "part.nc:3: the path is .* perhaps 25.4 times too large"),
-        (("M2", ""), [ORIGIN], "part.nc:5: ends without M2"),
-        (("G21", "G43"), [ORIGIN], "part.nc:1: G43: not known"),
+        (("M2", "G41 D1\nM98 P2"), [ORIGIN], r"part.nc:6: G41: .*\n.*part.nc:7: M98: "),
+        (("", ""), [ORIGIN, "--ignore=G3"], "part.nc: --ignore G3: other lines depend on it"),
+        (("", ""), [ORIGIN, "--z=5"], r"part.nc:2: Z: --z is for files that do not name it"),
         (("", ""), ["--origin=1 2"], "--origin 1 2: allowed: 3 numbers in mm"),
         (("", ""), [ORIGIN, "--run", "--resume"], "--run, --resume, --back: allowed: one"),
     ],
@@ -71,3 +71,15 @@ def test_what_cannot_be_followed_ends_with_status_2(file, change, options, told)
     assert done.returncode == 2
     assert re.search(told, done.stderr), done.stderr
     assert "Traceback" not in done.stderr
+
+
+def test_a_file_is_placed_as_the_options_say(file):
+    file.write_text("M104 S200\nG0 X0 Y0\nG1 X100 F6000\n")
+    placed = [ORIGIN, "--z=50", "--scale=2", "--rotate=90", "--mirror=x"]
+    done = cdpr_here("path", file, "--robot", "spatial-8", *placed, "--json")
+    assert done.returncode == 0, done.stderr
+    figures = json.loads(done.stdout.splitlines()[-1])
+    assert figures["length_m"] == pytest.approx(0.2)
+    assert figures["deviation_m"] < 1e-5
+    assert "note: ignored: the line of M104 (line 1)" in done.stderr
+    assert "note: the file ends without M2" in done.stderr

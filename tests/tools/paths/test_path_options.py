@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from cdpr_rt.motion.path.description import PathError
@@ -21,9 +22,34 @@ def test_an_origin_that_is_none_is_refused_in_the_words_that_were_typed(typed: s
 
 
 def test_words_to_be_skipped_are_words() -> None:
-    assert PathOptions(ignore="s, t m3").ignored() == ["S", "T", "M3"]
+    assert PathOptions(ignore="s, t m03").ignored() == ["S", "T", "M3"]
     with pytest.raises(BadInputError, match="--ignore M3;S: allowed: words of G-code"):
         PathOptions(ignore="M3;S")
+
+
+def test_an_origin_may_hold_those_of_other_coordinate_systems() -> None:
+    settings = PathOptions("1 2 3 g55 4 5 6 G59 7 8 9").settings(3)
+    np.testing.assert_allclose(settings.origin_m, [1e-3, 2e-3, 3e-3])
+    assert sorted(settings.origins_m) == ["G55", "G59"]
+    np.testing.assert_allclose(settings.origins_m["G59"], [7e-3, 8e-3, 9e-3])
+    with pytest.raises(BadInputError, match="--origin 1 2 3 G55 4: allowed: 2 or 3 numbers"):
+        PathOptions("1 2 3 G55 4")
+
+
+def test_a_file_is_mirrored_then_turned() -> None:
+    options = PathOptions(scale=2.0, rotate_deg=90.0, mirror="x")
+    np.testing.assert_allclose(
+        options.settings(3).placement @ [1.0, 1.0, 1.0], [-2.0, -2.0, 2.0], atol=1e-12
+    )
+    assert PathOptions(**options.request()) == options
+
+
+def test_options_of_gcode_are_refused_with_way_points() -> None:
+    for options in (PathOptions("1 2 3"), PathOptions(scale=2.0), PathOptions(z_mm=1.0)):
+        options.require_use(Path("part.nc"))
+        with pytest.raises(BadInputError, match="allowed: with G-code; part"):
+            options.require_use(Path("part.csv"))
+    PathOptions(blend_mm=5.0).require_use(Path("part.csv"))
 
 
 def test_a_file_of_any_name_has_one_that_the_daemon_takes(tmp_path: Path) -> None:

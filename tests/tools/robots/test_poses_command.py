@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from cdpr_here import cdpr_here
 
-from cdpr_profiles.reading.places import SHIPPED
+from cdpr_profiles.places import SHIPPED
 
 
 @pytest.mark.parametrize("choose", ["random", "spread", "information"])

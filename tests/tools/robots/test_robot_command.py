@@ -17,8 +17,8 @@ from cdpr_here import cdpr_here
 from matplotlib.patches import Polygon
 
 from cdpr_profiles import load_robot
-from cdpr_profiles.reading.places import SHIPPED
-from cdpr_rt.robots.feasibility.checks import findings
+from cdpr_profiles.places import SHIPPED
+from cdpr_rt.diagnosis.checks import diagnose
 from cdpr_tools.robots.picture import figure_of
 
 PLANAR = (SHIPPED / "robots" / "planar-3.toml").read_text()
@@ -123,7 +123,7 @@ def test_a_robot_in_space_is_told_and_drawn(tmp_path: Path) -> None:
     assert all(one["aside_m"] < one["away_m"] for one in broken)
     assert "targets up to 15.0 deg from home's orientation" in shown.stderr
     assert re.search(
-        r"axis 7 +at \(.*\) m it swings 1.4\d m and turns by 5\d deg; 2.0", shown.stderr
+        r"axis 7 +at \(.*\) m it swings 1.50 m and turns by 5\d deg; 2.0", shown.stderr
     )
     assert matplotlib.image.imread(picture).shape[0] > 1200  # three sections
 
@@ -132,11 +132,11 @@ def test_what_a_ceiling_cannot_hold_in_space_is_told_with_what_would_help(tmp_pa
     path = tmp_path / "heavy.toml"
     suspended = (SHIPPED / "robots" / "suspended-8.toml").read_text()
     path.write_text(suspended.replace("mass_kg = 100.0", "mass_kg = 900.0"))
-    told = {f.key: f.text for f in findings(load_robot(path)) if f.impossible}
+    told = {f.key: f.text for f in diagnose(load_robot(path)) if f.impossible}
     assert "the cables would need" in told["platform.home_m"]
     assert re.search(r"a platform of up to \d+ kg is possible there", told["platform.home_m"])
     path.write_text(suspended.replace("tension_max_N = 800.0", "tension_max_N = 1500.0"))
-    told = {f.key: f.text for f in findings(load_robot(path)) if f.impossible}
+    told = {f.key: f.text for f in diagnose(load_robot(path)) if f.impossible}
     assert "allowed: up to 1333 N" in told["limits.tension_max_N"]
 
 
@@ -144,9 +144,9 @@ def test_a_loop_that_has_to_be_slow_is_told(tmp_path: Path) -> None:
     path = tmp_path / "late.toml"
     text = (SHIPPED / "robots" / "suspended-6.toml").read_text()
     path.write_text(re.sub(r"^sync_period_s = .*$", "", text, flags=re.M))
-    assert not findings(load_robot(path))
+    assert not diagnose(load_robot(path))
     path.write_text("sync_period_s = 0.004\n" + path.read_text())
-    (found,) = findings(load_robot(path))
+    (found,) = diagnose(load_robot(path))
     assert not found.impossible and "slowest mode at 0.34 Hz" in found.text
     # 60 kg held at that frequency, against the 12 N that are usual in one winch of 300 N
     off_mm = re.search(r"such winches moves it by (\d+) mm", found.text)
@@ -158,7 +158,7 @@ def test_a_loop_that_has_to_be_slow_is_told(tmp_path: Path) -> None:
     slower = re.sub(r"^acceleration_m_s2 = .*$", "acceleration_m_s2 = 0.1", text, flags=re.M)
     slower = re.sub(r"^sync_period_s = .*$", "sync_period_s = 0.004", slower, flags=re.M)
     path.write_text(slower)
-    (found,) = findings(load_robot(path))
+    (found,) = diagnose(load_robot(path))
     less_mm = re.search(r"yield by ([\d.]+) mm as it is", found.text)
     accelerated = load_robot("suspended-6").platform
     assert less_mm is not None and accelerated is not None

@@ -12,15 +12,15 @@ import numpy as np
 import pytest
 from cdpr_here import cdpr_here
 
+from cdpr_drivers.robot.robot_buses import require_fit
 from cdpr_profiles import ProfileError, load_robot
-from cdpr_rt.robots.feasibility.checks import findings
-from cdpr_rt.robots.platform_model import RESERVE
-from cdpr_rt.robots.statics import statics_of
+from cdpr_rt.diagnosis.checks import diagnose, refuse_impossible
+from cdpr_rt.model.platform_model import RESERVE
+from cdpr_rt.model.statics import statics_of
 from cdpr_tools.errors import BadInputError
-from cdpr_tools.robots.kinds import KINDS, kind_of
 from cdpr_tools.robots.new_robot import answers_of, write_robot
 from cdpr_tools.robots.picture import figure_of
-from cdpr_tools.robots.questions import Question
+from cdpr_tools.robots.questions import KINDS, Question, kind_of
 
 
 @pytest.fixture(autouse=True)
@@ -37,7 +37,7 @@ def usual(question: Question, default: str, wrong: str) -> str:
 def test_the_defaults_of_every_kind_are_a_robot_that_works(kind: str, tmp_path: Path) -> None:
     path = tmp_path / "mine.toml"
     robot = write_robot(answers_of(path, {"kind": kind}, usual), path)
-    assert findings(robot) == []
+    assert diagnose(robot) == []
     shipped = load_robot(kind)
     assert robot.platform is not None and shipped.platform is not None
     assert robot.platform.controlled == shipped.platform.controlled
@@ -62,7 +62,7 @@ def test_the_defaults_of_a_frame_of_any_size_are_a_robot_that_works(
     frame = ", ".join(f"{scale * side:.3f}" for side in usual_m)
     path = tmp_path / "mine.toml"
     robot = write_robot(answers_of(path, {"kind": kind, "frame_m": frame}, usual), path)
-    assert findings(robot) == []
+    assert diagnose(robot) == []
     assert robot.platform is not None
     side_m = max(math.dist(*pair) for pair in combinations(robot.platform.anchor_points_m, 2))
     assert side_m == pytest.approx(scale * kind_of(kind).side_m, rel=0.02)
@@ -71,7 +71,7 @@ def test_the_defaults_of_a_frame_of_any_size_are_a_robot_that_works(
 def test_the_box_that_is_proposed_of_a_wide_and_low_frame_is_all_of_targets(tmp_path: Path) -> None:
     path = tmp_path / "stadium.toml"
     given = {"kind": "point-4", "frame_m": "80 50 20"}
-    told = findings(write_robot(answers_of(path, given, usual), path))
+    told = diagnose(write_robot(answers_of(path, given, usual), path))
     # the smallest winches that hold the platform are proposed, and cables of 50 m sag in their pull
     assert [finding.key for finding in told] == ["limits.tension_min_N"]
 
@@ -93,7 +93,7 @@ def test_smaller_winches_and_a_smaller_frame_get_a_smaller_platform(tmp_path: Pa
     given = {"kind": "suspended-8", "frame_m": "3 2 2", "winch": "winch-300n"}
     robot = write_robot(answers_of(path, given, usual), path)
     platform = robot.platform
-    assert findings(robot) == []
+    assert diagnose(robot) == []
     assert platform is not None and 20.0 < platform.mass_kg < 40.0
     assert max(math.dist(*pair) for pair in combinations(platform.anchor_points_m, 2)) < 0.35
     assert min(math.dist(*pair) for pair in combinations(platform.exit_points_m, 2)) > 0.149
@@ -123,7 +123,7 @@ def test_the_defaults_are_a_robot_that_works(tmp_path: Path) -> None:
     assert done.returncode == 0, done.stderr
     assert json.loads(done.stdout.splitlines()[-1]) == {"ok": True, "file": str(path)}
     robot = load_robot(path)
-    assert robot.name == "mine" and findings(robot) == []
+    assert robot.name == "mine" and diagnose(robot) == []
     assert [axis.name for axis in robot.axes] == ["upper left", "upper right", "lower"]
     platform, shipped = robot.platform, load_robot("planar-3").platform
     assert platform is not None and shipped is not None
@@ -142,7 +142,7 @@ def test_defaults_follow_from_where_the_cables_leave(tmp_path: Path) -> None:
     given = {"exit_1_m": "-2, 0", "exit_2_m": "2, 0", "exit_3_m": "0.2, 3", "side_m": "0.2"}
     path = tmp_path / "upright.toml"
     robot = write_robot(answers_of(path, given, usual), path)
-    assert findings(robot) == []
+    assert diagnose(robot) == []
     platform = robot.platform
     assert platform is not None
     # one corner up, the others towards their exit points
@@ -204,7 +204,7 @@ def test_all_wrong_keys_are_named_with_those_of_the_kind(tmp_path: Path) -> None
         answers_of(tmp_path / "mine.toml", given, usual)
     text = str(caught.value)
     assert text.startswith("--set width_m, height: no such question; allowed for planar-4: kind, ")
-    page = (Path(__file__).parents[3] / "docs" / "describing-your-robot.md").read_text()
+    page = (Path(__file__).parents[3] / "docs" / "how-to" / "describing-your-robot.md").read_text()
     for key in text.rpartition(": ")[2].split(", "):
         assert f"`{key}`" in page or re.fullmatch(r"(exit|anchor)_[234]_m", key), key
 
@@ -281,3 +281,62 @@ def test_a_platform_that_cables_hold_down_to_the_floor_has_a_stand(
     answers = answers_of(tmp_path / "mine.toml", given, usual)
     assert answers["home_m"][-1] >= under_m
     assert answers["low_m"][-1] > answers["home_m"][-1]
+
+
+# Robots with other numbers of cables than `cdpr robot new` describes, as the pages say.
+
+
+def _point(axis: str, key: str, point_m: tuple[float, ...]) -> str:
+    return re.sub(rf"^{key} = \[.*?\]", f"{key} = {list(point_m)}", axis, flags=re.MULTILINE)
+
+
+def _file_of(kind: str, path: Path) -> tuple[str, list[str]]:
+    """Return the head and the axes of a file as `cdpr robot new` writes it."""
+    write_robot(answers_of(path, {"kind": kind}, usual), path)
+    head, *axes = path.read_text().split("\n[[axes]]\n")
+    return head, axes
+
+
+def _require_works(path: Path, head: str, axes: list[str]) -> None:
+    path.write_text("\n[[axes]]\n".join([head, *axes]))
+    robot = load_robot(path)
+    require_fit(robot)
+    refuse_impossible(robot)
+    assert robot.platform is not None and len(robot.axes) == len(axes)
+    box = robot.platform.workspace_min_m, robot.platform.workspace_max_m
+    assert statics_of(robot).is_target(np.mean(box, axis=0))
+
+
+@pytest.mark.parametrize("kind", ["planar-4", "suspended-6", "suspended-8", "spatial-8"])
+@pytest.mark.parametrize("above", [False, True])
+def test_one_more_cable_straight_below_or_above_the_middle(
+    kind: str, above: bool, tmp_path: Path
+) -> None:
+    path = tmp_path / "mine.toml"
+    head, axes = _file_of(kind, path)
+    robot = load_robot(path)
+    assert robot.platform is not None
+    size = len(robot.platform.home_m)
+    top_m = max(point[-1] for point in robot.platform.exit_points_m)
+    place_m = (*(0.0,) * (size - 1), top_m if above else robot.platform.home_m[-1] - 0.2)
+    more = _point(axes[-1], "exit_point_m", place_m)
+    more = _point(more, "anchor_point_m", (0.0,) * size)
+    more = re.sub(r"node_id = \d+", f"node_id = {len(axes) + 1}", more)
+    more = re.sub(r"^name = .*", 'name = "middle"', more, flags=re.MULTILINE)
+    head = head.replace("sync_period_s = 0.001 ", "sync_period_s = 0.00125 ")
+    _require_works(path, head, [*axes, more])
+
+
+def test_a_point_on_two_cables_in_a_plane(tmp_path: Path) -> None:
+    path = tmp_path / "mine.toml"
+    head, axes = _file_of("planar-3", path)
+    head = re.sub(r"^mass_kg = \S+", "mass_kg = 6.5", head, flags=re.MULTILINE)
+    upper = [_point(axis, "anchor_point_m", (0.0, 0.0)) for axis in axes[:2]]
+    _require_works(path, head, upper)
+
+
+def test_a_point_on_three_cables_from_above(tmp_path: Path) -> None:
+    path = tmp_path / "mine.toml"
+    head, axes = _file_of("point-4", path)
+    _, y_m, z_m = (float(x) for x in re.findall(r"exit_point_m = \[(.*?)\]", axes[2])[0].split(","))
+    _require_works(path, head, [*axes[:2], _point(axes[2], "exit_point_m", (0.0, y_m, z_m))])

@@ -6,7 +6,8 @@ import re
 from pathlib import Path
 
 from cdpr_profiles import load_robot
-from cdpr_profiles.reading.places import SHIPPED
+from cdpr_profiles.places import SHIPPED
+from cdpr_rt.diagnosis.subject import Subject
 from cdpr_tools.robots.summary import figures, lines
 
 
@@ -16,16 +17,16 @@ def test_a_point_in_a_plane_is_not_said_to_turn(tmp_path: Path) -> None:
     path.write_text(re.sub(r"anchor_point_m = .*", "anchor_point_m = [0.0, 0.0]", text))
     robot = load_robot(path)
     assert robot.platform is not None
-    told = figures(robot, robot.platform)
+    told = figures(Subject(robot))
     assert told["turns_at_most_rad"] == 0.0 and told["free_rotation"] is None
-    assert not any("turns" in line for line in lines(robot, robot.platform, told))
+    assert not any("turns" in line for line in lines(Subject(robot), told))
 
 
 def test_a_share_that_is_nearly_all_is_not_said_to_be_all() -> None:
     robot = load_robot("planar-3")
     assert robot.platform is not None
-    told = figures(robot, robot.platform) | {"target_share": 0.997}
-    assert any("accepted in 99 % of it" in line for line in lines(robot, robot.platform, told))
+    told = figures(Subject(robot)) | {"target_share": 0.997}
+    assert any("accepted in 99 % of it" in line for line in lines(Subject(robot), told))
 
 
 def test_it_is_said_whether_a_cable_that_slips_is_noticed() -> None:
@@ -35,6 +36,10 @@ def test_it_is_said_whether_a_cable_that_slips_is_noticed() -> None:
     ):
         robot = load_robot(name)
         assert robot.platform is not None
-        told = figures(robot, robot.platform)
+        told = figures(Subject(robot))
         assert (told["lengths_disagree_m"] is not None) is allowed
-        assert any(text in line for line in lines(robot, robot.platform, told))
+        shown = lines(Subject(robot), told)
+        assert any(text in line for line in shown)
+        slips = [axis["slip"] for axis in told["axes"]]
+        assert all((slip["unnoticed_m"] is not None) is allowed for slip in slips)
+        assert any("none is shown" in line for line in shown) is not allowed

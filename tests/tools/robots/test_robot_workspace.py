@@ -12,7 +12,7 @@ import pytest
 import trimesh
 from cdpr_here import cdpr_here
 
-from cdpr_profiles.reading.places import SHIPPED
+from cdpr_profiles.places import SHIPPED
 
 COARSE = ("--cells", "12", "--rays", "200")
 

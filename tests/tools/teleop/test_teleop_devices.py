@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 from scipy.spatial.transform import Rotation
 
-from cdpr_rt.service.streams.stream_packet import REACH_M
+from cdpr_rt.service.stream_packet import REACH_M
 from cdpr_tools.errors import BadInputError
 from cdpr_tools.teleop.input_device import InputDevice, InputSample, parse_scale
 from cdpr_tools.teleop.keyboard import Keyboard, Keys, STEPS_mm

@@ -12,11 +12,12 @@ import pytest
 
 from cdpr_rt.core.shared_block import SAMPLES, SharedBlock
 from cdpr_rt.core.states import LoopState
-from cdpr_rt.motion.stream_buttons import CLUTCH, confirmation
-from cdpr_rt.runtime.right import PublishedRight
+from cdpr_rt.loop.right import PublishedRight
+from cdpr_rt.motion.pose_stream import CLUTCH, confirmation
 from cdpr_rt.service.lease import Lease
-from cdpr_rt.service.streams.setpoint_stream import SetpointStream, listen_udp
-from cdpr_rt.service.streams.stream_client import StreamClient
+from cdpr_rt.service.listening import listen_udp
+from cdpr_rt.service.setpoint_stream import SetpointStream
+from cdpr_rt.service.stream_client import StreamClient
 from cdpr_tools.teleop import session as session_module
 from cdpr_tools.teleop.input_device import End, InputDevice, InputSample
 from cdpr_tools.teleop.script import ScriptDevice, ScriptLine

@@ -9,8 +9,8 @@ import pytest
 from rich.console import Console
 
 from cdpr_rt.core.states import LoopState
-from cdpr_rt.service.streams.stream_client import StreamClient
-from cdpr_rt.service.streams.stream_packet import (
+from cdpr_rt.service.stream_client import StreamClient
+from cdpr_rt.service.stream_packet import (
     UNKNOWN_POSE,
     Standing,
     StreamAnswer,

@@ -15,10 +15,10 @@ import pytest
 
 from cdpr_rt.core.clock import Clock, LockstepClock, PacedClock
 from cdpr_rt.errors import InvalidRequestError
-from cdpr_rt.procedures.tension.masses import have_hung
-from cdpr_tools.tension import hanging
-from cdpr_tools.tension.hanging import by_prompt
-from tests.cdpr_rt.runtime.operating_rig import Inertias, powered
+from cdpr_tools.tension import watch
+from cdpr_tools.tension.calibration import have_hung
+from cdpr_tools.tension.watch import by_prompt
+from tests.cdpr_rt.loop.operating_rig import Inertias, powered
 
 LONGEST_S = 60.0
 
@@ -53,7 +53,7 @@ def test_only_enter_alone_raises_the_mass(
 def test_a_question_left_open_does_not_spoil_the_end_of_the_process() -> None:
     ask = (
         "from cdpr_rt.core.clock import PacedClock as C\n"
-        "from cdpr_tools.tension.hanging import by_prompt"
+        "from cdpr_tools.tension.watch import by_prompt"
     )
     catch = "\ntry: by_prompt(5.0, C())\nexcept Exception as error: print(error)"
     with subprocess.Popen(
@@ -76,7 +76,7 @@ def test_a_signal_ends_the_question(
     monkeypatch: pytest.MonkeyPatch, number: int, clock: Callable[[], Clock]
 ) -> None:
     outlet, inlet = os.pipe()
-    asked, typed = threading.Event(), hanging._typed
+    asked, typed = threading.Event(), watch.typed_line
 
     def ask(question: str, stop_requested: Callable[[], bool]) -> str:
         asked.set()
@@ -90,7 +90,7 @@ def test_a_signal_ends_the_question(
     sent = threading.Thread(target=interrupt)
     with os.fdopen(outlet) as answers, ignored(number):
         monkeypatch.setattr("sys.stdin", answers)
-        monkeypatch.setattr(hanging, "_typed", ask)
+        monkeypatch.setattr(watch, "typed_line", ask)
         too_late.start()
         sent.start()
         try:
@@ -107,7 +107,7 @@ def test_a_signal_beside_enter_ends_it_too(monkeypatch: pytest.MonkeyPatch) -> N
         signal.raise_signal(signal.SIGINT)
         return "\n"
 
-    monkeypatch.setattr(hanging, "_typed", typed)
+    monkeypatch.setattr(watch, "typed_line", typed)
     with pytest.raises(InvalidRequestError, match="nobody has hung 5 kg"):
         by_prompt(5.0, LockstepClock())
 

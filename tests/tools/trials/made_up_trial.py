@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from cdpr_profiles import load_robot
 from cdpr_tools.trials.directions import Directions
-from cdpr_tools.trials.evaluation.recorded import Recorded
+from cdpr_tools.trials.recorded import Recorded
 
 PERIOD_S = 1e-3
 FIRST = 500

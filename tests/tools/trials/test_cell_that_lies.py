@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from cdpr_profiles.reading.places import SHIPPED
+from cdpr_profiles.places import SHIPPED
 from cdpr_rt.core.states import LoopState
 from cdpr_tools.trials.lockstep import LockstepRobot
 

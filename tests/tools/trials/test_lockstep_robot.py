@@ -8,11 +8,10 @@ import pytest
 from cdpr_drivers.axes.axis_group import AxisGroup
 from cdpr_drivers.errors import BusError
 from cdpr_rt.core.states import LoopState
-from cdpr_rt.service.streams.stream_packet import Standing, StreamSession
+from cdpr_rt.service.stream_packet import Standing, StreamSession
 from cdpr_tools.errors import WorkFailedError
-from cdpr_tools.trials.evaluation.pose_log import read_pose_log
-from cdpr_tools.trials.lockstep import CommandRefusedError, LockstepRobot
-from cdpr_tools.trials.streams.stream import StreamSender
+from cdpr_tools.trials.lockstep import CommandRefusedError, LockstepRobot, StreamSender
+from cdpr_tools.trials.pose_log import read_pose_log
 
 HEIGHT = 1.5
 

@@ -12,11 +12,14 @@ import pytest
 from mcap.reader import make_reader
 
 from cdpr_drivers.errors import ConfigurationError
+from cdpr_profiles import load_robot
+from cdpr_profiles.calibration.in_force import take_over, undo
 from cdpr_profiles.errors import ProfileError
-from cdpr_tools.commands.robot import robot_trial
-from cdpr_tools.commands.robot.robot_trial import KindOfTrial
+from cdpr_tools.commands import robot_trial
+from cdpr_tools.commands.robot_trial import KindOfTrial
 from cdpr_tools.errors import BadInputError, WorkFailedError
-from cdpr_tools.trials.evaluation.recorded import Recorded
+from cdpr_tools.trials.recorded import Recorded
+from tests.profiles.test_geometry_calibration import calibration
 
 pytestmark = pytest.mark.long
 
@@ -99,6 +102,25 @@ def test_what_the_status_tells_at_the_end_is_told(
     out = capsys.readouterr()
     assert "note: winch 1 swings" in out.out + out.err
     assert json.loads(out.out.splitlines()[-1])["notices"] == {"run": ["winch 1 swings"]}
+
+
+def test_the_calibration_in_force_is_reported_with_the_figures(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+):
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
+    robot = load_robot("planar-3")
+    known = calibration(robot, move_m=0.0).model_copy(
+        update={"drum_scales": (1.0, 1.0, 1.0), "elongation_scale": 1.0}
+    )
+    take_over(robot, known)
+    folder = tmp_path / "trial"
+    robot_trial.trial("planar-3", KindOfTrial.TARGETS, minutes=0.12, out_dir=folder, as_json=True)
+    told = json.loads(capsys.readouterr().out.splitlines()[-1])
+    assert told["calibration"]["identity"] == known.identity
+    undo(robot)  # a trial is judged by what was in force while it ran
+    robot_trial.trial("planar-3", KindOfTrial.TARGETS, out_dir=folder, again=True)
+    out = capsys.readouterr()
+    assert f"calibration 1 ({known.identity})" in out.out + out.err
 
 
 @pytest.mark.parametrize("by", [1, -30])

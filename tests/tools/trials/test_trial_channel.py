@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from cdpr_tools.trials.streams.channel import Channel, Network
+from cdpr_tools.trials.streaming import Channel, Network
 
 SHARES = st.floats(0.0, 0.9)
 

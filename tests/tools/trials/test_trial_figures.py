@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 from cdpr_profiles import load_robot
-from cdpr_tools.trials import limits, line, targets
-from cdpr_tools.trials.evaluation.figures import Figure, all_reached
-from cdpr_tools.trials.streams import streaming
+from cdpr_tools.trials import limits, line, streaming, targets
+from cdpr_tools.trials.figures import Figure, all_reached
 from tests.tools.trials.made_up_trial import PERIOD_S, recorded
 
 ROBOT = load_robot("planar-3")

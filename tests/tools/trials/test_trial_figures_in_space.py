@@ -10,11 +10,9 @@ from scipy.spatial.transform import Rotation
 
 from cdpr_profiles import load_robot
 from cdpr_sim_bus.robot.robot_plant import RobotPlant
-from cdpr_tools.trials import limits, line, tape, targets
+from cdpr_tools.trials import limits, line, pictures, streaming, tape, targets
 from cdpr_tools.trials.directions import Directions
-from cdpr_tools.trials.evaluation import pictures
-from cdpr_tools.trials.evaluation.figures import Figure
-from cdpr_tools.trials.streams import streaming
+from cdpr_tools.trials.figures import Figure
 from tests.tools.trials.made_up_trial import PERIOD_S, PLANE, POINT, SPACE, recorded
 
 ROBOT = load_robot("planar-3")

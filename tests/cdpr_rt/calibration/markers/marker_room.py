@@ -8,11 +8,10 @@ from collections.abc import Callable
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from cdpr_profiles.devices.camera import CameraIntrinsics
-from cdpr_rt.calibration.markers.geometry.lens import project
-from cdpr_rt.calibration.markers.marker_map import MarkerMap
-from cdpr_rt.calibration.markers.seen_markers import CORNERS, SeenMarkers
-from cdpr_rt.calibration.markers.sighting import Sighting
+from cdpr_profiles.camera import CameraIntrinsics
+from cdpr_rt.arrays import FloatArray
+from cdpr_rt.calibration.markers.geometry import logarithms, project
+from cdpr_rt.calibration.markers.marker_map import CORNERS, MarkerMap, SeenMarkers, Sighting
 
 LENS = np.array([604.0, 606.0, 322.3, 255.8, -0.112, 0.083, 4e-4, -3e-4, -0.012])
 WIDTH, HEIGHT = 640, 512
@@ -113,3 +112,43 @@ def room(
         *(seen.names, where, down),
     )
     return Room(truth, seen)
+
+
+def seen_from(map_: MarkerMap, marker: int) -> MarkerMap:
+    """Return the map in the frame of another marker."""
+    k = map_.ids.index(marker)
+    back = map_.rotation[k].T
+    return map_.moved(back, -back @ map_.position_m[k], marker)
+
+
+@dataclasses.dataclass(frozen=True)
+class MapDifference:
+    """Differences of a map from another in the frame of one marker: thesis, figures 3.20, 3.21."""
+
+    ids: tuple[int, ...]
+    distance_m: FloatArray
+    """Of each marker's middle from that of the reference marker, (m,)."""
+    position_error_m: FloatArray
+    """Of the middles, (m,)."""
+    rotation_error_rad: FloatArray
+    """(m,)."""
+
+
+def difference(map_: MarkerMap, other: MarkerMap, reference: int | None = None) -> MapDifference:
+    """Return how a map differs from another with the marker `reference` at the same place."""
+    reference = map_.reference if reference is None else reference
+    a, b = seen_from(map_, reference), seen_from(other, reference)
+    common = [
+        marker
+        for marker in a.ids
+        if marker in b.ids and a.placed[a.ids.index(marker)] and b.placed[b.ids.index(marker)]
+    ]
+    i, j = ([one.ids.index(marker) for marker in common] for one in (a, b))
+    off = a.position_m[i] - b.position_m[j]
+    turn = logarithms(a.rotation[i] @ b.rotation[j].transpose(0, 2, 1))
+    return MapDifference(
+        tuple(common),
+        np.linalg.norm(b.position_m[j], axis=1),
+        np.linalg.norm(off, axis=1),
+        np.linalg.norm(turn, axis=1),
+    )

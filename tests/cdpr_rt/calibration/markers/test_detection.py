@@ -6,10 +6,15 @@ import cv2
 import numpy as np
 import pytest
 
-from cdpr_rt.calibration.markers.images.charuco import Board, CalibrationError, fit_intrinsics
-from cdpr_rt.calibration.markers.images.detection import MarkerDetector
+from cdpr_rt.calibration.markers.detection import (
+    Board,
+    CalibrationError,
+    MarkerDetector,
+    fit_intrinsics,
+)
 from cdpr_rt.errors import InvalidRequestError
-from cdpr_sim_bus.camera.camera_plant import (
+from cdpr_sim_bus.camera.sim_camera import Box, SimCamera, random_poses, seen_at
+from cdpr_sim_bus.robot.camera_plant import (
     BoardPlant,
     CameraPlant,
     GridPlant,
@@ -18,8 +23,6 @@ from cdpr_sim_bus.camera.camera_plant import (
     MountPlant,
     PrintPlant,
 )
-from cdpr_sim_bus.camera.random_poses import Box, random_poses
-from cdpr_sim_bus.camera.sim_camera import SimCamera, seen_at
 
 LENS = LensPlant(
     width_px=480, height_px=384, focal_px=(415.0, 416.0), centre_px=(242.0, 189.0), blur_px=0.6

@@ -4,22 +4,32 @@ from __future__ import annotations
 
 import dataclasses
 
+import cv2
 import numpy as np
 import pytest
-from marker_room import LENS, Room, intrinsics, room
+from marker_room import LENS, Room, difference, intrinsics, room, seen_from
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
-from cdpr_profiles.devices.camera import KnownMarker, MarkerSheets, MarkerSize
-from cdpr_rt.calibration.markers.bundle import adjust
-from cdpr_rt.calibration.markers.coverage import coverage
-from cdpr_rt.calibration.markers.diagnosis import Suspect
-from cdpr_rt.calibration.markers.geometry.square_pose import square_poses
-from cdpr_rt.calibration.markers.graph import first_map
-from cdpr_rt.calibration.markers.map_fit import MapFit, fit_map, verdict, warnings
-from cdpr_rt.calibration.markers.marker_map import best_fit, difference
-from cdpr_rt.calibration.markers.reprojection import Estimate, residuals
-from cdpr_rt.calibration.markers.sighting import Sighting
+from cdpr_profiles.camera import KnownMarker, MarkerSheets, MarkerSize
+from cdpr_rt.calibration.markers.bundle import Estimate, adjust
+from cdpr_rt.calibration.markers.geometry import angles, project
+from cdpr_rt.calibration.markers.map_fit import (
+    MapFit,
+    Suspect,
+    first_map,
+    fit_map,
+    square_poses,
+    verdict,
+    warnings,
+)
+from cdpr_rt.calibration.markers.marker_map import (
+    CORNERS,
+    SeenMarkers,
+    Sighting,
+    best_fit,
+    coverage,
+)
 from cdpr_rt.errors import InvalidRequestError
 
 SHEETS = MarkerSheets(size_m=0.15)
@@ -65,7 +75,7 @@ def test_standard_deviations_are_those_of_many_maps() -> None:
     base = room(2, rows=3, columns=4, images=15, noise_px=0.0)
     reference = 5
     chance = np.random.default_rng(9)
-    start = Estimate(base.truth.seen_from(reference), LENS)
+    start = Estimate(seen_from(base.truth, reference), LENS)
     weighed = []
     for _ in range(60):
         noise = chance.normal(0.0, 0.1, base.seen.corners_px.shape)
@@ -74,9 +84,7 @@ def test_standard_deviations_are_those_of_many_maps() -> None:
         off = bundle.estimate.map.position_m - start.map.position_m
         for k, marker in enumerate(base.seen.ids):
             if marker != reference:
-                at = 6 * (len(bundle.estimate.map.names) + k)
-                covariance = bundle.covariance[at : at + 3, at : at + 3]
-                weighed.append(off[k] @ np.linalg.solve(covariance, off[k]))
+                weighed.append(off[k] @ np.linalg.solve(bundle.marker_covariance_m2[k], off[k]))
     # mean of chi square with 3 degrees of freedom
     assert np.mean(weighed) == pytest.approx(3.0, rel=0.15)
 
@@ -87,17 +95,17 @@ def test_the_fit_is_that_of_an_independent_solver() -> None:
     first = first_map(base.seen, poses)
     bundle = adjust(Estimate(first, LENS), base.seen, (first.reference,))
     start = Estimate(bundle.estimate.map, LENS)
-    free = np.flatnonzero(np.diag(bundle.covariance) > 0.0)
+    sigma = np.sqrt(np.diag(bundle.covariance))
+    free, root = np.flatnonzero(sigma), np.sqrt(bundle.weight)[..., None]
 
     def off(x: np.ndarray) -> np.ndarray:
-        step = np.zeros(start.parameters)
-        step[free] = x
-        root = np.sqrt(bundle.weight)[..., None]
-        return (root * residuals(start.changed(step), base.seen)).ravel()
+        step, moves = np.zeros(start.parameters), x[len(free) :].reshape(-1, 6)
+        step[free] = x[: len(free)]
+        return np.asarray(root * start.changed(step, moves).off_px(base.seen)).ravel()
 
-    solved = least_squares(off, np.full(len(free), 1e-4), method="lm")
-    sigma = np.sqrt(np.diag(bundle.covariance)[free])
-    assert np.abs(solved.x / sigma).max() < 0.1
+    begin = np.full(len(free) + 6 * len(base.seen.names), 1e-4)
+    solved = least_squares(off, begin, method="lm").x[: len(free)]
+    assert np.abs(solved / sigma[free]).max() < 0.1
 
 
 @pytest.mark.parametrize("seed", [11, 12, 13])
@@ -122,7 +130,7 @@ def test_most_of_what_a_map_is_off_across_its_plane_is_the_tilt_of_its_reference
     told = np.sqrt((fit.bundle.shape_sigma_m**2).sum(axis=1).mean())
     assert np.sqrt((left**2).sum(axis=1).mean()) < 2.0 * told
     assert told < 0.5 * sigma[2]
-    assert any("tells little of its own tilt" in note for note in fit.notes)
+    assert any("tells little about its tilt" in note for note in fit.notes)
 
 
 def test_markers_never_seen_together_are_islands_with_advice(one: Room) -> None:
@@ -252,6 +260,46 @@ def test_known_places_give_the_frame_and_are_held(one: Room) -> None:
     assert np.linalg.norm(fit.map.position_m - one.truth.position_m, axis=1).max() < 0.02
 
 
+def exchanged(known: tuple[KnownMarker, ...], i: int, j: int) -> tuple[KnownMarker, ...]:
+    """Return known markers of which two have each other's place."""
+    ids = [one.id for one in known]
+    ids[i], ids[j] = ids[j], ids[i]
+    return tuple(
+        one.model_copy(update={"id": marker}) for one, marker in zip(known, ids, strict=True)
+    )
+
+
+@pytest.mark.parametrize("ids", [(0, 19), (0, 8, 19), (0, 4, 15, 19), (0, 3, 4, 8, 15, 19)])
+def test_exchanged_known_markers_are_named_and_do_not_bend_the_map(
+    one: Room, ids: tuple[int, ...]
+) -> None:
+    known = exchanged(known_places(one, *ids), 0, len(ids) - 1)
+    fit = fit_map(one.sightings(), intrinsics(), SHEETS.model_copy(update={"known": known}))
+    assert len(fit.faults) == 1, fit.faults
+    assert fit.faults[0].startswith("markers 0, 19 are exchanged")
+    turn, shift = best_fit(fit.map.position_m, one.truth.position_m)
+    off = fit.map.position_m @ turn.T + shift - one.truth.position_m
+    assert np.linalg.norm(off, axis=1).max() < 0.003
+
+
+def test_a_known_place_that_is_wrong_is_named_and_left_out(one: Room) -> None:
+    known = list(known_places(one, 0, 4, 15, 19))
+    x, *rest = known[2].position_m
+    known[2] = known[2].model_copy(update={"position_m": (x + 0.2, *rest)})
+    fit = fit_map(one.sightings(), intrinsics(), SHEETS.model_copy(update={"known": tuple(known)}))
+    assert len(fit.faults) == 1 and "marker 15 does not lie where it is known" in fit.faults[0]
+    assert fit.fixed == (0, 4, 19)
+
+
+def test_known_places_of_which_no_majority_agrees_are_all_left_out(one: Room) -> None:
+    known, rng = known_places(one, 0, 4, 15, 19), np.random.default_rng(3)
+    off = [tuple((np.array(k.position_m) + rng.uniform(-1, 1, 3)).tolist()) for k in known]
+    wrong = tuple(k.model_copy(update={"position_m": p}) for k, p in zip(known, off, strict=True))
+    fit = fit_map(one.sightings(), intrinsics(), SHEETS.model_copy(update={"known": wrong}))
+    assert "cannot be said which of them are wrong" in fit.faults[0]
+    assert len(fit.fixed) == 1 and fit.known is None
+
+
 @pytest.mark.parametrize(
     "change", [(0, 0.02), (4, -1.0)], ids=["another focal length", "no distortion"]
 )
@@ -287,3 +335,39 @@ def test_errors_of_the_sheets_are_in_what_a_map_says_of_itself(one: Room, plain:
     told = np.sqrt((fit.bundle.shape_sigma_m**2).sum(axis=1).mean())
     assert np.sqrt((left**2).sum(axis=1).mean()) < 2.0 * told
     assert any("off on their sheets" in note for note in fit.notes)
+
+
+MATRIX = np.array([[LENS[0], 0, LENS[2]], [0, LENS[1], LENS[3]], [0, 0, 1.0]])
+
+
+def test_points_are_seen_where_opencv_has_them() -> None:
+    chance = np.random.default_rng(3)
+    points = np.column_stack([chance.uniform(-0.4, 0.4, (50, 2)), chance.uniform(0.9, 2.0, 50)])
+    seen = project(points, LENS)
+    theirs, _ = cv2.projectPoints(points, np.zeros(3), np.zeros(3), MATRIX, LENS[4:])
+    np.testing.assert_allclose(seen, theirs.reshape(-1, 2), atol=1e-9)
+
+
+def test_one_of_a_squares_two_poses_is_the_true_one() -> None:
+    chance = np.random.default_rng(4)
+    turns = Rotation.from_rotvec([np.pi, 0, 0]) * Rotation.from_rotvec(
+        chance.normal(0.0, 0.4, (80, 3))
+    )
+    places = chance.uniform((-0.3, -0.25, 0.9), (0.3, 0.25, 1.5), (80, 3))
+    rows = [
+        (i, 7, project(0.15 * CORNERS @ turn.T + place, LENS))
+        for i, (turn, place) in enumerate(zip(turns.as_matrix(), places, strict=True))
+    ]
+    poses = square_poses(SeenMarkers.of(map(str, range(80)), rows, {7: 0.15}), LENS)
+    off = angles(poses.rotation @ turns.inv().as_matrix()[:, None])
+    assert off[:, 0].max() < 1e-5
+    np.testing.assert_allclose(poses.position_m[:, 0], places, atol=1e-6)
+    assert (off[:, 1] > 1e-3).sum() > 40
+
+
+def test_what_is_seen_twice_in_an_image_or_has_no_size_is_refused() -> None:
+    corners = np.zeros((4, 2))
+    with pytest.raises(Exception, match="marker 3 is there twice in image number 0"):
+        SeenMarkers.of(["a"], [(0, 3, corners), (0, 3, corners)], {3: 0.1})
+    with pytest.raises(Exception, match="marker 4 was seen, but has no size"):
+        SeenMarkers.of(["a"], [(0, 3, corners), (0, 4, corners)], {3: 0.1})

@@ -6,20 +6,19 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from cdpr_rt.motion.path.arcs import arc_by_radius
 from cdpr_rt.motion.path.description import Coordinates, PathDescription, PathError
-from cdpr_rt.motion.path.gcode import GcodeSettings, read_gcode
-from cdpr_rt.motion.path.pieces import pieces_of
+from cdpr_rt.motion.path.gcode import GcodeSettings, arc_by_radius, read_gcode
+from cdpr_rt.motion.path.nodes import nodes_of, pieces_of
 
 ROOM = Coordinates(("x", "y", "z", "rx", "ry", "rz"), np.array([0.0, 0.1, 1.4, 0.0, 0.0, 0.0]))
 PLANE = Coordinates(("x", "y"), np.array([0.0, 1.4]))
 
 
-def read(*lines: str, origin=(0.0, 0.0, 0.0), where=ROOM, ignored=()) -> PathDescription:
-    wanted = GcodeSettings(np.array(origin[: where.positions]), 1e-3, frozenset(ignored))
+def read(*lines: str, origin=(0.0, 0.0, 0.0), where=ROOM, ignored=(), **others) -> PathDescription:
+    wanted = GcodeSettings(np.array(origin[: where.positions]), 1e-3, frozenset(ignored), **others)
     return read_gcode("\n".join([*lines, ""]), "part.nc", where, wanted)
 
 
@@ -84,7 +83,7 @@ def test_an_arc_is_the_same_by_its_centre_and_by_its_radius(begin, turn, clockwi
     away = centre - first
     by_centre = read(*head, f"{to} I{away[0]:.9f} J{away[1]:.9f}", "M2").moves[0].arc
     assert by_centre is not None
-    np.testing.assert_allclose(by_centre.centre_m, 1e-3 * centre, atol=2e-6)
+    np.testing.assert_allclose(by_centre.centre_m[:2], 1e-3 * centre, atol=2e-6)
     np.testing.assert_allclose(by_centre.angle_rad, sign * turn, atol=1e-5)
     if abs(turn - math.pi) > 0.1:
         r = radius if turn < math.pi else -radius
@@ -105,35 +104,181 @@ def test_a_whole_circle_and_a_helix():
 @pytest.mark.parametrize(
     ("lines", "where", "told"),
     [
-        (["G0 X0 Y0 Z0", "G43 H1"], ROOM, r":2: G43: not known; allowed: G0 G1"),
-        (["G0 X0 Y0 Z0", "T1 M6"], ROOM, r":2: M6: not known"),
+        (["G0 X0 Y0 Z0", "G41 D1"], ROOM, r":2: G41: tool radius compensation .* not supported"),
+        (["G0 X0 Y0 Z0", "M428"], ROOM, r":2: M428: is not supported; .* --ignore M428 skips"),
+        (["G0 X0 Y0 Z0", "G38.2 Z-5"], ROOM, r":2: G38.2: is not supported$"),
         (["G0 X0 Y0 Z0", "G1 X5"], ROOM, r":2: G1 without a feed"),
-        (["G0 X0 Y0 Z0", "G1 X#1"], ROOM, r":2: 'X#1'"),
+        (["G0 X0 Y0 Z0", "G1 X#1"], ROOM, r":2: parameters and expressions"),
+        (["G0 X0 Y0 Z0", "o<drill> sub"], ROOM, r":2: O-words"),
         (["G0 X0 Y0 Z0", "F60", "G2 X5 I1 J0"], ROOM, r":3: G2: its ends are 1.0000 mm"),
         (["G0 X0 Y0 Z0", "F60", "G2 X5 R1"], ROOM, r":3: G2: R1 mm: its ends are 5 mm apart"),
         (["G0 X0 Y0 Z0", "F60", "G2 X5"], ROOM, r":3: G2: allowed: either I and J, or R"),
+        (["G0 X0 Y0 Z0", "F60", "G18 G2 X5 I2.5 J1"], ROOM, r":3: J: has no meaning in .* G18"),
+        (["G0 X0 Y0 Z0", "G0 X1 I5"], ROOM, r":2: I: has no meaning with G0"),
         (["G0 X0 Y0 Z0", "G0 G1 X5"], ROOM, r":2: G0 G1: allowed: one"),
+        (["G90 G91", "G0 X0 Y0 Z0"], ROOM, r":1: G90 G91: allowed: one"),
         (["G0 X0 Y0 Z0", "X1 X2"], ROOM, r":2: X stands twice"),
+        (["G0 X0 Y0 Z0", "X1 Yes"], ROOM, r":2: 'Yes': allowed: words"),
+        (["G0 X0 Y0 Z0", "X1e2"], ROOM, r":2: X1e2: allowed: numbers without exponent"),
+        (["G0 X0 Y0 Z0", "G4 X2"], ROOM, r":2: G4: allowed: P or S, without axes"),
+        (["G0 X0 Y0 Z0", "G80", "X5"], ROOM, r":3: .* after G80 no motion"),
+        (["G0 X0 Y0 Z0", "F60 G93", "G1 X5"], ROOM, r":3: G1 without a feed; .* in the same line"),
+        (["G0 X0 Y0 Z0", "G55 X5"], ROOM, r":2: G55: its zero is unknown; give --origin"),
+        (["G0 X0 Y0 Z0", "G10 L20 P1 X5"], ROOM, r":2: G10: moves the zero within the path"),
+        (["G0 X0 Y0 Z0 F60", "G83 Z-1 R1 Q.00000000000001"], ROOM, r":2: .* Q of 0.01 or more"),
+        (
+            ["G0 X0 Y0 Z0 F60", "G83 Z-1 R1" + "0" * 30 + " Q1"],
+            ROOM,
+            r":2: R: the number is too large",
+        ),
+        (["G0 X0 Y0 Z0 F60", "G1 X1", "M48 X5 Y5"], ROOM, r":3: M48: X has no meaning with it"),
+        (["G0 X0 Y0 Z0 F60", "G90.1 G2 X5 I2"], ROOM, r":2: G2: after G90.1 both I and J"),
+        (["G0 X0 Y0 Z0", "M104 S200 G1 X5"], ROOM, r":2: M104 and G1 share a line"),
+        (["G0 X0 Y0 Z0", "M220 S50"], ROOM, r":2: M220: is not supported"),
+        (["G0 X0 Y0 Z0", "(" * 5000], ROOM, r":2: the line is longer than 4096 characters"),
         (["G0 X0 Y0 Z0", "(open"], ROOM, r":2: a comment is not closed"),
-        (["G91 X5"], ROOM, r":1: X: by how much, but from where"),
-        (["G0 X0 Y0", "Z5"], PLANE, r":2: Z5: not known; allowed: X Y F"),
+        (["G91 X5"], ROOM, r":1: X: a relative move before the position"),
+        (["G0 X0 Y0", "Z5"], PLANE, r":2: Z: the robot has no such axis; --ignore Z drops it"),
+        (["G0 X0 Y0", "G18"], PLANE, r":2: G18: the robot moves in one plane"),
         (["G0 X0 Y0 Z0", "G4 P-1"], ROOM, r":2: G4: allowed"),
-        (["G0 X0 Y0 Z0", "X5"], ROOM, r":2: ends without M2.*cut short"),
+        (["G0 X0 Y0"], ROOM, r"Z never named; .*: --z says at which height"),
     ],
 )
 def test_what_is_refused(lines, where, told):
-    end = [] if "cut short" in told else ["M2"]
     with pytest.raises(PathError, match=told):
-        read(*lines, *end, where=where)
+        read(*lines, "M2", where=where)
 
 
-def test_words_may_be_skipped():
-    path = read("G0 X0 Y0 Z0", "S5000 M3", "T1", "X5", "M5", "M2", ignored={"S", "T", "M3", "M5"})
-    assert len(path.moves) == 1
+def test_all_reasons_are_reported_at_once_by_line():
+    with pytest.raises(PathError) as caught:
+        read(
+            "G0 X0 Y0 Z0", "G41 G5 G21 X1 U3", "M98 P5", "#1=5", "G1 X5 F60", "#2=#1", "X1e3", "M2"
+        )
+    lines = str(caught.value).split("\n")
+    assert [line.split(": ")[0] for line in lines] == [f"part.nc:{i}" for i in (2, 2, 2, 3, 4, 7)]
+    assert [line.split(": ")[1] for line in lines[:3]] == ["G41", "G5", "U"]
+    assert lines[4].endswith("(2 lines)")
+    assert "leave" not in str(caught.value)
+
+
+def test_many_different_problems_stay_a_short_text():
+    with pytest.raises(PathError) as caught:
+        read("G0 X0 Y0 Z0", *(f"X1e{i}" for i in range(5000)), "M2")
+    assert len(str(caught.value)) < 4000
+    assert "and 4980 more problems" in str(caught.value)
+
+
+def test_words_of_tools_and_printers_are_ignored_with_one_notice():
+    path = read(
+        "G21 G90 G94 G91.1", "M104 S200", "M201 X500 Y500 Z100 E5000", "M203 X150 Y60 Z10",
+        "M84 X Y E", "M117 Printing G1 X99", "G10 L2 P1 X5 Y5 Z5", "N5 T1 M6*71", "G0 X0 Y0 Z0",
+        "G92 E0", "G43 H1 Z20", "S5000 M3 M8", "G1 X5 F600 E1.5", "G2 X15 I5 J0 K0", "G98 M1",
+        "/G1 X20", "M5 M9", "M30",
+    )  # fmt: skip
+    assert ends_mm(path) == [[0, 0, 20], [5, 0, 20], [15, 0, 20], [20, 0, 20]]
+    (notice,) = path.notices
+    for name in ("M201", "M203", "M117", "G10", "T (", "M6", "S (", "E (", "G43", "H", "/", "M1 "):
+        assert name in notice
+
+
+def test_a_line_is_skipped_with_the_code_that_is_ignored():
+    path = read("G0 X0 Y0 Z0", "M777 X150 Y60 Z10", "G0 X5", "M2", ignored={"M777"})
+    assert ends_mm(path) == [[5, 0, 0]]
+    with pytest.raises(PathError, match=r":2: M777 and G1 share a line: divide it"):
+        read("G0 X0 Y0 Z0", "M777 G1 X5", "M2", ignored={"M777"})
+
+
+@pytest.mark.parametrize("name", ["G92", "G90.1", "G18", "G93", "G1", "X", "F", "I", "M2", "M98"])
+def test_what_other_lines_depend_on_cannot_be_ignored(name):
+    with pytest.raises(PathError, match=f"--ignore {name}: .* depend"):
+        read("G0 X0 Y0 Z0", "X5", "M2", ignored={name})
+
+
+def test_an_axis_that_the_robot_lacks_may_be_dropped():
+    path = read("G0 X0 Y0 Z5", "G1 X5 Z-1 F60", "M2", where=PLANE, ignored={"Z"})
+    assert ends_mm(path) == [[5, 0]]
+
+
+def test_a_feed_is_in_the_units_of_its_own_line():
+    path = read("G20 G90 F60", "G21", "G0 X0 Y0 Z0", "G1 X50", "G20 F30 X3", "M2")
+    np.testing.assert_allclose([move.speed for move in path.moves], [0.0254, 0.0127])
+
+
+def test_inverse_time_gives_the_duration_of_each_move():
+    path = read("G0 X0 Y0 Z0", "G93 G1 X30 F6", "G3 X30 I-10 F2", "M2")
+    np.testing.assert_allclose([move.speed for move in path.moves], [3e-3, 0.02 * math.pi / 30.0])
+
+
+def test_stops_before_the_first_position_are_where_the_path_begins():
+    path = read("G0 Z50", "M0 (clamp it)", "G4 P2", "G0 X0 Y0", "G1 X50 F3000", "M2")
+    nodes = nodes_of(path, np.ones(6))
+    assert nodes.runs[0].tolist() == [0, 0]
+    assert (nodes.dwell_s[0], bool(nodes.waits[0])) == (2.0, True)
+    assert nodes.waits.sum() == 1
+
+
+def test_dwells_are_in_s_or_ms_and_long_ones_are_noticed():
+    lines = ["G0 X0 Y0 Z0", "G4 P500", "X5", "G4 S2", "M2"]
+    path = read(*lines)
+    assert [move.dwell_s for move in path.moves] == [500.0, 0.0, 2.0]
+    assert path.notices == ["line 2: a dwell of 500 s; --dwell ms reads P in ms"]
+    path = read("G0 X0 Y0 Z0", "G4 S2", *["G4 P11"] * 2000, "X5", "M2")
+    assert path.notices == ["line 3: a dwell of 11 s (first of 2000); --dwell ms reads P in ms"]
+    path = read(*lines, dwell_unit_s=1e-3)
+    assert [move.dwell_s for move in path.moves] == [0.5, 0.0, 2.0]
+    assert not path.notices
+
+
+def test_coordinate_systems_have_zeros_of_their_own():
+    zeros = {"G55": np.array([1.0, 0.0, 0.0])}
+    path = read("G0 X0 Y0 Z0", "G55 X10", "G92 X0", "X5", "G92.1", "G54 X7", "M2", origins_m=zeros)
+    assert ends_mm(path) == [[1010, 0, 0], [1015, 0, 0], [7, 0, 0]]
+
+
+def test_an_offset_before_the_first_move_says_where_the_path_begins():
+    path = read("G92 X10 Y0 Z0", "G1 X20 F60", "M2", origin=(0.1, 0.0, 0.0))
+    np.testing.assert_allclose(path.start[:3], [0.11, 0.0, 0.0])
+    assert ends_mm(path) == [[120, 0, 0]]
+
+
+def test_relative_reference_positions_of_a_program_head():
+    path = read("G28 G91 Z0", "G90", "G28 X Y", "G0 X5 Y0", "Z10", "M30", origin=(0.1, 0.1, 1.0))
+    np.testing.assert_allclose(path.start[:3], [0.0, 0.1, 1.4])
+    assert ends_mm(path) == [[105, 100, 1400], [105, 100, 1010]]
+
+
+def test_files_of_a_plane_take_their_height_from_the_settings():
+    path = read("G0 X0 Y0", "X5", "M2", z_m=0.02, origin=(0.0, 0.0, 1.0))
+    assert ends_mm(path) == [[5, 0, 1020]]
+    with pytest.raises(PathError, match=r":1: Z: --z is for files that do not name it \(2 lines\)"):
+        read("G0 X0 Y0 Z5", "Z6", "M2", z_m=0.02)
+
+
+def test_rotation_vectors_turn_with_a_file_that_is_turned_and_mirrored():
+    turn = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+    path = read("G0 X0 Y0 Z0", "X10 A5", "M2", placement=2.0 * turn)
+    np.testing.assert_allclose(path.moves[0].end, [0, 0.02, 0, 0, math.radians(5), 0], atol=1e-12)
+    path = read("G0 X0 Y0 Z0", "X10 A5 C5", "M2", placement=np.diag([-1.0, 1.0, 1.0]))
+    angle = math.radians(5.0)
+    np.testing.assert_allclose(path.moves[0].end, [-0.01, 0, 0, angle, 0, -angle], atol=1e-12)
+
+
+def test_how_text_is_written_does_not_matter():
+    lines = ["G21 G90", "G0X0Y0Z0", "G1X5F60", "X+0.5"]
+    wanted = GcodeSettings(np.zeros(3))
+    for text in (
+        "\ufeff" + "\n".join(lines),
+        "\r".join(lines),
+        "(T1; D=6 (x))\r\n" + "\r\n".join(lines),
+    ):
+        path = read_gcode(text, "part.nc", ROOM, wanted)
+        assert ends_mm(path) == [[5, 0, 0], [0.5, 0, 0]]
+        assert path.notices == ["the file ends without M2 or M30: is it complete?"]
 
 
 @settings(max_examples=150)
-@given(st.text(alphabet="GMXYZABCFIJR0123456789.-+ %();\n", max_size=120))
+@example("*71")
+@given(st.text(alphabet="GMXYZABCFIJKLPQRSE0123456789.-+ %/#*();\n", max_size=120))
 def test_any_text_is_read_or_refused(text):
     try:
         read(text)

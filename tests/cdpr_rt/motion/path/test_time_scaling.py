@@ -15,8 +15,7 @@ from toppra import algorithm, constraint
 
 from cdpr_rt.motion.path.description import Arc, Coordinates, Move, PathDescription
 from cdpr_rt.motion.path.nodes import PathNodes, nodes_of
-from cdpr_rt.motion.path.time_scaling import PathLimits, TimedPath, time_path
-from cdpr_rt.motion.path.time_scaling_kernel import WrenchBounds
+from cdpr_rt.motion.path.time_scaling import PathLimits, TimedPath, WrenchBounds, time_path
 
 toppra.setup_logging("ERROR")
 ROOM = Coordinates(("x", "y", "z", "rx", "ry", "rz"), np.zeros(6))
@@ -137,6 +136,15 @@ def test_dwells_and_waits():
     assert still[-31:].all()
     assert still.sum() >= 25 + 30
     assert plan.waits.tolist() == [len(plan.samples) - 1]
+
+
+def test_a_wait_where_the_path_begins_is_after_a_moment_of_rest():
+    """A wait at time 0 would be passed over by who looks for the next one."""
+    path = polyline([[0] * 6, [0] * 6, [0.1] + [0] * 5], 0.0)
+    path.moves[0] = Move(2, path.start, np.inf, waits=True)
+    plan = timed(nodes_of(path, SCALE))
+    assert plan.waits.tolist() == [1]
+    assert not plan.samples[:2, 1:].any()
 
 
 def test_tensions_slow_it_down():

@@ -10,7 +10,8 @@ import pytest
 from cdpr_profiles.errors import ProfileError
 from cdpr_rt.motion.path.description import Coordinates, PathError
 from cdpr_rt.motion.path.gcode import GcodeSettings
-from cdpr_rt.motion.path.reading import read_path
+from cdpr_rt.motion.path.nodes import nodes_of
+from cdpr_rt.motion.path.way_points import read_path
 
 PLANE = Coordinates(("x", "y", "angle"), np.zeros(3))
 SETTINGS = GcodeSettings(np.zeros(2))
@@ -44,6 +45,17 @@ def test_both_say_the_same(tmp_path):
         assert [move.waits for move in path.moves] == [False, True]
     assert one.lines == [3, 5, 10]
     assert other.lines == [2, 3, 5]
+
+
+def test_a_stop_at_the_first_point_is_where_the_path_begins(tmp_path):
+    text = TOML.replace("position_m = [0.0, 1.4]", "position_m = [0.0, 1.4]\nwait = true")
+    (tmp_path / "a.toml").write_text(text)
+    (tmp_path / "a.csv").write_text(CSV.replace(",200,0.01,,", ",200,0.01,1.5,1"))
+    for kind in ("toml", "csv"):
+        nodes = nodes_of(read_path(tmp_path / f"a.{kind}", PLANE, SETTINGS), np.ones(3))
+        assert nodes.runs[0].tolist() == [0, 0]
+        assert nodes.waits[0]
+    assert nodes.dwell_s[0] == 1.5
 
 
 @pytest.mark.parametrize(

@@ -18,9 +18,8 @@ import numpy as np
 
 from cdpr_rt.core.shared_block import RowWriter, SharedBlock
 from cdpr_rt.core.states import LoopState
-from cdpr_rt.service.http.access_control import AccessControl, AccessPolicy
+from cdpr_rt.service.access_control import AccessControl, AccessPolicy
 from cdpr_rt.service.http.app import create_app
-from cdpr_rt.service.http.connections import FairQueue
 from cdpr_rt.service.http.server import Server
 from cdpr_rt.service.lease import LeaseError
 from cdpr_rt.service.listening import listen_tcp, listen_unix
@@ -105,7 +104,6 @@ class Rig:
         self.loop = MadeUpLoop(self.block)
         self.socket = folder / "control.sock"
         self.port = self.guarded_port = 0
-        self.told: list[str] = []
         self._ended = threading.Event()
         self._up = threading.Event()
         self._threads = [
@@ -145,15 +143,12 @@ class Rig:
             plain: AccessPolicy.on_tcp(None, "127.0.0.1"),
             guarded: AccessPolicy.on_tcp(KEY, "127.0.0.1"),
         }
-        queue = FairQueue()
         servers = [
             Server(
                 AccessControl(
                     app, policy, service.count_refusal, service.lease.is_held_by, service.tickets
                 ),
                 listener,
-                queue,
-                self.told.append,
             )
             for listener, policy in policies.items()
         ]

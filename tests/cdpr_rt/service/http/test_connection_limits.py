@@ -3,27 +3,25 @@
 from __future__ import annotations
 
 import asyncio
+import http.client
 import logging
-import os
-import resource
 import select
 import socket
 import struct
 import subprocess
 import sys
-import time
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
-from pathlib import Path
+from collections.abc import Callable, Coroutine
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
+from types import SimpleNamespace
 from typing import Any
 
 import httpx
 import pytest
 
-from cdpr_rt.service.http import acceptor, access_control, connections, server
-from cdpr_rt.service.http.access_control import AccessControl, AccessPolicy
-from cdpr_rt.service.http.tickets import Tickets
-from cdpr_rt.service.listening import listen_unix
+from cdpr_rt.service import access_control
+from cdpr_rt.service.access_control import AccessControl, AccessPolicy, Tickets
+from cdpr_rt.service.http import server
 from tests.cdpr_rt.service.http.service_rig import KEY, Rig, raw, reachable, wait_for
 
 RIGHT = {"Authorization": f"Bearer {KEY.decode()}"}
@@ -67,12 +65,7 @@ def _idle(rig: Rig, kind: str, most: int) -> list[socket.socket]:
 
 
 @pytest.mark.parametrize("kind", ["unix", "tcp"])
-def test_connections_that_ask_nothing_make_room_for_those_that_do(
-    rig: Rig, kind: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    # none leaves by itself
-    monkeypatch.setattr(server, "_REQUEST_S", 3600.0)
-    monkeypatch.setattr(acceptor, "_PENDING_S", 3600.0)
+def test_connections_that_ask_nothing_make_room_for_those_that_do(rig: Rig, kind: str) -> None:
     silent = _idle(rig, kind, 80)
     try:
         for _ in range(5):
@@ -87,79 +80,55 @@ def test_connections_that_ask_nothing_make_room_for_those_that_do(
     wait_for(lambda: reachable(rig))
 
 
-def test_no_more_who_say_nothing_are_kept_than_need_be(rig: Rig) -> None:
-    """The oldest of them leave first."""
-    silent = _idle(rig, "unix", acceptor.MOST_PENDING + 10)
-    try:
-        assert all(_ended(sock) for sock in silent[:10])
-        silent[-1].sendall(b"GET /status HTTP/1.1\r\nHost: localhost\r\n\r\n")
-        assert silent[-1].recv(100).startswith(b"HTTP/1.1 200")
-    finally:
-        for sock in silent:
-            sock.close()
-    wait_for(lambda: reachable(rig))
-
-
 @pytest.mark.parametrize("kind", ["unix", "tcp"])
-def test_connections_that_have_had_their_answer_make_room(rig: Rig, kind: str) -> None:
+@pytest.mark.parametrize("have_asked", [False, True])
+def test_of_one_clients_idle_connections_only_some_are_kept(
+    rig: Rig, kind: str, have_asked: bool
+) -> None:
     more = 6
-    kept = _idle(rig, kind, connections.MOST_OF_PEER + more)
+    kept = _idle(rig, kind, server.MOST_IDLE_OF_PEER + more)
     try:
-        for sock in kept:
-            sock.sendall(b"HEAD /status HTTP/1.1\r\nHost: localhost\r\n\r\n")
-            head = b""
-            while not head.endswith(b"\r\n\r\n"):
-                head += (part := sock.recv(4096))
-                assert part, head
-        assert all(_ended(sock) for sock in kept[:more])
-        for sock in kept[more:]:
-            sock.setblocking(False)
-            with pytest.raises(BlockingIOError):
-                sock.recv(1)
+        for sock in kept if have_asked else ():
+            with suppress(ConnectionError):  # ended while it was idle
+                sock.sendall(b"HEAD /status HTTP/1.1\r\nHost: localhost\r\n\r\n")
+                sock.recv(4096)
+        wait_for(lambda: sum(map(_has_ended, kept)) == more, 5.0)
     finally:
         for sock in kept:
             sock.close()
     wait_for(lambda: reachable(rig))
 
 
-def test_where_every_place_is_busy_there_is_one_for_a_stop(
-    rig: Rig, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def _has_ended(sock: socket.socket) -> bool:
+    poll = select.poll()
+    poll.register(sock, select.POLLRDHUP | select.POLLHUP)
+    return bool(poll.poll(0))
+
+
+def test_one_client_cannot_keep_all_requests_waiting_and_its_stop_is_taken(rig: Rig) -> None:
     rig.loop.answers = False  # whatever is asked of it is waited for
-    asked: list[str] = []
-    command = rig.service.link.command
-
-    async def noted(do: str, wait_s: float, **fields: Any) -> Any:
-        asked.append(do)
-        return await command(do, 10.0 * wait_s, **fields)
-
-    monkeypatch.setattr(rig.service.link, "command", noted)
-    key = b"Authorization: Bearer " + KEY
-    head = b"POST /check HTTP/1.1\r\nHost: localhost\r\n" + key + b"\r\nContent-Length: 0\r\n\r\n"
-    busy = []
+    head = (
+        b"POST /check HTTP/1.1\r\nHost: localhost\r\nAuthorization: Bearer "
+        + KEY
+        + b"\r\nContent-Length: 0\r\n\r\n"
+    )
+    busy: list[socket.socket] = []
     try:
-        for _ in range(connections.MOST_OF_PEER):
+        while not (busy and select.select([busy[-1]], [], [], 0.1)[0]):
             busy.append(socket.create_connection(("127.0.0.1", rig.guarded_port)))
             busy[-1].sendall(head)
-        wait_for(lambda: len(asked) == connections.MOST_OF_PEER)  # all have had their turn
-        status = b"GET /status HTTP/1.1\r\nHost: localhost\r\n" + key + b"\r\n\r\n"
-        assert raw(rig, status, 60.0, rig.guarded_port) == b""
-        wanted = head.replace(b"/check", b"/hold")
-        with socket.create_connection(("127.0.0.1", rig.guarded_port), 60.0) as sock:
-            for part in (wanted[:7], wanted[7:]):
-                sock.sendall(part)
-                time.sleep(0.1)
-            rig.loop.answers = True
-            answer = b""
-            while not answer.endswith(b"}"):
-                answer += sock.recv(4096)
-            assert answer.startswith(b"HTTP/1.1 200")
-            sock.sendall(status)
-            assert _ended(sock)  # the place was for a stop, and for nothing else
+            assert len(busy) < 100
+        assert busy[-1].recv(100).startswith(b"HTTP/1.1 429")
+        with rig.client() as other:
+            assert other.get("/events").status_code == 200
+        asking = ThreadPoolExecutor(1)
+        stop = asking.submit(httpx.post, f"{rig.guarded_url}/hold", headers=RIGHT, timeout=60.0)
+        wait_for(lambda: int(rig.block.counters["urgent"][0]) > 0)
+        rig.loop.answers = True
+        assert stop.result(60.0).status_code == 200
     finally:
         for sock in busy:
             sock.close()
-    assert {command["do"] for command in rig.loop.commands} == {"check", "hold"}
     wait_for(lambda: reachable(rig))
 
 
@@ -200,32 +169,16 @@ def test_wrong_keys_from_the_same_address_do_not_shut_out_the_right_one(rig: Rig
             guessing.kill()
 
 
-def test_a_head_that_comes_in_parts_shows_the_key_too(rig: Rig) -> None:
-    parts = (
-        f"GET /control HTTP/1.1\r\nHost: localhost\r\nauthorization: Bearer {KEY.decode()}",
-        "\r\n\r\n",
-    )
-    with socket.create_connection(("127.0.0.1", rig.guarded_port), 60.0) as sock:
-        for part in parts:
-            sock.sendall(part.encode())
-            time.sleep(0.1)
-        assert sock.recv(100).startswith(b"HTTP/1.1 200")
-
-
 @pytest.mark.parametrize("sent", [b"", b"GET /sta", b"GET /status HTTP/1.1\r\nHost: local"])
 def test_a_connection_that_asks_nothing_is_ended(
     rig: Rig, monkeypatch: pytest.MonkeyPatch, sent: bytes
 ) -> None:
-    monkeypatch.setattr(server, "_REQUEST_S", 0.2)
-    monkeypatch.setattr(server, "_LOOK_S", 0.1)
-    monkeypatch.setattr(acceptor, "_PENDING_S", 0.2)
+    monkeypatch.setattr(server, "IDLE_S", 0.2)
     assert raw(rig, sent, 3600.0) == b""
 
 
 def test_an_answer_that_is_not_taken_is_given_up(rig: Rig, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(server, "_ANSWER_S", 0.5)
-    monkeypatch.setattr(server, "_REQUEST_S", 0.5)
-    monkeypatch.setattr(server, "_LOOK_S", 0.1)
+    monkeypatch.setattr(server, "ANSWER_S", 0.5)
     with socket.socket(socket.AF_UNIX) as sock:
         sock.connect(str(rig.socket))
         sock.sendall(b"GET /openapi.json HTTP/1.1\r\nHost: localhost\r\n\r\n" * 100)
@@ -241,15 +194,17 @@ def test_an_answer_that_is_not_taken_is_given_up(rig: Rig, monkeypatch: pytest.M
 @pytest.mark.parametrize(
     "head", ["?" + 2500 * "a=1&" + " HTTP/1.1", " HTTP/1.1" + 300 * "\r\nA: b"]
 )
-def test_a_websocket_that_is_not_understood_takes_no_place(rig: Rig, head: str) -> None:
+def test_a_websocket_that_is_not_understood_is_ended(
+    rig: Rig, head: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(server, "IDLE_S", 0.2)
     upgrade = (
         f"GET /control{head}\r\nHost: localhost\r\nConnection: Upgrade\r\nUpgrade: websocket\r\n"
         "Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n\r\n"
     )
     with socket.create_connection(("127.0.0.1", rig.port), 60.0) as sock:
         sock.sendall(upgrade.encode())
-        assert sock.recv(65536).startswith(b"HTTP/1.1 400 ")
-        assert sock.recv(65536) == b""
+        assert _ended(sock)
 
 
 @pytest.mark.parametrize(
@@ -293,51 +248,79 @@ def test_a_client_that_resets_its_connection_is_forgotten(rig: Rig) -> None:
     assert reachable(rig)
 
 
-def test_no_descriptors_left_is_said_once_and_serving_goes_on(
-    tmp_path: Path, caplog: pytest.LogCaptureFixture
+# How many requests are taken.
+
+
+def test_requests_without_end_are_slowed_down_and_a_stop_still_comes_through(rig: Rig) -> None:
+    connection = http.client.HTTPConnection("127.0.0.1", rig.port, timeout=10.0)
+    answers = set()
+    while 429 not in answers:
+        connection.request("GET", "/control")
+        answer = connection.getresponse()
+        answer.read()
+        answers.add(answer.status)
+        if answer.getheader("connection") == "close":
+            connection.close()
+    assert httpx.post(f"{rig.url}/hold").status_code == 200
+    with rig.client() as client:  # its user's own clients are not limited
+        assert client.get("/control").status_code == 200
+
+
+def test_a_flood_does_not_shut_out_the_one_that_may_move_from_the_same_address(
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    async def app(_scope: Any, _add: Any, send: Any) -> None:
-        await send({"type": "http.response.start", "status": 204, "headers": []})
-        await send({"type": "http.response.body"})
+    monkeypatch.setattr(access_control, "time", SimpleNamespace(monotonic=lambda: 0.0))
+    ask = _asking("the token".__eq__, AccessPolicy())
 
-    async def serve() -> None:
-        listener = listen_unix(tmp_path / "one.sock")
-        access = AccessControl(
-            app, AccessPolicy(local=True), lambda: None, lambda _token: False, Tickets()
-        )
-        one = server.Server(access, listener, connections.FairQueue(), told.append)
-        serving = asyncio.create_task(one.serve_until_stopped())
-        while not one.started:
-            await asyncio.sleep(0.01)
-        sock.setblocking(False)
-        with _no_descriptors():
-            sock.connect(str(tmp_path / "one.sock"))
-            await asyncio.sleep(1.2)  # tried several times
-        loop = asyncio.get_running_loop()
-        await loop.sock_sendall(sock, b"GET / HTTP/1.1\r\nHost: x\r\n\r\n")
-        assert b" 204 " in await asyncio.wait_for(loop.sock_recv(sock, 100), 60.0)
-        one.should_exit = True
-        await serving
+    async def flood() -> list[int]:
+        while await ask() != 429:
+            pass
+        return [await ask(x_control_token=token) for token in ("another", "the token")]
 
-    told: list[str] = []
-    with socket.socket(socket.AF_UNIX) as sock:
-        asyncio.run(serve())
-    assert told == ["no connection more can be taken: Too many open files"]
-    assert caplog.text == ""
+    assert asyncio.run(flood()) == [429, 200]
 
 
-@contextmanager
-def _no_descriptors() -> Iterator[None]:
-    limits = resource.getrlimit(resource.RLIMIT_NOFILE)
-    free = os.dup(0)
-    resource.setrlimit(resource.RLIMIT_NOFILE, (free + 1, limits[1]))
-    held = [free]
-    with suppress(OSError):
-        while True:
-            held.append(os.dup(0))
-    try:
-        yield
-    finally:
-        for one in held:
-            os.close(one)
-        resource.setrlimit(resource.RLIMIT_NOFILE, limits)
+@pytest.mark.parametrize("path", sorted(access_control.STOP_PATHS))
+def test_only_what_stops_is_free_from_the_measure_of_requests(
+    path: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(access_control, "time", SimpleNamespace(monotonic=lambda: 0.0))
+    ask = _asking(lambda _token: False, AccessPolicy(key=KEY))
+
+    async def flood() -> list[int]:
+        for _ in range(1000):
+            if await ask("GET", path) == 429:
+                break
+        others = [await ask(method, path) for method in ("GET", "HEAD", "PUT", "OPTIONS")]
+        return [*others, await ask("POST", path)]
+
+    assert asyncio.run(flood()) == [429, 429, 429, 429, 200]
+
+
+def _asking(
+    holds_right: Callable[[str], bool], policy: AccessPolicy
+) -> Callable[..., Coroutine[Any, Any, int]]:
+    """Return what asks over TCP with the key and returns the status of the answer."""
+
+    async def app(scope: Any, receive: Any, send: Any) -> None:
+        await send({"type": "http.response.start", "status": 200, "headers": []})
+        await send({"type": "http.response.body", "body": b""})
+
+    async def receive() -> dict[str, Any]:
+        return {"type": "http.request"}
+
+    access = AccessControl(app, policy, lambda: None, holds_right, Tickets())
+
+    async def ask(method: str = "GET", path: str = "/control", **headers: str) -> int:
+        sent: list[dict[str, Any]] = []
+
+        async def send(message: Any) -> None:
+            sent.append(message)
+
+        headers = {"host": "localhost", "authorization": RIGHT["Authorization"], **headers}
+        given = [(name.replace("_", "-").encode(), text.encode()) for name, text in headers.items()]
+        scope = {"type": "http", "method": method, "path": path, "headers": given, "state": {}}
+        await access({**scope, "client": ("10.0.0.1", 1)}, receive, send)
+        return int(sent[0]["status"])
+
+    return ask

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import json
 import subprocess
 import sys
 import threading
@@ -11,10 +12,14 @@ from typing import Any
 
 import httpx
 import pytest
+from pydantic import ValidationError
 
-from cdpr_rt.service.streams.setpoint_stream import SetpointStream, listen_udp
-from cdpr_rt.service.streams.stream_client import StreamClient
-from cdpr_rt.service.streams.stream_packet import Standing, StreamSession
+from cdpr_rt.service.http import models
+from cdpr_rt.service.http.websocket_routes import Order
+from cdpr_rt.service.listening import listen_udp
+from cdpr_rt.service.setpoint_stream import SetpointStream
+from cdpr_rt.service.stream_client import StreamClient
+from cdpr_rt.service.stream_packet import Standing, StreamSession
 from tests.cdpr_rt.service.http.service_rig import NOT_TIGHT, Rig, wait_for
 
 
@@ -131,6 +136,21 @@ def test_anybody_may_stop_while_somebody_else_moves(rig: Rig, do: str) -> None:
         take(client)
         assert client.post(f"/{do}").status_code == 200
     assert [command["do"] for command in rig.loop.commands] == [do]
+
+
+def test_a_shutdown_reaches_the_loop_before_anything_is_done_to_the_launcher(rig: Rig) -> None:
+    reached: list[list[str]] = []
+
+    def wake() -> None:
+        reached.append([command["do"] for command in rig.loop.commands])
+
+    rig.service.wake_launcher = wake
+    try:
+        with rig.client() as client:
+            assert client.post("/shutdown").status_code == 200
+    finally:
+        rig.service.wake_launcher = lambda: None
+    assert reached == [["shutdown"]]
 
 
 def test_silence_ends_the_right_by_itself(rig: Rig, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -320,6 +340,33 @@ def test_however_deep_a_body_is_it_is_refused_and_nothing_breaks(
             assert len(answer.json()["error"]) < 300
     assert rig.loop.commands == []
     assert capfd.readouterr().err == ""
+
+
+def test_a_long_body_of_many_keys_is_refused_before_it_is_parsed(rig: Rig) -> None:
+    many = "{" + ",".join(f'"k{k}":1' for k in range(150_000)) + "}"
+    flood = ["1," * 900_000, "[" * 1_900_000, '"' * 1_900_000, "9" * 1_900_000, many]
+    with rig.client() as client:
+        for body in flood:
+            answer = client.post("/path", content=body)
+            assert answer.status_code == 422
+            assert answer.json()["error"].startswith("body: more than 16384 bytes; allowed: ")
+
+
+def test_a_long_file_is_taken_whatever_signs_are_in_it(rig: Rig) -> None:
+    text = 'G1 X1 ("a", [b]: {c})\\\n' * 60_000
+    with rig.client() as client:
+        answer = client.post("/path", json={"name": "part.nc", "text": text})
+    assert answer.status_code == 409, "validated, and refused as this service has no planner"
+    assert "plans no paths" in answer.json()["error"]
+
+
+def test_only_one_of_many_unknown_keys_is_reported() -> None:
+    body = {f"key{k}": 1 for k in range(2000)} | {"wanted": {}}
+    for model in (models.Set, Order):
+        with pytest.raises(ValidationError) as refused:
+            model.model_validate_json(json.dumps(body))
+        assert refused.value.error_count() <= 2, "the first unknown key, and a missing one"
+        assert "key0" in str(refused.value)
 
 
 def test_a_command_too_long_for_the_loop_is_refused(rig: Rig) -> None:

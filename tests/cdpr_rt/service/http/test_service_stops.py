@@ -3,23 +3,15 @@
 from __future__ import annotations
 
 import asyncio
-import socket
 import threading
 import time
 from collections import Counter
-from collections.abc import Callable
-from contextlib import ExitStack
-from types import SimpleNamespace
+from pathlib import Path
 from typing import Any
 
 import httpx
-import pytest
 
-from cdpr_rt.service.http import acceptor, connections, server
-from cdpr_rt.service.http.access_control import AccessControl, AccessPolicy
-from cdpr_rt.service.http.tickets import Tickets
-from cdpr_rt.service.listening import listen_tcp
-from tests.cdpr_rt.service.http.service_rig import KEY, Rig
+from tests.cdpr_rt.service.http.service_rig import KEY, Rig, wait_for
 
 RIGHT = {"Authorization": f"Bearer {KEY.decode()}"}
 
@@ -51,93 +43,26 @@ def test_no_stop_is_one_too_many(rig: Rig) -> None:
     assert set(seen) == {200}
 
 
-class StoppedQueue(connections.FairQueue):
-    """A queue that runs nothing; it keeps what is submitted."""
+def test_a_stop_that_the_loop_took_itself_is_noted_once_and_ends_the_planning(rig: Rig) -> None:
+    planned = threading.Event()
 
-    def __init__(self) -> None:
-        super().__init__()
-        self.submitted: list[Any] = []
+    async def plan(_file: Path, _request: dict[str, Any]) -> tuple[int, str]:
+        await asyncio.to_thread(planned.wait, 60.0)
+        return 0, "{}"
 
-    def submit(self, work: Any, authenticated: bool = False) -> None:
-        self.submitted.append(work)
+    def noted() -> list[tuple[str, int]]:
+        return [
+            (one["kind"], one["times"])
+            for one in rig.service.events.since()
+            if one["text"] == "hold by maria@lab"
+        ]
 
-
-@pytest.mark.parametrize(("for_all", "at_once"), [(False, [True]), (True, [False, True])])
-def test_a_stop_that_will_be_refused_goes_before_nobody(for_all: bool, at_once: list[bool]) -> None:
-    entered: list[bool] = []
-    queue = StoppedQueue()
-
-    def enter(is_authenticated: bool, first_has_priority: bool) -> asyncio.Protocol:
-        assert first_has_priority
-        entered.append(is_authenticated)
-        return asyncio.Protocol()
-
-    async def receive() -> None:
-        listener = listen_tcp("127.0.0.1", 0)
-        one = acceptor.Acceptor(
-            listener,
-            enter,
-            lambda head: KEY in head,
-            lambda is_authenticated: is_authenticated or for_all,
-            queue,
-            lambda _: None,
-        )
-        for head in (b"\r\n\r\n", b"Authorization: Bearer " + KEY + b"\r\n\r\n"):
-            sock = stack.enter_context(socket.create_connection(listener.getsockname()))
-            sock.sendall(b"POST /hold HTTP/1.1\r\n" + head)
-            await asyncio.sleep(0.1)
-        one.close()
-        listener.close()
-
-    with ExitStack() as stack:
-        asyncio.run(receive())
-    assert entered == at_once
-    assert len(queue.submitted) == 2 - len(at_once)
-
-
-def test_of_strangers_stops_on_tcp_a_few_a_second_go_before_all_else(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    """From however many addresses they come; those of the known and of the socket always do."""
-    now_s = 0.0
-    monkeypatch.setattr(server, "time", SimpleNamespace(monotonic=lambda: now_s))
-
-    def first(policy: AccessPolicy, is_authenticated: bool) -> Callable[[int], list[bool]]:
-        access = AccessControl(Any, policy, lambda: None, lambda _token: False, Tickets())  # type: ignore[arg-type]
-        with socket.socket() as sock:
-            one = server.Server(access, sock, queue, lambda _: None)
-        return lambda count: [one._has_priority(is_authenticated) for _ in range(count)]
-
-    class Stepped(connections.FairQueue):
-        back = 0
-
-        def yield_to_stop(self) -> None:
-            self.back += 1
-
-    queue = Stepped()
-    stranger = first(AccessPolicy(), is_authenticated=False)
-    assert stranger(6) == [True] * 4 + [False] * 2
-    now_s = 0.1
-    assert stranger(3) == [True, True, False]
-    assert queue.back == 0
-    assert first(AccessPolicy(key=KEY), is_authenticated=False)(1) == [False]
-    assert first(AccessPolicy(local=True), is_authenticated=False)(100) == [True] * 100
-    assert first(AccessPolicy(), is_authenticated=True)(100) == [True] * 100
-    assert queue.back == 200
-
-
-def test_a_stranger_whose_stop_is_one_of_many_waits_for_its_turn(
-    rig: Rig, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    waited: list[bool] = []
-    submit = connections.FairQueue.submit
-
-    def note(self: connections.FairQueue, work: Any, authenticated: bool = False) -> None:
-        waited.append(authenticated)
-        submit(self, work, authenticated)
-
-    monkeypatch.setattr(connections.FairQueue, "submit", note)
-    monkeypatch.setattr(server.TokenBuckets, "take", lambda *_: False)
-    assert httpx.post(f"{rig.url}/hold").status_code == 200
-    assert waited == [False, False]  # to come in, and to be heard
-    assert [command["do"] for command in rig.loop.commands] == ["hold"]
+    rig.service.planner.work = plan
+    with rig.client() as client:
+        assert client.post("/path", json={"name": "a.nc", "text": ""}).status_code == 200
+        for taken in (1, 2):
+            rig.loop.publish(stops={"taken": taken, "do": "hold", "client": "maria@lab"})
+            wait_for(lambda taken=taken: noted() == [("command", taken)])  # type: ignore[misc]
+        planned.set()
+        wait_for(lambda: not client.get("/path").json()["planning"])
+        assert "hold by maria@lab" in client.get("/path").json()["error"]

@@ -1,0 +1,380 @@
+"""Compute from images the starting point of the fit of cables and camera."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from cdpr_profiles.camera import MarkerSheets, rotation_vector_rad
+from cdpr_rt.arrays import BoolArray, FloatArray, IntArray
+from cdpr_rt.calibration.camera_model import (
+    UNKNOWN_HAND_EYE_STD,
+    CameraKnowledge,
+    CameraModel,
+    corner_residuals,
+)
+from cdpr_rt.calibration.fit import Fit, fit
+from cdpr_rt.calibration.markers.geometry import angles, exponentials, logarithms, nearest_rotation
+from cdpr_rt.calibration.markers.map_fit import MapFit, fit_map
+from cdpr_rt.calibration.markers.marker_map import (
+    MarkerMap,
+    SeenMarkers,
+    Sighting,
+    aligned,
+    consistent_places,
+    known_places,
+)
+from cdpr_rt.calibration.parameters import CableGeometry
+from cdpr_rt.calibration.readings import CameraSetup, HandEye, Observations
+from cdpr_rt.errors import InvalidRequestError
+
+# Hand-eye calibration: a camera's place on a platform from poses of both, in closed form.
+# (Q_j, p_j) are platform poses in the room, (C_j, c_j) camera poses in the frame of a map, (X, x)
+# the camera's place on the platform and (Z, z) the map's in the room. They satisfy Q_j X = Z
+# C_j and p_j + Q_j x = Z c_j + z. For two poses, Q_j^T Q_k X = X C_j^T C_k; with the rotation
+# vectors a of the platform's turn and b of the camera's, a = X b (Park and Martin 1994).
+# X is the rotation that fits best.
+
+_LEAST_TURN_rad = 0.02
+_ROUNDS = 5
+
+
+@dataclass(frozen=True)
+class Rigid:
+    """A rotation (3, 3) and a position (3,) of one frame in another."""
+
+    rotation: FloatArray
+    position_m: FloatArray
+
+
+def turned_camera(platform: FloatArray, camera: FloatArray) -> FloatArray:
+    """Return X for rotations (N, 3, 3) of platform and camera; poses that do not fit count less.
+
+    Raises InvalidRequestError if the platform hardly turns, or turns about one axis only.
+    """
+    j, k = np.triu_indices(len(platform), 1)
+    a = logarithms(platform[j].transpose(0, 2, 1) @ platform[k])
+    b = logarithms(camera[j].transpose(0, 2, 1) @ camera[k])
+    spread = np.sqrt(np.linalg.eigvalsh(b.T @ b / max(len(b), 1))) if len(b) else np.zeros(3)
+    if spread[1] < _LEAST_TURN_rad:
+        raise InvalidRequestError(
+            f"the platform turns by {np.degrees(spread[1]):.1f} deg only about a second axis, which"
+            " does not tell how the camera sits on it; allowed: hand_eye in the data, as measured"
+        )
+    weight = np.ones(len(a))
+    for _ in range(_ROUNDS):
+        X = nearest_rotation((a * weight[:, None]).T @ b)
+        off = np.linalg.norm(a - b @ X.T, axis=1)
+        weight = _weights(off)
+    return X
+
+
+def rigid_places(
+    platform: FloatArray, camera: Rigid, turn: FloatArray, place_m: FloatArray | None
+) -> tuple[Rigid, Rigid]:
+    """Return the camera's place on the platform and the map's in the room.
+
+    `platform` (N, 4, 3) and `camera` (N, 3, 3), (N, 3) are poses, `turn` is X; `place_m` is x if
+    it is known. Least squares, reweighted so that poses that do not fit count less.
+    """
+    Q, p = platform[:, 1:], platform[:, 0]
+    weight = np.ones(len(p))
+    for _ in range(_ROUNDS):
+        Z = nearest_rotation(np.einsum("j,jab,bc,jdc->ad", weight, Q, turn, camera.rotation))
+        weight = _weights(angles(Q @ turn @ camera.rotation.transpose(0, 2, 1) @ Z.T))
+    right = camera.position_m @ Z.T - p
+    weight = np.ones(len(p))
+    for _ in range(_ROUNDS):
+        if place_m is None:
+            A = np.concatenate([Q, np.broadcast_to(-np.eye(3), Q.shape)], axis=2)
+            both = np.linalg.lstsq(
+                (weight[:, None, None] * A).reshape(-1, 6), (weight[:, None] * right).ravel(), None
+            )[0]
+            x, z = both[:3], both[3:]
+        else:
+            x = place_m
+            z = np.average(Q @ x - right, axis=0, weights=weight**2)
+        weight = np.sqrt(_weights(np.linalg.norm(Q @ x - z - right, axis=1)))
+    return Rigid(turn, x), Rigid(Z, z)
+
+
+def _weights(off: FloatArray) -> FloatArray:
+    """Return weights for distances; the weight is half at twice their median."""
+    scale = 2.0 * max(float(np.median(off)), 1e-9)
+    return np.asarray(1.0 / (1.0 + (off / scale) ** 2))
+
+
+_LIKELY_deg, _LIKELY_SIGMAS = 15.0, 6.0
+"""Largest likely error of the camera's rotation: the robot's file gives turns only roughly."""
+_ROOM_m, _ROOM_rad = 0.2, 0.15
+"""Known markers whose layout is displaced by no more than this are in the robot's own frame."""
+
+
+@dataclass(frozen=True)
+class CameraStart:
+    """A marker map, the matching camera model, and the observations."""
+
+    map: MapFit
+    camera: CameraModel
+    geometry: CableGeometry
+    seen: Observations
+    known_room: bool
+    """Whether places of markers are known in the room's frame."""
+    setup: CameraSetup
+    """The camera's, with only those known places that agree with each other."""
+    place_faults: tuple[str, ...] = ()
+    """Faults of known places, as text."""
+    contradictory_places: bool = False
+    """Whether no majority of known places agrees."""
+
+
+def camera_start(
+    geometry: CableGeometry,
+    seen: Observations,
+    setup: CameraSetup,
+    sightings: Sequence[Sighting],
+) -> CameraStart:
+    """Return the starting point of the fit; there is an image for each pose of `seen`.
+
+    Known places that contradict the map are left out. Raises InvalidRequestError and BundleError
+    if the images do not determine a map or the place of the camera.
+    """
+    found = map_of_images(setup, sightings)
+    places = consistent_places(found.map, setup.sheets, setup.known_std_m)
+    setup = setup.model_copy(update={"sheets": places.sheets})
+    start = start_on_map(geometry, seen, setup, found)
+    return replace(
+        start,
+        place_faults=(*places.faults, *start.place_faults),
+        contradictory_places=places.contradictory,
+    )
+
+
+def map_of_images(setup: CameraSetup, sightings: Sequence[Sighting]) -> MapFit:
+    """Return the map determined by images alone; raises InvalidRequestError and BundleError."""
+    # known places join the later fit as measurements; here they would only determine the frame
+    return fit_map(sightings, setup.intrinsics, setup.sheets.model_copy(update={"known": ()}))
+
+
+def start_on_map(
+    geometry: CableGeometry, seen: Observations, setup: CameraSetup, found: MapFit
+) -> CameraStart:
+    """Return the starting point, given a map of the images; raises InvalidRequestError."""
+    rough = fit(geometry, seen)
+    map_ = found.map
+    if known := known_places(map_, setup.sheets)[0]:
+        map_ = aligned(map_, setup.sheets)[0]
+    there = np.flatnonzero(map_.located)
+    hand_eye, room = _places(rough.poses, map_, there, setup)
+    known_room = bool(known) and _is_small(room, map_)
+    faults: tuple[str, ...] = ()
+    if known_room:
+        room = Rigid(np.eye(3), np.zeros(3))
+    elif known:
+        faults = (_other_room(room, map_),)
+    map_ = map_.moved(room.rotation, room.position_m, map_.reference)
+    markers = found.seen.keep(map_.placed[found.seen.marker] & map_.located[found.seen.image])
+    start = _platform_poses(rough.poses, map_, there, hand_eye, geometry)
+    model = _model(setup, found, map_, hand_eye, room)
+    before_camera = np.isfinite(corner_residuals(model, markers, start)).all(axis=(1, 2))
+    markers = markers.keep(np.asarray(before_camera))
+    return CameraStart(
+        found,
+        model,
+        rough.geometry,
+        replace(seen, start=start, markers=markers),
+        known_room,
+        setup,
+        faults,
+    )
+
+
+def _places(
+    platform: FloatArray, map_: MarkerMap, there: IntArray, setup: CameraSetup
+) -> tuple[Rigid, Rigid]:
+    """Return the camera's place on the platform, and the map's place in the room."""
+    cameras = Rigid(map_.camera_rotation[there], map_.camera_position_m[there])
+    told = setup.hand_eye
+    if told is None:
+        turn = turned_camera(platform[there, 1:], cameras.rotation)
+        return rigid_places(platform[there], cameras, turn, None)
+    turn = exponentials(np.array(rotation_vector_rad(told.rotation_deg)))[0]
+    _require_likely(turn, platform[there, 1:], cameras.rotation, told)
+    return rigid_places(platform[there], cameras, turn, np.array(told.position_m))
+
+
+def _require_likely(
+    turn: FloatArray, platform: FloatArray, camera: FloatArray, told: HandEye
+) -> None:
+    """Raise InvalidRequestError if the platform's turns contradict the given camera rotation."""
+    try:
+        seen = turned_camera(platform, camera)
+    except InvalidRequestError:  # it hardly turns: only the given rotation is known
+        return
+    off_deg = math.degrees(angles(seen.T @ turn))
+    most_deg = max(_LIKELY_deg, _LIKELY_SIGMAS * told.rotation_std_deg)
+    if off_deg > most_deg:
+        raise InvalidRequestError(
+            f"hand_eye.rotation_deg: value {list(told.rotation_deg)}: the platform's turns tell "
+            f"another, {off_deg:.0f} deg off; allowed: up to {most_deg:.0f} deg; without it the "
+            "turns alone tell how the camera sits"
+        )
+
+
+def _is_small(room: Rigid, map_: MarkerMap) -> bool:
+    """Return whether the map is nearly where the robot's file places it."""
+    return _moved_m(room, map_) < _ROOM_m and bool(angles(room.rotation) < _ROOM_rad)
+
+
+def _moved_m(room: Rigid, map_: MarkerMap) -> float:
+    """Return how far the camera is moved by the motion that takes the map into the room."""
+    at = map_.camera_position_m[map_.located]
+    moved = at @ room.rotation.T + room.position_m - at
+    return float(np.median(np.linalg.norm(moved, axis=1)))
+
+
+def _other_room(room: Rigid, map_: MarkerMap) -> str:
+    return (
+        f"the known markers put the platform {_moved_m(room, map_):.2f} m and "
+        f"{math.degrees(angles(room.rotation)):.0f} deg from where the robot's file has it: their "
+        "places are taken for a separate frame, and do not tell where the robot is in its "
+        "room; check them if they were measured in its frame"
+    )
+
+
+def _platform_poses(
+    rough: FloatArray,
+    map_: MarkerMap,
+    there: IntArray,
+    hand_eye: Rigid,
+    geometry: CableGeometry,
+) -> FloatArray:
+    """Return poses (N, 4, 3): of located cameras if six directions are free, else rough ones."""
+    poses = rough.copy()
+    if len(geometry.free) == 6:
+        Q = map_.camera_rotation[there] @ hand_eye.rotation.T
+        poses[there, 1:] = Q
+        poses[there, 0] = map_.camera_position_m[there] - Q @ hand_eye.position_m
+    return poses
+
+
+def _model(
+    setup: CameraSetup, found: MapFit, map_: MarkerMap, hand_eye: Rigid, room: Rigid
+) -> CameraModel:
+    lens = np.array(setup.intrinsics.parameters)
+    told = setup.hand_eye
+    std = np.array(UNKNOWN_HAND_EYE_STD)
+    if told is not None:
+        std = np.repeat([told.position_std_m, np.radians(told.rotation_std_deg)], 3)
+    sigmas = setup.intrinsics.sigmas
+    noise = found.bundle.sigma_px
+    position, rotation, known = _layout(setup, map_, room)
+    turn_std = 2.0 * setup.known_std_m / map_.size_m
+    knowledge = CameraKnowledge(
+        hand_eye.position_m,
+        hand_eye.rotation,
+        std,
+        setup.size_std,
+        lens,
+        np.zeros(9) if sigmas is None else np.array(sigmas),
+        known,
+        position,
+        rotation,
+        np.repeat(np.stack([np.full_like(turn_std, setup.known_std_m), turn_std], axis=1), 3, 1),
+        setup.sigma_px or noise * float(np.sqrt(found.bundle.sheets.inflation)),
+        noise,
+    )
+    placed = np.where(map_.placed[:, None], map_.position_m, 0.0)
+    turned = np.where(map_.placed[:, None, None], map_.rotation, np.eye(3))
+    return CameraModel(
+        hand_eye.position_m, hand_eye.rotation, 0.0, lens, map_.ids, placed, turned, knowledge
+    )
+
+
+def _layout(
+    setup: CameraSetup, map_: MarkerMap, room: Rigid
+) -> tuple[FloatArray, FloatArray, BoolArray]:
+    """Return positions and rotations of markers, and whether the place of each is known."""
+    count = len(map_.ids)
+    position, rotation = np.zeros((count, 3)), np.tile(np.eye(3), (count, 1, 1))
+    known = np.zeros(count, bool)
+    numbers, places, turns = known_places(map_, setup.sheets)
+    known[numbers] = True
+    position[numbers] = places @ room.rotation.T + room.position_m
+    rotation[numbers] = room.rotation @ turns
+    return position, rotation, known
+
+
+# Poses that images determine with the marker map of an earlier calibration.
+
+_MAP_m, _MAP_rad = 5e-4, 5e-4
+"""Common error of a whole map, which no image shows."""
+_PLACED_m = 0.05
+"""A marker whose place is less certain is not in the map."""
+_LEAST_MARKERS = 2
+
+
+def with_seen_poses(
+    made: Fit, sheets: MarkerSheets, seen: Observations, sightings: Sequence[Sighting]
+) -> Observations:
+    """Return observations with poses measured by the camera, using the map of a fit.
+
+    Images that show fewer than two markers of the map are ignored. Raises InvalidRequestError
+    if all images are ignored.
+    """
+    camera = made.camera
+    assert camera is not None  # the calibration used one
+    of_markers = made.camera_std[camera.first_marker :].reshape(-1, 6)
+    placed = of_markers[:, :3].max(axis=1) < _PLACED_m
+    markers = markers_of_map(camera.ids, placed, sheets, sightings)
+    if not len(markers):
+        raise InvalidRequestError(
+            f"no image shows {_LEAST_MARKERS} markers of the calibration's map: were the sheets "
+            "taken away?"
+        )
+    there = locate_by_camera(made.geometry, camera, replace(seen, markers=markers))
+    shown = np.isin(np.arange(seen.poses), markers.image)
+    sure = np.einsum("jdd->jd", there.pose_covariance) * max(there.corner_factor, 1.0)
+    position = np.where(shown[:, None], there.poses[:, 0], np.nan)
+    rotation = np.where(shown[:, None, None], there.poses[:, 1:], np.nan)
+    return seen.with_positions(position, np.sqrt(sure[:, :3] + _MAP_m**2)).with_rotations(
+        rotation, np.sqrt(sure[:, 3:] + _MAP_rad**2)
+    )
+
+
+def locate_by_camera(geometry: CableGeometry, camera: CameraModel, seen: Observations) -> Fit:
+    """Return the poses determined by images alone, with the map held fixed."""
+    blind = replace(
+        seen.unmeasured(), used=np.zeros_like(seen.used), markers=seen.markers, jumps=()
+    )
+    still = replace(camera, held=True)
+    return fit(replace(geometry, identified=()), blind, camera=still)
+
+
+def markers_of_map(
+    ids: tuple[int, ...],
+    placed: BoolArray,
+    sheets: MarkerSheets,
+    sightings: Sequence[Sighting],
+) -> SeenMarkers:
+    """Return seen markers that have a place (m,) in a map of `ids`, for images that show two."""
+    number = {marker: k for k, marker in enumerate(ids) if placed[k]}
+    rows = [
+        (image, number[marker], corners)
+        for image, one in enumerate(sightings)
+        if one.problem is None
+        and sum(marker in number for marker in one.corners_px) >= _LEAST_MARKERS
+        for marker, corners in sorted(one.corners_px.items())
+        if marker in number
+    ]
+    return SeenMarkers(
+        tuple(one.name for one in sightings),
+        ids,
+        np.array([row[0] for row in rows], np.int64),
+        np.array([row[1] for row in rows], np.int64),
+        np.array([row[2] for row in rows], float).reshape(-1, 4, 2),
+        np.array([sheets.size_of(marker) for marker in ids]),
+    )

@@ -1,1 +1,0 @@
-"""The least-squares fit: parameters, residuals, and readings that contradict it."""

@@ -1,0 +1,590 @@
+"""Faults of a calibration: wrong lengths, points, drums, images and markers, and their causes."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations
+from typing import Any, Final, Literal
+
+import numpy as np
+from scipy.stats import chi2
+
+from cdpr_rt.arrays import FloatArray
+from cdpr_rt.calibration.camera_model import SIZE, CameraKnowledge, CameraModel
+from cdpr_rt.calibration.camera_start import CameraStart
+from cdpr_rt.calibration.fit import Fit, fit
+from cdpr_rt.calibration.markers.map_fit import MapFit, misfits, warnings
+from cdpr_rt.calibration.markers.marker_map import Sighting
+from cdpr_rt.calibration.parameters import DRUM, CableGeometry
+from cdpr_rt.calibration.point_slips import (
+    MARGIN,
+    SlipVerdict,
+    cost_of_readings,
+    row_slip,
+    slipped,
+)
+from cdpr_rt.calibration.readings import Observations
+from cdpr_rt.calibration.residuals import length_std_m
+
+FaultKind = Literal[
+    "slack", "outlier", "jump", "point", "points",
+    "drum", "elongation", "image", "marker", "camera", "lens", "size", "hand_eye", "place",
+]  # fmt: skip
+_OUTLIER, _JUMP = 25.0, 40.0
+"""Least reduction of the sum of squared residuals by leaving a reading out, to first order."""
+_LEAST_GAIN = 16.0
+"""Least reduction over the variance of the remaining residuals (F-test)."""
+_MOST_FAULTS = 16
+_ALIKE, _MAYBE = 0.8, 0.2
+_TOLD = 0.05
+"""Least redundancy of a reading; below it, no other readings show that it is wrong."""
+_ENDS = 2
+"""Poses at both ends at which a jump looks like an outlier."""
+_FAR = 3.0
+_UNSURE = ": lengths alone do not tell"
+
+
+@dataclass(frozen=True)
+class Fault:
+    """A reading or figure that contradicts the assumed robot."""
+
+    kind: FaultKind
+    cable: int
+    """Counted from 0; -1 for all."""
+    pose: int
+    """Counted from 0; -1 for all poses."""
+    size: float
+    """In m; relative for drum, elongation and camera figures."""
+    text: str
+    alike: tuple[int, ...] = ()
+    """Other cables that might have the fault, by lengths alone."""
+
+    def as_json(self) -> dict[str, object]:
+        """Return it for JSON, cables and poses counted from 1."""
+        return {
+            "kind": self.kind,
+            "cable": self.cable + 1 or None,
+            "or_cables": [cable + 1 for cable in self.alike],
+            "pose": self.pose + 1 or None,
+            "size": self.size,
+            "text": self.text,
+        }
+
+
+def without_slack(
+    geometry: CableGeometry, seen: Observations, slack_N: FloatArray
+) -> tuple[Observations, list[Fault]]:
+    """Return observations without lengths of cables that were slack according to their tensions."""
+    slack = seen.used & (seen.tension_N < slack_N)
+    faults = [
+        Fault(
+            "slack", int(i), int(j), float(seen.tension_N[j, i]),
+            f"{geometry.cable_name(i)} was slack at pose {j + 1} ({seen.tension_N[j, i]:.1f} N); "
+            "its length there is left out",
+        )
+        for j, i in np.argwhere(slack)
+    ]  # fmt: skip
+    return replace(seen, used=seen.used & ~slack), faults
+
+
+def fit_without_faults(
+    geometry: CableGeometry,
+    seen: Observations,
+    slack_N: FloatArray,
+    camera: CameraModel | None = None,
+) -> tuple[Fit, list[Fault]]:
+    """Return the fit of all consistent readings, and the readings that were left out, as text.
+
+    The length or measured point that contradicts the others most is left out, until none does. If
+    all later lengths of a cable are off by the same amount, they get a separate offset instead.
+    """
+    seen, faults = without_slack(geometry, seen, slack_N)
+    found = fit(geometry, seen, camera=camera)
+    gains: list[float] = []
+    left_out: list[Fault] = []
+    while len(left_out) < _MOST_FAULTS and (tried := _worst(found)):
+        fault, without = _left_out(geometry, found, tried)
+        gains.append(found.total_cost - without.total_cost)
+        left_out.append(fault)
+        found = without
+    # readings that stood out before others were left out may not stand out any more
+    least = _LEAST_GAIN * max(found.variance_factor, 1.0)
+    sure = [fault for fault, gain in zip(left_out, gains, strict=True) if gain > least]
+    if len(sure) < len(left_out):
+        found = _only_without(geometry, seen, sure, found)
+    some = [fault for fault in sure if fault.kind != "jump" or _is_off(fault, found)]
+    if len(some) < len(sure):
+        sure, found = some, _only_without(geometry, seen, some, found)
+    faults += [_with_size(fault, found, seen) for fault in sure]
+    return found, faults + parameter_faults(found)
+
+
+def without_slipped_points(
+    geometry: CableGeometry, seen: Observations, slack_N: FloatArray
+) -> tuple[Observations, list[Fault]]:
+    """Return observations without measured points if these have slipped as a whole, and how.
+
+    Then the points contradict lengths and the robot's file. Leaving out single points would blame
+    points that may be right.
+    """
+    if not np.isfinite(seen.position_std_m).any():
+        return seen, []
+    blind, before = fit_without_faults(geometry, seen.unmeasured(), slack_N)
+    verdict = slipped(geometry, blind, seen)
+    if not verdict.text and verdict.explained:
+        return seen, []
+    causes = [verdict.text] if verdict.text else []
+    if not verdict.sure:
+        readings, rival = _wrong_lengths(geometry, seen, slack_N, before)
+        if rival.explained and (not causes or rival.cost < verdict.cost - MARGIN):
+            return seen, []
+        if rival.explained and rival.cost < verdict.cost + MARGIN:
+            causes += [one.text.partition(":")[0] for one in readings[:2]]
+    if len(causes) == 1 and not verdict.undecided:
+        text = f"{causes[0]}: correct the points, and fit again"
+    elif causes:
+        text = (
+            "undecided: measured points contradict lengths and the robot's file: "
+            f"{', or '.join(causes)}; nothing tells which: measure one distance between two poses "
+            "by other means"
+        )
+    else:
+        text = (
+            "undecided: measured points contradict lengths and the robot's file, and no single "
+            "slip or wrong value explains it: measure some of them again"
+        )
+    fault = Fault("points", -1, -1, verdict.off, text)
+    return replace(seen.unmeasured(), markers=seen.markers), [fault]
+
+
+def _wrong_lengths(
+    geometry: CableGeometry, seen: Observations, slack_N: FloatArray, before: list[Fault]
+) -> tuple[list[Fault], SlipVerdict]:
+    """Return lengths that only points show to be wrong, and whether these explain the points."""
+    joint, faults = fit_without_faults(geometry, seen, slack_N)
+    known = {(one.kind, one.cable, one.pose) for one in before}
+    readings = [
+        one
+        for one in faults
+        if one.kind in ("jump", "outlier") and (one.kind, one.cable, one.pose) not in known
+    ]
+    if not readings:
+        return [], SlipVerdict(explained=False)
+    start = replace(joint.seen, start=joint.poses).unmeasured()
+    others = fit(geometry, start, start=joint.geometry)
+    return readings, cost_of_readings(geometry, others, seen, len(readings))
+
+
+def without_points(seen: Observations, faults: Iterable[Fault]) -> Observations:
+    """Return observations without the measured points that are among the faults."""
+    for fault in faults:
+        if fault.kind == "point":
+            seen = _without(seen, fault)
+    return seen
+
+
+def _left_out(geometry: CableGeometry, found: Fit, tried: list[Fault]) -> tuple[Fault, Fit]:
+    """Return the tried fault without which the fit leaves least, and that fit.
+
+    Poses can absorb much of a jump. A pose that few readings determine can absorb much of a wrong
+    length or point. Only fitting the poses again shows which fault it is.
+    """
+    seen = replace(found.seen, start=found.poses)
+    fits = [
+        fit(geometry, _without(seen, one), start=found.geometry, camera=found.camera)
+        for one in tried
+    ]
+    if len(tried) == 1:
+        return tried[0], fits[0]
+    costs = np.array([one.total_cost for one in fits])
+    best = int(costs.argmin())
+    near = costs < costs[best] + _LEAST_GAIN * max(fits[best].variance_factor, 1.0)
+    if tried[0].kind == "point" and near[0]:
+        best = 0
+    alike = tuple(tried[k].cable for k in np.flatnonzero(near) if k != best)
+    return replace(tried[best], alike=alike), fits[best]
+
+
+def _without(seen: Observations, fault: Fault) -> Observations:
+    if fault.kind == "jump":
+        return replace(seen, jumps=(*seen.jumps, (fault.cable, fault.pose)))
+    if fault.kind == "point":
+        std_m = seen.position_std_m.copy()
+        std_m[fault.pose] = np.inf
+        return replace(seen, position_std_m=std_m)
+    used = seen.used.copy()
+    used[fault.pose, fault.cable] = False
+    return replace(seen, used=used)
+
+
+def _only_without(
+    geometry: CableGeometry, seen: Observations, faults: list[Fault], found: Fit
+) -> Fit:
+    """Return the fit without these faults, starting from another fit."""
+    seen = replace(seen, start=found.poses)
+    for fault in faults:
+        seen = _without(seen, fault)
+    return fit(geometry, seen, start=found.geometry, camera=found.camera)
+
+
+def _is_off(fault: Fault, found: Fit) -> bool:
+    """Return whether a jump still has a size: a jump found later may explain it entirely."""
+    k = found.seen.jumps.index((fault.cable, fault.pose))
+    variance = found.covariance[found.geometry.size + k, found.geometry.size + k]
+    return bool(found.jumps_m[k] ** 2 > _FAR**2 * variance)
+
+
+def _with_size(fault: Fault, found: Fit, seen: Observations) -> Fault:
+    """Return a jump or point of `seen` with its size according to the final fit."""
+    if fault.kind == "point":
+        return _with_distance(fault, found, seen)
+    if fault.kind != "jump":
+        return fault
+    size = float(found.jumps_m[found.seen.jumps.index((fault.cable, fault.pose))])
+    who = found.geometry.cables_text(fault.cable, fault.alike, _UNSURE)
+    text = (
+        f"{who} is {1e3 * size:+.1f} mm off from pose {fault.pose + 1} on: "
+        "its encoder, coupling or drum slipped between that pose and the one before"
+    )
+    return replace(fault, size=size, text=text)
+
+
+def _with_distance(fault: Fault, found: Fit, seen: Observations) -> Fault:
+    """Return a wrong point with its distance and possible explanations."""
+    j, k = fault.pose, found.geometry.coordinates
+    there = (found.poses[j, 0] + found.poses[j, 1:] @ seen.target_m)[:k]
+    std_m = seen.position_std_m[j, :k]
+    measured = np.where(np.isfinite(std_m), seen.position_m[j, :k], np.nan)
+    size = float(np.sqrt(np.nansum((measured - there) ** 2)))
+    text = (
+        f"pose {j + 1}: the measured point is {1e3 * size:.1f} mm from where all other readings "
+        "put it"
+    )
+    if slip := row_slip(measured, there, float(std_m.min())):
+        text += f"; it fits if {slip}"
+    if fault.alike:
+        cables = " or ".join(found.geometry.cable_name(cable) for cable in fault.alike)
+        text += f", or {cables} was slack or caught there: nothing tells which"
+    return replace(fault, size=size, text=f"{text}; it is left out")
+
+
+def _worst(found: Fit) -> list[Fault]:
+    """Return the readings that may be the worst contradiction; an empty list if there is none."""
+    n, seen = found.geometry.n, found.seen
+    residual, hat, weight = _hats(found)
+    redundancy = 1.0 - np.array([np.diag(h) for h in hat]).T
+    told = seen.used & (redundancy > _TOLD)
+    single = np.where(told, residual**2 / np.where(told, redundancy, 1.0), 0.0)
+    points = _point_gains(found)
+    # compare a jump with all lengths of its cable, weighted as by the robust loss
+    weights = found.weights[:, :n]
+    root = np.sqrt(weights)
+    off, by = residual * root, weight * root
+    gains = np.array([_jump_gains(off[:, c], hat[c], by[:, c]) for c in range(n)])
+    cable, pose = (int(x) for x in np.unravel_index(int(gains.argmax()), gains.shape))
+    j, i = (int(x) for x in np.unravel_index(int(single.argmax()), single.shape))
+    weighted = (
+        single[j, i] * weights[j, i],
+        (points * found.weights[:, found.at.points.start]).max(),
+    )
+    if gains[cable, pose] > max(_JUMP, *weighted) and (cable, pose) not in seen.jumps:
+        alike = _alike(gains[:, pose], cable, _MAYBE)
+        return [Fault("jump", c, pose, 0.0, "") for c in (cable, *alike)]
+    if points.max() > single[j, i]:
+        j = int(points.argmax())
+        i = int(single[j].argmax())
+    if max(points[j], single[j, i]) < _OUTLIER:
+        return []
+    size = float(residual[j, i] / weight[j, i] / redundancy[j, i]) if told[j, i] else 0.0
+    what = "slack or caught somewhere" if size > 0.0 else "longer than it was paid out"
+    alike = _alike(single[j], i)
+    who = found.geometry.cables_text(i, alike, _UNSURE)
+    text = (
+        f"{who} at pose {j + 1} is {1e3 * size:+.1f} mm off what all "
+        f"others say: {what}; its length there is left out"
+    )
+    tried = [Fault("point", -1, j, 0.0, "")] if points[j] > _MAYBE * single[j, i] else []
+    if single[j, i] > _MAYBE * points[j]:
+        tried.append(Fault("outlier", i, j, size, text, alike))
+    return tried
+
+
+def _point_gains(found: Fit) -> FloatArray:
+    """Return the reduction of the sum of squares by leaving out each measured point, (N,).
+
+    Two per coordinate except the first are subtracted, to compare with leaving out one length.
+    """
+    at, rows = found.at, found.at.points
+    by_pose = at.by_pose[:, rows] * np.sqrt(found.weights[:, rows])[..., None]
+    left, covariance = found.left[:, rows], found.covariance / found.inflation
+    hat = left @ covariance @ np.swapaxes(left, 1, 2)
+    hat += found.taken[:, rows] @ np.swapaxes(by_pose, 1, 2)
+    spare, axes = np.linalg.eigh(np.eye(3) - hat)
+    along = np.einsum("jab,ja->jb", axes, at.residual[:, rows])
+    gains = np.where(spare > _TOLD, along**2 / np.maximum(spare, _TOLD), 0.0).sum(axis=1)
+    known = np.isfinite(found.seen.position_std_m).sum(axis=1)
+    return np.asarray(np.maximum(gains - 2.0 * np.maximum(known - 1, 0), 0.0))
+
+
+def _alike(gains: FloatArray, best: int, share: float = _ALIKE) -> tuple[int, ...]:
+    """Return the cables that fit nearly as well as the best one."""
+    near = np.flatnonzero(gains > share * gains[best])
+    return tuple(int(cable) for cable in near if cable != best)
+
+
+def _hats(found: Fit) -> tuple[FloatArray, list[FloatArray], FloatArray]:
+    """Return residuals (N, n), the hat matrix of each cable's residuals, and weights.
+
+    For rows j, k of one cable it is p_j Σ p_k^T + δ_jk x_j C_j^-1 x_j^T; p are the derivatives by
+    the parameters less what the poses take of them.
+    """
+    n, at = found.geometry.n, found.at
+    by_pose = at.by_pose[:, :n] * np.sqrt(found.weights[:, :n])[..., None]
+    own, left = (found.taken[:, :n] * by_pose).sum(axis=2), found.left[:, :n]
+    covariance = found.covariance / found.inflation
+    hats = [left[:, i] @ covariance @ left[:, i].T + np.diag(own[:, i]) for i in range(n)]
+    weight = found.seen.used / length_std_m(found.geometry, found.seen)
+    return at.residual[:, :n], hats, weight
+
+
+def _jump_gains(residual: FloatArray, hat: FloatArray, weight: FloatArray) -> FloatArray:
+    """Return the reduction of the sum of squares by an offset from each pose on, (N,)."""
+    count = residual.size
+    left = (np.eye(count) - hat) * np.outer(weight, weight)
+    both = np.cumsum(np.cumsum(left[::-1, ::-1], axis=0), axis=1)[::-1, ::-1]
+    square = np.diag(both)
+    score = np.cumsum((weight * residual)[::-1])[::-1]
+    told = square > 1e-3 * (weight**2).max(initial=1e-30)
+    told[: _ENDS + 1] = told[count - _ENDS :] = False
+    return np.asarray(np.where(told, score**2 / np.where(told, square, 1.0), 0.0))
+
+
+def parameter_faults(found: Fit) -> list[Fault]:
+    """Return parameters that differ from the file by more than tape, drum or cable may."""
+    geometry, known = found.geometry, found.geometry.knowledge
+    faults = []
+    if "drum" in geometry.identified:
+        place = geometry.rows.index(DRUM)
+        std = found.std[: geometry.n * len(geometry.rows)][place :: len(geometry.rows)]
+        for i, error in enumerate(geometry.cable[:, DRUM]):
+            if abs(error) > _FAR * known.drum:
+                text = (
+                    f"{geometry.cable_name(i)}: a turn of its motor pays out {100 * error:+.2f} % "
+                    f"(± {300 * std[i]:.2f} %, 3 sigma) of what the file says: check "
+                    "drum_radius_m and gear_ratio of its winch"
+                )
+                faults.append(Fault("drum", i, -1, float(error), text))
+    if geometry.shared and abs(geometry.elongation) > _FAR * known.elongation:
+        text = (
+            f"the cables yield by {100 * geometry.elongation:+.0f} % of what the file says: check "
+            "elongation_percent_per_N of the cable"
+        )
+        faults.append(Fault("elongation", -1, -1, geometry.elongation, text))
+    return faults
+
+
+# Faults of images and markers, and which readings are right if camera and cables disagree.
+
+UNDECIDED = "undecided: "
+"""Start of the text for a contradiction that no reading resolves."""
+_OFF = 3.0
+"""Standard deviations of sizes, drums or lens beyond which causes are looked for."""
+_LOOSE_SIZE, _LOOSE_DRUM, _LOOSE_FOCAL = 0.1, 0.05, 0.05
+_LOOSE_LENS = (20.0, 20.0, 0.1, 0.1, 0.005, 0.005, 0.1)
+"""Standard deviations of lens figures that are set free: in px, then k1, k2, p1, p2, k3."""
+_COUNTS: Final[dict[FaultKind, int]] = {"size": 1, "drum": 0, "lens": 9}
+"""Causes, and how many numbers each sets free; 0 stands for one number per cable."""
+_CHANCE, _CHANCE_BESIDE_LENS = 1e-3, 1e-5
+"""Probability of rejecting a correct hand-eye. It is lower beside a wrong lens, because the lens
+then explains most of the camera's displacement."""
+_AT_ONCE = 3
+"""Least number of jumps at the same pose that a moved camera may explain."""
+_SURE = 9.0
+"""Reduction of the sum of squares by which one explanation must be better than others."""
+
+
+def map_faults(found: MapFit, sightings: Sequence[Sighting]) -> list[Fault]:
+    """Return the faults of images and single markers, found by the images alone."""
+    faults = [
+        Fault("image", -1, j, 0.0, f"image of {one.name}: {one.problem}; it is not used")
+        for j, one in enumerate(sightings)
+        if one.problem is not None
+    ]
+    texts = [*misfits(found.bundle), *warnings(sightings, found.dropped)]
+    return faults + [Fault("marker", -1, -1, 0.0, text) for text in texts]
+
+
+def hand_eye_fault(found: Fit, told: CameraKnowledge, others: Sequence[Fault] = ()) -> Fault | None:
+    """Return a fault if the camera does not sit where the hand-eye file says, else None.
+
+    `found` is a fit without that file, `others` are other faults of given figures. The difference
+    d from the given place has the covariance P + C, of the given place and of the fit. A place is
+    wrong if such a large coordinate, or d^T (P + C)^-1 d, is improbable.
+    """
+    camera = found.camera
+    assert camera is not None
+    first = found.geometry.size + found.jumps_m.size
+    covariance = found.uncertainty[first : first + SIZE, first : first + SIZE]
+    covariance = covariance + np.diag(told.hand_eye_std**2)
+    moved = camera.with_hand_eye(told.position_m, told.rotation, told.hand_eye_std)
+    off = moved.off_known()[:SIZE]
+    times = float((np.abs(off) / np.sqrt(np.diag(covariance))).max())
+    square = float(off @ np.linalg.solve(covariance, off))
+    chance = _CHANCE_BESIDE_LENS if any(one.kind == "lens" for one in others) else _CHANCE
+    if times**2 < chi2.isf(chance, 1) and square < chi2.isf(chance, SIZE):
+        return None
+    off_mm, off_deg = 1e3 * np.linalg.norm(off[:3]), np.degrees(np.linalg.norm(off[3:]))
+    most = 3.0 * np.sqrt(np.diag(covariance))
+    return Fault(
+        "hand_eye", -1, -1, float(np.linalg.norm(off[:3])),
+        f"the camera sits {off_mm:.1f} mm and {off_deg:.2f} deg from its given place on "
+        f"the platform (hand_eye; {1e3 * most[:3].max():.1f} mm and "
+        f"{np.degrees(most[3:].max()):.2f} deg are expected at most, 3 sigma): that place is not "
+        "used; measure it again, or leave it out",
+    )  # fmt: skip
+
+
+def place_faults(start: CameraStart) -> list[Fault]:
+    """Return the faults of the known places of markers."""
+    before = UNDECIDED if start.contradictory_places else ""
+    return [Fault("place", -1, -1, 0.0, before + text) for text in start.place_faults]
+
+
+def moved_or_slipped(faults: Sequence[Fault]) -> list[Fault]:
+    """Return a fault for each pose from which on several cables are off.
+
+    Several cables seldom slip together. A camera that moved on its platform looks the same: its
+    later poses contradict the lengths, and offsets of some cables explain most of it.
+    """
+    at = Counter(fault.pose for fault in faults if fault.kind == "jump")
+    return [
+        Fault(
+            "camera", -1, pose, 0.0,
+            f"{UNDECIDED}{cables} cables are off from pose {pose + 1} on: either they slipped "
+            "together, or the camera was moved on its platform; look at both, and measure again",
+        )
+        for pose, cables in at.items()
+        if cables >= _AT_ONCE
+    ]  # fmt: skip
+
+
+def told_right(geometry: CableGeometry, found: Fit, first: MapFit) -> tuple[Fit, list[Fault]]:
+    """Return the fit with wrong figures set free, and their faults: sheets, drums or the lens.
+
+    If one of these figures is far from its given value, cables and camera contradict each other.
+    Each is set free in turn while the others keep their given values, then each pair. The best fit
+    is the explanation; exit points by tape, known places of markers and measured points count in
+    it. If two explanations fit equally well, the cause remains unknown and the fit unchanged.
+    """
+    camera = found.camera
+    assert camera is not None
+    if not _contradiction(geometry, found, first):
+        return found, []
+    tried = [_tried(geometry, found, (kind,)) for kind in _COUNTS]
+    alone = {one.kinds[0]: one.score for one in tried}
+    for pair in combinations(_COUNTS, 2):
+        both = _tried(geometry, found, pair)
+        # otherwise one figure of the pair explains it equally well
+        if both.score <= min(alone[kind] for kind in pair) - _SURE:
+            tried.append(both)
+    tried.sort(key=lambda one: one.score)
+    best = tried[0]
+    if found.total_cost < best.score + _SURE:
+        return found, []
+    alike = [one for one in tried if one.score < best.score + _SURE]
+    if len(alike) == 1:
+        return _believed(geometry, best)
+    causes = [" and ".join(_cause(kind, one.fit)[1] for kind in one.kinds) for one in alike]
+    text = "cables and camera contradict each other: " + ", or ".join(causes)
+    advice = "; nothing tells which: measure a black square, and one distance between two poses"
+    kind = best.kinds[0]
+    return found, [Fault(kind, -1, -1, _cause(kind, best.fit)[0], UNDECIDED + text + advice)]
+
+
+@dataclass(frozen=True)
+class _Cause:
+    """Explanation by wrong figures of the file: `count` numbers and the fit with these free."""
+
+    kinds: tuple[FaultKind, ...]
+    count: int
+    fit: Fit
+
+    @property
+    def score(self) -> float:
+        """The sum of squares, and two for each free number (Akaike)."""
+        return self.fit.total_cost + 2 * self.count
+
+
+def _tried(geometry: CableGeometry, found: Fit, kinds: tuple[FaultKind, ...]) -> _Cause:
+    """Return an explanation: the fit with these figures set free."""
+    camera = found.camera
+    assert camera is not None
+    seen = replace(found.seen, start=found.poses)
+    known: dict[str, Any] = {}
+    if "size" in kinds:
+        known["size_std"] = _LOOSE_SIZE
+    if "lens" in kinds:
+        known["lens_std"] = np.array([*_LOOSE_FOCAL * camera.lens[:2], *_LOOSE_LENS])
+    if "drum" in kinds:
+        geometry = replace(geometry, knowledge=replace(geometry.knowledge, drum=_LOOSE_DRUM))
+    count = sum(_COUNTS[kind] or geometry.n for kind in kinds)
+    return _Cause(
+        kinds, count, fit(geometry, seen, start=found.geometry, camera=_with(camera, **known))
+    )
+
+
+def _believed(geometry: CableGeometry, best: _Cause) -> tuple[Fit, list[Fault]]:
+    """Return the fit by the only explanation, and faults for the wrong figures."""
+    why = "; exit points, and what was measured, agree best with that, and it is believed"
+    found, faults = best.fit, []
+    for kind in best.kinds:
+        if kind == "drum" and not _all_drums(geometry, found):
+            known = replace(found.geometry, knowledge=geometry.knowledge)
+            faults += parameter_faults(replace(found, geometry=known))
+        else:
+            size, text = _cause(kind, found)
+            faults.append(Fault(kind, -1, -1, size, text + why))
+    return found, faults
+
+
+def _contradiction(geometry: CableGeometry, found: Fit, first: MapFit) -> bool:
+    """Return whether a given figure of sheets, drums or lens is far off."""
+    camera = found.camera
+    assert camera is not None
+    free, known = camera.free_lens, camera.knowledge
+    off = [abs(camera.size_change) / known.size_std, float(not len(free) and first.lens.wrong) * 9]
+    off += (np.abs(camera.lens - known.lens)[free] / known.lens_std[free]).tolist()
+    if "drum" in geometry.identified:
+        mean = abs(float(found.geometry.cable[:, DRUM].mean()))
+        off.append(mean / geometry.knowledge.drum * float(np.sqrt(geometry.n)))
+    return max(off) > _OFF
+
+
+def _all_drums(geometry: CableGeometry, found: Fit) -> bool:
+    """Return whether the errors of all drums are similar, not only those of a few."""
+    drums = found.geometry.cable[:, DRUM]
+    return bool(abs(np.median(drums)) > 0.5 * np.abs(drums).max() > geometry.knowledge.drum)
+
+
+def _cause(kind: FaultKind, found: Fit) -> tuple[float, str]:
+    """Return the relative size of a cause, and its text."""
+    camera = found.camera
+    assert camera is not None
+    if kind == "size":
+        size = camera.size_change
+        how = "larger" if size > 0.0 else "smaller"
+        return size, f"all sheets are {100.0 * abs(size):.2f} % {how} than told"
+    if kind == "drum":
+        alike = float(np.median(found.geometry.cable[:, DRUM]))
+        return alike, f"all drums pay out {100.0 * alike:+.2f} % of what the robot's file says"
+    focal = float((camera.lens[:2] / camera.knowledge.lens[:2]).mean()) - 1.0
+    return focal, (
+        f"the intrinsics are not this camera's as it is now (focal length {100.0 * focal:+.2f} %): "
+        "was the lens turned or the resolution changed? `cdpr camera calibrate`"
+    )
+
+
+def _with(camera: CameraModel, **known: Any) -> CameraModel:
+    return replace(camera, knowledge=replace(camera.knowledge, **known))

@@ -1,0 +1,682 @@
+"""Fit all observations together by nonlinear least squares, with the poses eliminated."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+from scipy.special import expit
+
+from cdpr_rt.arrays import FloatArray, IntArray
+from cdpr_rt.calibration.camera_model import (
+    CameraModel,
+    corner_cost,
+    corner_residuals,
+    corner_terms,
+)
+from cdpr_rt.calibration.markers.bundle import (
+    NORMAL_MEDIAN,
+    PoseBlocks,
+    cauchy_weights,
+    corner_blocks,
+)
+from cdpr_rt.calibration.parameters import CableGeometry
+from cdpr_rt.calibration.readings import Observations
+from cdpr_rt.calibration.residuals import Linearised, length_std_m, linearise
+from cdpr_rt.errors import InvalidRequestError
+from cdpr_rt.model.cable_kernel import CABLE_ROWS, run_poses
+from cdpr_rt.model.rigid_body import G_m_s2
+
+_UNIT = 0.05
+"""Change of a parameter, m and rad, that counts as large whatever its prior."""
+
+
+class NormalEquations:
+    """Normal equations of rows of poses and corners of markers, in units of prior deviations."""
+
+    def __init__(
+        self,
+        at: Linearised,
+        known_std: FloatArray,
+        prior: FloatArray,
+        corners: PoseBlocks | None,
+        free: tuple[int, ...],
+        taken_out: FloatArray,
+    ) -> None:
+        """Take rows of poses, whose parameters come first, and corners; (P,) parameters in all.
+
+        `taken_out` (P,) is spurious information about single parameters, which is subtracted.
+        """
+        size, first = known_std.size, at.by_parameter.shape[2]
+        self._scale = known_std
+        scaled = at.by_parameter * known_std[:first]
+        turned, across = np.swapaxes(scaled, 1, 2), np.swapaxes(at.by_pose, 1, 2)
+        # products of one pose are so small that BLAS starts no threads, whose cost would exceed the
+        # gain
+        H, E = np.eye(size), np.zeros((len(at.by_pose), size, len(free)))
+        gradient, C = prior.copy(), across @ at.by_pose
+        by_pose = (across @ at.residual[..., None])[..., 0]
+        H[:first, :first] += (turned @ scaled).sum(axis=0)
+        E[:, :first] = turned @ at.by_pose
+        gradient[:first] += (turned @ at.residual[..., None]).sum(axis=0)[:, 0]
+        if corners is not None:
+            own, chosen = known_std[first:], list(free)
+            C += corners.C[:, chosen][:, :, chosen]
+            by_pose += corners.by_pose[:, chosen]
+            H[first:, first:] += corners.H * np.outer(own, own)
+            E[:, first:] = corners.E[:, :, chosen] * own[:, None]
+            gradient[first:] += corners.by_parameter * own
+        H[range(size), range(size)] -= taken_out * known_std**2
+        self._blocks = PoseBlocks(H, E, C, gradient, by_pose)
+
+    def solve(self, damping: float) -> tuple[FloatArray, FloatArray, float]:
+        """Return changes of parameters (P,), of poses (N, d), and their size.
+
+        The size is relative to a parameter's prior deviation, or to 5 cm and rad if that is less.
+        """
+        y, moves = self._blocks.step(damping)
+        spread = np.sqrt(np.einsum("jd,jde,je->j", moves, self._blocks.C, moves))
+        change = y * self._scale
+        large = np.abs(change) / np.minimum(self._scale, _UNIT)
+        size = max(float(large.max(initial=0.0)), float(spread.max(initial=0.0)) * 0.01)
+        return change, moves, size
+
+    def covariance(self) -> tuple[FloatArray, float]:
+        """Return the covariance of parameters, (P, P), and how many are determined."""
+        size = self._scale.size
+        if size == 0:
+            return np.zeros((0, 0)), 0.0
+        inverse = np.linalg.inv(self._blocks.reduced()[0])
+        both = 0.5 * (inverse + inverse.T)
+        told = float(size - np.trace(both))
+        return np.asarray(both * np.outer(self._scale, self._scale)), told
+
+    def left_of(self, at: Linearised) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return derivatives of rows by the parameters less what poses take of them, (N, R, P).
+
+        Also return J_x C^-1, (N, R, d), and C^-1, (N, d, d).
+        """
+        inverse = self._blocks.pose_covariance()
+        taken = at.by_pose @ inverse
+        left = -(taken @ np.swapaxes(self._blocks.E / self._scale[:, None], 1, 2))
+        left[..., : at.by_parameter.shape[2]] += at.by_parameter
+        return left, taken, inverse
+
+
+# Effect of noisy tensions on a fit: they correlate the lengths of a pose, and bias the elongation.
+# A length that yields by l c (1 + κ) t errs with the tension by (1 + κ) A e, A = l c / σ. So does
+# its derivative by κ, A t, which is used as A (t + e). Of the information I about κ, the share n
+# = Σ_j tr((1 - H_j) S_j) is spurious, S_j = A_j Cov(e_j) A_j with the hat H of all unknowns. If
+# true tensions scatter about given ones, such as a controller's set-points, 1 + κ is unbiased
+# (Berkson); if given ones scatter about true ones, it is (1 + κ) (I - n) / I (Fuller, Measurement
+# Error Models, 1.1). Which case applies is unknown. Both are weighed by how well their elongation
+# agrees with the file, and the mean is taken, by -q (1 + κ)² in the cost, which takes q out of
+# I. The standard deviation of the two cases is predicted in addition to noise.
+
+_MOST_SHARE = 0.9
+"""Largest share of the information about the elongation that counts as noise."""
+
+
+def slope_covariance(geometry: CableGeometry, seen: Observations) -> FloatArray:
+    """Return S, the effect of tension errors on lengths over their deviations, (N, n, n)."""
+    soft = geometry.knowledge.tension_N * seen.length_m * geometry.compliance_1_N
+    A = seen.used * soft / length_std_m(geometry, seen)
+    free = np.eye(geometry.n) if seen.tension_free is None else seen.tension_free
+    return np.asarray(A[:, :, None] * free * A[:, None])
+
+
+def correlated(left: FloatArray, noise: FloatArray, yielding: float) -> FloatArray:
+    """Return what rows with correlated errors add to the variance of the gradient, (P, P).
+
+    `left` (N, n, P) are derivatives by the parameters less what poses take of them, `noise` is S.
+    """
+    across = noise * (1.0 - np.eye(noise.shape[1]))
+    return np.asarray(yielding**2 * np.einsum("jap,jab,jbq->pq", left, across, left, optimize=True))
+
+
+def feigned(hats: FloatArray, noise: FloatArray, information: float) -> float:
+    """Return n for hats (N, n, n) of lengths, `noise` S and the information I about κ."""
+    spare = np.eye(noise.shape[1]) - hats
+    told = float((spare * noise).sum())
+    return most_taken_out(max(told, 0.0), information)
+
+
+def most_taken_out(wanted: float, information: float) -> float:
+    """Return what is taken out of the information I about κ, so that enough is left."""
+    return min(wanted, _MOST_SHARE * information)
+
+
+@dataclass(frozen=True)
+class Elongations:
+    """Elongations for true tensions that scatter about given ones, and for the opposite case."""
+
+    by_set: float
+    """1 + κ in the first case; `by_true` is that of the second."""
+    by_true: float
+    share: float
+    """Probability of the second case, by the prior of κ."""
+    taken_out: float
+    """q for which the fit has the mean of both."""
+
+    def off(self, elongation: float) -> float:
+        """Return the root mean square error of κ."""
+        one, other = 1.0 + elongation - self.by_set, 1.0 + elongation - self.by_true
+        return math.sqrt((1.0 - self.share) * one**2 + self.share * other**2)
+
+
+def elongations(
+    elongation: float, known_std: float, told: float, information: float, taken_out: float
+) -> Elongations:
+    """Return both cases for κ as found with q `taken_out`, for n and I."""
+    by_set = (1.0 + elongation) * (information - taken_out) / information
+    by_true = by_set * information / (information - told)
+    less_likely = ((by_true - 1.0) ** 2 - (by_set - 1.0) ** 2) / (2.0 * known_std**2)
+    share = float(expit(-less_likely))
+    mean = information - told + share * told
+    return Elongations(by_set, by_true, share, information * share * told / mean)
+
+
+def without(covariance: FloatArray, k: int, taken_out: float) -> FloatArray:
+    """Return the covariance (P, P) after taking this information about parameter k out."""
+    own = covariance[:, k]
+    return np.asarray(
+        covariance + np.outer(own, own) * (taken_out / (1.0 - taken_out * covariance[k, k]))
+    )
+
+
+_MOST_STEPS = 60
+_DONE = 1e-4
+"""Largest step over a parameter's standard deviation at which the search ends."""
+_DAMPING, _LEAST_DAMPING, _MOST_DAMPING = 1e-4, 1e-13, 1e8
+_HUBER = 2.5
+"""Standard deviations beyond which a length or a measured point counts less (Huber's loss)."""
+JUMP_STD_m = 1.0
+"""Prior standard deviation of the size of a jump."""
+_NO_MORE = 1e-12
+"""Relative increase of the cost that counts as no increase."""
+
+
+@dataclass(frozen=True)
+class Fit:
+    """An identified geometry with the poses that go with it, and how certain both are."""
+
+    geometry: CableGeometry
+    jumps_m: FloatArray
+    """Sizes of the jumps of lengths, in the order of the observations' jumps."""
+    poses: FloatArray
+    """(N, 4, 3)"""
+    seen: Observations
+    covariance: FloatArray
+    """Of the parameters of geometry, jumps and camera, (P, P), with priors; by noise alone."""
+    attenuation: FloatArray
+    """Standard deviation of parameters because the tensions err, (P,): common to all parameters,
+    and not reduced by further poses."""
+    slope_noise: float
+    """Value of `Knowledge.slope_noise` with which a further fit reaches the elongation of
+    `elongations`."""
+    at: Linearised
+    """Residuals and derivatives of geometry and jumps at the result, without the robust loss."""
+    weights: FloatArray
+    """Weights of the robust loss, (N, R), 1 and below: of lengths and of measured points."""
+    left: FloatArray
+    """Weighted derivatives of rows by all parameters less what poses take of them, (N, R, P)."""
+    taken: FloatArray
+    """Weighted derivatives of rows by the pose, times `pose_covariance`, (N, R, d)."""
+    pose_covariance: FloatArray
+    """C^-1, (N, d, d), of poses if the parameters are known."""
+    variance_factor: float
+    """Sum of squared residuals of lengths and measured poses over their degrees of freedom: 1 if
+    the standard deviations are right."""
+    corner_factor: float
+    """Variance factor of corners of markers, by the median of their distances; else 1."""
+    total_cost: float
+    """Of all observations and priors, as weighted by the losses."""
+    steps: int
+    converged: bool
+    camera: CameraModel | None = None
+
+    @property
+    def inflation(self) -> float:
+        """Factor of the covariance over the one from standard deviations alone."""
+        return max(self.variance_factor, self.corner_factor, 1.0)
+
+    @property
+    def uncertainty(self) -> FloatArray:
+        """Covariance by noise and by attenuation, (P, P)."""
+        return np.asarray(self.covariance + np.outer(self.attenuation, self.attenuation))
+
+    @property
+    def std(self) -> FloatArray:
+        """Standard deviations of the geometry's parameters, (P,)."""
+        return np.asarray(np.sqrt(np.diag(self.uncertainty)[: self.geometry.size]))
+
+    @property
+    def camera_std(self) -> FloatArray:
+        """Standard deviations of the camera's parameters, see `CameraModel`."""
+        first = self.geometry.size + self.jumps_m.size
+        return np.asarray(np.sqrt(np.diag(self.uncertainty)[first:]))
+
+    @property
+    def length_residual_m(self) -> FloatArray:
+        """Residuals of the lengths in units of their standard deviations, (N, n)."""
+        return self.at.residual[:, : self.geometry.n]
+
+
+def fit(
+    geometry: CableGeometry,
+    seen: Observations,
+    robust: bool = True,
+    start: CableGeometry | None = None,
+    camera: CameraModel | None = None,
+) -> Fit:
+    """Return the geometry and poses that minimise the squared residuals of all observations.
+
+    Levenberg and Marquardt. Prior knowledge of parameters counts as an observation, so that there
+    is always one minimum, and parameters that no observation determines stay as in the file. That
+    fixes the gauge: without measured poses or known markers the frame is that in which the exit
+    points, taken together, are moved least. `robust` applies Huber's loss to lengths and to
+    distances from measured points, and Cauchy's to corners. `start` is the first geometry, by
+    default `geometry`. With `camera`, which also is the start of its parameters, these are fitted
+    too and seen markers count. Raises InvalidRequestError for no poses.
+    """
+    if seen.poses == 0:
+        raise InvalidRequestError("no poses; allowed: at least one")
+    search = _Search(geometry, seen, robust, start or geometry, camera)
+    steps = search.settle()
+    if geometry.shared and geometry.knowledge.slope_noise:
+        search.take_out()
+        steps += search.settle()
+    return search.result(steps)
+
+
+@dataclass(frozen=True)
+class _State:
+    """All unknowns at one step of the search, and their cost."""
+
+    geometry: CableGeometry
+    jumps: FloatArray
+    camera: CameraModel | None
+    poses: FloatArray
+    at: Linearised
+    off_px: FloatArray
+    """Residuals of corners, (n, 4, 2)."""
+    prior: FloatArray
+    cost: float
+
+
+class _Search:
+    """The state of the search."""
+
+    def __init__(
+        self,
+        geometry: CableGeometry,
+        seen: Observations,
+        robust: bool,
+        start: CableGeometry,
+        camera: CameraModel | None,
+    ) -> None:
+        self._seen, self._robust = seen, robust
+        self._markers = seen.markers if camera is not None else None
+        self._first = geometry.values()
+        known = [geometry.known_std(), np.full(len(seen.jumps), JUMP_STD_m)]
+        if self._markers is not None and camera is not None:
+            known.append(camera.known_std())
+        self._known = np.concatenate(known)
+        self._taken_out = 0.0
+        self._fixed: tuple[FloatArray, FloatArray] | None = None
+        """Weights of rows and corners after they have been frozen."""
+        self._damping = _DAMPING
+        self._done, self._converged = False, True
+        start = replace(start, knowledge=geometry.knowledge)
+        self._here = self._state(start, np.zeros(len(seen.jumps)), camera, seen.start)
+
+    def _state(
+        self,
+        geometry: CableGeometry,
+        jumps: FloatArray,
+        camera: CameraModel | None,
+        poses: FloatArray,
+    ) -> _State:
+        at = linearise(geometry, self._seen, poses, jumps)
+        known = [geometry.values() - self._first, jumps]
+        off_px, cost = np.zeros((0, 4, 2)), 0.0
+        if camera is not None and self._markers is not None:
+            known.append(camera.off_known())
+            off_px = corner_residuals(camera, self._markers, poses)
+            cost = self._corner_cost(camera, off_px)
+        prior = np.concatenate(known) / self._known
+        cost += self._cost_of(at) + float((prior**2).sum())
+        cost -= self._taken_out * (1.0 + geometry.elongation) ** 2
+        return _State(geometry, jumps, camera, poses, at, off_px, prior, cost)
+
+    def _cost_of(self, at: Linearised) -> float:
+        squares = at.residual**2
+        if self._fixed is not None:
+            return float((squares * self._fixed[0]).sum())
+        if not self._robust:
+            return float(squares.sum())
+        n, points = self._seen.length_m.shape[1], at.points
+        point = squares[:, points].sum(axis=1)
+        rest = float(squares[:, n : points.start].sum() + squares[:, points.stop :].sum())
+        return rest + float(_huber_cost(squares[:, :n]).sum() + _huber_cost(point).sum())
+
+    def _corner_cost(self, camera: CameraModel, off_px: FloatArray) -> float:
+        if self._fixed is None:
+            return corner_cost(camera, off_px, self._robust)
+        return corner_cost(camera, off_px * np.sqrt(self._fixed[1])[..., None], robust=False)
+
+    def _weights(self) -> FloatArray:
+        """Return the weights of rows, (N, R)."""
+        if self._fixed is not None:
+            return self._fixed[0]
+        at, n = self._here.at, self._here.geometry.n
+        weights = np.ones_like(at.residual)
+        if self._robust:
+            weights[:, :n] = _huber_weight(np.abs(at.residual[:, :n]))
+            distance = np.linalg.norm(at.residual[:, at.points], axis=1)
+            weights[:, at.points] = _huber_weight(distance)[:, None]
+        return weights
+
+    def _weighted(self) -> Linearised:
+        at = self._here.at
+        if not self._robust:
+            return at
+        root = np.sqrt(self._weights())
+        return Linearised(
+            at.residual * root, at.by_parameter * root[..., None], at.by_pose * root[..., None]
+        )
+
+    def _normal(self, at: Linearised, slope_noise: float) -> NormalEquations:
+        """Return the normal equations, less `slope_noise` of information about the elongation."""
+        here, seen, corners = self._here, self._markers, None
+        prior, taken_out = here.prior.copy(), np.zeros_like(self._known)
+        if slope_noise:
+            k = here.geometry.size - 1
+            taken_out[k] = slope_noise
+            prior[k] -= slope_noise * (1.0 + here.geometry.elongation) * self._known[k]
+        if here.camera is not None and seen is not None:
+            terms = corner_terms(here.camera, seen, here.poses)
+            corners = corner_blocks(seen, terms, self._corner_weights(), self._seen.poses)
+            if here.camera.held:
+                corners = corners.only(np.zeros(0, int))
+        return NormalEquations(at, self._known, prior, corners, here.geometry.free, taken_out)
+
+    def _corner_weights(self) -> FloatArray:
+        here = self._here
+        if self._fixed is not None:
+            return self._fixed[1]
+        if here.camera is None or not self._robust:
+            return np.ones(here.off_px.shape[:2])
+        return cauchy_weights(here.off_px, here.camera.knowledge.noise_px)
+
+    def settle(self) -> int:
+        """Step until steps are small; return the number of steps."""
+        steps, self._done, self._damping = 0, False, _DAMPING
+        while steps < _MOST_STEPS and not self._done:
+            self.step()
+            steps += 1
+        self._converged &= self._done and self._damping < _MOST_DAMPING
+        return steps
+
+    def take_out(self) -> None:
+        """Take noise of tensions out of the information about the elongation.
+
+        An earlier fit has estimated the noise, and there may be less information here. Weights are
+        frozen from here on: decreasing weights would leave less and less information.
+        """
+        here, k = self._here, self._here.geometry.size - 1
+        information = 1.0 / float(self._normal(self._weighted(), 0.0).covariance()[0][k, k])
+        wanted = here.geometry.knowledge.slope_noise * self._seen.poses
+        self._fixed = self._weights(), self._corner_weights()
+        self._taken_out = most_taken_out(wanted, information)
+        self._here = self._state(here.geometry, here.jumps, here.camera, here.poses)
+
+    def step(self) -> None:
+        """Go one step, and shorten it until the cost does not increase."""
+        normal, here = self._normal(self._weighted(), self._taken_out), self._here
+        size_g, size_j = here.geometry.size, here.jumps.size
+        most = here.cost + _NO_MORE * abs(here.cost)
+        while self._damping < _MOST_DAMPING:
+            change, moves, size = normal.solve(self._damping)
+            camera = here.camera
+            if camera is not None and self._markers is not None:
+                camera = camera.changed(change[size_g + size_j :])
+            trial = self._state(
+                here.geometry.with_values(here.geometry.values() + change[:size_g]),
+                here.jumps + change[size_g : size_g + size_j],
+                camera,
+                moved(here.poses, moves, here.geometry.free),
+            )
+            if np.isfinite(trial.cost) and trial.cost <= most:
+                self._here = trial
+                self._damping = max(0.1 * self._damping, _LEAST_DAMPING)
+                self._done = size < _DONE
+                return
+            self._damping *= 10.0
+        self._done = True
+
+    def result(self, steps: int) -> Fit:
+        """Return the result of the search."""
+        here, weighted = self._here, self._weighted()
+        geometry, n = here.geometry, here.geometry.n
+        normal = self._normal(weighted, 0.0)
+        covariance, told = normal.covariance()
+        left, taken, pose_covariance = normal.left_of(weighted)
+        hats = left @ covariance @ np.swapaxes(left, 1, 2)
+        hats += taken @ np.swapaxes(weighted.by_pose, 1, 2)
+        rows = int((weighted.by_pose != 0.0).any(axis=2).sum())
+        corner_factor = 1.0
+        if here.camera is not None and self._markers is not None:
+            unknowns = float(np.trace(hats, axis1=1, axis2=2).sum())
+            distance = float(np.median(np.linalg.norm(here.off_px, axis=2)))
+            corner_factor = (distance / NORMAL_MEDIAN / here.camera.knowledge.noise_px) ** 2
+        else:
+            unknowns = here.poses.shape[0] * len(geometry.free) + told
+        factor = float((weighted.residual**2).sum()) / max(rows - unknowns, 1.0)
+        covariance, off, slope_noise = self._with_noise_of_tensions(
+            covariance, left[:, :n], hats[:, :n, :n]
+        )
+        return Fit(
+            geometry, here.jumps, here.poses, self._seen,
+            covariance * max(factor, corner_factor, 1.0), off, slope_noise,
+            here.at, self._weights(), left, taken, pose_covariance,
+            factor, corner_factor, here.cost, steps, self._converged,
+            here.camera if self._markers is not None else None,
+        )  # fmt: skip
+
+    def _with_noise_of_tensions(
+        self, covariance: FloatArray, left: FloatArray, hats: FloatArray
+    ) -> tuple[FloatArray, FloatArray, float]:
+        """Return the covariance with that noise, attenuation and slope noise as in `Fit`.
+
+        `left` (N, n, P) and `hats` (N, n, n) belong to the rows of lengths.
+        """
+        geometry = self._here.geometry
+        noise = slope_covariance(geometry, self._seen)
+        spread = correlated(left, noise, geometry.knowledge.yielding)
+        off, slope_noise, out = np.zeros(len(covariance)), 0.0, 0.0
+        if geometry.shared:
+            k = geometry.size - 1
+            information = 1.0 / float(covariance[k, k])
+            told = feigned(hats, noise, information)
+            out = most_taken_out(self._taken_out, information)
+            either = elongations(geometry.elongation, float(self._known[k]), told, information, out)
+            slope_noise = either.taken_out / self._seen.poses
+            covariance = without(covariance, k, out)
+            off = covariance[:, k] * (either.off(geometry.elongation) / float(covariance[k, k]))
+            spread[k, k] += out
+        covariance = covariance + covariance @ spread @ covariance
+        return covariance, off, slope_noise
+
+
+def _huber_cost(squares: FloatArray) -> FloatArray:
+    size = np.sqrt(squares)
+    return np.where(size > _HUBER, 2.0 * _HUBER * size - _HUBER**2, squares)
+
+
+def _huber_weight(size: FloatArray) -> FloatArray:
+    return np.asarray(_HUBER / np.maximum(size, _HUBER))
+
+
+def moved(poses: FloatArray, moves: FloatArray, free: tuple[int, ...]) -> FloatArray:
+    """Return poses (N, 4, 3) ⊞ moves (N, d) along the entries `free` of a twist."""
+    twist = np.zeros((len(poses), 6))
+    twist[:, list(free)] = moves
+    out = poses.copy()
+    out[:, 0] += twist[:, :3]
+    if any(i >= 3 for i in free):
+        out[:, 1:] = Rotation.from_rotvec(twist[:, 3:]).as_matrix() @ poses[:, 1:]
+    return out
+
+
+def locate(geometry: CableGeometry, seen: Observations) -> Fit:
+    """Return the poses determined by lengths alone, with the geometry held fixed."""
+    return fit(replace(geometry, identified=()), seen.unmeasured(), robust=False)
+
+
+# Standard deviations of lengths and tensions from residuals, because neither is known before.
+# Tensions t hold the platform: W t + w = 0, with the wrench matrix W and the weight's wrench w,
+# which is linear in the mass m and in m c. With W = U S V^T the d numbers S^-1 U^T (W t + w) of a
+# pose have the standard deviation of a tension.
+
+_LEAST_ROWS = 20
+_LEAST_N = 0.3
+_WEAK, _INERT = 1e-3, 1e-9
+_ROUNDS = 3
+_BELIEVED = 1.5
+_HELD = 3.0
+"""Multiple of the median beyond which another force must hold the platform at a pose."""
+_LEAST_SHARE = 0.2
+"""Least standard deviation of a length that the fit may find, relative to the prior one."""
+
+
+@dataclass(frozen=True)
+class Balance:
+    """Tensions as the balance of the platform's forces corrects them."""
+
+    tension_N: FloatArray
+    """(N, n)"""
+    free: FloatArray
+    """Projections onto the noise that the correction leaves, (N, n, n)."""
+    std_N: float | None
+    """Standard deviation of a tension before the correction; None if too few rows remain."""
+
+    def of(self, seen: Observations) -> Observations:
+        """Return observations with these tensions."""
+        return replace(seen, tension_N=self.tension_N, tension_free=self.free)
+
+
+def balance(found: Fit, seen: Observations) -> Balance:
+    """Return tensions that hold the platform at the poses of a fit, the nearest to those of `seen`.
+
+    Mass and centre of mass are found too. Errors that are common to all cables go unnoticed. Poses
+    at which a length is left out are not corrected, nor those at which the platform does not hang
+    free, for example on its stand.
+    """
+    there = np.flatnonzero(found.seen.used.all(axis=1))
+    balanced, off_N = _balance_of(found, seen, there)
+    if balanced.std_N is None:
+        return balanced
+    held = off_N > _HELD * np.median(off_N)
+    if not held.any():
+        return balanced
+    free, _ = _balance_of(found, seen, there[~held])
+    # too few poses hang free to correct tensions, but all poses together give their deviation
+    return replace(free, std_N=balanced.std_N) if free.std_N is None else free
+
+
+def _balance_of(found: Fit, seen: Observations, there: IntArray) -> tuple[Balance, FloatArray]:
+    """Return the balance at some poses (k,), and the root mean square residual of each."""
+    geometry = found.geometry
+    tension, free = seen.tension_N.copy(), np.tile(np.eye(geometry.n), (seen.poses, 1, 1))
+    poses = found.poses[there]
+    cables = np.empty((len(poses), CABLE_ROWS, geometry.n))
+    run_poses(geometry.kernel_geometry(), poses, cables)
+    chosen, up = list(geometry.model.kinematics.directions), geometry.coordinates - 1
+    weight = np.zeros((len(poses), 6, 4))
+    weight[:, up, 0] = -G_m_s2
+    pull = np.zeros(3)
+    pull[up] = -G_m_s2
+    weight[:, 3:, 1:] = np.swapaxes(np.cross(np.swapaxes(poses[:, 1:], 1, 2), pull), 1, 2)
+    U, s, V = np.linalg.svd(-cables[:, chosen])
+    told, d = s > _WEAK * s.max(initial=0.0), s.shape[1]
+    across = np.swapaxes(U, 1, 2)[:, :d] / np.maximum(s, _INERT)[..., None]
+    untold = V.copy()
+    untold[:, :d][told] = 0.0
+    V = np.where(told[..., None], V[:, :d], 0.0)
+    pulled = (V @ tension[there][..., None])[..., 0]
+    by_mass = np.where(told[..., None], across @ weight[:, chosen], 0.0)
+    mass, _, rank, _ = np.linalg.lstsq(by_mass[told], -pulled[told], rcond=_INERT)
+    left = pulled + by_mass @ mass
+    spare = int(told.sum()) - int(rank)
+    if spare < _LEAST_ROWS:
+        return Balance(tension, free, None), np.zeros(len(there))
+    tension[there] -= np.einsum("jdi,jd->ji", V, left)
+    # not 1 - V^T V: if all directions are determined, rounding makes its diagonal negative
+    free[there] = np.swapaxes(untold, 1, 2) @ untold
+    std_N = math.sqrt(float((left**2).sum()) / spare)
+    off_N = np.sqrt((left**2).mean(axis=1))
+    return Balance(tension, free, std_N), off_N
+
+
+def with_noise_seen(found: Fit, file: CableGeometry, told_N: float | None) -> CableGeometry:
+    """Return the robot's file with the accuracy of readings that a fit has found.
+
+    The assumed uncertainty of encoders and torques is a guess for all robots. The balance of forces
+    gives that of tensions, `told_N`; the residuals of lengths limit it. If a camera determines the
+    poses, the residuals of lengths also give their uncertainty, so that lengths and corners are
+    weighed correctly. It is only ever reduced.
+    """
+    geometry, guess = found.geometry, file.knowledge
+    known, yielding = geometry.knowledge, max(1.0 + geometry.elongation, 0.0)
+    soft = geometry.compliance_1_N * found.seen.length_m
+    squares = float((soft**2).mean())
+    if found.seen.tension_free is not None:
+        free = np.diagonal(found.seen.tension_free, axis1=1, axis2=2)
+        squares = float((soft**2 * free).mean())
+    before = known.length_m**2 + squares * (known.yielding * known.tension_N) ** 2
+    variance = found.variance_factor * before
+    tension_N = max(told_N or guess.tension_N, _LEAST_N)
+    if squares > 0.0 and yielding > 0.0:
+        tension_N = max(min(tension_N, math.sqrt(variance / squares) / yielding), _LEAST_N)
+    length_m = guess.length_m
+    if found.camera is not None:
+        rest = variance - squares * (yielding * tension_N) ** 2
+        length_m *= math.sqrt(min(max(rest / length_m**2, _LEAST_SHARE**2), 1.0))
+    seen = replace(guess, length_m=length_m, tension_N=tension_N, yielding=yielding)
+    return replace(file, knowledge=seen)
+
+
+def fit_with_noise_seen(found: Fit, file: CableGeometry) -> tuple[Fit, CableGeometry]:
+    """Return a fit with the accuracy of readings that it finds, and the file with that accuracy.
+
+    From the second round on the elongation is the mean of two cases: true tensions scatter about
+    given ones, or given ones about true ones.
+    """
+    told, slope_noise = found.seen, 0.0
+    weighed = file
+    for _ in range(_ROUNDS):
+        balanced = balance(found, told)
+        weighed = with_noise_seen(found, file, balanced.std_N)
+        weighed = replace(weighed, knowledge=replace(weighed.knowledge, slope_noise=slope_noise))
+        found = _weighed_fit(found, weighed, told, balanced)
+        slope_noise = found.slope_noise
+    return found, weighed
+
+
+def weighed_fit(found: Fit, weighed: CableGeometry, told: Observations) -> Fit:
+    """Return another fit, with balanced tensions of `told` and the weights of `weighed`.
+
+    If the lengths contradict such large errors of tensions as the balance finds, another force
+    holds the platform, and the tensions are not corrected.
+    """
+    return _weighed_fit(found, weighed, told, balance(found, told))
+
+
+def _weighed_fit(found: Fit, weighed: CableGeometry, told: Observations, balanced: Balance) -> Fit:
+    if (balanced.std_N or math.inf) <= _BELIEVED * weighed.knowledge.tension_N:
+        told = balanced.of(told)
+    seen = replace(told, start=found.poses)
+    return fit(weighed, seen, start=found.geometry, camera=found.camera)

@@ -1,1 +1,0 @@
-"""Rotations, lenses, and squares seen through them."""

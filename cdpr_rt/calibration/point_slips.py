@@ -1,0 +1,566 @@
+"""Slips in manually measured points, found by comparison with lengths at the same poses.
+
+Without points, lengths and prior geometry put the platform's point of pose j at
+
+    p_j = x_j + A_j (θ - θ_0) + e_j,    θ ~ N(θ_L, C),
+
+linearised at θ_0. Measured points q then have residuals y = q - x - A (θ_L - θ_0) of covariance
+
+    S = A C A^T + Cov(e) + σ².
+
+Each slip has points q' in place of q, or free columns in y. The slip with the least
+y^T S^-1 y + 2 for each free number (Akaike) explains the points. A point that contradicts all
+others has a constant cost for every tried slip, so that no single point decides. Wrong drums and
+exit points of the robot's file are tried in the same way.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from itertools import permutations, product
+from typing import Final
+
+import numpy as np
+from scipy.stats import chi2
+
+from cdpr_rt.arrays import BoolArray, FloatArray, IntArray
+from cdpr_rt.calibration.fit import Fit, JUMP_STD_m, locate
+from cdpr_rt.calibration.markers.marker_map import best_fit
+from cdpr_rt.calibration.parameters import DRUM, CableGeometry
+from cdpr_rt.calibration.readings import Observations
+from cdpr_rt.calibration.residuals import linearise
+
+_AXES = "xyz"
+_UNITS: Final = {10.0: "cm", 1000.0: "m", 25.4: "inches", 0.1: "tenths of a mm"}
+"""mm of each unit that may be typed in place of mm."""
+_POINT_COST: Final = 25.0
+"""Cost of a point that contradicts all others, in squared standard deviations."""
+_MOST_BAD: Final = 0.25
+"""Share of the points that may contradict all others."""
+_GAIN: Final = 12.0
+"""Least cost by which a slip must fit better than no slip."""
+_SCALE_GAIN: Final = 5.0
+"""The same for the scale alone, which the drums of any robot determine."""
+MARGIN: Final = 9.0
+"""Least cost by which one explanation must fit better than another."""
+_NOISIER: Final = (1.0, 2.0, 4.0)
+"""Tried factors on the given standard deviations of points."""
+_ODD: Final = 1e-3
+"""Chance below which points contradict the lengths."""
+_MISFIT: Final = 9.0
+"""Sum of squares over its expectation above which nothing explains the points."""
+_LEAST, _MOST = 2, 80
+"""Least and largest number of points that are examined for a common slip."""
+_GROSS: Final = 300.0
+"""Reduction of the cost by a slip above which no other explanation is considered."""
+_SHIFTS: Final = (1, -1, 2, -2)
+_FAR_m2: Final = 0.04
+_BEST: Final = 5
+_ROUNDS: Final = 3
+_SCALE, _SHIFT_m, _TURN_rad = 0.1, 1.0, 0.5
+"""Standard deviations of the size of slips."""
+_UNKNOWN_m2: Final = 100.0
+_SINGULAR, _ROUNDING = 1e-10, 1e-9
+_DRUM, _EXIT_m, _ELONGATION = 0.05, 0.1, 3.0
+"""Standard deviations of drums, exit points and elongation of a wrong file."""
+_NEAR, _NEAR_SHARE = 4.0, 0.05
+"""Distance at which a slip explains a single point: standard deviations, and share of its error."""
+_HOME_SHARE: Final = 0.5
+"""Standard deviation of home over the tolerance for the platform's place there."""
+
+
+@dataclass(frozen=True)
+class SlipVerdict:
+    """Fault of the measured points as a whole."""
+
+    text: str = ""
+    """The slip or contradiction, and what to do; empty for none."""
+    undecided: bool = False
+    """Whether the robot may be the cause instead."""
+    off: float = 0.0
+    """Relative error of the scale, or in m."""
+    explained: bool = True
+    """Whether points agree with lengths after the correction."""
+    cost: float = 0.0
+    """Of the best explanation."""
+    sure: bool = False
+    """Whether it fully explains a gross contradiction, which no other reading could."""
+
+
+@dataclass(frozen=True)
+class Points:
+    """Measured points, one per row, in the order of their poses; nan if not measured."""
+
+    pose: IntArray
+    place_m: FloatArray
+    """(M, k)"""
+    std_m: FloatArray
+    """(M, k)"""
+
+    @classmethod
+    def of(cls, seen: Observations, coordinates: int) -> Points:
+        """Return the measured positions of observations, a selection if there are very many."""
+        known = np.isfinite(seen.position_std_m[:, :coordinates])
+        pose = np.flatnonzero(known.any(axis=1))
+        if len(pose) > _MOST:
+            pose = pose[np.linspace(0, len(pose) - 1, _MOST).astype(int)]
+        place = np.where(known, seen.position_m[:, :coordinates], np.nan)
+        return cls(pose, place[pose], seen.position_std_m[pose, :coordinates])
+
+
+@dataclass(frozen=True)
+class _Slip:
+    """A slip: the corrected points, and the columns that are free."""
+
+    name: str
+    points: Points
+    cost: float
+    """Cost of choosing it among similar slips."""
+    columns: FloatArray | None = None
+    """(M, k, c), each at its standard deviation."""
+
+
+@dataclass(frozen=True)
+class _Score:
+    """How well points agree with lengths after correcting a slip."""
+
+    cost: float
+    squares: float
+    """y^T S^-1 y of the points that agree."""
+    count: int
+    """Number of their coordinates."""
+    bad: int
+    """Points that contradict all others."""
+    costs: tuple[float, ...]
+    """The cost for each of `_NOISIER`."""
+    y: FloatArray
+    """(M k,)"""
+    A: FloatArray
+    """(M k, P)"""
+    W: tuple[FloatArray, ...]
+    """S^-1 for each of `_NOISIER`; 0 for coordinates that are unknown or contradict all others."""
+    free: FloatArray
+    """(c,), sizes of the columns."""
+
+    @property
+    def odd(self) -> bool:
+        """Whether points contradict the lengths, or some points contradict all others."""
+        return self.bad > 0 or float(chi2.sf(self.squares, max(self.count, 1))) < _ODD
+
+    @property
+    def misfit(self) -> bool:
+        """Whether the points do not fit at all."""
+        return self.squares > _MISFIT * max(self.count, 1)
+
+
+class _ByLengths:
+    """Poses by lengths alone, linearised at a geometry."""
+
+    def __init__(
+        self,
+        file: CableGeometry,
+        at: CableGeometry,
+        seen: Observations,
+        jumps_m: FloatArray,
+        variance_factor: float,
+        first_m: FloatArray,
+    ) -> None:
+        """Take the file, the geometry to linearise at, and the target of the first pose (3,)."""
+        blind = seen.unmeasured()
+        there = locate(at, blind.without_jumps(jumps_m)).poses
+        rows = linearise(at, blind, there, jumps_m)
+        first, noise = rows.points.start, 1.0 / math.sqrt(max(variance_factor, 1.0))
+        r, Jp, Jx = (
+            part[:, :first] * noise for part in (rows.residual, rows.by_parameter, rows.by_pose)
+        )
+        across = np.swapaxes(Jx, 1, 2)
+        H = across @ Jx
+        own = np.linalg.pinv(H, rcond=_SINGULAR, hermitian=True)
+        taken = own @ across
+        by_pose = -(taken @ Jp)
+        left, off = Jp + Jx @ by_pose, r - (Jx @ (taken @ r[..., None]))[..., 0]
+        known = np.concatenate([file.known_std(), np.full(len(jumps_m), JUMP_STD_m)])
+        values = np.concatenate([at.values() - file.values(), jumps_m])
+        information = np.diag(known**-2.0) + np.einsum("jrp,jrq->pq", left, left)
+        gradient = np.einsum("jrp,jr->p", left, off) + values / known**2
+        arm = there[:, 1:] @ seen.target_m
+        twist = np.zeros((len(there), 3, 6))
+        twist[:, :, :3] = np.eye(3)
+        twist[:, 0, 4], twist[:, 0, 5] = arm[:, 2], -arm[:, 1]
+        twist[:, 1, 3], twist[:, 1, 5] = -arm[:, 2], arm[:, 0]
+        twist[:, 2, 3], twist[:, 2, 4] = arm[:, 1], -arm[:, 0]
+        k = file.coordinates
+        B = twist[:, :k][:, :, list(file.free)]
+        self.known, self.values = known, values
+        self.C = np.linalg.inv(information)
+        self.change = -self.C @ gradient
+        self.place_m = (there[:, 0] + arm)[:, :k]
+        self.A = B @ by_pose
+        self.own = B @ own @ np.swapaxes(B, 1, 2)
+        determined = np.linalg.eigvalsh(H)
+        self.own[determined[:, 0] <= _SINGULAR * determined[:, -1]] += _UNKNOWN_m2 * np.eye(k)
+        self._stands_at_home(file, first_m[:k], there[0, 0, :k])
+
+    def _stands_at_home(
+        self, file: CableGeometry, first_m: FloatArray, there_m: FloatArray
+    ) -> None:
+        """Include the place of the first pose, home, with the accuracy of the robot's file."""
+        platform, k = file.model.platform, file.coordinates
+        S = self.A[0] @ self.C @ self.A[0].T + self.own[0]
+        S += (_HOME_SHARE * platform.home_tolerance_m) ** 2 * np.eye(k)
+        gain = self.C @ self.A[0].T @ np.linalg.inv(S)
+        off = first_m - there_m - self.A[0] @ self.change
+        self.change = self.change + gain @ off
+        self.C = self.C - gain @ self.A[0] @ self.C
+
+    def score(self, slip: _Slip) -> _Score:
+        """Return how well points agree with the lengths after correcting a slip."""
+        points = slip.points
+        count, k = points.place_m.shape
+        size = count * k
+        known = np.isfinite(points.place_m).ravel()
+        A = self.A[points.pose].reshape(size, -1)
+        y = np.where(known, (points.place_m - self.place_m[points.pose]).ravel(), 0.0)
+        y = y - np.where(known, A @ self.change, 0.0)
+        columns = np.zeros((size, 0))
+        if slip.columns is not None:
+            columns = slip.columns.reshape(size, -1)
+        common = A @ self.C @ A.T + columns @ columns.T
+        for row, pose in enumerate(points.pose):
+            common[row * k : (row + 1) * k, row * k : (row + 1) * k] += self.own[pose]
+        noise = np.where(known, points.std_m.ravel() ** 2, 0.0)
+        W = _inverse(common, noise, known)
+        used, bad = known.copy(), 0
+        while bad < int(_MOST_BAD * count):
+            worst, gain = _worst_row(W, y, k)
+            if gain < _POINT_COST:
+                break
+            used[worst * k : (worst + 1) * k] = False
+            bad += 1
+            W = _without(W, slice(worst * k, (worst + 1) * k))
+        fixed = _POINT_COST * bad + slip.cost + 2.0 * columns.shape[1]
+        all_W, costs, size_told = [W], [float(y @ W @ y) + fixed], _log_size(W, used)
+        for times in _NOISIER[1:]:
+            W = _inverse(common, times**2 * noise, used)
+            all_W.append(W)
+            costs.append(float(y @ W @ y) + fixed + size_told - _log_size(W, used))
+        squares = float(y @ all_W[0] @ y)
+        free = columns.T @ all_W[0] @ y
+        return _Score(
+            min(costs), squares, int(used.sum()), bad, tuple(costs), y, A, tuple(all_W), free
+        )
+
+    def found(self, score: _Score) -> FloatArray:
+        """Return the parameters (P,) that fit lengths and points best."""
+        return np.asarray(self.values + self.change + self.C @ (score.A.T @ (score.W[0] @ score.y)))
+
+    def cost_of_file(self, score: _Score, directions: FloatArray, most: float) -> float:
+        """Return the cost if the file errs by `most` in directions (P, c) of parameters."""
+        inverse = directions / self.known[:, None] ** 2
+        by_points = score.A @ self.C @ inverse
+        costs = []
+        for cost, W in zip(score.costs, score.W, strict=True):
+            first = (self.values + self.change) @ inverse + by_points.T @ W @ score.y
+            # from the prior, less what lengths take of it, and from points
+            second = directions.T @ inverse - inverse.T @ self.C @ inverse
+            second = second + by_points.T @ W @ by_points + np.eye(len(first)) / most**2
+            costs.append(cost - float(first @ np.linalg.solve(second, first)))
+        return float(min(costs) + 2.0 * directions.shape[1])
+
+
+def _inverse(common: FloatArray, noise: FloatArray, used: BoolArray) -> FloatArray:
+    """Return S^-1 of the used coordinates, 0 for the others."""
+    W = np.zeros_like(common)
+    at = np.ix_(used, used)
+    W[at] = np.linalg.inv((common + np.diag(noise))[at])
+    return W
+
+
+def _without(W: FloatArray, rows: slice) -> FloatArray:
+    """Return the inverse of S without some rows; these become 0."""
+    block = np.linalg.pinv(W[rows, rows], rcond=_ROUNDING, hermitian=True)
+    less = W - W[:, rows] @ block @ W[rows]
+    less[rows] = less[:, rows] = 0.0
+    return np.asarray(less)
+
+
+def _log_size(W: FloatArray, used: BoolArray) -> float:
+    return float(np.linalg.slogdet(W[np.ix_(used, used)])[1])
+
+
+def _worst_row(W: FloatArray, y: FloatArray, k: int) -> tuple[int, float]:
+    """Return the row that contradicts all others most, and the reduction by leaving it out."""
+    pulled = (W @ y).reshape(-1, k)
+    blocks = np.einsum("iaib->iab", W.reshape(len(pulled), k, len(pulled), k))
+    left = np.linalg.pinv(blocks, rcond=_ROUNDING, hermitian=True)
+    gains = np.einsum("ia,iab,ib->i", pulled, left, pulled)
+    gains -= 2.0 * (np.diagonal(blocks, axis1=1, axis2=2) > 0.0).sum(axis=1) - 2.0
+    worst = int(gains.argmax())
+    return worst, float(gains[worst])
+
+
+def slipped(file: CableGeometry, blind: Fit, seen: Observations) -> SlipVerdict:
+    """Return the fault of the points of `seen`, given `blind`, the fit without any of them.
+
+    `file` is the robot's.
+    """
+    points = Points.of(seen, file.coordinates)
+    if len(points.pose) < _LEAST:
+        return SlipVerdict()
+    at, jumps_m = blind.geometry, blind.jumps_m
+    verdict, said = SlipVerdict(), "none yet"
+    for _ in range(_ROUNDS):  # linearise each at the result of the one before
+        model = _ByLengths(file, at, blind.seen, jumps_m, blind.variance_factor, seen.start[0, 0])
+        verdict, values = _judged(file, model, points)
+        if verdict.text == said:
+            break
+        said = verdict.text
+        at, jumps_m = at.with_values(file.values() + values[: at.size]), values[at.size :]
+    return verdict
+
+
+def cost_of_readings(
+    file: CableGeometry, blind: Fit, seen: Observations, faults: int
+) -> SlipVerdict:
+    """Return the verdict that `faults` wrong lengths, left out of `blind`, explain the points."""
+    points = Points.of(seen, file.coordinates)
+    model = _ByLengths(
+        file, blind.geometry, blind.seen, blind.jumps_m, blind.variance_factor, seen.start[0, 0]
+    )
+    score = model.score(_Slip("", points, 0.0))
+    return SlipVerdict(explained=not score.misfit, cost=score.cost + _POINT_COST * faults)
+
+
+def _judged(
+    file: CableGeometry, model: _ByLengths, points: Points
+) -> tuple[SlipVerdict, FloatArray]:
+    """Return the verdict, and the parameters (P,) that fit it best."""
+    null = model.score(_Slip("", points, 0.0))
+    slips = [(one, model.score(one)) for one in _slips(points, model, null)]
+    best, score = min(slips, key=lambda one: one[1].cost)
+    robot = _of_robot(file, model, null)
+    of_robot = min(robot)[0] if robot else math.inf
+    least = _SCALE_GAIN - 2.0 if best.name == "scale" else _GAIN
+    if score.cost + least > null.cost:
+        explained = not null.misfit or of_robot < null.cost - _GAIN
+        return SlipVerdict(explained=explained, cost=null.cost), model.found(null)
+    if of_robot < score.cost - MARGIN:
+        return SlipVerdict(cost=of_robot), model.found(null)
+    if score.misfit:
+        return SlipVerdict(explained=False, cost=score.cost), model.found(null)
+    text, off = _text(best, points, score)
+    alike = [what for cost, what in sorted(robot) if cost < score.cost + MARGIN]
+    if alike:
+        text = f"{text}, or {', or '.join(alike[:2])}"
+    sure = not score.odd and null.cost > score.cost + _GROSS
+    return SlipVerdict(text, bool(alike), off, True, score.cost, sure), model.found(score)
+
+
+def _of_robot(file: CableGeometry, model: _ByLengths, null: _Score) -> list[tuple[float, str]]:
+    """Return possible faults of the robot's file instead, with cost and text."""
+    size, rows, k = len(model.known), file.rows, file.coordinates
+    each = np.eye(size)
+    tried: list[tuple[str, FloatArray, float]] = []
+    if DRUM in rows:
+        drums = [i * len(rows) + rows.index(DRUM) for i in range(file.n)]
+        tried += [
+            (f"{file.cable_name(i)} has another drum than in the file", each[:, [drum]], _DRUM)
+            for i, drum in enumerate(drums)
+        ]
+        alike = each[:, drums].sum(axis=1, keepdims=True)
+        tried.append(("all drums pay out more or less than in the file", alike, _DRUM))
+    if 0 in rows:
+        tried += [
+            (f"the exit point of {file.cable_name(i)} is not where the file has it",
+             each[:, i * len(rows) : i * len(rows) + k], _EXIT_m)
+            for i in range(file.n)
+        ]  # fmt: skip
+    if file.shared:
+        yielding = each[:, [file.size - 1]]
+        tried.append(("the cables yield otherwise than in the file", yielding, _ELONGATION))
+    return [(model.cost_of_file(null, directions, most), name) for name, directions, most in tried]
+
+
+def _slips(points: Points, model: _ByLengths, null: _Score) -> Iterator[_Slip]:
+    """Yield the tried slips: scale and origin, and all others if points are odd."""
+    place = np.nan_to_num(points.place_m)
+    count, k = place.shape
+    shift = _SHIFT_m * np.tile(np.eye(k), (count, 1, 1))
+    turn = _TURN_rad * _turned(place)
+    scale = _SCALE * place[..., None]
+    yield _Slip("scale", points, 0.0, scale)
+    yield _Slip("shift", points, 0.0, shift)
+    if not null.odd:
+        return
+    yield _Slip("scale and shift", points, 0.0, np.concatenate([scale, shift], axis=2))
+    yield _Slip("turn", points, 0.0, np.concatenate([shift, turn], axis=2))
+    for axis in range(k):
+        one = shift[..., [axis]]
+        along = np.concatenate([one * scale[:, [axis]] / _SHIFT_m, one], axis=2)
+        yield _Slip(f"scale {_AXES[axis]}", points, 2.0 * math.log(k), along)
+    if (near := _turned_near(points, model)) is not None:
+        yield _Slip("turn", near, 4.0, np.concatenate([shift, turn], axis=2))
+    for mm, unit in _UNITS.items():
+        scaled = replace(points, place_m=mm * points.place_m, std_m=max(mm, 1.0) * points.std_m)
+        yield _Slip(f"unit {unit}", scaled, 2.0 * math.log(len(_UNITS)))
+    for name, order, sign in _axes(k):
+        other = replace(
+            points, place_m=points.place_m[:, order] * sign, std_m=points.std_m[:, order]
+        )
+        cost = 2.0 * math.log(2**k * math.factorial(k))
+        yield _Slip(f"axes {name}", other, cost)
+        yield _Slip(f"axes {name} and shift", other, cost, shift)
+    yield from _other_orders(points, model)
+
+
+def _turned(place_m: FloatArray) -> FloatArray:
+    """Return the derivatives (M, k, t) of points by small turns about the axes."""
+    if place_m.shape[1] == 2:
+        return np.stack([-place_m[:, 1], place_m[:, 0]], axis=1)[..., None]
+    return np.stack([np.cross(axis, place_m) for axis in np.eye(3)], axis=2)
+
+
+def _turned_near(points: Points, model: _ByLengths) -> Points | None:
+    """Return the points turned and moved to their places by lengths; None for too few."""
+    k = points.place_m.shape[1]
+    whole = np.isfinite(points.place_m).all(axis=1)
+    if whole.sum() < k:
+        return None
+    there = points.place_m[whole]
+    here = (model.place_m + model.A @ model.change)[points.pose[whole]]
+    turn, shift = best_fit(there, here)
+    return replace(points, place_m=points.place_m @ turn.T + shift)
+
+
+def _axes(k: int) -> Iterator[tuple[str, list[int], FloatArray]]:
+    """Yield the ways to exchange and reverse axes: as text, order and signs."""
+    for order, sign in product(permutations(range(k)), product((1.0, -1.0), repeat=k)):
+        if order == tuple(range(k)) and min(sign) > 0.0:
+            continue
+        name = ", ".join(
+            ("-" if s < 0.0 else "") + _AXES[a] for a, s in zip(order, sign, strict=True)
+        )
+        yield name, list(order), np.array(sign)
+
+
+def _other_orders(points: Points, model: _ByLengths) -> Iterator[_Slip]:
+    """Yield points assigned to other poses than in their file."""
+    yield _Slip("order reversed", replace(points, pose=points.pose[::-1].copy()), 2.0)
+    count, there = len(points.pose), model.place_m + model.A @ model.change
+    shifted = []
+    for what, by, start in product(("numbers", "lines"), _SHIFTS, range(count)):
+        kept = _renumbered(points, by, start, what == "lines", len(model.place_m))
+        if len(kept.pose) < max(2, count - abs(by)):
+            continue
+        off = kept.place_m - there[kept.pose]
+        off -= np.nansum(off, axis=0) / np.isfinite(off).sum(axis=0).clip(min=1)
+        squares = np.nansum(off**2, axis=1).clip(max=_FAR_m2)
+        first = points.pose[start] + 1 if start else 0
+        shifted.append((float(squares.sum()), f"{what} {by} {first}", kept))
+    for _, name, kept in sorted(shifted, key=lambda one: one[0])[:_BEST]:
+        lost = _POINT_COST * (count - len(kept.pose))
+        yield _Slip(name, kept, lost + 2.0 * math.log(2 * len(_SHIFTS) * count))
+    yield from _exchanged(points, model)
+
+
+def _renumbered(points: Points, by: int, start: int, lines: bool, poses: int) -> Points:
+    """Return points assigned to other pose numbers, or other lines, from one line on."""
+    count = len(points.pose)
+    line, pose = np.arange(count), points.pose.copy()
+    if lines:
+        line[start:] += by
+        inside = (line >= 0) & (line < count)
+        pose[inside] = points.pose[line[inside]]
+    else:
+        pose[start:] += by
+        inside = (pose >= 0) & (pose < poses)
+    # lines before the first shifted one keep their poses
+    inside[start:] &= ~np.isin(pose[start:], pose[:start])
+    return Points(pose[inside], points.place_m[inside], points.std_m[inside])
+
+
+def _exchanged(points: Points, model: _ByLengths) -> Iterator[_Slip]:
+    """Yield points with two rows exchanged, or two pairs of rows."""
+    count, here, information = len(points.pose), points, np.linalg.inv(model.C)
+    done: list[str] = []
+    for _ in range(2):
+        tried = []
+        for i in range(count):
+            for j in range(i + 1, count):
+                pose = here.pose.copy()
+                pose[[i, j]] = pose[[j, i]]
+                other = replace(here, pose=pose)
+                tried.append((_plain_cost(model, information, other), i, j, other))
+        tried.sort(key=lambda one: one[0])
+        for _, i, j, other in tried[: _BEST if not done else 1]:
+            pair = f"{points.pose[i] + 1} and {points.pose[j] + 1}"
+            names = [*done, pair]
+            yield _Slip(
+                "rows " + "; ".join(names), other, len(names) * 2.0 * math.log(count**2 / 2)
+            )
+        if not tried:
+            return
+        _, i, j, here = tried[0]
+        done.append(f"{points.pose[i] + 1} and {points.pose[j] + 1}")
+
+
+def _plain_cost(model: _ByLengths, information: FloatArray, points: Points) -> float:
+    """Return y^T S^-1 y with all points, if only C couples them (Woodbury)."""
+    known = np.isfinite(points.place_m)
+    A = model.A[points.pose][known]
+    y = (points.place_m - model.place_m[points.pose])[known] - A @ model.change
+    own = np.diagonal(model.own, axis1=1, axis2=2)[points.pose][known]
+    variance = points.std_m[known] ** 2 + own
+    by = A / variance[:, None]
+    pulled = y @ by
+    less = pulled @ np.linalg.solve(information + A.T @ by, pulled)
+    return float((y**2 / variance).sum() - less)
+
+
+def row_slip(measured_m: FloatArray, there_m: FloatArray, std_m: float) -> str:
+    """Return an explanation of a single point (k,), nan if not measured; empty for none."""
+    k = len(measured_m)
+    tried = {f"it is in {unit}": mm * measured_m for mm, unit in _UNITS.items()}
+    for name, order, sign in _axes(k):
+        tried[f"it is ({name})"] = measured_m[order] * sign
+    most = max(_NEAR * std_m, _NEAR_SHARE * float(np.nanmax(np.abs(measured_m - there_m))))
+    off = {text: float(np.nanmax(np.abs(place - there_m))) for text, place in tried.items()}
+    best = min(off, key=lambda text: off[text])
+    return best if off[best] < most else ""
+
+
+def _text(slip: _Slip, points: Points, score: _Score) -> tuple[str, float]:
+    """Return the slip as text, and its size."""
+    what, _, rest = slip.name.partition(" ")
+    names, size = ", ".join(_AXES[: points.place_m.shape[1]]), 0.0
+    if what == "scale":
+        size = float(1.0 / (1.0 - _SCALE * score.free[0]) - 1.0)
+        of_axis = f"{rest} of " if rest in tuple(_AXES) else ""
+        text = f"the scale of {of_axis}all measured points is {100.0 * size:+.2f} % off"
+    elif what == "shift":
+        off_m = _SHIFT_m * score.free
+        size = float(np.linalg.norm(off_m))
+        text = (
+            f"all measured points are off by ({', '.join(f'{1e3 * x:.0f}' for x in off_m)}) mm: "
+            "their origin is not that of the robot's file, or another point of the platform was "
+            "measured"
+        )
+    elif what == "turn":
+        text = "the axes of all measured points are turned against those of the robot's file"
+    elif what == "unit":
+        text = f"all measured points are in {rest}, not in mm"
+    elif what == "axes":
+        text = f"all measured points are ({rest.removesuffix(' and shift')}), not ({names})"
+    elif what == "order":
+        text = "all measured points are in the reverse order of the poses"
+    elif what in ("numbers", "lines"):
+        by, first = map(int, rest.split())
+        which = f"from pose {first} on, measured points" if first else "all measured points"
+        unit = "pose number" if what == "numbers" else "line"
+        far = f"{abs(by)} {unit}{'s' * (abs(by) > 1)} {'earlier' if by < 0 else 'later'}"
+        text = f"{which} belong {far}"
+    else:
+        text = f"the measured points of poses {rest.replace(';', ', and of')} are exchanged"
+    return text + (", and their origin is another" if rest.endswith("and shift") else ""), size

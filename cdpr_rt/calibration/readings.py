@@ -1,0 +1,508 @@
+"""Readings of a calibration: observations at its poses, and its data files."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Annotated, Literal, Self
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from cdpr_profiles import Robot
+from cdpr_profiles.bounded_input import read_text
+from cdpr_profiles.calibration.geometry import geometry_sha256, write_text
+from cdpr_profiles.camera import CameraIntrinsics, MarkerSheets
+from cdpr_profiles.errors import ProfileError, value_text
+from cdpr_profiles.reader import Profile, read_json_model
+from cdpr_rt.arrays import BoolArray, FloatArray, IntArray
+from cdpr_rt.calibration.markers.marker_map import SeenMarkers, Sighting
+from cdpr_rt.errors import InvalidRequestError
+from cdpr_rt.model.platform_model import PlatformModel
+
+# Data of a camera on the platform in a calibration: its setup, and its images.
+
+_DECIMALS_px = 4
+_Length_m = Annotated[float, Field(ge=-100.0, le=100.0)]
+_Angle_deg = Annotated[float, Field(ge=-360.0, le=360.0)]
+_Pixel = Annotated[float, Field(ge=-1e5, le=1e5)]
+_Pair = Annotated[tuple[_Pixel, ...], Field(min_length=2, max_length=2)]
+_Id = Annotated[int, Field(ge=0, lt=1024)]
+
+
+class HandEye(Profile):
+    """Prior knowledge of the camera's pose on the platform."""
+
+    position_m: Annotated[tuple[_Length_m, ...], Field(min_length=3, max_length=3)]
+    """Position of the camera's pinhole in the platform's frame."""
+    rotation_deg: Annotated[tuple[_Angle_deg, ...], Field(min_length=3, max_length=3)]
+    """Rotation vector from the camera's frame to the platform's; the camera looks along z, and x
+    points to the right in the image."""
+    position_std_m: Annotated[float, Field(ge=1e-6, le=10.0)] = 0.005
+    """Standard deviation of each coordinate: a ruler's."""
+    rotation_std_deg: Annotated[float, Field(ge=1e-4, le=180.0)] = 2.0
+    """About each axis."""
+
+
+class CameraSetup(Profile):
+    """The camera that took the images, and the sheets that it saw."""
+
+    intrinsics: CameraIntrinsics
+    """With `sigmas` the fit corrects them within these; without `sigmas` they are held."""
+    sheets: MarkerSheets
+    """Sizes of the markers, and places of those that are known."""
+    sigma_px: Annotated[float, Field(ge=1e-3, le=100.0)] | None = None
+    """Standard deviation of a coordinate of a corner; by default estimated from the images."""
+    size_std: Annotated[float, Field(ge=1e-6, le=0.5)] = 0.002
+    """Relative standard deviation of the size that all sheets share."""
+    known_std_m: Annotated[float, Field(ge=1e-6, le=1.0)] = 0.001
+    """Standard deviation of each coordinate of a corner of a marker whose place is known."""
+    hand_eye: HandEye | None = None
+    """None if unknown: then the robot's rotations determine it."""
+
+    @classmethod
+    def of(cls, intrinsics: CameraIntrinsics, sheets: MarkerSheets) -> CameraSetup:
+        """Return the setup of two files; known places are as accurate as the sheets' file says."""
+        setup = cls(intrinsics=intrinsics, sheets=sheets)
+        if sheets.known_std_m is None:
+            return setup
+        return setup.model_copy(update={"known_std_m": sheets.known_std_m})
+
+    def as_found(self, lens: FloatArray, size_change: float) -> CameraSetup:
+        """Return it with another lens (9,), sheets larger by a relative change, and no hand_eye."""
+        fx, fy, cx, cy, *distortion = lens.tolist()
+        found = {"focal_px": (fx, fy), "centre_px": (cx, cy), "distortion": tuple(distortion)}
+        sheets, by = self.sheets, 1.0 + size_change
+        sizes = tuple(one.model_copy(update={"size_m": by * one.size_m}) for one in sheets.sizes)
+        scaled = {"size_m": by * sheets.size_m, "sizes": sizes}
+        return self.model_copy(
+            update={
+                "intrinsics": self.intrinsics.model_copy(update=found),
+                "sheets": sheets.model_copy(update=scaled),
+                "hand_eye": None,
+            }
+        )
+
+
+class MarkerReading(Profile):
+    """A marker in an image."""
+
+    id: _Id
+    corners_px: Annotated[tuple[_Pair, ...], Field(min_length=4, max_length=4)]
+    """In the order of detectors: clockwise from the marker's upper left."""
+
+
+class ImageReading(Profile):
+    """Image of a pose; `markers` is empty if none was usable."""
+
+    markers: Annotated[tuple[MarkerReading, ...], Field(max_length=1024)] = ()
+    repeated: tuple[_Id, ...] = ()
+    """Ids that it shows more than once."""
+    mirrored: tuple[_Id, ...] = ()
+    """Ids that only its mirror image shows."""
+    problem: Annotated[str, Field(max_length=500)] | None = None
+    """Fault of the image as a whole, as text; None if it has none."""
+
+    @classmethod
+    def of(cls, seen: Sighting) -> Self:
+        """Return the reading of a detector's result."""
+        markers = tuple(
+            MarkerReading(
+                id=marker, corners_px=tuple(map(tuple, np.round(corners, _DECIMALS_px).tolist()))
+            )
+            for marker, corners in sorted(seen.corners_px.items())
+        )
+        return cls(
+            markers=markers, repeated=seen.repeated, mirrored=seen.mirrored, problem=seen.problem
+        )
+
+    def sighting(self, name: str) -> Sighting:
+        """Return it as a detector would; an id that is listed twice counts as repeated."""
+        ids = [one.id for one in self.markers]
+        twice = {marker for marker in ids if ids.count(marker) > 1}
+        corners = {one.id: np.array(one.corners_px) for one in self.markers if one.id not in twice}
+        repeated = tuple(sorted({*self.repeated, *twice}))
+        return Sighting(
+            name, corners, repeated=repeated, mirrored=self.mirrored, problem=self.problem
+        )
+
+
+@dataclass(frozen=True)
+class Images:
+    """Images of the camera on the platform, one for each pose, and its setup."""
+
+    setup: CameraSetup
+    sightings: Sequence[Sighting]
+
+
+# Observations at the poses of a calibration: lengths, tensions, measured poses, markers.
+
+
+@dataclass(frozen=True)
+class Observations:
+    """Readings at N poses of n cables; the standard deviation is inf for unmeasured values.
+
+    Positions may belong to another point of the platform than its origin: `target_m` in the
+    platform's frame, for example the reflector that a tracker sees.
+    """
+
+    length_m: FloatArray
+    """Unstretched cable lengths by the robot's file and its encoders, (N, n)."""
+    tension_N: FloatArray
+    """(N, n)"""
+    start: FloatArray
+    """Poses at which the search begins, as arrays of `Pose`, (N, 4, 3)."""
+    used: BoolArray
+    """Whether a length counts, (N, n)."""
+    position_m: FloatArray
+    """Measured positions in the room, (N, 3)."""
+    position_std_m: FloatArray
+    """(N, 3)"""
+    rotation: FloatArray
+    """Measured rotations, (N, 3, 3)."""
+    rotation_std_rad: FloatArray
+    """About each of the room's axes, (N, 3)."""
+    target_m: FloatArray
+    """Point of the platform to which `position_m` belongs, (3,)."""
+    reference_m: FloatArray
+    """Lengths when the encoders began to count; drum errors have no effect there, (n,)."""
+    jumps: tuple[tuple[int, int], ...] = ()
+    """(cable, pose) at which a cable's length jumped: from this pose on it has another offset."""
+    markers: SeenMarkers | None = None
+    """Markers seen by the camera on the platform, an image for each pose."""
+    tension_free: FloatArray | None = None
+    """Projections onto the remaining noise of tensions, (N, n, n), after their balance has removed
+    the rest; None if all remains."""
+
+    @classmethod
+    def of_lengths(
+        cls, length_m: FloatArray, tension_N: FloatArray, start: FloatArray
+    ) -> Observations:
+        """Return lengths (N, n) and tensions (N, n) alone; raises InvalidRequestError."""
+        lengths, tensions = np.array(length_m, float), np.array(tension_N, float)
+        poses = np.array(start, float)
+        count = len(lengths)
+        if lengths.shape != tensions.shape or poses.shape != (count, 4, 3):
+            raise InvalidRequestError(
+                f"lengths {lengths.shape}, tensions {tensions.shape}, poses {poses.shape}: allowed:"
+                " (N, n), (N, n) and (N, 4, 3)"
+            )
+        for name, values in (("lengths", lengths), ("tensions", tensions), ("poses", poses)):
+            if not np.isfinite(values).all():
+                bad = int(np.argmin(np.isfinite(values).reshape(count, -1).all(axis=1)))
+                raise InvalidRequestError(f"{name} of pose {bad + 1}: allowed: finite numbers")
+        nowhere = np.full((count, 3), np.inf)
+        turn = np.broadcast_to(np.eye(3), (count, 3, 3)).copy()
+        used = np.ones(lengths.shape, bool)
+        zero = np.zeros((count, 3))
+        first = lengths[0].copy() if count else np.zeros(lengths.shape[1])
+        return cls(
+            lengths, tensions, poses, used, zero, nowhere, turn, nowhere.copy(), np.zeros(3), first
+        )
+
+    @property
+    def poses(self) -> int:
+        """Number of poses."""
+        return len(self.length_m)
+
+    @property
+    def measured(self) -> BoolArray:
+        """Whether a pose has external measurements, (N,)."""
+        any_position = np.isfinite(self.position_std_m).any(axis=1)
+        return np.asarray(any_position | np.isfinite(self.rotation_std_rad).any(axis=1))
+
+    def with_positions(
+        self, position_m: FloatArray, std_m: FloatArray | float, target_m: FloatArray | None = None
+    ) -> Observations:
+        """Return the same with positions (N, 3); nan for coordinates that were not measured."""
+        measured = np.array(position_m, float)
+        known = np.isfinite(measured)
+        std = np.where(known, np.broadcast_to(std_m, measured.shape), np.inf)
+        if not (std > 0.0).all():
+            raise InvalidRequestError("standard deviation of a position: allowed: above 0")
+        point = np.zeros(3) if target_m is None else np.array(target_m, float)
+        return replace(
+            self,
+            position_m=np.where(known, measured, 0.0),
+            position_std_m=std,
+            target_m=point,
+        )
+
+    def with_rotations(self, rotation: FloatArray, std_rad: FloatArray | float) -> Observations:
+        """Return the same with rotations (N, 3, 3); nan for those that were not measured."""
+        measured = np.array(rotation, float)
+        known = np.isfinite(measured).all(axis=(1, 2))
+        std = np.where(known[:, None], np.broadcast_to(std_rad, (len(measured), 3)), np.inf)
+        if not (std > 0.0).all():
+            raise InvalidRequestError("standard deviation of a rotation: allowed: above 0")
+        return replace(
+            self,
+            rotation=np.where(known[:, None, None], measured, np.eye(3)),
+            rotation_std_rad=std,
+        )
+
+    def unmeasured(self) -> Observations:
+        """Return lengths and tensions alone."""
+        away = np.full_like(self.position_std_m, np.inf)
+        return replace(self, position_std_m=away, rotation_std_rad=away.copy(), markers=None)
+
+    def some(self, chosen: IntArray | BoolArray) -> Observations:
+        """Return the chosen poses; jumps stay at the same time."""
+        index = np.arange(self.poses)[chosen]
+        jumps = tuple((cable, int((index < pose).sum())) for cable, pose in self.jumps)
+        return replace(
+            self,
+            length_m=self.length_m[index],
+            tension_N=self.tension_N[index],
+            start=self.start[index],
+            used=self.used[index],
+            position_m=self.position_m[index],
+            position_std_m=self.position_std_m[index],
+            rotation=self.rotation[index],
+            rotation_std_rad=self.rotation_std_rad[index],
+            jumps=jumps,
+            tension_free=None if self.tension_free is None else self.tension_free[index],
+            markers=None if self.markers is None else self.markers.of_images(index),
+        )
+
+    def without_jumps(self, offsets_m: FloatArray) -> Observations:
+        """Return lengths after correcting jumps by one offset each."""
+        length = self.length_m.copy()
+        for (cable, pose), offset in zip(self.jumps, offsets_m, strict=True):
+            length[pose:, cable] += offset
+        return replace(self, length_m=length, jumps=())
+
+
+_MOST_BYTES, _MOST_DATA_BYTES = 4 << 20, 64 << 20
+_AXES = "xyz"
+_STD_mm = 2.0
+_COLUMNS = ("pose", "x_mm", "y_mm", "z_mm", "sigma_mm")
+_FURTHEST_mm = 1e6
+_ROTATION = 1e-4
+_TURNED_rad = 0.2
+
+Numbers = tuple[Annotated[float, Field(ge=-1e6, le=1e6)], ...]
+
+
+class PoseReading(Profile):
+    """Readings while the platform stood at one pose."""
+
+    target: Numbers
+    """The target (d,), as for the program `pose`, or the actual place if the platform did not reach
+    it; the first search begins there."""
+    length_m: Numbers
+    """Unstretched lengths by encoders and the robot's file, (n,)."""
+    tension_N: Numbers
+    position_m: Numbers | None = None
+    """Measured externally, (3,)."""
+    position_std_m: float | None = Field(default=None, gt=0)
+    rotation: tuple[Numbers, ...] | None = None
+    rotation_std_rad: float | None = Field(default=None, gt=0)
+    image: ImageReading | None = None
+    """Image of the camera on the platform there."""
+
+    @model_validator(mode="after")
+    def _measured_wholly(self) -> PoseReading:
+        if (self.position_m is None) != (self.position_std_m is None):
+            raise ValueError("position_m and position_std_m: allowed: both or none")
+        if (self.rotation is None) != (self.rotation_std_rad is None):
+            raise ValueError("rotation and rotation_std_rad: allowed: both or none")
+        if self.position_m is not None and len(self.position_m) != 3:
+            raise ValueError(f"position_m: value {value_text(self.position_m)}; allowed: 3 numbers")
+        if self.rotation is not None:
+            if [len(row) for row in self.rotation] != [3, 3, 3]:
+                raise ValueError("rotation: allowed: 3 rows of 3 numbers")
+            Q = np.array(self.rotation)
+            if np.abs(Q @ Q.T - np.eye(3)).max() > _ROTATION or np.linalg.det(Q) < 0.0:
+                raise ValueError(
+                    "rotation: not a rotation matrix; allowed: an orthogonal matrix, determinant 1"
+                )
+        return self
+
+
+class CalibrationData(Profile):
+    """Readings at all poses of a calibration; the platform is at home at the first."""
+
+    format: Literal["cdpr-rt geometry data 1"] = "cdpr-rt geometry data 1"
+    robot: str
+    geometry_sha256: str
+    """Digest of the robot's files as loaded when the platform was measured."""
+    simulated: bool
+    """Whether the robot was simulated; the result is then not used for a real one."""
+    date: str
+    left_out: tuple[str, ...] = ()
+    """Poses that were tried without success, and why."""
+    tried: tuple[Numbers, ...] = ()
+    """Targets (d,) that were not read, or not reached; a continued run skips them."""
+    camera: CameraSetup | None = None
+    """Required if there are images."""
+    restarts: tuple[Annotated[int, Field(ge=1)], ...] = ()
+    """Poses, counted from 0, before which the encoders began to count again."""
+    poses: tuple[PoseReading, ...] = Field(max_length=100_000)
+
+    @model_validator(mode="after")
+    def _camera_where_images(self) -> CalibrationData:
+        for j, reading in enumerate(self.poses):
+            if reading.image is not None and self.camera is None:
+                raise ValueError(f"poses[{j}].image: allowed: where `camera` says what took it")
+        if any(pose >= len(self.poses) for pose in self.restarts):
+            raise ValueError(f"restarts {self.restarts}; allowed: poses of the data")
+        return self
+
+    def save(self, path: Path) -> None:
+        """Write the file; raises ProfileError."""
+        write_text(path, self.model_dump_json(indent=1) + "\n")
+
+    def observations(self, robot: Robot, model: PlatformModel) -> Observations:
+        """Return the readings for the fit; raises InvalidRequestError for another robot."""
+        other = self.geometry_sha256 != geometry_sha256(robot)
+        if other and self.robot != robot.profile:
+            raise InvalidRequestError(
+                f"the data are of robot {self.robot!r}, not of {robot.profile!r}; allowed: "
+                f"{self.robot}"
+            )
+        if other:
+            raise InvalidRequestError(
+                f"the data are of another state of {self.robot!r}: {robot.path}, or a file of its "
+                "winches, has been changed since; allowed: the files they were measured with"
+            )
+        if not self.poses:
+            raise InvalidRequestError("the data hold no poses; allowed: at least a few")
+        n, d = len(robot.axes), model.size
+        for j, reading in enumerate(self.poses):
+            counts = (len(reading.length_m), len(reading.tension_N), len(reading.target))
+            if counts != (n, n, d):
+                raise InvalidRequestError(
+                    f"pose {j + 1} has {counts} lengths, tensions and coordinates; allowed: "
+                    f"{(n, n, d)}"
+                )
+        self._require_home_first(model)
+        start = model.poses(np.array([reading.target for reading in self.poses]))
+        seen = Observations.of_lengths(
+            np.array([reading.length_m for reading in self.poses]),
+            np.array([reading.tension_N for reading in self.poses]),
+            start,
+        )
+        anew = tuple((cable, pose) for pose in self.restarts for cable in range(n))
+        return replace(self._with_measured(seen, model.positions), jumps=anew)
+
+    def sightings(self) -> list[Sighting]:
+        """Return the markers in the images of all poses; empty without image."""
+        return [
+            (reading.image or ImageReading()).sighting(f"pose {j + 1}")
+            for j, reading in enumerate(self.poses)
+        ]
+
+    def _require_home_first(self, model: PlatformModel) -> None:
+        """Raise InvalidRequestError if the first pose is not home."""
+        off = np.abs(np.array(self.poses[0].target) - model.home)
+        k = model.positions
+        if off[:k].max() > model.platform.home_tolerance_m or (off[k:] > _TURNED_rad).any():
+            raise InvalidRequestError(
+                f"pose 1 was to be at {list(self.poses[0].target)}; allowed: home, "
+                f"{model.home.tolist()}, where the platform stands before it moves"
+            )
+
+    def _with_measured(self, seen: Observations, coordinates: int) -> Observations:
+        count = seen.poses
+        position, std = np.full((count, 3), np.nan), np.ones((count, 3))
+        turn, turn_std = np.full((count, 3, 3), np.nan), np.ones((count, 3))
+        for j, reading in enumerate(self.poses):
+            if reading.position_m is not None and reading.position_std_m is not None:
+                position[j, :coordinates] = reading.position_m[:coordinates]
+                std[j] = reading.position_std_m
+            if reading.rotation is not None and reading.rotation_std_rad is not None:
+                turn[j], turn_std[j] = np.array(reading.rotation), reading.rotation_std_rad
+        return seen.with_positions(position, std).with_rotations(turn, turn_std)
+
+
+def load_data(path: Path) -> CalibrationData:
+    """Return the data in a file; raises ProfileError."""
+    return read_json_model(path, CalibrationData, _MOST_DATA_BYTES)
+
+
+@dataclass(frozen=True)
+class MeasuredPoint:
+    """Measured position of the platform's origin at a pose; nan if not measured."""
+
+    pose: int
+    """Counted from 0."""
+    position_m: FloatArray
+    std_m: float
+
+
+def load_points(path: Path) -> list[MeasuredPoint]:
+    """Return measured points: CSV, columns pose,x_mm,y_mm,z_mm,sigma_mm, poses counted from 1.
+
+    Coordinates may be empty; sigma_mm is 2 by default. Raises ProfileError.
+    """
+    try:
+        reader = csv.reader(io.StringIO(read_text(path, _MOST_BYTES)))
+        lines = [(reader.line_num, row) for row in reader]
+    except csv.Error as error:
+        raise ProfileError(path, "", f"is no CSV: {error}") from None
+    lines = [(line, row) for line, row in lines if row and not row[0].lstrip().startswith("#")]
+    first, names = (lines[0][0], [name.strip() for name in lines[0][1]]) if lines else (1, [])
+    if names not in (
+        [c for c in _COLUMNS if c not in left]
+        for left in ((), ("z_mm",), ("sigma_mm",), ("z_mm", "sigma_mm"))
+    ):
+        raise ProfileError(path, f"line {first}", f"allowed: the columns {','.join(_COLUMNS)}")
+    points: list[MeasuredPoint] = []
+    line_of: dict[int, int] = {}
+    for line, row in lines[1:]:
+        point = _point(path, line, _cells(path, line, names, row))
+        if (other := line_of.setdefault(point.pose, line)) != line:
+            problem = f"pose {point.pose + 1} is also in line {other}; keep one of the two lines"
+            raise ProfileError(path, f"line {line}: pose", problem)
+        points.append(point)
+    return points
+
+
+def _cells(path: Path, line: int, names: list[str], row: list[str]) -> dict[str, str]:
+    if len(row) > len(names):
+        problem = f"{len(row)} cells; allowed: up to {len(names)}, one for each column"
+        raise ProfileError(path, f"line {line}", problem)
+    return dict(zip(names, row, strict=False))  # missing cells at the end count as empty
+
+
+def _point(path: Path, line: int, row: dict[str, str]) -> MeasuredPoint:
+    def number(key: str, otherwise: float) -> float:
+        text = row.get(key, "").strip()
+        if not text:
+            return otherwise
+        try:
+            value = float(text)
+        except ValueError:
+            value = math.nan
+        if not abs(value) <= _FURTHEST_mm:
+            raise ProfileError(path, f"line {line}: {key}", f"value {text!r}; allowed: a number")
+        return value
+
+    pose, sigma = number("pose", math.nan), number("sigma_mm", _STD_mm)
+    if not (pose >= 1.0 and pose.is_integer()):
+        raise ProfileError(path, f"line {line}: pose", "allowed: a pose's number, from 1")
+    if not sigma > 0.0:
+        raise ProfileError(path, f"line {line}: sigma_mm", f"value {sigma:g}; allowed: above 0")
+    at = np.array([number(f"{axis}_mm", math.nan) for axis in _AXES])
+    return MeasuredPoint(int(pose) - 1, 1e-3 * at, 1e-3 * sigma)
+
+
+def with_points(
+    seen: Observations, points: Sequence[MeasuredPoint], coordinates: int
+) -> Observations:
+    """Return observations in which points replace other measured positions at their poses."""
+    position = np.where(np.isfinite(seen.position_std_m), seen.position_m, np.nan)
+    std = np.where(np.isfinite(seen.position_std_m), seen.position_std_m, 1.0)
+    for point in points:
+        if point.pose >= seen.poses:
+            raise InvalidRequestError(
+                f"pose {point.pose + 1}; allowed: 1 to {seen.poses}, the poses of the data"
+            )
+        position[point.pose, :coordinates] = point.position_m[:coordinates]
+        std[point.pose] = point.std_m
+    return replace(seen.with_positions(position, std, seen.target_m), used=seen.used)

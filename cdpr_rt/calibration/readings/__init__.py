@@ -1,1 +1,0 @@
-"""Readings of a calibration: files, and arrays for the fit."""

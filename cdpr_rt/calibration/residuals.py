@@ -1,0 +1,241 @@
+"""One residual model of all observations, with its derivatives: closure, poses, balance.
+
+For cable i at pose j, with the encoder's unstretched length l_ij, offset o_i, drum error s_i
+about the length l_i0 at the start, and stretch S_ij = straight length over unstretched
+length under the tension t_ij at the winch, loop closure (Tremblay, (3.16) to (3.18)) is
+
+    f_ij = (l_ij + o_i + s_i (l_ij - l_i0)) S_ij - ρ(a_i, b_i, r_i, x_j)
+
+in metres. (3.18) is the difference of the squares: 2 ρ f, to first order. With ρ's unit
+vector u from exit to anchor, angle θ on the pulley and compliance c_i (1 + κ):
+
+    ∂f/∂a = u    ∂f/∂o = S    ∂f/∂s = (l - l_0) S    ∂f/∂b = -Q^T u    ∂f/∂r = sin θ - θ
+    ∂f/∂κ = l c t    ∂f/∂x = -(u, Q b × u)
+
+Measured positions are p + Q c - p~, rotations log(Q Q~^T). If a platform turns freely in its
+plane, Σ t_i (Q b_i × u_i) and its weight's moment are in balance. Each row is divided
+by its standard deviation.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from cdpr_rt.arrays import FloatArray
+from cdpr_rt.calibration.markers.geometry import cross_matrices
+from cdpr_rt.calibration.parameters import (
+    ANCHORS,
+    CABLE_ROWS,
+    DRUM,
+    EXIT,
+    OFFSET,
+    CableGeometry,
+)
+from cdpr_rt.calibration.readings import Observations
+from cdpr_rt.model.cable_kernel import (
+    ANCHOR,
+    ARC,
+    AXIS,
+    FREE,
+    WEIGHT,
+    run_poses,
+    write_unstretched_lengths,
+)
+from cdpr_rt.model.cable_kernel import CABLE_ROWS as KERNEL_ROWS
+from cdpr_rt.model.rigid_body import G_m_s2, in_space
+
+_MISSED = 0.3
+
+
+@dataclass(frozen=True)
+class Linearised:
+    """Residuals over their standard deviations and their derivatives, R rows for each of N poses.
+
+    The first n rows are those of the cables' lengths.
+    """
+
+    residual: FloatArray
+    """(N, R)"""
+    by_parameter: FloatArray
+    """(N, R, P)"""
+    by_pose: FloatArray
+    """(N, R, d)"""
+
+    @property
+    def points(self) -> slice:
+        """Rows of measured positions; those of measured rotations follow."""
+        return slice(self.residual.shape[1] - 6, self.residual.shape[1] - 3)
+
+
+def linearise(
+    geometry: CableGeometry, seen: Observations, poses: FloatArray, jumps_m: FloatArray
+) -> Linearised:
+    """Return residuals and derivatives at poses (N, 4, 3); `jumps_m` are those of `seen.jumps`.
+
+    P counts the geometry's parameters and then the jumps.
+    """
+    count, n, d = seen.poses, geometry.n, len(geometry.free)
+    kernel = geometry.kernel_geometry()
+    cables = np.empty((count, KERNEL_ROWS, n))
+    run_poses(kernel, poses, cables)
+    chosen = [i for i in geometry.free if i < 6]
+    size = geometry.size + len(seen.jumps)
+    rows = n + int(geometry.turns_freely) + 6
+    out = Linearised(
+        np.zeros((count, rows)), np.zeros((count, rows, size)), np.zeros((count, rows, d))
+    )
+    _closure(geometry, seen, poses, jumps_m, cables, kernel, chosen, out)
+    if geometry.turns_freely:
+        _balance(geometry, seen, poses, cables, kernel, chosen, out)
+    _measured_poses(seen, poses, chosen, out)
+    return out
+
+
+def length_std_m(geometry: CableGeometry, seen: Observations) -> FloatArray:
+    """Return the standard deviation of each length, including the tension's effect, (N, n)."""
+    known = geometry.knowledge
+    uncertain = known.yielding * seen.length_m * geometry.compliance_1_N * known.tension_N
+    if seen.tension_free is not None:
+        uncertain *= np.sqrt(np.diagonal(seen.tension_free, axis1=1, axis2=2))
+    return np.asarray(np.hypot(known.length_m, uncertain))
+
+
+def lengths_told(geometry: CableGeometry, poses: FloatArray, tension_N: FloatArray) -> FloatArray:
+    """Return encoders' lengths without drum errors at poses (N, 4, 3), (N, n)."""
+    cables = np.empty((len(poses), KERNEL_ROWS, geometry.n))
+    run_poses(geometry.kernel_geometry(), poses, cables)
+    straight = cables[:, FREE] + cables[:, ARC]
+    return np.asarray(straight / _stretch(geometry, tension_N, cables) - geometry.cable[:, OFFSET])
+
+
+def _stretch(geometry: CableGeometry, tension_N: FloatArray, cables: FloatArray) -> FloatArray:
+    """Return straight length over unstretched length, (N, n).
+
+    Tensions are given at the winches; at the platform the tension is less by the weight of a cable
+    as long as the exit's height above the anchor point.
+    """
+    soft = geometry.compliance()
+    if not geometry.weight_N_m.any():
+        return np.asarray(1.0 + soft * tension_N)
+    up = np.eye(3)[geometry.coordinates - 1]
+    straight = cables[:, FREE] + cables[:, ARC]
+    lengths = np.empty_like(straight)
+    most_weight, most_soft = float(geometry.weight_N_m.max()), float(soft.mean())
+    at_platform = tension_N + most_weight * cables[:, FREE] * (up @ cables[:, :3])
+    for j in range(len(cables)):
+        write_unstretched_lengths(
+            cables[j, :3], cables[j, FREE], cables[j, ARC], up, at_platform[j],
+            most_soft, most_weight, lengths[j],
+        )  # fmt: skip
+    return np.where(lengths > 0.0, straight / lengths, 1.0 + soft * tension_N)
+
+
+def _closure(
+    geometry: CableGeometry,
+    seen: Observations,
+    poses: FloatArray,
+    jumps_m: FloatArray,
+    cables: FloatArray,
+    kernel: FloatArray,
+    chosen: list[int],
+    out: Linearised,
+) -> None:
+    """Write the rows of the lengths."""
+    n, rows = geometry.n, list(geometry.rows)
+    extra = np.zeros_like(seen.length_m)
+    for (cable, pose), jump in zip(seen.jumps, jumps_m, strict=True):
+        extra[pose:, cable] += jump
+    paid_out = seen.length_m - seen.reference_m
+    length = seen.length_m + geometry.cable[:, OFFSET] + geometry.cable[:, DRUM] * paid_out + extra
+    stretch = _stretch(geometry, seen.tension_N, cables)
+    u = np.swapaxes(cables[:, :3], 1, 2)
+    weight = seen.used / length_std_m(geometry, seen)
+    out.residual[:, :n] = weight * (length * stretch - cables[:, FREE] - cables[:, ARC])
+    each = np.empty((*length.shape, CABLE_ROWS))
+    each[..., EXIT] = u
+    each[..., OFFSET] = stretch
+    each[..., DRUM] = paid_out * stretch
+    each[..., ANCHORS] = -np.einsum("jka,jik->jia", poses[:, 1:], u)
+    theta = np.arccos(np.clip(np.einsum("jik,ki->ji", u, kernel[AXIS:WEIGHT]), -1.0, 1.0))
+    each[..., CABLE_ROWS - 1] = np.sin(theta) - theta
+    each *= weight[..., None]
+    q = len(rows)
+    for i in range(n):
+        out.by_parameter[:, i, i * q : (i + 1) * q] = each[:, i, rows]
+    if geometry.shared:
+        by_elongation = length * geometry.compliance_1_N * seen.tension_N
+        out.by_parameter[:, :n, geometry.size - 1] = weight * by_elongation
+    for k, (cable, pose) in enumerate(seen.jumps):
+        out.by_parameter[pose:, cable, geometry.size + k] = (weight * stretch)[pose:, cable]
+    out.by_pose[:, :n] = -weight[..., None] * np.swapaxes(cables[:, chosen], 1, 2)
+
+
+def _balance(
+    geometry: CableGeometry,
+    seen: Observations,
+    poses: FloatArray,
+    cables: FloatArray,
+    kernel: FloatArray,
+    chosen: list[int],
+    out: Linearised,
+) -> None:
+    """Write the row of the moment about z of a platform that turns freely in its plane."""
+    n, q = geometry.n, len(geometry.rows)
+    Q = poses[:, 1:3, :2]
+    arm = np.einsum("jab,bi->jia", Q, kernel[ANCHOR : ANCHOR + 2])
+    u = np.swapaxes(cables[:, :2], 1, 2)
+    t, rho = seen.tension_N, cables[:, FREE]
+    across = arm[..., 0] * u[..., 1] - arm[..., 1] * u[..., 0]
+    # derivative by the anchor's place with a constant arm: t r × (1 - u u^T) / ρ
+    turned = np.stack([-arm[..., 1], arm[..., 0]], axis=-1)
+    square = turned - (turned * u).sum(axis=-1, keepdims=True) * u
+    by_place = (t / rho)[..., None] * square
+    platform = geometry.model.platform
+    centre = Q @ in_space(platform.centre_of_mass_m)[:2]
+    weight_N = platform.mass_kg * G_m_s2
+    moment = (t * across).sum(axis=1) + weight_N * centre[:, 0]
+    by_angle = (by_place * turned).sum(axis=(1, 2)) - (t * (arm * u).sum(axis=-1)).sum(axis=1)
+    by_angle -= weight_N * centre[:, 1]
+    # the moment's standard deviation: that of a tension, with a share of the arms as its lever
+    arms = geometry.model.kinematics.geometry[ANCHOR : ANCHOR + 2]
+    held = geometry.knowledge.tension_N * _MISSED * float(np.linalg.norm(arms))
+    weight = np.asarray(seen.used.all(axis=1) / held)
+    out.residual[:, n] = weight * moment
+    by_pose = {0: by_place[..., 0].sum(axis=1), 1: by_place[..., 1].sum(axis=1), 5: by_angle}
+    for k, direction in enumerate(chosen):
+        out.by_pose[:, n, k] = weight * by_pose[direction]
+    direct = t[..., None] * np.stack([u[..., 1], -u[..., 0]], axis=-1)
+    by_anchor = np.einsum("jab,jia->jib", Q, by_place + direct)
+    for place, row in enumerate(geometry.rows):
+        columns = slice(place, n * q, q)
+        if row < 2:
+            out.by_parameter[:, n, columns] = -weight[:, None] * by_place[..., row]
+        elif row - ANCHORS.start in (0, 1):
+            by_this = by_anchor[..., row - ANCHORS.start]
+            out.by_parameter[:, n, columns] = weight[:, None] * by_this
+
+
+def _measured_poses(
+    seen: Observations, poses: FloatArray, chosen: list[int], out: Linearised
+) -> None:
+    """Write the last six rows, of positions and rotations measured from outside."""
+    arm = poses[:, 1:] @ seen.target_m
+    first = out.points.start
+    weight = 1.0 / seen.position_std_m
+    out.residual[:, out.points] = weight * (poses[:, 0] + arm - seen.position_m)
+    by_twist = np.zeros((len(poses), 6, 6))
+    by_twist[:, :3, :3] = np.eye(3)
+    by_twist[:, :3, 3:] = -cross_matrices(arm)
+    by_twist[:, :3] *= weight[..., None]
+    if np.isfinite(seen.rotation_std_rad).any():
+        turn = poses[:, 1:] @ np.swapaxes(seen.rotation, 1, 2)
+        phi = Rotation.from_matrix(turn).as_rotvec()
+        weight = 1.0 / seen.rotation_std_rad
+        out.residual[:, first + 3 :] = weight * phi
+        skew = cross_matrices(phi)
+        # inverse of the left Jacobian of SO(3), to second order
+        by_twist[:, 3:, 3:] = weight[..., None] * (np.eye(3) - 0.5 * skew + skew @ skew / 12.0)
+    out.by_pose[:, first:] = by_twist[:, :, chosen]

@@ -1,0 +1,408 @@
+"""Verification of a calibration: compare poses by lengths alone with measurements, held out."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+from scipy.stats import t as student
+
+from cdpr_rt.arrays import BoolArray, FloatArray, IntArray
+from cdpr_rt.calibration.camera_model import CameraModel
+from cdpr_rt.calibration.camera_start import (
+    locate_by_camera,
+    map_of_images,
+    markers_of_map,
+    start_on_map,
+)
+from cdpr_rt.calibration.faults import fit_without_faults, told_right, without_slack
+from cdpr_rt.calibration.fit import Fit, locate, weighed_fit
+from cdpr_rt.calibration.markers.geometry import logarithms
+from cdpr_rt.calibration.markers.map_fit import MapFit
+from cdpr_rt.calibration.parameters import CableGeometry
+from cdpr_rt.calibration.readings import CameraSetup, Images, Observations
+from cdpr_rt.calibration.residuals import length_std_m
+from cdpr_rt.calibration.verdict import predicted_std
+
+_LEAST_MARKERS = 2
+"""Least markers in an image for a pose: the tilt of a single marker is uncertain."""
+_LEAST_POSES = 3
+_SURE = 0.975
+"""Quantile of the test whether poses became worse: about two standard errors."""
+_GROSS = 2.0
+"""Ratio of root mean squares above which errors are worse, whatever the test says."""
+
+
+@dataclass(frozen=True)
+class Scale:
+    """Ratio of measured distances between poses to those by lengths."""
+
+    factor: float
+    std: float
+    """From leaving out one pose after the other (jackknife); both nan for less than three poses."""
+
+    @classmethod
+    def of(cls, told_m: FloatArray, measured_m: FloatArray) -> Scale:
+        """Return the ratio of measured (M, k) to computed (M, k) distances, for all pairs together.
+
+        s^2 = sum |q_i - q_j|^2 / sum |p_i - p_j|^2; section 3.8 of the thesis discusses the scale.
+        """
+        count = len(told_m)
+        if count < _LEAST_POSES or not np.ptp(told_m, axis=0).any():
+            return cls(float("nan"), float("nan"))
+        factor = _ratio(told_m, measured_m)
+        less = np.array(
+            [_ratio(*(np.delete(p, j, axis=0) for p in (told_m, measured_m))) for j in range(count)]
+        )
+        return cls(factor, float(np.sqrt((count - 1) * less.var())))
+
+    @property
+    def text(self) -> str:
+        """Factor and three standard deviations, as text."""
+        return f"{self.factor:.5f} ± {3.0 * self.std:.5f}"
+
+
+def _ratio(told_m: FloatArray, measured_m: FloatArray) -> float:
+    # sums over pairs are proportional to those about the mean
+    squares = [float(((p - p.mean(axis=0)) ** 2).sum()) for p in (measured_m, told_m)]
+    return float(np.sqrt(squares[0] / max(squares[1], 1e-12)))
+
+
+@dataclass(frozen=True)
+class Verification:
+    """Errors of poses by lengths alone, at poses that the fit has not used."""
+
+    poses: int
+    errors_m: FloatArray
+    """Positions by lengths less measured ones, (M, k)."""
+    told_m: FloatArray
+    """Positions by lengths, (M, k)."""
+    turn_errors_rad: FloatArray
+    """Errors of measured rotations, (M, 3)."""
+    residual_m: float
+    """Root mean square of the lengths' residuals."""
+    squares_m2: FloatArray
+    """Sum of squares of the lengths' residuals at each pose, (N,)."""
+    by_camera: bool = False
+    """Whether the camera measured the poses, on a map by the images of other poses only."""
+
+    @property
+    def kind(self) -> Literal["camera", "points", "none"]:
+        """Kind of the reference with which poses by lengths are compared."""
+        if not self.errors_m.size:
+            return "none"
+        return "camera" if self.by_camera else "points"
+
+    @property
+    def reference(self) -> str:
+        """Reference as text."""
+        if self.kind != "camera":
+            return "measured points" if self.errors_m.size else "nothing but the lengths"
+        return (
+            "the camera, on a map by the images of the poses used alone, sheet sizes and lens as "
+            "calibrated"
+        )
+
+    @property
+    def mean_mm(self) -> float:
+        """Mean distance."""
+        return 1e3 * float(np.nanmean(self._distance())) if self.errors_m.size else float("nan")
+
+    @property
+    def worst_mm(self) -> float:
+        """Largest distance."""
+        return 1e3 * float(np.nanmax(self._distance())) if self.errors_m.size else float("nan")
+
+    @property
+    def mean_deg(self) -> float:
+        """Mean angle between rotations."""
+        turned = np.linalg.norm(self.turn_errors_rad, axis=1)
+        return float(np.degrees(turned.mean())) if turned.size else float("nan")
+
+    @property
+    def scale(self) -> Scale:
+        """Ratio of measured distances between the poses to those by lengths."""
+        return Scale.of(self.told_m, self.told_m - self.errors_m)
+
+    def worse_than(self, before: Verification) -> bool:
+        """Return whether errors are larger than those of `before`, by more than noise explains.
+
+        The mean of the differences of distances d_j is beyond t_0.975 of its standard error
+        (Student's paired test): errors of the measurement are in both. Or the root mean square is
+        above twice that before, because a few gross errors would make the standard error large.
+        Without measured poses, contradictions of the lengths are compared instead.
+        """
+        now, then = self._squares(), before._squares()
+        count = len(now)
+        if not count:
+            return False
+        if not float(now.mean()) <= _GROSS**2 * float(then.mean()):
+            return True
+        more = np.sqrt(now) - np.sqrt(then) if self.errors_m.size else now - then
+        if count < 2:
+            return False
+        error = float(more.std(ddof=1)) / math.sqrt(count)
+        return float(more.mean()) > float(student.ppf(_SURE, count - 1)) * error
+
+    def much_better_than(self, before: Verification) -> bool:
+        """Return whether the root mean square of errors is less than half that of `before`.
+
+        Errors of the reference, such as a camera's scale, seldom have such an effect. The result is
+        False with fewer than three poses.
+        """
+        now, then = self._squares(), before._squares()
+        return len(now) >= _LEAST_POSES and float(then.mean()) > _GROSS**2 * float(now.mean())
+
+    def _squares(self) -> FloatArray:
+        """Return squared errors of positions; of lengths if no positions were measured."""
+        return self._distance() ** 2 if self.errors_m.size else self.squares_m2
+
+    def _distance(self) -> FloatArray:
+        return np.asarray(np.linalg.norm(self.errors_m, axis=1))
+
+
+def verify(
+    geometry: CableGeometry,
+    jumps_m: FloatArray,
+    seen: Observations,
+    camera: CameraModel | None = None,
+) -> Verification:
+    """Return the errors of poses by `geometry` and lengths alone against measurements.
+
+    If only the camera has measured, the reference is the poses that the camera alone gives.
+    """
+    told = seen.without_jumps(jumps_m)
+    there = locate(geometry, told)
+    off = there.length_residual_m * length_std_m(geometry, told)
+    squares = np.asarray((off**2).sum(axis=1))
+    rms = float(np.sqrt(squares.sum() / max(int(seen.used.sum()), 1)))
+    k = geometry.coordinates
+    if camera is not None and not verifies(seen):
+        seen = replace(seen, start=there.poses)
+        errors, told_m, turns = _beside_camera(geometry, camera, seen)
+        return Verification(
+            seen.poses, errors[:, :k], told_m[:, :k], turns, rms, squares, by_camera=True
+        )
+    p = there.poses[:, 0] + there.poses[:, 1:] @ seen.target_m
+    errors = np.where(np.isfinite(seen.position_std_m), p - seen.position_m, np.nan)[:, :k]
+    measured = np.isfinite(errors).all(axis=1)
+    turned = np.isfinite(seen.rotation_std_rad).all(axis=1)
+    turns = logarithms(there.poses[turned, 1:] @ np.swapaxes(seen.rotation[turned], 1, 2))
+    return Verification(seen.poses, errors[measured], p[measured, :k], turns, rms, squares)
+
+
+def verifies(seen: Observations) -> bool:
+    """Return whether enough poses were measured, in space, for a separate reference."""
+    k = seen.position_m.shape[1]
+    return int((np.isfinite(seen.position_std_m).sum(axis=1) == k).sum()) >= _LEAST_POSES
+
+
+def _beside_camera(
+    geometry: CableGeometry, camera: CameraModel, seen: Observations
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return errors of positions, positions, and errors of rotations of `seen.start`, (M, 3).
+
+    Only for poses at which the camera saw enough markers.
+    """
+    markers = seen.markers
+    shown = np.zeros(seen.poses, int)
+    if markers is not None:
+        shown = np.bincount(markers.image, minlength=seen.poses)
+    index = np.flatnonzero(shown >= _LEAST_MARKERS)
+    if len(index) < _LEAST_POSES:
+        return np.zeros((0, 3)), np.zeros((0, 3)), np.zeros((0, 3))
+    there = locate_by_camera(geometry, camera, seen.some(index)).poses
+    p, Q = seen.start[index, 0], seen.start[index, 1:]
+    return p - there[:, 0], p, logarithms(Q @ np.swapaxes(there[:, 1:], 1, 2))
+
+
+def relative_errors(poses: FloatArray, true: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return errors of positions and rotations (N - 1, 3) of poses (N, 4, 3) seen from the first.
+
+    T_1^-1 T_j is compared, which does not depend on the frame of the room.
+    """
+    (p, Q), (p_true, Q_true) = _seen_from_first(poses), _seen_from_first(true)
+    return p - p_true, logarithms(Q @ np.swapaxes(Q_true, 1, 2))
+
+
+def _seen_from_first(poses: FloatArray) -> tuple[FloatArray, FloatArray]:
+    back = poses[0, 1:].T
+    return (poses[1:, 0] - poses[0, 0]) @ back.T, back @ poses[1:, 1:]
+
+
+# The poses that verify a calibration. The fit to the other poses uses no reading from them.
+# Two things come from all poses: the map of the markers with which the fit begins, and the list
+# of wrong measured points, which do not verify.
+
+_EACH = 5
+"""One pose in this number is kept from the fit and verifies it."""
+LEAST_VERIFYING = 3
+"""Least number of measured points that verify a calibration."""
+LEAST_POSES = _EACH * LEAST_VERIFYING
+"""With fewer poses, too few are kept for a verification."""
+
+
+def held_out(seen: Observations) -> BoolArray:
+    """Return which poses are kept from the fit, (N,).
+
+    One in five, but at least three of those with a measured point if there are six or more, so
+    that the fit also keeps three.
+    """
+    points, held = np.isfinite(seen.position_std_m).any(axis=1), np.zeros(seen.poses, bool)
+    for these in (np.flatnonzero(points), np.flatnonzero(~points)):
+        held[these[every_fifth(len(these))]] = True
+    measured = np.flatnonzero(points)
+    if 2 * LEAST_VERIFYING <= len(measured) < _EACH * LEAST_VERIFYING:
+        held[measured] = False
+        spread = np.linspace(1, len(measured) - 1, LEAST_VERIFYING).round().astype(int)
+        held[measured[spread]] = True
+    return held
+
+
+def every_fifth(poses: int) -> BoolArray:
+    """Return which of `poses` poses are kept from the fit if all of them are measured, (N,)."""
+    return np.asarray(np.arange(poses) % _EACH == _EACH - 1)
+
+
+@dataclass(frozen=True)
+class Reference:
+    """A map of markers by the images of the used poses alone, independent of the cables.
+
+    Only the sizes of sheets and the lens are results of the calibration.
+    """
+
+    setup: CameraSetup
+    map: MapFit
+    images: Images
+    """Images of the held-out poses."""
+
+
+@dataclass(frozen=True)
+class Unused:
+    """The held-out poses, and the fit to all others."""
+
+    index: IntArray
+    """Indices of the held-out poses."""
+    seen: Observations
+    """Observations there, without slack cables, with the jumps that the other poses determine."""
+    part: Fit
+    reference: Reference | None
+    """Reference for poses that a camera saw; None without a camera."""
+
+    @property
+    def jumps_m(self) -> FloatArray:
+        """Sizes of the jumps of `seen`, (j,)."""
+        return self.part.jumps_m
+
+    def verified(self) -> Verification:
+        """Return the errors of the fit to the other poses."""
+        return self._compared(self.part.geometry, self.jumps_m)
+
+    def before(self, file: CableGeometry) -> Verification:
+        """Return the errors of the robot's file.
+
+        Jumps are errors of the readings, not of the file, and are corrected here too. Otherwise
+        lengths would contradict the file after the encoders began to count again.
+        """
+        return self._compared(file, self.jumps_m)
+
+    def birge_ratio(self) -> float:
+        """Return the ratio of actual to predicted errors, against measured points.
+
+        The root mean square of errors by lengths over their standard deviations: by the fit's
+        uncertainty, by lengths of one pose, and by the measurement (Birge, Phys. Rev. 40, 1932).
+        nan if no positions were measured.
+        """
+        part, seen = self.part, self.seen
+        there = locate(part.geometry, seen.without_jumps(self.jumps_m))
+        k = part.geometry.coordinates
+        known = np.isfinite(seen.position_std_m[:, :k])
+        if not known.any():
+            return float("nan")
+        p = there.poses[:, 0] + there.poses[:, 1:] @ seen.target_m
+        own = np.diagonal(there.pose_covariance, axis1=1, axis2=2) * max(part.variance_factor, 1.0)
+        variance = predicted_std(part, there.poses)[:, :k] ** 2 + own[:, :k]
+        variance += np.where(known, seen.position_std_m[:, :k], 0.0) ** 2
+        squares = (p - seen.position_m)[:, :k] ** 2 / variance
+        return float(np.sqrt(squares[known].mean()))
+
+    def _compared(self, geometry: CableGeometry, jumps_m: FloatArray) -> Verification:
+        """Return the errors of poses by lengths alone with a geometry.
+
+        If the camera is the reference, its place on the platform and the place of its map in the
+        room are those that fit this geometry best at the used poses.
+        """
+        reference = self.reference
+        if reference is None or verifies(self.seen):
+            return verify(geometry, jumps_m, self.seen)
+        used = self.part.seen.unmeasured().without_jumps(jumps_m)
+        still = replace(geometry, identified=())
+        camera = start_on_map(still, used, reference.setup, reference.map).camera
+        markers = markers_of_map(
+            *(camera.ids, reference.map.map.placed),
+            *(reference.setup.sheets, reference.images.sightings),
+        )
+        return verify(geometry, jumps_m, replace(self.seen, markers=markers), camera)
+
+
+def hold_out(
+    geometry: CableGeometry,
+    weighed: CableGeometry,
+    seen: Observations,
+    slack_N: FloatArray,
+    whole: Fit,
+    first_map: MapFit | None,
+    images: Images | None,
+) -> Unused:
+    """Return the held-out poses and the fit to all others, which begins at the result `whole`.
+
+    `weighed` is the geometry for the last fit, with the accuracy of readings found.
+    """
+    held = held_out(seen)
+    part, _ = fit_without_faults(geometry, seen.some(~held), slack_N, whole.camera)
+    if first_map is not None:
+        part, _ = told_right(geometry, part, first_map)
+    part = weighed_fit(part, weighed, part.seen)
+    kept, index = np.flatnonzero(~held), np.flatnonzero(held)
+    slipped = part.seen.jumps[len(seen.jumps) :]  # jumps found at the other poses
+    some, _ = without_slack(geometry, seen.some(index), slack_N)
+    jumps = tuple((cable, int((index < kept[pose]).sum())) for cable, pose in slipped)
+    used = some.used.copy()
+    for cable, pose in slipped:  # the other poses do not show on which side of the jump these are
+        used[(index > kept[pose - 1]) & (index < kept[pose]), cable] = False
+    some = replace(some, jumps=(*some.jumps, *jumps), used=used)
+    return Unused(index, some, part, _reference(part, images, held))
+
+
+def _reference(part: Fit, images: Images | None, held: BoolArray) -> Reference | None:
+    if images is None or part.camera is None:
+        return None
+    setup = images.setup.as_found(part.camera.lens, part.camera.size_change)
+    used = [one for one, out in zip(images.sightings, held, strict=True) if not out]
+    unused = [one for one, out in zip(images.sightings, held, strict=True) if out]
+    return Reference(setup, map_of_images(setup, used), Images(setup, unused))
+
+
+# Predicted covariance with further poses of the same kind.
+
+MORE = 10
+"""Number of further poses in predictions."""
+
+
+def with_more_poses(found: Fit, more: int = MORE) -> Fit:
+    """Return a fit with the covariance that `more` further poses would leave.
+
+    Each is assumed to be as informative as the average so far: with N poses, covariance C and
+    prior covariance K, it becomes (K^-1 + (C^-1 - K^-1) (N + more) / N)^-1. In directions that only
+    the prior determines, more poses have no effect.
+    """
+    size, poses = found.geometry.size, found.seen.poses
+    known = found.geometry.known_std()
+    factor = max(found.variance_factor, 1.0)
+    C = found.covariance[:size, :size] / np.outer(known, known) / factor
+    shares, vectors = np.linalg.eigh(0.5 * (C + C.T))
+    told = np.maximum(1.0 / np.maximum(shares, 1e-12) - 1.0, 0.0) * (poses + more) / poses
+    C = (vectors / (1.0 + told)) @ vectors.T * np.outer(known, known) * factor
+    return replace(found, covariance=C, attenuation=found.attenuation[:size])

@@ -1,1 +1,0 @@
-"""Quality of a fit: on poses held out, by its covariance, and with further poses."""

@@ -1,0 +1,1 @@
+"""Diagnosis of a robot's file: feasibility, loop, turning, cable loss."""

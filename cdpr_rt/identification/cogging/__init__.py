@@ -1,1 +1,0 @@
-"""Identification of cogging and friction from sweeps."""

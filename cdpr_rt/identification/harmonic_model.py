@@ -1,0 +1,679 @@
+"""Joint identification of cogging, friction, inertia and latency from runs in both directions."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import scipy
+
+from cdpr_rt.arrays import FloatArray, rms
+from cdpr_rt.control.compensation import FrictionFeedforward
+from cdpr_rt.identification import windows as design
+from cdpr_rt.identification.result import ConfidenceInterval, Harmonic, HarmonicResult, likely_cause
+from cdpr_rt.identification.windows import (
+    STARTS,
+    TWO_PI,
+    ColumnLayout,
+    Equations,
+    FrictionRun,
+    FrictionShape,
+    IdentificationError,
+    IntArray,
+    Normal,
+    SweepData,
+    Windows,
+    check_runs,
+    contiguous,
+    cut,
+    encoder_noise_rad,
+    fit_shape,
+    huber_weights,
+    period_s,
+    stretches,
+)
+
+# The final fit over windows with chosen orders: coefficients, lags, and their confidence.
+
+CLUSTERS_PER_TURN = 24
+_ROUNDS = 5
+_LEAST_SPREAD_Nm = 1e-5
+_EMPTY = 1e-20
+_EXTRA = 3
+"""Columns after the harmonics: static lag, trend of the cogging, trend of the friction."""
+_TREND_SD_1_s = 3e-4
+_DRY = (design.COULOMB, design.COULOMB + 1, design.CREEP, design.CREEP + 1)
+_FEWEST_ROWS = 20
+
+
+@dataclass(frozen=True)
+class Prior:
+    """Gaussian prior of one column's coefficient."""
+
+    column: int
+    mean: float
+    deviation: float
+
+
+@dataclass
+class Rows:
+    """All rows of the fit: columns `x` (r, p), torque `y` (r,); all others (r,)."""
+
+    x: FloatArray
+    y: FloatArray
+    acceleration: FloatArray
+    """rad/s² if the inertia is not estimated from the row, else 0."""
+    kind: IntArray
+    direction: FloatArray
+    time: FloatArray
+    cluster: IntArray
+
+
+@dataclass(frozen=True)
+class HarmonicFit:
+    """Coefficients of the used columns, then of the extra ones, with their covariance."""
+
+    layout: ColumnLayout
+    used: list[int]
+    beta: FloatArray
+    covariance: FloatArray
+    lag_rad: float
+    residual_Nm: FloatArray
+
+    @property
+    def lag_deviation_rad(self) -> float:
+        """Standard error of the static lag."""
+        return float(np.sqrt(max(self.covariance[-_EXTRA, -_EXTRA], 0.0)))
+
+    @property
+    def cogging_trend_1_s(self) -> float:
+        """Relative change of the cogging per second."""
+        return float(self.beta[-_EXTRA + 1])
+
+    def value(self, column: int) -> float:
+        """Return a column's coefficient, 0 if it was not used."""
+        return float(self.beta[self.used.index(column)]) if column in self.used else 0.0
+
+    def deviation(self, column: int) -> float:
+        """Return the standard error of a column's coefficient, 0 if it was not used."""
+        if column not in self.used:
+            return 0.0
+        i = self.used.index(column)
+        return float(np.sqrt(max(self.covariance[i, i], 0.0)))
+
+
+def gather(windows: Sequence[Windows], layout: ColumnLayout) -> Rows:
+    """Collect the rows in which the rotor follows the ramp."""
+    xs, ys, accelerations, ks, ds, ts, cs = [], [], [], [], [], [], []
+    clusters = 0
+    for w, kind in zip(windows, design.kinds(windows), strict=True):
+        keep = np.flatnonzero(kind >= 0)
+        place = np.floor(w.centre_rad * (CLUSTERS_PER_TURN / TWO_PI)).astype(int)
+        place += clusters - int(place.min())
+        clusters = int(place.max()) + 1
+        xs.append(design.matrix(w, layout, 0, w.torque_Nm.size)[keep])
+        ys.append(w.torque_Nm[keep])
+        accelerations.append(w.acceleration_rad_s2[keep] * (not w.quick))
+        ks.append(kind[keep])
+        ds.append(w.direction[keep])
+        ts.append(w.centre_s[keep])
+        cs.append(place[keep])
+    parts = (np.concatenate(a) for a in (xs, ys, accelerations, ks, ds, ts, cs))
+    return Rows(*parts)
+
+
+def fit(
+    windows: Sequence[Windows],
+    layout: ColumnLayout,
+    used: list[int],
+    priors: list[Prior],
+    lag_prior: tuple[float, float],
+    inertia_kg_m2: float,
+) -> HarmonicFit:
+    """Fit the used columns, all harmonics and the static lag by Gauss-Newton steps.
+
+    `lag_prior` is mean and standard deviation in rad. In slow runs the noise of the acceleration
+    would bias the inertia low. There the inertia from the other runs is used, or `inertia_kg_m2`
+    if there are no others. The covariance is the sandwich estimator over clusters of neighbouring
+    windows, whose errors may be correlated.
+    """
+    rows = gather(windows, layout)
+    columns = [*used, *range(design.FIXED, layout.columns)]
+    precision, mean = _prior_arrays(columns, priors)
+    precision[-_EXTRA:] = lag_prior[1] ** -2, _TREND_SD_1_s**-2, _TREND_SD_1_s**-2
+    weight, inertia, lag = np.ones(rows.y.size), inertia_kg_m2, lag_prior[0]
+    beta = np.zeros(len(columns) + _EXTRA)
+    for step in range(_ROUNDS):
+        x = _linearised(rows, layout, columns, beta, lag)
+        mean[-_EXTRA] = lag_prior[0] - lag
+        inverse = _inverse((x * weight[:, None]).T @ x + np.diag(precision))
+        y = rows.y - inertia * rows.acceleration
+        beta = inverse @ (x.T @ (weight * y) + precision * mean)
+        residual = y - x @ beta
+        if step < _ROUNDS - 1:
+            lag += float(beta[-_EXTRA])
+            weight = _weights(rows, residual)
+            inertia = float(beta[0]) if used[0] == design.INERTIA else inertia
+    score_covariance = _score_covariance(x * (weight * residual)[:, None], rows.cluster)
+    covariance = inverse @ (score_covariance + np.diag(precision)) @ inverse
+    return HarmonicFit(layout, columns, beta, covariance, lag + float(beta[-_EXTRA]), residual)
+
+
+def _prior_arrays(columns: list[int], priors: list[Prior]) -> tuple[FloatArray, FloatArray]:
+    """Return precision and mean of the priors, for used and extra columns."""
+    precision, mean = np.zeros(len(columns) + _EXTRA), np.zeros(len(columns) + _EXTRA)
+    for p in priors:
+        if p.column in columns:
+            i = columns.index(p.column)
+            precision[i], mean[i] = p.deviation**-2, p.mean
+    return precision, mean
+
+
+def _inverse(matrix: FloatArray) -> FloatArray:
+    """Return the inverse, with zeros for a column that is zero in all rows."""
+    size = np.diag(matrix)
+    scale = np.sqrt(np.where(size > _EMPTY * size.max(), size, np.inf))
+    scaled = matrix / np.outer(scale, scale) + 1e-12 * np.eye(scale.size)
+    return np.asarray(np.linalg.inv(scaled) / np.outer(scale, scale))
+
+
+def _linearised(
+    rows: Rows, layout: ColumnLayout, columns: list[int], beta: FloatArray, lag: float
+) -> FloatArray:
+    """Return the used columns, harmonics shifted by the present lag, and the extra columns.
+
+    Extra columns are the derivatives by a further lag, and by the relative change of cogging and of
+    friction per second: the motor warms up, and the coefficients apply to the end of the runs.
+    """
+    x = rows.x[:, columns]
+    orders = np.repeat(np.array(layout.orders, float), 2)
+    first = len(columns) - orders.size
+    harmonics = _turned(x[:, first:], orders, rows.direction * lag)
+    x[:, first:] = harmonics
+    value = beta[first:-_EXTRA]
+    since = rows.time - rows.time.max()
+    dry = [i for i, c in enumerate(columns) if c in _DRY]
+    extra = (
+        -rows.direction * _slope(harmonics, orders, value),
+        since * (harmonics @ value),
+        since * (x[:, dry] @ beta[dry]),
+    )
+    return np.column_stack([x, *extra])
+
+
+def _turned(harmonics: FloatArray, orders: FloatArray, by: FloatArray) -> FloatArray:
+    """Return the cosine and sine columns for angles reduced by `by` (r,)."""
+    turn = by[:, None] * orders[None, ::2]
+    c, s = harmonics[:, ::2], harmonics[:, 1::2]
+    out = np.empty_like(harmonics)
+    out[:, ::2] = c * np.cos(turn) + s * np.sin(turn)
+    out[:, 1::2] = s * np.cos(turn) - c * np.sin(turn)
+    return out
+
+
+def _slope(harmonics: FloatArray, orders: FloatArray, beta: FloatArray) -> FloatArray:
+    """Return the derivative of the cogging by the angle, (r,)."""
+    n = orders[::2]
+    return np.asarray(harmonics[:, ::2] @ (n * beta[1::2]) - harmonics[:, 1::2] @ (n * beta[::2]))
+
+
+def _weights(rows: Rows, residual: FloatArray) -> FloatArray:
+    """Return each row's weight by Huber's rule, with one spread per kind; 0 for rare kinds."""
+    weight = np.zeros(rows.kind.size)
+    for kind in np.unique(rows.kind):
+        mine = rows.kind == kind
+        if np.count_nonzero(mine) >= _FEWEST_ROWS:
+            weight[mine] = huber_weights(residual[mine], _LEAST_SPREAD_Nm)
+    return weight
+
+
+def _score_covariance(score: FloatArray, cluster: IntArray) -> FloatArray:
+    """Return the sum over clusters of the outer products of their scores."""
+    order = np.argsort(cluster, kind="stable")
+    edges = np.flatnonzero(np.diff(cluster[order])) + 1
+    sums = np.add.reduceat(score[order], np.concatenate([[0], edges]), axis=0)
+    count = sums.shape[0]
+    return np.asarray(sums.T @ sums * (count / max(1, count - score.shape[1] // 8)))
+
+
+# Choice of the cogging's orders by cross-validation over turns.
+
+_MOST = 40
+_RIDGE = 1e-10
+
+
+@dataclass(frozen=True)
+class OrderSelection:
+    """The chosen orders, rising, and the cross-validation error with 0, 1, ... of them.
+
+    `error_Nm` (k + 1,) is the rms error of prediction of held-back turns with 0, 1, ... k orders.
+    """
+
+    orders: tuple[int, ...]
+    error_Nm: FloatArray
+
+
+def solve(normal: Normal, columns: list[int]) -> FloatArray:
+    """Return the coefficients of the chosen columns; 0 for columns that are zero in all rows."""
+    lower, scale = _factor(normal, columns)
+    beta = scipy.linalg.cho_solve((lower, True), normal.xy[columns] / scale)
+    return np.asarray(beta / scale)
+
+
+def _factor(normal: Normal, columns: list[int]) -> tuple[FloatArray, FloatArray]:
+    """Return the Cholesky factor of the chosen columns' scaled normal matrix, and the scale.
+
+    The factor for the first k columns consists of its first k rows and columns.
+    """
+    xx = normal.xx[np.ix_(columns, columns)]
+    size = np.diag(xx)
+    scale = np.sqrt(np.where(size > _EMPTY * size.max(), size, np.inf))
+    xx /= np.outer(scale, scale)
+    xx[np.diag_indices_from(xx)] += _RIDGE
+    return np.asarray(np.linalg.cholesky(xx)), np.asarray(scale)
+
+
+def squared_error(part: Normal, columns: list[int], beta: FloatArray) -> float:
+    """Return the sum of squared errors of a prediction over a part's rows."""
+    xy, xx = part.xy[columns], part.xx[np.ix_(columns, columns)]
+    return max(0.0, float(part.yy - 2.0 * beta @ xy + beta @ xx @ beta))
+
+
+def rows_counted(equations: Equations) -> FloatArray:
+    """Return the weight 1 for each kind of row that is frequent enough, 0 for the others."""
+    return np.where(equations.parts.rows.sum(axis=0) >= _FEWEST_ROWS, 1.0, 0.0)
+
+
+def noise_weights(equations: Equations, columns: list[int], beta: FloatArray) -> FloatArray:
+    """Return weights of the kinds of rows: one over the mean squared error, 0 for too few rows."""
+    kinds = equations.parts.sum()
+    squares = np.array(
+        [squared_error(kinds.part(k), columns, beta) for k in range(kinds.rows.size)]
+    )
+    mean = np.maximum(squares / np.maximum(kinds.rows, 1.0), 1e-10)
+    return np.where(kinds.rows >= _FEWEST_ROWS, 1.0 / mean, 0.0)
+
+
+def choose(equations: Equations, fixed: list[int], weight: FloatArray) -> OrderSelection:
+    """Choose the orders whose harmonics predict turns that were not fitted.
+
+    Each fold is held back once. The others rank the orders by significance (Wald statistic), and
+    increasingly large sets predict the fold. The result is the smallest set whose error exceeds the
+    best by no more than one standard error of the paired differences between folds.
+    """
+    layout, folds = equations.layout, equations.by_fold(weight)
+    held = np.flatnonzero(folds.rows >= _FEWEST_ROWS)
+    errors = []
+    for fold in held:
+        train = folds.sum(np.flatnonzero(np.arange(folds.rows.size) != fold))
+        ranking = _rank(train, fixed, layout)
+        errors.append(_path(train, folds.part(int(fold)), fixed, layout, ranking))
+    everything = folds.sum()
+    overall = _rank(everything, fixed, layout)
+    mean = np.mean(errors, axis=0)
+    best = int(np.argmin(mean))
+    gap = np.array(errors) - np.array(errors)[:, best : best + 1]
+    spread = gap.std(axis=0, ddof=1) / math.sqrt(len(held)) if len(held) > 1 else 0.0 * mean
+    size = int(np.flatnonzero(gap.mean(axis=0) <= spread)[0])
+    per_row = everything.rows / max(float((equations.parts.rows @ weight).sum()), 1e-300)
+    return OrderSelection(
+        tuple(sorted(layout.orders[i] for i in overall[:size])), np.sqrt(mean * per_row)
+    )
+
+
+def _rank(train: Normal, fixed: list[int], layout: ColumnLayout) -> IntArray:
+    """Return the indices of the orders by decreasing significance."""
+    columns = fixed + [c for i in range(len(layout.orders)) for c in layout.order(i)]
+    lower, scale = _factor(train, columns)
+    inverse = scipy.linalg.lapack.dtrtri(lower, lower=1)[0]
+    first = len(fixed)
+    beta = (inverse.T @ (inverse @ (train.xy[columns] / scale)))[first:].reshape(-1, 2, 1)
+    # 2 x 2 blocks on the diagonal of the inverse normal matrix
+    pairs = inverse[:, first:].reshape(len(columns), -1, 2)
+    covariance = np.einsum("rni,rnj->nij", pairs, pairs)
+    statistic = (beta * np.linalg.solve(covariance, beta)).sum(axis=(1, 2))
+    return np.argsort(-statistic)
+
+
+def _path(
+    train: Normal, test: Normal, fixed: list[int], layout: ColumnLayout, ranking: IntArray
+) -> FloatArray:
+    """Return the mean squared (weighted) error on held-back rows with 0, 1, ... orders."""
+    most = min(_MOST, ranking.size)
+    columns = fixed + [c for i in ranking[:most] for c in layout.order(int(i))]
+    lower, scale = _factor(train, columns)
+    solved = scipy.linalg.solve_triangular(lower, train.xy[columns] / scale, lower=True)
+    errors = np.zeros(most + 1)
+    for size in range(most + 1):
+        k = len(fixed) + 2 * size
+        beta = scipy.linalg.solve_triangular(lower[:k, :k], solved[:k], lower=True, trans=1)
+        errors[size] = squared_error(test, columns[:k], beta / scale[:k]) / test.rows
+    return errors
+
+
+MAX_ORDER = 200
+_BINS = 360
+"""Bins over a turn for the coverage."""
+_LATENCY_SD_s = 1e-3
+_LATENCY_SD_AGAIN_s = 2e-4
+_LAG_SD_rad = np.deg2rad(1.0)
+_CONFIDENCE = 1.96
+_NOISE_GAIN = 2.45
+"""Noise gain of a second difference: sqrt(6)."""
+_TOLERATED_NOISE_Nm = 3e-3
+_FINE_s = (0.005, 0.02)
+_LONGEST_s = 30.0
+_HARMONIC_MODEL_ROUNDS = 2
+_LEAST_SHARE = 2.5e-3
+_INERTIA_CHANGE = 0.05
+_INERTIA_SHARE = 0.01
+"""Relative error of the inertia by unmodelled effects, such as the current loop's lag."""
+
+
+def identify_harmonic_model(
+    legs: Sequence[SweepData], inertia_kg_m2: float, latency_s: float, pole_pairs: int
+) -> HarmonicResult:
+    """Identify the motor from slow sweeps and short fast legs, in both directions.
+
+    `inertia_kg_m2` is kept if no leg is fast enough to measure it; `latency_s` is the nominal
+    one (see compensation.AxisCompensation). Raises IdentificationError if the rotor does not
+    move in both directions.
+    """
+    check_runs(legs)
+    start = _Start(latency_s, pole_pairs, inertia_kg_m2, None)
+    return _identify(legs, start)
+
+
+def refine(before: HarmonicResult, run_legs: Sequence[SweepData]) -> HarmonicResult:
+    """Identify again from runs under PID and compensation; keep the values they do not show.
+
+    Friction, inertia and latency of `before` are priors with generous standard deviations; the
+    cogging is fitted without a prior.
+    """
+    check_runs(run_legs)
+    inertia = before.inertia_kg_m2.value
+    start = _Start(before.latency_s.value, before.pole_pairs, inertia, before)
+    return _identify(run_legs, start)
+
+
+@dataclass(frozen=True)
+class _Start:
+    """Prior knowledge of a fit; `before` is the result that is being refined."""
+
+    latency_s: float
+    pole_pairs: int
+    inertia_kg_m2: float
+    before: HarmonicResult | None
+
+
+def _identify(legs: Sequence[SweepData], start: _Start) -> HarmonicResult:
+    """Choose orders, find the friction's shape, then fit all parameters jointly."""
+    runs = contiguous(legs)
+    windows = [w for run in runs if (w := cut(run, start.latency_s)) is not None]
+    for sign, word in ((1.0, "increasing"), (-1.0, "decreasing")):
+        if not any(np.any(w.moving & (w.direction == sign)) for w in windows):
+            raise IdentificationError(f"the rotor was never seen moving with {word} angle")
+    shape = start.before.shape if start.before else FrictionShape()
+    every = ColumnLayout(tuple(range(1, MAX_ORDER + 1)), shape)
+    equations = design.accumulate(windows, every)
+    choice, beta, inertia = _choose(equations)
+    inertia = inertia or start.inertia_kg_m2
+    fast = any(w.fast for w in windows)
+    quick = any(w.quick for w in windows)
+    used = [design.INERTIA] if quick else []
+    if any(not w.quasi_static for w in windows):
+        used += [design.COULOMB, design.COULOMB + 1]
+    if any(w.quasi_static for w in windows):
+        used += [design.CREEP, design.CREEP + 1]
+    used += [design.VISCOUS] if fast or start.before else []
+    used += [design.LATENCY] if fast else []
+    lag = (start.before.lag_rad.value if start.before else 0.0, _LAG_SD_rad)
+    priors = _priors(start.before, quick)
+    starts = [start.before.shape, *STARTS] if start.before else list(STARTS)
+    for _ in range(_HARMONIC_MODEL_ROUNDS):
+        shape = _shape(runs, start, choice.orders, beta, inertia, starts) or shape
+        starts = [shape]
+        fitted = fit(windows, ColumnLayout(choice.orders, shape), used, priors, lag, inertia)
+        beta = fitted.beta[len(used) : len(fitted.used)]
+        quick = quick and _plausible(fitted.value(design.INERTIA), start)
+        used = [c for c in used if c != design.INERTIA or quick]
+        inertia = fitted.value(design.INERTIA) if quick else start.inertia_kg_m2
+    return _result(fitted, windows, choice, start, quick)
+
+
+def _plausible(inertia: float, start: _Start) -> bool:
+    """Return whether a second pass may use this inertia: hunting can bias it."""
+    before = start.inertia_kg_m2
+    return start.before is None or abs(inertia - before) < _INERTIA_CHANGE * before
+
+
+def _choose(equations: Equations) -> tuple[OrderSelection, FloatArray, float]:
+    """Choose the orders and weight the kinds of rows, in two rounds.
+
+    Also return the harmonics' coefficients and the inertia, 0 if no run shows it.
+    """
+    fixed = [design.INERTIA, design.COULOMB, design.COULOMB + 1, design.VISCOUS]
+    fixed += [design.CREEP, design.CREEP + 1]
+    weight = rows_counted(equations)
+    for _ in range(2):
+        choice = choose(equations, fixed, weight)
+        everything = equations.by_fold(weight).sum()
+        for step in range(2):
+            columns = fixed + [c for n in choice.orders for c in equations.layout.order(n - 1)]
+            beta = solve(everything, columns)
+            if step == 0:
+                choice = replace(choice, orders=_significant(choice.orders, beta, len(fixed)))
+        weight = noise_weights(equations, columns, beta)
+    return choice, beta[len(fixed) :], float(beta[0])
+
+
+def _significant(orders: tuple[int, ...], beta: FloatArray, first: int) -> tuple[int, ...]:
+    """Return the orders that are not small relative to the largest and to Coulomb friction.
+
+    Hunting is periodic with the cogging and thus passes cross-validation.
+    """
+    amplitude = np.hypot(beta[first::2], beta[first + 1 :: 2])
+    coulomb = np.abs(beta[1:3]).max()
+    least = _LEAST_SHARE * max(float(amplitude.max(initial=0.0)), float(coulomb))
+    return tuple(n for n, a in zip(orders, amplitude, strict=True) if a >= least)
+
+
+def _shape(
+    runs: list[SweepData],
+    start: _Start,
+    orders: tuple[int, ...],
+    beta: FloatArray,
+    inertia: float,
+    starts: list[FrictionShape],
+) -> FrictionShape | None:
+    """Find the friction's shape from short windows after subtracting the cogging found so far."""
+    layout = ColumnLayout(orders, FrictionShape())
+    motions = []
+    for run in runs:
+        noise = encoder_noise_rad(run)
+        spacing = math.sqrt(_NOISE_GAIN * noise * start.inertia_kg_m2 / _TOLERATED_NOISE_Nm)
+        spacing = min(max(spacing, _FINE_s[0]), _FINE_s[1])
+        part = SweepData(*(a[-round(_LONGEST_s / period_s(run)) :] for a in vars(run).values()))
+        w = cut(part, start.latency_s, spacing)
+        if w is None or w.quasi_static:
+            continue
+        rows = np.flatnonzero(w.moving)
+        if rows.size:
+            x = design.matrix(w, layout, 0, w.torque_Nm.size)[:, design.FIXED :]
+            rest = w.torque_Nm - x @ beta - inertia * w.acceleration_rad_s2
+            motions.append(FrictionRun(w, rest[rows], rows))
+    return fit_shape(motions, starts) if motions else None
+
+
+def _priors(before: HarmonicResult | None, quick: bool) -> list[Prior]:
+    """Return the priors: the nominal latency, and in a second pass inertia and friction.
+
+    The fit cannot separate these if the rotor hunts. The friction's level has a prior only if no
+    leg shows it, because it changes as the motor warms up.
+    """
+    if before is None:
+        return [Prior(design.LATENCY, 0.0, _LATENCY_SD_s)]
+    priors = [Prior(design.LATENCY, 0.0, _LATENCY_SD_AGAIN_s)]
+    known = [
+        (design.INERTIA, before.inertia_kg_m2.value, 0.02),
+        (design.VISCOUS, before.viscous_Nms_rad.value, 0.2),
+    ]
+    if not quick:
+        known += [
+            (design.COULOMB, before.coulomb_forward_Nm.value, 0.05),
+            (design.COULOMB + 1, before.coulomb_backward_Nm.value, 0.05),
+        ]
+    return priors + [Prior(c, m, max(1e-9, abs(m) * share)) for c, m, share in known]
+
+
+def _estimate(fitted: HarmonicFit, column: int) -> ConfidenceInterval:
+    return ConfidenceInterval(fitted.value(column), _CONFIDENCE * fitted.deviation(column))
+
+
+def _result(
+    fitted: HarmonicFit, windows: list[Windows], choice: OrderSelection, start: _Start, quick: bool
+) -> HarmonicResult:
+    """Assemble the result."""
+    layout, before = fitted.layout, start.before
+    measured = quick
+    rotor = (
+        _estimate(fitted, design.INERTIA) if quick else ConfidenceInterval(start.inertia_kg_m2, 0.0)
+    )
+    if not quick and before is not None:
+        rotor, measured = before.inertia_kg_m2, before.inertia_measured
+    rotor = ConfidenceInterval(
+        rotor.value, math.hypot(rotor.half_width, _INERTIA_SHARE * rotor.value)
+    )
+    delay = _estimate(fitted, design.LATENCY)
+    lag_half = _CONFIDENCE * fitted.lag_deviation_rad
+    rows = sum(w.moving.size for w in windows)
+    lost = sum(int(np.sum(~w.moving)) for w in windows)
+    level = design.COULOMB if design.COULOMB in fitted.used else design.CREEP
+    coulomb = [_estimate(fitted, level + i) for i in (0, 1)]
+    rise = layout.shape.rise if level == design.COULOMB else 0.0
+    viscous = _estimate(fitted, design.VISCOUS)
+    return HarmonicResult(
+        harmonics=tuple(_harmonic(fitted, i, start.pole_pairs) for i in range(len(layout.orders))),
+        friction=FrictionFeedforward(
+            coulomb[0].value,
+            coulomb[1].value,
+            coulomb[0].value * rise,
+            coulomb[1].value * rise,
+            layout.shape.speed_rad_s,
+            viscous.value,
+        ),
+        shape=layout.shape,
+        coulomb_forward_Nm=coulomb[0],
+        coulomb_backward_Nm=coulomb[1],
+        viscous_Nms_rad=viscous,
+        inertia_kg_m2=rotor,
+        inertia_measured=measured,
+        latency_s=ConfidenceInterval(start.latency_s + delay.value, delay.half_width),
+        lag_rad=ConfidenceInterval(fitted.lag_rad, lag_half),
+        pole_pairs=start.pole_pairs,
+        coverage=_coverage(windows),
+        cogging_trend_1_s=fitted.cogging_trend_1_s,
+        excluded_fraction=lost / rows,
+        residual_rms_Nm=rms(fitted.residual_Nm),
+        held_out_error_Nm=choice.error_Nm,
+    )
+
+
+def _harmonic(fitted: HarmonicFit, which: int, pole_pairs: int) -> Harmonic:
+    """Return one order; amplitude and phase get their confidence from both coefficients."""
+    order = fitted.layout.orders[which]
+    column = fitted.layout.order(which)
+    a, b = fitted.value(column[0]), fitted.value(column[1])
+    at = fitted.used.index(column[0])
+    covariance = fitted.covariance[at : at + 2, at : at + 2]
+    amplitude = max(math.hypot(a, b), 1e-12)
+    along = np.array([a, b]) / amplitude
+    across = np.array([b, -a]) / amplitude
+    spread = [math.sqrt(max(float(u @ covariance @ u), 0.0)) for u in (along, across)]
+    return Harmonic(
+        order=order,
+        cosine_Nm=a,
+        sine_Nm=b,
+        amplitude_Nm=ConfidenceInterval(amplitude, _CONFIDENCE * spread[0]),
+        phase_deg=ConfidenceInterval(
+            math.degrees(math.atan2(a, b)),
+            min(180.0, math.degrees(_CONFIDENCE * spread[1] / amplitude)),
+        ),
+        per_pole_pair=order / pole_pairs,
+        hint=likely_cause(order, pole_pairs),
+    )
+
+
+def _coverage(windows: list[Windows]) -> float:
+    """Return the share of the turn on which the rotor followed the ramp."""
+    seen = np.zeros(_BINS, np.bool_)
+    for w in windows:
+        turn = w.centre_rad[w.moving] / TWO_PI
+        seen[np.floor((turn - np.floor(turn)) * _BINS).astype(int) % _BINS] = True
+    return float(np.mean(seen))
+
+
+# The second pass: refinement by ramps under compensation.
+
+MOST_ROUNDS = 4
+_SAME = 0.2
+
+
+def rms_deviation_rad(legs: Sequence[SweepData]) -> float:
+    """Return the rms deviation from the set-point about its mean, the largest over the legs.
+
+    Only the last whole turns at constant speed count, to exclude the start. Raises
+    IdentificationError if no leg has a whole turn.
+    """
+    deviations = []
+    for stretch in stretches(legs):
+        part = stretch.last_whole_turns()
+        if part is None:
+            continue
+        cut = slice(part.start, part.stop)
+        deviations.append(float(np.std(part.run.angle_rad[cut] - part.run.setpoint_rad[cut])))
+    if not deviations:
+        raise IdentificationError("no leg of the second pass holds a whole turn at constant speed")
+    return max(deviations)
+
+
+class SecondPass:
+    """Refines a first result round by round; the best is the one with the smallest deviation.
+
+    Each round: run ramps in both directions under `current`, then `add` the recorded legs. A
+    refinement from runs with hunting may be wrong: the deviation of the run under it decides.
+    It is `done` when a round is as good as the best before it, or after `MOST_ROUNDS`. `fast_legs`
+    are those of the first result, without the sweeps.
+    """
+
+    def __init__(self, first: HarmonicResult, fast_legs: Sequence[SweepData]) -> None:
+        self.current = first
+        """The result under which the next ramps are run."""
+        self._known = list(fast_legs)
+        self._tried: list[tuple[float, HarmonicResult]] = []
+        self.done = False
+
+    @property
+    def best(self) -> HarmonicResult:
+        """The result with the smallest deviation; the first if none was run."""
+        if not self._tried:
+            return self.current
+        return min(self._tried, key=lambda tried: tried[0])[1]
+
+    @property
+    def rms_deviation_rad(self) -> tuple[float, ...]:
+        """The deviation of each round."""
+        return tuple(deviation_rad for deviation_rad, _ in self._tried)
+
+    def add(self, legs: Sequence[SweepData]) -> None:
+        """Evaluate ramps that were run under `current`; raises IdentificationError."""
+        deviation_rad = rms_deviation_rad(legs)
+        before = min(self.rms_deviation_rad, default=np.inf)
+        self._tried.append((deviation_rad, self.current))
+        converged = (1.0 - _SAME) * before <= deviation_rad <= (1.0 + _SAME) * before
+        self.done = converged or len(self._tried) >= MOST_ROUNDS
+        self._known += legs
+        if not self.done:
+            self.current = refine(self.best, self._known)

@@ -1,0 +1,1 @@
+"""The control loop: cycle engine, transitions, safe stop, commands, status."""

@@ -1,0 +1,359 @@
+"""Dispatches the commands that arrive in the shared memory, one per turn."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from cdpr_rt.arrays import FloatArray
+from cdpr_rt.core.clock import Task
+from cdpr_rt.core.shared_block import SharedBlockError
+from cdpr_rt.core.states import LoopState, Reaction, Transition
+from cdpr_rt.errors import ControlError
+from cdpr_rt.loop.engine import HOLD, Engine, RefusedError, Steps, TransitionRunner
+from cdpr_rt.loop.stop_socket import StopRequest, StopSocket
+from cdpr_rt.loop.transitions import Transitions
+from cdpr_rt.programs.base import Program
+from cdpr_rt.refusal import CommandRefusal, refusal_of
+
+Command = Mapping[str, Any]
+_MOST_TEXT, _SHORT_TEXT = 1500, 200
+_LONGEST_CABLE_m = 1000.0
+_ANOTHER = "another command came after it"
+_OBEYED = "obeyed; its end is not reported"
+_MOVING = frozenset({"enable", "program", "set"})
+_CHANGING = frozenset({"enable", "disable", "program", "hold", "shutdown"})
+"""Commands that decide what runs."""
+
+
+@dataclass(frozen=True)
+class _Deferred:
+    """A command that is being prepared beside the cycles."""
+
+    command: Command
+    task: Task[None]
+    program: Program
+    state: LoopState
+    """State when the command came; `program` is the one that ran then."""
+
+
+class CommandDispatcher:
+    """Takes commands, refuses those that the state forbids, and replies once to each.
+
+    A command that needs preparation, such as reading a file, is deferred until that is done, and
+    then dispatched again. It is cancelled if another command is carried out meanwhile, or anything
+    else changes state or program, such as a hold by the supervisor.
+    Stops come from the service through the shared memory, and from local clients through `stops`.
+    """
+
+    def __init__(
+        self,
+        engine: Engine,
+        runner: TransitionRunner,
+        transitions: Transitions,
+        request_stop: Callable[[], None],
+        stops: StopSocket | None,
+    ) -> None:
+        self._engine, self._life = engine, engine.life
+        self._runner = runner
+        self._transitions = transitions
+        self._request_stop = request_stop
+        self._stops = stops
+        self._void = 0
+        """Commands up to this number came before a stop from `stops`."""
+        self._deferred: _Deferred | None = None
+        self._replies: list[tuple[int | StopRequest, CommandRefusal | str]] = []
+        self._counters = engine.block.counters
+        # read in every cycle: a memoryview is faster
+        queues = ("urgent", "urgent_taken", "commands", "commands_taken")
+        self._urgent, self._urgent_taken, self._commands, self._commands_taken = (
+            self._counters[name].data for name in queues
+        )
+        self._handlers: dict[str, Callable[[Command], Steps | None]] = {
+            "configure": self._configure,
+            "check": self._check,
+            "enable": self._enable,
+            "disable": self._disable,
+            "acknowledge": self._acknowledge,
+            "program": self._program,
+            "set": self._set,
+            "hold": self._hold,
+            "lengths": self._lengths,
+            "shutdown": self._shutdown,
+        }
+
+    def poll(self) -> None:
+        """Take one stop from each source, then one command if there is any, or a deferred one."""
+        if self._deferred is not None and self._is_superseded(self._deferred):
+            self._cancel(self._deferred, self._life.reason or "something else came first")
+        if self._stops is not None and (stop := self._stops.take()) is not None:
+            self._void = self._commands[0]
+            self._life.changed = True
+            self._dispatch({"do": stop.do, "client": stop.client}, stop)
+            if stop.is_surplus and all(to is not stop for to, _ in self._replies):
+                state = self._life.state.label
+                stop.answer({"ok": True, "text": _OBEYED, "state": state})
+        if self._urgent[0] != self._urgent_taken[0]:
+            self._take(self._urgent_taken, self._engine.block.take_urgent)
+        if self._commands[0] != self._commands_taken[0]:
+            self._take(self._commands_taken, self._engine.block.take_command)
+        elif self._deferred is not None and self._deferred.task.done:
+            self._resume(self._deferred)
+
+    def _take(self, taken: memoryview, take: Callable[[], Command | None]) -> None:
+        try:
+            command = take()
+        except (ValueError, RecursionError):  # not JSON: there is no number to reply to
+            taken[0] += 1
+            return
+        if isinstance(command, dict):
+            self._dispatch(command)
+
+    def _dispatch(self, command: Command, stop: StopRequest | None = None) -> None:
+        number = _number(command)
+        do = command.get("do")
+        handler = self._handlers.get(do) if isinstance(do, str) else None
+        answer = partial(self._reply, number if stop is None else stop)
+        if do == "disable" and self._engine.reacting and self._runner.busy:
+            self._runner.listen(answer)  # in progress: replied to when the power is off
+            return
+        try:
+            if handler is None:
+                raise RefusedError(f"do: {do!r}; allowed: {', '.join(self._handlers)}")
+            void = max(self._void, int(self._counters["commands_void"][0]))
+            if do in _MOVING and number <= void:
+                raise RefusedError(f"{do}: given up: a stop was asked for after it")
+            steps = handler(command)
+        except ControlError as error:
+            answer(refusal_of(error) or str(error))
+            return
+        except Exception as error:  # whatever a command contains, the loop goes on
+            answer(f"{do}: {type(error).__name__}: {error}")
+            return
+        deferred = self._deferred
+        if deferred is not None and deferred.command is command:
+            return  # replied to when it is resumed
+        if deferred is not None and do != "lengths":
+            self._cancel(deferred, _ANOTHER)
+        if do in _CHANGING:
+            what = command["program"] if do == "program" else do
+            self._engine.commanded = f"{what} by {command.get('client')}"
+        if steps is None:
+            answer("")
+        else:
+            self._runner.begin(steps, answer)
+
+    def _prepare(self, command: Command, program: Program) -> bool:
+        """Return whether a command for a program is deferred because it needs preparation."""
+        work = program.preparation(self._arguments(command))
+        if work is None:
+            return False
+        engine, clock = self._engine, self._engine.machine.clock
+        if self._deferred is not None:
+            self._cancel(self._deferred, _ANOTHER)
+        task = clock.start(lambda: clock.run_blocking(work))
+        self._deferred = _Deferred(command, task, engine.program, self._life.state)
+        return True
+
+    def _is_superseded(self, deferred: _Deferred) -> bool:
+        """Return whether the robot's state or program has changed since the command came."""
+        engine, state = self._engine, self._life.state
+        changed = engine.program is not deferred.program or state is not deferred.state
+        return changed or engine.reacting is not Reaction.NONE
+
+    def _resume(self, deferred: _Deferred) -> None:
+        """Dispatch a command whose preparation has ended, or reply why it has failed."""
+        self._deferred = None
+        try:
+            deferred.task.result()
+        except Exception as error:  # whatever a file contains, the loop goes on
+            mistake = "" if isinstance(error, ControlError) else f"{type(error).__name__}: "
+            said = refusal_of(error) or f"{mistake}{error}"
+            self._reply(_number(deferred.command), said)
+            return
+        self._dispatch(deferred.command)
+
+    def _cancel(self, deferred: _Deferred, why: str) -> None:
+        self._deferred = None
+        self._engine.machine.clock.cancel(deferred.task)
+        self._reply(_number(deferred.command), f"given up: {why}")
+
+    def send_replies(self) -> None:
+        """Reply to the commands that were completed, refused or cancelled since the last call.
+
+        Called after the status was published: a client that asks for the status after the reply
+        sees the effect of its command.
+        """
+        for to, error in self._replies:
+            self._send(to, error)
+        self._replies.clear()
+
+    def _reply(self, to: int | StopRequest, error: CommandRefusal | str) -> None:
+        self._replies.append((to, error))
+
+    def _send(self, to: int | StopRequest, error: CommandRefusal | str) -> None:
+        state, text = self._life.state.label, str(error)
+        refusal = {"refusal": error.as_json()} if isinstance(error, CommandRefusal) else {}
+        # a character may take a dozen bytes
+        for most, more in ((_MOST_TEXT, refusal), (_MOST_TEXT, {}), (_SHORT_TEXT, {})):
+            reply = {"ok": not text, "text": text[:most], "state": state, **more}
+            if isinstance(to, StopRequest):
+                to.answer(reply)
+                return
+            try:
+                self._engine.block.post_reply({"to": to, **reply})
+                return
+            except SharedBlockError:
+                continue  # too long, or the queue is full
+
+    # -- handlers: each acts immediately, or returns the steps of a transition
+
+    def _configure(self, _command: Command) -> Steps:
+        self._require(Transition.CONFIGURE)
+        return self._transitions.configure()
+
+    def _check(self, _command: Command) -> Steps:
+        self._require(Transition.CHECK)
+        return self._transitions.check(reset=True)
+
+    def _acknowledge(self, _command: Command) -> Steps:
+        self._require(Transition.ACKNOWLEDGE)
+        return self._transitions.acknowledge()
+
+    def _enable(self, command: Command) -> Steps | None:
+        self._refuse_read_only("enable")
+        self._require(Transition.ENABLE)
+        name = self._known(command.get("program") or HOLD)
+        right = self._right("enable", command)
+        if self._prepare(command, self._engine.parts.programs[name]):
+            return None
+        return self._transitions.enable(name, self._arguments(command), right)
+
+    def _disable(self, _command: Command) -> Steps | None:
+        self._refuse_read_only("disable")
+        self._life.require(Transition.DISABLE)
+        if self._life.state is LoopState.READY:
+            return None
+        return self._transitions.disable()
+
+    def _shutdown(self, _command: Command) -> None:
+        self._request_stop()
+
+    def _hold(self, _command: Command) -> None:
+        engine = self._engine
+        if self._life.state is LoopState.ACTIVE and self._runner.busy and not engine.reacting:
+            # power-on is in progress: hold afterwards
+            self._transitions.first_program = HOLD
+            return
+        self._require_running(HOLD)
+        if engine.program.name != HOLD:  # a repeated hold keeps its position
+            engine.switch(HOLD, {}, 0)
+
+    def _program(self, command: Command) -> None:
+        name = self._known(command.get("program"))
+        right = self._right("program", command)
+        self._require_running(name)
+        if self._prepare(command, self._engine.parts.programs[name]):
+            return
+        self._engine.switch(name, self._arguments(command), right)
+        if name != HOLD:
+            self._life.clear_reason()  # that of the last hold
+
+    def _set(self, command: Command) -> None:
+        self._require_running("set")
+        right, program = self._right("set", command), self._engine.program
+        if program.needs_lease and right != self._engine.right.mover:
+            raise RefusedError(f"set: {program.name} was not started by who holds the right now")
+        if self._prepare(command, program):
+            return
+        program.command(self._arguments(command))
+        self._life.changed = True
+
+    def _lengths(self, command: Command) -> None:
+        device = self._engine.machine.device
+        allowed = (LoopState.READY, LoopState.ACTIVE)
+        if device is None or self._life.state not in allowed:
+            raise self._life.not_in_state("lengths", *allowed)
+        self._right("lengths", command)
+        if not device.feedback.valid.all():
+            raise RefusedError("lengths: not every axis answers")
+        length_m = self._lengths_in(self._arguments(command), device.n)
+        self._engine.parts.estimator.set_lengths(device.feedback.position_rad, length_m)
+
+    @staticmethod
+    def _lengths_in(arguments: Mapping[str, Any], n: int) -> FloatArray:
+        lengths = arguments.get("cable_length_m")
+        if (
+            set(arguments) != {"cable_length_m"}
+            or not isinstance(lengths, list)
+            or len(lengths) != n
+        ):
+            raise RefusedError(f"wanted: allowed: cable_length_m, {n} lengths or null")
+        for i, length in enumerate(lengths):
+            is_number = isinstance(length, int | float) and not isinstance(length, bool)
+            if length is not None and not (is_number and 0.0 < length <= _LONGEST_CABLE_m):
+                raise RefusedError(
+                    f"cable_length_m[{i}]: {length!r}; allowed: above 0, up to {_LONGEST_CABLE_m:g}"
+                )
+        return np.array([math.nan if length is None else length for length in lengths])
+
+    # -- preconditions
+
+    def _require(self, transition: Transition) -> None:
+        self._life.require(transition)
+        if self._runner.busy:
+            raise RefusedError(f"{transition.name.lower()}: {self._occupied()}")
+
+    def _occupied(self) -> str:
+        """Return the reason why the loop takes no command at present, "" if it does."""
+        if self._engine.reacting:
+            why = f" ({reason})" if (reason := self._life.reason) else ""
+            return f"the robot is being stopped{why}, a platform lowered; the power goes off then"
+        return "another command is being carried out"
+
+    def _require_running(self, what: str) -> None:
+        engine = self._engine
+        shadow = engine.machine.read_only and self._life.state is LoopState.READY
+        if (engine.driving and not self._runner.busy) or shadow:
+            return
+        if self._life.state is LoopState.ACTIVE:
+            raise RefusedError(f"{what}: {self._occupied()}")
+        raise self._life.not_in_state(what, LoopState.ACTIVE)
+
+    def _right(self, what: str, command: Command) -> int:
+        """Return the number of the grant that the command names, which must be the current one."""
+        number = command.get("right")
+        right = number if type(number) is int else 0
+        why_not = self._engine.right.refusal(right)
+        if why_not:
+            raise RefusedError(f"{what}: {why_not}")
+        return right
+
+    def _refuse_read_only(self, what: str) -> None:
+        if self._engine.machine.read_only:
+            raise RefusedError(f"{what}: this daemon only listens (--read-only)")
+
+    def _known(self, name: Any) -> str:
+        programs = self._engine.parts.programs
+        if not isinstance(name, str) or name not in programs:
+            raise RefusedError(f"program: {name!r}; allowed: {', '.join(programs)}")
+        return name
+
+    @staticmethod
+    def _arguments(command: Command) -> Mapping[str, Any]:
+        arguments = command.get("wanted")
+        if arguments is None:
+            return {}
+        if not isinstance(arguments, dict):
+            raise RefusedError(f"wanted: {arguments!r}; allowed: a table")
+        return arguments
+
+
+def _number(command: Command) -> int:
+    number = command.get("number")
+    return number if isinstance(number, int) else 0

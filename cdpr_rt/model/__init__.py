@@ -1,0 +1,1 @@
+"""Model of a robot's platform: geometry, statics, workspace."""

@@ -1,0 +1,78 @@
+"""Whether a robot is calibrated, stored in a small file that outlives the commands."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+
+from cdpr_rt.state_file import StateFileError, read_state, state_path, write_state
+
+
+@dataclass(frozen=True)
+class CalibrationState:
+    """Whether a robot's geometry is reliable."""
+
+    robot: str
+    calibrated: bool
+    why: str
+    """Cause of the state: the calibration, or the part that has moved."""
+    date: str
+    """ISO 8601, UTC; empty if no state was ever stored."""
+
+
+def calibrated_flag_file(robot: str) -> Path:
+    """Return the file that holds the robot's state."""
+    return state_path("calibration", robot)
+
+
+def calibration_state(robot: str) -> CalibrationState:
+    """Return the robot's state; without a file, or with a damaged one, it is not calibrated."""
+    path = calibrated_flag_file(robot)
+    try:
+        held = read_state(path)
+    except StateFileError as error:
+        return CalibrationState(robot, False, str(error), "")
+    if held is None:
+        return CalibrationState(robot, False, "it has never been calibrated", "")
+    calibrated, why, date = (held.get(key) for key in ("calibrated", "why", "date"))
+    if not (isinstance(calibrated, bool) and isinstance(why, str) and isinstance(date, str)):
+        problem = f"{path}: is damaged: calibrated, why and date are wanted"
+        return CalibrationState(robot, False, problem, "")
+    return CalibrationState(robot, calibrated, why, date)
+
+
+def mark_calibrated(robot: str, why: str) -> CalibrationState:
+    """Store that the robot is calibrated from now on; raises StateFileError."""
+    return _mark(robot, True, why)
+
+
+def mark_not_calibrated(robot: str, why: str) -> CalibrationState:
+    """Store that the robot's geometry is unreliable; raises StateFileError."""
+    return _mark(robot, False, why)
+
+
+def not_calibrated_reason(robot: str) -> str:
+    """Return why the geometry of a robot is unreliable, "" if it is reliable.
+
+    A robot that has never been calibrated has the geometry of its file.
+    """
+    if not calibrated_flag_file(robot).exists():
+        return ""
+    state = calibration_state(robot)
+    if state.calibrated:
+        return ""
+    since = f" since {state.date}" if state.date else ""
+    return (
+        f"robot {robot!r} is not calibrated{since}: {state.why}; calibrate it, or say that it is "
+        "(`cdpr robot mark-calibrated ROBOT --why ...`, ROBOT as it is run), and give it power "
+        "again: `cdpr disable`, `cdpr enable`, `cdpr tighten`"
+    )
+
+
+def _mark(robot: str, calibrated: bool, why: str) -> CalibrationState:
+    date = datetime.now(UTC).isoformat(timespec="seconds")
+    state = CalibrationState(robot, calibrated, why, date)
+    held = {"robot": robot, "calibrated": calibrated, "why": why, "date": date}
+    write_state(calibrated_flag_file(robot), held)
+    return state

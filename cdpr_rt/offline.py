@@ -1,0 +1,213 @@
+"""The model of a robot for offline work: kinematics, statics and workspace of whole arrays."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from cdpr_profiles import load_robot
+from cdpr_profiles.errors import ProfileError
+from cdpr_rt.arrays import BoolArray, FloatArray
+from cdpr_rt.errors import GeometryError
+from cdpr_rt.model.platform_model import PlatformModel, platform_model_of
+from cdpr_rt.model.pose import Pose
+from cdpr_rt.model.rigid_body import in_space
+from cdpr_rt.robot import InvalidArgument, InvalidRobot
+
+
+def load(robot: str | Path) -> Model:
+    """Return the model of a robot from its name or file. Nothing is started.
+
+    Raises InvalidRobot if the robot is unknown, if its file cannot be used, or if it has no
+    platform.
+    """
+    try:
+        profile = load_robot(robot)
+        if profile.platform is None:
+            raise InvalidRobot(f"{profile.path}: the robot has no platform; add a [platform] table")
+        return Model(platform_model_of(profile), [axis.name for axis in profile.axes])
+    except (ProfileError, GeometryError) as error:
+        raise InvalidRobot(str(error)) from error
+
+
+class Model:
+    """Kinematics, statics and workspace of a robot with n cables; made by `load`.
+
+    A position (d,) has one entry for each controlled direction: the coordinates of the platform's
+    origin, m, then the rotation vector from the orientation at home, rad. Each method takes one
+    position or an array of positions (..., d), and returns an array with the same leading shape. A
+    position without rotation has the orientation at home. Twists and wrenches have the same
+    directions, along the axes of the room; moments are about the platform's origin. Methods raise
+    InvalidArgument for a wrong shape and for nan.
+    """
+
+    def __init__(self, model: PlatformModel, cables: list[str]) -> None:
+        """Take the platform's model and the names of the cables."""
+        self._model = model
+        self.cables = cables
+        """Names of the n cables."""
+
+    @property
+    def n(self) -> int:
+        """Number of cables."""
+        return self._model.kinematics.n
+
+    @property
+    def d(self) -> int:
+        """Number of controlled directions."""
+        return self._model.size
+
+    @property
+    def home(self) -> FloatArray:
+        """The position on the stand, (d,)."""
+        return self._model.home.copy()
+
+    @property
+    def low_N(self) -> FloatArray:
+        """Lower bounds of the tensions, (n,)."""
+        return self._model.low_N.copy()
+
+    @property
+    def high_N(self) -> FloatArray:
+        """Upper bounds of the tensions, (n,): limits, and torque left while rotors accelerate."""
+        return self._model.torque_limited_N.copy()
+
+    @property
+    def box_m(self) -> FloatArray:
+        """Lowest and highest coordinates of the targets that the robot's file allows, (2, k)."""
+        platform = self._model.platform
+        return np.array([platform.workspace_min_m, platform.workspace_max_m])
+
+    def lengths(self, position: ArrayLike) -> FloatArray:
+        """Return the lengths (..., n), m, of unloaded cables, with the part on their pulleys."""
+        kinematics = self._model.kinematics
+        rows, shape = self._rows(position)
+        lengths = [kinematics.lengths(Pose(pose[0], pose[1:])) for pose in self._model.poses(rows)]
+        return np.array(lengths).reshape(*shape, self.n)
+
+    def jacobian(self, position: ArrayLike) -> FloatArray:
+        """Return J (..., n, d): the lengths change by J times the twist."""
+        return -np.swapaxes(self.wrench_matrix(position), -1, -2)
+
+    def wrench_matrix(self, position: ArrayLike) -> FloatArray:
+        """Return W = -J^T (..., d, n): tensions t pull on the platform with the wrench W t.
+
+        Tensions and the other wrenches w are in equilibrium if W t + w = 0. The columns are nan if
+        an anchor is in its exit point.
+        """
+        rows, shape = self._rows(position)
+        W = np.zeros((len(rows), self.d, self.n))
+        self._model.kinematics.wrench_matrices(self._model.poses(rows), W)
+        return W.reshape(*shape, self.d, self.n)
+
+    def gravity(self, position: ArrayLike) -> FloatArray:
+        """Return the wrench of gravity on the platform, (..., d), N and Nm, without cables."""
+        rows, shape = self._rows(position)
+        force, moment_arms_m = self._weight_N(), self._centres_m(rows)
+        return self._reduced(force, np.cross(moment_arms_m, force)).reshape(*shape, self.d)
+
+    def position(self, lengths_m: ArrayLike, start: ArrayLike | None = None) -> FloatArray:
+        """Return the positions (..., d) at which unloaded cables have these lengths (..., n).
+
+        Least squares, searched from the position `start` (d,), by default from home. nan if none is
+        found.
+        """
+        kinematics = self._model.kinematics
+        begin = self._model.pose(self.home if start is None else self._one(start))
+        unturned = Pose(np.zeros(3), self._model.home_pose.Q)
+        given = _numbers("lengths_m", lengths_m)
+        if given.ndim == 0 or given.shape[-1] != self.n or not np.isfinite(given).all():
+            raise InvalidArgument(f"lengths_m: shape {given.shape}; want finite (..., {self.n})")
+        found = np.full((int(np.prod(given.shape[:-1])), self.d), np.nan)
+        for row, lengths in zip(found, given.reshape(-1, self.n), strict=True):
+            solution = kinematics.pose_from_lengths(lengths, begin, restarts=8)
+            if solution.converged:
+                row[:] = solution.pose.minus(unturned)[list(kinematics.directions)]
+        return found.reshape(*given.shape[:-1], self.d)
+
+    def tensions(self, position: ArrayLike, wrench: ArrayLike | None = None) -> FloatArray:
+        """Return the tensions (..., n), N, at rest by the distribution that the file names.
+
+        `wrench` (d,) or (..., d) acts on the platform besides gravity. Tensions are in the middle
+        of the cables, and keep the controller's reserve from both bounds. nan where there are none.
+        """
+        rows, shape = self._rows(position)
+        acting = np.zeros((len(rows), 6))
+        acting[:, list(self._model.kinematics.directions)] = self._wrenches(wrench, shape)
+        force = acting[:, :3] + self._weight_N()
+        # about the centre of mass, where gravity has no moment
+        moment = acting[:, 3:] - np.cross(self._centres_m(rows), acting[:, :3])
+        found, carried = self._model.planned_tensions(
+            self._model.poses(rows), self._reduced(force, moment)
+        )
+        found[~carried] = np.nan
+        return found.reshape(*shape, self.n)
+
+    def capacity_margin(self, position: ArrayLike, acceleration_m_s2: float = 0.0) -> FloatArray:
+        """Return how far all tensions can keep from their bounds, (...), N; below 0: infeasible.
+
+        With an acceleration, the least over all combinations of directions. -inf where the cables
+        do not control a direction.
+        """
+        rows, shape = self._rows(position)
+        if not 0.0 <= acceleration_m_s2 < np.inf:
+            raise InvalidArgument(f"acceleration_m_s2: {acceleration_m_s2!r}; want a number from 0")
+        workspace = self._model.workspace(acceleration_m_s2, 0.0)
+        return workspace.capacity_margins(self._model.poses(rows)).reshape(shape)
+
+    def is_feasible(self, position: ArrayLike, acceleration_m_s2: float = 0.0) -> BoolArray:
+        """Return whether tensions within their bounds hold the platform, (...)."""
+        return np.asarray(self.capacity_margin(position, acceleration_m_s2) >= 0.0)
+
+    def _weight_N(self) -> FloatArray:
+        weight = np.zeros(3)
+        weight[self._model.positions - 1] = self._model.weight()[self._model.positions - 1]
+        return weight
+
+    def _centres_m(self, rows: FloatArray) -> FloatArray:
+        """Return the vectors (m, 3) from the platform's origin to its centre of mass."""
+        centre_m = in_space(self._model.platform.centre_of_mass_m)
+        return np.asarray(self._model.poses(rows)[:, 1:] @ centre_m)
+
+    def _reduced(self, force: FloatArray, moment: FloatArray) -> FloatArray:
+        """Return the controlled directions (m, d) of forces and moments (m, 3) or (3,)."""
+        wrench = np.concatenate(np.broadcast_arrays(force, moment), axis=-1)
+        return np.asarray(wrench[..., list(self._model.kinematics.directions)])
+
+    def _wrenches(self, wrench: ArrayLike | None, shape: tuple[int, ...]) -> FloatArray:
+        given = np.zeros(self.d) if wrench is None else _numbers("wrench", wrench)
+        try:
+            wide = np.broadcast_to(given, (*shape, self.d))
+        except ValueError:
+            wide = np.array(np.nan)
+        if not np.isfinite(wide).all():
+            raise InvalidArgument(
+                f"wrench: shape {given.shape}; want finite ({self.d},) or {(*shape, self.d)}"
+            )
+        return wide.reshape(-1, self.d)
+
+    def _one(self, position: ArrayLike) -> FloatArray:
+        rows, shape = self._rows(position)
+        if shape:
+            raise InvalidArgument(f"start: {len(rows)} positions; want one, ({self.d},)")
+        return np.asarray(rows[0])
+
+    def _rows(self, position: ArrayLike) -> tuple[FloatArray, tuple[int, ...]]:
+        """Return positions as rows (m, d), and the leading shape."""
+        given, k = _numbers("position", position), self._model.positions
+        if given.ndim == 0 or given.shape[-1] not in (k, self.d) or not np.isfinite(given).all():
+            wanted = f"(..., {k})" + (f" or (..., {self.d})" if self.d > k else "")
+            raise InvalidArgument(f"position: shape {given.shape}; want finite {wanted}")
+        rows = np.zeros((int(np.prod(given.shape[:-1])), self.d))
+        rows[:, : given.shape[-1]] = given.reshape(-1, given.shape[-1])
+        return rows, given.shape[:-1]
+
+
+def _numbers(name: str, given: ArrayLike) -> FloatArray:
+    """Return what was given as an array; raises InvalidArgument."""
+    try:
+        return np.asarray(given, float)
+    except (TypeError, ValueError):
+        raise InvalidArgument(f"{name}: {given!r}; want an array of numbers") from None

@@ -1,0 +1,666 @@
+"""Control of a platform on n cables in d directions: its pose, and the torques that move it.
+
+Tremblay (thesis), sections 2.4 and 3.6, eqs. (3.64) to (3.79), but with one velocity loop of the
+platform instead of one of each motor. It commands a wrench that the tensions exert within their
+bounds, so that no cable is unwound and the motors never pull against each other.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from cdpr_profiles import RobotAxis
+from cdpr_rt.arrays import BoolArray, FloatArray
+from cdpr_rt.control.compensation import Compensation
+from cdpr_rt.core.exchange import AxisFeedback, Setpoint
+from cdpr_rt.errors import GeometryError
+from cdpr_rt.jit import bound
+from cdpr_rt.model import pose_tracking as tracking
+from cdpr_rt.model.cable_kernel import (
+    ARC,
+    CABLE_ROWS,
+    FREE,
+    run_cables,
+    write_tension_rises,
+)
+from cdpr_rt.model.free_rotation_kernel import SHAPING_s, rotation_of
+from cdpr_rt.model.platform_model import PlatformModel
+from cdpr_rt.model.pose import Pose, place_text
+from cdpr_rt.model.pose_search import DISTINCT
+from cdpr_rt.model.robot_arrays import LEAST_REDUNDANCY
+from cdpr_rt.model.tension_distribution import TensionSolver
+from cdpr_rt.model.tension_split import OK, split
+from cdpr_rt.model.workspace import SHARES, infeasibility_text
+from cdpr_rt.platform import loop_kernel as loop
+from cdpr_rt.platform.body_kernel import body_of
+from cdpr_rt.platform.cell_feedback import CellCheck, CellFeedback, balance_std_N
+from cdpr_rt.platform.loop_design import designed_loop
+from cdpr_rt.platform.loop_plant import DAMPING_RATIO, LoopGains, OBSERVER_rad_s
+from cdpr_rt.platform.motor_learning import MotorLearning
+from cdpr_rt.platform.oscillation import LEAST_COUNTS, RESERVE_SHARES, Oscillation
+from cdpr_rt.platform.own_controller import (
+    Controller,
+    OwnController,
+    State,
+    Target,
+    read_only,
+)
+from cdpr_rt.platform.pull_fit import PullFit
+
+# Feasible places and ways of a platform: held by its cables, and free of contact.
+
+_MOST_LOOKS = 200  # in the contact check of a way, between two cycles
+
+
+class PlaceChecks:
+    """Checks places (d,), and ways from the set-point, between two cycles."""
+
+    position: FloatArray
+    """The set-point, (d,), kept up to date by the control."""
+
+    def __init__(self, model: PlatformModel) -> None:
+        self.model = model
+        self.workspace = model.workspace().prepared()
+        """The workspace of targets."""
+        self._interference = model.interference
+        self._directions = np.array(model.kinematics.directions)
+        self._home, self._to, self._place_scratch = (
+            model.home_pose,
+            Pose(np.zeros(3)),
+            np.zeros((4, 3)),
+        )
+
+    def is_feasible(self, position: FloatArray) -> bool:
+        """Return whether the platform can be held, and accelerated, at a position (d,)."""
+        self._turn_to(position)
+        return self.workspace.is_feasible(self._to)
+
+    def contact_ahead(self, position: FloatArray) -> int:
+        """Return a pair in contact on a short way from the set-point, -1 for none."""
+        return self._interference.contact_ahead(self.position, position)
+
+    def contact_at(self, position: FloatArray) -> int:
+        """Return a pair in contact at a position (d,), -1 for none."""
+        return self._interference.contact_at(self.position, position)
+
+    def contact(self, pair: int) -> str:
+        """Return as text that a pair is in contact."""
+        return self._interference.within_clearance(pair)
+
+    def infeasibility(self, position: FloatArray) -> str:
+        """Return why the platform cannot stand at a position (d,), "" if it can.
+
+        Tensions must keep a reserve to their bounds there while it is accelerated in any direction.
+        """
+        self._turn_to(position)
+        return self.workspace.infeasibility(self._to)
+
+    def way_infeasibility(self, position: FloatArray, start: FloatArray | None = None) -> str:
+        """Return what obstructs the straight way to a position (d,), "" for nothing.
+
+        The way begins at `start` (d,), or at the set-point.
+        """
+        share, begin = SHARES[:, None], self.position if start is None else start
+        poses = self.model.poses((1.0 - share) * begin + share * position)
+        obstacle = self.workspace.first_infeasible(poses)
+        if obstacle is None:
+            contact = self._interference.first_contact(np.array([begin, position]), _MOST_LOOKS)
+            return "" if contact is None else str(contact)
+        there, why = obstacle
+        k = self.model.positions
+        return f"{place_text(there.p[:k], k)}: {why}"
+
+    def _turn_to(self, position: FloatArray) -> None:
+        tracking.pose_of_coordinates(
+            position, self._directions, self._home.array, self._place_scratch, self._to.array
+        )
+
+
+# A platform's set-point as programs write it, and as its control follows it.
+
+
+class ShapedSetpoint:
+    """Position, velocity and acceleration (d,) of a set-point, and their mean, (3, d)."""
+
+    def __init__(self, home: FloatArray, period_s: float) -> None:
+        self.rows, self.shaped = np.zeros((2, 3, home.size))
+        """Position, velocity and acceleration, to be written; and their mean over `SHAPING_s`."""
+        self._past, self._place = np.zeros((max(1, round(SHAPING_s / period_s)), 3, home.size)), 0
+        self._shape = bound(loop.shape, self._past, then=(0, self.rows, self.shaped))
+        self.stand_at(home)
+
+    def stand_at(self, position: FloatArray) -> None:
+        """Set the set-point at rest at a position (d,), with no earlier motion."""
+        self.rows[:] = self._past[:] = self.shaped[:] = 0.0
+        self.rows[0] = self.shaped[0] = self._past[:, 0] = position
+
+    def shape(self) -> None:
+        """Update the mean by one cycle."""
+        self._place = self._shape(self._place, self.rows, self.shaped)
+
+
+# Parameters of the platform controller, from the robot's file.
+
+_REGULATOR_SHARE = 0.25
+_INTEGRAL_SHARE = 0.3
+_DEADBAND_m = 6e-5
+_STICTION_GAIN = 20.0
+_STICTION_m_s = 0.002
+_SPATIAL, _YAW = 3, 5
+
+
+def motor_rows(model: PlatformModel, axes: Sequence[RobotAxis]) -> FloatArray:
+    """Return the constants of motors and cables, (MOTOR_ROWS, n); other entries are 0."""
+    platform = model.platform
+    rows = np.zeros((tracking.MOTOR_ROWS, len(axes)))
+    rows[tracking.M_PER_RAD] = [axis.winch.cable_m_per_motor_rad for axis in axes]
+    rows[tracking.INERTIA] = [axis.winch.motor.rotor_inertia_kg_m2 for axis in axes]
+    if platform.cable_model != "rigid":
+        rows[tracking.COMPLIANCE] = [1.0 / axis.winch.cable.stiffness_N for axis in axes]
+    rows[tracking.WEIGHT] = platform.cable_weights_N_m
+    rows[tracking.STRETCH] = 1.0
+    return rows
+
+
+def tracking_filters(gains: LoopGains, period_s: float) -> FloatArray:
+    """Return the settings of the filters of the pose estimate, (FILTERS,)."""
+    row = np.zeros(tracking.FILTERS)
+    row[tracking.PERIOD], row[tracking.OBSERVER] = period_s, OBSERVER_rad_s
+    row[tracking.SMOOTHER], row[tracking.LOWPASS_SHARE] = gains.smoother_rad_s, gains.smooth
+    return row
+
+
+def loop_settings(gains: LoopGains, span_N: float, period_s: float) -> FloatArray:
+    """Return the settings of the loop's kernels for tensions of this span, (SETTINGS,)."""
+    row = np.zeros(loop.SETTINGS)
+    row[loop.PERIOD], row[loop.BANDWIDTH] = period_s, gains.bandwidth_rad_s
+    row[loop.DAMPING], row[loop.RATIO] = gains.damping_N_s_m, DAMPING_RATIO
+    row[loop.INTEGRAL], row[loop.NULL_DAMPING] = gains.integral_1_s, gains.null_damping_N_s_m
+    row[loop.ROTOR] = gains.rotor_kg
+    row[loop.REGULATOR_N], row[loop.MOST_N] = _REGULATOR_SHARE * span_N, _INTEGRAL_SHARE * span_N
+    row[loop.STICTION_GAIN], row[loop.STICTION_SPEED], row[loop.DEADBAND] = (
+        _STICTION_GAIN,
+        _STICTION_m_s,
+        _DEADBAND_m,
+    )
+    return row
+
+
+def slides_on_stand(model: PlatformModel) -> FloatArray:
+    """Return how much longer cables become if the platform slides on its stand, (n, k).
+
+    Along the horizontal directions, and in space about the vertical axis if that is controlled,
+    in m per m at the anchor points.
+    """
+    horizontal = list(range(model.positions - 1))
+    if model.positions == _SPATIAL:
+        horizontal += [i for i, k in enumerate(model.kinematics.directions) if k == _YAW]
+    J = -model.kinematics.wrench_matrix(model.home_pose).T
+    return np.asarray((J / model.wrench_scale)[:, horizontal])
+
+
+def oscillation(
+    model: PlatformModel,
+    axes: Sequence[RobotAxis],
+    motors: FloatArray,
+    count_rad: FloatArray,
+    velocity: FloatArray,
+    period_s: float,
+) -> Oscillation:
+    """Return the detector of oscillations of these `motors`, rows as above, caused by the loop.
+
+    `count_rad` (n,) is the resolution of their encoders, `velocity` (d,) the set-point's.
+    """
+    m_per_rad, theta_rad = motors[tracking.M_PER_RAD], motors[tracking.THETA]
+    stiffness_N_m = [a.winch.cable.stiffness_N for a in axes] / model.kinematics.lengths(
+        model.home_pose
+    )
+    threshold_m = np.maximum(
+        np.outer(RESERVE_SHARES, model.reserve_N / stiffness_N_m),
+        LEAST_COUNTS * count_rad * np.abs(m_per_rad),
+    )
+    names = [axis.name for axis in axes]
+    return Oscillation(names, threshold_m, m_per_rad, theta_rad, velocity, period_s)
+
+
+def cell_check(model: PlatformModel, axes: Sequence[RobotAxis], period_s: float) -> CellCheck:
+    """Return the check of the load cells of these axes, one for each cable."""
+    rated_N = np.array(
+        [a.winch.motor.rated_torque_Nm / abs(a.winch.cable_m_per_motor_rad) for a in axes]
+    )
+    weight_N = float(np.abs(model.weight()[: model.positions]).max())
+    std_N = balance_std_N(weight_N, model.positions - 1, model.wrench_scale)
+    return CellCheck([axis.name for axis in axes], rated_N, std_N, model.wrench_scale, period_s)
+
+
+_ON_STAND = 0.1  # of the integral part
+_SETTLING_STEPS, _LIFT_S, _COMES_AFTER_S = 60, 0.05, 0.1
+
+
+class CableControl(PlaceChecks):
+    """A controller of a platform's set-point: position, velocity, acceleration, (d,) each.
+
+    As a `Controller` it writes the axes' set-points itself, so that others may continue from them.
+    The tensions that carry the platform follow from the method that its file names; the loop's
+    wrench is added. The gains are designed from the robot. If it `learns`, it learns friction and
+    cogging of motors that `compensation` does not know.
+    """
+
+    def __init__(
+        self,
+        model: PlatformModel,
+        axes: Sequence[RobotAxis],
+        torque_Nm: FloatArray,
+        period_s: float,
+        compensation: Compensation | None = None,
+        *,
+        learns: bool = True,
+    ) -> None:
+        """Take the highest torques of the motors, `torque_Nm` (n,).
+
+        Raises GeometryError if the number of axes is not that of the cables.
+        """
+        n = model.kinematics.n
+        if len(axes) != n:
+            raise GeometryError(f"{len(axes)} axes; allowed: {n}, one for each cable")
+        super().__init__(model)
+        self._period_s, self._held = period_s, model.workspace(0.0).prepared()
+        self.low_N, self.high_N = self.workspace.low, self.workspace.high
+        """Bounds of planned tensions, (n,)."""
+        self.least_N = model.low_N
+        self.torque_Nm = np.array(torque_Nm, float)
+        self.setpoint = ShapedSetpoint(model.home, period_s)
+        self.position, self.velocity, self.acceleration = self.setpoint.rows
+        self.shaped: FloatArray = self.setpoint.shaped[0]
+        """The set-point's position that the control follows: shaped, some cycles later, (d,)."""
+        self.tension_N = np.array(self.low_N)
+        self.outcome, self.share, self._limited = 0, 1.0, False
+        self.effort_Nm, self.compensation_Nm, self.motor_loss_Nm = np.zeros((3, n))
+        self.cogging_Nm = np.zeros(n) if compensation is None else compensation.cogging_Nm
+        self.residual_m, self.suspect, self._rate_inconsistency_m_s = np.inf, -1, 0.0
+        """Largest normalised residual of the lengths, m, and its cable, -1 if that is not known."""
+        self.jump_m, self.jumped = 0.0, -1
+        """The largest sudden change of a residual within some 0.2 s, and its cable."""
+        self.estimated = np.array(model.home)
+        """Estimated position of the platform, (d,)."""
+        self._compensation = compensation
+        self._design(axes)
+        known = np.zeros(n, np.bool_) if compensation is None else compensation.available
+        self.learning: MotorLearning | None = None
+        """Learning of motors that were not identified."""
+        if learns and not known.all():
+            scale, reserve_N = model.wrench_scale, model.reserve_N
+            self.learning = MotorLearning(axes, known, scale, reserve_N, period_s)
+        self.pull_fit = PullFit(
+            axes, known, self.lengths_at_home, self.learning, slides_on_stand(model)
+        )
+        self._cells: CellFeedback | None = None
+        self._check = cell_check(model, axes, period_s)
+        self._moves = moves = np.zeros((4, 6))
+        self._own: OwnController | None = None
+        self._bind_pose(moves)
+        self._bind_force(moves)
+        self._bind_tensions()
+        self._oscillation = oscillation(
+            model, axes, self._motors, self.pull_fit.count_rad, self.velocity, period_s
+        )
+
+    def _design(self, axes: Sequence[RobotAxis]) -> None:
+        """Design the loop for the platform and its motors."""
+        model, period_s = self.model, self._period_s
+        self._motors = motor_rows(model, axes)
+        self._motors[tracking.TENSION] = self.low_N
+        self.gains = designed_loop(model, axes, period_s).gains
+        span_N = float((model.high_N - model.low_N).min())
+        self._settings = loop_settings(self.gains, span_N, period_s)
+        self._on_stand = False
+        self._integral_N = float(self._settings[loop.MOST_N])
+
+    def _bind_pose(self, moves: FloatArray) -> None:
+        """Bind the arrays of the kernels that estimate and follow the pose; these write `moves`."""
+        model, kinematics, motors = self.model, self.model.kinematics, self._motors
+        n, self._up = kinematics.n, np.eye(3)[model.positions - 1]
+        self._pose = Pose(np.zeros(3))
+        self._pose.array[:] = self._home.array
+        self._wanted = Pose(np.zeros(3))
+        self._scratch, (found, wanted) = np.zeros((4, 3)), np.zeros((2, CABLE_ROWS, n))
+        self._found, self._rise_N = found, np.zeros(n)
+        follows = self.gains.follows_pose
+        self._planned_at = (found, self._pose.array) if follows else (wanted, self._wanted.array)
+        filters = tracking_filters(self.gains, self._period_s)
+        self._swing, self._seven, position = np.zeros(tracking.SWING), np.zeros(7), np.zeros(n)
+        self._track = bound(
+            tracking.track_pose, motors, filters, kinematics.geometry, self._up, self._pose.array,
+            found, kinematics.solver, moves[loop.TWIST], rotation_of(model.platform),
+            self._swing, kinematics.turns_freely, then=(position,),
+        )  # fmt: skip
+        self._write_coordinates = bound(
+            tracking.coordinates_of_pose,
+            self._pose.array, self._directions, self._home.array, self._scratch, self.estimated,
+        )  # fmt: skip
+        self._motor_references = bound(
+            tracking.motor_references, self.setpoint.shaped, self._directions,
+            self._home.array, self._period_s, kinematics.geometry, motors, self._pose.array,
+            self._scratch, self._wanted.array, wanted, moves[loop.WANTED_TWIST],
+            moves[loop.WANTED_ACCELERATION], moves[loop.POSE_ERROR], then=(position,) * 3,
+        )  # fmt: skip
+
+    def _bind_force(self, moves: FloatArray) -> None:
+        """Bind the arrays of the kernels that compute the platform's force from `moves` (4, 6)."""
+        model, motors = self.model, self._motors
+        n, d = model.kinematics.n, model.size
+        self._state = np.zeros(3 * d + 1)
+        self._W, self._wrench, self._force = np.zeros((d, n)), np.zeros(d), np.zeros(d)
+        self._rise_N = np.zeros(n)
+        scratch, J = np.zeros((7, 7, 7)), np.zeros((n, d))
+        self._correct = bound(
+            loop.correct, self._settings, self._state, model.wrench_scale, body_of(model.platform),
+            self._directions, model.kinematics.geometry, *self._planned_at, moves, scratch,
+            J, self._W, self._rise_N, self._wrench, self._friction(), self._force, then=(1.0, 1.0),
+        )  # fmt: skip
+        if self.learning is not None:
+            self.learning.bind(
+                motors[tracking.THETA], motors[tracking.OMEGA], J, scratch[loop.MASS],
+                scratch[loop.TWIST_ERROR][:d], self._force, self.compensation_Nm,
+            )  # fmt: skip
+
+    def _friction(self) -> loop.WinchFriction:
+        """Return the compensated friction of the winches, which its owners keep up to date."""
+        known, learning = self._compensation, self.learning
+        n = self.model.kinematics.n
+        nothing = np.zeros((n, 2))[
+            :, 0
+        ]  # with gaps like the real ones: one compilation serves both
+        return loop.WinchFriction(
+            np.zeros(n) if known is None else known.friction_Nm,
+            nothing if known is None else known.faded_in,
+            nothing if learning is None else learning.friction_Nm,
+            1.0 / np.abs(self._motors[tracking.M_PER_RAD]),
+        )
+
+    def _bind_tensions(self) -> None:
+        """Bind the arrays of the kernels that turn the force into tensions and torques."""
+        model, motors, scale = self.model, self._motors, self.model.wrench_scale
+        n, d, method = model.kinematics.n, model.size, model.platform.tension_distribution
+        self._distribution: TensionSolver | None = None  # the split's own
+        if method != "minimum-deviation":
+            self._distribution = TensionSolver(method, self.low_N, self.high_N, scale)
+        plan, size = np.array([self.low_N, self.high_N]), max(n, 8)
+        self._slow_N, self._feedforward_N = plan[0].copy(), plan[0].copy()
+        space, position = np.zeros((n + 1, n)), np.zeros(n)
+        self._split = bound(
+            split, self._W, self._wrench, self._force, scale, plan, model.reserve_N,
+            self._period_s / (self._period_s + _LIFT_S), self._distribution is not None,
+            self._slow_N, self._feedforward_N, self.tension_N, np.zeros(d), np.zeros((3, n)),
+            np.zeros((2, n)), np.zeros((d, n + 1)), space, np.zeros((4, size, size)),
+        )  # fmt: skip
+        self._drive = bound(
+            loop.drive, self._settings, motors[tracking.M_PER_RAD], motors[tracking.INERTIA],
+            motors[tracking.OMEGA], motors[tracking.TENSION], self.tension_N, self._feedforward_N,
+            self._rise_N, space[1:], self.compensation_Nm, self.torque_Nm, self.effort_Nm,
+            then=(0, position, position),
+        )  # fmt: skip
+
+    # -- Controller
+
+    def use(self, controller: Controller) -> None:
+        """Let the user's controller choose the tensions from now on, see `Controller`."""
+        model, d, n = self.model, self.model.size, self.model.kinematics.n
+        method, planned = model.platform.tension_distribution, self.low_N
+        solver = TensionSolver(
+            method, planned, self.high_N, model.wrench_scale,
+            planned if method == "minimum-deviation" else None,
+        )  # fmt: skip
+        wrench, tension_N, self._velocity = np.zeros(d), np.zeros(n), np.zeros(d)
+
+        def distribute(force: FloatArray) -> FloatArray:
+            np.subtract(self._wrench, force, out=wrench)
+            solver.solve(self._W, wrench, tension_N)
+            return tension_N
+
+        last_N = np.array(self.tension_N)
+        state = State(
+            read_only(self.estimated), read_only(self._velocity), read_only(self._W),
+            read_only(self._wrench), read_only(self._motors[tracking.LENGTH]), read_only(last_N),
+            read_only(model.low_N), read_only(model.high_N), self._period_s, distribute,
+        )  # fmt: skip
+        position, velocity, acceleration = map(read_only, self.setpoint.shaped)
+        target = Target(position, velocity, acceleration)
+        self._own = OwnController(controller, state, target, last_N)
+
+    def stand_in(self) -> None:
+        """Control the platform without the user's controller until the next `begin`."""
+        if self._own is not None:
+            self._own.stand_in()
+
+    def reset(self) -> None:
+        """Reset the integral part."""
+        if self._own is not None:
+            self._own.restart(self.tension_N)
+        self._state[:] = 0.0
+        self._state[self.model.size] = 1.0
+        self._slow_N[:] = self.low_N
+        self.share = 1.0
+        if self._compensation is not None:
+            self._compensation.reset()
+        if self.learning is not None:
+            self.learning.restart()
+        if self._cells is not None:
+            self._cells.restart(self.tension_N)
+
+    @property
+    def learnt_Nm(self) -> FloatArray | None:
+        """Learnt friction and amplitude of the cogging of each motor, (2, n)."""
+        return None if self.learning is None else self.learning.learnt_Nm
+
+    def forget_motors(self) -> None:
+        """Forget what was learnt of the motors, for example after new origins of their encoders."""
+        if self.learning is not None:
+            self.learning.forget()
+
+    def measure_tensions(self, tension_N: FloatArray, measured: BoolArray) -> None:
+        """Correct the cables' tensions by readings (n,) that others keep up to date, if valid.
+
+        Without a reading the motor's torque constant and known losses are relied on.
+        """
+        learnt_Nm = np.zeros(len(tension_N)) if self.learning is None else self.learning.torque_Nm
+        self._cells = CellFeedback(
+            tension_N, measured, self._motors[tracking.M_PER_RAD], self.model.reserve_N,
+            self._period_s, self._check, self._W, self._wrench, learnt_Nm, self._rise_N,
+        )  # fmt: skip
+
+    def notices(self) -> list[str]:
+        """Return which load cell is off, and whether the loop oscillates; until `clear_notices`."""
+        return [text for text in (self._check.trouble, self._oscillation.trouble) if text]
+
+    def clear_notices(self) -> None:
+        """Forget the findings about load cells and loop."""
+        self._check.clear()
+        self._oscillation.clear()
+
+    def update(self, feedback: AxisFeedback, setpoint: Setpoint, torque_Nm: FloatArray) -> None:
+        """Write torques and the axes' set-points for the platform's present set-point."""
+        self.observe(feedback)
+        self.setpoint.shape()
+        slope = setpoint.acceleration_rad_s2
+        self._motor_references(setpoint.position_rad, setpoint.velocity_rad_s, slope)
+        if self.learning is not None:
+            self.learning.learn(self._was_exerted())
+        if self._on_stand and self.velocity.any():
+            self._rest(on_stand=False)
+        self._correct(self.share, self._rate_inconsistency_m_s)
+        self._compensate(feedback, setpoint)
+        if self._distribution is not None:
+            self._distribution.solve(self._W, self._wrench, self._feedforward_N)
+        self.outcome, self.share, null_directions = self._split()
+        if self._own is not None and self._on_stand:
+            self._own.restart(self.tension_N)
+        elif self._own is not None:
+            np.take(self._moves[loop.TWIST], self._directions, out=self._velocity)
+            self._own.write(self.tension_N)
+            self._feedforward_N[:] = self.tension_N
+        self._limited = self._drive(null_directions, slope, torque_Nm)
+        self._oscillation.update(setpoint.position_rad)
+
+    def _was_exerted(self) -> bool:
+        """Return whether the cables exerted the last cycle's force completely."""
+        plausible = self._rate_inconsistency_m_s <= loop.PLAUSIBLE_m_s
+        if self._own is not None and self._own.in_use:
+            return False
+        return plausible and self.share >= 1.0 and self.outcome == OK and not self._limited
+
+    def _compensate(self, feedback: AxisFeedback, setpoint: Setpoint) -> None:
+        """Write the torques against known, learnt and measured losses of the motors."""
+        learning, cells, torque = self.learning, self._cells, self.compensation_Nm
+        if self._compensation is not None:
+            self._compensation.torque(feedback, setpoint, self.motor_loss_Nm)
+        torque[:] = self.motor_loss_Nm
+        if learning is not None:
+            learning.write(setpoint.velocity_rad_s)
+            torque += learning.torque_Nm
+        if cells is not None:
+            cells.update(self.tension_N)
+            torque += cells.torque_Nm
+
+    def clear_compensation(self) -> None:
+        """Report zero compensation while a program drives the winches itself."""
+        self.compensation_Nm[:] = self.motor_loss_Nm[:] = self.cogging_Nm[:] = 0.0
+
+    # -- pose of the platform
+
+    def begin(self, feedback: AxisFeedback, tension_N: FloatArray | None = None) -> None:
+        """Take the motors to be at rest, and the platform at the pose given by its cables.
+
+        The cables have `tension_N` (n,) at their winches, which may be far from planned
+        tensions.
+        """
+        if self._own is not None:
+            self._own.revive()
+        motors = self._motors
+        motors[tracking.THETA] = feedback.position_rad
+        motors[[tracking.OMEGA, tracking.LOWPASSED_ONCE, tracking.LOWPASSED]] = 0.0
+        planned_N = np.maximum(motors[tracking.TENSION], self.low_N)
+        motors[tracking.TENSION] = planned_N
+        self._pose.array[:] = self._home.array
+        for _ in range(_SETTLING_STEPS):
+            if tension_N is not None:
+                motors[tracking.TENSION] = tension_N - self._rises_N(self._found)
+            self.observe(feedback)
+        self._swing[:] = 0.0
+        motors[tracking.TENSION] = planned_N
+        motors[tracking.SETTLED] = np.nan
+        self._rest(on_stand=False)  # the last set-point belonged to the former pose
+
+    def stand_still(self, *, on_stand: bool = False) -> None:
+        """Put the set-point at rest at the platform's pose; the platform may be `on_stand`.
+
+        On the stand the integral part is bounded until the set-point moves: otherwise it would
+        press, and the first way off the stand would begin against that. If this is called in every
+        cycle, the set-point follows the platform slowly when tensions are not planned for the
+        platform's pose, since they would not hold it.
+        """
+        again = self._on_stand and on_stand and not self.gains.follows_pose
+        share = self._period_s / (self._period_s + _COMES_AFTER_S) if again else 1.0
+        self._rest(on_stand=on_stand)
+        self.setpoint.stand_at(self.position + share * (self.estimated - self.position))
+
+    def _rest(self, *, on_stand: bool) -> None:
+        self._on_stand = on_stand
+        self._settings[loop.MOST_N] = self._integral_N * (_ON_STAND if on_stand else 1.0)
+
+    def observe(self, feedback: AxisFeedback) -> None:
+        """Update the estimate of the platform's pose by one cycle."""
+        found = self._track(feedback.position_rad)
+        self.residual_m, self.suspect, self._rate_inconsistency_m_s, self.jump_m, self.jumped = (
+            found
+        )
+        self._write_coordinates()
+
+    def suspects(self, jump: bool = False) -> list[int]:
+        """Return the cables whose length may be wrong, the likeliest first.
+
+        Those whose normalised residual |r_i| / sqrt(p_ii) is near the largest, where P = I - J J^+
+        and p_ii its diagonal; none if the lengths cannot contradict each other. With `jump` those
+        whose residual has changed suddenly by nearly the most.
+        """
+        J = self._found[list(self.model.kinematics.directions)].T
+        if not np.isfinite(J).all():
+            return []
+        motors = self._motors
+        redundancy = 1.0 - np.einsum("ij,ji->i", J, np.linalg.pinv(J))
+        off_m = self._found[FREE] + self._found[ARC] - motors[tracking.LENGTH]
+        seen = redundancy > LEAST_REDUNDANCY
+        residual_m = np.where(seen, np.abs(off_m) / np.sqrt(np.where(seen, redundancy, 1.0)), 0.0)
+        if jump:
+            residual_m = np.abs(motors[tracking.RESIDUAL] - motors[tracking.SETTLED])
+        near = np.flatnonzero(residual_m > DISTINCT * residual_m.max())
+        return sorted(near.tolist(), key=lambda i: -residual_m[i])
+
+    def lengths_at_home(self, tension_N: FloatArray) -> FloatArray:
+        """Return lengths (n,) without tension at home, with `tension_N` (n,) at the winches."""
+        kinematics, motors = self.model.kinematics, np.array(self._motors)
+        cables = np.zeros((CABLE_ROWS, kinematics.n))
+        run_cables(kinematics.geometry, self._home.array, cables)
+        motors[tracking.TENSION] = tension_N - self._rises_N(cables)
+        motors[tracking.STRETCH] = 1.0
+        tracking.stretch(motors, cables, self._up)
+        return np.asarray(kinematics.lengths(self._home) / motors[tracking.STRETCH])
+
+    def _rises_N(self, cables: FloatArray) -> FloatArray:
+        """Return how far tensions at winches exceed those in the middle, (n,); reused."""
+        write_tension_rises(self.model.kinematics.geometry, cables, self._rise_N)
+        return self._rise_N
+
+    def take_lengths(self, length_m: FloatArray, feedback: AxisFeedback) -> None:
+        """Set the lengths of the cables without tension at the motors' angles, (n,).
+
+        Those that are nan keep their length, which this cycle has just set.
+        """
+        at_zero = length_m - self._motors[tracking.M_PER_RAD] * feedback.position_rad
+        known = np.isfinite(at_zero)
+        self._motors[tracking.AT_ZERO, known] = at_zero[known]
+        self._motors[tracking.SETTLED] = np.nan
+
+    @property
+    def inertia_kg_m2(self) -> FloatArray:
+        """Inertia of each motor, (n,)."""
+        return np.asarray(self._motors[tracking.INERTIA])
+
+    @property
+    def free_lengths_m(self) -> FloatArray:
+        """Lengths of the cables without tension by the motors' angles, (n,)."""
+        turned = self._motors[tracking.M_PER_RAD] * self._motors[tracking.THETA]
+        return np.asarray(self._motors[tracking.AT_ZERO] + turned)
+
+    @property
+    def pose(self) -> FloatArray:
+        """Pose of the platform, (7,): x y z, quaternion w x y z; overwritten."""
+        tracking.write_quaternion(self._pose.array, self._seven)
+        return self._seven
+
+    @property
+    def swing_rad(self) -> float:
+        """Amplitude of rotation of a platform that no cable keeps from turning; else 0."""
+        return float(self._swing[tracking.AMPLITUDE])
+
+    @property
+    def swing_m(self) -> float:
+        """Amplitude of an anchor point of such a platform; else 0."""
+        return float(self._swing[tracking.AMPLITUDE_m])
+
+    # -- feasibility
+
+    def tension_infeasibility(self) -> str:
+        """Return why the last cycle's tensions are not feasible, "" if they are."""
+        if not self.outcome:
+            return ""
+        return self._held.infeasibility(self._wanted) or self._infeasibility_in_motion()
+
+    def _infeasibility_in_motion(self) -> str:
+        """Return which cable limits the wanted motion if the platform could stand still here."""
+        W, t, low_N, high_N = self._W, self._feedforward_N, self.low_N, self.high_N
+        needed_N = t - np.linalg.pinv(W) @ (W @ t + self._wrench)
+        margin_N = float(np.minimum(needed_N - low_N, high_N - needed_N).min())
+        return f"for this motion, {infeasibility_text(margin_N, needed_N, low_N, high_N)}"

@@ -1,0 +1,184 @@
+"""Platform controllers that users write."""
+
+from __future__ import annotations
+
+import math
+import sys
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from dataclasses import dataclass
+from importlib import import_module
+from importlib.util import module_from_spec, spec_from_file_location
+from pathlib import Path
+
+import numpy as np
+
+from cdpr_rt.arrays import FloatArray
+from cdpr_rt.errors import ControlError
+
+
+def read_only(array: FloatArray) -> FloatArray:
+    """Return a view that shows the values of `array` and cannot be written."""
+    view = array.view()
+    view.flags.writeable = False
+    return view
+
+
+@dataclass(frozen=True)
+class State:
+    """What a controller knows in a cycle. Arrays are read-only and overwritten in each cycle.
+
+    A position (d,) has one entry for each controlled direction: the coordinates of the platform's
+    origin, m, then the rotation vector from the orientation at home, rad. Velocities and wrenches
+    have the same directions. There are n cables.
+    """
+
+    position: FloatArray
+    """Estimated position, (d,)."""
+    velocity: FloatArray
+    """Estimated twist, (d,), m/s and rad/s."""
+    wrench_matrix: FloatArray
+    """W (d, n): tensions t pull on the platform with the wrench W t, about its origin."""
+    wrench: FloatArray
+    """Wrench without the cables' tensions if the platform follows the target, (d,), N and Nm.
+
+    Gravity, the weight of the cables, and the inertia against the target's acceleration. The
+    tensions t carry it if W t + wrench = 0.
+    """
+    cable_length_m: FloatArray
+    """Lengths of the unloaded cables, (n,)."""
+    tension_N: FloatArray
+    """Tensions of the last cycle, (n,)."""
+    low_N: FloatArray
+    """Lowest tensions that the robot allows, (n,)."""
+    high_N: FloatArray
+    """Highest tensions that the robot allows, (n,)."""
+    period_s: float
+    """Time between two cycles."""
+    distribute: Callable[[FloatArray], FloatArray]
+    """Return the tensions (n,) that exert a force (d,) in addition to carrying `wrench`.
+
+    By the distribution that the robot's file names. If the bounds leave no such tensions, return
+    those that come nearest.
+    """
+
+
+@dataclass(frozen=True)
+class Target:
+    """Commanded motion of the platform in this cycle. Arrays (d,) are overwritten in each cycle."""
+
+    position: FloatArray
+    velocity: FloatArray
+    acceleration: FloatArray
+
+
+class Controller(ABC):
+    """A platform controller of your own: derive from it and write `update`.
+
+    It replaces the built-in controller whenever a platform on tight cables is off its stand. The
+    loop fades to it within 0.2 s. The built-in controller tightens the cables. In every stop it
+    brakes and lowers the platform. The loop limits tensions to the robot's bounds. If `update`
+    raises, or returns something other than n finite numbers, the loop stops the robot with the
+    fault `not_finite`. After a stop, your controller is used again once the cables are tightened.
+    """
+
+    def reset(self, state: State) -> None:  # noqa: B027  # optional
+        """Forget the past: the next cycle follows one of another controller."""
+
+    @abstractmethod
+    def update(self, state: State, target: Target) -> FloatArray:
+        """Return the tensions of this cycle, (n,), N. It has to take less than a cycle."""
+
+
+def load_controller(reference: str) -> Controller:
+    """Return a new controller from "FILE.py:CLASS" or "MODULE:CLASS"; this runs the code there.
+
+    Raises ControlError that names the reference and the error.
+    """
+    home, _, name = reference.rpartition(":")
+    try:
+        if home.endswith(".py"):
+            spec = spec_from_file_location(f"controller_{Path(home).stem}", home)
+            if spec is None or spec.loader is None or not Path(home).is_file():
+                raise ControlError(f"--controller {reference}: there is no file {home}")
+            module = sys.modules[spec.name] = module_from_spec(spec)
+            spec.loader.exec_module(module)
+        else:
+            module = import_module(home)
+        found = getattr(module, name)
+        controller = found() if isinstance(found, type) else found
+    except ControlError:
+        raise
+    except (Exception, SystemExit) as error:  # whatever the code there does
+        raise ControlError(
+            f"--controller {reference}: {type(error).__name__}: {error}; give FILE.py:CLASS or "
+            "MODULE:CLASS"
+        ) from error
+    if not isinstance(controller, Controller):
+        raise ControlError(f"--controller {reference}: derive {name} from cdpr_rt.Controller")
+    return controller
+
+
+_FADE_S = 0.2
+
+
+class OwnController:
+    """Asks a `Controller` for the tensions of each cycle, until it fails."""
+
+    def __init__(
+        self, controller: Controller, state: State, target: Target, last_N: FloatArray
+    ) -> None:
+        """Take the array (n,) of which `state.tension_N` is a read-only view."""
+        self._controller, self._state, self._target = controller, state, target
+        self._failed, self._cycle = False, 0
+        self._low_N, self._high_N = state.low_N.copy(), state.high_N.copy()
+        self._last_N, self._bounded_N = last_N, np.zeros_like(last_N)
+        self._fade_cycles = max(1, round(_FADE_S / state.period_s))
+
+    def restart(self, tension_N: FloatArray) -> None:
+        """Have the controller reset before the next cycle; take the tensions of this one, (n,)."""
+        self._last_N[:] = tension_N
+        self._cycle = 0
+
+    def stand_in(self) -> None:
+        """Leave the tensions to the built-in controller until `revive`."""
+        self._failed = True
+
+    def revive(self) -> None:
+        """Use the controller again."""
+        self._failed, self._cycle = False, 0
+
+    @property
+    def in_use(self) -> bool:
+        """Whether the controller drives the cables."""
+        return not self._failed
+
+    def write(self, tension_N: FloatArray) -> None:
+        """Replace the built-in controller's tensions (n,) by the controller's.
+
+        Raises the errors of the controller, and ValueError if it does not return n finite numbers.
+        After that it writes nothing more.
+        """
+        if self._failed:
+            return
+        self._failed = True  # until this cycle succeeds
+        if self._cycle == 0:
+            self._controller.reset(self._state)
+        state = self._state
+        try:
+            wanted = np.asarray(self._controller.update(state, self._target), float)
+        except SystemExit as error:  # it must not end the loop's process
+            raise RuntimeError(f"SystemExit: {error}") from error
+        # of numbers that are not all finite neither is the sum
+        if wanted.shape != tension_N.shape or not math.isfinite(wanted.sum()):
+            name, shown = type(self._controller).__name__, np.array2string(wanted, threshold=10)
+            raise ValueError(
+                f"{name}.update returned {shown}; return {tension_N.size} finite tensions in N"
+            )
+        bounded = np.minimum(wanted, self._high_N, out=self._bounded_N)
+        np.maximum(bounded, self._low_N, out=bounded)
+        if self._cycle < self._fade_cycles:
+            bounded += (1.0 - self._cycle / self._fade_cycles) * (tension_N - bounded)
+            self._cycle += 1
+        tension_N[:] = self._last_N[:] = bounded
+        self._failed = False

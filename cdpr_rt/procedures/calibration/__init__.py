@@ -1,1 +1,0 @@
-"""Procedures that calibrate a robot's geometry."""

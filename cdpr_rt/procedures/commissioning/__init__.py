@@ -1,1 +1,0 @@
-"""Commissioning of one winch's motor: recorded passes, identification, validation."""

@@ -1,0 +1,364 @@
+"""What a commissioning leaves: its files, the identified motor, its results as one table."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Annotated, Any, Self
+
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+from cdpr_profiles import Winch
+from cdpr_profiles.bounded_input import read_json
+from cdpr_profiles.errors import ProfileError
+from cdpr_profiles.reader import read_json_model
+from cdpr_rt.arrays import FloatArray
+from cdpr_rt.control.tuning import PidDesign, design_pid
+from cdpr_rt.control.validation import ValidationMetrics, evaluate, floor, ratios, worst
+from cdpr_rt.errors import InvalidRequestError
+from cdpr_rt.identification.cogging_profile import (
+    CoggingProfile,
+    DriveIdentity,
+    stored_harmonic_model,
+    stored_harmonics,
+    stored_thesis,
+)
+from cdpr_rt.identification.harmonic_model import MOST_ROUNDS, SecondPass, identify_harmonic_model
+from cdpr_rt.identification.rawlog import RawLog, read_raw_log
+from cdpr_rt.identification.result import HarmonicResult
+from cdpr_rt.identification.thesis import ThesisResult, identify_thesis
+from cdpr_rt.identification.windows import SweepData
+from cdpr_rt.procedures.measurement import Recording, recording
+
+# Judges recorded validation runs, on the encoder or on an angle that is known better.
+
+METHODS = ("none", "thesis", "better")
+"""Compensations that are compared: without, the thesis' and the harmonic model."""
+
+FIGURES = ("rms_position_error_deg", "peak_pid_effort_Nm", "peak_velocity_error_deg_s")
+
+AngleOf = Callable[[RawLog, Recording], FloatArray]
+"""Gives the angle from the index on which a recorded pass is judged, (samples,)."""
+
+
+def judge(paths: Sequence[Path], angle_of: AngleOf | None) -> ValidationMetrics:
+    """Return the figures of the passes, the worst of each; on the encoder's angle by default."""
+    figures = []
+    for path in paths:
+        log = read_raw_log(path)
+        run = recording(log)
+        sweep = run.sweep
+        angle = sweep.angle_rad if angle_of is None else angle_of(log, run)
+        figures.append(
+            evaluate(
+                angle,
+                sweep.setpoint_rad,
+                sweep.setpoint_velocity_rad_s,
+                run.effort_Nm,
+                run.period_s,
+                run.judged,
+            )
+        )
+    return worst(figures)
+
+
+def compare(runs: Mapping[str, Sequence[Path]], angle_of: AngleOf | None = None) -> dict[str, Any]:
+    """Return the figures of each method and how many times smaller than without each is."""
+    metrics = {method: judge(paths, angle_of) for method, paths in runs.items()}
+    return {
+        method: {**_figures(m), "ratios": asdict(ratios(metrics["none"], m))}
+        for method, m in metrics.items()
+    }
+
+
+def lowest(
+    design: PidDesign, counts_per_turn: int, torque_step_Nm: float, period_s: float
+) -> dict[str, Any]:
+    """Return what the encoder's and the torque's steps alone leave in this loop."""
+    step_rad = math.tau / counts_per_turn
+    return _figures(
+        floor(
+            design.gains, design.inertia_kg_m2, design.latency_s, period_s, step_rad, torque_step_Nm
+        )
+    )
+
+
+def _figures(metrics: ValidationMetrics) -> dict[str, float]:
+    return {name: getattr(metrics, name) for name in FIGURES}
+
+
+# The files of a commissioning.
+
+
+@dataclass(frozen=True)
+class Paths:
+    """Files of a commissioning."""
+
+    out: Path
+
+    @property
+    def raw_folder(self) -> Path:
+        """Return where the recorded passes are."""
+        return self.out / "raw"
+
+    def raw(self, name: str) -> Path:
+        """Return the file of one recorded pass."""
+        return self.raw_folder / f"{name}.raw"
+
+    def passes(self, name: str) -> list[Path]:
+        """Return the recorded passes whose names begin with `name`, in the order they were run."""
+        found = self.raw_folder.glob(f"{name}-[0-9]*.raw")
+        return sorted(found, key=lambda path: int(path.stem.rsplit("-", 1)[1]))
+
+    @property
+    def profile(self) -> Path:
+        """Return the file of the cogging profile."""
+        return self.out / "cogging-profile.json"
+
+    @property
+    def run(self) -> Path:
+        """Return the file of what the report must know besides the recordings."""
+        return self.out / "run.json"
+
+    @property
+    def results(self) -> Path:
+        """Return the file of the results."""
+        return self.out / "report.json"
+
+    @property
+    def page(self) -> Path:
+        """Return the report for people."""
+        return self.out / "report.html"
+
+    @property
+    def truth(self) -> Path:
+        """Return the simulator's own log, which only the report reads."""
+        return self.out / "simulator-truth.log"
+
+
+# Identification of a motor from the recorded passes of a commissioning; its cogging profile.
+
+
+@dataclasses.dataclass(frozen=True)
+class Identified:
+    """Results of both methods."""
+
+    thesis: ThesisResult
+    harmonic: HarmonicResult
+
+
+def legs(paths: list[Path]) -> list[SweepData]:
+    """Return recorded passes as the identification takes them; raises RawLogError."""
+    # nothing but the sweep stays in memory: a recording is large
+    return [recording(read_raw_log(path)).sweep for path in paths]
+
+
+def identify(winch: Winch, latency_s: float, paths: Paths) -> Identified:
+    """Identify from the recorded passes in `paths`, all rounds of the second pass included.
+
+    Raises RawLogError and IdentificationError.
+    """
+    found = identify_first(winch, latency_s, paths)
+    second = SecondPass(found.harmonic, legs(paths.passes("fast")))
+    for number in range(MOST_ROUNDS):
+        recorded = paths.passes(round_name(number))
+        if not recorded or second.done:
+            break
+        second.add(legs(recorded))
+    return dataclasses.replace(found, harmonic=second.best)
+
+
+def identify_first(winch: Winch, latency_s: float, paths: Paths) -> Identified:
+    """Identify from the sweeps and the fast legs alone."""
+    sweep, fast = (legs(paths.passes(name)) for name in ("sweep", "fast"))
+    inertia, pole_pairs = winch.motor.rotor_inertia_kg_m2, winch.motor.poles // 2
+    harmonic = identify_harmonic_model(sweep + fast, inertia, latency_s, pole_pairs)
+    return Identified(identify_thesis(sweep), harmonic)
+
+
+def round_name(number: int) -> str:
+    """Return the name under which a round of the second pass is recorded."""
+    return f"round{number}"
+
+
+def store_profile(winch: Winch, identity: DriveIdentity, found: Identified, paths: Paths) -> None:
+    """Write the cogging profile."""
+    harmonic = found.harmonic
+    names = ("sweep", "fast", *(round_name(number) for number in range(MOST_ROUNDS)))
+    raw = [path.name for name in names for path in paths.passes(name)]
+    CoggingProfile(
+        motor=winch.motor.model,
+        drive=winch.drive.name,
+        identity=identity,
+        created=datetime.now(UTC).replace(microsecond=0),
+        raw_data=raw,
+        inertia_kg_m2=harmonic.inertia_kg_m2.value,
+        harmonics=stored_harmonics(harmonic),
+        residual_rms_Nm=harmonic.residual_rms_Nm,
+        repaired_fraction=found.thesis.repaired_fraction,
+        coverage=harmonic.coverage,
+        thesis=stored_thesis(found.thesis),
+        better=stored_harmonic_model(harmonic),
+    ).save(paths.profile)
+
+
+def validation_name(method: str, bandwidth_Hz: float) -> str:
+    """Return the name under which a validation run is recorded."""
+    return f"validate-{bandwidth_Hz:g}Hz-{method}"
+
+
+TARGETS = {
+    "thesis": {"rms_position_error": 3.0, "peak_pid_effort": 6.0, "peak_velocity_error": 5.0},
+    "better": {"rms_position_error": 10.0, "peak_pid_effort": 10.0, "peak_velocity_error": 8.0},
+}
+"""Times smaller than without compensation: what the thesis reached, and what is aimed at here."""
+
+
+_Positive = Annotated[float, Field(gt=0.0, le=1e9)]
+
+
+_Number = Annotated[float, Field(ge=-1e9, le=1e9)]
+_Count = Annotated[int, Field(ge=0, le=(1 << 63) - 1)]
+_Word = Annotated[int, Field(ge=0, lt=1 << 32)]
+
+
+class _Part(BaseModel):
+    """Part of `run.json` that the report reads; the rest is for people."""
+
+    model_config = ConfigDict(extra="allow", strict=True, allow_inf_nan=False)
+
+
+class _Bus(_Part):
+    url: str = ""
+    period_s: _Positive
+    cycles: _Count = 0
+    wall_s: _Positive | None = None
+
+
+class _Drive(_Part):
+    name: str = ""
+    vendor_id: _Word = 0
+    product_code: _Word = 0
+    revision: _Word = 0
+
+
+class _Pid(_Part):
+    inertia_kg_m2: _Positive
+    latency_s: _Positive
+    bandwidth_Hz: _Positive
+    crossover_Hz: _Positive
+    phase_margin_deg: _Number
+    gain_margin_dB: _Number | None
+    """None where no gain is too much."""
+    sensitivity_peak: _Positive
+
+
+class _Run(_Part):
+    winch: str
+    date: str
+    drive: _Drive
+    encoder_counts_per_turn: int = Field(gt=0, le=1 << 32)
+    rated_torque_Nm: _Positive
+    inertia_kg_m2: _Positive
+    latency_s: _Positive
+    bandwidth_Hz: _Positive
+    bandwidths_Hz: list[_Positive]
+    torque_step_Nm: _Positive | None = None
+    pid: list[_Pid] = Field(min_length=1)
+    bus: _Bus
+
+    @model_validator(mode="after")
+    def _has_its_default(self) -> Self:
+        if self.bandwidth_Hz not in self.bandwidths_Hz:
+            raise ValueError("bandwidths_Hz: allowed: bandwidth_Hz among them")
+        if len(self.pid) != len(self.bandwidths_Hz):
+            raise ValueError("pid: allowed: one for each of bandwidths_Hz")
+        return self
+
+
+def read_run(paths: Paths) -> dict[str, Any]:
+    """Return the run on the bus; raises InvalidRequestError where a part of it is missing."""
+    try:
+        read_json_model(paths.run, _Run)
+        run: dict[str, Any] = read_json(paths.run)
+    except ProfileError as error:
+        raise InvalidRequestError(f"{error}; {paths.out} holds no finished commissioning") from None
+    return run
+
+
+def assemble(
+    paths: Paths, run: dict[str, Any], found: Identified, true_angle: AngleOf | None
+) -> dict[str, Any]:
+    """Return everything the report tells; raises RawLogError and what `true_angle` raises.
+
+    Validation is judged on `true_angle` where a simulator has told it, else on the encoder.
+    """
+    # runs from before this was noted are all of drives that take per mille
+    run = {"torque_step_Nm": run["rated_torque_Nm"] / 1000.0, **run}
+    return {
+        "ok": True,
+        **run,
+        "identification": identification(found),
+        "validation": _validation(paths, run, true_angle),
+        "files": {
+            "report": str(paths.page),
+            "profile": str(paths.profile),
+            "raw": str(paths.raw_folder),
+        },
+    }
+
+
+def identification(found: Identified) -> dict[str, Any]:
+    """Return what was identified, in plain values."""
+    harmonic, thesis = found.harmonic, found.thesis
+    harmonics = harmonic.harmonics
+    friction = harmonic.friction
+    return {
+        "orders": list(harmonic.orders),
+        "amplitudes_Nm": list(harmonic.amplitudes_Nm),
+        "confidence_Nm": [h.amplitude_Nm.half_width for h in harmonics],
+        "phases_deg": [h.phase_deg.value for h in harmonics],
+        "per_pole_pair": [h.per_pole_pair for h in harmonics],
+        "hints": [h.hint for h in harmonics],
+        "residual_rms_Nm": harmonic.residual_rms_Nm,
+        "repaired_fraction": thesis.repaired_fraction,
+        "coverage": harmonic.coverage,
+        "excluded_fraction": harmonic.excluded_fraction,
+        "held_back_error_Nm": harmonic.held_out_error_Nm,
+        "coulomb_forward_Nm": harmonic.coulomb_forward_Nm.value,
+        "coulomb_backward_Nm": harmonic.coulomb_backward_Nm.value,
+        "viscous_Nms_rad": harmonic.viscous_Nms_rad.value,
+        "stribeck_forward_Nm": friction.stribeck_forward_Nm,
+        "stribeck_backward_Nm": friction.stribeck_backward_Nm,
+        "stribeck_speed_rad_s": friction.stribeck_speed_rad_s,
+        "inertia_kg_m2": harmonic.inertia_kg_m2.value,
+        "inertia_measured": harmonic.inertia_measured,
+        "latency_s": harmonic.latency_s.value,
+        "lag_deg": math.degrees(harmonic.lag_rad.value),
+        "thesis_mean_Nm": thesis.mean_Nm,
+    }
+
+
+def _validation(paths: Paths, run: dict[str, Any], true_angle: AngleOf | None) -> dict[str, Any]:
+    counts, period = run["encoder_counts_per_turn"], run["bus"]["period_s"]
+    step_Nm = run["torque_step_Nm"]
+    default: float = run["bandwidth_Hz"]
+    rows = []
+    for wanted in run["bandwidths_Hz"]:
+        runs = {m: paths.passes(validation_name(m, wanted)) for m in METHODS}
+        design: PidDesign = design_pid(run["inertia_kg_m2"], run["latency_s"], wanted, period)
+        row = {"bandwidth_Hz": wanted, **compare(runs, true_angle)}
+        row["floor"] = lowest(design, counts, step_Nm, period)
+        rows.append((row, runs))
+    at_default, runs = next((row, runs) for row, runs in rows if row["bandwidth_Hz"] == default)
+    return {
+        "judged_on": "encoder" if true_angle is None else "true angle",
+        **at_default,
+        "encoder": compare(runs),
+        "bandwidths": sorted((row for row, _ in rows), key=lambda row: row["bandwidth_Hz"]),
+        "targets": TARGETS,
+    }

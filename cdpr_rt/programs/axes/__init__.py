@@ -1,1 +1,0 @@
-"""Programs that move each axis by itself."""

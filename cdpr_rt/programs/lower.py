@@ -1,0 +1,270 @@
+"""Program `lower`: lower a platform until it rests."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from cdpr_profiles.platform import Platform
+from cdpr_rt.arrays import FloatArray
+from cdpr_rt.control.winch_speed_loop import (
+    DRUM_TENSION_SHARE,
+    PUSH_SHARE,
+    FASTEST_IN_m_s,
+    FIXED_END_1_s,
+    HANGING_LOAD_1_s,
+    SPARE_m,
+    UNKNOWN_POSE_m_s,
+    WinchSpeedLoop,
+)
+from cdpr_rt.core.exchange import AxisFeedback, Setpoint
+from cdpr_rt.programs.base import CommandArguments, ProgramError
+from cdpr_rt.programs.platform_program import Arrival, PlatformParts, PlatformProgram
+
+HOME_SPEED_m_s = 0.25
+"""Speed at which the platform returns to its stand; its rotation is limited in proportion."""
+SET_DOWN_m_s = 0.02
+"""Speed at which the cables set it down there."""
+_ARRIVED_m, _ARRIVED_S, _ARRIVING_S = 0.01, 0.25, 2.0
+_LATE = 1.5
+"""Time allowed for the way home, over the time that it should take."""
+_FASTEST = 1.5
+_LIGHT = 0.2
+_SPARE_HOME_m = 0.01
+"""Cable paid out at home in addition to what the stand needs."""
+_STILL_m = 0.001
+_RUNNING_IN_m_s = 0.02
+_STILL_S = 1.0
+_FADE_S = 0.2
+_MOST_S = 30.0
+"""Time for setting down, in addition to that for the distance at `UNKNOWN_POSE_m_s`."""
+
+
+def lowering_s(platform: Platform) -> float:
+    """Return the longest that `lower` may take, from anywhere in the box of targets."""
+    return _home_s(platform) + _down_s(platform) + _STILL_S + _FADE_S
+
+
+def _home_s(platform: Platform) -> float:
+    share = min(HOME_SPEED_m_s / platform.speed_m_s, 1.0)
+    way_s = _reach_m(platform) / platform.speed_m_s
+    turn_s = platform.workspace_angle_rad / platform.angular_speed_rad_s
+    braking_s = max(
+        platform.speed_m_s / platform.acceleration_m_s2,
+        platform.angular_speed_rad_s / platform.angular_acceleration_rad_s2,
+    )
+    return _LATE * (max(way_s, turn_s) / share + 2.0 * braking_s) + _ARRIVING_S
+
+
+def _down_s(platform: Platform) -> float:
+    return _MOST_S + _reach_m(platform) / UNKNOWN_POSE_m_s
+
+
+def _reach_m(platform: Platform) -> float:
+    """Return the largest distance of a target from home."""
+    box = platform.workspace_min_m, platform.home_m, platform.workspace_max_m
+    sides = [max(home - low, high - home) for low, home, high in zip(*box, strict=True)]
+    return math.hypot(*sides)
+
+
+class LowerProgram(PlatformProgram):
+    """Returns the platform to its stand and slackens the cables there.
+
+    With slack cables or the argument `blind`, for a pose that may be wrong, no measured pose is
+    used: every winch pays out at a limited speed and limited tension, and the platform sinks.
+
+    A small tension does not prove that a platform stands: friction of the winches may hold it. So
+    each winch pays out what its cable needs to reach the stand from the last set-point, against its
+    friction if necessary. A winch that a push beyond that friction does not turn ignores commands,
+    or holds its cable without power too. The program ends when the torque has faded out and then no
+    cable has run out for a second.
+    """
+
+    name = "lower"
+    needs_lease = False
+
+    def __init__(
+        self,
+        parts: PlatformParts,
+        torque_Nm: FloatArray,
+        cable_m: FloatArray,
+    ) -> None:
+        super().__init__(parts, torque_Nm)
+        self._arrival = Arrival(parts.period_s, _ARRIVED_m, _ARRIVED_S, _ARRIVING_S)
+        control = parts.control
+        inertia = np.full(cable_m.size, control.inertia_kg_m2)
+        self._winches = WinchSpeedLoop(inertia, cable_m, parts.period_s)
+        self._weight_only = parts.model.least_tensions(np.zeros(cable_m.size), parts.model.high_N)
+        self._weight = parts.model.weight()
+        self._W = np.zeros((self._weight.size, cable_m.size))
+        self._there = parts.model.pose(parts.model.home)
+        self._weight_tension_N = np.zeros(cable_m.size)
+        self._high = np.minimum(parts.model.high_N, torque_Nm / np.abs(cable_m))
+        self._least = np.array(control.least_N)
+        self._push_N = PUSH_SHARE * self._rubs_N(cable_m)
+        self._at_home_m = parts.model.kinematics.lengths(parts.model.home_pose)
+        self._stretch_m = self._largest_stretch_m()
+        self._home_s, self._down_s = _home_s(parts.platform), _down_s(parts.platform)
+        self._drum_tension_N = np.zeros(cable_m.size)
+        self._cable = np.array(cable_m)
+        self._here = np.zeros(cable_m.size)
+        self._stage = self._trouble = ""
+        self._cycles = self._still = 0
+        self._without_pose = self._was_tight = False
+        self._velocity = parts.estimator.estimate.velocity_rad_s
+
+    def start(self, feedback: AxisFeedback, setpoint: Setpoint, torque_Nm: FloatArray) -> None:
+        """Go on from the present set-point and torque, (n,) each."""
+        self._cycles = self._still = 0
+        self._was_tight = self._parts.tight
+        self._without_pose = not self._was_tight
+        self._trouble = ""
+        self._winches.left_m[:] = 0.0  # from a lowering that was interrupted
+        # slack cables stay as loose as they are
+        self._drum_tension_N[:] = 0.0 if self._without_pose else DRUM_TENSION_SHARE * self._least
+        self._stage = "home"
+        if self._parts.tight:
+            super().start(feedback, setpoint, torque_Nm)
+            self._target[:] = self._parts.model.home
+            self._acceleration[:] = self._parts.acceleration
+            self._speed[:] = self._parts.speeds(HOME_SPEED_m_s)
+        self._at_rest = self._stopping = False
+
+    def update(self, feedback: AxisFeedback, setpoint: Setpoint, torque_Nm: FloatArray) -> None:
+        """Write this cycle's set-point and torques, (n,) each, in place."""
+        self._cycles += 1
+        if self._stage == "home" and not self._without_pose:
+            super().update(feedback, setpoint, torque_Nm)
+            self._at_rest = False
+            if self._arrival.over:
+                self._need(_SPARE_HOME_m + self._lag_m())
+                self._pay_out(feedback, torque_Nm, SET_DOWN_m_s, FIXED_END_1_s)
+            elif self._cycles * self._parts.period_s > self._home_s:
+                self._without_pose = True  # obstructed
+            return
+        if self._stage == "home":
+            if self._parts.tight:
+                self._parts.last_stop.displaced = True
+                self._need(SPARE_m + self._parts.platform.home_tolerance_m)
+                self._carry_weight(torque_Nm)
+            self._pay_out(feedback, torque_Nm, UNKNOWN_POSE_m_s, HANGING_LOAD_1_s)
+        setpoint.position_rad[:] = feedback.position_rad
+        setpoint.velocity_rad_s[:] = setpoint.acceleration_rad_s2[:] = 0.0
+        self._winches.update(feedback, torque_Nm)
+        self._watch_rest(feedback)
+        if self._at_rest:
+            torque_Nm[:] = 0.0
+
+    def stop(self) -> None:
+        """Go on: lowering is the quickest stop; it is at rest when the platform stands."""
+        self._control.stand_in()
+
+    def progress(self) -> dict[str, Any]:
+        """Return the stage, tensions, whether the cables were tight, the end, and trouble."""
+        state = {
+            "stage": self._stage,
+            "blind": self._without_pose,
+            "was_tight": self._was_tight,
+            "done": float(self._at_rest),
+        }
+        if self._stage == "home":
+            return {**super().progress(), **state}
+        tension_N = np.maximum(self._winches.tension_N, 0.0).tolist()
+        return {"tension_N": tension_N, "trouble": self._trouble, **state}
+
+    def check(self, arguments: Mapping[str, Any]) -> bool:
+        """Return checked arguments for `apply`; raises ProgramError."""
+        CommandArguments(self.name, arguments, ("blind",))
+        blind = arguments.get("blind", False)
+        if not isinstance(blind, bool):
+            raise ProgramError(f"lower: blind: value {blind!r}; allowed: true or false")
+        return blind
+
+    def _apply(self, blind: bool) -> None:
+        self._without_pose = self._without_pose or blind
+
+    def _rubs_N(self, cable_m: FloatArray) -> FloatArray:
+        """Return how much of its cable's tension each winch's friction may take up, (n,)."""
+        known = self._parts.compensation
+        known_N = 0.0 if known is None else known.friction_Nm / np.abs(cable_m)
+        return np.asarray(np.maximum(known_N, self._control.pull_fit.taken_up_N))
+
+    def _largest_stretch_m(self) -> FloatArray:
+        """Return how far the highest tensions stretch the cables at home, (n,)."""
+        high_N, at_home_m = self._parts.model.high_N, self._control.lengths_at_home
+        stretch_m = at_home_m(self._least) - at_home_m(high_N)
+        return np.asarray(stretch_m * high_N / (high_N - self._least))
+
+    def _need(self, spare_m: float) -> None:
+        """Set the length each cable needs from the set-point to the stand, plus `spare_m`.
+
+        The platform was no farther than the set-point, and a jump of an encoder does not affect it.
+        """
+        self._there.array[:] = self._parts.model.poses(self._control.shaped[None])[0]
+        here_m = self._parts.model.kinematics.lengths(self._there)
+        self._winches.left_m[:] = self._at_home_m - here_m + self._stretch_m + spare_m
+
+    def _carry_weight(self, torque_Nm: FloatArray) -> None:
+        """Begin with the tensions that carry the weight at `_there`, without pretension.
+
+        Pretension would fling the platform if one of the cables has broken. So would tensions for
+        the estimated pose, which follows a cable that runs in or an encoder that jumps.
+        """
+        kinematics = self._parts.model.kinematics
+        kinematics.wrench_matrix(self._there, self._W)
+        hanging, rise_N = kinematics.hanging(self._there)
+        self._weight_only.solve(self._W, self._weight + hanging, self._weight_tension_N)
+        self._weight_tension_N += rise_N
+        torque_Nm[:] = -self._cable * np.maximum(self._weight_tension_N, self._drum_tension_N)
+
+    def _pay_out(
+        self, feedback: AxisFeedback, torque_Nm: FloatArray, speed_m_s: float, rate_1_s: float
+    ) -> None:
+        self._parts.tight = False
+        self._stage = "down"
+        self._still = self._cycles = 0
+        winches = self._winches
+        winches.low_N[:], winches.high_N[:] = self._drum_tension_N, self._high
+        winches.push_N[:] = self._push_N
+        winches.paying_out_m_s[:] = speed_m_s
+        winches.fastest_in_m_s = FASTEST_IN_m_s
+        winches.integral_rate_1_s = rate_1_s
+        # faster than the platform can move: a jump of the encoder
+        parts = self._parts
+        fastest = _FASTEST * np.linalg.norm(parts.scale_m * parts.speed) / np.abs(self._cable)
+        plausible = np.abs(self._velocity) < fastest
+        winches.begin(feedback, np.where(plausible, self._velocity, 0.0), torque_Nm)
+        self._control.clear_compensation()
+
+    def _watch_rest(self, feedback: AxisFeedback) -> None:
+        winches, period_s = self._winches, self._parts.period_s
+        low_N = winches.low_N
+        # a cable that runs in carries nothing, even if its winch trembles: it may be broken
+        running_in = self._cable * winches.speed_rad_s < -_RUNNING_IN_m_s
+        bottom_N = np.where(winches.left_m > 0.0, -winches.push_N, low_N)
+        unloaded = winches.tension_N <= bottom_N + _LIGHT * np.abs(bottom_N)
+        light = not low_N.any() or bool((unloaded | running_in).all())
+        paid_out_m = float((self._cable * (feedback.position_rad - self._here)).max())
+        if not light or paid_out_m > _STILL_m:
+            self._here[:] = feedback.position_rad
+            self._still = 0
+        self._still += 1
+        if self._stage == "fade" and low_N.any():
+            low_N -= self._drum_tension_N * (period_s / _FADE_S)
+            np.maximum(low_N, 0.0, out=low_N)
+            self._still = 0
+        elif self._still * period_s > _STILL_S or self._cycles * period_s > self._down_s:
+            self._at_rest = not low_N.any()
+            if self._stage == "down":
+                if self._still * period_s <= _STILL_S:
+                    self._parts.last_stop.fallen = True
+                    self._trouble = (
+                        f"the platform did not come to rest within {self._down_s:.0f} s; it may "
+                        "fall when the power goes"
+                    )
+                self._stage = "fade"
+                low_N[winches.left_m > 0.0] = 0.0
+                winches.left_m[:] = 0.0

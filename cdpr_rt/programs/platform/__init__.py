@@ -1,1 +1,0 @@
-"""Programs that move the platform by all its cables."""

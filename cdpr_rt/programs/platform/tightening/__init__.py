@@ -1,1 +1,0 @@
-"""Tightening of a platform's cables, from slack ones to a pose that is controlled."""

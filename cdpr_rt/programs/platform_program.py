@@ -1,0 +1,423 @@
+"""Base class of the programs that move a platform, and what they share."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from cdpr_profiles.robot import default_name
+from cdpr_rt.arrays import FloatArray
+from cdpr_rt.control.base import Controller
+from cdpr_rt.control.compensation import Compensation
+from cdpr_rt.core.estimate import Estimator
+from cdpr_rt.core.exchange import AxisFeedback, Setpoint
+from cdpr_rt.jit import jit
+from cdpr_rt.model.free_rotation_kernel import SWINGS_m
+from cdpr_rt.model.last_lengths import LastLengths
+from cdpr_rt.model.platform_model import PlatformModel
+from cdpr_rt.model.pose_tracking import pose_of_coordinates, write_quaternion
+from cdpr_rt.model.robot_arrays import LEAST_REDUNDANCY, exit_point_diagonal_m
+from cdpr_rt.motion.trajectory import approach, stopping_position
+from cdpr_rt.platform.cable_control import CableControl
+from cdpr_rt.programs.base import BumplessTransfer, CommandedProgram, ProgramError
+from cdpr_rt.programs.path_store import PathStore
+from cdpr_rt.refusal import CommandRefusal, RefusalCode
+
+# When a platform has arrived at a set-point at rest.
+
+NEAR_m, NEAR_SHARE = 5e-4, 1e-4
+"""Within this distance a platform has arrived, unless friction keeps it farther away. On a large
+robot, whose long cables stretch and sag more: this share of the diagonal of its frame."""
+_NEAR_S = 0.2
+_WAITED_S = 5.0
+
+
+class Arrival:
+    """Counts the cycles in which a set-point stands, and those in which the platform is near it.
+
+    It is over once the platform has been within `near_m` for `near_s`, or the set-point has stood
+    for `waited_s` without that.
+    """
+
+    def __init__(
+        self,
+        period_s: float,
+        near_m: float = NEAR_m,
+        near_s: float = _NEAR_S,
+        waited_s: float = _WAITED_S,
+    ) -> None:
+        self.near_m = near_m
+        self._near_cycles, self._most_cycles = round(near_s / period_s), round(waited_s / period_s)
+        self._near = self._standing = 0
+        self.off_m = 0.0
+        """How far the platform was from its set-point in the last cycle."""
+
+    def restart(self) -> None:
+        """Begin again, for a set-point that is about to move."""
+        self._near = self._standing = 0
+        self.off_m = 0.0
+
+    def update(self, standing: bool, off_m: float) -> None:
+        """Count a cycle in which the set-point stands or not, the platform `off_m` from it."""
+        self._standing = self._standing + 1 if standing else 0
+        self._near = self._near + 1 if standing and off_m < self.near_m else 0
+        self.off_m = off_m
+
+    @property
+    def over(self) -> bool:
+        """Whether the wait is over."""
+        return self._near > self._near_cycles or self._standing > self._most_cycles
+
+    def text(self) -> str:
+        """Return how far from the set-point the platform has stayed, "" if it has arrived."""
+        if not self.over or self._near > self._near_cycles:
+            return ""
+        return f"the platform stands {1e3 * self.off_m:.1f} mm from its target"
+
+
+_SLOWED_m, _WAITING_m = 0.02, 0.05
+_LEAST_PACE = 1e-3
+_LEAST_SHARE = 1e-6
+_TOLD_DIGITS = 3
+
+
+@jit
+def distance_m(here: FloatArray, there: FloatArray, scale: FloatArray) -> float:
+    """Return the distance of two positions (d,), whose entries count for `scale` metres."""
+    square = 0.0
+    for i in range(scale.size):
+        square += (scale[i] * (here[i] - there[i])) ** 2
+    return math.sqrt(square)
+
+
+@jit
+def along_velocity(velocity: FloatArray, most: FloatArray, acceleration: FloatArray) -> None:
+    """Write accelerations, up to `most`, that end all velocities in the same time; all are (n,)."""
+    longest = 0.0
+    for i in range(most.size):
+        longest = max(longest, abs(velocity[i]) / most[i])
+    for i in range(most.size):
+        share = 1.0
+        if longest > 0.0:
+            share = max(abs(velocity[i]) / most[i] / longest, _LEAST_SHARE)
+        acceleration[i] = share * most[i]
+
+
+@jit
+def synchronise(position: FloatArray, target: FloatArray, most: FloatArray) -> None:
+    """Lower bounds `most` of speed or acceleration so that all ways take the same time; (d,)."""
+    longest = 0.0
+    for i in range(most.size):
+        longest = max(longest, abs(target[i] - position[i]) / most[i])
+    if longest > 0.0:
+        for i in range(most.size):
+            share = abs(target[i] - position[i]) / most[i] / longest
+            most[i] *= max(share, _LEAST_SHARE)
+
+
+_TOLD_APART_m = 0.005
+"""Least residual that shows whether a platform stood at home: geometry errors cause some mm."""
+
+
+class PlatformParts:
+    """The parts that the programs of one platform share: control, estimator, bounds, state."""
+
+    def __init__(
+        self,
+        model: PlatformModel,
+        control: CableControl,
+        estimator: Estimator,
+        period_s: float,
+        compensation: Compensation | None = None,
+        lengths_disagree_m: float = math.inf,
+        names: Sequence[str] = (),
+    ) -> None:
+        self.model, self.platform = model, model.platform
+        self.lengths_allowed_m = lengths_disagree_m
+        """By how much the cables' lengths may disagree."""
+        self.home_lengths_allowed_m = min(model.platform.home_tolerance_m, lengths_disagree_m)
+        """The same at home, where the error of the drums has no effect."""
+        self.names = tuple(names) or tuple(map(default_name, range(control.torque_Nm.size)))
+        """Names of the cables in messages, those of their axes."""
+        self.near_m = max(NEAR_m, NEAR_SHARE * exit_point_diagonal_m(model.platform))
+        """Distance from its set-point within which a platform has arrived."""
+        self.compensation = compensation
+        self.last_stop = LastLengths()
+        """The lengths at the last stop."""
+        self.paths = PathStore(model)
+        """The planned paths."""
+        self.control = control
+        self.estimator = estimator
+        self._origins_lost = estimator.origins_lost
+        known = estimator.estimate
+        control.measure_tensions(known.tension_N, known.tension_measured)
+        self.period_s = period_s
+        self.speed, self.acceleration = model.speed, model.acceleration
+        """The most along each direction, (d,)."""
+        self.scale_m = model.wrench_scale
+        """How far an anchor point moves with each direction, (d,): 1, and for angles an arm."""
+        self.not_calibrated_reason = ""
+        """Why the geometry is unreliable, for example because a rail has moved; else empty."""
+        self.off_home = ""
+        """How far it may stand from the pose of its lengths, which were taken at home."""
+        self.off_home_by = np.zeros(model.size)
+        """Distance from home by the lengths when they were taken there, (d,); 0 if that is no cause
+        of `off_home`."""
+        self.cycle = -2
+        """The last cycle in which one of the programs moved the platform."""
+        self.tight = False
+        self.loop = BumplessTransfer(control, control.torque_Nm, period_s)
+        """The platform's control, which keeps its state from one program to the next."""
+
+    @property
+    def tight(self) -> bool:
+        """Whether all cables are tight and carry the platform at a known pose."""
+        return not self.estimator.estimate.slack_allowed
+
+    @tight.setter
+    def tight(self, tight: bool) -> None:
+        self.estimator.estimate.slack_allowed = not tight
+
+    @property
+    def pose_known(self) -> bool:
+        """Whether the pose of the platform is known."""
+        return bool(self.estimator.estimate.length_known.all())
+
+    def speeds(self, most_m_s: float) -> FloatArray:
+        """Return speeds (d,): of positions up to `most_m_s`, of angles reduced in proportion."""
+        return self.speed * min(most_m_s / float(self.speed[0]), 1.0)
+
+    def notices(self) -> list[str]:
+        """Return what an operator should know of the robot."""
+        broken = self.last_stop.broken
+        mend = f"{broken}: mend the cable, then `cdpr tighten --from home`" if broken else ""
+        if self._shows_right_lengths():
+            self.off_home = ""
+        told = (self.not_calibrated_reason, mend, *self.control.notices(), self.off_home)
+        return [text for text in told if text]
+
+    def _shows_right_lengths(self) -> bool:
+        """Return whether the lengths agree better than they could if `off_home` were right.
+
+        Lengths taken at home while the platform stood off it by δ are J_h δ too long, and leave
+        residuals (I - J J^+) J_h δ elsewhere.
+        """
+        if not self.off_home or not self.tight or not self.off_home_by.any():
+            return False
+        kinematics, model = self.model.kinematics, self.model
+        J_home = kinematics.wrench_matrix(model.home_pose).T.copy()
+        J = kinematics.wrench_matrix(model.pose(self.control.estimated)).T
+        P = np.eye(len(J)) - J @ np.linalg.pinv(J)
+        redundancy = np.maximum(np.diag(P), LEAST_REDUNDANCY)
+        expected_m = np.abs(P @ J_home @ self.off_home_by) / np.sqrt(redundancy)
+        return bool(max(2.0 * self.control.residual_m, _TOLD_APART_m) < expected_m.max())
+
+    def lengths_disagree(self) -> tuple[float, int, float, int]:
+        """Return how much the lengths disagree and the index of the worst cable; 0 while slack.
+
+        Then the largest sudden change of a length, and the index of its cable.
+        """
+        control = self.control
+        if not self.tight:
+            return 0.0, -1, 0.0, -1
+        return control.residual_m, control.suspect, control.jump_m, control.jumped
+
+    def suspects_text(self) -> str:
+        """Return which cable's length is most likely wrong, as the end of a message."""
+        names = [self.names[i] for i in self.control.suspects()]
+        which = "most likely that of" if len(names) == 1 else "one of"
+        return f", {which} {', '.join(names)}" if names else ""
+
+    def assume_at_home(self, feedback: AxisFeedback) -> None:
+        """Take the platform to be at home on tight cables, for the warm-up."""
+        lengths_m = self.control.lengths_at_home(self.control.least_N)
+        self.control.take_lengths(lengths_m, feedback)
+        self.control.begin(feedback)
+        self.estimator.set_lengths(feedback.position_rad, self.control.free_lengths_m)
+        self.tight = True
+
+    def slacken(self) -> None:
+        """Mark the cables as slack; a platform that they carried may have moved."""
+        self.last_stop.displaced = self.last_stop.displaced or self.tight
+        self.tight = False
+
+    def forget(self) -> None:
+        """Forget the pose of the platform, as if it stood at home."""
+        self.tight = self.last_stop.displaced = self.last_stop.fallen = False
+        self.last_stop.contradicted = ""
+        self.estimator.forget_lengths()
+        self.control.reset()
+        self.follow_origins()
+
+    def follow_origins(self) -> None:
+        """Forget what was learnt of motors whose angles have a new origin since."""
+        if self._origins_lost != self.estimator.origins_lost:
+            self._origins_lost = self.estimator.origins_lost
+            self.control.forget_motors()
+
+
+class PlatformProgram(CommandedProgram):
+    """Brakes and holds the platform on tight cables; subclasses override `_move`.
+
+    The pose has to be known: `tighten` finds it.
+    """
+
+    name = "platform"
+    needs_lease = False
+
+    def __init__(self, parts: PlatformParts, _torque_Nm: FloatArray) -> None:
+        self._parts = parts
+        self.controller: Controller = parts.control
+        self._control = parts.control
+        self._loop = parts.loop
+        model = parts.model
+        self._k = model.positions
+        self._about = np.array(model.kinematics.directions[self._k :], np.int64) - 3
+        self._target, self._rest, self._paced = np.zeros((3, model.size))
+        self._speed, self._acceleration = np.array(parts.speed), np.array(parts.acceleration)
+        self._directions = np.array(model.kinematics.directions)
+        self._wanted, self._scratch, self._seen = np.zeros((4, 3)), np.zeros((4, 3)), np.zeros(7)
+        self._arrival = Arrival(parts.period_s, parts.near_m)
+        # compiled here, not when the first pose is recorded
+        self._write_setpoint(self._target)
+
+    def start(self, feedback: AxisFeedback, _setpoint: Setpoint, torque_Nm: FloatArray) -> None:
+        """Go on from the present set-point and torque; the platform brakes and stays."""
+        parts, control = self._parts, self._control
+        self._stopping = False
+        self._at_rest = False
+        self._arrival.restart()
+        if feedback.cycle - parts.cycle not in (0, 1):
+            if parts.pose_known:
+                control.take_lengths(parts.estimator.estimate.cable_length_m, feedback)
+            control.begin(feedback)
+            control.stand_still()
+            self._loop.take_over(feedback, torque_Nm)
+        self._speed[:] = parts.speed
+        self._brake()
+
+    def update(self, feedback: AxisFeedback, setpoint: Setpoint, torque_Nm: FloatArray) -> None:
+        """Write this cycle's set-point and torques, (n,) each, in place."""
+        self._parts.cycle = feedback.cycle
+        if self._stopping:
+            self._at_rest = self._approach()
+        else:
+            self._at_rest = self._move()
+        self._loop.update(feedback, setpoint, torque_Nm)
+        self._arrival.update(self._at_rest, self._lag_m())
+
+    def stop(self) -> None:
+        """Begin to brake to a standstill, with the built-in controller."""
+        super().stop()
+        self._control.stand_in()
+        self._brake()
+
+    def _require_pose(self) -> None:
+        """Raise ProgramError if the platform must not be moved to a pose."""
+        parts = self._parts
+        if doubt := parts.not_calibrated_reason or parts.last_stop.contradicted:
+            why = {"why": doubt}
+            raise ProgramError(CommandRefusal(RefusalCode.NOT_CALIBRATED, self.name, arguments=why))
+        if not parts.tight:
+            raise ProgramError(CommandRefusal(RefusalCode.NOT_TIGHT, self.name))
+
+    @property
+    def pose(self) -> FloatArray | None:
+        """Return the pose of the platform, (7,)."""
+        return self._control.pose if self._parts.pose_known else None
+
+    @property
+    def pose_setpoint(self) -> FloatArray | None:
+        """Return the commanded pose, (7,)."""
+        if not self._parts.pose_known:
+            return None
+        self._write_setpoint(self._control.shaped)
+        return self._seen
+
+    def _write_setpoint(self, position: FloatArray) -> None:
+        home = self._parts.model.home_pose.array
+        pose_of_coordinates(position, self._directions, home, self._scratch, self._wanted)
+        write_quaternion(self._wanted, self._seen)
+
+    def progress(self) -> dict[str, Any]:
+        """Return position, target, tensions and why these are infeasible."""
+        control, k = self._control, self._k
+        turned = {
+            "rotation_rad": control.estimated[k:].tolist(),
+            "target_rotation_rad": self._target[k:].tolist(),
+        }
+        learnt = control.learnt_Nm
+        friction, cogging = ([], []) if learnt is None else learnt.round(_TOLD_DIGITS).tolist()
+        return {
+            "learnt_friction_Nm": friction,
+            "learnt_cogging_Nm": cogging,
+            "position_m": control.estimated[:k].tolist(),
+            "target_m": self._target[:k].tolist(),
+            **(turned if self._about.size else {}),
+            "tension_N": control.tension_N.tolist(),
+            "missing": control.tension_infeasibility(),
+            "held_back": self._held_back(),
+            "done": float(self._at_rest and self._arrival.over),
+            "trouble": self._arrival.text() or self._swing_text(),
+        }
+
+    def _swing_text(self) -> str:
+        """Return how far a platform that has arrived may still swing, "" for little."""
+        swing_rad, swing_m = self._control.swing_rad, self._control.swing_m
+        if not self._arrival.over or swing_m < SWINGS_m:
+            return ""
+        return (
+            f"the platform may still turn to and fro by {math.degrees(swing_rad):.1f} deg or more, "
+            f"its anchor points by {1e3 * swing_m:.0f} mm: no cable keeps it from turning"
+        )
+
+    def _held_back(self) -> str:
+        """Return why the set-point is slowed down, "" if it is not."""
+        lag_m = self._lag_m()
+        if lag_m < _WAITING_m or not self._parts.pose_known:
+            return ""
+        return f"the platform is {1e3 * lag_m:.0f} mm behind: friction, or something in its way"
+
+    def _move(self) -> bool:
+        """Move the platform's set-point; return whether it has arrived."""
+        return self._approach()
+
+    def _lag_m(self) -> float:
+        """Return how far the platform is from its set-point, at its anchor points."""
+        control = self._control
+        return distance_m(control.shaped, control.estimated, self._parts.scale_m)
+
+    def _pace(self) -> FloatArray:
+        """Return the set-point's speed, reduced the more the platform lags; overwritten.
+
+        If the set-point ran away from a stuck platform, a following error would result.
+        """
+        share = 1.0
+        if not self._stopping:
+            share = (_WAITING_m - self._lag_m()) / (_WAITING_m - _SLOWED_m)
+        np.multiply(self._speed, min(max(share, _LEAST_PACE), 1.0), out=self._paced)
+        return self._paced
+
+    def _approach(self) -> bool:
+        return self._go_towards(self._target)
+
+    def _go_towards(self, goal: FloatArray) -> bool:
+        control = self._control
+        return approach(
+            goal, self._pace(), self._acceleration, self._parts.period_s, control.position,
+            control.velocity, control.acceleration,
+        )  # fmt: skip
+
+    def _brake(self) -> None:
+        """Bring the set-point to rest on the straight line on which it moves."""
+        along_velocity(self._control.velocity, self._parts.acceleration, self._acceleration)
+        self._target[:] = self._stopping_position()
+
+    def _stopping_position(self) -> FloatArray:
+        """Return the position at which it comes to rest if it brakes from now on; overwritten."""
+        control = self._control
+        stopping_position(control.position, control.velocity, self._acceleration, self._rest)
+        return self._rest

@@ -1,0 +1,229 @@
+"""Checks by cables that are just tight whether a platform stands as `tighten` assumes."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from cdpr_rt.arrays import FloatArray
+from cdpr_rt.core.exchange import AxisFeedback
+from cdpr_rt.model.rigid_body import G_m_s2
+from cdpr_rt.model.standing_tensions import StandingTensions
+from cdpr_rt.programs.platform_program import PlatformParts, distance_m
+from cdpr_rt.refusal import CommandRefusal, RefusalCode
+
+_TURNED_MORE_rad = math.radians(30.0)
+"""A platform may stand turned by this much more than it turns in use."""
+_MOST_LOOKS = 200
+_CARRIED_SHARE = 0.8
+"""Sum of the tensions over the weight below which the cables do not carry the platform."""
+_FALLEN = (
+    "the platform hung when the power was taken, or a drive or cable lost: it has come down, "
+    "may have turned over, and cables may lie around it. Look at it. Where it stands at home, "
+    "upright, all cables free: tighten from home"
+)
+_FALLEN_ELSEWHERE = "; where it stands so elsewhere: from lengths"
+
+
+def bad_source(asked: Mapping[str, Any], why: str, *allowed: str) -> CommandRefusal:
+    """Return the refusal to take the cables' lengths from the source in `asked`."""
+    arguments = {"why": why, "allowed": allowed}
+    return CommandRefusal(RefusalCode.BAD_SOURCE, "tighten", asked, arguments)
+
+
+def source_refusal(
+    parts: PlatformParts, source: str, asked: Mapping[str, Any]
+) -> CommandRefusal | None:
+    """Return why not to take the lengths from a source, None for nothing.
+
+    After a fall or a release of the platform the source has to be `asked` for by name.
+    """
+    last = parts.last_stop
+    if asked and parts.tight:
+        return bad_source(asked, "the cables are tight already; lower it first")
+    if last.fallen and not asked:
+        elsewhere, allowed = (_FALLEN_ELSEWHERE, ("lengths",)) if parts.pose_known else ("", ())
+        return bad_source(asked, _FALLEN + elsewhere, "home", *allowed)
+    if source == "home" and last.displaced and not asked:
+        why = "the platform was released elsewhere, and its place is not known; stand it at home"
+        return bad_source(asked, why, "home")
+    if source == "lengths" and (last.contradicted or not parts.pose_known):
+        why = last.contradicted or "the cables' lengths are not known"
+        return bad_source(asked, why, "home")
+    if source == "last" and last.lengths is None:
+        return bad_source(asked, f"no lengths of the last stop: {last.why}")
+    why = ""
+    if source == "home" and parts.pose_known and not parts.tight and not last.contradicted:
+        why = why_not_to_wind_in(parts, parts.estimator.estimate.cable_length_m)
+    return bad_source(asked, why) if why else None
+
+
+def why_not_to_wind_in(parts: PlatformParts, length_m: FloatArray) -> str:
+    """Return why not to wind in the slack of a platform said to stand at home, "" for nothing.
+
+    Winding in alone may drag a platform along that lies elsewhere. If cables of length `length_m`
+    (n,) do not even reach home, within its tolerance and that of lengths, it is not at home,
+    however slack they are. One cable may have slipped, as in `why_not_at_home`.
+    """
+    short_m = parts.control.lengths_at_home(np.zeros(length_m.size)) - length_m
+    allowed_m = parts.platform.home_tolerance_m + parts.home_lengths_allowed_m
+    many = np.count_nonzero(short_m > allowed_m)
+    if many <= 1:
+        return ""
+    return _not_at_home(
+        f"{many} cables are up to {1e3 * short_m.max():.0f} mm too short to reach there, "
+        f"{1e3 * allowed_m:.0f} mm allowed"
+    )
+
+
+def why_not_at_home(
+    parts: PlatformParts, length_m: FloatArray, tension_N: FloatArray, feedback: AxisFeedback
+) -> str:
+    """Return why not to pull at a platform said to stand at home, "" for nothing.
+
+    The cables' lengths `length_m` (n,), tracked since they were known, have to be those of home at
+    `tension_N` (n,), each within the tolerance of home and that of lengths. One may be further off:
+    its cable has slipped if the lengths disagree. If they agree, their pose has to be near home.
+    Far from home no pose is searched, since several may belong to the lengths.
+    """
+    control = parts.control
+    off_m = np.abs(length_m - control.lengths_at_home(tension_N))
+    allowed_m = parts.platform.home_tolerance_m + parts.home_lengths_allowed_m
+    many = np.count_nonzero(off_m > allowed_m)
+    if many > 1:
+        return _not_at_home(
+            f"the lengths of {many} cables are up to {1e3 * off_m.max():.0f} mm from those there, "
+            f"{1e3 * allowed_m:.0f} mm allowed"
+        )
+    control.take_lengths(length_m, feedback)
+    control.begin(feedback, tension_N)
+    here, home = control.estimated, parts.model.home
+    near = distance_m(here, home, parts.scale_m) <= parts.platform.home_tolerance_m
+    if near or disagreement(parts, "home"):
+        return ""
+    return _not_at_home(f"it is {_place(here, parts.model.positions)}")
+
+
+def _not_at_home(why: str) -> str:
+    return (
+        f"the platform is not at home: by its cables' lengths, followed since they were known, "
+        f"{why}; stand it at home, upright, all cables free. Where these lengths are wrong: end "
+        "the daemon and start it again"
+    )
+
+
+def why_not_to_pull(
+    parts: PlatformParts, length_m: FloatArray, tension_N: FloatArray, feedback: AxisFeedback
+) -> str:
+    """Return why not to pull at the platform where it is, "" for nothing.
+
+    Its pose follows from the cables' lengths `length_m` (n,) at `tension_N` (n,), which have to
+    agree. It must not be turned much, and the straight way home must be free of contact.
+    """
+    control, k = parts.control, parts.model.positions
+    control.take_lengths(length_m, feedback)
+    control.begin(feedback, tension_N)
+    if why := disagreement(parts):
+        return why
+    here, home = np.array(control.estimated), parts.model.home
+    near = parts.model.contact_on_way(np.array([here, home]), _MOST_LOOKS)
+    if not _turned_much(parts) and not near:
+        return ""
+    why = f"; on the way home from there, {near}" if near else ""
+    return _not_pulled(here, k, why)
+
+
+def would_move(parts: PlatformParts) -> str:
+    """Return the message that tight cables would move the platform from its place."""
+    why = ", where tight cables would pull it along"
+    return _not_pulled(parts.control.estimated, parts.model.positions, why)
+
+
+def hangs(parts: PlatformParts) -> bool:
+    """Return whether the cables' tensions may carry the platform, wherever it is."""
+    carried_N = float(np.nansum(parts.estimator.estimate.tension_N))
+    return carried_N > _CARRIED_SHARE * parts.platform.mass_kg * G_m_s2
+
+
+def rests_at_home(parts: PlatformParts, length_m: FloatArray, feedback: AxisFeedback) -> bool:
+    """Return whether a platform is at home by its cables' lengths (n,), and not carried by them.
+
+    After it was lowered, friction of the winches can leave tensions whose sum is its weight but
+    which nearly cancel each other.
+    """
+    control, model = parts.control, parts.model
+    control.take_lengths(length_m, feedback)
+    control.begin(feedback)
+    here = control.estimated
+    if distance_m(here, model.home, parts.scale_m) > parts.platform.home_tolerance_m:
+        return False
+    pose, up = model.pose(here), model.positions - 1
+    hanging, rise_N = model.kinematics.hanging(pose)
+    tension_N = np.nan_to_num(parts.estimator.estimate.tension_N) - rise_N
+    carried_N = (model.kinematics.wrench_matrix(pose) @ tension_N + hanging)[up]
+    return bool(carried_N < _CARRIED_SHARE * parts.platform.mass_kg * G_m_s2)
+
+
+def why_not_to_hold(
+    parts: PlatformParts, standing: StandingTensions, length_m: FloatArray, feedback: AxisFeedback
+) -> str:
+    """Return why a hanging platform must not be held by its pose, "" for nothing.
+
+    The pose follows from the cables' lengths `length_m` (n,), which have to agree. It must not be
+    turned much, and tensions within their bounds have to carry the platform there.
+    """
+    control, model = parts.control, parts.model
+    control.take_lengths(length_m, feedback)
+    control.begin(feedback)
+    why = _off(parts, parts.lengths_allowed_m)
+    carried = standing.carry(model.pose(control.estimated))
+    if not why and (_turned_much(parts) or not carried):
+        place = _place(control.estimated, model.positions)
+        why = f"by its cables' lengths it is {place}, where they could not hold it"
+    if not why:
+        return ""
+    return (
+        f"the platform may hang on its cables, and {why}: each cable is held as it is; lower it, "
+        "stand it at home and tighten from home"
+    )
+
+
+def _turned_much(parts: PlatformParts) -> bool:
+    turned_rad = float(np.linalg.norm(parts.control.estimated[parts.model.positions :]))
+    return turned_rad > parts.model.angle_rad + _TURNED_MORE_rad
+
+
+def _not_pulled(here: FloatArray, k: int, why: str) -> str:
+    return (
+        f"the platform is {_place(here, k)}{why}: it is not pulled at; stand it at home, upright, "
+        "all cables free, and tighten from home"
+    )
+
+
+def disagreement(parts: PlatformParts, source: str = "lengths") -> str:
+    """Return by how much the lengths in the control disagree, if too much."""
+    at_home = source == "home"
+    off = _off(parts, parts.home_lengths_allowed_m if at_home else parts.lengths_allowed_m)
+    if off and at_home:
+        return f"{off}; it does not stand at home, or a point is not where the robot's file has it"
+    return f"{off}; stand the platform at home and tighten from it" if off else ""
+
+
+def _off(parts: PlatformParts, allowed_m: float) -> str:
+    off_m = parts.control.residual_m
+    if off_m <= allowed_m:
+        return ""
+    return (
+        f"the cables' lengths disagree by {1e3 * off_m:.0f} mm, {1e3 * allowed_m:.0f} mm allowed"
+        f"{parts.suspects_text()}"
+    )
+
+
+def _place(here: FloatArray, k: int) -> str:
+    place = "at " + ", ".join(f"{1e3 * x:.0f}" for x in here[:k]) + " mm"
+    if here.size == k:
+        return place
+    return f"{place}, turned by {math.degrees(np.linalg.norm(here[k:])):.0f} deg"

@@ -1,0 +1,709 @@
+"""Program `tighten`: take up slack, pretension the cables, find the platform's pose."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+
+from cdpr_rt.arrays import BoolArray, FloatArray
+from cdpr_rt.control.winch_speed_loop import WinchSpeedLoop
+from cdpr_rt.core.exchange import AxisFeedback, Setpoint
+from cdpr_rt.model.last_lengths import (
+    StoppedLengths,
+    index_disagreement,
+    off_index_m,
+)
+from cdpr_rt.model.platform_model import PlatformModel
+from cdpr_rt.model.standing_tensions import OVERSHOOT, StandingTensions
+from cdpr_rt.programs.base import CommandArguments, ProgramError
+from cdpr_rt.programs.platform_program import Arrival, PlatformParts, PlatformProgram, distance_m
+from cdpr_rt.programs.slack import PULLED, TAKE_UP_SHARE, SlackTakeUp, Stillness, TAKE_UP_m_s
+from cdpr_rt.programs.standing import (
+    bad_source,
+    disagreement,
+    hangs,
+    rests_at_home,
+    source_refusal,
+    why_not_at_home,
+    why_not_to_hold,
+    why_not_to_pull,
+    would_move,
+)
+
+# A path of the platform on which every motor passes its index.
+
+_TURNS = 1.05
+"""Angle that each motor must turn, one turn with a margin."""
+_STEPS = 16
+
+
+def index_path(
+    model: PlatformModel, cable_m: FloatArray, feasible: Callable[[FloatArray], bool]
+) -> list[FloatArray]:
+    """Return positions (d,) to visit in order from home, so that each motor turns once.
+
+    Straight up as far as needed, then to the sides, not turned; all of it within the workspace and
+    at positions that are `feasible`. `cable_m` (n,) is paid out per radian.
+    """
+    platform, kinematics, k = model.platform, model.kinematics, model.positions
+    low, high = np.array(platform.workspace_min_m), np.array(platform.workspace_max_m)
+    home, unturned = model.home, np.zeros(model.size - k)
+    needed_m = _TURNS * math.tau * np.abs(cable_m)
+    shortest = longest = kinematics.lengths(model.pose(home))
+    path: list[FloatArray] = []
+    sides = itertools.product(*np.stack([low, high])[:, :-1].T)
+    for aside in (home[: k - 1], *map(np.array, sides)):
+        target = np.array([*aside, high[-1], *unturned])
+        start = path[0] if path else home
+        for step in range(1, _STEPS + 1):
+            there = start + step / _STEPS * (target - start)
+            inside = bool((there[:k] >= low).all()) or not path
+            if not inside or not feasible(there):
+                break
+            rho = kinematics.lengths(model.pose(there))
+            shortest, longest = np.minimum(shortest, rho), np.maximum(longest, rho)
+            enough = bool((longest - shortest >= needed_m).all())
+            if enough or step == _STEPS or not feasible(there + (target - start) / _STEPS):
+                path.append(there)
+                break
+        if (longest - shortest >= needed_m).all():
+            break
+    return path
+
+
+# Whether cables are tight while the force that presses a platform on its stand is released.
+
+_AGREE_m = 0.002
+"""By how much lengths just taken may disagree, in addition to stretch caused by friction."""
+_OFF_HOME_m = 0.006
+"""Distance from home, by lengths just taken there, up to which nothing is reported: friction on the
+stand causes up to 4 mm, which ends as winches turn."""
+_RUNS_IN_m_s = 0.2
+"""Speed that no winch reaches if its cable is tight while the platform stands."""
+_REMEDY = (
+    "take up slack by hand, have the platform held, or have the cables pulled with more than their "
+    "winches rub: see `cdpr robot show`"
+)
+
+
+class LettingGo:
+    """Detects slack cables that were taken for tight, by their speeds and lengths.
+
+    Lengths taken where the platform stands agree there, whatever the errors of the geometry. While
+    tensions change to those that hold it, friction of the winches explains a small disagreement. A
+    slack cable, which is reeled in meanwhile, exceeds that.
+    """
+
+    def __init__(self, parts: PlatformParts, cable_m: FloatArray, pretension_N: FloatArray) -> None:
+        """Take the pretension at home, (n,)."""
+        self._parts, self._cable = parts, cable_m
+        control = parts.control
+        rubbed_N = pretension_N + control.pull_fit.taken_up_N
+        stretch_m = control.lengths_at_home(pretension_N) - control.lengths_at_home(rubbed_N)
+        self._allowed_m = min(parts.home_lengths_allowed_m, _AGREE_m + float(stretch_m.max()))
+        self._inwards_m_s = np.zeros(cable_m.size)
+
+    def runs_in(self) -> str:
+        """Return which winch reels in faster than any with a tight cable, "" for none."""
+        velocity_rad_s = self._parts.estimator.estimate.velocity_rad_s
+        np.multiply(velocity_rad_s, self._cable, out=self._inwards_m_s)
+        i = int(self._inwards_m_s.argmin())
+        if self._inwards_m_s[i] >= -_RUNS_IN_m_s:
+            return ""
+        return (
+            f"{self._parts.names[i]}: its winch runs in with {-self._inwards_m_s[i]:.2f} m/s, "
+            f"{_RUNS_IN_m_s:g} m/s allowed: its cable was slack; {_REMEDY}"
+        )
+
+    def disagree(self) -> str:
+        """Return by how much lengths taken at home disagree, if too much, and the worst cable."""
+        control = self._parts.control
+        if control.residual_m <= self._allowed_m:
+            return ""
+        return (
+            f"the cables' lengths, just taken at home, disagree by {1e3 * control.residual_m:.1f} "
+            f"mm{self._parts.suspects_text()}; {1e3 * self._allowed_m:.1f} mm allowed, which "
+            "friction may make: a cable was slack, or the platform has moved on its stand; "
+            f"{_REMEDY}"
+        )
+
+    def off_home(self) -> str:
+        """Return how far from home the platform is by lengths taken there, "" for not far.
+
+        Cables that all sag more than expected do not contradict each other: the pull on heavy ones
+        may not overcome the friction of their winches.
+        """
+        parts = self._parts
+        here, home, k = parts.control.estimated, parts.model.home, parts.model.positions
+        off_m = distance_m(here, home, parts.scale_m)
+        if off_m <= _OFF_HOME_m:
+            return ""
+        off = f"{1e3 * float(np.linalg.norm(here[:k] - home[:k])):.0f} mm from there"
+        if here.size > k:
+            off += f", turned by {math.degrees(np.linalg.norm(here[k:])):.1f} deg"
+        return (
+            f"by the cables' lengths, taken at home, the platform is {off}: targets will be "
+            f"as far off, or further; cables sagged or were slack, or it has moved; {_REMEDY}, "
+            "and tighten from home again"
+        )
+
+
+# The cables' lengths from a platform that stands at home with tight cables.
+
+_CAME_IN_m = 0.003
+"""By how much more than twice its stretch a tight cable may come in when pulled harder: the stretch
+that friction had prevented before."""
+
+
+class LengthsAtHome:
+    """Lengths (n,) at home, by the tensions that load cells measure or that motors are to exert.
+
+    Without a load cell, the angle at the pretension is the one that the control's `pull_fit` finds,
+    without friction and cogging; else the mean of those reached from above and from below, in which
+    friction cancels out. Known cogging is corrected once the index is known.
+    """
+
+    def __init__(self, parts: PlatformParts, cable_m: FloatArray, pretension_N: FloatArray) -> None:
+        """Take the pretension at home, (n,)."""
+        n = cable_m.size
+        self._parts, self._cable = parts, np.array(cable_m)
+        self._rising_rad = np.zeros(n)
+        self._rad = np.full(n, np.nan)
+        """Angles at which lengths were taken, nan once they have been corrected."""
+        self._N, self._pretension_N = np.zeros(n), np.array(pretension_N)
+        """Tensions that stretched them then, and the pretension."""
+        self._sure = np.zeros(n, np.bool_)
+        """Which of these are free of a motor's cogging and friction."""
+        parts.control.pull_fit.prepare(pretension_N)
+
+    def forget(self) -> None:
+        """Discard the angles: nothing is left to correct."""
+        self._rad[:] = np.nan
+
+    def keep_rising(self, feedback: AxisFeedback) -> None:
+        """Keep the angles at the pretension, reached from below."""
+        self._rising_rad[:] = feedback.position_rad
+
+    def slack_before(self, feedback: AxisFeedback, harder: float) -> str:
+        """Return which cable was not tight when angles were kept, now pulled `harder`, "" for none.
+
+        A tight cable comes in by its stretch. Not needed if the lengths can contradict each other.
+        """
+        parts, pull_N = self._parts, self._pretension_N
+        if self._cable.size > parts.model.size:
+            return ""
+        in_m = (self._rising_rad - feedback.position_rad) * self._cable
+        stretch_m = parts.control.lengths_at_home(pull_N)
+        stretch_m -= parts.control.lengths_at_home(harder * pull_N)
+        allowed_m = 2.0 * stretch_m + _CAME_IN_m
+        i = int((in_m - allowed_m).argmax())
+        if in_m[i] <= allowed_m[i]:
+            return ""
+        return (
+            f"{parts.names[i]}: came in by {1e3 * in_m[i]:.1f} mm as it was pulled with "
+            f"{harder * pull_N[i]:.0f} N in place of {pull_N[i]:.0f} N, {1e3 * allowed_m[i]:.1f} "
+            "mm allowed: what it was pulled with before did not overcome its winch's friction, or "
+            "the platform has moved on its stand; take up slack by hand, or hold the platform"
+        )
+
+    def take(self, feedback: AxisFeedback) -> FloatArray:
+        """Return the lengths (n,) at the pretension, reached from above."""
+        control, estimate = self._parts.control, self._parts.estimator.estimate
+        measured, fitted_rad = estimate.tension_measured, control.pull_fit.end()
+        middle_rad = 0.5 * (feedback.position_rad + self._rising_rad)
+        found = np.isfinite(fitted_rad)
+        self._sure[:] = measured | found
+        self._rad[:] = np.where(found, fitted_rad, middle_rad)
+        self._rad[measured] = feedback.position_rad[measured]
+        self._N[:] = np.where(measured, estimate.tension_N, self._pretension_N)
+        turned_m = self._cable * (feedback.position_rad - self._rad)
+        return np.asarray(control.lengths_at_home(self._N) + turned_m)
+
+    def correct(self, feedback: AxisFeedback) -> None:
+        """Correct lengths for known cogging and friction, once the index is known.
+
+        These torques were part of the tensions by which the cables stretched.
+        """
+        parts, control, known = self._parts, self._parts.control, self._parts.compensation
+        if known is None or np.isnan(self._rad).any():
+            return
+        torque_error_N = known.standing_Nm(self._rad, feedback) / self._cable
+        torque_error_N[self._sure] = 0.0
+        stretch_error_m = control.lengths_at_home(self._N + torque_error_N)
+        stretch_error_m -= control.lengths_at_home(self._N)
+        self.forget()
+        length_m = parts.estimator.estimate.cable_length_m + stretch_error_m
+        parts.estimator.set_lengths(feedback.position_rad, length_m)
+        control.take_lengths(length_m, feedback)
+
+
+# Source of the cables' lengths when they are pulled tight, and the indices that check them.
+
+SOURCES = ("home", "lengths", "last")
+
+
+class LengthSource:
+    """Lengths (n,) by `home`, the stand of the platform, by the estimate, or by the last stop.
+
+    `name` is one of `SOURCES`.
+    """
+
+    def __init__(self, parts: PlatformParts, cable_m: FloatArray, pretension_N: FloatArray) -> None:
+        """Take the pretension at home, (n,)."""
+        self._parts, self._cable = parts, cable_m
+        self._last: StoppedLengths | None = None
+        self.at_home = LengthsAtHome(parts, cable_m, pretension_N)
+        self.name = "home"
+
+    @property
+    def default(self) -> str:
+        """The source if none is requested."""
+        return "lengths" if self._parts.pose_known else "home"
+
+    def begin(self) -> None:
+        """Begin again with the default."""
+        self.name, self._last = self.default, None
+
+    def before(self, source: str, feedback: AxisFeedback) -> FloatArray | None:
+        """Return the lengths (n,) that were known before, None if unknown."""
+        stopped, parts = self._parts.last_stop.lengths, self._parts
+        if source == "last" and stopped is not None:
+            return stopped.at(feedback.position_rad, self._cable)
+        known = parts.pose_known and not parts.last_stop.contradicted
+        return parts.estimator.estimate.cable_length_m if known else None
+
+    def take_last(self) -> None:
+        """Take the lengths of the last stop, which nobody can use then; forget those at home.
+
+        They are used if they are the source.
+        """
+        last = self._parts.last_stop.take()
+        self._last = last if self.name == "last" else None
+        self.at_home.forget()
+
+    def now(self, feedback: AxisFeedback) -> FloatArray:
+        """Return the cables' lengths, (n,), as they are now."""
+        if self.name == "last" and self._last is not None:
+            return self._last.at(feedback.position_rad, self._cable)
+        if self.name == "lengths":
+            return self._parts.estimator.estimate.cable_length_m
+        return self.at_home.take(feedback)
+
+    def lacks_index(self, feedback: AxisFeedback) -> BoolArray:
+        """Return which indices (n,) are missing that compensation or the last lengths need.
+
+        The indices check the lengths of the last stop.
+        """
+        compensated = self._parts.compensation
+        wanted = np.zeros(self._cable.size, np.bool_)
+        if compensated is not None:
+            wanted |= compensated.available
+        if self._last is not None:
+            wanted |= np.isfinite(self._last.cable_at_index_m)
+        return wanted & ~feedback.index_known
+
+    def check_by_indices(self, feedback: AxisFeedback) -> str:
+        """Correct the lengths by the indices; return how these contradict the last stop's."""
+        self.at_home.correct(feedback)
+        parts, last = self._parts, self._parts.last_stop
+        last.contradicted = ""
+        if self._last is not None:
+            length_m, allowed_m = parts.estimator.estimate.cable_length_m, parts.lengths_allowed_m
+            off_m = off_index_m(self._last, length_m, feedback, self._cable)
+            last.contradicted = index_disagreement(off_m, self._cable, allowed_m, parts.names)
+        last.displaced = bool(last.contradicted)
+        return last.contradicted
+
+
+INDEX_m_s = 0.1
+"""Speed of the platform during the search for indices."""
+_SETTLING_S = 0.5
+_RISE_1_s = 1.0
+_FALL_S = 0.2
+_HAND_OVER_S = 0.5
+_SLACK_m, _ONCE_TIGHT_m = 1.0, 0.05
+"""How far a cable may be wound in while some are slack, and once all are tight, plus stretch."""
+_TIGHT_WITHIN_S = 60.0
+
+_STAGES = (
+    ("slack", TAKE_UP_SHARE), ("pull", 1.0), ("below", 2.0 - OVERSHOOT), ("back", 1.0),
+    ("beyond", OVERSHOOT), ("lengths", 1.0),
+)  # fmt: skip
+_FITTED_FROM = 2
+"""Stage from which angles show what motors take up: the first rise takes winches along."""
+
+
+class TightenProgram(PlatformProgram):
+    """Takes up slack until all cables are tight and still, pretensions them, then holds.
+
+    The platform stays on its stand meanwhile: tensions grow together to those whose wrench presses
+    it down if the cables can do that, and has no horizontal component. The cables' lengths follow
+    from home, if it stands there, from the estimate, or from the last stop. If a motor's cogging is
+    known but not its index, the platform is lifted until all have passed theirs. The program ends
+    and slackens the cables again if a cable does not become tight, if lengths disagree, or if by
+    its lengths the platform is not at the expected pose. A platform that hangs because brakes have
+    kept it is held by its pose immediately, from the torques of the last cycle on. If the pose does
+    not follow from the lengths, the command is refused, and nothing changes.
+    """
+
+    name = "tighten"
+    needs_lease = True
+
+    def __init__(self, parts: PlatformParts, torque_Nm: FloatArray, cable_m: FloatArray) -> None:
+        super().__init__(parts, torque_Nm)
+        self._arrival = Arrival(parts.period_s, parts.near_m, _SETTLING_S)
+        self._cable = np.array(cable_m)
+        most_N = torque_Nm / np.abs(cable_m)
+        self._standing = StandingTensions(
+            parts.model, parts.control.low_N, most_N, parts.control.pull_fit.taken_up_N
+        )
+        self._home_pretension_N = self._standing.at(parts.model.home_pose)[0].copy()
+        self._pretension_N = self._home_pretension_N.copy()
+        self._from_N, self._to_N = self._pretension_N.copy(), self._pretension_N.copy()
+        """Pretensions between which it blends, to that for where the platform stands."""
+        self._blend = 1.0
+        self._hangs = self._hands_over = False
+        self._let_go_cycle = 0
+        self._checked = AxisFeedback(cable_m.size)
+        inertia = np.full(cable_m.size, parts.control.inertia_kg_m2)
+        self._winches = WinchSpeedLoop(inertia, cable_m, parts.period_s)
+        self._slack = SlackTakeUp(self._winches, parts, self._cable, self._home_pretension_N)
+        # a long cable comes in by its sag rather than by its stretch, above the friction
+        shares = np.array([0.0, 0.5 * TAKE_UP_SHARE, OVERSHOOT])[:, None]
+        lengths_m = [parts.control.lengths_at_home(N) for N in shares * self._pretension_N]
+        self._once_tight_m = _ONCE_TIGHT_m + float(np.ptp(lengths_m, axis=0).max())
+        self._start_rad = np.zeros(cable_m.size)
+        self._enough_N, self._weak = np.zeros(cable_m.size), np.zeros(cable_m.size, np.bool_)
+        self._stillness = Stillness(self._cable, parts.control.pull_fit.count_rad, parts.period_s)
+        self._source = LengthSource(parts, self._cable, self._home_pretension_N)
+        self._letting_go = LettingGo(parts, self._cable, self._home_pretension_N)
+        self._stage = 0
+        self._share = 0.0
+        self._cycles = self._handing_over_cycles = 0
+        self._feedback = AxisFeedback(cable_m.size)
+        self._path: list[FloatArray] = []
+        self._failure = ""
+
+    def start(self, feedback: AxisFeedback, setpoint: Setpoint, torque_Nm: FloatArray) -> None:
+        """Go on from the torque of the last cycle."""
+        parts = self._parts
+        parts.follow_origins()
+        self._feedback = feedback
+        self._failure = ""
+        self._stopping = self._at_rest = False
+        self._source.begin()
+        self._pretension_N[:] = self._from_N[:] = self._to_N[:] = self._home_pretension_N
+        self._blend, self._hangs, self._hands_over = 1.0, False, False
+        self._stage = self._cycles = 0
+        if parts.tight:
+            super().start(feedback, setpoint, torque_Nm)
+            self._look_for_indices()
+            return
+        self._start_rad[:] = feedback.position_rad
+        self._stillness.begin(feedback.position_rad)
+        self._slack.begin(feedback.position_rad)
+        self._winches.begin(feedback, parts.estimator.estimate.velocity_rad_s, torque_Nm)
+        self._control.clear_compensation()
+        self._control.clear_notices()
+        self._share = min(
+            max(float(np.max(-torque_Nm / self._cable / self._pretension_N)), 0.0), 1.0
+        )
+        np.multiply(self._pretension_N, self._share, out=self._winches.high_N)
+
+    def update(self, feedback: AxisFeedback, setpoint: Setpoint, torque_Nm: FloatArray) -> None:
+        """Write this cycle's set-point and torques, (n,) each, in place."""
+        if self._hangs:
+            self._hold_hanging(feedback, setpoint, torque_Nm)
+        if self._parts.tight:
+            super().update(feedback, setpoint, torque_Nm)
+            self._at_rest = self._at_rest and (self._stopping or self._arrival.over)
+            return
+        if self._hands_over:
+            self._let_go(feedback, setpoint, torque_Nm)
+            return
+        self._bound_tension(feedback)
+        self._winches.update(feedback, torque_Nm)
+        if self._source.name == "home" and self._stage >= _FITTED_FROM:
+            self._control.pull_fit.take(feedback.position_rad, self._winches.tension_N)
+        setpoint.position_rad[:] = feedback.position_rad
+        setpoint.velocity_rad_s[:] = setpoint.acceleration_rad_s2[:] = 0.0
+        self._cycles += 1
+        if self._stopping:
+            self._at_rest = not self._winches.high_N.any()
+        elif self._stillness.lasts(feedback.position_rad, self._pulls()):
+            self._next_stage(feedback, torque_Nm)
+        else:
+            self._fail_if(self._trouble(feedback))
+
+    def progress(self) -> dict[str, Any]:
+        """Return the stage, the cables' tensions, and the failure."""
+        tight = self._parts.tight
+        held = tight or self._hands_over
+        stage = _STAGES[self._stage][0] if not held else "index" if self._path else "held"
+        done = tight and self._at_rest and not self._failure
+        state = {"stage": stage, "tight": tight, "done": float(done), "trouble": self._failure}
+        if tight:
+            progress = super().progress()
+            return {**progress, **state, "trouble": self._failure or progress["trouble"]}
+        tension_N = self._control.tension_N if held else self._winches.tension_N
+        return {"tension_N": tension_N.tolist(), **state}
+
+    # -- commands
+
+    def check(self, arguments: Mapping[str, Any]) -> tuple[str, bool]:
+        """Return checked arguments for `apply`; raises ProgramError."""
+        CommandArguments(self.name, arguments, ("from",))
+        source = arguments.get("from", self._source.default)
+        if source not in SOURCES:
+            allowed = ", ".join(SOURCES)
+            raise ProgramError(f"tighten: from: value {source!r}; allowed: {allowed}")
+        if (refusal := source_refusal(self._parts, source, arguments)) is not None:
+            raise ProgramError(refusal)
+        return str(source), source != "home" and self._is_to_hold(source, arguments)
+
+    def _is_to_hold(self, source: str, arguments: Mapping[str, Any]) -> bool:
+        """Return whether a hanging platform is to be held as it is; raises ProgramError.
+
+        The control's estimate is unreliable while cables may be slack, so it is computed again.
+        """
+        parts, now = self._parts, self._checked
+        # another program may have ended the hand-over since
+        handing_over = self._hands_over and self._feedback.cycle - self._let_go_cycle <= 1
+        if parts.tight or handing_over or not hangs(parts):
+            return False
+        now.position_rad[:] = parts.estimator.position_rad
+        length_m = self._source.before(source, now)
+        if length_m is None or rests_at_home(parts, length_m, now):
+            return False
+        if why := why_not_to_hold(parts, self._standing, length_m, now):
+            raise ProgramError(bad_source(arguments, why))
+        return True
+
+    def _apply(self, checked: tuple[str, bool]) -> None:
+        self._source.name, self._hangs = checked
+
+    def _hold_hanging(
+        self, feedback: AxisFeedback, setpoint: Setpoint, torque_Nm: FloatArray
+    ) -> None:
+        """Begin to hold the platform at the pose found by the check of the command."""
+        self._hangs = False
+        self._control.observe(feedback)
+        self._source.take_last()
+        self._take_over(feedback, torque_Nm)
+        self._control.stand_still()
+        self._finish(feedback, setpoint, torque_Nm)
+
+    # -- taking up slack
+
+    def _bound_tension(self, feedback: AxisFeedback) -> None:
+        """Make the winches pull with a share of the pretension, or as their slack ended.
+
+        After a stop the bounds decrease from their present values.
+        """
+        high_N, step = self._winches.high_N, self._parts.period_s * _RISE_1_s
+        self._winches.low_N[:], self._winches.paying_out_m_s[:] = 0.0, -TAKE_UP_m_s
+        if self._stopping:
+            high_N -= self._pretension_N * (self._parts.period_s / _FALL_S)
+            np.maximum(high_N, 0.0, out=high_N)
+            return
+        self._share += min(max(_STAGES[self._stage][1] - self._share, -step), step)
+        self._blend = min(self._blend + step, 1.0)
+        self._pretension_N[:] = self._from_N + self._blend * (self._to_N - self._from_N)
+        np.multiply(self._pretension_N, self._share, out=high_N)
+        if self._stage == 0:
+            share = self._share / TAKE_UP_SHARE
+            if self._slack.update(feedback.position_rad, self._pretension_N, share):
+                self._cycles = 0
+        else:
+            np.maximum(high_N, self._slack.tight_N, out=high_N)
+
+    def _pulls(self) -> bool:
+        """Return whether all winches pull with the tension of the present stage."""
+        ready = self._share == _STAGES[self._stage][1] and self._blend == 1.0
+        return ready and not self._not_tight().any()
+
+    def _not_tight(self) -> BoolArray:
+        """Return which cables are slack, else which are pulled with less than their bound, (n,)."""
+        if self._stage == 0 and (slack := self._slack.not_tight).any():
+            return slack
+        np.multiply(self._winches.high_N, PULLED, out=self._enough_N)
+        return np.less_equal(self._winches.tension_N, self._enough_N, out=self._weak)
+
+    def _next_stage(self, feedback: AxisFeedback, torque_Nm: FloatArray) -> None:
+        self._stillness.begin(feedback.position_rad)
+        if self._stage == 0:
+            self._start_rad[:] = feedback.position_rad
+        if self._stage + 1 == len(_STAGES):
+            self._end_tight(feedback, torque_Nm)
+            return
+        # away from home, lengths give the pose of the platform, wherever it is pulled to
+        stage = _STAGES[self._stage][0]
+        matters = stage in ("slack", "pull") and self._source.name == "home"
+        moved = self._slack.why_moved(feedback.position_rad, stage == "pull") if matters else ""
+        if self._source.name == "home":  # else the lengths stay those of that notice
+            self._parts.off_home = self._slack.off_home
+        self._fail_if(moved or self._why_not_to_pull(feedback))
+        if self._failure:
+            return
+        if stage == "slack":
+            self._share = 0.0  # begins at the cables' present pull
+        elif stage == "pull":
+            self._control.pull_fit.begin(feedback.position_rad)
+        elif stage == "back":
+            self._source.at_home.keep_rising(feedback)
+        elif stage == "beyond" and self._source.name == "home":
+            self._fail_if(self._source.at_home.slack_before(feedback, OVERSHOOT))
+            if self._failure:
+                return
+        self._stage += 1
+
+    def _end_tight(self, feedback: AxisFeedback, torque_Nm: FloatArray) -> None:
+        """Take the lengths, and hold the platform at their pose, unless they disagree."""
+        self._source.take_last()
+        self._control.take_lengths(self._source.now(feedback), feedback)
+        estimate = self._parts.estimator.estimate
+        tension_N = np.where(estimate.tension_measured, estimate.tension_N, self._pretension_N)
+        # as they stand: the cables press with tensions that may stretch them more than planned ones
+        self._control.begin(feedback, tension_N)
+        self._fail_if(disagreement(self._parts, self._source.name))
+        if not self._failure:
+            if self._source.name == "home":  # other sources may belong to another pose
+                self._control.pull_fit.begin_learning()
+            self._control.begin(feedback)
+            self._take_over(feedback, torque_Nm)
+            self._hands_over, self._path = True, []
+            self._let_go_cycle, self._handing_over_cycles = feedback.cycle, 0
+
+    def _let_go(self, feedback: AxisFeedback, setpoint: Setpoint, torque_Nm: FloatArray) -> None:
+        """Blend out the force that presses the platform on its stand; then it may be moved.
+
+        Meanwhile the stretch of its cables differs from the control's, so the set-point stays at
+        the estimated pose: the control does not push the platform against its stand.
+        """
+        self._control.stand_still(on_stand=True)
+        self._loop.update(feedback, setpoint, torque_Nm)
+        self._handing_over_cycles += 1
+        self._let_go_cycle = feedback.cycle
+        over = self._handing_over_cycles * self._parts.period_s > _HAND_OVER_S
+        slack = self._letting_go.runs_in()
+        if over and not slack and self._source.name == "home":
+            slack = self._letting_go.disagree()
+        if slack:
+            self._let_down(feedback, torque_Nm, slack)
+        elif over:
+            if self._source.name == "home":
+                parts, found = self._parts, self._letting_go.off_home()
+                off = parts.control.estimated - parts.model.home
+                parts.off_home_by[:] = 0.0 if parts.off_home or not found else off
+                parts.off_home = "; ".join(filter(None, (parts.off_home, found)))
+            self._finish(feedback, setpoint, torque_Nm)
+
+    def _let_down(self, feedback: AxisFeedback, torque_Nm: FloatArray, slack: str) -> None:
+        """Pay out cables of which some is slack, so that the lengths taken are wrong."""
+        self._hands_over = False
+        self._parts.estimator.forget_lengths()
+        speed_rad_s = self._parts.estimator.estimate.velocity_rad_s
+        # the torque on a winch that runs in holds nothing
+        runs_in = speed_rad_s * self._cable < -TAKE_UP_m_s
+        self._winches.begin(feedback, speed_rad_s, np.where(runs_in, 0.0, torque_Nm))
+        np.maximum(-torque_Nm / self._cable, 0.0, out=self._winches.high_N)
+        self._fail_if(slack)
+
+    def _why_not_to_pull(self, feedback: AxisFeedback) -> str:
+        """Return why not to pull on; if lengths are known, set the tensions for that pose."""
+        parts, length_m = self._parts, self._source.before(self._source.name, feedback)
+        if length_m is None:
+            return ""
+        if self._source.name == "home":
+            return why_not_at_home(parts, length_m, self._winches.high_N, feedback)
+        why = why_not_to_pull(parts, length_m, self._winches.high_N, feedback)
+        if why or self._stage > 0:
+            return why
+        tensions_N, stays = self._standing.at(parts.model.pose(parts.control.estimated))
+        self._to_N[:], self._blend = tensions_N, 0.0
+        return "" if stays else would_move(parts)
+
+    def _take_over(self, feedback: AxisFeedback, torque_Nm: FloatArray) -> None:
+        """Begin to take the torques from the platform's control, starting at this cycle's."""
+        parts = self._parts
+        parts.estimator.set_lengths(feedback.position_rad, self._control.free_lengths_m)
+        parts.loop.take_over(feedback, torque_Nm)
+
+    def _finish(self, feedback: AxisFeedback, setpoint: Setpoint, torque_Nm: FloatArray) -> None:
+        stopping, self._hands_over = self._stopping, False
+        parts = self._parts
+        parts.cycle, parts.tight = feedback.cycle, True
+        parts.last_stop.displaced = parts.last_stop.fallen = False
+        parts.last_stop.broken = ""
+        super().start(feedback, setpoint, torque_Nm)
+        if stopping:
+            self.stop()
+        else:
+            self._look_for_indices()
+
+    def _trouble(self, feedback: AxisFeedback) -> str:
+        moved_m = np.abs((feedback.position_rad - self._start_rad) * self._cable)
+        if self._source.name == "home" and (dragged := self._slack.dragged(feedback.position_rad)):
+            return dragged
+        i = int(moved_m.argmax())
+        # a platform on its stand does not move once its cables are tight
+        allowed_m = self._once_tight_m if self._stage > 0 else _SLACK_m
+        if moved_m[i] > allowed_m:
+            return (
+                f"{self._parts.names[i]}: {1e3 * moved_m[i]:.1f} mm reeled in and not tight, "
+                f"{1e3 * allowed_m:.1f} mm allowed"
+                + (": is its cable broken, unhooked, or wound off?" if self._stage == 0 else "")
+            )
+        if self._cycles * self._parts.period_s > _TIGHT_WITHIN_S:
+            return self._late()
+        return ""
+
+    def _late(self) -> str:
+        """Return which cables are not tight yet, and the pull on each."""
+        told, weak = f"no further cable tight within {_TIGHT_WITHIN_S:g} s", self._not_tight()
+        if weak.any():
+            return f"{told}: {self._slack.pulls(weak)}"
+        i = int(self._stillness.moved_m.argmax())
+        pull_N = self._winches.tension_N[i]
+        return f"{told}: {self._parts.names[i]} pulls with {pull_N:.1f} N and does not stand still"
+
+    def _fail_if(self, trouble: str) -> None:
+        self._failure = trouble
+        self._stopping = bool(trouble)
+
+    # -- the search for indices
+
+    def _look_for_indices(self) -> None:
+        """Start along a path on which all motors turn, if an index is needed."""
+        parts, control = self._parts, self._control
+        self._path = []
+        if self._source.lacks_index(self._feedback).any():
+            self._path = index_path(
+                parts.model, self._cable, lambda there: not control.infeasibility(there)
+            )
+        if self._path:
+            self._target[:] = self._path[0]
+            self._acceleration[:] = parts.acceleration
+            self._speed[:] = parts.speeds(INDEX_m_s)
+        else:
+            self._failure = self._source.check_by_indices(self._feedback)
+
+    def _move(self) -> bool:
+        arrived = self._approach()
+        if not self._path:
+            return arrived
+        lacks = self._source.lacks_index(self._feedback)
+        found = not lacks.any()
+        if found or arrived:
+            self._path = [] if found else self._path[1:]
+            self._target[:] = self._path[0] if self._path else self._stopping_position()
+            if not found and not self._path:
+                names = (self._parts.names[i] for i in np.flatnonzero(lacks))
+                self._failure = f"motors that have not passed their index: {', '.join(names)}"
+            if found:
+                self._failure = self._source.check_by_indices(self._feedback)
+        return False

@@ -1,0 +1,653 @@
+"""One robot as a script sees it: commands, state and log, in this process or through a daemon."""
+
+from __future__ import annotations
+
+import math
+import warnings
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Final, Protocol, Self
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from cdpr_rt.arrays import FloatArray
+from cdpr_rt.core.cycle_row import FIELDS, Row
+from cdpr_rt.refusal import CommandRefusal, RefusalCode
+
+
+class Error(Exception):
+    """Base class of all errors of a robot handle."""
+
+
+class InvalidRobot(Error):  # noqa: N818
+    """The robot is unknown, or its file cannot be used; the message names file, key and value."""
+
+
+class InvalidArgument(Error, ValueError):  # noqa: N818
+    """An argument has a wrong shape, type or value. Nothing has moved."""
+
+
+class NotRunning(Error):  # noqa: N818
+    """No daemon of the robot runs, or the robot has ended."""
+
+
+class AlreadyRunning(Error):  # noqa: N818
+    """A daemon of this robot runs already; `connect` uses it."""
+
+
+class Refused(Error):  # noqa: N818
+    """The robot refused a command. Nothing has changed; the message gives the reason.
+
+    `refusal` is the reason for programs, `code` its code; None if there is only the message.
+    """
+
+    def __init__(self, text: str, refusal: CommandRefusal | None = None) -> None:
+        super().__init__(text)
+        self.refusal = refusal
+        self.code = None if refusal is None else refusal.code
+
+
+class MotionEnded(Error):  # noqa: N818
+    """A motion ended before its target, and the drives still have power.
+
+    Somebody else commanded a hold or took over, or the platform cannot go on.
+    """
+
+
+class Faulted(Error):  # noqa: N818
+    """A fault ended the motion and removed the power.
+
+    `limit` is the key of the limit, `axis` the name of the axis. Each is None if the fault is of no
+    single limit or axis.
+    """
+
+    def __init__(self, text: str, limit: str | None = None, axis: str | None = None) -> None:
+        super().__init__(text)
+        self.limit = limit
+        self.axis = axis
+
+
+class Backend(Protocol):
+    """Carries out the commands of a `Robot`. All methods raise errors of this module."""
+
+    description: Mapping[str, Any]
+    """The robot as `GET /description` returns it."""
+    look_s: float
+    """Time between two checks of a motion."""
+
+    def command(self, do: str, program: str = "", wanted: Mapping[str, Any] | None = None) -> None:
+        """Send a command and wait for the reply; take the right to move if it needs that."""
+
+    def status(self) -> dict[str, Any]:
+        """Return the present status as `GET /status` does."""
+
+    def wait(self, seconds: float) -> None:
+        """Let time of the robot pass, s."""
+
+    def observe(self, seconds: float) -> Row:
+        """Let time of the robot pass; return the cycles that were seen meanwhile."""
+
+    def plan(self, file: Path) -> str:
+        """Plan the path in a file; return the name of the plan."""
+
+    def log(self, fields: Sequence[str]) -> Row:
+        """Return these fields of all cycles since the handle was opened."""
+
+    def inject_fault(self, axis: int, fault: str, value: int | None) -> None:
+        """Inject a fault into a simulated drive."""
+
+    def end(self) -> None:
+        """Lower the platform, remove the power, and end the robot."""
+
+    def close(self) -> None:
+        """Release the robot; idempotent."""
+
+
+_RENEW_S: Final = 0.1
+_JOG_TIMEOUT_S: Final = 0.6
+_REACTION_S: Final = 120.0
+_ANGLES: Final = ("angle", "rx", "ry", "rz")
+_STANDING: Final = ("hold", "idle")
+_STANDS: Final = ("the path waits here", "stepped back")
+_AXIS_PROGRAMS: Final = ("jog", "pid", "sweep")
+_SETTLE_S: Final = 2.0
+_REST_RAD, _REST_RAD_S = math.radians(0.5), math.radians(2.0)
+
+
+class Robot:
+    """A robot that a script commands; a context manager.
+
+    `cdpr_rt.simulate`, `cdpr_rt.connect` and `cdpr_rt.run` make one. Lengths are in m, angles in
+    rad, tensions in N, torques in Nm, times in s. n is the number of axes, k the number of
+    coordinates of the platform (2 or 3), c the number of its controlled angles. Motions return
+    when they are done. They raise Refused before anything moves, Faulted if a fault removes the
+    power, and MotionEnded if somebody else ends them. Ctrl-C stops a motion and holds the robot.
+    """
+
+    def __init__(self, backend: Backend) -> None:
+        self._backend = backend
+        description = backend.description
+        self.name = str(description["robot"])
+        """Name of the robot."""
+        self.axes = tuple(str(axis["name"]) for axis in description["axes"])
+        """Names of the axes, n."""
+        self.on_status: Callable[[Mapping[str, Any]], object] | None = None
+        """Called with each status while a motion lasts; if it raises, the robot is held."""
+        platform = description.get("platform") or {}
+        self._k = len(platform.get("home_m", ()))
+        self._started = ""
+        """The motion that this handle has started and not ended."""
+        self._c = len([name for name in platform.get("controlled", ()) if name in _ANGLES])
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        try:
+            self.close()
+        except Error as failed:
+            if error is None:
+                raise
+            error.add_note(str(failed))
+
+    def __repr__(self) -> str:
+        return f"<Robot {self.name!r}>"
+
+    def close(self) -> None:
+        """Release the robot. `simulate` ends it, `connect` holds it, `run` lowers and ends it."""
+        self._backend.close()
+
+    # -- state
+
+    @property
+    def status(self) -> dict[str, Any]:
+        """The whole status, as `GET /status` of the control interface returns it.
+
+        A simulation has no service: the keys `robot`, `loop`, `control`, `parts` and `calibration`
+        are missing.
+        """
+        return self._backend.status()
+
+    @property
+    def description(self) -> Mapping[str, Any]:
+        """The robot's axes, limits, platform and programs, as `GET /description` returns them."""
+        return self._backend.description
+
+    @property
+    def state(self) -> str:
+        """State of the control loop: unconfigured, inactive, ready, active or fault."""
+        return str(self.status["state"])
+
+    @property
+    def program(self) -> str:
+        """Name of the running program."""
+        return str(self.status["program"])
+
+    @property
+    def reason(self) -> str:
+        """Reason of the last fault or hold, or an empty text."""
+        return str(self.status["reason"])
+
+    @property
+    def time_s(self) -> float:
+        """Bus time of the newest cycle, s; nan before the first."""
+        return _number((self.status["cycle"] or {}).get("time_s"))
+
+    @property
+    def pose(self) -> FloatArray:
+        """Pose of the platform, (7,): x, y, z in m, quaternion w, x, y, z; nan if not known."""
+        return _numbers((self.status["cycle"] or {}).get("pose"), 7)
+
+    @property
+    def position_m(self) -> FloatArray:
+        """Position of the platform, (k,), m, as `move_to` takes it; nan if not known."""
+        return _numbers(self._progress().get("position_m"), self._k)
+
+    @property
+    def rotation_rad(self) -> FloatArray:
+        """Rotation vector from the orientation at home, (c,), rad; nan if not known."""
+        return _numbers(self._progress().get("rotation_rad"), self._c)
+
+    @property
+    def tension_N(self) -> FloatArray:
+        """Cable tensions, measured or estimated, (n,), N; nan where not known."""
+        return self._axis_values("tension_N")
+
+    @property
+    def cable_length_m(self) -> FloatArray:
+        """Cable lengths, (n,), m; nan where not known."""
+        return self._axis_values("cable_length_m")
+
+    @property
+    def angle_rad(self) -> FloatArray:
+        """Angles of the motors as the encoders count them, (n,), rad; nan before the first."""
+        return self._axis_values("position_rad")
+
+    @property
+    def velocity_rad_s(self) -> FloatArray:
+        """Estimated speeds of the motors, (n,), rad/s."""
+        return self._axis_values("velocity_rad_s")
+
+    @property
+    def torque_Nm(self) -> FloatArray:
+        """Torques that the drives report, (n,), Nm."""
+        return self._axis_values("torque_actual_Nm")
+
+    def log(self, *fields: str) -> Row:
+        """Return the recorded cycles since the handle was opened: a structured array, (cycles,).
+
+        `fields` are those of the recordings, such as "time_s", "pose" (7,) and "tension_N" (n,);
+        all by default.
+        A simulation keeps the last 5 minutes. A daemon's rows come from its recording on this
+        machine. Raises Error if the daemon records nothing.
+        """
+        if unknown := set(fields) - FIELDS.keys():
+            raise InvalidArgument(f"fields: {sorted(unknown)}; allowed: {', '.join(FIELDS)}")
+        return self._backend.log(fields or tuple(FIELDS))
+
+    # -- power
+
+    def enable(self, program: str = "hold") -> None:
+        """Give the drives power and run a program. No change if they have it already."""
+        if self.state != "active":
+            self._backend.command("enable", program)
+
+    def disable(self) -> None:
+        """Stop the motion under control, then remove the power. No change after a fault."""
+        try:
+            self._backend.command("disable")
+        except Refused as error:
+            if error.code is not RefusalCode.NOT_IN_STATE:  # in those states there is no power
+                raise
+        self._started = ""
+
+    def acknowledge(self) -> None:
+        """Acknowledge a fault whose cause is gone; the drives stay without power.
+
+        No change if there is no fault.
+        """
+        if self.state not in ("ready", "active"):
+            self._backend.command("acknowledge")
+
+    def shut_down(self) -> None:
+        """Lower the platform, remove the power, end the robot and close the handle.
+
+        A daemon ends also if the script has not started it. The call returns when it has ended.
+        Raises Error if the power may still be on.
+        """
+        try:
+            self._backend.end()
+        finally:
+            self.close()
+
+    # -- motion of a platform
+
+    def tighten(self, source: str | None = None) -> None:
+        """Take up the slack of the cables and find the pose; the cables hold the platform then.
+
+        `source` says where the cable lengths come from: "home" (the platform stands at home),
+        "last" (those of the last stop) or "lengths" (those the loop knows).
+        """
+        self.run("tighten", **({} if source is None else {"from": source}))
+
+    def lower(self, *, blind: bool = False) -> None:
+        """Lower the platform onto its stand; the power stays on.
+
+        `blind`: every winch pays its cable out without a measured pose.
+        """
+        self.run("lower", **({"blind": True} if blind else {}))
+
+    def move_to(
+        self,
+        position_m: ArrayLike | None = None,
+        rotation_rad: ArrayLike | None = None,
+        *,
+        speed_m_s: float | None = None,
+        wait: bool = True,
+    ) -> None:
+        """Move the platform to a position (k,) and a rotation (c,) on a straight line.
+
+        `rotation_rad` is the rotation vector from the orientation at home. Omitted coordinates keep
+        their values. `speed_m_s` is the top speed, by default that of the robot's file. With
+        `wait=False` the call returns at once; `wait_until_done` waits for the end.
+        """
+        position = self._vector("position_m", position_m, self._k, "coordinate, in m")
+        rotation = self._vector("rotation_rad", rotation_rad, self._c, "controlled angle, in rad")
+        self._move(
+            wait,
+            position_m=position,
+            rotation_rad=rotation,
+            speed_m_s=_positive("speed_m_s", speed_m_s),
+        )
+
+    def move_by(
+        self,
+        distance_m: ArrayLike | None = None,
+        turn_rad: ArrayLike | None = None,
+        *,
+        frame: str = "room",
+        speed_m_s: float | None = None,
+        wait: bool = True,
+    ) -> None:
+        """Move the platform by a distance (k,) and a turn (c,), from its target or where it is.
+
+        `frame` is "room" or "platform": the axes along which and about which it moves. The rest is
+        as in `move_to`.
+        """
+        distance = self._vector("distance_m", distance_m, self._k, "coordinate, in m")
+        turn = self._vector("turn_rad", turn_rad, self._c, "controlled angle, in rad")
+        self._move(
+            wait,
+            distance_m=distance,
+            turn_rad=turn,
+            frame=frame,
+            speed_m_s=_positive("speed_m_s", speed_m_s),
+        )
+
+    def _move(self, wait: bool, **arguments: Any) -> None:
+        given = {key: value for key, value in arguments.items() if value is not None}
+        if not given.keys() - {"frame", "speed_m_s"}:
+            names = [key for key in arguments if key not in ("frame", "speed_m_s")]
+            raise InvalidArgument(f"nothing to move; give {' or '.join(names)}")
+        self._carry_out("pose", given, wait)
+
+    # -- motion of single axes
+
+    def turn_to(
+        self, angle_rad: ArrayLike, *, speed_rad_s: float | None = None, wait: bool = True
+    ) -> None:
+        """Turn the motors to angles (n,), rad, as `angle_rad` counts them; nan leaves one alone.
+
+        For robots without a platform, as `turn_by` and `jog`.
+        """
+        self._turn("position_rad", angle_rad, speed_rad_s, wait)
+
+    def turn_by(
+        self, distance_rad: ArrayLike, *, speed_rad_s: float | None = None, wait: bool = True
+    ) -> None:
+        """Turn the motors by angles (n,), rad; nan leaves one alone."""
+        self._turn("distance_rad", distance_rad, speed_rad_s, wait)
+
+    def pay_out(
+        self, cable_m: ArrayLike, *, speed_rad_s: float | None = None, wait: bool = True
+    ) -> None:
+        """Pay out lengths of cable (n,), m, negative to wind it in; nan leaves one alone."""
+        self._turn("cable_m", cable_m, speed_rad_s, wait)
+
+    def _turn(self, key: str, value: ArrayLike, speed_rad_s: float | None, wait: bool) -> None:
+        angles = self._vector(key, value, len(self.axes), "axis", optional=True)
+        speed = _positive("speed_rad_s", speed_rad_s)
+        wanted = {key: angles} | ({} if speed is None else {"speed_rad_s": speed})
+        self._carry_out("pid", wanted, wait)
+
+    def jog(self, velocity_rad_s: ArrayLike, duration_s: float) -> None:
+        """Turn the motors at speeds (n,), rad/s, for a time; then they brake and hold."""
+        self._jog("velocity_rad_s", velocity_rad_s, "axis, in rad/s", duration_s)
+
+    def jog_cable(self, velocity_m_s: ArrayLike, duration_s: float) -> None:
+        """Pay out cable at speeds (n,), m/s, negative to wind it in, as `jog`."""
+        self._jog("cable_velocity_m_s", velocity_m_s, "axis, in m/s", duration_s)
+
+    def _jog(self, key: str, value: ArrayLike, each: str, duration_s: float) -> None:
+        wanted = {
+            key: self._vector(key, value, len(self.axes), each),
+            "timeout_s": _JOG_TIMEOUT_S,
+            "duration_s": _positive("duration_s", duration_s),
+        }
+        with _HeldOnError(self, Refused, InvalidArgument):
+            self._start("jog", wanted)
+            with _HeldOnError(self):
+                while not is_done(self._running("jog")):
+                    self._backend.wait(_RENEW_S)
+                    self._running("jog")
+                    self._backend.command("set", wanted=wanted)
+                self._settle("jog")
+        self.hold()
+
+    # -- any motion
+
+    def follow(self, path: str | Path) -> None:
+        """Plan and follow the path in a file of way points (.toml, .csv) or G-code in the room.
+
+        The whole path is planned before anything moves. The call returns when the path waits, and
+        `resume` goes on. Raises Refused with the line that the robot cannot follow, or if the path
+        takes more than one plan.
+        """
+        file = Path(path)
+        if not file.is_file():
+            raise InvalidArgument(f"{file}: no such file")
+        self.run("path", plan=self._backend.plan(file))
+
+    def run(self, program: str, /, **arguments: Any) -> None:
+        """Run a program with its arguments until it is done; `hold` and `idle` return at once.
+
+        Programs and arguments are those of the reference page "Programs".
+        """
+        self._carry_out(program, arguments)
+
+    def hold(self) -> None:
+        """Stop the motion and stay there with power, whoever moves; `resume` goes on."""
+        self._backend.command("hold")
+        self._started = ""
+
+    def resume(self) -> None:
+        """Go on to the target, or along the path, that a hold interrupted."""
+        self.run("path" if self._progress().get("path") else "pose", resume=True)
+
+    def wait(self, seconds: float) -> None:
+        """Let time of the robot pass, s. Raises Faulted if a fault removes the power meanwhile."""
+        if not math.isfinite(seconds) or seconds < 0.0:
+            raise InvalidArgument(f"seconds: {seconds!r}; allowed: a number from 0")
+        with _HeldOnError(self):
+            powered = self.state == "active"
+            for part in range(math.ceil(round(seconds / _RENEW_S, 6))):
+                self._backend.wait(min(_RENEW_S, seconds - part * _RENEW_S))
+                self._require_power(powered, self._look())
+
+    def observe(self, seconds: float) -> Row:
+        """Let time pass as `wait`; return the cycles that were seen meanwhile, (cycles,).
+
+        At least two. A daemon's are some 50 a second, with `time_s`, `position_rad`,
+        `cable_length_m` and `tension_N` only.
+        """
+        powered, rows = self.state == "active", self._backend.observe(seconds)
+        self._require_power(powered, self._look())
+        return rows
+
+    def wait_until_done(self) -> None:
+        """Wait until the motion that was started last is done. Raises Faulted and MotionEnded."""
+        program = self._started
+        if not program:
+            return
+        with _HeldOnError(self):
+            while not is_done(progress := self._running(program)):
+                self._backend.wait(self._backend.look_s)
+            if program in _AXIS_PROGRAMS:
+                self._settle(program)
+        self._started = ""
+        if (trouble := progress.get("trouble")) and self.on_status is None:
+            warnings.warn(str(trouble), RuntimeWarning, stacklevel=4)
+
+    def inject_fault(self, axis: str | int, fault: str, value: int | None = None) -> None:
+        """Inject a fault into a simulated axis, given by name or index from 0.
+
+        Faults and values are those of `cdpr sim fault`, such as "drive-fault" and "cut-cable".
+        """
+        if isinstance(axis, str) and axis in self.axes:
+            axis = self.axes.index(axis)
+        if not isinstance(axis, int) or not 0 <= axis < len(self.axes):
+            names = ", ".join(map(repr, self.axes))
+            raise InvalidArgument(f"axis: {axis!r}; allowed: 0 to {len(self.axes) - 1}, or {names}")
+        self._backend.inject_fault(axis, fault, value)
+
+    # -- helpers
+
+    def _carry_out(self, program: str, wanted: Mapping[str, Any], wait: bool = True) -> None:
+        with _HeldOnError(self, Refused, InvalidArgument):  # the wait has a guard for these
+            self._start(program, wanted)
+            if wait:
+                self.wait_until_done()
+
+    def _start(self, program: str, wanted: Mapping[str, Any]) -> None:
+        before, self._started = self._started, program
+        try:
+            self._backend.command("program", program, wanted)
+        except (Refused, InvalidArgument):
+            self._started = before
+            raise
+        if program in _STANDING:
+            self._started = ""
+
+    def _progress(self) -> dict[str, Any]:
+        return self.status.get("program_progress") or {}
+
+    def _axis_values(self, field: str) -> FloatArray:
+        return np.array([_number(axis.get(field)) for axis in self.status["axes"]], float)
+
+    def _running(self, program: str) -> dict[str, Any]:
+        """Return the progress of a program; raises Faulted and MotionEnded if it has ended."""
+        status = self._look()
+        if status["state"] != "active" or status["reacting"] != "none":
+            raise self._fault(status)
+        progress: dict[str, Any] = status.get("program_progress") or {}
+        if status["program"] != program:
+            self._started = ""
+            raise MotionEnded(f"{program} was ended: {end_text(status)}")
+        if progress.get("trouble") and progress.get("done") != 1.0:
+            raise MotionEnded(f"{program}: {progress['trouble']}")
+        return progress
+
+    def _look(self) -> dict[str, Any]:
+        status = self.status
+        if self.on_status is not None:
+            self.on_status(status)
+        return status
+
+    def _require_power(self, powered: bool, status: dict[str, Any]) -> None:
+        if powered and (status["state"] != "active" or status["reacting"] != "none"):
+            raise self._fault(status)
+
+    def _settle(self, program: str) -> None:
+        """Wait until the motors have followed their set-points, or have not for a while."""
+        waited_s = 0.0
+        while waited_s < _SETTLE_S and not all(map(is_at_rest, self.status["axes"])):
+            self._backend.wait(self._backend.look_s)
+            waited_s += self._backend.look_s
+            self._running(program)
+
+    def _fault(self, status: dict[str, Any]) -> Error:
+        """Return the error of a robot that has lost its power, once its reaction has ended."""
+        self._started = ""
+        most_s = _REACTION_S + float(self.description.get("lowering_s", 0.0))
+        waited_s = 0.0
+        while status["reacting"] != "none" or status["busy"]:
+            if waited_s > most_s:
+                break
+            self._backend.wait(_RENEW_S)
+            waited_s += _RENEW_S
+            status = self._look()
+        if status["state"] == "ready":
+            return MotionEnded(f"the power was removed: {status['reason'] or 'by a command'}")
+        details = status.get("reason_limit") or {}
+        axis = details.get("axis")
+        name = None
+        if isinstance(axis, int) and 0 <= axis < len(self.axes):
+            name = self.axes[axis]
+        return Faulted(str(status["reason"]), details.get("limit"), name)
+
+    def _vector(
+        self, name: str, value: ArrayLike | None, size: int, each: str, optional: bool = False
+    ) -> list[float | None] | None:
+        """Return numbers as a list, nan as None if `optional`; raises InvalidArgument."""
+        if value is None:
+            return None
+        try:
+            numbers = np.asarray(value, float)
+        except (TypeError, ValueError):
+            raise InvalidArgument(
+                f"{name}: {value!r}; allowed: {size} numbers, one for each {each}"
+            ) from None
+        if not size:
+            raise InvalidArgument(f"{name}: {self.name} has none; allowed: leave it out")
+        if numbers.shape != (size,):
+            raise InvalidArgument(
+                f"{name}: shape {numbers.shape}; allowed: ({size},), one number for each {each}"
+            )
+        bad = np.isinf(numbers) if optional else ~np.isfinite(numbers)
+        if bad.any():
+            place = int(bad.argmax())
+            raise InvalidArgument(f"{name}[{place}]: {numbers[place]}; allowed: a finite number")
+        return [None if math.isnan(number) else number for number in numbers.tolist()]
+
+
+class _HeldOnError:
+    """Holds the robot if an error, such as a Ctrl-C, leaves the block while its motion goes on.
+
+    Errors of the types `but` are ignored. A fault or another client ends the motion itself: then
+    nothing is held.
+    """
+
+    def __init__(self, robot: Robot, *but: type[Error]) -> None:
+        self._robot = robot
+        self._but = but
+
+    def __enter__(self) -> None:
+        pass
+
+    def __exit__(self, _kind: Any, error: BaseException | None, _traceback: Any) -> None:
+        if error is None or isinstance(error, self._but) or not self._robot._started:
+            return
+        try:
+            self._robot.hold()
+        except Error as failed:
+            if str(failed) != str(error):
+                error.add_note(f"the robot could not be held: {failed}")
+
+
+def end_text(status: Mapping[str, Any]) -> str:
+    """Return why a program does not run any more: a fault, a hold, or another command."""
+    return str(status["reason"] or status.get("commanded") or f"{status['program']} runs")
+
+
+def is_done(progress: Mapping[str, Any]) -> bool:
+    """Whether a program is at its end: a sweep after its last leg, a path also when it waits."""
+    if path := progress.get("path"):
+        over = progress.get("done") == 1.0 and path.get("time_s") == path.get("duration_s")
+        return over or path.get("waiting") in _STANDS
+    return progress.get("done") == 1.0 and progress.get("leg") == progress.get("legs")
+
+
+def is_at_rest(axis: Mapping[str, Any]) -> bool:
+    """Whether a motor stands at its set-point, by its part of a status."""
+    angle, speed = _number(axis.get("position_rad")), _number(axis.get("velocity_rad_s"))
+    off = abs(angle - _number(axis.get("setpoint_rad")))
+    return not (off > _REST_RAD or abs(speed) > _REST_RAD_S)
+
+
+def _positive(name: str, value: float | None) -> float | None:
+    if value is None:
+        return None
+    try:
+        number = float(value)
+    except (TypeError, ValueError):
+        number = math.nan
+    if not 0.0 < number < math.inf:
+        raise InvalidArgument(f"{name}: {value!r}; allowed: a finite number above 0")
+    return number
+
+
+def _number(value: float | None) -> float:
+    return math.nan if value is None else float(value)
+
+
+def _numbers(values: Any, size: int) -> FloatArray:
+    if not values:
+        return np.full(size, math.nan)
+    return np.array([_number(value) for value in values], float)

@@ -1,1 +1,0 @@
-"""Prediction of what a platform does when one of its cables breaks."""

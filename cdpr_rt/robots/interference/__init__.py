@@ -1,1 +1,0 @@
-"""Interference of cables with each other, the platform, and boxes of the frame."""

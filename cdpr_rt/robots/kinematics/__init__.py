@@ -1,1 +1,0 @@
-"""Kinematics of n cables in two to six directions."""

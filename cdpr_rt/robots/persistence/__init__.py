@@ -1,1 +1,0 @@
-"""State of a robot kept from one run to the next: cable lengths, and the calibration in force."""

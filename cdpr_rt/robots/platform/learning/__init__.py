@@ -1,1 +1,0 @@
-"""What a control learns of motors that were not commissioned: friction, cogging, constants."""

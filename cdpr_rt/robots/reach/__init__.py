@@ -1,1 +1,0 @@
-"""Straight motions that are held all the way and without contact."""

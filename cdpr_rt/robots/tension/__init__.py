@@ -1,1 +1,0 @@
-"""Tension distribution of n cables."""

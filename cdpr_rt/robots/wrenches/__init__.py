@@ -1,1 +1,0 @@
-"""Wrenches that tensions within bounds can exert, and those that a motion takes."""

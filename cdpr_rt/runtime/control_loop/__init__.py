@@ -1,1 +1,0 @@
-"""The control loop: its engine, transitions, safe stop, commands and status."""

@@ -1,0 +1,378 @@
+"""Access control: middleware before the control interface, with a policy for each listener."""
+
+from __future__ import annotations
+
+import asyncio
+import hashlib
+import hmac
+import ipaddress
+import json
+import secrets
+import socket
+import time
+from collections import Counter, OrderedDict
+from collections.abc import Callable, Container, Mapping
+from dataclasses import dataclass
+from http import HTTPStatus
+from typing import Any, Final
+from urllib.parse import parse_qs
+
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from cdpr_profiles.bounded_input import is_mostly_text
+from cdpr_rt.loop.stop_socket import STOPS
+
+# A ticket opens one WebSocket instead of the key: browsers send no header with the request.
+
+VALID_S: Final = 30.0
+MOST_TICKETS: Final = 64
+"""If there are more, the oldest becomes void."""
+
+
+class Tickets:
+    """Random tickets, each valid once and for `VALID_S`; for one asyncio loop."""
+
+    def __init__(self, clock_s: Callable[[], float] = time.monotonic) -> None:
+        self._clock_s = clock_s
+        self._until_s: OrderedDict[str, float] = OrderedDict()
+
+    def issue(self) -> str:
+        """Return a new ticket."""
+        ticket = secrets.token_urlsafe(24)
+        self._until_s[ticket] = self._clock_s() + VALID_S
+        if len(self._until_s) > MOST_TICKETS:
+            self._until_s.popitem(last=False)
+        return ticket
+
+    def redeem(self, ticket: str) -> bool:
+        """Use a ticket up; return whether it was valid."""
+        until_s = self._until_s.pop(ticket, None)
+        return until_s is not None and self._clock_s() < until_s
+
+
+MOST_BODY_BYTES: Final = 16384
+MOST_PATH_BYTES: Final = 1 << 21
+"""Longest body of `POST /path`, a path's file."""
+_PATH_PATH: Final = "/path"
+_MOST_STRINGS, _MOST_OTHER_BYTES = 32, 1024
+"""Most keys and texts of a body longer than `MOST_BODY_BYTES`, and bytes beside these texts.
+
+The file is one of the texts. Validating 100,000 keys would take the event loop a second.
+"""
+_BODY_S = 5.0
+_REQUESTS_PER_S, _BURST = 200.0, 400.0
+_FAILURES_PER_S, _FAILURES = 2.0, 10.0
+_FAILURES_OF_ALL_PER_S, _FAILURES_OF_ALL = 20.0, 100.0
+_THROTTLE_S, _MOST_THROTTLED = 1.0, 64
+"""Delay of the answer to a wrong key or token after too many of them; most delayed answers."""
+_MOST_AT_ONCE: Final = 24
+"""Requests of one client that are processed at the same time."""
+_MOST_PEERS: Final = 1024
+_MOST_FIELDS = 16
+STOP_PATHS: Final = frozenset(f"/{do}" for do in STOPS)
+_PUBLIC_PATHS = frozenset({"/", "/status", "/docs", "/openapi.json"})
+_KEYLESS_STOPS = frozenset({("http", "POST", "/hold"), ("http", "POST", "/disable")})
+_LIVE_PATH = "/live"
+_HEADERS = [(b"x-content-type-options", b"nosniff"), (b"cache-control", b"no-store")]
+
+
+class _RefusedError(Exception):
+    def __init__(self, status: HTTPStatus, text: str) -> None:
+        super().__init__(text)
+        self.status = status
+
+
+@dataclass(frozen=True)
+class AccessPolicy:
+    """Access policy of one listener."""
+
+    key: bytes | None = None
+    """The shared key, required beyond the status; without one nobody can move or end anything here.
+
+    Any user of the machine can reach a loopback address: they may watch and stop.
+    """
+    local: bool = False
+    """A Unix socket: its file's permissions limit who may connect; clients may do everything."""
+    hosts: frozenset[str] = frozenset()
+    """Names of this machine, in addition to localhost and numeric addresses."""
+
+    @classmethod
+    def on_tcp(cls, key: bytes | None, host: str, *, loopback: bool = False) -> AccessPolicy:
+        """Return the policy of a listener on TCP at `host`.
+
+        The listener also answers to this machine's names, except on loopback: there nobody needs
+        them, and on a network without DNS anybody may answer to them.
+        """
+        names = frozenset[str]() if loopback else names_of_this_machine()
+        return cls(key, hosts=names | {host.lower()})
+
+
+def names_of_this_machine() -> frozenset[str]:
+    """Return this machine's names: its host name, and that on a network without DNS (mDNS)."""
+    name = socket.gethostname().lower()
+    return frozenset({name, f"{name}.local"})
+
+
+def is_own_host(host: str, names: Container[str]) -> bool:
+    """Whether a request's `Host` is localhost, a numeric address, or one of `names`.
+
+    The host name of a web page that was redirected to this machine (DNS rebinding) is not.
+    """
+    name = host.rpartition(":")[0] if host.rpartition(":")[2].isdigit() else host
+    name = name.removeprefix("[").removesuffix("]").lower()
+    if name == "localhost" or name in names:
+        return True
+    try:
+        ipaddress.ip_address(name)
+    except ValueError:
+        return False
+    return True
+
+
+class AccessControl:
+    """Checks the key, blocks web pages, and limits the rate and size of requests.
+
+    A page open in a browser can send requests to this machine. Those carry the page's `Origin`; if
+    its name was redirected to this machine afterwards, they carry that name as `Host`.
+    No limit here is for stops, but the server's limit of TCP connections applies to all requests.
+    Clients of the Unix socket, which all belong to its user, share no rate limit.
+    `refused` is called for every client that is rejected. `holds_right` returns whether a token is
+    that of the client that may move: a flood from its own address must not block it. If a key is
+    required, one of `tickets` opens a WebSocket.
+    """
+
+    def __init__(
+        self,
+        app: ASGIApp,
+        policy: AccessPolicy,
+        refused: Callable[[], None],
+        holds_right: Callable[[str], bool],
+        tickets: Tickets,
+    ) -> None:
+        self._app = app
+        self._policy = policy
+        self._refused = refused
+        self._holds_right = holds_right
+        self._tickets = tickets
+        self._requests = TokenBuckets(_REQUESTS_PER_S, _BURST)
+        self._failures = TokenBuckets(_FAILURES_PER_S, _FAILURES)
+        self._failures_of_all = TokenBuckets(_FAILURES_OF_ALL_PER_S, _FAILURES_OF_ALL)
+        self._throttled = 0
+        self._serving = Counter[str]()
+        self._turns = asyncio.Lock()
+        """One request begins in each pass of the event loop, so a stop waits for one at most."""
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Let a request through, or answer it here."""
+        if scope["type"] not in ("http", "websocket"):
+            await self._app(scope, receive, send)
+            return
+        who = ""
+        try:
+            who = await self._check(scope)
+            if who and self._serving[who] >= _MOST_AT_ONCE:
+                who = ""
+                raise _RefusedError(
+                    HTTPStatus.TOO_MANY_REQUESTS,
+                    f"more than {_MOST_AT_ONCE} requests at the same time",
+                )
+            self._serving[who] += 1
+            if scope["type"] == "http":
+                most = MOST_PATH_BYTES if scope["path"] == _PATH_PATH else MOST_BODY_BYTES
+                receive = await _read_body(receive, most)
+
+            async def send_on(message: Message) -> None:
+                if message["type"] == "http.response.start":
+                    message = {**message, "headers": [*message.get("headers", ()), *_HEADERS]}
+                await send(message)
+
+            if not _is_stop(scope):
+                async with self._turns:
+                    await asyncio.sleep(0.0)
+            await self._app(scope, receive, send_on)
+        except _RefusedError as refused:
+            self._refused()
+            await _answer(scope, send, refused)
+        finally:
+            self._serving[who] -= 1
+            if self._serving[who] <= 0:
+                del self._serving[who]
+
+    async def _check(self, scope: Scope) -> str:
+        """Return the client whose requests are counted together, "" if this kind is not limited."""
+        headers = {name.lower(): value for name, value in scope["headers"]}
+        if b"content-length" in headers and b"transfer-encoding" in headers:
+            # a proxy may see its end elsewhere, and take the rest for another client's request
+            raise _RefusedError(
+                HTTPStatus.BAD_REQUEST, "Content-Length and Transfer-Encoding; allowed: one of them"
+            )
+        self._check_page(headers)
+        peer = scope["client"][0] if scope["client"] else ""
+        has_key = self._has_key(headers.get(b"authorization", b"")) or self._has_ticket(scope)
+        if not has_key and not self._is_public(scope):
+            await self._throttle(peer)
+            raise _RefusedError(
+                HTTPStatus.UNAUTHORIZED,
+                "Authorization: Bearer KEY is missing or wrong"
+                if self._policy.key
+                else "nobody can show a key here: everybody may look on, hold and disable; for the "
+                "rest use the Unix socket, or start the daemon with --key-file",
+            )
+        if _is_stop(scope):
+            return ""
+        token = headers.get(b"x-control-token", b"").decode("latin-1")
+        if self._holds_right(token):
+            who = "the one that may move"
+        elif token:
+            await self._throttle(peer)
+            who = peer
+        else:
+            who = f"{peer}, with the key" if has_key and self._policy.key else peer
+        if self._policy.local:
+            return ""
+        if not self._requests.take(who, time.monotonic()):
+            raise _RefusedError(HTTPStatus.TOO_MANY_REQUESTS, "too many requests; go slower")
+        return who
+
+    def _check_page(self, headers: Mapping[bytes, bytes]) -> None:
+        host = headers.get(b"host", b"").decode("latin-1")
+        if not self._policy.local and not is_own_host(host, self._policy.hosts):
+            raise _RefusedError(
+                HTTPStatus.FORBIDDEN, "Host: not a name of this machine; use its address"
+            )
+        origin = headers.get(b"origin")
+        if origin is not None and origin.decode("latin-1").lower() != f"http://{host}".lower():
+            raise _RefusedError(
+                HTTPStatus.FORBIDDEN, "Origin: pages of other hosts may not do this"
+            )
+
+    def _has_key(self, given: bytes) -> bool:
+        key = self._policy.key
+        if key is None:
+            return self._policy.local
+        scheme, _, secret = given.partition(b" ")
+        # digests: the duration of the comparison reveals nothing, not even the key's length
+        right = hmac.compare_digest(_digest(secret.strip()), _digest(key))
+        return right and scheme.lower() == b"bearer"
+
+    def _has_ticket(self, scope: Scope) -> bool:
+        if scope["type"] != "websocket" or self._policy.key is None:
+            return False
+        try:
+            query = parse_qs(scope["query_string"].decode("latin-1"), max_num_fields=_MOST_FIELDS)
+        except ValueError:
+            return False
+        return self._tickets.redeem(query.get("ticket", [""])[0])
+
+    def _is_public(self, scope: Scope) -> bool:
+        """Whether everybody who can connect may request this, with or without the key."""
+        kind, method, path = scope["type"], scope.get("method", ""), scope["path"]
+        reads = kind == "http" and method in ("GET", "HEAD")
+        if self._policy.key is not None:
+            return reads and path in _PUBLIC_PATHS
+        looks_on = kind == "websocket" and path == _LIVE_PATH
+        return reads or looks_on or (kind, method, path) in _KEYLESS_STOPS
+
+    async def _throttle(self, peer: str) -> None:
+        """Note a wrong key or token; after too many, delay the answer to this client, or to all.
+
+        Clients with the right key never come here. If too many wait already, refuse this one.
+        """
+        now_s = time.monotonic()
+        of_this, of_all = self._failures.take(peer, now_s), self._failures_of_all.take("", now_s)
+        if of_this and of_all:
+            return
+        if self._throttled >= _MOST_THROTTLED:
+            raise _RefusedError(HTTPStatus.TOO_MANY_REQUESTS, "too many wrong keys or tokens")
+        self._throttled += 1
+        try:
+            await asyncio.sleep(_THROTTLE_S)
+        finally:
+            self._throttled -= 1
+
+
+class TokenBuckets:
+    """A bucket of `burst` tokens for each peer, filled at `rate_Hz`.
+
+    If there are too many peers, the one not seen for longest is forgotten first.
+    """
+
+    def __init__(self, rate_Hz: float, burst: float) -> None:
+        self._rate_Hz = rate_Hz
+        self._burst = burst
+        self._peers: OrderedDict[str, tuple[float, float]] = OrderedDict()
+
+    def take(self, peer: str, now_s: float, cost: float = 1.0) -> bool:
+        """Take `cost` tokens of `peer`; return whether there were enough."""
+        left, before_s = self._peers.pop(peer, (self._burst, now_s))
+        left = min(self._burst, left + (now_s - before_s) * self._rate_Hz)
+        allowed = left >= cost
+        self._peers[peer] = (left - cost if allowed else left), now_s
+        if len(self._peers) > _MOST_PEERS:
+            self._peers.popitem(last=False)
+        return allowed
+
+
+def _is_stop(scope: Scope) -> bool:
+    """Whether this asks for a stop; another method at the same path does not."""
+    is_post = scope["type"] == "http" and scope["method"] == "POST"
+    return is_post and scope["path"] in STOP_PATHS
+
+
+async def _read_body(receive: Receive, most: int) -> Receive:
+    """Read a body that is neither large nor slow; return a `receive` that returns it."""
+    body = bytearray()
+    try:
+        async with asyncio.timeout(_BODY_S):
+            while True:
+                message = await receive()
+                if message["type"] == "http.disconnect":
+                    raise _RefusedError(HTTPStatus.BAD_REQUEST, "the body is not whole")
+                body += message.get("body", b"")
+                if len(body) > most:
+                    raise _RefusedError(
+                        HTTPStatus.REQUEST_ENTITY_TOO_LARGE,
+                        f"the body has more than {most} bytes",
+                    )
+                if not message.get("more_body"):
+                    break
+    except TimeoutError:
+        raise _RefusedError(
+            HTTPStatus.REQUEST_TIMEOUT, f"the body did not come within {_BODY_S:g} s"
+        ) from None
+    content = bytes(body)
+    if len(body) > MOST_BODY_BYTES and not is_mostly_text(
+        content, _MOST_STRINGS, _MOST_OTHER_BYTES
+    ):
+        raise _RefusedError(
+            HTTPStatus.UNPROCESSABLE_ENTITY,
+            f"body: more than {MOST_BODY_BYTES} bytes; allowed: up to {MOST_PATH_BYTES} with up to "
+            f"{_MOST_STRINGS} keys and texts, the file included",
+        )
+    whole: list[Message] = [{"type": "http.request", "body": content, "more_body": False}]
+
+    async def receive_on() -> Message:
+        return whole.pop() if whole else await receive()
+
+    return receive_on
+
+
+async def _answer(scope: Scope, send: Send, refused: _RefusedError) -> None:
+    body = json.dumps({"error": str(refused)}).encode()
+    headers = [
+        (b"content-type", b"application/json"),
+        (b"content-length", str(len(body)).encode()),
+        *_HEADERS,
+    ]
+    if refused.status is HTTPStatus.UNAUTHORIZED:
+        headers.append((b"www-authenticate", b"Bearer"))
+    if scope["type"] == "http":
+        headers.append((b"connection", b"close"))  # the rest of the body is not read
+    kind = "http" if scope["type"] == "http" else "websocket.http"
+    start: dict[str, Any] = {"status": refused.status.value, "headers": headers}
+    await send({"type": f"{kind}.response.start", **start})
+    await send({"type": f"{kind}.response.body", "body": body})
+
+
+def _digest(value: bytes) -> bytes:
+    return hashlib.sha256(value).digest()

@@ -1,0 +1,306 @@
+"""Reads recordings, whole or cut short: cycles as arrays, the other topics as tables of JSON."""
+
+from __future__ import annotations
+
+import os
+import struct
+from collections.abc import Collection, Iterator
+from pathlib import Path
+from typing import IO, Any, Final
+
+import numpy as np
+import pyarrow as pa  # type: ignore[import-untyped]
+from mcap.exceptions import McapError
+from mcap.records import Channel, Chunk, Footer, Header, Message, Metadata, Schema
+from mcap.stream_reader import StreamReader, breakup_chunk
+from numpy.typing import NDArray
+from pyarrow import json as arrow_json
+from zstandard import ZstdError, frame_content_size
+
+from cdpr_profiles.bounded_input import open_regular, parse_json
+from cdpr_profiles.errors import ProfileError, brief
+from cdpr_rt.core.cycle_row import FIELDS
+from cdpr_rt.service.recording_file import (
+    CYCLE,
+    DESCRIPTION,
+    EVENTS,
+    PROFILE,
+    STATUS,
+    TIMING,
+    RecordingError,
+)
+
+Columns = dict[str, NDArray[Any]]
+"""Fields of rows: (rows,) each, or (rows, axes); null is nan."""
+
+_BROKEN: Final = (
+    ProfileError,
+    McapError,
+    ZstdError,
+    struct.error,
+    ValueError,
+    LookupError,
+    TypeError,
+    AttributeError,
+    EOFError,
+    MemoryError,  # due to a damaged length
+    OverflowError,
+)
+_MOST_CHUNK_BYTES: Final = 1 << 24
+"""Bytes of a chunk, compressed or not: the recorder closes one at a quarter of that."""
+_MOST_RATIO: Final = 1000
+"""Content of the chunks over the size of a file: rows that differ only in time reach 400."""
+_LEAST_BYTES: Final = 1 << 26
+"""Content that a file may hold whatever its size."""
+_MOST_MESSAGE_BYTES: Final = 1 << 18
+"""Bytes of a description, a status or an event."""
+_MOST_EVENTS: Final = 100_000
+_MOST_EVENT_BYTES: Final = 1 << 24
+"""Bytes of all events."""
+_MOST_STATES: Final = 64
+_MOST_TIMINGS: Final = 100_000
+_MOST_TIMING_BYTES: Final = 1 << 25
+"""Bytes of timings whose rows have not come yet."""
+_MOST_CHANNELS: Final = 64
+"""Channels, and schemas: a recording has five of each."""
+_TYPES: Final = {"number": pa.float64(), "integer": pa.int64(), "boolean": pa.bool_()}
+_ALWAYS: Final = ("time_s", "stamp_ns")
+
+_PLACES: Final = {name: k for k, name in enumerate(FIELDS)}
+
+CLOSED, KILLED, CUT = "closed", "not closed", "cut short"
+
+
+class RecordingReader:
+    """One file; `cycles` reads it, all other attributes are known afterwards.
+
+    Raises RecordingError if the file is missing or not a recording. Unreadable data end it like
+    the end of the file.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.metadata: dict[str, str] = {}
+        self.part = 0
+        """Its number in its session, from 1."""
+        self.offset_ns = 0
+        """Time of day minus stamp."""
+        self.description: dict[str, Any] = {}
+        """Robot's description as published last."""
+        self.axes: list[str] = []
+        """Names of the axes, as far as the description has them."""
+        self.states: set[str] = set()
+        """States that appear in statuses."""
+        self.events: list[dict[str, Any]] = []
+        """In the order of the file, each with `log_time_ns`, the time of day."""
+        self.ended = CUT
+        """`CLOSED`; `KILLED` if its writer had no time to write the index; `CUT` if the file
+        breaks off."""
+        self.position = 0
+        """Bytes read so far."""
+        self._timings: list[bytes] = []
+        """Timing messages of rows that follow: a chunk may end between the two."""
+        self._held_bytes = self._event_bytes = 0
+
+    def cycles(self, fields: Collection[str] | None = None) -> Iterator[Columns]:
+        """Yield the rows, some hundred at a time; all fields or only `fields`."""
+        channels: dict[int, Channel] = {}
+        schemas: dict[int, Schema] = {}
+        with self._open() as file:
+            for chunk in self._chunks(file):
+                try:
+                    self._require_bounds(chunk)
+                    columns = self._rows(chunk, channels, schemas, fields)
+                except _BROKEN:
+                    self.ended = CUT
+                    return
+                if columns:
+                    yield columns
+
+    def _open(self) -> IO[bytes]:
+        try:
+            return os.fdopen(open_regular(self.path), "rb")
+        except ProfileError as error:
+            raise RecordingError(str(error)) from None
+
+    def _chunks(self, file: IO[bytes]) -> Iterator[Chunk]:
+        """Yield the chunks; take in the records between them."""
+        stream = StreamReader(file, emit_chunks=True, record_size_limit=_MOST_CHUNK_BYTES)
+        try:
+            for record in stream.records:
+                self.position = file.tell()
+                if isinstance(record, Header) and record.profile != PROFILE:
+                    raise RecordingError(
+                        f"{self.path}: an MCAP file, but not a recording of {PROFILE}"
+                    )
+                if isinstance(record, Metadata) and record.name == "recording":
+                    self._take_metadata(record.metadata)
+                elif isinstance(record, Footer):
+                    self.ended = CLOSED if record.summary_start else KILLED
+                elif isinstance(record, Chunk) and self.metadata:
+                    yield record
+        except OSError as error:
+            raise RecordingError(f"{self.path}: cannot be read: {error.strerror}") from None
+        except _BROKEN as error:
+            self.ended = CUT
+            if not self.metadata:
+                reason = str(error).partition(", invalid magic")[0] or "nothing in it"
+                raise RecordingError(f"{self.path}: not a recording: {reason}") from None
+        if not self.metadata:
+            raise RecordingError(f"{self.path}: not a recording: does not say of what")
+
+    def _require_bounds(self, chunk: Chunk) -> None:
+        """Raise RecordingError for a chunk larger than a recorder writes.
+
+        ValueError if its sizes disagree: the library relies on the one in the compressed data.
+        """
+        size = max(chunk.uncompressed_size, len(chunk.data))
+        if chunk.compression == "zstd":
+            if frame_content_size(chunk.data) not in (-1, chunk.uncompressed_size):
+                raise ValueError("sizes of a chunk disagree")
+        elif chunk.compression:
+            raise RecordingError(
+                f"{self.path}: compressed by {brief(chunk.compression, 20)}; allowed: zstd"
+            )
+        if size > _MOST_CHUNK_BYTES:
+            raise RecordingError(
+                f"{self.path}: a chunk of {size} bytes; allowed: up to {_MOST_CHUNK_BYTES}"
+            )
+        self._held_bytes += size
+        most = max(_LEAST_BYTES, _MOST_RATIO * self.position)
+        if self._held_bytes > most:
+            raise RecordingError(
+                f"{self.path}: its first {self.position} bytes hold more than {most}; allowed: up "
+                f"to {_MOST_RATIO} times as many"
+            )
+
+    def _take_metadata(self, metadata: dict[str, str]) -> None:
+        self.part = int(metadata["part"])
+        self.offset_ns = int(metadata["start_realtime_ns"]) - int(metadata["start_monotonic_ns"])
+        self.metadata = dict(metadata)
+
+    def _rows(
+        self,
+        chunk: Chunk,
+        channels: dict[int, Channel],
+        schemas: dict[int, Schema],
+        fields: Collection[str] | None,
+    ) -> Columns:
+        """Take in one chunk; return the rows in it, nothing if there are none."""
+        rows: list[bytes] = []
+        for record in breakup_chunk(chunk, validate_crc=True):
+            if isinstance(record, Schema):
+                self._require_few("schemas", schemas, len(record.data))
+                schemas[record.id] = record
+            elif isinstance(record, Channel):
+                texts = (record.topic, *record.metadata.keys(), *record.metadata.values())
+                self._require_few("channels", channels, sum(map(len, texts)))
+                channels[record.id] = record
+            elif isinstance(record, Message):
+                channel = channels[record.channel_id]
+                if channel.topic in (CYCLE, TIMING):
+                    (rows if channel.topic == CYCLE else self._timings).append(record.data)
+                else:
+                    self._take(channel.topic, record)
+        held_bytes = sum(map(len, self._timings[len(rows) :]))
+        if len(self._timings) - len(rows) > _MOST_TIMINGS or held_bytes > _MOST_TIMING_BYTES:
+            raise RecordingError(
+                f"{self.path}: timings without their rows; allowed: up to {_MOST_TIMINGS}, of "
+                f"{_MOST_TIMING_BYTES} bytes together"
+            )
+        if not rows:
+            return {}
+        parts = {CYCLE: rows}
+        topics = {channel.topic: channel.schema_id for channel in channels.values()}
+        if TIMING in topics:  # earlier recordings have all fields in one topic
+            parts[TIMING] = self._timings[: len(rows)]
+            del self._timings[: len(rows)]
+        known = {
+            topic: parse_json(schemas[topics[topic]].data, "schema")["properties"]
+            for topic in parts
+        }
+        for name in (*(fields or ()), *_ALWAYS):
+            if not any(name in properties for properties in known.values()):
+                version = self.metadata.get("version")
+                raise RecordingError(f"{self.path}: has no {name}; recorded by version {version}")
+        return _joined([(parts[topic], known[topic]) for topic in parts], fields)
+
+    def _require_few(self, what: str, known: Collection[int], size: int) -> None:
+        if len(known) >= _MOST_CHANNELS or size > _MOST_MESSAGE_BYTES:
+            raise RecordingError(
+                f"{self.path}: too many or too long {what}; allowed: up to {_MOST_CHANNELS}, each "
+                f"of {_MOST_MESSAGE_BYTES} bytes"
+            )
+
+    def _take(self, topic: str, message: Message) -> None:
+        if topic not in (DESCRIPTION, STATUS, EVENTS):
+            return
+        if (size := len(message.data)) > _MOST_MESSAGE_BYTES:
+            raise RecordingError(
+                f"{self.path}: {topic}: a message of {size} bytes; allowed: {_MOST_MESSAGE_BYTES}"
+            )
+        value: dict[str, Any] = parse_json(message.data, topic)
+        if topic == DESCRIPTION:
+            axes = enumerate(value.get("axes", []))
+            self.axes = [str(axis.get("name") or k) for k, axis in axes]
+            self.description = value
+        elif topic == STATUS:
+            if len(self.states) < _MOST_STATES:
+                self.states.add(str(value.get("state"))[:_MOST_STATES])
+        else:
+            self._event_bytes += size
+            if len(self.events) >= _MOST_EVENTS or self._event_bytes > _MOST_EVENT_BYTES:
+                raise RecordingError(
+                    f"{self.path}: too many events; allowed: up to {_MOST_EVENTS}, of "
+                    f"{_MOST_EVENT_BYTES} bytes together"
+                )
+            self.events.append(
+                {"log_time_ns": message.log_time, **value, "text": str(value["text"])}
+            )
+
+
+def _joined(
+    parts: list[tuple[list[bytes], dict[str, Any]]], fields: Collection[str] | None
+) -> Columns:
+    """Return the columns of all parts of the same rows; raises ValueError if rows differ."""
+    wanted = None if fields is None else {*fields, "cycle"}
+    joined = _columns(*parts[0], wanted)
+    for messages, properties in parts[1:]:
+        if wanted is None or wanted & (properties.keys() - {"cycle"}):
+            columns = _columns(messages, properties, wanted)
+            if not np.array_equal(joined["cycle"], columns["cycle"]):
+                raise ValueError("rows and their timing belong to other cycles")
+            joined |= columns
+    names = sorted(joined, key=lambda name: _PLACES.get(name, len(_PLACES)))
+    return {name: joined[name] for name in names if fields is None or name in fields}
+
+
+def _columns(
+    rows: list[bytes], properties: dict[str, Any], fields: Collection[str] | None
+) -> Columns:
+    wanted = [name for name in properties if fields is None or name in fields]
+    types, widths = [], {}
+    for name in wanted:
+        one = properties[name]
+        is_array = one["type"] == "array"
+        kind = _TYPES[(one["items"] if is_array else one)["type"]]
+        types.append((name, pa.list_(kind) if is_array else kind))
+        widths[name] = one["minItems"] if is_array else 0
+    text = b"\n".join(rows)
+    if len(rows) * sum(max(width, 1) for width in widths.values()) > len(text):
+        raise ValueError("rows do not hold what their schema says")
+    table = arrow_json.read_json(
+        pa.BufferReader(text),
+        read_options=arrow_json.ReadOptions(use_threads=False, block_size=len(text) + 1),
+        parse_options=arrow_json.ParseOptions(
+            explicit_schema=pa.schema(types), unexpected_field_behavior="ignore"
+        ),
+    )
+    columns: Columns = {}
+    for name in wanted:
+        values = table[name].combine_chunks()
+        if widths[name]:
+            values = values.flatten()
+        array = values.to_numpy(zero_copy_only=False)
+        columns[name] = array.reshape(len(rows), -1) if widths[name] else array
+    return columns

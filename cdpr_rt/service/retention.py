@@ -1,0 +1,74 @@
+"""Retention of recordings by age and size, so that they do not fill the disk."""
+
+from __future__ import annotations
+
+import re
+import time
+from collections.abc import Iterator
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+BYTES_PER_AXIS: Final = 60.0
+"""Approximate bytes of an axis in a cycle: more in motion, less at rest."""
+_WRITTEN_S: Final = 60.0
+"""A file that was written this recently may belong to another daemon, and stays."""
+_DAY_S: Final = 86400.0
+_GAP_DAYS: Final = 30.0
+
+
+@dataclass(frozen=True)
+class Retention:
+    """Limits of a robot's kept recordings; if infinite, all are kept."""
+
+    days: float = float("inf")
+    total_bytes: float = float("inf")
+
+    def prune(self, folder: Path, robot: str) -> list[Path]:
+        """Remove recordings of this robot beyond the limits, the oldest first; return them.
+
+        Only files named as its recordings are considered. The newest stays, and so do files that
+        cannot be removed. Ages are relative to the last recording, and a gap that is longer than
+        `days` and 30 days counts as zero: correcting a wrong clock removes nothing.
+        """
+        found = sorted(_recordings(folder, robot), key=lambda one: one[1])
+        total = sum(size for _, _, size in found)
+        removed = []
+        for (path, written_s, size), age_s in zip(found, self._ages(found), strict=True):
+            if path == found[-1][0] or abs(time.time() - written_s) < _WRITTEN_S:
+                continue
+            if age_s <= self.days * _DAY_S and total <= self.total_bytes:
+                continue
+            with suppress(OSError):
+                path.unlink()
+                removed.append(path)
+                total -= size
+        return removed
+
+    def _ages(self, found: list[tuple[Path, float, int]]) -> list[float]:
+        """Return how much older than the last each recording is, s."""
+        longest_s = max(self.days, _GAP_DAYS) * _DAY_S
+        ages = [0.0] * len(found)
+        for k in range(len(found) - 2, -1, -1):
+            gap_s = found[k + 1][1] - found[k][1]
+            ages[k] = ages[k + 1] + (gap_s if gap_s <= longest_s else 0.0)
+        return ages
+
+
+def _recordings(folder: Path, robot: str) -> Iterator[tuple[Path, float, int]]:
+    name = re.compile(re.escape(robot) + r"-\d{8}T\d{6}Z-\d{3,}\.mcap")
+    for path in folder.glob("*.mcap"):
+        if not name.fullmatch(path.name) or path.is_symlink():
+            continue
+        with suppress(OSError):
+            entry = path.stat()
+            yield path, entry.st_mtime, entry.st_size
+
+
+def size_text(count: float) -> str:
+    """Return a number of bytes as text, in a unit that leaves it at least 1."""
+    for unit, size in (("GB", 1e9), ("MB", 1e6), ("kB", 1e3)):
+        if count >= size:
+            return f"{count / size:.3g} {unit}"
+    return f"{count:.0f} bytes"

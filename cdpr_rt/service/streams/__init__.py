@@ -1,1 +1,0 @@
-"""Set-point streams over UDP."""

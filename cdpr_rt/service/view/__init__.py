@@ -1,1 +1,0 @@
-"""The live view, by the Foxglove protocol."""

@@ -1,1 +1,0 @@
-"""Boot of CANopen nodes (CiA 302-2) and their configuration."""

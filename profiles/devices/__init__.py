@@ -1,1 +1,0 @@
-"""Profiles of rails, safety I/O and load cells."""

@@ -1,1 +1,0 @@
-"""Electronic data sheets (CiA 306)."""

@@ -1,1 +1,0 @@
-"""Limits of robots and motors: their kinds, figures and bounds."""

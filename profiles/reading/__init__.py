@@ -1,1 +1,0 @@
-"""Reading of files that people write: bounds, units, messages."""

@@ -1,1 +1,0 @@
-"""The simulated bus for programs that know other adapters only."""

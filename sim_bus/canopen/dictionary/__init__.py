@@ -1,1 +1,0 @@
-"""Object dictionary, data types, stored parameters."""

@@ -1,1 +1,0 @@
-"""PDOs of a simulated node."""

@@ -1,1 +1,0 @@
-"""What is true of a simulated robot, recorded for reports and tests alone."""

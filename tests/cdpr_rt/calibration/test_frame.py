@@ -1,0 +1,96 @@
+"""The frame of a calibration: kept where nothing tells it, told with how well it is known."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from cdpr_profiles import load_robot
+from cdpr_rt.calibration.calibrate import calibrate, in_frame_of_file, position_shift
+from cdpr_rt.calibration.fit import Fit, fit
+from cdpr_rt.calibration.parameters import EXIT
+from tests.cdpr_rt.calibration.camera_robot import KNOWN, camera_robot
+from tests.cdpr_rt.calibration.made_up import made_up, measured
+from tests.cdpr_rt.calibration.synthetic_readings import ErrorBudget
+
+RIGHT = ErrorBudget(
+    exit_m=0.0, home_m=1e-4, home_deg=0.01, drum=0.0, elongation=0.03, print_scale=3e-4
+)
+WRONG_EXITS = replace(RIGHT, exit_m=0.005)
+TAPE = replace(KNOWN, exit_m=0.05)
+
+
+def turned(found: Fit, turn: np.ndarray, shift: np.ndarray) -> Fit:
+    """Return a fit that is moved as a whole."""
+    exits, cable = found.geometry.kernel_geometry()[:3].T, found.geometry.cable.copy()
+    cable[:, EXIT] += exits @ turn.T + shift - exits
+    return replace(found, geometry=replace(found.geometry, cable=cable))
+
+
+@pytest.mark.parametrize("robot", ["planar-4", "spatial-8"])
+def test_a_fit_that_is_moved_as_a_whole_comes_back_to_the_frame_of_the_file(robot: str) -> None:
+    what = made_up(robot, 30, 3, exit_m=0.0, drum=0.0, elongation=0.0, offset_m=0.0)
+    found = fit(what.file, what.seen)
+    turn = Rotation.from_rotvec([0.0, 0.0, 0.01]).as_matrix()
+    moved = turned(found, turn, np.array([0.01, -0.02, 0.0]))
+    poses = what.seen.start[:20]
+    assert np.linalg.norm(position_shift(moved, what.file, poses)) > 0.01
+    # nothing is known of the frame by the exit points, or all of it
+    back = in_frame_of_file(moved, what.file, poses, exits_std_m=10.0)
+    assert np.abs(position_shift(back.found, what.file, poses)).max() < 1e-5
+    assert back.share == pytest.approx(1.0, rel=1e-3)
+    stays = in_frame_of_file(moved, what.file, poses, exits_std_m=1e-6)
+    assert stays.found.geometry.cable == pytest.approx(moved.geometry.cable, abs=1e-6)
+
+
+@pytest.mark.parametrize("seed", [3, pytest.param(4, marks=pytest.mark.long)])
+def test_with_a_camera_a_right_file_is_kept_in_its_frame_and_a_wrong_one_is_told_from_it(
+    seed: int,
+) -> None:
+    right = camera_robot(25, seed, RIGHT, hand_eye_known=False, knowledge=TAPE)
+    kept = calibrate(right.robot, right.geometry, right.seen, "camera", right.images)
+    assert not kept.told_from_file, kept.verdict()
+    assert np.linalg.norm(kept.shift_m) < 0.5e-3
+    assert kept.absolute.position_mm > 10.0 > kept.predicted_3_sigma_mm
+    wrong = camera_robot(25, seed, WRONG_EXITS, hand_eye_known=False, knowledge=TAPE)
+    told = calibrate(wrong.robot, wrong.geometry, wrong.seen, "camera", wrong.images)
+    assert told.told_from_file, told.verdict()
+
+
+@pytest.mark.parametrize("robot", ["planar-4", "spatial-8"])
+def test_with_points_a_right_file_is_kept_and_a_wrong_one_is_corrected(robot: str) -> None:
+    none = {"exit_m": 0.0, "drum": 0.0, "elongation": 0.0, "offset_m": 0.0}
+    for errors, told in (({**none, "elongation": 0.03}, False), ({**none, "drum": 0.006}, True)):
+        what = made_up(robot, 45, 6, noise_m=2e-4, home_first=True, **errors)  # type: ignore[arg-type]
+        seen = measured(what, 1e-3, 2e-3, 8)
+        outcome = calibrate(load_robot(robot), what.file, seen, "points")
+        assert outcome.good and outcome.told_from_file == told, outcome.verdict()
+        assert outcome.absolute.position_mm > outcome.predicted_3_sigma_mm
+
+
+def test_the_absolute_figure_contains_a_scale_error_that_all_points_share() -> None:
+    what = made_up("spatial-8", 45, 6, noise_m=2e-4, home_first=True)
+    right = measured(what, 1e-3, 2e-3, 8)
+    wrong = replace(right, position_m=1.004 * right.position_m)
+    robot = load_robot("spatial-8")
+    by_right, by_wrong = (calibrate(robot, what.file, seen, "points") for seen in (right, wrong))
+    off_mm = 1e3 * np.abs(by_wrong.shift_m - by_right.shift_m).max()
+    assert by_wrong.good and off_mm > by_wrong.predicted_3_sigma_mm
+    assert off_mm < by_wrong.absolute.position_mm
+    assert "scale, origin, axes" in by_wrong.frame() and "0.9 % (3 sigma)" in by_wrong.frame()
+
+
+def test_a_calibration_says_what_it_does_to_absolute_positions_and_orientations() -> None:
+    what = made_up("spatial-8", 45, 4, noise_m=2e-4, home_first=True)
+    outcome = calibrate(load_robot("spatial-8"), what.file, measured(what, 1e-3, 2e-3, 8), "points")
+    text = "\n".join(outcome.verdict())
+    assert "absolute positions move by" in text
+    assert outcome.predicted.orientation_deg is not None
+    assert f"orientations to {outcome.predicted.orientation_deg:.3f} deg" in text
+    assert outcome.absolute.orientation_deg is not None
+    assert f"absolute orientations to {outcome.absolute.orientation_deg:.2f} deg" in text
+    poor = replace(outcome, predicted=replace(outcome.predicted, orientation_deg=0.2))
+    assert not poor.accuracy().endswith("good") and "0.15 deg wanted" in poor.accuracy()

@@ -1,0 +1,168 @@
+"""Platforms in space whose file leaves angles out of `controlled`: how they hang is told."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.optimize import root
+from scipy.spatial.transform import Rotation
+
+from cdpr_profiles import load_robot
+from cdpr_profiles.places import SHIPPED
+from cdpr_rt.diagnosis.checks import diagnose
+from cdpr_rt.diagnosis.subject import Finding
+from cdpr_rt.model.statics import PlatformStatics, statics_of
+
+CAMERA = (SHIPPED / "robots" / "point-4.toml").read_text()
+SUSPENDED = (SHIPPED / "robots" / "suspended-8.toml").read_text()
+STANDARD_GRAVITY = 9.80665
+TURNED = r"at \((.*), (.*), (.*)\) m the platform hangs turned by (\S+) deg, .*, (\S+) mm from"
+
+
+def hanging(arm_m: float, below_m: float, origin_m: float = 0.0) -> str:
+    """Return point-4 with anchors so far apart, and its centre of mass so far below them.
+
+    The origin of the platform's frame may be so far below the anchors, of which all the rest is.
+    """
+    text = CAMERA.replace(
+        "mass_kg",
+        f"centre_of_mass_m = [0.0, 0.0, {origin_m - below_m}]\n"
+        'controlled = ["x", "y", "z"]\nmass_kg',
+        1,
+    )
+    for exit_m in re.findall(r"exit_point_m = \[(.*), (.*), .*\]", CAMERA):
+        x, y = (float(np.copysign(arm_m, float(one))) for one in exit_m)
+        point = f"anchor_point_m = [{x}, {y}, {origin_m}]"
+        text = text.replace("anchor_point_m = [0.0, 0.0, 0.0]", point, 1)
+    return re.sub(
+        r"((?:home_m|workspace_m.._m) = \[.*, )(.*)\]",
+        lambda found: f"{found[1]}{float(found[2]) - origin_m}]",
+        text,
+    )
+
+
+def rod(turned_rad: float, beside_m: float) -> str:
+    """Return spatial-8 as a rod whose own axis is not controlled."""
+    text = (SHIPPED / "robots" / "spatial-8.toml").read_text()
+    text = re.sub(r"(anchor_point_m =) \[.*, (.*)\]", r"\1 [0.0, 0.0, \2]", text)
+    text = re.sub(r"\nworkspace_angle_rad.*", "", text)
+    given = f"centre_of_mass_m = [{beside_m}, 0.0, 0.0]\nhome_rotation_rad = [0, {turned_rad}, 0]\n"
+    return text.replace("mass_kg", f'{given}controlled = ["x", "y", "z", "rx", "ry"]\nmass_kg', 1)
+
+
+def told(folder: Path, text: str) -> Finding | None:
+    path = folder / "hanging.toml"
+    path.write_text(text)
+    of_it = (one for one in diagnose(load_robot(path)) if one.key == "platform.controlled")
+    return next(of_it, None)
+
+
+def resting(statics: PlatformStatics, place: np.ndarray) -> np.ndarray:
+    """Return the motion (6,) from `place` to where all is in equilibrium and seems to be there.
+
+    The control adds to its planned tensions what holds the directions that it controls.
+    """
+    platform = statics.platform
+    directions = list(statics.model.kinematics.directions)
+    a, b = np.array(platform.exit_points_m), np.array(platform.anchor_points_m)
+    weight = np.array([0.0, 0.0, -platform.mass_kg * STANDARD_GRAVITY])
+    t = statics.least_tensions_N(place[None], statics.model.reserve_N)[0]
+
+    def lengths_and_jacobian(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        arms = Rotation.from_rotvec(x[3:]).apply(b)
+        away = place + x[:3] + arms - a
+        lengths = np.linalg.norm(away, axis=1)
+        u = away / lengths[:, None]
+        return lengths, np.hstack([u, np.cross(arms, u)])
+
+    before, J = lengths_and_jacobian(np.zeros(6))
+    inverse = np.linalg.pinv(J[:, directions])
+
+    def wrong(unknown: np.ndarray) -> np.ndarray:
+        x, force = unknown[:6], unknown[6:]
+        lengths, J_there = lengths_and_jacobian(x)
+        wrench = -J_there.T @ (t + inverse.T @ force)
+        wrench[:3] += weight
+        centre = Rotation.from_rotvec(x[3:]).apply(platform.centre_of_mass_m)
+        wrench[3:] += np.cross(centre, weight)
+        return np.concatenate([wrench, 100.0 * inverse @ (lengths - before)])
+
+    found = root(wrong, np.zeros(6 + len(directions)), tol=1e-12)
+    assert found.success
+    return np.asarray(found.x[:6])
+
+
+@pytest.mark.parametrize(
+    ("arm_m", "below_m", "origin_m"), [(0.05, 0.1, 0.0), (0.05, 0.1, 0.1), (0.03, 0.05, -0.05)]
+)
+def test_how_far_it_hangs_turned_is_where_all_is_in_equilibrium(
+    tmp_path: Path, arm_m: float, below_m: float, origin_m: float
+) -> None:
+    found = told(tmp_path, hanging(arm_m, below_m, origin_m))
+    assert found is not None and not found.impossible
+    figures = re.search(TURNED, found.text)
+    assert figures is not None, found.text
+    *place, turned_deg, off_mm = map(float, figures.groups())
+    x = resting(statics_of(load_robot(tmp_path / "hanging.toml")), np.array(place))
+    assert np.degrees(np.linalg.norm(x[3:])) == pytest.approx(turned_deg, rel=0.12)
+    assert 1e3 * np.linalg.norm(x[:3]) == pytest.approx(off_mm, rel=0.12)
+
+
+@pytest.mark.parametrize(
+    ("arm_m", "below_m", "says"),
+    [(0.05, -0.1, "turn the platform over"), (0.05, -0.02, "turns by more than 30 deg")],
+)
+def test_one_that_turns_over_is_impossible(
+    tmp_path: Path, arm_m: float, below_m: float, says: str
+) -> None:
+    found = told(tmp_path, hanging(arm_m, below_m))
+    assert found is not None and found.impossible
+    assert says in found.text and "takes 6 cables" in found.text
+
+
+def test_one_whose_lengths_would_disagree_is_impossible(tmp_path: Path) -> None:
+    controlled = 'controlled = ["x", "y", "z", "rz"]\nmass_kg'
+    text = (SHIPPED / "robots" / "suspended-6.toml").read_text()
+    found = told(tmp_path, text.replace("mass_kg", controlled, 1))
+    assert found is not None and found.impossible
+    assert re.search(r"^rx, ry left out: .* disagree by \d+\.\d mm, 31\.6 mm allowed", found.text)
+    assert "its cables can control them" in found.text
+
+
+def test_what_disagrees_are_normalised_residuals(tmp_path: Path) -> None:
+    controlled = 'controlled = ["x", "y", "z", "ry", "rz"]\nmass_kg'
+    text = SUSPENDED.replace("mass_kg", controlled, 1)
+    found = told(tmp_path, re.sub(r"workspace_angle_rad.*\n", "", text))
+    assert found is not None and found.impossible
+    figures = re.search(r"at \((.*), (.*), (.*)\) m .* by (\S+) mm, ", found.text)
+    assert figures is not None, found.text
+    *place, apart_mm = map(float, figures.groups())
+    statics = statics_of(load_robot(tmp_path / "hanging.toml"))
+    x = resting(statics, np.array(place))
+    kinematics = statics.model.kinematics
+    held = kinematics.jacobian(statics.model.pose(np.array(place)))
+    projection = np.eye(8) - held @ np.linalg.pinv(held)
+    turned = statics.model.pose(np.array(place)).plus(x)
+    longer = kinematics.lengths(turned) - kinematics.lengths(statics.model.pose(np.array(place)))
+    normalised = np.abs(projection @ longer) / np.sqrt(np.diag(projection))
+    assert 1e3 * normalised.max() == pytest.approx(apart_mm, rel=0.15)
+
+
+@pytest.mark.parametrize(("turned_rad", "beside_m"), [(0.0, 0.0), (0.02, 0.0), (0.35, 0.0)])
+def test_of_a_rod_the_angle_about_its_own_axis_is_nothing_to_mind(
+    tmp_path: Path, turned_rad: float, beside_m: float
+) -> None:
+    assert told(tmp_path, rod(turned_rad, beside_m)) is None
+
+
+def test_what_hangs_beside_a_rods_axis_or_below_a_knot_swings_and_is_possible(
+    tmp_path: Path,
+) -> None:
+    knot = CAMERA.replace("mass_kg", "centre_of_mass_m = [0.02, 0.0, -0.1]\nmass_kg", 1)
+    for text in (rod(0.0, 0.02), knot):
+        found = told(tmp_path, text)
+        assert found is not None and not found.impossible
+        assert "its weight swings about these axes" in found.text

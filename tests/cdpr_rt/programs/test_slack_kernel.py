@@ -1,0 +1,197 @@
+"""When a cable whose slack is taken up counts as tight, and what its winch may pull with."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+import pytest
+
+from cdpr_rt.arrays import FloatArray, IntArray
+from cdpr_rt.control.winch_speed_loop import WinchSpeedLoop
+from cdpr_rt.core.exchange import AxisFeedback
+from cdpr_rt.programs import slack as kernel
+from cdpr_rt.programs.slack import Stillness
+
+PERIOD_S, CABLE_m, ENOUGH_N, HARMLESS_N, PRETENSION_N = 1e-3, 0.026, 16.0, 7.0, 60.0
+STANDS_N = 8.0
+
+
+def one(value: float) -> FloatArray:
+    return np.full(1, value)
+
+
+@dataclass
+class OneCable:
+    """A cable by itself, whose winch turns and pulls as it is told to."""
+
+    phase: IntArray = field(default_factory=lambda: np.zeros(1, np.int64))
+    state: FloatArray = field(default_factory=lambda: np.zeros((1, kernel.STATE)))
+    position: FloatArray = field(default_factory=lambda: one(0.0))
+    winch: kernel.Winches = field(
+        default_factory=lambda: kernel.Winches(
+            PERIOD_S,
+            False,
+            one(CABLE_m),
+            one(ENOUGH_N),
+            one(HARMLESS_N),
+            one(STANDS_N),
+            *(one(0.0) for _ in range(6)),
+        )
+    )
+
+    def enter(self, phase: int) -> None:
+        kernel.enter(phase, self.phase, self.state, self.position)
+
+    def run(self, seconds: float, tension_N: float, inwards_m_s: float = 0.0) -> int:
+        """Turn so fast, pulling so hard, until its phase changes; return the phase."""
+        before = self.phase[0]
+        self.winch.tension_N[0] = tension_N
+        self.winch.speed_rad_s[0] = -inwards_m_s / CABLE_m
+        for _ in range(round(seconds / PERIOD_S)):
+            self.position -= PERIOD_S * inwards_m_s / CABLE_m
+            self.winch.high_N[:] = self.winch.low_N[:] = 0.0
+            kernel.take_up(
+                self.winch, self.phase, self.state, self.position, one(PRETENSION_N), 1.0
+            )
+            if self.phase[0] != before:
+                break
+        return int(self.phase[0])
+
+
+def reeled_in(by_m: float, tension_N: float = 3.0) -> OneCable:
+    """Return a cable that has been reeled in so far since it was first paid out, with that."""
+    cable = OneCable()
+    cable.enter(kernel.LOOSENED)
+    assert cable.run(0.5, -3.0, -0.05) == kernel.NEXT
+    assert cable.run(0.5, 0.0) == kernel.REELED_IN
+    cable.run(0.25, tension_N)
+    cable.run((by_m + 0.005) / 0.05, tension_N, 0.05)
+    assert cable.phase[0] == kernel.REELED_IN
+    return cable
+
+
+def test_a_cable_is_tight_where_what_has_turned_its_winch_turns_it_no_more() -> None:
+    assert reeled_in(0.03, 9.0).run(0.5, 8.0) == kernel.REELED_IN
+    assert reeled_in(0.03, 9.0).run(0.5, 9.0) == kernel.PAID_OUT
+
+
+def test_it_is_not_tight_with_less_than_the_stand_surely_holds() -> None:
+    """Cogging may have turned its winch by itself."""
+    assert reeled_in(0.03, 1.0).run(0.5, 0.9 * HARMLESS_N) == kernel.REELED_IN
+    assert reeled_in(0.03, 1.0).run(0.5, HARMLESS_N) == kernel.PAID_OUT
+
+
+def test_it_is_not_tight_while_it_is_further_out_than_it_was() -> None:
+    """Where it sticks, though more than winches take up pulls at it, it is."""
+    assert reeled_in(-0.004, 9.0).run(0.5, 12.0) == kernel.REELED_IN
+    assert reeled_in(-0.004, 9.0).run(0.5, ENOUGH_N) == kernel.PAID_OUT
+
+
+def test_nor_is_one_that_was_left_with_slack_until_it_is_reeled_in_again() -> None:
+    cable = reeled_in(0.03, 9.0)
+    cable.enter(kernel.CLOSING)
+    assert cable.run(0.5, 12.0) == kernel.CLOSING
+    cable.run(0.08, 9.0, 0.05)
+    assert cable.run(0.5, 9.0) == kernel.TIGHT
+    assert cable.winch.high_N[0] == cable.state[0, kernel.TIGHT_N] == pytest.approx(9.0)
+
+
+def test_a_winch_may_pull_with_more_only_while_it_stands_still() -> None:
+    cable = reeled_in(0.02, 5.0)
+    may_N = cable.winch.high_N[0]
+    assert 4.0 < may_N < 6.0
+    cable.run(0.2, may_N, 0.05)
+    assert cable.winch.high_N[0] == may_N
+    cable.run(0.03, may_N)
+    assert may_N < cable.winch.high_N[0] < may_N + 2.5 * 0.03 * ENOUGH_N
+
+
+def test_its_winch_does_not_pull_with_what_only_drags_the_platform() -> None:
+    """Nor does what turned it as it dragged the platform count as what it needs without load."""
+    cable = reeled_in(0.02, 1.0)
+    cable.winch.stands_N[0] = 2.0
+    for _ in range(20):
+        cable.run(0.1, cable.winch.high_N[0])
+        cable.run(0.02, cable.winch.high_N[0], 0.05)
+    most_N = HARMLESS_N + 2.0
+    assert cable.winch.high_N[0] <= most_N
+    for _ in range(3):  # nor as it is reeled in once more, what dragged it being known
+        cable.enter(kernel.CLOSING)
+        cable.run(0.02, 1.0, 0.05)
+        for _ in range(20):
+            cable.run(0.1, cable.winch.high_N[0])
+            cable.run(0.02, cable.winch.high_N[0], 0.05)
+        assert cable.winch.high_N[0] <= most_N
+
+
+def test_a_heavy_cable_whose_turn_it_is_does_not_run_out() -> None:
+    cable = OneCable()
+    hangs_N = 3.0 * ENOUGH_N
+    cable.winch.hangs_N[:] = hangs_N
+    cable.enter(kernel.NEXT)
+    assert cable.run(0.002, hangs_N) == kernel.REELED_IN
+    assert 0.85 * hangs_N < cable.winch.high_N[0] < 0.95 * hangs_N
+
+
+def test_one_cable_after_the_other_is_reeled_in() -> None:
+    phase = np.array([kernel.PAID_OUT, kernel.NEXT, kernel.NEXT])
+    assert kernel._whose_turn(phase) == -1
+    phase[0] = kernel.WAITING
+    assert kernel._whose_turn(phase) == 1
+    phase[1] = kernel.REELED_IN
+    assert kernel._whose_turn(phase) == -1
+
+
+def test_a_tight_cable_is_let_go_at_once() -> None:
+    cable = reeled_in(0.03, 9.0)
+    assert cable.winch.high_N[0] > 0.0
+    assert cable.run(0.5, 9.0) == kernel.PAID_OUT
+    assert cable.winch.high_N[0] == 0.0
+
+
+def test_it_is_not_tight_with_what_its_own_weight_pulls() -> None:
+    cable = reeled_in(0.03, 9.0)
+    cable.winch.hangs_N[:] = 40.0
+    assert cable.run(0.5, 1.1 * ENOUGH_N) == kernel.REELED_IN
+    assert cable.run(0.5, 40.0) == kernel.PAID_OUT
+
+
+def test_a_motor_that_dithers_by_a_count_stands_still() -> None:
+    """A count in a cycle is a speed at which its winch pulls with less for some cycles."""
+    count_rad = one(1.5 * 0.0001 / CABLE_m)
+    for still_for, far in ((3, 1.0), (60, 1.0), (3, 4.0)):
+        stillness = Stillness(one(CABLE_m), count_rad, PERIOD_S)
+        stillness.begin(one(0.0))
+        lasted = [
+            stillness.lasts(far * count_rad * (cycle // 80 % 2), cycle % 80 >= still_for)
+            for cycle in range(1000)
+        ]
+        assert any(lasted) == (still_for == 3 and far == 1.0)
+
+
+def test_a_heavy_cable_is_paid_out_a_little_and_held_against_what_it_pulls() -> None:
+    """With no more than what keeps light ones from sticking it would run out."""
+    pulls_N, inertia_kg_m2 = 2.5 * ENOUGH_N, 2.3e-4
+    cable, feedback, torque_Nm = OneCable(), AxisFeedback(1), np.zeros(1)
+    loop = WinchSpeedLoop(one(inertia_kg_m2), one(CABLE_m), PERIOD_S)
+    cable.winch.hangs_N[:] = 3.5 * ENOUGH_N
+    cable.enter(kernel.PAID_OUT)
+    torque_Nm[:] = -CABLE_m * pulls_N
+    loop.begin(feedback, one(0.0), torque_Nm)
+    speed_rad_s, w = 0.0, cable.winch
+    for _ in range(1000):
+        w.high_N[:], w.low_N[:], w.paying_out_m_s[:] = 0.0, 0.0, -kernel.TAKE_UP_m_s
+        w.speed_rad_s[:], w.tension_N[:] = loop.speed_rad_s, loop.tension_N
+        kernel.take_up(w, cable.phase, cable.state, feedback.position_rad, one(PRETENSION_N), 1.0)
+        if cable.phase[0] != kernel.PAID_OUT:
+            break
+        loop.high_N[:], loop.low_N[:] = w.high_N, w.low_N
+        loop.paying_out_m_s[:] = w.paying_out_m_s
+        loop.update(feedback, torque_Nm)
+        speed_rad_s += PERIOD_S / inertia_kg_m2 * float(torque_Nm[0] + CABLE_m * pulls_N)
+        feedback.position_rad += PERIOD_S * speed_rad_s
+    assert cable.phase[0] == kernel.CLOSING  # having waited for no others
+    assert w.high_N[0] >= pulls_N
+    assert CABLE_m * feedback.position_rad[0] == pytest.approx(0.005, abs=0.001)
+    assert CABLE_m * speed_rad_s == pytest.approx(kernel.TAKE_UP_m_s, rel=0.3)

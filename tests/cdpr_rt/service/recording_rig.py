@@ -1,0 +1,148 @@
+"""Rows that look like a robot's, and a recorder in a process of its own."""
+
+from __future__ import annotations
+
+import json
+import signal
+import subprocess
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from fork_server import FORKED
+from mcap.reader import make_reader
+
+from cdpr_rt.core.cycle_row import AXES, Row, cycle_dtype
+from cdpr_rt.core.shared_block import RowWriter, SharedBlock
+from cdpr_rt.core.states import LoopState
+
+PERIOD_s = 1e-3
+DESCRIPTION = {
+    "robot": "bench",
+    "period_s": PERIOD_s,
+    "axes": [{"name": "left"}, {"name": "right"}],
+    "programs": ["idle", "hold", "jog"],
+    "version": "0.0",
+}
+_CHILD = """
+import json, os, resource, sys
+from pathlib import Path
+from cdpr_rt.core.shared_block import SharedBlock
+from cdpr_rt.service.recording import Recorder
+
+fd, folder, most_file_bytes = int(sys.argv[1]), Path(sys.argv[2]), int(sys.argv[3])
+if most_file_bytes:
+    resource.setrlimit(resource.RLIMIT_FSIZE, (most_file_bytes, most_file_bytes))
+recorder = Recorder(SharedBlock.attach(fd), folder, "bench", reserve_bytes=0)
+recorder.start()
+print("ready", flush=True)
+for line in sys.stdin:
+    print(json.dumps(recorder.status()), flush=True)
+recorder.stop()
+print(json.dumps(recorder.status()), flush=True)
+"""
+
+
+def made_rows(first: int, count: int, n: int = 2) -> Row:
+    """Return rows `first` to `first + count` of one endless run, stamped in steps of a period."""
+    rows = np.zeros(count, cycle_dtype(n))
+    cycles = np.arange(first, first + count)
+    rows["cycle"] = cycles
+    rows["time_s"] = cycles * PERIOD_s
+    rows["stamp_ns"] = 5_000_000_000 + cycles * 1_000_000
+    rows["state"] = LoopState.ACTIVE
+    rows["limit_axis"] = -1
+    for k, name in enumerate(AXES[:12]):
+        rows[name] = np.sin(cycles * 1e-3 + k)[:, None] * np.arange(1, n + 1)
+    rows["cable_length_m"] = np.nan
+    rows["stream_age_s"] = np.nan
+    rows["pose"] = rows["pose_setpoint"] = np.nan
+    rows["valid"] = True
+    rows["statusword"] = 0x1237
+    return rows
+
+
+def block_with_clock(seconds: float = 10.0, n: int = 2) -> SharedBlock:
+    """Return a block as the launcher makes it, described."""
+    block = SharedBlock.create(n, seconds, 1.0 / PERIOD_s)
+    block.counters["start_monotonic_ns"] = 5_000_000_000
+    block.counters["start_realtime_ns"] = 1_800_000_000_000_000_000
+    block.write_description(DESCRIPTION)
+    block.write_status({"state": "active", "reason": ""})
+    return block
+
+
+def put(writer: RowWriter, rows: Row) -> None:
+    """Write `rows` as the loop does, one after the other."""
+    for k in range(rows.size):
+        writer.slot()[:] = rows[k]
+        writer.commit()
+
+
+class RecorderProcess:
+    """A recorder in another process, which may be killed or have no room for files."""
+
+    def __init__(self, block: SharedBlock, folder: Path, most_file_bytes: int = 0) -> None:
+        arguments = [str(block.fd), str(folder), str(most_file_bytes)]
+        self.process = subprocess.Popen(
+            [*FORKED, _CHILD, *arguments],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+            pass_fds=[block.fd],
+        )
+        assert self._line() == "ready"
+
+    def _line(self) -> str:
+        assert self.process.stdout is not None
+        return self.process.stdout.readline().strip()
+
+    def status(self) -> dict[str, Any]:
+        assert self.process.stdin is not None
+        self.process.stdin.write("\n")
+        self.process.stdin.flush()
+        value: dict[str, Any] = json.loads(self._line())
+        return value
+
+    def stop(self) -> dict[str, Any]:
+        assert self.process.stdin is not None
+        self.process.stdin.close()
+        value: dict[str, Any] = json.loads(self._line())
+        self.process.wait(120)
+        return value
+
+    def kill(self) -> None:
+        self.process.send_signal(signal.SIGKILL)
+        self.process.wait(120)
+
+
+def run_for(writer: RowWriter, seconds: float, first: int) -> int:
+    """Write rows at their pace; return the number of the next one."""
+    began = time.monotonic()
+    at = first
+    while (passed := time.monotonic() - began) < seconds:
+        due = first + round(passed / PERIOD_s)
+        put(writer, made_rows(at, due - at))
+        at = due
+        time.sleep(0.005)
+    return at
+
+
+def stock_messages(path: Path, topic: str) -> list[tuple[int, dict[str, Any]]]:
+    """Read a file with the `mcap` package alone: log times and values."""
+    with path.open("rb") as file:
+        messages = make_reader(file, validate_crcs=True).iter_messages(topics=[topic])
+        return [(message.log_time, json.loads(message.data)) for _, _, message in messages]
+
+
+def stock_cycles(*paths: Path) -> list[int]:
+    """Return the cycle numbers in files, one after the other."""
+    return [row["cycle"] for path in paths for _, row in stock_messages(path, "/cycle")]
+
+
+def wait_until(done: object, seconds: float = 60.0) -> None:
+    end = time.monotonic() + seconds
+    while not done():  # type: ignore[operator]
+        assert time.monotonic() < end
+        time.sleep(0.02)

@@ -1,0 +1,483 @@
+"""Serial adapters, socketcand servers and python-can's interfaces, also those that behave badly."""
+
+from __future__ import annotations
+
+import fcntl
+import os
+import pty
+import select
+import socket
+import threading
+import time
+import tty
+from collections.abc import Callable, Iterator
+
+import can
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from cdpr_drivers.bus import BusHealth, BusState, BusUrl, FramePort, open_port
+from cdpr_drivers.bus.frames import EFF_FLAG, ERR_FLAG, FRAME, RTR_FLAG
+from cdpr_drivers.bus.slcan import SlcanAdapter
+from cdpr_drivers.bus.socketcand import SocketcandAdapter
+from cdpr_drivers.errors import BusError
+from tests.drivers.bus.port_frames import frame, open_files, receive
+
+
+def opened(url: BusUrl, filters: list[tuple[int, int]] | None = None) -> FramePort:
+    """Return a port that also receives error frames and waits for a frame."""
+    port = open_port(url, filters, receive_errors=True)
+    port.settimeout(60.0)
+    return port
+
+
+# -- serial adapters
+
+
+class Adapter:
+    """The far end of a serial line; a thread answers commands by a table, frames are kept."""
+
+    def __init__(self, answers: dict[bytes, bytes]) -> None:
+        self.host, self.terminal = pty.openpty()
+        tty.setraw(self.terminal)
+        self.path = os.ttyname(self.terminal)
+        self.answers = answers
+        self.lines: list[bytes] = []
+        self._out = threading.Event()
+        self._thread = threading.Thread(target=self._serve, daemon=True)
+        self._thread.start()
+
+    @property
+    def url(self) -> BusUrl:
+        return BusUrl.parse(f"slcan:{self.path}?bitrate=1000000")
+
+    def _serve(self) -> None:
+        rest = b""
+        while not self._out.is_set():
+            if not select.select([self.host], [], [], 0.02)[0]:
+                continue
+            rest += os.read(self.host, 4096)
+            *lines, rest = rest.split(b"\r")
+            for line in lines:
+                self.lines.append(line)
+                answer = self.answers.get(line, self.answers.get(line[:1], b""))
+                os.write(self.host, answer)
+
+    def say(self, text: bytes) -> None:
+        os.write(self.host, text)
+
+    def pull_out(self) -> None:
+        """Take the adapter away: the end of the line."""
+        if self._out.is_set():
+            return
+        self._out.set()
+        self._thread.join()
+        os.close(self.terminal)
+        os.close(self.host)
+
+
+GOOD = {b"C": b"\r", b"S": b"\r", b"O": b"\r", b"V": b"V1013\r", b"F": b"\a", b"t": b"z\r"}
+
+
+@pytest.fixture
+def start() -> Iterator[Callable[[dict[bytes, bytes]], Adapter]]:
+    started: list[Adapter] = []
+
+    def start(answers: dict[bytes, bytes]) -> Adapter:
+        started.append(Adapter(answers))
+        return started[-1]
+
+    yield start
+    for adapter in started:
+        adapter.pull_out()
+
+
+Start = Callable[[dict[bytes, bytes]], Adapter]
+
+
+def test_an_adapter_is_opened_step_by_step(start: Start) -> None:
+    adapter = start(GOOD)
+    port = open_port(adapter.url)
+    assert adapter.lines == [b"", b"C", b"V", b"S8", b"O", b"F"]
+    port.close()
+    deadline = time.monotonic() + 60.0
+    while adapter.lines[-1] != b"C":
+        assert time.monotonic() < deadline
+        time.sleep(0.01)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({b"S": b"\a"}, r"refuses bit rate 1000000 \(S8\)"),
+        ({b"O": b"\a"}, "refuses to open"),
+        (dict.fromkeys(GOOD, b""), "nothing there answers as a serial CAN adapter"),
+    ],
+)
+def test_a_refusal_of_the_adapter_is_reported(
+    start: Start, change: dict[bytes, bytes], message: str
+) -> None:
+    adapter = start(GOOD | change)
+    with pytest.raises(BusError, match=message) as caught:
+        open_port(adapter.url)
+    assert str(caught.value).count(adapter.path) == 1
+
+
+def test_an_adapter_that_acknowledges_nothing_but_tells_its_version(start: Start) -> None:
+    adapter = start({b"V": b"V1013\r"})
+    port = opened(adapter.url)
+    adapter.say(b"t1810\r")
+    assert receive(port) == frame(0x181)
+    port.close()
+
+
+def test_late_answers_to_what_was_before_are_not_mistaken(start: Start) -> None:
+    """A channel that was closed already refuses to close, and may say so late."""
+    adapter = start(GOOD | {b"C": b"", b"V": b"\az\rt1810\r\aV1013\r"})
+    open_port(adapter.url).close()
+
+
+def test_frames_of_before_do_not_come_in(start: Start) -> None:
+    adapter = start(GOOD)
+    adapter.say(b"t7770\rt77")
+    port = opened(adapter.url)
+    adapter.say(b"t1811AA\r")
+    assert receive(port) == frame(0x181, b"\xaa")
+    assert port.drain() == 0
+    port.close()
+
+
+@given(st.lists(st.binary(max_size=30), max_size=10))
+@settings(max_examples=200)
+def test_rubbish_on_the_line_yields_frames_or_nothing(chunks: list[bytes]) -> None:
+    adapter = SlcanAdapter.__new__(SlcanAdapter)
+    adapter._reported_flags = 0
+    for chunk in chunks:
+        for kind in (b"", b"t", b"T", b"r", b"R", b"F"):
+            got = adapter._frame_of(kind + chunk, b"\r")
+            if got is not None:
+                can_id, length, _ = FRAME.unpack(got)
+                assert length <= 8
+                assert can_id & ERR_FLAG or can_id & EFF_FLAG or can_id & ~RTR_FLAG < 0x1000
+
+
+def test_rubbish_between_frames_loses_none(start: Start) -> None:
+    adapter = start(GOOD)
+    port = opened(adapter.url)
+    adapter.say(b"t1810\r\xff\x00t99\rtXX81\rt1819\r\r\rhello\rt18")
+    got = [receive(port)]  # so the line is read between the two pieces
+    adapter.say(b"22ABCD12F0\rT000001811EE\rr1813\r")
+    got += [receive(port) for _ in range(3)]
+    assert got == [
+        frame(0x181),
+        frame(0x182, b"\xab\xcd"),  # with a time stamp
+        frame(EFF_FLAG | 0x181, b"\xee"),
+        FRAME.pack(RTR_FLAG | 0x181, 3, b""),
+    ]
+    port.close()
+
+
+def test_a_line_cut_short_by_an_adapter_that_takes_nothing_is_ended_before_the_next(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    send_timeout = "cdpr_drivers.bus.slcan.SEND_TIMEOUT_S"
+    monkeypatch.setattr(send_timeout, 0.2)
+    host, terminal = pty.openpty()
+    tty.setraw(terminal)
+    adapter = SlcanAdapter.__new__(SlcanAdapter)  # on a channel that is open already
+    adapter._fd, adapter._sending, adapter._partly_sent = terminal, threading.Lock(), False
+    os.set_blocking(terminal, False)
+    sent = frame(0x201, bytes(8))
+    with pytest.raises(BlockingIOError):
+        while True:
+            adapter.write(sent)
+    monkeypatch.setattr(send_timeout, 60.0)
+    text = b""
+    sending = threading.Thread(target=adapter.write, args=[frame(0x123, b"\x01")])
+    sending.start()
+    while not text.endswith(b"t123101\r"):  # it comes in as many pieces as the kernel likes
+        assert select.select([host], [], [], 60.0)[0], text[-100:]
+        text += os.read(host, 1 << 16)
+    sending.join()
+    *whole, piece, last, _ = text.split(b"\r")
+    assert set(whole) == {b"t2018" + bytes(16).replace(b"\0", b"0")}
+    assert last == b"t123101", piece
+    os.close(host)
+    os.close(terminal)
+
+
+def test_flags_of_the_adapter_become_error_frames_for_who_asks_for_them(
+    start: Start, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # an adapter that does not answer F at first is never asked again
+    monkeypatch.setattr(SlcanAdapter._command, "__defaults__", (60.0, b""))
+    adapter = start(GOOD | {b"F": b"F00\r", b"t": b"\a"})
+    cyclic, acyclic = open_port(adapter.url), opened(adapter.url, [(0x701, 0x7FF)])
+    health = BusHealth()
+
+    def take_error() -> None:
+        can_id, _, data = FRAME.unpack(receive(acyclic))
+        assert can_id & ERR_FLAG
+        health.take_error(can_id, data)
+
+    cyclic.send(frame(0x201))
+    take_error()
+    assert "transmit overflow" in health.text
+    adapter.answers[b"F"] = b"FA4\r"
+    take_error()
+    assert health.state is BusState.PASSIVE
+    adapter.answers[b"F"] = b"F00\r"
+    while health.state is not BusState.ACTIVE:
+        take_error()
+    assert health.errors >= 2
+    with pytest.raises(BlockingIOError):
+        cyclic.recv_waiting(bytearray(16))
+    cyclic.close()
+    acyclic.close()
+
+
+def test_one_adapter_serves_all_who_open_it(start: Start) -> None:
+    adapter = start(GOOD)
+    first, second = opened(adapter.url, [(0x180, 0x780)]), opened(adapter.url)
+    adapter.say(b"t7010\rt1810\r")
+    assert receive(first) == frame(0x181)
+    assert [receive(second) for _ in range(2)] == [frame(0x701), frame(0x181)]
+    first.send(frame(0x701, b"\x05"))  # the others hear it, as on SocketCAN
+    assert receive(second) == frame(0x701, b"\x05")
+    assert first.drain() == 0
+    with pytest.raises(BusError, match="is in use with other settings"):
+        open_port(BusUrl.parse(f"slcan:{adapter.path}?bitrate=500000"))
+    first.close()
+    first.close()
+    adapter.say(b"t1820\r")
+    assert receive(second) == frame(0x182)
+    with pytest.raises(OSError, match="closed"):
+        first.send(frame(0x80))
+    second.close()
+    assert not [t for t in threading.enumerate() if t.name.startswith("reads slcan")]
+
+
+def test_an_adapter_that_is_pulled_out_is_reported_to_all_and_frees_its_name(start: Start) -> None:
+    adapter = start(GOOD)
+    ports = opened(adapter.url), opened(adapter.url)
+    adapter.pull_out()
+    told = f"{adapter.url}: the bus has gone away (the serial adapter has been pulled out"
+    for port in ports:
+        assert port.recv_into(bytearray(16)) == 0
+        assert told in str(port.lost())
+        with pytest.raises(OSError, match="pulled out") as caught:
+            port.send(frame(0x80))
+        assert told in str(port.lost(caught.value))
+    # nothing holds its name, which the next one may be given
+    assert not [name for name in open_files() if name.startswith(adapter.path)]
+    for port in ports:
+        port.close()
+
+
+def test_a_port_in_use_by_another_program(start: Start) -> None:
+    adapter = start(GOOD)
+    with open(adapter.path, "rb", buffering=0) as other:  # noqa: PTH123  # a terminal
+        fcntl.flock(other, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        with pytest.raises(BusError, match="is in use by another program"):
+            open_port(adapter.url)
+
+
+# -- socketcand
+
+
+class Server:
+    """Plays a socketcand server that says what the test wants, in pieces as the test cuts them."""
+
+    def __init__(self, *greeting: bytes) -> None:
+        self.listener = socket.create_server(("127.0.0.1", 0))
+        self.heard = b""
+        self.client: socket.socket
+        self._greeting = greeting
+        self.serve()
+
+    def serve(self) -> None:
+        """Greet one client."""
+        self._thread = threading.Thread(target=self._greet, daemon=True)
+        self._thread.start()
+
+    @property
+    def url(self) -> BusUrl:
+        return BusUrl.parse(f"socketcand://127.0.0.1:{self.listener.getsockname()[1]}/can0")
+
+    def _greet(self) -> None:
+        self.client, _ = self.listener.accept()
+        for text in self._greeting:
+            self.client.sendall(text)
+            if text != self._greeting[-1]:
+                self.heard += self.client.recv(4096)
+
+    def close(self) -> None:
+        self.listener.close()
+        self._thread.join(60.0)
+        self.client.close()
+
+
+GREETING = (b"< hi >", b"< ok >", b"< ok >")
+
+
+def test_a_lost_line_can_be_opened_again_while_the_old_port_is_held() -> None:
+    server = Server(*GREETING)
+    old = opened(server.url)
+    server.client.close()
+    assert old.recv_into(bytearray(16)) == 0
+    assert "the bus has gone away (lost the socketcand server: " in str(old.lost())
+    with pytest.raises(OSError, match="lost the socketcand server"):
+        old.send(frame(0x80))
+    server.serve()
+    new = opened(server.url)
+    old.close()
+    server.client.sendall(b"< frame 181 1.0 AA >")
+    assert receive(new) == frame(0x181, b"\xaa")
+    new.close()
+    server.close()
+
+
+def test_a_conversation_in_pieces_and_glued_together() -> None:
+    server = Server(b"< hi >", b"< ok >", b"< ok >< frame 181 1.5 1122 >< fr")
+    port = opened(server.url)
+    assert receive(port) == frame(0x181, b"\x11\x22")
+    for piece in (
+        b"ame 080 23.424",
+        b"242  >< frame 12345678 1.0 01 02 03 >",
+        b"< frame 7FF 1.0 >< error 20000040 1.0 >",
+    ):
+        server.client.sendall(piece)
+        time.sleep(0.02)
+    got = [receive(port) for _ in range(4)]
+    assert got == [
+        frame(0x080),
+        frame(EFF_FLAG | 0x12345678, b"\x01\x02\x03"),
+        frame(0x7FF),
+        FRAME.pack(ERR_FLAG | 0x040, 8, b""),  # bus-off
+    ]
+    port.send(frame(0x080))
+    port.send(frame(EFF_FLAG | 0x123, b"\x0f\xf4"))
+    assert server.heard == b"< open can0 >< rawmode >"
+    wanted = b"< send 080 0  >< send 00000123 2 0f f4 >"
+    heard = b""
+    while len(heard) < len(wanted):
+        heard += server.client.recv(4096)
+    assert heard == wanted
+    with pytest.raises(OSError, match="no remote frames"):
+        port.send(FRAME.pack(RTR_FLAG | 0x701, 1, b""))
+    port.close()
+    server.close()
+
+
+def test_rubbish_from_a_server_loses_no_frame() -> None:
+    server = Server(*GREETING)
+    port = opened(server.url)
+    server.client.sendall(
+        b"< frame XYZ 1.0 11 >< frame 181 1.0 123 ><><   ><frame 182><< hello >"
+        b"< frame 183 1.0 112233445566778899 >" + b"\xff" * 9000 + b">< frame 184 1.0 AA >"
+    )
+    got = [receive(port)]
+    while got[-1] != frame(0x184, b"\xaa"):
+        got.append(receive(port))
+    assert got[:-1] in ([], [frame(0x182)])
+    port.close()
+    server.close()
+
+
+def test_a_server_that_takes_nothing_is_given_up_in_bounded_time() -> None:
+    server = Server(*GREETING)
+    port = open_port(server.url, [])
+    longest = 0.0
+    with pytest.raises(OSError, match="takes no frames"):
+        while True:
+            started = time.monotonic()
+            port.send(frame(0x181, bytes(8)))
+            longest = max(longest, time.monotonic() - started)
+    assert longest < 60.0
+    port.close()
+    server.close()
+
+
+def test_a_peer_that_vanishes_without_a_word_is_given_up() -> None:
+    """Unplugged network cable: what the kernel is told to do about it."""
+    server = Server(*GREETING)
+    line = SocketcandAdapter(server.url)
+    options = [
+        line.sock.getsockopt(socket.IPPROTO_TCP, option)
+        for option in (socket.TCP_KEEPIDLE, socket.TCP_KEEPINTVL, socket.TCP_KEEPCNT)
+    ]
+    assert line.sock.getsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE)
+    assert options[0] + options[1] * options[2] <= 5
+    line.close()
+    server.close()
+
+
+@pytest.mark.parametrize(
+    ("greeting", "message"),
+    [
+        ((b"< hi >", b"< error could not open bus >"), "could not open bus.*has it a bus 'can0'"),
+        ((b"SSH-2.0-OpenSSH", b""), "went away"),
+        ((b"< hello >",), "'hello' to 'the connection'"),
+    ],
+)
+def test_a_refusal_of_the_server_is_reported(
+    greeting: tuple[bytes, ...], message: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("cdpr_drivers.bus.socketcand._ANSWER_S", 0.3)
+    server = Server(*greeting)
+    with pytest.raises(BusError, match=message):
+        open_port(server.url)
+    server.close()
+
+
+# -- any bus
+
+
+@pytest.mark.parametrize(
+    ("url", "message"),
+    [
+        ("slcan:/dev/ttyNOTHING?bitrate=1000000", "there is no serial port /dev/ttyNOTHING"),
+        ("slcan:/dev/null?bitrate=1000000", "/dev/null is no serial port"),
+        ("slcan:/tmp?bitrate=1000000", "/tmp is no serial port"),
+        ("slcan:/dev/ptmx?bitrate=123456", "bitrate 123456: allowed are 10000, "),
+        ("slcan:/dev/ptmx?bitrte=1000000", "unknown option 'bitrte'; allowed: bitrate, "),
+        ("slcan:/dev/ptmx?tty_baudrate=fast", "tty_baudrate 'fast': this port cannot be set"),
+        ("socketcand://127.0.0.1:1/can0", r"no socketcand server at 127\.0\.0\.1:1 \(Connection"),
+        ("socketcand://127.0.0.1:1/can0?speed=1", "unknown option 'speed'"),
+        ("simbus:nobody-is-home", "no simulated bus of that name is running"),
+        ("udp_multicast:no-address", "cannot be opened"),
+    ],
+)
+def test_a_bus_that_cannot_be_opened_is_reported_once(url: str, message: str) -> None:
+    with pytest.raises(BusError, match=message) as caught:
+        open_port(BusUrl.parse(url))
+    assert str(caught.value).count(url.split("?", maxsplit=1)[0]) == 1
+
+
+def test_two_ports_on_any_other_interface_share_one_bus() -> None:
+    url = BusUrl.parse("virtual:shared-adapters")
+    one, two = open_port(url), open_port(url, [(0x181, 0x7FF)])
+    with can.Bus("shared-adapters", interface="virtual") as third_party:
+        two.settimeout(60.0)
+        one.send(frame(0x181, b"ours"))
+        third_party.send(can.Message(arbitration_id=0x181, data=b"theirs", is_extended_id=False))
+        assert [receive(two), receive(two)] == [frame(0x181, b"ours"), frame(0x181, b"theirs")]
+        message = third_party.recv(60.0)
+        assert message is not None
+        assert bytes(message.data) == b"ours"
+    one.close()
+    two.close()
+
+
+def test_frames_a_port_does_not_read_in_time_are_counted() -> None:
+    url, health = BusUrl.parse("virtual:line-overflow"), BusHealth()
+    slow, sender = open_port(url, None, health), open_port(url, [])
+    sent = 0
+    while not health.rx_lost:
+        assert sent < 500_000
+        sender.send(frame(0x181))
+        sent += 1
+    assert slow.drain() == sent - health.rx_lost
+    slow.close()
+    sender.close()

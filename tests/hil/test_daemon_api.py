@@ -1,0 +1,208 @@
+"""The Python interface through a daemon: who may move, faults, a script that dies, the end."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from threading import Timer
+
+import numpy as np
+import pytest
+from daemon_rig import PATIENCE_S, RealDaemon, alive, until, write_robot
+
+import cdpr_rt as cdpr
+from cdpr_rt.arrays import FloatArray
+from cdpr_tools.daemon.loop_file import LoopFile, launcher_pid
+from cdpr_tools.daemon.paths import find_launcher_files, find_sockets
+
+
+@pytest.fixture(scope="module")
+def daemon(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RealDaemon]:
+    folder = tmp_path_factory.mktemp("daemon")
+    one = RealDaemon(folder, "--record", str(folder / "recordings"))
+    yield one
+    assert one.end() == 0, one.errors()
+
+
+@pytest.fixture
+def robot(daemon: RealDaemon) -> Iterator[cdpr.Robot]:
+    with cdpr.connect(socket=daemon.socket) as connected:
+        connected.enable()
+        yield connected
+
+
+def setpoints(robot: cdpr.Robot) -> FloatArray:
+    """Return where the motors should be: friction keeps those of this robot off it."""
+    return np.array([axis["setpoint_rad"] for axis in robot.status["axes"]])
+
+
+def test_a_script_moves_the_robot_of_a_daemon_and_reads_its_recording(robot: cdpr.Robot) -> None:
+    robot.turn_by([0.1, 0.1])  # the set-points of a first cycle with power follow the encoders
+    begun = setpoints(robot)
+    robot.turn_by([0.5, -0.25])
+    assert setpoints(robot) - begun == pytest.approx([0.5, -0.25])
+    log = robot.log()
+    assert log["setpoint_rad"][-1] - begun == pytest.approx([0.5, -0.25])
+    assert np.diff(log["cycle"]).max() == 1
+    assert log["time_s"][-1] <= robot.time_s
+
+
+def test_a_second_script_is_refused_while_the_first_may_move(
+    robot: cdpr.Robot, daemon: RealDaemon
+) -> None:
+    robot.turn_by([0.1, 0.1])
+    with cdpr.connect(socket=daemon.socket) as second:
+        assert second.state == "active"
+        with pytest.raises(cdpr.Refused, match="holds the right to move"):
+            second.turn_by([0.1, 0.1])
+        robot.close()
+        second.turn_by([0.1, 0.1])
+
+
+def test_a_hold_by_somebody_else_ends_the_motion(robot: cdpr.Robot, daemon: RealDaemon) -> None:
+    with cdpr.connect(socket=daemon.socket) as second:
+        Timer(0.5, second.hold).start()
+        with pytest.raises(cdpr.MotionEnded, match="pid was ended"):
+            robot.turn_by([0.5, 0.0], speed_rad_s=0.02)
+    assert (robot.state, robot.program) == ("active", "hold")
+
+
+def test_a_fault_names_the_limit_and_is_acknowledged(robot: cdpr.Robot) -> None:
+    robot.turn_by([0.5, 0.0], speed_rad_s=0.02, wait=False)
+    robot.inject_fault("left", "drive-fault")
+    with pytest.raises(cdpr.Faulted, match="left") as fault:
+        robot.wait_until_done()
+    assert fault.value.limit == "drive"
+    robot.acknowledge()
+    assert robot.state == "ready"
+
+
+def test_a_script_that_dies_leaves_a_robot_that_stands(daemon: RealDaemon) -> None:
+    script = (
+        "import sys, cdpr_rt as cdpr\n"
+        "robot = cdpr.connect(socket=sys.argv[1])\n"
+        "robot.enable()\n"
+        "robot.turn_by([0.5, 0.0], speed_rad_s=0.02, wait=False)\n"
+        "print('moving', flush=True)\n"
+        "robot.wait(100.0)\n"
+    )
+    command = [sys.executable, "-c", script, str(daemon.socket)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as dying:
+        assert dying.stdout is not None
+        assert dying.stdout.readline() == "moving\n"
+        dying.kill()
+    status = until(lambda: (now := daemon.status())["program"] != "pid" and now, 15.0)
+    assert (status["state"], status["program"]) == ("active", "hold"), status["reason"]
+    assert "nobody holds the right to move" in status["reason"]
+
+
+@pytest.mark.long
+def test_stops_reach_the_loop_of_a_service_that_hangs(tmp_path: Path) -> None:
+    daemon = RealDaemon(tmp_path, "--no-record")
+    try:
+        service = daemon.children()["service"]
+        with cdpr.connect(socket=daemon.socket) as moving:
+            moving.enable()
+            moving.turn_by([0.5, 0.0], speed_rad_s=0.02, wait=False)
+            with cdpr.connect(socket=daemon.socket) as robot:
+                os.kill(service, signal.SIGSTOP)
+                robot.disable()
+                robot.disable()
+        assert daemon.wait_for("ready")["program"] != "pid"  # the launcher starts a new service
+    finally:
+        daemon.end()
+
+
+@pytest.mark.long
+def test_a_connected_script_ends_the_daemon_and_waits_for_it(tmp_path: Path) -> None:
+    daemon = RealDaemon(tmp_path, "--no-record")
+    try:
+        robot = cdpr.connect(socket=daemon.socket)
+        robot.enable()
+        robot.shut_down()
+        with pytest.raises(cdpr.NotRunning):
+            cdpr.connect(socket=daemon.socket)
+        assert daemon.process.wait(PATIENCE_S) == 0
+    finally:
+        daemon.end()
+
+
+@pytest.mark.long
+def test_a_daemon_ends_when_the_script_that_started_it_is_killed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+    script = (
+        "import sys, cdpr_rt as cdpr\n"
+        "robot = cdpr.run(sys.argv[1], bus='simbus:', record=sys.argv[2])\n"
+        "robot.enable()\n"
+        "print('active', flush=True)\n"
+        "robot.wait(100.0)\n"
+    )
+    command = [sys.executable, "-c", script, str(write_robot(tmp_path)), str(tmp_path)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as dying:
+        assert dying.stdout is not None
+        assert dying.stdout.readline() == "active\n"
+        (launcher,) = map(launcher_pid, find_launcher_files())
+        dying.kill()
+    assert launcher is not None
+    until(lambda: not alive(launcher))
+    assert not find_sockets()
+
+
+@pytest.mark.long
+def test_the_end_of_a_daemon_whose_loop_died_is_an_error(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+    robot = cdpr.run(write_robot(tmp_path), bus="simbus:", record=tmp_path)
+    robot.enable()
+    os.kill(LoopFile.read(LoopFile.beside(find_sockets()[0])).pid, signal.SIGKILL)
+    with pytest.raises(cdpr.Error, match="the loop has died"):
+        robot.close()
+    assert not find_sockets()
+
+
+def test_a_dropped_handle_releases_the_right_to_move(daemon: RealDaemon) -> None:
+    robot = cdpr.connect(socket=daemon.socket)
+    robot.enable()
+    robot.turn_by([0.05, 0.05])
+    assert daemon.status()["control"]["held"]
+    del robot
+    until(lambda: not daemon.status()["control"]["held"], 15.0)
+
+
+def test_real_drives_are_not_started_without_consent(tmp_path: Path) -> None:
+    robot = write_robot(tmp_path)
+    with pytest.raises(cdpr.InvalidArgument, match="can0 will move; give yes=True"):
+        cdpr.run(robot, bus="can0=socketcan:can0")
+    command = [sys.executable, "-P", "-m", "cdpr_tools.cli", "run", str(robot), "--no-record"]
+    options = ["--bus", "can0=slcan:/dev/no-adapter", "--socket", str(tmp_path / "one.sock")]
+    with subprocess.Popen(
+        [*command, *options, "--exit-with-stdin"],
+        stdin=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+    ) as asked:  # fmt: skip
+        assert asked.stderr is not None
+        assert asked.wait(PATIENCE_S) == 2
+        assert "with --exit-with-stdin, real drives need --yes" in asked.stderr.read()
+
+
+def test_a_daemon_that_a_script_starts_ends_with_it(
+    tmp_path: Path, daemon: RealDaemon, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+    with cdpr.run(daemon.robot, bus="simbus:", record=tmp_path) as robot:
+        with pytest.raises(cdpr.AlreadyRunning, match=r"connect\(.* uses it"):
+            cdpr.run(daemon.robot, bus="simbus:")
+        robot.enable()
+        robot.turn_by([0.1, 0.1])
+    with pytest.raises(cdpr.NotRunning):
+        cdpr.connect(daemon.robot)
+    with pytest.raises(cdpr.NotRunning, match="the handle is closed"):
+        robot.enable()
+    with pytest.raises(cdpr.InvalidRobot, match="no-such-robot"):
+        cdpr.run("no-such-robot", bus="simbus:")

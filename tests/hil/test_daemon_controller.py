@@ -1,0 +1,82 @@
+"""A controller of the user's own in a daemon: `cdpr run ROBOT --controller FILE.py:CLASS`."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+from daemon_rig import RealDaemon, cdpr
+from test_daemon_platform import PERIOD_S, SHIPPED
+
+MINE = """
+import numpy as np
+import cdpr_rt as cdpr
+
+class Mine(cdpr.Controller):
+    def reset(self, state):
+        self.integral = np.zeros_like(state.position)
+
+    def update(self, state, target):
+        error = target.position - state.position
+        self.integral += state.period_s * error
+        force = 3000.0 * (error + 3.0 * self.integral)
+        return state.distribute(force + 250.0 * (target.velocity - state.velocity))
+
+class Other:
+    pass
+"""
+
+
+@contextmanager
+def running(folder: Path, controller: str) -> Iterator[RealDaemon]:
+    file, robot = folder / "mine.py", folder / "planar.toml"
+    file.write_text(MINE)
+    shipped = (SHIPPED / "planar-3.toml").read_text()
+    robot.write_text(shipped.replace("sync_period_s = 0.001", f"sync_period_s = {PERIOD_S}"))
+    env = {"XDG_STATE_HOME": str(folder)}
+    mine = ("--no-record", "--controller", f"{file}:{controller}")
+    daemon = RealDaemon(folder, *mine, robot=robot, env=env)
+    try:
+        yield daemon
+    finally:
+        daemon.end()
+
+
+def done(daemon: RealDaemon, *command: str) -> dict[str, object]:
+    result = cdpr(*command, *daemon.at, "--json")
+    assert result.returncode == 0, f"{result.stderr}{daemon.errors()}"
+    told: dict[str, object] = json.loads(result.stdout.splitlines()[-1])
+    return told
+
+
+def test_a_controller_from_a_file_moves_the_platform_and_is_shown(tmp_path: Path) -> None:
+    with running(tmp_path, "Mine") as daemon:
+        done(daemon, "enable")
+        done(daemon, "tighten")
+        moved = done(daemon, "move", "--to", "100", "1600")
+        assert moved["position_m"] == pytest.approx([0.1, 1.6], abs=0.005)
+        notices = daemon.status()["notices"]
+        assert any("mine.py:Mine controls the platform" in notice for notice in notices)
+
+
+@pytest.mark.parametrize(
+    ("controller", "text"),
+    [
+        ("Other", "derive Other from cdpr_rt.Controller"),
+        ("Missing", "has no attribute 'Missing'"),
+    ],
+)
+def test_what_is_no_controller_is_rejected_before_anything_starts(
+    tmp_path: Path, controller: str, text: str
+) -> None:
+    file = tmp_path / "mine.py"
+    file.write_text(MINE)
+    at = ("--socket", tmp_path / "control.sock", "--no-record")
+    result = cdpr(
+        "run", "planar-3", "--bus", "simbus:", *at, "--controller", f"{file}:{controller}"
+    )
+    assert result.returncode == 2, result.stderr
+    assert text in result.stderr and "Traceback" not in result.stderr

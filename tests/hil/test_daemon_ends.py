@@ -1,0 +1,252 @@
+"""Who owns a robot, and how a daemon fares if its terminal, reader or launcher fails."""
+
+from __future__ import annotations
+
+import json
+import os
+import pty
+import select
+import signal
+import subprocess
+import sys
+import time
+from contextlib import ExitStack, suppress
+from dataclasses import asdict
+from pathlib import Path
+
+import pytest
+from daemon_lab import KEY, with_key
+from daemon_rig import PATIENCE_S, RealDaemon, alive, cdpr, until, write_robot
+
+from cdpr_profiles.places import SHIPPED
+from cdpr_tools.bench.flood import Target
+from cdpr_tools.composition.simulator import OwnSimulator
+from cdpr_tools.daemon.loop_file import LoopFile
+
+RUN = [sys.executable, "-P", "-m", "cdpr_tools.cli", "run"]
+
+
+def test_of_two_daemons_started_at_once_for_a_robot_one_runs_and_estop_asks_its_drives(
+    tmp_path: Path,
+) -> None:
+    at = ("--socket", str(tmp_path / "control.sock"))
+    command = [*RUN, str(write_robot(tmp_path)), "--bus", "simbus:", "--no-record", *at]
+    both = [
+        subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        for _ in range(2)
+    ]
+    try:
+        until(lambda: any(one.poll() is not None for one in both), PATIENCE_S)
+        refused, running = sorted(both, key=lambda one: one.poll() is None)
+        told, why = refused.communicate(timeout=PATIENCE_S)
+        assert (refused.returncode, told) == (2, "")
+        assert f"a daemon runs there already, process {running.pid}; `cdpr stop`" in why
+        assert running.stdout is not None
+        assert json.loads(running.stdout.readline())["ready"]["pid"] == running.pid
+        assert cdpr("enable", *at).returncode == 0
+        loop = LoopFile.read(tmp_path / "control.loop").pid
+        assert Path(f"/proc/{loop}/stat").read_text().split()[3] == str(running.pid)
+        done = cdpr("estop", *at)
+        assert (done.returncode, "every drive says so" in done.stdout) == (0, True)
+        assert '"state": "fault"' in cdpr("status", "--json", *at).stdout
+        running.terminate()
+        assert running.wait(PATIENCE_S) == 0
+    finally:
+        for one in both:
+            one.kill()
+            one.communicate()
+    assert not list(tmp_path.glob("control.*"))
+
+
+def test_a_daemon_whose_notices_nobody_reads_restarts_its_service_and_goes_on(
+    tmp_path: Path,
+) -> None:
+    reader, writer = os.pipe()
+    daemon = RealDaemon(tmp_path, "--no-record", stderr=writer)
+    try:
+        os.close(writer)
+        assert daemon.process.stdout is not None
+        daemon.process.stdout.close()  # it shares the fate of `cdpr run 2>&1 | tee log`
+        os.close(reader)
+        assert cdpr("enable", *daemon.at).returncode == 0
+        before = daemon.children()
+        os.kill(before["service"], signal.SIGKILL)
+        until(lambda: daemon.children().get("service") not in (None, before["service"]))
+        assert daemon.children()["loop"] == before["loop"]
+        assert daemon.wait_for("active")["program"] == "hold"
+        daemon.process.send_signal(signal.SIGINT)
+        assert daemon.process.wait(PATIENCE_S) == 0
+    finally:
+        daemon.process.kill()
+        daemon.process.wait()
+
+
+def on_terminal(*words: str) -> tuple[subprocess.Popen[bytes], int]:
+    """Start `cdpr run` on a terminal of its own; return it with the terminal's other side."""
+    ours, theirs = pty.openpty()
+    # in a session whose terminal it is, so that it gets SIGHUP when that closes
+    become = "import os, sys, fcntl, termios; os.setsid(); fcntl.ioctl(0, termios.TIOCSCTTY, 0); "
+    become += "os.execv(sys.argv[1], sys.argv[1:])"
+    process = subprocess.Popen(
+        [sys.executable, "-c", become, *RUN, *words],
+        stdin=theirs, stdout=theirs, stderr=theirs, env={**os.environ, "TERM": "dumb"},
+    )  # fmt: skip
+    os.close(theirs)
+    shown, end_s = b"", time.monotonic() + PATIENCE_S
+    try:
+        while b"Ctrl-C ends it" not in shown:
+            if select.select([ours], [], [], 1.0)[0]:
+                with suppress(OSError):
+                    shown += os.read(ours, 4096)
+            assert process.poll() is None, shown
+            assert time.monotonic() < end_s, shown
+    except BaseException:
+        process.kill()
+        process.wait()
+        raise
+    return process, ours
+
+
+def test_a_daemon_whose_terminal_closes_ends_with_status_0(tmp_path: Path) -> None:
+    at = ("--socket", str(tmp_path / "control.sock"))
+    robot = str(write_robot(tmp_path))
+    process, terminal = on_terminal(robot, "--bus", "simbus:", "--no-record", *at)
+    try:
+        done = cdpr("enable", *at)
+        assert done.returncode == 0, done.stderr
+        os.close(terminal)
+        assert process.wait(PATIENCE_S) == 0
+    finally:
+        process.kill()
+        process.wait()
+    assert not list(tmp_path.glob("control.*"))
+
+
+@pytest.mark.alone
+def test_a_closed_terminal_lowers_a_platform_that_needs_more_than_half_a_minute(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    robot, at = tmp_path / "planar.toml", ("--socket", str(tmp_path / "control.sock"))
+    text = (SHIPPED / "robots" / "planar-3.toml").read_text()
+    for key, value, instead in (("sync_period_s", 0.001, 0.004), ("\nspeed_m_s", 0.5, 0.02)):
+        assert f"{key} = {value}" in text
+        text = text.replace(f"{key} = {value}", f"{key} = {instead}")
+    robot.write_text(text)
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
+    bus = f"simbus:terminal-{os.getpid()}"
+    simulator = OwnSimulator(str(robot), bus)  # not by the daemon, which keeps the lengths then
+    try:
+        process, ours = on_terminal(str(robot), "--bus", bus, *at, "--no-record")
+        try:
+            for words in (("enable",), ("tighten",), ("move", "--to", "0", "1900")):
+                done = cdpr(*words, *at)
+                assert done.returncode == 0, done.stderr
+            os.close(ours)
+            closed_s = time.monotonic()
+            assert process.wait(120) == 0
+            assert time.monotonic() - closed_s > 30.0
+        finally:
+            process.kill()
+            process.wait()
+    finally:
+        simulator.stop()
+    kept = json.loads((tmp_path / "cdpr-rt" / "lengths.planar.simulated.json").read_text())
+    assert (kept["stopped"], kept["fallen"], kept["displaced"]) == (True, False, False)
+
+
+def test_a_stop_comes_through_though_the_launcher_is_stopped(tmp_path: Path) -> None:
+    daemon = RealDaemon(tmp_path, "--no-record")
+    try:
+        assert cdpr("enable", *daemon.at).returncode == 0
+        children = daemon.children()
+        os.kill(daemon.process.pid, signal.SIGSTOP)
+        done = cdpr("stop", *daemon.at)  # which ends by itself, in a minute at most
+        assert (done.returncode, done.stdout) == (0, "stopped, power off\n"), done.stderr
+        assert daemon.process.wait(PATIENCE_S) == 0
+        assert not any(alive(pid) for pid in children.values())
+    finally:
+        daemon.process.send_signal(signal.SIGCONT)
+        daemon.end()
+
+
+def test_a_user_without_a_folder_of_his_own_can_run_a_robot(tmp_path: Path) -> None:
+    env = {"HOME": "/proc/nowhere", "XDG_STATE_HOME": "/proc/nowhere", "XDG_CACHE_HOME": ""}
+    daemon = RealDaemon(tmp_path, env=env)
+    try:
+        assert cdpr("enable", *daemon.at).returncode == 0
+        assert daemon.status()["state"] == "active"
+        assert "recorder" not in daemon.status()["parts"]
+    finally:
+        assert daemon.end() == 0
+    told = daemon.errors()
+    assert told.count("nothing will be recorded: /proc/nowhere/cdpr-rt/recordings") == 1
+    assert "Traceback" not in told
+
+
+@pytest.mark.parametrize(
+    ("command", "status", "told"),
+    [
+        ("status", 1, "no daemon answers at {}.sock ([Errno 2] No such file or directory)"),
+        ("stop", 0, "nothing runs\n"),
+        ("estop", 1, "NOT CONFIRMED: {}.loop: cannot be read: No such file or directory"),
+    ],
+)
+def test_commands_do_without_a_home(tmp_path: Path, command: str, status: int, told: str) -> None:
+    env = {"PATH": os.environ["PATH"], "HOME": "/proc/nowhere", "CDPR_TEST_FORKS": "0"}
+    done = subprocess.run(
+        [sys.executable, "-P", "-m", "cdpr_tools.cli", command, "--socket", tmp_path / "no.sock"],
+        env=env, capture_output=True, text=True, check=False, timeout=PATIENCE_S,
+    )  # fmt: skip
+    assert done.returncode == status
+    assert told.format(tmp_path / "no") in done.stdout + done.stderr
+    assert "Traceback" not in done.stderr
+
+
+@pytest.mark.long
+def test_hold_disable_and_stop_are_obeyed_though_the_service_hangs(tmp_path: Path) -> None:
+    daemon = RealDaemon(tmp_path, "--no-record")
+    try:
+        assert cdpr("enable", *daemon.at).returncode == 0
+        service = daemon.children()["service"]
+        os.kill(service, signal.SIGSTOP)
+        held = cdpr("hold", *daemon.at)
+        assert (held.returncode, held.stdout) == (0, "active\n"), held.stderr
+        disabled = cdpr("disable", *daemon.at)
+        assert (disabled.returncode, disabled.stdout) == (0, "ready\n"), disabled.stderr
+        done = cdpr("stop", *daemon.at)
+        assert (done.returncode, done.stdout) == (0, "stopped, power off\n"), done.stderr
+        assert daemon.process.wait(PATIENCE_S) == 0
+        assert not (tmp_path / "control.stop").exists()
+    finally:
+        daemon.end()
+
+
+@pytest.mark.long
+def test_a_hold_and_a_stop_are_obeyed_while_every_interface_is_flooded(tmp_path: Path) -> None:
+    options = (*with_key(tmp_path), "--stream", "127.0.0.1:0", "--no-record")
+    daemon = RealDaemon(tmp_path, *options)
+    parts = daemon.status()["parts"]
+    http, stream = parts["service"]["http"], parts["stream"]["address"]
+    target = json.dumps(asdict(Target(str(daemon.socket), http, stream, KEY)))
+    command = [sys.executable, "-m", "cdpr_tools.bench.flood", target]
+    try:
+        assert cdpr("enable", *daemon.at).returncode == 0
+        with ExitStack() as stack:
+            for _ in range(2):
+                flood = stack.enter_context(subprocess.Popen(command, stdout=subprocess.PIPE))
+                stack.callback(flood.terminate)
+            refused = daemon.status()["parts"]["service"]["refused"]
+            until(lambda: _refused(daemon) > refused + 100)
+            for _ in range(3):
+                held = cdpr("hold", *daemon.at)
+                assert held.stdout == "active\n" or "state ready" in held.stderr, held.stderr
+            done = cdpr("stop", *daemon.at)
+            assert (done.returncode, done.stdout) == (0, "stopped, power off\n"), done.stderr
+        assert daemon.process.wait(PATIENCE_S) == 0
+    finally:
+        daemon.end()
+
+
+def _refused(daemon: RealDaemon) -> int:
+    """Return how many requests were refused, as far as the flooded service answers."""
+    return int(daemon.status().get("parts", {}).get("service", {}).get("refused", 0))

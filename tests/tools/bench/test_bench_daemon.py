@@ -1,0 +1,113 @@
+"""`cdpr bench` loop, stop and latency run the cases that they name; no timing is judged."""
+
+from __future__ import annotations
+
+import json
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from cdpr_profiles import load_robot
+from cdpr_tools.bench import loop, stop
+from cdpr_tools.output import Output
+
+PERIOD_S, WAKE_UP_S = 4e-3, 0.002
+ALONE = pytest.mark.alone
+pytestmark = pytest.mark.long
+
+
+def slower(robot: str, folder: Path) -> str:
+    """Return the path of a copy at a quarter of the rate, which a busy machine can follow."""
+    shipped = load_robot(robot).path
+    path = folder / shipped.name
+    path.write_text(
+        shipped.read_text().replace("sync_period_s = 0.001", f"sync_period_s = {PERIOD_S}")
+    )
+    return str(path)
+
+
+@ALONE
+def test_the_baseline_loop_turns_the_same_axes_and_costs_more(tmp_path: Path) -> None:
+    figures = loop.measure(6.0, Output(as_json=True), slower("bench-8", tmp_path))
+    ours, *baseline = figures.rows.values()
+    assert len(baseline) == 2
+    for row, period_s in zip(
+        figures.rows.values(), (PERIOD_S, PERIOD_S, 4 * PERIOD_S), strict=True
+    ):
+        assert row["cycles"] > 0.5 * 6.0 / period_s
+        assert row["missed"] < 8 * row["cycles"]  # eight axes
+        assert 20.0 < row["host CPU"] < 5000.0
+        assert 0.0 < row["computing p50"] <= row["computing p99.9"]
+    ratio = baseline[1]["host CPU"] / ours["host CPU"]
+    assert figures.targets["baseline_over_ours"].value == pytest.approx(ratio) and ratio > 1.5
+
+
+@ALONE
+def test_a_platform_is_led_to_and_fro_though_one_of_its_name_has_fallen(
+    tmp_path: Path, state_home: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    fallen = '{"stopped": false}'
+    for name in ("spatial-8", "spatial-8.simulated"):
+        file = state_home / "cdpr-rt" / f"lengths.{name}.json"
+        file.parent.mkdir(exist_ok=True)
+        file.write_text(fallen)
+    monkeypatch.setattr(loop, "ROUNDS", 1)
+    figures = loop.measure(3.0, Output(as_json=True), slower("spatial-8", tmp_path))
+    (ours,) = figures.rows.values()
+    assert ours["cycles"] > 0.5 * 3.0 / PERIOD_S
+    for name in ("spatial-8", "spatial-8.simulated"):
+        assert (state_home / "cdpr-rt" / f"lengths.{name}.json").read_text() == fallen
+
+
+def test_each_stop_is_accepted_while_every_interface_is_flooded() -> None:
+    figures = stop.measure(6, Output(as_json=True))
+    assert len(figures.rows) == 4
+    for ms in figures.rows.values():
+        assert 0.0 < ms["p50"] <= ms["p99"] <= ms["max"]
+    kinds = {"unix", "http_with_key", "http_without_key", "websocket", "websocket_refused"}
+    assert set(figures.more["sent"]) == kinds | {"idle_connections", "stream_packets"}
+    assert min(figures.more["sent"].values()) > 0
+
+
+def test_all_four_curves_of_latency_are_measured_and_drawn(tmp_path: Path) -> None:
+    picture = tmp_path / "new" / "latency.png"
+    options = ("--seconds", "0.2", "--rate", "500", "--out", str(picture), "--json")
+    command = [sys.executable, "-m", "cdpr_tools.cli", "bench", "latency", *options]
+    run = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
+    assert run.returncode == 0, run.stderr
+    figures: dict[str, Any] = json.loads(run.stdout.splitlines()[-1])
+    assert (figures["wakeups"], len(figures["rows"])) == (100, 4)
+    for us in figures["rows"].values():
+        assert 0.0 <= us["p50"] <= us["p99"] <= us["p99.9"] <= us["max"]
+    for notice in figures["not_allowed"]:
+        assert notice in run.stderr
+    assert picture.read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_wake_up_that_is_held_up_for_many_cycles_is_counted_that_late() -> None:
+    """The loop gives up the deadlines that have passed; their lateness is counted all the same."""
+    arguments = [str(WAKE_UP_S), "1000"]
+    probe = subprocess.Popen(
+        [sys.executable, "-m", "cdpr_tools.bench.latency", *arguments], stdout=subprocess.PIPE
+    )
+    stopped_s = 0.0
+    while probe.poll() is None:  # whenever it has loaded its libraries, one falls into its cycles
+        time.sleep(0.5)
+        began_s = time.monotonic()
+        probe.send_signal(signal.SIGSTOP)
+        time.sleep(0.4)
+        probe.send_signal(signal.SIGCONT)
+        stopped_s += time.monotonic() - began_s
+    out, _ = probe.communicate(timeout=120)
+    late_ns = np.frombuffer(out.partition(b"\n")[2], "<i8")
+    assert late_ns.size == 1000
+    assert late_ns.min() > -1000
+    assert late_ns.max() > 0.3e9
+    # all other cycles begin on time
+    assert np.sum(late_ns > 0.1e9) * WAKE_UP_S < stopped_s

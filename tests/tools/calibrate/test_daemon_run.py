@@ -1,0 +1,333 @@
+"""A platform that a daemon, which is made up, moves from pose to pose: what is kept and ends it."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from cdpr_profiles import Robot, load_robot
+from cdpr_profiles.calibration.geometry import geometry_sha256
+from cdpr_profiles.calibration.in_force import calibrated, take_over, undo
+from cdpr_rt.arrays import FloatArray
+from cdpr_rt.calibration.parameters import CableGeometry
+from cdpr_rt.calibration.readings import load_data
+from cdpr_rt.calibration.residuals import lengths_told
+from cdpr_rt.errors import TripError
+from cdpr_rt.refusal import CommandRefusal, RefusalCode
+from cdpr_tools.calibrate import daemon_run
+from cdpr_tools.calibrate.check import checked_running
+from cdpr_tools.calibrate.daemon_run import going_on, read_places
+from cdpr_tools.calibrate.places import Places
+from cdpr_tools.calibrate.pose_operator import PoseOperator
+from cdpr_tools.client.client import ConnectionLostError
+from cdpr_tools.client.daemon_robot import commanded
+from cdpr_tools.client.refusals import DaemonRefusalError
+from cdpr_tools.errors import BadInputError, WorkFailedError
+from cdpr_tools.output import Output
+from tests.profiles.test_geometry_calibration import calibration
+from tests.tools.calibrate.test_daemon_pose import ROBOT, Told, kept_in, read
+
+pytestmark = pytest.mark.usefixtures("daemon_time")
+
+
+PLACES = [(0.1, 1.5, 0.0), (0.2, 1.6, 0.05), (-0.1, 1.7, 0.0), (0.0, 1.4, -0.05)]
+
+
+class Moved(Told):
+    """A daemon that moves its platform, unless a place is refused, not reached, or ends it."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.program, self.target = "hold", list(self.place)
+        self.refused: set[float] = set()
+        self.stuck: set[float] = set()
+        self.faulty: set[float] = set()
+        self.limit, self.holds, self.rights = "slack", 0, 0
+        self.lost = self.silent = False
+        self.reacting = "none"
+        """How the robot is being stopped."""
+
+    def get(self, path: str) -> dict[str, Any]:
+        if self.lost:
+            raise ConnectionLostError("gone")
+        status = super().get(path)
+        if path != "/status":
+            return status
+        if self.program == "pose" and self.target[0] in self.faulty:
+            self.state = "fault"
+        arrived = self.program == "pose" and self.target[0] not in self.stuck
+        if arrived:
+            self.place = list(self.target)
+            here = {"position_m": self.place[:2], "rotation_rad": self.place[2:]}
+            status["program_progress"] |= here
+        status["program_progress"] |= {
+            "done": float(arrived), "trouble": "", "held_back": "a cable would be slack",
+            "missing": "",
+        }  # fmt: skip
+        reason = "axis 1: slack" if self.state == "fault" or self.reacting != "none" else ""
+        limit = {"limit": self.limit} if reason else None
+        return status | {
+            "program": self.program,
+            "commanded": f"{self.program} by me",
+            "state": self.state,
+            "reason": reason,
+            "reason_limit": limit,
+            "reacting": self.reacting,
+        }
+
+    def post(
+        self, path: str, body: dict[str, Any] | None = None, _token: str | None = None
+    ) -> dict[str, Any]:
+        if path == "/control":
+            self.rights += 1
+            return {"token": "one"}
+        if path == "/hold":
+            self.program, self.holds = "hold", self.holds + 1
+            return {}
+        wanted = (body or {})["wanted"]
+        assert (path, (body or {})["program"]) == ("/program", "pose")
+        assert wanted["speed_m_s"] == 0.5 * ROBOT.platform.speed_m_s  # type: ignore[union-attr]
+        if self.silent:
+            raise WorkFailedError("the loop has not turned for 2.0 s")
+        if self.reacting != "none":
+            raise refused("the robot is being stopped")
+        if wanted["position_m"][0] in self.refused:
+            raise refused("a cable is in the way")
+        self.program, self.target = "pose", [*wanted["position_m"], *wanted["rotation_rad"]]
+        return {}
+
+    def renew(self, _token: str) -> None: ...
+    def release(self, _token: str) -> None: ...
+
+
+def refused(why: str) -> DaemonRefusalError:
+    return DaemonRefusalError.of(
+        CommandRefusal(RefusalCode.NOT_FEASIBLE, "pose", arguments={"why": why})
+    )
+
+
+class Measurement:
+    """A measurement with such a daemon, of four places, in a folder."""
+
+    def __init__(self, daemon: Moved, folder: Path) -> None:
+        self.daemon, self.folder = daemon, folder
+        self.asked: list[int] = []
+        self.ask = self.asked.append
+        self.stopped = False
+
+    def run(self, wanted: int = 5) -> daemon_run.DaemonPoses:
+        robot, kept = kept_in(self.daemon, self.folder)
+        places = Places(np.array([0.0, 1.5, 0.0]), np.array(PLACES))
+        out = Output(as_json=False)
+        with going_on(kept), commanded(self.daemon, in_control=True) as running:  # type: ignore[arg-type]
+            operator = PoseOperator(running, robot, lambda _: None, lambda: self.stopped)
+            read_places(out, robot, operator, kept, places, wanted, lambda _: None, self.ask)
+        return kept
+
+
+@pytest.fixture
+def measurement(tmp_path: Path) -> Measurement:
+    return Measurement(Moved(), tmp_path)
+
+
+def test_home_is_read_and_then_each_place_and_all_are_kept(measurement: Measurement) -> None:
+    kept = measurement.run()
+    data = load_data(measurement.folder / "data.json")
+    assert data == kept.data and len(data.poses) == 5 and data.restarts == ()
+    assert {pose.target for pose in data.poses[1:]} == set(PLACES)
+    assert measurement.asked == [1, 2, 3, 4, 5]
+    # the right is held from the first pose to the last
+    assert measurement.daemon.rights == measurement.daemon.holds == 1
+    assert measurement.daemon.program == "hold"
+
+
+def test_one_that_was_ended_goes_on_behind_what_is_kept(measurement: Measurement) -> None:
+    assert measurement.run(3).data.restarts == ()
+    assert measurement.run(4).data.restarts == ()
+    measurement.daemon.counted_m += 0.01  # as after another start
+    kept = measurement.run()
+    assert len(kept.data.poses) == 5 and kept.data.restarts == (4,)
+
+
+def test_a_place_that_is_refused_is_left_out_and_one_that_is_not_reached_read(
+    measurement: Measurement, capsys: pytest.CaptureFixture[str]
+) -> None:
+    measurement.daemon.refused, measurement.daemon.stuck = {0.2}, {-0.1}
+    data = measurement.run().data
+    told = capsys.readouterr().err
+    assert "a cable is in the way" in told
+    assert "mm" in told and "still on its way" not in told and "a cable would be slack" in told
+    assert set(data.tried) == {PLACES[1], PLACES[2]}
+    assert len(data.poses) == 4
+
+
+@pytest.mark.parametrize(("limit", "tried"), [("slack", 1), ("late", 0)])
+def test_a_fault_ends_it_with_what_was_read_kept(
+    measurement: Measurement, limit: str, tried: int
+) -> None:
+    measurement.daemon.faulty, measurement.daemon.limit = {-0.1}, limit
+    with pytest.raises(TripError, match="the motion was ended: axis 1: slack") as caught:
+        measurement.run()
+    assert "the same command goes on behind" in caught.value.__notes__[0]
+    data = load_data(measurement.folder / "data.json")
+    assert len(data.tried) == tried and 1 <= len(data.poses) < 5
+
+
+def test_a_robot_that_is_being_stopped_ends_it_before_other_places_are_asked_for(
+    measurement: Measurement,
+) -> None:
+    """As one whose platform is let down: it has power yet, and refuses whatever is asked."""
+    measurement.run(2)
+    daemon = measurement.daemon
+    post = daemon.post
+
+    def stopped_meanwhile(*arguments: Any) -> Any:
+        daemon.reacting = "controlled stop"
+        return post(*arguments)
+
+    daemon.post = stopped_meanwhile  # type: ignore[method-assign]
+    with pytest.raises(TripError, match=r"axis 1: slack \(controlled stop under way\)"):
+        measurement.run()
+    # the platform has not set out for a place, which is gone to later
+    assert daemon.rights == 2 and load_data(measurement.folder / "data.json").tried == ()
+    with pytest.raises(TripError):  # nor is anything read then
+        measurement.run()
+    assert len(load_data(measurement.folder / "data.json").poses) == 2
+
+
+def test_a_loop_that_does_not_answer_is_not_taken_for_a_refusal(measurement: Measurement) -> None:
+    measurement.run(2)
+    measurement.daemon.silent = True
+    with pytest.raises(WorkFailedError, match="has not turned"):
+        measurement.run()
+    assert measurement.daemon.rights == 2
+    assert load_data(measurement.folder / "data.json").tried == ()
+
+
+def test_a_hold_from_elsewhere_ends_it_also_while_the_platform_stands(
+    measurement: Measurement,
+) -> None:
+    def ask(pose: int) -> None:
+        if pose == 3:
+            measurement.daemon.program = "hold"
+
+    measurement.ask = ask
+    with pytest.raises(TripError, match="the motion was ended"):
+        measurement.run()
+    assert len(load_data(measurement.folder / "data.json").poses) == 3
+
+
+def test_a_stop_holds_and_a_lost_daemon_is_told(measurement: Measurement) -> None:
+    measurement.run(2)
+    daemon, post = measurement.daemon, measurement.daemon.post
+
+    def stopped_on_the_way(path: str, *arguments: Any) -> dict[str, Any]:
+        answer = post(path, *arguments)
+        measurement.stopped |= path == "/program"
+        return answer
+
+    daemon.post = stopped_on_the_way  # type: ignore[method-assign]
+    daemon.stuck = {place[0] for place in PLACES}
+    with pytest.raises(WorkFailedError, match="stopped; 2 poses are kept"):
+        measurement.run()
+    assert daemon.program == "hold"
+    measurement.stopped, daemon.lost = False, True
+    with pytest.raises(ConnectionLostError):
+        measurement.run()
+
+
+class Calibrated(Moved):
+    """One that runs a robot as calibrated, a drum of which may pay out more than it did."""
+
+    def __init__(self, robot: Robot, drum: float) -> None:
+        super().__init__()
+        self.robot, self.drum = robot, drum
+        self.description |= {
+            "reference": str(robot.path), "geometry_sha256": geometry_sha256(robot),
+            "calibration": {"version": 1},
+        }  # fmt: skip
+        self.geometry = CableGeometry.of(robot)
+        self.tension_N = np.full((1, 4), 40.0)
+        self.home_m = self.lengths_m(np.array([*robot.platform.home_m, 0.0]))  # type: ignore[union-attr]
+
+    def lengths_m(self, place: FloatArray) -> FloatArray:
+        poses = self.geometry.model.poses(place[None])
+        return np.asarray(lengths_told(self.geometry, poses, self.tension_N)[0])
+
+    def get(self, path: str) -> dict[str, Any]:
+        status = super().get(path)
+        if path == "/status":
+            lengths_m = self.lengths_m(np.array(self.place))
+            lengths_m[1] -= self.drum * (lengths_m[1] - self.home_m[1])
+            for axis, length_m in zip(status["axes"], lengths_m, strict=True):
+                axis |= {"cable_length_m": float(length_m), "tension_N": 40.0}
+        return status
+
+
+@pytest.fixture
+def file(tmp_path: Path) -> Robot:
+    """A robot's file beside which a calibration is in force."""
+    path = tmp_path / "mine.toml"
+    shutil.copy(ROBOT.path, path)
+    robot = load_robot(path)
+    take_over(robot, calibration(robot))
+    return robot
+
+
+@pytest.mark.parametrize(("drum", "moved"), [(0.0, False), (0.01, True)])
+def test_a_robot_that_runs_is_checked_against_its_calibration(
+    file: Robot, drum: float, moved: bool, tmp_path: Path
+) -> None:
+    daemon = Calibrated(calibrated(file), drum)
+    out = Output(as_json=False)
+    found = checked_running(out, file, daemon, None, 1, tmp_path / "out")  # type: ignore[arg-type]
+    assert (found.moved, found.poses) == (moved, 11)
+    if moved:
+        (change,) = found.changes
+        assert (change.kind, change.cable) == ("drum", 1)
+        assert change.size == pytest.approx([0.01], rel=0.2)
+    data = load_data(tmp_path / "out" / "check.json")
+    assert len(data.poses) == 11 and not data.simulated
+
+
+def test_a_robot_that_does_not_run_with_its_calibration_is_not_checked(
+    file: Robot, tmp_path: Path
+) -> None:
+    out, folder = Output(as_json=False), tmp_path / "out"
+    daemon = Calibrated(calibrated(file), 0.0)
+    with pytest.raises(BadInputError, match="calibrated with one"):
+        checked_running(out, file, daemon, "opencv:0", 1, folder)  # type: ignore[arg-type]
+    with pytest.raises(BadInputError, match="the daemon of this name runs"):
+        checked_running(out, ROBOT, daemon, None, 1, folder)  # type: ignore[arg-type]
+    undo(file)
+    with pytest.raises(BadInputError, match="or its calibration, has been changed"):
+        checked_running(out, file, daemon, None, 1, folder)  # type: ignore[arg-type]
+    assert not folder.exists() and daemon.rights == 0
+
+
+def test_a_check_does_not_write_over_what_a_calibration_has_read(
+    file: Robot, tmp_path: Path
+) -> None:
+    read(Told(), tmp_path)
+    daemon = Calibrated(calibrated(file), 0.0)
+    before = {path.name: path.read_bytes() for path in tmp_path.iterdir() if path.is_file()}
+    with pytest.raises(BadInputError, match="has the poses of a calibration; allowed: another"):
+        checked_running(Output(as_json=False), file, daemon, None, 1, tmp_path)  # type: ignore[arg-type]
+    assert before == {path.name: path.read_bytes() for path in tmp_path.iterdir() if path.is_file()}
+    assert daemon.rights == 0
+
+
+def test_a_platform_that_is_not_held_at_home_is_not_checked(file: Robot, tmp_path: Path) -> None:
+    out, folder = Output(as_json=False), tmp_path / "out"
+    daemon = Calibrated(calibrated(file), 0.0)
+    daemon.place[0] += 0.3
+    with pytest.raises(BadInputError, match=r"\d+ mm from home; allowed for the first pose"):
+        checked_running(out, file, daemon, None, 1, folder)  # type: ignore[arg-type]
+    daemon.state = "ready"
+    with pytest.raises(WorkFailedError, match=r"not held on its cables \(ready, hold\)"):
+        checked_running(out, file, daemon, None, 1, folder)  # type: ignore[arg-type]
+    assert not folder.exists() and daemon.rights == 0

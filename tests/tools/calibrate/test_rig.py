@@ -1,0 +1,162 @@
+"""The procedure of calibration on a simulated robot over its bus, with a scanner beside it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from cdpr_profiles import load_robot
+from cdpr_rt.errors import TripError
+from cdpr_rt.procedures.measure_poses import (
+    Measured,
+    NotThePoseError,
+    measure_poses,
+    read_pose,
+)
+from cdpr_tools.calibrate import pose_operator
+from cdpr_tools.calibrate.places import chosen_places
+from cdpr_tools.calibrate.pose_operator import StoppedError
+from cdpr_tools.calibrate.rig import OutsidePose, simulated_rig
+
+pytestmark = pytest.mark.long
+
+_PLANT = """
+[geometry]
+exit_errors_m = [[0.006, 0.0], [0.0, -0.006], [0.0, 0.005]]
+[scanner]
+position_sigma_m = 0.0005
+"""
+
+
+class Notes:
+    def note(self, text: str) -> None:
+        raise AssertionError(text)
+
+
+def test_home_and_poses_are_read_and_measured(tmp_path: Path) -> None:
+    plant = tmp_path / "plant.toml"
+    plant.write_text(_PLANT)
+    places = chosen_places(load_robot("planar-3"), 6, 3)
+    outside: list[OutsidePose] = []
+    with simulated_rig("planar-3", plant=plant, scanner=True) as operator:
+        measured = Measured(lambda: outside.append(operator.outside()))
+        measured.add(read_pose(operator, operator.tighten()))
+        measure_poses(operator, places.chosen[:2], places.middle, measured, Notes())
+    assert len(measured.readings) == len(outside) == 3
+    for reading, other in zip(measured.readings, outside, strict=True):
+        assert reading.position_m is not None
+        off = np.array(reading.position_m[:2]) - np.array(reading.target[:2])
+        # the exit points are some millimetres from where the file has them
+        assert 1e-5 < float(np.linalg.norm(off)) < 0.03
+        assert reading.position_std_m is not None and 1e-4 < reading.position_std_m < 3e-4
+        assert min(reading.tension_N) > 5.0 and min(reading.length_m) > 0.5
+        assert other.position_m == reading.position_m
+        missed = np.array(other.true_position_m) - np.array(reading.position_m)
+        assert float(np.linalg.norm(missed)) < 6.0 * reading.position_std_m
+
+
+def test_somebody_who_wants_an_end_is_heard_between_two_cycles() -> None:
+    wanted: list[bool] = []
+    with (
+        pytest.raises(StoppedError),
+        simulated_rig("planar-3", plant=None, scanner=False, stop=lambda: bool(wanted)) as operator,
+    ):
+        operator.tighten()
+        wanted.append(True)
+        operator.move_to(chosen_places(load_robot("planar-3"), 1, 3).middle)
+
+
+def test_a_pose_that_is_not_reached_in_time_is_read_where_the_platform_is_held(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    places, said = chosen_places(load_robot("planar-3"), 3, 3), list[str]()
+    first, second = places.chosen[:2]
+
+    class Noted:
+        def note(self, text: str) -> None:
+            said.append(text)
+
+    with simulated_rig("planar-3", plant=None, scanner=False) as operator:
+        operator.tighten()
+        monkeypatch.setattr(pose_operator, "_SLOWED", 0.3)
+        monkeypatch.setattr(pose_operator, "_LATE_S", 0.0)
+        measured = Measured(lambda: None)
+        measure_poses(operator, [first], places.middle, measured, Noted())
+        true = operator.rig.truth()["position_m"][:2].copy()
+        monkeypatch.undo()
+        measure_poses(operator, [second], places.middle, measured, Noted())
+    stood, other = measured.readings
+    assert np.linalg.norm(np.array(stood.target) - first) > 0.1
+    assert np.array(stood.target) == pytest.approx(true, abs=0.01)
+    assert measured.tried == [tuple(first.tolist())] and measured.failures == 0
+    assert other.target == tuple(second.tolist())
+    assert len(said) == 1 and said[0].startswith("pose 1, at ")
+    assert "is read where the platform stands" in said[0] and "mm off after" in said[0]
+
+
+@pytest.mark.parametrize("when", ["on its way", "before it is read", "while it is read"])
+def test_an_emergency_stop_is_no_fault_of_the_pose(
+    when: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    places = chosen_places(load_robot("planar-3"), 3, 3)
+    with simulated_rig("planar-3", plant=None, scanner=False) as operator:
+        operator.tighten()
+        rig = operator.rig
+        measured, pressed_s = Measured(lambda: None), list[float]()
+        name = {"on its way": "move_to", "before it is read": "wait", "while it is read": "read"}[
+            when
+        ]
+        told = getattr(operator, name)
+
+        def pressing(what: Any) -> Any:
+            begun_s, turn = rig.now_s, rig.loop.turn
+
+            def press() -> None:
+                turn()
+                if rig.now_s > begun_s + 0.3 and not pressed_s:
+                    pressed_s.append(rig.now_s)
+                    rig.loop.request_power_off()
+
+            monkeypatch.setattr(rig.loop, "turn", press)
+            return told(what)
+
+        monkeypatch.setattr(operator, name, pressing)
+        with pytest.raises(NotThePoseError, match="emergency stop"):
+            measure_poses(operator, places.chosen[:2], places.middle, measured, Notes())
+        assert pressed_s and not measured.tried and not measured.readings
+        monkeypatch.undo()
+        with pytest.raises(NotThePoseError):  # in the fault, no pose is to blame for it either
+            operator.move_to(places.middle)
+
+
+def test_a_drive_that_fails_on_the_way_is_held_against_the_pose(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    places = chosen_places(load_robot("planar-3"), 3, 3)
+    with simulated_rig("planar-3", plant=None, scanner=False) as operator:
+        operator.tighten()
+        measured, begin = Measured(lambda: None), operator.robot.move_to
+
+        def failing(*arguments: Any, **options: Any) -> None:
+            begin(*arguments, **options)
+            operator.rig.inject_fault(1, 1, 0x2310)
+
+        monkeypatch.setattr(operator.robot, "move_to", failing)
+        with pytest.raises(TripError) as caught:
+            measure_poses(operator, places.chosen[:1], places.middle, measured, Notes())
+    assert not isinstance(caught.value, NotThePoseError)
+    assert measured.tried == [tuple(places.chosen[0].tolist())]
+
+
+def test_a_drive_that_fails_before_the_platform_has_set_out_is_not() -> None:
+    places = chosen_places(load_robot("planar-3"), 3, 3)
+    with simulated_rig("planar-3", plant=None, scanner=False) as operator:
+        operator.tighten()
+        measured = Measured(lambda: None)
+        operator.rig.inject_fault(1, 1, 0x2310)
+        with pytest.raises(NotThePoseError):
+            measure_poses(operator, places.chosen[:1], places.middle, measured, Notes())
+    assert measured.tried == []

@@ -1,0 +1,330 @@
+"""`cdpr drive import`: profiles out of data sheets, good and bad."""
+
+from __future__ import annotations
+
+import io
+import json
+import subprocess
+import sys
+from contextlib import redirect_stdout
+from pathlib import Path
+from typing import Any
+
+import canopen
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import cdpr_profiles
+from cdpr_profiles import ProfileError, load_drive
+from cdpr_profiles.eds import load_dictionary, read_eds
+from cdpr_tools.command_group import load
+from cdpr_tools.commands.drive_import import propose
+from cdpr_tools.errors import BAD_INPUT, CommandError
+
+GENERIC = load_drive("generic-cia402")
+TEXT = GENERIC.eds.read_text()
+
+
+COMMAND = load("groups", "drive")
+
+
+def cdpr(*arguments: str | Path) -> tuple[int, str, str]:
+    """Run the command; return its exit status, text and error as `cdpr` would."""
+    out = io.StringIO()
+    try:
+        with redirect_stdout(out):
+            COMMAND.main([str(word) for word in arguments], standalone_mode=False)
+    except (CommandError, ProfileError) as error:
+        status = error.exit_status if isinstance(error, CommandError) else BAD_INPUT
+        return status, out.getvalue(), str(error)
+    return 0, out.getvalue(), ""
+
+
+def imported(file: Path, out: Path, *more: str) -> dict[str, Any]:
+    status, text, errors = cdpr("import", file, "--out", out, "--json", *more)
+    assert status == 0, errors
+    return dict(json.loads(text.splitlines()[-1]))
+
+
+def refused(text: str, tmp_path: Path) -> str:
+    path = tmp_path / "odd.eds"
+    path.write_text(text)
+    status, _, errors = cdpr("import", path, "--out", tmp_path / "out")
+    assert status == 2, errors
+    assert not (tmp_path / "out").exists()
+    return errors
+
+
+def without(index: str, text: str = TEXT) -> str:
+    """The data sheet without an object's sections."""
+    kept, skipping = [], False
+    for line in text.splitlines():
+        if line.startswith("["):
+            skipping = line.lower().startswith(f"[{index.lower()}")
+        if not skipping:
+            kept.append(line)
+    return "\n".join(kept)
+
+
+def with_key(section: str, key: str, value: str, text: str = TEXT) -> str:
+    head, found, tail = text.partition(f"[{section}]\n")
+    assert found
+    body, gap, rest = tail.partition("\n\n")
+    lines = [line for line in body.splitlines() if not line.startswith(f"{key}=")]
+    return head + found + "\n".join([*lines, f"{key}={value}"]) + gap + rest
+
+
+def test_the_generic_drive_comes_out_as_it_is_shipped(tmp_path: Path) -> None:
+    told = imported(GENERIC.eds, tmp_path, "--name", "mine")
+    drive = load_drive(tmp_path / "mine.toml")
+    assert drive.eds == (tmp_path / "mine.eds").resolve()
+    assert drive.eds.read_bytes() == GENERIC.eds.read_bytes()
+    same = ("vendor_id", "product_code", "revision", "supported_modes", "mode_torque")
+    for key in (*same, "homing_methods", "rpdos", "tpdos", "torque_unit", "heartbeat_consumer_s"):
+        assert getattr(drive, key) == getattr(GENERIC, key), key
+    assert told["remarks"] == []
+    assert set(told["facts"]) == set(drive.verified)
+    assert {fact["status"] for fact in told["facts"].values()} == {"manual", "assumed"}
+    unknown = " ".join(one["what"] for one in told["unknown"])
+    for what in ("position_sign", "torque_sign", "homing_sign", "feedback_delay_s", "torque_unit"):
+        assert what in unknown
+        assert told["facts"][what]["status"] == "assumed"
+    assert all(one["why"] and one["how"] for one in told["unknown"])
+
+
+@pytest.mark.parametrize("name", ["mnm-profile-torque", "parker-compax3-canopen"])
+def test_the_other_shipped_drives_can_be_imported(name: str, tmp_path: Path) -> None:
+    shipped = load_drive(name)
+    imported(shipped.eds, tmp_path)
+    drive = load_drive(tmp_path / f"{name}.toml")
+    for key in ("vendor_id", "product_code", "revision", "supported_modes", "mode_torque"):
+        assert getattr(drive, key) == getattr(shipped, key)
+    mapped = {entry.index for pdo in drive.tpdos for entry in pdo.entries}
+    assert {0x6041, 0x6064, 0x6077} <= mapped
+
+
+def test_a_readable_text_lists_facts_and_gaps(tmp_path: Path) -> None:
+    status, text, _ = cdpr("import", GENERIC.eds, "--out", tmp_path)
+    assert status == 0
+    assert "vendor_id               00CD9A01h" in text
+    assert "What the file cannot tell:" in text
+    assert "to find out: `cdpr drive jog WINCH" in text
+    status, _, errors = cdpr("import", GENERIC.eds, "--out", tmp_path)
+    assert status == 2
+    assert "generic-cia402.toml: is there already; choose another --name or --out" in errors
+
+
+def test_a_dcf_gives_what_belongs_to_the_winch(tmp_path: Path) -> None:
+    dcf = tmp_path / "Drive 5.DCF"
+    text = TEXT + "\n[DeviceComissioning]\nNodeID=5\nBaudrate=500\n"
+    text = with_key("1800sub1", "ParameterValue", "0x405", text)
+    dcf.write_text(with_key("6502", "ParameterValue", "0x28", text))  # PT and homing only
+    told = imported(dcf, tmp_path / "out")
+    assert (told["node_id"], told["bitrate_bit_s"]) == (5, 500_000)
+    drive = load_drive(tmp_path / "out" / "drive-5.toml")
+    assert drive.tpdos[0].cob_id_offset == 0x400
+    assert (drive.supported_modes, drive.mode_torque) == ((4, 6), 4)
+    assert drive.torque_slope_Nm_s == 3000.0
+    assert "torque_slope_Nm_s (6087h)" in [one["what"] for one in told["unknown"]]
+
+
+def test_the_steepest_torque_ramp_is_taken_from_the_limits(tmp_path: Path) -> None:
+    text = with_key("6087", "HighLimit", "2000000", with_key("6502", "DefaultValue", "0x28"))
+    path = tmp_path / "slope.eds"
+    path.write_text(with_key("6076", "DefaultValue", "5000", text))
+    told = imported(path, tmp_path / "out")
+    fact = told["facts"]["torque_slope_Nm_s"]
+    assert (fact["value"], fact["status"]) == (10_000.0, "manual")
+
+
+def test_flaws_are_told_and_the_copy_is_the_makers(tmp_path: Path) -> None:
+    path = tmp_path / "odd.eds"
+    text = with_key("6077", "AccessType", "readonly", TEXT) + "\n[6041]\nParameterName=Again\n"
+    text = text.replace("ProductName=Generic", "ProductName=Gerät")
+    path.write_bytes(text.replace("BaudRate_10=1", "BaudRate_10=yes").encode("cp1252"))
+    told = imported(path, tmp_path / "out")
+    remarks = "\n".join(told["remarks"])
+    assert "read as Windows-1252" in remarks
+    assert "[6041]: is there twice" in remarks
+    assert "[6077] AccessType: value 'readonly'; allowed: ro, wo, rw" in remarks
+    assert "[DeviceInfo] BaudRate_10: value 'yes'; allowed: a number" in remarks
+    drive = load_drive(tmp_path / "out" / "odd.toml")
+    assert "Gerät" in drive.name
+    assert drive.eds.read_bytes() == path.read_bytes()
+    assert len(load_dictionary(drive.eds, 3)) == len(load_dictionary(GENERIC.eds, 3))
+
+
+def test_a_profile_beside_its_file_needs_no_copy(tmp_path: Path) -> None:
+    path = tmp_path / "odd.eds"
+    path.write_text(TEXT + "\n[6041]\nParameterName=Again\n")
+    told = imported(path, tmp_path)
+    assert Path(told["eds"]) == load_drive(tmp_path / "odd.toml").eds == path
+    assert sorted(tmp_path.iterdir()) == [path, tmp_path / "odd.toml"]
+
+
+@pytest.mark.parametrize("suffix", [".eds", ".dcf"])
+def test_a_data_sheet_that_a_strangers_library_wrote(suffix: str, tmp_path: Path) -> None:
+    path = tmp_path / f"theirs{suffix}"
+    od = canopen.import_od(str(GENERIC.eds), 5)
+    od.node_id, od.bitrate = 5, 250_000
+    canopen.export_od(od, str(path))
+    told = imported(path, tmp_path / "out")
+    assert told["remarks"] == []
+    drive = load_drive(tmp_path / "out" / "theirs.toml")
+    assert (drive.rpdos, drive.tpdos) == (GENERIC.rpdos, GENERIC.tpdos)
+    wanted = (5, 250_000) if suffix == ".dcf" else (None, None)
+    assert (told["node_id"], told["bitrate_bit_s"]) == wanted
+
+
+def test_an_imported_profile_runs_its_drive(tmp_path: Path) -> None:
+    """A data sheet with flaws: master and simulated drive take it, up to the power stage."""
+    path = tmp_path / "odd.eds"
+    path.write_bytes((TEXT + "\n[6041]\nParameterName=Zustand für alle\n").encode("cp1252"))
+    assert imported(path, tmp_path / "mine")["remarks"]
+    winch = tmp_path / "mine" / "winch.toml"
+    shipped = (Path(cdpr_profiles.__file__).parent / "winches" / "winch-mpp0923d.toml").read_text()
+    assert 'drive = "generic-cia402"' in shipped
+    winch.write_text(shipped.replace('drive = "generic-cia402"', 'drive = "odd"'))
+    words = ("drive", "enable", str(winch), "--bus", "simbus:", "--seconds", "0.2", "--json")
+    ended = subprocess.run(
+        [sys.executable, "-m", "cdpr_tools.cli", *words],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert ended.returncode == 0, ended.stderr
+    assert json.loads(ended.stdout.splitlines()[-1])["ok"] is True
+
+
+def test_maps_are_proposed_where_the_defaults_do_not_serve(tmp_path: Path) -> None:
+    text = TEXT
+    for number in range(4):
+        for base in ("160", "1A0"):
+            text = with_key(f"{base}{number}sub0", "DefaultValue", "0", text)
+    path = tmp_path / "empty-maps.eds"
+    path.write_text(text)
+    told = imported(path, tmp_path / "out")
+    drive = load_drive(tmp_path / "out" / "empty-maps.toml")
+    assert drive.rpdos == GENERIC.rpdos
+    assert drive.tpdos == GENERIC.tpdos
+    assert told["facts"]["rpdos"]["status"] == "assumed"
+    assert any("step J" in one["how"] for one in told["unknown"])
+
+
+def test_small_fixed_maps_are_combined(tmp_path: Path) -> None:
+    text = TEXT
+    for number, entries in enumerate((["0x60410010"], ["0x60640020"], ["0x60770010"], [])):
+        text = with_key(f"1A0{number}sub0", "AccessType", "ro", text)
+        text = with_key(f"1A0{number}sub0", "DefaultValue", str(len(entries)), text)
+        for sub, entry in enumerate(entries, 1):
+            text = with_key(f"1A0{number}sub{sub}", "DefaultValue", entry, text)
+    path = tmp_path / "small.eds"
+    path.write_text(text)
+    imported(path, tmp_path / "out")
+    tpdos = load_drive(tmp_path / "out" / "small.toml").tpdos
+    assert [[entry.index for entry in pdo.entries] for pdo in tpdos] == [
+        *([0x6041], [0x6064], [0x6077])
+    ]
+
+
+def test_a_drive_without_what_torque_control_needs_is_refused(tmp_path: Path) -> None:
+    assert "[6071]: is missing; torque control needs it" in refused(without("6071"), tmp_path)
+    assert "[1018]: is missing; every CANopen device" in refused(without("1018"), tmp_path)
+    assert "[6060]: is missing; without it no mode" in refused(without("6060"), tmp_path)
+    spoilt = with_key("6040", "DataType", "0x0Z")
+    told = refused(spoilt, tmp_path)
+    assert "[6040]: is missing; torque control needs it" in told
+    assert "[6040] DataType: value '0x0Z'; allowed: a type of CiA 301" in told
+    told = refused(with_key("6064", "DataType", "0x0003"), tmp_path)
+    assert "[6064] DataType: value 0x0003 has 16 bits; allowed: one of 32 bits" in told
+    told = refused(with_key("6502", "DefaultValue", "0x21"), tmp_path)
+    assert "[6502] DefaultValue: value 0x21 has the modes 1, 6 only; allowed: one with 4" in told
+
+
+def test_a_drive_whose_maps_cannot_carry_torque_is_refused(tmp_path: Path) -> None:
+    text = TEXT
+    for number in range(4):
+        text = with_key(f"160{number}sub0", "DefaultValue", "0", text)
+    told = refused(with_key("6071", "PDOMapping", "0", text), tmp_path)
+    assert "RPDO: no RPDO can carry 6040h, 6071h" in told
+    assert "[6071] PDOMapping is not 1" in told
+    for number in range(4):
+        text = with_key(f"160{number}sub0", "AccessType", "ro", text)
+    assert "the maps are fixed" in refused(text, tmp_path)
+    for number in range(4):
+        text = without(f"140{number}", text)
+    assert "the file describes no RPDO" in refused(text, tmp_path)
+
+
+def test_what_an_eds_lacks_is_listed_with_its_consequence(tmp_path: Path) -> None:
+    text = TEXT
+    for index in ("1016", "1017", "60E3", "6502", "6076", "60B8", "60B9", "60BA"):
+        text = without(index, text)
+    path = tmp_path / "poor.eds"
+    path.write_text(text)
+    told = imported(path, tmp_path / "out")
+    unknown = {one["what"]: one["why"] for one in told["unknown"]}
+    assert "notice a master that falls silent" in unknown["1016h is not in the EDS"]
+    assert "step K" in unknown["1017h is not in the EDS"]
+    assert {"homing methods", "modes of operation"} <= set(unknown)
+    assert any("touch probe" in what for what in unknown)
+    assert any("maps 60B9h:0 with 16 bits, which the file" in text for text in told["remarks"])
+    assert told["facts"]["homing_methods"] == {
+        **{"value": [33, 34], "status": "assumed", "how": "the standard's, to the index"}
+    }
+    assert told["facts"]["supported_modes"]["status"] == "assumed"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "problem"),
+    [
+        (("nothing.eds",), "nothing.eds: cannot be read: No such file"),
+        (("drive.xdd",), "drive.xdd: allowed: a file *.eds or *.dcf"),
+        ((str(GENERIC.eds), "--name", "a/b"), "--name a/b: allowed"),
+    ],
+)
+def test_wrong_arguments_are_told(arguments: tuple[str, ...], problem: str) -> None:
+    status, _, errors = cdpr("import", *arguments)
+    assert status == 2
+    assert problem in errors
+
+
+SECTIONS = TEXT.split("\n[")
+VALUES = st.sampled_from(
+    ["", "0", "1", "-1", "0x7", "0x0005", "0x001B", "0xFFFFFFFF", "$NODEID+0x200", "rw", "ro", "?"]
+) | st.text(max_size=6)
+
+
+@pytest.mark.long
+@settings(max_examples=40)
+@given(data=st.data())
+def test_a_mutated_data_sheet_makes_a_profile_or_a_clear_error(
+    tmp_path_factory: pytest.TempPathFactory, data: st.DataObject
+) -> None:
+    sections = list(SECTIONS)
+    for _ in range(data.draw(st.integers(1, 8))):
+        at = data.draw(st.integers(1, len(sections) - 1))
+        change = data.draw(st.sampled_from(["drop", "twice", "value", "value", "value"]))
+        if change == "drop" and len(sections) > 2:
+            del sections[at]
+        elif change == "twice":
+            sections.append(sections[at])
+        else:
+            lines = sections[at].splitlines()
+            line = data.draw(st.integers(0, len(lines) - 1))
+            lines[line] = lines[line].partition("=")[0] + "=" + data.draw(VALUES)
+            sections[at] = "\n".join(lines)
+    folder = tmp_path_factory.getbasetemp()
+    path = folder / "mutated.eds"
+    path.write_text("\n[".join(sections), encoding="utf-8", errors="replace")
+    try:
+        eds = read_eds(path)
+        made = propose(eds)
+    except ProfileError as error:
+        assert str(path) in str(error)
+        return
+    for pdo in (*made.table["rpdos"], *made.table["tpdos"]):
+        assert sum(entry["bits"] for entry in pdo["entries"]) <= 64
+        assert all(entry["index"] in eds.od for entry in pdo["entries"])
+    assert made.table["mode_torque"] in made.table["supported_modes"]

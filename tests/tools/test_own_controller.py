@@ -1,0 +1,151 @@
+"""A platform controller of the user's own, in simulation."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import cdpr_rt as cdpr
+from cdpr_profiles.places import SHIPPED
+
+
+class PoseController(cdpr.Controller):
+    """PID control of the pose; `failing` replaces the tensions from a given cycle on."""
+
+    def __init__(self, failing: Callable[[np.ndarray], object] | None = None) -> None:
+        self.failing, self.fails_at, self.cycles, self.resets = failing, 10**9, 0, 0
+        self.integral = np.zeros(0)
+
+    def reset(self, state: cdpr.State) -> None:
+        self.integral = np.zeros_like(state.position)
+        self.resets += 1
+
+    def update(self, state: cdpr.State, target: cdpr.Target) -> np.ndarray:
+        self.cycles += 1
+        error = target.position - state.position
+        self.integral += state.period_s * error
+        force = 3000.0 * (error + 3.0 * self.integral)
+        force += 250.0 * (target.velocity - state.velocity)
+        tensions = state.distribute(force)
+        if self.failing is not None and self.cycles >= self.fails_at:
+            return self.failing(tensions)  # type: ignore[return-value]
+        return tensions
+
+
+@pytest.fixture(scope="module")
+def robot_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The shipped robot with a quarter of the cycles a second, which take less time."""
+    path = tmp_path_factory.mktemp("robot") / "planar-3.toml"
+    shipped = (SHIPPED / "robots" / "planar-3.toml").read_text()
+    path.write_text(shipped.replace("sync_period_s = 0.001", "sync_period_s = 0.004"))
+    return path
+
+
+def test_a_numpy_controller_moves_the_platform(robot_file: Path) -> None:
+    mine = PoseController()
+    with cdpr.simulate(robot_file, controller=mine) as robot:
+        robot.enable()
+        assert mine.cycles == 0
+        robot.tighten()
+        assert mine.cycles == 0  # it stands on its stand
+        robot.move_to([0.2, 1.8])
+        robot.wait(1.0)
+        assert robot.position_m == pytest.approx([0.2, 1.8], abs=0.004)
+        pose = robot.status["program"] == "pose"
+        assert pose and mine.cycles > 250
+
+
+def infinite(tensions: np.ndarray) -> object:
+    return tensions * np.nan
+
+
+def too_few(tensions: np.ndarray) -> object:
+    return tensions[1:]
+
+
+def leaving(_tensions: np.ndarray) -> object:
+    raise SystemExit("enough")
+
+
+def division(_tensions: np.ndarray) -> object:
+    raise ZeroDivisionError("no way on")
+
+
+def test_a_controller_that_fails_stops_the_robot_like_any_fault(robot_file: Path) -> None:
+    mine = PoseController()
+    with cdpr.simulate(robot_file, controller=mine) as robot:
+        for failing, reason in (
+            (infinite, r"PoseController.update returned \[nan nan nan\]; return 3 finite tensions"),
+            (too_few, "return 3 finite tensions in N"),
+            (leaving, "SystemExit: enough"),
+            (division, "ZeroDivisionError: no way on"),
+        ):
+            mine.failing = None
+            robot.enable()
+            robot.tighten("home")
+            mine.failing, mine.fails_at = failing, mine.cycles + 250
+            with pytest.raises(cdpr.Faulted, match=reason) as fault:
+                robot.move_to([0.2, 1.8], speed_m_s=0.1)
+            assert fault.value.limit == "not_finite"
+            assert mine.cycles == mine.fails_at  # the built-in controller has lowered the platform
+            robot.acknowledge()
+
+
+def test_the_built_in_controller_brakes_and_lowers_after_any_fault(robot_file: Path) -> None:
+    mine = PoseController()
+    with cdpr.simulate(robot_file, controller=mine) as robot:
+        robot.enable()
+        robot.tighten()
+        robot.move_to([0.0, 1.8])
+        before = mine.cycles
+        robot.inject_fault("lower", "drive-fault")
+        for _ in range(300):  # it is lowered before the power goes
+            with suppress(cdpr.Faulted):
+                robot.wait(0.1)
+            if robot.state == "fault":
+                break
+        assert robot.state == "fault"
+        assert mine.cycles < before + 50
+
+
+def test_the_state_of_a_controller_cannot_be_written(robot_file: Path) -> None:
+    class Reaching(PoseController):
+        def update(self, state: cdpr.State, target: cdpr.Target) -> np.ndarray:
+            state.high_N[:] = 1e6
+            return super().update(state, target)
+
+    with cdpr.simulate(robot_file, controller=Reaching()) as robot:
+        robot.enable()
+        robot.tighten()
+        with pytest.raises(cdpr.Faulted, match="read-only"):
+            robot.move_to([0.0, 1.4])
+
+
+def test_tensions_are_limited_to_the_robots_bounds(robot_file: Path) -> None:
+    seen: list[np.ndarray] = []
+
+    class Pulling(PoseController):
+        def update(self, state: cdpr.State, target: cdpr.Target) -> np.ndarray:
+            seen.append(state.tension_N.copy())
+            return super().update(state, target)
+
+    mine = Pulling(lambda tensions: tensions + 1e4 * np.arange(-1.0, 2.0))
+    model = cdpr.load("planar-3")
+    with cdpr.simulate(robot_file, controller=mine) as robot:
+        robot.enable()
+        robot.tighten()
+        robot.move_to([0.0, 1.4])
+        mine.fails_at = mine.cycles + 1
+        robot.wait(0.02)
+    low_N, high_N = seen[-1].min(), seen[-1].max()
+    assert low_N == model.low_N.min()
+    assert model.high_N.max() <= high_N < 2.0 * model.high_N.max()
+
+
+def test_a_robot_without_a_platform_takes_no_controller() -> None:
+    with pytest.raises(cdpr.InvalidArgument, match="controller: bench-2 has no platform"):
+        cdpr.simulate("bench-2", controller=PoseController())

@@ -1,1 +1,0 @@
-"""One update of a platform's control, beside the same in NumPy and SciPy."""

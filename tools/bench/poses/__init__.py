@@ -1,1 +1,0 @@
-"""Reachable poses measured: how many a second, and whether brute force agrees."""

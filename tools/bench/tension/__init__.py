@@ -1,1 +1,0 @@
-"""Tension distribution measured: what it costs, what it finds, how smooth it is along paths."""

@@ -1,0 +1,435 @@
+"""Move a robot that a daemon runs to the poses of a calibration and read them."""
+
+from __future__ import annotations
+
+import math
+import os
+import select
+import sys
+import termios
+from collections.abc import Callable, Iterator
+from contextlib import closing, contextmanager
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from pydantic import Field
+
+from cdpr_drivers.errors import DriverError
+from cdpr_profiles import Robot, load_robot
+from cdpr_profiles.calibration.geometry import geometry_sha256, write_text
+from cdpr_profiles.calibration.in_force import calibrated
+from cdpr_profiles.camera import CameraIntrinsics, MarkerSheets
+from cdpr_profiles.errors import ProfileError
+from cdpr_profiles.platform import NO_PLATFORM
+from cdpr_profiles.reader import Profile, read_json_model
+from cdpr_rt.arrays import FloatArray
+from cdpr_rt.calibration.readings import CalibrationData, CameraSetup, PoseReading, load_points
+from cdpr_rt.core.clock import PacedClock
+from cdpr_rt.errors import ControlError
+from cdpr_rt.procedures.measure_poses import (
+    Measured,
+    PoseRefusedError,
+    measure_poses,
+    read_pose,
+)
+from cdpr_tools.calibrate.places import (
+    Places,
+)
+from cdpr_tools.calibrate.pose_operator import PoseOperator, StoppedError, TakeImage
+from cdpr_tools.calibrate.run import COUNTED, DATA, IMAGES, StopCriterion, refuse_foreign
+from cdpr_tools.client.client import Daemon
+from cdpr_tools.errors import BadInputError, CommandError, WorkFailedError
+from cdpr_tools.output import Output
+
+# Read the pose at which a daemon's robot stands into the data of a calibration.
+
+_COUNTS_ANEW_m = 1e-5
+
+
+class CountedFrom(Profile):
+    """Cable lengths at which the motor angles are zero; they change when counting restarts."""
+
+    length_m: tuple[float, ...] = Field(max_length=64)
+
+
+def robot_of(daemon: Daemon, as_calibrated: bool = False) -> tuple[Robot, dict[str, Any]]:
+    """Return the robot that a daemon runs, and the daemon's description of it.
+
+    It must run with the geometry of its file or, if `as_calibrated`, of its calibration. Raises
+    BadInputError if it does not, has no platform, or its file or calibration has changed since.
+    """
+    description = daemon.get("/description")
+    robot = load_robot(description["reference"])
+    if robot.platform is None:
+        raise BadInputError(f"{robot.path}: {NO_PLATFORM}")
+    if as_calibrated:
+        robot = calibrated(robot)
+    elif description["calibration"] is not None:
+        raise BadInputError(
+            f"{robot.profile} runs with a calibration in force, and its lengths count by that; "
+            f"allowed: by its file: cdpr calibrate undo {robot.reference}, then start it again"
+        )
+    if description["geometry_sha256"] != geometry_sha256(robot):
+        what = "or its calibration, " if as_calibrated else ""
+        raise BadInputError(
+            f"{robot.path}: {what}has been changed since the daemon was started with it"
+        )
+    return robot, description
+
+
+def no_poses(robot: Robot, simulated: bool) -> CalibrationData:
+    """Return data without poses, for a robot that has not been measured yet."""
+    return CalibrationData(
+        robot=robot.profile,
+        geometry_sha256=geometry_sha256(robot),
+        simulated=simulated,
+        date=datetime.now(UTC).isoformat(timespec="seconds"),
+        poses=(),
+    )
+
+
+class DaemonPoses:
+    """Poses of a robot that a daemon runs, in a folder; each is stored as soon as it is read."""
+
+    def __init__(self, folder: Path, data: CalibrationData, name: str = DATA) -> None:
+        self.folder, self.data, self._path = folder, data, folder / name
+
+    def require_home(self, robot: Robot, place: FloatArray) -> None:
+        """Raise BadInputError if the first pose, (d,), is not home, where lengths are measured."""
+        platform = robot.platform
+        assert platform is not None  # see `robot_of`
+        k = len(platform.home_m)
+        off_m = float(np.abs(place[:k] - np.array(platform.home_m)).max())
+        if not self.data.poses and off_m > platform.home_tolerance_m:
+            raise BadInputError(
+                f"the platform is {1e3 * off_m:.0f} mm from home; allowed for the first pose: "
+                "home, where it stands after `cdpr lower`, `cdpr tighten`"
+            )
+
+    def add(self, reading: PoseReading, counted_m: FloatArray) -> None:
+        """Append a reading and store it; raises ProfileError.
+
+        `counted_m` (n,) are the lengths at which the motors' angles are zero.
+        """
+        poses, restarts = self.data.poses, self.data.restarts
+        if poses:
+            before = read_json_model(self.folder / COUNTED, CountedFrom).length_m
+            if np.abs(np.array(before) - counted_m).max() > _COUNTS_ANEW_m:
+                restarts += (len(poses),)
+        update = {"poses": (*poses, reading), "restarts": restarts}
+        self.data = self.data.model_copy(update=update)
+        counted = CountedFrom(length_m=tuple(counted_m.tolist())).model_dump_json() + "\n"
+        if not poses:
+            write_text(self.folder / COUNTED, counted)
+        self.save()
+        # written last: if killed before, the next reading still finds a restart by older lengths
+        write_text(self.folder / COUNTED, counted)
+
+    def save(self) -> None:
+        """Write the data; raises ProfileError."""
+        self.data.save(self._path)
+
+
+def read_into(reader: PoseOperator, robot: Robot, kept: DaemonPoses) -> None:
+    """Read the pose at which the robot stands, and keep it.
+
+    Raises ProfileError, BadInputError, WorkFailedError.
+    """
+    place = reader.place()
+    kept.require_home(robot, place)
+    try:
+        reading = read_pose(reader, place)
+    except PoseRefusedError as error:
+        raise WorkFailedError(str(error)) from None
+    kept.add(reading, reader.counted_m)
+
+
+def data_of(folder: Path, robot: Robot, simulated: bool) -> CalibrationData:
+    """Return the data that the folder already holds; data without poses for a new folder.
+
+    Raises ProfileError, BadInputError.
+    """
+    data = refuse_foreign(folder)
+    if data is None:
+        return no_poses(robot, simulated)
+    if (data.robot, data.geometry_sha256, data.simulated) != (
+        robot.profile,
+        geometry_sha256(robot),
+        simulated,
+    ):
+        raise BadInputError(
+            f"{folder / DATA}: of another robot, bus or state of its file; allowed: another --out"
+        )
+    if not (folder / COUNTED).exists():
+        raise BadInputError(f"{folder}: holds an automatic run; allowed: another --out")
+    return data
+
+
+@contextmanager
+def image_taker(
+    camera: str | None,
+    intrinsics: Path | None,
+    markers: Path | None,
+    kept: DaemonPoses,
+    note: Callable[[str], None],
+) -> Iterator[TakeImage]:
+    """Yield a function that takes an image of the next pose with the camera of a URL, if given.
+
+    Intrinsics and markers come from these files at the first pose, then from the stored data.
+    Raises CameraError, ProfileError, BadInputError.
+    """
+    if camera is None:
+        yield lambda _wait: None
+        return
+    from cdpr_tools.calibrate.pose_camera import (  # noqa: PLC0415  # needs an extra
+        PoseCamera,
+    )
+
+    setup = _camera_setup(kept.data, intrinsics, markers)
+    kept.data = kept.data.model_copy(update={"camera": setup})
+    images = kept.folder / IMAGES
+    opened = PoseCamera(camera, PacedClock(), setup.intrinsics, setup.sheets, images, note)
+    with closing(opened):
+        yield lambda wait: opened.see(len(kept.data.poses) + 1, wait)
+
+
+def _camera_setup(
+    data: CalibrationData, intrinsics: Path | None, markers: Path | None
+) -> CameraSetup:
+    if data.camera is not None:
+        _require_same("--intrinsics", intrinsics, data.camera.intrinsics)
+        _require_same("--markers", markers, data.camera.sheets)
+        return data.camera
+    if data.poses:
+        raise BadInputError("--camera: the poses before were read without; allowed: another --out")
+    if intrinsics is None or markers is None:
+        raise BadInputError("--camera: the first pose also needs --intrinsics and --markers")
+    return CameraSetup.of(CameraIntrinsics.load_file(intrinsics), MarkerSheets.load_file(markers))
+
+
+def _require_same(option: str, path: Path | None, kept: Profile) -> None:
+    """Raise BadInputError if a file differs from that of the first pose; ProfileError."""
+    if path is None:
+        return
+    given = type(kept).load_file(path).model_dump()
+    other = [
+        f"{key} {given[key]!r}, {value!r} at the first pose"
+        for key, value in kept.model_dump().items()
+        if given[key] != value
+    ]
+    if other:
+        raise BadInputError(
+            f"{option} {path}: {'; '.join(other)}; allowed: the same, leave it out, or another "
+            "--out"
+        )
+
+
+def lines(robot: Robot, data: CalibrationData) -> list[str]:
+    """Return the last reading as lines of text."""
+    assert robot.platform is not None  # see `robot_of`
+    reading = data.poses[-1]
+    place = ", ".join(f"{1e3 * x:.1f}" for x in reading.target[: len(robot.platform.home_m)])
+    low, high = min(reading.tension_N), max(reading.tension_N)
+    said = [f"pose {len(data.poses)} at {place} mm: tensions {low:.1f} to {high:.1f} N"]
+    if reading.image is not None:
+        said[0] += f"; {len(reading.image.markers)} markers in the image"
+    if data.restarts and data.restarts[-1] == len(data.poses) - 1:
+        said.append(
+            "lengths count from a new zero since the pose before: these have separate offsets"
+        )
+    return said
+
+
+Ask = Callable[[int], None]
+"""Asks a person what they measured at the pose, counted from 1, at which the platform stands."""
+
+
+@contextmanager
+def going_on(kept: DaemonPoses) -> Iterator[None]:
+    """Add to any error of the block how to go on; StoppedError becomes WorkFailedError."""
+    try:
+        yield
+    except StoppedError:
+        raise WorkFailedError(f"stopped; {_going_on(kept)}") from None
+    except (CommandError, ControlError, DriverError) as error:
+        error.add_note(_going_on(kept))
+        raise
+
+
+def read_places(
+    out: Output,
+    robot: Robot,
+    operator: PoseOperator,
+    kept: DaemonPoses,
+    places: Places,
+    most: int,
+    criterion: StopCriterion = lambda _data: None,
+    ask: Ask = lambda _pose: None,
+) -> None:
+    """Read home if there are no poses yet, then places until `most` or `criterion` is reached.
+
+    All readings are kept, even after an error. Raises CommandError, ControlError, DriverError, and
+    StoppedError if the user stops the run.
+    """
+    with out.progress(f"reading up to {most} poses", float(most)) as advance:
+        if not kept.data.poses:
+            read_into(operator, robot, kept)
+            ask(1)
+
+        def keep() -> None:
+            kept.add(measured.readings[-1], operator.counted_m)
+            advance(float(len(kept.data.poses)))
+            ask(len(kept.data.poses))
+
+        before = kept.data
+        measured = Measured(keep, list(before.poses), list(before.left_out), list(before.tried))
+        done = {reading.target for reading in before.poses} | set(before.tried)
+        try:
+            for batch in places.batches():
+                left = np.array([place for place in batch if tuple(place.tolist()) not in done])
+                left = left[: most - len(measured.readings)]
+                measure_poses(operator, left, places.middle, measured, out)
+                if len(measured.readings) >= most or (len(left) and criterion(kept.data)):
+                    return
+        finally:
+            update = {"left_out": tuple(measured.refused), "tried": tuple(measured.tried)}
+            kept.data = kept.data.model_copy(update=update)
+            kept.save()
+    out.note(f"{len(measured.readings)} poses only: all others were refused")
+
+
+def _going_on(kept: DaemonPoses) -> str:
+    if not kept.data.poses:
+        return "nothing was read yet"
+    count = len(kept.data.poses)
+    are = "1 pose is" if count == 1 else f"{count} poses are"
+    return f"{are} kept in {kept.folder}; the same command goes on behind"
+
+
+# Ask a person for the measured position while the platform stands; store it in a file of points.
+
+_LOOK_S: Final = 0.2
+_NAMES: Final = ("x", "y", "z")
+_BYTES: Final = 4096
+_MOVED_m: Final = 2e-3
+_DOUBTFUL_m: Final = 0.2
+"""Ask again for a point that is further off: no exit point may be moved by more."""
+
+
+def require_points_of(poses: int, path: Path) -> None:
+    """Raise BadInputError if a file has points of poses that have not been read; ProfileError.
+
+    They were measured at poses of an earlier run, whose data are no longer in the folder.
+    """
+    if not path.exists():
+        return
+    last = max((point.pose + 1 for point in load_points(path)), default=0)
+    if last > poses:
+        raise BadInputError(
+            f"{path}: has a point of pose {last}, where {poses} were read: of an earlier run; "
+            "allowed: another --out, or remove it"
+        )
+
+
+class AskedPoints:
+    """Asks on standard input for a position at each pose, and stores it in a file for `--points`.
+
+    `coordinates` is the number of coordinates of the platform's origin, 2 or 3. `place` returns
+    the platform's place (d,) from its cables; it raises if the platform is no longer held or the
+    user stops. It is called while waiting for input. Raises ProfileError if writing fails.
+    """
+
+    def __init__(
+        self, out: Output, path: Path, coordinates: int, place: Callable[[], FloatArray]
+    ) -> None:
+        self._out, self._path, self._names = out, path, _NAMES[:coordinates]
+        self._place, self._read = place, b""
+        self._open = sys.stdin is not None  # None: closed by a shell's `<&-`
+        if not path.exists():
+            self._append(",".join(["pose", *(f"{name}_mm" for name in self._names), "sigma_mm"]))
+
+    def __call__(self, pose: int) -> None:
+        """Ask for the position at a pose, counted from 1, at which the platform stands now.
+
+        Raises WorkFailedError if the platform is moved meanwhile, and the errors of `place`.
+        """
+        if not self._open:
+            return
+        with self._out.paused():
+            if sys.stdin.isatty():
+                # discard input typed during the motion: nobody has measured this pose yet
+                termios.tcflush(sys.stdin, termios.TCIFLUSH)
+            self._ask(pose, self._origin_m())
+
+    def _ask(self, pose: int, origin_m: FloatArray) -> None:
+        names, doubted = " ".join(self._names), [""]
+        while True:
+            # the person who measures stands beside a robot that moves after the answer
+            self._out.note(
+                f"pose {pose} stands: measured {names} in mm [and sigma], Enter for none; stand "
+                "clear, it moves on then:"
+            )
+            words = self._line(pose, origin_m).split()
+            if not words:
+                return
+            numbers = self._numbers(words)
+            if not numbers:
+                self._out.note(
+                    f"allowed: {names}, numbers in mm, a decimal point, blanks between them; and "
+                    "how sure, above 0, where not 2 mm"
+                )
+                continue
+            off_m = float(np.linalg.norm(1e-3 * np.array(numbers[: len(origin_m)]) - origin_m))
+            if off_m <= _DOUBTFUL_m or words == doubted:
+                self._append(",".join([str(pose), *map(repr, numbers)]))
+                return
+            doubted = words
+            by_cables = " ".join(f"{1e3 * x:.0f}" for x in origin_m)
+            self._out.note(
+                f"that is {1e3 * off_m:.0f} mm from where its cables have it, {by_cables}; "
+                "where it is right, type the same again"
+            )
+
+    def _numbers(self, words: list[str]) -> list[float]:
+        try:
+            numbers = [float(word) for word in words]
+        except ValueError:
+            return []
+        k = len(self._names)
+        given = k <= len(numbers) <= k + 1 and all(map(math.isfinite, numbers))
+        return numbers if given and min(numbers[k:], default=1.0) > 0.0 else []
+
+    def _line(self, pose: int, origin_m: FloatArray) -> str:
+        """Return a line of standard input, an empty one at the end of the input."""
+        number = sys.stdin.fileno()
+        while b"\n" not in self._read:
+            self._require_there(pose, origin_m)
+            if select.select([number], [], [], _LOOK_S)[0]:
+                more = os.read(number, _BYTES)
+                if not more:
+                    self._open = False
+                    return ""
+                self._read += more
+        self._require_there(pose, origin_m)
+        line, _, self._read = self._read.partition(b"\n")
+        return line.decode(errors="replace")
+
+    def _origin_m(self) -> FloatArray:
+        return self._place()[: len(self._names)]
+
+    def _require_there(self, pose: int, origin_m: FloatArray) -> None:
+        if np.abs(self._origin_m() - origin_m).max() > _MOVED_m:
+            raise WorkFailedError(
+                f"the platform was moved after pose {pose} had been read, so that nothing measured "
+                "belongs to it"
+            )
+
+    def _append(self, line: str) -> None:
+        try:
+            self._path.parent.mkdir(parents=True, exist_ok=True)
+            with self._path.open("a", encoding="utf-8") as file:
+                file.write(f"{line}\n")
+        except OSError as error:
+            raise ProfileError(self._path, "", f"cannot be written: {error.strerror}") from None

@@ -1,0 +1,245 @@
+"""Move and read the platform for a calibration through the robot's handle, on any backend."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from typing import Any, Final
+
+import numpy as np
+
+from cdpr_profiles import Robot as Profile
+from cdpr_profiles.robot_limits import Limit
+from cdpr_rt.arrays import FloatArray
+from cdpr_rt.calibration.markers.marker_map import Sighting
+from cdpr_rt.errors import TripError
+from cdpr_rt.loop.loop import EMERGENCY_STOP
+from cdpr_rt.procedures.measure_poses import (
+    SETTLE_S,
+    NotThePoseError,
+    PoseRefusedError,
+    Readings,
+    TargetNotReached,
+)
+from cdpr_rt.robot import Error, Faulted, MotionEnded, Refused, Robot, end_text
+from cdpr_tools.client.client import ServiceRefusalError
+from cdpr_tools.client.daemon_robot import command_error
+from cdpr_tools.errors import WorkFailedError
+from cdpr_tools.trials.directions import Directions, platform_of
+
+TakeImage = Callable[[Callable[[float], None]], Sighting | None]
+"""Takes an image and returns its markers, None without a camera; the argument lets time pass."""
+_SLOWED: Final = 1.5
+_LATE_S: Final = 10.0
+"""A motion may take `_SLOWED` times the planned duration plus `_LATE_S`."""
+_SPEED_SHARE: Final = 0.5
+"""Share of the speed in the robot's file: a robot that is not calibrated yet moves slowly."""
+_SILENT_S: Final = 5.0
+_NO_POSE_MAKES: Final = frozenset(
+    limit.key
+    for limit in (
+        Limit.SAFETY_STOP, Limit.SAFETY_ALARM, Limit.STALE, Limit.MISSED, Limit.MISSED_IN_WINDOW,
+        Limit.LATE,
+    )
+)  # fmt: skip
+"""Limits whose violation has nothing to do with the pose."""
+
+
+class StoppedError(Exception):
+    """The user has stopped the calibration; all readings are kept."""
+
+
+class _LateError(Exception):
+    """A motion takes too long or is blocked."""
+
+
+class PoseOperator:
+    """Moves and reads the platform of a robot; a `PlatformOperator`.
+
+    `stop` returns whether the user wants to stop; then StoppedError ends the motion, and the
+    platform is held.
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        profile: Profile,
+        image: TakeImage = lambda _wait: None,
+        stop: Callable[[], bool] = lambda: False,
+    ) -> None:
+        self.robot = robot
+        self.directions = Directions.of(platform_of(profile))
+        self.counted_m = np.zeros(len(profile.axes))
+        """Cable lengths (n,) at which the motor angles are zero, as last read."""
+        self._m_per_rad = np.array([axis.winch.cable_m_per_motor_rad for axis in profile.axes])
+        self._image, self._stop = image, stop
+        self._deadline_s = math.inf
+        self._seen: Mapping[str, Any] = {}
+        """The last status."""
+        self._program = ""
+        """The program that must keep running while the platform stands; empty before the first."""
+        robot.on_status = self._look
+
+    def _look(self, status: Mapping[str, Any]) -> None:
+        if self._stop():
+            raise StoppedError
+        silent_s = status.get("loop", {}).get("silent_s", 0.0)
+        if silent_s > _SILENT_S:
+            raise WorkFailedError(f"the loop has not turned for {silent_s:.0f} s")
+        self._seen = status
+        if status["cycle"]["time_s"] > self._deadline_s:
+            raise _LateError
+
+    def tighten(self) -> FloatArray:
+        """Enable the drives and take up the slack at home; return the home place, (d,)."""
+        with self._trips():
+            self.robot.enable()
+            self.robot.tighten()
+        self._program = "tighten"
+        home = np.array(self.robot.description["platform"]["home_m"])
+        return np.pad(home, (0, self.directions.d - self.directions.k))
+
+    def place(self) -> FloatArray:
+        """Return the platform's place, (d,); raises WorkFailedError if cables do not hold it."""
+        status = self._held_status()
+        progress = status["program_progress"]
+        return np.array([*progress["position_m"], *progress.get("rotation_rad", ())])
+
+    def move_to(self, place: FloatArray) -> TargetNotReached | None:
+        """Move the platform to a place (d,), or hold it on its way if that takes too long.
+
+        Raises PoseRefusedError, TripError, StoppedError, and CommandError for failures that do not
+        depend on the pose, such as a daemon whose loop does not answer.
+        """
+        robot, directions = self.robot, self.directions
+        arguments = directions.arguments(place, _SPEED_SHARE * float(directions.speed[0]))
+        try:
+            with self._trips():
+                allowed_s = within_s(directions, self.place(), place)
+                try:
+                    robot.move_to(**arguments, wait=False)
+                except Refused as error:
+                    if isinstance(error.__cause__, ServiceRefusalError):
+                        raise  # somebody else may move the robot
+                    self._held_status()  # raises if the motion is being ended
+                    raise PoseRefusedError(str(error)) from None
+        except TripError as error:  # before the motion began
+            raise NotThePoseError(str(error)) from None
+        self._deadline_s = robot.time_s + allowed_s
+        try:
+            with self._trips():
+                robot.wait_until_done()
+        except _LateError:  # the robot is held
+            self._program = "hold"
+        else:
+            self._program = "pose"
+            return None
+        finally:
+            self._deadline_s = math.inf
+        progress = self._seen["program_progress"]
+        with self._trips():
+            robot.wait(SETTLE_S)  # it brakes
+        return _not_reached(directions, place, self.place(), allowed_s, progress)
+
+    def wait(self, seconds: float) -> None:
+        """Let time pass; raises TripError if the loop ends the motion meanwhile."""
+        with self._trips():
+            self.robot.wait(seconds)
+        self._require_standing()
+
+    def read(self, seconds: float) -> Readings:
+        """Let time pass and return lengths and tensions; raises TripError as `wait`."""
+        with self._trips():
+            rows = self.robot.observe(seconds)
+        self._require_standing()
+        lengths, tensions = np.array(rows["cable_length_m"]), np.array(rows["tension_N"])
+        if not np.isfinite([lengths, tensions]).all():
+            raise WorkFailedError("not all lengths and tensions are known; run tighten first")
+        self.counted_m = (lengths - self._m_per_rad * rows["position_rad"]).mean(axis=0)
+        return Readings(lengths, tensions)
+
+    def image(self) -> Sighting | None:
+        """Return the markers that the camera sees, None without a camera."""
+        return self._image(self.wait)
+
+    def _require_standing(self) -> None:
+        status = self.robot.status
+        if self._program and status["program"] != self._program:
+            raise self._ended(status)
+
+    def _held_status(self) -> dict[str, Any]:
+        status = self.robot.status
+        self._look(status)
+        progress = status.get("program_progress") or {}
+        powered = status["state"] == "active" and status["reacting"] == "none"
+        if powered and progress.get("tight") is not False and "position_m" in progress:
+            self._require_standing()
+            return status
+        if self._program or status["reacting"] != "none":
+            raise self._ended(status)
+        raise WorkFailedError(
+            f"the platform is not held on its cables ({status['state']}, {status['program']}); "
+            "allowed: after `cdpr enable`, `cdpr tighten`, `cdpr move`"
+        )
+
+    @staticmethod
+    def _ended(status: Mapping[str, Any]) -> TripError:
+        reaction = status["reacting"]
+        how = status["state"] if reaction == "none" else f"{reaction} under way"
+        limit = (status["reason_limit"] or {}).get("limit")
+        return _trip(f"{end_text(status)} ({how})", limit)
+
+    @contextmanager
+    def _trips(self) -> Iterator[None]:
+        """Turn the end of a motion into TripError, other errors of the handle into CommandError."""
+        try:
+            yield
+        except Faulted as error:
+            raise _trip(str(error), error.limit) from None
+        except MotionEnded as error:
+            if self._seen["program"] == "pose" and self._seen["state"] == "active":
+                raise _LateError from None  # the way is blocked and the robot is held
+            raise _trip(str(error), None) from None
+        except Error as error:
+            raise command_error(error) from None
+
+
+def _trip(why: str, limit: str | None) -> TripError:
+    """Return the error for an ended motion; NotThePoseError if the pose cannot be the cause."""
+    text = f"the motion was ended: {why}"
+    if limit in _NO_POSE_MAKES or EMERGENCY_STOP in why:
+        return NotThePoseError(text)
+    return TripError(text)
+
+
+def within_s(directions: Directions, start: FloatArray, place: FloatArray) -> float:
+    """Return the time limit of a motion between two places (d,), from rest to rest.
+
+    The planned duration assumes that all directions move for the same time, as `pose` does.
+    """
+    way = np.abs(place - start)
+    planned_s = float((way / directions.speed).max()) / _SPEED_SHARE
+    square_s2 = float((way / directions.acceleration).max())
+    if square_s2 > planned_s**2:  # too short to reach full speed
+        planned_s = 2.0 * math.sqrt(square_s2)
+    else:
+        planned_s += square_s2 / max(planned_s, 1e-9)
+    return _SLOWED * planned_s + _LATE_S
+
+
+def _not_reached(
+    directions: Directions,
+    place: FloatArray,
+    start: FloatArray,
+    allowed_s: float,
+    progress: Mapping[str, Any],
+) -> TargetNotReached:
+    """Return why the platform, which stands at `start`, has not reached a place (d,)."""
+    k = directions.k
+    apart = f"{1e3 * float(np.linalg.norm((start - place)[:k])):.0f} mm"
+    if directions.turns:
+        apart += f" and {math.degrees(float(np.linalg.norm((start - place)[k:]))):.1f} deg"
+    kept = progress["trouble"] or progress["held_back"] or progress["missing"]
+    why = f"{apart} off after {allowed_s:.0f} s: {kept or 'still on its way'}"
+    return TargetNotReached(start, why)

@@ -1,1 +1,0 @@
-"""How good a calibration is: judged beside what a simulator knows, drawn and reported."""

@@ -1,0 +1,219 @@
+"""A simulated robot for the calibration procedure, with a scanner beside it and a camera on it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING
+
+import numpy as np
+from pydantic import Field
+from scipy.spatial.transform import Rotation
+from typing_extensions import override
+
+from cdpr_profiles.bounded_input import parse_json
+from cdpr_profiles.calibration.geometry import write_text
+from cdpr_profiles.reader import Profile, read_json_model
+from cdpr_rt.arrays import FloatArray
+from cdpr_rt.calibration.markers.marker_map import Sighting
+from cdpr_rt.core.clock import Clock
+from cdpr_rt.procedures.measure_poses import (
+    Readings,
+    TargetNotReached,
+)
+from cdpr_tools.calibrate.pose_operator import PoseOperator
+from cdpr_tools.errors import WorkFailedError
+from cdpr_tools.simulated_robot import handle_of
+from cdpr_tools.trials.lockstep import LockstepRobot
+
+if TYPE_CHECKING:
+    from cdpr_tools.calibrate.pose_camera import PoseCamera
+
+
+# True and scanned poses of a simulated robot; they verify a calibration, which does not use them.
+
+_Vector = tuple[float, ...]
+_Matrix = tuple[_Vector, ...]
+
+
+class OutsidePose(Profile):
+    """The true pose in the simulator, and the pose that the scanner measured, if it did."""
+
+    true_position_m: _Vector
+    true_rotation: _Matrix
+    position_m: _Vector | None = None
+    position_std_m: float | None = None
+    """Of each coordinate."""
+    rotation: _Matrix | None = None
+    rotation_std_rad: float | None = None
+    """About each axis."""
+
+    def with_truth_of(self, other: OutsidePose) -> OutsidePose:
+        """Return a copy with the true pose of another time."""
+        of_other = ("true_position_m", "true_rotation")
+        return self.model_copy(update={name: getattr(other, name) for name in of_other})
+
+
+class OutsidePoses(Profile):
+    """True and scanned poses for all poses of a calibration's data, in the same order."""
+
+    poses: tuple[OutsidePose, ...] = Field(max_length=100_000)
+
+    def save(self, path: Path) -> None:
+        """Write the file; raises ProfileError."""
+        write_text(path, self.model_dump_json() + "\n")
+
+    @classmethod
+    def load_file(cls, path: str | Path) -> OutsidePoses:
+        """Read such a file; raises ProfileError."""
+        return read_json_model(Path(path), cls)
+
+
+_HEADER_BYTES = 1024
+
+
+class ScannerTail:
+    """The log of a simulated scanner, read while it is written."""
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        with path.open("rb") as file:
+            header = parse_json(file.read(_HEADER_BYTES), path)
+        self._dtype = np.dtype(
+            [(name, kind, *map(tuple, shape)) for name, kind, *shape in header["fields"]]
+        )
+        self.position_std_m = float(header["position_sigma_m"])
+        self.rotation_std_rad = float(header["rotation_sigma_rad"])
+
+    def count(self) -> int:
+        """Return how many readings there are."""
+        return (self._path.stat().st_size - _HEADER_BYTES) // self._dtype.itemsize
+
+    def since(self, first: int) -> tuple[FloatArray, FloatArray]:
+        """Return positions (k, 3) and rotations (k, 3, 3) from a reading on."""
+        offset = _HEADER_BYTES + first * self._dtype.itemsize
+        rows = np.fromfile(self._path, self._dtype, count=self.count() - first, offset=offset)
+        return np.array(rows["position_m"]), np.array(rows["rotation"])
+
+
+class RigOperator(PoseOperator):
+    """Operator of a simulated robot with a scanner.
+
+    If `given`, a reading contains the scanner's pose; otherwise only `outside` returns it.
+    """
+
+    def __init__(
+        self, rig: LockstepRobot, scanner: ScannerTail, given: bool, stop: Callable[[], bool]
+    ) -> None:
+        super().__init__(handle_of(rig), rig.robot, self._see, stop)
+        self.rig = rig
+        self.camera: PoseCamera | None = None
+        self.number = 1
+        """Number of the pose that is read next."""
+        self._scanner, self._given = scanner, given
+        self._standing: int | None = None
+        """Number of scanner readings when the platform came to rest; None while it moves."""
+
+    def _see(self, wait: Callable[[float], None]) -> Sighting | None:
+        if self.camera is None:
+            return None
+        seen = self.camera.see(self.number, wait)
+        self.number += 1
+        return seen
+
+    @override
+    def move_to(self, place: FloatArray) -> TargetNotReached | None:
+        self._standing = None
+        return super().move_to(place)
+
+    @override
+    def wait(self, seconds: float) -> None:
+        super().wait(0.5 * seconds)
+        if self._standing is None:  # any motion left is too small for the scanner to see
+            self._standing = self._scanner.count()
+        super().wait(0.5 * seconds)
+
+    @override
+    def read(self, seconds: float) -> Readings:
+        readings = super().read(seconds)
+        seen = self._scanned() if self._given else None
+        return readings if seen is None else Readings(readings.length_m, readings.tension_N, *seen)
+
+    def _scanned(self) -> tuple[FloatArray, float, FloatArray, float] | None:
+        """Return the scanner's mean pose since the platform stands, with standard deviations."""
+        position, rotation = self._scanner.since(self._standing or 0)
+        if not len(position):
+            return None
+        better = math.sqrt(len(position))
+        return (
+            *(position.mean(axis=0), self._scanner.position_std_m / better),
+            *(Rotation.from_matrix(rotation).mean().as_matrix(),),
+            self._scanner.rotation_std_rad / better,
+        )
+
+    def outside(self) -> OutsidePose:
+        """Return the true pose and the scanner's, which the calibration does not use.
+
+        The scanner's pose is the mean of its readings since the platform stands.
+        """
+        truth, seen = self.rig.truth(), self._scanned()
+        return OutsidePose(
+            true_position_m=_tuple(truth["position_m"]),
+            true_rotation=_tuples(truth["rotation"]),
+            position_m=None if seen is None else _tuple(seen[0]),
+            position_std_m=None if seen is None else seen[1],
+            rotation=None if seen is None else _tuples(seen[2]),
+            rotation_std_rad=None if seen is None else seen[3],
+        )
+
+
+def _tuple(vector: FloatArray) -> tuple[float, ...]:
+    return tuple(np.asarray(vector, float).tolist())
+
+
+def _tuples(matrix: FloatArray) -> tuple[tuple[float, ...], ...]:
+    return tuple(_tuple(row) for row in matrix)
+
+
+@contextmanager
+def simulated_rig(
+    robot: str,
+    *,
+    plant: Path | None,
+    scanner: bool,
+    camera: Callable[[str, Clock], PoseCamera] | None = None,
+    stop: Callable[[], bool] = lambda: False,
+    as_calibrated: bool = False,
+) -> Iterator[RigOperator]:
+    """Open a robot on its own simulator; raises the errors of `LockstepRobot`.
+
+    With `scanner` readings contain the scanner's pose; `camera` opens the camera of a URL. The
+    robot is shut down under control however the block ends, unless it no longer responds.
+    """
+    with TemporaryDirectory(prefix="cdpr-calibrate-") as folder:
+        path, socket = Path(folder) / "scanner.log", Path(folder) / "camera"
+        with LockstepRobot(
+            robot,
+            plant=plant,
+            scanner=path,
+            camera=None if camera is None else socket,
+            as_calibrated=as_calibrated,
+            calibration_in_doubt=True,
+        ) as rig:
+            operator = RigOperator(rig, ScannerTail(path), scanner, stop)
+            try:
+                if camera is not None:
+                    operator.camera = camera(f"sim:{socket}", rig.machine.clock)
+                yield operator
+            except Exception:
+                with suppress(WorkFailedError):  # the first error shows the cause
+                    rig.shut_down()
+                raise
+            else:
+                rig.shut_down()
+            finally:
+                if operator.camera is not None:
+                    operator.camera.close()

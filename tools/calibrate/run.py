@@ -1,0 +1,472 @@
+"""Measure the poses of a calibration on a simulated robot; a stored run can be resumed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import ExitStack, suppress
+from dataclasses import dataclass, field
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import TYPE_CHECKING, Final, Literal, get_args
+
+import numpy as np
+from pydantic import Field, field_validator
+
+from cdpr_drivers.errors import DriverError
+from cdpr_profiles import Robot
+from cdpr_profiles.calibration.geometry import geometry_sha256, write_text
+from cdpr_profiles.errors import FileMissingError, ProfileError, brief
+from cdpr_profiles.reader import Profile, read_json_model
+from cdpr_rt.calibration.markers.marker_map import coverage, listed
+from cdpr_rt.calibration.outcome import Outcome
+from cdpr_rt.calibration.readings import (
+    CalibrationData,
+    CameraSetup,
+    MeasuredPoint,
+    Numbers,
+    load_data,
+    load_points,
+)
+from cdpr_rt.calibration.verification import every_fifth
+from cdpr_rt.core.clock import Clock
+from cdpr_rt.errors import ControlError
+from cdpr_rt.procedures.measure_poses import (
+    Measured,
+    PoseRefusedError,
+    measure_poses,
+    read_pose,
+)
+from cdpr_tools.calibrate.places import (
+    MOST_POSES,
+    Listed,
+    Places,
+    listed_places,
+    places_of,
+)
+from cdpr_tools.calibrate.pose_operator import StoppedError
+from cdpr_tools.calibrate.rig import OutsidePose, OutsidePoses, RigOperator, simulated_rig
+from cdpr_tools.calibrate.truth_comparison import TruthComparison, compare_with_truth
+from cdpr_tools.errors import BadInputError, CommandError, WorkFailedError
+from cdpr_tools.output import Advance, Output
+from cdpr_tools.signals import stop_on_signals
+
+if TYPE_CHECKING:
+    from cdpr_tools.calibrate.pose_camera import PoseCamera
+
+
+DATA, SETTINGS, OUTSIDE, IMAGES = "data.json", "run.json", "outside.json", "images"
+POINTS = "points.csv"
+"""Positions measured at the poses of `cdpr calibrate measure --ask`, or by hand."""
+COUNTED = "counted.json"
+"""Written by `cdpr calibrate read`; it marks a folder as one of poses read that way."""
+_FIRST_S, _HELD_OUT_S = 8.0, 3.0
+
+PoseSource = Literal["camera", "scanner", "redundancy", "points"]
+
+
+class CalibrationRunSettings(Profile):
+    """Settings of a run; a resumed run uses the same."""
+
+    robot: str
+    plant: str | None
+    source: PoseSource
+    poses: int | None = Field(ge=1)
+    """None: until more poses bring little."""
+    seed: int = Field(ge=0)
+    places: tuple[Numbers, ...] | None = None
+    """(m, d), from a list; the run reads these and home only."""
+    points: str | None = None
+    """File of measured positions, which a resumed run reads again."""
+
+    @field_validator("places")
+    @classmethod
+    def _alike(cls, places: tuple[Numbers, ...] | None) -> tuple[Numbers, ...] | None:
+        if places is not None and len(set(map(len, places))) > 1:
+            raise ValueError("as many numbers in each")
+        return places
+
+    def save(self, folder: Path) -> None:
+        """Write them into the folder of the run; raises ProfileError."""
+        write_text(folder / SETTINGS, self.model_dump_json(indent=1) + "\n")
+
+    def resumed(
+        self, poses: int | None, places: Listed | None, points: Path | None
+    ) -> CalibrationRunSettings:
+        """Return them with another number or list of poses and other points, if given.
+
+        Raises BadInputError for a list if the run began without one, and the other way round.
+        """
+        update: dict[str, object] = {}
+        if points is not None:
+            update["points"] = str(points.resolve())
+        if poses is not None:
+            if (places is None) != (self.places is None):
+                kind = "a list of poses" if self.places is not None else "no list of poses"
+                raise BadInputError(
+                    f"--poses: allowed: as the run that goes on was begun, with {kind}"
+                )
+            update |= {"poses": poses, "places": places}
+        return self.model_copy(update=update)
+
+    @classmethod
+    def load(cls, folder: Path) -> CalibrationRunSettings:
+        """Read them; raises ProfileError."""
+        return read_json_model(folder / SETTINGS, cls)
+
+
+StopCriterion = Callable[[CalibrationData], str | None]
+"""Called after each batch; returns why no more poses are needed, None if more are."""
+
+
+@dataclass
+class StoredRun:
+    """Readings of a run, in the files of its folder; the files are complete after each pose."""
+
+    folder: Path
+    data: CalibrationData
+    outside: list[OutsidePose] = field(default_factory=list)
+
+    @classmethod
+    def new(cls, folder: Path, robot: Robot, camera: CameraSetup | None) -> StoredRun:
+        """Return an empty run and write it; remove the poses of an earlier run.
+
+        Raises ProfileError, and BadInputError for poses of a real robot or files that no run wrote.
+        """
+        before = refuse_foreign(folder)
+        if before is not None and not before.simulated:
+            raise BadInputError(
+                f"{folder / DATA}: was read of a real robot; allowed: another --out, or remove it"
+            )
+        try:
+            # remove the settings first: if they exist, --resume expects data to go on with
+            for name in (SETTINGS, DATA, OUTSIDE, COUNTED):
+                (folder / name).unlink(missing_ok=True)
+            for image in (folder / IMAGES).glob("pose-[0-9][0-9][0-9][0-9].png"):
+                image.unlink()
+            with suppress(OSError):  # the folder does not exist, or has files of somebody else
+                (folder / IMAGES).rmdir()
+        except OSError as error:
+            raise ProfileError(folder, "", f"cannot be emptied: {error.strerror}") from error
+        data = CalibrationData(
+            robot=robot.profile,
+            geometry_sha256=geometry_sha256(robot),
+            simulated=True,
+            date=datetime.now(UTC).isoformat(timespec="seconds"),
+            camera=camera,
+            poses=(),
+        )
+        data.save(folder / DATA)
+        return cls(folder, data)
+
+    @classmethod
+    def resumed(cls, folder: Path, robot: Robot) -> StoredRun:
+        """Return the stored part of a run that ended early; raises ProfileError, BadInputError."""
+        data = load_data(folder / DATA)
+        if data.geometry_sha256 != geometry_sha256(robot):
+            raise BadInputError(
+                f"{folder / DATA}: of another state of {robot.profile!r}; allowed: --overwrite"
+            )
+        try:
+            outside = list(OutsidePoses.load_file(folder / OUTSIDE).poses)[: len(data.poses)]
+        except FileMissingError:  # ended before the first pose
+            outside = []
+        # if the run was killed between the two files, drop a pose that is in only one of them
+        return cls(folder, data.model_copy(update={"poses": data.poses[: len(outside)]}), outside)
+
+    def done(self) -> set[tuple[float, ...]]:
+        """Return the targets (d,) that were read, or tried in vain."""
+        return {reading.target for reading in self.data.poses} | set(self.data.tried)
+
+    def remaining(self, places: Listed | None) -> Listed | None:
+        """Return the listed places (m, d) that were not tried yet; None without a list."""
+        return None if places is None else tuple(one for one in places if one not in self.done())
+
+    def keep(self, measured: Measured, restarts: tuple[int, ...], outside: OutsidePose) -> None:
+        """Store all readings with a new pose; raises ProfileError."""
+        self.outside.append(outside)
+        OutsidePoses(poses=tuple(self.outside)).save(self.folder / OUTSIDE)
+        self.data = self.data.model_copy(
+            update={"poses": tuple(measured.readings), "restarts": restarts}
+        )
+        self.save(measured)
+
+    def save(self, measured: Measured) -> None:
+        """Store refused and tried places, without a new pose; raises ProfileError."""
+        self.data = self.data.model_copy(
+            update={"left_out": tuple(measured.refused), "tried": tuple(measured.tried)}
+        )
+        self.data.save(self.folder / DATA)
+
+
+def measure(
+    out: Output,
+    robot: Robot,
+    settings: CalibrationRunSettings,
+    kept: StoredRun,
+    criterion: StopCriterion,
+) -> CalibrationData:
+    """Measure the missing poses on a separate simulator; return all data.
+
+    All readings are kept, even after an error, and the error says how to go on. Raises the errors
+    of the robot and its camera, and WorkFailedError if the user stops the run.
+    """
+    most, listed = settings.poses or MOST_POSES, kept.remaining(settings.places)
+    if listed is not None:  # home is read at each start
+        most = len(kept.data.poses) + len(listed) + bool(listed)
+    if len(kept.data.poses) >= most:
+        return kept.data
+    if listed is not None:
+        places = listed_places(robot, np.array(listed))
+    else:
+        with out.stage("choosing poses"):
+            places = places_of(robot, settings.poses, None, settings.seed)
+    plant = None if settings.plant is None else Path(settings.plant)
+
+    def camera(url: str, clock: Clock) -> PoseCamera:
+        from cdpr_tools.calibrate.pose_camera import (  # noqa: PLC0415  # needs an extra
+            PoseCamera,
+        )
+
+        setup = kept.data.camera
+        assert setup is not None  # only used in a run with a camera
+        images = kept.folder / IMAGES
+        return PoseCamera(url, clock, setup.intrinsics, setup.sheets, images, out.note)
+
+    try:
+        with (
+            stop_on_signals("the robot is brought to rest and switched off") as stop,
+            ExitStack() as stack,
+        ):
+            with out.stage(f"{robot.profile}: starting the simulated robot"):
+                operator = stack.enter_context(
+                    simulated_rig(
+                        str(robot.path),
+                        plant=plant,
+                        scanner=settings.source == "scanner",
+                        camera=camera if settings.source == "camera" else None,
+                        stop=stop,
+                    )
+                )
+            up_to = "" if settings.poses else "up to "
+            advance = stack.enter_context(out.progress(f"reading {up_to}{most} poses", float(most)))
+            _Measuring(out, operator, kept, most, advance).go(
+                robot,
+                places,
+                criterion if settings.poses is None else report_faults_only(criterion),
+            )
+    except StoppedError:
+        raise WorkFailedError(f"stopped; {_going_on(robot, kept)}") from None
+    except (CommandError, ControlError, DriverError) as error:
+        error.add_note(_going_on(robot, kept))
+        raise
+    return kept.data
+
+
+def refuse_foreign(folder: Path) -> CalibrationData | None:
+    """Return the data in a folder, None if there are none.
+
+    Raises BadInputError if files in the folder have the names of a run but no run wrote them.
+    """
+    names = [
+        name for name in (DATA, SETTINGS, OUTSIDE, COUNTED, IMAGES) if (folder / name).exists()
+    ]
+    if not names:
+        return None
+    try:
+        if names[0] == DATA:
+            return load_data(folder / DATA)
+        if names[0] == SETTINGS:
+            CalibrationRunSettings.load(folder)
+            return None
+        why = "no calibration has written it"
+    except ProfileError as error:
+        why = brief(error.problem)
+    raise BadInputError(f"{folder / names[0]}: {why}; allowed: another --out, or move it away")
+
+
+def report_faults_only(criterion: StopCriterion) -> StopCriterion:
+    """Return a criterion that reports faults but never ends the run: the user gave the number."""
+
+    def asked(data: CalibrationData) -> str | None:
+        criterion(data)
+        return None
+
+    return asked
+
+
+def truth_comparison_of(
+    robot: Robot, settings: CalibrationRunSettings, folder: Path
+) -> Callable[[Outcome], TruthComparison]:
+    """Return a function that compares the outcome of a run with the truth of its simulator."""
+
+    def compare(outcome: Outcome) -> TruthComparison:
+        plant = None if settings.plant is None else Path(settings.plant)
+        return compare_with_truth(robot, plant, outcome, OutsidePoses.load_file(folder / OUTSIDE))
+
+    return compare
+
+
+def truth_comparison_of_folder(
+    robot: Robot, folder: Path
+) -> Callable[[Outcome], TruthComparison] | None:
+    """Return that function for the folder of a run; None if it holds only readings."""
+    if not (folder / SETTINGS).exists() or not (folder / OUTSIDE).exists():
+        return None
+    return truth_comparison_of(robot, CalibrationRunSettings.load(folder), folder)
+
+
+def _going_on(robot: Robot, kept: StoredRun) -> str:
+    if not kept.data.poses:
+        return "nothing was read yet"
+    return (
+        f"{len(kept.data.poses)} poses are kept in {kept.folder}; go on with: cdpr calibrate run "
+        f"{robot.reference} --resume --out {kept.folder}"
+    )
+
+
+def _scanned_s(pose: int) -> float:
+    """Return how much longer the scanner measures a pose, counted from 0, used for verification.
+
+    It measures the first pose longest: all errors are relative to it and contain its error.
+    """
+    if pose == 0:
+        return _FIRST_S
+    return _HELD_OUT_S if every_fifth(pose + 1)[pose] else 0.0
+
+
+class _Measuring:
+    """Measures the poses with a robot that stands ready at home."""
+
+    def __init__(
+        self, out: Output, operator: RigOperator, kept: StoredRun, most: int, advance: Advance
+    ) -> None:
+        self._out, self._operator, self._kept = out, operator, kept
+        self._most, self._advance = most, advance
+        before = kept.data
+        self._restarts = before.restarts
+        if before.poses:
+            self._restarts += (len(before.poses),)
+            out.note(f"going on after {len(before.poses)} poses: home is read again first")
+        self._measured = Measured(
+            self._keep, list(before.poses), list(before.left_out), list(before.tried)
+        )
+        operator.number = len(before.poses) + 1
+
+    def _keep(self) -> None:
+        operator, count = self._operator, len(self._measured.readings)
+        outside = operator.outside()
+        try:
+            if longer_s := _scanned_s(count - 1):
+                operator.wait(longer_s)
+                # a cable may slip or creep meanwhile: use the truth from when lengths were read
+                outside = operator.outside().with_truth_of(outside)
+        finally:  # the pose has been read, even if the wait fails
+            self._kept.keep(self._measured, self._restarts, outside)
+        self._advance(float(count))
+
+    def go(self, robot: Robot, places: Places, criterion: StopCriterion) -> None:
+        """Read home, then one batch of places after another until there are enough."""
+        try:
+            self._go(robot, places, criterion)
+        finally:
+            if self._kept.data.poses:
+                self._kept.save(self._measured)
+
+    def _go(self, robot: Robot, places: Places, criterion: StopCriterion) -> None:
+        operator, measured = self._operator, self._measured
+        done = self._kept.done()
+        try:
+            measured.add(read_pose(operator, operator.tighten()))
+        except PoseRefusedError as error:
+            raise WorkFailedError(f"{robot.profile}: at home: {error}") from error
+        self._look_at_home()
+        for batch in places.batches():
+            left = np.array([place for place in batch if tuple(place.tolist()) not in done])
+            left = left[: self._most - len(measured.readings)]
+            measure_poses(operator, left, places.middle, measured, self._out)
+            if len(measured.readings) >= self._most:
+                return
+            if len(left) and self._judged(criterion):
+                return
+        self._out.note(f"{len(measured.readings)} poses only: all others were refused")
+
+    def _look_at_home(self) -> None:
+        """Report camera problems before the robot moves far; raises WorkFailedError."""
+        seen, setup = self._measured.readings[-1].image, self._kept.data.camera
+        if seen is None or setup is None or seen.problem is not None:
+            return  # the image's problem is already reported; the next one may be better
+        if not seen.markers:
+            why = "was another set printed, or does the camera not look at the sheets?"
+            if seen.mirrored:
+                why = f"{listed(seen.mirrored)} read as mirror images: are all printed so?"
+            raise WorkFailedError(
+                f"at home the camera sees no marker of {setup.sheets.dictionary}: {why}"
+            )
+        self._out.note(f"at home the camera sees {len(seen.markers)} markers")
+
+    def _judged(self, criterion: StopCriterion) -> bool:
+        """Report how good the poses so far are; return whether no more are needed."""
+        data = self._kept.data
+        if data.camera is not None:
+            cover = coverage(data.sightings(), data.camera.sheets.placed)
+            for text in cover.lines():
+                self._out.note(f"after {len(data.poses)} poses: {text}")
+            if not any(len(island) > 1 for island in cover.islands):
+                raise WorkFailedError("no image shows two markers together: put them closer")
+        why = criterion(data)
+        if why is not None:
+            self._out.note(why)
+        return why is not None
+
+
+# Check the options of a run before anything moves.
+
+_METRES: Final = 300.0
+"""If all points are this many times nearer to the origin than targets, metres were typed."""
+
+
+def points_of(path: Path, robot: Robot) -> list[MeasuredPoint]:
+    """Return the points of a file; raises BadInputError if metres were typed, ProfileError."""
+    points, platform = load_points(path), robot.platform
+    assert platform is not None  # callers have checked it
+    box_m = np.abs([platform.workspace_min_m, platform.workspace_max_m])
+    furthest_m = float(np.linalg.norm(box_m.max(axis=0)))
+    at_m = float(np.abs([np.nan_to_num(point.position_m) for point in points]).max(initial=0.0))
+    if 0.0 < at_m < furthest_m / _METRES:
+        raise BadInputError(
+            f"--points {path}: all within {1e3 * at_m:.3g} mm of the room's origin, where targets "
+            f"are up to {1e3 * furthest_m:.0f} mm from it; were metres typed? allowed: mm"
+        )
+    return points
+
+
+def check_points(path: Path, robot: Robot, poses: int | None) -> None:
+    """Raise BadInputError for points of poses beyond the last one, and errors of `points_of`."""
+    for point in points_of(path, robot):
+        if poses is not None and point.pose >= poses:
+            raise BadInputError(
+                f"--points {path}: pose {point.pose + 1}; allowed: 1 to {poses} (--poses)"
+            )
+
+
+def source_of(robot: Robot, **given: bool) -> PoseSource:
+    """Return what a run uses in addition to lengths and tensions, from the options given.
+
+    Raises BadInputError.
+    """
+    asked = [source for source in get_args(PoseSource) if given.get(source)]
+    if not asked and robot.platform is not None and len(robot.platform.controlled) == 6:
+        return "camera"
+    if asked == ["camera", "points"]:
+        asked = ["camera"]  # points are used in addition
+    if len(asked) != 1:
+        raise BadInputError(
+            "give one of --camera, --redundancy, --scanner and --points, or --camera with --points"
+        )
+    if asked[0] == "camera" and robot.platform is not None and len(robot.platform.controlled) < 6:
+        raise BadInputError(
+            f"--camera: {robot.profile} does not turn its platform about two axes, which is what "
+            "tells where the camera sits on it; allowed: --scanner, --points, --redundancy"
+        )
+    chosen: PoseSource = asked[0]
+    return chosen

@@ -1,0 +1,130 @@
+"""The end of a daemon: request it, wait for it, and report the power of the drives."""
+
+from __future__ import annotations
+
+import os
+import time
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+from cdpr_rt.core.shared_block import SharedBlockError
+from cdpr_rt.service.link import STARTING
+from cdpr_tools.client.client import Daemon, NoDaemonError
+from cdpr_tools.client.status_text import (
+    DEAD,
+    ProgressNotes,
+    after_stop_text,
+    has_died,
+    power_text,
+    unheard_axes,
+)
+from cdpr_tools.daemon.estop import (
+    end_leftover_processes,
+    end_starting,
+    launcher_left,
+    status_in_memory,
+)
+from cdpr_tools.daemon.loop_file import LoopFile
+from cdpr_tools.errors import WorkFailedError
+from cdpr_tools.output import Output
+
+_WATCH_S = 0.2
+_END_S = 90.0
+"""In addition to the time to lower a platform."""
+_LAUNCHER_S = 10.0
+"""Once the loop has ended, a working launcher ends the service within this time."""
+
+
+def end_daemon(daemon: Daemon, out: Output, socket: Path | None) -> None:
+    """Request the end of the daemon and wait for it; raises WorkFailedError if it does not end.
+
+    Raises it also if a drive may still have power.
+
+    `socket` is None for a daemon on another machine, which is known only by its answers.
+    """
+    status, description = _status_before_end(daemon, socket)
+    if status.get("state") == STARTING and socket is not None and (lines := end_starting(socket)):
+        out.say(*lines)
+        return
+    had_died, ended, dies = has_died(status), status, ""
+    end_s = _END_S + float(description.get("lowering_s", 0.0))
+    if lines := _ask_to_end(daemon, socket):
+        out.say(*lines)
+        return
+    notes, deadline = ProgressNotes(out, status), time.monotonic() + end_s
+    alone_at = deadline
+    if status["state"] == "active":
+        out.note("stopping: what moves is brought to rest, then the power goes off ...")
+    while time.monotonic() < deadline:
+        try:
+            status = daemon.get("/status")
+        except NoDaemonError as error:
+            if status["state"] != DEAD and _may_run(socket, error):
+                time.sleep(_WATCH_S)
+                continue
+            told = "; ".join(filter(None, (after_stop_text(ended), dies)))
+            if had_died or dies or unheard_axes(ended):
+                raise WorkFailedError(told) from None
+            out.say(told)
+            return
+        if has_died(status) and not had_died and not dies:
+            # if drives do not confirm, it ends with an error, which the service stays to report.
+            # If it ends normally, the end may be seen before the service has ended too.
+            dies = str(status["reason"])
+            with suppress(NoDaemonError):  # the next request detects it
+                daemon.post("/shutdown")
+        if status["state"] == DEAD:  # its launcher ends the rest
+            alone_at = min(alone_at, time.monotonic() + _LAUNCHER_S)
+            if time.monotonic() > alone_at:
+                raise WorkFailedError(_without_launcher(daemon, status))
+        if not had_died:
+            if status["state"] != DEAD:  # a drive may have fallen silent in the meantime
+                ended = status
+            notes(str(status["program"]), status.get("program_progress") or {})
+        time.sleep(_WATCH_S)
+    raise WorkFailedError(f"the daemon still runs {end_s:g} s after it was asked to end")
+
+
+def _status_before_end(
+    daemon: Daemon, socket: Path | None
+) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Return status and description; a service that hangs or is flooded must not delay a stop."""
+    if socket is not None:
+        with suppress(WorkFailedError, OSError, SharedBlockError):
+            return status_in_memory(LoopFile.read(LoopFile.beside(socket)))
+    return daemon.get("/status"), daemon.get("/description")
+
+
+def _ask_to_end(daemon: Daemon, socket: Path | None) -> list[str]:
+    """Request the end of the daemon; return the actions on a loop whose service does not obey."""
+    try:
+        daemon.post("/shutdown")
+    except NoDaemonError as error:
+        if socket is None:
+            raise WorkFailedError(_unknown_end(error)) from None
+        return end_leftover_processes(None, socket)
+    return []
+
+
+def _may_run(socket: Path | None, error: NoDaemonError) -> bool:
+    """Whether the loop of a silent daemon may run; raises WorkFailedError if unknown."""
+    if socket is None:
+        raise WorkFailedError(_unknown_end(error))
+    path = LoopFile.beside(socket)
+    try:
+        return path.exists() and LoopFile.read(path).runs()
+    except (OSError, WorkFailedError) as unread:
+        if not os.path.lexists(path):  # removed in the meantime, because the loop has ended
+            return False
+        raise WorkFailedError(_unknown_end(unread)) from None
+
+
+def _unknown_end(error: Exception) -> str:
+    return f"{error}; it was asked to end, and whether it has is not known: look at the robot"
+
+
+def _without_launcher(daemon: Daemon, status: dict[str, Any]) -> str:
+    """Return the known facts of a daemon whose loop has ended and whose launcher does nothing."""
+    left = launcher_left(Path(daemon.where)) or "its launcher does not respond"
+    return f"{status['reason']}; {power_text(status)}; {left}"

@@ -1,0 +1,534 @@
+"""`cdpr calibrate`: a robot's geometry from its own cables and from measured points."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from cdpr_profiles import Robot, load_robot
+from cdpr_profiles.calibration.in_force import undo as take_back
+from cdpr_tools.client.client import Daemon, open_daemon
+from cdpr_tools.commands.options import (
+    ClusterOption,
+    HandEyeOption,
+    JsonOption,
+    KeyFileOption,
+    OverwriteOption,
+    PngOption,
+    RobotArgument,
+    SeedOption,
+    SocketOption,
+    UrlOption,
+)
+from cdpr_tools.commands.with_daemon import with_daemon
+from cdpr_tools.errors import BadInputError, WorkFailedError, os_error_as
+from cdpr_tools.loading import loading_notice
+from cdpr_tools.output import Output
+from cdpr_tools.signals import HELD, stop_on_signals
+
+if TYPE_CHECKING:
+    from cdpr_rt.calibration.parameters import CableGeometry
+    from cdpr_rt.calibration.readings import CameraSetup, HandEye
+
+
+# Options shared by several commands of `cdpr calibrate`, and their evaluation.
+
+PointsOption = Annotated[
+    Path | None,
+    typer.Option(
+        help="Measured positions, CSV with the columns pose (from 1), x_mm, y_mm, z_mm, sigma_mm.",
+        metavar="FILE",
+    ),
+]
+IdentifyOption = Annotated[
+    str | None,
+    typer.Option(
+        help="What is identified, with commas between: exit, offset, drum, elongation (these by "
+        "default), anchor, pulley.",
+        metavar="LIST",
+    ),
+]
+KnownMmOption = Annotated[
+    float | None,
+    typer.Option(
+        "--known-mm", min=0.1, max=500.0,
+        help="Standard deviation with which the exit points of the robot's file are known; 50 by "
+        "default, as with a tape.",
+    ),
+]  # fmt: skip
+CalibrationPlantOption = Annotated[
+    Path | None,
+    typer.Option(help="Plant file: the truth about robot, cables, motors and camera."),
+]
+DryRunOption = Annotated[
+    bool, typer.Option("--dry-run", help="Tell what is found; take nothing over.")
+]
+AdoptOption = Annotated[
+    bool,
+    typer.Option("--adopt", help="Take it over even if its changes are not significant."),
+]
+PosesOption = Annotated[
+    str | None,
+    typer.Option(
+        metavar="N|FILE",
+        help="How many poses, home among them, or a list as `cdpr poses` writes it; else up to "
+        "100, while more bring something.",
+    ),
+]
+ScannerOption = Annotated[
+    bool, typer.Option("--scanner", help="With poses that the simulated scanner measures.")
+]
+OutDirOption = Annotated[
+    Path | None,
+    typer.Option(
+        "--out", help="Folder for data, images, result and report; else out/calibrate-ROBOT."
+    ),
+]
+CameraUrlOption = Annotated[
+    str | None,
+    typer.Option("--camera", help="Take images with it, such as opencv:0.", metavar="CAMERA"),
+]
+IntrinsicsOption = Annotated[
+    Path | None, typer.Option(help="Of the camera, for the first pose.", metavar="FILE")
+]
+MarkersOption = Annotated[
+    Path | None, typer.Option(help="Sizes of the sheets, for the first pose.", metavar="FILE")
+]
+
+
+def hand_eye_of(path: Path | None) -> HandEye | None:
+    """Return the hand-eye transform of `--hand-eye`; raises ProfileError."""
+    from cdpr_rt.calibration.readings import HandEye  # noqa: PLC0415  # slow to load
+
+    return None if path is None else HandEye.load_file(path)
+
+
+def geometry_of(robot: Robot, identify: str | None, known_mm: float | None) -> CableGeometry:
+    """Return the parameters to identify; raises InvalidRequestError for an unknown kind."""
+    from cdpr_rt.calibration.parameters import (  # noqa: PLC0415  # slow to load
+        USUAL,
+        CableGeometry,
+        Knowledge,
+    )
+
+    known = Knowledge() if known_mm is None else Knowledge(exit_m=1e-3 * known_mm)
+    kinds = USUAL if identify is None else tuple(part.strip() for part in identify.split(","))
+    return CableGeometry.of(robot, kinds, known)
+
+
+# `cdpr calibrate measure`: move a robot that a daemon runs through poses and calibrate it.
+
+
+@with_daemon
+def measure(
+    daemon: Daemon,
+    out: Output,
+    camera: CameraUrlOption = None,
+    ask: Annotated[
+        bool,
+        typer.Option("--ask", help="Ask at each pose where the platform is measured to be."),
+    ] = False,
+    poses: PosesOption = None,
+    intrinsics: IntrinsicsOption = None,
+    markers: MarkersOption = None,
+    hand_eye: HandEyeOption = None,
+    seed: SeedOption = 1,
+    identify: IdentifyOption = None,
+    known_mm: KnownMmOption = None,
+    out_dir: OutDirOption = None,
+    dry_run: DryRunOption = False,
+    adopt: AdoptOption = False,
+) -> None:
+    """Move a running robot through poses, read its cables, identify; put a good result in force.
+
+    Start with the robot at home on tight cables, as after `cdpr tighten`; it is held at the last
+    pose. Without --camera and --ask it uses only lengths and tensions. If the folder already has
+    poses, also from `cdpr calibrate read`, it continues after them. Ctrl-C holds the platform.
+    The exit status is as for `cdpr calibrate run`.
+    """
+    with out.stage("choosing poses"):
+        from cdpr_tools.calibrate import daemon_run  # noqa: PLC0415
+        from cdpr_tools.calibrate.daemon_run import AskedPoints, require_points_of  # noqa: PLC0415
+        from cdpr_tools.calibrate.finish import finish, stop_criterion, with_hand_eye  # noqa: PLC0415
+        from cdpr_tools.calibrate.places import MOST_POSES, places_of, poses_wanted  # noqa: PLC0415
+        from cdpr_tools.calibrate.pose_operator import PoseOperator  # noqa: PLC0415
+        from cdpr_tools.calibrate.run import DATA, POINTS, report_faults_only  # noqa: PLC0415  # slow to load
+        from cdpr_tools.client.daemon_robot import commanded  # noqa: PLC0415
+        from cdpr_tools.trials.directions import platform_of  # noqa: PLC0415  # slow to load
+
+        robot, description = daemon_run.robot_of(daemon)
+        geometry, known = geometry_of(robot, identify, known_mm), hand_eye_of(hand_eye)
+        count, listed = poses_wanted(robot, poses)
+        folder = out_dir or Path("out") / f"calibrate-{robot.profile}"
+        kept = daemon_run.DaemonPoses(
+            folder, daemon_run.data_of(folder, robot, description["simulated"])
+        )
+        points = folder / POINTS
+        require_points_of(len(kept.data.poses), points)
+        # check this before the slow choice of poses, and before a file is made
+        with commanded(daemon) as running:
+            kept.require_home(robot, PoseOperator(running, robot).place())
+        if ask or points.exists():
+            out.note(f"measured positions: {points}")
+        places, most = places_of(robot, count, listed, seed), count or MOST_POSES
+    with (
+        stop_on_signals(HELD) as stop,
+        daemon_run.image_taker(camera, intrinsics, markers, kept, out.note) as image,
+        daemon_run.going_on(kept),
+        commanded(daemon, in_control=True) as running,
+    ):
+        kept.data = with_hand_eye(kept.data, known)
+        operator = PoseOperator(running, robot, image, stop)
+        home_m = platform_of(robot).home_m
+        asked = AskedPoints(out, points, len(home_m), operator.place) if ask else None
+        criterion = stop_criterion(out, robot, points if ask else None, geometry)
+        daemon_run.read_places(
+            out, robot, operator, kept, places, most,
+            criterion if count is None else report_faults_only(criterion),
+            asked or (lambda _pose: None),
+        )  # fmt: skip
+    out.say("the platform is held at the last pose; `cdpr lower` takes it back onto its stand")
+    finish(
+        *(out, robot, kept.data, points if points.exists() else None, geometry),
+        *(folder / DATA, folder, dry_run, adopt),
+    )
+
+
+# `cdpr calibrate read`: read the pose at which a robot stands, if people move it.
+
+_ENOUGH = 15
+
+
+@with_daemon
+def read(
+    daemon: Daemon,
+    out: Output,
+    out_dir: Annotated[
+        Path, typer.Option("--out", help="Folder of the poses; the first one begins it.")
+    ],
+    camera: CameraUrlOption = None,
+    intrinsics: IntrinsicsOption = None,
+    markers: MarkersOption = None,
+) -> None:
+    """Read the pose of a running robot's platform, for `cdpr calibrate fit`; moves nothing.
+
+    The first pose is home, after `cdpr tighten`; use `cdpr move` to go to the others. At least
+    fifteen poses are needed. `cdpr calibrate measure` moves to poses automatically.
+    """
+    from cdpr_tools.calibrate import daemon_run  # noqa: PLC0415
+    from cdpr_tools.calibrate.pose_operator import PoseOperator  # noqa: PLC0415
+    from cdpr_tools.calibrate.run import DATA, POINTS  # noqa: PLC0415  # slow to load
+    from cdpr_tools.client.daemon_robot import commanded  # noqa: PLC0415
+
+    robot, description = daemon_run.robot_of(daemon)
+    data = daemon_run.data_of(out_dir, robot, description["simulated"])
+    kept = daemon_run.DaemonPoses(out_dir, data)
+    with (
+        daemon_run.image_taker(camera, intrinsics, markers, kept, out.note) as image,
+        commanded(daemon) as running,
+    ):
+        daemon_run.read_into(PoseOperator(running, robot, image), robot, kept)
+    data = kept.data
+    number = len(data.poses)
+    out.say(*daemon_run.lines(robot, data))
+    points = f" --points {out_dir / POINTS}" if (out_dir / POINTS).exists() else ""
+    out.say(f"{number} poses in {out_dir / DATA}")
+    if number >= _ENOUGH:
+        out.say(f"fit them: cdpr calibrate fit {robot.reference} --data {out_dir}{points}")
+    reading = data.poses[-1]
+    figures = {"pose": number, **reading.model_dump(include={"target", "length_m", "tension_N"})}
+    out.result({"ok": True, **figures, "data": out_dir / DATA})
+
+
+app = typer.Typer(
+    name="calibrate",
+    help="Calibrate a robot's geometry, drums and elongation.",
+    no_args_is_help=True,
+)
+
+
+app.command()(read)
+app.command()(measure)
+
+
+@app.command(name="fit")
+def fit_data(
+    robot: RobotArgument,
+    data: Annotated[
+        Path,
+        typer.Option(help="Folder of a run, or readings as its data.json.", metavar="FOLDER|FILE"),
+    ],
+    points: PointsOption = None,
+    hand_eye: HandEyeOption = None,
+    identify: IdentifyOption = None,
+    known_mm: KnownMmOption = None,
+    out_dir: Annotated[
+        Path | None, typer.Option("--out", help="Folder for the result; else that of --data.")
+    ] = None,
+    dry_run: DryRunOption = False,
+    adopt: AdoptOption = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Identify from poses measured before, as at the end of a run; nothing moves.
+
+    For the folder of a run, held-out poses are also compared with its simulator's scanner and
+    truth. The number after ± is three standard deviations (3 sigma). If the result is not good, it
+    is not put in force and the exit status is 1. If it changes nothing significantly, it is not
+    put in force either, with status 0.
+    """
+    from cdpr_rt.calibration.readings import load_data  # noqa: PLC0415
+    from cdpr_tools.calibrate import run as runs  # noqa: PLC0415
+    from cdpr_tools.calibrate.finish import finish, with_hand_eye  # noqa: PLC0415  # slow to load
+
+    out = Output(as_json)
+    profile = load_robot(robot)
+    compare = None
+    if data.is_dir():
+        compare = runs.truth_comparison_of_folder(profile, data)
+        data /= runs.DATA
+    read_before = with_hand_eye(load_data(data), hand_eye_of(hand_eye))
+    finish(
+        *(out, profile, read_before, points, geometry_of(profile, identify, known_mm)),
+        *(data, out_dir or data.parent, dry_run, adopt, compare),
+        hand_eye=hand_eye,
+    )
+
+
+@app.command()
+def run(
+    robot: RobotArgument,
+    camera: Annotated[
+        bool,
+        typer.Option(
+            "--camera",
+            help="With the camera on the platform; so without any of these where it has six "
+            "directions.",
+        ),
+    ] = False,
+    redundancy: Annotated[
+        bool, typer.Option("--redundancy", help="From encoder lengths and tensions alone.")
+    ] = False,
+    scanner: ScannerOption = False,
+    points: PointsOption = None,
+    poses: PosesOption = None,
+    plant: CalibrationPlantOption = None,
+    intrinsics: Annotated[
+        Path | None,
+        typer.Option(help="Of the camera; else found by a board first.", metavar="FILE"),
+    ] = None,
+    markers: Annotated[
+        Path | None,
+        typer.Option(help="Sizes of the sheets, known places; else as ordered.", metavar="FILE"),
+    ] = None,
+    hand_eye: HandEyeOption = None,
+    seed: SeedOption = 1,
+    identify: IdentifyOption = None,
+    known_mm: KnownMmOption = None,
+    out_dir: OutDirOption = None,
+    resume: Annotated[
+        bool, typer.Option("--resume", help="Go on with what a run has left that ended early.")
+    ] = False,
+    overwrite: OverwriteOption = False,
+    dry_run: DryRunOption = False,
+    adopt: AdoptOption = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Move a simulated robot through poses, read its cables, identify, verify, put in force.
+
+    It starts a simulator and runs over the bus, from home and with the geometry of its file.
+    The number after ± is three standard deviations (3 sigma). If the result is not good, it is not
+    put in force and the exit status is 1. If it changes nothing significantly, it is not put in
+    force either, with status 0.
+    """
+    out = Output(as_json)
+    with out.stage("looking at the robot's file"):
+        from cdpr_rt.diagnosis.checks import refuse_impossible  # noqa: PLC0415
+        from cdpr_tools.calibrate import run as runs  # noqa: PLC0415
+        from cdpr_tools.calibrate.finish import (  # noqa: PLC0415  # slow to load
+            finish,
+            refuse_foreign_report,
+            stop_criterion,
+            with_hand_eye,
+        )
+        from cdpr_tools.calibrate.places import poses_wanted  # noqa: PLC0415
+        from cdpr_tools.calibrate.run import check_points, source_of  # noqa: PLC0415
+
+        profile = load_robot(robot)
+        refuse_impossible(profile)
+        geometry, known = geometry_of(profile, identify, known_mm), hand_eye_of(hand_eye)
+        count, listed = poses_wanted(profile, poses)
+        if points is not None:
+            check_points(points, profile, None if resume else count)
+
+    folder = out_dir or Path("out") / f"calibrate-{profile.profile}"
+    refuse_foreign_report(folder)
+    if resume:
+        _require_as_begun({
+            "--camera": camera, "--redundancy": redundancy, "--scanner": scanner, "--plant": plant,
+            "--intrinsics": intrinsics, "--markers": markers,
+        })  # fmt: skip
+        settings = runs.CalibrationRunSettings.load(folder).resumed(count, listed, points)
+        if points is None and settings.points is not None:
+            points = Path(settings.points)
+            check_points(points, profile, None)
+        kept = runs.StoredRun.resumed(folder, profile)
+    else:
+        _require_new(folder, runs.DATA, overwrite)
+        source = source_of(
+            profile, camera=camera, redundancy=redundancy, scanner=scanner, points=bool(points)
+        )
+        _require_camera(known, source)
+        settings = runs.CalibrationRunSettings(
+            robot=profile.profile,
+            plant=None if plant is None else str(plant.resolve()),
+            source=source,
+            poses=count,
+            seed=seed,
+            places=listed,
+            points=None if points is None else str(points.resolve()),
+        )
+        setup = _camera_setup(out, plant, intrinsics, markers) if source == "camera" else None
+        kept = runs.StoredRun.new(folder, profile, setup)
+    settings.save(folder)
+    kept.data = with_hand_eye(kept.data, known)
+    data = runs.measure(
+        out, profile, settings, kept, stop_criterion(out, profile, points, geometry)
+    )
+    finish(
+        *(out, profile, data, points, geometry, folder / runs.DATA, folder, dry_run, adopt),
+        runs.truth_comparison_of(profile, settings, folder),
+    )
+
+
+def _require_as_begun(given: Mapping[str, object]) -> None:
+    """Raise BadInputError for options that only a new run accepts."""
+    for option, value in given.items():
+        if value:
+            raise BadInputError(f"{option}: not with --resume, which goes on as the run was begun")
+
+
+def _require_camera(hand_eye: HandEye | None, source: str) -> None:
+    if hand_eye is not None and source != "camera":
+        raise BadInputError("--hand-eye: is of a camera; allowed: with --camera")
+
+
+def _camera_setup(
+    out: Output, plant: Path | None, intrinsics: Path | None, markers: Path | None
+) -> CameraSetup:
+    """Return the camera's setup for a new run; its module needs an extra."""
+    from cdpr_tools.calibrate.pose_camera import camera_setup  # noqa: PLC0415
+
+    return camera_setup(out, plant, intrinsics, markers)
+
+
+def _require_new(folder: Path, name: str, overwrite: bool) -> None:
+    if (folder / name).exists() and not overwrite:
+        raise BadInputError(
+            f"{folder / name}: is there already; allowed: --resume to go on with it, --overwrite"
+        )
+
+
+@app.command()
+def check(
+    robot: RobotArgument,
+    scanner: ScannerOption = False,
+    plant: CalibrationPlantOption = None,
+    running: Annotated[
+        bool,
+        typer.Option("--running", help="The robot that a daemon runs instead, tight and at home."),
+    ] = False,
+    camera: CameraUrlOption = None,
+    seed: SeedOption = 1,
+    out_dir: Annotated[
+        Path | None,
+        typer.Option("--out", help="Folder for the readings, check.json; else out/check-ROBOT."),
+    ] = None,
+    socket: SocketOption = None,
+    url: UrlOption = None,
+    key_file: KeyFileOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Move a calibrated robot to ten poses and report whether it has changed.
+
+    The robot is simulated, or `--running`. The exit status is 1 if a cable, a drum or an exit
+    point has changed enough to matter.
+    """
+    out = Output(as_json)
+    with out.stage("looking at the robot's file"):
+        from cdpr_rt.diagnosis.checks import refuse_impossible  # noqa: PLC0415
+        from cdpr_tools.calibrate import check as checks  # noqa: PLC0415  # slow to load
+
+        profile = load_robot(robot)
+        refuse_impossible(profile)
+    folder = out_dir or Path("out") / f"check-{profile.profile}"
+    if running:
+        if scanner or plant is not None:
+            raise BadInputError("--running: not together with --scanner or --plant")
+        name = None if socket is not None or url is not None else robot
+        with open_daemon(name, socket, url, key_file) as daemon:
+            found = checks.checked_running(out, profile, daemon, camera, seed, folder)
+    elif camera is not None:
+        raise BadInputError("--camera: allowed: with --running")
+    else:
+        found = checks.checked(out, profile, plant, scanner, seed, folder)
+    out.say(*checks.lines(found, profile))
+    out.result({"ok": not found.moved, **checks.as_json(found), "data": folder / checks.CHECK})
+    if found.moved:
+        raise typer.Exit(WorkFailedError.exit_status)
+
+
+@app.command()
+def undo(robot: RobotArgument, as_json: JsonOption = False) -> None:
+    """Undo the calibration in force; the previous one, or the robot's file, applies again.
+
+    A running robot is not affected until its next start.
+    """
+    out = Output(as_json)
+    profile = load_robot(robot)
+    from cdpr_tools.calibrate.finish import distrust_again  # noqa: PLC0415  # slow to load
+
+    distrust_again(profile)
+    before = take_back(profile)
+    if before is None:
+        out.say(f"{profile.profile}: the geometry of {profile.path} takes effect at the next start")
+    else:
+        out.say(
+            f"{profile.profile}: calibration {before.version} of {before.date:%Y-%m-%d %H:%M} "
+            f"({before.identity}) takes effect at the next start"
+        )
+    out.result({"ok": True, "in_force": None if before is None else before.summary()})
+
+
+@app.command()
+def study(
+    robot: Annotated[
+        str, typer.Argument(help="A robot whose platform has six directions.", metavar="ROBOT")
+    ] = "spatial-8",
+    draws: Annotated[int, typer.Option(min=2, max=100_000, help="Trials of each case.")] = 200,
+    seed: SeedOption = 1,
+    png: PngOption = None,
+    cluster: ClusterOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Show how measurement errors become errors of the geometry, by a model and by trial.
+
+    Computes table 3.1 and figures 3.7, 3.8, B.1 to B.6 and C.1 to C.6 of the thesis for one of our
+    robots, on all cores or a cluster. --png draws NAME.png, NAME-B.png and NAME-C.png.
+    """
+    with loading_notice():
+        from cdpr_tools.calibrate import study as studies  # noqa: PLC0415  # slow to load
+
+    out = Output(as_json)
+    with out.progress("cases", float(len(studies.cases()))) as advance:
+        rows = studies.study(robot, draws, seed, cluster, advance)
+    out.say(*studies.lines(rows))
+    if png is not None:
+        with os_error_as(BadInputError, f"--png {png}: cannot be written"):
+            studies.draw(png, rows)
+    out.result({
+        "ok": True, "robot": robot, "draws": draws, "seed": seed, "cases": rows,
+        "plateaus": studies.plateaus(rows),
+    })  # fmt: skip

@@ -1,1 +1,0 @@
-"""`cdpr calibrate`, `camera` and `markers`."""

@@ -1,0 +1,325 @@
+"""`cdpr jog|move|controller|tighten|lower|pause|resume`: motion through a daemon."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Annotated, Any, Final
+
+import typer
+
+from cdpr_rt.robot import Robot
+from cdpr_tools.client.client import Daemon, axis_values, key_values
+from cdpr_tools.client.motion import Outcome, carry_out, finish, require_platform, run_to_end
+from cdpr_tools.client.refusals import in_typed_words
+from cdpr_tools.commands.with_daemon import with_daemon
+from cdpr_tools.errors import BadInputError, WorkFailedError
+from cdpr_tools.number_options import numbers, numbers_command
+from cdpr_tools.output import Output
+
+_STANDING = frozenset({"hold", "idle"})
+
+
+_COORDINATES: Final = {2: ("x", "y"), 3: ("x", "y", "z")}
+_ANGLES: Final = ("angle", "rx", "ry", "rz")
+
+
+class ReferenceFrame(StrEnum):
+    """The frame whose axes a relative motion uses."""
+
+    ROOM = "room"
+    PLATFORM = "platform"
+
+
+@dataclass(frozen=True)
+class PlatformMove:
+    """A motion of a platform as typed: mm, deg, mm/s."""
+
+    to: str | None
+    rotate: str | None
+    relative: bool
+    frame: ReferenceFrame
+    speed: float | None
+
+    @property
+    def typed(self) -> str:
+        """Return the options that give the target."""
+        words = [f"--to {self.to}"] if self.to is not None else []
+        words += [f"--rotate {self.rotate}"] if self.rotate is not None else []
+        return " ".join(words)
+
+    def arguments(self, daemon: Daemon) -> dict[str, Any]:
+        """Return the arguments of the program `pose`; raises BadInputError."""
+        description = daemon.get("/description")
+        require_platform(description, self.typed, "; its axes are moved by AXIS=ANGLE...")
+        platform = description["platform"]
+        names = _COORDINATES[len(platform["home_m"])]
+        turns = [name for name in platform.get("controlled", ()) if name in _ANGLES]
+        to = None if self.to is None else numbers("--to", self.to, names, "mm", 1e-3)
+        rotate = None
+        if self.rotate is not None:
+            if not turns:
+                raise BadInputError(
+                    f"--rotate {self.rotate}: no angle of this platform is controlled; allowed: "
+                    f"--to {' '.join(names).upper()}"
+                )
+            rotate = numbers("--rotate", self.rotate, turns, "deg", math.radians(1.0))
+        if not self.relative and self.frame is not ReferenceFrame.ROOM:
+            raise BadInputError(f"--frame {self.frame}: allowed: together with --relative")
+        if to is not None and not self.relative:
+            self._require_millimetres(to, platform)
+        keys = ("distance_m", "turn_rad") if self.relative else ("position_m", "rotation_rad")
+        given: dict[str, Any] = dict(zip(keys, (to, rotate), strict=True))
+        given["frame"] = self.frame.value if self.relative else None
+        given["speed_m_s"] = None if self.speed is None else 1e-3 * self.speed
+        return {key: value for key, value in given.items() if value is not None}
+
+    def _require_millimetres(self, to: Sequence[float], platform: dict[str, Any]) -> None:
+        """Raise BadInputError if the typed position is in the workspace only if read as metres."""
+        box = list(zip(platform["workspace_min_m"], platform["workspace_max_m"], strict=True))
+
+        def is_inside(factor: float) -> bool:
+            return all(low <= factor * x <= high for x, (low, high) in zip(to, box, strict=True))
+
+        if is_inside(1e3) and not is_inside(1.0):
+            in_mm = " ".join(f"{1e6 * x:g}" for x in to)
+            raise BadInputError(f"--to {self.to}: were metres typed? In mm: --to {in_mm}")
+
+
+app = typer.Typer()
+
+
+@app.command()
+@with_daemon
+def jog(
+    daemon: Daemon,
+    out: Output,
+    axes: Annotated[
+        list[str], typer.Argument(help="Speeds in deg/s at the motor.", metavar="AXIS=SPEED...")
+    ],
+    seconds: Annotated[float, typer.Option(min=0.1, max=3600.0, help="Duration.")] = 1.0,
+    cable: Annotated[
+        bool, typer.Option("--cable", help="Speeds are mm/s of cable, positive pays out.")
+    ] = False,
+) -> None:
+    """Turn axes at a constant speed for a while."""
+    n, speeds = _given(daemon, axes, "mm/s" if cable else "deg/s")
+    factor = 1e-3 if cable else math.radians(1.0)
+    values = [factor * speeds.get(axis, 0.0) for axis in range(n)]
+
+    def motion(robot: Robot) -> None:
+        (robot.jog_cable if cable else robot.jog)(values, seconds)
+
+    with in_typed_words("jog", axes=_names(daemon)):
+        outcome = carry_out(daemon, out, motion)
+    finish(daemon, out, Outcome(outcome.stopped))
+
+
+@app.command(cls=numbers_command("--to", "--rotate"))
+@with_daemon
+def move(
+    daemon: Daemon,
+    out: Output,
+    axes: Annotated[
+        list[str] | None,
+        typer.Argument(help="Angles in deg of the motor.", metavar="[AXIS=ANGLE]..."),
+    ] = None,
+    to: Annotated[
+        str | None,
+        typer.Option(metavar="X Y [Z]", help="The platform to this position, in mm."),
+    ] = None,
+    rotate: Annotated[
+        str | None,
+        typer.Option(
+            metavar="RX RY RZ | ANGLE",
+            help="The platform to this rotation vector from its orientation at home, in deg; an "
+            "angle in a plane.",
+        ),
+    ] = None,
+    relative: Annotated[
+        bool, typer.Option("--relative", help="Relative to the present position.")
+    ] = False,
+    frame: Annotated[
+        ReferenceFrame,
+        typer.Option(help="With --relative: along and about whose axes the platform moves."),
+    ] = ReferenceFrame.ROOM,
+    cable: Annotated[
+        bool, typer.Option("--cable", help="Relative, in mm of cable; positive pays out.")
+    ] = False,
+    speed: Annotated[
+        float | None,
+        typer.Option(
+            min=0.01,
+            help="Top speed: deg/s at the motor; mm/s of a platform, its rotation scaled alike.",
+        ),
+    ] = None,
+) -> None:
+    """Move axes or the platform to a position and wait until they are there."""
+    if to is not None or rotate is not None:
+        if axes or cable:
+            given = ", ".join([*(axes or []), *["--cable"] * cable])
+            text = f"--to, --rotate: not together with axes or --cable: {given}"
+            if any("=" not in axis for axis in axes or []):
+                text += "; allowed: numbers without a unit, of mm and deg"
+            raise BadInputError(text)
+        move = PlatformMove(to, rotate, relative, frame, speed)
+        with in_typed_words("move", move.typed):
+            run_to_end(daemon, out, "pose", move.arguments(daemon), arrived=True)
+        return
+    if frame is not ReferenceFrame.ROOM:
+        raise BadInputError(f"--frame {frame}: allowed: together with --to or --rotate")
+    goals = _goals(daemon, axes or [], cable)
+
+    def motion(robot: Robot) -> None:
+        turn = robot.pay_out if cable else robot.turn_by if relative else robot.turn_to
+        turn(goals, speed_rad_s=None if speed is None else math.radians(speed))
+        robot.hold()
+
+    with in_typed_words("move", axes=_names(daemon)):
+        outcome = carry_out(daemon, out, motion)
+    finish(daemon, out, outcome, arrived=True)
+
+
+def _names(daemon: Daemon) -> list[str]:
+    return [str(axis["name"]) for axis in daemon.get("/status")["axes"]]
+
+
+def _goals(daemon: Daemon, axes: list[str], cable: bool) -> list[float]:
+    """Return the axes' targets, rad or m, nan for axes that do not move; raises BadInputError."""
+    if not axes:
+        raise BadInputError(
+            "nothing to move; allowed: AXIS=ANGLE..., or --to and --rotate for a platform"
+        )
+    if "pid" not in daemon.get("/description").get("programs", ["pid"]):
+        raise BadInputError(
+            f"{axes[0]}: the platform is moved as a whole; allowed: --to and --rotate, or "
+            "`cdpr jog` for a single winch"
+        )
+    n, goals = _given(daemon, axes, "mm" if cable else "deg")
+    factor = 1e-3 if cable else math.radians(1.0)
+    return [factor * goals.get(axis, math.nan) for axis in range(n)]
+
+
+@app.command()
+@with_daemon
+def controller(
+    daemon: Daemon,
+    out: Output,
+    name: Annotated[str, typer.Argument(help="Program: hold, idle, sweep, pid, ...")],
+    values: Annotated[
+        list[str] | None,
+        typer.Argument(help="Arguments of the program, in JSON.", metavar="[KEY=VALUE]..."),
+    ] = None,
+    seconds: Annotated[
+        float | None,
+        typer.Option(
+            min=0.1, help="End after this many seconds; at the program's own end otherwise."
+        ),
+    ] = None,
+) -> None:
+    """Run a program (a controller with its motion) until it is done, then hold.
+
+    `hold` and `idle` keep running after the command has ended.
+    """
+    arguments = key_values(values or [])
+
+    def motion(robot: Robot) -> None:
+        robot.run(name, **arguments)
+        if name not in _STANDING:
+            robot.hold()
+
+    finish(daemon, out, carry_out(daemon, out, motion, seconds=seconds or math.inf))
+
+
+def _given(daemon: Daemon, texts: list[str], unit: str) -> tuple[int, dict[int, float]]:
+    """Return the number of axes and the values given for some of them; raises BadInputError."""
+    axes = daemon.get("/status")["axes"]
+    values = axis_values(texts, axes, unit)
+    for axis, value in values.items():
+        if not math.isfinite(value):
+            raise BadInputError(f"{axes[axis]['name']}={value:g}: allowed: a finite number")
+    return len(axes), values
+
+
+class LengthSource(StrEnum):
+    """The source of the cables' lengths."""
+
+    HOME = "home"
+    LAST = "last"
+    LENGTHS = "lengths"
+
+
+@app.command()
+@with_daemon
+def tighten(
+    daemon: Daemon,
+    out: Output,
+    source: Annotated[
+        LengthSource | None,
+        typer.Option(
+            "--from",
+            help="From what the cables' lengths follow: the platform stands at home, they are "
+            "those of the last stop, or the lengths that the daemon knows. By default what it "
+            "knows, else home.",
+        ),
+    ] = None,
+) -> None:
+    """Tighten the cables, measure where the platform is, and hold it."""
+    arguments = {} if source is None else {"from": source.value}
+    typed = "tighten" if source is None else f"tighten --from {source.value}"
+    _require_platform(daemon, "tighten")
+    with in_typed_words("tighten", typed, option="--from "):
+        run_to_end(daemon, out, "tighten", arguments)
+
+
+@app.command()
+@with_daemon
+def lower(
+    daemon: Daemon,
+    out: Output,
+    blind: Annotated[
+        bool,
+        typer.Option("--blind", help="Every winch just lets its cable out, wherever that leads."),
+    ] = False,
+) -> None:
+    """Lower the platform onto its stand and slacken the cables; the power stays on."""
+    _require_platform(daemon, "lower")
+    arguments = {"blind": True} if blind else {}
+    status = daemon.get("/status")
+    if status["program"] == "lower" and status["control"]["held"]:
+        raise WorkFailedError(
+            f"lower: the platform is being lowered already, by {status['control']['client']}; "
+            "`cdpr status --watch` shows it"
+        )
+    tight = (status.get("program_progress") or {}).get("tight")
+    where = "lowered blind" if blind else "on its stand" if tight else "where it is"
+    run_to_end(daemon, out, "lower", arguments, f"{where}, cables loose, power on")
+
+
+@app.command()
+@with_daemon
+def pause(daemon: Daemon, out: Output) -> None:
+    """Stop a motion and hold; `cdpr resume` continues it."""
+    _require_platform(daemon, "pause")
+    daemon.post("/hold")
+    finish(daemon, out, Outcome())
+
+
+@app.command()
+@with_daemon
+def resume(daemon: Daemon, out: Output) -> None:
+    """Continue the move or path that was paused."""
+    if (daemon.get("/status").get("program_progress") or {}).get("path"):
+        from cdpr_tools.client.path_following import go_on  # noqa: PLC0415  # slow to load
+
+        go_on(daemon, out)
+        return
+    _require_platform(daemon, "resume")
+    with in_typed_words("resume", instead="cdpr move --to"):
+        run_to_end(daemon, out, "pose", {"resume": True})
+
+
+def _require_platform(daemon: Daemon, what: str) -> None:
+    require_platform(daemon.get("/description"), what)

@@ -1,0 +1,225 @@
+"""`cdpr status|check|enable|disable|hold|ack|stop`: show and change a daemon's state."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from rich.live import Live
+from rich.text import Text
+
+from cdpr_tools.client.client import Daemon, NoDaemonError, open_daemon
+from cdpr_tools.client.daemon_end import end_daemon
+from cdpr_tools.client.daemon_robot import commanded
+from cdpr_tools.client.refusals import DaemonRefusalError
+from cdpr_tools.client.status_text import (
+    fallen_text,
+    status_text,
+)
+from cdpr_tools.commands.options import (
+    JsonOption,
+    KeyFileOption,
+    RobotOption,
+    SocketOption,
+    UrlOption,
+    YesOption,
+)
+from cdpr_tools.commands.with_daemon import with_daemon, with_daemon_at_once
+from cdpr_tools.consent import require_consent
+from cdpr_tools.daemon.estop import end_leftover_processes
+from cdpr_tools.errors import WorkFailedError
+from cdpr_tools.output import Output
+from cdpr_tools.signals import stop_on_signals
+
+_WATCH_S = 0.2
+_ANSWER_S = 10.0
+"""A service that takes longer hangs; then a signal asks the loop to end."""
+_BOOT_S = 60.0
+_BOOTING = ("unconfigured", "inactive")
+
+
+app = typer.Typer()
+
+
+@app.command()
+@with_daemon_at_once
+def status(
+    daemon: Daemon,
+    out: Output,
+    watch: Annotated[
+        bool, typer.Option("--watch", help="Show it continuously until Ctrl-C.")
+    ] = False,
+) -> None:
+    """Show the state of the daemon and its robot."""
+    state = daemon.get("/status")
+    if watch:
+        state = _watch(daemon, out, state)
+    else:
+        for part in status_text(state).renderables:
+            out.text.print(part, soft_wrap=True)
+    out.result({"ok": state["state"] not in ("fault", "dead"), **state})
+
+
+def _watch(daemon: Daemon, out: Output, state: dict[str, Any]) -> dict[str, Any]:
+    """Show the status continuously; wait if the service is being restarted."""
+    with (
+        stop_on_signals() as stop_requested,
+        Live(status_text(state), console=out.text, auto_refresh=False) as view,
+    ):
+        while not stop_requested():
+            time.sleep(_WATCH_S)
+            try:
+                state = daemon.get("/status")
+            except NoDaemonError as error:
+                view.update(Text(str(error), style="red"), refresh=True)
+            else:
+                view.update(status_text(state), refresh=True)
+    return state
+
+
+@app.command()
+@with_daemon
+def check(daemon: Daemon, out: Output) -> None:
+    """Boot the drives again and check the bus, without power."""
+    if daemon.get("/status")["state"] in ("unconfigured", "inactive"):
+        daemon.post("/configure")
+    _show(out, daemon.post("/check"))
+
+
+@app.command()
+@with_daemon
+def enable(
+    daemon: Daemon,
+    out: Output,
+    program: Annotated[
+        str, typer.Option(help="Program that runs as soon as there is power.")
+    ] = "hold",
+    yes: YesOption = False,
+) -> None:
+    """Switch the drives on; they hold their position.
+
+    If they have power already, nothing changes.
+    """
+    status = _booted(daemon, out)
+    if status["state"] == "active":
+        _require_no_stop(status)
+        out.say(f"has power already, program {status['program']}", *_next(status))
+        out.result({"ok": True, "state": "active", "text": ""})
+        return
+    _confirm(status, yes)
+    with commanded(daemon) as robot:
+        robot.enable(program)
+    status = daemon.get("/status")
+    _show(out, {"state": status["state"], "text": ""}, *_next(status))
+
+
+def _require_no_stop(status: dict[str, Any]) -> None:
+    """Raise WorkFailedError if the robot is being stopped: the stop would undo the request."""
+    if (reaction := str(status.get("reacting", "none"))) != "none":
+        reason = f": {status['reason']}" if status["reason"] else ""
+        raise WorkFailedError(
+            f"the robot is being stopped, {reaction} under way{reason}; `cdpr status` says when it "
+            "has ended"
+        )
+
+
+def _next(status: dict[str, Any]) -> list[str]:
+    """Return the steps before a platform that has power but is not held yet can move."""
+    progress = status.get("program_progress") or {}
+    if progress.get("tight") is not False or status["program"] != "hold":
+        return []
+    fallen = fallen_text(status)
+    return [f"cables loose{fallen or '; next: `cdpr tighten`, then it can be moved'}"]
+
+
+def _booted(daemon: Daemon, out: Output) -> dict[str, Any]:
+    """Return the status once the drives have booted or the reason why not is known."""
+    deadline, announced = time.monotonic() + _BOOT_S, False
+    while (status := daemon.get("/status"))["state"] in _BOOTING and not status["reason"]:
+        if time.monotonic() > deadline:
+            break
+        if not announced:
+            out.note("the drives are still booting ...")
+        announced = True
+        time.sleep(_WATCH_S)
+    return status
+
+
+@app.command()
+@with_daemon_at_once
+def disable(daemon: Daemon, out: Output) -> None:
+    """Stop the motion under control, then switch the drives off.
+
+    If a fault has already done so, nothing changes.
+    """
+    try:
+        answer = daemon.post("/disable")
+    except DaemonRefusalError as error:
+        refusal = error.refusal
+        if refusal is None or refusal.arguments.get("state") != "fault":
+            raise
+        answer = {"state": "fault", "text": daemon.get("/status")["reason"]}
+        _show(out, answer, "stopped by it already; next: `cdpr ack`, once its cause is gone")
+        return
+    _show(out, answer)
+
+
+@app.command()
+@with_daemon_at_once
+def hold(daemon: Daemon, out: Output) -> None:
+    """Stop the motion and hold the position; the power stays on."""
+    _show(out, daemon.post("/hold"))
+
+
+@app.command()
+@with_daemon
+def ack(daemon: Daemon, out: Output) -> None:
+    """Acknowledge a fault after its cause has been removed; gives no power."""
+    status = daemon.get("/status")
+    if (state := status["state"]) in ("ready", "active"):
+        _require_no_stop(status)
+        out.say("no fault to acknowledge")
+        out.result({"ok": True, "state": state, "text": ""})
+        return
+    _show(out, daemon.post("/acknowledge"))
+
+
+@app.command()
+def stop(
+    robot: RobotOption = None,
+    socket: SocketOption = None,
+    url: UrlOption = None,
+    key_file: KeyFileOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Stop the motion under control, switch the drives off and end the daemon.
+
+    The exit status is 0 if the drives have no power afterwards, or nothing ran. It is 1 if the loop
+    had died or dies meanwhile, if a drive does not answer and may have power, or if the daemon does
+    not end or may not have ended.
+    """
+    out = Output(as_json)
+    try:
+        with open_daemon(robot, socket, url, key_file, _ANSWER_S) as daemon:
+            end_daemon(daemon, out, Path(daemon.where) if url is None else None)
+    except NoDaemonError:  # no request was sent yet
+        if url is not None:  # the daemon may run on another machine
+            raise
+        out.say(*end_leftover_processes(robot, socket) or ["nothing runs"])
+    out.result({"ok": True})
+
+
+def _show(out: Output, answer: dict[str, Any], *more: str) -> None:
+    out.say(answer["state"] + (f": {answer['text']}" if answer["text"] else ""), *more)
+    out.result({"ok": True, **answer})
+
+
+def _confirm(state: dict[str, Any], yes: bool) -> None:
+    """Ask before motors on a real bus get power."""
+    urls = [str(bus.get("url", "")) for bus in state.get("buses", {}).values()]
+    real = [url for url in urls if not url.startswith("simbus:")]
+    if real or not urls:
+        where = " and ".join(real) or "its buses"
+        require_consent(f"{state['robot']} on {where}: the drives get power.", yes)

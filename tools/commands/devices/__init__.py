@@ -1,1 +1,0 @@
-"""Commands of devices beside the winches: rails, safety inputs and outputs."""

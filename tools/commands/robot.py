@@ -1,0 +1,192 @@
+"""`cdpr robot new|show|mark-calibrated`: describe a cable robot, and show it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict
+from pathlib import Path
+from shlex import quote
+from typing import Annotated
+
+import typer
+
+from cdpr_drivers.bus.budget import machine_budget
+from cdpr_drivers.robot.robot_buses import refusal
+from cdpr_profiles import Robot, load_robot
+from cdpr_profiles.calibration.in_force import load_calibrated
+from cdpr_profiles.errors import ProfileError, printable
+from cdpr_profiles.platform import NO_PLATFORM, Platform
+from cdpr_rt.diagnosis import checks
+from cdpr_rt.diagnosis.subject import Finding, Subject
+from cdpr_rt.model.calibration_state import mark_calibrated
+from cdpr_tools.commands.options import JsonOption, PngOption, RobotArgument
+from cdpr_tools.errors import BAD_INPUT, BadInputError
+from cdpr_tools.output import Output
+from cdpr_tools.robots import new_robot, summary
+from cdpr_tools.robots.calibration_text import calibration_lines
+from cdpr_tools.robots.questions import KINDS, SKETCH, Question
+
+app = typer.Typer()
+
+
+@app.command()
+def show(robot: RobotArgument, png: PngOption = None, as_json: JsonOption = False) -> None:
+    """Show a robot's platform, cables and workspace, and check whether it can work.
+
+    The exit status is 2 if the robot cannot work.
+    """
+    out = Output(as_json)
+    profile = load_calibrated(robot)
+    platform = profile.platform
+    if platform is None:
+        raise BadInputError(
+            f"{profile.path}: {NO_PLATFORM}; `cdpr profiles show` tells what else there is"
+        )
+    with out.stage(f"{profile.profile}: computing tensions, control and what cannot work"):
+        subject = Subject(profile)
+        figures = summary.figures(subject)
+        found = [*checks.diagnose(profile), *_bus_findings(profile)]
+    out.say(*summary.lines(subject, figures))
+    known = profile.calibration
+    figures["calibration"] = None if known is None else known.summary()
+    if known is not None:
+        out.say("", *calibration_lines(known, profile))
+    if png is not None:
+        _draw(profile, platform, png, out)
+    out.say("")
+    _say_findings(out, found)
+    if not found:
+        out.say("nothing to object to")
+    figures["findings"] = [
+        {"key": f.key, "text": f.text, "impossible": f.impossible} for f in found
+    ]
+    possible = not any(finding.impossible for finding in found)
+    out.result({"ok": possible, **figures})
+    if not possible:
+        raise typer.Exit(BAD_INPUT)
+
+
+def _bus_findings(profile: Robot) -> list[Finding]:
+    """Return a finding if the cycle does not fit the buses, else an empty list."""
+    reason = refusal(machine_budget(profile))
+    return [Finding("sync_period_s", reason, impossible=True)] if reason else []
+
+
+@app.command("mark-calibrated")
+def mark_calibrated_(
+    robot: RobotArgument,
+    why: Annotated[str, typer.Option("--why", help="How the exit points in its file are known.")],
+    as_json: JsonOption = False,
+) -> None:
+    """Confirm the geometry in the robot's file, as after moving a rail."""
+    out = Output(as_json)
+    state = mark_calibrated(load_robot(robot).profile, why)
+    out.say(f"robot {state.robot}: calibrated since {state.date}: {state.why}")
+    out.result({"ok": True, "calibration": asdict(state)})
+
+
+@app.command()
+def new(
+    path: Annotated[Path, typer.Argument(help="The file to write, NAME.toml.", metavar="FILE")],
+    answers: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--set",
+            metavar="KEY=VALUE",
+            help="Answer in advance, such as frame_m='3 2'; may be repeated. A wrong key is "
+            "answered with all keys.",
+        ),
+    ] = None,
+    yes: Annotated[
+        bool, typer.Option("--yes", help="Use the defaults for all other questions.")
+    ] = False,
+    png: PngOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Write a robot's file by answering questions.
+
+    It describes robots in a plane and in space, with 3 to 8 cables. The first question lists the
+    kinds and explains their numbers of cables. Each question has a default; most defaults follow
+    from earlier answers. Never overwrites a file. If the robot cannot work, it is rejected, and you
+    can change your answers.
+    """
+    out = Output(as_json)
+    if path.exists():
+        raise BadInputError(f"{path}: is never written over; allowed: a file that is not there yet")
+    if path.suffix != ".toml" or not path.parent.is_dir():
+        raise BadInputError(f"{path}: allowed: NAME.toml in a folder that is there")
+    given = _given(answers or ())
+    if "kind" not in given and not yes:
+        typer.echo(SKETCH, err=True)
+        for name, what in KINDS.items():
+            typer.echo(f"{name:12} {what}", err=True)
+    typed = dict(given)
+
+    def ask(question: Question, default: str, problem: str) -> str:
+        typed[question.key] = _ask(question, default, problem)
+        return typed[question.key]
+
+    complete = new_robot.answers_of(path, given, _default if yes else ask)
+    try:
+        with out.stage("checking whether it can work"):
+            profile = new_robot.write_robot(complete, path)
+            found = checks.diagnose(profile)
+    except ProfileError as error:
+        options = " ".join(f"--set {quote(f'{key}={text}')}" for key, text in typed.items())
+        again = f"cdpr robot new {path} {options} --yes"
+        raise BadInputError(f"{error}\nnothing was written; with other answers: {again}") from None
+    out.say(f"{path}: written")
+    _say_findings(out, found)
+    if png is not None and profile.platform is not None:
+        _draw(profile, profile.platform, png, out)
+    out.say(f"next: cdpr robot show {path}")
+    out.say(f"      cdpr run {path} --bus simbus:      # on simulated winches")
+    out.result({"ok": True, "file": str(path)})
+
+
+def _given(answers: Sequence[str]) -> dict[str, str]:
+    given: dict[str, str] = {}
+    for key, value in map(_key_and_value, answers):
+        if key in given:
+            raise BadInputError(f"--set {key}: {given[key]!r} and {value!r}; allowed: one of them")
+        given[key] = value
+    return given
+
+
+def _key_and_value(text: str) -> tuple[str, str]:
+    key, equals, value = text.partition("=")
+    if not equals:
+        raise BadInputError(f"--set {text}: allowed: KEY=VALUE")
+    return key.strip(), value.strip()
+
+
+def _default(question: Question, default: str, problem: str) -> str:
+    if problem:
+        raise BadInputError(f"{question.key}: {problem}; answer it with --set")
+    return default
+
+
+def _ask(question: Question, default: str, problem: str) -> str:
+    if problem:
+        typer.echo(printable(f"  {problem}"), err=True)
+    try:
+        return str(typer.prompt(question.text, default=default, err=True))
+    except typer.Abort:
+        typer.echo(err=True)  # end the line of the question
+        raise BadInputError(
+            f"no answer to {question.key!r} (--yes takes the defaults); nothing was written"
+        ) from None
+
+
+def _say_findings(out: Output, found: list[Finding]) -> None:
+    for finding in found:
+        kind = "impossible" if finding.impossible else "mind"
+        out.say(f"{kind}: {finding.key}: {finding.text}")
+
+
+def _draw(profile: Robot, platform: Platform, path: Path, out: Output) -> None:
+    from cdpr_tools.robots.picture import draw_robot  # noqa: PLC0415  # slow to load
+
+    with out.stage(f"{path.name}: drawing the workspace"):
+        draw_robot(profile, platform, path)
+    out.say(f"\npicture: {path}")

@@ -1,1 +1,0 @@
-"""`cdpr robot`, `path` and `poses`."""

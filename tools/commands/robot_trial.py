@@ -1,0 +1,119 @@
+"""`cdpr robot trial`: try a whole robot on its simulator and judge it against the truth."""
+
+from __future__ import annotations
+
+import time
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from cdpr_profiles import load_robot
+from cdpr_tools.commands.options import (
+    AgainOption,
+    CommissionedOption,
+    JsonOption,
+    RobotArgument,
+    RobotPlantOption,
+    SeedOption,
+)
+from cdpr_tools.errors import BadInputError
+from cdpr_tools.loading import loading_notice
+from cdpr_tools.output import Output
+from cdpr_tools.signals import interrupted_by_sigterm
+
+
+class KindOfTrial(StrEnum):
+    """The task of the robot."""
+
+    TARGETS = "targets"
+    LINE = "line"
+    RANDOM = "random"
+    STREAM = "stream"
+    PATH = "path"
+    TAPE = "tape"
+
+
+app = typer.Typer()
+
+
+@app.command()
+def trial(
+    robot: RobotArgument,
+    kind: Annotated[
+        KindOfTrial,
+        typer.Argument(
+            help="targets: accuracy at rest; line: lines and turns with compensation and without; "
+            "random: targets at the limits; path: lines, arcs and cut corners of a G-code file; "
+            "stream: a hand that leads through a bad network; "
+            "tape: exit points 20 to 50 mm off what the robot's file says."
+        ),
+    ],
+    plant: RobotPlantOption = None,
+    seed: SeedOption = 1,
+    minutes: Annotated[
+        float | None,
+        typer.Option(min=0.05, max=600.0, help="Duration in the robot's time; not for line."),
+    ] = None,
+    speed_mm_s: Annotated[
+        float | None,
+        typer.Option(min=0.1, help="Speed of lines, else 10; of a path, else the robot's."),
+    ] = None,
+    commissioned: CommissionedOption = None,
+    without_compensation: Annotated[
+        bool,
+        typer.Option("--without-compensation", help="Use nothing that commissioning has learnt."),
+    ] = False,
+    out_dir: Annotated[
+        Path | None,
+        typer.Option(
+            "--out", help="New folder for recordings, true poses and picture.", metavar="DIR"
+        ),
+    ] = None,
+    again: AgainOption = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Try a robot in simulation and judge its accuracy against the truth.
+
+    Every cycle crosses the simulated bus to the daemon's own loop, in bus time: ten minutes take a
+    few. The exit status is 0 after judging, even if a figure misses its limit.
+    """
+    with loading_notice():
+        from cdpr_tools.trials import trial as trials  # noqa: PLC0415  # slow to load
+
+    out = Output(as_json)
+    if again:
+        if out_dir is None:
+            raise BadInputError("--again: needs --out, the folder of a trial that was run")
+        result = trials.judge(out_dir)
+        if result["kind"] != kind.value:
+            raise BadInputError(f"{out_dir}: holds a trial of {result['kind']}, not {kind}")
+    else:
+        profile = load_robot(robot)
+        name = f"trial-{profile.profile}-{kind}-{time.strftime('%Y%m%d-%H%M%S')}"
+        folder = out_dir or Path("out") / name
+        if folder.exists() and any(folder.iterdir()):
+            raise BadInputError(f"--out {folder}: holds something already; allowed: a new folder")
+        default = trials.KINDS[kind]
+        if minutes is not None and default.at_speed:
+            raise BadInputError(f"--minutes {minutes:g}: {kind} lasts as long as it lasts")
+        if speed_mm_s is not None and not default.at_speed:
+            raise BadInputError(f"--speed-mm-s {speed_mm_s:g}: allowed: with line and path")
+        if speed_mm_s is None and kind is KindOfTrial.PATH and profile.platform is not None:
+            speed_mm_s = 1e3 * profile.platform.speed_m_s
+        settings = trials.TrialSettings(
+            kind=kind.value,
+            robot=robot,
+            plant=None if plant is None else str(plant.absolute()),
+            seed=seed,
+            minutes=default.minutes if minutes is None else minutes,
+            commissioned=None if commissioned is None else str(commissioned.absolute()),
+            compensated=not without_compensation,
+            **({} if speed_mm_s is None else {"speed_m_s": 1e-3 * speed_mm_s}),
+        )
+        with interrupted_by_sigterm():
+            result = trials.perform(settings, folder, out)
+    out.say(*result.pop("lines"))
+    out.say(f"picture: {result['picture']}")
+    out.result({"ok": True, **result})

@@ -1,0 +1,411 @@
+"""`cdpr run`: run the control loop of a robot as a daemon."""
+
+from __future__ import annotations
+
+import math
+import os
+import signal
+import sys
+import tempfile
+import threading
+import time
+from collections.abc import Callable
+from contextlib import ExitStack, suppress
+from functools import partial
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from cdpr_drivers.bus.url import refuse_second_master
+from cdpr_drivers.errors import BusError
+from cdpr_drivers.robot.commissioned import load_profiles, uncommissioned_text, with_commissioned
+from cdpr_drivers.robot.robot_buses import (
+    real_buses,
+    refuse_simulated_calibration,
+    require_fit,
+    robot_urls,
+    starts_own_simulator,
+)
+from cdpr_profiles import Robot
+from cdpr_profiles.calibration.in_force import load_calibrated
+from cdpr_rt.core.shared_block import MOST_AXES, SharedBlock
+from cdpr_rt.diagnosis.checks import refuse_impossible
+from cdpr_rt.service.listening import listener_pid
+from cdpr_rt.service.retention import BYTES_PER_AXIS, Retention, size_text
+from cdpr_rt.state_file import make_private_folder
+from cdpr_tools.commands.options import (
+    ExitWithStdinOption,
+    JsonOption,
+    RobotBusOption,
+    SafetyIoOption,
+    YesOption,
+)
+from cdpr_tools.compiling import compiling_notices_to
+from cdpr_tools.composition.simulator import OwnSimulator
+from cdpr_tools.consent import require_consent
+from cdpr_tools.daemon.launcher import Launcher, ServiceManager
+from cdpr_tools.daemon.loop_file import LauncherLock
+from cdpr_tools.daemon.paths import SOCKET_SUFFIX, default_recordings, default_socket
+from cdpr_tools.daemon.settings import Address, RunSettings, checked_origin
+from cdpr_tools.errors import (
+    BAD_INPUT,
+    DONE,
+    BadInputError,
+    CommandError,
+    WorkFailedError,
+)
+from cdpr_tools.output import Output, to_json
+from cdpr_tools.robots.calibration_text import calibration_text
+from cdpr_tools.streams import outlive_output
+
+_KEPT_DAYS, _KEPT_GB = 30.0, 20.0
+_RING_S = 15.0  # longer than it takes to detect a hanging service and restart it
+
+
+app = typer.Typer()
+
+
+@app.command()
+def run(
+    robot: Annotated[
+        str,
+        typer.Argument(
+            help="Robot or winch profile: a name or the path of a file.", metavar="ROBOT|WINCH"
+        ),
+    ],
+    bus: RobotBusOption = None,
+    plant: Annotated[
+        Path | None, typer.Option(help="Plant file for the simulator that `simbus:` starts.")
+    ] = None,
+    camera: Annotated[
+        Path | None,
+        typer.Option(help="Socket to make of a camera on the platform, for that simulator."),
+    ] = None,
+    http: Annotated[
+        str | None,
+        typer.Option(metavar="HOST:PORT", help="Listen there too, besides the Unix socket."),
+    ] = None,
+    unix: Annotated[
+        Path | None,
+        typer.Option("--socket", help="Unix socket of the control interface, if not this user's."),
+    ] = None,
+    key_file: Annotated[
+        Path | None,
+        typer.Option(help="Secret of those who may move the robot over --http or --stream."),
+    ] = None,
+    record: Annotated[
+        Path | None,
+        typer.Option(metavar="DIR", help="Record into this folder instead of the user's."),
+    ] = None,
+    no_record: Annotated[bool, typer.Option("--no-record", help="Record nothing.")] = False,
+    keep_days: Annotated[
+        float | None,
+        typer.Option(
+            min=0.01, help="Remove older recordings of this robot; 30 in the user's folder."
+        ),
+    ] = None,
+    keep_gb: Annotated[
+        float | None,
+        typer.Option(
+            "--keep-gb",
+            min=0.01,
+            help="Remove its oldest recordings beyond so much in all; 20 in the user's folder.",
+        ),
+    ] = None,
+    live: Annotated[
+        int | None,
+        typer.Option(metavar="PORT", min=0, max=65535, help="Foxglove live view, on loopback."),
+    ] = None,
+    live_origin: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="ORIGIN",
+            help="A web page that may look at the live view, such as https://app.foxglove.dev.",
+        ),
+    ] = None,
+    stream: Annotated[
+        str | None,
+        typer.Option(metavar="HOST:PORT", help="Receive a set-point stream (UDP) there."),
+    ] = None,
+    read_only: Annotated[
+        bool, typer.Option("--read-only", help="Listen to another master's bus; send nothing.")
+    ] = False,
+    safety_io: SafetyIoOption = None,
+    tension_port: Annotated[
+        str | None,
+        typer.Option(metavar="PORT", help="Serial port of the robot's tension sensors."),
+    ] = None,
+    commissioned: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="DIR", help="What `cdpr commission ROBOT` has left: motors to compensate."
+        ),
+    ] = None,
+    controller: Annotated[
+        str | None,
+        typer.Option(
+            metavar="FILE.py:CLASS",
+            help="Your own controller of the platform, or MODULE:CLASS. This runs the code there.",
+        ),
+    ] = None,
+    yes: YesOption = False,
+    as_json: JsonOption = False,
+    exit_with_stdin: ExitWithStdinOption = False,
+) -> None:
+    """Start a robot's control loop as a daemon. It gives no power until you enable it.
+
+    It reports on standard output when it is up. Ctrl-C and SIGTERM end it with a controlled stop.
+    """
+    out = Output(as_json)
+    if exit_with_stdin:
+        threading.Thread(target=_end_with_stdin, daemon=True).start()
+    if find_spec("uvicorn") is None:  # report this before a child process fails without it
+        raise ModuleNotFoundError(name="uvicorn")
+    profile = load_calibrated(robot)
+    refuse_simulated_calibration(profile, bus or ())
+    settings = settings_for(
+        profile, bus=bus, plant=plant, http=http, unix=unix, key_file=key_file, record=record,
+        no_record=no_record, keep_days=keep_days, keep_gb=keep_gb, live=live,
+        live_origin=live_origin, stream=stream, read_only=read_only, safety_io=safety_io,
+        tension_port=tension_port, commissioned=commissioned, controller=controller,
+    )  # fmt: skip
+    if camera is not None and not starts_own_simulator(bus or ()):
+        raise BadInputError("--camera: only for a simulator that the command starts (simbus:)")
+    _require_possible(settings.socket)
+    with ExitStack() as stack:
+        # held from before anything starts until everything has ended
+        lock = stack.enter_context(LauncherLock(settings.socket))
+        _require_free(settings.socket)
+        _require_no_master(profile, settings)
+        if not settings.own_simulator:
+            _note_doubts(profile, out)
+        _ask(profile, settings, yes, exit_with_stdin)
+        settings = settings.model_copy(
+            update={"lock_fd": lock.fd, "record": _writable(settings.record, record, out)}
+        )
+        settings = settings.with_key_loaded().with_ports_bound()
+        manager = ServiceManager()  # before any child is started: no child may speak for the daemon
+        for text in (
+            uncommissioned_text(with_commissioned(profile, commissioned)),
+            calibration_text(profile.calibration.summary()) if profile.calibration else "",
+        ):
+            if text:
+                out.note(text)
+        simulator = None
+        if settings.own_simulator:
+            simulator = _simulator(profile, settings, plant, camera, out, lock.tell)
+            stack.callback(simulator.stop)
+        _launch(profile, settings, out, manager, simulator)
+
+
+def _end_with_stdin() -> None:
+    """End this process as SIGTERM does when its standard input ends."""
+    with suppress(OSError, ValueError):
+        while os.read(sys.stdin.fileno(), 4096):
+            pass
+    os.kill(os.getpid(), signal.SIGTERM)
+
+
+def _simulator(
+    robot: Robot,
+    settings: RunSettings,
+    plant: Path | None,
+    camera: Path | None,
+    out: Output,
+    tell: Callable[[str], None],
+) -> OwnSimulator:
+    """Start the robot's simulated drives, and report this with `tell` to the launcher's file."""
+    out.note(f"starting simulated drives: {len(robot.axes)} ...")
+    check = partial(_note_doubts, robot, out)  # compiles kernels if none are stored yet
+    tell("simulated drives")
+    with compiling_notices_to(tell):
+        simulator = OwnSimulator(
+            robot.reference, settings.buses[0], plant, camera=camera, meanwhile=check
+        )
+    tell("")
+    return simulator
+
+
+def _writable(folder: Path | None, asked: Path | None, out: Output) -> Path | None:
+    """Make a folder for recordings and return it; a new one is private to this user.
+
+    If it cannot be written, raises BadInputError if the user `asked` for it; else nothing is
+    recorded.
+    """
+    if folder is None:
+        return None
+    try:
+        make_private_folder(folder)
+        with tempfile.TemporaryFile(dir=folder):
+            return folder
+    except OSError as error:
+        if asked is not None:
+            raise BadInputError(f"--record {asked}: {error.strerror or error}") from None
+        why = f"{folder} cannot be written ({error.strerror or error})"
+        out.note(f"nothing will be recorded: {why}; --record DIR records elsewhere")
+        return None
+
+
+def _note_doubts(robot: Robot, out: Output) -> None:
+    """Note doubts about the robot; raises ProfileError for one that cannot work."""
+    for doubt in refuse_impossible(robot):
+        out.note(doubt)
+
+
+def settings_for(
+    robot: Robot,
+    *,
+    bus: list[str] | None,
+    plant: Path | None,
+    http: str | None,
+    unix: Path | None,
+    key_file: Path | None,
+    record: Path | None,
+    no_record: bool,
+    keep_days: float | None = None,
+    keep_gb: float | None = None,
+    live: int | None,
+    live_origin: list[str] | None = None,
+    stream: str | None,
+    read_only: bool,
+    safety_io: str | None,
+    tension_port: str | None = None,
+    commissioned: Path | None = None,
+    controller: str | None = None,
+) -> RunSettings:
+    """Return the settings from the options of `cdpr run`; raises BadInputError."""
+    if len(robot.axes) > MOST_AXES:
+        raise BadInputError(f"{robot.path}: {len(robot.axes)} axes; allowed: 1 to {MOST_AXES}")
+    require_fit(robot)
+    load_profiles(with_commissioned(robot, commissioned))
+    if record is not None and no_record:
+        raise BadInputError("--record and --no-record: one of them")
+    if controller is not None and robot.platform is None:
+        raise BadInputError(f"--controller: {robot.profile} has no platform to control")
+    own_simulator = starts_own_simulator(bus or ())
+    if plant is not None and not own_simulator:
+        raise BadInputError("--plant: only for a simulator that the command starts (simbus:)")
+    if read_only and own_simulator:
+        raise BadInputError(
+            "--read-only: no other master is on a simulator that the command starts; "
+            "give --bus simbus:NAME of one that runs"
+        )
+    return RunSettings(
+        robot=robot.reference,
+        name=robot.profile,
+        buses=(f"simbus:own-{os.getpid()}",) if own_simulator else tuple(bus or ()),
+        simulated=own_simulator
+        or all(url.is_simulated for url in robot_urls(robot, tuple(bus or ())).values()),
+        own_simulator=own_simulator,
+        read_only=read_only,
+        safety_io=safety_io,
+        tension_port=tension_port,
+        commissioned=commissioned,
+        controller=controller,
+        socket=unix or default_socket(robot.profile),
+        http=None if http is None else Address.parse("--http", http),
+        key_file=key_file,
+        record=None if no_record else record or default_recordings(),
+        keep=_kept(record, keep_days, keep_gb),
+        live=live,
+        live_origins=tuple(map(checked_origin, live_origin or ())),
+        stream=None if stream is None else Address.parse("--stream", stream),
+        launcher_pid=os.getpid(),
+    )
+
+
+def _kept(record: Path | None, days: float | None, gb: float | None) -> Retention:
+    """Return which recordings are kept: in a folder that the user gives, all by default."""
+    usual_days, usual_gb = (_KEPT_DAYS, _KEPT_GB) if record is None else (math.inf, math.inf)
+    return Retention(usual_days if days is None else days, 1e9 * (usual_gb if gb is None else gb))
+
+
+def _recording_text(robot: Robot, settings: RunSettings) -> str:
+    """Return the folder of recordings, their size per hour, and how many are kept, as text."""
+    if settings.record is None:
+        return "records nothing"
+    hour = 3600.0 * BYTES_PER_AXIS * len(robot.axes) / robot.sync_period_s
+    keep = settings.keep
+    kept = [f"{keep.days:g} days"] * math.isfinite(keep.days)
+    kept += [size_text(keep.total_bytes)] * math.isfinite(keep.total_bytes)
+    until = f"keeps {' and '.join(kept)} at most" if kept else "removes none"
+    return f"records into {settings.record}: about {size_text(hour)} an hour; {until}"
+
+
+def _launch(
+    robot: Robot,
+    settings: RunSettings,
+    out: Output,
+    manager: ServiceManager,
+    simulator: OwnSimulator | None,
+) -> None:
+    block = SharedBlock.create(len(robot.axes), _RING_S, 1.0 / robot.sync_period_s)
+    block.counters["start_monotonic_ns"] = time.monotonic_ns()
+    block.counters["start_realtime_ns"] = time.time_ns()
+    settings = settings.model_copy(update={"block_fd": block.fd})
+
+    def ready(status: dict[str, Any]) -> None:
+        report = {"robot": robot.name, "state": status["state"], "reason": status.get("reason", "")}
+        _report_ready({**report, "socket": str(settings.socket), "pid": os.getpid()}, out)
+
+    out.note(_recording_text(robot, settings))
+    out.note("starting the control loop ...")
+    outlive_output()
+    launcher = Launcher(settings, block, out.note, ready, manager, simulator)
+    status = launcher.run()
+    if status != DONE:
+        raise _ended(launcher.reason, status)
+    out.result({"ok": True})
+
+
+def _report_ready(report: dict[str, Any], out: Output) -> None:
+    """Report on standard output that the daemon is ready, as JSON unless a person reads it."""
+    if out.as_json or not sys.stdout.isatty():
+        print(to_json({"ready": report}), flush=True)
+        return
+    out.say(
+        f"{report['robot']}: {report['state']}"
+        + (f": {report['reason']}" if report["reason"] else "")
+    )
+    out.say(f"socket {report['socket']}; Ctrl-C ends it")
+
+
+def _ended(reason: str, status: int) -> CommandError:
+    return BadInputError(reason) if status == BAD_INPUT else WorkFailedError(reason)
+
+
+def _require_possible(control: Path) -> None:
+    """Raise BadInputError if no daemon could ever listen at `control`."""
+    if control.suffix != SOCKET_SUFFIX:  # the loop's file beside it differs only in the suffix
+        raise BadInputError(f"--socket {control}: allowed: a name that ends in {SOCKET_SUFFIX}")
+    if not os.access(control.parent, os.W_OK | os.X_OK):
+        raise BadInputError(f"--socket {control}: {control.parent} is no folder to write into")
+
+
+def _require_free(control: Path) -> None:
+    """Raise BadInputError if a process without the robot's lock listens at `control`."""
+    if (pid := listener_pid(control)) is not None:
+        whose = f"process {pid}" if pid else "a process"
+        raise BadInputError(f"--socket {control}: {whose} listens there already; end it first")
+
+
+def _require_no_master(robot: Robot, settings: RunSettings) -> None:
+    """Raise WorkFailedError if another process currently runs drives on one of the buses."""
+    if settings.read_only:
+        return
+    for url in robot_urls(robot, settings.buses).values():
+        try:
+            refuse_second_master(url)
+        except BusError as error:
+            raise WorkFailedError(f"{error}, or give --read-only to listen") from None
+
+
+def _ask(robot: Robot, settings: RunSettings, yes: bool, exit_with_stdin: bool) -> None:
+    real = real_buses(robot, settings.buses)
+    if real and not settings.read_only:
+        where = " and ".join(real)
+        if exit_with_stdin and not yes:  # a pipe cannot answer a question
+            raise BadInputError(f"{where}: with --exit-with-stdin, real drives need --yes")
+        require_consent(f"{robot.name} on {where}: its motors will turn when told to.", yes)

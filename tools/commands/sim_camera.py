@@ -1,0 +1,92 @@
+"""`cdpr sim camera` and `cdpr sim photos`: a simulated camera beside a robot, or without one."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import cv2
+import typer
+
+from cdpr_profiles.camera import CameraIntrinsics
+from cdpr_sim_bus.camera.camera_server import CameraServer
+from cdpr_sim_bus.camera.sim_camera import Box, SimCamera, random_poses
+from cdpr_sim_bus.physics_board import PhysicsBoard
+from cdpr_sim_bus.robot.camera_plant import CameraPlant
+from cdpr_tools.commands.options import ExitWithStdinOption, JsonOption, SeedOption
+from cdpr_tools.errors import BadInputError
+from cdpr_tools.number_options import numbers
+from cdpr_tools.output import Output
+from cdpr_tools.report.save import require_free, save
+
+_PlantOption = Annotated[
+    Path | None,
+    typer.Option(help="Camera's plant file: the truth about lens, mount, light and markers."),
+]
+
+app = typer.Typer()
+
+
+@app.command()
+def camera(
+    socket: Annotated[Path, typer.Argument(help="Unix socket to make.", metavar="SOCKET")],
+    board: Annotated[Path, typer.Option(help="Physics board of the robot that carries it.")],
+    plant: _PlantOption = None,
+    exit_with_stdin: ExitWithStdinOption = False,
+) -> None:
+    """Run a camera on a simulated platform until Ctrl-C; other commands know it as sim:SOCKET.
+
+    Type `dark`, `defocus 6` or `unplug` to break it, and `mend` to repair it.
+    """
+    made = SimCamera(CameraPlant.load_file(plant))
+    with PhysicsBoard.attach(board) as shared:
+        platform = shared.platform
+        if platform.state() is None:
+            raise BadInputError(f"--board {board}: no platform moves on its axes' cables")
+        lens = made.plant.lens
+        details = {"width_px": lens.width_px, "height_px": lens.height_px}
+        CameraServer(made, platform, socket).serve(exit_with_stdin, details)
+
+
+@app.command()
+def photos(
+    folder: Annotated[Path, typer.Argument(help="New folder for the images.", metavar="FOLDER")],
+    plant: _PlantOption = None,
+    count: Annotated[int, typer.Option(min=1, max=2000, help="Number of images.")] = 40,
+    seed: SeedOption = 1,
+    low: Annotated[
+        str, typer.Option(help="Lowest position of the platform, m.", metavar='"X Y Z"')
+    ] = "-0.5 -0.4 1.4",
+    high: Annotated[
+        str, typer.Option(help="Highest position of the platform, m.", metavar='"X Y Z"')
+    ] = "0.2 0.6 1.75",
+    tilt_deg: Annotated[float, typer.Option(min=0.0, max=80.0, help="Most rotation.")] = 15.0,
+    overwrite: Annotated[
+        bool, typer.Option("--overwrite", help="Replace what is in FOLDER already.")
+    ] = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Write images of a simulated camera from random poses, and its intrinsics.
+
+    The true intrinsics are written to camera.toml beside the images.
+    """
+    out = Output(as_json)
+    truth = CameraPlant.load_file(plant)
+    (x_low, y_low, z_low), (x, y, z) = (
+        numbers(option, text, "xyz", "m", 1.0)
+        for option, text in (("--low", low), ("--high", high))
+    )
+    box = Box((x_low, y_low, z_low), (x, y, z), tilt_deg)
+    require_free("FOLDER", folder, overwrite)
+    folder.mkdir(parents=True, exist_ok=True)
+    made, lens = SimCamera(truth), truth.lens
+    with out.progress(f"{count} images", float(count)) as advance:
+        for k, state in enumerate(random_poses(box, count, seed)):
+            path = folder / f"image-{k:04d}.png"
+            if not cv2.imwrite(str(path), made.grab(state)):
+                raise BadInputError(f"{path}: cannot be written")
+            advance(k + 1.0)
+    intrinsics = CameraIntrinsics.model_validate(lens, from_attributes=True)
+    save(folder / "camera.toml", intrinsics.toml_text())
+    out.say(f"{count} images and camera.toml in {folder}")
+    out.result({"ok": True, "folder": folder, "images": count})

@@ -1,0 +1,112 @@
+"""`cdpr sim fault`: inject faults into a simulated robot while it runs."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from cdpr_drivers.robot.robot_buses import robot_urls
+from cdpr_profiles import ProfileError, Robot, RobotAxis, Winch, load_winch_or_robot
+from cdpr_profiles.errors import printable
+from cdpr_profiles.robot import robot_of_winch
+from cdpr_tools.composition.fault_injection import (
+    InjectedFault,
+    inject_beside,
+    named_injection,
+)
+from cdpr_tools.errors import BadInputError
+
+app = typer.Typer()
+
+
+@app.command()
+def fault(
+    machine: Annotated[
+        str,
+        typer.Argument(
+            help="Winch or robot that is simulated, or the name of its daemon.",
+            metavar="WINCH|ROBOT",
+        ),
+    ],
+    what: Annotated[
+        str,  # for an enum, typer would also list all choices as the type, with bad line breaks
+        typer.Argument(
+            help=f"What goes wrong, immediately: {', '.join(InjectedFault)}.",
+            metavar="FAULT",
+        ),
+    ],
+    value: Annotated[
+        str | None,
+        typer.Argument(
+            help="How much: mm to slip (100 by default), counts to jump (500), error code of the "
+            "drive (0x7305), ms of silence (65535: for good, by default), N that a load cell shows "
+            "too much (40).",
+            metavar="VALUE",
+        ),
+    ] = None,
+    *,
+    bus: Annotated[
+        list[str] | None,
+        typer.Option(help="The simulator's buses; those of the robot's daemon where left out."),
+    ] = None,
+    axis: Annotated[str, typer.Option(help="Axis by its name, or by its number from 1.")] = "1",
+) -> None:
+    """Inject a fault into a running simulated robot: a cable, an encoder, a drive.
+
+    It writes object 2F00h, which no real drive has, while the robot's master keeps running. For
+    pre-operational it sends the NMT command.
+    """
+    profile, daemon = _profile(machine, by_daemon=not bus)
+    robot = robot_of_winch(profile) if isinstance(profile, Winch) else profile
+    chosen = _axis(robot, axis)
+    url = robot_urls(robot, bus or _buses_of_daemon(daemon))[chosen.bus]
+    amount = inject_beside(robot, chosen, url, what, value)
+    typer.echo(printable(f"{chosen.name}: {what}{_amount_text(what, amount)}"))
+
+
+def _profile(machine: str, *, by_daemon: bool) -> tuple[Winch | Robot, str]:
+    """Return the machine of a profile or of a daemon with this name, and its daemon's name."""
+    try:
+        profile = load_winch_or_robot(machine)
+    except ProfileError:
+        # loaded here: a simulator without a daemon needs no client
+        from cdpr_tools.client.client import answers, open_daemon  # noqa: PLC0415
+
+        if not by_daemon or machine.endswith(".toml") or not answers(machine, None):
+            raise
+        with open_daemon(machine, None, None, None) as daemon:
+            return load_winch_or_robot(daemon.get("/description")["reference"]), machine
+    return profile, profile.profile
+
+
+def _buses_of_daemon(robot: str) -> list[str]:
+    """Return the buses of the daemon that runs the robot, in the form of options.
+
+    Raises NoDaemonError if there is no such daemon.
+    """
+    # loaded here: a simulator without a daemon needs no client
+    from cdpr_tools.client.client import open_daemon  # noqa: PLC0415
+
+    with open_daemon(robot, None, None, None) as daemon:
+        buses = daemon.get("/status")["buses"]
+    return [f"{name}={bus['url']}" for name, bus in buses.items()]
+
+
+def _amount_text(what: str, amount: int) -> str:
+    if what in (InjectedFault.CUT_CABLE, InjectedFault.PRE_OPERATIONAL):
+        return ""
+    return (
+        f" {amount:#06x}"
+        if what == InjectedFault.DRIVE_FAULT
+        else f" {amount} {named_injection(what).unit}"
+    )
+
+
+def _axis(robot: Robot, text: str) -> RobotAxis:
+    names = [axis.name for axis in robot.axes]
+    if text in names:
+        return robot.axes[names.index(text)]
+    if text.isdecimal() and 0 < int(text) <= len(names):
+        return robot.axes[int(text) - 1]
+    raise BadInputError(f"--axis {text}: allowed: 1 to {len(names)}, or {', '.join(names)}")

@@ -1,1 +1,0 @@
-"""The daemon's processes, and the launcher above them."""

@@ -1,1 +1,0 @@
-"""Model of the operator who teleoperates."""

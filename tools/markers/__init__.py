@@ -1,1 +1,0 @@
-"""Printed markers: sheets of them, and pictures of their maps."""

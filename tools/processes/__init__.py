@@ -1,1 +1,0 @@
-"""Work in processes of its own: pools of workers, and modules of this project."""

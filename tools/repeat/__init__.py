@@ -1,1 +1,0 @@
-"""Runs a command several times and compares what it writes."""

@@ -1,1 +1,0 @@
-"""Poses that a robot reaches: chosen, written to a file, drawn."""

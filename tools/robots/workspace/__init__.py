@@ -1,1 +1,0 @@
-"""The workspace of a robot for people: searched, in words, drawn, as a mesh."""

@@ -1,1 +1,0 @@
-"""What a trial has recorded, its figures and its pictures."""
