@@ -47,20 +47,21 @@ def watch(io: _IoArgument, seconds: _Seconds = 3600.0, as_json: JsonOption = Fal
     """Show each change as it happens; changes nothing."""
     out = Output(as_json)
     before: list[str] = []
-    with _link(io) as link:
+    # an interrupt inside a print could print the line twice
+    with _link(io) as link, stop_on_signals() as stop_requested:
         clock = link.clock
         deadline_s = clock.now_s + seconds
-        state = link.state()
-        try:
-            while clock.now_s < deadline_s:
-                lines = _lines(state)
-                for line in lines:
-                    if line not in before:
-                        out.say(f"{time.strftime('%H:%M:%S')}  {line}")
-                before = lines
-                clock.sleep(link.profile.poll_period_s)
-                state = link.state()
-        except KeyboardInterrupt:
+        while True:
+            state = link.state()
+            lines = _lines(state)
+            for line in lines:
+                if line not in before:
+                    out.say(f"{time.strftime('%H:%M:%S')}  {line}")
+            before = lines
+            if stop_requested() or clock.now_s >= deadline_s:
+                break
+            clock.sleep(link.profile.poll_period_s)
+        if stop_requested():
             out.note("stopped on request")
     out.result({"ok": True, **_as_dict(state)})
 
