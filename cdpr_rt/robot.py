@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cdpr_rt.arrays import FloatArray
-from cdpr_rt.core.cycle_row import FIELDS, Row
+from cdpr_rt.core.cycle_row import FIELDS, Row, column_names
 from cdpr_rt.refusal import CommandRefusal, RefusalCode
 
 
@@ -114,6 +114,33 @@ _STANDS: Final = ("the path waits here", "stepped back")
 _AXIS_PROGRAMS: Final = ("jog", "pid", "sweep")
 _SETTLE_S: Final = 2.0
 _REST_RAD, _REST_RAD_S = math.radians(0.5), math.radians(2.0)
+
+
+class Log(np.ndarray[Any, np.dtype[np.void]]):
+    """Recorded cycles: a structured NumPy array, (cycles,)."""
+
+    axes: tuple[str, ...] = ()
+    """Names of the axes, n."""
+
+    def __array_finalize__(self, other: Any) -> None:
+        self.axes = getattr(other, "axes", ())
+
+    def to_pandas(self) -> Any:
+        """Return a pandas.DataFrame with a column for each scalar, axis and pose coordinate.
+
+        Columns are named as by `cdpr log export`: `time_s`, `tension_N[left]`, `pose[qw]`.
+        Raises Error if pandas is not installed.
+        """
+        try:
+            import pandas as pd  # noqa: PLC0415
+        except ImportError:
+            raise Error("pandas is not installed; install it with: pip install pandas") from None
+        columns: dict[str, Any] = {}
+        for field in self.dtype.names or ():
+            values = np.asarray(self[field])
+            names = column_names(field, values.shape, self.axes)
+            columns |= zip(names, values.T if values.ndim == 2 else [values], strict=True)
+        return pd.DataFrame(columns)
 
 
 class Robot:
@@ -240,7 +267,7 @@ class Robot:
         """Torques that the drives report, (n,), Nm."""
         return self._axis_values("torque_actual_Nm")
 
-    def log(self, *fields: str) -> Row:
+    def log(self, *fields: str) -> Log:
         """Return the recorded cycles since the handle was opened: a structured array, (cycles,).
 
         `fields` are those of the recordings, such as "time_s", "pose" (7,) and "tension_N" (n,);
@@ -250,7 +277,9 @@ class Robot:
         """
         if unknown := set(fields) - FIELDS.keys():
             raise InvalidArgument(f"fields: {sorted(unknown)}; allowed: {', '.join(FIELDS)}")
-        return self._backend.log(fields or tuple(FIELDS))
+        log = self._backend.log(fields or tuple(FIELDS)).view(Log)
+        log.axes = self.axes
+        return log
 
     # -- power
 

@@ -6,6 +6,7 @@ status, the live view and the metrics follow from these tables.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 from typing import Final
@@ -281,7 +282,24 @@ FIELDS: Final = {field.name: field for field in (*SCALAR_FIELDS, *AXIS_FIELDS, *
 """All fields of a row by name, in its order."""
 SCALARS: Final = tuple(field.name for field in SCALAR_FIELDS)
 AXES: Final = tuple(field.name for field in AXIS_FIELDS)
+POSES: Final = tuple(field.name for field in POSE_FIELDS)
 WALL_TIMES: Final = tuple(field.name for field in FIELDS.values() if field.wall)
+
+
+_COORDINATES: Final = ("x", "y", "z", "qw", "qx", "qy", "qz")
+
+
+def column_names(field: str, shape: tuple[int, ...], axes: Sequence[str]) -> list[str]:
+    """Return the names of a field's columns in a flat table; `shape` is that of its values.
+
+    They are `time_s` for a scalar, `tension_N[left]` for each axis, `pose[qw]` for a pose. Numbers
+    from 0 replace names that are missing or not distinct.
+    """
+    if len(shape) == 1:
+        return [field]
+    names = _COORDINATES if field in POSES else axes
+    distinct = len(set(names)) == len(names) == shape[1]
+    return [f"{field}[{name}]" for name in (names if distinct else range(shape[1]))]
 
 
 def cycle_dtype(n: int) -> np.dtype[np.void]:

@@ -42,7 +42,7 @@ def free_rotation(statics: PlatformStatics) -> Iterator[Finding]:
     if degrees[0] > _TIPPED_deg:
         text = (
             f"there the cables would turn the platform by {degrees[0]:.0f} deg, and may tip it on "
-            "its stand; where it turns less, lengths learnt from there are better"
+            "its stand; choose a home where it turns less: cable lengths are measured there"
         )
         yield Finding("platform.home_m", text, impossible=False)
     if degrees.max() > _FAR_TURNED_deg:

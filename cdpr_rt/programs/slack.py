@@ -359,8 +359,8 @@ class SlackTakeUp:
             )
         return (
             f"{self._names[i]} had {1e3 * more_m:.1f} mm more slack than {self._names[j]}, "
-            f"{1e3 * allowed_m:.1f} mm allowed: what turns its winches pulls so light a platform "
-            f"along; {_REMEDY}"
+            f"{1e3 * allowed_m:.1f} mm allowed: the torque that overcomes the friction of the "
+            f"winches also moves this light platform; {_REMEDY}"
         )
 
     def _slack_m(self, position_rad: FloatArray) -> FloatArray:
@@ -417,9 +417,9 @@ class SlackTakeUp:
         turned_deg = math.degrees(turned_m / self._arm_m)
         turned = f", and be turned by up to about {turned_deg:.0f} degrees" if turned_m else ""
         return (
-            "what turns its winches pulls so light a platform along on its stand: by its cables' "
-            f"slack it may stand up to about {1e3 * aside_m:.0f} mm from where its lengths say"
-            f"{turned}; {_REMEDY}"
+            "the torque that overcomes the friction of the winches also slides this light platform "
+            f"on its stand: with this slack it may stand up to about {1e3 * aside_m:.0f} mm from "
+            f"the place that the cable lengths give{turned}; {_REMEDY}"
         )
 
     def begin(self, position_rad: FloatArray) -> None:

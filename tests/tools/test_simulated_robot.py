@@ -49,6 +49,10 @@ def test_a_move_ends_at_its_target_and_is_in_the_log(robot: cdpr.Robot) -> None:
     assert log["pose"][-1] == pytest.approx(robot.pose)
     assert log["tension_N"].shape == (log.size, 3)
     assert np.diff(log["cycle"]).max() == 1
+    table = log[-10:].to_pandas()
+    assert table["tension_N[upper left]"].tolist() == log["tension_N"][-10:, 0].tolist()
+    assert table["pose[qz]"].iloc[-1] == log["pose"][-1, 6]
+    assert table["time_s"].size == 10
 
 
 def test_relative_moves_add_up(robot: cdpr.Robot) -> None:

@@ -123,8 +123,8 @@ def _daemon(robot: Robot, seconds: float, folder: Path) -> Run:
         while time.monotonic_ns() < begin_ns + 1e9 * seconds:
             next(to_and_fro)
         processor_s, end_ns = _processor_time_s(pid) - begin_s, time.monotonic_ns()
-        rows = handle.log()
-    rows = rows[(rows["stamp_ns"] >= begin_ns) & (rows["stamp_ns"] <= end_ns)]
+        log = handle.log()
+    rows = log[(log["stamp_ns"] >= begin_ns) & (log["stamp_ns"] <= end_ns)]
     return {
         "compute_s": rows["compute_s"],
         "lateness_s": rows["lateness_s"],

@@ -17,7 +17,7 @@ from pyarrow import csv, parquet
 
 from cdpr_profiles.bounded_input import replacing
 from cdpr_rt.arrays import FloatArray
-from cdpr_rt.core.cycle_row import FIELDS
+from cdpr_rt.core.cycle_row import FIELDS, column_names
 from cdpr_rt.service.recording_file import RecordingError
 from cdpr_rt.service.recording_reader import Columns, RecordingReader
 from cdpr_tools.daemon.paths import default_recordings
@@ -205,7 +205,7 @@ def _write(selection: Selection, file: IO[bytes], suffix: str) -> int:
     count, writer = 0, None
     try:
         for columns in selection.rows():
-            table = _table(columns)
+            table = _table(columns, selection.readers[0].axes)
             if writer is None and suffix == ".csv":
                 writer = csv.CSVWriter(file, table.schema)
             elif writer is None:
@@ -227,13 +227,11 @@ def _write(selection: Selection, file: IO[bytes], suffix: str) -> int:
     return count
 
 
-def _table(columns: Columns) -> Any:
-    """Return flat columns, `name[0]` and so on for arrays; unknown values are null."""
+def _table(columns: Columns, axes: Sequence[str]) -> Any:
+    """Return flat columns, `tension_N[left]` and so on for arrays; unknown values are null."""
     flat: dict[str, Any] = {}
-    for name, values in columns.items():
-        if values.ndim == 1:
-            flat[name] = pa.array(values, from_pandas=True)
-        else:
-            for k in range(values.shape[1]):
-                flat[f"{name}[{k}]"] = pa.array(values[:, k], from_pandas=True)
+    for field, values in columns.items():
+        parts = values.T if values.ndim == 2 else [values]
+        for name, part in zip(column_names(field, values.shape, axes), parts, strict=True):
+            flat[name] = pa.array(part, from_pandas=True)
     return pa.table(flat)

@@ -91,11 +91,12 @@ def test_exports_are_the_rows_that_were_written(folder: Path, tmp_path: Path) ->
     assert csv.column_names == parquet.column_names
     for table in (csv, parquet):
         assert table["cycle"].to_pylist() == rows["cycle"].tolist()
-        for k in (0, 1):
-            read = table[f"position_rad[{k}]"].to_numpy()
+        assert {"pose[x]", "pose[qz]"} <= set(table.column_names)
+        for k, axis in enumerate(("left", "right")):
+            read = table[f"position_rad[{axis}]"].to_numpy()
             assert np.abs(read - rows["position_rad"][:, k]).max() < 1e-9
-            assert table[f"cable_length_m[{k}]"].null_count == rows.size
-            assert table[f"valid[{k}]"].to_pylist() == rows["valid"][:, k].tolist()
+            assert table[f"cable_length_m[{axis}]"].null_count == rows.size
+            assert table[f"valid[{axis}]"].to_pylist() == rows["valid"][:, k].tolist()
     stored = pyarrow.parquet.read_metadata(tmp_path / "all.parquet").metadata
     assert json.loads(stored[b"description"])["robot"] == "bench"
     assert not list(tmp_path.glob("*.part"))
@@ -123,7 +124,7 @@ def test_export_of_some_fields_and_a_stretch(folder: Path, tmp_path: Path) -> No
     arguments = ("--fields", "cycle,tension_N", "--from", "1.9995", "--until", "2.1")
     _done("export", folder, "--out", target, *arguments)
     table = pyarrow.csv.read_csv(target)
-    assert table.column_names == ["elapsed_s", "cycle", "tension_N[0]", "tension_N[1]"]
+    assert table.column_names == ["elapsed_s", "cycle", "tension_N[left]", "tension_N[right]"]
     assert table["cycle"].to_pylist() == list(range(2000, 2101))
     assert np.allclose(table["elapsed_s"].to_numpy(), np.arange(2000, 2101) * 1e-3)
 
@@ -212,7 +213,7 @@ def test_plot_draws_the_newest_session_and_names_the_picture_after_it(
     assert (told["out"], told["rows"]) == (str(three_sessions / "bench-20260102T000000Z.png"), 3990)
 
 
-def test_curves_are_interrupted_where_nothing_wasrecord() -> None:
+def test_curves_are_interrupted_where_nothing_was_recorded() -> None:
     elapsed = np.array([0.0, 0.1, 0.2, 440.0, 440.1])
     assert recorded_stretches(elapsed) == [(0, 3), (3, 5)]
     assert recorded_stretches(elapsed[:3]) == [(0, 3)]

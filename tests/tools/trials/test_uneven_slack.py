@@ -177,7 +177,7 @@ def test_a_platform_too_light_for_its_winches_is_told_to_have_moved(tmp_path: Pa
     with LockstepRobot("planar-4", plant=file) as robot:
         robot.enable()
         with pytest.raises(
-            WorkFailedError, match=r"mm more slack than .* pulls so light a platform"
+            WorkFailedError, match=r"mm more slack than .* moves this light platform"
         ):
             robot.carry_out("tighten", 60.0)
 
