@@ -22,7 +22,7 @@ from cdpr_rt.errors import ControlError
 from cdpr_rt.identification.result import HarmonicResult
 from cdpr_rt.identification.thesis import ThesisResult
 
-CompensationMethod = Literal["thesis", "better"]
+CompensationMethod = Literal["thesis", "harmonic"]
 
 _MOST_SAMPLES = 1 << 16
 _LONGEST_s = 0.5
@@ -142,8 +142,7 @@ class CoggingProfile(_Part):
     repaired_fraction: _Share
     coverage: _Share
     thesis: StoredMethod
-    harmonic: StoredMethod = Field(alias="better")
-    """Of the harmonic model; its key is `better`, both in the file and for this class."""
+    harmonic: StoredMethod
 
     def save(self, path: Path) -> None:
         """Write the profile atomically; it replaces a file of that name."""
@@ -160,7 +159,7 @@ class CoggingProfile(_Part):
             profile = read_json_model(path, cls)
         except ProfileError as error:
             raise CoggingProfileError(str(error)) from None
-        for name, method in (("thesis", profile.thesis), ("better", profile.harmonic)):
+        for name, method in (("thesis", profile.thesis), ("harmonic", profile.harmonic)):
             forward, backward = method.table_Nm
             if len(forward) != len(backward):
                 raise CoggingProfileError(
@@ -184,7 +183,7 @@ class CoggingProfile(_Part):
         yield from bounds.inertia("inertia_kg_m2", self.inertia_kg_m2)
         total = math.fsum(abs(harmonic.amplitude_Nm) for harmonic in self.harmonics)
         yield from bounds.compensation("harmonics: sum of amplitude_Nm", total)
-        for name, method in (("better", self.harmonic), ("thesis", self.thesis)):
+        for name, method in (("harmonic", self.harmonic), ("thesis", self.thesis)):
             for key, problem in method.faults(bounds):
                 yield f"{name}.{key}", problem
 

@@ -36,7 +36,7 @@ from cdpr_rt.procedures.measurement import Recording, recording
 
 # Judges recorded validation runs, on the encoder or on an angle that is known better.
 
-METHODS = ("none", "thesis", "better")
+METHODS = ("none", "thesis", "harmonic")
 """Compensations that are compared: without, the thesis' and the harmonic model."""
 
 FIGURES = ("rms_position_error_deg", "peak_pid_effort_Nm", "peak_velocity_error_deg_s")
@@ -202,7 +202,7 @@ def store_profile(winch: Winch, identity: DriveIdentity, found: Identified, path
         repaired_fraction=found.thesis.repaired_fraction,
         coverage=harmonic.coverage,
         thesis=stored_thesis(found.thesis),
-        better=stored_harmonic_model(harmonic),
+        harmonic=stored_harmonic_model(harmonic),
     ).save(paths.profile)
 
 
@@ -213,7 +213,7 @@ def validation_name(method: str, bandwidth_Hz: float) -> str:
 
 TARGETS = {
     "thesis": {"rms_position_error": 3.0, "peak_pid_effort": 6.0, "peak_velocity_error": 5.0},
-    "better": {"rms_position_error": 10.0, "peak_pid_effort": 10.0, "peak_velocity_error": 8.0},
+    "harmonic": {"rms_position_error": 10.0, "peak_pid_effort": 10.0, "peak_velocity_error": 8.0},
 }
 """Times smaller than without compensation: what the thesis reached, and what is aimed at here."""
 

@@ -102,7 +102,7 @@ def load_profiles(robot: Robot, limits: Limits | None = None) -> CoggingProfiles
     if len(lengths) > 1:
         paths = " and ".join(f"{robot.axes[i].commissioned}" for i in lengths.values())
         raise ConfigurationError(
-            f"{paths}: better.table_Nm of {' and '.join(map(str, lengths))} values; allowed: as "
+            f"{paths}: harmonic.table_Nm of {' and '.join(map(str, lengths))} values; allowed: as "
             "many for every axis"
         )
     return found
@@ -169,6 +169,6 @@ def check_drive_identities(
         if profile is None:
             continue
         try:
-            profile.compensation("better", identity_of(report), bounds[i])
+            profile.compensation("harmonic", identity_of(report), bounds[i])
         except CoggingProfileError as error:
             raise CoggingProfileError(f"axis {axis.name}: {axis.commissioned}: {error}") from error

@@ -63,7 +63,7 @@ def test_default_plant_reaches_the_figures(default: tuple[Path, dict[str, Any]])
     _, result = default
     validation = result["validation"]
     assert validation["judged_on"] == "true angle"
-    harmonic, thesis = validation["better"]["ratios"], validation["thesis"]["ratios"]
+    harmonic, thesis = validation["harmonic"]["ratios"], validation["thesis"]["ratios"]
     assert harmonic["rms_position_error"] >= 10
     assert harmonic["peak_pid_effort"] >= 10
     assert harmonic["peak_velocity_error"] >= 8
@@ -101,7 +101,7 @@ def test_profile_serves_another_day_in_other_cycles(
     arguments = ("cogging", "validate", slower, profile, "--bus", "simbus:", "--json")
     result = last_line(cdpr(*arguments, "--out", tmp_path / "later"))
     validation = result["validation"]
-    assert validation["better"]["ratios"]["rms_position_error"] >= 10
+    assert validation["harmonic"]["ratios"]["rms_position_error"] >= 10
 
 
 def test_a_raw_file_cut_short_is_said_so(
@@ -121,7 +121,7 @@ def test_a_raw_file_cut_short_is_said_so(
 def test_a_motor_that_runs_away_under_the_usual_gain(slower: Path, tmp_path: Path) -> None:
     plant = PLANTS / "runaway.toml"
     result = commission(tmp_path, "--plant", plant, "--quick", winch=slower)
-    ratios = result["validation"]["better"]["ratios"]
+    ratios = result["validation"]["harmonic"]["ratios"]
     assert ratios["rms_position_error"] > 3
     assert ratios["peak_pid_effort"] > 3
 
@@ -151,6 +151,6 @@ def test_an_odd_motor_of_a_robot_is_compensated(tmp_path: Path) -> None:
     assert (Path(told["commissioned"]) / "upper-right" / "cogging-profile.json").is_file()
     result = told["axes"]["upper right"]
     assert set(result["identification"]["orders"]) >= {4, 24}
-    ratios = result["validation"]["better"]["ratios"]
+    ratios = result["validation"]["harmonic"]["ratios"]
     assert ratios["rms_position_error"] > 3
     assert ratios["peak_pid_effort"] > 3

@@ -70,7 +70,7 @@ def profile_of(winch: Winch, plant: Plant, serial: int) -> CoggingProfile:
         repaired_fraction=0.0,
         coverage=1.0,
         thesis=method,
-        better=method,
+        harmonic=method,
     )
 
 

@@ -35,25 +35,25 @@ def test_no_daemon_starts_with_a_cogging_profile_that_would_run_its_motors_away(
 ) -> None:
     path = learnt / "lower" / "cogging-profile.json"
     table = json.loads(path.read_text())
-    table["better"]["table_Nm"][0][7] = 1e6
+    table["harmonic"]["table_Nm"][0][7] = 1e6
     path.write_text(json.dumps(table))
     told = said(cdpr_here("run", "planar-3", "--bus", "simbus:", "--commissioned", learnt))
-    assert f"axis lower: {path}: better.table_Nm[0]: value 1e+06; allowed: -0.75 to 0.75" in told
+    assert f"axis lower: {path}: harmonic.table_Nm[0]: value 1e+06; allowed: -0.75 to 0.75" in told
     out = learnt / "out"
     told = said(
         cdpr_here("cogging", "validate", "winch-mpp0923d", path, "--bus", "simbus:", "--out", out)
     )
-    assert f"{path}: better.table_Nm[0]: value 1e+06" in told
+    assert f"{path}: harmonic.table_Nm[0]: value 1e+06" in told
     assert not out.exists()
 
 
 def test_cogging_profiles_of_tables_that_differ_in_length_are_refused(learnt: Path) -> None:
     path = learnt / "lower" / "cogging-profile.json"
     table = json.loads(path.read_text())
-    table["better"]["table_Nm"] = [row[::2] for row in table["better"]["table_Nm"]]
+    table["harmonic"]["table_Nm"] = [row[::2] for row in table["harmonic"]["table_Nm"]]
     path.write_text(json.dumps(table))
     told = said(cdpr_here("run", "planar-3", "--bus", "simbus:", "--commissioned", learnt))
-    assert "better.table_Nm of 512 and 256 values; allowed: as many for every axis" in told
+    assert "harmonic.table_Nm of 512 and 256 values; allowed: as many for every axis" in told
 
 
 def make_deep(path: Path) -> None:

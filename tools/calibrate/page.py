@@ -127,7 +127,7 @@ def _held_out(
     size_m = float(f"{typical_m:.0e}")
     arrows = ax.quiver(
         places_m[:, i], places_m[:, j], errors.position_m[:, i], errors.position_m[:, j],
-        color=COLOURS["better"], angles="xy", scale_units="xy", scale=size_m / _ARROW_m, zorder=3,
+        color=COLOURS["harmonic"], angles="xy", scale_units="xy", scale=size_m / _ARROW_m, zorder=3,
         width=0.008,
     )  # fmt: skip
     tips = places_m + errors.position_m * (_ARROW_m / size_m)
@@ -149,7 +149,7 @@ def held_out_figure(comparison: TruthComparison) -> Figure:
     ):  # fmt: skip
         for errors, label, colour, shift in (
             (before, "by the robot's file", COLOURS["none"], -0.2),
-            (after, "calibrated", COLOURS["better"], 0.2),
+            (after, "calibrated", COLOURS["harmonic"], 0.2),
         ):
             size = scale * np.linalg.norm(getattr(errors, key), axis=1)
             ax.bar(numbers + shift, size, 0.4, color=colour, label=label if ax is axes[0] else None)

@@ -43,10 +43,8 @@ def follow(
             out.note(f"{file.name}: {notice}")
         duration_s, lasts = 0.0, True
         while lasts:
-            out.say(
-                f"{file.name}: {planned['length_m']:.3f} m in {time_text(planned['duration_s'])}, "
-                f"{planned['gain']:.1f} times as fast as at one speed throughout"
-            )
+            lasts_text = time_text(planned["duration_s"])
+            out.say(f"{file.name}: {planned['length_m']:.3f} m in {lasts_text}")
             arguments = {"plan": planned["plan"]} | _feed(feed)
             duration_s += planned["duration_s"]
             line = planned.get("next_line")

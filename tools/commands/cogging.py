@@ -192,7 +192,7 @@ def validate(
         open_winch(winch.profile, winch.url, out, winch.plant, paths.truth) as session,
     ):
         try:  # before the motor moves
-            learnt.compensation("better", session.drive_identity, bounds)
+            learnt.compensation("harmonic", session.drive_identity, bounds)
         except CoggingProfileError as error:
             raise BadInputError(f"{cogging_profile}: {error}") from error
         plan = Plan(bandwidths_Hz=())

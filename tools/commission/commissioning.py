@@ -55,7 +55,7 @@ _SPOKEN = {
 _METHODS = {
     "none": "no compensation",
     "thesis": "thesis' method",
-    "better": "harmonic model",
+    "harmonic": "harmonic model",
 }
 
 
@@ -350,7 +350,7 @@ class Commissioning:
         session = self._session
         known: dict[str, AxisCompensation | None] = {
             method: profile.compensation(method, session.drive_identity, self._bounds)
-            for method in ("thesis", "better")
+            for method in ("thesis", "harmonic")
         }
         known["none"] = None
         self._out.note("validating on ramps of 22 deg/s")
@@ -389,7 +389,7 @@ class Commissioning:
     ) -> None:
         """Record the ramps of one bandwidth, method by method."""
         # the model just identified comes first: it no longer fits once the motor warms up
-        for method in ("better", "none", "thesis"):
+        for method in ("harmonic", "none", "thesis"):
             name = validation_name(method, wanted_Hz)
             passes = ramps(both_ways)
             self._measure.track(name, design, known[method], passes, {"method": method})

@@ -90,7 +90,7 @@ def tables(
         measured = decimated(degrees, raw_Nm[side])
         ax.plot(*measured, color=COLOURS["none"], lw=2.2, alpha=0.6, label="measured, averaged")
         ax.plot(degrees, thesis_Nm[side], color=COLOURS["thesis"], label="thesis: filtered")
-        ax.plot(degrees, harmonic_Nm[side], color=COLOURS["better"], label=LABELS["better"])
+        ax.plot(degrees, harmonic_Nm[side], color=COLOURS["harmonic"], label=LABELS["harmonic"])
         low, high = ax.get_ylim()
         ax.fill_between(
             degrees, low, high, where=repaired[side], color=REPAIRED, alpha=0.35, lw=0,
@@ -117,7 +117,7 @@ def spectrum(
     places = np.arange(len(orders))
     left.errorbar(
         places, amplitudes_Nm * 1e3, confidence_Nm * 1e3,
-        fmt="o", ms=4, capsize=4, color=COLOURS["better"], ecolor="black", elinewidth=1,
+        fmt="o", ms=4, capsize=4, color=COLOURS["harmonic"], ecolor="black", elinewidth=1,
     )  # fmt: skip
     if len(orders) and amplitudes_Nm.max() > _WIDE_SPREAD * amplitudes_Nm.min():
         left.set_yscale("log")
@@ -125,7 +125,7 @@ def spectrum(
     elif len(orders):
         left.set_ylim(0.0, 1.15e3 * float((amplitudes_Nm + confidence_Nm).max()))
     left.vlines(
-        places, left.get_ylim()[0], amplitudes_Nm * 1e3, color=COLOURS["better"], lw=5, alpha=0.35
+        places, left.get_ylim()[0], amplitudes_Nm * 1e3, color=COLOURS["harmonic"], lw=5, alpha=0.35
     )
     left.set_xticks(places, [str(order) for order in orders], rotation=60 * (len(orders) > 10))
     left.set_xlim(-0.7, len(orders) - 0.3)
@@ -133,7 +133,7 @@ def spectrum(
     count = np.arange(held_back_Nm.size)
     right.plot(count, held_back_Nm * 1e3, ".-", color=COLOURS["none"], ms=4)
     chosen = min(len(orders), held_back_Nm.size - 1)
-    right.plot(chosen, held_back_Nm[chosen] * 1e3, "o", color=COLOURS["better"], label="chosen")
+    right.plot(chosen, held_back_Nm[chosen] * 1e3, "o", color=COLOURS["harmonic"], label="chosen")
     right.set(xlabel="number of orders", ylabel="error on held-back turns (mNm)", title="Choice")
     right.set_yscale("log")
     _log_labels(right.yaxis)
@@ -172,14 +172,14 @@ def deviations(time_s: FloatArray, curves: Mapping[str, FloatArray], what: Devia
     for method, curve in curves.items():
         x, y = decimated(time_s[: curve.size], curve)
         whole.plot(x, y, color=COLOURS[method], label=LABELS[method], lw=0.9)
-        faint = 1.0 if method == "better" else 0.6
+        faint = 1.0 if method == "harmonic" else 0.6
         near.plot(x, y, color=COLOURS[method], lw=0.7, alpha=faint)
     # with an edge, so that it is visible even if it is thinner than a line
     near.axhspan(
         *(-what.floor, what.floor), color=COLOURS["floor"], alpha=0.35, lw=1.2, zorder=3.0,
         label=f"{what.floor_label}: {what.floor:.1g}",
     )  # fmt: skip
-    limit = 1.6 * max(float(np.abs(curves["better"]).max()), 1.2 * what.floor)
+    limit = 1.6 * max(float(np.abs(curves["harmonic"]).max()), 1.2 * what.floor)
     near.set(ylim=(-limit, limit), xlabel="time (s)", title="the same, enlarged")
     whole.set_xlim(0.0, time_s[-1])
     figure.supylabel(what.label, fontsize=9.5)
@@ -203,11 +203,11 @@ def bandwidths(
         ("peak_velocity_error", "_deg_s", "peak velocity\nerror (deg/s)"),
     )
     for (key, unit, label), left, gained in zip(quantities, axes[::2], axes[1::2], strict=True):
-        for method in ("none", "thesis", "better", "floor"):
+        for method in ("none", "thesis", "harmonic", "floor"):
             y = [row[method][key + unit] for row in rows]
             style = "--" if method == "floor" else "o-"
             left.plot(x, y, style, color=COLOURS[method], label=LABELS[method], ms=3.5)
-        for method in ("thesis", "better"):
+        for method in ("thesis", "harmonic"):
             y = [row[method]["ratios"][key] for row in rows]
             known = [np.nan if one is None else one for one in y]
             gained.plot(x, known, "o-", color=COLOURS[method], ms=3.5)
@@ -243,7 +243,7 @@ def residual_effort(left: ResidualEffort, orders: Sequence[int]) -> str:
     top.set(xlabel="angle from the index (deg)", ylabel="PID effort (mNm)")
     _over_turn(top)
     for order in orders:
-        bottom.axvline(order, color=COLOURS["better"], lw=5, alpha=0.18)
+        bottom.axvline(order, color=COLOURS["harmonic"], lw=5, alpha=0.18)
     bottom.set(xlabel="order (periods a turn)", ylabel="amplitude (mNm)", xlim=(0, count[-1]))
     bottom.set_ylim(bottom=0.0)
     legend_above(figure, top)

@@ -59,7 +59,7 @@ def build(paths: Paths, winch: Winch, results: dict[str, Any], found: Identified
     truth = Truth(paths.truth) if on_true_angle else None
     passes = {m: _recorded(paths, validation_name(m, results["bandwidth_Hz"])) for m in METHODS}
     ramps = {method: curves.read_ramp(some[0], truth) for method, some in passes.items()}
-    left = curves.read_residual_effort(passes["better"], _ORDERS_SHOWN)
+    left = curves.read_residual_effort(passes["harmonic"], _ORDERS_SHOWN)
     speed_rad_s = abs(read_raw_log(_recorded(paths, "sweep")[0]).header["speed_rad_s"])
     order = curves.strongest_order(harmonic)
     filtered = [(h.order, curves.filter_gain(h.order)) for h in harmonic.harmonics]
@@ -69,7 +69,7 @@ def build(paths: Paths, winch: Winch, results: dict[str, Any], found: Identified
             for q in _QUANTITIES
             if judged["floor"][q.key] > 0.0
         }
-        for method in ("none", "better")
+        for method in ("none", "harmonic")
     }
     text = rendered(
         "commissioning.html.j2",
@@ -82,7 +82,7 @@ def build(paths: Paths, winch: Winch, results: dict[str, Any], found: Identified
         quantities=_QUANTITIES,
         missed={method: _missed(judged, method) for method in METHODS[1:]},
         on_true_angle=on_true_angle,
-        both_ways=len(passes["better"]) > 1,
+        both_ways=len(passes["harmonic"]) > 1,
         speed_deg_s=math.degrees(speed_rad_s),
         order=order,
         shift_deg=curves.shift_deg(thesis.raw_Nm, order),
@@ -91,7 +91,7 @@ def build(paths: Paths, winch: Winch, results: dict[str, Any], found: Identified
         deg_per_rad=math.degrees(1.0),
         ramps=ramps,
         above_floor=above_floor,
-        near_floor=[name for name, n in above_floor["better"].items() if n <= _NEAR_FLOOR],
+        near_floor=[name for name, n in above_floor["harmonic"].items() if n <= _NEAR_FLOOR],
         table_errors=curves.table_errors(thesis, harmonic),
         flattened=[(order, gain) for order, gain in filtered if gain < _FLAT],
         left=left,

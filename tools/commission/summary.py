@@ -9,7 +9,7 @@ from rich.table import Table
 from cdpr_rt.procedures.commissioning_results import METHODS
 from cdpr_tools.output import Output
 
-_NAMES = {"none": "no compensation", "thesis": "thesis' method", "better": "harmonic model"}
+_NAMES = {"none": "no compensation", "thesis": "thesis' method", "harmonic": "harmonic model"}
 
 
 def show(out: Output, results: dict[str, Any]) -> None:
@@ -45,8 +45,9 @@ def show_identified(out: Output, found: dict[str, Any]) -> None:
         f"friction {1e3 * found['coulomb_forward_Nm']:.1f} / "
         f"{1e3 * found['coulomb_backward_Nm']:.1f} mNm forward / backward, "
         f"inertia {found['inertia_kg_m2']:.3e} kg m2, "
-        f"unexplained {1e3 * found['residual_rms_Nm']:.2f} mNm RMS, "
-        f"{100 * found['repaired_fraction']:.1f} % of the thesis' curves repaired"
+        f"unexplained {1e3 * found['residual_rms_Nm']:.2f} mNm RMS",
+        "thesis' method: the rotor ran away, and the other direction was used, at "
+        f"{100 * found['repaired_fraction']:.1f} % of the angles",
     )
 
 
@@ -80,7 +81,7 @@ def _show_loop(out: Output, design: dict[str, Any]) -> None:
 
 
 def _show_shortfall(out: Output, validation: dict[str, Any]) -> None:
-    for method in ("thesis", "better"):
+    for method in ("thesis", "harmonic"):
         ratios, targets = validation[method]["ratios"], validation["targets"][method]
         missed = [
             f"{key.replace('_', ' ')} {ratios[key]:.1f} of {targets[key]:g}"

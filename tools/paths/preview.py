@@ -152,7 +152,7 @@ def lines(shown: Preview, robot: Robot, table: dict[str, Any]) -> list[str]:
             f"duration {time_text(table['duration_s'])}, fastest "
             f"{1e3 * table['top_speed_m_s']:.0f} mm/s",
             f"farthest from the file's lines and arcs: {1e3 * table['deviation_m']:.4f} mm",
-            f"at one speed and acceleration that all of it bears: "
+            "with the same limits of speed and acceleration along the whole path: "
             f"{time_text(table['constant_limit_s'])}, {table['gain']:.1f} times as long",
         ]
     if table.get("slowed_moves"):

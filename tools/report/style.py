@@ -18,11 +18,11 @@ from matplotlib.patches import Rectangle
 from cdpr_rt.arrays import FloatArray
 from cdpr_tools.report.save import OWN_MARK, save
 
-COLOURS = {"none": "#8a8f98", "thesis": "#2f6fb0", "better": "#d1581a", "floor": "#3b8f5a"}
+COLOURS = {"none": "#8a8f98", "thesis": "#2f6fb0", "harmonic": "#d1581a", "floor": "#3b8f5a"}
 LABELS = {
     "none": "no compensation",
     "thesis": "thesis' method",
-    "better": "harmonic model",
+    "harmonic": "harmonic model",
     "floor": "floor: encoder and torque steps",
 }
 SERIES = (

@@ -314,13 +314,13 @@ def validate(done: Commissioned) -> dict[str, ValidationMetrics]:
     gains = design_pid(done.harmonic.inertia_kg_m2.value, LATENCY, BANDWIDTH).gains
     latency = plant.delay + 1.5 * T + 1 / (2 * math.pi * plant.current_Hz)
     result = {}
-    for name in ("better", "oracle", "none", "thesis"):
+    for name in ("harmonic", "oracle", "none", "thesis"):
         runs = []
         for v in (RAMP_SPEED, -RAMP_SPEED):
             known = {
                 "none": lambda: None,
                 "thesis": lambda: AxisCompensation(done.thesis.tables(4096), most_Nm=10.0),
-                "better": lambda: compensation(done.harmonic),
+                "harmonic": lambda: compensation(done.harmonic),
                 "oracle": lambda: bench.oracle(latency, OBSERVER),
             }[name]()
             run, rec = bench.ramp(v, 1, lead=0.3, gains=gains, comp=known)

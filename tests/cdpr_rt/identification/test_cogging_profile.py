@@ -61,7 +61,7 @@ def profile() -> CoggingProfile:
         repaired_fraction=0.0,
         coverage=1.0,
         thesis=method,
-        better=method,
+        harmonic=method,
     )
 
 
@@ -70,12 +70,10 @@ def test_round_trip(tmp_path):
     profile().save(path)
     assert CoggingProfile.load(path) == profile()
     assert [p.name for p in tmp_path.iterdir()] == ["p.json"]
-    stored = json.loads(path.read_text())
-    assert "better" in stored and "harmonic" not in stored
 
 
 def test_compensation_is_what_was_stored():
-    axis = profile().compensation("better", IDENTITY, BOUNDS)
+    axis = profile().compensation("harmonic", IDENTITY, BOUNDS)
     assert axis.table_Nm.shape == (2, 16)
     assert axis.look_ahead_s == 0.002
     assert axis.friction.coulomb_backward_Nm == 0.07
@@ -85,12 +83,12 @@ def test_another_drive_is_refused_by_name():
     for key, mine in IDENTITY.model_dump().items():
         other = IDENTITY.model_copy(update={key: 99})
         with pytest.raises(CoggingProfileError, match=f"{key} = {mine}.*99"):
-            profile().compensation("better", other, BOUNDS)
+            profile().compensation("harmonic", other, BOUNDS)
 
 
 def test_another_motor_is_refused():
     with pytest.raises(CoggingProfileError, match=r"MPP0923D.*MPP1003D"):
-        profile().compensation("better", IDENTITY, MotorBounds(OTHER))
+        profile().compensation("harmonic", IDENTITY, MotorBounds(OTHER))
 
 
 def spoil(change):
@@ -109,10 +107,14 @@ def spoil(change):
             lambda: spoil(lambda d: d.update(inertia_kg_m2=-1.0)),
             "inertia_kg_m2: value -1.0; allowed: greater than 0",
         ),
-        (lambda: spoil(lambda d: d["better"]["table_Nm"][0].pop()), "better.table_Nm"),
+        (lambda: spoil(lambda d: d["harmonic"]["table_Nm"][0].pop()), "harmonic.table_Nm"),
         (
-            lambda: spoil(lambda d: d.update(beter=d.pop("better"))),
-            "beter: unknown key; did you mean 'better'?",
+            lambda: spoil(lambda d: d.update(harmonik=d.pop("harmonic"))),
+            "harmonik: unknown key; did you mean 'harmonic'?",
+        ),
+        (
+            lambda: spoil(lambda d: d.update(better=d.pop("harmonic"))),
+            "harmonic: this key is required and missing",
         ),
     ],
 )
@@ -130,7 +132,7 @@ def test_a_missing_file_is_refused(tmp_path):
 
 
 def changed(path: str, value: object) -> CoggingProfile:
-    """Return the profile with one value replaced, the place given as `better.friction.x`."""
+    """Return the profile with one value replaced, the place given as `harmonic.friction.x`."""
     data = json.loads(profile().model_dump_json(by_alias=True))
     here, *keys, last = data, *path.split(".")
     for key in keys:
@@ -142,23 +144,27 @@ def changed(path: str, value: object) -> CoggingProfile:
 @pytest.mark.parametrize(
     ("key", "value", "message"),
     [
-        ("better.table_Nm.0.3", 1e6, "better.table_Nm[0]: value 1e+06; allowed: -0.75 to 0.75 Nm"),
-        ("thesis.table_Nm.1.0", -0.76, "thesis.table_Nm[1]: value 0.76; allowed: -0.75 to 0.75"),
-        ("better.friction.coulomb_forward_Nm", 0.7, "better.table_Nm and friction together"),
-        ("better.friction.stribeck_backward_Nm", -2.0, "better.friction: value 2.07"),
         (
-            "better.table_Nm",
+            "harmonic.table_Nm.0.3",
+            1e6,
+            "harmonic.table_Nm[0]: value 1e+06; allowed: -0.75 to 0.75 Nm",
+        ),
+        ("thesis.table_Nm.1.0", -0.76, "thesis.table_Nm[1]: value 0.76; allowed: -0.75 to 0.75"),
+        ("harmonic.friction.coulomb_forward_Nm", 0.7, "harmonic.table_Nm and friction together"),
+        ("harmonic.friction.stribeck_backward_Nm", -2.0, "harmonic.friction: value 2.07"),
+        (
+            "harmonic.table_Nm",
             [[0.5] * 16, [0.5] * 16],
-            "better.mean of table_Nm and friction over both directions: value 0.505; "
+            "harmonic.mean of table_Nm and friction over both directions: value 0.505; "
             "allowed: -0.06 to 0.06 Nm, 2 % of the rated torque of MPP0923D",
         ),
-        ("better.friction.coulomb_backward_Nm", -0.07, "better.mean of table_Nm and friction"),
+        ("harmonic.friction.coulomb_backward_Nm", -0.07, "harmonic.mean of table_Nm and friction"),
         (
-            "better.friction.viscous_Nms_rad",
+            "harmonic.friction.viscous_Nms_rad",
             0.0012,
-            "better.friction.viscous_Nms_rad: value 0.0012; allowed: -0.001158 to 0.001158",
+            "harmonic.friction.viscous_Nms_rad: value 0.0012; allowed: -0.001158 to 0.001158",
         ),
-        ("better.friction.stribeck_speed_rad_s", 1e-9, "better.friction.stribeck_speed_rad_s"),
+        ("harmonic.friction.stribeck_speed_rad_s", 1e-9, "harmonic.friction.stribeck_speed_rad_s"),
         ("harmonics.0.amplitude_Nm", -0.8, "harmonics: sum of amplitude_Nm: value 0.8"),
         ("inertia_kg_m2", 1e-9, "inertia_kg_m2: value 1e-09; allowed: 5.65e-05 to 0.00565 kg m2"),
     ],
@@ -167,7 +173,7 @@ def test_what_no_such_motor_can_have_is_refused(key: str, value: object, message
     spoilt = changed(key, value)
     for use in (
         lambda: spoilt.require_true_of(BOUNDS),
-        lambda: spoilt.compensation("better", IDENTITY, BOUNDS),
+        lambda: spoilt.compensation("harmonic", IDENTITY, BOUNDS),
     ):
         with pytest.raises(CoggingProfileError, match=re.escape(message)):
             use()
@@ -182,7 +188,7 @@ def test_an_axis_that_may_use_little_torque_allows_little_compensation() -> None
     profile().require_true_of(BOUNDS)
     with pytest.raises(CoggingProfileError, match=r"allowed: -0.1 to 0.1 Nm, the axis' torque"):
         profile().require_true_of(MotorBounds(MOTOR, 0.1))
-    assert profile().compensation("better", IDENTITY, BOUNDS).most_Nm == 0.75
+    assert profile().compensation("harmonic", IDENTITY, BOUNDS).most_Nm == 0.75
 
 
 @pytest.mark.parametrize("key", ["look_ahead_s", "observer_s"])

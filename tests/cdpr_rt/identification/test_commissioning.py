@@ -26,7 +26,7 @@ def true_amplitude(bench: Bench, amplitude: float) -> float:
 
 def assert_near_oracle(figures):
     for name in FIGURES:
-        reached, ideal = getattr(figures["better"], name), getattr(figures["oracle"], name)
+        reached, ideal = getattr(figures["harmonic"], name), getattr(figures["oracle"], name)
         assert reached <= 1.5 * ideal, (name, reached, ideal)
 
 
@@ -55,7 +55,7 @@ def test_default_motor_is_identified(default):
 def test_default_motor_runs_smoothly(default):
     figures = validate(default)
     thesis = ratios(figures["none"], figures["thesis"])
-    harmonic = ratios(figures["none"], figures["better"])
+    harmonic = ratios(figures["none"], figures["harmonic"])
     assert thesis.rms_position_error >= 3
     assert thesis.peak_pid_effort >= 6
     assert thesis.peak_velocity_error >= 5

@@ -26,8 +26,8 @@ INDEX_rad = 0.7
 SYNC_OFFSET = 40
 AMPLITUDES_Nm = {4: 0.05, 24: 0.02}
 COULOMB_Nm = 0.08
-ERROR_deg = {"none": 4.0, "thesis": 0.9, "better": 0.2}
-EFFORT_Nm = {"none": 0.08, "thesis": 0.01, "better": 0.004}
+ERROR_deg = {"none": 4.0, "thesis": 0.9, "harmonic": 0.2}
+EFFORT_Nm = {"none": 0.08, "thesis": 0.01, "harmonic": 0.004}
 ERROR_ORDER = 4
 LATENCY_s = 2.8e-3
 
@@ -152,7 +152,7 @@ def make_up(out: Path, both_ways: bool, bandwidths_Hz: tuple[float, ...]) -> Com
         made.record(f"sweep-{number}", slow, np.zeros_like, np.zeros_like)
     for bandwidth in bandwidths_Hz:
         softer = 8.0 / bandwidth
-        for method in ("none", "thesis", "better"):
+        for method in ("none", "thesis", "harmonic"):
             error, effort = (
                 (lambda x, a=a * softer: a * np.sin(ERROR_ORDER * x))
                 for a in (math.radians(ERROR_deg[method]), EFFORT_Nm[method])

@@ -114,7 +114,7 @@ def test_table_holds_the_figures_of_the_json(commissioned: Commissioned, page: P
     for key in FIGURES:
         ratio = key.rsplit("_deg", 1)[0].removesuffix("_Nm")
         wanted += [stored["none"][key]]
-        for method in ("thesis", "better"):
+        for method in ("thesis", "harmonic"):
             wanted += [stored[method][key], stored[method]["ratios"][ratio]]
         wanted += [stored["floor"][key]]
     assert page.tables[0] == wanted
@@ -122,15 +122,15 @@ def test_table_holds_the_figures_of_the_json(commissioned: Commissioned, page: P
         assert f">{number(value)}</data>" in page.text
     # and the figures are those the recordings were made with
     assert wanted[0] == pytest.approx(4.0 / math.sqrt(2.0), rel=1e-3)
-    assert stored["better"]["ratios"]["rms_position_error"] == pytest.approx(20.0, rel=0.01)
+    assert stored["harmonic"]["ratios"]["rms_position_error"] == pytest.approx(20.0, rel=0.01)
     assert stored["thesis"]["ratios"]["peak_pid_effort"] == pytest.approx(8.0, rel=0.01)
 
 
 def test_encoder_table_differs_from_the_true_one(results: dict[str, Any], page: Page) -> None:
     judged = results["validation"]["encoder"]
     table = next(one for one in page.tables[1:] if judged["none"][FIGURES[0]] in one)
-    assert judged["better"][FIGURES[2]] in table
-    assert judged["better"][FIGURES[2]] != results["validation"]["better"][FIGURES[2]]
+    assert judged["harmonic"][FIGURES[2]] in table
+    assert judged["harmonic"][FIGURES[2]] != results["validation"]["harmonic"][FIGURES[2]]
 
 
 def test_harmonics_and_margins_are_told(results: dict[str, Any], page: Page) -> None:
@@ -150,7 +150,7 @@ def test_verdict_follows_the_targets(
 ) -> None:
     paths = copy_of(commissioned, tmp_path)
     harder = copy.deepcopy(results)
-    harder["validation"]["targets"]["better"]["peak_pid_effort"] = 21.0
+    harder["validation"]["targets"]["harmonic"]["peak_pid_effort"] = 21.0
     harder["validation"]["targets"]["thesis"]["rms_position_error"] = 99.0
     build(paths, winch, harder, commissioned.found)
     told = Page(paths.page)
@@ -203,7 +203,7 @@ def copy_of(made: Commissioned, folder: Path) -> Paths:
     [
         (("pid",), "no pid"),
         (("identification", "hints"), "no identification.hints"),
-        (("validation", "better", "ratios"), "no validation.better.ratios"),
+        (("validation", "harmonic", "ratios"), "no validation.harmonic.ratios"),
         (("validation", "floor", "peak_pid_effort_Nm"), "no validation.floor.peak_pid_effort_Nm"),
     ],
 )
