@@ -30,7 +30,7 @@ def told(folder: Path, *words: str) -> list[str]:
     return done.stdout.split()
 
 
-def test_a_controllers_kernel_is_compiled_anew_when_its_callee_has_changed(tmp_path: Path) -> None:
+def test_a_controllers_kernel_is_compiled_again_when_its_callee_has_changed(tmp_path: Path) -> None:
     (tmp_path / "caller.py").write_text(CALLER)
     callee = tmp_path / "kernels_callee.py"
     callee.write_text(CALLEE.format(added=1.0))

@@ -77,7 +77,7 @@ def test_every_code_is_among_these() -> None:
 
 
 @pytest.mark.parametrize(("refusal", "text"), REFUSALS)
-def test_it_is_told_in_words_and_survives_json(refusal: CommandRefusal, text: str) -> None:
+def test_it_is_reported_as_text_and_survives_json(refusal: CommandRefusal, text: str) -> None:
     assert str(refusal) == str(ControlError(refusal)) == text
     assert CommandRefusal.from_json(json.loads(json.dumps(refusal.as_json()))) == refusal
 
@@ -123,5 +123,5 @@ def test_an_error_carries_it_and_one_of_words_none() -> None:
         {"code": "bad_source", "command": "tighten", "arguments": {"why": "x", "allowed": None}},
     ],
 )
-def test_what_is_not_one_as_it_is_known_here_is_none(value: Any) -> None:
+def test_an_unknown_refusal_reads_as_none(value: Any) -> None:
     assert CommandRefusal.from_json(value) is None

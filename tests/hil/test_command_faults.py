@@ -203,7 +203,7 @@ def test_another_drive_than_the_profile_says(
     assert lab.state() == OFF
 
 
-def test_a_node_in_fault_is_told_in_words(lab: Lab) -> None:
+def test_a_node_in_fault_is_reported_as_text(lab: Lab) -> None:
     lab.inject_fault(1, 0x3210)
     told = fails("drive", "enable", WINCH, "--bus", lab.bus)
     assert "node 1" in told

@@ -149,7 +149,7 @@ def test_a_drive_that_does_not_answer_is_not_called_stopped(
 
 
 @paced
-def test_a_drive_that_does_not_confirm_at_the_end_is_told_once(tmp_path: Path) -> None:
+def test_a_drive_that_does_not_confirm_at_the_end_is_reported_once(tmp_path: Path) -> None:
     daemon = slow_daemon(tmp_path)
     try:
         assert cdpr("enable", *daemon.at).returncode == 0

@@ -61,7 +61,7 @@ def test_ctrl_c_stops_the_motor_and_takes_the_power(daemon: RealDaemon, tmp_path
 @pytest.mark.parametrize(
     ("axis", "text"), [("middle", "allowed: left, right"), ("left", "records nothing")]
 )
-def test_what_cannot_be_swept_is_told_before_anything_has_power(
+def test_what_cannot_be_swept_is_reported_before_anything_has_power(
     daemon: RealDaemon, tmp_path: Path, axis: str, text: str
 ) -> None:
     if axis == "left":

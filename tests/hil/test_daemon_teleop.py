@@ -185,7 +185,7 @@ def test_who_is_killed_in_mid_motion_is_braked(daemon: RealDaemon) -> None:
     assert np.linalg.norm(place(daemon) - killed) < 0.1
 
 
-def test_what_cannot_be_led_is_told(
+def test_what_cannot_be_led_is_reported(
     daemon: RealDaemon, folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(session_module, "_GREET_S", 0.5)

@@ -172,7 +172,7 @@ def test_a_torque_turns_the_rotor_that_way_with_that_strength(
     assert moved == pytest.approx(now["angle"][0] - true["angle"][0], abs=4 * RAD_PER_COUNT)
 
 
-def test_torques_are_told_and_sent_in_its_own_steps(booted: BootedDrive) -> None:
+def test_torques_are_reported_and_sent_in_its_own_steps(booted: BootedDrive) -> None:
     booted.power()
     device = booted.session.device
     wanted, sent, told = 0.0437, [], []

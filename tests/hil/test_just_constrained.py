@@ -14,7 +14,7 @@ PLOTTER = Path(__file__).parent / "robots" / "plotter.toml"
 
 
 @pytest.mark.parametrize(("axis", "name"), [(0, "c1"), (1, "c2")])
-def test_a_cable_that_is_cut_is_told_as_broken(axis: int, name: str) -> None:
+def test_a_cable_that_is_cut_is_reported_as_broken(axis: int, name: str) -> None:
     """What is left of 25 N is its winch's friction, four times what counts as slack."""
     with LockstepRobot(PLOTTER) as robot:
         robot.enable()
@@ -29,7 +29,7 @@ def test_a_cable_that_is_cut_is_told_as_broken(axis: int, name: str) -> None:
         assert robot.status["reason"].startswith(f"{name}: the cable seems broken")
 
 
-def test_a_cable_that_was_slack_as_lengths_were_looked_for_is_told(tmp_path: Path) -> None:
+def test_a_cable_that_was_slack_as_lengths_were_looked_for_is_reported(tmp_path: Path) -> None:
     """Friction and cogging keep its winch until it is pulled harder; the platform is off by 4 mm.
 
     With the friction that winches usually have, or twice that, it is tight.

@@ -183,7 +183,7 @@ def test_an_open_chain_refuses_before_anything_is_energised(lab: Lab) -> None:
     assert lab.io("show")["chain_ok"] is False
 
 
-def test_a_welded_contactor_is_told_at_the_end(lab: Lab) -> None:
+def test_a_welded_contactor_is_reported_at_the_end(lab: Lab) -> None:
     lab.io_device.break_(SafetyIoFault.CONTACTOR_WELDED)
     assert "is it welded?" in lab.refused_jog(0.1)
     assert not lab.winch.brake_released

@@ -60,13 +60,13 @@ def test_a_guest_that_dies_fails_the_test(request: pytest.FixtureRequest, lines:
     assert "Kernel panic" in str(last.longrepr)
 
 
-def test_a_machine_without_apt_is_told_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+def test_a_machine_without_apt_is_reported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setenv("PATH", str(tmp_path))
     with pytest.raises(NoGuestError, match="no apt-get here to fetch user-mode-linux"):
         vcan_guest.obtain(tmp_path / "guest")
 
 
-def test_a_kernel_that_does_not_start_is_told_so(tmp_path: Path):
+def test_a_kernel_that_does_not_start_is_reported(tmp_path: Path):
     (tmp_path / "run").mkdir()
     (tmp_path / "modules").mkdir()
     kernel = tmp_path / "linux.uml"

@@ -111,7 +111,7 @@ def down() -> Iterator[None]:
     set_link("vcan1", up=True)
 
 
-def test_an_interface_that_is_down_is_told_so(down: None) -> None:
+def test_an_interface_that_is_down_is_reported(down: None) -> None:
     with pytest.raises(BusError, match=r"'vcan1' is down; .* sudo ip link set vcan1 up"):
         open_port(VCAN1)
     with pytest.raises(BusError, match="'lo' is no CAN interface"):

@@ -20,7 +20,7 @@ def _eventually(clock: PacedClock, condition: Callable[[], object]) -> None:
     assert clock.wait(condition, clock.now_s + 5.0)
 
 
-def test_error_passive_is_told_and_bus_off_is_an_alarm_until_it_is_over() -> None:
+def test_error_passive_is_reported_and_bus_off_is_an_alarm_until_it_is_over() -> None:
     clock = PacedClock()
     network = CanNetwork(VCAN0, clock, [1], 127, 0.1)
     wire = open_port(VCAN0, [])

@@ -52,9 +52,7 @@ def test_figures_that_no_motor_has_are_refused(change: dict[str, object], told: 
         ("x = " + "1 " * (1 << 18), "is too long; allowed: up to 262144 bytes"),
     ],
 )
-def test_what_would_keep_a_parser_busy_is_refused_beforehand(
-    tmp_path: Path, text: str, told: str
-) -> None:
+def test_costly_input_is_rejected_before_parsing(tmp_path: Path, text: str, told: str) -> None:
     path = tmp_path / "x.toml"
     path.write_text(text)
     with pytest.raises(ProfileError) as refused:

@@ -88,7 +88,7 @@ def test_writable_objects_that_are_numbers_have_a_default(variables):
             assert v.default is not None, f"{v.index:04X}h:{v.subindex}"
 
 
-def test_what_the_master_must_have_is_there(od):
+def test_each_eds_has_the_objects_the_master_needs(od):
     needed = (0x1017, 0x603F, 0x6040, 0x6041, 0x605A, 0x6007, 0x6060, 0x6061, 0x6064, 0x6071)
     assert not [
         f"{i:04X}h" for i in (*needed, 0x6072, 0x6077, 0x6098, 0x6099, 0x609A) if i not in od

@@ -206,7 +206,7 @@ def test_a_dcf_gives_node_id_bit_rate_and_values(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("encoding", ["utf-8-sig", "utf-16", "cp1252", "latin-1"])
-def test_encodings_are_told_and_read(tmp_path: Path, encoding: str) -> None:
+def test_encodings_are_reported_and_read(tmp_path: Path, encoding: str) -> None:
     text = HEAD + MANDATORY.replace("Device type", "Gerätetyp")
     eds = read_eds(write(tmp_path, text.replace("\n", "\r\n").encode(encoding)))
     assert len(eds.remarks.texts) == 1
@@ -228,7 +228,7 @@ def test_encodings_are_told_and_read(tmp_path: Path, encoding: str) -> None:
         ),
     ],
 )
-def test_what_is_no_data_sheet_is_refused(tmp_path: Path, content: bytes, problem: str) -> None:
+def test_a_file_that_is_no_eds_is_rejected(tmp_path: Path, content: bytes, problem: str) -> None:
     with pytest.raises(ProfileError, match=problem) as told:
         load_dictionary(write(tmp_path, content))
     assert "\n" not in str(told.value)

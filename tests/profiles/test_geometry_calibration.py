@@ -129,7 +129,7 @@ def test_one_of_another_state_of_the_robots_file_is_refused(robot: Robot) -> Non
         ({"drum_scales": (0.51, 1.0, 1.0, 1.0)}, r"drum_scales\[0\]"),
     ],
 )
-def test_what_cannot_be_of_the_robot_is_refused(
+def test_a_calibration_of_another_robot_is_rejected(
     robot: Robot, change: dict[str, object], named: str
 ) -> None:
     wrong = calibration(robot).model_copy(update=change)

@@ -36,7 +36,7 @@ def test_the_shipped_platform_hangs_on_three_cables() -> None:
     assert sides == pytest.approx([0.15] * 6, abs=1e-4)  # the thesis' triangle
 
 
-def test_what_the_file_leaves_out_is_filled_in() -> None:
+def test_missing_keys_get_defaults() -> None:
     platform = load_robot("planar-3").platform
     assert platform is not None
     assert platform.controlled == ("x", "y")  # three cables leave a plane's angle free
@@ -50,7 +50,7 @@ def test_what_the_file_leaves_out_is_filled_in() -> None:
     assert in_space.home_rotation_rad == in_space.centre_of_mass_m == (0.0,) * 3
 
 
-def test_what_the_file_says_arrives(tmp_path: Path) -> None:
+def test_values_of_the_file_are_read(tmp_path: Path) -> None:
     said = (
         "mass_kg = 2.0\ninertia_kg_m2 = 0.01\ncentre_of_mass_m = [0.0, -0.01]\n"
         'home_rotation_rad = 0.1\ncontrolled = ["y", "x"]\ncable_model = "catenary"\n'
@@ -89,7 +89,7 @@ def test_what_the_file_says_arrives(tmp_path: Path) -> None:
         (("tension_min_N = 20.0\n", "\n"), "limits.tension_min_N", "where there is a [platform]"),
     ],
 )
-def test_what_no_platform_can_be_is_refused(
+def test_impossible_platforms_are_rejected(
     tmp_path: Path, replaced: tuple[str, str], key: str, problem: str
 ) -> None:
     changes = [replaced]
@@ -220,7 +220,7 @@ def test_a_stand_may_be_under_the_box_or_in_it(tmp_path: Path) -> None:
         assert platform is not None and platform.home_m == (0.0, y_m)
 
 
-def test_what_was_commissioned_is_found_beside_the_robots_file(tmp_path: Path) -> None:
+def test_commissioning_results_are_found_beside_the_robot_file(tmp_path: Path) -> None:
     (tmp_path / "motors" / "left").mkdir(parents=True)
     name = 'name = "upper left"'
     path = changed(tmp_path, (name, f'{name}\ncommissioned = "motors/left"'))

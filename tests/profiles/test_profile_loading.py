@@ -165,7 +165,7 @@ def test_missing_file_and_folder(tmp_path: Path):
         cdpr_profiles.load_motor(tmp_path)
 
 
-def test_every_fault_of_a_file_is_told(tmp_path: Path):
+def test_every_fault_of_a_file_is_reported(tmp_path: Path):
     source = SHIPPED / "winches" / "winch-mpp0923d.toml"
     table = _read(source) | {"gear_ratio": -4.0, "node_id": 128}
     with pytest.raises(ProfileError) as caught:
@@ -221,7 +221,7 @@ def test_contradictions_within_a_drive(change: dict[str, Any], part: str, tmp_pa
         ),
     ],
 )
-def test_a_fault_within_a_table_is_told_with_its_place(
+def test_a_fault_within_a_table_is_reported_with_its_place(
     file: str, edit: Callable[[Any], object], part: str, tmp_path: Path
 ):
     source = SHIPPED / file

@@ -126,7 +126,7 @@ def test_figures_are_one_for_all_or_one_for_each(tmp_path: Path) -> None:
         ),
     ],
 )
-def test_what_cannot_be_is_refused(
+def test_impossible_limits_are_rejected(
     tmp_path: Path, parts: dict[str, str], key: str, problem: str
 ) -> None:
     with pytest.raises(ProfileError) as caught:

@@ -69,7 +69,7 @@ def test_winches_are_told_what_the_robot_decides(tmp_path: Path):
         ({"top": "sync_periods = 1"}, "sync_periods", "did you mean 'sync_period_s'?"),
     ],
 )
-def test_what_contradicts_itself_is_refused(
+def test_contradictory_profiles_are_rejected(
     tmp_path: Path, changes: dict[str, object], key: str, problem: str
 ):
     path = robot_file(tmp_path, **changes)

@@ -30,7 +30,7 @@ print(outer(1.0, 2), len(inner.signatures))
 """
 
 
-def test_kernels_of_which_nothing_is_kept_are_told_once_and_compiled_once(
+def test_kernels_of_which_nothing_is_kept_are_reported_once_and_compiled_once(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """One machine code serves constants and numbers that are not known beforehand."""
@@ -85,7 +85,7 @@ for _ in range(30):
 """
 
 
-def test_what_is_compiled_for_long_is_told_again_and_again(
+def test_what_is_compiled_for_long_is_reported_again_and_again(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.delenv("CDPR_COMPILING_TOLD", raising=False)

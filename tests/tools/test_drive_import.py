@@ -138,7 +138,7 @@ def test_the_steepest_torque_ramp_is_taken_from_the_limits(tmp_path: Path) -> No
     assert (fact["value"], fact["status"]) == (10_000.0, "manual")
 
 
-def test_flaws_are_told_and_the_copy_is_the_makers(tmp_path: Path) -> None:
+def test_flaws_are_reported_and_the_copy_is_the_makers(tmp_path: Path) -> None:
     path = tmp_path / "odd.eds"
     text = with_key("6077", "AccessType", "readonly", TEXT) + "\n[6041]\nParameterName=Again\n"
     text = text.replace("ProductName=Generic", "ProductName=Gerät")
@@ -284,7 +284,7 @@ def test_what_an_eds_lacks_is_listed_with_its_consequence(tmp_path: Path) -> Non
         ((str(GENERIC.eds), "--name", "a/b"), "--name a/b: allowed"),
     ],
 )
-def test_wrong_arguments_are_told(arguments: tuple[str, ...], problem: str) -> None:
+def test_wrong_arguments_are_reported(arguments: tuple[str, ...], problem: str) -> None:
     status, _, errors = cdpr("import", *arguments)
     assert status == 2
     assert problem in errors

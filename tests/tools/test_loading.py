@@ -44,7 +44,7 @@ def _all_of(terminal: RawIOBase) -> bytes:
             return told
 
 
-def test_what_takes_a_moment_is_told_and_wiped_out() -> None:
+def test_what_takes_a_moment_is_reported_and_wiped_out() -> None:
     assert _told(0.1, 1.0) == "loading ...\r\x1b[Kdone\r\n"
     assert _told(600.0, 0.0) == "done\r\n"
 
@@ -54,7 +54,7 @@ def test_a_line_that_is_another_s_and_a_dumb_terminal_are_left_alone(name: str) 
     assert _told(0.0, 0.5, **{name: "dumb"}) == "done\r\n"
 
 
-def test_a_pipe_is_told_nothing() -> None:
+def test_a_pipe_is_reported_nothing() -> None:
     command = [sys.executable, "-c", SCRIPT, "0.0", "0.5"]
     done = subprocess.run(command, capture_output=True, text=True, check=True)
     assert done.stderr == "done\n"

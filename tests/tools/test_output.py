@@ -29,7 +29,7 @@ def test_no_bar_and_no_blank_line_in_a_pipe() -> None:
     assert errors.getvalue() == ""
 
 
-def test_what_is_done_is_told_in_a_pipe_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_progress_in_a_pipe_names_the_work_immediately(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(output, "_TELL_S", (3600.0, 3600.0))
     errors = io.StringIO()
     with redirect_stderr(errors), Output(as_json=True).stage("winding"):
@@ -37,7 +37,7 @@ def test_what_is_done_is_told_in_a_pipe_at_once(monkeypatch: pytest.MonkeyPatch)
     assert errors.getvalue() == "winding ...\n"
 
 
-def test_what_takes_longer_is_told_in_a_pipe_too(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_long_work_prints_progress_in_a_pipe(monkeypatch: pytest.MonkeyPatch) -> None:
     now_s = 10.0
     monkeypatch.setattr(output, "time", SimpleNamespace(monotonic=lambda: now_s))
     monkeypatch.setattr(output, "_TELL_S", (0.01, 0.01))

@@ -170,7 +170,7 @@ def test_names_and_times_that_are_of_the_run_make_no_difference(tmp_path: Path) 
     }
 
 
-def test_the_first_difference_is_told(tmp_path: Path) -> None:
+def test_the_first_difference_is_reported(tmp_path: Path) -> None:
     runs = made_runs(tmp_path, 1, 2, 3)
     for run in runs:
         last = run.number == 3

@@ -57,7 +57,7 @@ def test_kernels_do_not_load_scipys_linear_algebra_nor_spoil_it() -> None:
 @pytest.mark.parametrize(
     "module", ["bus", "cogging", "commission", "profiles", "groups", "tension"]
 )
-def test_what_commissions_and_simulates_does_without_the_packages_of_the_daemon(
+def test_commissioning_and_simulation_need_no_daemon_packages(
     module: str,
 ) -> None:
     absent = "'fastapi httpx mcap pyarrow starlette uvicorn websockets zstandard'.split()"

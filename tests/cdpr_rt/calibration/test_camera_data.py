@@ -61,7 +61,7 @@ def spoilt(path: Path, change: Any) -> Path:
     return path
 
 
-def test_what_was_seen_is_read_back(tmp_path: Path) -> None:
+def test_camera_readings_survive_a_round_trip(tmp_path: Path) -> None:
     file = tmp_path / "data.json"
     data().save(file)
     there = load_data(file)
@@ -102,7 +102,9 @@ def test_an_id_that_is_listed_twice_counts_as_repeated(tmp_path: Path) -> None:
         (lambda t: t["camera"].update(size_m=0.1), "camera.size_m"),
     ],
 )
-def test_what_no_camera_saw_is_refused_with_its_key(tmp_path: Path, change: Any, told: str) -> None:
+def test_impossible_camera_readings_are_rejected_with_their_key(
+    tmp_path: Path, change: Any, told: str
+) -> None:
     with pytest.raises(ProfileError, match=told):
         load_data(spoilt(tmp_path / "data.json", change))
 

@@ -185,7 +185,7 @@ def test_slipped_encoders_and_bad_markers_are_named_and_survived() -> None:
     assert readings.off_mm(outcome) < 3.0
 
 
-def test_a_wrong_size_of_all_sheets_is_told_by_the_cables() -> None:
+def test_a_wrong_size_of_all_sheets_is_reported_by_the_cables() -> None:
     readings = Readings(_robot(layout=replace(FEW, known=3)))
     readings.wrong_size(1.04)
     outcome = readings.outcome()
@@ -197,7 +197,9 @@ def test_a_wrong_size_of_all_sheets_is_told_by_the_cables() -> None:
 
 
 @pytest.mark.parametrize("drums", [(0.02,) * 8, (0.0, 0.0, 0.03, 0.0, 0.0, 0.0, 0.0, 0.0)])
-def test_sheets_and_drums_that_are_wrong_together_are_told_apart(drums: tuple[float, ...]) -> None:
+def test_sheets_and_drums_that_are_wrong_together_are_distinguished(
+    drums: tuple[float, ...],
+) -> None:
     readings = Readings(_robot())
     readings.wrong_size(1.04)
     for cable, share in enumerate(drums):
@@ -211,7 +213,7 @@ def test_sheets_and_drums_that_are_wrong_together_are_told_apart(drums: tuple[fl
 
 
 @pytest.mark.parametrize(("size", "drum"), [(1.04, 0.0), (1.0, 0.02)])
-def test_a_lens_and_sheets_or_drums_that_are_wrong_together_are_told_apart(
+def test_a_lens_and_sheets_or_drums_that_are_wrong_together_are_distinguished(
     size: float, drum: float
 ) -> None:
     readings = Readings(_robot())

@@ -231,7 +231,7 @@ def test_measured_points_verify_where_three_poses_have_all_of_theirs() -> None:
         assert verifies(replace(seen, position_std_m=std_m)) == enough
 
 
-def test_what_no_pose_held_out_verifies_is_not_taken_over() -> None:
+def test_a_fit_without_held_out_verification_is_not_adopted() -> None:
     what = plain(20)
     blind = [
         replace(one, corners_px={}) if out else one

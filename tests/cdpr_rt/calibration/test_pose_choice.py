@@ -67,7 +67,7 @@ def test_each_pose_that_is_taken_tells_most_beside_those_before() -> None:
         assert one == max(others, key=lambda j: log_det(rows, [*before, j]))
 
 
-def test_what_a_pose_tells_is_the_information_without_the_pose() -> None:
+def test_information_of_a_pose_is_the_difference_without_it() -> None:
     # poses and parameters as unknowns of one problem, from which the poses are taken out
     _, _, model, poses = candidates(3)
     geometry = cable_geometry(model)

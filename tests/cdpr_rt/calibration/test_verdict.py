@@ -89,7 +89,7 @@ def test_without_measured_points_frame_and_scale_are_said_to_be_open() -> None:
     assert not any("together" in text or "scale" in text for text in told)
 
 
-def test_what_no_pose_tells_is_named_with_its_cable() -> None:
+def test_unobservable_parameters_are_named_with_their_cable() -> None:
     what = made_up("spatial-8", 40, 7, noise_m=2e-4)
     seen = measured(what, 1e-3, 2e-3, 4)
     used = seen.used.copy()
@@ -179,7 +179,7 @@ def test_changes_that_noise_explains_are_not_significant(robot: str) -> None:
     assert outcome.told_from_file and outcome.insignificance() is None
 
 
-def test_what_tells_unused_poses_worse_is_not_taken_over_only_because_it_is_asked_for() -> None:
+def test_a_calibration_that_predicts_held_out_poses_worse_is_not_adopted_on_request() -> None:
     right = made_up(
         *("planar-3", 45, 1), exit_m=0.0, drum=0.0, elongation=0.0, offset_m=0.0, noise_m=3e-4,
         home_first=True,
@@ -268,7 +268,7 @@ def test_a_cable_is_called_as_its_axis_is_or_by_its_number(tmp_path: Path) -> No
     assert geometry.cables_text(1, (0, 2)) == "cable 2 (or c1, cable 3)"
 
 
-def test_a_slack_cable_is_told_with_the_name(tmp_path: Path) -> None:
+def test_a_slack_cable_is_reported_with_the_name(tmp_path: Path) -> None:
     what = made_up(str(named(tmp_path)), 20, 3, noise_m=2e-4)
     seen = measured(what, 1e-3, 2e-3, 4)
     seen.tension_N[4, 0] = 0.5
@@ -289,7 +289,7 @@ def test_it_is_what_a_fit_comes_to_that_has_every_pose_twice() -> None:
     assert (told < found.std).all()
 
 
-def test_what_nothing_tells_stays_as_it_was_known() -> None:
+def test_unobservable_parameters_keep_their_prior() -> None:
     what = made_up("spatial-8", 30, 3)
     found = fit(what.file, what.seen)
     before = what.file.known_std() ** 2

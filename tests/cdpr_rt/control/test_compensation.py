@@ -58,7 +58,7 @@ def test_cogging_is_what_averages_to_nothing_over_a_turn(velocity):
     assert cogging == pytest.approx(total - total.mean(), abs=1e-9)
 
 
-def test_friction_is_told_as_far_as_it_is_made_up_for():
+def test_friction_is_reported_as_far_as_it_is_made_up_for():
     rubbing = FrictionFeedforward(
         coulomb_forward_Nm=0.3, coulomb_backward_Nm=0.2, stribeck_backward_Nm=0.15
     )
@@ -86,7 +86,7 @@ def test_hand_over_at_standstill_is_continuous():
 
 @settings(max_examples=60)
 @given(angle=st.floats(-50, 50), index=st.floats(-10, 10))
-def test_what_motors_take_up_standing_is_what_is_compensated_then(angle, index):
+def test_compensation_at_rest_equals_the_friction_held_at_rest(angle, index):
     feedback, setpoint = at(n=3, angle=angle, index=index, velocity=0.0)
     feedback.index_known[2] = False
     rubbing = FrictionFeedforward(coulomb_forward_Nm=0.3, stribeck_backward_Nm=0.1)
@@ -185,6 +185,6 @@ def test_no_table_and_no_friction_adds_more_than_the_axis_may_have(scale, veloci
     assert abs(standing[0]) <= most
 
 
-def test_what_is_not_a_number_stays_none_for_the_supervisor_to_see():
+def test_nan_passes_through_to_the_supervisor():
     axis = AxisCompensation(np.full((2, M), np.nan), most_Nm=0.5)
     assert math.isnan(settled(axis, *at()))

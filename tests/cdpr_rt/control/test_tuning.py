@@ -83,7 +83,7 @@ def test_a_wrong_inertia_shows_in_the_margins():
     assert again.gain_reduction_dB == pytest.approx(design.gain_reduction_dB - 6.02, abs=0.05)
 
 
-def test_what_cannot_be_had_is_refused():
+def test_unreachable_bandwidths_are_rejected():
     with pytest.raises(TuningError, match=r"200 Hz .* latency of 4\.00 ms"):
         design_pid(1e-4, 4e-3, 200.0)
     with pytest.raises(TuningError, match="inertia_kg_m2 = -1"):

@@ -127,7 +127,7 @@ def test_tension_is_found_from_the_torque(
 
 
 @pytest.mark.parametrize("measured_Nm", [0.0, 0.08])
-def test_what_turns_the_motor_alone_is_not_on_the_cable(measured_Nm: float) -> None:
+def test_friction_torque_is_not_counted_as_tension(measured_Nm: float) -> None:
     """Friction counts once: as the motor's, or as the whole winch's where that was measured."""
     winch = Winch(1.0, 0.08)
     estimator = Estimator(1, PERIOD_S, winches(np.array([1.0]), measured_Nm))
@@ -152,7 +152,7 @@ def test_cogging_is_not_on_the_cable_whoever_measured_the_friction(measured_Nm: 
     assert estimator.estimate.tension_N[0] == pytest.approx(60.0, abs=1.0)
 
 
-def test_what_accelerates_the_motor_is_not_on_the_cable() -> None:
+def test_inertial_torque_is_not_counted_as_tension() -> None:
     """A cable is cut while the motor goes on pulling: the torque alone would say 50 N still."""
     winch, estimator = Winch(1.0), Estimator(1, PERIOD_S, winches(np.array([1.0])))
     limits = Limits(

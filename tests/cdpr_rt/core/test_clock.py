@@ -112,7 +112,7 @@ def test_a_task_waits_for_another_which_waits_for_a_third(kind: type[Clock]) -> 
     assert [task.result() for task in clock.gather([lambda: deep(3)])] == [15]
 
 
-def test_what_a_task_raises_is_for_who_asks_for_its_result() -> None:
+def test_an_exception_of_a_task_is_raised_by_its_result() -> None:
     clock = LockstepClock()
 
     def fail() -> None:

@@ -81,7 +81,7 @@ def test_axes_are_called_by_their_names():
     assert reason_of(supervisor, ("left", "right")).startswith("right: following error")
 
 
-def test_what_others_find_counts_where_it_is_worse():
+def test_the_more_severe_external_reaction_wins():
     supervisor, cycle = Supervisor(SAFE, 2, PERIOD_S), Cycle()
     door = Fault(Limit.SAFETY_STOP, code="door", detail="a door is open")
     drive = Fault(Limit.DRIVE, 1, "2310h", "node 2", detail="over current")

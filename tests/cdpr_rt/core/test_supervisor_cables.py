@@ -52,7 +52,7 @@ def test_lengths_that_jump_stop_the_motion_before_they_disagree_too_far(
     )
 
 
-def test_lengths_that_swing_about_agreement_are_told_too():
+def test_lengths_that_swing_about_agreement_are_reported_too():
     limits = dataclasses.replace(SAFE, lengths_disagree_m=0.03, broken_within_s=0.05)
     supervisor, cycle = Supervisor(limits, 2, PERIOD_S), Cycle()
     told = []
@@ -69,7 +69,7 @@ def test_a_cable_that_was_never_tight_is_not_slack():
     assert {cycle.check(supervisor) for _ in range(500)} == {Reaction.NONE}
 
 
-def test_slack_is_told_once_until_the_cable_was_tight_again():
+def test_slack_is_reported_once_until_the_cable_was_tight_again():
     supervisor, cycle = Supervisor(SAFE, 2, PERIOD_S), Cycle()
     told = []
     for tension_N in (50.0, 10.0, 2.0, 10.0, 50.0, 10.0, 2.0):
@@ -99,7 +99,7 @@ def test_a_cable_from_which_tension_was_paid_out_is_not_broken(paid_out_rad: flo
     assert supervisor.limit is limit
 
 
-def test_a_broken_cable_is_told_once():
+def test_a_broken_cable_is_reported_once():
     supervisor, cycle = Supervisor(SAFE, 2, PERIOD_S), Cycle()
     cycle.check(supervisor)
     cycle.estimate.tension_N[1] = 0.0

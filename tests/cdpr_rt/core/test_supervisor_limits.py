@@ -318,7 +318,7 @@ def test_no_limit_of_the_kernel_is_left_untried():
 # -- memory
 
 
-def test_what_left_the_window_counts_no_more():
+def test_violations_outside_the_window_are_not_counted():
     supervisor, cycle = Supervisor(SAFE, 2, PERIOD_S), Cycle()
     tripped = []
     for k in range(200):

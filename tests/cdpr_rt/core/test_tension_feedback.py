@@ -51,7 +51,7 @@ def test_a_reading_has_its_time_and_grows_old() -> None:
     assert found is not None and (found.limit, found.detail) == (Limit.SAFETY_STOP, both.reason())
 
 
-def test_a_fault_is_told_with_its_cable_and_goes_when_it_is_mended() -> None:
+def test_a_fault_is_reported_with_its_cable_and_goes_when_it_is_mended() -> None:
     clock = Clock()
     both = exchange(clock)
     for i in range(3):

@@ -93,7 +93,7 @@ def test_a_body_that_turns_and_swings_keeps_its_energy() -> None:
     assert np.abs(energy).max() < 0.02 * kinetic.max()
 
 
-def test_what_no_cable_holds_falls_freely_and_comes_to_rest_on_the_ground() -> None:
+def test_a_platform_without_cables_falls_freely_to_the_ground() -> None:
     path = fallen((0.0, 0.0, 1.0), (0.0, 0.0, -1e3), 5.0, ground_m=0.0, stiffness_N_m=1e-9)
     t = PERIOD_S * np.arange(1, 401)
     assert path[:400, 0, 2] == pytest.approx(1.0 - G_m_s2 * t**2 / 2.0, abs=2e-3)
@@ -127,7 +127,7 @@ def test_a_winch_that_rubs_enough_keeps_its_load() -> None:
     assert np.abs(path[:, 0]).max() < 1e-3
 
 
-def test_what_is_left_lets_the_platform_down_at_the_speed_of_lowering() -> None:
+def test_the_remaining_cables_lower_the_platform_at_lowering_speed() -> None:
     path = fallen(
         (0.0, 0.0, 0.0), (0.0, 0.0, 2.0), 6.0, held_s=0.02, rotor_kg=0.2, gain_N_s_m=20.0,
         held_N=MASS_kg * G_m_s2, weight_N=MASS_kg * G_m_s2, damping_N_s_m=100.0,

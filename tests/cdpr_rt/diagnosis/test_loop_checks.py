@@ -63,7 +63,7 @@ def test_a_platform_that_tensions_hold_is_not_refused() -> None:
     assert told(short_arms(), 200.0, 800.0) == []
 
 
-def test_what_tensions_hold_and_swings_for_long_is_doubtful() -> None:
+def test_a_stable_pose_with_a_long_swing_is_doubtful() -> None:
     late, leans = told(short_arms(), 20.0, 200.0, 4e-3, impossible=False)
     found = re.match(
         r"axes\[0\]\.anchor_point_m: held by its tensions .* at \(.*\) m it may swing at (\d+) Hz, "

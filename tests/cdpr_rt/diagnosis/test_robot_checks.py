@@ -73,7 +73,7 @@ def hall(low_N: float, high_N: float) -> Robot:
 
 
 @pytest.mark.parametrize(("low_N", "high_N"), [(1.0, 20.0), (20.0, 150.0)])
-def test_cables_that_sag_are_told_with_the_tension_that_would_do(
+def test_cables_that_sag_are_reported_with_the_tension_that_would_do(
     low_N: float, high_N: float
 ) -> None:
     """The slope of what a parabola across its chord is longer than that, over all of the box."""
@@ -122,7 +122,7 @@ def test_every_shipped_robot_holds_its_box_at_all_orientations(name: str) -> Non
     assert moving.min() > statics.model.reserve_N
 
 
-def test_angles_that_nothing_controls_in_space_are_told(tmp_path: Path) -> None:
+def test_angles_that_nothing_controls_in_space_are_reported(tmp_path: Path) -> None:
     free = 'controlled = ["x", "y", "z"]\nmass_kg'
     text = re.sub(r"workspace_angle_rad.*\n", "", SUSPENDED.replace("mass_kg", free, 1))
     assert "rx, ry, rz left out" in findings_of(tmp_path, text)["platform.controlled"]
@@ -147,7 +147,7 @@ def test_of_a_rod_the_axis_that_need_not_be_controlled_is_named(tmp_path: Path) 
         assert told.endswith(free)
 
 
-def test_orientations_that_cables_cannot_hold_are_told_with_the_angle_that_they_can(
+def test_orientations_that_cables_cannot_hold_are_reported_with_the_angle_that_they_can(
     tmp_path: Path,
 ) -> None:
     text = SUSPENDED.replace("workspace_angle_rad = 0.2618", "workspace_angle_rad = 0.6")
@@ -164,7 +164,7 @@ def test_in_a_plane_an_orientation_is_one_angle(tmp_path: Path) -> None:
     assert re.search(r" m, turned by -?40 deg the cables ", told), told
 
 
-def test_a_turned_platform_that_meets_its_stand_is_told(tmp_path: Path) -> None:
+def test_a_turned_platform_that_meets_its_stand_is_reported(tmp_path: Path) -> None:
     text = SUSPENDED.replace("[-2.6, -1.8, 0.75]", "[-2.6, -1.8, 0.6]")
     told = findings_of(tmp_path, text)["platform.workspace_angle_rad"]
     assert "0.18 m lower, and the box begins 0.10 m above home" in told
@@ -174,7 +174,7 @@ def test_a_turned_platform_that_meets_its_stand_is_told(tmp_path: Path) -> None:
 BODY = "body = { min_m = [-0.1, -0.1, -0.3], max_m = [0.1, 0.1, 0.3] }"
 
 
-def test_cables_that_touch_within_the_box_are_told_with_the_place(tmp_path: Path) -> None:
+def test_cables_that_touch_within_the_box_are_reported_with_the_place(tmp_path: Path) -> None:
     # cables of one corner of the frame, from below to the top and from above to the bottom, cross
     text = SPATIAL.replace("[0.1, -0.1, 0.3]", "[-0.1, -0.1, 0.3]", 1)
     text = text.replace("[-0.1, 0.1, -0.3]", "[-0.1, -0.1, -0.3]", 1)
@@ -199,14 +199,14 @@ def test_a_body_that_no_cable_passes_is_impossible(tmp_path: Path) -> None:
         refuse_impossible(load_robot(path))
 
 
-def test_winches_that_rub_by_more_than_is_kept_for_control_are_told(tmp_path: Path) -> None:
+def test_winches_that_rub_by_more_than_is_kept_for_control_are_reported(tmp_path: Path) -> None:
     # of the 115 N that such a motor is rated for
     told = diagnose(robot_of(tmp_path, ("max_N = 150", "max_N = 60")))
     about = [f for f in told if f.key == "platform.mass_kg"]
     assert about and "may take up 6.9 N" in about[0].text and not about[0].impossible
 
 
-def test_what_no_place_mends_is_not_laid_to_the_place(tmp_path: Path) -> None:
+def test_a_problem_at_every_place_is_not_blamed_on_one_place(tmp_path: Path) -> None:
     # all upper cables to the lower end, all lower ones to the upper: none turns it about z
     text = re.sub(r"(anchor_point_m = )\[.*, .*, (.*)\]", r"\1[0.1, 0.0, \2]", SPATIAL)
     told = findings_of(tmp_path, text)["platform.home_m"]
@@ -297,7 +297,7 @@ def test_cables_may_leave_in_one_point_and_not_end_in_one_as_well(tmp_path: Path
         ),
     ],
 )  # fmt: skip
-def test_what_cannot_work_is_told_with_what_would(
+def test_infeasible_settings_are_reported_with_a_remedy(
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
     replaced: list[tuple[str, str]],
@@ -323,7 +323,7 @@ def test_what_cannot_work_is_told_with_what_would(
         assert any(f"{key}: " in line for line in refuse_impossible(robot))
 
 
-def test_more_cables_than_a_daemon_runs_are_told(tmp_path: Path) -> None:
+def test_more_cables_than_a_daemon_runs_are_reported(tmp_path: Path) -> None:
     axes = re.findall(r"\[\[axes\]\][^\[]*(?:\[[\d., -]*\][^\[]*)*", SUSPENDED)
     more = [re.sub('name = "', f'name = "{i}', axis) for i in range(1, 3) for axis in axes]
     more = [re.sub(r"node_id = .*", f"node_id = {20 + k}", axis) for k, axis in enumerate(more)]

@@ -32,7 +32,7 @@ def test_shipped_robots_can_be_pulled_tight(name: str) -> None:
 
 
 @pytest.mark.parametrize(("name", "high_N"), [("planar-3", 12.0), ("spatial-8", 25.0)])
-def test_bounds_below_what_winches_rub_are_told_with_some_that_would_do(
+def test_bounds_below_what_winches_rub_are_reported_with_some_that_would_do(
     name: str, high_N: float
 ) -> None:
     (finding,) = told(name, high_N)
@@ -51,7 +51,7 @@ def heavy(weight_N_m: float) -> Robot:
     return dataclasses.replace(robot, platform=platform)
 
 
-def test_ropes_that_unwind_their_drums_without_power_are_told_but_where_brakes_hold_them(
+def test_ropes_that_unwind_their_drums_without_power_are_reported_but_where_brakes_hold_them(
     tmp_path: Path,
 ) -> None:
     winch = load_robot("suspended-8").axes[0].winch
@@ -80,7 +80,7 @@ def test_ropes_that_unwind_their_drums_without_power_are_told_but_where_brakes_h
     assert "axis 1," not in finding.text and "axis 2, " in finding.text
 
 
-def test_what_motors_stand_with_has_in_it_what_hangs_from_their_winches() -> None:
+def test_standing_torque_includes_the_weight_of_hanging_cables() -> None:
     light, robot = load_robot("suspended-8"), heavy(2.0)
     place_m, platform = np.array([0.0, 0.0, 1.0]), robot.platform
     assert platform is not None

@@ -132,7 +132,7 @@ def test_one_whose_lengths_would_disagree_is_impossible(tmp_path: Path) -> None:
     assert "its cables can control them" in found.text
 
 
-def test_what_disagrees_are_normalised_residuals(tmp_path: Path) -> None:
+def test_disagreement_is_measured_by_normalised_residuals(tmp_path: Path) -> None:
     controlled = 'controlled = ["x", "y", "z", "ry", "rz"]\nmass_kg'
     text = SUSPENDED.replace("mass_kg", controlled, 1)
     found = told(tmp_path, re.sub(r"workspace_angle_rad.*\n", "", text))
@@ -158,7 +158,7 @@ def test_of_a_rod_the_angle_about_its_own_axis_is_nothing_to_mind(
     assert told(tmp_path, rod(turned_rad, beside_m)) is None
 
 
-def test_what_hangs_beside_a_rods_axis_or_below_a_knot_swings_and_is_possible(
+def test_loads_beside_a_rod_axis_or_below_a_knot_swing_and_are_accepted(
     tmp_path: Path,
 ) -> None:
     knot = CAMERA.replace("mass_kg", "centre_of_mass_m = [0.02, 0.0, -0.1]\nmass_kg", 1)

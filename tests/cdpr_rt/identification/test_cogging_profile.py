@@ -169,7 +169,9 @@ def changed(path: str, value: object) -> CoggingProfile:
         ("inertia_kg_m2", 1e-9, "inertia_kg_m2: value 1e-09; allowed: 5.65e-05 to 0.00565 kg m2"),
     ],
 )
-def test_what_no_such_motor_can_have_is_refused(key: str, value: object, message: str) -> None:
+def test_values_impossible_for_the_motor_are_rejected(
+    key: str, value: object, message: str
+) -> None:
     spoilt = changed(key, value)
     for use in (
         lambda: spoilt.require_true_of(BOUNDS),

@@ -160,7 +160,7 @@ def test_shipped_robots_are_clear_in_their_box_of_targets(name: str) -> None:
     assert clearances.min() >= platform.clearance_m
 
 
-def test_what_is_too_near_at_the_start_may_leave_but_not_come_nearer() -> None:
+def test_a_pair_too_close_at_the_start_may_part_but_not_approach() -> None:
     exits = np.array([[-1.0, 0.0, 2.0], [1.0, 0.0, 2.0]])
     anchors = np.array([[-0.1, 0.0, 0.1], [0.1, 0.0, 0.1]])
     kinematics = CableKinematics(exits, anchors, (0, 2))
@@ -177,7 +177,7 @@ def test_what_is_too_near_at_the_start_may_leave_but_not_come_nearer() -> None:
 
 
 @pytest.mark.parametrize("overlap_m", [0.0, 0.004])
-def test_what_touches_at_the_start_does_not_get_deeper(overlap_m: float) -> None:
+def test_a_pair_in_contact_at_the_start_does_not_penetrate_deeper(overlap_m: float) -> None:
     """Nor through a sheet so thin that it would be clear again behind it."""
     exits = np.array([[-1.0, 0.0, 2.0], [1.0, 0.0, 2.0]])
     anchors = np.array([[-0.1, 0.0, 0.2], [0.1, 0.0, 0.2]])
@@ -193,7 +193,7 @@ def test_what_touches_at_the_start_does_not_get_deeper(overlap_m: float) -> None
     assert found.position[0] < 0.004
 
 
-def test_what_some_looks_do_not_prove_clear_is_refused_in_words() -> None:
+def test_a_way_not_proven_clear_is_rejected_with_a_reason() -> None:
     model = model_of("spatial-8")
     there = model.home + np.array([0.1, 0.1, 0.5, 0.1, 0.2, 0.3])
     way = np.array([model.home, there])

@@ -188,7 +188,7 @@ def test_a_bad_start_ends_at_the_truth() -> None:
 
 
 @pytest.mark.parametrize("shape", [(7,), (9,), (8, 1), ()])
-def test_what_are_not_the_lengths_of_its_cables_is_refused(shape: tuple[int, ...]) -> None:
+def test_impossible_cable_lengths_are_rejected(shape: tuple[int, ...]) -> None:
     robot = CableKinematics(SPATIAL_8.exit_points_m, SPATIAL_8.anchor_points_m)
     with pytest.raises(GeometryError, match=r"^lengths \(.*\); allowed: \(8,\)$"):
         robot.pose_from_lengths(np.full(shape, 3.0), SPATIAL_8.home)
@@ -204,7 +204,7 @@ def test_another_process_may_have_a_robot_that_has_searched() -> None:
     assert np.abs(found.pose.minus(truth)).max() < 1e-9
 
 
-def test_what_cannot_be_found_says_so() -> None:
+def test_forward_kinematics_reports_failure() -> None:
     robot = CableKinematics(SPATIAL_8.exit_points_m, SPATIAL_8.anchor_points_m)
     nan = robot.pose_from_lengths(np.full(8, math.nan), SPATIAL_8.home, restarts=9)
     assert not nan.converged
@@ -227,7 +227,7 @@ def test_an_anchor_in_its_exit_or_pulley_has_no_direction() -> None:
             robot.jacobian(Pose(a[2]))
 
 
-def test_a_cable_that_does_not_carry_itself_is_told() -> None:
+def test_a_cable_that_does_not_carry_itself_is_reported() -> None:
     robot = CableKinematics(
         SPATIAL_8.exit_points_m, SPATIAL_8.anchor_points_m, model=CableModel(40e3, 0.122)
     )

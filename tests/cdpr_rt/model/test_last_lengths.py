@@ -89,7 +89,7 @@ def test_that_it_fell_is_remembered_until_it_is_tight_again(path: Path, flag: st
     assert not getattr(read(path), flag)
 
 
-def test_what_did_not_move_stays_true_though_nobody_knew_it(path: Path):
+def test_lengths_of_motors_that_did_not_move_stay_valid(path: Path):
     stopped(path)
     last = read(path)
     last.begin_to_move(np.zeros(3))
@@ -126,7 +126,7 @@ def test_a_damaged_file_leaves_none_and_says_which(path: Path, damage: str):
     assert str(path) in last.why
 
 
-def test_a_file_that_cannot_be_written_is_told(tmp_path: Path):
+def test_a_file_that_cannot_be_written_is_reported(tmp_path: Path):
     (tmp_path / "file").write_text("")
     with pytest.raises(StateFileError, match="cannot be written"):
         stopped(tmp_path / "file" / "lengths.json")

@@ -90,6 +90,6 @@ def test_minus_undoes_plus(
         ([0.0, 0.0, 0.0], np.eye(2), "rotation"),
     ],
 )
-def test_what_is_no_pose_is_refused(p: list[float], Q: np.ndarray, told: str) -> None:
+def test_invalid_poses_are_rejected(p: list[float], Q: np.ndarray, told: str) -> None:
     with pytest.raises(GeometryError, match=told):
         Pose(np.array(p), Q)

@@ -89,7 +89,7 @@ def test_twist_and_acceleration_are_the_pose_s_derivatives(
 
 @quick
 @given(seeds)
-def test_what_separates_two_poses_is_scipy_s_rotation_vector(seed: int) -> None:
+def test_pose_difference_equals_scipys_rotation_vector(seed: int) -> None:
     rng, one, _ = drawn(seed, CHOSEN[0])
     turn = vector(rng, 3.0)
     other = Pose(rng.normal(size=3), Rotation.from_rotvec(turn).as_matrix() @ one.Q)

@@ -152,7 +152,7 @@ class _Shape:
         return np.ones(len(ends_m))
 
 
-def test_what_no_straight_line_reaches_is_told() -> None:
+def test_regions_no_ray_reaches_are_reported() -> None:
     shape, box = cast(Any, _Shape()), Box((-1.5, -1.5), (1.5, 1.5))
     grid = by_grid(shape, box, 100)
     whole = 4.0 - 0.8 * 1.4

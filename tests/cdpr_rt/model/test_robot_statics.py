@@ -50,7 +50,7 @@ def by_linear_programming(statics: PlatformStatics, p: np.ndarray, a: np.ndarray
 
 @settings(max_examples=100)
 @given(st.floats(-2.2, 2.2), st.floats(-0.5, 3.3))
-def test_what_can_be_held_is_what_the_controller_distributes(x: float, y: float) -> None:
+def test_feasible_wrenches_are_those_the_controller_distributes(x: float, y: float) -> None:
     statics, p = shipped(), np.array([x, y])
     weight = np.array([0.0, -9.80665 * statics.platform.mass_kg])
     W, t = statics.model.kinematics.wrench_matrix(statics.model.pose(p)), np.zeros(3)

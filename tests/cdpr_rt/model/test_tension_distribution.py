@@ -111,7 +111,7 @@ def test_a_wrench_that_cannot_be_carried_is_missed_as_little_as_bounds_allow(
 
 
 @pytest.mark.parametrize("method", ["minimum-norm", "closed-form", "polygon-centroid"])
-def test_cables_that_cannot_hold_a_direction_are_told_and_carry_the_rest(method: str) -> None:
+def test_cables_that_cannot_hold_a_direction_are_reported_and_carry_the_rest(method: str) -> None:
     W = np.array([[1.0, -1.0, 0.5, -0.5], [0.0, 0.0, 0.0, 0.0], [0.2, 0.2, -0.2, -0.3]])
     low, high = np.full(4, 5.0), np.full(4, 100.0)
     distribution = of(method, low, high, np.ones(3), low)
@@ -145,7 +145,7 @@ def test_no_cable_pulls_anywhere(method: str) -> None:
 
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("wrong", [np.nan, np.inf, -np.inf, 1e200])
-def test_what_is_no_number_is_refused_and_nothing_written(method: str, wrong: float) -> None:
+def test_nan_is_rejected_and_nothing_is_written(method: str, wrong: float) -> None:
     W, w_e, low, high = made_up(7, 3, 5, True)
     distribution = of(method, low, high, np.ones(3), low)
     t = np.full(5, 17.0)

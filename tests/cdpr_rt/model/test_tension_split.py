@@ -65,7 +65,7 @@ def is_nearest(
 
 
 @pytest.mark.parametrize("name", MACHINES)
-def test_what_is_known_and_asked_for_is_exerted_within_bounds(name: str) -> None:
+def test_the_requested_wrench_is_exerted_within_bounds(name: str) -> None:
     splitting = Split(MACHINES[name]())
     rng, d = np.random.default_rng(1), splitting.model.size
     for q in places(splitting, 100):
@@ -86,7 +86,7 @@ def test_what_is_known_and_asked_for_is_exerted_within_bounds(name: str) -> None
 
 
 @pytest.mark.parametrize("name", MACHINES)
-def test_what_cannot_be_had_is_missed_least(name: str) -> None:
+def test_an_infeasible_wrench_is_approximated_with_least_error(name: str) -> None:
     splitting = Split(MACHINES[name]())
     rng, d = np.random.default_rng(2), splitting.model.size
     limited = 0
@@ -159,7 +159,7 @@ def test_the_inner_tension_follows_slowly_what_a_force_needs() -> None:
     assert splitting.t.min() > low[0] - 0.2
 
 
-def test_what_no_tensions_carry_is_told() -> None:
+def test_an_infeasible_load_is_reported() -> None:
     splitting = Split(planar())
     outside = splitting.W(np.array([-1.5, 0.5]))
     outcome, _, _ = splitting(outside, splitting.weight, np.zeros(2))

@@ -80,7 +80,7 @@ def test_the_margin_is_what_linear_programming_finds(
     assert (workspace.infeasibility(pose) == "") == (margin >= 0.0)
 
 
-def test_what_no_tension_holds_is_told() -> None:
+def test_infeasible_poses_are_reported() -> None:
     flat = CableKinematics(
         np.array([[-1.0, 0.0], [1.0, 0.0], [2.0, 0.0]]), np.zeros((3, 2)), (0, 1)
     )

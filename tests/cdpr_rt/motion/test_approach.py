@@ -114,7 +114,7 @@ def test_a_goal_lies_on_the_way_to_its_target(
         assert share > 0.999
 
 
-def test_what_sleeps_takes_more_to_wake_than_what_is_awake_to_fall_asleep() -> None:
+def test_waking_needs_a_larger_step_than_falling_asleep() -> None:
     goal = np.zeros(1)
     shares = {
         (awake, size): soft_deadband(np.array([size]), np.zeros(1), np.ones(1), awake, 1e-4, goal)
@@ -130,7 +130,7 @@ def test_what_sleeps_takes_more_to_wake_than_what_is_awake_to_fall_asleep() -> N
 
 @settings(max_examples=100)
 @given(pairs, bounds, bounds)
-def test_what_is_braked_stops_at_the_place_to_rest(
+def test_braking_stops_at_the_rest_position(
     pace: np.ndarray, speed: np.ndarray, acceleration: np.ndarray
 ) -> None:
     velocity = np.clip(pace, -speed, speed)

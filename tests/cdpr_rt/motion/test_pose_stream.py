@@ -128,7 +128,7 @@ def test_after_some_seconds_jitter_makes_no_sample_late(transits: list[float]) -
     assert sender.stream.delay_s <= max(transits) - min(transits) + 0.06
 
 
-def test_silence_is_held_then_stopped_and_what_follows_begins_anew() -> None:
+def test_silence_is_held_then_stopped_and_what_follows_starts_again() -> None:
     sender = Sender()
     for k in range(31):
         sender.send(k, k / 30.0, (k / 30.0, 0.0, 0.0))
@@ -148,7 +148,7 @@ def test_silence_is_held_then_stopped_and_what_follows_begins_anew() -> None:
     assert poses[-1, 0] == pytest.approx(5.0 + 59 / 30.0)
 
 
-def test_another_session_begins_anew_and_the_old_ones_samples_do_not_count() -> None:
+def test_another_session_starts_again_and_the_old_ones_samples_do_not_count() -> None:
     sender = Sender()
     for k in range(30):
         sender.send(k, k / 30.0, (0.1, 0.0, 0.0))
@@ -172,7 +172,7 @@ def test_another_session_begins_anew_and_the_old_ones_samples_do_not_count() -> 
         {"scale": 1e9},
     ],
 )
-def test_what_cannot_be_meant_is_refused(change: dict[str, object]) -> None:
+def test_implausible_samples_are_rejected(change: dict[str, object]) -> None:
     sender = Sender()
     sender.send(0, 0.0, (0.0, 0.0, 0.0))
     bad: dict[str, object] = {"sequence": 1, "sent_s": 0.03, "position": (0.01, 0.0, 0.0)}
@@ -189,7 +189,7 @@ def test_what_cannot_be_meant_is_refused(change: dict[str, object]) -> None:
     [((1.5, 0.0, 0.0), 0.5 + 1 / 30), ((0.5, 0.0, 0.0), -100.0), ((0.5, 0.0, 0.0), 100.0)],
     ids=["the hand leaps", "the clock goes back", "the clock goes forth"],
 )
-def test_a_leap_of_hand_or_clock_begins_anew(
+def test_a_leap_of_hand_or_clock_starts_again(
     position: tuple[float, float, float], sent_s: float
 ) -> None:
     sender = Sender()
@@ -261,7 +261,7 @@ def test_no_sample_whatever_breaks_it(samples: list[tuple[object, ...]]) -> None
     assert sender.stream.state == StreamState.STOPPED
 
 
-def test_more_than_the_ring_keeps_is_counted_and_begins_anew() -> None:
+def test_more_than_the_ring_keeps_is_counted_and_starts_again() -> None:
     sender = Sender()
     for k in range(200):
         sender.send(k, k * 1e-3, (0.0, 0.0, 0.0), transit_s=0.3 - k * 1e-3)

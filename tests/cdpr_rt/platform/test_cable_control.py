@@ -50,7 +50,7 @@ def moved(physics: Physics, targets: tuple[tuple[float, ...], ...]) -> Moved:
     return physics, legs
 
 
-def test_winches_that_swing_at_rest_are_told_until_that_is_cleared() -> None:
+def test_winches_that_swing_at_rest_are_reported_until_that_is_cleared() -> None:
     physics = Physics(planar(), RobotPlant())
     control, feedback = physics.control, physics.feedback
     at_rest_rad = feedback.position_rad.copy()
@@ -182,7 +182,7 @@ def test_an_update_allocates_nothing_that_stays(name: str) -> None:
     assert grown < 2000
 
 
-def test_a_place_that_tensions_cannot_hold_is_told() -> None:
+def test_a_place_that_tensions_cannot_hold_is_reported() -> None:
     control = planar().control()
     control.stand_still()
     control.position[:] = 0.0, 1.9
@@ -197,7 +197,7 @@ def test_a_place_that_tensions_cannot_hold_is_told() -> None:
     assert not control.way_infeasibility(np.array([0.3, 1.6]))
 
 
-def test_an_obstacle_in_the_way_is_told() -> None:
+def test_an_obstacle_in_the_way_is_reported() -> None:
     robot = load_robot("spatial-8")
     assert robot.platform is not None
     box = BoxFile(min_m=(-0.1, 0.0, 2.12), max_m=(0.0, 0.2, 2.2))
@@ -209,20 +209,20 @@ def test_an_obstacle_in_the_way_is_told() -> None:
     assert not control.way_infeasibility(np.array([-0.05, 0.1, 1.7, 0.0, 0.0, 0.0]))
 
 
-def test_an_orientation_that_tensions_cannot_hold_is_told() -> None:
+def test_an_orientation_that_tensions_cannot_hold_is_reported() -> None:
     control = spatial().control()
     assert control.is_feasible(np.array([0.0, 0.0, 1.4, 0.0, 0.0, 0.1]))
     assert "cable" in control.infeasibility(np.array([0.0, 0.0, 1.4, 0.0, 0.0, 1.5]))
 
 
-def test_a_target_in_an_exit_point_is_told() -> None:
+def test_a_target_in_an_exit_point_is_reported() -> None:
     machine = planar()
     place = np.subtract(machine.platform.exit_points_m[0], machine.platform.anchor_points_m[0])
     assert machine.control().infeasibility(place)
 
 
 @pytest.mark.parametrize(("place", "told"), [((0.0, 1.9), False), ((-1.5, 1.0), True)])
-def test_tensions_that_are_missing_are_told(place: tuple[float, float], told: bool) -> None:
+def test_tensions_that_are_missing_are_reported(place: tuple[float, float], told: bool) -> None:
     control = planar().control()
     feedback, setpoint, torque = AxisFeedback(3), Setpoint(3), np.zeros(3)
     lengths = control.model.kinematics.lengths(control.model.pose(np.array(place)))
@@ -268,7 +268,7 @@ def test_a_jump_is_told_of_the_cable_that_jumped_not_of_one_that_was_off_before(
     assert 5 not in control.suspects(jump=True)
 
 
-def test_an_acceleration_that_tensions_cannot_give_is_told() -> None:
+def test_an_acceleration_that_tensions_cannot_give_is_reported() -> None:
     control = planar().control()
     feedback, setpoint, torque = AxisFeedback(3), Setpoint(3), np.zeros(3)
     place = np.array([0.0, 1.9])
@@ -303,7 +303,7 @@ def test_lengths_of_this_very_cycle_stay_and_home_is_found() -> None:
     assert not control.velocity.any()
 
 
-def test_what_was_integrated_is_forgotten() -> None:
+def test_reset_clears_the_integral_part() -> None:
     control = planar().control()
     feedback, setpoint, torque = AxisFeedback(3), Setpoint(3), np.zeros(3)
     control.take_lengths(control.model.kinematics.lengths(control.model.home_pose), feedback)

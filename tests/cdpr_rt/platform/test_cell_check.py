@@ -57,7 +57,7 @@ def test_the_balance_of_forces_tells_cell_and_motor_apart() -> None:
     assert cells.told().startswith("two: its load cell shows 22 N more")
 
 
-def test_what_is_usual_of_motors_and_payloads_is_no_cell() -> None:
+def test_usual_motor_and_payload_errors_do_not_blame_a_load_cell() -> None:
     cells = Cells()
     cells.read_N[:] += np.array([5.0, -4.0, 6.0, 3.0])
     assert not cells.told()

@@ -49,7 +49,7 @@ class Cables:
         return np.array(seen)
 
 
-def test_what_a_motor_gives_too_little_is_made_up_for_within_bounds() -> None:
+def test_a_weak_motor_is_compensated_within_bounds() -> None:
     cables = Cables()
     cables.run(4.0)
     np.testing.assert_allclose(cables.true_N[:2], 50.0, atol=0.05)

@@ -45,7 +45,7 @@ class Bound:
     st.booleans(),
 )
 @settings(max_examples=40)
-def test_what_is_added_is_bounded_whatever_happens(
+def test_the_learnt_torque_is_always_bounded(
     seen: list[float], speed: list[float], again: bool
 ) -> None:
     bound = Bound()
@@ -121,7 +121,7 @@ def test_friction_and_cogging_together_leave_the_tensions_a_third_of_their_reser
     np.testing.assert_allclose(largest_Nm, 2.0 * third_Nm, rtol=1e-9)
 
 
-def test_what_is_added_leaves_the_tensions_their_reserve() -> None:
+def test_the_learnt_torque_leaves_the_tension_reserve() -> None:
     bound, reserve_N = Bound(reserve_N=9.0), 9.0
     cable = np.array([abs(axis.winch.cable_m_per_motor_rad) for axis in ROBOT.axes])
     bound.force[:] = [10.0, -10.0]

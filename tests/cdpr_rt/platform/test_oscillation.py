@@ -50,7 +50,7 @@ def sine(frequency_Hz: float, amplitude_m: float, mean_m: float = 0.0) -> Wave:
 
 @pytest.mark.parametrize("frequency_Hz", [6.0, 13.0, 80.0, 120.0])
 @pytest.mark.parametrize("mean_m", [0.0, -0.003])
-def test_what_swings_for_more_than_three_seconds_is_told(
+def test_oscillation_longer_than_three_seconds_is_reported(
     frequency_Hz: float, mean_m: float
 ) -> None:
     winches = Winches()
@@ -107,7 +107,7 @@ def test_a_loop_that_works_is_none(swing_m: Wave) -> None:
     assert not Winches().told(swing_m, 10.0)
 
 
-def test_a_pause_begins_anew() -> None:
+def test_a_pause_starts_again() -> None:
     winches = Winches()
     for _ in range(5):
         assert not winches.told(sine(40.0, MUCH_m), 2.5)

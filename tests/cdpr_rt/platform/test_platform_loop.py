@@ -203,7 +203,7 @@ def test_the_integral_part_sleeps_within_what_friction_hides_and_wakes_later() -
     assert law.state[2] == 1.0
 
 
-def test_what_held_against_friction_at_rest_is_given_back_where_motion_begins() -> None:
+def test_torque_held_by_friction_at_rest_is_released_when_motion_begins() -> None:
     """As much of it as friction can be; the last motion's integral part stays."""
     machine = planar()
     law = Loop(machine, loop_model(machine).design(), np.array([0.1, 1.9]))

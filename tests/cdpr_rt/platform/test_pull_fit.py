@@ -168,7 +168,7 @@ def test_a_motor_whose_friction_does_not_turn_round_rubs_as_others_of_its_kind(
     np.testing.assert_allclose(learning.friction_Nm[little], expected_Nm[little], atol=0.03)
 
 
-def test_what_a_motor_takes_up_besides_does_not_have_the_others_of_its_kind_rub_more(
+def test_an_extra_load_on_one_motor_does_not_raise_the_friction_of_similar_motors(
     lengths: Callable[[np.ndarray], np.ndarray],
 ) -> None:
     """Fits that leave a rest tell little, and six of them no more than they found."""
@@ -239,7 +239,7 @@ def test_nothing_is_found_of_motors_that_are_known_or_do_not_turn(
     assert not learning.friction_Nm.any()
 
 
-def test_what_is_known_of_a_motor_is_not_begun_anew(
+def test_known_motor_parameters_are_kept(
     lengths: Callable[[np.ndarray], np.ndarray],
 ) -> None:
     """As when cables are tightened again after motions that have taught more."""
@@ -257,7 +257,7 @@ def test_what_is_known_of_a_motor_is_not_begun_anew(
 
 
 @pytest.mark.parametrize("reserve_N", [3.0, 20.0, 500.0])
-def test_what_is_found_leaves_the_tensions_a_third_of_their_reserve(
+def test_identified_friction_leaves_a_third_of_the_tension_reserve(
     lengths: Callable[[np.ndarray], np.ndarray], reserve_N: float
 ) -> None:
     learning = MotorLearning(AXES, NOBODY, np.ones(N), reserve_N, 1e-3)

@@ -103,7 +103,7 @@ def test_each_reading_is_kept_at_once_with_what_the_camera_saw() -> None:
     assert last.image.sighting("x").corners_px[4].tolist() == [[0, 1], [2, 3], [4, 5], [6, 7]]
 
 
-def test_what_is_refused_or_shakes_is_left_out_with_its_reason() -> None:
+def test_refused_or_shaking_poses_are_skipped_with_a_reason() -> None:
     operator, notes = Operator(shaky=3.0, refused=2.0), Notes()
     measured, _ = collected()
     measure_poses(operator, PLACES[:6], BETWEEN, measured, notes)
@@ -169,7 +169,7 @@ def test_it_gives_up_where_nothing_comes_to_rest_and_keeps_what_it_has() -> None
     assert len(measured.readings) == 1 and len(measured.refused) == 5
 
 
-def test_what_is_not_reached_is_read_where_it_stands_five_times_in_turn_at_the_most() -> None:
+def test_at_most_five_consecutive_unreached_poses_are_measured_where_they_stand() -> None:
     measured, kept = collected()
     notes = Notes()
     measure_poses(Operator(beyond=8.0), PLACES[5:], BETWEEN, measured, notes)
@@ -185,7 +185,7 @@ def test_what_is_not_reached_is_read_where_it_stands_five_times_in_turn_at_the_m
     assert [reading.target[0] for reading in measured.readings] == [3, 4, 4, 4, 4, 4, 4]
 
 
-def test_what_neither_is_reached_nor_stands_is_left_out_with_both_reasons() -> None:
+def test_an_unreached_moving_pose_is_skipped_with_both_reasons() -> None:
     measured, notes = collected()[0], Notes()
     measure_poses(Operator(beyond=8.0, shaky=8.0), PLACES[8:9], BETWEEN, measured, notes)
     assert not measured.readings and measured.tried == [(9.0, 2.0)]

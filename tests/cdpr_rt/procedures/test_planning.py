@@ -207,7 +207,7 @@ def test_a_long_path_takes_several_plans_that_go_on_where_the_one_before_rests(p
     np.testing.assert_allclose(rest, path.moves[-1].end, atol=1e-9)
 
 
-def test_what_comes_in_a_later_plan_is_looked_at_before_the_first(planner):
+def test_later_plans_are_checked_before_the_first_one_runs(planner):
     lines = [f"G1 X{100 * (i % 2)} F600" for i in range(1, 150)]
     plan = planner.plan(gcode(planner, "G0 X0 Y0 Z0", *lines, "G0 Z190"))
     assert plan.timed is None and plan.obstacle is not None

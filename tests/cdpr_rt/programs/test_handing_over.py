@@ -23,7 +23,7 @@ def handing_over(robot: Standing, source: str | None = None) -> Standing:
     raise AssertionError("not tight")
 
 
-def test_it_is_not_moved_before_it_is_let_go(robot: Standing):
+def test_it_is_not_moved_before_it_is_released(robot: Standing):
     handing_over(robot)
     with pytest.raises(ProgramError, match="the cables are not tight; run tighten first"):
         robot.programs["pose"].check({"stream": True})
@@ -54,7 +54,7 @@ def let_go_of(robot: Standing) -> None:
     robot.run(0.05)
 
 
-def test_what_ends_it_meanwhile_leaves_the_platform_as_displaced_as_it_was(robot: Standing):
+def test_an_early_end_leaves_the_platform_where_it_was(robot: Standing):
     robot.parts.last_stop.displaced = True
     handing_over(robot, "home")
     let_go_of(robot)
@@ -118,7 +118,7 @@ def test_a_cable_that_was_slack_is_let_down_and_its_length_forgotten(
 
 
 @pytest.mark.parametrize(("up_m", "told"), [(0.0, False), (0.003, False), (0.02, True)])
-def test_lengths_that_agree_on_a_place_off_home_are_told(
+def test_lengths_that_agree_on_a_place_off_home_are_reported(
     robot: Standing, up_m: float, told: bool
 ) -> None:
     """All cables that are slack alike contradict nothing but the stand."""

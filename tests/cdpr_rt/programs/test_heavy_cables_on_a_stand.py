@@ -72,7 +72,7 @@ def test_a_pose_follows_from_what_winches_of_heavy_cables_pull() -> None:
     np.testing.assert_allclose(control.estimated, control.model.home, atol=2e-5)
 
 
-def test_what_lets_a_platform_down_begins_with_what_winches_truly_carry() -> None:
+def test_lowering_begins_with_the_loads_the_winches_carry() -> None:
     robot = heavy(shipped("suspended-8"), 4.0)
     parts, torque_Nm = parts_of(robot), np.zeros(robot.n)
     cable_m = np.array([axis.winch.cable_m_per_motor_rad for axis in robot.axes])

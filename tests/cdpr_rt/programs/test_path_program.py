@@ -185,7 +185,7 @@ def test_after_a_kill_it_goes_back_to_where_it_was_left(rig):
     rig.check()
 
 
-def test_what_is_refused(rig, tmp_path):
+def test_invalid_path_commands_are_rejected(rig, tmp_path):
     rig.platform.restart()
     for wanted, told in (
         ({"plan": "../../etc/passwd"}, "plan: value"),
@@ -423,7 +423,7 @@ class BeingBegun(np.ndarray):
 
 
 @pytest.mark.parametrize("ends", [False, True])
-def test_what_is_begun_at_this_moment_is_looked_at_anew(
+def test_a_start_checks_the_plan_again(
     monkeypatch: pytest.MonkeyPatch, ends: bool, tmp_path: Path
 ) -> None:
     written: list[bytes] = []
@@ -448,7 +448,7 @@ def test_what_is_begun_at_this_moment_is_looked_at_anew(
     assert written and set(written) == {b"1" * 32}
 
 
-def test_what_a_full_disk_refused_is_written_once_there_is_room(
+def test_progress_is_written_when_a_full_disk_has_room_again(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     tried: list[str] = []

@@ -28,7 +28,7 @@ def with_torque(share: float) -> Robot:
 
 
 @pytest.mark.parametrize("share", [1.0, 0.8])
-def test_what_was_planned_for_a_robot_is_taken_by_its_control(share: float, tmp_path: Path) -> None:
+def test_a_plan_for_the_robot_is_accepted_by_its_control(share: float, tmp_path: Path) -> None:
     """Also where the motors' torque leaves less than the cables' bounds; not with other motors."""
     robot, n = with_torque(share), 3
     planner = PathPlanner(robot)

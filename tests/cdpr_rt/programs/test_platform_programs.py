@@ -117,7 +117,7 @@ def test_tensions_for_where_it_stands_are_not_stepped_to(robot: Standing):
     assert np.abs(np.diff(asked_N, axis=0)).max() < fastest_N_s * PERIOD_S
 
 
-def test_a_cable_that_ends_nowhere_is_told_and_all_are_let_go(robot: Standing):
+def test_a_cable_that_ends_nowhere_is_reported_and_all_are_let_go(robot: Standing):
     robot.slack_m[1] = 5.0
     robot.switch("tighten")
     told = robot.until_done(60.0)
@@ -192,7 +192,7 @@ def test_a_cable_that_gives_way_while_they_are_tightened_ends_it(robot: Standing
     assert "reeled in and not tight" in told["trouble"]
 
 
-def test_a_tight_robot_is_not_told_anew_where_it_is(robot: Standing):
+def test_a_tight_robot_is_not_told_again_where_it_is(robot: Standing):
     tightened(robot)
     with pytest.raises(ProgramError, match="the cables are tight already; lower it first"):
         robot.programs["tighten"].check({"from": "home"})
@@ -317,7 +317,7 @@ def test_a_broken_cable_that_runs_in_does_not_keep_a_standing_platform_waiting(
     assert np.abs(robot.tension_N[:2]).max() < 12.0
 
 
-def test_what_is_loose_already_is_not_wound_up_to_be_let_go(robot: Standing):
+def test_slack_cables_are_not_reeled_in_before_lowering(robot: Standing):
     before = robot.angle.copy()
     robot.switch("lower")
     robot.until_done(20.0)
@@ -400,7 +400,7 @@ def test_tightening_leaves_the_platform_its_weight_where_lower_cables_can(name: 
     assert pull == pytest.approx((pull @ weight) / (weight @ weight) * weight, abs=1e-6)
 
 
-def test_what_counts_as_arrived_grows_with_the_robot(robot: Standing):
+def test_arrival_tolerance_scales_with_the_robot(robot: Standing):
     assert robot.parts.near_m == 5e-4
     large = load_robot("suspended-8")
     n, limits = len(large.axes), limits_of(large)

@@ -122,7 +122,7 @@ def test_progress_tells_position_and_rotation(robot: IdealPlatform) -> None:
     assert interrupted == pytest.approx([*position, *rotation])
 
 
-def test_what_is_left_out_stays_as_it_is(robot: IdealPlatform) -> None:
+def test_coordinates_left_out_keep_their_value(robot: IdealPlatform) -> None:
     position, rotation = split(robot)
     middle, k = robot.path[0], robot.model.positions
     robot.pose.command({"rotation_rad": rotation})
@@ -159,7 +159,7 @@ def test_a_platform_that_stands_turned_too_far_is_turned_back_into_what_is_allow
         ("position_m", "many", "position_m: value .* allowed: a list of [23], one number"),
     ],
 )
-def test_what_is_not_allowed_is_refused_by_its_name(
+def test_targets_outside_limits_are_rejected_by_name(
     robot: IdealPlatform, key: str, value: str, told: str
 ) -> None:
     count = len(split(robot)[key == "rotation_rad"])
@@ -173,7 +173,7 @@ def test_what_is_not_allowed_is_refused_by_its_name(
     assert np.ptp(robot.path, axis=0).max() == 0.0
 
 
-def test_the_allowed_angle_is_told(robot: IdealPlatform) -> None:
+def test_the_allowed_angle_is_reported(robot: IdealPlatform) -> None:
     rotation = np.zeros(len(split(robot)[1]))
     rotation[-1] = -0.5
     allowed = re.escape(f"allowed: up to {np.degrees(robot.model.angle_rad):.4g} deg")
@@ -259,7 +259,7 @@ def test_a_hand_turns_the_platform_no_further_than_is_allowed(robot: IdealPlatfo
     assert angles[-1] == pytest.approx(robot.model.angle_rad, abs=1e-3)
 
 
-def test_a_hand_that_leaps_to_another_orientation_begins_anew(robot: IdealPlatform) -> None:
+def test_a_hand_that_leaps_to_another_orientation_starts_again(robot: IdealPlatform) -> None:
     robot.pose.command({"stream": True})
     for angle in np.repeat([0.0, 2.0], 30):
         robot.hand((0.0, 0.0, 0.0), Rotation.from_rotvec([0.0, 0.0, angle]))

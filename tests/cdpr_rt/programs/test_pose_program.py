@@ -191,7 +191,7 @@ def test_a_target_that_changes_in_motion_does_not_step(robot: LedPlatform) -> No
         ({"velocity": 1}, "velocity"),
     ],
 )
-def test_what_is_not_possible_is_refused(
+def test_infeasible_targets_are_rejected(
     robot: LedPlatform, wanted: dict[str, object], told: str
 ) -> None:
     with pytest.raises(ProgramError, match=told):
@@ -233,7 +233,7 @@ def test_a_place_in_the_box_that_tensions_cannot_hold_is_refused_with_the_reason
     assert wide.control.position[0] < 0.5 * max(place[0] for place in wide.path)
 
 
-def test_what_no_tensions_hold_is_not_entered_on_the_way_either_and_that_is_told(
+def test_a_way_through_an_infeasible_region_stops_before_it_with_a_reason(
     wide: LedPlatform,
 ) -> None:
     wide.program.command({"position_m": [0.5, 1.8]})

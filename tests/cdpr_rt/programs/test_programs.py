@@ -275,7 +275,7 @@ NAN, INF = float("nan"), float("inf")
         ("follow", {"scale": 2.0}, r"follow: key 'scale'; allowed: none"),
     ],
 )
-def test_what_a_program_does_not_do_is_refused_and_changes_nothing(
+def test_unsupported_requests_are_rejected_and_change_nothing(
     name: str, wanted: dict[str, object], message: str
 ) -> None:
     rig = ProgramRig()

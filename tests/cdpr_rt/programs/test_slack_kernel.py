@@ -143,7 +143,7 @@ def test_one_cable_after_the_other_is_reeled_in() -> None:
     assert kernel._whose_turn(phase) == -1
 
 
-def test_a_tight_cable_is_let_go_at_once() -> None:
+def test_a_tight_cable_is_released_at_once() -> None:
     cable = reeled_in(0.03, 9.0)
     assert cable.winch.high_N[0] > 0.0
     assert cable.run(0.5, 9.0) == kernel.PAID_OUT

@@ -57,7 +57,7 @@ def test_it_stops_a_clearance_before_and_names_the_pair(robot, way_m, told, seco
     assert any(one.startswith(f"{told} come within ") for one in words), words
 
 
-def test_what_is_in_contact_may_be_led_away_but_not_nearer(robot):
+def test_a_stream_in_contact_may_retreat_but_not_approach(robot):
     near = np.array([0.405, 0.0, 1.1, 0.0, 0.0, 0.0])
     for x, moves in ((0.1, False), (-0.1, True)):
         robot.restart(near)

@@ -40,7 +40,7 @@ def test_nobody_holds_it_at_first_whatever_an_earlier_service_has_published() ->
     assert lease.holder() is None
 
 
-def test_the_loop_is_told_until_when_and_each_sign_of_life_extends_it() -> None:
+def test_the_loop_is_reported_until_when_and_each_sign_of_life_extends_it() -> None:
     lease, clock = made()
     token = lease.take("maria", 2.0)
     assert until_ns() == clock.ns + 2_000_000_000
@@ -70,7 +70,7 @@ def test_who_was_silent_has_lost_it_also_where_nobody_else_took_it() -> None:
     assert until_ns() < clock.ns
 
 
-def test_given_back_it_is_gone_at_once() -> None:
+def test_released_it_is_gone_at_once() -> None:
     lease, _ = made()
     token = lease.take("maria", 2.0)
     lease.release(token)

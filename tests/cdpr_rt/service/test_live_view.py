@@ -129,7 +129,7 @@ def test_a_client_sees_axes_tensions_pose_and_times() -> None:
     assert len(messages["/axes"]) <= seconds * 50 + 5
 
 
-def test_what_happens_goes_into_the_log() -> None:
+def test_events_appear_in_the_live_log() -> None:
     block = block_with_clock()
     with running(block) as view, repeating(block, made_rows(100, 1)):
         trip = iter([{"state": "fault", "reason": "cable of left: 2 N"}])
@@ -323,7 +323,7 @@ def test_a_viewer_that_talks_without_end_is_cut_off(head: int) -> None:
         assert view.status()["error"] == ""
 
 
-def test_what_is_no_wish_changes_nothing() -> None:
+def test_invalid_requests_change_nothing() -> None:
     block = block_with_clock()
     nonsense: list[str | bytes] = [
         "",
@@ -379,7 +379,7 @@ def test_strange_letters_of_a_refused_page_can_be_told() -> None:
         assert view.status()["refused_last"].encode().startswith(b"Origin: ")
 
 
-def test_who_says_nothing_makes_room_and_too_many_are_told(
+def test_who_says_nothing_makes_room_and_too_many_are_reported(
     caplog: pytest.LogCaptureFixture,
 ) -> None:
     with running(block_with_clock()) as view:

@@ -42,7 +42,7 @@ def test_a_plan_has_its_name_and_figures():
     assert job == {"number": 1, "planning": False, "error": None, "plan": "ab", "duration_s": 2.0}
 
 
-def test_what_cannot_be_followed_is_told_by_the_name_that_was_given():
+def test_an_infeasible_path_is_reported_by_the_users_file_name():
     job = planned(2, json.dumps({"error": "FILE:3: outside"}))
     assert (job["plan"], job["error"]) == (None, "part.nc:3: outside")
     assert planned(1, "no JSON")["error"].startswith("planning ended with status 1: out of memory?")

@@ -207,7 +207,7 @@ def test_damaged_in_the_middle_it_is_read_up_to_there(recorded: Path, tmp_path: 
     assert reader.ended == CUT and cycles == list(range(len(cycles)))
 
 
-def test_what_is_no_recording_is_said(tmp_path: Path) -> None:
+def test_a_file_that_is_no_recording_is_reported(tmp_path: Path) -> None:
     other = tmp_path / "other.mcap"
     for data in (b"", b"not one", os.urandom(500)):
         other.write_bytes(data)
@@ -247,7 +247,7 @@ def test_mcap_files_of_others_are_said_to_be_that(tmp_path: Path) -> None:
         list(RecordingReader(path).cycles())
 
 
-def test_what_claims_to_be_a_recording_ends_where_it_makes_no_sense(tmp_path: Path) -> None:
+def test_reading_a_corrupt_recording_ends_at_the_corruption(tmp_path: Path) -> None:
     known = {"part": "1", "start_realtime_ns": "1", "start_monotonic_ns": "1", "version": "9"}
     numbers = b'{"properties": {"time_s": {"type": "number"}, "stamp_ns": {"type": "integer"}}}'
     for schema, data in ((b"", b"{}"), (b"[]", b"{}"), (b"\xff", b"{}"), (numbers, b"no row")):
@@ -339,7 +339,7 @@ def test_events_say_what_changed_and_why(tmp_path: Path) -> None:
     assert events[-1]["client"] == "panel" and events[-1]["at"] is None
 
 
-def test_what_an_operator_confirms_is_an_event_once() -> None:
+def test_an_operators_confirmation_is_recorded_once() -> None:
     rows = made_rows(0, 60)
     rows["stream_buttons"][10:20] = stream_buttons(clutch=True, confirmed=0)
     rows["stream_buttons"][20:40] = stream_buttons(clutch=False, confirmed=1)

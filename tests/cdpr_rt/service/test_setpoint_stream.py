@@ -157,7 +157,7 @@ def test_a_stream_that_others_can_reach_needs_a_key() -> None:
         listen_udp(host, 0, has_key=True).close()
 
 
-def test_an_address_in_use_is_told() -> None:
+def test_an_address_in_use_is_reported() -> None:
     with robot() as there, StreamClient("127.0.0.1", there.port, there.give()) as client:
         converse(client, lambda: client.answered >= 1)  # with the holder's socket in place
         with pytest.raises(ListenError, match="in use"):

@@ -123,7 +123,7 @@ def test_with_a_key_nobody_without_it_is_answered() -> None:
     assert rig.posted == 1
 
 
-def test_what_was_sent_once_opens_no_second_session() -> None:
+def test_a_replayed_packet_opens_no_second_session() -> None:
     rig = StreamRig(KEY)
     key = rig.greet()
     heard = [seal(replace(BASE, sequence=k), key) for k in range(1, 4)]
@@ -138,7 +138,7 @@ def test_what_was_sent_once_opens_no_second_session() -> None:
 
 
 @pytest.mark.parametrize("obstacle", ["busy", "no right"])
-def test_what_was_refused_is_of_no_use_later(obstacle: str) -> None:
+def test_a_rejected_packet_cannot_be_used_later(obstacle: str) -> None:
     rig = StreamRig(KEY)
     first, free_after_ms = rig.greet(9, THERE), 1500.0
     if obstacle == "busy":

@@ -164,7 +164,7 @@ def test_rounding_of_torque_never_adds_up(wanted: list[float], sign: int) -> Non
 
 
 @pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
-def test_a_torque_that_is_no_number_goes_out_as_zero_and_is_told(value: float) -> None:
+def test_a_torque_that_is_no_number_goes_out_as_zero_and_is_reported(value: float) -> None:
     group = Group(2)
     group.enable()
     group.state.command.torque_Nm[:] = [value, 0.3]
@@ -198,7 +198,7 @@ def test_an_unconfirmed_mode_stops_at_switched_on() -> None:
     assert struct.unpack("<Hh", group.give()[0][1])[0] == 0x0F
 
 
-def test_a_fault_reset_is_one_edge_and_a_fault_that_stays_is_told_again() -> None:
+def test_a_fault_reset_is_one_edge_and_a_fault_that_stays_is_reported_again() -> None:
     group = Group(1)
     group.enable()
     ints = group.state.ints

@@ -99,7 +99,7 @@ def test_a_mode_6502h_does_not_have_is_refused(rig: Rig) -> None:
         rig.group.ask_mode(7)
 
 
-def test_a_mode_the_drive_refuses_is_told_with_its_reason(rig: Rig) -> None:
+def test_a_mode_the_drive_refuses_is_reported_with_its_reason(rig: Rig) -> None:
     rig.misbehave(3, 1)
     with pytest.raises(ModeRefusedError, match="06090030h"):
         rig.group.ask_mode(Mode.CYCLIC_TORQUE)
@@ -196,7 +196,7 @@ def _drop_answers(rig: Rig) -> None:
         (_drop_answers, "has not answered SYNC", 0.05),
     ],
 )
-def test_what_the_drive_does_unasked_raises_the_alarm(
+def test_an_unrequested_state_change_raises_an_alarm(
     rig: Rig, trouble: Callable[[Rig], None], told: str, within_s: float
 ) -> None:
     rig.enable()
@@ -208,7 +208,7 @@ def test_what_the_drive_does_unasked_raises_the_alarm(
     assert rig.group.feedback.index_known[0] == (trouble is not _restart)
 
 
-def test_the_cause_is_told_before_what_follows_from_it(
+def test_the_cause_is_reported_before_what_follows_from_it(
     bus: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """While the only drive is waited for by the wall clock, it misses the master's heartbeat."""

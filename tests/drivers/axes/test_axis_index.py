@@ -130,7 +130,7 @@ def bus_without_index(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]
         simulator.stop()
 
 
-def test_no_index_is_a_homing_error_that_is_told(bus_without_index: str) -> None:
+def test_no_index_is_a_homing_error_that_is_reported(bus_without_index: str) -> None:
     with open_rig(bus_without_index) as rig:
         with pytest.raises(DriveFaultError, match="homing error"):
             _home(rig, 33)
@@ -144,7 +144,7 @@ def test_the_probe_sees_nothing_where_there_is_no_index(bus_without_index: str) 
             _turn(rig, 0.2, seconds=1.0)
 
 
-def test_a_map_without_the_probe_is_told(bus: str) -> None:
+def test_a_map_without_the_probe_is_reported(bus: str) -> None:
     drive = DRIVE.model_copy(update={"tpdos": DRIVE.tpdos[:1]})
     with open_rig(bus, drive=drive) as rig, pytest.raises(DriveFaultError, match="60B9h"):
         touch_probe.arm(rig.group, 0)

@@ -145,7 +145,7 @@ def _one(drive: DriveProfile, limit_Nm: float = 2.0) -> GroupLayout:
     return GroupLayout([AxisConfig(1, drive, 3.0, 8192, 0x2D, limit_Nm)])
 
 
-def test_feedback_that_is_told_again_when_it_changes_is_not_waited_for() -> None:
+def test_feedback_that_is_reported_again_when_it_changes_is_not_waited_for() -> None:
     """Drives have the statusword in a PDO of its own, sent on change, as delivered."""
     (statusword, *_), *_ = (pdo.entries for pdo in SPLIT.tpdos)
     event = Pdo(number=2, cob_id_offset=0x280, transmission_type=255, entries=(statusword,))
@@ -158,7 +158,7 @@ def test_feedback_that_is_told_again_when_it_changes_is_not_waited_for() -> None
         assert tpdos.index(event) not in fields[fields[:, 3] > 0, 0]
 
 
-def test_what_would_be_set_to_zero_every_cycle_is_refused() -> None:
+def test_a_mapped_object_that_would_be_zeroed_is_rejected() -> None:
     command, torque = SPLIT.rpdos
     for index, refused in ((0x6060, True), (0x6072, True), (0x0005, False)):
         more = (*command.entries, PdoEntry(index=index, bits=8))

@@ -216,7 +216,7 @@ def test_without_a_master_a_cycle_ends_soon_and_says_so(stage: Stage) -> None:
         assert not ears.feedback.valid[0]
 
 
-def test_silence_of_a_drive_is_an_alarm_until_the_master_begins_anew(
+def test_silence_of_a_drive_is_an_alarm_until_the_master_starts_again(
     stage: Stage, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("cdpr_drivers.axes.listening._LOCKSTEP_ANSWER_S", 0.01)
@@ -239,7 +239,7 @@ def test_silence_of_a_drive_is_an_alarm_until_the_master_begins_anew(
         assert alarm(ears) == ""
 
 
-def test_what_the_other_master_does_with_its_drives_is_no_alarm(stage: Stage) -> None:
+def test_actions_of_the_other_master_raise_no_alarm(stage: Stage) -> None:
     with device([stage], [[1]]) as ears:
         for word, mode in ((ENABLED, 10), (0x0240, 6), (ENABLED, 6), (0x0231, 8), (ENABLED, 8)):
             stage.says(0x080)
@@ -352,14 +352,14 @@ def test_a_flood_does_not_hold_a_cycle_up(stage: Stage) -> None:
             thread.join()
 
 
-def test_a_bus_that_goes_away_is_told(stage: Stage) -> None:
+def test_a_bus_that_goes_away_is_reported(stage: Stage) -> None:
     with device([stage], [[1]]) as ears:
         stage.end()
         with pytest.raises(BusError, match="gone away"):
             cycle(ears)
 
 
-def test_a_bus_that_is_not_there_is_told() -> None:
+def test_a_bus_that_is_not_there_is_reported() -> None:
     axis = monitored_axis(WINCH, 1)
     with pytest.raises(BusError, match="no simulated bus"):
         ListeningDevice(

@@ -112,7 +112,7 @@ def test_the_highest_rate_is_where_it_stops_to_fit(n: int, bitrate: int):
     assert not above.fits
 
 
-def test_what_comes_on_a_change_counts_by_its_priority():
+def test_event_driven_frames_count_by_priority():
     first, second = DRIVE.tpdos
     below = second.model_copy(update={"cob_id_offset": 0x181, "transmission_type": 255})
     waits = bus_budget("b", 1_000_000, 1e-3, [(1, DRIVE)])

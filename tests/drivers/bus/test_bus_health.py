@@ -22,7 +22,7 @@ from cdpr_drivers.bus.health import ERR_FLAG
         (0x002, [], BusState.ACTIVE, 0, ""),  # lost arbitration is how a bus works
     ],
 )
-def test_what_each_error_frame_tells(
+def test_error_frames_are_classified(
     can_id: int, data: list[int], state: BusState, errors: int, words: str
 ) -> None:
     health = BusHealth()

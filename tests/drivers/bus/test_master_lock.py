@@ -57,7 +57,7 @@ def test_the_second_is_refused_with_the_first_ones_process(url: BusUrl) -> None:
     MasterLock(url).close()
 
 
-def test_buses_are_told_apart(url: BusUrl) -> None:
+def test_buses_are_distinguished(url: BusUrl) -> None:
     with MasterLock(url):
         other = BusUrl.parse(f"{url}-b")
         refuse_second_master(other)

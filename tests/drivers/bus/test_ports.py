@@ -262,7 +262,7 @@ def test_all_rows_go_out_in_order(pair: Pair) -> None:
     assert [pair.far.recv(99) for _ in range(N)] == [bytes(row) for row in pair.out.rows]
 
 
-def test_what_has_come_is_taken_in_with_its_length(pair: Pair) -> None:
+def test_received_frames_keep_their_length(pair: Pair) -> None:
     pair.port.settimeout(0.0)
     assert pair.batch.receive() == 0
     packets = [bytes([k]) * (16 + k) for k in range(N + 2)]
@@ -284,14 +284,14 @@ def test_the_other_ends_leaving_is_a_length_of_zero(pair: Pair) -> None:
     assert pair.batch.lengths[last - 1] == 0
 
 
-def test_a_full_socket_is_told_as_by_the_port(pair: Pair) -> None:
+def test_a_full_socket_is_reported_as_by_the_port(pair: Pair) -> None:
     pair.port.settimeout(0.0)
     with pytest.raises(BlockingIOError):
         while True:
             pair.sender.send()
 
 
-def test_a_closed_port_is_told(pair: Pair) -> None:
+def test_a_closed_port_is_reported(pair: Pair) -> None:
     pair.port.close()
     with pytest.raises(OSError, match="Bad file descriptor"):
         pair.batch.receive()

@@ -100,7 +100,7 @@ def test_a_command_alone_and_too_many_for_a_packet_go_one_by_one(led: Led, n: in
 
 
 @pytest.mark.parametrize("packet", [b"", bytes(24), bytes(20)], ids=["gone", "24", "20"])
-def test_what_is_neither_ends_the_bus(led: Led, packet: bytes) -> None:
+def test_an_invalid_mode_ends_the_bus(led: Led, packet: bytes) -> None:
     if packet:
         led.far.send(packet)
     else:

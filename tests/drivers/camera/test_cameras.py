@@ -47,7 +47,7 @@ def test_a_folder_is_read_in_the_order_of_its_numbers(tmp_path: Path) -> None:
     assert names == [f"{k + 1}.png" for k in range(12)]
 
 
-def test_a_video_is_a_camera_for_opencv_and_its_end_is_told(tmp_path: Path) -> None:
+def test_a_video_is_a_camera_for_opencv_and_its_end_is_reported(tmp_path: Path) -> None:
     path = tmp_path / "video.avi"
     writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"MJPG"), 10.0, (80, 64))
     for level in (40, 200):
@@ -71,7 +71,7 @@ def test_a_video_is_a_camera_for_opencv_and_its_end_is_told(tmp_path: Path) -> N
         ("sim:/nowhere.sock", "`cdpr sim camera` starts one"),
     ],
 )
-def test_what_cannot_be_opened_is_told(url: str, said: str) -> None:
+def test_a_camera_that_cannot_be_opened_is_reported(url: str, said: str) -> None:
     with pytest.raises(CameraError, match=said):
         open_camera(url, LockstepClock())
 
@@ -161,7 +161,7 @@ class Stream:
         return self.grab(), np.full((4, 4), self._taken, np.uint8)
 
 
-def test_what_a_stream_had_waiting_is_not_taken_for_an_image_of_now() -> None:
+def test_buffered_frames_are_not_used_as_current_images() -> None:
     stream: Any = Stream()
     with mock.patch.object(cv2, "VideoCapture", lambda _: stream):
         assert OpencvCamera("rtsp://10.0.0.9/stream", stream).grab().pixels[0, 0] > 5

@@ -174,7 +174,7 @@ def test_without_a_trigger_the_image_that_was_there_before_is_not_taken(
         ({"open_fails": RuntimeError("access denied")}, "access denied; is it used by another"),
     ],
 )
-def test_a_camera_that_cannot_be_opened_is_told_and_the_producer_let_go(
+def test_a_camera_that_cannot_be_opened_is_reported_and_the_producer_let_go(
     tmp_path: Path, harvester: type[FakeHarvester], state: dict[str, Any], said: str
 ) -> None:
     for key, value in state.items():
@@ -197,7 +197,7 @@ def test_a_camera_that_cannot_be_opened_is_told_and_the_producer_let_go(
         ),
     ],
 )
-def test_an_image_that_does_not_come_is_told(
+def test_an_image_that_does_not_come_is_reported(
     tmp_path: Path, harvester: type[FakeHarvester], state: dict[str, Any], said: str
 ) -> None:
     with opened(tmp_path) as camera:
@@ -207,7 +207,7 @@ def test_an_image_that_does_not_come_is_told(
             camera.grab()
 
 
-def test_an_incomplete_image_of_before_is_told_no_less(
+def test_an_incomplete_image_of_before_is_reported_no_less(
     tmp_path: Path, harvester: type[FakeHarvester]
 ) -> None:
     harvester.triggered, harvester.incomplete = False, True
@@ -218,7 +218,7 @@ def test_an_incomplete_image_of_before_is_told_no_less(
         camera.grab()
 
 
-def test_a_producer_that_is_no_file_is_told(harvester: type[FakeHarvester]) -> None:
+def test_a_producer_that_is_no_file_is_reported(harvester: type[FakeHarvester]) -> None:
     with pytest.raises(CameraError, match=r"no file /nowhere\.cti; it is the GenTL producer"):
         open_camera("genicam:/nowhere.cti", LockstepClock())
 

@@ -181,14 +181,14 @@ def test_eight_drives_boot_at_the_same_time() -> None:
         simulator.stop()
 
 
-def test_of_several_failures_all_are_told(bus: str) -> None:
+def test_of_several_failures_all_are_reported(bus: str) -> None:
     with open_network(bus, [1, 8, 9]) as network, pytest.raises(BootError) as caught:
         boot_all(network, dict.fromkeys([1, 8, 9], (DRIVE, SETTINGS)))
     assert caught.value.node_id == 8
     assert any("node 9" in note for note in caught.value.__notes__)
 
 
-def test_a_bus_that_nobody_runs_is_told_by_name() -> None:
+def test_a_bus_that_nobody_runs_is_reported_by_name() -> None:
     with pytest.raises(BusError, match="nobody-here"):
         url = BusUrl.parse("simbus:nobody-here")
         CanNetwork(url, open_clock([url]), [1], MASTER, HEARTBEAT_S)

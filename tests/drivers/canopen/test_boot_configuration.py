@@ -90,7 +90,7 @@ def test_every_difference_changes_the_stamp() -> None:
     assert all(0 < s.days <= 0xFFFF and 0 < s.ms < 86_400_000 for s in stamps)
 
 
-def test_what_the_eds_cannot_take_is_told_before_anything_is_sent() -> None:
+def test_settings_invalid_by_the_eds_are_reported_before_anything_is_sent() -> None:
     tpdo = DRIVE.tpdos[0].model_copy(update={"number": 5})
     with pytest.raises(DriverError, match="1804h:1 is not in the drive's EDS"):
         _wanted(DRIVE.model_copy(update={"tpdos": (tpdo,)}))

@@ -23,7 +23,7 @@ OPTIONAL = replace(SETTINGS, mandatory=False)
 WRONG = DRIVE.model_copy(update={"product_code": 0x1234})
 
 
-def test_an_optional_node_that_is_missing_is_told_and_nothing_else(bus: str) -> None:
+def test_an_optional_node_that_is_missing_is_reported_and_nothing_else(bus: str) -> None:
     drives = {1: (DRIVE, SETTINGS), 2: (DRIVE, OPTIONAL), 9: (DRIVE, OPTIONAL)}
     with open_network(bus, [1, 2, 9]) as network:
         reports = boot_all(network, drives)
@@ -58,7 +58,7 @@ def test_a_node_booted_alone_is_mandatory(bus: str) -> None:
     assert caught.value.letter == "M"
 
 
-def test_another_master_is_told_for_all_at_once(bus: str) -> None:
+def test_another_master_is_reported_for_all_at_once(bus: str) -> None:
     with (
         open_network(bus, [1, 2], lead=False) as network,
         scripted(bus, 9, lambda _request: []) as other,

@@ -25,7 +25,7 @@ def network(rig: Rig) -> CanNetwork:
         (0x1018, 1, 1, "06010002h"),
     ],
 )
-def test_an_abort_is_told_in_words_with_node_and_object(
+def test_an_abort_is_reported_as_text_with_node_and_object(
     network: CanNetwork, index: int, sub: int, value: int, words: str
 ) -> None:
     with pytest.raises(SdoError) as caught:
@@ -39,14 +39,14 @@ def test_a_value_too_large_for_its_type_never_leaves(network: CanNetwork) -> Non
         network.write(1, 0x6060, 0, 1000)
 
 
-def test_an_object_the_eds_lacks_is_told(network: CanNetwork) -> None:
+def test_an_object_the_eds_lacks_is_reported(network: CanNetwork) -> None:
     with pytest.raises(SdoError, match="5F00h:0 is not in the drive's EDS"):
         network.read(1, 0x5F00)
     with pytest.raises(SdoError, match="1018h:9 is not in the drive's EDS"):
         network.read(1, 0x1018, 9)
 
 
-def test_a_silent_node_is_told_after_the_attempts(bus: str) -> None:
+def test_a_silent_node_is_reported_after_the_attempts(bus: str) -> None:
     with open_network(bus, [9]) as network:
         begin_s = network.clock.now_s
         with pytest.raises(SdoError, match="node 9"):

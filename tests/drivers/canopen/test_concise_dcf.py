@@ -34,5 +34,5 @@ def test_the_layout_is_that_of_1f22h() -> None:
 
 
 @given(lists)
-def test_what_goes_in_comes_out(wanted: tuple[DcfEntry, ...]) -> None:
+def test_concise_dcf_survives_a_round_trip(wanted: tuple[DcfEntry, ...]) -> None:
     assert decoded(Configuration(wanted).concise_dcf()) == wanted

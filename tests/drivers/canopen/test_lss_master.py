@@ -167,7 +167,7 @@ def test_a_silent_owner_of_a_node_id_is_known_by_its_heartbeat() -> None:
         assert master.node_id_in_use(9) == "its heartbeat is on the bus"
 
 
-def test_refusals_are_told_in_words(tmp_path: Path) -> None:
+def test_refusals_are_reported_as_text(tmp_path: Path) -> None:
     with master_of(device(1, 4, store=tmp_path / "missing" / "drive.json")) as master:
         master.select(address(1))
         with pytest.raises(LssError, match="refuses node id 128: it takes node ids 1 to 127 only"):
@@ -176,7 +176,7 @@ def test_refusals_are_told_in_words(tmp_path: Path) -> None:
             master.store()
 
 
-def test_a_refused_bit_rate_is_told() -> None:
+def test_a_refused_bit_rate_is_reported() -> None:
     node = device(1, 4)
     node.od.bitrates = frozenset({1_000_000, 500_000})
     with master_of(node) as master:

@@ -103,7 +103,7 @@ def test_segments_lost_from_a_block_are_sent_again(network: CanNetwork, bus: str
         (0xDEADBEEF, "a code no standard has"),
     ],
 )
-def test_abort_codes_are_told_in_words_and_as_a_number(
+def test_abort_codes_are_reported_as_text_and_as_a_number(
     network: CanNetwork, bus: str, code: int, words: str
 ) -> None:
     with (
@@ -150,7 +150,7 @@ def test_a_transfer_of_a_task_is_cancelled(network: CanNetwork, bus: str, block:
         assert network.read_int(SCRIPTED, 0x1000) == 4711
 
 
-def test_the_drive_is_told_and_serves_the_next_request(network: CanNetwork) -> None:
+def test_the_drive_is_reported_and_serves_the_next_request(network: CanNetwork) -> None:
     network.write_bytes(1, 0x2F10, 0, bytes(6000))
     task = network.clock.start(lambda: network.read_bytes(1, 0x2F10))
     network.clock.sleep(0.001)
@@ -213,7 +213,7 @@ def test_a_lost_request_is_repeated(
     assert [request[0] for request in asked] == [0x40, 0x80, 0x40]  # the first one was given up
 
 
-def test_a_drive_that_vanishes_in_the_middle_is_told_and_the_other_goes_on(
+def test_a_drive_that_vanishes_in_the_middle_is_reported_and_the_other_goes_on(
     network: CanNetwork, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     network.write_bytes(1, 0x2F10, 0, bytes(700))

@@ -190,7 +190,7 @@ def test_a_drive_that_keeps_its_torque_is_switched_off_while_the_others_go_on(
 # -- emergency messages
 
 
-def test_an_emergency_is_told_in_words_and_kept_until_it_is_taken_back(trio: Rig) -> None:
+def test_an_emergency_is_reported_as_text_and_kept_until_it_is_taken_back(trio: Rig) -> None:
     text = _drive_into(trio, lambda: trio.misbehave(RAISE_FAULT, 0x4310, node=3))
     assert "(node 3) reports error" in text
     assert "4310h (drive temperature too high)" in text

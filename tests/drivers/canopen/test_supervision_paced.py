@@ -119,7 +119,7 @@ def test_a_simulator_that_is_held_up_misses_no_heartbeat(
     assert rig.network.read_int(2, 0x1001) == 0
 
 
-def test_a_bus_that_takes_no_frames_any_more_is_told_and_not_waited_for(
+def test_a_bus_that_takes_no_frames_any_more_is_reported_and_not_waited_for(
     rig: Rig, simulator: tuple[str, int]
 ) -> None:
     """The transmit queue is full: here the simulator's process is frozen."""

@@ -72,7 +72,7 @@ def _no_more_than_mapped(node: canopen.LocalNode) -> Callable[..., None]:
 LEAN = DRIVE.model_copy(update=dict.fromkeys(("product_code", "revision", "serial")))
 
 
-def test_what_is_optional_may_be_absent(stock: canopen.LocalNode, network: CanNetwork) -> None:
+def test_optional_objects_may_be_missing(stock: canopen.LocalNode, network: CanNetwork) -> None:
     stock.set_data(0x1A00, 0, b"\0")
     stock.add_read_callback(_no_more_than_mapped(stock))  # type: ignore[no-untyped-call]
     report = boot(network, FOREIGN_NODE, LEAN, SETTINGS)
@@ -82,7 +82,7 @@ def test_what_is_optional_may_be_absent(stock: canopen.LocalNode, network: CanNe
     assert stock.get_data(0x1A00, 2) == bytes.fromhex("20006460")
 
 
-def test_what_the_profile_asks_for_must_be_there(
+def test_objects_required_by_the_profile_must_exist(
     stock: canopen.LocalNode, network: CanNetwork
 ) -> None:
     with pytest.raises(BootError, match=r"step M.*product code is not there") as caught:

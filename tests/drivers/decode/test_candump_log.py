@@ -101,7 +101,7 @@ def test_lines_of_can_utils() -> None:
         ("\x00\xff\xfe", "not of the form"),
     ],
 )
-def test_a_line_that_is_none_is_told_by_number(line: str, words: str) -> None:
+def test_a_line_that_is_none_is_reported_by_number(line: str, words: str) -> None:
     good = "(1.000000) can0 123#11\n"
     with pytest.raises(LogError, match=r"trip\.log: line 3: ") as told:
         list(read_log("trip.log", [good, "\n", line + "\n", good]))

@@ -156,7 +156,7 @@ def test_bits_that_depend_on_the_mode_need_it() -> None:
     assert "follows commands" not in decoder.decode(feedback).text
 
 
-def test_a_pdo_that_does_not_fit_its_map_is_told() -> None:
+def test_a_pdo_that_does_not_fit_its_map_is_reported() -> None:
     short = decoded(0x181, "3702 00080000")
     assert short.problem
     assert "6 bytes, too few for the map" in short.text
@@ -301,7 +301,7 @@ def test_error_frames(classes: int, data: str, text: str) -> None:
     assert record.text.startswith(text)
 
 
-def test_what_is_no_canopen_is_shown_as_it_is() -> None:
+def test_frames_outside_canopen_are_shown_raw() -> None:
     decoder = Decoder()
     extended = decoder.decode(Frame(0.0, 0x181, b"\1", extended=True))
     assert (extended.kind, extended.node_id) == ("frame", None)

@@ -156,7 +156,9 @@ def test_a_transfer_joined_in_its_middle(client: canopen.RemoteNode, overhear: O
     assert not [event for event in found if event.data is not None]
 
 
-def test_what_is_read_is_believed(client: canopen.RemoteNode, overhear: Overhear) -> None:
+def test_values_read_by_sdo_are_used_for_decoding(
+    client: canopen.RemoteNode, overhear: Overhear
+) -> None:
     """Ratings and PDO maps that pass by serve from then on."""
     overhear()
     for index, sub in ((0x6076, 0), (0x608F, 1), *((0x1A00, entry) for entry in range(4))):

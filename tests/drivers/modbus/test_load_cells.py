@@ -105,7 +105,7 @@ def test_every_cell_reads_the_tension_of_its_cable(rig: LoadCellRig, cells: Load
         ("wrong-unit", "unit 3 answered"),
     ],
 )
-def test_a_disturbed_line_is_told_and_harms_no_other_cell(
+def test_a_disturbed_line_is_reported_and_harms_no_other_cell(
     rig: LoadCellRig, cells: LoadCells, fault: str, message: str
 ) -> None:
     rig.tell(f"{fault} 2")
@@ -118,7 +118,7 @@ def test_a_disturbed_line_is_told_and_harms_no_other_cell(
     assert cells.read(1).fault is TensionFault.NONE
 
 
-def test_over_range_and_broken_wire_are_told_apart(rig: LoadCellRig, cells: LoadCells) -> None:
+def test_over_range_and_broken_wire_are_distinguished(rig: LoadCellRig, cells: LoadCells) -> None:
     rig.tell("over-range 1")
     rig.tell("broken-wire 2")
     assert cells.read(0).fault is TensionFault.OVER_RANGE
@@ -154,7 +154,7 @@ def test_tare_makes_the_present_tension_zero(rig: LoadCellRig, cells: LoadCells)
     settled(cells, 0, 0.0)
 
 
-def test_a_register_that_is_not_there_is_refused_in_words(cells: LoadCells) -> None:
+def test_a_register_that_is_not_there_is_rejected_with_a_reason(cells: LoadCells) -> None:
     with pytest.raises(ModbusError, match=r"unit 1: holding register 99: refused.*no such input"):
         cells.line.registers("holding", 1, 99, 1)
     with pytest.raises(
@@ -211,7 +211,7 @@ def test_the_sampler_dates_readings_and_outlives_what_fails(rig: LoadCellRig) ->
         until(lambda: valid([True, True, True]))
 
 
-def test_a_port_that_is_not_there_is_told(tmp_path: Path) -> None:
+def test_a_port_that_is_not_there_is_reported(tmp_path: Path) -> None:
     with pytest.raises(LineError, match=r"ttyNone: cannot be opened: No such file or directory"):
         TensionSampler(three(), str(tmp_path / "ttyNone"), CLOCK).start()
     plain = tmp_path / "plain"

@@ -87,7 +87,9 @@ def test_a_good_answer_is_read(device: Babbler, client: ModbusTcp) -> None:
         (bytes([0x82, 200]), "exception 200 .unknown exception"),
     ],
 )
-def test_a_wrong_answer_is_told(device: Babbler, client: ModbusTcp, body: bytes, said: str) -> None:
+def test_a_wrong_answer_is_reported(
+    device: Babbler, client: ModbusTcp, body: bytes, said: str
+) -> None:
     device.answer = lambda request: framed(request, body)
     with pytest.raises(
         ModbusError, match=f"127.0.0.1:{device.port}: discrete inputs 7 to 15: .*{said}"

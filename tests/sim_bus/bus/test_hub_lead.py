@@ -119,7 +119,7 @@ def test_frames_of_others_move_nothing_on_a_led_bus(start_bus: StartBus, stub_no
     assert member.sync() == ([ANSWER], 0.02, math.inf)
 
 
-def test_nodes_that_answer_each_other_are_done_before_the_time_is_told(
+def test_nodes_that_answer_each_other_are_done_before_the_time_is_reported(
     start_bus: StartBus, stub_node: type
 ) -> None:
     """A frame goes from node to node; the master has them all in front of the time packet."""
@@ -168,9 +168,7 @@ def test_one_leads_at_a_time(start_bus: StartBus, stub_node: type) -> None:
     assert member.ask({"lead": True}) == {"error": "lead: another client leads this bus"}
 
 
-def test_a_bus_given_back_stands_until_somebody_speaks(
-    start_bus: StartBus, stub_node: type
-) -> None:
+def test_a_bus_released_stands_until_somebody_speaks(start_bus: StartBus, stub_node: type) -> None:
     bus = start_bus(stub_node(1, timers=(3.05,)))
     member, other = bus.join(), bus.join()
     member.lead()
@@ -237,7 +235,7 @@ def test_a_leader_that_dies_during_its_go_is_noticed(start_bus: StartBus, stub_n
     assert end_s - begun_s <= passed_s <= time.monotonic() - before_s
 
 
-def test_the_time_is_told_as_soon_as_the_master_reads_again(
+def test_the_time_is_reported_as_soon_as_the_master_reads_again(
     start_bus: StartBus, stub_node: type
 ) -> None:
     """Its socket is full of another's frames when the packet is due."""

@@ -313,7 +313,7 @@ def test_a_client_that_leaves_or_does_not_read_harms_nobody(
 # -- how they begin and end
 
 
-def test_a_port_in_use_is_told(simulator: Simulator) -> None:
+def test_a_port_in_use_is_reported(simulator: Simulator) -> None:
     second = Simulator(f"simbus:{NAME}-2", simulator.port)
     status, errors = second.stop()
     assert status == 1

@@ -175,7 +175,9 @@ def test_giving_up_the_watch_takes_the_error_back(bench: Bench) -> None:
     assert bench.run_to(2.0) == []
 
 
-def test_emergencies_are_told_once_kept_in_the_register_and_in_the_history(bench: Bench) -> None:
+def test_emergencies_are_reported_once_kept_in_the_register_and_in_the_history(
+    bench: Bench,
+) -> None:
     slave = bench.slave
     slave.emergency(0x2310, 0x02, b"\x34\x12xyz")
     slave.emergency(0x2310, 0x02)

@@ -68,7 +68,7 @@ def test_new_node_id_counts_after_a_reset_of_communication(
     assert again.take() == [(0x700 + 33, b"\0")]
 
 
-def test_store_that_fails_is_told(master: type[LssMaster], tmp_path: Path) -> None:
+def test_store_that_fails_is_reported(master: type[LssMaster], tmp_path: Path) -> None:
     bench = lss_bench(NODE, ParameterStore(tmp_path / "missing" / "drive.json"))
     lss = bench.network.lss
     lss.send_switch_state_global(lss.CONFIGURATION_STATE)

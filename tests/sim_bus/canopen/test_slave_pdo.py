@@ -167,7 +167,7 @@ def test_event_driven_rpdo_acts_at_once(running: Bench) -> None:
     assert running.app.events == [("after_rpdo", running.now)]
 
 
-def test_missed_rpdo_deadline_is_told_and_taken_back(running: Bench) -> None:
+def test_missed_rpdo_deadline_is_reported_and_taken_back(running: Bench) -> None:
     running.write(0x1400, 5, (30).to_bytes(2, "little"))
     assert running.run_to(running.now + 1.0) == []
     t = running.now
@@ -194,7 +194,7 @@ def test_wrong_length_is_an_emergency_and_a_short_frame_is_dropped(running: Benc
     assert emcy_codes(running.send(RPDO1, bytes(4))) == [0]
 
 
-def test_errors_of_pdos_are_told_again_after_a_reset_of_communication(running: Bench) -> None:
+def test_errors_of_pdos_are_reported_again_after_a_reset_of_communication(running: Bench) -> None:
     assert emcy_codes(running.send(RPDO1, b"")) == [0x8210]
     running.nmt(130)
     assert running.od.get(0x1001) == 0

@@ -141,7 +141,7 @@ def test_scan_for_people(lab: Lab) -> None:
 
 
 @hastily
-def test_two_nodes_with_one_id_are_told(lab: Lab) -> None:
+def test_two_nodes_with_one_id_are_reported(lab: Lab) -> None:
     with third_party_node(lab, 1, x1018_4=77, x1000=0x20192):
         found = scan(lab, "--nodes", "1-2")
     assert found[2]["problems"] == []

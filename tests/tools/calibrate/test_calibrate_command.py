@@ -138,7 +138,7 @@ def hardly_off(tmp_path: Path, seed: int, exit_m: float) -> list[Any]:
     return [*words, "--json", "--points", points_of(what, tmp_path / "p.csv")]
 
 
-def test_what_changes_nothing_significantly_is_taken_over_only_when_asked(tmp_path: Path) -> None:
+def test_an_insignificant_calibration_is_adopted_only_on_request(tmp_path: Path) -> None:
     words = hardly_off(tmp_path, 21, 2.5e-4)
     done = cdpr_here(*words)
     assert done.returncode == 0, done.stderr
@@ -157,7 +157,7 @@ def test_what_changes_nothing_significantly_is_taken_over_only_when_asked(tmp_pa
     assert result(asked)["in_force"]["version"] == 1 and result(asked)["not_taken_over"] is None
 
 
-def test_what_tells_poses_not_used_worse_is_not_taken_over_even_when_asked(
+def test_a_calibration_that_predicts_held_out_poses_worse_is_never_adopted(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(Verification, "worse_than", lambda *_: True)
@@ -201,7 +201,7 @@ def test_redundancy_says_that_the_frame_is_that_of_the_file(tmp_path: Path) -> N
     assert residuals["length_residual_mm"] < residuals["length_residual_before_mm"]
 
 
-def test_a_slipped_encoder_is_told_and_survived(tmp_path: Path) -> None:
+def test_a_slipped_encoder_is_reported_and_survived(tmp_path: Path) -> None:
     def slip(lengths: Any) -> None:
         lengths[20:, 6] += 0.015
 
@@ -306,7 +306,7 @@ def test_the_study_has_each_figure_and_the_ratio(tmp_path: Path) -> None:
         assert matplotlib.image.imread(tmp_path / f"study{end}.png").std() > 0.01
 
 
-def test_a_cluster_that_is_not_there_is_told() -> None:
+def test_a_cluster_that_is_not_there_is_reported() -> None:
     done = cdpr_here("calibrate", "study", "--cluster", "127.0.0.1:1")
     # after the progress, where drawing poses takes long enough for any
     assert done.returncode == 1

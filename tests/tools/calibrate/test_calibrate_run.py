@@ -147,7 +147,7 @@ def go_on(folder: Path, wanted: run.CalibrationRunSettings) -> CalibrationData:
         (KeyboardInterrupt(), KeyboardInterrupt),  # as sudden as a kill
     ],
 )
-def test_what_was_read_is_kept_and_the_rest_is_read_later(
+def test_measured_poses_are_kept_and_the_rest_resumed(
     failure: BaseException,
     raised: type[BaseException],
     tmp_path: Path,
@@ -204,7 +204,7 @@ def test_a_kill_between_two_files_loses_one_pose_and_no_more(
     assert again.poses[:9] == data.poses[:9]
 
 
-def test_lengths_that_count_anew_after_a_restart_spoil_nothing(
+def test_lengths_that_count_again_after_a_restart_spoil_nothing(
     tmp_path: Path, rigs: Callable[..., list[Rig]]
 ) -> None:
     rigs((12, StoppedError()))
@@ -247,7 +247,7 @@ def test_the_scanner_takes_its_time_at_the_first_pose_and_at_those_held_out(
     assert longer[0][1] > max(s for _, s in longer[1:])
 
 
-def test_what_was_true_is_that_of_the_reading_though_the_scanner_measures_longer(
+def test_truth_belongs_to_the_reading_although_the_scanner_takes_longer(
     tmp_path: Path, rigs: Callable[..., list[Rig]], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     rigs()
@@ -395,7 +395,7 @@ def test_a_new_run_keeps_what_somebody_else_has_put_beside_its_images(tmp_path: 
     assert (tmp_path / run.IMAGES / "holiday.png").read_text() == "a beach"
 
 
-def test_what_was_read_of_a_real_robot_is_not_overwritten_by_a_simulation(tmp_path: Path) -> None:
+def test_a_simulation_does_not_overwrite_readings_of_a_real_robot(tmp_path: Path) -> None:
     kept = run.StoredRun.new(tmp_path, ROBOT, None)
     kept.data.model_copy(update={"simulated": False}).save(tmp_path / run.DATA)
     with pytest.raises(BadInputError, match="was read of a real robot"):

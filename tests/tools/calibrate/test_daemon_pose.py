@@ -79,7 +79,7 @@ def kept_in(told: Told, folder: Path) -> tuple[Robot, daemon_run.DaemonPoses]:
     return robot, daemon_run.DaemonPoses(folder, data)
 
 
-def test_poses_follow_each_other_and_lengths_that_count_anew_are_noticed(tmp_path: Path) -> None:
+def test_poses_follow_each_other_and_lengths_that_count_again_are_noticed(tmp_path: Path) -> None:
     told = Told()
     home = read(told, tmp_path).poses[0]
     assert home.target == tuple(told.place) and home.tension_N == (40.0, 41.0, 42.0, 43.0)

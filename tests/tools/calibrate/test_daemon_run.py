@@ -221,7 +221,7 @@ def test_a_hold_from_elsewhere_ends_it_also_while_the_platform_stands(
     assert len(load_data(measurement.folder / "data.json").poses) == 3
 
 
-def test_a_stop_holds_and_a_lost_daemon_is_told(measurement: Measurement) -> None:
+def test_a_stop_holds_and_a_lost_daemon_is_reported(measurement: Measurement) -> None:
     measurement.run(2)
     daemon, post = measurement.daemon, measurement.daemon.post
 

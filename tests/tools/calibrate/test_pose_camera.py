@@ -114,7 +114,7 @@ def test_a_camera_that_stays_gone_ends_it(tmp_path: Path, monkeypatch: pytest.Mo
     assert len(opens) == 3 and "opened again" in said[0]
 
 
-def test_another_resolution_and_ids_printed_twice_are_told(
+def test_another_resolution_and_ids_printed_twice_are_reported(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     camera, _, said = opened([scene(3, 7, 3), scene(3, 7, 3), GOOD[:200]], tmp_path, monkeypatch)

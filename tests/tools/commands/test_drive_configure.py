@@ -41,7 +41,7 @@ def test_a_stored_configuration_is_vouched_for_after_the_next_start(bus: str) ->
     assert (told["vouched"], told["stored"], told["changed"]) == (True, False, [])
 
 
-def test_what_a_drive_remembers_is_told_in_words(bus: str) -> None:
+def test_what_a_drive_remembers_is_reported_as_text(bus: str) -> None:
     assert _cdpr("drive", "errors", WINCH, "--bus", bus)[1]["history"] == []
     for code in ("0x7305", "0x4310"):
         _cdpr("drive", "od", WINCH, "2F00:1", "--set", code, "--bus", bus)

@@ -156,7 +156,7 @@ def test_one_drive_alone_gets_a_bit_rate_that_counts(tmp_path: Path) -> None:
         process.communicate(timeout=120)
 
 
-def test_a_store_that_is_damaged_is_told(tmp_path: Path) -> None:
+def test_a_store_that_is_damaged_is_reported(tmp_path: Path) -> None:
     (tmp_path / "drive-1.json").write_text("{")
     command = [sys.executable, "-m", "cdpr_tools.cli", "sim", "up", WINCH, "--bus", "simbus:never"]
     ended = subprocess.run(
@@ -200,7 +200,7 @@ def test_a_driven_drive_is_left_alone() -> None:
         ((), "no simulated bus of that name"),
     ],
 )
-def test_wrong_arguments_are_told(arguments: tuple[str, ...], problem: str) -> None:
+def test_wrong_arguments_are_reported(arguments: tuple[str, ...], problem: str) -> None:
     assert problem in refused(2, "simbus:nobody-runs-this", *arguments)
 
 

@@ -129,7 +129,7 @@ def test_export_of_some_fields_and_a_stretch(folder: Path, tmp_path: Path) -> No
     assert np.allclose(table["elapsed_s"].to_numpy(), np.arange(2000, 2101) * 1e-3)
 
 
-def test_time_goes_on_where_cycles_begin_anew(tmp_path: Path) -> None:
+def test_time_goes_on_where_cycles_begin_again(tmp_path: Path) -> None:
     # as after a fault that made the drives boot again
     again = made_rows(0, 500)
     again["stamp_ns"] += 2_000_000_000

@@ -116,7 +116,9 @@ def test_images_that_are_mirrored_are_said_to_be(photos: Path, tmp_path: Path) -
         (("board", "--marker-mm", "28"), "smaller markers"),
     ],
 )
-def test_bad_input_is_told(photos: Path, tmp_path: Path, words: tuple[str, ...], said: str) -> None:
+def test_bad_input_is_reported(
+    photos: Path, tmp_path: Path, words: tuple[str, ...], said: str
+) -> None:
     done = cdpr_here("markers", *(word.format(photos=photos) for word in words), cwd=tmp_path)
     assert done.returncode == 2, done.stdout
     assert said in done.stderr

@@ -133,7 +133,7 @@ def test_encoder_table_differs_from_the_true_one(results: dict[str, Any], page: 
     assert judged["harmonic"][FIGURES[2]] != results["validation"]["harmonic"][FIGURES[2]]
 
 
-def test_harmonics_and_margins_are_told(results: dict[str, Any], page: Page) -> None:
+def test_harmonics_and_margins_are_reported(results: dict[str, Any], page: Page) -> None:
     amplitudes = [1e3 * one for one in AMPLITUDES_Nm.values()]
     assert amplitudes in page.tables
     assert "cause of 24" in page.plain

@@ -118,7 +118,7 @@ def test_rotor_that_stands_still_is_seen(tmp_path: Path) -> None:
     assert curves.read_ramp(path, None).standing > 0.9
 
 
-def test_what_repeats_is_told_from_what_does_not(tmp_path: Path) -> None:
+def test_repeatable_and_random_parts_are_separated(tmp_path: Path) -> None:
     made = MadeUp(tmp_path)
     rng = np.random.default_rng(3)
 

@@ -158,7 +158,7 @@ def test_nothing_is_compensated_before_an_index_is_known_and_then_it_fades_in(
     assert torque.max() > 0.04
 
 
-def test_what_is_compensated_is_the_cogging_where_each_motor_is(
+def test_each_motor_is_compensated_at_its_own_angle(
     compensated: _Compensated,
     plant: Path,
     wanted: Wanted,

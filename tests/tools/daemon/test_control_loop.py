@@ -237,7 +237,7 @@ def test_a_drive_in_fault_quick_stops_the_others_and_latches(jogging: LoopRig) -
     jogging.obeyed("enable")
 
 
-def test_a_drive_that_falls_silent_is_booted_anew(jogging: LoopRig) -> None:
+def test_a_drive_that_falls_silent_is_booted_again(jogging: LoopRig) -> None:
     jogging.inject_fault(1, SILENT_MS, 100)
     jogging.turn_until(lambda: jogging.state is LoopState.FAULT)
     assert "node 2" in jogging.status["reason"]

@@ -81,7 +81,7 @@ def test_a_program_that_fails_stops_the_drives_and_not_the_loop(lab: tuple[Path,
         rig.obeyed("enable")
 
 
-def test_why_a_program_failed_is_told_until_another_moves(lab: tuple[Path, str]) -> None:
+def test_why_a_program_failed_is_reported_until_another_moves(lab: tuple[Path, str]) -> None:
     class Stuck(IdleProgram):
         name = "stuck"
         done = 0.0

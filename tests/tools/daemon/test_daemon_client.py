@@ -74,7 +74,9 @@ def test_a_robot_that_is_named_without_its_option_is_told_how(
     assert ("a robot is named by --robot" in told) == hint
 
 
-def test_what_a_killed_daemon_left_behind_is_none(listening: list[Path], folder: Path) -> None:
+def test_files_of_a_killed_daemon_do_not_count_as_a_daemon(
+    listening: list[Path], folder: Path
+) -> None:
     listening[0].unlink()
     with socket.socket(socket.AF_UNIX) as dead:
         dead.bind(str(folder / "dead.sock"))
@@ -187,7 +189,7 @@ def test_values_are_json() -> None:
 
 
 @pytest.mark.parametrize("text", ["a", "=1", "a=", "a=x", "a=[1", "a=NaN", "a=[1, -Infinity]"])
-def test_what_is_no_json_is_refused(text: str) -> None:
+def test_malformed_json_is_rejected(text: str) -> None:
     with pytest.raises(BadInputError, match=r"^a|^=1"):
         key_values([text])
 

@@ -45,7 +45,7 @@ def test_a_daemon_takes_targets_with_the_calibration_in_force_only(tmp_path, mon
     assert "taken over or undone" in platform.not_calibrated_reason
 
 
-def test_what_a_simulated_robot_told_moves_no_real_one() -> None:
+def test_a_simulated_robots_description_cannot_move_a_real_one() -> None:
     robot = load_robot("planar-4")
     found = calibration(robot).model_copy(update={"simulated": True})
     refuse_simulated_calibration(found.applied(robot), ["simbus:here"])

@@ -164,7 +164,7 @@ def test_it_tells_when_both_are_up_and_ends_the_loop_before_the_service(start: S
     assert daemon.log() == ["loop stopped", "service stopped"]
 
 
-def test_what_systemd_has_no_room_for_is_told_until_it_is_taken(start: Start) -> None:
+def test_notifications_are_repeated_until_systemd_takes_them(start: Start) -> None:
     daemon = start({"stopping_s": 1.0, "loading_s": 0.5}, watchdog_s=0.4)
     daemon.stuff()  # before anything is told
     daemon.line("ready")
@@ -215,7 +215,7 @@ def test_a_service_that_works_for_long_before_its_first_turn_is_left_to_it(start
     assert daemon.ends() == 0
 
 
-def test_a_loop_that_dies_is_told_and_the_service_stays_to_say_so(start: Start) -> None:
+def test_a_loop_that_dies_is_reported_and_the_service_stays_to_say_so(start: Start) -> None:
     daemon = start(watchdog_s=0.4)
     daemon.line("ready")
     daemon.heard("WATCHDOG=1")
@@ -246,7 +246,7 @@ def test_a_loop_that_ends_on_command_has_not_died_though_a_drive_may_have_power(
     assert daemon.ends() == 1
 
 
-def test_a_fault_is_told_with_its_reason_once(start: Start) -> None:
+def test_a_fault_is_reported_with_its_reason_once(start: Start) -> None:
     daemon = start()
     daemon.line("ready")
     (daemon.folder / "fault").touch()
@@ -409,7 +409,7 @@ def test_a_loop_that_cannot_be_named_ends_the_daemon_before_it_is_ready(start: S
     assert not list(daemon.folder.glob(".control*"))
 
 
-def test_what_another_daemon_has_written_there_since_is_left(start: Start) -> None:
+def test_a_file_of_another_daemon_is_not_removed(start: Start) -> None:
     daemon = start()
     daemon.line("ready")
     path = daemon.folder / "control.loop"

@@ -119,7 +119,7 @@ def states(row: Row) -> list[State]:
     return [State(int(STATE_TABLE[int(word) & 0x7F])) for word in row["statusword"]]
 
 
-def test_drives_are_told_the_robots_torque_and_heartbeat(ready: WildRig) -> None:
+def test_drives_are_reported_the_robots_torque_and_heartbeat(ready: WildRig) -> None:
     network = ready.machine.networks["can0"]
     for node in (1, 2):
         assert network.read_int(node, 0x6072) == 500  # 1.5 Nm of 3 Nm

@@ -125,7 +125,7 @@ def test_a_process_of_another_user_than_the_file_is_let_be(
     ],
     ids=map(str, range(9)),  # texts name the process that runs the tests
 )
-def test_a_file_that_no_daemon_wrote_is_refused_in_words(
+def test_a_file_that_no_daemon_wrote_is_rejected_with_a_reason(
     tmp_path: Path, change: str | dict[str, Any], told: str
 ) -> None:
     path = tmp_path / "r.loop"
@@ -194,7 +194,7 @@ def test_the_loop_of_a_robot_is_that_which_runs_it(
     assert find_loops(asked) == [path] * found
 
 
-def test_what_other_drives_say_confirms_nothing(tmp_path: Path) -> None:
+def test_other_drives_do_not_confirm_power_off(tmp_path: Path) -> None:
     """The memory is that of the loop that was signalled, or no answer."""
     block = SharedBlock.create(1, 0.1, 100.0)
     block.counters["loop_pid"] = os.getpid()

@@ -139,7 +139,7 @@ def test_long_words_are_answered(rig: LoopRig) -> None:
     rig.obeyed("hold")
 
 
-def test_a_machine_that_cannot_be_left_in_order_is_told_of(
+def test_a_machine_that_cannot_be_left_in_order_is_reported_of(
     rig: LoopRig, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     leave = rig.machine._stack.close

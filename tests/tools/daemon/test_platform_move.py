@@ -130,7 +130,7 @@ def test_a_relative_motion_is_left_to_the_loop() -> None:
          "--frame platform: allowed: together"),
     ],
 )  # fmt: skip
-def test_what_is_not_allowed_is_refused_as_it_was_typed(
+def test_rejections_quote_the_input_as_typed(
     platform: dict[str, Any], typed: dict[str, Any], told: str
 ) -> None:
     with pytest.raises(BadInputError, match=told):
@@ -221,7 +221,7 @@ def test_the_daemon_s_refusal_names_what_was_typed(monkeypatch: pytest.MonkeyPat
     assert str(result.exception) == "--to 0 0 700: cable 1 would need 9 N"
 
 
-def test_what_holds_a_platform_back_is_told_once_while_it_does(
+def test_an_obstructed_platform_is_reported_once(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     told = Told(ROOM, HERE)
@@ -241,7 +241,7 @@ def test_a_way_that_is_blocked_ends_it_with_the_reason(
     assert "no way on, at 100.0, 0.0, 700.0 mm: cable 1" in str(result.exception)
 
 
-def test_a_platform_that_friction_keeps_away_is_told_and_there_all_the_same(
+def test_a_platform_that_friction_keeps_away_is_reported_and_there_all_the_same(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     told = Told(ROOM, HERE)
@@ -252,7 +252,7 @@ def test_a_platform_that_friction_keeps_away_is_told_and_there_all_the_same(
     assert figures["trouble"] == "the platform stands 1.2 mm from its target"
 
 
-def test_who_lets_the_platform_down_already_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_who_lets_the_platform_down_already_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
     down = Told(ROOM)
     held = {"program": "lower", "control": {"held": True, "client": "a@b"}}
     told = down.get
@@ -263,7 +263,7 @@ def test_who_lets_the_platform_down_already_is_told(monkeypatch: pytest.MonkeyPa
     assert not down.posted
 
 
-def test_a_robot_without_a_platform_is_told_so_and_what_moves_its_axes() -> None:
+def test_a_robot_without_a_platform_is_reported_so_and_what_moves_its_axes() -> None:
     bare = Told(PLANE)
     bare.platform = None  # type: ignore[assignment]
     with pytest.raises(BadInputError, match=r"--to 1 2: .*has no platform; .* by AXIS=ANGLE"):

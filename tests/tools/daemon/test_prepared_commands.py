@@ -64,7 +64,7 @@ def test_it_is_carried_out_once_it_is_prepared(rig: LoopRig) -> None:
     rig.obeyed("hold")
 
 
-def test_what_cannot_be_prepared_is_refused_and_changes_nothing(rig: LoopRig) -> None:
+def test_a_failed_preparation_is_refused_and_changes_nothing(rig: LoopRig) -> None:
     hold(rig)
     answer = rig.command("program", program="prepared", wanted={"what": "bad"})
     assert (answer["ok"], answer["text"]) == (False, "what: value 'bad'")
@@ -106,7 +106,7 @@ def answer_to(rig: LoopRig, number: int) -> str:
 
 
 @pytest.mark.parametrize("limit", [Limit.SLACK, Limit.DRIVE])
-def test_what_the_supervisor_finds_meanwhile_ends_it(
+def test_a_fault_during_preparation_cancels_it(
     rig: LoopRig, limit: Limit, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     number = begun_in_a_jog(rig, f"with {limit}")

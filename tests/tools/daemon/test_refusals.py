@@ -26,14 +26,14 @@ def told(refusal: CommandRefusal, *typed: Any, **words: Any) -> str:
     return str(raised.value)
 
 
-def test_what_was_asked_for_is_named_as_it_was_typed() -> None:
+def test_refusals_quote_the_request_as_typed() -> None:
     refusal = CommandRefusal(RefusalCode.NOT_FEASIBLE, "pose", {"position_m": [0.3, 2.0]}, WHY)
     assert told(refusal, "move", "--to 300 2000") == f"--to 300 2000: {WHY['why']}"
     refusal = CommandRefusal(RefusalCode.NOT_TIGHT, "pose")
     assert told(refusal, "move", "--to 300 2000").startswith("move: the cables are not tight")
 
 
-def test_what_is_allowed_is_named_as_it_is_typed() -> None:
+def test_refusals_give_allowed_values_as_typed() -> None:
     nothing = {"left": "target", "instead": "position_m"}
     refusal = CommandRefusal(RefusalCode.NOTHING_LEFT, "pose", {"resume": True}, nothing)
     text = told(refusal, "resume", instead="cdpr move --to")
@@ -67,7 +67,7 @@ def test_a_number_out_of_its_bounds_is_bad_input_in_units_that_are_typed(
     assert str(raised.value) == text
 
 
-def test_a_number_that_no_option_stands_for_is_told_as_the_loop_tells_it() -> None:
+def test_a_number_that_no_option_stands_for_is_reported_as_the_loop_tells_it() -> None:
     refusal = CommandRefusal(
         RefusalCode.OUT_OF_RANGE, "path", {"feed": 2.0}, {**RANGE, "index": None}
     )

@@ -90,9 +90,7 @@ def test_systemd_finds_nothing_wrong_with_the_unit(tmp_path: Path) -> None:
         (("--record", "here", "--no-record"), "one of them"),
     ],
 )
-def test_what_run_would_refuse_is_refused_when_the_unit_is_made(
-    options: tuple[str, ...], words: str
-) -> None:
+def test_a_unit_for_an_invalid_run_is_rejected(options: tuple[str, ...], words: str) -> None:
     made = cdpr("service-unit", "spatial-8", *options)
     assert made.returncode == 2
     assert made.stdout == ""

@@ -71,7 +71,7 @@ def test_the_calibration_in_force_is_shown_with_how_well_it_knows_positions() ->
         assert figure in line
 
 
-def test_what_was_counted_on_a_bus_is_shown() -> None:
+def test_bus_counters_are_shown() -> None:
     counts = {"transmit_queue_full": 3, "bus_off": 1}
     buses = {
         "can0": {"url": "socketcan:can0", "state": "", "counts": {}},
@@ -121,7 +121,7 @@ def test_of_a_platform_that_fell_it_is_told_what_comes_before_it_is_tightened() 
         assert line.endswith(home + told)
 
 
-def test_a_part_that_does_not_work_is_told_by_its_option() -> None:
+def test_a_part_that_does_not_work_is_reported_by_its_option() -> None:
     parts = {"live_view": {"error": "the live view ended: why"}, "stream": {"error": ""}}
     status = status_of(parts=parts)
     lines = [str(line) for line in status_text(status).renderables]
@@ -142,7 +142,7 @@ def test_the_status_tells_which_motors_are_compensated() -> None:
     assert compensation_text([{"name": "left"}]) == ""
 
 
-def test_what_was_learnt_of_the_motors_is_told_once_it_is_something() -> None:
+def test_learnt_motor_friction_is_shown_once_significant() -> None:
     progress = {"learnt_friction_Nm": [0.08, 0.11], "learnt_cogging_Nm": [0.0, 0.0]}
     told = learnt_text({"program_progress": progress})
     assert told == "estimated from the motors: friction 0.080 to 0.110 Nm"
@@ -159,7 +159,7 @@ def test_what_was_learnt_of_the_motors_is_told_once_it_is_something() -> None:
         ({"read_only": True, "driving": True}, "it only listened"),
     ],
 )
-def test_of_a_dead_loop_nothing_is_told_as_if_it_were_known(
+def test_of_a_dead_loop_nothing_is_reported_as_if_it_were_known(
     told: dict[str, Any], power: str
 ) -> None:
     progress = {"position_m": [0.3, 2.0], "target_m": [0.0, 1.0], "tight": True, "stage": "pull"}
@@ -176,7 +176,7 @@ def test_of_a_dead_loop_nothing_is_told_as_if_it_were_known(
     assert power in death_text(status | told) and "next: `cdpr stop`" in death_text(status)
 
 
-def test_a_loop_that_hangs_is_told_before_all_that_is_of_the_time_before() -> None:
+def test_a_loop_that_hangs_is_reported_before_all_that_is_of_the_time_before() -> None:
     status = status_of(program="hold") | {"driving": True, "loop": {"silent_s": 13.6}}
     lines = [str(line) for line in status_text(status).renderables[:-1]]
     assert lines[1] == "the loop has not turned for 13.6 s: what follows is of then"
@@ -231,9 +231,7 @@ def test_a_path_is_left_until_its_end() -> None:
         ),
     ],
 )
-def test_what_is_said_of_the_power_after_a_stop_is_what_is_known(
-    keys: dict[str, Any], told: str
-) -> None:
+def test_power_after_a_stop_is_reported_only_as_known(keys: dict[str, Any], told: str) -> None:
     assert after_stop_text(status_of(**keys)).startswith(told)
 
 

@@ -73,7 +73,7 @@ def test_a_hold_stops_the_motion_and_is_answered_and_reported(
     assert (stops["do"], stops["client"]) == ("hold", "maria@lab")
 
 
-def test_what_was_queued_before_a_stop_does_not_move_after_it(
+def test_commands_queued_before_a_stop_do_not_move_after_it(
     jogging: LoopRig, socket_path: Path
 ) -> None:
     block = jogging.block
@@ -121,7 +121,7 @@ def test_a_refusal_is_answered_with_its_code(loop: LoopRig, socket_path: Path) -
         json.dumps({"do": "hold", "client": "x" * 5000}).encode(),
     ],
 )
-def test_what_is_no_stop_is_ignored_and_costs_no_descriptor(
+def test_invalid_datagrams_are_ignored_without_leaking_descriptors(
     jogging: LoopRig, socket_path: Path, data: bytes
 ) -> None:
     before = descriptors()

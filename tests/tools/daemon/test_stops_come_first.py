@@ -171,7 +171,7 @@ def test_thousands_of_stops_are_few_orders_and_all_are_answered(active: LoopRig)
     assert active.state is LoopState.READY
 
 
-def test_what_is_no_stop_is_left_aside(active: LoopRig) -> None:
+def test_commands_other_than_stops_are_skipped(active: LoopRig) -> None:
     block = active.block
     for data in (b"{", b"\xff\xfe", b"7", b'"hold"', b"null", b'{"do": "enable", "number": -1}'):
         number = int(block.counters["urgent"][0])
@@ -184,7 +184,7 @@ def test_what_is_no_stop_is_left_aside(active: LoopRig) -> None:
     assert active.loop.engine.program.name == "hold"
 
 
-def test_a_hold_over_and_over_does_not_begin_anew(active: LoopRig) -> None:
+def test_a_hold_over_and_over_does_not_begin_again(active: LoopRig) -> None:
     active.obeyed("program", **JOG)
     active.run(0.2)
     active.obeyed("hold")

@@ -126,7 +126,7 @@ def test_a_robot_that_does_not_move_is_given_up(monkeypatch: pytest.MonkeyPatch)
         )
 
 
-def test_no_room_for_the_pattern_is_told() -> None:
+def test_no_room_for_the_pattern_is_reported() -> None:
     narrow = replace(PLATFORM, workspace_min_m=(-0.2, 1.4))
     with pytest.raises(BadInputError, match="place B of the pattern needs"):
         centre_m(replace(ROBOT, platform=narrow), "B")

@@ -41,7 +41,7 @@ def faults(path: Path) -> list[tuple[float, str]]:
     return faults_of(selection.readers, selection.columns())
 
 
-def test_what_ran_and_what_went_wrong_are_told_with_their_times(tmp_path: Path) -> None:
+def test_programs_and_faults_are_listed_with_times(tmp_path: Path) -> None:
     rows = active(0, 0, 0, 1, 1, 1, 0, 0, 0, 0)
     rows["pose"] = rows["pose_setpoint"] = [0.3, 2.0, 0.0, 1.0, 0.0, 0.0, 0.0]
     rows["pose"][:, 0] += 1e-3 * np.linspace(0.0, 1.0, 1000)
@@ -94,7 +94,7 @@ def test_a_lowering_by_which_a_robot_was_stopped_has_come_to_its_end(tmp_path: P
     assert "lower: ended, left" in told
 
 
-def test_the_reason_is_told_with_the_cable_that_broke_not_with_the_winch_that_ran_away(
+def test_the_reason_is_reported_with_the_cable_that_broke_not_with_the_winch_that_ran_away(
     tmp_path: Path,
 ) -> None:
     why = "right: the cable seems broken: tension fell suddenly to 6.5 N, from above 36.0 N"
@@ -110,7 +110,7 @@ def test_the_reason_is_told_with_the_cable_that_broke_not_with_the_winch_that_ra
     ]
 
 
-def test_a_reason_that_comes_again_is_told_again(
+def test_a_reason_that_comes_again_is_reported_again(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     rows = active(0)

@@ -16,7 +16,7 @@ from cdpr_profiles.places import SHIPPED
 
 
 @pytest.mark.parametrize("choose", ["random", "spread", "information"])
-def test_poses_are_told_written_and_drawn(tmp_path: Path, choose: str) -> None:
+def test_poses_are_reported_written_and_drawn(tmp_path: Path, choose: str) -> None:
     table, picture = tmp_path / "poses.csv", tmp_path / "poses.png"
     done = cdpr_here(
         "poses", "spatial-8", "-n", "12", "--seed", "3", "--choose", choose, "--angle", "10",

@@ -35,7 +35,7 @@ def as_json(done: subprocess.CompletedProcess[str]) -> dict[str, object]:
     return told
 
 
-def test_the_planar_robot_is_told_sketched_and_drawn(tmp_path: Path) -> None:
+def test_the_planar_robot_is_reported_sketched_and_drawn(tmp_path: Path) -> None:
     picture = tmp_path / "planar.png"
     shown = cdpr_here("robot", "show", "planar-3", "--png", picture, "--json")
     assert shown.returncode == 0, shown.stderr
@@ -75,7 +75,9 @@ def test_what_cannot_be_held_is_marked_and_ends_with_its_reason(tmp_path: Path) 
     assert "Traceback" not in run.stderr
 
 
-def test_a_cycle_that_does_not_fit_its_bus_is_told_as_the_daemon_refuses_it(tmp_path: Path) -> None:
+def test_a_cycle_that_does_not_fit_its_bus_is_reported_as_the_daemon_refuses_it(
+    tmp_path: Path,
+) -> None:
     path = tmp_path / "slow-bus.toml"
     path.write_text(PLANAR.replace("[[buses]]", "[[buses]]\nbitrate_bit_s = 500000"))
     shown = cdpr_here("robot", "show", path, "--json")
@@ -86,7 +88,7 @@ def test_a_cycle_that_does_not_fit_its_bus_is_told_as_the_daemon_refuses_it(tmp_
     assert run.returncode == 2 and "the cycle does not fit: bus can0: 3 drives" in run.stderr
 
 
-def test_a_bar_that_swings_is_told_with_how_far_and_how_long() -> None:
+def test_a_bar_that_swings_is_reported_with_how_far_and_how_long() -> None:
     bar = Path(__file__).parents[2] / "hil" / "others" / "bar-1m.toml"
     shown = cdpr_here("robot", "show", bar, "--json")
     assert shown.returncode == 0, shown.stderr
@@ -100,7 +102,7 @@ def test_a_bar_that_swings_is_told_with_how_far_and_how_long() -> None:
     assert "to die down" not in small.stderr
 
 
-def test_a_robot_in_space_is_told_and_drawn(tmp_path: Path) -> None:
+def test_a_robot_in_space_is_reported_and_drawn(tmp_path: Path) -> None:
     picture = tmp_path / "suspended.png"
     shown = cdpr_here("robot", "show", "suspended-8", "--png", picture, "--json")
     assert shown.returncode == 0, shown.stderr
@@ -128,7 +130,9 @@ def test_a_robot_in_space_is_told_and_drawn(tmp_path: Path) -> None:
     assert matplotlib.image.imread(picture).shape[0] > 1200  # three sections
 
 
-def test_what_a_ceiling_cannot_hold_in_space_is_told_with_what_would_help(tmp_path: Path) -> None:
+def test_what_a_ceiling_cannot_hold_in_space_is_reported_with_what_would_help(
+    tmp_path: Path,
+) -> None:
     path = tmp_path / "heavy.toml"
     suspended = (SHIPPED / "robots" / "suspended-8.toml").read_text()
     path.write_text(suspended.replace("mass_kg = 100.0", "mass_kg = 900.0"))
@@ -140,7 +144,7 @@ def test_what_a_ceiling_cannot_hold_in_space_is_told_with_what_would_help(tmp_pa
     assert "allowed: up to 1333 N" in told["limits.tension_max_N"]
 
 
-def test_a_loop_that_has_to_be_slow_is_told(tmp_path: Path) -> None:
+def test_a_loop_that_has_to_be_slow_is_reported(tmp_path: Path) -> None:
     path = tmp_path / "late.toml"
     text = (SHIPPED / "robots" / "suspended-6.toml").read_text()
     path.write_text(re.sub(r"^sync_period_s = .*$", "", text, flags=re.M))
@@ -206,7 +210,7 @@ def test_exit_points_above_each_other_share_a_name_and_the_platform_is_drawn_who
                 assert area == pytest.approx(np.ptp(x) * np.ptp(y))  # a rectangle from each side
 
 
-def test_colours_of_a_thin_robot_are_told_without_numbers_over_each_other() -> None:
+def test_colours_of_a_thin_robot_are_reported_without_numbers_over_each_other() -> None:
     robot = load_robot("spatial-8")
     assert robot.platform is not None
     thin = tuple((x, 0.03 * y, z) for x, y, z in robot.platform.exit_points_m)

@@ -108,7 +108,7 @@ def test_the_stand_is_in_the_middle_of_a_frame_about_the_room_s_zero(tmp_path: P
     assert platform.home_m[:2] == (0.0, 0.0)
 
 
-def test_kinds_are_told_before_the_first_question(tmp_path: Path) -> None:
+def test_kinds_are_reported_before_the_first_question(tmp_path: Path) -> None:
     path = tmp_path / "mine.toml"
     done = cdpr_here("robot", "new", path, stdin="planar-5\n\n")
     assert done.returncode == 2 and not path.exists()
@@ -236,7 +236,7 @@ def test_two_answers_to_one_question_are_refused(tmp_path: Path) -> None:
     assert "--set kind: 'planar-3' and 'planar-4'; allowed: one of them" in done.stderr
 
 
-def test_what_cannot_work_is_told_and_not_written(tmp_path: Path) -> None:
+def test_what_cannot_work_is_reported_and_not_written(tmp_path: Path) -> None:
     path = tmp_path / "point.toml"
     line = ["exit_1_m=-1,2", "exit_2_m=0,2", "exit_3_m=1,2", "side_m=0", 'name=A "line" é']
     done = cdpr_here("robot", "new", path, "--yes", *(p for text in line for p in ("--set", text)))

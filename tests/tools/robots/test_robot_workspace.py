@@ -96,12 +96,12 @@ def test_any_number_of_workers_finds_the_same() -> None:
     assert searched("planar-4", *COARSE, "--within", "5", "--workers", "2") == alone
 
 
-def test_a_cluster_that_is_not_there_is_told() -> None:
+def test_a_cluster_that_is_not_there_is_reported() -> None:
     done = cdpr_here("robot", "workspace", "planar-3", "--cluster", "127.0.0.1:1")
     assert done.returncode == 1 and done.stderr.startswith("cdpr: --cluster 127.0.0.1:1: ")
 
 
-def test_where_no_place_is_held_the_nearest_is_told() -> None:
+def test_where_no_place_is_held_the_nearest_is_reported() -> None:
     done = cdpr_here("robot", "workspace", "spatial-8", "--margin", "85", *COARSE)
     assert done.returncode == 1
     assert "nearest to it is" in done.stderr and "N short" in done.stderr

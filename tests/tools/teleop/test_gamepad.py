@@ -159,7 +159,7 @@ def test_nothing_was_confirmed_before_it_was_asked() -> None:
     assert Rig(pad).hand.confirmed == 0
 
 
-def test_unplugged_it_holds_and_waits_to_be_pressed_anew() -> None:
+def test_unplugged_it_holds_and_waits_to_be_pressed_again() -> None:
     rig = Rig(StandIn())
     rig.key(ecodes.BTN_TR, True)
     rig.push(255, 127)

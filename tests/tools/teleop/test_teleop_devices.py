@@ -128,7 +128,7 @@ def test_no_script_leads_further_than_its_packets_may_say(tmp_path: Path) -> Non
         read_script(path, 8.0)
 
 
-def test_what_is_no_script_is_refused(tmp_path: Path) -> None:
+def test_invalid_scripts_are_rejected(tmp_path: Path) -> None:
     (tmp_path / "binary").write_bytes(b"\xff\xfe\x00")
     for name, told in (
         ("binary", "binary: is not UTF-8 text"),
@@ -210,7 +210,7 @@ def wait_for_bytes(terminal: int, count: int) -> None:
         time.sleep(0.005)
 
 
-def test_a_terminal_leads_and_is_given_back_as_it_was() -> None:
+def test_a_terminal_leads_and_is_released_as_it_was() -> None:
     ours, its = pty.openpty()
     before = termios.tcgetattr(its)
     device = Keyboard(1.0, its)
@@ -243,7 +243,7 @@ def test_a_terminal_that_goes_away_ends_it() -> None:
     os.close(its)
 
 
-def test_what_is_no_terminal_is_refused() -> None:
+def test_keyboard_without_a_terminal_is_rejected() -> None:
     reading, writing = os.pipe()
     with pytest.raises(BadInputError, match="standard input is no terminal"):
         Keyboard(1.0, reading)

@@ -121,7 +121,7 @@ class Unhurried:
         self._device.close()
 
 
-def test_what_the_hand_does_reaches_the_loop_and_its_answer_the_hand(robot: Robot) -> None:
+def test_hand_motion_reaches_the_loop_and_the_answer_returns(robot: Robot) -> None:
     lines = (
         ScriptLine(0.0, (0.0, 0.0, 0.0)),
         ScriptLine(0.2, (0.01, -0.02, 0.0), confirm=True),
@@ -170,7 +170,7 @@ def test_a_right_that_is_gone_ends_it(robot: Robot) -> None:
     assert end.failed and end.text.startswith("the right to move has ended")
 
 
-def test_a_robot_lost_on_its_way_to_the_end_of_a_script_is_told(robot: Robot) -> None:
+def test_a_robot_lost_on_its_way_to_the_end_of_a_script_is_reported(robot: Robot) -> None:
     done = ScriptDevice((ScriptLine(0.0, (0.0, 0.0, 0.0)),))
     _, end = teleoperate(robot, done, lambda: robot.run(IDLE))
     assert end.failed and end.text == "the robot does not follow the stream any more"

@@ -88,7 +88,7 @@ def test_the_robot_stands_where_it_is_told_and_its_target_too() -> None:
         assert told in text
 
 
-def test_what_is_old_is_not_shown_as_if_it_were_so(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_stale_values_are_not_shown_as_current(monkeypatch: pytest.MonkeyPatch) -> None:
     pose = (0.5, 0.5, 0.0, 1.0, 0.0, 0.0, 0.0)
     status = {"axes": [{"tension_N": 40.4}], "reason": "held long ago"}
     text = "\n".join(seen(pose, status, before="held long ago"))
@@ -125,7 +125,7 @@ def test_lines_are_drawn_where_they_are() -> None:
     assert rows == ["⡏⠉⠉⠉", "⡇  x"]
 
 
-def test_in_space_all_coordinates_and_the_rotation_are_told() -> None:
+def test_in_space_all_coordinates_and_the_rotation_are_reported() -> None:
     half = math.radians(5.0)
     pose = (0.5, 0.25, 1.5, math.cos(half), 0.0, -math.sin(half), 0.0)
     room = {"home_m": [0.0, 0.0, 1.0]}

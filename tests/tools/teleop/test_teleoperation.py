@@ -34,6 +34,6 @@ def test_the_stream_is_where_the_daemon_is() -> None:
     assert address(None, via="4000") == ("127.0.0.1", 4000)
 
 
-def test_a_daemon_without_stream_is_told() -> None:
+def test_a_daemon_without_stream_is_reported() -> None:
     with pytest.raises(BadInputError, match=r"planar-3: .*started with --stream HOST:PORT"):
         address(None)

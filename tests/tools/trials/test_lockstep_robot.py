@@ -77,7 +77,7 @@ def test_a_fall_after_the_controller_s_death_is_in_the_log():
     assert fastest < -0.3
 
 
-def test_what_is_refused_is_told_and_changes_nothing(robot):
+def test_what_is_refused_is_reported_and_changes_nothing(robot):
     with pytest.raises(CommandRefusedError, match="workspace"):
         robot.program("pose", position_m=[9.0, HEIGHT])
     assert robot.state is LoopState.ACTIVE
@@ -85,7 +85,7 @@ def test_what_is_refused_is_told_and_changes_nothing(robot):
         robot.until(lambda: False, 0.1, "the impossible")
 
 
-def test_a_right_that_is_given_back_holds_the_motion(robot):
+def test_a_right_that_is_released_holds_the_motion(robot):
     robot.program("pose", position_m=[0.3, HEIGHT])
     robot.right.drop()
     robot.run(0.01)

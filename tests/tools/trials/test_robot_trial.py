@@ -89,7 +89,7 @@ def test_it_can_be_judged_again(trial, capsys):
         robot_trial.trial("planar-3", KindOfTrial.LINE, out_dir=folder, again=True)
 
 
-def test_what_the_status_tells_at_the_end_is_told(
+def test_what_the_status_tells_at_the_end_is_reported(
     trial: tuple[Path, dict[str, Any]], monkeypatch: pytest.MonkeyPatch, capsys
 ):
     def marked(recorded: Recorded, what: str) -> list[dict[str, Any]]:
@@ -154,7 +154,7 @@ def test_a_log_of_other_syncs_is_noticed(trial, tmp_path, by):
         ("planar-3", KindOfTrial.TARGETS, {"commissioned": Path("/nowhere")}, "/nowhere"),
     ],
 )
-def test_what_cannot_be_tried_is_told(tmp_path, robot, kind, options, told):
+def test_what_cannot_be_tried_is_reported(tmp_path, robot, kind, options, told):
     with pytest.raises((BadInputError, ConfigurationError, ProfileError), match=told):
         robot_trial.trial(robot, kind, **{"out_dir": tmp_path / "out", **options})
 

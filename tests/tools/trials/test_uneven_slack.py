@@ -152,7 +152,7 @@ def test_a_platform_that_was_dragged_along_by_one_winch_ends_it(tmp_path: Path) 
         assert moved_mm(robot, "spatial-8")[0] > 5.0
 
 
-def test_how_far_slack_lets_a_light_platform_be_pulled_along_is_told(tmp_path: Path) -> None:
+def test_how_far_slack_lets_a_light_platform_be_pulled_along_is_reported(tmp_path: Path) -> None:
     """At most what is told, and no less than a third of it."""
     file = plant(tmp_path / "plant.toml", SLACK_m[:4])
     file.write_text("seed = 100\n" + file.read_text())

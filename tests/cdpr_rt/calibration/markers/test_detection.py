@@ -137,7 +137,7 @@ def test_a_board_that_is_another_than_told_is_said_to_be(
 
 
 @pytest.mark.parametrize("name", ["DICT_6X6_250", "6x6_250", "nonsense"])
-def test_a_set_of_markers_that_opencv_lacks_is_told_with_what_is_meant(name: str) -> None:
+def test_a_set_of_markers_that_opencv_lacks_is_reported_with_what_is_meant(name: str) -> None:
     said = "did you mean '6X6_250'" if "6" in name else "allowed: 4X4_50, 4X4_100"
     for made in (lambda: MarkerDetector(name), Board(dictionary=name).made):
         with pytest.raises(InvalidRequestError, match=said):

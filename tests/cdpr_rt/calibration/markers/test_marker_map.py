@@ -150,7 +150,7 @@ def test_markers_never_seen_together_are_islands_with_advice(one: Room) -> None:
     assert fit.map.placed.sum() == 12
 
 
-def test_what_reads_as_an_id_that_was_not_laid_out_joins_no_islands(one: Room) -> None:
+def test_a_misread_id_does_not_join_groups_of_markers(one: Room) -> None:
     left, right = ({k for k in range(20) if (k % 5 < 3) == side} for side in (True, False))
     shown = [
         Sighting(sight.name, {i: c for i, c in sight.corners_px.items() if i in which})
@@ -211,7 +211,7 @@ def test_a_marker_that_was_moved_twice_is_not_said_to_be_partly_covered(one: Roo
     assert difference(fit.map, one.truth).position_error_m.max() < 0.004
 
 
-def test_what_is_wrong_with_a_marker_is_said_in_one_warning() -> None:
+def test_each_faulty_marker_gives_one_warning() -> None:
     found = [
         Suspect(9, "covered", "marker 9 is partly covered", (3, 4)),
         Suspect(2, "twice", "marker 2 is there twice"),
@@ -365,7 +365,7 @@ def test_one_of_a_squares_two_poses_is_the_true_one() -> None:
     assert (off[:, 1] > 1e-3).sum() > 40
 
 
-def test_what_is_seen_twice_in_an_image_or_has_no_size_is_refused() -> None:
+def test_duplicate_or_sizeless_markers_are_rejected() -> None:
     corners = np.zeros((4, 2))
     with pytest.raises(Exception, match="marker 3 is there twice in image number 0"):
         SeenMarkers.of(["a"], [(0, 3, corners), (0, 3, corners)], {3: 0.1})

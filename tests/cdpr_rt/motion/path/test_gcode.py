@@ -144,7 +144,7 @@ def test_a_whole_circle_and_a_helix():
         (["G0 X0 Y0"], ROOM, r"Z never named; .*: --z says at which height"),
     ],
 )
-def test_what_is_refused(lines, where, told):
+def test_unsupported_codes_are_rejected(lines, where, told):
     with pytest.raises(PathError, match=told):
         read(*lines, "M2", where=where)
 
@@ -189,7 +189,7 @@ def test_a_line_is_skipped_with_the_code_that_is_ignored():
 
 
 @pytest.mark.parametrize("name", ["G92", "G90.1", "G18", "G93", "G1", "X", "F", "I", "M2", "M98"])
-def test_what_other_lines_depend_on_cannot_be_ignored(name):
+def test_modal_codes_cannot_be_ignored(name):
     with pytest.raises(PathError, match=f"--ignore {name}: .* depend"):
         read("G0 X0 Y0 Z0", "X5", "M2", ignored={name})
 

@@ -298,7 +298,9 @@ def test_a_file_in_the_sockets_place_is_left_alone(tmp_path: Path) -> None:
     assert file.read_text() == "mine"
 
 
-def test_what_cannot_be_replaced_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_key_file_that_cannot_be_replaced_is_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     def refuse(_path: Path) -> None:  # as of a stranger's socket in /tmp
         raise PermissionError(errno.EPERM, "Operation not permitted")
 

@@ -228,7 +228,7 @@ def test_a_websocket_that_is_not_understood_is_ended(
         b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n",
     ],
 )
-def test_what_is_no_request_does_nothing(
+def test_malformed_requests_have_no_effect(
     rig: Rig, text: bytes, caplog: pytest.LogCaptureFixture
 ) -> None:
     answer = raw(rig, text, 2.0)

@@ -29,7 +29,7 @@ def take(client: httpx.Client, name: str = "maria", ttl_s: float = 10.0) -> dict
     return {"X-Control-Token": answer.json()["token"]}
 
 
-def test_what_moves_needs_the_right_to_move_and_never_reaches_the_loop_without(rig: Rig) -> None:
+def test_motion_without_the_right_to_move_never_reaches_the_loop(rig: Rig) -> None:
     with rig.client() as client:
         for path, body in (
             ("/enable", {}),
@@ -43,7 +43,7 @@ def test_what_moves_needs_the_right_to_move_and_never_reaches_the_loop_without(r
     assert rig.loop.commands == []
 
 
-def test_its_holder_moves_and_others_are_told_who_that_is(rig: Rig) -> None:
+def test_its_holder_moves_and_others_are_reported_who_that_is(rig: Rig) -> None:
     with rig.client() as client:
         headers = take(client)
         wanted = {"velocity_rad_s": [0.5, 0]}
@@ -88,7 +88,7 @@ def test_power_on_needs_no_body(rig: Rig) -> None:
 
 
 @pytest.mark.parametrize("path", ["/enable", "/set", "/hold", "/control"])
-def test_what_is_no_json_is_told_from_what_is_not_allowed(rig: Rig, path: str) -> None:
+def test_malformed_json_and_invalid_values_have_different_errors(rig: Rig, path: str) -> None:
     json_type = {"Content-Type": "application/json"}
     with rig.client() as client:
         answer = client.post(path, content=b'{"client": ', headers=json_type)
@@ -167,7 +167,7 @@ def test_silence_ends_the_right_by_itself(rig: Rig, monkeypatch: pytest.MonkeyPa
         take(client, "jan")
 
 
-def test_given_back_the_loop_knows_at_once(rig: Rig) -> None:
+def test_released_the_loop_knows_at_once(rig: Rig) -> None:
     with rig.client() as client:
         headers = take(client, ttl_s=10.0)
         assert client.delete("/control", headers=headers).json()["held"] is False
@@ -196,7 +196,7 @@ def test_the_right_outlasts_a_command_that_takes_long_but_not_a_client_that_leav
     wait_for(lambda: rig.lease_left_s < 0.0)
 
 
-def test_what_the_loop_refuses_is_passed_on_with_its_state(rig: Rig) -> None:
+def test_a_refusal_of_the_loop_is_returned_with_its_state(rig: Rig) -> None:
     with rig.client() as client:
         answer = client.post("/check")
         assert answer.status_code == 409
@@ -308,7 +308,9 @@ def test_a_loop_that_dies_is_said_to_be_dead_also_to_those_who_wait(own_rig: Rig
         ("/set", "\x00", "JSON"),
     ],
 )
-def test_what_makes_no_sense_is_refused_by_name(rig: Rig, path: str, body: str, where: str) -> None:
+def test_meaningless_values_are_rejected_by_name(
+    rig: Rig, path: str, body: str, where: str
+) -> None:
     with rig.client() as client:
         headers = {**take(client), "content-type": "application/json"}
         answer = client.post(path, content=body, headers=headers)

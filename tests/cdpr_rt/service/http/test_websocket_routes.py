@@ -109,7 +109,7 @@ def test_a_field_of_strange_letters_is_refused_without_a_traceback(
     assert caplog.text == ""
 
 
-def test_who_answers_no_ping_is_let_go_without_a_traceback(
+def test_who_answers_no_ping_is_released_without_a_traceback(
     rig: Rig, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     protocol = WebSocketsSansIOProtocol
@@ -291,7 +291,7 @@ def test_nonsense_is_answered_and_moves_nothing(rig: Rig, text: str | bytes) -> 
     assert rig.loop.commands == []
 
 
-def test_what_is_no_text_ends_the_connection_without_a_traceback(
+def test_binary_messages_close_the_connection_without_a_traceback(
     rig: Rig, caplog: pytest.LogCaptureFixture
 ) -> None:
     with open_unix(rig, "/control?client=maria") as connection:
