@@ -54,7 +54,7 @@ def test_a_line_that_is_another_s_and_a_dumb_terminal_are_left_alone(name: str) 
     assert _told(0.0, 0.5, **{name: "dumb"}) == "done\r\n"
 
 
-def test_a_pipe_is_reported_nothing() -> None:
+def test_no_notice_is_written_to_a_pipe() -> None:
     command = [sys.executable, "-c", SCRIPT, "0.0", "0.5"]
     done = subprocess.run(command, capture_output=True, text=True, check=True)
     assert done.stderr == "done\n"

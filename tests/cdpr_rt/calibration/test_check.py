@@ -68,7 +68,7 @@ def test_the_exit_point_that_moved_is_named_with_its_way() -> None:
     assert "cable 2" in found.verdict()[1] and "pulley" in found.verdict()[1]
 
 
-def test_a_cable_whose_axis_has_a_name_is_reported_by_it(tmp_path: Path) -> None:
+def test_cables_are_reported_by_the_names_of_their_axes(tmp_path: Path) -> None:
     text = (SHIPPED / "robots" / "spatial-8.toml").read_text()
     named = tmp_path / "named.toml"
     named.write_text(text.replace("[[axes]]", '[[axes]]\nname = "c1"', 1))

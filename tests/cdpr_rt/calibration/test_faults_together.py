@@ -185,7 +185,7 @@ def test_slipped_encoders_and_bad_markers_are_named_and_survived() -> None:
     assert readings.off_mm(outcome) < 3.0
 
 
-def test_a_wrong_size_of_all_sheets_is_reported_by_the_cables() -> None:
+def test_cable_lengths_reveal_a_wrong_size_of_all_sheets() -> None:
     readings = Readings(_robot(layout=replace(FEW, known=3)))
     readings.wrong_size(1.04)
     outcome = readings.outcome()

@@ -239,7 +239,7 @@ def test_nothing_is_found_of_motors_that_are_known_or_do_not_turn(
     assert not learning.friction_Nm.any()
 
 
-def test_known_motor_parameters_are_kept(
+def test_learning_again_keeps_the_known_friction(
     lengths: Callable[[np.ndarray], np.ndarray],
 ) -> None:
     """As when cables are tightened again after motions that have taught more."""

@@ -263,7 +263,7 @@ def test_who_lets_the_platform_down_already_is_reported(monkeypatch: pytest.Monk
     assert not down.posted
 
 
-def test_a_robot_without_a_platform_is_reported_so_and_what_moves_its_axes() -> None:
+def test_move_without_a_platform_names_the_command_for_axes() -> None:
     bare = Told(PLANE)
     bare.platform = None  # type: ignore[assignment]
     with pytest.raises(BadInputError, match=r"--to 1 2: .*has no platform; .* by AXIS=ANGLE"):

@@ -210,7 +210,7 @@ def test_exit_points_above_each_other_share_a_name_and_the_platform_is_drawn_who
                 assert area == pytest.approx(np.ptp(x) * np.ptp(y))  # a rectangle from each side
 
 
-def test_colours_of_a_thin_robot_are_reported_without_numbers_over_each_other() -> None:
+def test_colour_labels_of_a_thin_robot_do_not_overlap() -> None:
     robot = load_robot("spatial-8")
     assert robot.platform is not None
     thin = tuple((x, 0.03 * y, z) for x, y, z in robot.platform.exit_points_m)
