@@ -160,7 +160,7 @@ def test_how_far_slack_lets_a_light_platform_be_pulled_along_is_reported(tmp_pat
         robot.enable()
         robot.carry_out("tighten")
         (told,) = robot.status["notices"]
-        stands = re.search(r"may stand up to about (\d+) mm from where", told)
+        stands = re.search(r"may stand up to about (\d+) mm from the place", told)
         assert stands is not None, told
         most_mm = float(stands[1])
         assert most_mm / 3.0 < moved_mm(robot, "planar-4")[0] < most_mm
