@@ -1,4 +1,4 @@
-"""Commands run in the test's own process, which has loaded their libraries already."""
+"""Run commands in the test's process, which has already loaded their libraries."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from cdpr_tools.cli import main
 def cdpr_here(
     *arguments: str | Path, stdin: str = "", cwd: Path | None = None
 ) -> subprocess.CompletedProcess[str]:
-    """Run one command line as its process would, sparing the second that its start takes.
+    """Run a command line in this process, which saves the second that a new process needs.
 
-    Not for commands that run cycles: these change how the operating system treats their process.
+    Not for commands that run control cycles: they change the scheduling of their process.
     """
     argv = ["cdpr", *map(str, arguments)]
     out, errors = io.StringIO(), io.StringIO()

@@ -1,4 +1,4 @@
-"""How the tests are shared out between processes, and for how long each may run."""
+"""Set up test processes, distribute files among them, and limit the time of teardowns."""
 
 from __future__ import annotations
 
@@ -18,24 +18,24 @@ from hypothesis.internal.conjecture.providers import HypothesisProvider
 from hypothesis.internal.constants_ast import Constants
 from xdist.scheduler import LoadScopeScheduling
 
-# before anything loads numpy: threads that spin for work take the cores of the other processes
+# before anything loads numpy: idle threads that spin would take cores from other processes
 for _library in ("OPENBLAS", "OMP", "NUMBA"):
     os.environ.setdefault(f"{_library}_NUM_THREADS", "1")
-# profiles of whoever runs the tests are none of theirs
+# the tests must not find the profiles of the user who runs them
 os.environ["XDG_CONFIG_HOME"] = "/nonexistent"
-# tests start hundreds of processes, none of which is to compile all sources anew
+# tests start hundreds of processes, which must not all compile the sources again
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 sys.dont_write_bytecode = False
-# a shell's job in the background ignores Ctrl-C, and so would all that it starts
+# a background job of a shell ignores Ctrl-C, and so would all processes that it starts
 signal.signal(signal.SIGINT, signal.default_int_handler)
 fork_server.install()
-# the collector would go through all that is imported and collected for tests, again and again
+# during collection, the garbage collector would scan all imported modules again and again
 gc.disable()
 
-# Hypothesis also draws the constants of whatever modules are loaded: these depend on which tests a
-# process has run before, and so would the examples. It has no setting for that.
+# Hypothesis also draws constants of the loaded modules. These depend on the tests that a process
+# has run before, and so would the examples. There is no setting for it.
 HypothesisProvider._local_constants = Constants()  # type: ignore[assignment]
-# no examples from an earlier run, and no failure for the sake of a slow machine
+# reuse no examples of earlier runs, and do not fail on a slow machine
 hypothesis.settings.register_profile(
     "repeatable",
     derandomize=True,
@@ -48,9 +48,9 @@ hypothesis.settings.load_profile("repeatable")
 
 @pytest.fixture(scope="module", autouse=True)
 def state_home(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
-    """Keep what a file of tests has the programs remember from those of others, and from a user's.
+    """Give each test file a separate state folder.
 
-    A robot of the same name may stand beside this machine.
+    Programs must not see the state of other files, or that of a user's robot of the same name.
     """
     with pytest.MonkeyPatch.context() as patch:
         folder = tmp_path_factory.mktemp("state")
@@ -60,10 +60,10 @@ def state_home(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
 
 @pytest.fixture(autouse=True)
 def signals_as_before() -> Iterator[None]:
-    """Have every test and what it starts take signals as the first one did.
+    """Restore the signal handlers after each test.
 
-    A command that ends on request ignores further Ctrl-C; where it has run in this process, so
-    would all processes that are started from it afterwards.
+    A command that stops on Ctrl-C ignores it from then on. If it has run in this process, all
+    processes started later would inherit that.
     """
     numbers = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
     before = [(number, signal.getsignal(number)) for number in numbers]
@@ -73,9 +73,10 @@ def signals_as_before() -> Iterator[None]:
 
 
 class _ByFile(LoadScopeScheduling):
-    """One process for each file, for all in the guest kernel's single boot, and for all daemons.
+    """Run each file in one process, all tests of the guest kernel in one, and all daemons in one.
 
-    Several daemons at a time, each with two real-time processes, would keep each other waiting.
+    The guest kernel boots only once. Several daemons, each with two real-time processes, would
+    delay each other.
     """
 
     def _split_scope(self, nodeid: str) -> str:
@@ -91,18 +92,18 @@ def _of_a_daemon(nodeid: str) -> bool:
 _ROOT = Path(__file__).parents[1]
 _KEPT = pytest.StashKey[set[Path]]()
 _OURS: set[str] = set()
-"""Kernels that test processes have compiled. They are excused, even if a command needs them too:
-tests call some kernels with arrays that no command has."""
+"""Kernels that test processes have compiled. These are not reported, even if a command needs them
+too, because tests call some kernels with arrays of other types."""
 
 
 def _kept_kernels() -> set[Path]:
-    """Return the files of machine code beside the product's kernels."""
+    """Return the files of machine code in the caches of the product's kernels."""
     folders = ("cdpr_rt", "drivers", "profiles", "sim_bus", "tools")
     return {file for one in folders for file in (_ROOT / one).rglob("*.nbc")}
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    """Add the option that `make` gives, which has compiled all kernels before."""
+    """Add an option that `make` gives after it has compiled all kernels."""
     parser.addoption(
         "--compiled", action="store_true", help="fail where a command compiles a kernel"
     )
@@ -114,7 +115,7 @@ def pytest_sessionstart(session: pytest.Session) -> None:
 
 
 def pytest_testnodedown(node: Any) -> None:
-    """Take over what a process that has run tests has compiled."""
+    """Collect the names of kernels that a test process has compiled."""
     _OURS.update(getattr(node, "workeroutput", {}).get("compiled", ()))
 
 
@@ -149,24 +150,24 @@ def pytest_sessionfinish(session: pytest.Session) -> None:
 
 @pytest.hookimpl(trylast=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Begin with those of daemons: they are the most that one process has to run."""
+    """Run daemon tests first: they are the longest sequence in a single process."""
     items.sort(key=lambda item: not _of_a_daemon(item.nodeid))
 
 
 def pytest_collection_finish() -> None:
-    """Collect garbage from now on, but leave alone what has been made until now."""
+    """Enable the garbage collector, but exclude all objects that exist by now."""
     gc.freeze()
     gc.enable()
 
 
 def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> LoadScopeScheduling:
-    """Keep files together: some make one long commissioning for all of their tests."""
+    """Keep files together: some share one long commissioning among their tests."""
     return _ByFile(config, log)
 
 
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_teardown(item: pytest.Item) -> Generator[None]:
-    """Limit the time of a teardown as well: the test's own limit has ended where it failed."""
+    """Limit the time of teardowns too: the limit of a test ends when the test fails."""
     settings = pytest_timeout.get_env_settings(item.config)
     if settings.timeout:
         item.ihook.pytest_timeout_set_timer(item=item, settings=settings)

@@ -1,4 +1,4 @@
-"""Texts of the faults of a device, for assertions."""
+"""Return the faults of a device as text, for assertions."""
 
 from __future__ import annotations
 
@@ -8,5 +8,5 @@ from cdpr_rt.core.fault import fault_text
 
 
 def alarm(device: Any) -> str:
-    """Return the faults of `device` as text, "" for none."""
+    """Return the faults of `device` as text, "" if there are none."""
     return "; ".join(fault_text(fault, ()) for fault in device.faults())

@@ -1,17 +1,17 @@
-"""Processes of the command line, forked from one that has imported all of it.
+"""Fork commands from a server that has already imported everything.
 
-To import numba, numpy and what else a command stands on, to load its kernels, and to take all that
-apart at its end takes a second of processor time, and the tests start hundreds of commands. A
-process started here is one of its own in all else: arguments, environment, folder, descriptors,
-session and signals are those that `subprocess` was asked for. It does what a process does at its
-end (threads, atexit, what is written) except for freeing its memory piece by piece. It is killed
-where the test process dies, and the server with it, without having ended it.
+The tests start hundreds of commands. Each would need a second of processor time to import numba and
+numpy, load its kernels and tear everything down again. A forked process behaves like a new one: it
+has the arguments, environment, folder, descriptors, session and signals that the caller gave to
+`subprocess`. At its end it joins threads, runs atexit functions and flushes its output, but does
+not free its memory piece by piece. If the test process dies, the server and its forks are killed.
 
-The two processes of a daemon look for their parent, the launcher. It has a server of its own, from
-which it adopts them: for that moment, orphans below it are its children.
+The two processes of a daemon check that the launcher is their parent. Therefore each launcher has
+a separate server and adopts the processes that this server forks: for that moment the launcher is
+the subreaper of orphaned descendants.
 
-What cannot be had by a fork is started as usual, as is all that has CDPR_TEST_FORKS=0 in its
-environment.
+A process that cannot be forked is started as usual. So is every process with CDPR_TEST_FORKS=0 in
+its environment.
 """
 
 from __future__ import annotations
@@ -40,11 +40,11 @@ from typing import Any, NoReturn
 
 _COMMAND = "cdpr_tools.cli"
 FORKED = (sys.executable, "-X", "forked", "-c")
-"""The beginning of a command whose words go on with a script, which may be run in such a process,
-and with its arguments. By itself Python takes no notice of the option."""
+"""Prefix of a command that runs a script in a forked process: append the script and its arguments.
+Python ignores the option."""
 _SCRIPT = "-c"
 _LAUNCHER_RIG = "launcher_rig"
-"""A launcher of stand-ins, which PYTHONPATH leads to."""
+"""A launcher whose loop and service are stand-ins, found by PYTHONPATH."""
 _OF_A_LAUNCHER = {
     "cdpr_tools.daemon.loop_process",
     "cdpr_tools.daemon.service_process",
@@ -53,15 +53,15 @@ _OF_A_LAUNCHER = {
 }
 _STARTED_BY = [sys.executable, "-P", str(Path(__file__).resolve())]
 _ROOM = " " * 8192
-"""A last word of the server's, in whose place go the words of what is forked: /proc shows them."""
+"""Last argument of the server, which reserves room for the arguments that /proc shows of a fork."""
 _SPECIAL = ("PYTHON", "NUMBA", "LD_", "MALLOC", "OPENBLAS", "OMP")
-"""Variables that Python and libraries read when they start."""
+"""Prefixes of variables that Python and libraries read at startup."""
 _FINDS_ITS_CHILDREN = "verify"
-"""The command that looks for its processes by their environment, which /proc shows as at first."""
+"""A command that finds its processes by their environment in /proc, which a fork cannot change."""
 _LAUNCHES = "run"
-"""The command whose processes, and their tests, look for their parent."""
+"""The command that is a launcher: its processes, and tests, check who their parent is."""
 _WHEN_NEEDED = ("httpcore", "rich.markdown", "scipy.signal")
-"""Modules that commands load in the middle of their work."""
+"""Modules that commands load late."""
 _PR_SET_PDEATHSIG, _PR_SET_CHILD_SUBREAPER = 1, 36
 _SWITCH = "CDPR_TEST_FORKS"
 _MOST_BYTES = 1 << 17
@@ -70,16 +70,16 @@ _OUT_OF_THE_WAY = 200
 
 _Popen = subprocess.Popen
 _connections: dict[int, socket.socket] = {}
-"""By the process that they belong to: one that was forked has to make its own."""
+"""Connection of each process id. A forked process has to open a new one."""
 _address: list[str] = []
 _own: list[socket.socket] = []
-"""Of a launcher: the way to its own server."""
+"""In a launcher: the socket to its separate server."""
 _asking = threading.Lock()
-"""Whose request it is, its answer is."""
+"""Held from a request until its answer, so that no other thread receives it."""
 
 
 def _ask(request: dict[str, Any], descriptors: Sequence[int] = ()) -> int:
-    """Return the server's answer to `request`; the server is started when first needed."""
+    """Return the server's answer to `request`. Start the server on first use."""
     with _asking:
         if not _address:
             _start_server()
@@ -91,7 +91,7 @@ def _ask(request: dict[str, Any], descriptors: Sequence[int] = ()) -> int:
         try:
             socket.send_fds(_connections[pid], [message], list(descriptors))
             return int(_connections[pid].recv(64))
-        except BaseException:  # an answer that comes yet is not to be taken for the next one's
+        except BaseException:  # a late answer must not be taken for that to the next request
             _connections.pop(pid).close()
             raise
 
@@ -102,7 +102,7 @@ def _start_server() -> None:
     listener.bind(_address[0])
     listener.listen()
     lifeline, kept = os.pipe()
-    os.set_inheritable(kept, False)  # open for as long as this process lives
+    os.set_inheritable(kept, False)  # open as long as this process lives
     numbers = [listener.fileno(), lifeline]
     _Popen([*_STARTED_BY, *map(str, numbers), _ROOM], pass_fds=numbers)
     listener.close()
@@ -110,7 +110,7 @@ def _start_server() -> None:
 
 
 class ForkingPopen(_Popen):  # type: ignore[type-arg]
-    """subprocess.Popen that has commands of ours forked from the server."""
+    """A subprocess.Popen that forks our commands from the server."""
 
     _forked = False
 
@@ -175,8 +175,8 @@ class ForkingPopen(_Popen):  # type: ignore[type-arg]
         if not self._forked:
             return super()._internal_poll(*given, **more)  # type: ignore[misc,no-any-return]
         if more and _asking.locked():
-            return None  # the collector has come in the middle of a question
-        # as in Popen: of two threads one alone asks how it has ended
+            return None  # the garbage collector interrupted a request
+        # as in Popen: only one of two threads asks for the exit status
         if self.returncode is None and self._waitpid_lock.acquire(False):
             try:
                 if self.returncode is None:
@@ -189,7 +189,7 @@ class ForkingPopen(_Popen):  # type: ignore[type-arg]
 
 
 def _module_of(words: list[str]) -> str:
-    """Return the module that is run, empty where it is something else."""
+    """Return the module that a command line runs, "" if it runs none."""
     if words[:4] == [*FORKED]:
         return _SCRIPT
     if words[:2] == [sys.executable, "-P"]:
@@ -198,7 +198,7 @@ def _module_of(words: list[str]) -> str:
 
 
 def _adopt(request: dict[str, Any], descriptors: Sequence[int]) -> int:
-    """Return the process that the launcher's own server has started as a child of this one."""
+    """Have the launcher's server start a process. Adopt it and return its pid."""
     prctl = ctypes.CDLL(None).prctl
     prctl(_PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0)
     try:
@@ -209,7 +209,7 @@ def _adopt(request: dict[str, Any], descriptors: Sequence[int]) -> int:
 
 
 def _limits() -> list[tuple[int, int]]:
-    """Return the limits that a process inherits."""
+    """Return the resource limits that a process inherits."""
     return [resource.getrlimit(what) for what in (resource.RLIMIT_NOFILE, resource.RLIMIT_FSIZE)]
 
 
@@ -222,7 +222,7 @@ def _of_start(wanted: dict[str, str], name: str) -> bool:
 
 
 def install() -> None:
-    """Have this process start commands by forks from now on."""
+    """Make this process fork its commands from now on."""
     subprocess.Popen = ForkingPopen  # type: ignore[misc]
 
 
@@ -250,7 +250,7 @@ def _serve(listener: socket.socket, lifeline: int) -> None:
 
 
 def _obey(client: socket.socket, selector: selectors.BaseSelector, kernels: Any) -> bool:
-    """Answer one request of a client; return False where it has gone."""
+    """Answer one request of a client. Return False if the client has disconnected."""
     message, descriptors = _received(client)
     if not message:
         return False
@@ -262,7 +262,7 @@ def _obey(client: socket.socket, selector: selectors.BaseSelector, kernels: Any)
         gc.freeze()
         answer = os.fork()
         if answer == 0:
-            # what a test has started does not outlive it, however it ends
+            # no process outlives the test that started it
             ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL, 0, 0, 0)
             _address[:] = [request["address"]]
             for key in [*selector.get_map().values()]:
@@ -271,7 +271,7 @@ def _obey(client: socket.socket, selector: selectors.BaseSelector, kernels: Any)
             _become(request, descriptors)
         for descriptor in descriptors:
             os.close(descriptor)
-    with suppress(ConnectionError):  # whose question was interrupted has gone
+    with suppress(ConnectionError):  # an interrupted client has closed its connection
         client.send(str(answer).encode())
     return True
 
@@ -285,7 +285,7 @@ def _received(client: socket.socket) -> tuple[bytes, list[int]]:
 
 
 class _Kernels:
-    """The kernels of the modules that are loaded, and which of their machine code is."""
+    """The kernels of the loaded modules, and which of their machine code is loaded."""
 
     def __init__(self) -> None:
         dispatcher = importlib.import_module("numba.core.dispatcher").Dispatcher
@@ -293,13 +293,13 @@ class _Kernels:
         found = {id(value): value for module in ours for value in vars(module).values()}
         self._seen_ns: dict[Any, int] = {}
         for kernel in found.values():
-            # of a kernel that is kept nowhere on this machine there is nothing to load
+            # a kernel without a cache has nothing to load
             if isinstance(kernel, dispatcher) and hasattr(kernel._cache, "open"):
                 kernel._cache.open()
                 self._seen_ns[kernel] = 0
 
     def load(self) -> None:
-        """Load what there is on disk by now."""
+        """Load machine code that has been added on disk."""
         for kernel, seen_ns in self._seen_ns.items():
             file = kernel._cache._cache_file
             try:
@@ -322,7 +322,7 @@ def _import_all() -> None:
 
 
 def _serve_launcher(client: socket.socket) -> NoReturn:
-    """Start processes that the launcher, the parent of this one, becomes the parent of."""
+    """Start processes as orphans, which the launcher adopts. The launcher is this one's parent."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     while True:
         message, descriptors = _received(client)
@@ -338,7 +338,7 @@ def _serve_launcher(client: socket.socket) -> NoReturn:
                 os._exit(0)
             for number in (told, tell, go, client.fileno()):
                 os.close(number)
-            os.read(wait, 1)  # until this one is the launcher's
+            os.read(wait, 1)  # until the launcher has adopted this process
             os.close(wait)
             _become(json.loads(message), descriptors)
         os.waitpid(between, 0)
@@ -392,16 +392,16 @@ def _get_own_server(descriptors: list[int]) -> None:
             os.close(number)
         _serve_launcher(its)
     its.close()
-    # where no descriptor has to go that the process is to have
+    # above all descriptors that the process gets
     _own.append(socket.socket(fileno=fcntl.fcntl(mine, fcntl.F_DUPFD_CLOEXEC, _OUT_OF_THE_WAY)))
     mine.close()
 
 
 @contextmanager
 def _quick_end() -> Iterator[None]:
-    """At the end of the block do what an interpreter does at its own, but free no memory.
+    """At the end of the block, exit as the interpreter does but without freeing memory.
 
-    Any end but an exit in order is left to the interpreter.
+    Leave every end but an orderly exit to the interpreter.
     """
     code: Any = None
     try:
@@ -421,7 +421,7 @@ def _quick_end() -> Iterator[None]:
 
 
 def _be_shown_as(words: list[str]) -> None:
-    """Have /proc show this process with these words."""
+    """Make /proc show `words` as the arguments of this process."""
     fields = Path("/proc/self/stat").read_text().rpartition(")")[2].split()
     begin, end = int(fields[45]), int(fields[46])
     text = b"\0".join(word.encode() for word in words)[: end - begin - 1]

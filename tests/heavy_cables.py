@@ -1,4 +1,4 @@
-"""Elastic catenaries: a point mass on them, and how one between two points pulls at its ends."""
+"""Elastic catenaries: a point mass in equilibrium on three cables, a cable between two points."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ G_m_s2 = 9.80665
 
 
 class Standing(NamedTuple):
-    """An equilibrium."""
+    """An equilibrium of a point mass."""
 
     position_m: NDArray[np.float64]
     winch_N: NDArray[np.float64]
@@ -33,11 +33,12 @@ def standing(
     position_m: ArrayLike | None = None,
     guess_m: ArrayLike = (0.0, 0.0, 0.0),
 ) -> Standing:
-    """Return how a mass hangs on three cables of given unstretched lengths, or at a given place.
+    """Return the equilibrium of a mass on three cables, given unstretched lengths or its position.
 
-    Irvine, Cable Structures (1981): of a cable of unstretched length L with H beside and V upward
-    at its lower end, the upper one is H L/EA + H/w (asinh((V + wL)/H) - asinh(V/H)) beside and
-    (V L + w L²/2)/EA + (√(H² + (V + wL)²) - √(H² + V²))/w above.
+    Irvine, Cable Structures (1981): a cable of unstretched length L has the horizontal force H and
+    the vertical force V at its lower end. Its upper end is at the horizontal distance
+    H L/EA + H/w (asinh((V + wL)/H) - asinh(V/H)) and at the height
+    (V L + w L²/2)/EA + (√(H² + (V + wL)²) - √(H² + V²))/w.
     """
     exits, w, EA = np.asarray(exits_m, float), weight_N_m, stiffness_N
 
@@ -74,7 +75,7 @@ class Cable(NamedTuple):
     """An elastic catenary between two points."""
 
     length_m: float
-    """Its length without tension."""
+    """Unstretched length."""
     pull_N: NDArray[np.float64]
     """Force on the anchor point, (3,)."""
 
@@ -82,7 +83,7 @@ class Cable(NamedTuple):
 def cable_with(
     exit_m: ArrayLike, anchor_m: ArrayLike, weight_N_m: float, stiffness_N: float, exit_N: float
 ) -> Cable:
-    """Return the cable whose tension at its exit is `exit_N`, which may be above or below.
+    """Return the cable whose tension at its exit is `exit_N`. The exit may be below the anchor.
 
     The formulae are those of `standing`.
     """
@@ -107,7 +108,7 @@ def cable_with(
 def cables_on(
     platform: Platform, position_m: ArrayLike, stiffness_N: ArrayLike, exit_N: ArrayLike
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return lengths (n,) of the cables of an upright platform, and their wrench (6,) on it."""
+    """Return the cable lengths (n,) of an upright platform and the wrench (6,) of its cables."""
     lengths_m, wrench, arms = [], np.zeros(6), np.array(platform.anchor_points_m)
     each = zip(platform.exit_points_m, arms, platform.cable_weights_N_m, strict=True)
     pulls = zip(each, np.asarray(stiffness_N, float), np.asarray(exit_N, float), strict=True)

@@ -1,4 +1,4 @@
-"""The examples run as they are, and print what their docstrings promise."""
+"""Each example runs unchanged and prints what its docstring promises."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ PRINTED = {
 }
 
 
-def test_each_example_is_listed_here_and_short() -> None:
+def test_each_example_is_listed_here_and_has_at_most_60_lines() -> None:
     files = {path.name: path.read_text().count("\n") for path in EXAMPLES.glob("*.py")}
     assert files.keys() == PRINTED.keys()
     assert max(files.values()) <= MOST_LINES
@@ -33,7 +33,7 @@ def test_each_example_is_listed_here_and_short() -> None:
 
 @pytest.mark.long
 @pytest.mark.parametrize("name", PRINTED)
-def test_an_example_runs_and_prints_what_happened(name: str, tmp_path: Path) -> None:
+def test_example_succeeds_and_prints_its_results(name: str, tmp_path: Path) -> None:
     done = subprocess.run(
         [sys.executable, str(EXAMPLES / name)],
         cwd=tmp_path,

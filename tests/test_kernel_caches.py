@@ -1,4 +1,4 @@
-"""Machine code kept on disk is not used any more once a kernel that it calls has changed."""
+"""Cached machine code is valid until its kernel, a callee or a constant changes."""
 
 from __future__ import annotations
 
@@ -22,25 +22,27 @@ print(outer(1.0), sum(outer.stats.cache_hits.values()))
 """
 
 
-def told(folder: Path, *words: str) -> list[str]:
-    # without bytecode, which is not renewed for a source that changes twice in a second
+def output_words(folder: Path, *words: str) -> list[str]:
+    # without bytecode, which is not updated if a source changes twice in a second
     done = subprocess.run(
         [sys.executable, "-B", *words], cwd=folder, capture_output=True, text=True, check=True
     )
     return done.stdout.split()
 
 
-def test_a_controllers_kernel_is_compiled_again_when_its_callee_has_changed(tmp_path: Path) -> None:
+def test_kernel_is_compiled_again_after_its_callee_changed(tmp_path: Path) -> None:
     (tmp_path / "caller.py").write_text(CALLER)
     callee = tmp_path / "kernels_callee.py"
     callee.write_text(CALLEE.format(added=1.0))
-    assert told(tmp_path, "caller.py") == ["20.0", "0"]
-    assert told(tmp_path, "caller.py") == ["20.0", "1"]
+    assert output_words(tmp_path, "caller.py") == ["20.0", "0"]
+    assert output_words(tmp_path, "caller.py") == ["20.0", "1"]
     callee.write_text(CALLEE.format(added=2.0))
-    assert told(tmp_path, "caller.py") == ["30.0", "0"]
+    assert output_words(tmp_path, "caller.py") == ["30.0", "0"]
 
 
-def test_so_it_is_when_the_callee_is_in_another_folder(tmp_path: Path) -> None:
+def test_kernel_is_compiled_again_after_an_indirect_callee_in_another_folder_changed(
+    tmp_path: Path,
+) -> None:
     (tmp_path / "middle").mkdir()
     (tmp_path / "inner").mkdir()
     callee = tmp_path / "inner" / "kernels_callee.py"
@@ -52,11 +54,11 @@ def test_so_it_is_when_the_callee_is_in_another_folder(tmp_path: Path) -> None:
     (tmp_path / "caller.py").write_text(text.replace("inner(", "middle("))
     for added, found in ((1.0, "40.0"), (2.0, "60.0")):
         callee.write_text(CALLEE.format(added=added))
-        assert told(tmp_path, "caller.py") == [found, "0"]
-        assert told(tmp_path, "caller.py") == [found, "1"]
+        assert output_words(tmp_path, "caller.py") == [found, "0"]
+        assert output_words(tmp_path, "caller.py") == [found, "1"]
 
 
-def test_machine_code_is_kept_once_by_whichever_path_its_source_is_found(tmp_path: Path) -> None:
+def test_a_symlinked_source_shares_the_cache_of_its_target(tmp_path: Path) -> None:
     (tmp_path / "itself").mkdir()
     (tmp_path / "itself" / "kernels_callee.py").write_text(CALLEE.format(added=1.0))
     (tmp_path / "linked").symlink_to("itself")
@@ -65,7 +67,9 @@ def test_machine_code_is_kept_once_by_whichever_path_its_source_is_found(tmp_pat
     )
     for name, found in (("itself", "0"), ("linked", "1")):
         folder = str(tmp_path / name)
-        assert told(tmp_path, "-c", f"import sys; sys.path.insert(0, {folder!r}); {ask}") == [found]
+        assert output_words(
+            tmp_path, "-c", f"import sys; sys.path.insert(0, {folder!r}); {ask}"
+        ) == [found]
 
 
 CONSTANTS = """
@@ -95,21 +99,21 @@ FACTOR, OFFSET, TABLE = {factor}, {offset}, np.array([{one}, 7])
 """
 
 
-def test_a_constant_that_changes_has_only_the_kernels_compiled_that_use_it(tmp_path: Path) -> None:
-    """Wherever it comes from; what is written besides code changes nothing."""
+def test_a_changed_constant_recompiles_only_kernels_that_use_it(tmp_path: Path) -> None:
+    """Constants may be imported by name or as attributes of a module. Comments do not matter."""
     numbers, kernels = tmp_path / "numbers_of_ours.py", tmp_path / "kernels.py"
     kernels.write_text(CONSTANTS)
     numbers.write_text(NUMBERS.format(factor=2.0, offset=1.0, one=1))
-    told(tmp_path, "kernels.py")
+    output_words(tmp_path, "kernels.py")
     kernels.write_text("# a remark\n" + CONSTANTS)
-    assert told(tmp_path, "kernels.py")[2:] == ["1", "2.0", "2.0", "4.0"]
+    assert output_words(tmp_path, "kernels.py")[2:] == ["1", "2.0", "2.0", "4.0"]
     for factor, offset, one, found in (
         (3.0, 1.0, 1, ["0", "1", "0", "3.0", "2.0", "5.0"]),
         (3.0, 2.0, 1, ["1", "0", "0", "3.0", "3.0", "6.0"]),
         (3.0, 2.0, 2, ["1", "0", "0", "3.0", "5.0", "8.0"]),
     ):
         numbers.write_text(NUMBERS.format(factor=factor, offset=offset, one=one))
-        assert told(tmp_path, "kernels.py") == found
+        assert output_words(tmp_path, "kernels.py") == found
 
 
 UNWRITABLE = """
@@ -133,10 +137,10 @@ print(kernel(1.0), sum(kernel.stats.cache_hits.values()))
 def without_folders(
     folder: Path, temporary: str, *words: str | Path
 ) -> subprocess.CompletedProcess[str]:
-    """Run a kernel whose folder, and whose user's home, nobody can write."""
+    """Run a kernel in a folder that nobody can write to, for a user without a home folder."""
     script = folder / "kernel.py"
     script.write_text(UNWRITABLE.format(temporary=temporary))
-    (folder / "__pycache__").touch()  # where numba wants a folder
+    (folder / "__pycache__").touch()  # numba expects a folder here
     given = {"HOME": "/proc/nowhere", "PYTHONDONTWRITEBYTECODE": "1"}
     env = {k: v for k, v in os.environ.items() if k not in ("NUMBA_CACHE_DIR", "XDG_CACHE_HOME")}
     return subprocess.run(
@@ -145,7 +149,7 @@ def without_folders(
     )  # fmt: skip
 
 
-def test_machine_code_that_can_be_kept_nowhere_else_is_kept_in_a_temporary_folder(
+def test_cache_falls_back_to_a_private_temporary_folder(
     tmp_path: Path,
 ) -> None:
     for found in ("0", "1"):
@@ -157,12 +161,10 @@ def test_machine_code_that_can_be_kept_nowhere_else_is_kept_in_a_temporary_folde
 
 
 @pytest.mark.parametrize("taken", [False, True])
-def test_kernels_work_though_their_machine_code_can_be_kept_nowhere(
-    tmp_path: Path, taken: bool
-) -> None:
+def test_kernels_work_without_any_cache_folder(tmp_path: Path, taken: bool) -> None:
     temporary = tmp_path / "of-others"
     temporary.mkdir(mode=0o777)
-    temporary.chmod(0o777)  # who writes there could have us run what he likes
+    temporary.chmod(0o777)  # other users could write machine code there, which we would run
     where = str(temporary) if taken else "/proc/nowhere/own"
     done = without_folders(tmp_path, where)
     assert done.stdout.split() == ["2.0", "0"]
@@ -170,7 +172,7 @@ def test_kernels_work_though_their_machine_code_can_be_kept_nowhere(
     assert not list(temporary.iterdir())
 
 
-def test_kernels_work_though_their_cache_cannot_be_used_any_more(tmp_path: Path) -> None:
+def test_kernels_work_after_their_cache_folder_was_replaced_by_a_file(tmp_path: Path) -> None:
     done = without_folders(tmp_path, str(tmp_path / "own"), tmp_path / "own" / "kernels")
     assert done.stdout.split() == ["2.0", "0"]
 
@@ -190,17 +192,17 @@ print(kernel(1.0), sum(kernel.stats.cache_hits.values()))
 
 
 @pytest.mark.parametrize("home", ["home", "/proc/nowhere"])
-def test_machine_code_beside_its_source_is_read_by_users_who_cannot_write_there(
+def test_users_without_write_access_read_the_cache_beside_the_source(
     tmp_path: Path, home: str
 ) -> None:
     script = tmp_path / "tree" / "kernel.py"
     script.parent.mkdir()
     script.write_text(HITS)
-    assert told(tmp_path, str(script)) == ["2.0", "0"]
+    assert output_words(tmp_path, str(script)) == ["2.0", "0"]
     folders = [one for one in (script.parent, *script.parent.rglob("*")) if one.is_dir()]
     for folder in folders:
         folder.chmod(0o555)
-    # root may write there nevertheless, unless it has lost the right to
+    # drop root's right to write there
     weak = ["setpriv", "--bounding-set=-dac_override"] if os.geteuid() == 0 else []
     env = {k: v for k, v in os.environ.items() if k not in ("NUMBA_CACHE_DIR", "XDG_CACHE_HOME")}
     done = subprocess.run(
@@ -240,10 +242,10 @@ print(sum(kernel.stats.cache_hits.values()))
 """
 
 
-def test_two_processes_that_compile_one_kernel_for_other_types_keep_both(tmp_path: Path) -> None:
-    """Each waits, before it writes the index, until the other one is about to write it too."""
+def test_cache_keeps_the_types_that_two_processes_compile_simultaneously(tmp_path: Path) -> None:
+    """Each process writes the index only when the other one is about to write it too."""
     (tmp_path / "at_once.py").write_text(AT_ONCE)
     both = [["at_once.py", "float", "int"], ["at_once.py", "int", "float"]]
     running = [subprocess.Popen([sys.executable, *words], cwd=tmp_path) for words in both]
     assert [one.wait(60) for one in running] == [0, 0]
-    assert [told(tmp_path, *words) for words in both] == [["1"], ["1"]]
+    assert [output_words(tmp_path, *words) for words in both] == [["1"], ["1"]]

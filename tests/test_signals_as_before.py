@@ -1,4 +1,4 @@
-"""Tests and their processes take signals whatever a test before them has done."""
+"""Signal handlers are restored after each test."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ TOLD = "import signal; print(signal.getsignal(signal.SIGINT) is signal.default_i
 
 
 @pytest.mark.parametrize("time", ["first", "again"])
-def test_what_is_started_after_a_command_that_was_interrupted_hears_ctrl_c(time: str) -> None:
+def test_a_process_receives_ctrl_c_after_a_test_that_ignored_it(time: str) -> None:
     heard = subprocess.run([sys.executable, "-c", TOLD], capture_output=True, check=True)
     assert heard.stdout == b"True\n", time
     with stop_on_signals() as stop_requested:
         os.kill(os.getpid(), signal.SIGINT)
     assert stop_requested()
-    assert signal.getsignal(signal.SIGINT) == signal.SIG_IGN  # what the next process would inherit
+    assert signal.getsignal(signal.SIGINT) == signal.SIG_IGN  # the next process would inherit this

@@ -1,4 +1,4 @@
-"""The page on threats: each test that it names is there."""
+"""Each test that the threat model names exists."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ TESTS = Path(__file__).parent
 PAGE = TESTS.parent / "docs" / "reference" / "threat-model.md"
 
 
-def test_each_test_that_the_page_names_is_there_and_each_row_names_one() -> None:
+def test_each_named_test_exists_and_each_row_names_a_test() -> None:
     text = PAGE.read_text()
     named = re.findall(r"`([a-z_0-9/]+\.py)::(test_\w+)`", text)
     assert len(named) > 40

@@ -1,4 +1,4 @@
-"""A test that hangs ends with its traceback, and what it has started ends with it."""
+"""A test that hangs ends with a traceback, and its processes end with it."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def test_fails_and_then_hangs(waits_at_its_end):
     ("name", "line"),
     [("test_hangs", "def test_hangs"), ("test_fails_and_then_hangs", "def waits_at_its_end")],
 )
-def test_a_test_that_hangs_ends_with_a_traceback_and_leaves_no_process(
+def test_a_hanging_test_ends_with_a_traceback_and_leaves_no_process(
     tmp_path: Path, name: str, line: str
 ) -> None:
     file = tmp_path / "test_endless.py"
@@ -67,5 +67,5 @@ def test_a_test_that_hangs_ends_with_a_traceback_and_leaves_no_process(
         os.kill(int((tmp_path / "pid").read_text()), 0)
 
 
-def test_every_test_here_has_a_time_limit(request: pytest.FixtureRequest) -> None:
+def test_each_test_has_a_time_limit(request: pytest.FixtureRequest) -> None:
     assert float(request.config.getini("timeout")) > 0.0

@@ -1,4 +1,4 @@
-"""Where things are: each file and name that a page refers to exists."""
+"""Each file and name in code that the documentation refers to exists."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ PATHS = re.compile(rf"`((?:{'|'.join(PACKAGES)})/[\w/.]+)`")
 NAMES = re.compile(r"\bcdpr_(?:rt|drivers|profiles|sim_bus|tools)(?:\.[A-Za-z_]\w*)+")
 
 
-def test_each_path_exists() -> None:
+def test_each_path_in_where_things_are_exists() -> None:
     paths = PATHS.findall((ROOT / "docs/explanation/where-things-are.md").read_text())
     assert len(paths) > 50
     assert [path for path in paths if not (ROOT / path).exists()] == []
 
 
-def test_each_name_in_code_that_pages_tell_of_is_there() -> None:
+def test_each_dotted_name_in_the_documentation_exists() -> None:
     pages = [ROOT / "README.md", *(ROOT / "docs").rglob("*.md")]
     names = {name for page in pages for name in NAMES.findall(page.read_text())}
     assert len(names) > 5

@@ -60,7 +60,7 @@ def is_help(docstring: ast.Expr, tree: ast.Module) -> bool:
     )
 
 
-def test_what_users_read_has_no_private_idiom() -> None:
+def test_documents_help_and_messages_have_no_private_idiom() -> None:
     sources = [path for one in PRODUCT for path in sorted((ROOT / one).rglob("*.py"))]
     read = [*lines_of_documents(), *(text for path in sources for text in texts_of(path))]
     assert len(read) > 10_000

@@ -1,4 +1,4 @@
-"""Text from outside: what is refused before a parser sees it, and that nothing else is."""
+"""Input that is too deep, too long or has too large numbers is rejected before it is parsed."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from cdpr_profiles.reader import validated
         ({"rated_torque_Nm": float("inf")}, "rated_torque_Nm: value inf; allowed: a finite number"),
     ],
 )
-def test_figures_that_no_motor_has_are_refused(change: dict[str, object], told: str) -> None:
+def test_motor_figures_out_of_range_are_rejected(change: dict[str, object], told: str) -> None:
     whole = load_motor("MPP0923D").model_dump()
     with pytest.raises(ProfileError) as refused:
         validated(Path("m.toml"), whole | change, Motor)
@@ -60,7 +60,7 @@ def test_costly_input_is_rejected_before_parsing(tmp_path: Path, text: str, told
     assert str(refused.value).startswith(f"{path}: {told}")
 
 
-def test_brackets_and_digits_in_strings_and_comments_are_no_depth(tmp_path: Path) -> None:
+def test_brackets_and_digits_in_strings_and_comments_do_not_count(tmp_path: Path) -> None:
     path = tmp_path / "x.toml"
     many = "[" * 100 + "1" * 200
     path.write_text(f'# {many}\na = \'{many}\'\nb = "\\"{many}"\nc = """\n"{many}""""\nd = 1.5\n')
@@ -81,7 +81,7 @@ def test_brackets_and_digits_in_strings_and_comments_are_no_depth(tmp_path: Path
         ("{", "x: is not valid JSON: "),
     ],
 )
-def test_json_that_is_none_or_means_nothing_is_refused(text: str | bytes, told: str) -> None:
+def test_invalid_json_is_rejected(text: str | bytes, told: str) -> None:
     with pytest.raises(ProfileError) as refused:
         parse_json(text, "x")
     assert str(refused.value).startswith(told)
@@ -99,6 +99,6 @@ JSON = st.recursive(
 
 
 @given(JSON)
-def test_json_that_is_sound_means_what_it_always_meant(value: object) -> None:
+def test_valid_json_is_parsed_as_by_the_standard_library(value: object) -> None:
     assert parse_json(json.dumps(value), "x") == value
     assert parse_json(json.dumps(value, ensure_ascii=False, indent=1), "x") == value

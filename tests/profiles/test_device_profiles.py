@@ -1,4 +1,4 @@
-"""Files of load cells, safety I/Os, rails and calibrated winches: what is read and refused."""
+"""Files of load cells, safety I/Os, rails and calibrated winches are read or rejected."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ CELL, IO, CIA402, MODBUS = (
         (MODBUS, "metre_per_unit = 1e-5", "metre_per_unit = 0.0", "metre_per_unit: value 0.0"),
     ],
 )  # fmt: skip
-def test_a_wrong_value_is_refused_with_file_and_key(
+def test_error_for_a_wrong_value_names_file_and_key(
     tmp_path: Path, file: Path, old: str, new: str, told: str
 ) -> None:
     text = (SHIPPED / file).read_text()
@@ -66,7 +66,7 @@ def test_a_wrong_value_is_refused_with_file_and_key(
     assert str(path) in str(error.value) and told in str(error.value)
 
 
-def test_an_unknown_name_is_answered_with_the_likely_one(tmp_path: Path) -> None:
+def test_error_for_an_unknown_name_suggests_the_likely_one(tmp_path: Path) -> None:
     with pytest.raises(ProfileError, match="did you mean 'rtu-load-cells-8'"):
         load_tension_sensors("rtu-load-cells-9")
     with pytest.raises(ProfileError, match="did you mean 'modbus-remote-io'"):
@@ -79,7 +79,7 @@ def test_an_unknown_name_is_answered_with_the_likely_one(tmp_path: Path) -> None
         load_rail_drive(path, cia402)
 
 
-def test_a_safety_io_can_be_moved_to_another_place() -> None:
+def test_a_reference_to_a_safety_io_may_replace_host_and_port() -> None:
     shipped = load_safety_io("modbus-remote-io")
     assert (shipped.host, shipped.port, shipped.chain.input) == ("127.0.0.1", 502, 0)
     moved = load_safety_io("modbus-remote-io@plc-7:1502")
@@ -95,7 +95,7 @@ def test_the_shipped_rails_load() -> None:
     assert 1 in load_rail_drive("rail-cia402", cia402).supported_modes
 
 
-def test_a_calibration_is_read_as_it_was_written(tmp_path: Path) -> None:
+def test_a_winch_calibration_is_read_back_as_written(tmp_path: Path) -> None:
     made = WinchCalibration(
         winch='a "quoted" winch: Förderseil 🏗',
         motor="MPP0923D",

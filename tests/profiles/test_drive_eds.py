@@ -1,4 +1,4 @@
-"""The shipped drives' data sheets are well formed and say what their profiles say."""
+"""The EDS files of the shipped drives are well formed and agree with the drive profiles."""
 
 from collections.abc import Iterator
 from configparser import RawConfigParser
@@ -54,7 +54,7 @@ def test_the_profiles_pdos_can_be_mapped(drive, od):
                 assert mapped.writable if base == 0x1400 else mapped.readable
 
 
-def test_every_default_mapping_names_a_mappable_object_of_its_length(od):
+def test_each_default_mapping_names_a_mappable_object_of_the_right_length(od):
     for index in _mappings(od):
         total = 0
         for sub in range(1, od[index][0].default + 1):
@@ -69,7 +69,7 @@ def test_every_default_mapping_names_a_mappable_object_of_its_length(od):
         assert 0 < total <= 64
 
 
-def test_identifiers_of_pdos_that_exist_are_the_predefined_ones(od):
+def test_default_pdos_have_the_predefined_identifiers(od):
     for base, first in ((0x1400, 0x200), (0x1800, 0x180)):
         for number in range(4):
             cob_id = od[base + number][1].default
@@ -82,7 +82,7 @@ def test_defaults_lie_within_their_limits(variables):
             assert v.min <= v.default <= v.max, f"{v.index:04X}h:{v.subindex}"
 
 
-def test_writable_objects_that_are_numbers_have_a_default(variables):
+def test_all_objects_but_domains_have_a_default(variables):
     for v in variables:
         if v.data_type != canopen.objectdictionary.DOMAIN:
             assert v.default is not None, f"{v.index:04X}h:{v.subindex}"
@@ -102,7 +102,7 @@ def test_a_torque_slope_fits_its_object(drive, od):
         assert od[0x6087].min <= slope <= od[0x6087].max
 
 
-def test_generic_defaults_fit_the_motor(generic):
+def test_defaults_of_the_generic_drive_fit_the_motor(generic):
     od = generic
     motor = load_motor("MPP0923D")
     assert od[0x6076].default == round(motor.rated_torque_Nm * 1000)
@@ -117,7 +117,7 @@ def test_generic_defaults_fit_the_motor(generic):
     assert od[0x6092][1].default == per_turn
 
 
-def test_lists_and_counts_of_the_file_agree_with_its_sections(drive):
+def test_object_lists_and_counts_agree_with_the_sections(drive):
     eds = RawConfigParser(inline_comment_prefixes=(";",))
     eds.optionxform = str
     eds.read(drive.eds)

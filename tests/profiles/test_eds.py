@@ -1,4 +1,4 @@
-"""EDS and DCF files as makers write them: what is read, remarked and refused."""
+"""EDS and DCF files of manufacturers are read; flaws are remarked on; other files are rejected."""
 
 from __future__ import annotations
 
@@ -82,7 +82,7 @@ def contents(od: canopen.ObjectDictionary) -> dict[tuple[int, int], tuple[object
 
 
 @pytest.mark.parametrize("name", ["generic-cia402", "mnm-profile-torque", "parker-compax3-canopen"])
-def test_a_clean_file_is_read_as_the_canopen_package_reads_it(name: str) -> None:
+def test_a_flawless_file_is_read_as_by_the_canopen_package(name: str) -> None:
     path = load_drive(name).eds
     ours, theirs = load_dictionary(path, 5), canopen.import_od(str(path), 5)
     assert read_eds(path).remarks.texts == []
@@ -129,7 +129,9 @@ def test_integers_are_decimal_hexadecimal_or_octal(text: str, value: int | None)
         ("$NODE+1", None),
     ],
 )
-def test_expressions_of_the_node_id(tmp_path: Path, text: str, value: int | None) -> None:
+def test_expressions_with_the_node_id_are_evaluated(
+    tmp_path: Path, text: str, value: int | None
+) -> None:
     more = variable("2000", DataType="0x0007", DefaultValue=text)
     found = load_dictionary(write(tmp_path, HEAD + MANDATORY + more), 5)[0x2000]
     assert found.default == value
@@ -159,7 +161,7 @@ def test_expressions_of_the_node_id(tmp_path: Path, text: str, value: int | None
         (variable("2000", DataType="0x0008", DefaultValue="nan"), "allowed: a number; left out"),
     ],
 )
-def test_a_flaw_is_remarked_with_section_key_value_and_what_is_allowed(
+def test_remark_on_a_flaw_names_section_key_value_and_allowed_values(
     tmp_path: Path, more: str, remark: str
 ) -> None:
     eds, remarks = read(tmp_path, more)
@@ -167,12 +169,12 @@ def test_a_flaw_is_remarked_with_section_key_value_and_what_is_allowed(
     assert eds.od[0x1018][1].default == 0x1F
 
 
-def test_signed_numbers_given_by_their_bits_are_understood(tmp_path: Path) -> None:
+def test_signed_numbers_may_be_given_as_unsigned_hexadecimal(tmp_path: Path) -> None:
     eds, _ = read(tmp_path, variable("2000", DefaultValue="0xFFFF", LowLimit="0x8000"))
     assert (eds.od[0x2000].default, eds.od[0x2000].min) == (-1, -32768)
 
 
-def test_a_type_with_limits_is_read_as_the_type_it_limits(tmp_path: Path) -> None:
+def test_a_subrange_type_is_read_as_its_base_type(tmp_path: Path) -> None:
     eds, remarks = read(
         tmp_path, variable("A0sub1", DefaultValue="0x3") + variable("2000", DataType="0xA0")
     )
@@ -180,7 +182,7 @@ def test_a_type_with_limits_is_read_as_the_type_it_limits(tmp_path: Path) -> Non
     assert remarks == ""
 
 
-def test_short_forms_are_written_out(tmp_path: Path) -> None:
+def test_compact_pdos_and_compact_arrays_are_expanded(tmp_path: Path) -> None:
     head = HEAD.replace(
         "VendorNumber=0x1F", "VendorNumber=0x1F\nCompactPDO=0x3\nNrOfRXPDO=1\nNrOfTXPDO=5"
     )
@@ -196,7 +198,7 @@ def test_short_forms_are_written_out(tmp_path: Path) -> None:
     assert [entry.writable for entry in od[0x1A00].values()] == [True] * 9
 
 
-def test_a_dcf_gives_node_id_bit_rate_and_values(tmp_path: Path) -> None:
+def test_a_dcf_sets_node_id_bit_rate_and_values(tmp_path: Path) -> None:
     more = "[DeviceComissioning]\nNodeID=0x10\nBaudrate=500\n"
     more += "[1800]\nParameterName=PDO\nObjectType=9\nSubNumber=1\n"
     more += variable("1800sub1", DataType="7", DefaultValue="$NODEID+0x180", ParameterValue="0x290")
@@ -206,7 +208,7 @@ def test_a_dcf_gives_node_id_bit_rate_and_values(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("encoding", ["utf-8-sig", "utf-16", "cp1252", "latin-1"])
-def test_encodings_are_reported_and_read(tmp_path: Path, encoding: str) -> None:
+def test_files_not_in_ascii_are_read_and_remarked_on(tmp_path: Path, encoding: str) -> None:
     text = HEAD + MANDATORY.replace("Device type", "Gerätetyp")
     eds = read_eds(write(tmp_path, text.replace("\n", "\r\n").encode(encoding)))
     assert len(eds.remarks.texts) == 1
@@ -234,7 +236,7 @@ def test_a_file_that_is_no_eds_is_rejected(tmp_path: Path, content: bytes, probl
     assert "\n" not in str(told.value)
 
 
-def test_a_file_that_is_not_there_is_refused(tmp_path: Path) -> None:
+def test_a_missing_file_or_a_folder_is_rejected(tmp_path: Path) -> None:
     with pytest.raises(ProfileError, match="cannot be read: No such file"):
         read_eds(tmp_path / "nothing.eds")
     with pytest.raises(ProfileError, match="is no regular file"):
@@ -249,7 +251,7 @@ JUNK = st.text(max_size=12) | st.sampled_from(
 
 @settings(max_examples=300)
 @given(data=st.data())
-def test_no_text_whatsoever_raises_anything_else(
+def test_a_damaged_eds_raises_only_profile_errors(
     tmp_path_factory: pytest.TempPathFactory, data: st.DataObject
 ) -> None:
     lines = list(LINES)

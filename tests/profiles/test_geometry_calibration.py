@@ -1,4 +1,4 @@
-"""The calibration beside a robot's file: applied, refused, kept in versions, undone."""
+"""The calibration beside a robot's file is applied, validated, versioned and undone."""
 
 from __future__ import annotations
 
@@ -57,12 +57,12 @@ def calibration(robot: Robot, version: int = 1, move_m: float = 0.01) -> Geometr
     )
 
 
-def test_a_robot_without_one_is_as_its_file_says(robot: Robot) -> None:
+def test_a_robot_without_calibration_is_as_its_file_says(robot: Robot) -> None:
     assert calibrated(robot) is robot
     assert next_version(robot) == 1
 
 
-def test_one_in_force_takes_the_place_of_the_file(robot: Robot) -> None:
+def test_calibration_replaces_the_geometry_of_the_robots_file(robot: Robot) -> None:
     path = take_over(robot, calibration(robot))
     assert path == calibration_file(robot) and path.parent == robot.path.parent
     told = calibrated(robot)
@@ -74,11 +74,11 @@ def test_one_in_force_takes_the_place_of_the_file(robot: Robot) -> None:
     assert first.cable.stiffness_N == pytest.approx(before_first.cable.stiffness_N / 1.4)
     assert told.platform.home_m[0] == pytest.approx(robot.platform.home_m[0] + 0.002)
     assert told.calibration == calibration(robot)
-    # the file itself is as it was: a simulator that loads it has no part in it
+    # the file is unchanged: a simulator that loads it does not see the calibration
     assert load_robot(robot.path).platform == robot.platform
 
 
-def test_the_file_reads_back_as_it_was_written(robot: Robot) -> None:
+def test_calibration_is_read_back_as_written(robot: Robot) -> None:
     given = calibration(robot)
     held = GeometryCalibration.load_file(take_over(robot, given))
     assert held == given
@@ -86,7 +86,7 @@ def test_the_file_reads_back_as_it_was_written(robot: Robot) -> None:
     assert calibration(robot, move_m=0.011).identity != given.identity
 
 
-def test_versions_are_kept_and_undone_one_by_one(robot: Robot) -> None:
+def test_undo_restores_one_version_at_a_time(robot: Robot) -> None:
     take_over(robot, calibration(robot, 1))
     assert next_version(robot) == 2
     take_over(robot, calibration(robot, 2, 0.02))
@@ -97,12 +97,12 @@ def test_versions_are_kept_and_undone_one_by_one(robot: Robot) -> None:
     assert held is not None and held.version == 1
     assert undo(robot) is None
     assert calibrated(robot) is robot
-    assert next_version(robot) == 3, "no number is used twice"
+    assert next_version(robot) == 3, "no version number is used twice"
     with pytest.raises(ProfileError, match="none to undo"):
         undo(robot)
 
 
-def test_one_of_another_state_of_the_robots_file_is_refused(robot: Robot) -> None:
+def test_calibration_is_rejected_after_the_robots_geometry_changed(robot: Robot) -> None:
     take_over(robot, calibration(robot))
     text = robot.path.read_text()
     robot.path.write_text(text + "\n# a remark\n")
@@ -129,7 +129,7 @@ def test_one_of_another_state_of_the_robots_file_is_refused(robot: Robot) -> Non
         ({"drum_scales": (0.51, 1.0, 1.0, 1.0)}, r"drum_scales\[0\]"),
     ],
 )
-def test_a_calibration_of_another_robot_is_rejected(
+def test_calibration_that_does_not_fit_the_robot_is_rejected(
     robot: Robot, change: dict[str, object], named: str
 ) -> None:
     wrong = calibration(robot).model_copy(update=change)
@@ -140,13 +140,13 @@ def test_a_calibration_of_another_robot_is_rejected(
         calibrated(robot)
 
 
-def test_a_damaged_file_is_refused_by_its_name(robot: Robot) -> None:
+def test_error_for_a_damaged_calibration_names_its_file(robot: Robot) -> None:
     calibration_file(robot).write_text("robot = 7\n")
     with pytest.raises(ProfileError, match=r"mine\.calibration"):
         calibrated(robot)
 
 
-def test_that_of_a_shipped_robot_lies_in_the_users_folder(
+def test_calibration_of_a_shipped_robot_is_kept_in_the_users_folder(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
@@ -158,7 +158,7 @@ def test_that_of_a_shipped_robot_lies_in_the_users_folder(
     assert calibrated(winch) is winch
 
 
-def test_an_older_one_of_another_robot_is_not_put_back(robot: Robot) -> None:
+def test_undo_does_not_restore_a_version_for_another_geometry(robot: Robot) -> None:
     take_over(robot, calibration(robot, 1))
     path = take_over(robot, calibration(robot, 2, 0.02))
     older = path.with_name(path.name + ".1")
@@ -167,7 +167,7 @@ def test_an_older_one_of_another_robot_is_not_put_back(robot: Robot) -> None:
     assert calibrated(robot) is robot
 
 
-def test_that_of_another_name_is_not_taken_for_a_version(tmp_path: Path) -> None:
+def test_versions_of_a_robot_with_a_similar_name_are_ignored(tmp_path: Path) -> None:
     named, other = tmp_path / "a[1].toml", tmp_path / "a1.toml"
     for path in (named, other):
         shutil.copy(SHIPPED / "robots" / "planar-4.toml", path)
@@ -176,7 +176,7 @@ def test_that_of_another_name_is_not_taken_for_a_version(tmp_path: Path) -> None
     assert next_version(load_robot(named)) == 1
 
 
-def test_a_calibration_that_cannot_be_read_is_not_taken_for_none(robot: Robot) -> None:
+def test_a_calibration_that_cannot_be_read_is_an_error(robot: Robot) -> None:
     path = take_over(robot, calibration(robot))
     elsewhere = path.with_name("share")
     path.rename(elsewhere)
@@ -193,7 +193,7 @@ def test_a_calibration_that_cannot_be_read_is_not_taken_for_none(robot: Robot) -
             refused(robot)
 
 
-def test_a_folder_of_calibrations_that_is_not_mounted_is_not_taken_for_none(
+def test_a_calibration_folder_that_is_not_mounted_is_an_error(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))

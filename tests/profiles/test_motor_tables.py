@@ -1,7 +1,7 @@
-"""The printed tables obey the laws that tie their columns together, row by row.
+"""The columns of the printed motor tables agree with each other in each row.
 
-A wrong digit in one column breaks the law with its neighbour: pounds against newtons, peak against
-continuous, power against torque and speed.
+A wrong digit in one column contradicts another one: pounds and newtons, peak and continuous values,
+power and torque times speed.
 """
 
 import math
@@ -19,7 +19,7 @@ ROWS_230 = SERIES.ratings.models_230_VAC
 ROWS_460 = SERIES.ratings.models_460_VAC
 ROWS = {row.model: row for row in ROWS_230 + ROWS_460}
 
-# Factors with which the source was evidently computed.
+# Factors that the source evidently used.
 LB_IN_PER_NM = 8.85
 kg_m2_PER_lb_in_s2 = 0.45359237 * N_PER_KGF * 0.0254
 KW_PER_HP = 0.75
@@ -27,11 +27,11 @@ PEAK_OVER_STALL_CURRENT = 3.16
 
 
 def _within_last_digit(a: float, b: float, factor: float, digit_a: float, digit_b: float) -> bool:
-    """Tell whether a * factor equals b when each is rounded to its last digit."""
+    """Return whether a * factor equals b if each is rounded to its last digit."""
     return abs(a * factor - b) <= 0.5001 * (digit_a * factor + digit_b) + 3e-4 * abs(b)
 
 
-def test_the_source_has_19_and_25_models_and_8_size_sheets():
+def test_series_has_19_models_for_230_volts_25_for_460_volts_and_sheets_of_size_92():
     assert (len(ROWS_230), len(ROWS_460)) == (19, 25)
     assert len(ROWS) == 44
     assert set(SERIES.detail) == {m for m in ROWS if m.startswith("092")}
@@ -95,7 +95,7 @@ def test_size_sheet_agrees_with_the_table_of_all_models(model: str):
     assert (d.mpj_inertia_kg_m2 is None) == (row.mpj_inertia_kg_m2 is None)
 
 
-def test_mpj_inertias_of_size_92_disagree_as_noted_and_the_sheet_is_used():
+def test_mpj_inertia_of_size_92_is_taken_from_the_size_sheet():
     row = load_motor_ratings("MPJ0922D")
     assert row.mpj_inertia_kg_m2 == 6.90e-4
     assert row.mpj_inertia_kg_m2 == row.mpp_inertia_lb_in_s2
@@ -103,7 +103,7 @@ def test_mpj_inertias_of_size_92_disagree_as_noted_and_the_sheet_is_used():
     assert any("0922" in note for note in SERIES.notes)
 
 
-def test_rows_copied_by_eye():
+def test_three_rows_equal_the_printed_table():
     assert tuple(ROWS["0923D"].model_dump().values()) == (
         *("0923D", 4947.33, 1.55, 2.07, 1.00e-3, 1.13e-4, None, None),
         *(4.03, 35.63, 11.55, 102.23, 7.23, 22.85),
@@ -118,7 +118,7 @@ def test_rows_copied_by_eye():
     )
 
 
-def test_the_thesis_motor():
+def test_thesis_motor_has_the_printed_figures():
     motor = load_motor("MPP0923D")
     assert isinstance(motor, Motor)
     assert motor.pole_pairs == 4

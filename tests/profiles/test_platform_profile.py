@@ -1,4 +1,4 @@
-"""The platform of a robot's file: what it may say, and what is refused with which key."""
+"""The platform in a robot's file is read, and each invalid value is rejected with its key."""
 
 from __future__ import annotations
 
@@ -39,11 +39,11 @@ def test_the_shipped_platform_hangs_on_three_cables() -> None:
 def test_missing_keys_get_defaults() -> None:
     platform = load_robot("planar-3").platform
     assert platform is not None
-    assert platform.controlled == ("x", "y")  # three cables leave a plane's angle free
+    assert platform.controlled == ("x", "y")  # three cables in a plane do not control the angle
     assert (platform.inertia_kg_m2, platform.home_rotation_rad) == (None, (0.0,))
     assert (platform.centre_of_mass_m, platform.pulley_radius_m) == ((0.0, 0.0), (0.0,) * 3)
     assert platform.pulley_axes == ((0.0, 1.0),) * 3
-    assert platform.angular_speed_rad_s == pytest.approx(0.5 / 0.1)  # an arm of 0.1 m at least
+    assert platform.angular_speed_rad_s == pytest.approx(0.5 / 0.1)  # the arm is at least 0.1 m
     in_space = load_robot("suspended-8").platform
     assert in_space is not None
     assert in_space.controlled == ("x", "y", "z", "rx", "ry", "rz")
@@ -163,7 +163,7 @@ HOME = "home_m = [0.0, 0.0, 0.5]"
          "are they in millimetres?"),
     ],
 )  # fmt: skip
-def test_sizes_and_directions_that_no_robot_has_are_refused(
+def test_impossible_sizes_and_directions_are_rejected(
     tmp_path: Path, text: str, old: str, new: str, key: str, problem: str
 ) -> None:
     assert old in text
@@ -174,7 +174,7 @@ def test_sizes_and_directions_that_no_robot_has_are_refused(
     assert key == caught.value.key and problem in str(caught.value), caught.value
 
 
-def test_a_camera_over_a_stadium_is_a_robot(tmp_path: Path) -> None:
+def test_a_point_mass_over_a_stadium_is_accepted(tmp_path: Path) -> None:
     path = tmp_path / "stadium.toml"
     path.write_text(
         CAMERA.replace("3.0, 2.5, 4.0", "100.0, 70.0, 40.0").replace(
@@ -185,7 +185,7 @@ def test_a_camera_over_a_stadium_is_a_robot(tmp_path: Path) -> None:
     assert platform is not None and platform.exit_points_m[0] == (-100.0, 70.0, 40.0)
 
 
-def test_anchor_points_a_millimetre_apart_are_no_platform(tmp_path: Path) -> None:
+def test_anchor_points_a_millimetre_apart_are_rejected(tmp_path: Path) -> None:
     text = re.sub(r"anchor_point_m = \[(.*), (.*)\]", r"anchor_point_m = [\1e-3, \2e-3]", WALL)
     path = tmp_path / "mine.toml"
     path.write_text(text)
@@ -193,7 +193,9 @@ def test_anchor_points_a_millimetre_apart_are_no_platform(tmp_path: Path) -> Non
         load_robot(path)
 
 
-def test_a_polygon_of_tensions_takes_two_cables_more_than_directions(tmp_path: Path) -> None:
+def test_polygon_centroid_allows_at_most_two_more_cables_than_directions(
+    tmp_path: Path,
+) -> None:
     path = tmp_path / "mine.toml"
     polygon = 'controlled = ["x", "y", "z"]\ntension_distribution = "polygon-centroid"\nmass_kg'
     text = re.sub(r"workspace_angle_rad.*\n", "", HALL.replace("mass_kg", polygon, 1))
@@ -202,7 +204,7 @@ def test_a_polygon_of_tensions_takes_two_cables_more_than_directions(tmp_path: P
         load_robot(path)
 
 
-def test_points_without_a_platform_and_cables_too_few_are_refused(tmp_path: Path) -> None:
+def test_exit_points_without_platform_and_too_few_cables_are_rejected(tmp_path: Path) -> None:
     start, end = PLANAR.index("[platform]"), PLANAR.index("[limits]")
     path = tmp_path / "mine.toml"
     path.write_text(PLANAR[:start] + PLANAR[end:])
@@ -213,7 +215,7 @@ def test_points_without_a_platform_and_cables_too_few_are_refused(tmp_path: Path
         load_robot(path)
 
 
-def test_a_stand_may_be_under_the_box_or_in_it(tmp_path: Path) -> None:
+def test_home_may_be_below_the_workspace_or_in_it(tmp_path: Path) -> None:
     for y_m in (0.2, 1.4, 2.4):
         path = changed(tmp_path, ("home_m = [0.0, 1.3]", f"home_m = [0.0, {y_m}]"))
         platform = load_robot(path).platform
@@ -228,7 +230,7 @@ def test_commissioning_results_are_found_beside_the_robot_file(tmp_path: Path) -
     assert (first.commissioned, second.commissioned) == (tmp_path / "motors" / "left", None)
 
 
-def test_body_and_obstacles_are_boxes_of_the_robots_own_dimension(tmp_path: Path) -> None:
+def test_body_and_obstacles_have_as_many_dimensions_as_the_robot(tmp_path: Path) -> None:
     body = "body = { min_m = [-0.1, -0.1], max_m = [0.1, 0.1] }\nmass_kg"
     box = "[[platform.obstacles]]\nmin_m = [0.0, 0.0]\nmax_m = [0.1, 0.2]\n[limits]"
     platform = load_robot(changed(tmp_path, ("mass_kg", body), ("[limits]", box))).platform
@@ -251,13 +253,13 @@ def test_body_and_obstacles_are_boxes_of_the_robots_own_dimension(tmp_path: Path
         assert problem in str(refused.value)
 
 
-def test_a_clearance_below_the_cables_diameter_is_refused(tmp_path: Path) -> None:
+def test_a_clearance_below_the_cable_diameter_is_rejected(tmp_path: Path) -> None:
     path = changed(tmp_path, ("mass_kg", "clearance_m = 0.002\nmass_kg"))
     with pytest.raises(ProfileError, match=r"platform.clearance_m: value 0.002; allowed: .*0.0048"):
         load_robot(path)
 
 
-def test_a_body_says_how_far_off_a_centre_of_mass_may_be(tmp_path: Path) -> None:
+def test_a_larger_body_allows_a_more_distant_centre_of_mass(tmp_path: Path) -> None:
     path = tmp_path / "mine.toml"
     hung = ROOM.replace(BODY, "centre_of_mass_m = [0.0, 0.0, -0.8]\n" + BODY)
     path.write_text(hung)

@@ -1,4 +1,4 @@
-"""Shipped profiles load; whatever is wrong in a file is told with its file, key and value."""
+"""Shipped profiles load; errors in a file are reported with file, key and value."""
 
 import math
 import shutil
@@ -34,7 +34,7 @@ MODELS: dict[str, tuple[type[Profile], type[Profile]]] = {
     "safety_io": (SafetyIoProfile, SafetyIoProfile),
     "rails": (RailProfile, RailProfile),
 }
-"""By kind, the model of a single profile and that of a series."""
+"""For each kind, the model of a single profile and that of a series."""
 FILES = {
     path: MODELS[kind][path.name.endswith(SERIES)]
     for kind in KINDS
@@ -86,14 +86,14 @@ def test_load_all_holds_every_listed_profile():
 
 
 @pytest.mark.parametrize("path", FILES, ids=lambda p: p.name)
-def test_written_out_and_read_again_it_is_the_same(path: Path, tmp_path: Path):
+def test_a_profile_is_the_same_after_writing_and_reading(path: Path, tmp_path: Path):
     again = _write(tmp_path, path, _read(path))
     assert read_toml_model(again, FILES[path]) == read_toml_model(path, FILES[path])
 
 
 @given(path=files, data=st.data())
 @repeatable
-def test_a_misspelt_key_is_refused_and_the_right_one_named(path: Path, data, tmp_path: Path):
+def test_error_for_a_misspelt_key_suggests_the_right_one(path: Path, data, tmp_path: Path):
     table = _read(path)
     key = data.draw(st.sampled_from([k for k in table if len(k) > 4]))
     at = data.draw(st.integers(1, len(key) - 2))
@@ -112,7 +112,7 @@ def test_a_misspelt_key_is_refused_and_the_right_one_named(path: Path, data, tmp
 
 @given(path=files, data=st.data())
 @repeatable
-def test_a_senseless_value_is_refused_with_its_key(path: Path, data, tmp_path: Path):
+def test_error_for_a_senseless_value_names_its_key(path: Path, data, tmp_path: Path):
     table = _read(path)
     key = data.draw(st.sampled_from(sorted(table)))
     junk = [j for j in JUNK if type(j) is not type(table[key])]
@@ -128,7 +128,7 @@ def test_a_senseless_value_is_refused_with_its_key(path: Path, data, tmp_path: P
 
 @given(path=files, data=st.data())
 @repeatable
-def test_a_missing_key_is_named_unless_it_has_a_default(path: Path, data, tmp_path: Path):
+def test_a_missing_key_without_default_is_reported(path: Path, data, tmp_path: Path):
     table = _read(path)
     key = data.draw(st.sampled_from(sorted(table)))
     del table[key]
@@ -139,7 +139,7 @@ def test_a_missing_key_is_named_unless_it_has_a_default(path: Path, data, tmp_pa
     else:
         try:
             read_toml_model(cut, FILES[path])
-        except ProfileError as error:  # wanted for what another key says
+        except ProfileError as error:  # another key requires it
             assert key in error.key + error.problem
 
 
@@ -151,21 +151,21 @@ def test_a_missing_key_is_named_unless_it_has_a_default(path: Path, data, tmp_pa
         (b"\xff\xfe", "is not UTF-8 text"),
     ],
 )
-def test_a_file_that_is_not_toml(content: bytes, part: str, tmp_path: Path):
+def test_error_for_invalid_toml_names_the_line(content: bytes, part: str, tmp_path: Path):
     path = tmp_path / "m.toml"
     path.write_bytes(content)
     with pytest.raises(ProfileError, match=part):
         read_toml_model(path, Motor)
 
 
-def test_missing_file_and_folder(tmp_path: Path):
+def test_a_missing_file_and_a_folder_are_rejected(tmp_path: Path):
     with pytest.raises(ProfileError, match="cannot be read: No such file"):
         cdpr_profiles.load_motor(tmp_path / "none.toml")
     with pytest.raises(ProfileError, match="is no regular file"):
         cdpr_profiles.load_motor(tmp_path)
 
 
-def test_every_fault_of_a_file_is_reported(tmp_path: Path):
+def test_all_errors_of_a_file_are_reported_together(tmp_path: Path):
     source = SHIPPED / "winches" / "winch-mpp0923d.toml"
     table = _read(source) | {"gear_ratio": -4.0, "node_id": 128}
     with pytest.raises(ProfileError) as caught:
@@ -190,7 +190,7 @@ def test_every_fault_of_a_file_is_reported(tmp_path: Path):
         ({"quirks": {"halt_befor_mode_change": True}}, "did you mean 'halt_before_mode_change'"),
     ],
 )
-def test_contradictions_within_a_drive(change: dict[str, Any], part: str, tmp_path: Path):
+def test_invalid_drive_profiles_are_rejected(change: dict[str, Any], part: str, tmp_path: Path):
     source = SHIPPED / "drives" / "generic-cia402.toml"
     with pytest.raises(ProfileError, match=part):
         read_toml_model(_write(tmp_path, source, _read(source) | change), DriveProfile)
@@ -221,7 +221,7 @@ def test_contradictions_within_a_drive(change: dict[str, Any], part: str, tmp_pa
         ),
     ],
 )
-def test_a_fault_within_a_table_is_reported_with_its_place(
+def test_error_within_a_table_is_reported_with_its_place(
     file: str, edit: Callable[[Any], object], part: str, tmp_path: Path
 ):
     source = SHIPPED / file
@@ -231,7 +231,7 @@ def test_a_fault_within_a_table_is_reported_with_its_place(
         read_toml_model(_write(tmp_path, source, table), FILES[source])
 
 
-def test_peak_below_rated_is_refused(tmp_path: Path):
+def test_peak_torque_below_rated_torque_is_rejected(tmp_path: Path):
     motor = cdpr_profiles.load_motor("MPP0923D").model_dump(mode="json") | {"peak_torque_Nm": 2.0}
     path = tmp_path / "weak.toml"
     path.write_text(_document(motor), encoding="utf-8")
@@ -239,7 +239,7 @@ def test_peak_below_rated_is_refused(tmp_path: Path):
         cdpr_profiles.load_motor(path)
 
 
-def test_unknown_names_are_answered_with_the_likely_one():
+def test_error_for_an_unknown_name_suggests_the_likely_one():
     with pytest.raises(ProfileError, match="no profile named 'mpp923d'; did you mean 'MPP0923D'"):
         cdpr_profiles.load_motor("mpp923d")
     with pytest.raises(ProfileError, match="did you mean 'winch-mpp0923d'"):
@@ -248,7 +248,7 @@ def test_unknown_names_are_answered_with_the_likely_one():
         cdpr_profiles.load_drive("zzz")
 
 
-def test_of_files_beside_only_those_of_the_kind_are_named(tmp_path: Path):
+def test_only_neighbouring_files_of_the_right_kind_are_suggested(tmp_path: Path):
     (tmp_path / "pyproject.toml").write_text('[project]\nname = "mine"\n')
     (tmp_path / "broken.toml").write_text("= 1")
     mine = (SHIPPED / "winches" / "winch-300n.toml").read_text()
@@ -263,7 +263,7 @@ def test_of_files_beside_only_those_of_the_kind_are_named(tmp_path: Path):
         cdpr_profiles.load_winch("notes.md", tmp_path)
 
 
-def test_a_motor_with_ratings_only_says_so():
+def test_error_for_a_motor_with_ratings_only_says_so():
     assert cdpr_profiles.load_motor_ratings("MPP1152C").peak_torque_Nm == 15.69
     with pytest.raises(ProfileError, match="ratings of MPP1152C only"):
         cdpr_profiles.load_motor("MPP1152C")
@@ -271,18 +271,18 @@ def test_a_motor_with_ratings_only_says_so():
         cdpr_profiles.load_motor_ratings("MPJ0923D")
 
 
-def test_the_shipped_winch():
+def test_shipped_winch_has_its_motor_and_drive_and_moves_10_mm_per_22_degrees():
     winch = cdpr_profiles.load_winch("winch-mpp0923d")
     assert winch.motor == cdpr_profiles.load_motor("MPP0923D")
     assert winch.drive == cdpr_profiles.load_drive("generic-cia402")
     assert winch.drive.eds.is_absolute()
     assert winch.profile == "winch-mpp0923d"
-    # 22 deg/s at the motor move the cable by 10 mm/s; a turn by 163 mm.
+    # 22 deg/s at the motor move the cable at 10 mm/s. A turn moves it by 163 mm.
     assert winch.cable_m_per_motor_rad * math.radians(22) == pytest.approx(0.010, rel=0.003)
     assert winch.cable_m_per_motor_rad * 2 * math.pi == pytest.approx(0.163, abs=5e-4)
 
 
-def test_a_users_winch_finds_its_own_profiles_beside_it_then_the_shipped_ones(tmp_path: Path):
+def test_a_winch_finds_profiles_in_its_folder_before_shipped_ones(tmp_path: Path):
     own = cdpr_profiles.load_motor("MPP0922D").model_dump(mode="json") | {"model": "mine"}
     (tmp_path / "my-motor.toml").write_text(_document(own), encoding="utf-8")
     shutil.copy(SHIPPED / "cables" / "dyneema-4.8mm.toml", tmp_path / "rope.toml")
@@ -300,20 +300,20 @@ def test_a_users_winch_finds_its_own_profiles_beside_it_then_the_shipped_ones(tm
     assert "did you mean 'my-motor'?" in str(caught.value)
 
 
-def test_a_node_cannot_be_its_own_master(tmp_path: Path):
+def test_the_node_id_of_the_master_is_rejected(tmp_path: Path):
     source = SHIPPED / "winches" / "winch-mpp0923d.toml"
     path = _write(tmp_path, source, _read(source) | {"node_id": 127})
     with pytest.raises(ProfileError, match="node_id: value 127; allowed: another than master"):
         cdpr_profiles.load_winch(path)
 
 
-def test_a_drive_without_its_eds(tmp_path: Path):
+def test_a_drive_without_its_eds_is_rejected(tmp_path: Path):
     shutil.copy(SHIPPED / "drives" / "generic-cia402.toml", tmp_path)
     with pytest.raises(ProfileError, match=r"eds: value 'generic-cia402\.eds'; allowed: a file"):
         cdpr_profiles.load_drive(tmp_path / "generic-cia402.toml")
 
 
-def test_cable_table_agrees_with_itself_and_with_the_cable_in_use():
+def test_columns_of_the_cable_table_agree_with_each_other_and_with_the_shipped_cable():
     path = SHIPPED / "cables" / "barry-dyneema.series.toml"
     series = read_toml_model(path, CableSeries)
     assert len(series.sizes) == 15
@@ -334,7 +334,7 @@ def test_cable_table_agrees_with_itself_and_with_the_cable_in_use():
     assert cable.stiffness_N == pytest.approx(40e3)
 
 
-def test_the_examples_of_the_manual_load(tmp_path: Path):
+def test_the_examples_in_describing_your_winch_load(tmp_path: Path):
     page = Path(__file__).parents[2] / "docs" / "how-to" / "describing-your-winch.md"
     examples = page.read_text(encoding="utf-8").split("```toml\n")[1:]
     for name, example in zip(("winch", "my-motor", "my-cable"), examples, strict=True):
@@ -343,7 +343,7 @@ def test_the_examples_of_the_manual_load(tmp_path: Path):
     assert cdpr_profiles.load_cable(tmp_path / "my-cable.toml").min_tension_N == 20
 
 
-def test_own_profiles_are_found_by_name_before_shipped_ones(
+def test_a_users_profile_is_found_by_name_before_a_shipped_one(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
@@ -353,7 +353,7 @@ def test_own_profiles_are_found_by_name_before_shipped_ones(
     (winches / "mine.toml").write_text(text)
     assert "mine" in cdpr_profiles.list_profiles()["winches"]
     mine = cdpr_profiles.load_winch("mine")
-    assert mine.reference == str(winches / "mine.toml")  # for a service that has another home
+    assert mine.reference == str(winches / "mine.toml")  # for a service with another home
     assert cdpr_profiles.load_winch("winch-mpp0923d").reference == "winch-mpp0923d"
     (winches / "winch-mpp0923d.toml").write_text(text)
     assert cdpr_profiles.load_winch("winch-mpp0923d").path.parent == winches
@@ -362,7 +362,7 @@ def test_own_profiles_are_found_by_name_before_shipped_ones(
     assert cdpr_profiles.load_winch_or_robot("mine") == mine
 
 
-def test_a_profile_that_is_a_lost_link_is_not_replaced_by_the_shipped_one(
+def test_a_broken_link_to_a_profile_is_not_replaced_by_the_shipped_one(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))

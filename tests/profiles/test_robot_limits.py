@@ -1,4 +1,4 @@
-"""A robot's limits, reactions, names and heartbeat: what its file may say and what follows."""
+"""Limits, reactions, axis names, calibrations and heartbeat in a robot's file."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def robot_file(folder: Path, **parts: str) -> Path:
     return path
 
 
-def test_a_robot_that_says_nothing_has_safe_limits(tmp_path: Path) -> None:
+def test_a_robot_without_limits_gets_safe_defaults(tmp_path: Path) -> None:
     robot = load_robot(robot_file(tmp_path))
     limits, motor = limits_of(robot), robot.axes[0].winch.motor
     np.testing.assert_allclose(limits.torque_Nm, [motor.rated_torque_Nm] * 2)
@@ -69,7 +69,7 @@ def test_a_robot_that_says_nothing_has_safe_limits(tmp_path: Path) -> None:
     assert limits.reactions == DEFAULT_REACTIONS
 
 
-def test_figures_are_one_for_all_or_one_for_each(tmp_path: Path) -> None:
+def test_a_limit_is_one_number_for_all_axes_or_one_for_each(tmp_path: Path) -> None:
     text = "torque_Nm = [1.0, 2]\nspeed_rad_s = 30\ntension_min_N = [10.0, 20.0]"
     robot = load_robot(robot_file(tmp_path, limits=text, reactions='tension_low = "quick stop"'))
     limits = limits_of(robot)
@@ -163,7 +163,7 @@ KEYS = st.sampled_from([*RobotLimits.model_fields, "torque", ""])
 
 @settings(max_examples=300)
 @given(st.dictionaries(KEYS, ANYTHING, max_size=4))
-def test_whatever_a_file_says_is_understood_or_refused(table: dict[str, object]) -> None:
+def test_any_value_of_a_limit_is_read_or_rejected_with_an_error(table: dict[str, object]) -> None:
     arrays = {k: tuple(v) if isinstance(v, list) else v for k, v in table.items()}
     try:
         told = validated(Path("x.toml"), arrays, RobotLimits)
@@ -179,7 +179,7 @@ def test_whatever_a_file_says_is_understood_or_refused(table: dict[str, object])
 # -- names, directions, heartbeat
 
 
-def test_axes_have_names_and_directions(tmp_path: Path) -> None:
+def test_axes_have_names_and_cable_signs(tmp_path: Path) -> None:
     robot = load_robot(robot_file(tmp_path, first='name = "top left"', second="cable_sign = -1"))
     assert [axis.name for axis in robot.axes] == ["top left", "axis 2"]
     assert [axis.winch.cable_sign for axis in robot.axes] == [1, -1]
@@ -211,7 +211,7 @@ def calibration(motor: str = "MPP0923D") -> WinchCalibration:
     )
 
 
-def test_an_axis_knows_its_calibration(tmp_path: Path) -> None:
+def test_an_axis_uses_the_calibration_of_its_winch(tmp_path: Path) -> None:
     (tmp_path / "mine.toml").write_text(calibration().to_toml())
     path = robot_file(tmp_path, second='calibration = "mine.toml"')
     arrays = winches_of(load_robot(path).axes)
@@ -239,7 +239,7 @@ def test_an_axis_knows_its_calibration(tmp_path: Path) -> None:
         ("lowest_tension_N", 81.0, "allowed: 0 to 80 N, highest_tension_N"),
     ],
 )
-def test_a_calibration_that_no_such_winch_can_have_is_refused(
+def test_an_implausible_winch_calibration_is_rejected(
     tmp_path: Path, key: str, value: float, allowed: str
 ) -> None:
     spoilt = calibration().model_copy(update={key: value})
@@ -252,7 +252,7 @@ def test_a_calibration_that_no_such_winch_can_have_is_refused(
     assert allowed in refused.value.problem
 
 
-def test_drives_miss_their_master_in_fewer_than_two_heartbeats(tmp_path: Path) -> None:
+def test_drives_detect_a_missing_master_within_two_heartbeats(tmp_path: Path) -> None:
     robot = load_robot(robot_file(tmp_path, top="master_heartbeat_s = 0.04"))
     for axis in robot.axes:
         assert 1.5 * 0.04 < axis.winch.drive.heartbeat_consumer_s < 2 * 0.04
@@ -262,7 +262,7 @@ def test_drives_miss_their_master_in_fewer_than_two_heartbeats(tmp_path: Path) -
     assert more_bits_s == pytest.approx(65 / 0.04 - 65 / 0.1)
 
 
-def test_a_winch_is_a_robot_of_one_axis() -> None:
+def test_a_winch_loads_as_a_robot_with_one_axis() -> None:
     robot = load_robot("winch-mpp0923d")
     assert robot.is_winch
     assert [axis.name for axis in robot.axes] == ["axis 1"]
@@ -274,7 +274,7 @@ def test_a_winch_is_a_robot_of_one_axis() -> None:
         load_robot("winch-mpp0923")
 
 
-def test_eight_drives_on_one_bus_take_it_to_95_percent() -> None:
+def test_eight_drives_load_one_bus_to_95_percent() -> None:
     robot = load_robot("one-bus-8")
     (budget,) = machine_budget(robot)
     assert budget.fits
@@ -288,7 +288,7 @@ def test_eight_drives_on_one_bus_take_it_to_95_percent() -> None:
 DOCS = Path(__file__).parents[2] / "docs"
 
 
-def test_the_documented_robot_is_one(tmp_path: Path) -> None:
+def test_the_documented_robot_loads_and_shows_all_keys(tmp_path: Path) -> None:
     text = (DOCS / "how-to" / "describing-your-robot.md").read_text()
     robot, _devices, platform, limits = re.findall(r"```toml\n(.*?)```", text, re.DOTALL)
     winch = (SHIPPED / "winches" / "winch-mpp0923d.toml").read_text()
@@ -310,7 +310,7 @@ def test_the_documented_robot_is_one(tmp_path: Path) -> None:
     documented = validated(path, keys, PlatformFile)
     shipped = load_robot("planar-4").platform
     assert shipped is not None
-    of_contact = {"body", "obstacles"}  # which that robot has none of
+    of_contact = {"body", "obstacles"}  # planar-4 has no body or obstacles
     assert all(getattr(shipped, k) == value for k, value in documented if k not in of_contact)
     assert documented.body is not None and len(documented.obstacles) == 1
     assert list(keys) == list(PlatformFile.model_fields)
@@ -322,8 +322,8 @@ def test_the_documented_reactions_are_the_defaults() -> None:
     assert rows == [(limit.key, reaction.label) for limit, reaction in DEFAULT_REACTIONS.items()]
 
 
-def test_each_text_takes_value_and_allowed_value() -> None:
-    """A limit without a text is told by whoever found it."""
+def test_the_text_of_each_limit_takes_value_and_allowed_value() -> None:
+    """Whoever detects a limit without a text writes the message."""
     for limit in Limit:
         assert limit.text.count("{") <= 2
         limit.text.format(1.0, 2.0)

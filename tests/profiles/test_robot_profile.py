@@ -1,4 +1,4 @@
-"""Robot files: what they hold, what they refuse, and how they are found."""
+"""Robot files are found, read and validated."""
 
 from pathlib import Path
 
@@ -44,7 +44,7 @@ def test_the_shipped_robot_has_four_winches_on_each_of_two_buses():
     assert isinstance(cdpr_profiles.load_all()["robots"]["spatial-8"], Robot)
 
 
-def test_winches_are_told_what_the_robot_decides(tmp_path: Path):
+def test_winches_inherit_node_id_bit_rate_and_period_from_the_robot(tmp_path: Path):
     robot = load_robot(robot_file(tmp_path, top="sync_period_s = 0.004\nmaster_node_id = 100"))
     right, left = robot.axes
     # one node id on each of two buses is allowed
@@ -79,14 +79,14 @@ def test_contradictory_profiles_are_rejected(
     assert problem in str(caught.value)
 
 
-def test_two_buses_of_one_name_are_refused(tmp_path: Path):
+def test_two_buses_of_the_same_name_are_rejected(tmp_path: Path):
     path = robot_file(tmp_path, bus="left", node=1)
     path.write_text(path.read_text().replace('name = "right"', 'name = "left"'))
     with pytest.raises(ProfileError, match=r"buses\[1\].name: value 'left'; allowed: each name"):
         load_robot(path)
 
 
-def test_a_machine_is_a_winch_or_a_robot(tmp_path: Path):
+def test_a_machine_is_loaded_as_winch_or_robot(tmp_path: Path):
     assert isinstance(load_winch_or_robot("winch-mpp0923d"), Winch)
     assert isinstance(load_winch_or_robot("spatial-8"), Robot)
     assert isinstance(load_winch_or_robot(robot_file(tmp_path)), Robot)
@@ -97,7 +97,7 @@ def test_a_machine_is_a_winch_or_a_robot(tmp_path: Path):
         load_winch_or_robot("spatial8")
 
 
-def test_devices_beside_the_drives_are_found_from_anywhere(tmp_path: Path):
+def test_paths_of_devices_are_relative_to_the_robots_file(tmp_path: Path):
     shipped = cdpr_profiles.places.SHIPPED / "safety_io/modbus-remote-io.toml"
     (tmp_path / "io.toml").write_text(shipped.read_text())
     top = 'safety_io = "./io.toml@127.0.0.1:1502"\nrails = ["rail-modbus", "sub/mine.toml"]'
@@ -116,7 +116,7 @@ def test_devices_beside_the_drives_are_found_from_anywhere(tmp_path: Path):
     assert (caught.value.file, caught.value.key) == (str(wrong), "tension_sensors")
 
 
-def test_a_safety_io_needs_node_ids_of_their_own(tmp_path: Path):
+def test_a_safety_io_requires_unique_node_ids_on_all_buses(tmp_path: Path):
     path = robot_file(tmp_path, top='safety_io = "modbus-remote-io"')
     with pytest.raises(ProfileError, match="which knows its brakes by it") as caught:
         load_robot(path)
