@@ -1,4 +1,4 @@
-"""A master beside simulated drives that run in a process of their own."""
+"""A master in the test process and simulated drives in a separate process."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def dictionary(node_id: int) -> canopen.ObjectDictionary:
 
 @contextmanager
 def open_network(bus: str, nodes: list[int], *, lead: bool = True) -> Iterator[CanNetwork]:
-    """Join a bus; who does not `lead` it goes by wall time, so that other programs can answer."""
+    """Join a bus. Without `lead`, use wall-clock time, so that other programs can answer."""
     url = BusUrl.parse(bus)
     clock = open_clock([url]) if lead else PacedClock()
     network = CanNetwork(url, clock, nodes, MASTER, HEARTBEAT_S)
@@ -57,7 +57,7 @@ def open_network(bus: str, nodes: list[int], *, lead: bool = True) -> Iterator[C
 
 
 class Rig:
-    """Booted drives and their group; `run` makes cycles."""
+    """Booted drives and their axis group. `run` runs cycles."""
 
     def __init__(
         self,
@@ -85,7 +85,7 @@ class Rig:
     def run(
         self, seconds: float, until: Callable[[], bool] = lambda: False, alarms: bool = False
     ) -> float:
-        """Run cycles for `seconds` of bus time or until `until`; return the bus time it took."""
+        """Run cycles for `seconds` of bus time or until `until`. Return the elapsed bus time."""
         begin = self.group.feedback.time_s
         for _ in range(round(seconds / PERIOD_S)):
             self.group.sync()
@@ -113,7 +113,7 @@ class Rig:
         self.reach(State.OPERATION_ENABLED)
 
     def until_alarm(self, seconds: float) -> tuple[str, float]:
-        """Run until the group raises an alarm; return its text and the bus time it took."""
+        """Run until the group raises an alarm. Return its text and the elapsed bus time."""
         elapsed = self.run(seconds, lambda: bool(alarm(self.group)), alarms=True)
         return alarm(self.group), elapsed
 

@@ -1,4 +1,4 @@
-"""Everything that crosses a simulated bus, written down by a client of its own."""
+"""Record all frames on a simulated bus with a separate client."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _SYNC = 0x080
 
 @dataclass(frozen=True)
 class Seen:
-    """One frame; `cycle` counts the SYNCs up to it, so that bus time is cycle x period."""
+    """One frame. `cycle` counts the SYNCs before it, so that bus time is cycle x period."""
 
     cycle: int
     identifier: int
@@ -54,7 +54,7 @@ class BusLog:
         return [frame for frame in list(self.frames) if frame.identifier == identifier]
 
     def close(self) -> None:
-        """Take in what is under way still, and leave."""
+        """Record the frames still in flight, then disconnect."""
         self._stop.set()
         self._thread.join()
         self._sock.close()

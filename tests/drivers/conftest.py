@@ -1,4 +1,4 @@
-"""Simulated drives for the tests of the master side."""
+"""Simulated drives for tests of the master."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from tests.drivers.axis_rig import Rig, open_network, open_rig
 
 @pytest.fixture(scope="module")
 def simulated_bus() -> Iterator[str]:
-    """A bus with the drives 1 and 2, whose time stands for a short while only after a SYNC."""
+    """Yield a bus with drives 1 and 2 that waits only briefly for the master after a SYNC."""
     bus = f"simbus:axes-{os.getpid()}-{uuid.uuid4().hex[:6]}"
     command = [sys.executable, "-m", "cdpr_tools.cli", "sim", "up", "winch-mpp0923d", "--bus", bus]
     command += ["--nodes", "2", "--exit-with-stdin"]
@@ -30,7 +30,7 @@ def simulated_bus() -> Iterator[str]:
 
 @pytest.fixture(autouse=True)
 def brief_waits(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Simulated drives are there at once: do not wait as long as for real ones."""
+    """Wait less than for real drives: simulated ones are present immediately."""
     monkeypatch.setattr("cdpr_drivers.canopen.boot._BOOT_UP_TIMEOUT_S", 0.4)
     monkeypatch.setattr("cdpr_drivers.canopen.boot._LISTEN_SHARE", 0.1)
     monkeypatch.setattr("cdpr_drivers.canopen.boot._LISTEN_LEAST_S", 0.05)
@@ -40,16 +40,16 @@ def brief_waits(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture
 def bus(simulated_bus: str) -> str:
-    """A bus with the drives 1 and 2, freshly switched on."""
+    """Return a bus with drives 1 and 2, freshly switched on."""
     with open_network(simulated_bus, [1, 2]) as mains:
         for node in (1, 2):
             mains.reset(node)
-            assert mains.read_int(node, 0x1001) == 0  # it is there again
+            assert mains.read_int(node, 0x1001) == 0  # the drive is back
     return simulated_bus
 
 
 @pytest.fixture
 def rig(bus: str) -> Iterator[Rig]:
-    """Drive 1 on `bus`, booted."""
+    """Yield a rig with drive 1 on `bus`, booted."""
     with open_rig(bus) as opened:
         yield opened

@@ -1,4 +1,4 @@
-"""States and controlwords, against the `canopen` package's tables and the standard."""
+"""States and controlwords agree with the tables of the `canopen` package and the standard."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _NAMES = {
 }
 
 
-def test_every_statusword_is_read_as_a_third_party_reads_it() -> None:
+def test_each_statusword_is_decoded_as_by_the_canopen_package() -> None:
     for word in range(1 << 16):
         theirs = [
             _NAMES[n] for n, (mask, value) in State402.SW_MASK.items() if word & mask == value
@@ -28,7 +28,7 @@ def test_every_statusword_is_read_as_a_third_party_reads_it() -> None:
         assert state_of(word) == (theirs[0] if theirs else S.UNKNOWN), f"{word:04X}"
 
 
-# CiA 402-2, commands by the controlword's low four bits: (mask, value, from, to)
+# CiA 402-2, commands in the low four bits of the controlword: (mask, value, from, to)
 _COMMANDS = (
     (0x02, 0x00, {S.READY, S.SWITCHED_ON, S.OPERATION_ENABLED, S.QUICK_STOP}, S.SWITCH_ON_DISABLED),
     (0x06, 0x02, {S.READY, S.SWITCHED_ON}, S.SWITCH_ON_DISABLED),
@@ -41,7 +41,7 @@ _COMMANDS = (
 
 
 def _drive(state: State, word: int) -> State:
-    """Return where a drive goes on a controlword."""
+    """Return the state of a drive after a controlword."""
     for mask, value, sources, to in _COMMANDS:
         if word & mask == value and state in sources:
             return to
@@ -50,7 +50,7 @@ def _drive(state: State, word: int) -> State:
 
 @pytest.mark.parametrize("target", TARGETS, ids=lambda s: s.name)
 @pytest.mark.parametrize("start", TARGETS, ids=lambda s: s.name)
-def test_the_words_lead_from_anywhere_to_the_target_and_never_enable_by_the_way(
+def test_controlwords_lead_from_each_state_to_the_target_without_enabling(
     start: State, target: State
 ) -> None:
     if target == S.QUICK_STOP and start != S.OPERATION_ENABLED:
@@ -66,7 +66,7 @@ def test_the_words_lead_from_anywhere_to_the_target_and_never_enable_by_the_way(
     assert state == wanted
 
 
-def test_no_word_in_a_fault_has_the_reset_bit() -> None:
+def test_no_controlword_in_a_fault_has_the_reset_bit() -> None:
     assert not (CONTROLWORD_TABLE & 0x80).any()
     for target in TARGETS:
         assert CONTROLWORD_TABLE[target, S.FAULT] == 0
@@ -80,7 +80,7 @@ def test_supported_modes_follow_6502h() -> None:
     assert supports(0, -3)
 
 
-def test_a_fault_code_nobody_listed_is_named_by_its_group() -> None:
+def test_an_unlisted_fault_code_is_described_by_its_group() -> None:
     assert fault_text(0x8611) == "8611h following error"
     assert "current" in fault_text(0x2399)
     assert fault_text(0x81FF).startswith("81FFh communication")

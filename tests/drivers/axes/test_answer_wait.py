@@ -1,4 +1,4 @@
-"""When the answers of a cycle are looked for."""
+"""The wait between SYNC and the first look for answers."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ SYNC_S = 100.0
 
 
 class ClockAtSync(PacedClock):
-    """Shows the instant of the SYNC, and notes the sleeps that were asked for."""
+    """Stand at the instant of the SYNC and record how long each sleep should take."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -34,25 +34,25 @@ def clock() -> ClockAtSync:
     return ClockAtSync()
 
 
-def missing(clock: ClockAtSync, took_s: float) -> AnswerWait:
+def after_100_early_looks(clock: ClockAtSync, took_s: float) -> AnswerWait:
     wait = AnswerWait(clock, MOST_S)
     for _ in range(100):
         wait.learn(took_s, too_early=True)
     return wait
 
 
-def test_it_sleeps_until_the_answers_have_usually_come(clock: ClockAtSync) -> None:
-    missing(clock, 0.01).sleep(SYNC_S)
+def test_sleep_lasts_until_answers_usually_arrive(clock: ClockAtSync) -> None:
+    after_100_early_looks(clock, 0.01).sleep(SYNC_S)
     assert clock.slept_s == pytest.approx([0.01], rel=1e-3)
 
 
-def test_it_never_sleeps_beyond_the_deadline(clock: ClockAtSync) -> None:
-    missing(clock, 5.0).sleep(SYNC_S)
+def test_sleep_never_exceeds_the_deadline(clock: ClockAtSync) -> None:
+    after_100_early_looks(clock, 5.0).sleep(SYNC_S)
     assert clock.slept_s == pytest.approx([MOST_S], rel=1e-3)
 
 
-def test_it_looks_earlier_when_nothing_was_ever_missing(clock: ClockAtSync) -> None:
-    wait = missing(clock, 0.01)
+def test_sleep_shortens_while_no_answer_is_missing(clock: ClockAtSync) -> None:
+    wait = after_100_early_looks(clock, 0.01)
     for _ in range(500):
         wait.learn(0.01, too_early=False)
     wait.sleep(SYNC_S)
@@ -60,9 +60,9 @@ def test_it_looks_earlier_when_nothing_was_ever_missing(clock: ClockAtSync) -> N
     for _ in range(1500):
         wait.learn(0.01, too_early=False)
     wait.sleep(SYNC_S)
-    assert len(clock.slept_s) == 1  # so short a wait is left to the socket
+    assert len(clock.slept_s) == 1  # a wait this short is left to the socket
 
 
-def test_a_time_that_is_over_is_not_slept(clock: ClockAtSync) -> None:
-    missing(clock, 0.01).sleep(SYNC_S - 1.0)
+def test_no_sleep_if_answers_are_already_due(clock: ClockAtSync) -> None:
+    after_100_early_looks(clock, 0.01).sleep(SYNC_S - 1.0)
     assert clock.slept_s == []

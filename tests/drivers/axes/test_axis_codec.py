@@ -1,4 +1,4 @@
-"""The compiled codec, against `struct` and the laws it must obey."""
+"""The compiled codec is checked against `struct` and against its invariants."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ SETTINGS = settings(max_examples=150)
 
 
 class Group:
-    """The arrays of n axes without a bus."""
+    """The arrays of n axes, without a bus."""
 
     def __init__(self, n: int = 2, torque_sign: int = 1, position_sign: int = 1) -> None:
         signs = {"torque_sign": torque_sign, "position_sign": position_sign}
@@ -66,7 +66,7 @@ class Group:
 @given(
     st.integers(0, 0xFFFF), I32, st.integers(-(1 << 15), (1 << 15) - 1), st.sampled_from([-1, 1])
 )
-def test_feedback_is_what_struct_reads(word: int, counts: int, torque: int, sign: int) -> None:
+def test_feedback_is_decoded_as_by_struct(word: int, counts: int, torque: int, sign: int) -> None:
     group = Group(torque_sign=sign, position_sign=-sign)
     assert group.take((0x182, TPDO1.pack(word, counts, torque))) == 1
     feedback = group.state.feedback
@@ -78,7 +78,7 @@ def test_feedback_is_what_struct_reads(word: int, counts: int, torque: int, sign
 
 @SETTINGS
 @given(I32, st.lists(st.integers(-(1 << 30), 1 << 30), max_size=12), I32)
-def test_positions_and_index_count_on_where_32_bits_wrap(
+def test_positions_and_index_stay_continuous_when_32_bits_wrap(
     first: int, steps: list[int], index_ahead: int
 ) -> None:
     group = Group(1)
@@ -100,7 +100,7 @@ def _wrapped(value: int) -> int:
     return (value + (1 << 31)) % (1 << 32) - (1 << 31)
 
 
-def test_a_latched_probe_counts_only_once_it_was_armed() -> None:
+def test_a_probe_latched_before_arming_is_ignored() -> None:
     group = Group(1)
     group.take((0x281, TPDO2.pack(10, 0x0003, 77)))
     assert not group.state.feedback.index_known[0]
@@ -120,12 +120,12 @@ def test_a_latched_probe_counts_only_once_it_was_armed() -> None:
         max_size=20,
     )
 )
-def test_no_frame_whatsoever_breaks_the_decoder(frames: list[tuple[int, bytes, int]]) -> None:
+def test_arbitrary_frames_do_not_break_the_decoder(frames: list[tuple[int, bytes, int]]) -> None:
     group = Group(1)
     raw = b"".join(CAN_FRAME.pack(i, length, data) for i, data, length in frames)
     whole = [
         (i, data) for i, data, length in frames if i == 0x181 and length >= 8
-    ]  # at least as long as the map
+    ]  # at least as long as the PDO map
     array = np.frombuffer(bytearray(raw), np.uint8).reshape(-1, 16)
     s = group.state
     others = np.full(len(array) + 1, -1, np.int64)
@@ -134,7 +134,7 @@ def test_no_frame_whatsoever_breaks_the_decoder(frames: list[tuple[int, bytes, i
         s.ints, s.floats, s.words, s.flags, others, len(array),
     )  # fmt: skip
     assert answered == min(1, len(whole))
-    # all but this axis' TPDOs are for the acyclic side, in the order in which they came
+    # all frames but this axis's TPDOs go to the acyclic side in their order
     assert others[1 : others[0] + 1].tolist() == [
         k for k, (identifier, _, _) in enumerate(frames) if identifier not in (0x181, 0x281)
     ]
@@ -142,7 +142,7 @@ def test_no_frame_whatsoever_breaks_the_decoder(frames: list[tuple[int, bytes, i
 
 @SETTINGS
 @given(st.lists(st.floats(-2.5, 2.5), min_size=1, max_size=60), st.sampled_from([-1, 1]))
-def test_rounding_of_torque_never_adds_up(wanted: list[float], sign: int) -> None:
+def test_rounding_errors_of_torque_do_not_accumulate(wanted: list[float], sign: int) -> None:
     group = Group(1, torque_sign=sign)
     group.enable()
     asked = sent = 0.0
@@ -158,13 +158,13 @@ def test_rounding_of_torque_never_adds_up(wanted: list[float], sign: int) -> Non
             asked += torque
             sent += sign * units * 3e-3
         else:
-            asked = sent = 0.0  # what a limit takes is gone, not owed
+            asked = sent = 0.0  # torque cut by a limit is not carried over
             group.state.floats[codec.RESIDUAL_UNITS] = 0.0
     assert abs(asked - sent) <= 0.5 * 3e-3 + 1e-9
 
 
 @pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
-def test_a_torque_that_is_no_number_goes_out_as_zero_and_is_reported(value: float) -> None:
+def test_a_nan_torque_is_sent_as_zero_and_reported(value: float) -> None:
     group = Group(2)
     group.enable()
     group.state.command.torque_Nm[:] = [value, 0.3]
@@ -175,7 +175,7 @@ def test_a_torque_that_is_no_number_goes_out_as_zero_and_is_reported(value: floa
     assert struct.unpack("<Hh", group.give()[0][1])[1] == 100
 
 
-def test_no_torque_and_no_residual_unless_enabled_on_request() -> None:
+def test_no_torque_and_no_rounding_residual_unless_enabled_on_request() -> None:
     group = Group(1)
     group.enable()
     group.state.command.torque_Nm[0] = 0.1015
@@ -188,7 +188,7 @@ def test_no_torque_and_no_residual_unless_enabled_on_request() -> None:
     assert group.state.floats[codec.RESIDUAL_UNITS, 0] == 0.0
 
 
-def test_an_unconfirmed_mode_stops_at_switched_on() -> None:
+def test_an_unconfirmed_mode_is_not_enabled() -> None:
     group = Group(1)
     group.state.ints[codec.MODE_DISPLAYED] = 1
     group.state.ints[codec.TARGET] = State.OPERATION_ENABLED
@@ -198,7 +198,7 @@ def test_an_unconfirmed_mode_stops_at_switched_on() -> None:
     assert struct.unpack("<Hh", group.give()[0][1])[0] == 0x0F
 
 
-def test_a_fault_reset_is_one_edge_and_a_fault_that_stays_is_reported_again() -> None:
+def test_a_fault_that_outlasts_its_reset_is_reported_again() -> None:
     group = Group(1)
     group.enable()
     ints = group.state.ints
@@ -213,7 +213,7 @@ def test_a_fault_reset_is_one_edge_and_a_fault_that_stays_is_reported_again() ->
     assert alarms == [True, True, False, False, False, True, True, True]
 
 
-def test_a_fault_reset_that_works_leaves_the_drive_disabled() -> None:
+def test_a_successful_fault_reset_leaves_the_drive_disabled() -> None:
     group = Group(1)
     group.enable()
     group.take((0x181, TPDO1.pack(0x08, 0, 0)))
@@ -225,14 +225,14 @@ def test_a_fault_reset_that_works_leaves_the_drive_disabled() -> None:
     assert group.state.ints[codec.FAULTED, 0] == 0
 
 
-def test_two_axes_with_one_node_id_are_refused() -> None:
+def test_two_axes_with_the_same_node_id_are_rejected() -> None:
     axis = AxisConfig(1, DRIVE, 3.0, 8192, 0x3AD, 2.0)
     with pytest.raises(DriverError, match="081h"):
         GroupLayout([axis, axis])
 
 
 @pytest.mark.parametrize(("which", "index"), [("tpdos", 0x6064), ("rpdos", 0x6071)])
-def test_a_map_without_torque_control_is_refused(which: str, index: int) -> None:
+def test_a_pdo_map_without_torque_control_is_rejected(which: str, index: int) -> None:
     pdos = tuple(
         p.model_copy(update={"entries": tuple(e for e in p.entries if e.index != index)})
         for p in getattr(DRIVE, which)

@@ -1,4 +1,4 @@
-"""A group of axes beside simulated drives: what goes right, and what happens when it does not."""
+"""A group of axes on simulated drives: normal operation, modes, faults and shutdown."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def _state(bus: str, node: int = 1) -> State:
         return state_of(network.read_int(node, 0x6041))
 
 
-def test_nothing_is_enabled_that_was_not_requested(rig: Rig) -> None:
+def test_no_axis_is_enabled_without_a_request(rig: Rig) -> None:
     rig.set_mode()
     rig.group.command.torque_Nm[:] = 1.0
     rig.run(0.2)
@@ -37,7 +37,7 @@ def test_nothing_is_enabled_that_was_not_requested(rig: Rig) -> None:
     assert rig.group.command.sent_torque_Nm[0] == 0.0
 
 
-def test_torque_turns_the_motor_and_close_takes_it_away(bus: str) -> None:
+def test_torque_turns_the_motor_and_close_removes_power(bus: str) -> None:
     with open_rig(bus, [1, 2]) as rig:
         rig.enable()
         start = rig.group.feedback.position_rad.copy()
@@ -52,7 +52,7 @@ def test_torque_turns_the_motor_and_close_takes_it_away(bus: str) -> None:
     assert _state(bus, 2) in OFF
 
 
-def test_signs_of_the_profile_turn_angle_and_torque_about(bus: str) -> None:
+def test_signs_of_the_profile_reverse_angle_and_torque(bus: str) -> None:
     mirrored = DRIVE.model_copy(update={"torque_sign": -1, "position_sign": -1})
     with open_rig(bus, drive=mirrored) as rig:
         rig.enable()
@@ -64,17 +64,17 @@ def test_signs_of_the_profile_turn_angle_and_torque_about(bus: str) -> None:
         assert rig.network.read_int(1, 0x6071) == pytest.approx(-133, abs=1)
 
 
-def test_cycles_may_pause_for_as_long_as_one_likes(rig: Rig) -> None:
+def test_cycles_may_pause_while_drives_are_disabled(rig: Rig) -> None:
     rig.enable()
     rig.reach(State.SWITCH_ON_DISABLED)
     rig.group.stop_cycling()
-    rig.network.clock.sleep(1.5)  # longer than the drive tolerates a silent master
+    rig.network.clock.sleep(1.5)  # longer than the drive tolerates the master's silence
     rig.enable()
     rig.run(0.2)
     assert not rig.network.emergencies
 
 
-def test_cycles_may_not_pause_while_a_drive_is_enabled(rig: Rig) -> None:
+def test_a_pause_of_cycles_is_rejected_while_a_drive_is_enabled(rig: Rig) -> None:
     rig.enable()
     with pytest.raises(DriveFaultError, match="disabled"):
         rig.group.stop_cycling()
@@ -94,18 +94,18 @@ def test_a_drive_with_an_rpdo_deadline_waits_in_pre_operational(bus: str) -> Non
 # -- modes
 
 
-def test_a_mode_6502h_does_not_have_is_refused(rig: Rig) -> None:
+def test_a_mode_missing_in_6502h_is_rejected(rig: Rig) -> None:
     with pytest.raises(ModeRefusedError, match=r"7 \(interpolated position\).*6502h"):
         rig.group.ask_mode(7)
 
 
-def test_a_mode_the_drive_refuses_is_reported_with_its_reason(rig: Rig) -> None:
+def test_a_mode_rejected_by_the_drive_is_reported_with_its_reason(rig: Rig) -> None:
     rig.misbehave(3, 1)
     with pytest.raises(ModeRefusedError, match="06090030h"):
         rig.group.ask_mode(Mode.CYCLIC_TORQUE)
 
 
-def test_without_a_confirmed_mode_there_is_no_enabling(rig: Rig) -> None:
+def test_a_drive_without_confirmed_mode_is_not_enabled(rig: Rig) -> None:
     with pytest.raises(ModeRefusedError, match="no mode"):
         rig.group.request(State.OPERATION_ENABLED)
     rig.set_mode(Mode.PROFILE_VELOCITY)
@@ -117,7 +117,7 @@ def test_without_a_confirmed_mode_there_is_no_enabling(rig: Rig) -> None:
         rig.group.request(State.OPERATION_ENABLED)
 
 
-def test_another_mode_while_enabled_raises_the_alarm(rig: Rig) -> None:
+def test_a_mode_change_while_enabled_raises_an_alarm(rig: Rig) -> None:
     rig.enable()
     rig.misbehave(4, 8)
     text, elapsed = rig.until_alarm(1.0)
@@ -132,7 +132,7 @@ def test_the_mode_is_not_changed_while_enabled(rig: Rig) -> None:
         rig.group.ask_mode(Mode.PROFILE_TORQUE)
 
 
-def test_a_mode_that_no_pdo_shows_is_asked_for_by_sdo(bus: str) -> None:
+def test_a_mode_that_is_not_in_a_pdo_is_read_by_sdo(bus: str) -> None:
     with open_rig(bus, drive=DRIVE.model_copy(update={"tpdos": DRIVE.tpdos[:1]})) as rig:
         rig.enable()
 
@@ -140,7 +140,7 @@ def test_a_mode_that_no_pdo_shows_is_asked_for_by_sdo(bus: str) -> None:
 # -- faults
 
 
-def test_a_fault_is_latched_told_and_cleared_only_on_request(rig: Rig) -> None:
+def test_a_fault_is_latched_and_reported_until_acknowledged(rig: Rig) -> None:
     rig.enable()
     rig.misbehave(1, 0x2310)
     text, _ = rig.until_alarm(1.0)
@@ -153,12 +153,12 @@ def test_a_fault_is_latched_told_and_cleared_only_on_request(rig: Rig) -> None:
         rig.group.request(State.OPERATION_ENABLED)
     rig.group.acknowledge_fault()
     rig.run(0.2)
-    assert rig.group.reached(State.SWITCH_ON_DISABLED)  # and not enabled again by itself
+    assert rig.group.reached(State.SWITCH_ON_DISABLED)  # and not enabled again
     assert [e.code for e in rig.network.emergencies] == [0x2310, 0]
     rig.reach(State.OPERATION_ENABLED)
 
 
-def test_a_fault_that_somebody_else_resets_does_not_enable_again(rig: Rig) -> None:
+def test_a_fault_reset_by_another_master_does_not_enable_the_drive(rig: Rig) -> None:
     rig.enable()
     rig.misbehave(1, 0x2310)
     rig.until_alarm(1.0)
@@ -208,11 +208,11 @@ def test_an_unrequested_state_change_raises_an_alarm(
     assert rig.group.feedback.index_known[0] == (trouble is not _restart)
 
 
-def test_the_cause_is_reported_before_what_follows_from_it(
+def test_a_missing_answer_is_reported_rather_than_its_consequences(
     bus: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """While the only drive is waited for by the wall clock, it misses the master's heartbeat."""
-    # it answers at the end too, when its process comes to it
+    """While the master waits for the only drive, the drive also misses the master's heartbeat."""
+    # the drive also answers at the end, when its process gets to it
     monkeypatch.setattr("cdpr_drivers.canopen.network.TIMEOUT_S", 60.0)
     with open_rig(bus, lead=False) as rig:
         rig.enable()
@@ -221,14 +221,14 @@ def test_the_cause_is_reported_before_what_follows_from_it(
     assert "(node 1) has not answered SYNC for 1 cycle:" in text
 
 
-def test_a_drive_that_goes_off_by_itself_is_not_enabled_again(rig: Rig) -> None:
+def test_a_drive_disabled_by_another_master_is_not_enabled_again(rig: Rig) -> None:
     rig.enable()
     with (
         can.Bus(interface="simbus", channel=rig.bus[7:]) as other,
         can.Bus(interface="simbus", channel=rig.bus[7:]) as third,
     ):
         rig.cycle()
-        # somebody else's controlword comes after ours, and both before the next SYNC
+        # the other master's controlword follows ours, and both precede the next SYNC
         while (heard := other.recv(60.0)) is not None and heard.arbitration_id != 0x201:
             pass
         other.send(can.Message(arbitration_id=0x201, data=bytes(4), is_extended_id=False))
@@ -245,7 +245,9 @@ def test_a_drive_that_goes_off_by_itself_is_not_enabled_again(rig: Rig) -> None:
 
 
 @pytest.mark.parametrize("error", [RuntimeError, KeyboardInterrupt])
-def test_whatever_ends_the_block_the_drives_are_off(bus: str, error: type[BaseException]) -> None:
+def test_drives_are_off_after_the_block_ends_with_or_without_an_error(
+    bus: str, error: type[BaseException]
+) -> None:
     with pytest.raises(error), open_rig(bus, [1, 2]) as rig:
         rig.enable()
         rig.group.command.torque_Nm[:] = 0.3
@@ -255,9 +257,9 @@ def test_whatever_ends_the_block_the_drives_are_off(bus: str, error: type[BaseEx
     assert _state(bus, 2) in OFF
 
 
-def test_a_drive_that_does_not_take_pdos_is_switched_off_by_sdo(rig: Rig) -> None:
+def test_a_drive_that_ignores_pdos_is_switched_off_by_sdo(rig: Rig) -> None:
     rig.enable()
-    rig.network.write(1, 0x1016, 1, 0)  # or it stops for want of a heartbeat
+    rig.network.write(1, 0x1016, 1, 0)  # otherwise it stops because the heartbeat is missing
     _leave_operational(rig)
     assert rig.network.wait_for_heartbeat(1, 2.0) == 127
     assert state_of(rig.network.read_int(1, 0x6041)) == State.OPERATION_ENABLED
@@ -265,7 +267,7 @@ def test_a_drive_that_does_not_take_pdos_is_switched_off_by_sdo(rig: Rig) -> Non
     assert state_of(rig.network.read_int(1, 0x6041)) in OFF
 
 
-def test_a_killed_simulator_is_a_bus_error_soon() -> None:
+def test_a_killed_simulator_raises_a_bus_error() -> None:
     simulator = start_simulator()
     try:
         with pytest.raises(BusError, match="gone away") as caught, open_rig(simulator.bus) as rig:
@@ -278,7 +280,7 @@ def test_a_killed_simulator_is_a_bus_error_soon() -> None:
         simulator.stop()
 
 
-def test_a_simulator_that_stands_for_a_while_changes_nothing() -> None:
+def test_a_stopped_simulator_process_only_delays_lockstep_cycles() -> None:
     simulator = start_simulator()
     try:
         with open_network(simulator.bus, [1]) as network:
@@ -287,7 +289,7 @@ def test_a_simulator_that_stands_for_a_while_changes_nothing() -> None:
             simulator.process.send_signal(signal.SIGSTOP)
             go_on = (simulator.process.send_signal, [signal.SIGCONT])
             stopped = time.monotonic()
-            threading.Timer(1.5, *go_on).start()  # longer than any time-out of a drive
+            threading.Timer(1.5, *go_on).start()  # longer than any timeout of a drive
             rig.run(0.5)
             assert time.monotonic() - stopped > 1.4
             assert rig.group.reached(State.OPERATION_ENABLED)
@@ -315,11 +317,11 @@ with open_rig({bus!r}) as rig:
 
 @pytest.mark.parametrize(
     "hang",
-    # drives that live by the wall clock, and a master at 1 kHz that has to keep up with it
+    # paced drives, whose 1 kHz master has to keep up with the wall clock
     [pytest.param(False, id="killed"), pytest.param(True, id="hung", marks=pytest.mark.alone)],
 )
 def test_drives_stop_when_the_master_dies_or_hangs(hang: bool) -> None:
-    """Where it leads the bus a master that hangs only holds up the time."""
+    """A hung master is tested on a paced bus: in lockstep it would only stop the time."""
     simulator = start_simulator(paced=hang)
     code = _DYING_MASTER.format(folder=str(Path(__file__).parents[3]), bus=simulator.bus)
     command = [sys.executable, "-c", code]
@@ -330,7 +332,7 @@ def test_drives_stop_when_the_master_dies_or_hangs(hang: bool) -> None:
         with open_network(simulator.bus, [1]) as network:
             assert state_of(network.read_int(1, 0x6041)) == State.OPERATION_ENABLED
             master.send_signal(signal.SIGSTOP if hang else signal.SIGKILL)
-            # the consumer's 0.5 s run by the wall clock, since nobody leads the bus any more
+            # without a leader, the consumer's 0.5 s are wall-clock time
             deadline = time.monotonic() + 60.0
             while state_of(network.read_int(1, 0x6041)) == State.OPERATION_ENABLED:
                 assert time.monotonic() < deadline
@@ -342,7 +344,7 @@ def test_drives_stop_when_the_master_dies_or_hangs(hang: bool) -> None:
         simulator.stop()
 
 
-def test_time_and_period_are_the_bus_own(rig: Rig) -> None:
+def test_feedback_time_and_period_are_those_of_the_bus(rig: Rig) -> None:
     rig.run(0.25)
     assert rig.group.feedback.cycle == 250
     assert rig.group.feedback.time_s == pytest.approx(250 * PERIOD_S)

@@ -1,4 +1,4 @@
-"""Finding the encoder index of a simulated drive: by homing and by touch probe."""
+"""The encoder index of a simulated drive is found by homing and by touch probe."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def _home(rig: Rig, method: int, timeout_s: float = 30.0) -> Homing:
 
 
 def _turn(rig: Rig, torque_Nm: float, seconds: float = 3.0) -> None:
-    """Turn the motor by hand-set torque until its index is known."""
+    """Turn the motor with the given torque until its index is known."""
     feedback = rig.group.feedback
     rig.enable(Mode.CYCLIC_TORQUE)
     rig.group.command.torque_Nm[0] = torque_Nm
@@ -48,14 +48,14 @@ def test_homing_puts_the_origin_on_the_index_from_either_side(rig: Rig, method: 
     feedback = rig.group.feedback
     assert feedback.index_known[0]
     assert feedback.index_rad[0] == 0.0
-    assert abs(feedback.position_rad[0]) < 0.2  # stopped just past it
-    # the probe, which knows nothing of homing, finds it at a whole number of turns
+    assert abs(feedback.position_rad[0]) < 0.2  # the motor stops just past the index
+    # the probe finds the index at a whole number of turns
     touch_probe.arm(rig.group, 0)
     _turn(rig, 0.25)
     assert _turns_apart(feedback.index_rad[0], 0.0) <= COUNT_RAD
 
 
-def test_the_probe_finds_one_place_in_both_directions(rig: Rig) -> None:
+def test_the_probe_finds_the_same_index_in_both_directions(rig: Rig) -> None:
     found = []
     for torque_Nm in (0.25, -0.25, 0.25):
         touch_probe.arm(rig.group, 0)
@@ -66,7 +66,7 @@ def test_the_probe_finds_one_place_in_both_directions(rig: Rig) -> None:
     assert _turns_apart(found[0], found[2]) <= COUNT_RAD
 
 
-def test_a_drive_that_counts_homing_directions_the_other_way_round(bus: str) -> None:
+def test_homing_works_on_a_drive_with_reversed_homing_directions(bus: str) -> None:
     mirrored = DRIVE.model_copy(update={"homing_sign": -1})
     with open_rig(bus, drive=mirrored) as rig:
         Homing(rig.group, 0, 34).configure()
@@ -76,18 +76,18 @@ def test_a_drive_that_counts_homing_directions_the_other_way_round(bus: str) -> 
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_the_mirror_of_a_method_is_its_own_the_other_way_round(method: int) -> None:
+def test_the_mirrored_homing_method_moves_in_opposite_directions(method: int) -> None:
     assert METHODS[MIRRORED[method]] == METHODS[method].mirrored()
-    if method < 15:  # the same without index
+    if method < 15:  # the same method without index
         assert MIRRORED[method + 16] == MIRRORED[method] + 16
 
 
-def test_homing_in_place_tells_no_index(rig: Rig) -> None:
+def test_homing_in_place_does_not_find_the_index(rig: Rig) -> None:
     assert _home(rig, 37).step is HomingStep.DONE
     assert not rig.group.feedback.index_known[0]
 
 
-def test_an_earlier_homing_is_not_taken_for_this_one(rig: Rig) -> None:
+def test_a_second_homing_moves_although_the_drive_is_already_homed(rig: Rig) -> None:
     _home(rig, 37)
     homing = Homing(rig.group, 0, 34)
     homing.configure()
@@ -95,11 +95,11 @@ def test_an_earlier_homing_is_not_taken_for_this_one(rig: Rig) -> None:
     begin = rig.group.feedback.time_s
     rig.run(40.0, homing.update)
     assert homing.step is HomingStep.DONE
-    assert rig.group.feedback.time_s - begin > 0.1  # it took a motion
+    assert rig.group.feedback.time_s - begin > 0.1  # the motor had to move
     assert rig.group.feedback.index_known[0]
 
 
-def test_a_method_the_profile_lacks_is_refused(rig: Rig) -> None:
+def test_a_homing_method_missing_in_the_profile_is_rejected(rig: Rig) -> None:
     with pytest.raises(DriveFaultError, match="homing method 19 is not among"):
         Homing(rig.group, 0, 19)
 
@@ -130,21 +130,21 @@ def bus_without_index(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]
         simulator.stop()
 
 
-def test_no_index_is_a_homing_error_that_is_reported(bus_without_index: str) -> None:
+def test_homing_to_a_missing_index_is_reported_as_homing_error(bus_without_index: str) -> None:
     with open_rig(bus_without_index) as rig:
         with pytest.raises(DriveFaultError, match="homing error"):
             _home(rig, 33)
         assert not rig.group.feedback.index_known[0]
 
 
-def test_the_probe_sees_nothing_where_there_is_no_index(bus_without_index: str) -> None:
+def test_the_probe_latches_nothing_if_there_is_no_index(bus_without_index: str) -> None:
     with open_rig(bus_without_index) as rig:
         touch_probe.arm(rig.group, 0)
         with pytest.raises(AssertionError):
             _turn(rig, 0.2, seconds=1.0)
 
 
-def test_a_map_without_the_probe_is_reported(bus: str) -> None:
+def test_arming_a_probe_that_is_not_in_a_pdo_is_an_error(bus: str) -> None:
     drive = DRIVE.model_copy(update={"tpdos": DRIVE.tpdos[:1]})
     with open_rig(bus, drive=drive) as rig, pytest.raises(DriveFaultError, match="60B9h"):
         touch_probe.arm(rig.group, 0)

@@ -1,4 +1,4 @@
-"""A group of axes on a paced bus, where time does not wait for anybody."""
+"""A group of axes on a paced bus, where time does not wait for the master."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from tests.fault_texts import alarm
 pytestmark = pytest.mark.alone
 
 PERIOD_S = 10e-3
-"""Slow enough for two processes of a busy machine."""
+"""Slow enough for two processes on a busy machine."""
 
 
 @pytest.fixture(scope="module")
@@ -53,14 +53,14 @@ def rig(
 
 
 def _cycles(rig: Rig, count: int, patience_s: float = 1.0) -> list[str]:
-    """Run cycles a period apart; return the alarm after each.
+    """Run cycles one period apart and return the alarm after each.
 
-    `patience_s` is how long an answer may take: a busy machine shall not look like a lost drive.
+    An answer may take `patience_s`, so that a busy machine does not look like a lost drive.
     """
     alarms = []
     deadline = time.monotonic()
     for _ in range(count):
-        deadline = max(deadline + PERIOD_S, time.monotonic())  # what was late is not made up for
+        deadline = max(deadline + PERIOD_S, time.monotonic())  # late cycles are not caught up
         time.sleep(max(0.0, deadline - time.monotonic()))
         rig.group.sync()
         rig.group.receive(time.monotonic() + patience_s)
@@ -104,7 +104,7 @@ def test_the_wait_for_an_answer_ends_within_the_period(rig: Rig) -> None:
     rig.misbehave(2, 0, node=2)
 
 
-def test_two_lost_answers_are_bridged_and_the_third_is_an_alarm(rig: Rig) -> None:
+def test_two_lost_answers_are_tolerated_and_the_third_raises_an_alarm(rig: Rig) -> None:
     _enable(rig)
     rig.misbehave(2, 2, node=2)
     assert "no answer" not in "".join(_cycles(rig, 20, 0.1))
@@ -115,11 +115,11 @@ def test_two_lost_answers_are_bridged_and_the_third_is_an_alarm(rig: Rig) -> Non
     rig.misbehave(2, 0, node=2)
 
 
-def test_an_answer_that_comes_late_is_not_taken_for_the_next_one(rig: Rig) -> None:
+def test_late_answers_are_discarded_at_the_next_sync(rig: Rig) -> None:
     _cycles(rig, 20)
     group = rig.group
     group.sync()
-    group._late = True  # as after a cycle that was given up too early
+    group._late = True  # as after a cycle that ended before its answers arrived
     time.sleep(2 * PERIOD_S)
     group.sync()
     assert not group.feedback.valid.any()

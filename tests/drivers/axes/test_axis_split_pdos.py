@@ -1,4 +1,4 @@
-"""Drives whose commands and feedback lie in several PDOs, beside one whose fit in one each."""
+"""A drive with several PDOs each way, beside a drive with one PDO each way."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ I32 = st.integers(-(1 << 31), (1 << 31) - 1)
 
 
 class Pair:
-    """Axis 0 with split PDOs (node 1), axis 1 with one PDO each way (node 2), without a bus."""
+    """Axis 0 (node 1) with split PDOs and axis 1 (node 2) with one PDO each way, without a bus."""
 
     def __init__(self) -> None:
         axes = [
@@ -65,7 +65,7 @@ class Pair:
 
 @settings(max_examples=60)
 @given(st.integers(0, 0xFFFF), I32, I16, st.permutations(["word", "torque", "whole"]))
-def test_an_axis_has_answered_when_all_its_pdos_are_in(
+def test_an_axis_has_answered_when_all_its_pdos_have_arrived(
     word: int, counts: int, torque: int, order: list[str]
 ) -> None:
     frames = {
@@ -84,7 +84,7 @@ def test_an_axis_has_answered_when_all_its_pdos_are_in(
     assert feedback.torque_Nm == pytest.approx([torque * 1e-3, torque * 3e-3])
 
 
-def test_half_an_answer_is_none_and_does_not_count_in_the_next_cycle() -> None:
+def test_an_incomplete_answer_does_not_count_in_this_or_the_next_cycle() -> None:
     pair = Pair()
     assert pair.take((0x381, struct.pack("<hi", 1, 0))) == 0
     pair.next_cycle()
@@ -93,7 +93,7 @@ def test_half_an_answer_is_none_and_does_not_count_in_the_next_cycle() -> None:
     assert pair.take((0x381, struct.pack("<hi", 1, 0))) == 1
 
 
-def test_a_frame_shorter_than_its_map_is_no_answer() -> None:
+def test_a_frame_shorter_than_its_map_does_not_count_as_answer() -> None:
     pair = Pair()
     assert pair.take((0x381, struct.pack("<h", 1)), (0x181, struct.pack("<Hh", ENABLED, 0))) == 0
     assert pair.take((0x182, struct.pack("<Hi", ENABLED, 0))) == 0
@@ -112,14 +112,14 @@ def test_each_axis_is_commanded_in_its_own_frames_and_units() -> None:
         0x301: struct.pack("<h", 123),
         0x202: struct.pack("<Hh", 0x0F, -41),
     }
-    # torque limits are those of each axis' unit as well
+    # torque limits are also in the unit of each axis
     pair.state.command.torque_Nm[:] = 50.0
     frames = pair.give()
     assert frames[0x301] == struct.pack("<h", 2000)
     assert frames[0x202][2:] == struct.pack("<h", 666)
 
 
-def test_one_axis_waits_for_its_own_mode_while_the_other_goes_on() -> None:
+def test_an_axis_that_waits_for_its_mode_does_not_stop_the_other() -> None:
     pair = Pair()
     ints = pair.state.ints
     ints[codec.MODE_REQUESTED] = [4, 10]
@@ -132,7 +132,7 @@ def test_one_axis_waits_for_its_own_mode_while_the_other_goes_on() -> None:
     assert frames[0x202][:2] == struct.pack("<H", 0x07)
 
 
-def test_feedback_that_does_not_come_at_every_sync_is_refused() -> None:
+def test_feedback_that_is_not_sent_at_every_sync_is_rejected() -> None:
     late = tuple(
         p.model_copy(update={"transmission_type": 0 if p.number == 3 else 1}) for p in SPLIT.tpdos
     )
@@ -141,12 +141,12 @@ def test_feedback_that_does_not_come_at_every_sync_is_refused() -> None:
         GroupLayout([AxisConfig(1, drive, 3.0, 8192, 0x2D, 2.0)])
 
 
-def _one(drive: DriveProfile, limit_Nm: float = 2.0) -> GroupLayout:
+def layout_of(drive: DriveProfile, limit_Nm: float = 2.0) -> GroupLayout:
     return GroupLayout([AxisConfig(1, drive, 3.0, 8192, 0x2D, limit_Nm)])
 
 
-def test_feedback_that_is_reported_again_when_it_changes_is_not_waited_for() -> None:
-    """Drives have the statusword in a PDO of its own, sent on change, as delivered."""
+def test_an_event_driven_copy_of_the_feedback_is_not_awaited() -> None:
+    """By factory setting, drives also send the statusword on change in a separate PDO."""
     (statusword, *_), *_ = (pdo.entries for pdo in SPLIT.tpdos)
     event = Pdo(number=2, cob_id_offset=0x280, transmission_type=255, entries=(statusword,))
     plain = AxisConfig(1, SPLIT, 3.0, 8192, 0x2D, 2.0)
@@ -166,21 +166,21 @@ def test_a_mapped_object_that_would_be_zeroed_is_rejected() -> None:
         drive = SPLIT.model_copy(update={"rpdos": rpdos})
         if refused:
             with pytest.raises(DriverError, match=f"{index:04X}h .* would be set to 0"):
-                _one(drive)
+                layout_of(drive)
         else:
-            assert _one(drive).rpdos.array["length"].tolist() == [3, 2]
+            assert layout_of(drive).rpdos.array["length"].tolist() == [3, 2]
 
 
-def test_an_object_of_another_length_is_refused() -> None:
+def test_an_object_mapped_with_the_wrong_length_is_rejected() -> None:
     status, torque = SPLIT.tpdos
     entries = (status.entries[0], PdoEntry(index=0x6064, bits=16))
     tpdos = status.model_copy(update={"entries": entries}), torque
     with pytest.raises(DriverError, match="6064h has 16 bits; allowed: 32"):
-        _one(SPLIT.model_copy(update={"tpdos": tpdos}))
+        layout_of(SPLIT.model_copy(update={"tpdos": tpdos}))
 
 
 @pytest.mark.parametrize("torque_Nm", [40.0, -40.0, 1e300])
-def test_more_millinewtonmetres_than_16_bits_hold_are_cut_and_not_wrapped(torque_Nm: float) -> None:
+def test_torque_beyond_16_bits_is_clamped_instead_of_wrapped(torque_Nm: float) -> None:
     axes = [AxisConfig(1, SPLIT, 3.0, 8192, 0x2D, 50.0)]
     layout, state = GroupLayout(axes), StateArrays(len(axes))
     state.begin(axes, PERIOD_S, lockstep=True)

@@ -1,4 +1,4 @@
-"""Axes of another master, taken in on buses where a script is master and drives in one."""
+"""Listening to axes of another master. A script plays the master and the drives."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ FRAME = struct.Struct("=IB3x8s")
 
 
 class Stage:
-    """One bus; `says` sends any frame on it, as master or as drive."""
+    """A bus on which `says` sends frames as master or as drive."""
 
     def __init__(self, name: str) -> None:
         self.bus = f"simbus:{name}"
@@ -54,13 +54,13 @@ class Stage:
         self.says(0x180 + node, struct.pack("<Hih", word, counts, torque))
 
     def cycle(self, counts: int) -> None:
-        """SYNC, and the answer of node 1 to it."""
+        """Send SYNC and the answer of node 1."""
         self.says(0x080)
         self.answers(1, counts)
         self.settle()
 
     def settle(self) -> None:
-        """Wait until the hub has dealt with all that was said."""
+        """Wait until the hub has processed all sent frames."""
         exchange(self.sock, None)
 
     def end(self) -> None:
@@ -75,7 +75,7 @@ class Stage:
 
 
 class ScriptedClock(PacedClock):
-    """Time that passes in waits alone, while a script's frames come at their instants."""
+    """A clock that advances only in waits and runs scripted actions at their instants."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -83,7 +83,7 @@ class ScriptedClock(PacedClock):
         self._now_s = 0.0
 
     def at(self, time_s: float, act: Callable[[], None]) -> None:
-        """Have `act` done at an instant no earlier than those before."""
+        """Schedule `act` at an instant that is no earlier than those scheduled before."""
         self.script.append((time_s, act))
 
     @property
@@ -102,7 +102,7 @@ class ScriptedClock(PacedClock):
 def device(
     stages: Sequence[Stage], nodes: Sequence[Sequence[int]], clock: PacedClock | None = None
 ) -> ListeningDevice:
-    """Return a device whose axes go round the buses: the first of each, the second of each..."""
+    """Return a device whose axes alternate between buses."""
     axis_numbers: list[list[int]] = [[] for _ in stages]
     order = sorted((k, b) for b, each in enumerate(nodes) for k in range(len(each)))
     for place, (_, bus) in enumerate(order):
@@ -146,7 +146,7 @@ def cycle(device: ListeningDevice) -> int:
     return answered
 
 
-def test_feedback_is_what_the_drives_say(stage: Stage) -> None:
+def test_feedback_states_and_faults_follow_the_drives_answers(stage: Stage) -> None:
     with device([stage], [[1, 2]]) as ears:
         for k in range(1, 4):
             stage.says(0x080)
@@ -170,12 +170,12 @@ def test_feedback_is_what_the_drives_say(stage: Stage) -> None:
         assert ears.command.sent_torque_Nm.tolist() == [0.0, 0.0]
 
 
-def others(log: BusLog, said: int) -> int:
-    """Return how many frames crossed the bus which the script did not send."""
+def frames_not_from_the_script(log: BusLog, said: int) -> int:
+    """Return how many frames on the bus the script did not send."""
     return len(log.frames) - said
 
 
-def test_not_one_frame_is_sent(two: list[Stage]) -> None:
+def test_a_listener_sends_no_frame(two: list[Stage]) -> None:
     with logged(two[0].bus) as first, logged(two[1].bus) as second:
         with device(two, [[1], [1]]) as ears:
             assert cycle(ears) == 0  # without a master
@@ -193,10 +193,13 @@ def test_not_one_frame_is_sent(two: list[Stage]) -> None:
             ears.forget_alarms()
         for bus in two:
             bus.settle()
-    assert (others(first, 102), others(second, 101)) == (0, 0)
+    assert (frames_not_from_the_script(first, 102), frames_not_from_the_script(second, 101)) == (
+        0,
+        0,
+    )
 
 
-def test_without_a_master_a_cycle_ends_soon_and_says_so(stage: Stage) -> None:
+def test_a_cycle_without_master_ends_and_shows_the_silence(stage: Stage) -> None:
     with device([stage], [[1]]) as ears:
         assert ears.silent_s == math.inf
         begin = time.monotonic()
@@ -216,7 +219,7 @@ def test_without_a_master_a_cycle_ends_soon_and_says_so(stage: Stage) -> None:
         assert not ears.feedback.valid[0]
 
 
-def test_silence_of_a_drive_is_an_alarm_until_the_master_starts_again(
+def test_a_silent_drive_raises_an_alarm_until_the_master_starts_again(
     stage: Stage, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("cdpr_drivers.axes.listening._LOCKSTEP_ANSWER_S", 0.01)
@@ -250,7 +253,7 @@ def test_actions_of_the_other_master_raise_no_alarm(stage: Stage) -> None:
             assert alarm(ears) == ""
 
 
-def test_an_index_that_the_master_latches_is_known_here_too(stage: Stage) -> None:
+def test_an_index_latched_by_the_master_is_known_to_the_listener(stage: Stage) -> None:
     with device([stage], [[1]]) as ears:
         for status in (1, 3, 3):
             stage.says(0x080)
@@ -261,13 +264,13 @@ def test_an_index_that_the_master_latches_is_known_here_too(stage: Stage) -> Non
             cycle(ears)
         assert ears.feedback.index_known[0]
         assert ears.feedback.index_rad[0] == pytest.approx(1000 / COUNTS * math.tau)
-        stage.says(0x701, b"\0")  # the drive restarts: its origin is another one
+        stage.says(0x701, b"\0")  # the drive restarts, so that its origin changes
         stage.settle()
         cycle(ears)
         assert not ears.feedback.index_known[0]
 
 
-def test_a_backlog_is_taken_in_cycle_by_cycle(two: list[Stage]) -> None:
+def test_a_backlog_of_frames_is_processed_cycle_by_cycle(two: list[Stage]) -> None:
     with device(two, [[1, 2], [1, 2]]) as ears:
         for k in range(1, 200):
             for bus in two:
@@ -279,7 +282,7 @@ def test_a_backlog_is_taken_in_cycle_by_cycle(two: list[Stage]) -> None:
         for k in range(1, 200):
             assert cycle(ears) == 4
             counts = np.rint(ears.feedback.position_rad * COUNTS / math.tau)
-            # the axes go round the buses
+            # the axes alternate between the buses
             assert counts.tolist() == [k, k, -k, -k]
         assert ears.feedback.cycle == 199
 
@@ -287,10 +290,10 @@ def test_a_backlog_is_taken_in_cycle_by_cycle(two: list[Stage]) -> None:
 @pytest.mark.parametrize("apart", [0.0, 0.01, 0.2])
 @pytest.mark.parametrize("swapped", [False, True])
 @pytest.mark.parametrize("behind", [0, 1])
-def test_a_bus_that_has_lost_cycles_is_caught_up_with(
+def test_buses_a_cycle_apart_get_back_in_step(
     two: list[Stage], behind: int, swapped: bool, apart: float
 ) -> None:
-    """SYNCs that only one of the buses heard leave the buses a cycle apart, but not for long."""
+    """After a SYNC on one bus only, both buses deliver the same cycle again within 20 cycles."""
     clock = ScriptedClock()
     with device(two, [[1], [1]], clock) as ears:
         two[behind].cycle(-1)
@@ -309,7 +312,7 @@ def test_a_bus_that_has_lost_cycles_is_caught_up_with(
 @pytest.mark.parametrize(
     ("answered", "apart"), [(0.3, 0.01), (0.755, 0.01), (0.76, 0.05), (0.8, 0.1), (0.9, 0.05)]
 )
-def test_buses_in_step_stay_so_whenever_drives_answer(
+def test_buses_stay_in_step_however_late_drives_answer(
     two: list[Stage], answered: float, apart: float
 ) -> None:
     clock = ScriptedClock()
@@ -334,7 +337,7 @@ def test_buses_in_step_stay_so_whenever_drives_answer(
             assert first == second
 
 
-def test_a_flood_does_not_hold_a_cycle_up(stage: Stage) -> None:
+def test_a_flood_of_frames_does_not_block_a_cycle(stage: Stage) -> None:
     with device([stage], [[1]]) as ears:
         stop = threading.Event()
 
@@ -359,7 +362,7 @@ def test_a_bus_that_goes_away_is_reported(stage: Stage) -> None:
             cycle(ears)
 
 
-def test_a_bus_that_is_not_there_is_reported() -> None:
+def test_listening_on_a_missing_bus_is_an_error() -> None:
     axis = monitored_axis(WINCH, 1)
     with pytest.raises(BusError, match="no simulated bus"):
         ListeningDevice(

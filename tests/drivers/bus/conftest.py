@@ -1,4 +1,4 @@
-"""A simulated bus in a process of its own, with one node that answers SYNC and SDO-like frames."""
+"""A simulated bus in a separate process, with one node that answers SYNC and SDO-like frames."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Frames as ports take and give them, and the files this process holds."""
+"""Build and receive packed frames, and list the open files of this process."""
 
 from __future__ import annotations
 
@@ -21,6 +21,6 @@ def receive(port: FramePort) -> bytes:
 def open_files() -> list[str]:
     names = []
     for entry in Path("/proc/self/fd").iterdir():
-        with contextlib.suppress(FileNotFoundError):  # the folder's own
+        with contextlib.suppress(FileNotFoundError):  # the descriptor of the folder itself
             names.append(str(entry.readlink()))
     return names

@@ -1,4 +1,4 @@
-"""Serial adapters, socketcand servers and python-can's interfaces, also those that behave badly."""
+"""Serial adapters, socketcand servers and interfaces of python-can, some of them misbehaving."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from tests.drivers.bus.port_frames import frame, open_files, receive
 
 
 def opened(url: BusUrl, filters: list[tuple[int, int]] | None = None) -> FramePort:
-    """Return a port that also receives error frames and waits for a frame."""
+    """Return a port that receives error frames too and waits up to 60 s for a frame."""
     port = open_port(url, filters, receive_errors=True)
     port.settimeout(60.0)
     return port
@@ -36,7 +36,7 @@ def opened(url: BusUrl, filters: list[tuple[int, int]] | None = None) -> FramePo
 
 
 class Adapter:
-    """The far end of a serial line; a thread answers commands by a table, frames are kept."""
+    """The far end of a serial line. A thread answers commands from a table and keeps frames."""
 
     def __init__(self, answers: dict[bytes, bytes]) -> None:
         self.host, self.terminal = pty.openpty()
@@ -68,7 +68,7 @@ class Adapter:
         os.write(self.host, text)
 
     def pull_out(self) -> None:
-        """Take the adapter away: the end of the line."""
+        """Unplug the adapter: close the line."""
         if self._out.is_set():
             return
         self._out.set()
@@ -96,7 +96,7 @@ def start() -> Iterator[Callable[[dict[bytes, bytes]], Adapter]]:
 Start = Callable[[dict[bytes, bytes]], Adapter]
 
 
-def test_an_adapter_is_opened_step_by_step(start: Start) -> None:
+def test_an_adapter_is_opened_with_the_expected_commands(start: Start) -> None:
     adapter = start(GOOD)
     port = open_port(adapter.url)
     assert adapter.lines == [b"", b"C", b"V", b"S8", b"O", b"F"]
@@ -115,7 +115,7 @@ def test_an_adapter_is_opened_step_by_step(start: Start) -> None:
         (dict.fromkeys(GOOD, b""), "nothing there answers as a serial CAN adapter"),
     ],
 )
-def test_a_refusal_of_the_adapter_is_reported(
+def test_a_command_rejected_by_the_adapter_is_reported(
     start: Start, change: dict[bytes, bytes], message: str
 ) -> None:
     adapter = start(GOOD | change)
@@ -124,7 +124,7 @@ def test_a_refusal_of_the_adapter_is_reported(
     assert str(caught.value).count(adapter.path) == 1
 
 
-def test_an_adapter_that_acknowledges_nothing_but_tells_its_version(start: Start) -> None:
+def test_an_adapter_that_only_answers_the_version_query_is_accepted(start: Start) -> None:
     adapter = start({b"V": b"V1013\r"})
     port = opened(adapter.url)
     adapter.say(b"t1810\r")
@@ -132,13 +132,13 @@ def test_an_adapter_that_acknowledges_nothing_but_tells_its_version(start: Start
     port.close()
 
 
-def test_late_answers_to_what_was_before_are_not_mistaken(start: Start) -> None:
-    """A channel that was closed already refuses to close, and may say so late."""
+def test_late_answers_to_earlier_commands_are_ignored(start: Start) -> None:
+    """A channel that is already closed rejects the close command, maybe late."""
     adapter = start(GOOD | {b"C": b"", b"V": b"\az\rt1810\r\aV1013\r"})
     open_port(adapter.url).close()
 
 
-def test_frames_of_before_do_not_come_in(start: Start) -> None:
+def test_frames_from_before_opening_are_discarded(start: Start) -> None:
     adapter = start(GOOD)
     adapter.say(b"t7770\rt77")
     port = opened(adapter.url)
@@ -150,7 +150,7 @@ def test_frames_of_before_do_not_come_in(start: Start) -> None:
 
 @given(st.lists(st.binary(max_size=30), max_size=10))
 @settings(max_examples=200)
-def test_rubbish_on_the_line_yields_frames_or_nothing(chunks: list[bytes]) -> None:
+def test_garbage_on_the_line_yields_valid_frames_or_nothing(chunks: list[bytes]) -> None:
     adapter = SlcanAdapter.__new__(SlcanAdapter)
     adapter._reported_flags = 0
     for chunk in chunks:
@@ -162,11 +162,11 @@ def test_rubbish_on_the_line_yields_frames_or_nothing(chunks: list[bytes]) -> No
                 assert can_id & ERR_FLAG or can_id & EFF_FLAG or can_id & ~RTR_FLAG < 0x1000
 
 
-def test_rubbish_between_frames_loses_none(start: Start) -> None:
+def test_garbage_between_frames_loses_no_frame(start: Start) -> None:
     adapter = start(GOOD)
     port = opened(adapter.url)
     adapter.say(b"t1810\r\xff\x00t99\rtXX81\rt1819\r\r\rhello\rt18")
-    got = [receive(port)]  # so the line is read between the two pieces
+    got = [receive(port)]  # the line is read between the two pieces
     adapter.say(b"22ABCD12F0\rT000001811EE\rr1813\r")
     got += [receive(port) for _ in range(3)]
     assert got == [
@@ -178,14 +178,14 @@ def test_rubbish_between_frames_loses_none(start: Start) -> None:
     port.close()
 
 
-def test_a_line_cut_short_by_an_adapter_that_takes_nothing_is_ended_before_the_next(
+def test_a_partly_sent_frame_is_completed_before_the_next_one(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     send_timeout = "cdpr_drivers.bus.slcan.SEND_TIMEOUT_S"
     monkeypatch.setattr(send_timeout, 0.2)
     host, terminal = pty.openpty()
     tty.setraw(terminal)
-    adapter = SlcanAdapter.__new__(SlcanAdapter)  # on a channel that is open already
+    adapter = SlcanAdapter.__new__(SlcanAdapter)  # as if the channel were open
     adapter._fd, adapter._sending, adapter._partly_sent = terminal, threading.Lock(), False
     os.set_blocking(terminal, False)
     sent = frame(0x201, bytes(8))
@@ -196,7 +196,7 @@ def test_a_line_cut_short_by_an_adapter_that_takes_nothing_is_ended_before_the_n
     text = b""
     sending = threading.Thread(target=adapter.write, args=[frame(0x123, b"\x01")])
     sending.start()
-    while not text.endswith(b"t123101\r"):  # it comes in as many pieces as the kernel likes
+    while not text.endswith(b"t123101\r"):  # in any number of pieces
         assert select.select([host], [], [], 60.0)[0], text[-100:]
         text += os.read(host, 1 << 16)
     sending.join()
@@ -207,10 +207,10 @@ def test_a_line_cut_short_by_an_adapter_that_takes_nothing_is_ended_before_the_n
     os.close(terminal)
 
 
-def test_flags_of_the_adapter_become_error_frames_for_who_asks_for_them(
+def test_status_flags_become_error_frames_for_ports_that_want_them(
     start: Start, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    # an adapter that does not answer F at first is never asked again
+    # an adapter that does not answer F at first is not polled again
     monkeypatch.setattr(SlcanAdapter._command, "__defaults__", (60.0, b""))
     adapter = start(GOOD | {b"F": b"F00\r", b"t": b"\a"})
     cyclic, acyclic = open_port(adapter.url), opened(adapter.url, [(0x701, 0x7FF)])
@@ -237,13 +237,13 @@ def test_flags_of_the_adapter_become_error_frames_for_who_asks_for_them(
     acyclic.close()
 
 
-def test_one_adapter_serves_all_who_open_it(start: Start) -> None:
+def test_several_ports_share_one_adapter(start: Start) -> None:
     adapter = start(GOOD)
     first, second = opened(adapter.url, [(0x180, 0x780)]), opened(adapter.url)
     adapter.say(b"t7010\rt1810\r")
     assert receive(first) == frame(0x181)
     assert [receive(second) for _ in range(2)] == [frame(0x701), frame(0x181)]
-    first.send(frame(0x701, b"\x05"))  # the others hear it, as on SocketCAN
+    first.send(frame(0x701, b"\x05"))  # other ports receive it, as on SocketCAN
     assert receive(second) == frame(0x701, b"\x05")
     assert first.drain() == 0
     with pytest.raises(BusError, match="is in use with other settings"):
@@ -258,7 +258,7 @@ def test_one_adapter_serves_all_who_open_it(start: Start) -> None:
     assert not [t for t in threading.enumerate() if t.name.startswith("reads slcan")]
 
 
-def test_an_adapter_that_is_pulled_out_is_reported_to_all_and_frees_its_name(start: Start) -> None:
+def test_an_unplugged_adapter_is_reported_to_all_ports_and_its_name_is_free(start: Start) -> None:
     adapter = start(GOOD)
     ports = opened(adapter.url), opened(adapter.url)
     adapter.pull_out()
@@ -269,13 +269,13 @@ def test_an_adapter_that_is_pulled_out_is_reported_to_all_and_frees_its_name(sta
         with pytest.raises(OSError, match="pulled out") as caught:
             port.send(frame(0x80))
         assert told in str(port.lost(caught.value))
-    # nothing holds its name, which the next one may be given
+    # nothing keeps the name in use, so that the next adapter can get it
     assert not [name for name in open_files() if name.startswith(adapter.path)]
     for port in ports:
         port.close()
 
 
-def test_a_port_in_use_by_another_program(start: Start) -> None:
+def test_a_serial_port_in_use_by_another_program_is_reported(start: Start) -> None:
     adapter = start(GOOD)
     with open(adapter.path, "rb", buffering=0) as other:  # noqa: PTH123  # a terminal
         fcntl.flock(other, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -287,7 +287,7 @@ def test_a_port_in_use_by_another_program(start: Start) -> None:
 
 
 class Server:
-    """Plays a socketcand server that says what the test wants, in pieces as the test cuts them."""
+    """A socketcand server that sends the pieces of text that a test gives it."""
 
     def __init__(self, *greeting: bytes) -> None:
         self.listener = socket.create_server(("127.0.0.1", 0))
@@ -321,7 +321,7 @@ class Server:
 GREETING = (b"< hi >", b"< ok >", b"< ok >")
 
 
-def test_a_lost_line_can_be_opened_again_while_the_old_port_is_held() -> None:
+def test_a_lost_server_can_be_reopened_before_the_old_port_is_closed() -> None:
     server = Server(*GREETING)
     old = opened(server.url)
     server.client.close()
@@ -338,7 +338,7 @@ def test_a_lost_line_can_be_opened_again_while_the_old_port_is_held() -> None:
     server.close()
 
 
-def test_a_conversation_in_pieces_and_glued_together() -> None:
+def test_messages_of_a_server_may_be_split_or_joined() -> None:
     server = Server(b"< hi >", b"< ok >", b"< ok >< frame 181 1.5 1122 >< fr")
     port = opened(server.url)
     assert receive(port) == frame(0x181, b"\x11\x22")
@@ -370,7 +370,7 @@ def test_a_conversation_in_pieces_and_glued_together() -> None:
     server.close()
 
 
-def test_rubbish_from_a_server_loses_no_frame() -> None:
+def test_garbage_from_a_server_loses_no_valid_frame() -> None:
     server = Server(*GREETING)
     port = opened(server.url)
     server.client.sendall(
@@ -385,7 +385,7 @@ def test_rubbish_from_a_server_loses_no_frame() -> None:
     server.close()
 
 
-def test_a_server_that_takes_nothing_is_given_up_in_bounded_time() -> None:
+def test_sending_to_a_server_that_reads_nothing_fails_in_bounded_time() -> None:
     server = Server(*GREETING)
     port = open_port(server.url, [])
     longest = 0.0
@@ -399,8 +399,8 @@ def test_a_server_that_takes_nothing_is_given_up_in_bounded_time() -> None:
     server.close()
 
 
-def test_a_peer_that_vanishes_without_a_word_is_given_up() -> None:
-    """Unplugged network cable: what the kernel is told to do about it."""
+def test_keepalive_detects_a_vanished_server_within_5_s() -> None:
+    """Check the socket options for an unplugged network cable."""
     server = Server(*GREETING)
     line = SocketcandAdapter(server.url)
     options = [
@@ -421,7 +421,7 @@ def test_a_peer_that_vanishes_without_a_word_is_given_up() -> None:
         ((b"< hello >",), "'hello' to 'the connection'"),
     ],
 )
-def test_a_refusal_of_the_server_is_reported(
+def test_a_server_that_does_not_open_the_bus_is_reported(
     greeting: tuple[bytes, ...], message: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("cdpr_drivers.bus.socketcand._ANSWER_S", 0.3)
@@ -449,13 +449,13 @@ def test_a_refusal_of_the_server_is_reported(
         ("udp_multicast:no-address", "cannot be opened"),
     ],
 )
-def test_a_bus_that_cannot_be_opened_is_reported_once(url: str, message: str) -> None:
+def test_the_error_for_a_bus_that_cannot_be_opened_names_it_once(url: str, message: str) -> None:
     with pytest.raises(BusError, match=message) as caught:
         open_port(BusUrl.parse(url))
     assert str(caught.value).count(url.split("?", maxsplit=1)[0]) == 1
 
 
-def test_two_ports_on_any_other_interface_share_one_bus() -> None:
+def test_two_ports_on_a_python_can_interface_share_one_bus() -> None:
     url = BusUrl.parse("virtual:shared-adapters")
     one, two = open_port(url), open_port(url, [(0x181, 0x7FF)])
     with can.Bus("shared-adapters", interface="virtual") as third_party:
@@ -470,7 +470,7 @@ def test_two_ports_on_any_other_interface_share_one_bus() -> None:
     two.close()
 
 
-def test_frames_a_port_does_not_read_in_time_are_counted() -> None:
+def test_frames_lost_by_a_slow_reader_are_counted() -> None:
     url, health = BusUrl.parse("virtual:line-overflow"), BusHealth()
     slow, sender = open_port(url, None, health), open_port(url, [])
     sent = 0

@@ -1,4 +1,4 @@
-"""The bus budget against frames stuffed bit by bit, against the simulated bus, and as a command."""
+"""The bus budget agrees with bit-stuffed frames and the simulated bus; its command reports it."""
 
 import json
 import re
@@ -34,7 +34,7 @@ def crc15(bits: list[int]) -> int:
 
 
 def stuff_bits(bits: list[int]) -> int:
-    """Put a bit of the other kind after each five equal ones; return how many there were."""
+    """Return the number of stuff bits: one opposite bit after each five equal bits."""
     sent: list[int] = []
     for bit in bits:
         sent.append(bit)
@@ -44,7 +44,7 @@ def stuff_bits(bits: list[int]) -> int:
 
 
 def on_the_wire(identifier: int, data: bytes) -> int:
-    """Return the bits of a base format data frame, from its start to the end of the space."""
+    """Return the length in bits of a base-format data frame, including the interframe space."""
     # start of frame, identifier, RTR, IDE, r0, DLC, data, CRC
     bits = [0, *bits_of(identifier, 11), 0, 0, 0, *bits_of(len(data), 4)]
     for byte in data:
@@ -53,14 +53,14 @@ def on_the_wire(identifier: int, data: bytes) -> int:
     return len(bits) + stuff_bits(bits) + UNSTUFFED
 
 
-def test_the_reference_knows_a_printed_crc():
-    # one start bit and zeros leave the register empty, a lone 1 leaves the polynomial
+def test_reference_crc_gives_known_values():
+    # zeros leave the register empty, and a single 1 leaves the polynomial
     assert crc15([0] * 20) == 0
     assert crc15([0, 0, 1]) == 0x4599
 
 
 identifiers = st.integers(0, 0x7FF)
-# bytes with long runs of equal bits, which are what has to be stuffed
+# bytes with long runs of equal bits, which need stuff bits
 runs = st.sampled_from([0x00, 0xFF, 0x0F, 0xF0, 0x1E, 0x3C, 0x78, 0x87, 0xC3, 0xE1])
 payloads = st.binary(max_size=8) | st.lists(runs, max_size=8).map(bytes)
 
@@ -73,15 +73,15 @@ def test_no_frame_is_longer_than_the_bound(identifier: int, data: bytes):
 
 
 @pytest.mark.parametrize("n", range(9))
-def test_the_bound_is_attained_by_bits_of_ones_own_choice(n: int):
-    """0 00001111 0000 1111 ...: each stuff bit begins the next run."""
+def test_the_worst_bit_pattern_reaches_the_bound(n: int):
+    """In 0 00001111 0000 1111 ... each stuff bit begins the next run."""
     m = 34 + 8 * n
     worst = [0] + [(k // 4) % 2 for k in range(m - 1)]
     assert bare_bits(n) + stuff_bits(worst) == worst_case_bits(n)
 
 
-def test_the_figures_are_those_of_the_simulated_bus():
-    """Two formulas, written apart, for one wire."""
+def test_frame_lengths_agree_with_the_simulated_bus():
+    """Master and simulator compute them independently."""
     assert tuple(worst_case_bits(n) for n in range(9)) == SFF_BITS
     assert [worst_case_bits(n) for n in (0, 4, 6, 8)] == [55, 95, 115, 135]
 
@@ -89,7 +89,7 @@ def test_the_figures_are_those_of_the_simulated_bus():
 def test_eight_drives_take_two_buses_at_1_kHz():
     eight = bus_budget("one", 1_000_000, 1e-3, [(node, DRIVE) for node in range(1, 9)])
     assert eight.cycle_s == pytest.approx(1895e-6)
-    # statuswords and controlwords are of 16 bits, as torques are; positions are of 32
+    # statusword, controlword and torque have 16 bits, a position has 32
     assert eight.commands_s == pytest.approx(8 * 95e-6)
     assert eight.cycle_limit_Hz == pytest.approx(527.7, abs=0.05)
     assert not eight.fits
@@ -97,13 +97,13 @@ def test_eight_drives_take_two_buses_at_1_kHz():
     four = machine_budget(load_robot("spatial-8"))
     assert [budget.cycle_s for budget in four] == pytest.approx([975e-6] * 2)
     assert all(budget.fits for budget in four)
-    # 65 bits of 4 drives each 100 ms and of the master each 100 ms
+    # 4 drives and the master each send 65 bits every 100 ms
     assert four[0].heartbeat_share == pytest.approx((4 * 65 / 0.1 + 65 / 0.1) * 1e-6)
 
 
 @repeatable
 @given(st.integers(1, 30), st.sampled_from([125_000, 500_000, 1_000_000]))
-def test_the_highest_rate_is_where_it_stops_to_fit(n: int, bitrate: int):
+def test_the_highest_rate_just_fits(n: int, bitrate: int):
     drives = [(node, DRIVE) for node in range(1, n + 1)]
     highest = bus_budget("b", bitrate, 1e-2, drives).highest_rate_Hz
     at, above = (bus_budget("b", bitrate, 1 / (highest * f), drives) for f in (1.0, 1.001))
@@ -123,7 +123,7 @@ def test_event_driven_frames_count_by_priority():
     assert (waits.changes_s, pushes.changes_s) == (pytest.approx(125e-6), 0.0)
 
 
-def test_a_machine_that_does_not_fit_is_refused_with_the_figure():
+def test_a_machine_that_does_not_fit_is_rejected_with_its_highest_rate():
     robot = load_robot("spatial-8")
     require_fit(robot)
     with pytest.raises(
@@ -144,7 +144,7 @@ def run(*arguments: str) -> tuple[int, dict[str, object], str]:
     return done.returncode, json.loads(done.stdout.splitlines()[-1]), done.stderr
 
 
-def test_the_command_tells_and_refuses():
+def test_the_command_reports_the_budget_and_rejects_a_rate_that_does_not_fit():
     status, told, _ = run("spatial-8")
     assert (status, told["ok"]) == (0, True)
     assert [bus["cycle_us"] for bus in told["buses"]] == [975.0, 975.0]

@@ -1,4 +1,4 @@
-"""Error frames turned into a state and counts."""
+"""Error frames become a bus state and counts."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from cdpr_drivers.bus.health import ERR_FLAG
         (0x020, [], BusState.ACTIVE, 1, "no acknowledge"),
         (0x008 | 0x080, [], BusState.ACTIVE, 1, "protocol violation; bus error"),
         (0x004, [0, 0x01], BusState.ACTIVE, 1, "frames lost"),
-        (0x002, [], BusState.ACTIVE, 0, ""),  # lost arbitration is how a bus works
+        (0x002, [], BusState.ACTIVE, 0, ""),  # lost arbitration is normal
     ],
 )
 def test_error_frames_are_classified(
@@ -42,11 +42,11 @@ def test_a_bus_off_and_its_end_are_counted() -> None:
     assert health.counts() == {"bus_off": 1}
 
 
-def test_back_to_active_by_the_controllers_own_word() -> None:
+def test_only_the_controller_reports_the_return_to_active() -> None:
     health = BusHealth()
     health.take_error(0x004, bytes([0, 0x10]))
     health.take_error(0x080, b"")
-    assert health.state is BusState.PASSIVE  # a bus error alone changes no state
+    assert health.state is BusState.PASSIVE  # a bus error alone does not change the state
     assert health.take_error(0x004, bytes([0, 0x40]))
     assert health.state is BusState.ACTIVE
 

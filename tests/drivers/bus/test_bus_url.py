@@ -1,4 +1,4 @@
-"""Bus URLs."""
+"""Bus URLs are parsed, printed and rejected."""
 
 from __future__ import annotations
 
@@ -32,7 +32,9 @@ from cdpr_drivers.errors import BusError
         ),
     ],
 )
-def test_known_forms(text: str, interface: str, channel: str, options: dict[str, object]) -> None:
+def test_known_forms_are_parsed(
+    text: str, interface: str, channel: str, options: dict[str, object]
+) -> None:
     url = BusUrl.parse(text)
     assert (url.interface, url.channel, url.options) == (interface, channel, options)
     assert url.starts_own_simulator == (text == "simbus:")
@@ -55,7 +57,7 @@ def test_known_forms(text: str, interface: str, channel: str, options: dict[str,
         ("socketcand://host:99999/can0", "write it as socketcand://"),
     ],
 )
-def test_bad_urls_are_named(text: str, message: str) -> None:
+def test_error_for_an_invalid_url_quotes_it(text: str, message: str) -> None:
     with pytest.raises(BusError, match=message) as caught:
         BusUrl.parse(text)
     assert repr(text) in str(caught.value)

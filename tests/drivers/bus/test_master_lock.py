@@ -1,4 +1,4 @@
-"""One process of a machine runs the drives on a bus."""
+"""Only one process of a computer runs the drives on a bus."""
 
 from __future__ import annotations
 
@@ -43,13 +43,13 @@ def url() -> BusUrl:
     return BusUrl.parse(f"simbus:lock-{os.getpid()}-{uuid.uuid4().hex[:6]}")
 
 
-def test_the_second_is_refused_with_the_first_ones_process(url: BusUrl) -> None:
+def test_a_second_master_is_rejected_with_the_process_id_of_the_first(url: BusUrl) -> None:
     refuse_second_master(url)
     with held_elsewhere(str(url)) as process:
         for attempt in (MasterLock, refuse_second_master):
             with pytest.raises(BusError, match=f"process {process.pid} .*end that first"):
                 attempt(url)
-        process.kill()  # no chance to tidy up
+        process.kill()  # without cleaning up
         process.wait()
     with MasterLock(url), pytest.raises(BusError, match=f"process {os.getpid()} "):
         MasterLock(url)
@@ -57,7 +57,7 @@ def test_the_second_is_refused_with_the_first_ones_process(url: BusUrl) -> None:
     MasterLock(url).close()
 
 
-def test_buses_are_distinguished(url: BusUrl) -> None:
+def test_masters_on_different_buses_do_not_conflict(url: BusUrl) -> None:
     with MasterLock(url):
         other = BusUrl.parse(f"{url}-b")
         refuse_second_master(other)
@@ -65,7 +65,7 @@ def test_buses_are_distinguished(url: BusUrl) -> None:
             pass
 
 
-def test_one_wire_is_one_bus_however_it_is_written(tmp_path: Path) -> None:
+def test_different_urls_of_the_same_bus_conflict(tmp_path: Path) -> None:
     device, link = tmp_path / "ttyACM0", tmp_path / "by-id"
     link.symlink_to(device)
     pairs = [

@@ -28,14 +28,16 @@ def url(simulator: Any) -> BusUrl:
 
 @pytest.fixture
 def port(url: BusUrl) -> Iterator[FramePort]:
-    """A port that receives the answers to SYNC."""
+    """Yield a port that receives the answers to SYNC."""
     opened = open_port(url, [(0x180, 0x780)])
     opened.settimeout(60.0)
     yield opened
     opened.close()
 
 
-def test_one_cycle_over_the_simulated_bus(simulator: Any, port: FramePort) -> None:
+def test_a_port_exchanges_100_cycles_over_the_simulated_bus(
+    simulator: Any, port: FramePort
+) -> None:
     assert (port.status["mode"], port.status["nodes"]) == ("lockstep", [1])
     assert port.status["truth_log"] == "truth.bin"
     tx, rx = FrameBuffer(2), FrameBuffer(1)
@@ -52,7 +54,7 @@ def test_one_cycle_over_the_simulated_bus(simulator: Any, port: FramePort) -> No
     assert (status["sync_count"], status["frames"], status["dropped"]) == (100, 400, 0)
 
 
-def test_more_filters_than_one_control_message_holds(url: BusUrl) -> None:
+def test_filters_may_exceed_one_control_message(url: BusUrl) -> None:
     filters = [(EFF_FLAG | can_id, 0xFFFFFFFF) for can_id in range(100)] + [(0x281, 0x7FF)]
     port, other = open_port(url, filters), open_port(url, [])
     port.settimeout(60.0)
@@ -66,7 +68,7 @@ def test_more_filters_than_one_control_message_holds(url: BusUrl) -> None:
 
 
 @pytest.mark.parametrize("timeout_s", [0, 0.02, 0.2])
-def test_a_wait_ends_at_its_time_out(url: BusUrl, timeout_s: float) -> None:
+def test_a_wait_ends_at_its_timeout(url: BusUrl, timeout_s: float) -> None:
     port = open_port(url, [])
     port.settimeout(timeout_s)
     started = time.monotonic()
@@ -77,7 +79,7 @@ def test_a_wait_ends_at_its_time_out(url: BusUrl, timeout_s: float) -> None:
     port.close()
 
 
-def test_drain_throws_away_what_waits(simulator: Any, port: FramePort) -> None:
+def test_drain_discards_waiting_frames(simulator: Any, port: FramePort) -> None:
     for _ in range(7):
         port.send(frame(0x80))
     while query_status(simulator.name)["sync_count"] < 7:
@@ -98,7 +100,7 @@ def test_a_killed_simulator_is_noticed(simulator: Any, port: FramePort) -> None:
 
 
 def test_a_simulator_killed_with_frames_unread_is_noticed(simulator: Any) -> None:
-    """The kernel reports a connection whose other end left data unread as reset."""
+    """If the other end leaves data unread, the kernel reports the connection as reset."""
     port = open_port(BusUrl.parse(f"simbus:{simulator.name}"), [])
     port.settimeout(60.0)
     simulator.process.send_signal(19)
@@ -113,7 +115,7 @@ def test_a_simulator_killed_with_frames_unread_is_noticed(simulator: Any) -> Non
     port.close()
 
 
-def test_a_bus_that_is_not_there() -> None:
+def test_a_missing_bus_is_reported() -> None:
     with pytest.raises(BusError, match=r"no simulated bus of that name.*cdpr sim up"):
         open_port(BusUrl.parse("simbus:nobody-home"))
     with pytest.raises(BusError, match="simbus:nobody-home"):
@@ -124,7 +126,7 @@ def test_a_bus_that_is_not_there() -> None:
         open_port(BusUrl.parse("slcan:/dev/nothing?bitrate=1000000"))
 
 
-def test_a_bus_that_does_not_answer(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_bus_that_does_not_answer_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("cdpr_drivers.bus.simbus._ANSWER_TIMEOUT_S", 0.1)
     with socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as stuck:
         stuck.bind("\0cdpr-rt/simbus/stuck")
@@ -133,7 +135,7 @@ def test_a_bus_that_does_not_answer(monkeypatch: pytest.MonkeyPatch) -> None:
             query_status("stuck")
 
 
-def test_any_python_can_interface_gives_the_same_port() -> None:
+def test_a_python_can_interface_works_like_other_ports() -> None:
     port = open_port(BusUrl.parse("virtual:packed-port"), [(0x180, 0x780), (EFF_FLAG, EFF_FLAG)])
     port.settimeout(60.0)
     with can.Bus("packed-port", interface="virtual") as peer:
@@ -155,7 +157,7 @@ def test_any_python_can_interface_gives_the_same_port() -> None:
         for _ in range(3):
             peer.send(can.Message(arbitration_id=0x181, is_extended_id=False))
         deadline, drained = time.monotonic() + 60.0, 0
-        while drained < 3 and time.monotonic() < deadline:  # a thread of the port's passes them on
+        while drained < 3 and time.monotonic() < deadline:  # a thread of the port forwards them
             drained += port.drain()
         assert drained == 3
         port.settimeout(0.01)
@@ -167,7 +169,7 @@ def test_any_python_can_interface_gives_the_same_port() -> None:
         assert "gone away" in str(port.lost(caught.value))
 
 
-def test_frame_buffers_are_one_memory() -> None:
+def test_rows_and_array_of_a_frame_buffer_share_memory() -> None:
     buffer = FrameBuffer(3)
     buffer.rows[1][:] = frame(0x181 | EFF_FLAG, b"abc")
     assert buffer.array["can_id"].tolist() == [0, 0x181 | EFF_FLAG, 0]
@@ -176,7 +178,7 @@ def test_frame_buffers_are_one_memory() -> None:
     assert buffer.rows[2][4] == 8
 
 
-def test_the_cycle_calls_the_socket_itself(port: FramePort) -> None:
+def test_send_and_recv_into_are_methods_of_the_socket(port: FramePort) -> None:
     assert isinstance(getattr(port.send, "__self__", None), socket.socket)
     assert isinstance(getattr(port.recv_into, "__self__", None), socket.socket)
     assert Path(f"/proc/self/fd/{port.fileno()}").exists()
@@ -199,7 +201,7 @@ while True:
 
 @pytest.fixture(params=["001", "7FF"])
 def babbler(simulator: Any, request: pytest.FixtureRequest) -> Iterator[int]:
-    """A node that sends as fast as it can, with the highest or the lowest priority."""
+    """Run a node that sends as fast as it can, with the highest or the lowest priority."""
     process = subprocess.Popen(
         [sys.executable, "-c", BABBLER, simulator.name, request.param], stdout=subprocess.PIPE
     )
@@ -211,7 +213,7 @@ def babbler(simulator: Any, request: pytest.FixtureRequest) -> Iterator[int]:
 
 
 def test_a_babbling_node_does_not_reach_a_filtered_port(simulator: Any, babbler: int) -> None:
-    """Each cycle is answered, and what comes is only what was asked for."""
+    """Each cycle is answered, and only frames that pass the filter arrive."""
     port = open_port(BusUrl.parse(f"simbus:{simulator.name}"), [(0x181, 0x7FF)])
     port.settimeout(60.0)
     cycles = babbled = 0
@@ -233,7 +235,7 @@ N = 5
 
 
 class Pair:
-    """A port, and the other end of its socket."""
+    """A port and the other end of its socket."""
 
     def __init__(self, together: bool) -> None:
         near, self.far = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
@@ -275,7 +277,7 @@ def test_received_frames_keep_their_length(pair: Pair) -> None:
     assert pair.batch.receive() == 0
 
 
-def test_the_other_ends_leaving_is_a_length_of_zero(pair: Pair) -> None:
+def test_a_closed_peer_is_received_as_length_zero(pair: Pair) -> None:
     pair.port.settimeout(0.0)
     pair.far.send(bytes(16))
     pair.far.close()
@@ -284,14 +286,14 @@ def test_the_other_ends_leaving_is_a_length_of_zero(pair: Pair) -> None:
     assert pair.batch.lengths[last - 1] == 0
 
 
-def test_a_full_socket_is_reported_as_by_the_port(pair: Pair) -> None:
+def test_a_full_socket_raises_blocking_io_error(pair: Pair) -> None:
     pair.port.settimeout(0.0)
     with pytest.raises(BlockingIOError):
         while True:
             pair.sender.send()
 
 
-def test_a_closed_port_is_reported(pair: Pair) -> None:
+def test_a_batch_on_a_closed_port_raises_os_error(pair: Pair) -> None:
     pair.port.close()
     with pytest.raises(OSError, match="Bad file descriptor"):
         pair.batch.receive()

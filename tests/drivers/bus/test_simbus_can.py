@@ -1,4 +1,4 @@
-"""The python-can interface "simbus", driven by python-can's own tools."""
+"""The python-can interface "simbus", used through python-can."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ def test_filters_are_applied_and_can_change(simulator: Any) -> None:
         assert got.is_extended_id
 
 
-def test_the_stock_logger_in_another_process(simulator: Any) -> None:
+def test_python_cans_logger_records_all_frames(simulator: Any) -> None:
     command = [sys.executable, "-u", "-m", "can.logger", "-i", "simbus", "-c", simulator.name]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as logger:
         try:
@@ -108,6 +108,6 @@ def test_running_buses_are_found(simulator: Any) -> None:
     assert {"interface": "simbus", "channel": simulator.name} in list(found)
 
 
-def test_no_bus_is_one_clear_error() -> None:
+def test_a_missing_bus_is_reported_with_its_name() -> None:
     with pytest.raises(can.CanInitializationError, match="simbus:nobody-home"):
         can.Bus(interface="simbus", channel="nobody-home")

@@ -1,4 +1,4 @@
-"""What a leader takes in between two words on the time."""
+"""Frames that a leader receives and sends between two time packets."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def frame(identifier: int) -> bytes:
 
 
 class Led:
-    """A led bus, and the end of its socket at which the bus is played."""
+    """A led bus and the end of its socket where the test plays the bus."""
 
     def __init__(self) -> None:
         near, self.far = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
@@ -41,7 +41,7 @@ class Led:
         self.send(b"bus-time", now_s, *identifiers)
 
     def sent(self) -> list[bytes]:
-        """Return the packets that have come at the bus."""
+        """Return the packets that the bus has received."""
         packets = []
         self.far.setblocking(False)
         while True:
@@ -59,7 +59,7 @@ def led() -> Iterator[Led]:
     led.far.close()
 
 
-def test_frames_up_to_the_time_are_taken_in(led: Led) -> None:
+def test_frames_of_a_time_packet_are_received_with_it(led: Led) -> None:
     led.time(0.5, 1, 2)
     assert led.bus.receive_until_time()
     assert (led.taken, led.bus.now_s, led.bus.next_s) == ([1, 2], 0.5, 1.5)
@@ -67,7 +67,7 @@ def test_frames_up_to_the_time_are_taken_in(led: Led) -> None:
     assert not led.bus.receive_until_time()
 
 
-def test_more_than_one_packet_takes_come_before_the_time(led: Led) -> None:
+def test_data_packets_are_received_before_the_time_packet(led: Led) -> None:
     led.send(b"bus-data", 0.0, *range(128))
     led.time(0.5, 128)
     led.time(0.6, 129)
@@ -78,14 +78,14 @@ def test_more_than_one_packet_takes_come_before_the_time(led: Led) -> None:
 
 
 def commands(led: Led, n: int) -> tuple[Batch, FrameBuffer, bytes]:
-    """Return a batch of n frames, their buffer, and the frames as they go out."""
+    """Return a batch of n frames, their buffer, and the frames as sent."""
     buffer = FrameBuffer(n)
     for k, row in enumerate(buffer.rows):
         row[:] = frame(0x200 + k)
     return led.port.batch(buffer), buffer, b"".join(map(bytes, buffer.rows))
 
 
-def test_commands_go_in_one_packet(led: Led) -> None:
+def test_two_to_26_commands_are_sent_in_one_packet(led: Led) -> None:
     for n in (2, 4, 26):
         batch, _, frames = commands(led, n)
         batch.send()
@@ -93,14 +93,14 @@ def test_commands_go_in_one_packet(led: Led) -> None:
 
 
 @pytest.mark.parametrize("n", [1, 27])
-def test_a_command_alone_and_too_many_for_a_packet_go_one_by_one(led: Led, n: int) -> None:
+def test_a_single_command_or_more_than_26_are_sent_one_by_one(led: Led, n: int) -> None:
     batch, _, frames = commands(led, n)
     batch.send()
     assert led.sent() == [frames[at : at + 16] for at in range(0, len(frames), 16)]
 
 
 @pytest.mark.parametrize("packet", [b"", bytes(24), bytes(20)], ids=["gone", "24", "20"])
-def test_an_invalid_mode_ends_the_bus(led: Led, packet: bytes) -> None:
+def test_an_invalid_packet_ends_the_bus(led: Led, packet: bytes) -> None:
     if packet:
         led.far.send(packet)
     else:

@@ -1,4 +1,4 @@
-"""A master that leads simulated buses: bus time is what it waits for, whatever wall time does."""
+"""A master that leads simulated buses waits in bus time, independent of wall-clock time."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ Process = subprocess.Popen[bytes]
 
 
 def _session(bus: str, disturb: Callable[[], None]) -> tuple[BusLog, list[float]]:
-    """Boot, drive while tasks read objects, stop; return the bus' frames and what was measured."""
+    """Boot, drive while tasks read objects, and stop. Return the frames and the measured values."""
     measured: list[float] = []
     with logged(bus) as log, open_network(bus, NODES) as network:
         clock = network.clock
@@ -62,7 +62,7 @@ def _session(bus: str, disturb: Callable[[], None]) -> tuple[BusLog, list[float]
     return log, measured
 
 
-def test_the_same_run_is_the_same_frames_however_either_process_is_held_up() -> None:
+def test_a_repeated_run_gives_the_same_frames_although_processes_are_delayed() -> None:
     seed = 4711
     print(f"seed {seed}")
     rng = random.Random(seed)
@@ -73,9 +73,9 @@ def test_the_same_run_is_the_same_frames_however_either_process_is_held_up() -> 
         def disturb(process: Process = simulator.process, held_up: bool = held_up) -> None:
             if not held_up:
                 return
-            time.sleep(0.1 * rng.random())  # we are late
+            time.sleep(0.1 * rng.random())  # the master is late
             process.send_signal(signal.SIGSTOP)
-            # and so is the simulator, while we go on
+            # the simulator is late while the master continues
             threading.Timer(0.7 * rng.random(), process.send_signal, [signal.SIGCONT]).start()
 
         try:
@@ -90,7 +90,7 @@ def test_the_same_run_is_the_same_frames_however_either_process_is_held_up() -> 
     assert figures[0] == figures[1]
 
 
-def test_time_out_of_a_silent_node_is_bus_time_and_no_wall_time(bus: str) -> None:
+def test_timeout_of_a_silent_node_is_in_bus_time(bus: str) -> None:
     with open_network(bus, [9]) as network:
         begin_s, began = network.clock.now_s, time.monotonic()
         for _ in range(20):
@@ -100,7 +100,7 @@ def test_time_out_of_a_silent_node_is_bus_time_and_no_wall_time(bus: str) -> Non
         assert time.monotonic() - began < 10.0
 
 
-def test_a_bus_has_one_leader_and_then_the_next(bus: str) -> None:
+def test_a_bus_has_one_leader_at_a_time(bus: str) -> None:
     url = BusUrl.parse(bus)
     with closing(open_clock([url])) as clock:
         assert isinstance(clock, SimulatedBusClock)
@@ -109,12 +109,12 @@ def test_a_bus_has_one_leader_and_then_the_next(bus: str) -> None:
     time.sleep(0.05)
     with closing(open_clock([url])) as clock:
         assert isinstance(clock, SimulatedBusClock)
-        assert clock.now_s == before_s + 0.01  # it was given back in order
+        assert clock.now_s == before_s + 0.01  # the first leader released it properly
     assert isinstance(open_clock([BusUrl.parse("simbus:nobody-here")]), PacedClock)
     assert isinstance(open_clock([]), PacedClock)
 
 
-def test_all_buses_of_a_robot_stand_at_one_instant() -> None:
+def test_all_buses_of_a_robot_have_the_same_time() -> None:
     rng = random.Random(7)
     with ExitStack() as stack:
         simulators = [start_simulator() for _ in range(3)]
@@ -140,7 +140,7 @@ def test_all_buses_of_a_robot_stand_at_one_instant() -> None:
 
 
 @pytest.mark.parametrize("while_waiting", [False, True])
-def test_a_killed_simulator_ends_what_waits_and_time_goes_on(while_waiting: bool) -> None:
+def test_a_killed_simulator_ends_waits_and_time_continues(while_waiting: bool) -> None:
     simulator = start_simulator()
     try:
         with open_network(simulator.bus, [1]) as network:
@@ -164,7 +164,7 @@ def test_a_killed_simulator_ends_what_waits_and_time_goes_on(while_waiting: bool
         simulator.stop()
 
 
-def test_time_does_not_go_back_when_the_bus_dies_between_two_cycles() -> None:
+def test_time_does_not_go_backwards_when_the_bus_dies_between_two_cycles() -> None:
     simulator = start_simulator()
     try:
         with open_network(simulator.bus, [1]) as network:
@@ -184,7 +184,7 @@ def test_time_does_not_go_back_when_the_bus_dies_between_two_cycles() -> None:
         simulator.stop()
 
 
-def test_a_bus_that_comes_back_is_led_again_and_time_goes_on() -> None:
+def test_a_restarted_bus_is_led_again_and_time_continues() -> None:
     simulator = start_simulator()
     url = BusUrl.parse(simulator.bus)
     with closing(open_clock([url])) as clock:
@@ -206,7 +206,7 @@ def test_a_bus_that_comes_back_is_led_again_and_time_goes_on() -> None:
     simulator.stop()
 
 
-def test_a_cycle_is_a_period_where_the_drives_have_forgotten_it(bus: str) -> None:
+def test_a_cycle_lasts_one_period_after_the_drives_restarted(bus: str) -> None:
     with open_network(bus, [1]) as network:
         rig = Rig(bus, network, DRIVE, [1])
         rig.enable()
@@ -221,7 +221,7 @@ def test_a_cycle_is_a_period_where_the_drives_have_forgotten_it(bus: str) -> Non
 
 
 def test_several_users_of_one_bus_share_its_clock(bus: str) -> None:
-    """The second one has a port of its own, and waits as the first one does."""
+    """The second network has a separate port and waits with the same clock."""
     with open_network(bus, [1]) as network:
         url, clock = BusUrl.parse(bus), network.clock
         assert isinstance(clock, LockstepClock)
@@ -234,13 +234,13 @@ def test_several_users_of_one_bus_share_its_clock(bus: str) -> None:
         assert network.read_int(1, 0x1000) == 0x00020192
 
 
-def test_frames_under_way_when_a_port_is_handed_on_do_not_come_in(bus: str) -> None:
+def test_frames_in_flight_are_not_received_by_the_next_user_of_a_port(bus: str) -> None:
     url = BusUrl.parse(bus)
     with closing(open_clock([url])) as clock:
         for _ in range(3):
             network = CanNetwork(url, clock, [1], MASTER, HEARTBEAT_S)
             network.add_node(1, dictionary(1))
-            network.send(0, bytes([129, 1]))  # its boot-up is under way
+            network.send(0, bytes([129, 1]))  # the boot-up message is in flight
             network.close()
             other = CanNetwork(url, clock, [1], MASTER, HEARTBEAT_S)
             other.add_node(1, dictionary(1))

@@ -1,4 +1,4 @@
-"""Every back-end that can be tried here behind the one interface, and what it says when it ends."""
+"""Folders, videos, streams and simulated cameras behind one interface, and their errors."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def test_a_folder_is_read_in_the_order_of_its_numbers(tmp_path: Path) -> None:
     assert names == [f"{k + 1}.png" for k in range(12)]
 
 
-def test_a_video_is_a_camera_for_opencv_and_its_end_is_reported(tmp_path: Path) -> None:
+def test_a_video_is_read_by_opencv_and_its_end_is_reported(tmp_path: Path) -> None:
     path = tmp_path / "video.avi"
     writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"MJPG"), 10.0, (80, 64))
     for level in (40, 200):
@@ -76,7 +76,7 @@ def test_a_camera_that_cannot_be_opened_is_reported(url: str, said: str) -> None
         open_camera(url, LockstepClock())
 
 
-def test_a_library_that_is_missing_is_named_with_its_extra() -> None:
+def test_error_for_a_missing_library_names_its_extra() -> None:
     with (
         mock.patch.dict(sys.modules, {"harvesters": None, "harvesters.core": None}),
         pytest.raises(CameraError, match=r"pip install 'cdpr-rt\[genicam\]'"),
@@ -84,7 +84,7 @@ def test_a_library_that_is_missing_is_named_with_its_extra() -> None:
         open_camera("genicam:/opt/some.cti", LockstepClock())
 
 
-def test_an_image_that_is_none_is_named(tmp_path: Path) -> None:
+def test_error_for_an_invalid_image_names_its_file(tmp_path: Path) -> None:
     (tmp_path / "1.png").write_bytes(b"not a picture")
     with (
         open_camera(f"folder:{tmp_path}", LockstepClock()) as camera,
@@ -96,7 +96,9 @@ def test_an_image_that_is_none_is_named(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("bits", [8, 10, 12, 16])
-def test_files_of_16_bits_give_the_8_upper_ones_in_use(tmp_path: Path, bits: int) -> None:
+def test_images_of_up_to_16_bits_are_reduced_to_their_upper_8_bits(
+    tmp_path: Path, bits: int
+) -> None:
     pixels = np.linspace(0, (1 << bits) - 1, 80 * 64).reshape(64, 80).astype(np.uint16)
     cv2.imwrite(str(tmp_path / "1.png"), np.tile(pixels, (4, 4)))
     defective = np.tile(pixels, (4, 4))
@@ -110,7 +112,7 @@ def test_files_of_16_bits_give_the_8_upper_ones_in_use(tmp_path: Path, bits: int
     assert (other.pixels != expected).sum() <= 1 and other.pixels[100, 100] == 255
 
 
-def test_a_dark_image_of_16_bits_stays_dark_beside_bright_ones(tmp_path: Path) -> None:
+def test_a_dark_16_bit_image_stays_dark_after_a_bright_one(tmp_path: Path) -> None:
     pixels = np.linspace(0, 4095, 80 * 64).reshape(64, 80).astype(np.uint16)
     for name, share in (("1", 16), ("2", 1), ("4", 16)):
         cv2.imwrite(str(tmp_path / f"{name}.png"), pixels // share)
@@ -126,14 +128,16 @@ def test_a_dark_image_of_16_bits_stays_dark_beside_bright_ones(tmp_path: Path) -
     assert last is not None and last.pixels.max() == 15
 
 
-def test_how_a_telephone_was_held_does_not_turn_what_its_sensor_saw(tmp_path: Path) -> None:
+def test_the_exif_orientation_of_an_image_is_ignored(tmp_path: Path) -> None:
     _, coded = cv2.imencode(".jpg", np.full((64, 80, 3), 90, np.uint8))
     turned = b"Exif\0\0MM\0*\0\0\0\x08\0\x01\x01\x12\0\x03\0\0\0\x01\0\x06\0\0\0\0\0\0"
     data = coded.tobytes()
     marked = data[:2] + b"\xff\xe1" + (len(turned) + 2).to_bytes(2, "big") + turned + data[2:]
     assert cv2.imdecode(np.frombuffer(marked, np.uint8), cv2.IMREAD_COLOR).shape[:2] == (80, 64)
     (tmp_path / "1.jpg").write_bytes(marked)
-    cv2.imwrite(str(tmp_path / "2.png"), np.full((64, 80, 4), 90, np.uint8))  # with transparency
+    cv2.imwrite(
+        str(tmp_path / "2.png"), np.full((64, 80, 4), 90, np.uint8)
+    )  # with an alpha channel
     cv2.imwrite(str(tmp_path / "3.tif"), np.full((64, 80), 0.5, np.float32))
     with open_camera(f"folder:{tmp_path}", LockstepClock()) as camera:
         for _ in range(2):
@@ -145,7 +149,7 @@ def test_how_a_telephone_was_held_does_not_turn_what_its_sensor_saw(tmp_path: Pa
 
 
 class Stream:
-    """Stands for cv2.VideoCapture on a stream: five images wait, each further comes in 40 ms."""
+    """Stand-in for cv2.VideoCapture on a stream: five images wait, each further one takes 40 ms."""
 
     def __init__(self) -> None:
         self.now_s, self._taken = 0.0, 0
@@ -167,7 +171,7 @@ def test_buffered_frames_are_not_used_as_current_images() -> None:
         assert OpencvCamera("rtsp://10.0.0.9/stream", stream).grab().pixels[0, 0] > 5
 
 
-def test_an_image_that_is_too_large_is_named(tmp_path: Path) -> None:
+def test_error_for_a_too_large_image_names_its_file(tmp_path: Path) -> None:
     write_images(tmp_path, 1)
     with (
         mock.patch.object(cv2, "imdecode", side_effect=cv2.error("too many pixels")),
@@ -178,7 +182,7 @@ def test_an_image_that_is_too_large_is_named(tmp_path: Path) -> None:
 
 
 class Told(io.StringIO):
-    """Standard output of the server; its first line says that it can be reached."""
+    """Standard output of the server. Its first line shows that the server is ready."""
 
     def __init__(self, ready: Event) -> None:
         super().__init__()
@@ -195,7 +199,7 @@ def serve(board: Path, path: Path, ready: Event) -> None:
         CameraServer(SimCamera(TINY), shared.platform, path).serve(False, {})
 
 
-def test_a_simulated_camera_shows_the_boards_platform_until_it_is_unplugged(tmp_path: Path) -> None:
+def test_a_simulated_camera_shows_the_platform_until_it_is_unplugged(tmp_path: Path) -> None:
     path = tmp_path / "camera"
     with PhysicsBoard.create(tmp_path / "board", 3) as board:
         platform = board.platform
@@ -203,7 +207,9 @@ def test_a_simulated_camera_shows_the_boards_platform_until_it_is_unplugged(tmp_
         state = PlatformState(2.5, (0.0, 0.1, 1.5), LEVEL, (0.0,) * 3, (0.0,) * 3)
         platform.publish(state)
         assert platform.state() == state
-        context = multiprocessing.get_context("spawn")  # a fork beside OpenCV's threads may hang
+        context = multiprocessing.get_context(
+            "spawn"
+        )  # a fork could hang because OpenCV runs threads
         ready = context.Event()
         server = context.Process(target=serve, args=(tmp_path / "board", path, ready))
         server.start()

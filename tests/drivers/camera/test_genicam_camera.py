@@ -1,6 +1,6 @@
-"""Industrial cameras without one: a stand-in for harvesters, and its own producer if it is there.
+"""Industrial cameras without hardware: a stand-in for harvesters, and genicam's test producer.
 
-`FakeHarvester` is written against the interface of harvesters 1.4: it has its names, nothing more.
+`FakeHarvester` has the names of the interface of harvesters 1.4, nothing more.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from cdpr_rt.core.clock import LockstepClock
 
 RED, GREEN, BLUE = 200, 100, 20
 GREY = 121
-"""Of these three, by ITU-R BT.601."""
+"""Grey level of the red, green and blue levels above, by ITU-R BT.601."""
 
 
 def plain(*levels: int) -> NDArray[np.uint8]:
@@ -34,7 +34,7 @@ def mosaic(rows: tuple[tuple[int, int], tuple[int, int]]) -> NDArray[np.uint8]:
 
 
 class FakeHarvester:
-    """A producer with the cameras of `serials`, the first of which gives `pixels`."""
+    """A producer with the cameras in `serials`. The first one delivers `pixels`."""
 
     serials = ("77",)
     pixels: NDArray[Any] = plain(90)
@@ -156,7 +156,7 @@ def test_pixel_formats_become_grey_levels(
     assert harvester.called[1:] == ["create {'serial_number': '77'}", "start", *ends]
 
 
-def test_without_a_trigger_the_image_that_was_there_before_is_not_taken(
+def test_an_old_image_of_a_camera_without_trigger_is_discarded(
     tmp_path: Path, harvester: type[FakeHarvester]
 ) -> None:
     harvester.triggered, harvester.stamp_ns = False, None
@@ -174,7 +174,7 @@ def test_without_a_trigger_the_image_that_was_there_before_is_not_taken(
         ({"open_fails": RuntimeError("access denied")}, "access denied; is it used by another"),
     ],
 )
-def test_a_camera_that_cannot_be_opened_is_reported_and_the_producer_let_go(
+def test_a_camera_that_cannot_be_opened_is_reported_and_its_producer_released(
     tmp_path: Path, harvester: type[FakeHarvester], state: dict[str, Any], said: str
 ) -> None:
     for key, value in state.items():
@@ -197,7 +197,7 @@ def test_a_camera_that_cannot_be_opened_is_reported_and_the_producer_let_go(
         ),
     ],
 )
-def test_an_image_that_does_not_come_is_reported(
+def test_a_missing_image_is_reported(
     tmp_path: Path, harvester: type[FakeHarvester], state: dict[str, Any], said: str
 ) -> None:
     with opened(tmp_path) as camera:
@@ -207,7 +207,7 @@ def test_an_image_that_does_not_come_is_reported(
             camera.grab()
 
 
-def test_an_incomplete_image_of_before_is_reported_no_less(
+def test_an_incomplete_old_image_is_reported(
     tmp_path: Path, harvester: type[FakeHarvester]
 ) -> None:
     harvester.triggered, harvester.incomplete = False, True
@@ -218,13 +218,13 @@ def test_an_incomplete_image_of_before_is_reported_no_less(
         camera.grab()
 
 
-def test_a_producer_that_is_no_file_is_reported(harvester: type[FakeHarvester]) -> None:
+def test_a_missing_producer_file_is_reported(harvester: type[FakeHarvester]) -> None:
     with pytest.raises(CameraError, match=r"no file /nowhere\.cti; it is the GenTL producer"):
         open_camera("genicam:/nowhere.cti", LockstepClock())
 
 
-# an extra that the lock file leaves out: its binaries are under a licence of their own and not made
-# for every Python; what the driver does with them is tested above without
+# This extra is not in the lock file: its binaries have a different licence and do not exist for
+# each Python version. The tests above do not need it.
 @pytest.mark.skipif(find_spec("genicam") is None, reason="needs cdpr-rt[genicam]")
 def test_the_simulated_cameras_of_the_librarys_own_producer_give_images() -> None:
     folder = Path(str(importlib.import_module("genicam").__file__)).parent

@@ -1,4 +1,4 @@
-"""A device on the simulated bus that answers as a test wants, through python-can."""
+"""A device on the simulated bus that answers as a test defines, through python-can."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ Answer = Callable[[bytes], list[bytes]]
 
 
 class ScriptedNode:
-    """Answers each SDO request with what `answer` returns; keeps the requests."""
+    """Answer each SDO request with the frames that `answer` returns, and keep the requests."""
 
     def __init__(self, bus: str, node_id: int, answer: Answer) -> None:
         self.node_id = node_id

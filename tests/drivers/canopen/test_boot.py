@@ -1,4 +1,4 @@
-"""Booting simulated drives: each way it can fail, and what is left alone when nothing differs."""
+"""Booting simulated drives: each failure, and the configuration that is written or kept."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def _boot_fails(
         ("N", "revision", "00010000h"),
     ],
 )
-def test_another_identity_is_refused_with_both_values(
+def test_error_for_a_wrong_identity_shows_both_values(
     bus: str, letter: str, field: str, found: str
 ) -> None:
     error = _boot_fails(bus, DRIVE.model_copy(update={field: 0x1234}))
@@ -53,18 +53,18 @@ def test_another_identity_is_refused_with_both_values(
     assert "00001234h" in str(error)
 
 
-def test_a_profile_bound_to_one_device_refuses_another(bus: str) -> None:
+def test_a_profile_with_serial_number_rejects_another_device(bus: str) -> None:
     assert _boot_fails(bus, DRIVE.model_copy(update={"serial": 0x1234})).letter == "O"
 
 
-def test_no_answer_is_step_b(bus: str) -> None:
+def test_a_missing_answer_fails_step_b(bus: str) -> None:
     error = _boot_fails(bus, node=9)
     assert error.letter == "B"
     assert "node 9" in str(error)
     assert "wiring" in str(error)
 
 
-def test_a_mute_drive_is_step_k(rig: Rig, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_drive_without_heartbeat_fails_step_k(rig: Rig, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("cdpr_drivers.canopen.boot._HEARTBEAT_MARGIN_S", 0.2)
     rig.misbehave(5, 1)
     with pytest.raises(BootError) as caught:
@@ -72,15 +72,15 @@ def test_a_mute_drive_is_step_k(rig: Rig, monkeypatch: pytest.MonkeyPatch) -> No
     assert caught.value.letter == "K"
 
 
-def test_a_drive_that_somebody_drives_is_step_l(rig: Rig) -> None:
+def test_a_drive_enabled_by_another_master_fails_step_l_undisturbed(rig: Rig) -> None:
     rig.enable()
     error = _boot_fails(rig.bus)
     assert error.letter == "L"
     rig.run(0.01)
-    assert rig.group.reached(State.OPERATION_ENABLED)  # it was not disturbed
+    assert rig.group.reached(State.OPERATION_ENABLED)
 
 
-def test_another_master_is_step_l(bus: str) -> None:
+def test_the_heartbeat_of_another_master_fails_step_l(bus: str) -> None:
     with (
         open_network(bus, [1], lead=False) as network,
         can.Bus(interface="simbus", channel=bus[7:]) as other,
@@ -91,8 +91,8 @@ def test_another_master_is_step_l(bus: str) -> None:
     assert caught.value.letter == "L"
 
 
-def test_another_masters_sync_is_step_l_before_anything_is_sent(bus: str) -> None:
-    """One without heartbeat, or with another node id."""
+def test_the_sync_of_another_master_fails_step_l_before_anything_is_sent(bus: str) -> None:
+    """The other master has no heartbeat or a different node id."""
     stop = threading.Event()
     with can.Bus(interface="simbus", channel=bus[7:]) as other, logged(bus) as log:
 
@@ -112,7 +112,7 @@ def test_another_masters_sync_is_step_l_before_anything_is_sent(bus: str) -> Non
     assert "another master's SYNC is on the bus" in str(error)
 
 
-def test_an_object_that_cannot_be_mapped_is_step_j(bus: str) -> None:
+def test_an_object_that_cannot_be_mapped_fails_step_j(bus: str) -> None:
     entries = (
         *DRIVE.rpdos[0].entries[:1],
         DRIVE.rpdos[0].entries[1].model_copy(update={"index": 0x1008}),
@@ -123,18 +123,18 @@ def test_an_object_that_cannot_be_mapped_is_step_j(bus: str) -> None:
     assert "1600h:2" in str(error)
 
 
-def test_another_rated_torque_is_step_j_with_both_values(bus: str) -> None:
+def test_a_different_rated_torque_fails_step_j_with_both_values(bus: str) -> None:
     error = _boot_fails(bus, rated_torque_Nm=2.4)
     assert error.letter == "J"
     assert "3 Nm" in str(error)
     assert "2.4 Nm" in str(error)
 
 
-def test_configuration_is_written_only_where_it_differs(bus: str) -> None:
+def test_only_differing_objects_are_written(bus: str) -> None:
     with open_network(bus, [1]) as network:
         first = boot(network, 1, DRIVE, SETTINGS)
         again = boot(network, 1, DRIVE, SETTINGS)
-        # 6072h is no communication object: the reset keeps it
+        # 6072h is not a communication object: the reset keeps it
         assert "6072h:0" not in " ".join(again.changed)
         assert {c.split(":")[0] for c in again.changed} == {
             "1006h",
@@ -152,7 +152,7 @@ def test_configuration_is_written_only_where_it_differs(bus: str) -> None:
     assert first.device_name
 
 
-def test_a_pdo_is_remapped_and_an_unwanted_one_switched_off(bus: str) -> None:
+def test_a_pdo_is_remapped_and_an_unused_one_is_disabled(bus: str) -> None:
     entries = tuple(reversed(DRIVE.tpdos[0].entries))
     tpdo = DRIVE.tpdos[0].model_copy(update={"entries": entries})
     profile = DRIVE.model_copy(update={"tpdos": (tpdo,)})
@@ -181,14 +181,14 @@ def test_eight_drives_boot_at_the_same_time() -> None:
         simulator.stop()
 
 
-def test_of_several_failures_all_are_reported(bus: str) -> None:
+def test_all_boot_failures_are_reported_together(bus: str) -> None:
     with open_network(bus, [1, 8, 9]) as network, pytest.raises(BootError) as caught:
         boot_all(network, dict.fromkeys([1, 8, 9], (DRIVE, SETTINGS)))
     assert caught.value.node_id == 8
     assert any("node 9" in note for note in caught.value.__notes__)
 
 
-def test_a_bus_that_nobody_runs_is_reported_by_name() -> None:
+def test_error_for_a_missing_bus_names_it() -> None:
     with pytest.raises(BusError, match="nobody-here"):
         url = BusUrl.parse("simbus:nobody-here")
         CanNetwork(url, open_clock([url]), [1], MASTER, HEARTBEAT_S)

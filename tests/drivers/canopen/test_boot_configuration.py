@@ -1,4 +1,4 @@
-"""The configuration of a drive: the one list, its stamp in 1020h, storing, and what is skipped."""
+"""The configuration of a drive: its list of objects, its stamp in 1020h, and storing."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from tests.drivers.axis_rig import DRIVE, MASTER, SETTINGS, dictionary, open_net
 def network(bus: str) -> Iterator[CanNetwork]:
     with open_network(bus, [1]) as opened:
         yield opened
-        opened.write(1, 0x1011, 1, int.from_bytes(b"load", "little"))  # what is stored goes
+        opened.write(1, 0x1011, 1, int.from_bytes(b"load", "little"))  # erase what is stored
 
 
 def _wanted(profile: DriveProfile = DRIVE, **want: float) -> Configuration:
@@ -37,7 +37,7 @@ def _boot(network: CanNetwork, profile: DriveProfile = DRIVE, store: bool = Fals
 
 
 class _Requests:
-    """Counts SDO requests."""
+    """Record SDO requests."""
 
     def __init__(self, network: CanNetwork, monkeypatch: pytest.MonkeyPatch) -> None:
         self.reads: list[tuple[int, int]] = []
@@ -59,7 +59,7 @@ class _Requests:
 # -- the list
 
 
-def test_the_list_holds_profile_and_settings_in_the_order_of_the_standard() -> None:
+def test_the_list_has_profile_and_settings_in_the_order_of_the_standard() -> None:
     wanted = _wanted()
     values = {(e.index, e.sub): e.value for e in wanted.entries}
     assert values[0x1006, 0] == 1000
@@ -96,7 +96,7 @@ def test_settings_invalid_by_the_eds_are_reported_before_anything_is_sent() -> N
         _wanted(DRIVE.model_copy(update={"tpdos": (tpdo,)}))
 
 
-def test_the_drives_own_bits_of_a_cob_id_are_no_difference() -> None:
+def test_bits_of_a_cob_id_that_the_drive_sets_do_not_count_as_difference() -> None:
     enabled = [e for e in _wanted().entries if (e.index, e.sub) == (0x1800, 1)][-1]
     assert matches(enabled, 0x181)
     assert matches(enabled, 0x4000_0181)
@@ -107,7 +107,7 @@ def test_the_drives_own_bits_of_a_cob_id_are_no_difference() -> None:
 # -- the stamp
 
 
-def test_after_a_download_1020h_holds_the_stamp(network: CanNetwork) -> None:
+def test_1020h_contains_the_stamp_after_a_download(network: CanNetwork) -> None:
     report = _boot(network)
     assert not report.stamp_matched
     assert not report.stored
@@ -115,7 +115,9 @@ def test_after_a_download_1020h_holds_the_stamp(network: CanNetwork) -> None:
     assert network.read_int(1, 0x1A00, 0) == 3
 
 
-def test_without_storing_the_next_boot_compares_again(network: CanNetwork) -> None:
+def test_a_configuration_that_is_not_stored_is_compared_at_the_next_boot(
+    network: CanNetwork,
+) -> None:
     _boot(network)
     assert not _boot(network).stamp_matched
 
@@ -134,19 +136,21 @@ def test_a_stored_configuration_is_not_compared_again(
     assert again.changed == []
     assert requests.writes == []
     assert not [key for key in requests.reads if 0x1400 <= key[0] < 0x1C00]
-    # and it is the wanted one
+    # it is the wanted configuration
     assert network.read_int(1, 0x1017) == 100
     assert network.read_int(1, 0x1800, 1) & 0xBFFFFFFF == 0x181
 
 
-def test_another_configuration_is_downloaded_and_the_difference_told(network: CanNetwork) -> None:
+def test_a_different_configuration_is_downloaded_and_the_changes_reported(
+    network: CanNetwork,
+) -> None:
     _boot(network, store=True)
     report = _boot(network, DRIVE.model_copy(update={"heartbeat_producer_s": 0.2}))
     assert not report.stamp_matched
     assert report.changed == ["1017h:0 = 200"]
 
 
-def test_a_limit_changed_by_hand_is_found_though_the_stamp_was_stored(
+def test_a_limit_changed_by_hand_is_corrected_although_the_stamp_was_stored(
     network: CanNetwork,
 ) -> None:
     _boot(network, store=True)
@@ -156,7 +160,7 @@ def test_a_limit_changed_by_hand_is_found_though_the_stamp_was_stored(
     assert network.read_int(1, 0x6072) == 1000
 
 
-def test_a_forged_stamp_does_not_hide_a_changed_limit(network: CanNetwork) -> None:
+def test_a_changed_limit_is_corrected_although_the_stamp_matches(network: CanNetwork) -> None:
     _boot(network)
     network.write(1, 0x6072, 0, 4000)
     stamp = _wanted().stamp()
@@ -169,7 +173,7 @@ def test_a_forged_stamp_does_not_hide_a_changed_limit(network: CanNetwork) -> No
     assert read_stamp(network, 1) == stamp
 
 
-def test_a_drive_without_1020h_is_compared_each_time(network: CanNetwork, bus: str) -> None:
+def test_a_drive_without_1020h_is_compared_at_each_boot(network: CanNetwork, bus: str) -> None:
     lean = dictionary(1)
     del lean[0x1020]
     network.add_node(1, lean)
@@ -179,18 +183,18 @@ def test_a_drive_without_1020h_is_compared_each_time(network: CanNetwork, bus: s
     assert again.changed == []
 
 
-def test_a_drive_that_cannot_store_is_step_j(
+def test_a_drive_that_cannot_store_fails_step_j(
     network: CanNetwork, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(
         "cdpr_drivers.canopen.configuration._SAVE", 0x12345678
-    )  # a signature it does not take
+    )  # a signature that the drive rejects
     with pytest.raises(BootError, match=r"step J.*stored.*1010h:1.*0800002") as caught:
         _boot(network, store=True)
     assert caught.value.letter == "J"
 
 
-def test_an_unused_stamp_is_none(network: CanNetwork) -> None:
+def test_read_stamp_returns_none_if_1020h_is_unused(network: CanNetwork) -> None:
     assert read_stamp(network, 1) is None
     network.write(1, 0x1020, 1, 5)
     assert read_stamp(network, 1) == Stamp(5, 0)

@@ -1,4 +1,4 @@
-"""Booting several nodes: optional ones, what is started when, and two devices with one id."""
+"""Booting several nodes: optional nodes, the order of starting, and duplicate node ids."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ OPTIONAL = replace(SETTINGS, mandatory=False)
 WRONG = DRIVE.model_copy(update={"product_code": 0x1234})
 
 
-def test_an_optional_node_that_is_missing_is_reported_and_nothing_else(bus: str) -> None:
+def test_a_missing_optional_node_is_reported_and_the_others_start(bus: str) -> None:
     drives = {1: (DRIVE, SETTINGS), 2: (DRIVE, OPTIONAL), 9: (DRIVE, OPTIONAL)}
     with open_network(bus, [1, 2, 9]) as network:
         reports = boot_all(network, drives)
@@ -35,7 +35,7 @@ def test_an_optional_node_that_is_missing_is_reported_and_nothing_else(bus: str)
         assert network.alarm_text == ""
 
 
-def test_an_optional_node_that_is_another_device_is_not_started(bus: str) -> None:
+def test_an_optional_node_with_a_wrong_identity_is_not_started(bus: str) -> None:
     with open_network(bus, [1, 2]) as network:
         reports = boot_all(network, {1: (DRIVE, SETTINGS), 2: (WRONG, OPTIONAL)})
         assert reports.missing[2].letter == "M"
@@ -44,7 +44,7 @@ def test_an_optional_node_that_is_another_device_is_not_started(bus: str) -> Non
         assert network.wait_for_heartbeat(1, 2.0) == 5
 
 
-def test_nobody_is_started_when_a_mandatory_node_fails(bus: str) -> None:
+def test_no_node_is_started_when_a_mandatory_node_fails(bus: str) -> None:
     with open_network(bus, [1, 2]) as network:
         with pytest.raises(BootError) as caught:
             boot_all(network, {1: (DRIVE, SETTINGS), 2: (WRONG, SETTINGS)})
@@ -52,13 +52,13 @@ def test_nobody_is_started_when_a_mandatory_node_fails(bus: str) -> None:
         assert network.wait_for_heartbeat(1, 2.0) == 127
 
 
-def test_a_node_booted_alone_is_mandatory(bus: str) -> None:
+def test_a_single_booted_node_is_mandatory(bus: str) -> None:
     with open_network(bus, [2]) as network, pytest.raises(BootError) as caught:
         boot(network, 2, WRONG, OPTIONAL)
     assert caught.value.letter == "M"
 
 
-def test_another_master_is_reported_for_all_at_once(bus: str) -> None:
+def test_another_master_fails_the_boot_of_all_optional_nodes(bus: str) -> None:
     with (
         open_network(bus, [1, 2], lead=False) as network,
         scripted(bus, 9, lambda _request: []) as other,
@@ -73,8 +73,10 @@ def test_another_master_is_reported_for_all_at_once(bus: str) -> None:
 
 
 @pytest.mark.parametrize("serial", [None, 0x1234], ids=["any serial number", "another one"])
-def test_two_answers_to_each_request_are_two_devices(bus: str, serial: int | None) -> None:
-    """Even where the identity is wrong as well: what explains it comes first."""
+def test_two_answers_to_each_request_indicate_a_duplicate_node_id(
+    bus: str, serial: int | None
+) -> None:
+    """A duplicate node id is reported before a wrong identity, which it explains."""
     profile = DRIVE.model_copy(update={"serial": serial})
 
     def answer(request: bytes) -> list[bytes]:
@@ -92,7 +94,7 @@ def test_two_answers_to_each_request_are_two_devices(bus: str, serial: int | Non
 
 
 class _Second(ScriptedNode):
-    """A device that boots with the first one, and says nothing else."""
+    """A device that boots with the first one and sends nothing else."""
 
     def boot_with(self) -> None:
         self.bus.set_filters([{"can_id": 0, "can_mask": 0x7FF, "extended": False}])
@@ -106,7 +108,7 @@ class _Second(ScriptedNode):
                 self.send(0x700 + self.node_id, b"\0")
 
 
-def test_two_boot_ups_after_one_reset_are_two_devices(bus: str) -> None:
+def test_two_boot_ups_after_one_reset_indicate_a_duplicate_node_id(bus: str) -> None:
     second = _Second(bus, 1, lambda _request: [])
     try:
         with open_network(bus, [1], lead=False) as network, pytest.raises(BootError) as caught:
@@ -118,8 +120,8 @@ def test_two_boot_ups_after_one_reset_are_two_devices(bus: str) -> None:
     assert "a different node id" in str(caught.value)
 
 
-def test_a_map_that_does_not_fit_a_frame_is_refused_by_the_drive_in_words(bus: str) -> None:
-    """The profile refuses it first; this one was made behind its back."""
+def test_the_drives_rejection_of_a_too_long_pdo_is_reported_as_text(bus: str) -> None:
+    """The profile would reject the map: this one bypasses its validation."""
     tpdo = DRIVE.tpdos[0]
     wide = tpdo.entries[1].model_copy(update={"index": 0x606C})
     entries = (*tpdo.entries, wide)  # 16 + 32 + 16 + 32 bits
@@ -133,7 +135,7 @@ def test_a_map_that_does_not_fit_a_frame_is_refused_by_the_drive_in_words(bus: s
     assert "PDO length exceeded (06040042h)" in str(caught.value)
 
 
-def test_who_floods_the_bus_is_named_where_a_node_does_not_answer(bus: str) -> None:
+def test_the_identifier_that_floods_the_bus_is_reported_with_a_missing_answer(bus: str) -> None:
     stop = threading.Event()
 
     def babble() -> None:
@@ -153,14 +155,14 @@ def test_who_floods_the_bus_is_named_where_a_node_does_not_answer(bus: str) -> N
     finally:
         stop.set()
         thread.join()
-    assert caught.value.node_id == 9  # the drive that is there boots all the same
+    assert caught.value.node_id == 9  # the other drive boots
     (note,) = caught.value.__notes__
     assert "the bus is flooded" in note
     assert "identifier 12Ah (node 42 by the usual numbering)" in note
     load = re.search(r"flooded: (\d+)% load", told)
-    assert load and int(load[1]) > 400, "of a bus eight times slower"
+    assert load and int(load[1]) > 400, "load of a bus eight times slower"
 
 
-def test_a_quiet_bus_is_no_flood(bus: str) -> None:
+def test_a_quiet_or_missing_bus_is_not_flooded(bus: str) -> None:
     assert flood_text(BusUrl.parse(bus), PacedClock()) == ""
     assert flood_text(BusUrl.parse("simbus:nobody-here"), PacedClock()) == ""

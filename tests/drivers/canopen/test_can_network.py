@@ -1,4 +1,4 @@
-"""SDO, NMT and EMCY of the master, beside a simulated drive."""
+"""SDO, NMT and EMCY of the master, with a simulated drive."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def test_an_abort_is_reported_as_text_with_node_and_object(
     assert words in str(caught.value)
 
 
-def test_a_value_too_large_for_its_type_never_leaves(network: CanNetwork) -> None:
+def test_a_value_too_large_for_its_type_is_not_sent(network: CanNetwork) -> None:
     with pytest.raises(SdoError, match="does not fit"):
         network.write(1, 0x6060, 0, 1000)
 
@@ -54,11 +54,11 @@ def test_a_silent_node_is_reported_after_the_attempts(bus: str) -> None:
         assert network.clock.now_s - begin_s == pytest.approx(0.5)
 
 
-def test_long_values_come_in_segments(network: CanNetwork) -> None:
+def test_long_values_are_read_in_segments(network: CanNetwork) -> None:
     assert network.read(1, 0x1008) == "Generic CiA 402 torque servo"
 
 
-def test_several_tasks_may_use_it_at_once(rig: Rig) -> None:
+def test_several_tasks_may_read_from_one_node_simultaneously(rig: Rig) -> None:
     def work(node_objects: list[tuple[int, int, int]]) -> bool:
         return all(
             rig.network.read_int(1, index, sub) == value
@@ -73,7 +73,7 @@ def test_several_tasks_may_use_it_at_once(rig: Rig) -> None:
     ]
     tasks = [rig.network.clock.start(partial(work, job)) for job in jobs]
     rig.set_mode()
-    for _ in range(1000):  # one answer each a cycle, for all three ask the same node
+    for _ in range(1000):  # one answer per cycle, because all three ask the same node
         rig.cycle()
         rig.network.clock.run_tasks()
     assert all(task.result() for task in tasks)
@@ -93,7 +93,7 @@ def test_emergencies_between_cycles_are_kept_and_raise_the_alarm(rig: Rig) -> No
     assert "8611h" in text or "in fault" in text
 
 
-def test_a_bus_that_is_gone_is_a_bus_error() -> None:
+def test_a_killed_simulator_raises_bus_errors() -> None:
     simulator = start_simulator()
     with open_network(simulator.bus, [1]) as network:
         assert network.read_int(1, 0x1000) == 0x00020192

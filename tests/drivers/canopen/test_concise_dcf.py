@@ -1,4 +1,4 @@
-"""Concise DCF: the layout of 1F22h, read by hand."""
+"""Concise DCF has the layout of 1F22h, decoded here independently."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ lists = st.lists(entries, max_size=12).map(tuple)
 
 
 def decoded(stream: bytes) -> tuple[DcfEntry, ...]:
-    """Read a concise DCF as CiA 302 has it; fails where it is cut short or goes on."""
+    """Decode a concise DCF by CiA 302. Fail if it is too short or too long."""
     (count,) = struct.unpack_from("<I", stream)
     at, found = 4, []
     for _ in range(count):
@@ -25,7 +25,7 @@ def decoded(stream: bytes) -> tuple[DcfEntry, ...]:
     return tuple(found)
 
 
-def test_the_layout_is_that_of_1f22h() -> None:
+def test_concise_dcf_has_the_layout_of_1f22h() -> None:
     wanted = Configuration((DcfEntry(0x1017, 0, b"\x64\0"), DcfEntry(0x1400, 1, b"\1\2\0\0")))
     assert (
         wanted.concise_dcf().hex(" ")

@@ -1,4 +1,4 @@
-"""The LSS master against simulated devices on a bus, and a third party's master beside it."""
+"""The LSS master with simulated devices on a bus, compared with a third party's master."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ TIMEOUT_S = 0.02
 
 @pytest.fixture(autouse=True)
 def quick(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Devices of one process answer together, so that little time has to pass for the last."""
+    """Shorten the wait for the last answer: devices in one process answer together."""
     monkeypatch.setattr("cdpr_drivers.canopen.lss._SETTLE_S", 0.001)
 
 
@@ -67,7 +67,7 @@ def bus_with(*nodes: CanopenSlave) -> Iterator[str]:
 
 @contextmanager
 def master_on(name: str, timeout_s: float = TIMEOUT_S, *, lead: bool = True) -> Iterator[LssMaster]:
-    """An LSS master; who does not `lead` goes by the wall clock, as others who answer do."""
+    """Yield an LSS master. Without `lead` it uses the wall clock, so that others can answer."""
     url = BusUrl.parse(f"simbus:{name}")
     with (
         closing(open_clock([url]) if lead else PacedClock()) as clock,
@@ -82,21 +82,21 @@ def master_of(*nodes: CanopenSlave) -> Iterator[LssMaster]:
         yield master
 
 
-def test_fastscan_finds_every_new_device_and_no_other() -> None:
+def test_fastscan_finds_all_unconfigured_devices_and_no_others() -> None:
     serials = (1, 0xFFFF0000)
     nodes = [device(serial) for serial in serials]
     with master_of(*nodes, device(77, node_id=4)) as master:
         assert master.has_unconfigured()
         wanted = [address(serial) for serial in serials]
         assert master.unconfigured() == wanted
-        assert master.unconfigured() == wanted  # a search changes nothing
+        assert master.unconfigured() == wanted  # a search does not change the devices
 
 
-def test_devices_that_answer_the_fastscan_until_they_have_a_node_id_are_all_found(
+def test_devices_that_keep_answering_the_fastscan_are_all_found(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """As those with CANopenNode do, once they are found; none keeps the id that silenced it."""
-    nodes = [device(5)]  # by the standard
+    """CANopenNode devices do so after they were found. None keeps the temporary node id."""
+    nodes = [device(5)]  # follows the standard
     by_the_standard = LssSlave._fastscan
 
     def goes_on(lss: LssSlave, data: bytes) -> None:
@@ -115,7 +115,7 @@ def test_devices_that_answer_the_fastscan_until_they_have_a_node_id_are_all_foun
         assert master.node_id_in_use(4) == "it answers to SDO"
 
 
-def test_nobody_there_is_no_error() -> None:
+def test_searching_for_missing_devices_finds_nothing() -> None:
     with master_of(device(1, node_id=3)) as master:
         assert not master.has_unconfigured()
         assert master.unconfigured() == []
@@ -124,7 +124,7 @@ def test_nobody_there_is_no_error() -> None:
             master.select(address(2))
 
 
-def test_devices_of_a_type_are_found_with_and_without_node_id() -> None:
+def test_devices_of_a_product_are_found_with_and_without_node_id() -> None:
     nodes = [device(1, 9), device(0xFFFF0000), device(7, product=1)]
     with master_of(*nodes) as master:
         low = (REVISION - 5, REVISION + 5)
@@ -156,18 +156,18 @@ def test_a_new_device_gets_its_node_id_boots_and_keeps_it(tmp_path: Path) -> Non
         assert master.node_id_in_use(5) == "it answers to SDO"
 
 
-def test_a_silent_owner_of_a_node_id_is_known_by_its_heartbeat() -> None:
+def test_a_node_id_in_use_by_a_stopped_node_is_detected_by_heartbeat() -> None:
     node = device(1, node_id=9)
     with bus_with(node) as name, master_on(name, lead=False) as master:
         with canopen.Network() as network:
             network.connect(interface="simbus", channel=name)
             network.add_node(9, str(EDS)).sdo[0x1017].raw = 100
-            network.send_message(0, bytes([2, 9]))  # stopped: no SDO
+            network.send_message(0, bytes([2, 9]))  # stopped: it does not answer SDO
             time.sleep(0.05)
         assert master.node_id_in_use(9) == "its heartbeat is on the bus"
 
 
-def test_refusals_are_reported_as_text(tmp_path: Path) -> None:
+def test_rejections_by_a_device_are_reported_as_text(tmp_path: Path) -> None:
     with master_of(device(1, 4, store=tmp_path / "missing" / "drive.json")) as master:
         master.select(address(1))
         with pytest.raises(LssError, match="refuses node id 128: it takes node ids 1 to 127 only"):
@@ -176,7 +176,7 @@ def test_refusals_are_reported_as_text(tmp_path: Path) -> None:
             master.store()
 
 
-def test_a_refused_bit_rate_is_reported() -> None:
+def test_a_rejected_bit_rate_is_reported() -> None:
     node = device(1, 4)
     node.od.bitrates = frozenset({1_000_000, 500_000})
     with master_of(node) as master:
@@ -190,7 +190,7 @@ def test_a_refused_bit_rate_is_reported() -> None:
         assert (node.bitrate, node.muted) == (500_000, True)
 
 
-def test_the_only_device_needs_no_name_and_two_are_refused() -> None:
+def test_select_only_accepts_one_device_and_rejects_two() -> None:
     with master_of(device(1, 4)) as master:
         assert master.select_only() == (address(1), 4)
     with (
@@ -201,10 +201,10 @@ def test_the_only_device_needs_no_name_and_two_are_refused() -> None:
 
 
 class Sluggish:
-    """Answers the fastscan like a device, each answer late: it meets the next question."""
+    """Answer the fastscan like a device, but late, when the next request has been sent."""
 
     stubborn = False
-    """Whether it goes on answering the fastscan after it has been found."""
+    """Whether it keeps answering the fastscan after it has been found."""
 
     def __init__(self, name: str, numbers: tuple[int, ...], delay_s: float) -> None:
         self.bus = can.Bus(interface="simbus", channel=name)
@@ -261,8 +261,8 @@ def sluggish_device(name: str, serial: int, delay_s: float) -> Iterator[None]:
         thread.join()
 
 
-def test_answers_that_run_into_the_next_question_are_no_bits() -> None:
-    """A quick device and a slow one, whose answer comes when the next question is out."""
+def test_answers_that_arrive_after_the_next_request_are_not_read_as_bits() -> None:
+    """One device is fast. The other answers when the next request has been sent."""
     with ExitStack() as stack:
         name = stack.enter_context(bus_with(device(3)))
         stack.enter_context(sluggish_device(name, 6, 0.0015))
@@ -271,7 +271,7 @@ def test_answers_that_run_into_the_next_question_are_no_bits() -> None:
 
 
 def _found_at_last(master: LssMaster) -> list[LssAddress]:
-    """Search again where a busy machine made answers later still: an error, nothing invented."""
+    """Search again after an error, because a busy machine may delay answers further."""
     for _ in range(5):
         try:
             return master.unconfigured()
@@ -280,7 +280,7 @@ def _found_at_last(master: LssMaster) -> list[LssAddress]:
     return []
 
 
-def test_a_device_that_is_found_again_and_again_ends_the_search(
+def test_a_device_that_never_leaves_the_fastscan_ends_the_search_with_an_error(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(Sluggish, "stubborn", True)
@@ -292,7 +292,7 @@ def test_a_device_that_is_found_again_and_again_ends_the_search(
             master.unconfigured()
 
 
-def test_a_device_too_slow_for_the_timeout_is_an_error_not_a_wrong_identity() -> None:
+def test_a_device_too_slow_for_the_timeout_does_not_give_a_wrong_identity() -> None:
     with ExitStack() as stack:
         name = stack.enter_context(bus_with())
         stack.enter_context(sluggish_device(name, 0x0F0F0F0F, 0.015))
@@ -305,8 +305,8 @@ def test_a_device_too_slow_for_the_timeout_is_an_error_not_a_wrong_identity() ->
             assert found in ([], [address(0x0F0F0F0F)])
 
 
-def test_a_babbling_node_does_not_hold_the_search() -> None:
-    """Somebody sends LSS answers without end, faster than they can be read."""
+def test_a_babbling_node_does_not_block_the_search() -> None:
+    """The node sends LSS answers without end, faster than the master can read them."""
     with bus_with() as name, can.Bus(interface="simbus", channel=name) as babbler:
         stop = threading.Event()
 
@@ -326,6 +326,6 @@ def test_a_babbling_node_does_not_hold_the_search() -> None:
             thread.join()
 
 
-def test_a_bus_that_is_not_there_is_a_bus_error() -> None:
+def test_a_missing_bus_raises_a_bus_error() -> None:
     with pytest.raises(BusError):
         LssMaster(BusUrl.parse("simbus:nobody-runs-this"), PacedClock())

@@ -1,4 +1,4 @@
-"""SDO from the master: long data, cancelling, duplicates, repeats, devices that vanish."""
+"""SDO transfers of the master: long data, cancelling, duplicates, repeats, vanished devices."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ SCRIPTED = 9
 
 @pytest.fixture(scope="module")
 def bus(simulated_bus: str) -> str:
-    """A bus that is not switched off and on between the tests."""
+    """Return a bus that is not restarted between tests."""
     return simulated_bus
 
 
@@ -32,14 +32,14 @@ TIMEOUT = "cdpr_drivers.canopen.network.TIMEOUT_S"
 
 @pytest.fixture(autouse=True)
 def patient(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The time-out is by the wall clock; whoever answers may have to wait for a core."""
+    """Lengthen the wall-clock timeout, because the answering thread may have to wait for a core."""
     monkeypatch.setattr(TIMEOUT, 60.0)
 
 
-# -- what comes back
+# -- values that are read
 
 
-def test_data_of_any_length_come_back_as_written(network: CanNetwork) -> None:
+def test_data_of_any_length_are_read_as_written(network: CanNetwork) -> None:
     for size in (1, 4, 5, 7, 8, 13, 889, 890, 2500):
         data = bytes((7 * k + size) & 0xFF for k in range(size))
         network.write_bytes(1, 0x2F10, 0, data)
@@ -131,7 +131,7 @@ def test_a_transfer_of_a_task_is_cancelled(network: CanNetwork, bus: str, block:
             return [b"\xc0" + request[1:4] + bytes(4)]
         return [bytes([k]) + bytes(7) for k in range(1, 128)]
 
-    assert not network.cancel(SCRIPTED)  # nothing runs
+    assert not network.cancel(SCRIPTED)  # no transfer is running
     with scripted(bus, SCRIPTED, endless_blocks if block else endless) as node:
         task = clock.start(lambda: network.read_bytes(SCRIPTED, 0x1008, block=block))
         while len(node.requests) < 3:
@@ -145,12 +145,12 @@ def test_a_transfer_of_a_task_is_cancelled(network: CanNetwork, bus: str, block:
         told = f"node {SCRIPTED}: object 1008h:0 cannot be read: the transfer was cancelled"
         with pytest.raises(SdoCancelledError, match=told):
             task.result()
-        # the next transfer is none the worse for it
+        # the next transfer works
         node.answer = lambda request: [expedited(request, 4711)]
         assert network.read_int(SCRIPTED, 0x1000) == 4711
 
 
-def test_the_drive_is_reported_and_serves_the_next_request(network: CanNetwork) -> None:
+def test_a_drive_serves_requests_after_a_cancelled_transfer(network: CanNetwork) -> None:
     network.write_bytes(1, 0x2F10, 0, bytes(6000))
     task = network.clock.start(lambda: network.read_bytes(1, 0x2F10))
     network.clock.sleep(0.001)
@@ -161,10 +161,10 @@ def test_the_drive_is_reported_and_serves_the_next_request(network: CanNetwork) 
     assert network.read_int(1, 0x1018, 1) == 0x00CD9A01
 
 
-# -- what goes wrong on the wire
+# -- errors on the wire
 
 
-def test_duplicated_answers_are_left_aside_and_counted(network: CanNetwork, bus: str) -> None:
+def test_duplicate_answers_are_ignored_and_counted(network: CanNetwork, bus: str) -> None:
     values = {0x1000: 1, 0x1001: 2, 0x1014: 3, 0x1006: 4, 0x1005: 5}
 
     def answer(request: bytes) -> list[bytes]:
@@ -179,7 +179,7 @@ def test_duplicated_answers_are_left_aside_and_counted(network: CanNetwork, bus:
     assert "two devices have this node id" in network.duplicate_node(SCRIPTED)
 
 
-def test_duplicated_segments_do_not_double_the_data(network: CanNetwork, bus: str) -> None:
+def test_duplicate_segments_do_not_duplicate_data(network: CanNetwork, bus: str) -> None:
     text = b"abcdefghijklmnopqrst"
     parts = [text[:7], text[7:14], text[14:]]
     sent = 0
@@ -210,14 +210,14 @@ def test_a_lost_request_is_repeated(
     asked: list[bytes] = []
     with scripted(bus, SCRIPTED, answer):
         assert network.read_int(SCRIPTED, 0x1000) == 7
-    assert [request[0] for request in asked] == [0x40, 0x80, 0x40]  # the first one was given up
+    assert [request[0] for request in asked] == [0x40, 0x80, 0x40]  # the first request timed out
 
 
-def test_a_drive_that_vanishes_in_the_middle_is_reported_and_the_other_goes_on(
+def test_a_drive_that_vanishes_during_a_transfer_is_reported_and_the_other_works(
     network: CanNetwork, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     network.write_bytes(1, 0x2F10, 0, bytes(700))
-    network.write(1, 0x2F00, 10, 5)  # for good: no test may follow that needs drive 1
+    network.write(1, 0x2F00, 10, 5)  # permanently: no later test may need drive 1
     monkeypatch.setattr(TIMEOUT, 0.5)
     with pytest.raises(SdoTimeoutError) as caught:
         network.read_bytes(1, 0x2F10)

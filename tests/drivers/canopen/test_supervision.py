@@ -1,8 +1,7 @@
-"""What the supervision table in docs/reference/supervision.md promises, one test for each row.
+"""One test for each row of the supervision table in docs/reference/supervision.md.
 
-Rows whose test stands elsewhere: master lost (test_axis_group: drives stop when the master dies or
-hangs), bus gone (test_axis_group: a killed simulator), drive in fault, mode and state changes
-(test_axis_group), two devices with one node id at boot (test_boot_network).
+The tests of some rows are in other files: master lost, bus gone, drive in fault, mode and state
+changes in test_axis_group, and a duplicate node id at boot in test_boot_network.
 """
 
 from __future__ import annotations
@@ -50,7 +49,7 @@ def three_drives() -> Iterator[str]:
 
 @pytest.fixture
 def trio(three_drives: str) -> Iterator[Rig]:
-    """Three drives, enabled."""
+    """Yield a rig of three enabled drives."""
     with open_network(three_drives, NODES) as network:
         for node in NODES:
             _eventually(network.clock, lambda node=node: _answers(network, node))
@@ -74,7 +73,7 @@ def _eventually(clock: Clock, condition: Callable[[], object]) -> None:
 
 
 def _drive_into(rig: Rig, trouble: Callable[[], None]) -> str:
-    """Drive until there is an alarm and switch off, as every loop does; return why."""
+    """Cycle until an alarm, then switch off, as every loop does. Return the alarm."""
     group = rig.group
     with pytest.raises(TripError) as caught, group:
         for cycle in range(5000):
@@ -91,10 +90,10 @@ def _drive_into(rig: Rig, trouble: Callable[[], None]) -> str:
 
 
 def _stopped(log: BusLog, node: int) -> tuple[int, int]:
-    """Return the cycles in which a node was told to stop, and said that its power was off."""
+    """Return the cycle in which a node was commanded to stop, and that in which it was off."""
     pushed = [f.cycle for f in log.of(0x200 + node) if any(f.data[2:])]
     assert pushed
-    # controlword disable voltage and no torque
+    # controlword "disable voltage" and zero torque
     told = [f.cycle for f in log.of(0x200 + node) if f.cycle >= pushed[-1] and not any(f.data)]
     off = [f.cycle for f in log.of(0x180 + node) if f.cycle > pushed[-1] and _is_off(f.data)]
     return told[0], off[0]
@@ -112,7 +111,7 @@ def _is_off(tpdo: bytes) -> bool:
     [(MUTE, 1, "(node 2) sends no heartbeat"), (SILENT, 1500, "(node 2) has not answered SYNC")],
     ids=["heartbeat stops", "falls silent"],
 )
-def test_the_others_stop_within_two_heartbeats_of_the_last_one(
+def test_other_drives_stop_within_two_heartbeats_of_a_lost_node(
     trio: Rig, sub: int, value: int, told: str
 ) -> None:
     with logged(trio.bus) as log:
@@ -123,12 +122,12 @@ def test_the_others_stop_within_two_heartbeats_of_the_last_one(
         last_heard = [f.cycle for f in log.of(0x702) if f.cycle <= commanded][-1]
         assert (commanded - last_heard) * PERIOD_S <= 2 * HEARTBEAT_S
         assert (off - last_heard) * PERIOD_S <= 2 * HEARTBEAT_S
-        if sub == SILENT:  # then the missing answer tells, long before a heartbeat is due
+        if sub == SILENT:  # the missing answer is detected long before the next heartbeat
             last_answer = [f.cycle for f in log.of(0x182) if f.cycle <= commanded][-1]
             assert commanded - last_answer <= 3
 
 
-def test_a_node_lost_between_cycles_is_an_alarm(trio: Rig) -> None:
+def test_a_node_lost_between_cycles_raises_an_alarm(trio: Rig) -> None:
     trio.reach(State.SWITCH_ON_DISABLED)
     trio.group.stop_cycling()
     trio.misbehave(MUTE, 1, node=3)
@@ -137,14 +136,14 @@ def test_a_node_lost_between_cycles_is_an_alarm(trio: Rig) -> None:
     assert "(node 3) sends no heartbeat" in alarm(trio.group)
 
 
-def test_all_are_heard_between_cycles(trio: Rig) -> None:
+def test_heartbeats_are_received_between_cycles(trio: Rig) -> None:
     trio.reach(State.SWITCH_ON_DISABLED)
     trio.group.stop_cycling()
-    trio.network.clock.sleep(1.6)  # longer than the patience
+    trio.network.clock.sleep(1.6)  # longer than the heartbeat timeout
     assert trio.network.alarm_text == ""
 
 
-def test_a_restart_between_cycles_is_an_alarm_and_voids_the_index(trio: Rig) -> None:
+def test_a_restart_between_cycles_raises_an_alarm_and_invalidates_the_index(trio: Rig) -> None:
     trio.group.set_index(1, 0.0)
     trio.reach(State.SWITCH_ON_DISABLED)
     trio.group.stop_cycling()
@@ -156,7 +155,7 @@ def test_a_restart_between_cycles_is_an_alarm_and_voids_the_index(trio: Rig) -> 
     assert not trio.group.feedback.alive[1]
 
 
-def test_a_node_that_leaves_operational_between_cycles_is_an_alarm(trio: Rig) -> None:
+def test_a_node_that_leaves_operational_between_cycles_raises_an_alarm(trio: Rig) -> None:
     trio.reach(State.SWITCH_ON_DISABLED)
     trio.group.stop_cycling()
     _eventually(trio.network.clock, lambda: trio.network.wait_for_heartbeat(1, 1.0) == 5)
@@ -166,11 +165,11 @@ def test_a_node_that_leaves_operational_between_cycles_is_an_alarm(trio: Rig) ->
 
 
 @pytest.mark.parametrize("command", [128, 2], ids=["pre-operational", "stopped"])
-def test_a_drive_that_keeps_its_torque_is_switched_off_while_the_others_go_on(
+def test_a_lost_drive_is_switched_off_while_the_others_stay_enabled(
     trio: Rig, command: int
 ) -> None:
-    """A stopped one takes no SDO either: then it is reset."""
-    trio.network.write(2, 0x6007, 0, 0)  # what it loses makes it do nothing
+    """A stopped node does not accept SDO either, so it is reset."""
+    trio.network.write(2, 0x6007, 0, 0)  # the drive does not react to a lost connection
     group, clock = trio.group, trio.network.clock
     trio.network.send(0, bytes([command, 2]))
     for _ in range(500):
@@ -190,7 +189,7 @@ def test_a_drive_that_keeps_its_torque_is_switched_off_while_the_others_go_on(
 # -- emergency messages
 
 
-def test_an_emergency_is_reported_as_text_and_kept_until_it_is_taken_back(trio: Rig) -> None:
+def test_an_emergency_is_reported_as_text_and_active_until_the_drive_clears_it(trio: Rig) -> None:
     text = _drive_into(trio, lambda: trio.misbehave(RAISE_FAULT, 0x4310, node=3))
     assert "(node 3) reports error" in text
     assert "4310h (drive temperature too high)" in text
@@ -210,9 +209,9 @@ def test_an_emergency_is_reported_as_text_and_kept_until_it_is_taken_back(trio: 
 # -- answers that are missing, double, or too many
 
 
-def test_a_double_answer_is_taken_once_and_never_for_the_next_cycles(trio: Rig) -> None:
-    # a simulator that loses its core between the two copies sends the second one after the next
-    # SYNC, where nobody can know it for what it is: that is not what is looked at here
+def test_a_duplicate_answer_is_not_taken_for_that_of_the_next_cycle(trio: Rig) -> None:
+    # a simulator that is preempted between the two copies sends the second one after the next SYNC,
+    # where it cannot be recognised. That is not tested here.
     assert any(_follows_through_double_answers(trio) for _ in range(4))
     assert alarm(trio.group) == ""
 
@@ -221,7 +220,7 @@ def _follows_through_double_answers(trio: Rig) -> bool:
     group = trio.group
     trio.run(0.3)
     before = group.repeated
-    trio.misbehave(DOUBLE, 20, node=3)  # the last to answer: nothing is awaited after it
+    trio.misbehave(DOUBLE, 20, node=3)  # the last drive to answer
     with logged(trio.bus) as log:
         for _ in range(60):
             group.command.torque_Nm[:] = 0.2
@@ -229,7 +228,7 @@ def _follows_through_double_answers(trio: Rig) -> bool:
         positions = group.feedback.position_rad.copy()
         flagged = group.feedback.rate_ok.copy()
     assert list(flagged) == [True, True, False]
-    # what the feedback holds is what the drives said to this very SYNC
+    # the feedback is that of this SYNC
     last = max(f.cycle for f in log.frames)
     told = []
     for node in NODES:
@@ -239,7 +238,7 @@ def _follows_through_double_answers(trio: Rig) -> bool:
     return bool(np.allclose(positions, told, rtol=1e-6)) and group.repeated - before == 20
 
 
-def test_the_rate_is_good_again_once_the_answers_are(trio: Rig) -> None:
+def test_the_rate_is_valid_again_after_duplicate_answers_end(trio: Rig) -> None:
     trio.misbehave(DOUBLE, 3, node=2)
     trio.run(0.02)
     assert not trio.group.feedback.rate_ok.all() or trio.group.repeated == 3
@@ -248,14 +247,14 @@ def test_the_rate_is_good_again_once_the_answers_are(trio: Rig) -> None:
     assert trio.group.feedback.alive.all()
 
 
-def test_double_answers_without_end_are_two_devices(trio: Rig) -> None:
+def test_endless_duplicate_answers_indicate_a_duplicate_node_id(trio: Rig) -> None:
     text = _drive_into(trio, lambda: trio.misbehave(DOUBLE, 255, node=2))
     assert "answers of the drive (node 2) to SYNC came twice" in text
     assert "second device with its node id" in text
     assert "node 1" not in text
 
 
-def test_a_node_that_answers_sdo_but_not_sync_is_named_with_advice(trio: Rig) -> None:
+def test_a_node_that_answers_sdo_but_not_sync_is_reported_with_advice(trio: Rig) -> None:
     def switch_tpdo_off() -> None:
         trio.network.write(2, 0x1800, 1, 0x8000_0182)
 
@@ -265,7 +264,7 @@ def test_a_node_that_answers_sdo_but_not_sync_is_named_with_advice(trio: Rig) ->
     assert trio.network.read_int(2, 0x1018, 1) == 0x00CD9A01
 
 
-def test_a_node_that_babbles_is_named_and_the_others_are_served(trio: Rig) -> None:
+def test_a_babbling_node_is_reported_and_the_others_are_served(trio: Rig) -> None:
     trio.misbehave(BABBLE, 60, node=2)
     for _ in range(40):
         trio.cycle()
@@ -278,7 +277,7 @@ def test_a_node_that_babbles_is_named_and_the_others_are_served(trio: Rig) -> No
     assert trio.group.reached(State.SWITCH_ON_DISABLED)
 
 
-def test_a_flood_of_emergencies_between_cycles_is_named(three_drives: str) -> None:
+def test_a_flood_of_emergencies_between_cycles_is_reported(three_drives: str) -> None:
     with (
         open_network(three_drives, NODES) as network,
         scripted(three_drives, 2, lambda _request: []) as node,
@@ -301,7 +300,7 @@ def test_a_flood_of_emergencies_between_cycles_is_named(three_drives: str) -> No
 
 
 class _Server:
-    """A socketcand server that tells of the errors of its controller."""
+    """A socketcand server that reports errors of its controller."""
 
     def __init__(self) -> None:
         self._listener = socket.create_server(("127.0.0.1", 0))
@@ -328,20 +327,20 @@ class _Server:
         self._listener.close()
 
 
-def test_bus_off_is_an_alarm_until_the_controller_has_come_back() -> None:
+def test_bus_off_raises_an_alarm_until_the_controller_is_active_again() -> None:
     server = _Server()
     network = CanNetwork(BusUrl.parse(server.url), PacedClock(), [1], MASTER, HEARTBEAT_S)
     try:
         network.add_node(1, dictionary(1))
         server.tell(b"< error 20000080 1.0 >")
         _eventually(network.clock, lambda: network.health.errors == 1)
-        assert network.alarm_text == ""  # a disturbed frame is sent again by the controller
+        assert network.alarm_text == ""  # the controller repeats a disturbed frame
         server.tell(b"< error 20000040 1.0 >")
         _eventually(network.clock, lambda: network.alarm_text)
         assert "the CAN controller is bus-off" in network.alarm_text
         assert "restart the interface" in network.alarm_text
         network.clear_alarm()
-        assert "bus-off" in network.alarm_text  # its cause is not gone
+        assert "bus-off" in network.alarm_text  # the cause remains
         server.tell(b"< error 20000100 1.0 >")
         _eventually(network.clock, lambda: network.health.state is BusState.ACTIVE)
         assert "bus-off" in network.alarm_text  # latched

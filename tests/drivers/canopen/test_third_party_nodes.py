@@ -1,4 +1,4 @@
-"""Devices that follow the standard in another way than ours, or break it in one thing each."""
+"""Devices that follow the standard in a different way, or violate it in one point each."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ def network(simulated_bus: str) -> Iterator[CanNetwork]:
         yield opened
 
 
-# -- a stock slave with no more than the standard demands
+# -- a third-party slave with the objects that the standard requires
 
 
 @pytest.fixture
 def stock(simulated_bus: str, monkeypatch: pytest.MonkeyPatch) -> Iterator[canopen.LocalNode]:
-    # by the wall clock: a slave in this process may have to wait for a core
+    # wall-clock time: a slave in this process may have to wait for a core
     monkeypatch.setattr("cdpr_drivers.canopen.boot._BOOT_UP_TIMEOUT_S", 60.0)
     monkeypatch.setattr("cdpr_drivers.canopen.network.TIMEOUT_S", 60.0)
     third_party = canopen.Network()
@@ -47,10 +47,10 @@ def stock(simulated_bus: str, monkeypatch: pytest.MonkeyPatch) -> Iterator[canop
         if data[0] not in (129, 130):
             node.nmt.on_command(can_id, data, time_s)
             return
-        # between two threads one of its heartbeats would be a second boot-up message
+        # otherwise one of its heartbeats could look like a second boot-up message
         node.nmt.stop_heartbeat()
         node.nmt.send_command(130)
-        node.nmt.state = "PRE-OPERATIONAL"  # it takes its heartbeats for boot-ups otherwise
+        node.nmt.state = "PRE-OPERATIONAL"  # otherwise it takes its heartbeats for boot-ups
 
     third_party.unsubscribe(0, node.nmt.on_command)
     third_party.subscribe(0, restart)
@@ -91,7 +91,7 @@ def test_objects_required_by_the_profile_must_exist(
     assert stock.nmt.state == "PRE-OPERATIONAL"
 
 
-def test_a_device_that_refuses_to_answer_is_not_called_silent(
+def test_an_sdo_abort_at_boot_is_not_reported_as_silence(
     simulated_bus: str, network: CanNetwork
 ) -> None:
     with (
@@ -147,7 +147,7 @@ def _abort_later(request: bytes) -> list[bytes]:
         (_abort_later, SdoAbortError, "hardware error"),
     ],
 )
-def test_a_transfer_that_goes_wrong_ends_with_a_reason(
+def test_a_faulty_transfer_fails_with_its_reason_and_the_next_one_works(
     simulated_bus: str,
     network: CanNetwork,
     monkeypatch: pytest.MonkeyPatch,
@@ -167,7 +167,9 @@ def test_a_transfer_that_goes_wrong_ends_with_a_reason(
         assert network.read_int(FOREIGN_NODE, 0x1000) == 4711
 
 
-def test_a_flood_of_answers_fills_no_memory(simulated_bus: str, network: CanNetwork) -> None:
+def test_a_flood_of_answers_does_not_fill_the_memory(
+    simulated_bus: str, network: CanNetwork
+) -> None:
     with scripted(simulated_bus, FOREIGN_NODE, lambda request: [expedited(request, 4711)]) as node:
         for k in range(3000):
             node.send(0x580 + FOREIGN_NODE, bytes(8))

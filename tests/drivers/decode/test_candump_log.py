@@ -1,4 +1,4 @@
-"""Log files of candump: our lines against python-can's reader and writer, and against can-utils."""
+"""Log files of candump are compatible with python-can and can-utils."""
 
 from __future__ import annotations
 
@@ -27,12 +27,12 @@ CHANNELS = st.sampled_from(["can0", "vcan17", "slcan-a", "lab.2"])
 
 
 @given(CHANNELS, STANDARD | EXTENDED | REMOTE | ERRORS)
-def test_a_line_gives_back_its_frame(channel: str, frame: Frame) -> None:
+def test_a_formatted_line_is_parsed_to_the_same_frame(channel: str, frame: Frame) -> None:
     assert parse_line(format_line(channel, frame)) == (channel, frame)
 
 
 @given(STANDARD | EXTENDED | REMOTE | ERRORS)
-def test_packed_frames_keep_all(frame: Frame) -> None:
+def test_packing_and_unpacking_keeps_all_fields(frame: Frame) -> None:
     assert Frame.unpack(frame.time_s, frame.pack()) == frame
 
 
@@ -49,33 +49,33 @@ def _message(frame: Frame) -> can.Message:
 
 
 @given(STANDARD | EXTENDED | REMOTE)
-def test_python_can_reads_what_we_write(frame: Frame) -> None:
+def test_python_can_reads_our_lines(frame: Frame) -> None:
     (read,) = can.CanutilsLogReader(io.StringIO(format_line("can0", frame) + "\n"))
     assert read.equals(_message(frame), timestamp_delta=1e-6, check_direction=False)
 
 
 @given(STANDARD | EXTENDED | REMOTE)
-def test_we_read_what_python_can_writes(frame: Frame) -> None:
+def test_lines_of_python_can_are_read(frame: Frame) -> None:
     file = io.StringIO()
     can.CanutilsLogWriter(file)(_message(frame))
     channel, read = parse_line(file.getvalue())
     assert channel == "can0"
-    # it writes no length of remote frames
+    # python-can does not write the length of remote frames
     assert read == (frame._replace(length=0) if frame.remote else frame)
 
 
-def test_an_error_frame_of_python_can_stays_one() -> None:
+def test_an_error_frame_of_python_can_is_read_as_error_frame() -> None:
     file = io.StringIO()
     can.CanutilsLogWriter(file)(can.Message(timestamp=1.5, is_error_frame=True, channel="can0"))
     frame = parse_line(file.getvalue()).frame
     assert frame.error
-    assert frame.can_id == 0x80  # a bus error, the only class that it writes
+    assert frame.can_id == 0x80  # a bus error, the only class that python-can writes
     (read,) = can.CanutilsLogReader(io.StringIO(format_line("can0", frame) + "\n"))
     assert read.is_error_frame
 
 
-def test_lines_of_can_utils() -> None:
-    # as `candump -L` prints them, -x adding the direction, and cansend's length code
+def test_lines_of_can_utils_are_read() -> None:
+    # as `candump -L` prints them, with the direction of -x and cansend's length code
     assert parse_line("(1436509052.249713) vcan0 044#2A366C2BBA").frame == Frame(
         1436509052.249713, 0x044, bytes.fromhex("2A366C2BBA")
     )
@@ -101,15 +101,15 @@ def test_lines_of_can_utils() -> None:
         ("\x00\xff\xfe", "not of the form"),
     ],
 )
-def test_a_line_that_is_none_is_reported_by_number(line: str, words: str) -> None:
+def test_error_for_an_invalid_line_has_its_number(line: str, words: str) -> None:
     good = "(1.000000) can0 123#11\n"
     with pytest.raises(LogError, match=r"trip\.log: line 3: ") as told:
         list(read_log("trip.log", [good, "\n", line + "\n", good]))
     assert words in str(told.value)
 
 
-def test_a_log_that_was_cut_off_is_read_to_its_last_whole_line() -> None:
+def test_a_truncated_log_is_read_up_to_its_last_complete_line() -> None:
     lines = ["(1.000000) can0 123#11\n", "(1.000000) can0 124#\n", "(1.00000"]
     assert [frame.can_id for _, frame in read_log("trip.log", lines)] == [0x123, 0x124]
-    with pytest.raises(LogError, match="line 1"):  # nothing of it is a log
+    with pytest.raises(LogError, match="line 1"):  # no line is complete
         list(read_log("trip.log", ["no log at all"]))

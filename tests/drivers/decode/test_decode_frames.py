@@ -1,4 +1,4 @@
-"""Frames in words: encoded by the `canopen` library or by hand, decoded here; and any garbage."""
+"""Frames are decoded to text: frames of the `canopen` library, handmade ones, and garbage."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def values(record: Record) -> dict[int, Any]:
 
 
 def pdo(dictionary: canopen.ObjectDictionary, entries: dict[int, int]) -> bytes:
-    """Encode a PDO as the canopen library does."""
+    """Encode a PDO with the canopen library."""
     map_ = canopen.RemoteNode(1, dictionary).rpdo[1]
     map_.clear()
     variables = [map_.add_variable(index) for index in entries]
@@ -49,7 +49,7 @@ DICTIONARY = canopen.import_od(str(WINCH.drive.eds), 1)
 
 
 @given(st.integers(0, 0xFFFF), st.integers(-(2**31), 2**31 - 1), st.integers(-32768, 32767))
-def test_feedback_is_decoded_to_si(status: int, position: int, torque: int) -> None:
+def test_feedback_is_decoded_to_si_units(status: int, position: int, torque: int) -> None:
     data = pdo(DICTIONARY, {0x6041: status, 0x6064: position, 0x6077: torque})
     record = decoded(0x181, data)
     assert (record.kind, record.node_id, record.problem) == ("TPDO1", 1, False)
@@ -84,7 +84,7 @@ def drive(**changes: Any) -> DriveProfile:
         (KnownNode(drive(torque_unit="mNm")), (2048.0, "counts"), (0.1, "Nm")),
     ],
 )
-def test_units_are_those_of_the_profile(
+def test_units_follow_the_profile(
     known: KnownNode, position: tuple[float, str], torque: tuple[float, str]
 ) -> None:
     told = values(decoded(0x181, struct.pack("<Hih", 0x237, 2048, 100), known))
@@ -101,7 +101,9 @@ def test_units_are_those_of_the_profile(
         (0x60FF, 0, "-90.000 deg/s"),
     ],
 )
-def test_a_speed_has_no_direction_and_a_count_no_unit(index: int, sub: int, text: str) -> None:
+def test_speeds_ignore_the_position_sign_and_counts_have_no_unit(
+    index: int, sub: int, text: str
+) -> None:
     number = 2048 if sub or index != 0x6099 else 2
     answer = struct.pack("<BHBI", 0x43, index, sub, number)
     known = replace(KNOWN, drive=drive(position_sign=-1))
@@ -121,7 +123,7 @@ STATES = {
 
 
 @pytest.mark.parametrize(("word", "state"), STATES.items())
-def test_statuswords_in_words(word: int, state: str) -> None:
+def test_statuswords_are_decoded_to_text(word: int, state: str) -> None:
     text = decoded(0x181, struct.pack("<Hih", word, 0, 0)).fields[0].text
     assert text.startswith(state)
     assert ("not remote" in text) == (word == 0)
@@ -139,12 +141,12 @@ COMMANDS = {
 
 
 @pytest.mark.parametrize(("word", "command"), COMMANDS.items())
-def test_controlwords_in_words(word: int, command: str) -> None:
+def test_controlwords_are_decoded_to_text(word: int, command: str) -> None:
     field = decoded(0x201, struct.pack("<Hh", word, 0)).fields[0]
     assert field.text == f"{command} ({word:04X}h)"
 
 
-def test_bits_that_depend_on_the_mode_need_it() -> None:
+def test_mode_specific_bits_are_decoded_only_if_the_mode_is_known() -> None:
     decoder = Decoder({1: KNOWN})
     feedback = Frame(0.0, 0x181, struct.pack("<Hih", 0x1637, 0, 0))
     assert "homed" not in decoder.decode(feedback).text
@@ -152,7 +154,7 @@ def test_bits_that_depend_on_the_mode_need_it() -> None:
     assert "homed" in decoder.decode(feedback).text
     decoder.decode(Frame(0.0, 0x281, struct.pack("<bHi", 10, 0, 0)))
     assert "follows commands" in decoder.decode(feedback).text
-    decoder.decode(Frame(0.0, 0x701, b"\0"))  # after a boot-up nobody knows
+    decoder.decode(Frame(0.0, 0x701, b"\0"))  # the mode is unknown after a boot-up
     assert "follows commands" not in decoder.decode(feedback).text
 
 
@@ -160,19 +162,19 @@ def test_a_pdo_that_does_not_fit_its_map_is_reported() -> None:
     short = decoded(0x181, "3702 00080000")
     assert short.problem
     assert "6 bytes, too few for the map" in short.text
-    assert "90.000 deg" in short.text  # what is there is decoded
+    assert "90.000 deg" in short.text  # the bytes that exist are decoded
     long = decoded(0x201, "0F00 6400 FF")
     assert long.problem
     assert "1 bytes more than mapped: FF" in long.text
 
 
-def test_pdos_without_a_profile_keep_their_bytes() -> None:
+def test_pdos_without_a_profile_are_shown_as_bytes() -> None:
     record = Decoder().decode(Frame(0.0, 0x395, b"\x12\x34"))
     assert (record.kind, record.node_id, record.text) == ("TPDO3", 0x15, "map not known: 12 34")
     assert not record.problem
 
 
-def test_pdos_at_identifiers_of_their_own_and_gaps() -> None:
+def test_pdos_with_custom_identifiers_and_gaps_are_decoded() -> None:
     entries = tuple(PdoEntry(index=i, bits=b) for i, b in ((0x0005, 8), (0x6041, 16), (0x606C, 32)))
     moved = Pdo(number=3, cob_id_offset=0x18A, transmission_type=1, entries=entries)
     known = replace(KNOWN, drive=drive(tpdos=(moved,), velocity_unit="rpm"))
@@ -182,12 +184,12 @@ def test_pdos_at_identifiers_of_their_own_and_gaps() -> None:
     assert values(record)[0x606C] == (pytest.approx(10 * 6.0), "deg/s")
 
 
-# -- everything else, as the canopen library sends it
+# -- other services, sent by the canopen library
 
 
 @pytest.fixture
 def third_party() -> Iterator[tuple[canopen.Network, can.BusABC]]:
-    """A network of the library's, and somebody who listens."""
+    """Yield a network of the canopen library and a listener."""
     with can.Bus("decode", "virtual") as bus, can.Bus("decode", "virtual") as ear:
         network = canopen.Network(bus)
         yield network, ear
@@ -201,7 +203,7 @@ def heard(ear: can.BusABC) -> list[Record]:
     return records
 
 
-def test_network_management(third_party: tuple[canopen.Network, can.BusABC]) -> None:
+def test_network_management_is_decoded(third_party: tuple[canopen.Network, can.BusABC]) -> None:
     network, ear = third_party
     node = network.add_node(5, DICTIONARY)
     node.nmt.state = "OPERATIONAL"
@@ -219,7 +221,9 @@ def test_network_management(third_party: tuple[canopen.Network, can.BusABC]) -> 
     assert time.text.endswith(":02:01.500")
 
 
-def test_heartbeats_and_emergencies(third_party: tuple[canopen.Network, can.BusABC]) -> None:
+def test_heartbeats_and_emergencies_are_decoded(
+    third_party: tuple[canopen.Network, can.BusABC],
+) -> None:
     network, ear = third_party
     node = canopen.LocalNode(3, DICTIONARY)
     network.add_node(node)
@@ -241,7 +245,9 @@ def test_heartbeats_and_emergencies(third_party: tuple[canopen.Network, can.BusA
     assert decoded(0x703, "11").problem
 
 
-def test_layer_setting(third_party: tuple[canopen.Network, can.BusABC]) -> None:
+def test_layer_setting_services_are_decoded(
+    third_party: tuple[canopen.Network, can.BusABC],
+) -> None:
     network, ear = third_party
     lss = network.lss
     lss.RESPONSE_TIMEOUT = 0.01
@@ -256,7 +262,7 @@ def test_layer_setting(third_party: tuple[canopen.Network, can.BusABC]) -> None:
         lss.fast_scan,
     ):
         with suppress(canopen.lss.LssError):
-            ask()  # nobody answers
+            ask()  # no device answers
     records = heard(ear)
     assert {record.kind for record in records} == {"LSS"}
     told = [record.text for record in records]
@@ -294,7 +300,7 @@ def test_layer_setting(third_party: tuple[canopen.Network, can.BusABC]) -> None:
         (0x020, "", "no acknowledge"),
     ],
 )
-def test_error_frames(classes: int, data: str, text: str) -> None:
+def test_error_frames_are_decoded(classes: int, data: str, text: str) -> None:
     frame = Frame(0.0, classes, bytes.fromhex(data).ljust(8, b"\0"), error=True)
     record = Decoder().decode(frame)
     assert record.problem
@@ -309,7 +315,7 @@ def test_frames_outside_canopen_are_shown_raw() -> None:
     assert decoder.decode(Frame(0.0, 0x7FF, b"\1")).text == "no CANopen identifier: 01"
 
 
-# -- whatever comes
+# -- arbitrary frames
 
 IDENTIFIERS = st.integers(0, 0x7FF) | st.sampled_from(
     [0, 0x80, 0x81, 0x100, 0x181, 0x201, 0x281, 0x581, 0x581, 0x601, 0x601, 0x701, 0x7E4, 0x7E5]
@@ -333,7 +339,9 @@ FRAMES = st.tuples(
 
 @settings(max_examples=150)
 @given(st.lists(FRAMES, max_size=60), st.booleans())
-def test_no_frame_makes_it_fail(frames: list[tuple[int, bytes, int, int]], known: bool) -> None:
+def test_arbitrary_frames_are_decoded_to_printable_text(
+    frames: list[tuple[int, bytes, int, int]], known: bool
+) -> None:
     decoder = Decoder({1: KNOWN}) if known else Decoder(others=KnownNode(WINCH.drive))
     for identifier, data, flags, length in frames:
         packet = struct.pack(

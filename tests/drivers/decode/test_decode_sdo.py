@@ -1,4 +1,4 @@
-"""SDO transfers of the `canopen` library's client, overheard on the bus and understood."""
+"""SDO transfers of the `canopen` library's client are recorded on the bus and decoded."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ Overhear = Callable[[], list[can.Message]]
 
 @pytest.fixture(scope="module")
 def client(simulated_bus: str) -> Iterator[canopen.RemoteNode]:
-    """A third party's client of drive 1."""
+    """Yield a third-party client of drive 1."""
     network = canopen.Network()
     network.NOTIFIER_CYCLE = 0.02
     network.connect(interface="simbus", channel=simulated_bus.partition(":")[2])
@@ -34,7 +34,7 @@ def client(simulated_bus: str) -> Iterator[canopen.RemoteNode]:
 
 @pytest.fixture(scope="module")
 def overhear(simulated_bus: str) -> Iterator[Overhear]:
-    """Give the SDO frames that have passed since the last call."""
+    """Yield a function that returns the SDO frames since its last call."""
     name = simulated_bus.partition(":")[2]
     sdo: list[can.typechecking.CanFilter] = [
         {"can_id": 0x581, "can_mask": 0x7FF},
@@ -78,7 +78,7 @@ overheard = settings(
 
 @overheard
 @given(value=VALUES)
-def test_segmented_and_expedited_values_are_put_together(
+def test_segmented_and_expedited_values_are_reassembled(
     client: canopen.RemoteNode, overhear: Overhear, value: bytes
 ) -> None:
     overhear()
@@ -93,7 +93,7 @@ def test_segmented_and_expedited_values_are_put_together(
 
 @overheard
 @given(value=VALUES)
-def test_block_transfers_are_put_together(
+def test_block_transfers_are_reassembled(
     client: canopen.RemoteNode, overhear: Overhear, value: bytes
 ) -> None:
     overhear()
@@ -107,7 +107,7 @@ def test_block_transfers_are_put_together(
     assert not [event for event in found if event.step is Step.UNEXPECTED]
 
 
-def test_transfers_in_words(client: canopen.RemoteNode, overhear: Overhear) -> None:
+def test_transfers_are_described_as_text(client: canopen.RemoteNode, overhear: Overhear) -> None:
     overhear()
     client.sdo[0x6072].raw = 500
     client.sdo.upload(0x1018, 2)
@@ -121,7 +121,7 @@ def test_transfers_in_words(client: canopen.RemoteNode, overhear: Overhear) -> N
     assert told[-1] == "<- abort 5FFFh:3: object does not exist (06020000h)"
 
 
-def test_an_abort_is_marked(client: canopen.RemoteNode, overhear: Overhear) -> None:
+def test_an_abort_is_marked_as_problem(client: canopen.RemoteNode, overhear: Overhear) -> None:
     overhear()
     with pytest.raises(canopen.SdoAbortedError):
         client.sdo.download(0x1018, 1, bytes(4))
@@ -131,7 +131,7 @@ def test_an_abort_is_marked(client: canopen.RemoteNode, overhear: Overhear) -> N
     assert "attempt to write a read only object (06010002h)" in refused.text
 
 
-def test_a_missed_segment_gives_no_wrong_value(
+def test_no_value_is_reported_if_a_segment_is_missing(
     client: canopen.RemoteNode, overhear: Overhear
 ) -> None:
     client.sdo.download(USER_DATA, 0, bytes(range(60)))
@@ -148,7 +148,9 @@ def test_a_missed_segment_gives_no_wrong_value(
         assert one(events(gap), Step.VALUE).data is None
 
 
-def test_a_transfer_joined_in_its_middle(client: canopen.RemoteNode, overhear: Overhear) -> None:
+def test_no_value_is_reported_if_the_start_of_a_transfer_is_missing(
+    client: canopen.RemoteNode, overhear: Overhear
+) -> None:
     client.sdo.download(USER_DATA, 0, bytes(range(60)))
     overhear()
     client.sdo.upload(USER_DATA, 0)
@@ -156,10 +158,9 @@ def test_a_transfer_joined_in_its_middle(client: canopen.RemoteNode, overhear: O
     assert not [event for event in found if event.data is not None]
 
 
-def test_values_read_by_sdo_are_used_for_decoding(
+def test_ratings_and_pdo_maps_read_by_sdo_are_used_for_decoding(
     client: canopen.RemoteNode, overhear: Overhear
 ) -> None:
-    """Ratings and PDO maps that pass by serve from then on."""
     overhear()
     for index, sub in ((0x6076, 0), (0x608F, 1), *((0x1A00, entry) for entry in range(4))):
         client.sdo.upload(index, sub)

@@ -1,4 +1,4 @@
-"""Simulated load cells in a process of their own, on a board that the test writes."""
+"""Simulated load cells in a separate process, on a physics board that the test writes."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _STEP_S = 1e-3
 
 
 class LoadCellRig:
-    """`cdpr sim tension` and the physics it reads; `tell` breaks and mends things."""
+    """`cdpr sim tension` and the physics board that it reads. `tell` causes and ends faults."""
 
     def __init__(
         self,
@@ -38,7 +38,7 @@ class LoadCellRig:
         self.port = str(self._answer()["ready"]["port"])
 
     def pull(self, tensions_N: list[float], seconds: float = 0.4) -> None:
-        """Have the cables carry these tensions for so long, by the time of the board."""
+        """Apply these tensions for `seconds` of the board's time."""
         for _ in range(round(seconds / _STEP_S)):
             self.time_s += _STEP_S
             for axis, tension in zip(self._axes, tensions_N, strict=False):

@@ -1,4 +1,4 @@
-"""A simulated safety I/O in a process of its own, with a physics board, for tests."""
+"""A simulated safety I/O in a separate process, with a physics board."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ from cdpr_sim_bus.devices.sim_safety_io import SafetyIoFault
 from cdpr_sim_bus.physics_board import PhysicsBoard
 
 CLOCK = PacedClock()
-"""Whoever waits by it has the devices asked meanwhile."""
+"""While this clock waits, the devices are polled."""
 PANEL = 247
 DEADLINE_S = 60.0
 
 
 class SafetyIoProcess:
-    """A running `cdpr sim safety-io`; the client here is pymodbus alone."""
+    """A running `cdpr sim safety-io`, accessed through pymodbus."""
 
     def __init__(self, profile: Path, *options: str | Path) -> None:
         self.file = profile
@@ -47,7 +47,7 @@ class SafetyIoProcess:
         assert not self._client.write_register(1, int(fault), device_id=PANEL).isError()
 
     def mend(self) -> None:
-        """Have everything as it was at the start."""
+        """Restore the initial state."""
         self.press(False)
         self.break_(SafetyIoFault(0))
         for coil in (0, 1, 2, 8, 9, 10):
@@ -82,10 +82,10 @@ def ready(process: subprocess.Popen[bytes]) -> dict[str, Any]:
 
 
 def wait_until(done: Callable[[], object], timeout_s: float = DEADLINE_S) -> float:
-    """Return how long it took; fails after the time-out."""
+    """Return how long it took. Fail after the timeout."""
     began_s = CLOCK.now_s
     while not done():
-        assert CLOCK.now_s - began_s < timeout_s, "did not come about"
+        assert CLOCK.now_s - began_s < timeout_s, "timed out"
         CLOCK.sleep(0.005)
     return CLOCK.now_s - began_s
 
@@ -97,7 +97,7 @@ def patient_profile(
     trip_s: float = 0.4,
     follow_s: float = 0.3,
 ) -> Path:
-    """Return the shipped profile with times that suit a busy machine."""
+    """Return the shipped profile with timeouts for a busy machine."""
     text = (SHIPPED / "safety_io" / "modbus-remote-io.toml").read_text()
     for key, value in (("answer_timeout_s", answer_s), ("trip_timeout_s", trip_s)):
         line = next(line for line in text.splitlines() if line.startswith(key))
@@ -122,9 +122,9 @@ def board_file() -> Iterator[Path]:
 def io_device_on_board(
     folder: Path, axes: int = 2
 ) -> Iterator[tuple[SafetyIoProcess, PhysicsBoard]]:
-    """A simulated I/O whose board is the test's own, with limit switches at -90 and 90 deg.
+    """Yield a simulated I/O on the test's board, with limit switches at -90 and 90 degrees.
 
-    Whoever wants to see a time-out asks for a short one.
+    Timeouts are long: tests of timeouts pass shorter ones to `profile`.
     """
     plant = folder / "safety-plant.toml"
     switches = "[[axes]]\nlimit_negative_deg = -90.0\nlimit_positive_deg = 90.0\n"

@@ -1,4 +1,4 @@
-"""Load cells over a real serial line (a pseudo-terminal): values, faults of line and cell, tare."""
+"""Load cells on a real serial line (a pseudo-terminal): values, faults of line and cell, tare."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from cdpr_rt.core.clock import PacedClock
 from cdpr_rt.core.exchange import TensionFault
 from tests.drivers.modbus.load_cell_rig import LoadCellRig
 
-# amplifiers answer within 0.05 s of wall time, from a process of their own
+# amplifiers in a separate process answer within 0.05 s of wall-clock time
 pytestmark = pytest.mark.alone
 CLOCK = PacedClock()
 N = 3
@@ -31,7 +31,7 @@ def three() -> TensionSensors:
 
 
 def write_toml(path: Path, type_: str, order: str, kind: str, status_address: int) -> Path:
-    """Write a sensors' file with another register map."""
+    """Write a file of sensors with a different register map."""
     scale = 0.1 if type_.endswith("16") else 0.01
     path.write_text(f"""
 name = "another maker's"
@@ -87,7 +87,7 @@ def settled(cells: LoadCells, number: int, tension_N: float) -> None:
     assert cells.read(number).tension_N == pytest.approx(tension_N, abs=0.05)
 
 
-def test_every_cell_reads_the_tension_of_its_cable(rig: LoadCellRig, cells: LoadCells) -> None:
+def test_each_cell_reads_the_tension_of_its_cable(rig: LoadCellRig, cells: LoadCells) -> None:
     rig.pull([20.0, 45.5, 130.25])
     for number, tension in enumerate((20.0, 45.5, 130.25)):
         settled(cells, number, tension)
@@ -105,7 +105,7 @@ def test_every_cell_reads_the_tension_of_its_cable(rig: LoadCellRig, cells: Load
         ("wrong-unit", "unit 3 answered"),
     ],
 )
-def test_a_disturbed_line_is_reported_and_harms_no_other_cell(
+def test_a_disturbed_answer_is_reported_and_does_not_affect_other_cells(
     rig: LoadCellRig, cells: LoadCells, fault: str, message: str
 ) -> None:
     rig.tell(f"{fault} 2")
@@ -125,11 +125,11 @@ def test_over_range_and_broken_wire_are_distinguished(rig: LoadCellRig, cells: L
     assert cells.read(1).fault is TensionFault.BROKEN_WIRE
     assert cells.read(2).fault is TensionFault.NONE
     rig.tell("mend all")
-    rig.pull([1500.0])  # by its own means
+    rig.pull([1500.0])  # the amplifier detects it without a fault command
     assert cells.read(0).fault is TensionFault.OVER_RANGE
 
 
-def test_a_disturbed_answer_is_asked_for_again(rig: LoadCellRig) -> None:
+def test_a_request_is_repeated_after_a_disturbed_answer(rig: LoadCellRig) -> None:
     profile = three().model_copy(update={"retries": 5})
     cells = LoadCells(profile, rig.port, CLOCK)
     cells.read(0)
@@ -154,7 +154,7 @@ def test_tare_makes_the_present_tension_zero(rig: LoadCellRig, cells: LoadCells)
     settled(cells, 0, 0.0)
 
 
-def test_a_register_that_is_not_there_is_rejected_with_a_reason(cells: LoadCells) -> None:
+def test_a_missing_register_is_rejected_with_a_reason(cells: LoadCells) -> None:
     with pytest.raises(ModbusError, match=r"unit 1: holding register 99: refused.*no such input"):
         cells.line.registers("holding", 1, 99, 1)
     with pytest.raises(
@@ -163,8 +163,8 @@ def test_a_register_that_is_not_there_is_rejected_with_a_reason(cells: LoadCells
         cells.line.write_register(1, 10, 7)
 
 
-def test_the_bytes_on_the_line_are_those_of_the_standard(rig: LoadCellRig) -> None:
-    """A third party who knows the Modbus specification alone asks and checks."""
+def test_the_bytes_on_the_line_follow_the_modbus_specification(rig: LoadCellRig) -> None:
+    """Requests and checks are written from the specification, without the driver."""
 
     def crc(data: bytes) -> bytes:
         value = 0xFFFF
@@ -185,7 +185,7 @@ def test_the_bytes_on_the_line_are_those_of_the_standard(rig: LoadCellRig) -> No
         assert struct.unpack(">iH", answer[3:9]) == (10000, 0)
 
 
-def test_the_sampler_dates_readings_and_outlives_what_fails(rig: LoadCellRig) -> None:
+def test_the_sampler_timestamps_readings_and_survives_faults(rig: LoadCellRig) -> None:
     rig.tell("mend all")
     rig.pull([30.0, 40.0, 50.0])
     with TensionSampler(three(), rig.port, CLOCK) as sampler:
@@ -211,7 +211,7 @@ def test_the_sampler_dates_readings_and_outlives_what_fails(rig: LoadCellRig) ->
         until(lambda: valid([True, True, True]))
 
 
-def test_a_port_that_is_not_there_is_reported(tmp_path: Path) -> None:
+def test_a_missing_port_is_reported(tmp_path: Path) -> None:
     with pytest.raises(LineError, match=r"ttyNone: cannot be opened: No such file or directory"):
         TensionSampler(three(), str(tmp_path / "ttyNone"), CLOCK).start()
     plain = tmp_path / "plain"
@@ -220,7 +220,7 @@ def test_a_port_that_is_not_there_is_reported(tmp_path: Path) -> None:
         TensionSampler(three(), str(plain), CLOCK).start()
 
 
-def test_other_register_maps_and_an_adapter_pulled_out(tmp_path: Path) -> None:
+def test_other_register_maps_work_and_an_unplugged_adapter_is_reported(tmp_path: Path) -> None:
     (tmp_path / "amplifiers.toml").write_text(_EXACT)
     maps = [("float32", "little", "holding", 90), ("int16", "big", "input", 101)]
     for type_, order, kind, status in maps:
@@ -245,7 +245,7 @@ def test_other_register_maps_and_an_adapter_pulled_out(tmp_path: Path) -> None:
             cells.close()
 
 
-def test_raw_values_of_every_type_and_word_order() -> None:
+def test_raw_values_of_each_type_and_word_order_are_decoded() -> None:
     numbers = {"int16": -2, "uint16": 65534, "int32": -100000, "uint32": 3_000_000_000}
     codes = {"int16": ">h", "uint16": ">H", "int32": ">i", "uint32": ">I", "float32": ">f"}
     for type_, order in itertools.product(codes, ("big", "little")):
@@ -258,7 +258,7 @@ def test_raw_values_of_every_type_and_word_order() -> None:
         assert raw_value(value, words if order == "big" else words[::-1]) == number
 
 
-def test_nothing_of_the_rig_stays_open(rig: LoadCellRig) -> None:
+def test_a_closed_sampler_leaves_no_file_descriptor_open(rig: LoadCellRig) -> None:
     count = len(list(Path("/proc/self/fd").iterdir()))
     for _ in range(3):
         with TensionSampler(three(), rig.port, CLOCK) as sampler:

@@ -1,8 +1,8 @@
-"""Simulated Modbus devices in lockstep: what they answer depends on bus time and nothing else.
+"""The answers of simulated Modbus devices in lockstep depend only on bus time.
 
-The bus here is the test's own, a mock of a simulated bus that this process leads: it moves the
-physics board in steps of 1 ms as the simulated drives do. The devices are real processes behind
-real lines; some of them are stopped (SIGSTOP) by the wall clock while they are asked.
+The bus is a stand-in that this process leads. It updates the physics board in steps of 1 ms, as
+simulated drives do. The devices are real processes on real lines. Some are stopped (SIGSTOP) for a
+while during a request.
 """
 
 from __future__ import annotations
@@ -39,11 +39,11 @@ from tests.drivers.modbus.safety_rig import (
 )
 
 STEP_S = 1e-3
-HELD_UP_S = 0.6  # much longer than any of the lines' time-outs
+HELD_UP_S = 0.6  # much longer than any timeout of the lines
 
 
 class BoardBus:
-    """Bus time that goes on in steps, with what lies on the board at each."""
+    """Bus time that advances in steps and updates the board at each."""
 
     def __init__(self, board: PhysicsBoard, tension_N: Callable[[float], float]) -> None:
         self.now_s, self.next_s, self.gone = 0.0, math.inf, False
@@ -51,7 +51,7 @@ class BoardBus:
         self._tension_N = tension_N
         self._steps = 0
         self.seen: list[tuple[int, bool, bool]] = []
-        """Step, power and brake of the first axis, wherever one has changed."""
+        """Step, power and brake of the first axis at each change."""
         self._publish()
 
     def go(self, until_s: float) -> bool:
@@ -73,7 +73,7 @@ class BoardBus:
 
 @contextmanager
 def held_up(process: subprocess.Popen[bytes] | subprocess.Popen[str]) -> Iterator[None]:
-    """Stop a process for a while, from now on."""
+    """Stop a process for a while, starting now."""
     os.kill(process.pid, signal.SIGSTOP)
     going_on = threading.Timer(HELD_UP_S, os.kill, (process.pid, signal.SIGCONT))
     going_on.start()
@@ -84,12 +84,12 @@ def held_up(process: subprocess.Popen[bytes] | subprocess.Popen[str]) -> Iterato
 
 
 def pulled(time_s: float) -> float:
-    """A tension that never stands still."""
+    """Return a tension that always changes."""
     return 40.0 + 30.0 * math.sin(9.0 * time_s) + 5.0 * math.sin(120.0 * time_s)
 
 
 def readings(folder: Path, *, disturbed: bool) -> list[tuple[float, ...]]:
-    """Return what three cells tell in each of 400 cycles."""
+    """Return the readings of three cells in each of 400 cycles."""
     folder.mkdir()
     whole = load_tension_sensors("rtu-load-cells-8")
     profile = whole.model_copy(update={"sensors": whole.sensors[:3]})
@@ -112,20 +112,20 @@ def readings(folder: Path, *, disturbed: bool) -> list[tuple[float, ...]]:
     return told
 
 
-def test_load_cells_read_the_same_however_long_their_process_is_held_up(tmp_path: Path) -> None:
+def test_delays_of_the_load_cell_process_do_not_change_readings(tmp_path: Path) -> None:
     calm = readings(tmp_path / "calm", disturbed=False)
     assert readings(tmp_path / "disturbed", disturbed=True) == calm
-    # each is that of the instant at which it was asked for, behind a filter of 15 Hz
+    # each reading is that at the time of its request, filtered with 15 Hz
     asked = {row[3]: row[0] for row in calm if math.isfinite(row[3])}
     assert len(asked) > 15
     smooth = [tension - 40.0 - 30.0 * math.sin(9.0 * (t - 0.021)) for t, tension in asked.items()]
     assert max(map(abs, smooth[2:])) < 6.0
-    # and it takes its time on the wire before anybody has it
+    # it arrives after its transmission time
     ages = [row[6] for row in calm if math.isfinite(row[6])]
     assert min(ages) > 19 * 11 / 115200
 
 
-def test_a_cell_that_says_nothing_is_found_silent_in_bus_time(tmp_path: Path) -> None:
+def test_a_silent_or_truncated_cell_becomes_stale_in_bus_time(tmp_path: Path) -> None:
     profile = load_tension_sensors("rtu-load-cell-1")
     with LoadCellRig("rtu-load-cell-1", tmp_path, 1, lockstep=True) as rig:
         clock = LockstepClock([BoardBus(rig.board, pulled)])
@@ -157,7 +157,7 @@ def safety_lab(folder: Path) -> Iterator[tuple[SafetyIoProcess, BoardBus, Lockst
 
 
 def session(folder: Path, *, disturbed: bool) -> list[tuple[int, bool, bool]]:
-    """Return when power and brake came and went in a session with a safety I/O."""
+    """Return when power and brake switched in a session with a safety I/O."""
     with safety_lab(folder) as (io_device, bus, clock), SafetyIo(io_device.profile(), clock) as io:
         io.energise()
         if disturbed:
@@ -174,7 +174,7 @@ def session(folder: Path, *, disturbed: bool) -> list[tuple[int, bool, bool]]:
         return bus.seen
 
 
-def test_contactor_and_brake_follow_in_bus_time_however_long_the_device_is_held_up(
+def test_delays_of_the_safety_io_do_not_change_when_contactor_and_brake_switch(
     tmp_path: Path,
 ) -> None:
     calm = session(tmp_path / "calm", disturbed=False)
@@ -188,13 +188,13 @@ def test_contactor_and_brake_follow_in_bus_time_however_long_the_device_is_held_
     assert session(tmp_path / "disturbed", disturbed=True) == calm
 
 
-def test_the_devices_own_watchdog_counts_bus_time(tmp_path: Path) -> None:
+def test_the_watchdog_of_the_device_counts_bus_time(tmp_path: Path) -> None:
     with safety_lab(tmp_path / "lab") as (io_device, bus, clock):
         io = SafetyIo(io_device.profile(), clock).open()
         io.energise()
         fed_s = io.state.at_s
-        time.sleep(1.5)  # by the wall clock: the device has 1 s
-        bus.go(fed_s + 0.9)  # nobody asks meanwhile
+        time.sleep(1.5)  # longer than the watchdog's 1 s, but wall-clock time
+        bus.go(fed_s + 0.9)  # without a poll
         assert bus.seen[-1][1]
         bus.go(fed_s + 1.1)
         assert not bus.seen[-1][1]
@@ -206,16 +206,14 @@ def test_the_devices_own_watchdog_counts_bus_time(tmp_path: Path) -> None:
 
 
 def answer_to_third_party(io_device: SafetyIoProcess) -> bytes:
-    """Return what comes where the discrete inputs 0 to 7 are asked for."""
+    """Return the answer to a third party's request for the discrete inputs 0 to 7."""
     with socket.create_connection(("127.0.0.1", io_device.port), 10.0) as third_party:
         third_party.sendall(bytes.fromhex("0001 0000 0006 01 02 0000 0008"))
         return third_party.recv(100)
 
 
 @pytest.mark.parametrize("fault", [SafetyIoFault.SILENT, SafetyIoFault.TRUNCATED])
-def test_a_safety_io_that_falls_silent_trips_in_bus_time(
-    tmp_path: Path, fault: SafetyIoFault
-) -> None:
+def test_a_silent_safety_io_trips_in_bus_time(tmp_path: Path, fault: SafetyIoFault) -> None:
     with safety_lab(tmp_path / "lab") as (io_device, _, clock):
         io = SafetyIo(io_device.profile(), clock).open()
         io.energise()
@@ -234,7 +232,7 @@ def test_a_safety_io_that_falls_silent_trips_in_bus_time(
 
 
 def travel(folder: Path, *, disturbed: bool) -> list[tuple[float, float]]:
-    """Return where the carriage was when, in a move by a Modbus rail."""
+    """Return times and positions of the carriage in a move of a Modbus rail."""
     folder.mkdir()
     profile = folder / "rail.toml"
     told: list[tuple[float, float]] = []
@@ -261,7 +259,7 @@ def travel(folder: Path, *, disturbed: bool) -> list[tuple[float, float]]:
     return told
 
 
-def test_a_rail_moves_in_bus_time_however_long_its_process_is_held_up(
+def test_delays_of_the_rail_process_do_not_change_its_motion(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))

@@ -1,4 +1,4 @@
-"""The Modbus TCP client against a server that answers anything: an answer or a clear error."""
+"""The Modbus TCP client returns a valid answer or raises a clear error."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ Answer = Callable[[bytes], bytes]
 
 
 class Babbler:
-    """A device whose answers the test makes up, frame by frame."""
+    """A device whose answers the test defines frame by frame."""
 
     def __init__(self) -> None:
         self.answer: Answer = lambda request: b""
@@ -50,7 +50,7 @@ def _received(peer: socket.socket) -> bytes:
 
 
 def framed(request: bytes, body: bytes, length: int | None = None) -> bytes:
-    """Return the body behind the header that answers `request`."""
+    """Return `body` with the header of an answer to `request`."""
     announced = len(body) + 1 if length is None else length
     return request[:4] + announced.to_bytes(2, "big") + request[6:7] + body
 
@@ -69,12 +69,12 @@ def client(device: Babbler) -> Iterator[ModbusTcp]:
     opened.close()
 
 
-def test_a_good_answer_is_read(device: Babbler, client: ModbusTcp) -> None:
+def test_a_valid_answer_is_read(device: Babbler, client: ModbusTcp) -> None:
     device.answer = lambda request: framed(request, bytes([2, 2, 0b00000101, 1]))
     assert client.inputs(7, 9) == [True, False, True, *[False] * 5, True]
     device.answer = lambda request: framed(request, bytes([3, 4, 0x12, 0x34, 0xFF, 0xFF]))
     assert client.registers(100, 2) == [0x1234, 0xFFFF]
-    device.answer = lambda request: request  # as it should be
+    device.answer = lambda request: request  # the right unit
     client.write_coil(5, True)
 
 
@@ -96,10 +96,10 @@ def test_a_wrong_answer_is_reported(
     ):
         client.inputs(7, 9)
     device.answer = lambda request: framed(request, bytes([2, 2, 0, 0]))
-    assert client.inputs(7, 9) == [False] * 9  # and the next request is none the worse
+    assert client.inputs(7, 9) == [False] * 9  # the next request works
 
 
-def test_an_echo_of_another_write_is_no_confirmation(device: Babbler, client: ModbusTcp) -> None:
+def test_an_echo_of_a_different_write_is_rejected(device: Babbler, client: ModbusTcp) -> None:
     device.answer = lambda request: framed(request, bytes([5, 0, 6, 0xFF, 0]))
     with pytest.raises(ModbusError, match="set coil 5 to 1: the answer is that to another request"):
         client.write_coil(5, True)
@@ -108,7 +108,7 @@ def test_an_echo_of_another_write_is_no_confirmation(device: Babbler, client: Mo
         client.write_registers(100, [1, 2])
 
 
-def test_whatever_comes_is_an_answer_or_a_modbus_error(device: Babbler) -> None:
+def test_arbitrary_bytes_give_an_answer_or_a_modbus_error(device: Babbler) -> None:
     dice = random.Random(3)
     client = ModbusTcp("127.0.0.1", device.port, 1, 0.03, PacedClock())
 

@@ -1,4 +1,4 @@
-"""The safety I/O's driver against a simulated one in a process of its own."""
+"""The driver of the safety I/O with a simulated device in a separate process."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from tests.drivers.modbus.safety_rig import CLOCK, SafetyIoProcess, io_device_on
 
 TRIP_S = 0.4
 QUICK = {"answer_timeout_s": 0.2, "trip_timeout_s": TRIP_S}
-"""For what is to be given up soon."""
+"""Short timeouts, for tests that wait for them."""
 
 
 def watched(io_device: SafetyIoProcess) -> SafetyIoProfile:
@@ -46,7 +46,7 @@ def winch(lab: tuple[SafetyIoProcess, PhysicsBoard]) -> BoardAxis:
 def io_device(
     lab: tuple[SafetyIoProcess, PhysicsBoard], winch: BoardAxis
 ) -> Iterator[SafetyIoProcess]:
-    """The device, whole and at rest, its winch in the middle."""
+    """Return the device in its initial state, with its winch in the middle."""
     winch.publish(0.0, 0.0, 0.0, 0.0, False)
     lab[0].mend()
     yield lab[0]
@@ -73,7 +73,7 @@ def test_the_contactor_closes_when_asked_and_opens_at_the_end(
     assert not io_device.coil(0)
 
 
-def test_an_open_chain_refuses_power(io_device: SafetyIoProcess, winch: BoardAxis) -> None:
+def test_an_open_chain_prevents_power(io_device: SafetyIoProcess, winch: BoardAxis) -> None:
     io_device.press()
     with (
         SafetyIo(io_device.profile(), CLOCK) as io,
@@ -103,7 +103,7 @@ def test_the_emergency_stop_trips_until_it_is_acknowledged(
         assert io.alarm()  # stays
     with SafetyIo(
         io_device.profile(), CLOCK, latch
-    ) as later:  # another command, after the buttons were pulled
+    ) as later:  # a second command, after the buttons were released
         with pytest.raises(SafetyIoError, match=r"tripped on .*chain is open.*io ack"):
             later.energise()
         later.acknowledge()
@@ -123,7 +123,7 @@ def test_the_emergency_stop_trips_until_it_is_acknowledged(
         (SafetyIoFault.EXCEPTIONS, r"no good poll .*refused with exception 4 \(device failure\)"),
     ],
 )
-def test_answers_that_are_no_answers_stop_the_motion(
+def test_invalid_answers_stop_the_motion(
     io_device: SafetyIoProcess, fault: SafetyIoFault, text: str
 ) -> None:
     io = SafetyIo(io_device.profile(**QUICK), CLOCK).open()
@@ -133,7 +133,7 @@ def test_answers_that_are_no_answers_stop_the_motion(
         io_device.break_(fault)
         wait_until(io.stop_reason)
         assert CLOCK.now_s - began_s > TRIP_S / 2
-        assert not io.alarm()  # braked under control: nothing says that the power is gone
+        assert not io.alarm()  # a controlled stop: power is not known to be off
         io_device.break_(SafetyIoFault(0))
         CLOCK.sleep(0.1)
         with pytest.raises(SafetyIoError, match=text):
@@ -143,8 +143,10 @@ def test_answers_that_are_no_answers_stop_the_motion(
         io.close()
 
 
-def test_a_poll_that_waits_for_its_answer_trips_as_well(io_device: SafetyIoProcess) -> None:
-    """The task waits for an answer much longer than the trip time-out allows."""
+def test_a_poll_waiting_for_its_answer_trips_after_the_trip_timeout(
+    io_device: SafetyIoProcess,
+) -> None:
+    """The task waits for the answer much longer than the trip timeout."""
     io = SafetyIo(io_device.profile(trip_timeout_s=TRIP_S), CLOCK).open()
     try:
         io.energise()
@@ -156,11 +158,11 @@ def test_a_poll_that_waits_for_its_answer_trips_as_well(io_device: SafetyIoProce
         assert "no good poll" in io.close()
 
 
-def test_a_pause_of_the_whole_process_is_no_silence_but_silence_after_it_is(
+def test_a_pause_of_the_process_does_not_trip_but_silence_after_it_does(
     io_device: SafetyIoProcess,
 ) -> None:
-    hold_interpreter = ctypes.PyDLL(None).usleep  # unlike time.sleep it lets no thread run
-    trip_s = 1.0  # longer than a busy machine may keep the device from answering
+    hold_interpreter = ctypes.PyDLL(None).usleep  # unlike time.sleep, it blocks all threads
+    trip_s = 1.0  # longer than a busy machine delays answers
     with SafetyIo(io_device.profile(answer_timeout_s=0.5, trip_timeout_s=trip_s), CLOCK) as io:
         io.energise()
         assert io.stop_reason() == ""
@@ -176,8 +178,10 @@ def test_a_pause_of_the_whole_process_is_no_silence_but_silence_after_it_is(
         io_device.break_(SafetyIoFault(0))
 
 
-def test_rare_questions_are_answered_as_well(io_device: SafetyIoProcess) -> None:
-    """Cycles that are longer than the trip time-out get the benefit of the doubt only once."""
+def test_silence_trips_also_if_cycles_are_longer_than_the_trip_timeout(
+    io_device: SafetyIoProcess,
+) -> None:
+    """Only the first such cycle is excused."""
     with SafetyIo(io_device.profile(**QUICK), CLOCK) as io:
         io.energise()
         io_device.break_(SafetyIoFault.SILENT)
@@ -188,7 +192,7 @@ def test_rare_questions_are_answered_as_well(io_device: SafetyIoProcess) -> None
         io_device.break_(SafetyIoFault(0))
 
 
-def test_a_welded_contactor_is_noticed(io_device: SafetyIoProcess) -> None:
+def test_a_welded_contactor_is_detected(io_device: SafetyIoProcess) -> None:
     io = SafetyIo(io_device.profile(), CLOCK).open()
     io.energise()
     io_device.break_(SafetyIoFault.CONTACTOR_WELDED)
@@ -200,7 +204,7 @@ def test_a_welded_contactor_is_noticed(io_device: SafetyIoProcess) -> None:
         wait_until(lambda: not io.state.contactor_closed)
 
 
-def test_a_contactor_without_feedback_is_noticed(
+def test_a_contactor_without_feedback_is_detected(
     io_device: SafetyIoProcess, winch: BoardAxis
 ) -> None:
     io_device.break_(SafetyIoFault.FEEDBACK_STUCK)
@@ -212,7 +216,7 @@ def test_a_contactor_without_feedback_is_noticed(
         wait_until(lambda: not io_device.coil(0))
 
 
-def test_a_brake_that_does_not_follow_is_noticed(io_device: SafetyIoProcess) -> None:
+def test_a_brake_that_does_not_follow_is_detected(io_device: SafetyIoProcess) -> None:
     with SafetyIo(io_device.profile(), CLOCK) as io:
         io.energise()
         io_device.break_(SafetyIoFault.BRAKES_STUCK)
@@ -222,17 +226,17 @@ def test_a_brake_that_does_not_follow_is_noticed(io_device: SafetyIoProcess) -> 
         assert "brake of winch 1" in io.alarm()
 
 
-def test_an_output_that_somebody_else_changes_is_noticed(io_device: SafetyIoProcess) -> None:
+def test_an_output_changed_by_another_client_is_detected(io_device: SafetyIoProcess) -> None:
     with SafetyIo(io_device.profile(), CLOCK) as io:
         io.energise()
-        io_device.break_(SafetyIoFault.FEEDBACK_STUCK)  # which would tell otherwise
+        io_device.break_(SafetyIoFault.FEEDBACK_STUCK)  # otherwise the feedback would show it
         io_device.set(0, False)
         wait_until(io.alarm)
         assert "output 0 was set to 1 and reads 0" in io.alarm()
         io_device.break_(SafetyIoFault(0))
 
 
-def test_a_second_command_does_not_take_the_power_from_the_first(
+def test_a_second_command_cannot_open_the_device_and_does_not_cut_power(
     io_device: SafetyIoProcess, winch: BoardAxis
 ) -> None:
     with SafetyIo(io_device.profile(), CLOCK) as io:
@@ -244,7 +248,7 @@ def test_a_second_command_does_not_take_the_power_from_the_first(
         assert not io.alarm()
 
 
-def test_a_poll_that_fails_in_an_unforeseen_way_is_silence_and_power_still_goes(
+def test_an_unexpected_error_in_a_poll_trips_and_power_is_cut_at_close(
     io_device: SafetyIoProcess, winch: BoardAxis, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def fail(*_: object) -> None:
@@ -259,7 +263,7 @@ def test_a_poll_that_fails_in_an_unforeseen_way_is_silence_and_power_still_goes(
     assert not winch.power_allowed
 
 
-def test_an_interrupt_that_ends_the_polling_still_ends_in_an_open_contactor(
+def test_an_interrupt_of_the_polling_opens_the_contactor(
     io_device: SafetyIoProcess, winch: BoardAxis, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def interrupt(*_: object) -> None:
@@ -274,12 +278,12 @@ def test_an_interrupt_that_ends_the_polling_still_ends_in_an_open_contactor(
     assert not io_device.coil(0)
 
 
-def test_a_loop_that_is_busy_for_long_finds_that_the_device_has_opened_the_contactor(
+def test_a_loop_busy_for_long_detects_that_the_device_opened_the_contactor(
     io_device: SafetyIoProcess, winch: BoardAxis
 ) -> None:
     with SafetyIo(watched(io_device), CLOCK) as io:
         io.energise()
-        time.sleep(1.3)  # nobody polls; the device waits for 1 s
+        time.sleep(1.3)  # no polls; the device waits for 1 s
         deadline = time.monotonic() + 60.0
         while winch.power_allowed:
             assert time.monotonic() < deadline
@@ -287,13 +291,13 @@ def test_a_loop_that_is_busy_for_long_finds_that_the_device_has_opened_the_conta
         assert "contactor did not stay closed" in io.alarm()
 
 
-def test_each_place_has_trips_of_its_own() -> None:
+def test_each_address_has_a_separate_trip_file() -> None:
     here, there = (trip_file(f"modbus-remote-io@10.0.0.{i}:502") for i in (1, 2))
     assert here != there
     assert trip_file("modbus-remote-io@127.0.0.1:502") == trip_file("modbus-remote-io")
 
 
-def test_a_damaged_trip_file_refuses_until_it_is_acknowledged(
+def test_a_damaged_trip_file_prevents_power_until_acknowledged(
     io_device: SafetyIoProcess, tmp_path: Path
 ) -> None:
     latch = tmp_path / "trip.json"
@@ -313,7 +317,7 @@ def test_a_limit_switch_stops_the_motion(io_device: SafetyIoProcess, winch: Boar
         assert "winch 1 stands on its positive limit switch (input 4 reads 0)" in io.stop_reason()
         assert not io.alarm()
         assert winch.power_allowed  # for the controlled stop
-        wait_until(lambda: not winch.power_allowed)  # which may not take for ever
+        wait_until(lambda: not winch.power_allowed)  # the stop has a time limit
     with (
         SafetyIo(io_device.profile(), CLOCK) as io,
         pytest.raises(SafetyIoError, match="limit switch"),
@@ -334,7 +338,7 @@ def test_the_device_drops_its_outputs_when_the_master_falls_silent(
     link.close()
 
 
-def test_a_device_that_is_not_there_or_another_one_is_said_in_words(
+def test_a_missing_silent_or_wrong_device_is_reported(
     io_device: SafetyIoProcess,
 ) -> None:
     with socket.socket() as free:
@@ -342,7 +346,7 @@ def test_a_device_that_is_not_there_or_another_one_is_said_in_words(
         port = free.getsockname()[1]
         with pytest.raises(ModbusError, match=rf"127.0.0.1:{port}: cannot connect: Connection ref"):
             SafetyIo(io_device.profile(port=port), CLOCK).open()
-        # takes the connection and says nothing
+        # accepts the connection but does not answer
         free.listen()
         with pytest.raises(ModbusError, match=r"no answer within 0\.2 s from unit 1"):
             SafetyIo(io_device.profile(port=port, **QUICK), CLOCK).open()

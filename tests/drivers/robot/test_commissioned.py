@@ -1,4 +1,4 @@
-"""A robot finds what commissioning has learnt of its motors, and takes no other motor's for it."""
+"""A robot finds the commissioning results of its motors and rejects those of other motors."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def learnt(robot: Robot, tmp_path: Path) -> Path:
     return leave_profiles(robot, [Plant()] * 3, tmp_path / "learnt")
 
 
-def test_each_axis_has_a_folder_of_its_own(robot: Robot, learnt: Path) -> None:
+def test_each_axis_has_a_separate_folder(robot: Robot, learnt: Path) -> None:
     assert [folder_of(axis) for axis in robot.axes] == ["upper-left", "upper-right", "lower"]
     found = with_commissioned(robot, learnt)
     assert [axis.commissioned for axis in found.axes] == [
@@ -53,7 +53,7 @@ def test_each_axis_has_a_folder_of_its_own(robot: Robot, learnt: Path) -> None:
     assert with_commissioned(found, None) is found
 
 
-def test_axes_that_are_not_commissioned_yet_are_left_as_they_are(
+def test_axes_without_commissioning_results_run_without_compensation(
     robot: Robot, learnt: Path
 ) -> None:
     (learnt / "upper-right" / PROFILE).unlink()
@@ -65,7 +65,7 @@ def test_axes_that_are_not_commissioned_yet_are_left_as_they_are(
         with_commissioned(robot, learnt)
 
 
-def test_the_robots_file_names_a_folder_or_a_file(robot: Robot, learnt: Path) -> None:
+def test_the_robots_file_may_name_a_folder_or_a_file_of_results(robot: Robot, learnt: Path) -> None:
     text = robot_file(learnt.parent, [("can0", 1), ("can0", 2)]).read_text()
     own = text.replace("node_id = 1", 'node_id = 1\ncommissioned = "learnt/upper-left"')
     own = own.replace("node_id = 2", f'node_id = 2\ncommissioned = "learnt/lower/{PROFILE}"')
@@ -80,7 +80,7 @@ def test_the_robots_file_names_a_folder_or_a_file(robot: Robot, learnt: Path) ->
         load_robot(path)
 
 
-def test_a_damaged_profile_or_another_motors_is_refused(robot: Robot, learnt: Path) -> None:
+def test_a_damaged_profile_or_one_of_another_motor_is_rejected(robot: Robot, learnt: Path) -> None:
     path = learnt / "lower" / PROFILE
     whole = path.read_text()
     found = with_commissioned(robot, learnt)
@@ -92,7 +92,9 @@ def test_a_damaged_profile_or_another_motors_is_refused(robot: Robot, learnt: Pa
         load_profiles(found)
 
 
-def test_another_drive_is_refused_by_its_serial_number(robot: Robot, learnt: Path) -> None:
+def test_a_profile_of_another_drive_is_rejected_by_serial_number(
+    robot: Robot, learnt: Path
+) -> None:
     found = with_commissioned(robot, learnt)
     profiles = load_profiles(found)
     drive = robot.axes[0].winch.drive
@@ -113,7 +115,7 @@ def test_another_drive_is_refused_by_its_serial_number(robot: Robot, learnt: Pat
 
 
 @pytest.mark.parametrize(("booted", "refused"), [(1, False), (0, False), (77, True)])
-def test_a_calibration_of_a_winch_with_another_drive_is_refused(
+def test_a_calibration_of_a_winch_with_another_drive_is_rejected(
     robot: Robot, booted: int, refused: bool
 ) -> None:
     drive = robot.axes[0].winch.drive

@@ -1,4 +1,4 @@
-"""Faults that a safety I/O reports to a session."""
+"""A session receives the faults of a safety I/O."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from cdpr_drivers.robot.safety import SessionSafety
 
 
 @pytest.mark.parametrize(("nodes", "axis"), [((1, 2), 1), ((2, 2), -1), ((1, 3), -1)])
-def test_a_trip_is_of_an_axis_only_if_its_node_id_occurs_once(
+def test_a_trip_is_assigned_to_an_axis_only_if_its_node_id_is_unique(
     nodes: tuple[int, int], axis: int
 ) -> None:
     profile = SimpleNamespace(axes=[SimpleNamespace(axis="hoist", node_id=2, brake=None)])
