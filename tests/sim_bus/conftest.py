@@ -1,4 +1,4 @@
-"""A bus in a thread of the test, with nodes that only do what the test tells them."""
+"""A bus in a thread, with nodes whose behaviour the test defines."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _numbers = itertools.count()
 
 
 class StubNode:
-    """Answers each SYNC with `answers`; sends a frame at each of `timers`; remembers all."""
+    """Answer each SYNC with `answers`, send a frame at each of `timers`, and record everything."""
 
     def __init__(
         self,
@@ -61,7 +61,7 @@ class StubNode:
 
 
 class Member:
-    """A client on a plain socket; knows the wire, not the library under test."""
+    """A client on a plain socket that does not use the library under test."""
 
     def __init__(self, name: str) -> None:
         self.sock = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
@@ -79,7 +79,7 @@ class Member:
         return int.from_bytes(self.recv()[:4], "little")
 
     def ask(self, message: object) -> dict[str, object]:
-        """Send a control message and return the answer, dropping frames that come before."""
+        """Send a control message and return the answer, discarding frames before it."""
         text = json.dumps(message).encode()
         self.sock.send(text + b" " * (len(text) == 16))
         while len(packet := self.recv()) == 16:
@@ -98,7 +98,7 @@ class Member:
         return answer["now_s"], math.inf if answer["next_s"] is None else answer["next_s"]
 
     def until_time(self) -> tuple[list[bytes], float, float]:
-        """Return the frames up to the next time packet, bus time, and the next event's."""
+        """Return frames up to the next time packet, the bus time, and that of the next event."""
         frames = list[bytes]()
         while True:
             packet = self.recv()
@@ -109,12 +109,12 @@ class Member:
             assert mark == b"bus-data"
 
     def go(self, until_s: float) -> tuple[list[bytes], float, float]:
-        """Let the bus go on and return what `until_time` does."""
+        """Let the bus run until `until_s`. Return the result of `until_time`."""
         self.sock.send(struct.pack("<8sdd", b"bus-go\0\0", until_s, 0.0))
         return self.until_time()
 
     def sync(self) -> tuple[list[bytes], float, float]:
-        """Send the SYNC of a leader and return what `until_time` does."""
+        """Send the SYNC of a leader. Return the result of `until_time`."""
         self.send(SYNC_ID)
         return self.until_time()
 
@@ -123,13 +123,13 @@ class Member:
         self.status()
 
     def quiet(self) -> bool:
-        """Return whether nothing waits, after the bus has dealt with all that was sent."""
+        """Return whether no frame waits after the bus has processed all sent frames."""
         self.sock.send(b'{"status":true}  ')
         return len(self.recv()) != 16
 
 
 class RunningBus:
-    """A hub in a thread, with its members."""
+    """A hub in a thread, with its clients."""
 
     def __init__(self, nodes: tuple[StubNode, ...], mode: ClockMode, bitrate: int) -> None:
         self.name = f"t{os.getpid()}-{next(_numbers)}"

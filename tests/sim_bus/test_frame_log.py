@@ -1,4 +1,4 @@
-"""The log of all frames, read back by the tools that know candump's format."""
+"""The log of all frames is readable by tools for candump's format."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def told(path: Path) -> list[tuple[float, str, int, bytes]]:
     ]
 
 
-def test_every_frame_is_there_at_bus_time_in_the_order_of_the_bus(
+def test_all_frames_are_logged_with_bus_time_in_bus_order(
     tmp_path: Path, start_bus: StartBus, stub_node: type
 ) -> None:
     path = tmp_path / "frames.log"
@@ -54,7 +54,7 @@ def test_every_frame_is_there_at_bus_time_in_the_order_of_the_bus(
     wanted = [(0.0, 0x701, b"\x05")]
     for k in range(3):
         wanted.append((0.01 * k, 0x200 + k, bytes([k])))
-        # the timer that runs out before the SYNC sends before it
+        # a timer that expires before the SYNC sends before it
         wanted += [(0.03, 0x701, b"\x05")] * (k == 2)
         wanted += [(round(0.01 * (k + 1), 6), *one) for one in cycle]
     wanted += [(0.03, 0x1ABCDE00, b"12345678"), (0.03, 0x321, b""), (0.03, 0x700, bytes(8))]
@@ -65,7 +65,7 @@ def test_every_frame_is_there_at_bus_time_in_the_order_of_the_bus(
 
 
 def play(path: Path, *order: int) -> bytes:
-    """Have two buses heard, at each instant in this order; return the file."""
+    """Log two buses, polled in this order at each instant. Return the file's content."""
     log = FrameLog(path)
     ears = [log.listener("left"), log.listener("right")]
     for k in range(5000):
@@ -77,14 +77,14 @@ def play(path: Path, *order: int) -> bytes:
     return path.read_bytes()
 
 
-def test_which_bus_was_looked_at_first_makes_no_difference(tmp_path: Path) -> None:
+def test_the_polling_order_of_buses_does_not_change_the_log(tmp_path: Path) -> None:
     one = play(tmp_path / "one.log", 0, 1)
     assert play(tmp_path / "other.log", 1, 0) == one
     channels = [frame.channel for frame in logged(tmp_path / "other.log")]
     assert channels == ["left", "right"] * 5000
 
 
-def test_a_bus_that_stands_for_ever_fills_no_memory(
+def test_a_bus_whose_time_stands_does_not_fill_the_memory(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("cdpr_sim_bus.frame._MOST_WAITING", 8192)
@@ -96,7 +96,7 @@ def test_a_bus_that_stands_for_ever_fills_no_memory(
     log.close()
 
 
-def test_two_simulators_do_not_write_one_file(tmp_path: Path) -> None:
+def test_two_simulators_write_to_different_files(tmp_path: Path) -> None:
     path = tmp_path / "frames.log"
     path.write_text("(0000000001.000000) can0 080#\n")
     log = FrameLog(path)
@@ -117,7 +117,7 @@ def test_a_recording_of_a_real_bus_is_not_overwritten(tmp_path: Path) -> None:
     assert path.read_text() == "(1764335419.123456) can0 080#\n"
 
 
-def test_a_full_disk_ends_the_log_and_not_the_bus(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_full_disk_ends_the_log_but_not_the_bus(capsys: pytest.CaptureFixture[str]) -> None:
     log = FrameLog(Path("/dev/full"))
     listener = log.listener("can0")
     for k in range(10_000):
@@ -126,7 +126,7 @@ def test_a_full_disk_ends_the_log_and_not_the_bus(capsys: pytest.CaptureFixture[
     assert capsys.readouterr().err == "frame log /dev/full: No space left on device; it ends here\n"
 
 
-def test_the_command_logs_where_the_environment_says(tmp_path: Path) -> None:
+def test_the_environment_or_an_option_names_the_log_file(tmp_path: Path) -> None:
     path = tmp_path / "frames.log"
     script = """
 from cdpr_tools.composition.simulator import OwnSimulator

@@ -1,4 +1,4 @@
-"""Time on the wire and order of arbitration, against the bits themselves."""
+"""Time on the wire and arbitration order agree with the bits of frames."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from cdpr_sim_bus.frame import EFF_FLAG, RTR_FLAG, arbitration_key, bits_by_leng
 LAW = settings(max_examples=300)
 standard_ids = st.integers(0, 0x7FF)
 extended_ids = st.integers(0, 0x1FFFFFFF).map(lambda can_id: can_id | EFF_FLAG)
-# payloads that provoke stuffing are rare among random ones
+# payloads with many stuff bits are rare among random ones
 payloads = st.one_of(
     st.binary(max_size=8), st.lists(st.sampled_from([0x00, 0xFF, 0x0F, 0xF0, 0x87]), max_size=8)
 ).map(bytes)
 
 
 def header_bits(can_id: int) -> str:
-    """Return the bits from start of frame to the RTR bit inclusive, as ISO 11898-1 lays them."""
+    """Return the bits from start of frame to RTR by ISO 11898-1."""
     remote = "1" if can_id & RTR_FLAG else "0"
     if can_id & EFF_FLAG:
         bits = f"{can_id & 0x1FFFFFFF:029b}"
@@ -37,7 +37,7 @@ def crc15(bits: str) -> str:
 
 
 def bits_on_wire(can_id: int, data: bytes) -> int:
-    """Return the length of the very frame, stuff bits counted one by one."""
+    """Return the exact length of the frame, with its stuff bits."""
     payload = "" if can_id & RTR_FLAG else "".join(f"{byte:08b}" for byte in data)
     bits = header_bits(can_id) + "00" + f"{len(data):04b}" + payload
     bits += crc15(bits)
@@ -59,12 +59,12 @@ def test_no_frame_is_longer_than_its_worst_case(can_id: int, data: bytes, remote
     worst = bits_by_length(can_id)[len(data)]
     actual = bits_on_wire(can_id, data)
     assert actual <= worst
-    # the bound adds stuff bits only: at most one for four bits
+    # the bound only adds stuff bits: at most one for four bits
     assert worst <= actual * 5 / 4
 
 
 @pytest.mark.parametrize(("n", "bits"), [(0, 55), (4, 95), (6, 115), (8, 135)])
-def test_worst_case_of_the_bus_budget(n: int, bits: int) -> None:
+def test_worst_case_lengths_have_known_values(n: int, bits: int) -> None:
     assert worst_case_bits(n) == bits
 
 
@@ -84,12 +84,12 @@ any_id = st.builds(
 @LAW
 def test_the_frame_with_the_first_dominant_bit_wins(a: int, b: int, share: bool) -> None:
     if share and (a ^ b) & EFF_FLAG:
-        # the same leading bits, once standard and once extended
+        # the same leading bits in a standard and an extended frame
         long, short = (a, b) if a & EFF_FLAG else (b, a)
         a, b = long, (short & RTR_FLAG) | (long & 0x1FFFFFFF) >> 18
 
     def on_wire(can_id: int) -> str:
-        # after a standard frame's RTR comes its dominant IDE bit
+        # the RTR bit of a standard frame is followed by its dominant IDE bit
         return header_bits(can_id) + ("" if can_id & EFF_FLAG else "0")
 
     if on_wire(a) != on_wire(b):

@@ -1,4 +1,4 @@
-"""The physics board: shared between processes, consistent, and refused where it is none."""
+"""The physics board is shared between processes and consistent. Invalid files are rejected."""
 
 from __future__ import annotations
 
@@ -39,12 +39,14 @@ def test_another_process_sees_consistent_states(tmp_path: Path) -> None:
             seen.add(n)
         writer.join()
         assert writer.exitcode == 0
-        assert len(seen) > 5  # as few as that where both share one core
+        assert len(seen) > 5  # so few if both processes share one core
         assert axis.state() == BoardState(300_000.0, 600_000.0, 900_000.0, 1_200_000.0, True)
         assert board.axis(0).state().time_s == 0.0
 
 
-def test_power_and_brake_are_free_until_somebody_takes_them(tmp_path: Path) -> None:
+def test_power_is_allowed_and_brakes_are_released_until_a_process_changes_them(
+    tmp_path: Path,
+) -> None:
     with PhysicsBoard.create(tmp_path / "board", 3) as board:
         one, other = board.axis(2), PhysicsBoard.attach(tmp_path / "board")
         assert one.power_allowed and one.brake_released and one.hung_mass_kg == 0.0
@@ -57,7 +59,7 @@ def test_power_and_brake_are_free_until_somebody_takes_them(tmp_path: Path) -> N
     assert not (tmp_path / "board").exists()
 
 
-def test_what_is_no_board_is_refused(tmp_path: Path) -> None:
+def test_invalid_board_files_are_rejected_and_left_boards_replaced(tmp_path: Path) -> None:
     with pytest.raises(BusSetupError, match=r"No such file.*cdpr sim up"):
         PhysicsBoard.attach(tmp_path / "none")
     for content in (b"", b"short", b"x" * 1000):
@@ -65,9 +67,9 @@ def test_what_is_no_board_is_refused(tmp_path: Path) -> None:
         with pytest.raises(BusSetupError, match=r"physics board .*other"):
             PhysicsBoard.attach(tmp_path / "other")
     with pytest.raises(BusSetupError, match="not a physics board"):
-        PhysicsBoard.create(tmp_path / "other", 1)  # whosever it is
+        PhysicsBoard.create(tmp_path / "other", 1)  # never overwrite a file of something else
     assert (tmp_path / "other").read_bytes() == b"x" * 1000
-    left = tmp_path / "left"  # by a simulator that was killed
+    left = tmp_path / "left"  # left by a killed simulator
     PhysicsBoard.create(left, 1)
     with PhysicsBoard.create(left, 3) as board:
         assert board.axes == 3
@@ -80,7 +82,7 @@ def test_what_is_no_board_is_refused(tmp_path: Path) -> None:
         board.axis(1)
 
 
-def test_a_processor_that_shows_stores_out_of_order_shares_no_board(
+def test_a_processor_with_weak_memory_order_cannot_attach_to_a_board(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     with PhysicsBoard.create(tmp_path / "board", 1):

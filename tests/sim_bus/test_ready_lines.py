@@ -1,4 +1,4 @@
-"""What a simulator tells when it is up: JSON to programs, readable lines on a terminal."""
+"""A ready simulator prints JSON for programs and readable lines on a terminal."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from cdpr_sim_bus.bus.server import print_ready
 READY = {"bus": "simbus:lab", "pid": 7, "mode": "lockstep", "nodes": [1, 2], "slcan": "/dev/pts/3"}
 
 
-def test_a_program_gets_one_line_of_json() -> None:
+def test_output_to_a_pipe_is_one_line_of_json() -> None:
     out = io.StringIO()
     with redirect_stdout(out):
         print_ready(READY)
@@ -21,13 +21,13 @@ def test_a_program_gets_one_line_of_json() -> None:
     assert out.getvalue().count("\n") == 1
 
 
-def test_a_terminal_gets_what_a_person_wants_to_know() -> None:
+def test_output_on_a_terminal_is_readable_lines() -> None:
     ours, theirs = pty.openpty()
     with os.fdopen(theirs, "w") as terminal, redirect_stdout(terminal):
         print_ready(READY)
         print_ready({"robot": "r", "pid": 7, "buses": {"a": READY, "b": {"bus": "simbus:b"}}})
     text = b""
-    with suppress(OSError):  # how the end of a terminal reads
+    with suppress(OSError):  # end of file on a terminal
         while part := os.read(ours, 4096):
             text += part
     os.close(ours)

@@ -1,4 +1,4 @@
-"""The same packets of a master that leads give the same bytes, whatever the wall clock does."""
+"""The same packets of a leading master give the same bytes, independent of the wall clock."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ serve_fleet(
 
 
 class Bus:
-    """A master's socket, and all that it was told."""
+    """The socket of a master and all bytes received on it."""
 
     def __init__(self, name: str) -> None:
         self.sock = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
@@ -85,7 +85,7 @@ class Bus:
 
     def until_time(self) -> None:
         while (packet := self.hear())[:8] != b"bus-time":
-            assert packet, "the simulator has gone"
+            assert packet, "the simulator has disconnected"
         _, self.now_s, _ = GO.unpack_from(packet)
 
     def go(self, until_s: float) -> None:
@@ -108,7 +108,7 @@ def simulator(log: Path) -> Iterator[tuple[subprocess.Popen[bytes], list[Bus]]]:
         buses += [Bus(f"{name}-{letter}") for letter in "ab"]
         yield process, buses
     finally:
-        # the simulator first, so that no time passes by the wall clock
+        # end the simulator first, so that time does not follow the wall clock
         process.stdin.close()
         process.wait(120)
         process.stdout.close()
@@ -122,7 +122,7 @@ def download(index: int, sub: int, value: int, size: int) -> bytes:
 
 
 def prepare(buses: list[Bus]) -> None:
-    """Have three drives send position and statusword at each SYNC and take a torque, 2 ms."""
+    """Configure three drives to exchange position, statusword and torque at each SYNC (2 ms)."""
     nodes = [(buses[0], 1), (buses[0], 2), (buses[1], 3)]
     for bus, node in nodes:
         for request in (
@@ -142,7 +142,7 @@ def prepare(buses: list[Bus]) -> None:
 
 
 def take(buses: list[Bus], k: int, what: str, value: int) -> None:
-    """Take one step, as a master does that keeps its buses together."""
+    """Take one step like a master that keeps its buses at the same time."""
     for bus, nodes in zip(buses, ((1, 2), (3,)), strict=True):
         if what == "sync":
             for node in nodes:
@@ -166,7 +166,7 @@ def take(buses: list[Bus], k: int, what: str, value: int) -> None:
 
 
 def play(log: Path, steps: list[tuple[str, int]], delays: list[float], stops: set[int]) -> bytes:
-    """Take `steps` after pauses, the simulator stopped for a while at some; return all bytes."""
+    """Take `steps` after pauses, with the simulator stopped at some. Return all bytes."""
     with simulator(log) as (process, buses):
         prepare(buses)
         for k, (what, value) in enumerate(steps):
@@ -194,17 +194,17 @@ STEPS = st.lists(
 
 @given(STEPS, st.lists(st.floats(0.0, 0.004), min_size=1, max_size=7), st.sets(st.integers(0, 60)))
 @LAW
-def test_same_packets_same_bytes(
+def test_same_packets_give_same_bytes_despite_delays(
     tmp_path: Path, steps: list[tuple[str, int]], delays: list[float], stops: set[int]
 ) -> None:
-    """Two buses of one robot, whose drives share their physics; the third drive is on the other."""
+    """The drives of a robot share their physics. Two are on one bus, the third on another."""
     some = set(sorted(stops)[:2])
     quick = play(tmp_path / "quick.bin", steps, [0.0], set())
     assert play(tmp_path / "slow.bin", steps, delays, some) == quick
     assert len((tmp_path / "quick.bin").read_bytes()) > 1024
 
 
-def test_what_happens_after_the_masters_death_is_in_the_log(tmp_path: Path) -> None:
+def test_motion_after_the_masters_death_is_logged(tmp_path: Path) -> None:
     log = tmp_path / "pose.bin"
     with simulator(log) as (_, buses):
         prepare(buses)

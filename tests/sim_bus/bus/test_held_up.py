@@ -1,4 +1,4 @@
-"""A simulator that is held up on a paced bus: what was sent meanwhile counts as sent then."""
+"""A delayed simulator on a paced bus processes frames with the times when they were sent."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ pytestmark = pytest.mark.alone
 MASTER = 127
 CONSUMER_S = 0.4
 CLOCKS_S = 2e-3
-"""How exactly the kernel's stamps, which are of another clock, become bus time."""
+"""Accuracy of converting the kernel's timestamps, which use another clock, to bus time."""
 SYNC, HEARTBEAT = pack_frame(0x080), pack_frame(0x700 + MASTER, b"\x05")
 
 
 class Held:
-    """A paced hub that runs only when the test lets it, and clients that send meanwhile."""
+    """A paced hub that runs only when the test lets it, with clients that send meanwhile."""
 
     def __init__(self, *nodes: object) -> None:
         self.hub = Hub(nodes, mode=ClockMode.PACED)  # type: ignore[arg-type]
@@ -37,7 +37,7 @@ class Held:
             self.clients.append(mine)
 
     def catch_up(self, seconds: float = 0.0) -> None:
-        """Let the hub run until nothing waits, at least for `seconds`."""
+        """Let the hub run for at least `seconds`, until no frames wait."""
         end = time.monotonic() + seconds
         self.hub.turn(0.0)
         while (wait_s := self.hub.wait_s()) == 0.0 or time.monotonic() < end or self._has_frames():
@@ -60,7 +60,7 @@ class Held:
             client.close()
 
 
-def test_frames_of_all_clients_are_taken_at_the_times_they_were_sent(stub_node: type) -> None:
+def test_frames_are_processed_with_the_times_they_were_sent(stub_node: type) -> None:
     held = Held(node := stub_node(sync_period_s=0.01))
     earliest, latest = [], []
     for k in range(100):
@@ -80,7 +80,7 @@ def test_frames_of_all_clients_are_taken_at_the_times_they_were_sent(stub_node: 
     assert all(a <= b for a, b in pairwise(node.advanced))
 
 
-def test_a_timer_goes_off_between_the_frames_around_it(stub_node: type) -> None:
+def test_a_timer_expires_between_the_frames_before_and_after_it(stub_node: type) -> None:
     held = Held(node := stub_node(sync_period_s=0.01))
     held.catch_up()
     held.clients[0].send(SYNC)
@@ -120,8 +120,8 @@ def _emergencies(held: Held) -> list[int]:
     ]
 
 
-def test_no_heartbeat_is_lost_by_holding_up_the_simulator(held_drive: Held) -> None:
-    """More than a second, several times what the drive tolerates."""
+def test_delaying_the_simulator_loses_no_heartbeat(held_drive: Held) -> None:
+    """The delay is over a second, several times what the drive tolerates."""
     cycles, heartbeats = held_drive.clients
     for k in range(250):
         cycles.send(SYNC)
@@ -136,7 +136,7 @@ def test_no_heartbeat_is_lost_by_holding_up_the_simulator(held_drive: Held) -> N
     held_drive.close()
 
 
-def test_a_silence_while_it_is_held_up_is_a_silence(held_drive: Held) -> None:
+def test_silence_during_a_delay_of_the_simulator_is_detected(held_drive: Held) -> None:
     cycles, heartbeats = held_drive.clients
     heartbeats.send(HEARTBEAT)
     for _ in range(100):
@@ -144,6 +144,6 @@ def test_a_silence_while_it_is_held_up_is_a_silence(held_drive: Held) -> None:
         time.sleep(0.005)
     heartbeats.send(HEARTBEAT)
     held_drive.catch_up()
-    # lost in the middle, and taken back with the heartbeat at the end
+    # the error is set in the middle and cleared by the heartbeat at the end
     assert _emergencies(held_drive) == [0x8130, 0x0000]
     held_drive.close()

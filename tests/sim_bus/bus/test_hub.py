@@ -19,7 +19,7 @@ from cdpr_sim_bus.frame import ERR_FLAG, RTR_FLAG, pack_frame
 StartBus = Callable[..., Any]
 
 
-def test_everybody_but_the_sender_gets_a_frame(start_bus: StartBus, stub_node: type) -> None:
+def test_a_frame_reaches_all_but_its_sender(start_bus: StartBus, stub_node: type) -> None:
     node = stub_node()
     bus = start_bus(node)
     sender, *others = [bus.join() for _ in range(4)]
@@ -30,7 +30,7 @@ def test_everybody_but_the_sender_gets_a_frame(start_bus: StartBus, stub_node: t
     assert [frame for frame, _ in node.seen] == [pack_frame(0x123, b"hello")]
 
 
-def test_filters_are_those_of_raw_can(start_bus: StartBus) -> None:
+def test_filters_work_as_those_of_raw_can_sockets(start_bus: StartBus) -> None:
     bus = start_bus()
     sender, picky, deaf = bus.join(), bus.join(), bus.join()
     picky.filters((0x180, 0x780), (0x605, 0x7FF | RTR_FLAG))
@@ -46,11 +46,13 @@ def test_filters_are_those_of_raw_can(start_bus: StartBus) -> None:
     assert picky.recv_id() == 0x606
 
 
-def test_what_a_client_sends_last_arrives_though_it_left_frames_unread(start_bus: StartBus) -> None:
+def test_the_last_frames_of_a_client_that_left_frames_unread_are_delivered(
+    start_bus: StartBus,
+) -> None:
     bus = start_bus()
     other, hasty = bus.join(), bus.join()
     other.send(0x181)
-    other.status()  # so that the frame waits for the hasty one, which does not read it
+    other.status()  # the frame now waits for the hasty client, which does not read it
     hasty.send(0x123)
     hasty.send(0x124)
     hasty.sock.close()
@@ -61,7 +63,7 @@ def test_what_a_client_sends_last_arrives_though_it_left_frames_unread(start_bus
         time.sleep(0.01)
 
 
-def test_long_filter_lists_come_in_parts(start_bus: StartBus) -> None:
+def test_filter_lists_may_be_sent_in_parts(start_bus: StartBus) -> None:
     bus = start_bus()
     sender, picky = bus.join(), bus.join()
     picky.sock.send(json.dumps({"filters": [[1, 0x7FF]]}).encode())
@@ -73,7 +75,7 @@ def test_long_filter_lists_come_in_parts(start_bus: StartBus) -> None:
     assert picky.quiet()
 
 
-def test_lss_answers_that_are_the_same_are_one_frame(start_bus: StartBus, stub_node: type) -> None:
+def test_identical_lss_answers_become_one_frame(start_bus: StartBus, stub_node: type) -> None:
     both = (pack_frame(0x7E4, b"\x4f" + bytes(7)), pack_frame(0x584, bytes(8)))
     bus = start_bus(stub_node(1, answers=both), stub_node(2, answers=both))
     master = bus.join()
@@ -82,7 +84,7 @@ def test_lss_answers_that_are_the_same_are_one_frame(start_bus: StartBus, stub_n
     assert master.quiet()
 
 
-def test_answers_to_one_sync_come_in_the_order_of_arbitration(
+def test_answers_to_one_sync_arrive_in_arbitration_order(
     start_bus: StartBus, stub_node: type
 ) -> None:
     nodes = [
@@ -101,8 +103,8 @@ def test_answers_to_one_sync_come_in_the_order_of_arbitration(
     assert [frame[8:9] for frame in frames[-2:]] == [b"1", b"2"]
 
 
-def test_clients_that_wait_together_contend_for_the_bus(stub_node: type) -> None:
-    """Frames sent while the hub is busy go out by identifier, each client's own in its order."""
+def test_waiting_clients_contend_for_the_bus(stub_node: type) -> None:
+    """Frames sent while the hub is busy are ordered by identifier. Each client keeps its order."""
     hub = Hub([node := stub_node()], mode=ClockMode.PACED)
     pairs = [socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET) for _ in range(3)]
     for mine, theirs in pairs:
@@ -122,13 +124,13 @@ def test_clients_that_wait_together_contend_for_the_bus(stub_node: type) -> None
     hub.run()
     hub.close()
     order = [int.from_bytes(frame[:4], "little") for frame, _ in node.seen]
-    # 0x100 stands behind 0x300 in its client's queue and cannot overtake it
+    # 0x100 is behind 0x300 in the queue of its client and cannot overtake it
     assert order == [0x080, 0x200, 0x300, 0x100, 0x400]
     for mine, _ in pairs:
         mine.close()
 
 
-def test_a_packet_of_several_frames_is_as_many_frames(start_bus: StartBus, stub_node: type) -> None:
+def test_all_frames_of_a_packet_are_delivered(start_bus: StartBus, stub_node: type) -> None:
     answer = pack_frame(0x181, b"answer")
     bus = start_bus(node := stub_node(7, answers=(answer,)))
     member, other = bus.join(), bus.join()
@@ -143,7 +145,7 @@ def test_a_packet_of_several_frames_is_as_many_frames(start_bus: StartBus, stub_
         assert b"error" in member.recv()
 
 
-def test_frames_of_one_packet_contend_one_by_one(stub_node: type) -> None:
+def test_frames_of_one_packet_contend_separately(stub_node: type) -> None:
     hub = Hub([node := stub_node()], mode=ClockMode.LOCKSTEP)
     pairs = [socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET) for _ in range(2)]
     for _, theirs in pairs:
@@ -161,10 +163,8 @@ def test_frames_of_one_packet_contend_one_by_one(stub_node: type) -> None:
         mine.close()
 
 
-def test_nodes_hear_each_other_and_only_what_they_accept(
-    start_bus: StartBus, stub_node: type
-) -> None:
-    # with a cycle period bus time is held after SYNC, so that nothing but frames can matter
+def test_nodes_receive_only_frames_that_they_accept(start_bus: StartBus, stub_node: type) -> None:
+    # with a cycle period, bus time is held after SYNC, so that no timers interfere
     talker = stub_node(1, sync_period_s=0.001, answers=(pack_frame(0x181, b"x"),))
     listener = stub_node(2, accepts=frozenset((0x181,)))
     bus = start_bus(talker, listener)
@@ -182,7 +182,7 @@ def test_nodes_hear_each_other_and_only_what_they_accept(
     assert [frame[:2] for frame, _ in listener.seen] == [b"\x81\x01", b"\x00\x03"]
 
 
-def test_a_client_that_does_not_read_loses_frames_and_holds_up_nobody(
+def test_a_client_that_does_not_read_loses_frames_without_blocking_others(
     start_bus: StartBus, stub_node: type
 ) -> None:
     bus = start_bus(stub_node(1, sync_period_s=0.001, answers=(pack_frame(0x181, bytes(8)),)))
@@ -195,7 +195,7 @@ def test_a_client_that_does_not_read_loses_frames_and_holds_up_nobody(
             assert master.recv_id() == 0x181
         count += 1000
         assert time.monotonic() - started < 300.0
-    # what did get into the sleeper's queue is whole and in order
+    # the frames in the sleeper's queue are complete and in order
     kept = 0
     sleeper.sock.setblocking(False)
     with pytest.raises(BlockingIOError):
@@ -206,7 +206,7 @@ def test_a_client_that_does_not_read_loses_frames_and_holds_up_nobody(
     assert kept + dropped == 2 * count
 
 
-def test_a_client_that_leaves_disturbs_nobody(start_bus: StartBus) -> None:
+def test_a_client_that_leaves_does_not_disturb_others(start_bus: StartBus) -> None:
     bus = start_bus()
     one, two, leaver = bus.join(), bus.join(), bus.join()
     for can_id in range(50):
@@ -220,7 +220,7 @@ def test_a_client_that_leaves_disturbs_nobody(start_bus: StartBus) -> None:
     assert back.recv_id() == 0x99
 
 
-def test_frames_that_no_bus_carries_are_counted_and_dropped(start_bus: StartBus) -> None:
+def test_invalid_frames_are_counted_and_dropped(start_bus: StartBus) -> None:
     bus = start_bus()
     sender, other = bus.join(), bus.join()
     sender.sock.send((0x123).to_bytes(4, "little") + b"\x09" + bytes(11))
@@ -230,7 +230,7 @@ def test_frames_that_no_bus_carries_are_counted_and_dropped(start_bus: StartBus)
     assert (status["malformed"], status["frames"]) == (2, 0)
 
 
-def test_status_tells_what_the_bus_is(start_bus: StartBus, stub_node: type) -> None:
+def test_status_reports_name_mode_bit_rate_and_nodes(start_bus: StartBus, stub_node: type) -> None:
     bus = start_bus(stub_node(7), stub_node(9), mode=ClockMode.PACED, bitrate=500_000)
     status = bus.join().status()
     assert status["name"] == bus.name
@@ -250,14 +250,14 @@ def test_status_tells_what_the_bus_is(start_bus: StartBus, stub_node: type) -> N
         b'{"status":true}'.ljust(PACKET_BYTES),
     ],
 )
-def test_wrong_control_messages_get_an_answer(start_bus: StartBus, packet: bytes) -> None:
+def test_invalid_control_messages_are_answered(start_bus: StartBus, packet: bytes) -> None:
     member = start_bus().join()
     member.sock.send(packet)
     assert list(json.loads(member.recv())) == ["error"]
     member.status()
 
 
-def test_a_name_in_use_is_refused(start_bus: StartBus) -> None:
+def test_a_bus_name_in_use_is_rejected(start_bus: StartBus) -> None:
     bus = start_bus()
     second = Hub(name=bus.name)
     with pytest.raises(BusSetupError, match=f"simbus:{bus.name} is in use"):
@@ -266,17 +266,17 @@ def test_a_name_in_use_is_refused(start_bus: StartBus) -> None:
 
 
 @pytest.mark.parametrize("name", ["", "a b", "/tmp/x", "x" * 65, "-x", "é"])
-def test_a_malformed_name_is_refused(name: str) -> None:
+def test_a_malformed_bus_name_is_rejected(name: str) -> None:
     hub = Hub(name=name)
     with pytest.raises(BusSetupError, match="allowed are 1 to 64 letters"):
         hub.listen()
     hub.close()
 
 
-def test_a_real_interface_carries_the_same_nodes_and_its_end_ends_the_hub(
+def test_the_hub_serves_nodes_on_a_real_interface_and_ends_with_it(
     stub_node: type,
 ) -> None:
-    """A connected socket stands for the raw CAN socket: one frame a packet, as there."""
+    """A connected socket replaces the raw CAN socket. Both have one frame per packet."""
     node = stub_node(4, answers=(pack_frame(0x184, b"truth"),))
     hub = Hub([node], name="socketcan:can0")
     mine, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)

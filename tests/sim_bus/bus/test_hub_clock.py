@@ -1,4 +1,4 @@
-"""Bus time, and bus load against it."""
+"""Bus time, and bus load relative to it."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def test_paced_time_is_wall_time() -> None:
     assert clock.wall_wait(103.0, 3.5) == pytest.approx(0.5)
 
 
-def test_lockstep_counts_syncs_and_not_the_wall() -> None:
+def test_lockstep_time_counts_syncs_and_not_wall_time() -> None:
     clock = BusClock(ClockMode.LOCKSTEP, 50.0)
     start = clock.sync(50.0, 0.002)
     for k in range(1, 500):
@@ -33,7 +33,7 @@ def test_lockstep_counts_syncs_and_not_the_wall() -> None:
         assert clock.now(50.0 + 0.3 * k + 0.1) == pytest.approx(start + 0.002 * k)
 
 
-def test_lockstep_stands_until_it_is_told_to_run() -> None:
+def test_lockstep_time_stands_still_unless_running() -> None:
     clock = BusClock(ClockMode.LOCKSTEP, 0.0)
     assert clock.now(9.0) == clock.peek(10.0) == 0.0
     clock.run(20.0)
@@ -48,7 +48,7 @@ def test_lockstep_stands_until_it_is_told_to_run() -> None:
     assert clock.now(201.0) == pytest.approx(103.0)
 
 
-def test_a_hold_ends_where_the_clock_is_stopped() -> None:
+def test_stopping_the_clock_ends_a_hold() -> None:
     clock = BusClock(ClockMode.LOCKSTEP, 0.0)
     clock.run(0.0)
     held = clock.sync(1.0, 0.001)
@@ -67,7 +67,7 @@ def test_time_runs_again_half_a_second_after_the_last_sync() -> None:
     assert clock.sync(10.0 + HOLD_S + 3.0, 0.001) == pytest.approx(held + 3.001)
 
 
-def test_lockstep_without_a_cycle_period_runs_with_the_wall() -> None:
+def test_lockstep_without_a_cycle_period_follows_wall_time() -> None:
     clock = BusClock(ClockMode.LOCKSTEP, 0.0)
     clock.run(0.0)
     assert clock.sync(4.0, 0.0) == pytest.approx(4.0)
@@ -82,7 +82,7 @@ def test_lockstep_without_a_cycle_period_runs_with_the_wall() -> None:
     ),
 )
 @LAW
-def test_bus_time_never_goes_back(
+def test_bus_time_never_decreases(
     mode: ClockMode, steps: list[tuple[float, float | str | None]]
 ) -> None:
     clock = BusClock(mode, 7.0)
@@ -111,7 +111,7 @@ def test_lockstep_cycle_that_does_not_fit_is_an_overrun() -> None:
     assert load.load(0.005) == pytest.approx(5001 / 5000)
 
 
-def test_acyclic_frames_load_the_bus_but_make_no_overrun() -> None:
+def test_acyclic_frames_load_the_bus_but_cause_no_overrun() -> None:
     load = BusLoad(1_000_000, lockstep=True)
     load.sync(0.001)
     load.acyclic_bits += 5000
@@ -124,7 +124,7 @@ def test_acyclic_frames_load_the_bus_but_make_no_overrun() -> None:
 def test_sdo_between_two_syncs_waits_for_gaps(
     start_bus: Callable[..., object], stub_node: type, can_id: int, overruns: int
 ) -> None:
-    """Twenty frames of 135 us do not fit 1 ms, which matters where they have priority."""
+    """Twenty frames of 135 us do not fit into 1 ms, but only matter if they have priority."""
     node = stub_node(1, sync_period_s=0.001)
     member = start_bus(node).join()  # type: ignore[attr-defined]
     member.send(0x80)
@@ -148,10 +148,10 @@ def test_paced_overrun_when_the_wire_is_still_busy(sizes: list[int], period_us: 
 
 
 @pytest.mark.parametrize("fits", [True, False])
-def test_hub_reports_overrun_of_eight_drives(
+def test_hub_reports_an_overrun_of_eight_drives_at_1_ms(
     start_bus: Callable[..., object], stub_node: type, fits: bool
 ) -> None:
-    """At 1 Mbit/s 1895 us of frames fit 2 ms, and not 1 ms."""
+    """At 1 Mbit/s, 1895 us of frames fit into 2 ms but not into 1 ms."""
     nodes = [
         stub_node(
             n,
@@ -174,13 +174,13 @@ def test_hub_reports_overrun_of_eight_drives(
     assert status["peak_cycle_load"] == pytest.approx(0.9475 if fits else 1.895)
 
 
-def test_nodes_time_stands_between_syncs_and_runs_after_them(
+def test_time_of_nodes_stands_between_syncs_and_runs_after_the_last_one(
     start_bus: Callable[..., object], stub_node: type
 ) -> None:
     node = stub_node(5, sync_period_s=0.01, answers=(pack_frame(0x185),))
     member = start_bus(node).join()  # type: ignore[attr-defined]
     for _ in range(20):
-        started = time.monotonic()  # the last time before bus time is held for the last time
+        started = time.monotonic()  # overwritten until the last SYNC
         member.send(0x205)
         member.send(0x80)
         assert member.recv_id() == 0x185
@@ -196,7 +196,7 @@ def test_nodes_time_stands_between_syncs_and_runs_after_them(
     assert node.advanced[-1] == due
 
 
-def test_timers_due_between_two_syncs_send_before_the_second(
+def test_a_timer_due_between_two_syncs_sends_before_the_second(
     start_bus: Callable[..., object], stub_node: type
 ) -> None:
     node = stub_node(5, sync_period_s=0.01, answers=(pack_frame(0x185),))
@@ -209,7 +209,7 @@ def test_timers_due_between_two_syncs_send_before_the_second(
     assert [watcher.recv_id() for _ in range(5)] == [0x80, 0x185, 0x705, 0x80, 0x185]
 
 
-def test_paced_timers_keep_wall_time(start_bus: Callable[..., object], stub_node: type) -> None:
+def test_paced_timers_follow_wall_time(start_bus: Callable[..., object], stub_node: type) -> None:
     node = stub_node(3, sync_period_s=0.001)
     member = start_bus(node, mode=ClockMode.PACED).join()  # type: ignore[attr-defined]
     before_s = time.monotonic()

@@ -1,4 +1,4 @@
-"""A bus in lockstep that one master leads: its time moves by that master's packets alone."""
+"""On a led lockstep bus, only packets of the leading master advance the time."""
 
 from __future__ import annotations
 
@@ -24,14 +24,14 @@ def beat(node_id: int) -> bytes:
     return pack_frame(0x700 + node_id, b"\x05")
 
 
-def test_bus_time_is_0_until_somebody_speaks(start_bus: StartBus, stub_node: type) -> None:
+def test_bus_time_is_zero_until_the_first_frame(start_bus: StartBus, stub_node: type) -> None:
     bus = start_bus(node := stub_node(7, timers=(0.0, 0.5)))
     member = bus.join()
     time.sleep(0.1)
     assert member.status()["bus_time_s"] == 0.0
     assert node.advanced == []
     member.send(0x123)
-    # switched on, then the frame, then the wall clock
+    # first the start, then the frame, then the wall clock
     assert [member.recv(), member.recv()] == [beat(7), beat(7)]
     assert node.advanced[0] == 0.0
     assert node.seen[0][0] == pack_frame(0x123)
@@ -40,7 +40,7 @@ def test_bus_time_is_0_until_somebody_speaks(start_bus: StartBus, stub_node: typ
     assert not member.status()["led"]
 
 
-def test_a_led_bus_stands_however_long_its_master_takes(
+def test_time_of_a_led_bus_stands_while_its_master_pauses(
     start_bus: StartBus, stub_node: type
 ) -> None:
     node = stub_node(7, sync_period_s=0.01, answers=(ANSWER,), timers=(0.0, 0.025))
@@ -58,7 +58,7 @@ def test_a_led_bus_stands_however_long_its_master_takes(
     assert node.advanced == [0.0, 0.01, 0.02, 0.03]
 
 
-def test_a_go_ends_at_the_first_frame_for_its_sender(start_bus: StartBus, stub_node: type) -> None:
+def test_go_ends_at_the_first_frame_for_its_sender(start_bus: StartBus, stub_node: type) -> None:
     one, two = stub_node(1, timers=(0.1, 0.4)), stub_node(2, timers=(0.2, 0.3))
     bus = start_bus(one, two)
     member, other = bus.join(), bus.join()
@@ -75,7 +75,9 @@ def test_a_go_ends_at_the_first_frame_for_its_sender(start_bus: StartBus, stub_n
     assert one.advanced == two.advanced == [0.0, 0.1, 0.15, 0.2, 0.3, 0.4, 1.0]
 
 
-def test_a_go_comes_after_all_that_was_sent_before(start_bus: StartBus, stub_node: type) -> None:
+def test_frames_sent_before_a_go_are_processed_before_it(
+    start_bus: StartBus, stub_node: type
+) -> None:
     node = stub_node(1, accepts=frozenset(range(0x800)))
     bus = start_bus(node)
     member = bus.join()
@@ -90,7 +92,7 @@ def test_a_go_comes_after_all_that_was_sent_before(start_bus: StartBus, stub_nod
     assert member.go(0.0) == ([], 0.5, math.inf)
 
 
-def test_what_came_before_a_go_ends_it_before_time_moves(
+def test_a_frame_that_already_waits_ends_a_go_before_time_advances(
     start_bus: StartBus, stub_node: type
 ) -> None:
     node = stub_node(1, answers=(ANSWER,))
@@ -101,11 +103,11 @@ def test_what_came_before_a_go_ends_it_before_time_moves(
     other.status()
     assert member.go(1.0) == ([pack_frame(0x123)], 0.0, math.inf)
     assert member.go(1.0) == ([], 1.0, math.inf)
-    # without 1006h a SYNC moves nothing
+    # without 1006h a SYNC does not advance the time
     assert member.sync() == ([ANSWER], 1.0, math.inf)
 
 
-def test_frames_of_others_move_nothing_on_a_led_bus(start_bus: StartBus, stub_node: type) -> None:
+def test_frames_of_others_do_not_advance_a_led_bus(start_bus: StartBus, stub_node: type) -> None:
     node = stub_node(1, sync_period_s=0.01, answers=(ANSWER,))
     bus = start_bus(node)
     member, other = bus.join(), bus.join()
@@ -119,10 +121,10 @@ def test_frames_of_others_move_nothing_on_a_led_bus(start_bus: StartBus, stub_no
     assert member.sync() == ([ANSWER], 0.02, math.inf)
 
 
-def test_nodes_that_answer_each_other_are_done_before_the_time_is_reported(
+def test_frames_between_nodes_are_delivered_before_the_time_is_reported(
     start_bus: StartBus, stub_node: type
 ) -> None:
-    """A frame goes from node to node; the master has them all in front of the time packet."""
+    """A frame passes from node to node. The master receives all of them before the time packet."""
     nodes = [stub_node(k, accepts=frozenset((0x300 + k,))) for k in range(1, 6)]
     for k, node in enumerate(nodes, 1):
         node.receive = lambda frame, now, k=k, out=node.outbox: out.append(pack_frame(0x301 + k))
@@ -132,14 +134,14 @@ def test_nodes_that_answer_each_other_are_done_before_the_time_is_reported(
     member.send(0x301)
     answers = [pack_frame(0x300 + k) for k in range(2, 7)]
     assert member.go(1.0)[0] == answers
-    # and what begins with a timer
+    # also if a timer starts it
     nodes[0].accepts = frozenset((0x701,))
     nodes[4].node_id = 1
     nodes[4].timers.append(0.5)
     assert member.go(1.0) == ([beat(1), *answers], 0.5, math.inf)
 
 
-def test_a_ring_of_nodes_does_not_keep_the_master_waiting(
+def test_an_endless_ring_of_nodes_does_not_block_the_master(
     start_bus: StartBus, stub_node: type
 ) -> None:
     nodes = [stub_node(k, accepts=frozenset((0x300 + k,))) for k in (0, 1)]
@@ -153,7 +155,7 @@ def test_a_ring_of_nodes_does_not_keep_the_master_waiting(
     assert member.go(0.0)[1] == 0.0
 
 
-def test_one_leads_at_a_time(start_bus: StartBus, stub_node: type) -> None:
+def test_only_one_client_leads_at_a_time(start_bus: StartBus, stub_node: type) -> None:
     bus = start_bus(stub_node(1))
     member, other = bus.join(), bus.join()
     assert member.lead() == member.lead() == (0.0, math.inf)
@@ -168,7 +170,9 @@ def test_one_leads_at_a_time(start_bus: StartBus, stub_node: type) -> None:
     assert member.ask({"lead": True}) == {"error": "lead: another client leads this bus"}
 
 
-def test_a_bus_released_stands_until_somebody_speaks(start_bus: StartBus, stub_node: type) -> None:
+def test_time_of_a_released_bus_stands_until_the_next_frame(
+    start_bus: StartBus, stub_node: type
+) -> None:
     bus = start_bus(stub_node(1, timers=(3.05,)))
     member, other = bus.join(), bus.join()
     member.lead()
@@ -181,13 +185,13 @@ def test_a_bus_released_stands_until_somebody_speaks(start_bus: StartBus, stub_n
     assert other.recv() == beat(1)
 
 
-def test_a_paced_bus_is_led_by_nobody(start_bus: StartBus) -> None:
+def test_a_paced_bus_cannot_be_led(start_bus: StartBus) -> None:
     member = start_bus(mode=ClockMode.PACED).join()
     answer = member.ask({"lead": True})
     assert answer == {"error": "lead: this bus is paced, its time is the clock's"}
 
 
-def test_the_wall_takes_over_from_a_leader_that_has_gone(
+def test_time_follows_the_wall_clock_after_the_leader_disconnects(
     start_bus: StartBus, stub_node: type
 ) -> None:
     timers = tuple(2.0 + 0.01 * k for k in range(1, 30))
@@ -200,7 +204,7 @@ def test_the_wall_takes_over_from_a_leader_that_has_gone(
     for _ in timers:
         assert other.recv() == beat(1)
     assert time.monotonic() - started > 0.25
-    # each timer had its own time, whenever the loop looked
+    # each timer had its exact time, independent of when the loop ran
     assert node.advanced == [0.0, 2.0, *timers]
     now_s, _ = other.lead()
     assert now_s >= timers[-1]
@@ -208,7 +212,7 @@ def test_the_wall_takes_over_from_a_leader_that_has_gone(
     assert other.status()["bus_time_s"] == now_s
 
 
-def test_a_leader_that_dies_during_its_go_is_noticed(start_bus: StartBus, stub_node: type) -> None:
+def test_a_leader_that_dies_during_its_go_is_detected(start_bus: StartBus, stub_node: type) -> None:
     endless = stub_node(1)
     endless.next_event = lambda: endless.advanced[-1] + 1e-3 if endless.advanced else 0.0
     bus = start_bus(endless)
@@ -225,7 +229,7 @@ def test_a_leader_that_dies_during_its_go_is_noticed(start_bus: StartBus, stub_n
     while (status := other.status())["led"]:
         pass
     assert first < status["bus_time_s"] < 1e9
-    # its time is that of the wall clock now
+    # the time now follows the wall clock
     before_s = time.monotonic()
     begin_s = other.status()["bus_time_s"]
     begun_s = time.monotonic()
@@ -238,7 +242,7 @@ def test_a_leader_that_dies_during_its_go_is_noticed(start_bus: StartBus, stub_n
 def test_the_time_is_reported_as_soon_as_the_master_reads_again(
     start_bus: StartBus, stub_node: type
 ) -> None:
-    """Its socket is full of another's frames when the packet is due."""
+    """The socket is full of frames of another client when the packet is due."""
     bus = start_bus(stub_node(1))
     member, other = bus.join(), bus.join()
     member.lead()
@@ -257,7 +261,7 @@ def test_the_time_is_reported_as_soon_as_the_master_reads_again(
     assert member.go(1.0) == ([], 1.0, math.inf)
 
 
-def test_many_frames_for_the_master_come_in_parts_and_in_order(
+def test_many_frames_for_the_master_are_split_into_packets_in_order(
     start_bus: StartBus, stub_node: type
 ) -> None:
     bus = start_bus(stub_node(1))
@@ -272,7 +276,7 @@ def test_many_frames_for_the_master_come_in_parts_and_in_order(
     assert [len(packet) for packet in packets] == [24 + 16 * n for n in (128, 128, 44)]
     assert [packet[:8] for packet in packets] == [b"bus-data", b"bus-data", b"bus-time"]
     assert b"".join(packet[24:] for packet in packets) == b"".join(sent)
-    # what is kept when the lead is given back still comes, and then each by itself
+    # frames kept when the lead is released are still delivered, later ones in single packets
     other.sock.send(sent[0])
     other.status()
     member.sock.send(b'{"lead":false}')
@@ -282,8 +286,8 @@ def test_many_frames_for_the_master_come_in_parts_and_in_order(
     assert member.recv() == sent[1]
 
 
-def test_the_buses_of_a_robot_take_the_syncs_of_a_cycle_in_order(stub_node: type) -> None:
-    """Also those that are sent after the first bus has been looked at, and before the second."""
+def test_the_buses_of_a_robot_process_the_syncs_of_a_cycle_in_order(stub_node: type) -> None:
+    """This includes SYNCs sent between the turns of the two buses."""
     taken: list[int] = []
     masters: list[socket.socket] = []
 

@@ -1,4 +1,4 @@
-"""The serial adapter's protocol, command by command."""
+"""The Lawicel protocol of the serial adapter, command by command."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ FRAMES = st.one_of(
 
 
 class Bench:
-    """An adapter on a bus at 1 Mbit/s that keeps what is put on the bus."""
+    """An adapter on a bus at 1 Mbit/s. It keeps the frames that it transmits."""
 
     def __init__(self, *lines: bytes) -> None:
         self.sent: list[bytes] = []
@@ -46,14 +46,14 @@ def test_a_channel_opens_once_and_only_with_a_bit_rate() -> None:
 
 
 @pytest.mark.parametrize(("registers", "right"), [(b"s0014", True), (b"s001C", False)])
-def test_bus_timing_registers(registers: bytes, right: bool) -> None:
+def test_bus_timing_registers_set_the_bit_rate(registers: bytes, right: bool) -> None:
     # 8 quanta of 8 MHz make 1 Mbit/s, 16 make 500 kbit/s
     assert Bench(registers, b"O").adapter.on_bus is right
 
 
 @given(FRAMES)
 @settings(max_examples=200)
-def test_what_is_told_of_a_frame_sends_the_same_frame(frame: bytes) -> None:
+def test_the_text_of_a_frame_sends_the_same_frame(frame: bytes) -> None:
     bench = Bench(b"S8", b"O")
     line = bench.adapter.text_of(frame, 0.0)
     assert bench.adapter.obey(line[:-1]) == (b"Z\r" if line[:1] in b"TR" else b"z\r")
@@ -62,7 +62,7 @@ def test_what_is_told_of_a_frame_sends_the_same_frame(frame: bytes) -> None:
 
 @given(st.lists(st.binary(max_size=40), max_size=8))
 @settings(max_examples=300)
-def test_rubbish_is_refused_or_answered_and_never_more(chunks: list[bytes]) -> None:
+def test_garbage_gets_short_answers(chunks: list[bytes]) -> None:
     bench = Bench(b"S8", b"O")
     for chunk in chunks:
         for line in bench.adapter.lines(chunk + b"\r"):
@@ -73,7 +73,7 @@ def test_rubbish_is_refused_or_answered_and_never_more(chunks: list[bytes]) -> N
 
 @given(st.binary(max_size=60), st.lists(st.integers(0, 60), max_size=5))
 @settings(max_examples=200)
-def test_lines_do_not_depend_on_how_they_are_cut(data: bytes, cuts: list[int]) -> None:
+def test_lines_do_not_depend_on_how_input_is_split(data: bytes, cuts: list[int]) -> None:
     whole = Bench().adapter.lines(data)
     edges = sorted({0, len(data), *(min(cut, len(data)) for cut in cuts)})
     adapter = Bench().adapter
@@ -85,13 +85,13 @@ def test_lines_do_not_depend_on_how_they_are_cut(data: bytes, cuts: list[int]) -
     "line",
     [b"t8000", b"t1819", b"t18120A", b"t1812ABCDE", b"tXYZ0", b"T200000000", b"t 810", b"r18111"],
 )
-def test_a_malformed_frame_is_refused(line: bytes) -> None:
+def test_a_malformed_frame_is_rejected(line: bytes) -> None:
     bench = Bench(b"S8", b"O")
     assert bench.adapter.obey(line) == b"\a"
     assert bench.sent == []
 
 
-def test_closed_or_listening_only_it_sends_nothing() -> None:
+def test_a_closed_or_listen_only_adapter_sends_nothing() -> None:
     closed, listening = Bench(b"S8"), Bench(b"S8", b"L")
     for bench in (closed, listening):
         assert bench.adapter.obey(b"t0800") == b"\a"
@@ -99,20 +99,20 @@ def test_closed_or_listening_only_it_sends_nothing() -> None:
     assert listening.adapter.on_bus
 
 
-def test_flags_tell_a_full_buffer_once() -> None:
+def test_flags_report_a_full_buffer_once() -> None:
     bench = Bench(b"S8", b"O")
     bench.room = False
     assert bench.adapter.obey(b"t0800") == b"\a"
     assert [bench.adapter.obey(b"F") for _ in range(2)] == [b"F02\r", b"F00\r"]
 
 
-def test_at_the_wrong_bit_rate_it_becomes_error_passive() -> None:
+def test_an_adapter_with_the_wrong_bit_rate_becomes_error_passive() -> None:
     bench = Bench(b"S6", b"O")
     assert bench.adapter.obey(b"F") == b"F00\r"
     assert bench.adapter.obey(b"t0800") == b"\a"
     flags = [int(bench.adapter.obey(b"F")[1:3], 16) for _ in range(2)]
     assert flags[0] & 0xA4 == 0xA4
-    assert flags[1] & 0x24 == 0x24  # a state, not an event
+    assert flags[1] & 0x24 == 0x24  # the state persists
     assert bench.sent == []
 
 

@@ -1,7 +1,7 @@
-"""Who may join a simulated bus.
+"""Only the user who runs a simulated bus may join it.
 
-Run by root, another user is tried as uid 65534. Run by anybody else, nobody else can be played:
-then the bus is told that the user who runs it is another one.
+If root runs the tests, uid 65534 is the other user. Otherwise no other user is available, and the
+bus is made to believe that a different user runs it.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ NOBODY = 65534
 
 
 def join_as_nobody(name: str) -> str:
-    """Return what an unprivileged user is told who joins."""
+    """Return the answer to an unprivileged user who joins."""
     reader, writer = os.pipe()
     pid = os.fork()
     if pid == 0:
@@ -40,7 +40,7 @@ def join_as_nobody(name: str) -> str:
     return answer
 
 
-def test_another_user_may_not_join_and_that_is_said_once(
+def test_another_user_may_not_join_and_is_reported_once(
     start_bus: Callable[..., Any],
     capsys: pytest.CaptureFixture[str],
     monkeypatch: pytest.MonkeyPatch,

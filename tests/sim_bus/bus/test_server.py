@@ -1,4 +1,4 @@
-"""The simulator as a process of its own, and its gateways, met by clients that others wrote."""
+"""The simulator as a separate process, and its gateways with third-party clients."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ except SimulatorError as error:
 
 
 class Simulator:
-    """A bus that answers SYNC: in lockstep with both gateways, or paced without any."""
+    """A bus that answers SYNC: in lockstep with both gateways, or paced without gateways."""
 
     def __init__(self, bus: str, port: int | None = 0, trace: Path = Path(os.devnull)) -> None:
         self.process = subprocess.Popen(
@@ -76,7 +76,7 @@ def simulator() -> Iterator[Simulator]:
     running = Simulator(f"simbus:{NAME}")
     with can.Bus(NAME, interface="simbus") as bus:
         bus.send(can.Message(arbitration_id=0x080, is_extended_id=False))
-        while frames(bus, 1)[0][0] != 0x281:  # the boot-up message has gone by then
+        while frames(bus, 1)[0][0] != 0x281:  # by then the boot-up message has passed
             pass
     yield running
     assert running.stop() == (0, "")
@@ -90,10 +90,10 @@ def member(simulator: Simulator) -> Iterator[can.BusABC]:
 
 @pytest.fixture
 def line(simulator: Simulator) -> Iterator[serial.Serial]:
-    """The adapter's serial line, channel closed, nothing left of an earlier user's.
+    """Yield the adapter's serial line with a closed channel and no earlier answers.
 
-    That one may have gone before it was answered, and no terminal tells the adapter: what comes
-    before the version is the answer to others.
+    An earlier user may have left before its answers arrived. Input before the version is such an
+    answer.
     """
     with serial.Serial(simulator.ready["slcan"], timeout=60.0) as port:
         port.write(b"\rC\rV\r")
@@ -115,12 +115,12 @@ def stock_slcan(simulator: Simulator, line: serial.Serial) -> Iterator[can.BusAB
 @pytest.fixture
 def stock_socketcand(simulator: Simulator) -> Iterator[can.BusABC]:
     with can.Bus(NAME, interface="socketcand", host="127.0.0.1", port=simulator.port) as bus:
-        time.sleep(0.05)  # the server keeps still for a moment after the greeting
+        time.sleep(0.05)  # the server pauses after the greeting
         yield bus
 
 
 def frames(bus: can.BusABC, count: int) -> list[tuple[int, bool, bool, bytes]]:
-    """Return what comes, `count` frames within two seconds each."""
+    """Return the received frames: up to `count`, each within two seconds."""
     seen = []
     while len(seen) < count:
         message = bus.recv(60.0)
@@ -154,7 +154,7 @@ def wire(message: can.Message) -> tuple[int, bool, bool, bytes]:
 
 
 @pytest.mark.parametrize("gateway", ["stock_slcan", "stock_socketcand"])
-def test_the_stock_clients_take_part(
+def test_third_party_clients_exchange_frames_with_the_bus(
     gateway: str, member: can.BusABC, request: pytest.FixtureRequest
 ) -> None:
     bus = request.getfixturevalue(gateway)
@@ -165,22 +165,22 @@ def test_the_stock_clients_take_part(
     assert frames(member, len(sent)) == expected
     for message in sent:
         member.send(message)
-    # what python-can takes for an answer to its commands does not come out
+    # python-can does not return what it takes for answers to its commands
     assert frames(bus, len(sent)) == expected
 
 
 @pytest.mark.parametrize("gateway", ["stock_slcan", "stock_socketcand"])
-def test_sync_is_carried_and_answered_in_order(
+def test_sync_is_delivered_and_answered_in_order(
     gateway: str, request: pytest.FixtureRequest
 ) -> None:
-    """The frame without data, which needs two spaces in socketcand."""
+    """SYNC has no data, which needs two spaces in socketcand."""
     bus = request.getfixturevalue(gateway)
     for _ in range(20):
         bus.send(can.Message(arbitration_id=0x080, is_extended_id=False))
         assert [frame[0] for frame in frames(bus, 2)] == [0x181, 0x281]
 
 
-def test_each_sees_what_the_others_send(
+def test_each_client_receives_the_frames_of_the_others(
     stock_slcan: can.BusABC, stock_socketcand: can.BusABC, member: can.BusABC
 ) -> None:
     everyone = [stock_slcan, stock_socketcand, member]
@@ -192,13 +192,13 @@ def test_each_sees_what_the_others_send(
         assert sender.recv(0.05) is None
 
 
-def test_version_and_serial_number(stock_slcan: Any) -> None:
+def test_the_adapter_reports_version_and_serial_number(stock_slcan: Any) -> None:
     assert stock_slcan.get_version(None) == (10, 13)
     assert stock_slcan.get_serial_number(None) == "SIM1"
 
 
-def test_the_serial_line_takes_its_time(line: serial.Serial) -> None:
-    """At 1 Mbaud a character takes 10 us; 200 frames of 23 characters and their answers 46 ms."""
+def test_the_serial_line_takes_the_time_of_its_characters(line: serial.Serial) -> None:
+    """At 1 Mbaud a character takes 10 us. 200 frames of 23 characters and answers take 46 ms."""
     line.write(b"S8\rO\r")
     assert line.read(2) == b"\r\r"
     started = time.monotonic()
@@ -209,14 +209,14 @@ def test_the_serial_line_takes_its_time(line: serial.Serial) -> None:
     assert took > 200 * 22 * 10e-6
 
 
-def test_an_adapter_that_nobody_reads_loses_frames_and_lives(
+def test_an_adapter_whose_line_is_not_read_loses_frames_and_keeps_working(
     line: serial.Serial, member: can.BusABC
 ) -> None:
     line.write(b"S8\rO\r")
     assert line.read(2) == b"\r\r"
     end = time.monotonic() + 60.0
     flags = 0
-    while not flags & 0x09:  # frames come until it has told once that it lost some
+    while not flags & 0x09:  # frames arrive until the flags have reported the loss once
         assert time.monotonic() < end, f"{flags:02X}"
         for _ in range(1500):
             member.send(can.Message(arbitration_id=0x301, data=bytes(8), is_extended_id=False))
@@ -234,7 +234,7 @@ def test_an_adapter_that_nobody_reads_loses_frames_and_lives(
 
 
 class Talk:
-    """A bare connection to the server."""
+    """A raw connection to the server."""
 
     def __init__(self, port: int) -> None:
         self.sock = socket.create_connection(("127.0.0.1", port), 60.0)
@@ -260,7 +260,7 @@ def talk(simulator: Simulator) -> Iterator[Talk]:
     talk.sock.close()
 
 
-def test_the_conversation_of_socketcand(talk: Talk, member: can.BusABC) -> None:
+def test_socketcand_commands_get_the_expected_answers(talk: Talk, member: can.BusABC) -> None:
     talk.say("< echo >", "< echo >")
     talk.say("< rawmode >", "< error no bus is open >")
     talk.say("< open nobus9 >", "< error could not open bus >")
@@ -281,7 +281,7 @@ def test_the_conversation_of_socketcand(talk: Talk, member: can.BusABC) -> None:
     assert [text.split(" ", 1)[1] for text in texts] == [" >", "3132333435363738 >", " >"]
 
 
-def test_commands_cut_anywhere_are_understood(talk: Talk, member: can.BusABC) -> None:
+def test_socketcand_commands_may_be_split_anywhere(talk: Talk, member: can.BusABC) -> None:
     for character in "< open can0 >":
         talk.sock.sendall(character.encode())
     talk.expect("< ok >")
@@ -293,7 +293,7 @@ def test_commands_cut_anywhere_are_understood(talk: Talk, member: can.BusABC) ->
     ]
 
 
-def test_a_client_that_leaves_or_does_not_read_harms_nobody(
+def test_a_client_that_leaves_or_does_not_read_does_not_affect_others(
     simulator: Simulator, member: can.BusABC
 ) -> None:
     deaf, gone = Talk(simulator.port), Talk(simulator.port)
@@ -310,7 +310,7 @@ def test_a_client_that_leaves_or_does_not_read_harms_nobody(
     third.sock.close()
 
 
-# -- how they begin and end
+# -- start and end of the gateways
 
 
 def test_a_port_in_use_is_reported(simulator: Simulator) -> None:
@@ -321,7 +321,7 @@ def test_a_port_in_use_is_reported(simulator: Simulator) -> None:
     assert "Traceback" not in errors
 
 
-def test_on_a_real_interface_there_are_none() -> None:
+def test_gateways_on_a_real_interface_are_rejected() -> None:
     status, errors = Simulator("socketcan:nocan9").stop()
     assert status == 1
     assert "'socketcan:nocan9': --slcan and --socketcand are for simbus:NAME only" in errors
@@ -357,7 +357,9 @@ def plain(trace: Path) -> Iterator[Simulator]:
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
-def test_a_signal_ends_it_in_order(plain: Simulator, trace: Path, number: signal.Signals) -> None:
+def test_a_signal_ends_the_simulator_properly(
+    plain: Simulator, trace: Path, number: signal.Signals
+) -> None:
     assert (plain.ready["bus"], plain.ready["pid"]) == (f"simbus:{NAME}-4", plain.process.pid)
     assert (plain.ready["mode"], plain.ready["nodes"]) == ("paced", [1])
     plain.process.send_signal(number)
@@ -365,8 +367,8 @@ def test_a_signal_ends_it_in_order(plain: Simulator, trace: Path, number: signal
     assert trace.read_text() == "closed"
 
 
-def test_it_ends_with_the_command_that_started_it(plain: Simulator, trace: Path) -> None:
-    assert plain.stop() == (0, "")  # its standard input ends
+def test_the_simulator_ends_when_its_standard_input_closes(plain: Simulator, trace: Path) -> None:
+    assert plain.stop() == (0, "")
     assert trace.read_text() == "closed"
 
 
@@ -380,7 +382,9 @@ def test_it_ends_with_the_command_that_started_it(plain: Simulator, trace: Path)
     ],
     ids=["taken", "adapter", "unnamed", "no-interface"],
 )
-def test_a_bus_it_cannot_serve_is_refused(simulator: Simulator, bus: str, message: str) -> None:
+def test_a_bus_that_cannot_be_served_is_rejected(
+    simulator: Simulator, bus: str, message: str
+) -> None:
     status, errors = Simulator(bus, None).stop()
     assert status == 1
     assert message in errors

@@ -1,4 +1,4 @@
-"""What the simulated camera shows is where geometry has it, found by a detector of others."""
+"""Images of the simulated camera agree with geometry, as found by OpenCV's detector."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def above(
 
 
 def corners_of(camera: SimCamera, image: np.ndarray) -> np.ndarray:
-    """Return the corners that OpenCV finds, which are good to some tenths of a pixel."""
+    """Return the corners that OpenCV finds, to some tenths of a pixel."""
     settings = cv2.aruco.DetectorParameters()
     settings.cornerRefinementMethod = cv2.aruco.CORNER_REFINE_SUBPIX
     settings.cornerRefinementWinSize = 3
@@ -64,7 +64,7 @@ def expected(camera: SimCamera, state: PlatformState) -> np.ndarray:
     return seen_at(at @ pose.rotation, camera.plant.lens)
 
 
-def test_pixels_look_where_opencv_has_them() -> None:
+def test_rays_of_pixels_agree_with_opencv() -> None:
     rays = ray_table(LENS)
     pixels = np.array([(0.0, 0.0), (319.0, 255.0), (100.0, 30.0), (7.0, 200.0)])
     matrix = np.array([[280.0, 0.0, 158.0], [0.0, 282.0, 130.0], [0.0, 0.0, 1.0]])
@@ -77,13 +77,15 @@ def test_pixels_look_where_opencv_has_them() -> None:
 
 
 @pytest.mark.parametrize("turn_deg", [(0.0, 0.0, 0.0), (12.0, -9.0, 30.0)])
-def test_a_marker_is_seen_where_the_pose_says(turn_deg: tuple[float, float, float]) -> None:
+def test_a_marker_appears_at_the_projection_of_its_pose(
+    turn_deg: tuple[float, float, float],
+) -> None:
     camera, state = SimCamera(plant()), above(turn_deg)
     off = corners_of(camera, camera.grab(state)) - expected(camera, state)
     assert np.abs(off).max() < 0.4
 
 
-def test_motion_blurs_and_a_rolling_shutter_shears() -> None:
+def test_motion_blurs_an_image_and_a_rolling_shutter_shears_it() -> None:
     state = above(velocity=(0.4, 0.0, 0.0))
     still, moving, rolling = (
         SimCamera(plant(sensor=SensorPlant(exposure_s=0.03, noise=0.0, shot_noise=0.0, **more)))
@@ -92,23 +94,23 @@ def test_motion_blurs_and_a_rolling_shutter_shears() -> None:
     sharp, blurred = still.grab(above()), moving.grab(state)
     slope = [np.abs(np.diff(image.astype(float), axis=1)).max() for image in (sharp, blurred)]
     assert slope[1] < 0.8 * slope[0]
-    # in the middle of the exposure it is where it would be at rest
+    # the blur is centred on the position in the middle of the exposure
     assert np.abs(corners_of(moving, blurred) - expected(moving, state)).max() < 0.5
     seen, rest = corners_of(rolling, rolling.grab(state)), expected(rolling, above())
-    rate = -0.4 * 280.0 / 1.2 * 0.15 / 256.0  # px to the right for each row further down
+    rate = -0.4 * 280.0 / 1.2 * 0.15 / 256.0  # px to the right per row
     sheared = rest[:, 0] + rate * (rest[:, 1] - 128.0)
     assert np.abs(seen[:, 0] - sheared).max() < 0.5
     assert np.abs(seen[:, 0] - rest[:, 0]).max() > 1.0
 
 
-def test_noise_belongs_to_the_number_of_the_image_alone() -> None:
+def test_noise_depends_only_on_the_number_of_the_image() -> None:
     first, second = SimCamera(plant()), SimCamera(plant())
     images = [first.grab(above()), first.grab(above())]
     np.testing.assert_array_equal(images[0], second.grab(above()))
     assert (images[0] != images[1]).mean() > 0.3
 
 
-def test_what_is_broken_shows() -> None:
+def test_darkness_defocus_occlusion_and_moved_markers_are_visible() -> None:
     camera = SimCamera(plant())
     good = camera.grab(above()).astype(float)
     camera.dark = True
@@ -128,7 +130,7 @@ def test_what_is_broken_shows() -> None:
     assert (places[1] - places[0])[:, 0].mean() == pytest.approx(0.05 * 280.0 / 1.2, abs=0.5)
 
 
-def test_faults_of_the_plant_come_at_their_images_and_go(tmp_path: Path) -> None:
+def test_faults_of_the_plant_affect_only_their_images(tmp_path: Path) -> None:
     path = tmp_path / "plant.toml"
     path.write_text(
         "seed = 3\n[camera]\nsamples = 4\n"

@@ -9,7 +9,7 @@ from tests.sim_bus.canopen.slave_bench import Bench, odd_eds
 
 @pytest.fixture
 def bench() -> Bench:
-    """A booted slave in PRE-OPERATIONAL."""
+    """Return a booted slave in PRE-OPERATIONAL."""
     return Bench().boot()
 
 
@@ -20,5 +20,5 @@ def odd_eds_path(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def odd_bench(odd_eds_path: Path) -> Bench:
-    """A booted slave with objects of every type."""
+    """Return a booted slave with objects of each type."""
     return Bench(odd_eds_path).boot()

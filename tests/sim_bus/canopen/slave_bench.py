@@ -1,4 +1,4 @@
-"""A slave on a bench: frames and bus time handed to it directly."""
+"""A slave without a bus. Tests give it frames and bus time directly."""
 
 from __future__ import annotations
 
@@ -31,11 +31,11 @@ ODD_OBJECTS = {
     0x2108: ("0x0001", "rw", "1"),
     0x2109: ("0x0007", "ro", "0xCAFE"),
 }
-"""Types and rights that a plain drive has no use for: (data type, access, default)."""
+"""Types and access rights that a usual drive does not use: (data type, access, default)."""
 
 
 def odd_eds(directory: Path) -> Path:
-    """EDS of the generic drive with dummies allowed and objects of every type added."""
+    """Write an EDS of the generic drive with dummies allowed and objects of each type added."""
     text = GENERIC_EDS.read_text()
     for n in range(2, 8):
         text = text.replace(f"Dummy000{n}=0", f"Dummy000{n}=1")
@@ -55,7 +55,7 @@ def _parsed(eds: Path) -> canopen.ObjectDictionary:
 
 
 class Recorder(SlaveApplication):
-    """An application that notes what it is told."""
+    """An application that records its callbacks."""
 
     def __init__(self) -> None:
         self.events: list[tuple[object, ...]] = []
@@ -80,7 +80,7 @@ class Recorder(SlaveApplication):
 
 
 class Bench:
-    """One slave, its frames in the order it sent them, and the bus time."""
+    """One slave, the frames it sent in their order, and the bus time."""
 
     def __init__(
         self,
@@ -91,7 +91,7 @@ class Bench:
         bitrate: int = 1_000_000,
     ) -> None:
         self.od = ObjectDictionary.from_eds(eds, node_id)
-        # the drive ships with types that any master can use; these are a synchronous master's
+        # the factory setting suits any master; this one suits a synchronous master
         self.od.set_default(0x1400, 2, 1)
         self.od.set_default(0x1801, 2, 0)
         self.app = Recorder() if app is None else app
@@ -106,7 +106,7 @@ class Bench:
         return self
 
     def take(self) -> list[tuple[int, bytes]]:
-        """Frames sent since the last call: identifier and data."""
+        """Return identifier and data of the frames sent since the last call."""
         frames = []
         for packed in self.slave.outbox:
             assert len(packed) == 16
@@ -116,12 +116,12 @@ class Bench:
         return frames
 
     def send(self, identifier: int, data: bytes = b"") -> list[tuple[int, bytes]]:
-        """Put a frame on the bus; returns what the slave sent."""
+        """Deliver a frame. Return the frames that the slave sent."""
         self.slave.receive(FRAME.pack(identifier, len(data), data), self.now)
         return self.take()
 
     def run_to(self, time_s: float) -> list[tuple[float, int, bytes]]:
-        """Let bus time run as the hub does; returns (time, identifier, data)."""
+        """Advance bus time as the hub does. Return (time, identifier, data) of the sent frames."""
         sent = []
         while (due := self.slave.next_event()) <= time_s:
             self.now = max(self.now, due)
@@ -133,7 +133,7 @@ class Bench:
         return sent + [(self.now, *frame) for frame in self.take()]
 
     def sync(self, data: bytes = b"", period_s: float = 1e-3) -> list[tuple[int, bytes]]:
-        """One SYNC, a period after the last."""
+        """Send a SYNC one period after the last."""
         self.now += period_s
         self.slave.advance(self.now)
         return self.take() + self.send(0x80, data)
@@ -146,14 +146,14 @@ class Bench:
         return self
 
     def sdo(self, request: bytes) -> bytes:
-        """Answer of the SDO server to one request."""
+        """Return the answer of the SDO server to one request."""
         ((identifier, data),) = self.send(0x600 + self.slave.node_id, request.ljust(8, b"\0"))
         assert identifier == 0x580 + self.slave.node_id
         assert len(data) == 8
         return data
 
     def write(self, index: int, sub: int, data: bytes) -> None:
-        """Write by SDO with the `canopen` package; raises canopen.SdoAbortedError."""
+        """Write by SDO with the `canopen` package, which may raise canopen.SdoAbortedError."""
         assert self.remote is not None
         self.remote.sdo.download(index, sub, data)
 
@@ -162,7 +162,7 @@ class Bench:
         return self.remote.sdo.upload(index, sub)
 
     def configure_pdo(self, com: int, entries: list[int], transmission: int, **extra: int) -> None:
-        """Map and switch on a PDO by the standard's procedure; extra are sub3, sub5, sub6."""
+        """Map and enable a PDO by the standard's procedure. `extra` are sub3, sub5 and sub6."""
         cob_id = int.from_bytes(self.read(com, 1), "little")
         off = (cob_id | 0x80000000).to_bytes(4, "little")
         self.write(com, 1, off)
@@ -180,7 +180,7 @@ class Bench:
 
 
 class DirectNetwork(canopen.Network):
-    """The `canopen` package's master, joined to the bench without sockets."""
+    """The master of the `canopen` package, connected to the bench without sockets."""
 
     def __init__(self, bench: Bench) -> None:
         super().__init__()
@@ -191,7 +191,7 @@ class DirectNetwork(canopen.Network):
         self.frames_to_master = 0
 
     def send_message(self, can_id: int, data: bytes, remote: bool = False) -> None:
-        """Deliver a frame, then the answers; frames whose number is to be dropped get lost."""
+        """Deliver a frame, then the answers. Frames whose number is in `drop` are lost."""
         self.frames_to_slave += 1
         if self.frames_to_slave in self.drop_to_slave:
             return

@@ -1,4 +1,4 @@
-"""NMT, boot-up, heartbeats both ways, emergencies."""
+"""NMT, boot-up, heartbeat producer and consumer, and emergencies of a slave."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def beat(bench: Bench, state: int = 5, node: int = MASTER) -> list[tuple[int, by
     return bench.send(0x700 + node, bytes([state]))
 
 
-def test_boots_up_with_one_message_and_only_when_time_runs() -> None:
+def test_boot_up_is_one_message_and_waits_until_time_runs() -> None:
     bench = Bench()
     assert bench.take() == []
     assert bench.slave.next_event() <= 0.0
@@ -53,7 +53,9 @@ def test_nmt_for_others_and_nonsense_is_ignored(bench: Bench) -> None:
     assert bench.slave.nmt_state == NmtState.PRE_OPERATIONAL
 
 
-def test_resets_restore_what_they_should(bench: Bench) -> None:
+def test_communication_reset_keeps_and_node_reset_restores_application_parameters(
+    bench: Bench,
+) -> None:
     def change() -> None:
         bench.write(0x1017, 0, (500).to_bytes(2, "little"))
         bench.write(0x6072, 0, (123).to_bytes(2, "little"))
@@ -69,14 +71,14 @@ def test_resets_restore_what_they_should(bench: Bench) -> None:
     assert ("reset",) in bench.app.events[2:]
 
 
-def test_reset_leaves_to_the_device_what_masters_cannot_write(bench: Bench) -> None:
+def test_reset_keeps_read_only_objects(bench: Bench) -> None:
     bench.od.set(0x6064, 0, 4711)
     bench.od.set(0x1018, 4, 77)
     bench.nmt(129)
     assert (bench.od.get(0x6064), bench.od.get(0x1018, 4)) == (4711, 77)
 
 
-def test_heartbeat_carries_the_state_at_the_period(bench: Bench) -> None:
+def test_heartbeat_is_sent_at_its_period_with_the_nmt_state(bench: Bench) -> None:
     bench.write(0x1017, 0, (250).to_bytes(2, "little"))
     bench.nmt(1)
     sent = bench.run_to(1.0)
@@ -89,7 +91,7 @@ def test_heartbeat_carries_the_state_at_the_period(bench: Bench) -> None:
     assert bench.run_to(5.0) == []
 
 
-def test_heartbeat_keeps_its_pace_when_time_comes_in_cycles(bench: Bench) -> None:
+def test_heartbeat_keeps_its_period_when_time_advances_in_cycles(bench: Bench) -> None:
     bench.write(0x1017, 0, (10).to_bytes(2, "little"))
     beats = [k for k in range(1, 101) if any(i == HEARTBEAT for i, _ in bench.sync())]
     assert beats == list(range(10, 101, 10))
@@ -123,7 +125,7 @@ def test_monitoring_begins_with_the_first_heartbeat(bench: Bench) -> None:
     ("behaviour", "state"),
     [(0, NmtState.PRE_OPERATIONAL), (1, NmtState.OPERATIONAL), (2, NmtState.STOPPED)],
 )
-def test_loss_of_the_master_ends_as_1029h_says(
+def test_loss_of_the_master_leads_to_the_state_in_1029h(
     bench: Bench, behaviour: int, state: NmtState
 ) -> None:
     bench.write(0x1029, 1, bytes([behaviour]))
@@ -134,7 +136,7 @@ def test_loss_of_the_master_ends_as_1029h_says(
     assert bench.slave.nmt_state is state
 
 
-def test_restart_of_a_watched_node_is_a_loss(bench: Bench) -> None:
+def test_restart_of_a_monitored_node_counts_as_loss(bench: Bench) -> None:
     watch_master(bench, 100)
     assert beat(bench, 0) == []
     beat(bench)
@@ -165,7 +167,7 @@ def test_consumers_are_checked_and_independent(bench: Bench) -> None:
     assert bench.od.get(0x1001) == 0
 
 
-def test_giving_up_the_watch_takes_the_error_back(bench: Bench) -> None:
+def test_ending_the_monitoring_clears_the_error(bench: Bench) -> None:
     watch_master(bench, 100)
     beat(bench)
     bench.run_to(1.0)
@@ -175,7 +177,7 @@ def test_giving_up_the_watch_takes_the_error_back(bench: Bench) -> None:
     assert bench.run_to(2.0) == []
 
 
-def test_emergencies_are_reported_once_kept_in_the_register_and_in_the_history(
+def test_emergencies_are_sent_once_and_kept_in_register_and_history(
     bench: Bench,
 ) -> None:
     slave = bench.slave
@@ -199,7 +201,7 @@ def test_emergencies_are_reported_once_kept_in_the_register_and_in_the_history(
         bench.read(0x1003, 1)
 
 
-def test_history_keeps_the_newest(bench: Bench) -> None:
+def test_history_keeps_the_newest_errors(bench: Bench) -> None:
     for code in range(0xFF00, 0xFF20):
         bench.slave.emergency(code, 0x80)
     length = len(bench.od.subs(0x1003))
@@ -217,7 +219,7 @@ def test_inhibit_time_spaces_emergencies_in_bus_time(bench: Bench) -> None:
     assert [data[0] for *_, data in sent] == [1, 2, 3]
 
 
-def test_emergency_waits_in_stopped_and_may_be_switched_off(bench: Bench) -> None:
+def test_emergency_waits_in_stopped_and_can_be_disabled(bench: Bench) -> None:
     bench.nmt(2)
     bench.slave.emergency(0xFF01, 0)
     assert bench.take() == []
@@ -230,7 +232,7 @@ def test_emergency_waits_in_stopped_and_may_be_switched_off(bench: Bench) -> Non
     assert [i for i, _ in bench.take()] == [0x90]
 
 
-def test_application_survives_a_reset_with_its_errors_cleared(bench: Bench) -> None:
+def test_node_reset_clears_errors_that_a_communication_reset_keeps(bench: Bench) -> None:
     bench.slave.emergency(0xFF01, 0x80)
     bench.send(0x200 + NODE, b"")
     bench.nmt(130)

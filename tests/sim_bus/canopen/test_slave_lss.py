@@ -1,4 +1,4 @@
-"""LSS slave against the `canopen` package's LSS master."""
+"""The LSS slave with the LSS master of the `canopen` package."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def lss_bench(node_id: int, store: ParameterStore | None = None) -> Bench:
     return bench.boot()
 
 
-def test_selected_by_its_address_it_tells_who_it_is(master: type[LssMaster]) -> None:
+def test_a_selected_device_answers_inquiries_of_its_address(master: type[LssMaster]) -> None:
     bench = lss_bench(NODE)
     lss = bench.network.lss
     with pytest.raises(LssError):
@@ -44,7 +44,7 @@ def test_selected_by_its_address_it_tells_who_it_is(master: type[LssMaster]) -> 
         lss.inquire_node_id()
 
 
-def test_new_node_id_counts_after_a_reset_of_communication(
+def test_a_new_node_id_is_active_after_a_communication_reset(
     master: type[LssMaster], tmp_path: Path
 ) -> None:
     path = tmp_path / "drive.json"
@@ -117,12 +117,12 @@ def test_bit_timing_is_checked_and_activated_after_silence(master: type[LssMaste
     assert bench.run_to(0.19) == []
     assert bench.send(0x600 + NODE, b"\x40\x00\x10".ljust(8, b"\0")) == []
     assert bench.slave.bitrate == 1_000_000
-    assert bench.run_to(0.3) == []  # a bus of 1 Mbit/s does not hear it any more
+    assert bench.run_to(0.3) == []  # a bus at 1 Mbit/s does not receive its frames any more
     assert bench.slave.bitrate == 500_000
     assert bench.send(0x600 + NODE, b"\x40\x00\x10".ljust(8, b"\0")) == []
 
 
-def test_bit_timing_that_the_bus_has_is_taken_up_after_silence(master: type[LssMaster]) -> None:
+def test_the_bit_timing_of_the_bus_is_activated_after_silence(master: type[LssMaster]) -> None:
     bench = lss_bench(NODE)
     bench.write(0x1017, 0, (10).to_bytes(2, "little"))
     lss = bench.network.lss
@@ -134,7 +134,7 @@ def test_bit_timing_that_the_bus_has_is_taken_up_after_silence(master: type[LssM
     assert bench.sdo(b"\x40\x00\x10")[0] == 0x43
 
 
-def test_stored_bit_rate_counts_when_switched_on_again(
+def test_a_stored_bit_rate_is_active_after_the_next_power_up(
     master: type[LssMaster], tmp_path: Path
 ) -> None:
     path = tmp_path / "drive.json"

@@ -1,4 +1,4 @@
-"""PDOs: transmission types, timers, remapping rules, deadlines; SYNC with and without counter."""
+"""PDOs: transmission types, timers, mapping rules and deadlines. SYNC with and without counter."""
 
 from __future__ import annotations
 
@@ -32,12 +32,12 @@ def emcy_codes(frames: list[tuple[int, bytes]]) -> list[int]:
 
 @pytest.fixture
 def running(bench: Bench) -> Bench:
-    """Operational, with TPDO2 off; TPDO1 is as the EDS has it."""
+    """Return a slave in OPERATIONAL with TPDO2 disabled and TPDO1 as in the EDS."""
     bench.write(0x1801, 1, (0x80000000 | TPDO2).to_bytes(4, "little"))
     return bench.start()
 
 
-def test_default_map_is_exchanged_at_each_sync(running: Bench) -> None:
+def test_default_pdos_are_exchanged_at_each_sync(running: Bench) -> None:
     od = running.od
     od.set(0x6041, 0, 0x1237)
     od.set(0x6077, 0, -321)
@@ -55,7 +55,7 @@ def test_default_map_is_exchanged_at_each_sync(running: Bench) -> None:
     assert od.get(0x6071) == 0
 
 
-def test_order_at_a_sync_is_latch_then_rpdo_then_act_then_tpdo(bench: Bench) -> None:
+def test_a_sync_first_latches_then_applies_rpdos_then_acts_then_samples_tpdos(bench: Bench) -> None:
     order: list[str] = []
 
     class Application(Recorder):
@@ -77,7 +77,7 @@ def test_order_at_a_sync_is_latch_then_rpdo_then_act_then_tpdo(bench: Bench) -> 
     assert bench.od.get(0x6071) == 2
 
 
-def test_pdos_rest_outside_operational(bench: Bench) -> None:
+def test_pdos_are_inactive_outside_operational(bench: Bench) -> None:
     assert bench.sync() == []
     bench.send(RPDO1, struct.pack("<Hh", 6, 0))
     bench.start()
@@ -89,7 +89,7 @@ def test_pdos_rest_outside_operational(bench: Bench) -> None:
     assert bench.od.get(0x6040) == 0
 
 
-def test_type_0_goes_out_at_the_sync_after_a_change(running: Bench) -> None:
+def test_type_0_is_sent_at_the_sync_after_a_change(running: Bench) -> None:
     running.configure_pdo(0x1801, [MODE_DISPLAY], 0)
     sent = []
     for mode in (0, 0, 10, 10, 6, 10):
@@ -99,13 +99,13 @@ def test_type_0_goes_out_at_the_sync_after_a_change(running: Bench) -> None:
 
 
 @pytest.mark.parametrize("n", [2, 3, 240])
-def test_type_n_goes_out_at_every_nth_sync(running: Bench, n: int) -> None:
+def test_type_n_is_sent_at_each_nth_sync(running: Bench, n: int) -> None:
     running.configure_pdo(0x1801, [MODE_DISPLAY], n)
     turns = [k for k in range(1, 3 * n + 1) if any(i == TPDO2 for i, _ in running.sync())]
     assert turns == [n, 2 * n, 3 * n]
 
 
-def test_type_252_answers_a_remote_request_with_the_syncs_sample(running: Bench) -> None:
+def test_type_252_answers_a_remote_request_with_the_sample_of_the_last_sync(running: Bench) -> None:
     running.configure_pdo(0x1801, [POSITION], 252)
     assert running.send(TPDO2 | RTR) == []
     running.od.set(0x6064, 0, 1)
@@ -124,7 +124,7 @@ def test_type_253_answers_a_remote_request_with_a_fresh_sample(running: Bench) -
 
 
 @pytest.mark.parametrize("transmission", [254, 255])
-def test_event_driven_goes_out_on_change_within_inhibit_time(
+def test_event_driven_pdo_is_sent_on_change_but_not_within_the_inhibit_time(
     running: Bench, transmission: int
 ) -> None:
     running.configure_pdo(0x1801, [MODE_DISPLAY], transmission, sub3=50)
@@ -139,27 +139,27 @@ def test_event_driven_goes_out_on_change_within_inhibit_time(
     assert (when, data) == (pytest.approx(start + 0.105), b"\3")
 
 
-def test_event_driven_goes_out_once_at_the_start(running: Bench) -> None:
+def test_event_driven_pdo_is_sent_once_at_the_start(running: Bench) -> None:
     running.nmt(128)
     running.configure_pdo(0x1801, [MODE_DISPLAY], 255)
     assert running.nmt(1) == [(TPDO2, b"\0")]
     assert running.sync() == [(TPDO1, bytes(8))]
 
 
-def test_sdo_write_is_a_change_for_event_driven_pdos(running: Bench) -> None:
+def test_an_sdo_write_triggers_an_event_driven_pdo(running: Bench) -> None:
     running.configure_pdo(0x1801, [MAX_TORQUE], 255)
     sent = running.send(0x600 + NODE, bytes.fromhex("2b7260003412 0000"))
     assert (TPDO2, b"\x34\x12") in sent
 
 
-def test_event_timer_repeats_without_change(running: Bench) -> None:
+def test_event_timer_repeats_a_pdo_without_change(running: Bench) -> None:
     running.configure_pdo(0x1801, [MODE_DISPLAY], 255, sub5=20)
     start = running.now
     times = [when - start for when, identifier, _ in running.run_to(start + 0.1) if identifier]
     assert times == pytest.approx([0.02, 0.04, 0.06, 0.08, 0.1])
 
 
-def test_event_driven_rpdo_acts_at_once(running: Bench) -> None:
+def test_event_driven_rpdo_acts_immediately(running: Bench) -> None:
     running.configure_pdo(0x1400, [CONTROLWORD, TARGET_TORQUE], 255)
     running.app.events.clear()
     running.send(RPDO1, struct.pack("<Hh", 6, 99))
@@ -167,7 +167,7 @@ def test_event_driven_rpdo_acts_at_once(running: Bench) -> None:
     assert running.app.events == [("after_rpdo", running.now)]
 
 
-def test_missed_rpdo_deadline_is_reported_and_taken_back(running: Bench) -> None:
+def test_a_missed_rpdo_deadline_is_reported_and_cleared(running: Bench) -> None:
     running.write(0x1400, 5, (30).to_bytes(2, "little"))
     assert running.run_to(running.now + 1.0) == []
     t = running.now
@@ -183,7 +183,9 @@ def test_missed_rpdo_deadline_is_reported_and_taken_back(running: Bench) -> None
     assert running.od.get(0x1001) == 0
 
 
-def test_wrong_length_is_an_emergency_and_a_short_frame_is_dropped(running: Bench) -> None:
+def test_a_pdo_of_wrong_length_raises_an_emergency_and_a_short_one_is_dropped(
+    running: Bench,
+) -> None:
     assert emcy_codes(running.send(RPDO1, b"\x07\0\0")) == [0x8210]
     assert emcy_codes(running.send(RPDO1, b"\x07\0\0")) == []
     running.sync()
@@ -194,7 +196,7 @@ def test_wrong_length_is_an_emergency_and_a_short_frame_is_dropped(running: Benc
     assert emcy_codes(running.send(RPDO1, bytes(4))) == [0]
 
 
-def test_errors_of_pdos_are_reported_again_after_a_reset_of_communication(running: Bench) -> None:
+def test_pdo_errors_are_reported_again_after_a_communication_reset(running: Bench) -> None:
     assert emcy_codes(running.send(RPDO1, b"")) == [0x8210]
     running.nmt(130)
     assert running.od.get(0x1001) == 0
@@ -202,7 +204,7 @@ def test_errors_of_pdos_are_reported_again_after_a_reset_of_communication(runnin
     assert emcy_codes(running.send(RPDO1, b"")) == [0x8210]
 
 
-def test_value_out_of_range_in_a_pdo_leaves_the_object(running: Bench) -> None:
+def test_a_value_out_of_range_in_a_pdo_is_ignored(running: Bench) -> None:
     running.od.entry(0x6072).high = 1000
     running.configure_pdo(0x1400, [CONTROLWORD, MAX_TORQUE], 1)
     running.od.set(0x6072, 0, 500)
@@ -211,7 +213,7 @@ def test_value_out_of_range_in_a_pdo_leaves_the_object(running: Bench) -> None:
     assert (running.od.get(0x6040), running.od.get(0x6072)) == (6, 500)
 
 
-def test_mapping_rules(bench: Bench) -> None:
+def test_invalid_mappings_are_rejected(bench: Bench) -> None:
     def entry(value: int) -> bytes:
         return value.to_bytes(4, "little")
 
@@ -222,11 +224,11 @@ def test_mapping_rules(bench: Bench) -> None:
     assert code_of(write, 0x1600, 1, entry(TARGET_TORQUE)) == 0x08000022
     write(0x1600, 0, b"\0")
     assert code_of(write, 0x1600, 1, entry(POSITION)) == 0x06040041  # not writable
-    assert code_of(write, 0x1600, 1, entry(0x60710020)) == 0x06040041  # not its length
+    assert code_of(write, 0x1600, 1, entry(0x60710020)) == 0x06040041  # not the object's length
     assert code_of(write, 0x1600, 1, entry(0x10050020)) == 0x06040041  # not mappable
     assert code_of(write, 0x1600, 1, entry(0x5FFF0010)) == 0x06020000
     assert code_of(write, 0x1600, 1, entry(0x60710110)) == 0x06090011
-    assert code_of(write, 0x1600, 1, entry(0x00050008)) == 0x06020000  # no dummies in this EDS
+    assert code_of(write, 0x1600, 1, entry(0x00050008)) == 0x06020000  # this EDS has no dummies
     write(0x1600, 1, entry(0x607A0020))
     write(0x1600, 2, entry(0x60FF0020))
     write(0x1600, 3, entry(TARGET_TORQUE))
@@ -241,7 +243,7 @@ def test_mapping_rules(bench: Bench) -> None:
     assert (bench.od.get(0x607A), bench.od.get(0x60FF)) == (-1, 77)
 
 
-def test_communication_parameter_rules(bench: Bench) -> None:
+def test_invalid_communication_parameters_are_rejected(bench: Bench) -> None:
     def long(value: int) -> bytes:
         return value.to_bytes(4, "little")
 
@@ -260,7 +262,7 @@ def test_communication_parameter_rules(bench: Bench) -> None:
     assert [identifier for identifier, _ in bench.sync()][:1] == [0x190]
 
 
-def test_dummies_take_room_in_an_rpdo_only(odd_bench: Bench) -> None:
+def test_dummies_may_only_be_mapped_in_rpdos(odd_bench: Bench) -> None:
     odd_bench.configure_pdo(0x1400, [0x00060010, 0x00050008, TARGET_TORQUE], 1)
     odd_bench.start()
     odd_bench.send(RPDO1, struct.pack("<HBh", 0xFFFF, 0xFF, -9))
@@ -273,7 +275,7 @@ def test_dummies_take_room_in_an_rpdo_only(odd_bench: Bench) -> None:
     assert caught.value.code == 0x06040041
 
 
-def test_sync_counter_and_start_value(running: Bench) -> None:
+def test_pdos_follow_sync_counter_and_start_value(running: Bench) -> None:
     running.configure_pdo(0x1801, [MODE_DISPLAY], 2, sub6=5)
     running.write(0x1019, 0, b"\x08")
     sent = [
@@ -289,7 +291,7 @@ def test_sync_counter_and_start_value(running: Bench) -> None:
     assert code_of(running.write, 0x1019, 0, b"\0") == 0x08000022
 
 
-def test_rpdo_after_the_synchronous_window_waits_for_nothing(running: Bench) -> None:
+def test_an_rpdo_after_the_synchronous_window_is_discarded(running: Bench) -> None:
     running.write(0x1007, 0, (300).to_bytes(4, "little"))
     running.sync()
     running.run_to(running.now + 0.0002)
@@ -326,7 +328,7 @@ NUMBERS = {
     count=st.integers(1, 6),
     data=st.binary(min_size=8, max_size=8),
 )
-def test_any_mapping_carries_what_the_objects_hold(
+def test_any_mapping_transfers_the_values_of_its_objects(
     indexes: list[int], count: int, data: bytes
 ) -> None:
     bench = Bench().boot()
@@ -348,7 +350,7 @@ def test_any_mapping_carries_what_the_objects_hold(
     assert tuple(bench.od.get(i) for i in chosen) == layout.unpack(frame)
 
 
-def test_impossible_mapping_in_an_eds_is_named(tmp_path: Path) -> None:
+def test_error_for_an_impossible_mapping_in_an_eds_names_it(tmp_path: Path) -> None:
     eds = tmp_path / "bad.eds"
     eds.write_text(GENERIC_EDS.read_text().replace("0x60640020", "0x60650820"))
     with pytest.raises(DictionaryError, match="1A0"):

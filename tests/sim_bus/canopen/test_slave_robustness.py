@@ -1,4 +1,4 @@
-"""Frames nobody should send: the slave neither falls nor lets go of what is protected."""
+"""Invalid frames neither crash the slave nor change protected objects."""
 
 from __future__ import annotations
 
@@ -55,7 +55,9 @@ def protected(od: ObjectDictionary) -> dict[tuple[int, int], object]:
 
 @settings(max_examples=120)
 @given(garbage=st.lists(frames, max_size=60), state=st.sampled_from([1, 2, 128]))
-def test_garbage_changes_nothing_protected(garbage: list[tuple[int, bytes]], state: int) -> None:
+def test_garbage_does_not_change_protected_objects(
+    garbage: list[tuple[int, bytes]], state: int
+) -> None:
     bench = Bench().boot()
     before = protected(bench.od)
     bench.nmt(state)
@@ -69,15 +71,15 @@ def test_garbage_changes_nothing_protected(garbage: list[tuple[int, bytes]], sta
     assert bench.sdo(b"\x40\x00\x10")[0] == 0x43
 
 
-def test_frames_for_others_are_not_even_asked_for(bench: Bench) -> None:
+def test_frames_for_other_nodes_are_not_accepted(bench: Bench) -> None:
     bench.start()
     accepted = bench.slave.accepts
     assert {0, 0x80, 0x200 + NODE, 0x600 + NODE, 0x7E5} <= accepted
     assert not accepted & {0x600 + NODE + 1, 0x200 + NODE + 1, 0x180 + NODE + 1}
 
 
-def test_cost_of_a_sync_stays_small() -> None:
-    """In lines of Python, as many on any machine: a bound far above the usual 60."""
+def test_a_sync_executes_few_lines_of_python() -> None:
+    """The number of lines is the same on any machine. The bound is far above the usual 60."""
     bench = Bench(app=SlaveApplication()).boot()
     bench.configure_pdo(0x1801, [0x60610008, 0x60B90010, 0x60BA0020], 0)
     bench.start()

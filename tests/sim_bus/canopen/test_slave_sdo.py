@@ -1,4 +1,4 @@
-"""SDO server against the `canopen` package's client and against hand-made frames."""
+"""The SDO server with the client of the `canopen` package and with handmade frames."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def abort_of(answer: bytes) -> tuple[int, int, int]:
 
 
 def refused(bench: Bench, index: int, sub: int, data: bytes | None = None) -> int:
-    """Abort code of a read, or of a write when there is data."""
+    """Return the abort code of a read, or of a write if `data` is given."""
     with pytest.raises(canopen.SdoAbortedError) as caught:
         if data is None:
             bench.read(index, sub)
@@ -42,7 +42,7 @@ def shared(odd_eds_path: Path) -> Bench:
 
 @settings(max_examples=60)
 @given(content=contents, block_down=st.booleans(), block_up=st.booleans(), crc=st.booleans())
-def test_bytes_come_back_through_every_kind_of_transfer(
+def test_bytes_survive_each_kind_of_transfer(
     shared: Bench, content: bytes, block_down: bool, block_up: bool, crc: bool
 ) -> None:
     sdo = shared.remote.sdo
@@ -92,12 +92,12 @@ def test_block_upload_repeats_from_the_acknowledged_segment(bench: Bench) -> Non
     assert bench.send(request, bytes([0xA1]).ljust(8, b"\0")) == []
 
 
-def test_small_object_by_block_request_with_switch_threshold_comes_expedited(bench: Bench) -> None:
+def test_a_block_upload_of_a_small_object_switches_to_expedited(bench: Bench) -> None:
     answer = bench.sdo(struct.pack("<BHBBB", 0xA4, 0x1000, 0, 127, 10))
     assert answer == bytes.fromhex("43001000") + (0x00020192).to_bytes(4, "little")
 
 
-def test_block_download_with_wrong_crc_is_refused_and_nothing_written(bench: Bench) -> None:
+def test_a_block_download_with_wrong_crc_is_rejected_and_writes_nothing(bench: Bench) -> None:
     bench.od.set(DOMAIN, 0, b"old")
     bench.sdo(struct.pack("<BHBI", 0xC6, DOMAIN, 0, 7))
     bench.sdo(b"\x81abcdefg")
@@ -131,7 +131,7 @@ def test_block_download_with_wrong_crc_is_refused_and_nothing_written(bench: Ben
         (0x2108, 0, b"\x02", 0x06090031),
     ],
 )
-def test_refused_accesses_carry_the_code_of_the_standard(
+def test_rejected_accesses_have_the_abort_code_of_the_standard(
     odd_bench: Bench, index: int, sub: int, data: bytes | None, code: int
 ) -> None:
     before = {(e.index, e.sub): e.value for e in odd_bench.od}
@@ -152,14 +152,14 @@ def test_refused_accesses_carry_the_code_of_the_standard(
         (0x2108, b"\x00"),
     ],
 )
-def test_every_type_of_object_keeps_what_was_written(
+def test_objects_of_each_type_keep_written_values(
     odd_bench: Bench, index: int, encoded: bytes
 ) -> None:
     odd_bench.write(index, 0, encoded)
     assert odd_bench.read(index) == encoded
 
 
-def test_limits_of_an_object_are_kept(bench: Bench) -> None:
+def test_values_beyond_the_limits_of_an_object_are_rejected(bench: Bench) -> None:
     torque = bench.od.entry(0x6071)
     torque.low, torque.high = -100, 50
     assert refused(bench, 0x6071, 0, struct.pack("<h", -101)) == 0x06090032
@@ -177,12 +177,12 @@ def test_defaults_of_the_eds_are_served(odd_bench: Bench) -> None:
     assert odd_bench.remote.sdo[0x1008].raw == "Generic CiA 402 torque servo"
 
 
-def test_expedited_download_without_size_takes_the_objects_own(bench: Bench) -> None:
+def test_an_expedited_download_without_size_uses_the_size_of_the_object(bench: Bench) -> None:
     assert bench.sdo(bytes.fromhex("2240600006000000"))[0] == 0x60
     assert bench.od.get(0x6040) == 6
 
 
-def test_device_may_refuse_a_write_and_provide_a_read(bench: Bench) -> None:
+def test_callbacks_may_reject_a_write_and_provide_a_read(bench: Bench) -> None:
     def refuse(value: object) -> None:
         raise SdoAbort(Abort.LOCAL_CONTROL)
 
@@ -203,11 +203,11 @@ def test_wrong_toggle_bit_aborts_upload_and_download(bench: Bench) -> None:
 
 
 @pytest.mark.parametrize("request_bytes", [b"\xe0", b"\x00", b"\x60", b"\xa3", b"\xa1", b"\xc1"])
-def test_command_that_fits_nothing_is_refused(bench: Bench, request_bytes: bytes) -> None:
+def test_an_unexpected_command_is_rejected(bench: Bench, request_bytes: bytes) -> None:
     assert abort_of(bench.sdo(request_bytes))[2] == 0x05040001
 
 
-def test_download_shorter_or_longer_than_announced_is_refused(bench: Bench) -> None:
+def test_a_download_of_wrong_length_is_rejected(bench: Bench) -> None:
     bench.sdo(struct.pack("<BHBI", 0x21, DOMAIN, 0, 9))
     assert abort_of(bench.sdo(b"\x01abcdefg"))[2] == 0x06070013
     bench.sdo(struct.pack("<BHBI", 0x21, DOMAIN, 0, 5))
@@ -216,7 +216,7 @@ def test_download_shorter_or_longer_than_announced_is_refused(bench: Bench) -> N
     assert bench.od.get(DOMAIN) == b""
 
 
-def test_silent_client_is_told_of_the_time_out(bench: Bench) -> None:
+def test_a_transfer_of_a_silent_client_is_aborted_after_the_timeout(bench: Bench) -> None:
     bench.sdo(struct.pack("<BHB", 0x40, 0x1008, 0))
     ((_, identifier, data),) = bench.run_to(TIMEOUT_S + 0.1)
     assert identifier == 0x580 + NODE
@@ -224,7 +224,7 @@ def test_silent_client_is_told_of_the_time_out(bench: Bench) -> None:
     assert bench.run_to(60.0) == []
 
 
-def test_new_request_displaces_the_transfer_and_an_abort_ends_it(bench: Bench) -> None:
+def test_a_new_request_replaces_a_transfer_and_an_abort_ends_it(bench: Bench) -> None:
     bench.sdo(struct.pack("<BHB", 0x40, 0x1008, 0))
     assert bench.sdo(struct.pack("<BHB", 0x40, 0x1000, 0))[0] == 0x43
     assert abort_of(bench.sdo(b"\x60"))[2] == 0x05040001
@@ -242,7 +242,7 @@ def test_server_is_closed_in_stopped(bench: Bench) -> None:
     assert abort_of(bench.sdo(b"\x60"))[2] == 0x05040001
 
 
-def test_every_readable_object_can_be_read_by_a_third_party(bench: Bench) -> None:
+def test_a_third_party_can_read_each_readable_object(bench: Bench) -> None:
     for index in bench.remote.object_dictionary:
         record = bench.remote.object_dictionary[index]
         variables = (

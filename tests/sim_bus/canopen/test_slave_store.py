@@ -1,4 +1,4 @@
-"""1010h, 1011h and the file behind them."""
+"""1010h and 1011h store and restore parameters in a file."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def test_stored_values_survive_a_power_cycle_and_resets(tmp_path: Path) -> None:
         assert (device.od.get(0x60FF), device.od.get(0x6040)) == (7, 8)
 
 
-def test_areas_are_stored_and_restored_apart(bench: Bench) -> None:
+def test_areas_are_stored_and_restored_separately(bench: Bench) -> None:
     def change() -> None:
         bench.write(0x1017, 0, (750).to_bytes(2, "little"))
         bench.write(0x6072, 0, (555).to_bytes(2, "little"))
@@ -66,14 +66,14 @@ def test_stored_identifiers_follow_the_node_id(tmp_path: Path) -> None:
     assert other.read(0x1800, 1) == (0x189).to_bytes(4, "little")
 
 
-def test_storage_that_fails_is_a_hardware_error(tmp_path: Path) -> None:
+def test_failed_storing_is_reported_as_hardware_error(tmp_path: Path) -> None:
     bench = power_cycle(tmp_path / "missing" / "drive.json")
     with pytest.raises(canopen.SdoAbortedError) as caught:
         bench.write(0x1010, 1, b"save")
     assert caught.value.code == 0x06060000
 
 
-def test_storing_leaves_the_other_files_of_the_folder_alone(tmp_path: Path) -> None:
+def test_storing_does_not_change_other_files_in_the_folder(tmp_path: Path) -> None:
     path, other = tmp_path / "drive.json", tmp_path / "drive.json.part"
     other.write_text("of the user")
     power_cycle(path).write(0x1010, 1, b"save")
@@ -85,7 +85,7 @@ def test_storing_leaves_the_other_files_of_the_folder_alone(tmp_path: Path) -> N
     "content",
     ["", "[]", "{}", '{"values": {"zz": 1}, "node_id": 1, "bitrate": 1}', '{"values": 3}'],
 )
-def test_file_that_is_no_store_is_named(tmp_path: Path, content: str) -> None:
+def test_error_for_an_invalid_store_names_the_file(tmp_path: Path, content: str) -> None:
     path = tmp_path / "drive.json"
     path.write_text(content)
     with pytest.raises(StoreError, match=r"drive\.json"):

@@ -1,4 +1,4 @@
-"""1020h: date and time of the configuration, void once any of it is changed."""
+"""1020h keeps date and time of the configuration until a parameter changes."""
 
 from __future__ import annotations
 
@@ -22,17 +22,17 @@ def _write_stamp(bench: Bench) -> None:
     bench.write(0x1020, 2, struct.pack("<I", 1234567))
 
 
-def test_it_holds_what_was_written_until_something_changes(bench: Bench) -> None:
+def test_the_stamp_is_kept_until_a_parameter_changes(bench: Bench) -> None:
     assert _stamp(bench) == (0, 0)
     _write_stamp(bench)
     assert _stamp(bench) == (15000, 1234567)
-    bench.write(0x1017, 0, struct.pack("<H", 0))  # as it was: no change
+    bench.write(0x1017, 0, struct.pack("<H", 0))  # unchanged
     assert _stamp(bench) == (15000, 1234567)
     bench.write(0x1017, 0, struct.pack("<H", 100))
     assert _stamp(bench) == (0, 0)
 
 
-def test_application_parameters_count_process_data_do_not(bench: Bench) -> None:
+def test_application_parameters_clear_the_stamp_and_process_data_do_not(bench: Bench) -> None:
     _write_stamp(bench)
     bench.write(0x6072, 0, struct.pack("<H", 321))
     assert _stamp(bench) == (0, 0)
@@ -42,7 +42,7 @@ def test_application_parameters_count_process_data_do_not(bench: Bench) -> None:
     assert _stamp(bench) == (15000, 1234567)
 
 
-def test_a_refused_write_changes_nothing(bench: Bench) -> None:
+def test_a_rejected_write_keeps_the_stamp(bench: Bench) -> None:
     _write_stamp(bench)
     for index, sub, data in ((0x1016, 1, b"\x64\0\x7f\xff"), (0x1000, 0, bytes(4))):
         with pytest.raises(canopen.SdoAbortedError):
@@ -50,11 +50,11 @@ def test_a_refused_write_changes_nothing(bench: Bench) -> None:
     assert _stamp(bench) == (15000, 1234567)
 
 
-def test_it_is_stored_and_restored_with_the_parameters(bench: Bench) -> None:
+def test_the_stamp_is_stored_and_restored_with_the_parameters(bench: Bench) -> None:
     bench.write(0x1017, 0, struct.pack("<H", 100))
     _write_stamp(bench)
     bench.nmt(130)
-    assert _stamp(bench) == (0, 0)  # not stored: 1017h is back to what it was as well
+    assert _stamp(bench) == (0, 0)  # not stored: 1017h is also restored
     bench.write(0x1017, 0, struct.pack("<H", 100))
     _write_stamp(bench)
     bench.write(0x1010, 1, SAVE)
@@ -66,7 +66,9 @@ def test_it_is_stored_and_restored_with_the_parameters(bench: Bench) -> None:
     assert _stamp(bench) == (0, 0)
 
 
-def test_a_communication_reset_does_not_vouch_for_a_changed_application(bench: Bench) -> None:
+def test_a_communication_reset_clears_the_stamp_if_application_parameters_changed(
+    bench: Bench,
+) -> None:
     _write_stamp(bench)
     bench.write(0x1010, 1, SAVE)
     bench.write(0x6072, 0, struct.pack("<H", 321))

@@ -1,4 +1,4 @@
-"""Fixtures of the drive's tests."""
+"""Fixture of a simulated drive."""
 
 from __future__ import annotations
 

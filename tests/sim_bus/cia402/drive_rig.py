@@ -1,4 +1,4 @@
-"""A simulated drive on no bus at all: frames in, frames out, bus time turned by hand."""
+"""A simulated drive without a bus. Tests exchange frames and advance the bus time."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ FRAME = struct.Struct("=IB3x8s")
 NODE = 5
 PERIOD_S = 1e-3
 SMOOTH = Plant.model_validate({"ripple": {"sixth": 0.0, "twelfth": 0.0}})
-"""A motor whose torque is its current's, exactly."""
+"""A motor whose torque is exactly proportional to its current."""
 
 
 class SdoRefusedError(Exception):
@@ -25,7 +25,7 @@ class SdoRefusedError(Exception):
 
 
 class Rig:
-    """Master's side of the frames of one drive: SDO, default PDOs, SYNC."""
+    """The master of one drive: SDO, default PDOs, SYNC."""
 
     def __init__(
         self, plant: Plant | None = None, truth_log: Path | None = None, eds: Path = EDS

@@ -1,4 +1,4 @@
-"""Faults: their causes, codes, reactions and resets."""
+"""Faults of a simulated drive: causes, codes, reactions and resets."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def reset(rig: Rig) -> int:
     return rig.status & 0x4F
 
 
-def test_following_error() -> None:
+def test_a_following_error_faults_the_drive_with_8611h() -> None:
     rig = rig_with(load={"inertia_kg_m2": 0.01})
     rig.write(0x6065, 500)
     rig.write(0x6066, 20)
@@ -41,7 +41,7 @@ def test_following_error() -> None:
     assert rig.read(0x603F) == 0
 
 
-def test_overcurrent_takes_the_power_off_at_once() -> None:
+def test_overcurrent_cuts_power_immediately() -> None:
     rig = rig_with(drive={"overcurrent_Arms": 4.0})
     rig.enable(10)
     rig.torque = 900  # 4.8 A
@@ -53,16 +53,16 @@ def test_overcurrent_takes_the_power_off_at_once() -> None:
     assert reset(rig) == SOD
 
 
-def test_overspeed() -> None:
+def test_exceeding_a_lowered_speed_limit_faults_the_drive_with_8400h() -> None:
     rig = rig_with(friction={"coulomb_Nm": 0.0, "breakaway_Nm": 0.0, "viscous_Nms_rad": 0.0})
     rig.write(0x6080, 600)
     rig.enable(10)
     rig.torque = 300
     rig.cycles(400)
-    # The speed limit holds the torque back ...
+    # The speed limit reduces the torque ...
     assert rig.truth[1] == pytest.approx(600 * 0.10472, rel=0.05)
     assert rig.status & 0x0800
-    # ... until it is lowered below what the motor does already.
+    # ... until it is lowered below the present speed.
     rig.write(0x6080, 300)
     rig.until(lambda: rig.status & 0x4F == FAULT, 0.1)
     assert rig.read(0x603F) == 0x8400
@@ -70,14 +70,14 @@ def test_overspeed() -> None:
     assert abs(rig.truth[1]) < 0.1
 
 
-def test_i2t_warns_then_trips_and_cools_before_a_reset() -> None:
+def test_i2t_warns_then_trips_and_must_cool_before_a_reset() -> None:
     rig = rig_with(
         drive={"i2t_time_constant_s": 0.5},
         friction={"coulomb_Nm": 5.0},
         motor={"torque_constant_error": 0.0},
     )
     rig.enable(10)
-    rig.torque = 1400  # 4.2 Nm: 1.34 times the rated current, 1.79 the rated heat
+    rig.torque = 1400  # 4.2 Nm: 1.34 times the rated current, 1.79 times the rated heat
     rig.until(lambda: bool(rig.status & 0x80), 2.0)
     assert rig.status & 0x6F == OE
     rig.until(lambda: rig.status & 0x4F == FAULT, 2.0)
@@ -88,7 +88,7 @@ def test_i2t_warns_then_trips_and_cools_before_a_reset() -> None:
     assert reset(rig) == SOD
 
 
-def test_rated_torque_is_carried_for_ever() -> None:
+def test_rated_torque_never_trips_i2t() -> None:
     rig = rig_with(drive={"i2t_time_constant_s": 0.05}, friction={"coulomb_Nm": 5.0})
     rig.enable(10)
     rig.torque = 1000
@@ -97,7 +97,7 @@ def test_rated_torque_is_carried_for_ever() -> None:
 
 
 @pytest.mark.parametrize("option", [0, 1, 2, 3])
-def test_fault_reaction_options(option: int) -> None:
+def test_fault_reaction_options_stop_the_motor_as_specified(option: int) -> None:
     rig = Rig()
     rig.write(0x605E, option)
     rig.enable(3)
@@ -145,7 +145,7 @@ def test_reset_does_not_enable() -> None:
     assert rig.status & 0x4F == SOD
 
 
-def test_second_fault_does_not_hide_the_first() -> None:
+def test_a_second_fault_does_not_hide_the_first() -> None:
     rig = Rig()
     rig.write(0x2F00, 0xFF01, 1)
     rig.write(0x2F00, 0xFF02, 1)
@@ -163,7 +163,7 @@ def test_power_is_off_in_fault() -> None:
     assert abs(rig.truth[1]) < 1e-3
 
 
-def test_an_encoder_that_jumps_miscounts_from_then_on() -> None:
+def test_an_encoder_jump_offsets_the_position_permanently() -> None:
     rig = Rig()
     rig.enable(10)
     rig.cycles(50)
@@ -176,7 +176,7 @@ def test_an_encoder_that_jumps_miscounts_from_then_on() -> None:
     assert rig.position == pytest.approx(before, abs=3)
 
 
-def test_a_cable_is_cut_or_slips_only_where_there_is_one() -> None:
+def test_only_a_drive_with_a_cable_accepts_cut_and_slip() -> None:
     bare = Rig()
     for sub in (12, 13):
         with pytest.raises(SdoRefusedError, match="06060000h"):

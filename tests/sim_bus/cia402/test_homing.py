@@ -1,4 +1,4 @@
-"""Homing against a geometric oracle: which index pulse each method must find."""
+"""Homing methods find the index pulse or switch that geometry predicts."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def rig_at(angle_deg: float, **limits: float) -> Rig:
 def home(rig: Rig, method: int, limit_s: float = 30.0) -> None:
     rig.write(0x6098, method)
     rig.enable(6)
-    assert rig.status & 0x3400 == 0x0400  # not started
+    assert rig.status & 0x3400 == 0x0400  # homing has not started
     rig.word = 0x1F
     rig.cycle()
     if method not in (35, 37):
@@ -45,7 +45,7 @@ def home(rig: Rig, method: int, limit_s: float = 30.0) -> None:
 
 
 def homed_deg(rig: Rig) -> float:
-    """Mechanical angle that the drive now calls zero."""
+    """Return the mechanical angle that is now the drive's zero."""
     rig.until(lambda: rig.status & 0x3400 in (0x1400, 0x2400), 2.0)
     rig.cycles(100)
     assert rig.status & 0x3400 == 0x1400
@@ -58,7 +58,7 @@ def next_index(angle_deg: float, direction: int) -> float:
     return INDEX_DEG + 360 * (math.ceil(turns) if direction > 0 else math.floor(turns))
 
 
-# Edge that counts and final direction, from the figures of the standard.
+# Relevant edge and final direction, from the figures of the standard.
 EXPECTED = {
     1: ("negative", +1),
     2: ("positive", -1),
@@ -75,7 +75,7 @@ EXPECTED = {
 
 @pytest.mark.parametrize("method", EXPECTED)
 @pytest.mark.parametrize("start_deg", [-900.0, 400.0, 1500.0])
-def test_methods_with_switches(method: int, start_deg: float) -> None:
+def test_methods_with_switches_find_the_predicted_index(method: int, start_deg: float) -> None:
     edge_name, direction = EXPECTED[method]
     edge = {
         "negative": LIMITS["negative_deg"],
@@ -98,7 +98,7 @@ def test_methods_with_switches(method: int, start_deg: float) -> None:
         (6, {"home_to_deg": 130.0}, -1),
     ],
 )
-def test_methods_with_a_one_sided_home_switch(
+def test_methods_with_a_one_sided_home_switch_find_the_predicted_index(
     method: int, home_switch: dict[str, float], direction: int, start_deg: float
 ) -> None:
     rig = rig_at(start_deg, **home_switch)
@@ -107,7 +107,7 @@ def test_methods_with_a_one_sided_home_switch(
 
 
 @pytest.mark.parametrize("method", [1, 2])
-def test_starting_on_the_limit_switch(method: int) -> None:
+def test_homing_may_start_on_the_limit_switch(method: int) -> None:
     rig = rig_at(-2100.0 if method == 1 else 2700.0, **LIMITS)
     home(rig, method)
     edge, direction = (-2000.0, 1) if method == 1 else (2600.0, -1)
@@ -116,24 +116,26 @@ def test_starting_on_the_limit_switch(method: int) -> None:
 
 @settings(max_examples=12)
 @given(start=st.floats(-700, 700), method=st.sampled_from([33, 34]), offset=st.integers(-500, 500))
-def test_index_methods_from_anywhere(start: float, method: int, offset: int) -> None:
+def test_index_methods_find_the_next_index_from_any_start(
+    start: float, method: int, offset: int
+) -> None:
     rig = rig_at(start)
     rig.write(0x607C, offset)
     home(rig, method)
     index = next_index(start, -1 if method == 33 else 1)
-    # The zero lies one home offset beyond the index.
+    # The zero is one home offset beyond the index.
     assert homed_deg(rig) == pytest.approx(index + offset * 360 / COUNTS, abs=1.5)
 
 
 @pytest.mark.parametrize("method", [35, 37])
-def test_present_position(method: int) -> None:
+def test_methods_35_and_37_home_at_the_present_position(method: int) -> None:
     rig = rig_at(77.0)
     home(rig, method, 0.1)
     assert homed_deg(rig) == pytest.approx(77.0, abs=1.5)
     assert abs(rig.truth[0] - math.radians(77.0)) < 0.02
 
 
-def test_index_that_never_comes_ends_in_an_error() -> None:
+def test_homing_without_index_ends_with_an_error() -> None:
     rig = Rig(Plant.model_validate({"encoder": {"index_present": False}}))
     rig.write(0x6099, 16_000, 2)
     home(rig, 34)
@@ -144,7 +146,7 @@ def test_index_that_never_comes_ends_in_an_error() -> None:
     assert rig.status & 0x6F == 0x27
 
 
-def test_both_limits_met_ends_in_an_error() -> None:
+def test_reaching_both_limits_ends_with_an_error() -> None:
     rig = rig_at(0.0, negative_deg=-200.0, positive_deg=300.0)
     home(rig, 7)
     rig.until(lambda: rig.status & 0x3400 == 0x2400, 2.0)
@@ -163,7 +165,7 @@ def test_failed_homing_can_be_tried_again() -> None:
 
 
 @pytest.mark.parametrize("word", [0x0F, 0x11F])
-def test_interruption(word: int) -> None:
+def test_ending_the_command_or_halt_interrupts_homing(word: int) -> None:
     rig = rig_at(50.0)
     rig.write(0x6098, 34)
     rig.enable(6)
@@ -178,7 +180,7 @@ def test_interruption(word: int) -> None:
     assert abs(rig.truth[0] - stopped_at) < 0.01
 
 
-def test_stays_homed_through_other_modes_and_not_through_a_reset() -> None:
+def test_a_drive_stays_homed_in_other_modes_but_not_after_a_reset() -> None:
     rig = rig_at(0.0)
     home(rig, 34)
     homed_deg(rig)
@@ -209,12 +211,12 @@ def test_position_mode_uses_the_new_zero() -> None:
     assert math.degrees(rig.truth[0]) == pytest.approx(INDEX_DEG + 90, abs=8)
 
 
-def test_inputs_show_the_switches() -> None:
+def test_digital_inputs_show_the_switches() -> None:
     seen = [rig_at(angle, **LIMITS, **HOME).read(0x60FD) for angle in (-2100.0, 0.0, 400.0, 2700.0)]
     assert seen == [1, 0, 4, 2]
 
 
-def test_long_steps_of_bus_time_change_nothing() -> None:
+def test_homing_is_the_same_with_one_long_step_of_bus_time() -> None:
     rig = rig_at(0.0)
     rig.write(0x6098, 34)
     rig.enable(6)
@@ -222,5 +224,4 @@ def test_long_steps_of_bus_time_change_nothing() -> None:
     rig.now += 3.0
     rig.drive.advance(rig.now)
     assert rig.read(0x6041) & 0x3400 == 0x1400
-    # From standstill the index is 111 counts away at 1000 counts/s.
     assert math.degrees(rig.truth[0]) == pytest.approx(INDEX_DEG, abs=10)

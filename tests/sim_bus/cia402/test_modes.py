@@ -1,4 +1,4 @@
-"""Motion modes with stiction, cogging and encoder noise in place: PP, PV, PT, CSP, CSV, CST."""
+"""The modes PP, PV, PT, CSP, CSV and CST with stiction, cogging and encoder noise."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def plants() -> list[Plant]:
 
 
 def set_point(rig: Rig, target: int, extra: int = 0) -> None:
-    """Do the handshake of profile position mode."""
+    """Perform the handshake of profile position mode."""
     rig.write(0x607A, target)
     rig.word = 0x1F | extra
     rig.until(lambda: bool(rig.status & 0x1000), 0.1)
@@ -39,7 +39,7 @@ def set_point(rig: Rig, target: int, extra: int = 0) -> None:
 
 
 def mean_velocity(rig: Rig, cycles: int = 600) -> float:
-    """Mean true velocity in counts/s over some cycles."""
+    """Return the mean true velocity over some cycles in counts/s."""
     angle = rig.truth[0]
     rig.cycles(cycles)
     return (rig.truth[0] - angle) / (cycles * 1e-3) / RAD
@@ -47,7 +47,7 @@ def mean_velocity(rig: Rig, cycles: int = 600) -> float:
 
 class TestProfilePosition:
     @pytest.mark.parametrize("plant", plants())
-    def test_reaches_every_target_and_says_so(self, plant: Plant) -> None:
+    def test_reaches_each_target_and_reports_it(self, plant: Plant) -> None:
         rig = Rig(plant)
         rig.enable(1)
         for target in (8192, 8200, -3000, -3001, 0):
@@ -79,7 +79,7 @@ class TestProfilePosition:
         assert references[-1] == 20_000
         assert max(references) <= 20_000
 
-    def test_waiting_set_point_comes_after_the_active_one(self, rig: Rig) -> None:
+    def test_a_buffered_set_point_follows_the_active_one(self, rig: Rig) -> None:
         rig.enable(1)
         set_point(rig, 8192)
         rig.cycles(5)
@@ -97,7 +97,7 @@ class TestProfilePosition:
         assert abs(rig.position) < 20
         assert rig.status & 0x1400 == 0x0400
 
-    def test_change_at_once_and_relative(self, rig: Rig) -> None:
+    def test_a_set_point_may_be_immediate_and_relative(self, rig: Rig) -> None:
         rig.enable(1)
         set_point(rig, 80_000)
         rig.cycles(100)
@@ -108,7 +108,7 @@ class TestProfilePosition:
         rig.until(lambda: bool(rig.status & 0x0400), 4.0)
         assert abs(rig.position + 1500) < 20
 
-    def test_software_limit_holds_the_target_back(self, rig: Rig) -> None:
+    def test_software_limit_clamps_the_target(self, rig: Rig) -> None:
         rig.write(0x607D, -1000, 1)
         rig.write(0x607D, 4000, 2)
         rig.enable(1)
@@ -117,7 +117,7 @@ class TestProfilePosition:
         assert abs(rig.position - 4000) < 20
         assert rig.status & 0x0800
 
-    def test_halt_and_go_on(self, rig: Rig) -> None:
+    def test_motion_continues_after_halt(self, rig: Rig) -> None:
         rig.enable(1)
         set_point(rig, 80_000)
         rig.cycles(300)
@@ -131,7 +131,7 @@ class TestProfilePosition:
         rig.until(lambda: rig.status & 0x0400 and rig.position > 79_000, 4.0)
         assert abs(rig.position - 80_000) < 20
 
-    def test_holds_its_place_when_enabled(self, rig: Rig) -> None:
+    def test_holds_the_position_when_enabled(self, rig: Rig) -> None:
         rig.write(0x607A, 5000)
         rig.enable(1)
         rig.cycles(500)
@@ -148,7 +148,7 @@ class TestVelocity:
             rig.write(0x60FF, target)
             rig.cycles(700)
             mean = mean_velocity(rig)
-            # A slow reference is followed by stick and slip, a few counts behind at times.
+            # The motor follows a slow reference with stick-slip, up to a few counts behind.
             assert mean == pytest.approx(target, rel=0.02, abs=150)
 
     def test_velocity_actual_value_follows_the_true_one(self, rig: Rig) -> None:
@@ -163,7 +163,7 @@ class TestVelocity:
         assert np.mean(shown) == pytest.approx(np.mean(true), rel=0.01)
         assert np.std(np.subtract(shown, true)) < 600
 
-    def test_profile_ramps(self, rig: Rig) -> None:
+    def test_velocity_follows_the_profile_ramps(self, rig: Rig) -> None:
         rig.write(0x6083, 40_000)
         rig.write(0x6084, 80_000)
         rig.enable(3)
@@ -195,7 +195,7 @@ class TestVelocity:
 
 
 class TestCyclicPosition:
-    def test_tracks_a_sine_and_reports_what_lacks(self, rig: Rig) -> None:
+    def test_tracks_a_sine_and_reports_the_following_error(self, rig: Rig) -> None:
         rig.enable(8)
         errors = []
         for k in range(2000):
@@ -203,7 +203,7 @@ class TestCyclicPosition:
             rig.write(0x607A, target)
             rig.cycle()
             errors.append(rig.read(0x60F4, signed=True))
-        # The torque needed at the reversals costs some counts until the integrator has it.
+        # At reversals, the error is some counts until the integrator supplies the torque.
         assert max(abs(e) for e in errors[200:]) < 60
         assert rig.status & 0x3000 == 0x1000
 
@@ -213,7 +213,7 @@ class TestCyclicPosition:
         rig.cycles(40)
         start = rig.read(0x6062, signed=True)
         rig.write(0x607A, 200)
-        rig.cycle()  # taken at its SYNC
+        rig.cycle()  # applied at its SYNC
         references = []
         for _ in range(20):
             rig.now += 1e-3
@@ -230,7 +230,7 @@ class TestCyclicPosition:
 
 
 class TestTorque:
-    def test_slope_and_target_reached(self, rig: Rig) -> None:
+    def test_torque_follows_its_slope_and_reports_the_target(self, rig: Rig) -> None:
         rig.write(0x6087, 1000)
         rig.enable(4)
         rig.torque = 100
@@ -245,8 +245,8 @@ class TestTorque:
         assert ramp[-1] == 100
         assert all(b >= a for a, b in itertools.pairwise(demands))
 
-    def test_torque_acts_from_the_next_sync_on(self) -> None:
-        """A command sent before SYNC k acts over the cycle after it."""
+    def test_torque_acts_from_the_next_sync(self) -> None:
+        """A command sent before SYNC k acts during the cycle after it."""
         rig = Rig(SMOOTH)
         rig.enable(10)
         rig.torque = 300
@@ -267,7 +267,9 @@ class TestTorque:
         ("index", "value", "up", "down"),
         [(0x6072, 50, 50, -50), (0x60E0, 40, 40, -100), (0x60E1, 30, 100, -30)],
     )
-    def test_limits(self, rig: Rig, index: int, value: int, up: int, down: int) -> None:
+    def test_torque_limits_clamp_the_torque(
+        self, rig: Rig, index: int, value: int, up: int, down: int
+    ) -> None:
         rig.write(index, value)
         rig.enable(10)
         for demand, expected in ((100, up), (-100, down)):
@@ -285,7 +287,7 @@ class TestTorque:
         assert rig.actual_torque == pytest.approx(5.59 * 0.561 / 3.0 * 1000, abs=1)
         assert rig.read(0x6078, signed=True) == pytest.approx(1000, abs=1)
 
-    def test_steps_are_those_of_the_rated_torque(self, rig: Rig) -> None:
+    def test_torque_is_in_per_mille_of_the_rated_torque(self, rig: Rig) -> None:
         assert rig.read(0x6076) == 3000
         rig.write(0x6076, 1000)
         rig.enable(10)

@@ -1,4 +1,4 @@
-"""What the simulated drives beside the generic one do on the wire, drive by drive."""
+"""Quirks of the simulated drives other than the generic one."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def refusal(rig: Rig, index: int, value: int, sub: int = 0) -> int:
 
 
 def enable(rig: Rig, mode: int) -> None:
-    """By SDO alone, with halt set while the mode changes."""
+    """Enable the drive by SDO, with halt set during the mode change."""
     rig.write(0x6040, HALT)
     rig.write(0x6060, mode)
     rig.write(0x6040, 0)
@@ -50,7 +50,7 @@ def enable(rig: Rig, mode: int) -> None:
 
 
 def turn(rig: Rig, units: int, seconds: float = 0.012) -> tuple[float, float]:
-    """Return true torque and speed after `units` in 6071h."""
+    """Write `units` to 6071h and return true torque and speed."""
     rig.write(0x6071, units)
     rig.run(seconds)
     sample = rig.drive.axis.sample
@@ -92,26 +92,26 @@ def test_velocities_are_in_rpm(mnm: Rig) -> None:
 
 
 @pytest.mark.parametrize("eds", [MNM, COMPAX3])
-def test_only_its_own_modes_are_taken(eds: Path) -> None:
+def test_unsupported_modes_are_rejected(eds: Path) -> None:
     rig = Rig(SMOOTH, eds=eds)
     for mode in (2, 5, 7, 8, 9, CST, -1):
         assert refusal(rig, 0x6060, mode) == INVALID
 
 
-def test_a_mode_is_passed_over_without_halt(mnm: Rig) -> None:
+def test_a_mode_change_without_halt_is_ignored(mnm: Rig) -> None:
     mnm.write(0x6060, PT)
     mnm.run(0.2)
     assert mnm.read(0x6061) == 0
     mnm.write(0x6040, HALT)
     mnm.write(0x6060, PT)
     mnm.run(0.02)
-    assert mnm.read(0x6061) == 0, "it takes its time"
+    assert mnm.read(0x6061) == 0, "the change takes some time"
     mnm.run(0.01)
     assert mnm.read(0x6061) == PT
 
 
 @pytest.mark.parametrize("eds", [MNM, COMPAX3])
-def test_no_mode_change_while_enabled(eds: Path) -> None:
+def test_the_mode_cannot_be_changed_while_enabled(eds: Path) -> None:
     rig = Rig(SMOOTH, eds=eds)
     enable(rig, PT)
     assert refusal(rig, 0x6060, HM) == DEVICE_STATE
@@ -120,7 +120,7 @@ def test_no_mode_change_while_enabled(eds: Path) -> None:
 
 
 @pytest.mark.parametrize(("method", "way"), [(34, -1), (33, 1)])
-def test_homing_goes_the_other_way_round(mnm: Rig, method: int, way: int) -> None:
+def test_homing_directions_are_reversed(mnm: Rig, method: int, way: int) -> None:
     enable(mnm, HM)
     mnm.write(0x6098, method)
     begin = mnm.truth[0]
@@ -131,7 +131,7 @@ def test_homing_goes_the_other_way_round(mnm: Rig, method: int, way: int) -> Non
         words.add(mnm.read(0x6041) & 0x3400)
         if 0x1000 in words:
             break
-    assert words == {0x0000, 0x1000}, "bit 12 comes alone, and at rest"
+    assert words == {0x0000, 0x1000}, "bit 12 is set without bit 10, and at rest"
     assert abs(mnm.truth[1]) < 0.2
     assert way * (mnm.truth[0] - begin) > 0.1
     error = math.degrees(mnm.truth[0]) - mnm.read(0x6064, signed=True) * 360 / 8192 - 123.4
@@ -139,7 +139,7 @@ def test_homing_goes_the_other_way_round(mnm: Rig, method: int, way: int) -> Non
 
 
 @pytest.mark.parametrize("method", [17, 37, 3])
-def test_homing_methods_it_does_not_have(mnm: Rig, method: int) -> None:
+def test_unsupported_homing_methods_are_rejected(mnm: Rig, method: int) -> None:
     assert refusal(mnm, 0x6098, method) == INVALID
 
 
@@ -150,7 +150,7 @@ def test_homing_methods_it_does_not_have(mnm: Rig, method: int) -> None:
         (COMPAX3, (0x6502, 0x60B2, 0x60B8, 0x60B9, 0x60C1, 0x2F00, 0x60E0)),
     ],
 )
-def test_objects_it_lacks_cannot_be_reached(eds: Path, lacking: tuple[int, ...]) -> None:
+def test_objects_that_a_drive_lacks_cannot_be_read(eds: Path, lacking: tuple[int, ...]) -> None:
     rig = Rig(SMOOTH, eds=eds)
     for index in lacking:
         with pytest.raises(SdoRefusedError) as caught:
@@ -158,7 +158,7 @@ def test_objects_it_lacks_cannot_be_reached(eds: Path, lacking: tuple[int, ...])
         assert caught.value.code == NO_OBJECT, f"{index:04X}h"
 
 
-def test_pdos_are_small_and_the_mode_cannot_be_mapped(mnm: Rig) -> None:
+def test_pdos_have_two_entries_and_the_mode_cannot_be_mapped(mnm: Rig) -> None:
     mnm.write(0x1800, 0x80000180 | NODE, 1)
     mnm.write(0x1A00, 0)
     assert refusal(mnm, 0x1A00, 0x60610008, 1) == NOT_MAPPABLE
@@ -171,15 +171,15 @@ def test_pdos_are_small_and_the_mode_cannot_be_mapped(mnm: Rig) -> None:
     assert mnm.read(0x1A00) == 2
 
 
-def test_its_statusword_has_bits_of_its_own(mnm: Rig) -> None:
+def test_statusword_has_manufacturer_bits_and_no_voltage_enabled(mnm: Rig) -> None:
     word = mnm.read(0x6041)
     assert word & 0x4100 == 0x4100
     enable(mnm, PT)
-    assert mnm.read(0x6041) & 0x4110 == 0x4100, "voltage enabled is not told"
+    assert mnm.read(0x6041) & 0x4110 == 0x4100, "voltage enabled is not reported"
 
 
-def test_a_drive_that_nobody_described_is_a_standard_one(tmp_path: Path) -> None:
-    """With the objects of its EDS: torque in per mille, all modes, no peculiarity."""
+def test_a_drive_without_profile_is_simulated_as_a_standard_drive(tmp_path: Path) -> None:
+    """It has the objects of its EDS, torque in per mille, all modes and no quirks."""
     eds = tmp_path / "my-own.eds"
     eds.write_text(COMPAX3.read_text().replace("0x0000C321", "0x00000001"))
     rig = Rig(SMOOTH, eds=eds)
@@ -193,8 +193,8 @@ def test_a_drive_that_nobody_described_is_a_standard_one(tmp_path: Path) -> None
         rig.read(0x6502)
 
 
-def test_objects_a_master_cannot_see_keep_it_safe(mnm: Rig) -> None:
-    """What the firmware needs and the EDS lacks is there for itself: a lost master stops it."""
+def test_a_lost_master_stops_a_drive_whose_eds_lacks_the_options(mnm: Rig) -> None:
+    """The firmware has internal objects that its EDS lacks."""
     mnm.write(0x1016, 127 << 16 | 200, 1)
     mnm.write(0x6007, 3)
     mnm.send(0x700 + 127, bytes([5]))

@@ -1,4 +1,4 @@
-"""State machine: every command in every state, option codes, mode changes, lost connections."""
+"""State machine: each command in each state, option codes, mode changes, lost connections."""
 
 from __future__ import annotations
 
@@ -40,21 +40,23 @@ def bring_to(rig: Rig, state: int) -> None:
 
 @pytest.mark.parametrize("state", TABLE)
 @pytest.mark.parametrize("column", range(len(COMMANDS)))
-def test_every_command_in_every_state(rig: Rig, state: int, column: int) -> None:
+def test_each_command_in_each_state_leads_to_the_specified_state(
+    rig: Rig, state: int, column: int
+) -> None:
     bring_to(rig, state)
     rig.write(0x6040, list(COMMANDS.values())[column])
     rig.run(0.05)
     assert rig.state == TABLE[state][column]
 
 
-def test_boots_by_itself_into_switch_on_disabled() -> None:
+def test_boots_into_switch_on_disabled() -> None:
     rig = Rig()
     assert rig.state == SOD
     status = rig.read(0x6041)
     assert status & 0x0210 == 0x0210  # remote, voltage enabled
 
 
-def test_enabling_takes_its_time(rig: Rig) -> None:
+def test_enabling_takes_some_time(rig: Rig) -> None:
     rig.write(0x6040, 6)
     rig.write(0x6040, 7)
     rig.write(0x6040, 15)
@@ -63,7 +65,7 @@ def test_enabling_takes_its_time(rig: Rig) -> None:
     assert rig.state == OE
 
 
-def test_enable_command_taken_back_in_time(rig: Rig) -> None:
+def test_an_enable_command_can_be_cancelled(rig: Rig) -> None:
     rig.write(0x6040, 6)
     rig.write(0x6040, 15)
     rig.write(0x6040, 6)
@@ -72,7 +74,7 @@ def test_enable_command_taken_back_in_time(rig: Rig) -> None:
 
 
 @pytest.mark.parametrize("option", range(9))
-def test_quick_stop_options(rig: Rig, option: int) -> None:
+def test_quick_stop_options_stop_the_motor_as_specified(rig: Rig, option: int) -> None:
     rig.write(0x605A, option)
     rig.enable(3)
     rig.write(0x60FF, 40_000)
@@ -98,7 +100,7 @@ def test_quick_stop_options(rig: Rig, option: int) -> None:
 
 
 @pytest.mark.parametrize(("index", "word", "end"), [(0x605B, 6, RTSO), (0x605C, 7, SO)])
-def test_leaving_operation_along_the_ramp_or_at_once(
+def test_leaving_operation_brakes_along_the_ramp_or_cuts_power(
     rig: Rig, index: int, word: int, end: int
 ) -> None:
     ways = []
@@ -118,7 +120,7 @@ def test_leaving_operation_along_the_ramp_or_at_once(
     assert ways[1] < 0.9 < 1.2 * ways[0]
 
 
-def test_order_to_leave_can_be_taken_back(rig: Rig) -> None:
+def test_leaving_operation_can_be_cancelled_during_the_ramp(rig: Rig) -> None:
     rig.enable(3)
     rig.write(0x60FF, 40_000)
     rig.cycles(300)
@@ -131,7 +133,7 @@ def test_order_to_leave_can_be_taken_back(rig: Rig) -> None:
 
 
 @pytest.mark.parametrize("option", [1, 2, 3, 4])
-def test_halt_in_every_way(rig: Rig, option: int) -> None:
+def test_each_halt_option_stops_the_motor_and_motion_can_continue(rig: Rig, option: int) -> None:
     rig.write(0x605D, option)
     rig.enable(3)
     rig.write(0x60FF, 40_000)
@@ -147,7 +149,7 @@ def test_halt_in_every_way(rig: Rig, option: int) -> None:
     assert rig.truth[1] == pytest.approx(30.7, rel=0.05)
 
 
-def test_halt_in_a_torque_mode_takes_the_torque_back_along_its_slope(rig: Rig) -> None:
+def test_halt_in_a_torque_mode_reduces_the_torque_along_its_slope(rig: Rig) -> None:
     rig.write(0x6087, 2000)
     rig.enable(10)
     rig.torque = 100
@@ -163,7 +165,7 @@ def test_halt_in_a_torque_mode_takes_the_torque_back_along_its_slope(rig: Rig) -
 
 
 class TestModes:
-    def test_supported_modes_are_those_accepted(self, rig: Rig) -> None:
+    def test_supported_modes_are_accepted_and_others_rejected(self, rig: Rig) -> None:
         supported = rig.read(0x6502)
         for mode in range(-10, 20):
             if mode == 0 or (mode > 0 and supported >> (mode - 1) & 1):
@@ -176,7 +178,7 @@ class TestModes:
                 rig.run(0.02)
                 assert rig.read(0x6061) == before
 
-    def test_display_follows_after_a_delay(self, rig: Rig) -> None:
+    def test_mode_display_follows_after_a_delay(self, rig: Rig) -> None:
         rig.write(0x6060, 10)
         assert rig.read(0x6061) == 0
         rig.run(0.004)
@@ -184,7 +186,7 @@ class TestModes:
         rig.run(0.002)
         assert rig.read(0x6061) == 10
 
-    def test_mode_does_not_act_before_it_is_displayed(self, rig: Rig) -> None:
+    def test_a_mode_does_not_act_before_it_is_displayed(self, rig: Rig) -> None:
         rig.enable(10)
         rig.torque = 200
         rig.cycles(10)
@@ -197,7 +199,7 @@ class TestModes:
 
 
 class TestMisbehaviour:
-    def test_node_reset_ends_it(self, rig: Rig) -> None:
+    def test_node_reset_ends_misbehaviour(self, rig: Rig) -> None:
         rig.write(0x2F00, 8, 4)
         rig.write(0x2F00, 2, 3)
         rig.nmt(129)
@@ -211,7 +213,9 @@ class TestConnection:
     @pytest.mark.parametrize(
         ("option", "end", "code"), [(0, OE, 0), (1, FAULT, 0x8130), (2, SOD, 0), (3, SOD, 0)]
     )
-    def test_lost_heartbeat(self, rig: Rig, option: int, end: int, code: int) -> None:
+    def test_lost_heartbeat_acts_as_6007h_specifies(
+        self, rig: Rig, option: int, end: int, code: int
+    ) -> None:
         rig.write(0x6007, option)
         rig.write(0x1016, 127 << 16 | 50, 1)
         rig.enable(10)
@@ -224,14 +228,14 @@ class TestConnection:
         assert rig.read(0x603F) == code
         assert (0x8130, 0x11) in rig.emergencies
 
-    def test_nothing_happens_while_not_enabled(self, rig: Rig) -> None:
+    def test_lost_heartbeat_does_not_change_the_state_while_not_enabled(self, rig: Rig) -> None:
         rig.write(0x1016, 127 << 16 | 50, 1)
         rig.write(0x6040, 6)
         rig.send(0x77F, b"\x05")
         rig.run(0.2)
         assert rig.state == RTSO
 
-    def test_nmt_stop(self, rig: Rig) -> None:
+    def test_nmt_stop_faults_an_enabled_drive(self, rig: Rig) -> None:
         rig.enable(10)
         rig.nmt(2)
         rig.run(0.05)
@@ -239,7 +243,7 @@ class TestConnection:
         assert rig.state == FAULT
 
     @pytest.mark.parametrize(("drops", "end"), [(False, OE), (True, SOD)])
-    def test_pre_operational_keeps_the_torque_or_drops_the_power(
+    def test_pre_operational_keeps_torque_or_cuts_power_by_plant(
         self, drops: bool, end: int
     ) -> None:
         rig = Rig(Plant.model_validate({"drive": {"off_when_pre_operational": drops}}))
@@ -252,7 +256,7 @@ class TestConnection:
         assert rig.state == end
         assert (rig.read(0x6077, signed=True) == 0) == drops
 
-    def test_missed_rpdo_deadline(self, rig: Rig) -> None:
+    def test_a_missed_rpdo_deadline_faults_an_enabled_drive(self, rig: Rig) -> None:
         rig.map_pdos()
         rig.nmt(128)
         rig.write(0x1400, 0x80000200 + NODE, 1)
@@ -280,7 +284,9 @@ class TestConnection:
         assert abs(moved) > 0.1
         assert abs(rig.read(0x6064, signed=True)) < 8192 * 8
 
-    def test_the_error_stands_until_master_is_back_and_fault_is_reset(self, rig: Rig) -> None:
+    def test_the_error_remains_until_the_master_is_back_and_the_fault_is_reset(
+        self, rig: Rig
+    ) -> None:
         lose_master(rig)
         assert rig.state == FAULT
         assert rig.emergencies == [(0x8130, 0x11)]
@@ -292,7 +298,7 @@ class TestConnection:
         assert rig.read(0x1001) == 0
         assert rig.emergencies == [(0x8130, 0x11), (0, 0)]
 
-    def test_a_reset_fault_leaves_the_error_while_the_master_is_missing(self, rig: Rig) -> None:
+    def test_a_fault_reset_keeps_the_error_while_the_master_is_missing(self, rig: Rig) -> None:
         lose_master(rig)
         rig.write(0x6040, 0x80)
         rig.run(0.01)
@@ -319,7 +325,7 @@ class TestFixedObjects:
         with pytest.raises(SdoRefusedError):
             rig.write(index, value + 1, sub)
 
-    def test_unknown_homing_method_is_refused(self, rig: Rig) -> None:
+    def test_an_unknown_homing_method_is_rejected(self, rig: Rig) -> None:
         with pytest.raises(SdoRefusedError):
             rig.write(0x6098, 17)
         listed = [rig.read(0x60E3, sub) for sub in range(1, rig.read(0x60E3, 0) + 1)]

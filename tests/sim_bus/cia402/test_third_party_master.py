@@ -1,4 +1,4 @@
-"""A third party at the drive: `BaseNode402` of the `canopen` package, across processes."""
+"""A third-party master, `BaseNode402` of the `canopen` package, in a separate process."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ serve([drive], "simbus:" + sys.argv[1], mode=ClockMode(sys.argv[2]), until_stdin
 
 LONGEST_S = 60.0
 PATIENCES = ("CHECK_TPDO", "SWITCH_OP_MODE", "SWITCH_STATE_FINAL")
-"""What the package waits for, for parts of a second only."""
+"""Events for which the package waits only parts of a second."""
 
 
 @pytest.fixture(params=["paced", "lockstep"])
@@ -59,7 +59,7 @@ def node(request: pytest.FixtureRequest) -> Iterator[BaseNode402]:
 
 
 def start(node: BaseNode402) -> None:
-    """Map the words as the package's documentation does, then go operational with a SYNC."""
+    """Map the PDOs as the package's documentation does, then start the node with a SYNC."""
     states: list[int] = []
     node.nmt.add_heartbeat_callback(states.append)
     node.nmt.send_command(129)
@@ -116,8 +116,8 @@ def test_boots_enables_homes_faults_and_resets(node: BaseNode402) -> None:
     node.sdo[0x6099][2].raw = 8192
     assert node.homing(timeout=LONGEST_S)
     assert node.is_homed()
-    # The zero is where the index is: 123.4° from where the rotor stood.
-    # The two are read one after the other, so the rotor must have come to rest.
+    # The zero is at the index, 123.4° from the initial rotor angle.
+    # The rotor must be at rest, because the two values are read one after the other.
     stood = -round(123.4 / 360 * 8192)
     assert wait_for(lambda: abs(node.sdo[0x6064].raw - node.sdo[0x6063].raw - stood) <= 10)
 
@@ -133,8 +133,8 @@ def test_boots_enables_homes_faults_and_resets(node: BaseNode402) -> None:
     node.state = "SWITCH ON DISABLED"
 
 
-def test_serves_a_master_that_changes_no_mapping(node: BaseNode402) -> None:
-    """As it is shipped: no PDO is remapped, the library's own set-up is all there is."""
+def test_a_master_can_use_the_default_mapping(node: BaseNode402) -> None:
+    """The drive has factory settings and the library only does its usual set-up."""
     node.network.sync.stop()
     boot_ups: list[int] = []
     node.nmt.add_heartbeat_callback(boot_ups.append)

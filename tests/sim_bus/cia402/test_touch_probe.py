@@ -1,4 +1,4 @@
-"""Touch probes on the zero pulse, during ordinary torque-mode motion."""
+"""Touch probes on the index pulse, during motion in torque mode."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ def turning() -> Rig:
 
 
 def turn(rig: Rig, counts: int) -> None:
-    """Turn by some counts at 16 counts a cycle."""
+    """Turn by some counts at 16 counts per cycle."""
     rig.write(0x60FF, 16_000 if counts > 0 else -16_000)
     rig.cycles(abs(counts) // 16)
     rig.write(0x60FF, 0)
     rig.cycles(50)
 
 
-def test_first_event_only(turning: Rig) -> None:
+def test_a_single_event_probe_latches_only_the_first_event(turning: Rig) -> None:
     turning.write(0x60B8, ENABLE | ZERO | POSITIVE)
     assert turning.read(0x60B9) == 0x01
     turn(turning, 8192)
@@ -37,7 +37,7 @@ def test_first_event_only(turning: Rig) -> None:
     assert turning.read(0x60BA, signed=True) == FIRST
     turn(turning, 8192)
     assert turning.read(0x60BA, signed=True) == FIRST
-    # Taking the edge out and back in arms it again.
+    # Disabling and enabling the edge arms it again.
     turning.write(0x60B8, ENABLE | ZERO)
     assert turning.read(0x60B9) == 0x01
     turning.write(0x60B8, ENABLE | ZERO | POSITIVE)
@@ -55,7 +55,7 @@ def test_continuous_events_toggle_their_bit(turning: Rig) -> None:
     assert seen == [0x43, 0x03, 0x43]
 
 
-def test_edges_are_a_count_apart_and_depend_on_the_direction(turning: Rig) -> None:
+def test_edges_are_one_count_apart_and_depend_on_the_direction(turning: Rig) -> None:
     turning.write(0x60B8, ENABLE | ZERO | POSITIVE | NEGATIVE | CONTINUOUS)
     turn(turning, 6000)
     assert turning.read(0x60BA, signed=True) == FIRST
@@ -67,7 +67,7 @@ def test_edges_are_a_count_apart_and_depend_on_the_direction(turning: Rig) -> No
     assert turning.read(0x60B9) == 0x07
 
 
-def test_second_probe_by_source_object(turning: Rig) -> None:
+def test_the_second_probe_latches_the_index_by_source_object(turning: Rig) -> None:
     with pytest.raises(SdoRefusedError):
         turning.write(0x60B8, (ENABLE | 0x08 | POSITIVE) << 8)
     turning.write(0x60D0, 5, 2)
@@ -78,7 +78,7 @@ def test_second_probe_by_source_object(turning: Rig) -> None:
     assert turning.read(0x60BA) == 0
 
 
-def test_external_input_does_not_exist(turning: Rig) -> None:
+def test_the_external_input_is_rejected(turning: Rig) -> None:
     with pytest.raises(SdoRefusedError):
         turning.write(0x60B8, ENABLE | POSITIVE)
     assert turning.read(0x60B9) == 0
@@ -93,7 +93,7 @@ def test_disabling_clears_the_status(turning: Rig) -> None:
     assert turning.read(0x60B9) == 0
 
 
-def test_position_is_that_of_the_dictionary(turning: Rig) -> None:
+def test_the_latched_position_includes_the_home_offset(turning: Rig) -> None:
     turning.write(0x607C, -500)
     turning.write(0x6098, 37)
     turning.set_mode(6)

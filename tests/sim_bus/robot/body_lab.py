@@ -1,4 +1,4 @@
-"""A platform on cables without drives, and what a physicist would ask of it."""
+"""A platform on cables without drives, and physical quantities of it."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def body(
 ) -> CableRobot:
     """Return a robot whose cables are taut at power-up.
 
-    `shape` are further fields of its RobotShape, `plant` sections of its plant file.
+    `shape` are further fields of its RobotShape, and `plant` sections of its plant file.
     """
     sections = {
         "cables": {
@@ -89,7 +89,7 @@ def free_length_m(robot: CableRobot) -> NDArray[np.float64]:
 
 
 def energy_J(robot: CableRobot) -> float:
-    """Return kinetic energy, height and strain; of cables without weight."""
+    """Return the sum of kinetic, potential and strain energy, for cables without weight."""
     p, m = robot.platform[0], robot.motors
     spin = p["rotation"].T @ p["spin"]
     total = 0.5 * p["mass"] * float(p["velocity"] @ p["velocity"])
@@ -105,7 +105,7 @@ def energy_J(robot: CableRobot) -> float:
 def run(
     robot: CableRobot, seconds: float, torque_units: float | None = None, begin_s: float = 0.0
 ) -> None:
-    """Advance all, the power stages off or under one torque command."""
+    """Advance all axes, with power stages off or one common torque command."""
     command = servo.OFF if torque_units is None else servo.TORQUE, torque_units or 0.0
     robot.commands = [lambda: command] * robot.n
     for k in range(1, round(seconds * 1e3) + 1):

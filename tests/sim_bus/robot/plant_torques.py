@@ -1,4 +1,4 @@
-"""Torques that a plant file asks for, by their formulas: what the kernels are compared with."""
+"""Torques by the formulas of a plant file, as a reference for the kernels."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from cdpr_sim_bus.robot.plant import Plant
 def cogging_Nm(
     plant: Plant, angle_rad: ArrayLike, *, energised: bool = True, rise_K: float = 0.0
 ) -> NDArray[np.float64]:
-    """Return the torque that holds the rotor against the cogging at mechanical angles.
+    """Return the torque that holds the rotor against cogging at mechanical angles.
 
-    `angle_rad` counts from the mechanical zero, in which frame the index lies at
-    `encoder.index_deg`: c = Σ A sin(order·θ + phase). The offset ripple acts while energised.
+    `angle_rad` is relative to the mechanical zero, and the index is at `encoder.index_deg`:
+    c = Σ A sin(order·θ + phase). The offset ripple acts only while energised.
     """
     angle = np.asarray(angle_rad, dtype=np.float64)
     total = np.zeros_like(angle)
@@ -36,7 +36,7 @@ def friction_Nm(
 ) -> NDArray[np.float64]:
     """Return the friction torque that opposes steady motion at the given velocities.
 
-    It is that at mechanical angles, and on average over a turn where they are left out.
+    Without angles, it is the average over a turn.
     """
     v = np.asarray(velocity_rad_s, dtype=np.float64)
     f = plant.friction

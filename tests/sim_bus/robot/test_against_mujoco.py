@@ -1,4 +1,4 @@
-"""The platform against a third party's physics: MuJoCo, tendons of the same stiffness."""
+"""The platform moves as in MuJoCo, with tendons of the same stiffness."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from tests.sim_bus.robot.body_lab import body, free_length_m, run
 STEP_S = 5e-5
 
 
-def third_party(robot: CableRobot) -> tuple[mujoco.MjModel, mujoco.MjData]:
-    """Return the same planar robot, its winches locked, for MuJoCo."""
+def mujoco_model(robot: CableRobot) -> tuple[mujoco.MjModel, mujoco.MjData]:
+    """Return MuJoCo's model and data of the same planar robot with locked winches."""
     p, free = robot.platform[0], free_length_m(robot)
     sites, world, tendons = [], [], []
     for i in range(robot.n):
@@ -52,7 +52,7 @@ def third_party(robot: CableRobot) -> tuple[mujoco.MjModel, mujoco.MjData]:
         ("released: rings on taut cables", (), (0.1, 0.2), 0.15),
     ],
 )
-def test_agrees_with_a_third_party(
+def test_planar_motion_agrees_with_mujoco(
     name: str, cut: tuple[int, ...], velocity: tuple[float, float], seconds: float
 ) -> None:
     robot = body(locked=True, pretension_N=15.0)
@@ -60,7 +60,7 @@ def test_agrees_with_a_third_party(
         robot.cut(i)
     robot.platform["velocity"][0, :2] = velocity
     start = robot.position_m[:2].copy()
-    model, data = third_party(robot)
+    model, data = mujoco_model(robot)
     apart, way = 0.0, 0.0
     for k in range(round(seconds * 1e3)):
         run(robot, 1e-3, begin_s=k * 1e-3)
@@ -82,7 +82,7 @@ COM_m = (0.01, -0.02, 0.03)
 
 
 def in_space(cut: tuple[int, ...], turned: tuple[float, float, float]) -> CableRobot:
-    """Return eight locked winches on a body whose centre of mass is off its origin."""
+    """Return a robot with eight locked winches whose centre of mass is off the body's origin."""
     robot = body(
         exits=ROOM_EXITS_m, anchors=ROOM_ANCHORS_m, home=(0.1, -0.2, 1.4), locked=True,
         mass_kg=10.0, shape={"inertia_kg_m2": INERTIA, "centre_of_mass_m": COM_m},
@@ -93,8 +93,8 @@ def in_space(cut: tuple[int, ...], turned: tuple[float, float, float]) -> CableR
     return robot
 
 
-def third_party_in_space(robot: CableRobot) -> tuple[mujoco.MjModel, mujoco.MjData]:
-    """Return the same body on a free joint, with a spatial tendon for each cable."""
+def mujoco_model_in_space(robot: CableRobot) -> tuple[mujoco.MjModel, mujoco.MjData]:
+    """Return MuJoCo's model and data of the same body on a free joint, with a tendon per cable."""
     p, free = robot.platform[0], free_length_m(robot)
     world, sites, tendons = [], [], []
     for i in range(robot.n):
@@ -117,7 +117,7 @@ def third_party_in_space(robot: CableRobot) -> tuple[mujoco.MjModel, mujoco.MjDa
     turned = Rotation.from_matrix(robot.rotation)
     data.qpos[:3] = robot.position_m
     data.qpos[3:] = turned.as_quat(scalar_first=True)
-    # a free joint has the velocity of its origin in the room, its spin in the body's axes
+    # a free joint has its velocity in the room's frame and its angular velocity in the body's
     data.qvel[:3] = p["velocity"] - np.cross(p["spin"], turned.apply(COM_m))
     data.qvel[3:] = turned.inv().apply(p["spin"])
     return model, data
@@ -133,7 +133,7 @@ def third_party_in_space(robot: CableRobot) -> tuple[mujoco.MjModel, mujoco.MjDa
         ("thrown, no cable left", tuple(range(8)), (30.0, 0.0, 60.0), (3.0, 5.0, -4.0), 0.6),
     ],
 )
-def test_agrees_with_a_third_party_in_space(
+def test_spatial_motion_agrees_with_mujoco(
     name: str,
     cut: tuple[int, ...],
     turned_deg: tuple[float, float, float],
@@ -144,7 +144,7 @@ def test_agrees_with_a_third_party_in_space(
     p = robot.platform[0]
     p["spin"], p["velocity"] = spin, 0.1 * np.array(spin)
     start, begun = robot.position_m, Rotation.from_matrix(robot.rotation)
-    model, data = third_party_in_space(robot)
+    model, data = mujoco_model_in_space(robot)
     apart, way, askew, turn = 0.0, 0.0, 0.0, 0.0
     for k in range(round(seconds * 1e3)):
         run(robot, 1e-3, begin_s=k * 1e-3)

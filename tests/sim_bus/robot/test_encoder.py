@@ -16,11 +16,11 @@ from cdpr_sim_bus.robot.motor import Motor
 from cdpr_sim_bus.robot.plant import Plant
 
 TRUE = {"eccentricity_rad": 0.0, "interpolation_error": 0.0}
-"""An exact disc."""
+"""An encoder without errors."""
 
 
 def spinning(speed_rad_s: float, **sections: object) -> Motor:
-    """A flywheel without friction or cogging that turns at a constant speed."""
+    """Return a flywheel without friction or cogging that turns at a constant speed."""
     plant = Plant.model_validate(
         {
             "cogging": (),
@@ -54,12 +54,12 @@ def test_counter_is_the_delayed_angle(speed: float, counts: int, delay: float, d
     assert abs(sample.counts - exact) <= 1.0 + 1e-6 * abs(exact)
 
 
-def test_noise_has_the_stated_deviation() -> None:
+def test_noise_is_normal_white_and_has_the_stated_deviation() -> None:
     motor = spinning(0.0, encoder={"noise_counts": 4.0})
     readings = np.array([motor.step(1e-4, servo.OFF, 0.0).counts for _ in range(20_000)])
     assert np.std(readings) == pytest.approx(math.hypot(4.0, 1 / math.sqrt(12)), rel=0.02)
     assert abs(np.mean(readings)) < 0.6
-    # Fourth moment of a normal distribution, and no memory from one reading to the next.
+    # Fourth moment of a normal distribution, and no correlation between readings.
     deviation = readings - readings.mean()
     assert np.mean(deviation**4) / np.var(readings) ** 2 == pytest.approx(3.0, abs=0.2)
     assert abs(np.corrcoef(deviation[1:], deviation[:-1])[0, 1]) < 0.03
@@ -71,13 +71,13 @@ def test_noise_has_the_stated_deviation() -> None:
     counts=st.sampled_from([17, 1000, 5000, 8192, 10007, 65536]),
     index_deg=st.floats(-360.0, 360.0),
 )
-def test_index_latches_once_a_turn_at_its_angle(
+def test_index_latches_once_per_turn_at_its_angle(
     speed: float, counts: int, index_deg: float
 ) -> None:
     motor = spinning(speed, encoder={"counts_per_turn": counts, "index_deg": index_deg})
     start = math.radians(12.0)
     away = (start - math.radians(index_deg) + math.pi) % (2 * math.pi) - math.pi
-    begins_on_it = abs(away) <= 2 * math.pi / counts  # then the pulse falls before it ever rose
+    begins_on_it = abs(away) <= 2 * math.pi / counts  # then the pulse falls before it rises
     latched = []
     for _ in range(200):
         sample = motor.step(1e-3, servo.OFF, 0.0)
@@ -95,7 +95,7 @@ def test_index_latches_once_a_turn_at_its_angle(
     assert all(abs(b - a) % counts == 0 for a, b in itertools.pairwise(latched))
 
 
-def test_index_lies_at_the_same_count_in_both_directions() -> None:
+def test_index_is_at_the_same_count_in_both_directions() -> None:
     motor = spinning(20.0)
     forward = backward = None
     for _ in range(400):
@@ -109,14 +109,16 @@ def test_index_lies_at_the_same_count_in_both_directions() -> None:
     assert (forward - backward) % 8192 == 0
 
 
-def test_absent_index_never_comes() -> None:
+def test_a_missing_index_never_latches() -> None:
     motor = spinning(100.0, encoder={"index_present": False})
     edges = motor_physics.INDEX_ROSE | motor_physics.INDEX_FELL
     assert not any(motor.step(1e-3, servo.OFF, 0.0).flags & edges for _ in range(500))
 
 
 @pytest.mark.parametrize("index_deg", [123.4, -200.0])
-def test_an_eccentric_disc_errs_once_a_turn_and_not_at_its_index(index_deg: float) -> None:
+def test_error_of_an_eccentric_disc_has_one_period_per_turn_and_is_zero_at_the_index(
+    index_deg: float,
+) -> None:
     disc = {"eccentricity_rad": 0.01, "eccentricity_phase_deg": 50.0, "interpolation_error": 0.0}
     disc |= {"counts_per_turn": 2**20, "noise_counts": 0.0, "index_deg": index_deg}
     motor = spinning(0.0, encoder=disc)
@@ -129,7 +131,7 @@ def test_an_eccentric_disc_errs_once_a_turn_and_not_at_its_index(index_deg: floa
         assert read == pytest.approx(angle - math.radians(12.0) + error, abs=2e-5)
 
 
-def test_interpolation_errs_once_in_four_counts() -> None:
+def test_interpolation_error_has_a_period_of_four_counts() -> None:
     disc = {"eccentricity_rad": 0.0, "interpolation_error": 0.2, "noise_counts": 0.0}
     motor = spinning(0.0, encoder=disc)
     zero = int(motor.record["zero"][0])
@@ -139,7 +141,7 @@ def test_interpolation_errs_once_in_four_counts() -> None:
         assert read == math.floor(place + 0.8 * math.sin(math.pi / 2 * place) + 0.5)
 
 
-def test_jitter_moves_a_reading_by_how_far_the_rotor_goes_meanwhile() -> None:
+def test_jitter_shifts_readings_by_speed_times_delay() -> None:
     speed, jitter = 100.0, 5e-4
     motor = spinning(
         speed,

@@ -1,4 +1,4 @@
-"""What hangs on the cable: statics, energy, slack, floor, brake, and safe torque off."""
+"""Loads on the cable: statics, energy, slack, floor, brake, and safe torque off."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def read(motor: Motor, field: str) -> float:
 
 
 def hold(motor: Motor, torque_Nm: float, seconds: float, target: float | None = None) -> None:
-    """Let a torque act, or with a target a velocity in counts/s."""
+    """Apply a torque, or with `target` a velocity in counts/s."""
     for _ in range(round(seconds / 1e-3)):
         if target is None:
             motor.step(1e-3, servo.TORQUE, torque_Nm / 3.0 * 1e3)
@@ -47,7 +47,7 @@ def hold(motor: Motor, torque_Nm: float, seconds: float, target: float | None = 
 
 
 def torque_at(motor: Motor, rad_s: float) -> float:
-    """Mean torque over a motor turn at constant velocity."""
+    """Return the mean torque over a motor turn at constant velocity."""
     counts_s = rad_s * read(motor, "counts_per_rad")
     hold(motor, 0.0, 1.5, counts_s)
     sums, steps = 0.0, round(math.tau / abs(rad_s) / 1e-3)
@@ -58,7 +58,7 @@ def torque_at(motor: Motor, rad_s: float) -> float:
 
 @pytest.mark.parametrize("sign", [1, -1])
 @pytest.mark.parametrize("mass_kg", [2.0, 8.0])
-def test_raising_and_lowering_a_mass_takes_weight_plus_and_minus_friction(
+def test_torque_to_raise_or_lower_a_mass_is_weight_plus_or_minus_friction(
     sign: int, mass_kg: float
 ) -> None:
     load = {"kind": "hung_mass", "mass_kg": mass_kg, "height_m": 1.0, "friction_share": 0.06}
@@ -75,7 +75,7 @@ def test_raising_and_lowering_a_mass_takes_weight_plus_and_minus_friction(
     assert read(motor, "tension") == pytest.approx(mass_kg * G, rel=2e-2)
 
 
-def test_energy_is_kept_but_for_what_friction_and_cable_take() -> None:
+def test_energy_is_conserved_apart_from_friction_and_cable_damping() -> None:
     load = {"kind": "hung_mass", "mass_kg": 4.0, "height_m": 2.0, "cable_damping_s": 0.0}
     load |= {"friction_share": 0.0, "cable_m": 40.0}
     p = plant(load, friction=FREE)
@@ -90,14 +90,14 @@ def test_energy_is_kept_but_for_what_friction_and_cable_take() -> None:
 
     start, angle, put_in, lost = energy(), 0.0, 0.0, 0.0
     before = np.array([4.0 * G / k, 0.0, 0.0])
-    for step in range(6000):  # every control step, so that the work is what the torque did
+    for step in range(6000):  # at each control step, so that the work is exact
         torque = -4.0 * G * GAIN * (1.3 + math.sin(step * 0.01))
         sample = motor.step(5e-5, servo.TORQUE, torque / 3.0 * 1e3)
         put_in += sample.motor_Nm * (sample.angle_rad - angle)
         angle = sample.angle_rad
         stretch = read(motor, "tension") / k
         now = np.array([stretch, read(motor, "velocity"), read(motor, "mass_velocity")])
-        lost += 0.5 * np.array([k, J, m]) @ (now - before) ** 2  # what implicit Euler takes
+        lost += 0.5 * np.array([k, J, m]) @ (now - before) ** 2  # dissipation of implicit Euler
         before = now
     assert put_in > 1.0
     assert lost < 0.02 * put_in
@@ -111,7 +111,7 @@ def test_energy_is_kept_but_for_what_friction_and_cable_take() -> None:
     tension=st.floats(5.0, 90.0),
     error=st.floats(-0.1, 0.1),
 )
-def test_an_anchored_cable_carries_what_the_torque_gives_within_friction(
+def test_tension_of_an_anchored_cable_balances_the_torque_within_friction(
     stiffness: float, damping: float, tension: float, error: float
 ) -> None:
     load = {"kind": "fixed_anchor", "cable_stiffness_N": stiffness, "cable_damping_s": damping}
@@ -130,7 +130,7 @@ def test_an_anchored_cable_carries_what_the_torque_gives_within_friction(
     assert read(motor, "tension") == 0.0
 
 
-def test_a_slack_cable_pulls_at_nothing_and_then_lifts() -> None:
+def test_a_slack_cable_has_no_tension_until_it_lifts_the_mass() -> None:
     load = {"kind": "hung_mass", "mass_kg": 3.0, "slack_m": 0.05}
     motor = Motor(plant(load), transmission=Transmission(GAIN))
     seen = []
@@ -148,7 +148,7 @@ def test_a_slack_cable_pulls_at_nothing_and_then_lifts() -> None:
     assert position < -0.04
 
 
-def test_brake_holds_what_falls_without_it() -> None:
+def test_brake_holds_a_mass_that_falls_without_it() -> None:
     load = {"kind": "hung_mass", "mass_kg": 10.0, "height_m": 0.3}
     motor = Motor(plant(load), transmission=Transmission(GAIN))
     motor.record["brake"] = 8.0
@@ -177,7 +177,7 @@ def enabled(tmp_path: Path, load: dict[str, Any] | None = None) -> tuple[Rig, Ph
     return rig, board
 
 
-def test_safe_torque_off_takes_torque_and_state(tmp_path: Path) -> None:
+def test_safe_torque_off_removes_torque_and_faults_an_enabled_drive(tmp_path: Path) -> None:
     rig, board = enabled(tmp_path)
     axis = board.axis(0)
     rig.write(0x6071, 300)
@@ -190,10 +190,10 @@ def test_safe_torque_off_takes_torque_and_state(tmp_path: Path) -> None:
     assert not axis.state().power_on
     assert abs(rig.drive.axis.sample[6]) < 1e-6
     word = rig.read(0x6041)
-    assert word & 0x4F == 0x08 and not word & 0x10  # fault, no voltage
+    assert word & 0x4F == 0x08 and not word & 0x10  # fault, without voltage
     assert rig.emergencies[-1][0] == 0x5441
     rig.write(0x6040, 0x80)
-    for command in (0x06, 0x07, 0x0F):  # not before the power is allowed again
+    for command in (0x06, 0x07, 0x0F):  # only after power is allowed again
         rig.write(0x6040, command)
         rig.run(0.01)
     assert rig.read(0x6041) & 0x5F == 0x40
@@ -205,7 +205,7 @@ def test_safe_torque_off_takes_torque_and_state(tmp_path: Path) -> None:
     board.close()
 
 
-def test_a_drive_made_ready_falls_back_without_a_fault(tmp_path: Path) -> None:
+def test_safe_torque_off_disables_a_switched_on_drive_without_a_fault(tmp_path: Path) -> None:
     rig, board = enabled(tmp_path)
     rig.write(0x6040, 0x07)
     rig.run(0.1)
@@ -233,7 +233,7 @@ def test_board_brake_and_mass_reach_the_motor(tmp_path: Path) -> None:
     board.close()
 
 
-def test_a_plant_that_contradicts_itself_is_refused(tmp_path: Path) -> None:
+def test_a_contradictory_plant_is_rejected(tmp_path: Path) -> None:
     path = tmp_path / "plant.toml"
     for text, named in (
         ("[load]\nkind = 'spring'", "load.kind"),
@@ -246,11 +246,11 @@ def test_a_plant_that_contradicts_itself_is_refused(tmp_path: Path) -> None:
             Plant.load_file(path)
 
 
-def test_what_is_on_the_board_beforehand_comes_at_its_bus_time(tmp_path: Path) -> None:
+def test_scheduled_loss_of_power_on_the_board_acts_at_its_bus_time(tmp_path: Path) -> None:
     rig, board = enabled(tmp_path)
     drive, axis = rig.drive, board.axis(0)
     begun_s = drive.axis.time
-    # the second is as near to the drive's time as rounding brings two times
+    # the second time differs from the drive's only by rounding
     for until_s in (begun_s + 0.0105, begun_s + 0.0105 + 1e-13):
         axis.allow_power((-math.inf, until_s))
         while drive.axis.time < until_s - 1e-9:

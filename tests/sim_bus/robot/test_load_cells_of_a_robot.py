@@ -1,4 +1,4 @@
-"""Load cells at the cables of a platform: each reads the true tension of its own."""
+"""Load cells at the cables of a platform read the true tensions."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def test_each_cell_reads_the_tension_of_its_cable(tmp_path: Path) -> None:
         axes = [board.axis(i) for i in range(n)]
         for drive, axis in zip(drives, axes, strict=True):
             drive.connect(axis)
-            axis.brake_released = False  # the platform hangs on its brakes
+            axis.brake_released = False  # the brakes hold the platform
         cells = [
             SimAmplifier(profile, sensor, exact, axis)
             for sensor, axis in zip(profile.sensors, axes, strict=True)
@@ -56,10 +56,10 @@ def test_each_cell_reads_the_tension_of_its_cable(tmp_path: Path) -> None:
             if k % 100 == 0:
                 read = np.array([cell.measured_N() for cell in cells])
     true = body.tension_N
-    assert np.ptp(true) > 20.0, "no two cables are alike"
+    assert np.ptp(true) > 20.0, "tensions of all cables differ"
     assert np.allclose(read, true, rtol=2e-3, atol=0.1)
     p = body.platform[0]
-    # halfway a cable's tension is less than at its winch, and the platform bears half of each cable
+    # tension is lower at mid-cable than at the winch, and the platform bears half of each cable
     weight_N_m, motors = 0.5, body.motors
     halfway = true - 0.5 * weight_N_m * motors["far_drop"]
     carried_N = 980.665 + 0.5 * weight_N_m * motors["far_distance"].sum()

@@ -1,4 +1,4 @@
-"""The motor's equations against an independent stiff solver, and against laws of mechanics."""
+"""The motor agrees with an independent stiff solver and with laws of mechanics."""
 
 from __future__ import annotations
 
@@ -30,13 +30,13 @@ def step_torque(motor: Motor, dt_s: float, torque_Nm: float) -> Sample:
 
 
 def swing(p: Plant, angle_rad: float) -> float:
-    """Torque over its mean at the same current."""
+    """Return torque relative to its mean at the same current."""
     x = 6 * p.ripple.pole_pairs * angle_rad + math.radians(p.ripple.phase_deg)
     return 1 + p.ripple.sixth * math.sin(x) + p.ripple.twelfth * math.sin(2 * x)
 
 
 def reference(p: Plant, torque_Nm: Any, duration_s: float) -> np.ndarray:
-    """Angle, velocity, bristle and current after `duration_s`, by a stiff solver."""
+    """Return angle, velocity, bristle state and current after `duration_s`, by a stiff solver."""
     f, J = p.friction, p.inertia_kg_m2
     bandwidth = 2 * math.pi * p.drive.current_loop_bandwidth_Hz
 
@@ -138,8 +138,7 @@ def test_steady_friction_follows_the_stribeck_curve(
         },
     )
     motor = Motor(p)
-    # A heavy rotor, its speed given again and again, while the bristle settles over many of its
-    # own lengths.
+    # A heavy rotor whose speed is set at each step, until the bristle state has settled.
     travel = 12 * coulomb * ratio * 1.4 / p.friction.sigma0_Nm_rad
     for _ in range(200):
         motor.record["velocity"] = velocity if forward else -velocity
@@ -154,7 +153,7 @@ def test_steady_friction_follows_the_stribeck_curve(
     sigma0=st.floats(200.0, 5000.0),
     asymmetry=st.floats(-0.5, 0.5),
 )
-def test_rotor_sticks_below_breakaway_and_slips_above(
+def test_rotor_sticks_below_breakaway_torque_and_slips_above(
     torque: float, sigma0: float, asymmetry: float
 ) -> None:
     p = plant(
@@ -171,7 +170,7 @@ def test_rotor_sticks_below_breakaway_and_slips_above(
 
     def settle(demand_Nm: float) -> tuple[float, float]:
         motor = Motor(p)
-        for k in range(600):  # raised slowly: an impact would carry the rotor over the peak
+        for k in range(600):  # raised slowly: a step would carry the rotor over the peak
             motor.step(1e-3, servo.TORQUE, min(1.0, k / 400) * demand_Nm / 3.0 * 1e3)
         return float(motor.record["velocity"][0]), float(motor.record["angle"][0])
 
@@ -207,20 +206,20 @@ def test_coasting_never_gains_energy(speed: float, order: int, sigma0: float) ->
     assert before < 0.9 * first
 
 
-def test_newton_holds_in_every_sample() -> None:
+def test_each_sample_obeys_newtons_law() -> None:
     p = plant()
     motor = Motor(p)
     last = step_torque(motor, 5e-5, 0.3)
     for _ in range(400):
         sample = step_torque(motor, 5e-5, 0.3)
         acceleration = (sample.velocity_rad_s - last.velocity_rad_s) / 5e-5
-        # The sample shows the torque at the end of the step that it produced the motion in.
+        # The sample shows the torque at the end of the step in which it caused the motion.
         net = sample.motor_Nm - sample.cogging_Nm - sample.friction_Nm
         assert p.inertia_kg_m2 * acceleration == pytest.approx(net, abs=2e-4)
         last = sample
 
 
-def test_cogging_oracle_is_the_torque_that_holds_the_rotor() -> None:
+def test_cogging_follows_its_formula_energised_and_off() -> None:
     p = plant(
         motor={"initial_angle_deg": 33.0},
         cogging=(
@@ -240,7 +239,7 @@ def test_cogging_oracle_is_the_torque_that_holds_the_rotor() -> None:
     assert abs(float(unpowered) - float(cogging_Nm(p, sample.angle_rad))) > 1e-4
 
 
-def test_torque_constant_error_shows_in_the_motion_and_not_in_the_drive() -> None:
+def test_torque_constant_error_changes_the_motion_but_not_the_reported_torque() -> None:
     p = plant(cogging=(), motor={"torque_constant_error": 0.2, "inertia_kg_m2": 0.1})
     motor = Motor(p)
     sample = step_torque(motor, 0.05, 1.5)
@@ -287,7 +286,7 @@ def test_warming_scales_cogging_and_friction() -> None:
     assert sample.rise_K < 0.2
 
 
-def test_same_seed_same_readings() -> None:
+def test_the_same_seed_gives_the_same_readings() -> None:
     def readings(seed: int) -> list[int]:
         motor = Motor(Plant(seed=seed))
         return [step_torque(motor, 1e-3, 0.3).counts for _ in range(200)]
@@ -308,14 +307,14 @@ def test_result_hardly_depends_on_the_cycle_time() -> None:
 
 
 @pytest.mark.parametrize("units", [100.0, -400.0])
-def test_ripple_is_a_share_of_the_torque_six_and_twelve_times_per_electrical_turn(
+def test_torque_ripple_has_orders_6_and_12_per_electrical_turn(
     units: float,
 ) -> None:
     p = plant(cogging=(), ripple={"sixth": 0.03, "twelfth": 0.02, "phase_deg": 0.0})
     motor = Motor(p)
     motor.step(0.01, servo.TORQUE, units)
     mean = units * 3e-3 * 1.04
-    motor.record["inertia"] = 1e9  # it is turned by hand
+    motor.record["inertia"] = 1e9  # the rotor is turned by the test
     found = []
     angles = np.arange(256) / 256 * 2 * math.pi
     for angle in angles:
@@ -329,7 +328,7 @@ def test_ripple_is_a_share_of_the_torque_six_and_twelve_times_per_electrical_tur
     assert others.max() < 1e-9
 
 
-def test_friction_comes_and_goes_once_a_turn() -> None:
+def test_friction_varies_once_per_turn() -> None:
     given = {"coulomb_Nm": 0.1, "angle_share": 0.2, "angle_phase_deg": 30.0}
     p = plant(
         cogging=(), motor={"inertia_kg_m2": 10.0}, friction={**given, "direction_asymmetry": 0.0}

@@ -1,4 +1,4 @@
-"""The platform's physics against its laws."""
+"""The physics of the platform obeys conservation laws and statics."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ ROOM_ANCHORS_m = [(x, y, z) for z in (-0.3, 0.3) for x in (-0.1, 0.1) for y in (
 
 
 @pytest.mark.parametrize("locked", [True, False])
-def test_energy_stays(locked: bool) -> None:
+def test_energy_is_conserved(locked: bool) -> None:
     robot = body(locked=locked)
     robot.platform["velocity"][0, :2] = 0.3, 0.1
     begin, lowest, highest = energy_J(robot), math.inf, -math.inf
@@ -30,8 +30,8 @@ def test_energy_stays(locked: bool) -> None:
 
 
 @pytest.mark.parametrize("order", [(1, 2, 0), (2, 1, 0)])
-def test_it_does_not_matter_which_drive_asks_first(order: tuple[int, ...]) -> None:
-    """A command acts from the same instant on, whichever bus comes first."""
+def test_the_order_of_the_drives_does_not_change_the_motion(order: tuple[int, ...]) -> None:
+    """Commands of all buses act from the same instant."""
     states = []
     torque = [0.0, 0.0, 0.0]
     for turn in ((0, 1, 2), order):
@@ -44,7 +44,7 @@ def test_it_does_not_matter_which_drive_asks_first(order: tuple[int, ...]) -> No
     assert states[0] == states[1]
 
 
-def test_damping_and_friction_only_take_energy() -> None:
+def test_damping_and_friction_only_remove_energy() -> None:
     robot = body(smooth=False, cables={"damping_s": 0.002, "friction_share": 0.05})
     robot.platform["velocity"][0, 0] = 0.5
     last = energy_J(robot)
@@ -57,7 +57,7 @@ def test_damping_and_friction_only_take_energy() -> None:
     assert last < begin - 0.2
 
 
-def test_a_free_body_keeps_momentum_spin_and_energy() -> None:
+def test_a_free_body_keeps_momentum_angular_momentum_and_energy() -> None:
     robot = body(exits=ROOM_EXITS_m, anchors=ROOM_ANCHORS_m, home=(0.0, 0.0, 1.5))
     for i in range(8):
         robot.cut(i)
@@ -77,11 +77,11 @@ def test_a_free_body_keeps_momentum_spin_and_energy() -> None:
     assert np.allclose(momentum(), before, atol=2e-3 * np.linalg.norm(before))
     assert energy_J(robot) == pytest.approx(kinetic, rel=2e-3)
     assert np.allclose(p["rotation"] @ p["rotation"].T, np.eye(3), atol=1e-9)
-    assert abs(float(np.dot(p["rotation"][:, 2], (0.0, 0.0, 1.0)))) < 0.999, "it has tumbled"
+    assert abs(float(np.dot(p["rotation"][:, 2], (0.0, 0.0, 1.0)))) < 0.999, "the body has tumbled"
 
 
 @pytest.mark.parametrize("room", [False, True])
-def test_at_rest_tensions_carry_the_platform(room: bool) -> None:
+def test_tensions_at_rest_balance_the_weight(room: bool) -> None:
     points = (
         (ROOM_EXITS_m, ROOM_ANCHORS_m, (0.1, 0.2, 1.4))
         if room
@@ -102,16 +102,16 @@ def test_at_rest_tensions_carry_the_platform(room: bool) -> None:
     assert np.linalg.norm(weight) > 30.0
 
 
-def test_a_cut_cable_lets_go_and_the_others_hold() -> None:
+def test_a_cut_cable_has_no_tension_and_the_platform_swings_on_the_others() -> None:
     robot = body(locked=True, cables={"damping_s": 0.002})
     run(robot, 0.05)
     robot.cut(0)
     run(robot, 0.4, begin_s=0.05)
     assert robot.tension_N[0] < 1e-3
     x, y, _ = robot.position_m
-    assert y < 1.5 - 0.1, "it falls"
+    assert y < 1.5 - 0.1, "the platform falls"
     reach = np.hypot(x - 2.0, y - 3.0)
-    assert reach < free_length_m(robot)[1] + 0.2, "on its remaining cable"
+    assert reach < free_length_m(robot)[1] + 0.2, "the remaining cable holds it"
 
 
 @pytest.mark.parametrize("length_m", [0.05, 0.2, 1.0])
@@ -121,7 +121,7 @@ def test_stiff_short_cables_stay_stable(length_m: float) -> None:
     robot.platform["velocity"][0, 0] = 0.5
     begin = energy_J(robot)
     run(robot, 0.5, torque_units=-300.0)
-    # what the motors put in: 0.9 Nm over the little they turn
+    # work of the motors: 0.9 Nm times the small angle
     turned = float(np.abs(robot.motors["angle"] - robot.motors["angle_start"]).sum())
     assert energy_J(robot) - begin < 1.0 * turned + 0.5
     assert np.isfinite(robot.position_m).all()
@@ -149,12 +149,12 @@ def test_the_floor_carries_a_slack_platform() -> None:
     run(robot, 1.0)
     assert np.linalg.norm(robot.platform["velocity"][0]) < 1e-3
     assert robot.position_m[:2] == pytest.approx((0.2, 1.5), abs=2e-5)
-    # what a slack cable of some 2 m weighs
+    # the weight of a slack cable of about 2 m
     assert 0.0 < robot.tension_N.max() < 3.0
 
 
 @pytest.mark.parametrize("share", [0.7, 1.3])
-def test_a_foot_sticks_until_a_force_is_more_than_its_friction(share: float) -> None:
+def test_a_platform_on_the_floor_slips_only_beyond_its_friction(share: float) -> None:
     friction_m_s2 = 0.3 * 9.80665
     floor = {"present": True, "friction": 0.3}
     robot = body(pretension_N=0.0, start={"slack_m": 0.05}, floor=floor)
@@ -176,7 +176,7 @@ def test_a_sagging_cable_is_a_catenary(tension_N: float, span_m: float) -> None:
     weight, rigidity = 0.122, 40_000.0
 
     def unstretched(t: float) -> float:
-        # elastic catenary of level ends with horizontal tension t: length less its mean stretch
+        # elastic catenary between level ends with horizontal tension t: length minus mean stretch
         a = t / weight
         length = 2.0 * a * math.sinh(span_m / (2.0 * a))
         mean = t * a / length * (span_m / (2.0 * a) + math.sinh(span_m / a) / 2.0) * 2.0 / 2.0
@@ -194,7 +194,9 @@ def test_a_sagging_cable_is_a_catenary(tension_N: float, span_m: float) -> None:
 
 @pytest.mark.parametrize("stretch_m", [-0.5, -0.01, 0.0, 1e-4, 1e-2])
 @pytest.mark.parametrize("last_N", [0.0, 1.0, 5000.0])
-def test_the_cable_force_is_found_from_any_last_tension(stretch_m: float, last_N: float) -> None:
+def test_the_cable_force_converges_from_any_previous_tension(
+    stretch_m: float, last_N: float
+) -> None:
     k, sag = 2e4, 0.122**2 * 8.0 / 24.0
     t, slope = cable_force(stretch_m, k, sag, last_N)
     assert t / k - sag / t**2 == pytest.approx(stretch_m, abs=1e-9)

@@ -1,4 +1,4 @@
-"""The plant file of a robot: what is refused, and how its motors differ."""
+"""Plant files of robots and motors: defaults, variation and rejected values."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from cdpr_sim_bus.robot.robot_plant import RobotPlant
 from tests.sim_bus.robot.body_lab import body, free_length_m, run
 
 
-def test_each_motor_is_its_own() -> None:
+def test_motors_of_a_robot_differ_reproducibly() -> None:
     motors = RobotPlant().motor_plants(3)
     assert motors == RobotPlant().motor_plants(3)
     assert len({motor.cogging[0].phase_deg for motor in motors}) == 3
@@ -42,14 +42,14 @@ def test_each_motor_is_its_own() -> None:
         ({"motor": {"load": {"kind": "hung_mass"}}}, "motor.load: allowed: inertia_kg_m2;"),
     ],
 )
-def test_a_plant_that_does_not_fit_the_robot_is_refused(
+def test_a_plant_that_does_not_fit_the_robot_is_rejected(
     table: dict[str, object], reason: str
 ) -> None:
     with pytest.raises(ValueError, match=reason):
         RobotPlant.model_validate(table).require_fit(3, 2)
 
 
-def test_slack_is_one_number_or_one_for_each(tmp_path: Path) -> None:
+def test_slack_is_one_number_for_all_cables_or_one_for_each(tmp_path: Path) -> None:
     path = tmp_path / "plant.toml"
     for text, read in (("0.1", (0.1,)), ("[0.1, 0.0, 0.2]", (0.1, 0.0, 0.2))):
         path.write_text(f"start.slack_m = {text}\n")
@@ -63,7 +63,7 @@ def test_slack_is_one_number_or_one_for_each(tmp_path: Path) -> None:
         assert len(str(caught.value).splitlines()) == 1
 
 
-def test_a_cable_slips_once_at_its_time() -> None:
+def test_a_cable_slips_once_at_the_specified_time() -> None:
     slips = (
         {"cable": 2, "at_s": 0.02, "slip_m": 0.012},
         {"cable": 1, "at_s": 0.01, "slip_m": -0.003},
@@ -81,7 +81,7 @@ def test_a_cable_slips_once_at_its_time() -> None:
     assert seen[2] == pytest.approx([-0.003, 0.012], abs=1e-4)
 
 
-def test_a_single_motors_plant_is_refused(tmp_path: Path) -> None:
+def test_the_plant_of_a_single_motor_is_rejected(tmp_path: Path) -> None:
     path = tmp_path / "plant.toml"
     path.write_text("[friction]\ncoulomb_Nm = 0.1\n")
     with pytest.raises(ProfileError, match="friction"):
@@ -90,7 +90,7 @@ def test_a_single_motors_plant_is_refused(tmp_path: Path) -> None:
     RobotPlant.load_file(path).require_fit(3, 2)
 
 
-def test_the_page_shows_the_defaults_and_a_plant_that_works(tmp_path: Path) -> None:
+def test_the_documentation_shows_the_defaults_and_a_valid_plant(tmp_path: Path) -> None:
     page = Path(__file__).parents[3] / "docs" / "how-to" / "simulated-robot.md"
     shown, other = re.findall(r"```toml\n(.*?)```", page.read_text(), re.DOTALL)
     path = tmp_path / "plant.toml"
@@ -116,7 +116,7 @@ def test_the_page_shows_the_defaults_and_a_plant_that_works(tmp_path: Path) -> N
     assert [term.order for term in worse.motor_plants(3)[0].cogging] == [4, 24]
 
 
-def test_what_is_left_out_follows_the_winch() -> None:
+def test_values_that_a_plant_omits_follow_the_winch() -> None:
     winch = load_winch("winch-mpp0923d")
     assert RobotPlant().motor_plants(3, [winch] * 3) == RobotPlant().motor_plants(3)
     assert Plant().of(winch) == Plant()
@@ -181,13 +181,13 @@ def test_example_is_the_default(tmp_path: Path) -> None:
     assert load(tmp_path, EXAMPLE) == load(tmp_path, "") == Plant()
 
 
-def test_every_line_of_the_example_counts(tmp_path: Path) -> None:
+def test_each_changed_line_of_the_example_changes_the_plant(tmp_path: Path) -> None:
     changes = {"4\n": "5\n", "0.06": "0.05", "17.0": "18.0", '"torque"': '"current_offset"'}
     for old, new in changes.items():
         assert load(tmp_path, EXAMPLE.replace(old, new, 1)) != Plant()
 
 
-def test_breakaway_follows_a_lone_coulomb(tmp_path: Path) -> None:
+def test_breakaway_torque_defaults_to_a_multiple_of_coulomb_friction(tmp_path: Path) -> None:
     plant = load(tmp_path, "[friction]\ncoulomb_Nm = 0.2\n")
     assert plant.friction.breakaway_Nm == pytest.approx(0.25)
 
@@ -212,7 +212,9 @@ def test_breakaway_follows_a_lone_coulomb(tmp_path: Path) -> None:
         ("seed = true", "seed", "seed"),
     ],
 )
-def test_wrong_key_or_value_is_named(tmp_path: Path, text: str, key: str, told: str) -> None:
+def test_error_for_a_wrong_key_or_value_names_it(
+    tmp_path: Path, text: str, key: str, told: str
+) -> None:
     with pytest.raises(ProfileError) as caught:
         load(tmp_path, text)
     assert caught.value.key == key

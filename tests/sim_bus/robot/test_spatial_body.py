@@ -1,4 +1,4 @@
-"""A platform in space: what its file says is the truth, and cables that leave over pulleys."""
+"""A platform in space: values of its file, errors of the plant, and cables over pulleys."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def robot_in_space(**changes: Any) -> CableRobot:
     return body(exits=EXITS_m, anchors=ANCHORS_m, **given)
 
 
-def test_what_the_file_says_is_the_truth() -> None:
+def test_the_simulated_body_has_the_values_of_the_robots_file() -> None:
     vector, com = (0.1, -0.3, 0.4), (0.01, -0.02, 0.05)
     shape = {"inertia_kg_m2": INERTIA, "centre_of_mass_m": com, "home_rotation_rad": vector}
     robot = robot_in_space(shape=shape)
@@ -43,7 +43,7 @@ def test_what_the_file_says_is_the_truth() -> None:
         assert robot.distance_m(i) == pytest.approx(float(np.linalg.norm(anchor - EXITS_m[i])))
 
 
-def test_a_plants_errors_come_on_top() -> None:
+def test_errors_of_the_plant_are_added_to_the_values_of_the_file() -> None:
     shape = {"inertia_kg_m2": INERTIA, "home_rotation_rad": (0.0, 0.0, 0.5)}
     other = {"mass_error": 0.1, "centre_of_mass_m": (0.0, 0.0, 0.02)}
     start = {"position_m": (0.0, 0.0, 1.5), "rotation_deg": (0.0, 20.0, 0.0)}
@@ -59,7 +59,7 @@ def test_a_plants_errors_come_on_top() -> None:
     assert np.allclose(rod["inertia"], 10.0 * 0.2**2 * np.eye(3))
 
 
-def test_a_plane_has_one_angle_and_one_inertia() -> None:
+def test_a_planar_body_has_one_angle_and_one_inertia() -> None:
     robot = body(shape={"home_rotation_rad": (0.3,), "inertia_kg_m2": (0.02,)})
     assert np.allclose(robot.rotation, Rotation.from_euler("z", 0.3).as_matrix())
     assert robot.platform[0]["inertia"][2, 2] == 0.02
@@ -74,7 +74,7 @@ def test_a_plane_has_one_angle_and_one_inertia() -> None:
         ({"rotation_deg": (0.0, 0.0, 3.0)}, 2, "start.rotation_deg: allowed: in space"),
     ],
 )
-def test_an_angle_of_the_other_kind_is_refused(
+def test_a_spatial_angle_in_a_plane_or_vice_versa_is_rejected(
     start: dict[str, Any], size: int, reason: str
 ) -> None:
     with pytest.raises(ValueError, match=reason):
@@ -84,7 +84,7 @@ def test_an_angle_of_the_other_kind_is_refused(
 def over_a_pulley(
     exit_m: np.ndarray, axis: np.ndarray, radius_m: float, anchor_m: np.ndarray
 ) -> float:
-    """Return the cable from where it comes to the pulley to the anchor, by its tangent point."""
+    """Return the cable length from its entry at the pulley to the anchor, by the tangent point."""
     way = anchor_m - exit_m
     along = float(way @ axis)
     aside = way - along * axis
@@ -134,7 +134,7 @@ _coordinate = st.floats(-0.8, 0.8)
     st.tuples(_coordinate, _coordinate, st.floats(0.8, 2.0)),
     st.tuples(_coordinate, _coordinate, _coordinate),
 )
-def test_a_cable_over_a_pulley_is_its_arc_and_what_is_free(
+def test_length_over_a_pulley_is_arc_plus_free_cable(
     position_m: tuple[float, ...], vector: tuple[float, ...]
 ) -> None:
     robot = robot_in_space(shape=PULLEYS)
@@ -151,7 +151,7 @@ def test_a_cable_over_a_pulley_is_its_arc_and_what_is_free(
     st.tuples(_coordinate, _coordinate, st.floats(0.8, 2.0)),
     st.tuples(_coordinate, _coordinate, _coordinate),
 )
-def test_a_cable_pulls_along_the_slope_of_its_length(
+def test_a_cable_pulls_along_the_gradient_of_its_length(
     position_m: tuple[float, ...], vector: tuple[float, ...]
 ) -> None:
     robot = robot_in_space(shape=PULLEYS)
@@ -169,7 +169,7 @@ def test_a_cable_pulls_along_the_slope_of_its_length(
         assert np.allclose(slope, -ways[:, k], atol=1e-6)
 
 
-def test_pulleys_make_no_energy() -> None:
+def test_pulleys_create_no_energy() -> None:
     robot = robot_in_space(shape={**PULLEYS, "inertia_kg_m2": INERTIA}, locked=True)
     p = robot.platform[0]
     p["velocity"], p["spin"] = (0.3, -0.2, 0.1), (0.3, 0.5, -1.0)
@@ -182,7 +182,7 @@ def test_pulleys_make_no_energy() -> None:
     assert float(np.linalg.norm(robot.position_m - (0.1, -0.2, 1.4))) > 1e-3
 
 
-def test_in_a_plane_a_pulley_is_led_over_on_the_platforms_side() -> None:
+def test_a_planar_cable_leaves_its_pulley_on_the_side_of_the_platform() -> None:
     radii = {"pulley_radii_m": [0.1, 0.1, 0.0]}
     points, pulleys = body(), body(shape=radii)
     for i, x in enumerate((-2.0, 2.0)):

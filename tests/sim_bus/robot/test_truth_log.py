@@ -1,4 +1,4 @@
-"""The log of the true motion, read back as the report reads it."""
+"""The logs of the true motion and of simulated pose measurements."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def read(path: Path) -> tuple[dict[str, object], np.ndarray]:
     return header, np.fromfile(path, dtype, offset=HEADER_BYTES)
 
 
-def test_one_record_per_sync_that_obeys_newton(tmp_path: Path) -> None:
+def test_the_log_has_one_record_per_sync_that_obeys_newtons_law(tmp_path: Path) -> None:
     plant = Plant.model_validate({"motor": {"initial_angle_deg": 200.0}})
     path = tmp_path / "truth.bin"
     rig = Rig(plant, path)
@@ -47,7 +47,7 @@ def test_one_record_per_sync_that_obeys_newton(tmp_path: Path) -> None:
     assert list(log["sync_index"]) == list(range(len(log)))
     tail = log[-1500:]
     assert tail["time_s"] == pytest.approx(times)
-    # The angle counts from power-up, as the encoder does, half a millisecond later.
+    # The angle is relative to power-up. The encoder shows it half a millisecond later.
     seen = np.array(positions) * 2 * math.pi / 8192
     midway = 0.5 * (tail["angle_rad"][1:] + tail["angle_rad"][:-1])
     assert np.abs(seen[1:] - midway).max() < 0.006
@@ -67,8 +67,7 @@ def test_one_record_per_sync_that_obeys_newton(tmp_path: Path) -> None:
     assert np.abs(tail["cogging_Nm"] - expected).max() < 0.03
 
 
-def test_what_happens_when_the_syncs_end_is_in_the_log_at_once(tmp_path: Path) -> None:
-    """The motor turns on by itself; a record is there every 20 ms."""
+def test_motion_after_the_last_sync_is_logged_every_20_ms(tmp_path: Path) -> None:
     path = tmp_path / "truth.bin"
     rig = Rig(truth_log=path)
     rig.enable(10)
@@ -94,7 +93,7 @@ def test_full_disk_ends_the_log_and_not_the_drive(capsys: pytest.CaptureFixture[
     assert capsys.readouterr().err.count("log /dev/full") == 1
 
 
-# Poses that are measured from outside.
+# Poses measured by an external scanner.
 
 PLANT = ScannerPlant(position_sigma_m=0.003, rotation_sigma_rad=0.01, rate_Hz=40.0)
 SPACE = {
@@ -106,7 +105,7 @@ SPACE = {
 
 
 def measured(path: Path, robot: CableRobot, seconds: float, seed: int = 1) -> np.ndarray:
-    """Return the records of so many seconds with an instant each millisecond."""
+    """Return the records of `seconds`, advanced in steps of a millisecond."""
     scanner = PoseScanner(path, robot, PLANT, seed)
     for k in range(round(seconds * 1e3)):
         scanner.append(k, k * 1e-3, ())
@@ -118,7 +117,7 @@ def measured(path: Path, robot: CableRobot, seconds: float, seed: int = 1) -> np
     return np.frombuffer(data[HEADER_BYTES:], np.dtype(fields))
 
 
-def test_it_measures_at_its_rate_with_the_errors_that_its_plant_says(tmp_path: Path) -> None:
+def test_pose_measurements_have_the_rate_and_errors_of_the_plant(tmp_path: Path) -> None:
     robot = body(**SPACE)
     seen = measured(tmp_path / "scan", robot, 50.0)
     assert np.allclose(seen["time_s"], np.arange(2000) / 40.0, atol=1e-9)
@@ -127,13 +126,13 @@ def test_it_measures_at_its_rate_with_the_errors_that_its_plant_says(tmp_path: P
     assert np.abs(off.mean(axis=0)).max() < 3e-4
     turned = Rotation.from_matrix(seen["rotation"] @ robot.rotation.T).as_rotvec()
     assert np.std(turned, axis=0) == pytest.approx([0.01] * 3, rel=0.06)
-    # one reading knows nothing of the one before it, nor a position of its rotation
+    # readings are not correlated with previous ones, nor positions with rotations
     both = np.hstack([off, turned])
     assert np.abs(np.corrcoef(both[1:].T, both[:-1].T)[:6, 6:]).max() < 0.1
     assert np.abs(np.corrcoef(both.T) - np.eye(6)).max() < 0.1
 
 
-def test_in_a_plane_it_measures_three_figures(tmp_path: Path) -> None:
+def test_planar_pose_measurements_have_two_coordinates_and_an_angle(tmp_path: Path) -> None:
     seen = measured(tmp_path / "scan", body(), 2.0)
     turned = Rotation.from_matrix(seen["rotation"]).as_rotvec()
     assert (seen["position_m"][:, 2] == 0.0).all()
@@ -141,7 +140,7 @@ def test_in_a_plane_it_measures_three_figures(tmp_path: Path) -> None:
     assert np.std(turned[:, 2]) > 0.005
 
 
-def test_the_same_seed_has_the_same_errors(tmp_path: Path) -> None:
+def test_the_same_seed_gives_the_same_measurement_errors(tmp_path: Path) -> None:
     one, again, other = (
         measured(tmp_path / f"scan-{i}", body(), 1.0, seed) for i, seed in enumerate((1, 1, 2))
     )

@@ -1,4 +1,4 @@
-"""Level winding: what drum and carriage add to the cable that is paid out."""
+"""Level winding, creep, gear elasticity and weight of cables."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ LOWPASSED_ONCE = {
 }
 
 
-def test_cable_is_paid_out_as_drum_and_carriage_say() -> None:
+def test_length_paid_out_follows_drum_run_out_and_carriage() -> None:
     m = body(winding=LOWPASSED_ONCE).motors[0]
     start, _ = paid_out(m)
-    for turns in (0.5, 1.0, 3.25):  # of the drum, four of the motor each
+    for turns in (0.5, 1.0, 3.25):  # turns of the drum, each with four turns of the motor
         m["angle"] = m["angle_start"] + 8.0 * math.pi * turns
         straight = start + 0.026 * 8.0 * math.pi * turns
         phase = float(m["run_out_phase"])
@@ -33,7 +33,7 @@ def test_cable_is_paid_out_as_drum_and_carriage_say() -> None:
         assert paid_out(m)[0] == pytest.approx(straight + eccentric - askew, abs=1e-12)
 
 
-def test_the_lever_is_the_slope_of_what_is_paid_out() -> None:
+def test_the_lever_is_the_derivative_of_the_length_paid_out() -> None:
     m = body(winding=LOWPASSED_ONCE).motors[1]
     for angle in np.linspace(-30.0, 30.0, 13):
         lengths = []
@@ -44,7 +44,7 @@ def test_the_lever_is_the_slope_of_what_is_paid_out() -> None:
         assert paid_out(m)[1] == pytest.approx((lengths[1] - lengths[0]) / 2e-5, rel=1e-5)
 
 
-def test_winding_makes_no_energy() -> None:
+def test_winding_creates_no_energy() -> None:
     robot = body(winding=LOWPASSED_ONCE)
     robot.platform["velocity"][0, :2] = 0.3, 0.1
     p, m = robot.platform[0], robot.motors
@@ -68,20 +68,20 @@ def test_winding_makes_no_energy() -> None:
     assert np.abs(m["angle"] - m["angle_start"]).max() > 0.5, "the drums have turned"
 
 
-# Creep of cables, and what gear and belt yield.
+# Creep of cables, and elasticity of gear and belt.
 
 LOAD_N = 100.0
 
 
 def hung(**sections: dict[str, object]) -> CableRobot:
-    """A mass on one vertical cable whose motor is locked."""
+    """Return a mass on one vertical cable whose motor is locked."""
     return body(
         exits=((0.0, 3.0),), anchors=((0.0, 0.0),), home=(0.0, 1.0), locked=True,
         pretension_N=LOAD_N, mass_kg=LOAD_N / 9.80665, platform={"air_Ns_m": 100.0}, **sections,
     )  # fmt: skip
 
 
-def test_a_cable_creeps_by_its_shares_in_their_times() -> None:
+def test_a_cable_creeps_by_its_shares_with_their_time_constants() -> None:
     robot = hung(cables={"creep_shares": (0.2, 0.1), "creep_times_s": (0.1, 2.0)})
     free = float(free_length_m(robot)[0])
     elastic = LOAD_N / float(robot.motors["rigidity"][0]) * free
@@ -92,16 +92,16 @@ def test_a_cable_creeps_by_its_shares_in_their_times() -> None:
         way.append(robot.distance_m(0) - free - elastic)
     t = np.array(at)
     expected = elastic * (0.2 * (1 - np.exp(-t / 0.1)) + 0.1 * (1 - np.exp(-t / 2.0)))
-    # it swings a little on its cable at first
+    # at first the mass oscillates on the cable
     assert np.allclose(way, expected, atol=0.04 * elastic)
     assert np.allclose(way[20:], expected[20:], atol=0.003 * elastic)
 
 
-def test_gear_and_belt_yield_in_series_with_the_cable() -> None:
+def test_elasticity_of_gear_and_belt_is_in_series_with_the_cable() -> None:
     robot = hung(winding={"gear_stiffness_Nm_rad": 200.0})
     begun = float(robot.position_m[1])
     run(robot, 2.0)
-    # 100 N at a drum of 104 mm turn it by 52 mrad
+    # 100 N turn a drum of 104 mm radius by 52 mrad
     assert begun - robot.position_m[1] == pytest.approx(LOAD_N * 0.104**2 / 200.0, rel=0.01)
 
 
@@ -115,7 +115,7 @@ MASS_kg, WEIGHT_N_m = 110.0, 4.0
 
 
 @pytest.mark.parametrize("home_m", [(0.0, 0.0, 1.0), (1.5, 1.0, 3.0)])
-def test_a_mass_on_heavy_cables_stands_as_on_catenaries(home_m: tuple[float, ...]) -> None:
+def test_a_mass_on_heavy_cables_hangs_as_on_catenaries(home_m: tuple[float, ...]) -> None:
     robot = body(
         exits=EXITS_m, anchors=[(0.0, 0.0, 0.0)] * 3, home=home_m, locked=True, pretension_N=0.0,
         mass_kg=MASS_kg, weight_N_m=WEIGHT_N_m, shape={"inertia_kg_m2": (1.0, 1.0, 1.0, 0, 0, 0)},
@@ -131,7 +131,7 @@ def test_a_mass_on_heavy_cables_stands_as_on_catenaries(home_m: tuple[float, ...
     np.testing.assert_allclose(robot.position_m, true.position_m, atol=5e-3)
     rise = robot.tension_N - robot.motors["tension"]
     np.testing.assert_allclose(robot.motors["tension"] - rise, true.platform_N, rtol=1e-2)
-    # without weight they would have some twentieth less
+    # without weight, tensions would be about a twentieth lower
     light = standing(
         EXITS_m, MASS_kg, 1e-3, float(robot.motors["rigidity"][0]),
         position_m=robot.position_m,
