@@ -1,7 +1,7 @@
-"""All tests here are `long`; those marked `vcan` run on a real vcan0, in a guest kernel if need be.
+"""Mark all tests here `long`, and run those marked `vcan` on a real vcan0.
 
-In the second case one boot runs all of them, by a pytest of its own inside, whose reports are
-replayed here test by test. Without a guest they are reported as skipped, with the reason.
+If the machine has no vcan0, a guest kernel boots once and a separate pytest runs all of them in it.
+Their reports are replayed here test by test. Without a guest they are skipped with the reason.
 """
 
 import os
@@ -14,10 +14,10 @@ import vcan_replay
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Each test has its time limit in the guest; the first of them waits for all, out here.
+    """Give each test its time limit in the guest, and the first one here time for all of them.
 
-    They come before the others of this folder: one boot for all is the longest there is to share
-    out, but kernels should be on disk by then, since to compile is slow in a guest.
+    Run them before other tests of this folder, because their common boot is the longest job. By
+    then kernels should be on disk, because compilation is slow in a guest.
     """
     here = [item for item in items if Path(__file__).parent in item.path.parents]
     if here:
@@ -33,7 +33,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_runtest_protocol(item: pytest.Item, nextitem: pytest.Item | None) -> bool | None:
-    """Replay what a `vcan` test did in the guest; every other test runs as usual."""
+    """Replay the report of a `vcan` test from the guest. Run other tests as usual."""
     if not item.get_closest_marker("vcan") or _runs_here():
         return None
     stash = item.session.stash
@@ -44,13 +44,13 @@ def pytest_runtest_protocol(item: pytest.Item, nextitem: pytest.Item | None) -> 
     for report in vcan_replay.replay(item, stash[_OUTCOME]):
         item.ihook.pytest_runtest_logreport(report=report)
     item.ihook.pytest_runtest_logfinish(nodeid=item.nodeid, location=item.location)
-    # what the test before left set up for this one's sake
+    # fixtures that the previous test kept for this one
     item.session._setupstate.teardown_exact(nextitem)
     return True
 
 
 def pytest_runtest_logreport(report: pytest.TestReport) -> None:
-    """Inside the guest, hand every report to the run outside."""
+    """Inside the guest, write each report for the outer run."""
     if vcan_replay.REPORTS_VARIABLE in os.environ:
         vcan_replay.append(report, os.environ[vcan_replay.REPORTS_VARIABLE])
 

@@ -1,4 +1,4 @@
-"""Real daemons that are asked, or move, and what is common to their tests."""
+"""Real daemons, and helpers that their tests share."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def running(folder: Path, *options: str, period_s: float) -> Iterator[RealDaemon
 
 
 def with_key(folder: Path) -> tuple[str, ...]:
-    """Return the options with which it listens on TCP too, to who knows the key."""
+    """Return the options that make a daemon listen on TCP too, for clients with the key."""
     key_file = folder / "key"
     key_file.write_text(KEY)
     key_file.chmod(0o600)
@@ -42,7 +42,7 @@ def events(daemon: RealDaemon) -> list[tuple[str, str]]:
 
 @contextmanager
 def with_power(daemon: RealDaemon) -> Iterator[RealDaemon]:
-    """Have it hold; nobody holds the right to move."""
+    """Enable the daemon's drives in program hold, with the right to move released."""
     until(lambda: not daemon.status()["control"]["held"])
     if daemon.status()["state"] != "active":
         with holding(daemon) as headers:

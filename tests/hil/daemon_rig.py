@@ -1,4 +1,4 @@
-"""A real daemon for tests: `cdpr run` on a simulated robot of its own, and what is seen of it."""
+"""A real daemon for tests: `cdpr run` on its own simulated robot."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ import httpx
 
 from cdpr_tools.composition.simulator import OwnSimulator
 
-# slow enough for a machine on which other tests run: its paced simulator must answer in time
+# slow enough for a busy machine: the paced simulator must answer in time
 _ROBOT = """
 name = "Two motors, slowly"
 sync_period_s = {period_s}
@@ -47,14 +47,14 @@ _names = itertools.count()
 
 
 def write_robot(folder: Path, period_s: float = PERIOD_S, limits: str = "") -> Path:
-    """Write the robot's file into a folder, `limits` being more lines of that table; return it."""
+    """Write the robot's file into a folder, with more lines `limits` in that table. Return it."""
     path = folder / f"{NAME}.toml"
     path.write_text(_ROBOT.format(period_s=period_s).replace("[limits]", f"[limits]\n{limits}"))
     return path
 
 
 def until(what: Callable[[], Any], patience_s: float = PATIENCE_S) -> Any:
-    """Ask until the answer is true; return it."""
+    """Call `what` until its result is true. Return the result."""
     end = time.monotonic() + patience_s
     while not (answer := what()):
         assert time.monotonic() < end, f"not within {patience_s:g} s"
@@ -63,7 +63,7 @@ def until(what: Callable[[], Any], patience_s: float = PATIENCE_S) -> Any:
 
 
 def alive(pid: int) -> bool:
-    """Whether a process runs; one that only waits to be reaped does not."""
+    """Return whether a process runs. A zombie does not."""
     try:
         return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
     except OSError:
@@ -71,9 +71,9 @@ def alive(pid: int) -> bool:
 
 
 class RealDaemon:
-    """`cdpr run` of a slow robot with two axes, or of `robot`; `ready` is the line that it is up.
+    """`cdpr run` of a slow robot with two axes, or of `robot`. `ready` is its line of readiness.
 
-    Its drives live by the wall clock where they are `paced`, else their time waits for the loop.
+    If `paced`, drives follow the wall clock. Otherwise their time waits for the loop.
     """
 
     def __init__(
@@ -119,7 +119,7 @@ class RealDaemon:
             raise
 
     def connection(self) -> httpx.Client:
-        """Return another connection to its control interface."""
+        """Return another connection to the control interface."""
         transport = httpx.HTTPTransport(uds=str(self.socket))
         return httpx.Client(transport=transport, base_url="http://localhost", timeout=PATIENCE_S)
 
@@ -131,11 +131,11 @@ class RealDaemon:
         return line
 
     def errors(self) -> str:
-        """Return what it has said on standard error so far, or until it ended."""
+        """Return the standard error so far, or all of it after the end."""
         return self._errors.read_text()
 
     def status(self) -> dict[str, Any]:
-        """Return what the control interface tells, an empty table where nobody answers."""
+        """Return the status from the control interface, {} if it does not answer."""
         try:
             status: dict[str, Any] = self.http.get("/status").json()
         except (httpx.HTTPError, ValueError):
@@ -143,7 +143,7 @@ class RealDaemon:
         return status
 
     def wait_for(self, state: str) -> dict[str, Any]:
-        """Wait until the loop is in a state; return the status."""
+        """Wait until the loop is in `state`. Return the status."""
         status: dict[str, Any] = {}
 
         def there() -> bool:
@@ -158,7 +158,7 @@ class RealDaemon:
         return status
 
     def children(self) -> dict[str, int]:
-        """Return the processes of loop, service and simulator, those of them that live."""
+        """Return the living processes among loop, service and simulator."""
         pid = self.process.pid
         found = {}
         for child in Path(f"/proc/{pid}/task/{pid}/children").read_text().split():
@@ -171,7 +171,7 @@ class RealDaemon:
         return found
 
     def end(self) -> int:
-        """End it as a user would; return its exit status."""
+        """End the daemon as a user would. Return its exit status."""
         self.http.close()
         if self.process.poll() is None:
             self.process.send_signal(signal.SIGTERM)
@@ -187,10 +187,10 @@ class RealDaemon:
 
 @contextmanager
 def held_right(daemon: RealDaemon, client: str) -> Iterator[httpx.Headers]:
-    """Yield the headers of the right to move; it is renewed, then the axes hold and it is released.
+    """Yield headers with the right to move and renew it. At the end, hold the axes and release it.
 
-    It expires by the wall clock, but an unpaced robot's time waits for the loop: what takes it a
-    second may take a busy machine longer than the right lasts.
+    The right expires by the wall clock, but the time of an unpaced robot waits for the loop. On a
+    busy machine, a second of the robot may last longer than the right.
     """
     taken = daemon.http.post("/control", json={"client": client, "ttl_s": _RIGHT_S})
     assert taken.status_code == 200, taken.text
@@ -216,7 +216,7 @@ def held_right(daemon: RealDaemon, client: str) -> Iterator[httpx.Headers]:
 def cdpr(
     *arguments: str | Path, typed: str = "", timeout_s: float = PATIENCE_S
 ) -> subprocess.CompletedProcess[str]:
-    """Run a command to its end; `typed` is its standard input."""
+    """Run a command to its end, with `typed` as its standard input."""
     command = [sys.executable, "-m", "cdpr_tools.cli", *map(str, arguments)]
     return subprocess.run(
         command, input=typed, capture_output=True, text=True, timeout=timeout_s, check=False

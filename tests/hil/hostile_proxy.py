@@ -1,4 +1,4 @@
-"""A network between a hand and its robot that loses, delays, repeats, reorders, and even alters."""
+"""A network that loses, delays, duplicates, reorders and alters packets between hand and robot."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 LOSS, COPIES, JITTER_S = 0.2, 0.05, 0.05
-_SETPOINT, _KIND_AT, _POSITION_AT = 3, 5, 48  # as docs/reference/setpoint-stream.md has it
+_SETPOINT, _KIND_AT, _POSITION_AT = 3, 5, 48  # as described in docs/reference/setpoint-stream.md
 
 
 class Proxy:
-    """Passes datagrams on, in both directions, through the same bad network; counts them."""
+    """Forward datagrams in both directions through the same bad network and count them."""
 
     def __init__(self, port: int, seed: int, altered: float) -> None:
         self._rng = random.Random(seed)
@@ -66,18 +66,18 @@ class Proxy:
                     self._front.sendto(data, sender)
 
     def _copies(self) -> list[float]:
-        """Return when a datagram is passed on: never, once, or twice."""
+        """Return the times at which a datagram is forwarded: none, one or two."""
         weights = (LOSS, 1.0 - LOSS - COPIES, COPIES)
         count = self._rng.choices((0, 1, 2), weights)[0]
         now_s = time.monotonic()
         return [now_s + self._rng.uniform(0.0, JITTER_S) for _ in range(count)]
 
     def _spoil(self, data: bytes) -> bytes:
-        """Make some set-points say NaN, or a metre from where the hand is."""
+        """Change some set-points to NaN or by a metre."""
         if data[_KIND_AT] != _SETPOINT:
             return data
         self._setpoints += 1
-        # by count: of some tens of them chance spoils anything between none and many
+        # by count, because random choice among some tens could spoil none or many
         if self.spoilt >= self._altered * self._setpoints:
             return data
         self.spoilt += 1
@@ -90,7 +90,7 @@ class Proxy:
 
 @contextmanager
 def hostile(port: int, seed: int, altered: float = 0.0) -> Iterator[Proxy]:
-    """Yield a proxy before a local port; `altered` is the share of set-points that it spoils."""
+    """Yield a proxy before a local port. It spoils the share `altered` of set-points."""
     proxy = Proxy(port, seed, altered)
     try:
         yield proxy

@@ -1,4 +1,4 @@
-"""Simulated drives of any shipped profile, the session that drives one, and the true motion."""
+"""Simulated drives of any shipped profile, a session with one, and the true motion."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ PLANT = """
 [drive]
 overcurrent_Arms = 4.0
 """
-"""A drive that trips at 2.2 Nm, so that a fault can be had without a hook in the drive."""
+"""A drive that trips at 2.2 Nm, so that a test can cause a fault without injecting it."""
 
 _TRUTH = np.dtype(
     [("sync", "<u4"), ("time", "<f8"), ("angle", "<f8"), ("from_index", "<f8"),
@@ -39,7 +39,7 @@ _FLUSHED_CYCLES = 513
 
 
 def write_winch(folder: Path, drive: str, node_id: int = 1) -> Path:
-    """Return the file of the shipped winch with another drive and node id."""
+    """Write and return the file of the shipped winch with a different drive and node id."""
     text = (SHIPPED / "winches" / "winch-mpp0923d.toml").read_text()
     text = text.replace('"generic-cia402"', f'"{drive}"').replace(
         "node_id = 1\n", f"node_id = {node_id}\n"
@@ -54,16 +54,16 @@ def bus_name() -> str:
 
 
 class Motion:
-    """Runs cycles on a session's device, its loop left aside; tells what truly happened in them."""
+    """Run cycles on a session's device without its loop, and read the true motion."""
 
     def __init__(self, session: Session, truth_log: Path) -> None:
         self.session = session
         self._log = truth_log
 
     def push(self, torque_Nm: float, cycles: int) -> NDArray[np.void]:
-        """Ask for a torque for some cycles, then for none; return the true motion meanwhile.
+        """Command a torque for some cycles, then zero. Return the true motion meanwhile.
 
-        The first SYNC at which the torque acts is that of the second record.
+        The torque first acts at the SYNC of the second record.
         """
         device = self.session.device
         first = device.feedback.cycle + 1
@@ -75,16 +75,16 @@ class Motion:
         return self.truth(first, device.feedback.cycle)
 
     def give_back(self) -> None:
-        """Have the loop take the drives as they are now, whatever has moved them meanwhile."""
+        """Let the loop continue from the present state of the drives."""
         self.session.loop.engine.parts.estimator.reset()
         self.session.loop.engine.parts.supervisor.reset()
 
     def truth(self, first: int, last: int) -> NDArray[np.void]:
-        """Return the truth at the SYNCs of the cycles `first` up to `last`."""
+        """Return the true motion at the SYNCs of cycles `first` to `last`."""
         device = self.session.device
         powered = device.command.torque_Nm.copy()
         device.command.torque_Nm[:] = 0.0
-        for _ in range(_FLUSHED_CYCLES):  # until the simulator has written its buffer
+        for _ in range(_FLUSHED_CYCLES):  # wait until the simulator has written its buffer
             device.sync()
             device.receive()
             device.transmit()
@@ -99,7 +99,7 @@ class Motion:
 
 
 class MixedSimulator:
-    """Several winches, each with its own drive type, on one simulated bus in one process."""
+    """Several winches with different drive types on one simulated bus in one process."""
 
     def __init__(self, winches: Sequence[Path]) -> None:
         self.bus = bus_name()

@@ -1,4 +1,4 @@
-"""Rails for tests: simulated ones, their safety I/O and load cell, and commands that move them."""
+"""Simulated rails, their safety I/O and load cell, and commands that move them."""
 
 from __future__ import annotations
 
@@ -34,12 +34,12 @@ from cdpr_tools.commands import rail as rail_commands
 
 M_PER_RAD = 0.02 / math.tau
 ANSWER_S, MASTER_S = 2.0, 2.0
-"""How long a device may take to answer, and its master to be heard, on a busy machine."""
+"""Timeouts of devices and of their master, for a busy machine."""
 
 
 @dataclass
 class Rails:
-    """A rail on CiA 402 with its safety I/O, one on Modbus, and the load cell of a winch."""
+    """A CiA 402 rail with its safety I/O, a Modbus rail, and the load cell of a winch."""
 
     bus: str
     io_device: SafetyIoProcess
@@ -52,7 +52,7 @@ class Rails:
     home: Path
 
     def pull(self, tension_N: float) -> None:
-        """Have the winch's cable carry this tension for half a second of its board's time."""
+        """Apply this tension to the winch's cable for half a second of its board's time."""
         begun_s = self.winch.time_s
         for step in range(1, 501):
             self.winch.publish(begun_s + 1e-3 * step, tension_N, 0.0, 0.0, False)
@@ -71,12 +71,12 @@ class Rails:
         return self.begin(*self._move(kind, to_m, slack))
 
     def moved(self, kind: str, to_m: float, *slack: str) -> Result:
-        """Move in this process, which is quicker."""
+        """Move with a command in this process, which is faster."""
         runner = CliRunner(env={"XDG_STATE_HOME": str(self.home)})
         return runner.invoke(rail_commands.app, list(self._move(kind, to_m, slack)))
 
     def refused(self, kind: str, to_m: float, *slack: str) -> str:
-        """Ask for a move in this process; return why it was refused."""
+        """Request a move in this process. Return why it was rejected."""
         outcome = self.moved(kind, to_m, *slack)
         assert isinstance(outcome.exception, DriverError), outcome.output
         return str(outcome.exception)
@@ -89,18 +89,18 @@ class Rails:
         return ("move", str(self.cia402), "--to", str(to_m), *where, *slack)
 
     def position_m(self, kind: str) -> float:
-        """The truth, and not what a command tells."""
+        """Return the true position, not that of a command."""
         if kind == "cia402":
             return self.rail.state().motor_rad * M_PER_RAD
         high, low = self._registers(104, 2)
         return (high << 16 | low) * 1e-5
 
     def speed_m_s(self) -> float:
-        """The true speed of the CiA 402 rail."""
+        """Return the true speed of the CiA 402 rail."""
         return self.rail.state().motor_rad_s * M_PER_RAD
 
     def braked(self, kind: str) -> bool:
-        """Whether the rail stands without power on an applied brake."""
+        """Return whether the rail is without power on an applied brake."""
         if kind == "cia402":
             return not self.rail.brake_released and not self.rail.state().power_on
         return not self._registers(111, 1)[0] & 0b10011
@@ -120,7 +120,7 @@ class Rails:
         return held
 
     def forget(self) -> None:
-        """Have the robot calibrated."""
+        """Mark the robot as calibrated."""
         self._state_file().parent.mkdir(parents=True, exist_ok=True)
         told = {"robot": "spatial-8", "calibrated": True, "why": "camera", "date": "2020-01-01"}
         self._state_file().write_text(json.dumps(told))
@@ -133,7 +133,7 @@ class Rails:
         return self.home / "cdpr-rt" / "calibration.spatial-8.json"
 
     def _registers(self, address: int, count: int) -> list[int]:
-        with self._modbus() as drive:  # or its connections stay, hundreds while a move is awaited
+        with self._modbus() as drive:  # otherwise hundreds of connections stay open during a move
             found: list[int] = drive.read_holding_registers(
                 address, count=count, device_id=1
             ).registers
@@ -144,7 +144,7 @@ class Rails:
 
 
 def patient_rail(folder: Path, kind: str, port: int = 502) -> Path:
-    """Write the shipped rail with times that suit a busy machine, and a port; return it."""
+    """Write the shipped rail with `port` and timeouts for a busy machine. Return it."""
     text = (SHIPPED / "rails" / f"rail-{kind}.toml").read_text()
     drive = write_tolerant_drive(folder, 0.5 * MASTER_S, MASTER_S)
     changes = {
@@ -165,7 +165,7 @@ def patient_rail(folder: Path, kind: str, port: int = 502) -> Path:
 
 @contextmanager
 def another_winch() -> Iterator[tuple[str, Callable[[], None]]]:
-    """A simulated winch on a bus of its own: the bus, and what gives it power."""
+    """Yield the separate bus of a simulated winch and a function that enables it."""
     bus = f"winches-{os.getpid()}-{uuid.uuid4().hex[:6]}"
     winch = start("up", "winch-mpp0923d", "--bus", f"simbus:{bus}", "--paced")
     ready(winch)
@@ -175,7 +175,7 @@ def another_winch() -> Iterator[tuple[str, Callable[[], None]]]:
     node.sdo.RESPONSE_TIMEOUT = 60.0
     node.sdo[0x6060].raw = 4
 
-    def power() -> None:  # by PDO: who is asked for power by SDO has one channel for all
+    def power() -> None:  # by PDO, because all clients share one SDO channel
         node.nmt.state = "OPERATIONAL"
         for word in (6, 7, 15):
             network.send_message(0x201, struct.pack("<Hh", word, 0))

@@ -1,4 +1,4 @@
-"""Whole sessions with a simulated drive over a serial adapter and over socketcand."""
+"""Complete sessions with a simulated drive over a serial adapter and over socketcand."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ CDPR = (sys.executable, "-m", "cdpr_tools.cli")
 
 
 class Lab:
-    """A simulated drive reachable three ways, and a third party's master on the simulated bus."""
+    """A simulated drive that is reachable in three ways, and a third-party master on its bus."""
 
     def __init__(self) -> None:
         self.name = name = f"adapters-{os.getpid()}-{uuid.uuid4().hex[:6]}"
@@ -44,7 +44,7 @@ class Lab:
         self.node.sdo.RESPONSE_TIMEOUT = 60.0
 
     def bus(self, gateway: str) -> str:
-        """Return the URL of one of the gateways, for a simulation whose time waits for SYNC."""
+        """Return the URL of a gateway, for a simulation whose time waits for SYNC."""
         if gateway == "slcan":
             return f"slcan:{self.ready['slcan']}?bitrate=1000000&lockstep=true"
         return f"{self.ready['socketcand']}?lockstep=true"
@@ -71,7 +71,7 @@ def cdpr(*words: str) -> subprocess.CompletedProcess[str]:
 
 
 @pytest.mark.parametrize("gateway", ["slcan", "socketcand"])
-def test_a_session(lab: Lab, gateway: str) -> None:
+def test_a_complete_session_succeeds_over_each_gateway(lab: Lab, gateway: str) -> None:
     """Boot, mode, power, cycles in closed loop, power off."""
     words = ("drive", "jog", WINCH, "--bus", lab.bus(gateway), "--seconds", "0.4")
     result = cdpr(*words, "--speed-deg-s", "75", "--yes")
@@ -80,21 +80,21 @@ def test_a_session(lab: Lab, gateway: str) -> None:
     assert lab.state() == OFF
 
 
-def test_it_asks_before_a_motor_turns_that_could_be_a_real_one(lab: Lab) -> None:
+def test_motion_over_an_adapter_needs_a_confirmation(lab: Lab) -> None:
     result = cdpr("drive", "jog", WINCH, "--bus", lab.bus("slcan"))
     assert result.returncode == 2
     assert "--yes" in result.stderr
 
 
 @pytest.mark.parametrize("gateway", ["slcan", "socketcand"])
-def test_pulled_out_in_motion(gateway: str) -> None:
-    """One message and status 1; the drive, left alone, takes its power away by itself."""
+def test_unplugging_the_adapter_in_motion_is_reported_and_the_drive_stops(gateway: str) -> None:
+    """The command prints one message and exits with status 1. The drive cuts its power."""
     lab = Lab()
     words = ("drive", "jog", WINCH, "--bus", lab.bus(gateway), "--seconds", "300", "--yes")
     command = subprocess.Popen(
         [*CDPR, *words], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     )
-    # from the PDOs: a second SDO client would disturb the command while it boots the drive
+    # read from PDOs: a second SDO client would disturb the command that boots the drive
     filters = [{"can_id": 0x181, "can_mask": 0x7FF}]
     with can.Bus(lab.name, interface="simbus", can_filters=filters) as bus:
         enabled, deadline = 0, time.monotonic() + 120.0
@@ -112,7 +112,7 @@ def test_pulled_out_in_motion(gateway: str) -> None:
     assert last.startswith("cdpr: ")
     assert "the bus has gone away" in last
     assert "Traceback" not in errors
-    # bus time runs by itself again after half a second, and the heartbeat is missed
+    # after half a second, bus time runs again and the drive misses the heartbeat
     while lab.state() == ENABLED:
         assert time.monotonic() - pulled_at < 60.0
         time.sleep(0.02)

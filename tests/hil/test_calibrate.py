@@ -1,4 +1,4 @@
-"""`cdpr calibrate run` as typed: killed in the middle, gone on with, then checked."""
+"""`cdpr calibrate run` is killed and resumed, and `cdpr calibrate check` checks its result."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def _own_folders(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def killed_after(poses: int, data: Path, words: list[str]) -> None:
-    """Run a command and kill it, without a word, once it has kept so many poses."""
+    """Run a command and kill it as soon as it has recorded `poses` poses."""
     command = [sys.executable, "-P", "-m", "cdpr_tools.cli", *words]
     process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
     try:
@@ -47,7 +47,7 @@ def killed_after(poses: int, data: Path, words: list[str]) -> None:
         process.communicate()
 
 
-def test_a_killed_run_goes_on_names_a_slip_after_it_and_its_calibration_is_checked(
+def test_a_killed_run_resumes_reports_a_slip_and_its_calibration_can_be_checked(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("cdpr_tools.calibrate.check.POSES", 6)
@@ -56,7 +56,7 @@ def test_a_killed_run_goes_on_names_a_slip_after_it_and_its_calibration_is_check
     plant.write_text(fine.read_text())
     moved.write_text(_PLANT.format(drum=0.02))
     folder, robot = tmp_path / "out", tmp_path / "planar-4.toml"
-    # a quarter of the cycles a second, which take a quarter of the time
+    # a quarter of the cycle rate, which takes a quarter of the time
     shipped = (SHIPPED / "robots" / "planar-4.toml").read_text()
     robot.write_text(shipped.replace("sync_period_s = 0.001", "sync_period_s = 0.004"))
     words = ["calibrate", "run", str(robot), "--scanner", "--plant", str(plant)]
@@ -83,7 +83,7 @@ def test_a_killed_run_goes_on_names_a_slip_after_it_and_its_calibration_is_check
     assert told["in_force"]["version"] == 1
     page = Path(told["report"]).read_text()
     assert page.count("<figure>") >= 3 and 'src="data:image/png' in page
-    # with its "://": letters alone stand in a picture's base64 by chance
+    # with "://", because letters alone could occur in a picture's base64
     assert "://" not in page.split("</style>")[1]
     held = cdpr_here("calibrate", "check", robot, "--plant", fine, "--json")
     assert held.returncode == 0, held.stderr + held.stdout

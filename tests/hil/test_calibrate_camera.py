@@ -1,4 +1,4 @@
-"""`cdpr calibrate run --camera` as typed, on a robot, a camera and sheets with several faults."""
+"""`cdpr calibrate run --camera` with several faults of robot, camera and marker sheets."""
 
 from __future__ import annotations
 
@@ -57,13 +57,13 @@ def _own_folders(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
 
 
-def test_a_run_with_a_camera_survives_a_slip_a_mirrored_sheet_and_an_unplugged_cable(
+def test_a_camera_run_survives_a_slip_a_mirrored_sheet_and_an_unplugged_camera(
     tmp_path: Path,
 ) -> None:
     plant, lens, robot = (tmp_path / f"{name}.toml" for name in ("plant", "lens", "spatial-8"))
     plant.write_text(_PLANT)
     lens.write_text(_LENS)
-    # half the cycles a second, which take half the time
+    # half the cycle rate, which takes half the time
     shipped = (SHIPPED / "robots" / "spatial-8.toml").read_text()
     robot.write_text(shipped.replace("sync_period_s = 0.001", "sync_period_s = 0.002"))
     done = cdpr_here(

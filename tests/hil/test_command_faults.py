@@ -1,4 +1,4 @@
-"""What a user sees when something fails: one message, the status, power off, raw data kept."""
+"""A failing command prints one message, exits with a status, cuts power and keeps raw data."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ OFF, ENABLED, FAULT = 0x40, 0x27, 0x08
 
 
 class Lab:
-    """A simulated drive on a bus of its own, and a third-party master that reads and disturbs."""
+    """A simulated drive on a separate bus, and a third-party master that reads and disturbs."""
 
     def __init__(self, *options: str | Path) -> None:
         self.bus = f"simbus:lab-{os.getpid()}-{uuid.uuid4().hex[:6]}"
@@ -47,17 +47,17 @@ class Lab:
         self._network = canopen.Network()
         self._network.NOTIFIER_CYCLE = 0.05
         self._network.connect(interface="simbus", channel=self.bus.partition(":")[2])
-        # of the cycles, which come faster than in real time, it would be seconds behind
+        # cycles are faster than real time: its queue would be seconds behind
         asked = [{"can_id": i + 1, "can_mask": 0x7FF} for i in (0x080, 0x580, 0x700)]
         self._network.bus.set_filters(asked)
         self.node = self._network.add_node(1, str(EDS))
         self.node.sdo.RESPONSE_TIMEOUT = 60.0
 
     def reset(self) -> None:
-        """Switch the drive off and on."""
+        """Restart the drive."""
         self.node.nmt.send_command(129)
         self.node.emcy.reset()
-        # bus time stands still for half a second after the last SYNC
+        # bus time stands for half a second after the last SYNC
         deadline = time.monotonic() + 60.0
         while self.state() != OFF:
             assert time.monotonic() < deadline
@@ -68,20 +68,20 @@ class Lab:
         return int(word & (0x6F if word & 0x20 else 0x4F))
 
     def read(self, index: int) -> int:
-        """Ask for an object; what a command has asked before it ended may be answered first."""
+        """Read an object. Answers to a command that has ended may arrive first."""
         client, asked = self.node.sdo, index.to_bytes(2, "little") + b"\0"
         client.responses = queue.Queue()
         client.send_request(b"\x40" + asked + bytes(4))
         while (answer := client.responses.get(timeout=60.0))[1:4] != asked:
             continue
-        assert answer[0] & 0xE3 == 0x43, answer.hex(" ")  # and no abort
+        assert answer[0] & 0xE3 == 0x43, answer.hex(" ")  # not an abort
         return int.from_bytes(answer[4 : 8 - (answer[0] >> 2 & 3)], "little", signed=True)
 
     def inject_fault(self, sub: int, value: int) -> None:
         self.node.sdo[0x2F00][sub].raw = value
 
     def leave(self) -> None:
-        """Take the third party away, whose receiving thread would print the end of the bus."""
+        """Disconnect the third party, whose receiving thread would print the end of the bus."""
         self._network.disconnect()
 
     def close(self) -> None:
@@ -114,7 +114,7 @@ def begin(*arguments: str | Path) -> Command:
 
 
 def complaint(command: Command, status: int, timeout_s: float = 60.0) -> str:
-    """Wait for a command that has to fail; return its one message, the same in text and JSON."""
+    """Wait for a command that must fail. Return its message, which text and JSON share."""
     out, errors = command.communicate(timeout=timeout_s)
     assert "Traceback" not in errors + out, errors
     assert command.returncode == status, errors
@@ -132,7 +132,7 @@ def fails(*arguments: str | Path, status: int = FAILED) -> str:
 
 
 def rows_of(out: Path) -> int:
-    """Return how many cycles of the first pass were kept, after looking at them."""
+    """Check the kept cycles of the first pass and return their number."""
     log = read_raw_log(out / "raw" / "sweep-0.raw")
     cycles = log.column("cycle")
     assert np.all(np.diff(cycles) == 1)
@@ -142,7 +142,7 @@ def rows_of(out: Path) -> int:
 
 @contextmanager
 def sweeping(lab: Lab, out: Path, *more: str) -> Iterator[Command]:
-    """Have a sweep under way: recording for some seconds of bus time, the drive energised."""
+    """Yield a sweep command that has recorded for some seconds with an energised drive."""
     command = begin("cogging", "sweep", WINCH, "--bus", lab.bus, "--out", out, *more)
     try:
         file = out / "raw" / "sweep-0.raw"
@@ -158,11 +158,11 @@ def sweeping(lab: Lab, out: Path, *more: str) -> Iterator[Command]:
         command.communicate()
 
 
-# -- a drive that is not there, not the one meant, or in a bad way before anything moves
+# -- a missing, wrong or faulty drive, before anything moves
 
 
 def own_profiles(folder: Path, winch: dict[str, str], drive: dict[str, str]) -> Path:
-    """Write winch and drive profiles that differ from the shipped ones in single lines."""
+    """Write winch and drive profiles with some lines changed."""
     for kind, name, changes in (
         ("winches", WINCH, {"drive": '"my-drive"', **winch}),
         ("drives", "generic-cia402", {"eds": f'"{EDS}"', **drive}),
@@ -176,7 +176,7 @@ def own_profiles(folder: Path, winch: dict[str, str], drive: dict[str, str]) -> 
     return folder / "my-winch.toml"
 
 
-def test_no_node_answers(lab: Lab, tmp_path: Path) -> None:
+def test_a_missing_node_is_reported(lab: Lab, tmp_path: Path) -> None:
     winch = own_profiles(tmp_path, {"node_id": "9"}, {})
     told = fails("drive", "enable", winch, "--bus", lab.bus)
     assert "node 9" in told
@@ -192,7 +192,7 @@ def test_no_node_answers(lab: Lab, tmp_path: Path) -> None:
         ("revision", "0x00020000", "N", "00010000h"),
     ],
 )
-def test_another_drive_than_the_profile_says(
+def test_a_drive_with_a_wrong_identity_is_reported(
     lab: Lab, tmp_path: Path, key: str, value: str, letter: str, found: str
 ) -> None:
     winch = own_profiles(tmp_path, {}, {key: value})
@@ -211,7 +211,7 @@ def test_a_node_in_fault_is_reported_as_text(lab: Lab) -> None:
     assert lab.state() == FAULT
 
 
-def test_a_drive_that_refuses_the_mode(lab: Lab) -> None:
+def test_a_drive_that_rejects_the_mode_is_reported(lab: Lab) -> None:
     lab.inject_fault(3, 1)
     told = fails("drive", "enable", WINCH, "--bus", lab.bus)
     assert "10 (cyclic torque) was refused" in told
@@ -219,9 +219,7 @@ def test_a_drive_that_refuses_the_mode(lab: Lab) -> None:
 
 
 @pytest.mark.parametrize(("sub", "value", "shown"), [(3, 2, "0 (no mode)"), (4, 8, "8 (cyclic")])
-def test_a_drive_in_another_mode_than_asked_is_not_enabled(
-    lab: Lab, sub: int, value: int, shown: str
-) -> None:
+def test_a_drive_in_a_wrong_mode_is_not_enabled(lab: Lab, sub: int, value: int, shown: str) -> None:
     lab.inject_fault(sub, value)
     told = fails("drive", "enable", WINCH, "--bus", lab.bus)
     assert "asked for mode 10 (cyclic torque)" in told
@@ -229,14 +227,14 @@ def test_a_drive_in_another_mode_than_asked_is_not_enabled(
     assert lab.state() == OFF
 
 
-def test_a_drive_without_heartbeat(lab: Lab) -> None:
+def test_a_drive_without_heartbeat_is_reported(lab: Lab) -> None:
     lab.inject_fault(5, 1)
     told = fails("drive", "enable", WINCH, "--bus", lab.bus)
     assert "step K" in told
     assert lab.state() == OFF
 
 
-def test_an_index_that_never_comes(tmp_path: Path) -> None:
+def test_a_missing_index_is_reported(tmp_path: Path) -> None:
     plant = tmp_path / "plant.toml"
     plant.write_text("[encoder]\nindex_present = false\n")
     lab = Lab("--plant", plant)
@@ -249,10 +247,10 @@ def test_an_index_that_never_comes(tmp_path: Path) -> None:
         lab.close()
 
 
-# -- in mid-sweep
+# -- during a sweep
 
 
-def test_an_emergency_in_mid_sweep(lab: Lab, tmp_path: Path) -> None:
+def test_an_emergency_during_a_sweep_is_reported(lab: Lab, tmp_path: Path) -> None:
     with sweeping(lab, tmp_path, "--json") as command:
         assert lab.state() == ENABLED
         lab.inject_fault(1, 0x7305)
@@ -263,7 +261,7 @@ def test_an_emergency_in_mid_sweep(lab: Lab, tmp_path: Path) -> None:
     assert rows_of(tmp_path) > 2000
 
 
-def test_a_drive_that_changes_its_mode_in_mid_sweep(lab: Lab, tmp_path: Path) -> None:
+def test_a_mode_change_during_a_sweep_is_reported(lab: Lab, tmp_path: Path) -> None:
     with sweeping(lab, tmp_path) as command:
         lab.inject_fault(4, 9)
         told = complaint(command, FAILED)
@@ -272,7 +270,7 @@ def test_a_drive_that_changes_its_mode_in_mid_sweep(lab: Lab, tmp_path: Path) ->
     assert rows_of(tmp_path) > 2000
 
 
-def test_a_drive_that_restarts_in_mid_sweep(lab: Lab, tmp_path: Path) -> None:
+def test_a_restart_of_the_drive_during_a_sweep_is_reported(lab: Lab, tmp_path: Path) -> None:
     with sweeping(lab, tmp_path) as command:
         lab.node.nmt.send_command(129)
         told = complaint(command, FAILED)
@@ -281,7 +279,7 @@ def test_a_drive_that_restarts_in_mid_sweep(lab: Lab, tmp_path: Path) -> None:
     assert rows_of(tmp_path) > 2000
 
 
-def test_a_simulator_killed_in_mid_sweep(tmp_path: Path) -> None:
+def test_a_simulator_killed_during_a_sweep_is_reported(tmp_path: Path) -> None:
     lab = Lab()
     lab.leave()
     with sweeping(lab, tmp_path) as command:
@@ -293,20 +291,22 @@ def test_a_simulator_killed_in_mid_sweep(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_a_stop_in_mid_sweep(lab: Lab, tmp_path: Path, number: signal.Signals) -> None:
+def test_a_stop_during_a_sweep_brakes_and_keeps_the_data(
+    lab: Lab, tmp_path: Path, number: signal.Signals
+) -> None:
     with sweeping(lab, tmp_path) as command:
         command.send_signal(number)
         told = complaint(command, FAILED)
     assert "stopped on request" in told
     assert lab.state() == OFF
-    # braked, not dropped: it stands where it was when the recording ended
+    # braked: the motor stands where it was when the recording ended
     log = read_raw_log(tmp_path / "raw" / "sweep-0.raw")
     stands_rad = lab.read(0x6064) * 2 * np.pi / 8192
     assert abs(np.degrees(stands_rad - log.column("position_rad")[-1])) < 1.0
     assert rows_of(tmp_path) > 2000
 
 
-def test_a_second_master_is_kept_out(lab: Lab, tmp_path: Path) -> None:
+def test_a_second_master_on_the_bus_is_rejected(lab: Lab, tmp_path: Path) -> None:
     with sweeping(lab, tmp_path) as command:
         told = fails("drive", "enable", WINCH, "--bus", lab.bus, status=BAD_INPUT)
         assert f"process {command.pid} " in told
@@ -317,7 +317,7 @@ def test_a_second_master_is_kept_out(lab: Lab, tmp_path: Path) -> None:
         complaint(command, FAILED)
 
 
-def test_a_full_disk_in_mid_sweep(lab: Lab, tmp_path: Path) -> None:
+def test_a_full_disk_during_a_sweep_is_reported(lab: Lab, tmp_path: Path) -> None:
     with sweeping(lab, tmp_path) as command:
         resource.prlimit(command.pid, resource.RLIMIT_FSIZE, (500_000, 500_000))
         told = complaint(command, FAILED)
@@ -326,13 +326,13 @@ def test_a_full_disk_in_mid_sweep(lab: Lab, tmp_path: Path) -> None:
     assert rows_of(tmp_path) > 2000
 
 
-def test_a_killed_master_leaves_no_power(lab: Lab, tmp_path: Path) -> None:
+def test_a_killed_master_leaves_the_drive_without_power(lab: Lab, tmp_path: Path) -> None:
     with sweeping(lab, tmp_path) as command:
         assert lab.state() == ENABLED
         command.kill()
         command.wait()
-        # half a second until bus time runs by itself, half a second until the heartbeat is missed,
-        # then the quick stop; on a busy machine wall time is later than bus time
+        # half a second until bus time runs again, half a second until the heartbeat is missed, then
+        # the quick stop. On a busy machine, wall-clock time is ahead of bus time.
         deadline = time.monotonic() + 60.0
         while lab.state() != OFF:
             assert time.monotonic() < deadline
@@ -340,11 +340,11 @@ def test_a_killed_master_leaves_no_power(lab: Lab, tmp_path: Path) -> None:
     assert rows_of(tmp_path) > 1000
 
 
-def test_the_next_command_finds_the_drive_well(lab: Lab) -> None:
+def test_a_command_leaves_the_drive_ready_for_the_next_one(lab: Lab) -> None:
     for _ in range(2):
         command = begin("drive", "enable", WINCH, "--bus", lab.bus, "--seconds", "0.2")
         _, errors = command.communicate(timeout=120)
         assert command.returncode == 0, errors
-    time.sleep(1.5)  # longer than a drive waits for a heartbeat
+    time.sleep(1.5)  # longer than the drive's heartbeat timeout
     assert lab.read(0x1001) == 0
     assert lab.node.emcy.active == []

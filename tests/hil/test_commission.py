@@ -1,4 +1,4 @@
-"""The main job as a user does it: whole commissionings on the embedded bus."""
+"""Complete commissionings by command on the embedded bus."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def commission(
 
 
 def winch_in_cycles(folder: Path, period_s: float) -> Path:
-    """Write the shipped winch with fewer cycles a second, which take less time."""
+    """Write the shipped winch with a lower cycle rate, which takes less time."""
     path = folder / f"winch-{1e3 * period_s:g}ms.toml"
     shipped = (SHIPPED / "winches" / "winch-mpp0923d.toml").read_text()
     text = shipped.replace("sync_period_s = 0.001", f"sync_period_s = {period_s}")
@@ -53,13 +53,15 @@ def slower(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def default(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, Any]]:
-    """A tenth of the measurements has to do here; `make demo` makes them all, in its own cycles."""
+    """Commission with a tenth of the measurements. `make demo` takes them all."""
     out = tmp_path_factory.mktemp("default")
     winch = winch_in_cycles(tmp_path_factory.mktemp("winch"), 0.002)
     return out, commission(out, "--quick", winch=winch)
 
 
-def test_default_plant_reaches_the_figures(default: tuple[Path, dict[str, Any]]) -> None:
+def test_commissioning_the_default_plant_reaches_the_documented_figures(
+    default: tuple[Path, dict[str, Any]],
+) -> None:
     _, result = default
     validation = result["validation"]
     assert validation["judged_on"] == "true angle"
@@ -71,12 +73,12 @@ def test_default_plant_reaches_the_figures(default: tuple[Path, dict[str, Any]])
     assert thesis["peak_pid_effort"] >= 6
     assert result["bus"]["overruns"] == 0
     assert result["bus"]["missed"] == 0
-    # the plant file's truth, which nothing but this test compares with: 60 mNm in drive units
+    # the true amplitude of the plant file, 60 mNm, in drive units
     assert result["identification"]["orders"] == [4]
     assert result["identification"]["amplitudes_Nm"][0] == pytest.approx(0.06 / 1.04, rel=0.03)
 
 
-def test_report_can_be_made_again_offline(default: tuple[Path, dict[str, Any]]) -> None:
+def test_the_report_can_be_made_again_offline(default: tuple[Path, dict[str, Any]]) -> None:
     out, result = default
     (out / "report.html").unlink()
     again = last_line(cdpr_here("cogging", "report", out, "--json"))
@@ -84,7 +86,7 @@ def test_report_can_be_made_again_offline(default: tuple[Path, dict[str, Any]]) 
     assert again["validation"] == result["validation"]
 
 
-def test_fit_from_the_raw_data_alone(default: tuple[Path, dict[str, Any]]) -> None:
+def test_the_fit_can_be_repeated_from_raw_data(default: tuple[Path, dict[str, Any]]) -> None:
     out, result = default
     again = last_line(cdpr_here("cogging", "fit", out, "--json"))
     assert again["identification"]["orders"] == result["identification"]["orders"]
@@ -93,7 +95,7 @@ def test_fit_from_the_raw_data_alone(default: tuple[Path, dict[str, Any]]) -> No
     )
 
 
-def test_profile_serves_another_day_in_other_cycles(
+def test_a_profile_works_later_at_a_different_cycle_rate(
     default: tuple[Path, dict[str, Any]], slower: Path, tmp_path: Path
 ) -> None:
     out, _ = default
@@ -104,7 +106,7 @@ def test_profile_serves_another_day_in_other_cycles(
     assert validation["harmonic"]["ratios"]["rms_position_error"] >= 10
 
 
-def test_a_raw_file_cut_short_is_said_so(
+def test_a_truncated_raw_file_is_reported(
     default: tuple[Path, dict[str, Any]], tmp_path: Path
 ) -> None:
     out, _ = default
@@ -118,7 +120,9 @@ def test_a_raw_file_cut_short_is_said_so(
     assert "Traceback" not in result.stderr
 
 
-def test_a_motor_that_runs_away_under_the_usual_gain(slower: Path, tmp_path: Path) -> None:
+def test_a_motor_unstable_with_the_default_gain_is_commissioned(
+    slower: Path, tmp_path: Path
+) -> None:
     plant = PLANTS / "runaway.toml"
     result = commission(tmp_path, "--plant", plant, "--quick", winch=slower)
     ratios = result["validation"]["harmonic"]["ratios"]
@@ -132,7 +136,7 @@ MORE_UNKNOWN = {
     "seed = 11": "seed = 11\n[ripple]\nsixth = 0.01\ntwelfth = 0.005\n"
     "[drive]\nfeedback_jitter_s = 4e-5",
 }
-"""Twice as much as usual of what the identification has no term for."""
+"""Twice the usual effects that the identification does not model."""
 
 
 def test_an_odd_motor_of_a_robot_is_compensated(tmp_path: Path) -> None:

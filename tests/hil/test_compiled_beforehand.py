@@ -1,4 +1,4 @@
-"""Nothing is compiled once a robot has power: the loop would stand still meanwhile."""
+"""No kernel is compiled while a robot has power, because the loop would stand still meanwhile."""
 
 from __future__ import annotations
 
@@ -40,8 +40,8 @@ print(sum(before.values()), sorted(late))
 """
 
 
-def test_from_the_first_power_to_a_fault_nothing_is_compiled():
-    """In a process of its own, since what other tests have compiled stays compiled."""
+def test_no_kernel_is_compiled_between_the_first_power_and_a_fault():
+    """This needs a separate process, because other tests compile kernels too."""
     done = subprocess.run(
         [sys.executable, "-c", SCRIPT], capture_output=True, text=True, timeout=120, check=False
     )

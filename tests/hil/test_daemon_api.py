@@ -1,4 +1,4 @@
-"""The Python interface through a daemon: who may move, faults, a script that dies, the end."""
+"""The Python interface to a daemon: right to move, faults, dying scripts, and the end."""
 
 from __future__ import annotations
 
@@ -36,12 +36,14 @@ def robot(daemon: RealDaemon) -> Iterator[cdpr.Robot]:
 
 
 def setpoints(robot: cdpr.Robot) -> FloatArray:
-    """Return where the motors should be: friction keeps those of this robot off it."""
+    """Return the set-points of the motors, which friction keeps this robot from reaching."""
     return np.array([axis["setpoint_rad"] for axis in robot.status["axes"]])
 
 
 def test_a_script_moves_the_robot_of_a_daemon_and_reads_its_recording(robot: cdpr.Robot) -> None:
-    robot.turn_by([0.1, 0.1])  # the set-points of a first cycle with power follow the encoders
+    robot.turn_by(
+        [0.1, 0.1]
+    )  # in the first cycle with power, set-points equal the encoder positions
     begun = setpoints(robot)
     robot.turn_by([0.5, -0.25])
     assert setpoints(robot) - begun == pytest.approx([0.5, -0.25])
@@ -51,7 +53,7 @@ def test_a_script_moves_the_robot_of_a_daemon_and_reads_its_recording(robot: cdp
     assert log["time_s"][-1] <= robot.time_s
 
 
-def test_a_second_script_is_refused_while_the_first_may_move(
+def test_a_second_script_is_rejected_while_the_first_has_the_right_to_move(
     robot: cdpr.Robot, daemon: RealDaemon
 ) -> None:
     robot.turn_by([0.1, 0.1])
@@ -63,7 +65,7 @@ def test_a_second_script_is_refused_while_the_first_may_move(
         second.turn_by([0.1, 0.1])
 
 
-def test_a_hold_by_somebody_else_ends_the_motion(robot: cdpr.Robot, daemon: RealDaemon) -> None:
+def test_a_hold_by_another_client_ends_the_motion(robot: cdpr.Robot, daemon: RealDaemon) -> None:
     with cdpr.connect(socket=daemon.socket) as second:
         Timer(0.5, second.hold).start()
         with pytest.raises(cdpr.MotionEnded, match="pid was ended"):
@@ -71,7 +73,7 @@ def test_a_hold_by_somebody_else_ends_the_motion(robot: cdpr.Robot, daemon: Real
     assert (robot.state, robot.program) == ("active", "hold")
 
 
-def test_a_fault_names_the_limit_and_is_acknowledged(robot: cdpr.Robot) -> None:
+def test_a_fault_names_its_limit_and_can_be_acknowledged(robot: cdpr.Robot) -> None:
     robot.turn_by([0.5, 0.0], speed_rad_s=0.02, wait=False)
     robot.inject_fault("left", "drive-fault")
     with pytest.raises(cdpr.Faulted, match="left") as fault:
@@ -81,7 +83,7 @@ def test_a_fault_names_the_limit_and_is_acknowledged(robot: cdpr.Robot) -> None:
     assert robot.state == "ready"
 
 
-def test_a_script_that_dies_leaves_a_robot_that_stands(daemon: RealDaemon) -> None:
+def test_the_robot_holds_after_its_script_was_killed(daemon: RealDaemon) -> None:
     script = (
         "import sys, cdpr_rt as cdpr\n"
         "robot = cdpr.connect(socket=sys.argv[1])\n"
@@ -101,7 +103,7 @@ def test_a_script_that_dies_leaves_a_robot_that_stands(daemon: RealDaemon) -> No
 
 
 @pytest.mark.long
-def test_stops_reach_the_loop_of_a_service_that_hangs(tmp_path: Path) -> None:
+def test_a_stop_reaches_the_loop_while_the_service_hangs(tmp_path: Path) -> None:
     daemon = RealDaemon(tmp_path, "--no-record")
     try:
         service = daemon.children()["service"]
@@ -155,7 +157,7 @@ def test_a_daemon_ends_when_the_script_that_started_it_is_killed(
 
 
 @pytest.mark.long
-def test_the_end_of_a_daemon_whose_loop_died_is_an_error(
+def test_closing_a_daemon_whose_loop_died_is_an_error(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
@@ -191,7 +193,7 @@ def test_real_drives_are_not_started_without_consent(tmp_path: Path) -> None:
         assert "with --exit-with-stdin, real drives need --yes" in asked.stderr.read()
 
 
-def test_a_daemon_that_a_script_starts_ends_with_it(
+def test_a_daemon_started_by_a_script_ends_with_it(
     tmp_path: Path, daemon: RealDaemon, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))

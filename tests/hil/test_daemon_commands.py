@@ -1,4 +1,4 @@
-"""A real daemon used from the terminal."""
+"""A real daemon is controlled by commands on a terminal."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from cdpr_tools.cli import main
 
 @pytest.fixture(scope="module")
 def daemon(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RealDaemon]:
-    """One that is only asked, and stands still: its cycle is slow."""
+    """A daemon that stands still and answers requests, with a slow cycle."""
     folder = tmp_path_factory.mktemp("daemon")
     with running(folder, *with_key(folder), period_s=0.01) as one:
         yield one
@@ -36,14 +36,14 @@ def daemon(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RealDaemon]:
 
 @pytest.fixture(scope="module")
 def quick_daemon(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RealDaemon]:
-    """One that moves: its cycle is fast enough for a stiff position loop."""
+    """A daemon that moves, with a cycle fast enough for a stiff position loop."""
     with running(tmp_path_factory.mktemp("quick"), period_s=0.002) as one:
         yield one
 
 
 @pytest.fixture
 def url(daemon: RealDaemon) -> str:
-    # a service that was started anew has found itself another port
+    # a restarted service has a different port
     return f"http://{daemon.status()['parts']['service']['http']}"
 
 
@@ -60,7 +60,7 @@ def quick(quick_daemon: RealDaemon) -> Iterator[RealDaemon]:
 
 
 class Terminal:
-    """Commands of `cdpr` in this process: what they say, and their exit status."""
+    """Run commands of `cdpr` in this process and return output and exit status."""
 
     def __init__(self, capsys: pytest.CaptureFixture[str], monkeypatch: Any) -> None:
         self._capsys = capsys
@@ -85,7 +85,7 @@ def terminal(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
     return Terminal(capsys, monkeypatch)
 
 
-def test_a_move_ends_where_it_should(quick: RealDaemon, terminal: Terminal) -> None:
+def test_a_move_ends_at_its_target(quick: RealDaemon, terminal: Terminal) -> None:
     result = terminal.told("move", "left=20", "right=-15", "--speed", "200", *quick.at)
     assert result["arrived"] is True
     assert setpoints(quick) == pytest.approx([20.0, -15.0], abs=0.1)
@@ -95,18 +95,16 @@ def test_a_move_ends_where_it_should(quick: RealDaemon, terminal: Terminal) -> N
     assert setpoints(quick) == pytest.approx([20.0, -10.0], abs=0.1)
 
 
-def test_a_jog_turns_as_long_and_as_fast_as_asked(quick: RealDaemon, terminal: Terminal) -> None:
+def test_a_jog_has_the_requested_speed_and_duration(quick: RealDaemon, terminal: Terminal) -> None:
     start = setpoints(quick)
     result = terminal.told("jog", "left=40", "--seconds", "1", *quick.at)
     assert result["program"] == "hold"
     turned = [now - then for now, then in zip(setpoints(quick), start, strict=True)]
     assert turned == pytest.approx([40.0, 0.0], abs=0.1)
-    assert abs(angles(quick)[0] - setpoints(quick)[0]) < 15.0  # at this slow cycle
+    assert abs(angles(quick)[0] - setpoints(quick)[0]) < 15.0  # with this slow cycle
 
 
-def test_a_controller_runs_to_its_end_and_hold_follows(
-    quick: RealDaemon, terminal: Terminal
-) -> None:
+def test_a_controller_runs_to_its_end_and_then_holds(quick: RealDaemon, terminal: Terminal) -> None:
     sweep = ("sweep", "distance_rad=[0.2, 0.2]", "speed_rad_s=0.4", "legs=2")
     result = terminal.told("controller", *sweep, *quick.at)
     assert (result["state"], result["program"]) == ("active", "hold")
@@ -131,7 +129,7 @@ def test_a_controller_runs_to_its_end_and_hold_follows(
         (("controller", "sweep", "legs=[1"), 2, "legs: is not valid JSON"),
     ],
 )
-def test_what_cannot_be_done_is_said_in_one_line(
+def test_an_impossible_command_prints_one_line(
     active: RealDaemon, terminal: Terminal, arguments: tuple[str, ...], status: int, said: str
 ) -> None:
     ended, _, err = terminal.run(*arguments, *active.at)
@@ -140,7 +138,7 @@ def test_what_cannot_be_done_is_said_in_one_line(
     assert err.count("\n") == 1
 
 
-def test_status_is_for_people_and_for_programs(active: RealDaemon, terminal: Terminal) -> None:
+def test_status_prints_text_or_json(active: RealDaemon, terminal: Terminal) -> None:
     _, shown, _ = terminal.run("status", *active.at)
     assert shown.startswith(f"{NAME}: active, program hold")
     for axis in ("left", "right"):
@@ -148,14 +146,12 @@ def test_status_is_for_people_and_for_programs(active: RealDaemon, terminal: Ter
     assert terminal.told("status", *active.at)["axes"][1]["name"] == "right"
 
 
-def test_where_there_is_no_fault_acknowledging_is_no_error(
-    active: RealDaemon, terminal: Terminal
-) -> None:
+def test_acknowledging_without_a_fault_succeeds(active: RealDaemon, terminal: Terminal) -> None:
     assert terminal.told("ack", *active.at)["state"] == "active"
 
 
-def test_disable_and_enable(active: RealDaemon, terminal: Terminal) -> None:
-    for _ in range(2):  # what is so already is no error
+def test_disable_and_enable_are_idempotent(active: RealDaemon, terminal: Terminal) -> None:
+    for _ in range(2):
         assert terminal.told("disable", *active.at)["state"] == "ready"
     for _ in range(2):
         assert terminal.told("enable", *active.at)["state"] == "active"
@@ -167,7 +163,7 @@ def handles_sigterm(pid: int) -> bool:
     return bool(caught >> (signal.SIGTERM - 1) & 1)
 
 
-def test_status_goes_on_until_ctrl_c(active: RealDaemon) -> None:
+def test_status_follow_runs_until_ctrl_c(active: RealDaemon) -> None:
     command = [sys.executable, "-m", "cdpr_tools.cli", "status", "--watch", "--json", *active.at]
     watching = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     until(lambda: handles_sigterm(watching.pid))
@@ -179,7 +175,7 @@ def test_status_goes_on_until_ctrl_c(active: RealDaemon) -> None:
     assert json.loads(out.splitlines()[-1])["state"] == "active"
 
 
-def test_over_tcp_with_the_key_only(
+def test_commands_over_tcp_need_the_key(
     active: RealDaemon, url: str, terminal: Terminal, tmp_path: Path
 ) -> None:
     key_file = tmp_path / "key"
@@ -202,7 +198,7 @@ def wrong_key(folder: Path) -> Path:
     return path
 
 
-def test_where_no_daemon_runs_it_says_how_to_start_one(tmp_path: Path, terminal: Terminal) -> None:
+def test_error_without_a_daemon_tells_how_to_start_one(tmp_path: Path, terminal: Terminal) -> None:
     status, _, err = terminal.run("hold", "--socket", str(tmp_path / "none.sock"))
     assert status == 1
     assert "cdpr run ROBOT" in err

@@ -1,4 +1,4 @@
-"""A controller of the user's own in a daemon: `cdpr run ROBOT --controller FILE.py:CLASS`."""
+"""A user's controller in a daemon: `cdpr run ROBOT --controller FILE.py:CLASS`."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ def test_a_controller_from_a_file_moves_the_platform_and_is_shown(tmp_path: Path
         ("Missing", "has no attribute 'Missing'"),
     ],
 )
-def test_what_is_no_controller_is_rejected_before_anything_starts(
+def test_an_invalid_controller_is_rejected_before_anything_starts(
     tmp_path: Path, controller: str, text: str
 ) -> None:
     file = tmp_path / "mine.py"

@@ -1,4 +1,4 @@
-"""Who owns a robot, and how a daemon fares if its terminal, reader or launcher fails."""
+"""One daemon per robot, and daemons whose terminal, reader, launcher or service fails."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from cdpr_tools.daemon.loop_file import LoopFile
 RUN = [sys.executable, "-P", "-m", "cdpr_tools.cli", "run"]
 
 
-def test_of_two_daemons_started_at_once_for_a_robot_one_runs_and_estop_asks_its_drives(
+def test_only_one_of_two_simultaneously_started_daemons_runs_and_estop_reaches_it(
     tmp_path: Path,
 ) -> None:
     at = ("--socket", str(tmp_path / "control.sock"))
@@ -58,7 +58,7 @@ def test_of_two_daemons_started_at_once_for_a_robot_one_runs_and_estop_asks_its_
     assert not list(tmp_path.glob("control.*"))
 
 
-def test_a_daemon_whose_notices_nobody_reads_restarts_its_service_and_goes_on(
+def test_a_daemon_whose_output_is_closed_restarts_its_service(
     tmp_path: Path,
 ) -> None:
     reader, writer = os.pipe()
@@ -66,7 +66,7 @@ def test_a_daemon_whose_notices_nobody_reads_restarts_its_service_and_goes_on(
     try:
         os.close(writer)
         assert daemon.process.stdout is not None
-        daemon.process.stdout.close()  # it shares the fate of `cdpr run 2>&1 | tee log`
+        daemon.process.stdout.close()  # as if tee in `cdpr run 2>&1 | tee log` had ended
         os.close(reader)
         assert cdpr("enable", *daemon.at).returncode == 0
         before = daemon.children()
@@ -82,9 +82,9 @@ def test_a_daemon_whose_notices_nobody_reads_restarts_its_service_and_goes_on(
 
 
 def on_terminal(*words: str) -> tuple[subprocess.Popen[bytes], int]:
-    """Start `cdpr run` on a terminal of its own; return it with the terminal's other side."""
+    """Start `cdpr run` on a new terminal. Return the process and the other end of the terminal."""
     ours, theirs = pty.openpty()
-    # in a session whose terminal it is, so that it gets SIGHUP when that closes
+    # a new session with a controlling terminal, so that the process receives SIGHUP
     become = "import os, sys, fcntl, termios; os.setsid(); fcntl.ioctl(0, termios.TIOCSCTTY, 0); "
     become += "os.execv(sys.argv[1], sys.argv[1:])"
     process = subprocess.Popen(
@@ -123,7 +123,7 @@ def test_a_daemon_whose_terminal_closes_ends_with_status_0(tmp_path: Path) -> No
 
 
 @pytest.mark.alone
-def test_a_closed_terminal_lowers_a_platform_that_needs_more_than_half_a_minute(
+def test_a_closed_terminal_lowers_a_platform_for_more_than_half_a_minute(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     robot, at = tmp_path / "planar.toml", ("--socket", str(tmp_path / "control.sock"))
@@ -134,7 +134,9 @@ def test_a_closed_terminal_lowers_a_platform_that_needs_more_than_half_a_minute(
     robot.write_text(text)
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
     bus = f"simbus:terminal-{os.getpid()}"
-    simulator = OwnSimulator(str(robot), bus)  # not by the daemon, which keeps the lengths then
+    simulator = OwnSimulator(
+        str(robot), bus
+    )  # not by the daemon, which keeps the lengths in that case
     try:
         process, ours = on_terminal(str(robot), "--bus", bus, *at, "--no-record")
         try:
@@ -154,13 +156,13 @@ def test_a_closed_terminal_lowers_a_platform_that_needs_more_than_half_a_minute(
     assert (kept["stopped"], kept["fallen"], kept["displaced"]) == (True, False, False)
 
 
-def test_a_stop_comes_through_though_the_launcher_is_stopped(tmp_path: Path) -> None:
+def test_stop_works_while_the_launcher_process_is_stopped(tmp_path: Path) -> None:
     daemon = RealDaemon(tmp_path, "--no-record")
     try:
         assert cdpr("enable", *daemon.at).returncode == 0
         children = daemon.children()
         os.kill(daemon.process.pid, signal.SIGSTOP)
-        done = cdpr("stop", *daemon.at)  # which ends by itself, in a minute at most
+        done = cdpr("stop", *daemon.at)  # it takes a minute at most
         assert (done.returncode, done.stdout) == (0, "stopped, power off\n"), done.stderr
         assert daemon.process.wait(PATIENCE_S) == 0
         assert not any(alive(pid) for pid in children.values())
@@ -169,7 +171,7 @@ def test_a_stop_comes_through_though_the_launcher_is_stopped(tmp_path: Path) -> 
         daemon.end()
 
 
-def test_a_user_without_a_folder_of_his_own_can_run_a_robot(tmp_path: Path) -> None:
+def test_a_user_without_home_folder_can_run_a_robot(tmp_path: Path) -> None:
     env = {"HOME": "/proc/nowhere", "XDG_STATE_HOME": "/proc/nowhere", "XDG_CACHE_HOME": ""}
     daemon = RealDaemon(tmp_path, env=env)
     try:
@@ -191,7 +193,9 @@ def test_a_user_without_a_folder_of_his_own_can_run_a_robot(tmp_path: Path) -> N
         ("estop", 1, "NOT CONFIRMED: {}.loop: cannot be read: No such file or directory"),
     ],
 )
-def test_commands_do_without_a_home(tmp_path: Path, command: str, status: int, told: str) -> None:
+def test_commands_work_without_home_folder(
+    tmp_path: Path, command: str, status: int, told: str
+) -> None:
     env = {"PATH": os.environ["PATH"], "HOME": "/proc/nowhere", "CDPR_TEST_FORKS": "0"}
     done = subprocess.run(
         [sys.executable, "-P", "-m", "cdpr_tools.cli", command, "--socket", tmp_path / "no.sock"],
@@ -203,7 +207,7 @@ def test_commands_do_without_a_home(tmp_path: Path, command: str, status: int, t
 
 
 @pytest.mark.long
-def test_hold_disable_and_stop_are_obeyed_though_the_service_hangs(tmp_path: Path) -> None:
+def test_hold_disable_and_stop_work_while_the_service_hangs(tmp_path: Path) -> None:
     daemon = RealDaemon(tmp_path, "--no-record")
     try:
         assert cdpr("enable", *daemon.at).returncode == 0
@@ -222,7 +226,7 @@ def test_hold_disable_and_stop_are_obeyed_though_the_service_hangs(tmp_path: Pat
 
 
 @pytest.mark.long
-def test_a_hold_and_a_stop_are_obeyed_while_every_interface_is_flooded(tmp_path: Path) -> None:
+def test_hold_and_stop_work_while_all_interfaces_are_flooded(tmp_path: Path) -> None:
     options = (*with_key(tmp_path), "--stream", "127.0.0.1:0", "--no-record")
     daemon = RealDaemon(tmp_path, *options)
     parts = daemon.status()["parts"]
@@ -248,5 +252,5 @@ def test_a_hold_and_a_stop_are_obeyed_while_every_interface_is_flooded(tmp_path:
 
 
 def _refused(daemon: RealDaemon) -> int:
-    """Return how many requests were refused, as far as the flooded service answers."""
+    """Return how many requests were rejected, if the flooded service answers."""
     return int(daemon.status().get("parts", {}).get("service", {}).get("refused", 0))

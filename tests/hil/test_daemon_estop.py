@@ -1,4 +1,4 @@
-"""`cdpr estop` and modules planted in the working directory, on real daemons."""
+"""`cdpr estop`, and modules planted in the working directory, with real daemons."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ from cdpr_tools.daemon.loop_file import POWER_OFF_SIGNAL, LoopFile, started
 
 SILENT, FOR_GOOD = 6, 0xFFFF  # of 2F00h
 paced = pytest.mark.alone
-"""Of tests with drives that do not wait for the loop, nor for their own process."""
+"""Marks of tests with drives that follow the wall clock."""
 
 
 def estop(*arguments: str | Path, **env: str) -> tuple[int, dict[str, Any]]:
@@ -58,7 +58,7 @@ def daemon(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RealDaemon]:
 
 
 @paced
-def test_it_takes_the_power_at_once_and_a_fault_stays_though_the_service_hangs(
+def test_estop_cuts_power_immediately_while_the_service_hangs_and_leaves_a_fault(
     daemon: RealDaemon,
 ) -> None:
     service = daemon.children()["service"]
@@ -72,7 +72,7 @@ def test_it_takes_the_power_at_once_and_a_fault_stays_though_the_service_hangs(
         assert (status, told["ok"], robot["robot"]) == (0, True, NAME), told
         assert "every drive says so (fault: emergency stop by cdpr estop)" in robot["text"]
         words = [data[0] for _, data in ear.of(0x201)]
-        assert 0x02 not in {word & 0x0F for word in words}  # no quick stop, no braking
+        assert 0x02 not in {word & 0x0F for word in words}  # without quick stop or braking
         assert state_of(int.from_bytes(ear.of(0x181)[-1][1][:2], "little")) in POWER_OFF
     assert daemon.wait_for("fault")["reason"] == "emergency stop by cdpr estop"
     assert "fault" in cdpr("enable", *daemon.at).stderr
@@ -80,7 +80,7 @@ def test_it_takes_the_power_at_once_and_a_fault_stays_though_the_service_hangs(
 
 
 @paced
-def test_a_loop_that_stands_still_is_killed_and_that_is_not_called_confirmed(
+def test_estop_kills_a_hanging_loop_and_reports_it_as_unconfirmed(
     tmp_path: Path,
 ) -> None:
     daemon = slow_daemon(tmp_path)
@@ -103,7 +103,7 @@ def test_a_loop_that_stands_still_is_killed_and_that_is_not_called_confirmed(
 
 
 @paced
-def test_a_listener_stops_nothing_and_says_of_the_drives_what_it_hears(
+def test_estop_of_a_listener_stops_nothing_and_reports_the_observed_drives(
     daemon: RealDaemon, tmp_path: Path
 ) -> None:
     options = ("--no-record", "--read-only")
@@ -113,7 +113,7 @@ def test_a_listener_stops_nothing_and_says_of_the_drives_what_it_hears(
             status, told = estop(*listener.at)
             assert (status, told["robots"][0]["confirmed"]) == (1, False)
             assert "only listens: stop the master" in told["robots"][0]["text"]
-            for node in NODES:  # as their master wants them
+            for node in NODES:  # as their master commands
                 word = int.from_bytes(ear.of(0x180 + node)[-1][1][:2], "little")
                 assert state_of(word) is State.OPERATION_ENABLED
             assert estop(*daemon.at)[0] == 0
@@ -126,7 +126,7 @@ def test_a_listener_stops_nothing_and_says_of_the_drives_what_it_hears(
 
 
 @paced
-def test_a_drive_that_does_not_answer_is_not_called_stopped(
+def test_estop_does_not_confirm_a_drive_that_does_not_answer(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(emergency_stop, "_CONFIRM_S", 1.5)
@@ -141,7 +141,7 @@ def test_a_drive_that_does_not_answer_is_not_called_stopped(
             assert not outcome.confirmed
             assert "not every drive has confirmed within 1.5 s" in outcome.text
             assert "fault" in outcome.text
-            # the other one has lost its power all the same
+            # the other drive has lost its power
             word = int.from_bytes(ear.of(0x180 + NODES[1])[-1][1][:2], "little")
             assert state_of(word) in POWER_OFF
     finally:
@@ -149,7 +149,7 @@ def test_a_drive_that_does_not_answer_is_not_called_stopped(
 
 
 @paced
-def test_a_drive_that_does_not_confirm_at_the_end_is_reported_once(tmp_path: Path) -> None:
+def test_stop_reports_a_drive_that_does_not_confirm_once(tmp_path: Path) -> None:
     daemon = slow_daemon(tmp_path)
     try:
         assert cdpr("enable", *daemon.at).returncode == 0
@@ -166,12 +166,12 @@ def test_a_drive_that_does_not_confirm_at_the_end_is_reported_once(tmp_path: Pat
     assert len(told) == 1 and "does not confirm that its power stage is off" in told[0]
 
 
-def test_a_file_that_was_left_behind_names_nobody(tmp_path: Path) -> None:
+def test_estop_signals_no_process_for_a_stale_loop_file(tmp_path: Path) -> None:
     own = started(os.getpid())
     named = LoopFile(
         robot=NAME,
         pid=os.getpid(),
-        started=own - 1,  # a process that had our number before us
+        started=own - 1,  # an earlier process with the same pid
         block_fd=3,
         uid=os.geteuid(),
         drives_stop_s=0.2,
@@ -188,7 +188,7 @@ def test_a_file_that_was_left_behind_names_nobody(tmp_path: Path) -> None:
     assert "its loop has ended" in told["robots"][0]["text"]
 
 
-def test_whose_power_is_taken_is_named_where_several_run(tmp_path: Path) -> None:
+def test_estop_requires_a_name_or_all_if_several_robots_run(tmp_path: Path) -> None:
     runtime = tmp_path / "cdpr-rt"
     runtime.mkdir(mode=0o700)
     env = {"XDG_RUNTIME_DIR": str(tmp_path)}
@@ -207,7 +207,7 @@ def test_whose_power_is_taken_is_named_where_several_run(tmp_path: Path) -> None
         assert estop("left", "--robot", "right", **env)[0] == 2
         status, told = estop("letf", **env)
         assert (status, "what runs: left, right; --all stops it" in told["error"]) == (1, True)
-        assert one.status()["state"] == "ready"  # nothing was done
+        assert one.status()["state"] == "ready"  # no robot was stopped
         status, told = estop("--all", **env)
         assert (status, len(told["robots"])) == (0, 2)
         one.wait_for("fault")
@@ -216,7 +216,7 @@ def test_whose_power_is_taken_is_named_where_several_run(tmp_path: Path) -> None
             assert (status, len(told["robots"])) == (0, 1)
 
 
-def test_nothing_is_loaded_from_the_working_directory(tmp_path: Path) -> None:
+def test_no_module_is_loaded_from_the_working_directory(tmp_path: Path) -> None:
     planted = tmp_path / "planted"
     planted.mkdir()
     text = f"open({str(tmp_path / 'loaded')!r}, 'a').write(__name__ + ' ')\nraise SystemExit(3)\n"

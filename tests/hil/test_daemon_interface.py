@@ -1,4 +1,4 @@
-"""A real daemon's control interface: fuzzed by its own description, flooded, and left alone."""
+"""The control interface of a real daemon: fuzzing, floods, and failures of service or client."""
 
 from __future__ import annotations
 
@@ -37,12 +37,12 @@ from requests.adapters import HTTPAdapter
 
 MORE_MEMORY_B = 40e6
 MOST_MEMORY_B, LEVEL_B = 100e6, 2e6
-"""What a flood may take in all, and within two seconds once that has levelled off."""
+"""Memory that a flood may take in total, and in two seconds after levelling off."""
 
 
 @pytest.fixture(scope="module")
 def daemon(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RealDaemon]:
-    """One that is only asked, and stands still: its cycle is slow."""
+    """A daemon that stands still and answers requests, with a slow cycle."""
     folder = tmp_path_factory.mktemp("daemon")
     with running(folder, *with_key(folder), period_s=0.01) as one:
         yield one
@@ -50,7 +50,7 @@ def daemon(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RealDaemon]:
 
 @pytest.fixture(scope="module")
 def quick_daemon(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RealDaemon]:
-    """One that moves: its cycle is fast enough for a stiff position loop."""
+    """A daemon that moves, with a cycle fast enough for a stiff position loop."""
     with running(tmp_path_factory.mktemp("quick"), period_s=0.002) as one:
         yield one
 
@@ -65,7 +65,7 @@ def description(daemon: RealDaemon) -> Any:
     described = daemon.http.get("/openapi.json").json()
     for operations in described["paths"].values():
         for operation in operations.values():
-            del operation["security"]  # each request has the key
+            del operation["security"]  # each request contains the key
     return schemathesis.openapi.from_dict(described)
 
 
@@ -78,7 +78,7 @@ def resident_B(pid: int) -> int:
 
 
 class ConnectsFrom(HTTPAdapter):
-    """Connects from `address`, one of this machine's."""
+    """Connect from `address` of this machine."""
 
     def __init__(self, address: str) -> None:
         self._address = address
@@ -89,9 +89,9 @@ class ConnectsFrom(HTTPAdapter):
 
 
 def fuzz(description: Any, url: str, leave_out: set[str], **headers: str) -> int:
-    """Send made-up requests of every kind, right ones and wrong ones; return how many.
+    """Send valid and invalid requests of each kind. Return how many.
 
-    Each comes from another address: who has tried too many wrong tokens waits a second for each.
+    Each comes from a different address, because an address with too many wrong tokens must wait.
     """
     sent = 0
     for found in description.get_all_operations():
@@ -113,20 +113,20 @@ def fuzz(description: Any, url: str, leave_out: set[str], **headers: str) -> int
                     )
 
             if mode is schemathesis.GenerationMode.NEGATIVE:
-                with suppress(Unsatisfiable):  # where there is nothing that could be wrong
+                with suppress(Unsatisfiable):  # if nothing in the request can be invalid
                     try_it()
             else:
                 try_it()
     return sent
 
 
-def test_each_answer_is_as_described_and_nothing_gets_power(
+def test_each_answer_matches_the_description_and_nothing_gets_power(
     daemon: RealDaemon, description: Any, url: str
 ) -> None:
     before = angles(daemon)
     sent = fuzz(description, url, {"/shutdown"})
     assert sent > 150
-    assert angles(daemon) == pytest.approx(before, abs=3.0)  # within the encoder's noise
+    assert angles(daemon) == pytest.approx(before, abs=3.0)  # within encoder noise
     assert ("state", "active") not in events(daemon)
 
 
@@ -142,7 +142,7 @@ def quick(quick_daemon: RealDaemon) -> Iterator[RealDaemon]:
         yield one
 
 
-def test_with_power_too_nobody_moves_it_who_does_not_hold_the_right(
+def test_no_request_without_the_right_to_move_moves_an_active_robot(
     active: RealDaemon, description: Any, url: str
 ) -> None:
     service = active.children()["service"]
@@ -182,7 +182,7 @@ WISHES = st.dictionaries(
 )
 
 
-def test_no_wish_of_the_holder_ends_the_loop(quick: RealDaemon) -> None:
+def test_no_request_of_the_holder_ends_the_loop(quick: RealDaemon) -> None:
     loop = quick.children()["loop"]
     programs = quick.http.get("/description").json()["programs"]
     seen: set[int] = set()
@@ -192,7 +192,7 @@ def test_no_wish_of_the_holder_ends_the_loop(quick: RealDaemon) -> None:
         @settings(max_examples=80)
         @given(program=st.sampled_from([*programs, "none"]), first=WISHES, then=WISHES)
         def wish(program: str, first: dict[str, Any], then: dict[str, Any]) -> None:
-            if program == "idle":  # its torque is zero: what hangs on the cable falls
+            if program == "idle":  # idle has zero torque, so that a suspended load would fall
                 return
             body = {"program": program, "wanted": first}
             seen.add(quick.http.post("/program", json=body, headers=headers).status_code)
@@ -203,7 +203,7 @@ def test_no_wish_of_the_holder_ends_the_loop(quick: RealDaemon) -> None:
     assert alive(loop)
 
 
-def test_a_client_that_is_killed_while_it_jogs_leaves_an_axis_at_rest(quick: RealDaemon) -> None:
+def test_the_axis_stops_after_a_jogging_client_was_killed(quick: RealDaemon) -> None:
     command = [
         sys.executable,
         "-m",
@@ -225,7 +225,7 @@ def test_a_client_that_is_killed_while_it_jogs_leaves_an_axis_at_rest(quick: Rea
     assert "nobody holds the right to move" in quick.status()["reason"]
 
 
-def test_a_service_that_stalls_lets_go_and_one_that_dies_is_joined_again(
+def test_a_stalled_service_loses_the_right_to_move_and_a_dead_one_is_restarted(
     quick: RealDaemon,
 ) -> None:
     with holding(quick, 4.0) as headers:
@@ -244,10 +244,8 @@ def test_a_service_that_stalls_lets_go_and_one_that_dies_is_joined_again(
     assert status["control"]["held"] is False
 
 
-def test_a_service_that_comes_back_needs_the_keys_file_no_more(
-    daemon: RealDaemon, url: str
-) -> None:
-    """The launcher has read the key once, and the address is the same."""
+def test_a_restarted_service_does_not_need_the_key_file(daemon: RealDaemon, url: str) -> None:
+    """The launcher keeps the key that it read, and the address remains the same."""
     key_file = daemon.socket.parent / "key"
     text = key_file.read_text()
     key_file.unlink()
@@ -281,7 +279,7 @@ def flood(url: str, ended: threading.Event, what: bytes) -> None:
                 sock.recv(1)
 
 
-def test_a_flood_from_the_holders_own_address_neither_moves_nor_silences_it(
+def test_a_flood_from_the_holders_address_neither_moves_nor_blocks_it(
     active: RealDaemon, url: str
 ) -> None:
     service = active.children()["service"]
@@ -309,7 +307,7 @@ def test_a_flood_from_the_holders_own_address_neither_moves_nor_silences_it(
         for thread in threads:
             thread.start()
         try:
-            # what connections and their buffers take levels off, however long it goes on
+            # the memory of connections and buffers levels off
             while taken_B[-1] - taken_B[0] < MOST_MEMORY_B:
                 for _ in range(10):
                     assert client.put("/control", headers=shown).status_code == 200

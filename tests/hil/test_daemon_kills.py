@@ -1,4 +1,4 @@
-"""A daemon's loop killed, stopped, ended in motion: what the drives do, seen on the bus."""
+"""Drives stop after the loop was killed, stopped or terminated in motion, as seen on the bus."""
 
 from __future__ import annotations
 
@@ -30,12 +30,12 @@ PERIOD_S, HEARTBEAT_S = 0.002, 0.1
 PATIENT = "missed_cycles = 50\nmissed_in_window = 500\nlate_s = 0.5"
 NODES = (1, 2)
 SPEED_rad_s = 2.0
-# beside the other tests neither this process nor the simulator is always on time
+# during other tests, this process and the simulator may be late
 SLACK_S = 0.15
 
 
 class Ear:
-    """Hears every frame of the daemon's bus, with the time at which it came."""
+    """Record all frames on the daemon's bus with their times."""
 
     def __init__(self, daemon: RealDaemon) -> None:
         self.bus = BusUrl.parse(f"{daemon.bus}-can0")
@@ -62,7 +62,7 @@ class Ear:
         return [(at, data) for at, i, data in frames if i == identifier and at >= since_s]
 
     def torques(self, node: int, since_s: float) -> list[int]:
-        """Return the target torques that were sent to a drive, in its units."""
+        """Return the target torques sent to a drive, in its units."""
         return [struct.unpack_from("<h", data, 2)[0] for _, data in self.of(0x200 + node, since_s)]
 
     def close(self) -> None:
@@ -72,7 +72,7 @@ class Ear:
 
 
 def slow_daemon(folder: Path) -> RealDaemon:
-    """Return one whose drives do not wait for it."""
+    """Return a daemon whose drives do not wait for it."""
     return RealDaemon(folder, "--no-record", period_s=PERIOD_S, limits=PATIENT, paced=True)
 
 
@@ -85,7 +85,7 @@ def daemon(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RealDaemon]:
 
 @contextmanager
 def in_motion(daemon: RealDaemon) -> Iterator[Ear]:
-    """Both axes at speed, for a second at least."""
+    """Move both axes at speed for a second at least."""
     held = daemon.http.post("/control", json={"client": "test", "ttl_s": 10.0})
     assert held.status_code == 200, held.text
     token = {"X-Control-Token": held.json()["token"]}
@@ -114,7 +114,7 @@ def jog(speeds: list[float]) -> dict[str, Any]:
 
 
 def speed_of(ear: Ear, node: int) -> float:
-    """Return a motor's speed by its last positions on the bus, rad/s."""
+    """Return a motor's speed from its last positions on the bus, in rad/s."""
     heard = ear.of(0x180 + node)[-50:]
     if len(heard) < 50:
         return 0.0
@@ -124,7 +124,7 @@ def speed_of(ear: Ear, node: int) -> float:
 
 @contextmanager
 def third_party(bus: BusUrl) -> Iterator[CanNetwork]:
-    """Join the drives' bus beside their master."""
+    """Join the bus as a second client."""
     eds = load_drive("generic-cia402").eds
     network = CanNetwork(bus, PacedClock(), NODES, 126, 1.0)
     try:
@@ -136,13 +136,13 @@ def third_party(bus: BusUrl) -> Iterator[CanNetwork]:
 
 
 def ask_drives(bus: BusUrl) -> list[State]:
-    """Ask every drive by SDO, as a third party."""
+    """Read the state of each drive by SDO, as a third party."""
     with third_party(bus) as network:
         return [state_of(network.read_int(node, 0x6041)) for node in NODES]
 
 
-def told_lost(ear: Ear, since_s: float) -> dict[int, float]:
-    """Return after what time each drive has reported that its master is lost (EMCY 8130h)."""
+def lost_master_s(ear: Ear, since_s: float) -> dict[int, float]:
+    """Return the time until each drive reported that its master is lost (EMCY 8130h)."""
     found = {}
     for node in NODES:
         for at, data in ear.of(0x080 + node, since_s):
@@ -152,15 +152,15 @@ def told_lost(ear: Ear, since_s: float) -> dict[int, float]:
 
 
 def expect_stop(ear: Ear, at_s: float) -> None:
-    """Have the drives notice, within two heartbeats, that their master is gone, and let go."""
-    until(lambda: len(told_lost(ear, at_s)) == len(NODES))
-    assert max(told_lost(ear, at_s).values()) < 2 * HEARTBEAT_S + SLACK_S
+    """Check that the drives detect the loss of their master within two heartbeats and cut power."""
+    until(lambda: len(lost_master_s(ear, at_s)) == len(NODES))
+    assert max(lost_master_s(ear, at_s).values()) < 2 * HEARTBEAT_S + SLACK_S
     until(lambda: all(state in POWER_OFF for state in ask_drives(ear.bus)))
-    # nobody commands them meanwhile
+    # without further commands
     assert not ear.of(0x200 + NODES[0], at_s + SLACK_S)
 
 
-def test_a_loop_that_stands_still_stops_the_drives_within_two_heartbeats(
+def test_drives_stop_within_two_heartbeats_of_a_hanging_loop(
     daemon: RealDaemon,
 ) -> None:
     loop = daemon.children()["loop"]
@@ -179,7 +179,7 @@ def test_a_loop_that_stands_still_stops_the_drives_within_two_heartbeats(
         assert all(state in POWER_OFF for state in ask_drives(ear.bus))
 
 
-def test_a_terminated_daemon_brakes_and_takes_the_power(daemon: RealDaemon) -> None:
+def test_a_terminated_daemon_brakes_and_then_cuts_power(daemon: RealDaemon) -> None:
     with in_motion(daemon) as ear:
         at_s = time.monotonic()
         daemon.process.send_signal(signal.SIGTERM)
@@ -189,13 +189,13 @@ def test_a_terminated_daemon_brakes_and_takes_the_power(daemon: RealDaemon) -> N
         states = [state_of(struct.unpack_from("<H", d)[0]) for _, d in ear.of(0x181, at_s)]
         assert states[0] == State.OPERATION_ENABLED
         assert states[-1] in POWER_OFF
-        # braked under its controller: torque was sent until it stood
+        # braked by the controller: torque was sent until standstill
         enabled = [d for _, d in ear.of(0x181, at_s) if state_of(d[0] | d[1] << 8) == 4]
         counts = [struct.unpack_from("<i", data, 2)[0] for data in enabled[-4:]]
         assert abs(counts[-1] - counts[0]) / 8192 * 6.2832 / (3 * PERIOD_S) < 0.5 * SPEED_rad_s
 
 
-def test_a_killed_loop_stops_the_drives_within_two_heartbeats(tmp_path: Path) -> None:
+def test_drives_stop_within_two_heartbeats_of_a_killed_loop(tmp_path: Path) -> None:
     daemon = slow_daemon(tmp_path)
     try:
         with in_motion(daemon) as ear:

@@ -1,7 +1,7 @@
-"""Another user of the machine beside a real daemon: what it may see, and what it cannot do.
+"""Another user of the machine can neither stop, read nor control a real daemon.
 
-Run by root, what is tried is tried as uid 65534, without groups. Run by anybody else, nobody else
-can be played: whose a file is, and its permissions, stand in for the attempt.
+If root runs the tests, attempts are made as uid 65534 without groups. Otherwise no other user is
+available: then owner and permissions of files are checked instead.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ IS_ROOT = os.geteuid() == 0
 
 @pytest.fixture(scope="module")
 def daemon() -> Iterator[RealDaemon]:
-    """A daemon whose files lie in a folder that everybody may look into."""
+    """Yield a daemon whose files are in a folder that all users may read."""
     folder = Path(tempfile.mkdtemp(prefix="cdpr-neighbour-"))
     folder.chmod(0o755)
     before = os.umask(0o000)
@@ -49,7 +49,7 @@ def daemon() -> Iterator[RealDaemon]:
 
 
 def as_nobody(attempt: Callable[[], object]) -> str:
-    """Return what an unprivileged user gets for it: a result, or the name of an error."""
+    """Return the result of `attempt` as an unprivileged user, or the name of its error."""
     reader, writer = os.pipe()
     pid = os.fork()
     if pid == 0:
@@ -71,7 +71,7 @@ def as_nobody(attempt: Callable[[], object]) -> str:
 
 
 def is_denied(path: Path, attempt: Callable[[], object]) -> bool:
-    """Whether another user may not do what `path` gives way to."""
+    """Return whether another user is denied what `path` gives access to."""
     if IS_ROOT:
         return as_nobody(attempt) == "PermissionError"
     held = path.stat()
@@ -91,7 +91,7 @@ def loop_of(daemon: RealDaemon) -> LoopFile:
     return LoopFile.read(daemon.socket.with_suffix(".loop"))
 
 
-def test_what_the_daemon_writes_and_listens_at_is_closed_to_others(daemon: RealDaemon) -> None:
+def test_files_and_sockets_of_the_daemon_are_closed_to_other_users(daemon: RealDaemon) -> None:
     folder = daemon.socket.parent
     until(lambda: any((folder / "rec").iterdir()))
     (recording,) = (folder / "rec").iterdir()
@@ -103,7 +103,9 @@ def test_what_the_daemon_writes_and_listens_at_is_closed_to_others(daemon: RealD
     assert is_denied(folder / "rec", lambda: list((folder / "rec").iterdir()))
 
 
-def test_its_processes_are_neither_stopped_nor_looked_into(daemon: RealDaemon) -> None:
+def test_other_users_can_neither_signal_nor_inspect_the_daemons_processes(
+    daemon: RealDaemon,
+) -> None:
     loop = loop_of(daemon)
     for pid in (loop.pid, daemon.children()["service"], daemon.process.pid):
         proc = Path(f"/proc/{pid}")
@@ -112,14 +114,14 @@ def test_its_processes_are_neither_stopped_nor_looked_into(daemon: RealDaemon) -
         for name in ("environ", "mem"):
             assert is_denied(proc / name, (proc / name).read_bytes)
         assert is_denied(proc / "fd", lambda p=proc: list((p / "fd").iterdir()))
-        # everybody may read this: the key is not in it
+        # all users may read this: it does not contain the key
         assert KEY not in as_nobody((proc / "cmdline").read_bytes)
     shared = Path(f"/proc/{loop.pid}/fd/{loop.block_fd}")
     assert is_denied(shared.parent, lambda: os.open(shared, os.O_RDONLY))
     assert daemon.status()["state"] == "ready"
 
 
-def test_without_the_key_it_reads_the_status_and_nothing_more(daemon: RealDaemon) -> None:
+def test_a_user_without_the_key_can_only_read_the_status(daemon: RealDaemon) -> None:
     url = f"http://{daemon.status()['parts']['service']['http']}"
 
     def ask() -> object:
@@ -131,7 +133,7 @@ def test_without_the_key_it_reads_the_status_and_nothing_more(daemon: RealDaemon
     assert json.loads(as_nobody(ask)) == [401, 401, 401, 401, 200, 401, 401]
 
 
-def test_set_points_without_key_or_session_are_counted_and_not_answered(
+def test_set_points_without_key_or_session_are_counted_but_not_answered(
     daemon: RealDaemon,
 ) -> None:
     port = port_of(daemon)
@@ -157,7 +159,7 @@ def http_port_of(daemon: RealDaemon) -> int:
 def bind(kind: socket.SocketKind, port: int) -> None:
     with socket.socket(socket.AF_INET, kind) as sock:
         sock.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        if IS_ROOT:  # the kernel lets a user share a port with none but itself
+        if IS_ROOT:  # the kernel only lets the same user share a port
             sock.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEPORT, 1)
         sock.bind(("127.0.0.1", port))
         if kind is socket.SOCK_STREAM:
@@ -168,7 +170,7 @@ def live_port_of(daemon: RealDaemon) -> int:
     return int(until(daemon.status)["parts"]["live_view"]["url"].rpartition(":")[2])
 
 
-def test_a_port_is_not_to_be_had_while_the_service_is_away(daemon: RealDaemon) -> None:
+def test_another_user_cannot_take_a_port_while_the_service_restarts(daemon: RealDaemon) -> None:
     http, live, stream = http_port_of(daemon), live_port_of(daemon), port_of(daemon)
     ports = {
         http: socket.SOCK_STREAM,
@@ -191,7 +193,7 @@ def test_a_port_is_not_to_be_had_while_the_service_is_away(daemon: RealDaemon) -
     os.kill(service, signal.SIGKILL)
     until(lambda: "service" not in daemon.children())
     assert as_nobody(take) == "(True, [])"
-    # who asks meanwhile is answered by the service that comes
+    # the restarted service answers requests made meanwhile
     with httpx.Client(base_url=f"http://127.0.0.1:{http}") as client:
         assert client.get("/status", timeout=60.0).status_code == 200
     assert [http_port_of(daemon), live_port_of(daemon), port_of(daemon)] == list(ports)
@@ -199,7 +201,7 @@ def test_a_port_is_not_to_be_had_while_the_service_is_away(daemon: RealDaemon) -
 
 
 @pytest.mark.parametrize("option", ["--http", "--stream", "--live"])
-def test_no_daemon_starts_where_its_port_is_anothers(
+def test_a_daemon_does_not_start_if_its_port_is_in_use(
     daemon: RealDaemon, tmp_path: Path, option: str
 ) -> None:
     ports = {"--http": http_port_of, "--stream": port_of, "--live": live_port_of}

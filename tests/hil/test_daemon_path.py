@@ -1,4 +1,4 @@
-"""`cdpr path` on a real daemon: paused, faulted and killed in the middle, and taken up again."""
+"""`cdpr path` on a real daemon is paused, faulted, killed and resumed."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def folder(tmp_path: Path) -> Path:
 
 @contextmanager
 def running(folder: Path, status: int = 0) -> Iterator[RealDaemon]:
-    """The daemon, its platform off the stand on tight cables; it ends with `status`."""
+    """Yield a daemon with its platform off the stand on tight cables. It ends with `status`."""
     env = {"XDG_STATE_HOME": str(folder)}
     one = RealDaemon(folder, "--no-record", robot=folder / "planar.toml", env=env)
     try:
@@ -45,7 +45,7 @@ def running(folder: Path, status: int = 0) -> Iterator[RealDaemon]:
         yield one
     except BaseException as error:
         error.add_note(one.errors())
-        one.end()  # what went wrong is told, not the status of a daemon that was not killed
+        one.end()  # report the failure instead of the exit status of a daemon that was not killed
         raise
     assert one.end() == status, one.errors()
 
@@ -75,8 +75,8 @@ def _still(daemon: RealDaemon) -> float | None:
 
 
 def pause(daemon: RealDaemon, folder: Path) -> None:
-    """Follow it from its beginning until somebody pauses it."""
-    # an origin in the plane: X is across, Y is up
+    """Follow the path from its beginning until it is paused."""
+    # an origin in the plane: X is horizontal, Y is up
     with following(daemon, folder / "part.nc", "--run", "--origin=0 1700") as path:
         until_time(daemon, 0.5)
         assert cdpr("pause", *daemon.at).returncode == 0
@@ -88,7 +88,7 @@ def pause(daemon: RealDaemon, folder: Path) -> None:
 
 
 def lead(daemon: RealDaemon) -> None:
-    """Go on slowly, stop on the path and step back over HTTP."""
+    """Continue slowly, stop on the path and step back over HTTP."""
     left = told(daemon)
     with held_right(daemon, "api") as headers:
 
@@ -108,7 +108,7 @@ def lead(daemon: RealDaemon) -> None:
 
 
 def break_a_drive(daemon: RealDaemon) -> None:
-    """Have an encoder fail on the path, then make the robot well again."""
+    """Let an encoder fail on the path, then recover the robot."""
     with following(daemon, "--resume", "--feed", "50") as path:
         seen = until_time(daemon, told(daemon)["time_s"] + 0.2)
         with third_party(BusUrl.parse(f"{daemon.bus}-can0")) as network:
@@ -123,14 +123,14 @@ def break_a_drive(daemon: RealDaemon) -> None:
     assert told(daemon)["time_s"] >= seen["time_s"]
 
 
-def test_paused_faulted_and_killed_it_is_taken_up_where_it_was_left(folder: Path) -> None:
+def test_a_path_resumes_where_it_was_paused_faulted_or_killed(folder: Path) -> None:
     with running(folder, status=1) as daemon:
         pause(daemon, folder)
         lead(daemon)
         break_a_drive(daemon)
         with following(daemon, "--resume") as path:
             seen = until_time(daemon, told(daemon)["time_s"] + 0.2)
-            assert seen["feed"] == 0.5  # as it was left
+            assert seen["feed"] == 0.5
             os.kill(daemon.children()["loop"], signal.SIGKILL)
             path.communicate()
         assert path.returncode == 1
@@ -146,7 +146,7 @@ def test_paused_faulted_and_killed_it_is_taken_up_where_it_was_left(folder: Path
         assert "--resume: no path has been left; allowed: --run with a path's FILE" in done.stderr
 
 
-def test_a_path_of_several_plans_is_followed_to_its_end(folder: Path) -> None:
+def test_a_path_of_several_plans_is_completed(folder: Path) -> None:
     count = 26_000
     lines = "".join(f"X{-100.0 + 200.0 * i / count:.3f}\n" for i in range(1, count + 1))
     (folder / "long.nc").write_text(f"G21 G90\nG0 X-100 Y0\nG1 F6000\n{lines}M2\n")
@@ -156,4 +156,4 @@ def test_a_path_of_several_plans_is_followed_to_its_end(folder: Path) -> None:
         assert path.returncode == 0, errors
         progress = json.loads(out.splitlines()[-1])["path"]
         assert (progress["name"], progress["line"]) == ("long.nc", count + 3)
-        assert errors.count("long.nc: 0.") == 2  # the figures of both
+        assert errors.count("long.nc: 0.") == 2  # sums over both plans

@@ -1,4 +1,4 @@
-"""The commands that move a platform, on a real daemon with a simulated planar robot."""
+"""Commands that move a platform, on a real daemon with a simulated planar robot."""
 
 from __future__ import annotations
 
@@ -27,18 +27,18 @@ SHIPPED = Path(cdpr_profiles.__file__).parent / "robots"
 
 @pytest.fixture(scope="module")
 def daemon(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RealDaemon]:
-    """The shipped robot with three cables."""
+    """Yield a daemon of the shipped robot with three cables."""
     yield from running("planar-3", tmp_path_factory.mktemp("platform"))
 
 
 @pytest.fixture(scope="module")
 def turning(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RealDaemon]:
-    """The shipped robot whose four cables turn its platform, too."""
+    """Yield a daemon of the shipped robot whose four cables also turn its platform."""
     yield from running("planar-4", tmp_path_factory.mktemp("turning"))
 
 
 def running(name: str, folder: Path) -> Iterator[RealDaemon]:
-    """Yield the daemon of a shipped robot in cycles that leave room for what runs beside it."""
+    """Yield the daemon of a shipped robot with a cycle that leaves time for other processes."""
     robot = folder / "planar.toml"
     period = f"sync_period_s = {PERIOD_S}"
     robot.write_text(
@@ -52,8 +52,8 @@ def running(name: str, folder: Path) -> Iterator[RealDaemon]:
         assert one.end() == 0, one.errors()
 
 
-def told(daemon: RealDaemon, *command: str) -> dict[str, object]:
-    """Return what a command that succeeds tells as JSON."""
+def output_of(daemon: RealDaemon, *command: str) -> dict[str, object]:
+    """Return the JSON output of a command that must succeed."""
     done = cdpr(*command, *daemon.at, "--json")
     assert done.returncode == 0, f"{done.stderr}{daemon.errors()}"
     figures: dict[str, object] = json.loads(done.stdout.splitlines()[-1])
@@ -66,17 +66,17 @@ def refused(daemon: RealDaemon, *command: str) -> tuple[int, str]:
     return done.returncode, done.stderr
 
 
-def test_a_platform_from_its_stand_and_back_onto_it(daemon: RealDaemon) -> None:
+def test_a_platform_is_tightened_moved_and_lowered_to_its_stand(daemon: RealDaemon) -> None:
     status, why = refused(daemon, "move", "--to", "0", "1600")
     assert (status, "run tighten first" in why) == (1, True)
     status, why = refused(daemon, "tighten", "--from", "last")
     assert (status, "no lengths of the last stop" in why) == (1, True)
-    assert told(daemon, "tighten")["position_m"] == pytest.approx([0.0, 1.3], abs=0.005)
+    assert output_of(daemon, "tighten")["position_m"] == pytest.approx([0.0, 1.3], abs=0.005)
 
-    assert told(daemon, "move", "--to", "100", "1600")["position_m"] == pytest.approx(
+    assert output_of(daemon, "move", "--to", "100", "1600")["position_m"] == pytest.approx(
         [0.1, 1.6], abs=0.005
     )
-    moved = told(daemon, "move", "--to", "-50", "20", "--relative", "--speed", "200")
+    moved = output_of(daemon, "move", "--to", "-50", "20", "--relative", "--speed", "200")
     assert moved["position_m"] == pytest.approx([0.05, 1.62], abs=0.005)
     shown = cdpr("status", *daemon.at).stdout
     assert re.search(r"platform at \d+\.\d, 16\d\d\.\d mm; target 50\.0, 1620\.0 mm", shown)
@@ -107,14 +107,14 @@ def test_a_platform_from_its_stand_and_back_onto_it(daemon: RealDaemon) -> None:
     with subprocess.Popen([*command, *daemon.at], stderr=subprocess.PIPE, text=True) as going:
         target = pytest.approx([-0.3, 1.9])
         until(lambda: daemon.status()["program_progress"].get("target_m") == target)
-        paused = told(daemon, "pause")
+        paused = output_of(daemon, "pause")
         assert paused["program"] == "hold"
         assert paused["position_m"] != pytest.approx([-0.3, 1.9], abs=0.05)
         assert "pose was ended: hold by" in going.communicate()[1]
     assert going.returncode == 1
-    assert told(daemon, "resume")["position_m"] == pytest.approx([-0.3, 1.9], abs=0.005)
+    assert output_of(daemon, "resume")["position_m"] == pytest.approx([-0.3, 1.9], abs=0.005)
 
-    lowered = told(daemon, "lower")
+    lowered = output_of(daemon, "lower")
     assert lowered["program"] == "hold"
     assert until(lambda: daemon.status()["program_progress"].get("tight") is False)
     again = cdpr("lower", *daemon.at)
@@ -122,18 +122,18 @@ def test_a_platform_from_its_stand_and_back_onto_it(daemon: RealDaemon) -> None:
     assert "letting the cables out; a platform" in again.stderr
 
 
-def test_after_a_rail_has_moved_it_goes_nowhere_until_somebody_says_where_it_is(
+def test_a_platform_does_not_move_after_a_rail_moved_until_marked_calibrated(
     daemon: RealDaemon, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     assert daemon.robot is not None
     monkeypatch.setenv("XDG_STATE_HOME", str(daemon.robot.parent))
     mark_not_calibrated("planar", "rail 2 was moved from 0.1000 m")
-    # the drives have power: what they stand on has not moved since
+    # the drives have had power since then, so that the rails cannot have moved
     status, why = refused(daemon, "move", "--to", "0", "1600")
     assert (status, "run tighten first" in why) == (1, True)
     for _ in range(2):
-        told(daemon, "disable")
-        told(daemon, "enable")
+        output_of(daemon, "disable")
+        output_of(daemon, "enable")
         status, why = refused(daemon, "move", "--to", "0", "1600")
         if "run tighten first" in why:
             return
@@ -143,17 +143,17 @@ def test_after_a_rail_has_moved_it_goes_nowhere_until_somebody_says_where_it_is(
     pytest.fail(why)
 
 
-def test_a_platform_is_turned_as_it_is_typed(turning: RealDaemon) -> None:
-    told(turning, "tighten")
-    moved = told(turning, "move", "--to", "50", "1500", "--rotate", "-5")
+def test_a_platform_turns_to_the_given_angle(turning: RealDaemon) -> None:
+    output_of(turning, "tighten")
+    moved = output_of(turning, "move", "--to", "50", "1500", "--rotate", "-5")
     assert moved["position_m"] == pytest.approx([0.05, 1.5], abs=0.005)
     assert moved["rotation_rad"] == pytest.approx([math.radians(-5.0)], abs=0.01)
-    turned = told(turning, "move", "--rotate", "3", "--relative", "--speed", "200")
+    turned = output_of(turning, "move", "--rotate", "3", "--relative", "--speed", "200")
     assert turned["rotation_rad"] == pytest.approx([math.radians(-2.0)], abs=0.01)
     shown = cdpr("status", *turning.at).stdout
     assert "target 50.0, 1500.0 mm, turned by -2.00 deg" in shown
 
-    told(turning, "move", "--to", "0", "100", "--relative", "--frame", "platform")
+    output_of(turning, "move", "--to", "0", "100", "--relative", "--frame", "platform")
     target_m = turning.status()["program_progress"]["target_m"]
     way = 0.1 * math.sin(math.radians(2.0)), 0.1 * math.cos(math.radians(2.0))
     assert target_m == pytest.approx([0.05 + way[0], 1.5 + way[1]], abs=1e-6)
@@ -161,22 +161,20 @@ def test_a_platform_is_turned_as_it_is_typed(turning: RealDaemon) -> None:
     status, why = refused(turning, "move", "--rotate", "20")
     assert status == 2
     assert "--rotate 20: 20 deg from the orientation at home; allowed: up to 15 deg" in why
-    told(turning, "lower")
+    output_of(turning, "lower")
 
 
-def test_poses_at_which_it_stands_are_read_for_a_calibration(
-    turning: RealDaemon, tmp_path: Path
-) -> None:
+def test_poses_are_recorded_for_a_calibration(turning: RealDaemon, tmp_path: Path) -> None:
     read = ("calibrate", "read", "--out", str(tmp_path / "cal"))
     status, why = refused(turning, *read)
     assert (status, "not held on its cables" in why) == (1, True)
-    told(turning, "tighten")
-    assert told(turning, *read)["pose"] == 1
-    told(turning, "move", "--to", "150", "1500", "--rotate", "4")
-    assert told(turning, *read)["pose"] == 2
-    told(turning, "lower")
-    told(turning, "tighten", "--from", "home")
-    told(turning, *read)
+    output_of(turning, "tighten")
+    assert output_of(turning, *read)["pose"] == 1
+    output_of(turning, "move", "--to", "150", "1500", "--rotate", "4")
+    assert output_of(turning, *read)["pose"] == 2
+    output_of(turning, "lower")
+    output_of(turning, "tighten", "--from", "home")
+    output_of(turning, *read)
     data = load_data(tmp_path / "cal" / "data.json")
     assert data.simulated and len(data.poses) == 3 and data.restarts == (2,)
     geometry = CableGeometry.of(load_robot(str(turning.robot)))
@@ -184,13 +182,11 @@ def test_poses_at_which_it_stands_are_read_for_a_calibration(
     tension_N = np.array([data.poses[1].tension_N])
     lengths_m = lengths_told(geometry, there, tension_N)[0]
     assert data.poses[1].length_m == pytest.approx(lengths_m.tolist(), abs=0.005)
-    told(turning, "lower")
+    output_of(turning, "lower")
 
 
-def test_it_goes_to_the_poses_of_a_calibration_by_itself(
-    turning: RealDaemon, tmp_path: Path
-) -> None:
-    """Near to each other, since only the ways take time; what is measured of two is typed."""
+def test_a_daemon_moves_to_the_poses_of_a_calibration(turning: RealDaemon, tmp_path: Path) -> None:
+    """The poses are close together to save time. The test types measurements of two."""
     poses, folder = tmp_path / "poses.csv", tmp_path / "cal"
     places = [(0.03 * (j % 4), 1.4 + 0.03 * (j // 4), 0.02 * (j % 3)) for j in range(14)]
     rows = [",".join(map(str, place)) for place in places]
@@ -198,11 +194,11 @@ def test_it_goes_to_the_poses_of_a_calibration_by_itself(
     command = ("calibrate", "measure", "--poses", str(poses), "--ask", "--dry-run")
     status, why = refused(turning, *command, "--out", str(folder))
     assert (status, "not held on its cables" in why, folder.exists()) == (1, True, False)
-    told(turning, "tighten")
+    output_of(turning, "tighten")
     typed = "0 1000\n\n\n0 1450 0.5\n"
     # fifteen poses, and a fit
     done = cdpr(*command, *turning.at, "--out", folder, typed=typed, timeout_s=240.0)
-    assert done.stderr.count("measured x y in mm") == 5, done.stderr  # what is typed ends there
+    assert done.stderr.count("measured x y in mm") == 5, done.stderr  # end of the typed input
     assert "the platform is held at the last pose" in done.stdout
     data = load_data(folder / "data.json")
     assert len(data.poses) == 15 and data.simulated
@@ -212,4 +208,4 @@ def test_it_goes_to_the_poses_of_a_calibration_by_itself(
         "4,0.0,1450.0,0.5",
     ]
     assert turning.status()["program"] == "hold"
-    told(turning, "lower")
+    output_of(turning, "lower")

@@ -1,4 +1,4 @@
-"""A real daemon's processes: what systemd hears, who may run where, what is left when one dies."""
+"""Processes of a real daemon: notifications to systemd, cores, and the death of each process."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ POWERED = 0x0004  # statusword: operation enabled
 
 
 class Manager:
-    """The socket at which systemd listens."""
+    """The socket of systemd for notifications."""
 
     def __init__(self, path: Path) -> None:
         self.env = {"NOTIFY_SOCKET": str(path), "WATCHDOG_USEC": "2000000"}
@@ -29,7 +29,7 @@ class Manager:
         self._socket.bind(str(path))
 
     def heard(self, seconds: float) -> list[str]:
-        """Return everything told until nothing comes for so long."""
+        """Return all notifications until `seconds` pass without one."""
         told: list[str] = []
         self._socket.settimeout(seconds)
         while True:
@@ -39,7 +39,7 @@ class Manager:
                 return told
 
     def hears(self, wanted: str) -> None:
-        """Wait for a line."""
+        """Wait for a notification."""
         self._socket.settimeout(60.0)
         told, end = list[str](), time.monotonic() + 60.0
         while wanted not in told:
@@ -54,30 +54,32 @@ def manager(tmp_path_factory: pytest.TempPathFactory) -> Manager:
 
 @pytest.fixture(scope="module")
 def daemon(tmp_path_factory: pytest.TempPathFactory, manager: Manager) -> Iterator[RealDaemon]:
-    # /proc tells of a forked process with what environment the server was started
+    # of a forked process, /proc shows the environment of the fork server
     env = {**manager.env, "CDPR_TEST_FORKS": "0"}
     daemon = RealDaemon(tmp_path_factory.mktemp("run"), "--no-record", env=env)
     yield daemon
     daemon.end()
 
 
-def test_it_is_up_without_power_and_systemd_hears_so(daemon: RealDaemon, manager: Manager) -> None:
+def test_a_daemon_starts_without_power_and_notifies_systemd(
+    daemon: RealDaemon, manager: Manager
+) -> None:
     assert daemon.ready["socket"] == str(daemon.socket)
     assert daemon.ready["pid"] == daemon.process.pid
     manager.hears("READY=1")
     manager.hears("WATCHDOG=1")
     assert daemon.status()["state"] == "ready"
-    # whoever comes later does not speak for the daemon
+    # only the launcher may notify systemd
     for pid in daemon.children().values():
         assert b"NOTIFY_SOCKET" not in Path(f"/proc/{pid}/environ").read_bytes()
 
 
-def test_the_core_of_a_loop_that_has_to_be_punctual_is_left_to_it(tmp_path: Path) -> None:
+def test_other_processes_leave_the_core_of_a_real_time_loop_alone(tmp_path: Path) -> None:
     daemon = RealDaemon(tmp_path, "--no-record", paced=True)
     try:
         children = daemon.children()
         taken = os.sched_getaffinity(children["loop"])
-        if len(taken) > 1:  # it could not have one, and says so
+        if len(taken) > 1:  # the loop could not get a separate core, and reports it
             assert any("none to itself" in n or "ordinary" in n for n in daemon.status()["notices"])
             return
         for pid in (daemon.process.pid, children["service"]):
@@ -87,7 +89,7 @@ def test_the_core_of_a_loop_that_has_to_be_punctual_is_left_to_it(tmp_path: Path
         daemon.end()
 
 
-def test_a_second_daemon_for_the_same_robot_is_refused(daemon: RealDaemon) -> None:
+def test_a_second_daemon_for_the_same_robot_is_rejected(daemon: RealDaemon) -> None:
     second = cdpr("run", daemon.robot, "--bus", "simbus:", "--no-record", *daemon.at)
     assert second.returncode == 2
     assert "a daemon runs there already" in second.stderr
@@ -95,7 +97,7 @@ def test_a_second_daemon_for_the_same_robot_is_refused(daemon: RealDaemon) -> No
     assert daemon.status()["loop"]["alive"]
 
 
-def test_a_loop_that_is_killed_is_reported_and_nobody_feeds_the_watchdog(
+def test_a_killed_loop_is_reported_and_the_watchdog_is_not_fed(
     daemon: RealDaemon, manager: Manager
 ) -> None:
     children = daemon.children()
@@ -116,7 +118,7 @@ def test_a_loop_that_is_killed_is_reported_and_nobody_feeds_the_watchdog(
         )
     shown = cdpr("status", *daemon.at).stdout
     assert "next: `cdpr stop`" in shown and "what follows is of" in shown
-    stopped = cdpr("stop", *daemon.at)  # ends what is left, and is no error where nothing is
+    stopped = cdpr("stop", *daemon.at)  # ends the remaining processes
     assert stopped.returncode == 1
     assert "its loop had died: its drives had been told to have no power" in stopped.stderr
     assert daemon.process.wait(60.0) == 1
@@ -127,7 +129,7 @@ def test_a_loop_that_is_killed_is_reported_and_nobody_feeds_the_watchdog(
     assert not daemon.socket.exists()
 
 
-def test_a_launcher_that_is_killed_takes_everything_along_in_order(tmp_path: Path) -> None:
+def test_loop_and_service_end_properly_after_the_launcher_was_killed(tmp_path: Path) -> None:
     daemon = RealDaemon(tmp_path, "--record", str(tmp_path / "log"))
     children = daemon.children()
     assert set(children) == {"loop", "service", "simulator"}
@@ -145,19 +147,19 @@ def test_a_launcher_that_is_killed_takes_everything_along_in_order(tmp_path: Pat
     with log.open("rb") as file:
         found = make_reader(file).iter_messages(["/cycle"])
         words = [json.loads(message.data)["statusword"] for _, _, message in found]
-    # the motors lost their power in cycles that are recorded, the last of all
+    # the recording shows power in some cycles and none in the last
     assert any(word & POWERED for word in chain(*words))
     assert not any(word & POWERED for word in words[-1])
 
 
-def test_a_loop_that_ends_is_not_taken_for_a_process_of_another_kind(tmp_path: Path) -> None:
-    # one that is forked has no interpreter to take apart at its end
+def test_a_loop_file_does_not_report_an_ending_process_as_running(tmp_path: Path) -> None:
+    # not forked: a forked process exits without tearing down its interpreter
     daemon = RealDaemon(tmp_path, "--no-record", env={"CDPR_TEST_FORKS": "0"})
     found = LoopFile.read(LoopFile.beside(daemon.socket))
     daemon.process.terminate()
     while found.runs():
         time.sleep(0.001)
-    while alive(found.pid):  # its interpreter takes a while to end
+    while alive(found.pid):  # the interpreter takes a while to exit
         assert not found.runs()
         time.sleep(0.001)
     assert daemon.end() == 0

@@ -1,4 +1,4 @@
-"""A daemon's recording from start to end, through a full disk and the death of its writer."""
+"""A daemon's recording is complete despite a full disk and the death of the writer."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ from websockets.sync.client import connect
 PERIOD_s = 0.01
 
 
-def told(*arguments: str | Path) -> dict[str, Any]:
-    """Run a command with --json that has to succeed; return what it tells."""
+def output_of(*arguments: str | Path) -> dict[str, Any]:
+    """Run a command with --json that must succeed. Return its output."""
     result = cdpr(*arguments, "--json")
     assert result.returncode == 0, result.stderr
     value: dict[str, Any] = json.loads(result.stdout.splitlines()[-1])
@@ -30,14 +30,14 @@ def told(*arguments: str | Path) -> dict[str, Any]:
 
 
 def messages(path: Path, topic: str) -> list[tuple[int, dict[str, Any]]]:
-    """Read a file with the `mcap` package alone."""
+    """Read messages of a file with the `mcap` package."""
     with path.open("rb") as file:
         found = make_reader(file, validate_crcs=True).iter_messages(topics=[topic])
         return [(message.log_time, json.loads(message.data)) for _, _, message in found]
 
 
 def fill_the_disk_for(service: int, daemon: RealDaemon, folder: Path) -> None:
-    """Let the service's files grow no further; wait until it says so, the robot being active."""
+    """Limit the size of the service's files. Wait until it reports that, with an active robot."""
     (path,) = folder.iterdir()
     size = path.stat().st_size
     resource.prlimit(service, resource.RLIMIT_FSIZE, (size, size))
@@ -50,7 +50,7 @@ def fill_the_disk_for(service: int, daemon: RealDaemon, folder: Path) -> None:
 
 
 def watch_live(daemon: RealDaemon) -> dict[str, Any]:
-    """Return the first message on the axes that a client of the live view gets."""
+    """Return the first message on axes that a client of the live view receives."""
     url = until(lambda: daemon.status()["parts"]["live_view"]["url"])
     with connect(url, subprotocols=["foxglove.sdk.v1"]) as client:  # type: ignore[list-item]
         while True:
@@ -66,7 +66,7 @@ def watch_live(daemon: RealDaemon) -> dict[str, Any]:
 
 @contextmanager
 def few_files(most: int) -> Iterator[None]:
-    """Let processes that are started here open no more than this, unless they ask for it."""
+    """Limit the open files of processes started in this block, unless they raise the limit."""
     before = resource.getrlimit(resource.RLIMIT_NOFILE)
     resource.setrlimit(resource.RLIMIT_NOFILE, (most, before[1]))
     try:
@@ -77,30 +77,32 @@ def few_files(most: int) -> Iterator[None]:
 
 @pytest.fixture(scope="module")
 def recorded(tmp_path_factory: pytest.TempPathFactory) -> Iterator[list[Path]]:
-    """The files of a run in which, while the motors had power, the disk was full for the service
-    and it was killed then; the next one has room again."""
+    """Return the files of a run with a full disk and a killed service.
+
+    Both happen while the motors have power. The restarted service can write again.
+    """
     folder = tmp_path_factory.mktemp("run")
     recordings = folder / "recordings"
     with few_files(512):
         daemon = RealDaemon(folder, "--record", str(recordings), "--live", "0")
     try:
-        told("enable", *daemon.at)
+        output_of("enable", *daemon.at)
         assert set(watch_live(daemon)) == {"left", "right"}
-        told("jog", "left=30", "--seconds", "1", *daemon.at)
+        output_of("jog", "left=30", "--seconds", "1", *daemon.at)
         service = daemon.children()["service"]
-        # for files in spite of clients, but not for clients without end: they take memory too
+        # enough for files and clients, but not for endless clients, which take memory too
         assert 512 < resource.prlimit(service, resource.RLIMIT_NOFILE)[0] <= 4096
         fill_the_disk_for(service, daemon, recordings)
         os.kill(service, signal.SIGKILL)
         until(lambda: daemon.children().get("service", service) != service)
         daemon.wait_for("active")
-        told("disable", *daemon.at)
+        output_of("disable", *daemon.at)
     finally:
         assert daemon.end() == 0
     yield sorted(recordings.iterdir())
 
 
-def test_no_cycle_is_missing_from_the_first_to_the_last(recorded: list[Path]) -> None:
+def test_no_cycle_is_missing_in_the_recording(recorded: list[Path]) -> None:
     assert [path.name[-8:] for path in recorded] == ["001.mcap", "002.mcap"]
     rows = [row for path in recorded for _, row in messages(path, "/cycle")]
     cycles = np.array([row["cycle"] for row in rows])
@@ -113,7 +115,7 @@ def test_no_cycle_is_missing_from_the_first_to_the_last(recorded: list[Path]) ->
     assert (np.diff(stamps) > 0).all()
 
 
-def test_the_rows_tell_what_the_robot_did(recorded: list[Path]) -> None:
+def test_the_rows_show_what_the_robot_did(recorded: list[Path]) -> None:
     rows = [row for path in recorded for _, row in messages(path, "/cycle")]
     states = [row["state"] for row in rows]
     changes = [states[0], *(b for a, b in pairwise(states) if a != b)]
@@ -129,7 +131,7 @@ def test_the_rows_tell_what_the_robot_did(recorded: list[Path]) -> None:
     assert enabled.mean() > 0.8
 
 
-def test_events_and_description_are_there(recorded: list[Path]) -> None:
+def test_the_recording_contains_events_and_description(recorded: list[Path]) -> None:
     texts = [value["text"] for path in recorded for _, value in messages(path, "/events")]
     for text in ("state ready", "state active", "program jog", "program hold"):
         assert text in texts
@@ -139,8 +141,8 @@ def test_events_and_description_are_there(recorded: list[Path]) -> None:
         assert description["period_s"] == PERIOD_s
 
 
-def test_what_the_stock_reader_finds_cdpr_log_finds(recorded: list[Path]) -> None:
-    first, second = told("log", "info", str(recorded[0].parent))["recordings"]
+def test_cdpr_log_finds_as_many_messages_as_the_mcap_reader(recorded: list[Path]) -> None:
+    first, second = output_of("log", "info", str(recorded[0].parent))["recordings"]
     assert (first["ended"], second["ended"]) == ("not closed", "closed")
     assert first["missing_cycles"] == second["missing_cycles"] == 0
     for path, figures in zip(recorded, (first, second), strict=True):

@@ -1,4 +1,4 @@
-"""A second Ctrl-C at `cdpr run`: what crosses the bus then, and what the shell is told."""
+"""A second Ctrl-C at `cdpr run` cuts power immediately and sets the exit status."""
 
 from __future__ import annotations
 
@@ -22,17 +22,17 @@ pytestmark = pytest.mark.alone
 SHIPPED = Path(cdpr_profiles.__file__).parent / "robots" / "planar-3.toml"
 PERIOD_S = 0.004
 NODES = (1, 2, 3)
-# disable voltage goes out with the next SYNC's answers, acts at the SYNC after it, is told then
+# "disable voltage" is sent after the next SYNC, acts at the SYNC after it, and is then reported
 MOST_CYCLES = 3
-# two processes are woken up one after the other, on a machine that does other things too
+# two processes wake up one after the other on a busy machine
 MOST_S = 0.5
 
 
 def press_twice(daemon: RealDaemon) -> float:
-    """Have it end, and lose patience while it does; return when that was."""
+    """Press Ctrl-C, and again during the shutdown. Return the time of the second press."""
     daemon.process.send_signal(signal.SIGINT)
     until(lambda: "Press Ctrl-C again to remove the power immediately" in daemon.errors())
-    time.sleep(0.3)  # less is one and the same press
+    time.sleep(0.3)  # a shorter interval counts as one press
     at_s = time.monotonic()
     daemon.process.send_signal(signal.SIGINT)
     return at_s
@@ -44,13 +44,15 @@ def is_off(data: bytes) -> bool:
 
 @pytest.fixture
 def hanging(tmp_path: Path) -> Iterator[RealDaemon]:
-    """A platform that hangs on its cables, in cycles that leave room for what runs beside it."""
+    """Yield a daemon with a suspended platform and a cycle that leaves time for others."""
     robot = tmp_path / "planar.toml"
     period = f"sync_period_s = {PERIOD_S}"
     robot.write_text(SHIPPED.read_text().replace("sync_period_s = 0.001", period))
     bus = f"simbus:second-{os.getpid()}"
     env = {"XDG_STATE_HOME": str(tmp_path)}
-    simulator = OwnSimulator(str(robot), bus)  # outlives the daemon, so the fall is kept
+    simulator = OwnSimulator(
+        str(robot), bus
+    )  # the simulator outlives the daemon, so that the fall is visible later
     try:
         one = RealDaemon(tmp_path, "--no-record", robot=robot, bus=bus, env=env)
     except BaseException:
@@ -66,7 +68,7 @@ def hanging(tmp_path: Path) -> Iterator[RealDaemon]:
         simulator.stop()
 
 
-def test_a_platform_that_hangs_is_not_let_down_then(
+def test_a_second_ctrl_c_cuts_power_instead_of_lowering_the_platform(
     hanging: RealDaemon, tmp_path: Path, record_property: pytest.RecordProperty
 ) -> None:
     ear = Ear(hanging)
@@ -78,12 +80,12 @@ def test_a_platform_that_hangs_is_not_let_down_then(
     assert "\nthe power is removed now" in hanging.errors()
     assert "; the platform was not lowered" in hanging.errors()
     kept = json.loads((tmp_path / "cdpr-rt" / "lengths.planar.simulated.json").read_text())
-    assert kept["stopped"] is False  # it has fallen since its lengths were seen last
+    assert kept["stopped"] is False  # it has fallen since its lengths were last measured
     told_s, off_s, cycles = 0.0, 0.0, 0
     for node in NODES:
         before = ear.of(0x200 + node)
         last = [word for at, word in before if at < at_s][-1]
-        assert last[0] & 0x0F == 0x0F  # it was being let down, with power
+        assert last[0] & 0x0F == 0x0F  # it was being lowered with power
         first_s = next(at for at, word in ear.of(0x200 + node, at_s) if not word[0] & 0x02)
         lost_s = next(at for at, word in ear.of(0x180 + node, at_s) if is_off(word))
         syncs = [at for at, _ in ear.of(0x080) if first_s < at < lost_s]
@@ -93,4 +95,4 @@ def test_a_platform_that_hangs_is_not_let_down_then(
     print(f"second Ctrl-C: drives {figures} of {1e3 * PERIOD_S:g} ms later")
     record_property("second_ctrl_c_to_power_off_s", off_s)
     assert cycles <= MOST_CYCLES
-    assert off_s < MOST_S  # letting it down takes some five seconds
+    assert off_s < MOST_S  # lowering takes about five seconds

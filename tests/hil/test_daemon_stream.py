@@ -1,4 +1,4 @@
-"""A real daemon led by a hand over UDP, with others who want the same bus."""
+"""A real daemon follows a hand over UDP while other clients use the same bus."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def ask(daemon: RealDaemon, path: str, token: str, **body: Any) -> dict[str, Any
 
 
 def follow(daemon: RealDaemon) -> str:
-    """Take the right to move, enable the drives, and have them follow; return the token."""
+    """Take the right to move, enable the drives, and start following. Return the token."""
     daemon.http.post("/disable", json={})
     daemon.wait_for("ready")
     until(lambda: not daemon.http.get("/control").json()["held"])
@@ -64,14 +64,14 @@ def follow(daemon: RealDaemon) -> str:
 
 
 def hand_of(daemon: RealDaemon, token: str, port: int | None = None) -> StreamClient:
-    """Return a sender with a session for the holder of the right to move."""
+    """Return a sender with a session of the holder of the right to move."""
     told = ask(daemon, "/stream", token)
     given = StreamSession(told["session"], bytes.fromhex(told["key"]))
     return StreamClient(told["host"], port or told["port"], given)
 
 
 def lead(client: StreamClient, path: Callable[[float], float], seconds: float) -> None:
-    """Send x of the hand along `path` at 60 Hz."""
+    """Send positions x of the hand along `path` at 60 Hz."""
     begin = time.monotonic()
     for k in itertools.count():
         t = k / RATE_Hz
@@ -83,12 +83,12 @@ def lead(client: StreamClient, path: Callable[[float], float], seconds: float) -
 
 
 def setpoints(daemon: RealDaemon) -> list[float]:
-    """Return the set-points in m of cable; at this slow cycle motors follow them softly."""
+    """Return the set-points in m of cable, which motors follow softly at this slow cycle."""
     axes = daemon.status()["axes"]
     return [float(axis["setpoint_rad"]) * WINCH.cable_m_per_motor_rad for axis in axes]
 
 
-def test_a_hand_leads_until_it_is_gone(daemon: RealDaemon) -> None:
+def test_the_robot_follows_a_hand_and_stops_when_it_disappears(daemon: RealDaemon) -> None:
     token = follow(daemon)
     before = setpoints(daemon)
     with hand_of(daemon, token) as hand:
@@ -97,12 +97,12 @@ def test_a_hand_leads_until_it_is_gone(daemon: RealDaemon) -> None:
         assert (hand.state.standing, hand.state.state) == (Standing.ACCEPTED, LoopState.ACTIVE)
 
         def there() -> bool:
-            lead(hand, lambda t: 0.04, 0.1)  # on a busy machine the robot's time passes more slowly
+            lead(hand, lambda t: 0.04, 0.1)  # on a busy machine, the robot's time is slower
             moved = np.subtract(setpoints(daemon), before)
             return bool(np.allclose(moved, [0.04 * SCALE, 0.0], rtol=0.0, atol=1e-4))
 
         until(there)
-        # the hand is gone in mid-motion, without a good-bye
+        # the hand disappears in motion without ending its session
         lead(hand, lambda t: 0.04 + 0.04 * t, 0.5)
         told = daemon.status()
         assert told["parts"]["stream"]["holder"] is not None
@@ -111,14 +111,14 @@ def test_a_hand_leads_until_it_is_gone(daemon: RealDaemon) -> None:
         assert "nobody holds the right to move" in daemon.status()["reason"]
         assert daemon.status()["state"] == "active"
         moved = np.subtract(setpoints(daemon), before)
-        # to the last sample, and nothing beyond
+        # up to the last sample and not beyond
         np.testing.assert_allclose(moved, [0.06 * SCALE, 0.0], atol=4e-4)
 
 
-def test_who_has_no_key_and_no_session_moves_nothing_even_when_the_holder_is_silent(
+def test_packets_without_key_or_session_move_nothing_while_the_holder_is_silent(
     daemon: RealDaemon,
 ) -> None:
-    """An unprivileged user of the same machine, who can reach the port but not the socket."""
+    """The sender is an unprivileged user who can reach the port but not the socket."""
     token = follow(daemon)
     before = setpoints(daemon)
     with hand_of(daemon, token) as hand:
@@ -140,7 +140,7 @@ def test_who_has_no_key_and_no_session_moves_nothing_even_when_the_holder_is_sil
     np.testing.assert_allclose(setpoints(daemon), before, atol=1e-4)
 
 
-def test_a_hostile_network_makes_no_step(daemon: RealDaemon) -> None:
+def test_a_hostile_network_causes_no_step(daemon: RealDaemon) -> None:
     token = follow(daemon)
     with (
         hostile(port_of(daemon), 4) as proxy,
@@ -158,7 +158,9 @@ def test_a_hostile_network_makes_no_step(daemon: RealDaemon) -> None:
     daemon.http.delete("/control", headers={"X-Control-Token": token})
 
 
-def test_a_second_daemon_is_refused_and_a_listener_is_not(daemon: RealDaemon, folder: Path) -> None:
+def test_a_second_daemon_is_rejected_and_a_listener_is_accepted(
+    daemon: RealDaemon, folder: Path
+) -> None:
     daemon.wait_for("ready")
     other = folder / "other.sock"
     told = cdpr("run", daemon.robot, "--bus", daemon.bus, "--socket", other, "--no-record")
@@ -186,8 +188,8 @@ def test_a_second_daemon_is_refused_and_a_listener_is_not(daemon: RealDaemon, fo
     assert daemon.wait_for("ready")
 
 
-def test_recorded_setpoints_never_step(daemon: RealDaemon, folder: Path) -> None:
-    """Last: it ends the daemon, whose recording holds all that went before."""
+def test_recorded_set_points_have_no_steps(daemon: RealDaemon, folder: Path) -> None:
+    """This test is last because it ends the daemon, to read the recording of all others."""
     daemon.end()
     assert daemon.process.returncode == 0
     step = MOST_ACCELERATION_m_s2 * PERIOD_S / abs(WINCH.cable_m_per_motor_rad)
@@ -198,7 +200,7 @@ def test_recorded_setpoints_never_step(daemon: RealDaemon, folder: Path) -> None
             for name in wanted:
                 rows[name].append(columns[name])
     speed, state, program = (np.concatenate(rows[name]) for name in wanted)
-    led = (state == LoopState.ACTIVE) & (program != 0)  # idle has no set-point of its own
+    led = (state == LoopState.ACTIVE) & (program != 0)  # idle has no set-point
     both = led[1:] & led[:-1]
     assert both.sum() > 500
     assert np.abs(speed[led]).max() > 2.0

@@ -1,4 +1,4 @@
-"""A motor measured by the daemon that runs its robot, as a user does it."""
+"""A daemon measures a motor of its robot by command."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def result(command: subprocess.Popen[str], status: int = 0) -> dict[str, Any]:
     return told
 
 
-def test_a_sweep_by_the_daemon_finds_the_cogging(daemon: RealDaemon, tmp_path: Path) -> None:
+def test_a_sweep_by_the_daemon_measures_the_cogging(daemon: RealDaemon, tmp_path: Path) -> None:
     fast = ("--turns", "1", "--speed-deg-s", "60")
     result(begin(*SWEEP, "right", "--out", tmp_path / "right", *fast, *daemon.at))
     assert daemon.status()["state"] == "ready"
@@ -50,7 +50,7 @@ def test_a_sweep_by_the_daemon_finds_the_cogging(daemon: RealDaemon, tmp_path: P
     assert profile["identity"] == serials["right"] != serials["left"]
 
 
-def test_ctrl_c_stops_the_motor_and_takes_the_power(daemon: RealDaemon, tmp_path: Path) -> None:
+def test_ctrl_c_stops_the_motor_and_cuts_power(daemon: RealDaemon, tmp_path: Path) -> None:
     command = begin(*SWEEP, "left", "--out", tmp_path / "left", *daemon.at)
     until(lambda: daemon.status()["program"] == "sweep")
     os.kill(command.pid, signal.SIGINT)
@@ -61,7 +61,7 @@ def test_ctrl_c_stops_the_motor_and_takes_the_power(daemon: RealDaemon, tmp_path
 @pytest.mark.parametrize(
     ("axis", "text"), [("middle", "allowed: left, right"), ("left", "records nothing")]
 )
-def test_what_cannot_be_swept_is_reported_before_anything_has_power(
+def test_an_impossible_sweep_is_reported_before_power_is_on(
     daemon: RealDaemon, tmp_path: Path, axis: str, text: str
 ) -> None:
     if axis == "left":

@@ -1,4 +1,4 @@
-"""`cdpr teleop` leads a simulated planar robot through a real daemon, over bad networks too."""
+"""`cdpr teleop` moves a simulated planar robot through a real daemon, also over bad networks."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def daemon(folder: Path) -> Iterator[RealDaemon]:
-    """The shipped robot in cycles that leave room for what runs beside it."""
+    """Yield a daemon of the shipped robot with a cycle that leaves time for other processes."""
     robot = folder / "planar.toml"
     period = f"sync_period_s = {PERIOD_S}"
     robot.write_text(SHIPPED.read_text().replace("sync_period_s = 0.001", period))
@@ -56,9 +56,9 @@ def daemon(folder: Path) -> Iterator[RealDaemon]:
 
 
 def start_up(daemon: RealDaemon) -> None:
-    """Give power and tighten the cables; back as soon as it may be led."""
+    """Enable the drives and tighten the cables. Return when teleoperation may start."""
     wish: dict[str, Any] = {"client": "start-up"}
-    # after a loop that was killed nobody else can know that the simulated platform is at home
+    # after a killed loop, only the test knows that the simulated platform is at home
     tighten = {"program": "tighten", "wanted": {"from": "home"}}
     with held_right(daemon, wish["client"]) as headers:
         for path, more in (("/enable", {}), ("/program", tighten)):
@@ -72,7 +72,7 @@ def port_of(daemon: RealDaemon) -> int:
 
 
 def place(daemon: RealDaemon) -> np.ndarray:
-    """Return where the platform is to come to rest, x and y in m."""
+    """Return the position at which the platform will come to rest, x and y in m."""
     return np.array(daemon.status()["program_progress"]["target_m"])
 
 
@@ -82,7 +82,7 @@ def teleop(daemon: RealDaemon, *options: str | Path) -> list[str]:
 
 
 def play(daemon: RealDaemon, folder: Path, script: str, *options: str) -> dict[str, Any]:
-    """Lead by a script to its end; return what the command tells in JSON."""
+    """Run teleoperation from a script to its end. Return the JSON output of the command."""
     path = folder / "script"
     path.write_text(script)
     given = ("--device", "script", "--script", path, *options, "--json")
@@ -96,7 +96,7 @@ def play(daemon: RealDaemon, folder: Path, script: str, *options: str) -> dict[s
 
 @contextmanager
 def at_the_keys(daemon: RealDaemon) -> Iterator[tuple[subprocess.Popen[str], int]]:
-    """Lead by the keyboard of a terminal; yield the command, and the terminal's other end."""
+    """Run teleoperation by keyboard. Yield the command and the other end of its terminal."""
     ours, its = pty.openpty()
     command = teleop(daemon, "--device", "keyboard", "--scale", "8:1")
     process = subprocess.Popen(command, stdin=its, stderr=subprocess.PIPE, text=True)
@@ -110,18 +110,18 @@ def at_the_keys(daemon: RealDaemon) -> Iterator[tuple[subprocess.Popen[str], int
 
 
 def hold_key(terminal: int, key: bytes, seconds: float) -> None:
-    """Press a key as a terminal repeats it."""
+    """Send a key repeatedly, as a terminal does while it is held."""
     end = time.monotonic() + seconds
     while time.monotonic() < end:
         os.write(terminal, key)
         time.sleep(0.03)
 
 
-def test_a_script_leads_through_a_bad_network(daemon: RealDaemon, folder: Path) -> None:
-    begin = place(daemon)  # on the stand, under the box of targets
+def test_a_script_moves_the_robot_through_a_bad_network(daemon: RealDaemon, folder: Path) -> None:
+    begin = place(daemon)  # on the stand, below the workspace
     script = (
-        # off the stand first: nobody leads it sideways there; and still where the clutch opens
-        # and closes: a set-point that is lost tells that too late
+        # first up from the stand, where no sideways motion is possible. At rest when the clutch
+        # opens and closes, because a lost set-point would report that too late.
         "0 0 0\n0.2 0 0\n1 0 30\n1.5 0 30\n2.2 40 30\n2.8 40 30 confirm\n3 40 30 clutch\n"
         "3.2 40 30 clutch\n3.4 0 0 clutch\n3.6 0 0\n3.8 0 0\n4.2 0 20 confirm"
     )
@@ -129,7 +129,7 @@ def test_a_script_leads_through_a_bad_network(daemon: RealDaemon, folder: Path) 
         via = f"127.0.0.1:{proxy.port}"
         figures = play(daemon, folder, script, "--scale", "4:1", "--via", via)
         assert proxy.passed < 0.95 * proxy.came
-    # all that the hand has led is there, whatever was lost on the way
+    # the whole motion of the hand arrives despite losses
     np.testing.assert_allclose(place(daemon) - begin, [0.16, 0.12 + 0.08], atol=5e-4)
     assert figures["answered"] < 0.9 * figures["sent"]
     assert 1.0 < figures["round_trip_ms"]["p50"] < 1000.0
@@ -140,10 +140,10 @@ def test_a_script_leads_through_a_bad_network(daemon: RealDaemon, folder: Path) 
     assert (status["state"], status["program"], status["control"]["held"]) == (
         "active", "hold", False
     )  # fmt: skip
-    assert status["reason"] == ""  # it was asked to hold before the right to move went
+    assert status["reason"] == ""  # it was commanded to hold before the right to move was released
 
 
-def test_nan_and_steps_of_a_metre_carry_nothing_away(daemon: RealDaemon, folder: Path) -> None:
+def test_altered_set_points_do_not_move_the_robot(daemon: RealDaemon, folder: Path) -> None:
     begin = place(daemon)
     refused = daemon.status()["parts"]["stream"]["packets"]["tag"]
     with hostile(port_of(daemon), seed=8, altered=0.2) as proxy:
@@ -151,17 +151,17 @@ def test_nan_and_steps_of_a_metre_carry_nothing_away(daemon: RealDaemon, folder:
         play(daemon, folder, "0 0 0\n0.7 20 0\n1.5 -20 0\n2 0 0", "--scale", "2:1", "--via", via)
         assert proxy.spoilt > 5
     packets = daemon.status()["parts"]["stream"]["packets"]
-    assert packets["tag"] > refused, "what was altered on its way is nobody's"
-    # each begin anew costs some of what the hand has led, no more than all of it
+    assert packets["tag"] > refused, "altered packets belong to no session"
+    # each restart loses some of the motion of the hand, but does not add any
     assert np.all(np.abs(place(daemon) - begin) <= [0.085, 5e-4])
     assert daemon.status()["state"] == "active"
 
 
-def test_keys_lead_until_the_terminal_is_gone(daemon: RealDaemon) -> None:
+def test_keys_move_the_robot_until_the_terminal_closes(daemon: RealDaemon) -> None:
     begin = place(daemon)
     with at_the_keys(daemon) as (process, terminal):
         until(lambda: hold_key(terminal, RIGHT, 0.3) or place(daemon)[0] - begin[0] > 0.02)
-        os.close(terminal)  # in mid-motion
+        os.close(terminal)  # in motion
         assert process.wait(timeout=60.0) == 1
         assert process.stderr is not None
         assert "the terminal is gone" in process.stderr.read()
@@ -172,7 +172,7 @@ def test_keys_lead_until_the_terminal_is_gone(daemon: RealDaemon) -> None:
     np.testing.assert_allclose(place(daemon), rest, atol=2e-3)
 
 
-def test_who_is_killed_in_mid_motion_is_braked(daemon: RealDaemon) -> None:
+def test_the_robot_brakes_when_teleop_is_killed_in_motion(daemon: RealDaemon) -> None:
     begin = place(daemon)
     with at_the_keys(daemon) as (process, terminal):
         until(lambda: hold_key(terminal, b"a", 0.3) or begin[0] - place(daemon)[0] > 0.02)
@@ -185,7 +185,7 @@ def test_who_is_killed_in_mid_motion_is_braked(daemon: RealDaemon) -> None:
     assert np.linalg.norm(place(daemon) - killed) < 0.1
 
 
-def test_what_cannot_be_led_is_reported(
+def test_impossible_teleoperation_is_reported(
     daemon: RealDaemon, folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(session_module, "_GREET_S", 0.5)
@@ -210,10 +210,10 @@ def test_what_cannot_be_led_is_reported(
     assert daemon.status()["program"] == "hold"
 
 
-def test_the_recording_shows_no_step_and_each_confirmation(
+def test_the_recording_has_no_steps_and_shows_each_confirmation(
     daemon: RealDaemon, folder: Path
 ) -> None:
-    """Last: it ends the daemon, whose recording holds all that went before."""
+    """This test is last because it ends the daemon, to read the recording of all others."""
     described = daemon.http.get("/description").json()["programs"]
     followed = described.index("pose")
     daemon.end()
@@ -229,7 +229,7 @@ def test_the_recording_shows_no_step_and_each_confirmation(
     xy = pose[:, :2]
     speed = np.diff(xy, axis=0) / PERIOD_S
     change = np.diff(speed, axis=0)
-    # what a hand has begun is braked by the program that comes after
+    # the following program brakes the motion that the hand started
     begun, ended = np.flatnonzero(program == followed)[[0, -1]]
     known = np.isfinite(xy).all(axis=1) & (state == LoopState.ACTIVE)
     known &= (program == followed) | (program == held)

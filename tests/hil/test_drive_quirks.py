@@ -1,7 +1,7 @@
-"""Every shipped drive profile on its simulated drive: one suite, whatever the drive's quirks.
+"""One suite runs each shipped drive profile on its simulated drive.
 
-The simulated drives take their quirks from data of the simulator, so that a profile with a wrong
-unit, sign or mode fails here against the true motion.
+The simulated drives take their quirks from the simulator's data. A profile with a wrong unit, sign
+or mode fails here when compared with the true motion.
 """
 
 from __future__ import annotations
@@ -34,10 +34,10 @@ from cdpr_tools.composition.simulator import OwnSimulator
 from cdpr_tools.output import Output
 from tests.fault_texts import alarm
 
-# the plant's truth, which the master does not know
+# true values of the plant, which the master does not know
 TRUE_OVER_NOMINAL, COGGING_NM = 1.04, 0.06
 RAD_PER_COUNT = math.tau / 8192
-# sin(4 angle + 17 deg), and the index lies at 123.4 deg
+# sin(4 angle + 17 deg), with the index at 123.4 deg
 _PHASE_AT_INDEX_DEG = (17.0 + 4 * 123.4 + 180.0) % 360.0 - 180.0
 UNITS_NM = {"generic-cia402": 3e-3, "mnm-profile-torque": 1e-3, "parker-compax3-canopen": 3e-3}
 PERIOD_S = 1e-3
@@ -45,7 +45,7 @@ PERIOD_S = 1e-3
 
 @dataclass
 class BootedDrive:
-    """One drive type, simulated and booted, and what its tests need."""
+    """A simulated and booted drive of one type, with its session and motion."""
 
     name: str
     session: Session
@@ -59,7 +59,7 @@ class BootedDrive:
         return self.session.network.read_int(self.session.winch.node_id, index, sub)
 
     def power(self) -> None:
-        """Enable it in its torque mode."""
+        """Enable the drive in its torque mode."""
         self.session.set_mode(self.drive.mode_torque)
         self.session.enable()
 
@@ -88,7 +88,7 @@ def booted(module_drive: BootedDrive) -> Iterator[BootedDrive]:
     session.idle(0.3)
 
 
-def test_boots_as_its_profile_says(booted: BootedDrive) -> None:
+def test_a_drive_boots_with_the_values_of_its_profile(booted: BootedDrive) -> None:
     boot, drive = booted.session.boot, booted.drive
     assert (boot.vendor_id, boot.product_code, boot.revision) == (
         drive.vendor_id, drive.product_code, drive.revision,
@@ -98,8 +98,8 @@ def test_boots_as_its_profile_says(booted: BootedDrive) -> None:
     assert booted.session.network.dictionary(1).device_information.vendor_number == boot.vendor_id
 
 
-def test_pdos_are_mapped_as_its_profile_says(booted: BootedDrive) -> None:
-    assert any(" and " in change for change in booted.session.boot.changed), "nothing was mapped"
+def test_pdos_are_mapped_as_in_the_profile(booted: BootedDrive) -> None:
+    assert any(" and " in change for change in booted.session.boot.changed), "no object was mapped"
     for base, pdos in ((0x1400, booted.drive.rpdos), (0x1800, booted.drive.tpdos)):
         for pdo in pdos:
             parameters, mapping = base + pdo.number - 1, base + 0x1FF + pdo.number
@@ -109,16 +109,16 @@ def test_pdos_are_mapped_as_its_profile_says(booted: BootedDrive) -> None:
             assert mapped == [entry.mapping for entry in pdo.entries]
 
 
-def test_every_mode_of_its_profile_is_confirmed(booted: BootedDrive) -> None:
+def test_each_mode_of_the_profile_is_confirmed(booted: BootedDrive) -> None:
     for mode in booted.drive.supported_modes:
         booted.session.set_mode(mode)
         assert booted.shown(0x6061) == mode
 
 
-def test_info_tells_what_the_drive_cannot(
+def test_info_reports_values_that_the_drive_has_no_objects_for(
     booted: BootedDrive, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """The ratings and modes for which a drive has no objects come from the files."""
+    """Such ratings and modes come from the files."""
     winch = booted.session.winch
     url = str(booted.session.network.url)
     info(winch=winch.reference, bus=url, plant=None, as_json=True)
@@ -130,7 +130,7 @@ def test_info_tells_what_the_drive_cannot(
     assert told["profile_fits"] is True
 
 
-def test_other_modes_are_refused_by_master_and_drive(booted: BootedDrive) -> None:
+def test_unsupported_modes_are_rejected_by_master_and_drive(booted: BootedDrive) -> None:
     foreign = sorted({*range(1, 11)} - {*booted.drive.supported_modes})
     assert foreign
     booted.session.set_mode(Mode.HOMING)
@@ -142,7 +142,7 @@ def test_other_modes_are_refused_by_master_and_drive(booted: BootedDrive) -> Non
         assert booted.shown(0x6061) == Mode.HOMING
 
 
-def test_is_enabled_and_disabled(booted: BootedDrive) -> None:
+def test_a_drive_is_enabled_and_disabled(booted: BootedDrive) -> None:
     booted.power()
     assert booted.session.device.states() == [State.OPERATION_ENABLED]
     assert booted.shown(0x6061) == booted.drive.mode_torque
@@ -155,7 +155,7 @@ def test_is_enabled_and_disabled(booted: BootedDrive) -> None:
 
 
 @pytest.mark.parametrize("torque_Nm", [0.6, -0.6])
-def test_a_torque_turns_the_rotor_that_way_with_that_strength(
+def test_a_torque_acts_with_the_commanded_sign_and_magnitude(
     booted: BootedDrive, torque_Nm: float
 ) -> None:
     booted.power()
@@ -166,13 +166,13 @@ def test_a_torque_turns_the_rotor_that_way_with_that_strength(
     assert steady == pytest.approx(torque_Nm * TRUE_OVER_NOMINAL, rel=0.01)
     assert np.sign(true["velocity"][-1]) == np.sign(torque_Nm)
     assert abs(true["velocity"][-1]) > 20.0
-    # what the drive tells, against the truth it does not know
+    # the reported values agree with the truth
     moved = float(device.feedback.position_rad[0]) - before
     now = booted.motion.truth(device.feedback.cycle, device.feedback.cycle)
     assert moved == pytest.approx(now["angle"][0] - true["angle"][0], abs=4 * RAD_PER_COUNT)
 
 
-def test_torques_are_reported_and_sent_in_its_own_steps(booted: BootedDrive) -> None:
+def test_torques_are_sent_and_reported_in_steps_of_the_drive(booted: BootedDrive) -> None:
     booted.power()
     device = booted.session.device
     wanted, sent, told = 0.0437, [], []
@@ -193,12 +193,12 @@ def test_torques_are_reported_and_sent_in_its_own_steps(booted: BootedDrive) -> 
 
 
 @pytest.mark.parametrize(("method", "way"), [(34, 1), (33, -1)])
-def test_homing_goes_the_way_asked_and_finds_the_index(
+def test_homing_moves_in_the_requested_direction_and_finds_the_index(
     booted: BootedDrive, method: int, way: int
 ) -> None:
     device = booted.session.device
     booted.power()
-    booted.motion.push(-way * 0.6, 14)  # away from an index that an earlier test has found
+    booted.motion.push(-way * 0.6, 14)  # away from the index that an earlier test found
     booted.session.idle(0.3)
     booted.session.disable()
     first = device.feedback.cycle + 1
@@ -209,7 +209,7 @@ def test_homing_goes_the_way_asked_and_finds_the_index(
     assert travelled.min() > -0.02
     speed = np.median(true["velocity"][200:-50])
     assert speed == pytest.approx(way * math.radians(30.0), rel=0.05)
-    # 360 deg/s2: 70 ms from a fifteenth of the speed to nine tenths of it, where cogging helps
+    # 360 deg/s2: 70 ms from a fifteenth to nine tenths of the speed, with the help of cogging
     begun, there = (np.argmax(way * true["velocity"] > v * math.radians(30)) for v in (1 / 15, 0.9))
     assert 50 < there - begun < 300
     assert device.feedback.index_known.all()
@@ -217,7 +217,7 @@ def test_homing_goes_the_way_asked_and_finds_the_index(
 
 
 def _index_is_right(booted: BootedDrive) -> None:
-    """Hold the angle from the index, as the master has it, against the truth."""
+    """Compare the master's angle from the index with the truth."""
     feedback = booted.session.device.feedback
     now = booted.motion.truth(feedback.cycle, feedback.cycle)
     known = float(feedback.position_rad[0] - feedback.index_rad[0])
@@ -234,7 +234,7 @@ def test_touch_probe_finds_the_index_in_motion(booted: BootedDrive) -> None:
     booted.power()
     session.expect_index()
     assert not device.feedback.index_known[0]
-    booted.motion.push(0.6, 20)  # by more than a turn, wherever the rotor stands
+    booted.motion.push(0.6, 20)  # by more than a turn from any rotor angle
     session.idle(0.3)
     assert device.feedback.index_known[0]
     _index_is_right(booted)
@@ -256,7 +256,7 @@ def test_quick_stop_brings_the_rotor_to_rest(booted: BootedDrive) -> None:
     assert end - begin < 500
 
 
-def test_a_fault_takes_the_torque_and_stays_until_it_is_acknowledged(booted: BootedDrive) -> None:
+def test_a_fault_removes_torque_and_remains_until_acknowledged(booted: BootedDrive) -> None:
     booted.power()
     device = booted.session.device
     true = booted.motion.push(2.8, 8)
@@ -273,7 +273,7 @@ def test_a_fault_takes_the_torque_and_stays_until_it_is_acknowledged(booted: Boo
     assert booted.motion.push(0.6, 14)["motor_Nm"][8:14] == pytest.approx(0.624, rel=0.01)
 
 
-def test_a_master_that_falls_silent_loses_the_torque(booted: BootedDrive) -> None:
+def test_a_silent_master_makes_the_drive_remove_torque(booted: BootedDrive) -> None:
     booted.power()
     booted.motion.push(0.05, 50)  # too little to turn the rotor
     clock = booted.session.network.clock
@@ -282,10 +282,12 @@ def test_a_master_that_falls_silent_loses_the_torque(booted: BootedDrive) -> Non
         assert clock.now_s < deadline_s
         clock.sleep(0.02)
     assert "8130h" in alarm(booted.session.device)
-    booted.session.network.start(booted.session.winch.node_id)  # CiA 301, 1029h: it had left it
+    booted.session.network.start(
+        booted.session.winch.node_id
+    )  # CiA 301, 1029h: the drive had left operational
 
 
-def test_a_sweep_finds_the_cogging(booted: BootedDrive, tmp_path: Path) -> None:
+def test_a_sweep_measures_the_cogging(booted: BootedDrive, tmp_path: Path) -> None:
     session, paths = booted.session, Paths(tmp_path)
     (tmp_path / "raw").mkdir()
     Commissioning(session, Output(True), paths).prepare()
@@ -294,19 +296,19 @@ def test_a_sweep_finds_the_cogging(booted: BootedDrive, tmp_path: Path) -> None:
     session.enable()
     passes = both_ways(math.radians(60.0), 0.5 * math.pi, 1)
     recorded = Measurement(session, Output(True), paths).track("sweep", design, None, passes)
-    # half the sum of both directions: what does not turn round with the motion, as friction does
+    # half the sum of both directions cancels friction, which changes sign with the motion
     orders = np.arange(1, 13)
     waves = np.mean([_waves(path, orders) for path in recorded], axis=0)
     amplitudes = np.abs(waves)
     assert orders[np.argmax(amplitudes)] == 4
-    # in the drive's torque, which is as much smaller as the true torque constant is larger
+    # in the drive's torque, which is smaller by the factor of the true torque constant
     assert amplitudes[3] == pytest.approx(COGGING_NM / TRUE_OVER_NOMINAL, rel=0.05)
     assert max(np.delete(amplitudes, 3)) < 0.1 * amplitudes[3]
     assert math.degrees(np.angle(waves[3])) == pytest.approx(_PHASE_AT_INDEX_DEG, abs=4.0)
 
 
 def _waves(path: Path, orders: NDArray[np.int64]) -> NDArray[np.complex128]:
-    """Return the complex amplitudes of a recorded pass' torque over the angle from the index."""
+    """Return complex amplitudes of the torque of a recorded pass over the angle from the index."""
     found = recording(read_raw_log(path))
     angle, torque = found.sweep.angle_rad[found.judged], found.sweep.torque_Nm[found.judged]
     turning = np.outer(angle, orders)

@@ -1,4 +1,4 @@
-"""A platform that hung when the power was taken at once: what `tighten` does with it then."""
+"""`tighten` after power was cut immediately while the platform was suspended."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from cdpr_tools.trials.lockstep import CommandRefusedError, LockstepRobot
 from cdpr_tools.trials.pose_log import read_pose_log
 
 LOOSE_N, TAKES_UP_N = 15.0, 40.0
-"""What no winch pulls with that is not told to, and what slack is taken up with, and friction."""
+"""Tension of an inactive winch, and tension to take up slack, both with friction."""
 
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The shipped robots with a quarter of the cycles a second, which take less time."""
+    """Write the shipped robots with a quarter of the cycle rate, which takes less time."""
     place = tmp_path_factory.mktemp("robots")
     for name in ("spatial-8", "suspended-8"):
         shipped = (SHIPPED / "robots" / f"{name}.toml").read_text()
@@ -47,7 +47,7 @@ def highest_N(robot: LockstepRobot, since: int) -> float:
 def fallen(
     folder: Path, position_m: list[float], rotation_rad: list[float]
 ) -> Iterator[LockstepRobot]:
-    """Yield a robot whose platform has fallen from there, and that has power again."""
+    """Yield a robot with power whose platform has fallen from the given pose."""
     with LockstepRobot(folder / "spatial-8.toml") as robot:
         robot.enable()
         robot.carry_out("tighten")
@@ -60,7 +60,7 @@ def fallen(
         yield robot
 
 
-def test_one_that_has_turned_over_is_not_pulled_at(folder: Path) -> None:
+def test_tighten_does_not_pull_at_a_platform_that_has_turned_over(folder: Path) -> None:
     with fallen(folder, [-0.45, -0.3, 1.7], [0.18, 0.18, 0.0]) as robot:
         assert turned_deg(robot) > 60.0
         with pytest.raises(CommandRefusedError, match="it has come down, may have turned over"):
@@ -71,16 +71,16 @@ def test_one_that_has_turned_over_is_not_pulled_at(folder: Path) -> None:
         robot.run(0.5)
         assert highest_N(robot, since) < LOOSE_N
         robot.program("tighten", **{"from": "lengths"})
-        robot.finish(120.0)  # each cable by itself is reeled in by decimetres, at 50 mm/s
+        robot.finish(120.0)  # each cable is reeled in separately by decimetres at 50 mm/s
         assert re.search(r"turned by \d+ deg.*: it is not pulled at", robot.progress["trouble"])
         assert robot.progress["stage"] == "slack" and not robot.progress["tight"]
         assert highest_N(robot, since) < TAKES_UP_N
 
 
-def test_one_that_still_stands_upright_is_tightened_where_it_is(folder: Path) -> None:
-    # 15 cm above the stand: from higher up it is chance whether it tips over
+def test_tighten_from_lengths_finds_a_platform_that_landed_upright(folder: Path) -> None:
+    # 15 cm above the stand: from higher up it may tip over
     with fallen(folder, [0.15, 0.5, 1.45], [0.2, 0.0, 0.0]) as robot:
-        assert turned_deg(robot) < 20.0  # the platform may be turned by 15 in use
+        assert turned_deg(robot) < 20.0  # in use, the platform may be turned by 15 degrees
         assert robot.progress["fallen"]
         with pytest.raises(CommandRefusedError, match="allowed: from home, lengths"):
             robot.program("tighten")
@@ -95,12 +95,12 @@ def test_one_that_still_stands_upright_is_tightened_where_it_is(folder: Path) ->
         here_m, true_m = robot.progress["position_m"], robot.truth()["position_m"]
         assert here_m == pytest.approx(np.ravel(true_m), abs=0.01)
         robot.carry_out("lower")
-        robot.program("tighten")  # home again, nobody has to be told so
+        robot.program("tighten")  # at home again, `from` is not needed
 
 
 @contextmanager
 def held_by_axes(folder: Path, name: str, position_m: list[float]) -> Iterator[LockstepRobot]:
-    """Yield a robot whose platform hangs, each cable held by itself, as after brakes."""
+    """Yield a robot whose platform is suspended with each cable held separately, as by brakes."""
     with LockstepRobot(folder / f"{name}.toml") as robot:
         robot.enable()
         robot.carry_out("tighten")
@@ -116,7 +116,7 @@ def held_by_axes(folder: Path, name: str, position_m: list[float]) -> Iterator[L
     ("name", "position_m"),
     [("spatial-8", [-0.4, 0.5, 1.7]), ("suspended-8", [1.5, 1.0, 1.5])],
 )
-def test_one_that_brakes_have_held_is_held_where_it_hangs(
+def test_tighten_from_lengths_keeps_a_suspended_platform_in_place(
     folder: Path, name: str, position_m: list[float]
 ) -> None:
     with held_by_axes(folder, name, position_m) as robot:
@@ -137,7 +137,7 @@ def test_one_that_brakes_have_held_is_held_where_it_hangs(
         assert robot.progress["tight"], robot.progress["trouble"]
 
 
-def test_drives_that_lose_their_power_together_let_it_fall_as_well(folder: Path) -> None:
+def test_tighten_is_rejected_after_all_drives_lost_power_together(folder: Path) -> None:
     with LockstepRobot(folder / "spatial-8.toml") as robot:
         robot.enable()
         robot.carry_out("tighten")

@@ -1,4 +1,4 @@
-"""As many cables as directions: nothing but what its own motor does tells of a cable."""
+"""With as many cables as directions, only a cable's own motor shows its state."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ PLOTTER = Path(__file__).parent / "robots" / "plotter.toml"
 
 @pytest.mark.parametrize(("axis", "name"), [(0, "c1"), (1, "c2")])
 def test_a_cable_that_is_cut_is_reported_as_broken(axis: int, name: str) -> None:
-    """What is left of 25 N is its winch's friction, four times what counts as slack."""
+    """The estimated tension falls from 25 N to winch friction, four times the slack threshold."""
     with LockstepRobot(PLOTTER) as robot:
         robot.enable()
         robot.carry_out("tighten")
@@ -29,10 +29,10 @@ def test_a_cable_that_is_cut_is_reported_as_broken(axis: int, name: str) -> None
         assert robot.status["reason"].startswith(f"{name}: the cable seems broken")
 
 
-def test_a_cable_that_was_slack_as_lengths_were_looked_for_is_reported(tmp_path: Path) -> None:
-    """Friction and cogging keep its winch until it is pulled harder; the platform is off by 4 mm.
+def test_tighten_reports_a_cable_that_friction_kept_slack(tmp_path: Path) -> None:
+    """Friction and cogging block the winch until the torque rises. The platform is off by 4 mm.
 
-    With the friction that winches usually have, or twice that, it is tight.
+    With usual or doubled friction the cable is tight.
     """
     plant = tmp_path / "plant.toml"
     plant.write_text(

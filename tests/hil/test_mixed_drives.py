@@ -1,4 +1,4 @@
-"""Drives of all shipped types in one group on one bus, each in its own mode, unit and PDOs."""
+"""Drives of all shipped types in one group on one bus, each with its mode, unit and PDOs."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ def _until(group: AxisGroup, state: State) -> None:
     raise AssertionError(group.states())
 
 
-def test_different_drives_work_in_one_group(mixed: AxisGroup) -> None:
+def test_different_drives_follow_torques_in_one_group(mixed: AxisGroup) -> None:
     modes = mixed.torque_modes
     assert len(set(modes)) > 1
     mixed.ask_mode(modes)
@@ -79,19 +79,19 @@ def test_different_drives_work_in_one_group(mixed: AxisGroup) -> None:
     _until(mixed, State.SWITCH_ON_DISABLED)
 
 
-def test_a_mode_that_one_of_them_lacks_is_refused_by_name(mixed: AxisGroup) -> None:
+def test_a_mode_that_one_drive_lacks_is_rejected_with_its_name(mixed: AxisGroup) -> None:
     lacking = next(a for a in mixed.axes if Mode.CYCLIC_TORQUE not in a.drive.supported_modes)
     mixed.ask_mode(Mode.HOMING)
     with pytest.raises(ModeRefusedError, match=f"node {lacking.node_id}: mode 10"):
         mixed.ask_mode(Mode.CYCLIC_TORQUE)
     _cycles(mixed, 50, [0.0] * mixed.n)
-    assert mixed.mode_confirmed(), "those that have the mode were not left in it"
+    assert mixed.mode_confirmed(), "drives that have the mode must not remain in it"
     for axis in mixed.axes:
         assert mixed.network.read_int(axis.node_id, 0x6061) == Mode.HOMING
 
 
-def test_after_a_refusal_none_is_enabled_in_the_mode_it_had(mixed: AxisGroup) -> None:
-    """The drive's refusal comes late: axes before it have taken the new mode, others have not."""
+def test_no_drive_can_be_enabled_after_a_rejected_mode(mixed: AxisGroup) -> None:
+    """The drive rejects the mode late: axes before it have changed mode, others have not."""
     mixed.ask_mode(mixed.torque_modes)
     _cycles(mixed, 50, [0.0] * mixed.n)
     assert mixed.mode_confirmed()
@@ -102,7 +102,7 @@ def test_after_a_refusal_none_is_enabled_in_the_mode_it_had(mixed: AxisGroup) ->
         mixed.request(State.OPERATION_ENABLED)
 
 
-def test_none_is_enabled_before_the_last_confirms_its_mode(mixed: AxisGroup) -> None:
+def test_no_drive_can_be_enabled_before_all_confirm_their_mode(mixed: AxisGroup) -> None:
     mixed.ask_mode(Mode.PROFILE_POSITION)
     _cycles(mixed, 1, [0.0] * mixed.n)
     assert not mixed.mode_confirmed()

@@ -1,4 +1,4 @@
-"""What `cdpr robot show` says of a cable that breaks is true of simulated robots."""
+"""Predictions of `cdpr robot show` for a broken cable are true of simulated robots."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from cdpr_tools.trials.pose_log import read_pose_log
 
 CUT = 12
 MOST = 1.3
-"""By how much truth may exceed what is predicted."""
+"""Ratio by which the truth may exceed the prediction."""
 LEAST = 0.4
-"""Of what is predicted the platform does at least; else anything would be on the safe side."""
+"""Least ratio of truth to prediction, since any large prediction would be on the safe side."""
 
 
 @pytest.mark.parametrize(
@@ -29,7 +29,7 @@ LEAST = 0.4
     ],
     ids=lambda value: getattr(value, "stem", None),
 )
-def test_a_platform_swings_and_gets_as_far_as_predicted(
+def test_a_platform_swings_as_fast_and_as_far_as_predicted(
     robot: Path, cable: int, place_m: tuple[float, ...], tmp_path: Path
 ) -> None:
     slower = tmp_path / robot.name

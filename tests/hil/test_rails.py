@@ -1,4 +1,4 @@
-"""Rails moved by command: what is refused, what an interrupted move leaves behind."""
+"""Commands that move rails: rejected moves and interrupted moves."""
 
 from __future__ import annotations
 
@@ -93,7 +93,7 @@ def result(command: subprocess.Popen[str], status: int = 0) -> dict[str, Any]:
 
 
 @pytest.mark.parametrize("kind", ["cia402", "modbus"])
-def test_a_move_arrives_and_voids_the_calibration(rails: Rails, kind: str) -> None:
+def test_a_move_arrives_and_invalidates_the_calibration(rails: Rails, kind: str) -> None:
     target = rails.position_m(kind) + 0.01
     told = result(rails.move(kind, target))
     assert abs(rails.position_m(kind) - target) < 5e-4
@@ -104,16 +104,16 @@ def test_a_move_arrives_and_voids_the_calibration(rails: Rails, kind: str) -> No
 
 
 @pytest.mark.parametrize("meanwhile", ["nothing", "Ctrl-C", "power"])
-def test_while_a_slow_disk_is_written_the_drive_hears_its_master_and_all_is_looked_at_again(
+def test_conditions_of_a_move_are_checked_again_after_a_slow_disk_write(
     rails: Rails, monkeypatch: pytest.MonkeyPatch, meanwhile: str
 ) -> None:
-    def slow(_fd: int) -> None:  # a busy disk cannot be had here
+    def slow(_fd: int) -> None:  # simulates a busy disk
         if meanwhile == "Ctrl-C" and not written:
             os.kill(os.getpid(), signal.SIGINT)
         if meanwhile == "power":
             power()
         written.append(_fd)
-        # longer than drives wait for their master, and who asks winches for an answer
+        # longer than the timeouts of drives for their master and of questions to winches
         time.sleep(1.5 * MASTER_S)
 
     def enable(axis: Cia402RailAxis) -> None:
@@ -136,11 +136,11 @@ def test_while_a_slow_disk_is_written_the_drive_hears_its_master_and_all_is_look
     said = str(outcome.exception)
     assert (why or "stopped on request") in said
     assert said.endswith("; the robot is not calibrated any more")
-    assert abs(moved_m) < 2e-4 and rails.braked("cia402")  # its brake's play
+    assert abs(moved_m) < 2e-4 and rails.braked("cia402")  # play of the brake
     assert not enabled
 
 
-def test_a_stop_before_the_carriage_moves_leaves_the_calibration(
+def test_a_stop_before_the_carriage_moves_keeps_the_calibration(
     rails: Rails, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def push(axis: Cia402RailAxis, share: float) -> bool:
@@ -157,7 +157,7 @@ def test_a_stop_before_the_carriage_moves_leaves_the_calibration(
 
 
 @pytest.mark.parametrize("kind", ["cia402", "modbus"])
-def test_a_brake_that_does_not_hold_is_found_before_the_move(rails: Rails, kind: str) -> None:
+def test_a_brake_that_does_not_hold_is_detected_before_the_move(rails: Rails, kind: str) -> None:
     before = rails.position_m(kind)
     rails.wear_brake(kind)
     error = rails.refused(kind, before + 0.3)
@@ -176,7 +176,7 @@ def test_a_brake_that_does_not_hold_is_found_before_the_move(rails: Rails, kind:
         (RailFault.SILENT, f"no answer within {ANSWER_S:g} s from unit 1"),
     ],
 )
-def test_a_drive_that_does_not_do_as_it_is_told_is_not_moved(
+def test_a_drive_that_does_not_follow_commands_is_not_moved(
     rails: Rails, fault: RailFault, said: str
 ) -> None:
     before = rails.position_m("modbus")
@@ -187,8 +187,8 @@ def test_a_drive_that_does_not_do_as_it_is_told_is_not_moved(
     assert rails.position_m("modbus") == before
 
 
-@pytest.mark.alone  # load cells and who reads them live by the wall clock
-def test_tight_cables_refuse_the_move_and_end_it(rails: Rails) -> None:
+@pytest.mark.alone  # load cells and their reader follow the wall clock
+def test_tight_cables_prevent_or_end_a_move(rails: Rails) -> None:
     before = rails.position_m("cia402")
     cells = ("--sensors", "rtu-load-cell-1", "--tension-port", rails.tension_port)
     rails.pull(40.0)
@@ -206,7 +206,7 @@ def test_tight_cables_refuse_the_move_and_end_it(rails: Rails) -> None:
     assert before + 0.01 < rails.position_m("cia402") < before + 0.3
 
 
-def test_a_winch_with_power_refuses_the_move_and_ends_it(rails: Rails) -> None:
+def test_a_winch_with_power_prevents_or_ends_a_move(rails: Rails) -> None:
     before = rails.position_m("modbus")
     with another_winch() as (bus, power):
         slack = ("--cables-slack-checked", "--winch-bus", bus)
@@ -223,7 +223,7 @@ def test_a_winch_with_power_refuses_the_move_and_ends_it(rails: Rails) -> None:
         assert rails.position_m("modbus") == before
 
 
-def test_a_rail_on_modbus_heeds_the_safety_io_and_one_command(rails: Rails) -> None:
+def test_a_modbus_rail_obeys_the_safety_io_and_only_one_command(rails: Rails) -> None:
     before = rails.position_m("modbus")
     slack = ("--cables-slack-checked", "--safety-io", rails.io_device.reference)
     command = rails.move("modbus", before + 0.5, *slack)
@@ -237,7 +237,9 @@ def test_a_rail_on_modbus_heeds_the_safety_io_and_one_command(rails: Rails) -> N
     rails.acknowledge_trip()
 
 
-def test_a_real_drive_is_not_moved_unasked_because_a_simulated_bus_is_named(rails: Rails) -> None:
+def test_naming_a_simulated_bus_does_not_replace_the_confirmation_for_a_real_rail(
+    rails: Rails,
+) -> None:
     arguments = ["move", str(rails.modbus), "--to", "0.9", "--cables-slack-checked"]
     outcome = CliRunner().invoke(rail_commands.app, [*arguments, "--bus", rails.bus])
     assert isinstance(outcome.exception, BadInputError)
@@ -245,7 +247,7 @@ def test_a_real_drive_is_not_moved_unasked_because_a_simulated_bus_is_named(rail
 
 
 @pytest.mark.parametrize("kind", ["cia402", "modbus"])
-def test_an_interrupted_move_is_stopped_and_braked_and_voids_the_calibration(
+def test_an_interrupted_move_stops_brakes_and_invalidates_the_calibration(
     rails: Rails, kind: str
 ) -> None:
     before = rails.position_m(kind)
@@ -279,17 +281,17 @@ def test_an_interrupted_move_comes_to_rest_before_it_is_braked(
     monkeypatch.setattr(Cia402RailAxis, "set_brake", set_brake)
     assert "stopped on request" in rails.refused("cia402", before + 0.5)
     in_motion, *braked = map(abs, speeds)
-    assert in_motion > 0.8 * 0.05 and max(braked) < 0.2 * 0.05  # of the move's speed
+    assert in_motion > 0.8 * 0.05 and max(braked) < 0.2 * 0.05  # share of the move's speed
 
 
 @pytest.mark.parametrize("kind", ["cia402", "modbus"])
-def test_a_command_that_dies_leaves_no_rail_that_moves(rails: Rails, kind: str) -> None:
+def test_a_rail_stops_after_its_command_was_killed(rails: Rails, kind: str) -> None:
     before = rails.position_m(kind)
     command = rails.move(kind, before + 0.5)
     await_motion(rails, kind, command, before + 0.005)
     command.kill()
     command.communicate()
-    if kind == "cia402":  # the drive misses its master before the I/O does
+    if kind == "cia402":  # the drive misses the master before the I/O does
         wait_until(lambda: abs(rails.rail.state().motor_rad_s) < 0.05)
         assert rails.rail.brake_released
     wait_until(lambda: rails.braked(kind))
@@ -297,7 +299,7 @@ def test_a_command_that_dies_leaves_no_rail_that_moves(rails: Rails, kind: str) 
     assert rails.calibration()["calibrated"] is False
 
 
-def test_a_safety_io_that_falls_silent_ends_a_move(rails: Rails) -> None:
+def test_a_silent_safety_io_ends_a_move(rails: Rails) -> None:
     before = rails.position_m("cia402")
     command = rails.move("cia402", before + 0.3)
     await_motion(rails, "cia402", command, before + 0.005)
@@ -337,7 +339,7 @@ def test_the_emergency_stop_ends_a_move(rails: Rails) -> None:
         ),
     ],
 )
-def test_what_a_move_needs_is_said_before_anything_moves(
+def test_missing_requirements_of_a_move_are_reported_before_it_starts(
     arguments: tuple[str, ...], said: str
 ) -> None:
     command = ["move", "rail-cia402", "--bus", "simbus:nobody", *arguments]

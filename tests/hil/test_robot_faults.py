@@ -1,4 +1,4 @@
-"""What goes wrong on a planar robot: it is held or let down under control, and the reason is told.
+"""Faults of a planar robot: it is held or lowered under control and the reason is reported.
 
 Speeds are those of the simulator's true pose, which no controller reads.
 """
@@ -33,7 +33,7 @@ ACCELERATION_m_s2 = 2.0
 
 
 def aloft(robot: LockstepRobot, **tighten: str) -> None:
-    """Have the platform hang on its cables."""
+    """Tighten the cables and lift the platform."""
     robot.enable()
     robot.carry_out("tighten", 30.0, **tighten)
     robot.carry_out("pose", 30.0, position_m=list(HIGH))
@@ -42,7 +42,7 @@ def aloft(robot: LockstepRobot, **tighten: str) -> None:
 
 @pytest.fixture(scope="module")
 def planar(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The shipped robot at half the cycles a second, which take half the time."""
+    """Write the shipped robot with half the cycle rate, which takes half the time."""
     shipped = load_robot("planar-3").path
     slower = tmp_path_factory.mktemp("planar") / shipped.name
     text = shipped.read_text()
@@ -67,7 +67,7 @@ def shared(planar: Path) -> Iterator[LockstepRobot]:
 
 @pytest.fixture
 def healthy(shared: LockstepRobot) -> LockstepRobot:
-    """A robot at rest, whose tests leave it able to go on."""
+    """Return a robot at rest, for tests that leave it usable."""
     if shared.right.token is None:
         shared.run(4.0)
         shared.right.take("trial")
@@ -77,14 +77,14 @@ def healthy(shared: LockstepRobot) -> LockstepRobot:
 
 
 class Truth:
-    """What the simulator logs from now on."""
+    """The simulator's log from now on."""
 
     def __init__(self, robot: LockstepRobot) -> None:
         self._robot = robot
         self._from = robot.cycle + robot.sync_offset
 
     def read(self) -> Any:
-        """Return the records since."""
+        """Return the records since then."""
         log = read_pose_log(self._robot.truth_log)
         return log[log["sync_index"] >= self._from]
 
@@ -94,8 +94,8 @@ def end_of_fault(robot: LockstepRobot) -> None:
     robot._turn_until(lambda: not robot.loop.busy, 60.0, "the power off")
 
 
-def stands_m_s(robot: LockstepRobot, truth: Truth) -> float:
-    """Return the highest speed from 50 ms before the power goes until a second after it."""
+def speed_at_power_off_m_s(robot: LockstepRobot, truth: Truth) -> float:
+    """Return the highest speed from 50 ms before to 1 s after the power is cut."""
     end_of_fault(robot)
     off = len(truth.read())
     robot.run(1.0)
@@ -107,7 +107,7 @@ def height_m(records: Any) -> float:
 
 
 FAULTS = [
-    # what breaks where, by 2F00h; what is told; whether gravity can still be carried
+    # the fault and its axis by 2F00h, the reported texts, whether the cables still carry gravity
     ((UPPER_RIGHT, 1, 0x7305), ("7305h",), False),
     ((UPPER_LEFT, 12, 1), ("upper left: the cable seems broken",), False),
     ((LOWER, 12, 1), ("lower: the cable seems broken",), True),
@@ -120,10 +120,10 @@ FAULTS = [
     FAULTS,
     ids=["drive", "cut", "lower-cut", "jump"],
 )
-def test_the_winches_that_are_left_let_the_platform_down(
+def test_the_remaining_winches_lower_the_platform(
     hanging: LockstepRobot, what: tuple[int, int, int], told: tuple[str, ...], carries: bool
 ) -> None:
-    if what[0] == LOWER:  # on its way home already
+    if what[0] == LOWER:  # already on its way home
         hanging.block.post_command({"do": "disable", "client": "test"})
         hanging.run(0.3)
     truth = Truth(hanging)
@@ -135,24 +135,24 @@ def test_the_winches_that_are_left_let_the_platform_down(
     mend = [text for text in hanging.status["notices"] if "mend the cable" in text]
     assert len(mend) == ("broken" in told[0])
     assert all(text.startswith(told[0]) for text in mend)
-    # how far its cables are out is not known any more, but after the fault of a drive
+    # cable lengths remain known only after a fault of a drive
     assert hanging.loop.engine.parts.estimator.estimate.length_known.all() == (told == ("7305h",))
     records = truth.read()
     down_m_s = -records["velocity_m_s"][:, 1].min()
     if carries:
         assert down_m_s < 0.45
-    # what only one upper cable is left of swings: it gains hardly more than its height is worth
+    # with one upper cable left the platform swings, with little more energy than its height gives
     speed_m_s = np.linalg.norm(records["velocity_m_s"], axis=1).max()
     assert speed_m_s < 1.03 * math.sqrt(2.0 * G_m_s2 * height_m(records))
     others = [axis for axis in range(3) if axis != what[0]]
     assert records["tension_N"][:, others].max() < TENSION_MAX_N
-    # it rests: on the floor, the cables without load
+    # at rest on the floor, without load on the cables
     assert np.abs(records["velocity_m_s"][-1]).max() < 0.02
     assert height_m(records) > 0.25
     assert records["tension_N"][-1].max() < 8.0
 
 
-def test_a_platform_that_friction_could_hold_stands_before_the_power_goes(
+def test_a_platform_held_by_friction_is_at_rest_before_power_is_cut(
     planar: Path, tmp_path: Path
 ) -> None:
     path, plant = tmp_path / "light.toml", tmp_path / "plant.toml"
@@ -162,21 +162,21 @@ def test_a_platform_that_friction_could_hold_stands_before_the_power_goes(
         aloft(robot)
         truth = Truth(robot)
         robot.inject_fault(LOWER, 1, 0x7305)
-        assert stands_m_s(robot, truth) < 0.01
+        assert speed_at_power_off_m_s(robot, truth) < 0.01
         assert height_m(truth.read()) == pytest.approx(HIGH[1] - 1.3, abs=0.02)
 
 
-def test_a_drive_that_goes_pre_operational_is_switched_off_before_it_drags_the_platform(
+def test_a_drive_that_goes_pre_operational_is_switched_off_in_time(
     hanging: LockstepRobot,
 ) -> None:
     axis = hanging.robot.axes[UPPER_LEFT]
     network = hanging.machine.networks[axis.bus]
     truth = Truth(hanging)
-    network.send(0, bytes([128, axis.node_id]))  # it keeps its last torque, and its heartbeats
+    network.send(0, bytes([128, axis.node_id]))  # it keeps its last torque and its heartbeats
     hanging.run(0.05)
     assert network.read_int(axis.node_id, 0x6041) & 0x6F == 0x40  # switch on disabled
     assert abs(height_m(truth.read())) < 0.02
-    assert stands_m_s(hanging, truth) < 0.02
+    assert speed_at_power_off_m_s(hanging, truth) < 0.02
     assert (
         "pre-operational" in hanging.loop.life.reason or "not answered" in hanging.loop.life.reason
     )
@@ -185,7 +185,7 @@ def test_a_drive_that_goes_pre_operational_is_switched_off_before_it_drags_the_p
 
 
 @pytest.mark.parametrize("slip_mm", [20, 60])
-def test_a_cable_that_slips_is_snatched_no_harder_than_predicted(
+def test_peak_tension_after_a_slip_is_at_most_as_predicted(
     hanging: LockstepRobot, slip_mm: int
 ) -> None:
     hanging.carry_out("pose", 30.0, position_m=[0.6, 2.4])
@@ -195,7 +195,7 @@ def test_a_cable_that_slips_is_snatched_no_harder_than_predicted(
     highest_N = truth.read()["tension_N"].max()
     predicted_N = slips(Subject(hanging.robot))[UPPER_RIGHT].peak_N
     assert highest_N < 1.1 * predicted_N
-    hanging.run(0.6)  # until the status is published again
+    hanging.run(0.6)  # wait for the next status
     notices, reason = hanging.status["notices"], hanging.loop.life.reason
     reported = any("upper right: tension" in note for note in notices) or "upper right" in reason
     assert reported or highest_N < TENSION_MAX_N
@@ -237,7 +237,7 @@ anchor_point_m = [0.0, 0.0, 0.0]
     )
 )
 SECOND_CAUSES = [
-    # what fails first and 0.5 s later; who is named for it
+    # the first fault, that 0.5 s later, and the axis and text reported for it
     ((UPPER_LEFT, CUT), (LOWER, None), "lower", "restarted"),
     ((LOWER, CUT), (UPPER_LEFT, FAULT), "upper left", "7305h"),
     ((LOWER, FAULT), (UPPER_RIGHT, CUT), "upper right", "the cable seems broken"),
@@ -245,7 +245,7 @@ SECOND_CAUSES = [
 
 
 @pytest.mark.parametrize(("first", "second", "named", "told"), SECOND_CAUSES)
-def test_what_fails_during_a_reaction_is_reported_after_the_first_cause(
+def test_a_second_fault_during_a_reaction_is_reported_in_the_notices(
     hanging: LockstepRobot,
     first: tuple[int, int],
     second: tuple[int, int | None],
@@ -268,17 +268,19 @@ def test_what_fails_during_a_reaction_is_reported_after_the_first_cause(
     assert any(named in note and told in note for note in notes), notes
 
 
-def test_a_cable_that_the_landing_makes_slack_is_not_called_broken_for_certain(
+def test_a_cable_slack_after_landing_is_reported_as_possibly_broken(
     hanging: LockstepRobot,
 ) -> None:
-    hanging.inject_fault(UPPER_LEFT, FAULT, 0x7305)  # it swings down on the other upper cable
+    hanging.inject_fault(
+        UPPER_LEFT, FAULT, 0x7305
+    )  # the platform swings down on the other upper cable
     end_of_fault(hanging)
     notes = [note for note in hanging.status["notices"] if "seems broken" in note]
     assert notes
     assert all("or the platform came to rest" in note for note in notes)
 
 
-def test_two_cables_that_break_at_once_are_both_reported(hanging: LockstepRobot) -> None:
+def test_two_cables_that_break_together_are_both_reported(hanging: LockstepRobot) -> None:
     hanging.inject_fault(UPPER_LEFT, CUT, 1)
     hanging.inject_fault(UPPER_RIGHT, CUT, 1)
     end_of_fault(hanging)
@@ -288,7 +290,7 @@ def test_two_cables_that_break_at_once_are_both_reported(hanging: LockstepRobot)
     assert "upper right: the cable seems broken" in told
 
 
-def test_a_slip_at_once_of_the_one_cable_that_carries_is_noticed(tmp_path: Path) -> None:
+def test_a_slip_of_the_only_carrying_cable_is_detected(tmp_path: Path) -> None:
     path = tmp_path / "one.toml"
     path.write_text(ONE_CARRIES)
     with LockstepRobot(path) as robot:
@@ -305,8 +307,8 @@ def test_a_slip_at_once_of_the_one_cable_that_carries_is_noticed(tmp_path: Path)
 
 
 @pytest.mark.parametrize("slip_mm", [60, 30])
-def test_a_cable_of_eight_that_slips_is_noticed_by_the_others(tmp_path: Path, slip_mm: int) -> None:
-    """By its tension if it slips far, else by the lengths; 30 mm only on a calibrated robot."""
+def test_a_slip_of_one_of_eight_cables_is_detected(tmp_path: Path, slip_mm: int) -> None:
+    """A large slip shows in the tension, a small one in the lengths of a calibrated robot."""
     path = tmp_path / "mine.toml"
     shutil.copy(load_robot("spatial-8").path, path)
     if slip_mm < 60:
@@ -323,12 +325,12 @@ def test_a_cable_of_eight_that_slips_is_noticed_by_the_others(tmp_path: Path, sl
         told = robot.loop.life.reason
         if "the cables' lengths disagree by" in told:
             assert "axis 2" in told
-            assert told.startswith(("the cables", "axis 2: "))  # no other cable is named as the one
+            assert told.startswith(("the cables", "axis 2: "))  # no wrong cable is named
         else:
             assert told.startswith("axis 2: the cable seems broken, or has slipped")
 
 
-def test_a_platform_gets_no_power_if_its_lengths_could_not_be_kept(planar: Path) -> None:
+def test_power_is_rejected_if_cable_lengths_cannot_be_stored(planar: Path) -> None:
     with LockstepRobot(planar) as robot:
         last = robot.loop.engine.parts.last_stop
         last.path = Path("/proc/nowhere/cdpr-rt/lengths.planar-3.json")
@@ -340,7 +342,7 @@ def test_a_platform_gets_no_power_if_its_lengths_could_not_be_kept(planar: Path)
         robot.enable()
 
 
-def test_a_lowering_that_fails_does_not_leave_motors_with_power(hanging: LockstepRobot) -> None:
+def test_a_failing_lower_program_ends_with_power_off(hanging: LockstepRobot) -> None:
     def mistaken(*_: object) -> None:
         raise ValueError("a mistake")
 
@@ -356,7 +358,7 @@ def test_a_lowering_that_fails_does_not_leave_motors_with_power(hanging: Lockste
     assert hanging.machine.unpowered()
 
 
-def test_a_lowering_that_does_not_come_to_rest_ends_in_a_fault(hanging: LockstepRobot) -> None:
+def test_a_platform_not_at_rest_after_lowering_ends_in_a_fault(hanging: LockstepRobot) -> None:
     lower = hanging.loop.engine.parts.programs["lower"]
     progress = lower.progress
     lower.progress = lambda: progress() | {"trouble": "not at rest"}  # type: ignore[method-assign]
@@ -372,14 +374,14 @@ def test_drives_that_are_all_silent_for_three_cycles_lower_the_platform(
 ) -> None:
     truth = Truth(hanging)
     for axis in range(3):
-        hanging.inject_fault(axis, 2, 6)  # two TPDOs a cycle
+        hanging.inject_fault(axis, 2, 6)  # two TPDOs per cycle
     hanging.run(0.1)
     assert hanging.machine.powered()
-    assert stands_m_s(hanging, truth) < 0.02
+    assert speed_at_power_off_m_s(hanging, truth) < 0.02
     assert -truth.read()["velocity_m_s"][:, 1].min() < 0.45
 
 
-def test_a_target_out_of_the_workspace_is_refused_and_nothing_moves(
+def test_a_target_outside_the_workspace_is_rejected_without_motion(
     healthy: LockstepRobot,
 ) -> None:
     truth = Truth(healthy)
@@ -397,7 +399,7 @@ def test_a_target_out_of_the_workspace_is_refused_and_nothing_moves(
 
 
 def lead(robot: LockstepRobot, hand: StreamSender, places: list[list[float]]) -> Any:
-    """Send a place every 20 ms; return the rows of all cycles meanwhile."""
+    """Send a position every 20 ms. Return the rows of all cycles meanwhile."""
     rows = []
     for place in places:
         robot.stream.take(hand.packet(robot.now_s, place))
@@ -405,7 +407,7 @@ def lead(robot: LockstepRobot, hand: StreamSender, places: list[list[float]]) ->
     return np.concatenate(rows)
 
 
-def test_a_hand_that_leaps_by_a_metre_moves_nothing_at_a_step(healthy: LockstepRobot) -> None:
+def test_a_jump_of_the_hand_by_a_metre_causes_no_step(healthy: LockstepRobot) -> None:
     healthy.program("pose", stream=True)
     hand = healthy.stream.sender()
     lead(healthy, hand, [[0.0, 0.0, 0.0]] * 20)
@@ -418,7 +420,7 @@ def test_a_hand_that_leaps_by_a_metre_moves_nothing_at_a_step(healthy: LockstepR
     assert healthy.state is LoopState.ACTIVE
 
 
-def test_a_hand_that_is_no_number_is_not_followed(healthy: LockstepRobot) -> None:
+def test_set_points_with_nan_are_not_followed(healthy: LockstepRobot) -> None:
     healthy.program("pose", stream=True)
     hand = healthy.stream.sender()
     lead(healthy, hand, [[0.0, 0.0, 0.0]] * 20)
@@ -429,7 +431,7 @@ def test_a_hand_that_is_no_number_is_not_followed(healthy: LockstepRobot) -> Non
     assert healthy.state is LoopState.ACTIVE
 
 
-def test_a_master_that_disappears_in_motion_leaves_the_platform_held(
+def test_the_platform_is_held_when_the_hand_disappears_in_motion(
     healthy: LockstepRobot,
 ) -> None:
     healthy.program("pose", position_m=[-0.4, 2.1], speed_m_s=0.2)
@@ -442,16 +444,16 @@ def test_a_master_that_disappears_in_motion_leaves_the_platform_held(
     healthy.run(0.5)
     records = truth.read()
     assert np.linalg.norm(records["velocity_m_s"], axis=1).max() < 0.01
-    assert records["tension_N"].min() > 10.0  # of the 20 N that are planned
+    assert records["tension_N"].min() > 10.0  # of the planned 20 N
     assert healthy.progress["tight"]
-    # somebody who leads it again is not told the old reason for ever
+    # the old reason disappears when a hand moves the platform again
     healthy.run(4.0)
     healthy.right.take("trial")
     healthy.carry_out("pose", 30.0, position_m=list(HIGH))
     assert healthy.loop.life.reason == ""
 
 
-def test_what_was_paused_goes_on_to_where_it_was_going(healthy: LockstepRobot) -> None:
+def test_a_paused_motion_resumes_to_its_target(healthy: LockstepRobot) -> None:
     target = [-0.3, 1.6]
     healthy.program("pose", position_m=target)
     healthy.run(0.4)
@@ -464,13 +466,13 @@ def test_what_was_paused_goes_on_to_where_it_was_going(healthy: LockstepRobot) -
     assert healthy.truth()["position_m"][:2] == pytest.approx(target, abs=0.01)
 
 
-def test_no_platform_is_dropped_by_a_word(healthy: LockstepRobot) -> None:
+def test_program_idle_is_rejected_while_the_platform_is_suspended(healthy: LockstepRobot) -> None:
     with pytest.raises(WorkFailedError, match="the platform hangs on its cables; lower it first"):
         healthy.program("idle")
     assert healthy.loop.engine.program.name == "pose"
 
 
-def test_lengths_that_an_index_contradicts_neither_move_the_platform_nor_are_kept(
+def test_cable_lengths_that_contradict_the_index_are_neither_used_nor_stored(
     planar: Path, tmp_path: Path
 ) -> None:
     with LockstepRobot(planar) as robot:
@@ -484,7 +486,7 @@ def test_lengths_that_an_index_contradicts_neither_move_the_platform_nor_are_kep
         last.take()
         last.load(3, 3.0)
         assert last.lengths is not None
-        # as if a motor had been turned by hand meanwhile, by 44 deg, which is 20 mm of cable
+        # as if a motor had been turned by hand by 44 degrees, 20 mm of cable
         turned_m = np.array([0.0, 0.02, 0.0])
         elsewhere = last.lengths.cable_at_index_m + turned_m
         last.lengths = replace(last.lengths, cable_at_index_m=elsewhere)
@@ -492,7 +494,7 @@ def test_lengths_that_an_index_contradicts_neither_move_the_platform_nor_are_kep
         told = "upper right: its motor's index is 20.* mm from where the last stop has it"
         with pytest.raises(WorkFailedError, match=told):
             robot.carry_out("tighten", 30.0, **{"from": "last"})
-        robot.run(3.0)  # at rest, it has not done what it was to
+        robot.run(3.0)  # the robot is at rest and has not carried out the command
         assert robot.progress["done"] == 0.0
         assert robot.status["failure"].startswith("tighten: upper right: its motor's index is 20")
         with pytest.raises(WorkFailedError, match=told):
@@ -513,7 +515,7 @@ def test_lengths_that_an_index_contradicts_neither_move_the_platform_nor_are_kep
         assert last.lengths is not None and not last.displaced
 
 
-def test_a_stop_leaves_the_next_start_its_lengths_and_the_platform_on_its_stand(
+def test_a_stop_lowers_the_platform_and_stores_lengths_for_the_next_start(
     planar: Path, tmp_path: Path
 ) -> None:
     with LockstepRobot(planar) as robot:
@@ -522,10 +524,10 @@ def test_a_stop_leaves_the_next_start_its_lengths_and_the_platform_on_its_stand(
         assert platform is not None
         last.path = tmp_path / "lengths.json"
         aloft(robot)
-        robot.carry_out("lower", 30.0, blind=True)  # beside where it stood
+        robot.carry_out("lower", 30.0, blind=True)  # beside its previous position
         robot.command("disable")
         assert robot.state is LoopState.READY
-        # as if the daemon and its drives had been without power meanwhile
+        # as if daemon and drives had been without power
         robot.loop.engine.parts.estimator.forget_lengths()
         last.take()
         last.load(3, 3.0)

@@ -1,4 +1,4 @@
-"""Planar robots that others have described: they load, start, move and come to rest again."""
+"""Planar robots described by other users load, start, move and come to rest."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from cdpr_tools.trials.lockstep import LockstepRobot
 
 OTHERS = sorted((Path(__file__).parent / "others").glob("*.toml"))
 START_m = 0.003
-"""What the stand and the winches' friction leave unknown at the start, and so everywhere."""
+"""Position error that the stand and winch friction leave at the start, and so everywhere."""
 
 
 @pytest.mark.parametrize("path", OTHERS, ids=lambda path: path.stem)
-def test_somebody_elses_robot_starts_moves_and_rests(path: Path) -> None:
+def test_a_robot_of_another_user_starts_moves_and_rests(path: Path) -> None:
     with LockstepRobot(path) as robot:
         refuse_impossible(robot.robot)
         statics = statics_of(robot.robot)

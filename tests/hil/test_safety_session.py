@@ -1,4 +1,4 @@
-"""A winch behind a safety I/O: each reaction seen on the physics board, not on what is told."""
+"""A winch with a safety I/O. Reactions are checked on the physics board, not in output."""
 
 from __future__ import annotations
 
@@ -37,10 +37,10 @@ TRIP_S = 2.0
 
 @dataclass
 class Lab:
-    """One simulated winch and its safety I/O.
+    """A simulated winch and its safety I/O.
 
-    The bus is in lockstep: a busy machine makes it slow, and misses no cycle. The I/O goes by the
-    clock, so that many seconds of the bus pass until it is heard.
+    The bus is in lockstep: a busy machine slows it down but misses no cycle. The I/O follows the
+    wall clock, so that many seconds of bus time pass until it reacts.
     """
 
     bus: str
@@ -64,7 +64,7 @@ class Lab:
         return self.begin("drive", "jog", WINCH, "--bus", self.bus, "--speed-deg-s", "600", *behind)
 
     def refused_jog(self, seconds: float) -> str:
-        """Jog in this process, which is quicker; return why it failed."""
+        """Jog in this process, which is faster. Return why it failed."""
         behind = [
             "--bus",
             self.bus,
@@ -116,7 +116,7 @@ def module_io_device(
     simulator: tuple[str, Path], tmp_path_factory: pytest.TempPathFactory
 ) -> Iterator[SafetyIoProcess]:
     folder = tmp_path_factory.mktemp("io")
-    # no device that waits for a core is taken for a silent one
+    # long timeouts, because a device may have to wait for a core
     patient = patient_profile(folder, 60.0, TRIP_S, TRIP_S, 1.5)
     io_device = SafetyIoProcess(patient, "--board", simulator[1])
     yield io_device
@@ -129,7 +129,7 @@ def lab(
 ) -> Iterator[Lab]:
     bus, path = simulator
     with PhysicsBoard.attach(path) as board:
-        _mend_drive(bus)  # a master that does not lead: bus time goes on with the wall clock
+        _mend_drive(bus)  # without a leader, bus time follows the wall clock
         module_io_device.mend()
         yield Lab(bus, path, board.axis(0), tmp_path, module_io_device)
 
@@ -147,7 +147,7 @@ def _mend_drive(bus: str) -> None:
         network.disconnect()
 
 
-def test_the_emergency_stop_takes_the_torque_in_motion(lab: Lab) -> None:
+def test_the_emergency_stop_removes_torque_in_motion(lab: Lab) -> None:
     command = lab.jog(600)
     wait_until(lab.moving)
     assert lab.winch.brake_released
@@ -161,12 +161,12 @@ def test_the_emergency_stop_takes_the_torque_in_motion(lab: Lab) -> None:
     assert lab.drive("reset")["state"] == "switch on disabled"
 
 
-def test_an_io_that_falls_silent_for_longer_than_allowed_stops_the_motion(lab: Lab) -> None:
+def test_an_io_silent_for_longer_than_allowed_stops_the_motion(lab: Lab) -> None:
     command = lab.jog(600)
     wait_until(lab.moving)
     lab.io_device.process.send_signal(signal.SIGSTOP)
     time.sleep(0.1)
-    lab.io_device.process.send_signal(signal.SIGCONT)  # shorter than the trip time-out: nothing
+    lab.io_device.process.send_signal(signal.SIGCONT)  # shorter than the trip timeout: no reaction
     time.sleep(0.5)
     wait_until(lab.moving)
     assert command.poll() is None
@@ -175,7 +175,7 @@ def test_an_io_that_falls_silent_for_longer_than_allowed_stops_the_motion(lab: L
     assert "no good poll" in result(command, status=1)["error"]
 
 
-def test_an_open_chain_refuses_before_anything_is_energised(lab: Lab) -> None:
+def test_an_open_chain_is_reported_before_power_is_on(lab: Lab) -> None:
     lab.io_device.press()
     error = lab.refused_jog(1)
     assert "the emergency-stop chain is open (input 0)" in error
@@ -196,7 +196,7 @@ def test_a_brake_that_stays_applied_ends_the_session(lab: Lab) -> None:
     wait_until(lambda: not lab.winch.state().power_on)
 
 
-def test_lamps_and_brakes_by_hand(lab: Lab) -> None:
+def test_commands_switch_lamps_and_brakes(lab: Lab) -> None:
     lamp = lab.begin("io", "light", lab.io_device.reference, "green", "--seconds", "3")
     wait_until(lambda: lab.io_device.coil(10))
     assert result(lamp)["ok"]
@@ -215,12 +215,12 @@ def test_lamps_and_brakes_by_hand(lab: Lab) -> None:
         assert not other.alarm()
         assert lab.io("off")["contactor_closed"] is False
         assert not lab.winch.power_allowed
-        wait_until(other.alarm)  # it may not switch on again
+        wait_until(other.alarm)  # it may not switch power on again
     refused("light", lab.io_device.reference, "pink", said="red, yellow, green")
     refused("brake", lab.io_device.reference, "winch 9", said="'winch 1', 'rail 1'")
 
 
-def test_watching_tells_what_changes_and_changes_nothing(lab: Lab) -> None:
+def test_io_watch_prints_changes_and_switches_nothing(lab: Lab) -> None:
     watching = subprocess.Popen(
         [sys.executable, "-m", "cdpr_tools.cli", "io", "watch", lab.io_device.reference],
         stdout=subprocess.PIPE,
@@ -232,10 +232,12 @@ def test_watching_tells_what_changes_and_changes_nothing(lab: Lab) -> None:
     lab.io_device.press()
     while not lines[-1].strip().endswith("chain  OPEN"):
         lines.append(watching.stdout.readline())
-        assert lines[-1], "it ended before it showed the open chain"
+        assert lines[-1], "watch ended before it showed the open chain"
     watching.send_signal(signal.SIGINT)
     more, errors = watching.communicate(timeout=120)
-    assert (watching.returncode, more) == (0, ""), errors  # once each, and the change
+    assert (watching.returncode, more) == (0, ""), (
+        errors
+    )  # one line per input, and one for the change
     told = [line for line in lines if "emergency-stop chain" in line]
     assert [line.split("chain")[1].strip() for line in told] == ["closed (ok)", "OPEN"]
     assert not lab.io_device.coil(8)  # not even the red lamp
@@ -247,12 +249,12 @@ def refused(*arguments: str, said: str) -> None:
     assert said in str(outcome.exception)
 
 
-def test_a_lost_io_brakes_the_motion_under_control(lab: Lab) -> None:
-    """The last test here: its safety I/O does not come back."""
+def test_a_lost_io_causes_a_controlled_stop(lab: Lab) -> None:
+    """This test must be last, because its safety I/O does not return."""
     command = lab.jog(600)
     wait_until(lab.moving)
     os.kill(lab.io_device.process.pid, signal.SIGKILL)
-    # nobody can reach contactor or brake now: what stops the motor is its drive
+    # contactor and brake are out of reach: the drive stops the motor
     assert lab.winch.brake_released
     wait_until(lambda: lab.winch.state().motor_rad_s < 0.1)
     wait_until(lambda: not lab.winch.state().power_on)

@@ -1,4 +1,4 @@
-"""Winch calibration and load cells as commands, against the simulator's truth."""
+"""Commands for winch calibration and load cells agree with the simulator's truth."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def cdpr(*arguments: str | Path) -> list[str]:
 
 
 def invoke(*arguments: str | Path, status: int = 0) -> str:
-    """Run a command in this process, which has the libraries loaded; return what it wrote."""
+    """Run a command in this process, which has the libraries loaded. Return its output."""
     out, notes = io.StringIO(), io.StringIO()
     with (
         pytest.MonkeyPatch.context() as patch,
@@ -57,7 +57,7 @@ def run(*arguments: str | Path, status: int = 0) -> dict[str, Any]:
 
 
 class Simulator:
-    """A running simulator and what it told when it was ready."""
+    """A running simulator and its line of readiness."""
 
     def __init__(self, process: subprocess.Popen[str], ready: dict[str, Any]) -> None:
         self.process = process
@@ -71,7 +71,7 @@ class Simulator:
 
 @contextmanager
 def simulator(*arguments: str | Path) -> Iterator[Simulator]:
-    """A `cdpr sim ...` in the background."""
+    """Run `cdpr sim ...` in the background."""
     process = subprocess.Popen(
         cdpr("sim", *arguments, "--exit-with-stdin"),
         stdin=subprocess.PIPE,
@@ -87,7 +87,7 @@ def simulator(*arguments: str | Path) -> Iterator[Simulator]:
 
 @contextmanager
 def winch(folder: Path, plant: str) -> Iterator[tuple[str, Path]]:
-    """A simulated winch; yields its bus and its board."""
+    """Run a simulated winch. Yield its bus and its board."""
     (folder / "plant.toml").write_text(plant)
     bus, board = f"simbus:ten-{os.getpid()}-{uuid.uuid4().hex[:6]}", folder / "board"
     with simulator("up", WINCH, "--bus", bus, "--plant", folder / "plant.toml", "--board", board):
@@ -95,7 +95,7 @@ def winch(folder: Path, plant: str) -> Iterator[tuple[str, Path]]:
 
 
 def without_power(board: PhysicsBoard) -> None:
-    """Wait for it: bus time stands still for half a second after the last SYNC."""
+    """Wait until the winch has no power. Bus time stands for half a second after the last SYNC."""
     end = time.monotonic() + 60.0
     while board.axis(0).state().power_on:
         assert time.monotonic() < end
@@ -103,7 +103,7 @@ def without_power(board: PhysicsBoard) -> None:
 
 
 def gain(result: dict[str, Any], true: float) -> None:
-    """The gain is right within 1 %, and its interval is honest (three times as wide at most)."""
+    """Check that the gain is right within 1 % and within three times its interval."""
     assert result["gain_m"] == pytest.approx(true, rel=0.01)
     assert abs(result["gain_m"] - true) < 3.0 * result["gain_half_width_m"] + 1e-3 * true
 
@@ -134,7 +134,7 @@ def gain(result: dict[str, Any], true: float) -> None:
     ],
     ids=["default", "other"],
 )
-def test_masses_give_gain_and_friction(
+def test_calibration_with_masses_finds_gain_and_friction(
     tmp_path: Path,
     masses: str,
     more: tuple[str, ...],
@@ -158,7 +158,7 @@ def test_masses_give_gain_and_friction(
 
 
 def tare(folder: Path, port: str) -> None:
-    """By the file where the amplifier cannot, then by the amplifier."""
+    """Tare in the file for an amplifier that cannot, then by the amplifier."""
     shipped = (SHIPPED / "tension_sensors" / "rtu-load-cell-1.toml").read_text()
     start, end = shipped.index("[amplifier.tare]"), shipped.index("[[sensors]]")
     plain = folder / "plain.toml"
@@ -179,7 +179,7 @@ def tare(folder: Path, port: str) -> None:
 
 
 def watched_session(folder: Path, bus: str, cells: Simulator) -> None:
-    """Load cells beside `cdpr drive` keep it from what it would do."""
+    """Check that load cells prevent motion of `cdpr drive`."""
     tight = folder / "tight.toml"
     text = (SHIPPED / "tension_sensors" / "rtu-load-cell-1.toml").read_text()
     tight.write_text("stop_above_N = 50.0\n" + text + "zero_N = -100.0\n")
@@ -196,7 +196,7 @@ def watched_session(folder: Path, bus: str, cells: Simulator) -> None:
 
 
 @pytest.mark.alone  # a simulated line answers within 50 ms of wall-clock time
-def test_a_load_cell_gives_the_same(tmp_path: Path) -> None:
+def test_calibration_with_a_load_cell_finds_gain_and_friction(tmp_path: Path) -> None:
     plant = ANCHOR + "drum_radius_error = 0.03\n"
     out = tmp_path / "out"
     sensors = "rtu-load-cell-1"
@@ -242,7 +242,7 @@ def test_a_load_cell_gives_the_same(tmp_path: Path) -> None:
 
 
 def pull(folder: Path, *, disturbed: bool) -> bytes:
-    """Calibrate by a load cell with everything fresh; return the recording."""
+    """Calibrate by a load cell with a new simulation. Return the recording."""
     folder.mkdir()
     sensors, out = "rtu-load-cell-1", folder / "out"
     with (
@@ -269,12 +269,12 @@ def pull(folder: Path, *, disturbed: bool) -> bytes:
     return (out / "raw" / "pull.raw").read_bytes()
 
 
-def test_the_same_calibration_gives_the_same_bytes_however_it_is_held_up(tmp_path: Path) -> None:
+def test_delays_do_not_change_the_bytes_of_a_calibration_recording(tmp_path: Path) -> None:
     calm = pull(tmp_path / "calm", disturbed=False)
     assert pull(tmp_path / "disturbed", disturbed=True) == calm
 
 
-def test_what_cannot_be_calibrated_is_refused(tmp_path: Path) -> None:
+def test_invalid_calibration_options_are_rejected(tmp_path: Path) -> None:
     calibrate = ("tension", "calibrate", WINCH, "--bus", "simbus:nobody", "--out", tmp_path / "o")
     for more, message in (
         (("--masses", "2,5"), "at least three different masses"),
@@ -302,7 +302,7 @@ def test_what_cannot_be_calibrated_is_refused(tmp_path: Path) -> None:
         assert message in result["error"]
 
 
-def test_slack_that_eats_the_lead_in_refuses_the_result_and_keeps_the_data(tmp_path: Path) -> None:
+def test_a_calibration_with_too_much_slack_fails_and_keeps_its_data(tmp_path: Path) -> None:
     out = tmp_path / "out"
     (tmp_path / "plant.toml").write_text("[load]\nkind = 'hung_mass'\nslack_m = 0.3\n")
     result = run(
@@ -325,7 +325,7 @@ def test_slack_that_eats_the_lead_in_refuses_the_result_and_keeps_the_data(tmp_p
     real = ("--bus", "socketcan:none", "--masses", "2,5,9", "--out", out, "--overwrite")
     result = run("tension", "calibrate", WINCH, *real, status=BAD_INPUT)
     assert "not confirmed" in result["error"]
-    assert (out / "raw" / "mass-2kg.raw").exists()  # nobody agreed to lose it
+    assert (out / "raw" / "mass-2kg.raw").exists()  # deletion was not confirmed
     result = run("tension", "calibrate", WINCH, *real, "--yes", status=BAD_INPUT)
     assert "socketcan:none" in result["error"]
     assert [path.name for path in (out / "raw").iterdir()] == ["sweep.raw"]
@@ -357,7 +357,7 @@ def test_stopping_lowers_the_mass_and_a_dead_load_cell_stops_the_pull(tmp_path: 
         assert "stopped on request" in json.loads(out.splitlines()[-1])["error"]
         without_power(shared)
         state = axis.state()
-        assert abs(state.motor_rad) < 3.0  # back where it began, the mass on the floor
+        assert abs(state.motor_rad) < 3.0  # back at the start, with the mass on the floor
         sign_wrong = tmp_path / "wrong.toml"
         told = load_winch(WINCH).path.read_text()
         sign_wrong.write_text(told.replace("cable_sign = 1", "cable_sign = -1"))

@@ -1,7 +1,7 @@
-"""Programs that nobody here wrote, on the other side of ours or beside it.
+"""Our programs work with those of third parties.
 
-Our master against slaves built on `canopen.LocalNode`; our drives against the `canopen` package's
-master; python-can's own command-line tools as listeners and players on a simulated bus.
+Our master with slaves built on `canopen.LocalNode`, our drives with the master of the `canopen`
+package, and python-can's command-line tools as listeners and players on a simulated bus.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ MARK = can.Message(arbitration_id=0x7FF, is_extended_id=False)
 
 @pytest.fixture(autouse=True)
 def patient(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Have the package's masters wait for longer than 0.3 s: drives may have to wait for a core."""
+    """Lengthen the package's timeout of 0.3 s, because drives may have to wait for a core."""
     monkeypatch.setattr(canopen.sdo.SdoClient, "RESPONSE_TIMEOUT", LONGEST_S)
 
 
@@ -74,12 +74,12 @@ def third_party_on(name: str) -> Iterator[canopen.Network]:
         network.disconnect()
 
 
-# -- a third party's slaves, our master
+# -- third-party slaves with our master
 
 
 @pytest.fixture
 def empty_bus() -> Iterator[str]:
-    """A bus without any node of ours; paced, as a third-party slave runs by wall time."""
+    """Yield a bus without our nodes. It is paced because third-party slaves use wall-clock time."""
     name = f"empty-{os.getpid()}-{uuid.uuid4().hex[:6]}"
     hub = Hub([], mode=ClockMode.PACED, name=name)
     hub.listen()
@@ -94,7 +94,7 @@ def empty_bus() -> Iterator[str]:
 
 
 def write_patient_winch(folder: Path, period_s: float) -> Path:
-    """Write the shipped winch, whose drive sends two heartbeats a second; return it."""
+    """Write the shipped winch with two heartbeats per second of its drive. Return the file."""
     write_tolerant_drive(folder, 0.5, 1.0)
     path, text = folder / "patient.toml", PROFILE.path.read_text()
     for before, after in (
@@ -107,10 +107,10 @@ def write_patient_winch(folder: Path, period_s: float) -> Path:
     return path
 
 
-def test_a_slave_without_process_data_boots_as_far_as_it_goes(
+def test_a_slave_without_process_data_boots_as_far_as_possible(
     empty_bus: str, tmp_path: Path
 ) -> None:
-    """`LocalNode` answers SDO, but after a reset its heartbeats are boot-up messages."""
+    """`LocalNode` answers SDO, but sends boot-up messages as heartbeats after a reset."""
     bus, winch = f"simbus:{empty_bus}", str(write_patient_winch(tmp_path, period_s=0.001))
     with third_party_on(empty_bus) as network:
         node = network.create_node(1, EDS)
@@ -121,7 +121,7 @@ def test_a_slave_without_process_data_boots_as_far_as_it_goes(
         ended = cdpr("drive", "enable", winch, "--bus", bus)
         assert ended.returncode == 1
         assert "node 1 did not boot (step K): no heartbeat came" in ended.stderr
-        assert node.sdo[0x1A00][2].raw == 0x60640020  # configured it was
+        assert node.sdo[0x1A00][2].raw == 0x60640020  # its configuration was written
 
         def obey(can_id: int, data: bytearray, time_s: float) -> None:
             if data[0] not in (129, 130):
@@ -134,7 +134,7 @@ def test_a_slave_without_process_data_boots_as_far_as_it_goes(
 
         network.unsubscribe(0, node.nmt.on_command)
         network.subscribe(0, obey)
-        # else a heartbeat sent before it obeys the next reset would be a boot-up message too many
+        # otherwise a heartbeat before the next reset would look like a second boot-up message
         node.nmt.state = "PRE-OPERATIONAL"
         ended = cdpr("drive", "enable", winch, "--bus", bus)
         assert ended.returncode == 1
@@ -144,7 +144,7 @@ def test_a_slave_without_process_data_boots_as_far_as_it_goes(
 
 
 class ThirdPartyServo:
-    """A drive on `canopen.LocalNode`: its SDO server, NMT, heartbeat and PDO maps, little else."""
+    """A drive built on the SDO server, NMT, heartbeat and PDO maps of `canopen.LocalNode`."""
 
     STATES = ((0x80, 0x80, 0x40), (0x02, 0x00, 0x40), (0x0F, 0x0F, 0x27), (0x0F, 0x07, 0x23))
 
@@ -196,8 +196,8 @@ class ThirdPartyServo:
             pdo.transmit()
 
 
-def test_a_third_partys_servo_is_enabled_and_switched_off(empty_bus: str, tmp_path: Path) -> None:
-    # in cycles that it keeps up where it has to wait for a core
+def test_a_third_party_servo_is_enabled_and_disabled(empty_bus: str, tmp_path: Path) -> None:
+    # slow enough for a servo that has to wait for a core
     winch = write_patient_winch(tmp_path, period_s=0.2)
     with third_party_on(empty_bus) as network:
         servo = ThirdPartyServo(network, 1)
@@ -211,7 +211,7 @@ def test_a_third_partys_servo_is_enabled_and_switched_off(empty_bus: str, tmp_pa
         assert wait_for(lambda: servo.node.nmt.state == "PRE-OPERATIONAL")
 
 
-# -- our drives, a third party's master
+# -- our drives with a third-party master
 
 
 @contextmanager
@@ -233,24 +233,26 @@ def simulator(*options: str) -> Iterator[str]:
 
 @pytest.fixture(scope="module")
 def drives() -> Iterator[str]:
-    """Two drives with the node ids 1 and 2."""
+    """Yield two drives with node ids 1 and 2."""
     with simulator("--nodes", "2", "--paced") as name:
         yield name
 
 
-def test_the_stock_lss_master_configures_new_drives_one_by_one(
+def test_a_third_party_lss_master_configures_new_drives_one_by_one(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """It takes silence for a bit; by the wall clock a drive without a core would be silent, too."""
+    """The master reads silence as a bit. A drive that waits for a core would be silent too."""
     passed = threading.Event()
 
     class Answers(queue.Queue[bytes]):
-        """Waits until the bus has dealt with the request, not for a time."""
+        """Wait until the bus has processed the request, instead of for a time."""
 
         def get(self, block: bool = True, timeout: float | None = None) -> bytes:
             passed.clear()
-            network.send_message(MARK.arbitration_id, b"")  # after the request, on its connection
-            assert other.recv(LONGEST_S) is not None  # what was answered has been sent by now
+            network.send_message(
+                MARK.arbitration_id, b""
+            )  # sent after the request on the same connection
+            assert other.recv(LONGEST_S) is not None  # all answers have been sent by now
             other.send(MARK)
             assert passed.wait(LONGEST_S)
             return super().get(block=False)
@@ -280,7 +282,7 @@ def test_the_stock_lss_master_configures_new_drives_one_by_one(
         assert wait_for(lambda: sorted(network.scanner.nodes) == [10, 11])
 
 
-def test_the_stock_master_hears_emergencies_of_the_right_node(drives: str) -> None:
+def test_a_third_party_master_receives_emergencies_of_the_right_node(drives: str) -> None:
     with third_party_on(drives) as network:
         nodes = [network.add_node(BaseNode402(node_id, EDS)) for node_id in (1, 2)]
         codes: dict[int, list[int]] = {1: [], 2: []}
@@ -295,7 +297,7 @@ def test_the_stock_master_hears_emergencies_of_the_right_node(drives: str) -> No
         assert nodes[1].sdo[0x1001].raw == 0
 
 
-def test_the_stock_master_moves_data_in_blocks_through_two_drives_at_once(drives: str) -> None:
+def test_a_third_party_master_transfers_blocks_with_two_drives_simultaneously(drives: str) -> None:
     contents = {1: os.urandom(20_000), 2: os.urandom(777)}
 
     def there_and_back(node: canopen.RemoteNode, content: bytes) -> None:
@@ -319,12 +321,12 @@ def test_the_stock_master_moves_data_in_blocks_through_two_drives_at_once(drives
     assert got == contents
 
 
-# -- python-can's own tools
+# -- python-can's tools
 
 
 @contextmanager
 def tool(*words: str) -> Iterator[subprocess.Popen[bytes]]:
-    """Run a command of python-can; end it as its user does, by Ctrl-C."""
+    """Run a command of python-can and end it by Ctrl-C, as its user does."""
     process = subprocess.Popen(
         [sys.executable, "-u", "-m", *words], stdout=subprocess.PIPE, stderr=subprocess.STDOUT
     )
@@ -335,8 +337,10 @@ def tool(*words: str) -> Iterator[subprocess.Popen[bytes]]:
         process.communicate(timeout=120)
 
 
-def test_the_stock_logger_and_player_take_part(drives: str, tmp_path: Path) -> None:
-    """What a third party's master did is logged, and played back it does the same again."""
+def test_python_cans_logger_records_and_its_player_repeats_a_session(
+    drives: str, tmp_path: Path
+) -> None:
+    """Playing the log of a third-party master has the same effect on the drive."""
     log = tmp_path / "session.log"
     words = ("can.logger", "-i", "simbus", "-c", drives, "-f", str(log))
     with tool(*words) as logger, third_party_on(drives) as network:
@@ -348,7 +352,7 @@ def test_the_stock_logger_and_player_take_part(drives: str, tmp_path: Path) -> N
         node.sdo[0x6072].raw = 321
         node.nmt.state = "OPERATIONAL"
         network.sync.transmit()
-        # what comes before so much more has been written
+        # it is complete when much more has been written
         size = log.stat().st_size
         assert wait_for(lambda: _ask(node) == 0 and log.stat().st_size > size + 16384)
     messages = list(can.LogReader(str(log)))
@@ -366,7 +370,7 @@ def test_the_stock_logger_and_player_take_part(drives: str, tmp_path: Path) -> N
             [sys.executable, "-m", *player], capture_output=True, timeout=120, check=False
         )
         assert played.returncode == 0, played.stderr
-        # those that were played, and the drive's to what was: none is taken for one to a question
+        # the played answers and those of the drive, none taken for that to another request
         count = identifiers.count(0x582) + identifiers.count(0x602)
         assert wait_for(lambda: len(answers) == count), (len(answers), count)
         assert node.sdo[0x6072].raw == 321
@@ -376,7 +380,7 @@ def _ask(node: canopen.RemoteNode) -> int:
     return int(node.sdo[0x1001].raw)
 
 
-def test_the_stock_viewer_shows_the_bus(drives: str) -> None:
+def test_python_cans_viewer_shows_the_bus(drives: str) -> None:
     master, terminal = pty.openpty()
     fcntl.ioctl(terminal, termios.TIOCSWINSZ, struct.pack("HHHH", 40, 120, 0, 0))
     viewer = subprocess.Popen(

@@ -1,4 +1,4 @@
-"""The cost of a frame on a real SocketCAN interface, beside python-can's own."""
+"""The cost of a frame on a real SocketCAN interface, compared with python-can."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from cdpr_tools.output import Output
 pytestmark = pytest.mark.vcan
 
 
-def test_frames_on_vcan_are_measured_both_ways() -> None:
+def test_bench_measures_frames_on_vcan_for_both_ports() -> None:
     rows = measure_vcan(200, Output(as_json=True))
     assert list(rows) == ["socketcan, ours", "socketcan, python-can"]
     for row in rows.values():

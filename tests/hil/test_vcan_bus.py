@@ -1,4 +1,4 @@
-"""Frames over a real vcan0: python-can, raw sockets, and the project's own ports agree."""
+"""Frames on a real vcan0: python-can, raw sockets and our ports agree."""
 
 import multiprocessing
 import socket
@@ -26,7 +26,7 @@ def raw():
         yield bus
 
 
-def test_two_buses_exchange_frames_and_filters_hold():
+def test_two_clients_exchange_frames_through_their_filters():
     with (
         can.Bus("vcan0", interface="socketcan") as one,
         can.Bus(
@@ -44,7 +44,7 @@ def test_two_buses_exchange_frames_and_filters_hold():
         assert (answer.arbitration_id, bytes(answer.data)) == (0x601, b"12345678")
 
 
-def test_raw_socket_carries_the_packed_frame(raw: socket.socket):
+def test_a_raw_socket_transfers_packed_frames(raw: socket.socket):
     with can.Bus("vcan0", interface="socketcan") as other:
         raw.send(FRAME.pack(0x201, 4, b"\x0f\x00\xf4\x01"))
         message = other.recv(60.0)
@@ -54,7 +54,7 @@ def test_raw_socket_carries_the_packed_frame(raw: socket.socket):
         assert FRAME.unpack(raw.recv(16)) == (0x181, 8, bytes(range(8)))
 
 
-def test_the_socket_port_filters_waits_and_drains():
+def test_a_socket_port_filters_waits_and_drains():
     url = BusUrl.parse("socketcan:vcan0")
     port = open_socketcan(url, [(0x181, 0x7FF), (0x080, 0x7FF)])
     other = open_socketcan(url, None)
@@ -85,7 +85,7 @@ def test_the_socket_port_filters_waits_and_drains():
         other.close()
 
 
-def test_an_interface_that_is_not_there_is_named():
+def test_error_for_a_missing_interface_names_it():
     with pytest.raises(BusError, match="there is no network interface 'vcan77'"):
         open_socketcan(BusUrl.parse("socketcan:vcan77"), None)
 
@@ -100,7 +100,7 @@ def _answer_each_sync(count: int) -> None:
     port.close()
 
 
-def test_cycles_between_two_processes_lose_nothing():
+def test_cycles_between_two_processes_lose_no_frame():
     port = open_socketcan(BusUrl.parse("socketcan:vcan0"), None)
     port.settimeout(60.0)
     slave = multiprocessing.get_context("fork").Process(target=_answer_each_sync, args=(CYCLES,))

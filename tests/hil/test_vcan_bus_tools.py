@@ -1,4 +1,4 @@
-"""Scan, monitor and replay on a real vcan0, beside a slave of the canopen library."""
+"""Scan, monitor and replay on a real vcan0, with a slave of the canopen library."""
 
 import socket
 import struct
@@ -41,7 +41,7 @@ def slave() -> Iterator[canopen.LocalNode]:
     network.disconnect()
 
 
-def test_scan_finds_a_third_partys_slave(slave: canopen.LocalNode) -> None:
+def test_scan_finds_a_third_party_slave(slave: canopen.LocalNode) -> None:
     with Scan(URL, range(5, 15)) as scan:
         scan.ask()
     (found,) = responding(scan.found)
@@ -50,7 +50,7 @@ def test_scan_finds_a_third_partys_slave(slave: canopen.LocalNode) -> None:
     assert told["state"] == "operation enabled"
     assert told["profiles"] == ["generic"]
     assert told["problems"] == []
-    assert not scan.traffic.sdo_requests  # our own requests are not taken for a master's
+    assert not scan.traffic.sdo_requests  # our requests are not mistaken for those of a master
 
 
 def frames_of(source: FrameSource, n: int) -> list[Frame]:
@@ -62,7 +62,7 @@ def frames_of(source: FrameSource, n: int) -> list[Frame]:
     return found
 
 
-def test_monitor_sees_every_kind_of_frame_when_it_came() -> None:
+def test_monitor_shows_each_kind_of_frame_with_its_time() -> None:
     source = FrameSource(URL)
     now = time.time()
     kinds = [
@@ -84,7 +84,7 @@ def test_monitor_sees_every_kind_of_frame_when_it_came() -> None:
     assert now - 0.1 < times[0] < after + 0.1
 
 
-def test_replay_sends_and_switches_off_at_the_end() -> None:
+def test_replay_sends_frames_and_disables_drives_at_the_end() -> None:
     notes: list[str] = []
     with socket.socket(socket.AF_CAN, socket.SOCK_RAW, socket.CAN_RAW) as bus:
         bus.bind(("vcan0",))
@@ -94,6 +94,6 @@ def test_replay_sends_and_switches_off_at_the_end() -> None:
             sender.complete = True
         enabled, off = (struct.unpack("=IB3x8s", bus.recv(16)) for _ in range(2))
     assert enabled[:2] == (0x205, 4)
-    # on a real bus, where a recording may end in the middle of motion
+    # a recording may end in motion
     assert off == (0x605, 8, bytes.fromhex("2B40600000000000"))
     assert notes == ["asked to switch their power off: node 5", "sent 1 frames to socketcan:vcan0"]

@@ -1,4 +1,4 @@
-"""A motor's measurements over a real SocketCAN interface."""
+"""A motor is measured over a real SocketCAN interface."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def simulated_drive(winch: Path) -> Iterator[None]:
 
 
 def test_a_motor_is_measured_over_socketcan(tmp_path: Path) -> None:
-    """Compensation, which no bus changes, is judged where cycles cost less."""
+    """Compensation does not depend on the bus and is tested elsewhere, where cycles are cheaper."""
     winch, out = tmp_path / "winch.toml", tmp_path / "out"
     winch.write_text(WINCH)
     write_tolerant_drive(tmp_path)
@@ -62,6 +62,6 @@ def test_a_motor_is_measured_over_socketcan(tmp_path: Path) -> None:
         assert result.returncode == 0, result.stderr[-2000:]
     told = json.loads(cdpr_here("cogging", "fit", out, "--json").stdout.splitlines()[-1])
     found = told["identification"]
-    # by how much is judged where the bus is led; here wall time counts once a SYNC is late
+    # the size is tested on a led bus, because here late SYNCs would affect it
     strongest = max(zip(found["amplitudes_Nm"], found["orders"], strict=True))
     assert strongest[1] == 4

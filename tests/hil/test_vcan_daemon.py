@@ -1,4 +1,4 @@
-"""The daemon on a real SocketCAN interface, with simulated drives in a process of their own."""
+"""The daemon on a real SocketCAN interface, with simulated drives in a separate process."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from tolerant_drive import write_tolerant_robot
 pytestmark = pytest.mark.vcan
 
 BUS = "can0=socketcan:vcan0"
-PERIOD_S = 0.05  # the guest's kernel is slow, and has one processor for all of it
+PERIOD_S = 0.05  # the guest kernel is slow and has one processor
 LIMITS = """
 late_s = 5.0
 missed_cycles = 200
@@ -26,7 +26,7 @@ stale_cycles = 1000
 
 @pytest.fixture
 def robot(tmp_path: Path) -> Path:
-    """Its master and drives may be held up for as long as LIMITS say, not a few cycles alone."""
+    """Write a robot whose master and drives tolerate the delays in LIMITS."""
     path = write_robot(tmp_path, PERIOD_S, LIMITS)
     write_tolerant_robot(path, path.read_text())
     return path

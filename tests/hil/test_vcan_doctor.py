@@ -9,7 +9,7 @@ from cdpr_tools.host.host_checks import list_interfaces, look_around
 pytestmark = pytest.mark.vcan
 
 
-def test_the_interface_is_found_with_its_queue() -> None:
+def test_doctor_finds_the_interface_and_its_queue_length() -> None:
     interface = next(one for one in list_interfaces() if one.name == "vcan0")
     assert interface.is_virtual
     assert (interface.is_up, interface.state, interface.bitrate_bit_s) == (True, "up", 0)

@@ -1,4 +1,4 @@
-"""A vcan test counts as passed only where it ran: the guest's outcomes are replayed faithfully."""
+"""A vcan test passes only if it ran: outcomes of the guest are replayed faithfully."""
 
 import json
 from pathlib import Path
@@ -30,14 +30,14 @@ def _outcomes(item: pytest.Item, outcome: Outcome) -> list[str]:
     return [f"{r.when} {r.outcome}" for r in replay(item, outcome)]
 
 
-def test_without_a_guest_it_is_skipped_with_the_reason(request: pytest.FixtureRequest):
+def test_a_test_is_skipped_with_the_reason_if_there_is_no_guest(request: pytest.FixtureRequest):
     (report,) = replay(request.node, Outcome({}, "", "no apt-get"))
     assert report.outcome == "skipped"
     assert isinstance(report.longrepr, tuple)
     assert report.longrepr[2].endswith("no guest kernel: no apt-get")
 
 
-def test_what_the_guest_reported_comes_out_again(request: pytest.FixtureRequest):
+def test_reports_of_the_guest_are_replayed(request: pytest.FixtureRequest):
     item = request.node
     ran = [_phase(item, when, "passed") for when in ("setup", "call", "teardown")]
     whole = Outcome(parse("".join(line + "\n" for line in ran)), "")
@@ -79,7 +79,7 @@ def test_a_kernel_that_does_not_start_is_reported(tmp_path: Path):
 
 def test_a_guest_that_hangs_is_stopped(tmp_path: Path):
     (tmp_path / "run").mkdir()
-    (tmp_path / "run" / "ready").touch()  # as the guest does, however soon it comes to it
+    (tmp_path / "run" / "ready").touch()  # as the guest does
     (tmp_path / "modules").mkdir()
     kernel = tmp_path / "linux.uml"
     kernel.write_text("#!/bin/sh\nsleep 60\n")

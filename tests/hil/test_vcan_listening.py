@@ -1,4 +1,4 @@
-"""Axes of another master on a real vcan0, whose kernel counts every frame that is sent."""
+"""Listening to another master on a real vcan0, where the kernel counts all sent frames."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ pytestmark = pytest.mark.vcan
 SENT = Path("/sys/class/net/vcan0/statistics/tx_packets")
 
 
-def test_what_is_said_is_heard_and_nothing_added() -> None:
+def test_a_listener_receives_feedback_and_sends_no_frame() -> None:
     winch, url = load_winch("winch-mpp0923d"), BusUrl.parse("socketcan:vcan0")
     talker = open_port(url, [])
     axis = monitored_axis(winch, 1)

@@ -47,7 +47,7 @@ def simulator() -> Iterator[subprocess.Popen[bytes]]:
     process.communicate()
 
 
-def test_cycles_over_vcan(simulator: subprocess.Popen[bytes]) -> None:
+def test_a_port_exchanges_cycles_with_drives_over_vcan(simulator: subprocess.Popen[bytes]) -> None:
     url = BusUrl.parse("socketcan:vcan0")
     port = open_port(url, [(0x180, 0x780)])
     port.settimeout(60.0)
@@ -73,11 +73,11 @@ def test_cycles_over_vcan(simulator: subprocess.Popen[bytes]) -> None:
     port.close()
 
 
-def test_the_simulator_ends_in_order(simulator: subprocess.Popen[bytes]) -> None:
+def test_the_simulator_ends_properly(simulator: subprocess.Popen[bytes]) -> None:
     out, _ = simulator.communicate(timeout=120)
     assert (simulator.returncode, out) == (0, b"closed\n")
 
 
-def test_an_interface_that_is_not_there_is_named() -> None:
+def test_error_for_a_missing_interface_names_it() -> None:
     with pytest.raises(BusError, match=r"socketcan:nocan9.*No such device"):
         open_port(BusUrl.parse("socketcan:nocan9"))

@@ -1,4 +1,4 @@
-"""What SocketCAN has besides frames: error frames, time stamps, full queues, links that go down."""
+"""SocketCAN beyond frames: error frames, timestamps, full queues and links that go down."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def set_link(name: str, *, up: bool) -> None:
         fcntl.ioctl(sock, SIOCSIFFLAGS, struct.pack("16sH22x", name.encode(), flags))
 
 
-def test_two_buses_at_once_keep_apart() -> None:
+def test_two_buses_are_independent() -> None:
     with contextlib.ExitStack() as stack:
         ports = [open_port(url) for url in (VCAN0, VCAN1)]
         peers = [open_port(url, []) for url in (VCAN0, VCAN1)]
@@ -61,7 +61,7 @@ def test_two_buses_at_once_keep_apart() -> None:
         assert [port.drain() for port in ports] == [0, 0]
 
 
-def test_the_kernel_stamps_when_a_frame_came() -> None:
+def test_frames_have_the_kernels_timestamps() -> None:
     port, peer = open_port(VCAN0, [(0x181, 0x7FF)]), open_port(VCAN0, [])
     port.settimeout(60.0)
     before = time.time()
@@ -76,8 +76,8 @@ def test_the_kernel_stamps_when_a_frame_came() -> None:
     peer.close()
 
 
-def test_error_frames_tell_the_health_and_disturb_no_cycle() -> None:
-    """A vcan carries error frames that a program sends, as a driver would make them."""
+def test_error_frames_update_the_bus_health_and_disturb_no_cycle() -> None:
+    """On a vcan, a program can send the error frames that a driver would create."""
     cyclic, source = open_port(VCAN0), open_port(VCAN0, [])
     cyclic.settimeout(0.05)
     acyclic = open_port(VCAN0, [(0x701, 0x7FF)], receive_errors=True)
@@ -118,7 +118,7 @@ def test_an_interface_that_is_down_is_reported(down: None) -> None:
         open_port(BusUrl.parse("socketcan:lo"))
 
 
-def test_an_interface_that_goes_down_in_motion_is_noticed_by_readers_and_senders() -> None:
+def test_readers_and_senders_detect_an_interface_that_goes_down() -> None:
     port, peer = open_port(VCAN1), open_port(VCAN1, [])
     port.settimeout(60.0)
     peer.send(FRAME.pack(0x181, 0, b""))
@@ -140,7 +140,7 @@ def test_an_interface_that_goes_down_in_motion_is_noticed_by_readers_and_senders
 
 
 def kernel_slcan(terminal: int) -> str:
-    """Give a terminal to the kernel's own slcan driver; return its network interface, up."""
+    """Attach the kernel's slcan driver to a terminal. Return its active network interface."""
     try:
         fcntl.ioctl(terminal, termios.TIOCSETD, struct.pack("i", N_SLCAN))
     except OSError as error:
@@ -154,7 +154,7 @@ def kernel_slcan(terminal: int) -> str:
 
 @pytest.fixture
 def stalled_adapter() -> Iterator[tuple[int, str]]:
-    """A real CAN driver, the kernel's slcan, on a terminal that nobody reads."""
+    """Yield an interface of the kernel's slcan driver on a terminal that nobody reads."""
     host, terminal = pty.openpty()
     tty.setraw(terminal)
     name = kernel_slcan(terminal)
@@ -163,7 +163,7 @@ def stalled_adapter() -> Iterator[tuple[int, str]]:
     os.close(host)
 
 
-def test_a_full_transmit_queue_is_counted_and_told(stalled_adapter: tuple[int, str]) -> None:
+def test_a_full_transmit_queue_is_counted_and_reported(stalled_adapter: tuple[int, str]) -> None:
     host, name = stalled_adapter
     health = BusHealth()
     port = open_port(BusUrl.parse(f"socketcan:{name}"), [], health)
@@ -177,7 +177,7 @@ def test_a_full_transmit_queue_is_counted_and_told(stalled_adapter: tuple[int, s
     assert time.monotonic() - started < 300.0
     assert health.tx_full > 100
     assert f"transmit queue of {name} has been full" in str(port.lost(caught.value))
-    # as soon as the adapter takes frames again the bus is usable
+    # the bus works again as soon as the adapter reads frames
     os.set_blocking(host, False)
     deadline = time.monotonic() + 60.0
     while time.monotonic() < deadline:
@@ -191,7 +191,7 @@ def test_a_full_transmit_queue_is_counted_and_told(stalled_adapter: tuple[int, s
     port.close()
 
 
-def test_an_adapter_pulled_out_takes_its_interface_away(stalled_adapter: tuple[int, str]) -> None:
+def test_unplugging_an_adapter_removes_its_interface(stalled_adapter: tuple[int, str]) -> None:
     host, name = stalled_adapter
     port = open_port(BusUrl.parse(f"socketcan:{name}"))
     port.settimeout(60.0)
@@ -227,7 +227,7 @@ serve([Node()], "simbus:kernel-slcan", until_stdin_ends=True, slcan=True)
 """
 
 
-def test_the_kernels_own_driver_takes_the_simulated_adapter_for_a_real_one() -> None:
+def test_the_kernels_slcan_driver_works_with_the_simulated_adapter() -> None:
     simulator = subprocess.Popen(
         [*FORKED, SIMULATOR], stdin=subprocess.PIPE, stdout=subprocess.PIPE
     )
@@ -245,7 +245,7 @@ def test_the_kernels_own_driver_takes_the_simulated_adapter_for_a_real_one() -> 
             port.send(FRAME.pack(0x080, 0, b""))
             port.recv_into(buffer)
             assert FRAME.unpack(buffer) == (0x181, 8, bytes([k, 1, 2, 3, 4, 5, 6, 255]))
-        # pulled out: the driver takes its interface away
+        # unplugged: the driver removes its interface
         os.kill(ready["slcan_pid"], signal.SIGKILL)
         with pytest.raises(OSError, match=r".") as caught:
             port.recv_into(buffer)

@@ -1,4 +1,4 @@
-"""Error-passive and bus-off as the kernel tells of them: what the network makes of it."""
+"""The network's reaction to error-passive and bus-off, as the kernel reports them."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def _eventually(clock: PacedClock, condition: Callable[[], object]) -> None:
     assert clock.wait(condition, clock.now_s + 5.0)
 
 
-def test_error_passive_is_reported_and_bus_off_is_an_alarm_until_it_is_over() -> None:
+def test_error_passive_is_reported_and_bus_off_raises_an_alarm_until_it_ends() -> None:
     clock = PacedClock()
     network = CanNetwork(VCAN0, clock, [1], 127, 0.1)
     wire = open_port(VCAN0, [])

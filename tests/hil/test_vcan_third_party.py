@@ -1,4 +1,4 @@
-"""Third-party software on a real vcan0: a stock master, python-can's logger, and our LSS."""
+"""Third-party software on a real vcan0: a master, python-can's logger, and our LSS master."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ pytestmark = pytest.mark.vcan
 EDS = load_drive("generic-cia402").eds
 NODE = 5
 SEEN = {0x000, 0x080, 0x080 + NODE, 0x180 + NODE, 0x580 + NODE, 0x600 + NODE, 0x700 + NODE}
-"""Identifiers that the logger is to see, those of a boot until a fault."""
+"""Identifiers that the logger must record, from boot to fault."""
 _LOGGER_S = 240.0
 _LONGEST_S = 60.0
 
@@ -48,7 +48,7 @@ def wait_for(condition: Callable[[], bool], timeout_s: float = 60.0) -> bool:
 
 @contextmanager
 def on_vcan(*nodes: LocalNode) -> Iterator[None]:
-    """Run nodes of ours on vcan0, in a thread."""
+    """Run our nodes on vcan0 in a thread."""
     hub = Hub(nodes, mode=ClockMode.PACED, name="vcan0")
     hub.attach(raw_can_socket("vcan0"), essential=True)
     thread = threading.Thread(target=hub.run)
@@ -83,7 +83,9 @@ def identifiers(log: Path) -> set[int]:
     return {int(text, 16) for text in re.findall(r"ID: +([0-9a-f]+) ", log.read_text())}
 
 
-def test_the_stock_master_enables_a_drive_while_the_stock_logger_writes(tmp_path: Path) -> None:
+def test_a_third_party_master_enables_a_drive_while_python_cans_logger_records(
+    tmp_path: Path,
+) -> None:
     log = tmp_path / "vcan0.txt"
     command = [sys.executable, "-u", "-m", "can.logger", "-i", "socketcan", "-c", "vcan0"]
     with log.open("wb") as printed:
@@ -113,14 +115,14 @@ def test_the_stock_master_enables_a_drive_while_the_stock_logger_writes(tmp_path
             node.sdo[0x2F00][1].raw = 0xFF01
             assert wait_for(lambda: codes == [0xFF01])
             assert wait_for(node.is_faulted)
-        # it is asked to end only once it has worked off what waited for it
+        # the logger ends only after it has written all waiting frames
         assert wait_for(lambda: identifiers(log) >= SEEN, _LOGGER_S)
     finally:
         logger.send_signal(2)
         logger.communicate(timeout=120)
 
 
-def test_new_devices_get_their_node_ids_by_lss() -> None:
+def test_new_devices_get_node_ids_by_lss() -> None:
     serials = (0x0001FFFF, 0xFFFFFFF0)
     wanted = [LssAddress(0x00CD9A01, 0x402, 0x10000, serial) for serial in serials]
     with (

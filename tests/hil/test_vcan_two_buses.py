@@ -1,4 +1,4 @@
-"""Eight drives on two real CAN interfaces, four on each, run as one device."""
+"""Eight drives run as one device on two real CAN interfaces, four on each."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ FRAME = struct.Struct("=IB3x8s")
 
 @pytest.fixture
 def robot(tmp_path: Path) -> Path:
-    """Where nobody leads the buses, a master that is held up is silent for its drives."""
+    """Write a robot with long timeouts: without a leader, drives miss a delayed master."""
     path = tmp_path / "bench-8.toml"
     shipped = Path(cdpr_profiles.__file__).parent / "robots" / "bench-8.toml"
     write_tolerant_robot(path, shipped.read_text())
@@ -55,7 +55,7 @@ def drives(robot: Path) -> Iterator[dict[str, object]]:
 
 @pytest.fixture
 def listeners() -> Iterator[list[socket.socket]]:
-    """Bystanders on both interfaces that see every TPDO1 (180h to 1FFh) and SYNC."""
+    """Yield listeners on both interfaces that receive each TPDO1 (180h to 1FFh) and SYNC."""
     sockets = []
     for name in ("vcan0", "vcan1"):
         sock = socket.socket(socket.AF_CAN, socket.SOCK_RAW, socket.CAN_RAW)
@@ -71,7 +71,7 @@ def listeners() -> Iterator[list[socket.socket]]:
 
 
 def heard(sock: socket.socket) -> dict[int, int]:
-    """Return how many frames of each identifier wait."""
+    """Return the number of waiting frames per identifier."""
     counts: dict[int, int] = {}
     try:
         while True:
@@ -81,7 +81,7 @@ def heard(sock: socket.socket) -> dict[int, int]:
         return counts
 
 
-def test_four_drives_on_each_of_two_interfaces(
+def test_eight_drives_on_two_interfaces_are_exchanged_in_each_cycle(
     robot: Path, drives: dict[str, object], listeners: list[socket.socket]
 ) -> None:
     assert list(drives) == ["can0", "can1"]
@@ -100,5 +100,5 @@ def test_four_drives_on_each_of_two_interfaces(
         cycles = device.feedback.cycle
         assert cycles > 300
         for sock, nodes in zip(listeners, (range(1, 5), range(5, 9)), strict=True):
-            # each interface has its own four drives, every SYNC, and every answer
+            # each interface carries its four drives, all SYNCs and all answers
             assert heard(sock) == {0x080: cycles} | {0x180 + node: cycles for node in nodes}

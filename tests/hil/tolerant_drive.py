@@ -1,4 +1,4 @@
-"""A drive for simulators that live by the wall clock on a machine that may be slow."""
+"""A drive profile with long timeouts for paced simulators on a slow machine."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ _WINCH = "winch-mpp0923d"
 
 
 def write_tolerant_drive(folder: Path, producer_s: float = 5.0, consumer_s: float = 10.0) -> Path:
-    """Write the shipped drive that lets itself and its master be held up for seconds; return it.
+    """Write the shipped drive with timeouts of seconds. Return the file.
 
-    It sends a heartbeat every `producer_s`, waits `consumer_s` for its master's, and may take 5 s
-    to show a mode.
+    It sends a heartbeat every `producer_s`, waits `consumer_s` for that of its master, and may take
+    5 s to show a mode.
     """
     shipped = Path(cdpr_profiles.__file__).parent / "drives" / "generic-cia402.toml"
     text = shipped.read_text()
@@ -33,7 +33,7 @@ def write_tolerant_drive(folder: Path, producer_s: float = 5.0, consumer_s: floa
 
 
 def write_tolerant_robot(path: Path, text: str) -> None:
-    """Write a robot's file of the shipped winches whose master may be held up for seconds, too."""
+    """Write a robot of the shipped winches whose master may be delayed by seconds."""
     winch = (Path(cdpr_profiles.__file__).parent / "winches" / f"{_WINCH}.toml").read_text()
     (path.parent / "winch.toml").write_text(winch.replace('"generic-cia402"', f'"{NAME}"'))
     write_tolerant_drive(path.parent)

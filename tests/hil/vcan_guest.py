@@ -1,8 +1,8 @@
-"""Real SocketCAN buses, `vcan0` and `vcan1`: the machine's own, or those of a guest kernel.
+"""Real SocketCAN buses `vcan0` and `vcan1`, of the machine or of a guest kernel.
 
-The guest is Debian's user-mode-linux, an ordinary process with the machine's files as its root, so
-that it runs the very same tree and environment. Its packages are downloaded and unpacked into a
-cache, never installed.
+The guest is Debian's user-mode-linux, a normal process with the machine's files as its root. It
+runs the same tree and environment. Its packages are downloaded and unpacked into a cache, and not
+installed.
 """
 
 import contextlib
@@ -25,12 +25,12 @@ _CONSOLE_TAIL_LINES = 30
 
 
 class NoGuestError(Exception):
-    """The guest cannot be had or does not start on this machine; the text says why."""
+    """The guest is not available or does not start on this machine. The text gives the reason."""
 
 
 @dataclass(frozen=True)
 class Guest:
-    """Where the parts of the guest are."""
+    """The paths of the guest's parts."""
 
     kernel: Path
     modules: Path
@@ -39,14 +39,14 @@ class Guest:
 
 @dataclass(frozen=True)
 class GuestRun:
-    """What is left of one run: the command's exit code (None when it did not end) and output."""
+    """The result of a run: exit code of the command (None if it did not end) and output."""
 
     exit_code: int | None
     output: str
 
 
 def own_vcan() -> bool:
-    """Tell whether this machine's kernel has both buses; as root, add what is missing."""
+    """Return whether this machine has both buses. As root, add missing ones."""
     if not hasattr(socket, "AF_CAN"):
         return False
     ip = shutil.which("ip", path=f"{os.environ.get('PATH', '')}:/usr/sbin:/sbin")
@@ -67,7 +67,7 @@ def _is_up(name: str) -> bool:
 
 
 def obtain(cache: Path) -> Guest:
-    """Return the guest's parts from `cache`, fetched by apt where missing; raises NoGuestError."""
+    """Return the guest's parts from `cache`, fetched by apt if missing, or raise NoGuestError."""
     guest = _unpacked(cache)
     if guest is not None:
         return guest
@@ -81,7 +81,7 @@ def obtain(cache: Path) -> Guest:
             _run(["dpkg", "-x", str(package), str(fresh)], Path(scratch))
         if _unpacked(fresh) is None:
             raise NoGuestError(f"{' and '.join(PACKAGES)} hold no kernel for this machine")
-        with contextlib.suppress(OSError):  # another run was quicker
+        with contextlib.suppress(OSError):  # another run was faster
             fresh.rename(cache)
     guest = _unpacked(cache)
     if guest is None:
@@ -98,7 +98,7 @@ def _unpacked(folder: Path) -> Guest | None:
 
 
 def _download(folder: Path) -> list[Path]:
-    """Fetch the packages; with lists of our own where the machine's do not know them."""
+    """Fetch the packages, with separate package lists if those of the machine lack them."""
     get = ["apt-get", "-q", "-o", "Acquire::Retries=2", "-o", "Acquire::http::Timeout=30"]
     try:
         _run([*get, "download", *PACKAGES], folder)
@@ -138,10 +138,10 @@ def run(
     run_dir: Path,
     timeout_s: float = RUN_TIMEOUT_S,
 ) -> GuestRun:
-    """Boot the guest, run `command` in it, wait until it is off.
+    """Boot the guest, run `command` in it, and wait until it is off.
 
-    `run_dir` is an empty folder whose path holds no blanks; the guest may write there and nowhere
-    else on the machine. Raises NoGuestError when the guest never got as far as the command.
+    `run_dir` is an empty folder whose path has no blanks. The guest may write only there. Raise
+    NoGuestError if the guest did not reach the command.
     """
     exports = "".join(f"export {k}={shlex.quote(v)}\n" for k, v in environment.items())
     (run_dir / "command.sh").write_text(
@@ -166,13 +166,13 @@ def run(
 
 
 def _boot(guest: Guest, run_dir: Path, console: Path, timeout_s: float) -> str:
-    """Run the guest kernel to its end; return what went wrong in words, or nothing."""
+    """Run the guest kernel to its end. Return the error as text, "" if there was none."""
     words = [
         *(f"mem={MEMORY_MB}M", "root=/dev/root", "rootfstype=hostfs", "rootflags=/", "ro", "quiet"),
         *(f"init={run_dir}/init.sh", f"RUN_DIR={run_dir}"),
         *("con=null", "con0=fd:0,fd:1", "ssl=null"),
     ]
-    # Its memory is a file in TMPDIR: in /dev/shm where there is room for it.
+    # Its memory is a file in TMPDIR, which is /dev/shm if there is room.
     shm = Path("/dev/shm")
     roomy = shm.is_dir() and shutil.disk_usage(shm).free > MEMORY_MB << 20
     environment = {
@@ -183,7 +183,7 @@ def _boot(guest: Guest, run_dir: Path, console: Path, timeout_s: float) -> str:
     with console.open("wb") as out:
         try:
             process = subprocess.Popen(
-                # timeout: it ends even where this process is killed first.
+                # timeout ends the guest even if this process is killed first.
                 ["timeout", "-k", "5", str(timeout_s + 30), str(guest.kernel), *words],
                 stdin=subprocess.DEVNULL,
                 stdout=out,
@@ -198,7 +198,7 @@ def _boot(guest: Guest, run_dir: Path, console: Path, timeout_s: float) -> str:
         except subprocess.TimeoutExpired:
             return f" (stopped after {timeout_s:.0f} s)"
         finally:
-            # The guest's processes are processes here as well, in a group of their own.
+            # The guest's processes are also processes of this machine, in a separate group.
             with contextlib.suppress(ProcessLookupError):
                 os.killpg(process.pid, signal.SIGKILL)
             process.wait()

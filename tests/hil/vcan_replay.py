@@ -1,4 +1,4 @@
-"""Run tests in one boot of the guest and give their reports to the pytest outside."""
+"""Run tests in one boot of the guest and pass their reports to the outer pytest."""
 
 import json
 import os
@@ -16,13 +16,13 @@ from vcan_guest import NoGuestError
 REPOSITORY = Path(__file__).parents[2]
 GUEST_CACHE = REPOSITORY / "build" / "vcan-guest"
 REPORTS_VARIABLE = "CDPR_VCAN_REPORTS"
-# memory that is given back comes in again page by page, and a page fault is dear in a guest kernel
+# keep freed memory, because page faults are expensive in a guest kernel
 _KEEP_MEMORY = {"MALLOC_MMAP_THRESHOLD_": str(32 << 20), "MALLOC_TRIM_THRESHOLD_": str(1 << 30)}
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """Reports by test name, and the guest's last words; or why there was no guest."""
+    """Reports by test name and the end of the guest's output, or why there was no guest."""
 
     reports: dict[str, list[dict[str, Any]]]
     output: str
@@ -30,7 +30,7 @@ class Outcome:
 
 
 def run_in_guest(names: Sequence[str]) -> Outcome:
-    """Run tests (pytest's names of them) by a pytest inside the guest."""
+    """Run tests, given by node ids, with a pytest inside the guest."""
     with tempfile.TemporaryDirectory(prefix="cdpr-vcan-", dir="/tmp") as scratch:
         written = Path(scratch) / "reports.jsonl"
         command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", *names]
@@ -38,7 +38,7 @@ def run_in_guest(names: Sequence[str]) -> Outcome:
             REPORTS_VARIABLE: str(written),
             "HOME": os.environ.get("HOME", "/root"),
             "PYTHONDONTWRITEBYTECODE": "1",
-            # there a copy of a process that has all loaded costs more than to load it anew
+            # in the guest, forking a process with all modules costs more than loading them
             "CDPR_TEST_FORKS": "0",
             **_KEEP_MEMORY,
         }
@@ -52,7 +52,7 @@ def run_in_guest(names: Sequence[str]) -> Outcome:
 
 
 def parse(text: str) -> dict[str, list[dict[str, Any]]]:
-    """Return the reports, one JSON object a line, by test; a last line cut short is left out."""
+    """Return reports by test, from one JSON object per line. Ignore a truncated last line."""
     reports: dict[str, list[dict[str, Any]]] = {}
     for line in text.splitlines(keepends=True):
         if line.endswith("\n"):
@@ -68,7 +68,7 @@ def append(report: pytest.TestReport, path: str) -> None:
 
 
 def replay(item: pytest.Item, outcome: Outcome) -> Iterator[pytest.TestReport]:
-    """Yield what the guest reported of a test; where it ended without, a failure that says so."""
+    """Yield the guest's reports of a test, or a failure if the guest ended without them."""
     if outcome.no_guest is not None:
         reason = f"Skipped: no vcan0 here and no guest kernel: {outcome.no_guest}"
         yield _report(item, "skipped", (str(item.path), None, reason))
