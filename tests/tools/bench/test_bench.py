@@ -1,4 +1,4 @@
-"""The `cdpr bench` commands run to their end and their figures agree; no timing is judged."""
+"""The `cdpr bench` commands complete and their figures are consistent. Timing is not judged."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ from cdpr_tools.bench.harness import Figures, Target, cost_rows, with_nothing_op
 
 
 def bench(*arguments: str, here: bool = False) -> tuple[dict[str, Any], str]:
-    """Return the JSON line and the text for people of one `cdpr bench` run.
+    """Return the JSON line and the text of one `cdpr bench` run.
 
-    `here`: in this process, for commands that run no cycles.
+    With `here`, run it in this process, which suits commands without cycles.
     """
     if here:
         run = cdpr_here("bench", *arguments, "--json")
@@ -31,7 +31,7 @@ def bench(*arguments: str, here: bool = False) -> tuple[dict[str, Any], str]:
     return json.loads(run.stdout.splitlines()[-1]), run.stderr
 
 
-def test_ways_take_turns_and_are_compared_with_the_first() -> None:
+def test_alternatives_take_turns_and_are_compared_with_the_first() -> None:
     order: list[str] = []
     ways = {
         name: with_nothing_open(repeat(partial(order.extend, [name] * size)))
@@ -41,13 +41,13 @@ def test_ways_take_turns_and_are_compared_with_the_first() -> None:
     assert list(dict.fromkeys(order)) == ["one", "other"]
     turns = [name for k, name in enumerate(order) if k == 0 or order[k - 1] != name]
     assert turns == ["one", "other"] * 2
-    assert order.count("one") == 5  # three calls, and a warm-up in each of two blocks
+    assert order.count("one") == 5  # three calls and a warm-up in each of two blocks
     assert rows["one"]["times ours"] == 1.0 < rows["other"]["times ours"]
     for row in rows.values():
         assert row["wall p50"] <= row["wall max"]
 
 
-def test_figures_have_a_line_for_each_row_and_target() -> None:
+def test_figures_print_a_line_for_each_row_and_target() -> None:
     figures = Figures(
         "title",
         {"a": {"p50": 1.0}, "b": {"p50": 2.0, "late": 3}},
@@ -65,9 +65,9 @@ def test_figures_have_a_line_for_each_row_and_target() -> None:
     assert told["n"] == 4
 
 
-def test_every_way_exchanges_the_same_frames_with_all_eight_drives() -> None:
-    """SYNC, 8 TPDOs and 8 RPDOs, counted by the bus; ours adds the master's heartbeat."""
-    # two blocks, the second one shorter
+def test_bench_cycle_exchanges_the_same_frames_with_either_library() -> None:
+    """The bus counts SYNC, 8 TPDOs and 8 RPDOs. Our master adds its heartbeat."""
+    # two blocks, of which the second is shorter
     figures, text = bench("cycle", "--cycles", "520")
     rows = figures["rows"]
     assert rows[CANOPEN]["frames"] == 17.0
@@ -84,14 +84,14 @@ def test_every_way_exchanges_the_same_frames_with_all_eight_drives() -> None:
         (("control", "--robot", "bench-2"), "bench-2.toml: has no platform; allowed: robots with"),
     ],
 )
-def test_bad_input_is_one_message(arguments: tuple[str, ...], message: str) -> None:
+def test_invalid_input_prints_one_message(arguments: tuple[str, ...], message: str) -> None:
     done = cdpr_here("bench", *arguments)
     assert done.returncode == 2
     assert message in done.stderr
     assert "Traceback" not in done.stderr
 
 
-def test_each_way_exchanges_on_each_bus() -> None:
+def test_bench_bus_measures_each_library_on_each_bus() -> None:
     figures, text = bench("bus", "--exchanges", "20")
     rows = figures["rows"]
     for name in ("simbus", "socketcand", "slcan"):
@@ -99,7 +99,7 @@ def test_each_way_exchanges_on_each_bus() -> None:
             row = rows[f"{name}, {way}"]
             assert row["frames/s"] == pytest.approx(1e6 / row["wall mean"], rel=0.01)
     assert "socketcan" in text
-    # a frame of 8 bytes has 22 characters, 220 us at 1 Mbaud; both directions at once
+    # a frame of 8 bytes has 22 characters, 220 us at 1 Mbaud, in both directions simultaneously
     assert rows["slcan, ours"]["wall p50"] > 110.0
     assert rows["simbus, python-can"]["CPU p50"] > rows["simbus, ours"]["CPU p50"]
 
@@ -121,7 +121,7 @@ def test_kinematics_finds_each_pose_from_bad_starts() -> None:
     assert all(row["found, %"] == 100.0 for name, row in rows.items() if name.endswith("ours"))
 
 
-def test_every_tension_method_finds_tensions_at_the_same_poses() -> None:
+def test_each_tension_method_finds_tensions_at_the_same_poses() -> None:
     figures, _ = bench("tension", "--poses", "500", here=True)
     for robot in ("spatial-8", "suspended-8"):
         found = {

@@ -1,4 +1,4 @@
-"""`cdpr bench` loop, stop and latency run the cases that they name; no timing is judged."""
+"""`cdpr bench` loop, stop and latency run the cases that they name. Timing is not judged."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ pytestmark = pytest.mark.long
 
 
 def slower(robot: str, folder: Path) -> str:
-    """Return the path of a copy at a quarter of the rate, which a busy machine can follow."""
+    """Write a copy of a robot with a quarter of the cycle rate, for a busy machine. Return it."""
     shipped = load_robot(robot).path
     path = folder / shipped.name
     path.write_text(
@@ -33,7 +33,7 @@ def slower(robot: str, folder: Path) -> str:
 
 
 @ALONE
-def test_the_baseline_loop_turns_the_same_axes_and_costs_more(tmp_path: Path) -> None:
+def test_the_baseline_loop_runs_the_same_axes_and_costs_more(tmp_path: Path) -> None:
     figures = loop.measure(6.0, Output(as_json=True), slower("bench-8", tmp_path))
     ours, *baseline = figures.rows.values()
     assert len(baseline) == 2
@@ -49,7 +49,7 @@ def test_the_baseline_loop_turns_the_same_axes_and_costs_more(tmp_path: Path) ->
 
 
 @ALONE
-def test_a_platform_is_led_to_and_fro_though_one_of_its_name_has_fallen(
+def test_bench_loop_moves_a_platform_and_ignores_stored_lengths(
     tmp_path: Path, state_home: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     fallen = '{"stopped": false}'
@@ -90,14 +90,14 @@ def test_all_four_curves_of_latency_are_measured_and_drawn(tmp_path: Path) -> No
     assert picture.read_bytes().startswith(b"\x89PNG")
 
 
-def test_a_wake_up_that_is_held_up_for_many_cycles_is_counted_that_late() -> None:
-    """The loop gives up the deadlines that have passed; their lateness is counted all the same."""
+def test_a_delay_of_many_cycles_is_counted_for_each_of_them() -> None:
+    """The loop skips deadlines that have passed but counts their lateness."""
     arguments = [str(WAKE_UP_S), "1000"]
     probe = subprocess.Popen(
         [sys.executable, "-m", "cdpr_tools.bench.latency", *arguments], stdout=subprocess.PIPE
     )
     stopped_s = 0.0
-    while probe.poll() is None:  # whenever it has loaded its libraries, one falls into its cycles
+    while probe.poll() is None:  # one of the stops occurs during its cycles
         time.sleep(0.5)
         began_s = time.monotonic()
         probe.send_signal(signal.SIGSTOP)

@@ -1,4 +1,4 @@
-"""The soak finds nothing where all is well, and finds what leaks or gets lost."""
+"""The soak test reports leaks and lost frames, and nothing otherwise."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ pytestmark = pytest.mark.long
 SHORT = ("--hours", "0.006", "--rate", "250")
 
 
-def test_some_bus_time_leaks_nothing_and_loses_nothing():
-    """Eight drives, less than a minute: the command itself, as for 24 hours."""
+def test_a_short_soak_finds_no_leak_and_no_loss():
+    """The command runs with eight drives for less than a minute, as it would for 24 hours."""
     done = subprocess.run(
         [sys.executable, "-m", "cdpr_tools.cli", "bench", "soak", *SHORT, "--json"],
         capture_output=True,
@@ -41,7 +41,7 @@ def test_some_bus_time_leaks_nothing_and_loses_nothing():
     assert told["cycles"] >= 5_400
     assert told["lost_frames"] == 0
     for bus in told["rows"].values():
-        # SYNC, 4 RPDOs and 4 TPDOs in each cycle, 10 heartbeats a second from each of 4 drives
+        # SYNC, 4 RPDOs and 4 TPDOs per cycle, and 10 heartbeats per second from each of 4 drives
         assert bus["frames_counted"] == pytest.approx(9 * told["cycles"] + 40 * 21.6, rel=0.01)
         assert bus["overruns"] == 0
         assert abs(bus["frames_counted"] - bus["frames_expected"]) <= bus["tolerance"]
@@ -49,7 +49,7 @@ def test_some_bus_time_leaks_nothing_and_loses_nothing():
 
 @pytest.fixture
 def session(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Session]:
-    """Two drives on two buses, enabled; legs of half a second."""
+    """Yield a session of two enabled drives on two buses, with legs of half a second."""
     monkeypatch.setattr(soak_bench, "LEG_S", 1.5)
     path = robot_file(tmp_path, [("a", 1), ("b", 1)])
     simulator = Simulator(str(path), "--bus", f"simbus:{unique()}")
@@ -71,7 +71,7 @@ def soaked(session: Session, seconds: float, each_leg: Any = lambda _: None) -> 
     return soak.figures("soak")
 
 
-def test_memory_and_files_that_are_kept_are_found(session: Session):
+def test_leaked_memory_and_files_are_found(session: Session):
     memory: list[bytearray] = []
     files: list[int] = []
 
@@ -87,9 +87,7 @@ def test_memory_and_files_that_are_kept_are_found(session: Session):
     assert figures.more["open_files_growth"] == {"master": 2, "simulator": 0}
 
 
-def test_commands_that_never_reach_the_bus_are_found(
-    session: Session, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_lost_commands_are_found(session: Session, monkeypatch: pytest.MonkeyPatch) -> None:
     port = session.device.groups[1].network.reader.port
     send, commands = port.send, count(1)
 
@@ -107,7 +105,7 @@ def test_commands_that_never_reach_the_bus_are_found(
     assert figures.more["lost_frames"] == pytest.approx(300, abs=10)
 
 
-def test_growth_is_what_stays():
+def test_growth_is_the_difference_of_the_minima_of_both_halves():
     sizes = [(100, 9), (900, 12), (130, 10), (150, 9)]
     assert growth([Process(*size) for size in sizes]) == Process(30, 0)
     assert growth([Process(100 + k, 9 + k) for k in range(10)]) == Process(5, 5)

@@ -1,4 +1,4 @@
-"""Simulated drives on buses of their own, and commands beside them."""
+"""Simulated drives on separate buses, and commands."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def last_json(text: str) -> dict[str, Any]:
 
 
 class Lab:
-    """Simulated drives on a bus of their own."""
+    """Simulated drives on a separate bus."""
 
     def __init__(self, name: str, *options: str) -> None:
         self.name = f"{name}-{os.getpid()}"
@@ -51,7 +51,7 @@ class Lab:
         return can.Bus(self.name, "simbus")
 
     def passed(self, ear: can.BusABC) -> list[can.Message]:
-        """Return what has come to a member since it was last asked."""
+        """Return the frames that a client received since the last call."""
         with self.join() as other:
             other.send(MARK)
         messages = []

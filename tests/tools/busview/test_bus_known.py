@@ -1,4 +1,4 @@
-"""Whom a monitor takes the nodes for, by the profile that is named."""
+"""The nodes that a monitor knows from the named profile or robot."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def url(text: str) -> BusUrl:
     return BusUrl.parse(text)
 
 
-def test_one_bus_of_a_robot_by_name_by_url_or_by_its_simulation() -> None:
+def test_a_bus_of_a_robot_is_found_by_name_url_or_simulation() -> None:
     robot = load_robot(ROBOT)
     of_bus = {
         bus.name: {axis.node_id for axis in robot.axes if axis.bus == bus.name}
@@ -36,7 +36,7 @@ def test_one_bus_of_a_robot_by_name_by_url_or_by_its_simulation() -> None:
         known_bus(None, None, None, f"{ROBOT}:no-such")
 
 
-def test_buses_with_the_same_node_ids_have_to_be_told_apart(tmp_path: Path) -> None:
+def test_a_robot_with_ambiguous_node_ids_requires_the_name_of_a_bus(tmp_path: Path) -> None:
     axis = '[[axes]]\nwinch = "winch-mpp0923d"\nbus = "{}"\nnode_id = 1\n'
     bus = '[[buses]]\nname = "{}"\nbitrate_bit_s = {}\n'
     file = tmp_path / "pair.toml"
@@ -47,14 +47,14 @@ def test_buses_with_the_same_node_ids_have_to_be_told_apart(tmp_path: Path) -> N
     assert known_bus(None, None, None, f"{file}:left").bitrate_bit_s == 500_000
 
 
-def test_bit_rate_of_the_load() -> None:
+def test_the_bit_rate_is_that_of_the_url_or_winch() -> None:
     assert known_bus(url("slcan:/dev/ttyACM0?bitrate=250000"), None, None, None).bitrate_bit_s == (
         250_000
     )
     assert known_bus(url("socketcan:can0"), None, "winch-mpp0923d", None).bitrate_bit_s == 1_000_000
 
 
-def test_every_node_may_be_one_drive() -> None:
+def test_one_drive_profile_decodes_all_nodes() -> None:
     decoder = known_bus(None, "generic-cia402", None, None).decoder()
     record = decoder.decode(Frame(0.0, 0x1FF, bytes.fromhex("3702 00080000 0A00")))
     assert record.node_id == 127
@@ -66,7 +66,7 @@ def test_every_node_may_be_one_drive() -> None:
 
 
 @pytest.mark.parametrize("text", ["181", "0-7FF", "181,700-77F", "1,2,3,4,5,6", "7E4-7E5,80"])
-def test_filters_let_just_the_identifiers_through(text: str) -> None:
+def test_filters_pass_exactly_the_given_identifiers(text: str) -> None:
     wanted = parse_identifiers(text)
     pairs = filters(wanted)
     passed = {i for i in range(0x800) if any(i & mask == want & mask for want, mask in pairs)}
@@ -74,7 +74,7 @@ def test_filters_let_just_the_identifiers_through(text: str) -> None:
     assert not any(0x80000181 & mask == want & mask for want, mask in pairs)
 
 
-def test_node_ids() -> None:
+def test_node_ids_are_parsed_or_rejected() -> None:
     assert parse_node_ids("3,1-2, 127") == [1, 2, 3, 127]
     for text in ("0", "128", "5-2", "x", "", "1--2", "1_0", "+5", "5 - 7"):
         with pytest.raises(BadInputError, match="1 to 127"):

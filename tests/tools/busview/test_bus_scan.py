@@ -1,4 +1,4 @@
-"""`cdpr bus scan` beside simulated drives, a busy master, and third-party slaves."""
+"""`cdpr bus scan` with simulated drives, a busy master, and third-party slaves."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def lab(labs: tuple[Lab, Lab]) -> Lab:
 
 @contextmanager
 def third_party_node(lab: Lab, node_id: int, **objects: int) -> Iterator[canopen.LocalNode]:
-    """A slave of the canopen library on the bus; `x1018_1=7` sets an object."""
+    """Run a slave of the canopen library on the bus. `x1018_1=7` sets an object."""
     dictionary = canopen.import_od(EDS, node_id)
     network = canopen.Network()
     network.NOTIFIER_CYCLE = 0.02
@@ -65,7 +65,7 @@ def scan(lab: Lab, *arguments: str) -> dict[int, dict[str, Any]]:
 
 @pytest.fixture
 def hasty(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A scan that listens only briefly, where nobody is heard, and waits long for who is there."""
+    """Make scans listen only briefly, but wait long for answers of existing nodes."""
     monkeypatch.setattr(bus_commands, "LISTEN_S", 0.25)
     monkeypatch.setattr(node_reader, "_TIMEOUT_S", 2.5)
 
@@ -76,12 +76,12 @@ hastily = pytest.mark.usefixtures("hasty")
 # -- scan
 
 
-def test_scan_tells_who_is_there(lab: Lab) -> None:
-    # the drives are switched on when somebody speaks: this waits until they have started up
+def test_scan_lists_the_nodes_on_the_bus(lab: Lab) -> None:
+    # the first frame switches the drives on: wait until they have started
     assert cdpr_here("drive", "info", WINCH, "--bus", lab.bus).returncode == 0
     found = scan(lab)
     assert found.keys() == {0, 1, 2}
-    assert found[0]["seconds"] < 90.0  # one after the other the 125 silent ids alone take 100 s
+    assert found[0]["seconds"] < 90.0  # sequentially, the 125 silent ids would take 100 s
     for node_id in (1, 2):
         node = found[node_id]
         assert node["device_name"] == "Generic CiA 402 torque servo"
@@ -95,7 +95,7 @@ def test_scan_tells_who_is_there(lab: Lab) -> None:
 
 
 @hastily
-def test_a_name_that_is_an_escape_to_the_terminal(lab: Lab) -> None:
+def test_control_characters_in_a_device_name_are_replaced(lab: Lab) -> None:
     with third_party_node(
         lab, 20, x1000=0x20192, x6502=0xFFFFFFFF, x6041=0xFFFF, x1001=0xFF
     ) as node:
@@ -107,8 +107,7 @@ def test_a_name_that_is_an_escape_to_the_terminal(lab: Lab) -> None:
 
 
 @hastily
-def test_scan_disturbs_nobody(lab: Lab) -> None:
-    """All that goes out are requests to read."""
+def test_scan_only_sends_read_requests(lab: Lab) -> None:
     with lab.join() as ear:
         scan(lab, "--nodes", "1-5")
         passed = lab.passed(ear)
@@ -122,7 +121,7 @@ def test_scan_disturbs_nobody(lab: Lab) -> None:
 
 
 @hastily
-def test_scan_for_people(lab: Lab) -> None:
+def test_scan_prints_a_table(lab: Lab) -> None:
     result = cdpr_here("bus", "scan", "--bus", lab.bus, "--nodes", "2,9")
     assert result.returncode == 0
     title, heads, row, identity, doing = result.stdout.splitlines()
@@ -151,14 +150,16 @@ def test_two_nodes_with_one_id_are_reported(lab: Lab) -> None:
     )
 
 
-def test_devices_that_are_no_drives(lab: Lab, tmp_path: Path) -> None:
+def test_scan_reports_devices_that_are_not_drives_or_do_not_answer(
+    lab: Lab, tmp_path: Path
+) -> None:
     with (
         third_party_node(lab, 20, x1000=0x00000000, x1018_1=5, x1018_2=6),
         third_party_node(lab, 21, x1000=0x000F0191),
         third_party_node(lab, 22) as silent,
         third_party_node(lab, 23, x1000=0x00020192, x1018_1=5, x1018_2=6, x1018_3=8, x6502=0x200),
     ):
-        silent.network.unsubscribe(0x616)  # answers nothing
+        silent.network.unsubscribe(0x616)  # does not answer
         silent.nmt.start_heartbeat(100)
         found = scan(lab, "--nodes", "20-23")
     assert "as a bootloader has" in found[20]["problems"][0]
@@ -173,7 +174,7 @@ def test_devices_that_are_no_drives(lab: Lab, tmp_path: Path) -> None:
 
 
 @hastily
-def test_profiles_of_ones_own(lab: Lab, tmp_path: Path) -> None:
+def test_scan_names_matching_profiles_of_the_user(lab: Lab, tmp_path: Path) -> None:
     source = Path(EDS)
     text = source.with_suffix(".toml").read_text(encoding="utf-8")
     (tmp_path / source.name).write_bytes(source.read_bytes())
@@ -184,7 +185,7 @@ def test_profiles_of_ones_own(lab: Lab, tmp_path: Path) -> None:
     assert node["profiles"] == ["generic-cia402", own]
 
 
-def test_a_master_in_its_transfers_is_not_disturbed(lab: Lab) -> None:
+def test_scan_is_rejected_during_sdo_transfers_of_a_master(lab: Lab) -> None:
     with lab.join() as bus:
         reading = can.Message(arbitration_id=0x601, data=bytes.fromhex("4018100100000000"))
         reading.is_extended_id = False
@@ -196,14 +197,14 @@ def test_a_master_in_its_transfers_is_not_disturbed(lab: Lab) -> None:
         forced = scan(lab, "--nodes", "1", "--force")
         task.stop()
         task.thread.join()
-        lab.passed(bus)  # what it has sent is no other master's to whoever listens next
+        lab.passed(bus)  # discard its frames, so that the next scan does not see them
     assert forced[1]["serial"] == 1
-    assert forced[1]["problems"] == []  # answers to the other are no second node
+    assert forced[1]["problems"] == []  # answers to the other master do not count as a second node
     assert "SDO requests" in forced[0]["warning"]
 
 
 @hastily
-def test_scan_of_two_buses(labs: tuple[Lab, Lab]) -> None:
+def test_two_buses_are_scanned_together(labs: tuple[Lab, Lab]) -> None:
     lab, other = labs
     result = cdpr_here(
         "bus", "scan", "--bus", lab.bus, "--bus", other.bus, "--nodes", "2-9", "--json"
@@ -211,6 +212,6 @@ def test_scan_of_two_buses(labs: tuple[Lab, Lab]) -> None:
     assert result.returncode == 0
     buses = last_json(result.stdout)["buses"]
     assert [(bus["bus"], len(bus["nodes"])) for bus in buses] == [(lab.bus, 1), (other.bus, 0)]
-    empty = result.stderr.splitlines()[-2:]  # for people
+    empty = result.stderr.splitlines()[-2:]  # as text
     assert empty[0] == f"{other.bus}: no nodes"
     assert "termination" in empty[1]

@@ -1,4 +1,4 @@
-"""`cdpr bus monitor` and `replay` beside simulated drives and a working master."""
+"""`cdpr bus monitor` and `replay` with simulated drives and a working master."""
 
 from __future__ import annotations
 
@@ -39,24 +39,24 @@ def lab(labs: tuple[Lab, Lab]) -> Lab:
 
 
 class Session:
-    """A jog that was watched and logged."""
+    """A jog that was monitored and logged."""
 
     def __init__(self, lab: Lab, folder: Path) -> None:
         self.log = folder / "jog.log"
         shown = folder / "shown.txt"
         arguments = ("bus", "monitor", "--bus", lab.bus, "--winch", WINCH, "--log", self.log)
         with lab.join() as ear, shown.open("w") as screen:
-            lab.passed(ear)  # the drives are switched on with the first frame
+            lab.passed(ear)  # the first frame switches the drives on
             monitor = subprocess.Popen(
                 command(*arguments), stdout=screen, stderr=subprocess.PIPE, text=True
             )
             wait_for_log(self.log, ear)
             ear.send(PROBE)
-            lab.passed(ear)  # what woke the drives was before the log
+            lab.passed(ear)  # the frame that started the drives was before the log
             jog = ("drive", "jog", WINCH, "--bus", lab.bus, "--speed-deg-s", "90")
             assert cdpr_here(*jog, "--seconds", "0.5").returncode == 0
             self.heard = lab.passed(ear)
-            wait_until(lambda: self.log.read_text().count(" 7FE#") == 2)  # the marks of both
+            wait_until(lambda: self.log.read_text().count(" 7FE#") == 2)  # markers of both
             monitor.send_signal(signal.SIGINT)
             _, self.errors = monitor.communicate(timeout=120)
         assert monitor.returncode == 0, self.errors
@@ -71,7 +71,7 @@ def wait_until(seen: Callable[[], object]) -> None:
 
 
 def wait_for_log(log: Path, bus: can.BusABC) -> None:
-    """Return when a monitor logs what is sent."""
+    """Wait until a monitor logs sent frames."""
 
     def logs() -> bool:
         bus.send(PROBE)
@@ -89,7 +89,7 @@ def of_kind(lines: list[str], kind: str) -> list[str]:
     return [line for line in lines if f"  {kind} " in line]
 
 
-def test_monitor_shows_a_session_in_words(session: Session) -> None:
+def test_monitor_decodes_a_session_to_text(session: Session) -> None:
     feedback = of_kind(session.lines, "TPDO1")
     commands = of_kind(session.lines, "RPDO1")
     assert len(feedback) > 1000
@@ -102,11 +102,11 @@ def test_monitor_shows_a_session_in_words(session: Session) -> None:
     assert any("<- 1018h:1 Identity object: Vendor-ID = 00CD9A01h" in line for line in sdo)
     assert any("start: node 1" in line for line in of_kind(session.lines, "NMT"))
     assert any("boot-up" in line for line in of_kind(session.lines, "heartbeat"))
-    # what SYNC has to tell is counted
+    # SYNC frames are only counted
     assert not of_kind(session.lines, "SYNC")
 
 
-def test_monitor_sums_up(session: Session) -> None:
+def test_monitor_prints_a_summary(session: Session) -> None:
     head, _, *rows = session.errors.splitlines()
     assert re.fullmatch(
         r"\d+ frames in \d+\.\d{3} s of bus time; bus load \d+\.\d % of 1000 kbit/s, stuffed as "
@@ -120,7 +120,7 @@ def test_monitor_sums_up(session: Session) -> None:
     assert int(head.split()[0]) == sum(int(row[-1]) for row in counts.values())
 
 
-def test_the_log_is_what_others_have_heard(session: Session) -> None:
+def test_the_log_contains_the_frames_that_others_received(session: Session) -> None:
     logged = [(m.arbitration_id, bytes(m.data)) for m in can.CanutilsLogReader(session.log)]
     logged = [frame for frame in logged if frame not in ((0x7FF, b"\1"), (0x7FE, b""))]
     heard = [(m.arbitration_id, bytes(m.data)) for m in session.heard]
@@ -128,7 +128,7 @@ def test_the_log_is_what_others_have_heard(session: Session) -> None:
     assert logged[: len(heard)] == heard
 
 
-def test_replay_shows_the_same_lines(session: Session) -> None:
+def test_replay_prints_the_same_lines_as_monitor(session: Session) -> None:
     result = cdpr_here("bus", "replay", session.log, "--winch", WINCH)
     assert result.returncode == 0, result.stderr
     assert result.stdout.splitlines() == session.lines
@@ -136,8 +136,8 @@ def test_replay_shows_the_same_lines(session: Session) -> None:
     assert result.stderr.startswith(f"{logged} frames in")
 
 
-def test_replay_of_a_log_of_python_can(session: Session, tmp_path: Path) -> None:
-    """Other formats, and the same one written by somebody else."""
+def test_replay_reads_logs_of_python_can(session: Session, tmp_path: Path) -> None:
+    """These are other formats, and the same format from a different writer."""
     for name in ("other.log", "other.asc", "other.blf"):
         with can.Logger(tmp_path / name) as logger:
             for message in can.CanutilsLogReader(session.log):
@@ -147,16 +147,18 @@ def test_replay_of_a_log_of_python_can(session: Session, tmp_path: Path) -> None
         told = result.stdout.splitlines()
         assert [line[15:] for line in told] == [line[15:] for line in session.lines], name
         times = [[float(line[:12]) for line in lines] for lines in (told, session.lines)]
-        assert times[0] == pytest.approx(times[1], abs=1.1e-3), name  # .blf has whole milliseconds
+        assert times[0] == pytest.approx(times[1], abs=1.1e-3), (
+            name
+        )  # .blf has a resolution of a millisecond
 
 
 @pytest.mark.parametrize("bomb", ["container", "object"])
-def test_a_blf_file_that_unpacks_to_too_much_is_refused(tmp_path: Path, bomb: str) -> None:
+def test_a_blf_file_that_unpacks_to_too_much_is_rejected(tmp_path: Path, bomb: str) -> None:
     path, most = tmp_path / "bomb.blf", 1 << 24
     with can.Logger(path) as logger:
         logger(can.Message(arbitration_id=0x123, data=b"\x01"))
     header = path.read_bytes()[:144]
-    # an object that says it is as long as all that follows, or a container of zeros
+    # an object with the length of all the rest, or a container of zeros
     content = struct.pack("<4sHHLL", b"LOBJ", 16, 1, most, 1).ljust(1 << 16)
     packed = zlib.compress(content if bomb == "object" else bytes(most + 1))
     container = struct.pack("<H6xL4x", 2, len(content)) + packed
@@ -166,7 +168,7 @@ def test_a_blf_file_that_unpacks_to_too_much_is_refused(tmp_path: Path, bomb: st
     assert f"bomb.blf: {what} bytes" in complaint("replay", path)
 
 
-def test_raw_lines_are_a_log_again(session: Session) -> None:
+def test_raw_output_of_replay_is_a_log(session: Session) -> None:
     raw = cdpr_here("bus", "replay", session.log, "--raw", "--ids", "181,700-7FD").stdout
     frames = [
         line for line in session.log.read_text().splitlines() if re.search(" (181|7..)#", line)
@@ -177,7 +179,7 @@ def test_raw_lines_are_a_log_again(session: Session) -> None:
     assert again.stdout == raw
 
 
-def test_a_pipe_is_shown_line_by_line() -> None:
+def test_lines_from_a_pipe_are_printed_immediately() -> None:
     replay = subprocess.Popen(
         command("bus", "replay", "-"), stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
     )
@@ -207,7 +209,7 @@ def test_replay_sends_to_a_bus(lab: Lab, tmp_path: Path) -> None:
     assert (told["sent"], told["not_sent"]) == (10, 1)
 
 
-def test_a_sending_that_is_broken_off_takes_the_power_off(lab: Lab, tmp_path: Path) -> None:
+def test_an_interrupted_replay_disables_the_drives(lab: Lab, tmp_path: Path) -> None:
     log = tmp_path / "motion.log"
     log.write_text("(0.0) can0 301#0F00\n(0.1) can0 7FF#01\n(600.0) can0 301#0F00\n")
     with lab.join() as ear:
@@ -223,10 +225,10 @@ def test_a_sending_that_is_broken_off_takes_the_power_off(lab: Lab, tmp_path: Pa
     assert (last.arbitration_id, last.data.hex()) == (0x601, "2b40600000000000")
 
 
-# -- how a monitor ends, and what it writes
+# -- output and end of a monitor
 
 
-def test_monitor_lines_come_at_once_and_plain(lab: Lab) -> None:
+def test_monitor_prints_plain_lines_immediately(lab: Lab) -> None:
     monitor = begin("bus", "monitor", "--bus", lab.bus, "--ids", "705")
     assert monitor.stdout is not None
     with lab.join() as bus:
@@ -249,7 +251,7 @@ def test_monitor_lines_come_at_once_and_plain(lab: Lab) -> None:
     assert re.match(r"\d+ frames? in ", errors)
 
 
-def test_monitor_ends_by_itself_and_counts_what_is_odd(lab: Lab) -> None:
+def test_monitor_ends_after_its_time_and_counts_problems(lab: Lab) -> None:
     monitor = begin("bus", "monitor", "--bus", lab.bus, "--seconds", "3", "--ids", "711", "--json")
     with lab.join() as bus:
         while monitor.poll() is None:
@@ -261,11 +263,13 @@ def test_monitor_ends_by_itself_and_counts_what_is_odd(lab: Lab) -> None:
     told = last_json(out)
     assert [row["id"] for row in told["ids"]] == ["711"]
     assert told["problems"] == told["frames"] > 0
-    assert told["missed"] is None  # nobody counts what the filters keep away
+    assert told["missed"] is None  # frames that filters drop are not counted
     assert told["led"] is False
 
 
-def test_a_bus_that_goes_away(labs: tuple[Lab, Lab], tmp_path: Path) -> None:
+def test_monitor_reports_a_bus_that_goes_away_and_keeps_the_log(
+    labs: tuple[Lab, Lab], tmp_path: Path
+) -> None:
     lab = labs[1]
     log = tmp_path / "cut.log"
     monitor = begin("bus", "monitor", "--bus", lab.bus, "--log", log)
@@ -275,12 +279,12 @@ def test_a_bus_that_goes_away(labs: tuple[Lab, Lab], tmp_path: Path) -> None:
     _, errors = monitor.communicate(timeout=120)
     assert monitor.returncode == 1
     assert errors.splitlines()[-1].startswith(f"cdpr: {lab.bus}: the bus has gone away")
-    assert "7FF" in errors  # the summary is told all the same
-    assert "bus load" not in errors  # but nobody can say any more what bus time it took
+    assert "7FF" in errors  # the summary is still printed
+    assert "bus load" not in errors  # but the elapsed bus time is unknown
     assert cdpr_here("bus", "replay", log).returncode == 0
 
 
-def test_a_log_that_cannot_be_written_on(lab: Lab) -> None:
+def test_a_full_disk_ends_monitor_with_an_error(lab: Lab) -> None:
     monitor = begin("bus", "monitor", "--bus", lab.bus, "--log", "/dev/full")
     with lab.join() as bus:
         while monitor.poll() is None:
@@ -295,9 +299,9 @@ def test_a_log_that_cannot_be_written_on(lab: Lab) -> None:
     assert "Traceback" not in errors
 
 
-def test_a_reader_that_sleeps_costs_the_log_nothing(lab: Lab, tmp_path: Path) -> None:
+def test_a_reader_that_does_not_read_loses_no_frame_of_the_log(lab: Lab, tmp_path: Path) -> None:
     log = tmp_path / "all.log"
-    monitor = begin("bus", "monitor", "--bus", lab.bus, "--log", log)  # its lines are not read
+    monitor = begin("bus", "monitor", "--bus", lab.bus, "--log", log)  # the lines are not read
     with lab.join() as bus:
         wait_for_log(log, bus)
         for _ in range(60):
@@ -313,7 +317,7 @@ def test_a_reader_that_sleeps_costs_the_log_nothing(lab: Lab, tmp_path: Path) ->
     assert out.count(" 7FD ") == 6000
 
 
-def test_a_reader_that_has_seen_enough(lab: Lab, session: Session) -> None:
+def test_replay_into_a_closed_pipe_prints_no_error(lab: Lab, session: Session) -> None:
     shell = f"{sys.executable} -m cdpr_tools.cli bus replay {session.log} | head -n 2"
     result = subprocess.run(
         ["bash", "-c", shell], capture_output=True, text=True, timeout=60, check=False
@@ -323,7 +327,7 @@ def test_a_reader_that_has_seen_enough(lab: Lab, session: Session) -> None:
     assert "Exception" not in result.stderr
 
 
-# -- bad input
+# -- invalid input
 
 
 def complaint(*arguments: str | Path, status: int = 2, stdin: str = "") -> str:
@@ -334,9 +338,9 @@ def complaint(*arguments: str | Path, status: int = 2, stdin: str = "") -> str:
     return line.partition("cdpr: ")[2]
 
 
-def test_bad_arguments(lab: Lab, tmp_path: Path) -> None:
+def test_invalid_arguments_are_rejected(lab: Lab, tmp_path: Path) -> None:
     here = ("--bus", lab.bus)
-    assert lab.bus in complaint("monitor", "--bus", "simbus:")  # tells what runs
+    assert lab.bus in complaint("monitor", "--bus", "simbus:")  # the error lists running buses
     assert "'18x'" in complaint("monitor", *here, "--ids", "181,18x")
     assert "--nodes 0-3" in complaint("scan", *here, "--nodes", "0-3")
     assert "did you mean 'generic-cia402'" in complaint("monitor", *here, "--profile", "generic402")
@@ -347,7 +351,7 @@ def test_bad_arguments(lab: Lab, tmp_path: Path) -> None:
     assert "is no folder" in complaint("scan", *here, "--profiles", nowhere)
 
 
-def test_bad_logs(lab: Lab, tmp_path: Path) -> None:
+def test_invalid_logs_are_rejected(lab: Lab, tmp_path: Path) -> None:
     log = tmp_path / "trip.log"
     assert "trip.log: cannot be read" in complaint("replay", log)
     log.write_text("(1.0) can0 123#00\n(1.0) can1 123#00\n")
@@ -355,14 +359,14 @@ def test_bad_logs(lab: Lab, tmp_path: Path) -> None:
     assert "--channel can7" in complaint("replay", log, "--channel", "can7")
     log.write_text("(1.0) can0 123#00\n(1.0) can0 123#0\n(1.0) can0 123#00\n")
     assert "trip.log: line 2" in complaint("replay", log, status=1)
-    with lab.join() as ear:  # not even the first line is sent
+    with lab.join() as ear:  # no line is sent
         assert "trip.log: line 2" in complaint("replay", log, "--to", lab.bus, status=1)
         assert 0x123 not in {message.arbitration_id for message in lab.passed(ear)}
     (tmp_path / "trip.blf").write_bytes(b"nothing of the kind" * 20)
     assert "trip.blf" in complaint("replay", tmp_path / "trip.blf")
 
 
-def test_a_pipe_of_bytes_that_are_no_text() -> None:
+def test_binary_input_is_rejected() -> None:
     strict = os.environ | {"PYTHONIOENCODING": "utf-8:strict"}
     arguments = command("bus", "replay", "-")
     result = subprocess.run(
@@ -373,7 +377,7 @@ def test_a_pipe_of_bytes_that_are_no_text() -> None:
     assert b"Traceback" not in result.stderr
 
 
-def test_nothing_is_sent_to_a_real_bus_unasked(tmp_path: Path) -> None:
+def test_replay_to_a_real_bus_needs_a_confirmation(tmp_path: Path) -> None:
     log = tmp_path / "trip.log"
     log.write_text("(1.0) can0 201#0F00\n")
     for answer in ("", "n\n"):

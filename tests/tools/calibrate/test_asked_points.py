@@ -1,4 +1,4 @@
-"""What a person measures while a platform stands: what is taken for an answer, and what is not."""
+"""Points that a person measures and types while the platform stands."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from cdpr_tools.output import Output
 
 
 class Standing:
-    """A platform that stands somewhere, until it is moved; what is typed once it is looked at."""
+    """A platform at rest until a test moves it. Text is typed when its pose is read."""
 
     def __init__(self, typed: int) -> None:
         self.place, self.typed = np.array([0.01, 0.02, 0.3]), typed
@@ -35,7 +35,7 @@ class Standing:
 
 @pytest.fixture
 def typed(monkeypatch: pytest.MonkeyPatch) -> Iterator[int]:
-    """What is typed: the end of a pipe to write to."""
+    """Return the end of a pipe that replaces typed input."""
     source, sink = os.pipe()
     with os.fdopen(source) as stdin:
         monkeypatch.setattr(daemon_run.sys, "stdin", stdin)
@@ -44,7 +44,7 @@ def typed(monkeypatch: pytest.MonkeyPatch) -> Iterator[int]:
 
 @pytest.fixture
 def terminal(monkeypatch: pytest.MonkeyPatch) -> Iterator[int]:
-    """What is typed: at a terminal."""
+    """Return the end of a terminal that replaces typed input."""
     ours, theirs = os.openpty()
     with os.fdopen(theirs) as stdin:
         monkeypatch.setattr(daemon_run.sys, "stdin", stdin)
@@ -56,7 +56,7 @@ def asked(folder: Path, coordinates: int, place: Standing) -> AskedPoints:
     return AskedPoints(Output(as_json=False), folder / "points.csv", coordinates, place)
 
 
-def test_what_a_person_measures_is_kept_as_points(
+def test_typed_measurements_are_stored_as_points(
     tmp_path: Path, typed: int, capsys: pytest.CaptureFixture[str]
 ) -> None:
     ask = asked(tmp_path, 3, Standing(typed))
@@ -70,16 +70,16 @@ def test_what_a_person_measures_is_kept_as_points(
     assert [point.std_m for point in points] == [0.002, 0.0003, 0.002]
     said = capsys.readouterr().err.splitlines()
     assert sum("allowed: x y z" in line for line in said) == 4
-    assert said[-1].startswith("pose 5 stands")  # at the end of what is typed nothing is asked
+    assert said[-1].startswith("pose 5 stands")  # after the end of input there are no questions
 
 
-def test_a_point_far_from_where_the_cables_have_it_is_asked_for_again(
+def test_a_point_far_from_the_pose_by_cables_is_asked_again(
     tmp_path: Path, typed: int, capsys: pytest.CaptureFixture[str]
 ) -> None:
     ask = asked(tmp_path, 3, Standing(typed))
     os.write(typed, b"0.01 0.02 0.3\n10 20 301\n410 20 300\n410 20 300\n")
-    ask(1)  # metres, then what is right
-    ask(2)  # twice the same
+    ask(1)  # metres, then the right numbers
+    ask(2)  # the same numbers twice
     points = load_points(tmp_path / "points.csv")
     assert [point.position_m[0] for point in points] == pytest.approx([0.01, 0.41])
     said = capsys.readouterr().err
@@ -88,9 +88,7 @@ def test_a_point_far_from_where_the_cables_have_it_is_asked_for_again(
     os.close(typed)
 
 
-def test_what_was_typed_before_the_platform_stood_is_no_answer(
-    tmp_path: Path, terminal: int
-) -> None:
+def test_input_typed_before_the_platform_stood_is_discarded(tmp_path: Path, terminal: int) -> None:
     place = Standing(terminal)
     ask = asked(tmp_path, 3, place)
     os.write(terminal, b"11 22 310\n12 22 310\n")
@@ -102,9 +100,7 @@ def test_what_was_typed_before_the_platform_stood_is_no_answer(
     assert [point.position_m[0] for point in points] == pytest.approx([0.013, 0.014])
 
 
-def test_no_point_is_kept_of_a_platform_that_was_moved_meanwhile(
-    tmp_path: Path, typed: int
-) -> None:
+def test_no_point_is_stored_if_the_platform_moved_meanwhile(tmp_path: Path, typed: int) -> None:
     place = Standing(typed)
 
     def moved() -> FloatArray:
@@ -119,12 +115,14 @@ def test_no_point_is_kept_of_a_platform_that_was_moved_meanwhile(
     os.close(typed)
 
 
-def test_nothing_is_asked_without_an_input(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_measuring_without_an_input_is_rejected(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(daemon_run.sys, "stdin", None)
     asked(tmp_path, 2, Standing(0))(1)
 
 
-def test_points_of_poses_that_are_not_there_are_refused(tmp_path: Path) -> None:
+def test_points_of_missing_poses_are_rejected(tmp_path: Path) -> None:
     path = tmp_path / "points.csv"
     require_points_of(0, path)
     path.write_text("pose,x_mm,y_mm,sigma_mm\n")
@@ -135,7 +133,7 @@ def test_points_of_poses_that_are_not_there_are_refused(tmp_path: Path) -> None:
         require_points_of(2, path)
 
 
-def test_a_stop_ends_the_asking(tmp_path: Path, typed: int) -> None:
+def test_a_stop_ends_the_questions(tmp_path: Path, typed: int) -> None:
     def stopped() -> FloatArray:
         raise StoppedError
 

@@ -1,4 +1,4 @@
-"""`cdpr calibrate`: offline from data as typed, taken over, shown, undone, and what it refuses."""
+"""`cdpr calibrate` fits data offline, adopts and undoes results, and rejects invalid input."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def _own_folders(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def data_of(what: MadeUp, path: Path, spoil: Any = None) -> Path:
-    """Write what a run would have read of a robot made up, and return the file."""
+    """Write the data that a run would read of a synthetic robot. Return the file."""
     robot = load_robot("spatial-8")
     lengths = what.seen.length_m.copy()
     if spoil is not None:
@@ -69,7 +69,7 @@ def data_of(what: MadeUp, path: Path, spoil: Any = None) -> Path:
 
 
 def points_of(what: MadeUp, path: Path, every: int = 1) -> Path:
-    """Write the positions as a person measures them, to 1 mm."""
+    """Write the positions to 1 mm, as a person measures them."""
     rng = np.random.default_rng(5)
     rows = ["pose,x_mm,y_mm,z_mm,sigma_mm"]
     for j in range(0, len(what.poses), every):
@@ -85,7 +85,7 @@ def result(done: Any) -> dict[str, Any]:
     return told
 
 
-def test_points_of_a_person_calibrate_and_are_taken_over_shown_and_undone(tmp_path: Path) -> None:
+def test_a_calibration_by_points_is_adopted_shown_and_undone(tmp_path: Path) -> None:
     what = made_up("spatial-8", 45, 12, noise_m=2e-4, home_first=True)
     data, points = data_of(what, tmp_path / "data.json"), points_of(what, tmp_path / "p.csv")
     mark_not_calibrated("spatial-8", "rail 1 was moved")
@@ -129,7 +129,7 @@ def test_the_folder_of_a_run_can_be_fitted_again(tmp_path: Path) -> None:
 
 
 def hardly_off(tmp_path: Path, seed: int, exit_m: float) -> list[Any]:
-    """Return the command that fits data of a robot whose file is right, or nearly so."""
+    """Return the command that fits data of a robot whose file is nearly right."""
     what = made_up(
         *("spatial-8", 45, seed), exit_m=exit_m, drum=0.0, elongation=0.0, offset_m=0.0,
         noise_m=3e-4, home_first=True,
@@ -149,7 +149,7 @@ def test_an_insignificant_calibration_is_adopted_only_on_request(tmp_path: Path)
     assert "nothing was taken over" in done.stderr and "--adopt" in done.stderr
     report = Path(told["report"]).read_text()
     assert "not significant" in report
-    for text in (done.stderr, report):  # one convention for all figures
+    for text in (done.stderr, report):  # all figures have the same convention
         assert "3 sigma" in text and not re.search(r"\b[124] sigma", text)
     assert calibrated(load_robot("spatial-8")).calibration is None
     asked = cdpr_here(*words, "--adopt")
@@ -174,7 +174,7 @@ def test_a_calibration_that_predicts_held_out_poses_worse_is_never_adopted(
     assert calibrated(load_robot("spatial-8")).calibration is None
 
 
-def test_a_right_file_s_calibration_that_noise_alone_tells_worse_is_adopted_when_asked(
+def test_a_calibration_that_is_worse_only_by_noise_is_adopted_on_request(
     tmp_path: Path,
 ) -> None:
     asked = cdpr_here(*hardly_off(tmp_path, 2, 0.0), "--adopt")
@@ -184,7 +184,7 @@ def test_a_right_file_s_calibration_that_noise_alone_tells_worse_is_adopted_when
     assert result(asked)["in_force"]["version"] == 1
 
 
-def test_redundancy_says_that_the_frame_is_that_of_the_file(tmp_path: Path) -> None:
+def test_a_fit_without_measured_points_keeps_the_frame_of_the_file(tmp_path: Path) -> None:
     what = made_up("spatial-8", 45, 12, noise_m=2e-4, home_first=True)
     data = data_of(what, tmp_path / "data.json")
     done = cdpr_here("calibrate", "fit", "spatial-8", "--data", data, "--json")
@@ -201,7 +201,7 @@ def test_redundancy_says_that_the_frame_is_that_of_the_file(tmp_path: Path) -> N
     assert residuals["length_residual_mm"] < residuals["length_residual_before_mm"]
 
 
-def test_a_slipped_encoder_is_reported_and_survived(tmp_path: Path) -> None:
+def test_a_slipped_encoder_is_reported_and_tolerated(tmp_path: Path) -> None:
     def slip(lengths: Any) -> None:
         lengths[20:, 6] += 0.015
 
@@ -217,7 +217,7 @@ def test_a_slipped_encoder_is_reported_and_survived(tmp_path: Path) -> None:
     assert "cable 7 is -15" in done.stderr
 
 
-def test_points_of_poses_that_come_later_do_not_end_a_run(tmp_path: Path) -> None:
+def test_points_of_later_poses_do_not_end_a_run(tmp_path: Path) -> None:
     what = made_up("spatial-8", 45, 12, noise_m=2e-4, home_first=True)
     data = load_data(data_of(what, tmp_path / "data.json"))
     points, robot = points_of(what, tmp_path / "p.csv"), load_robot("spatial-8")
@@ -225,7 +225,7 @@ def test_points_of_poses_that_come_later_do_not_end_a_run(tmp_path: Path) -> Non
     asked(data.model_copy(update={"poses": data.poses[:30]}))
 
 
-def test_points_are_taken_besides_a_camera() -> None:
+def test_points_may_be_combined_with_a_camera_only() -> None:
     robot = load_robot("spatial-8")
     assert source_of(robot, camera=True, points=True) == "camera"
     assert source_of(robot, points=True) == "points"
@@ -245,7 +245,7 @@ def test_points_are_taken_besides_a_camera() -> None:
         ("pose,x_mm,y_mm,z_mm\n1,0.2,,1.4\n2,-0.3,0.4,\n", "within 1.4 mm of the room's origin"),
     ],
 )
-def test_bad_points_are_refused(tmp_path: Path, text: str, named: str) -> None:
+def test_invalid_points_are_rejected(tmp_path: Path, text: str, named: str) -> None:
     what = made_up("spatial-8", 45, 12, home_first=True)
     data, points = data_of(what, tmp_path / "data.json"), tmp_path / "p.csv"
     points.write_text(text)
@@ -254,7 +254,7 @@ def test_bad_points_are_refused(tmp_path: Path, text: str, named: str) -> None:
     assert named in done.stderr and "Traceback" not in done.stderr
 
 
-def test_bad_data_and_requests_are_refused(tmp_path: Path) -> None:
+def test_invalid_data_and_requests_are_rejected(tmp_path: Path) -> None:
     few = data_of(made_up("spatial-8", 9, 12, home_first=True), tmp_path / "few.json")
     done = cdpr_here("calibrate", "fit", "spatial-8", "--data", few)
     assert done.returncode == 2 and "15 and more" in done.stderr
@@ -275,7 +275,7 @@ def test_bad_data_and_requests_are_refused(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", ["images/holiday.png", "calibration.html", "data.json"])
-def test_a_run_keeps_its_hands_off_somebody_elses_files(tmp_path: Path, name: str) -> None:
+def test_a_run_does_not_overwrite_files_of_the_user(tmp_path: Path, name: str) -> None:
     kept = tmp_path / name
     kept.parent.mkdir(exist_ok=True)
     kept.write_text("somebody else's")
@@ -288,16 +288,16 @@ def test_a_run_keeps_its_hands_off_somebody_elses_files(tmp_path: Path, name: st
     ]
 
 
-def test_the_study_has_each_figure_and_the_ratio(tmp_path: Path) -> None:
+def test_the_study_reports_each_parameter_and_the_ratio(tmp_path: Path) -> None:
     picture = tmp_path / "study.png"
     done = cdpr_here("calibrate", "study", "--draws", "4", "--png", picture, "--json")
     assert done.returncode == 0, done.stderr
     rows = result(done)["cases"]
     figures = {row["figure"] for row in rows}
     assert figures == {"3.7", "3.8", *(f"B.{k}" for k in range(1, 7)), *PAIRS}
-    # sqrt(3), less what the directions to an exit point differ
+    # sqrt(3), reduced because directions to an exit point differ
     assert all(1.4 < row["ratio"] < 1.75 for row in rows if "bias" not in row["name"])
-    # a bias of lengths is all in initial lengths, one of the position all in exit points
+    # a length bias appears only in initial lengths, a position bias only in exit points
     assert all(row["off_exit"] is None for row in rows if row["figure"] == "B.1")
     assert all(row["off_offset"] is None for row in rows if row["figure"] == "B.2")
     assert all(abs(row["off"]) < 1e-6 for row in rows if row["figure"] in ("B.1", "B.2"))
@@ -306,9 +306,9 @@ def test_the_study_has_each_figure_and_the_ratio(tmp_path: Path) -> None:
         assert matplotlib.image.imread(tmp_path / f"study{end}.png").std() > 0.01
 
 
-def test_a_cluster_that_is_not_there_is_reported() -> None:
+def test_a_missing_cluster_is_reported() -> None:
     done = cdpr_here("calibrate", "study", "--cluster", "127.0.0.1:1")
-    # after the progress, where drawing poses takes long enough for any
+    # after the progress line, if generating poses takes long enough
     assert done.returncode == 1
     assert done.stderr.splitlines()[-1].startswith("cdpr: --cluster 127.0.0.1:1: ")
 
@@ -325,7 +325,7 @@ def test_a_cluster_that_is_not_there_is_reported() -> None:
         ),
     ],
 )
-def test_a_reading_that_is_none_is_refused(given: Any, named: str) -> None:
+def test_an_invalid_reading_is_rejected(given: Any, named: str) -> None:
     with pytest.raises(ValueError, match=named):
         PoseReading(target=(0.0,), length_m=(1.0,), tension_N=(1.0,), **given)
 
@@ -336,7 +336,7 @@ def test_the_first_pose_has_to_be_home(tmp_path: Path) -> None:
     assert done.returncode == 2 and "allowed: home" in done.stderr
 
 
-def test_markers_in_the_data_are_fitted_with_the_cables(tmp_path: Path) -> None:
+def test_markers_and_cables_are_fitted_together(tmp_path: Path) -> None:
     what = camera_robot(20)
     what.made.data.save(tmp_path / "data.json")
     done = cdpr_here("calibrate", "fit", "spatial-8", "--data", tmp_path / "data.json", "--json")
@@ -354,7 +354,7 @@ def test_markers_in_the_data_are_fitted_with_the_cables(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(("off_m", "believed"), [(0.0, True), (0.05, False)])
-def test_a_file_of_where_the_camera_sits_counts_if_the_readings_agree(
+def test_a_hand_eye_file_is_used_if_it_agrees_with_the_readings(
     tmp_path: Path, off_m: float, believed: bool
 ) -> None:
     made = camera_robot(20, hand_eye_known=False).made.data
@@ -373,7 +373,7 @@ def test_a_file_of_where_the_camera_sits_counts_if_the_readings_agree(
     assert (done["camera"]["position_m"] != as_without) == believed
 
 
-def test_a_check_fits_the_map_with_the_options_that_the_calibration_had(
+def test_a_check_fits_the_map_with_the_options_of_the_calibration(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     what = camera_robot(20, hand_eye_known=False)
@@ -405,7 +405,7 @@ def test_a_check_fits_the_map_with_the_options_that_the_calibration_had(
     assert before(out, robot) is None and "p.csv: is gone" in capsys.readouterr().err
 
 
-def test_a_file_of_where_the_camera_sits_is_refused_where_it_is_of_no_use(tmp_path: Path) -> None:
+def test_a_hand_eye_file_without_camera_is_rejected(tmp_path: Path) -> None:
     told = tmp_path / "hand-eye.toml"
     told.write_text("position_m = [0.0, 0.0, -0.28]\nrotation_deg = [180.0, 0.0, 0.0]\n")
     blind = data_of(made_up("spatial-8", 20, 12), tmp_path / "data.json")
@@ -423,9 +423,7 @@ def test_a_file_of_where_the_camera_sits_is_refused_where_it_is_of_no_use(tmp_pa
 @pytest.mark.parametrize(
     "given", [("--camera",), ("--scanner",), ("--plant", "p.toml"), ("--intrinsics", "c.toml")]
 )
-def test_a_run_that_goes_on_takes_no_options_of_its_beginning(
-    given: tuple[str, ...], tmp_path: Path
-) -> None:
+def test_a_resumed_run_rejects_options_of_its_start(given: tuple[str, ...], tmp_path: Path) -> None:
     where = ("--resume", "--out", tmp_path)
     done = cdpr_here("calibrate", "run", "planar-4", *where, *given)
     assert done.returncode == 2

@@ -1,4 +1,4 @@
-"""A run that ends early goes on: killed, stopped or left by its camera, on a robot made up."""
+"""Calibration runs that end early can be resumed, tested on a synthetic robot."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ TENSION = 60.0
 
 
 class Rig:
-    """A robot whose cables are 4 mm longer each time that it is switched on."""
+    """A robot whose cables are 4 mm longer after each start."""
 
     started = stuck_at = 0
 
@@ -103,7 +103,7 @@ class Rig:
 
 @pytest.fixture
 def rigs(monkeypatch: pytest.MonkeyPatch) -> Callable[..., list[Rig]]:
-    """Have runs work on rigs of which each fails as it is told."""
+    """Return a function that makes runs use rigs with the given failures."""
     Rig.started = Rig.stuck_at = 0
     made: list[Rig] = []
 
@@ -144,10 +144,10 @@ def go_on(folder: Path, wanted: run.CalibrationRunSettings) -> CalibrationData:
     [
         (StoppedError(), WorkFailedError),
         (CameraError("camera sim:x gives no image any more"), CameraError),
-        (KeyboardInterrupt(), KeyboardInterrupt),  # as sudden as a kill
+        (KeyboardInterrupt(), KeyboardInterrupt),  # as sudden as SIGKILL
     ],
 )
-def test_measured_poses_are_kept_and_the_rest_resumed(
+def test_a_resumed_run_keeps_measured_poses_and_measures_the_rest(
     failure: BaseException,
     raised: type[BaseException],
     tmp_path: Path,
@@ -166,13 +166,13 @@ def test_measured_poses_are_kept_and_the_rest_resumed(
     assert data.poses[: len(left.poses)] == left.poses
     assert data.poses[len(left.poses)].target == data.poses[0].target
     targets = [reading.target for reading in data.poses]
-    assert len(set(targets)) == 14  # home twice, no other place
+    assert len(set(targets)) == 14  # only home is visited twice
     assert len(OutsidePoses.load_file(tmp_path / run.OUTSIDE).poses) == 15
     assert len(made) == 2
     assert go_on(tmp_path, settings()) == data and len(made) == 2
 
 
-def test_a_list_of_poses_is_gone_to_wholly_also_after_a_run_that_ended(
+def test_all_poses_of_a_list_are_visited_despite_an_interruption(
     tmp_path: Path, rigs: Callable[..., list[Rig]]
 ) -> None:
     rigs((7, StoppedError()))
@@ -191,7 +191,7 @@ def test_a_list_of_poses_is_gone_to_wholly_also_after_a_run_that_ended(
         again.resumed(30, None, None)
 
 
-def test_a_kill_between_two_files_loses_one_pose_and_no_more(
+def test_a_kill_between_two_files_loses_at_most_one_pose(
     tmp_path: Path, rigs: Callable[..., list[Rig]]
 ) -> None:
     rigs()
@@ -204,7 +204,7 @@ def test_a_kill_between_two_files_loses_one_pose_and_no_more(
     assert again.poses[:9] == data.poses[:9]
 
 
-def test_lengths_that_count_again_after_a_restart_spoil_nothing(
+def test_new_initial_lengths_after_a_restart_are_fitted(
     tmp_path: Path, rigs: Callable[..., list[Rig]]
 ) -> None:
     rigs((12, StoppedError()))
@@ -218,7 +218,7 @@ def test_lengths_that_count_again_after_a_restart_spoil_nothing(
     assert outcome.before.mean_mm < 0.5  # the file is right
 
 
-def test_more_poses_are_read_until_they_bring_nothing(
+def test_poses_are_added_until_the_stop_criterion_is_met(
     tmp_path: Path, rigs: Callable[..., list[Rig]]
 ) -> None:
     rigs()
@@ -233,7 +233,7 @@ def test_more_poses_are_read_until_they_bring_nothing(
     assert 20 < len(data.poses) < 35 and asked[-1] == len(data.poses)
 
 
-def test_the_scanner_takes_its_time_at_the_first_pose_and_at_those_held_out(
+def test_the_scanner_measures_longer_at_the_first_and_at_held_out_poses(
     tmp_path: Path, rigs: Callable[..., list[Rig]]
 ) -> None:
     made = rigs((7, StoppedError()))
@@ -241,13 +241,13 @@ def test_the_scanner_takes_its_time_at_the_first_pose_and_at_those_held_out(
         begin(tmp_path, settings())
     go_on(tmp_path, settings())
     waits = [seconds for rig in made for seconds in rig.waits]
-    poses = np.cumsum(np.array(waits) == SETTLE_S)  # each is waited for before it is read
+    poses = np.cumsum(np.array(waits) == SETTLE_S)  # each pose is awaited before it is read
     longer = [(int(pose), s) for pose, s in zip(poses, waits, strict=True) if s != SETTLE_S]
     assert [pose for pose, _ in longer] == [1, 5, 10, 15]
     assert longer[0][1] > max(s for _, s in longer[1:])
 
 
-def test_truth_belongs_to_the_reading_although_the_scanner_takes_longer(
+def test_the_true_pose_is_that_at_the_reading_and_not_after_the_longer_scan(
     tmp_path: Path, rigs: Callable[..., list[Rig]], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     rigs()
@@ -275,7 +275,7 @@ def test_truth_belongs_to_the_reading_although_the_scanner_takes_longer(
     assert np.array(later)[[0, 4, 9, 14]] == pytest.approx(0.01)
 
 
-def test_a_pose_that_is_read_is_kept_whatever_ends_the_scanner_s_longer_stay(
+def test_a_read_pose_is_kept_if_the_longer_scan_is_interrupted(
     tmp_path: Path, rigs: Callable[..., list[Rig]], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     made = rigs()
@@ -296,7 +296,7 @@ def test_a_pose_that_is_read_is_kept_whatever_ends_the_scanner_s_longer_stay(
     assert data.poses[:5] == left.poses and len(data.poses) == 15
 
 
-def test_a_place_that_is_not_reached_is_read_where_it_stands_and_not_gone_to_again(
+def test_an_unreachable_place_is_read_where_the_platform_stops_and_not_retried(
     tmp_path: Path, rigs: Callable[..., list[Rig]], capsys: pytest.CaptureFixture[str]
 ) -> None:
     made = rigs((9, StoppedError()))
@@ -315,7 +315,7 @@ def test_a_place_that_is_not_reached_is_read_where_it_stands_and_not_gone_to_aga
     assert missed not in {tuple(place.tolist()) for place in made[1].gone}
 
 
-def test_a_place_at_which_the_motion_was_ended_is_not_gone_to_again(
+def test_a_place_at_which_a_fault_ended_the_motion_is_not_retried(
     tmp_path: Path, rigs: Callable[..., list[Rig]]
 ) -> None:
     rigs((7, TripError("the motion was ended: fault")))
@@ -328,7 +328,7 @@ def test_a_place_at_which_the_motion_was_ended_is_not_gone_to_again(
     assert left.tried[-1] not in {reading.target for reading in data.poses}
 
 
-def test_a_place_that_an_emergency_stop_has_interrupted_is_gone_to_again(
+def test_a_place_interrupted_by_an_emergency_stop_is_retried(
     tmp_path: Path, rigs: Callable[..., list[Rig]]
 ) -> None:
     made = rigs((7, NotThePoseError("the motion was ended: emergency stop")))
@@ -341,7 +341,7 @@ def test_a_place_that_an_emergency_stop_has_interrupted_is_gone_to_again(
     assert not any("emergency" in text for text in data.left_out)
 
 
-def test_a_camera_that_sees_no_marker_at_home_ends_it_before_anything_moves_far(
+def test_a_camera_that_sees_no_marker_at_home_ends_the_run(
     tmp_path: Path, rigs: Callable[..., list[Rig]], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     made = rigs()
@@ -351,7 +351,7 @@ def test_a_camera_that_sees_no_marker_at_home_ends_it_before_anything_moves_far(
     assert not made[0].gone
 
 
-def test_a_new_run_leaves_nothing_of_the_poses_before(
+def test_a_new_run_deletes_poses_of_the_previous_run(
     tmp_path: Path, rigs: Callable[..., list[Rig]]
 ) -> None:
     rigs()
@@ -364,7 +364,7 @@ def test_a_new_run_leaves_nothing_of_the_poses_before(
     assert not run.load_data(tmp_path / run.DATA).poses
 
 
-def test_a_run_that_ended_before_its_first_pose_begins_when_it_is_resumed(
+def test_a_run_that_ended_before_its_first_pose_can_be_resumed(
     tmp_path: Path, rigs: Callable[..., list[Rig]]
 ) -> None:
     rigs()
@@ -376,9 +376,7 @@ def test_a_run_that_ended_before_its_first_pose_begins_when_it_is_resumed(
 
 
 @pytest.mark.parametrize("name", [run.IMAGES, run.DATA, run.SETTINGS, run.OUTSIDE, run.COUNTED])
-def test_a_run_refuses_a_folder_with_somebody_elses_files_of_its_names(
-    tmp_path: Path, name: str
-) -> None:
+def test_a_run_rejects_a_folder_with_files_of_the_user(tmp_path: Path, name: str) -> None:
     kept = tmp_path / name / "pose-0001.png" if name == run.IMAGES else tmp_path / name
     kept.parent.mkdir(exist_ok=True)
     kept.write_text("somebody else's")
@@ -387,7 +385,7 @@ def test_a_run_refuses_a_folder_with_somebody_elses_files_of_its_names(
     assert kept.read_text() == "somebody else's"
 
 
-def test_a_new_run_keeps_what_somebody_else_has_put_beside_its_images(tmp_path: Path) -> None:
+def test_a_new_run_keeps_files_of_the_user_among_its_images(tmp_path: Path) -> None:
     run.StoredRun.new(tmp_path, ROBOT, SETUP)
     (tmp_path / run.IMAGES).mkdir()
     (tmp_path / run.IMAGES / "holiday.png").write_text("a beach")
@@ -403,7 +401,7 @@ def test_a_simulation_does_not_overwrite_readings_of_a_real_robot(tmp_path: Path
     assert (tmp_path / run.DATA).exists()
 
 
-def test_data_of_another_state_of_the_robot_are_not_gone_on_with(
+def test_data_of_a_changed_robot_cannot_be_resumed(
     tmp_path: Path, rigs: Callable[..., list[Rig]]
 ) -> None:
     rigs()

@@ -1,4 +1,4 @@
-"""Poses read from a daemon's status, which is made up: what is kept, and what is refused."""
+"""Poses are read from the status of a stand-in for a daemon, and stored or rejected."""
 
 from __future__ import annotations
 
@@ -26,8 +26,8 @@ ROBOT = load_robot("planar-4")
 LENS = "width_px = 64\nheight_px = 48\nfocal_px = [50.0, 50.0]\ncentre_px = [32.0, 24.0]\n"
 
 
-class Told:
-    """A daemon whose robot stands somewhere, its clock going on with each question."""
+class StandingDaemon:
+    """A stand-in for a daemon at rest, whose clock advances with each request."""
 
     def __init__(self) -> None:
         self.description: dict[str, Any] = {
@@ -66,21 +66,21 @@ class Told:
         }  # fmt: skip
 
 
-def read(told: Told, folder: Path, image: TakeImage | None = None) -> CalibrationData:
+def read(told: StandingDaemon, folder: Path, image: TakeImage | None = None) -> CalibrationData:
     robot, kept = kept_in(told, folder)
     with commanded(told) as running:  # type: ignore[arg-type]
         daemon_run.read_into(PoseOperator(running, robot, image or (lambda _: None)), robot, kept)
     return kept.data
 
 
-def kept_in(told: Told, folder: Path) -> tuple[Robot, daemon_run.DaemonPoses]:
+def kept_in(told: StandingDaemon, folder: Path) -> tuple[Robot, daemon_run.DaemonPoses]:
     robot, description = daemon_run.robot_of(told)  # type: ignore[arg-type]
     data = daemon_run.data_of(folder, robot, description["simulated"])
     return robot, daemon_run.DaemonPoses(folder, data)
 
 
-def test_poses_follow_each_other_and_lengths_that_count_again_are_noticed(tmp_path: Path) -> None:
-    told = Told()
+def test_poses_are_appended_and_restarted_lengths_detected(tmp_path: Path) -> None:
+    told = StandingDaemon()
     home = read(told, tmp_path).poses[0]
     assert home.target == tuple(told.place) and home.tension_N == (40.0, 41.0, 42.0, 43.0)
     per_rad = np.array([axis.winch.cable_m_per_motor_rad for axis in ROBOT.axes])
@@ -98,39 +98,39 @@ def test_poses_follow_each_other_and_lengths_that_count_again_are_noticed(tmp_pa
     )
 
 
-def shift(key: str, value: object) -> Callable[[Told, Path], None]:
+def shift(key: str, value: object) -> Callable[[StandingDaemon, Path], None]:
     return lambda told, _: told.description.update({key: value})
 
 
-def away(told: Told, _: Path) -> None:
+def away(told: StandingDaemon, _: Path) -> None:
     told.place = [0.3, 1.6, 0.0]
 
 
-def unpowered(told: Told, _: Path) -> None:
+def unpowered(told: StandingDaemon, _: Path) -> None:
     told.state = "ready"
 
 
-def lowered(told: Told, _: Path) -> None:
+def lowered(told: StandingDaemon, _: Path) -> None:
     told.tight = False
 
 
-def hung(told: Told, _: Path) -> None:
+def hung(told: StandingDaemon, _: Path) -> None:
     told.silent_s = 5.5
 
 
-def swinging(told: Told, _: Path) -> None:
+def swinging(told: StandingDaemon, _: Path) -> None:
     told.moving_m = 0.01
 
 
-def of_the_simulator(told: Told, folder: Path) -> None:
+def of_the_simulator(told: StandingDaemon, folder: Path) -> None:
     told.description["simulated"] = True
     read(told, folder)
     told.description["simulated"] = False
 
 
-def of_a_run(told: Told, folder: Path) -> None:
-    """It was begun with --overwrite where poses had been read by hand."""
-    told.description["simulated"] = True  # as all runs are
+def of_a_run(told: StandingDaemon, folder: Path) -> None:
+    """Store a run that was started with --overwrite over poses read by hand."""
+    told.description["simulated"] = True  # as in all runs
     read(told, folder)
     run.StoredRun.new(folder, ROBOT, None).data.save(folder / run.DATA)
 
@@ -150,22 +150,25 @@ def of_a_run(told: Told, folder: Path) -> None:
         (of_a_run, BadInputError, "holds an automatic run"),
     ],
 )
-def test_what_would_not_belong_together_is_refused(
-    spoil: Callable[[Told, Path], None], kind: type[CommandError], named: str, tmp_path: Path
+def test_poses_of_a_different_robot_state_or_source_are_rejected(
+    spoil: Callable[[StandingDaemon, Path], None],
+    kind: type[CommandError],
+    named: str,
+    tmp_path: Path,
 ) -> None:
-    told = Told()
+    told = StandingDaemon()
     spoil(told, tmp_path)
     with pytest.raises(kind, match=named):
         read(told, tmp_path)
 
 
-def test_an_image_goes_with_each_pose_and_the_files_with_the_first(
+def test_each_pose_has_an_image_and_the_first_also_the_camera_files(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     lens, sheets = tmp_path / "lens.toml", tmp_path / "sheets.toml"
     lens.write_text(LENS)
     sheets.write_text("size_m = 0.1\n")
-    told, folder = Told(), tmp_path / "cal"
+    told, folder = StandingDaemon(), tmp_path / "cal"
     folder.mkdir()
 
     class Camera:

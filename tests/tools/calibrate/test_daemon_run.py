@@ -1,4 +1,4 @@
-"""A platform that a daemon, which is made up, moves from pose to pose: what is kept and ends it."""
+"""A stand-in for a daemon moves a platform between poses. Readings are stored, failures end it."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ PLACES = [(0.1, 1.5, 0.0), (0.2, 1.6, 0.05), (-0.1, 1.7, 0.0), (0.0, 1.4, -0.05)
 
 
 class Moved(Told):
-    """A daemon that moves its platform, unless a place is refused, not reached, or ends it."""
+    """A stand-in that moves its platform, except for places that are rejected, missed or faulty."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -49,7 +49,7 @@ class Moved(Told):
         self.limit, self.holds, self.rights = "slack", 0, 0
         self.lost = self.silent = False
         self.reacting = "none"
-        """How the robot is being stopped."""
+        """The reaction that is stopping the robot."""
 
     def get(self, path: str) -> dict[str, Any]:
         if self.lost:
@@ -111,7 +111,7 @@ def refused(why: str) -> DaemonRefusalError:
 
 
 class Measurement:
-    """A measurement with such a daemon, of four places, in a folder."""
+    """A measurement of four places with such a daemon, stored in a folder."""
 
     def __init__(self, daemon: Moved, folder: Path) -> None:
         self.daemon, self.folder = daemon, folder
@@ -134,26 +134,26 @@ def measurement(tmp_path: Path) -> Measurement:
     return Measurement(Moved(), tmp_path)
 
 
-def test_home_is_read_and_then_each_place_and_all_are_kept(measurement: Measurement) -> None:
+def test_home_and_each_place_are_read_and_stored(measurement: Measurement) -> None:
     kept = measurement.run()
     data = load_data(measurement.folder / "data.json")
     assert data == kept.data and len(data.poses) == 5 and data.restarts == ()
     assert {pose.target for pose in data.poses[1:]} == set(PLACES)
     assert measurement.asked == [1, 2, 3, 4, 5]
-    # the right is held from the first pose to the last
+    # the right to move is held from the first pose to the last
     assert measurement.daemon.rights == measurement.daemon.holds == 1
     assert measurement.daemon.program == "hold"
 
 
-def test_one_that_was_ended_goes_on_behind_what_is_kept(measurement: Measurement) -> None:
+def test_a_measurement_continues_after_its_stored_poses(measurement: Measurement) -> None:
     assert measurement.run(3).data.restarts == ()
     assert measurement.run(4).data.restarts == ()
-    measurement.daemon.counted_m += 0.01  # as after another start
+    measurement.daemon.counted_m += 0.01  # as after a restart
     kept = measurement.run()
     assert len(kept.data.poses) == 5 and kept.data.restarts == (4,)
 
 
-def test_a_place_that_is_refused_is_left_out_and_one_that_is_not_reached_read(
+def test_a_rejected_place_is_omitted_and_a_missed_one_is_read(
     measurement: Measurement, capsys: pytest.CaptureFixture[str]
 ) -> None:
     measurement.daemon.refused, measurement.daemon.stuck = {0.2}, {-0.1}
@@ -166,7 +166,7 @@ def test_a_place_that_is_refused_is_left_out_and_one_that_is_not_reached_read(
 
 
 @pytest.mark.parametrize(("limit", "tried"), [("slack", 1), ("late", 0)])
-def test_a_fault_ends_it_with_what_was_read_kept(
+def test_a_fault_ends_the_measurement_and_keeps_readings(
     measurement: Measurement, limit: str, tried: int
 ) -> None:
     measurement.daemon.faulty, measurement.daemon.limit = {-0.1}, limit
@@ -177,10 +177,10 @@ def test_a_fault_ends_it_with_what_was_read_kept(
     assert len(data.tried) == tried and 1 <= len(data.poses) < 5
 
 
-def test_a_robot_that_is_being_stopped_ends_it_before_other_places_are_asked_for(
+def test_a_reacting_robot_ends_the_measurement_before_the_next_place(
     measurement: Measurement,
 ) -> None:
-    """As one whose platform is let down: it has power yet, and refuses whatever is asked."""
+    """While its platform is lowered, a robot still has power but rejects all commands."""
     measurement.run(2)
     daemon = measurement.daemon
     post = daemon.post
@@ -192,14 +192,14 @@ def test_a_robot_that_is_being_stopped_ends_it_before_other_places_are_asked_for
     daemon.post = stopped_meanwhile  # type: ignore[method-assign]
     with pytest.raises(TripError, match=r"axis 1: slack \(controlled stop under way\)"):
         measurement.run()
-    # the platform has not set out for a place, which is gone to later
+    # the platform has not started towards the place, which is visited later
     assert daemon.rights == 2 and load_data(measurement.folder / "data.json").tried == ()
-    with pytest.raises(TripError):  # nor is anything read then
+    with pytest.raises(TripError):  # nothing is read either
         measurement.run()
     assert len(load_data(measurement.folder / "data.json").poses) == 2
 
 
-def test_a_loop_that_does_not_answer_is_not_taken_for_a_refusal(measurement: Measurement) -> None:
+def test_a_silent_loop_does_not_count_as_rejection_of_a_place(measurement: Measurement) -> None:
     measurement.run(2)
     measurement.daemon.silent = True
     with pytest.raises(WorkFailedError, match="has not turned"):
@@ -208,7 +208,7 @@ def test_a_loop_that_does_not_answer_is_not_taken_for_a_refusal(measurement: Mea
     assert load_data(measurement.folder / "data.json").tried == ()
 
 
-def test_a_hold_from_elsewhere_ends_it_also_while_the_platform_stands(
+def test_a_hold_by_another_client_ends_the_measurement_at_rest(
     measurement: Measurement,
 ) -> None:
     def ask(pose: int) -> None:
@@ -221,7 +221,9 @@ def test_a_hold_from_elsewhere_ends_it_also_while_the_platform_stands(
     assert len(load_data(measurement.folder / "data.json").poses) == 3
 
 
-def test_a_stop_holds_and_a_lost_daemon_is_reported(measurement: Measurement) -> None:
+def test_a_stop_request_holds_the_robot_and_a_lost_daemon_is_reported(
+    measurement: Measurement,
+) -> None:
     measurement.run(2)
     daemon, post = measurement.daemon, measurement.daemon.post
 
@@ -241,7 +243,7 @@ def test_a_stop_holds_and_a_lost_daemon_is_reported(measurement: Measurement) ->
 
 
 class Calibrated(Moved):
-    """One that runs a robot as calibrated, a drum of which may pay out more than it did."""
+    """A stand-in that runs a calibrated robot. A drum may have changed since then."""
 
     def __init__(self, robot: Robot, drum: float) -> None:
         super().__init__()
@@ -270,7 +272,7 @@ class Calibrated(Moved):
 
 @pytest.fixture
 def file(tmp_path: Path) -> Robot:
-    """A robot's file beside which a calibration is in force."""
+    """Return a robot's file with a calibration in force."""
     path = tmp_path / "mine.toml"
     shutil.copy(ROBOT.path, path)
     robot = load_robot(path)
@@ -279,7 +281,7 @@ def file(tmp_path: Path) -> Robot:
 
 
 @pytest.mark.parametrize(("drum", "moved"), [(0.0, False), (0.01, True)])
-def test_a_robot_that_runs_is_checked_against_its_calibration(
+def test_a_running_robot_is_checked_against_its_calibration(
     file: Robot, drum: float, moved: bool, tmp_path: Path
 ) -> None:
     daemon = Calibrated(calibrated(file), drum)
@@ -294,7 +296,7 @@ def test_a_robot_that_runs_is_checked_against_its_calibration(
     assert len(data.poses) == 11 and not data.simulated
 
 
-def test_a_robot_that_does_not_run_with_its_calibration_is_not_checked(
+def test_a_check_requires_a_robot_that_runs_with_its_calibration(
     file: Robot, tmp_path: Path
 ) -> None:
     out, folder = Output(as_json=False), tmp_path / "out"
@@ -309,9 +311,7 @@ def test_a_robot_that_does_not_run_with_its_calibration_is_not_checked(
     assert not folder.exists() and daemon.rights == 0
 
 
-def test_a_check_does_not_write_over_what_a_calibration_has_read(
-    file: Robot, tmp_path: Path
-) -> None:
+def test_a_check_does_not_overwrite_data_of_a_calibration(file: Robot, tmp_path: Path) -> None:
     read(Told(), tmp_path)
     daemon = Calibrated(calibrated(file), 0.0)
     before = {path.name: path.read_bytes() for path in tmp_path.iterdir() if path.is_file()}
@@ -321,7 +321,7 @@ def test_a_check_does_not_write_over_what_a_calibration_has_read(
     assert daemon.rights == 0
 
 
-def test_a_platform_that_is_not_held_at_home_is_not_checked(file: Robot, tmp_path: Path) -> None:
+def test_a_check_requires_a_platform_held_at_home(file: Robot, tmp_path: Path) -> None:
     out, folder = Output(as_json=False), tmp_path / "out"
     daemon = Calibrated(calibrated(file), 0.0)
     daemon.place[0] += 0.3

@@ -1,4 +1,4 @@
-"""Which poses `--poses` has a calibration go to, and what it refuses."""
+"""`--poses` selects the poses of a calibration by number or list."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def listed(path: Path, count: int = 20) -> np.ndarray:
 
 
 @pytest.mark.parametrize("name", ["poses.csv", "poses.toml"])
-def test_a_list_is_gone_to_wholly_and_home_besides(tmp_path: Path, name: str) -> None:
+def test_a_list_gives_all_its_poses_and_home(tmp_path: Path, name: str) -> None:
     path = tmp_path / name
     places = listed(path)
     count, found = poses_wanted(ROBOT, str(path))
@@ -36,7 +36,7 @@ def test_a_list_is_gone_to_wholly_and_home_besides(tmp_path: Path, name: str) ->
     assert sorted(map(tuple, batches.tolist())) == sorted(found)
 
 
-def test_a_number_is_how_many() -> None:
+def test_a_number_gives_the_number_of_poses() -> None:
     assert poses_wanted(ROBOT, None) == (None, None)
     assert poses_wanted(ROBOT, "15") == (15, None)
     for text in ("14", "1001", "-20", "1.5", "", "9" * 5000):
@@ -62,7 +62,7 @@ def test_a_number_is_how_many() -> None:
         (2, 1, "1" * 200_000, r"poses\.csv:3: field larger than"),
     ],
 )
-def test_lists_that_cannot_be_gone_to_are_refused(
+def test_invalid_lists_are_rejected(
     tmp_path: Path, line: int, cell: int, text: str | None, named: str
 ) -> None:
     path = tmp_path / "poses.csv"
@@ -74,20 +74,20 @@ def test_lists_that_cannot_be_gone_to_are_refused(
         poses_wanted(ROBOT, str(path))
 
 
-def test_a_list_of_too_few_poses_is_refused(tmp_path: Path) -> None:
+def test_a_list_of_too_few_poses_is_rejected(tmp_path: Path) -> None:
     listed(tmp_path / "poses.csv", 13)
     with pytest.raises(BadInputError, match="13 poses; allowed: 14 to 999, home is read besides"):
         poses_wanted(ROBOT, str(tmp_path / "poses.csv"))
 
 
-def test_a_spreadsheets_mark_and_comments_come_before_the_columns(tmp_path: Path) -> None:
+def test_byte_order_mark_and_comments_may_precede_the_columns(tmp_path: Path) -> None:
     path = tmp_path / "poses.csv"
     places = listed(path)
     path.write_text("\ufeff# drawn by hand\n\n" + path.read_text(), encoding="utf-8")
     assert np.array(poses_wanted(ROBOT, str(path))[1]) == pytest.approx(places, abs=1e-6)
 
 
-def test_a_pose_that_is_there_twice_is_refused(tmp_path: Path) -> None:
+def test_a_duplicate_pose_is_rejected(tmp_path: Path) -> None:
     path = tmp_path / "poses.csv"
     listed(path)
     lines = path.read_text().splitlines()
@@ -96,7 +96,7 @@ def test_a_pose_that_is_there_twice_is_refused(tmp_path: Path) -> None:
         poses_wanted(ROBOT, str(path))
 
 
-def test_a_way_that_touches_something_is_refused(
+def test_a_pose_with_contact_on_the_way_is_rejected(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     listed(tmp_path / "poses.csv")

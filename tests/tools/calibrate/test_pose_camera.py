@@ -1,4 +1,4 @@
-"""The camera of a calibration: what it survives, what it says, and when it gives up."""
+"""The camera of a calibration retries bad images, reports them and finally fails."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ GONE = None
 
 
 class Scripted(Camera):
-    """Gives images one after another; None is a camera that has gone."""
+    """Return images one after another. None stands for a disconnected camera."""
 
     def __init__(self, images: list[Pixels | None]) -> None:
         self.name, self._images = "scripted", images
@@ -59,7 +59,7 @@ class Scripted(Camera):
 def opened(
     images: Sequence[Pixels | None], folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> tuple[PoseCamera, list[str], list[str]]:
-    """Return a camera that sees these, what it opens, and what it says."""
+    """Return a camera with these images, the list of its openings, and its notes."""
     left, opens, said = list(images), [], []
 
     def open_one(url: str, _: object) -> Camera:
@@ -76,7 +76,7 @@ def opened(
     ("images", "waits", "opens"),
     [([GOOD], 0, 1), ([DARK, GOOD], 1, 1), ([BLURRED, DARK, GOOD], 2, 1), ([GONE, GOOD], 1, 2)],
 )
-def test_an_image_that_is_bad_or_missing_is_taken_again(
+def test_a_bad_or_missing_image_is_taken_again(
     images: list[Pixels | None],
     waits: int,
     opens: int,
@@ -92,7 +92,7 @@ def test_an_image_that_is_bad_or_missing_is_taken_again(
     np.testing.assert_array_equal(kept, GOOD)
 
 
-def test_one_bad_pose_is_survived_and_told_five_in_turn_are_not(
+def test_one_bad_pose_is_reported_and_five_in_a_row_end_the_run(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     camera, _, said = opened([DARK] * 3 + [GOOD] + [DARK] * 15, tmp_path, monkeypatch)
@@ -106,7 +106,9 @@ def test_one_bad_pose_is_survived_and_told_five_in_turn_are_not(
         camera.see(8, lambda _: None)
 
 
-def test_a_camera_that_stays_gone_ends_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_camera_that_stays_disconnected_ends_the_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     camera, opens, said = opened([GOOD] + [GONE] * 3, tmp_path, monkeypatch)
     camera.see(1, lambda _: None)
     with pytest.raises(CameraError, match="no image any more"):
@@ -114,7 +116,7 @@ def test_a_camera_that_stays_gone_ends_it(tmp_path: Path, monkeypatch: pytest.Mo
     assert len(opens) == 3 and "opened again" in said[0]
 
 
-def test_another_resolution_and_ids_printed_twice_are_reported(
+def test_a_wrong_resolution_and_duplicate_ids_are_reported(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     camera, _, said = opened([scene(3, 7, 3), scene(3, 7, 3), GOOD[:200]], tmp_path, monkeypatch)

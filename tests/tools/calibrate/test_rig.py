@@ -1,4 +1,4 @@
-"""The procedure of calibration on a simulated robot over its bus, with a scanner beside it."""
+"""The calibration procedure on a simulated robot over its bus, with a scanner."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def test_home_and_poses_are_read_and_measured(tmp_path: Path) -> None:
     for reading, other in zip(measured.readings, outside, strict=True):
         assert reading.position_m is not None
         off = np.array(reading.position_m[:2]) - np.array(reading.target[:2])
-        # the exit points are some millimetres from where the file has them
+        # the true exit points differ from the file by some millimetres
         assert 1e-5 < float(np.linalg.norm(off)) < 0.03
         assert reading.position_std_m is not None and 1e-4 < reading.position_std_m < 3e-4
         assert min(reading.tension_N) > 5.0 and min(reading.length_m) > 0.5
@@ -58,7 +58,7 @@ def test_home_and_poses_are_read_and_measured(tmp_path: Path) -> None:
         assert float(np.linalg.norm(missed)) < 6.0 * reading.position_std_m
 
 
-def test_somebody_who_wants_an_end_is_heard_between_two_cycles() -> None:
+def test_a_stop_request_is_obeyed_between_two_cycles() -> None:
     wanted: list[bool] = []
     with (
         pytest.raises(StoppedError),
@@ -69,7 +69,7 @@ def test_somebody_who_wants_an_end_is_heard_between_two_cycles() -> None:
         operator.move_to(chosen_places(load_robot("planar-3"), 1, 3).middle)
 
 
-def test_a_pose_that_is_not_reached_in_time_is_read_where_the_platform_is_held(
+def test_a_pose_not_reached_in_time_is_read_where_the_platform_is_held(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     places, said = chosen_places(load_robot("planar-3"), 3, 3), list[str]()
@@ -98,7 +98,7 @@ def test_a_pose_that_is_not_reached_in_time_is_read_where_the_platform_is_held(
 
 
 @pytest.mark.parametrize("when", ["on its way", "before it is read", "while it is read"])
-def test_an_emergency_stop_is_no_fault_of_the_pose(
+def test_an_emergency_stop_does_not_mark_the_pose_as_tried(
     when: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     places = chosen_places(load_robot("planar-3"), 3, 3)
@@ -128,11 +128,11 @@ def test_an_emergency_stop_is_no_fault_of_the_pose(
             measure_poses(operator, places.chosen[:2], places.middle, measured, Notes())
         assert pressed_s and not measured.tried and not measured.readings
         monkeypatch.undo()
-        with pytest.raises(NotThePoseError):  # in the fault, no pose is to blame for it either
+        with pytest.raises(NotThePoseError):  # during the fault, no pose is marked either
             operator.move_to(places.middle)
 
 
-def test_a_drive_that_fails_on_the_way_is_held_against_the_pose(
+def test_a_drive_fault_during_the_motion_marks_the_pose_as_tried(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     places = chosen_places(load_robot("planar-3"), 3, 3)
@@ -151,7 +151,7 @@ def test_a_drive_that_fails_on_the_way_is_held_against_the_pose(
     assert measured.tried == [tuple(places.chosen[0].tolist())]
 
 
-def test_a_drive_that_fails_before_the_platform_has_set_out_is_not() -> None:
+def test_a_drive_fault_before_the_motion_does_not_mark_the_pose_as_tried() -> None:
     places = chosen_places(load_robot("planar-3"), 3, 3)
     with simulated_rig("planar-3", plant=None, scanner=False) as operator:
         operator.tighten()

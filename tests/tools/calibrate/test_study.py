@@ -1,4 +1,4 @@
-"""The thesis' error model against trials: each parameter's spread, biases, and the plateau."""
+"""The thesis' error model agrees with trials: spread of each parameter, biases, plateau."""
 
 from __future__ import annotations
 
@@ -30,13 +30,13 @@ def known(count: int) -> tuple[FloatArray, FloatArray, FloatArray]:
 
 
 @pytest.mark.parametrize("kind", list(BOUNDS))
-def test_the_error_model_has_the_spread_of_each_parameter(kind: str) -> None:
+def test_the_error_model_predicts_the_spread_of_each_parameter(kind: str) -> None:
     given = *known(100), 0.5 * BOUNDS[kind]
     rng = np.random.default_rng(3)
     tried = [simulated_errors(*given, rng.normal(size=(100, 14))) for _ in range(1000)]
     root_mean_square = np.sqrt((np.array(tried) ** 2).mean(axis=0))
     assert root_mean_square.shape == (8, 4)
-    # 1000 draws tell a spread to 2.2 % (1 sigma)
+    # 1000 draws determine a spread to 2.2 % (1 sigma)
     np.testing.assert_allclose(root_mean_square, predicted_spread(*given), rtol=0.1)
 
 
@@ -48,7 +48,7 @@ def test_a_bias_is_propagated_to_each_parameter(bias: tuple[float, float, float]
     told, tried = (
         of(*known(100), np.array(bias), unit) for of in (predicted_errors, simulated_errors)
     )
-    # what is left of a turn is of second order
+    # the error of a rotation is of second order
     np.testing.assert_allclose(tried, told, atol=0.02 * float(np.abs(told).max()))
     length_m, position_m, rotation_rad = bias
     if not rotation_rad:
@@ -63,5 +63,5 @@ def test_the_plateau_is_at_some_200_poses_with_the_noise_of_figure_3_8() -> None
     lengths_alone, all_kinds = plateaus(rows)
     for key in ("exit_poses", "offset_poses"):
         assert 140.0 < all_kinds[key] < 280.0
-        # the model is less off for this robot than for the thesis'
+        # the model is more accurate for this robot than for that of the thesis
         assert lengths_alone[key] > 2.0 * all_kinds[key]

@@ -1,4 +1,4 @@
-"""How a calibration is judged and reported, on a robot with a camera that is made up."""
+"""The comparison of a calibration with the truth, and its report, on a synthetic robot."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def outcome(robot: CameraRobot) -> Outcome:
 
 @pytest.fixture
 def known(robot: CameraRobot, outcome: Outcome, monkeypatch: pytest.MonkeyPatch) -> TruthComparison:
-    """Return what is said of it by the truth that it was made up with."""
+    """Return the comparison of the outcome with the synthetic truth."""
     made, rng = robot.made, np.random.default_rng(1)
     sheets = [
         SimpleNamespace(name=str(marker), place=lambda _, k=k: made.markers_m[k], rotation=turn)
@@ -67,21 +67,19 @@ def known(robot: CameraRobot, outcome: Outcome, monkeypatch: pytest.MonkeyPatch)
     return compare_with_truth(robot.robot, None, outcome, OutsidePoses(poses=tuple(poses)))
 
 
-def test_errors_are_those_of_poses_held_out_beside_scanner_and_truth(
-    known: TruthComparison, outcome: Outcome
-) -> None:
+def test_errors_are_those_of_held_out_poses(known: TruthComparison, outcome: Outcome) -> None:
     proof, truth = known.verification(), known.true_errors()
     assert known.index.tolist() == outcome.unused.index.tolist() == [4, 9, 14, 19, 24]
     assert truth["mean_position_error_mm"] < 0.5 * proof["mean_position_error_before_mm"]
     assert truth["mean_orientation_error_deg"] < 0.2
-    # the scanner's own error at the pose and at the first one is on top
+    # the errors of the scanner at this pose and at the first one add to it
     assert 1.0 < proof["of_which_scanner_mm"] < 1.6
     assert abs(proof["mean_position_error_mm"] - truth["mean_position_error_mm"]) < 2.0
     assert abs(proof["scale_factor"] - 1.0) < 4.0 * proof["scale_factor_std"] < 0.02
     assert all("distances between them are" in line for line in known.lines() if "mean" in line)
     frame = proof["in_marker_frame"]
-    # one sheet of 150 mm whose corners stand 0.3 mm off its plane tilts its frame by 0.3 / 75:
-    # 6 mm from 1.5 m away, one standard deviation
+    # corners 0.3 mm off the plane of a 150 mm sheet tilt its frame by 0.3 / 75: 6 mm at a
+    # distance of 1.5 m, one standard deviation
     assert frame["mean_position_error_mm"] < 3.0 * 6.0 and frame["marker"] in range(12)
     drums = [row for row in truth["parameters"] if row["name"].endswith("drum")]
     assert len(drums) == 8
@@ -89,7 +87,7 @@ def test_errors_are_those_of_poses_held_out_beside_scanner_and_truth(
     assert np.sqrt(np.mean(np.square(sigmas))) < 2.0
 
 
-def test_the_report_is_one_file_with_its_pictures(
+def test_the_report_is_one_file_including_pictures(
     known: TruthComparison, outcome: Outcome, robot: CameraRobot, tmp_path: Path
 ) -> None:
     shown = [len(one.image.markers) if one.image else 0 for one in robot.made.data.poses]
@@ -112,7 +110,7 @@ def test_the_report_is_one_file_with_its_pictures(
     assert page.read_text().count("<figure>") == 3
 
 
-def test_the_picture_names_the_axes_and_tells_their_residuals_apart(outcome: Outcome) -> None:
+def test_the_picture_labels_axes_and_distinguishes_their_residuals(outcome: Outcome) -> None:
     names = [axis.name for axis in outcome.robot.axes]
     above, below = found_figure(outcome).axes
     assert [text.get_text().split("\n")[1] for text in above.get_xticklabels()] == names

@@ -1,4 +1,4 @@
-"""Commands as a user types them, and how they are to refuse."""
+"""Run commands as a user types them, and check how they fail."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def cdpr(*arguments: str | Path) -> Result:
 
 
 def done(*arguments: str | Path) -> dict[str, Any]:
-    """Run a command with --json that has to succeed; return its last line."""
+    """Run a command with --json that must succeed. Return its last line."""
     result = cdpr(*arguments, "--json")
     assert result.returncode == 0, result.stderr
     told = json.loads(result.stdout.splitlines()[-1])
@@ -35,7 +35,7 @@ def done(*arguments: str | Path) -> dict[str, Any]:
 
 
 def refused(status: int, *arguments: str | Path, stdin: str = "") -> str:
-    """Run a command that has to fail; return its one line of complaint."""
+    """Run a command that must fail. Return its one line of error."""
     result = cdpr_here(*arguments, stdin=stdin)
     assert result.returncode == status, result.stderr
     assert "Traceback" not in result.stderr
@@ -46,7 +46,7 @@ def refused(status: int, *arguments: str | Path, stdin: str = "") -> str:
 
 
 def usage_error(*arguments: str) -> str:
-    """Run a command with wrong arguments; return what it says, without the frame around it."""
+    """Run a command with wrong arguments. Return its error without the frame."""
     result = cdpr_here(*arguments)
     assert result.returncode == 2, result.stderr
     assert result.stdout == ""

@@ -1,4 +1,4 @@
-"""Small commands as a user types them: those that work in a process of their own, the rest here."""
+"""Small commands as a user types them, in this process or in separate ones."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from tests.tools.commands.cli_rig import OWN, WINCH, cdpr, done, refused
 
 @pytest.fixture(scope="module")
 def lab() -> Iterator[str]:
-    """A simulated drive that several commands find on a bus of its own name."""
+    """Yield the bus of a simulated drive that several commands use."""
     bus = f"simbus:cli-{os.getpid()}"
     arguments = ["sim", "up", WINCH, "--bus", bus, "--exit-with-stdin"]
     process = subprocess.Popen(
@@ -42,10 +42,10 @@ def lab() -> Iterator[str]:
     assert process.returncode == 0
 
 
-# -- what needs no bus
+# -- commands without a bus
 
 
-def test_help_sorts_every_command_but_bench_under_a_heading() -> None:
+def test_help_lists_each_command_but_bench_under_a_heading() -> None:
     result = cdpr("--help")
     assert result.returncode == 0
     shown = [name for names in PANELS.values() for name in names]
@@ -63,9 +63,7 @@ def test_help_sorts_every_command_but_bench_under_a_heading() -> None:
         ("calibrat", "No such command 'calibrat'. "),
     ],
 )
-def test_a_typo_never_leads_to_a_command_that_moves_or_switches_power(
-    typed: str, answer: str
-) -> None:
+def test_a_typo_suggests_no_command_that_moves_or_switches_power(typed: str, answer: str) -> None:
     result = cdpr_here(typed)
     assert result.returncode == 2
     assert answer in result.stderr
@@ -73,14 +71,14 @@ def test_a_typo_never_leads_to_a_command_that_moves_or_switches_power(
 
 
 @pytest.mark.parametrize("alias", ALIASES)
-def test_an_alias_is_the_command_itself(alias: str) -> None:
+def test_an_alias_runs_its_command(alias: str) -> None:
     told = cdpr_here(alias, "--help")
     assert told.returncode == 0
     assert f"cdpr {ALIASES[alias]} [" in told.stdout
 
 
 def _commands(group: Any, words: tuple[str, ...] = ()) -> Iterator[tuple[str, Any]]:
-    """Yield all commands below a group, by what is typed."""
+    """Yield all commands below a group with their words."""
     if not hasattr(group, "list_commands"):
         yield " ".join(words), group
         return
@@ -90,7 +88,7 @@ def _commands(group: Any, words: tuple[str, ...] = ()) -> Iterator[tuple[str, An
         yield from _commands(command, (*words, name))
 
 
-def test_every_option_and_argument_is_explained() -> None:
+def test_each_option_and_argument_has_a_help_text() -> None:
     commands = dict(_commands(typer.main.get_group(app)))
     assert "robot trial" in commands and len(commands) > 80
     unexplained = [
@@ -107,7 +105,7 @@ def test_every_option_and_argument_is_explained() -> None:
                 assert param.metavar == param.metavar.upper(), f"{name}: {param.metavar}"
 
 
-def test_paragraphs_of_a_help_are_as_wide_as_the_terminal(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_help_paragraphs_use_the_width_of_the_terminal(monkeypatch: pytest.MonkeyPatch) -> None:
     for columns in (80, 140):
         monkeypatch.setenv("COLUMNS", str(columns))
         told = cdpr("robot", "new", "--help").stdout.partition("It describes")[2].partition("╭")[0]
@@ -125,7 +123,7 @@ def test_profiles_are_listed_by_kind() -> None:
     assert "spatial-8" in told["robots"]
 
 
-def test_profile_is_shown_for_people_and_for_programs() -> None:
+def test_a_profile_is_shown_as_text_or_json() -> None:
     told = done("profiles", "show", "MPP0923D")
     assert told["kind"] == "motors"
     assert told["profile"]["torque_constant_Nm_per_Arms"] == 0.561
@@ -134,7 +132,7 @@ def test_profile_is_shown_for_people_and_for_programs() -> None:
     assert done("profiles", "show", WINCH)["profile"]["motor"]["model"] == "MPP0923D"
 
 
-def test_doctor_judges_this_machine() -> None:
+def test_doctor_checks_this_machine() -> None:
     told = done("doctor")
     findings = {finding["what"]: finding for finding in told["findings"]}
     assert findings["embedded bus"]["level"] == "ok"
@@ -144,7 +142,7 @@ def test_doctor_judges_this_machine() -> None:
 # -- one drive
 
 
-def test_info_of_an_own_simulated_drive() -> None:
+def test_info_starts_a_simulated_drive() -> None:
     told = done("drive", "info", WINCH, *OWN)
     assert told["profile_fits"] is True
     assert told["state"] == "switch on disabled"
@@ -153,7 +151,7 @@ def test_info_of_an_own_simulated_drive() -> None:
     assert "10 (cyclic torque)" in told["supported_modes"]
 
 
-def test_own_drive_is_that_of_the_plant_file(tmp_path: Path) -> None:
+def test_a_drive_started_by_a_command_uses_the_plant_file(tmp_path: Path) -> None:
     plant = tmp_path / "fine.toml"
     plant.write_text("[encoder]\ncounts_per_turn = 20000\n")
     told = done("drive", "info", WINCH, *OWN, "--plant", plant)
@@ -168,7 +166,7 @@ def test_enable_ends_without_power(lab: str) -> None:
 def test_home_finds_the_index() -> None:
     told = done("drive", "home", WINCH, *OWN, "--method", "34")
     assert told["method"] == 34
-    assert abs(told["position_deg"]) < 10  # the drive stops past the index
+    assert abs(told["position_deg"]) < 10  # the drive stops beyond the index
 
 
 @pytest.mark.parametrize(("speed", "seconds"), [(20.0, 3.0), (-90.0, 4.0), (360.0, 2.0)])
@@ -185,11 +183,11 @@ def test_objects_are_read_and_written(lab: str) -> None:
 
 
 def _is_enabled(frame: can.Message | None) -> bool:
-    """Return whether the frame is the drive's first TPDO, in operation enabled."""
+    """Return whether a frame is the drive's first TPDO in operation enabled."""
     return frame is not None and frame.arbitration_id == 0x181 and frame.data[0] & 0x6F == 0x27
 
 
-def test_ctrl_c_ends_a_jog_under_control(lab: str) -> None:
+def test_ctrl_c_ends_a_jog_with_a_controlled_stop(lab: str) -> None:
     command = [sys.executable, "-m", "cdpr_tools.cli", "drive", "jog", WINCH, "--bus", lab]
     process = subprocess.Popen(
         [*command, "--seconds", "600", "--speed-deg-s", "90"],
@@ -208,13 +206,13 @@ def test_ctrl_c_ends_a_jog_under_control(lab: str) -> None:
     assert done("drive", "info", WINCH, "--bus", lab)["state"] == "switch on disabled"
 
 
-def test_ctrl_c_over_and_over_takes_the_power_at_once_and_is_confirmed(lab: str) -> None:
+def test_repeated_ctrl_c_cuts_power_immediately_and_confirms_it(lab: str) -> None:
     command = [sys.executable, "-m", "cdpr_tools.cli", "drive", "jog", WINCH, "--bus", lab]
     process = subprocess.Popen(
         [*command, "--seconds", "600", "--speed-deg-s", "90"],
         stderr=subprocess.PIPE,
         text=True,
-        # the interpreter is to take itself apart while more come
+        # more Ctrl-C arrive while the interpreter shuts down
         env={**os.environ, "CDPR_TEST_FORKS": "0"},
     )
     with can.Bus(interface="simbus", channel=lab.partition(":")[2]) as listener:
@@ -226,7 +224,7 @@ def test_ctrl_c_over_and_over_takes_the_power_at_once_and_is_confirmed(lab: str)
         line := process.stderr.readline()
     ):
         assert line
-    for _ in range(10):  # as somebody does who is afraid
+    for _ in range(10):  # as an alarmed user does
         process.send_signal(signal.SIGINT)
         time.sleep(0.002)
     _, errors = process.communicate(timeout=300)
@@ -235,16 +233,16 @@ def test_ctrl_c_over_and_over_takes_the_power_at_once_and_is_confirmed(lab: str)
     assert done("drive", "info", WINCH, "--bus", lab)["state"] == "switch on disabled"
 
 
-# -- bad input: one line that says what is allowed, status 2
+# -- invalid input: one line with the allowed values, status 2
 
 
-def test_a_bus_name_in_use_is_refused(lab: str) -> None:
+def test_a_bus_name_in_use_is_rejected(lab: str) -> None:
     message = refused(2, "sim", "up", WINCH, "--bus", lab)
     assert lab in message
     assert "in use" in message
 
 
-def test_plant_file_is_for_an_own_simulator_only(lab: str, tmp_path: Path) -> None:
+def test_a_plant_file_requires_a_simulator_of_the_command(lab: str, tmp_path: Path) -> None:
     plant = tmp_path / "plant.toml"
     plant.touch()
     assert "simbus:" in refused(2, "drive", "info", WINCH, "--bus", lab, "--plant", plant)
@@ -253,7 +251,7 @@ def test_plant_file_is_for_an_own_simulator_only(lab: str, tmp_path: Path) -> No
     )
 
 
-def test_what_a_drive_refuses_is_a_failure(lab: str) -> None:
+def test_an_object_that_a_drive_rejects_is_an_error(lab: str) -> None:
     for entry, value, words in (
         ("1018:1", "4", ("1018h:1", "read only")),
         ("6072", "99999999999", ("6072h:0", "99999999999")),

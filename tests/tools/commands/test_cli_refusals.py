@@ -1,4 +1,4 @@
-"""Bad input: one line that says what is allowed, status 2; and what needs no bus."""
+"""Invalid input: one line with the allowed values and status 2."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ from tests.tools.commands.cli_rig import OWN, WINCH, refused, usage_error
         ("socketcand://host", ("socketcand://host:port/can0",)),
     ],
 )
-def test_bad_bus(bus: str, words: tuple[str, ...]) -> None:
+def test_an_invalid_bus_is_rejected(bus: str, words: tuple[str, ...]) -> None:
     message = refused(2, "drive", "info", WINCH, "--bus", bus)
     for word in words:
         assert word in message
@@ -47,7 +47,9 @@ def test_bad_bus(bus: str, words: tuple[str, ...]) -> None:
     ],
     ids=["range", "section", "key", "type", "choice", "syntax"],
 )
-def test_bad_plant_file(tmp_path: Path, text: str, words: tuple[str, ...]) -> None:
+def test_an_invalid_plant_file_is_rejected(
+    tmp_path: Path, text: str, words: tuple[str, ...]
+) -> None:
     plant = tmp_path / "plant.toml"
     plant.write_text(text)
     message = refused(2, "drive", "info", WINCH, *OWN, "--plant", plant)
@@ -66,19 +68,21 @@ def test_bad_plant_file(tmp_path: Path, text: str, words: tuple[str, ...]) -> No
     ],
     ids=lambda value: " ".join(value[2:]) if isinstance(value, tuple) else value,
 )
-def test_bad_argument_of_drive(arguments: tuple[str, ...], words: tuple[str, ...]) -> None:
+def test_an_invalid_argument_of_drive_is_rejected(
+    arguments: tuple[str, ...], words: tuple[str, ...]
+) -> None:
     message = refused(2, "drive", *arguments, *OWN)
     for word in words:
         assert word in message
 
 
-def test_bad_usage_is_explained() -> None:
+def test_usage_errors_are_explained() -> None:
     assert "'nonsense'" in usage_error("nonsense")
     assert "600" in usage_error("drive", "enable", WINCH, *OWN, "--seconds", "1000")
     assert "'--bandwidth-hz'" in usage_error("commission", WINCH, *OWN, "--bandwidth-hz", "0")
 
 
-def test_a_real_bus_is_not_energised_unasked() -> None:
+def test_power_on_a_real_bus_needs_a_confirmation() -> None:
     for answer in ("n\n", ""):
         message = refused(
             2, "drive", "enable", WINCH, "--bus", "socketcan:no-such-can", stdin=answer
@@ -89,7 +93,7 @@ def test_a_real_bus_is_not_energised_unasked() -> None:
     )
 
 
-def test_files_that_are_not_there(tmp_path: Path) -> None:
+def test_missing_files_are_reported(tmp_path: Path) -> None:
     nothing = tmp_path / "nothing"
     assert str(nothing) in refused(2, "cogging", "fit", nothing)
     assert str(nothing / "run.json") in refused(2, "cogging", "report", nothing)
@@ -107,7 +111,7 @@ def test_an_earlier_run_is_not_overwritten(tmp_path: Path) -> None:
     assert old.read_bytes() == b"precious"
 
 
-def test_overwriting_an_earlier_run_keeps_what_it_had_not_written(tmp_path: Path) -> None:
+def test_overwriting_an_earlier_run_keeps_other_files(tmp_path: Path) -> None:
     raw = tmp_path / "raw"
     raw.mkdir()
     RawLogWriter(raw / "sweep-0.raw", ["cycle"], {}).close()
@@ -127,7 +131,7 @@ def test_overwriting_an_earlier_run_keeps_what_it_had_not_written(tmp_path: Path
         ("poses", "planar-3", "--out"),
     ],
 )
-def test_a_file_of_somebody_else_is_not_overwritten(words: tuple[str, ...], tmp_path: Path) -> None:
+def test_an_existing_file_is_not_overwritten(words: tuple[str, ...], tmp_path: Path) -> None:
     endings = {"--png": ".png", "--mesh": ".stl", "--out": ".csv"}
     file = tmp_path / f"precious{endings[words[-1]]}"
     file.write_text("precious")
@@ -137,7 +141,7 @@ def test_a_file_of_somebody_else_is_not_overwritten(words: tuple[str, ...], tmp_
     assert file.read_text() == "precious"
 
 
-def test_a_folder_of_something_else_is_not_commissioned_into(tmp_path: Path) -> None:
+def test_commission_rejects_a_folder_with_other_files(tmp_path: Path) -> None:
     (tmp_path / "thesis.tex").write_text("precious")
     message = refused(2, "commission", WINCH, *OWN, "--out", tmp_path)
     assert message.startswith(f"--out {tmp_path}: holds other things")
@@ -159,13 +163,13 @@ def test_a_folder_of_something_else_is_not_commissioned_into(tmp_path: Path) -> 
         ),
     ],
 )
-def test_what_could_not_be_written_or_read_is_refused_beforehand(
+def test_invalid_output_or_input_paths_are_rejected_before_work_starts(
     words: tuple[str, ...], problem: str
 ) -> None:
     assert problem in refused(2, *words)
 
 
-def test_an_error_is_json_too() -> None:
+def test_an_error_is_also_printed_as_json() -> None:
     result = cdpr_here("drive", "info", "no-such-winch", *OWN, "--json")
     told = json.loads(result.stdout.splitlines()[-1])
     assert told["ok"] is False
@@ -173,7 +177,7 @@ def test_an_error_is_json_too() -> None:
     assert told["error"] in result.stderr
 
 
-def test_ctrl_c_while_a_command_is_loaded_is_no_traceback() -> None:
+def test_ctrl_c_while_a_command_loads_prints_no_traceback() -> None:
     code = (
         "import os, signal, sys; from cdpr_tools import cli, command_group;"
         "command_group.load = lambda module, name: os.kill(os.getpid(), signal.SIGINT);"
@@ -186,7 +190,7 @@ def test_ctrl_c_while_a_command_is_loaded_is_no_traceback() -> None:
     assert json.loads(told.stdout)["error"] == "interrupted"
 
 
-def test_ctrl_c_while_the_interpreter_ends_is_no_traceback() -> None:
+def test_ctrl_c_during_shutdown_of_the_interpreter_prints_no_traceback() -> None:
     code = (
         "import atexit, os, signal, sys; from cdpr_tools import cli;"
         "atexit.register(os.kill, os.getpid(), signal.SIGINT);"
@@ -203,7 +207,7 @@ def test_the_version_is_that_of_the_package() -> None:
     assert (told.returncode, told.stdout) == (0, f"cdpr {version('cdpr-rt')}\n")
 
 
-def test_a_shell_completes_commands_and_those_of_a_group() -> None:
+def test_a_shell_completes_commands_and_subcommands() -> None:
     def completed(words: str, count: int) -> list[str]:
         asked = {"_CDPR_COMPLETE": "complete_bash", "COMP_WORDS": words, "COMP_CWORD": str(count)}
         done = subprocess.run(
@@ -223,7 +227,7 @@ def test_a_shell_completes_commands_and_those_of_a_group() -> None:
     ("module", "words"),
     [("httpx", ["status"]), ("uvicorn", ["run", "planar-3", "--bus", "simbus:"])],
 )
-def test_a_part_that_is_not_installed_is_named(module: str, words: list[str]) -> None:
+def test_a_missing_optional_package_is_named(module: str, words: list[str]) -> None:
     code = (
         "import sys; from cdpr_tools.cli import main;"
         f"sys.modules.pop({module!r}, None); sys.argv = ['cdpr', *{words!r}];"

@@ -1,4 +1,4 @@
-"""`cdpr drive configure` and `cdpr drive errors` beside a simulated drive."""
+"""`cdpr drive configure` and `cdpr drive errors` with a simulated drive."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def _cdpr(*words: str) -> tuple[int, dict[str, Any], str]:
     return done.returncode, json.loads(last), done.stderr
 
 
-def test_a_stored_configuration_is_vouched_for_after_the_next_start(bus: str) -> None:
+def test_a_stored_configuration_is_recognised_at_the_next_boot(bus: str) -> None:
     status, told, _ = _cdpr("drive", "configure", WINCH, "--bus", bus, "--store")
     assert status == 0
     assert told["stored"]
@@ -41,7 +41,7 @@ def test_a_stored_configuration_is_vouched_for_after_the_next_start(bus: str) ->
     assert (told["vouched"], told["stored"], told["changed"]) == (True, False, [])
 
 
-def test_what_a_drive_remembers_is_reported_as_text(bus: str) -> None:
+def test_the_error_history_of_a_drive_is_shown_as_text(bus: str) -> None:
     assert _cdpr("drive", "errors", WINCH, "--bus", bus)[1]["history"] == []
     for code in ("0x7305", "0x4310"):
         _cdpr("drive", "od", WINCH, "2F00:1", "--set", code, "--bus", bus)

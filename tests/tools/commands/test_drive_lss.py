@@ -1,4 +1,4 @@
-"""`cdpr drive lss` on simulated drives as they come out of the box."""
+"""`cdpr drive lss` on unconfigured simulated drives."""
 
 from __future__ import annotations
 
@@ -32,13 +32,13 @@ TYPE = ("--profile", "generic-cia402")
 
 @pytest.fixture(autouse=True)
 def quick(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Devices of one process answer together, so that little time has to pass for the last."""
+    """Shorten the wait for the last answer: devices in one process answer together."""
     monkeypatch.setattr("cdpr_drivers.canopen.lss._SETTLE_S", 0.001)
 
 
 @contextmanager
 def simulator(*options: str | Path) -> Iterator[str]:
-    """Run drives on a bus; yield its name."""
+    """Run drives on a bus. Yield its name."""
     name = f"lss-{os.getpid()}-{uuid.uuid4().hex[:6]}"
     words = ["sim", "up", WINCH, "--bus", f"simbus:{name}", "--exit-with-stdin"]
     command = [sys.executable, "-m", "cdpr_tools.cli", *words, *map(str, options)]
@@ -58,7 +58,7 @@ COMMAND = load("groups", "drive")
 
 
 def lss(bus: str, *arguments: str) -> tuple[int, str, str]:
-    """Run the command; return its exit status, text and error as `cdpr` would."""
+    """Run the command. Return exit status, text and error like `cdpr`."""
     out = io.StringIO()
     words = ["lss", "--bus", bus, *QUICK, *arguments]
     try:
@@ -84,7 +84,7 @@ def refused(status: int, bus: str, *arguments: str) -> str:
 
 
 def answers(name: str, node: int, timeout_s: float = 60.0) -> bool:
-    """Tell whether a stranger's master reads the node's device type."""
+    """Return whether a third-party master can read the node's device type."""
     with canopen.Network() as network:
         network.NOTIFIER_CYCLE = 0.05
         network.connect(interface="simbus", channel=name)
@@ -99,7 +99,7 @@ def answers(name: str, node: int, timeout_s: float = 60.0) -> bool:
     return False
 
 
-def test_new_drives_get_node_ids_that_outlast_the_power(tmp_path: Path) -> None:
+def test_new_drives_get_stored_node_ids(tmp_path: Path) -> None:
     store = ("--store", tmp_path / "memory")
     with simulator("--nodes", "2", "--unconfigured", *store) as name:
         bus = f"simbus:{name}"
@@ -123,14 +123,14 @@ def test_new_drives_get_node_ids_that_outlast_the_power(tmp_path: Path) -> None:
         assert answers(name, 7)
 
 
-def test_one_drive_alone_gets_a_bit_rate_that_counts(tmp_path: Path) -> None:
+def test_a_single_drive_gets_a_stored_bit_rate(tmp_path: Path) -> None:
     store = ("--store", tmp_path)
     with simulator(*store) as name:
         bus = f"simbus:{name}"
         status, text, _ = lss(bus, "--alone", "--bitrate", "500k")
         assert status == 0
         assert "500 kbit/s count from the next power-on" in text
-        assert answers(name, 1)  # nothing has changed yet
+        assert answers(name, 1)  # the bit rate has not changed yet
         words = ("--alone", "--bitrate", "500k", "--activate", "--switch-delay-ms", "20")
         status, text, _ = lss(bus, *words)
         assert status == 0
@@ -156,7 +156,7 @@ def test_one_drive_alone_gets_a_bit_rate_that_counts(tmp_path: Path) -> None:
         process.communicate(timeout=120)
 
 
-def test_a_store_that_is_damaged_is_reported(tmp_path: Path) -> None:
+def test_a_damaged_store_is_reported(tmp_path: Path) -> None:
     (tmp_path / "drive-1.json").write_text("{")
     command = [sys.executable, "-m", "cdpr_tools.cli", "sim", "up", WINCH, "--bus", "simbus:never"]
     ended = subprocess.run(
@@ -166,8 +166,8 @@ def test_a_store_that_is_damaged_is_reported(tmp_path: Path) -> None:
     assert "drive-1.json: is not valid JSON" in ended.stderr
 
 
-def test_a_driven_drive_is_left_alone() -> None:
-    """The power stage of another master's drive is enabled: no new node id for it."""
+def test_an_enabled_drive_gets_no_node_id() -> None:
+    """Another master has enabled the drive."""
     with simulator("--paced") as name, canopen.Network() as network:
         network.NOTIFIER_CYCLE = 0.05
         network.connect(interface="simbus", channel=name)
@@ -183,7 +183,7 @@ def test_a_driven_drive_is_left_alone() -> None:
         message = refused(1, f"simbus:{name}", "--alone", "--node-id", "9")
         assert "node 1 has its power stage enabled: stop whoever drives it first" in message
         assert node.sdo[0x6041].raw & 0x6F == 0x27
-        network.send_message(0, bytes([2, 1]))  # stopped: it answers no SDO
+        network.send_message(0, bytes([2, 1]))  # stopped: it does not answer SDO
         message = refused(1, f"simbus:{name}", "--alone", "--node-id", "9")
         assert (
             "node 1 does not tell whether its power stage is enabled: no answer to SDO" in message
@@ -204,12 +204,12 @@ def test_wrong_arguments_are_reported(arguments: tuple[str, ...], problem: str) 
     assert problem in refused(2, "simbus:nobody-runs-this", *arguments)
 
 
-def test_a_bus_of_its_own_has_nobody_to_find() -> None:
+def test_a_private_simulated_bus_is_rejected() -> None:
     assert "name the bus whose drives are looked for" in refused(2, "simbus:")
 
 
-def test_nothing_is_written_on_a_real_bus_without_consent() -> None:
-    """python-can's `virtual` bus stands for a real one: it is no simbus."""
+def test_writing_on_a_real_bus_needs_a_confirmation() -> None:
+    """python-can's `virtual` bus counts as real, because it is not a simbus."""
     bus = f"virtual:lss-{os.getpid()}"
     with can.Bus(bus.partition(":")[2], "virtual", receive_own_messages=False) as device:
         answering = Answering(device)
@@ -227,7 +227,7 @@ def test_nothing_is_written_on_a_real_bus_without_consent() -> None:
 
 
 class Answering(can.Listener):
-    """An early device: it tells its identity but no node id, takes one, and cannot store."""
+    """An old device that reports its identity but no node id, accepts one, and cannot store it."""
 
     def __init__(self, bus: can.BusABC) -> None:
         self.bus = bus

@@ -1,4 +1,4 @@
-"""`cdpr log` on recordings made up of rows that are known."""
+"""`cdpr log` on synthetic recordings with known rows."""
 
 import json
 import shutil
@@ -26,7 +26,7 @@ from tests.tools.recordings.made_recording import record
 
 
 def _log(*arguments: str | Path) -> tuple[int, str, str]:
-    """Run `cdpr log`; return its exit status and what it wrote."""
+    """Run `cdpr log`. Return its exit status and output."""
     ended = cdpr_here("log", *arguments)
     return ended.returncode, ended.stdout, ended.stderr
 
@@ -51,7 +51,7 @@ def _rows() -> Row:
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A session of two files, of which the second was cut short by a power cut."""
+    """Return a session of two files. A power cut truncated the second."""
     folder = tmp_path_factory.mktemp("recordings")
     block = block_with_clock()
     writer = RowWriter(block)
@@ -66,14 +66,14 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def test_info_counts_what_is_there_and_what_is_not(folder: Path) -> None:
+def test_info_counts_recorded_and_missing_cycles(folder: Path) -> None:
     one, two = _done("info", folder)["recordings"]
     assert [one["rows"], two["rows"]] == [2000, 1990]
     assert [one["ended"], two["ended"]] == ["closed", "cut short"]
     assert [one["missing_cycles"], two["missing_cycles"]] == [0, 10]
     assert one["states_s"] == pytest.approx({"ready": 0.999, "active": 1.0})
     assert two["states_s"] == pytest.approx({"active": 1.499, "fault": 0.5})
-    assert (two["late_cycles"], two["missed"]) == (0, 2)  # since the file's first row
+    assert (two["late_cycles"], two["missed"]) == (0, 2)  # since the first row of the file
     assert one["longest_lateness_s"] == 0.0 and two["longest_lateness_s"] == 3e-4
     assert one["axes"] == ["left", "right"] and one["robot"] == "bench"
     assert [event["text"] for event in two["events"]] == ["state active", "state fault"]
@@ -81,7 +81,7 @@ def test_info_counts_what_is_there_and_what_is_not(folder: Path) -> None:
     assert "cut short" in shown and "10 cycles not recorded" in shown and "state fault" in shown
 
 
-def test_exports_are_the_rows_that_were_written(folder: Path, tmp_path: Path) -> None:
+def test_exports_contain_the_recorded_rows(folder: Path, tmp_path: Path) -> None:
     rows = _rows()
     for name in ("all.csv", "all.parquet"):
         told = _done("export", folder, "--out", tmp_path / name)
@@ -102,7 +102,7 @@ def test_exports_are_the_rows_that_were_written(folder: Path, tmp_path: Path) ->
     assert not list(tmp_path.glob("*.part"))
 
 
-def test_a_file_of_the_user_that_ends_in_part_is_kept(folder: Path, tmp_path: Path) -> None:
+def test_files_of_the_user_ending_in_part_are_kept(folder: Path, tmp_path: Path) -> None:
     names = ("some.csv", "page.html", "curve.png", "left.toml")
     for name in names:
         (tmp_path / f"{name}.part").write_text("of the user")
@@ -119,7 +119,7 @@ def test_a_file_of_the_user_that_ends_in_part_is_kept(folder: Path, tmp_path: Pa
     assert {(tmp_path / name).stat().st_mode for name in names} == {usual.stat().st_mode}
 
 
-def test_export_of_some_fields_and_a_stretch(folder: Path, tmp_path: Path) -> None:
+def test_export_can_select_fields_and_a_period(folder: Path, tmp_path: Path) -> None:
     target = tmp_path / "some.csv"
     arguments = ("--fields", "cycle,tension_N", "--from", "1.9995", "--until", "2.1")
     _done("export", folder, "--out", target, *arguments)
@@ -129,8 +129,8 @@ def test_export_of_some_fields_and_a_stretch(folder: Path, tmp_path: Path) -> No
     assert np.allclose(table["elapsed_s"].to_numpy(), np.arange(2000, 2101) * 1e-3)
 
 
-def test_time_goes_on_where_cycles_begin_again(tmp_path: Path) -> None:
-    # as after a fault that made the drives boot again
+def test_time_continues_when_cycles_restart(tmp_path: Path) -> None:
+    # as after a fault, when the drives boot again
     again = made_rows(0, 500)
     again["stamp_ns"] += 2_000_000_000
     record(tmp_path, np.concatenate([made_rows(0, 500), again]))
@@ -158,7 +158,7 @@ def test_plot_draws_a_picture(folder: Path, tmp_path: Path) -> None:
 
 @pytest.fixture
 def three_sessions(folder: Path, tmp_path: Path) -> Path:
-    """A folder with a session of two files between one that is older and one of another robot."""
+    """Return a folder with an older session, one of two files, and one of another robot."""
     one, two = sorted(folder.iterdir())
     for name, source in (
         ("bench-20260101T000000Z-001", two),
@@ -170,7 +170,7 @@ def three_sessions(folder: Path, tmp_path: Path) -> Path:
     return tmp_path
 
 
-def test_list_names_the_sessions_the_newest_last(three_sessions: Path) -> None:
+def test_list_shows_sessions_with_the_newest_last(three_sessions: Path) -> None:
     found = _done("list", three_sessions)["sessions"]
     assert [(one["session"], len(one["files"])) for one in found] == [
         ("other-20250101T000000Z", 1),
@@ -179,7 +179,7 @@ def test_list_names_the_sessions_the_newest_last(three_sessions: Path) -> None:
     ]
 
 
-def test_list_tells_where_there_are_no_recordings(
+def test_list_reports_a_folder_without_recordings(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
@@ -193,7 +193,7 @@ def test_list_tells_where_there_are_no_recordings(
         assert str(folder) in errors and told in errors and "Traceback" not in errors
 
 
-def test_a_session_is_found_by_the_name_that_list_shows(
+def test_a_session_is_found_by_its_name_in_the_list(
     three_sessions: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     usual = three_sessions / "cdpr-rt" / "recordings"
@@ -213,7 +213,7 @@ def test_plot_draws_the_newest_session_and_names_the_picture_after_it(
     assert (told["out"], told["rows"]) == (str(three_sessions / "bench-20260102T000000Z.png"), 3990)
 
 
-def test_curves_are_interrupted_where_nothing_was_recorded() -> None:
+def test_curves_have_gaps_where_nothing_was_recorded() -> None:
     elapsed = np.array([0.0, 0.1, 0.2, 440.0, 440.1])
     assert recorded_stretches(elapsed) == [(0, 3), (3, 5)]
     assert recorded_stretches(elapsed[:3]) == [(0, 3)]
@@ -230,7 +230,7 @@ def test_a_single_cycle_and_odd_names_are_drawn(tmp_path: Path) -> None:
 
 
 @pytest.mark.filterwarnings("error")
-def test_a_recording_of_nothing_known_is_drawn(tmp_path: Path) -> None:
+def test_a_recording_with_only_nan_is_drawn(tmp_path: Path) -> None:
     rows = made_rows(0, 100)
     for name in ("position_rad", "setpoint_rad", "velocity_rad_s", "torque_sent_Nm", "tension_N"):
         rows[name] = np.nan
@@ -238,7 +238,7 @@ def test_a_recording_of_nothing_known_is_drawn(tmp_path: Path) -> None:
 
 
 @pytest.mark.filterwarnings("error")
-def test_a_platform_s_pose_is_drawn_as_far_as_it_moves(tmp_path: Path) -> None:
+def test_a_pose_is_drawn_for_the_directions_that_move(tmp_path: Path) -> None:
     rows = made_rows(0, 200)
     plain = record(tmp_path / "plain", rows)
     share = np.linspace(0.0, 1.0, 200)
@@ -260,11 +260,11 @@ def test_a_platform_s_pose_is_drawn_as_far_as_it_moves(tmp_path: Path) -> None:
     sizes = [imread(path.with_suffix(".png")).shape[:2] for path in (plain, moved)]
     (_, narrow), (_, wide) = sizes
     assert narrow < wide
-    assert max(high for high, _ in sizes) < 1800, "more than a screen shows"
+    assert max(high for high, _ in sizes) < 1800, "taller than a screen"
 
 
-def test_a_stop_is_shaded_until_the_robot_is_active_no_more() -> None:
-    """The limit may be passed for a moment only: the platform is let down for seconds then."""
+def test_a_stop_is_shaded_until_the_robot_is_not_active() -> None:
+    """The limit may be exceeded only briefly, but lowering the platform takes seconds."""
     ready, active, fault = LoopState.READY, LoopState.ACTIVE, LoopState.FAULT
     state = np.array([ready, active, active, active, active, active, active, fault, ready, active])
     reaction = np.zeros(state.size, int)
@@ -275,7 +275,7 @@ def test_a_stop_is_shaded_until_the_robot_is_active_no_more() -> None:
     assert kinds[0] == kinds[8] and len({reacting, int(kinds[7]), int(kinds[8]), 0}) == 4
 
 
-def test_in_a_plane_a_platform_s_orientation_is_its_angle() -> None:
+def test_orientation_in_a_plane_is_one_angle() -> None:
     pose = np.zeros((50, 7))
     pose[:, 3], pose[:, 6] = np.cos(np.linspace(0, 0.1)), np.sin(np.linspace(0, 0.1))
     for height_m, name in ((0.0, "angle"), (2.0, "rz")):
@@ -284,7 +284,7 @@ def test_in_a_plane_a_platform_s_orientation_is_its_angle() -> None:
         assert curve == name
 
 
-def test_recordings_of_several_robots_make_no_table(
+def test_recordings_of_several_robots_cannot_be_exported_together(
     tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
     record(tmp_path, made_rows(0, 100))
@@ -294,7 +294,7 @@ def test_recordings_of_several_robots_make_no_table(
         assert status == 2 and errors.count("\n") == 1
         assert f"{second}: of bench with 3 axes, and those before it of bench with 2" in errors
         assert not (tmp_path / name).exists()
-    assert capfd.readouterr().err == ""  # no complaint of a table that was not finished
+    assert capfd.readouterr().err == ""  # no warning about an unfinished table
     assert len(_done("info", tmp_path)["recordings"]) == 2
 
 
@@ -319,7 +319,7 @@ def test_recordings_of_several_robots_make_no_table(
         (("plot", "FOLDER", "--out", "x.pdf"), "allowed: a name that ends in .png"),
     ],
 )
-def test_bad_input_is_one_line(
+def test_invalid_input_prints_one_line(
     folder: Path,
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
@@ -338,7 +338,7 @@ def test_bad_input_is_one_line(
     assert sorted(path.name for path in tmp_path.iterdir()) == ["empty", "text.mcap", "there.csv"]
 
 
-def test_where_nothing_can_be_written_it_is_said(folder: Path) -> None:
+def test_an_unwritable_output_is_reported(folder: Path) -> None:
     for command, name in (("export", "run.csv"), ("plot", "run.png")):
         status, _, errors = _log(command, folder, "--out", f"/proc/{name}")
         assert status == 1

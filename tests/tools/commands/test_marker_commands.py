@@ -1,4 +1,4 @@
-"""`cdpr markers`, `cdpr camera` and `cdpr sim photos`, as typed."""
+"""`cdpr markers`, `cdpr camera` and `cdpr sim photos`."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ BOX = ("--low", "-0.3 -0.3 0.9", "--high", "0.3 0.3 1.2")
 
 
 def drawn(figure: object, dots_per_mm: float) -> np.ndarray:
-    """Return a page as a camera with so many pixels to a mm would see it."""
+    """Return a page as an image with `dots_per_mm`."""
     figure.set_dpi(25.4 * dots_per_mm)
     canvas = FigureCanvasAgg(figure)
     canvas.draw()
@@ -55,7 +55,7 @@ def photos(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder / "images"
 
 
-def test_a_map_of_images_with_verdict_picture_and_file(photos: Path, tmp_path: Path) -> None:
+def test_markers_map_writes_verdict_picture_and_file(photos: Path, tmp_path: Path) -> None:
     done = cdpr_here(
         *("markers", "map", photos, "--size-mm", "150", "--png", tmp_path / "map.png"),
         *("--out", tmp_path / "map.toml", "--json"),
@@ -72,7 +72,9 @@ def test_a_map_of_images_with_verdict_picture_and_file(photos: Path, tmp_path: P
     assert json.loads(again.stdout.splitlines()[-1])["scale_to_known"] == pytest.approx(1, abs=1e-3)
 
 
-def test_intrinsics_of_another_lens_fail_with_the_reason(photos: Path, tmp_path: Path) -> None:
+def test_intrinsics_of_a_different_lens_are_rejected_with_the_reason(
+    photos: Path, tmp_path: Path
+) -> None:
     true = CameraIntrinsics.load_file(photos / "camera.toml")
     wrong = true.model_copy(update={"focal_px": tuple(1.05 * f for f in true.focal_px)})
     (tmp_path / "wrong.toml").write_text(wrong.toml_text())
@@ -89,7 +91,7 @@ def test_intrinsics_of_another_lens_fail_with_the_reason(photos: Path, tmp_path:
     assert "has 480 x 384 pixels, the intrinsics are for 640 x 384" in done.stderr
 
 
-def test_images_that_are_mirrored_are_said_to_be(photos: Path, tmp_path: Path) -> None:
+def test_mirrored_images_are_reported(photos: Path, tmp_path: Path) -> None:
     for path in photos.glob("*.png"):
         image = cv2.imread(str(path), cv2.IMREAD_GRAYSCALE)
         cv2.imwrite(str(tmp_path / path.name), image[:, ::-1])
@@ -116,7 +118,7 @@ def test_images_that_are_mirrored_are_said_to_be(photos: Path, tmp_path: Path) -
         (("board", "--marker-mm", "28"), "smaller markers"),
     ],
 )
-def test_bad_input_is_reported(
+def test_invalid_input_is_reported(
     photos: Path, tmp_path: Path, words: tuple[str, ...], said: str
 ) -> None:
     done = cdpr_here("markers", *(word.format(photos=photos) for word in words), cwd=tmp_path)
@@ -126,7 +128,7 @@ def test_bad_input_is_reported(
     assert not list(tmp_path.iterdir())
 
 
-def test_sheets_have_their_true_size_and_are_not_replaced_unasked(tmp_path: Path) -> None:
+def test_sheets_have_true_size_and_are_not_overwritten(tmp_path: Path) -> None:
     target = tmp_path / "sheets.pdf"
     words = ("markers", "print", "0,7", "--size-mm", "120", "--out", target)
     assert cdpr_here(*words).returncode == 0
@@ -142,7 +144,7 @@ def test_sheets_have_their_true_size_and_are_not_replaced_unasked(tmp_path: Path
     assert corners[0, 0] < corners[1, 0] and corners[0, 1] < corners[3, 1]
 
 
-def test_a_boards_page_is_the_board_that_is_looked_for(tmp_path: Path) -> None:
+def test_a_printed_board_is_detected_with_its_true_size(tmp_path: Path) -> None:
     assert cdpr_here("markers", "board", "--out", tmp_path / "board.pdf").returncode == 0
     board = Board()
     image = drawn(board_page(board, "A4"), 4.0)
@@ -153,7 +155,7 @@ def test_a_boards_page_is_the_board_that_is_looked_for(tmp_path: Path) -> None:
     np.testing.assert_allclose(size, 1e3 * np.ptp(on_board.reshape(-1, 3)[:, :2], axis=0), atol=0.2)
 
 
-def test_intrinsics_from_a_folder_and_what_it_lacks(tmp_path: Path) -> None:
+def test_intrinsics_are_computed_from_a_folder_or_its_gaps_reported(tmp_path: Path) -> None:
     scene = SCENE.split("[[grids]]", maxsplit=1)[0] + "[board]\n"
     (tmp_path / "scene.toml").write_text(scene)
     made = cdpr_here(
@@ -175,7 +177,7 @@ def test_intrinsics_from_a_folder_and_what_it_lacks(tmp_path: Path) -> None:
     assert few.returncode == 1 and "holds no image" in few.stderr
 
 
-def test_images_are_taken_from_a_camera_with_their_times(photos: Path, tmp_path: Path) -> None:
+def test_images_of_a_camera_are_stored_with_their_times(photos: Path, tmp_path: Path) -> None:
     words = ("camera", "grab", f"folder:{photos}", "--count", "3", "--interval-s", "0")
     done = cdpr_here(*words, "--out", tmp_path / "taken", "--json")
     assert done.returncode == 0, done.stderr

@@ -1,4 +1,4 @@
-"""The mistakes that are made most: each is made, and the page that lists them compared with it."""
+"""The page of common mistakes shows the messages that the commands print."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ import cdpr_profiles
 PAGE = Path(__file__).resolve().parents[3] / "docs" / "reference" / "mistakes.md"
 SHIPPED = Path(cdpr_profiles.__file__).parent / "robots" / "planar-3.toml"
 WRITE = "CDPR_WRITE_PAGES"
-"""Where this is in the environment the page is written instead of compared."""
+"""If this variable is set, the page is written instead of compared."""
 MISTAKES = (
     ("Misspelt command", "cdpr comission planar-3"),
     ("Misspelt option", "cdpr doctor --jsn"),
@@ -59,14 +59,14 @@ about a file names the file, the key, the value and the allowed values.
 
 @pytest.fixture
 def tmp_path() -> Iterator[Path]:
-    """A folder whose name is short enough for that of a socket in it."""
+    """Yield a folder with a name short enough for sockets."""
     with tempfile.TemporaryDirectory(prefix="cdpr-") as folder:
         yield Path(folder)
 
 
 @pytest.fixture
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A working folder with files that have something wrong, of a user who runs no daemon."""
+    """Yield a working folder with invalid files, for a user without a daemon."""
     for name in ("XDG_RUNTIME_DIR", "XDG_STATE_HOME"):
         monkeypatch.setenv(name, str(tmp_path / name.lower()))
     robot = SHIPPED.read_text()
@@ -81,7 +81,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def answered(command: str, folder: Path) -> tuple[str, int]:
-    """Return what the command says, in one line without its frame, and its exit status."""
+    """Return the output of a command in one line without its frame, and its exit status."""
     ended = cdpr_here(*command.split()[1:], cwd=folder)
     assert "Traceback" not in ended.stderr
     lines = [re.sub(r"^[│╭╰].?|[│╮╯─]+$", "", line).strip() for line in ended.stderr.splitlines()]
@@ -90,7 +90,7 @@ def answered(command: str, folder: Path) -> tuple[str, int]:
     return " ".join(told).replace(f"{folder}/", "").removeprefix("cdpr: "), ended.returncode
 
 
-def test_every_mistake_gets_the_message_that_the_page_shows(folder: Path) -> None:
+def test_each_mistake_prints_the_message_on_the_page(folder: Path) -> None:
     rows = []
     for mistake, command in MISTAKES:
         said, status = answered(command, folder)

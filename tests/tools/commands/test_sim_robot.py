@@ -1,4 +1,4 @@
-"""A simulated cable robot as its commands show it: its true pose, its faults, its bare motors."""
+"""Commands of a simulated cable robot: true pose, faults, and motors without cables."""
 
 from __future__ import annotations
 
@@ -39,24 +39,24 @@ lens = { width_px = 80, height_px = 64, focal_px = [70.0, 70.0], centre_px = [40
 
 
 def whole_records(path: Path) -> np.ndarray:
-    """Return what stands in a log by now."""
+    """Return the records in a log so far."""
     data = path.read_bytes()
     header = json.loads(data[:HEADER_BYTES])
     fields = [(name, kind, *map(tuple, shape)) for name, kind, *shape in header["fields"]]
     record = np.dtype(fields)
     assert record.itemsize == header["record_bytes"]
-    assert (len(data) - HEADER_BYTES) % record.itemsize == 0, "no record is ever half there"
+    assert (len(data) - HEADER_BYTES) % record.itemsize == 0, "records must be complete"
     return np.frombuffer(data[HEADER_BYTES:], record)
 
 
 def records(path: Path) -> np.ndarray:
-    """Return those of the SYNCs."""
+    """Return the records at SYNCs."""
     all_of_them = whole_records(path)
     return all_of_them[all_of_them["sync_index"] != 0xFFFFFFFF]
 
 
 class Robot:
-    """planar-3 on a bus, its log and a stranger who sends SYNC."""
+    """planar-3 on a bus, its log, and a third-party client that sends SYNC."""
 
     def __init__(self, folder: Path) -> None:
         self.name = unique()
@@ -72,7 +72,7 @@ class Robot:
         self.bus = can.Bus(interface="simbus", channel=f"{self.name}-can0")
 
     def sync(self, seconds: float) -> np.ndarray:
-        """Let the robot go on, a SYNC every 10 ms; return the record of the last one, read live."""
+        """Send a SYNC every 10 ms for `seconds`. Return the last record, read live."""
         before = len(records(self.log))
         count = round(seconds / 0.01)
         for _ in range(count):
@@ -100,10 +100,10 @@ def robot(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Robot]:
     robot.close()
 
 
-def test_the_pose_is_in_the_log_at_once(robot: Robot):
+def test_the_pose_is_logged_immediately(robot: Robot):
     before = robot.sync(0.1)
     assert before["rotation"].ravel() == pytest.approx(np.eye(3).ravel(), abs=0.02)
-    assert before["tension_N"][:2].min() > 1e-3  # the weight of cables that sag
+    assert before["tension_N"][:2].min() > 1e-3  # weight of sagging cables
     assert len(before["torque_Nm"]) == 3
     again = robot.sync(0.05)
     assert again["time_s"] > before["time_s"]
@@ -115,13 +115,13 @@ def test_a_scanner_measures_the_pose_with_errors(robot: Robot) -> None:
     seen = whole_records(robot.scanner)
     assert len(seen) > 10
     every_s = np.diff(seen["time_s"])
-    assert every_s.mean() > 0.0199, "at most 50 Hz"
+    assert every_s.mean() > 0.0199, "rate of at most 50 Hz"
     off = seen["position_m"] - true["position_m"]
     assert (off[:, 2] == 0.0).all()
     assert 0.001 < np.std(off[:, :2]) < 0.007
 
 
-def test_a_camera_on_the_platform_sees_from_where_it_truly_is(robot: Robot) -> None:
+def test_a_camera_on_the_platform_sees_from_the_true_pose(robot: Robot) -> None:
     true = robot.sync(0.1)
     with open_camera(f"sim:{robot.camera}", LockstepClock()) as camera:
         image = camera.grab()
@@ -136,7 +136,7 @@ def test_a_cable_is_cut_while_the_robot_runs(
     robot.fault(InjectedFault.CUT_CABLE, axis="upper right")
     assert capsys.readouterr().out == "upper right: cut-cable\n"
     assert (robot.sync(0.05)["tension_N"][:2] > 1e-3).tolist() == [True, False]
-    # by its number, more cable than was taut
+    # by number; more cable than was taut
     robot.fault(InjectedFault.SLIP, "500", axis="1")
     assert robot.sync(0.05)["tension_N"][0] < 0.5
 
@@ -162,7 +162,7 @@ def test_a_drive_is_sent_to_pre_operational(
         ((InjectedFault.CELL_OFF,), "cell-off: Planar robot with 3 cables has no load cells"),
     ],
 )
-def test_a_fault_that_cannot_be_is_refused(robot: Robot, what: tuple[Any, ...], reason: str):
+def test_an_impossible_fault_is_rejected(robot: Robot, what: tuple[Any, ...], reason: str):
     with pytest.raises(BadInputError, match=reason):
         robot.fault(*what)
 
@@ -190,7 +190,7 @@ def test_a_fault_finds_the_robot_by_the_name_of_its_daemon(
         fault("mine", InjectedFault.SLIP, bus=[f"simbus:{robot.name}"])
 
 
-def test_detached_motors_have_no_cable_to_cut() -> None:
+def test_cutting_a_cable_of_detached_motors_is_rejected() -> None:
     with (
         simulated("planar-3", "--detached") as bus,
         pytest.raises(WorkFailedError, match=r"axis 'lower'.*06060000h"),
@@ -198,7 +198,7 @@ def test_detached_motors_have_no_cable_to_cut() -> None:
         fault("planar-3", InjectedFault.CUT_CABLE, bus=[bus], axis="lower")
 
 
-def test_a_robots_file_says_how_its_platform_stands_in_space(tmp_path: Path) -> None:
+def test_the_platform_starts_with_the_orientation_in_the_robots_file(tmp_path: Path) -> None:
     text = (ROBOTS / "suspended-8.toml").read_text()
     said = "mass_kg = 100.0\nhome_rotation_rad = [0.0, 0.1, 0.5]\n"
     text = text.replace("mass_kg = 100.0\n", said).replace(
