@@ -9,6 +9,9 @@ from cdpr_profiles import DriveProfile
 
 _OF_RATED = {"per_mille_of_rated": 1e-3, "percent_of_rated": 1e-2}
 _ABSOLUTE_Nm = {"mNm": 1e-3, "cNm": 1e-2}
+_SAME_TORQUE = 0.5
+"""The units of 6076h differ by 1000, so that even another motor's torque shows which is meant."""
+_RATED_Nm = {"mNm": 1e-3, "uNm": 1e-6}
 _RAD_S_PER_RPM = math.tau / 60.0
 
 
@@ -16,6 +19,25 @@ def torque_unit_Nm(drive: DriveProfile, rated_torque_Nm: float) -> float:
     """Return the torque of one unit of 6071h, 6072h, 6077h and, per second, of 6087h."""
     share = _OF_RATED.get(drive.torque_unit)
     return _ABSOLUTE_Nm[drive.torque_unit] if share is None else share * rated_torque_Nm
+
+
+def rated_torque_unit_Nm(drive: DriveProfile) -> float:
+    """Return the torque of one unit of 6076h."""
+    return _RATED_Nm[drive.rated_torque_unit]
+
+
+def suspected_unit(drive: DriveProfile, shown_Nm: float, expected_Nm: float) -> str:
+    """Return the unit of 6076h with which a drive shows the expected torque; "" if none does."""
+    shown = shown_Nm / rated_torque_unit_Nm(drive)
+    return next(
+        (
+            name
+            for name, unit_Nm in _RATED_Nm.items()
+            if name != drive.rated_torque_unit
+            and abs(shown * unit_Nm - expected_Nm) < _SAME_TORQUE * expected_Nm
+        ),
+        "",
+    )
 
 
 def whole_units(limit: float, unit: float) -> int:
@@ -26,6 +48,10 @@ def whole_units(limit: float, unit: float) -> int:
 def velocity_unit_rad_s(drive: DriveProfile, counts_per_turn: int) -> float:
     """Return the speed of one unit of 6099h."""
     return _RAD_S_PER_RPM if drive.velocity_unit == "rpm" else math.tau / counts_per_turn
+
+
+VELOCITY_UNITS = {0x00B4_4700: "rpm", 0x00B5_0300: "counts_per_s"}
+"""`velocity_unit` of a profile by 60A9h (prefix, numerator, denominator by CiA 303-2)."""
 
 
 def acceleration_unit_rad_s2(drive: DriveProfile, counts_per_turn: int) -> float:

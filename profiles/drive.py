@@ -14,7 +14,9 @@ Unsigned32 = Annotated[int, Field(ge=0, le=0xFFFFFFFF)]
 Mode = Annotated[int, Field(ge=-128, le=127)]
 
 TorqueUnit = Literal["per_mille_of_rated", "percent_of_rated", "mNm", "cNm"]
-"""Unit of 6071h, 6072h, 6077h, 60B2h and, per second, of 6087h; rated torque is 6076h in mNm."""
+"""Unit of 6071h, 6072h, 6077h, 60B2h and, per second, of 6087h."""
+RatedTorqueUnit = Literal["mNm", "uNm"]
+"""Unit of 6076h, to which relative torque units refer."""
 VelocityUnit = Literal["counts_per_s", "rpm"]
 """Unit of 6099h and the other velocities."""
 AccelerationUnit = Literal["counts_per_s2", "rpm_per_s"]
@@ -69,6 +71,8 @@ class Quirks(Profile):
     """6060h is accepted only while bit 8 of the controlword (halt) is set."""
     homing_done_by_bit_12_alone: bool = False
     """Bit 10 of the statusword has no meaning in homing mode; bit 12 is set once at rest."""
+    boot_ups: int = Field(default=1, ge=1, le=3)
+    """Number of boot-up messages that the drive sends after one reset."""
 
 
 class Evidence(Profile):
@@ -85,10 +89,10 @@ class DriveProfile(Profile):
     6076h the motor's rated torque applies, without 608Fh the winch's encoder resolution and without
     6502h `supported_modes`.
 
-    `torque_unit`, `velocity_unit` and `acceleration_unit` are units of the drive's objects. Each
-    sign turns one of the drive's directions into the motor's. `position_sign` is -1 if 6064h falls
-    while the motor turns forward, `torque_sign` if a positive 6071h drives it backward, and
-    `homing_sign` if method 34 seeks the index backward.
+    `torque_unit`, `rated_torque_unit`, `velocity_unit` and `acceleration_unit` are units of the
+    drive's objects. Each sign turns one of the drive's directions into the motor's:
+    `position_sign` is -1 if 6064h falls while the motor turns forward, `torque_sign` if a positive
+    6071h drives it backward, and `homing_sign` if method 34 seeks the index backward.
 
     `torque_slope_Nm_s` is written to 6087h for modes with a torque ramp (PT, 4). It should be as
     steep as the drive accepts, because a ramp is a lag in the loop. `torque_delay_s` is the
@@ -107,6 +111,7 @@ class DriveProfile(Profile):
     mode_torque: Mode = 10
     homing_methods: tuple[Mode, ...] = ()
     torque_unit: TorqueUnit = "per_mille_of_rated"
+    rated_torque_unit: RatedTorqueUnit = "mNm"
     torque_slope_Nm_s: float | None = Field(default=None, gt=0)
     velocity_unit: VelocityUnit = "counts_per_s"
     acceleration_unit: AccelerationUnit = "counts_per_s2"

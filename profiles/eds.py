@@ -30,6 +30,8 @@ _MOST_PDOS = 512
 _PDO_ENTRIES = 8
 _PREDEFINED = 4
 _OFF = 0x80000000
+_CONSUMER, _CONSUMER_TIME = 0x1016, 0xFFFF
+"""Consumer heartbeat time (CiA 301): the node id is above the 16 bits of the time."""
 
 _HEADER = re.compile(r"\[([^\]]*)\]\s*(?:;.*)?")
 _COMMENT = re.compile(r"\s;.*")
@@ -452,6 +454,9 @@ class _Objects:
             if low is not None and high is not None and low > high:
                 problem = f"value {low} is above HighLimit {high}; both left out"
                 self._remarks.add(section.place("LowLimit"), problem)
+            elif index == _CONSUMER and sub and high is not None and high <= _CONSUMER_TIME:
+                problem = f"value {high} leaves no room for a node id; left out"
+                self._remarks.add(section.place("HighLimit"), problem)
             else:
                 variable.min, variable.max = low, high
         # the package's annotations only allow integers

@@ -15,6 +15,7 @@ from cdpr_drivers.canopen.configuration import BootSettings, configure, make_con
 from cdpr_drivers.canopen.network import CanNetwork
 from cdpr_drivers.canopen.sdo import ABSENT
 from cdpr_drivers.cia402 import State, mode_bits, state_of
+from cdpr_drivers.drive_units import VELOCITY_UNITS, rated_torque_unit_Nm, suspected_unit
 from cdpr_drivers.errors import (
     BootError,
     BusError,
@@ -221,7 +222,7 @@ class _NodeBoot:
         network, node_id = self._network, self._node_id
         self._refuse_enabled_drive()
         # a drive that is silent may still answer later
-        network.reset_communication(node_id, _BOOT_UP_TIMEOUT_S)
+        network.reset_communication(node_id, _BOOT_UP_TIMEOUT_S, self._profile.quirks.boot_ups)
         self._check_identity()
         self._configure()
         timeout_s = 5.0 * self._profile.heartbeat_producer_s + _HEARTBEAT_MARGIN_S
@@ -271,12 +272,14 @@ class _NodeBoot:
 
     def _refuse_duplicate(self) -> None:
         """Raise BootError if two devices answer under one node id."""
-        problem = self._network.duplicate_node(self._node_id)
+        problem = self._network.duplicate_node(self._node_id, self._profile.quirks.boot_ups)
         if problem:
             raise self._error(
                 "B",
                 problem,
-                "give each device a different node id (connect one alone to see which it is)",
+                "give each device a different node id (connect one alone to see which it is); if it "
+                "is one drive that sends its boot-up message twice, set quirks.boot_ups in its "
+                "profile",
             )
 
     def _check_identity(self) -> None:
@@ -340,7 +343,7 @@ class _NodeBoot:
     def _rated_torque_Nm(self) -> float:
         """Return the motor's rated torque from the drive (6076h), else from the settings."""
         if 0x6076 in self._dictionary:
-            return self._read_int(0x6076) * 1e-3
+            return self._read_int(0x6076) * rated_torque_unit_Nm(self._profile)
         return self._settings.rated_torque_Nm or 0.0
 
     def _counts_per_turn(self) -> tuple[int, int]:
@@ -381,8 +384,11 @@ class _NodeBoot:
             increments, turns = self._counts_per_turn()
             if 0x6502 in self._dictionary:
                 report.supported_modes = self._read_int(0x6502)
-            else:
-                report.supported_modes = mode_bits(self._profile.supported_modes)
+            # a drive without the object, or with 0 in it, announces nothing
+            report.supported_modes = report.supported_modes or mode_bits(
+                self._profile.supported_modes
+            )
+            velocity_unit = self._read_int(0x60A9) if 0x60A9 in self._dictionary else 0
         except SdoError as error:
             raise self._error(
                 "J", f"its ratings cannot be read: {error}", "check the drive's EDS"
@@ -395,12 +401,34 @@ class _NodeBoot:
                 "set the drive's motor data first",
             )
         report.counts_per_turn = increments // turns
-        rated = self._settings.rated_torque_Nm
-        if rated is not None and abs(report.rated_torque_Nm - rated) > 0.5e-3 + 1e-3 * rated:
-            raise self._error(
-                "J",
-                f"its rated torque (6076h) is {report.rated_torque_Nm:g} Nm, the motor's profile "
-                f"has {rated:g} Nm",
-                "every torque would be off by this ratio: set the drive's motor data, or choose "
-                "the motor that is mounted",
-            )
+        self._check_velocity_unit(velocity_unit)
+        self._check_rated_torque(report.rated_torque_Nm)
+
+    def _check_velocity_unit(self, shown: int) -> None:
+        """Compare the unit that the drive shows in 60A9h, 0 for none, with the profile's."""
+        unit, assumed = VELOCITY_UNITS.get(shown), self._profile.velocity_unit
+        if not shown or unit == assumed:
+            return
+        raise self._error(
+            "J",
+            f"its velocity unit (60A9h) is {unit or f'{shown:08X}h'}, the profile "
+            f"{self._profile.name!r} has {assumed}",
+            f'write velocity_unit = "{unit}" into the profile, and acceleration_unit to match'
+            if unit
+            else "set 60A9h of the drive to revolutions per minute (00B44700h)",
+        )
+
+    def _check_rated_torque(self, found_Nm: float) -> None:
+        rated_Nm = self._settings.rated_torque_Nm
+        if rated_Nm is None or abs(found_Nm - rated_Nm) <= 0.5e-3 + 1e-3 * rated_Nm:
+            return
+        unit = suspected_unit(self._profile, found_Nm, rated_Nm)
+        raise self._error(
+            "J",
+            f"its rated torque (6076h) is {found_Nm:g} Nm, the motor's profile has {rated_Nm:g} Nm",
+            f'the drive seems to count in {unit}: write rated_torque_unit = "{unit}" into its '
+            "profile"
+            if unit
+            else "every torque would be off by this ratio: set the drive's motor data, or choose "
+            "the motor that is mounted",
+        )

@@ -170,6 +170,10 @@ class _Builder:
             raise DriverError(f"object {index:04X}h:{sub} is not in the drive's EDS")
         return found
 
+    def is_fixed(self, index: int, sub: int) -> bool:
+        """Return whether the EDS has the object, but does not let it be written."""
+        return self.has(index, sub) and not self.variable(index, sub).writable
+
     def put(self, index: int, sub: int, value: int) -> None:
         if not self.has(index, sub):
             self.absent.append(f"{index:04X}h:{sub}")
@@ -189,12 +193,17 @@ class _Builder:
         self.put(index, sub, value)
 
     def pdo(self, parameters: int, pdo: Pdo, node_id: int) -> None:
-        """Add one PDO in the order of CiA 301: off, map emptied, filled and counted, on again."""
+        """Add one PDO in the order of CiA 301: off, map emptied, filled and counted, on again.
+
+        A PDO with a COB-ID that cannot be written is mapped while it is on.
+        """
         mapping = parameters + _TO_MAPPING
         enabled = pdo.cob_id(node_id)
+        fixed = self.is_fixed(parameters, 1)
         if self.has(parameters, 1):
             enabled |= int(self.variable(parameters, 1).default or 0) & _NO_RTR
-        self.require(parameters, 1, enabled | _PDO_OFF)
+        if not fixed:
+            self.require(parameters, 1, enabled | _PDO_OFF)
         self.require(mapping, 0, 0)
         self.require(parameters, 2, pdo.transmission_type)
         times = (3, round(pdo.inhibit_time_s * 1e4)), (5, round(pdo.event_timer_s * 1e3))
@@ -206,7 +215,16 @@ class _Builder:
         for sub, entry in enumerate(pdo.entries, 1):
             self.require(mapping, sub, entry.mapping)
         self.require(mapping, 0, len(pdo.entries))
-        self.require(parameters, 1, enabled)
+        if not fixed:
+            self.require(parameters, 1, enabled)
+
+    def pdo_off(self, parameters: int) -> None:
+        """Switch a PDO off, or empty its map if its COB-ID cannot be written."""
+        if not self.is_fixed(parameters, 1):
+            default = int(self.variable(parameters, 1).default or 0)
+            self.put(parameters, 1, default | _PDO_OFF)
+        elif not self.is_fixed(parameters + _TO_MAPPING, 0):
+            self.put(parameters + _TO_MAPPING, 0, 0)
 
 
 def make_configuration(
@@ -239,8 +257,7 @@ def make_configuration(
             if parameters in used:
                 build.pdo(parameters, used[parameters], node_id)
             elif build.has(parameters, 1):
-                default = int(build.variable(parameters, 1).default or 0)
-                build.put(parameters, 1, default | _PDO_OFF)
+                build.pdo_off(parameters)
     return Configuration(tuple(build.entries), tuple(build.absent))
 
 

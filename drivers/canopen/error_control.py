@@ -38,8 +38,8 @@ class _Node:
         self.heartbeat_s = 0.0
         """Expected period between cycles, 0 while not monitored."""
         self.nmt_state: int | None = None
-        self.expects_boot_up = True
-        """Whether a boot-up is expected; initially it is, because the node may just power up."""
+        self.boot_ups_expected = 1
+        """Boot-ups still expected; initially one, because the node may just power up."""
         self.started = False
         """Whether it was seen operational since it was started."""
         self.starting = False
@@ -71,10 +71,11 @@ class ErrorControl:
         node.heard_s = self._clock.now_s
         if state == BOOT_UP:
             node.boot_ups += 1
-            if not node.expects_boot_up:
+            if not node.boot_ups_expected:
                 self.restarted.add(node.node_id)
                 self._alarm(Fault(Limit.DRIVE, -1, "restarted", source))
-            node.expects_boot_up = node.started = node.starting = False
+            node.boot_ups_expected = max(0, node.boot_ups_expected - 1)
+            node.started = node.starting = False
             node.heartbeat_s = 0.0
             return
         node.heartbeats += 1
@@ -87,11 +88,11 @@ class ErrorControl:
 
     # -- commands of the master to a node
 
-    def expect_reset(self, node_id: int) -> None:
-        """Expect the next boot-up of a node, after a reset by this master."""
+    def expect_reset(self, node_id: int, boot_ups: int = 1) -> None:
+        """Expect the next boot-ups of a node, after a reset by this master."""
         node = self._nodes[node_id]
         node.boot_ups_at_reset = node.boot_ups
-        node.expects_boot_up = True
+        node.boot_ups_expected = boot_ups
         node.started = node.starting = False
         node.heartbeat_s = 0.0
         self.restarted.discard(node_id)
@@ -100,6 +101,7 @@ class ErrorControl:
         """Monitor from now on that a node becomes and stays operational, and sends heartbeats."""
         node = self._nodes[node_id]
         node.starting = True
+        node.boot_ups_expected = 0
         node.heard_s = self._clock.now_s
         node.heartbeat_s = heartbeat_s
 

@@ -301,21 +301,24 @@ class CanNetwork(BusMember):
 
     # -- sent frames
 
-    def reset_communication(self, node_id: int, timeout_s: float) -> bool:
+    def reset_communication(self, node_id: int, timeout_s: float, boot_ups: int = 1) -> bool:
         """Reset the node's communication; return whether its boot-up message came in time.
 
-        Raises BusError.
+        `boot_ups` is how often the drive sends that message. Raises BusError.
         """
         self.clients[node_id].unexpected = 0
-        self._errors.expect_reset(node_id)
+        self._errors.expect_reset(node_id, boot_ups)
         self._command(_RESET_COMMUNICATION, node_id)
         return self._errors.wait_for_boot_up(node_id, timeout_s)
 
-    def duplicate_node(self, node_id: int) -> str:
-        """Return evidence of two devices with this node id since its reset, or an empty text."""
+    def duplicate_node(self, node_id: int, usual_boot_ups: int = 1) -> str:
+        """Return evidence of two devices with this node id since its reset, or an empty text.
+
+        `usual_boot_ups` is how often one such drive sends its boot-up message.
+        """
         boot_ups = self._errors.boot_ups_since_reset(node_id)
         # more boot-ups are the heartbeats of a device that stays in NMT state initialising
-        if 1 < boot_ups <= _MOST_BOOT_UPS:
+        if usual_boot_ups < boot_ups <= _MOST_BOOT_UPS:
             return f"two devices have this node id: {boot_ups} boot-up messages followed one reset"
         unexpected = self.clients[node_id].await_unexpected(_LATE_ANSWERS_S)
         if unexpected >= _FEWEST_UNEXPECTED:

@@ -15,6 +15,7 @@ from cdpr_drivers.canopen.lss import BITRATE_INDEX
 from cdpr_drivers.decode.candump import Frame
 from cdpr_drivers.decode.sdo import SdoDecoder, SdoEvent, Step
 from cdpr_drivers.decode.values import DecodedValue, NodeView, ObjectNames, read_field
+from cdpr_drivers.drive_units import rated_torque_unit_Nm
 from cdpr_drivers.errors import abort_text
 from cdpr_profiles import DriveProfile, Pdo, Winch
 
@@ -413,7 +414,8 @@ class Decoder:
         elif index in _CONFIGURATION and len(raw) <= 4:
             self._pdos.learn(node, index, sub, number)
         elif index == 0x6076 and number and len(raw) == 4:
-            node.rated_torque_Nm = number * 1e-3
+            unit_Nm = 1e-3 if node.drive is None else rated_torque_unit_Nm(node.drive)
+            node.rated_torque_Nm = number * unit_Nm
         elif (index, sub) == (0x608F, 1) and number and len(raw) == 4:
             node.counts_per_turn = number
 

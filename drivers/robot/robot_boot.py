@@ -30,8 +30,8 @@ from cdpr_profiles.robot_limits import Limit
 from cdpr_rt.core.clock import Clock
 from cdpr_rt.core.fault import Fault
 
-# objects that make a drive stop without a master, and that limit its torque until then
-_GUARDS = ("1016h", "6007h", "605Ah", "6072h")
+# objects that make a drive stop without a master, and the one that limits its torque
+_GUARDS, _TORQUE_LIMIT = ("1016h", "6007h", "605Ah"), "6072h"
 
 
 def open_networks(
@@ -150,11 +150,16 @@ def device_of(
 
 
 def _lacking_guards(node: str, report: BootReport) -> str:
-    """Return what to check if a drive lacks objects that stop it without a master; else ""."""
+    """Return what to check if a drive lacks objects that stop it or limit it; else ""."""
     lacking = [name for name in report.absent if name.startswith(_GUARDS)]
-    if not lacking:
-        return ""
-    return f"{node} lacks {', '.join(lacking)}: check what stops it when its master falls silent"
+    texts = []
+    if lacking:
+        texts.append(
+            f"lacks {', '.join(lacking)}: check what stops it when its master falls silent"
+        )
+    if any(name.startswith(_TORQUE_LIMIT) for name in report.absent):
+        texts.append(f"lacks {_TORQUE_LIMIT}: only the master limits its torque")
+    return f"{node} {'; '.join(texts)}" if texts else ""
 
 
 def boot_notes(

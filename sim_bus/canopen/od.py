@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from canopen.objectdictionary import ODVariable
+from canopen.objectdictionary import DeviceInformation, ODArray, ODRecord, ODVariable
 
 from cdpr_profiles.eds import load_dictionary
 from cdpr_profiles.errors import ProfileError
@@ -99,6 +99,10 @@ COMMUNICATION = range(0x1000, 0x2000)
 """Communication profile area, which a communication reset restores."""
 APPLICATION = range(0x2000, 0xC000)
 """Manufacturer and device profile areas."""
+
+
+_IDENTITY, _UNSIGNED32 = 0x1018, 0x07
+_MAPPINGS = frozenset((*range(0x1600, 0x1800), *range(0x1A00, 0x1C00)))
 
 
 class DictionaryError(SimulatorError):
@@ -246,11 +250,27 @@ class ObjectDictionary:
                     od.add(_entry(sub))
                 count = record.subindices.get(0)
                 if count is not None and count.default is None and count.value is None:
-                    od.entry(record.index).base_default = max(record.subindices)
+                    od.entry(record.index).base_default = _default_count(record)
+        od._add_identity(parsed.device_information)
         od.set_node_id(node_id)
         for entry in od:
             entry.power_on()
         return od
+
+    def _add_identity(self, info: DeviceInformation) -> None:
+        """Complete 1018h by [DeviceInfo], in which some makers state the identity only there.
+
+        An object that the EDS lacks is hidden from the bus.
+        """
+        stated = (info.vendor_number, info.product_number, info.revision_number, None)
+        for sub, number in enumerate(stated, 1):
+            if (_IDENTITY, sub) not in self:
+                entry = Entry(_IDENTITY, sub, CODECS[_UNSIGNED32], access="ro")
+                entry.hidden = True
+                self.add(entry)
+            entry = self.entry(_IDENTITY, sub)
+            if not entry.base_default and number is not None and 0 <= number <= 0xFFFFFFFF:
+                entry.base_default = number
 
     def add(self, entry: Entry) -> None:
         """Add an object."""
@@ -328,6 +348,16 @@ class ObjectDictionary:
         for entry in self:
             if entry.index in area and entry.writable:
                 entry.power_on()
+
+
+def _default_count(record: ODRecord | ODArray) -> int:
+    """Return the count of a record whose EDS gives none; a PDO maps the objects that have one."""
+    if record.index not in _MAPPINGS:
+        return max(record.subindices)
+    mapped = 0
+    while mapped + 1 in record.subindices and record.subindices[mapped + 1].default:
+        mapped += 1
+    return mapped
 
 
 def _entry(variable: ODVariable) -> Entry:

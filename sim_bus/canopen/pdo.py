@@ -82,9 +82,18 @@ class PdoRecord:
             if (self._com, sub) in od:
                 od.on_write(self._com, sub, lambda value, hook=hook: hook(int(value)))  # type: ignore[misc]
         if (self._map, 0) in od:
+            self._drop_impossible_default()
             od.on_write(self._map, 0, self._write_count)
             for entry in od.subs(self._map):
                 entry.hook = self._write_mapping
+
+    def _drop_impossible_default(self) -> None:
+        """Map nothing by default if the EDS contradicts its own map, as some makers' files do."""
+        count = self._od.entry(self._map)
+        try:
+            self._resolve_all(int(count.default))
+        except SdoAbort:
+            self._od.set_default(self._map, 0, 0)
 
     def parameters(self) -> PdoParameters:
         """Present communication parameters."""
@@ -101,12 +110,11 @@ class PdoRecord:
 
     def mapping(self) -> list[Mapped]:
         """Mapped objects in order; raises DictionaryError for a mapping that is not allowed."""
-        count = self._od.get_int(self._map, 0, 0)
         try:
-            return self._resolve_all(count)
+            return self._resolve_all(self._od.get_int(self._map, 0, 0))
         except SdoAbort as abort:
             raise DictionaryError(
-                f"object {self._map:04X}h: the mapping in the EDS is not possible ({abort})"
+                f"object {self._map:04X}h: the stored mapping is not possible ({abort})"
             ) from abort
 
     def _get(self, sub: int, default: int) -> int:
@@ -116,8 +124,10 @@ class PdoRecord:
         self._od.set(self._com, sub, value)
         self._changed()
 
-    def _exists(self) -> bool:
-        return not self._get(1, INVALID) & INVALID
+    def _locked(self) -> bool:
+        """Return whether the PDO exists; one whose COB-ID is fixed can be mapped nevertheless."""
+        fixed = (self._com, 1) in self._od and not self._od.entry(self._com, 1).writable
+        return not fixed and not self._get(1, INVALID) & INVALID
 
     def _write_cob_id(self, new: int) -> None:
         old = self._get(1, INVALID)
@@ -136,21 +146,21 @@ class PdoRecord:
 
     def _write_while_absent(self, sub: int) -> Callable[[int], None]:
         def write(value: int) -> None:
-            if self._exists() and value != self._get(sub, 0):
+            if self._locked() and value != self._get(sub, 0):
                 raise SdoAbort(Abort.INVALID_VALUE)
             self._store(sub, value)
 
         return write
 
     def _write_count(self, value: Value) -> None:
-        if self._exists():
+        if self._locked():
             raise SdoAbort(Abort.DEVICE_STATE)
         self._resolve_all(int(value))
         self._od.set(self._map, 0, value)
         self._changed()
 
     def _write_mapping(self, value: Value) -> None:
-        if self._exists() or self._od.get_int(self._map) != 0:
+        if self._locked() or self._od.get_int(self._map) != 0:
             raise SdoAbort(Abort.DEVICE_STATE)
         if value:
             self._resolve(int(value))

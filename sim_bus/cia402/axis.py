@@ -154,7 +154,7 @@ class Axis:
     def configure(self) -> None:
         """Read limits and windows from the dictionary."""
         get, m = self.od.get_int, self.motor
-        unit = self.quirks.torque_unit_Nm or get(0x6076) * 1e-6
+        unit = self.quirks.torque_unit_Nm or (1e-3 * get(0x6076) * self.quirks.rated_torque_unit_Nm)
         m["torque_unit"] = unit
         constant = self.ratings.torque_constant_Nm_per_Arms
         m["rated_current"] = get(0x6075) * 1e-3 * constant

@@ -220,6 +220,7 @@ _LOG_STEP_S = 0.02
 """Bus time without SYNC after which a record is written anyway."""
 _SYNC_ID = b"\x80\x00\x00\x00"
 _EDS_COUNTS_PER_TURN = 8192
+_DEVICE_TYPE, _PROFILE_402, _SERVO_DRIVE = 0x1000, 402, 2
 
 PROCESS_DATA = frozenset(
     {0x6040, 0x6060, 0x6071, 0x607A, 0x60B0, 0x60B1, 0x60B2, 0x60B8, 0x60C1, 0x60FF, 0x2F00}
@@ -482,8 +483,10 @@ def _fixed(entry: Entry) -> Callable[[Value], None]:
 
 
 def _adapt(od: ObjectDictionary, quirks: DriveQuirks, plant: Plant, ratings: MotorRatings) -> None:
-    """Set the defaults of the dictionary that follow from motor and encoder."""
+    """Set the defaults of the dictionary that follow from the device, its motor and encoder."""
     counts = plant.encoder.counts_per_turn
+    if od.get_int(_DEVICE_TYPE) & 0xFFFF != _PROFILE_402:  # an error of the file, not of the drive
+        od.set_default(_DEVICE_TYPE, 0, _SERVO_DRIVE << 16 | _PROFILE_402)
     rates = () if quirks.velocity_in_rpm else IN_VELOCITY_UNITS + IN_ACCELERATION_UNITS
     for index, sub in (*_POSITIONS, *rates):
         entry = od.entry(index, sub)
@@ -491,7 +494,7 @@ def _adapt(od: ObjectDictionary, quirks: DriveQuirks, plant: Plant, ratings: Mot
         _default(entry, min(scaled, entry.codec.high or scaled))
     _default(od.entry(0x608F, 1), counts)
     _default(od.entry(0x6075), round(ratings.rated_current_Arms * 1e3))
-    _default(od.entry(0x6076), round(ratings.rated_torque_Nm * 1e3))
+    _default(od.entry(0x6076), round(ratings.rated_torque_Nm / quirks.rated_torque_unit_Nm))
     unit = quirks.torque_unit_Nm or 1e-3 * ratings.rated_torque_Nm
     for index in (0x6072, 0x60E0, 0x60E1):
         _default(od.entry(index), round(ratings.peak_torque_Nm / unit))

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import cdpr_profiles
 from cdpr_sim_bus.canopen.abort import Abort, SdoAbort
-from cdpr_sim_bus.canopen.od import APPLICATION, Entry, ObjectDictionary
+from cdpr_sim_bus.canopen.od import APPLICATION, Codec, Entry, ObjectDictionary
 from cdpr_sim_bus.cia402.words import ModeNumber
 
 _STANDARD_EDS = Path(cdpr_profiles.__file__).parent / "drives" / "generic-cia402.eds"
@@ -44,6 +44,8 @@ class DriveQuirks:
 
     torque_unit_Nm: float | None = None
     """None: per mille of 6076h."""
+    rated_torque_unit_Nm: float = 1e-3
+    """Unit of 6076h."""
     velocity_in_rpm: bool = False
     """Velocities in rpm, accelerations in rpm/s; else counts/s and counts/s²."""
     modes: frozenset[int] | None = None
@@ -65,9 +67,14 @@ class DriveQuirks:
     """Minimum time from the enable operation command until the state is reached."""
 
     def supported_modes(self, announced: int) -> frozenset[int]:
-        """Return the modes to which 6060h may be set, including 0 (no mode)."""
+        """Return the modes to which 6060h may be set, including 0 (no mode).
+
+        Some drives announce nothing (6502h = 0) and have all modes that their objects allow.
+        """
         if self.modes is not None:
             return self.modes | {0}
+        if not announced:
+            return frozenset(ModeNumber)
         return frozenset({0}) | {n for n in ModeNumber if n and announced >> n - 1 & 1}
 
     def accepts_mode(self, enabled: bool, halted: bool) -> bool:
@@ -103,17 +110,30 @@ _QUIRKS = {
 }
 
 
+_VENDOR_QUIRKS = {
+    # maxon EPOS4: motor rated torque in uNm, velocities in rpm, accelerations in rpm/s
+    0x000000FB: DriveQuirks(rated_torque_unit_Nm=1e-6, velocity_in_rpm=True),
+}
+"""Quirks of all products of a vendor that have no entry in `_QUIRKS`."""
+
+
 def quirks_of(od: ObjectDictionary) -> DriveQuirks:
     """Return the quirks of the drive with this dictionary, by vendor and product (1018h)."""
-    return _QUIRKS.get((od.get_int(0x1018, 1), od.get_int(0x1018, 2, 0)), DriveQuirks())
+    vendor = od.get_int(0x1018, 1)
+    usual = _VENDOR_QUIRKS.get(vendor, DriveQuirks())
+    return _QUIRKS.get((vendor, od.get_int(0x1018, 2, 0)), usual)
 
 
 def add_missing_objects(od: ObjectDictionary, quirks: DriveQuirks) -> None:
-    """Add the standard objects that the EDS lacks, for the firmware, hidden from the bus."""
+    """Add the standard objects that the EDS lacks, for the firmware, hidden from the bus.
+
+    Objects with the standard's size get its sign, which some makers' files state wrongly.
+    """
     scaled = set(IN_VELOCITY_UNITS + IN_ACCELERATION_UNITS) if quirks.velocity_in_rpm else set()
     for model in _standard_objects():
         key = model.index, model.sub
         if key in od:
+            _correct_sign(od.entry(*key), model.codec)
             continue
         entry = Entry(*key, model.codec, name=model.name, access=model.access)
         value = model.base_default
@@ -122,6 +142,15 @@ def add_missing_objects(od: ObjectDictionary, quirks: DriveQuirks) -> None:
         entry.base_default = entry.default = entry.value = value
         entry.hidden = True
         od.add(entry)
+
+
+def _correct_sign(entry: Entry, standard: Codec) -> None:
+    codec = entry.codec
+    if codec.low is None or codec.size != standard.size or codec.low == standard.low:
+        return
+    entry.codec, entry.low, entry.high = standard, standard.low, standard.high
+    entry.base_default = standard.decode(codec.encode(entry.base_default))
+    entry.default = entry.value = entry.base_default
 
 
 @cache

@@ -8,11 +8,13 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Annotated, Any
 
 import typer
 
 from cdpr_drivers.cia402 import Mode, supported_modes
+from cdpr_drivers.drive_units import VELOCITY_UNITS
 from cdpr_profiles import load_drive
 from cdpr_profiles.bounded_input import read_bytes
 from cdpr_profiles.eds import MOST_EDS_BYTES, DataSheet, bits_of, read_eds
@@ -63,7 +65,6 @@ def import_drive(
     eds = read_eds(file)
     made = propose(eds)
     profile, copy = _write(file, out_dir, stem, made)
-    load_drive(profile)
     _show(out, eds, made, profile, copy)
     out.result(
         {
@@ -102,11 +103,25 @@ def _write(file: Path, folder: Path, stem: str, made: Proposal) -> tuple[Path, P
     for path in writes:
         if path.exists():
             raise BadInputError(f"{path}: is there already; choose another --name or --out")
+    _check(file, made)
     with os_error_as(WorkFailedError, f"{folder}: cannot be written"):
         folder.mkdir(parents=True, exist_ok=True)
         for path, content in writes.items():
             path.write_bytes(content)
     return profile, copy
+
+
+def _check(file: Path, made: Proposal) -> None:
+    """Read the profile as its users will, before anything is written."""
+    with TemporaryDirectory() as folder:
+        profile, copy = Path(folder) / "drive.toml", Path(folder) / f"drive{file.suffix.lower()}"
+        copy.write_bytes(read_bytes(file, MOST_EDS_BYTES))
+        profile.write_text(profile_text(made, copy.name, file.name), encoding="utf-8")
+        try:
+            load_drive(profile)
+        except ProfileError as error:
+            problem = str(error).removeprefix(f"{profile}: ")
+            raise BadInputError(f"{file}: gives no usable profile: {problem}") from error
 
 
 def _show(out: Output, eds: DataSheet, made: Proposal, profile: Path, copy: Path) -> None:
@@ -265,6 +280,7 @@ _TOPICS = {
 }
 _ASSUMPTIONS = {
     "torque_unit": ("per_mille_of_rated", "as CiA 402-2 has it for 6071h"),
+    "rated_torque_unit": ("mNm", "as CiA 402-2 has it; the boot compares 6076h with the motor"),
     "velocity_unit": ("counts_per_s", "as CiA 402-2 has it without scaling"),
     "acceleration_unit": ("counts_per_s2", "as CiA 402-2 has it without scaling"),
     "position_sign": (1, "no EDS tells it"),
@@ -277,6 +293,10 @@ _ASSUMPTIONS = {
     "heartbeat_producer_s": (0.1, "our choice, written to 1017h"),
     "heartbeat_consumer_s": (0.5, "our choice, written to 1016h"),
 }
+_MAKERS = {
+    0x000000FB: {"rated_torque_unit": ("uNm", "maxon: Motor rated torque of the EPOS4 is in uNm")},
+}
+"""Keys that a maker's manuals give for all its drives, by vendor id."""
 _CONSEQUENCES = {
     0x1006: "the drive does not know the cycle's period",
     0x1008: "the boot cannot show the device's name",
@@ -316,7 +336,8 @@ def propose(eds: DataSheet) -> Proposal:
     _homing(made, eds)
     for key, (value, how) in _ASSUMPTIONS.items():
         made.set(key, value, _ASSUMED, how)
-    made.find_out("torque_unit", "other_units", "position_sign", "torque_sign", "homing_sign")
+    _units(made, eds)
+    made.find_out("torque_unit", "position_sign", "torque_sign", "homing_sign")
     made.find_out("quirks", *([] if _number(eds, 0x6076) else ["rated_torque"]))
     made.find_out("delays", "timeouts")
     _pdos(made, eds)
@@ -369,6 +390,19 @@ def _identity(made: Proposal, eds: DataSheet) -> None:
             made.find_out(key)
     if made.table["revision"]:
         made.find_out("firmware")
+
+
+def _units(made: Proposal, eds: DataSheet) -> None:
+    """Set the units that the drive states itself (60A9h) or that its maker is known for."""
+    for key, (value, how) in _MAKERS.get(made.table["vendor_id"], {}).items():
+        made.set(key, value, _MANUAL, how)
+    unit = VELOCITY_UNITS.get(_number(eds, 0x60A9) or 0)
+    if unit is None:
+        made.find_out("other_units")
+        return
+    acceleration = "rpm_per_s" if unit == "rpm" else "counts_per_s2"
+    made.set("velocity_unit", unit, _MANUAL, "60A9h in the EDS")
+    made.set("acceleration_unit", acceleration, _ASSUMED, "to match the unit of velocities")
 
 
 def _modes(made: Proposal, eds: DataSheet) -> None:
