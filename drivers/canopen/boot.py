@@ -277,9 +277,8 @@ class _NodeBoot:
             raise self._error(
                 "B",
                 problem,
-                "give each device a different node id (connect one alone to see which it is); if it "
-                "is one drive that sends its boot-up message twice, set quirks.boot_ups in its "
-                "profile",
+                "give each device a different node id (connect one alone to see which it is); if "
+                "one drive sends its boot-up message twice, set quirks.boot_ups in its profile",
             )
 
     def _check_identity(self) -> None:

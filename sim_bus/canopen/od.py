@@ -352,9 +352,9 @@ class ObjectDictionary:
 
 def _default_count(record: ODRecord | ODArray) -> int:
     """Return the count of a record whose EDS gives none; a PDO maps the objects that have one."""
-    if record.index not in _MAPPINGS:
-        return max(record.subindices)
     mapped = 0
+    if record.index not in _MAPPINGS:
+        return int(max(record.subindices))
     while mapped + 1 in record.subindices and record.subindices[mapped + 1].default:
         mapped += 1
     return mapped

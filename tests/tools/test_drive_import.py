@@ -6,6 +6,7 @@ import io
 import json
 import subprocess
 import sys
+from collections.abc import Callable
 from contextlib import redirect_stdout
 from pathlib import Path
 from typing import Any
@@ -177,24 +178,106 @@ def test_a_data_sheet_that_a_strangers_library_wrote(suffix: str, tmp_path: Path
     assert (told["node_id"], told["bitrate_bit_s"]) == wanted
 
 
-def test_an_imported_profile_runs_its_drive(tmp_path: Path) -> None:
-    """A data sheet with flaws: master and simulated drive take it, up to the power stage."""
-    path = tmp_path / "odd.eds"
-    path.write_bytes((TEXT + "\n[6041]\nParameterName=Zustand für alle\n").encode("cp1252"))
-    assert imported(path, tmp_path / "mine")["remarks"]
-    winch = tmp_path / "mine" / "winch.toml"
-    shipped = (Path(cdpr_profiles.__file__).parent / "winches" / "winch-mpp0923d.toml").read_text()
-    assert 'drive = "generic-cia402"' in shipped
-    winch.write_text(shipped.replace('drive = "generic-cia402"', 'drive = "odd"'))
-    words = ("drive", "enable", str(winch), "--bus", "simbus:", "--seconds", "0.2", "--json")
+def flaws_tolerated(text: str) -> str:
+    """Return a data sheet with an object that no reader understands."""
+    return text + "\n[6041]\nParameterName=Zustand für alle\n"
+
+
+def without_counts(text: str) -> str:
+    """Return one without a serial number or mapping counts; 1016h has a limit for its time only."""
+    text = without("1018sub4", text)
+    for number in range(4):
+        for base in ("160", "1A0"):
+            text = with_key(f"{base}{number}sub0", "DefaultValue", "", text)
+    return with_key("1016sub1", "HighLimit", "65535", text)
+
+
+def identity_in_device_info(text: str) -> str:
+    """Return one with its identity in [DeviceInfo] only, that announces no mode of operation."""
+    for sub in (1, 2, 3):
+        text = with_key(f"1018sub{sub}", "DefaultValue", "", text)
+    return with_key("6502", "DefaultValue", "0", text)
+
+
+def fixed_identifiers(text: str) -> str:
+    """Return one whose COB-IDs cannot be written; its maps are empty."""
+    for number in range(4):
+        for base in ("140", "180"):
+            text = with_key(f"{base}{number}sub1", "AccessType", "ro", text)
+        for base in ("160", "1A0"):
+            text = with_key(f"{base}{number}sub0", "DefaultValue", "0", text)
+    return text
+
+
+def unsigned(text: str) -> str:
+    """Return one with signed objects declared unsigned, and a wrong device type."""
+    for index, data_type in (("6064", "0x0007"), ("6071", "0x0006"), ("6077", "0x0006")):
+        text = with_key(index, "DataType", data_type, text)
+        text = with_key(index, "LowLimit", "", with_key(index, "HighLimit", "", text))
+    return with_key("1000", "DefaultValue", "0x00220811", text)
+
+
+def jogged(winch: Path) -> tuple[int, str]:
+    """Turn the motor of a simulated drive; return the command's exit status and error."""
+    words = ("drive", "jog", str(winch), "--bus", "simbus:", "--speed-deg-s", "-60")
     ended = subprocess.run(
-        [sys.executable, "-m", "cdpr_tools.cli", *words],
+        [sys.executable, "-m", "cdpr_tools.cli", *words, "--seconds", "0.3", "--json"],
         capture_output=True,
         text=True,
         check=False,
+        timeout=60,
     )
-    assert ended.returncode == 0, ended.stderr
-    assert json.loads(ended.stdout.splitlines()[-1])["ok"] is True
+    if ended.returncode == 0:
+        assert json.loads(ended.stdout.splitlines()[-1])["moved_deg"] < -15.0
+    return ended.returncode, ended.stderr
+
+
+def winch_with(drive: str, folder: Path) -> Path:
+    shipped = (Path(cdpr_profiles.__file__).parent / "winches" / "winch-mpp0923d.toml").read_text()
+    assert 'drive = "generic-cia402"' in shipped
+    path = folder / "winch.toml"
+    path.write_text(shipped.replace('drive = "generic-cia402"', f'drive = "{drive}"'))
+    return path
+
+
+@pytest.mark.parametrize(
+    "spoil",
+    [flaws_tolerated, without_counts, identity_in_device_info, fixed_identifiers, unsigned],
+)
+def test_a_drive_with_an_odd_data_sheet_is_imported_and_turns_its_motor(
+    spoil: Callable[[str], str], tmp_path: Path
+) -> None:
+    path = tmp_path / "odd.eds"
+    path.write_bytes(spoil(TEXT).encode("cp1252"))
+    imported(path, tmp_path / "mine")
+    status, problem = jogged(winch_with("odd", tmp_path / "mine"))
+    assert status == 0, problem
+
+
+def test_a_drive_that_counts_in_other_units_runs_and_the_boot_names_a_wrong_unit(
+    tmp_path: Path,
+) -> None:
+    """The simulated drive of this vendor id has 6076h in uNm and velocities in rpm."""
+    text = with_key("1018sub1", "DefaultValue", "0xFB")
+    text += "\n[60A9]\nParameterName=SI unit velocity\nObjectType=0x7\nDataType=0x0007\n"
+    path = tmp_path / "micro.eds"
+    path.write_text(text + "AccessType=rw\nDefaultValue=0x00B44700\nPDOMapping=0\n")
+    facts = imported(path, tmp_path)["facts"]
+    assert facts["rated_torque_unit"]["value"] == "uNm"
+    assert facts["velocity_unit"]["value"] == "rpm"
+    winch, profile = winch_with("micro", tmp_path), tmp_path / "micro.toml"
+    status, problem = jogged(winch)
+    assert status == 0, problem
+    right = profile.read_text()
+    profile.write_text(right.replace('rated_torque_unit = "uNm"', 'rated_torque_unit = "mNm"'))
+    status, problem = jogged(winch)
+    assert status == 1
+    assert 'the drive seems to count in uNm: write rated_torque_unit = "uNm"' in problem
+    profile.write_text(right.replace('velocity_unit = "rpm"', 'velocity_unit = "counts_per_s"'))
+    status, problem = jogged(winch)
+    assert status == 1
+    assert "its velocity unit (60A9h) is rpm" in problem
+    assert 'write velocity_unit = "rpm" into the profile' in problem
 
 
 def test_maps_are_proposed_where_the_defaults_do_not_serve(tmp_path: Path) -> None:

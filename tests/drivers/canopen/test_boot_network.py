@@ -15,6 +15,7 @@ from cdpr_drivers.bus import BusUrl
 from cdpr_drivers.canopen.boot import boot, boot_all, flood_text
 from cdpr_drivers.errors import BootError
 from cdpr_profiles import Pdo
+from cdpr_profiles.drive import Quirks
 from cdpr_rt.core.clock import PacedClock
 from tests.drivers.axis_rig import DRIVE, MASTER, SETTINGS, open_network
 from tests.drivers.canopen.scripted_node import ScriptedNode, expedited, scripted
@@ -118,6 +119,17 @@ def test_two_boot_ups_after_one_reset_indicate_a_duplicate_node_id(bus: str) -> 
     assert caught.value.letter == "B"
     assert "2 boot-up messages followed one reset" in str(caught.value)
     assert "a different node id" in str(caught.value)
+
+
+def test_a_drive_whose_profile_says_that_it_boots_twice_is_one_device(bus: str) -> None:
+    twice = DRIVE.model_copy(update={"quirks": Quirks(boot_ups=2)})
+    second = _Second(bus, 1, lambda _request: [])
+    try:
+        with open_network(bus, [1], lead=False) as network:
+            assert boot(network, 1, twice, SETTINGS).counts_per_turn == 8192
+            assert network.alarm_text == ""
+    finally:
+        second.close()
 
 
 def test_the_drives_rejection_of_a_too_long_pdo_is_reported_as_text(bus: str) -> None:
