@@ -2,16 +2,15 @@
 
 from collections.abc import Iterator
 from configparser import RawConfigParser
-from pathlib import Path
 
 import canopen
 import pytest
 from canopen.objectdictionary import ODVariable
 
-import cdpr_profiles
 from cdpr_profiles import DriveProfile, load_drive, load_motor
 
-NAMES = sorted(p.stem for p in (Path(cdpr_profiles.__file__).parent / "drives").glob("*.toml"))
+NAMES = ("generic-cia402", "mnm-profile-torque", "parker-compax3-canopen")
+"""Drives with an EDS of our own; those made from makers' data sheets keep the makers' gaps."""
 NODE_ID = 5
 GENERIC = load_drive("generic-cia402")
 

@@ -244,7 +244,7 @@ def test_error_for_an_unknown_name_suggests_the_likely_one():
         cdpr_profiles.load_motor("mpp923d")
     with pytest.raises(ProfileError, match="did you mean 'winch-mpp0923d'"):
         cdpr_profiles.load_winch("winch-mpp923d")
-    with pytest.raises(ProfileError, match="allowed: generic-cia402"):
+    with pytest.raises(ProfileError, match="allowed: elmo-gold, eyou-servo, generic-cia402"):
         cdpr_profiles.load_drive("zzz")
 
 

@@ -240,6 +240,17 @@ def winch_with(drive: str, folder: Path) -> Path:
     return path
 
 
+SHIPPED = sorted(
+    path.stem for path in (Path(cdpr_profiles.__file__).parent / "drives").glob("*.toml")
+)
+
+
+@pytest.mark.parametrize("name", SHIPPED)
+def test_every_shipped_drive_turns_its_simulated_motor(name: str, tmp_path: Path) -> None:
+    status, problem = jogged(winch_with(name, tmp_path))
+    assert status == 0, problem
+
+
 @pytest.mark.parametrize(
     "spoil",
     [flaws_tolerated, without_counts, identity_in_device_info, fixed_identifiers, unsigned],
