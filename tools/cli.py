@@ -132,7 +132,9 @@ _WORDS = (
     (r"Value error, (.*) is not one of (.*)\.", r"\1; allowed: \2"),
 )
 """The library's texts for values that are not allowed, and their replacements here."""
-_UsageError: Any = BadParameter.__base__  # typer does not export it
+# typer does not export them
+_UsageError: Any = BadParameter.__base__
+_CommandLineError: Any = _UsageError.__base__
 
 
 class _Commands(group_of(MODULES, PANELS, ALIASES)):  # type: ignore[misc]
@@ -199,11 +201,15 @@ def main() -> None:
     announce_compiling()
     try:
         try:
-            app(standalone_mode=True)
+            status = app(standalone_mode=False)
         finally:
             sys.stdout.flush()  # here a failure can still be reported
     except BrokenPipeError:
         sys.exit(FAILED)
+    except _CommandLineError as error:
+        if not (text := error.format_message()):  # the help was shown instead
+            sys.exit(BAD_INPUT)
+        _end(_with_help(text, getattr(error, "ctx", None)), BAD_INPUT)
     except (CommandError, ControlError, DriverError, ProfileError, SimulatorError) as error:
         notes = getattr(error, "__notes__", ())
         _end("; ".join([str(error), *notes]), exit_status(error))
@@ -212,22 +218,32 @@ def main() -> None:
             raise
         extra = "camera" if error.name == "cv2" else "daemon"
         _end(f"needs {error.name}, which comes with: pip install 'cdpr-rt[{extra}]'", FAILED)
-    except KeyboardInterrupt:  # while libraries are loading
+    except (KeyboardInterrupt, typer.Abort):  # while libraries are loading, or at a question
         _end("interrupted", FAILED)
-    except SystemExit as end:
-        # the form in which the command line library reports an interrupt
-        if end.code == _INTERRUPTED:
-            _end("interrupted", FAILED)
-        raise
     finally:
         # all work is done: a Ctrl-C while the interpreter ends would only show a traceback
         atexit.register(signal.signal, signal.SIGINT, signal.SIG_IGN)
-    sys.exit(DONE)
+    if status == _INTERRUPTED:
+        _end("interrupted", FAILED)
+    sys.exit(status or DONE)
+
+
+def _with_help(text: str, context: Any) -> str:
+    """Return a message about the command line in one line, and where to look for what to do."""
+    text = " ".join(text.split()).removesuffix(".")
+    if context is None or text.endswith("?") or "allowed: " in text:
+        return text
+    return f"{text}; see `{context.command_path} --help`"
 
 
 def _end(message: str, status: int) -> NoReturn:
     message = message if len(message) <= _MOST_CHARS else f"{message[:_MOST_CHARS]}..."
-    print(f"cdpr: {printable(message)}", file=sys.stderr)
+    text = f"cdpr: {printable(message)}"
+    if sys.stderr.isatty():
+        from cdpr_tools.output import fold, width_of  # noqa: PLC0415  # slow to load
+
+        text = fold(text, width_of(sys.stderr))
+    print(text, file=sys.stderr)
     if "--json" in sys.argv:
         with suppress(OutputLostError, BrokenPipeError):
             result = {"ok": False, "error": message, "exit_status": status}

@@ -10,7 +10,7 @@ from functools import cache
 from typing import Any
 
 import typer
-from typer.core import TyperArgument, TyperCommand, TyperGroup
+from typer.core import TyperCommand, TyperGroup
 from typing_extensions import override
 
 from cdpr_tools.loading import loading_notice
@@ -31,17 +31,42 @@ def load(module: str, name: str) -> Any:
 
 
 def _unwrap(command: Any) -> None:
-    """Join the lines of each paragraph of the help, so that a terminal can wrap them.
+    """Prepare a command's help: paragraphs without line ends, so that a terminal can wrap them.
 
     Arguments without a metavariable are shown by their names, in capitals.
     """
-    for param in command.params:
-        if isinstance(param, TyperArgument):
-            param.metavar = param.metavar or str(param.name).upper()
+    for param in command.get_params(typer.Context(command)):
+        _shorten(param)
     paragraphs = inspect.cleandoc(command.help or "").split("\n\n")
     command.help = "\n\n".join(paragraph.replace("\n", " ") for paragraph in paragraphs)
     for other in getattr(command, "commands", {}).values():
         _unwrap(other)
+
+
+def _no_type(ctx: Any) -> None:
+    """Return the type of an argument that the help shows: none, its name says enough."""
+    del ctx
+
+
+def _shorten(param: Any) -> None:
+    """Show the kind of a value by one word at most, and its range with the explanation."""
+    kind = param.type_descriptor
+    if param.param_type_name == "argument":
+        param.metavar = param.metavar or str(param.name).upper()
+        param.display_type_rich = _no_type
+        choices = [one.value for one in kind.choices or ()]
+        if not all(one in param.help for one in choices):
+            param.help = f"{param.help} ({', '.join(choices)})"
+    elif param.is_flag:
+        param.metavar = ""
+    elif param.metavar is None and not kind.is_choice:
+        number = kind.is_ranged or kind.annotation in (int, float)
+        param.metavar = "PATH" if kind.is_path else "N" if number else "TEXT"
+    low, high = param.min, param.max
+    if low is not None or high is not None:
+        bounds = f"{low:g} or more" if high is None else f"{low:g} to {high:g}"
+        param.help = f"{param.help} ({bounds})"
+        param.min = param.max = None
 
 
 def group_of(
@@ -78,6 +103,13 @@ def group_of(
                 )
 
         @override
+        def get_params(self, ctx: Any) -> list[Any]:
+            params = super().get_params(ctx)
+            for param in params:
+                _shorten(param)
+            return params
+
+        @override
         def list_commands(self, ctx: Any) -> list[str]:
             return [*names, *hidden]  # in the order of the help, not alphabetical
 
@@ -87,12 +119,8 @@ def group_of(
             if name in module_of:
                 self.add_command(load(module_of[name], name))
             elif not ctx.resilient_parsing and not name.startswith("-"):
-                near = get_close_matches(name, suggested)
-                asked = f"{ctx.command_path} --help"
-                hint = (
-                    f"Did you mean {' or '.join(map(repr, near))}?" if near else f"See `{asked}`."
-                )
-                ctx.fail(f"No such command '{name}'. {hint}")
+                near = " or ".join(map(repr, get_close_matches(name, suggested)))
+                ctx.fail(f"No such command '{name}'" + (near and f"; did you mean {near}?"))
             return super().resolve_command(ctx, [name, *args[1:]])
 
     return _Group

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import sys
+
 import typer
 
 from cdpr_profiles.errors import printable
 from cdpr_tools.errors import BadInputError
+from cdpr_tools.output import fold, width_of
 
 
 def require_consent(question: str, yes: bool, undone: str = "nothing was energised") -> None:
@@ -13,7 +16,8 @@ def require_consent(question: str, yes: bool, undone: str = "nothing was energis
     if yes:
         return
     try:
-        agreed = typer.confirm(f"{printable(question)} Go on?", err=True)
+        asked = fold(f"{printable(question)} Go on?", width_of(sys.stderr))
+        agreed = typer.confirm(asked, err=True)
     except typer.Abort:  # nobody can answer
         agreed = False
     if not agreed:

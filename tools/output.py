@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import json
 import math
+import os
+import re
 import threading
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any
+from textwrap import wrap
+from typing import IO, Any, Final, Self
 
 import numpy as np
 from rich.console import Console, ConsoleOptions, RenderableType
@@ -22,6 +25,7 @@ from rich.progress import (
     TimeRemainingColumn,
 )
 from rich.segment import Segment
+from rich.text import Text
 from typing_extensions import override
 
 from cdpr_profiles.errors import printable
@@ -53,11 +57,151 @@ def to_json(result: dict[str, Any], indent: int | None = None) -> str:
     return json.dumps(_plain(result), indent=indent, allow_nan=False)
 
 
+_KEPT: Final = re.compile(r"`[^`]*`|(?:(?<=: )|(?<=^ {6}))cdpr .*")
+"""A command within a text: somebody may copy it, so it stays in one line."""
+_LABEL: Final = re.compile(r"\s*(?:\S+(?: \S+)?\s{2,})?")
+_SPACE: Final = "\0"
+_LEAST_TEXT: Final = 24
+"""Fewest columns that are left to a text beside its label, and to the first column of a table."""
+
+
+def fold(text: str, width: int | None) -> str:
+    """Break the lines of a text between words, so that they fit into `width` columns.
+
+    Paths and quoted commands are not broken, even if they are longer. Further lines are indented
+    like the text after a label at the beginning ("loop       gain margin ..."). Without a width
+    nothing changes, as in a pipe.
+    """
+    if width is None:
+        return text
+    return "\n".join(_fold_line(line, width) for line in text.split("\n"))
+
+
+def _fold_line(line: str, width: int) -> str:
+    if len(line) <= width:
+        return line
+    label = _LABEL.match(line)
+    indent = 0 if label is None else label.end()
+    if indent > width - _LEAST_TEXT:
+        indent = 0
+    whole = _KEPT.sub(lambda found: found[0].replace(" ", _SPACE), line)
+    folded = wrap(
+        whole,
+        width,
+        subsequent_indent=" " * indent,
+        break_long_words=False,
+        break_on_hyphens=False,
+    )
+    return "\n".join(folded).replace(_SPACE, " ")
+
+
+def _folded(text: Text, width: int | None) -> Text:
+    """Return a styled text folded like its letters."""
+    lines, end = [], 0
+    for line in fold(text.plain, width).split("\n"):
+        words = line.lstrip(" ")
+        begin = text.plain.index(words, end)
+        end = begin + len(words)
+        lines.append(Text(" " * (len(line) - len(words))) + text[begin:end])
+    return Text("\n").join(lines)
+
+
+class TableText(str):
+    """A table as text, which `Output.say` fits into the terminal; the first row is its header.
+
+    The first column has labels and is aligned to the left, like the columns named in `left`.
+    """
+
+    _rows: Sequence[Sequence[str]]
+    _left: Sequence[str]
+
+    def __new__(cls, rows: Sequence[Sequence[str]], left: Sequence[str] = ()) -> Self:
+        """Lay the table out as wide as it is."""
+        self = super().__new__(cls, "\n".join(_columns(rows, _aligned(rows, left))))
+        self._rows, self._left = rows, left
+        return self
+
+    def within(self, width: int | None) -> str:
+        """Return the table in `width` columns: labels are folded, other columns follow below."""
+        widths = _widths(self._rows)
+        if width is None or _total(widths) <= width:
+            return str(self)
+        label = max(min(width - _total(widths[1:]) - _GAP, widths[0]), min(_LEAST_TEXT, widths[0]))
+        parts: list[list[int]] = [[]]
+        for i, one in enumerate(widths[1:], 1):
+            if parts[-1] and _total([label, *(widths[j] for j in parts[-1]), one]) > width:
+                parts.append([])
+            parts[-1].append(i)
+        aligned = _aligned(self._rows, self._left)
+        lines: list[str] = []
+        for part in parts:
+            shown = [0, *part]
+            rows = [[row[i] for i in shown] for row in self._rows]
+            rows = [more for row in rows for more in _folded_label(row, label)]
+            lines += [*[""] * bool(lines), *_columns(rows, [aligned[i] for i in shown])]
+        return "\n".join(lines)
+
+    def __rich_console__(self, _: Console, options: ConsoleOptions) -> Iterator[Text]:
+        """Yield the table as wide as there is room."""
+        yield Text(self.within(options.max_width), no_wrap=True)
+
+
+_GAP: Final = 2
+
+
+def _widths(rows: Sequence[Sequence[str]]) -> list[int]:
+    return [max(map(len, column)) for column in zip(*rows, strict=True)]
+
+
+def _total(widths: Sequence[int]) -> int:
+    return sum(widths) + _GAP * (len(widths) - 1)
+
+
+def _aligned(rows: Sequence[Sequence[str]], left: Sequence[str]) -> list[str]:
+    return ["<" if i == 0 or title in left else ">" for i, title in enumerate(rows[0])]
+
+
+def _columns(rows: Sequence[Sequence[str]], aligned: Sequence[str]) -> list[str]:
+    shape = [f"{side}{width}" for side, width in zip(aligned, _widths(rows), strict=True)]
+    return [(" " * _GAP).join(map(format, row, shape)).rstrip() for row in rows]
+
+
+def _folded_label(row: Sequence[str], width: int) -> list[list[str]]:
+    """Return a row whose label needs several lines as several rows; the figures are in the last."""
+    labels = fold(row[0], width).split("\n")
+    return [*([label, *[""] * (len(row) - 1)] for label in labels[:-1]), [labels[-1], *row[1:]]]
+
+
+def width_of(stream: IO[str]) -> int | None:
+    """Return the columns of a stream's terminal; None for a pipe or a file."""
+    if not stream.isatty():
+        return None
+    with suppress(KeyError, ValueError):
+        return int(os.environ["COLUMNS"])
+    return os.get_terminal_size(stream.fileno()).columns or _ORDINARY
+
+
+_ORDINARY: Final = 80
+"""Columns of a terminal that does not report them."""
+_NO_LIMIT: Final = 10_000
+
+
 class _Terminal(Console):
     """A console on which only styles and bars control the terminal, never text."""
 
     def __init__(self, *, stderr: bool) -> None:
         super().__init__(stderr=stderr, highlight=False, emoji=False, markup=False)
+        if width_of(self.file) is None:
+            self.width = _NO_LIMIT
+
+    def say(self, text: str | Text) -> None:
+        """Write a text or table, broken between words if this is a terminal."""
+        width = width_of(self.file)
+        if isinstance(text, TableText):
+            text = text.within(width)
+        if isinstance(text, str):
+            text = Text(printable(text))
+        self.print(_folded(text, width), soft_wrap=True)
 
     @override
     def render(
@@ -79,14 +223,14 @@ class Output:
         self.text = self.notes if as_json else _Terminal(stderr=False)
         self._bar: Progress | None = None
 
-    def say(self, *lines: str) -> None:
+    def say(self, *lines: str | Text) -> None:
         """Write lines for people."""
         for line in lines:
-            self.text.print(printable(line), soft_wrap=True)
+            self.text.say(line)
 
     def note(self, text: str) -> None:
         """Write a line about the present work to standard error."""
-        self.notes.print(printable(text), style="dim", soft_wrap=True)
+        self.notes.say(Text(printable(text), "dim"))
 
     def result(self, result: dict[str, Any]) -> None:
         """Write the JSON line if requested; it is the last line of standard output."""

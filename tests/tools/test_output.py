@@ -13,7 +13,7 @@ import pytest
 from rich.table import Table
 
 from cdpr_tools import output
-from cdpr_tools.output import Output
+from cdpr_tools.output import Output, TableText, fold
 
 
 def _work() -> None:
@@ -98,6 +98,64 @@ def test_no_text_acts_on_the_terminal(as_json: bool) -> None:
             pass
     assert set("\x1b\x07\x9b\x7f\u202e\r\udc9b").isdisjoint(told.getvalue() + noted.getvalue())
     assert SHOWN in (noted if as_json else told).getvalue() and SHOWN in noted.getvalue()
+
+
+PATH = "/home/someone/recordings/planar-3-20260101T000000Z-001.mcap"
+FIGURES = TableText(
+    [
+        ["axis", "angle deg", "torque Nm", "tension N"],
+        ["upper left", "-1311.13", "-1.470", "~56.8"],
+        ["lower", "1545.73", "-0.951", "~36.9"],
+    ]
+)
+
+
+def test_text_wraps_between_words_under_its_label() -> None:
+    text = "loop       has a gain margin of 1.8 and a phase margin of 26 deg"
+    assert fold(text, 40).splitlines() == [
+        "loop       has a gain margin of 1.8 and",
+        "           a phase margin of 26 deg",
+    ]
+    assert fold(text, None) == text
+
+
+def test_paths_and_commands_to_copy_are_never_cut() -> None:
+    assert f"{PATH}," in fold(f"recording {PATH}, 5.7 MB", 40).splitlines()
+    assert "`cdpr tighten --from home`" in fold(
+        "cables loose; next: `cdpr tighten --from home`", 40
+    )
+    again = "cdpr robot new my.toml --set 'frame_m=3 2' --yes"
+    assert fold(f"nothing was written; again: {again}", 40).endswith(again)
+
+
+def test_a_narrow_table_continues_below_with_its_labels() -> None:
+    assert FIGURES.within(40).splitlines() == [
+        "axis        angle deg  torque Nm",
+        "upper left   -1311.13     -1.470",
+        "lower         1545.73     -0.951",
+        "",
+        "axis        tension N",
+        "upper left      ~56.8",
+        "lower           ~36.9",
+    ]
+    assert len(FIGURES.within(80).splitlines()) == 3
+
+
+def test_long_labels_of_a_table_wrap_before_columns_move() -> None:
+    table = TableText([["", "value"], ["largest distance from the set-point on the way", "12.5"]])
+    assert table.within(36).splitlines() == [
+        "                           value",
+        "largest distance from the",
+        "set-point on the way        12.5",
+    ]
+
+
+def test_a_pipe_has_no_width(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("COLUMNS", "20")
+    written = io.StringIO()
+    with redirect_stdout(written):
+        Output(as_json=False).say(f"recording {PATH}", FIGURES)
+    assert written.getvalue() == f"recording {PATH}\n{FIGURES}\n"
 
 
 def test_styles_still_reach_a_terminal(monkeypatch: pytest.MonkeyPatch) -> None:

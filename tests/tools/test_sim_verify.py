@@ -85,7 +85,7 @@ def test_a_command_that_fails_or_writes_nothing_proves_nothing(tmp_path: Path) -
     assert "run 1 ended with exit status 2: " in told["error"]
     assert "no-such-winch" in told["error"]
     told = verified("--", "no-such-command", status=2)
-    assert "ended with exit status 2: No such command 'no-such-command'. " in told["error"]
+    assert "ended with exit status 2: No such command 'no-such-command'" in told["error"]
     told = verified("--busy", "0", "--", "/bin/true", status=1)
     assert told["error"] == "the command wrote no file that is compared"
     told = verified("--", tmp_path / "missing", status=2)

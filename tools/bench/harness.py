@@ -15,6 +15,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from cdpr_tools.output import TableText
+
 Times = NDArray[np.int64]
 """Times in ns, (k,)."""
 Work = Callable[[], object]
@@ -61,12 +63,11 @@ class Figures:
     """Why the bench has failed."""
 
     def lines(self) -> list[str]:
-        """Return the table, with a line for each row, then targets and notes."""
+        """Return the table, then targets and notes."""
         columns = list(dict.fromkeys(column for row in self.rows.values() for column in row))
         cells = [(name, [row.get(c, "") for c in columns]) for name, row in self.rows.items()]
-        label = max((len(name) for name in self.rows), default=0) + 2
         targets = [target.line() for target in self.targets.values()]
-        return [self.title, *table(columns, cells, label=label), *targets, *self.notes]
+        return [self.title, table(columns, cells), *targets, *self.notes]
 
     def as_json(self) -> dict[str, Any]:
         """Return all figures."""
@@ -144,20 +145,11 @@ def percentiles(
 
 
 def table(
-    columns: Sequence[str],
-    rows: Iterable[tuple[str, Iterable[object]]],
-    label: int = 32,
-    width: int = 11,
-    digits: int = 1,
-) -> list[str]:
-    """Return a heading and a line for each row; a float has `digits` digits after the point.
-
-    A column has this `width`, or more if its name is longer.
-    """
-
-    def line(text: str, cells: Iterable[object]) -> str:
-        shown = (f"{x:.{digits}f}" if isinstance(x, float) else f"{x}" for x in cells)
-        pairs = zip(shown, columns, strict=False)
-        return f"{text:{label}}" + "".join(f"{x:>{max(width, len(c) + 2)}}" for x, c in pairs)
-
-    return [line("", columns), *(line(text, cells) for text, cells in rows)]
+    columns: Sequence[str], rows: Iterable[tuple[str, Iterable[object]]], digits: int = 1
+) -> TableText:
+    """Return the rows under a heading; a float has `digits` digits after the point."""
+    shown = [["", *columns]]
+    for label, cells in rows:
+        row = [label, *(f"{x:.{digits}f}" if isinstance(x, float) else f"{x}" for x in cells)]
+        shown.append(row + [""] * (len(shown[0]) - len(row)))
+    return TableText(shown)

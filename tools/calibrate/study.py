@@ -28,6 +28,7 @@ from cdpr_profiles import load_robot
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.model.platform_model import platform_model_of
 from cdpr_tools.errors import BadInputError
+from cdpr_tools.output import TableText
 from cdpr_tools.processes import cores, runner
 from cdpr_tools.report.style import BACKWARD, FORWARD, canvas, legend_above, save_figure
 
@@ -307,15 +308,15 @@ def plateaus(rows: Rows) -> Rows:
 
 def lines(rows: Rows) -> list[str]:
     """Return table 3.1 and the figures' content as lines of text."""
-    shown = []
+    shown: list[str] = []
     for title, figures in (
         ("noise at 100 poses (sigma), beside the thesis' table 3.1:", ("B.4", "B.5", "B.6")),
         ("the same bias at all of 100 poses, figures B.1 to B.3:", ("B.1", "B.2", "B.3")),
         ("noise of two kinds at 100 poses, figures C.1 to C.6:", tuple(PAIRS)),
         *((f"errors by the number of poses, figure {name}:", (name,)) for name in FIGURES),
     ):
-        shown.append(f"{title:64}{'e(a) mm':>14}{'e(rho_0) mm':>14}{'ratio':>7}{'model':>9}")
-        shown += [*(_line(row) for row in rows if row["figure"] in figures), ""]
+        cells = [_row(row) for row in rows if row["figure"] in figures]
+        shown += [TableText([[title, "e(a) mm", "e(rho_0) mm", "ratio", "model"], *cells]), ""]
     for one in plateaus(rows):
         shown.append(
             f"figure {one['figure']}: of e(a) {one['floor_exit_mm']:.2f} mm, of e(rho_0) "
@@ -325,7 +326,7 @@ def lines(rows: Rows) -> list[str]:
     return shown
 
 
-def _line(row: dict[str, Any]) -> str:
+def _row(row: dict[str, Any]) -> list[str]:
     noise = [f"{key} {row[f'{key}_mm']:.3g} mm" for key in BOUNDS if row.get(f"{key}_mm")]
     noise += [f"rotation {row['rotation_deg']:.3g} deg"] if row["rotation_deg"] else []
     counted = f"{row['poses']:6d} poses: " if row["figure"] in FIGURES else ""
@@ -333,10 +334,7 @@ def _line(row: dict[str, Any]) -> str:
     one, two = (f" ({x:g})" for x in thesis) if thesis else ("", "")
     exits, offsets = f"{row['exit_mm']:.2f}{one}", f"{row['offset_mm']:.2f}{two}"
     ratio = "" if row["ratio"] is None else f"{row['ratio']:.2f}"
-    return (
-        f"{counted + ', '.join(noise):64}{exits:>14}{offsets:>14}{ratio:>7}"
-        f"{100 * row['off']:+7.1f} %"
-    )
+    return [counted + ", ".join(noise), exits, offsets, ratio, f"{100 * row['off']:+.1f} %"]
 
 
 def _count(poses: float | None) -> str:

@@ -7,12 +7,10 @@ import time
 from collections.abc import Iterable
 from typing import Any, Final
 
-from rich.console import Group
-from rich.table import Table
 from rich.text import Text
 
 from cdpr_rt.robot import is_done
-from cdpr_tools.output import Output, time_text
+from cdpr_tools.output import Output, TableText, time_text
 from cdpr_tools.robots.calibration_text import calibration_text
 
 DEAD: Final = "dead"
@@ -88,10 +86,10 @@ _SILENT_s: Final = 1.0
 _COLOURS = {"active": "green", "fault": "red", "dead": "red", "ready": "cyan"}
 
 
-def status_text(status: dict[str, Any]) -> Group:
-    """Return the output of `cdpr status`."""
+def status_text(status: dict[str, Any]) -> list[Text | str]:
+    """Return the lines and the table of `cdpr status`."""
     described = any(axis.get("name") for axis in status["axes"])  # not before the loop is loaded
-    return Group(*_lines(status), *[_axes(status)] * described)
+    return [*_lines(status), *[_axes(status)] * described]
 
 
 def _lines(status: dict[str, Any]) -> list[Text]:
@@ -285,16 +283,13 @@ def _recording(recording: dict[str, Any]) -> str:
     return f"recording {recording['file']}, {recording['bytes'] / 1e6:.1f} MB{lost}"
 
 
-def _axes(status: dict[str, Any]) -> Table:
-    table = Table(box=None, pad_edge=False, header_style="dim")
-    table.add_column("axis")
-    for title in ("angle deg", "set deg", "speed deg/s", "torque Nm", "tension N", "cable m"):
-        table.add_column(title, justify="right")
-    table.add_column("")
+def _axes(status: dict[str, Any]) -> TableText:
+    titles = "angle deg", "set deg", "speed deg/s", "torque Nm", "tension N", "cable m"
+    rows = [["axis", *titles, ""]]
     for axis in status["axes"]:
         tension = _figure(axis.get("tension_N"), 1)
         measured = "" if axis.get("tension_measured") or tension == "-" else "~"
-        table.add_row(
+        row = [
             str(axis.get("name")),
             _figure(axis.get("position_rad"), 2, math.degrees(1.0)),
             _figure(axis.get("setpoint_rad"), 2, math.degrees(1.0)),
@@ -303,15 +298,15 @@ def _axes(status: dict[str, Any]) -> Table:
             f"{measured}{tension}",
             _figure(axis.get("cable_length_m"), 4),
             _trouble(axis),
-        )
-    return table
+        ]
+        rows.append(row)
+    return TableText(rows, left=[""])
 
 
-def _trouble(axis: dict[str, Any]) -> Text:
+def _trouble(axis: dict[str, Any]) -> str:
     if axis.get("alive") is None:
-        return Text("")
-    words = ["silent"] * (not axis["alive"]) + ["not valid"] * (not axis["valid"])
-    return Text(", ".join(words), style="red")
+        return ""
+    return ", ".join(["silent"] * (not axis["alive"]) + ["not valid"] * (not axis["valid"]))
 
 
 def compensation_text(axes: list[dict[str, Any]]) -> str:

@@ -44,7 +44,7 @@ from cdpr_tools.busview.scan import (
 from cdpr_tools.commands.options import JsonOption, WinchOrRobotArgument, YesOption
 from cdpr_tools.consent import require_consent
 from cdpr_tools.errors import BAD_INPUT, WorkFailedError
-from cdpr_tools.output import Output
+from cdpr_tools.output import Output, TableText
 from cdpr_tools.signals import stop_on_signals
 
 app = typer.Typer(
@@ -309,18 +309,21 @@ def _figures(budget: BusBudget) -> dict[str, Any]:
 
 def _report(name: str, budgets: list[BusBudget]) -> list[str]:
     period_s = budgets[0].period_s
-    lines = [
-        f"{name} at {1.0 / period_s:.6g} Hz: {period_s * _US:.0f} us a cycle",
-        f"{'bus':14}{'bit/s':>9}{'drives':>8}{'cycle, us':>11}{'unstuffed':>11}{'share':>9}"
-        f"{'left, us':>10}{'highest':>10}",
-    ]
+    titles = "bit/s", "drives", "cycle, us", "unstuffed", "share", "left, us", "highest"
+    rows = [["bus", *titles]]
     for b in budgets:
-        lines.append(
-            f"{b.bus:14}{b.bitrate_bit_s:9}{len(b.nodes):8}{b.cycle_s * _US:11.0f}"
-            f"{b.bare_cycle_s * _US:11.0f}{b.cycle_s / b.period_s:9.1%}"
-            f"{b.margin_s * _US:10.1f}{math.floor(b.highest_rate_Hz):7} Hz"
+        cells = (
+            f"{b.bitrate_bit_s}",
+            f"{len(b.nodes)}",
+            f"{b.cycle_s * _US:.0f}",
+            f"{b.bare_cycle_s * _US:.0f}",
+            f"{b.cycle_s / b.period_s:.1%}",
+            f"{b.margin_s * _US:.1f}",
+            f"{math.floor(b.highest_rate_Hz)} Hz",
         )
-    return lines + [_explanation(b) for b in budgets if b.fits]
+        rows.append([b.bus, *cells])
+    head = f"{name} at {1.0 / period_s:.6g} Hz: {period_s * _US:.0f} us a cycle"
+    return [head, TableText(rows), *(_explanation(b) for b in budgets if b.fits)]
 
 
 def _explanation(b: BusBudget) -> str:

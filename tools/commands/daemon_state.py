@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
+from rich.console import Group
 from rich.live import Live
 from rich.text import Text
 
@@ -57,8 +58,7 @@ def status(
     if watch:
         state = _watch(daemon, out, state)
     else:
-        for part in status_text(state).renderables:
-            out.text.print(part, soft_wrap=True)
+        out.say(*status_text(state))
     out.result({"ok": state["state"] not in ("fault", "dead"), **state})
 
 
@@ -66,7 +66,7 @@ def _watch(daemon: Daemon, out: Output, state: dict[str, Any]) -> dict[str, Any]
     """Show the status continuously; wait if the service is being restarted."""
     with (
         stop_on_signals() as stop_requested,
-        Live(status_text(state), console=out.text, auto_refresh=False) as view,
+        Live(Group(*status_text(state)), console=out.text, auto_refresh=False) as view,
     ):
         while not stop_requested():
             time.sleep(_WATCH_S)
@@ -75,7 +75,7 @@ def _watch(daemon: Daemon, out: Output, state: dict[str, Any]) -> dict[str, Any]
             except NoDaemonError as error:
                 view.update(Text(str(error), style="red"), refresh=True)
             else:
-                view.update(status_text(state), refresh=True)
+                view.update(Group(*status_text(state)), refresh=True)
     return state
 
 

@@ -20,7 +20,6 @@ from cdpr_tools.repeat import Run, Stops, Verdict, compare, run_once
 from cdpr_tools.signals import stop_on_signals
 
 _SEEDS = 2**31
-_BOX_END, _BOX_SIDE = "\N{BOX DRAWINGS LIGHT ARC UP AND RIGHT}", "\N{BOX DRAWINGS LIGHT VERTICAL} "
 
 
 app = typer.Typer()
@@ -120,9 +119,5 @@ def _check(run: Run) -> None:
 
 
 def _last_words(output: str) -> str:
-    """Return the last line of an output, or the text of the box at its end."""
-    lines = output.strip().splitlines() or ["(no output)"]
-    if not lines[-1].startswith(_BOX_END):
-        return lines[-1]
-    boxed = [line.strip(_BOX_SIDE) for line in lines if line.startswith(_BOX_SIDE[0])]
-    return " ".join(" ".join(boxed).split())
+    """Return the last line of an output."""
+    return (output.strip().splitlines() or ["(no output)"])[-1].removeprefix("cdpr: ")

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from rich.table import Table
-
 from cdpr_rt.procedures.commissioning_results import METHODS
-from cdpr_tools.output import Output
+from cdpr_tools.output import Output, TableText
 
 _NAMES = {"none": "no compensation", "thesis": "thesis' method", "harmonic": "harmonic model"}
 
@@ -31,16 +29,13 @@ def show(out: Output, results: dict[str, Any]) -> None:
 
 def show_identified(out: Output, found: dict[str, Any]) -> None:
     """Print the identified model."""
-    table = Table(title="identified cogging", title_justify="left")
-    for name in ("order", "amplitude", "95 %", "likely cause"):
-        table.add_column(name, justify="left" if name == "likely cause" else "right")
-    rows = zip(
-        found["orders"], found["amplitudes_Nm"], found["confidence_Nm"], found["hints"], strict=True
-    )
-    for order, amplitude, width, hint in rows:
-        cells = (f"{1e3 * amplitude:.2f} mNm", f"± {1e3 * width:.2f} mNm", hint)
-        table.add_row(str(order), *cells)
-    out.text.print(table)
+    columns = (found[key] for key in ("orders", "amplitudes_Nm", "confidence_Nm", "hints"))
+    rows = [
+        [str(order), f"{1e3 * amplitude:.2f} mNm", f"± {1e3 * width:.2f} mNm", hint]
+        for order, amplitude, width, hint in zip(*columns, strict=True)
+    ]
+    head = ["order", "amplitude", "95 %", "likely cause"]
+    out.say("identified cogging", TableText([head, *rows], left=["likely cause"]))
     out.say(
         f"friction {1e3 * found['coulomb_forward_Nm']:.1f} / "
         f"{1e3 * found['coulomb_backward_Nm']:.1f} mNm forward / backward, "
@@ -57,9 +52,7 @@ def show_validation(out: Output, validation: dict[str, Any], bandwidth_Hz: float
         f"ramp of 22 deg/s under one PID of {bandwidth_Hz:g} Hz closed-loop bandwidth, "
         f"judged on the {validation['judged_on']} (times smaller than without)"
     )
-    table = Table(title=title, title_justify="left")
-    for name in ("", "RMS position error", "peak PID effort", "peak velocity error"):
-        table.add_column(name, justify="right" if name else "left")
+    rows = [["", "RMS position error", "peak PID effort", "peak velocity error"]]
     for method in METHODS:
         figures, ratios = validation[method], validation[method]["ratios"]
         cells = (
@@ -68,8 +61,8 @@ def show_validation(out: Output, validation: dict[str, Any], bandwidth_Hz: float
             f"{figures['peak_velocity_error_deg_s']:.2f} deg/s",
         )
         gains = [f" ({ratio:.1f}x)" if method != "none" else "" for ratio in ratios.values()]
-        table.add_row(_NAMES[method], *(c + g for c, g in zip(cells, gains, strict=True)))
-    out.text.print(table)
+        rows.append([_NAMES[method], *(c + g for c, g in zip(cells, gains, strict=True))])
+    out.say(title, TableText(rows))
 
 
 def _show_loop(out: Output, design: dict[str, Any]) -> None:

@@ -15,6 +15,7 @@ from scipy import stats
 from cdpr_rt.arrays import FloatArray
 from cdpr_tools.bench.harness import table
 from cdpr_tools.experiment.trial import Points
+from cdpr_tools.output import TableText
 from cdpr_tools.report.style import SERIES, legend_above, save_figure
 
 
@@ -165,7 +166,7 @@ def lines(result: dict[str, Any]) -> list[str]:
     shown = [
         "Errors at the confirmed targets, mm (Tremblay, table 2.1): means and 3 sigma, those of "
         "the thesis, and the share of its 3 sigma",
-        *_table([*_xy("mean", "3 sigma", "thesis", "3 sigma", "share"), ""], rows, [
+        _table([*_xy("mean", "3 sigma", "thesis", "3 sigma", "share"), ""], rows, [
             [*row["mean_mm"], *row["three_sigma_mm"], *thesis["mean_mm"],
              *thesis["three_sigma_mm"], *row.get("share_of_thesis", ()),
              *([] if row.get("reached", True) else ["above half"])]
@@ -173,7 +174,7 @@ def lines(result: dict[str, Any]) -> list[str]:
         ]),
         "",
         "Time for the path, s (Tremblay, table 2.2)",
-        *_table(["mean", "sigma", "thesis", "sigma", "runs"], rows, [
+        _table(["mean", "sigma", "thesis", "sigma", "runs"], rows, [
             [row["time_s"], row["time_sigma_s"], thesis["time_s"], thesis["time_sigma_s"],
              row["runs"]]
             for row, thesis in pairs
@@ -185,7 +186,7 @@ def lines(result: dict[str, Any]) -> list[str]:
             "Where the errors come from, 3 sigma, mm: judged = the error that the operator was "
             "content with; hand, robot = the motion of either from then on; beside it the same "
             "operator's total with a robot without error, and the distance from the set-point",
-            *_table(_xy("judged", "hand", "robot", "total", "perfect", "off"), rows, [
+            _table(_xy("judged", "hand", "robot", "total", "perfect", "off"), rows, [
                 [*(value for part in row["parts_three_sigma_mm"].values() for value in part),
                  *row["three_sigma_mm"], *ideal["three_sigma_mm"],
                  *row["following_three_sigma_mm"]]
@@ -215,13 +216,13 @@ def _xy(*names: str) -> list[str]:
 
 def _table(
     columns: Sequence[str], rows: Sequence[dict[str, Any]], cells: Sequence[Sequence[object]]
-) -> list[str]:
+) -> TableText:
     labels = []
     for row in rows:
         level, other = row["level"], row.get("thesis", row)["level"]
         other = "" if other == level else f"({other})"
         labels.append(f"{VARIABLES[row['variable']].name:11}{level:>7} {other}")
-    return table(columns, zip(labels, cells, strict=True), label=29, width=8, digits=2)
+    return table(columns, zip(labels, cells, strict=True), digits=2)
 
 
 _THESIS: Final = "#8a8f98"

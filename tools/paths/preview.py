@@ -26,7 +26,7 @@ from cdpr_rt.procedures.path_planning import (
     size_note,
 )
 from cdpr_rt.programs.path_store import paths_folder, write_plan
-from cdpr_tools.output import time_text
+from cdpr_tools.output import TableText, time_text
 from cdpr_tools.paths.options import PathOptions
 from cdpr_tools.report.style import (
     BOUND,
@@ -159,13 +159,13 @@ def lines(shown: Preview, robot: Robot, table: dict[str, Any]) -> list[str]:
         text.append(f"note: {table['slowed_moves']} moves want more speed than the robot has")
     tensions = shown.tensions
     if tensions is not None:
-        text.append("tensions, N:        least   most   planned within")
         least, most = tensions.tension_N.min(axis=0), tensions.tension_N.max(axis=0)
-        text += [
-            f"  {axis.name:16}{least[i]:8.1f}{most[i]:7.1f}   "
-            f"{tensions.low_N[i]:.1f} to {tensions.high_N[i]:.1f}"
+        low, high = tensions.low_N, tensions.high_N
+        rows = [
+            [axis.name, f"{least[i]:.1f}", f"{most[i]:.1f}", f"{low[i]:.1f} to {high[i]:.1f}"]
             for i, axis in enumerate(robot.axes)
         ]
+        text.append(TableText([["tensions, N:", "least", "most", "planned within"], *rows]))
     return text
 
 

@@ -25,8 +25,9 @@ from cdpr_rt.errors import GeometryError
 from cdpr_rt.model.free_rotation_kernel import SWINGS_m
 from cdpr_rt.model.statics import PlatformStatics, view_of
 from cdpr_rt.platform.loop_design import STIFFNESS_SHARES
+from cdpr_tools.output import TableText
 
-_COLUMNS, _ROWS = 65, 23
+_COLUMNS, _ROWS = 59, 23
 _STIFFNESS_OFF = max(STIFFNESS_SHARES) - 1.0
 
 
@@ -157,7 +158,7 @@ def lines(s: Subject, figures: dict[str, Any]) -> list[str]:
         *_orientation_lines(platform),
         *_tension_lines(figures),
         "",
-        *_table(figures["axes"]),
+        _table(figures["axes"]),
         "",
         *_broken_lines(figures["axes"]),
         *_lowered_lines(figures),
@@ -186,70 +187,64 @@ def _orientation_lines(platform: Platform) -> list[str]:
 
 
 def _broken_lines(axes: Sequence[dict[str, Any]]) -> list[str]:
-    """Return a line for each cable: how far the platform moves at worst if the cable breaks."""
+    """Return a table of how far the platform moves at worst if a cable breaks."""
     if any("broken" not in axis for axis in axes):
         return []
-    lines = [
-        "if a cable breaks (predicted, at the worst of the corners, or of the targets nearest to "
-        f"them): how far it swings within {SWING_S:g} s, and how far",
-        "away and aside it is at most until the others have let it down to its ground:",
-    ]
+    turns = any(axis["broken"]["turn_rad"] > math.radians(1.0) for axis in axes)
+    titles = ["worst at, m", "swings, m", *["turns, deg"] * turns, "away, m", "aside, m"]
+    rows = [["cable breaks", *titles]]
     for axis in axes:
         broken = axis["broken"]
-        line = f"{axis['name']:16} at {point_text(broken['at_m'])} m it swings "
-        line += f"{broken['swing_m']:.2f} m"
-        if broken["turn_rad"] > math.radians(1.0):
-            line += f" and turns by {math.degrees(broken['turn_rad']):.0f} deg"
-        line += f"; {broken['away_m']:.2f} m away, {broken['aside_m']:.2f} m aside"
-        lines.append(line)
-    return lines
+        turned = [f"{math.degrees(broken['turn_rad']):.0f}"] * turns
+        lengths = [f"{broken[key]:.2f}" for key in ("swing_m", "away_m", "aside_m")]
+        rows.append([axis["name"], point_text(broken["at_m"]), lengths[0], *turned, *lengths[1:]])
+    return [
+        TableText(rows),
+        "Predicted for the worst of the corners, or of the targets nearest to them: the swing "
+        f"within {SWING_S:g} s, and the largest distances away and aside until the other cables "
+        "have lowered the platform to its ground.",
+    ]
 
 
 def _lowered_lines(figures: dict[str, Any]) -> list[str]:
-    """Return a line for each loss: how the platform is lowered in the worst case."""
+    """Return a table of how the platform is lowered in the worst case after a loss."""
     of_lengths = figures["lowered_after_lengths"]
     if of_lengths is None:
         return []
-    rows = [("no lengths", of_lengths)]
+    lost = [("all lengths", of_lengths)]
     for axis in figures["axes"]:
-        rows += [(f"{what} {axis['name']}", found) for what, found in axis["lowered_after"].items()]
-    lines = [
+        lost += [(f"{what} {axis['name']}", found) for what, found in axis["lowered_after"].items()]
+    rows = [["lost", "lowered at up to, m/s", "may hang at, m"]]
+    for name, found in lost:
+        hangs = f"{found['hangs_m']:.2f}" if found["hangs_m"] > 0.0 else "-"
+        rows.append([name, f"{found['fastest_m_s']:.2f}", hangs])
+    return [
         "",
-        "if a cable, a drive or the lengths are lost (predicted, at the worst corner, for winches "
-        f"that rub with up to {100.0 * FRICTIONS[-1]:.0f} %",
-        "of the rated torque): how fast the platform comes down, and whether it comes down at all:",
+        TableText(rows),
+        "Predicted for the worst corner and winches with a friction of up to "
+        f"{100.0 * FRICTIONS[-1]:.0f} % of the rated torque. If the platform may hang, friction "
+        "keeps it at this height above its stand, without power.",
     ]
-    for name, found in rows:
-        line = f"{name:24} up to {found['fastest_m_s']:.2f} m/s; "
-        if found["hangs_m"] > 0.0:
-            line += f"friction may keep it {found['hangs_m']:.2f} m above its stand, without power"
-        else:
-            line += "comes down"
-        lines.append(line)
-    return lines
 
 
 def _slip_lines(axes: Sequence[dict[str, Any]]) -> list[str]:
-    """Return a line for each cable: the effect of unnoticed slip, and the tension afterwards."""
-    lines = [
-        "if a cable slips at rest (predicted, at the worst of home and the same places): the "
-        "largest slip that the lengths do not show",
-        "(suddenly; slowly, and by how much the platform is off then), and the highest tension as "
-        "the cable is taut again:",
-    ]
+    """Return a table of the effect of a slip that is not noticed, and the tension afterwards."""
+    titles = ["sudden, mm", "slow, mm", "platform off, mm", "peak, N", "allowed, N"]
+    rows = [["cable slips", *titles]]
     for axis in axes:
         slip = axis["slip"]
         if slip["unnoticed_m"] is None:
-            seen = f"none is shown, {slip['off_per_m']:.2f} mm off for each mm"
+            seen = ["any", "any", f"{slip['off_per_m']:.2f} per mm"]
         else:
-            seen = f"{1e3 * slip['sudden_m']:.0f} mm; {1e3 * slip['unnoticed_m']:.0f} mm, "
-            seen += f"{1e3 * slip['off_m']:.0f} mm off"
-        peak = f"{slip['peak_N']:.0f} N"
-        if slip["allowed_N"] is not None:
-            above = slip["peak_N"] > slip["allowed_N"]
-            peak += f", more than the {slip['allowed_N']:g} N allowed" if above else ""
-        lines.append(f"{axis['name']:16} {seen}; {peak}")
-    return lines
+            seen = [f"{1e3 * slip[key]:.0f}" for key in ("sudden_m", "unnoticed_m", "off_m")]
+        most = "-" if slip["allowed_N"] is None else f"{slip['allowed_N']:g}"
+        rows.append([axis["name"], *seen, f"{slip['peak_N']:.0f}", most])
+    return [
+        TableText(rows),
+        "Predicted for rest at the worst of home and the same places: the largest slip that the "
+        "lengths do not show, if it is sudden or slow, and how far the platform is off then; and "
+        "the peak tension when the cable is taut again.",
+    ]
 
 
 def _tension_lines(figures: dict[str, Any]) -> list[str]:
@@ -258,10 +253,9 @@ def _tension_lines(figures: dict[str, Any]) -> list[str]:
     reserve, kept = figures["reserve_in_motion_N"], figures["kept_for_control_N"]
     least = "" if reserve is None or reserve < 0.0 else f" ({reserve:.0f} N at the worst place)"
     lines = [
-        f"tensions   hold the platform in {held} % of the box; targets are accepted in "
-        f"{taken} % of it,",
-        f"           where tensions in motion keep the {kept:.0f} N of the control from their "
-        f"limits{least}",
+        f"tensions   hold the platform in {held} % of the box; targets are accepted in {taken} % "
+        f"of it, where tensions in motion stay {kept:.0f} N away from their limits, for the "
+        f"control{least}",
     ]
     lowest = figures["lowest_resonance_Hz"]
     lines.append(
@@ -291,9 +285,9 @@ def _disagreement_line(allowed_m: float | None) -> str:
 def _loop_lines(loop: dict[str, float]) -> list[str]:
     slowest, fastest = loop["slowest_Hz"], loop["fastest_Hz"]
     lines = [
-        f"loop       the platform's modes at {slowest:.1f} to {fastest:.1f} Hz; with cables up to "
-        f"{_STIFFNESS_OFF:.0%} softer or stiffer",
-        f"           gain margin {loop['gain_margin']:.1f}, phase margin "
+        f"loop       moves the platform's modes at {slowest:.1f} to {fastest:.1f} Hz; with cables "
+        f"up to {_STIFFNESS_OFF:.0%} softer or stiffer it has a gain margin of "
+        f"{loop['gain_margin']:.1f} and a phase margin of "
         f"{math.degrees(loop['phase_margin_rad']):.0f} deg",
         f"           least damped of all that swings: {loop['least_damped_Hz']:.1f} Hz, damping "
         f"ratio {loop['least_damping_ratio']:.2g}",
@@ -310,9 +304,9 @@ def _free_rotation_lines(swings: dict[str, float] | None) -> list[str]:
         return []
     lines = [
         f"           and swings so at {swings['slowest_Hz']:.1f} to {swings['fastest_Hz']:.1f} Hz: "
-        f"a way at full speed leaves {math.degrees(swings['swing_rad']):.2f} deg,",
-        f"           its anchor points by {1e3 * swings['swing_m']:.1f} mm; friction and being "
-        "lifted set it swinging besides",
+        f"a move at full speed leaves {math.degrees(swings['swing_rad']):.2f} deg, its anchor "
+        f"points by {1e3 * swings['swing_m']:.1f} mm; friction and being lifted also set it "
+        "swinging",
     ]
     if swings["lasts_s"] > 0.0:
         lines.append(
@@ -321,19 +315,20 @@ def _free_rotation_lines(swings: dict[str, float] | None) -> list[str]:
     return lines
 
 
-def _table(axes: Sequence[dict[str, Any]]) -> list[str]:
-    coordinates = len(axes[0]["exit_point_m"])
-    a, b = 9 * coordinates, 10 * coordinates
-    rows = [f"{'cable, axis':19}{'exit point, m':>{a}}{'anchor point, m':>{b}}"]
-    rows[0] += f"{'cable, m':>16}{'tension, N':>14}{'torque, Nm':>16}"
+def _table(axes: Sequence[dict[str, Any]]) -> TableText:
+    titles = "exit point, m", "anchor point, m", "cable, m", "tension, N", "torque, Nm"
+    rows = [["cable, axis", *titles]]
     for number, axis in enumerate(axes, 1):
-        row = f"{number:>2} {axis['name']:16}{point_text(axis['exit_point_m']):>{a}}"
-        row += f"{point_text(axis['anchor_point_m'], 3):>{b}}"
-        cable = "{:.2f} to {:.2f}".format(*axis["cable_m"])
-        tension = "{:g} to {:g}".format(*axis["tension_N"])
-        torque = f"{axis['torque_at_most_Nm']:.3g} of {axis['torque_limit_Nm']:g}"
-        rows.append(row + f"{cable:>16}{tension:>14}{torque:>16}")
-    return rows
+        row = [
+            f"{number} {axis['name']}",
+            point_text(axis["exit_point_m"]),
+            point_text(axis["anchor_point_m"], 3),
+            "{:.2f} to {:.2f}".format(*axis["cable_m"]),
+            "{:g} to {:g}".format(*axis["tension_N"]),
+            f"{axis['torque_at_most_Nm']:.3g} of {axis['torque_limit_Nm']:g}",
+        ]
+        rows.append(row)
+    return TableText(rows)
 
 
 def _sketch(statics: PlatformStatics, platform: Platform) -> list[str]:
@@ -358,4 +353,5 @@ def _sketch(statics: PlatformStatics, platform: Platform) -> list[str]:
     put(platform.home_m, "o")
     legend = "1, 2 ... exit points   o at rest   # targets   . also held   "
     legend += "! targets that are not taken"
-    return ["".join(row).rstrip() for row in cells[::-1]] + [legend]
+    rows_shown = ["".join(row).rstrip() for row in cells[::-1]]
+    return ["\n".join(rows_shown).strip("\n"), legend]

@@ -79,9 +79,7 @@ def _table(sampler: TensionSampler, highest_N: float) -> Group:
         table.add_column(title, justify="right" if title in ("N", "age ms") else "left")
     for i, cable in enumerate(exchange.cables):
         valid = bool(feedback.valid[i])
-        bar = ProgressBar(
-            total=highest_N, completed=max(0.0, float(feedback.tension_N[i])), width=40
-        )
+        bar = ProgressBar(total=highest_N, completed=max(0.0, float(feedback.tension_N[i])))
         table.add_row(
             cable,
             f"{feedback.tension_N[i]:.1f}" if valid else "-",

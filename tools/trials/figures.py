@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-_TEXT, _VALUE = 68, 10
+from cdpr_tools.output import TableText
 
 
 @dataclass(frozen=True)
@@ -28,14 +28,13 @@ class Figure:
             return True
         return self.value >= self.limit if self.at_least else self.value <= self.limit
 
-    def line(self) -> str:
-        """Return the figure as a line of the table."""
-        shown = f"{self.text:{_TEXT}}{self.value:{_VALUE}.4g} {self.unit:6}"
+    def row(self) -> list[str]:
+        """Return the figure as a row of the table."""
+        shown = [self.text, f"{self.value:.4g}", self.unit]
         if self.limit is None:
-            return shown.rstrip()
+            return [*shown, "", ""]
         relation = "at least" if self.at_least else "at most"
-        verdict = "reached" if self.reached else "MISSED"
-        return f"{shown}wanted {relation} {self.limit:g}: {verdict}"
+        return [*shown, f"{relation} {self.limit:g}", "reached" if self.reached else "MISSED"]
 
     def as_table(self) -> dict[str, Any]:
         """Return the figure for JSON."""
@@ -46,6 +45,12 @@ class Figure:
             "wanted": None if self.limit is None else "at least" if self.at_least else "at most",
             "reached": self.reached,
         }
+
+
+def figures_table(figures: Sequence[Figure]) -> TableText:
+    """Return the figures as a table."""
+    rows = [["", "value", "unit", "wanted", ""], *(figure.row() for figure in figures)]
+    return TableText(rows, left=["unit", "wanted", ""])
 
 
 def all_reached(figures: Iterable[Figure]) -> bool:

@@ -21,7 +21,7 @@ from cdpr_tools.report.style import save_figure
 from cdpr_tools.robots.calibration_text import calibration_text
 from cdpr_tools.trials import limits, line, path, pictures, streaming, tape, targets
 from cdpr_tools.trials.directions import platform_of
-from cdpr_tools.trials.figures import Figure, all_reached
+from cdpr_tools.trials.figures import Figure, all_reached, figures_table
 from cdpr_tools.trials.recorded import Recorded
 from cdpr_tools.trials.run import TrialRun, trial_run
 
@@ -189,7 +189,7 @@ def judge(folder: Path) -> dict[str, Any]:
         "picture": str(folder / PICTURE),
         "lines": [
             *([] if calibration is None else [calibration_text(calibration)]),
-            *(figure.line() for figure in figures),
+            figures_table(figures),
             *(f"note: {text}" for text in dict.fromkeys(chain(*notices.values()))),
         ],
     }

@@ -54,7 +54,8 @@ def test_figures_print_a_line_for_each_row_and_target() -> None:
         {"fast": Target("how fast", 9.0, 10.0), "many": Target("how many", 9.0, 10.0, True)},
         more={"n": 4},
     )
-    title, columns, a, b, fast, many = figures.lines()
+    title, table, fast, many = figures.lines()
+    columns, a, b = table.splitlines()
     assert (title, columns.split(), a.split(), b.split()) == (
         "title", ["p50", "late"], ["a", "1.0"], ["b", "2.0", "3"],
     )  # fmt: skip

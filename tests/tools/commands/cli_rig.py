@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import re
 import subprocess
 import sys
 from pathlib import Path
@@ -46,9 +45,9 @@ def refused(status: int, *arguments: str | Path, stdin: str = "") -> str:
 
 
 def usage_error(*arguments: str) -> str:
-    """Run a command with wrong arguments. Return its error without the frame."""
+    """Run a command with wrong arguments and return its error."""
     result = cdpr_here(*arguments)
     assert result.returncode == 2, result.stderr
     assert result.stdout == ""
     assert "Traceback" not in result.stderr
-    return re.sub(r"[\s│╭╮╰╯─]+", " ", result.stderr)
+    return result.stderr

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
-from rich.table import Table
 
 from cdpr_profiles import load_robot
 from cdpr_tools.client.motion import Outcome, finish
@@ -55,16 +54,16 @@ def test_a_held_platform_tells_how_well_its_lengths_agree(
         "cycle": 1, "time_s": 0.1, "exchange_s": 0.0, "compute_s": 0.0, "missed": 0,
         "late_cycles": 0, "lengths_disagree_m": disagree_m,
     }  # fmt: skip
-    assert f"held by its cables{told}" in [str(line) for line in status_text(status).renderables]
+    assert f"held by its cables{told}" in [str(line) for line in status_text(status)]
 
 
 def test_the_calibration_in_force_is_shown_with_how_well_it_knows_positions() -> None:
-    shown = [str(line) for line in status_text(status_of()).renderables]
+    shown = [str(line) for line in status_text(status_of())]
     assert not any("calibration" in line for line in shown)
     known = calibration(load_robot("planar-4")).model_copy(
         update={"predicted_3_sigma_deg": 0.12, "absolute_3_sigma_mm": 14.6}
     )
-    shown = [str(line) for line in status_text(status_of(calibration=known.summary())).renderables]
+    shown = [str(line) for line in status_text(status_of(calibration=known.summary()))]
     (line,) = (line for line in shown if "calibration" in line)
     assert line.startswith(f"calibration 1 ({known.identity}) of 2026-03-04 05:06 UTC is in force")
     for figure in ("0.50 mm", "0.120 deg", "absolute positions are known to 14.6 mm", "3 sigma"):
@@ -77,7 +76,7 @@ def test_bus_counters_are_shown() -> None:
         "can0": {"url": "socketcan:can0", "state": "", "counts": {}},
         "can1": {"url": "socketcan:can1", "state": "bus-off: bus error", "counts": counts},
     }
-    lines = [str(line) for line in status_text(status_of(buses=buses)).renderables]
+    lines = [str(line) for line in status_text(status_of(buses=buses))]
     assert [line for line in lines if line.startswith("bus ")] == [
         "bus can1: transmit queue full 3 times, bus off 1 times; bus-off: bus error"
     ]
@@ -87,29 +86,29 @@ def test_of_a_loop_that_is_loaded_no_axes_are_shown_yet() -> None:
     """Their names are not known before; what is compiled meanwhile stands in the notices."""
     notices = ["compiling the control loop goes on: 20 kernels so far"]
     lines = status_text(status_of(state="starting", notices=notices, axes=[{"name": None}] * 3))
-    assert [str(line) for line in lines.renderables] == ["bench: starting", f"note: {notices[0]}"]
+    assert [str(line) for line in lines] == ["bench: starting", f"note: {notices[0]}"]
     shown = status_text(status_of(axes=[{"name": "left"}]))
-    assert isinstance(shown.renderables[-1], Table)
+    assert str(shown[-1]).startswith("axis ")
 
 
 def test_it_is_told_who_has_the_right_to_move() -> None:
     held = status_text(status_of(control={"held": True, "client": "hand"}))
-    assert "the right to move: hand" in [str(line) for line in held.renderables]
+    assert "the right to move: hand" in [str(line) for line in held]
 
 
 def test_cables_that_are_pulled_and_not_tight_are_not_called_loose() -> None:
     status = status_of(state="active", program="hold", program_progress={"tight": False})
     status["axes"] = [{"name": "left", "tension_N": N} for N in (0.4, 65.7)]
-    lines = [str(line) for line in status_text(status).renderables]
+    lines = [str(line) for line in status_text(status)]
     assert "cables not tight, pulled with up to 66 N, power on" in lines
     status["axes"][1]["tension_N"] = None
-    lines = [str(line) for line in status_text(status).renderables]
+    lines = [str(line) for line in status_text(status)]
     assert "cables loose, power on" in lines
 
 
 def test_of_a_platform_that_fell_it_is_told_what_comes_before_it_is_tightened() -> None:
     status = status_of(state="active", program="hold", program_progress={"tight": False})
-    assert "cables loose, power on" in [str(line) for line in status_text(status).renderables]
+    assert "cables loose, power on" in [str(line) for line in status_text(status)]
     status["program_progress"]["fallen"] = True
     home = "it has come down: look at it, then `cdpr tighten --from home` where it stands there, "
     for length_m, told in (
@@ -117,14 +116,14 @@ def test_of_a_platform_that_fell_it_is_told_what_comes_before_it_is_tightened() 
         (None, "upright"),  # lengths that were forgotten are refused
     ):
         status["axes"] = [{"name": "left", "cable_length_m": x} for x in (1.1, length_m)]
-        (line,) = (str(line) for line in status_text(status).renderables if "loose" in str(line))
+        (line,) = (str(line) for line in status_text(status) if "loose" in str(line))
         assert line.endswith(home + told)
 
 
 def test_a_part_that_does_not_work_is_reported_by_its_option() -> None:
     parts = {"live_view": {"error": "the live view ended: why"}, "stream": {"error": ""}}
     status = status_of(parts=parts)
-    lines = [str(line) for line in status_text(status).renderables]
+    lines = [str(line) for line in status_text(status)]
     assert "--live does not work: the live view ended: why" in lines
     assert not any("--stream" in line for line in lines)
 
@@ -166,7 +165,7 @@ def test_of_a_dead_loop_nothing_is_reported_as_if_it_were_known(
     reason = "the loop has died: killed by signal 9"
     status = status_of(state="dead", program="pose", reason=reason, program_progress=progress)
     status["loop"] = {"silent_s": 14.2}
-    lines = [str(line) for line in status_text(status | told).renderables[:-1]]
+    lines = [str(line) for line in status_text(status | told)[:-1]]
     assert lines[0].startswith("bench: dead") and "pose" not in lines[0]
     assert lines[1] == f"reason: {reason}"
     assert lines[2].startswith(power)
@@ -178,11 +177,11 @@ def test_of_a_dead_loop_nothing_is_reported_as_if_it_were_known(
 
 def test_a_loop_that_hangs_is_reported_before_all_that_is_of_the_time_before() -> None:
     status = status_of(program="hold") | {"driving": True, "loop": {"silent_s": 13.6}}
-    lines = [str(line) for line in status_text(status).renderables[:-1]]
+    lines = [str(line) for line in status_text(status)[:-1]]
     assert lines[1] == "the loop has not turned for 13.6 s: what follows is of then"
     assert lines[2].startswith("drives that had power stop without its heartbeat")
     # in lockstep the simulated drives' time stands with it
-    lines = [str(line) for line in status_text(status | {"lockstep": True}).renderables[:-1]]
+    lines = [str(line) for line in status_text(status | {"lockstep": True})[:-1]]
     assert lines[1].startswith("the loop has not turned")
     assert not any("stop without" in line for line in lines)
 
@@ -210,9 +209,9 @@ def test_a_platform_of_unknown_pose_is_not_told_to_be_taken_home() -> None:
 def test_a_path_is_left_until_its_end() -> None:
     path = {"name": "part.nc", "line": 7, "time_s": 5.0, "duration_s": 10.0}
     status = status_of(state="active", program="hold", program_progress={"path": path})
-    assert "path part.nc left at 50 %, line 7" in str(status_text(status).renderables[1])
+    assert "path part.nc left at 50 %, line 7" in str(status_text(status)[1])
     path["time_s"] = 10.0
-    assert not any("part.nc" in str(line) for line in status_text(status).renderables)
+    assert not any("part.nc" in str(line) for line in status_text(status))
 
 
 @pytest.mark.parametrize(

@@ -42,4 +42,4 @@ def test_it_is_said_whether_a_cable_that_slips_is_noticed() -> None:
         assert any(text in line for line in shown)
         slips = [axis["slip"] for axis in told["axes"]]
         assert all((slip["unnoticed_m"] is not None) is allowed for slip in slips)
-        assert any("none is shown" in line for line in shown) is not allowed
+        assert any(" per mm" in line for line in shown) is not allowed

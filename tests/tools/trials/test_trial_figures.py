@@ -23,7 +23,7 @@ def test_a_figure_is_reached_up_to_its_limit(value, at_least, reached):
     figure = Figure("key", "text", value, "mm", 1.0, at_least)
     assert figure.reached is reached
     assert all_reached([figure]) is reached
-    assert ("reached" in figure.line()) is reached
+    assert (figure.row()[-1] == "reached") is reached
 
 
 def test_errors_at_targets_are_those_at_the_end_of_the_stay():
