@@ -29,7 +29,7 @@ from cdpr_tools.client.refusals import DaemonRefusalError
 from cdpr_tools.errors import BadInputError, WorkFailedError
 from cdpr_tools.output import Output
 from tests.profiles.test_geometry_calibration import calibration
-from tests.tools.calibrate.test_daemon_pose import ROBOT, Told, kept_in, read
+from tests.tools.calibrate.test_daemon_pose import ROBOT, StandingDaemon, kept_in, read
 
 pytestmark = pytest.mark.usefixtures("daemon_time")
 
@@ -37,7 +37,7 @@ pytestmark = pytest.mark.usefixtures("daemon_time")
 PLACES = [(0.1, 1.5, 0.0), (0.2, 1.6, 0.05), (-0.1, 1.7, 0.0), (0.0, 1.4, -0.05)]
 
 
-class Moved(Told):
+class Moved(StandingDaemon):
     """A stand-in that moves its platform, except for places that are rejected, missed or faulty."""
 
     def __init__(self) -> None:
@@ -312,7 +312,7 @@ def test_a_check_requires_a_robot_that_runs_with_its_calibration(
 
 
 def test_a_check_does_not_overwrite_data_of_a_calibration(file: Robot, tmp_path: Path) -> None:
-    read(Told(), tmp_path)
+    read(StandingDaemon(), tmp_path)
     daemon = Calibrated(calibrated(file), 0.0)
     before = {path.name: path.read_bytes() for path in tmp_path.iterdir() if path.is_file()}
     with pytest.raises(BadInputError, match="has the poses of a calibration; allowed: another"):

@@ -1,4 +1,4 @@
-"""A commissioning's files, made up with known figures: no bus, no simulator."""
+"""Synthetic files of a commissioning with known figures, without bus or simulator."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ LATENCY_s = 2.8e-3
 
 
 class MadeUp:
-    """Writes recordings one after the other, as one device would, and the simulator's log."""
+    """Write recordings like those of one device, and the simulator's log."""
 
     def __init__(self, out: Path) -> None:
         self.paths = Paths(out)
@@ -47,7 +47,7 @@ class MadeUp:
         error: Callable[[np.ndarray], np.ndarray],
         effort: Callable[[np.ndarray], np.ndarray],
     ) -> Path:
-        """Write one pass; `error` and `effort` are given over the set-point from the index."""
+        """Write one pass with `error` and `effort` as functions of the set-point from the index."""
         move = what.move(np.array([INDEX_rad]))
         begin, end = what.measured()
         time_s = np.arange(round(what.duration_s() / PERIOD_s)) * PERIOD_s
@@ -89,7 +89,7 @@ class MadeUp:
         dtype = np.dtype([(name, kind) for name, kind in fields])
         records = np.zeros(self._truth[-1][0] + 1, dtype)
         records["sync_index"] = np.arange(records.size)
-        # the simulator counts from another of the index's turns than the drive happened to latch
+        # the simulator counts from a different turn of the index than the drive latched
         for sync, angle in self._truth:
             records["angle_from_index_rad"][sync] = angle - math.tau
         header = {"format": "cdpr-rt truth log 1", "record_bytes": dtype.itemsize, "fields": fields}
@@ -102,7 +102,7 @@ def cogging(angle: np.ndarray) -> np.ndarray:
 
 
 def harmonic_result() -> HarmonicResult:
-    """Return the model that the made-up motor has."""
+    """Return the model of the synthetic motor."""
     nothing = ConfidenceInterval(0.0, 1e-5)
     return HarmonicResult(
         harmonics=tuple(
@@ -137,7 +137,7 @@ def harmonic_result() -> HarmonicResult:
 
 @dataclasses.dataclass(frozen=True)
 class Commissioned:
-    """The files, what the bus run told, and what was identified."""
+    """The files, the results of the bus run, and the identified models."""
 
     paths: Paths
     run: dict[str, Any]
@@ -145,7 +145,7 @@ class Commissioned:
 
 
 def make_up(out: Path, both_ways: bool, bandwidths_Hz: tuple[float, ...]) -> Commissioned:
-    """Write the files of a commissioning with a default bandwidth of 8 Hz."""
+    """Write the files of a commissioning, with a default bandwidth of 8 Hz."""
     made = MadeUp(out)
     for number, sign in enumerate((1.0, -1.0)):
         slow = Pass(sign * math.radians(40.0), 0.3, math.tau)

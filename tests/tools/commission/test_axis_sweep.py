@@ -1,4 +1,4 @@
-"""What a motor is not swept for, told before anything has power; what a recording has to hold."""
+"""A sweep through a daemon is rejected before power is on, and its recording is checked."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ DRIVE = {
 
 
 class Told:
-    """A daemon that stands ready and records; `more` is what it tells otherwise."""
+    """A stand-in for a daemon that is ready and records. `more` changes its status."""
 
     def __init__(self, programs: list[str], **more: Any) -> None:
         self.description = {"programs": programs, "period_s": 0.002}
@@ -42,7 +42,7 @@ def swept(daemon: Told, name: str = "right", robot: str = "bench-2") -> SweptAxi
     return SweptAxis.of(daemon.description, daemon.status, name, load_robot(robot))
 
 
-def test_a_daemon_that_stands_ready_tells_what_is_to_be_known() -> None:
+def test_a_ready_daemon_provides_the_data_for_a_sweep() -> None:
     axis = swept(Told(PROGRAMS))
     assert (axis.place, axis.is_simulated, axis.identity["serial"]) == (1, True, 4)
 
@@ -57,12 +57,14 @@ def test_a_daemon_that_stands_ready_tells_what_is_to_be_known() -> None:
         (PROGRAMS, {"state": "fault"}, "is fault; allowed: ready"),
     ],
 )
-def test_why_a_motor_is_not_swept(programs: list[str], more: dict[str, Any], text: str) -> None:
+def test_a_sweep_is_rejected_with_the_reason(
+    programs: list[str], more: dict[str, Any], text: str
+) -> None:
     with pytest.raises(BadInputError, match=text):
         swept(Told(programs, **more))
 
 
-def test_a_recording_without_all_moves_is_refused(tmp_path: Path) -> None:
+def test_a_recording_without_all_moves_is_rejected(tmp_path: Path) -> None:
     axis = swept(Told(PROGRAMS))
     rows = np.zeros(100, cycle_dtype(2))
     rows["cycle"], rows["time_s"] = np.arange(100), np.arange(100) * 2e-3

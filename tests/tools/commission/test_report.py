@@ -1,4 +1,4 @@
-"""The report of a commissioning whose figures are known beforehand."""
+"""The report of a synthetic commissioning with known figures."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ FIGURES = ("rms_position_error_deg", "peak_pid_effort_Nm", "peak_velocity_error_
 
 
 class Page(HTMLParser):
-    """What a browser would have to load, and the numbers in each table."""
+    """The resources that a browser would load, and the numbers in each table."""
 
     def __init__(self, path: Path) -> None:
         super().__init__()
@@ -92,7 +92,7 @@ def page(commissioned: Commissioned, winch: Winch, results: dict[str, Any]) -> P
     return Page(commissioned.paths.page)
 
 
-def test_page_needs_nothing_beside_itself(page: Page) -> None:
+def test_the_page_loads_no_other_resource(page: Page) -> None:
     assert not {"script", "link", "iframe", "object", "base"} & set(page.tags)
     assert not page.links
     assert not re.search(r"https?://|url\(|@import|srcset", page.text)
@@ -104,10 +104,10 @@ def test_page_needs_nothing_beside_itself(page: Page) -> None:
     assert len(page.text) < 2_500_000
     assert 'name="viewport"' in page.text
     assert "@media print" in page.text
-    assert "a <drive> & more" in page.plain  # names are escaped, not taken for tags
+    assert "a <drive> & more" in page.plain  # names are escaped and not read as tags
 
 
-def test_table_holds_the_figures_of_the_json(commissioned: Commissioned, page: Page) -> None:
+def test_the_table_shows_the_figures_of_the_json(commissioned: Commissioned, page: Page) -> None:
     stored = json.loads(commissioned.paths.results.read_text())["validation"]
     assert not list(commissioned.paths.out.glob("*.part"))
     wanted = []
@@ -120,13 +120,13 @@ def test_table_holds_the_figures_of_the_json(commissioned: Commissioned, page: P
     assert page.tables[0] == wanted
     for value in wanted:
         assert f">{number(value)}</data>" in page.text
-    # and the figures are those the recordings were made with
+    # and the figures are those of the synthetic recordings
     assert wanted[0] == pytest.approx(4.0 / math.sqrt(2.0), rel=1e-3)
     assert stored["harmonic"]["ratios"]["rms_position_error"] == pytest.approx(20.0, rel=0.01)
     assert stored["thesis"]["ratios"]["peak_pid_effort"] == pytest.approx(8.0, rel=0.01)
 
 
-def test_encoder_table_differs_from_the_true_one(results: dict[str, Any], page: Page) -> None:
+def test_the_encoder_table_differs_from_the_true_one(results: dict[str, Any], page: Page) -> None:
     judged = results["validation"]["encoder"]
     table = next(one for one in page.tables[1:] if judged["none"][FIGURES[0]] in one)
     assert judged["harmonic"][FIGURES[2]] in table
@@ -142,10 +142,12 @@ def test_harmonics_and_margins_are_reported(results: dict[str, Any], page: Page)
     assert f"gain margin {number(design['gain_margin_dB'])} dB" in page.plain
     assert f"peak of the sensitivity {number(design['sensitivity_peak'])}" in page.plain
     assert "order 4 with 4.0 mNm is the largest part" in page.plain
-    assert "2.8 mNm rms come back at the same angle" in page.plain  # 4 mNm over the root of 2
+    assert (
+        "2.8 mNm rms come back at the same angle" in page.plain
+    )  # 4 mNm divided by the square root of 2
 
 
-def test_verdict_follows_the_targets(
+def test_the_verdict_follows_the_targets(
     commissioned: Commissioned, winch: Winch, results: dict[str, Any], tmp_path: Path
 ) -> None:
     paths = copy_of(commissioned, tmp_path)
@@ -170,15 +172,17 @@ def test_verdict_follows_the_targets(
     assert "falls short" not in told.plain
 
 
-def test_one_direction_and_one_bandwidth(quick: Commissioned, winch: Winch) -> None:
+def test_a_report_with_one_direction_and_one_bandwidth_says_so(
+    quick: Commissioned, winch: Winch
+) -> None:
     build(quick.paths, winch, assembled(quick), quick.found)
     told = Page(quick.paths.page)
     assert len(told.sources) == 9
     assert "one bandwidth only" in told.plain
-    assert "come back at the same angle" not in told.plain  # no turn before to compare with
+    assert "come back at the same angle" not in told.plain  # without an earlier turn for comparison
 
 
-def test_real_motor_is_judged_on_the_encoder(
+def test_a_real_motor_is_judged_by_its_encoder(
     quick: Commissioned, winch: Winch, tmp_path: Path
 ) -> None:
     paths = copy_of(quick, tmp_path)
@@ -207,7 +211,7 @@ def copy_of(made: Commissioned, folder: Path) -> Paths:
         (("validation", "floor", "peak_pid_effort_Nm"), "no validation.floor.peak_pid_effort_Nm"),
     ],
 )
-def test_incomplete_results_are_refused_by_name(
+def test_error_for_incomplete_results_names_the_missing_key(
     quick: Commissioned, winch: Winch, tmp_path: Path, keys: tuple[str, ...], told: str
 ) -> None:
     results = assembled(quick)
@@ -243,10 +247,10 @@ def test_missing_and_damaged_recordings_are_named(
 
 
 @given(st.floats(allow_nan=False, allow_infinity=False, width=32), st.integers(2, 5))
-def test_numbers_keep_their_digits(value: float, digits: int) -> None:
+def test_numbers_keep_their_significant_digits(value: float, digits: int) -> None:
     text = number(value, digits).replace("−", "-").replace("\u202f", "")
     assert float(text) == pytest.approx(value, rel=0.51 * 10.0 ** (1 - digits))
 
 
-def test_numbers_that_are_none() -> None:
+def test_missing_and_infinite_numbers_are_shown_as_a_dash() -> None:
     assert number(None) == number(math.inf) == number(np.nan) == "–"

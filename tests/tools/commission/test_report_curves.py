@@ -1,4 +1,4 @@
-"""What the report computes from recordings, against curves that are known."""
+"""Curves that the report computes from recordings agree with known ones."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def test_thinned_curves_keep_their_peaks(size: int, seed: int) -> None:
     assert few_y.min() == y.min()
 
 
-def test_curves_with_single_unknown_values_keep_their_extremes() -> None:
+def test_thinned_curves_with_single_nan_keep_their_extremes() -> None:
     x = np.arange(30_000.0)
     y = np.sin(x / 500.0)
     y[::7] = np.nan
@@ -55,7 +55,9 @@ def test_curves_with_single_unknown_values_keep_their_extremes() -> None:
     late_deg=st.tuples(st.floats(-3.0, 3.0), st.floats(-3.0, 3.0)),
     offset=st.floats(-0.1, 0.1),
 )
-def test_table_error_is_found(gain: float, late_deg: tuple[float, float], offset: float) -> None:
+def test_the_error_of_a_table_is_found(
+    gain: float, late_deg: tuple[float, float], offset: float
+) -> None:
     harmonic = harmonic_result()
     late = np.radians(late_deg)
     curve = gain * np.vstack(
@@ -74,13 +76,15 @@ def test_table_error_is_found(gain: float, late_deg: tuple[float, float], offset
 
 
 @pytest.mark.parametrize("order", [1, 4, 24, 72, 150])
-def test_filter_gain_is_that_of_the_thesis_filter(order: int) -> None:
+def test_filter_gain_equals_that_of_the_thesis_filter(order: int) -> None:
     wave = np.cos(order * ANGLE)
-    filtered = savgol_filter(wave, 51, 2, mode="wrap")  # 5 deg on this grid, both ends included
+    filtered = savgol_filter(
+        wave, 51, 2, mode="wrap"
+    )  # 5 degrees on this grid, including both ends
     assert curves.filter_gain(order) == pytest.approx(filtered[0], abs=1e-9)
 
 
-def test_friction_of_each_direction() -> None:
+def test_friction_is_found_for_each_direction() -> None:
     harmonic = harmonic_result()
     forward, backward = curves.friction_Nm(harmonic, 0.3)
     assert forward == pytest.approx(0.08 + 0.02 / math.e + 5e-4 * 0.3)
@@ -89,7 +93,7 @@ def test_friction_of_each_direction() -> None:
     assert curves.strongest_order(dataclasses.replace(harmonic, harmonics=())) == 1
 
 
-def test_ramp_is_read_as_it_was_recorded(tmp_path: Path) -> None:
+def test_a_ramp_is_read_as_recorded(tmp_path: Path) -> None:
     made = MadeUp(tmp_path)
     error = math.radians(0.5)
     path = made.record(
@@ -103,7 +107,7 @@ def test_ramp_is_read_as_it_was_recorded(tmp_path: Path) -> None:
     assert ramp.time_s.size * 2e-3 == pytest.approx(360.0 / 22.0, abs=0.01)
     assert np.abs(ramp.position_error_deg).max() == pytest.approx(0.5, rel=1e-3)
     assert np.abs(ramp.effort_Nm).max() == pytest.approx(0.01, rel=1e-2)
-    peak = 22.0 * error * ERROR_ORDER  # deg/s: the error's slope along the ramp
+    peak = 22.0 * error * ERROR_ORDER  # deg/s: slope of the error along the ramp
     assert np.abs(ramp.velocity_error_deg_s).max() == pytest.approx(peak, rel=1e-2)
     assert ramp.standing == 0.0
     on_encoder = curves.read_ramp(path, None)
@@ -111,7 +115,7 @@ def test_ramp_is_read_as_it_was_recorded(tmp_path: Path) -> None:
     assert not np.array_equal(on_encoder.position_error_deg, ramp.position_error_deg)
 
 
-def test_rotor_that_stands_still_is_seen(tmp_path: Path) -> None:
+def test_a_rotor_at_rest_is_detected(tmp_path: Path) -> None:
     made = MadeUp(tmp_path)
     step = math.radians(20.0)
     path = made.record("x-0", RAMP, lambda x: x - np.floor(x / step) * step, np.zeros_like)
@@ -123,7 +127,7 @@ def test_repeatable_and_random_parts_are_separated(tmp_path: Path) -> None:
     rng = np.random.default_rng(3)
 
     def effort(x: np.ndarray) -> np.ndarray:
-        # the second order turns its sign from one turn to the next, so it does not repeat
+        # the second order changes sign at each turn, so that it does not repeat
         sign = np.sign(np.sin(0.5 * x + 1e-9))
         noise = 1e-4 * rng.standard_normal(x.size)
         settling = 0.05 * np.exp(-np.abs(x) / 0.2)

@@ -1,4 +1,4 @@
-"""Which motors of a robot are commissioned."""
+"""The selection of motors to commission."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from cdpr_tools.commands.commission import chosen_axes
 from cdpr_tools.errors import BadInputError
 
 
-def test_motors_to_commission_are_named(tmp_path: Path) -> None:
+def test_motors_to_commission_are_selected_by_name(tmp_path: Path) -> None:
     robot = load_robot("planar-3")
     everything = chosen_axes(robot, (), True, tmp_path)
     assert [motor.winch.node_id for motor in everything] == [1, 2, 3]

@@ -1,4 +1,4 @@
-"""Pictures are there as a whole or not at all."""
+"""Pictures are written completely or not at all."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from cdpr_tools.report.save import save
 from cdpr_tools.report.style import save_figure
 
 
-def test_a_picture_replaces_the_one_before(tmp_path: Path) -> None:
+def test_a_picture_replaces_the_previous_one(tmp_path: Path) -> None:
     path = tmp_path / "it.png"
     save_figure(Figure((2.0, 2.0)), path)
     save_figure(Figure((1.0, 1.0)), path)
@@ -22,7 +22,7 @@ def test_a_picture_replaces_the_one_before(tmp_path: Path) -> None:
     assert [one.name for one in tmp_path.iterdir()] == ["it.png"]
 
 
-def test_a_full_disk_leaves_no_part_of_a_picture(tmp_path: Path) -> None:
+def test_a_full_disk_keeps_the_previous_picture(tmp_path: Path) -> None:
     path = tmp_path / "it.png"
     path.write_bytes(b"old, of cdpr-rt")
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
@@ -36,7 +36,7 @@ def test_a_full_disk_leaves_no_part_of_a_picture(tmp_path: Path) -> None:
     assert path.read_bytes() == b"old, of cdpr-rt"
 
 
-def test_a_picture_or_page_of_somebody_else_is_not_replaced(tmp_path: Path) -> None:
+def test_a_picture_or_page_of_the_user_is_not_replaced(tmp_path: Path) -> None:
     picture, report = tmp_path / "holiday.png", tmp_path / "report.html"
     picture.write_bytes(b"a beach")
     report.write_text("<title>Thesis</title>")

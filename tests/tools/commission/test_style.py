@@ -1,4 +1,4 @@
-"""Legends hide nothing of a picture."""
+"""Legends do not cover a picture."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from cdpr_tools.report.style import canvas, legend_above, legend_beside_title
 @pytest.mark.parametrize(
     ("words", "same_line"), [("way", True), ("way of the platform, and its target", False)]
 )
-def test_a_title_without_room_for_the_legend_goes_above_it(words: str, same_line: bool) -> None:
+def test_a_title_moves_above_the_legend_if_there_is_no_room(words: str, same_line: bool) -> None:
     figure, (ax, _) = canvas(1, 2)
     for name in ("upper left", "lower"):
         ax.plot([0.0, 1.0], label=name)
@@ -28,7 +28,7 @@ def test_a_title_without_room_for_the_legend_goes_above_it(words: str, same_line
 
 
 @pytest.mark.parametrize("names", ["abcdefgh", "abcdef", "abc"])
-def test_a_legend_is_read_row_by_row(names: str) -> None:
+def test_a_legend_is_ordered_row_by_row(names: str) -> None:
     figure, (ax,) = canvas(1, 1)
     for name in names:
         ax.plot([0.0, 1.0], label=name)

@@ -1,4 +1,4 @@
-"""Listening to a robot that another master runs: all it says is taken in, nothing is added."""
+"""A listener receives all feedback of a robot that another master runs, and sends nothing."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ AXES = (("left", 1), ("right", 1), ("left", 2), ("right", 2))
 
 
 class Witness:
-    """Everything that crosses one bus, kept until it is asked."""
+    """Record all frames on one bus."""
 
     def __init__(self, name: str) -> None:
         self.sock = connect(name)
@@ -41,7 +41,7 @@ class Witness:
             self.frames.append(packet)
 
     def close(self) -> None:
-        self.sock.send(b'{"status":true}  ')  # its answer comes after all that was said before
+        self.sock.send(b'{"status":true}  ')  # its answer follows all earlier frames
         self.thread.join()
         self.sock.close()
 
@@ -49,7 +49,7 @@ class Witness:
         return Counter(FRAME.unpack(frame)[0] for frame in self.frames)
 
     def positions(self, node: int) -> list[int]:
-        """Return 6064h of a node by cycle, from its first answer to SYNC."""
+        """Return 6064h of a node per cycle, from its first answer to SYNC."""
         heard = (FRAME.unpack(frame) for frame in self.frames)
         return [
             struct.unpack_from("<i", data, 2)[0] for can, _, data in heard if can == 0x180 + node
@@ -65,7 +65,7 @@ def listen(robot: Robot, url: str) -> ListeningDevice:
     return ListeningDevice(buses, robot.sync_period_s, PacedClock())
 
 
-def test_a_listener_hears_all_and_adds_nothing(tmp_path: Path) -> None:
+def test_a_listener_receives_all_feedback_and_sends_nothing(tmp_path: Path) -> None:
     robot = load_robot(robot_file(tmp_path, AXES))
     with simulated(robot.path) as url, ExitStack() as stack:
         witness = {
@@ -105,7 +105,7 @@ def test_a_listener_hears_all_and_adds_nothing(tmp_path: Path) -> None:
             counts = each.counts()
             assert counts[0x080] == group.feedback.cycle
             for i in robot.axes_on(name):
-                # as many commands as the master has sent, and those of its end
+                # the commands that the master sent, including those of its shutdown
                 assert transmits <= counts[0x200 + robot.axes[i].node_id] <= counts[0x080]
     assert len(rows) >= cycles
     for i, axis in enumerate(robot.axes):

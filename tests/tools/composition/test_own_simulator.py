@@ -1,4 +1,4 @@
-"""A simulator of a command's own: what is done while it starts, and where it does not."""
+"""A simulator that a command starts: work during its start, and a failed start."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from cdpr_tools.composition.simulator import OwnSimulator
 from tests.tools.robot_rig import unique
 
 
-def test_work_is_done_while_it_starts_and_not_after() -> None:
+def test_work_is_done_while_the_simulator_starts() -> None:
     done: list[str] = []
 
     class Noted(OwnSimulator):
@@ -33,9 +33,9 @@ def test_work_is_done_while_it_starts_and_not_after() -> None:
 
 
 def _command_lines() -> Iterator[str]:
-    """Yield those of all processes."""
+    """Yield the command lines of all processes."""
     for path in Path("/proc").glob("[0-9]*/cmdline"):
-        with suppress(OSError):  # it has ended meanwhile
+        with suppress(OSError):  # the process has ended meanwhile
             yield path.read_text()
 
 

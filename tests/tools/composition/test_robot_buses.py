@@ -1,4 +1,4 @@
-"""Which bus is which: the robot's file, --bus, and the simulator that opens them."""
+"""The buses of a robot: URLs in its file, --bus, and the simulator."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def urls(robot: Robot, *texts: str) -> dict[str, str]:
     return {name: str(url) for name, url in robot_urls(robot, texts).items()}
 
 
-def test_the_file_says_where_the_buses_are_unless_told_otherwise():
+def test_option_bus_overrides_the_urls_of_the_file():
     assert urls(SPATIAL) == {"can0": "socketcan:can0", "can1": "socketcan:can1"}
     assert urls(SPATIAL, "can1=slcan:/dev/ttyACM0?bitrate=1000000") == {
         "can0": "socketcan:can0",
@@ -33,14 +33,14 @@ def test_the_file_says_where_the_buses_are_unless_told_otherwise():
     }
 
 
-def test_one_simulated_name_stands_for_all_buses(without_urls: Robot):
+def test_one_simulated_name_gives_urls_of_all_buses(without_urls: Robot):
     assert urls(SPATIAL, "simbus:x") == {"can0": "simbus:x-can0", "can1": "simbus:x-can1"}
     assert urls(without_urls, "simbus:x") == {"left": "simbus:x-left", "right": "simbus:x-right"}
     assert starts_own_simulator(["simbus:"])
     assert not starts_own_simulator(["simbus:x"])
 
 
-def test_a_robot_on_one_bus_takes_one_url(tmp_path: Path):
+def test_a_robot_with_one_bus_takes_one_url(tmp_path: Path):
     robot = load_robot(robot_file(tmp_path, [("only", 1), ("only", 2)]))
     assert urls(robot, "socketcan:vcan0") == {"only": "socketcan:vcan0"}
 
@@ -58,7 +58,7 @@ def test_a_robot_on_one_bus_takes_one_url(tmp_path: Path):
         (("left=smoke:signals",), "unknown interface 'smoke'"),
     ],
 )
-def test_what_names_no_bus_is_refused(without_urls: Robot, texts: tuple[str, ...], reason: str):
+def test_invalid_bus_options_are_rejected(without_urls: Robot, texts: tuple[str, ...], reason: str):
     with pytest.raises(ConfigurationError) as caught:
         robot_urls(without_urls, texts)
     assert reason in str(caught.value)
@@ -86,7 +86,7 @@ def refused(*arguments: str) -> str:
     return done.stderr
 
 
-def test_the_simulator_refuses_what_cannot_be(tmp_path: Path):
+def test_the_simulator_rejects_impossible_robots_and_options(tmp_path: Path):
     tight = robot_file(tmp_path, [("b", node) for node in range(1, 9)])
     assert "8 drives need 1895 us" in refused(str(tight), "--bus", "simbus:x")
     assert "highest rate at 1000000 bit/s: 524 Hz" in refused(str(tight), "--bus", "simbus:x")

@@ -1,4 +1,4 @@
-"""A robot on two buses behind one safety I/O, seen on the physics board."""
+"""A robot on two buses with one safety I/O, checked on the physics board."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from tests.drivers.modbus.safety_rig import SafetyIoProcess, board_file, patient
 from tests.tools.robot_rig import OUT, hold, robot_file, simulated
 
 
-def test_the_emergency_stop_takes_the_torque_on_every_bus(
+def test_the_emergency_stop_removes_torque_on_each_bus(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))

@@ -35,7 +35,7 @@ EIGHT = load_robot("bench-8")
 
 @pytest.fixture(scope="module")
 def bus() -> Iterator[str]:
-    """Eight winches on two buses, simulated in lockstep."""
+    """Yield the bus of eight winches on two buses, simulated in lockstep."""
     with simulated("bench-8") as url:
         yield url
 
@@ -47,7 +47,7 @@ def session(bus: str) -> Iterator[Session]:
 
 
 def asked(session: Session, index: int) -> list[int]:
-    """Ask every drive itself, by SDO."""
+    """Read an object of each drive by SDO."""
     networks = session.machine.networks
     return [networks[axis.bus].read_int(axis.node_id, index) for axis in session.robot.axes]
 
@@ -60,13 +60,13 @@ def counts(session: Session) -> list[int]:
     return asked(session, 0x6064)
 
 
-def test_eight_drives_are_up_within_two_seconds_of_bus_time(bus: str):
+def test_eight_drives_boot_within_two_seconds_of_bus_time(bus: str):
     name = bus.removeprefix("simbus:")
     with open_robot(EIGHT, [bus], OUT) as opened:
         assert opened.boot_s < 2.0
         for of_bus, status in opened.bus_status().items():
             assert status["name"] == f"{name}-{of_bus}"
-            # what all frames so far, SDO included, take on a real wire at 1 Mbit/s
+            # the time of all frames so far, with SDO, on a real wire at 1 Mbit/s
             assert status["load"] * status["bus_time_s"] < 1.0
         assert [report.node_id for report in opened.machine.reports] == list(range(1, 9))
         opened.idle(0.01)
@@ -85,14 +85,14 @@ def test_all_axes_run_as_one_device(session: Session):
     assert device.feedback.time_s == pytest.approx(device.feedback.cycle * 1e-3)
     assert device.missed == 0
     session.disable()
-    # the drives themselves say that the axes are in the order of the file
+    # the drives confirm that the axes are in the order of the file
     turned = (np.array(counts(session)) - begin) * 2 * np.pi / 8192
     np.testing.assert_allclose(turned, 0.9 * speeds, atol=0.2)
-    # both buses saw every SYNC
+    # both buses carried each SYNC
     assert len({status["sync_count"] % 10**9 for status in session.bus_status().values()}) == 1
 
 
-def test_the_arrays_of_each_bus_are_slices_of_the_whole(session: Session):
+def test_the_arrays_of_each_bus_are_views_of_the_whole(session: Session):
     device = session.device
     for group, first in zip(device.groups, (0, 4), strict=True):
         for whole, part in (
@@ -136,12 +136,12 @@ def test_a_fault_on_one_bus_stops_the_axes_of_both(bus: str):
             hold(opened, 10.0)
         finally:
             (fault,) = opened.device.faults()
-            assert opened.device.faults()[0] is fault  # the same object in every cycle
+            assert opened.device.faults()[0] is fault  # the same object in each cycle
     with (
         pytest.raises(ControlError, match=r"^axis 6: the drive \(bus can1 node 6\) "),
         open_robot(EIGHT, [bus], OUT) as opened,
     ):
-        pytest.fail("opened with a drive in fault")
+        pytest.fail("the robot was opened with a drive in fault")
     with open_robot(EIGHT, [bus], OUT, reset=True) as opened:
         assert all(state in POWER_OFF for state in drive_states(opened))
         opened.enable()
@@ -149,7 +149,7 @@ def test_a_fault_on_one_bus_stops_the_axes_of_both(bus: str):
         opened.disable()
 
 
-def test_what_one_bus_refuses_enables_no_drive_of_the_other(session: Session):
+def test_a_mode_rejected_on_one_bus_enables_no_drive_on_the_other(session: Session):
     device = session.device
     device.groups[1].ask_mode(Mode.HOMING)
     session.idle(0.001)
@@ -175,7 +175,7 @@ def test_a_lost_bus_leaves_the_drives_of_the_other_without_power(tmp_path: Path)
         assert any("not known to be without power" in note for note in caught.value.__notes__)
         one = load_robot(robot_file(tmp_path, [("right", 1)]))
         with open_robot(one, buses[1:], OUT) as opened:
-            # it was switched off, not left to its own watch on the master
+            # the master switched it off, not its heartbeat timeout
             assert drive_states(opened) == [State.SWITCH_ON_DISABLED]
             assert opened.machine.networks["right"].read_int(1, 0x1003) == 0
     finally:
@@ -184,7 +184,7 @@ def test_a_lost_bus_leaves_the_drives_of_the_other_without_power(tmp_path: Path)
 
 
 @pytest.mark.alone
-def test_a_silent_bus_does_not_hold_up_switching_off_on_the_other(tmp_path: Path):
+def test_a_silent_bus_does_not_delay_switching_off_on_the_other(tmp_path: Path):
     robot = load_robot(robot_file(tmp_path, [("left", 1), ("right", 1)], period_s=0.01))
     left, right = (
         Simulator("winch-mpp0923d", "--bus", f"simbus:{unique()}", "--paced") for _ in range(2)
@@ -200,7 +200,7 @@ def test_a_silent_bus_does_not_hold_up_switching_off_on_the_other(tmp_path: Path
         one = load_robot(robot_file(tmp_path, [("right", 1)], period_s=0.01))
         with open_robot(one, buses[1:], OUT) as opened:
             assert drive_states(opened) == [State.SWITCH_ON_DISABLED]
-            # by the master: a drive that misses its heartbeat reports it and is in fault
+            # the master switched it off: a drive that misses the heartbeat would be in fault
             assert opened.machine.networks["right"].read_int(1, 0x1003) == 0
     finally:
         left.process.send_signal(signal.SIGCONT)
@@ -237,11 +237,11 @@ def test_a_drive_that_does_not_boot_is_named_with_its_bus(tmp_path: Path):
             pytest.raises(RobotBootError, match=r"on bus b: node 1 did not boot \(step N\)"),
             open_robot(load_robot(path), [url], OUT),
         ):
-            pytest.fail("opened without a drive")
+            pytest.fail("the robot was opened without a drive")
 
 
-def test_drives_of_different_makes_run_side_by_side(tmp_path: Path):
-    """Other torque units, signs, modes and PDO maps; the budget knows the frames of each."""
+def test_drives_of_different_makes_run_together(tmp_path: Path):
+    """Torque units, signs, modes and PDO maps differ. The budget knows the frames of each."""
     drives = ("generic-cia402", "mnm-profile-torque", "parker-compax3-canopen")
     path = robot_file(tmp_path, [("a", 1), ("a", 2), ("b", 1)], drives=drives)
     robot = load_robot(path)
@@ -280,7 +280,7 @@ def test_paced_buses_run_as_one_device(tmp_path: Path):
         opened.disable()
 
 
-def test_buses_that_keep_time_differently_are_refused(tmp_path: Path):
+def test_paced_and_lockstep_buses_together_are_rejected(tmp_path: Path):
     robot = load_robot(robot_file(tmp_path, [("left", 1), ("right", 1)]))
     with ExitStack() as stack:
         buses = [
@@ -291,7 +291,7 @@ def test_buses_that_keep_time_differently_are_refused(tmp_path: Path):
             stack.enter_context(open_robot(robot, buses, OUT))
 
 
-def test_a_robot_that_does_not_fit_is_refused_before_anything_is_opened():
+def test_a_robot_that_does_not_fit_its_bus_is_rejected_before_opening():
     fast: Robot = replace(EIGHT, sync_period_s=0.0009)
     with (
         pytest.raises(ConfigurationError, match=r"4 drives need 975 us .* has 900 us"),

@@ -1,7 +1,7 @@
-"""Run as a program: a launcher over stand-ins for its two processes, which do what a file says.
+"""Run as a program: a launcher whose two processes are stand-ins controlled by a file.
 
-The stand-ins speak as the real ones do through the shared memory, the socket and their exit
-status, and load within a fraction of a second. Who did what, in order, is in the file `log`.
+The stand-ins communicate like the real ones by shared memory, socket and exit status, and load
+within a fraction of a second. The file `log` lists their actions in order.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ def main(folder: Path) -> int:
     def ready(status: dict[str, object]) -> None:
         print(json.dumps({"ready": status}), flush=True)
 
-    if "no_service" in plan:  # as where the machine has no room for another process
+    if "no_service" in plan:  # as if the machine had no room for another process
 
         def child_but_no_service(module: str, *more: Any) -> child.Child:
             if module == launcher.SERVICE:
@@ -94,7 +94,7 @@ def _asked(number: signal.Signals) -> int:
 
 
 def loop() -> None:
-    """Write a status and turn until told to end, or do as the file `plan.json` says."""
+    """Write a status and turn until requested to end, or follow the file `plan.json`."""
     settings = RunSettings.from_argv()
     folder = Path(settings.robot)
     plan = json.loads((folder / "plan.json").read_text())
@@ -107,7 +107,9 @@ def loop() -> None:
     block.counters["loop_pid"] = os.getpid()
     if "refuse" in plan:
         sys.exit(plan["refuse"])
-    block.counters["loop_alive_ns"] = time.monotonic_ns()  # a test may stop it from here on
+    block.counters["loop_alive_ns"] = (
+        time.monotonic_ns()
+    )  # a test may stop the process from here on
     block.write_status(
         {"state": "ready", "reason": "", "driving": "stopping_s" in plan, **plan.get("status", {})}
     )
@@ -130,7 +132,7 @@ def loop() -> None:
 
 
 def service() -> None:
-    """Open the socket and wait to be told to end, or do as the file `plan.json` says."""
+    """Open the socket and wait for a request to end, or follow the file `plan.json`."""
     settings = RunSettings.from_argv()
     folder = Path(settings.robot)
     plan = json.loads((folder / "plan.json").read_text())

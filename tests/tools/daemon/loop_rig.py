@@ -1,4 +1,4 @@
-"""The daemon's loop in the test's own process, turned by the test, on simulated drives."""
+"""The daemon's loop in the test process, turned by the test, on simulated drives."""
 
 from __future__ import annotations
 
@@ -25,10 +25,10 @@ from cdpr_tools.composition.loop_parts import loop_parts
 
 
 class LoopRig:
-    """One loop on the buses of `url`, or of several; nothing moves unless the test turns it.
+    """A loop on the buses of one or several URLs, which only the test turns.
 
-    `programs` are run besides the daemon's own; the rest is for the machine. The right to move
-    is held from the beginning, by a clock that only the test moves.
+    `programs` are added to those of the daemon. Other arguments are for the machine. The right to
+    move is held from the beginning, with a clock that only the test advances.
     """
 
     def __init__(
@@ -52,12 +52,12 @@ class LoopRig:
         self._rows = RowReader(self.block)
 
     def boot(self) -> None:
-        """Do what the loop does by itself at its start."""
+        """Perform the steps of the loop's start."""
         self.loop.runner.begin(self.loop.transitions.start_up())
         self.turn_until(lambda: not self.loop.busy)
 
     def take_right(self) -> None:
-        """Take the right to move; orders are given with it from now on."""
+        """Take the right to move. Later commands use it."""
         self.token = self.lease.take("test", LONGEST_S)
         self.right = self.lease.renew(self.token).number
 
@@ -76,7 +76,7 @@ class LoopRig:
             self.loop.turn()
 
     def run(self, seconds: float) -> Row:
-        """Run cycles for `seconds` of bus time; return their rows."""
+        """Run cycles for `seconds` of bus time. Return their rows."""
         self.rows()
         self.turn(round(seconds / self.robot.sync_period_s))
         return self.rows()
@@ -101,12 +101,12 @@ class LoopRig:
         return answers[0]
 
     def obeyed(self, do: str, **what: Any) -> None:
-        """Post a command that is to be done."""
+        """Post a command that must succeed."""
         answer = self.command(do, **what)
         assert answer["ok"], answer
 
     def inject_fault(self, axis: int, sub: int, value: int) -> None:
-        """Have a drive do something on purpose (2F00h), told between two cycles."""
+        """Inject misbehaviour of a drive by 2F00h between two cycles."""
         where = self.robot.axes[axis]
         self.machine.networks[where.bus].write(where.node_id, 0x2F00, sub, value)
 

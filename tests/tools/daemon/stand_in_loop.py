@@ -1,4 +1,4 @@
-"""Run as a program: stands in for the daemon's loop process."""
+"""Run as a program: a stand-in for the daemon's loop process."""
 
 from __future__ import annotations
 

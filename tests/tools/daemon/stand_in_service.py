@@ -1,4 +1,4 @@
-"""Run as a program: stands in for the daemon's service process."""
+"""Run as a program: a stand-in for the daemon's service process."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a daemon's process does to its launcher."""
+"""A process of the daemon signals its launcher."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ time.sleep(60)
 """
 
 
-def test_a_launcher_is_signalled_while_it_runs_and_no_process_that_has_got_its_number() -> None:
+def test_only_the_running_launcher_is_signalled_and_no_process_with_its_pid() -> None:
     assert subprocess.run([sys.executable, "-c", PARENT], check=False).returncode == -signal.SIGTERM
     with subprocess.Popen(SLEEPS) as other:
         try:
@@ -26,4 +26,4 @@ def test_a_launcher_is_signalled_while_it_runs_and_no_process_that_has_got_its_n
             assert other.poll() is None
         finally:
             other.kill()
-    signal_launcher(other.pid, signal.SIGCONT)  # nobody has it, and that is no error
+    signal_launcher(other.pid, signal.SIGCONT)  # no process has this pid, which is not an error

@@ -1,4 +1,4 @@
-"""Commands to a robot that is being stopped, has stopped or ends badly: no success is told."""
+"""Commands to a robot that is stopping, has stopped or has failed report no false success."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ ACTIVE = {
 
 
 class Daemon:
-    """A daemon whose status follows from how often it was asked to end; None: nobody answers."""
+    """A stand-in whose status depends on the number of stop requests. None: no answer."""
 
     def __init__(
         self,
@@ -63,14 +63,14 @@ class Daemon:
 
 
 def ends(alive: bool, **status: str) -> Callable[[int], dict[str, Any] | None]:
-    """A daemon that ends once it is asked to; its drive is heard, or not."""
+    """Return the status of a daemon that ends on request, whose drive is `alive` or not."""
     told = {"axes": [{"name": "top", "alive": alive}], **status}
     return lambda asked: None if asked else told
 
 
 @pytest.fixture
 def run(monkeypatch: pytest.MonkeyPatch) -> Callable[..., Any]:
-    """Runs a command against a daemon; returns its result."""
+    """Return a function that runs a command with a daemon and returns the result."""
 
     def invoke(daemon: Daemon, *words: str) -> Any:
         @contextmanager
@@ -90,7 +90,7 @@ Run = Callable[..., Any]
 
 
 @pytest.mark.parametrize("command", ["ack", "enable"])
-def test_while_a_robot_is_being_stopped_it_is_told_why(run: Run, command: str) -> None:
+def test_commands_during_a_reaction_report_its_reason(run: Run, command: str) -> None:
     stopping = {"reacting": "controlled stop", "reason": "left: angle jumped"}
     error = run(Daemon(lambda _: stopping), command).exception
     assert isinstance(error, WorkFailedError)
@@ -104,7 +104,7 @@ def refusing(state: str) -> Daemon:
     return Daemon(lambda _: status, refusal=DaemonRefusalError.of(refusal))
 
 
-def test_in_fault_there_is_nothing_to_disable(run: Run) -> None:
+def test_disable_in_fault_succeeds_and_mentions_ack(run: Run) -> None:
     result = run(refusing("fault"), "disable", "--json")
     assert result.exit_code == 0, result.exception
     told = json.loads(result.stdout.splitlines()[-1])
@@ -112,7 +112,7 @@ def test_in_fault_there_is_nothing_to_disable(run: Run) -> None:
     assert "cdpr ack" in result.output
 
 
-def test_disabling_where_no_drive_has_booted_is_an_error(run: Run) -> None:
+def test_disable_without_booted_drives_is_an_error(run: Run) -> None:
     assert isinstance(run(refusing("unconfigured"), "disable").exception, DaemonRefusalError)
 
 
@@ -127,7 +127,7 @@ DIED = "the loop has died: killed by signal 9"
         (ends(True, state="dead", reason=DIED), 1, "ended; its loop had died: "),
     ],
 )
-def test_a_script_learns_what_is_known_of_the_power(
+def test_exit_status_of_stop_shows_whether_power_is_known_to_be_off(
     run: Run, status: Callable[[int], dict[str, Any] | None], exit_status: int, told: str
 ) -> None:
     ended = run(Daemon(status), "stop")
@@ -137,8 +137,8 @@ def test_a_script_learns_what_is_known_of_the_power(
     assert told in (str(error) if error else ended.output)
 
 
-def test_a_daemon_elsewhere_that_falls_silent_is_not_said_to_have_ended(run: Run) -> None:
-    for asked in (0, 1):  # also where nothing has answered from the beginning
+def test_stop_does_not_claim_that_a_silent_remote_daemon_has_ended(run: Run) -> None:
+    for asked in (0, 1):  # also if there was no answer from the beginning
         daemon = Daemon(ends(True))
         daemon.asked = asked
         ended = run(daemon, "stop", "--url", "http://elsewhere:8000")
@@ -148,9 +148,7 @@ def test_a_daemon_elsewhere_that_falls_silent_is_not_said_to_have_ended(run: Run
 
 
 @pytest.mark.parametrize("takes", [True, False])
-def test_a_loop_that_runs_on_without_a_service_is_waited_for(
-    run: Run, tmp_path: Path, takes: bool
-) -> None:
+def test_stop_waits_for_a_loop_without_service(run: Run, tmp_path: Path, takes: bool) -> None:
     with subprocess.Popen([sys.executable, "-c", LOOP], stdout=subprocess.PIPE) as loop:
         assert loop.stdout is not None
         loop.stdout.readline()
@@ -173,7 +171,7 @@ def test_a_loop_that_runs_on_without_a_service_is_waited_for(
     assert told in ended.output
 
 
-def test_a_loop_that_dies_while_it_ends_keeps_nobody_waiting(run: Run) -> None:
+def test_stop_does_not_wait_for_a_loop_that_dies_while_ending(run: Run) -> None:
     def dies(asked: int) -> dict[str, Any] | None:
         axes = [{"name": "top", "alive": False}]
         state = ("fault", "dead", None)[asked]
@@ -184,7 +182,7 @@ def test_a_loop_that_dies_while_it_ends_keeps_nobody_waiting(run: Run) -> None:
     assert str(error) == "stopped; unheard, and not known to be without power: top; it died"
 
 
-def test_a_loop_that_is_seen_to_have_ended_as_asked_is_no_failure(
+def test_a_loop_that_ends_before_its_service_is_a_successful_stop(
     run: Run, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     states = iter(["active", "active", "dead", "dead"])
@@ -203,7 +201,7 @@ def test_a_loop_that_is_seen_to_have_ended_as_asked_is_no_failure(
 
 
 @pytest.mark.long
-def test_a_launcher_that_hangs_is_named_with_what_is_known_of_the_power(
+def test_a_hanging_launcher_is_reported_with_the_state_of_the_power(
     run: Run, tmp_path: Path
 ) -> None:
     control = tmp_path / "control.sock"
@@ -219,7 +217,7 @@ def test_a_launcher_that_hangs_is_named_with_what_is_known_of_the_power(
 
 
 class UnheldDaemon:
-    """A daemon whose service does not take a hold any more. A stand-in: a real one always does."""
+    """A stand-in for a daemon whose service rejects holds. A real one always accepts them."""
 
     where = "nowhere"
 

@@ -1,4 +1,4 @@
-"""What is known of a robot's motors is cancelled under the daemon's control, once it may be."""
+"""The daemon compensates cogging and friction of commissioned motors."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ SPEED_m_s = 0.01
 _Compensated = tuple[LockstepRobot, np.ndarray, tuple[float, float]]
 FADE_IN_CYCLES = 200
 MOST_Nm = 0.25
-"""More than cogging and friction of these motors ever are together."""
+"""An upper bound of cogging plus friction of these motors."""
 SMOOTH = """
 [cables]
 creep_shares = [0.0, 0.0]
@@ -42,7 +42,7 @@ interpolation_error = 0.0
 [motor.drive]
 feedback_jitter_s = 0.0
 """
-"""Nothing that a motor's profile has no term for."""
+"""A plant with only the effects that a motor's profile can describe."""
 WORSE = """
 seed = 3
 [cables]
@@ -69,20 +69,20 @@ twelfth = 0.005
 eccentricity_rad = 3e-4
 interpolation_error = 0.04
 """
-"""More of all that a motor has, known to its profile or not, on cables that rub."""
+"""A plant with larger effects, also ones outside the profile, and with cable friction."""
 
 
 @dataclass(frozen=True)
 class Wanted:
-    """A plant, and what compensation is to do on it."""
+    """A plant and the required effect of compensation."""
 
     plant: str
     friction_share: tuple[float, float]
-    """What is added for friction, of the true one of the motor without tension."""
+    """Share of the motor's true friction without tension that is compensated."""
     evener: float
-    """By how much more evenly the platform moves, at least."""
+    """Least factor by which the motion becomes smoother."""
     better_known: float
-    """By how much better it is known where it stands."""
+    """Least factor by which the known position becomes more accurate."""
     mistaken_mm: float
 
 
@@ -114,9 +114,9 @@ def learnt(plant: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def _wandering_mm(robot: LockstepRobot) -> tuple[float, float]:
-    """Return how far the platform truly leaves an even motion, root mean square about the mean.
+    """Return the deviation from uniform motion and the mean error of the estimated position.
 
-    And how far on average it is from where the control takes it to be.
+    The deviation is the root mean square of the true position about its mean.
     """
     robot.carry_out("pose", position_m=[0.0, 1.5])
     robot.run(1.0)
@@ -143,13 +143,13 @@ def compensated(plant: Path, learnt: Path) -> Iterator[_Compensated]:
         yield robot, begun, _wandering_mm(robot)
 
 
-def test_nothing_is_compensated_before_an_index_is_known_and_then_it_fades_in(
+def test_compensation_fades_in_after_the_index_is_known(
     compensated: _Compensated,
 ) -> None:
     _, begun, _ = compensated
     known, torque = begun["index_known"], np.abs(begun["compensation_Nm"])
     assert not known[0].any()
-    assert known[-1].all()  # tightening looks for them
+    assert known[-1].all()  # tightening searches for the indices
     for axis in range(3):
         first = int(np.argmax(known[:, axis]))
         assert torque[:first, axis].max() == 0.0
@@ -158,7 +158,7 @@ def test_nothing_is_compensated_before_an_index_is_known_and_then_it_fades_in(
     assert torque.max() > 0.04
 
 
-def test_each_motor_is_compensated_at_its_own_angle(
+def test_each_motor_is_compensated_at_its_angle(
     compensated: _Compensated,
     plant: Path,
     wanted: Wanted,
@@ -171,13 +171,13 @@ def test_each_motor_is_compensated_at_its_own_angle(
     least, most = wanted.friction_share
     for axis, motor in enumerate(_motors(plant)):
         cogging = cogging_Nm(motor, angle[:, axis])
-        assert np.ptp(cogging) > 0.04  # it turns far enough to tell
+        assert np.ptp(cogging) > 0.04  # it turns far enough for the comparison
         friction = rows["compensation_Nm"][:, axis] - cogging
         assert np.ptp(friction) < 0.25 * np.ptp(cogging)
         assert least < np.abs(friction).mean() / motor.friction.coulomb_Nm < most
 
 
-def test_the_platform_moves_more_evenly_and_from_where_it_truly_stood(
+def test_compensation_smooths_motion_and_improves_the_known_position(
     compensated: _Compensated,
     plant: Path,
     wanted: Wanted,
@@ -188,14 +188,14 @@ def test_the_platform_moves_more_evenly_and_from_where_it_truly_stood(
         without_mm, mistaken_mm = _wandering_mm(robot)
     with_mm, still_mistaken_mm = compensated[2]
     assert without_mm > wanted.evener * with_mm, (without_mm, with_mm)
-    # cogging is in the torques under which the cables' lengths were taken
+    # cogging is part of the torques at which cable lengths were determined
     assert mistaken_mm > wanted.better_known * still_mistaken_mm, (mistaken_mm, still_mistaken_mm)
     assert still_mistaken_mm < wanted.mistaken_mm
 
 
 @pytest.fixture(scope="module")
 def pair(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Path, str]]:
-    """Two motors that have been commissioned, with nothing on them."""
+    """Yield two commissioned motors without load."""
     folder = tmp_path_factory.mktemp("pair")
     path = robot_file(folder, [("can0", 1), ("can0", 2)], period_s=2e-3)
     leave_profiles(load_robot(path), [Plant()] * 2, folder)
@@ -208,7 +208,7 @@ def pair(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Path, str]]
         yield path, url
 
 
-def test_a_drive_that_restarted_has_its_index_to_find_again(pair: tuple[Path, str]) -> None:
+def test_a_restarted_drive_must_find_its_index_again(pair: tuple[Path, str]) -> None:
     jog = {"velocity_rad_s": [8.0, 8.0], "timeout_s": 2.0}
     with opened(*pair) as rig:
         for _ in range(2):
@@ -225,7 +225,7 @@ def test_a_drive_that_restarted_has_its_index_to_find_again(pair: tuple[Path, st
             rig.obeyed("acknowledge")
 
 
-def test_the_profile_of_another_drive_keeps_the_robot_from_starting(
+def test_the_profile_of_another_drive_prevents_the_start(
     pair: tuple[Path, str],
 ) -> None:
     path, url = pair

@@ -56,7 +56,7 @@ def ready(rig: LoopRig) -> Iterator[LoopRig]:
 
 @pytest.fixture
 def jogging(ready: LoopRig) -> LoopRig:
-    """Both axes at 2 rad/s."""
+    """Return a loop that moves both axes at 2 rad/s."""
     ready.obeyed("enable")
     ready.obeyed("program", program="jog", wanted=JOG)
     ready.run(0.4)
@@ -77,11 +77,11 @@ def drive_states(rows: Row) -> set[State]:
 
 
 def controlwords(log: BusLog, node: int) -> list[tuple[int, int]]:
-    """Cycle and controlword of each command to a drive."""
+    """Return cycle and controlword of each command to a drive."""
     return [(f.cycle, struct.unpack_from("<H", f.data)[0]) for f in log.of(0x200 + node)]
 
 
-def test_it_stands_ready_without_power_and_says_what_it_runs(ready: LoopRig) -> None:
+def test_the_loop_is_ready_without_power_after_its_start(ready: LoopRig) -> None:
     rows = ready.run(0.5)
     assert drive_states(rows) <= {State.SWITCH_ON_DISABLED, State.READY}
     assert np.all(rows["state"] == LoopState.READY)
@@ -95,7 +95,7 @@ def test_it_stands_ready_without_power_and_says_what_it_runs(ready: LoopRig) -> 
     assert status["lockstep"] is True
 
 
-def test_enabling_holds_and_disabling_takes_the_power(ready: LoopRig) -> None:
+def test_enable_holds_and_disable_cuts_power(ready: LoopRig) -> None:
     ready.obeyed("enable")
     rows = ready.run(0.5)
     assert drive_states(rows) == {State.OPERATION_ENABLED}
@@ -110,7 +110,7 @@ def test_enabling_holds_and_disabling_takes_the_power(ready: LoopRig) -> None:
     assert np.all(rows["torque_sent_Nm"] == 0.0)
 
 
-def test_who_does_not_hold_the_right_to_move_moves_nothing(ready: LoopRig) -> None:
+def test_enable_without_the_right_to_move_is_rejected(ready: LoopRig) -> None:
     ready.drop_right()
     try:
         for order in ({"do": "enable"}, {"do": "enable", "program": "jog"}):
@@ -122,7 +122,7 @@ def test_who_does_not_hold_the_right_to_move_moves_nothing(ready: LoopRig) -> No
         ready.take_right()
 
 
-def test_a_lease_that_runs_out_in_motion_ends_in_a_hold(jogging: LoopRig) -> None:
+def test_a_lease_that_expires_in_motion_ends_with_a_hold(jogging: LoopRig) -> None:
     try:
         jogging.drop_right()
         rows = jogging.run(1.0)
@@ -131,13 +131,13 @@ def test_a_lease_that_runs_out_in_motion_ends_in_a_hold(jogging: LoopRig) -> Non
         assert status["program"] == "hold"
         assert "right to move" in status["reason"]
         assert rows["setpoint_velocity_rad_s"][-1] == pytest.approx([0.0, 0.0])
-        jogging.obeyed("hold")  # anybody may
+        jogging.obeyed("hold")  # allowed without the right
         assert not jogging.command("set", wanted={})["ok"]
     finally:
         jogging.take_right()
 
 
-def test_programs_follow_each_other_without_a_bump(ready: LoopRig) -> None:
+def test_program_changes_cause_no_step(ready: LoopRig) -> None:
     ready.obeyed("enable")
     ready.run(0.2)
     ready.rows()
@@ -162,7 +162,7 @@ def test_programs_follow_each_other_without_a_bump(ready: LoopRig) -> None:
     assert np.max(step[switched]) < 0.5
 
 
-def test_no_cycle_has_two_commands_whatever_happens(ready: LoopRig) -> None:
+def test_each_cycle_has_exactly_one_command_per_drive(ready: LoopRig) -> None:
     with log_of(ready) as log:
         ready.obeyed("enable")
         ready.obeyed("program", program="jog", wanted=JOG)
@@ -179,27 +179,27 @@ def test_no_cycle_has_two_commands_whatever_happens(ready: LoopRig) -> None:
         assert set(each.values()) == {1}
 
 
-def test_an_emergency_stop_takes_the_power_in_the_next_cycle_and_latches(jogging: LoopRig) -> None:
+def test_an_emergency_stop_cuts_power_in_the_next_cycle_and_latches(jogging: LoopRig) -> None:
     with log_of(jogging) as log:
         jogging.loop.request_power_off()
         jogging.turn(2)
         assert not jogging.loop.engine.driving
     words = [word for _, word in controlwords(log, 1)]
-    assert words[-1] & 0x0F == 0  # disable voltage, no quick stop and no braking before
+    assert words[-1] & 0x0F == 0  # "disable voltage", without quick stop or braking before
     jogging.turn_until(lambda: jogging.state is LoopState.FAULT and not jogging.loop.busy)
     assert jogging.status["reason"] == "emergency stop by cdpr estop"
     assert not jogging.command("enable")["ok"]
     jogging.obeyed("acknowledge")
 
 
-def test_an_emergency_stop_without_power_latches_once_and_for_all_states(ready: LoopRig) -> None:
+def test_an_emergency_stop_without_power_latches_in_each_state(ready: LoopRig) -> None:
     ready.loop.request_power_off()
     ready.turn_until(lambda: ready.state is LoopState.FAULT and not ready.loop.busy)
-    ready.loop.request_power_off()  # it is latched already
+    ready.loop.request_power_off()  # already latched
     ready.turn(5)
     number = ready.block.post_command({"do": "acknowledge", "client": "test"})
     ready.turn(1)
-    ready.loop.request_power_off()  # while it is being acknowledged
+    ready.loop.request_power_off()  # during the acknowledgement
     ready.turn_until(lambda: ready.block.take_reply() is not None)
     ready.turn_until(lambda: ready.state is LoopState.FAULT and not ready.loop.busy)
     assert ready.status["reason"] == "emergency stop by cdpr estop"
@@ -207,7 +207,7 @@ def test_an_emergency_stop_without_power_latches_once_and_for_all_states(ready: 
     ready.obeyed("acknowledge")
 
 
-def test_a_drive_in_fault_quick_stops_the_others_and_latches(jogging: LoopRig) -> None:
+def test_a_drive_fault_quick_stops_the_other_drives_and_latches(jogging: LoopRig) -> None:
     with log_of(jogging) as log:
         jogging.inject_fault(0, FAULT_CODE, 0x7305)
         jogging.rows()
@@ -218,7 +218,7 @@ def test_a_drive_in_fault_quick_stops_the_others_and_latches(jogging: LoopRig) -
     assert stopped <= fault + 2
     rows = jogging.rows()
     assert State.QUICK_STOP in drive_states(rows)
-    # the healthy one came to a stand by its own ramp, under power, not by coasting
+    # the healthy drive stopped under power along its ramp, without coasting
     velocity = rows["velocity_rad_s"][:, 1]
     assert abs(velocity[-1]) < 1.0
     status = jogging.status
@@ -237,11 +237,11 @@ def test_a_drive_in_fault_quick_stops_the_others_and_latches(jogging: LoopRig) -
     jogging.obeyed("enable")
 
 
-def test_a_drive_that_falls_silent_is_booted_again(jogging: LoopRig) -> None:
+def test_a_silent_drive_is_booted_again_on_acknowledge(jogging: LoopRig) -> None:
     jogging.inject_fault(1, SILENT_MS, 100)
     jogging.turn_until(lambda: jogging.state is LoopState.FAULT)
     assert "node 2" in jogging.status["reason"]
-    jogging.run(0.1)  # until it is heard again
+    jogging.run(0.1)  # until it answers again
     jogging.turn_until(lambda: not jogging.loop.busy)
     cycle = jogging.loop.engine.cycle
     jogging.obeyed("acknowledge")
@@ -268,14 +268,16 @@ def test_a_request_to_end_brakes_within_the_acceleration_limit(lab: tuple[Path, 
         assert [word for _, word in controlwords(log, 1)][-1] & 0x0F == 0
 
 
-def test_nothing_that_is_posted_crashes_the_loop_or_gives_power(ready: LoopRig) -> None:
+def test_arbitrary_commands_neither_crash_the_loop_nor_give_power(ready: LoopRig) -> None:
     @settings(
         max_examples=4,
         suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow],
     )
     @given(st.lists(st.dictionaries(KEYS, JUNK, min_size=1), min_size=30, max_size=30))
     def post(orders: list[dict[str, Any]]) -> None:
-        if ready.state is LoopState.FAULT:  # the drives have missed us while these were made up
+        if (
+            ready.state is LoopState.FAULT
+        ):  # the drives missed the master while examples were generated
             ready.obeyed("acknowledge")
         for order in orders:
             what = {key: value for key, value in order.items() if key != "do"}
@@ -290,7 +292,7 @@ def test_nothing_that_is_posted_crashes_the_loop_or_gives_power(ready: LoopRig) 
     post()
 
 
-def test_a_refusal_says_by_a_code_and_figures_what_is_in_the_way(ready: LoopRig) -> None:
+def test_a_rejection_has_a_code_and_figures(ready: LoopRig) -> None:
     answer = ready.command("program", program="jog", wanted=JOG)
     assert answer["text"] == "jog: not in state ready; allowed in active"
     assert answer["refusal"] == {
@@ -310,7 +312,7 @@ def test_a_refusal_says_by_a_code_and_figures_what_is_in_the_way(ready: LoopRig)
     assert not answer["ok"] and "refusal" not in answer
 
 
-def test_a_command_that_is_no_command_is_left_aside(ready: LoopRig) -> None:
+def test_invalid_commands_are_ignored(ready: LoopRig) -> None:
     block = ready.block
     for data in (b"{", b"\xff\xfe", b"[" * 4000, b"7", b'"enable"', b"null"):
         number = int(block.counters["commands"][0])
@@ -323,7 +325,7 @@ def test_a_command_that_is_no_command_is_left_aside(ready: LoopRig) -> None:
     assert ready.command("set", wanted={})["ok"] is False
 
 
-def test_status_is_plain_json_that_a_service_can_read(ready: LoopRig) -> None:
+def test_status_is_plain_json(ready: LoopRig) -> None:
     ready.obeyed("enable")
     ready.run(1.2)
     status = ready.status
@@ -344,7 +346,7 @@ JUNK = st.recursive(
 )
 
 
-def test_nothing_that_is_allocated_in_a_cycle_stays(ready: LoopRig) -> None:
+def test_cycles_keep_no_allocated_memory(ready: LoopRig) -> None:
     ready.obeyed("enable", program="jog", wanted=JOG)
     ready.turn(500)
     gc.collect()
@@ -356,6 +358,6 @@ def test_nothing_that_is_allocated_in_a_cycle_stays(ready: LoopRig) -> None:
         after, peak = tracemalloc.get_traced_memory()
     finally:
         tracemalloc.stop()
-    assert after - before < 16_384  # the status as it was written last
+    assert after - before < 16_384  # the last written status
     assert peak - before < 65_536
-    assert gc.collect() == 0  # so that the collector may stay off
+    assert gc.collect() == 0  # no garbage, so that the collector may stay off

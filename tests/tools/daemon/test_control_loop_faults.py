@@ -1,4 +1,4 @@
-"""Faults that stay, or that end: a deaf drive, a lost bus, a program that fails."""
+"""Permanent and temporary faults: a deaf drive, a lost bus, a failing program."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def lab(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Path, str]]:
         yield path, url
 
 
-def test_a_drive_that_stays_deaf_keeps_the_fault(lab: tuple[Path, str]) -> None:
+def test_a_deaf_drive_keeps_the_fault(lab: tuple[Path, str]) -> None:
     with simulated(lab[0]) as url, opened(lab[0], url) as rig:
         rig.inject_fault(1, SILENT_MS, 65535)
         rig.turn_until(lambda: rig.state is LoopState.FAULT)
@@ -40,7 +40,7 @@ def test_a_drive_that_stays_deaf_keeps_the_fault(lab: tuple[Path, str]) -> None:
         assert "axis 2: the drive (bus can0 node 2)" in rig.status["reason"]
 
 
-def test_a_bus_that_is_gone_and_comes_back(lab: tuple[Path, str]) -> None:
+def test_a_bus_that_returns_can_be_acknowledged(lab: tuple[Path, str]) -> None:
     name = unique()
     simulator = Simulator(str(lab[0]), "--bus", f"simbus:{name}")
     with opened(lab[0], f"simbus:{name}") as rig:
@@ -61,7 +61,7 @@ def test_a_bus_that_is_gone_and_comes_back(lab: tuple[Path, str]) -> None:
             rig.obeyed("disable")
 
 
-def test_a_program_that_fails_stops_the_drives_and_not_the_loop(lab: tuple[Path, str]) -> None:
+def test_a_failing_program_stops_the_drives_but_not_the_loop(lab: tuple[Path, str]) -> None:
     class Failing(IdleProgram):
         name = "failing"
 
@@ -81,7 +81,9 @@ def test_a_program_that_fails_stops_the_drives_and_not_the_loop(lab: tuple[Path,
         rig.obeyed("enable")
 
 
-def test_why_a_program_failed_is_reported_until_another_moves(lab: tuple[Path, str]) -> None:
+def test_the_failure_of_a_program_is_reported_until_another_program_moves(
+    lab: tuple[Path, str],
+) -> None:
     class Stuck(IdleProgram):
         name = "stuck"
         done = 0.0
@@ -99,12 +101,12 @@ def test_why_a_program_failed_is_reported_until_another_moves(lab: tuple[Path, s
         rig.obeyed("hold")
         rig.turn_until(lambda: rig.status["program"] == "hold")
         assert rig.status["failure"] == "stuck: no way on"
-        stuck.done = 1.0  # it has come to its end, with a remark
+        stuck.done = 1.0  # it is complete, with a remark
         rig.obeyed("program", program="stuck")
         assert rig.status["failure"] == ""
 
 
-# Drives that are in fault when the loop begins or checks.
+# Drives in fault when the loop starts or checks.
 
 FAULT_CODE = 1
 JOG = {"velocity_rad_s": [2.0, 2.0], "timeout_s": 2.0}
@@ -114,12 +116,14 @@ def unpowered(rig: LoopRig) -> bool:
     return all(state in POWER_OFF for state in rig.machine._booted.states())
 
 
-def test_a_loop_that_begins_with_a_drive_in_fault(lab: tuple[Path, str]) -> None:
+def test_a_loop_that_starts_with_a_drive_in_fault_is_inactive_until_checked(
+    lab: tuple[Path, str],
+) -> None:
     with opened(*lab) as rig:
         rig.inject_fault(0, FAULT_CODE, 0x7305)
         rig.turn_until(lambda: rig.state is LoopState.FAULT)
     with opened(*lab) as rig:
-        # a start resets nothing by itself; somebody who asks for a check does
+        # a start does not reset faults; a requested check does
         assert rig.state is LoopState.INACTIVE
         assert "7305h" in rig.status["reason"]
         assert rig.status["reason_limit"]["axis"] == 0
@@ -129,7 +133,7 @@ def test_a_loop_that_begins_with_a_drive_in_fault(lab: tuple[Path, str]) -> None
         rig.obeyed("enable")
 
 
-def test_a_fault_while_one_is_acknowledged(lab: tuple[Path, str]) -> None:
+def test_a_fault_during_an_acknowledgement_is_latched(lab: tuple[Path, str]) -> None:
     with opened(*lab) as rig:
         rig.inject_fault(0, FAULT_CODE, 0x7305)
         rig.turn_until(lambda: rig.state is LoopState.FAULT and not rig.loop.busy)
@@ -147,7 +151,7 @@ def test_a_fault_while_one_is_acknowledged(lab: tuple[Path, str]) -> None:
         assert unpowered(rig)
 
 
-def test_a_drive_that_restarted_needs_a_new_boot(lab: tuple[Path, str]) -> None:
+def test_a_restarted_drive_needs_a_new_boot(lab: tuple[Path, str]) -> None:
     with opened(*lab) as rig:
         rig.block.post_command({"do": "check"})
         rig.turn(30)
@@ -163,7 +167,7 @@ def test_a_drive_that_restarted_needs_a_new_boot(lab: tuple[Path, str]) -> None:
         assert rig.state is LoopState.READY
 
 
-def test_who_asks_for_hold_while_the_power_comes_gets_no_motion(lab: tuple[Path, str]) -> None:
+def test_a_hold_while_enabling_prevents_the_requested_motion(lab: tuple[Path, str]) -> None:
     with opened(*lab) as rig:
         rig.block.post_command(
             {"do": "enable", "right": rig.right, "program": "jog", "wanted": JOG}

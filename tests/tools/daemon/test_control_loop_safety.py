@@ -1,4 +1,4 @@
-"""The loop behind a safety I/O: contactor, brakes and emergency stop, seen on the physics."""
+"""The loop with a safety I/O: contactor, brakes and emergency stop, checked on the physics."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def lab(
 
 
 def wait(rig: LoopRig, done: Callable[[], object]) -> None:
-    """Turn the loop, at a pace at which the I/O is polled meanwhile, until `done`."""
+    """Turn the loop until `done`, slowly enough for polls of the I/O."""
 
     def at_ease() -> bool:
         time.sleep(0.002)
@@ -67,7 +67,7 @@ def jog(rig: LoopRig) -> None:
     rig.run(0.3)
 
 
-def test_brakes_open_behind_power_and_close_before_it_goes(
+def test_brakes_open_after_power_is_on_and_close_before_it_is_off(
     lab: tuple[LoopRig, SafetyIoProcess, BoardAxis],
 ) -> None:
     rig, _, winch = lab
@@ -76,7 +76,7 @@ def test_brakes_open_behind_power_and_close_before_it_goes(
     assert not winch.brake_released
     number = rig.block.post_command({"do": "enable", "right": rig.right})
     wait(rig, lambda: winch.brake_released)
-    assert rig.loop.engine.driving  # it was held before the brake let go
+    assert rig.loop.engine.driving  # the motor held before the brake opened
     wait(rig, lambda: not rig.loop.busy)
     answer = rig.block.take_reply()
     assert answer is not None
@@ -88,7 +88,7 @@ def test_brakes_open_behind_power_and_close_before_it_goes(
     rig.block.take_reply()
 
 
-def test_an_emergency_stop_takes_the_torque_at_once(
+def test_an_emergency_stop_removes_torque_in_the_next_cycle(
     lab: tuple[LoopRig, SafetyIoProcess, BoardAxis],
 ) -> None:
     rig, io_device, winch = lab
@@ -106,7 +106,7 @@ def test_an_emergency_stop_takes_the_torque_at_once(
     rows = rig.rows()
     (changes,) = (rows["state"] == LoopState.FAULT).nonzero()
     assert not rows["torque_sent_Nm"][changes].any()
-    # it stays while the button is pressed
+    # the fault remains while the button is pressed
     answer = rig.command("acknowledge")
     assert not answer["ok"]
     assert "chain" in answer["text"]
@@ -118,7 +118,7 @@ def test_an_emergency_stop_takes_the_torque_at_once(
     assert not winch.state().power_on
 
 
-def test_a_brake_that_does_not_open_ends_in_a_fault(
+def test_a_brake_that_does_not_open_causes_a_fault(
     lab: tuple[LoopRig, SafetyIoProcess, BoardAxis],
 ) -> None:
     rig, io_device, winch = lab
@@ -135,7 +135,7 @@ def test_a_brake_that_does_not_open_ends_in_a_fault(
     rig.obeyed("acknowledge")
 
 
-def test_power_that_is_taken_at_once_while_it_ends_has_the_brakes_applied(
+def test_an_immediate_power_off_during_shutdown_applies_the_brakes(
     lab: tuple[LoopRig, SafetyIoProcess, BoardAxis],
 ) -> None:
     rig, _, winch = lab
@@ -144,10 +144,10 @@ def test_power_that_is_taken_at_once_while_it_ends_has_the_brakes_applied(
     jog(rig)
     rig.loop.request_stop()
     rig.turn(10)
-    assert rig.loop.engine.driving  # it brakes under its controller
+    assert rig.loop.engine.driving  # the controller brakes
     rig.loop.request_stop()
     rig.turn(2)
-    assert rig.loop.engine.driving  # who asks for the same again changes nothing
+    assert rig.loop.engine.driving  # repeating the request changes nothing
     rig.loop.request_power_off()
     rig.turn(2)
     assert not rig.loop.engine.driving

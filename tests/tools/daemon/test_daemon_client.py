@@ -1,4 +1,4 @@
-"""Which daemon a command speaks to, and how it reads what is typed."""
+"""How a command selects a daemon and parses its input."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def where(robot: str | None) -> str:
         return daemon.where
 
 
-def test_several_daemons_must_be_told_apart(listening: list[Path]) -> None:
+def test_several_running_daemons_require_a_name(listening: list[Path]) -> None:
     with pytest.raises(BadInputError, match=r"choose one by --robot \(left, right\)"):
         where(None)
     assert where("right") == str(listening[1])
@@ -66,7 +66,7 @@ def test_several_daemons_must_be_told_apart(listening: list[Path]) -> None:
 @pytest.mark.parametrize(
     ("words", "hint"), [(("status", "planar-3"), True), (("run", "planar-3", "more"), False)]
 )
-def test_a_robot_that_is_named_without_its_option_is_told_how(
+def test_a_robot_given_as_argument_gets_a_hint_at_the_option(
     words: tuple[str, ...], hint: bool
 ) -> None:
     told = " ".join(cdpr_here(*words).stderr.split())
@@ -74,9 +74,7 @@ def test_a_robot_that_is_named_without_its_option_is_told_how(
     assert ("a robot is named by --robot" in told) == hint
 
 
-def test_files_of_a_killed_daemon_do_not_count_as_a_daemon(
-    listening: list[Path], folder: Path
-) -> None:
+def test_files_of_a_killed_daemon_are_ignored(listening: list[Path], folder: Path) -> None:
     listening[0].unlink()
     with socket.socket(socket.AF_UNIX) as dead:
         dead.bind(str(folder / "dead.sock"))
@@ -90,12 +88,12 @@ def test_files_of_a_killed_daemon_do_not_count_as_a_daemon(
 
 @contextmanager
 def running(path: Path, reference: str) -> Iterator[None]:
-    """A daemon that tells one command which robot it runs."""
+    """Run a stand-in for a daemon that reports its robot to one command."""
     body = b'{"reference": "%s"}' % reference.encode()
     head = b"HTTP/1.1 200 OK\r\nContent-Length: %d\r\nConnection: close\r\n\r\n" % len(body)
 
     def serve() -> None:
-        listener.accept()[0].close()  # whether it lives
+        listener.accept()[0].close()  # the check whether it is alive
         with listener.accept()[0] as caller:
             assert caller.recv(4096).startswith(b"GET /description")
             caller.sendall(head + body)
@@ -110,7 +108,7 @@ def running(path: Path, reference: str) -> Iterator[None]:
     path.unlink()
 
 
-def test_a_file_is_that_of_the_robot_that_the_daemon_of_its_name_runs(folder: Path) -> None:
+def test_a_file_selects_the_daemon_of_its_name_only_if_it_runs_that_file(folder: Path) -> None:
     own, others = folder / "mine.toml", folder / "elsewhere" / "mine.toml"
     with running(folder / "mine.sock", str(own)):
         assert where(str(own)) == str(folder / "mine.sock")
@@ -119,7 +117,7 @@ def test_a_file_is_that_of_the_robot_that_the_daemon_of_its_name_runs(folder: Pa
         where(str(others))
 
 
-def test_a_robot_is_found_by_the_name_of_the_daemon_that_runs_its_file(folder: Path) -> None:
+def test_a_robot_is_found_by_the_name_of_its_daemon(folder: Path) -> None:
     with running(folder / "mine.sock", "planar-3"):
         assert robot_by_name("mine").profile == "planar-3"
     with pytest.raises(ProfileError, match="no profile named 'mine'"):
@@ -127,10 +125,10 @@ def test_a_robot_is_found_by_the_name_of_the_daemon_that_runs_its_file(folder: P
 
 
 @pytest.mark.parametrize(("path", "tries"), [("/hold", 3), ("/disable", 3), ("/check", 1)])
-def test_a_stop_that_is_cut_off_is_asked_for_again(
+def test_an_interrupted_stop_request_is_repeated(
     listening: list[Path], path: str, tries: int
 ) -> None:
-    """Two connections are ended before the answer, as where too many have one."""
+    """Two connections are closed before the answer, as if there were too many."""
     asked: list[bytes] = []
     body = b'{"text": "", "state": "active"}'
     head = b"HTTP/1.1 200 OK\r\nContent-Length: %d\r\nConnection: close\r\n\r\n" % len(body)
@@ -158,12 +156,12 @@ def test_a_stop_that_is_cut_off_is_asked_for_again(
     assert asked == [f"POST {path} HTTP/1.1".encode()] * tries
 
 
-def test_none_at_all(folder: Path) -> None:
+def test_error_without_a_daemon_mentions_cdpr_run(folder: Path) -> None:
     with pytest.raises(NoDaemonError, match="cdpr run ROBOT"):
         where(None)
 
 
-def test_options_that_exclude_each_other() -> None:
+def test_mutually_exclusive_options_are_rejected() -> None:
     with pytest.raises(BadInputError, match="--url"), open_daemon("a", None, "http://x", None):
         pass
 
@@ -171,7 +169,7 @@ def test_options_that_exclude_each_other() -> None:
 AXES: list[dict[str, Any]] = [{"name": "left"}, {"name": "x=y"}]
 
 
-def test_numbers_go_to_their_axes_by_name() -> None:
+def test_numbers_are_assigned_to_axes_by_name() -> None:
     assert axis_values(["left=-2.5", "x=y=3"], AXES, "deg") == {0: -2.5, 1: 3.0}
     assert axis_values(["7"], AXES[:1], "deg") == {0: 7.0}
     with pytest.raises(BadInputError, match="left=3: left is there twice"):
@@ -179,12 +177,12 @@ def test_numbers_go_to_their_axes_by_name() -> None:
 
 
 @pytest.mark.parametrize("text", ["7", "left", "left=", "up=1", "left=1,5", "=1", ""])
-def test_others_are_refused_with_what_is_allowed(text: str) -> None:
+def test_invalid_axis_values_are_rejected_with_the_allowed_form(text: str) -> None:
     with pytest.raises(BadInputError, match="deg"):
         axis_values([text], AXES, "deg")
 
 
-def test_values_are_json() -> None:
+def test_values_are_parsed_as_json() -> None:
     assert key_values(["a=1.5", "b=[1, null]", 'c="x=y"']) == {"a": 1.5, "b": [1, None], "c": "x=y"}
 
 
@@ -194,7 +192,7 @@ def test_malformed_json_is_rejected(text: str) -> None:
         key_values([text])
 
 
-def test_a_command_waits_for_a_daemon_that_is_still_starting(
+def test_a_command_waits_for_a_starting_daemon(
     folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     states = ["starting", "starting", "unconfigured", "inactive", "ready"]
@@ -230,7 +228,7 @@ def test_a_command_waits_for_a_daemon_that_is_still_starting(
     assert told.count("the daemon is still starting: its control loop is loaded, ") == 1
 
 
-def test_a_user_without_a_name_can_command_too(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_user_without_a_name_can_send_commands(monkeypatch: pytest.MonkeyPatch) -> None:
     def unknown(uid: int) -> None:
         raise KeyError(f"getpwuid(): uid not found: {uid}")
 

@@ -1,4 +1,4 @@
-"""What a daemon tells of its robot can be written as JSON, whatever the robot's file has."""
+"""The daemon's description of each robot is valid JSON."""
 
 import json
 from types import SimpleNamespace
@@ -18,7 +18,7 @@ from tests.profiles.test_geometry_calibration import calibration
 
 
 @pytest.mark.parametrize("name", list_profiles()["robots"])
-def test_every_shipped_robot_is_described(name: str) -> None:
+def test_each_shipped_robot_is_described(name: str) -> None:
     robot, parts = load_robot(name), SimpleNamespace(programs={}, lowering=None)
     told = json.loads(json.dumps(description(robot, limits_of(robot), parts)))  # type: ignore[arg-type]
     assert [axis["name"] for axis in told["axes"]] == [axis.name for axis in robot.axes]
@@ -26,7 +26,7 @@ def test_every_shipped_robot_is_described(name: str) -> None:
         assert told["platform"]["home_m"] == list(robot.platform.home_m)
 
 
-def test_a_daemon_takes_targets_with_the_calibration_in_force_only(tmp_path, monkeypatch) -> None:
+def test_targets_require_the_calibration_in_force(tmp_path, monkeypatch) -> None:
     for folder in ("XDG_CONFIG_HOME", "XDG_STATE_HOME"):
         monkeypatch.setenv(folder, str(tmp_path))
     before, platform = load_calibrated("planar-4"), SimpleNamespace(not_calibrated_reason="")
@@ -45,7 +45,7 @@ def test_a_daemon_takes_targets_with_the_calibration_in_force_only(tmp_path, mon
     assert "taken over or undone" in platform.not_calibrated_reason
 
 
-def test_a_simulated_robots_description_cannot_move_a_real_one() -> None:
+def test_a_calibration_of_a_simulated_robot_is_rejected_on_a_real_bus() -> None:
     robot = load_robot("planar-4")
     found = calibration(robot).model_copy(update={"simulated": True})
     refuse_simulated_calibration(found.applied(robot), ["simbus:here"])

@@ -1,4 +1,4 @@
-"""Every kind of drive fault is reported with its axis and code: status, recording and HTTP."""
+"""Each drive fault is reported with axis and code in status, recording and HTTP."""
 
 from __future__ import annotations
 
@@ -100,7 +100,7 @@ def test_a_drives_fault_is_reported_with_its_axis_and_code(
         recorder.begin()
         name, told = rig.robot.axes[AXIS].name, list[str]()
         for code, inject in KINDS.items():
-            rig.drop_right()  # a service that begins gives nobody the right
+            rig.drop_right()  # nobody holds the right after the start of a service
             rig.take_right()
             rig.obeyed("enable", program="hold")
             rig.turn(5)
@@ -149,7 +149,7 @@ BITS = {
 
 
 @pytest.mark.parametrize("bit", BITS)
-def test_each_alarm_of_a_drive_is_a_fault_of_its_axis(bit: int) -> None:
+def test_each_alarm_of_a_drive_becomes_a_fault_of_its_axis(bit: int) -> None:
     winch = load_robot("planar-3").axes[0].winch
     axes = [monitored_axis(winch, node) for node in (1, 2)]
     state = StateArrays(2)

@@ -1,4 +1,4 @@
-"""The process above the daemon's two, with stand-ins for those: who is started, told and ended."""
+"""The launcher starts, watches and ends the daemon's two processes, here stand-ins."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ SAME_PRESS_S = 2.0
 
 
 class Daemon:
-    """A running launcher, and what systemd would hear of it."""
+    """A running launcher and the socket of systemd."""
 
     def __init__(self, folder: Path, plan: dict[str, Any], watchdog_s: float = 0.0) -> None:
         self.folder = folder
@@ -56,7 +56,7 @@ class Daemon:
         raise AssertionError(f"the launcher ended without a word of {key}")
 
     def heard(self, wanted: str) -> list[str]:
-        """Wait until systemd hears `wanted`; return all that it has heard until then."""
+        """Wait until systemd receives `wanted`. Return all notifications until then."""
         told, end = list[str](), time.monotonic() + TIMEOUT_S
         self.manager.settimeout(TIMEOUT_S)
         while wanted not in told:
@@ -65,7 +65,7 @@ class Daemon:
         return told
 
     def stuff(self) -> None:
-        """Leave systemd's queue no room for a word."""
+        """Fill systemd's queue."""
         with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as other:
             other.setblocking(False)
             with suppress(BlockingIOError):
@@ -73,13 +73,13 @@ class Daemon:
                     other.sendto(b"X_OTHER=1", str(self.folder / "notify"))
 
     def feeds(self, times: int = 2) -> None:
-        """Wait until the watchdog has been fed so often, counted from now on."""
+        """Wait until the watchdog has been fed `times` times from now on."""
         self.drain()
         for _ in range(times):
             self.heard("WATCHDOG=1")
 
     def drain(self) -> int:
-        """Take what systemd has not read yet; return how often the watchdog was fed in it."""
+        """Read all waiting notifications. Return how often they feed the watchdog."""
         count = 0
         self.manager.settimeout(0.0)
         with suppress(BlockingIOError):
@@ -94,7 +94,7 @@ class Daemon:
         return self.drain()
 
     def starves(self) -> None:
-        """Wait until the watchdog is not fed any more."""
+        """Wait until the watchdog is no longer fed."""
         end = time.monotonic() + TIMEOUT_S
         while self.fed(0.6):
             assert time.monotonic() < end
@@ -153,26 +153,26 @@ def _gone(pid: int) -> bool:
     return not _is_child(pid)
 
 
-def test_it_tells_when_both_are_up_and_ends_the_loop_before_the_service(start: Start) -> None:
+def test_the_launcher_reports_readiness_and_ends_the_loop_before_the_service(start: Start) -> None:
     daemon = start({"stopping_s": 0.5})
     assert daemon.line("ready")["ready"]["state"] == "ready"
     daemon.heard("READY=1")
     daemon.process.terminate()
     daemon.heard("STOPPING=1")
     assert daemon.ends() == 0
-    # the recording has the controlled stop to its end
+    # the recording contains the whole controlled stop
     assert daemon.log() == ["loop stopped", "service stopped"]
 
 
-def test_notifications_are_repeated_until_systemd_takes_them(start: Start) -> None:
+def test_notifications_are_repeated_until_systemd_accepts_them(start: Start) -> None:
     daemon = start({"stopping_s": 1.0, "loading_s": 0.5}, watchdog_s=0.4)
-    daemon.stuff()  # before anything is told
+    daemon.stuff()  # before the first notification
     daemon.line("ready")
     (daemon.folder / "fault").touch()
     assert daemon.line("told")["told"] == "fault: left: too fast"
     told = daemon.heard("STATUS=fault: left: too fast")
     assert told.count("READY=1") == 1
-    assert "STATUS=ready" not in told  # only the newest is worth a word
+    assert "STATUS=ready" not in told  # only the newest state is sent
     daemon.feeds()
     daemon.stuff()
     daemon.process.terminate()
@@ -184,7 +184,7 @@ def test_notifications_are_repeated_until_systemd_takes_them(start: Start) -> No
     ("number", "told"),
     [(signal.SIGKILL, "killed by signal 9"), (signal.SIGSTOP, "has not turned")],
 )
-def test_a_service_that_dies_or_hangs_is_started_again_and_the_loop_goes_on(
+def test_a_dead_or_hanging_service_is_restarted_and_the_loop_continues(
     start: Start, number: signal.Signals, told: str
 ) -> None:
     daemon = start({"stalled_s": 1.0 if number == signal.SIGSTOP else 60.0})
@@ -200,7 +200,7 @@ def test_a_service_that_dies_or_hangs_is_started_again_and_the_loop_goes_on(
     assert _is_child(loop)
 
 
-def test_a_service_that_hangs_before_its_first_turn_is_started_again(start: Start) -> None:
+def test_a_service_that_hangs_before_its_first_turn_is_restarted(start: Start) -> None:
     daemon = start({"freeze_service": True, "service_start_s": 5.0})
     assert "has not turned for 5 s" in daemon.line("told")["told"]
     assert daemon.line("ready")["ready"]["state"] == "ready"
@@ -208,14 +208,14 @@ def test_a_service_that_hangs_before_its_first_turn_is_started_again(start: Star
     assert daemon.ends() == 0
 
 
-def test_a_service_that_works_for_long_before_its_first_turn_is_left_to_it(start: Start) -> None:
+def test_a_service_busy_before_its_first_turn_is_not_restarted(start: Start) -> None:
     daemon = start({"service_works_s": 3.0, "service_start_s": 2.0})
-    assert daemon.line("ready")["ready"]["state"] == "ready"  # and nothing is told before
+    assert daemon.line("ready")["ready"]["state"] == "ready"  # without an earlier notice
     daemon.process.terminate()
     assert daemon.ends() == 0
 
 
-def test_a_loop_that_dies_is_reported_and_the_service_stays_to_say_so(start: Start) -> None:
+def test_a_dead_loop_is_reported_and_the_service_remains(start: Start) -> None:
     daemon = start(watchdog_s=0.4)
     daemon.line("ready")
     daemon.heard("WATCHDOG=1")
@@ -235,7 +235,7 @@ def test_a_loop_that_dies_is_reported_and_the_service_stays_to_say_so(start: Sta
     assert daemon.ends() == 1
 
 
-def test_a_loop_that_ends_on_command_has_not_died_though_a_drive_may_have_power(
+def test_a_loop_that_ends_with_unconfirmed_power_is_not_reported_as_dead(
     start: Start,
 ) -> None:
     why = "node 1: does not confirm that its power stage is off"
@@ -252,10 +252,10 @@ def test_a_fault_is_reported_with_its_reason_once(start: Start) -> None:
     (daemon.folder / "fault").touch()
     assert daemon.line("told")["told"] == "fault: left: too fast"
     os.kill(daemon.pid("service"), signal.SIGKILL)
-    assert "killed by signal 9" in daemon.line("told")["told"]  # and not the fault again
+    assert "killed by signal 9" in daemon.line("told")["told"]  # without repeating the fault
 
 
-def test_the_watchdog_is_fed_while_the_loop_turns_and_no_longer(start: Start) -> None:
+def test_the_watchdog_is_fed_only_while_the_loop_turns(start: Start) -> None:
     daemon = start({"stalled_s": 1.0}, watchdog_s=0.4)
     daemon.line("ready")
     daemon.feeds()
@@ -268,20 +268,20 @@ def test_the_watchdog_is_fed_while_the_loop_turns_and_no_longer(start: Start) ->
     daemon.feeds()
 
 
-def test_in_lockstep_a_loop_that_stands_still_is_nothing_to_tell(start: Start) -> None:
+def test_a_stalled_loop_in_lockstep_is_not_reported(start: Start) -> None:
     daemon = start({"status": {"lockstep": True}, "stalled_s": 1.0}, watchdog_s=0.4)
     daemon.line("ready")
     loop = daemon.pid("loop")
     os.kill(loop, signal.SIGSTOP)
     daemon.heard("WATCHDOG=1")
-    daemon.starves()  # it has been seen to stand still
+    daemon.starves()  # the launcher has detected the stall
     os.kill(loop, signal.SIGCONT)
     daemon.feeds()
     (daemon.folder / "fault").touch()
-    assert daemon.line("told")["told"] == "fault: left: too fast", "and nothing before it"
+    assert daemon.line("told")["told"] == "fault: left: too fast", "no earlier notice"
 
 
-def test_a_loop_that_hangs_does_not_keep_the_daemon_from_ending(start: Start) -> None:
+def test_a_hanging_loop_is_killed_when_the_daemon_ends(start: Start) -> None:
     daemon = start({"stalled_s": 1.0})
     daemon.line("ready")
     os.kill(daemon.pid("loop"), signal.SIGSTOP)
@@ -292,7 +292,7 @@ def test_a_loop_that_hangs_does_not_keep_the_daemon_from_ending(start: Start) ->
     assert daemon.log() == ["service stopped"]
 
 
-def test_a_loop_that_turns_again_has_its_time_to_end(start: Start) -> None:
+def test_a_loop_that_turns_again_gets_its_time_to_end(start: Start) -> None:
     daemon = start({"stalled_s": 2.0, "stopping_s": 4.0})
     daemon.line("ready")
     os.kill(daemon.pid("loop"), signal.SIGSTOP)
@@ -305,19 +305,21 @@ def test_a_loop_that_turns_again_has_its_time_to_end(start: Start) -> None:
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_a_second_request_to_end_takes_the_power_at_once(
+def test_a_second_request_to_end_cuts_power_immediately(
     start: Start, number: signal.Signals
 ) -> None:
     daemon = start({"stopping_s": 600.0, "lowering_s": 20.0, "same_press_s": SAME_PRESS_S})
     daemon.line("ready")
     daemon.process.send_signal(number)
-    daemon.process.send_signal(number)  # passed on by a program in between, it is the same one
+    daemon.process.send_signal(
+        number
+    )  # repeated by a parent program, it counts as the same request
     told = daemon.line("told")["told"]
     assert "the platform is lowered" in told
     assert "up to 50 s" in told
     assert "Press Ctrl-C again to remove the power immediately" in told
     time.sleep(1.5 * SAME_PRESS_S)
-    daemon.process.send_signal(signal.SIGHUP)  # a terminal that closes is not impatient
+    daemon.process.send_signal(signal.SIGHUP)  # a closing terminal does not count as second request
     time.sleep(0.5)
     assert not (daemon.folder / "log").exists()
     daemon.process.send_signal(number)
@@ -327,23 +329,23 @@ def test_a_second_request_to_end_takes_the_power_at_once(
     assert daemon.log() == ["power taken", "loop stopped", "service stopped"]
 
 
-def test_a_mistake_of_the_launcher_leaves_the_loop_the_time_to_lower(start: Start) -> None:
+def test_an_error_of_the_launcher_leaves_the_loop_time_to_lower(start: Start) -> None:
     plan = {"mistake": "in the middle of it", "stopping_s": 3.0, "lowering_s": 30.0, "stop_s": 1.0}
     daemon = start(plan)
     daemon.line("ready")
-    daemon.process.terminate()  # and its notice of that fails
+    daemon.process.terminate()  # the launcher then fails while printing
     assert daemon.ends() == 1
     assert daemon.log() == ["loop stopped", "service stopped"]
 
 
-def test_where_the_service_cannot_be_started_the_loop_is_ended_first(start: Start) -> None:
+def test_the_loop_ends_first_if_the_service_cannot_be_started(start: Start) -> None:
     daemon = start({"no_service": True, "stopping_s": 1.0})
     assert daemon.ends() == 1
     assert daemon.log() == ["loop stopped"]
     assert not (daemon.folder / "control.launcher").exists()
 
 
-def test_a_socket_of_somebody_else_does_not_make_a_daemon_ready(
+def test_a_socket_of_another_process_does_not_make_the_daemon_ready(
     start: Start, tmp_path: Path
 ) -> None:
     with socket.socket(socket.AF_UNIX) as other:
@@ -370,12 +372,12 @@ def test_the_robot_is_locked_until_the_loop_of_a_killed_launcher_has_ended(start
     while time.monotonic() < end:
         with suppress(BadInputError), LauncherLock(control):
             assert not _is_child(loop)
-            assert not LoopFile.beside(control).exists()  # which named the loop that has ended
+            assert not LoopFile.beside(control).exists()  # the file named the loop that has ended
             return
-    raise AssertionError("it stays locked")
+    raise AssertionError("the robot stays locked")
 
 
-def test_the_loop_is_named_beside_the_socket_for_this_user_while_it_runs(start: Start) -> None:
+def test_a_private_file_beside_the_socket_names_the_running_loop(start: Start) -> None:
     daemon = start()
     daemon.line("ready")
     path = daemon.folder / "control.loop"
@@ -385,7 +387,7 @@ def test_the_loop_is_named_beside_the_socket_for_this_user_while_it_runs(start: 
     pidfd = named.open()
     assert pidfd is not None
     os.close(pidfd)
-    # another process that has got the same number is not it
+    # a different process with the same pid does not match
     assert named.model_copy(update={"started": named.started + 1}).open() is None
     daemon.process.terminate()
     assert daemon.ends() == 0
@@ -393,17 +395,17 @@ def test_the_loop_is_named_beside_the_socket_for_this_user_while_it_runs(start: 
     assert not path.exists()
 
 
-def test_a_loop_that_cannot_be_named_ends_the_daemon_before_it_is_ready(start: Start) -> None:
+def test_a_daemon_that_cannot_write_its_loop_file_ends_before_it_is_ready(start: Start) -> None:
     def in_the_way(folder: Path) -> None:
         (folder / "control.loop").mkdir()
-        (folder / "control.loop.new").mkdir()  # that is nobody's name: it is in nobody's way
+        (folder / "control.loop.new").mkdir()  # this name is not used
 
     daemon = start(before=in_the_way)
     reason = daemon.line("reason")["reason"]
     path = daemon.folder / "control.loop"
     assert reason == f"{path}: cannot be written, for `cdpr estop`: Is a directory"
     assert daemon.ends() == 2
-    # the service is told to end too, maybe before it has begun
+    # the service is ended too, maybe before it has started
     assert "loop stopped" in daemon.log()
     assert set(daemon.log()) <= {"loop stopped", "service stopped"}
     assert not list(daemon.folder.glob(".control*"))
@@ -420,7 +422,7 @@ def test_a_file_of_another_daemon_is_not_removed(start: Start) -> None:
     assert LoopFile.read(path) == other
 
 
-def test_who_ends_it_while_the_loop_loads_is_told_of_no_failure(start: Start) -> None:
+def test_ending_the_daemon_while_the_loop_loads_succeeds(start: Start) -> None:
     daemon = start({"loading_s": 30.0})
     end = time.monotonic() + TIMEOUT_S
     while not (daemon.folder / "loop.pid").exists():
@@ -432,7 +434,7 @@ def test_who_ends_it_while_the_loop_loads_is_told_of_no_failure(start: Start) ->
 
 
 @pytest.mark.parametrize("status", [1, 2])
-def test_a_loop_that_cannot_begin_ends_the_daemon_with_its_status(
+def test_a_loop_that_cannot_start_ends_the_daemon_with_its_status(
     start: Start, status: int
 ) -> None:
     daemon = start({"refuse": status})
@@ -441,7 +443,7 @@ def test_a_loop_that_cannot_begin_ends_the_daemon_with_its_status(
 
 
 @pytest.mark.parametrize(("status", "times"), [(1, 4), (2, 1)])
-def test_a_service_that_cannot_begin_ends_the_daemon_in_the_end(
+def test_a_service_that_cannot_start_ends_the_daemon_after_retries(
     start: Start, status: int, times: int
 ) -> None:
     daemon = start({"refuse_service": status})
@@ -450,7 +452,7 @@ def test_a_service_that_cannot_begin_ends_the_daemon_in_the_end(
     assert daemon.log().count("service refused") == times
 
 
-def test_a_loop_that_was_told_to_shut_down_ends_the_daemon_well(start: Start) -> None:
+def test_a_loop_that_was_shut_down_ends_the_daemon_with_status_0(start: Start) -> None:
     daemon = start()
     daemon.line("ready")
     (daemon.folder / "shutdown").touch()
@@ -459,7 +461,7 @@ def test_a_loop_that_was_told_to_shut_down_ends_the_daemon_well(start: Start) ->
     assert daemon.log() == ["loop stopped", "service stopped"]
 
 
-def test_both_end_by_themselves_when_their_launcher_is_killed(start: Start) -> None:
+def test_loop_and_service_end_after_their_launcher_was_killed(start: Start) -> None:
     daemon = start()
     daemon.line("ready")
     loop, service = daemon.pid("loop"), daemon.pid("service")

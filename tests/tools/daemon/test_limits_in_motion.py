@@ -1,4 +1,4 @@
-"""A program that does what it must not, on simulated drives: what the supervisor makes of it."""
+"""The supervisor stops a program that violates limits, on simulated drives."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ Deed = Callable[[int, AxisFeedback, Setpoint, FloatArray], None]
 
 
 class Wild(Program):
-    """A program that does whatever a test wants; axis 0 is left at rest."""
+    """A program that runs a function of the test. Axis 0 stays at rest."""
 
     name = "wild"
     needs_lease = False
@@ -64,7 +64,7 @@ class Wild(Program):
         self._cycles += 1
 
     def stop(self) -> None:
-        """It stands still whenever it is told to."""
+        """Stand still from now on."""
         self.deed = lambda _k, _feedback, _setpoint, _torque: None
 
     def progress(self) -> dict[str, Any]:
@@ -72,14 +72,14 @@ class Wild(Program):
 
 
 class WildRig(LoopRig):
-    """A loop that may run the wild program."""
+    """A loop that can run the wild program."""
 
     def __init__(self, path: Path, url: str, **more: Any) -> None:
         self.wild = Wild()
         super().__init__(path, url, {"wild": self.wild}, **more)
 
     def go_wild(self, deed: Deed) -> Row:
-        """Enable with the wild program doing `deed`; return the rows until it is over."""
+        """Enable with the wild program running `deed`. Return the rows until the fault."""
         self.wild.deed = deed
         self.rows()
         self.obeyed("enable", program="wild")
@@ -119,14 +119,14 @@ def states(row: Row) -> list[State]:
     return [State(int(STATE_TABLE[int(word) & 0x7F])) for word in row["statusword"]]
 
 
-def test_drives_are_reported_the_robots_torque_and_heartbeat(ready: WildRig) -> None:
+def test_drives_get_the_robots_torque_limit_and_heartbeat(ready: WildRig) -> None:
     network = ready.machine.networks["can0"]
     for node in (1, 2):
         assert network.read_int(node, 0x6072) == 500  # 1.5 Nm of 3 Nm
         assert network.read_int(node, 0x1016, 1) == 127 << 16 | 175
 
 
-def test_a_motor_that_runs_away_is_stopped_by_its_drive(ready: WildRig) -> None:
+def test_a_runaway_motor_is_stopped_by_the_drives(ready: WildRig) -> None:
     rows = ready.go_wild(push(1.0))
     told = ready.status
     assert told["reason"].startswith("axis 2: speed ")
@@ -136,7 +136,7 @@ def test_a_motor_that_runs_away_is_stopped_by_its_drive(ready: WildRig) -> None:
     tripped = int(np.flatnonzero(rows["limit"] == Limit.SPEED)[0])
     assert rows["reaction"][tripped] == Reaction.QUICK_STOP
     assert rows["limit_axis"][tripped] == 1
-    # no torque from this cycle on; both drives brake by themselves, then have no power
+    # no torque from this cycle on; the drives brake and then cut power
     assert not rows["torque_sent_Nm"][tripped:].any()
     after = [states(row) for row in rows[tripped + 1 :]]
     assert [State.QUICK_STOP] * 2 in after[:3]
@@ -145,19 +145,19 @@ def test_a_motor_that_runs_away_is_stopped_by_its_drive(ready: WildRig) -> None:
     assert np.abs(speed).max() < 5.0
 
 
-def test_torque_is_clamped_in_value_and_rate(ready: WildRig) -> None:
+def test_torque_is_clamped_in_magnitude_and_rate(ready: WildRig) -> None:
     rows = ready.go_wild(push(9.0))
     clamped = rows[rows["reaction"] == Reaction.CLAMP]
     assert set(clamped["limit"]) <= {Limit.TORQUE, Limit.TORQUE_RATE}
     assert clamped.size > 0
     assert (clamped["torque_asked_Nm"][:, 1] == 9.0).all()
     assert np.abs(rows["torque_sent_Nm"]).max() <= 1.5
-    # 0.2 Nm a cycle, and what the drive's unit of 3 mNm makes of it
+    # 0.2 Nm per cycle, rounded to the drive's unit of 3 mNm
     assert np.diff(clamped["torque_sent_Nm"][:, 1]).max() <= 0.2 + 3e-3
 
 
 @pytest.mark.parametrize("what", [math.nan, math.inf, -math.inf])
-def test_a_torque_that_is_no_number_reaches_no_drive(ready: WildRig, what: float) -> None:
+def test_a_nan_or_infinite_torque_reaches_no_drive(ready: WildRig, what: float) -> None:
     rows = ready.go_wild(push(what))
     tripped = int(np.flatnonzero(rows["limit"] == Limit.NOT_FINITE)[0])
     assert rows["reaction"][tripped] == Reaction.QUICK_STOP
@@ -166,7 +166,7 @@ def test_a_torque_that_is_no_number_reaches_no_drive(ready: WildRig, what: float
 
 
 @pytest.mark.parametrize("what", [1.6, -1.6, math.nan])
-def test_the_robots_own_reaction_is_what_happens(ready: WildRig, what: float) -> None:
+def test_the_reaction_in_the_robots_file_is_executed(ready: WildRig, what: float) -> None:
     def jump(_k: int, feedback: AxisFeedback, setpoint: Setpoint, _torque: FloatArray) -> None:
         setpoint.position_rad[1] = feedback.position_rad[1] + what
 
@@ -174,7 +174,7 @@ def test_the_robots_own_reaction_is_what_happens(ready: WildRig, what: float) ->
     tripped = int(np.flatnonzero(rows["limit"] == Limit.FOLLOWING_ERROR)[0])
     assert rows["reaction"][tripped] == Reaction.TORQUE_OFF
     assert ready.status["reason_limit"]["reaction"] == "torque off"
-    # without a quick stop between
+    # without a quick stop
     after = [states(row) for row in rows[tripped + 1 :]]
     assert not any(State.QUICK_STOP in each for each in after)
     assert after[-1] == [State.SWITCH_ON_DISABLED] * 2
@@ -193,14 +193,14 @@ def test_the_robots_own_reaction_is_what_happens(ready: WildRig, what: float) ->
         {"cable_length_m": [1.0, 1.0], "more": 1},
     ],
 )
-def test_lengths_that_are_none_are_refused(ready: WildRig, wanted: dict[str, Any]) -> None:
+def test_invalid_lengths_are_rejected(ready: WildRig, wanted: dict[str, Any]) -> None:
     answer = ready.command("lengths", wanted=wanted)
     assert not answer["ok"]
     assert "allowed: " in answer["text"]
     assert not ready.loop.engine.parts.estimator.estimate.length_known.any()
 
 
-def test_a_cable_beyond_its_length_is_held_and_may_come_back(ready: WildRig) -> None:
+def test_a_cable_beyond_its_length_is_held_and_can_return(ready: WildRig) -> None:
     estimator = ready.loop.engine.parts.estimator
     ready.drop_right()
     assert not ready.command("lengths", wanted={"cable_length_m": [None, 1.0]})["ok"]
@@ -220,7 +220,7 @@ def test_a_cable_beyond_its_length_is_held_and_may_come_back(ready: WildRig) -> 
         assert told["reason"].endswith("1.020 m allowed")
         ready.turn(200)
         length_m = estimator.estimate.cable_length_m[1]
-        assert 1.02 < length_m < 1.05  # it brakes at 1 m/s2
+        assert 1.02 < length_m < 1.05  # the axis brakes at 1 m/s2
         back = {"velocity_rad_s": [0.0, -4.0], "timeout_s": 2.0}
         ready.obeyed("program", program="jog", wanted=back)
         ready.turn_until(lambda: estimator.estimate.cable_length_m[1] < length_m - 5e-3)
@@ -279,12 +279,12 @@ def loaded(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[WildRig, 
 
 
 def until_read(rig: WildRig, tension_N: float) -> None:
-    """Turn until the right load cell is read as `tension_N`, but for its own error."""
+    """Turn until the right load cell reads `tension_N` within its error."""
     told = rig.loop.engine.parts.estimator.estimate
     rig.turn_until(lambda: abs(told.tension_N[1] - tension_N) < 2.0)
 
 
-# whichever a tension that falls comes to first
+# whichever limit a falling tension reaches first
 FALLEN = ("tension_low", "slack", "broken_cable")
 
 
@@ -315,7 +315,7 @@ def test_measured_tensions_end_a_motion(
     assert least_N < told["value"] < most_N
 
 
-def test_a_silent_load_cell_ends_the_motion_and_is_named(
+def test_a_silent_load_cell_ends_the_motion_and_is_reported(
     loaded: tuple[WildRig, LoadCellRig],
 ) -> None:
     rig, cells = loaded
@@ -336,10 +336,10 @@ def test_a_silent_load_cell_ends_the_motion_and_is_named(
     rig.turn_until(lambda: bool(rig.command("acknowledge")["ok"]))
 
 
-# -- a winch alone
+# -- a single winch
 
 
-def test_a_winch_is_run_as_a_robot_of_one_axis() -> None:
+def test_a_winch_runs_as_a_robot_with_one_axis() -> None:
     path = SHIPPED / "winches" / "winch-mpp0923d.toml"
     with simulated(path) as url, opened(path, url) as rig:
         assert rig.state is LoopState.READY, rig.status

@@ -1,4 +1,4 @@
-"""What names a loop is believed of its owner's own processes, and of nobody's but his."""
+"""A loop file is trusted only if file and process belong to the same user."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def stopped(path: Path) -> EmergencyStopResult:
 
 
 def give_away(path: Path) -> None:
-    """Make it nobody's; where the tests do not run as root, open to all stands in for that."""
+    """Give a file to another user. If the tests do not run as root, open it to all instead."""
     if os.geteuid() == 0:
         os.chown(path, NOBODY, NOBODY)
     else:
@@ -67,7 +67,7 @@ def give_away(path: Path) -> None:
 
 
 @pytest.mark.parametrize("process", [DOES_NOT], indirect=True)
-def test_a_process_that_the_signal_would_end_is_let_be(
+def test_a_process_without_signal_handler_is_not_signalled(
     tmp_path: Path, process: subprocess.Popen[bytes]
 ) -> None:
     path = tmp_path / "r.loop"
@@ -79,7 +79,7 @@ def test_a_process_that_the_signal_would_end_is_let_be(
 
 
 @pytest.mark.parametrize("process", [IGNORES], indirect=True)
-def test_a_loop_that_has_turned_last_is_said_to_have_ended(
+def test_a_process_that_ignores_the_signal_counts_as_ended_loop(
     tmp_path: Path, process: subprocess.Popen[bytes]
 ) -> None:
     path = tmp_path / "r.loop"
@@ -92,7 +92,7 @@ def test_a_loop_that_has_turned_last_is_said_to_have_ended(
 
 
 @pytest.mark.parametrize("process", [OBEYS], indirect=True)
-def test_a_process_of_another_user_than_the_file_is_let_be(
+def test_a_loop_file_for_another_users_process_is_not_trusted(
     tmp_path: Path, process: subprocess.Popen[bytes]
 ) -> None:
     path = tmp_path / "r.loop"
@@ -123,7 +123,7 @@ def test_a_process_of_another_user_than_the_file_is_let_be(
         ("{}", "Field required"),
         (" " * 5000, "is not valid JSON"),
     ],
-    ids=map(str, range(9)),  # texts name the process that runs the tests
+    ids=map(str, range(9)),  # texts contain the pid of the test process
 )
 def test_a_file_that_no_daemon_wrote_is_rejected_with_a_reason(
     tmp_path: Path, change: str | dict[str, Any], told: str
@@ -136,7 +136,7 @@ def test_a_file_that_no_daemon_wrote_is_rejected_with_a_reason(
     assert told in outcome.text
 
 
-def test_a_pipe_or_a_link_in_its_place_keeps_nobody_waiting(tmp_path: Path) -> None:
+def test_a_pipe_or_link_instead_of_a_loop_file_is_rejected_immediately(tmp_path: Path) -> None:
     path, other = tmp_path / "r.loop", tmp_path / "other"
     os.mkfifo(path)
     assert "is no regular file" in stopped(path).text
@@ -146,14 +146,14 @@ def test_a_pipe_or_a_link_in_its_place_keeps_nobody_waiting(tmp_path: Path) -> N
     assert "cannot be read" in stopped(path).text
 
 
-def test_a_robots_name_cannot_write_to_the_terminal(tmp_path: Path) -> None:
+def test_control_characters_in_a_robots_name_are_escaped(tmp_path: Path) -> None:
     path = tmp_path / "r.loop"
     path.write_text(json.dumps(named(os.getpid(), robot="\x1b[2J")))
     assert LoopFile.read(path).robot == r"\x1b[2J"
 
 
 @pytest.mark.parametrize("process", [OBEYS], indirect=True)
-def test_a_folder_that_another_has_made_is_not_looked_into(
+def test_a_runtime_folder_of_another_user_is_not_searched(
     tmp_path: Path, process: subprocess.Popen[bytes], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
@@ -175,14 +175,14 @@ def test_a_folder_that_another_has_made_is_not_looked_into(
 @pytest.mark.parametrize(
     ("asked", "found"),
     [
-        ("left", True),  # the robot's own name
-        ("r", True),  # that of its socket
+        ("left", True),  # the name of the robot
+        ("r", True),  # the name of the socket
         ("right", False),
         ("left.toml", True),
         ("elsewhere/left.toml", False),
     ],
 )
-def test_the_loop_of_a_robot_is_that_which_runs_it(
+def test_a_loop_is_found_by_the_name_or_file_of_its_robot(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, asked: str, found: bool
 ) -> None:
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
@@ -194,8 +194,8 @@ def test_the_loop_of_a_robot_is_that_which_runs_it(
     assert find_loops(asked) == [path] * found
 
 
-def test_other_drives_do_not_confirm_power_off(tmp_path: Path) -> None:
-    """The memory is that of the loop that was signalled, or no answer."""
+def test_shared_memory_of_another_loop_does_not_confirm_power_off(tmp_path: Path) -> None:
+    """Only the memory of the signalled loop counts."""
     block = SharedBlock.create(1, 0.1, 100.0)
     block.counters["loop_pid"] = os.getpid()
     command = [sys.executable, "-c", OBEYS]
@@ -211,8 +211,8 @@ def test_other_drives_do_not_confirm_power_off(tmp_path: Path) -> None:
     assert "the shared memory is another loop's" in outcome.text
 
 
-def test_a_strangers_socket_is_not_spoken_to(tmp_path: Path) -> None:
-    if os.geteuid() == 0:  # nobody else can make another's socket in a folder of this user's
+def test_a_socket_of_another_user_is_rejected(tmp_path: Path) -> None:
+    if os.geteuid() == 0:  # only root can create a socket of another user here
         path = tmp_path / "r.sock"
         path.touch()
         os.chown(path, NOBODY, NOBODY)
@@ -225,7 +225,7 @@ def test_a_strangers_socket_is_not_spoken_to(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("process", [OBEYS], indirect=True)
-def test_a_second_daemon_does_not_take_the_place_of_one_whose_service_is_starting(
+def test_a_second_daemon_is_rejected_while_the_service_of_the_first_starts(
     tmp_path: Path, process: subprocess.Popen[bytes]
 ) -> None:
     run = ("run", "bench-2", "--bus", "simbus:", "--no-record", "--socket")
@@ -238,7 +238,7 @@ def test_a_second_daemon_does_not_take_the_place_of_one_whose_service_is_startin
     assert "a daemon runs there already" in told.stderr
 
 
-def test_the_lock_of_a_process_that_is_left_stays_on_a_file(tmp_path: Path) -> None:
+def test_a_lock_remains_until_an_inheriting_process_has_ended(tmp_path: Path) -> None:
     control, file = tmp_path / "control.sock", tmp_path / "control.launcher"
     with LauncherLock(control) as lock:
         child = subprocess.Popen(

@@ -1,4 +1,4 @@
-"""Mistakes of programs, and what cannot be told: the drives stop, the loop goes on and says so."""
+"""Errors in programs and status: the drives stop, and the loop continues and reports them."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ PERIOD_S = 2e-3
 
 
 class Careless(AxisProgram):
-    """Holds, but cannot stop and cannot tell of itself."""
+    """A program that holds, but whose stop and progress raise errors."""
 
     name = "careless"
 
@@ -51,7 +51,7 @@ def rig(tmp_path: Path) -> Iterator[LoopRig]:
         yield made
 
 
-def test_a_program_that_cannot_stop_loses_the_power(rig: LoopRig) -> None:
+def test_a_program_whose_stop_fails_loses_power(rig: LoopRig) -> None:
     answer = rig.command("disable")
     assert not answer["ok"]
     rig.turn_until(lambda: rig.state is LoopState.FAULT and not rig.loop.busy)
@@ -60,7 +60,7 @@ def test_a_program_that_cannot_stop_loses_the_power(rig: LoopRig) -> None:
     rig.obeyed("acknowledge")
 
 
-def test_where_a_limit_ends_it_the_drives_brake_by_themselves(rig: LoopRig) -> None:
+def test_a_limit_with_a_program_whose_stop_fails_causes_a_quick_stop(rig: LoopRig) -> None:
     rig.loop.safe_stop.stop(Reaction.CONTROLLED_STOP, LoopState.FAULT)
     assert rig.loop.engine.reacting is Reaction.QUICK_STOP
     assert not rig.loop.engine.driving
@@ -69,7 +69,7 @@ def test_where_a_limit_ends_it_the_drives_brake_by_themselves(rig: LoopRig) -> N
 
 
 @pytest.mark.parametrize("way", ["command", "limit"])
-def test_its_traceback_is_printed_after_the_power_is_removed(
+def test_the_traceback_is_printed_after_power_is_off(
     rig: LoopRig, monkeypatch: pytest.MonkeyPatch, way: str
 ) -> None:
     had_power = []
@@ -87,7 +87,7 @@ def test_its_traceback_is_printed_after_the_power_is_removed(
     assert had_power and not any(had_power)
 
 
-def test_a_command_that_comes_while_it_is_being_stopped_is_told_why_that_is(rig: LoopRig) -> None:
+def test_a_command_during_a_reaction_is_rejected_with_its_reason(rig: LoopRig) -> None:
     rig.loop.life.set_reason("axis 1: slack")
     rig.loop.safe_stop.stop(Reaction.CONTROLLED_STOP, LoopState.FAULT)
     answer = rig.command("hold")
@@ -95,7 +95,7 @@ def test_a_command_that_comes_while_it_is_being_stopped_is_told_why_that_is(rig:
     assert "the robot is being stopped (axis 1: slack), " in answer["text"]
 
 
-def test_a_program_that_cannot_tell_of_itself_goes_on(rig: LoopRig) -> None:
+def test_a_program_whose_progress_fails_continues(rig: LoopRig) -> None:
     rig.turn(10)
     assert rig.status["program"] == "careless"
     assert "KeyError" in rig.status["program_progress"]["error"]
@@ -103,7 +103,7 @@ def test_a_program_that_cannot_tell_of_itself_goes_on(rig: LoopRig) -> None:
 
 
 @pytest.mark.parametrize("what", ["reason", "safety", "everything"])
-def test_a_status_that_cannot_be_written_ends_no_loop(
+def test_a_status_that_cannot_be_written_does_not_end_the_loop(
     rig: LoopRig, monkeypatch: pytest.MonkeyPatch, what: str
 ) -> None:
     before = rig.status["state"]
@@ -120,7 +120,7 @@ def test_a_status_that_cannot_be_written_ends_no_loop(
     rig.obeyed("hold")
 
 
-def test_a_long_error_of_a_program_leaves_the_faults_in_the_status(
+def test_a_long_error_of_a_program_does_not_displace_faults_in_the_status(
     rig: LoopRig, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def fail(*_: object) -> None:
@@ -133,13 +133,13 @@ def test_a_long_error_of_a_program_leaves_the_faults_in_the_status(
     assert "ValueError: \u00e9" in fault["text"]
 
 
-def test_long_words_are_answered(rig: LoopRig) -> None:
+def test_a_very_long_command_is_rejected(rig: LoopRig) -> None:
     answer = rig.command("\u00e9" * 665)
     assert not answer["ok"]
     rig.obeyed("hold")
 
 
-def test_a_machine_that_cannot_be_left_in_order_is_reported_of(
+def test_an_error_while_closing_the_machine_is_reported(
     rig: LoopRig, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     leave = rig.machine._stack.close

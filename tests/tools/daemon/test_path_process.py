@@ -1,4 +1,4 @@
-"""Planning in a process of its own: what it may take of the machine."""
+"""Path planning in a separate process with limited resources."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import pytest
 from cdpr_tools.daemon import service_process
 
 
-def test_a_file_does_not_take_more_memory_than_it_is_given(
+def test_planning_a_file_is_limited_in_memory(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     file = tmp_path / "part.nc"

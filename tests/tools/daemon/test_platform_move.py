@@ -1,4 +1,4 @@
-"""`cdpr move` of a platform: what is typed in mm and deg, and how it is refused."""
+"""`cdpr move` of a platform: input in mm and degrees, and rejections."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ HERE = {"target_m": [0.1, 0.2, 1.0], "target_rotation_rad": [0.1, -0.05, 0.2]}
 
 
 class Told:
-    """A daemon as far as `cdpr move` asks it."""
+    """A stand-in for a daemon, with the requests of `cdpr move`."""
 
     def __init__(
         self,
@@ -53,7 +53,7 @@ class Told:
         self.platform, self.progress, self.refusal = platform, progress or {}, refusal
         self.posted: list[dict[str, Any]] = []
         self.ways: list[dict[str, Any]] = []
-        """What the progress says before the motion is done."""
+        """The progress before the motion is complete."""
 
     def get(self, path: str) -> dict[str, Any]:
         if path == "/description":
@@ -96,7 +96,7 @@ def wanted(
     return PlatformMove(to, rotate, relative, frame, speed).arguments(told)  # type: ignore[arg-type]
 
 
-def test_millimetres_and_degrees_become_si() -> None:
+def test_millimetres_and_degrees_are_converted_to_si() -> None:
     asked = wanted(Told(PLANE), "300 2000", speed=50.0)
     assert asked == {"position_m": [0.3, 2.0], "speed_m_s": 0.05}
     asked = wanted(Told(TURNING), rotate="-10")
@@ -106,7 +106,7 @@ def test_millimetres_and_degrees_become_si() -> None:
     assert asked["rotation_rad"] == pytest.approx([math.radians(5.0), 0.0, math.radians(-10.0)])
 
 
-def test_a_relative_motion_is_left_to_the_loop() -> None:
+def test_a_relative_motion_is_sent_as_distance_and_turn() -> None:
     asked = wanted(Told(ROOM), "50 20 -30", "3 -2 4", True, ReferenceFrame.PLATFORM)
     assert asked == {
         "distance_m": pytest.approx([0.05, 0.02, -0.03]),
@@ -137,7 +137,7 @@ def test_rejections_quote_the_input_as_typed(
         wanted(Told(platform), **typed)
 
 
-def test_the_status_tells_where_a_platform_is_and_how_it_is_turned() -> None:
+def test_the_status_shows_position_and_rotation_of_a_platform() -> None:
     progress = {
         "position_m": [0.1, 0.2, 0.3],
         "rotation_rad": [0.0, 0.0, math.radians(5.0)],
@@ -152,11 +152,11 @@ def test_the_status_tells_where_a_platform_is_and_how_it_is_turned() -> None:
     )
 
 
-# -- as it is typed
+# -- as typed
 
 
 def typed(monkeypatch: pytest.MonkeyPatch, told: Told, *words: str, command: str = "move") -> Any:
-    """Run `cdpr move`, or another command, with these words against a made-up daemon."""
+    """Run `cdpr move`, or another command, with the stand-in for a daemon."""
 
     @contextmanager
     def opened(*_where: Any) -> Iterator[Told]:
@@ -179,7 +179,7 @@ def typed(monkeypatch: pytest.MonkeyPatch, told: Told, *words: str, command: str
          {"position_m": [0.001, 0.002, 0.7], "rotation_rad": [0.0, 0.0, 0.0], "speed_m_s": 0.05}),
     ],
 )  # fmt: skip
-def test_options_take_all_numbers_that_follow(
+def test_options_take_all_following_numbers(
     monkeypatch: pytest.MonkeyPatch, words: list[str], asked: dict[str, Any]
 ) -> None:
     told = Told(ROOM, HERE)
@@ -201,7 +201,7 @@ def test_options_take_all_numbers_that_follow(
         (["--to", "1", "2"], "2 numbers; allowed: 3, X Y Z in mm"),
     ],
 )
-def test_mistakes_end_with_a_message(
+def test_invalid_input_ends_with_a_message(
     monkeypatch: pytest.MonkeyPatch, words: list[str], message: str
 ) -> None:
     told = Told(ROOM, HERE)
@@ -212,7 +212,7 @@ def test_mistakes_end_with_a_message(
     assert not told.posted
 
 
-def test_the_daemon_s_refusal_names_what_was_typed(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_rejection_by_the_daemon_quotes_the_typed_input(monkeypatch: pytest.MonkeyPatch) -> None:
     why = {"why": "cable 1 would need 9 N"}
     asked = {"position_m": [0.0, 0.0, 0.7]}
     told = Told(ROOM, HERE, CommandRefusal(RefusalCode.NOT_FEASIBLE, "pose", asked, why))
@@ -231,7 +231,7 @@ def test_an_obstructed_platform_is_reported_once(
     assert "50 mm behind" in result.output and "51 mm" not in result.output
 
 
-def test_a_way_that_is_blocked_ends_it_with_the_reason(
+def test_a_blocked_motion_ends_with_the_reason(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     told = Told(ROOM, HERE)
@@ -241,7 +241,7 @@ def test_a_way_that_is_blocked_ends_it_with_the_reason(
     assert "no way on, at 100.0, 0.0, 700.0 mm: cable 1" in str(result.exception)
 
 
-def test_a_platform_that_friction_keeps_away_is_reported_and_there_all_the_same(
+def test_a_target_missed_by_friction_is_reported_and_the_move_succeeds(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     told = Told(ROOM, HERE)
@@ -252,7 +252,7 @@ def test_a_platform_that_friction_keeps_away_is_reported_and_there_all_the_same(
     assert figures["trouble"] == "the platform stands 1.2 mm from its target"
 
 
-def test_who_lets_the_platform_down_already_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_lower_reports_the_client_that_is_already_lowering(monkeypatch: pytest.MonkeyPatch) -> None:
     down = Told(ROOM)
     held = {"program": "lower", "control": {"held": True, "client": "a@b"}}
     told = down.get

@@ -1,4 +1,4 @@
-"""A platform that is turned by its cables, from its stand and back, judged by what was true."""
+"""A platform that its cables turn, from its stand and back, checked against the truth."""
 
 from __future__ import annotations
 
@@ -23,12 +23,14 @@ def robot() -> Iterator[LockstepRobot]:
 
 
 def turned_rad(robot: LockstepRobot) -> float:
-    """Return by how much the platform is truly turned."""
+    """Return the true angle of the platform."""
     Q = robot.truth()["rotation"]
     return math.atan2(Q[1, 0], Q[0, 0])
 
 
-def test_it_goes_turned_where_it_is_told_and_is_lowered_as_it_stood(robot: LockstepRobot) -> None:
+def test_a_platform_moves_and_turns_and_is_lowered_to_its_initial_pose(
+    robot: LockstepRobot,
+) -> None:
     robot.carry_out("pose", position_m=[0.1, 1.6], rotation_rad=[TURN_rad])
     robot.run(1.0)
     assert turned_rad(robot) == pytest.approx(TURN_rad, abs=2e-3)
@@ -41,7 +43,9 @@ def test_it_goes_turned_where_it_is_told_and_is_lowered_as_it_stood(robot: Locks
 
     robot.carry_out("pose", position_m=[0.0, 1.5])
     robot.run(0.5)
-    assert turned_rad(robot) == pytest.approx(TURN_rad, abs=2e-3), "what is left out stays"
+    assert turned_rad(robot) == pytest.approx(TURN_rad, abs=2e-3), (
+        "an omitted angle does not change"
+    )
 
     robot.carry_out("lower")
     assert turned_rad(robot) == pytest.approx(0.0, abs=2e-3)
@@ -50,20 +54,20 @@ def test_it_goes_turned_where_it_is_told_and_is_lowered_as_it_stood(robot: Locks
     np.testing.assert_allclose(robot.truth()["position_m"][:2], home.home_m, atol=5e-3)
 
 
-# The first way off the stand.
+# The first motion off the stand.
 
 TWICE = "[motor.friction]\ncoulomb_Nm = 0.16\nbreakaway_Nm = 0.2\n"
 
 
 def lag_mm(robot: LockstepRobot) -> float:
-    """Return how far the platform truly is from its set-point."""
+    """Return the true distance of the platform from its set-point."""
     k = len(robot.robot.platform.workspace_min_m)
     setpoint = robot.row["pose_setpoint"][:3] if k == 3 else robot.row["pose_setpoint"][:2]
     return float(1e3 * np.linalg.norm(setpoint - robot.truth()["position_m"][:k]))
 
 
 def way_mm(robot: LockstepRobot, seconds: float = 1.5) -> float:
-    """Return the farthest that the platform is off within some time."""
+    """Return the largest distance from the set-point within `seconds`."""
     lags = []
     for _ in range(round(seconds / 0.01)):
         robot.turn(10)
@@ -74,13 +78,13 @@ def way_mm(robot: LockstepRobot, seconds: float = 1.5) -> float:
 @pytest.mark.parametrize(
     ("name", "plant", "waits_s", "most_mm"),
     [
-        ("spatial-8", "", 0.0, 12.0),  # 34 mm where the set-point is below the stand
+        ("spatial-8", "", 0.0, 12.0),  # 34 mm if the set-point is below the stand
         ("spatial-8", "", 8.0, 12.0),
         ("planar-3", TWICE, 8.0, 6.0),  # 9 mm
         ("suspended-8", "", 0.0, 4.0),  # 8 mm
     ],
 )
-def test_a_platform_leaves_its_stand_as_it_goes_other_ways(
+def test_a_platform_follows_its_set_point_when_leaving_the_stand(
     tmp_path: Path, name: str, plant: str, waits_s: float, most_mm: float
 ) -> None:
     (tmp_path / "plant.toml").write_text(plant)
@@ -95,7 +99,7 @@ def test_a_platform_leaves_its_stand_as_it_goes_other_ways(
         assert robot.progress["held_back"] == ""
 
 
-def test_a_hand_leads_it_off_its_stand() -> None:
+def test_a_platform_follows_a_hand_off_its_stand() -> None:
     with LockstepRobot("planar-3") as robot:
         robot.enable()
         robot.carry_out("tighten")
@@ -107,4 +111,4 @@ def test_a_hand_leads_it_off_its_stand() -> None:
             robot.turn(20)
             lags.append(lag_mm(robot))
         assert robot.truth()["position_m"][1] > 1.38
-        assert max(lags) < 4.0  # 7 mm where the set-point is below the stand
+        assert max(lags) < 4.0  # 7 mm if the set-point is below the stand

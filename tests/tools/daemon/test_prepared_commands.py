@@ -1,4 +1,4 @@
-"""Commands that need a file to be read or the like: put off until that is done."""
+"""Commands that need preparation, such as reading a file, are deferred until it is done."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ JOG = {"velocity_rad_s": [1.0], "timeout_s": 2.0}
 
 
 class Prepared(IdleProgram):
-    """Does nothing, once what it was asked for has been prepared."""
+    """A program that does nothing after its request has been prepared."""
 
     name = "prepared"
     ready = ""
@@ -51,20 +51,20 @@ def rig(tmp_path_factory: pytest.TempPathFactory) -> Iterator[LoopRig]:
 
 
 def hold(rig: LoopRig) -> None:
-    """Have the robot hold with power, whatever it did before."""
+    """Make the robot hold with power from any state."""
     if rig.state is LoopState.READY:
         rig.obeyed("enable")
     rig.obeyed("hold")
 
 
-def test_it_is_carried_out_once_it_is_prepared(rig: LoopRig) -> None:
+def test_a_command_is_executed_after_its_preparation(rig: LoopRig) -> None:
     hold(rig)
     rig.obeyed("program", program="prepared", wanted={"what": "plan"})
     assert rig.loop.engine.program.name == "prepared"
     rig.obeyed("hold")
 
 
-def test_a_failed_preparation_is_refused_and_changes_nothing(rig: LoopRig) -> None:
+def test_a_failed_preparation_is_rejected_and_changes_nothing(rig: LoopRig) -> None:
     hold(rig)
     answer = rig.command("program", program="prepared", wanted={"what": "bad"})
     assert (answer["ok"], answer["text"]) == (False, "what: value 'bad'")
@@ -72,7 +72,7 @@ def test_a_failed_preparation_is_refused_and_changes_nothing(rig: LoopRig) -> No
 
 
 @pytest.mark.parametrize("urgent", [False, True])
-def test_a_command_that_comes_meanwhile_ends_it(rig: LoopRig, urgent: bool) -> None:
+def test_another_command_cancels_a_preparation(rig: LoopRig, urgent: bool) -> None:
     hold(rig)
     asked = {"do": "program", "program": "prepared", "wanted": {"what": f"other {urgent}"}}
     number = rig.block.post_command({**asked, "right": rig.right})
@@ -88,7 +88,7 @@ def test_a_command_that_comes_meanwhile_ends_it(rig: LoopRig, urgent: bool) -> N
 
 
 def begun_in_a_jog(rig: LoopRig, what: str) -> int:
-    """Jog, and ask for what takes until the next turn to be prepared; return the number."""
+    """Jog, and post a command whose preparation takes until the next turn. Return its number."""
     hold(rig)
     rig.obeyed("program", program="jog", wanted=JOG)
     asked = {"do": "program", "program": "prepared", "wanted": {"what": what}, "right": rig.right}
@@ -98,7 +98,7 @@ def begun_in_a_jog(rig: LoopRig, what: str) -> int:
 
 
 def answer_to(rig: LoopRig, number: int) -> str:
-    """Turn until a command has been refused; return why."""
+    """Turn until a command is rejected. Return the reason."""
     rig.turn(20)
     answers = {answer["to"]: answer for answer in iter(rig.block.take_reply, None)}
     assert not answers[number]["ok"]
@@ -125,7 +125,7 @@ def test_a_fault_during_preparation_cancels_it(
         rig.obeyed("acknowledge")
 
 
-def test_a_right_that_is_lost_meanwhile_ends_it(rig: LoopRig) -> None:
+def test_losing_the_right_to_move_cancels_a_preparation(rig: LoopRig) -> None:
     number = begun_in_a_jog(rig, "without a right")
     rig.drop_right()
     rig.take_right()
@@ -134,7 +134,7 @@ def test_a_right_that_is_lost_meanwhile_ends_it(rig: LoopRig) -> None:
     assert (rig.loop.engine.program.name, rig.status["reason"]) == ("hold", why)
 
 
-def test_power_comes_once_it_is_prepared(rig: LoopRig) -> None:
+def test_enable_gives_power_after_the_preparation(rig: LoopRig) -> None:
     rig.obeyed("disable")
     assert not rig.command("enable", program="prepared", wanted={"what": "bad"})["ok"]
     assert rig.state is LoopState.READY

@@ -18,7 +18,7 @@ MASS_KG, DRUM_M, GEAR = 5.0, 0.104, 4.0
 
 @pytest.fixture(scope="module")
 def rig(tmp_path_factory: pytest.TempPathFactory) -> Iterator[LoopRig]:
-    """Two winches, below each a mass half a metre above the floor, its cable just slack."""
+    """Yield two winches, each with a mass half a metre above the floor on a barely slack cable."""
     folder = tmp_path_factory.mktemp("robot")
     path = robot_file(folder, [("can0", 1), ("can0", 2)], period_s=PERIOD_S)
     plant = folder / "plant.toml"
@@ -33,18 +33,18 @@ def error_deg(rows: Row, seconds: float) -> np.ndarray:
     return np.degrees(last["setpoint_rad"] - last["position_rad"])
 
 
-def test_motors_arrive_and_stand_in_spite_of_cogging_and_friction(rig: LoopRig) -> None:
+def test_motors_reach_their_target_despite_cogging_and_friction(rig: LoopRig) -> None:
     for distance in ([3.0, -1.0], [-3.4, 2.0], [0.3, 0.4]):
         rig.obeyed("program", program="pid", wanted={"distance_rad": distance})
         rows = rig.run(3.0)
         assert rig.loop.engine.program.at_rest
-        # friction of 0.1 Nm and cogging over the gain, less what the integral has made up for
+        # friction of 0.1 Nm and cogging divided by the gain, reduced by the integral
         assert np.max(np.abs(error_deg(rows, 0.5))) < 4.0
         assert np.max(np.ptp(error_deg(rows, 0.5), axis=0)) < 2.0
 
 
-def test_a_mass_is_lifted_and_held_through_all_changes(rig: LoopRig) -> None:
-    """Fifty rotors' inertia: swings die out, and no change of programs lets it drop."""
+def test_a_mass_is_lifted_and_held_through_changes_of_programs(rig: LoopRig) -> None:
+    """The mass has the inertia of fifty rotors. Oscillations decay, and no change drops it."""
     up_rad = 0.4 / (DRUM_M / GEAR)  # 0.2 m of slack first
     gently = {"distance_rad": [-up_rad, 0.0], "speed_rad_s": 5.0}
     rig.obeyed("program", program="pid", wanted=gently)
@@ -63,7 +63,7 @@ def test_a_mass_is_lifted_and_held_through_all_changes(rig: LoopRig) -> None:
     assert np.max(np.abs(error_deg(rows, 0.5)[:, 0])) < 5.0
     steps = np.abs(np.diff(rows["torque_sent_Nm"], axis=0))
     switched = np.diff(rows["program"].astype(int)) != 0
-    # no larger where programs change than where they do not
+    # no larger at changes of programs than elsewhere
     assert steps[switched].max() <= max(steps[~switched].max(), 0.01)
     rig.obeyed("program", program="pid", wanted={"distance_rad": [up_rad, 0.0]})
     rig.run(6.0)

@@ -1,4 +1,4 @@
-"""How refusals of the loop are told in the words of the command line."""
+"""Rejections by the loop are reported in the words of the command line."""
 
 from __future__ import annotations
 
@@ -20,32 +20,32 @@ WHY = {"why": "on the way, at 250.0, -1500.0 mm turned by 5.7 deg: cable 1"}
 RANGE = {"index": 1, "low": -1.0, "high": 1.0}
 
 
-def told(refusal: CommandRefusal, *typed: Any, **words: Any) -> str:
+def text_of(refusal: CommandRefusal, *typed: Any, **words: Any) -> str:
     with pytest.raises(DaemonRefusalError) as raised, in_typed_words(*typed, **words):
         raise DaemonRefusalError.of(refusal)
     return str(raised.value)
 
 
-def test_refusals_quote_the_request_as_typed() -> None:
+def test_rejections_quote_the_request_as_typed() -> None:
     refusal = CommandRefusal(RefusalCode.NOT_FEASIBLE, "pose", {"position_m": [0.3, 2.0]}, WHY)
-    assert told(refusal, "move", "--to 300 2000") == f"--to 300 2000: {WHY['why']}"
+    assert text_of(refusal, "move", "--to 300 2000") == f"--to 300 2000: {WHY['why']}"
     refusal = CommandRefusal(RefusalCode.NOT_TIGHT, "pose")
-    assert told(refusal, "move", "--to 300 2000").startswith("move: the cables are not tight")
+    assert text_of(refusal, "move", "--to 300 2000").startswith("move: the cables are not tight")
 
 
-def test_refusals_give_allowed_values_as_typed() -> None:
+def test_rejections_give_allowed_values_as_typed() -> None:
     nothing = {"left": "target", "instead": "position_m"}
     refusal = CommandRefusal(RefusalCode.NOTHING_LEFT, "pose", {"resume": True}, nothing)
-    text = told(refusal, "resume", instead="cdpr move --to")
+    text = text_of(refusal, "resume", instead="cdpr move --to")
     assert text == "resume: no target has been left; allowed: cdpr move --to"
-    # the same words beside another refusal of the same command
+    # the same arguments with a different rejection of the command
     states = {"state": "ready", "allowed": ["active"]}
     refusal = CommandRefusal(RefusalCode.NOT_IN_STATE, "program", arguments=states)
-    text = told(refusal, "resume", instead="cdpr move --to")
+    text = text_of(refusal, "resume", instead="cdpr move --to")
     assert text == "resume: not in state ready; allowed in active; `cdpr enable` gives power"
     sources = {"why": "the cables' lengths are not known", "allowed": ["home"]}
     refusal = CommandRefusal(RefusalCode.BAD_SOURCE, "tighten", {"from": "lengths"}, sources)
-    text = told(refusal, "tighten", "tighten --from lengths", option="--from ")
+    text = text_of(refusal, "tighten", "tighten --from lengths", option="--from ")
     assert text == "tighten --from lengths: the cables' lengths are not known; allowed: --from home"
 
 
@@ -58,7 +58,7 @@ def test_refusals_give_allowed_values_as_typed() -> None:
         ({"back_m": 2.0}, None, "--back 2000: allowed: -1000 to 1000 mm"),
     ],
 )
-def test_a_number_out_of_its_bounds_is_bad_input_in_units_that_are_typed(
+def test_a_number_out_of_range_is_reported_in_the_typed_units(
     asked: dict[str, float], index: int | None, text: str
 ) -> None:
     refusal = CommandRefusal(RefusalCode.OUT_OF_RANGE, "pid", asked, {**RANGE, "index": index})
@@ -67,11 +67,11 @@ def test_a_number_out_of_its_bounds_is_bad_input_in_units_that_are_typed(
     assert str(raised.value) == text
 
 
-def test_a_number_that_no_option_stands_for_is_reported_as_the_loop_tells_it() -> None:
+def test_a_number_without_an_option_is_reported_in_the_loops_words() -> None:
     refusal = CommandRefusal(
         RefusalCode.OUT_OF_RANGE, "path", {"feed": 2.0}, {**RANGE, "index": None}
     )
-    assert told(refusal, "path", "--feed") == str(refusal)
+    assert text_of(refusal, "path", "--feed") == str(refusal)
 
 
 @pytest.mark.parametrize(
@@ -83,18 +83,20 @@ def test_a_number_that_no_option_stands_for_is_reported_as_the_loop_tells_it() -
         ("shutting-down", ["active"], ""),
     ],
 )
-def test_the_remedy_follows_from_the_state(state: str, allowed: list[str], remedy: str) -> None:
+def test_the_proposed_action_depends_on_the_state(
+    state: str, allowed: list[str], remedy: str
+) -> None:
     states = {"state": state, "allowed": allowed}
     refusal = CommandRefusal(RefusalCode.NOT_IN_STATE, "jog", arguments=states)
     text = str(DaemonRefusalError.of(refusal))
     assert text == f"jog: not in state {state}; allowed in {' or '.join(allowed)}{remedy}"
-    # words alone have none
-    assert told(
+    # the text of another rejection gets none
+    assert text_of(
         CommandRefusal(RefusalCode.NOT_CALIBRATED, "jog", {}, {"why": text}), "jog"
     ).endswith(text)
 
 
-def test_the_error_goes_from_process_to_process_and_takes_other_words() -> None:
+def test_the_error_can_be_pickled_and_reworded() -> None:
     states = {"state": "ready", "allowed": ["active"]}
     refusal = CommandRefusal(RefusalCode.NOT_IN_STATE, "jog", arguments=states)
     error = DaemonRefusalError.of(refusal)
@@ -123,10 +125,15 @@ def test_the_error_goes_from_process_to_process_and_takes_other_words() -> None:
             "its words",
         ),
         (b'"ready"', b"null", DaemonRefusalError, "its words"),
-        (b"null", b"null", ServiceRefusalError, "its words"),  # the service's, such as of the right
+        (
+            b"null",
+            b"null",
+            ServiceRefusalError,
+            "its words",
+        ),  # a rejection by the service, such as for the right to move
     ],
 )
-def test_a_daemon_s_answer_is_raised_with_its_code(
+def test_a_rejection_by_the_daemon_is_raised_with_its_code(
     tmp_path: Path, state: bytes, refusal: bytes, kind: type[Exception], words: str
 ) -> None:
     body = b'{"error": "its words", "state": %s, "refusal": %s}' % (state, refusal)

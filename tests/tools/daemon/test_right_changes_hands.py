@@ -1,8 +1,9 @@
-"""A thousand grants of the right to move: no cycle moves under a right that is another's by then.
+"""During a thousand grants of the right to move, no cycle moves under an expired right.
 
-Two clients move axis 0, one forwards and one backwards, so that each set-point tells whose it is.
-An attacker wants axis 1 to move. All goes through the lease, the session manager of the set-point
-stream and the shared memory to the loop and its simulated drives; only time is the test's.
+Two clients move axis 0, one forwards and one backwards, so that each set-point shows its sender.
+An attacker tries to move axis 1. Everything passes through the lease, the session manager of the
+set-point stream, and shared memory to the loop and its simulated drives. The test only controls
+the time.
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ SEED = 20260
 TTL_S = 0.5
 SPEED_rad_s = 0.5
 STEP_rad_s = 1.0 / 13.0
-"""What an axis may gain in a cycle; who arrives may correct his place by no more."""
+"""Largest speed change of an axis per cycle, also for a correction at the target."""
 KEPT = 64
 
 
@@ -46,14 +47,14 @@ JOG = {"velocity_rad_s": [2.0, 2.0], "timeout_s": 2.0}
 
 
 def change_hands(rig: LoopRig) -> int:
-    """Have another take the right before the loop looks again; return the number that was."""
+    """Let another client take the right before the loop checks again. Return the old number."""
     before = rig.right
     rig.drop_right()
     rig.take_right()
     return before
 
 
-def test_motion_ends_when_the_right_changes_hands_between_two_looks(rig: LoopRig) -> None:
+def test_motion_ends_when_the_right_changes_hands_between_two_checks(rig: LoopRig) -> None:
     rig.obeyed("enable", program="jog", wanted=JOG)
     rig.run(0.4)
     before = change_hands(rig)
@@ -69,7 +70,7 @@ def test_motion_ends_when_the_right_changes_hands_between_two_looks(rig: LoopRig
     rig.obeyed("disable")
 
 
-def test_enabling_for_somebody_who_has_lost_the_right_ends_in_a_hold(rig: LoopRig) -> None:
+def test_enabling_under_a_lost_right_ends_with_a_hold(rig: LoopRig) -> None:
     what = {"do": "enable", "program": "jog", "wanted": JOG, "right": rig.right}
     number = rig.block.post_command(what)
     rig.turn_until(lambda: rig.state is LoopState.ACTIVE)
@@ -81,7 +82,7 @@ def test_enabling_for_somebody_who_has_lost_the_right_ends_in_a_hold(rig: LoopRi
     assert (answer["to"], answer["ok"]) == (number, False)
     assert answer["text"] == "jog: the right to move is somebody else's by now; held"
     assert (rig.status["state"], rig.status["program"]) == ("active", "hold")
-    # cogging moves an axis without power: the hold brakes what it finds, and nothing is added to it
+    # cogging moves an axis without power: hold brakes that motion and adds none
     speeds = np.abs(rig.run(0.2)["setpoint_velocity_rad_s"])
     assert np.all(np.diff(speeds, axis=0) <= 0.0)
     assert np.all(speeds[0] < 0.5 * np.array(JOG["velocity_rad_s"]))
@@ -91,7 +92,7 @@ def test_enabling_for_somebody_who_has_lost_the_right_ends_in_a_hold(rig: LoopRi
 
 @dataclass
 class Client:
-    """One that takes the right, and does not know when it has lost it."""
+    """A client that takes the right and does not notice when it has lost it."""
 
     name: str
     sign: int
@@ -104,7 +105,7 @@ class Client:
 
 @dataclass
 class Scene:
-    """Who holds the right by the test's own account, and what has been said on the way there."""
+    """The holder of the right as the test knows it, and the messages so far."""
 
     rig: LoopRig
     rng: random.Random
@@ -112,16 +113,16 @@ class Scene:
     number: int = 0
     until_ns: int = 0
     ordered: bool = False
-    """Whether the holder has asked for motion under the present grant."""
+    """Whether the holder has requested motion under the present grant."""
     tokens: list[str] = field(default_factory=list)
     orders: list[dict[str, Any]] = field(default_factory=list)
     packets: list[tuple[bytes, int]] = field(default_factory=list)
     in_between: Callable[[], object] | None = None
-    """What happens while the loop looks who holds the right."""
+    """A function that runs while the loop checks the right."""
     speed: float = 0.0
     driven: int = 0
     stopped: int = 0
-    """Cycles that moved on the holder's behalf; grants that have stopped somebody's motion."""
+    """Cycles that moved for the holder, and grants that stopped another client's motion."""
 
     def __post_init__(self) -> None:
         self.sessions = StreamSessionManager(self.rig.block, self.rig.lease)
@@ -136,7 +137,7 @@ class Scene:
     # -- the right
 
     def take(self, client: Client, lapsed: bool) -> None:
-        """End what holds, by its release or by its silence, and have `client` take the right."""
+        """End the present right by release or silence, and let `client` take it."""
         if self.holder is not None and not lapsed:
             self.rig.lease.release(self.holder.token)
         elif self.holder is not None:
@@ -149,7 +150,7 @@ class Scene:
         self.tokens = [*self.tokens[-KEPT:], client.token]
 
     def asked(self, client: Client, do: str, **what: Any) -> dict[str, Any] | None:
-        """Return the command that the service makes of an order; None where it refuses it."""
+        """Return the command that the service posts for a request, None if it rejects it."""
         try:
             number = self.rig.lease.renew(client.token).number
         except LeaseError:
@@ -162,7 +163,7 @@ class Scene:
         return command
 
     def send(self, client: Client) -> None:
-        """Stream the next set-point, where the client has been given a session."""
+        """Stream the next set-point if the client has a session."""
         session = client.session
         if session is None:
             return
@@ -181,17 +182,17 @@ class Scene:
     # -- cycles
 
     def turn(self) -> None:
-        """Run one cycle and judge what it has commanded."""
+        """Run one cycle and check its commands."""
         loop = self.rig.loop
         self.rig.now_ns += PERIOD_NS
         loop.turn()
-        if self.in_between is not None:  # nobody has looked meanwhile
+        if self.in_between is not None:  # the loop has not checked meanwhile
             self.clock_ns()
         while self.rig.block.take_reply() is not None:
             pass
         assert (loop.life.state, loop.engine.driving) == (LoopState.ACTIVE, True), loop.life.reason
         before, self.speed = self.speed, float(loop.engine.setpoint.velocity_rad_s[0])
-        assert loop.engine.setpoint.velocity_rad_s[1] == 0.0, "the attacker's axis"
+        assert loop.engine.setpoint.velocity_rad_s[1] == 0.0, "the attacker's axis moved"
         if abs(self.speed) <= STEP_rad_s:
             return
         brakes = before * self.speed > 0.0 and abs(self.speed) < abs(before)
@@ -205,7 +206,7 @@ class Scene:
 
 
 def moves(scene: Scene, client: Client) -> None:
-    """Have a client who believes to hold the right ask for motion, in one way or another."""
+    """Let a client that believes to hold the right request motion in one of several ways."""
     rng = scene.rng
     speed = client.sign * SPEED_rad_s * rng.uniform(0.5, 1.0)
     jog = {"velocity_rad_s": [speed, 0.0], "timeout_s": 2.0}
@@ -221,7 +222,7 @@ def moves(scene: Scene, client: Client) -> None:
         command = scene.asked(client, do, program="jog", wanted=jog)
     if command is None:
         return
-    if rng.random() < 0.2:  # it changes hands between the service's look and the loop's
+    if rng.random() < 0.2:  # the right changes hands between the checks of service and loop
         late, other = client, rng.choice([one for one in CLIENTS if one is not client])
         scene.take(other, lapsed=rng.random() < 0.5)
         assert scene.holder is not late
@@ -231,7 +232,7 @@ def moves(scene: Scene, client: Client) -> None:
 
 
 def attacks(scene: Scene) -> None:
-    """Guess, replay and forge; nothing of it may move axis 1, or axis 0 under another's right."""
+    """Guess, replay and forge. None may move axis 1, or axis 0 under another's right."""
     scene.rng.choice((guesses, replays_orders, makes_orders, replays_packets, forges))(scene)
 
 
@@ -281,7 +282,7 @@ ATTACKER = Client("attacker", 0, 666)
 
 
 @pytest.mark.long
-def test_no_motion_goes_on_under_somebody_elses_right(rig: LoopRig) -> None:
+def test_no_motion_continues_under_the_right_of_another_client(rig: LoopRig) -> None:
     print(f"seed {SEED}")
     rig.obeyed("enable")
     scene = Scene(rig, random.Random(SEED), number=rig.right)
@@ -299,7 +300,7 @@ def test_no_motion_goes_on_under_somebody_elses_right(rig: LoopRig) -> None:
         scene.stopped += not nobody_moved
         for _ in range(rng.randrange(1, 24)):
             scene.turn()
-            for one in CLIENTS:  # who has lost it goes on as if nothing had been
+            for one in CLIENTS:  # a client that has lost the right continues unchanged
                 scene.send(one)
                 if rng.random() < (0.1 if scene.ordered else 0.5):
                     moves(scene, one)

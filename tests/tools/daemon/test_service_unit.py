@@ -1,4 +1,4 @@
-"""`cdpr service-unit` and the settings it shares with `cdpr run`, read by systemd itself."""
+"""`cdpr service-unit`, checked by systemd, and the settings that it shares with `cdpr run`."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def _value(unit: str, key: str) -> str:
     return next(line for line in unit.splitlines() if line.startswith(f"{key}=")).partition("=")[2]
 
 
-def test_the_unit_starts_what_was_asked_for_with_paths_that_hold_anywhere(tmp_path: Path) -> None:
+def test_the_unit_starts_the_requested_daemon_with_absolute_paths(tmp_path: Path) -> None:
     key = tmp_path / "key file"
     key.write_text("0123456789abcdef0123456789abcdef\n")
     key.chmod(0o600)
@@ -50,12 +50,12 @@ def test_the_unit_starts_what_was_asked_for_with_paths_that_hold_anywhere(tmp_pa
     assert _value(made.stdout, "RuntimeDirectoryMode") == "0700"
     assert _value(made.stdout, "UMask") == "0077"
     assert _value(made.stdout, "User") == "robot"
-    # the kernel's names of the robot's interfaces, so that it starts when they are there
+    # the kernel's names of the robot's interfaces, so that the unit starts when they exist
     assert "sys-subsystem-net-devices-can1.device" in _value(made.stdout, "Wants")
 
 
 def _complaints(unit: Path) -> str:
-    """Return what systemd has to say of a unit; nothing where there is no systemd."""
+    """Return systemd's warnings about a unit, "" without systemd."""
     judge = shutil.which("systemd-analyze")
     if judge is None:
         return ""
@@ -65,7 +65,7 @@ def _complaints(unit: Path) -> str:
     return said.stdout + said.stderr
 
 
-def test_systemd_finds_nothing_wrong_with_the_unit(tmp_path: Path) -> None:
+def test_systemd_reports_no_problem_with_the_unit(tmp_path: Path) -> None:
     robot = load_robot("spatial-8")
     unit = tmp_path / "cdpr-spatial-8.service"
     odd = ["--key-file", "/etc/a $HOME \"b\" 'c' \\ %h;"]
@@ -99,7 +99,7 @@ def test_a_unit_for_an_invalid_run_is_rejected(options: tuple[str, ...], words: 
     assert len(made.stderr.strip().splitlines()) == 1
 
 
-def test_a_key_is_long_enough_and_its_owners_alone(tmp_path: Path) -> None:
+def test_a_key_must_be_long_and_readable_only_by_its_owner(tmp_path: Path) -> None:
     key = tmp_path / "key"
     key.write_bytes(b"0123456789abcdef\nthe rest does not count")
     key.chmod(0o640)
@@ -113,13 +113,13 @@ def test_a_key_is_long_enough_and_its_owners_alone(tmp_path: Path) -> None:
             read_key(key)
     key.write_bytes(b"k" * 4096)
     assert read_key(key) == b"k" * 4096
-    key.write_bytes(b"k" * 4097)  # cut short it would be another key than its owner's
+    key.write_bytes(b"k" * 4097)  # a truncated key would differ from that of the owner
     with pytest.raises(BadInputError, match="allowed: up to 4096 bytes"):
         read_key(key)
 
 
 @given(st.text(alphabet="0123456789abcdef:.[]-", max_size=24))
-def test_an_address_is_understood_or_refused(text: str) -> None:
+def test_an_address_is_parsed_or_rejected(text: str) -> None:
     try:
         address = Address.parse("--http", text)
     except BadInputError as error:
@@ -136,7 +136,7 @@ def test_only_loopback_is_trusted() -> None:
     assert not any(map(is_loopback, others))
 
 
-def test_settings_reach_the_other_processes_as_they_are(
+def test_settings_are_passed_unchanged_to_other_processes(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     settings = RunSettings(
@@ -153,7 +153,7 @@ def test_settings_reach_the_other_processes_as_they_are(
     assert settings.record == Path.cwd() / "here"
 
 
-def test_the_folder_of_sockets_is_its_users_alone(
+def test_the_folder_of_sockets_is_private_to_its_user(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
@@ -169,10 +169,12 @@ def test_the_folder_of_sockets_is_its_users_alone(
         default_socket("a")
 
 
-def test_nobody_is_told_where_nobody_asks(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_notifications_need_a_socket_and_the_own_watchdog_pid(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     monkeypatch.delenv("NOTIFY_SOCKET", raising=False)
     assert not ServiceManager().asks
-    # another process' watchdog is not ours to feed
+    # the watchdog belongs to another process
     monkeypatch.setenv("NOTIFY_SOCKET", "@cdpr-nobody-listens-here")
     monkeypatch.setenv("WATCHDOG_USEC", "1000000")
     monkeypatch.setenv("WATCHDOG_PID", "1")
@@ -180,4 +182,4 @@ def test_nobody_is_told_where_nobody_asks(monkeypatch: pytest.MonkeyPatch) -> No
     assert manager.asks
     assert manager.watchdog_s == 0.0
     assert "NOTIFY_SOCKET" not in os.environ
-    manager.notify(READY=1)  # who has gone is not missed
+    manager.notify(READY=1)  # a missing receiver is not an error

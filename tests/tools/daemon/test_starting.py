@@ -1,4 +1,4 @@
-"""Commands wait for a daemon that has no socket yet, and for none that nobody starts."""
+"""Commands wait for a starting daemon without socket, but not for one that nobody starts."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from tests.cdpr_here import cdpr_here
 
 @pytest.fixture
 def path(monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
-    """Where the socket of a daemon of `mine` is to be; names of sockets are short."""
+    """Return the future path of the socket of the daemon `mine`, in a short folder."""
     with tempfile.TemporaryDirectory(prefix="cdpr-") as folder:
         monkeypatch.setenv("XDG_RUNTIME_DIR", folder)
         yield default_socket("mine")
@@ -38,7 +38,7 @@ def where(robot: str) -> str:
 
 
 class ComesUp(Output):
-    """Makes the socket as soon as it is said that it is waited for."""
+    """Create the socket as soon as a command reports that it waits."""
 
     def __init__(self, path: Path) -> None:
         super().__init__(as_json=True)
@@ -53,7 +53,7 @@ class ComesUp(Output):
 
 
 @pytest.mark.parametrize("named", [True, False])
-def test_a_daemon_whose_launcher_runs_is_waited_for(path: Path, named: bool) -> None:
+def test_a_command_waits_for_a_daemon_whose_launcher_runs(path: Path, named: bool) -> None:
     out = ComesUp(path)
     with LauncherLock(path), out.server:
         await_socket("mine" if named else None, None if named else path, out)
@@ -63,13 +63,13 @@ def test_a_daemon_whose_launcher_runs_is_waited_for(path: Path, named: bool) -> 
     assert not path.with_suffix(LAUNCHER_SUFFIX).exists()
 
 
-def test_it_is_told_what_a_daemon_that_starts_is_doing(path: Path) -> None:
+def test_the_progress_of_a_starting_daemon_is_shown(path: Path) -> None:
     mark, out = path.with_suffix(LAUNCHER_SUFFIX), ComesUp(path)
     with LauncherLock(path) as lock, out.server:
         assert launcher_does(mark) == ""
         for text in ("compiling the numerics, with many words", "compiling: 7 kernels so far"):
             lock.tell(text)
-            assert launcher_does(mark) == text  # nothing is left of a longer one before
+            assert launcher_does(mark) == text  # nothing remains of an earlier longer text
         with pytest.raises(NoDaemonError, match=r"mine is still starting, compiling: 7 kernels so"):
             where("mine")
         await_socket("mine", None, out)
@@ -77,11 +77,11 @@ def test_it_is_told_what_a_daemon_that_starts_is_doing(path: Path) -> None:
     assert launcher_does(mark) is None
 
 
-def test_nobody_waits_for_one_that_nobody_starts(path: Path) -> None:
+def test_a_command_does_not_wait_without_a_launcher(path: Path) -> None:
     out = ComesUp(path)
     await_socket(None, None, out)
     mark = path.with_suffix(LAUNCHER_SUFFIX)
-    mark.write_text(f"{os.getpid()} {started(os.getpid()) - 1}")  # its number is another's now
+    mark.write_text(f"{os.getpid()} {started(os.getpid()) - 1}")  # another process has this pid now
     await_socket("mine", None, out)
     mark.write_text("no process")
     await_socket("mine", None, out)
@@ -92,7 +92,7 @@ def test_nobody_waits_for_one_that_nobody_starts(path: Path) -> None:
 
 
 class StillStarting(BaseHTTPRequestHandler):
-    """Answers as the service of a daemon whose loop is still loaded."""
+    """Answer like the service of a daemon whose loop is still loading."""
 
     def do_GET(self) -> None:
         content = b'{"state": "starting"}'
@@ -111,7 +111,7 @@ class StillStarting(BaseHTTPRequestHandler):
 
 
 @pytest.mark.parametrize("answers", [False, True])
-def test_stop_ends_a_daemon_that_is_starting(path: Path, answers: bool) -> None:
+def test_stop_ends_a_starting_daemon(path: Path, answers: bool) -> None:
     if answers:
         server = socketserver.UnixStreamServer(str(path), StillStarting)
         threading.Thread(target=server.serve_forever, daemon=True).start()

@@ -1,4 +1,4 @@
-"""A daemon's status for people: what does not work is said."""
+"""The status of a daemon as text."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def status_of(**keys: Any) -> dict[str, Any]:
     [(0.00034, ", whose lengths agree within 0.3 mm"), (0.0, ""), (None, "")],
     ids=["eight cables", "none redundant", "not known"],
 )
-def test_a_held_platform_tells_how_well_its_lengths_agree(
+def test_a_held_platform_shows_how_well_its_lengths_agree(
     disagree_m: float | None, told: str
 ) -> None:
     status = status_of(state="active", program_progress={"tight": True})
@@ -57,7 +57,7 @@ def test_a_held_platform_tells_how_well_its_lengths_agree(
     assert f"held by its cables{told}" in [str(line) for line in status_text(status)]
 
 
-def test_the_calibration_in_force_is_shown_with_how_well_it_knows_positions() -> None:
+def test_the_calibration_in_force_is_shown_with_its_accuracy() -> None:
     shown = [str(line) for line in status_text(status_of())]
     assert not any("calibration" in line for line in shown)
     known = calibration(load_robot("planar-4")).model_copy(
@@ -82,8 +82,8 @@ def test_bus_counters_are_shown() -> None:
     ]
 
 
-def test_of_a_loop_that_is_loaded_no_axes_are_shown_yet() -> None:
-    """Their names are not known before; what is compiled meanwhile stands in the notices."""
+def test_a_starting_loop_shows_notices_but_no_axes() -> None:
+    """Names of axes are not known yet. Notices report the compilation."""
     notices = ["compiling the control loop goes on: 20 kernels so far"]
     lines = status_text(status_of(state="starting", notices=notices, axes=[{"name": None}] * 3))
     assert [str(line) for line in lines] == ["bench: starting", f"note: {notices[0]}"]
@@ -91,12 +91,12 @@ def test_of_a_loop_that_is_loaded_no_axes_are_shown_yet() -> None:
     assert str(shown[-1]).startswith("axis ")
 
 
-def test_it_is_told_who_has_the_right_to_move() -> None:
+def test_the_holder_of_the_right_to_move_is_shown() -> None:
     held = status_text(status_of(control={"held": True, "client": "hand"}))
     assert "the right to move: hand" in [str(line) for line in held]
 
 
-def test_cables_that_are_pulled_and_not_tight_are_not_called_loose() -> None:
+def test_cables_under_tension_but_not_tight_are_not_reported_as_loose() -> None:
     status = status_of(state="active", program="hold", program_progress={"tight": False})
     status["axes"] = [{"name": "left", "tension_N": N} for N in (0.4, 65.7)]
     lines = [str(line) for line in status_text(status)]
@@ -106,21 +106,21 @@ def test_cables_that_are_pulled_and_not_tight_are_not_called_loose() -> None:
     assert "cables loose, power on" in lines
 
 
-def test_of_a_platform_that_fell_it_is_told_what_comes_before_it_is_tightened() -> None:
+def test_a_fallen_platform_shows_how_to_tighten_it() -> None:
     status = status_of(state="active", program="hold", program_progress={"tight": False})
     assert "cables loose, power on" in [str(line) for line in status_text(status)]
     status["program_progress"]["fallen"] = True
     home = "it has come down: look at it, then `cdpr tighten --from home` where it stands there, "
     for length_m, told in (
         (1.2, "or `--from lengths` where it stands upright elsewhere"),
-        (None, "upright"),  # lengths that were forgotten are refused
+        (None, "upright"),  # unknown lengths are rejected
     ):
         status["axes"] = [{"name": "left", "cable_length_m": x} for x in (1.1, length_m)]
         (line,) = (str(line) for line in status_text(status) if "loose" in str(line))
         assert line.endswith(home + told)
 
 
-def test_a_part_that_does_not_work_is_reported_by_its_option() -> None:
+def test_a_failing_part_is_reported_with_its_option() -> None:
     parts = {"live_view": {"error": "the live view ended: why"}, "stream": {"error": ""}}
     status = status_of(parts=parts)
     lines = [str(line) for line in status_text(status)]
@@ -128,7 +128,7 @@ def test_a_part_that_does_not_work_is_reported_by_its_option() -> None:
     assert not any("--stream" in line for line in lines)
 
 
-def test_the_status_tells_which_motors_are_compensated() -> None:
+def test_the_status_shows_which_motors_are_compensated() -> None:
     axes = [
         {"name": "left", "commissioned": "a", "index_known": True},
         {"name": "right", "commissioned": "b", "index_known": False},
@@ -158,7 +158,7 @@ def test_learnt_motor_friction_is_shown_once_significant() -> None:
         ({"read_only": True, "driving": True}, "it only listened"),
     ],
 )
-def test_of_a_dead_loop_nothing_is_reported_as_if_it_were_known(
+def test_a_dead_loop_is_shown_with_old_values_marked_as_such(
     told: dict[str, Any], power: str
 ) -> None:
     progress = {"position_m": [0.3, 2.0], "target_m": [0.0, 1.0], "tight": True, "stage": "pull"}
@@ -175,18 +175,18 @@ def test_of_a_dead_loop_nothing_is_reported_as_if_it_were_known(
     assert power in death_text(status | told) and "next: `cdpr stop`" in death_text(status)
 
 
-def test_a_loop_that_hangs_is_reported_before_all_that_is_of_the_time_before() -> None:
+def test_a_hanging_loop_is_reported_before_older_values() -> None:
     status = status_of(program="hold") | {"driving": True, "loop": {"silent_s": 13.6}}
     lines = [str(line) for line in status_text(status)[:-1]]
     assert lines[1] == "the loop has not turned for 13.6 s: what follows is of then"
     assert lines[2].startswith("drives that had power stop without its heartbeat")
-    # in lockstep the simulated drives' time stands with it
+    # in lockstep, the time of the simulated drives stands too
     lines = [str(line) for line in status_text(status | {"lockstep": True})[:-1]]
     assert lines[1].startswith("the loop has not turned")
     assert not any("stop without" in line for line in lines)
 
 
-def test_a_stop_under_way_has_a_reason_also_where_the_loop_gives_none() -> None:
+def test_a_stop_in_progress_without_reason_names_the_command() -> None:
     class Stopping:
         def get(self, _path: str) -> dict[str, Any]:
             return status_of(
@@ -198,15 +198,15 @@ def test_a_stop_under_way_has_a_reason_also_where_the_loop_gives_none() -> None:
         finish(Stopping(), Output(False), Outcome())  # type: ignore[arg-type]
 
 
-def test_a_platform_of_unknown_pose_is_not_told_to_be_taken_home() -> None:
+def test_lowering_a_platform_of_unknown_pose_is_not_described_as_moving_home() -> None:
     assert stage_text("lower", {"stage": "home", "blind": False}).startswith("taking the platform")
     assert stage_text("lower", {"stage": "home", "blind": True}) == "letting the platform down"
-    for stage in ("home", "down"):  # it stands already, or nobody knows
+    for stage in ("home", "down"):  # it already stands, or its pose is unknown
         slack = {"stage": stage, "blind": True, "was_tight": False}
         assert stage_text("lower", slack).startswith("letting the cables out")
 
 
-def test_a_path_is_left_until_its_end() -> None:
+def test_a_path_is_shown_as_left_until_it_is_complete() -> None:
     path = {"name": "part.nc", "line": 7, "time_s": 5.0, "duration_s": 10.0}
     status = status_of(state="active", program="hold", program_progress={"path": path})
     assert "path part.nc left at 50 %, line 7" in str(status_text(status)[1])
@@ -218,7 +218,7 @@ def test_a_path_is_left_until_its_end() -> None:
     ("keys", "told"),
     [
         ({"axes": [{"name": "left", "alive": True}]}, "stopped, power off"),
-        ({"axes": []}, "stopped, power off"),  # before it had booted
+        ({"axes": []}, "stopped, power off"),  # before the drive booted
         (
             {"axes": [{"name": "left", "alive": False}, {"name": "right", "alive": True}]},
             "stopped; unheard, and not known to be without power: left",
@@ -230,11 +230,11 @@ def test_a_path_is_left_until_its_end() -> None:
         ),
     ],
 )
-def test_power_after_a_stop_is_reported_only_as_known(keys: dict[str, Any], told: str) -> None:
+def test_power_off_after_a_stop_is_reported_only_if_known(keys: dict[str, Any], told: str) -> None:
     assert after_stop_text(status_of(**keys)).startswith(told)
 
 
-def test_of_what_was_under_way_before_nothing_is_said(capsys: pytest.CaptureFixture[str]) -> None:
+def test_progress_of_an_earlier_motion_is_not_reported(capsys: pytest.CaptureFixture[str]) -> None:
     moved = {"target_m": [0.1, 0.2], "held_back": "friction"}
     before = status_of(state="active", program="hold", program_progress=moved)
     notes = ProgressNotes(Output(False), before)

@@ -1,4 +1,4 @@
-"""The loop's own socket for stops, in a real loop on simulated drives."""
+"""The stop socket of a real loop on simulated drives."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def loop(socket_path: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterato
 
 @pytest.fixture
 def jogging(loop: LoopRig) -> LoopRig:
-    """A loop that jogs; its queue of replies is empty."""
+    """Return a jogging loop with an empty queue of replies."""
     if loop.state is LoopState.READY:
         loop.obeyed("enable")
     loop.turn_until(lambda: not loop.loop.busy)
@@ -45,7 +45,7 @@ def jogging(loop: LoopRig) -> LoopRig:
 
 
 def send(path: Path, data: bytes, *fds: int) -> None:
-    """Send a datagram with these descriptors."""
+    """Send a datagram with file descriptors."""
     with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as sock:
         sock.connect(str(path))
         sock.sendmsg([data], [(socket.SOL_SOCKET, socket.SCM_RIGHTS, array.array("i", fds))])
@@ -57,7 +57,7 @@ def descriptors() -> int:
 
 @contextmanager
 def asking(path: Path, do: str, client: str = "test") -> Iterator[Future[Any]]:
-    """Have another thread ask for a stop."""
+    """Request a stop from another thread."""
     with ThreadPoolExecutor(1) as pool:
         yield pool.submit(send_stop, path, do, client, WAIT_S)
 
@@ -84,11 +84,11 @@ def test_commands_queued_before_a_stop_do_not_move_after_it(
     assert jogging.loop.engine.program.name == "hold"
     while (reply := block.take_reply()) is not None:
         assert "a stop was asked for after it" in reply["text"]
-    jogging.obeyed("program", **JOG)  # what comes later counts again
+    jogging.obeyed("program", **JOG)  # later commands are accepted again
     assert jogging.loop.engine.program.name == "jog"
 
 
-def test_a_disable_is_answered_once_the_power_is_off_and_a_second_one_too(
+def test_disable_is_answered_when_power_is_off_and_is_idempotent(
     jogging: LoopRig, socket_path: Path
 ) -> None:
     with asking(socket_path, "disable") as one, asking(socket_path, "disable") as other:
@@ -98,7 +98,7 @@ def test_a_disable_is_answered_once_the_power_is_off_and_a_second_one_too(
     assert jogging.state is LoopState.READY
 
 
-def test_a_refusal_is_answered_with_its_code(loop: LoopRig, socket_path: Path) -> None:
+def test_a_rejection_is_answered_with_its_code(loop: LoopRig, socket_path: Path) -> None:
     if loop.state is LoopState.ACTIVE:
         loop.obeyed("disable")
     with asking(socket_path, "hold") as answer:
@@ -135,18 +135,20 @@ def test_invalid_datagrams_are_ignored_without_leaking_descriptors(
     assert answer.result()["ok"]
 
 
-def test_a_stop_whose_sender_has_gone_is_obeyed(jogging: LoopRig, socket_path: Path) -> None:
+def test_a_stop_is_obeyed_although_its_sender_has_ended(
+    jogging: LoopRig, socket_path: Path
+) -> None:
     with pytest.raises(StopUnansweredError):
         send_stop(socket_path, "hold", "impatient", 0.01)
     jogging.turn(2)
     assert jogging.loop.engine.program.name == "hold"
 
 
-def test_stops_without_end_are_obeyed_and_keep_few_descriptors(
+def test_a_flood_of_stops_is_obeyed_with_few_open_descriptors(
     jogging: LoopRig, socket_path: Path
 ) -> None:
     jogging.obeyed("program", program="jog", wanted={"velocity_rad_s": [5.0], "timeout_s": 2.0})
-    jogging.turn(400)  # fast: the stop takes longer than 32 requests
+    jogging.turn(400)  # fast motion, so that the stop takes longer than 32 requests
     before = descriptors()
     ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
     with ours, theirs:
@@ -161,7 +163,7 @@ def test_stops_without_end_are_obeyed_and_keep_few_descriptors(
     assert descriptors() == before
 
 
-def test_who_waits_for_a_loop_that_ends_is_not_kept_waiting(tmp_path: Path) -> None:
+def test_a_waiting_client_is_answered_when_the_loop_ends(tmp_path: Path) -> None:
     path = tmp_path / "robot.stop"
     assert send_stop(path, "hold", "test", WAIT_S) is None
     stops = StopSocket(path)

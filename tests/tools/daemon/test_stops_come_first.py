@@ -1,4 +1,4 @@
-"""Stops by the service's link to the real loop: before all else, and after nothing."""
+"""Stops through the service's link to the real loop precede all other commands."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def active(rig: LoopRig) -> Iterator[LoopRig]:
         rig.obeyed("disable")
 
 
-def test_who_has_the_reply_finds_the_command_in_the_status(
+def test_the_status_shows_a_command_before_its_reply(
     active: LoopRig, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     found: list[tuple[str, str]] = []
@@ -63,12 +63,12 @@ def test_who_has_the_reply_finds_the_command_in_the_status(
 
 
 class Clients:
-    """Clients of a link, and a loop that turns when told to."""
+    """Clients of a link, and a loop that the test turns."""
 
     def __init__(self, rig: LoopRig) -> None:
         self.rig = rig
         self.link = LoopLink(rig.block)
-        rig.block.counters["loop_pid"] = 0  # alive as this process is
+        rig.block.counters["loop_pid"] = 0  # alive like this process
         self.link._require_loop = lambda: None  # type: ignore[method-assign]  # turned by the test
         self.asked: list[tuple[str, asyncio.Task[Reply]]] = []
 
@@ -109,7 +109,7 @@ STEPS = st.lists(
     suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow],
 )
 @given(steps=STEPS)
-def test_whatever_was_asked_for_before_a_stop_does_not_move_after_it(
+def test_requests_from_before_a_stop_do_not_move_after_it(
     active: LoopRig, steps: list[str]
 ) -> None:
     async def play() -> None:
@@ -132,7 +132,7 @@ def test_whatever_was_asked_for_before_a_stop_does_not_move_after_it(
     asyncio.run(play())
 
 
-def test_a_stop_is_taken_before_a_full_queue(active: LoopRig) -> None:
+def test_a_stop_precedes_a_full_queue(active: LoopRig) -> None:
     block = active.block
     active.obeyed("program", **JOG)
     for _ in range(MESSAGES):
@@ -148,11 +148,11 @@ def test_a_stop_is_taken_before_a_full_queue(active: LoopRig) -> None:
     assert active.loop.engine.program.name == "hold"
     while (reply := block.take_reply()) is not None:
         assert "a stop was asked for after it" in reply["text"]
-    active.obeyed("program", **JOG)  # what comes later counts again
+    active.obeyed("program", **JOG)  # later commands are accepted again
     active.obeyed("hold")
 
 
-def test_thousands_of_stops_are_few_orders_and_all_are_answered(active: LoopRig) -> None:
+def test_thousands_of_stops_are_merged_and_all_are_answered(active: LoopRig) -> None:
     async def play() -> None:
         clients = Clients(active)
         before = int(active.block.counters["urgent"][0])
@@ -184,7 +184,7 @@ def test_commands_other_than_stops_are_skipped(active: LoopRig) -> None:
     assert active.loop.engine.program.name == "hold"
 
 
-def test_a_hold_over_and_over_does_not_begin_again(active: LoopRig) -> None:
+def test_repeated_holds_do_not_move_the_set_point(active: LoopRig) -> None:
     active.obeyed("program", **JOG)
     active.run(0.2)
     active.obeyed("hold")

@@ -1,4 +1,4 @@
-"""A quick stop goes on to its end where answers, or a whole bus, are lost meanwhile."""
+"""A quick stop completes although answers or a whole bus are lost meanwhile."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def jog(rig: LoopRig) -> None:
 
 
 def expect_no_coasting(log: BusLog, node: int) -> None:
-    """Have a drive been told to let go only after it had said that it brakes no more."""
+    """Check that power was cut only after the drive reported the end of braking."""
     said, told = State.OPERATION_ENABLED, set()
     for frame in log.frames:
         if frame.identifier == 0x180 + node:
@@ -36,7 +36,7 @@ def expect_no_coasting(log: BusLog, node: int) -> None:
     assert told == {0x0F, 0x02}
 
 
-def test_one_bus_of_two_is_lost(tmp_path: Path) -> None:
+def test_a_quick_stop_completes_after_the_loss_of_one_of_two_buses(tmp_path: Path) -> None:
     axes = [("can0", 1), ("can1", 1)]
     path = robot_file(tmp_path, axes, period_s=PERIOD_S)
     names = [unique(), unique()]
@@ -54,17 +54,17 @@ def test_one_bus_of_two_is_lost(tmp_path: Path) -> None:
             rig.turn_until(lambda: not rig.loop.busy)
             assert "axis 1: not known to be without power" in rig.status["reason"]
         expect_no_coasting(log, 1)
-        assert rows["valid"][:, 1].all()  # it was listened to
+        assert rows["valid"][:, 1].all()  # its answers were received
         assert not rows["alive"][-1, 0]
     finally:
         lost.close()
         left.close()
 
 
-def test_answers_are_missing_while_the_drives_brake(tmp_path: Path) -> None:
+def test_a_quick_stop_completes_while_answers_are_missing(tmp_path: Path) -> None:
     axes = [("can0", 1), ("can0", 2)]
     path = robot_file(tmp_path, axes, period_s=PERIOD_S)
-    # what answers are waited for leaves little of the half second that a bus usually stands
+    # waiting for answers takes most of the half second that a bus holds its time
     with simulated(path) as url, opened(path, url) as rig:
         jog(rig)
         (bus,) = rig.machine._urls.values()
