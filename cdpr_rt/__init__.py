@@ -31,7 +31,7 @@ if TYPE_CHECKING:
         Robot,
     )
     from cdpr_tools.client.daemon_robot import connect, run
-    from cdpr_tools.simulated_robot import simulate
+    from cdpr_tools.lockstep_robot import simulate
 
 __all__ = [
     "AlreadyRunning",
@@ -60,7 +60,7 @@ _HOMES = {
     "connect": "cdpr_tools.client.daemon_robot",
     "load": "cdpr_rt.offline",
     "run": "cdpr_tools.client.daemon_robot",
-    "simulate": "cdpr_tools.simulated_robot",
+    "simulate": "cdpr_tools.lockstep_robot",
     "State": "cdpr_rt.platform.own_controller",
     "Target": "cdpr_rt.platform.own_controller",
 }

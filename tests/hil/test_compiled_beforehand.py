@@ -8,7 +8,7 @@ import sys
 SCRIPT = """
 import sys
 from numba.core.registry import CPUDispatcher
-from cdpr_tools.trials.lockstep import LockstepRobot
+from cdpr_tools.lockstep_robot import LockstepRobot
 
 def compiled():
     return {
@@ -31,7 +31,7 @@ with LockstepRobot("planar-3") as robot:
         robot.turn(20)
         hand.answer_of(robot.stream.take(hand.packet(robot.now_s, place)))
     assert robot.loop.engine.program.progress()["accepted"] > 20
-    robot.inject_fault(1, 1, 0x7305)
+    robot.inject(1, 1, 0x7305)
     robot._turn_until(lambda: robot.loop.busy, 3.0, "a reaction")
     robot._turn_until(lambda: not robot.loop.busy, 60.0, "the power off")
     assert "7305h" in robot.loop.life.reason

@@ -13,8 +13,9 @@ from scipy.spatial.transform import Rotation
 
 from cdpr_profiles.places import SHIPPED
 from cdpr_rt.core.states import LoopState
-from cdpr_tools.trials.lockstep import CommandRefusedError, LockstepRobot
-from cdpr_tools.trials.pose_log import read_pose_log
+from cdpr_rt.robot import Refused
+from cdpr_tools.lockstep_robot import LockstepRobot
+from cdpr_tools.recordings.pose_log import read_pose_log
 
 LOOSE_N, TAKES_UP_N = 15.0, 40.0
 """Tension of an inactive winch, and tension to take up slack, both with friction."""
@@ -63,10 +64,10 @@ def fallen(
 def test_tighten_does_not_pull_at_a_platform_that_has_turned_over(folder: Path) -> None:
     with fallen(folder, [-0.45, -0.3, 1.7], [0.18, 0.18, 0.0]) as robot:
         assert turned_deg(robot) > 60.0
-        with pytest.raises(CommandRefusedError, match="it has come down, may have turned over"):
+        with pytest.raises(Refused, match="it has come down, may have turned over"):
             robot.program("tighten")
         since = robot.cycle + robot.sync_offset
-        with pytest.raises(CommandRefusedError, match=r"\d cables are up to \d+ mm too short"):
+        with pytest.raises(Refused, match=r"\d cables are up to \d+ mm too short"):
             robot.program("tighten", **{"from": "home"})
         robot.run(0.5)
         assert highest_N(robot, since) < LOOSE_N
@@ -82,16 +83,16 @@ def test_tighten_from_lengths_finds_a_platform_that_landed_upright(folder: Path)
     with fallen(folder, [0.15, 0.5, 1.45], [0.2, 0.0, 0.0]) as robot:
         assert turned_deg(robot) < 20.0  # in use, the platform may be turned by 15 degrees
         assert robot.progress["fallen"]
-        with pytest.raises(CommandRefusedError, match="allowed: from home, lengths"):
+        with pytest.raises(Refused, match="allowed: from home, lengths"):
             robot.program("tighten")
         last = robot.loop.engine.parts.last_stop
         assert last is not None
         last.broken = "axis 1: the cable seems broken"
-        assert any("mend the cable" in notice for notice in robot.status["notices"])
+        assert any("mend the cable" in notice for notice in robot.status()["notices"])
         robot.carry_out("tighten", **{"from": "lengths"})
         assert robot.progress["tight"], robot.progress["trouble"]
         assert "fallen" not in robot.progress
-        assert not any("mend the cable" in notice for notice in robot.status["notices"])
+        assert not any("mend the cable" in notice for notice in robot.status()["notices"])
         here_m, true_m = robot.progress["position_m"], robot.truth()["position_m"]
         assert here_m == pytest.approx(np.ravel(true_m), abs=0.01)
         robot.carry_out("lower")
@@ -125,7 +126,7 @@ def test_tighten_from_lengths_keeps_a_suspended_platform_in_place(
         length_m = known.estimate.cable_length_m.copy()
         slipped_m = np.eye(8)[0] * 0.3
         known.set_lengths(known.position_rad, length_m + slipped_m)
-        with pytest.raises(CommandRefusedError, match=r"disagree by .* held as it is; lower it"):
+        with pytest.raises(Refused, match=r"disagree by .* held as it is; lower it"):
             robot.program("tighten", **{"from": "lengths"})
         robot.run(0.5)
         assert np.ravel(robot.truth()["position_m"]) == pytest.approx(position_m, abs=0.01)
@@ -143,11 +144,11 @@ def test_tighten_is_rejected_after_all_drives_lost_power_together(folder: Path) 
         robot.carry_out("tighten")
         robot.carry_out("pose", position_m=[-0.4, 0.5, 1.7])
         for axis in range(8):
-            robot.inject_fault(axis, 1, 0x3220)
+            robot.inject(axis, 1, 0x3220)
         robot._turn_until(lambda: robot.loop.busy, 3.0, "a reaction")
         robot._turn_until(lambda: not robot.loop.busy, 60.0, "the power off")
         assert robot.state is LoopState.FAULT
         robot.command("acknowledge")
         robot.enable()
-        with pytest.raises(CommandRefusedError, match="it has come down, may have turned over"):
+        with pytest.raises(Refused, match="it has come down, may have turned over"):
             robot.program("tighten")

@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from cdpr_profiles.robot_limits import Limit
-from cdpr_tools.errors import WorkFailedError
-from cdpr_tools.trials.lockstep import LockstepRobot
+from cdpr_rt.robot import Error
+from cdpr_tools.lockstep_robot import LockstepRobot
 
 PLOTTER = Path(__file__).parent / "robots" / "plotter.toml"
 
@@ -21,12 +21,12 @@ def test_a_cable_that_is_cut_is_reported_as_broken(axis: int, name: str) -> None
         robot.carry_out("tighten")
         robot.carry_out("pose", position_m=[0.2, 1.3])
         robot.run(1.0)
-        robot.inject_fault(axis, 12, 1)
+        robot.inject(axis, 12, 1)
         rows = robot.run(0.15)
         first = int(rows["limit"].argmax())
         assert Limit(int(rows["limit"][first])) is Limit.BROKEN_CABLE
         assert first * robot.period_s < 0.05
-        assert robot.status["reason"].startswith(f"{name}: the cable seems broken")
+        assert robot.status()["reason"].startswith(f"{name}: the cable seems broken")
 
 
 def test_tighten_reports_a_cable_that_friction_kept_slack(tmp_path: Path) -> None:
@@ -50,7 +50,7 @@ motor.cogging = [
     )
     with LockstepRobot(PLOTTER, plant=plant) as robot:
         robot.enable()
-        with pytest.raises(WorkFailedError, match=r"c1: came in by .* take up slack by hand"):
+        with pytest.raises(Error, match=r"c1: came in by .* take up slack by hand"):
             robot.carry_out("tighten")
     plant.write_text(
         "seed = 100\nmotor.friction.coulomb_Nm = 0.16\nstart.slack_m = [0.016, 0.035]\n"

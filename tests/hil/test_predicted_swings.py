@@ -11,8 +11,8 @@ from cdpr_profiles import load_robot
 from cdpr_rt.core.states import LoopState
 from cdpr_rt.diagnosis.predictions import SWING_S, CableLoss
 from cdpr_rt.diagnosis.subject import Subject
-from cdpr_tools.trials.lockstep import LockstepRobot
-from cdpr_tools.trials.pose_log import read_pose_log
+from cdpr_tools.lockstep_robot import LockstepRobot
+from cdpr_tools.recordings.pose_log import read_pose_log
 
 CUT = 12
 MOST = 1.3
@@ -43,7 +43,7 @@ def test_a_platform_swings_as_fast_and_as_far_as_predicted(
         rig.carry_out("pose", position_m=list(place_m))
         rig.run(1.5)
         first = rig.cycle + rig.sync_offset
-        rig.inject_fault(cable, CUT, 1)
+        rig.inject(cable, CUT, 1)
         rig._turn_until(lambda: rig.loop.busy, 1.0, "a reaction")
         rig._turn_until(lambda: not rig.loop.busy, 30.0, "the power off")
         assert rig.state is LoopState.FAULT

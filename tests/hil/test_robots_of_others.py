@@ -9,7 +9,7 @@ import pytest
 
 from cdpr_rt.diagnosis.checks import refuse_impossible
 from cdpr_rt.model.statics import statics_of
-from cdpr_tools.trials.lockstep import LockstepRobot
+from cdpr_tools.lockstep_robot import LockstepRobot
 
 OTHERS = sorted((Path(__file__).parent / "others").glob("*.toml"))
 START_m = 0.003

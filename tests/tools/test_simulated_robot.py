@@ -16,7 +16,7 @@ import pytest
 import cdpr_rt as cdpr
 from cdpr_rt.refusal import RefusalCode
 from cdpr_tools.errors import WorkFailedError
-from cdpr_tools.trials.lockstep import LockstepRobot
+from cdpr_tools.lockstep_robot import LockstepRobot
 
 
 @pytest.fixture(scope="module")

@@ -24,10 +24,10 @@ from cdpr_rt.procedures.measure_poses import (
     Readings,
     TargetNotReached,
 )
+from cdpr_rt.robot import Error, Robot
 from cdpr_tools.calibrate.pose_operator import PoseOperator
-from cdpr_tools.errors import WorkFailedError
-from cdpr_tools.simulated_robot import handle_of
-from cdpr_tools.trials.lockstep import LockstepRobot
+from cdpr_tools.client.daemon_robot import robot_errors
+from cdpr_tools.lockstep_robot import LockstepRobot
 
 if TYPE_CHECKING:
     from cdpr_tools.calibrate.pose_camera import PoseCamera
@@ -108,7 +108,7 @@ class RigOperator(PoseOperator):
     def __init__(
         self, rig: LockstepRobot, scanner: ScannerTail, given: bool, stop: Callable[[], bool]
     ) -> None:
-        super().__init__(handle_of(rig), rig.robot, self._see, stop)
+        super().__init__(Robot(rig), rig.robot, self._see, stop)
         self.rig = rig
         self.camera: PoseCamera | None = None
         self.number = 1
@@ -188,28 +188,31 @@ def simulated_rig(
     stop: Callable[[], bool] = lambda: False,
     as_calibrated: bool = False,
 ) -> Iterator[RigOperator]:
-    """Open a robot on its own simulator; raises the errors of `LockstepRobot`.
+    """Open a robot on its own simulator; raises CommandError, DriverError and ProfileError.
 
     With `scanner` readings contain the scanner's pose; `camera` opens the camera of a URL. The
     robot is shut down under control however the block ends, unless it no longer responds.
     """
     with TemporaryDirectory(prefix="cdpr-calibrate-") as folder:
         path, socket = Path(folder) / "scanner.log", Path(folder) / "camera"
-        with LockstepRobot(
-            robot,
-            plant=plant,
-            scanner=path,
-            camera=None if camera is None else socket,
-            as_calibrated=as_calibrated,
-            calibration_in_doubt=True,
-        ) as rig:
+        with (
+            robot_errors(),
+            LockstepRobot(
+                robot,
+                plant=plant,
+                scanner=path,
+                camera=None if camera is None else socket,
+                as_calibrated=as_calibrated,
+                calibration_in_doubt=True,
+            ) as rig,
+        ):
             operator = RigOperator(rig, ScannerTail(path), scanner, stop)
             try:
                 if camera is not None:
                     operator.camera = camera(f"sim:{socket}", rig.machine.clock)
                 yield operator
             except Exception:
-                with suppress(WorkFailedError):  # the first error shows the cause
+                with suppress(Error):  # the first error shows the cause
                     rig.shut_down()
                 raise
             else:

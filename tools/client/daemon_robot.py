@@ -140,7 +140,7 @@ def commanded(daemon: Daemon, *, in_control: bool = False) -> Iterator[Robot]:
     If it is `in_control`, the right to move is taken before the block, and the robot is held at its
     end.
     """
-    try:
+    with robot_errors():
         backend = _Remote(daemon)
         backend.watched_only = not in_control
         try:
@@ -151,6 +151,13 @@ def commanded(daemon: Daemon, *, in_control: bool = False) -> Iterator[Robot]:
             if in_control:
                 backend.close()
             backend.release()
+
+
+@contextmanager
+def robot_errors() -> Iterator[None]:
+    """Raise errors of a robot's handle in the block as those of commands."""
+    try:
+        yield
     except Error as error:
         raise command_error(error) from None
 

@@ -50,6 +50,7 @@ from cdpr_rt.loop.warm_up import warm_up
 from cdpr_rt.model.robot_arrays import RATED_SPEED_SHARE, limits_of
 from cdpr_rt.programs.idle import ZeroTorqueProgram
 from cdpr_rt.programs.track import TrackProgram
+from cdpr_tools.composition.loop_parts import control_loop
 from cdpr_tools.composition.simulator import OwnSimulator
 from cdpr_tools.consent import require_consent
 from cdpr_tools.errors import BadInputError, raised_as
@@ -263,17 +264,18 @@ def _loop_of(
 ) -> tuple[ControlLoop, TrackProgram]:
     """Return the loop of the machine's axes, and its program."""
     robot, n, period_s = machine.robot, len(machine.robot.axes), machine.robot.sync_period_s
+    limits = _limits(robot, tolerance)
     block = SharedBlock.create(n, _RING_S, 1.0 / period_s)
     stack.callback(os.close, block.fd)
     track, limp = TrackProgram(n, period_s), ZeroTorqueProgram(n)
     parts = LoopParts(
         programs={IDLE: limp, HOLD: limp, track.name: track},
-        supervisor=Supervisor(_limits(robot, tolerance), n, period_s),
+        supervisor=Supervisor(limits, n, period_s),
         estimator=Estimator(n, period_s),
         axis_names=[axis.name for axis in robot.axes],
         enable_realtime=lambda: stack.enter_context(paced_realtime()),
     )
-    return ControlLoop(block, machine, parts), track
+    return control_loop(robot, limits, block, machine, parts), track
 
 
 @contextmanager

@@ -120,10 +120,13 @@ def _identification() -> None:
 
 def _buses() -> None:
     """Boot robots on one and two simulated buses: frames, truth log, rows."""
-    from cdpr_tools.trials.lockstep import LockstepRobot  # noqa: PLC0415  needs the daemon's extra
+    # they need the daemon's extra
+    from cdpr_tools.client.daemon_robot import robot_errors  # noqa: PLC0415
+    from cdpr_tools.lockstep_robot import LockstepRobot  # noqa: PLC0415
 
     for name in ("bench-2", "bench-8", "planar-3"):
         with (
+            robot_errors(),
             TemporaryDirectory() as folder,
             LockstepRobot(name, record=Path(folder), as_calibrated=False) as robot,
         ):

@@ -14,8 +14,8 @@ from cdpr_profiles import load_robot
 from cdpr_rt.arrays import FloatArray, rms
 from cdpr_rt.service.recording_reader import Columns, RecordingReader
 from cdpr_tools.errors import BadInputError, WorkFailedError
+from cdpr_tools.recordings.pose_log import Truth, read_pose_log
 from cdpr_tools.trials.directions import Directions, platform_of, rotations_of
-from cdpr_tools.trials.pose_log import Truth, read_pose_log
 
 TRUTH: Final = "truth.log"
 FIELDS: Final = (

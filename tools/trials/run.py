@@ -12,9 +12,11 @@ import numpy as np
 
 from cdpr_profiles import load_robot
 from cdpr_rt.arrays import FloatArray
+from cdpr_rt.robot import Error, Refused
+from cdpr_tools.client.daemon_robot import robot_errors
 from cdpr_tools.errors import BadInputError, WorkFailedError
+from cdpr_tools.lockstep_robot import LockstepRobot
 from cdpr_tools.trials.directions import Directions, platform_of
-from cdpr_tools.trials.lockstep import CommandRefusedError, LockstepRobot
 from cdpr_tools.trials.recorded import TRUTH
 
 _TIGHTEN_S, _MOVE_S = 180.0, 60.0
@@ -85,7 +87,7 @@ class TrialRun:
         return np.asarray(share * self.directions.angle_rad * axis / np.linalg.norm(axis))
 
     def start_move(self, place: FloatArray, speed_m_s: float | None = None) -> None:
-        """Start a move to a place (d,); returns immediately. Raises CommandRefusedError."""
+        """Start a move to a place (d,); returns immediately. Raises Refused."""
         self.rig.program("pose", **self.directions.arguments(place, speed_m_s))
         self._advance(self.elapsed_s)
 
@@ -95,7 +97,7 @@ class TrialRun:
             place = self.random_place()
             try:
                 self.start_move(place, speed_m_s)
-            except CommandRefusedError as error:
+            except Refused as error:
                 self.refused += 1
                 reason = str(error)
                 self.mark("refused", **self.directions.marked(place, "target"), reason=reason)
@@ -143,9 +145,12 @@ def trial_run(
     """
     platform_of(load_robot(robot))
     _require_empty(folder)
-    with LockstepRobot(
-        robot, plant=plant, record=folder, truth_log=folder / TRUTH, **options
-    ) as rig:
+    with (
+        robot_errors(),
+        LockstepRobot(
+            robot, plant=plant, record=folder, truth_log=folder / TRUTH, **options
+        ) as rig,
+    ):
         run = TrialRun(rig, np.random.default_rng(seed), advance)
         with _with_notices(rig):
             run.start_up()
@@ -157,7 +162,7 @@ def trial_run(
         )  # fmt: skip
         with _with_notices(rig):
             yield run
-        run.mark("end", refused=run.refused, notices=rig.status["notices"])
+        run.mark("end", refused=run.refused, notices=rig.status()["notices"])
         rig.turn()  # so that the recording contains the last cycle
     recorder = rig.recorder
     if recorder is not None and (status := recorder.status())["error"]:
@@ -169,8 +174,8 @@ def _with_notices(rig: LockstepRobot) -> Iterator[None]:
     """Add the notices of the robot's status to an error of the block."""
     try:
         yield
-    except WorkFailedError as error:
-        for text in rig.status["notices"]:
+    except (Error, WorkFailedError) as error:
+        for text in rig.status()["notices"]:
             error.add_note(text)
         raise
 

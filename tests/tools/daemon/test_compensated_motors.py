@@ -13,7 +13,7 @@ from cdpr_profiles import load_robot
 from cdpr_rt.core.states import LoopState
 from cdpr_sim_bus.robot.plant import Plant
 from cdpr_sim_bus.robot.robot_plant import RobotPlant
-from cdpr_tools.trials.lockstep import LockstepRobot
+from cdpr_tools.lockstep_robot import LockstepRobot
 from tests.tools.daemon.loop_rig import opened
 from tests.tools.motor_profiles import cogging_Nm, leave_profiles
 from tests.tools.robot_rig import robot_file, simulated
@@ -233,6 +233,6 @@ def test_the_profile_of_another_drive_prevents_the_start(
     stored.write_text(stored.read_text().replace('"serial": 2', '"serial": 7'))
     with opened(path, url) as rig:
         assert rig.state is LoopState.UNCONFIGURED
-        reason = rig.status["reason"]
+        reason = rig.status()["reason"]
         assert "axis axis 2: " in reason
         assert "serial = 7, this axis has 2: commission it again" in reason

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cdpr_tools.trials.lockstep import LockstepRobot
+from cdpr_tools.lockstep_robot import LockstepRobot
 
 TURN_rad = 0.15
 

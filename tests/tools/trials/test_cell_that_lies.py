@@ -9,7 +9,7 @@ import pytest
 
 from cdpr_profiles.places import SHIPPED
 from cdpr_rt.core.states import LoopState
-from cdpr_tools.trials.lockstep import LockstepRobot
+from cdpr_tools.lockstep_robot import LockstepRobot
 
 pytestmark = pytest.mark.long
 
@@ -32,7 +32,7 @@ def robot(tmp_path: Path) -> Iterator[LockstepRobot]:
 
 
 def notices(robot: LockstepRobot) -> list[str]:
-    return [text for text in robot.status["notices"] if "load cell" in text]
+    return [text for text in robot.status()["notices"] if "load cell" in text]
 
 
 def test_a_cell_that_lies_is_named_and_the_motion_goes_on(robot: LockstepRobot) -> None:
@@ -40,13 +40,13 @@ def test_a_cell_that_lies_is_named_and_the_motion_goes_on(robot: LockstepRobot) 
     robot.run(6.0)
     assert not notices(robot)
     name = robot.robot.axes[AXIS].name
-    robot.inject_fault(axis=AXIS, sub=CELL_OFF, value=35)
+    robot.inject(axis=AXIS, sub=CELL_OFF, value=35)
     robot.run(6.0)
     (told,) = notices(robot)
     assert told.startswith(f"{name}: its load cell shows ")
     assert 25.0 < float(told.split(" shows ")[1].split(" N ")[0]) < 45.0
     assert " N more than its motor" in told
-    robot.inject_fault(axis=AXIS, sub=CELL_OFF, value=0)
+    robot.inject(axis=AXIS, sub=CELL_OFF, value=0)
     robot.carry_out("pose", position_m=[0.0, 1.5])
     robot.run(3.0)
     assert notices(robot) == [told], "it stays in the status"

@@ -8,10 +8,10 @@ import pytest
 from cdpr_drivers.axes.axis_group import AxisGroup
 from cdpr_drivers.errors import BusError
 from cdpr_rt.core.states import LoopState
+from cdpr_rt.robot import Error, Refused
 from cdpr_rt.service.stream_packet import Standing, StreamSession
-from cdpr_tools.errors import WorkFailedError
-from cdpr_tools.trials.lockstep import CommandRefusedError, LockstepRobot, StreamSender
-from cdpr_tools.trials.pose_log import read_pose_log
+from cdpr_tools.lockstep_robot import LockstepRobot, StreamSender
+from cdpr_tools.recordings.pose_log import read_pose_log
 
 HEIGHT = 1.5
 
@@ -78,10 +78,10 @@ def test_a_fall_after_the_controller_s_death_is_in_the_log():
 
 
 def test_what_is_refused_is_reported_and_changes_nothing(robot):
-    with pytest.raises(CommandRefusedError, match="workspace"):
+    with pytest.raises(Refused, match="workspace"):
         robot.program("pose", position_m=[9.0, HEIGHT])
     assert robot.state is LoopState.ACTIVE
-    with pytest.raises(WorkFailedError, match=r"the impossible: not within 0\.1 s: active"):
+    with pytest.raises(Error, match=r"the impossible: not within 0\.1 s: active"):
         robot.until(lambda: False, 0.1, "the impossible")
 
 
@@ -90,7 +90,7 @@ def test_a_right_that_is_released_holds_the_motion(robot):
     robot.right.drop()
     robot.run(0.01)
     assert robot.loop.engine.program.name == "hold"
-    with pytest.raises(CommandRefusedError, match="nobody holds the right"):
+    with pytest.raises(Refused, match="nobody holds the right"):
         robot.program("pose", position_m=[0.0, HEIGHT])
 
 
@@ -126,7 +126,7 @@ def test_a_stream_s_packets_are_taken_as_the_daemon_takes_them(robot):
 def test_a_drive_that_stays_silent_does_not_keep_two_buses_from_being_left():
     with LockstepRobot("bench-8") as robot:
         robot.enable()
-        robot.inject_fault(axis=1, sub=6, value=65535)
+        robot.inject(axis=1, sub=6, value=65535)
         robot.run(0.5)
         begin_s = robot.machine.clock.now_s
         left = robot.machine.close()
@@ -140,7 +140,7 @@ def test_a_bus_that_is_not_exchanged_any_more_does_not_keep_the_others_from_bein
     usual = AxisGroup.sync
     with LockstepRobot("bench-8") as robot:
         robot.enable()
-        robot.inject_fault(axis=1, sub=6, value=65535)
+        robot.inject(axis=1, sub=6, value=65535)
         robot.run(0.5)
         dropped_out = robot.machine.device.groups[1]
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from cdpr_rt.core.states import LoopState
-from cdpr_tools.trials.lockstep import LockstepRobot
+from cdpr_tools.lockstep_robot import LockstepRobot
 
 pytestmark = pytest.mark.long
 
@@ -26,7 +26,7 @@ def test_it_is_told_while_it_runs(tmp_path: Path, answer_s: float, oscillates: b
             robot.turn(6)
             tension_N.append(robot.truth()["tension_N"].copy())
         assert robot.state is LoopState.ACTIVE, robot.state_text()
-        told = robot.status["notices"]
+        told = robot.status()["notices"]
         assert bool(np.ptp(tension_N, axis=0).max() > 25.0) is oscillates
         if not oscillates:
             assert not told
@@ -35,4 +35,4 @@ def test_it_is_told_while_it_runs(tmp_path: Path, answer_s: float, oscillates: b
         assert ": the platform's loop swings this winch, for 1 s at 3" in notice
         robot.carry_out("lower")
         robot.program("tighten")  # begins with what is known then
-        assert not any("swings this winch" in text for text in robot.status["notices"])
+        assert not any("swings this winch" in text for text in robot.status()["notices"])

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 from mcap.reader import make_reader
 
-from cdpr_tools.trials.lockstep import LockstepRobot
+from cdpr_tools.lockstep_robot import LockstepRobot
 
 pytestmark = pytest.mark.long
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from cdpr_profiles import load_robot
-from cdpr_tools.trials.lockstep import LockstepRobot
+from cdpr_tools.lockstep_robot import LockstepRobot
 
 pytestmark = pytest.mark.long
 

@@ -11,8 +11,8 @@ from cdpr_here import cdpr_here
 
 from cdpr_profiles import load_robot
 from cdpr_profiles.places import SHIPPED
-from cdpr_tools.errors import WorkFailedError
-from cdpr_tools.trials.lockstep import LockstepRobot
+from cdpr_rt.robot import Error
+from cdpr_tools.lockstep_robot import LockstepRobot
 
 pytestmark = pytest.mark.long
 
@@ -136,7 +136,7 @@ def test_cables_that_become_tight_at_the_same_time_do_not_turn_the_platform(tmp_
         robot.enable()
         robot.carry_out("tighten")
         moved, turned_deg = moved_mm(robot, "spatial-8")
-        assert not robot.status["notices"]
+        assert not robot.status()["notices"]
     assert moved < 2.0
     assert turned_deg < 1.0
 
@@ -147,7 +147,7 @@ def test_a_platform_that_was_dragged_along_by_one_winch_ends_it(tmp_path: Path) 
     file.write_text("seed = 100\nplatform.mass_error = -0.5\n" + file.read_text() + MUCH_COGGING)
     with LockstepRobot("spatial-8", plant=file) as robot:
         robot.enable()
-        with pytest.raises(WorkFailedError, match="further out than it was alone"):
+        with pytest.raises(Error, match="further out than it was alone"):
             robot.carry_out("tighten")
         assert moved_mm(robot, "spatial-8")[0] > 5.0
 
@@ -159,7 +159,7 @@ def test_how_far_slack_lets_a_light_platform_be_pulled_along_is_reported(tmp_pat
     with LockstepRobot("planar-4", plant=file) as robot:
         robot.enable()
         robot.carry_out("tighten")
-        (told,) = robot.status["notices"]
+        (told,) = robot.status()["notices"]
         stands = re.search(r"may stand up to about (\d+) mm from the place", told)
         assert stands is not None, told
         most_mm = float(stands[1])
@@ -168,7 +168,7 @@ def test_how_far_slack_lets_a_light_platform_be_pulled_along_is_reported(tmp_pat
     with LockstepRobot("planar-4", plant=file) as robot:
         robot.enable()
         robot.carry_out("tighten")
-        assert not robot.status["notices"]
+        assert not robot.status()["notices"]
 
 
 def test_a_platform_too_light_for_its_winches_is_told_to_have_moved(tmp_path: Path) -> None:
@@ -176,9 +176,7 @@ def test_a_platform_too_light_for_its_winches_is_told_to_have_moved(tmp_path: Pa
     file = plant(tmp_path / "plant.toml", [0.0, 0.3, 0.3, 0.3])
     with LockstepRobot("planar-4", plant=file) as robot:
         robot.enable()
-        with pytest.raises(
-            WorkFailedError, match=r"mm more slack than .* moves this light platform"
-        ):
+        with pytest.raises(Error, match=r"mm more slack than .* moves this light platform"):
             robot.carry_out("tighten", 60.0)
 
 

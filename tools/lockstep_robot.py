@@ -1,4 +1,4 @@
-"""A robot's daemon in this process, on simulated drives, cycle by cycle in bus time.
+"""`cdpr_rt.simulate`: a robot on simulated drives in this process, cycle by cycle in bus time.
 
 The loop, its programs, its supervisor and the bus are those of `cdpr run`. Only leases and streams
 use bus time as their clock, so that minutes of motion pass as fast as the machine computes them.
@@ -7,27 +7,33 @@ use bus time as their clock, so that minutes of motion pass as fast as the machi
 from __future__ import annotations
 
 import os
+import signal
 import tempfile
+import threading
 import time
-from collections.abc import Callable, Mapping, Sequence
-from contextlib import ExitStack, suppress
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import replace
 from itertools import count
 from pathlib import Path
+from types import FrameType
 from typing import TYPE_CHECKING, Any, Final, Self
 
 import numpy as np
 
 from cdpr_drivers.bus.simbus import query_status
+from cdpr_drivers.errors import DriverError
 from cdpr_drivers.robot.commissioned import with_commissioned, without_commissioned
 from cdpr_drivers.robot.machine import RobotMachine
 from cdpr_drivers.robot.robot_buses import robot_urls
 from cdpr_profiles import load_robot
 from cdpr_profiles.calibration.in_force import calibrated
+from cdpr_profiles.errors import ProfileError
 from cdpr_rt.core.clock import Clock
 from cdpr_rt.core.cycle_row import Row
 from cdpr_rt.core.shared_block import RowReader, SharedBlock
 from cdpr_rt.core.states import LoopState
+from cdpr_rt.errors import ControlError
 from cdpr_rt.loop.engine import LoopParts
 from cdpr_rt.loop.loop import ControlLoop
 from cdpr_rt.loop.realtime import one_core
@@ -36,6 +42,7 @@ from cdpr_rt.model.robot_arrays import limits_of
 from cdpr_rt.platform.own_controller import Controller
 from cdpr_rt.programs.base import Program
 from cdpr_rt.refusal import CommandRefusal
+from cdpr_rt.robot import Error, InvalidArgument, InvalidRobot, NotRunning, Refused, Robot
 from cdpr_rt.service.lease import Lease, LeaseError
 from cdpr_rt.service.rows import cycle_figures
 from cdpr_rt.service.setpoint_stream import Address, StreamSessionManager
@@ -46,10 +53,11 @@ from cdpr_rt.service.stream_packet import (
     parse,
     seal,
 )
+from cdpr_tools.composition.fault_injection import injection_of
 from cdpr_tools.composition.loop_parts import control_loop, loop_parts
 from cdpr_tools.composition.simulator import OwnLoadCells, OwnSimulator
-from cdpr_tools.errors import WorkFailedError
-from cdpr_tools.trials.pose_log import PoseLogTail
+from cdpr_tools.errors import BadInputError, CommandError
+from cdpr_tools.recordings.pose_log import PoseLogTail
 
 if TYPE_CHECKING:
     from cdpr_rt.service.recording import Recorder
@@ -170,19 +178,41 @@ class StreamSender:
 
 
 RING_S: Final = 30.0
+_LOG_S: Final = 300.0
+_REPLY_S: Final = 120.0
 _LOOK_CYCLES: Final = 512
 _names = count()
 
 
-class CommandRefusedError(WorkFailedError):
-    """A command was refused or failed, for the reason given."""
+def simulate(
+    robot: str | Path, *, plant: str | Path | None = None, controller: Controller | None = None
+) -> Robot:
+    """Return a robot on simulated drives in this process, ready and without power.
 
-    refusal: CommandRefusal | None = None
-    """The reason in machine-readable form, None if there is only a text."""
+    `robot` is the name or file of a robot, `plant` a file with the deviations of the simulated
+    machine from it. `controller` replaces the built-in controller of the platform. Bus time passes
+    only while a method waits, as fast as this machine computes: the same script gives the same
+    rows. Use the handle from one thread. Closing it removes the power. Raises InvalidRobot, and
+    Error if the drives do not get ready.
+    """
+    plant_file = None if plant is None else Path(plant)
+    try:
+        made = LockstepRobot(
+            robot, plant=plant_file, controller=controller, ring_s=_LOG_S, pinned=False
+        )
+        if controller is not None and made.robot.platform is None:
+            raise InvalidArgument(f"controller: {robot} has no platform to control")
+        return Robot(made.__enter__())
+    except (ProfileError, BadInputError) as error:
+        raise InvalidRobot(str(error)) from error
+    except (CommandError, DriverError, ControlError) as error:
+        raise Error(str(error)) from error
 
 
 class LockstepRobot:
     """One robot, booted and checked, whose time passes only in `turn`; a context manager.
+
+    It is the backend of a `Robot` in this process. Trials and tests also run it cycle by cycle.
 
     `robot` is a profile's name or file, `plant` the simulator's plant file. The simulator logs the
     true pose to `truth_log`, by default a temporary file. `record` is a folder for the recording
@@ -195,8 +225,10 @@ class LockstepRobot:
     `camera` the socket of a simulated camera on the platform. Rows of the last `ring_s` are kept.
     If `pinned`, the simulator and all of this process share one core. The right to move is held
     from the beginning, see `right`. Raises CommandError, DriverError and ProfileError as `cdpr
-    run` does, WorkFailedError if the robot does not get ready.
+    run` does, Error if the robot does not get ready.
     """
+
+    look_s = 0.02
 
     def __init__(
         self,
@@ -232,7 +264,10 @@ class LockstepRobot:
         self._controller = controller
         self._limits = limits_of(self.robot, calibration_in_doubt=calibration_in_doubt)
         self._stack = ExitStack()
-        self._turns = self._status_seen = 0
+        self._turns = self._status_seen = self._began = 0
+        self._closed = False
+        self.description: Mapping[str, Any]
+        """The description that the daemon would publish."""
         self.block: SharedBlock
         self.machine: RobotMachine
         self.loop: ControlLoop
@@ -255,6 +290,7 @@ class LockstepRobot:
 
     def __exit__(self, *_: object) -> None:
         """Remove the power immediately, wherever the platform is; `shut_down` lowers it first."""
+        self._closed = True
         self._stack.close()
 
     def _parts(self) -> LoopParts:
@@ -302,7 +338,7 @@ class LockstepRobot:
         # doubts about the calibration of a real robot do not concern a simulated one
         parts = replace(parts, programs=programs, before_power=lambda: None)
         self.loop = control_loop(robot, limits, block, self.machine, parts, lambda: self.now_ns)
-        self._description = block.description()
+        self.description = block.description()
         self.right = RightInBusTime(block, lambda: self.now_ns)
         self.stream = StreamInBusTime(block, self.right, lambda: self.now_ns)
         self._reader = RowReader(block)
@@ -315,6 +351,7 @@ class LockstepRobot:
             stack.callback(self._end_recording)
             self.recorder.begin()
         self._boot()
+        self._began = self.rows_written
         if self._truth_path is not None:
             self._truth = stack.enter_context(PoseLogTail(self._truth_path))
         if self._pinned:
@@ -325,7 +362,7 @@ class LockstepRobot:
         loop.runner.begin(loop.transitions.start_up())
         self._turn_until(lambda: not loop.busy, 60.0, "the boot")
         if loop.life.state is not LoopState.READY:
-            raise WorkFailedError(loop.life.reason or "the drives are not ready")
+            raise Error(loop.life.reason or "the drives are not ready")
         self.right.take("trial")
 
     def _end_recording(self) -> None:
@@ -373,7 +410,7 @@ class LockstepRobot:
         return self.rows()
 
     def until(self, done: Callable[[], bool], within_s: float, what: str = "the end") -> None:
-        """Run cycles until `done`; raises WorkFailedError if that takes longer than `within_s`.
+        """Run cycles until `done`; raises Error if that takes longer than `within_s`.
 
         It fails immediately if the drives lose their power meanwhile.
         """
@@ -385,25 +422,30 @@ class LockstepRobot:
         self._turn_until(done_or_lost, within_s, what)
         if not done():
             self._turn_until(lambda: not self.loop.busy, within_s, "the drives' power off")
-            raise WorkFailedError(f"{what}: {self.loop.life.reason or 'the power was taken'}")
+            raise Error(f"{what}: {self.loop.life.reason or 'the power was taken'}")
 
     def _turn_until(self, done: Callable[[], bool], within_s: float, what: str) -> None:
         clock = self.machine.clock  # bus time also passes without cycles, as in a boot
         end_s = clock.now_s + within_s
         while not done():
             if clock.now_s > end_s:
-                raise WorkFailedError(f"{what}: not within {within_s:g} s: {self.state_text()}")
+                raise Error(f"{what}: not within {within_s:g} s: {self.state_text()}")
             self.turn()
 
     # -- commands
 
-    def command(self, do: str, within_s: float = 60.0, **what: Any) -> dict[str, Any]:
+    def command(
+        self,
+        do: str,
+        program: str = "",
+        wanted: Mapping[str, Any] | None = None,
+        within_s: float = _REPLY_S,
+    ) -> None:
         """Send a command as the service does, and run cycles until the reply arrives.
 
-        `what` are the command's keys: program, wanted. Raises CommandRefusedError if it fails.
+        Raises Refused if it is refused or fails.
         """
-        right = self.right.number
-        number = self.block.post_command({"do": do, "client": "trial", "right": right, **what})
+        fields = {"program": program} if program else {}
         answers: list[dict[str, Any]] = []
 
         def answered() -> bool:
@@ -412,12 +454,15 @@ class LockstepRobot:
                     answers.append(answer)
             return bool(answers)
 
-        self._turn_until(answered, within_s, do)
+        with self._for_script():
+            right = self.right.number
+            number = self.block.post_command(
+                {"do": do, "client": "trial", "right": right, **fields, "wanted": wanted or {}}
+            )
+            self._turn_until(answered, within_s, do)
         if not answers[0]["ok"]:
-            refused = CommandRefusedError(f"{do}: {answers[0]['text']}")
-            refused.refusal = CommandRefusal.from_json(answers[0].get("refusal"))
-            raise refused
-        return answers[0]
+            refusal = CommandRefusal.from_json(answers[0].get("refusal"))
+            raise Refused(str(refusal or answers[0]["text"]), refusal)
 
     def enable(self, program: str = "hold", **arguments: Any) -> None:
         """Enable the drives and run `program`."""
@@ -428,12 +473,12 @@ class LockstepRobot:
         self.command("program", program=name, wanted=arguments)
 
     def carry_out(self, name: str, within_s: float = 60.0, **arguments: Any) -> None:
-        """Run a program until it has finished; raises WorkFailedError if it does not succeed."""
+        """Run a program until it has finished; raises Error if it does not succeed."""
         self.program(name, **arguments)
         program = self.loop.engine.program
         self.finish(within_s)
         if trouble := program.progress().get("trouble", ""):
-            raise WorkFailedError(f"{name}: {trouble}")
+            raise Error(f"{name}: {trouble}")
 
     def finish(self, within_s: float = 60.0) -> None:
         """Run cycles until the running program has finished."""
@@ -444,10 +489,10 @@ class LockstepRobot:
 
         self.until(over, within_s, program.name)
         if self.loop.engine.program is not program:
-            raise WorkFailedError(f"{program.name} was ended: {self.state_text()}")
+            raise Error(f"{program.name} was ended: {self.state_text()}")
 
-    def inject_fault(self, axis: int, sub: int, value: int) -> None:
-        """Inject a fault into a simulated drive (object 2F00h), between two cycles."""
+    def inject(self, axis: int, sub: int, value: int) -> None:
+        """Write a fault to a simulated drive (object 2F00h), between two cycles."""
         where = self.robot.axes[axis]
         networks = self.machine.networks
         networks[where.bus].write(where.node_id, 0x2F00, sub, value)
@@ -466,11 +511,6 @@ class LockstepRobot:
         self.machine.clock.sleep(seconds)
 
     # -- state and data
-
-    @property
-    def description(self) -> dict[str, Any]:
-        """The description that the daemon would publish."""
-        return self._description
 
     def rows(self) -> Row:
         """Return the rows since the last call, but no more than those of the last `ring_s`."""
@@ -518,9 +558,9 @@ class LockstepRobot:
         """The progress of the running program."""
         return self.loop.engine.program.progress()
 
-    @property
     def status(self) -> dict[str, Any]:
-        """The status that the daemon would publish now, with the newest cycle."""
+        """Return the status that the daemon would publish now, with the newest cycle."""
+        self._require_open()
         self.loop.status.publish()
         return self.block.status() | cycle_figures(self.block, self.description)
 
@@ -533,3 +573,100 @@ class LockstepRobot:
     def recordings(self) -> Sequence[Path]:
         """Return the files recorded so far, oldest first."""
         return [] if self._record is None else sorted(self._record.glob("*.mcap"))
+
+    # -- for the handle: a Ctrl-C takes effect between two cycles, and errors are the handle's
+
+    def wait(self, seconds: float) -> None:
+        """Run cycles for some seconds, at least one."""
+        with self._for_script():
+            self.turn(max(1, round(seconds / self.period_s)))
+
+    def observe(self, seconds: float) -> Row:
+        """Run cycles for some seconds; return their rows."""
+        began = self.rows_written
+        self.wait(seconds)
+        return self.kept_rows(began)
+
+    def plan(self, file: Path) -> str:
+        """Plan the path in a file; return the name of the plan."""
+        # imported here: most scripts follow no path
+        from cdpr_rt.programs.path_store import write_plan  # noqa: PLC0415
+        from cdpr_tools.paths.options import PathOptions  # noqa: PLC0415
+        from cdpr_tools.paths.preview import obstacle_text, preview  # noqa: PLC0415
+
+        self._require_open()
+        try:
+            shown = preview(self.robot, file, PathOptions(), lambda _what, _part: None)
+        except (ProfileError, ControlError, BadInputError) as error:
+            raise Refused(str(error)) from None
+        plan, paths = shown.plan, self.loop.engine.parts.paths
+        if shown.obstacle is not None or plan.timed is None or paths is None:
+            raise Refused(obstacle_text(shown))
+        if plan.next_line is not None:
+            raise Refused(f"{file}: is too long for one plan; divide it at line {plan.next_line}")
+        folder = self.folder / "paths"
+        paths.open(folder)
+        lines = plan.nodes.line[plan.timed.node]
+        return write_plan(folder, plan.timed, lines, file.name, shown.planner.model)
+
+    def log(self, fields: Sequence[str]) -> Row:
+        """Return these fields of the rows since the robot was ready, at most the last `ring_s`."""
+        self._require_open()
+        return self.kept_rows(self._began)[list(fields)]
+
+    def inject_fault(self, axis: int, fault: str, value: int | None) -> None:
+        """Inject a fault by its name."""
+        with self._for_script():
+            self.inject(axis, *injection_of(fault, value))
+
+    def end(self) -> None:
+        """End under control, then without power."""
+        with self._for_script():
+            self.shut_down()
+
+    def close(self) -> None:
+        """Remove the power and end the simulation; idempotent."""
+        if not self._closed:
+            with self._for_script():
+                self.__exit__()
+
+    def _require_open(self) -> None:
+        if self._closed:
+            raise NotRunning("the simulation has ended")
+
+    @contextmanager
+    def _for_script(self) -> Iterator[None]:
+        self._require_open()
+        try:
+            with _interrupts_deferred():
+                yield
+        except BadInputError as error:
+            raise InvalidArgument(str(error)) from error
+        except (CommandError, DriverError, ControlError) as error:
+            raise Error(str(error)) from error
+
+
+@contextmanager
+def _interrupts_deferred() -> Iterator[None]:
+    """Defer a Ctrl-C in the block to its end; a second one raises KeyboardInterrupt immediately."""
+    if (
+        threading.current_thread() is not threading.main_thread()
+        or signal.getsignal(signal.SIGINT) is not signal.default_int_handler
+    ):
+        yield
+        return
+    interrupts = 0
+
+    def note(_number: int, _frame: FrameType | None) -> None:
+        nonlocal interrupts
+        interrupts += 1
+        if interrupts > 1:
+            raise KeyboardInterrupt
+
+    signal.signal(signal.SIGINT, note)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+        if interrupts == 1:
+            raise KeyboardInterrupt
