@@ -79,10 +79,14 @@ _REASONS = {
     (_STORE, 2): "its memory could not be written",
 }
 _VENDOR_SPECIFIC = 255
+_NO_ANSWER = {
+    _SET_BIT_TIMING: "the device does not answer to a bit rate: it lacks this LSS service, so set "
+    "the bit rate with the maker's tool, and the node id without --bitrate",
+    _STORE: "the device does not answer to the request to store its settings",
+}
+"""Problems with a device that answered before, by the request that it leaves unanswered."""
 
 _SEARCHES = 4
-_NEVER_USED = 127
-"""Node id that a device has during a search; it is removed before it could take effect."""
 _ALL = (0, 0xFFFFFFFF)
 
 
@@ -115,6 +119,8 @@ class LssMaster(BusMember):
 
     def __init__(self, url: BusUrl, clock: Clock, timeout_s: float = 0.1) -> None:
         self.timeout_s = timeout_s
+        self.hides_others = False
+        """Whether a device of the last fastscan answered to everything, which hides others."""
         self._frames: deque[tuple[int, bytes]] = deque(maxlen=_MOST_WAITING)
         self._lost: BusError | None = None
         self._clients: dict[int, SdoClient] = {}
@@ -186,7 +192,9 @@ class LssMaster(BusMember):
         """Return the answer of the one device in the configuration state; raises LssError."""
         answer = self._ask(question, specifier)
         if answer is None:
-            raise LssError(f"no device answers (LSS command {question[0]:02X}h)")
+            raise LssError(
+                _NO_ANSWER.get(question[0], f"no device answers (LSS command {question[0]:02X}h)")
+            )
         answers = [answer, *self._collect(specifier, self._settle_s)]
         if len(answers) > 1:
             raise LssError(
@@ -351,29 +359,27 @@ class LssMaster(BusMember):
         return found
 
     def _fastscan_all(self) -> set[LssAddress] | None:
-        """Return the devices found by repeated fastscans; None if a scan does not complete."""
+        """Return the devices found by repeated fastscans; None if a scan does not complete.
+
+        A device is in the configuration state once it is found, and then takes no part by CiA 305.
+        Devices with the CANopenNode stack answer every request in that state, until they have a
+        node id and are released. They hide the devices that are not found yet.
+        """
         self.release()
+        self.hides_others = False
         found: set[LssAddress] = set()
-        silenced: set[LssAddress] = set()
-        try:
-            while self._scan(0, _FROM_THE_START, 0, 0):
-                address = self._scan_address()
-                if address is None:
-                    return None
-                if address in silenced:
-                    raise LssError(
-                        f"{address} takes part in the fastscan after it has been found, which "
-                        "hides others: connect it alone and use --alone"
-                    )
-                # it is in configuration state now, so that the next scan skips it; CANopenNode
-                # also waits for a node id
-                if address in found or silenced:
-                    self._prepare_node_id(_NEVER_USED)
-                    silenced = found | {address}
-                found.add(address)
-        finally:
-            if silenced:
-                self._prepare_node_id(UNCONFIGURED)
+        while self._scan(0, _FROM_THE_START, 0, 0):
+            # every waiting device expects the first number now, so none may answer to the last
+            self.hides_others = bool(found) and self._scan(0, 31, 3, 3)
+            if self.hides_others:
+                break
+            address = self._scan_address()
+            if address is None:
+                return None
+            if address in found:
+                self.hides_others = True
+                break
+            found.add(address)
         return found
 
     def _scan_address(self) -> LssAddress | None:
@@ -384,11 +390,6 @@ class LssMaster(BusMember):
                 return None
             numbers.append(number)
         return LssAddress(*numbers)
-
-    def _prepare_node_id(self, node_id: int) -> None:
-        """Give all devices in the configuration state a node id that takes effect at `release`."""
-        self._ask(bytes([_SET_NODE_ID, node_id]), _SET_NODE_ID)
-        self._collect(_SET_NODE_ID, self._settle_s)
 
     def _confirms(self, address: LssAddress) -> bool:
         try:
@@ -434,9 +435,10 @@ class LssMaster(BusMember):
         self._set(_SET_NODE_ID, bytes([node_id]), f"node id {node_id}")
 
     def set_bitrate(self, bitrate_bit_s: int) -> None:
-        """Give the selected device a bit rate of `BITRATE_INDEX`; raises LssError if refused.
+        """Give the selected device a bit rate of `BITRATE_INDEX`.
 
-        It takes effect at `activate_bitrate` or, if stored, at the next power-on.
+        It takes effect at `activate_bitrate` or, if stored, at the next power-on. Raises LssError
+        if the device refuses it, or lacks this service.
         """
         table = bytes([0, BITRATE_INDEX[bitrate_bit_s]])
         self._set(_SET_BIT_TIMING, table, f"a bit rate of {bitrate_bit_s // 1000} kbit/s")

@@ -35,8 +35,14 @@ _STORE_FAILED = 2
 class LssSlave:
     """One LSS slave; the LSS address is 1018h. It listens in every NMT state."""
 
-    def __init__(self, slave: CanopenSlave) -> None:
+    def __init__(self, slave: CanopenSlave, *, hides_others: bool = False) -> None:
+        """Build the slave.
+
+        With `hides_others` it answers every fastscan in the configuration state, as devices with
+        the CANopenNode stack do.
+        """
         self._slave = slave
+        self._hides_others = hides_others
         self._configuration = False
         self.pending_node_id = slave.node_id
         """Node id that takes effect at the next communication reset."""
@@ -116,6 +122,8 @@ class LssSlave:
         return self._slave.node_id == UNCONFIGURED and self.pending_node_id == UNCONFIGURED
 
     def _fastscan(self, data: bytes) -> None:
+        if self._configuration and self._hides_others:
+            self._send(_IDENTIFIED)
         if self._configuration or not self._is_unconfigured():
             return
         number, bit, part, following = int.from_bytes(data[1:5], "little"), *data[5:8]

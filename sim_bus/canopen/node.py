@@ -111,7 +111,8 @@ class CanopenSlave:
     The first `advance` boots it. `outbox` always stays the same list: the sender of its frames
     empties it with `clear()`. A node id stored by LSS overrides `node_id`; 255 starts it
     unconfigured, with LSS only. `bitrate` is that of the bus; a node that LSS set to another rate
-    receives nothing. Raises DictionaryError if the EDS cannot be used.
+    receives nothing. `lss_hides_others`: see `LssSlave`. Raises DictionaryError if the EDS cannot
+    be used.
     """
 
     def __init__(
@@ -122,6 +123,7 @@ class CanopenSlave:
         *,
         store: ParameterStore | None = None,
         bitrate: int = 1_000_000,
+        lss_hides_others: bool = False,
     ) -> None:
         self.od = od
         self.app = app
@@ -153,7 +155,7 @@ class CanopenSlave:
         self._heartbeat = HeartbeatProducer(self)
         self._consumers = HeartbeatConsumers(self)
         self._sdo = SdoServer(self)
-        self._lss = LssSlave(self)
+        self._lss = LssSlave(self, hides_others=lss_hides_others)
         self.sync = SyncConsumer(self)
         self.pdo = PdoService(self)
 

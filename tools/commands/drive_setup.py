@@ -139,8 +139,15 @@ def lss(
         out.say(f"{len(found)} device{'s' * (len(found) != 1)} found")
         for device in found:
             out.say(f"  {device}")
+        if master.hides_others:
+            out.say(
+                "A device that is listed answers to every search until it has a node id, which "
+                "can hide others. Give it one, then search again."
+            )
+        if not found and (kind is not None or str(new)):
+            raise WorkFailedError(_none_found(master, kind))
         if str(new):
-            device = _choose(found, master)
+            device = _choose(found)
             _check(master, device, found, new)
             question = f"on {url}: {device.address} gets {new}."
             require_consent(question, yes or url.is_simulated, "nothing was changed")
@@ -164,13 +171,18 @@ def _search(
     master: LssMaster, name: str | None, kind: DriveProfile | None, serial: int | None
 ) -> list[_Device]:
     """Return the devices of a type, or those without node id; the serial number narrows it down."""
-    if kind is None:
-        addresses = [a for a in master.unconfigured() if serial in (None, a.serial)]
-    else:
+    if kind is not None:
         serials = (0, 0xFFFFFFFF) if serial is None else (serial, serial)
         addresses = master.find(
             kind.vendor_id, kind.product_code, serials=serials, usual_revision=kind.revision
         )
+    if kind is None or not addresses:  # some devices can be found by fastscan only
+        addresses = [
+            a
+            for a in master.unconfigured()
+            if serial in (None, a.serial)
+            and (kind is None or (a.vendor_id, a.product_code) == _type(kind))
+        ]
     known = {} if name is None or kind is None else {_type(kind): name}
     known = _shipped() | known
     return [
@@ -200,20 +212,30 @@ def _type(drive: DriveProfile) -> tuple[int, int]:
     return drive.vendor_id, drive.product_code
 
 
-def _choose(found: list[_Device], master: LssMaster) -> _Device:
+def _choose(found: list[_Device]) -> _Device:
     if len(found) == 1:
         return found[0]
-    if found:
-        serials = ", ".join(str(device.address.serial) for device in found)
-        raise BadInputError(f"{len(found)} devices found: choose one by --serial ({serials})")
-    hint = (
-        "one without a node id is there, but takes no part in the search: give its --profile and "
-        "--serial, or connect it alone and use --alone"
-        if master.has_unconfigured()
-        else "check power, wiring, termination and bit rate; a device that has a node id is found "
-        "by its --profile, or by --alone when it is the only one on the bus"
+    serials = ", ".join(str(device.address.serial) for device in found)
+    raise BadInputError(f"{len(found)} devices found: choose one by --serial ({serials})")
+
+
+def _none_found(master: LssMaster, kind: DriveProfile | None) -> str:
+    """Return what to do if a search found no device."""
+    if master.hides_others:
+        return (
+            "no such device found: another device hides it. Search without --profile and --serial, "
+            "and give that one a node id first"
+        )
+    if master.has_unconfigured():
+        return (
+            "no device found: one without a node id is there, but takes no part in the search: "
+            "give its --profile and --serial, or connect it alone and use --alone"
+        )
+    looked_for = "" if kind is None else f" of vendor {kind.vendor_id:08X}h"
+    return (
+        f"no device{looked_for} found: check power, wiring, termination and bit rate; a device "
+        "with a node id is found by its --profile, or by --alone if it is the only one on the bus"
     )
-    raise WorkFailedError(f"no device found: {hint}")
 
 
 def _check(master: LssMaster, device: _Device, found: list[_Device], new: _NewSettings) -> None:

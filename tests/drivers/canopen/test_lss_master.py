@@ -22,7 +22,6 @@ from cdpr_profiles import load_drive
 from cdpr_rt.core.clock import PacedClock
 from cdpr_sim_bus.bus.hub import Hub
 from cdpr_sim_bus.canopen import CanopenSlave, ObjectDictionary, ParameterStore, SlaveApplication
-from cdpr_sim_bus.canopen.lss import LssSlave
 
 pytestmark = pytest.mark.alone
 
@@ -38,12 +37,23 @@ def quick(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def device(
-    serial: int, node_id: int = UNCONFIGURED, store: Path | None = None, product: int = PRODUCT
+    serial: int,
+    node_id: int = UNCONFIGURED,
+    store: Path | None = None,
+    product: int = PRODUCT,
+    *,
+    hides_others: bool = False,
 ) -> CanopenSlave:
     od = ObjectDictionary.from_eds(EDS, node_id)
     od.set_default(0x1018, 2, product)
     od.set_default(0x1018, 4, serial)
-    return CanopenSlave(od, node_id, SlaveApplication(), store=ParameterStore(store))
+    return CanopenSlave(
+        od,
+        node_id,
+        SlaveApplication(),
+        store=ParameterStore(store),
+        lss_hides_others=hides_others,
+    )
 
 
 def address(serial: int, product: int = PRODUCT) -> LssAddress:
@@ -92,27 +102,25 @@ def test_fastscan_finds_all_unconfigured_devices_and_no_others() -> None:
         assert master.unconfigured() == wanted  # a search does not change the devices
 
 
-def test_devices_that_keep_answering_the_fastscan_are_all_found(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    """CANopenNode devices do so after they were found. None keeps the temporary node id."""
-    nodes = [device(5)]  # follows the standard
-    by_the_standard = LssSlave._fastscan
-
-    def goes_on(lss: LssSlave, data: bytes) -> None:
-        found, lss._configuration = lss._configuration, False
-        by_the_standard(lss, data)
-        lss._configuration |= found
-
-    monkeypatch.setattr(LssSlave, "_fastscan", goes_on)
-    nodes += [device(3), device(9)]
+def test_devices_that_hide_others_once_found_are_found_one_after_the_other() -> None:
+    serials = (3, 5, 9)
+    nodes = [device(serial, hides_others=True) for serial in serials]
     with master_of(*nodes) as master:
-        assert master.unconfigured() == [address(serial) for serial in (3, 5, 9)]
-        assert [node.node_id for node in nodes] == [UNCONFIGURED] * 3
-        master.select(address(9))
-        master.set_node_id(4)
-        assert master.unconfigured() == [address(3), address(5)]
-        assert master.node_id_in_use(4) == "it answers to SDO"
+        for node_id, serial in enumerate(serials, 1):
+            assert master.unconfigured() == [address(serial)]
+            assert master.hides_others
+            master.select(address(serial))
+            master.set_node_id(node_id)
+            master.release()
+            assert master.wait_for_boot_up(node_id)
+        assert master.unconfigured() == []
+        assert not master.hides_others
+
+
+def test_devices_found_before_one_that_hides_others_are_listed_with_it() -> None:
+    with master_of(device(7, hides_others=True), device(2), device(9)) as master:
+        assert master.unconfigured() == [address(2), address(7)]
+        assert master.hides_others
 
 
 def test_searching_for_missing_devices_finds_nothing() -> None:
@@ -203,9 +211,6 @@ def test_select_only_accepts_one_device_and_rejects_two() -> None:
 class Sluggish:
     """Answer the fastscan like a device, but late, when the next request has been sent."""
 
-    stubborn = False
-    """Whether it keeps answering the fastscan after it has been found."""
-
     def __init__(self, name: str, numbers: tuple[int, ...], delay_s: float) -> None:
         self.bus = can.Bus(interface="simbus", channel=name)
         self.numbers, self.delay_s = numbers, delay_s
@@ -232,7 +237,7 @@ class Sluggish:
                 self.answer(b"\x44")
         elif data[0] == 0x5E and self.found:
             self.answer(b"\x5e\xff")
-        elif data[0] == 0x51 and (self.stubborn or not self.found):
+        elif data[0] == 0x51 and not self.found:
             number, bit, part, following = int.from_bytes(data[1:5], "little"), *data[5:]
             if bit == 128:
                 self.position = 0
@@ -278,18 +283,6 @@ def _found_at_last(master: LssMaster) -> list[LssAddress]:
         except LssError:
             continue
     return []
-
-
-def test_a_device_that_never_leaves_the_fastscan_ends_the_search_with_an_error(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    monkeypatch.setattr(Sluggish, "stubborn", True)
-    with ExitStack() as stack:
-        name = stack.enter_context(bus_with())
-        stack.enter_context(sluggish_device(name, 3, 0.0))
-        master = stack.enter_context(master_on(name, 0.02, lead=False))
-        with pytest.raises(LssError, match="serial 3 takes part in the fastscan after"):
-            master.unconfigured()
 
 
 def test_a_device_too_slow_for_the_timeout_does_not_give_a_wrong_identity() -> None:

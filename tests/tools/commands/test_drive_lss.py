@@ -118,7 +118,9 @@ def test_new_drives_get_stored_node_ids(tmp_path: Path) -> None:
         told(bus, *TYPE, "--serial", "2", "--node-id", "7")
         assert answers(name, 7)
         assert not answers(name, 5, 0.3)
-        assert "no device found" in refused(1, bus, *TYPE, "--serial", "3", "--node-id", "9")
+        nowhere = "no device of vendor 00CD9A01h found"
+        assert nowhere in refused(1, bus, *TYPE, "--serial", "3", "--node-id", "9")
+        assert nowhere in refused(1, bus, *TYPE, "--serial", "3")
     with simulator("--nodes", "2", "--unconfigured", *store) as name:
         assert answers(name, 7)
 
