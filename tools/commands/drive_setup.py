@@ -226,7 +226,7 @@ def _none_found(master: LssMaster, kind: DriveProfile | None) -> str:
             "no such device found: another device hides it. Search without --profile and --serial, "
             "and give that one a node id first"
         )
-    if master.has_unconfigured():
+    if kind is None and master.has_unconfigured():
         return (
             "no device found: one without a node id is there, but takes no part in the search: "
             "give its --profile and --serial, or connect it alone and use --alone"
