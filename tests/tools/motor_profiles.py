@@ -1,4 +1,4 @@
-"""Cogging profiles as the commissioning of simulated motors would leave them at its very best."""
+"""Cogging profiles of simulated motors as a perfect commissioning would write them."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ SAMPLES = 512
 
 
 def cogging_Nm(plant: Plant, from_index_rad: np.ndarray) -> np.ndarray:
-    """Return the torque, in the drive's units, that cancels a plant's cogging."""
+    """Return the torque in the drive's units that cancels the cogging of a plant."""
     angle = from_index_rad + math.radians(plant.encoder.index_deg)
     total = np.zeros_like(angle)
     for term in plant.cogging:
@@ -31,7 +31,7 @@ def cogging_Nm(plant: Plant, from_index_rad: np.ndarray) -> np.ndarray:
 
 
 def profile_of(winch: Winch, plant: Plant, serial: int) -> CoggingProfile:
-    """Return what is true of a simulated motor, as a profile of the drive of this serial number."""
+    """Return the true profile of a simulated motor, for the drive with this serial number."""
     angle = np.linspace(0.0, math.tau, SAMPLES, endpoint=False)
     table = cogging_Nm(plant, angle).tolist()
     f, gain = plant.friction, 1.0 + plant.motor.torque_constant_error
@@ -75,7 +75,7 @@ def profile_of(winch: Winch, plant: Plant, serial: int) -> CoggingProfile:
 
 
 def leave_profiles(robot: Robot, plants: list[Plant], folder: Path) -> Path:
-    """Write the profile of each motor of a simulated robot, as `cdpr commission` would."""
+    """Write the profile of each motor of a simulated robot like `cdpr commission`."""
     for i, (axis, plant) in enumerate(zip(robot.axes, plants, strict=True)):
         own = folder / folder_of(axis)
         own.mkdir(parents=True)

@@ -1,4 +1,4 @@
-"""Simulated robots in a process of their own, for tests."""
+"""Simulated robots in separate processes."""
 
 from __future__ import annotations
 
@@ -33,12 +33,12 @@ def robot_file(
     optional: int = -1,
     drives: Sequence[str] = (),
 ) -> Path:
-    """Write a robot with `axes` (bus, node id); the one numbered `optional` is not mandatory.
+    """Write a robot with `axes` (bus, node id). Axis number `optional` is not mandatory.
 
-    `drives` are the drive profiles of the axes, where these are not that of the shipped winch.
+    `drives` are the drive profiles of axes that do not use that of the shipped winch.
     """
     lines = ['name = "test robot"', f"sync_period_s = {period_s}"]
-    # slow cycles are for buses that keep time by the clock, on a machine that does other things
+    # slow cycles are for paced buses on a busy machine
     lines += ["master_heartbeat_s = 0.4"] * (period_s >= 0.01)
     for bus in dict.fromkeys(bus for bus, _ in axes):
         lines += ["[[buses]]", f'name = "{bus}"']
@@ -57,7 +57,7 @@ def robot_file(
 
 
 class Simulator:
-    """A running `cdpr sim up`; `ready` is what it told."""
+    """A running `cdpr sim up`. `ready` is its line of readiness."""
 
     def __init__(self, *arguments: str) -> None:
         self.process = subprocess.Popen(
@@ -86,7 +86,7 @@ class Simulator:
 
 @contextmanager
 def simulated(machine: str | Path, *options: str, name: str = "") -> Iterator[str]:
-    """Run a simulated machine; yield the URL that stands for all of its buses."""
+    """Run a simulated machine. Yield the URL for all of its buses."""
     bus = f"simbus:{name or unique()}"
     simulator = Simulator(str(machine), "--bus", bus, *options)
     try:
@@ -105,7 +105,7 @@ def hold(
     speed_rad_s: Sequence[float] | None = None,
     gain_Nm_rad: float = 3.0,
 ) -> None:
-    """Run all axes under a proportional controller, at rest or on a leg of constant speed."""
+    """Run all axes with a proportional controller, at rest or at constant speed."""
     n = session.device.n
     speed = np.zeros(n) if speed_rad_s is None else np.array(speed_rad_s, float)
     start = session.device.feedback.position_rad.copy()

@@ -1,4 +1,4 @@
-"""What a Ray cluster computes is what this process computes."""
+"""A Ray cluster computes the same results as this process."""
 
 from __future__ import annotations
 
@@ -27,14 +27,14 @@ def address() -> Iterator[str]:
         cluster.shutdown()
 
 
-def told(*words: str) -> Any:
+def result_of(*words: str) -> Any:
     done = cdpr_here(*words, "--json")
     assert done.returncode == 0, done.stderr
     return json.loads(done.stdout.splitlines()[-1])
 
 
-@pytest.mark.alone  # Ray gives its own processes half a minute of wall-clock time to start
+@pytest.mark.alone  # Ray's processes have half a minute of wall-clock time to start
 @pytest.mark.parametrize("command", COMMANDS)
-def test_a_cluster_finds_the_same(command: str, address: str) -> None:
+def test_a_cluster_gives_the_same_result(command: str, address: str) -> None:
     words = COMMANDS[command]
-    assert told(*words, "--cluster", address) == told(*words)
+    assert result_of(*words, "--cluster", address) == result_of(*words)

@@ -1,4 +1,4 @@
-"""What is compiled on this machine for the first time is told, and is told then only."""
+"""Compilation is reported, and only when kernels are compiled."""
 
 from __future__ import annotations
 
@@ -30,12 +30,12 @@ print(outer(1.0, 2), len(inner.signatures))
 """
 
 
-def test_kernels_of_which_nothing_is_kept_are_reported_once_and_compiled_once(
+def test_kernels_without_cache_are_compiled_and_reported_once(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """One machine code serves constants and numbers that are not known beforehand."""
+    """The same machine code serves constants and variables."""
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "kept"))
-    monkeypatch.delenv("CDPR_COMPILING_TOLD", raising=False)  # by a command in this process
+    monkeypatch.delenv("CDPR_COMPILING_TOLD", raising=False)  # set by a command in this process
     script = tmp_path / "kernels.py"
     script.write_text(KERNELS)
     first, again = (
@@ -60,13 +60,13 @@ logging.getLogger("cdpr.compiling").info("a kernel")
 """
 
 
-def test_a_command_and_those_that_it_starts_tell_it_once(
+def test_a_command_and_its_child_processes_report_compilation_once(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.delenv("CDPR_COMPILING_TOLD", raising=False)
     script = tmp_path / "twice.py"
     script.write_text(TWICE)
-    for _ in range(2):  # another command tells it again
+    for _ in range(2):  # another command reports it again
         done = subprocess.run(
             [sys.executable, str(script)], capture_output=True, text=True, check=True
         )
@@ -85,7 +85,7 @@ for _ in range(30):
 """
 
 
-def test_what_is_compiled_for_long_is_reported_again_and_again(
+def test_a_long_compilation_is_reported_repeatedly(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.delenv("CDPR_COMPILING_TOLD", raising=False)
@@ -114,7 +114,7 @@ print(*heard, sep="\\n")
 """
 
 
-def test_who_listens_is_told_of_each_kernel_and_of_what_is_passed_on() -> None:
+def test_a_listener_gets_each_kernel_and_forwarded_progress() -> None:
     done = subprocess.run(
         [sys.executable, "-c", LISTENED], capture_output=True, text=True, check=True
     )
@@ -142,7 +142,7 @@ except ModuleNotFoundError as error:
 """
 
 
-def test_kernels_are_compiled_with_shipped_robots_and_without_optional_modules_only(
+def test_kernels_are_compiled_with_shipped_robots_and_without_missing_modules(
     tmp_path: Path,
 ) -> None:
     own = tmp_path / "cdpr-rt" / "profiles" / "robots" / "planar-3.toml"
@@ -156,8 +156,8 @@ def test_kernels_are_compiled_with_shipped_robots_and_without_optional_modules_o
     assert done.stdout.split() == ["3", "cdpr_rt.gone"]
 
 
-def test_doctor_compiles_nothing_if_machine_code_can_be_kept_nowhere() -> None:
-    # numba looks for a folder only for functions of a notebook
+def test_doctor_compiles_nothing_without_a_cache_folder() -> None:
+    # this locator finds folders only for functions in notebooks
     nowhere = os.environ | {"NUMBA_CACHE_LOCATOR_CLASSES": "IPythonCacheLocator"}
     program = (
         "from cdpr_profiles import user_folders; from pathlib import Path\n"

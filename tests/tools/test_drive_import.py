@@ -1,4 +1,4 @@
-"""`cdpr drive import`: profiles out of data sheets, good and bad."""
+"""`cdpr drive import` writes profiles from valid and flawed data sheets."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ COMMAND = load("groups", "drive")
 
 
 def cdpr(*arguments: str | Path) -> tuple[int, str, str]:
-    """Run the command; return its exit status, text and error as `cdpr` would."""
+    """Run the command. Return exit status, text and error like `cdpr`."""
     out = io.StringIO()
     try:
         with redirect_stdout(out):
@@ -58,7 +58,7 @@ def refused(text: str, tmp_path: Path) -> str:
 
 
 def without(index: str, text: str = TEXT) -> str:
-    """The data sheet without an object's sections."""
+    """Return the data sheet without the sections of an object."""
     kept, skipping = [], False
     for line in text.splitlines():
         if line.startswith("["):
@@ -76,7 +76,7 @@ def with_key(section: str, key: str, value: str, text: str = TEXT) -> str:
     return head + found + "\n".join([*lines, f"{key}={value}"]) + gap + rest
 
 
-def test_the_generic_drive_comes_out_as_it_is_shipped(tmp_path: Path) -> None:
+def test_importing_the_generic_drive_gives_the_shipped_profile(tmp_path: Path) -> None:
     told = imported(GENERIC.eds, tmp_path, "--name", "mine")
     drive = load_drive(tmp_path / "mine.toml")
     assert drive.eds == (tmp_path / "mine.eds").resolve()
@@ -105,7 +105,7 @@ def test_the_other_shipped_drives_can_be_imported(name: str, tmp_path: Path) -> 
     assert {0x6041, 0x6064, 0x6077} <= mapped
 
 
-def test_a_readable_text_lists_facts_and_gaps(tmp_path: Path) -> None:
+def test_the_text_lists_facts_and_gaps(tmp_path: Path) -> None:
     status, text, _ = cdpr("import", GENERIC.eds, "--out", tmp_path)
     assert status == 0
     assert "vendor_id               00CD9A01h" in text
@@ -116,11 +116,13 @@ def test_a_readable_text_lists_facts_and_gaps(tmp_path: Path) -> None:
     assert "generic-cia402.toml: is there already; choose another --name or --out" in errors
 
 
-def test_a_dcf_gives_what_belongs_to_the_winch(tmp_path: Path) -> None:
+def test_a_dcf_gives_the_values_of_the_winch(tmp_path: Path) -> None:
     dcf = tmp_path / "Drive 5.DCF"
     text = TEXT + "\n[DeviceComissioning]\nNodeID=5\nBaudrate=500\n"
     text = with_key("1800sub1", "ParameterValue", "0x405", text)
-    dcf.write_text(with_key("6502", "ParameterValue", "0x28", text))  # PT and homing only
+    dcf.write_text(
+        with_key("6502", "ParameterValue", "0x28", text)
+    )  # profile torque and homing only
     told = imported(dcf, tmp_path / "out")
     assert (told["node_id"], told["bitrate_bit_s"]) == (5, 500_000)
     drive = load_drive(tmp_path / "out" / "drive-5.toml")
@@ -130,7 +132,7 @@ def test_a_dcf_gives_what_belongs_to_the_winch(tmp_path: Path) -> None:
     assert "torque_slope_Nm_s (6087h)" in [one["what"] for one in told["unknown"]]
 
 
-def test_the_steepest_torque_ramp_is_taken_from_the_limits(tmp_path: Path) -> None:
+def test_the_torque_slope_is_the_steepest_within_limits(tmp_path: Path) -> None:
     text = with_key("6087", "HighLimit", "2000000", with_key("6502", "DefaultValue", "0x28"))
     path = tmp_path / "slope.eds"
     path.write_text(with_key("6076", "DefaultValue", "5000", text))
@@ -139,7 +141,7 @@ def test_the_steepest_torque_ramp_is_taken_from_the_limits(tmp_path: Path) -> No
     assert (fact["value"], fact["status"]) == (10_000.0, "manual")
 
 
-def test_flaws_are_reported_and_the_copy_is_the_makers(tmp_path: Path) -> None:
+def test_flaws_are_reported_and_the_copy_is_unchanged(tmp_path: Path) -> None:
     path = tmp_path / "odd.eds"
     text = with_key("6077", "AccessType", "readonly", TEXT) + "\n[6041]\nParameterName=Again\n"
     text = text.replace("ProductName=Generic", "ProductName=Gerät")
@@ -156,7 +158,7 @@ def test_flaws_are_reported_and_the_copy_is_the_makers(tmp_path: Path) -> None:
     assert len(load_dictionary(drive.eds, 3)) == len(load_dictionary(GENERIC.eds, 3))
 
 
-def test_a_profile_beside_its_file_needs_no_copy(tmp_path: Path) -> None:
+def test_a_profile_beside_its_eds_makes_no_copy(tmp_path: Path) -> None:
     path = tmp_path / "odd.eds"
     path.write_text(TEXT + "\n[6041]\nParameterName=Again\n")
     told = imported(path, tmp_path)
@@ -165,7 +167,9 @@ def test_a_profile_beside_its_file_needs_no_copy(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("suffix", [".eds", ".dcf"])
-def test_a_data_sheet_that_a_strangers_library_wrote(suffix: str, tmp_path: Path) -> None:
+def test_a_data_sheet_written_by_the_canopen_library_is_imported(
+    suffix: str, tmp_path: Path
+) -> None:
     path = tmp_path / f"theirs{suffix}"
     od = canopen.import_od(str(GENERIC.eds), 5)
     od.node_id, od.bitrate = 5, 250_000
@@ -291,7 +295,7 @@ def test_a_drive_that_counts_in_other_units_runs_and_the_boot_names_a_wrong_unit
     assert 'write velocity_unit = "rpm" into the profile' in problem
 
 
-def test_maps_are_proposed_where_the_defaults_do_not_serve(tmp_path: Path) -> None:
+def test_pdo_maps_are_proposed_if_the_defaults_do_not_suffice(tmp_path: Path) -> None:
     text = TEXT
     for number in range(4):
         for base in ("160", "1A0"):
@@ -306,7 +310,7 @@ def test_maps_are_proposed_where_the_defaults_do_not_serve(tmp_path: Path) -> No
     assert any("step J" in one["how"] for one in told["unknown"])
 
 
-def test_small_fixed_maps_are_combined(tmp_path: Path) -> None:
+def test_small_fixed_pdo_maps_are_combined(tmp_path: Path) -> None:
     text = TEXT
     for number, entries in enumerate((["0x60410010"], ["0x60640020"], ["0x60770010"], [])):
         text = with_key(f"1A0{number}sub0", "AccessType", "ro", text)
@@ -322,7 +326,7 @@ def test_small_fixed_maps_are_combined(tmp_path: Path) -> None:
     ]
 
 
-def test_a_drive_without_what_torque_control_needs_is_refused(tmp_path: Path) -> None:
+def test_a_drive_without_objects_for_torque_control_is_rejected(tmp_path: Path) -> None:
     assert "[6071]: is missing; torque control needs it" in refused(without("6071"), tmp_path)
     assert "[1018]: is missing; every CANopen device" in refused(without("1018"), tmp_path)
     assert "[6060]: is missing; without it no mode" in refused(without("6060"), tmp_path)
@@ -336,7 +340,7 @@ def test_a_drive_without_what_torque_control_needs_is_refused(tmp_path: Path) ->
     assert "[6502] DefaultValue: value 0x21 has the modes 1, 6 only; allowed: one with 4" in told
 
 
-def test_a_drive_whose_maps_cannot_carry_torque_is_refused(tmp_path: Path) -> None:
+def test_a_drive_whose_pdo_maps_cannot_contain_torque_is_rejected(tmp_path: Path) -> None:
     text = TEXT
     for number in range(4):
         text = with_key(f"160{number}sub0", "DefaultValue", "0", text)
@@ -351,7 +355,7 @@ def test_a_drive_whose_maps_cannot_carry_torque_is_refused(tmp_path: Path) -> No
     assert "the file describes no RPDO" in refused(text, tmp_path)
 
 
-def test_what_an_eds_lacks_is_listed_with_its_consequence(tmp_path: Path) -> None:
+def test_missing_objects_are_listed_with_their_consequence(tmp_path: Path) -> None:
     text = TEXT
     for index in ("1016", "1017", "60E3", "6502", "6076", "60B8", "60B9", "60BA"):
         text = without(index, text)
@@ -393,7 +397,7 @@ VALUES = st.sampled_from(
 @pytest.mark.long
 @settings(max_examples=40)
 @given(data=st.data())
-def test_a_mutated_data_sheet_makes_a_profile_or_a_clear_error(
+def test_a_mutated_data_sheet_gives_a_profile_or_a_clear_error(
     tmp_path_factory: pytest.TempPathFactory, data: st.DataObject
 ) -> None:
     sections = list(SECTIONS)

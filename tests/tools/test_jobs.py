@@ -1,4 +1,4 @@
-"""Work in parts, in processes of this machine."""
+"""Jobs run in processes of this machine."""
 
 from __future__ import annotations
 
@@ -17,17 +17,17 @@ class Square:
 
     def run(self) -> int:
         if self.number < 0:
-            os._exit(9)  # as where the system ends it for want of memory
+            os._exit(9)  # as if the system killed it for lack of memory
         return self.number**2
 
 
 @pytest.mark.parametrize("workers", [1, 2])
-def test_results_come_in_the_order_of_jobs(workers: int) -> None:
+def test_results_are_in_the_order_of_jobs(workers: int) -> None:
     with runner(workers, None) as run:
         assert list(run([Square(k) for k in range(7)])) == [k**2 for k in range(7)]
 
 
-def test_a_process_that_dies_ends_the_work() -> None:
+def test_a_dying_process_ends_all_jobs() -> None:
     with (
         runner(2, None) as run,
         pytest.raises(WorkFailedError, match="has died; is there too little memory"),

@@ -1,4 +1,4 @@
-"""What is loaded for long is told on a terminal, and nowhere else."""
+"""Slow loading is reported on terminals only."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ print("done", file=sys.stderr)
 
 
 def _told(soon_s: float, seconds: float, **environment: str) -> str:
-    """Return what the script writes to a terminal if the notice is due after the first time."""
+    """Return the terminal output of the script if the notice is due after `soon_s`."""
     ours, its = pty.openpty()
     command = [sys.executable, "-c", SCRIPT, str(soon_s), str(seconds)]
     with os.fdopen(ours, "rb", buffering=0) as terminal:
@@ -35,22 +35,22 @@ def _told(soon_s: float, seconds: float, **environment: str) -> str:
 
 
 def _all_of(terminal: RawIOBase) -> bytes:
-    """Return what was written to a terminal that its writers have closed."""
+    """Return the output on a terminal until its writers close it."""
     told = b""
     while True:
         try:
             told += terminal.read(4096) or b""
-        except OSError:  # EIO: all is read
+        except OSError:  # EIO: end of output
             return told
 
 
-def test_what_takes_a_moment_is_reported_and_wiped_out() -> None:
+def test_a_notice_of_slow_loading_is_shown_and_erased() -> None:
     assert _told(0.1, 1.0) == "loading ...\r\x1b[Kdone\r\n"
     assert _told(600.0, 0.0) == "done\r\n"
 
 
 @pytest.mark.parametrize("name", ["_CDPR_COMPLETE", "TERM"])
-def test_a_line_that_is_another_s_and_a_dumb_terminal_are_left_alone(name: str) -> None:
+def test_no_notice_is_written_during_completion_or_on_a_dumb_terminal(name: str) -> None:
     assert _told(0.0, 0.5, **{name: "dumb"}) == "done\r\n"
 
 

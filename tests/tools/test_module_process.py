@@ -1,4 +1,4 @@
-"""Processes that end with their standard input, and such that do not."""
+"""Processes that end when their standard input closes, and others."""
 
 import signal
 import subprocess
@@ -14,7 +14,7 @@ import pytest
 from cdpr_tools.processes import end_by_stdin
 
 ENDS = "import sys; sys.stdout.write('x' * (1 << 20)); sys.stdout.flush(); sys.stdin.read()"
-"""More than a pipe holds, which has to be read."""
+"""More data than fits into a pipe."""
 STAYS = "import time; print('up', flush=True); time.sleep(600)"
 LEAVES_A_CHILD = (
     "import subprocess, sys; "
@@ -39,20 +39,20 @@ def _out(process: subprocess.Popen[bytes]) -> IO[bytes]:
     return process.stdout
 
 
-def test_it_ends_by_itself_whatever_it_writes() -> None:
+def test_a_process_ends_however_much_it_writes() -> None:
     with _running(ENDS) as process:
         end_by_stdin(process, 60.0)
         assert process.returncode == 0
 
 
-def test_one_that_does_not_is_killed() -> None:
+def test_a_process_that_does_not_end_is_killed() -> None:
     with _running(STAYS) as process:
         _out(process).readline()
         end_by_stdin(process, 0.3)
         assert process.returncode == -signal.SIGKILL
 
 
-def test_a_child_of_it_that_keeps_its_pipes_is_not_waited_for() -> None:
+def test_stopping_does_not_wait_for_a_child_that_keeps_the_pipes() -> None:
     with _running(LEAVES_A_CHILD) as process:
         child = int(_out(process).readline())
         try:
@@ -63,13 +63,13 @@ def test_a_child_of_it_that_keeps_its_pipes_is_not_waited_for() -> None:
             subprocess.run(["kill", str(child)], check=True)
 
 
-def test_an_interrupt_does_not_leave_it_behind(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_interrupt_while_stopping_leaves_no_process(monkeypatch: pytest.MonkeyPatch) -> None:
     with _running(STAYS) as process:
         _out(process).readline()
         waited = process.communicate
 
         def communicate(timeout: float) -> tuple[str, str]:
-            # once, and begun here: one that came before it is waited for would end the tests
+            # once and here, because an earlier interrupt would end the test run
             monkeypatch.undo()
             press = signal.pthread_kill, (threading.get_ident(), signal.SIGINT)
             threading.Timer(0.2, *press).start()

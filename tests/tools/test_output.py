@@ -1,4 +1,4 @@
-"""Progress: a bar on a terminal, a line now and then in a file or pipe."""
+"""Progress is a bar on a terminal and occasional lines in a file or pipe."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def _work() -> None:
             advance(float(second))
 
 
-def test_no_bar_and_no_blank_line_in_a_pipe() -> None:
+def test_a_pipe_gets_neither_a_bar_nor_a_blank_line() -> None:
     errors = io.StringIO()
     with redirect_stderr(errors):
         _work()
@@ -53,7 +53,7 @@ def test_long_work_prints_progress_in_a_pipe(monkeypatch: pytest.MonkeyPatch) ->
             until("winding: for 7 s now")
         with out.progress("turns", 10.0) as advance:
             until("turns: 0 %")
-            now_s += 40.0  # kernels are compiled before anything turns
+            now_s += 40.0  # kernels are compiled before the motion
             advance(0.0)
             now_s += 3.0
             advance(5.0)
@@ -67,13 +67,13 @@ def test_long_work_prints_progress_in_a_pipe(monkeypatch: pytest.MonkeyPatch) ->
     assert errors.getvalue() == told
 
 
-def test_a_bar_on_a_terminal(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_terminal_shows_a_bar(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("TERM", "xterm")
     ours, theirs = pty.openpty()
     with open(theirs, "w") as terminal, redirect_stderr(terminal):  # noqa: PTH123
         _work()
     shown = b""
-    with suppress(OSError):  # the end, where a terminal's other side is closed
+    with suppress(OSError):  # end of output, when the other end of the terminal is closed
         while piece := os.read(ours, 65536):
             shown += piece
     assert b"winding" in shown
@@ -85,7 +85,7 @@ SHOWN = "\\x1b]0;owned\\x07 \\x9b31m \\x7f \\u202etxt.exe \\r \\udc9b [red]"
 
 
 @pytest.mark.parametrize("as_json", [False, True])
-def test_no_text_acts_on_the_terminal(as_json: bool) -> None:
+def test_control_characters_in_text_are_escaped(as_json: bool) -> None:
     told, noted = io.StringIO(), io.StringIO()
     with redirect_stdout(told), redirect_stderr(noted):
         out = Output(as_json)

@@ -1,4 +1,4 @@
-"""Small files that stand for a large amount of data are refused, with a bound, in little memory."""
+"""Small files that expand to much data are rejected with their bound and little memory."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from mcap.writer import CompressionType, Writer
 from cdpr_rt.service.recording_file import EVENTS, PROFILE, TIMING
 
 BEYOND_BYTES = 1 << 29
-"""Memory that a reader may take beyond what is loaded."""
+"""Memory that a reader may take beyond the loaded modules."""
 READERS = """
 import resource, sys
 from importlib import import_module
@@ -186,7 +186,7 @@ def many_schemas(path: Path) -> None:
     ],
     ids=lambda value: value.__name__ if callable(value) else None,
 )
-def test_a_file_that_stands_for_too_much_is_refused_in_little_memory(
+def test_a_file_that_expands_to_too_much_is_rejected_with_little_memory(
     tmp_path: Path, name: str, write: Callable[[Path], None], bound: str
 ) -> None:
     write(tmp_path / name)

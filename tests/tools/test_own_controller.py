@@ -1,4 +1,4 @@
-"""A platform controller of the user's own, in simulation."""
+"""A user's platform controller in simulation."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from cdpr_profiles.places import SHIPPED
 
 
 class PoseController(cdpr.Controller):
-    """PID control of the pose; `failing` replaces the tensions from a given cycle on."""
+    """PID control of the pose. `failing` replaces the tensions from a given cycle on."""
 
     def __init__(self, failing: Callable[[np.ndarray], object] | None = None) -> None:
         self.failing, self.fails_at, self.cycles, self.resets = failing, 10**9, 0, 0
@@ -38,7 +38,7 @@ class PoseController(cdpr.Controller):
 
 @pytest.fixture(scope="module")
 def robot_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The shipped robot with a quarter of the cycles a second, which take less time."""
+    """Write the shipped robot with a quarter of the cycle rate, which takes less time."""
     path = tmp_path_factory.mktemp("robot") / "planar-3.toml"
     shipped = (SHIPPED / "robots" / "planar-3.toml").read_text()
     path.write_text(shipped.replace("sync_period_s = 0.001", "sync_period_s = 0.004"))
@@ -51,7 +51,7 @@ def test_a_numpy_controller_moves_the_platform(robot_file: Path) -> None:
         robot.enable()
         assert mine.cycles == 0
         robot.tighten()
-        assert mine.cycles == 0  # it stands on its stand
+        assert mine.cycles == 0  # the platform is on its stand
         robot.move_to([0.2, 1.8])
         robot.wait(1.0)
         assert robot.position_m == pytest.approx([0.2, 1.8], abs=0.004)
@@ -75,7 +75,7 @@ def division(_tensions: np.ndarray) -> object:
     raise ZeroDivisionError("no way on")
 
 
-def test_a_controller_that_fails_stops_the_robot_like_any_fault(robot_file: Path) -> None:
+def test_a_failing_controller_stops_the_robot_like_any_fault(robot_file: Path) -> None:
     mine = PoseController()
     with cdpr.simulate(robot_file, controller=mine) as robot:
         for failing, reason in (
@@ -103,7 +103,7 @@ def test_the_built_in_controller_brakes_and_lowers_after_any_fault(robot_file: P
         robot.move_to([0.0, 1.8])
         before = mine.cycles
         robot.inject_fault("lower", "drive-fault")
-        for _ in range(300):  # it is lowered before the power goes
+        for _ in range(300):  # the platform is lowered before power is cut
             with suppress(cdpr.Faulted):
                 robot.wait(0.1)
             if robot.state == "fault":
@@ -146,6 +146,6 @@ def test_tensions_are_limited_to_the_robots_bounds(robot_file: Path) -> None:
     assert model.high_N.max() <= high_N < 2.0 * model.high_N.max()
 
 
-def test_a_robot_without_a_platform_takes_no_controller() -> None:
+def test_a_robot_without_a_platform_rejects_a_controller() -> None:
     with pytest.raises(cdpr.InvalidArgument, match="controller: bench-2 has no platform"):
         cdpr.simulate("bench-2", controller=PoseController())

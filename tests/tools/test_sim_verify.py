@@ -1,4 +1,4 @@
-"""`cdpr sim verify`: what is the same is said to be, what is not is found, and nothing stays."""
+"""`cdpr sim verify` confirms identical runs, finds differences, and leaves no process."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def wait_until(done: Callable[[], bool]) -> None:
         time.sleep(0.02)
 
 
-def test_a_motion_is_the_same_beside_busy_processes_and_stopped(tmp_path: Path) -> None:
+def test_a_motion_is_identical_beside_busy_and_with_stopped_processes(tmp_path: Path) -> None:
     keep = tmp_path / "kept"
     options = ("--seed", "3", "--busy", "2", "--keep", keep)
     told = verified(*options, "--", *JOG, status=0)
@@ -66,7 +66,7 @@ def test_a_motion_is_the_same_beside_busy_processes_and_stopped(tmp_path: Path) 
     assert "kept: cannot be made: File exists" in refused["error"]
 
 
-def test_a_drive_with_other_noise_is_found(tmp_path: Path) -> None:
+def test_a_drive_with_different_noise_is_found(tmp_path: Path) -> None:
     script = tmp_path / "different.sh"
     (tmp_path / "seeds").write_text("")
     script.write_text(DIFFERENT.format(seeds=tmp_path / "seeds"))
@@ -80,7 +80,7 @@ def test_a_drive_with_other_noise_is_found(tmp_path: Path) -> None:
     assert found["plant.toml"]["difference"] == "runs 1 and 2: seed: 0 | 1"
 
 
-def test_a_command_that_fails_or_writes_nothing_proves_nothing(tmp_path: Path) -> None:
+def test_a_command_that_fails_or_writes_nothing_is_an_error(tmp_path: Path) -> None:
     told = verified("--", "drive", "jog", "no-such-winch", "--bus", "simbus:", status=2)
     assert "run 1 ended with exit status 2: " in told["error"]
     assert "no-such-winch" in told["error"]
@@ -92,7 +92,7 @@ def test_a_command_that_fails_or_writes_nothing_proves_nothing(tmp_path: Path) -
     assert told["error"] == f"{tmp_path}/missing: cannot be run: No such file or directory"
 
 
-def test_a_ctrl_c_leaves_nothing_behind(tmp_path: Path) -> None:
+def test_ctrl_c_leaves_no_process(tmp_path: Path) -> None:
     keep = tmp_path / "kept"
     script = tmp_path / "sleeps.sh"
     left = f"trap 'echo asked > asked' TERM; sleep {SLOW_S} & echo begun > begun; wait"
@@ -108,10 +108,10 @@ def test_a_ctrl_c_leaves_nothing_behind(tmp_path: Path) -> None:
     _, told = process.communicate(timeout=SLOW_S)
     assert process.returncode == 1 and "cdpr: stopped on request, in run 1" in told
     assert processes_of(work) == []
-    assert (work / "asked").exists()  # what the command has started is asked to end, not killed
+    assert (work / "asked").exists()  # processes of the command are asked to end and not killed
 
 
-def test_processes_are_stopped_one_at_a_time_and_go_on() -> None:
+def test_processes_are_stopped_one_at_a_time_and_continue() -> None:
     sleeping = [subprocess.Popen(["sleep", "60"]) for _ in range(3)]
 
     def stopped() -> int:
@@ -122,7 +122,7 @@ def test_processes_are_stopped_one_at_a_time_and_go_on() -> None:
     most, some = 0, [one.pid for one in sleeping]
     try:
         while stops.number < 3:
-            stops.turn([*some, 2**22 + 1])  # one that has ended meanwhile
+            stops.turn([*some, 2**22 + 1])  # a process that has ended meanwhile
             most = max(most, stopped())
             time.sleep(0.005)
         assert most == 1 and 0.1 < stops.held_s < time.monotonic() - began
@@ -148,7 +148,7 @@ def differences(runs: list[Run]) -> dict[str, str | None]:
     return {one.file: None if one.same is None else one.difference for one in compare(runs)}
 
 
-def test_names_and_times_that_are_of_the_run_make_no_difference(tmp_path: Path) -> None:
+def test_names_and_times_specific_to_a_run_are_ignored(tmp_path: Path) -> None:
     runs = made_runs(tmp_path, 4711, 815)
     for run, name, date in zip(
         runs, ("x-20261122T100000Z-001", "x-20261122T100907Z-001"), ("now", "later"), strict=True
@@ -219,7 +219,7 @@ def recording(path: Path, log_time: int, torque: float, events: int) -> None:
         (0.0, 1, "runs 1 and 2: /events, message 2: the second has no more"),
     ],
 )
-def test_recordings_are_compared_but_for_the_walls_time(
+def test_recordings_are_compared_without_wall_clock_times(
     tmp_path: Path, torque: float, events: int, wanted: str
 ) -> None:
     runs = made_runs(tmp_path, 1, 2)

@@ -28,14 +28,14 @@ def robot() -> Iterator[cdpr.Robot]:
         yield opened
 
 
-def test_importing_it_loads_neither_numpy_nor_drivers() -> None:
+def test_importing_the_interface_loads_neither_numpy_nor_drivers() -> None:
     code = "import sys, cdpr_rt; print({'numpy', 'cdpr_tools', 'cdpr_drivers'} & set(sys.modules))"
     told = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert told.stdout.strip() == "set()"
     assert set(cdpr.__all__) <= set(dir(cdpr))
 
 
-def test_a_move_ends_at_its_target_and_is_in_the_log(robot: cdpr.Robot) -> None:
+def test_a_move_ends_at_its_target_and_is_recorded(robot: cdpr.Robot) -> None:
     begun_s = robot.time_s
     robot.move_to([0.2, 1.9], speed_m_s=0.4)
     assert robot.state == "active"
@@ -98,7 +98,7 @@ def test_wrong_shapes_and_values_move_nothing(robot: cdpr.Robot) -> None:
 
 
 def interrupt_turn(monkeypatch: pytest.MonkeyPatch, number: int) -> None:
-    """Send a Ctrl-C when cycles are run for this time from now on."""
+    """Send Ctrl-C during the given run of cycles from now on."""
     turn, turns = LockstepRobot.turn, count(1)
 
     def interrupted(self: LockstepRobot, cycles: int = 1) -> None:
@@ -118,7 +118,7 @@ def interrupt_turn(monkeypatch: pytest.MonkeyPatch, number: int) -> None:
     ],
     ids=["wait_until_done", "wait", "start"],
 )
-def test_a_motion_is_held_by_ctrl_c_and_can_be_resumed(
+def test_ctrl_c_holds_a_motion_which_can_be_resumed(
     robot: cdpr.Robot, monkeypatch: pytest.MonkeyPatch, wait: Callable[[cdpr.Robot], None]
 ) -> None:
     robot.move_to([0.0, 1.8])
@@ -147,7 +147,7 @@ def test_a_motion_is_held_when_an_error_ends_the_wait(
     assert (robot.state, robot.program) == ("active", "hold")
 
 
-def test_a_refused_motion_leaves_the_one_before_it_running(robot: cdpr.Robot) -> None:
+def test_a_rejected_motion_does_not_end_the_previous_one(robot: cdpr.Robot) -> None:
     robot.move_to([0.0, 1.8])
     robot.move_to([0.0, 1.9], wait=False)
     with pytest.raises(cdpr.Refused):
@@ -156,7 +156,7 @@ def test_a_refused_motion_leaves_the_one_before_it_running(robot: cdpr.Robot) ->
     assert robot.position_m == pytest.approx([0.0, 1.9], abs=2e-3)
 
 
-def test_time_passes_exactly_as_long_as_asked_for(
+def test_wait_runs_exactly_the_requested_time(
     robot: cdpr.Robot, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     turn, passes = LockstepRobot.turn, list[int]()
@@ -238,7 +238,7 @@ def test_two_simulations_of_one_script_give_the_same_rows() -> None:
         np.testing.assert_array_equal(logs[0][name], logs[1][name])
 
 
-def test_an_unknown_robot_and_a_missing_daemon_have_errors_of_their_own() -> None:
+def test_an_unknown_robot_and_a_missing_daemon_raise_specific_errors() -> None:
     with pytest.raises(cdpr.InvalidRobot, match="no-such-robot"):
         cdpr.simulate("no-such-robot")
     with pytest.raises(cdpr.NotRunning, match="`cdpr run ROBOT` starts one"):

@@ -1,4 +1,4 @@
-"""Whole commands refuse files that are spoilt, or no files at all, and say why."""
+"""Commands reject damaged files, pipes and devices with the reason."""
 
 from __future__ import annotations
 
@@ -18,19 +18,19 @@ from tests.tools.motor_profiles import leave_profiles
 
 @pytest.fixture
 def learnt(tmp_path: Path) -> Path:
-    """Return a folder of the cogging profiles of planar-3's motors."""
+    """Return a folder with cogging profiles of planar-3's motors."""
     return leave_profiles(load_robot("planar-3"), [Plant()] * 3, tmp_path / "learnt")
 
 
 def said(done: subprocess.CompletedProcess[str]) -> str:
-    """Return the one line in which a command has refused its input."""
+    """Return the one line in which a command rejects its input."""
     assert done.returncode == 2, done.stderr
     assert done.stderr.startswith("cdpr: ")
     assert done.stderr.count("\n") == 1
     return done.stderr
 
 
-def test_no_daemon_starts_with_a_cogging_profile_that_would_run_its_motors_away(
+def test_a_daemon_rejects_a_cogging_profile_with_implausible_torque(
     learnt: Path,
 ) -> None:
     path = learnt / "lower" / "cogging-profile.json"
@@ -47,7 +47,7 @@ def test_no_daemon_starts_with_a_cogging_profile_that_would_run_its_motors_away(
     assert not out.exists()
 
 
-def test_cogging_profiles_of_tables_that_differ_in_length_are_refused(learnt: Path) -> None:
+def test_cogging_profiles_with_tables_of_different_length_are_rejected(learnt: Path) -> None:
     path = learnt / "lower" / "cogging-profile.json"
     table = json.loads(path.read_text())
     table["harmonic"]["table_Nm"] = [row[::2] for row in table["harmonic"]["table_Nm"]]
@@ -89,7 +89,7 @@ def make_huge(path: Path) -> None:
         (make_huge, "is too long; allowed: up to"),
     ],
 )
-def test_what_is_no_file_of_ours_is_refused_by_every_command_that_reads_it(
+def test_each_command_rejects_an_invalid_input_file(
     tmp_path: Path, learnt: Path, make: Callable[[Path], None], told: str
 ) -> None:
     robot, plant = tmp_path / "robot.toml", tmp_path / "plant.toml"
@@ -113,7 +113,7 @@ def test_what_is_no_file_of_ours_is_refused_by_every_command_that_reads_it(
 
 
 @pytest.mark.parametrize("command", [("drive", "import"), ("log", "info"), ("bus", "replay")])
-def test_a_pipe_in_place_of_a_file_keeps_nobody_waiting(
+def test_a_pipe_instead_of_a_file_is_rejected_immediately(
     tmp_path: Path, command: tuple[str, ...]
 ) -> None:
     path = tmp_path / "file.eds"

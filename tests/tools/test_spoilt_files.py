@@ -1,4 +1,4 @@
-"""Files that were damaged or made up: each is used, or refused in our own words; never more."""
+"""Damaged files are either used or rejected with our message."""
 
 from __future__ import annotations
 
@@ -72,14 +72,14 @@ LINE = re.compile(rb"[^\n]*\n")
 
 @dataclass(frozen=True)
 class Kind:
-    """One kind of file: which it is, and what reads it."""
+    """A kind of file: its path and its reader."""
 
     path: Path
     use: Callable[[], object]
 
 
 def spoil(data: bytes, rng: random.Random) -> bytes:
-    """Return a file with one to three things changed in it."""
+    """Return the content of a file with one to three changes."""
     for _ in range(rng.choice((1, 1, 1, 2, 3))):
         token = rng.choice(HOSTILE).encode("utf-8")
         spans = [m.span() for m in NUMBER.finditer(data)]
@@ -144,7 +144,7 @@ def raw_log(path: Path) -> Path:
 
 
 def profiles(folder: Path) -> dict[str, Kind]:
-    """Write a robot's file and all that it names, from those that come along."""
+    """Write a robot's file and all files that it names, from shipped ones."""
     for sub in ("robots", "winches", "drives", "cables", "safety_io", "tension_sensors", "rails"):
         for path in (SHIPPED / sub).iterdir():
             shutil.copy(path, folder / path.name)
@@ -175,7 +175,7 @@ def profiles(folder: Path) -> dict[str, Kind]:
 
 
 def written(folder: Path) -> dict[str, Kind]:
-    """Write what commands leave behind, and scripts for them."""
+    """Write output files of commands, and scripts for them."""
     winch = load_robot(folder / "planar-3.toml").axes[0].winch
     cogging, lengths, store, asked, script = (
         folder / name
@@ -235,7 +235,7 @@ def plants(folder: Path) -> dict[str, Kind]:
 
 @pytest.fixture(scope="module")
 def kinds(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Kind]:
-    """Return a sound file of each kind, which has just been used."""
+    """Return a valid file of each kind that has been read once."""
     folder = tmp_path_factory.mktemp("files")
     found = {**profiles(folder), **written(folder), **plants(folder)}
     for kind in found.values():
@@ -252,7 +252,7 @@ NAMES = (
 
 
 def refused(kind: Kind) -> str:
-    """Use a file; return why it was refused, "" where it was not."""
+    """Use a file. Return why it was rejected, "" if it was not."""
     began = time.process_time()
     reason = ""
     try:
@@ -260,7 +260,7 @@ def refused(kind: Kind) -> str:
     except OURS as error:
         reason = str(error)
         assert reason
-    # time of the processor, so that it does not matter what else the machine does
+    # processor time, which does not depend on the load of the machine
     assert time.process_time() - began < CPU_S
     assert len(reason) < LONGEST_CHARS
     assert "\x1b" not in reason
@@ -271,7 +271,7 @@ def refused(kind: Kind) -> str:
 @seed(SEED)
 @settings(max_examples=25, database=None)
 @given(number=st.integers(0, 2**32 - 1))
-def test_a_spoilt_file_is_used_or_refused(kinds: dict[str, Kind], name: str, number: int) -> None:
+def test_a_damaged_file_is_used_or_rejected(kinds: dict[str, Kind], name: str, number: int) -> None:
     kind = kinds[name]
     sound = kind.path.read_bytes()
     try:
@@ -296,7 +296,7 @@ def test_a_spoilt_file_is_used_or_refused(kinds: dict[str, Kind], name: str, num
         (("torque_step_Nm",), "2"),
     ],
 )
-def test_a_report_names_what_is_wrong_with_its_run(
+def test_error_of_a_report_names_the_invalid_key_of_its_run(
     kinds: dict[str, Kind], keys: tuple[str | int, ...], value: object
 ) -> None:
     path = kinds["run"].path

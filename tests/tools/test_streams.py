@@ -1,4 +1,4 @@
-"""What a command does if nobody takes what it writes: a full disk, a reader that has gone."""
+"""Commands whose output cannot be written: full disks, closed pipes, closed descriptors."""
 
 from __future__ import annotations
 
@@ -52,19 +52,19 @@ def test_a_full_disk_is_reported_in_one_line_with_status_1(words: tuple[str, ...
     assert (done.returncode, done.stderr) == (1, NO_SPACE)
 
 
-def test_it_is_reported_by_a_command_that_writes_from_a_thread(log: Path) -> None:
+def test_a_full_disk_is_reported_by_a_command_that_writes_from_a_thread(log: Path) -> None:
     done = cdpr("bus", "replay", log)
     assert done.returncode == 1
     assert done.stderr.endswith(f"\n{NO_SPACE}") and "Traceback" not in done.stderr
 
 
-def test_bad_input_is_reported_though_its_json_cannot_be_written() -> None:
+def test_invalid_input_is_reported_although_its_json_cannot_be_written() -> None:
     done = cdpr("robot", "show", "nosuch", "--json")
     assert done.returncode == 2
     assert done.stderr.count("\n") == 1 and "'nosuch'" in done.stderr
 
 
-def test_a_reader_that_has_gone_ends_the_command_without_a_word() -> None:
+def test_a_closed_pipe_ends_the_command_silently() -> None:
     reader, writer = os.pipe()
     os.close(reader)
     done = subprocess.run(
@@ -74,7 +74,7 @@ def test_a_reader_that_has_gone_ends_the_command_without_a_word() -> None:
     assert (done.returncode, done.stderr) == (1, "")
 
 
-def test_standard_error_that_cannot_be_written_changes_no_result() -> None:
+def test_an_unwritable_standard_error_does_not_change_the_result() -> None:
     with FULL.open("w") as full:
         done = subprocess.run(
             [*CDPR, "robot", "show", "nosuch", "--json"],
@@ -84,7 +84,7 @@ def test_standard_error_that_cannot_be_written_changes_no_result() -> None:
     assert json.loads(done.stdout)["exit_status"] == 2
 
 
-def test_descriptors_that_are_closed_are_nobody_elses(tmp_path: Path) -> None:
+def test_closed_standard_descriptors_are_not_reused_for_files(tmp_path: Path) -> None:
     script = (
         "from cdpr_tools.streams import guard_streams; guard_streams(); import os, sys;"
         "print('lost'); print('lost', file=sys.stderr);"
@@ -95,8 +95,8 @@ def test_descriptors_that_are_closed_are_nobody_elses(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("lost", ["reader", "terminal", "disk", "paused", "paused terminal"])
-def test_no_notice_of_a_daemon_raises_or_waits(lost: str) -> None:
-    """Also a signal's handler writes one."""
+def test_a_notice_of_a_daemon_neither_raises_nor_blocks(lost: str) -> None:
+    """Signal handlers write notices too."""
     ours, theirs = pty.openpty() if "terminal" in lost else os.pipe()
     if lost == "disk":
         theirs = os.open(FULL, os.O_WRONLY)
@@ -117,7 +117,7 @@ def test_no_notice_of_a_daemon_raises_or_waits(lost: str) -> None:
         process.stdout.close()
 
 
-def test_a_notice_written_from_the_background_does_not_stop_a_daemon() -> None:
+def test_a_notice_from_a_background_daemon_does_not_stop_it() -> None:
     """A terminal sends SIGTTOU after `stty tostop`."""
     script = (
         "from cdpr_tools.streams import guard_streams, outlive_output; import os, signal, sys;"

@@ -1,4 +1,4 @@
-"""A command's process loads the libraries it needs and no others: each costs its start."""
+"""A command loads only the libraries it needs, because each costs startup time."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from cdpr_tools.commands import groups
 
 
 def _loaded(code: str) -> set[str]:
-    """Return the modules that are loaded after `code` in a process of its own."""
+    """Return the modules that are loaded after `code` in a separate process."""
     told = subprocess.run(
         [sys.executable, "-c", f"{code}\nimport sys\nprint(*sys.modules)"],
         capture_output=True,
@@ -28,7 +28,7 @@ def _loaded(code: str) -> set[str]:
     [cli.MODULES, groups.SIM, groups.DRIVE, groups.ROBOT],
     ids=["cdpr", "sim", "drive", "robot"],
 )
-def test_the_lines_of_help_are_those_of_the_commands(modules: dict[str, dict[str, str]]) -> None:
+def test_summaries_of_help_equal_those_of_the_commands(modules: dict[str, dict[str, str]]) -> None:
     for module, lines in modules.items():
         for name, line in lines.items():
             told = load(module, name).help
@@ -42,12 +42,12 @@ def test_help_loads_no_command() -> None:
     assert not {"numpy", "pydantic", "numba", "can", "cdpr_tools.commands.run"} & loaded
 
 
-def test_a_command_that_is_not_asked_for_is_not_loaded() -> None:
+def test_other_commands_are_not_loaded() -> None:
     loaded = _loaded("from cdpr_tools.command_group import load; load('sim_up', 'up')")
     assert not {"pymodbus", "matplotlib", "fastapi", "httpx"} & loaded
 
 
-def test_kernels_do_not_load_scipys_linear_algebra_nor_spoil_it() -> None:
+def test_kernels_do_not_load_scipys_linear_algebra_and_keep_it_usable() -> None:
     call = "import numba; assert numba.njit(lambda x: 2.0 * x)(2.0) == 4.0"
     loaded = _loaded(f"import cdpr_profiles.jit; {call}")
     assert "scipy.linalg" not in loaded

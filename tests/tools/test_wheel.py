@@ -1,4 +1,4 @@
-"""What is built for others: a wheel that runs where folders have the names of the repository's."""
+"""The wheel runs beside folders with the names of the repository's packages."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ PIP = (sys.executable, "-m", "pip", "--disable-pip-version-check", "-q")
 
 
 def installed(scratch: Path) -> Path:
-    """Return a folder with what a wheel of this repository installs, and nothing else."""
+    """Return a folder with exactly the files that a wheel of this repository installs."""
     source, wheels, target = (scratch / name for name in ("source", "wheels", "installed"))
     source.mkdir()
     for name in FOLDERS:
@@ -37,7 +37,7 @@ def installed(scratch: Path) -> Path:
 
 
 def test_a_wheel_runs_beside_folders_of_the_same_names(tmp_path: Path) -> None:
-    """With a simulator, which is a process of its own, and the shipped profiles."""
+    """It starts a simulator process and uses the shipped profiles."""
     target, beside = installed(tmp_path), tmp_path / "beside"
     for name in FOLDERS:
         (beside / name).mkdir(parents=True)

@@ -1,4 +1,4 @@
-"""The experiment with a robot on its bus: recorded, judged from files, gone on with, refused."""
+"""The experiment with a robot on its bus: recorded, evaluated from files, and resumed."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ SETTINGS = ExperimentSettings(
 
 @pytest.fixture(scope="module")
 def session(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Two targets with motors of which nothing is known, and an operator who is soon content."""
+    """Run two targets with unidentified motors and an easily satisfied operator."""
     folder = tmp_path_factory.mktemp("experiment") / "A-350ms-1"
     with pytest.MonkeyPatch.context() as patch:
         short = "cdpr_tools.experiment.trial.targets_m"
@@ -56,8 +56,8 @@ def test_errors_come_from_the_recording_and_the_true_poses(session: Path) -> Non
     assert parts == pytest.approx(points["error_m"], abs=1e-12)
 
 
-def test_what_the_operator_saw_is_where_the_platform_was(session: Path) -> None:
-    """The truth kept with each packet, and that of the log at the confirmations, agree."""
+def test_true_positions_of_packets_agree_with_the_log(session: Path) -> None:
+    """They are compared at the confirmations."""
     ticks = np.load(session / f"{CONDITION.name}.npy")
     points = points_of_session(session)
     for point in points:
@@ -68,7 +68,7 @@ def test_what_the_operator_saw_is_where_the_platform_was(session: Path) -> None:
         assert off_m == pytest.approx(point["error_m"], abs=4e-3)
 
 
-def test_a_session_broken_off_is_not_judged(session: Path, tmp_path: Path) -> None:
+def test_an_incomplete_session_is_not_evaluated(session: Path, tmp_path: Path) -> None:
     with pytest.raises(WorkFailedError, match="not finished"):
         half = tmp_path / "half"
         half.mkdir()
@@ -80,7 +80,9 @@ def test_a_session_broken_off_is_not_judged(session: Path, tmp_path: Path) -> No
         points_of_session(half)
 
 
-def test_an_experiment_goes_on_and_is_judged_from_its_files(session: Path, tmp_path: Path) -> None:
+def test_an_experiment_is_resumed_and_evaluated_from_its_files(
+    session: Path, tmp_path: Path
+) -> None:
     folder = tmp_path / "whole"
     experiment.begin(SETTINGS, folder)
     (name,) = SETTINGS.sessions()
@@ -90,7 +92,7 @@ def test_an_experiment_goes_on_and_is_judged_from_its_files(session: Path, tmp_p
         experiment.judge(folder, 1)
     (kept / "done").touch()
     experiment.begin(SETTINGS, folder)
-    experiment.perform(SETTINGS, folder, 1, Output(as_json=True))  # nothing is left to be run
+    experiment.perform(SETTINGS, folder, 1, Output(as_json=True))  # nothing remains to be run
     result = experiment.judge(folder, 1)
     assert result["sessions"] == "1 of 1"
     points = points_of_session(session)
@@ -108,7 +110,7 @@ def cdpr(*arguments: object) -> subprocess.CompletedProcess[str]:
     return subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
 
 
-def test_the_operator_alone_as_one_line_of_json() -> None:
+def test_the_operator_alone_gives_one_line_of_json() -> None:
     done = cdpr("--perfect-robot", "--places", "A", "--scales", "2:1", "--repeats", 1, "--json")
     assert done.returncode == 0, done.stderr
     told = json.loads(done.stdout.splitlines()[-1])
@@ -130,7 +132,9 @@ def test_the_operator_alone_as_one_line_of_json() -> None:
         (["winch-mpp0923d", "--perfect-robot"], "has no platform; allowed"),
     ],
 )
-def test_bad_input_is_one_message(arguments: list[str], message: str, tmp_path: Path) -> None:
+def test_invalid_input_prints_one_message(
+    arguments: list[str], message: str, tmp_path: Path
+) -> None:
     from typer.testing import CliRunner  # noqa: PLC0415
 
     from cdpr_tools.commands.teleop import app  # noqa: PLC0415

@@ -1,4 +1,4 @@
-"""Tables and analysis of variance, on made-up errors whose answer is known."""
+"""Tables and analysis of variance of synthetic errors with known results."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from cdpr_tools.experiment.trial import POINT
 
 
 def made_up(sigma_mm: dict[float, float], runs: int = 30) -> np.ndarray:
-    """Errors whose spread depends on the scale alone; a run takes 10 s for each of its targets."""
+    """Return errors whose spread depends only on the scale. A run takes 10 s per target."""
     random = np.random.default_rng(3)
     found = []
     for place in "AB":
@@ -47,7 +47,7 @@ def test_means_and_three_sigma_of_each_level() -> None:
     assert row(PLACE, "A")["three_sigma_mm"] == pytest.approx([3 * both] * 2, rel=0.1)
 
 
-def test_half_of_the_thesis_is_what_counts() -> None:
+def test_a_level_is_reached_with_half_the_errors_of_the_thesis() -> None:
     assert row(SCALE, "2:1")["reached"]  # 0.9 mm: at most 1.66 and 1.195
     assert not row(SCALE, "8:1")["reached"]  # 2.7 mm: at most 2.65 and 2.435
     assert row(SCALE, "8:1")["share_of_thesis"][1] == pytest.approx(2.7 / 4.87, rel=0.1)
@@ -55,13 +55,13 @@ def test_half_of_the_thesis_is_what_counts() -> None:
     assert row(tables.OPERATION, "730 ms")["thesis"]["level"] == "remote"
 
 
-def test_time_is_that_of_whole_runs() -> None:
+def test_time_is_that_of_complete_runs() -> None:
     assert sorted(set(run_times_s(POINTS))) == [100.0, 101.0]
     assert row(tables.OPERATION, "350 ms")["time_s"] == pytest.approx(101.0)
     assert row(PLACE, "B")["time_sigma_s"] == pytest.approx(0.5, rel=0.05)
 
 
-def test_variance_analysis_finds_what_differs_and_nothing_else() -> None:
+def test_variance_analysis_finds_only_the_variable_that_differs() -> None:
     found = {one["variable"]: one for one in variance_analysis(POINTS)}
     assert found[SCALE]["differs"]
     assert found[SCALE]["degrees_of_freedom"] == [1, 1198]
@@ -75,7 +75,7 @@ def test_variance_analysis_finds_what_differs_and_nothing_else() -> None:
     assert SCALE not in {one["variable"] for one in variance_analysis(alone)}
 
 
-def test_the_text_names_the_rows_above_half() -> None:
+def test_the_text_names_the_rows_above_half_of_the_thesis() -> None:
     table = rows(POINTS)
     text = lines(
         {"rows": table, "operator_alone": table, "variance_analysis": variance_analysis(POINTS)}
@@ -85,7 +85,7 @@ def test_the_text_names_the_rows_above_half() -> None:
     assert len(re.findall("^scale", "\n".join(text), re.MULTILINE)) == 7
 
 
-def test_pictures_show_every_error_and_the_thesis_bars(tmp_path) -> None:
+def test_pictures_show_each_error_and_the_bars_of_the_thesis(tmp_path) -> None:
     drawn = tables.draw(POINTS, tmp_path)
     assert [path.name for path in drawn] == [
         "figure-2.10.png", "figure-2.11.png", "figure-2.12.png",

@@ -1,4 +1,4 @@
-"""The operator model: a hand that trembles, a delayed view, and a stopping rule."""
+"""The operator model: a trembling hand, a delayed view, and a stopping rule."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ def points(
 
 
 def test_a_hand_at_rest_trembles_between_8_and_12_hertz_and_wanders_slowly() -> None:
-    """Both with the amplitudes that were asked for, found again by another's spectrum."""
+    """A spectrum by scipy shows both with the requested amplitudes."""
     x = hand_at_rest(600.0, master_step_m=1e-9)[:, 0]
     frequency, density = signal.welch(x, 1.0 / PACKET_S, nperseg=512)
     band = (frequency > 5.0) & (frequency < 15.0)
@@ -71,7 +71,7 @@ def test_a_hand_at_rest_trembles_between_8_and_12_hertz_and_wanders_slowly() -> 
     assert np.sqrt(power[frequency < 2.0].sum()) == pytest.approx(OPERATOR.drift_m, rel=0.25)
 
 
-def test_all_targets_are_reached_in_their_order_and_the_parts_make_the_error() -> None:
+def test_all_targets_are_reached_in_order_and_the_parts_add_up_to_the_error() -> None:
     found = points()
     assert found["target"].tolist() == [*range(10)] * 2
     assert np.all(np.diff(found["pressed_s"].reshape(2, 10), axis=1) > 0.0)
@@ -80,12 +80,12 @@ def test_all_targets_are_reached_in_their_order_and_the_parts_make_the_error() -
     assert np.abs(found["error_m"]).max() < 4e-3
 
 
-def test_with_the_clutch_the_hand_moves_nothing_between_look_and_confirmation() -> None:
+def test_with_the_clutch_the_hand_adds_no_error_before_the_confirmation() -> None:
     assert np.abs(points(scale=8.0, runs=1)["hand_m"]).max() < 1e-5
 
 
-def test_without_clutch_the_hand_is_that_of_the_thesis() -> None:
-    """There the variance grows by (0.18 mm * scale)^2 (docs/how-to/experiment.md); here alike."""
+def test_without_clutch_the_error_of_the_hand_agrees_with_the_thesis() -> None:
+    """In both, the variance grows by (0.18 mm * scale)^2, see docs/how-to/experiment.md."""
     spread_at = {
         scale: spread_mm(points(scale, 0.0, OF_THE_THESIS)["hand_m"]).mean() for scale in (2, 8)
     }
@@ -93,7 +93,7 @@ def test_without_clutch_the_hand_is_that_of_the_thesis() -> None:
     assert 0.09 < hand_mm < 0.27
 
 
-def test_delay_costs_time_and_no_precision() -> None:
+def test_delay_costs_time_but_no_precision() -> None:
     slow, quick = points(4.0, 0.73), points(4.0, 0.0)
     assert slow["pressed_s"].max() > 1.4 * quick["pressed_s"].max()
     assert spread_mm(slow["error_m"]).max() < 1.6 * spread_mm(quick["error_m"]).min()
@@ -108,7 +108,7 @@ def test_the_same_seed_gives_the_same_run() -> None:
     assert not np.array_equal(other["error_m"], once["error_m"])
 
 
-def test_a_robot_that_does_not_move_is_given_up(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_run_with_a_robot_that_does_not_move_is_aborted(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(trial, "LONGEST_S", 20.0)
 
     class Stuck(PerfectRobot):
@@ -126,7 +126,7 @@ def test_a_robot_that_does_not_move_is_given_up(monkeypatch: pytest.MonkeyPatch)
         )
 
 
-def test_no_room_for_the_pattern_is_reported() -> None:
+def test_a_workspace_too_small_for_the_pattern_is_reported() -> None:
     narrow = replace(PLATFORM, workspace_min_m=(-0.2, 1.4))
     with pytest.raises(BadInputError, match="place B of the pattern needs"):
         centre_m(replace(ROBOT, platform=narrow), "B")
@@ -134,7 +134,7 @@ def test_no_room_for_the_pattern_is_reported() -> None:
         centre_m(ROBOT, "D")
 
 
-def test_in_space_the_pattern_stands_upright_in_the_middle_of_the_depth():
+def test_the_pattern_in_space_is_vertical_in_the_middle_of_the_depth():
     robot = load_robot("suspended-8")
     directions = Directions.of(platform_of(robot))
     centre = centre_m(robot, "B")

@@ -1,4 +1,4 @@
-"""`cdpr doctor --report`: what a report of a fault holds, and what it does not."""
+"""`cdpr doctor --report` writes a report without secrets."""
 
 from pathlib import Path
 
@@ -8,7 +8,7 @@ from cdpr_here import cdpr_here
 KEY = "0123456789abcdef0123456789abcdef"
 
 
-def test_a_report_holds_versions_checks_and_robots_but_no_keys(
+def test_a_report_contains_versions_checks_and_robots_but_no_keys(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
@@ -18,7 +18,7 @@ def test_a_report_holds_versions_checks_and_robots_but_no_keys(
     (folder / "broken.mcap").write_text("no recording")
     report = tmp_path / "report.txt"
     asked = ("doctor", "--report", report, "--robot", "planar-3")
-    cdpr_here(*asked)  # what is found of the machine decides its exit status
+    cdpr_here(*asked)  # the exit status depends on the machine
     text = report.read_text()
     for part in ("== versions", "numpy ", "embedded bus", "[[axes]]", "broken.mcap: not a rec"):
         assert part in text

@@ -1,4 +1,4 @@
-"""What `cdpr doctor` says of machines that differ from this one."""
+"""`cdpr doctor` on machines that differ from this one."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from cdpr_tools.host.host_checks import (
 
 
 def link(state: str | None, flags: str = "UP", kind: str = "can", queue: int = 10) -> str:
-    """Return what `ip -details -json link show` prints of a CAN interface and a loopback."""
+    """Return the output of `ip -details -json link show` for a CAN interface and a loopback."""
     own = {"state": state, "bittiming": {"bitrate": 500_000, "sample_point": "0.875"}}
     info = {"info_kind": kind} | ({} if state is None else {"info_data": own})
     can = {"ifname": "can0", "flags": ["NOARP", flags], "txqlen": queue, "link_type": "can"}
@@ -39,7 +39,7 @@ def link(state: str | None, flags: str = "UP", kind: str = "can", queue: int = 1
         (link(None, flags="", kind="vcan"), "note", "ip link set can0 up"),
     ],
 )
-def test_a_can_interface_is_judged_by_what_ip_shows(
+def test_a_can_interface_is_checked_by_the_output_of_ip(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, shown: str, level: str, words: str
 ) -> None:
     program = tmp_path / "ip"
@@ -51,12 +51,12 @@ def test_a_can_interface_is_judged_by_what_ip_shows(
     assert words in f"{found.found} {found.remedy}"
 
 
-def test_without_the_command_ip_doctor_asks_for_it(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_doctor_asks_to_install_ip_if_it_is_missing(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("PATH", "/nowhere")
     assert list_interfaces() == []
     (found,) = (one for one in look_around() if one.what == "SocketCAN")
     assert found.level == "note"
-    assert "iproute2" in found.remedy or "modprobe" in found.remedy  # a kernel without CAN
+    assert "iproute2" in found.remedy or "modprobe" in found.remedy  # kernel without CAN
 
 
 @pytest.mark.parametrize(
@@ -70,7 +70,9 @@ def test_without_the_command_ip_doctor_asks_for_it(monkeypatch: pytest.MonkeyPat
         ("#1 SMP Debian 5.10", "", "", "no preemption inside the kernel"),
     ],
 )
-def test_the_kinds_of_preemption(version: str, realtime: str, command_line: str, kind: str) -> None:
+def test_kinds_of_preemption_are_recognised(
+    version: str, realtime: str, command_line: str, kind: str
+) -> None:
     assert preemption(version, realtime, command_line) == kind
 
 
@@ -90,7 +92,7 @@ def test_the_kinds_of_preemption(version: str, realtime: str, command_line: str,
         ("CPU governor", {"cpu0/cpufreq/scaling_governor": "performance"}, "ok", ""),
     ],
 )
-def test_machines_of_another_kind(
+def test_problems_of_other_machines_are_reported_with_a_remedy(
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
     what: str,

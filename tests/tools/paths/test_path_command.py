@@ -1,4 +1,4 @@
-"""`cdpr path` as typed, without a daemon."""
+"""`cdpr path` without a daemon."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def file(tmp_path: Path) -> Path:
     return path
 
 
-def test_a_preview_with_picture_and_a_plan_for_the_daemon(file, tmp_path, monkeypatch):
+def test_a_preview_writes_a_picture_and_the_plan_for_the_daemon(file, tmp_path, monkeypatch):
     for folder in ("XDG_CONFIG_HOME", "XDG_STATE_HOME"):
         monkeypatch.setenv(folder, str(tmp_path))
     robot = load_robot("spatial-8")
@@ -63,7 +63,7 @@ def test_a_preview_with_picture_and_a_plan_for_the_daemon(file, tmp_path, monkey
         (("", ""), [ORIGIN, "--run", "--resume"], "--run, --resume, --back: allowed: one"),
     ],
 )
-def test_what_cannot_be_followed_ends_with_status_2(file, change, options, told):
+def test_an_infeasible_path_ends_with_status_2(file, change, options, told):
     import re  # noqa: PLC0415
 
     file.write_text(GCODE.replace(*change) if change[0] else GCODE)
@@ -73,7 +73,7 @@ def test_what_cannot_be_followed_ends_with_status_2(file, change, options, told)
     assert "Traceback" not in done.stderr
 
 
-def test_a_file_is_placed_as_the_options_say(file):
+def test_options_place_the_path_of_a_file(file):
     file.write_text("M104 S200\nG0 X0 Y0\nG1 X100 F6000\n")
     placed = [ORIGIN, "--z=50", "--scale=2", "--rotate=90", "--mirror=x"]
     done = cdpr_here("path", file, "--robot", "spatial-8", *placed, "--json")

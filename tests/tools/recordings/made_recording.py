@@ -1,4 +1,4 @@
-"""Recordings made of rows and of what the loop said meanwhile."""
+"""Write recordings of given rows and statuses of the loop."""
 
 from __future__ import annotations
 
@@ -25,9 +25,9 @@ def record(
     clock: pytest.MonkeyPatch | None = None,
     **described: Any,
 ) -> Path:
-    """Record rows of `n` axes and return the file; `said` is the loop's status from some rows on.
+    """Record rows of `n` axes and return the file. `said` gives statuses from certain rows on.
 
-    With `clock` the machine's time is that of the row before.
+    With `clock`, the machine's time is that of the previous row.
     """
     block = block_with_clock(n=n)
     block.write_description({"robot": "bench", **described})

@@ -1,4 +1,4 @@
-"""The true angle at SYNCs, out of a log that also has records without SYNC and still grows."""
+"""True angles at SYNCs are read from a growing log that also has records without SYNC."""
 
 import json
 import math
@@ -24,7 +24,7 @@ def write(path: Path, syncs: list[int]) -> None:
     path.write_bytes(json.dumps(header).encode().ljust(1024) + records(syncs))
 
 
-def test_records_without_sync_are_passed_over_and_later_ones_found(tmp_path: Path) -> None:
+def test_records_without_sync_are_skipped_and_later_ones_found(tmp_path: Path) -> None:
     path = tmp_path / "truth.log"
     write(path, [0, 1, NO_SYNC, NO_SYNC, 2, 3, NO_SYNC])
     truth = Truth(path)

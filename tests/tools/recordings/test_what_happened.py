@@ -1,4 +1,4 @@
-"""What `cdpr log` says of programs, faults and their reasons, and of how a recording ends."""
+"""`cdpr log` reports programs, faults with their reasons, and the end of a recording."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ ESTOP = "emergency stop by cdpr estop"
 
 
 def active(*programs: int) -> Row:
-    """Return 1000 rows with power in which these programs take turns."""
+    """Return 1000 rows with power, divided equally among the given programs in order."""
     rows = made_rows(0, 1000)
     rows["state"] = LoopState.ACTIVE
     rows["program"] = np.repeat(programs, -(-1000 // len(programs)))[:1000]
@@ -59,9 +59,11 @@ def test_programs_and_faults_are_listed_with_times(tmp_path: Path) -> None:
     assert cdpr_here("log", "plot", path).returncode == 0
 
 
-def test_an_emergency_stop_is_named_where_it_cut_a_motion_short(tmp_path: Path) -> None:
+def test_a_motion_ended_by_an_emergency_stop_is_reported_as_such(tmp_path: Path) -> None:
     rows = active(1, 2, 2, 0, 0)
-    rows["state"][603:] = LoopState.FAULT  # the power goes at once, no supervisor reacts
+    rows["state"][603:] = (
+        LoopState.FAULT
+    )  # power is off immediately, without a reaction of the supervisor
     said = [(620, {"state": "fault", "reason": ESTOP, "reason_limit": None})]
     programs = ["idle", "pose", "path"]
     path = record(tmp_path, rows, said=said, axes=LEFT_RIGHT, programs=programs)
@@ -70,7 +72,7 @@ def test_an_emergency_stop_is_named_where_it_cut_a_motion_short(tmp_path: Path) 
     assert [text for _, text in faults(path)] == [f"state fault: {ESTOP}"]
 
 
-def test_a_program_that_failed_has_not_just_ended(tmp_path: Path) -> None:
+def test_a_failed_program_is_reported_as_failed(tmp_path: Path) -> None:
     rows = active(1, 1, 1, 0, 0, 0, 1, 1, 1, 1)
     rows["stamp_ns"] += time.monotonic_ns() - rows["stamp_ns"][599]
     rows["stamp_ns"][600:] += 3600 * 10**9  # tightened again an hour later
@@ -85,16 +87,16 @@ def test_a_program_that_failed_has_not_just_ended(tmp_path: Path) -> None:
     assert any(line.endswith(f"  {why}") for line in told.splitlines())
 
 
-def test_a_lowering_by_which_a_robot_was_stopped_has_come_to_its_end(tmp_path: Path) -> None:
+def test_a_lowering_caused_by_a_stop_is_reported_as_ended(tmp_path: Path) -> None:
     rows = active(1, 1, 1, 2, 2, 2, 2, 2, 0, 0)
     rows["reaction"][300:320] = Reaction.CONTROLLED_STOP
-    rows["state"][803:] = LoopState.FAULT  # the idle program has the last cycles with power
+    rows["state"][803:] = LoopState.FAULT  # program idle runs in the last cycles with power
     told = shown(record(tmp_path, rows, axes=LEFT_RIGHT, programs=["idle", "pose", "lower"]))
     assert "pose: cut short: a fault; then left" in told
     assert "lower: ended, left" in told
 
 
-def test_the_reason_is_reported_with_the_cable_that_broke_not_with_the_winch_that_ran_away(
+def test_the_reason_is_shown_with_the_limit_that_caused_it_and_not_with_the_next(
     tmp_path: Path,
 ) -> None:
     why = "right: the cable seems broken: tension fell suddenly to 6.5 N, from above 36.0 N"
@@ -110,7 +112,7 @@ def test_the_reason_is_reported_with_the_cable_that_broke_not_with_the_winch_tha
     ]
 
 
-def test_a_reason_that_comes_again_is_reported_again(
+def test_a_repeated_reason_is_reported_again(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     rows = active(0)
@@ -126,7 +128,7 @@ def test_a_reason_that_comes_again_is_reported_again(
     assert [text for _, text in faults(path)] == [f"state fault: {ESTOP}"] * 2
 
 
-def test_a_fault_is_shown_whatever_has_happened_since(tmp_path: Path) -> None:
+def test_a_fault_is_shown_despite_later_events(tmp_path: Path) -> None:
     figures = summarise(record(tmp_path, active(0), programs=["hold"]), Output(as_json=True))
     events = [
         {"text": "state fault", "cycle": 7, "reaction": 0},
@@ -139,7 +141,7 @@ def test_a_fault_is_shown_whatever_has_happened_since(tmp_path: Path) -> None:
     assert told == ["state fault", "emergency stop", *(f"hold by me {k}" for k in range(42, 50))]
 
 
-def test_who_may_move_and_refusals_over_and_over_do_not_fill_the_list() -> None:
+def test_repeated_rejections_and_grants_do_not_fill_the_list() -> None:
     texts = ["pose by me: refused: a", "pose by me: refused: b", "state fault"]
     events = [{"text": text, "kind": "command"} for text in texts]
     events.insert(0, {"text": "me may move", "kind": "control"})
@@ -148,14 +150,14 @@ def test_who_may_move_and_refusals_over_and_over_do_not_fill_the_list() -> None:
 
 
 def ends_active(folder: Path, state: str) -> tuple[Path, list[tuple[float, str]]]:
-    """Record a motion whose cycles end while it is active, and what its picture tells of that."""
+    """Record a motion that ends while active. Return the file and the marks of its picture."""
     said = [(1000, {}), (1000, {"state": state, "reason": "the loop has died: signal 9"})]
     path = record(folder, active(2), said=said, programs=["idle", "hold", "path"])
     selection = Selection([path], FIELDS)
     return path, end_while_active(selection, selection.columns())
 
 
-def test_a_recording_that_a_killed_loop_has_ended_says_so(tmp_path: Path) -> None:
+def test_a_recording_ended_by_a_killed_loop_is_reported_as_such(tmp_path: Path) -> None:
     path, ((end_s, told),) = ends_active(tmp_path, "dead")
     assert end_s == pytest.approx(0.999) and "while the robot was active" in told
     assert f"{told}\n" in shown(path)
@@ -163,7 +165,7 @@ def test_a_recording_that_a_killed_loop_has_ended_says_so(tmp_path: Path) -> Non
     selection = Selection([path], FIELDS, until_s=0.5)
     assert end_while_active(selection, selection.columns()) == []
     other, told_of_it = ends_active(tmp_path / "other", "active")
-    assert told_of_it == []  # closed in order: the next file goes on from there
+    assert told_of_it == []  # closed properly: the next file continues it
     assert "while the robot was active" not in shown(other)
     red, reds = np.array([0xB3, 0x26, 0x1E]) / 255, []
     for one in (path, other):
@@ -173,7 +175,7 @@ def test_a_recording_that_a_killed_loop_has_ended_says_so(tmp_path: Path) -> Non
     assert reds[0] > 1000 and reds[1] == 0
 
 
-def test_a_recording_that_breaks_off_while_active_says_so_unless_another_goes_on(
+def test_a_truncated_recording_is_reported_unless_another_file_continues_it(
     tmp_path: Path,
 ) -> None:
     path, _ = ends_active(tmp_path, "active")

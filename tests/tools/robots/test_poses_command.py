@@ -1,4 +1,4 @@
-"""`cdpr poses`: what it tells, writes, draws and refuses."""
+"""`cdpr poses` reports, writes and draws poses, and rejects invalid requests."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def test_poses_are_reported_written_and_drawn(tmp_path: Path, choose: str) -> No
     assert "and 7 more" in done.stderr
 
 
-def test_poses_in_a_plane_from_another_place_as_toml(tmp_path: Path) -> None:
+def test_planar_poses_from_another_place_are_written_as_toml(tmp_path: Path) -> None:
     table = tmp_path / "poses.toml"
     done = cdpr_here(
         "poses", "planar-3", "-n", "3", "--from", "-100", "1800", "--out", table, "--png",
@@ -64,14 +64,14 @@ def test_poses_in_a_plane_from_another_place_as_toml(tmp_path: Path) -> None:
         (("spatial-8", "-n", "0"), "allowed: 1 or more"),
     ],
 )
-def test_what_cannot_be_meant_is_refused(arguments: tuple[str, ...], problem: str) -> None:
+def test_invalid_requests_are_rejected(arguments: tuple[str, ...], problem: str) -> None:
     done = cdpr_here("poses", *arguments)
     assert done.returncode == 2
     told = " ".join((done.stdout + done.stderr).replace("│", " ").split())
     assert problem in told and "Traceback" not in told
 
 
-def test_a_box_in_the_way_cuts_ways(tmp_path: Path) -> None:
+def test_poses_cut_off_by_an_obstacle_are_counted(tmp_path: Path) -> None:
     text = (SHIPPED / "robots" / "spatial-8.toml").read_text()
     box = (
         "[[platform.obstacles]]\nmin_m = [-0.2, 0.05, 1.98]\nmax_m = [-0.1, 0.15, 2.05]\n\n[limits]"

@@ -1,4 +1,4 @@
-"""`cdpr robot show`: what it tells, draws and refuses."""
+"""`cdpr robot show` reports and draws robots, and rejects invalid requests."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def test_the_planar_robot_is_reported_sketched_and_drawn(tmp_path: Path) -> None
     lines = shown.stderr.splitlines()
     assert any("hold the platform in 100 % of the box" in line for line in lines)
     assert any("nothing to object to" in line for line in lines)
-    # exit points where they are, the box of targets full, the stand under it
+    # exit points, the filled box of targets, and the stand below it
     first = next(i for i, line in enumerate(lines) if line.strip().startswith("1  "))
     assert lines[first].split() == ["1", "2"]
     home = next(line for line in lines[first:] if "o" in line)
@@ -58,7 +58,7 @@ def test_the_planar_robot_is_reported_sketched_and_drawn(tmp_path: Path) -> None
     assert len(np.unique(image.reshape(-1, image.shape[2]), axis=0)) > 200  # not a blank page
 
 
-def test_what_cannot_be_held_is_marked_and_ends_with_its_reason(tmp_path: Path) -> None:
+def test_a_robot_that_cannot_hold_its_platform_is_reported_and_not_run(tmp_path: Path) -> None:
     path = tmp_path / "heavy.toml"
     path.write_text(PLANAR.replace("mass_kg = 2.0", "mass_kg = 20.0"))
     shown = cdpr_here("robot", "show", path, "--json")
@@ -68,14 +68,14 @@ def test_what_cannot_be_held_is_marked_and_ends_with_its_reason(tmp_path: Path) 
     assert "!!!" in shown.stderr
     told = as_json(shown)
     assert told["ok"] is False and told["held_share"] == 0.0
-    # and it is not run either
+    # the robot is not run either
     run = cdpr_here("run", path, "--bus", "simbus:", "--json")
     assert run.returncode == 2
     assert f"{path}: platform.home_m: at (0.00, 1.30) m" in run.stderr
     assert "Traceback" not in run.stderr
 
 
-def test_a_cycle_that_does_not_fit_its_bus_is_reported_as_the_daemon_refuses_it(
+def test_a_cycle_that_does_not_fit_its_bus_is_reported_as_by_the_daemon(
     tmp_path: Path,
 ) -> None:
     path = tmp_path / "slow-bus.toml"
@@ -88,7 +88,7 @@ def test_a_cycle_that_does_not_fit_its_bus_is_reported_as_the_daemon_refuses_it(
     assert run.returncode == 2 and "the cycle does not fit: bus can0: 3 drives" in run.stderr
 
 
-def test_a_bar_that_swings_is_reported_with_how_far_and_how_long() -> None:
+def test_a_swinging_bar_is_reported_with_amplitude_and_duration() -> None:
     bar = Path(__file__).parents[2] / "hil" / "others" / "bar-1m.toml"
     shown = cdpr_here("robot", "show", bar, "--json")
     assert shown.returncode == 0, shown.stderr
@@ -121,14 +121,14 @@ def test_a_robot_in_space_is_reported_and_drawn(tmp_path: Path) -> None:
     broken = [axis["broken"] for axis in told["axes"]]  # type: ignore[attr-defined]
     swings, furthest = ([one[key] for one in broken] for key in ("swing_m", "away_m"))
     assert len(swings) == 8 and max(swings) == pytest.approx(1.49, abs=0.02)
-    assert min(furthest) > 1.9  # down to the ground
+    assert min(furthest) > 1.9  # from the ground
     assert all(one["aside_m"] < one["away_m"] for one in broken)
     assert "targets up to 15.0 deg from home's orientation" in shown.stderr
     assert re.search(r"^axis 7 +\(.*\) +1\.50 +5\d +2\.0", shown.stderr, re.MULTILINE)
     assert matplotlib.image.imread(picture).shape[0] > 1200  # three sections
 
 
-def test_what_a_ceiling_cannot_hold_in_space_is_reported_with_what_would_help(
+def test_a_suspended_robot_that_cannot_hold_is_reported_with_a_remedy(
     tmp_path: Path,
 ) -> None:
     path = tmp_path / "heavy.toml"
@@ -142,7 +142,7 @@ def test_what_a_ceiling_cannot_hold_in_space_is_reported_with_what_would_help(
     assert "allowed: up to 1333 N" in told["limits.tension_max_N"]
 
 
-def test_a_loop_that_has_to_be_slow_is_reported(tmp_path: Path) -> None:
+def test_a_slow_control_loop_is_reported(tmp_path: Path) -> None:
     path = tmp_path / "late.toml"
     text = (SHIPPED / "robots" / "suspended-6.toml").read_text()
     path.write_text(re.sub(r"^sync_period_s = .*$", "", text, flags=re.M))
@@ -150,7 +150,7 @@ def test_a_loop_that_has_to_be_slow_is_reported(tmp_path: Path) -> None:
     path.write_text("sync_period_s = 0.004\n" + path.read_text())
     (found,) = diagnose(load_robot(path))
     assert not found.impossible and "slowest mode at 0.34 Hz" in found.text
-    # 60 kg held at that frequency, against the 12 N that are usual in one winch of 300 N
+    # 60 kg at that frequency, compared with the usual 12 N in one winch of 300 N
     off_mm = re.search(r"such winches moves it by (\d+) mm", found.text)
     assert off_mm is not None
     alone_m = 12.0 / (60.0 * (2.0 * np.pi * 0.34) ** 2)
@@ -178,7 +178,9 @@ def test_a_loop_that_has_to_be_slow_is_reported(tmp_path: Path) -> None:
         (["planar-3", "--png", "/nowhere/robot.png"], "a file in a folder that can be written to"),
     ],
 )
-def test_what_cannot_be_shown_is_one_clear_line(arguments: list[str], problem: str) -> None:
+def test_a_robot_that_cannot_be_shown_is_reported_in_one_line(
+    arguments: list[str], problem: str
+) -> None:
     shown = cdpr_here("robot", "show", *arguments, cwd=Path(__file__).parent)
     assert shown.returncode == 2
     (line,) = shown.stderr.strip().splitlines()
@@ -192,7 +194,7 @@ def test_exit_points_above_each_other_share_a_name_and_the_platform_is_drawn_who
     text = (SHIPPED / "robots" / "spatial-8.toml").read_text()
     columns = iter([(x, y, z) for z in (0.8, 2.9) for x in (-1.7, 1.5) for y in (-2.2, 2.2)])
     text = re.sub(r"exit_point_m = .*", lambda _: f"exit_point_m = {list(next(columns))}", text)
-    inner = "anchor_point_m = [0.03, -0.1, 0.05]"  # within the outline that the others have
+    inner = "anchor_point_m = [0.03, -0.1, 0.05]"  # within the outline of the others
     path.write_text(text.replace("anchor_point_m = [0.1, -0.1, 0.3]", inner, 1))
     robot = load_robot(path)
     assert robot.platform is not None
@@ -205,7 +207,7 @@ def test_exit_points_above_each_other_share_a_name_and_the_platform_is_drawn_who
             if outline.get_fill():
                 x, y = outline.get_xy().T
                 area = abs(np.dot(x[:-1], y[1:]) - np.dot(x[1:], y[:-1])) / 2.0
-                assert area == pytest.approx(np.ptp(x) * np.ptp(y))  # a rectangle from each side
+                assert area == pytest.approx(np.ptp(x) * np.ptp(y))  # a rectangle in each view
 
 
 def test_colour_labels_of_a_thin_robot_do_not_overlap() -> None:

@@ -1,4 +1,4 @@
-"""What is said of a robot in figures, where the figure could mislead."""
+"""Figures of a robot are worded so that they do not mislead."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from cdpr_rt.diagnosis.subject import Subject
 from cdpr_tools.robots.summary import figures, lines
 
 
-def test_a_point_in_a_plane_is_not_said_to_turn(tmp_path: Path) -> None:
+def test_no_rotation_is_reported_for_a_point_in_a_plane(tmp_path: Path) -> None:
     text = (SHIPPED / "robots" / "planar-3.toml").read_text()
     path = tmp_path / "point.toml"
     path.write_text(re.sub(r"anchor_point_m = .*", "anchor_point_m = [0.0, 0.0]", text))
@@ -22,14 +22,14 @@ def test_a_point_in_a_plane_is_not_said_to_turn(tmp_path: Path) -> None:
     assert not any("turns" in line for line in lines(Subject(robot), told))
 
 
-def test_a_share_that_is_nearly_all_is_not_said_to_be_all() -> None:
+def test_a_share_just_below_100_percent_is_not_rounded_to_100() -> None:
     robot = load_robot("planar-3")
     assert robot.platform is not None
     told = figures(Subject(robot)) | {"target_share": 0.997}
     assert any("accepted in 99 % of it" in line for line in lines(Subject(robot), told))
 
 
-def test_it_is_said_whether_a_cable_that_slips_is_noticed() -> None:
+def test_the_summary_tells_whether_a_slipping_cable_is_detected() -> None:
     for name, allowed, text in (
         ("spatial-8", True, "more than 27.5 mm end a motion"),
         ("suspended-6", False, "a cable that slips, and stays tight, is not noticed"),

@@ -1,4 +1,4 @@
-"""`cdpr robot workspace`: what it finds, draws, writes and refuses."""
+"""`cdpr robot workspace` searches, draws and writes workspaces, and rejects invalid requests."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def refused(*arguments: str | Path) -> str:
     return done.stderr
 
 
-def test_a_robot_in_space_is_searched_drawn_and_written_as_a_mesh(tmp_path: Path) -> None:
+def test_a_workspace_in_space_is_searched_drawn_and_written_as_a_mesh(tmp_path: Path) -> None:
     picture, mesh = tmp_path / "space.png", tmp_path / "space.stl"
     done = cdpr_here(
         "robot", "workspace", "spatial-8", "--cells", "30", "--rays", "2000", "--png", picture,
@@ -50,7 +50,7 @@ def test_a_robot_in_space_is_searched_drawn_and_written_as_a_mesh(tmp_path: Path
     assert loaded.volume == pytest.approx(told["grid"]["volume_m3"], rel=1e-3)
 
 
-def test_of_less_there_is_more() -> None:
+def test_weaker_requirements_give_a_larger_workspace() -> None:
     at_rest = searched("spatial-8", "--static", *COARSE)["grid"]["volume_m3"]
     moving = searched("spatial-8", *COARSE)["grid"]["volume_m3"]
     with_margin = searched("spatial-8", "--margin", "22", *COARSE)
@@ -63,7 +63,7 @@ def test_of_less_there_is_more() -> None:
     assert with_margin["greatest_margin_N"] > 60.0 and with_margin["margin_at_least_N"] == 22.0
 
 
-def test_contact_can_be_left_out() -> None:
+def test_contact_can_be_ignored() -> None:
     turned = ("spatial-8", "--static", "--rotate", "0", "0", "30", *COARSE)
     free = searched(*turned, "--contact-free")
     assert free["contact_free"] is True
@@ -74,7 +74,7 @@ def test_contact_can_be_left_out() -> None:
 
 
 @pytest.mark.parametrize("suffix", [".ply", ".obj"])
-def test_other_formats_of_meshes_are_closed_too(tmp_path: Path, suffix: str) -> None:
+def test_meshes_in_other_formats_are_closed(tmp_path: Path, suffix: str) -> None:
     path = tmp_path / f"mesh{suffix}"
     told = searched("suspended-6", "--mesh", path, *COARSE)
     loaded = trimesh.load_mesh(path)
@@ -83,7 +83,7 @@ def test_other_formats_of_meshes_are_closed_too(tmp_path: Path, suffix: str) -> 
     assert told["reaches_sides"] == ["z low"]
 
 
-def test_a_robot_in_a_plane_has_an_area(tmp_path: Path) -> None:
+def test_a_planar_workspace_has_an_area(tmp_path: Path) -> None:
     picture = tmp_path / "plane.png"
     told = searched("planar-3", "--png", picture, "--low", "-2000", "0", "--high", "2000", "3000")
     assert told["grid"]["area_m2"] == pytest.approx(told["rays"]["area_m2"], rel=0.02)
@@ -91,23 +91,23 @@ def test_a_robot_in_a_plane_has_an_area(tmp_path: Path) -> None:
     assert picture.stat().st_size > 10_000
 
 
-def test_any_number_of_workers_finds_the_same() -> None:
+def test_the_number_of_workers_does_not_change_the_result() -> None:
     alone = searched("planar-4", *COARSE, "--within", "5", "--workers", "1")
     assert searched("planar-4", *COARSE, "--within", "5", "--workers", "2") == alone
 
 
-def test_a_cluster_that_is_not_there_is_reported() -> None:
+def test_a_missing_cluster_is_reported() -> None:
     done = cdpr_here("robot", "workspace", "planar-3", "--cluster", "127.0.0.1:1")
     assert done.returncode == 1 and done.stderr.startswith("cdpr: --cluster 127.0.0.1:1: ")
 
 
-def test_where_no_place_is_held_the_nearest_is_reported() -> None:
+def test_the_nearest_place_is_reported_if_none_is_held() -> None:
     done = cdpr_here("robot", "workspace", "spatial-8", "--margin", "85", *COARSE)
     assert done.returncode == 1
     assert "nearest to it is" in done.stderr and "N short" in done.stderr
 
 
-def test_a_centre_outside_is_refused_with_one_that_is_not() -> None:
+def test_a_centre_outside_the_workspace_is_rejected_with_one_inside() -> None:
     for outside in (("0", "0", "0.5"), ("0", "0", "900000")):
         told = refused("spatial-8", *COARSE, "--centre", *outside)
         inside = told.rsplit("such as ", 1)[1].split()
@@ -134,11 +134,11 @@ def test_a_centre_outside_is_refused_with_one_that_is_not() -> None:
         (["nobody"], "nobody"),
     ],
 )
-def test_what_makes_no_sense_is_refused(arguments: list[str], told: str) -> None:
+def test_invalid_requests_are_rejected(arguments: list[str], told: str) -> None:
     assert told in refused(*arguments)
 
 
-def test_a_robot_of_ones_own_is_searched_by_its_file(tmp_path: Path) -> None:
+def test_a_users_robot_is_searched_by_its_file(tmp_path: Path) -> None:
     text = (SHIPPED / "robots" / "planar-3.toml").read_text()
     path = tmp_path / "mine.toml"
     path.write_text(text.replace("mass_kg = 2.0", "mass_kg = 4.0"))

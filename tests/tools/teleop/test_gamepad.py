@@ -1,7 +1,7 @@
-"""The gamepad: what its events do to a hand, and what becomes of it when it is unplugged.
+"""Events of a gamepad move a hand, and unplugging it holds the hand.
 
-No kernel that these tests run on has input devices. `StandIn` takes the place of
-`evdev.InputDevice`, with the events that the kernel documents; it shows nothing of a real pad.
+The kernels that run these tests have no input devices. `StandIn` replaces `evdev.InputDevice` with
+the events that the kernel documents. It does not test real gamepads.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ SCALE = 8.0
 
 
 class StandIn:
-    """Gives what was put into it as an EvdevDevice does, until it is unplugged."""
+    """Return queued events like an EvdevDevice until it is unplugged."""
 
     path = "/dev/input/event7"
     name = "a pad that is not there"
@@ -65,7 +65,7 @@ class StandIn:
 
 @dataclass
 class Pads:
-    """A finder of the pads that are plugged in, one after the other."""
+    """A finder of gamepads that are plugged in one after another."""
 
     there: list[StandIn] = field(default_factory=list)
 
@@ -77,7 +77,7 @@ class Pads:
 
 
 class Rig:
-    """A gamepad whose time the test tells."""
+    """A gamepad whose time the test controls."""
 
     def __init__(self, *pads: StandIn, used: StickMap = MAP) -> None:
         self.pad = pads[0]
@@ -94,7 +94,7 @@ class Rig:
         self.pad.put(ecodes.EV_ABS, ecodes.ABS_Y, y)
 
     def run(self, seconds: float) -> tuple[float, float]:
-        """Return by how much the hand has moved."""
+        """Return the motion of the hand in `seconds`."""
         before = self.hand.position_m
         for _ in range(round(seconds * 60.0)):
             self.now_s += 1.0 / 60.0
@@ -103,7 +103,7 @@ class Rig:
         return after[0] - before[0], after[1] - before[1]
 
 
-def test_the_stick_leads_while_the_dead_man_is_held() -> None:
+def test_the_stick_moves_the_hand_while_the_dead_man_button_is_held() -> None:
     rig = Rig(StandIn())
     rig.push(255, 127)
     assert rig.run(0.5) == (0.0, 0.0)
@@ -111,27 +111,27 @@ def test_the_stick_leads_while_the_dead_man_is_held() -> None:
     rig.key(ecodes.BTN_TR, True)
     assert rig.run(1.0) == pytest.approx((0.05, 0.0), abs=1e-3)
     assert not rig.hand.clutch
-    rig.push(128, 0)  # the kernel counts downward
+    rig.push(128, 0)  # the kernel's axis points down
     assert rig.run(1.0) == pytest.approx((0.0, 0.05), abs=2e-3)
     rig.key(ecodes.BTN_TR, False)
     assert rig.run(0.5) == (0.0, 0.0)
     assert rig.hand.clutch
 
 
-def test_the_dead_zone_is_round_and_speed_grows_slowly_from_its_edge() -> None:
+def test_the_dead_zone_is_round_and_speed_increases_slowly_from_its_edge() -> None:
     rig = Rig(StandIn(-1000, 1000))
     rig.key(ecodes.BTN_TR, True)
     rig.push(69, -69)
     assert rig.run(1.0) == (0.0, 0.0)
-    rig.push(0, -550)  # half of the way that is left
+    rig.push(0, -550)  # half of the remaining way
     x, y = rig.run(1.0)
     assert (x, y) == pytest.approx((0.0, 0.25 * 0.05), rel=0.02)
-    rig.push(1000, -1000)  # a square stick: no faster in its corner
+    rig.push(1000, -1000)  # a stick with a square range is not faster in its corner
     x, y = rig.run(1.0)
     assert math.hypot(x, y) == pytest.approx(0.05, rel=0.02)
 
 
-def test_a_loop_that_stood_still_moves_the_hand_no_further_for_it() -> None:
+def test_a_pause_of_the_loop_does_not_move_the_hand_further() -> None:
     rig = Rig(StandIn())
     rig.key(ecodes.BTN_TR, True)
     rig.push(255, 127)
@@ -145,7 +145,7 @@ def test_each_press_confirms_once() -> None:
     rig = Rig(StandIn())
     for _ in range(3):
         rig.key(ecodes.BTN_SOUTH, True)
-        rig.pad.put(ecodes.EV_KEY, ecodes.BTN_SOUTH, 2)  # the kernel repeats it
+        rig.pad.put(ecodes.EV_KEY, ecodes.BTN_SOUTH, 2)  # key repeat of the kernel
         rig.pad.put(ecodes.EV_KEY, ecodes.BTN_EAST, 1)
         rig.run(0.05)
         rig.key(ecodes.BTN_SOUTH, False)
@@ -153,13 +153,13 @@ def test_each_press_confirms_once() -> None:
     assert rig.hand.confirmed == 3
 
 
-def test_nothing_was_confirmed_before_it_was_asked() -> None:
+def test_a_press_from_before_the_session_confirms_nothing() -> None:
     pad = StandIn()
     pad.put(ecodes.EV_KEY, ecodes.BTN_SOUTH, 1)
     assert Rig(pad).hand.confirmed == 0
 
 
-def test_unplugged_it_holds_and_waits_to_be_pressed_again() -> None:
+def test_an_unplugged_gamepad_holds_until_the_button_is_pressed_again() -> None:
     rig = Rig(StandIn())
     rig.key(ecodes.BTN_TR, True)
     rig.push(255, 127)
@@ -170,7 +170,7 @@ def test_unplugged_it_holds_and_waits_to_be_pressed_again() -> None:
     assert rig.hand.clutch and "plug it in again" in rig.hand.trouble
     assert rig.pad.closed
     again = StandIn()
-    again.values[ecodes.ABS_X] = 255  # pushed, and held, while it is plugged in
+    again.values[ecodes.ABS_X] = 255  # pushed and held while it is plugged in
     rig.pads.there, rig.pad = [again], again
     assert rig.run(1.5) == (0.0, 0.0)
     assert (rig.hand.clutch, rig.hand.trouble) == (True, "")
@@ -178,7 +178,7 @@ def test_unplugged_it_holds_and_waits_to_be_pressed_again() -> None:
     assert rig.run(1.0)[0] == pytest.approx(0.05, abs=1e-3)
 
 
-def test_events_that_were_lost_let_go() -> None:
+def test_lost_events_stop_the_hand_until_the_button_is_pressed_again() -> None:
     rig = Rig(StandIn())
     rig.key(ecodes.BTN_TR, True)
     rig.push(255, 127)
@@ -187,10 +187,10 @@ def test_events_that_were_lost_let_go() -> None:
     rig.pad.put(ecodes.EV_SYN, ecodes.SYN_DROPPED, 0)
     assert rig.run(0.5) == (0.0, 0.0)
     rig.key(ecodes.BTN_TR, True)
-    assert rig.run(0.5)[0] == pytest.approx(-0.025, abs=1e-3)  # as the pad stands now
+    assert rig.run(0.5)[0] == pytest.approx(-0.025, abs=1e-3)  # the present state of the stick
 
 
-def test_nothing_that_fits_is_refused(tmp_path: Path) -> None:
+def test_a_missing_gamepad_is_rejected(tmp_path: Path) -> None:
     with pytest.raises(BadInputError, match="nothing is plugged in"):
         Gamepad(Pads(), MAP, SCALE)
     missing = tmp_path / "event0"
@@ -211,16 +211,16 @@ def test_nothing_that_fits_is_refused(tmp_path: Path) -> None:
         ("ABS_X,ABS_Y", "BTN_TR", "BTN_TR", "--confirm BTN_TR: allowed: another button"),
     ],
 )
-def test_names_that_mean_nothing_are_refused(
+def test_unknown_names_of_axes_and_buttons_are_rejected(
     axes: str, dead_man: str, confirm: str, told: str
 ) -> None:
     with pytest.raises(BadInputError, match=told):
         stick_map(PLANE, axes, None, dead_man, confirm, 0.1, 0.05)
 
 
-def test_a_second_stick_and_the_directional_pad_lift_and_turn() -> None:
+def test_the_second_stick_and_the_directional_pad_lift_and_turn() -> None:
     used = stick_map(ROOM, None, None, "BTN_TR", "BTN_SOUTH", 0.1, 0.05)
-    most = 0.05 * math.radians(100.0)  # a tenth of a degree for a millimetre
+    most = 0.05 * math.radians(100.0)  # a tenth of a degree per millimetre
     for code, value, way, about in (
         (ecodes.ABS_HAT0Y, -1000, (0.0, 0.0, 0.05), (0.0, 0.0, 0.0)),
         (ecodes.ABS_RX, 1000, (0.0, 0.0, 0.0), (0.0, most, 0.0)),
@@ -237,7 +237,7 @@ def test_a_second_stick_and_the_directional_pad_lift_and_turn() -> None:
         assert turned == pytest.approx(about, abs=2e-3)
 
 
-def test_in_a_plane_the_second_stick_turns_to_its_side() -> None:
+def test_the_second_stick_turns_a_planar_platform() -> None:
     used = stick_map((2, (2,)), None, None, "BTN_TR", "BTN_SOUTH", 0.1, 0.05)
     rig = Rig(StandIn(-1000, 1000), used=used)
     rig.key(ecodes.BTN_TR, True)
@@ -248,7 +248,7 @@ def test_in_a_plane_the_second_stick_turns_to_its_side() -> None:
     )
 
 
-def test_axes_that_do_not_fit_the_robot_are_refused() -> None:
+def test_axes_that_do_not_fit_the_robot_are_rejected() -> None:
     for axes, turns, told in (
         ("ABS_X,ABS_Y", None, "--axes ABS_X,ABS_Y: 2 axes; allowed: 3 for this robot, x, y, z"),
         (None, "ABS_RX", "--turn-axes ABS_RX: 1 axes; allowed: 3 for this robot, about x, y, z"),

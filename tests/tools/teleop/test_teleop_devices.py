@@ -1,4 +1,4 @@
-"""What leads: scripts, keys and sticks; and a keyboard on a real pseudo-terminal."""
+"""Input devices of teleoperation: scripts, keys, and a keyboard on a real pseudo-terminal."""
 
 from __future__ import annotations
 
@@ -27,12 +27,12 @@ TICK_S = 1.0 / 60.0
 @pytest.mark.parametrize(
     ("text", "scale"), [("8:1", 8.0), ("1:4", 0.25), ("2", 2.0), ("0.5", 0.5), ("3:2", 1.5)]
 )
-def test_a_scale_is_metres_of_the_robot_for_a_metre_of_the_hand(text: str, scale: float) -> None:
+def test_a_scale_is_metres_of_the_robot_per_metre_of_the_hand(text: str, scale: float) -> None:
     assert parse_scale(text) == scale
 
 
 @pytest.mark.parametrize("text", ["", "8:0", "0", "-2", "nan", "1e9", "8:1:1", "big", "inf:1"])
-def test_a_scale_that_cannot_be_is_refused(text: str) -> None:
+def test_an_invalid_scale_is_rejected(text: str) -> None:
     with pytest.raises(BadInputError, match=r"--scale .*allowed: 0\.001 to 100"):
         parse_scale(text)
 
@@ -43,7 +43,7 @@ def script(folder: Path, text: str) -> Path:
     return path
 
 
-def test_a_script_is_played_straight_between_its_lines(tmp_path: Path) -> None:
+def test_a_script_is_interpolated_linearly_between_its_lines(tmp_path: Path) -> None:
     hand = ScriptDevice(
         read_script(
             script(
@@ -55,7 +55,7 @@ def test_a_script_is_played_straight_between_its_lines(tmp_path: Path) -> None:
     )
     begin = 77.0
     seen = {t: hand.read(begin + t) for t in (0.0, 0.5, 1.0, 1.4, 1.5, 1.99, 2.5, 3.0, 9.0)}
-    # positions count from the first line's, wherever the hand really is
+    # positions are relative to the first line
     for t, (x_mm, y_mm) in {
         0.0: (0, 0), 0.5: (5, 0), 1.4: (10, 0), 2.5: (5, 10), 3.0: (0, 0), 9.0: (0, 0)
     }.items():  # fmt: skip
@@ -114,14 +114,14 @@ def test_keys_lift_and_turn_about_the_room_s_axes() -> None:
         ("0 0 30000", "line 1: 0 30000 mm"),
     ],
 )
-def test_a_script_that_cannot_be_played_is_refused(tmp_path: Path, text: str, told: str) -> None:
+def test_a_script_that_cannot_be_played_is_rejected(tmp_path: Path, text: str, told: str) -> None:
     path = script(tmp_path, text)
     with pytest.raises(BadInputError, match=told) as refused:
         read_script(path)
     assert str(path) in str(refused.value)
 
 
-def test_no_script_leads_further_than_its_packets_may_say(tmp_path: Path) -> None:
+def test_a_script_beyond_the_range_of_packets_is_rejected(tmp_path: Path) -> None:
     path = script(tmp_path, "0 -1000 0\n1 1400 0\n2 1600 0")
     assert len(read_script(path, 1.0)) == 3
     with pytest.raises(BadInputError, match=r"line 3: 2\.6 m .*allowed: 2\.5 m at this scale"):
@@ -139,7 +139,7 @@ def test_invalid_scripts_are_rejected(tmp_path: Path) -> None:
             read_script(tmp_path / name)
 
 
-def test_each_press_is_a_step_and_nothing_moves_without() -> None:
+def test_each_key_press_moves_the_hand_by_one_step() -> None:
     keys = Keys(scale=8.0)
     step = keys.step_m
     for key in (RIGHT, RIGHT, UP, "d", LEFT, DOWN, "w"):
@@ -152,7 +152,7 @@ def test_each_press_is_a_step_and_nothing_moves_without() -> None:
     assert keys.step_m == 1e-3 * STEPS_mm[0]
 
 
-def test_keys_that_come_in_pieces_are_understood() -> None:
+def test_key_sequences_may_arrive_in_pieces() -> None:
     keys = Keys(scale=1.0)
     step = keys.step_m
     for piece in ("\x1b", "[", "C", "\x1b[", "C", "\x1b", "\x1b[C", "\x1b[1;5C\x1b[3~", "x\x1bOC"):
@@ -160,7 +160,7 @@ def test_keys_that_come_in_pieces_are_understood() -> None:
     assert keys.position_m == pytest.approx((4 * step, 0.0, 0.0))  # not for Ctrl-right and Delete
 
 
-def test_space_holds_enter_confirms_q_ends() -> None:
+def test_space_holds_enter_confirms_and_q_ends() -> None:
     keys = Keys(scale=1.0)
     keys.press(" ", TICK_S)
     assert keys.clutch
@@ -174,16 +174,16 @@ def test_space_holds_enter_confirms_q_ends() -> None:
     assert keys.quit
 
 
-def test_keys_nobody_meant_do_not_carry_the_robot_away() -> None:
+def test_queued_or_pasted_keys_move_the_hand_only_a_few_steps() -> None:
     keys = Keys(scale=1.0)
-    keys.press(RIGHT * 500, 30.0)  # typed while the program stood still
+    keys.press(RIGHT * 500, 30.0)  # typed while the program was paused
     assert 0.0 < keys.position_m[0] <= 7 * keys.step_m
     pasted = Keys(scale=1.0)
     pasted.press("dddddddddddddddddddd", TICK_S)
     assert pasted.position_m[0] <= 2 * pasted.step_m
 
 
-def test_no_hand_goes_where_packets_are_refused() -> None:
+def test_the_hand_stays_within_the_range_of_packets() -> None:
     keys = Keys(scale=100.0)
     for _ in range(10):
         keys.press("+", TICK_S)
@@ -194,7 +194,7 @@ def test_no_hand_goes_where_packets_are_refused() -> None:
 
 
 def read_soon(device: InputDevice, what: str) -> InputSample:
-    """Read until something is true of the hand: terminals pass bytes on in their own time."""
+    """Read until a condition holds for the hand, because terminals forward bytes with delay."""
     end = time.monotonic() + 60.0
     while not getattr(hand := device.read(time.monotonic()), what):
         assert time.monotonic() < end, hand
@@ -203,22 +203,22 @@ def read_soon(device: InputDevice, what: str) -> InputSample:
 
 
 def wait_for_bytes(terminal: int, count: int) -> None:
-    """Wait until so many bytes that were typed can be read."""
+    """Wait until `count` typed bytes can be read."""
     end = time.monotonic() + 60.0
     while int.from_bytes(fcntl.ioctl(terminal, termios.FIONREAD, bytes(4)), sys.byteorder) < count:
         assert time.monotonic() < end
         time.sleep(0.005)
 
 
-def test_a_terminal_leads_and_is_released_as_it_was() -> None:
+def test_a_terminal_moves_the_hand_and_its_settings_are_restored() -> None:
     ours, its = pty.openpty()
     before = termios.tcgetattr(its)
     device = Keyboard(1.0, its)
     during = termios.tcgetattr(its)
     assert not during[3] & (termios.ECHO | termios.ICANON)
-    assert during[3] & termios.ISIG  # Ctrl-C stays what it is
+    assert during[3] & termios.ISIG  # Ctrl-C keeps its meaning
     typed = RIGHT.encode() + b" \n"
-    os.write(ours, typed)  # before anybody listens
+    os.write(ours, typed)  # before the device reads
     wait_for_bytes(its, len(typed))
     assert device.read(time.monotonic()) == InputSample(clutch=False)
     os.write(ours, RIGHT.encode() + b"\n")
@@ -233,7 +233,7 @@ def test_a_terminal_leads_and_is_released_as_it_was() -> None:
     os.close(its)
 
 
-def test_a_terminal_that_goes_away_ends_it() -> None:
+def test_a_closed_terminal_ends_teleoperation() -> None:
     ours, its = pty.openpty()
     device = Keyboard(1.0, its)
     os.close(ours)

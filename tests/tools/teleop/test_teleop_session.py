@@ -1,4 +1,4 @@
-"""A session of teleoperation against a real receiver of set-points, over real UDP."""
+"""A teleoperation session with a real receiver of set-points over real UDP."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ SCALE = 4.0
 
 
 class Robot:
-    """A receiver behind which the platform is wherever it is to be."""
+    """A receiver of set-points whose platform has a constant pose."""
 
     def __init__(self) -> None:
         self.block = SharedBlock.create(3, 0.1, 1000.0)
@@ -45,7 +45,7 @@ class Robot:
         self.block.counters["rows"][0] = 1
 
     def samples(self) -> np.ndarray:
-        """Return the newest samples, the oldest first."""
+        """Return the newest samples in order of time."""
         posted = int(self.block.counters["samples"][0])
         first = max(0, posted - SAMPLES)
         return self.block.samples[[k % SAMPLES for k in range(first, posted)]]
@@ -63,7 +63,7 @@ def robot() -> Iterator[Robot]:
 def teleoperate(
     robot: Robot, device: InputDevice, then: Callable[[], None] | None = None
 ) -> tuple[TeleopSession, End]:
-    """Lead to the end; have something happen once the hand leads."""
+    """Run teleoperation to its end. Call `then` once the hand moves the robot."""
     given = robot.stream.sessions.issue(robot.token)
     with StreamClient(*robot.stream.address, given) as stream:
         session = TeleopSession(stream, device, SCALE, POSE)
@@ -89,7 +89,7 @@ def teleoperate(
 
 
 class Still:
-    """A hand that stays where it is."""
+    """A hand at rest."""
 
     hint = "nothing"
 
@@ -104,7 +104,7 @@ class Still:
 
 
 class Unhurried:
-    """A hand whose time goes on by a sample's at most between two: nothing holds it up."""
+    """A hand whose time advances by at most one sample per read, so that delays do not matter."""
 
     def __init__(self, device: ScriptDevice) -> None:
         self._device = device
@@ -137,9 +137,9 @@ def test_hand_motion_reaches_the_loop_and_the_answer_returns(robot: Robot) -> No
     np.testing.assert_allclose(samples["position_m"][numbers == 1][0], [0.01, -0.02, 0], atol=2e-3)
     turned = 2.0 * np.arctan2(samples["quaternion"][:, 2], samples["quaternion"][:, 0])
     assert turned.max() == pytest.approx(0.4, abs=0.1)
-    assert np.abs(np.diff(turned)).max() < 0.3, "steadily"
+    assert np.abs(np.diff(turned)).max() < 0.3, "steady motion"
     clutch = (samples["buttons"] & CLUTCH) != 0
-    assert clutch[0]  # until the robot has answered nothing leads
+    assert clutch[0]  # the hand moves nothing until the robot has answered
     assert clutch[numbers == 1][-1] and not clutch[numbers == 1][0] and not clutch[-1]
     figures = session.figures()
     assert [one["number"] for one in figures["confirmations"]] == [1, 2]
@@ -148,35 +148,37 @@ def test_hand_motion_reaches_the_loop_and_the_answer_returns(robot: Robot) -> No
     assert figures["answered"] > 0.9 * figures["sent"]
 
 
-def test_a_hand_in_trouble_does_not_lead(robot: Robot) -> None:
+def test_a_hand_in_trouble_does_not_move_the_robot(robot: Robot) -> None:
     session, _ = teleoperate(robot, Still("its cable is loose"), lambda: robot.run(IDLE))
     assert session.leading
     assert np.all(robot.samples()["buttons"] & CLUTCH)
 
 
-def test_a_program_that_has_ended_ends_it(robot: Robot) -> None:
+def test_the_end_of_the_program_ends_teleoperation(robot: Robot) -> None:
     session, end = teleoperate(robot, Still(), lambda: robot.run(IDLE))
     assert end.failed and end.text == "the robot does not follow the stream any more"
     assert session.leading
 
 
-def test_a_fault_ends_it(robot: Robot) -> None:
+def test_a_fault_ends_teleoperation(robot: Robot) -> None:
     _, end = teleoperate(robot, Still(), lambda: robot.run(POSE, LoopState.FAULT))
     assert end.failed
 
 
-def test_a_right_that_is_gone_ends_it(robot: Robot) -> None:
+def test_losing_the_right_to_move_ends_teleoperation(robot: Robot) -> None:
     _, end = teleoperate(robot, Still(), lambda: robot.lease.release(robot.token))
     assert end.failed and end.text.startswith("the right to move has ended")
 
 
-def test_a_robot_lost_on_its_way_to_the_end_of_a_script_is_reported(robot: Robot) -> None:
+def test_a_robot_lost_during_a_script_is_reported(robot: Robot) -> None:
     done = ScriptDevice((ScriptLine(0.0, (0.0, 0.0, 0.0)),))
     _, end = teleoperate(robot, done, lambda: robot.run(IDLE))
     assert end.failed and end.text == "the robot does not follow the stream any more"
 
 
-def test_silence_ends_it(robot: Robot, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_silence_of_the_robot_ends_teleoperation(
+    robot: Robot, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(session_module, "_SILENCE_S", 0.3)
     _, end = teleoperate(robot, Still(), robot.stream.stop)
     assert end.failed and end.text == "the robot has not answered for 0.3 s"

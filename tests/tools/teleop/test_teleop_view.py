@@ -1,4 +1,4 @@
-"""What the operator sees in the terminal."""
+"""The terminal view of teleoperation."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def seen(
     silent_s: float = 0.0,
     coordinates: int = 2,
 ) -> list[str]:
-    """Return the lines shown of a robot that has answered once."""
+    """Return the lines shown for a robot that has answered once."""
     with StreamClient("127.0.0.1", 9, StreamSession(1, bytes(32))) as stream:
         stream.state = StreamAnswer(
             1, Standing.ACCEPTED, 1, 0, 0, LoopState.ACTIVE, 3, pose=pose, pose_setpoint=pose
@@ -60,7 +60,7 @@ def seen(
     return shown.get().splitlines()
 
 
-def test_the_robot_stands_where_it_is_told_and_its_target_too() -> None:
+def test_the_picture_shows_robot_and_target_at_their_positions() -> None:
     turn = math.radians(1.5)
     pose = (0.5, 0.5, 0.0, math.cos(turn), 0.0, 0.0, math.sin(turn))
     axes = [{"tension_N": 40.4}, {"tension_N": None}, {"tension_N": 20.0}]
@@ -73,8 +73,8 @@ def test_the_robot_stands_where_it_is_told_and_its_target_too() -> None:
         next((k, line.index(mark)) for k, line in enumerate(picture) if mark in line)
         for mark in "o+"
     )
-    assert row_o == row_t  # one height
-    # 1 m apart of 4.2 m in 22 rows of 4 dots, each character 2 dots wide
+    assert row_o == row_t  # same height
+    # 1 m of 4.2 m in 22 rows of 4 dots, with 2 dots per character
     assert column_o - column_t == pytest.approx(1.0 * 22 * 4 / 4.2 / 2, abs=1.5)
     for told in (
         "LEADS  active, 2 confirmed",
@@ -108,24 +108,24 @@ def test_a_small_terminal_shows_the_figures_before_the_picture() -> None:
     assert not any("◉" in line for line in seen(pose, {}, height=12))
 
 
-def test_without_a_plane_there_are_figures_only() -> None:
+def test_a_robot_without_picture_shows_figures_only() -> None:
     lines = seen(UNKNOWN_POSE, {}, platform=None)
     assert lines[0].startswith("LEADS")
     assert not any("platform" in line or "◉" in line for line in lines)
 
 
-def test_lines_are_drawn_where_they_are() -> None:
+def test_lines_and_marks_are_drawn_at_their_positions() -> None:
     canvas = Canvas(4, 2, (0.0, 0.0), (7.0, 7.0))
     canvas.line((0.0, 7.0), (7.0, 7.0))
     canvas.line((0.0, 0.0), (0.0, 7.0))
-    canvas.line((-1e9, math.nan), (1.0, 1.0))  # nowhere: left out
+    canvas.line((-1e9, math.nan), (1.0, 1.0))  # not finite: omitted
     canvas.mark((6.9, 0.1), "x", "red")
     canvas.mark((70.0, 0.0), "y", "red")
     rows = ["".join(letters for letters, _ in row) for row in canvas.rows()]
     assert rows == ["⡏⠉⠉⠉", "⡇  x"]
 
 
-def test_in_space_all_coordinates_and_the_rotation_are_reported() -> None:
+def test_all_coordinates_and_the_rotation_are_shown_in_space() -> None:
     half = math.radians(5.0)
     pose = (0.5, 0.25, 1.5, math.cos(half), 0.0, -math.sin(half), 0.0)
     room = {"home_m": [0.0, 0.0, 1.0]}

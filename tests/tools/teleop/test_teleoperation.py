@@ -1,4 +1,4 @@
-"""Where set-points go, as a daemon tells and a user wants it."""
+"""The address of set-points, from the daemon or the user."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def address(listens: str | None, url: str | None = None, via: str | None = None)
     return stream_address({"robot": "planar-3", "parts": parts}, settings)
 
 
-def test_the_stream_is_where_the_daemon_is() -> None:
+def test_the_stream_has_the_host_of_the_daemon() -> None:
     assert address("127.0.0.1:7710") == ("127.0.0.1", 7710)
     assert address("0.0.0.0:7710") == ("127.0.0.1", 7710)
     assert address("0.0.0.0:7710", url="http://robot.example:7711") == ("robot.example", 7710)

@@ -1,4 +1,4 @@
-"""Masses hung by a person: what is asked, what counts as an answer, and what no mass can be."""
+"""A person hangs masses: the question, its answer, and signals."""
 
 from __future__ import annotations
 
@@ -29,10 +29,10 @@ def ignored(number: int) -> Iterator[None]:
     try:
         yield
     finally:
-        assert signal.signal(number, before) == signal.SIG_IGN  # put back as it was
+        assert signal.signal(number, before) == signal.SIG_IGN  # the handler was restored
 
 
-def test_only_enter_alone_raises_the_mass(
+def test_only_an_empty_line_confirms_the_mass(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     outlet, inlet = os.pipe()
@@ -50,7 +50,7 @@ def test_only_enter_alone_raises_the_mass(
             by_prompt(2.0, LockstepClock())
 
 
-def test_a_question_left_open_does_not_spoil_the_end_of_the_process() -> None:
+def test_an_open_question_does_not_disturb_the_end_of_the_process() -> None:
     ask = (
         "from cdpr_rt.core.clock import PacedClock as C\n"
         "from cdpr_tools.tension.watch import by_prompt"
@@ -96,13 +96,13 @@ def test_a_signal_ends_the_question(
         try:
             with pytest.raises(InvalidRequestError, match="nobody has hung 5 kg"):
                 by_prompt(5.0, clock())
-        finally:  # a signal that comes later ends the test run
+        finally:  # a later signal would end the test run
             sent.join()
             too_late.cancel()
     os.close(inlet)
 
 
-def test_a_signal_beside_enter_ends_it_too(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_signal_together_with_enter_ends_the_question(monkeypatch: pytest.MonkeyPatch) -> None:
     def typed(_question: str, _stop_requested: Callable[[], bool]) -> str:
         signal.raise_signal(signal.SIGINT)
         return "\n"

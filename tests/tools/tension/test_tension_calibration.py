@@ -1,4 +1,4 @@
-"""A calibration by tension refuses what no calibration can be: masses, recordings."""
+"""Calibration by tension rejects invalid masses, recordings and tensions."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ from cdpr_tools.tension.calibration import (
 @pytest.mark.parametrize(
     "masses", [(2.0, 5.0), (2.0, 5.0, float("nan")), (2.0, 2.0, 5.0), (-1.0, 2.0, 5.0), (4, 5, 6)]
 )
-def test_masses_that_cannot_tell_the_gain_are_refused(masses: tuple[float, ...]) -> None:
+def test_masses_that_do_not_determine_the_gain_are_rejected(masses: tuple[float, ...]) -> None:
     with pytest.raises(InvalidRequestError, match="--masses: "):
         check_masses(load_winch("winch-mpp0923d"), masses, 9.81)
 
 
-def test_a_recording_of_something_else_is_refused(tmp_path: Path) -> None:
+def test_a_recording_of_a_different_kind_is_rejected(tmp_path: Path) -> None:
     path = tmp_path / "raw" / "mass-2kg.raw"
     log = RawLogWriter(path, ["time_s"], {"identity": {"winch": "w", "motor": "m", "serial": "x"}})
     log.write(np.zeros((3, 1)))
@@ -41,6 +41,6 @@ def test_a_recording_of_something_else_is_refused(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("tensions_N", [(0.0, 80.0), (80.0, 10.0), (10.0, 1e4)])
-def test_tensions_that_the_motor_cannot_give_are_refused(tensions_N: tuple[float, float]) -> None:
+def test_tensions_beyond_the_motors_torque_are_rejected(tensions_N: tuple[float, float]) -> None:
     with pytest.raises(InvalidRequestError, match="rising and up to"):
         plan_anchor(load_winch("winch-mpp0923d"), *tensions_N, 5e-3, 0.5)

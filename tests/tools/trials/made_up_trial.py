@@ -1,4 +1,4 @@
-"""Recordings of trials that never were, whose figures are known."""
+"""Synthetic recordings of trials with known figures."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -41,7 +41,7 @@ def recorded(
     directions: Directions = PLANE,
     **truth: np.ndarray,
 ) -> Recorded:
-    """Return cycles in which the platform was at places `true` (c, d); marks count rows from 0."""
+    """Return cycles with the platform at places `true` (c, d). Marks count rows from 0."""
     count = len(true)
     made = object.__new__(Recorded)
     made.folder, made.first, made.directions = Path("made-up"), FIRST, directions
@@ -71,6 +71,6 @@ def _positions(places: np.ndarray, directions: Directions) -> np.ndarray:
 
 
 def _rotations(places: np.ndarray, directions: Directions) -> Rotation:
-    """Return what the rotation vectors of places (c, d) from the orientation at home mean."""
+    """Return rotations (c, 3, 3) from rotation vectors in places (c, d) relative to home."""
     vectors = places[:, directions.k :] if directions.turns else np.zeros((len(places), 3))
     return Rotation.from_rotvec(vectors) * Rotation.from_matrix(directions.home_rotation)

@@ -1,4 +1,4 @@
-"""A load cell that is off, brought about on the simulated robot, is named in the status."""
+"""A load cell with an offset, injected on the simulated robot, is reported in the status."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def notices(robot: LockstepRobot) -> list[str]:
     return [text for text in robot.status()["notices"] if "load cell" in text]
 
 
-def test_a_cell_that_lies_is_named_and_the_motion_goes_on(robot: LockstepRobot) -> None:
+def test_an_offset_load_cell_is_reported_and_motion_continues(robot: LockstepRobot) -> None:
     robot.carry_out("pose", position_m=[0.3, 1.7])
     robot.run(6.0)
     assert not notices(robot)
@@ -49,7 +49,7 @@ def test_a_cell_that_lies_is_named_and_the_motion_goes_on(robot: LockstepRobot) 
     robot.inject(axis=AXIS, sub=CELL_OFF, value=0)
     robot.carry_out("pose", position_m=[0.0, 1.5])
     robot.run(3.0)
-    assert notices(robot) == [told], "it stays in the status"
+    assert notices(robot) == [told], "the notice remains in the status"
     assert robot.state is LoopState.ACTIVE
     robot.carry_out("lower", 60.0)
     robot.carry_out("tighten", 60.0)

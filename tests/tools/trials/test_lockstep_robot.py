@@ -1,4 +1,4 @@
-"""A robot's daemon in the test's own process: time, rights, streams and truth are the bus' own."""
+"""A robot's loop in the test process, with time, right to move, stream and truth in bus time."""
 
 from collections.abc import Iterator
 
@@ -29,11 +29,11 @@ def robot() -> Iterator[LockstepRobot]:
 def _held_right(robot: LockstepRobot) -> Iterator[None]:
     yield
     if robot.right.token is None:
-        robot.run(4.0)  # whoever had it has lost it by silence
+        robot.run(4.0)  # the previous holder has lost the right by silence
         robot.right.take("trial")
 
 
-def test_time_is_that_of_the_cycles(robot):
+def test_time_advances_with_the_cycles(robot):
     before_s = robot.now_s
     rows = robot.run(0.25)
     assert rows.size == 250
@@ -42,7 +42,7 @@ def test_time_is_that_of_the_cycles(robot):
     assert robot.row["cycle"] == robot.cycle
 
 
-def test_truth_is_that_of_the_last_sync(robot):
+def test_truth_is_recorded_at_the_last_sync(robot):
     robot.program("pose", position_m=[0.0, HEIGHT + 0.1])
     robot.turn(400)
     record = robot.truth()
@@ -53,14 +53,14 @@ def test_truth_is_that_of_the_last_sync(robot):
     assert log[-1] == record
     rows = robot.run(0.1)
     true = read_pose_log(robot.truth_log)["motor_rad"][-rows.size :]
-    # the encoder is noisy and half a millisecond behind
+    # the encoder is noisy and half a millisecond late
     off = rows["position_rad"] - true
     np.testing.assert_allclose(off, np.tile(off.mean(axis=0), (100, 1)), atol=4e-3)
     np.testing.assert_allclose(turned, off.mean(axis=0), atol=4e-3)
     robot.finish()
 
 
-def test_a_fall_after_the_controller_s_death_is_in_the_log():
+def test_a_fall_after_the_death_of_the_controller_is_logged():
     with LockstepRobot("planar-3") as dying:
         dying.enable()
         dying.carry_out("tighten", 60.0)
@@ -73,11 +73,11 @@ def test_a_fall_after_the_controller_s_death_is_in_the_log():
     assert after["time_s"][-1] == pytest.approx(now_s + 2.0, abs=0.1)
     height, fastest = after["position_m"][:, 1], after["velocity_m_s"][:, 1].min()
     assert height[0] == pytest.approx(HEIGHT, abs=0.01)
-    assert height[-1] == pytest.approx(1.3, abs=1e-3)  # on its stand
+    assert height[-1] == pytest.approx(1.3, abs=1e-3)  # on the stand
     assert fastest < -0.3
 
 
-def test_what_is_refused_is_reported_and_changes_nothing(robot):
+def test_a_rejected_command_raises_an_error_and_changes_nothing(robot):
     with pytest.raises(Refused, match="workspace"):
         robot.program("pose", position_m=[9.0, HEIGHT])
     assert robot.state is LoopState.ACTIVE
@@ -85,7 +85,7 @@ def test_what_is_refused_is_reported_and_changes_nothing(robot):
         robot.until(lambda: False, 0.1, "the impossible")
 
 
-def test_a_right_that_is_released_holds_the_motion(robot):
+def test_releasing_the_right_to_move_holds_the_motion(robot):
     robot.program("pose", position_m=[0.3, HEIGHT])
     robot.right.drop()
     robot.run(0.01)
@@ -94,7 +94,7 @@ def test_a_right_that_is_released_holds_the_motion(robot):
         robot.program("pose", position_m=[0.0, HEIGHT])
 
 
-def test_a_right_runs_out_by_the_time_of_the_bus(robot):
+def test_the_right_to_move_expires_in_bus_time(robot):
     robot.program("pose", position_m=[0.0, HEIGHT + 0.2], speed_m_s=0.001)
     robot.right.fall_silent()
     robot.run(1.0)
@@ -103,7 +103,7 @@ def test_a_right_runs_out_by_the_time_of_the_bus(robot):
     assert robot.loop.engine.program.name == "hold"
 
 
-def test_a_stream_s_packets_are_taken_as_the_daemon_takes_them(robot):
+def test_packets_of_a_stream_are_processed_as_in_the_daemon(robot):
     robot.carry_out("pose", position_m=[0.0, HEIGHT])
     robot.program("pose", stream=True)
     hand = robot.stream.sender()
@@ -123,20 +123,20 @@ def test_a_stream_s_packets_are_taken_as_the_daemon_takes_them(robot):
     assert robot.truth()["velocity_m_s"][1] == pytest.approx(0.0, abs=5e-3)
 
 
-def test_a_drive_that_stays_silent_does_not_keep_two_buses_from_being_left():
+def test_a_silent_drive_does_not_prevent_closing_two_buses():
     with LockstepRobot("bench-8") as robot:
         robot.enable()
         robot.inject(axis=1, sub=6, value=65535)
         robot.run(0.5)
         begin_s = robot.machine.clock.now_s
         left = robot.machine.close()
-        # one second of cycles, then by SDO, whose time runs out
+        # one second of cycles, then SDO until its timeout
         assert 1.0 < robot.machine.clock.now_s - begin_s < 10.0
     assert left.startswith("node 2 (axis 2): does not confirm that its power stage is off")
     assert "node 1" not in left
 
 
-def test_a_bus_that_is_not_exchanged_any_more_does_not_keep_the_others_from_being_left(monkeypatch):
+def test_a_bus_that_fails_to_exchange_does_not_prevent_closing_the_others(monkeypatch):
     usual = AxisGroup.sync
     with LockstepRobot("bench-8") as robot:
         robot.enable()

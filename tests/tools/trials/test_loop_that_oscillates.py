@@ -1,4 +1,4 @@
-"""Drives whose answers are older than their profile says make a loop oscillate: it is told."""
+"""A loop that oscillates because of delayed answers of drives is reported."""
 
 from __future__ import annotations
 
@@ -14,7 +14,9 @@ pytestmark = pytest.mark.long
 
 
 @pytest.mark.parametrize(("answer_s", "oscillates"), [(0.0005, False), (0.0055, True)])
-def test_it_is_told_while_it_runs(tmp_path: Path, answer_s: float, oscillates: bool) -> None:
+def test_an_oscillating_loop_is_reported_in_the_status(
+    tmp_path: Path, answer_s: float, oscillates: bool
+) -> None:
     plant = tmp_path / "plant.toml"
     plant.write_text(f"[motor.drive]\nfeedback_delay_s = {answer_s}\n")
     with LockstepRobot("planar-4", plant=plant) as robot:
@@ -34,5 +36,5 @@ def test_it_is_told_while_it_runs(tmp_path: Path, answer_s: float, oscillates: b
         (notice,) = (text for text in told if "swings this winch" in text)
         assert ": the platform's loop swings this winch, for 1 s at 3" in notice
         robot.carry_out("lower")
-        robot.program("tighten")  # begins with what is known then
+        robot.program("tighten")  # tightening starts a new detection
         assert not any("swings this winch" in text for text in robot.status()["notices"])

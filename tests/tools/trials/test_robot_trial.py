@@ -1,4 +1,4 @@
-"""`cdpr robot trial`: its figures are those of its files, as a stranger reads them."""
+"""`cdpr robot trial`: its figures agree with its files, read independently."""
 
 import json
 import shutil
@@ -24,7 +24,7 @@ from tests.profiles.test_geometry_calibration import calibration
 pytestmark = pytest.mark.long
 
 ROOT = Path(__file__).parents[3]
-BEHIND = 1024  # the header of a log of true poses
+BEHIND = 1024  # header of a log of true poses
 
 
 @pytest.fixture(scope="module")
@@ -37,21 +37,21 @@ def trial(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, Any
     return folder, json.loads(done.stdout.splitlines()[-1])
 
 
-def test_a_trial_that_is_told_to_end_says_so(tmp_path):
+def test_an_interrupted_trial_is_reported(tmp_path):
     what = ["robot", "trial", "planar-3", "targets", "--out", str(tmp_path / "trial")]
     command = [sys.executable, "-m", "cdpr_tools.cli", *what]
     with subprocess.Popen(command, stderr=subprocess.PIPE, text=True, cwd=ROOT) as process:
         assert process.stderr is not None
-        # on a machine that has compiled nothing yet, that is told before
+        # on a machine without compiled kernels, a notice precedes this
         assert any("starting the simulated robot" in line for line in process.stderr)
         process.terminate()
         *_, last = process.stderr.read().splitlines()
     assert (process.returncode, last) == (1, "cdpr: interrupted")
 
 
-def test_figures_are_those_of_the_files(trial):
+def test_figures_agree_with_the_files(trial):
     folder, told = trial
-    assert told["speed_m_s"] is None, "targets have none of their own"
+    assert told["speed_m_s"] is None, "targets have no speed"
     (recording,) = (folder / "run").glob("*.mcap")
     with recording.open("rb") as file:
         marks = [
@@ -80,7 +80,7 @@ def test_figures_are_those_of_the_files(trial):
     assert (folder / "trial.png").read_bytes().startswith(b"\x89PNG")
 
 
-def test_it_can_be_judged_again(trial, capsys):
+def test_a_trial_can_be_evaluated_again(trial, capsys):
     folder, told = trial
     robot_trial.trial("planar-3", KindOfTrial.TARGETS, out_dir=folder, again=True, as_json=True)
     again = json.loads(capsys.readouterr().out.splitlines()[-1])
@@ -89,7 +89,7 @@ def test_it_can_be_judged_again(trial, capsys):
         robot_trial.trial("planar-3", KindOfTrial.LINE, out_dir=folder, again=True)
 
 
-def test_what_the_status_tells_at_the_end_is_reported(
+def test_notices_at_the_end_of_a_trial_are_reported(
     trial: tuple[Path, dict[str, Any]], monkeypatch: pytest.MonkeyPatch, capsys
 ):
     def marked(recorded: Recorded, what: str) -> list[dict[str, Any]]:
@@ -117,14 +117,14 @@ def test_the_calibration_in_force_is_reported_with_the_figures(
     robot_trial.trial("planar-3", KindOfTrial.TARGETS, minutes=0.12, out_dir=folder, as_json=True)
     told = json.loads(capsys.readouterr().out.splitlines()[-1])
     assert told["calibration"]["identity"] == known.identity
-    undo(robot)  # a trial is judged by what was in force while it ran
+    undo(robot)  # a trial is evaluated with the calibration during its run
     robot_trial.trial("planar-3", KindOfTrial.TARGETS, out_dir=folder, again=True)
     out = capsys.readouterr()
     assert f"calibration 1 ({known.identity})" in out.out + out.err
 
 
 @pytest.mark.parametrize("by", [1, -30])
-def test_a_log_of_other_syncs_is_noticed(trial, tmp_path, by):
+def test_a_log_of_different_syncs_is_rejected(trial, tmp_path, by):
     folder, _ = trial
     part = tmp_path / "run"
     shutil.copytree(folder / "run", part)
@@ -134,7 +134,7 @@ def test_a_log_of_other_syncs_is_noticed(trial, tmp_path, by):
     size = json.loads(data[:BEHIND])["record_bytes"]
     records = np.frombuffer(data[BEHIND:], np.uint8).reshape(-1, size)
     moved = np.roll(records, by, axis=0)
-    moved[:, :4] = records[:, :4]  # the number of the SYNC stays
+    moved[:, :4] = records[:, :4]  # SYNC numbers do not change
     log.write_bytes(data[:BEHIND] + moved.tobytes())
     with pytest.raises(WorkFailedError, match="do not belong together"):
         Recorded(part)
@@ -154,18 +154,18 @@ def test_a_log_of_other_syncs_is_noticed(trial, tmp_path, by):
         ("planar-3", KindOfTrial.TARGETS, {"commissioned": Path("/nowhere")}, "/nowhere"),
     ],
 )
-def test_what_cannot_be_tried_is_reported(tmp_path, robot, kind, options, told):
+def test_an_impossible_trial_is_rejected(tmp_path, robot, kind, options, told):
     with pytest.raises((BadInputError, ConfigurationError, ProfileError), match=told):
         robot_trial.trial(robot, kind, **{"out_dir": tmp_path / "out", **options})
 
 
-def test_an_earlier_trial_is_not_written_over(trial):
+def test_an_earlier_trial_is_not_overwritten(trial):
     folder, _ = trial
     with pytest.raises(BadInputError, match="holds something already"):
         robot_trial.trial("planar-3", KindOfTrial.TARGETS, minutes=0.1, out_dir=folder)
 
 
-def test_angles_of_motors_that_swing_fast_may_be_old(trial):
+def test_delayed_angles_of_oscillating_motors_are_accepted(trial):
     recorded = Recorded(trial[0] / "run")
     time_s, rad_s = recorded.time_s[:, None], 2.0 * np.pi * 36.0
     recorded.truth["motor_rad"] = 0.2 * np.sin(rad_s * time_s)

@@ -1,4 +1,4 @@
-"""What a robot that is turned cycle by cycle records does not depend on when it is turned."""
+"""The recording of a robot in lockstep does not depend on the wall clock."""
 
 import time
 from pathlib import Path
@@ -14,7 +14,7 @@ COMPARED = ("/cycle", "/description", "/events", "/status")
 
 
 def recorded(folder: Path, *, pause_s: float) -> dict[str, list[bytes]]:
-    """Tighten the cables a little, with pauses by the wall clock; return the messages by topic."""
+    """Tighten the cables with pauses in wall-clock time. Return messages by topic."""
     with LockstepRobot("planar-3", record=folder) as robot:
         robot.enable()
         for name in ("hold", "tighten") * 3:
@@ -40,12 +40,12 @@ def runs(tmp_path_factory: pytest.TempPathFactory) -> list[dict[str, list[bytes]
 
 
 @pytest.mark.parametrize("topic", COMPARED)
-def test_messages_are_the_same_whatever_the_wall_did(runs, topic):
+def test_messages_do_not_depend_on_pauses(runs, topic):
     quick, slow = runs
     assert quick[topic] == slow[topic] and quick[topic]
 
 
-def test_the_walls_time_stands_apart(runs):
+def test_wall_clock_times_are_recorded_separately(runs):
     quick, slow = runs
     assert quick.keys() == slow.keys() == {*COMPARED, "/timing"}
     assert len(quick["/timing"]) == len(slow["/timing"]) == len(quick["/cycle"])

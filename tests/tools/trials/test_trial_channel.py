@@ -1,4 +1,4 @@
-"""The bad network of the stream trial does what it says, and nothing else."""
+"""The bad network of the stream trial has exactly the specified losses and delays."""
 
 import numpy as np
 import pytest
@@ -11,7 +11,7 @@ SHARES = st.floats(0.0, 0.9)
 
 
 def transport(network: Network, seed: int, count: int) -> tuple[Channel, list[tuple[float, int]]]:
-    """Send `count` packets at 50 Hz; return when each arrived that did, in that order."""
+    """Send `count` packets at 50 Hz. Return arrival times of those that arrived, in order."""
     channel = Channel(network, np.random.default_rng(seed))
     came = []
     for step in range(50 * (count + 50)):
@@ -24,7 +24,7 @@ def transport(network: Network, seed: int, count: int) -> tuple[Channel, list[tu
 
 @given(loss=SHARES, duplicates=SHARES, jitter_s=st.floats(0.0, 0.1), seed=st.integers(0, 9))
 @settings(max_examples=20)
-def test_a_packet_comes_within_its_jitter_or_never(loss, duplicates, jitter_s, seed):
+def test_a_packet_arrives_within_its_jitter_or_never(loss, duplicates, jitter_s, seed):
     network = Network(loss, duplicates, 0.02, jitter_s)
     channel, came = transport(network, seed, 100)
     transit_s = [at - number * 0.02 for at, number in came]
@@ -34,7 +34,7 @@ def test_a_packet_comes_within_its_jitter_or_never(loss, duplicates, jitter_s, s
     assert len(numbers) - len(set(numbers)) == channel.doubled
 
 
-def test_shares_are_those_that_were_asked_for():
+def test_losses_and_duplicates_have_the_requested_shares():
     channel, came = transport(Network(), 3, 4000)
     assert channel.lost / channel.sent == pytest.approx(0.2, abs=0.02)
     assert channel.doubled / (channel.sent - channel.lost) == pytest.approx(0.1, abs=0.02)

@@ -1,4 +1,4 @@
-"""Each trial's figures, on motion that was made up and whose figures are known."""
+"""Figures of each trial for synthetic motion with known figures."""
 
 import numpy as np
 import pytest
@@ -19,7 +19,7 @@ def figures_of(found: list[Figure]) -> dict[str, Figure]:
 @pytest.mark.parametrize(("value", "at_least", "reached"), [(1.0, False, True), (1.1, False, False),
                          (1.0, True, True), (0.9, True, False), (np.nan, False, False),
                          (np.nan, True, False)])  # fmt: skip
-def test_a_figure_is_reached_up_to_its_limit(value, at_least, reached):
+def test_a_target_is_reached_up_to_and_including_its_limit(value, at_least, reached):
     figure = Figure("key", "text", value, "mm", 1.0, at_least)
     assert figure.reached is reached
     assert all_reached([figure]) is reached
@@ -44,7 +44,7 @@ def test_errors_at_targets_are_those_at_the_end_of_the_stay():
 
 
 def slanted(ripple_m: float) -> object:
-    """Return motion along (3, 4) / 5 that swings across it, and lags 1 mm behind its set-point."""
+    """Return motion along (3, 4) / 5 that oscillates across it and lags 1 mm behind."""
     along, across = np.array([0.6, 0.8]), np.array([-0.8, 0.6])
     way = np.linspace(0.0, 0.5, 5000)[:, None]
     setpoint = REACH + way * along
@@ -59,7 +59,7 @@ def test_a_line_s_error_is_the_distance_from_it():
     assert found["path_with_mm"].value == pytest.approx(1.0 / np.sqrt(2.0), rel=0.01)
     assert found["path_without_mm"].value == pytest.approx(4.0 / np.sqrt(2.0), rel=0.01)
     assert found["path_ratio"].value == pytest.approx(4.0, rel=0.01)
-    expected = np.sqrt((8.0 + 1.0) / (0.5 + 1.0))  # the lag is in both
+    expected = np.sqrt((8.0 + 1.0) / (0.5 + 1.0))  # both contain the lag
     assert found["setpoint_ratio"].value == pytest.approx(expected, rel=0.01)
     assert not found["setpoint_ratio"].reached
     expected = np.sqrt(8.0 / 0.5)
@@ -70,7 +70,7 @@ def test_a_line_s_error_is_the_distance_from_it():
 
 
 def leg_of(over_m: float, **truth: np.ndarray) -> object:
-    """Return one leg from rest to 0.5 m beside, whose end the platform passes by `over_m`."""
+    """Return a leg of 0.5 m from rest whose target the platform passes by `over_m`."""
     way = np.concatenate([np.zeros(10), np.linspace(0.0, 1.0, 990)])
     setpoint = REACH + np.outer(way, [-0.5, 0.0])
     true = setpoint.copy()
@@ -81,15 +81,15 @@ def leg_of(over_m: float, **truth: np.ndarray) -> object:
 
 
 @pytest.mark.parametrize("over_m", [0.0, 1.5e-3, 3e-3])
-def test_overshoot_is_what_lies_beyond_the_target(over_m):
+def test_overshoot_is_the_distance_beyond_the_target(over_m):
     found = figures_of(limits.judge(leg_of(over_m), ROBOT))
     assert found["overshoot_mm"].value == pytest.approx(1e3 * over_m, abs=1e-6)
     assert found["overshoot_mm"].reached is (over_m <= 2e-3)
-    assert found["off_mm"].value == pytest.approx(4.0)  # in y, in which it had not to move
+    assert found["off_mm"].value == pytest.approx(4.0)  # in y, where there was no motion
 
 
 @pytest.mark.parametrize(("rests_s", "over_mm"), [(0.4, None), (0.6, 1.5)])
-def test_overshoot_of_rest_leaves_out_how_far_off_the_platform_rests(rests_s, over_mm):
+def test_overshoot_of_rest_excludes_the_error_at_rest(rests_s, over_mm):
     way = np.concatenate([np.linspace(0.0, 1.0, 1000), np.ones(round(rests_s / PERIOD_S))])
     setpoint = REACH + np.outer(way, [-0.5, 0.0])
     true = setpoint - [2e-3, 0.0] * (way > 0.999)[:, None]
@@ -104,7 +104,7 @@ def test_overshoot_of_rest_leaves_out_how_far_off_the_platform_rests(rests_s, ov
         assert found["overshoot_of_rest_mm"].limit is None
 
 
-def test_a_target_changed_on_the_way_is_not_overshot_while_the_set_point_brakes():
+def test_braking_after_a_changed_target_does_not_count_as_overshoot():
     speed, acceleration = 0.4, ROBOT.platform.acceleration_m_s2
     time_s = np.arange(600) * PERIOD_S
     way = np.where(time_s < 0.2, speed * time_s, 0.0)
@@ -124,7 +124,7 @@ def test_a_target_changed_on_the_way_is_not_overshot_while_the_set_point_brakes(
 
 @pytest.mark.parametrize(("tension_N", "key"), [(19.9, "tension_min_N"), (150.1, "tension_max_N"),
                          (2.0, "slack_cycles")])  # fmt: skip
-def test_one_cycle_out_of_the_bounds_counts(tension_N, key):
+def test_a_single_cycle_out_of_bounds_counts(tension_N, key):
     tension = np.full((1000, 3), 60.0)
     assert all_reached(limits.judge(leg_of(0.0, tension_N=tension), ROBOT))
     tension[777, 1] = tension_N

@@ -1,4 +1,4 @@
-"""Each trial's figures in space, on motion that was made up and whose figures are known."""
+"""Figures of each trial in space for synthetic motion with known figures."""
 
 from dataclasses import replace
 
@@ -33,7 +33,7 @@ def turn_about(axis: np.ndarray, angle: float) -> np.ndarray:
 
 @given(st.lists(st.floats(-1.7, 1.7), min_size=6, max_size=6))
 @settings(max_examples=50)
-def test_a_place_is_where_the_platform_is_and_how_it_has_turned_from_home(values):
+def test_a_place_is_position_and_rotation_vector_from_home(values):
     place = np.array(values)
     angle = float(np.linalg.norm(place[3:]))
     turned = turn_about(place[3:], angle) if angle > 0.0 else np.eye(3)
@@ -45,7 +45,7 @@ def test_a_place_is_where_the_platform_is_and_how_it_has_turned_from_home(values
 
 
 @pytest.mark.parametrize("spin", [0.0, -0.4, 3.0])
-def test_what_a_rod_spins_about_its_own_axis_is_no_error(spin):
+def test_rotation_of_a_rod_about_its_axis_does_not_count_as_error(spin):
     rod = replace(SPACE, names=("x", "y", "z", "rx", "ry"))
     wanted = np.array([0.1, -0.2, 1.5, 0.1, 0.05])
     tilted = np.array([0.1, -0.2, 1.5, -0.03, 0.12])
@@ -58,7 +58,7 @@ def test_what_a_rod_spins_about_its_own_axis_is_no_error(spin):
     assert np.linalg.norm(rod.turn_between(spun, spun)) == 0.0
 
 
-def test_what_a_platform_swings_about_two_free_axes_is_no_error():
+def test_rotation_about_two_free_axes_does_not_count_as_error():
     upright = replace(SPACE, names=("x", "y", "z", "rz"), home_rotation=np.eye(3))
     turn = Rotation.from_rotvec([0.2, -0.1, 0.3]).as_matrix()
     np.testing.assert_allclose(upright.turn_between(np.eye(3), turn), [0.0, 0.0, 0.3], atol=1e-12)
@@ -78,11 +78,11 @@ def test_an_angle_in_the_plane_is_about_the_third_axis():
     }
 
 
-def test_targets_that_may_not_turn_say_nothing_of_a_rotation():
+def test_targets_of_a_point_contain_no_rotation():
     assert POINT.arguments(POINT.middle, 0.1) == {"position_m": [0.0, 0.0, 1.5], "speed_m_s": 0.1}
 
 
-def test_errors_at_targets_in_space_are_those_in_each_direction_and_of_the_whole_orientation():
+def test_errors_at_targets_in_space_are_per_direction_and_of_the_orientation():
     chance = np.random.default_rng(4)
     goals = HERE + chance.uniform(-0.2, 0.2, (6, 6))
     off_m = chance.uniform(-1e-3, 1e-3, (6, 3))
@@ -112,7 +112,7 @@ def test_errors_at_targets_in_space_are_those_in_each_direction_and_of_the_whole
     pictures.of_targets(made)
 
 
-def test_a_point_has_no_orientation_that_counts():
+def test_a_point_has_no_orientation_error():
     goals = np.tile(HERE[:3], (600, 1))
     marks = [{"mark": "measured", **POINT.marked(HERE[:3], "target"), "row": k} for k in (200, 500)]
     made = recorded(goals, goals, marks, POINT)
@@ -123,7 +123,7 @@ def test_a_point_has_no_orientation_that_counts():
 
 
 @DIRECTIONS
-def test_there_is_a_line_along_each_direction_within_the_workspace(directions):
+def test_each_direction_has_a_line_within_the_workspace(directions):
     found = line.lines(directions)
     assert len(found) == directions.d
     for i, (start, end) in enumerate(found):
@@ -134,7 +134,7 @@ def test_there_is_a_line_along_each_direction_within_the_workspace(directions):
 
 
 def ridden(axis: int, ripple: np.ndarray) -> object:
-    """Return a line along a direction of space, with a ripple (6,) on all of them."""
+    """Return a line along one direction, with a ripple (6,) in all directions."""
     start, end = line.lines(SPACE)[axis]
     way = np.linspace(0.0, 1.0, 4000)[:, None]
     setpoint = start + way * (end - start)
@@ -145,7 +145,7 @@ def ridden(axis: int, ripple: np.ndarray) -> object:
 
 
 @pytest.mark.parametrize("axis", [0, 1, 2])
-def test_a_line_s_error_in_space_is_all_of_the_distance_from_it(axis):
+def test_the_error_of_a_line_in_space_is_the_distance_from_it(axis):
     ripple = np.array([1.0, 2.0, 3.0, 0.0, 0.0, 0.0]) * 1e-3
     across = np.delete(ripple, axis)
     found = figures_of(line.judge({line.WITHOUT: ridden(axis, ripple)}, line.SPEED_m_s))
@@ -158,7 +158,7 @@ def test_a_line_s_error_in_space_is_all_of_the_distance_from_it(axis):
     assert "turn_without_mm" not in found
 
 
-def test_a_turn_s_error_is_an_angle_and_how_far_the_origin_moved():
+def test_the_error_of_a_turn_is_an_angle_and_the_motion_of_the_origin():
     parts = {line.WITHOUT: ridden(1, np.zeros(6))}
     turned = ridden(4, np.array([0.0, 2e-3, 0.0, 0.0, 1e-3, 0.0]))
     (errors,) = line.line_errors(turned)
@@ -185,7 +185,7 @@ def _again(made, rows):
 
 
 def swung(dies_s: float, over: np.ndarray) -> object:
-    """Return a leg of 0.5 s of motion, after which the platform swings by `over` (6,) at 1 Hz."""
+    """Return a leg of 0.5 s, after which the platform oscillates by `over` (6,) at 1 Hz."""
     time_s = np.arange(4500) * PERIOD_S
     goal = HERE + np.array([0.3, 0.2, 0.1, 0.02, -0.03, 0.04])
     share = np.clip(time_s / 0.5, 0.0, 1.0)[:, None]
@@ -212,7 +212,7 @@ def test_a_swing_lasts_until_the_platform_stays_near_its_target():
     assert still["swing_s"].value == 0.0
 
 
-def test_a_rest_that_is_too_short_tells_of_no_swing():
+def test_no_swing_is_reported_if_the_rest_is_too_short():
     made = swung(3.0, np.array([0.02, 0, 0, 0, 0, 0]))
     made.truth, made.cycles = made.truth[:2000], {k: v[:2000] for k, v in made.cycles.items()}
     assert "swing_s" not in figures_of(limits.judge(made, ROBOT))
@@ -229,7 +229,7 @@ def test_overshoot_in_space_counts_in_each_direction_and_angle():
 
 
 @pytest.mark.parametrize("most_rad", [0.05, 0.26, 1.5])
-def test_an_angle_is_off_by_no_more_than_its_quaternion_s_rounding_makes_of_it(most_rad):
+def test_the_bound_of_angle_rounding_holds_and_is_tight(most_rad):
     chance = np.random.default_rng(3)
     turns = chance.standard_normal((200_000, 3))
     turns *= most_rad / np.linalg.norm(turns, axis=1, keepdims=True)
@@ -255,7 +255,7 @@ def test_a_step_of_the_commanded_velocity_is_found_in_any_direction(direction, k
     pictures.of_stream(made)
 
 
-def test_a_hand_s_turn_is_that_of_its_place():
+def test_the_pose_of_a_hand_equals_its_place():
     place = np.array([0.01, 0.02, 0.03, 0.2, -0.1, 0.3])
     position_m, (w, x, y, z) = streaming.hand_pose(SPACE, place)
     assert position_m == place[:3].tolist()
@@ -264,7 +264,7 @@ def test_a_hand_s_turn_is_that_of_its_place():
 
 
 @pytest.mark.parametrize("seed", [1, 2])
-def test_a_tape_measure_is_some_centimetres_off(tmp_path, seed):
+def test_a_tape_measure_has_errors_of_some_centimetres(tmp_path, seed):
     path = tmp_path / "plant.toml"
     path.write_text("seed = 3\n[platform]\nmass_error = 0.1\n", encoding="utf-8")
     text = tape.plant_text(ROBOT, path, seed)
@@ -278,13 +278,13 @@ def test_a_tape_measure_is_some_centimetres_off(tmp_path, seed):
     assert (text == tape.plant_text(ROBOT, path, 1)) is (seed == 1)
 
 
-def test_a_plant_with_a_geometry_of_its_own_is_taken_as_it_is(tmp_path):
+def test_a_plant_with_geometry_errors_is_used_unchanged(tmp_path):
     path = tmp_path / "plant.toml"
     path.write_text("[geometry]\nexit_sigma_m = 0.02\n", encoding="utf-8")
     assert tape.plant_text(ROBOT, path, 1) == path.read_text(encoding="utf-8")
 
 
-def test_tensions_out_of_their_bounds_under_the_tape_measure_are_found():
+def test_tensions_out_of_bounds_in_the_tape_trial_are_found():
     true = np.tile(HERE, (1000, 1))
     pose = HERE + np.array([0.003, 0.004, 0.0, 0.0, 0.0, 0.01])
     marks = [{"mark": "pose", **SPACE.marked(pose, "target"), "row": 500}]
@@ -299,7 +299,7 @@ def test_tensions_out_of_their_bounds_under_the_tape_measure_are_found():
 
 
 class HurriedRun:
-    """A trial whose robot takes 10 s from pose to pose; what it marks."""
+    """A trial whose robot takes 10 s per pose, and its marks."""
 
     def __init__(self) -> None:
         self.directions, self.elapsed_s = SPACE, 0.0
@@ -324,14 +324,14 @@ class HurriedRun:
 @pytest.mark.parametrize(
     ("seconds", "poses", "wanted"), [(30.0, 3, 1), (999.0, 100, 100), (2000.0, 100, 100)]
 )
-def test_poses_that_the_time_did_not_last_for_are_not_missed(seconds, poses, wanted):
+def test_poses_beyond_the_duration_do_not_count_as_missed(seconds, poses, wanted):
     run = HurriedRun()
     tape.drive(run, seconds)
     true = np.tile(HERE, (6000, 1))
     found = figures_of(tape.judge(recorded(true, true, run.marks, SPACE), ROBOT))
     assert (found["poses"].value, found["poses"].limit) == (poses, wanted)
     assert found["poses"].reached
-    # a robot that did not do them all, in all the time it wanted, did miss some
+    # with enough time, missing poses count
     marks = run.marks[:2] if wanted == 100 else run.marks[-1:]
     found = figures_of(tape.judge(recorded(true, true, marks, SPACE), ROBOT))
     assert not found["poses"].reached

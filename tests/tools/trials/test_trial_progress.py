@@ -1,4 +1,4 @@
-"""How far a trial has come, as it is told while it runs."""
+"""The progress of a trial."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import pytest
 from cdpr_tools.trials.run import trial_run
 
 
-def test_how_far_it_is_counts_from_the_trial_on_and_never_goes_back(tmp_path: Path) -> None:
+def test_progress_starts_with_the_trial_and_never_decreases(tmp_path: Path) -> None:
     told: list[float] = []
     with trial_run("planar-3", tmp_path / "run", plant=None, seed=1, advance=told.append) as run:
         assert told and set(told) == {0.0}

@@ -1,4 +1,4 @@
-"""Cables some of which have much more slack than others do not pull the platform off its stand."""
+"""Tightening cables with very different slack does not pull the platform off its stand."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ amplitude_Nm = 0.036
 [motor.friction]
 coulomb_Nm = 0.062
 """
-"""Half as much again as is usual of a motor of 1.2 Nm, each its own way."""
+"""Friction and cogging 1.5 times the usual of a 1.2 Nm motor, different for each motor."""
 
 
 MUCH_COGGING = """
@@ -50,7 +50,7 @@ amplitude_Nm = 0.03
 phase_deg = 10.0
 """
 SLACK_m = [0.016, 0.035, 0.04, 0.011, 0.017, 0.056, 0.014, 0.016]
-"""By chance, between 10 and 60 mm."""
+"""Random values between 10 and 60 mm."""
 
 
 def plant(path: Path, slack_m: list[float]) -> Path:
@@ -59,7 +59,7 @@ def plant(path: Path, slack_m: list[float]) -> Path:
 
 
 def moved_mm(robot: LockstepRobot, name: str | Path) -> tuple[float, float]:
-    """Return how far the platform truly is from home, mm, and how far it is turned, deg."""
+    """Return the true distance of the platform from home in mm and its angle in degrees."""
     platform, truth = load_robot(name).platform, robot.truth()
     assert platform is not None
     home_m = np.zeros(3)
@@ -91,10 +91,10 @@ def test_slack_is_taken_up_without_moving_the_platform(
     assert turned_deg < 0.1
 
 
-def test_a_cable_that_becomes_tight_in_motion_does_not_pull_the_platform_along(
+def test_a_cable_that_becomes_tight_in_motion_does_not_move_the_platform(
     tmp_path: Path,
 ) -> None:
-    """Its winch pulls with what has turned it, and with more only while it stands still."""
+    """The winch keeps the torque that turned it, and increases it only at rest."""
     slack_m = [0.057, 0.041, 0.028, 0.036, 0.043, 0.024, 0.017, 0.049]
     file = plant(tmp_path / "plant.toml", slack_m)
     file.write_text("seed = 101\n" + file.read_text())
@@ -106,8 +106,8 @@ def test_a_cable_that_becomes_tight_in_motion_does_not_pull_the_platform_along(
         assert turned_deg < 0.2
 
 
-def test_cogging_that_turns_a_winch_is_not_taken_for_all_that_it_needs(tmp_path: Path) -> None:
-    """Where cogging turned it by itself, it stands still further on though its cable is slack."""
+def test_cogging_that_turns_a_winch_does_not_hide_its_slack(tmp_path: Path) -> None:
+    """A winch turned by cogging stops further on although its cable is slack."""
     file = tmp_path / "plant.toml"
     file.write_text(
         """
@@ -129,7 +129,7 @@ motor.cogging = [
 
 
 def test_cables_that_become_tight_at_the_same_time_do_not_turn_the_platform(tmp_path: Path) -> None:
-    """One is reeled in after the other: winches that rub and cog much pull with some newtons."""
+    """They are reeled in sequentially, because winches with much friction pull some newtons."""
     file = plant(tmp_path / "plant.toml", SLACK_m)
     file.write_text("seed = 100\n" + file.read_text() + MUCH_COGGING)
     with LockstepRobot("spatial-8", plant=file) as robot:
@@ -141,8 +141,8 @@ def test_cables_that_become_tight_at_the_same_time_do_not_turn_the_platform(tmp_
     assert turned_deg < 1.0
 
 
-def test_a_platform_that_was_dragged_along_by_one_winch_ends_it(tmp_path: Path) -> None:
-    """Half as heavy as its file says, it is dragged by what it was to stand against."""
+def test_tighten_fails_if_one_winch_drags_the_platform(tmp_path: Path) -> None:
+    """The platform has half the mass of its file, so that the allowed tension moves it."""
     file = plant(tmp_path / "plant.toml", SLACK_m)
     file.write_text("seed = 100\nplatform.mass_error = -0.5\n" + file.read_text() + MUCH_COGGING)
     with LockstepRobot("spatial-8", plant=file) as robot:
@@ -152,8 +152,8 @@ def test_a_platform_that_was_dragged_along_by_one_winch_ends_it(tmp_path: Path) 
         assert moved_mm(robot, "spatial-8")[0] > 5.0
 
 
-def test_how_far_slack_lets_a_light_platform_be_pulled_along_is_reported(tmp_path: Path) -> None:
-    """At most what is told, and no less than a third of it."""
+def test_the_possible_displacement_of_a_light_platform_is_reported(tmp_path: Path) -> None:
+    """The true displacement is between a third of the reported value and this value."""
     file = plant(tmp_path / "plant.toml", SLACK_m[:4])
     file.write_text("seed = 100\n" + file.read_text())
     with LockstepRobot("planar-4", plant=file) as robot:
@@ -171,8 +171,8 @@ def test_how_far_slack_lets_a_light_platform_be_pulled_along_is_reported(tmp_pat
         assert not robot.status()["notices"]
 
 
-def test_a_platform_too_light_for_its_winches_is_told_to_have_moved(tmp_path: Path) -> None:
-    """What turns a winch of `planar-4` without load pulls its platform of 3 kg along."""
+def test_tighten_reports_a_platform_too_light_for_its_winches(tmp_path: Path) -> None:
+    """The torque that turns an unloaded winch of `planar-4` moves its 3 kg platform."""
     file = plant(tmp_path / "plant.toml", [0.0, 0.3, 0.3, 0.3])
     with LockstepRobot("planar-4", plant=file) as robot:
         robot.enable()
@@ -180,10 +180,10 @@ def test_a_platform_too_light_for_its_winches_is_told_to_have_moved(tmp_path: Pa
             robot.carry_out("tighten", 60.0)
 
 
-def test_a_winch_that_stuck_with_slack_is_not_taken_for_a_platform_that_moved(
+def test_a_winch_blocked_by_friction_is_not_mistaken_for_a_moved_platform(
     tmp_path: Path,
 ) -> None:
-    """With this seed friction holds a winch before its 20 mm of slack are in."""
+    """With this seed, friction blocks a winch before its 20 mm of slack are reeled in."""
     file = tmp_path / "plant.toml"
     file.write_text("seed = 10\n")
     with LockstepRobot("planar-4", plant=file) as robot:
@@ -192,8 +192,8 @@ def test_a_winch_that_stuck_with_slack_is_not_taken_for_a_platform_that_moved(
         assert moved_mm(robot, "planar-4")[0] < 1.0
 
 
-def test_a_platform_that_would_tip_over_is_not_pulled_at_by_one_winch_alone(tmp_path: Path) -> None:
-    """A winch that turns without load pulls with 2.2 N, which does not slide 0.95 kg: 0.3 of it."""
+def test_a_platform_that_could_tip_over_is_not_pulled_by_a_single_winch(tmp_path: Path) -> None:
+    """An unloaded winch pulls with 2.2 N, too little to slide 0.95 kg with friction 0.3."""
     name = tmp_path / "tall.toml"
     asked = ("kind=spatial-8", "frame_m=1.5 1.5 1.5", "winch=winch-45n")
     answers = [word for answer in asked for word in ("--set", answer)]
@@ -208,8 +208,8 @@ def test_a_platform_that_would_tip_over_is_not_pulled_at_by_one_winch_alone(tmp_
     assert turned_deg < 1.0
 
 
-def test_winches_that_rub_more_than_the_least_tension_leave_no_cable_slack(tmp_path: Path) -> None:
-    """They are pulled on the stand with more than they rub, 16 N, and not with 8 N."""
+def test_winch_friction_above_the_least_tension_leaves_no_cable_slack(tmp_path: Path) -> None:
+    """On the stand, cables are pulled with 16 N, more than friction, instead of 8 N."""
     name, file = tmp_path / "heavy.toml", tmp_path / "plant.toml"
     text = (SHIPPED / "robots" / "planar-4.toml").read_text()
     for old, new in (
