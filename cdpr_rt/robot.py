@@ -112,32 +112,56 @@ _ANGLES: Final = ("angle", "rx", "ry", "rz")
 _STANDING: Final = ("hold", "idle")
 _STANDS: Final = ("the path waits here", "stepped back")
 _AXIS_PROGRAMS: Final = ("jog", "pid", "sweep")
+_LIKELY_mm: Final = 20.0
+"""A refused position or distance above this, in m, has probably been given in mm."""
 _SETTLE_S: Final = 2.0
 _REST_RAD, _REST_RAD_S = math.radians(0.5), math.radians(2.0)
 
 
 class Log(np.ndarray[Any, np.dtype[np.void]]):
-    """Recorded cycles: a structured NumPy array, (cycles,)."""
+    """Recorded cycles: a structured NumPy array, (cycles,).
+
+    `log["pose"]` is the array of one field, (cycles, 7) here.
+    """
 
     axes: tuple[str, ...] = ()
     """Names of the axes, n."""
+    _field = ""
+    """The field of which these are the rows, if it is a single one."""
 
     def __array_finalize__(self, other: Any) -> None:
         self.axes = getattr(other, "axes", ())
 
+    def __getitem__(self, key: Any) -> Any:
+        found: Any = super().__getitem__(key)
+        if isinstance(found, Log):
+            if isinstance(key, str):
+                found._field = key
+            elif not isinstance(key, tuple) and found.ndim == self.ndim:  # some of its rows
+                found._field = self._field
+        return found
+
     def to_pandas(self) -> Any:
         """Return a pandas.DataFrame with a column for each scalar, axis and pose coordinate.
 
-        Columns are named as by `cdpr log export`: `time_s`, `tension_N[left]`, `pose[qw]`.
-        Raises Error if pandas is not installed.
+        Columns are named as by `cdpr log export`: `time_s`, `tension_N[left]`, `pose[qw]`. The rows
+        of a single field, as `log["pose"]`, give its columns. Raises Error for numbers computed
+        from a log, which have no names, and if pandas is not installed.
         """
         try:
             import pandas as pd  # noqa: PLC0415
         except ImportError:
             raise Error("pandas is not installed; install it with: pip install pandas") from None
+        fields = {name: np.asarray(self[name]) for name in self.dtype.names or ()}
+        if self._field:
+            fields = {self._field: np.asarray(self)}
+        if not fields:
+            raise Error(
+                "to_pandas: these numbers have no field's name; call it on a log or on one of its "
+                'fields, as log["pose"].to_pandas()'
+            )
         columns: dict[str, Any] = {}
-        for field in self.dtype.names or ():
-            values = np.asarray(self[field])
+        for field, values in fields.items():
             names = column_names(field, values.shape, self.axes)
             columns |= zip(names, values.T if values.ndim == 2 else [values], strict=True)
         return pd.DataFrame(columns)
@@ -385,7 +409,14 @@ class Robot:
         if not given.keys() - {"frame", "speed_m_s"}:
             names = [key for key in arguments if key not in ("frame", "speed_m_s")]
             raise InvalidArgument(f"nothing to move; give {' or '.join(names)}")
-        self._carry_out("pose", given, wait)
+        try:
+            self._carry_out("pose", given, wait)
+        except Refused as error:
+            for key in ("position_m", "distance_m"):
+                if np.abs(given.get(key, 0.0)).max() > _LIKELY_mm:
+                    text = f"{error}; {key} is in metres"
+                    raise Refused(text, error.refusal) from error.__cause__
+            raise
 
     # -- motion of single axes
 

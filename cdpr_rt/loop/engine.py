@@ -325,7 +325,9 @@ class Engine:
         self.last_program = self.program
         """The program of the last cycle, even if the verdict has replaced it since."""
         self.program_fault: Fault | None = None
-        """The exception of the program in this cycle."""
+        """The exception of the program in this cycle, or that it took too long."""
+        self.program_s = 0.0
+        """Time that the program took in this cycle, 0 in lockstep."""
         self.setpoint = Setpoint(block.n)
         self.cycling = False
         """Whether cycles run."""
@@ -415,6 +417,7 @@ class Engine:
                 Limit.NOT_FINITE, code=PROGRAM, source=f"program {program.name}",
                 detail=f"{type(error).__name__}: {error}"[:_MOST_OF_AN_ERROR],
             )  # fmt: skip
+        self.program_s = machine.clock.now_s - came_s
         self.asked_Nm[:] = torque
         self.reaction = judge(cycle, torque)
         if machine.clock.now_s - came_s > _TOO_OLD_S:

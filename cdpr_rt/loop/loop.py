@@ -8,9 +8,10 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from typing import Any, Final
 
+from cdpr_profiles.robot_limits import Limit
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.core.cycle import Cycle
-from cdpr_rt.core.fault import Fault, fault_record
+from cdpr_rt.core.fault import PROGRAM, Fault, fault_record
 from cdpr_rt.core.shared_block import SharedBlock, SharedBlockError
 from cdpr_rt.core.states import CUT_SHORT, LoopState, Reaction
 from cdpr_rt.loop.command_dispatcher import CommandDispatcher
@@ -261,6 +262,9 @@ class ControlLoop:
             estimate = parts.estimator.estimate
             feedback, blind = cycle.device.feedback, safe_stop.pays_out_blind
             reaction = supervisor.check(feedback, estimate, engine.setpoint, torque_Nm, blind)
+            if engine.program_s >= supervisor.limits.late_s and engine.program_fault is None:
+                engine.program_fault = _too_long(engine, supervisor.limits.late_s)
+                reaction = supervisor.report(engine.program_fault)
             if parts.lengths_disagree is not None:
                 engine.lengths_disagree_m, axis, jump_m, jumped = parts.lengths_disagree()
                 reaction = supervisor.compare_lengths(
@@ -292,3 +296,12 @@ class ControlLoop:
         if (drives or reaction > Reaction.HOLD) and (reacts or safe_stop.reacts_to_fault):
             safe_stop.note_further(drives)
         return reaction
+
+
+def _too_long(engine: Engine, allowed_s: float) -> Fault:
+    """Return the fault of a program that held up the loop, such as one with a user's controller."""
+    name, took_s = engine.last_program.name, engine.program_s
+    return Fault(
+        Limit.LATE, code=PROGRAM, source=f"program {name}", value=took_s, allowed=allowed_s,
+        detail=f"took {1e3 * took_s:.0f} ms in a cycle, {1e3 * allowed_s:.0f} ms allowed",
+    )  # fmt: skip

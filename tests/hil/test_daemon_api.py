@@ -7,6 +7,8 @@ import signal
 import subprocess
 import sys
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from pathlib import Path
 from threading import Timer
 
@@ -193,11 +195,17 @@ def test_real_drives_are_not_started_without_consent(tmp_path: Path) -> None:
         assert "with --exit-with-stdin, real drives need --yes" in asked.stderr.read()
 
 
-def test_a_daemon_started_by_a_script_ends_with_it(
+def test_one_of_two_scripts_starts_the_daemon_and_it_ends_with_that_script(
     tmp_path: Path, daemon: RealDaemon, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
-    with cdpr.run(daemon.robot, bus="simbus:", record=tmp_path) as robot:
+    start = partial(cdpr.run, daemon.robot, bus="simbus:", record=tmp_path)
+    with ThreadPoolExecutor() as scripts:
+        started = [scripts.submit(start) for _ in range(2)]
+    errors = [error for one in started if (error := one.exception()) is not None]
+    assert [type(error) for error in errors] == [cdpr.AlreadyRunning], errors
+    (robot,) = (one.result() for one in started if one.exception() is None)
+    with robot:
         with pytest.raises(cdpr.AlreadyRunning, match=r"connect\(.* uses it"):
             cdpr.run(daemon.robot, bus="simbus:")
         robot.enable()

@@ -8,10 +8,15 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
-from daemon_rig import RealDaemon, cdpr
+from daemon_rig import RealDaemon
+from daemon_rig import cdpr as run_cdpr
 from test_daemon_platform import PERIOD_S, SHIPPED
 
+import cdpr_rt as cdpr
+
 MINE = """
+import time
+
 import numpy as np
 import cdpr_rt as cdpr
 
@@ -25,20 +30,26 @@ class Mine(cdpr.Controller):
         force = 3000.0 * (error + 3.0 * self.integral)
         return state.distribute(force + 250.0 * (target.velocity - state.velocity))
 
+class Blocking(Mine):
+    def update(self, state, target):
+        if target.position[1] > 1.5:
+            time.sleep(0.05)
+        return super().update(state, target)
+
 class Other:
     pass
 """
 
 
 @contextmanager
-def running(folder: Path, controller: str) -> Iterator[RealDaemon]:
+def running(folder: Path, controller: str, paced: bool = False) -> Iterator[RealDaemon]:
     file, robot = folder / "mine.py", folder / "planar.toml"
     file.write_text(MINE)
     shipped = (SHIPPED / "planar-3.toml").read_text()
     robot.write_text(shipped.replace("sync_period_s = 0.001", f"sync_period_s = {PERIOD_S}"))
     env = {"XDG_STATE_HOME": str(folder)}
     mine = ("--no-record", "--controller", f"{file}:{controller}")
-    daemon = RealDaemon(folder, *mine, robot=robot, env=env)
+    daemon = RealDaemon(folder, *mine, robot=robot, env=env, paced=paced)
     try:
         yield daemon
     finally:
@@ -46,7 +57,7 @@ def running(folder: Path, controller: str) -> Iterator[RealDaemon]:
 
 
 def done(daemon: RealDaemon, *command: str) -> dict[str, object]:
-    result = cdpr(*command, *daemon.at, "--json")
+    result = run_cdpr(*command, *daemon.at, "--json")
     assert result.returncode == 0, f"{result.stderr}{daemon.errors()}"
     told: dict[str, object] = json.loads(result.stdout.splitlines()[-1])
     return told
@@ -62,6 +73,25 @@ def test_a_controller_from_a_file_moves_the_platform_and_is_shown(tmp_path: Path
         assert any("mine.py:Mine controls the platform" in notice for notice in notices)
 
 
+@pytest.mark.alone
+def test_a_controller_that_blocks_for_50_ms_stops_the_robot(tmp_path: Path) -> None:
+    with (
+        running(tmp_path, "Blocking", paced=True) as daemon,
+        cdpr.connect(socket=daemon.socket) as robot,
+    ):
+        robot.enable()
+        robot.tighten()
+        blocked = r"program pose: took \d+ ms in a cycle, 50 ms allowed"
+        with pytest.raises(cdpr.Faulted, match=blocked) as fault:
+            robot.move_to([0.0, 1.6])
+        assert fault.value.limit == "late"
+        assert robot.state == "fault"
+        enabled = [axis["statusword"] & 0x6F == 0x27 for axis in robot.status["axes"]]
+        assert enabled == [False] * 3
+        robot.acknowledge()
+        assert robot.state == "ready"
+
+
 @pytest.mark.parametrize(
     ("controller", "text"),
     [
@@ -75,7 +105,7 @@ def test_an_invalid_controller_is_rejected_before_anything_starts(
     file = tmp_path / "mine.py"
     file.write_text(MINE)
     at = ("--socket", tmp_path / "control.sock", "--no-record")
-    result = cdpr(
+    result = run_cdpr(
         "run", "planar-3", "--bus", "simbus:", *at, "--controller", f"{file}:{controller}"
     )
     assert result.returncode == 2, result.stderr

@@ -53,6 +53,13 @@ def test_a_move_ends_at_its_target_and_is_recorded(robot: cdpr.Robot) -> None:
     assert table["tension_N[upper left]"].tolist() == log["tension_N"][-10:, 0].tolist()
     assert table["pose[qz]"].iloc[-1] == log["pose"][-1, 6]
     assert table["time_s"].size == 10
+    of_field = log["tension_N"][-10:].to_pandas()
+    assert list(of_field) == [f"tension_N[{axis}]" for axis in robot.axes]
+    assert of_field.equals(table[list(of_field)])
+    assert list(log["time_s"].to_pandas()) == ["time_s"]
+    for computed in (2.0 * log["pose"], log["pose"][:, :2]):
+        with pytest.raises(cdpr.Error, match="to_pandas: these numbers have no field's name"):
+            computed.to_pandas()
 
 
 def test_relative_moves_add_up(robot: cdpr.Robot) -> None:
@@ -91,8 +98,12 @@ def test_wrong_shapes_and_values_move_nothing(robot: cdpr.Robot) -> None:
         robot.move_to([0.0, 1.8], speed_m_s=-1.0)
     with pytest.raises(cdpr.InvalidArgument, match="nothing to move; give position_m or rotation"):
         robot.move_to()
-    with pytest.raises(cdpr.Refused, match="position_m"):
+    with pytest.raises(cdpr.Refused, match=r"-600 to 600 mm, the workspace$"):
         robot.move_to([9.0, 1.8])
+    with pytest.raises(cdpr.Refused, match=r"2000\.0; allowed: .*; position_m is in metres"):
+        robot.move_to([300, 2000])
+    with pytest.raises(cdpr.Refused, match=r"600 mm, the workspace; distance_m is in metres"):
+        robot.move_by([100, 0])
     with pytest.raises(cdpr.Refused, match=r"program: .dance.; allowed: idle, hold"):
         robot.run("dance")
 

@@ -105,10 +105,7 @@ def run(
     power. Raises AlreadyRunning, InvalidRobot, InvalidArgument without a necessary `yes`, and Error
     if the daemon does not start, or does not confirm at its end that the power is off.
     """
-    if answers(str(robot), None):
-        raise AlreadyRunning(f"{robot}: its daemon runs already; connect({str(robot)!r}) uses it")
-    if is_starting(str(robot)):
-        raise AlreadyRunning(f"{robot}: its daemon is starting, or ending; wait for it")
+    _require_no_daemon(str(robot))
     buses = [bus] if isinstance(bus, str) else list(bus or ())
     with _errors_of_opening():
         real = real_buses(load_robot(robot), buses)
@@ -123,7 +120,11 @@ def run(
     ):
         options += [] if value is None else [option, str(value)]
     with ExitStack() as stack, _errors_of_opening():
-        process = _DaemonProcess([str(robot), *options, *["--yes"] * yes])
+        try:
+            process = _DaemonProcess([str(robot), *options, *["--yes"] * yes])
+        except Error:
+            _require_no_daemon(str(robot))  # another script may have started one meanwhile
+            raise
         stack.callback(process.stop)
         daemon = stack.enter_context(open_daemon(None, process.socket, None, None))
         await_start(daemon, Output(as_json=True))
@@ -131,6 +132,13 @@ def run(
         process.lowering_s = float(backend.description.get("lowering_s", 0.0))
         backend.opened = stack.pop_all()
         return Robot(backend)
+
+
+def _require_no_daemon(robot: str) -> None:
+    if answers(robot, None):
+        raise AlreadyRunning(f"{robot}: its daemon runs already; connect({robot!r}) uses it")
+    if is_starting(robot):
+        raise AlreadyRunning(f"{robot}: its daemon is starting, or ending; wait for it")
 
 
 @contextmanager
