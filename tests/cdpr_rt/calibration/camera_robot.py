@@ -1,4 +1,4 @@
-"""A robot with a camera that is made up, small enough for a test."""
+"""A synthetic robot with a camera, small enough for a test."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ FEW = SheetLayout(rows=3, columns=4, size_m=0.15)
 
 @dataclass(frozen=True)
 class CameraRobot:
-    """What is true, and what is told of it."""
+    """The truth, and the readings and settings of a calibration."""
 
     robot: Robot
     geometry: CableGeometry
@@ -45,7 +45,7 @@ def camera_robot(
     knowledge: Knowledge = KNOWN,
     identified: tuple[str, ...] = USUAL,
 ) -> CameraRobot:
-    """Return readings of spatial-8 at random poses in its box, the first at home."""
+    """Return readings of spatial-8 at random poses in its box, of which the first is home."""
     print(f"camera robot of seed {seed}")
     robot = load_robot("spatial-8")
     geometry = CableGeometry.of(robot, identified, knowledge)

@@ -1,4 +1,4 @@
-"""Robots with a truth that differs from their files, and what would be observed of them."""
+"""Synthetic robots whose true geometry differs from their files, and their observations."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from cdpr_rt.model.rigid_body import G_m_s2
 
 @dataclass(frozen=True)
 class MadeUp:
-    """A geometry by the file, the true one, and the poses at which the robot truly stood."""
+    """The geometry of the file, the true one, and the true poses."""
 
     file: CableGeometry
     true: CableGeometry
@@ -43,9 +43,9 @@ def made_up(
     home_first: bool = False,
     in_balance: bool = False,
 ) -> MadeUp:
-    """Return a robot with errors of a normal distribution and its lengths with noise.
+    """Return a robot with normally distributed errors and noisy lengths.
 
-    Tensions are drawn; `in_balance` has the nearest to them that hold the platform.
+    Tensions are random. With `in_balance`, they are the nearest ones that hold the platform.
     """
     profile = load_robot(robot)
     rng = np.random.default_rng(seed)
@@ -77,10 +77,10 @@ def made_up(
             tension[j] = _holding(true, pose, tension[j])
         held.append(pose)
         lengths[j] = truly.lengths(pose, tension[j])
-        # winches tell what their cables weigh more from there to the platform, where tension acts
+        # tension at the winch exceeds that at the platform by the weight of the cable between
         height = (exits - pose.p - anchors @ pose.Q.T)[:, up]
         told[j] = tension[j] + file.weight_N_m * height
-    # what the encoders say: offset and drum taken away again
+    # readings of the encoders: without offset and drum error
     reference = lengths[0] - cable[:, 3]
     reading = (lengths - cable[:, 3] + cable[:, 4] * reference) / (1.0 + cable[:, 4])
     reading += rng.normal(0.0, 1.0, reading.shape) * noise_m
@@ -121,7 +121,7 @@ def _balanced(pose: Pose, exits: FloatArray, anchors: FloatArray, t: FloatArray)
 
 
 def measured(what: MadeUp, std_m: float, std_rad: float | None, seed: int) -> Observations:
-    """Return the observations with positions, and rotations unless None, measured with noise."""
+    """Return the observations with noisy positions, and rotations unless `std_rad` is None."""
     rng = np.random.default_rng(seed)
     k = what.file.coordinates
     p = np.array([pose.p for pose in what.poses]) + rng.normal(0, std_m, (len(what.poses), 3))

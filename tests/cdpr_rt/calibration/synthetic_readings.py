@@ -1,7 +1,7 @@
-"""Readings of a robot that is made up: its errors drawn, its cables and images by their own code.
+"""Readings of a synthetic robot with random errors, computed without code of the calibration.
 
-Nothing of the calibration is used: lengths are norms with stretch by a closed-form distribution of
-tensions, images are OpenCV's projections.
+Lengths are norms plus stretch, with a closed-form tension distribution. Images are projections by
+OpenCV.
 """
 
 from __future__ import annotations
@@ -40,40 +40,40 @@ _SLACK_N, _MOST_N = 25.0, 125.0
 
 @dataclass(frozen=True)
 class ErrorBudget:
-    """What is wrong with a robot, its camera and its sheets; standard deviations unless said."""
+    """Errors of a robot, its camera and its sheets. Values are standard deviations unless noted."""
 
     exit_m: float = 0.03
-    """Of each coordinate of an exit point: a tape's."""
+    """Coordinates of an exit point, measured with a tape."""
     home_m: float = 0.01
-    """Of each coordinate of the stand, on which the file takes the platform to be at home."""
+    """Coordinates of the stand relative to home in the file."""
     home_deg: float = 0.5
     drum: float = 0.002
-    """Relative, of what a turn of a motor pays out."""
+    """Relative error of the length paid out per motor turn."""
     elongation: float = 0.43
-    """Of the cables over the file's, relative; the same in each trial."""
+    """Relative excess of cable elongation over the file, the same in each trial."""
     encoder_m: float = 1.5e-4
-    """Of a length, at each pose."""
+    """Noise of a length at each pose."""
     tension_N: float = 1.0
-    """Of a tension as it is told, at each pose."""
+    """Noise of a reported tension at each pose."""
     spread_N: float = 20.0
-    """By which tensions differ from the least ones that hold the platform, from pose to pose."""
+    """Variation of tensions between poses, beyond the least ones that hold the platform."""
     corner_px: float = 0.1
-    """Of a coordinate of a corner."""
+    """Noise of a coordinate of a corner."""
     focal: float = 1e-3
-    """Relative, of the focal length that ChArUco found."""
+    """Relative error of the focal length by ChArUco."""
     centre_px: float = 0.7
     distortion: float = 1.0
-    """Over the typical error of k1; those of k2 and k3 go with it, and what is left is small."""
+    """Factor of the typical error of k1. Those of k2 and k3 are proportional, the rest is small."""
     hand_eye_m: float = 0.003
     hand_eye_deg: float = 1.0
     print_scale: float = 0.002
-    """Relative, of all sheets alike."""
+    """Relative size error common to all sheets."""
     sheet_scale: float = 5e-4
-    """Relative, of each sheet and each of its directions."""
+    """Relative size error of each sheet and direction."""
     bend_m: float = 3e-4
-    """By which a sheet's corners stand off its plane."""
+    """Deviation of a sheet's corners from its plane."""
     known_m: float = 5e-4
-    """Of the places of known markers, as measured."""
+    """Measured places of known markers."""
 
 
 _DISTORTION = np.array([1.3e-3, 6.9e-3, 7e-5, 9e-5, 1.2e-2])
@@ -81,20 +81,20 @@ _DISTORTION = np.array([1.3e-3, 6.9e-3, 7e-5, 9e-5, 1.2e-2])
 
 @dataclass(frozen=True)
 class SheetLayout:
-    """Sheets about the robot, in rows on its floor."""
+    """Sheets around the robot, in rows on the floor."""
 
     rows: int = 6
     columns: int = 7
     size_m: float = 0.1
     height_m: float = 0.001
-    """By which their middles stand off the floor."""
+    """Deviation of the sheets' centres from the floor."""
     tilt_deg: float = 0.3
     known: int = 0
-    """So many have places that were measured: the corners of the grid first, then others."""
+    """Number of sheets with measured places: the corners of the grid first, then others."""
 
     @property
     def known_ids(self) -> list[int]:
-        """Return which: close together, or in a row, they would not tell the floor's tilt."""
+        """Return the ids with known places, spread so that they determine the tilt of the floor."""
         last = self.rows * self.columns - 1
         corners = [0, last, self.columns - 1, last - self.columns + 1]
         others = [k for k in range(2, last, 5) if k not in corners]
@@ -103,14 +103,14 @@ class SheetLayout:
 
 @dataclass(frozen=True)
 class SyntheticReadings:
-    """A robot with its truth, and what is read of it."""
+    """A robot with its true geometry and its readings."""
 
     poses: FloatArray
-    """Where the platform truly was, (N, 4, 3)."""
+    """True poses of the platform, (N, 4, 3)."""
     exits_m: FloatArray
     drums: FloatArray
     markers_m: FloatArray
-    """True middles of the sheets, (m, 3)."""
+    """True centres of the sheets, (m, 3)."""
     marker_rotation: FloatArray
     data: CalibrationData
 
@@ -125,9 +125,9 @@ def synthetic_readings(
     *,
     hand_eye_known: bool = True,
 ) -> SyntheticReadings:
-    """Return readings near the poses `nominal` (N, 4, 3), whose numbers are `targets` (N, 6).
+    """Return readings near the poses `nominal` (N, 4, 3), which are `targets` (N, 6) as numbers.
 
-    The first is at home. The platform does not stand where it is wanted: its geometry is off.
+    The first is home. The platform misses its targets because of errors in the geometry.
     """
     rng = np.random.default_rng(seed)
     poses = _missed(nominal, errors, rng)
@@ -169,7 +169,7 @@ def _read_cables(
     errors: ErrorBudget,
     rng: np.random.Generator,
 ) -> tuple[FloatArray, FloatArray]:
-    """Return lengths and tensions as they are told, (N, n); `home` is where the file has it."""
+    """Return reported lengths and tensions, (N, n). `home` is that of the file."""
     platform = robot.platform
     assert platform is not None
     anchors = np.array(platform.anchor_points_m)
@@ -184,7 +184,7 @@ def _read_cables(
         np.abs(rng.normal(0.0, 1.0, straight.shape)) * errors.spread_N,
     )
     free = straight / (1.0 + soft * (1.0 + errors.elongation) * tension)
-    # the encoders begin to count at what the file says of home
+    # the encoders start at the lengths of home in the file
     corners = home[0] + anchors @ home[1:].T
     start = np.linalg.norm(np.array(platform.exit_points_m) - corners, axis=1)
     start = start / (1.0 + soft * tension[0])
@@ -207,7 +207,7 @@ def _missed(nominal: FloatArray, errors: ErrorBudget, rng: np.random.Generator) 
 def _tensions(
     u: FloatArray, arm: FloatArray, mass_kg: float, preferred_N: FloatArray
 ) -> FloatArray:
-    """Return tensions (N, n) that hold the platform, nearest to those wanted; thesis (3.80)."""
+    """Return tensions (N, n) that hold the platform, nearest to the wanted ones; thesis (3.80)."""
     W = np.concatenate([u, np.cross(arm, u)], axis=2).transpose(0, 2, 1)
     load = np.array([0.0, 0.0, -mass_kg * G_m_s2, 0.0, 0.0, 0.0])
     held, n = 1e3, u.shape[1]
@@ -247,11 +247,11 @@ def _setup(
     rng: np.random.Generator,
     hand_eye_known: bool,
 ) -> tuple[CameraSetup, FloatArray, FloatArray]:
-    """Return what is told of camera and sheets, and where the camera truly is."""
+    """Return the described camera and sheets, and the true pose of the camera."""
     sigma = np.array([*LENS[:2], 1.0, 1.0, *_DISTORTION])
     sigma *= [*[errors.focal] * 2, *[errors.centre_px] * 2, *[errors.distortion] * 5]
     off = rng.normal(0.0, sigma)
-    # what ChArUco gets wrong of both focal lengths is nearly the same, and so is the distortion
+    # ChArUco's errors of both focal lengths are nearly equal, and so are those of the distortion
     off[1], off[5:] = LENS[1] * off[0] / LENS[0], 0.0
     lens = np.array(LENS) + off
     place = np.array(HAND_EYE_m) + rng.normal(0.0, errors.hand_eye_m, 3)
@@ -298,7 +298,7 @@ def _images(
     errors: ErrorBudget,
     rng: np.random.Generator,
 ) -> list[Sighting]:
-    """Return what a true lens sees of true sheets, with noise."""
+    """Return noisy images of the true sheets through the true lens."""
     count = len(position)
     scale = 1.0 + rng.normal(0.0, errors.print_scale) * np.ones((count, 1, 2))
     scale = scale + rng.normal(0.0, errors.sheet_scale, (count, 1, 2))

@@ -1,4 +1,4 @@
-"""What a camera saw, in the data file of a calibration: written, read back, and refused."""
+"""Camera readings in the data file of a calibration are written, read back and validated."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ def test_camera_readings_survive_a_round_trip(tmp_path: Path) -> None:
     assert third.problem is None and not third.corners_px
 
 
-def test_data_without_a_camera_are_read_as_ever(tmp_path: Path) -> None:
+def test_data_without_camera_keys_are_read(tmp_path: Path) -> None:
     def old(table: Any) -> None:
         del table["camera"]
         for pose in table["poses"]:
@@ -83,7 +83,7 @@ def test_data_without_a_camera_are_read_as_ever(tmp_path: Path) -> None:
     assert there.camera is None and there.poses[0].image is None
 
 
-def test_an_id_that_is_listed_twice_counts_as_repeated(tmp_path: Path) -> None:
+def test_an_id_listed_twice_counts_as_repeated(tmp_path: Path) -> None:
     def twice(table: Any) -> None:
         table["poses"][0]["image"]["markers"][1]["id"] = 3
 
@@ -109,7 +109,7 @@ def test_impossible_camera_readings_are_rejected_with_their_key(
         load_data(spoilt(tmp_path / "data.json", change))
 
 
-def test_places_are_known_as_well_as_the_file_of_the_sheets_says(tmp_path: Path) -> None:
+def test_uncertainty_of_known_places_is_that_of_the_sheets_file(tmp_path: Path) -> None:
     path, camera = tmp_path / "markers.toml", data().camera
     assert camera is not None
     for line, std_m in (("", 0.001), ("known_std_m = 0.0004", 0.0004)):

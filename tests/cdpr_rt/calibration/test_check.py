@@ -1,4 +1,4 @@
-"""Whether a calibrated robot is as it was: one thing changed, and which, by readings made up."""
+"""The check of a calibrated robot detects and names a single change, with synthetic readings."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def checked(
     slip_m: float = 0.0,
     slip_from: int = 0,
 ) -> Check:
-    """Return the check of a robot as its file has it but for what is said."""
+    """Return the check of a robot that differs from its file only by the arguments."""
     what = made_up(robot, 11, 4, exit_m=0.0, drum=0.0, elongation=0.0, home_first=True)
     k, changed = what.file.coordinates, np.zeros((what.file.n, 9))
     changed[cable, :k], changed[cable, 4] = exit_m[:k], drum
@@ -39,7 +39,7 @@ def checked(
     tension = what.seen.tension_N
     true = lengths_told(replace(what.file, cable=changed), poses, tension)
     rng = np.random.default_rng(4)
-    # encoders count from what the lengths at home are taken for
+    # encoders start at the assumed lengths of home
     paid_out = (true - true[0]) / (1.0 + changed[:, 4]) + rng.normal(0.0, 1.5e-4, true.shape)
     told = lengths_told(what.file, what.seen.start[:1], tension[:1])[0] + paid_out
     told[slip_from:, cable] -= slip_m
@@ -52,14 +52,14 @@ def checked(
 
 
 @pytest.mark.parametrize("robot", ["spatial-8", "planar-4"])
-def test_a_robot_as_it_was_is_one_also_on_its_stand_a_little_off(robot: str) -> None:
+def test_an_unchanged_robot_passes_even_if_slightly_off_on_its_stand(robot: str) -> None:
     for home_m in ((0.0, 0.0, 0.0), (0.002, -0.003, 0.001)):
         found = checked(robot, home_m=home_m)
         assert not found.moved and not found.changes
         assert found.verdict()[0].startswith("UNCHANGED: lengths at")
 
 
-def test_the_exit_point_that_moved_is_named_with_its_way() -> None:
+def test_a_moved_exit_point_is_reported_with_its_displacement() -> None:
     found = checked("spatial-8", cable=1, exit_m=(0.0, 0.0, 0.02))
     assert found.moved
     (change,) = found.changes
@@ -77,7 +77,7 @@ def test_cables_are_reported_by_the_names_of_their_axes(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("robot", ["spatial-8", "planar-4"])
-def test_a_drum_that_is_another_is_named_and_a_scanner_leaves_no_doubt(robot: str) -> None:
+def test_a_changed_drum_is_reported_and_certain_with_a_scanner(robot: str) -> None:
     by_lengths, with_scanner = (
         checked(robot, cable=2, drum=0.01, scanner_m=std) for std in (None, 1e-3)
     )
@@ -91,14 +91,14 @@ def test_a_drum_that_is_another_is_named_and_a_scanner_leaves_no_doubt(robot: st
     assert change.effect_m > 1e-3
 
 
-def test_of_a_platform_that_turns_freely_its_moments_tell_how_far_positions_are_off() -> None:
-    """A fit of the file's geometry to the same readings is 4.3 mm off what was true, at worst."""
+def test_the_effect_of_a_change_is_predicted_for_a_freely_turning_platform() -> None:
+    """A fit of the file's geometry to the same readings is wrong by 4.3 mm at worst."""
     (change,) = checked("planar-3", drum=-0.008).changes
     assert (change.kind, change.cable) == ("drum", 0)
     assert change.effect_m == pytest.approx(4.3e-3, rel=0.3)
 
 
-def test_a_cable_that_slips_during_the_check_is_named_alone_with_its_pose() -> None:
+def test_a_cable_that_slips_during_the_check_is_reported_with_its_pose() -> None:
     found = checked("spatial-8", cable=1, slip_m=0.01, slip_from=6)
     (change,) = found.changes
     assert (change.kind, change.cable, change.pose) == ("slip", 1, 6)
@@ -117,7 +117,7 @@ def test_lengths_alone_cannot_check_a_robot_with_as_many_cables_as_degrees_of_fr
     ("robot", "spare"),
     [("suspended-6", False), ("spatial-8", True), ("planar-3", True), ("point-4", True)],
 )
-def test_a_robot_that_lengths_cannot_check_is_known_before_it_moves(
+def test_a_robot_without_redundant_lengths_is_rejected_before_it_moves(
     robot: str, spare: bool
 ) -> None:
     with nullcontext() if spare else pytest.raises(InvalidRequestError, match="cannot check"):

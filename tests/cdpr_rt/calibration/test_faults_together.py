@@ -1,4 +1,4 @@
-"""Two things wrong at once, with cables and camera: each is named, nothing else, and survived."""
+"""Simultaneous faults of cables and camera are all reported, and nothing else."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _robot = cache(camera_robot)
 
 
 class Readings:
-    """What is read of a robot, and what is done to it."""
+    """Readings of a robot, and faults to apply."""
 
     def __init__(self, what: CameraRobot) -> None:
         self.what = what
@@ -36,7 +36,7 @@ class Readings:
         return calibrate(self.what.robot, self.what.geometry, seen, "camera", images)
 
     def off_mm(self, outcome: Outcome) -> float:
-        """Return how far off positions seen from the first pose are, the mean."""
+        """Return the mean error of positions relative to the first pose."""
         off, _ = relative_errors(outcome.found.poses, self.what.made.poses)
         return 1e3 * float(np.linalg.norm(off, axis=1).mean())
 
@@ -114,7 +114,7 @@ class Readings:
 
 
 def _short(fault: Fault) -> tuple[object, ...]:
-    """Return what of a fault counts: its kind, cable and pose, of a marker its number."""
+    """Return kind, cable and pose of a fault, or the number of a marker."""
     if fault.kind == "marker":
         return ("marker", fault.text.split()[1])
     return (fault.kind, fault.cable, fault.pose)
@@ -155,7 +155,7 @@ def _short(fault: Fault) -> tuple[object, ...]:
     ids=["moved, size", "slip, lens", "drum, black", "slack, slip", "twice, unplugged",
          "caught, one size", "slip, drum"],
 )  # fmt: skip
-def test_two_at_once_are_both_named_and_nothing_else_is(
+def test_two_simultaneous_faults_are_both_reported_and_nothing_else(
     done: Callable[[Readings], object], named: set[tuple[object, ...]]
 ) -> None:
     readings = Readings(_robot())
@@ -165,7 +165,7 @@ def test_two_at_once_are_both_named_and_nothing_else_is(
     assert readings.off_mm(outcome) < 3.5
 
 
-def test_slipped_encoders_and_bad_markers_are_named_and_survived() -> None:
+def test_slipped_encoders_and_faulty_markers_are_reported_and_tolerated() -> None:
     readings = Readings(_robot())
     readings.slip(6, 10, 0.008)
     readings.slip(1, 15, -0.006)
@@ -197,7 +197,7 @@ def test_cable_lengths_reveal_a_wrong_size_of_all_sheets() -> None:
 
 
 @pytest.mark.parametrize("drums", [(0.02,) * 8, (0.0, 0.0, 0.03, 0.0, 0.0, 0.0, 0.0, 0.0)])
-def test_sheets_and_drums_that_are_wrong_together_are_distinguished(
+def test_wrong_sizes_of_sheets_and_drums_are_distinguished(
     drums: tuple[float, ...],
 ) -> None:
     readings = Readings(_robot())
@@ -213,7 +213,7 @@ def test_sheets_and_drums_that_are_wrong_together_are_distinguished(
 
 
 @pytest.mark.parametrize(("size", "drum"), [(1.04, 0.0), (1.0, 0.02)])
-def test_a_lens_and_sheets_or_drums_that_are_wrong_together_are_distinguished(
+def test_a_wrong_lens_and_wrong_sizes_of_sheets_or_drums_are_distinguished(
     size: float, drum: float
 ) -> None:
     readings = Readings(_robot())
@@ -229,7 +229,7 @@ def test_a_lens_and_sheets_or_drums_that_are_wrong_together_are_distinguished(
 
 
 @pytest.mark.long
-def test_four_cables_that_slip_at_once_are_named_but_might_be_the_camera() -> None:
+def test_four_simultaneous_slips_are_reported_with_the_camera_as_alternative() -> None:
     readings = Readings(_robot())
     slips = {0: 0.008, 1: 0.005, 2: -0.007, 3: 0.009}
     for cable, metres in slips.items():
@@ -242,7 +242,7 @@ def test_four_cables_that_slip_at_once_are_named_but_might_be_the_camera() -> No
 
 
 @pytest.mark.long
-def test_a_camera_that_is_moved_on_its_platform_is_not_taken_for_slips_alone() -> None:
+def test_a_moved_camera_is_reported_as_possible_cause_of_several_slips() -> None:
     readings = Readings(_robot())
     readings.move_camera(10)
     readings.slip(6, 14, 0.008)
@@ -255,7 +255,7 @@ def test_a_camera_that_is_moved_on_its_platform_is_not_taken_for_slips_alone() -
 
 
 @pytest.mark.parametrize("seed", [3, pytest.param(4, marks=pytest.mark.long)])
-def test_three_faults_are_named_though_the_camera_does_not_sit_where_it_was_told(seed: int) -> None:
+def test_three_faults_are_reported_despite_a_wrong_camera_position(seed: int) -> None:
     readings = Readings(_robot(seed=seed))
     readings.slip(6, 10, 0.008)
     readings.catch(3, 7, 0.025)
@@ -270,7 +270,7 @@ def test_three_faults_are_named_though_the_camera_does_not_sit_where_it_was_told
 
 
 @pytest.mark.long
-def test_a_wrong_lens_is_not_taken_for_a_camera_that_sits_elsewhere() -> None:
+def test_a_wrong_lens_is_not_mistaken_for_a_wrong_camera_position() -> None:
     readings = Readings(_robot())
     readings.slip(6, 10, 0.008)
     readings.wrong_lens(1.03)
@@ -295,7 +295,7 @@ def test_exchanged_known_markers_do_not_move_the_calibration() -> None:
     assert np.linalg.norm(off_m, axis=1).mean() < 1e-3 * outcome.absolute.position_mm
 
 
-def test_islands_make_a_calibration_not_good() -> None:
+def test_a_calibration_with_islands_is_not_good() -> None:
     readings = Readings(camera_robot(30))
     far = {2, 3, 6, 7, 10, 11}  # two columns of sheets
     for j, one in enumerate(readings.sightings):
@@ -311,7 +311,7 @@ def test_islands_make_a_calibration_not_good() -> None:
     assert not outcome.good
 
 
-def test_markers_seen_once_and_those_of_others_are_no_islands() -> None:
+def test_markers_seen_once_and_foreign_markers_are_not_islands() -> None:
     def image(name: str, *markers: int) -> Sighting:
         return Sighting(name, dict.fromkeys(markers))  # type: ignore[arg-type]
 
@@ -320,4 +320,4 @@ def test_markers_seen_once_and_those_of_others_are_no_islands() -> None:
     assert found.lines()[0] == "80% of the markers seen"
     others = [image("b", 11, 12), *(image(f"{k}", 7) for k in range(3))]
     assert coverage([image("a", 1, 2), *others]).apart == [(7,)]
-    assert not coverage([image("a", 1, 2), *others], placed=[1, 2]).apart  # somebody else's
+    assert not coverage([image("a", 1, 2), *others], placed=[1, 2]).apart  # a foreign marker

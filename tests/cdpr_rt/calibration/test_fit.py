@@ -1,4 +1,4 @@
-"""The identification against truths made up, numeric derivatives and an independent solver."""
+"""The fit agrees with synthetic truths, numeric derivatives and an independent solver."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ _STEP = 1e-6
 
 
 @pytest.mark.parametrize("robot", STRAIGHT)
-def test_derivatives_are_those_of_differences(robot: str) -> None:
-    kinds = tuple(kind for kind in KINDS if kind != "pulley")  # no radius is below 0
+def test_derivatives_agree_with_finite_differences(robot: str) -> None:
+    kinds = tuple(kind for kind in KINDS if kind != "pulley")  # radii are not negative
     what = made_up(robot, 12, 3, identified=kinds)
     geometry = what.file.with_values(np.random.default_rng(1).normal(0.0, 0.01, what.file.size))
     seen = measured(what, 1e-3, 2e-3, 5)
@@ -54,7 +54,7 @@ def test_derivatives_are_those_of_differences(robot: str) -> None:
         assert at.by_pose[..., k] == pytest.approx(told, rel=2e-3, abs=2e-6 * np.abs(told).max())
 
 
-def test_the_derivative_by_a_pulleys_radius_is_that_of_differences() -> None:
+def test_the_derivative_by_a_pulley_radius_agrees_with_finite_differences() -> None:
     what = made_up("spatial-8", 6, 4, identified=("pulley",))
     cable = what.file.cable.copy()
     cable[:, 8] = 0.04
@@ -71,9 +71,9 @@ def test_the_derivative_by_a_pulleys_radius_is_that_of_differences() -> None:
 
 
 @pytest.mark.parametrize("robot", ROBOTS)
-def test_without_noise_the_truth_is_found(robot: str) -> None:
+def test_the_truth_is_found_without_noise(robot: str) -> None:
     what = made_up(robot, 40, 11)
-    # next to nothing is known before
+    # with almost no prior knowledge
     loose = Knowledge(exit_m=5.0, offset_m=5.0, drum=0.5, elongation=50.0)
     seen = measured(what, 1e-7, 1e-7, 1)
     found = fit(replace(what.file, knowledge=loose), seen)
@@ -85,7 +85,7 @@ def test_without_noise_the_truth_is_found(robot: str) -> None:
         assert found.geometry.elongation == pytest.approx(what.true.elongation, abs=2e-2)
 
 
-def test_it_agrees_with_an_independent_solver_on_the_thesis_equations() -> None:
+def test_the_fit_agrees_with_an_independent_solver_of_the_thesis_equations() -> None:
     what = made_up("spatial-8", 30, 5, drum=0.0, elongation=-1.0, identified=("exit", "offset"))
     rigid = replace(what.file, compliance_1_N=np.zeros(8))
     seen = measured(what, 1e-7, 1e-7, 2)
@@ -105,7 +105,7 @@ def test_it_agrees_with_an_independent_solver_on_the_thesis_equations() -> None:
 
 @settings(max_examples=12)
 @given(seed=st.integers(0, 10_000), robot=st.sampled_from(["planar-4", "point-4", "spatial-8"]))
-def test_errors_are_as_large_as_predicted(seed: int, robot: str) -> None:
+def test_errors_agree_with_their_predicted_covariance(seed: int, robot: str) -> None:
     known = Knowledge(exit_m=0.008, offset_m=0.01, drum=0.003, length_m=3e-4, tension_N=1e-6)
     what = made_up(robot, 40, seed, noise_m=3e-4, elongation=-0.3)
     found = fit(replace(what.file, knowledge=known), measured(what, 1e-3, 2e-3, seed + 1))
@@ -118,7 +118,7 @@ def test_errors_are_as_large_as_predicted(seed: int, robot: str) -> None:
 
 
 @pytest.mark.parametrize("robot", ["planar-4", "spatial-8"])
-def test_moving_the_room_moves_the_result_and_changes_no_length(robot: str) -> None:
+def test_a_translation_of_the_room_translates_the_result(robot: str) -> None:
     what = made_up(robot, 25, 8, noise_m=1e-4)
     shift = np.array([0.3, -0.2, 0.0])
     seen = measured(what, 1e-4, 1e-3, 3)
@@ -134,20 +134,20 @@ def test_moving_the_room_moves_the_result_and_changes_no_length(robot: str) -> N
     assert moved_by == pytest.approx(np.tile(shift[:k], (what.file.n, 1)), abs=2e-4)
 
 
-def test_without_measured_poses_the_exit_points_together_stay() -> None:
+def test_the_mean_of_exit_points_stays_without_measured_poses() -> None:
     what = made_up("spatial-8", 60, 2, noise_m=1e-4)
     found = fit(what.file, what.seen)
     assert np.abs(found.geometry.cable[:, :3].mean(axis=0)).max() < 2e-3
 
 
-def test_poses_by_the_true_geometry_are_the_true_ones() -> None:
+def test_poses_with_the_true_geometry_are_true() -> None:
     what = made_up("spatial-8", 20, 6)
     there = locate(what.true, what.seen)
     true = np.array([pose.array for pose in what.poses])
     assert there.poses == pytest.approx(true, abs=1e-8)
 
 
-def test_no_poses_and_no_numbers_are_refused() -> None:
+def test_missing_poses_and_nan_lengths_are_rejected() -> None:
     what = made_up("planar-4", 5, 1)
     with pytest.raises(InvalidRequestError, match="no poses"):
         fit(what.file, what.seen.some(np.zeros(5, bool)))
@@ -157,7 +157,7 @@ def test_no_poses_and_no_numbers_are_refused() -> None:
         Observations.of_lengths(lengths, what.seen.tension_N, what.seen.start)
 
 
-def test_an_unknown_kind_of_parameter_is_refused() -> None:
+def test_an_unknown_kind_of_parameter_is_rejected() -> None:
     with pytest.raises(InvalidRequestError, match="colour"):
         CableGeometry.of(load_robot("planar-4"), ("exit", "colour"))
     with pytest.raises(InvalidRequestError, match="no platform"):
@@ -167,7 +167,7 @@ def test_an_unknown_kind_of_parameter_is_refused() -> None:
 WEIGHT_N_m = 2.0
 
 
-def test_lengths_belong_to_the_tensions_that_winches_tell() -> None:
+def test_lengths_of_heavy_cables_correspond_to_tensions_at_the_winches() -> None:
     robot = load_robot("suspended-8")
     assert robot.platform is not None
     cable = robot.axes[0].winch.cable.model_copy(update={"weight_per_length_N_m": WEIGHT_N_m})

@@ -1,4 +1,4 @@
-"""The frame of a calibration: kept where nothing tells it, told with how well it is known."""
+"""The frame of a calibration is kept if nothing determines it, and its accuracy reported."""
 
 from __future__ import annotations
 
@@ -24,21 +24,21 @@ TAPE = replace(KNOWN, exit_m=0.05)
 
 
 def turned(found: Fit, turn: np.ndarray, shift: np.ndarray) -> Fit:
-    """Return a fit that is moved as a whole."""
+    """Return a fit moved as a rigid body."""
     exits, cable = found.geometry.kernel_geometry()[:3].T, found.geometry.cable.copy()
     cable[:, EXIT] += exits @ turn.T + shift - exits
     return replace(found, geometry=replace(found.geometry, cable=cable))
 
 
 @pytest.mark.parametrize("robot", ["planar-4", "spatial-8"])
-def test_a_fit_that_is_moved_as_a_whole_comes_back_to_the_frame_of_the_file(robot: str) -> None:
+def test_a_rigidly_moved_fit_is_returned_to_the_frame_of_the_file(robot: str) -> None:
     what = made_up(robot, 30, 3, exit_m=0.0, drum=0.0, elongation=0.0, offset_m=0.0)
     found = fit(what.file, what.seen)
     turn = Rotation.from_rotvec([0.0, 0.0, 0.01]).as_matrix()
     moved = turned(found, turn, np.array([0.01, -0.02, 0.0]))
     poses = what.seen.start[:20]
     assert np.linalg.norm(position_shift(moved, what.file, poses)) > 0.01
-    # nothing is known of the frame by the exit points, or all of it
+    # exit points determine nothing of the frame, or all of it
     back = in_frame_of_file(moved, what.file, poses, exits_std_m=10.0)
     assert np.abs(position_shift(back.found, what.file, poses)).max() < 1e-5
     assert back.share == pytest.approx(1.0, rel=1e-3)
@@ -47,7 +47,7 @@ def test_a_fit_that_is_moved_as_a_whole_comes_back_to_the_frame_of_the_file(robo
 
 
 @pytest.mark.parametrize("seed", [3, pytest.param(4, marks=pytest.mark.long)])
-def test_with_a_camera_a_right_file_is_kept_in_its_frame_and_a_wrong_one_is_told_from_it(
+def test_a_camera_keeps_the_frame_of_a_right_file_and_detects_a_wrong_one(
     seed: int,
 ) -> None:
     right = camera_robot(25, seed, RIGHT, hand_eye_known=False, knowledge=TAPE)
@@ -61,7 +61,7 @@ def test_with_a_camera_a_right_file_is_kept_in_its_frame_and_a_wrong_one_is_told
 
 
 @pytest.mark.parametrize("robot", ["planar-4", "spatial-8"])
-def test_with_points_a_right_file_is_kept_and_a_wrong_one_is_corrected(robot: str) -> None:
+def test_points_keep_a_right_file_and_correct_a_wrong_one(robot: str) -> None:
     none = {"exit_m": 0.0, "drum": 0.0, "elongation": 0.0, "offset_m": 0.0}
     for errors, told in (({**none, "elongation": 0.03}, False), ({**none, "drum": 0.006}, True)):
         what = made_up(robot, 45, 6, noise_m=2e-4, home_first=True, **errors)  # type: ignore[arg-type]
@@ -71,7 +71,7 @@ def test_with_points_a_right_file_is_kept_and_a_wrong_one_is_corrected(robot: st
         assert outcome.absolute.position_mm > outcome.predicted_3_sigma_mm
 
 
-def test_the_absolute_figure_contains_a_scale_error_that_all_points_share() -> None:
+def test_absolute_accuracy_includes_the_common_scale_error_of_points() -> None:
     what = made_up("spatial-8", 45, 6, noise_m=2e-4, home_first=True)
     right = measured(what, 1e-3, 2e-3, 8)
     wrong = replace(right, position_m=1.004 * right.position_m)
@@ -83,7 +83,7 @@ def test_the_absolute_figure_contains_a_scale_error_that_all_points_share() -> N
     assert "scale, origin, axes" in by_wrong.frame() and "0.9 % (3 sigma)" in by_wrong.frame()
 
 
-def test_a_calibration_says_what_it_does_to_absolute_positions_and_orientations() -> None:
+def test_the_verdict_reports_accuracy_of_absolute_positions_and_orientations() -> None:
     what = made_up("spatial-8", 45, 4, noise_m=2e-4, home_first=True)
     outcome = calibrate(load_robot("spatial-8"), what.file, measured(what, 1e-3, 2e-3, 8), "points")
     text = "\n".join(outcome.verdict())

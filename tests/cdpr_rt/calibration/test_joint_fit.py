@@ -1,4 +1,4 @@
-"""The fit of cables, camera and markers: derivatives, an independent solver, trials, and faults."""
+"""The joint fit of cables, camera and markers: derivatives, accuracy and verification."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def off_mm(what: CameraRobot, poses: np.ndarray) -> float:
     return 1e3 * float(np.linalg.norm(relative_errors(poses, what.made.poses)[0], axis=1).mean())
 
 
-def test_derivatives_are_those_of_differences() -> None:
+def test_derivatives_agree_with_finite_differences() -> None:
     start = plain(8).start()
     camera, poses, seen = start.camera, start.seen.start, start.seen.markers
     assert seen is not None
@@ -81,7 +81,7 @@ def test_derivatives_are_those_of_differences() -> None:
             assert not told[~own].any()
 
 
-def test_without_noise_the_truth_is_found_and_no_place_of_the_camera_need_be_known() -> None:
+def test_the_truth_is_found_without_noise_and_without_known_camera_position() -> None:
     sharp = Knowledge(exit_m=0.1, length_m=1e-5, tension_N=0.01, drum=0.02)
     what = camera_robot(15, 5, NOTHING_WRONG, hand_eye_known=False, knowledge=sharp)
     start = what.start()
@@ -95,8 +95,8 @@ def test_without_noise_the_truth_is_found_and_no_place_of_the_camera_need_be_kno
     assert found.camera.position_m == pytest.approx(HAND_EYE_m, abs=0.02)
 
 
-def test_it_agrees_with_an_independent_solver() -> None:
-    # exit points and offsets by (3.18), corners by OpenCV; markers and all poses unknown
+def test_the_fit_agrees_with_an_independent_solver() -> None:
+    # exit points and offsets by (3.18), corners by OpenCV, with markers and all poses unknown
     errors = ErrorBudget(elongation=0.0, drum=0.0)
     sheets = replace(FEW, rows=2, columns=2)
     what = camera_robot(7, 7, errors, sheets, identified=("exit", "offset"))
@@ -120,7 +120,7 @@ def _plain_solution(
     poses: np.ndarray,
     camera: CameraModel,
 ) -> np.ndarray:
-    """Return exit points, offsets, camera and what else there is by SciPy, numeric derivatives."""
+    """Return exit points, offsets, camera and other unknowns by SciPy with numeric derivatives."""
     markers, known, file = seen.markers, first.knowledge, what.geometry
     assert markers is not None
     n, count, m = file.n, seen.poses, len(first.ids)
@@ -161,7 +161,7 @@ def _plain_solution(
         out.append(np.array([size / known.size_std]))
         return np.concatenate(out)
 
-    # the turns are told from ours, what is compared begins at the file's
+    # rotations start at our solution, compared values at those of the file
     begin = np.concatenate([
         np.zeros(4 * n), known.position_m, np.zeros(3), [0.0],
         np.hstack([poses[:, 0], np.zeros((count, 3))]).ravel(),
@@ -171,8 +171,8 @@ def _plain_solution(
     return np.asarray(found.x)
 
 
-def test_errors_are_as_large_as_predicted() -> None:
-    # nothing that the model does not know: noise of corners and encoders, drums, tape, lens, size
+def test_errors_agree_with_their_predicted_covariance() -> None:
+    # only errors in the model: noise of corners and encoders, drums, tape, lens, size
     errors = ErrorBudget(sheet_scale=0.0, bend_m=0.0, tension_N=0.0, elongation=0.0)
     chi, freedom = 0.0, 0
     for seed in range(3):
@@ -204,13 +204,13 @@ def test_a_camera_alone_locates_the_platform_in_the_map_of_the_fit() -> None:
     assert off_mm(what, there.poses) < 3.0
 
 
-def test_a_camera_on_a_platform_that_does_not_turn_has_to_be_told_where_it_is() -> None:
+def test_hand_eye_is_required_for_a_camera_on_a_platform_that_does_not_turn() -> None:
     turns = Rotation.from_rotvec(np.outer(np.linspace(0.0, 0.3, 8), (0.0, 0.0, 1.0))).as_matrix()
     with pytest.raises(InvalidRequestError, match="hand_eye"):
         turned_camera(turns, turns)
 
 
-def test_a_camera_that_sits_otherwise_than_told_is_refused() -> None:
+def test_a_contradictory_camera_orientation_is_rejected() -> None:
     what = plain(15)
     setup = what.images.setup
     assert setup.hand_eye is not None
@@ -220,7 +220,7 @@ def test_a_camera_that_sits_otherwise_than_told_is_refused() -> None:
         camera_start(what.geometry, what.seen, setup, what.images.sightings)
 
 
-def test_measured_points_verify_where_three_poses_have_all_of_theirs() -> None:
+def test_measured_points_verify_if_three_poses_have_complete_points() -> None:
     seen = plain(15).seen.some(np.arange(5))
     for std_m, enough in (
         (np.full((5, 3), np.nan), False),

@@ -1,4 +1,4 @@
-"""Slips in measured points: named, or at least never adopted, and no healthy cable is blamed."""
+"""Mistakes in measured points are reported or at least not adopted, and blame no cable."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ _POSES, _STD_m = 40, 0.002
 
 @pytest.fixture(scope="module")
 def robots(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
-    """Return the paths of two robots that are made up, by name, and the names of two shipped."""
+    """Return the paths of two synthetic robots and the names of two shipped ones."""
     folder = tmp_path_factory.mktemp("robots")
     for name, answers in MADE_UP.items():
         path = folder / f"{name}.toml"
@@ -47,20 +47,20 @@ def _usual(_: Question, default: str, wrong: str) -> str:
 
 @dataclass(frozen=True)
 class PointSet:
-    """A robot that is made up, with some poses at which points were measured; the first is home."""
+    """A synthetic robot with points measured at some poses, of which the first is home."""
 
     robot: Robot
     what: MadeUp
     exact: Observations
-    """Its lengths without noise."""
+    """Lengths without noise."""
     seen: Observations
     rows: FloatArray
-    """Poses that were measured."""
+    """Measured poses."""
     rng: np.random.Generator
 
     @classmethod
     def of(cls, robot: str, points: int, seed: int, **errors: float) -> PointSet:
-        """Return a robot whose points a person has measured, to 2 mm (1 sigma)."""
+        """Return a robot whose points a person measured to 2 mm (1 sigma)."""
         what, exact = (
             made_up(robot, _POSES, seed, noise_m=noise_m, home_first=True, **errors)  # type: ignore[arg-type]
             for noise_m in (3e-4, 0.0)
@@ -74,14 +74,14 @@ class PointSet:
         return cls(load_robot(robot), what, exact.seen, seen, rows, rng)
 
     def spoiled(self, slip: Callable[[PointSet, FloatArray], FloatArray]) -> Outcome:
-        """Return the calibration by points (M, k) that a slip has changed."""
+        """Return the calibration by points (M, k) that a mistake has changed."""
         place, k = self.seen.position_m.copy(), self.what.file.coordinates
         place[self.rows, :k] = slip(self, place[self.rows, :k])
         seen = replace(self.seen, position_m=place)
         return calibrate(self.robot, self.what.file, seen, "points")
 
     def error_mm(self, geometry: CableGeometry) -> float:
-        """Return how far off positions by lengths truly are, the mean of all poses."""
+        """Return the mean true error of positions from lengths."""
         there = locate(geometry, self.exact).poses[:, 0]
         off = there - np.array([pose.p for pose in self.what.poses])
         return 1e3 * float(np.linalg.norm(off[:, : geometry.coordinates], axis=1).mean())
@@ -96,7 +96,7 @@ def _scaled(by: float) -> Callable[[PointSet, FloatArray], FloatArray]:
 
 
 def _rows_exchanged(one: PointSet, points: FloatArray) -> FloatArray:
-    # two that are apart, or nothing has slipped
+    # two distant points, since exchanging near ones changes nothing
     away = np.linalg.norm(points - points[1], axis=1)
     other = int(away.argmax())
     points[[1, other]] = points[[other, 1]]
@@ -157,13 +157,13 @@ SLIPS: dict[str, tuple[Callable[[PointSet, FloatArray], FloatArray], str]] = {
     "one in cm": (_one_in_cm, "it fits if it is in cm"),
     "one 120 mm off": (_one_off, "mm from where all other readings put it"),
 }
-"""What is done to points, and what has to be said."""
+"""Changes of points and the required report."""
 _LEFT_OUT = ("one in cm", "one 120 mm off")
-"""Slips of a single point, which is left out; all others end in no calibration."""
+"""Mistakes in a single point, which is omitted. All others prevent a calibration."""
 
 
 def _judged(one: PointSet, slip: str) -> tuple[Outcome, bool]:
-    """Return the calibration, and whether the slip was named, with what always has to hold."""
+    """Return the calibration and whether it reported the mistake. Check what must always hold."""
     spoil, text = SLIPS[slip]
     outcome = one.spoiled(spoil)
     said = [fault.text for fault in outcome.faults]
@@ -179,7 +179,7 @@ def _judged(one: PointSet, slip: str) -> tuple[Outcome, bool]:
 
 @pytest.mark.parametrize("slip", SLIPS)
 @pytest.mark.parametrize("name", ["planar-3", "ceiling"])
-def test_a_slip_in_the_points_is_named_and_no_cable_is_blamed(
+def test_a_mistake_in_the_points_is_reported_and_no_cable_is_blamed(
     robots: dict[str, str], name: str, slip: str
 ) -> None:
     outcome, named = _judged(PointSet.of(robots[name], 12, 3), slip)
@@ -188,7 +188,7 @@ def test_a_slip_in_the_points_is_named_and_no_cable_is_blamed(
 
 @pytest.mark.long
 @pytest.mark.parametrize("name", ["spatial-8", "wide"])
-def test_slips_are_named_on_other_robots_and_never_adopted(
+def test_mistakes_on_other_robots_are_reported_and_never_make_a_calibration_worse(
     robots: dict[str, str], name: str
 ) -> None:
     missed = []
@@ -219,7 +219,7 @@ def test_healthy_points_are_not_suspected(robots: dict[str, str], name: str) -> 
     assert after < min(before, predicted)
 
 
-def test_points_that_are_less_sure_than_told_are_not_suspected(robots: dict[str, str]) -> None:
+def test_points_less_accurate_than_stated_are_not_suspected(robots: dict[str, str]) -> None:
     one = PointSet.of(robots["planar-3"], 20, 5)
     noise_m = 2.0 * _STD_m
     outcome = one.spoiled(lambda it, points: points + it.rng.normal(0.0, noise_m, points.shape))
@@ -227,7 +227,7 @@ def test_points_that_are_less_sure_than_told_are_not_suspected(robots: dict[str,
 
 
 @pytest.mark.parametrize("first", [0, 4])
-def test_shifted_pose_numbers_are_named(robots: dict[str, str], first: int) -> None:
+def test_shifted_pose_numbers_are_reported(robots: dict[str, str], first: int) -> None:
     one = PointSet.of(robots["planar-3"], 8, 1)
     numbers = one.rows + (np.arange(8) >= first)
     place = np.zeros_like(one.seen.position_m)
@@ -242,7 +242,7 @@ def test_shifted_pose_numbers_are_named(robots: dict[str, str], first: int) -> N
     assert not outcome.good
 
 
-def test_a_slip_of_an_encoder_that_only_points_show_is_not_taken_for_theirs(
+def test_an_encoder_slip_visible_only_by_points_does_not_blame_the_points(
     robots: dict[str, str],
 ) -> None:
     one = PointSet.of(robots["planar-3"], 40, 3)
@@ -253,7 +253,7 @@ def test_a_slip_of_an_encoder_that_only_points_show_is_not_taken_for_theirs(
     assert 1 in (outcome.faults[0].cable, *outcome.faults[0].alike)
 
 
-def test_a_wrong_drum_that_points_show_is_blamed(robots: dict[str, str]) -> None:
+def test_a_wrong_drum_visible_by_points_is_blamed(robots: dict[str, str]) -> None:
     one = PointSet.of(robots["planar-3"], 20, 3)
     home = one.seen.reference_m[1]
     lengths = one.seen.length_m.copy()
@@ -262,7 +262,7 @@ def test_a_wrong_drum_that_points_show_is_blamed(robots: dict[str, str]) -> None
     assert [(fault.kind, fault.cable) for fault in outcome.faults] == [("drum", 1)]
 
 
-def test_a_caught_cable_and_a_point_there_are_both_named_if_nothing_tells_which(
+def test_a_caught_cable_at_a_measured_pose_is_reported_by_pose_and_cable(
     robots: dict[str, str],
 ) -> None:
     one = PointSet.of(robots["planar-3"], 20, 3)
@@ -274,7 +274,7 @@ def test_a_caught_cable_and_a_point_there_are_both_named_if_nothing_tells_which(
     assert 2 in (outcome.faults[0].cable, *outcome.faults[0].alike)
 
 
-def test_fewer_than_three_points_to_verify_by_are_not_verified(robots: dict[str, str]) -> None:
+def test_fewer_than_three_held_out_points_do_not_verify(robots: dict[str, str]) -> None:
     few, enough = (PointSet.of(robots["planar-3"], count, 3).spoiled(_none) for count in (5, 6))
     assert any("not verified" in text for text in few.objections())
     assert len(enough.verified.errors_m) == 3
@@ -282,7 +282,7 @@ def test_fewer_than_three_points_to_verify_by_are_not_verified(robots: dict[str,
 
 
 @pytest.mark.parametrize("points", [6, 8])
-def test_wrong_points_at_verifying_poses_are_counted_and_too_few_left_is_an_objection(
+def test_too_few_right_points_for_verification_are_an_objection(
     robots: dict[str, str], points: int
 ) -> None:
     one = PointSet.of(robots["ceiling"], points, 3)
@@ -307,7 +307,7 @@ def test_wrong_points_at_verifying_poses_are_counted_and_too_few_left_is_an_obje
         (["1,0,0,0", "", "# by tape", "2,x,0,0"], "line 6: x_mm: value 'x'"),
     ],
 )
-def test_errors_in_a_file_of_points_name_the_lines_of_the_file(
+def test_errors_in_a_file_of_points_name_their_lines(
     tmp_path: Path, rows: list[str], said: str
 ) -> None:
     file = tmp_path / "points.csv"

@@ -1,4 +1,4 @@
-"""How uncertain lengths and tensions were, and what uncertain tensions do to what is predicted."""
+"""Uncertainty of lengths and tensions, and its effect on predicted errors."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def fitted(what: CameraRobot) -> Fit:
 
 
 @pytest.mark.parametrize("tension_N", [0.8, 2.5])
-def test_lengths_and_tensions_tell_how_uncertain_they_are(tension_N: float) -> None:
+def test_noise_of_lengths_and_tensions_is_estimated(tension_N: float) -> None:
     guess = replace(KNOWN, length_m=3e-4, tension_N=4.0)
     what = camera_robot(40, 5, ErrorBudget(tension_N=tension_N), knowledge=guess)
     first = fitted(what)
@@ -38,15 +38,15 @@ def test_lengths_and_tensions_tell_how_uncertain_they_are(tension_N: float) -> N
     assert weighed.cable == pytest.approx(0.0)
 
 
-def test_another_mass_than_the_file_s_is_not_taken_for_noise() -> None:
+def test_a_wrong_mass_is_not_mistaken_for_noise() -> None:
     found = fitted(camera_robot(40, 5, ErrorBudget(tension_N=0.5)))
     told = balance(found, found.seen).std_N
     assert told is not None
-    seen = replace(found.seen, tension_N=1.1 * found.seen.tension_N)  # as of a mass 10 % larger
+    seen = replace(found.seen, tension_N=1.1 * found.seen.tension_N)  # as with a mass 10 % larger
     assert balance(found, seen).std_N == pytest.approx(1.1 * told, rel=1e-6)
 
 
-def test_few_poses_tell_nothing_of_tensions() -> None:
+def test_three_poses_do_not_determine_the_noise_of_tensions() -> None:
     found = fitted(camera_robot(15, 5))
     few = replace(found, seen=found.seen.some(np.arange(3)), poses=found.poses[:3])
     told = balance(few, few.seen)
@@ -54,23 +54,23 @@ def test_few_poses_tell_nothing_of_tensions() -> None:
     assert told.tension_N == pytest.approx(few.seen.tension_N)
 
 
-def test_balanced_tensions_hold_the_platform_and_err_less() -> None:
+def test_balanced_tensions_hold_the_platform_and_have_smaller_errors() -> None:
     what = camera_robot(40, 5, ErrorBudget(tension_N=3.0))
     first = fitted(what)
     tension = first.seen.tension_N.copy()
-    tension[0] += 60.0  # as of a platform on its stand
+    tension[0] += 60.0  # as for a platform on its stand
     told = balance(first, replace(first.seen, tension_N=tension))
     assert told.tension_N[0] == pytest.approx(tension[0])
     assert told.free[0] == pytest.approx(np.eye(8))
     assert told.std_N == pytest.approx(3.0, rel=0.12)
-    # six of eight directions are told by the balance
+    # the balance determines six of eight directions
     assert np.trace(told.free[1:], axis1=1, axis2=2) == pytest.approx(2.0)
     moved = told.tension_N - tension
     assert np.einsum("jab,jb->ja", told.free[1:], moved[1:]) == pytest.approx(0.0, abs=1e-9)
 
 
-@pytest.mark.parametrize("std_N", [1.0, 20.0])  # of motors whose friction is as large at the cable
-def test_tensions_of_a_robot_whose_weight_alone_tells_them_are_corrected_by_it(
+@pytest.mark.parametrize("std_N", [1.0, 20.0])  # friction of the motors at the cable
+def test_tensions_determined_by_weight_are_corrected_by_it(
     std_N: float,
 ) -> None:
     what = made_up("suspended-6", 40, 5, noise_m=1e-4, in_balance=True)
@@ -90,12 +90,12 @@ def test_tensions_of_a_robot_whose_weight_alone_tells_them_are_corrected_by_it(
     assert 0.3 < float(off @ np.linalg.solve(found.uncertainty, off)) / off.size < 2.3
 
 
-def test_where_few_poses_hang_free_tensions_tell_their_noise_and_stay() -> None:
+def test_tensions_are_not_corrected_if_few_poses_are_free() -> None:
     found = fitted(camera_robot(15, 5))
     few = replace(found, seen=found.seen.some(np.arange(5)), poses=found.poses[:5])
     told = balance(few, few.seen).std_N
     tension = few.seen.tension_N.copy()
-    # something else holds the platform at two poses: 18 rows are left, less four for the mass
+    # another force acts at two poses: 18 rows remain, minus four for the mass
     tension[:2] += np.random.default_rng(0).normal(0.0, 60.0, (2, 8))
     held = balance(few, replace(few.seen, tension_N=tension))
     assert told is not None and held.std_N is not None and held.std_N > told
@@ -104,7 +104,7 @@ def test_where_few_poses_hang_free_tensions_tell_their_noise_and_stay() -> None:
 
 
 @pytest.mark.parametrize("slope_noise", [150.0, 1e4])
-def test_no_more_is_taken_out_of_the_elongation_than_a_fit_knows_of_it(slope_noise: float) -> None:
+def test_attenuation_of_the_elongation_is_bounded_by_its_information(slope_noise: float) -> None:
     what = made_up("spatial-8", 30, 5, noise_m=3e-4)
     first = fit(what.file, measured(what, 1e-3, 2e-3, 4))
     known = replace(what.file.knowledge, slope_noise=slope_noise)
@@ -115,20 +115,20 @@ def test_no_more_is_taken_out_of_the_elongation_than_a_fit_knows_of_it(slope_noi
     assert np.isfinite(found.attenuation).all()
     std = np.sqrt(np.diag(found.covariance))
     assert np.linalg.eigvalsh(found.covariance / np.outer(std, std)).min() > 0.0
-    assert std[-1] > np.sqrt(first.covariance[-1, -1])  # what is taken out makes it less certain
+    assert std[-1] > np.sqrt(first.covariance[-1, -1])  # the attenuation increases the uncertainty
 
 
-def test_a_fit_that_begins_where_another_ended_settles_there() -> None:
+def test_a_fit_started_at_a_solution_stays_there() -> None:
     what = made_up("spatial-8", 30, 5, noise_m=3e-4)
     file = replace(what.file, knowledge=replace(what.file.knowledge, slope_noise=20.0))
     there = fit(file, measured(what, 1e-3, 2e-3, 4))
-    assert there.total_cost < 0.0  # by what is taken out
+    assert there.total_cost < 0.0  # because of the attenuation
     again = fit(file, replace(there.seen, start=there.poses), start=there.geometry)
     assert again.converged
     assert again.geometry.values() == pytest.approx(there.geometry.values(), abs=1e-5)
 
 
-def test_errors_are_as_large_as_predicted_where_tensions_err_as_much_as_they_differ() -> None:
+def test_errors_agree_with_predictions_if_tension_errors_are_large() -> None:
     by_all, by_noise = [], []
     for seed in range(30, 33):
         what = camera_robot(40, seed, ErrorBudget(tension_N=3.0, spread_N=10.0))
@@ -145,11 +145,11 @@ def test_errors_are_as_large_as_predicted_where_tensions_err_as_much_as_they_dif
     # chi squared of 24 and 3 degrees of freedom
     assert 0.25 < drums_off < 2.5
     assert elongation_off < 2.5
-    assert np.mean(by_noise) > 2.5  # noise alone does not make them
+    assert np.mean(by_noise) > 2.5  # noise alone does not explain them
 
 
 def with_tensions_about_those_told(what: CameraRobot, std_N: float, seed: int) -> CameraRobot:
-    """Return the robot whose true tensions err about told ones, in what no balance tells."""
+    """Return the robot whose tensions have errors in directions that no balance determines."""
     made, n = what.made, what.geometry.n
     rng, tension = np.random.default_rng(seed), what.seen.tension_N
     arm = np.einsum("jab,ib->jia", made.poses[:40, 1:], what.geometry.kernel_geometry()[3:6].T)
@@ -165,7 +165,7 @@ def with_tensions_about_those_told(what: CameraRobot, std_N: float, seed: int) -
 
 
 @pytest.mark.long
-def test_elongation_and_drums_err_as_predicted_whichever_tensions_err() -> None:
+def test_errors_of_elongation_and_drums_agree_with_predictions_for_any_tension_error() -> None:
     chi = 0.0
     raw: list[float] = []
     off: dict[str, list[float]] = {"true": [], "told": []}

@@ -1,4 +1,4 @@
-"""Poses chosen by distance and by information: against plain definitions of both."""
+"""Poses chosen by distance and by information agree with plain definitions of both."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def log_det(rows: np.ndarray, taken: list[int]) -> float:
     return float(np.linalg.slogdet(np.eye(rows.shape[2]) + all_rows.T @ all_rows)[1])
 
 
-def test_no_spread_is_twice_as_wide_as_the_one_that_is_chosen() -> None:
+def test_the_chosen_spread_is_at_least_half_the_optimum() -> None:
     positions = np.random.default_rng(2).uniform(-1.0, 1.0, (14, 3))
     arms = np.array([1.0, 1.0, 0.3])
 
@@ -57,7 +57,7 @@ def test_no_spread_is_twice_as_wide_as_the_one_that_is_chosen() -> None:
     assert best / 2.0 <= width(taken) <= best
 
 
-def test_each_pose_that_is_taken_tells_most_beside_those_before() -> None:
+def test_each_chosen_pose_adds_the_most_information() -> None:
     _, _, model, poses = candidates(100)
     rows = pose_rows(cable_geometry(model), poses)
     taken = informative(cable_geometry(model), poses, 5).tolist()
@@ -67,8 +67,8 @@ def test_each_pose_that_is_taken_tells_most_beside_those_before() -> None:
         assert one == max(others, key=lambda j: log_det(rows, [*before, j]))
 
 
-def test_information_of_a_pose_is_the_difference_without_it() -> None:
-    # poses and parameters as unknowns of one problem, from which the poses are taken out
+def test_information_rows_of_a_pose_equal_its_marginal_information() -> None:
+    # poses and parameters are unknowns of one problem, and the poses are eliminated
     _, _, model, poses = candidates(3)
     geometry = cable_geometry(model)
     rows = pose_rows(geometry, poses)
@@ -100,13 +100,13 @@ def test_information_of_a_pose_is_the_difference_without_it() -> None:
         p, x = slice(0, size + 6), slice(size + 6, None)
         left = H[p, p] - H[p, x] @ np.linalg.solve(H[x, x], H[x, p])
         drums = np.isin(np.arange(size + 6), [5 * i + 4 for i in range(n)])
-        same = ~drums  # the length paid out at a pose is known to the rows alone
+        same = ~drums  # only the rows contain the length paid out at a pose
         expected = (left * np.outer(known, known))[np.ix_(same, same)]
         got = (rows[j].T @ rows[j])[np.ix_(same, same)]
         assert got == pytest.approx(expected, rel=1e-3, abs=1e-4 * np.abs(expected).max())
 
 
-def test_chosen_poses_tell_more_than_as_many_at_random() -> None:
+def test_chosen_poses_give_more_information_than_random_ones() -> None:
     _, _, model, poses = candidates(400)
     geometry = model.kinematics.geometry
     taken = informative(cable_geometry(model), poses, 30)
@@ -115,8 +115,8 @@ def test_chosen_poses_tell_more_than_as_many_at_random() -> None:
     assert chosen < at_random
 
 
-def test_a_pose_tells_what_measurement_would() -> None:
-    # a cable, measured lengths, poses with noise: residuals' deviation is what the rows divide by
+def test_information_rows_agree_with_simulated_measurements() -> None:
+    # one cable with noisy lengths and poses: rows are divided by the deviation of its residuals
     exits, anchors, model, poses = candidates(1)
     rng, count = np.random.default_rng(4), 40_000
     exit_point, anchor, p, Q = exits[2], anchors[2], poses[0, 0], poses[0, 1:]
@@ -133,7 +133,7 @@ def test_a_pose_tells_what_measurement_would() -> None:
     assert -row[:3] @ step / row[3] == pytest.approx(change, rel=1e-3)
 
 
-def test_over_a_pulley_a_pose_tells_what_its_length_does() -> None:
+def test_information_rows_over_a_pulley_follow_its_cable_length() -> None:
     exits, anchors, model, poses = candidates(1)
     geometry, radius_m, i = model.kinematics.geometry.copy(), 0.2, 2
     geometry[RADIUS] = radius_m

@@ -1,4 +1,4 @@
-"""What a calibration says of bad data, of what stays open, and of itself."""
+"""The verdict of a calibration on data, undetermined parameters and itself."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _NO_SLACK = np.zeros(8)
 
 
 @pytest.mark.parametrize("robot", ["planar-4", "point-4", "spatial-8"])
-def test_nothing_is_found_wrong_where_nothing_is(robot: str) -> None:
+def test_good_data_have_no_faults(robot: str) -> None:
     what = made_up(robot, 50, 9, noise_m=3e-4)
     slack = np.zeros(what.file.n)
     for seen in (measured(what, 1e-3, 2e-3, 4), what.seen):
@@ -34,7 +34,7 @@ def test_nothing_is_found_wrong_where_nothing_is(robot: str) -> None:
 
 
 @pytest.mark.parametrize(("robot", "blind"), [("planar-4", False), ("spatial-8", True)])
-def test_a_slipped_encoder_and_a_caught_cable_are_named(robot: str, blind: bool) -> None:
+def test_a_slipped_encoder_and_a_caught_cable_are_reported(robot: str, blind: bool) -> None:
     what = made_up(robot, 50, 9, noise_m=2e-4)
     seen = what.seen if blind else measured(what, 1e-3, 2e-3, 4)
     lengths = seen.length_m.copy()
@@ -51,7 +51,7 @@ def test_a_slipped_encoder_and_a_caught_cable_are_named(robot: str, blind: bool)
     assert any("slipped" in fault.text and "pose 26" in fault.text for fault in faults)
 
 
-def test_a_slack_cable_is_left_out_by_its_tension() -> None:
+def test_a_slack_cable_is_omitted_by_its_tension() -> None:
     what = made_up("spatial-8", 40, 3, noise_m=2e-4)
     tension, lengths = what.seen.tension_N.copy(), what.seen.length_m.copy()
     tension[7, 3], lengths[7, 3] = 0.4, lengths[7, 3] + 0.05
@@ -62,7 +62,7 @@ def test_a_slack_cable_is_left_out_by_its_tension() -> None:
     assert not found.seen.used[7, 3]
 
 
-def test_a_wrong_drum_is_named_with_its_error() -> None:
+def test_a_wrong_drum_is_reported_with_its_error() -> None:
     what = made_up("spatial-8", 50, 5, noise_m=2e-4)
     cable = what.true.cable.copy()
     wrong = 0.05
@@ -77,7 +77,7 @@ def test_a_wrong_drum_is_named_with_its_error() -> None:
     assert found.converged
 
 
-def test_without_measured_points_frame_and_scale_are_said_to_be_open() -> None:
+def test_frame_and_scale_are_reported_as_undetermined_without_points() -> None:
     what = made_up("spatial-8", 60, 7, noise_m=2e-4)
     blind = [one.what for one in open_directions(fit(what.file, what.seen))]
     for axis in "xyz":
@@ -89,7 +89,7 @@ def test_without_measured_points_frame_and_scale_are_said_to_be_open() -> None:
     assert not any("together" in text or "scale" in text for text in told)
 
 
-def test_unobservable_parameters_are_named_with_their_cable() -> None:
+def test_unobservable_parameters_are_reported_with_their_cable() -> None:
     what = made_up("spatial-8", 40, 7, noise_m=2e-4)
     seen = measured(what, 1e-3, 2e-3, 4)
     used = seen.used.copy()
@@ -106,7 +106,7 @@ def test_unobservable_parameters_are_named_with_their_cable() -> None:
     assert sum("(lower left)" in one.advice for one in named) == len(opened)
 
 
-def test_too_few_poses_are_refused_with_how_many_are_missing() -> None:
+def test_too_few_poses_are_rejected_with_the_missing_number() -> None:
     what = made_up("spatial-8", 60, 7)
     with pytest.raises(InvalidRequestError, match=r"at least \d+ poses more"):
         require_enough(what.file, what.seen.some(np.arange(8)))
@@ -125,7 +125,7 @@ def test_a_robot_without_redundancy_needs_points() -> None:
 
 
 @pytest.mark.parametrize("robot", ["planar-4", "spatial-8"])
-def test_predicted_deviations_of_poses_are_those_of_trials(robot: str) -> None:
+def test_predicted_deviations_of_poses_agree_with_trials(robot: str) -> None:
     squares = predicted = 0.0
     for seed in range(6):
         what = made_up(robot, 30, 100 + seed, noise_m=3e-4)
@@ -139,7 +139,7 @@ def test_predicted_deviations_of_poses_are_those_of_trials(robot: str) -> None:
     assert 0.15 < squares / predicted < 4.0
 
 
-def test_a_calibration_is_verified_on_other_poses_and_becomes_a_file() -> None:
+def test_a_calibration_is_verified_on_held_out_poses_and_written() -> None:
     robot = load_robot("spatial-8")
     what = made_up("spatial-8", 50, 4, noise_m=2e-4, home_first=True)
     outcome = calibrate(robot, what.file, measured(what, 1e-3, 2e-3, 8), "points")
@@ -173,7 +173,7 @@ def test_changes_that_noise_explains_are_not_significant(robot: str) -> None:
         chances.append(outcome.change.chance)
         if not outcome.told_from_file:
             assert "may be right already" in "\n".join(outcome.verdict())
-    assert min(chances) > 0.001 and np.mean(chances) > 0.1  # 0.5 on the average
+    assert min(chances) > 0.001 and np.mean(chances) > 0.1  # 0.5 on average
     wrong = made_up(robot, 45, 1, exit_m=0.003, drum=0.001, offset_m=0.0, noise_m=3e-4)
     outcome = calibrate(load_robot(robot), wrong.file, measured(wrong, 1e-3, 2e-3, 8), "points")
     assert outcome.told_from_file and outcome.insignificance() is None
@@ -190,9 +190,9 @@ def test_a_calibration_that_predicts_held_out_poses_worse_is_not_adopted_on_requ
     asked = replace(outcome, adopt=True)
     assert not outcome.told_from_file and outcome.good
     before = outcome.before.errors_m
-    other_way = 1.05 * before[::-1]  # the mean is larger, but not what is larger at most poses
+    other_way = 1.05 * before[::-1]  # the mean is larger, but errors are not larger at most poses
     gross = before.copy()
-    gross[2] *= 40.0  # so far off that the mean is no surer
+    gross[2] *= 40.0  # an outlier, so that the mean is uncertain
     for errors_m, worse in (
         *((1.1 * before, True), (0.9 * before, False), (other_way, False), (gross, True)),
     ):
@@ -200,14 +200,16 @@ def test_a_calibration_that_predicts_held_out_poses_worse_is_not_adopted_on_requ
         assert told.worse == worse and told.good != worse
         said = "NOT GOOD: at the poses kept for verification the errors are significantly larger"
         assert any(said in line for line in told.verdict()) == worse
-        assert replace(told, adopt=False).good  # not significant, which it says
+        assert replace(told, adopt=False).good  # not significant, and reported as such
     for errors_m, worse in ((before[:1], False), (3.0 * before[:1], True)):
         one = replace(asked.before, errors_m=before[:1])
         assert replace(one, errors_m=errors_m).worse_than(one) == worse
 
 
 @pytest.mark.parametrize("measured_too", [pytest.param(True, marks=pytest.mark.long), False])
-def test_a_right_file_is_seldom_told_worse_by_noise_and_a_wrong_one_is(measured_too: bool) -> None:
+def test_noise_seldom_makes_a_calibration_worse_and_a_wrong_file_is_detected(
+    measured_too: bool,
+) -> None:
     robot, told, swapped = load_robot("planar-3" if measured_too else "planar-4"), 0, 0
     for exit_m in (0.0, 0.004):
         for seed in range(6):
@@ -219,17 +221,19 @@ def test_a_right_file_is_seldom_told_worse_by_noise_and_a_wrong_one_is(measured_
             outcome = calibrate(robot, what.file, seen, "points" if measured_too else "redundancy")
             if exit_m == 0.0:
                 told += outcome.worse
-            else:  # the file in the place of what was calibrated
+            else:  # the file in place of the calibration
                 assert not outcome.worse
                 swapped += outcome.before.worse_than(outcome.verified)
     assert told <= 1 and swapped >= 5
 
 
-def test_a_slip_next_to_a_pose_held_out_counts_on_neither_side_there() -> None:
+def test_a_slip_beside_a_held_out_pose_excludes_its_cable_there() -> None:
     what = made_up("planar-4", 45, 9, noise_m=2e-4)
     seen = measured(what, 1e-3, 2e-3, 4)
     lengths = seen.length_m.copy()
-    lengths[24:, 1] += 0.012  # pose 25 is held out: 24 and 26 do not tell when it was
+    lengths[24:, 1] += (
+        0.012  # pose 25 is held out: 24 and 26 do not show whether the slip preceded it
+    )
     outcome = calibrate(
         load_robot("planar-4"), what.file, replace(seen, length_m=lengths), "points"
     )
@@ -261,14 +265,14 @@ def named(folder: Path) -> Path:
     return path
 
 
-def test_a_cable_is_called_as_its_axis_is_or_by_its_number(tmp_path: Path) -> None:
+def test_a_cable_has_the_name_of_its_axis_or_its_number(tmp_path: Path) -> None:
     geometry = CableGeometry.of(load_robot(str(named(tmp_path))))
     assert geometry.names()[0] == "c1 exit point x"
     assert geometry.names()[len(geometry.rows)] == "cable 2 exit point x"
     assert geometry.cables_text(1, (0, 2)) == "cable 2 (or c1, cable 3)"
 
 
-def test_a_slack_cable_is_reported_with_the_name(tmp_path: Path) -> None:
+def test_a_slack_cable_is_reported_by_name(tmp_path: Path) -> None:
     what = made_up(str(named(tmp_path)), 20, 3, noise_m=2e-4)
     seen = measured(what, 1e-3, 2e-3, 4)
     seen.tension_N[4, 0] = 0.5
@@ -276,7 +280,7 @@ def test_a_slack_cable_is_reported_with_the_name(tmp_path: Path) -> None:
     assert without_slack(what.file, seen, slack_N)[1][0].text.startswith("c1 was slack at pose 5")
 
 
-def test_it_is_what_a_fit_comes_to_that_has_every_pose_twice() -> None:
+def test_predicted_covariance_with_more_poses_equals_that_of_doubled_poses() -> None:
     what = made_up("spatial-8", 30, 3)
     seen = measured(what, 1e-3, 1e-3, 3)
     found, twice = fit(what.file, seen), fit(what.file, seen.some(np.tile(np.arange(30), 2)))
@@ -300,7 +304,7 @@ def test_unobservable_parameters_keep_their_prior() -> None:
 TRUE, NOISE_m = 1.002, 5e-4
 
 
-def test_the_scale_is_that_of_distances_and_its_deviation_that_of_trials() -> None:
+def test_scale_factor_and_its_deviation_agree_with_trials() -> None:
     rng = np.random.default_rng(3)
     found = []
     for _ in range(200):
@@ -314,7 +318,7 @@ def test_the_scale_is_that_of_distances_and_its_deviation_that_of_trials() -> No
     assert 0.8 < predicted / factors.std() < 1.3
 
 
-def test_two_poses_and_poses_at_one_place_tell_no_scale() -> None:
+def test_scale_is_nan_for_two_poses_or_identical_positions() -> None:
     for told in (np.eye(3)[:2], np.ones((5, 3))):
         scale = Scale.of(told, 1.01 * told)
         assert math.isnan(scale.factor) and math.isnan(scale.std)

@@ -1,4 +1,4 @@
-"""The compensation looks up, hands over, looks ahead and fades in."""
+"""Compensation interpolates its tables, blends directions, looks ahead and fades in."""
 
 import math
 
@@ -44,7 +44,7 @@ def test_table_is_interpolated_from_the_index(angle, index, forward):
 
 
 @pytest.mark.parametrize("velocity", [-1.0, 0.0, 1.0])
-def test_cogging_is_what_averages_to_nothing_over_a_turn(velocity):
+def test_reported_cogging_has_zero_mean_over_a_turn(velocity):
     rubbing = FrictionFeedforward(coulomb_forward_Nm=0.3, coulomb_backward_Nm=0.2)
     compensation = Compensation([AxisCompensation(TABLE, rubbing, most_Nm=10.0)], 1e-3)
     total, cogging = np.zeros((2, M))
@@ -58,7 +58,7 @@ def test_cogging_is_what_averages_to_nothing_over_a_turn(velocity):
     assert cogging == pytest.approx(total - total.mean(), abs=1e-9)
 
 
-def test_friction_is_reported_as_far_as_it_is_made_up_for():
+def test_reported_friction_is_the_compensated_part():
     rubbing = FrictionFeedforward(
         coulomb_forward_Nm=0.3, coulomb_backward_Nm=0.2, stribeck_backward_Nm=0.15
     )
@@ -69,14 +69,14 @@ def test_friction_is_reported_as_far_as_it_is_made_up_for():
     for _ in range(100):
         compensation.torque(feedback, setpoint, np.zeros(3))
     made_up_for = compensation.friction_Nm * compensation.faded_in
-    assert made_up_for == pytest.approx([0.175, 0.0, 0.0])  # half faded in
+    assert made_up_for == pytest.approx([0.175, 0.0, 0.0])  # faded in by half
     for _ in range(200):
         compensation.torque(feedback, setpoint, np.zeros(3))
     made_up_for = compensation.friction_Nm * compensation.faded_in
     assert made_up_for == pytest.approx([0.35, 0.0, 0.0])
 
 
-def test_hand_over_at_standstill_is_continuous():
+def test_directions_blend_continuously_at_standstill():
     axis = AxisCompensation(TABLE, blend_speed_rad_s=0.02, most_Nm=10.0)
     got = [settled(axis, *at(angle=0.4, velocity=v)) for v in np.linspace(-0.03, 0.03, 61)]
     assert np.max(np.abs(np.diff(got))) < 0.06 * np.ptp(got)
@@ -86,7 +86,7 @@ def test_hand_over_at_standstill_is_continuous():
 
 @settings(max_examples=60)
 @given(angle=st.floats(-50, 50), index=st.floats(-10, 10))
-def test_compensation_at_rest_equals_the_friction_held_at_rest(angle, index):
+def test_standing_torque_equals_the_compensation_at_rest(angle, index):
     feedback, setpoint = at(n=3, angle=angle, index=index, velocity=0.0)
     feedback.index_known[2] = False
     rubbing = FrictionFeedforward(coulomb_forward_Nm=0.3, stribeck_backward_Nm=0.1)
@@ -104,7 +104,7 @@ def test_compensation_at_rest_equals_the_friction_held_at_rest(angle, index):
 
 
 @pytest.mark.parametrize("observer_s", [0.0, 0.003])
-def test_angle_is_the_one_when_the_torque_acts(observer_s):
+def test_the_table_is_read_at_the_angle_when_the_torque_acts(observer_s):
     axis = AxisCompensation(TABLE, look_ahead_s=0.002, observer_s=observer_s, most_Nm=10.0)
     got = settled(axis, *at(angle=1.0, velocity=5.0))
     assert got == pytest.approx(math.sin(4 * 1.01), abs=1e-4)
@@ -115,13 +115,13 @@ def test_observer_follows_a_moving_deviation_without_lag():
     compensation, out = Compensation([axis], 1e-3), np.zeros(1)
     for k in range(400):
         feedback, setpoint = at(angle=0.0, velocity=1.0)
-        feedback.position_rad[:] = 0.5 * k * 1e-3  # the set-point stands at 0, the rotor drifts
+        feedback.position_rad[:] = 0.5 * k * 1e-3  # the set-point is at 0 while the rotor drifts
         compensation.torque(feedback, setpoint, out)
     angle = 0.5 * 399e-3 + 1.5 * 0.01
     assert out[0] == pytest.approx(math.sin(4 * angle), abs=3e-4)
 
 
-def test_friction_is_that_of_the_rotor_and_never_pushes_back():
+def test_friction_follows_the_speed_of_the_rotor_and_never_reverses():
     friction = FrictionFeedforward(0.08, 0.06, 0.02, 0.01, 0.2, 5e-4)
     axis = AxisCompensation(np.zeros((2, M)), friction, observer_s=0.003, most_Nm=10.0)
     assert settled(axis, *at(velocity=1.0)) == pytest.approx(0.08 + 0.02 * math.exp(-25.0) + 5e-4)
@@ -129,12 +129,12 @@ def test_friction_is_that_of_the_rotor_and_never_pushes_back():
     compensation, out = Compensation([axis], 1e-3), np.zeros(1)
     for k in range(400):
         feedback, setpoint = at(velocity=0.3)
-        feedback.position_rad[:] = -0.3 * k * 1e-3  # so the rotor stands
+        feedback.position_rad[:] = -0.3 * k * 1e-3  # so that the rotor stands
         compensation.torque(feedback, setpoint, out)
     assert out[0] == pytest.approx(0.08 + 0.02, abs=1e-6)
 
 
-def test_fades_in_when_the_index_is_seen_and_stops_without():
+def test_compensation_fades_in_with_the_index_and_stops_without():
     compensation = Compensation([AxisCompensation(TABLE + 1.0, most_Nm=10.0)], 1e-3)
     out = np.zeros(1)
     hidden, seen = at(known=False), at()
@@ -151,7 +151,7 @@ def test_fades_in_when_the_index_is_seen_and_stops_without():
     assert out[0] == 0.0
 
 
-def test_axes_without_profile_get_nothing():
+def test_axes_without_profile_are_not_compensated():
     compensation, out = (
         Compensation([None, AxisCompensation(TABLE + 1.0, most_Nm=10.0), None], 1e-3),
         np.ones(3),
@@ -161,7 +161,7 @@ def test_axes_without_profile_get_nothing():
     assert out == pytest.approx([0.0, 1.0, 0.0])
 
 
-def test_tables_of_another_shape_are_refused():
+def test_tables_of_different_shapes_are_rejected():
     with pytest.raises(ValueError, match="shape"):
         Compensation(
             [AxisCompensation(TABLE, most_Nm=10.0), AxisCompensation(TABLE[:, :100], most_Nm=10.0)],
@@ -176,7 +176,7 @@ def test_tables_of_another_shape_are_refused():
     angle=st.floats(-50, 50),
     most=st.floats(0.01, 1.0),
 )
-def test_no_table_and_no_friction_adds_more_than_the_axis_may_have(scale, velocity, angle, most):
+def test_compensation_never_exceeds_the_limit_of_the_axis(scale, velocity, angle, most):
     friction = FrictionFeedforward(scale, scale, scale, -scale, 0.2, scale)
     axis = AxisCompensation(scale * TABLE, friction, look_ahead_s=0.5, most_Nm=most)
     feedback, setpoint = at(angle=angle, velocity=velocity)

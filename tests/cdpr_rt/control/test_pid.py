@@ -1,4 +1,4 @@
-"""The PID against scipy's linear simulation, and its behaviour at the limits."""
+"""The PID agrees with scipy's linear simulation and behaves at its limits."""
 
 import numpy as np
 from scipy import signal
@@ -21,7 +21,7 @@ def run(pid: Pid, errors: np.ndarray) -> np.ndarray:
     return np.array(out)
 
 
-def test_matches_the_discrete_transfer_function() -> None:
+def test_the_pid_matches_its_discrete_transfer_function() -> None:
     seed = 3
     print("seed", seed)
     errors = np.random.default_rng(seed).normal(0, 0.01, 500)
@@ -36,18 +36,18 @@ def test_matches_the_discrete_transfer_function() -> None:
     np.testing.assert_allclose(got, expected, rtol=1e-9, atol=1e-12)
 
 
-def test_saturates_and_leaves_the_limit_at_once() -> None:
+def test_the_pid_saturates_without_windup() -> None:
     limit = 0.1
     pid = Pid([GAINS], np.array([limit]), PERIOD_S)
     errors = np.concatenate([np.full(5000, 1.0), np.full(50, -0.01)])
     torque = run(pid, errors)
     assert np.max(np.abs(torque)) == limit
-    # five seconds against the limit must not have been integrated: the sign turns at once
+    # five seconds at the limit must not be integrated: the torque decreases immediately
     assert torque[5001] < limit
     assert torque[5040] < 0.0
 
 
-def test_known_torque_counts_towards_the_limit_and_is_kept_apart() -> None:
+def test_compensation_counts_towards_the_limit_and_is_reported_separately() -> None:
     class Constant:
         cogging_Nm = np.zeros(1)
 

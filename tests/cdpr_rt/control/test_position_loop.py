@@ -1,4 +1,4 @@
-"""Bare motors of the whole series, and held axes, under the position loop of `jog` and the axes."""
+"""Bare motors of the whole series, loaded and blocked axes, with the position loop of `jog`."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ SETTLED_deg, SETTLED_S = 1.0, 1.0
 
 
 def series() -> list[str]:
-    """Return one name for each rotor of the MPP and MPJ series whose data sheet tells all."""
+    """Return one name for each rotor of the MPP and MPJ series with a complete data sheet."""
     found: dict[tuple[float, float], str] = {}
     for name in list_profiles()["motors"]:
         try:
@@ -41,7 +41,7 @@ def series() -> list[str]:
 
 
 class MotorUnderLoop:
-    """A simulated motor under the position loop of a bare rotor."""
+    """A simulated motor with the position loop of a bare rotor."""
 
     def __init__(self, winch: Winch, plant: Plant, compensated: bool = False) -> None:
         motor, self.plant = winch.motor, plant.of(winch)
@@ -77,7 +77,7 @@ class MotorUnderLoop:
             leg.fill(cycle * PERIOD_S, self._setpoint)
             self._pid.update(self._feedback, self._setpoint, self._torque)
             self._step()
-            # what is asked for acts one cycle later
+            # a commanded torque acts one cycle later
             self._permille = float(round(1e3 * self._torque[0] / self._rated_Nm))
             errors.append(math.degrees(self._feedback.position_rad[0] - leg.end_rad()[0]))
         return np.array(errors[round((seconds + RAMP_S) / PERIOD_S) :])
@@ -85,7 +85,7 @@ class MotorUnderLoop:
 
 @pytest.mark.parametrize("compensated", [False, True])
 @pytest.mark.parametrize("name", series())
-def test_every_motor_turns_by_what_is_asked_and_stands(name: str, compensated: bool) -> None:
+def test_each_motor_turns_by_the_commanded_angle_and_stands(name: str, compensated: bool) -> None:
     winch = replace(load_winch(WINCH), motor=load_motor(name))
     motor = MotorUnderLoop(winch, Plant(), compensated)
     for speed_deg_s, seconds in ((20.0, 3.0), (90.0, 3.0), (-20.0, 3.0), (360.0, 2.0)):
@@ -105,8 +105,8 @@ def test_a_load_of_fifty_rotors_comes_to_rest() -> None:
 
 
 @pytest.mark.parametrize("counts", [0, 1])
-def test_an_axis_that_is_held_is_not_pulled_any_harder(counts: int) -> None:
-    """It stands fast, its encoder between `counts` apart, while the set-point goes on and stops."""
+def test_a_blocked_axis_is_not_pulled_harder_by_the_following_part(counts: int) -> None:
+    """The axis is blocked, with encoder noise of `counts`, while the set-point moves and stops."""
     winch, seed = load_winch(WINCH), 4
     print("seed", seed)
     design = position_loop(winch.motor.rotor_inertia_kg_m2, winch.latency_s, PERIOD_S)
@@ -119,11 +119,11 @@ def test_an_axis_that_is_held_is_not_pulled_any_harder(counts: int) -> None:
         leg.fill(cycle * PERIOD_S, setpoint)
         feedback.position_rad[:] = count * math.tau / 8192
         pid.update(feedback, setpoint, torque_Nm)
-    assert torque_Nm[1] > 0.5  # what proportional part and usual integral come to
+    assert torque_Nm[1] > 0.5  # torque of the proportional part and the usual integral
     assert torque_Nm[0] - torque_Nm[1] == pytest.approx(0.0, abs=0.05 if counts else 1e-12)
 
 
-def test_a_loop_that_follows_keeps_its_margins() -> None:
+def test_a_loop_with_following_part_keeps_its_margins() -> None:
     winch = load_winch(WINCH)
     for period_s in (0.5e-3, 1e-3, 2e-3, 4e-3):
         latency_s = winch.latency_s + 1.5 * (period_s - PERIOD_S)

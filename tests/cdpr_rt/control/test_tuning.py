@@ -1,4 +1,4 @@
-"""PID design: its margins hold, and its bandwidth is found again in the time domain."""
+"""The PID design has its margins, and its bandwidth in the time domain."""
 
 import math
 
@@ -25,7 +25,7 @@ inertias = st.floats(1e-5, 1e-1)
 
 
 def simulated_response(design, frequency_Hz, delay_cycles, sub=10):
-    """Amplitude of the closed loop at one frequency, sample by sample with its own integrator."""
+    """Return the closed-loop amplitude at one frequency, by an independent simulation in time."""
     g, seconds = design.gains, 8.0 / frequency_Hz + 3.0
     n = round(seconds / T)
     angle = velocity = integral = slope = last = 0.0
@@ -51,8 +51,8 @@ def simulated_response(design, frequency_Hz, delay_cycles, sub=10):
 
 
 @pytest.mark.parametrize("bandwidth", [5.0, 12.5, 25.0])
-def test_bandwidth_is_found_in_time(bandwidth):
-    design = design_pid(1.13e-4, 2.5 * T, bandwidth)  # two cycles, and half a cycle of the hold
+def test_bandwidth_agrees_with_a_simulation_in_time(bandwidth):
+    design = design_pid(1.13e-4, 2.5 * T, bandwidth)  # two cycles plus half a cycle of the hold
     assert design.bandwidth_Hz == pytest.approx(bandwidth, rel=0.01)
     assert simulated_response(design, bandwidth, 2) == pytest.approx(math.sqrt(0.5), rel=0.03)
     assert simulated_response(design, 1.5 * bandwidth, 2) < 0.6
@@ -60,7 +60,7 @@ def test_bandwidth_is_found_in_time(bandwidth):
 
 @settings(max_examples=20)
 @given(inertia=inertias, latency=st.floats(0.5e-3, 4e-3), bandwidth=st.floats(3.0, 25.0))
-def test_margins_hold(inertia, latency, bandwidth):
+def test_designs_keep_their_margins(inertia, latency, bandwidth):
     design = design_pid(inertia, latency, bandwidth)
     assert design.phase_margin_deg == pytest.approx(PHASE_MARGIN_deg, abs=0.5)
     assert design.gain_margin_dB >= GAIN_MARGIN_dB
@@ -77,7 +77,7 @@ def test_gains_follow_the_inertia(inertia):
         assert b / a == pytest.approx(inertia / 1e-4, rel=1e-3)
 
 
-def test_a_wrong_inertia_shows_in_the_margins():
+def test_a_wrong_inertia_reduces_the_margins():
     design = design_pid(1e-4, 2e-3, 10.0)
     again = analyse(design.gains, 2e-4, 2e-3)
     assert again.gain_reduction_dB == pytest.approx(design.gain_reduction_dB - 6.02, abs=0.05)
@@ -92,14 +92,14 @@ def test_unreachable_bandwidths_are_rejected():
         sweep_gain(1e-4, 0.0)
 
 
-def test_sweep_gain_leaves_the_latency_its_phase():
+def test_sweep_gain_leaves_phase_for_the_latency():
     gain = sweep_gain(1.13e-4, 2.3e-3)
     assert math.sqrt(gain / 1.13e-4) * 2.3e-3 == pytest.approx(0.3)
 
 
 @settings(max_examples=10)
 @given(inertias, st.sampled_from([5e-4, 1e-3, 2e-3, 4e-3]))
-def test_a_firm_loop_keeps_its_bounds_and_bears_more_inertia(inertia, period):
+def test_a_firm_loop_keeps_its_margins_and_tolerates_more_inertia(inertia, period):
     latency = 0.8e-3 + 1.5 * period
     plain = stiffest_pid(inertia, latency, (30.0, 20.0, 10.0, 5.0), period)
     firm = standstill_gains(plain, period)
@@ -110,8 +110,8 @@ def test_a_firm_loop_keeps_its_bounds_and_bears_more_inertia(inertia, period):
 
 
 @pytest.mark.parametrize("period", [1e-3, 2e-3])
-def test_a_firm_loop_is_stiffer_than_cogging_is_steep(period):
+def test_a_firm_loop_is_stiffer_than_the_slope_of_cogging(period):
     latency = 0.8e-3 + 1.5 * period
     firm = standstill_gains(stiffest_pid(1.13e-4, latency, (30.0, 20.0), period), period)
-    # 0.06 Nm, four times a turn
+    # 0.06 Nm, four times per turn
     assert firm.gains.proportional_Nm_rad > 4 * 0.06

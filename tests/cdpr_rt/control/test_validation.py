@@ -1,4 +1,4 @@
-"""Figures of merit on signals whose figures are known."""
+"""Figures of merit of signals with known figures."""
 
 import math
 
@@ -18,7 +18,7 @@ def ramp(seconds=40.0):
     return time, SPEED * time, np.full(time.size, SPEED)
 
 
-def test_known_oscillation():
+def test_figures_of_a_known_oscillation():
     time, setpoint, velocity = ramp()
     swing = math.radians(0.5) * np.sin(2 * math.pi * 2.0 * time)
     effort = 0.3 + 0.01 * np.sin(2 * math.pi * 2.0 * time)
@@ -35,7 +35,7 @@ def test_an_offset_counts_as_position_error():
     assert got.mean_position_error_deg == pytest.approx(math.degrees(0.01))
 
 
-def test_velocity_is_low_passed_without_shift():
+def test_velocity_is_low_passed_without_phase_shift():
     time, setpoint, _ = ramp(4.0)
     middle = slice(1000, 3000)
     slow = low_pass_velocity(setpoint + 1e-3 * np.sin(2 * math.pi * 5 * time), T)[middle]
@@ -45,7 +45,7 @@ def test_velocity_is_low_passed_without_shift():
     assert np.max(np.abs(fast - SPEED)) < 0.02 * 1e-3 * 400 * math.pi
 
 
-def test_worst_and_ratios():
+def test_figures_combine_to_worst_values_and_ratios():
     _, setpoint, velocity = ramp(2.0)
     small = evaluate(setpoint - 0.01, setpoint, velocity, 0 * setpoint, T)
     large = evaluate(setpoint + 0.02, setpoint, velocity, 0 * setpoint, T)
@@ -53,14 +53,14 @@ def test_worst_and_ratios():
     assert ratios(large, small).rms_position_error == pytest.approx(2.0)
 
 
-def test_lengths_must_agree():
+def test_signals_of_different_length_are_rejected():
     _, setpoint, velocity = ramp(2.0)
     with pytest.raises(ControlError, match="lengths"):
         evaluate(setpoint[:-1], setpoint, velocity, setpoint, T)
 
 
-def test_floor_is_what_a_frictionless_rotor_shows():
-    """Against a simulation in time of the same loop with rounded reading and torque."""
+def test_the_noise_floor_agrees_with_a_frictionless_rotor():
+    """The same loop is simulated in time with rounded reading and torque."""
     inertia, step, quantum = 1.13e-4, 2 * math.pi / 8192, 3e-3
     design = design_pid(inertia, 2.5 * T, 12.0)
     g, rng = design.gains, np.random.default_rng(1)
@@ -70,7 +70,9 @@ def test_floor_is_what_a_frictionless_rotor_shows():
     truth, wanted = np.zeros(n), np.zeros(n)
     for k in range(n):
         truth[k] = angle
-        reading = step * (math.floor(angle / step + rng.uniform()))  # dithered: white
+        reading = step * (
+            math.floor(angle / step + rng.uniform())
+        )  # dithered, so that rounding errors are white
         error = -reading
         integral += g.integral_Nm_rad_s * T * error
         slope = (g.derivative_filter_s * slope + error - last) / (g.derivative_filter_s + T)
@@ -88,7 +90,7 @@ def test_floor_is_what_a_frictionless_rotor_shows():
         assert 0.4 < getattr(seen, name) / getattr(low, name) < 2.5, name
 
 
-def test_floor_grows_with_the_steps():
+def test_the_noise_floor_grows_with_the_steps():
     gains = design_pid(1.13e-4, 2.5 * T, 12.0).gains
     fine = floor(gains, 1.13e-4, 2.5 * T, T, 1e-4, 1e-4)
     coarse = floor(gains, 1.13e-4, 2.5 * T, T, 1e-3, 1e-3)

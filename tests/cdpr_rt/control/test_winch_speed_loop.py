@@ -1,4 +1,4 @@
-"""Velocity loops of the winches."""
+"""Speed loops of the winches."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ LOW_N, HIGH_N, COULOMB_Nm = 5.0, 150.0, 0.08
 
 
 @pytest.mark.parametrize("begins_rad_s", [0.0, -150.0, -250.0])
-def test_a_winch_whose_cable_has_broken_does_not_run_away(begins_rad_s: float) -> None:
-    """It begins with 18 N, which nothing holds, and as what the loop is told of a jump: at rest."""
+def test_a_winch_with_a_broken_cable_does_not_run_away(begins_rad_s: float) -> None:
+    """It starts with an unopposed 18 N, and the loop first sees the jump as rest."""
     loop = WinchSpeedLoop(np.array([INERTIA_kg_m2]), np.array([CABLE_m]), PERIOD_s)
     loop.low_N[:], loop.high_N[:], loop.paying_out_m_s[:] = LOW_N, HIGH_N, 0.15
     loop.fastest_in_m_s, loop.integral_rate_1_s = FASTEST_IN_m_s, HANGING_LOAD_1_s
@@ -33,7 +33,7 @@ def test_a_winch_whose_cable_has_broken_does_not_run_away(begins_rad_s: float) -
 
 @pytest.mark.parametrize("friction_N", [0.5, 8.0, 12.0])
 def test_a_slack_cable_is_paid_out_against_friction_up_to_the_push(friction_N: float) -> None:
-    """As far as it is asked for; a winch that rubs more than that stands still."""
+    """The cable is paid out by the requested length. A winch with more friction stands still."""
     push_N, left_m = 10.0, 0.1
     loop = WinchSpeedLoop(np.array([INERTIA_kg_m2]), np.array([CABLE_m]), PERIOD_s)
     loop.high_N[:], loop.paying_out_m_s[:] = HIGH_N, 0.15

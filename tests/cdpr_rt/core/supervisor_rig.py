@@ -1,4 +1,4 @@
-"""A cycle of two axes as a supervisor sees it, and limits for them."""
+"""The inputs of a supervisor for a cycle of two axes, and limits."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ SAFE = Limits(
 
 
 class Cycle:
-    """What one cycle sees of two axes, both well; tests change it."""
+    """A cycle of two healthy axes, which tests change."""
 
     def __init__(self) -> None:
         self.feedback, self.estimate = AxisFeedback(2), AxisEstimate(2)
@@ -55,6 +55,6 @@ def with_rate(rate_Nm_s: float) -> Limits:
 
 
 def reason_of(supervisor: Supervisor, names: Sequence[str] = ()) -> str:
-    """Return the worst finding of the last cycle as text, "" for none."""
+    """Return the worst finding of the last cycle as text, "" if there is none."""
     fault = supervisor.fault()
     return "" if fault is None else fault_text(fault, names)

@@ -1,4 +1,4 @@
-"""Velocity, cable length and tension of axes, held against motors whose state is known."""
+"""Estimates of velocity, cable length and tension agree with motors of known state."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def winches(signs: FloatArray, friction_Nm: float = 0.0) -> WinchArrays:
 
 
 class Winch:
-    """A motor with a drum whose cable pulls with a tension; angles as an encoder has them."""
+    """A motor with a drum and a cable under tension, with angles as read by an encoder."""
 
     def __init__(self, sign: float, friction_Nm: float = 0.0) -> None:
         self.feedback = AxisFeedback(1)
@@ -55,7 +55,7 @@ class Winch:
 
 @settings(max_examples=30)
 @given(st.floats(-50.0, 50.0), st.floats(-1e4, 1e4), st.sets(st.integers(20, 190), max_size=40))
-def test_a_steady_speed_is_found_whatever_answers_are_missing(
+def test_a_constant_speed_is_found_despite_missing_answers(
     speed: float, start: float, missing: set[int]
 ) -> None:
     estimator, feedback = Estimator(1, PERIOD_S), AxisFeedback(1)
@@ -65,11 +65,11 @@ def test_a_steady_speed_is_found_whatever_answers_are_missing(
             exact = start + speed * k * PERIOD_S
             feedback.position_rad[0] = round(exact / COUNT_rad) * COUNT_rad
         estimator.update(feedback)
-    # the filter turns a step of the encoder in a cycle into a twelfth of its rate
+    # the filter reduces an encoder step in one cycle to a twelfth of its rate
     assert estimator.estimate.velocity_rad_s[0] == pytest.approx(speed, abs=COUNT_rad / FILTER_S)
 
 
-def test_the_time_between_cycles_is_the_one_that_passed() -> None:
+def test_the_estimate_uses_the_elapsed_time_between_cycles() -> None:
     estimator, feedback = Estimator(1, PERIOD_S), AxisFeedback(1)
     feedback.valid[:] = True
     at = 0.0
@@ -82,7 +82,7 @@ def test_the_time_between_cycles_is_the_one_that_passed() -> None:
     assert estimator.estimate.velocity_rad_s[0] == pytest.approx(5.0, rel=1e-3)
 
 
-def test_lengths_follow_the_motors_once_they_are_known() -> None:
+def test_known_lengths_follow_the_motors() -> None:
     estimator = Estimator(3, PERIOD_S, winches(np.array([1.0, -1.0, 1.0])))
     feedback = AxisFeedback(3)
     feedback.valid[:] = True
@@ -115,20 +115,20 @@ def test_tension_is_found_from_the_torque(
     winch = Winch(sign, friction_Nm)
     estimator = Estimator(1, PERIOD_S, winches(np.array([sign]), friction_Nm))
     for _ in range(1500):
-        # a speed controller winds the cable, which pulls with 60 N
+        # a speed controller winds the cable under 60 N
         wanted = -sign * winding_rad_s
         winding = DRUM_m * 60.0 + 0.02 - sign * 0.02 * (wanted - winch.speed)
         winch.step(winding, 60.0)
         estimator.update(winch.feedback)
-    # the speed controller has no integrator: friction leaves its speed short, not its sign
+    # friction reduces the speed, because the controller has no integrator
     assert np.sign(winch.speed) == np.sign(-sign * winding_rad_s)
     assert estimator.estimate.tension_N[0] == pytest.approx(60.0, abs=1.0)
     assert not estimator.estimate.tension_measured[0]
 
 
 @pytest.mark.parametrize("measured_Nm", [0.0, 0.08])
-def test_friction_torque_is_not_counted_as_tension(measured_Nm: float) -> None:
-    """Friction counts once: as the motor's, or as the whole winch's where that was measured."""
+def test_friction_torque_does_not_count_as_tension(measured_Nm: float) -> None:
+    """Friction is subtracted once: that of the motor, or the measured friction of the winch."""
     winch = Winch(1.0, 0.08)
     estimator = Estimator(1, PERIOD_S, winches(np.array([1.0]), measured_Nm))
     for _ in range(1500):
@@ -140,20 +140,22 @@ def test_friction_torque_is_not_counted_as_tension(measured_Nm: float) -> None:
 
 
 @pytest.mark.parametrize("measured_Nm", [0.0, 0.08])
-def test_cogging_is_not_on_the_cable_whoever_measured_the_friction(measured_Nm: float) -> None:
+def test_cogging_does_not_count_as_tension(measured_Nm: float) -> None:
     winch = Winch(1.0, 0.08)
     estimator = Estimator(1, PERIOD_S, winches(np.array([1.0]), measured_Nm))
     loss, cogging = np.full(1, -0.08 - 0.06), np.full(1, -0.06)
     for _ in range(1500):
         winding = DRUM_m * 60.0 + 0.02 - 0.02 * (-5.0 - winch.speed)
         winch.step(winding, 60.0)
-        winch.feedback.torque_Nm += cogging  # the drive exerts it, the rotor's magnets take it up
+        winch.feedback.torque_Nm += (
+            cogging  # the drive exerts this torque and the rotor's magnets balance it
+        )
         estimator.update(winch.feedback, motor_loss_Nm=loss, cogging_Nm=cogging)
     assert estimator.estimate.tension_N[0] == pytest.approx(60.0, abs=1.0)
 
 
-def test_inertial_torque_is_not_counted_as_tension() -> None:
-    """A cable is cut while the motor goes on pulling: the torque alone would say 50 N still."""
+def test_inertial_torque_does_not_count_as_tension() -> None:
+    """A cable is cut while the motor pulls. The torque alone would still indicate 50 N."""
     winch, estimator = Winch(1.0), Estimator(1, PERIOD_S, winches(np.array([1.0])))
     limits = Limits(
         10.0, 1e4, 1e4, 3, tension_min_N=20.0, slack_N=5.0, slack_s=0.1, broken_within_s=0.05
@@ -172,18 +174,18 @@ def test_inertial_torque_is_not_counted_as_tension() -> None:
         supervisor.check(winch.feedback, estimator.estimate, setpoint, torque)
         cycles += 1
     assert supervisor.limit is Limit.BROKEN_CABLE
-    assert 15 <= cycles <= 50  # after the estimate's 10 ms have gone by more than twice
+    assert 15 <= cycles <= 50  # after more than twice the estimate's 10 ms
     assert winch.feedback.torque_Nm[0] == pytest.approx(-winding)
 
 
-def test_friction_that_grows_with_tension_is_told_from_it() -> None:
+def test_tension_is_found_with_friction_proportional_to_it() -> None:
     table = winches(np.array([1.0]), friction_Nm=0.1)
     table.friction_per_N_m[:] = 5e-3
     feedback = AxisFeedback(1)
     feedback.valid[:] = True
     for winding_rad_s, way in ((2.0, 1.0), (-2.0, -1.0), (0.0, 0.0)):
         estimator = Estimator(1, PERIOD_S, table)
-        # 60 N while the motor turns steadily: a positive angle pays out
+        # 60 N at constant speed; a positive angle pays out
         torque = -(DRUM_m * 60.0 + 0.02 + way * (0.1 + 5e-3 * 60.0))
         for k in range(300):
             feedback.position_rad[0] = 1e3 - winding_rad_s * k * PERIOD_S
@@ -192,7 +194,7 @@ def test_friction_that_grows_with_tension_is_told_from_it() -> None:
         assert estimator.estimate.tension_N[0] == pytest.approx(60.0, abs=1e-3)
 
 
-def test_reset_forgets_the_motion_and_begins_where_it_is() -> None:
+def test_reset_forgets_the_motion_and_keeps_the_position() -> None:
     winch, estimator = Winch(1.0), Estimator(1, PERIOD_S, winches(np.array([1.0])))
     for _ in range(100):
         winch.step(-1.0, 0.0)
@@ -200,7 +202,7 @@ def test_reset_forgets_the_motion_and_begins_where_it_is() -> None:
     assert estimator.estimate.velocity_rad_s[0] > 10.0
     estimator.reset()
     assert estimator.estimate.velocity_rad_s[0] == 0.0
-    winch.feedback.position_rad[0] += 1000.0  # cycles did not run for long
+    winch.feedback.position_rad[0] += 1000.0  # as after a long pause of cycles
     winch.feedback.torque_Nm[0] = -(DRUM_m * 30.0 + 0.02)
     estimator.update(winch.feedback)
     assert estimator.estimate.velocity_rad_s[0] == 0.0
@@ -215,7 +217,7 @@ def test_a_cable_does_not_push() -> None:
     assert estimator.estimate.tension_N[0] == 0.0
 
 
-def test_without_a_cable_there_is_no_tension() -> None:
+def test_an_axis_without_a_cable_has_no_tension() -> None:
     estimator, feedback = Estimator(2, PERIOD_S), AxisFeedback(2)
     feedback.valid[:] = True
     estimator.update(feedback)
@@ -232,7 +234,7 @@ def readings(*tension_N: float) -> TensionFeedback:
     return told
 
 
-def test_a_sensor_is_believed_before_the_torque() -> None:
+def test_a_sensor_takes_precedence_over_the_torque() -> None:
     winch, estimator = Winch(1.0), Estimator(1, PERIOD_S, winches(np.array([1.0])))
     read = readings(42.0)
     told = estimator.estimate
@@ -246,7 +248,7 @@ def test_a_sensor_is_believed_before_the_torque() -> None:
     assert (told.tension_measured[0], told.sensor_ok[0]) == (False, False)
 
 
-def test_readings_belong_to_the_first_axes() -> None:
+def test_sensor_readings_belong_to_the_first_axes() -> None:
     feedback = AxisFeedback(3)
     feedback.valid[:] = True
     first = Estimator(3, PERIOD_S)

@@ -1,4 +1,4 @@
-"""Time and cooperative tasks: fixed order, waits, time-outs, ends; in wall time and without it."""
+"""Time and cooperative tasks in lockstep and paced: order, waits, timeouts, cancelling."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from cdpr_rt.core.clock import Clock, LockstepClock, PacedClock, TaskCancelled
 
 
 class Line:
-    """One end of a real socket as a source: what came, and when it was ticked."""
+    """A real socket as a source. It records what it receives and when it is ticked."""
 
     def __init__(self, clock: Clock, tick_s: float = math.inf) -> None:
         self.sock, self.peer = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
@@ -48,7 +48,7 @@ naps = st.lists(st.sampled_from([0.0, 0.001, 0.25, 0.5, 1.0, 3.0]), max_size=6)
 
 
 @given(st.lists(naps, max_size=5))
-def test_tasks_go_on_by_time_and_then_in_the_order_they_were_started(
+def test_tasks_continue_by_time_and_then_in_starting_order(
     plans: list[list[float]],
 ) -> None:
     clock = LockstepClock()
@@ -69,7 +69,7 @@ def test_tasks_go_on_by_time_and_then_in_the_order_they_were_started(
     assert clock.now_s == pytest.approx(max((sum(plan) for plan in plans), default=0.0))
 
 
-def test_time_without_a_wall_passes_only_where_somebody_waits() -> None:
+def test_lockstep_time_advances_only_in_waits() -> None:
     clock = LockstepClock()
     time.sleep(0.02)
     assert clock.now_s == 0.0
@@ -79,7 +79,7 @@ def test_time_without_a_wall_passes_only_where_somebody_waits() -> None:
     assert time.monotonic() - began < 60.0
 
 
-def test_a_wait_ends_with_what_comes_not_with_its_time_out() -> None:
+def test_a_wait_ends_with_an_event_before_its_timeout() -> None:
     clock = PacedClock()
     line = Line(clock)
     threading.Timer(0.05, line.peer.send, [b"here"]).start()
@@ -87,7 +87,7 @@ def test_a_wait_ends_with_what_comes_not_with_its_time_out() -> None:
     assert line.came == [b"here"]
 
 
-def test_a_wait_is_never_shorter_than_its_time_out() -> None:
+def test_a_wait_without_event_lasts_its_timeout() -> None:
     clock = PacedClock()
     Line(clock)
     for seconds in (0.0, 0.0004, 0.003, 0.02):
@@ -97,7 +97,7 @@ def test_a_wait_is_never_shorter_than_its_time_out() -> None:
 
 
 @pytest.mark.parametrize("kind", [PacedClock, LockstepClock])
-def test_a_task_waits_for_another_which_waits_for_a_third(kind: type[Clock]) -> None:
+def test_tasks_may_wait_for_each_other_in_a_chain(kind: type[Clock]) -> None:
     clock = kind()
 
     def deep(levels: int) -> int:
@@ -126,14 +126,14 @@ def test_an_exception_of_a_task_is_raised_by_its_result() -> None:
     assert clock.now_s == 2.0
 
 
-def test_a_cancelled_task_ends_where_it_waits_and_cleans_up() -> None:
+def test_a_cancelled_task_ends_at_its_wait_and_cleans_up() -> None:
     clock = LockstepClock()
     left: list[str] = []
 
     def work() -> None:
         try:
             clock.sleep(math.inf)
-        except Exception:  # what a driver does about errors is not to keep it alive
+        except Exception:  # error handling of a driver must not keep the task alive
             left.append("caught")
         finally:
             left.append("finally")
@@ -152,7 +152,7 @@ def test_a_cancelled_task_ends_where_it_waits_and_cleans_up() -> None:
         task.result()
 
 
-def test_who_cancels_a_task_waits_as_before() -> None:
+def test_the_canceller_of_a_task_can_still_wait() -> None:
     clock = LockstepClock()
     task = clock.start(lambda: clock.sleep(math.inf))
     clock.run_tasks()
@@ -162,7 +162,7 @@ def test_who_cancels_a_task_waits_as_before() -> None:
     assert task.done
 
 
-def test_an_interrupt_comes_through_and_ends_all() -> None:
+def test_an_interrupt_is_raised_and_ends_all_tasks() -> None:
     clock = PacedClock()
     ended: list[int] = []
 
@@ -176,15 +176,15 @@ def test_an_interrupt_comes_through_and_ends_all() -> None:
 
     with pytest.raises(KeyboardInterrupt):
         clock.gather([lambda: work(0), lambda: work(1), lambda: work(2)])
-    assert ended == [1, 0]  # the third had not begun
+    assert ended == [1, 0]  # the third had not started
 
 
-def test_a_turn_waits_for_nothing_and_runs_each_task_once() -> None:
+def test_run_tasks_does_not_wait_and_runs_each_task_once() -> None:
     clock = LockstepClock()
     steps: list[int] = []
     task = clock.start(lambda: [(steps.append(k), clock.sleep(0.001 * k)) for k in range(3)])
     clock.run_tasks()
-    assert steps == [0, 1]  # a wait for no time gives way to nobody
+    assert steps == [0, 1]  # a wait of zero does not yield to other tasks
     clock.run_tasks()
     assert steps == [0, 1]
     assert clock.now_s == 0.0
@@ -192,7 +192,7 @@ def test_a_turn_waits_for_nothing_and_runs_each_task_once() -> None:
     assert steps == [0, 1, 2]
 
 
-def test_sources_are_ticked_at_their_times_while_somebody_waits() -> None:
+def test_sources_are_ticked_at_their_times_during_a_wait() -> None:
     clock = LockstepClock()
     line = Line(clock, tick_s=0.25)
     clock.sleep(1.1)
@@ -204,7 +204,7 @@ def test_sources_are_ticked_at_their_times_while_somebody_waits() -> None:
 
 
 @pytest.mark.parametrize("kind", [PacedClock, LockstepClock])
-def test_work_aside_returns_what_it_does_and_raises_what_it_raises(kind: type[Clock]) -> None:
+def test_run_blocking_returns_results_and_raises_errors(kind: type[Clock]) -> None:
     clock = kind()
     steps: list[str] = []
     ran = threading.Event()
@@ -224,7 +224,7 @@ def test_work_aside_returns_what_it_does_and_raises_what_it_raises(kind: type[Cl
     other = clock.start(run)
     here = clock.run_blocking(slow) == threading.get_ident()
     clock.wait(lambda: other.done)
-    # paced the rest goes on meanwhile; in lockstep its time stands still
+    # other tasks continue meanwhile if paced; in lockstep, time stands still
     assert (steps, here) == (
         (["slow", "other"], True) if clock.lockstep else (["other", "slow"], False)
     )
@@ -232,7 +232,7 @@ def test_work_aside_returns_what_it_does_and_raises_what_it_raises(kind: type[Cl
         clock.run_blocking(lambda: 1 // 0)
 
 
-def test_in_real_time_simulated_time_is_never_ahead_of_the_walls() -> None:
+def test_real_time_simulation_is_never_ahead_of_the_wall_clock() -> None:
     clock = LockstepClock(real_time=True)
     clock.sleep(0.01)
     began_s, begin_s = time.monotonic(), clock.now_s
@@ -241,10 +241,10 @@ def test_in_real_time_simulated_time_is_never_ahead_of_the_walls() -> None:
         assert clock.now_s - begin_s <= time.monotonic() - began_s + 0.02
 
 
-def test_in_real_time_what_was_missed_is_not_made_up_for() -> None:
+def test_real_time_simulation_does_not_catch_up_after_a_delay() -> None:
     clock = LockstepClock(real_time=True)
     clock.sleep(0.01)
-    time.sleep(0.3)  # as of a machine that was busy
+    time.sleep(0.3)  # as on a busy machine
     clock.sleep(0.001)
     began_s = time.monotonic()
     clock.sleep(0.1)

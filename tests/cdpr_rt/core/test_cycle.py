@@ -1,4 +1,4 @@
-"""When a cycle begins."""
+"""The start times of cycles."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ PERIOD_S, COMMANDS_S = 2e-3, 0.8e-3
 
 
 class SteppedClock(PacedClock):
-    """A clock that goes on where somebody takes time or sleeps, and sleeps to the point."""
+    """A clock that advances only by used time and exact sleeps."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -32,7 +32,7 @@ class SteppedClock(PacedClock):
 
 
 class Drives:
-    """Drives whose answers take a time, to which `computing_s` is added."""
+    """Drives with an answer time, to which `computing_s` is added."""
 
     period_s, commands_s, lockstep = PERIOD_S, COMMANDS_S, False
 
@@ -68,26 +68,26 @@ def test_cycles_begin_a_period_apart() -> None:
     assert cycle.lateness.late == 0
 
 
-def test_no_sync_goes_out_while_commands_are_on_the_wire() -> None:
+def test_sync_is_not_sent_while_commands_are_on_the_wire() -> None:
     late_s = 0.25e-3
     drives, cycle = synced([0.0, late_s, 0.0, 0.0, 0.0])
     for sync_s, sent_s in zip(drives.synced_s[1:], drives.sent_s[:-1], strict=True):
         assert sync_s >= sent_s + COMMANDS_S - 1e-12
     behind_s = 1.1e-3 + late_s + COMMANDS_S - PERIOD_S
-    # what is behind is made up for by what a cycle leaves free, and the deadlines stay
+    # delays are caught up in the free time of cycles, and deadlines do not change
     assert drives.synced_s[2] == pytest.approx(50.0 + 2 * PERIOD_S + behind_s)
     assert drives.synced_s[4] == pytest.approx(50.0 + 4 * PERIOD_S)
     assert cycle.lateness.worst_s == pytest.approx(behind_s)
 
 
-def test_the_rate_is_kept_where_commands_are_late_in_every_cycle() -> None:
+def test_the_rate_is_kept_if_commands_are_late_in_each_cycle() -> None:
     drives, cycle = synced([0.4e-3] * 100)
     behind_s = drives.synced_s[-1] - (50.0 + 99 * PERIOD_S)
     assert behind_s == pytest.approx(0.25 * PERIOD_S)
     assert cycle.late_s == pytest.approx(behind_s)
 
 
-def test_after_a_pause_a_cycle_begins_at_once() -> None:
+def test_a_cycle_starts_immediately_after_a_pause() -> None:
     drives, cycle = synced([0.0])
     cycle.begin()
     drives.clock.time_s += 0.01

@@ -1,4 +1,4 @@
-"""The memory that the daemon's processes share: what it is attached to, and what nobody may do."""
+"""The shared memory of the daemon's processes is sealed and validated."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from cdpr_rt.core.shared_block import SharedBlock, SharedBlockError
 
 
 @pytest.mark.parametrize("by", [-4096, 4096])
-def test_nobody_can_resize_it(by: int) -> None:
+def test_the_block_cannot_be_resized(by: int) -> None:
     block = SharedBlock.create(3, 1.0, 100.0)
     size = os.fstat(block.fd).st_size
     with pytest.raises(PermissionError):
@@ -20,7 +20,7 @@ def test_nobody_can_resize_it(by: int) -> None:
     assert (joined.n, joined.capacity) == (3, block.capacity)
 
 
-def test_memory_that_others_may_resize_is_not_joined() -> None:
+def test_resizable_memory_is_rejected() -> None:
     made = SharedBlock.create(1, 1.0, 100.0)
     fd = os.memfd_create("open", os.MFD_ALLOW_SEALING)
     os.write(fd, os.pread(made.fd, os.fstat(made.fd).st_size, 0))
@@ -28,7 +28,7 @@ def test_memory_that_others_may_resize_is_not_joined() -> None:
         SharedBlock.attach(fd)
 
 
-def test_who_may_only_read_it_writes_nothing() -> None:
+def test_a_read_only_descriptor_cannot_write() -> None:
     made = SharedBlock.create(2, 1.0, 100.0)
     made.write_status({"state": "ready"})
     fd = os.open(f"/proc/self/fd/{made.fd}", os.O_RDONLY)
@@ -47,15 +47,15 @@ def test_who_may_only_read_it_writes_nothing() -> None:
 
 
 @pytest.mark.parametrize(("counter", "value"), [("axes", 0), ("axes", 2), ("capacity", 1 << 40)])
-def test_memory_of_another_size_than_it_says_is_not_joined(counter: str, value: int) -> None:
+def test_memory_whose_size_contradicts_its_header_is_rejected(counter: str, value: int) -> None:
     block = SharedBlock.create(1, 1.0, 100.0)
     block.counters[counter] = value
     with pytest.raises(SharedBlockError, match="bytes"):
         SharedBlock.attach(block.fd)
 
 
-def test_a_processor_that_reorders_stores_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    made = SharedBlock.create(1, 1.0, 100.0)  # within one process it does no harm
+def test_a_processor_with_weak_memory_order_is_rejected(monkeypatch: pytest.MonkeyPatch) -> None:
+    made = SharedBlock.create(1, 1.0, 100.0)  # harmless within one process
     monkeypatch.setattr(platform, "machine", lambda: "aarch64")
     with pytest.raises(SharedBlockError, match="processor is aarch64"):
         SharedBlock.attach(made.fd)

@@ -1,4 +1,4 @@
-"""What the supervisor passes on, reports and forgets."""
+"""The supervisor clamps torques, reports faults and resets."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ from tests.cdpr_rt.core.supervisor_rig import PERIOD_S, SAFE, Cycle, reason_of, 
 # -- clamping
 
 
-def test_torque_is_clamped_to_each_axis_own_limit():
+def test_torque_is_clamped_to_the_limit_of_each_axis():
     supervisor, cycle = Supervisor(SAFE, 2, PERIOD_S), Cycle()
     cycle.torque[:] = -5.0, 5.0
     assert cycle.check(supervisor) == Reaction.CLAMP
     np.testing.assert_array_equal(cycle.torque, [-1.0, 2.0])
 
 
-def test_torque_rises_and_falls_no_faster_than_its_rate():
+def test_torque_changes_at_most_with_its_rate():
     supervisor, cycle = Supervisor(with_rate(100.0), 2, PERIOD_S), Cycle()
     supervisor.reset(np.array([0.5, -0.5]))
     sent = [[0.5, -0.5]]
@@ -43,26 +43,26 @@ def test_torque_rises_and_falls_no_faster_than_its_rate():
     assert sent[-1] == pytest.approx([-0.6, 0.4])
 
 
-def test_a_torque_that_is_no_number_is_not_passed_on():
+def test_a_nan_torque_is_not_passed_on():
     supervisor, cycle = Supervisor(SAFE, 2, PERIOD_S), Cycle()
     cycle.torque[:] = math.nan, math.inf
     assert cycle.check(supervisor) == Reaction.QUICK_STOP
     np.testing.assert_array_equal(cycle.torque, [0.0, 0.0])
 
 
-def test_one_figure_serves_all_axes():
+def test_one_limit_applies_to_all_axes():
     supervisor, cycle = Supervisor(Limits(1.5, 1.0, 1.0, 3), 2, PERIOD_S), Cycle()
     cycle.torque[:] = -5.0, 5.0
     cycle.check(supervisor)
     np.testing.assert_array_equal(cycle.torque, [-1.5, 1.5])
 
 
-# -- what is reported
+# -- reporting
 
 
-def test_the_worst_of_a_cycle_is_what_counts():
+def test_the_most_severe_violation_of_a_cycle_counts():
     supervisor, cycle = Supervisor(SAFE, 2, PERIOD_S), Cycle()
-    cycle.torque[:] = 5.0  # to be clamped
+    cycle.torque[:] = 5.0  # will be clamped
     cycle.estimate.tension_N[0] = 110.0
     cycle.setpoint.position_rad[1] = 1.0
     assert cycle.check(supervisor) == Reaction.QUICK_STOP
@@ -73,7 +73,7 @@ def test_the_worst_of_a_cycle_is_what_counts():
     assert (supervisor.limit, supervisor.axis) == (Limit.TENSION_HIGH, 0)
 
 
-def test_axes_are_called_by_their_names():
+def test_axes_are_reported_by_name():
     supervisor = Supervisor(SAFE, 2, PERIOD_S)
     cycle = Cycle()
     cycle.setpoint.position_rad[1] = 1.0
@@ -96,7 +96,7 @@ def test_the_more_severe_external_reaction_wins():
     assert (reason_of(supervisor), supervisor.limit, supervisor.axis) == ("", Limit.NONE, -1)
 
 
-# -- whatever comes
+# -- arbitrary input
 
 
 WILD = st.one_of(
@@ -106,7 +106,7 @@ WILD = st.one_of(
 
 @settings(max_examples=200)
 @given(st.lists(st.tuples(*[WILD] * 7, st.integers(0, 31)), min_size=1, max_size=20))
-def test_whatever_is_asked_for_no_drive_gets_more_than_it_may(
+def test_arbitrary_torques_never_exceed_the_limits(
     cycles: list[tuple[float, float, float, float, float, float, float, int]],
 ) -> None:
     supervisor, cycle = Supervisor(with_rate(100.0), 2, PERIOD_S), Cycle()
@@ -141,7 +141,7 @@ def test_whatever_is_asked_for_no_drive_gets_more_than_it_may(
         last[:] = cycle.torque
 
 
-def test_checking_leaves_nothing_behind() -> None:
+def test_checking_keeps_no_allocated_memory() -> None:
     supervisor, cycle = Supervisor(SAFE, 2, PERIOD_S), Cycle()
     estimator = Estimator(2, PERIOD_S)
     estimator.update(cycle.feedback)

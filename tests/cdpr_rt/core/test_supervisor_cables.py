@@ -1,4 +1,4 @@
-"""Cables whose lengths disagree, that are slack, and that have broken."""
+"""Detection of disagreeing lengths, slack cables and broken cables."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from tests.cdpr_rt.core.test_supervisor_limits import run, tension
 
 
 @pytest.mark.parametrize(("axis", "named"), [(1, "axis 2: "), (-1, "")])
-def test_lengths_that_disagree_for_longer_than_a_break_takes(axis: int, named: str) -> None:
+def test_lengths_that_disagree_persistently_stop_the_motion(axis: int, named: str) -> None:
     limits = dataclasses.replace(SAFE, lengths_disagree_m=0.03, broken_within_s=0.0495)
     supervisor, cycle = Supervisor(limits, 2, PERIOD_S), Cycle()
     told = []
@@ -52,7 +52,7 @@ def test_lengths_that_jump_stop_the_motion_before_they_disagree_too_far(
     )
 
 
-def test_lengths_that_swing_about_agreement_are_reported_too():
+def test_lengths_that_oscillate_about_agreement_are_reported():
     limits = dataclasses.replace(SAFE, lengths_disagree_m=0.03, broken_within_s=0.05)
     supervisor, cycle = Supervisor(limits, 2, PERIOD_S), Cycle()
     told = []
@@ -63,7 +63,7 @@ def test_lengths_that_swing_about_agreement_are_reported_too():
     assert Reaction.CONTROLLED_STOP in told
 
 
-def test_a_cable_that_was_never_tight_is_not_slack():
+def test_a_cable_that_was_never_tight_is_not_reported_as_slack():
     supervisor, cycle = Supervisor(SAFE, 2, PERIOD_S), Cycle()
     cycle.estimate.tension_N[:] = 0.0
     assert {cycle.check(supervisor) for _ in range(500)} == {Reaction.NONE}
@@ -89,7 +89,9 @@ def test_slack_is_reported_once_until_the_cable_was_tight_again():
         (-0.06, Limit.BROKEN_CABLE),
     ],
 )
-def test_a_cable_from_which_tension_was_paid_out_is_not_broken(paid_out_rad: float, limit: Limit):
+def test_a_cable_that_lost_tension_by_paying_out_is_not_reported_as_broken(
+    paid_out_rad: float, limit: Limit
+):
     def change(cycle: Cycle, k: int) -> None:
         tension(0.0, after_cycles=20, paid_out_rad=paid_out_rad)(cycle, k)
         cycle.feedback.position_rad[1] += 7.0
@@ -108,7 +110,7 @@ def test_a_broken_cable_is_reported_once():
 
 
 def runs_in(at_rad_s: float, tension_N: float, planned_rad_s: float = 0.0) -> Limit:
-    """Return what is told of a cable under 50 N that comes in so fast, with this tension left."""
+    """Return the limit reported for a cable under 50 N reeled in at this speed and tension."""
     limits = dataclasses.replace(
         SAFE, speed_rad_s=200.0, following_error_rad=100.0, runaway_m_s=1.0
     )
@@ -125,17 +127,17 @@ def runs_in(at_rad_s: float, tension_N: float, planned_rad_s: float = 0.0) -> Li
     return Limit.NONE
 
 
-def test_a_winch_that_runs_away_against_no_more_than_friction_has_lost_its_cable():
-    """What friction leaves of a tension by torque may be more than `slack_N`."""
+def test_a_winch_that_runs_away_against_friction_has_a_broken_cable():
+    """Friction may leave an estimated tension above `slack_N`."""
     assert runs_in(40.0, 24.0) is Limit.BROKEN_CABLE  # 1.04 m/s
     assert runs_in(37.0, 24.0) is Limit.NONE
     assert runs_in(60.0, 24.0, planned_rad_s=25.0) is Limit.NONE
-    # held, as by a platform that somebody pushes: its tension is left
+    # held, as by a pushed platform: tension remains
     assert runs_in(60.0, 35.0) is Limit.NONE
 
 
-def test_a_weak_winch_takes_long_to_run_away():
-    """Meanwhile what friction leaves is not taken for the tension that the cable had."""
+def test_a_broken_cable_of_a_slowly_accelerating_winch_is_detected():
+    """Meanwhile the tension left by friction does not replace the earlier tension."""
     limits = dataclasses.replace(
         SAFE,
         speed_rad_s=200.0,
@@ -158,7 +160,7 @@ def test_a_weak_winch_takes_long_to_run_away():
     assert told == [Limit.BROKEN_CABLE]
 
 
-def test_two_cables_that_break_in_one_cycle_are_both_found() -> None:
+def test_two_cables_that_break_in_one_cycle_are_both_reported() -> None:
     supervisor, cycle = Supervisor(SAFE, 2, PERIOD_S), Cycle()
     cycle.check(supervisor)
     cycle.estimate.tension_N[:] = 0.0
@@ -171,9 +173,7 @@ def test_two_cables_that_break_in_one_cycle_are_both_found() -> None:
 @pytest.mark.parametrize(
     ("suspects", "told"), [((1,), ", one of right"), ((1, 0), ", one of right, left"), ((), "")]
 )
-def test_lengths_that_do_not_tell_one_cable_name_those_that_it_may_be(
-    suspects: tuple[int, ...], told: str
-) -> None:
+def test_ambiguous_lengths_name_all_suspected_cables(suspects: tuple[int, ...], told: str) -> None:
     limits = dataclasses.replace(SAFE, lengths_disagree_m=0.03)
     limits = dataclasses.replace(limits, lengths_jump_m=0.007)
     supervisor, cycle = Supervisor(limits, 2, PERIOD_S), Cycle()
@@ -191,7 +191,7 @@ def test_lengths_that_do_not_tell_one_cable_name_those_that_it_may_be(
     compare(0.05)
     assert supervisor.limit is Limit.LENGTHS
     assert reason_of(supervisor, ("left", "right")).endswith(f"cable or encoder failed{told}")
-    assert asked == [False]  # not in every cycle of a disagreement
+    assert asked == [False]  # only once per disagreement
     compare(0.0)
     assert supervisor.limit is Limit.NONE
     compare(0.05)
@@ -202,7 +202,7 @@ def test_lengths_that_do_not_tell_one_cable_name_those_that_it_may_be(
     assert asked == [False, False, True]
 
 
-def test_a_snatch_that_ends_before_its_limit_is_exceeded_is_reported() -> None:
+def test_a_tension_peak_that_ends_early_is_reported() -> None:
     supervisor, cycle = Supervisor(SAFE, 2, PERIOD_S), Cycle()
     for tension_N in (50.0, 99.0, 140.0, 99.0, 50.0, 120.0, 50.0):
         cycle.estimate.tension_at_once_N[1] = tension_N
@@ -214,7 +214,7 @@ def test_a_snatch_that_ends_before_its_limit_is_exceeded_is_reported() -> None:
     assert supervisor.peaks() == []
 
 
-def test_an_angle_that_jumps_is_no_snatch() -> None:
+def test_an_angle_jump_is_not_reported_as_tension_peak() -> None:
     supervisor, cycle = Supervisor(SAFE, 2, PERIOD_S), Cycle()
     for _ in range(3):
         cycle.check(supervisor)
@@ -226,10 +226,10 @@ def test_an_angle_that_jumps_is_no_snatch() -> None:
 
 
 @pytest.mark.parametrize(("within_s", "told"), [(0.005, True), (0.2, False)])
-def test_a_cable_that_breaks_while_winches_pay_out_blindly_is_noticed(
+def test_a_break_while_slack_is_allowed_is_detected_by_the_sudden_run_in(
     within_s: float, told: bool
 ) -> None:
-    """Its winch runs in at once; that of a platform that swings takes in slack more slowly."""
+    """The winch runs in immediately. With a swinging platform, a winch takes up slack slowly."""
     limits = dataclasses.replace(SAFE, speed_rad_s=200.0, following_error_rad=100.0)
     supervisor, cycle, found = Supervisor(limits, 2, PERIOD_S), Cycle(), set()
     cycle.estimate.slack_allowed = True

@@ -1,4 +1,4 @@
-"""Every limit, one by one: what trips it and what just does not, and what is done then."""
+"""Each limit: conditions that trip it, conditions that do not, and the reaction."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ Change = Callable[[Cycle, int], None]
 def run(
     change: Change, limits: Limits = SAFE, cycles: int = 400, at_rad: float = 0.0
 ) -> tuple[Supervisor, int, Cycle]:
-    """Run 50 cycles in which all is well, then some with `change`; return the first that trips.
+    """Run 50 normal cycles, then some with `change`. Return the first cycle that trips.
 
-    Its number is counted from the change, -1 where there is none.
+    Its number is relative to the change, -1 if no cycle trips.
     """
     supervisor, cycle = Supervisor(limits, 2, PERIOD_S), Cycle()
     supervisor.reset()
@@ -57,7 +57,7 @@ def speed(value: float) -> Change:
 
 
 def jump(value: float, missed: int = 0) -> Change:
-    """Leap once, after so many cycles without an answer."""
+    """Jump once after `missed` cycles without an answer."""
 
     def change(cycle: Cycle, k: int) -> None:
         cycle.feedback.valid[1] = k >= missed
@@ -83,7 +83,7 @@ def length(value_m: float, wanted_rad_s: float) -> Change:
 
 
 def tension(value_N: float, after_cycles: int = 0, paid_out_rad: float = 0.0) -> Change:
-    """Fall to a tension within some cycles, as the motor pays out."""
+    """Reduce the tension within some cycles while the motor pays out."""
 
     def change(cycle: Cycle, k: int) -> None:
         fallen = min(1.0, (k + 1) / (after_cycles + 1))
@@ -111,7 +111,7 @@ def flag(name: str, cycles: int) -> Change:
 def sensor(is_ok: bool) -> Change:
     def change(cycle: Cycle, _k: int) -> None:
         cycle.estimate.sensor_ok[1] = is_ok
-        # without a reading there is the estimate, which may be anything
+        # without a reading, the estimate is used, which may have any value
         cycle.estimate.tension_N[1] = 50.0 if is_ok else 0.0
 
     return change
@@ -126,13 +126,13 @@ def late(value_s: float) -> Change:
 
 @dataclass(frozen=True)
 class Case:
-    """One limit: what trips it and when, what does not, and what it says."""
+    """One limit: what trips it and when, what does not, and its text."""
 
     limit: Limit
     trips: Change
     told: str
     at: int = 0
-    """In which cycle after the change."""
+    """Cycle after the change."""
     value: float = math.nan
     axis: int = 1
     does_not: tuple[Change, ...] = field(default_factory=tuple)
@@ -166,7 +166,7 @@ CASES = [
         jump(0.0701),
         "axis 2: angle jumped by 4.0 deg, 4.0 deg possible",
         value=0.0701,
-        # what a motor may turn while nobody hears of it
+        # the angle that a motor may turn during missing answers
         does_not=(jump(0.0699), jump(-0.0699), jump(0.0899, missed=1)),
     ),
     Case(Limit.SPEED, speed(math.nan), "axis 2: speed nan deg/s, 1146 deg/s allowed", does_not=()),
@@ -187,7 +187,7 @@ CASES = [
         length(4.01, 0.1),
         "axis 2: cable length 4.010 m, 4.000 m allowed",
         value=4.01,
-        # on the way back, at rest, and where the length is not known
+        # on the way back, at rest, and with unknown length
         does_not=(length(3.99, 0.1), length(4.01, -0.1), length(4.01, 0.0), length(math.nan, 0.1)),
     ),
     Case(
@@ -300,7 +300,7 @@ def test_a_limit_trips_in_the_cycle_in_which_it_is_exceeded(case: Case):
 
 @pytest.mark.parametrize("case", CASES, ids=NAMES)
 @pytest.mark.parametrize("reaction", [Reaction.CONTROLLED_STOP, Reaction.TORQUE_OFF])
-def test_a_limit_is_answered_as_the_robot_wants_it(case: Case, reaction: Reaction):
+def test_a_limit_causes_the_reaction_in_the_robots_file(case: Case, reaction: Reaction):
     values = {name: getattr(SAFE, name) for name in SAFE.__dataclass_fields__}
     rate = 1000.0 if case.limit is Limit.TORQUE_RATE else 1e4
     wanted = Limits(**values | {"reactions": {case.limit: reaction}, "torque_rate_Nm_s": rate})
@@ -308,7 +308,7 @@ def test_a_limit_is_answered_as_the_robot_wants_it(case: Case, reaction: Reactio
     assert (supervisor.limit, when, supervisor.reaction) == (case.limit, case.at, reaction)
 
 
-def test_no_limit_of_the_kernel_is_left_untried():
+def test_each_limit_of_the_kernel_has_a_case():
     others = {Limit.NONE, Limit.SAFETY_STOP, Limit.SAFETY_ALARM, Limit.DRIVE}
     others |= {Limit.LENGTHS, Limit.LENGTHS_JUMP}
     assert {case.limit for case in CASES} == set(Limit) - others
@@ -322,7 +322,7 @@ def test_violations_outside_the_window_are_not_counted():
     supervisor, cycle = Supervisor(SAFE, 2, PERIOD_S), Cycle()
     tripped = []
     for k in range(200):
-        # five in every window of fifty, at times that shift
+        # five in each window of fifty, at shifting times
         cycle.feedback.valid[1] = k % 50 not in (1, 11, 21, 31, 41)
         tripped.append(cycle.check(supervisor))
     assert not any(tripped)

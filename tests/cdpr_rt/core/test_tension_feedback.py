@@ -1,4 +1,4 @@
-"""Readings handed from the task that samples to the cycle: whole, dated, not believed for long."""
+"""Readings from the sampling task reach the cycle complete, with time, and become stale."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from cdpr_rt.core.fault import LOAD_CELL, LOAD_CELL_HIGH, fault_text
 
 
 class Clock:
-    """A mock: the time alone, set by the test."""
+    """A clock whose time the test sets."""
 
     now_s = 100.0
 
@@ -19,7 +19,7 @@ def exchange(clock: Clock, n: int = 3) -> TensionExchange:
     return TensionExchange([f"winch {i + 1}" for i in range(n)], 0.25, clock)
 
 
-def test_nothing_is_valid_before_it_was_read() -> None:
+def test_no_reading_is_valid_before_the_first_update() -> None:
     clock = Clock()
     both = exchange(clock)
     both.update()
@@ -28,7 +28,7 @@ def test_nothing_is_valid_before_it_was_read() -> None:
     assert both.reason() == "winch 1: tension sensor: no reading"
 
 
-def test_a_reading_has_its_time_and_grows_old() -> None:
+def test_a_reading_has_a_time_and_becomes_stale() -> None:
     clock = Clock()
     both = exchange(clock)
     for i in range(3):
@@ -51,7 +51,7 @@ def test_a_reading_has_its_time_and_grows_old() -> None:
     assert found is not None and (found.limit, found.detail) == (Limit.SAFETY_STOP, both.reason())
 
 
-def test_a_fault_is_reported_with_its_cable_and_goes_when_it_is_mended() -> None:
+def test_a_fault_is_reported_with_its_cable_until_it_is_repaired() -> None:
     clock = Clock()
     both = exchange(clock)
     for i in range(3):
@@ -69,7 +69,7 @@ def test_a_fault_is_reported_with_its_cable_and_goes_when_it_is_mended() -> None
     assert both.feedback.valid.all()
 
 
-def test_a_watch_stops_what_pulls_too_hard() -> None:
+def test_a_watch_reports_high_tension_and_sensor_faults() -> None:
     clock = Clock()
     both = exchange(clock)
     watch = TensionWatch(both, 80.0)
@@ -82,7 +82,7 @@ def test_a_watch_stops_what_pulls_too_hard() -> None:
     assert told(watch) == "winch 1: tension sensor: broken wire"
 
 
-def test_a_watch_of_one_load_cell_names_the_axis_and_the_kind_of_fault() -> None:
+def test_a_watch_of_one_load_cell_reports_axis_and_code() -> None:
     one = exchange(Clock(), 1)
     watch = TensionWatch(one, 80.0)
     one.publish(0, 80.1, 100.0, TensionFault.NONE)

@@ -1,4 +1,4 @@
-"""Robots that several tests of predictions and findings use."""
+"""Robots for tests of predictions and findings."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ _Robot = TypeVar("_Robot", Robot, Machine)
 
 
 def with_cables(robot: _Robot, **update: float) -> _Robot:
-    """Return a robot with other figures in the profiles of its cables."""
+    """Return a robot with changed values in the profiles of its cables."""
     axes = []
     for axis in robot.axes:
         cable = axis.winch.cable.model_copy(update=update)

@@ -1,4 +1,4 @@
-"""A broken cable and the rotors' resonance: against places and frequencies known by hand."""
+"""Predicted motion after a cable loss, and resonance of rotors, agree with known values."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def resonance_Hz(robot: Robot, position_m: tuple[float, ...]) -> float:
 
 
 @pytest.mark.parametrize("name", ["planar-3", "point-4", "suspended-6"])
-def test_it_swings_from_all_corners_and_gets_as_far_away_as_to_the_ground(name: str) -> None:
+def test_swings_are_predicted_for_all_corners_and_reach_the_ground(name: str) -> None:
     robot = load_robot(name)
     platform = robot.platform
     assert platform is not None
@@ -50,7 +50,7 @@ def test_it_swings_from_all_corners_and_gets_as_far_away_as_to_the_ground(name: 
             assert swing.away_m > 0.9 * (swing.position_m[-1] - platform.home_m[-1])
 
 
-def test_nothing_is_said_of_corners_that_are_no_targets() -> None:
+def test_corners_that_are_not_targets_are_replaced_or_omitted() -> None:
     robot = load_robot("planar-3")
     assert robot.platform is not None
     high_m = (robot.platform.workspace_max_m[0], robot.platform.exit_points_m[0][1] - 0.1)
@@ -67,7 +67,7 @@ def test_nothing_is_said_of_corners_that_are_no_targets() -> None:
     assert corner_swings(Subject(heavy)) == [[], [], []]
 
 
-def test_a_place_lower_than_the_stand_is_not_in_the_ground() -> None:
+def test_a_place_below_the_stand_is_not_treated_as_in_the_ground() -> None:
     robot = load_robot("point-4")
     assert robot.platform is not None
     x, y, low = robot.platform.workspace_min_m
@@ -79,7 +79,7 @@ def test_a_place_lower_than_the_stand_is_not_in_the_ground() -> None:
     assert lying[1].away_m == pytest.approx(lying[0].away_m, rel=1e-3)
 
 
-def test_it_tells_the_worst_of_winches_that_rub_and_that_do_not() -> None:
+def test_the_prediction_is_the_worst_of_winches_with_and_without_friction() -> None:
     robot, place = load_robot("planar-4"), (0.8, 2.0)
     loss = CableLoss(Subject(robot))
     start = platform_model_of(robot).pose(np.array(place))
@@ -92,8 +92,8 @@ def test_it_tells_the_worst_of_winches_that_rub_and_that_do_not() -> None:
     assert max(found) > 1.1 * min(found)
 
 
-def test_only_a_winch_that_obeys_nobody_may_keep_a_light_platform_aloft() -> None:
-    """Its friction does; those that obey pay out against theirs."""
+def test_only_the_friction_of_a_failed_drive_can_hold_a_light_platform() -> None:
+    """Working winches pay out against their friction."""
     robot, place = load_robot("planar-3"), (0.0, 2.2)
     assert robot.platform is not None
     light = dataclasses.replace(robot, platform=dataclasses.replace(robot.platform, mass_kg=0.5))
@@ -103,7 +103,7 @@ def test_only_a_winch_that_obeys_nobody_may_keep_a_light_platform_aloft() -> Non
     assert CableLoss(Subject(robot)).swing(0, place, Loss.DRIVE).hangs_m == 0.0
 
 
-def test_a_loss_that_is_noticed_late_flings_the_platform_more() -> None:
+def test_late_detection_of_a_loss_moves_the_platform_further() -> None:
     robot, cable = load_robot("planar-3"), 2
     limits = robot.limits.model_copy(update={"speed_rad_s": (150.0,)})
     start = platform_model_of(robot).pose(np.array([0.0, 1.8]))
@@ -115,7 +115,7 @@ def test_a_loss_that_is_noticed_late_flings_the_platform_more() -> None:
     assert late_m > 1.2 * early_m
 
 
-def test_it_falls_from_where_winches_carry_the_cables_too() -> None:
+def test_tensions_before_the_fall_include_the_weight_of_cables() -> None:
     robot, place_m = load_robot("suspended-8"), (0.4, -0.3, 1.2)
     assert robot.platform is not None
     platform = dataclasses.replace(robot.platform, cable_weights_N_m=(4.0,) * 8)
@@ -128,7 +128,7 @@ def test_it_falls_from_where_winches_carry_the_cables_too() -> None:
         assert wrench[2] == pytest.approx(weight_N, rel=within)
 
 
-def test_cables_damp_a_fall_as_their_profile_has_it_but_for_no_more_than_steps_allow() -> None:
+def test_cable_damping_affects_the_fall_up_to_the_bound_of_the_time_step() -> None:
     robot, place_m = load_robot("planar-3"), np.array([0.0, 1.8])
     start = platform_model_of(robot).pose(place_m)
     paths = []
@@ -140,7 +140,7 @@ def test_cables_damp_a_fall_as_their_profile_has_it_but_for_no_more_than_steps_a
     np.testing.assert_array_equal(much, assumed)
 
 
-def test_one_rotor_and_a_mass_swing_at_the_textbook_frequency() -> None:
+def test_resonance_of_rotors_and_a_mass_has_the_textbook_frequency() -> None:
     robot = load_robot("point-4")
     assert robot.platform is not None
     platform = dataclasses.replace(
@@ -150,7 +150,7 @@ def test_one_rotor_and_a_mass_swing_at_the_textbook_frequency() -> None:
     winch = robot.axes[0].winch
     k = winch.cable.stiffness_N / 2.0
     m = winch.motor.rotor_inertia_kg_m2 / winch.cable_m_per_motor_rad**2
-    # on a line between two cables: rotors together against each other, or both against the mass
+    # on a line between two cables: rotors move against each other, or both against the mass
     between = math.sqrt(k / m), math.sqrt(k / m + 2.0 * k / platform.mass_kg)
     found = 2.0 * math.pi * resonance_Hz(pair, (0.0, 0.0))
     assert found == pytest.approx(min(between), rel=1e-6)
@@ -160,7 +160,7 @@ def test_one_rotor_and_a_mass_swing_at_the_textbook_frequency() -> None:
     assert found == pytest.approx(math.sqrt(k * (1.0 / m + 1.0 / platform.mass_kg)), rel=1e-6)
 
 
-def test_pulleys_lengthen_and_turn_the_cables_that_platform_and_rotors_swing_over() -> None:
+def test_resonance_includes_length_and_direction_of_cables_over_pulleys() -> None:
     robot, radius_m, at = load_robot("point-4"), 0.5, (0.0, -0.5)
     straight = dataclasses.replace(hung(((-2.0, 0.0), (2.0, 0.0)), ((0.0, 0.0),) * 2), mass_kg=0.1)
     platform = dataclasses.replace(straight, pulley_radius_m=(radius_m,) * 2)
@@ -169,7 +169,7 @@ def test_pulleys_lengthen_and_turn_the_cables_that_platform_and_rotors_swing_ove
     rho, slope = over_a_pulley(np.array([2.0, 0.0]), radius_m, np.array(at))
     k = winch.cable.stiffness_N / rho
     m = winch.motor.rotor_inertia_kg_m2 / winch.cable_m_per_motor_rad**2
-    # two cables mirror each other: up and down and to the sides are modes of their own
+    # the cables are symmetric, so that vertical and horizontal motion are separate modes
     share = min(math.sin(slope) ** 2, math.cos(slope) ** 2)
     expected = math.sqrt(k * (1.0 / m + 2.0 * share / platform.mass_kg))
     assert 2.0 * math.pi * resonance_Hz(pair, at) == pytest.approx(expected, rel=1e-4)

@@ -1,4 +1,4 @@
-"""A platform that falls on the cables that are left: against motions known by hand."""
+"""A platform falling on its remaining cables moves as computed by hand."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from tests.cdpr_rt.diagnosis.robots import hung
 G_m_s2, MASS_kg, PERIOD_S = 9.80665, 2.0, 1e-3
 STIFFNESS_N_m = 1e5
 FAST = 1e12
-"""Of a rotor that nothing turns, kg."""
+"""Mass of a rotor that does not turn, kg."""
 
 
 def fallen(
@@ -33,7 +33,7 @@ def fallen(
     weight_N_m: float = 0.0,
     **winch: float,
 ) -> FloatArray:
-    """Return the poses after each cycle of 1 ms; a second cable, straight up, is the broken one."""
+    """Return the poses after each cycle of 1 ms. A second, vertical cable is the broken one."""
     body = body_of(hung(((0.0,) * 3,) * 2, ((0.0,) * 3,) * 2))
     assert body[MASS] == MASS_kg and body[GRAVITY + 2] == -G_m_s2 and not body[CENTRE:INERTIA].any()
     free = np.ones(6)
@@ -67,7 +67,7 @@ def fallen(
     return path[:cycles]
 
 
-def test_a_point_on_one_cable_is_a_pendulum() -> None:
+def test_a_point_on_one_cable_moves_as_a_pendulum() -> None:
     angle, length = 0.2, 1.5
     start = (length * math.sin(angle), 0.0, -length * math.cos(angle))
     half_s = math.pi * math.sqrt(length / G_m_s2) * (1.0 + angle**2 / 16.0)
@@ -77,7 +77,7 @@ def test_a_point_on_one_cable_is_a_pendulum() -> None:
     assert path[:, 0, 2].min() == pytest.approx(-length, abs=1e-3)
 
 
-def test_a_body_that_turns_and_swings_keeps_its_energy() -> None:
+def test_a_body_that_turns_and_swings_conserves_energy() -> None:
     inertia, anchor_m, exit_m = np.diag([0.02, 0.05, 0.03]), (0.1, 0.2, 0.1), (0.0, 0.0, 0.5)
     path = fallen((1.0, 0.0, 0.0), exit_m, 0.8, anchor_m=anchor_m, inertia_kg_m2=inertia)
     speed = (path[2:, 0] - path[:-2, 0]) / (2.0 * PERIOD_S)
@@ -102,7 +102,9 @@ def test_a_platform_without_cables_falls_freely_to_the_ground() -> None:
 
 
 @pytest.mark.parametrize(("friction_N", "braked_N"), [(0.0, 0.0), (3.0, 3.0)])
-def test_a_motor_gives_way_to_what_is_above_its_torque(friction_N: float, braked_N: float) -> None:
+def test_a_motor_yields_to_a_load_above_its_torque_and_friction(
+    friction_N: float, braked_N: float
+) -> None:
     path = fallen(
         (0.0, 0.0, 0.0), (0.0, 0.0, 2.0), 0.5, rotor_kg=3.0, held_N=10.0, friction_N=friction_N
     )
@@ -110,8 +112,8 @@ def test_a_motor_gives_way_to_what_is_above_its_torque(friction_N: float, braked
     assert -path[-1, 0, 2] == pytest.approx(acceleration * 0.5**2 / 2.0, rel=0.02)
 
 
-def test_a_cable_that_weighs_something_pulls_itself_out_with_all_its_weight() -> None:
-    # half of it on the platform, half at the winch: (M + m) s" = M g - T + w (s + l), l at first
+def test_a_heavy_cable_accelerates_the_fall_with_its_weight() -> None:
+    # half on the platform, half at the winch: (M + m) s" = M g - T + w (s + l), l at the start
     rotor_kg, held_N, w, length_m, seconds = 3.0, 10.0, 4.0, 2.0, 0.5
     path = fallen(
         (0.0, 0.0, 0.0), (0.0, 0.0, length_m), seconds, rotor_kg=rotor_kg, held_N=held_N,
@@ -122,7 +124,7 @@ def test_a_cable_that_weighs_something_pulls_itself_out_with_all_its_weight() ->
     assert -path[-1, 0, 2] == pytest.approx(first * (math.cosh(rate * seconds) - 1.0), rel=0.02)
 
 
-def test_a_winch_that_rubs_enough_keeps_its_load() -> None:
+def test_a_winch_with_enough_friction_keeps_its_load() -> None:
     path = fallen((0.0, 0.0, 0.0), (0.0, 0.0, 2.0), 0.5, rotor_kg=3.0, held_N=10.0, friction_N=12.0)
     assert np.abs(path[:, 0]).max() < 1e-3
 
@@ -135,7 +137,7 @@ def test_the_remaining_cables_lower_the_platform_at_lowering_speed() -> None:
     assert path[5000, 0, 2] - path[-1, 0, 2] == pytest.approx(0.15 * 0.999, abs=2e-3)
 
 
-def test_until_it_is_noticed_the_platform_is_pulled_away_from_where_the_cable_was() -> None:
+def test_an_undetected_loss_pulls_the_platform_away_from_the_lost_cable() -> None:
     pushed = fallen((0.0, 0.0, 0.0), (0.0, 0.0, -1.0), 0.2, stiffness_N_m=1e-9, misled_N=10.0)
     falling = fallen((0.0, 0.0, 0.0), (0.0, 0.0, -1.0), 0.2, stiffness_N_m=1e-9)
     further_m = falling[-1, 0, 2] - pushed[-1, 0, 2]

@@ -1,4 +1,4 @@
-"""What is told of a robot whose tensions turn its platform away, or hold it as springs."""
+"""Findings about robots whose tensions destabilise or stabilise the platform's orientation."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from tests.cdpr_rt.diagnosis.robots import with_cables
 from tests.cdpr_rt.platform.platform_physics import Machine, crossed_rod, short_arms
 
 
-def told(
+def findings_with_bounds(
     machine: Machine,
     low_N: float,
     high_N: float,
@@ -26,7 +26,7 @@ def told(
     *,
     impossible: bool = True,
 ) -> list[str]:
-    """Return what is told of a robot with these bounds of tension."""
+    """Return the findings about a robot with these bounds of tension."""
     base = load_robot("spatial-8")
     bounds = {"tension_min_N": (low_N,), "tension_max_N": (high_N,), "slack_N": (0.5 * low_N,)}
     robot: Robot = dataclasses.replace(
@@ -40,17 +40,17 @@ def told(
     return [f"{f.key}: {f.text}" for f in found if f.impossible is impossible]
 
 
-def test_a_platform_that_tensions_turn_away_faster_than_a_loop_can_hold_it_is_refused() -> None:
-    (text,) = told(crossed_rod(), 200.0, 800.0)
+def test_a_platform_destabilised_faster_than_a_loop_can_hold_is_rejected() -> None:
+    (text,) = findings_with_bounds(crossed_rod(), 200.0, 800.0)
     assert text.startswith("axes[0].anchor_point_m: its tensions turn the platform away")
-    assert told(crossed_rod(), 20.0, 150.0) == []
+    assert findings_with_bounds(crossed_rod(), 20.0, 150.0) == []
 
 
-def test_a_loop_is_not_taken_for_that_of_other_bounds_of_tension() -> None:
+def test_designed_loops_are_cached_separately_for_each_bounds_of_tension() -> None:
     arms = short_arms()
     n = len(arms.axes)
     bounds = [(np.full(n, low), np.full(n, low + 80.0)) for low in (5.0, 90.0)]
-    weak = (*bounds[0], np.full(n, 40.0))  # by what the motors hold
+    weak = (*bounds[0], np.full(n, 40.0))  # bounds by the motors' torque
     loops = [
         designed_loop(platform_model(arms.platform, *both), arms.axes, 1e-3)
         for both in (*bounds, weak)
@@ -59,12 +59,12 @@ def test_a_loop_is_not_taken_for_that_of_other_bounds_of_tension() -> None:
     assert loops[0] is not loops[2]
 
 
-def test_a_platform_that_tensions_hold_is_not_refused() -> None:
-    assert told(short_arms(), 200.0, 800.0) == []
+def test_a_platform_stabilised_by_tensions_is_accepted() -> None:
+    assert findings_with_bounds(short_arms(), 200.0, 800.0) == []
 
 
-def test_a_stable_pose_with_a_long_swing_is_doubtful() -> None:
-    late, leans = told(short_arms(), 20.0, 200.0, 4e-3, impossible=False)
+def test_a_stable_but_weakly_damped_pose_is_doubtful() -> None:
+    late, leans = findings_with_bounds(short_arms(), 20.0, 200.0, 4e-3, impossible=False)
     found = re.match(
         r"axes\[0\]\.anchor_point_m: held by its tensions .* at \(.*\) m it may swing at (\d+) Hz, "
         r"with (0\.\d+) % of critical damping, for ([\d.]+) s ",
@@ -73,23 +73,26 @@ def test_a_stable_pose_with_a_long_swing_is_doubtful() -> None:
     assert found is not None, late
     frequency_Hz, damping, lasts_s = map(float, found.groups())
     assert lasts_s > 5.0
-    # 2 % are left; the damping has one digit
+    # decay to 2 %; the damping has one digit
     assert lasts_s * frequency_Hz * damping == pytest.approx(100 * math.log(50) / math.tau, rel=0.2)
     assert re.search(
         r"^sync_period_s: value 0\.004; the loop leans on what the cables are assumed .*damping_s "
         r".*: with 0\.5 ms a mode at [34]\d Hz grows with the platform at \(.*\) m; ",
         leans,
     )
-    (leans,) = told(short_arms(), 20.0, 200.0, 2e-3, impossible=False)
+    (leans,) = findings_with_bounds(short_arms(), 20.0, 200.0, 2e-3, impossible=False)
     assert leans.startswith("sync_period_s: value 0.002; the loop leans on")
-    assert told(short_arms(), 20.0, 200.0, 1e-3, impossible=False) == []
+    assert findings_with_bounds(short_arms(), 20.0, 200.0, 1e-3, impossible=False) == []
     assert (
-        told(with_cables(short_arms(), damping_s=2e-3), 20.0, 200.0, 2e-3, impossible=False) == []
+        findings_with_bounds(
+            with_cables(short_arms(), damping_s=2e-3), 20.0, 200.0, 2e-3, impossible=False
+        )
+        == []
     )
 
 
-def test_a_platform_that_swings_for_long_on_soft_cables_is_doubtful() -> None:
-    """Its tensions follow its pose: what it is told of tensions that hold others is not true."""
+def test_a_weakly_damped_platform_on_soft_cables_is_doubtful() -> None:
+    """Its tensions follow its pose, unlike tensions that stabilise a platform."""
     robot = load_robot("suspended-8")
     assert list(loop_findings(Subject(robot))) == []
     softer = 3.0 * robot.axes[0].winch.cable.elongation_percent_per_N
@@ -103,12 +106,12 @@ def test_a_platform_that_swings_for_long_on_soft_cables_is_doubtful() -> None:
     assert lasts_s * frequency_Hz * percent == pytest.approx(100 * math.log(50) / math.tau, rel=0.2)
 
 
-def test_a_robot_that_every_loop_drives_is_refused_by_its_cycle(
+def test_a_robot_that_each_loop_destabilises_is_rejected_by_its_cycle(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     def refuse(*_: object) -> None:
         raise SwingsError("the loop drives a mode")
 
     monkeypatch.setattr("cdpr_rt.diagnosis.subject.designed_loop", refuse)
-    (text,) = told(short_arms(), 20.0, 200.0, 4e-3)
+    (text,) = findings_with_bounds(short_arms(), 20.0, 200.0, 4e-3)
     assert text.startswith("sync_period_s: value 0.004; the loop drives a mode: a shorter cycle")

@@ -1,4 +1,4 @@
-"""What of a robot's file cannot work, or works less well than it seems, and what would do."""
+"""Findings about a robot's file: impossible and doubtful settings with remedies."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def robot_of(folder: Path, *replaced: tuple[str, str]) -> Robot:
     return load_robot(path)
 
 
-def test_the_shipped_robot_is_held_with_a_reserve_in_its_whole_box() -> None:
+def test_the_shipped_robot_has_a_reserve_in_its_whole_box() -> None:
     robot = load_robot("planar-3")
     statics = statics_of(robot)
     assert diagnose(robot) == [] and refuse_impossible(robot) == []
@@ -37,7 +37,7 @@ def test_the_shipped_robot_is_held_with_a_reserve_in_its_whole_box() -> None:
     assert diagnose(load_robot("spatial-8")) == []
 
 
-def test_a_home_where_the_platform_would_tip_is_doubtful(tmp_path: Path) -> None:
+def test_a_home_at_which_the_platform_would_tip_is_doubtful(tmp_path: Path) -> None:
     apart = [
         ("[-2.0, 3.0]", "[-1.0, 2.5]"),
         ("[2.0, 3.0]", "[2.5, 2.0]"),
@@ -57,7 +57,7 @@ def _ten_times(value: Any) -> Any:
 
 
 def hall(low_N: float, high_N: float) -> Robot:
-    """Return `planar-3` in a frame ten times as large, with other bounds of tension."""
+    """Return `planar-3` in a frame ten times as large, with the given bounds of tension."""
     robot = load_robot("planar-3")
     assert robot.platform is not None
     larger = {
@@ -73,10 +73,8 @@ def hall(low_N: float, high_N: float) -> Robot:
 
 
 @pytest.mark.parametrize(("low_N", "high_N"), [(1.0, 20.0), (20.0, 150.0)])
-def test_cables_that_sag_are_reported_with_the_tension_that_would_do(
-    low_N: float, high_N: float
-) -> None:
-    """The slope of what a parabola across its chord is longer than that, over all of the box."""
+def test_sagging_cables_are_reported_with_a_sufficient_tension(low_N: float, high_N: float) -> None:
+    """The reference is the derivative of a parabola's extra length over the whole box."""
     robot = hall(low_N, high_N)
     told = [f.text for f in diagnose(robot) if f.key == "limits.tension_min_N"]
     statics, cable = statics_of(robot), robot.axes[0].winch.cable
@@ -109,7 +107,7 @@ def findings_of(folder: Path, text: str) -> dict[str, str]:
 
 
 @pytest.mark.parametrize("name", ["planar-4", "point-4", "suspended-6", "suspended-8", "spatial-8"])
-def test_every_shipped_robot_holds_its_box_at_all_orientations(name: str) -> None:
+def test_each_shipped_robot_holds_its_box_at_all_orientations(name: str) -> None:
     robot = load_robot(name)
     assert diagnose(robot) == []
     statics = statics_of(robot)
@@ -122,13 +120,13 @@ def test_every_shipped_robot_holds_its_box_at_all_orientations(name: str) -> Non
     assert moving.min() > statics.model.reserve_N
 
 
-def test_angles_that_nothing_controls_in_space_are_reported(tmp_path: Path) -> None:
+def test_uncontrolled_angles_in_space_are_reported(tmp_path: Path) -> None:
     free = 'controlled = ["x", "y", "z"]\nmass_kg'
     text = re.sub(r"workspace_angle_rad.*\n", "", SUSPENDED.replace("mass_kg", free, 1))
     assert "rx, ry, rz left out" in findings_of(tmp_path, text)["platform.controlled"]
 
 
-def test_points_in_a_line_or_an_upright_plane_are_told_to_hold_nothing(tmp_path: Path) -> None:
+def test_collinear_or_coplanar_anchor_points_are_reported(tmp_path: Path) -> None:
     level = re.sub(r"(anchor_point_m = \[.*), .*, .*\]", r"\1, 0.0, 0.0]", SUSPENDED)
     assert "all anchor points lie in one line" in findings_of(tmp_path, level)["platform.home_m"]
     camera = (SHIPPED / "robots" / "point-4.toml").read_text()
@@ -138,7 +136,7 @@ def test_points_in_a_line_or_an_upright_plane_are_told_to_hold_nothing(tmp_path:
     assert told.endswith("all exit points lie in one line")
 
 
-def test_of_a_rod_the_axis_that_need_not_be_controlled_is_named(tmp_path: Path) -> None:
+def test_the_axis_of_a_rod_that_needs_no_control_is_reported(tmp_path: Path) -> None:
     for turned, free in (("0.0, 0.0, 0.0", "rz"), ("0.0, 1.5708, 0.0", "rx"), ("0, 0.7, 0", "")):
         upright = re.sub(r"(anchor_point_m =) \[(.*), .*, .*\]", r"\1 [0.0, 0.0, \2]", SUSPENDED)
         text = upright.replace("mass_kg", f"home_rotation_rad = [{turned}]\nmass_kg", 1)
@@ -147,7 +145,7 @@ def test_of_a_rod_the_axis_that_need_not_be_controlled_is_named(tmp_path: Path) 
         assert told.endswith(free)
 
 
-def test_orientations_that_cables_cannot_hold_are_reported_with_the_angle_that_they_can(
+def test_infeasible_orientations_are_reported_with_the_feasible_angle(
     tmp_path: Path,
 ) -> None:
     text = SUSPENDED.replace("workspace_angle_rad = 0.2618", "workspace_angle_rad = 0.6")
@@ -157,14 +155,14 @@ def test_orientations_that_cables_cannot_hold_are_reported_with_the_angle_that_t
     )
 
 
-def test_in_a_plane_an_orientation_is_one_angle(tmp_path: Path) -> None:
+def test_an_orientation_in_a_plane_is_reported_as_one_angle(tmp_path: Path) -> None:
     text = (SHIPPED / "robots" / "planar-4.toml").read_text()
     text = re.sub(r"(workspace_angle_rad =) \S+", r"\1 0.7", text)
     told = findings_of(tmp_path, text)["platform.workspace_min_m"]
     assert re.search(r" m, turned by -?40 deg the cables ", told), told
 
 
-def test_a_turned_platform_that_meets_its_stand_is_reported(tmp_path: Path) -> None:
+def test_a_turned_platform_that_touches_its_stand_is_reported(tmp_path: Path) -> None:
     text = SUSPENDED.replace("[-2.6, -1.8, 0.75]", "[-2.6, -1.8, 0.6]")
     told = findings_of(tmp_path, text)["platform.workspace_angle_rad"]
     assert "0.18 m lower, and the box begins 0.10 m above home" in told
@@ -175,21 +173,21 @@ BODY = "body = { min_m = [-0.1, -0.1, -0.3], max_m = [0.1, 0.1, 0.3] }"
 
 
 def test_cables_that_touch_within_the_box_are_reported_with_the_place(tmp_path: Path) -> None:
-    # cables of one corner of the frame, from below to the top and from above to the bottom, cross
+    # cables of a corner cross: from below to the top and from above to the bottom
     text = SPATIAL.replace("[0.1, -0.1, 0.3]", "[-0.1, -0.1, 0.3]", 1)
     text = text.replace("[-0.1, 0.1, -0.3]", "[-0.1, -0.1, -0.3]", 1)
     text = text.replace("[-2.0873, -1.7254, 2.9602]", "[-1.8133, -2.1594, 2.9602]", 1)
     path = tmp_path / "crossed.toml"
     path.write_text(text)
     told = next(f for f in diagnose(load_robot(path)) if f.key == "platform.clearance_m")
-    # everywhere as at home, nowhere once it is turned far enough: it can be moved
+    # contact everywhere at home, none if turned far enough: the platform can be moved
     assert not told.impossible and re.match(
         r"value 0\.01; in 100 % of the box, turned as at home, .* at \(.*\) m.* cable", told.text
     )
     assert "platform.clearance_m" not in findings_of(tmp_path, SPATIAL)
 
 
-def test_a_body_that_no_cable_passes_is_impossible(tmp_path: Path) -> None:
+def test_a_body_that_cables_cannot_pass_is_impossible(tmp_path: Path) -> None:
     path = tmp_path / "wide.toml"
     wide = "body = { min_m = [-2.5, -2.5, -0.3], max_m = [2.5, 2.5, 0.3] }"
     path.write_text(SPATIAL.replace(BODY, wide))
@@ -199,21 +197,21 @@ def test_a_body_that_no_cable_passes_is_impossible(tmp_path: Path) -> None:
         refuse_impossible(load_robot(path))
 
 
-def test_winches_that_rub_by_more_than_is_kept_for_control_are_reported(tmp_path: Path) -> None:
-    # of the 115 N that such a motor is rated for
+def test_winch_friction_above_the_reserve_for_control_is_reported(tmp_path: Path) -> None:
+    # share of the motor's rated 115 N
     told = diagnose(robot_of(tmp_path, ("max_N = 150", "max_N = 60")))
     about = [f for f in told if f.key == "platform.mass_kg"]
     assert about and "may take up 6.9 N" in about[0].text and not about[0].impossible
 
 
-def test_a_problem_at_every_place_is_not_blamed_on_one_place(tmp_path: Path) -> None:
-    # all upper cables to the lower end, all lower ones to the upper: none turns it about z
+def test_a_problem_at_all_places_is_reported_in_general(tmp_path: Path) -> None:
+    # upper cables go to the lower end, lower ones to the upper end: none turns it about z
     text = re.sub(r"(anchor_point_m = )\[.*, .*, (.*)\]", r"\1[0.1, 0.0, \2]", SPATIAL)
     told = findings_of(tmp_path, text)["platform.home_m"]
     assert "or other anchor points" in told or "all anchor points" in told
 
 
-def test_turning_takes_part_in_the_speed_of_the_cables(tmp_path: Path) -> None:
+def test_angular_speed_contributes_to_cable_speed(tmp_path: Path) -> None:
     text = SUSPENDED.replace("angular_speed_rad_s = 0.25", "angular_speed_rad_s = 0.6")
     told = findings_of(tmp_path, text)["platform.speed_m_s"]
     assert "along and about all directions together cables run at up to" in told
@@ -221,7 +219,7 @@ def test_turning_takes_part_in_the_speed_of_the_cables(tmp_path: Path) -> None:
         r"up to (\S+) with angular_speed_rad_s up to (\S+), or limits.speed_rad_s from (\d+)$", told
     )
     assert found is not None, told
-    # each of the two ways out is one
+    # each of the two remedies works
     slower = SUSPENDED.replace("angular_speed_rad_s = 0.25", f"angular_speed_rad_s = {found[2]}")
     slower = re.sub(r"\nspeed_m_s = [\d.]+", f"\nspeed_m_s = {found[1]}", slower)
     assert "platform.speed_m_s" not in findings_of(tmp_path, slower)
@@ -229,8 +227,8 @@ def test_turning_takes_part_in_the_speed_of_the_cables(tmp_path: Path) -> None:
     assert "platform.speed_m_s" not in findings_of(tmp_path, quicker)
 
 
-def test_cables_may_leave_in_one_point_and_not_end_in_one_as_well(tmp_path: Path) -> None:
-    # the robocrane as it is published: three points, two cables from each
+def test_pairs_of_cables_may_share_exit_points(tmp_path: Path) -> None:
+    # the published robocrane: three exit points with two cables each
     crane = (SHIPPED / "robots" / "suspended-6.toml").read_text()
     for pair, point in (
         (r"-?0\.15, 4\.0", "0.0, 4.0"),
@@ -310,7 +308,7 @@ def test_infeasible_settings_are_reported_with_a_remedy(
     about = [found for found in told if found.key == key]
     assert about, told
     assert any(problem in found.text and found.impossible is impossible for found in about), about
-    # what takes seconds to find is found once
+    # compute the findings, which take seconds, only once
     monkeypatch.setattr(
         "cdpr_rt.diagnosis.checks.diagnose",
         lambda asked, _limits: told if asked is robot else [],
@@ -332,7 +330,7 @@ def test_more_cables_than_a_daemon_runs_are_reported(tmp_path: Path) -> None:
 
 
 def on_seven(anchor_arm_m: float, winch: str) -> str:
-    """Return the file of a platform that four cables hold from above, three from below."""
+    """Return the file of a platform with four cables from above and three from below."""
     x, y = 0.15 * anchor_arm_m / 0.18, 0.1 * anchor_arm_m / 0.18
     ends = [(-1, -1, 1), (1, -1, 1), (1, 1, 1), (-1, 1, 1), (0, -1, -1), (1, 1, -1), (-1, 1, -1)]
     axes = "".join(
@@ -370,11 +368,13 @@ def on_seven(anchor_arm_m: float, winch: str) -> str:
         {axes}"""
 
 
-def test_friction_does_not_turn_over_what_tensions_of_the_set_point_hold(tmp_path: Path) -> None:
+def test_friction_does_not_destabilise_a_platform_held_by_set_point_tensions(
+    tmp_path: Path,
+) -> None:
     assert "axes[0].anchor_point_m" not in findings_of(tmp_path, on_seven(0.18, "winch-300n"))
 
 
-def test_friction_that_turns_a_plate_over_names_no_axis_in_a_plane(tmp_path: Path) -> None:
+def test_friction_that_turns_a_planar_platform_is_reported_without_axis(tmp_path: Path) -> None:
     plate = (SHIPPED / "robots" / "planar-4.toml").read_text()
     text = plate.replace("anchor_point_m = [-0.2, -0.1]", "anchor_point_m = [0.0, 0.0]")
     told = findings_of(tmp_path, text)["axes[0].anchor_point_m"]
@@ -388,8 +388,8 @@ def test_friction_that_turns_a_plate_over_names_no_axis_in_a_plane(tmp_path: Pat
     assert held < turned and per_mm > 0.1
 
 
-def test_a_stand_on_an_exit_point_leaves_a_cable_that_tells_nothing(tmp_path: Path) -> None:
-    # the lower anchor point is 87 mm under the platform's origin
+def test_a_stand_too_close_to_an_exit_point_is_reported(tmp_path: Path) -> None:
+    # the lower anchor point is 87 mm below the platform's origin
     told = diagnose(robot_of(tmp_path, ("exit_point_m = [0.0, 0.0]", "exit_point_m = [0.0, 1.15]")))
     about = [f for f in told if f.key == "platform.home_m" and f.impossible]
     assert about and about[0].text.startswith("the platform at rest comes up to 0.063 m from")

@@ -1,4 +1,4 @@
-"""What is predicted of a cable that slips, against the kinematics and the lengths' limit."""
+"""Predictions for a slipping cable agree with kinematics and the limit of lengths."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ UPPER = 3
 
 
 def one_carries() -> Robot:
-    """Return a point on three low cables and an upper one that carries it."""
+    """Return a point on three low cables and one upper cable that carries it."""
     file = load_robot("point-4")
     angles = np.radians([90.0, 210.0, 330.0])
     low = [(float(1.7 * np.cos(a)), float(1.7 * np.sin(a)), 0.1) for a in angles]
@@ -34,7 +34,7 @@ def one_carries() -> Robot:
 
 
 @pytest.mark.parametrize("robot", [one_carries(), load_robot("planar-3")], ids=["one", "planar"])
-def test_the_largest_unnoticed_slip_is_as_far_off_as_predicted(robot: Robot) -> None:
+def test_the_largest_undetected_slip_displaces_the_platform_as_predicted(robot: Robot) -> None:
     model, allowed_m = platform_model_of(robot), limits_of(robot).lengths_disagree_m
     k, n = model.positions, len(robot.axes)
     places = [model.home[:k], *map(np.array, Subject(robot).corner_targets)]
@@ -50,7 +50,7 @@ def test_the_largest_unnoticed_slip_is_as_far_off_as_predicted(robot: Robot) -> 
         assert told.off_m == pytest.approx(max(off_m))
 
 
-def test_a_platform_sinks_by_most_of_a_slip_of_the_one_cable_that_carries_it() -> None:
+def test_a_platform_sinks_by_most_of_a_slip_of_its_only_carrying_cable() -> None:
     model = platform_model_of(one_carries())
     lengths_m = model.kinematics.lengths(model.home_pose) + 0.03 * np.eye(4)[UPPER]
     found = model.kinematics.pose_from_lengths(lengths_m, model.home_pose)
@@ -58,24 +58,24 @@ def test_a_platform_sinks_by_most_of_a_slip_of_the_one_cable_that_carries_it() -
     assert 0.02 < off_m < 0.03 * slips(Subject(one_carries()))[UPPER].off_per_m * 1.05
 
 
-def test_a_slip_of_the_one_cable_that_carries_is_the_least_noticed() -> None:
+def test_most_of_an_undetected_slip_of_the_only_carrying_cable_displaces_the_platform() -> None:
     told = slips(Subject(one_carries()))
     assert told[UPPER].unnoticed_m > 2.0 * limits_of(one_carries()).lengths_disagree_m
     assert told[UPPER].off_m > 0.8 * told[UPPER].unnoticed_m
 
 
-def test_a_slip_at_once_is_noticed_earlier_than_a_slow_one() -> None:
+def test_a_sudden_slip_is_detected_earlier_than_a_slow_one() -> None:
     for told in slips(Subject(one_carries())):
         assert 0.0 < told.sudden_m < 0.5 * told.unnoticed_m
 
 
-def test_no_slip_is_noticed_without_a_redundant_cable() -> None:
+def test_no_slip_is_detected_without_a_redundant_cable() -> None:
     for told in slips(Subject(load_robot("suspended-6"))):
         assert told.unnoticed_m == told.sudden_m == np.inf
         assert told.off_per_m > 0.5
 
 
-def test_a_snatch_of_stiffer_cables_is_harder() -> None:
+def test_stiffer_cables_have_a_higher_tension_peak_after_a_slip() -> None:
     robot = load_robot("planar-3")
     stiff = 0.25 * robot.axes[0].winch.cable.elongation_percent_per_N
     stiffer = with_cables(robot, elongation_percent_per_N=stiff)

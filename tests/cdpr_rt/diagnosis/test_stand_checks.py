@@ -1,4 +1,4 @@
-"""Whether winches can pull cables of a platform on its stand, and keep heavy ones wound."""
+"""Winches can tighten the cables of a platform on its stand and keep heavy cables wound."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ from cdpr_rt.model.statics import statics_of
 SHIPPED = ("planar-3", "planar-4", "point-4", "spatial-8", "suspended-6", "suspended-8")
 
 
-def told(name: str, high_N: float | None = None) -> list[Finding]:
-    """Return what is told of a shipped robot, whose cables bear 2 N to `high_N` where given."""
+def tightening_findings(name: str, high_N: float | None = None) -> list[Finding]:
+    """Return the findings about a shipped robot, with tensions of 2 N to `high_N` if given."""
     robot = load_robot(name)
     if high_N is not None:
         bounds = {"tension_min_N": (2.0,), "tension_max_N": (high_N,), "slack_N": (0.5,)}
@@ -27,37 +27,39 @@ def told(name: str, high_N: float | None = None) -> list[Finding]:
 
 
 @pytest.mark.parametrize("name", SHIPPED)
-def test_shipped_robots_can_be_pulled_tight(name: str) -> None:
-    assert told(name) == []
+def test_shipped_robots_can_be_tightened(name: str) -> None:
+    assert tightening_findings(name) == []
 
 
 @pytest.mark.parametrize(("name", "high_N"), [("planar-3", 12.0), ("spatial-8", 25.0)])
-def test_bounds_below_what_winches_rub_are_reported_with_some_that_would_do(
+def test_tension_bounds_below_friction_are_reported_with_sufficient_ones(
     name: str, high_N: float
 ) -> None:
-    (finding,) = told(name, high_N)
+    (finding,) = tightening_findings(name, high_N)
     assert (finding.key, finding.impossible) == ("limits.tension_max_N", False)
     assert "such winches usually rub with up to 7.6 N" in finding.text
     enough = re.search(r"enough: (\d+),", finding.text)
     assert enough is not None
-    assert told(name, float(enough[1])) == []
+    assert tightening_findings(name, float(enough[1])) == []
 
 
 def heavy(weight_N_m: float) -> Robot:
-    """Return suspended-8, whose exit points are 3.9 to 4.9 m above its anchor points at home."""
+    """Return suspended-8 with heavy cables: exit points are 3.9 to 4.9 m above anchors at home."""
     robot = load_robot("suspended-8")
     assert robot.platform is not None
     platform = dataclasses.replace(robot.platform, cable_weights_N_m=(weight_N_m,) * 8)
     return dataclasses.replace(robot, platform=platform)
 
 
-def test_ropes_that_unwind_their_drums_without_power_are_reported_but_where_brakes_hold_them(
+def test_ropes_that_unwind_without_power_are_reported_unless_brakes_hold_them(
     tmp_path: Path,
 ) -> None:
     winch = load_robot("suspended-8").axes[0].winch
     rubs_N = 0.02 * winch.motor.rated_torque_Nm / winch.cable_m_per_motor_rad
     for hangs_N, unwinds in ((0.95 * rubs_N, False), (1.05 * rubs_N, True)):
-        robot = heavy(hangs_N / 4.91)  # of the highest exit point over the lowest anchor point
+        robot = heavy(
+            hangs_N / 4.91
+        )  # height of the highest exit point above the lowest anchor point
         found = list(unwinding(Subject(robot)))
         assert bool(found) is unwinds
     robot = heavy(1.5 * rubs_N / 3.9)
@@ -75,7 +77,7 @@ def test_ropes_that_unwind_their_drums_without_power_are_reported_but_where_brak
     io.write_text(f"{before}{braked}\n[[axes]]{after}")
     held = dataclasses.replace(robot, safety_io=str(io))
     assert not list(unwinding(Subject(held)))
-    io.write_text(shipped)  # which holds the first alone
+    io.write_text(shipped)  # brakes hold only the first axis
     (finding,) = unwinding(Subject(held))
     assert "axis 1," not in finding.text and "axis 2, " in finding.text
 

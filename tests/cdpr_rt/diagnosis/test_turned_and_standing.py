@@ -1,4 +1,4 @@
-"""Angles that a robot cannot take anywhere, and platforms that do not stand by themselves."""
+"""Angles that are infeasible everywhere, and platforms that do not stand without cables."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ CROSSED_m = {
 
 
 def crossed() -> str:
-    """Return the robot with cables that touch each other at small angles alone."""
+    """Return the robot with cables that touch each other only at small angles."""
     text = SPATIAL.replace(BODY, "")
     for key, value in (
         ("home_m", [0.0, 0.0, 1.1]),
@@ -51,15 +51,15 @@ def test_an_angle_that_is_held_nowhere_in_the_box_is_impossible(tmp_path: Path) 
         refused = rf"workspace_angle_rad: value 2; turned by [\d.]+ deg{about}, .*up to ([\d.]+)"
         with pytest.raises(ProfileError, match=refused) as caught:
             refuse_impossible(load_robot(path))
-        assert "anchor_point_m" not in str(caught.value)  # which are not what has to change
+        assert "anchor_point_m" not in str(caught.value)  # anchor points are not the cause
         allowed = re.search(refused, str(caught.value))[1]  # type: ignore[index]
-        assert float(allowed) >= 0.2618  # which all places in their boxes take
+        assert float(allowed) >= 0.2618  # feasible in the whole box
         path.write_text(re.sub(r"(workspace_angle_rad =) \S+", rf"\1 {allowed}", shipped))
         told = [f.key for f in diagnose(load_robot(path)) if f.impossible]
         assert "platform.workspace_angle_rad" not in told
 
 
-def test_smaller_angles_at_which_cables_touch_everywhere_are_not_passed_over(
+def test_smaller_angles_with_contact_everywhere_are_not_skipped(
     tmp_path: Path,
 ) -> None:
     path = tmp_path / "crossed.toml"
@@ -72,7 +72,7 @@ def test_smaller_angles_at_which_cables_touch_everywhere_are_not_passed_over(
         assert bool(told) is (angle > 0.11) and (not told or re.search(refused, told)), told
 
 
-def test_an_upright_rod_has_to_be_held_or_needs_a_foot(tmp_path: Path) -> None:
+def test_an_upright_rod_without_foot_is_reported_as_tipping(tmp_path: Path) -> None:
     text = re.sub(r"(anchor_point_m =) \[.*, (.*)\]", r"\1 [0.0, 0.0, \2]", SPATIAL)
     text = re.sub(r"\nworkspace_angle_rad.*", "", text)
     path, rod = tmp_path / "rod.toml", 'controlled = ["x", "y", "z", "rx", "ry"]'
@@ -82,7 +82,7 @@ def test_an_upright_rod_has_to_be_held_or_needs_a_foot(tmp_path: Path) -> None:
         assert ("0 % of its weight tip it over" in found.get("axes[0].anchor_point_m", "")) == told
 
 
-def test_the_simulated_platform_stands_on_the_body_that_its_file_gives(tmp_path: Path) -> None:
+def test_the_simulated_platform_stands_on_the_body_of_its_file(tmp_path: Path) -> None:
     path = tmp_path / "footed.toml"
     path.write_text(SPATIAL.replace(BODY, BODY.replace("-0.1, -0.1, -0.3", "-0.2, -0.4, -0.5")))
     physics, _ = physics_of(load_robot(path), None, detached=False)

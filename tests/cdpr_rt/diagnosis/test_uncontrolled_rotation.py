@@ -1,4 +1,4 @@
-"""Platforms in space whose file leaves angles out of `controlled`: how they hang is told."""
+"""Findings about platforms in space with uncontrolled angles: equilibrium and stability."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ TURNED = r"at \((.*), (.*), (.*)\) m the platform hangs turned by (\S+) deg, .*,
 
 
 def hanging(arm_m: float, below_m: float, origin_m: float = 0.0) -> str:
-    """Return point-4 with anchors so far apart, and its centre of mass so far below them.
+    """Return point-4 with anchors apart by `arm_m` and its centre of mass below them.
 
-    The origin of the platform's frame may be so far below the anchors, of which all the rest is.
+    `origin_m` puts the origin of the platform's frame below the anchors.
     """
     text = CAMERA.replace(
         "mass_kg",
@@ -45,7 +45,7 @@ def hanging(arm_m: float, below_m: float, origin_m: float = 0.0) -> str:
 
 
 def rod(turned_rad: float, beside_m: float) -> str:
-    """Return spatial-8 as a rod whose own axis is not controlled."""
+    """Return spatial-8 as a rod with uncontrolled rotation about its axis."""
     text = (SHIPPED / "robots" / "spatial-8.toml").read_text()
     text = re.sub(r"(anchor_point_m =) \[.*, (.*)\]", r"\1 [0.0, 0.0, \2]", text)
     text = re.sub(r"\nworkspace_angle_rad.*", "", text)
@@ -53,7 +53,7 @@ def rod(turned_rad: float, beside_m: float) -> str:
     return text.replace("mass_kg", f'{given}controlled = ["x", "y", "z", "rx", "ry"]\nmass_kg', 1)
 
 
-def told(folder: Path, text: str) -> Finding | None:
+def rotation_finding(folder: Path, text: str) -> Finding | None:
     path = folder / "hanging.toml"
     path.write_text(text)
     of_it = (one for one in diagnose(load_robot(path)) if one.key == "platform.controlled")
@@ -61,9 +61,9 @@ def told(folder: Path, text: str) -> Finding | None:
 
 
 def resting(statics: PlatformStatics, place: np.ndarray) -> np.ndarray:
-    """Return the motion (6,) from `place` to where all is in equilibrium and seems to be there.
+    """Return the motion (6,) from `place` to the equilibrium in which lengths seem to match.
 
-    The control adds to its planned tensions what holds the directions that it controls.
+    The control adds tensions that hold the controlled directions.
     """
     platform = statics.platform
     directions = list(statics.model.kinematics.directions)
@@ -98,10 +98,10 @@ def resting(statics: PlatformStatics, place: np.ndarray) -> np.ndarray:
 @pytest.mark.parametrize(
     ("arm_m", "below_m", "origin_m"), [(0.05, 0.1, 0.0), (0.05, 0.1, 0.1), (0.03, 0.05, -0.05)]
 )
-def test_how_far_it_hangs_turned_is_where_all_is_in_equilibrium(
+def test_the_reported_rotation_is_that_of_the_equilibrium(
     tmp_path: Path, arm_m: float, below_m: float, origin_m: float
 ) -> None:
-    found = told(tmp_path, hanging(arm_m, below_m, origin_m))
+    found = rotation_finding(tmp_path, hanging(arm_m, below_m, origin_m))
     assert found is not None and not found.impossible
     figures = re.search(TURNED, found.text)
     assert figures is not None, found.text
@@ -115,18 +115,18 @@ def test_how_far_it_hangs_turned_is_where_all_is_in_equilibrium(
     ("arm_m", "below_m", "says"),
     [(0.05, -0.1, "turn the platform over"), (0.05, -0.02, "turns by more than 30 deg")],
 )
-def test_one_that_turns_over_is_impossible(
+def test_a_platform_that_turns_over_is_impossible(
     tmp_path: Path, arm_m: float, below_m: float, says: str
 ) -> None:
-    found = told(tmp_path, hanging(arm_m, below_m))
+    found = rotation_finding(tmp_path, hanging(arm_m, below_m))
     assert found is not None and found.impossible
     assert says in found.text and "takes 6 cables" in found.text
 
 
-def test_one_whose_lengths_would_disagree_is_impossible(tmp_path: Path) -> None:
+def test_a_platform_whose_lengths_would_disagree_is_impossible(tmp_path: Path) -> None:
     controlled = 'controlled = ["x", "y", "z", "rz"]\nmass_kg'
     text = (SHIPPED / "robots" / "suspended-6.toml").read_text()
-    found = told(tmp_path, text.replace("mass_kg", controlled, 1))
+    found = rotation_finding(tmp_path, text.replace("mass_kg", controlled, 1))
     assert found is not None and found.impossible
     assert re.search(r"^rx, ry left out: .* disagree by \d+\.\d mm, 31\.6 mm allowed", found.text)
     assert "its cables can control them" in found.text
@@ -135,7 +135,7 @@ def test_one_whose_lengths_would_disagree_is_impossible(tmp_path: Path) -> None:
 def test_disagreement_is_measured_by_normalised_residuals(tmp_path: Path) -> None:
     controlled = 'controlled = ["x", "y", "z", "ry", "rz"]\nmass_kg'
     text = SUSPENDED.replace("mass_kg", controlled, 1)
-    found = told(tmp_path, re.sub(r"workspace_angle_rad.*\n", "", text))
+    found = rotation_finding(tmp_path, re.sub(r"workspace_angle_rad.*\n", "", text))
     assert found is not None and found.impossible
     figures = re.search(r"at \((.*), (.*), (.*)\) m .* by (\S+) mm, ", found.text)
     assert figures is not None, found.text
@@ -152,17 +152,17 @@ def test_disagreement_is_measured_by_normalised_residuals(tmp_path: Path) -> Non
 
 
 @pytest.mark.parametrize(("turned_rad", "beside_m"), [(0.0, 0.0), (0.02, 0.0), (0.35, 0.0)])
-def test_of_a_rod_the_angle_about_its_own_axis_is_nothing_to_mind(
+def test_rotation_of_a_rod_about_its_axis_is_not_reported(
     tmp_path: Path, turned_rad: float, beside_m: float
 ) -> None:
-    assert told(tmp_path, rod(turned_rad, beside_m)) is None
+    assert rotation_finding(tmp_path, rod(turned_rad, beside_m)) is None
 
 
-def test_loads_beside_a_rod_axis_or_below_a_knot_swing_and_are_accepted(
+def test_loads_beside_a_rod_or_below_a_knot_are_reported_as_swinging_but_accepted(
     tmp_path: Path,
 ) -> None:
     knot = CAMERA.replace("mass_kg", "centre_of_mass_m = [0.02, 0.0, -0.1]\nmass_kg", 1)
     for text in (rod(0.0, 0.02), knot):
-        found = told(tmp_path, text)
+        found = rotation_finding(tmp_path, text)
         assert found is not None and not found.impossible
         assert "its weight swings about these axes" in found.text

@@ -1,4 +1,4 @@
-"""A room with markers and a camera that sees their corners, without images."""
+"""A room with markers and a camera that observes their corners, without images."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def intrinsics(lens: np.ndarray = LENS) -> CameraIntrinsics:
 
 @dataclasses.dataclass
 class Room:
-    """What is true, and what was seen of it."""
+    """The true map and the observations."""
 
     truth: MarkerMap
     seen: SeenMarkers
@@ -52,11 +52,11 @@ class Room:
     def with_marker_off(
         self, marker: int, off_m: tuple[float, float, float], when: Callable[[int], bool]
     ) -> Room:
-        """Return the room in which a marker is elsewhere in some images, by their numbers."""
+        """Return the room with a marker displaced in the images numbered `when`."""
         return self.with_corners_off(marker, np.tile(off_m, (4, 1)), when)
 
     def with_corners_off(self, marker: int, off_m: np.ndarray, when: Callable[[int], bool]) -> Room:
-        """Return the room in which each corner of a marker, (4, 3), is elsewhere in some images."""
+        """Return the room with the corners (4, 3) of a marker displaced in the images `when`."""
         k, corners = self.seen.ids.index(marker), self.seen.corners_px.copy()
         map_ = self.truth
         for row in np.flatnonzero(self.seen.marker == k):
@@ -78,7 +78,7 @@ def room(
     heights_m: float = 0.001,
     tilt_deg: float = 15.0,
 ) -> Room:
-    """Return markers in rows on a floor, seen from 1.1 to 1.6 m above it."""
+    """Return markers in rows on a floor, observed from 1.1 to 1.6 m above it."""
     print(f"room of seed {seed}")
     chance = np.random.default_rng(seed)
     count = rows * columns
@@ -115,7 +115,7 @@ def room(
 
 
 def seen_from(map_: MarkerMap, marker: int) -> MarkerMap:
-    """Return the map in the frame of another marker."""
+    """Return the map in the frame of `marker`."""
     k = map_.ids.index(marker)
     back = map_.rotation[k].T
     return map_.moved(back, -back @ map_.position_m[k], marker)
@@ -123,19 +123,19 @@ def seen_from(map_: MarkerMap, marker: int) -> MarkerMap:
 
 @dataclasses.dataclass(frozen=True)
 class MapDifference:
-    """Differences of a map from another in the frame of one marker: thesis, figures 3.20, 3.21."""
+    """Differences between two maps in the frame of one marker (thesis, figures 3.20 and 3.21)."""
 
     ids: tuple[int, ...]
     distance_m: FloatArray
-    """Of each marker's middle from that of the reference marker, (m,)."""
+    """Distance of each marker's centre from that of the reference marker, (m,)."""
     position_error_m: FloatArray
-    """Of the middles, (m,)."""
+    """Position difference of the centres, (m,)."""
     rotation_error_rad: FloatArray
-    """(m,)."""
+    """Angle difference, (m,)."""
 
 
 def difference(map_: MarkerMap, other: MarkerMap, reference: int | None = None) -> MapDifference:
-    """Return how a map differs from another with the marker `reference` at the same place."""
+    """Return the difference between two maps whose markers `reference` coincide."""
     reference = map_.reference if reference is None else reference
     a, b = seen_from(map_, reference), seen_from(other, reference)
     common = [

@@ -1,4 +1,4 @@
-"""Detection in rendered images: to hundredths of a pixel, and what is wrong with an image."""
+"""Detection in rendered images to hundredths of a pixel, and reports of faulty images."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def plant(**more: object) -> CameraPlant:
     return CameraPlant(**{**made, **more})
 
 
-def test_corners_are_found_to_hundredths_of_a_pixel_where_opencv_finds_tenths() -> None:
+def test_corners_are_ten_times_as_accurate_as_those_of_opencv() -> None:
     camera, detector = SimCamera(plant()), MarkerDetector("4X4_100")
     settings = cv2.aruco.DetectorParameters()
     settings.cornerRefinementMethod = cv2.aruco.CORNER_REFINE_SUBPIX
@@ -66,7 +66,7 @@ def test_corners_are_found_to_hundredths_of_a_pixel_where_opencv_finds_tenths() 
     assert np.median(off) < 0.4 * np.median(other)
 
 
-def test_an_image_that_shows_nothing_is_told_why() -> None:
+def test_an_image_without_markers_is_reported_with_the_reason() -> None:
     camera, detector = SimCamera(plant()), MarkerDetector("4X4_100")
     state = next(iter(random_poses(BOX, 1, 6)))
     camera.dark = True
@@ -81,7 +81,7 @@ def test_an_image_that_shows_nothing_is_told_why() -> None:
         MarkerDetector("4x4")
 
 
-def test_a_mirrored_sheet_and_one_that_is_there_twice_are_seen() -> None:
+def test_mirrored_and_duplicate_sheets_are_detected() -> None:
     at = [(-0.2, 0.1, 0.0), (0.2, 0.1, 0.0), (0.0, -0.2, 0.0)]
     markers = (
         MarkerPlant(id=5, size_m=0.2, position_m=at[0]),
@@ -96,7 +96,7 @@ def test_a_mirrored_sheet_and_one_that_is_there_twice_are_seen() -> None:
     assert not sight.corners_px
 
 
-def test_intrinsics_of_a_board_are_the_true_ones_within_what_they_say() -> None:
+def test_intrinsics_from_a_board_are_true_within_their_uncertainty() -> None:
     camera = SimCamera(plant(grids=(), board=BoardPlant(), samples=16))
     states = random_poses(Box((-0.06, -0.05, 0.3), (0.06, 0.05, 0.55), 45.0), 14, 8)
     images = [(f"{k}", camera.grab(state)) for k, state in enumerate(states)]
@@ -126,7 +126,7 @@ def test_intrinsics_of_a_board_are_the_true_ones_within_what_they_say() -> None:
         (Board(), True, "markers read as mirror images: is the board, or the image, so"),
     ],
 )
-def test_a_board_that_is_another_than_told_is_said_to_be(
+def test_a_board_that_differs_from_its_description_is_reported(
     board: Board, flipped: bool, said: str
 ) -> None:
     camera = SimCamera(plant(grids=(), board=BoardPlant(), samples=16))
@@ -137,7 +137,7 @@ def test_a_board_that_is_another_than_told_is_said_to_be(
 
 
 @pytest.mark.parametrize("name", ["DICT_6X6_250", "6x6_250", "nonsense"])
-def test_a_set_of_markers_that_opencv_lacks_is_reported_with_what_is_meant(name: str) -> None:
+def test_an_unknown_marker_dictionary_is_reported_with_a_suggestion(name: str) -> None:
     said = "did you mean '6X6_250'" if "6" in name else "allowed: 4X4_50, 4X4_100"
     for made in (lambda: MarkerDetector(name), Board(dictionary=name).made):
         with pytest.raises(InvalidRequestError, match=said):

@@ -1,4 +1,4 @@
-"""Maps from corners: how near the truth, how well they know it, and what they say is wrong."""
+"""Marker maps from corners: accuracy, standard deviations, and reported faults."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ from cdpr_rt.errors import InvalidRequestError
 
 SHEETS = MarkerSheets(size_m=0.15)
 ODD = 9
-"""A marker in the middle of the room."""
+"""The number of a marker in the middle of the room."""
 
 
 @pytest.fixture(scope="module")
@@ -60,7 +60,7 @@ def known_places(one: Room, *ids: int) -> tuple[KnownMarker, ...]:
     )
 
 
-def test_a_map_is_as_near_the_truth_as_it_says(one: Room, plain: MapFit) -> None:
+def test_a_map_is_as_accurate_as_it_claims(one: Room, plain: MapFit) -> None:
     assert not plain.faults
     assert not plain.warnings
     assert verdict(plain).startswith("good: 20 markers from 25 images")
@@ -71,7 +71,7 @@ def test_a_map_is_as_near_the_truth_as_it_says(one: Room, plain: MapFit) -> None
     assert plain.bundle.sigma_px == pytest.approx(0.05, rel=0.1)
 
 
-def test_standard_deviations_are_those_of_many_maps() -> None:
+def test_standard_deviations_agree_with_many_maps() -> None:
     base = room(2, rows=3, columns=4, images=15, noise_px=0.0)
     reference = 5
     chance = np.random.default_rng(9)
@@ -89,7 +89,7 @@ def test_standard_deviations_are_those_of_many_maps() -> None:
     assert np.mean(weighed) == pytest.approx(3.0, rel=0.15)
 
 
-def test_the_fit_is_that_of_an_independent_solver() -> None:
+def test_the_fit_agrees_with_an_independent_solver() -> None:
     base = room(3, rows=2, columns=3, images=4, noise_px=0.1)
     poses = square_poses(base.seen, LENS)
     first = first_map(base.seen, poses)
@@ -109,14 +109,14 @@ def test_the_fit_is_that_of_an_independent_solver() -> None:
 
 
 @pytest.mark.parametrize("seed", [11, 12, 13])
-def test_small_markers_that_can_be_either_way_round_end_up_the_right_way(seed: int) -> None:
+def test_ambiguous_small_markers_get_the_right_orientation(seed: int) -> None:
     one = room(seed, size_m=0.05, noise_px=0.15, tilt_deg=8.0)
     fit = fit_map(one.sightings(), intrinsics(), MarkerSheets(size_m=0.05))
     assert not fit.faults
     assert difference(fit.map, one.truth).rotation_error_rad.max() < 0.06
 
 
-def test_most_of_what_a_map_is_off_across_its_plane_is_the_tilt_of_its_reference_marker() -> None:
+def test_out_of_plane_errors_of_a_map_are_mostly_tilt_of_its_reference_marker() -> None:
     # figures 3.20 and 3.21 of the thesis show errors in the frame of one small marker
     one = room(4, noise_px=0.1)
     fit = fit_map(one.sightings(), intrinsics(), SHEETS, reference=7)
@@ -133,7 +133,7 @@ def test_most_of_what_a_map_is_off_across_its_plane_is_the_tilt_of_its_reference
     assert any("tells little about its tilt" in note for note in fit.notes)
 
 
-def test_markers_never_seen_together_are_islands_with_advice(one: Room) -> None:
+def test_markers_never_seen_together_are_reported_as_islands_with_advice(one: Room) -> None:
     split = []
     for sight in one.sightings():
         left = {i: c for i, c in sight.corners_px.items() if i % 5 < 3}
@@ -157,7 +157,7 @@ def test_a_misread_id_does_not_join_groups_of_markers(one: Room) -> None:
         for sight, which in zip(one.sightings(), [left, right] * 13, strict=False)
     ]
     square = np.array([(300.0, 200.0), (340.0, 202.0), (338.0, 241.0), (299.0, 240.0)])
-    for k in (6, 9):  # one on each side
+    for k in (6, 9):  # one marker of each group
         shown[k] = Sighting(shown[k].name, {**shown[k].corners_px, 33: square}, (34,), (), (35,))
     joined = fit_map(shown, intrinsics(), SHEETS)
     assert difference(joined.map, one.truth).position_error_m.max() > 0.05
@@ -168,13 +168,13 @@ def test_a_misread_id_does_not_join_groups_of_markers(one: Room) -> None:
     assert any("marker 33 read, but not among those laid out" in note for note in fit.notes)
 
 
-def test_without_two_markers_in_an_image_there_is_no_map() -> None:
+def test_a_map_requires_images_with_two_markers() -> None:
     alone = [Sighting("a", {}), Sighting("b", {3: np.zeros((4, 2))})]
     with pytest.raises(InvalidRequestError, match="no image shows two markers"):
         fit_map(alone, intrinsics(), SHEETS)
 
 
-def test_a_marker_that_was_moved_is_named_with_the_image(one: Room) -> None:
+def test_a_moved_marker_is_reported_with_the_image(one: Room) -> None:
     moved = one.with_marker_off(ODD, (0.04, 0.02, 0.0), lambda i: i >= 12)
     fit = fit_map(moved.sightings(), intrinsics(), SHEETS)
     assert len(fit.warnings) == 1
@@ -186,8 +186,8 @@ def test_a_marker_that_was_moved_is_named_with_the_image(one: Room) -> None:
     assert difference(fit.map, one.truth).position_error_m.max() < 0.004
 
 
-def test_a_marker_that_is_partly_covered_is_not_said_to_have_been_moved(one: Room) -> None:
-    # a sheet above hides its right half: these corners are where its edges vanish beneath it
+def test_a_partly_covered_marker_is_not_reported_as_moved(one: Room) -> None:
+    # a sheet above hides the right half: these corners are where edges disappear beneath it
     own = one.truth.rotation[one.truth.ids.index(ODD)]
     hidden = np.array([(0.0, -0.02, 0.0), (-0.07, -0.008, 0.0), (-0.05, 0.0, 0.0), (0.0, 0.0, 0.0)])
     covered = one.with_corners_off(ODD, hidden @ own.T, lambda i: i >= 14)
@@ -201,7 +201,7 @@ def test_a_marker_that_is_partly_covered_is_not_said_to_have_been_moved(one: Roo
     assert len(images) and images.max() < 14
 
 
-def test_a_marker_that_was_moved_twice_is_not_said_to_be_partly_covered(one: Room) -> None:
+def test_a_marker_moved_twice_is_not_reported_as_partly_covered(one: Room) -> None:
     moved = one.with_marker_off(ODD, (0.04, 0.02, 0.0), lambda i: i >= 12)
     moved = moved.with_marker_off(ODD, (0.05, -0.25, 0.0), lambda i: i >= 17)
     fit = fit_map(moved.sightings(), intrinsics(), SHEETS)
@@ -221,7 +221,7 @@ def test_each_faulty_marker_gives_one_warning() -> None:
     assert warnings([], found) == [*said, "marker 2 is there twice"]
 
 
-def test_an_id_that_is_there_twice_is_named(one: Room) -> None:
+def test_a_duplicate_id_is_reported(one: Room) -> None:
     twice = one.with_marker_off(ODD, (0.6, 0.0, 0.0), lambda i: i % 2 == 0)
     fit = fit_map(twice.sightings(), intrinsics(), SHEETS)
     assert any(f"marker {ODD} is there twice" in line for line in fit.warnings)
@@ -230,13 +230,13 @@ def test_an_id_that_is_there_twice_is_named(one: Room) -> None:
     assert "printed twice" in fit_map(both, intrinsics(), SHEETS).warnings[0]
 
 
-def test_a_sheet_of_another_size_is_named_with_its_size(one: Room) -> None:
+def test_a_sheet_of_a_different_size_is_reported_with_its_size(one: Room) -> None:
     told = MarkerSheets(size_m=0.15, sizes=(MarkerSize(ids=(ODD,), size_m=0.145),))
     fit = fit_map(one.sightings(), intrinsics(), told)
     assert f"marker {ODD} is +3." in fit.warnings[0]
 
 
-def test_a_wrong_size_of_all_is_seen_by_known_places_alone(one: Room) -> None:
+def test_only_known_places_reveal_a_wrong_size_of_all_sheets(one: Room) -> None:
     wrong = MarkerSheets(size_m=0.153)
     blind = fit_map(one.sightings(), intrinsics(), wrong)
     assert not blind.faults
@@ -248,7 +248,7 @@ def test_a_wrong_size_of_all_is_seen_by_known_places_alone(one: Room) -> None:
     assert any("0.980" in fault for fault in fit.faults)
 
 
-def test_known_places_give_the_frame_and_are_held(one: Room) -> None:
+def test_known_places_define_the_frame_and_are_kept(one: Room) -> None:
     told = SHEETS.model_copy(update={"known": known_places(one, 0, 8, 19)})
     fit = fit_map(one.sightings(), intrinsics(), told)
     assert not fit.faults
@@ -261,7 +261,7 @@ def test_known_places_give_the_frame_and_are_held(one: Room) -> None:
 
 
 def exchanged(known: tuple[KnownMarker, ...], i: int, j: int) -> tuple[KnownMarker, ...]:
-    """Return known markers of which two have each other's place."""
+    """Return known markers with the places of two exchanged."""
     ids = [one.id for one in known]
     ids[i], ids[j] = ids[j], ids[i]
     return tuple(
@@ -270,7 +270,7 @@ def exchanged(known: tuple[KnownMarker, ...], i: int, j: int) -> tuple[KnownMark
 
 
 @pytest.mark.parametrize("ids", [(0, 19), (0, 8, 19), (0, 4, 15, 19), (0, 3, 4, 8, 15, 19)])
-def test_exchanged_known_markers_are_named_and_do_not_bend_the_map(
+def test_exchanged_known_markers_are_reported_and_do_not_distort_the_map(
     one: Room, ids: tuple[int, ...]
 ) -> None:
     known = exchanged(known_places(one, *ids), 0, len(ids) - 1)
@@ -282,7 +282,7 @@ def test_exchanged_known_markers_are_named_and_do_not_bend_the_map(
     assert np.linalg.norm(off, axis=1).max() < 0.003
 
 
-def test_a_known_place_that_is_wrong_is_named_and_left_out(one: Room) -> None:
+def test_a_wrong_known_place_is_reported_and_omitted(one: Room) -> None:
     known = list(known_places(one, 0, 4, 15, 19))
     x, *rest = known[2].position_m
     known[2] = known[2].model_copy(update={"position_m": (x + 0.2, *rest)})
@@ -291,7 +291,7 @@ def test_a_known_place_that_is_wrong_is_named_and_left_out(one: Room) -> None:
     assert fit.fixed == (0, 4, 19)
 
 
-def test_known_places_of_which_no_majority_agrees_are_all_left_out(one: Room) -> None:
+def test_known_places_without_a_consistent_majority_are_all_omitted(one: Room) -> None:
     known, rng = known_places(one, 0, 4, 15, 19), np.random.default_rng(3)
     off = [tuple((np.array(k.position_m) + rng.uniform(-1, 1, 3)).tolist()) for k in known]
     wrong = tuple(k.model_copy(update={"position_m": p}) for k, p in zip(known, off, strict=True))
@@ -314,16 +314,16 @@ def test_intrinsics_of_another_camera_are_recognised(one: Room, change: tuple[in
         assert fit.lens.focal_change == pytest.approx(-0.0196, abs=0.004)
 
 
-def test_a_reference_that_is_not_there_is_refused(one: Room) -> None:
+def test_a_missing_reference_marker_is_rejected(one: Room) -> None:
     with pytest.raises(InvalidRequestError, match="reference marker 77 is not in the map"):
         fit_map(one.sightings(), intrinsics(), SHEETS, reference=77)
     assert fit_map(one.sightings(), intrinsics(), SHEETS, reference=3).map.reference == 3
 
 
-def test_errors_of_the_sheets_are_in_what_a_map_says_of_itself(one: Room, plain: MapFit) -> None:
+def test_uncertainty_of_a_map_includes_errors_of_the_sheets(one: Room, plain: MapFit) -> None:
     assert plain.bundle.sheets.inflation == 1.0
     chance = np.random.default_rng(6)
-    # told otherwise by 0.2 % each, which is as if the printer had made them so
+    # sizes in the file differ by 0.2 % each, like errors of the printer
     sizes = tuple(
         MarkerSize(ids=(marker,), size_m=float(0.15 * (1.0 + chance.normal(0.0, 0.002))))
         for marker in one.seen.ids
@@ -340,7 +340,7 @@ def test_errors_of_the_sheets_are_in_what_a_map_says_of_itself(one: Room, plain:
 MATRIX = np.array([[LENS[0], 0, LENS[2]], [0, LENS[1], LENS[3]], [0, 0, 1.0]])
 
 
-def test_points_are_seen_where_opencv_has_them() -> None:
+def test_projection_of_points_agrees_with_opencv() -> None:
     chance = np.random.default_rng(3)
     points = np.column_stack([chance.uniform(-0.4, 0.4, (50, 2)), chance.uniform(0.9, 2.0, 50)])
     seen = project(points, LENS)
@@ -348,7 +348,7 @@ def test_points_are_seen_where_opencv_has_them() -> None:
     np.testing.assert_allclose(seen, theirs.reshape(-1, 2), atol=1e-9)
 
 
-def test_one_of_a_squares_two_poses_is_the_true_one() -> None:
+def test_one_of_the_two_poses_of_a_square_is_the_true_one() -> None:
     chance = np.random.default_rng(4)
     turns = Rotation.from_rotvec([np.pi, 0, 0]) * Rotation.from_rotvec(
         chance.normal(0.0, 0.4, (80, 3))
