@@ -59,7 +59,7 @@ class TruePlant:
 
 @numba.njit(cache=True)
 def _advance(par, cog, off, applied, motion, hist, head):
-    """Return a motor's `motion`, th, w, z, tau and t, a cycle later, and the head of `hist`."""
+    """Return a motor's `motion` (th, w, z, tau and t) one cycle later, and the head of `hist`."""
     (coul, brk, vs, visc, s0, s1, asym, kte, J, _, _, tau_c, _, cpk, fpk, tct, rise) = par
     h, size = T / SUB, cog.size - 1
     th, w, z, tau, t = motion
@@ -90,7 +90,7 @@ def _advance(par, cog, off, applied, motion, hist, head):
 
 @numba.njit(cache=True)
 def _latched(par, hist, head, noise):
-    """Return the encoder's reading, of an instant before."""
+    """Return the encoder's reading, which is slightly older than the angle."""
     counts, dsub = par[9], par[12] / (T / SUB)
     dlow = int(dsub)
     dpart = dsub - dlow
@@ -143,7 +143,7 @@ def leg_setpoint(start, speed, cruise, ramp):
 
 
 class Bench:
-    """One motor that lives through legs one after the other."""
+    """One motor that runs legs one after the other and keeps its state between them."""
 
     def __init__(self, plant: TruePlant) -> None:
         self.plant = p = plant
@@ -260,7 +260,7 @@ class Commissioned:
 
 
 def fast_legs(bench):
-    """The legs that tell inertia, latency and the friction curve, under a stiff PID."""
+    """The legs that show inertia, latency and the friction curve, under a stiff PID."""
     gains = design_pid(NOMINAL_INERTIA, LATENCY, 30.0).gains
     legs = [bench.ramp(v, 3, ramp_s=0.1, gains=gains)[0] for v in (300, -300, 600, -600)]
     legs += [bench.triangle(v, 4.0, gains=gains)[0] for v in (90, -90)]
@@ -309,7 +309,7 @@ def judged_turns(setpoint_rad, setpoint_velocity_rad_s, lead_in_rad):
 
 
 def validate(done: Commissioned) -> dict[str, ValidationMetrics]:
-    """The ramps of the thesis' validation, both ways, judged on the true angle."""
+    """The ramps of the thesis' validation in both directions, judged by the true angle."""
     bench, plant = done.bench, done.bench.plant
     gains = design_pid(done.harmonic.inertia_kg_m2.value, LATENCY, BANDWIDTH).gains
     latency = plant.delay + 1.5 * T + 1 / (2 * math.pi * plant.current_Hz)

@@ -1,4 +1,4 @@
-"""A stored profile comes back as it was, and is refused where it does not belong."""
+"""A stored profile is read back unchanged, and is rejected for another motor or drive."""
 
 import json
 import re
@@ -65,28 +65,28 @@ def profile() -> CoggingProfile:
     )
 
 
-def test_round_trip(tmp_path):
+def test_a_profile_is_read_back_unchanged(tmp_path):
     path = tmp_path / "p.json"
     profile().save(path)
     assert CoggingProfile.load(path) == profile()
     assert [p.name for p in tmp_path.iterdir()] == ["p.json"]
 
 
-def test_compensation_is_what_was_stored():
+def test_compensation_has_the_stored_values():
     axis = profile().compensation("harmonic", IDENTITY, BOUNDS)
     assert axis.table_Nm.shape == (2, 16)
     assert axis.look_ahead_s == 0.002
     assert axis.friction.coulomb_backward_Nm == 0.07
 
 
-def test_another_drive_is_refused_by_name():
+def test_each_different_key_of_another_drive_is_named():
     for key, mine in IDENTITY.model_dump().items():
         other = IDENTITY.model_copy(update={key: 99})
         with pytest.raises(CoggingProfileError, match=f"{key} = {mine}.*99"):
             profile().compensation("harmonic", other, BOUNDS)
 
 
-def test_another_motor_is_refused():
+def test_a_profile_of_another_motor_is_rejected():
     with pytest.raises(CoggingProfileError, match=r"MPP0923D.*MPP1003D"):
         profile().compensation("harmonic", IDENTITY, MotorBounds(OTHER))
 
@@ -118,7 +118,7 @@ def spoil(change):
         ),
     ],
 )
-def test_a_damaged_file_is_refused_with_the_reason(tmp_path, text, message):
+def test_a_damaged_file_is_rejected_with_the_reason(tmp_path, text, message):
     path = tmp_path / "p.json"
     path.write_text(text())
     with pytest.raises(CoggingProfileError, match=re.escape(message)) as error:
@@ -126,13 +126,13 @@ def test_a_damaged_file_is_refused_with_the_reason(tmp_path, text, message):
     assert str(path) in str(error.value)
 
 
-def test_a_missing_file_is_refused(tmp_path):
+def test_a_missing_file_is_rejected(tmp_path):
     with pytest.raises(CoggingProfileError, match="cannot be read"):
         CoggingProfile.load(tmp_path / "none.json")
 
 
 def changed(path: str, value: object) -> CoggingProfile:
-    """Return the profile with one value replaced, the place given as `harmonic.friction.x`."""
+    """Return the profile with one value replaced; its path is as in `harmonic.friction.x`."""
     data = json.loads(profile().model_dump_json(by_alias=True))
     here, *keys, last = data, *path.split(".")
     for key in keys:
@@ -181,12 +181,12 @@ def test_values_impossible_for_the_motor_are_rejected(
             use()
 
 
-def test_friction_in_the_tables_is_no_bias() -> None:
+def test_friction_in_the_tables_is_not_rejected_as_bias() -> None:
     level = [0.3] * 16, [-0.3] * 16
     changed("thesis.table_Nm", level).require_true_of(BOUNDS)
 
 
-def test_an_axis_that_may_use_little_torque_allows_little_compensation() -> None:
+def test_a_table_above_the_torque_limit_of_the_axis_is_rejected() -> None:
     profile().require_true_of(BOUNDS)
     with pytest.raises(CoggingProfileError, match=r"allowed: -0.1 to 0.1 Nm, the axis' torque"):
         profile().require_true_of(MotorBounds(MOTOR, 0.1))
@@ -195,7 +195,7 @@ def test_an_axis_that_may_use_little_torque_allows_little_compensation() -> None
 
 @pytest.mark.parametrize("key", ["look_ahead_s", "observer_s"])
 @pytest.mark.parametrize("value", ["NaN", "1e999", "-1.0", "10.0", "1" * 6000])
-def test_a_time_that_is_none_is_refused(tmp_path, key, value):
+def test_an_invalid_time_is_rejected(tmp_path, key, value):
     path = tmp_path / "p.json"
     path.write_text(
         re.sub(

@@ -1,4 +1,4 @@
-"""Whole commissionings of simulated motors: what must come out, and against an oracle."""
+"""Whole commissionings of simulated motors: required results, and results beside an oracle's."""
 
 import math
 
@@ -35,7 +35,7 @@ def default():
     return commission(TruePlant())
 
 
-def test_default_motor_is_identified(default):
+def test_the_default_motor_is_identified(default):
     harmonic, plant = default.harmonic, default.bench.plant
     assert harmonic.orders == (4,)
     amplitude = true_amplitude(default.bench, 0.06)
@@ -52,7 +52,7 @@ def test_default_motor_is_identified(default):
     assert harmonic.harmonics[0].per_pole_pair == 1.0
 
 
-def test_default_motor_runs_smoothly(default):
+def test_the_default_motor_runs_smoothly_under_compensation(default):
     figures = validate(default)
     thesis = ratios(figures["none"], figures["thesis"])
     harmonic = ratios(figures["none"], figures["harmonic"])
@@ -65,7 +65,7 @@ def test_default_motor_runs_smoothly(default):
     assert_near_oracle(figures)
 
 
-def test_slots_with_runaway_odd_encoder_and_drift():
+def test_a_motor_with_slots_runaway_odd_encoder_and_drift_is_identified():
     plant = TruePlant(
         terms=((24, 0.04, 10.0), (72, 0.02, 33.0)),
         counts=10007,
@@ -84,7 +84,7 @@ def test_slots_with_runaway_odd_encoder_and_drift():
     assert_near_oracle(validate(done))
 
 
-def test_low_friction_and_offset_ripple():
+def test_ripple_by_current_sensor_offset_is_found_at_low_friction():
     plant = TruePlant(
         terms=((24, 0.01, 3.0),),
         offset_terms=((4, 0.08, 17.0),),
@@ -100,7 +100,7 @@ def test_low_friction_and_offset_ripple():
     assert_near_oracle(validate(done))
 
 
-def test_motor_without_cogging_gets_no_order():
+def test_a_motor_without_cogging_has_no_harmonic_orders():
     bench = Bench(TruePlant(terms=()))
     sweeps = [bench.ramp(v, 1, lead=0.05, kp=1.9)[0] for v in (3, -3)]
     found = identify_harmonic_model(sweeps, 1.13e-4, 0.0023, 4)

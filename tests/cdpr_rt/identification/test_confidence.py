@@ -1,4 +1,4 @@
-"""The intervals that are reported hold the truth about as often as they claim."""
+"""The reported intervals contain the truth about as often as they claim."""
 
 import numpy as np
 import pytest
@@ -20,7 +20,7 @@ pytestmark = pytest.mark.long
 TERMS = ((1, 0.01, 5.0), (4, 0.05, 1.0), (24, 0.02, 9.0))
 
 
-def test_intervals_cover_the_truth():
+def test_intervals_contain_the_truth_as_often_as_claimed():
     inside, widths = [], []
     first = None
     for seed in range(4):

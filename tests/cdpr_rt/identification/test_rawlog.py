@@ -1,4 +1,4 @@
-"""Raw logs survive what happens to files."""
+"""Raw logs: truncated and damaged files, and full disks."""
 
 from pathlib import Path
 
@@ -18,7 +18,7 @@ def write(path: Path) -> None:
     log.close()
 
 
-def test_round_trip(tmp_path: Path) -> None:
+def test_a_log_is_read_back_unchanged(tmp_path: Path) -> None:
     write(tmp_path / "a.raw")
     log = read_raw_log(tmp_path / "a.raw")
     assert log.complete
@@ -26,7 +26,7 @@ def test_round_trip(tmp_path: Path) -> None:
     np.testing.assert_array_equal(log.column("position_rad"), ROWS[:, 2])
 
 
-def test_cut_short_keeps_whole_rows(tmp_path: Path) -> None:
+def test_a_truncated_file_keeps_its_whole_rows(tmp_path: Path) -> None:
     path = tmp_path / "a.raw"
     write(path)
     data = path.read_bytes()
@@ -37,7 +37,7 @@ def test_cut_short_keeps_whole_rows(tmp_path: Path) -> None:
         np.testing.assert_array_equal(log.rows, ROWS[: (240 - cut) // 24])
 
 
-def test_refusals_name_the_file(tmp_path: Path) -> None:
+def test_errors_of_unreadable_logs_state_the_reason(tmp_path: Path) -> None:
     path = tmp_path / "a.raw"
     with pytest.raises(RawLogError, match=r"a\.raw"):
         read_raw_log(path)
@@ -54,7 +54,7 @@ def test_refusals_name_the_file(tmp_path: Path) -> None:
         read_raw_log(path).column("effort_Nm")
 
 
-def test_full_disk_is_one_clear_error() -> None:
+def test_a_full_disk_is_one_clear_error() -> None:
     full = Path("/dev/full")
     with pytest.raises(RawLogError, match="cannot record: No space left"):
         RawLogWriter(full, ["cycle"], {})

@@ -1,4 +1,4 @@
-"""The fit of gain and friction on made-up measurements, and what it refuses."""
+"""The fit of gain and friction to made-up measurements, and what it rejects."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def points(
     share=st.floats(0.0, 0.2),
     bias=st.floats(-0.05, 0.05),
 )
-def test_exact_measurements_give_the_exact_truth(
+def test_exact_measurements_give_the_exact_parameters(
     gain: float, friction: float, share: float, bias: float
 ) -> None:
     found = identify_tension_gain(points([20.0, 50.0, 100.0], gain, friction, share, bias), NOMINAL)
@@ -58,7 +58,7 @@ def test_exact_measurements_give_the_exact_truth(
     assert found.bias_Nm.value == pytest.approx(bias, abs=1e-9)
 
 
-def test_the_interval_holds_the_truth_as_often_as_it_says() -> None:
+def test_the_interval_contains_the_truth_as_often_as_claimed() -> None:
     inside = 0
     for seed in range(300):
         noise = np.random.default_rng(seed)
@@ -67,7 +67,7 @@ def test_the_interval_holds_the_truth_as_often_as_it_says() -> None:
     assert 270 <= inside <= 299  # 95 %
 
 
-def test_cogging_is_taken_out_along_a_pull() -> None:
+def test_cogging_along_a_pull_is_fitted_and_removed() -> None:
     tensions = list(np.linspace(10.0, 80.0, 200))
     noise = np.random.default_rng(3)
     pull = points(tensions, cogging=0.06, noise=noise)
@@ -78,7 +78,7 @@ def test_cogging_is_taken_out_along_a_pull() -> None:
     assert blind.residual_rms_Nm > 10 * found.residual_rms_Nm
 
 
-def test_a_course_of_like_errors_counts_for_fewer_measurements() -> None:
+def test_correlated_errors_widen_the_interval() -> None:
     tensions = list(np.linspace(10.0, 80.0, 200))
     pull = points(tensions, noise=np.random.default_rng(5))
     wavy = [
@@ -91,28 +91,32 @@ def test_a_course_of_like_errors_counts_for_fewer_measurements() -> None:
     assert blurred.gain_m.half_width > 2 * sharp.gain_m.half_width
 
 
-def refused(made: list[TorquePoint], what: str, **more: Any) -> None:
+def assert_rejected(made: list[TorquePoint], what: str, **more: Any) -> None:
     with pytest.raises(CalibrationRefusedError, match=what):
         identify_tension_gain(made, NOMINAL, **more)
 
 
-def test_measurements_that_support_nothing_are_refused() -> None:
-    refused(points([20.0, 50.0]), "2 tensions were measured winding in; at least 3")
-    refused(points([20.0, 50.0, 80.0])[:3], "0 tensions were measured paying out")
-    refused(points([50.0, 55.0, 60.0]), r"reach from 50.0 to 60.0 N")
-    refused(points([20.0, 50.0, 80.0], gain=-0.026, share=0.0), "cable_sign")
-    refused(points([20.0, 50.0, 80.0], gain=0.052, share=0.0), "far from the geometry's 26.00")
-    refused(points([20.0, 50.0, 80.0], friction=-0.2, share=0.0), "sign exchanged")
+def test_measurements_that_are_too_few_or_too_poor_are_rejected() -> None:
+    assert_rejected(points([20.0, 50.0]), "2 tensions were measured winding in; at least 3")
+    assert_rejected(points([20.0, 50.0, 80.0])[:3], "0 tensions were measured paying out")
+    assert_rejected(points([50.0, 55.0, 60.0]), r"reach from 50.0 to 60.0 N")
+    assert_rejected(points([20.0, 50.0, 80.0], gain=-0.026, share=0.0), "cable_sign")
+    assert_rejected(
+        points([20.0, 50.0, 80.0], gain=0.052, share=0.0), "far from the geometry's 26.00"
+    )
+    assert_rejected(points([20.0, 50.0, 80.0], friction=-0.2, share=0.0), "sign exchanged")
     wild = [
         TorquePoint(p.tension_N, p.torque_Nm + 0.3 * (-1) ** i, p.winding_in)
         for i, p in enumerate(points([20.0, 50.0, 80.0]))
     ]
-    refused(wild, "the gain is uncertain by")
+    assert_rejected(wild, "the gain is uncertain by")
 
 
-def test_a_pull_too_short_to_tell_cogging_from_gain_is_refused() -> None:
+def test_a_pull_too_short_to_separate_cogging_from_gain_is_rejected() -> None:
     short = [
         TorquePoint(p.tension_N, p.torque_Nm, p.winding_in, 0.001 * p.tension_N)
         for p in points(list(np.linspace(10.0, 80.0, 50)), cogging=0.06)
     ]
-    refused(short, "cannot tell gain, friction and cogging apart|is uncertain by", cogging_order=4)
+    assert_rejected(
+        short, "cannot tell gain, friction and cogging apart|is uncertain by", cogging_order=4
+    )

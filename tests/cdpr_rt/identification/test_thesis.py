@@ -1,4 +1,4 @@
-"""The thesis' curves: average, filter, repair."""
+"""The thesis' cogging curves: averaging, filtering and repair."""
 
 import math
 
@@ -29,7 +29,7 @@ def curve(direction):
     return lambda a: 0.06 * np.sin(4 * a + 0.3) + direction * 0.09
 
 
-def test_curve_and_mean_are_found():
+def test_the_curve_and_its_mean_are_found():
     found = identify_thesis([sweep(1, curve(1)), sweep(-1, curve(-1))])
     grid = np.arange(GRID) * 2 * math.pi / GRID + math.pi / GRID
     assert found.mean_Nm == pytest.approx([0.09, -0.09], abs=1e-4)
@@ -39,7 +39,7 @@ def test_curve_and_mean_are_found():
         assert np.max(np.abs(row - 0.06 * np.sin(4 * grid + 0.3))) < 1e-3
 
 
-def test_filter_is_a_quadratic_over_five_degrees():
+def test_the_filter_is_a_quadratic_over_five_degrees():
     def spike(a):
         return np.where(np.abs(np.degrees(a) % 360.0 - 100.0) < 0.05, 1.0, 0.0)
 
@@ -48,7 +48,7 @@ def test_filter_is_a_quadratic_over_five_degrees():
     assert (touched[-1] - touched[0]) * 360.0 / GRID == pytest.approx(5.0, abs=0.3)
 
 
-def test_runaway_is_repaired_from_the_other_direction():
+def test_a_runaway_is_repaired_from_the_other_direction():
     lost = ((30.0, 50.0), (200.0, 215.0))
     found = identify_thesis([sweep(1, curve(1), lost), sweep(-1, curve(-1))])
     assert found.repaired[0].mean() == pytest.approx(35.0 / 360.0, rel=0.25)
@@ -69,7 +69,7 @@ def test_a_missing_direction_is_named():
         identify_thesis([sweep(1, curve(1))])
 
 
-def test_broken_records_are_refused():
+def test_broken_records_are_rejected():
     good = sweep(1, curve(1))
     with pytest.raises(IdentificationError, match="no recorded run"):
         identify_thesis([])

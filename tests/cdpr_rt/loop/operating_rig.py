@@ -1,4 +1,4 @@
-"""A loop and its operator on a machine of two free inertias (a stand-in: no bus is wanted here)."""
+"""A loop and its operator on two free inertias in place of a machine, without a bus."""
 
 from __future__ import annotations
 
@@ -79,7 +79,7 @@ class Inertias:
 
 
 class Bench:
-    """Implements `Machine` over one device whose drives do at once what they are told."""
+    """Implements `Machine` over one device whose drives obey immediately."""
 
     failures: tuple[type[Exception], ...] = (ConnectionError,)
     read_only = has_brakes = False
@@ -120,7 +120,7 @@ class Bench:
         return True
 
     def set_brakes(self, _released: bool) -> None:
-        """There are none."""
+        """Do nothing: there are no brakes."""
 
     def nothing(self) -> str:
         return ""
@@ -151,14 +151,14 @@ class Rig:
         self.operator.check()
         self.operator.enable()
         self.began = device.feedback.cycle
-        """The last cycle before whatever comes."""
+        """The last cycle before the motion of the test."""
 
     def _asked(self) -> bool:
         return self.stop()
 
     @property
     def cycle(self) -> int:
-        """Cycles since it got its power."""
+        """Cycles since power was switched on."""
         return self.device.feedback.cycle - self.began
 
     def follow(self, motion: Any = None, by: Any = None, log: Any = None) -> None:

@@ -27,7 +27,7 @@ def _put(engine: SimpleNamespace, source: str, value: Any) -> None:
 
 
 def _engine() -> SimpleNamespace:
-    """Return something that has a value of its own at the source of each field."""
+    """Return a stand-in for the engine that has a different value at each field's source."""
     engine, random = SimpleNamespace(), np.random.default_rng(3)
     for number, field in enumerate(SCALAR_FIELDS):
         _put(engine, field.source, number)
@@ -47,7 +47,7 @@ def _at(engine: Any, source: str) -> Any:
 
 
 def test_each_field_is_written_from_its_source() -> None:
-    """All of a row, at the places of the second cycle as of the first."""
+    """Also in the second row, after values have changed in place."""
     block = SharedBlock.create(_N, 1.0, 500.0)
     rows, engine = CycleRows(block), _engine()
     rows.follow(engine)
@@ -66,8 +66,7 @@ def test_each_field_is_written_from_its_source() -> None:
 @pytest.mark.parametrize(
     "array", [np.zeros(_N, np.float32), np.zeros(_N + 1), np.zeros(2 * _N)[::2]]
 )
-def test_an_array_of_another_layout_is_refused(array: Any) -> None:
-    """Its bytes would be something else."""
+def test_an_array_of_another_layout_is_rejected(array: Any) -> None:
     rows, engine = CycleRows(SharedBlock.create(_N, 1.0, 500.0)), _engine()
     _put(engine, FIELDS["tension_N"].source, array)
     with pytest.raises(TypeError, match=r"estimate\.tension_N: .*allowed: .*contiguous"):
@@ -76,16 +75,16 @@ def test_an_array_of_another_layout_is_refused(array: Any) -> None:
 
 @pytest.mark.parametrize("kind", ["?", "<u1", "<u2", "<i2", "<u4", "<i4", "<u8", "<i8", "<f8"])
 def test_a_scalar_of_any_kind_is_packed_as_numpy_reads_it(kind: str) -> None:
-    """Also of kinds that no field is of yet."""
+    """Also kinds that no field has yet."""
     assert np.frombuffer(struct.pack(f"<{_CODES[kind]}", 1), kind).tolist() == [1]
 
 
-def test_every_field_says_what_it_means() -> None:
-    """And is in the row once."""
+def test_every_field_has_a_meaning() -> None:
+    """And each field is in the row once."""
     assert all(field.meaning for field in FIELDS.values())
     assert [name for name in cycle_dtype(_N).names or () if name != "spare"] == list(FIELDS)
 
 
-def test_the_page_of_recordings_names_every_field() -> None:
+def test_the_page_on_recordings_names_every_field() -> None:
     page = (Path(__file__).parents[3] / "docs" / "how-to" / "recordings.md").read_text()
     assert [name for name in FIELDS if f"`{name}`" not in page] == []

@@ -1,4 +1,4 @@
-"""What fails besides the first cause while a robot reacts to a fault."""
+"""Further faults while a robot reacts to its first fault."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ SWITCH = Fault(Limit.SAFETY_STOP, 1, "limit_switch", "chain", detail="the limit 
 def reacting(
     *explained: Fault, last: LastLengths | None = None
 ) -> tuple[SafeStop, Supervisor, Cycle, Lifecycle]:
-    """Return what reacts on two axes, whose machine finds `explained` in the end."""
+    """Return a safe stop of two axes and its parts; its machine explains it by `explained`."""
     cycle, supervisor = Cycle(), Supervisor(SAFE, 2, PERIOD_S)
     parts = SimpleNamespace(
         supervisor=supervisor,
@@ -42,7 +42,7 @@ def reacting(
     return safe_stop, supervisor, cycle, engine.life
 
 
-def test_each_fault_that_is_reported_in_a_cycle_keeps_its_code_and_its_words() -> None:
+def test_faults_reported_in_one_cycle_keep_their_codes_and_texts() -> None:
     safe_stop, supervisor, cycle, life = reacting(DRIVE, SWITCH)
     cycle.check(supervisor)
     supervisor.report(DRIVE)
@@ -65,7 +65,7 @@ def test_each_fault_that_is_reported_in_a_cycle_keeps_its_code_and_its_words() -
         (Fault(Limit.SAFETY_ALARM, code="watchdog"), False),
     ],
 )
-def test_a_safety_stop_takes_the_place_of_a_cause_that_its_open_chain_explains(
+def test_a_safety_stop_replaces_a_cause_that_its_open_chain_explains(
     cause: Fault, replaced: bool
 ) -> None:
     safe_stop, supervisor, _, life = reacting(SWITCH)
@@ -75,14 +75,14 @@ def test_a_safety_stop_takes_the_place_of_a_cause_that_its_open_chain_explains(
     assert set(life.faults.values()) == {SWITCH, cause}
 
 
-def test_a_cable_that_breaks_after_its_tension_was_the_cause_is_recorded_once() -> None:
+def test_a_cable_that_breaks_after_a_tension_fault_is_recorded_once() -> None:
     last = LastLengths()
     safe_stop, supervisor, cycle, life = reacting(last=last)
     life.enter(LoopState.ACTIVE)
     life.set_cause(Fault(Limit.TENSION_HIGH, 1), Reaction.CONTROLLED_STOP)
 
     def see(tension_N: float) -> bool:
-        """Return whether the status must be published for it."""
+        """Return whether this tension has the status published."""
         life.changed = False
         cycle.estimate.tension_N[1] = tension_N
         cycle.check(supervisor)
@@ -99,7 +99,7 @@ def test_a_cable_that_breaks_after_its_tension_was_the_cause_is_recorded_once() 
     assert last.broken.count("broken") == 1
 
 
-def test_a_tension_that_rises_in_a_reaction_publishes_the_status_once() -> None:
+def test_a_tension_that_rises_during_the_reaction_publishes_the_status_once() -> None:
     life = Lifecycle()
     life.set_cause(Fault(Limit.SPEED, 0), Reaction.CONTROLLED_STOP)
     for value_N in (120, 130, 140):
@@ -109,7 +109,7 @@ def test_a_tension_that_rises_in_a_reaction_publishes_the_status_once() -> None:
     assert [fault.value for fault in life.further] == [140]
 
 
-def test_two_buses_that_are_off_are_two_faults() -> None:
+def test_two_buses_that_are_off_are_recorded_as_two_faults() -> None:
     first, second = (
         Fault(Limit.DRIVE, code=BUS_OFF, source=bus, detail=f"{bus} is off") for bus in "AB"
     )
@@ -120,7 +120,7 @@ def test_two_buses_that_are_off_are_two_faults() -> None:
     assert list(life.faults.values()) == [first, second]
 
 
-def test_a_drive_that_falls_silent_is_one_fault_with_the_code_of_the_drive() -> None:
+def test_a_silent_drive_is_recorded_as_one_fault_with_the_code_of_the_drive() -> None:
     silent = Fault(Limit.DRIVE, 0, "silent", "node 1", 4.0, 3.0)
     safe_stop, _, _, life = reacting()
     life.set_cause(Fault(Limit.MISSED, 0, value=3.0, allowed=3.0), Reaction.CONTROLLED_STOP)

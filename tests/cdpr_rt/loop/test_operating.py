@@ -1,4 +1,4 @@
-"""What a procedure does with a loop: motions run and recorded, and every way in which they end."""
+"""A procedure's motions in the loop: how they run, are recorded and end."""
 
 from __future__ import annotations
 
@@ -29,8 +29,8 @@ from tests.cdpr_rt.loop.operating_rig import (
 )
 
 
-class At:
-    """A watch that speaks up from a cycle of the device on."""
+class WatchWithFault:
+    """A watch that reports a fault from a cycle of the device on."""
 
     def __init__(self, device: Inertias, alarm: str = "", stop: str = "") -> None:
         self.device, self.cycle, self.texts = device, 10**9, (alarm, stop)
@@ -43,7 +43,7 @@ class At:
         return Fault(limit, detail=alarm or stop)
 
 
-def test_follows_a_leg_and_records_every_cycle(tmp_path: Path) -> None:
+def test_a_leg_is_followed_and_every_cycle_recorded(tmp_path: Path) -> None:
     writer = log(tmp_path / "a.raw")
     with powered() as rig:
         rig.follow(log=writer)
@@ -52,7 +52,7 @@ def test_follows_a_leg_and_records_every_cycle(tmp_path: Path) -> None:
     recorded = read_raw_log(tmp_path / "a.raw")
     np.testing.assert_array_equal(recorded.column("cycle") - began, np.arange(1, 702))
     np.testing.assert_allclose(device.angle, [0.6, -0.6], atol=0.06)
-    # what was recorded as sent is what acted: the motion can be computed from the file alone
+    # the recorded torque acted: the motion can be computed from the file alone
     torque = recorded.column("torque_sent_Nm", 1)
     speed = angle = 0.0
     angles = []
@@ -79,7 +79,7 @@ def test_a_motion_longer_than_the_ring_loses_no_row(tmp_path: Path) -> None:
     assert told == pytest.approx(0.128 * np.arange(1, 72))
 
 
-def test_motions_follow_each_other_with_no_torque_in_between() -> None:
+def test_no_torque_remains_between_two_motions() -> None:
     with powered() as rig:
         for _ in range(2):
             start = rig.device.angle.copy()
@@ -91,7 +91,7 @@ def test_motions_follow_each_other_with_no_torque_in_between() -> None:
         assert rig.machine.power
 
 
-def test_bridges_few_missing_answers_and_trips_on_more() -> None:
+def test_three_missing_answers_are_tolerated_and_more_trip() -> None:
     with powered() as rig:
         rig.device.silent = {rig.began + k for k in (50, 51, 52)}
         rig.follow()
@@ -103,7 +103,7 @@ def test_bridges_few_missing_answers_and_trips_on_more() -> None:
         assert not rig.machine.power
 
 
-def test_alarm_speed_and_following_error_end_the_motion_without_torque() -> None:
+def test_alarm_speed_and_following_error_trip_the_motion() -> None:
     with powered() as rig:
         rig.device.alarm_at = rig.began + 100
         with pytest.raises(TripError, match="told to stop"):
@@ -124,7 +124,7 @@ def test_alarm_speed_and_following_error_end_the_motion_without_torque() -> None
             rig.follow()
 
 
-def test_a_motion_that_was_ended_may_be_tried_again_once_it_is_acknowledged(
+def test_a_motion_can_be_repeated_after_its_fault_is_acknowledged(
     tmp_path: Path,
 ) -> None:
     with powered() as rig:
@@ -177,7 +177,7 @@ def test_a_requested_stop_brakes_along_the_set_point(tmp_path: Path) -> None:
     assert np.all(np.abs(np.diff(velocity)) < 0.011)
 
 
-def test_a_lost_bus_costs_no_row_that_was_measured(tmp_path: Path) -> None:
+def test_a_lost_bus_loses_no_measured_row(tmp_path: Path) -> None:
     class Cut(Inertias):
         last = 10**9
 
@@ -200,7 +200,7 @@ def test_a_lost_bus_costs_no_row_that_was_measured(tmp_path: Path) -> None:
     assert len(read_raw_log(tmp_path / "a.raw").rows) == 500
 
 
-def test_a_stop_asked_for_beforehand_begins_nothing() -> None:
+def test_an_earlier_stop_request_prevents_any_motion() -> None:
     with powered() as rig:
         rig.stop = lambda: True
         with pytest.raises(InterruptedMotionError):
@@ -208,7 +208,7 @@ def test_a_stop_asked_for_beforehand_begins_nothing() -> None:
         with pytest.raises(InterruptedMotionError, match="before anything"):
             rig.operator.wait(lambda: False, 1.0, "anything")
         assert rig.cycle == 0
-        rig.operator.disable()  # which is always done
+        rig.operator.disable()  # a procedure always ends with this
         assert not rig.machine.power
         with pytest.raises(InterruptedMotionError):
             rig.operator.enable()
@@ -227,14 +227,14 @@ def test_a_full_disk_ends_the_motion_without_torque() -> None:
         assert np.all(rig.device.pending == 0.0)
 
 
-def test_until_ends_a_motion_in_its_cycle() -> None:
+def test_a_motion_ends_in_the_cycle_of_its_condition() -> None:
     with powered() as rig:
         rig.operator.follow(controller(), leg(), until=lambda: rig.cycle == 30)
-        assert rig.cycle == 31  # one more takes the torque back
+        assert rig.cycle == 31  # one more cycle takes the torque away
         assert not rig.device.pending.any()
 
 
-def test_waiting_ends_by_condition_or_time_of_the_bus() -> None:
+def test_waiting_ends_by_its_condition_or_after_its_time_in_cycles() -> None:
     with powered() as rig:
         rig.operator.wait(lambda: rig.cycle >= 30, 1.0, "the index")
         assert rig.cycle == 30
@@ -243,7 +243,7 @@ def test_waiting_ends_by_condition_or_time_of_the_bus() -> None:
         assert rig.cycle == 130
 
 
-def test_drives_that_move_by_themselves_are_not_judged_by_where_they_are() -> None:
+def test_positions_are_not_supervised_while_drives_move_their_motors() -> None:
     with powered() as rig:
         rig.operator.disable()
 
@@ -257,7 +257,7 @@ def test_drives_that_move_by_themselves_are_not_judged_by_where_they_are() -> No
         assert rig.loop.life.state is LoopState.READY
 
 
-def test_work_beside_the_cycles_keeps_none_of_them_waiting() -> None:
+def test_a_background_task_does_not_delay_cycles() -> None:
     with powered() as rig:
         clock = rig.loop.engine.machine.clock
 
@@ -273,12 +273,12 @@ def test_work_beside_the_cycles_keeps_none_of_them_waiting() -> None:
         assert not rig.loop.runner.task_running
 
 
-# -- what something beside the axes wants
+# -- alarms and stops from outside the axes
 
 
 def test_an_alarm_takes_the_torque_in_the_same_cycle() -> None:
     device = Inertias()
-    quiet, loud = At(device, "never"), At(device, "input 0 reads 0")
+    quiet, loud = WatchWithFault(device, "never"), WatchWithFault(device, "input 0 reads 0")
     with powered(device, quiet, loud) as rig:
         loud.cycle = rig.began + 200
         speeds = []
@@ -288,12 +288,12 @@ def test_an_alarm_takes_the_torque_in_the_same_cycle() -> None:
             )
         assert len(speeds) == 200
         assert not device.pending.any()
-        assert speeds[-1] > 0.5  # nothing has braked it
+        assert speeds[-1] > 0.5  # without braking
 
 
-def test_a_reason_to_stop_brakes_the_motion_first(tmp_path: Path) -> None:
+def test_a_stop_by_a_watch_brakes_before_torque_is_removed(tmp_path: Path) -> None:
     device, writer = Inertias(), log(tmp_path / "a.raw")
-    watch = At(device, stop="no good poll")
+    watch = WatchWithFault(device, stop="no good poll")
     with powered(device, watch) as rig:
         watch.cycle = rig.began + 200
         with pytest.raises(TripError, match="no good poll"):
@@ -307,8 +307,8 @@ def test_a_reason_to_stop_brakes_the_motion_first(tmp_path: Path) -> None:
     assert abs(velocity[-1]) < 0.05
 
 
-def test_a_braking_motion_may_take_its_time(tmp_path: Path) -> None:
-    """As a mass that is lowered to where it hung."""
+def test_braking_may_take_several_seconds(tmp_path: Path) -> None:
+    """For example a mass that is lowered to where it hung."""
 
     class Slow(TrapezoidalMove):
         def brake(self, time_s: float) -> TrapezoidalMove:
@@ -316,7 +316,7 @@ def test_a_braking_motion_may_take_its_time(tmp_path: Path) -> None:
             return Hold(now.position_rad, 14.0)
 
     device, writer = Inertias(), log(tmp_path / "a.raw")
-    watch = At(device, stop="no good poll")
+    watch = WatchWithFault(device, stop="no good poll")
     with powered(device, watch) as rig:
         watch.cycle = rig.began + 200
         with pytest.raises(TripError, match="no good poll"):
@@ -325,9 +325,9 @@ def test_a_braking_motion_may_take_its_time(tmp_path: Path) -> None:
     assert len(read_raw_log(tmp_path / "a.raw").rows) == 200 + 7000
 
 
-def test_a_watch_ends_waiting_as_well() -> None:
+def test_a_watch_also_ends_waiting() -> None:
     device = Inertias()
-    watch = At(device, stop="no good poll")
+    watch = WatchWithFault(device, stop="no good poll")
     with powered(device, watch) as rig:
         watch.cycle = rig.began + 20
         with pytest.raises(TripError, match="no good poll"):
@@ -342,10 +342,10 @@ def test_paced_cycles_keep_the_period() -> None:
     with powered(Inertias(lockstep=False)) as rig:
         before = rig.operator.lateness.cycles
         rig.follow()
-        assert rig.operator.lateness.cycles - before == 702  # the last one takes the torque back
+        assert rig.operator.lateness.cycles - before == 702  # the last one takes the torque away
 
 
-def test_a_cycle_that_is_held_up_is_counted_and_makes_none_run_in_a_hurry() -> None:
+def test_a_delayed_cycle_is_counted_and_later_cycles_keep_their_period() -> None:
     class HeldUp(Inertias):
         at = 10**9
         held = 0
@@ -370,12 +370,12 @@ def test_a_cycle_that_is_held_up_is_counted_and_makes_none_run_in_a_hurry() -> N
         device.at = rig.began + 50
         rig.operator.wait(lambda: rig.cycle >= 100, 60.0, "some cycles")
         assert rig.operator.lateness.worst_s > 0.04
-        # the cycle after it begins late, and those that follow need their time: none is made up for
+        # the next cycle begins late; it and those that follow take their full period
         syncs = device.syncs[device.held :]
         assert syncs[-1] - syncs[0] > 0.05 + (len(syncs) - 3) * device.period_s
 
 
-def test_a_torque_that_was_computed_from_old_answers_is_not_sent() -> None:
+def test_a_torque_computed_from_old_answers_is_not_sent() -> None:
     class Sends(Inertias):
         def __init__(self) -> None:
             super().__init__(lockstep=False)
@@ -386,7 +386,7 @@ def test_a_torque_that_was_computed_from_old_answers_is_not_sent() -> None:
             self.sent[self.feedback.cycle] = float(self.command.torque_Nm[0])
 
     class Stopped(Proportional):
-        """Its process stands still in one cycle, as one that was sent SIGSTOP."""
+        """Its process stands still in one cycle, as after SIGSTOP."""
 
         at = 0
 
@@ -399,6 +399,6 @@ def test_a_torque_that_was_computed_from_old_answers_is_not_sent() -> None:
     with powered(device) as rig:
         stopped = Stopped(np.zeros(2), np.zeros(2))
         stopped.at = rig.began + 30
-        with suppress(TripError):  # late as it is
+        with suppress(TripError):  # the cycle is late
             rig.follow(by=stopped)
     assert [device.sent[stopped.at - k] for k in (2, 1, 0)] == [0.01, 0.01, 0.0]

@@ -1,4 +1,4 @@
-"""Which core a loop takes for itself, asked in processes of their own."""
+"""The core that a loop reserves, in separate processes."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def stack() -> Iterator[ExitStack]:
 
 
 def _loop(stack: ExitStack) -> str:
-    """Start one; return what it tells, while it goes on holding its core."""
+    """Start a loop; return its output, while it goes on holding its core."""
     process = subprocess.Popen(
         [sys.executable, "-c", CODE], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
     )
@@ -39,7 +39,7 @@ def _loop(stack: ExitStack) -> str:
 
 
 def test_two_loops_do_not_share_a_core(stack: ExitStack) -> None:
-    """Other tests hold cores as well: a loop that finds none says so and stays where it is."""
+    """Other tests hold cores too: a loop that finds no free core reports it and takes none."""
     told = [_loop(stack) for _ in range(2)]
     here = sorted(os.sched_getaffinity(0))
     cores = []

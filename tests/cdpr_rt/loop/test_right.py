@@ -1,4 +1,4 @@
-"""Which grant of the right to move holds, as the loop reads it while the service writes."""
+"""Which grant of the right to move is valid, as the loop reads it while the service writes."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ LONGEST_NS = round(LONGEST_S * 1e9)
 
 
 class Clock:
-    """Stands still; whoever asks it lets something happen between two reads of the memory."""
+    """Stands still; reading it can make something happen between two reads of the memory."""
 
     def __init__(self) -> None:
         self.between: Callable[[], object] = int
@@ -34,7 +34,7 @@ def sides() -> tuple[PublishedRight, RightToMove, Clock]:
 Sides = tuple[PublishedRight, RightToMove, Clock]
 
 
-def test_only_the_newest_grant_holds_and_only_while_its_time_lasts(sides: Sides) -> None:
+def test_only_the_newest_grant_is_valid_until_its_time_ends(sides: Sides) -> None:
     service, loop, _ = sides
     assert loop.current == 0
     first = service.begin(NOW_NS + 1)
@@ -54,13 +54,15 @@ def test_only_the_newest_grant_holds_and_only_while_its_time_lasts(sides: Sides)
     ("ahead_ns", "holds"),
     [(LONGEST_NS, True), (LONGEST_NS + 1, False), (1 << 62, False), (-(1 << 62), False)],
 )
-def test_a_time_that_no_service_gives_is_nobodys(sides: Sides, ahead_ns: int, holds: bool) -> None:
+def test_a_grant_for_longer_than_any_service_gives_is_invalid(
+    sides: Sides, ahead_ns: int, holds: bool
+) -> None:
     service, loop, _ = sides
     number = service.begin(NOW_NS + ahead_ns)
     assert loop.current == (number if holds else 0)
 
 
-def test_a_change_of_hands_in_the_middle_of_a_look_is_nobodys(sides: Sides) -> None:
+def test_a_grant_that_changes_during_a_read_is_invalid(sides: Sides) -> None:
     service, loop, clock = sides
     first = service.begin(NOW_NS + 1)
     clock.between = lambda: service.begin(NOW_NS + 1)
@@ -68,7 +70,7 @@ def test_a_change_of_hands_in_the_middle_of_a_look_is_nobodys(sides: Sides) -> N
     assert loop.current == first + 1
 
 
-def test_motion_is_lost_whenever_the_one_that_holds_is_another(sides: Sides) -> None:
+def test_the_mover_loses_the_right_with_its_grant(sides: Sides) -> None:
     service, loop, _ = sides
     loop.mover = service.begin(NOW_NS + 1)
     assert loop.loss() == ""

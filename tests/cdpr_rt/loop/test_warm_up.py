@@ -1,4 +1,4 @@
-"""After the warm-up no kernel of the cycle is left to be compiled."""
+"""The warm-up compiles every kernel of the cycle."""
 
 from __future__ import annotations
 
@@ -34,14 +34,14 @@ def compiled() -> dict[str, int]:
 
 
 @pytest.mark.parametrize("n", [1, 8])
-def test_the_cycle_compiles_nothing_after_it(n: int) -> None:
+def test_the_cycle_compiles_nothing_after_the_warm_up(n: int) -> None:
     warm_up(n, 1e-3)
     before = compiled()
-    # a kernel that another calls need not have been compiled for itself
+    # a kernel that only other kernels call has no compiled variant
     for name in CYCLE:
         assert max(count for key, count in before.items() if key.startswith(f"{name}.")) > 0
 
-    # as a device has them: rows of larger arrays
+    # rows of larger arrays, as devices use them
     rows, flags = np.zeros((5, n)), np.ones((2, n), bool)
     feedback, setpoint = AxisFeedback(n), Setpoint(n)
     feedback.position_rad, feedback.torque_Nm, feedback.index_rad = rows[0], rows[1], rows[2]
