@@ -405,6 +405,8 @@ class Supervisor:
         self._verdict = self._verdicts[:1]
         self._reported: dict[int, Fault] = {}
         """The findings of this cycle that came from `report`, by row of `_verdicts`."""
+        self._of_no_axis: dict[Limit, Fault] = {}
+        """The findings of this cycle that end a motion and are of no single axis."""
         self._disagree_s = 0.0
         self._suspects: tuple[int, ...] | None = None
         """Axes whose lengths may be wrong, from the first disagreement until they agree."""
@@ -417,6 +419,7 @@ class Supervisor:
         self._window[:] = 0
         self._verdicts[:] = np.zeros(1, VERDICT)
         self._reported.clear()
+        self._of_no_axis.clear()
         self._suspects = None
         self._disagree_s = 0.0
 
@@ -435,6 +438,7 @@ class Supervisor:
         a broken one is detected only by its winch.
         """
         self._reported.clear()
+        self._of_no_axis.clear()
         check = self._kernel(feedback, estimate, setpoint, torque_Nm)
         return check(estimate.elapsed_s, estimate.slack_allowed, paying_out_blind)
 
@@ -503,19 +507,22 @@ class Supervisor:
         if fault.axis >= 0 and reaction > self._verdicts["reaction"][1 + fault.axis]:
             self._verdicts[1 + fault.axis] = verdict
             self._reported[1 + fault.axis] = fault
+        for found in (self.fault(), fault):
+            if found and found.axis < 0 and self._reactions[found.limit] > Reaction.HOLD:
+                self._of_no_axis.setdefault(found.limit, found)
         if reaction > worst:
             self._verdict[0] = verdict
             self._reported[0] = fault
         return max(reaction, worst)
 
     def findings(self) -> Iterator[Fault]:
-        """Yield the findings that end a motion: the worst of each axis and the worst of all.
-
-        The worst of all is yielded only if it is of no single axis (-1).
-        """
-        for row in np.flatnonzero(self._verdicts["reaction"] > Reaction.HOLD):
-            if int(self._verdicts["axis"][row]) == row - 1:
-                yield self._fault(int(row))
+        """Yield the findings that end a motion: those of no single axis, the worst of each axis."""
+        yield from self._of_no_axis.values()
+        for row in np.flatnonzero(self._verdicts["reaction"] > Reaction.HOLD).tolist():
+            if int(self._verdicts["axis"][row]) == row - 1 and (
+                row > 0 or self.limit not in self._of_no_axis
+            ):
+                yield self._fault(row)
 
     def peaks(self) -> list[Fault]:
         """Return which cables exceeded their highest tension since power-on, if only shortly.

@@ -56,6 +56,23 @@ def test_faults_reported_in_one_cycle_keep_their_codes_and_texts() -> None:
     assert not list(supervisor.findings())
 
 
+def test_all_faults_of_no_single_axis_in_a_cycle_are_findings() -> None:
+    alarm = Fault(Limit.SAFETY_ALARM, code="watchdog")
+    lengths = Fault(Limit.LENGTHS, value=0.2, allowed=0.1)
+    _, supervisor, cycle, _ = reacting()
+    cycle.estimate.elapsed_s = 1.0
+    cycle.check(supervisor)
+    assert supervisor.limit is Limit.LATE
+    for fault in (lengths, alarm, lengths, DRIVE):
+        supervisor.report(fault)
+    found = list(supervisor.findings())
+    assert [fault.limit for fault in found[:1]] == [Limit.LATE]
+    assert found[1:] == [lengths, alarm, DRIVE]
+    cycle.estimate.elapsed_s = PERIOD_S
+    cycle.check(supervisor)
+    assert not list(supervisor.findings())
+
+
 @pytest.mark.parametrize(
     ("cause", "replaced"),
     [
