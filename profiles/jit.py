@@ -167,6 +167,11 @@ class _ReadOnlyCacheFiles(CompileResultCacheImpl):
     _locator_classes: Any = (_ReadOnlyLocator,)
 
 
+def machine_code_lost() -> bool:
+    """Return whether this process or its parent has compiled a kernel that cannot be kept."""
+    return _WARNED in os.environ
+
+
 class _ReadOnlyCache(FunctionCache):
     """Machine code that can be read beside its source, but cannot be written anywhere."""
 

@@ -156,18 +156,37 @@ def test_kernels_are_compiled_with_shipped_robots_and_without_missing_modules(
     assert done.stdout.split() == ["3", "cdpr_rt.gone"]
 
 
-def test_doctor_compiles_nothing_without_a_cache_folder() -> None:
-    # this locator finds folders only for functions in notebooks
-    nowhere = os.environ | {"NUMBA_CACHE_LOCATOR_CLASSES": "IPythonCacheLocator"}
-    program = (
-        "from cdpr_profiles import user_folders; from pathlib import Path\n"
-        "user_folders.temporary_folder = lambda: Path('/proc/nowhere/own')\n"
-        "from cdpr_tools.cli import main; main()"
-    )
+NOWHERE = """
+from cdpr_profiles import user_folders
+from pathlib import Path
+user_folders.temporary_folder = lambda: Path("/proc/nowhere/own")
+from cdpr_profiles.jit import jit
+from cdpr_tools.host import kernels
+
+@jit
+def kernel(x):
+    return x + 1.0
+
+for task in (lambda: None, lambda: kernel(1.0)):
+    print(kernels.compile_with("a task", task))
+kernels.compile_kernels = lambda processes: kernels.compile_with("a task", lambda: None)
+from cdpr_tools.cli import main
+main()
+"""
+
+
+def test_doctor_fails_without_a_cache_folder_only_after_compiling_a_kernel(
+    tmp_path: Path,
+) -> None:
+    (script := tmp_path / "kernels.py").write_text(NOWHERE)
+    (tmp_path / "__pycache__").touch()  # numba expects a folder here
+    given = {"HOME": "/proc/nowhere", "PYTHONDONTWRITEBYTECODE": "1"}
+    others = ("NUMBA_CACHE_DIR", "XDG_CACHE_HOME", "CDPR_KERNELS_NOT_KEPT")
+    nowhere = {k: v for k, v in os.environ.items() if k not in others} | given
     done = subprocess.run(
-        [sys.executable, "-c", program, "doctor", "--compile"],
+        [sys.executable, str(script), "doctor", "--compile"],
         env=nowhere, capture_output=True, text=True, check=False,
     )  # fmt: skip
-    assert done.returncode == 1 and done.stdout == ""
-    assert done.stderr.count("\n") == 1
-    assert "/proc/nowhere/own; set NUMBA_CACHE_DIR to a folder that can be written" in done.stderr
+    assert (done.returncode, done.stdout.split()) == (1, ["True", "False"]), done.stderr
+    error = done.stderr.splitlines()[-1]
+    assert "/proc/nowhere/own; set NUMBA_CACHE_DIR to a folder that can be written" in error

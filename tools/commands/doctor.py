@@ -51,17 +51,14 @@ def doctor(
     out = Output(as_json)
     if compile_all:
         # imported here: it needs all packages that a robot needs
-        from cdpr_rt.jit import machine_code_folder  # noqa: PLC0415
+        from cdpr_tools.host.kernels import compile_kernels  # noqa: PLC0415
 
-        if machine_code_folder() is None:
+        if not compile_kernels(len(os.sched_getaffinity(0))):
             raise WorkFailedError(
                 "--compile: compiled kernels cannot be kept: neither the program's folder nor the "
                 f"user's cache can be written, nor can {temporary_folder()}; set NUMBA_CACHE_DIR "
                 "to a folder that can be written"
             )
-        from cdpr_tools.host.kernels import compile_kernels  # noqa: PLC0415
-
-        compile_kernels(len(os.sched_getaffinity(0)))
         out.say("all kernels are compiled")
         out.result({"ok": True})
         return

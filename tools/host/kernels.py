@@ -14,6 +14,7 @@ from typing import Final
 import numpy as np
 
 from cdpr_profiles import load_robot
+from cdpr_profiles.jit import machine_code_lost
 from cdpr_rt.core.shared_block import SharedBlock
 from cdpr_rt.diagnosis.predictions import CableLoss, free_rotation
 from cdpr_rt.diagnosis.subject import Subject
@@ -42,23 +43,27 @@ _OPTIONAL: Final = frozenset(
 """Modules of the extras `camera` and `daemon`."""
 
 
-def compile_kernels(processes: int) -> None:
+def compile_kernels(processes: int) -> bool:
     """Compile every kernel that commands use and that has no cached machine code.
 
-    `processes` run in parallel and report their progress on standard error.
+    `processes` run in parallel and report their progress on standard error. Stop and return False
+    if the machine code of a kernel cannot be kept.
     """
     # new processes inherit no lock or thread of this one
     with ProcessPoolExecutor(processes, multiprocessing.get_context("spawn")) as pool:
         for stage in _STAGES:
             for task in [pool.submit(compile_with, what, task) for what, task in stage.items()]:
-                task.result()
+                if not task.result():
+                    pool.shutdown(cancel_futures=True)
+                    return False
+    return True
 
 
-def compile_with(what: str, task: Callable[[], None]) -> None:
-    """Run `task`, which compiles kernels, in a separate process; `what` names the kernels.
+def compile_with(what: str, task: Callable[[], None]) -> bool:
+    """Run `task`, which compiles kernels; return whether their machine code is kept.
 
-    If an extra is not installed, skip its kernels: no command uses them. Profiles in
-    the user's folder are ignored, because they may have the names of shipped ones.
+    `what` names the kernels. If an extra is not installed, skip its kernels: no command uses them.
+    Profiles in the user's folder are ignored, because they may have the names of shipped ones.
     """
     os.environ["XDG_CONFIG_HOME"] = "/nonexistent"
     announce_compiling(what)
@@ -67,6 +72,7 @@ def compile_with(what: str, task: Callable[[], None]) -> None:
     except ModuleNotFoundError as error:
         if (error.name or "").partition(".")[0] not in _OPTIONAL:
             raise
+    return not machine_code_lost()
 
 
 def _loops(*names: str) -> None:
