@@ -1,6 +1,6 @@
-"""Distances of cables, platform and obstacles by plain NumPy, place after place.
+"""Distances of cables, platform and obstacles by plain NumPy at sampled places.
 
-It shares nothing with the kernels: not the distances, not the kinematics, not the way.
+It shares no code with the kernels: distances, kinematics and ways are computed separately.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ _HALVINGS = 60
 
 @dataclass(frozen=True)
 class BruteRobot:
-    """Exit points, anchor points (n, 3), pulleys, and boxes (2, 3), the first in its own frame."""
+    """Exit and anchor points (n, 3), pulleys, and boxes (2, 3); the first is the platform's body."""
 
     exits: Floats
     anchors: Floats
@@ -31,7 +31,7 @@ class BruteRobot:
     obstacles: tuple[Floats, ...] = ()
 
     def clearances(self, p: Floats, phi: Floats) -> dict[tuple[str, str], Floats]:
-        """Return what each two things are apart, at positions and rotation vectors (m, 3)."""
+        """Return the distance of each pair of things, at positions and rotation vectors (m, 3)."""
         Q = Rotation.from_rotvec(phi).as_matrix() @ self.home_rotation
         ends = p[:, None] + np.einsum("mij,nj->mni", Q, self.anchors)
         starts = np.stack([self._start(i, ends[:, i]) for i in range(len(self.exits))], axis=1)
@@ -59,7 +59,7 @@ class BruteRobot:
         return found
 
     def _start(self, i: int, ends: Floats) -> Floats:
-        """Return where a cable leaves its eye or its pulley, which turns towards the anchor."""
+        """Return where a cable leaves its eye, or its pulley turned towards the anchor."""
         a = np.broadcast_to(self.exits[i], ends.shape)
         if self.radius is None or self.axes is None or self.radius[i] == 0.0:
             return a

@@ -1,4 +1,4 @@
-"""Wrench matrices of robots and made-up ones, computed by NumPy alone."""
+"""Wrench matrices of robots, and random ones, computed by NumPy alone."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def suspended_poses(count: int, seed: int) -> list[FloatArray]:
 def made_up(
     seed: int, directions: int, cables: int, feasible: bool
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Return W, w_e, low and high; where `feasible`, some tensions within the bounds carry w_e."""
+    """Return W, w_e, low and high; if `feasible`, some tensions within the bounds carry w_e."""
     rng = np.random.default_rng(seed)
     W = rng.normal(size=(directions, cables))
     low = rng.uniform(0.0, 30.0, cables)

@@ -1,4 +1,4 @@
-"""Cables that stretch and sag, against the differential equation and against printed figures."""
+"""Cables that stretch and sag, compared with the differential equation and published figures."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def test_the_catenary_solves_its_differential_equation(
 ) -> None:
     if math.hypot(across, height) < 0.1:
         return
-    # a good deal more than the cable's weight, as a winch pulls
+    # much more than the cable's weight, as a winch pulls
     t = slack + 3.0 * weight * math.hypot(across, height)
     length = unstretched_length(across, height, t, compliance, weight)
     angle = math.atan2(height, across)
@@ -59,7 +59,7 @@ def test_the_catenary_solves_its_differential_equation(
     ("tension", "sag_mm", "more_mm"),
     [(4.6, 80.2, 3.47), (10.4, 35.5, 0.68), (14.5, 25.4, 0.35), (18.6, 19.8, 0.21)],
 )
-def test_a_level_cable_is_that_of_the_thesis(tension: float, sag_mm: float, more_mm: float) -> None:
+def test_a_level_cable_sags_as_in_the_thesis(tension: float, sag_mm: float, more_mm: float) -> None:
     """Table 3.2: 4925 mm of 0.122 N/m, by (3.83) and, corrected, (3.84)."""
     span, weight = 4.925, 0.122
     alpha = tension / weight  # the thesis takes the tension as horizontal
@@ -73,7 +73,7 @@ def test_a_level_cable_is_that_of_the_thesis(tension: float, sag_mm: float, more
 
 @quick
 @given(st.floats(0.1, 10.0), st.floats(0.0, 200.0), st.floats(1e3, 1e6))
-def test_without_weight_it_is_straight_and_stretched(rho: float, t: float, EA: float) -> None:
+def test_a_cable_without_weight_is_straight_and_stretched(rho: float, t: float, EA: float) -> None:
     across, height = 0.6 * rho, -0.8 * rho
     assert unstretched_length(across, height, t, 1.0 / EA, 0.0) == pytest.approx(
         rho / (1.0 + t / EA), rel=1e-14
@@ -88,6 +88,6 @@ def test_a_hanging_cable_is_stretched_by_its_own_weight() -> None:
     assert L * (1.0 + (t - 0.5 * w * L) / EA) == pytest.approx(height, rel=1e-14)
 
 
-def test_a_cable_that_does_not_carry_itself_has_no_length() -> None:
+def test_a_cable_that_cannot_carry_its_weight_has_no_length() -> None:
     assert math.isnan(unstretched_length(5.0, 0.0, 0.2, 0.0, 0.122))
     assert math.isnan(unstretched_length(5.0, 0.0, 0.0, 0.0, 0.122))

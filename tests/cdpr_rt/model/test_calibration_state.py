@@ -26,7 +26,7 @@ def state_home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-def test_a_robot_is_not_calibrated_until_somebody_says_so() -> None:
+def test_a_robot_is_calibrated_only_after_it_was_marked() -> None:
     assert not calibration_state("spatial-8").calibrated
     assert not_calibrated_reason("spatial-8") == "", "it has the geometry of its file"
     mark_calibrated("spatial-8", "camera calibration of 40 poses")
@@ -43,7 +43,7 @@ def test_a_robot_is_not_calibrated_until_somebody_says_so() -> None:
 @pytest.mark.parametrize(
     "held", [b"", b"{", b"\xff\xfe", b"[1]", b'{"calibrated": 1, "why": "", "date": ""}']
 )
-def test_a_damaged_file_is_no_calibration_and_is_replaced(held: bytes) -> None:
+def test_a_damaged_file_counts_as_not_calibrated_and_is_replaced(held: bytes) -> None:
     path = calibrated_flag_file("spatial-8")
     path.parent.mkdir(parents=True)
     path.write_bytes(held)
@@ -55,13 +55,13 @@ def test_a_damaged_file_is_no_calibration_and_is_replaced(held: bytes) -> None:
     assert calibration_state("spatial-8").calibrated
 
 
-def test_a_file_that_cannot_be_written_is_an_error_that_names_it(state_home: Path) -> None:
+def test_an_error_names_the_file_that_cannot_be_written(state_home: Path) -> None:
     (state_home / "cdpr-rt").write_text("a file where the folder should be")
     with pytest.raises(StateFileError, match=str(state_home)):
         mark_not_calibrated("spatial-8", "rail 3 was moved")
 
 
-def test_a_name_cannot_lead_out_of_the_folder(state_home: Path) -> None:
+def test_a_robot_name_cannot_lead_out_of_the_folder(state_home: Path) -> None:
     mark_not_calibrated("../../etc/x", "moved")
     assert calibrated_flag_file("../../etc/x").parent == state_home / "cdpr-rt"
     assert len(list((state_home / "cdpr-rt").iterdir())) == 1

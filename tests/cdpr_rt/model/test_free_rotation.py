@@ -1,4 +1,4 @@
-"""A rotation that no cable controls: computed and told."""
+"""A rotation that no cable controls: its equilibrium, frequency and swing."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def with_mass_at(machine: Machine, centre_m: tuple[float, float]) -> Machine:
 
 
 class Swinging:
-    """The same platform by the potential of its cables' tensions, about its centre of mass."""
+    """The same platform, computed from the potential of its cables' tensions."""
 
     def __init__(self, machine: Machine, position_m: tuple[float, float]) -> None:
         platform = machine.platform
@@ -57,7 +57,7 @@ class Swinging:
         return -float(TENSION_N @ (more - less)) / (2.0 * step)
 
     def frequency_Hz(self, angle: float, inertia: float, step: float = 1e-4) -> float:
-        """Return that of swinging in the direction that changes the lengths least."""
+        """Return the frequency of the swing that changes the lengths least."""
         q, e = self.at(angle), step * np.eye(3)
         J = np.array([self.lengths(q + x) - self.lengths(q - x) for x in e]).T / (2.0 * step)
         H = np.zeros((3, 3))
@@ -65,7 +65,7 @@ class Swinging:
             potential = TENSION_N @ self.lengths(q + a * e[i] + b * e[j])
             H[i, j] += a * b * potential / (4.0 * step**2)
         M = np.diag([self.mass, self.mass, inertia])
-        # springs hold the lengths in the two directions that positions have
+        # springs hold the lengths in the two directions of the position
         held = J.T @ J[:, :2] @ np.linalg.inv(J[:, :2].T @ J[:, :2])
         stiff = 1e7 * held @ held.T
         return math.sqrt(float(eigh(H + stiff, M, eigvals_only=True)[0])) / math.tau
@@ -73,7 +73,7 @@ class Swinging:
 
 @pytest.mark.parametrize("centre_m", [(0.0, 0.0), (0.04, -0.03)])
 @pytest.mark.parametrize("position_m", [(-0.3, 1.4), (0.0, 1.6), (0.4, 1.9)])
-def test_where_it_turns_to_and_how_fast_it_swings(
+def test_equilibrium_and_frequency_follow_from_the_potential(
     centre_m: tuple[float, float], position_m: tuple[float, float]
 ) -> None:
     machine = with_mass_at(bar(), centre_m)
@@ -91,7 +91,7 @@ def test_where_it_turns_to_and_how_fast_it_swings(
     assert omega / math.tau == pytest.approx(found_Hz, rel=1e-3)
 
 
-def test_a_wide_bar_swings_long_and_others_hardly() -> None:
+def test_only_a_wide_bar_swings_far_and_for_long() -> None:
     swings = free_rotation(bar().model())
     assert swings is not None
     assert 1.5 < swings.slowest_Hz < 2.5 < swings.fastest_Hz < 4.5
@@ -104,7 +104,7 @@ def test_a_wide_bar_swings_long_and_others_hardly() -> None:
 
 
 @pytest.mark.long
-def test_a_bar_truly_swings_as_told() -> None:
+def test_a_simulated_bar_swings_no_further_than_predicted() -> None:
     told = free_rotation(bar().model())
     assert told is not None
     physics = Physics(bar(), RobotPlant())

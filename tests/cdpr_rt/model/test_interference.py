@@ -1,4 +1,4 @@
-"""First contact on a way against brute force of other code, and what it says and leaves out."""
+"""The first contact on a way, compared with brute force of separate code, and its text."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def model_of(name: str) -> PlatformModel:
 
 
 class MadeUp:
-    """A robot of no particular sense: crowded, with pulleys, a body and boxes in the room."""
+    """A random, crowded robot with pulleys, a body and boxes in the room."""
 
     def __init__(self, seed: int, parts: str) -> None:
         rng = np.random.default_rng(seed)
@@ -88,7 +88,7 @@ def test_no_place_before_the_first_contact_is_in_contact(seed: int, parts: str) 
 
 @settings(max_examples=100)
 @given(st.integers(0, 2**32 - 1), st.sampled_from(["eyes", "shared", "pulleys", "body", "boxes"]))
-def test_the_clearance_of_a_pose_is_that_of_brute_force(seed: int, parts: str) -> None:
+def test_the_clearance_of_a_pose_equals_brute_force(seed: int, parts: str) -> None:
     robot = MadeUp(seed, parts)
     q = robot.way
     poses = np.array(
@@ -105,7 +105,7 @@ def test_the_clearance_of_a_pose_is_that_of_brute_force(seed: int, parts: str) -
             assert clearance[j] == pytest.approx(least, abs=1e-8) == float(apart[things][j])
 
 
-def test_a_wire_that_lies_between_samples_is_seen() -> None:
+def test_a_wire_between_samples_is_found() -> None:
     exits, anchors = np.array([[0.0, 0.0, 2.0], [3.0, 0.0, 2.0]]), np.zeros((2, 3))
     wire = np.array([[-0.5, 0.0130, 0.99], [0.5, 0.0132, 1.01]])
     home = Pose(np.zeros(3)).array
@@ -121,7 +121,7 @@ def test_a_wire_that_lies_between_samples_is_seen() -> None:
     assert found.position == pytest.approx([0.0, 0.024], abs=5e-4)
 
 
-def test_the_words_name_both_things_the_distance_and_the_place() -> None:
+def test_the_text_names_both_things_their_distance_and_the_place() -> None:
     model = model_of("spatial-8")
     there = np.array([-0.15, 0.1, 1.5, 0.0, 0.0, 2.0])
     found = model.interference.first_contact(np.array([model.home, there]))
@@ -139,7 +139,7 @@ def test_the_words_name_both_things_the_distance_and_the_place() -> None:
 
 
 @pytest.mark.parametrize("name", ["planar-3", "planar-4"])
-def test_cables_in_a_plane_run_in_layers(name: str) -> None:
+def test_cables_in_a_plane_do_not_interfere(name: str) -> None:
     model = model_of(name)
     assert len(model.interference.pairs) == 0
     assert model.interference.contact(model.home_pose.array) == ""
@@ -173,12 +173,12 @@ def test_a_pair_too_close_at_the_start_may_part_but_not_approach() -> None:
     down = interference.first_contact(np.array([[0.0, 0.0], [0.0, -0.1]]))
     assert down is not None and down.position[1] > -0.0011
     aside = interference.first_contact(np.array([[0.0, 0.0], [0.05, 0.0]]))
-    assert aside is not None and aside.share == 1.0  # it is no nearer, but not clear either
+    assert aside is not None and aside.share == 1.0  # at the same distance, which is too close
 
 
 @pytest.mark.parametrize("overlap_m", [0.0, 0.004])
 def test_a_pair_in_contact_at_the_start_does_not_penetrate_deeper(overlap_m: float) -> None:
-    """Nor through a sheet so thin that it would be clear again behind it."""
+    """Also not through a thin sheet, behind which it would be clear again."""
     exits = np.array([[-1.0, 0.0, 2.0], [1.0, 0.0, 2.0]])
     anchors = np.array([[-0.1, 0.0, 0.2], [0.1, 0.0, 0.2]])
     body = np.array([[-0.01, -0.01, 0.0], [0.01, 0.01, 0.005]])
@@ -203,8 +203,8 @@ def test_a_way_not_proven_clear_is_rejected_with_a_reason() -> None:
     assert "and cannot be proved in time to stay clear; go another way or in parts" in str(found)
 
 
-def test_a_flat_platform_that_turns_is_proved_clear_in_a_few_looks() -> None:
-    """Its body has no depth by which it would sweep about."""
+def test_a_flat_platform_that_turns_is_proved_clear_in_few_steps() -> None:
+    """Its body is flat, so that turning sweeps no depth."""
     robot = load_robot("planar-4")
     assert robot.platform is not None
     box = BoxFile(min_m=(-0.1, 0.0), max_m=(0.1, 0.4))
@@ -218,10 +218,10 @@ def test_a_flat_platform_that_turns_is_proved_clear_in_a_few_looks() -> None:
 
 
 @pytest.mark.parametrize("shared", ["anchor points", "exit points"])
-def test_a_long_way_of_cables_that_share_a_point_is_proved_clear_in_a_few_looks(
+def test_a_long_way_of_cables_that_share_a_point_is_proved_clear_in_few_steps(
     shared: str,
 ) -> None:
-    """A camera in a stadium, and a platform on three pairs of cables from a point each."""
+    """A camera in a stadium, and a platform on three pairs of cables that share exit points."""
     if shared == "anchor points":
         exits = np.array([(x, y, 30.0) for x in (-50.0, 50.0) for y in (-30.0, 30.0)])
         anchors, directions = np.zeros((4, 3)), SPATIAL[:3]

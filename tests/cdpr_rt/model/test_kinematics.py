@@ -1,4 +1,4 @@
-"""Kinematics of n cables: inverse of each other, against finite differences and plain NumPy."""
+"""Kinematics of n cables, forward and inverse, compared with finite differences and plain NumPy."""
 
 from __future__ import annotations
 
@@ -101,7 +101,7 @@ def test_the_jacobian_is_the_derivative_and_w_its_negative_transpose(
 
 @quick
 @given(seeds)
-def test_they_are_those_of_plain_numpy(seed: int) -> None:
+def test_lengths_and_jacobian_equal_those_of_plain_numpy(seed: int) -> None:
     rng = np.random.default_rng(seed)
     a, b = made_up(SPATIAL, 8, rng)
     pose = near(Pose(np.zeros(3)), SPATIAL, rng, 1.0)
@@ -114,7 +114,7 @@ def test_they_are_those_of_plain_numpy(seed: int) -> None:
 
 
 def test_tensions_pull_the_platform_to_the_exit_points() -> None:
-    """A platform that hangs on one cable straight above its origin: 5 N up, against 5 N down."""
+    """A platform that hangs on one cable straight above its origin: 5 N up balance 5 N down."""
     robot = CableKinematics(np.array([[0.0, 0.0, 3.0]] * 3), np.zeros((3, 3)), POINT)
     W = robot.wrench_matrix(Pose(np.zeros(3)))
     assert pytest.approx(np.zeros(3)) == W @ [5.0, 0.0, 0.0] + [0.0, 0.0, -5.0]
@@ -156,7 +156,7 @@ def wound(exit_m: np.ndarray, anchor_m: np.ndarray, axis: np.ndarray, r: float) 
 
 @settings(max_examples=10)
 @given(seeds, st.floats(0.01, 0.15))
-def test_a_pulley_is_left_along_its_tangent(seed: int, radius: float) -> None:
+def test_a_cable_leaves_its_pulley_along_the_tangent(seed: int, radius: float) -> None:
     rng = np.random.default_rng(seed)
     a, b = made_up(SPATIAL, 8, rng)
     axes = rng.normal(size=(8, 3))
@@ -168,7 +168,7 @@ def test_a_pulley_is_left_along_its_tangent(seed: int, radius: float) -> None:
     assert robot.lengths(pose) == pytest.approx(told, abs=1e-6)
 
 
-def test_a_bad_start_ends_at_the_truth() -> None:
+def test_restarts_find_the_true_pose_from_a_bad_start() -> None:
     """CoGiRo, started up to 1 m and 40 degrees off, without and with a rotation at home."""
     rng = np.random.default_rng(11)
     robot = CableKinematics(COGIRO.exit_points_m, COGIRO.anchor_points_m, length_std_m=1e-6)
@@ -184,7 +184,7 @@ def test_a_bad_start_ends_at_the_truth() -> None:
         best = robot.pose_from_lengths(rho, start, restarts=9)
         found += best.converged and np.abs(best.pose.minus(truth)).max() < 1e-6
     assert found == 300
-    assert alone < 295, "no start was bad: this shows nothing"
+    assert alone < 295, "no start was bad: the test shows nothing"
 
 
 @pytest.mark.parametrize("shape", [(7,), (9,), (8, 1), ()])
@@ -194,7 +194,7 @@ def test_impossible_cable_lengths_are_rejected(shape: tuple[int, ...]) -> None:
         robot.pose_from_lengths(np.full(shape, 3.0), SPATIAL_8.home)
 
 
-def test_another_process_may_have_a_robot_that_has_searched() -> None:
+def test_a_pickled_robot_works_independently_of_its_original() -> None:
     robot = CableKinematics(SPATIAL_8.exit_points_m, SPATIAL_8.anchor_points_m)
     truth = SPATIAL_8.home.plus(np.array([0.1, -0.05, 0.08, 0.1, 0.2, -0.1]))
     robot.pose_from_lengths(robot.lengths(truth), SPATIAL_8.home)
@@ -219,7 +219,7 @@ def test_forward_kinematics_reports_failure() -> None:
     assert not line.converged, "cables in one line leave a direction free"
 
 
-def test_an_anchor_in_its_exit_or_pulley_has_no_direction() -> None:
+def test_an_anchor_point_in_its_exit_point_or_pulley_is_rejected() -> None:
     a = SPATIAL_8.exit_points_m
     for radius, off in ((0.0, 0.0), (0.05, 0.04)):
         robot = CableKinematics(a, np.tile([off, 0.0, 0.0], (8, 1)), pulley_radius_m=radius)
@@ -227,7 +227,7 @@ def test_an_anchor_in_its_exit_or_pulley_has_no_direction() -> None:
             robot.jacobian(Pose(a[2]))
 
 
-def test_a_cable_that_does_not_carry_itself_is_reported() -> None:
+def test_a_cable_that_cannot_carry_its_weight_is_reported() -> None:
     robot = CableKinematics(
         SPATIAL_8.exit_points_m, SPATIAL_8.anchor_points_m, model=CableModel(40e3, 0.122)
     )
@@ -236,7 +236,7 @@ def test_a_cable_that_does_not_carry_itself_is_reported() -> None:
 
 
 @pytest.mark.parametrize("radius", [0.0, 0.05])
-def test_the_geometric_stiffness_is_how_the_tensions_wrench_turns_with_the_pose(
+def test_the_geometric_stiffness_is_the_derivative_of_the_tensions_wrench(
     radius: float,
 ) -> None:
     rng = np.random.default_rng(11)

@@ -1,4 +1,4 @@
-"""How far lengths are from agreeing, and which cable's is off, against plain NumPy."""
+"""By how much lengths disagree, and which cable is off, compared with plain NumPy."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ SHAPES = [
 
 
 def residual(robot: Kinematics, lengths_m: np.ndarray, start: Pose) -> tuple[float, int, Pose]:
-    """Return the kernel's answer for lengths, and the pose that they have."""
+    """Return the kernel's result for lengths, and the pose that fits them."""
     found = robot.pose_from_lengths(lengths_m, start)
     assert found.converged
     cables = np.array(robot._cables)
@@ -35,13 +35,13 @@ def residual(robot: Kinematics, lengths_m: np.ndarray, start: Pose) -> tuple[flo
 
 
 def projector(J: np.ndarray) -> np.ndarray:
-    """Return what the residuals have of errors in the lengths: I - J J⁺."""
+    """Return the matrix that turns errors of lengths into residuals: I - J J⁺."""
     return np.eye(len(J)) - J @ np.linalg.pinv(J)
 
 
 @settings(max_examples=60)
 @given(st.sampled_from(SHAPES), st.integers(0, 2**32 - 1))
-def test_it_is_the_largest_normalised_residual(
+def test_the_kernel_finds_the_largest_normalised_residual(
     shape: tuple[tuple[int, ...], int], seed: int
 ) -> None:
     directions, n = shape
@@ -65,14 +65,14 @@ def test_it_is_the_largest_normalised_residual(
     told = off[share > 2e-3] / share[share > 2e-3]
     assert value == pytest.approx(told.max(), rel=0.02, abs=1e-8)
     if share[slipped] > 0.1:
-        # what is not linear in 1 mm is all that is left
+        # only the nonlinearity over 1 mm is left
         assert value == pytest.approx(SLIP_m * share[slipped], rel=0.05)
         assert index in {-1, slipped}
     if n == len(directions) + 1:
-        assert index == -1, "of one redundant cable, each may be the one"
+        assert index == -1, "with one redundant cable, any cable may be the wrong one"
 
 
-def test_a_jump_is_the_change_from_where_the_residuals_had_settled() -> None:
+def test_a_jump_is_the_change_from_the_settled_residuals() -> None:
     settled = np.full(3, np.nan)
     before, after = np.array([0.02, -0.01, 0.0]), np.array([0.02, -0.018, 0.001])
     for _ in range(100):

@@ -1,4 +1,4 @@
-"""The lengths of the last stop: what a file keeps, and what their indices tell of them."""
+"""The lengths of the last stop: the file that keeps them, and their check by index pulses."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def path(tmp_path: Path) -> Path:
 
 
 def stopped(path: Path) -> LastLengths:
-    """Return what a stop keeps: motors at 1, 2, 3 rad, the index of two of them known."""
+    """Return what a stop keeps: motors at 1, 2 and 3 rad, the indices of two of them known."""
     estimate, feedback = AxisEstimate(3), AxisFeedback(3)
     estimate.cable_m_per_rad[:], estimate.cable_length_m[:] = CABLE_m, LENGTH_m
     estimate.length_known[:] = True
@@ -41,14 +41,14 @@ def read(path: Path) -> LastLengths:
     return last
 
 
-def test_a_start_gets_what_the_stop_has_left(path: Path):
+def test_a_start_reads_the_lengths_that_the_stop_has_written(path: Path):
     stopped(path)
     last = read(path)
     assert last.lengths is not None
     assert last.lengths.cable_length_m == pytest.approx(LENGTH_m)
     assert last.lengths.cable_at_index_m[:2] == pytest.approx([2.0 - 0.013, 2.5 - 0.013])
     assert math.isnan(last.lengths.cable_at_index_m[2])
-    # drives that were switched on anew count from anywhere: only what they turn since then counts
+    # drives count from an arbitrary angle after power-on: only later rotation matters
     last.begin_to_move(np.array([70.0, 0.0, -5.0]))
     taken = last.take()
     assert taken is not None
@@ -56,7 +56,7 @@ def test_a_start_gets_what_the_stop_has_left(path: Path):
     assert last.lengths is None
 
 
-def test_a_robot_that_was_not_stopped_leaves_none(path: Path):
+def test_a_robot_that_was_not_stopped_leaves_no_lengths(path: Path):
     stopped(path).begin_to_move(np.zeros(3))
     last = read(path)
     assert last.lengths is None
@@ -74,7 +74,7 @@ def test_a_robot_that_was_stopped_with_slack_cables_has_not_fallen(path: Path):
 
 
 @pytest.mark.parametrize("flag", ["fallen", "displaced"])
-def test_that_it_fell_is_remembered_until_it_is_tight_again(path: Path, flag: str):
+def test_a_fallen_or_displaced_platform_is_remembered_until_cleared(path: Path, flag: str):
     last = read(path)
     last.begin_to_move(np.zeros(3))
     setattr(last, flag, True)
@@ -114,10 +114,10 @@ def held(length_m: list[object], at_index_m: list[object]) -> str:
         "{}",
         held([1.0], [1]),
         held([1.0, "x", 2.0], [None] * 3),
-        held([1.0, 6.1, 2.0], [None] * 3),  # longer than twice the longest that is in use
+        held([1.0, 6.1, 2.0], [None] * 3),  # more than twice the longest cable in use
     ],
 )
-def test_a_damaged_file_leaves_none_and_says_which(path: Path, damage: str):
+def test_a_damaged_file_gives_no_lengths_and_is_named(path: Path, damage: str):
     path.parent.mkdir()
     path.write_text(damage)
     last = read(path)
@@ -134,7 +134,7 @@ def test_a_file_that_cannot_be_written_is_reported(tmp_path: Path):
 
 @pytest.mark.parametrize("turns", [0, 1, -3])
 @pytest.mark.parametrize("slip_m", [0.0, 0.02, -0.05])
-def test_an_index_tells_what_a_cable_is_off_but_for_whole_turns(
+def test_an_index_shows_a_cables_error_apart_from_whole_turns(
     path: Path, turns: int, slip_m: float
 ):
     last = stopped(path).lengths
@@ -142,7 +142,7 @@ def test_an_index_tells_what_a_cable_is_off_but_for_whole_turns(
     feedback = AxisFeedback(3)
     feedback.position_rad[:] = (10.0, 20.0, 30.0)
     feedback.index_known[:] = (True, False, True)
-    # where the motors' indices are, of cables that are as long as at the stop but for `slip_m`
+    # the motors' indices, of cables whose lengths differ from those at the stop by `slip_m`
     feedback.index_rad[:] = 10.0 + (last.cable_at_index_m - LENGTH_m) / CABLE_m + math.tau * turns
     off = off_index_m(last, LENGTH_m + slip_m, feedback, CABLE_m)
     assert off[0] == pytest.approx(slip_m, abs=1e-9)
@@ -150,7 +150,7 @@ def test_an_index_tells_what_a_cable_is_off_but_for_whole_turns(
 
 
 @pytest.mark.parametrize("m_per_turn", [0.0188, 0.0628, 0.164])  # of gears of 20:1, 10:1, 4:1
-def test_a_motor_turned_by_a_part_of_a_turn_is_noticed_however_little_cable_that_is(
+def test_a_motor_that_was_turned_by_40_degrees_is_reported_at_any_gear_ratio(
     path: Path, m_per_turn: float
 ):
     last, feedback = stopped(path).lengths, AxisFeedback(3)
@@ -172,7 +172,7 @@ def test_a_motor_turned_by_a_part_of_a_turn_is_noticed_however_little_cable_that
     )
 
 
-def test_lengths_by_another_geometry_are_none(path: Path):
+def test_lengths_by_another_geometry_are_not_used(path: Path):
     stopped(path)
     last = LastLengths(path)
     last.geometry = "5f3a"

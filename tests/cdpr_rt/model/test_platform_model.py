@@ -1,4 +1,4 @@
-"""A platform's model as it follows from the robot's file."""
+"""A platform's model from the robot's file."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def test_directions_follow_from_the_points(platform: Platform, directions: tuple
     assert directions_of(platform) == directions
 
 
-def test_the_reserve_is_a_part_of_what_tensions_can_keep_from_their_bounds() -> None:
+def test_the_reserve_is_a_share_of_the_margin_to_the_tension_bounds() -> None:
     planar, suspended = platform_model_of(PLANAR), platform_model_of(SUSPENDED)
     assert planar.reserve_N == RESERVE * 130.0
     box = np.array([suspended.platform.workspace_min_m, suspended.platform.workspace_max_m])
@@ -59,7 +59,7 @@ def test_the_reserve_is_a_part_of_what_tensions_can_keep_from_their_bounds() -> 
     assert control.position == pytest.approx(planar.platform.home_m)
 
 
-def test_weight_and_wrench_scale_are_those_of_the_directions() -> None:
+def test_weight_and_wrench_scale_have_an_entry_per_direction() -> None:
     planar, suspended = platform_model_of(PLANAR), platform_model_of(SUSPENDED)
     assert planar.weight() == pytest.approx([0.0, -2.0 * 9.80665])
     assert suspended.weight() == pytest.approx([0.0, 0.0, -980.665, 0.0, 0.0, 0.0])
@@ -107,7 +107,7 @@ def test_least_tensions_of_three_cables_have_the_least_sum(
 
 @pytest.mark.parametrize("name", ["planar-3", "planar-4", "point-4", "spatial-8", "suspended-8"])
 @pytest.mark.parametrize("size", [0.3, 1.0, 3.0])
-def test_lengths_may_disagree_by_what_tape_and_drums_do(name: str, size: float) -> None:
+def test_lengths_may_disagree_by_errors_of_tape_and_drums(name: str, size: float) -> None:
     robot = _of_size(load_robot(name), size)
     assert robot.platform is not None
     frame_m = np.linalg.norm(np.ptp(np.array(robot.platform.exit_points_m), axis=0))
@@ -118,8 +118,8 @@ def test_lengths_may_disagree_by_what_tape_and_drums_do(name: str, size: float) 
     assert limits_of(dataclasses.replace(robot, limits=told)).lengths_disagree_m == 0.05
 
 
-def test_lengths_of_a_facade_may_disagree_by_what_was_seen_there() -> None:
-    # 10 m x 6 m; exit points 5 mm and drums 0.3 % off, cables 30 % softer: 38 mm, nothing failed
+def test_lengths_of_a_facade_robot_may_disagree_by_the_observed_38_mm() -> None:
+    # 10 m x 6 m; exit points 5 mm and drums 0.3 % off, cables 30 % softer: 38 mm, without a fault
     facade = dataclasses.replace(
         load_robot("planar-4").platform,
         exit_points_m=((-5.0, 6.0), (5.0, 6.0), (5.0, 0.0), (-5.0, 0.0)),
@@ -140,16 +140,16 @@ def test_lengths_of_a_facade_may_disagree_by_what_was_seen_there() -> None:
         ("planar-4", 0.08),
         ("point-4", 0.06),
         ("spatial-8", 0.08),
-        ("suspended-8", 0.09),  # 19 m across: drums alone make 20 mm
+        ("suspended-8", 0.09),  # 19 m across: drums alone cause 20 mm
     ],
 )
-def test_a_slip_is_more_than_lengths_may_disagree(name: str, slip_m: float) -> None:
+def test_a_slip_of_6_to_9_cm_exceeds_the_allowed_disagreement(name: str, slip_m: float) -> None:
     robot = load_robot(name)
     assert (slip_m * _shares_of_a_slip(robot) > limits_of(robot).lengths_disagree_m).all()
 
 
 @pytest.mark.parametrize("name", ["planar-3", "planar-4", "point-4", "spatial-8", "suspended-8"])
-def test_on_a_calibrated_robot_a_slip_of_30_mm_is_more(name: str) -> None:
+def test_a_slip_of_3_cm_exceeds_the_allowed_disagreement_after_calibration(name: str) -> None:
     file = load_robot(name)
     robot = dataclasses.replace(file, calibration=calibration(file))
     least_m = 0.03 * _shares_of_a_slip(robot).min()
@@ -163,7 +163,7 @@ def test_on_a_calibrated_robot_a_slip_of_30_mm_is_more(name: str) -> None:
     [(0.5, 0.00545), (8.0, 0.008), (20.0, 0.01633)],
     ids=["a third", "as it was calibrated", "as without"],
 )
-def test_a_calibration_on_a_small_frame_counts_as_far_as_it_is_good(
+def test_a_calibration_tightens_the_limit_of_a_small_frame_by_its_accuracy(
     predicted_mm: float, allowed_m: float
 ) -> None:
     known = calibration(PLANAR).model_copy(update={"predicted_3_sigma_mm": predicted_mm})
@@ -171,14 +171,14 @@ def test_a_calibration_on_a_small_frame_counts_as_far_as_it_is_good(
     assert limits_of(robot).lengths_disagree_m == pytest.approx(allowed_m, abs=2e-5)
 
 
-def test_a_calibration_is_not_believed_finer_than_5_mm() -> None:
+def test_a_calibration_never_lowers_the_limit_below_5_mm() -> None:
     known = calibration(PLANAR).model_copy(update={"predicted_3_sigma_mm": 0.5})
     robot = dataclasses.replace(_of_size(PLANAR, 0.2), calibration=known)
     assert limits_of(robot).lengths_disagree_m == 0.005
 
 
 def _of_size(robot: Robot, size: float) -> Robot:
-    """Return a robot all of whose points are so many times as far from the origin."""
+    """Return a robot with all points scaled by `size`."""
     platform = robot.platform
     assert platform is not None
 
@@ -220,7 +220,7 @@ def _residual_of_drums_m(robot: Robot, off: float) -> float:
 
 
 def _shares_of_a_slip(robot: Robot) -> np.ndarray:
-    """Return what each cable's slip has as normalised residual at home, as a share of it."""
+    """Return each cable's normalised residual at home as a share of its slip."""
     model = platform_model_of(robot)
     J = model.kinematics.jacobian(model.home_pose)
     return np.sqrt(1.0 - np.diag(J @ np.linalg.pinv(J)))

@@ -1,4 +1,4 @@
-"""Poses: exponential and logarithm against SciPy's rotations, and the laws of a group."""
+"""Poses: exponential and logarithm compared with SciPy's rotations, and the group's laws."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def vector_of(Q: np.ndarray) -> np.ndarray:
 @given(vectors)
 @example(np.zeros(3))
 @example(np.array([0.0, 0.0, 1e-4]))
-def test_the_exponential_is_that_of_scipy(phi: np.ndarray) -> None:
+def test_the_exponential_equals_scipys(phi: np.ndarray) -> None:
     Q = turned(phi)
     assert np.abs(Q - Rotation.from_rotvec(phi).as_matrix()).max() < 1e-14
     assert np.abs(Q @ Q.T - np.eye(3)).max() < 1e-14
@@ -49,7 +49,7 @@ def test_the_exponential_is_that_of_scipy(phi: np.ndarray) -> None:
 
 @given(vectors)
 @example(np.zeros(3))
-def test_the_logarithm_inverts_it(phi: np.ndarray) -> None:
+def test_the_logarithm_inverts_the_exponential(phi: np.ndarray) -> None:
     assert np.abs(vector_of(turned(phi)) - phi).max() < 1e-7 * max(np.linalg.norm(phi), 1e-9)
     assert vector_of(turned(phi)) == pytest.approx(
         Rotation.from_matrix(turned(phi)).as_rotvec(), rel=1e-7, abs=1e-14
@@ -57,7 +57,7 @@ def test_the_logarithm_inverts_it(phi: np.ndarray) -> None:
 
 
 @pytest.mark.parametrize("axis", [*np.eye(3), np.ones(3) / np.sqrt(3.0)])
-def test_half_a_turn_has_either_vector(axis: np.ndarray) -> None:
+def test_the_logarithm_of_half_a_turn_has_length_pi(axis: np.ndarray) -> None:
     Q = 2.0 * np.outer(axis, axis) - np.eye(3)
     found = vector_of(Q)
     assert np.linalg.norm(found) == pytest.approx(np.pi, abs=1e-12)

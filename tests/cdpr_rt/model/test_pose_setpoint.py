@@ -1,4 +1,4 @@
-"""Set-points of a platform: poses, their derivatives, and motors, beside SciPy's rotations."""
+"""A platform's set-points: poses, derivatives and motor references, compared with SciPy."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def test_a_pose_is_home_turned_by_the_rotation_vector(seed: int, chosen: tuple[i
 
 @quick
 @given(seeds, st.sampled_from(CHOSEN))
-def test_a_set_point_is_found_again_in_its_pose(seed: int, chosen: tuple[int, ...]) -> None:
+def test_coordinates_are_recovered_from_the_pose(seed: int, chosen: tuple[int, ...]) -> None:
     _, home, q = drawn(seed, chosen)
     found = np.zeros(len(chosen))
     pose = placed(q, chosen, home).array
@@ -65,7 +65,7 @@ def test_a_set_point_is_found_again_in_its_pose(seed: int, chosen: tuple[int, ..
 
 @quick
 @given(seeds, st.sampled_from(CHOSEN))
-def test_twist_and_acceleration_are_the_pose_s_derivatives(
+def test_twist_and_acceleration_are_the_poses_derivatives(
     seed: int, chosen: tuple[int, ...]
 ) -> None:
     rng, home, q = drawn(seed, chosen, 2.0)
@@ -101,7 +101,7 @@ def test_pose_difference_equals_scipys_rotation_vector(seed: int) -> None:
 
 @quick
 @given(seeds)
-def test_a_quaternion_is_scipy_s(seed: int) -> None:
+def test_the_quaternion_equals_scipys(seed: int) -> None:
     _, pose, _ = drawn(seed, CHOSEN[0])
     out = np.zeros(7)
     tracking.write_quaternion(pose.array, out)
@@ -112,7 +112,7 @@ def test_a_quaternion_is_scipy_s(seed: int) -> None:
 
 
 @pytest.mark.parametrize("make", [planar, spatial])
-def test_motors_are_asked_for_the_lengths_and_rates_of_the_kinematics(make: object) -> None:
+def test_motor_references_follow_from_the_kinematics(make: object) -> None:
     machine = make()  # type: ignore[operator]
     model, n = machine.model(), machine.n
     kinematics, d = model.kinematics, model.size

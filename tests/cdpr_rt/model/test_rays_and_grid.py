@@ -1,4 +1,4 @@
-"""Workspaces by rays and by a grid: against each other, geometry and published robots."""
+"""Workspaces by rays and by a grid, compared with each other, geometry and published robots."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def by_rays(criterion: Criterion, box: Box, centre: tuple[float, ...], count: in
 
 
 def hung(exits: FloatArray, mass_kg: float = 10.0) -> Platform:
-    """Return a point on cables."""
+    """Return a point platform on cables."""
     size = exits.shape[1]
     low, high = exits.min(axis=0).tolist(), exits.max(axis=0).tolist()
     return Platform(
@@ -59,7 +59,7 @@ def hung(exits: FloatArray, mass_kg: float = 10.0) -> Platform:
     )  # fmt: skip
 
 
-def test_a_point_that_hangs_is_held_in_the_prism_below_its_exit_points() -> None:
+def test_the_workspace_of_a_hanging_point_is_the_prism_below_its_exit_points() -> None:
     exits = np.array([[-3.0, -2.0, 4.0], [2.5, -2.2, 4.0], [3.0, 2.0, 4.0], [-2.0, 2.5, 4.0]])
     x, y = exits[:, 0], exits[:, 1]
     base = 0.5 * abs(float(x @ np.roll(y, -1) - y @ np.roll(x, -1)))
@@ -72,7 +72,7 @@ def test_a_point_that_hangs_is_held_in_the_prism_below_its_exit_points() -> None
     assert grid.unseen_share(rays) == 0.0
 
 
-def test_a_point_pulled_by_three_cables_is_held_in_the_triangle_of_their_exit_points() -> None:
+def test_the_workspace_of_three_cables_is_the_triangle_of_their_exit_points() -> None:
     exits = np.array([[-2.0, 3.0], [2.0, 3.0], [0.0, 0.0]])
     criterion = Criterion(hung(exits, 1e-9), (1e-6,) * 3, (1e6,) * 3, 0.0)
     box = Box((-2.2, -0.2), (2.2, 3.2))
@@ -81,7 +81,7 @@ def test_a_point_pulled_by_three_cables_is_held_in_the_triangle_of_their_exit_po
 
 
 @pytest.mark.parametrize("name", ["spatial-8", "suspended-8", "planar-4"])
-def test_rays_and_grid_agree(name: str) -> None:
+def test_rays_and_grid_find_the_same_volume(name: str) -> None:
     robot = load_robot(name)
     assert robot.platform is not None
     criterion = criterion_of(robot, robot.platform.acceleration_m_s2, np.zeros((1, 3)), 10.0)
@@ -92,7 +92,7 @@ def test_rays_and_grid_agree(name: str) -> None:
     rays = by_rays(criterion, box, tuple(centre.tolist()), 3000)
     grid = by_grid(criterion, box, 40)
     assert rays.size == pytest.approx(grid.size, rel=0.02)
-    # the rays end at the border, or at a side of the box
+    # rays end at the border or at a side of the box
     at_side = (np.abs(rays.ends_m - box.low_m) < 1e-9) | (np.abs(rays.ends_m - box.high_m) < 1e-9)
     ended = ~at_side.any(axis=1)
     assert ended.sum() > 500
@@ -101,7 +101,7 @@ def test_rays_and_grid_agree(name: str) -> None:
     assert (criterion.depths(further) < 0.0).all()
 
 
-def test_the_total_orientation_workspace_is_within_that_of_each_orientation() -> None:
+def test_the_total_orientation_workspace_is_the_intersection_of_all_orientations() -> None:
     robot = load_robot("spatial-8")
     assert robot.platform is not None
     turns = turns_within(robot.platform, 0.2)
@@ -140,7 +140,7 @@ def test_places_behind_a_contact_can_be_left_out() -> None:
 
 @dataclass(frozen=True)
 class _Shape:
-    """A workspace of any shape in place of one of cables: a U in a plane, its arms upward."""
+    """A workspace in the shape of a U in a plane, its arms upward."""
 
     def depths(self, points: FloatArray) -> FloatArray:
         x, y = points.T
@@ -158,14 +158,14 @@ def test_regions_no_ray_reaches_are_reported() -> None:
     whole = 4.0 - 0.8 * 1.4
     assert grid.size == pytest.approx(whole, rel=0.01)
     rays = by_rays(shape, box, (-0.7, 0.5), 4000)
-    # from the left arm: of the bottom what the corner of the gap lets be seen, nothing of the right
+    # from the left arm a part of the bottom is visible, and nothing of the right arm
     assert rays.size < 0.75 * whole
     assert grid.unseen_share(rays) == pytest.approx(1.0 - rays.size / whole, abs=0.06)
     assert replace(grid, depths=np.abs(grid.depths)).cut == ["x low", "x high", "y low", "y high"]
 
 
-def test_ipanema_as_published_has_the_wrenches_published_and_its_middle_is_held_best() -> None:
-    """Fraunhofer IPA's design as in its WireX: structure matrix at a place, 5.5 N at the middle."""
+def test_ipanema_has_its_published_structure_matrix_and_margin() -> None:
+    """Fraunhofer IPA's design as in its WireX: structure matrix, and 5.5 N in the middle."""
     corners = [(-1, 1), (1, 1), (1, -1), (-1, -1)]
     exits = tuple((2.0 * x, 1.5 * y, z) for z in (2.0, 0.0) for x, y in corners)
     anchors = tuple((0.06 * x, 0.06 * y, 0.0) for _ in range(2) for x, y in corners)
@@ -189,7 +189,7 @@ def test_ipanema_as_published_has_the_wrenches_published_and_its_middle_is_held_
     where, depth_N = grid.deepest
     assert_allclose(where, [0.0, 0.0, 1.0], atol=1e-9)
     assert depth_N == pytest.approx(4.5, abs=1e-6)
-    # it is as symmetrical as its frame
+    # the workspace is as symmetrical as the frame
     for axis in range(3):
         assert_allclose(grid.depths, np.flip(grid.depths, axis=axis), atol=1e-6)
 
@@ -202,7 +202,7 @@ def ball(radius: float, count: int) -> tuple[FloatArray, FloatArray, FloatArray]
 
 @settings(max_examples=40)
 @given(st.tuples(*[st.integers(2, 7)] * 3), st.integers(0, 2**32 - 1), st.floats(-2.0, 2.0))
-def test_whatever_the_values_the_surface_is_closed_and_has_its_volume(
+def test_the_isosurface_of_random_values_is_closed_and_has_its_volume(
     shape: tuple[int, int, int], seed: int, level: float
 ) -> None:
     rng = np.random.default_rng(seed)
@@ -219,7 +219,7 @@ def test_whatever_the_values_the_surface_is_closed_and_has_its_volume(
     assert volume(vertices, triangles) > 0.0
 
 
-def test_a_ball_has_its_volume_and_what_is_cut_off_at_the_side_not() -> None:
+def test_the_volume_of_a_ball_ends_at_the_grid() -> None:
     values, low, spacing = ball(0.8, 41)
     whole = volume(*isosurface(values, low, spacing))
     assert whole == pytest.approx(4.0 / 3.0 * math.pi * 0.8**3, rel=5e-3)
@@ -230,7 +230,7 @@ def test_a_ball_has_its_volume_and_what_is_cut_off_at_the_side_not() -> None:
     )
 
 
-def test_a_disc_has_its_area() -> None:
+def test_the_area_of_a_disc() -> None:
     values, _, spacing = ball(0.8, 61)
     across = values[:, :, 30]
     assert area(across, spacing[0] ** 2) == pytest.approx(math.pi * 0.64, rel=5e-3)

@@ -1,4 +1,4 @@
-"""How far straight ways go: against brute force, other margins, and what is refused."""
+"""How far straight ways reach, compared with brute force and other margins; rejected starts."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ def model_of(name: str) -> PlatformModel:
 
 
 def changed(name: str, **changes: object) -> PlatformModel:
-    """Return the model of a shipped robot with something else about its platform."""
+    """Return the model of a shipped robot with changes to its platform."""
     model = model_of(name)
     platform = replace(model.platform, **changes)  # type: ignore[arg-type]
     return platform_model(platform, model.low_N, model.high_N)
 
 
 def askew() -> PlatformModel:
-    """Return a robot that nobody would build: exit points anywhere, off balance, a lamp above."""
+    """Return an unusual robot: irregular exit points, off balance, a lamp above."""
     rng = np.random.default_rng(7)
     platform = load_robot("spatial-8").platform
     assert platform is not None
@@ -76,7 +76,7 @@ def wild_ends(model: PlatformModel, count: int) -> np.ndarray:
 
 
 @pytest.mark.parametrize("name", MODELS)
-def test_all_of_what_is_reached_is_held_and_clear_and_hardly_more_would_be(name: str) -> None:
+def test_ways_are_feasible_and_clear_up_to_their_end_and_not_beyond(name: str) -> None:
     model = MODELS[name]()
     reach, workspace = Reach(model), model.workspace()
     ends = wild_ends(model, 25)
@@ -100,7 +100,7 @@ def test_all_of_what_is_reached_is_held_and_clear_and_hardly_more_would_be(name:
             assert model.interference.clearances(further)[0][0] < model.platform.clearance_m + 1e-5
 
 
-def test_poses_are_in_the_box_turned_as_told_and_the_same_for_the_same_seed() -> None:
+def test_drawn_poses_are_in_the_box_within_the_angle_and_reproducible() -> None:
     model = model_of("spatial-8")
     reach = Reach(model)
     once, again, other = (reach.draw(50, seed, 0.1) for seed in (3, 3, 4))
@@ -114,7 +114,7 @@ def test_poses_are_in_the_box_turned_as_told_and_the_same_for_the_same_seed() ->
     assert not reach.draw(3, 1, 0.0).positions[:, 3:].any()
 
 
-def test_a_way_that_ends_early_is_gone_in_part() -> None:
+def test_a_way_that_ends_early_contributes_its_first_part() -> None:
     model = changed("spatial-8", obstacles=(LAMP,))
     reach = Reach(model)
     drawn = reach.draw(200, 1)
@@ -126,7 +126,7 @@ def test_a_way_that_ends_early_is_gone_in_part() -> None:
     assert clearances.min() >= model.platform.clearance_m
 
 
-def test_a_start_from_which_nothing_leads_is_refused_by_its_reason(
+def test_a_start_without_any_way_is_rejected_with_the_reason(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(reachable, "_MOST_DRAWN", 1)
@@ -144,7 +144,7 @@ def test_a_start_from_which_nothing_leads_is_refused_by_its_reason(
         Reach(caged).draw(2, 1)
 
 
-def test_a_robot_with_three_cables_too_many_is_refused() -> None:
+def test_a_robot_with_three_redundant_cables_is_rejected() -> None:
     model = model_of("planar-3")
     platform = model.platform
     more = replace(
@@ -159,7 +159,7 @@ def test_a_robot_with_three_cables_too_many_is_refused() -> None:
         Reach(platform_model(more, np.full(5, 20.0), np.full(5, 200.0)))
 
 
-def test_a_turned_platform_is_not_sent_down_on_its_stand() -> None:
+def test_drawn_poses_keep_a_turned_platform_above_its_stand() -> None:
     name = "suspended-8"
     platform = model_of(name).platform
     up = len(platform.home_m) - 1
@@ -174,6 +174,6 @@ def test_a_turned_platform_is_not_sent_down_on_its_stand() -> None:
     for pose in poses:
         assert (pose[0] + anchors @ pose[1:].T)[:, up].min() > stand_m
     below = changed(name, workspace_min_m=(*low[:up], platform.home_m[up] - 0.1))
-    # one whose targets reach below home does not stand on a floor there
+    # a robot whose targets reach below home does not stand on a floor there
     lowest = Reach(below, start).draw(200, 3).positions[:, up].min()
     assert lowest < platform.home_m[up]

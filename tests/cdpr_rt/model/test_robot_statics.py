@@ -1,4 +1,4 @@
-"""What a planar robot's cables can hold: against linear programming, statics and the controller."""
+"""What a robot's cables can hold, compared with linear programming, statics and the controller."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def shipped() -> PlatformStatics:
 
 
 def by_linear_programming(statics: PlatformStatics, p: np.ndarray, a: np.ndarray) -> float:
-    """Return the greatest distance of all tensions from their bounds: another way to the same."""
+    """Return the greatest possible distance of all tensions from their bounds."""
     ways = statics.exits_m - p - statics.anchors_m
     W = (ways / np.linalg.norm(ways, axis=1)[:, None]).T
     force = statics.platform.mass_kg * (a + UP)
@@ -50,7 +50,7 @@ def by_linear_programming(statics: PlatformStatics, p: np.ndarray, a: np.ndarray
 
 @settings(max_examples=100)
 @given(st.floats(-2.2, 2.2), st.floats(-0.5, 3.3))
-def test_feasible_wrenches_are_those_the_controller_distributes(x: float, y: float) -> None:
+def test_poses_are_feasible_if_the_controller_finds_tensions(x: float, y: float) -> None:
     statics, p = shipped(), np.array([x, y])
     weight = np.array([0.0, -9.80665 * statics.platform.mass_kg])
     W, t = statics.model.kinematics.wrench_matrix(statics.model.pose(p)), np.zeros(3)
@@ -64,7 +64,7 @@ def test_feasible_wrenches_are_those_the_controller_distributes(x: float, y: flo
 
 
 @pytest.mark.parametrize("name", ["planar-3", "spatial-8"])
-def test_lengths_that_are_checked_are_those_of_the_loop_with_pulleys_too(name: str) -> None:
+def test_lengths_equal_those_of_the_loop_also_with_pulleys(name: str) -> None:
     robot = load_robot(name)
     assert robot.platform is not None
     radii = tuple(0.02 + 0.01 * i for i in range(len(robot.axes)))
@@ -80,7 +80,7 @@ def test_lengths_that_are_checked_are_those_of_the_loop_with_pulleys_too(name: s
     assert (wound >= 0.0).all() and (wound > 1e-3).any(axis=1).all()
 
 
-def test_in_motion_the_worst_direction_counts_and_arrays_keep_their_shape() -> None:
+def test_the_margin_in_motion_is_that_of_the_worst_acceleration() -> None:
     statics, points = shipped(), shipped().box.grid(4, 3)
     assert points.shape == (3, 4, 2)
     moving = statics.margin_N(points, 2.0)
@@ -108,7 +108,7 @@ def test_the_platform_turns_to_where_the_tensions_have_no_moment() -> None:
     assert 1e-3 < abs(angle) < 0.1
 
 
-def test_the_largest_box_is_all_of_targets_and_no_wider_one_is() -> None:
+def test_the_largest_box_is_feasible_and_a_wider_one_is_not() -> None:
     statics, plane = shipped(), Box((-2.0, 0.0), (2.0, 3.0))
     found = statics.largest_box(plane)
     assert found is not None
@@ -122,18 +122,18 @@ def test_the_largest_box_is_all_of_targets_and_no_wider_one_is() -> None:
 
 @settings(max_examples=40)
 @given(st.floats(-1.2, 1.2), st.floats(0.8, 2.7))
-def test_targets_are_what_the_controller_takes(x: float, y: float) -> None:
+def test_targets_are_the_positions_that_the_controller_accepts(x: float, y: float) -> None:
     robot, p = load_robot("planar-3"), np.array([x, y])
     assert robot.platform is not None
     statics = shipped()
     control = CableControl(statics.model, list(robot.axes), np.full(3, 4.5), 1e-3)
     moving_N = float(statics.margin_N(p, statics.platform.acceleration_m_s2))
-    # the controller counts no more than it must of the acceleration
+    # the controller reserves less for the acceleration than the statics
     if abs(moving_N - statics.model.reserve_N) > 0.5:
         assert (control.infeasibility(p) == "") == bool(statics.is_target(p))
 
 
-def test_a_platform_that_is_a_point_does_not_turn_and_may_sit_in_an_exit_point() -> None:
+def test_a_point_platform_does_not_turn_and_has_no_margin_in_an_exit_point() -> None:
     platform = dataclasses.replace(shipped().platform, anchor_points_m=((0.0, 0.0),) * 3)
     statics = PlatformStatics(platform_model(platform, LOW, HIGH))
     assert statics.angle_rad(np.array([0.3, 1.5])) == 0.0
@@ -141,9 +141,9 @@ def test_a_platform_that_is_a_point_does_not_turn_and_may_sit_in_an_exit_point()
     assert (at_exits == -np.inf).all()
 
 
-def test_the_reserve_of_a_smaller_box_is_that_of_its_own_middle() -> None:
+def test_the_largest_box_is_feasible_with_the_reserve_of_its_own_middle() -> None:
     statics = statics_of(load_robot("point-4"))
-    # in the middle of the wide box little can be kept, in that of the smaller one more has to be
+    # the margin in the middle of the wide box is small, that in the smaller one is larger
     low, high = (-2.7, -2.2, 1.2), (2.7, 2.2, 3.8)
     platform = dataclasses.replace(
         statics.platform, workspace_min_m=low, workspace_max_m=high, home_m=(0.0, 0.0, 1.2)
@@ -157,7 +157,7 @@ def test_the_reserve_of_a_smaller_box_is_that_of_its_own_middle() -> None:
     assert smaller.is_target(smaller.points()).all()
 
 
-def test_a_mass_beside_the_origin_is_held_by_other_tensions() -> None:
+def test_tensions_balance_a_centre_of_mass_beside_the_origin() -> None:
     statics = statics_of(load_robot("suspended-8"))
     aside = dataclasses.replace(statics.platform, centre_of_mass_m=(0.2, 0.0, 0.0))
     other = PlatformStatics(platform_model(aside, statics.low_N, statics.high_N))
@@ -166,7 +166,7 @@ def test_a_mass_beside_the_origin_is_held_by_other_tensions() -> None:
     W = other.model.kinematics.wrench_matrix(pose)
     weight = np.array([0.0, 0.0, -9.80665 * aside.mass_kg])
     wrench = np.concatenate([weight, np.cross([0.2, 0.0, 0.0], weight)])
-    # of each of its steel cables, 0.64 N/m, it bears half
+    # it bears half of each of its steel cables, 0.64 N/m
     for exit_m, anchor_m in zip(aside.exit_points_m, aside.anchor_points_m, strict=True):
         half = np.array([0.0, 0.0, -0.32 * np.linalg.norm(p + anchor_m - exit_m)])
         wrench += np.concatenate([half, np.cross(anchor_m, half)])

@@ -1,4 +1,4 @@
-"""Distances of segments and boxes, against MuJoCo's collision functions and plain minimisation."""
+"""Distances of segments and boxes, compared with MuJoCo and plain minimisation."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ many = settings(max_examples=150)
 
 
 class Scene:
-    """Two bodies of MuJoCo, placed at will."""
+    """Two bodies of MuJoCo at any pose."""
 
     def __init__(self, *kinds: str) -> None:
         bodies = "".join(
@@ -54,12 +54,12 @@ class Scene:
 
 
 TWO_SEGMENTS, TWO_BOXES = Scene("capsule", "capsule"), Scene("box", "box")
-"""A segment at a box is a thin box: the distance of a capsule there is not exact in MuJoCo."""
+"""A thin box represents a segment beside a box: MuJoCo's distance of a capsule is not exact."""
 
 
 @many
 @given(seeds, st.sampled_from(["any", "crossing", "parallel", "short"]))
-def test_segments_are_as_far_apart_as_mujocos_capsules(seed: int, kind: str) -> None:
+def test_the_distance_of_segments_equals_mujocos(seed: int, kind: str) -> None:
     rng, near = np.random.default_rng(seed), np.empty((2, 3))
     p, q, r, s = rng.uniform(-3.0, 3.0, (4, 3))
     if kind == "crossing":
@@ -81,7 +81,7 @@ def test_segments_are_as_far_apart_as_mujocos_capsules(seed: int, kind: str) -> 
 
 @many
 @given(seeds, st.booleans())
-def test_a_segment_is_as_far_from_a_box_as_mujocos(seed: int, axial: bool) -> None:
+def test_the_distance_of_segment_and_box_equals_mujocos(seed: int, axial: bool) -> None:
     rng, near = np.random.default_rng(seed), np.empty((2, 3))
     p, q = rng.uniform(-3.0, 3.0, (2, 3))
     if axial:
@@ -97,7 +97,7 @@ def test_a_segment_is_as_far_from_a_box_as_mujocos(seed: int, axial: bool) -> No
 
 @many
 @given(seeds)
-def test_boxes_are_as_far_apart_as_mujocos(seed: int) -> None:
+def test_the_distance_of_boxes_equals_mujocos(seed: int) -> None:
     rng = np.random.default_rng(seed)
     boxes = []
     for _ in range(2):
@@ -113,7 +113,7 @@ def test_boxes_are_as_far_apart_as_mujocos(seed: int) -> None:
 
 @many
 @given(seeds)
-def test_a_segment_is_as_deep_in_a_box_as_its_deepest_point(seed: int) -> None:
+def test_the_depth_of_a_segment_in_a_box_is_that_of_its_deepest_point(seed: int) -> None:
     rng = np.random.default_rng(seed)
     p, q = rng.uniform(-2.0, 2.0, (2, 3))
     box = np.sort(rng.uniform(-1.0, 1.0, (2, 3)), axis=0)
@@ -125,7 +125,7 @@ def test_a_segment_is_as_deep_in_a_box_as_its_deepest_point(seed: int) -> None:
 
 @many
 @given(seeds)
-def test_boxes_overlap_by_how_far_one_has_to_be_moved_out_along_a_side(seed: int) -> None:
+def test_the_depth_of_boxes_is_the_shortest_translation_along_a_side(seed: int) -> None:
     rng = np.random.default_rng(seed)
     box, other = np.sort(rng.uniform(-1.0, 1.0, (2, 2, 3)), axis=1)
     Q = Rotation.random(random_state=seed).as_matrix()

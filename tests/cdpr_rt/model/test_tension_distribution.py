@@ -1,4 +1,4 @@
-"""Tensions carry the wrench within bounds, are optimal, and say why where there are none."""
+"""Tension distribution: wrench and bounds, optimality, and the outcome if no tensions exist."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def of(
 
 
 def feasible(W: FloatArray, w_e: FloatArray, low: FloatArray, high: FloatArray) -> bool:
-    """Ask the simplex method."""
+    """Return whether the simplex method finds tensions."""
     bounds = list(zip(low, high, strict=True))
     return bool(linprog(np.zeros(low.size), A_eq=W, b_eq=-w_e, bounds=bounds).status == 0)
 
@@ -51,7 +51,7 @@ def feasible(W: FloatArray, w_e: FloatArray, low: FloatArray, high: FloatArray) 
 @pytest.mark.parametrize("method", METHODS)
 @settings(max_examples=150)
 @given(seeds, shapes, st.booleans())
-def test_tensions_carry_the_wrench_within_bounds_wherever_the_simplex_method_finds_some(
+def test_tensions_within_bounds_are_found_if_the_simplex_method_finds_some(
     method: str, seed: int, shape: tuple[int, int], wanted_feasible: bool
 ) -> None:
     d, n = shape
@@ -71,7 +71,7 @@ def test_tensions_carry_the_wrench_within_bounds_wherever_the_simplex_method_fin
 
 @settings(max_examples=200)
 @given(seeds, shapes, st.booleans())
-def test_minimum_deviation_meets_the_conditions_of_an_optimum(
+def test_minimum_deviation_satisfies_the_optimality_conditions(
     seed: int, shape: tuple[int, int], none_wanted: bool
 ) -> None:
     """t - wanted is a sum of rows of W and of bounds that hold tensions up, or down."""
@@ -90,7 +90,7 @@ def test_minimum_deviation_meets_the_conditions_of_an_optimum(
 
 @settings(max_examples=200)
 @given(seeds, st.integers(2, 6), st.integers(0, 6), st.booleans())
-def test_a_wrench_that_cannot_be_carried_is_missed_as_little_as_bounds_allow(
+def test_an_infeasible_wrench_is_approximated_with_the_least_error(
     seed: int, d: int, more: int, singular: bool
 ) -> None:
     rng = np.random.default_rng(seed)
@@ -111,7 +111,7 @@ def test_a_wrench_that_cannot_be_carried_is_missed_as_little_as_bounds_allow(
 
 
 @pytest.mark.parametrize("method", ["minimum-norm", "closed-form", "polygon-centroid"])
-def test_cables_that_cannot_hold_a_direction_are_reported_and_carry_the_rest(method: str) -> None:
+def test_a_direction_that_no_cable_holds_is_reported_and_the_rest_carried(method: str) -> None:
     W = np.array([[1.0, -1.0, 0.5, -0.5], [0.0, 0.0, 0.0, 0.0], [0.2, 0.2, -0.2, -0.3]])
     low, high = np.full(4, 5.0), np.full(4, 100.0)
     distribution = of(method, low, high, np.ones(3), low)
@@ -123,7 +123,7 @@ def test_cables_that_cannot_hold_a_direction_are_reported_and_carry_the_rest(met
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_a_cable_that_pulls_nowhere_keeps_within_its_bounds(method: str) -> None:
+def test_a_cable_without_effect_stays_within_its_bounds(method: str) -> None:
     W = np.array([[1.0, -1.0, 0.0, 0.3], [0.4, 0.5, 0.0, -1.0]])
     low, high = np.full(4, 5.0), np.full(4, 100.0)
     distribution = of(method, low, high, np.ones(2), np.full(4, 40.0))
@@ -134,7 +134,7 @@ def test_a_cable_that_pulls_nowhere_keeps_within_its_bounds(method: str) -> None
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_no_cable_pulls_anywhere(method: str) -> None:
+def test_a_zero_wrench_matrix_is_singular(method: str) -> None:
     low, high = np.full(3, 5.0), np.full(3, 100.0)
     distribution = of(method, low, high, np.ones(2), low)
     t, w_e = np.zeros(3), np.array([1.0, 2.0])
@@ -145,7 +145,7 @@ def test_no_cable_pulls_anywhere(method: str) -> None:
 
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("wrong", [np.nan, np.inf, -np.inf, 1e200])
-def test_nan_is_rejected_and_nothing_is_written(method: str, wrong: float) -> None:
+def test_nan_is_rejected_and_tensions_stay_unchanged(method: str, wrong: float) -> None:
     W, w_e, low, high = made_up(7, 3, 5, True)
     distribution = of(method, low, high, np.ones(3), low)
     t = np.full(5, 17.0)
@@ -162,7 +162,7 @@ def test_nan_is_rejected_and_nothing_is_written(method: str, wrong: float) -> No
     assert distribution.solve(W, w_e, t) in FOUND
 
 
-def test_other_sizes_and_reversed_bounds_are_refused_in_the_cycle() -> None:
+def test_wrong_sizes_and_reversed_bounds_are_rejected_in_the_cycle() -> None:
     W, w_e, low, high = made_up(8, 3, 5, True)
     distribution = of("minimum-norm", low, high, np.ones(3), low)
     t = np.full(5, 17.0)
@@ -176,7 +176,7 @@ def test_other_sizes_and_reversed_bounds_are_refused_in_the_cycle() -> None:
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_the_same_question_has_the_same_answer_whatever_was_asked_before(method: str) -> None:
+def test_results_do_not_depend_on_earlier_calls(method: str) -> None:
     low, high = np.full(8, 10.0), np.full(8, 6000.0)
     matrices = suspended_poses(40, seed=9)
 
@@ -192,7 +192,7 @@ def test_the_same_question_has_the_same_answer_whatever_was_asked_before(method:
     assert answers(range(40)) == answers(range(39, -1, -1))
 
 
-def test_a_cut_cable_is_bounds_of_zero() -> None:
+def test_bounds_of_zero_exclude_a_cut_cable() -> None:
     W = suspended_poses(1, seed=10)[0]
     distribution = of("minimum-norm", np.full(8, 10.0), np.full(8, 6000.0), SCALE, W[0])
     distribution.low[3] = distribution.high[3] = 0.0
@@ -202,8 +202,8 @@ def test_a_cut_cable_is_bounds_of_zero() -> None:
     assert (outcome in FOUND) == feasible(W, WEIGHT, distribution.low, distribution.high)
 
 
-def test_the_closed_form_says_where_another_method_had_to_help() -> None:
-    """There are wrenches that can be carried and of which the closed form finds no tensions."""
+def test_the_closed_form_reports_when_another_method_was_used() -> None:
+    """Some wrenches can be carried although the closed form finds no tensions for them."""
     low, high, t = np.full(8, 10.0), np.full(8, 6000.0), np.zeros(8)
     closed_form, optimum = (of(m, low, high, SCALE, low) for m in ("closed-form", "minimum-norm"))
     helped = 0
@@ -214,8 +214,8 @@ def test_the_closed_form_says_where_another_method_had_to_help() -> None:
     assert 0 < helped < 100
 
 
-def test_the_closed_form_is_potts() -> None:
-    """t_m - W^+(w_e + W t_m) where that is within bounds."""
+def test_the_closed_form_equals_potts_formula() -> None:
+    """t_m - W^+(w_e + W t_m) if that is within bounds."""
     seen = 0
     for seed in range(200):
         W, w_e, low, high = made_up(seed, 3, 6, True)
@@ -231,7 +231,7 @@ def test_the_closed_form_is_potts() -> None:
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_as_many_cables_as_directions_have_one_answer(method: str) -> None:
+def test_as_many_cables_as_directions_have_one_solution(method: str) -> None:
     W, w_e, low, high = made_up(11, 6, 6, True)
     t = np.zeros(6)
     assert of(method, low, high, np.ones(6), low).solve(W, w_e, t) == TensionOutcome.FEASIBLE
@@ -243,7 +243,7 @@ def test_as_many_cables_as_directions_have_one_answer(method: str) -> None:
 def test_a_call_allocates_no_arrays(method: str) -> None:
     low, high, t = np.full(8, 10.0), np.full(8, 6000.0), np.zeros(8)
     distribution = of(method, low, high, SCALE, np.full(8, 300.0))
-    matrices = suspended_poses(50, seed=15)  # feasible ones and another
+    matrices = suspended_poses(50, seed=15)  # feasible ones and one that is not
     for W in matrices:
         distribution.solve(W, WEIGHT, t)
     headers = 9  # numba makes one for each array that a kernel is given
@@ -316,7 +316,7 @@ def test_with_one_cable_more_the_centroid_is_the_middle_of_a_segment(seed: int, 
 
 
 def steps(method: str, seed: int) -> FloatArray:
-    """Return what remains of the largest change within 3 mm of paths when looked at within 1 nm."""
+    """Return what remains within 1 nm of the largest change within 3 mm, of each of some paths."""
     rng = np.random.default_rng(seed)
     wanted = np.full(8, 400.0) if method == "minimum-deviation" else None
     distribution = TensionSolver(method, LOW, HIGH, SCALE, wanted)
@@ -345,12 +345,12 @@ def steps(method: str, seed: int) -> FloatArray:
 
 @pytest.mark.parametrize("method", ["minimum-norm", "minimum-deviation", "polygon-centroid"])
 def test_tensions_do_not_step_along_paths(method: str) -> None:
-    """Not even where a path leaves what can be carried."""
+    """Not even where a path leaves the feasible region."""
     assert steps(method, seed=13).max() < 0.01
 
 
-def test_a_cut_cable_makes_a_segment_of_the_polygon() -> None:
-    """The polygon has no area then: as if the robot did not have this cable."""
+def test_the_centroid_without_a_cut_cable_is_the_middle_of_a_segment() -> None:
+    """The polygon then has no area: the result is that of a robot without this cable."""
     rest = [0, 1, 2, 4, 5, 6, 7]
     cut = TensionSolver("polygon-centroid", LOW, HIGH, SCALE)
     cut.low[3] = cut.high[3] = 0.0
@@ -366,7 +366,7 @@ def test_a_cut_cable_makes_a_segment_of_the_polygon() -> None:
     assert seen > 10
 
 
-def test_a_polygon_that_is_a_point_is_that_point() -> None:
+def test_a_polygon_that_is_a_point_has_this_point_as_centroid() -> None:
     """Two opposite cables at their upper bounds hold the load; nothing is left to choose."""
     W = np.array([[-1.0, 1.0, 0.6, -0.6], [0.0, 0.0, 0.8, 0.8]])
     low, high = np.full(4, 10.0), np.array([100.0, 100.0, 50.0, 50.0])

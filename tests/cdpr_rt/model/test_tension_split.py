@@ -1,4 +1,4 @@
-"""Tensions that carry a platform and exert a loop's force: their laws, beside SciPy."""
+"""Tensions that carry a platform and exert a loop's force, compared with SciPy."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ MACHINES = {"plane": planar, "space": spatial}
 
 
 class Split:
-    """`tension_split.split` of a robot, with what it keeps from cycle to cycle."""
+    """`tension_split.split` of a robot, with its state from cycle to cycle."""
 
     def __init__(self, machine: Machine, pace: float = 0.0) -> None:
         self.model: PlatformModel = machine.model()
@@ -109,8 +109,8 @@ def test_an_infeasible_wrench_is_approximated_with_least_error(name: str) -> Non
 
 
 @pytest.mark.parametrize("name", MACHINES)
-def test_who_asks_for_more_never_gets_less(name: str) -> None:
-    """The nearest of a convex set: along what is asked for, what is exerted never falls."""
+def test_a_larger_requested_force_never_exerts_less(name: str) -> None:
+    """The nearest point of a convex set: along the requested direction, the force never falls."""
     splitting = Split(MACHINES[name]())
     rng, d = np.random.default_rng(3), splitting.model.size
     for q in places(splitting, 30):
@@ -127,14 +127,14 @@ def test_who_asks_for_more_never_gets_less(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", MACHINES)
-def test_along_a_path_tensions_change_as_the_path_does(name: str) -> None:
+def test_tensions_do_not_step_along_a_path(name: str) -> None:
     splitting = Split(MACHINES[name](), pace=1e-3 / 0.051)
     rng, d = np.random.default_rng(4), splitting.model.size
     here, there = places(splitting, 2)
     way = rng.normal(size=d) * splitting.scale
     tensions = []
     for s in np.linspace(0.0, 1.0, 2001):
-        # from below what can be had to beyond it, and back
+        # from below the feasible force to beyond it, and back
         force = 200.0 * np.sin(np.pi * s) ** 2 * way / np.linalg.norm(way / splitting.scale)
         splitting(splitting.W((1.0 - s) * here + s * there), splitting.weight, force)
         tensions.append(splitting.t.copy())
@@ -143,8 +143,8 @@ def test_along_a_path_tensions_change_as_the_path_does(name: str) -> None:
     assert steps.max() < 2.5
 
 
-def test_the_inner_tension_follows_slowly_what_a_force_needs() -> None:
-    """A force that takes more than half of the reserve has the cables tightened for it."""
+def test_the_inner_tension_follows_a_large_force_slowly() -> None:
+    """A force that needs more than half of the reserve tightens the cables."""
     splitting = Split(planar(), pace=0.02)
     W, force = splitting.W(np.array([0.0, 1.9])), np.array([0.0, 40.0])
     splitting(W, splitting.weight, np.zeros(2))
@@ -171,7 +171,7 @@ def test_an_infeasible_load_is_reported() -> None:
     assert splitting.t == pytest.approx(splitting.plan[0])
 
 
-def test_tensions_that_are_given_stay() -> None:
+def test_given_tensions_stay_unchanged() -> None:
     splitting = Split(spatial())
     W = splitting.W(np.array([0.0, 0.0, 1.4, 0.0, 0.0, 0.0]))
     splitting(W, splitting.weight, np.zeros(6))

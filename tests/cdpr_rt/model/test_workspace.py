@@ -1,4 +1,4 @@
-"""Wrench-feasible workspace of any robot: its margin against linear programming, and its words."""
+"""Wrench-feasible workspace of any robot: margins compared with linear programming, and texts."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def by_linear_programming(workspace: CableWorkspace, pose: Pose) -> float:
 
 @settings(max_examples=200)
 @given(st.sampled_from(SHAPES), st.integers(0, 2**32 - 1))
-def test_the_margin_is_what_linear_programming_finds(
+def test_the_margin_equals_that_of_linear_programming(
     shape: tuple[tuple[int, ...], int], seed: int
 ) -> None:
     workspace, pose = made_up(*shape, np.random.default_rng(seed))
@@ -93,7 +93,7 @@ def test_infeasible_poses_are_reported() -> None:
     assert "N outside" in workspace.infeasibility(Pose(np.array([0.5, -0.3, 0.0])))
 
 
-def test_margins_in_closed_form_are_those_of_every_corner_of_a_published_robot() -> None:
+def test_closed_form_margins_agree_with_linear_programming_for_cogiro() -> None:
     """CoGiRo with its published payload and tensions: the polygon of its tensions has corners."""
     rng = np.random.default_rng(2025)
     robot = CableKinematics(COGIRO.exit_points_m, COGIRO.anchor_points_m)
@@ -118,7 +118,7 @@ def robot_matrices(robot: CableKinematics, poses: FloatArray) -> list[FloatArray
     return [robot.wrench_matrix(Pose(pose[0], pose[1:])).copy() for pose in poses]
 
 
-def test_a_platform_in_motion_needs_more_in_every_direction() -> None:
+def test_wrenches_in_motion_include_both_signs_of_every_acceleration() -> None:
     told = corners(*wrenches_in_motion(2.0, 3.0, 2, SPATIAL))
     assert told.shape == (8, 6)
     assert {tuple(row) for row in np.abs(told[:, :2])} == {(6.0, 6.0)}
@@ -126,7 +126,7 @@ def test_a_platform_in_motion_needs_more_in_every_direction() -> None:
     assert not told[:, 3:].any()
 
 
-def test_the_first_place_in_the_way_is_found() -> None:
+def test_the_first_infeasible_pose_of_a_way_is_found() -> None:
     ceiling = np.array([[-2.0, -2.0, 3.0], [2.0, -2.0, 3.0], [2.0, 2.0, 3.0], [-2.0, 2.0, 3.0]])
     robot = CableKinematics(ceiling, np.zeros((4, 3)), POINT)
     weight, _ = wrenches_in_motion(10.0, 0.0, 2, POINT)
