@@ -19,7 +19,7 @@ _HALVINGS = 60
 
 @dataclass(frozen=True)
 class BruteRobot:
-    """Exit and anchor points (n, 3), pulleys, and boxes (2, 3); the first is the platform's body."""
+    """Exit and anchor points (n, 3), pulleys, and boxes (2, 3), first that of the platform."""
 
     exits: Floats
     anchors: Floats

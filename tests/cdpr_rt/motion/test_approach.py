@@ -1,4 +1,4 @@
-"""Laws of set-points that are planned anew in every cycle."""
+"""Set-points that are planned again in every cycle."""
 
 import numpy as np
 from hypothesis import given, settings
@@ -12,7 +12,7 @@ bounds = st.lists(st.floats(0.05, 50), min_size=2, max_size=2).map(np.array)
 
 
 class Run:
-    """Two axes on their way; keeps what they did."""
+    """Two axes that move to targets, with their history."""
 
     def __init__(self, speed: np.ndarray, acceleration: np.ndarray) -> None:
         self.speed, self.acceleration = speed, acceleration
@@ -41,7 +41,7 @@ class Run:
 
 
 @given(pairs, bounds, bounds)
-def test_arrives_without_overshoot_as_early_as_the_bounds_allow(
+def test_axes_arrive_without_overshoot_as_early_as_the_bounds_allow(
     target: np.ndarray, speed: np.ndarray, acceleration: np.ndarray
 ) -> None:
     run = Run(speed, acceleration)
@@ -63,7 +63,7 @@ def test_arrives_without_overshoot_as_early_as_the_bounds_allow(
 
 
 @given(st.lists(st.tuples(pairs, st.integers(1, 400)), min_size=1, max_size=8), bounds, bounds)
-def test_bounds_hold_whatever_becomes_of_the_target(
+def test_bounds_hold_however_the_target_changes(
     targets: list[tuple[np.ndarray, int]], speed: np.ndarray, acceleration: np.ndarray
 ) -> None:
     run = Run(speed, acceleration)
@@ -72,7 +72,7 @@ def test_bounds_hold_whatever_becomes_of_the_target(
     run.check()
 
 
-def test_a_target_that_is_no_number_brakes() -> None:
+def test_a_nan_or_infinite_target_brakes() -> None:
     run = Run(np.ones(2), np.ones(2))
     run.towards(np.array([5.0, 5.0]), 500)
     run.towards(np.array([np.nan, np.inf]), 600)
@@ -81,7 +81,7 @@ def test_a_target_that_is_no_number_brakes() -> None:
 
 
 @given(st.lists(st.tuples(pairs, st.integers(1, 400)), min_size=1, max_size=8), bounds)
-def test_a_pace_is_reached_within_the_acceleration(
+def test_a_velocity_is_reached_within_the_acceleration(
     wanted: list[tuple[np.ndarray, int]], acceleration: np.ndarray
 ) -> None:
     run = Run(np.full(2, 20.0), acceleration)
@@ -95,7 +95,7 @@ def test_a_pace_is_reached_within_the_acceleration(
         )
         assert np.all(close)
     run.check()
-    # 20 rad/s, 0.05 rad/s²: in one go
+    # speed and then position change within single cycles
     assert not ramp_velocity(np.ones(2), np.full(2, 1e6), PERIOD_S, *state)
     assert not ramp_velocity(np.zeros(2), np.full(2, 1e6), PERIOD_S, *state)
     assert ramp_velocity(np.zeros(2), np.full(2, 1e6), PERIOD_S, *state)
@@ -103,7 +103,7 @@ def test_a_pace_is_reached_within_the_acceleration(
 
 @settings(max_examples=200)
 @given(pairs, pairs, st.floats(0.0, 1.0))
-def test_a_goal_lies_on_the_way_to_its_target(
+def test_the_deadbands_goal_lies_between_position_and_target(
     target: np.ndarray, position: np.ndarray, awake: float
 ) -> None:
     goal = np.zeros(2)
@@ -114,7 +114,7 @@ def test_a_goal_lies_on_the_way_to_its_target(
         assert share > 0.999
 
 
-def test_waking_needs_a_larger_step_than_falling_asleep() -> None:
+def test_the_deadband_wakes_at_a_larger_step_than_it_falls_asleep() -> None:
     goal = np.zeros(1)
     shares = {
         (awake, size): soft_deadband(np.array([size]), np.zeros(1), np.ones(1), awake, 1e-4, goal)
@@ -122,8 +122,8 @@ def test_waking_needs_a_larger_step_than_falling_asleep() -> None:
         for size in (5e-6, 3e-5, 2e-4)
     }
     assert shares[0.0, 5e-6] < 0.01
-    assert shares[0.0, 3e-5] < 0.01, "asleep it stays"
-    assert shares[1.0, 3e-5] > 0.99, "awake it goes on"
+    assert shares[0.0, 3e-5] < 0.01, "it stays asleep"
+    assert shares[1.0, 3e-5] > 0.99, "it stays awake"
     assert shares[1.0, 5e-6] < 0.1
     assert shares[0.0, 2e-4] > 0.99
 

@@ -1,4 +1,4 @@
-"""The set-point stream as it is played: continuous, in order, never ahead of what was sent."""
+"""Playback of the set-point stream: continuous, in order, never ahead of the samples sent."""
 
 import heapq
 import itertools
@@ -18,7 +18,7 @@ IDENTITY = (1.0, 0.0, 0.0, 0.0)
 
 
 class Sender:
-    """A hand that leads, on a clock of its own, and a network in between."""
+    """A sender with a separate clock, and a network with delays."""
 
     def __init__(self, offset_ns: int = 7_000_000_000_000) -> None:
         self.block = SharedBlock.create(1, 1.0, 100.0)
@@ -66,7 +66,7 @@ def wave(t: float) -> tuple[float, float, float]:
     return (0.1 * np.sin(2.0 * t), 0.05 * np.cos(3.0 * t), 0.02 * t)
 
 
-def test_an_even_stream_is_played_with_its_delay_between_its_samples() -> None:
+def test_an_even_stream_is_interpolated_at_its_delay() -> None:
     sender = Sender()
     for k in range(120):
         sender.send(k, k / 60.0, wave(k / 60.0), transit_s=0.02)
@@ -89,7 +89,7 @@ doubled = st.lists(st.booleans(), min_size=60, max_size=60)
 
 @settings(max_examples=60)
 @given(transits, dropped, doubled, st.sampled_from([30.0, 60.0]), st.integers(0, 1 << 61))
-def test_loss_jitter_duplicates_and_another_order_never_make_it_leap(
+def test_loss_jitter_duplicates_and_reordering_cause_no_leaps(
     transits: list[float], dropped: set[int], doubled: list[bool], rate: float, offset_ns: int
 ) -> None:
     sender = Sender(offset_ns)
@@ -104,7 +104,7 @@ def test_loss_jitter_duplicates_and_another_order_never_make_it_leap(
     begun = np.flatnonzero(states != StreamState.STOPPED)[0]
     x = poses[begun:, 0]
     steps = np.diff(x)
-    # it is played at up to twice the pace, never backwards, and to the last sample
+    # playback goes at up to twice the speed, never backwards, and up to the last sample
     assert np.all(steps >= -1e-12)
     assert np.all(steps <= 2.0 * speed * PERIOD_S + 1e-9)
     sent = [k for k in range(60) if doubled[k] or k not in dropped]
@@ -116,7 +116,7 @@ def test_loss_jitter_duplicates_and_another_order_never_make_it_leap(
 
 @settings(max_examples=40)
 @given(st.lists(st.floats(0.0, 0.15), min_size=30, max_size=30))
-def test_after_some_seconds_jitter_makes_no_sample_late(transits: list[float]) -> None:
+def test_the_delay_adapts_to_jitter_within_seconds(transits: list[float]) -> None:
     sender = Sender()
     for k in range(150):
         sender.send(k, k / 30.0, wave(k / 30.0), transits[k % 30])
@@ -128,7 +128,7 @@ def test_after_some_seconds_jitter_makes_no_sample_late(transits: list[float]) -
     assert sender.stream.delay_s <= max(transits) - min(transits) + 0.06
 
 
-def test_silence_is_held_then_stopped_and_what_follows_starts_again() -> None:
+def test_a_silent_stream_holds_then_stops_and_later_samples_start_again() -> None:
     sender = Sender()
     for k in range(31):
         sender.send(k, k / 30.0, (k / 30.0, 0.0, 0.0))
@@ -148,7 +148,7 @@ def test_silence_is_held_then_stopped_and_what_follows_starts_again() -> None:
     assert poses[-1, 0] == pytest.approx(5.0 + 59 / 30.0)
 
 
-def test_another_session_starts_again_and_the_old_ones_samples_do_not_count() -> None:
+def test_a_new_session_starts_again_and_samples_of_the_old_one_are_ignored() -> None:
     sender = Sender()
     for k in range(30):
         sender.send(k, k / 30.0, (0.1, 0.0, 0.0))
@@ -189,7 +189,7 @@ def test_implausible_samples_are_rejected(change: dict[str, object]) -> None:
     [((1.5, 0.0, 0.0), 0.5 + 1 / 30), ((0.5, 0.0, 0.0), -100.0), ((0.5, 0.0, 0.0), 100.0)],
     ids=["the hand leaps", "the clock goes back", "the clock goes forth"],
 )
-def test_a_leap_of_hand_or_clock_starts_again(
+def test_a_leap_of_position_or_clock_starts_again(
     position: tuple[float, float, float], sent_s: float
 ) -> None:
     sender = Sender()
@@ -211,7 +211,9 @@ rotations = st.lists(st.floats(-2.0, 2.0), min_size=3, max_size=3)
 @settings(max_examples=50)
 @given(rotations, st.booleans())
 @example([1e-9, 0.0, 0.0], True)
-def test_the_attitude_turns_evenly_on_the_shortest_way(turn: list[float], flipped: bool) -> None:
+def test_rotation_is_interpolated_evenly_on_the_shortest_way(
+    turn: list[float], flipped: bool
+) -> None:
     there = Rotation.from_rotvec(np.array(turn) * (0.9 * np.pi / (2.0 * np.sqrt(3.0))))
     x, y, z, w = there.as_quat()
     sign = -1.0 if flipped else 1.0
@@ -245,7 +247,7 @@ numbers = st.floats(allow_nan=True, allow_infinity=True)
         max_size=40,
     )
 )
-def test_no_sample_whatever_breaks_it(samples: list[tuple[object, ...]]) -> None:
+def test_random_samples_never_give_an_infinite_pose(samples: list[tuple[object, ...]]) -> None:
     sender = Sender()
     row = np.zeros((), SAMPLE)
     for sequence, sent_ns, position, scale, session, copies in samples:
@@ -261,7 +263,7 @@ def test_no_sample_whatever_breaks_it(samples: list[tuple[object, ...]]) -> None
     assert sender.stream.state == StreamState.STOPPED
 
 
-def test_more_than_the_ring_keeps_is_counted_and_starts_again() -> None:
+def test_samples_beyond_the_ring_are_counted_as_overrun() -> None:
     sender = Sender()
     for k in range(200):
         sender.send(k, k * 1e-3, (0.0, 0.0, 0.0), transit_s=0.3 - k * 1e-3)
@@ -271,14 +273,14 @@ def test_more_than_the_ring_keeps_is_counted_and_starts_again() -> None:
     assert counts["accepted"] + counts["late"] == 63
 
 
-def test_samples_overwritten_while_they_were_read_do_not_count() -> None:
+def test_samples_overwritten_during_reading_are_ignored() -> None:
     sender = Sender()
     sender.send(0, 0.0, (0.1, 0.0, 0.0))
     sender.run(0.1)
     posted = sender.block.counters["samples"]
 
     class Racing:
-        """The writer's counter, as seen by a reader that is held up after its first look."""
+        """The writer's counter, as seen by a reader that is delayed after its first read."""
 
         looks = 0
 
@@ -292,7 +294,7 @@ def test_samples_overwritten_while_they_were_read_do_not_count() -> None:
     assert sender.stream.counts()["overrun"] == 1
 
 
-def test_update_keeps_no_memory() -> None:
+def test_updates_retain_no_memory() -> None:
     sender = Sender()
     row = np.zeros((), SAMPLE)
     row["quaternion"], row["scale"], row["session"] = IDENTITY, 1.0, 1
@@ -318,7 +320,7 @@ def test_update_keeps_no_memory() -> None:
     assert sender.stream.state == StreamState.FRESH
 
 
-def test_only_samples_of_the_mover_s_right_are_played() -> None:
+def test_only_samples_of_the_movers_right_are_played() -> None:
     sender = Sender()
     sender.block.counters["mover"] = 5
     for k in range(1, 40):
@@ -329,7 +331,7 @@ def test_only_samples_of_the_mover_s_right_are_played() -> None:
     assert (counts["accepted"], counts["other_right"]) == (39, 78)
     assert poses[:, 0].min() >= 0.0
     assert poses[-1, 0] > 0.3
-    sender.block.counters["mover"] = 6  # another's turn
+    sender.block.counters["mover"] = 6  # another client may move
     sender.send(40, 40 / 60.0, (0.5, 0.0, 0.0), right=5, session=5)
     before = sender.stream.pose[0]
     sender.run(0.1)

@@ -1,4 +1,4 @@
-"""Laws of motion that every leg obeys."""
+"""Properties of every leg."""
 
 import numpy as np
 from hypothesis import given

@@ -1,4 +1,4 @@
-"""A small interpreter of G-code after the definition of RS-274, independent of the product's.
+"""A small interpreter of G-code by the definition of RS-274, independent of the product's.
 
 It returns points of the programmed path, in mm, close to each other. Lines are programs of the
 tests: words with numbers, no comments, all of X, Y and Z known from the first line on.
@@ -88,7 +88,7 @@ def _arc(points, here, to, offset, axes, clockwise, centre, radius, turns) -> No
     a, b = complex(here[u], here[v]), complex(to[u], to[v])
     if radius is None:
         middle = a + complex(centre.get(u, 0.0), centre.get(v, 0.0))
-    else:  # on that side of the chord on which the arc is the shorter one, or the longer one
+    else:  # on the side of the chord that makes the arc the shorter or the longer one
         chord = b - a
         aside = math.sqrt(max(radius**2 - abs(chord / 2) ** 2, 0.0))
         side = -1j if clockwise == (radius > 0) else 1j

@@ -1,4 +1,4 @@
-"""G-code: what it means, and what is refused with the line that it stands in."""
+"""G-code: its meaning, and rejected codes with their line numbers."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def ends_mm(path: PathDescription) -> list[list[float]]:
     return [[round(1e3 * x, 6) for x in move.end[:3]] for move in path.moves]
 
 
-def test_lines_units_and_modes():
+def test_units_distance_modes_and_line_numbers():
     path = read(
         "%", "O1000 (a part)", "N10 G21 G90 ; mm", "G0 X10 Y20. Z-3", "g1 x30 f600", "G91", "Y5",
         "G90 G20", "X1.0 F60", "G4 P0.5", "M0", "M2",
@@ -39,7 +39,7 @@ def test_lines_units_and_modes():
     assert (path.moves[3].dwell_s, path.moves[4].waits) == (0.5, True)
 
 
-def test_the_path_begins_where_all_coordinates_have_been_named():
+def test_the_path_begins_after_all_coordinates_were_named():
     path = read("G0 Z50", "G0 X1 Y2", "G1 X5 F100", "M30", origin=(0.1, 0.2, 0.3))
     np.testing.assert_allclose(path.start[:3], [0.101, 0.202, 0.35])
     assert len(path.moves) == 1
@@ -47,7 +47,7 @@ def test_the_path_begins_where_all_coordinates_have_been_named():
         read("G0 X1 Z2", "X5", "M2")
 
 
-def test_room_coordinates_and_the_reference():
+def test_g53_moves_in_room_coordinates_and_g28_to_the_reference():
     path = read(
         "G0 X0 Y0 Z0", "G53 X300 Y0 Z1500", "X5", "G28 Z100", "G28", "M2", origin=(0.1, 0.1, 1.0)
     )
@@ -55,14 +55,14 @@ def test_room_coordinates_and_the_reference():
                              [0, 100, 1400]]  # fmt: skip
 
 
-def test_turning_alone_takes_degrees_a_minute():
+def test_the_feed_of_a_pure_rotation_is_in_degrees_per_minute():
     path = read("G0 X0 Y0 Z0", "G1 A9 F600", "X10", "M2")
     np.testing.assert_allclose(path.moves[0].speed, math.radians(10.0))
     np.testing.assert_allclose(path.moves[0].end[3], math.radians(9.0))
     np.testing.assert_allclose(path.moves[1].speed, 0.01)
 
 
-def test_corners_are_cut_as_the_file_says():
+def test_g61_and_g64_set_the_corner_radius():
     path = read("G0 X0 Y0 Z0", "G1 X1 F60", "G64 P2.5", "X2", "G61", "X3", "G64", "X4", "M2")
     assert [move.blend_m for move in path.moves] == [1e-3, 2.5e-3, 0.0, 1e-3]
 
@@ -72,7 +72,7 @@ def test_corners_are_cut_as_the_file_says():
     st.floats(-math.pi, math.pi), st.floats(0.05, 2 * math.pi - 0.05), st.booleans(),
     st.floats(1.0, 400.0),
 )  # fmt: skip
-def test_an_arc_is_the_same_by_its_centre_and_by_its_radius(begin, turn, clockwise, radius):
+def test_centre_and_radius_define_the_same_arc(begin, turn, clockwise, radius):
     sign = -1.0 if clockwise else 1.0
     end = begin + sign * turn
     centre = np.array([7.0, -3.0])
@@ -92,7 +92,7 @@ def test_an_arc_is_the_same_by_its_centre_and_by_its_radius(begin, turn, clockwi
         np.testing.assert_allclose(by_radius.angle_rad, sign * turn, atol=1e-4)
 
 
-def test_a_whole_circle_and_a_helix():
+def test_a_full_circle_and_a_helix_have_their_angle_and_length():
     path = read("G0 X10 Y0 Z0", "F600", "G2 X10 Y0 I-10 J0", "G3 X-10 Z5 I-10", "M2")
     pieces = pieces_of(path, np.array([1, 1, 1, 0.3, 0.3, 0.3]))
     np.testing.assert_allclose(pieces.angle_rad, [-2 * math.pi, math.pi])
@@ -149,7 +149,7 @@ def test_unsupported_codes_are_rejected(lines, where, told):
         read(*lines, "M2", where=where)
 
 
-def test_all_reasons_are_reported_at_once_by_line():
+def test_all_problems_are_reported_together_by_line():
     with pytest.raises(PathError) as caught:
         read(
             "G0 X0 Y0 Z0", "G41 G5 G21 X1 U3", "M98 P5", "#1=5", "G1 X5 F60", "#2=#1", "X1e3", "M2"
@@ -161,7 +161,7 @@ def test_all_reasons_are_reported_at_once_by_line():
     assert "leave" not in str(caught.value)
 
 
-def test_many_different_problems_stay_a_short_text():
+def test_the_report_of_many_problems_is_short():
     with pytest.raises(PathError) as caught:
         read("G0 X0 Y0 Z0", *(f"X1e{i}" for i in range(5000)), "M2")
     assert len(str(caught.value)) < 4000
@@ -181,7 +181,7 @@ def test_words_of_tools_and_printers_are_ignored_with_one_notice():
         assert name in notice
 
 
-def test_a_line_is_skipped_with_the_code_that_is_ignored():
+def test_ignoring_a_code_skips_its_whole_line():
     path = read("G0 X0 Y0 Z0", "M777 X150 Y60 Z10", "G0 X5", "M2", ignored={"M777"})
     assert ends_mm(path) == [[5, 0, 0]]
     with pytest.raises(PathError, match=r":2: M777 and G1 share a line: divide it"):
@@ -194,12 +194,12 @@ def test_modal_codes_cannot_be_ignored(name):
         read("G0 X0 Y0 Z0", "X5", "M2", ignored={name})
 
 
-def test_an_axis_that_the_robot_lacks_may_be_dropped():
+def test_an_axis_that_the_robot_lacks_may_be_ignored():
     path = read("G0 X0 Y0 Z5", "G1 X5 Z-1 F60", "M2", where=PLANE, ignored={"Z"})
     assert ends_mm(path) == [[5, 0]]
 
 
-def test_a_feed_is_in_the_units_of_its_own_line():
+def test_a_feed_is_in_the_units_that_apply_in_its_line():
     path = read("G20 G90 F60", "G21", "G0 X0 Y0 Z0", "G1 X50", "G20 F30 X3", "M2")
     np.testing.assert_allclose([move.speed for move in path.moves], [0.0254, 0.0127])
 
@@ -209,7 +209,7 @@ def test_inverse_time_gives_the_duration_of_each_move():
     np.testing.assert_allclose([move.speed for move in path.moves], [3e-3, 0.02 * math.pi / 30.0])
 
 
-def test_stops_before_the_first_position_are_where_the_path_begins():
+def test_stops_before_the_first_position_move_to_the_beginning_of_the_path():
     path = read("G0 Z50", "M0 (clamp it)", "G4 P2", "G0 X0 Y0", "G1 X50 F3000", "M2")
     nodes = nodes_of(path, np.ones(6))
     assert nodes.runs[0].tolist() == [0, 0]
@@ -217,7 +217,7 @@ def test_stops_before_the_first_position_are_where_the_path_begins():
     assert nodes.waits.sum() == 1
 
 
-def test_dwells_are_in_s_or_ms_and_long_ones_are_noticed():
+def test_dwells_are_in_s_or_ms_and_long_ones_give_a_notice():
     lines = ["G0 X0 Y0 Z0", "G4 P500", "X5", "G4 S2", "M2"]
     path = read(*lines)
     assert [move.dwell_s for move in path.moves] == [500.0, 0.0, 2.0]
@@ -229,32 +229,32 @@ def test_dwells_are_in_s_or_ms_and_long_ones_are_noticed():
     assert not path.notices
 
 
-def test_coordinate_systems_have_zeros_of_their_own():
+def test_coordinate_systems_have_separate_zeros():
     zeros = {"G55": np.array([1.0, 0.0, 0.0])}
     path = read("G0 X0 Y0 Z0", "G55 X10", "G92 X0", "X5", "G92.1", "G54 X7", "M2", origins_m=zeros)
     assert ends_mm(path) == [[1010, 0, 0], [1015, 0, 0], [7, 0, 0]]
 
 
-def test_an_offset_before_the_first_move_says_where_the_path_begins():
+def test_an_offset_before_the_first_move_sets_where_the_path_begins():
     path = read("G92 X10 Y0 Z0", "G1 X20 F60", "M2", origin=(0.1, 0.0, 0.0))
     np.testing.assert_allclose(path.start[:3], [0.11, 0.0, 0.0])
     assert ends_mm(path) == [[120, 0, 0]]
 
 
-def test_relative_reference_positions_of_a_program_head():
+def test_relative_reference_moves_in_a_programs_head_are_followed():
     path = read("G28 G91 Z0", "G90", "G28 X Y", "G0 X5 Y0", "Z10", "M30", origin=(0.1, 0.1, 1.0))
     np.testing.assert_allclose(path.start[:3], [0.0, 0.1, 1.4])
     assert ends_mm(path) == [[105, 100, 1400], [105, 100, 1010]]
 
 
-def test_files_of_a_plane_take_their_height_from_the_settings():
+def test_a_file_without_z_takes_its_height_from_the_settings():
     path = read("G0 X0 Y0", "X5", "M2", z_m=0.02, origin=(0.0, 0.0, 1.0))
     assert ends_mm(path) == [[5, 0, 1020]]
     with pytest.raises(PathError, match=r":1: Z: --z is for files that do not name it \(2 lines\)"):
         read("G0 X0 Y0 Z5", "Z6", "M2", z_m=0.02)
 
 
-def test_rotation_vectors_turn_with_a_file_that_is_turned_and_mirrored():
+def test_placement_rotates_and_mirrors_rotation_vectors():
     turn = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
     path = read("G0 X0 Y0 Z0", "X10 A5", "M2", placement=2.0 * turn)
     np.testing.assert_allclose(path.moves[0].end, [0, 0.02, 0, 0, math.radians(5), 0], atol=1e-12)
@@ -263,7 +263,7 @@ def test_rotation_vectors_turn_with_a_file_that_is_turned_and_mirrored():
     np.testing.assert_allclose(path.moves[0].end, [-0.01, 0, 0, angle, 0, -angle], atol=1e-12)
 
 
-def test_how_text_is_written_does_not_matter():
+def test_line_ends_spaces_comments_and_byte_order_mark_do_not_matter():
     lines = ["G21 G90", "G0X0Y0Z0", "G1X5F60", "X+0.5"]
     wanted = GcodeSettings(np.zeros(3))
     for text in (
@@ -279,13 +279,13 @@ def test_how_text_is_written_does_not_matter():
 @settings(max_examples=150)
 @example("*71")
 @given(st.text(alphabet="GMXYZABCFIJKLPQRSE0123456789.-+ %/#*();\n", max_size=120))
-def test_any_text_is_read_or_refused(text):
+def test_any_text_is_read_or_rejected_with_a_path_error(text):
     try:
         read(text)
     except PathError as error:
         assert str(error).startswith("part.nc:")
 
 
-def test_an_arc_of_a_radius_beyond_reason_is_refused() -> None:
+def test_an_arc_with_an_excessive_radius_is_rejected() -> None:
     with pytest.raises(ValueError, match=r"allowed: up to 1e\+06 mm"):
         arc_by_radius(np.zeros(2), np.ones(2), 1e200, True)

@@ -1,6 +1,6 @@
-"""The motion follows the programmed geometry, between nodes and samples too.
+"""The motion follows the programmed geometry, also between nodes and samples.
 
-The reference is an interpreter of its own, `rs274`.
+The reference is the separate interpreter `rs274`.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ FAST = PathLimits(np.full(3, 2.0), np.full(3, 20.0), np.full(3, 2000.0))
 
 
 def commanded_mm(timed: TimedPath) -> np.ndarray:
-    """Return the set-points between the samples too, (m, 3): polynomials of fifth order in time."""
+    """Return set-points, also between the samples, (m, 3): quintic polynomials in time."""
     times = timed.period_s * np.arange(len(timed.samples))
     curve = BPoly.from_derivatives(times, timed.samples)
     return 1e3 * curve(np.linspace(0.0, times[-1], 8 * len(times)))
@@ -35,14 +35,14 @@ def commanded_mm(timed: TimedPath) -> np.ndarray:
 def off_mm(
     lines: list[str], limits: PathLimits = ORDINARY, blend_mm: float = 0.0
 ) -> tuple[float, float]:
-    """Return how far the set-points are from the program at most, and the program from them."""
+    """Return the largest distance of set-points from the program, and of the program from them."""
     wanted = GcodeSettings(np.zeros(3), 1e-3 * blend_mm)
     path = read_gcode("\n".join([*lines, "M2", ""]), "part.nc", ROOM, wanted)
     nodes = nodes_of(path, np.ones(3))
     timed = time_path(nodes, limits, WrenchBounds.none(len(nodes.s), 3))
     places, points = commanded_mm(timed), programmed_mm(lines)
     off = distances_mm(places, points).max()
-    # what planning says of itself, looked at in fewer places
+    # the planner's figure, which it computes at fewer places
     assert off <= 1.02e3 * (nodes.deviation_m + timed.departure_m) + 1e-3
     return off, distances_mm(points, places).max()
 
@@ -57,7 +57,7 @@ def tight_then(radius: float, wide: str) -> list[str]:
 @pytest.mark.parametrize("radius", [1.0, 0.2, 0.05])
 @pytest.mark.parametrize("wide", ["arc", "line"])
 @pytest.mark.parametrize("blend_mm", [0.0, 1.0])
-def test_a_tight_arc_does_not_bend_what_follows_it(limits, radius, wide, blend_mm):
+def test_a_tight_arc_does_not_distort_what_follows_it(limits, radius, wide, blend_mm):
     end = "G2 X50 Y{:.6f} I0 J-10000" if wide == "arc" else "G1 X50"
     if wide == "arc":
         drop = 10000.0 - math.sqrt(10000.0**2 - (50.0 - radius) ** 2)
@@ -109,11 +109,11 @@ PARTS = {
 
 
 @pytest.mark.parametrize("name", PARTS)
-def test_the_motion_is_that_of_another_interpreter(name):
+def test_the_motion_follows_the_path_of_the_other_interpreter(name):
     assert max(off_mm(PARTS[name])) < EXACT_mm
 
 
-def test_a_placed_file_is_the_other_interpreter_s_path_placed():
+def test_a_placed_file_follows_the_transformed_path_of_the_other_interpreter():
     c, s = math.cos(0.5), math.sin(0.5)
     placement = 1.5 * np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]]) @ np.diag([-1.0, 1.0, 1.0])
     lines = PARTS["planes"]

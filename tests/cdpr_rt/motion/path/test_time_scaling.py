@@ -1,6 +1,6 @@
-"""Corners and time: limits kept at every sample, corners within their radius, and near the fastest.
+"""Corners and timing: limits at every sample, corners within their radius, near-optimal duration.
 
-The fastest without limits of jerk is told by the package toppra.
+The package toppra computes the optimum without limits of jerk.
 """
 
 from __future__ import annotations
@@ -61,7 +61,7 @@ points = st.lists(
 
 @settings(max_examples=25)
 @given(points, st.sampled_from([0.0, 0.002, 0.02]), st.floats(0.02, 1.0))
-def test_every_sample_keeps_all_limits_and_every_corner_its_radius(places, blend_m, speed):
+def test_samples_keep_all_limits_and_corners_their_radius(places, blend_m, speed):
     path = polyline(places, blend_m, speed)
     nodes = nodes_of(path, SCALE)
     plan = timed(nodes)
@@ -99,7 +99,7 @@ def test_a_cut_corner_has_no_step_in_direction_or_curvature():
     )
 
 
-def test_it_is_nearly_as_fast_as_the_fastest_where_jerk_hardly_counts():
+def test_the_duration_is_near_the_optimum_if_jerk_is_hardly_limited():
     places = [[0, 0, 0, 0, 0, 0], [0.3, 0, 0, 0.1, 0, 0], [0.3, 0.3, 0.1, 0, 0, 0.1],
               [0.0, 0.4, 0.1, 0, 0.1, 0.1], [-0.2, 0.1, 0, 0, 0, 0]]  # fmt: skip
     path = polyline(places, 0.1)
@@ -119,14 +119,14 @@ def test_it_is_nearly_as_fast_as_the_fastest_where_jerk_hardly_counts():
     assert 0.97 * fastest.duration <= plan.duration_s <= 1.06 * fastest.duration
 
 
-def test_one_straight_run_takes_what_its_profile_takes():
+def test_a_straight_run_takes_the_time_of_its_velocity_profile():
     limits = LIMITS
     plan = timed(nodes_of(polyline([[0] * 6, [0.3, 0, 0, 0, 0, 0]], 0.0), SCALE), limits)
     a, v = 0.98, 0.4
     assert plan.duration_s == pytest.approx(0.3 / v + v / a + limits.smoothing_s, abs=0.011)
 
 
-def test_dwells_and_waits():
+def test_dwells_and_waits_become_rest():
     path = polyline([[0] * 6, [0.1] + [0] * 5, [0.1, 0.1] + [0] * 4], 0.01, dwell_s=0.3, waits=True)
     path.moves[0] = Move(2, path.moves[0].end, np.inf, 0.01, dwell_s=0.25)
     nodes = nodes_of(path, SCALE)
@@ -138,7 +138,7 @@ def test_dwells_and_waits():
     assert plan.waits.tolist() == [len(plan.samples) - 1]
 
 
-def test_a_wait_where_the_path_begins_is_after_a_moment_of_rest():
+def test_a_wait_at_the_beginning_comes_after_one_sample_of_rest():
     """A wait at time 0 would be passed over by who looks for the next one."""
     path = polyline([[0] * 6, [0] * 6, [0.1] + [0] * 5], 0.0)
     path.moves[0] = Move(2, path.start, np.inf, waits=True)
@@ -147,7 +147,7 @@ def test_a_wait_where_the_path_begins_is_after_a_moment_of_rest():
     assert not plan.samples[:2, 1:].any()
 
 
-def test_tensions_slow_it_down():
+def test_limited_wrenches_slow_the_path_down():
     path = polyline([[0] * 6, [0.3, 0, 0, 0, 0, 0]], 0.0)
     nodes = nodes_of(path, SCALE)
     count = len(nodes.s)
@@ -162,14 +162,14 @@ def test_tensions_slow_it_down():
     assert plan.duration_s > 1.3 * timed(nodes).duration_s
 
 
-def test_a_path_that_leads_nowhere_rests():
+def test_a_path_of_one_place_rests():
     path = polyline([[0.1] * 6, [0.1] * 6], 0.01, dwell_s=0.5)
     plan = timed(nodes_of(path, SCALE))
     assert plan.duration_s == pytest.approx(0.5)
     assert not plan.samples[:, 1:].any()
 
 
-def test_pieces_of_which_next_to_nothing_is_left_between_corners_slow_nothing_down():
+def test_tiny_pieces_between_cut_corners_do_not_slow_the_path():
     """As of arcs in lines of 2 mm, rounded to micrometres, whose corners are cut by half of it."""
     angle = np.arange(4000) / 50.0
     places = np.round(0.1 * np.stack([np.cos(angle), np.sin(angle)], axis=1), 6)

@@ -1,4 +1,4 @@
-"""Way points out of TOML and CSV files."""
+"""Way points from TOML and CSV files."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ wait = true
 CSV = "x_mm,y_m,angle_deg,speed_mm_s,blend_m,dwell_s,wait\n0,1.4,,200,0.01,,\n100,1.4,5,50,,0.5,\n"
 
 
-def test_both_say_the_same(tmp_path):
+def test_toml_and_csv_give_the_same_path(tmp_path):
     (tmp_path / "a.toml").write_text(TOML)
     (tmp_path / "a.csv").write_text(CSV + "# a comment\n100,1.6,,200,0,,1\n")
     one, other = (read_path(tmp_path / f"a.{kind}", PLANE, SETTINGS) for kind in ("toml", "csv"))
@@ -47,7 +47,7 @@ def test_both_say_the_same(tmp_path):
     assert other.lines == [2, 3, 5]
 
 
-def test_a_stop_at_the_first_point_is_where_the_path_begins(tmp_path):
+def test_a_stop_at_the_first_point_is_at_the_beginning_of_the_path(tmp_path):
     text = TOML.replace("position_m = [0.0, 1.4]", "position_m = [0.0, 1.4]\nwait = true")
     (tmp_path / "a.toml").write_text(text)
     (tmp_path / "a.csv").write_text(CSV.replace(",200,0.01,,", ",200,0.01,1.5,1"))
@@ -71,14 +71,14 @@ def test_a_stop_at_the_first_point_is_where_the_path_begins(tmp_path):
         ("x_m,y_m\n0,1\n", r"less than two"),
     ],
 )
-def test_csv_that_is_refused(tmp_path, text, told):
+def test_invalid_csv_is_rejected(tmp_path, text, told):
     file = tmp_path / "a.csv"
     file.write_text(text)
     with pytest.raises(PathError, match=told):
         read_path(file, PLANE, SETTINGS)
 
 
-def test_toml_that_is_refused(tmp_path):
+def test_invalid_toml_is_rejected(tmp_path):
     file = tmp_path / "a.toml"
     file.write_text(TOML.replace("[0.1, 1.6]", "[0.1]"))
     with pytest.raises(ProfileError, match=r"points\[2\].position_m: value \[0.1\]; allowed: 2 n"):
