@@ -1,4 +1,4 @@
-"""One cycle of a robot and its platform's loop, linear around a pose, as a model in time."""
+"""One cycle of a robot and its platform's loop, linearised at a pose in the time domain."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ def points_of(machine: Machine) -> list[tuple[float, FloatArray]]:
 
 
 def turned_wrench(machine: Machine, q: FloatArray, tension_N: FloatArray) -> FloatArray:
-    """Return ∂(J^T t - w)/∂q (d, d) by differences, with the weight w of points on the platform."""
+    """Return ∂(J^T t - w)/∂q (d, d) by differences; w is the weight of points on the platform."""
     model, pose = machine.model(), machine.model().pose(q)
 
     def left_over(step: FloatArray) -> FloatArray:
@@ -88,7 +88,7 @@ def turned_wrench(machine: Machine, q: FloatArray, tension_N: FloatArray) -> Flo
 def radius(
     machine: Machine, gains: LoopGains, q: FloatArray, share: float, period_s: float
 ) -> float:
-    """Return the largest eigenvalue's magnitude of one cycle of robot and loop, of all tensions."""
+    """Return the largest eigenvalue's magnitude of one cycle of robot and loop at any tensions."""
     tensions_N = planned_tensions(machine.model(), machine.model().pose(q))
     return max(radius_at(machine, gains, q, share, period_s, t) for t in tensions_N)
 
@@ -104,9 +104,9 @@ def radius_at(
 ) -> float:
     """Return the largest eigenvalue's magnitude of one cycle of robot and loop.
 
-    Cables and masses are discretised exactly, with torques that are held for a cycle and act
-    0.8 ms and a cycle behind the angles that they come from; observer, smoother, integral part,
-    and tensions and stretch that follow the pose are those of the kernels, written anew.
+    Cables and masses are discretised exactly. Torques are held for a cycle and act 0.8 ms and a
+    cycle after the angles they come from. Observer, smoother, integral part, and tensions and
+    stretch that follow the pose are as in the kernels, in separate code.
     """
     model = machine.model()
     pose = model.pose(q)

@@ -35,7 +35,7 @@ _CORNERS = np.array([[-1.0, -1.0], [-1.0, 1.0], [1.0, 1.0], [1.0, -1.0]])
 
 @dataclass(frozen=True)
 class Machine:
-    """A platform, its axes, and what its cables and motors bear."""
+    """A platform, its axes, and the limits of cables and motors."""
 
     platform: Platform
     axes: tuple[RobotAxis, ...]
@@ -43,7 +43,7 @@ class Machine:
     high_N: float
     torque_Nm: float
     learns: bool = True
-    """Whether its control learns what motors take up."""
+    """Whether its control learns the motors' friction and cogging."""
 
     @property
     def n(self) -> int:
@@ -66,7 +66,7 @@ def planar() -> Machine:
 
 
 def bar() -> Machine:
-    """A bar of 0.4 m on three cables, fastened unevenly: it turns a lot, at 2 to 4 Hz."""
+    """A bar of 0.4 m on three cables, fastened unevenly: it swings widely at 2 to 4 Hz."""
     motor = load_motor("MPP0922D")
     axes = [replace(axis, winch=replace(axis.winch, motor=motor)) for axis in _PLANAR.axes]
     platform = Platform(
@@ -84,7 +84,7 @@ def bar() -> Machine:
 
 
 def spatial() -> Machine:
-    """A box of 0.5 x 0.2 x 0.6 m on 8 cables in a frame of 4 x 4 x 3 m; upper ones end below."""
+    """A box of 0.5 x 0.2 x 0.6 m on 8 crossed cables in a frame of 4 x 4 x 3 m."""
     low, high = np.full((4, 1), 0.0), np.full((4, 1), 3.0)
     exits = np.vstack([np.hstack([2.0 * _CORNERS, low]), np.hstack([2.0 * _CORNERS, high])])
     across = _CORNERS * [0.25, 0.1]
@@ -161,7 +161,7 @@ def shipped(name: str) -> Machine:
 
 
 class Physics:
-    """The simulated robot: what is asked for in one cycle acts in the next."""
+    """The simulated robot: the command of one cycle acts in the next."""
 
     def __init__(self, machine: Machine, plant: RobotPlant) -> None:
         platform, n = machine.platform, machine.n
@@ -184,7 +184,7 @@ class Physics:
         self.feedback.valid[:] = True
         self._acting = np.zeros(n)
         self._now_s = 0.0
-        for k in range(1500):  # tight as it stands, its lengths known: no start-up here
+        for k in range(1500):  # tight and with known lengths: no start-up is needed
             self.torque[:] = -0.026 * machine.low_N * min(1.0, k / 1000)
             self._cycle()
         control.take_lengths(self.robot.motors["cable_start"].copy(), AxisFeedback(n))
@@ -214,7 +214,7 @@ class Physics:
         return np.asarray(Rotation.from_matrix(self.robot.rotation @ home.T).as_rotvec())
 
     def run(self, seconds: float, until_rest: bool = False) -> None:
-        """Follow the target so long; `until_rest`: until the set-point is there, at the most."""
+        """Follow the target for this time, or with `until_rest` until the set-point has arrived."""
         c, model = self.control, self.model
         for _ in range(round(seconds / PERIOD_S)):
             self._cycle()
@@ -231,7 +231,7 @@ class Physics:
                 return
 
     def go(self, target: Sequence[float] | FloatArray) -> FloatArray:
-        """Go there and rest; return on the way the true set-points and those wanted, (2, k, d)."""
+        """Go there and rest; return the true and the wanted positions on the way, (2, k, d)."""
         first = len(self.true)
         self.target = np.array(target, float)
         self.run(8.0, until_rest=True)
@@ -240,7 +240,7 @@ class Physics:
 
 
 def with_friction(coulomb_Nm: float) -> RobotPlant:
-    """Return a plant whose motors rub so much."""
+    """Return a plant whose motors have this friction."""
     motor = RobotPlant().motor
     friction = motor.friction.model_copy(
         update={"coulomb_Nm": coulomb_Nm, "breakaway_Nm": 1.25 * coulomb_Nm}

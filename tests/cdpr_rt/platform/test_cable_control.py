@@ -1,4 +1,4 @@
-"""A platform's control: on simulated physics, and beside the same computation in NumPy."""
+"""A platform's control on simulated physics, and compared with plain NumPy."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ Moved = tuple[Physics, list[Leg]]
 
 
 def moved(physics: Physics, targets: tuple[tuple[float, ...], ...]) -> Moved:
-    """Return of each target: target, path true and wanted, and rest, true."""
+    """Return for each target: the target, true and wanted path, and the true position at rest."""
     physics.go(targets[-1])
     physics.tension_N.clear()
     legs = []
@@ -50,7 +50,7 @@ def moved(physics: Physics, targets: tuple[tuple[float, ...], ...]) -> Moved:
     return physics, legs
 
 
-def test_winches_that_swing_at_rest_are_reported_until_that_is_cleared() -> None:
+def test_winches_that_swing_at_rest_are_reported_until_notices_are_cleared() -> None:
     physics = Physics(planar(), RobotPlant())
     control, feedback = physics.control, physics.feedback
     at_rest_rad = feedback.position_rad.copy()
@@ -66,7 +66,7 @@ def test_winches_that_swing_at_rest_are_reported_until_that_is_cleared() -> None
 
 @pytest.fixture(scope="module")
 def in_a_plane() -> Moved:
-    """A robot whose motors are unknown, after targets."""
+    """A robot with unidentified motors after motions to targets."""
     return moved(Physics(planar(), RobotPlant()), PLANE)
 
 
@@ -92,7 +92,9 @@ def test_positions_and_orientations_are_reached_in_space(in_space: Moved) -> Non
 
 
 @pytest.mark.parametrize("where", ["in_a_plane", "in_space"])
-def test_the_estimate_is_where_the_platform_is(where: str, request: pytest.FixtureRequest) -> None:
+def test_the_estimated_pose_equals_the_true_pose(
+    where: str, request: pytest.FixtureRequest
+) -> None:
     physics, _ = request.getfixturevalue(where)
     k = physics.model.positions
     estimated, truth = physics.control.estimated, physics.true[-1]
@@ -130,16 +132,16 @@ def test_friction_and_cogging_are_learnt_in_motion(in_a_plane: Moved) -> None:
     physics = in_a_plane[0]
     learning, motors = physics.control.learning, RobotPlant().motor_plants(3)
     assert learning is not None
-    # the tension's share of friction is learnt along with the motor's own; after so little motion
-    # better of all motors together than of each
+    # learnt friction includes the cable's share; after so little motion the mean over all motors
+    # is more accurate than each value
     share = learning.friction_Nm / [motor.friction.coulomb_Nm for motor in motors]
     assert share.min() > 0.5 and share.max() < 2.0 and 0.9 < share.mean() < 1.6
     amplitude = np.linalg.norm(learning.cogging_Nm, axis=1)
     np.testing.assert_allclose(amplitude, [m.cogging[0].amplitude_Nm for m in motors], rtol=0.35)
 
 
-def test_a_robot_with_much_friction_does_not_leap() -> None:
-    """Friction above what the proportional part may ask for; the damping is not saturated."""
+def test_a_robot_with_high_friction_overshoots_little() -> None:
+    """Friction exceeds the bound of the proportional part; the damping is not saturated."""
     physics, legs = moved(Physics(planar(), with_friction(0.5)), PLANE[:2])
     for target, (path, wanted), rest in legs:
         assert np.abs(rest - target).max() < 2e-3
@@ -150,7 +152,9 @@ def test_a_robot_with_much_friction_does_not_leap() -> None:
 
 
 @pytest.mark.parametrize("name", ROBOTS)
-def test_the_plain_controller_of_the_bench_finds_the_pose_and_carries_the_weight(name: str) -> None:
+def test_the_benchmarks_plain_controller_finds_the_pose_and_pulls_with_all_cables(
+    name: str,
+) -> None:
     ours = control_of(robot(name))
     plain, motion = PlainControl(robot(name), ours), PeriodicMotion(robot(name), ours)
     torques: list[np.ndarray] = []
@@ -163,7 +167,7 @@ def test_the_plain_controller_of_the_bench_finds_the_pose_and_carries_the_weight
 
 
 @pytest.mark.parametrize("name", ROBOTS)
-def test_an_update_allocates_nothing_that_stays(name: str) -> None:
+def test_updates_retain_no_memory(name: str) -> None:
     ours = control_of(robot(name))
     motion = PeriodicMotion(robot(name), ours)
     for work in islice(updates(ours, motion, []), 50):
@@ -182,7 +186,7 @@ def test_an_update_allocates_nothing_that_stays(name: str) -> None:
     assert grown < 2000
 
 
-def test_a_place_that_tensions_cannot_hold_is_reported() -> None:
+def test_a_position_that_tensions_cannot_hold_is_reported() -> None:
     control = planar().control()
     control.stand_still()
     control.position[:] = 0.0, 1.9
@@ -238,7 +242,7 @@ def test_tensions_that_are_missing_are_reported(place: tuple[float, float], told
     assert control.tension_N.max() <= model.high_N[0] + 1e-9
 
 
-def test_a_length_that_is_no_number_does_not_agree_with_the_others() -> None:
+def test_a_nan_length_makes_the_residual_nan_and_suspects_no_cable() -> None:
     control, feedback = spatial().control(), AxisFeedback(8)
     control.take_lengths(control.lengths_at_home(np.zeros(8)), feedback)
     control.begin(feedback)
@@ -251,7 +255,7 @@ def test_a_length_that_is_no_number_does_not_agree_with_the_others() -> None:
     assert control.suspects() == []
 
 
-def test_a_jump_is_told_of_the_cable_that_jumped_not_of_one_that_was_off_before() -> None:
+def test_a_jump_blames_the_cable_that_jumped_not_one_that_was_off_before() -> None:
     control, feedback = spatial().control(), AxisFeedback(8)
     lengths_m = control.lengths_at_home(np.zeros(8))
     lengths_m[5] += 0.02
@@ -282,8 +286,8 @@ def test_an_acceleration_that_tensions_cannot_give_is_reported() -> None:
     assert control.tension_infeasibility().startswith("for this motion, cable")
 
 
-def test_lengths_of_this_very_cycle_stay_and_home_is_found() -> None:
-    """Lengths under tension at home, given at any angle, have the platform stand at home."""
+def test_lengths_taken_at_any_motor_angles_place_the_platform_at_home() -> None:
+    """The platform is estimated at home after its lengths were given at any motor angles."""
     control = spatial().control()
     tension_N = np.full(8, 60.0)
     lengths = control.lengths_at_home(tension_N)
@@ -327,14 +331,14 @@ def test_reset_clears_the_integral_part() -> None:
     assert np.abs(torque - first).max() < 0.3 * np.abs(grown - first).max()
 
 
-def test_as_many_axes_as_cables() -> None:
+def test_fewer_axes_than_cables_are_rejected() -> None:
     machine = planar()
     with pytest.raises(GeometryError, match="2 axes; allowed: 3, one for each cable"):
         CableControl(machine.model(), list(machine.axes)[:2], np.full(3, 4.5), PERIOD_S)
 
 
-def test_the_set_point_is_shaped_without_changing_where_it_ends() -> None:
-    """The mean over 60 ms: behind a step of the acceleration it ramps, and it ends the same."""
+def test_shaping_the_set_point_keeps_its_end() -> None:
+    """The mean over 60 ms turns a step into a ramp that ends at the same place."""
     control = planar().control()
     feedback, setpoint, torque = AxisFeedback(3), Setpoint(3), np.zeros(3)
     control.take_lengths(control.model.kinematics.lengths(control.model.home_pose), feedback)
@@ -350,8 +354,8 @@ def test_the_set_point_is_shaped_without_changing_where_it_ends() -> None:
     assert control.shaped == pytest.approx(start + 0.01, abs=1e-12)
 
 
-def test_a_set_point_on_a_stand_begins_where_the_platform_was_put_since() -> None:
-    """Where it comes after the platform, it does not come from where that stood before."""
+def test_a_set_point_on_a_stand_begins_where_the_platform_stands_now() -> None:
+    """The set-point is the new estimate, not a way from the old one."""
     control = short_arms().control()
     assert not control.gains.follows_pose
     kinematics, model, feedback = control.model.kinematics, control.model, AxisFeedback(8)
@@ -367,8 +371,8 @@ def test_a_set_point_on_a_stand_begins_where_the_platform_was_put_since() -> Non
     np.testing.assert_allclose(control.position, control.estimated, atol=1e-9)
 
 
-def test_lengths_agree_under_the_tensions_with_which_the_platform_stands() -> None:
-    """Cables that press a platform on its stand are stretched by more than what is planned with."""
+def test_lengths_on_the_stand_agree_under_the_standing_tensions() -> None:
+    """Cables that press a platform on its stand are stretched by more than the planned tensions."""
     robot = load_robot("spatial-8")
     control = CableControl(platform_model_of(robot), robot.axes, np.full(8, 6.0), PERIOD_S)
     feedback, standing_N = (
@@ -379,14 +383,14 @@ def test_lengths_agree_under_the_tensions_with_which_the_platform_stands() -> No
     control.begin(feedback, standing_N)
     assert control.residual_m < 1e-6
     np.testing.assert_allclose(control.estimated, control.model.home, atol=1e-6)
-    # what is planned with is kept
+    # with the planned tensions, lengths disagree
     control.begin(feedback)
     assert control.residual_m > 1e-3
 
 
-def test_friction_that_is_made_up_for_in_motion_takes_over_from_the_integral_part() -> None:
+def test_friction_compensation_replaces_the_integral_part_as_motion_begins() -> None:
     def step_of_torque(friction_Nm: float) -> FloatArray:
-        """Return by what the torques change where motion begins after a wait beside the target."""
+        """Return the change of torque as motion begins after a wait beside the target."""
         control = planar().control()
         feedback, setpoint, torque = AxisFeedback(3), Setpoint(3), np.zeros(3)
         control.take_lengths(control.model.kinematics.lengths(control.model.home_pose), feedback)

@@ -1,4 +1,4 @@
-"""A load cell that is off is named; motors, payloads and cables that are off are none."""
+"""A load cell with a wrong reading is named; wrong motors, payloads and cables blame no cell."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ W = np.array([np.cos(ANGLES), np.sin(ANGLES)])
 TENSION_N = np.array([80.0, 80.0, 80.0, 80.0])
 WEIGHT = np.array([0.0, -WEIGHT_N])
 RISE_N = np.array([6.0, 5.0, -3.0, 0.0])
-"""By what cells show more than is in the middle of their cables."""
+"""Difference of tension from the middle of each cable to its cell."""
 TENSION_N = TENSION_N - np.linalg.pinv(W) @ (W @ TENSION_N + WEIGHT)
 
 
 class Cells:
-    """Four cables in a plane at rest, their tensions as they are read and as they are asked for."""
+    """Four cables in a plane at rest, with measured and requested tensions."""
 
     def __init__(self) -> None:
         names = ["one", "two", "three", "four"]
@@ -37,18 +37,18 @@ class Cells:
 
 
 @pytest.mark.parametrize(("off_N", "word"), [(40.0, "more"), (-40.0, "less")])
-def test_a_cell_that_is_off_is_named_with_how_much(off_N: float, word: str) -> None:
+def test_a_cell_with_a_wrong_reading_is_named_with_the_error(off_N: float, word: str) -> None:
     cells = Cells()
     assert not cells.told()
     cells.read_N[2] += off_N
     assert cells.told().startswith(f"three: its load cell shows 40 N {word} than its motor")
     cells.read_N[2] -= off_N
     cells.check.restart()
-    assert cells.told().startswith("three"), "it stays until it is cleared"
+    assert cells.told().startswith("three"), "the report stays until it is cleared"
 
 
-def test_the_balance_of_forces_tells_cell_and_motor_apart() -> None:
-    # what makes the balance worse is more likely than what leaves it: this is a motor that is off
+def test_the_balance_of_forces_distinguishes_cell_and_motor() -> None:
+    # the readings balance the weight, so the motor is wrong
     cells = Cells()
     cells.asked_N[1] -= 22.0
     assert not cells.told()
@@ -66,11 +66,11 @@ def test_usual_motor_and_payload_errors_do_not_blame_a_load_cell() -> None:
     carried = np.linalg.pinv(W) @ (W @ TENSION_N + cells.wrench)
     cells.asked_N -= carried
     cells.read_N -= carried
-    cells.wrench[1] = -WEIGHT_N  # it weighs half as much again, and nobody has said so
+    cells.wrench[1] = -WEIGHT_N  # the platform weighs 50 % more than the file says
     assert not cells.told()
 
 
-def test_a_hand_that_pulls_is_no_cell() -> None:
+def test_an_external_force_does_not_blame_a_load_cell() -> None:
     cells = Cells()
     pulled = np.linalg.pinv(W) @ np.array([60.0, 0.0])
     cells.asked_N += pulled
@@ -78,7 +78,7 @@ def test_a_hand_that_pulls_is_no_cell() -> None:
     assert not cells.told()
 
 
-def test_a_silent_cell_is_left_out() -> None:
+def test_a_silent_cell_is_ignored() -> None:
     cells = Cells()
     cells.read_N[3], cells.valid[3] = np.nan, False
     assert not cells.told()
@@ -86,7 +86,7 @@ def test_a_silent_cell_is_left_out() -> None:
     assert cells.told().startswith("one: ")
 
 
-def test_readings_that_swing_are_no_lie() -> None:
+def test_oscillating_readings_do_not_blame_a_load_cell() -> None:
     cells = Cells()
     for k in range(10_000):
         cells.read_N[:] = TENSION_N + RISE_N + 40.0 * np.sin(2.0 * np.pi * PERIOD_S * k)

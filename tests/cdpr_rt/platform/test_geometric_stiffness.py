@@ -1,4 +1,4 @@
-"""Platforms that their pretension holds, or turns away: the loop's design beside models in time."""
+"""Platforms that pretension stabilises or destabilises: the loop's design, and models."""
 
 from __future__ import annotations
 
@@ -34,7 +34,9 @@ from tests.cdpr_rt.platform.platform_physics import (
 
 
 @pytest.mark.parametrize("name", ["planar-3", "planar-4", "point-4", "suspended-6", "spatial-8"])
-def test_geometric_stiffness_is_how_wrenches_turn_with_cables_and_weight(name: str) -> None:
+def test_geometric_stiffness_is_the_derivative_of_the_tensions_and_weights_wrench(
+    name: str,
+) -> None:
     machine = shipped(name)
     model = machine.model()
     for q in loop_model(machine).poses[[0, 2, -1]]:
@@ -60,15 +62,15 @@ def test_planned_tensions_carry_the_weight_within_the_planned_bounds() -> None:
 
 
 @pytest.mark.parametrize("name", ["planar-3", "planar-4", "point-4", "suspended-6", "spatial-8"])
-def test_tensions_follow_the_pose_where_cables_are_stiffer_than_tensions(name: str) -> None:
+def test_tensions_follow_the_pose_if_cables_are_stiffer_than_tensions(name: str) -> None:
     machine = shipped(name)
     gains, poses = loop_model(machine).design(), loop_model(machine).poses[[1, -1]]
     assert gains.follows_pose
     assert max(radius(machine, gains, q, 0.7, PERIOD_S) for q in poses) < 1.0
 
 
-def test_tensions_are_those_of_the_set_point_where_they_hold_the_platform() -> None:
-    """Following the pose, they undo the stiffness that they give it, late, and it is unstable."""
+def test_tensions_are_those_of_the_set_point_if_they_stabilise_the_platform() -> None:
+    """If tensions followed the pose, they would cancel their stiffness with delay: unstable."""
     for machine in (short_arms(), replace(short_arms(), low_N=200.0, high_N=800.0)):
         gains, q = loop_model(machine).design(), loop_model(machine).poses[1]
         assert not gains.follows_pose
@@ -77,8 +79,8 @@ def test_tensions_are_those_of_the_set_point_where_they_hold_the_platform() -> N
         assert max(radius(machine, follows, q, share, PERIOD_S) for share in (0.7, 1.3)) > 1.0
 
 
-def test_tensions_follow_the_pose_of_a_platform_that_they_turn_away() -> None:
-    """Where no loop is stiff enough to hold it against them."""
+def test_tensions_follow_the_pose_if_they_destabilise_the_platform() -> None:
+    """Here no loop is stiff enough to hold it against tensions of the set-point."""
     model = loop_model(crossed_rod())
     gains = model.design()
     assert gains.follows_pose
@@ -87,8 +89,8 @@ def test_tensions_follow_the_pose_of_a_platform_that_they_turn_away() -> None:
     assert min(m.modulus for m in model.margins(stays)) < 0.5 * LEAST_MARGIN
 
 
-def test_a_platform_that_tensions_turn_away_too_fast_is_refused() -> None:
-    """At the set-point the loop is not stiff enough; where they follow, they are too late."""
+def test_a_platform_that_tensions_turn_away_too_fast_is_rejected() -> None:
+    """Tensions of the set-point need a stiffer loop; tensions that follow the pose are too late."""
     with pytest.raises(UnstableError, match="turn the platform away"):
         loop_model(replace(crossed_rod(), low_N=200.0, high_N=800.0)).design()
 
@@ -119,7 +121,7 @@ def test_a_plate_with_short_arms_stands_and_moves_within_its_tensions() -> None:
 
 
 def test_a_platform_on_softer_cables_does_not_drift_away_below_the_lowest_mode() -> None:
-    """Tensions that follow it do so by a stretch that is not its own, slower than 0.3 Hz."""
+    """Otherwise tensions would follow a wrong stretch, slower than 0.3 Hz."""
     heavy = replace(short_arms().platform, mass_kg=11.7, inertia_kg_m2=(0.245,))
     machine = replace(short_arms(), platform=heavy, low_N=6.0, high_N=32.0)
     gains, q = loop_model(machine).design(), loop_model(machine).poses[1]

@@ -1,4 +1,4 @@
-"""Cables that weigh a sixth of their platform: planned, asked for and true tensions."""
+"""Cables that weigh a sixth of their platform: planned, requested and true tensions."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ def rise_N(height_m: float) -> float:
 
 
 @pytest.mark.parametrize("place_m", [(0.0, 0.0, 1.0), PLACE_m, (-1.0, 1.0, 2.5)])
-def test_planned_tensions_are_those_of_catenaries(place_m: tuple[float, ...]) -> None:
+def test_planned_tensions_equal_those_of_catenaries(place_m: tuple[float, ...]) -> None:
     machine = heavy()
     statics = PlatformStatics(machine.model())
     true = standing(
@@ -76,7 +76,7 @@ def test_planned_tensions_are_those_of_catenaries(place_m: tuple[float, ...]) ->
         np.testing.assert_allclose(planned_N - rise_N(place_m[2]), true.platform_N, rtol=5e-3)
 
 
-def test_ways_end_where_tensions_with_the_cables_weight_do() -> None:
+def test_ways_end_where_no_tensions_with_cable_weight_exist() -> None:
     model = heavy().model()
     start, rng = np.array([0.0, 0.0, 2.0]), np.random.default_rng(3)
     ways = rng.normal(size=(40, 3))
@@ -95,11 +95,11 @@ def test_ways_end_where_tensions_with_the_cables_weight_do() -> None:
     )  # fmt: skip
 
 
-def test_a_platform_that_is_held_has_the_planned_tensions_and_the_loop_adds_nothing() -> None:
+def test_a_platform_at_rest_has_the_planned_tensions_without_the_loops_force() -> None:
     machine = heavy()
     physics = Physics(machine, RobotPlant.model_validate(SMOOTH))
     physics.go(PLACE_m)
-    physics.run(8.0)  # friction that is left is made up for by the integral part
+    physics.run(8.0)  # the integral part compensates the remaining friction
     statics = PlatformStatics(machine.model())
     winch_N = np.mean(physics.tension_N[-1000:], axis=0)
     planned_N = statics.tensions_N(np.array(PLACE_m)) + rise_N(PLACE_m[2])
@@ -110,10 +110,10 @@ def test_a_platform_that_is_held_has_the_planned_tensions_and_the_loop_adds_noth
         position_m=physics.robot.position_m,
     )  # fmt: skip
     np.testing.assert_allclose(winch_N, true.winch_N, rtol=0.01)
-    # all of the cables' weight, which is 15 N on the platform, is known beforehand
+    # the feedforward includes the cables' whole weight, 15 N on the platform
     control, planned_N = physics.control, planned_N - rise_N(PLACE_m[2])
     np.testing.assert_allclose(control._feedforward_N, planned_N, rtol=2e-3)
-    # and what winches pull more, 7 N upward, is not left to the loop
+    # and the difference at the winches, 7 N upward, is not left to the loop
     upward = control.model.kinematics.wrench_matrix(control.model.pose(np.array(PLACE_m)))[2]
     assert abs(upward @ (control.tension_N - planned_N)) < 1.0
     cable_m = np.array([axis.winch.cable_m_per_motor_rad for axis in machine.axes])
@@ -133,7 +133,7 @@ def heaviest() -> Machine:
     return Machine(platform, (axis,) * 3, 150.0, 1000.0, 4.0)
 
 
-def test_stiffness_of_ropes_that_sag_is_that_of_catenaries() -> None:
+def test_the_stiffness_of_sagging_ropes_equals_that_of_catenaries() -> None:
     machine = heaviest()
     model, EA = machine.model(), rigidity(machine)
     pose = model.pose(np.array([1.5, 1.5, 1.2]))
@@ -150,8 +150,8 @@ def test_stiffness_of_ropes_that_sag_is_that_of_catenaries() -> None:
     assert (found < 0.5 * EA / model.kinematics.lengths(pose)).any()
 
 
-def test_a_loop_keeps_its_margin_whether_its_ropes_sag_or_not() -> None:
-    """In a fast motion their own inertia keeps them from it."""
+def test_a_loop_keeps_its_margin_with_sagging_and_with_straight_ropes() -> None:
+    """In a fast motion, the ropes' inertia keeps them from sagging."""
     machine = heaviest()
     light = replace(
         machine, platform=replace(machine.platform, cable_weights_N_m=(0.0,) * machine.n)
@@ -165,7 +165,7 @@ def test_a_loop_keeps_its_margin_whether_its_ropes_sag_or_not() -> None:
         assert min(mode.damping_ratio for mode in model.least_damped(gains, CABLE_DAMPING_s)) > 0.05
 
 
-def test_rotors_and_platform_swing_over_ropes_that_sag() -> None:
+def test_the_lowest_resonance_includes_the_sag_of_ropes() -> None:
     machine, place_m = heaviest(), np.array([1.2, -0.6, 1.5])
     model, EA = machine.model(), rigidity(machine)
     pose = model.pose(place_m)
@@ -182,5 +182,7 @@ def test_rotors_and_platform_swing_over_ropes_that_sag() -> None:
     stretch = np.hstack([J, -np.eye(3)])
     masses = np.concatenate([[110.0] * 3, rotors(machine)])
     squares = np.linalg.eigvals((stretch.T * k @ stretch) / masses[:, None]).real
-    lowest = np.sqrt(np.sort(squares)[3]) / (2.0 * np.pi)  # three move rotors and platform together
+    lowest = np.sqrt(np.sort(squares)[3]) / (
+        2.0 * np.pi
+    )  # three modes move rotors and platform together
     assert lowest_resonance_Hz(model, machine.axes, place_m) == pytest.approx(lowest, rel=0.02)

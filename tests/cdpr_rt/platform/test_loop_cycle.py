@@ -1,4 +1,4 @@
-"""One cycle of robot and loop in the controller's model: beside another, and simulated physics."""
+"""The controller's model of one cycle of robot and loop, another model, and physics."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ def cycle_of(
     pose = model.pose(q)
     nothing = np.zeros(0, complex)
     plant = linear_plant(model, q, rotors(machine), rigidity(machine), nothing, ())
-    # J = P (modes)^-1, so that coordinates along the modes are those of J's pseudo-inverse
+    # J = P (modes)^-1, so coordinates along the modes are those of J's pseudo-inverse
     J = model.kinematics.jacobian(pose)
     along = np.linalg.pinv(J) @ plant.pulls
     K_G = along.T @ geometric_stiffness(model, pose, tension_N) @ along
@@ -81,7 +81,7 @@ def cycle_of(
 @pytest.mark.parametrize("period_s", [1e-3, LATE_S])
 @pytest.mark.parametrize("follows_pose", [False, True])
 @pytest.mark.parametrize("make", [planar, short_arms, crossed_rod])
-def test_a_cycle_has_the_eigenvalue_of_another_model(
+def test_a_cycle_has_the_largest_eigenvalue_of_the_other_model(
     make: object, follows_pose: bool, period_s: float
 ) -> None:
     machine = make()  # type: ignore[operator]
@@ -94,8 +94,8 @@ def test_a_cycle_has_the_eigenvalue_of_another_model(
             assert np.abs(np.linalg.eigvals(cycle)).max() == pytest.approx(expected, rel=1e-9)
 
 
-def test_a_drive_later_than_a_cycle_acts_by_torques_of_the_cycles_before() -> None:
-    """Half the cycle with the same loop differs little: delays are mostly the drive's."""
+def test_shorter_cycles_than_the_drives_delay_change_damping_little() -> None:
+    """Half the cycle with the same loop differs little: most of the delay is the drive's."""
     machine = planar()
     model = loop_model(machine)
     gains, q = model.design(), model.poses[1]
@@ -108,7 +108,7 @@ def test_a_drive_later_than_a_cycle_acts_by_torques_of_the_cycles_before() -> No
     assert ratios[0] < ratios[1] < ratios[2] < 1.5 * ratios[0]
 
 
-def test_an_oscillator_has_its_frequency_and_damping() -> None:
+def test_least_damped_finds_frequency_and_damping_of_an_oscillator() -> None:
     rate, ratio, period_s = 60.0, 0.03, 1e-3
     angle = rate * math.sqrt(1.0 - ratio**2) * period_s
     turn = np.array([[math.cos(angle), -math.sin(angle)], [math.sin(angle), math.cos(angle)]])
@@ -124,7 +124,7 @@ def test_an_oscillator_has_its_frequency_and_damping() -> None:
 
 
 def plate() -> Machine:
-    """A light plate under high tensions, which a loop in cycles of 4 ms drives at 33 Hz."""
+    """A light plate under high tensions, which a loop with cycles of 4 ms excites at 33 Hz."""
     anchors = np.array(short_arms().platform.anchor_points_m) * 1.72
     platform = replace(
         short_arms().platform,
@@ -136,7 +136,7 @@ def plate() -> Machine:
 
 
 def late_plate() -> LoopModel:
-    """Return the model of `plate` in the middle and at a corner of its box, in such cycles."""
+    """Return the model of `plate` with such cycles, in the middle and at a corner of its box."""
     return LoopModel(*robot_of(plate()), LATE_S, design_poses(plate().model())[[1, -1]])
 
 
@@ -147,7 +147,7 @@ def largest(
     period_s: float,
     cable_damping_s: float = CABLE_DAMPING_s,
 ) -> float:
-    """Return the largest eigenvalue's magnitude of the other model, of the tensions and cables."""
+    """Return the other model's largest eigenvalue magnitude over tensions and cable stiffness."""
     model = machine.model()
     return max(
         radius_at(machine, gains, q, share, period_s, tension_N, cable_damping_s)
@@ -157,7 +157,7 @@ def largest(
     )
 
 
-def test_a_loop_that_keeps_its_margin_and_swings_is_designed_again(
+def test_a_loop_that_swings_despite_its_margin_is_designed_again(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     machine, model = plate(), late_plate()
@@ -172,8 +172,8 @@ def test_a_loop_that_keeps_its_margin_and_swings_is_designed_again(
     assert min(mode.damping_ratio for mode in model.least_damped(by_margin, CABLE_DAMPING_s)) < 0.0
 
 
-def test_a_robot_that_every_loop_drives_is_refused() -> None:
-    """As cables would have it that take nothing out of a swing."""
+def test_a_robot_that_every_loop_excites_is_rejected() -> None:
+    """With cables that damp nothing."""
     machine, poses = plate(), late_plate().poses
     where = r"at \(0\.00, -?\d\.\d\d, \d\.\d\d\) m, turned by \((-?\d\.\d\d(, )?){3}\) rad$"
     with pytest.raises(SwingsError, match=r"drives a mode at [\d.]+ Hz to swing where .* " + where):
@@ -181,7 +181,7 @@ def test_a_robot_that_every_loop_drives_is_refused() -> None:
 
 
 @pytest.mark.parametrize(("name", "period_s"), [("planar-3", 1e-3), ("planar-3", 2e-3)])
-def test_a_loop_is_weaker_where_cables_are_known_to_damp_little(name: str, period_s: float) -> None:
+def test_a_loop_is_weaker_for_cables_with_little_known_damping(name: str, period_s: float) -> None:
     machine = shipped(name)
     assumed = loop_model(machine, period_s)
     leaning, poses = assumed.design(), assumed.poses
@@ -199,10 +199,10 @@ def test_a_loop_is_weaker_where_cables_are_known_to_damp_little(name: str, perio
 
 @given(st.integers(1, 5), st.integers(0, 2**32 - 1), st.floats(0.9, 1.1))
 @seed(15)
-def test_powers_vanish_where_all_eigenvalues_are_inside_the_circle(
+def test_powers_vanish_if_all_eigenvalues_are_inside_the_circle(
     n: int, chance: int, radius: float
 ) -> None:
-    """Those within 1e-4 of it are left out: their powers take long."""
+    """Radii within 1e-4 of the circle are left out: their powers take long."""
     assume(abs(radius - 1.0) > 1e-4)
     cycles = np.random.default_rng(chance).standard_normal((2, n, n))
     cycles[0] *= radius / np.abs(np.linalg.eigvals(cycles[0])).max()
@@ -211,8 +211,8 @@ def test_powers_vanish_where_all_eigenvalues_are_inside_the_circle(
 
 
 @pytest.mark.long
-def test_physics_swings_as_the_model_of_a_cycle_has_it() -> None:
-    """A plate that its tensions hold, turned to and fro at rest, with winches that do not rub."""
+def test_physics_swings_with_the_models_frequency_and_damping() -> None:
+    """A plate that its tensions stabilise swings at rest, with winches without friction."""
     machine, q = short_arms(), np.array([0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
     physics = Physics(machine, without_friction())
     physics.go(q)
@@ -232,7 +232,7 @@ def test_physics_swings_as_the_model_of_a_cycle_has_it() -> None:
 
 
 def zero_crossings(swing: FloatArray) -> Mode:
-    """Return how the first ten whole periods of a swing go on and die down."""
+    """Return frequency and damping of the first ten whole periods of a swing."""
     at = np.flatnonzero((swing[:-1] < 0.0) & (swing[1:] >= 0.0))[:11]
     peaks = [float(np.ptp(swing[a:b])) for a, b in itertools.pairwise(at)]
     period_s = float(at[-1] - at[0]) * PERIOD_S / 10.0
@@ -241,7 +241,7 @@ def zero_crossings(swing: FloatArray) -> Mode:
 
 
 def without_friction() -> RobotPlant:
-    """Return a plant whose motors and cables are as the linear model has them."""
+    """Return a plant with motors and cables as in the linear model."""
     friction = Plant().friction.model_copy(
         update={"coulomb_Nm": 0.0, "breakaway_Nm": 0.0, "viscous_Nms_rad": 0.0}
     )
@@ -257,7 +257,7 @@ def without_friction() -> RobotPlant:
 
 
 @pytest.mark.parametrize("name", ["planar-4", "suspended-8"])
-def test_shipped_robots_die_down(name: str) -> None:
+def test_oscillations_of_shipped_robots_die_down(name: str) -> None:
     machine = shipped(name)
     model = loop_model(machine)
     modes = model.least_damped(model.design(), CABLE_DAMPING_s)

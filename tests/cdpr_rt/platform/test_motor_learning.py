@@ -1,4 +1,4 @@
-"""What is learnt of motors in motion: bounded, forgotten when told, nothing of those known."""
+"""Learning friction and cogging in motion: its bounds, forgetting, and identified motors."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ RATED_Nm = ROBOT.axes[0].winch.motor.rated_torque_Nm
 
 
 class Bound:
-    """Learning on arrays of one's own."""
+    """Learning on the arrays of a test."""
 
     def __init__(self, known: tuple[bool, ...] = (False,) * N, reserve_N: float = 60.0) -> None:
         self.learning = MotorLearning(ROBOT.axes, np.array(known), np.ones(D), reserve_N, 1e-3)
@@ -59,7 +59,7 @@ def test_the_learnt_torque_is_always_bounded(
     assert np.isfinite(bound.learning.friction_Nm).all()
 
 
-def test_friction_is_found_from_the_force_that_it_takes() -> None:
+def test_friction_is_found_from_the_loops_force() -> None:
     bound, true = Bound(), np.array([0.12, 0.05, 0.2])
     cable = np.array([axis.winch.cable_m_per_motor_rad for axis in ROBOT.axes])
     for k in range(40):  # every combination of directions of turning, again and again
@@ -72,8 +72,8 @@ def test_friction_is_found_from_the_force_that_it_takes() -> None:
     assert np.abs(bound.learning.cogging_Nm).max() < 0.02
 
 
-def test_friction_is_found_within_six_short_ways_beside_a_wrench_that_stays() -> None:
-    """What turns round with the motion is friction, also where the platform rests in between."""
+def test_friction_is_found_within_six_short_motions_beside_a_constant_wrench() -> None:
+    """A force that reverses with the motion is friction, also with rests in between."""
     bound, true_Nm, stays_N = Bound(), 0.1, np.array([0.0, 10.0])
     cable = np.array([axis.winch.cable_m_per_motor_rad for axis in ROBOT.axes])
     for k in range(6):
@@ -89,11 +89,11 @@ def test_friction_is_found_within_six_short_ways_beside_a_wrench_that_stays() ->
 
 
 @pytest.mark.parametrize(("true_Nm", "learnt_Nm"), [(0.15, 0.15), (0.3, 0.2)])
-def test_friction_in_motion_may_be_above_what_was_found_at_rest(
+def test_friction_in_motion_may_exceed_that_found_at_rest_by_its_uncertainty(
     true_Nm: float, learnt_Nm: float
 ) -> None:
-    """By twice what that is unsure by: a motor that all but stands does not tell all of it."""
-    bound = Bound(reserve_N=16.0)  # of which a third are 0.14 Nm
+    """By twice its uncertainty: a motor that hardly turns does not show all of it."""
+    bound = Bound(reserve_N=16.0)  # a third of it is 0.14 Nm
     found, covariance = np.array([0.1, 0.0, 0.0]), np.diag([0.05, 0.01, 0.01]) ** 2
     everyone = np.ones(N, np.bool_)
     bound.learning.begin_with(everyone, np.tile(found, (N, 1)), np.tile(covariance, (N, 1, 1)))
@@ -133,8 +133,8 @@ def test_the_learnt_torque_leaves_the_tension_reserve() -> None:
     assert np.abs(added_N).max() <= 2.0 / 3.0 * reserve_N
 
 
-def test_a_wrench_that_stays_is_not_taken_for_friction() -> None:
-    """A payload that the file does not know, on a platform that moves one way for long."""
+def test_a_constant_wrench_is_not_learnt_as_friction() -> None:
+    """A payload that is not in the file, on a platform that moves in one direction for long."""
     bound = Bound()
     cable = np.array([axis.winch.cable_m_per_motor_rad for axis in ROBOT.axes])
     speed = bound.J @ np.array([0.0, 0.1]) / cable
@@ -142,18 +142,18 @@ def test_a_wrench_that_stays_is_not_taken_for_friction() -> None:
     bound.force[:] = [0.0, 30.0]
     bound.run(400, np.zeros(N))
     for _ in range(4000):
-        bound.force[:] = [0.0, 30.0] - added_N  # the loop makes up for what is missing
+        bound.force[:] = [0.0, 30.0] - added_N  # the loop compensates the rest
         bound.run(1, speed)
         added_N = bound.J.T @ (bound.learning.torque_Nm / cable)
     assert np.abs(added_N).max() < 0.1 * 30.0
 
 
-def test_a_force_that_was_not_exerted_teaches_nothing() -> None:
+def test_nothing_is_learnt_at_rest_or_from_a_force_that_was_not_exerted() -> None:
     bound = Bound()
     bound.force[:] = [20.0, -5.0]
     bound.run(300, np.array([3.0, -3.0, 3.0]), usable=False)
     assert not bound.learning.friction_Nm.any()
-    bound.run(300, np.zeros(N))  # a platform at rest does not either
+    bound.run(300, np.zeros(N))  # nor is anything learnt at rest
     assert not bound.learning.friction_Nm.any() and not bound.learning.torque_Nm.any()
     bound.run(300, np.array([3.0, -3.0, 3.0]))
     assert bound.learning.torque_Nm.any()
@@ -161,7 +161,7 @@ def test_a_force_that_was_not_exerted_teaches_nothing() -> None:
     assert not bound.learning.friction_Nm.any() and not bound.learning.torque_Nm.any()
 
 
-def test_nothing_is_learnt_of_motors_that_are_known() -> None:
+def test_nothing_is_learnt_about_identified_motors() -> None:
     bound = Bound((True, False, True))
     bound.force[:] = [20.0, -5.0]
     bound.run(300, np.array([3.0, -3.0, 3.0]))
@@ -169,7 +169,7 @@ def test_nothing_is_learnt_of_motors_that_are_known() -> None:
     assert not bound.learning.torque_Nm[[0, 2]].any()
 
 
-def test_a_robot_of_known_motors_does_not_learn() -> None:
+def test_a_robot_with_identified_motors_does_not_learn() -> None:
     known = AxisCompensation(np.zeros((2, 8)), most_Nm=1.0)
     model, limits = platform_model_of(ROBOT), np.full(N, 4.5)
     axes = list(ROBOT.axes)

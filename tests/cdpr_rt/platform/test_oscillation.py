@@ -1,4 +1,4 @@
-"""A loop that swings winches by itself is told; what moves, rings out or is noise is not."""
+"""Winches that the loop swings are reported; motion, decaying swings and noise are not."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Wave = Callable[[float], float]
 
 
 class Winches:
-    """Three winches, of which the second is swung."""
+    """Three winches; the second one swings."""
 
     def __init__(self) -> None:
         self.position_rad, self.velocity = np.full(3, STANDS_rad), np.zeros(2)
@@ -61,14 +61,14 @@ def test_oscillation_longer_than_three_seconds_is_reported(
     assert "by more than 0.40 mm of cable to either side" in told
     told_Hz = float(told.split(" at ")[1].split(" Hz")[0])
     assert abs(told_Hz - frequency_Hz) <= max(1.0, 0.03 * frequency_Hz)
-    assert winches.told(lambda _: 0.0, 5.0) == told, "it stays until it is cleared"
+    assert winches.told(lambda _: 0.0, 5.0) == told, "the report stays until it is cleared"
     winches.watch.clear()
     winches.moved()
     assert not winches.told(wave, 2.9)
     assert winches.told(wave, 1.4)
 
 
-def test_the_one_that_swings_the_furthest_is_named() -> None:
+def test_the_winch_that_swings_furthest_is_named() -> None:
     winches = Winches()
     for k in range(4000):
         turn = np.sin(2.0 * np.pi * 20.0 * k * PERIOD_S)
@@ -78,7 +78,7 @@ def test_the_one_that_swings_the_furthest_is_named() -> None:
 
 
 @pytest.mark.parametrize(("share", "told"), [(1.5, False), (2.9, False), (4.5, True)])
-def test_in_motion_winches_have_to_swing_three_times_as_far(share: float, told: bool) -> None:
+def test_the_threshold_in_motion_is_three_times_that_at_rest(share: float, told: bool) -> None:
     winches = Winches()
     wave = sine(20.0, share * THRESHOLD_m)
     way_rad = 0.0
@@ -103,19 +103,19 @@ def test_in_motion_winches_have_to_swing_three_times_as_far(share: float, told: 
     ],
     ids=["little", "slow", "there and back", "rings out", "leans on"],
 )
-def test_a_loop_that_works_is_none(swing_m: Wave) -> None:
+def test_small_slow_and_decaying_swings_are_not_reported(swing_m: Wave) -> None:
     assert not Winches().told(swing_m, 10.0)
 
 
-def test_a_pause_starts_again() -> None:
+def test_a_pause_restarts_the_time_of_a_swing() -> None:
     winches = Winches()
     for _ in range(5):
         assert not winches.told(sine(40.0, MUCH_m), 2.5)
         assert not winches.told(lambda _: 0.0, 0.4)
 
 
-def test_an_encoders_noise_is_none() -> None:
+def test_encoder_noise_is_not_reported() -> None:
     winches, chance = Winches(), np.random.default_rng(7)
-    count_m = THRESHOLD_m / 4.0  # the least that counts
+    count_m = THRESHOLD_m / 4.0  # the smallest threshold
     noise_m = count_m * np.round(chance.normal(0.3, 0.6, 20_000))
     assert not winches.told(lambda t: float(noise_m[round(t / PERIOD_S)]), 19.0)

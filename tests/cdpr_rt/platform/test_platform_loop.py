@@ -1,4 +1,4 @@
-"""A platform's loop: its gains' laws, and its margins beside a model in time."""
+"""A platform's loop: its gains, and its margins compared with a time-domain model."""
 
 from __future__ import annotations
 
@@ -80,7 +80,7 @@ class Loop:
         self.directions = np.array(kinematics.directions)
         self.moves, self.n, self.d = np.zeros((4, 6)), n, d
         self.state, self.friction = np.zeros(3 * d + 1), np.zeros(n)
-        # a half is of what was known, a half learnt
+        # a half was known before, a half was learnt
         self.winches = loop.WinchFriction(
             self.friction, np.full(n, 0.25), np.zeros(n), np.full(n, 2.0)
         )
@@ -99,7 +99,7 @@ class Loop:
         return force
 
     def gain(self, row: int, sign: float = 1.0) -> FloatArray:
-        """Return the force by each direction of one of the moves, (d, d)."""
+        """Return the force for a unit in each direction of one row of the moves, (d, d)."""
         columns = []
         for i in self.directions:
             self.moves[:] = 0.0
@@ -136,12 +136,12 @@ def test_gains_are_positive_definite_and_each_mode_has_its_damping_ratio(name: s
         assert omega.max() < gains.bandwidth_rad_s
         damped = 2.0 * DAMPING_RATIO * M @ modes.real * omega
         np.testing.assert_allclose(D @ modes.real, damped, atol=1e-6 * np.abs(damped).max())
-        # no cable is asked for more damping than was allowed
+        # no cable has more damping than allowed
         orthogonal = np.linalg.eigvals(np.linalg.solve(J.T @ J, D)).real
         assert orthogonal.max() < gains.damping_N_s_m
 
 
-def test_far_from_its_target_the_platform_comes_back_at_a_bounded_speed() -> None:
+def test_the_proportional_part_is_bounded_and_the_damping_is_not() -> None:
     """The proportional part is bounded, the damping is not."""
     machine = planar()
     gains = loop_model(machine).design()
@@ -158,7 +158,7 @@ def test_far_from_its_target_the_platform_comes_back_at_a_bounded_speed() -> Non
     assert law.force() == pytest.approx(far - K_D @ [0.2, -0.1])
 
 
-def test_rates_that_contradict_each_other_are_not_followed() -> None:
+def test_contradictory_rates_reduce_the_force() -> None:
     machine = planar()
     law = Loop(machine, loop_model(machine).design(), np.array([0.1, 1.9]))
     law.settings[loop.INTEGRAL] = 0.0
@@ -168,7 +168,7 @@ def test_rates_that_contradict_each_other_are_not_followed() -> None:
     assert law.force(apart=1.5) == pytest.approx(0.01 * whole)
 
 
-def test_nothing_is_integrated_that_cannot_be_had() -> None:
+def test_the_integral_does_not_grow_while_the_force_is_limited() -> None:
     machine = planar()
     law = Loop(machine, loop_model(machine).design(), np.array([0.1, 1.9]))
     law.settings[loop.INTEGRAL], law.settings[loop.DEADBAND] = 5.0, 1e-9
@@ -185,7 +185,7 @@ def test_nothing_is_integrated_that_cannot_be_had() -> None:
     assert law.state[0] < before
 
 
-def test_the_integral_part_sleeps_within_what_friction_hides_and_wakes_later() -> None:
+def test_the_integral_part_sleeps_within_its_deadband_and_wakes_beyond_it() -> None:
     machine = planar()
     law = Loop(machine, loop_model(machine).design(), np.array([0.1, 1.9]))
     law.settings[loop.INTEGRAL], law.settings[loop.DEADBAND] = 5.0, 1e-4
@@ -204,7 +204,7 @@ def test_the_integral_part_sleeps_within_what_friction_hides_and_wakes_later() -
 
 
 def test_torque_held_by_friction_at_rest_is_released_when_motion_begins() -> None:
-    """As much of it as friction can be; the last motion's integral part stays."""
+    """No more of it than friction can hold; the integral part of the last motion stays."""
     machine = planar()
     law = Loop(machine, loop_model(machine).design(), np.array([0.1, 1.9]))
     law.settings[loop.INTEGRAL], law.settings[loop.DEADBAND] = 5.0, 1e-9
@@ -220,7 +220,7 @@ def test_torque_held_by_friction_at_rest_is_released_when_motion_begins() -> Non
     at_rest = cycle(-0.02, moving=False, cycles=100)
     assert (np.abs(at_rest - in_motion)[:2] > 0.1).all()
     kept = law.state.copy()
-    assert cycle(0.0, moving=True) == pytest.approx(at_rest)  # nothing is made up for
+    assert cycle(0.0, moving=True) == pytest.approx(at_rest)  # without friction compensation
 
     law.state[:], law.friction[:] = kept, 1e6
     assert cycle(0.0, moving=True) == pytest.approx(in_motion)
@@ -244,7 +244,7 @@ def test_a_heavier_platform_gets_a_slower_loop() -> None:
     assert slowest[0] > slowest[1] > slowest[2]
 
 
-def test_the_lightest_rotor_decides_how_much_is_damped() -> None:
+def test_the_lightest_rotor_limits_the_damping() -> None:
     machine = planar()
     winch = machine.axes[0].winch
     geared = replace(machine.axes[0], winch=replace(winch, gear_ratio=8.0))  # four times as heavy
@@ -283,7 +283,7 @@ def test_loops_are_stable_with_any_stiffness(made: Callable[[], Machine], period
 
 @pytest.mark.parametrize("name", MACHINES)
 def test_the_margin_vanishes_where_the_loop_becomes_unstable(name: str) -> None:
-    """Damping scaled by g, stiffness by g²: from which g on do eigenvalues leave the circle?"""
+    """Damping is scaled by g and stiffness by g² until eigenvalues leave the circle."""
     machine = MACHINES[name]()
     model = loop_model(machine)
     q = model.poses[1]
@@ -301,7 +301,7 @@ def test_the_margin_vanishes_where_the_loop_becomes_unstable(name: str) -> None:
         gains = scaled(g)
         return all(radius(machine, gains, q, k, PERIOD_S) < 1.0 for k in STIFFNESS_SHARES)
 
-    # with a modulus margin μ a loop bears 1/(1 - μ) times its gain, and more of its parts
+    # with a modulus margin μ a loop stays stable up to 1/(1 - μ) times its gain
     assert stable(1.2)
     low, high = 1.2, 20.0
     assert not stable(high)
@@ -314,12 +314,14 @@ def test_the_margin_vanishes_where_the_loop_becomes_unstable(name: str) -> None:
     assert moduli[2] < 0.15
 
 
-# Whether a loop keeps its margin, against singular values by NumPy.
+# Whether a loop keeps its margin, compared with singular values by NumPy.
 
 
 @pytest.mark.parametrize("coupling", [0.0, 0.02, 0.1, 0.5, 2.0])
 @pytest.mark.parametrize("d", [1, 2, 3, 6])
-def test_it_is_kept_while_the_least_singular_value_is_above_it(d: int, coupling: float) -> None:
+def test_the_margin_is_kept_while_the_least_singular_value_exceeds_it(
+    d: int, coupling: float
+) -> None:
     rng = np.random.default_rng(17)
     beside = coupling * (1.0 - np.eye(d)) + np.eye(d)
     told = []
@@ -336,7 +338,7 @@ def test_it_is_kept_while_the_least_singular_value_is_above_it(d: int, coupling:
     assert all(told)
 
 
-# The rigid body, against points that make it up.
+# The rigid body, compared with the points that it consists of.
 
 quick = settings(max_examples=60)
 
@@ -358,7 +360,7 @@ def points(rng: np.random.Generator) -> tuple[FloatArray, FloatArray, FloatArray
 
 @quick
 @given(st.integers(0, 2**32 - 1))
-def test_mass_matrix_and_wrench_are_those_of_points(seed: int) -> None:
+def test_mass_matrix_and_wrench_equal_those_of_points(seed: int) -> None:
     rng = np.random.default_rng(seed)
     m, at, body = points(rng)
     pose = Pose(rng.normal(size=3), Rotation.from_rotvec(rng.normal(size=3)).as_matrix())

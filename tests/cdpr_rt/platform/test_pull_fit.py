@@ -1,4 +1,4 @@
-"""What is found of motors whose cables are pulled tight around a platform that stands."""
+"""Friction, cogging and lengths found as cables are pulled tight around a standing platform."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ AXES = [
     replace(axis, winch=replace(axis.winch, cable_sign=1 - 2 * (i % 2)))
     for i, axis in enumerate(ROBOT.axes)
 ]
-"""Every other cable is paid out by turning the other way."""
+"""Every other winch pays out in the opposite direction."""
 CABLE_m = np.array([axis.winch.cable_m_per_motor_rad for axis in AXES])
 PRETENSION_N = np.full(N, 80.0)
 FRICTION_Nm = np.array([0.04, 0.08, 0.12, 0.06, 0.10, 0.09])
@@ -40,7 +40,7 @@ def lengths() -> Callable[[np.ndarray], np.ndarray]:
 
 
 class Winches:
-    """Motors with friction and cogging that pull at cables made fast at home, without inertia."""
+    """Motors with friction and cogging, without inertia, that pull at cables fixed at home."""
 
     def __init__(
         self,
@@ -50,7 +50,7 @@ class Winches:
         friction_Nm: np.ndarray = FRICTION_Nm,
         harmonic_Nm: float = 0.0,
     ) -> None:
-        """Take what the motors exert over what is asked of them, `gain`; and a third harmonic."""
+        """Take the ratio of exerted to requested torque, `gain`, and a third harmonic."""
         self.tensions_N, self.gain = np.linspace(0.1, 300.0, 600), gain
         self.harmonic_Nm = harmonic_Nm
         self.pretension_N, self.friction_Nm = pretension_N, friction_Nm
@@ -76,7 +76,7 @@ class Winches:
 def pulled(
     fit: PullFit, winches: Winches, moved_m: float | np.ndarray = 0.0, moved_at: int = 60
 ) -> np.ndarray:
-    """Return the angles that are found from the pretension to below, above, and back to it."""
+    """Return the angles found by pulling from the pretension down, up and back to it."""
     pretension_N = winches.pretension_N
     fit.prepare(pretension_N)
     winches.pull(pretension_N)
@@ -99,17 +99,17 @@ def off_N(found_rad: np.ndarray, winches: Winches) -> np.ndarray:
     return CABLE_m * (found_rad - winches.at_pretension_rad) / softness
 
 
-def test_lengths_are_found_without_friction_and_cogging(
+def test_lengths_are_found_free_of_friction_and_cogging(
     lengths: Callable[[np.ndarray], np.ndarray],
 ) -> None:
     winches = Winches(lengths)
     learning = MotorLearning(AXES, NOBODY, np.ones(N), 500.0, 1e-3)
     fit = PullFit(AXES, NOBODY, lengths, learning, STANDS)
     found = pulled(fit, winches)
-    assert not learning.learnt_Nm.any()  # before it is sure that the platform stands at home
+    assert not learning.learnt_Nm.any()  # before the platform is known to stand at home
     fit.begin_learning()
     left_N = np.abs(off_N(winches.theta, winches))
-    assert left_N.max() > 10.0  # what is taken up where they have come to rest
+    assert left_N.max() > 10.0  # friction and cogging where the motors rest
     assert np.abs(off_N(found, winches)).max() < 2.0
     # friction in motion is taken to be four fifths of it, and nothing is more than 8 % of rated
     np.testing.assert_allclose(learning.friction_Nm, 0.8 * FRICTION_Nm, atol=0.012)
@@ -117,7 +117,7 @@ def test_lengths_are_found_without_friction_and_cogging(
     assert not learning.cogging_Nm.any()
 
 
-def test_cogging_is_found_of_motors_that_turn_by_a_period(
+def test_cogging_is_found_if_motors_turn_by_a_period(
     lengths: Callable[[np.ndarray], np.ndarray],
 ) -> None:
     loose_m = lengths(np.zeros(N))
@@ -134,7 +134,7 @@ def test_cogging_is_found_of_motors_that_turn_by_a_period(
 
 
 @pytest.mark.parametrize("stiffness", [0.7, 1.3])
-def test_friction_is_found_of_cables_that_are_softer_or_stiffer_than_told(
+def test_friction_is_found_with_cables_softer_or_stiffer_than_in_the_file(
     lengths: Callable[[np.ndarray], np.ndarray], stiffness: float
 ) -> None:
     loose_m = lengths(np.zeros(N))
@@ -148,10 +148,10 @@ def test_friction_is_found_of_cables_that_are_softer_or_stiffer_than_told(
 
 
 @pytest.mark.parametrize("alike", [True, False])
-def test_a_motor_whose_friction_does_not_turn_round_rubs_as_others_of_its_kind(
+def test_a_motor_whose_friction_never_reverses_takes_that_of_similar_motors(
     lengths: Callable[[np.ndarray], np.ndarray], alike: bool
 ) -> None:
-    """Every other cable is pulled so little that its winch only ever gives way when wound in."""
+    """Every other cable has so little tension that its winch turns only inwards."""
     little = np.arange(N) % 2 == 1
     pretension_N = np.where(little, 26.0, 80.0)
     winches = Winches(lengths, pretension_N=pretension_N, friction_Nm=np.linspace(0.15, 0.19, N))
@@ -171,7 +171,7 @@ def test_a_motor_whose_friction_does_not_turn_round_rubs_as_others_of_its_kind(
 def test_an_extra_load_on_one_motor_does_not_raise_the_friction_of_similar_motors(
     lengths: Callable[[np.ndarray], np.ndarray],
 ) -> None:
-    """Fits that leave a rest tell little, and six of them no more than they found."""
+    """Fits with a large residual count little."""
     friction_Nm = np.full(N, 0.12)
     winches = Winches(
         lengths, pretension_N=np.full(N, 50.0), friction_Nm=friction_Nm, harmonic_Nm=0.12
@@ -181,10 +181,10 @@ def test_an_extra_load_on_one_motor_does_not_raise_the_friction_of_similar_motor
     np.testing.assert_allclose(fit.unknowns[:, FRICTION], friction_Nm, atol=0.06)
 
 
-def test_a_torque_constant_that_is_off_is_not_taken_for_cogging(
+def test_a_wrong_torque_constant_is_not_taken_for_cogging(
     lengths: Callable[[np.ndarray], np.ndarray],
 ) -> None:
-    """Nothing but a load cell knows of it: the pretension is truly 5 % more than was asked for."""
+    """Only a load cell could show it: the true pretension is 5 % above the requested one."""
     winches = Winches(lengths, gain=1.05)
     fit = PullFit(AXES, NOBODY, lengths, None, STANDS)
     found = pulled(fit, winches)
@@ -192,7 +192,7 @@ def test_a_torque_constant_that_is_off_is_not_taken_for_cogging(
     assert np.abs(np.abs(off_N(found, winches)) - wrong_N).max() < 2.5
 
 
-def test_a_platform_that_moves_meanwhile_is_not_believed(
+def test_a_platform_that_moves_during_the_pull_gives_no_lengths(
     lengths: Callable[[np.ndarray], np.ndarray],
 ) -> None:
     fit = PullFit(AXES, NOBODY, lengths, None, STANDS)
@@ -202,12 +202,12 @@ def test_a_platform_that_moves_meanwhile_is_not_believed(
 @pytest.mark.parametrize(
     ("slide_mm", "known", "told"), [(4.0, 0, True), (0.1, 0, False), (4.0, 1, False)]
 )
-def test_a_slide_on_the_stand_is_told_where_it_is_significant(
+def test_a_significant_slide_on_the_stand_is_corrected(
     lengths: Callable[[np.ndarray], np.ndarray], slide_mm: float, known: int, told: bool
 ) -> None:
-    """With 1.25 times the pretension it slides; the lengths of home are those before.
+    """The platform slides at 1.25 times the pretension; lengths at home are those before.
 
-    Not of all cables where some motors are known, whose lengths are those after it.
+    They are not corrected if some motors are identified.
     """
     slid_m = SLIDES @ (1e-3 * slide_mm * np.array([0.6, -0.8, 0.5]))
     stood, of = Winches(lengths), np.arange(N) < known
@@ -221,7 +221,7 @@ def test_a_slide_on_the_stand_is_told_where_it_is_significant(
     assert off[0] < 0.5 * off[1] if told else off[0] == off[1]
 
 
-def test_nothing_is_found_of_motors_that_are_known_or_do_not_turn(
+def test_nothing_is_found_for_motors_that_are_identified_or_do_not_turn(
     lengths: Callable[[np.ndarray], np.ndarray],
 ) -> None:
     known = np.arange(N) % 2 == 0
@@ -242,7 +242,7 @@ def test_nothing_is_found_of_motors_that_are_known_or_do_not_turn(
 def test_learning_again_keeps_the_known_friction(
     lengths: Callable[[np.ndarray], np.ndarray],
 ) -> None:
-    """As when cables are tightened again after motions that have taught more."""
+    """For example when cables are tightened again after learning in motion."""
     learning = MotorLearning(AXES, NOBODY, np.ones(N), 500.0, 1e-3)
     fit = PullFit(AXES, NOBODY, lengths, learning, STANDS)
     pulled(fit, Winches(lengths))
@@ -271,7 +271,7 @@ def test_identified_friction_leaves_a_third_of_the_tension_reserve(
     assert (learning.most_Nm[0] <= 2.0 * third_Nm + 1e-12).all()
     assert (learning.most_Nm[1] <= third_Nm + 1e-12).all()
     assert (learning.friction_Nm <= learning.most_Nm[0]).all()
-    if reserve_N == 20.0:  # where friction is larger than a third, and cogging less
+    if reserve_N == 20.0:  # here friction exceeds a third of the reserve, and cogging does not
         assert (learning.friction_Nm > 1.05 * third_Nm).any()
     assert np.isfinite(added_Nm).all()
     learning.forget()

@@ -1,4 +1,4 @@
-"""The procedure that reads poses, on an operator that is made up."""
+"""The procedure that measures poses, with a fake operator."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from cdpr_rt.procedures.measure_poses import (
 
 
 class Operator:
-    """A platform that refuses some places and shakes at others."""
+    """A platform that rejects some places and shakes at others."""
 
     def __init__(
         self,
@@ -83,13 +83,13 @@ PLACES = [np.array([float(k), 2.0]) for k in range(1, 12)]
 
 
 def collected() -> tuple[Measured, list[int]]:
-    """Return what takes readings, and how many there were whenever it had them kept."""
+    """Return the store of readings, and their number at each time it saved them."""
     kept: list[int] = []
     measured = Measured(lambda: kept.append(len(measured.readings)))
     return measured, kept
 
 
-def test_each_reading_is_kept_at_once_with_what_the_camera_saw() -> None:
+def test_each_reading_is_saved_immediately_with_the_cameras_image() -> None:
     operator = Operator()
     operator.marker = 4
     measured, kept = collected()
@@ -103,7 +103,7 @@ def test_each_reading_is_kept_at_once_with_what_the_camera_saw() -> None:
     assert last.image.sighting("x").corners_px[4].tolist() == [[0, 1], [2, 3], [4, 5], [6, 7]]
 
 
-def test_refused_or_shaking_poses_are_skipped_with_a_reason() -> None:
+def test_rejected_or_shaking_poses_are_skipped_with_a_reason() -> None:
     operator, notes = Operator(shaky=3.0, refused=2.0), Notes()
     measured, _ = collected()
     measure_poses(operator, PLACES[:6], BETWEEN, measured, notes)
@@ -116,7 +116,7 @@ def test_refused_or_shaking_poses_are_skipped_with_a_reason() -> None:
     assert operator.looks == 4 + 10
 
 
-def test_where_the_straight_way_is_refused_it_goes_by_the_place_between() -> None:
+def test_a_rejected_straight_way_is_replaced_by_a_detour() -> None:
     operator = Operator(behind=3.0)
     measured, _ = collected()
     measure_poses(operator, PLACES[:4], BETWEEN, measured, Notes())
@@ -124,7 +124,7 @@ def test_where_the_straight_way_is_refused_it_goes_by_the_place_between() -> Non
     assert operator.gone == [1.0, 2.0, 0.5, 3.0, 4.0]
 
 
-def test_one_that_is_held_on_the_way_round_is_read_there_and_goes_no_further() -> None:
+def test_a_platform_stopped_on_its_detour_is_measured_where_it_stands() -> None:
     operator, notes = Operator(behind=3.0, held_on_way_to=0.5), Notes()
     measured, _ = collected()
     measure_poses(operator, PLACES[:4], BETWEEN, measured, notes)
@@ -143,7 +143,7 @@ def test_one_that_is_held_on_the_way_round_is_read_there_and_goes_no_further() -
 
 
 @pytest.mark.parametrize("ended_on_the_way", [True, False])
-def test_a_place_is_given_up_where_the_motion_was_ended_unless_that_was_not_its_fault(
+def test_a_trip_marks_the_pose_as_tried_unless_the_pose_was_not_its_cause(
     ended_on_the_way: bool,
 ) -> None:
     for error, tried in (
@@ -161,7 +161,7 @@ def test_a_place_is_given_up_where_the_motion_was_ended_unless_that_was_not_its_
         assert not measured.readings
 
 
-def test_it_gives_up_where_nothing_comes_to_rest_and_keeps_what_it_has() -> None:
+def test_five_shaking_poses_in_turn_end_the_measurement_and_keep_its_readings() -> None:
     measured, _ = collected()
     places = [PLACES[0], *[np.array([7.0, float(k)]) for k in range(9)]]
     with pytest.raises(TripError, match="5 poses in turn"):

@@ -1,4 +1,4 @@
-"""A path for a robot: where it cannot be, units that slipped, and tensions that hold it back."""
+"""Planning a path for a robot: unreachable places, wrong units, and limits of tensions."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def gcode(planner: PathPlanner, *lines: str) -> PathDescription:
 
 
 @pytest.mark.long
-def test_tensions_along_a_path_are_within_their_bounds(planner):
+def test_tensions_along_a_planned_path_stay_within_their_bounds(planner):
     plan = planner.plan(gcode(planner, "G0 X0 Y0 Z0", "X200 Z50", "Y-200 A5", "G1 X0 F6000"))
     assert plan.obstacle is None and plan.timed is not None
     told = path_tensions(planner.model, plan.timed)
@@ -52,7 +52,7 @@ def test_tensions_along_a_path_are_within_their_bounds(planner):
 )
 def test_the_first_place_outside_is_named(planner, lines, line, told):
     path = gcode(planner, *lines)
-    if "X900" in lines:  # a size that no slip explains
+    if "X900" in lines:  # a size that no wrong unit explains
         path.moves[-1].end[0] = 0.21
     obstacle = planner.plan(path).obstacle
     assert obstacle is not None
@@ -77,7 +77,7 @@ def test_an_arc_that_leaves_the_box_between_two_nodes_is_named(planner):
     [(25.4, "25.4 times too large"), (1000.0, "1000 times too large"),
      (1 / 25.4, "25.4 times too small"), (1e-3, "1000 times too small")],
 )  # fmt: skip
-def test_units_that_slipped(planner, factor, told):
+def test_wrong_units_are_reported_with_their_factor(planner, factor, told):
     path = PathDescription("part.nc", planner.coordinates, np.array([0.0, 0.0, 1.45, 0, 0, 0]), 1)
     path.add(Move(2, np.array([0.1, 0.2, 1.7, 0, 0, 0]), np.inf))
     path.start[:3] *= factor
@@ -86,7 +86,7 @@ def test_units_that_slipped(planner, factor, told):
         planner.plan(path)
 
 
-def test_positions_in_the_room_are_no_slip_of_units(planner):
+def test_room_coordinates_are_not_reported_as_wrong_units(planner):
     plan = planner.plan(gcode(planner, "G53 G0 Z0", "X0 Y9", "Z15"))
     assert plan.obstacle is not None
     assert plan.obstacle.text.startswith("z 0 mm is outside")
@@ -100,7 +100,7 @@ def test_a_place_that_no_tensions_hold_is_named(planner):
     path = gcode(weak, "G0 X0 Y0 Z0", "X300", "X300 Y450 Z170", "X-300 Y450")
     obstacle = weak.plan(path).obstacle
     assert obstacle is not None
-    # looked for every 5 mm, by another method
+    # searched every 5 mm by another method
     corners = np.zeros((len(path.moves) + 1, 6))
     corners[:] = [path.start, *(move.end for move in path.moves)]
     share = np.linspace(0.0, 1.0, 200)[:, None]
@@ -112,8 +112,8 @@ def test_a_place_that_no_tensions_hold_is_named(planner):
     assert "N" in obstacle.text
 
 
-def test_available_wrenches_are_those_of_linear_programs(planner, plane):
-    """Each facet is as far as the farthest wrench that tensions within bounds reach."""
+def test_available_wrenches_equal_those_of_linear_programs(planner, plane):
+    """Each facet is at the farthest wrench that tensions within bounds reach."""
     chance = np.random.default_rng(3)
     for one in (planner, plane):
         model = one.model
@@ -137,8 +137,8 @@ def test_available_wrenches_are_those_of_linear_programs(planner, plane):
             )
 
 
-def test_the_inertial_wrench_is_the_momentum_s_derivative(planner):
-    """By finite differences of momenta about a point at rest, and motion of the centre."""
+def test_the_inertial_wrench_is_the_derivative_of_momentum(planner):
+    """By finite differences of angular momenta and of the centre's motion."""
     from cdpr_rt.model.rigid_body import in_space, inertia_kg_m2  # noqa: PLC0415
 
     model = planner.model
@@ -181,19 +181,19 @@ def test_contact_on_the_way_is_named():
     assert obstacle.line == 4
 
 
-def test_a_robot_in_a_plane(plane):
+def test_a_path_of_a_planar_robot_is_planned_with_tensions(plane):
     plan = plane.plan(gcode(plane, "G0 X0 Y0", "X100", "F3000", "G3 X100 Y100 I0 J50"))
     assert plan.obstacle is None and plan.timed is not None
     assert path_tensions(plane.model, plan.timed).carried.all()
 
 
 @pytest.mark.parametrize("lines", [["G1 X100 F0.05"], ["X50", "G4 P3600"]])
-def test_a_move_that_takes_longer_than_a_plan_is_refused(planner, lines):
+def test_a_move_longer_than_a_plan_is_rejected(planner, lines):
     with pytest.raises(PathError, match=r":[23]: takes .* min or more; allowed: up to 16.7 min"):
         planner.plan(gcode(planner, "G0 X0 Y0 Z0", *lines))
 
 
-def test_a_long_path_takes_several_plans_that_go_on_where_the_one_before_rests(planner):
+def test_a_long_path_is_split_into_plans_that_begin_and_end_at_rest(planner):
     lines = [f"G1 X{100 * (i % 2)} F600" for i in range(1, 200)]
     path = gcode(planner, "G0 X0 Y0 Z0", *lines, "X0 Z100")
     line, moves, rest = 0, 0, path.start
@@ -215,7 +215,7 @@ def test_later_plans_are_checked_before_the_first_one_runs(planner):
     assert plan.obstacle.text.startswith("z 175")
 
 
-def test_a_small_circle_is_looked_at_from_node_to_node(planner, monkeypatch):
+def test_a_small_circle_is_checked_for_contact_from_node_to_node(planner, monkeypatch):
     ways = []
     monkeypatch.setattr(
         type(planner.model.interference), "first_contact", lambda _, way: ways.append(way)
