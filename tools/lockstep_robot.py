@@ -21,11 +21,9 @@ from typing import TYPE_CHECKING, Any, Final, Self
 
 import numpy as np
 
-from cdpr_drivers.bus.simbus import query_status
 from cdpr_drivers.errors import DriverError
 from cdpr_drivers.robot.commissioned import with_commissioned, without_commissioned
 from cdpr_drivers.robot.machine import RobotMachine
-from cdpr_drivers.robot.robot_buses import robot_urls
 from cdpr_profiles import load_robot
 from cdpr_profiles.calibration.in_force import calibrated
 from cdpr_profiles.errors import ProfileError
@@ -342,7 +340,6 @@ class LockstepRobot:
         self.right = RightInBusTime(block, lambda: self.now_ns)
         self.stream = StreamInBusTime(block, self.right, lambda: self.now_ns)
         self._reader = RowReader(block)
-        self._channels = [url.channel for url in robot_urls(robot, (bus,)).values()]
         if self._record is not None:
             # imported here: a robot that does not record needs no package of the daemon
             from cdpr_rt.service.recording import Recorder  # noqa: PLC0415
@@ -542,11 +539,6 @@ class LockstepRobot:
         """The file of the pose log."""
         assert self._truth_path is not None  # only for a robot with a platform
         return self._truth_path
-
-    @property
-    def sync_offset(self) -> int:
-        """Number of SYNCs that the simulator received before our first cycle."""
-        return int(query_status(self._channels[0]).get("sync_count", 0)) - self.cycle
 
     @property
     def state(self) -> LoopState:

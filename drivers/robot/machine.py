@@ -14,7 +14,7 @@ import numpy as np
 from cdpr_drivers.axes import homing
 from cdpr_drivers.axes.axis_buses import AxisBuses
 from cdpr_drivers.bus.health import BusHealth
-from cdpr_drivers.bus.simbus import open_clock
+from cdpr_drivers.bus.simbus import open_clock, query_status
 from cdpr_drivers.canopen.boot import BootReport
 from cdpr_drivers.canopen.network import CanNetwork
 from cdpr_drivers.cia402 import POWER_OFF, State, state_of
@@ -331,6 +331,18 @@ class RobotMachine:
             }
             for name, url in self._urls.items()
         }
+
+    def simulated_status(self) -> dict[str, dict[str, Any]]:
+        """Return the status of each simulated bus that is open, by its name."""
+        urls = {name: network.url for name, network in self.networks.items()}
+        return {name: query_status(url.channel) for name, url in urls.items() if url.is_simulated}
+
+    @property
+    def sync_offset(self) -> int:
+        """Number of SYNCs that the simulator received before our first cycle."""
+        status = next(iter(self.simulated_status().values()), {})
+        cycles = 0 if self.device is None else self.device.feedback.cycle
+        return int(status.get("sync_count", 0)) - cycles
 
     def _health(self, bus: str) -> BusHealth | None:
         return self.networks[bus].health if bus in self.networks else None

@@ -91,7 +91,7 @@ class Motion:
             device.transmit()
         device.command.torque_Nm[:] = powered
         self.give_back()
-        start = first + self.session.sync_offset() - 1
+        start = first + self.session.machine.sync_offset - 1
         logged: NDArray[Any] = np.fromfile(self._log, _TRUTH, offset=_HEADER_BYTES)
         records = logged[logged["sync"] != NO_SYNC][start : start + last - first + 1]
         assert records["sync"][0] == start

@@ -66,7 +66,7 @@ def test_tighten_does_not_pull_at_a_platform_that_has_turned_over(folder: Path) 
         assert turned_deg(robot) > 60.0
         with pytest.raises(Refused, match="it has come down, may have turned over"):
             robot.program("tighten")
-        since = robot.cycle + robot.sync_offset
+        since = robot.cycle + robot.machine.sync_offset
         with pytest.raises(Refused, match=r"\d cables are up to \d+ mm too short"):
             robot.program("tighten", **{"from": "home"})
         robot.run(0.5)

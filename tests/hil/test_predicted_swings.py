@@ -42,7 +42,7 @@ def test_a_platform_swings_as_fast_and_as_far_as_predicted(
         rig.carry_out("tighten")
         rig.carry_out("pose", position_m=list(place_m))
         rig.run(1.5)
-        first = rig.cycle + rig.sync_offset
+        first = rig.cycle + rig.machine.sync_offset
         rig.inject(cable, CUT, 1)
         rig._turn_until(lambda: rig.loop.busy, 1.0, "a reaction")
         rig._turn_until(lambda: not rig.loop.busy, 30.0, "the power off")

@@ -81,7 +81,7 @@ class Truth:
 
     def __init__(self, robot: LockstepRobot) -> None:
         self._robot = robot
-        self._from = robot.cycle + robot.sync_offset
+        self._from = robot.cycle + robot.machine.sync_offset
 
     def read(self) -> Any:
         """Return the records since then."""

@@ -54,7 +54,7 @@ class Process:
 def bus_counts(session: Session) -> dict[str, dict[str, Any]]:
     """Return for each bus, by its name, the bus' counts and the master's work on it."""
     device = session.device
-    status = session.bus_status()
+    status = session.machine.simulated_status()
     return {
         bus.name: {
             **status[bus.name],

@@ -103,7 +103,7 @@ class Measurement:
     ) -> list[Path]:
         session = self._session
         meta = {**meta, "what": name, "identity": session.identity}
-        meta["sync_offset"] = session.sync_offset()
+        meta["sync_offset"] = session.machine.sync_offset
         meta["latency_s"] = session.winch.latency_s
         total = sum(one.duration_s() for one in passes)
         recorded = []

@@ -17,7 +17,7 @@ from cdpr_drivers.axes.axis_buses import AxisBuses
 from cdpr_drivers.axes.homing import Homing
 from cdpr_drivers.bus import BusUrl
 from cdpr_drivers.bus.budget import HEARTBEATS_IN_TOLERANCE
-from cdpr_drivers.bus.simbus import open_clock, query_status
+from cdpr_drivers.bus.simbus import open_clock
 from cdpr_drivers.canopen.boot import BootReport
 from cdpr_drivers.canopen.network import CanNetwork
 from cdpr_drivers.cia402 import Mode
@@ -168,19 +168,6 @@ class Session(Operator):
         group, place = self.device.group_of(0)
         self.run_task(lambda: touch_probe.arm(group, place))
 
-    def bus_status(self) -> dict[str, dict[str, Any]]:
-        """Return the status of each simulated bus, by its name in the robot's file."""
-        return {
-            name: query_status(network.url.channel)
-            for name, network in self.machine.networks.items()
-            if network.url.is_simulated
-        }
-
-    def sync_offset(self) -> int:
-        """Return how many SYNCs a simulated bus had seen before the first cycle."""
-        status = next(iter(self.bus_status().values()), {})
-        return int(status.get("sync_count", 0)) - self.device.feedback.cycle
-
     # -- of one winch
 
     @property
@@ -221,7 +208,7 @@ class Session(Operator):
 
     def bus_record(self) -> dict[str, Any]:
         """Return the data about the first axis' bus for reports."""
-        status = self.bus_status().get(self.robot.axes[0].bus, {})
+        status = self.machine.simulated_status().get(self.robot.axes[0].bus, {})
         known = {key: status[key] for key in ("load", "peak_cycle_load", "overruns") if status}
         return {"url": str(self.network.url), "missed": self.device.missed, **known}
 

@@ -157,7 +157,7 @@ def trial_run(
         home_rad = platform_of(rig.robot).home_rotation_rad
         known = rig.robot.calibration
         run.mark(
-            "begin", sync_offset=rig.sync_offset, robot=robot, seed=seed,
+            "begin", sync_offset=rig.machine.sync_offset, robot=robot, seed=seed,
             home_rotation_rad=home_rad, calibration=None if known is None else known.summary(),
         )  # fmt: skip
         with _with_notices(rig):

@@ -64,7 +64,7 @@ def test_eight_drives_boot_within_two_seconds_of_bus_time(bus: str):
     name = bus.removeprefix("simbus:")
     with open_robot(EIGHT, [bus], OUT) as opened:
         assert opened.boot_s < 2.0
-        for of_bus, status in opened.bus_status().items():
+        for of_bus, status in opened.machine.simulated_status().items():
             assert status["name"] == f"{name}-{of_bus}"
             # the time of all frames so far, with SDO, on a real wire at 1 Mbit/s
             assert status["load"] * status["bus_time_s"] < 1.0
@@ -89,7 +89,12 @@ def test_all_axes_run_as_one_device(session: Session):
     turned = (np.array(counts(session)) - begin) * 2 * np.pi / 8192
     np.testing.assert_allclose(turned, 0.9 * speeds, atol=0.2)
     # both buses carried each SYNC
-    assert len({status["sync_count"] % 10**9 for status in session.bus_status().values()}) == 1
+    assert (
+        len(
+            {status["sync_count"] % 10**9 for status in session.machine.simulated_status().values()}
+        )
+        == 1
+    )
 
 
 def test_the_arrays_of_each_bus_are_views_of_the_whole(session: Session):

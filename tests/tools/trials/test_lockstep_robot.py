@@ -46,7 +46,7 @@ def test_truth_is_recorded_at_the_last_sync(robot):
     robot.program("pose", position_m=[0.0, HEIGHT + 0.1])
     robot.turn(400)
     record = robot.truth()
-    assert record["sync_index"] == robot.cycle - 1 + robot.sync_offset
+    assert record["sync_index"] == robot.cycle - 1 + robot.machine.sync_offset
     assert record["velocity_m_s"][1] > 0.1
     turned = robot.row["position_rad"] - record["motor_rad"]
     log = read_pose_log(robot.truth_log)
