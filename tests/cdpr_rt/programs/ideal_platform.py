@@ -1,4 +1,4 @@
-"""Platforms of 3 and of 6 directions that are where their set-points are, and hands that lead."""
+"""Ideal platforms with 3 and with 6 directions, exactly at their set-points, and a hand stream."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ ROOM = Platform(
 
 
 class NothingFound:
-    """A fit that finds nothing of any motor."""
+    """A fit that finds nothing about any motor."""
 
     taken_up_N = np.zeros(1)
 
@@ -80,7 +80,7 @@ class NothingFound:
 
 
 class IdealControl:
-    """A platform that is where its set-point is, on tensions that its workspace answers for."""
+    """A platform exactly at its set-point; its workspace says which tensions exist."""
 
     def __init__(self, model: PlatformModel) -> None:
         n, d = model.kinematics.n, model.size
@@ -99,7 +99,7 @@ class IdealControl:
         self.swing_rad = self.swing_m = 0.0
         self._there = model.pose(model.home)
         self.ways: list[tuple[FloatArray, FloatArray]] = []
-        """Those that were asked for: from where to where."""
+        """The checked ways: start and end of each."""
 
     @property
     def shaped(self) -> FloatArray:
@@ -193,7 +193,7 @@ class SteppedPlatform(ABC):
 
 
 class IdealPlatform(SteppedPlatform):
-    """One of these platforms under a program; keeps what its set-point did."""
+    """One of these platforms under a program, with the history of its set-point."""
 
     def __init__(self, platform: Platform, low_N: float, high_N: float) -> None:
         n = len(platform.exit_points_m)
@@ -210,7 +210,7 @@ class IdealPlatform(SteppedPlatform):
         self.restart()
 
     def restart(self, position: FloatArray | None = None) -> None:
-        """Begin anew, in the middle of the box or elsewhere."""
+        """Start again, in the middle of the box or elsewhere."""
         platform, k = self.model.platform, self.model.positions
         middle = 0.5 * np.add(platform.workspace_min_m, platform.workspace_max_m)
         self.parts.estimator.set_lengths(np.zeros(self.torque.size), np.ones(self.torque.size))
@@ -252,7 +252,7 @@ class IdealPlatform(SteppedPlatform):
         buttons: int = 0,
         cycles: int = 20,
     ) -> None:
-        """Post where a hand is now, then run some cycles."""
+        """Post the hand's pose, then run some cycles."""
         x, y, z, w = (Rotation.identity() if rotation is None else rotation).as_quat()
         sample = self.sample
         sample["sequence"] += 1

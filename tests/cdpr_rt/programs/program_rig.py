@@ -40,7 +40,7 @@ def rig_model() -> AxesModel:
 
 
 class ProgramRig:
-    """Runs one program after the other as a loop does, on rotors that turn; keeps the history."""
+    """Runs programs one after the other as the loop does, on simulated rotors, with a history."""
 
     def __init__(self, load_Nm: tuple[float, ...] = (0.0, 0.2, -0.1)) -> None:
         self.model = rig_model()
@@ -71,7 +71,7 @@ class ProgramRig:
         self.feedback.position_rad[:] = np.round(self.angle / COUNT_RAD) * COUNT_RAD
         self.program.update(self.feedback, self.setpoint, self.torque)
         self._keep()
-        # what is asked for acts one cycle later, against friction, until the next
+        # a torque acts one cycle later, against friction, until the next one
         force = self._acting + self.load_Nm - COULOMB_Nm * np.tanh(self.speed / 0.05)
         self.speed += force / INERTIA_kg_m2 * PERIOD_S
         self.angle += self.speed * PERIOD_S
@@ -82,7 +82,7 @@ class ProgramRig:
             self.cycle()
 
     def send(self, position_m: tuple[float, float, float], scale: float = 1.0) -> None:
-        """Post a sample of the stream that was sent just now."""
+        """Post a sample of the stream, sent now."""
         sample = self.sample
         sample["sequence"] += np.uint64(1)
         sample["sent_ns"] = round(self.feedback.cycle * PERIOD_S * 1e9)
@@ -90,7 +90,7 @@ class ProgramRig:
         self.block.post_sample(sample)
 
     def array(self, name: str) -> np.ndarray:
-        """Return what was kept of every cycle, (k, n), or the programs' names (k,)."""
+        """Return the history of a quantity, (k, n), or of the programs' names, (k,)."""
         return np.array(self.history[name])
 
     def _keep(self) -> None:

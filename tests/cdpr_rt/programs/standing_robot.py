@@ -1,4 +1,4 @@
-"""Winches whose cables end at a platform that stands fast."""
+"""Winches whose cables end at a fixed platform."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def _turn(
 
 
 class Standing:
-    """Three rotors with friction, a spring behind the slack of each."""
+    """Three rotors with friction; beyond its slack each cable is a spring."""
 
     def __init__(self) -> None:
         limits = limits_of(ROBOT)
@@ -80,7 +80,7 @@ class Standing:
         self.program: Program = self.programs["hold"]
 
     def loosen(self, slack_m: tuple[float, float, float]) -> None:
-        """Begin anew without torque, with so much slack."""
+        """Start again without torque, with this slack."""
         self.parts.forget()
         self.estimator.reset()
         self.speed[:] = self.torque[:] = self.tension_N[:] = 0.0

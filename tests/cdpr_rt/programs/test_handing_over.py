@@ -13,7 +13,7 @@ from tests.cdpr_rt.programs.standing_robot import PERIOD_S, Standing
 
 
 def handing_over(robot: Standing, source: str | None = None) -> Standing:
-    """Tighten up to where what presses on the stand is let go."""
+    """Tighten up to the release of the force that presses on the stand."""
     robot.switch("tighten", {"from": source} if source else {})
     for _ in range(2000):
         robot.run(0.01)
@@ -23,7 +23,7 @@ def handing_over(robot: Standing, source: str | None = None) -> Standing:
     raise AssertionError("not tight")
 
 
-def test_it_is_not_moved_before_it_is_released(robot: Standing):
+def test_the_platform_is_not_moved_before_it_is_released(robot: Standing):
     handing_over(robot)
     with pytest.raises(ProgramError, match="the cables are not tight; run tighten first"):
         robot.programs["pose"].check({"stream": True})
@@ -39,7 +39,7 @@ def test_it_is_not_moved_before_it_is_released(robot: Standing):
     assert robot.until_done(10.0)["done"]
 
 
-def test_a_stop_meanwhile_ends_on_tight_cables(robot: Standing):
+def test_a_stop_while_handing_over_ends_with_tight_cables(robot: Standing):
     handing_over(robot)
     robot.program.stop()
     robot.run(0.7)
@@ -47,23 +47,23 @@ def test_a_stop_meanwhile_ends_on_tight_cables(robot: Standing):
     assert robot.parts.tight
 
 
-def let_go_of(robot: Standing) -> None:
-    """Take the power away as a safe stop does, which asks no program."""
+def switch_power_off(robot: Standing) -> None:
+    """Switch power off as a safe stop does, without the program."""
     robot.program = robot.programs["idle"]
     robot.program.start(robot.feedback, robot.setpoint, robot.torque)
     robot.run(0.05)
 
 
-def test_an_early_end_leaves_the_platform_where_it_was(robot: Standing):
+def test_a_displaced_platform_stays_displaced_after_an_early_end(robot: Standing):
     robot.parts.last_stop.displaced = True
     handing_over(robot, "home")
-    let_go_of(robot)
+    switch_power_off(robot)
     assert robot.parts.last_stop.displaced
     assert handing_over(robot, "home").until_done(10.0)["done"]
     assert not robot.parts.last_stop.displaced
 
 
-def test_whether_it_hangs_is_looked_at_again_once_that_was_ended(
+def test_a_hanging_platform_is_checked_again_after_an_early_end(
     robot: Standing, monkeypatch: pytest.MonkeyPatch
 ):
     looked = []
@@ -77,13 +77,13 @@ def test_whether_it_hangs_is_looked_at_again_once_that_was_ended(
     looked.clear()
     robot.program.check({"from": "lengths"})
     assert not looked
-    let_go_of(robot)
+    switch_power_off(robot)
     robot.programs["tighten"].check({"from": "lengths"})
     assert looked
 
 
 @pytest.mark.parametrize("name", ["hold", "lower", "tighten"])
-def test_other_programs_meanwhile_go_on_without_a_step(robot: Standing, name: str):
+def test_other_programs_take_over_while_handing_over_without_a_step(robot: Standing, name: str):
     handing_over(robot)
     before_Nm, lengths_m = robot.torque.copy(), robot.estimator.estimate.cable_length_m.copy()
     robot.switch(name)
@@ -98,10 +98,10 @@ def test_other_programs_meanwhile_go_on_without_a_step(robot: Standing, name: st
 
 
 @pytest.mark.parametrize(("slack_m_s", "told"), [(4.0, "its winch runs in"), (0.04, "disagree by")])
-def test_a_cable_that_was_slack_is_let_down_and_its_length_forgotten(
+def test_a_slack_cable_ends_the_handover_and_lengths_are_forgotten(
     robot: Standing, slack_m_s: float, told: str
 ):
-    """Its winch is stopped before it runs away, and no length that it has made is believed."""
+    """Its winch is stopped before it runs away, and lengths are unknown afterwards."""
     handing_over(robot)
     fastest_m_s = 0.0
     while not robot.program.progress()["trouble"]:
@@ -118,10 +118,10 @@ def test_a_cable_that_was_slack_is_let_down_and_its_length_forgotten(
 
 
 @pytest.mark.parametrize(("up_m", "told"), [(0.0, False), (0.003, False), (0.02, True)])
-def test_lengths_that_agree_on_a_place_off_home_are_reported(
+def test_lengths_that_agree_away_from_home_give_a_notice(
     robot: Standing, up_m: float, told: bool
 ) -> None:
-    """All cables that are slack alike contradict nothing but the stand."""
+    """If all cables are equally slack, their lengths contradict only the stand."""
     handing_over(robot)
     model = robot.parts.model
     shorter_m = up_m * model.kinematics.wrench_matrix(model.home_pose)[1]
@@ -139,11 +139,11 @@ def test_lengths_that_agree_on_a_place_off_home_are_reported(
     assert not robot.parts.notices()
 
 
-def test_a_turned_platform_is_as_far_off_home_as_its_anchor_points():
+def test_a_rotation_counts_as_off_home_by_the_displacement_of_anchor_points():
     ideal = IdealPlatform(ROOM, 10.0, 6000.0)
     ideal.control.position[:] = ideal.model.home
     letting_go = LettingGo(ideal.parts, np.full(8, -0.01), np.full(8, 300.0))
-    ideal.control.off[5] = np.radians(0.2)  # by 2 mm
+    ideal.control.off[5] = np.radians(0.2)  # 2 mm at the anchor points
     assert not letting_go.off_home()
     ideal.control.off[5] = np.radians(4.0)
     told = letting_go.off_home()
@@ -152,13 +152,13 @@ def test_a_turned_platform_is_as_far_off_home_as_its_anchor_points():
     assert "the platform is 20 mm from there, turned by 0.0 deg" in letting_go.off_home()
 
 
-def test_a_notice_of_a_platform_off_home_goes_once_its_lengths_agree_elsewhere() -> None:
+def test_the_off_home_notice_ends_once_lengths_agree_elsewhere() -> None:
     ideal = IdealPlatform(ROOM, 10.0, 6000.0)
     parts, control = ideal.parts, ideal.control
     parts.tight = True
     parts.off_home, parts.off_home_by[:3] = "off", (0.0, 0.2, 0.0)
     control.position[:] = parts.model.home
-    assert parts.notices() == ["off"], "at home any place agrees"
+    assert parts.notices() == ["off"], "at home the notice stays"
     low, high = parts.platform.workspace_min_m, parts.platform.workspace_max_m
     control.position[:3] = high[0], high[1], low[2]
     control.residual_m = 0.02

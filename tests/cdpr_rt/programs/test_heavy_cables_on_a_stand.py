@@ -1,4 +1,4 @@
-"""Cables that weigh something around a platform on its stand, beside elastic catenaries."""
+"""Heavy cables at a platform on its stand, compared with elastic catenaries."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ G_m_s2 = 9.80665
 
 
 def heavy(machine: Machine, weight_N_m: float) -> Machine:
-    """Return a robot whose cables weigh so much."""
+    """Return a robot whose cables have this weight."""
     weights = (weight_N_m,) * machine.n
     platform = replace(machine.platform, cable_model="catenary", cable_weights_N_m=weights)
     return replace(machine, platform=platform)
@@ -43,7 +43,7 @@ def parts_of(machine: Machine) -> PlatformParts:
 @pytest.mark.parametrize(
     ("machine", "weight_N_m"), [(spatial(), 1.5), (shipped("suspended-8"), 0.64)]
 )
-def test_a_stand_is_pressed_as_planned_and_lengths_are_those_of_catenaries(
+def test_force_on_the_stand_and_lengths_equal_those_of_catenaries(
     machine: Machine, weight_N_m: float
 ) -> None:
     robot = heavy(machine, weight_N_m)
@@ -55,14 +55,14 @@ def test_a_stand_is_pressed_as_planned_and_lengths_are_those_of_catenaries(
     weight_N, hang_N = robot.platform.mass_kg * G_m_s2, model.kinematics.hanging(model.home_pose)[0]
     assert abs(hang_N[2]) > 0.02 * weight_N
     from_below = robot.platform.exit_points_m[0][2] < robot.platform.home_m[2]
-    # of what it carries, with the cables' weight, it is 0.57: the rest of theirs is on the stand
+    # cables carry 0.57 of platform and cable weight; the stand carries the rest
     wanted_N = -weight_N if from_below else 0.85 / 1.5 * (weight_N - hang_N[2]) + hang_N[2]
     assert wrench[2] == pytest.approx(wanted_N, abs=0.004 * weight_N)
     assert np.abs(np.delete(wrench, 2)).max() < 0.004 * weight_N
     np.testing.assert_allclose(control.lengths_at_home(winch_N), lengths_m, atol=2e-5)
 
 
-def test_a_pose_follows_from_what_winches_of_heavy_cables_pull() -> None:
+def test_the_pose_is_estimated_from_the_winch_tensions_of_heavy_cables() -> None:
     robot = heavy(spatial(), 1.5)
     control = robot.control()
     winch_N = np.where(np.arange(robot.n) < 4, 90.0, 60.0)
@@ -80,13 +80,13 @@ def test_lowering_begins_with_the_loads_the_winches_carry() -> None:
     program._drum_tension_N[:] = 0.0
     parts.control.setpoint.stand_at(np.array(parts.model.home))
     program._carry_weight(torque_Nm)
-    # cables of 4 N/m sag by a fifth of their tension: a parabola is off by that, squared
+    # cables of 4 N/m weigh a fifth of their tension: the parabola's error is the square of that
     _, wrench = truth(robot, -torque_Nm / cable_m)
     weight_N = robot.platform.mass_kg * G_m_s2
     assert wrench[2] == pytest.approx(weight_N, rel=0.02)
 
 
-def test_cables_that_carry_themselves_do_not_carry_the_platform() -> None:
+def test_the_weight_of_cables_is_not_counted_as_carrying_the_platform() -> None:
     robot = heavy(shipped("suspended-8"), 4.0)
     parts, feedback = parts_of(robot), AxisFeedback(robot.n)
     model, kinematics = parts.model, parts.model.kinematics

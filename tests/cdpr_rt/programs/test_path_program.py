@@ -1,4 +1,4 @@
-"""Program `path`: the set-point stays on the path whatever is asked of it."""
+"""Program `path`: the set-point stays on the path under every command."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def planned(platform: IdealPlatform) -> TimedPath:
 
 
 class PathRig:
-    """A platform with a plan in its store, and the program that follows it."""
+    """A platform with a stored plan, and the program that follows it."""
 
     def __init__(self, platform: IdealPlatform, timed: TimedPath, folder: Path) -> None:
         self.platform, self.folder, self.timed = platform, folder, timed
@@ -64,7 +64,7 @@ class PathRig:
         self.store.open(folder, self.live)
         platform.restart()
         self.program = PathProgram(platform.parts, np.full(platform.torque.size, 10.0))
-        # all places between samples, as the plan has them
+        # all places between the plan's samples
         h, q = self.timed.period_s, self.timed.samples
         u = np.linspace(0.0, 1.0, 50, endpoint=False)[:, None, None]
         p, v, a = q[:-1, 0], h * q[:-1, 1], h * h * q[:-1, 2]
@@ -80,7 +80,7 @@ class PathRig:
         self.program.check(wanted)
 
     def begin_anew(self) -> None:
-        """As another process does: nothing is left but the files."""
+        """Start again as a new process, which has only the files."""
         write_progress(self.folder, self.live)
         self.store = self.platform.parts.paths = PathStore(self.platform.model)
         self.store.open(self.folder)
@@ -105,7 +105,7 @@ class PathRig:
         return self.program.progress()["path"]
 
     def check(self, most: float = 1.25) -> None:
-        """The set-point has been on the path, and within the limits but for a part of braking."""
+        """The set-point has been on the path and within the limits, apart from some braking."""
         places, paces = np.array(self.platform.path), np.array(self.platform.paces)
         step = np.linalg.norm(np.diff(self.places.data, axis=0), axis=1).max()
         assert self.places.query(places)[0].max() <= OFF_m + step
@@ -130,7 +130,7 @@ def rig(_platform: IdealPlatform, _timed: TimedPath, tmp_path: Path) -> Iterator
     yield PathRig(_platform, _timed, tmp_path / "paths")
 
 
-def test_it_is_followed_in_the_planned_time_and_waits_where_it_is_to(rig):
+def test_a_path_is_followed_in_its_planned_time_and_waits_at_its_stop(rig):
     rig.begin()
     stop_s = rig.timed.period_s * rig.timed.waits[0]
     cycles = 0
@@ -146,7 +146,7 @@ def test_it_is_followed_in_the_planned_time_and_waits_where_it_is_to(rig):
     assert rig.platform.parts.paths.unfinished is None
 
 
-def test_feed_pause_and_steps_back_never_leave_it(rig):
+def test_feed_pause_and_steps_back_never_leave_the_path(rig):
     rig.begin()
     chance = np.random.default_rng(2)
     print("seed 2")
@@ -158,7 +158,7 @@ def test_feed_pause_and_steps_back_never_leave_it(rig):
     rig.check()
 
 
-def test_a_hold_brakes_along_it_and_it_is_taken_up_again(rig):
+def test_a_hold_brakes_along_the_path_and_it_can_be_resumed(rig):
     rig.begin()
     rig.platform.run(0.6)
     rig.program.stop()
@@ -171,7 +171,7 @@ def test_a_hold_brakes_along_it_and_it_is_taken_up_again(rig):
     rig.check()
 
 
-def test_after_a_kill_it_goes_back_to_where_it_was_left(rig):
+def test_after_a_kill_the_path_resumes_where_it_was_left(rig):
     rig.begin()
     rig.platform.run(0.7)
     rig.program.command({"pause": True})
@@ -214,7 +214,7 @@ def test_invalid_path_commands_are_rejected(rig, tmp_path):
     assert rig.store.unfinished is None
 
 
-def test_a_plan_for_other_motors_is_refused(rig, tmp_path):
+def test_a_plan_for_other_motors_is_rejected(rig, tmp_path):
     model = rig.platform.model
     weaker = replace(model, torque_limited_N=0.9 * model.high_N)
     lines = np.arange(len(rig.timed.samples))
@@ -224,7 +224,7 @@ def test_a_plan_for_other_motors_is_refused(rig, tmp_path):
 
 
 def swing(samples: np.ndarray, middle: slice) -> None:
-    """Positions that agree with alternating velocities at no acceleration."""
+    """Set alternating velocities at rest without acceleration."""
     samples[middle, 0] = samples[middle.start, 0]
     samples[middle, 1:] = 0.0
     samples[middle, 1, 0] = 0.15 * (-1.0) ** np.arange(middle.stop - middle.start)
@@ -244,7 +244,7 @@ SPOILT = {
 
 
 @pytest.mark.parametrize("what", SPOILT)
-def test_a_plan_beyond_the_limits_does_not_move(rig, what):
+def test_a_plan_beyond_the_limits_is_rejected(rig, what):
     samples = rig.timed.samples.copy()
     half = len(samples) // 2
     while samples[half : half + 4, 1:].any(axis=(1, 2)).sum() < 4 or half in rig.timed.waits:
@@ -258,7 +258,7 @@ def test_a_plan_beyond_the_limits_does_not_move(rig, what):
     assert not rig.store.is_loaded(name)
 
 
-def test_a_robot_whose_geometry_is_not_believed_follows_nothing(rig: PathRig) -> None:
+def test_a_robot_in_need_of_calibration_follows_no_path(rig: PathRig) -> None:
     parts = rig.platform.parts
     rig.begin()
     parts.not_calibrated_reason = "rail 2 was moved"
@@ -270,14 +270,14 @@ def test_a_robot_whose_geometry_is_not_believed_follows_nothing(rig: PathRig) ->
         parts.not_calibrated_reason = ""
 
 
-def test_the_way_back_to_the_beginning_is_looked_at(rig: PathRig) -> None:
-    """From the end of a path, and where something else has moved the platform in between."""
+def test_the_way_to_the_beginning_is_checked(rig: PathRig) -> None:
+    """From the end of a path, and after another program has moved the platform."""
     rig.begin()
     rig.platform.run(0.3)
     ways = rig.platform.control.ways
     ways.clear()
     rig.check_command(resume=True)
-    assert not ways  # it is on the path
+    assert not ways
     rig.program.check({"plan": rig.name})
     assert len(ways) == 1
     rig.platform.switch(rig.platform.pose, {})
@@ -286,7 +286,7 @@ def test_the_way_back_to_the_beginning_is_looked_at(rig: PathRig) -> None:
     assert len(ways) == 2
 
 
-def test_the_way_begins_where_a_moving_platform_stops(rig: PathRig) -> None:
+def test_the_way_to_the_path_begins_where_a_moving_platform_stops(rig: PathRig) -> None:
     platform = rig.platform
     platform.restart()
     aim = platform.control.position.copy()
@@ -320,7 +320,7 @@ def test_a_pause_on_the_way_to_the_path_stops_there(rig: PathRig) -> None:
 
 
 @pytest.mark.parametrize("time_s", [-1e7, 1e12, np.nan])
-def test_a_spoilt_time_does_not_reach_the_plan(rig: PathRig, time_s: float) -> None:
+def test_an_invalid_stored_time_is_clipped_or_rejected(rig: PathRig, time_s: float) -> None:
     rig.begin()
     rig.live["time_s"] = time_s
     rig.begin_anew()
@@ -338,7 +338,7 @@ def test_a_spoilt_time_does_not_reach_the_plan(rig: PathRig, time_s: float) -> N
     [b'"period_s": NaN', b'"period_s": 0', b'"waits_s": [0.5]', b'"waits_s": [NaN]',
      b'"waits_s": [-1.0]', b'"waits_s": [1e300]', b'"waits_s": [0.0, 0.0]'],
 )  # fmt: skip
-def test_a_head_that_is_spoilt_is_refused(rig: PathRig, spoilt: bytes) -> None:
+def test_a_plan_with_an_invalid_header_is_rejected(rig: PathRig, spoilt: bytes) -> None:
     file = rig.folder / f"{rig.name}.path"
     data = file.read_bytes()
     key = spoilt.split(b":")[0]
@@ -350,7 +350,7 @@ def test_a_head_that_is_spoilt_is_refused(rig: PathRig, spoilt: bytes) -> None:
         rig.store.load(name)
 
 
-def test_a_file_that_is_not_what_was_planned_does_not_move(rig: PathRig) -> None:
+def test_a_plan_file_that_was_changed_is_rejected(rig: PathRig) -> None:
     file = rig.folder / f"{rig.name}.path"
     data = bytearray(file.read_bytes())
     data[-1] ^= 1  # a line's number
@@ -359,7 +359,7 @@ def test_a_file_that_is_not_what_was_planned_does_not_move(rig: PathRig) -> None
         rig.store.load(rig.name)
 
 
-def test_the_plan_that_was_left_is_kept(rig: PathRig) -> None:
+def test_an_unfinished_plan_is_not_deleted(rig: PathRig) -> None:
     rig.begin()
     write_progress(rig.folder, rig.live)
     lines = np.arange(len(rig.timed.samples))
@@ -370,7 +370,7 @@ def test_the_plan_that_was_left_is_kept(rig: PathRig) -> None:
     assert len(kept) == 9
 
 
-def test_a_kill_loses_nothing_of_how_far_it_has_come(rig: PathRig) -> None:
+def test_a_kill_loses_no_progress(rig: PathRig) -> None:
     rig.begin()
     for _ in range(5):
         rig.platform.run(0.1)
@@ -385,7 +385,7 @@ async def on_disk(folder: Path, wanted: np.ndarray) -> None:
     raise AssertionError(read_progress(folder))
 
 
-def test_the_disk_follows_how_far_it_has_come(
+def test_progress_is_written_to_the_disk_continuously(
     rig: PathRig, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     async def follow() -> None:
@@ -406,11 +406,11 @@ def test_the_disk_follows_how_far_it_has_come(
     assert read_progress(rig.folder) == rig.live
 
 
-# How far a robot has come on its path, on the disk.
+# Progress along the path on the disk.
 
 
 class BeingBegun(np.ndarray):
-    """A row in which another path is begun while it is looked at first."""
+    """A row in which another path begins during the first read."""
 
     looks = 0
 
@@ -423,7 +423,7 @@ class BeingBegun(np.ndarray):
 
 
 @pytest.mark.parametrize("ends", [False, True])
-def test_a_start_checks_the_plan_again(
+def test_progress_is_read_again_if_another_path_begins_meanwhile(
     monkeypatch: pytest.MonkeyPatch, ends: bool, tmp_path: Path
 ) -> None:
     written: list[bytes] = []
@@ -435,7 +435,7 @@ def test_a_start_checks_the_plan_again(
         live = np.zeros(1, PATH).view(BeingBegun)
         live.looks = 1
         keeping = asyncio.create_task(keep_progress(tmp_path, live))
-        await asyncio.sleep(0)  # it has seen that there is none
+        await asyncio.sleep(0)  # until it has seen that there is no path
         live["name"], live["time_s"], live.looks = b"0" * 32, 7.0, 0
         while not ends and not written:
             await asyncio.sleep(1e-3)
@@ -465,7 +465,7 @@ def test_progress_is_written_when_a_full_disk_has_room_again(
         while len(tried) < 3:
             await asyncio.sleep(1e-3)
         await asyncio.sleep(0.02)
-        assert len(tried) == 3  # what is written is not written again
+        assert len(tried) == 3  # unchanged progress is not written again
         keeping.cancel()
         await asyncio.gather(keeping, return_exceptions=True)
 
@@ -474,7 +474,7 @@ def test_progress_is_written_when_a_full_disk_has_room_again(
     asyncio.run(follow())
 
 
-def test_a_pipe_in_place_of_the_file_keeps_nobody_waiting(tmp_path: Path) -> None:
+def test_a_pipe_in_place_of_the_progress_file_does_not_block(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "progress")
     assert not read_progress(tmp_path)["name"][0]
     with pytest.raises(OSError, match="No such device"):

@@ -1,4 +1,4 @@
-"""Plans as the planner makes them for a robot, held against what its control knows of it."""
+"""The planner's plans for a robot are accepted by its control."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def with_torque(share: float) -> Robot:
 
 @pytest.mark.parametrize("share", [1.0, 0.8])
 def test_a_plan_for_the_robot_is_accepted_by_its_control(share: float, tmp_path: Path) -> None:
-    """Also where the motors' torque leaves less than the cables' bounds; not with other motors."""
+    """Also if motor torque limits the tensions; but not for other motors."""
     robot, n = with_torque(share), 3
     planner = PathPlanner(robot)
     model = planner.model

@@ -1,4 +1,4 @@
-"""Tightening and letting go, on winches whose cables end at a platform that stands fast."""
+"""Tightening and lowering, on winches whose cables end at a fixed platform."""
 
 from __future__ import annotations
 
@@ -43,14 +43,14 @@ def mean_torque_Nm(robot: Standing, cycles: int = 6) -> np.ndarray:
     return np.mean(torques, axis=0)
 
 
-def test_slack_comes_in_and_lengths_are_those_of_home(robot: Standing):
+def test_tightening_takes_up_slack_and_sets_the_lengths_at_home(robot: Standing):
     assert not robot.parts.pose_known
     tightened(robot)
     assert robot.tension_N.min() > 15.0
     robot.run(0.01)
     known_m = robot.estimator.estimate.cable_length_m
     stiffness_N = ROBOT.axes[0].winch.cable.stiffness_N
-    # the spring that the cables end in has moved since; the lengths follow the motors' angles
+    # the springs at the cables' ends have moved since; lengths follow the motors' angles
     moved_m = (robot.tension_N - home_pretension_N(robot.parts)) / STIFFNESS_N_m
     home_m = statics_of(ROBOT).lengths(HOME_m) / (
         1.0 + home_pretension_N(robot.parts) / stiffness_N
@@ -65,15 +65,17 @@ def test_tensions_grow_together_and_no_cable_is_jerked(robot: Standing):
     while not robot.parts.tight:
         robot.run(0.002)
         shares.append((robot.tension_N / full_N).max())
-        uneven_N.append(robot.tension_N[0] - robot.tension_N[1])  # would pull it sideways
+        uneven_N.append(
+            robot.tension_N[0] - robot.tension_N[1]
+        )  # the difference would pull the platform sideways
     assert 1.2 < max(shares[:-1]) < 1.7
-    # what a stand bears on which it presses with twice its weight, friction 0.3: 15.8 N
+    # friction of 0.3 on a stand pressed with twice the weight holds 15.8 N
     assert np.abs(uneven_N[:-1]).max() < 15.0
 
 
-def test_slack_is_taken_up_again_as_at_first(monkeypatch: pytest.MonkeyPatch):
-    """What winches pulled with at the end of the time before makes no cable tight."""
-    monkeypatch.setattr(slack_module, "_STAND_FRICTION", 0.0)  # reeled in together at once
+def test_a_second_tightening_takes_up_slack_like_the_first(monkeypatch: pytest.MonkeyPatch):
+    """The tensions at the end of the previous tightening make no cable tight."""
+    monkeypatch.setattr(slack_module, "_STAND_FRICTION", 0.0)  # all cables are reeled in together
     robot = Standing()
     for slack_m in ((0.02, 0.015, 0.03), (0.06, 0.055, 0.07)):
         robot.loosen(slack_m)
@@ -81,7 +83,7 @@ def test_slack_is_taken_up_again_as_at_first(monkeypatch: pytest.MonkeyPatch):
         assert not robot.until_done(20.0)["trouble"]
 
 
-def test_cables_that_are_pulled_before_are_not_pulled_with_more_than_the_pretension(
+def test_cables_already_under_tension_never_exceed_the_pretension(
     robot: Standing,
 ):
     robot.loosen((0.0, 0.0, 0.0))
@@ -94,7 +96,7 @@ def test_cables_that_are_pulled_before_are_not_pulled_with_more_than_the_pretens
         assert (high_N <= full_N + 1e-9).all()
 
 
-def test_tensions_for_where_it_stands_are_not_stepped_to(robot: Standing):
+def test_tensions_change_without_a_step_to_those_of_the_actual_position(robot: Standing):
     model = robot.parts.model
     there = model.pose(np.array([0.8, 1.6]))
     slack_m = robot.slack_m + robot.cable_m * robot.angle
@@ -112,12 +114,12 @@ def test_tensions_for_where_it_stands_are_not_stepped_to(robot: Standing):
         assert not progress["trouble"]
     other_N = np.abs(asked_N[-1] - home_pretension_N(robot.parts)).max()
     assert other_N > 5.0
-    # full tensions in a second, and from some to others in a second
+    # from zero to full tension in a second, and from one tension to another in a second
     fastest_N_s = np.max(asked_N) + 1.5 * other_N
     assert np.abs(np.diff(asked_N, axis=0)).max() < fastest_N_s * PERIOD_S
 
 
-def test_a_cable_that_ends_nowhere_is_reported_and_all_are_let_go(robot: Standing):
+def test_a_broken_cable_is_reported_and_all_cables_are_released(robot: Standing):
     robot.slack_m[1] = 5.0
     robot.switch("tighten")
     told = robot.until_done(60.0)
@@ -130,10 +132,8 @@ def test_a_cable_that_ends_nowhere_is_reported_and_all_are_let_go(robot: Standin
 
 
 @pytest.mark.parametrize("name", ["tighten", "lower"])
-def test_where_winches_are_driven_alone_no_loss_is_taken_from_what_is_measured(
-    robot: Standing, name: str
-):
-    """What the control wrote last does not say what these programs do."""
+def test_tightening_and_lowering_subtract_no_learnt_loss_from_tensions(robot: Standing, name: str):
+    """The control's last values do not apply to these programs."""
     if name == "lower":
         tightened(robot)
     control = robot.parts.control
@@ -145,7 +145,7 @@ def test_where_winches_are_driven_alone_no_loss_is_taken_from_what_is_measured(
     assert not control.compensation_Nm.any()
 
 
-def test_only_a_tight_robot_takes_positions_and_only_a_loose_one_rests(robot: Standing):
+def test_positions_need_tight_cables_and_idle_needs_loose_ones(robot: Standing):
     pose, idle = robot.programs["pose"], robot.programs["idle"]
     with pytest.raises(ProgramError, match="cables are not tight; run tighten first"):
         pose.check({"position_m": [0.0, 1.6]})
@@ -158,12 +158,12 @@ def test_only_a_tight_robot_takes_positions_and_only_a_loose_one_rests(robot: St
         robot.programs["jog"].check({"velocity_rad_s": [0.0, 0.0, 0.0]})
     robot.parts.slacken()
     robot.switch("hold")
-    robot.run(0.1)  # each axis keeps its cable by itself now, as after brakes have held it
+    robot.run(0.1)  # each axis holds its own cable now, as after a stop with brakes
     with pytest.raises(ProgramError, match="may hang on them; lower it first"):
         idle.check({})
 
 
-def test_a_winch_that_pays_out_does_not_answer_an_encoder_that_jumps():
+def test_a_winch_that_pays_out_ignores_a_jump_of_its_encoder():
     winches, feedback, torque = (
         WinchSpeedLoop(np.full(3, 1e-4), CABLE_m, PERIOD_S),
         AxisFeedback(3),
@@ -180,7 +180,7 @@ def test_a_winch_that_pays_out_does_not_answer_an_encoder_that_jumps():
             assert winches.tension_N == pytest.approx(20.0)
 
 
-def test_a_cable_that_gives_way_while_they_are_tightened_ends_it(robot: Standing):
+def test_a_cable_that_goes_slack_ends_tightening(robot: Standing):
     robot.switch("tighten")
     for _ in range(400):
         robot.run(0.05)
@@ -192,19 +192,19 @@ def test_a_cable_that_gives_way_while_they_are_tightened_ends_it(robot: Standing
     assert "reeled in and not tight" in told["trouble"]
 
 
-def test_a_tight_robot_is_not_told_again_where_it_is(robot: Standing):
+def test_a_tight_robot_cannot_be_tightened_from_home_again(robot: Standing):
     tightened(robot)
     with pytest.raises(ProgramError, match="the cables are tight already; lower it first"):
         robot.programs["tighten"].check({"from": "home"})
     robot.programs["tighten"].check({})
 
 
-def test_a_platform_let_go_elsewhere_is_not_taken_to_stand_at_home(robot: Standing):
+def test_a_platform_lowered_blindly_is_not_assumed_to_stand_at_home(robot: Standing):
     tightened(robot)
     robot.switch("lower", {"blind": True})
     robot.run(2.0)
     tighten = robot.programs["tighten"]
-    tighten.check({})  # its cables' lengths tell where it is
+    tighten.check({})  # its cables' lengths are known
     robot.estimator.forget_lengths()
     with pytest.raises(ProgramError, match="stand it at home; allowed: from home"):
         tighten.check({})
@@ -213,7 +213,7 @@ def test_a_platform_let_go_elsewhere_is_not_taken_to_stand_at_home(robot: Standi
     assert not robot.parts.last_stop.displaced
 
 
-def test_a_platform_that_cannot_come_home_is_let_down_where_it_is(robot: Standing):
+def test_a_platform_that_cannot_reach_home_is_lowered_where_it_is(robot: Standing):
     tightened(robot)
     robot.switch("lower")
     stuck = robot.programs["lower"]._approach
@@ -225,10 +225,10 @@ def test_a_platform_that_cannot_come_home_is_let_down_where_it_is(robot: Standin
     assert robot.program.progress()["blind"]
 
 
-def test_holding_keeps_axes_before_and_the_platform_after(robot: Standing):
+def test_hold_keeps_axes_before_tightening_and_the_platform_after(robot: Standing):
     assert robot.programs["hold"].pose is None
     tightened(robot)
-    # an encoder's count to and fro is in each cycle's torque
+    # each cycle's torque contains noise of an encoder count
     before_Nm = mean_torque_Nm(robot)
     robot.switch("hold")
     assert mean_torque_Nm(robot) == pytest.approx(before_Nm, abs=0.02)
@@ -245,7 +245,7 @@ def test_holding_keeps_axes_before_and_the_platform_after(robot: Standing):
         ({"to": "home"}, "key 'to'; allowed: from"),
     ],
 )
-def test_lengths_that_are_not_there_are_refused(
+def test_tightening_from_unknown_lengths_is_rejected(
     robot: Standing, wanted: dict[str, str], named: str
 ):
     robot.parts.last_stop.take()
@@ -254,7 +254,7 @@ def test_lengths_that_are_not_there_are_refused(
         robot.programs["tighten"].check(wanted)
 
 
-def test_lengths_that_disagree_are_refused(robot: Standing):
+def test_tightening_from_lengths_that_disagree_fails(robot: Standing):
     home_m = robot.parts.control.lengths_at_home(np.full(3, 20.0))
     robot.estimator.set_lengths(robot.feedback.position_rad, home_m + np.array([0.2, 0.0, 0.2]))
     robot.run(0.01)
@@ -264,7 +264,7 @@ def test_lengths_that_disagree_are_refused(robot: Standing):
     assert not robot.parts.tight
 
 
-def test_nothing_is_learnt_where_lengths_taken_at_home_disagree(
+def test_no_friction_is_learnt_if_lengths_at_home_disagree(
     robot: Standing, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     begun: list[bool] = []
@@ -280,7 +280,7 @@ def test_nothing_is_learnt_where_lengths_taken_at_home_disagree(
     assert begun == [True]
 
 
-def test_lowering_ends_without_torque_and_with_slack_cables_though_winches_rub(robot: Standing):
+def test_lowering_ends_without_torque_and_with_slack_cables_despite_friction(robot: Standing):
     tightened(robot)
     parts, start = robot.parts, robot.angle.copy()
     least_N, high_N = parts.control.least_N, parts.model.high_N
@@ -299,7 +299,7 @@ def test_lowering_ends_without_torque_and_with_slack_cables_though_winches_rub(r
     assert np.abs(robot.cable_m * (robot.angle - before)).max() < 0.001
 
 
-def test_a_broken_cable_that_runs_in_does_not_keep_a_standing_platform_waiting(
+def test_a_broken_cable_does_not_delay_lowering_of_a_standing_platform(
     robot: Standing, monkeypatch: pytest.MonkeyPatch
 ):
     tightened(robot)
@@ -310,7 +310,7 @@ def test_a_broken_cable_that_runs_in_does_not_keep_a_standing_platform_waiting(
 
     def trembling(feedback: AxisFeedback, torque_Nm: np.ndarray) -> None:
         update(feedback, torque_Nm)
-        winches.tension_N[2] += 8.0 * (feedback.cycle % 50 == 0)  # cogging, as it turns
+        winches.tension_N[2] += 8.0 * (feedback.cycle % 50 == 0)  # cogging of the turning motor
 
     monkeypatch.setattr(winches, "update", trembling)
     robot.until_done(6.0)
@@ -324,18 +324,18 @@ def test_slack_cables_are_not_reeled_in_before_lowering(robot: Standing):
     assert (robot.cable_m * (robot.angle - before)).min() > -0.002
 
 
-def test_a_lowering_after_an_interrupted_one_pushes_no_slack_cable_out(robot: Standing):
+def test_lowering_after_an_interrupted_one_pays_out_no_slack_cable(robot: Standing):
     tightened(robot)
     robot.switch("lower", {"blind": True})
     robot.run(0.05)
-    robot.loosen((0.02, 0.02, 0.02))  # the power goes
+    robot.loosen((0.02, 0.02, 0.02))  # power off
     before = robot.angle.copy()
     robot.switch("lower")
     robot.until_done(20.0)
     assert (robot.cable_m * (robot.angle - before)).max() < 0.002
 
 
-def test_a_platform_that_does_not_come_to_rest_in_time_is_reported_and_its_lengths_doubted(
+def test_a_platform_that_keeps_sinking_is_reported_and_counts_as_fallen(
     monkeypatch: pytest.MonkeyPatch,
 ):
     monkeypatch.setattr(lower_module, "_MOST_S", 0.5)
@@ -345,7 +345,7 @@ def test_a_platform_that_does_not_come_to_rest_in_time_is_reported_and_its_lengt
     for _ in range(1500):
         before = robot.angle.copy()
         robot.run(0.01)
-        robot.slack_m -= robot.cable_m * (robot.angle - before)  # it sinks on and on
+        robot.slack_m -= robot.cable_m * (robot.angle - before)  # it keeps sinking
         told = robot.program.progress()
         if told["done"]:
             break
@@ -354,23 +354,23 @@ def test_a_platform_that_does_not_come_to_rest_in_time_is_reported_and_its_lengt
     assert robot.parts.last_stop.fallen
 
 
-def test_every_motor_turns_once_on_the_way_to_its_index():
+def test_the_index_path_turns_every_motor_by_a_whole_turn():
     platform = ROBOT.platform
     assert platform is not None
     cable_m = np.array([axis.winch.cable_m_per_motor_rad for axis in ROBOT.axes])
     statics = statics_of(ROBOT)
     way = index_path(statics.model, cable_m, lambda _: True)
-    assert len(way) == 1  # lifting it is enough
+    assert len(way) == 1  # lifting the platform is enough
     ends = np.array([platform.home_m, *way])
     assert (np.ptp(statics.lengths(ends), axis=0) > 2.0 * np.pi * np.abs(cable_m)).all()
-    # where it may not go up far enough it goes to the sides as well
+    # if it may not be lifted far enough, it also moves sideways
     way = index_path(statics.model, cable_m, lambda there: bool(there[1] < 1.5))
     assert len(way) == 3
     assert {float(np.sign(point[0])) for point in way[1:]} == {-1.0, 1.0}
     assert all(point[1] < 1.5 for point in way)
 
 
-def test_a_set_point_waits_for_a_platform_that_does_not_come(robot: Standing) -> None:
+def test_the_set_point_waits_for_a_platform_that_lags_behind(robot: Standing) -> None:
     tightened(robot)
     robot.switch("pose", {"position_m": [0.0, 1.8]})
     robot.run(1.0)
@@ -386,7 +386,7 @@ def test_a_set_point_waits_for_a_platform_that_does_not_come(robot: Standing) ->
 
 
 @pytest.mark.parametrize("name", ["planar-3", "planar-4", "spatial-8"])
-def test_tightening_leaves_the_platform_its_weight_where_lower_cables_can(name: str):
+def test_the_pretension_at_home_does_not_lift_the_platform(name: str):
     machine = load_robot(name)
     model = model_of(machine.axes, PERIOD_S, [2.3e-3] * len(machine.axes), limits_of(machine))
     estimator = Estimator(len(machine.axes), PERIOD_S, winches_of(machine.axes))
@@ -396,7 +396,7 @@ def test_tightening_leaves_the_platform_its_weight_where_lower_cables_can(name: 
     pull = parts.model.kinematics.wrench_matrix(parts.model.home_pose) @ t
     weight = parts.model.weight()
     assert (t >= parts.control.least_N - 1e-9).all()
-    assert pull @ weight >= -1e-6  # carried in part, friction slid spatial-8 by 0.7 mm on its stand
+    assert pull @ weight >= -1e-6  # otherwise friction moved spatial-8 by 0.7 mm on its stand
     assert pull == pytest.approx((pull @ weight) / (weight @ weight) * weight, abs=1e-6)
 
 
@@ -410,7 +410,7 @@ def test_arrival_tolerance_scales_with_the_robot(robot: Standing):
     assert parts.near_m == pytest.approx(1.9e-3, abs=1e-4)
 
 
-# How tightening ends.
+# Ends of tightening.
 
 FALL_S = 0.2
 
@@ -422,7 +422,7 @@ def until(robot: Standing, stage: str) -> None:
 
 
 @pytest.mark.parametrize(("stage", "after_s"), [("slack", 0.5), ("pull", 0.02), ("beyond", 0.1)])
-def test_a_stop_lets_all_tensions_down_and_none_at_once(
+def test_a_stop_reduces_all_tensions_without_a_step(
     robot: Standing, stage: str, after_s: float
 ) -> None:
     until(robot, stage)
@@ -439,7 +439,7 @@ def test_a_stop_lets_all_tensions_down_and_none_at_once(
     assert (-np.diff(asked_N, axis=0) <= fastest_N + 1e-9).all()
 
 
-def test_a_stop_in_the_first_cycle_lets_down_what_was_pulled_before(robot: Standing) -> None:
+def test_a_stop_in_the_first_cycle_reduces_earlier_tensions_without_a_step(robot: Standing) -> None:
     robot.loosen((0.0, 0.0, 0.0))
     robot.torque[:] = -10.0 * robot.cable_m
     robot.switch("tighten")
@@ -449,7 +449,7 @@ def test_a_stop_in_the_first_cycle_lets_down_what_was_pulled_before(robot: Stand
     assert (-robot.torque / robot.cable_m >= 10.0 - fastest_N - 1e-9).all()
 
 
-def test_cables_that_are_not_tight_in_time_are_named_with_what_they_pull(
+def test_cables_that_are_not_tight_in_time_are_named_with_their_tension(
     robot: Standing, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(tighten_module, "_TIGHT_WITHIN_S", 2.0)
@@ -461,7 +461,7 @@ def test_cables_that_are_not_tight_in_time_are_named_with_what_they_pull(
     assert "left" not in told and "lower" not in told
 
 
-def test_where_all_pull_the_cable_that_does_not_stand_still_is_named(
+def test_a_cable_that_pulls_but_does_not_stand_still_is_named(
     robot: Standing, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     until(robot, "pull")
@@ -472,9 +472,7 @@ def test_where_all_pull_the_cable_that_does_not_stand_still_is_named(
 
 
 @pytest.mark.parametrize("stage", ["slack", "pull"])
-def test_which_cables_are_tight_is_looked_at_without_new_arrays(
-    robot: Standing, stage: str
-) -> None:
+def test_checking_which_cables_are_tight_allocates_no_arrays(robot: Standing, stage: str) -> None:
     until(robot, stage)
     look = robot.program._not_tight  # type: ignore[attr-defined]
     first = look()

@@ -1,4 +1,4 @@
-"""Programs of platforms that turn: straight ways in all directions, refusals, hands, lowering."""
+"""Programs of platforms that turn: straight ways in all directions, rejections, hands, lowering."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def robot(made: IdealPlatform) -> IdealPlatform:
 
 
 def split(robot: IdealPlatform, way: list[float] | None = None) -> tuple[list[float], list[float]]:
-    """Return position and rotation of the target `way` from the middle of the box."""
+    """Return position and rotation of the target at `way` from the middle of the box."""
     k = robot.model.positions
     target = robot.path[0] + np.array(way or AWAY[robot.model.size])
     return target[:k].tolist(), target[k:].tolist()
@@ -51,12 +51,12 @@ def test_all_directions_arrive_together_on_a_straight_line(robot: IdealPlatform)
     share = (path - path[0]) / (target - path[0])
     assert np.ptp(share, axis=1).max() < 1e-6
     assert (np.diff(share, axis=0) > -1e-9).all()
-    # one direction is as fast as it may be at some time, or as accelerated
+    # one direction comes near its speed limit
     assert (np.abs(robot.paces).max(axis=0) / robot.model.speed).max() > 0.5
 
 
 @pytest.mark.parametrize("frame", ["room", "platform"])
-def test_a_relative_motion_goes_along_and_about_the_axes_of_its_frame(
+def test_a_relative_motion_is_along_and_about_the_axes_of_its_frame(
     robot: IdealPlatform, frame: str
 ) -> None:
     position, rotation = split(robot)
@@ -85,7 +85,7 @@ def test_relative_motions_add_up_while_the_platform_moves(robot: IdealPlatform) 
     assert robot.path[-1][:k] - begun[:k] == pytest.approx(np.full(k, 0.1), abs=1e-9)
 
 
-def test_a_relative_motion_out_of_the_workspace_is_refused(robot: IdealPlatform) -> None:
+def test_a_relative_motion_out_of_the_workspace_is_rejected(robot: IdealPlatform) -> None:
     k = robot.model.positions
     with pytest.raises(ProgramError, match=r"distance_m: .*leads to x \d+ mm; allowed: -\d+ to"):
         robot.pose.command({"distance_m": [1.5] + [0.0] * (k - 1)})
@@ -97,7 +97,7 @@ def test_a_relative_motion_out_of_the_workspace_is_refused(robot: IdealPlatform)
         robot.pose.command({"distance_m": [0.0] * k, "frame": "home"})
 
 
-def test_poses_are_those_of_independent_rotations(robot: IdealPlatform) -> None:
+def test_the_pose_setpoint_equals_that_by_scipys_rotations(robot: IdealPlatform) -> None:
     position, rotation = split(robot)
     robot.pose.command({"position_m": position, "rotation_rad": rotation})
     robot.until_rest()
@@ -109,7 +109,7 @@ def test_poses_are_those_of_independent_rotations(robot: IdealPlatform) -> None:
     np.testing.assert_allclose(robot.model.pose(target).Q, Q, atol=1e-12)
 
 
-def test_progress_tells_position_and_rotation(robot: IdealPlatform) -> None:
+def test_progress_reports_position_and_rotation(robot: IdealPlatform) -> None:
     position, rotation = split(robot)
     robot.pose.command({"position_m": position, "rotation_rad": rotation})
     robot.run(0.2)
@@ -122,7 +122,7 @@ def test_progress_tells_position_and_rotation(robot: IdealPlatform) -> None:
     assert interrupted == pytest.approx([*position, *rotation])
 
 
-def test_coordinates_left_out_keep_their_value(robot: IdealPlatform) -> None:
+def test_omitted_coordinates_keep_their_value(robot: IdealPlatform) -> None:
     position, rotation = split(robot)
     middle, k = robot.path[0], robot.model.positions
     robot.pose.command({"rotation_rad": rotation})
@@ -133,7 +133,7 @@ def test_coordinates_left_out_keep_their_value(robot: IdealPlatform) -> None:
     assert robot.path[-1] == pytest.approx([*position, *rotation])
 
 
-def test_a_platform_that_stands_turned_too_far_is_turned_back_into_what_is_allowed(
+def test_a_platform_turned_too_far_is_turned_back_to_the_allowed_angle(
     robot: IdealPlatform,
 ) -> None:
     k, most = robot.model.positions, robot.model.angle_rad
@@ -181,7 +181,7 @@ def test_the_allowed_angle_is_reported(robot: IdealPlatform) -> None:
         robot.pose.command({"rotation_rad": rotation.tolist()})
 
 
-def test_a_speed_that_is_asked_for_slows_turning_in_the_same_measure(robot: IdealPlatform) -> None:
+def test_a_requested_speed_slows_rotation_by_the_same_share(robot: IdealPlatform) -> None:
     position, rotation = split(robot)
     robot.pose.command({"rotation_rad": rotation, "speed_m_s": 0.05})
     robot.until_rest()
@@ -192,7 +192,7 @@ def test_a_speed_that_is_asked_for_slows_turning_in_the_same_measure(robot: Idea
     assert np.abs(robot.paces).max(axis=0)[0] <= 0.05 * (1 + 1e-9)
 
 
-def test_resume_goes_on_to_position_and_rotation(robot: IdealPlatform) -> None:
+def test_resume_continues_to_position_and_rotation(robot: IdealPlatform) -> None:
     position, rotation = split(robot)
     robot.pose.command({"position_m": position, "rotation_rad": rotation})
     robot.run(0.3)
@@ -207,10 +207,10 @@ def test_resume_goes_on_to_position_and_rotation(robot: IdealPlatform) -> None:
     assert robot.path[-1] == pytest.approx([*position, *rotation])
 
 
-# -- a hand that leads
+# -- motion by a hand
 
 
-def test_a_hand_turns_the_platform_as_it_turns(robot: IdealPlatform) -> None:
+def test_the_platform_turns_as_the_hand_turns(robot: IdealPlatform) -> None:
     model, k = robot.model, robot.model.positions
     start = robot.path[0].copy()
     start[-1] = 0.1
@@ -228,7 +228,7 @@ def test_a_hand_turns_the_platform_as_it_turns(robot: IdealPlatform) -> None:
     assert robot.path[-1][:k] == pytest.approx(start[:k], abs=1e-4)
 
 
-def test_a_hand_s_scale_is_of_its_motion_only(robot: IdealPlatform) -> None:
+def test_the_scale_applies_to_the_hands_translation_only(robot: IdealPlatform) -> None:
     robot.pose.command({"stream": True})
     k, turn = robot.model.positions, Rotation.from_rotvec([0.0, 0.0, 0.1])
     for share in [*np.linspace(0.0, 1.0, 60), *np.ones(60)]:
@@ -239,7 +239,7 @@ def test_a_hand_s_scale_is_of_its_motion_only(robot: IdealPlatform) -> None:
     assert np.linalg.norm(moved[k:]) == pytest.approx(0.1, abs=1e-3)
 
 
-def test_the_clutch_lets_a_hand_turn_alone(robot: IdealPlatform) -> None:
+def test_with_the_clutch_the_platform_does_not_follow_the_hand(robot: IdealPlatform) -> None:
     robot.pose.command({"stream": True})
     for angle in np.linspace(0.0, 1.5, 80):
         robot.hand((0.0, 0.0, 0.0), Rotation.from_rotvec([0.0, 0.0, angle]), buttons=CLUTCH)
@@ -248,7 +248,7 @@ def test_the_clutch_lets_a_hand_turn_alone(robot: IdealPlatform) -> None:
     assert np.ptp(robot.path, axis=0).max() < 1e-7
 
 
-def test_a_hand_turns_the_platform_no_further_than_is_allowed(robot: IdealPlatform) -> None:
+def test_a_hand_turns_the_platform_no_further_than_the_allowed_angle(robot: IdealPlatform) -> None:
     robot.pose.command({"stream": True})
     for angle in np.linspace(0.0, 1.0, 120):
         robot.hand((0.0, 0.0, 0.0), Rotation.from_rotvec([0.0, 0.0, angle]))
@@ -259,14 +259,14 @@ def test_a_hand_turns_the_platform_no_further_than_is_allowed(robot: IdealPlatfo
     assert angles[-1] == pytest.approx(robot.model.angle_rad, abs=1e-3)
 
 
-def test_a_hand_that_leaps_to_another_orientation_starts_again(robot: IdealPlatform) -> None:
+def test_a_leap_of_the_hands_orientation_does_not_move_the_platform(robot: IdealPlatform) -> None:
     robot.pose.command({"stream": True})
     for angle in np.repeat([0.0, 2.0], 30):
         robot.hand((0.0, 0.0, 0.0), Rotation.from_rotvec([0.0, 0.0, angle]))
     assert np.ptp(robot.path, axis=0).max() < 1e-7
 
 
-def test_on_its_stand_a_platform_is_not_turned_by_a_hand(robot: IdealPlatform) -> None:
+def test_a_hand_does_not_turn_a_platform_on_its_stand(robot: IdealPlatform) -> None:
     robot.restart(robot.model.home)
     robot.pose.command({"stream": True})
     for angle in np.linspace(0.0, 0.2, 40):
@@ -285,7 +285,7 @@ wild = st.tuples(
 
 @settings(max_examples=6)
 @given(st.lists(wild, min_size=5, max_size=12))
-def test_nothing_that_a_hand_does_makes_a_step_or_leaves_the_workspace(
+def test_no_hand_motion_causes_a_step_or_leaves_the_workspace(
     made: IdealPlatform, hand: list[tuple[list[float], list[float], float, int, int]]
 ) -> None:
     made.restart()
@@ -293,18 +293,18 @@ def test_nothing_that_a_hand_does_makes_a_step_or_leaves_the_workspace(
     for at, turned, scale, buttons, cycles in hand:
         rotation = Rotation.from_rotvec(turned)
         made.hand(at, rotation, scale=scale, buttons=buttons, cycles=cycles)
-    made.run(1.2)  # silence is borne for half a second
+    made.run(1.2)  # silence is tolerated for half a second
     made.check_motion()
     platform, k = made.model.platform, made.model.positions
     path = np.array(made.path)
     assert (path[:, :k] >= np.array(platform.workspace_min_m) - 1e-9).all()
     assert (path[:, :k] <= np.array(platform.workspace_max_m) + 1e-9).all()
-    # each direction brakes by itself: the angle bulges a little in between
+    # directions brake separately, so that the angle may exceed its limit a little
     assert np.linalg.norm(path[:, k:], axis=1).max() <= 1.1 * platform.workspace_angle_rad
     assert made.control.velocity == pytest.approx(np.zeros(made.model.size), abs=1e-6)
 
 
-# -- the others
+# -- other programs
 
 
 def test_lowering_turns_the_platform_back(robot: IdealPlatform) -> None:
@@ -333,7 +333,7 @@ def test_holding_brakes_all_directions_on_their_line(robot: IdealPlatform) -> No
     assert np.ptp(share) < 1e-6
 
 
-def test_the_way_to_the_indices_is_at_home_s_orientation(robot: IdealPlatform) -> None:
+def test_the_index_path_keeps_the_orientation_at_home(robot: IdealPlatform) -> None:
     model = robot.model
     path = index_path(model, np.full(robot.torque.size, 0.026), lambda _: True)
     assert path
@@ -346,7 +346,7 @@ vectors = st.lists(st.floats(-1.8, 1.8), min_size=3, max_size=3).map(np.array)
 
 
 @given(vectors, vectors)
-def test_rotations_are_those_of_scipy(first: np.ndarray, second: np.ndarray) -> None:
+def test_quaternion_products_equal_scipys(first: np.ndarray, second: np.ndarray) -> None:
     q, p, product, phi = np.zeros(4), np.zeros(4), np.zeros(4), np.zeros(3)
     to_quaternion(first, q)
     to_quaternion(second, p)

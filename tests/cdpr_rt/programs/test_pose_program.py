@@ -1,4 +1,4 @@
-"""A platform's set-point: straight ways, a hand that leads, and what it must not do."""
+"""A platform's set-point: straight ways, motion by a hand, and limits."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ SPEED_m_s, ACCELERATION_m_s2 = 0.5, 2.0
 
 
 class LedPlatform(SteppedPlatform):
-    """A platform that is where its set-point is, and a hand whose packets come at once."""
+    """A platform exactly at its set-point, and a hand whose packets arrive immediately."""
 
     def __init__(self, platform: Platform | None = None) -> None:
         self.platform = platform or ROBOT.platform
@@ -50,7 +50,7 @@ class LedPlatform(SteppedPlatform):
         self.restart()
 
     def restart(self, position_m: np.ndarray | None = None) -> None:
-        """Begin anew, in the middle of the box or elsewhere."""
+        """Start again, in the middle of the box or elsewhere."""
         assert self.platform is not None
         middle = 0.5 * np.add(self.platform.workspace_min_m, self.platform.workspace_max_m)
         middle = middle if position_m is None else position_m
@@ -79,7 +79,7 @@ class LedPlatform(SteppedPlatform):
         self.shaped.append(self.control.shaped.copy())
 
     def post(self, x: float, y: float, scale: float = 1.0, buttons: int = 0) -> None:
-        """Post where the hand is now."""
+        """Post the hand's position."""
         self.sample["sequence"] += 1
         self.sample["sent_ns"] = 1_000_000 * self.now_ms
         self.sample["position_m"] = (x, y, 0.0)
@@ -94,7 +94,7 @@ class LedPlatform(SteppedPlatform):
                 self.cycle()
 
     def check_motion(self) -> None:
-        """Nothing steps: velocity and acceleration keep their bounds, in the shaped motion too."""
+        """Velocity and acceleration keep their bounds, also in the shaped motion."""
         paces = np.array(self.paces)
         assert np.abs(paces).max() <= SPEED_m_s * (1 + 1e-9)
         most = ACCELERATION_m_s2 * PERIOD_S
@@ -115,7 +115,7 @@ def robot(made: LedPlatform) -> LedPlatform:
     return made
 
 
-def test_a_motion_is_done_when_the_platform_is_there_not_its_set_point(robot: LedPlatform) -> None:
+def test_a_motion_is_done_when_the_platform_arrives_not_its_set_point(robot: LedPlatform) -> None:
     robot.program.command({"position_m": [0.1, 1.9]})
     robot.stretch_rad[:] = 0.12, 0.12, -0.12  # some 4 mm upward
     robot.until_rest()
@@ -123,7 +123,7 @@ def test_a_motion_is_done_when_the_platform_is_there_not_its_set_point(robot: Le
     assert robot.program.at_rest and not robot.program.progress()["done"]
     robot.stretch_rad[:] = 0.0
     robot.run(0.15)
-    assert not robot.program.progress()["done"], "it has only just come"
+    assert not robot.program.progress()["done"], "it has arrived too recently"
     robot.run(0.15)
     told = robot.program.progress()
     assert (told["done"], told["trouble"]) == (1.0, "")
@@ -138,7 +138,7 @@ BAR = dataclasses.replace(
 )
 
 
-def test_a_platform_that_may_swing_says_so_on_arrival() -> None:
+def test_a_platform_that_may_swing_is_reported_on_arrival() -> None:
     robot = LedPlatform(BAR)
     for position_m in ([0.4, 1.8], [-0.3, 1.5], [0.4, 1.5]):
         robot.program.command({"position_m": position_m})
@@ -150,7 +150,7 @@ def test_a_platform_that_may_swing_says_so_on_arrival() -> None:
     assert told["done"] and "may still turn to and fro by" in told["trouble"]
 
 
-def test_a_platform_that_friction_keeps_away_is_waited_for_no_longer_than_5_s(
+def test_a_platform_kept_off_its_target_by_friction_is_awaited_for_5_s(
     robot: LedPlatform,
 ) -> None:
     robot.program.command({"position_m": [0.1, 1.9]})
@@ -203,7 +203,7 @@ def test_infeasible_targets_are_rejected(
 
 @pytest.fixture(scope="module")
 def made_wide() -> LedPlatform:
-    """A robot in whose box lies what no tensions hold."""
+    """A robot with infeasible positions in its box."""
     assert ROBOT.platform is not None
     return LedPlatform(
         dataclasses.replace(ROBOT.platform, workspace_min_m=(-1.8, 0.7), workspace_max_m=(1.8, 2.9))
@@ -216,7 +216,7 @@ def wide(made_wide: LedPlatform) -> LedPlatform:
     return made_wide
 
 
-def test_a_place_in_the_box_that_tensions_cannot_hold_is_refused_with_the_reason(
+def test_an_infeasible_position_in_the_box_is_rejected_with_the_reason(
     wide: LedPlatform,
 ) -> None:
     with pytest.raises(ProgramError, match=r"cable \d would need .* N outside"):
@@ -229,7 +229,7 @@ def test_a_place_in_the_box_that_tensions_cannot_hold_is_refused_with_the_reason
     assert "N outside" in wide.program.progress()["held_back"]
     assert wide.control.velocity == pytest.approx(np.zeros(2), abs=1e-6)
     assert all(wide.control.is_feasible(place) for place in wide.path)
-    wide.lead(hand[::-1])  # it does not stay caught there
+    wide.lead(hand[::-1])  # the hand can lead it back
     assert wide.control.position[0] < 0.5 * max(place[0] for place in wide.path)
 
 
@@ -237,7 +237,7 @@ def test_a_way_through_an_infeasible_region_stops_before_it_with_a_reason(
     wide: LedPlatform,
 ) -> None:
     wide.program.command({"position_m": [0.5, 1.8]})
-    wide.program._target[:] = 1.7, 0.8  # as if nobody had looked before
+    wide.program._target[:] = 1.7, 0.8  # as if nobody had checked the target
     assert wide.program._commanded is not None
     wide.program._commanded[:] = 1.7, 0.8
     wide.run(6.0)
@@ -253,7 +253,7 @@ def test_a_way_through_an_infeasible_region_stops_before_it_with_a_reason(
 
 
 def on_the_border(robot: LedPlatform, angle: float) -> np.ndarray:
-    """Return the outermost place that is held, in a direction from the middle of the box."""
+    """Return the outermost feasible place in a direction from the middle of the box."""
     middle, way = np.array([0.0, 1.8]), np.array([math.cos(angle), math.sin(angle)])
     held, not_held = 0.0, 1.0
     for _ in range(25):
@@ -266,7 +266,7 @@ def on_the_border(robot: LedPlatform, angle: float) -> np.ndarray:
 
 
 @pytest.mark.parametrize(("begin", "end"), [(0.0, 200.0), (250.0, 350.0), (340.0, 190.0)])
-def test_a_way_between_places_on_the_border_is_gone_to_its_end(
+def test_a_way_between_places_on_the_border_reaches_its_end(
     wide: LedPlatform, begin: float, end: float
 ) -> None:
     wide.restart(on_the_border(wide, math.radians(begin)))
@@ -278,7 +278,7 @@ def test_a_way_between_places_on_the_border_is_gone_to_its_end(
     assert all(wide.control.is_feasible(place) for place in wide.path)
 
 
-def test_a_platform_let_down_where_no_tensions_hold_it_is_taken_out_of_there_again(
+def test_a_platform_can_leave_an_infeasible_position(
     wide: LedPlatform,
 ) -> None:
     wide.run(0.1)
@@ -302,7 +302,7 @@ def test_a_new_target_in_motion_along_the_border_is_reached(wide: LedPlatform) -
     assert all(wide.control.is_feasible(place) for place in wide.path)
 
 
-def test_resume_goes_on_at_the_speed_that_was_asked_for(robot: LedPlatform) -> None:
+def test_resume_keeps_the_requested_speed(robot: LedPlatform) -> None:
     def fastest_m_s() -> float:
         begin = len(robot.path)
         robot.until_rest()
@@ -321,7 +321,7 @@ def test_resume_goes_on_at_the_speed_that_was_asked_for(robot: LedPlatform) -> N
     assert fastest_m_s() > 0.2
 
 
-def test_a_hand_lifts_a_platform_off_its_stand_before_it_leads_it_sideways(
+def test_a_hand_must_lift_a_platform_off_its_stand_before_moving_it_sideways(
     robot: LedPlatform,
 ) -> None:
     assert robot.platform is not None
@@ -339,7 +339,7 @@ def test_a_hand_lifts_a_platform_off_its_stand_before_it_leads_it_sideways(
     assert robot.control.position[0] == pytest.approx(start[0] + 0.2, abs=5e-3)
 
 
-def test_the_platform_does_not_run_on_after_a_quick_hand_has_stopped(robot: LedPlatform) -> None:
+def test_the_platform_stops_soon_after_a_quick_hand_has_stopped(robot: LedPlatform) -> None:
     robot.program.command({"stream": True})
     robot.lead(np.linspace([0.0, 0.0], [0.5, 0.0], 10))
     stopped = robot.control.position[0]
@@ -349,7 +349,7 @@ def test_the_platform_does_not_run_on_after_a_quick_hand_has_stopped(robot: LedP
     assert robot.control.velocity == pytest.approx(np.zeros(2), abs=1e-6)
 
 
-def test_trembling_at_rest_does_not_move_the_platform(robot: LedPlatform) -> None:
+def test_a_trembling_hand_does_not_move_the_platform(robot: LedPlatform) -> None:
     robot.program.command({"stream": True})
     chance = np.random.default_rng(3)
     robot.lead(np.zeros((5, 2)))
@@ -368,7 +368,7 @@ steps = st.tuples(
 
 @settings(max_examples=25)
 @given(st.lists(steps, min_size=5, max_size=25))
-def test_nothing_that_a_stream_brings_makes_a_step(
+def test_no_stream_causes_a_step_or_leaves_the_workspace(
     made: LedPlatform, hand: list[tuple[float, float, float, int, int]]
 ) -> None:
     made.restart()
@@ -377,7 +377,7 @@ def test_nothing_that_a_stream_brings_makes_a_step(
         made.post(x, y, scale, buttons)
         for _ in range(cycles):
             made.cycle()
-    made.run(0.9)  # silence is borne for half a second
+    made.run(0.9)  # silence is tolerated for half a second
     made.check_motion()
     assert made.platform is not None
     path = np.array(made.path)

@@ -1,4 +1,4 @@
-"""What each program does with what is wanted of it."""
+"""The behaviour of each program for its requests."""
 
 import json
 import tracemalloc
@@ -10,11 +10,11 @@ from cdpr_rt.programs.base import ProgramError
 from tests.cdpr_rt.programs.program_rig import PERIOD_S, COULOMB_Nm, N, ProgramRig
 
 
-def test_all_programs_have_their_numbers() -> None:
+def test_programs_are_in_the_order_of_their_numbers() -> None:
     assert list(ProgramRig().programs) == ["idle", "hold", "jog", "sweep", "pid", "follow"]
 
 
-def test_idle_lets_the_torque_fade_and_the_set_point_go_along() -> None:
+def test_idle_fades_the_torque_and_the_set_point_follows_the_axes() -> None:
     rig = ProgramRig()
     rig.switch("hold")
     rig.run(0.5)
@@ -32,7 +32,7 @@ def test_idle_lets_the_torque_fade_and_the_set_point_go_along() -> None:
     assert rig.setpoint.velocity_rad_s[1] == pytest.approx(rig.speed[1], rel=0.3)
 
 
-def test_hold_catches_what_turns_and_keeps_it_there() -> None:
+def test_hold_stops_a_turning_axis_and_keeps_it_there() -> None:
     rig = ProgramRig()
     rig.run(0.02)
     assert rig.speed[1] > 5.0
@@ -42,12 +42,12 @@ def test_hold_catches_what_turns_and_keeps_it_there() -> None:
     place = rig.setpoint.position_rad.copy()
     rig.run(0.5)
     np.testing.assert_array_equal(rig.setpoint.position_rad, place)
-    # back on the spot, by the integral, against the load
+    # the integral part brings axes back against the load
     np.testing.assert_allclose(rig.angle, place, atol=0.01)
     np.testing.assert_allclose(rig.torque, -rig.load_Nm, atol=1.2 * COULOMB_Nm)
 
 
-def test_jog_runs_for_as_long_as_it_is_asked_again() -> None:
+def test_jog_stops_when_its_request_is_not_repeated_in_time() -> None:
     rig = ProgramRig()
     rig.switch("hold")
     rig.run(0.1)
@@ -67,14 +67,14 @@ def test_jog_runs_for_as_long_as_it_is_asked_again() -> None:
     assert rig.program.at_rest
 
 
-def test_jog_in_metres_of_cable_a_second() -> None:
+def test_jog_takes_velocities_of_cables() -> None:
     rig = ProgramRig()
     rig.switch("jog", {"cable_velocity_m_s": [0.026, 0.026, -0.1]})
     rig.run(0.4)
     np.testing.assert_allclose(rig.setpoint.velocity_rad_s, [1.0, -1.0, -2.0])
 
 
-def test_pid_goes_to_positions_together_and_reports_its_progress() -> None:
+def test_pid_moves_axes_together_and_reports_its_progress() -> None:
     rig = ProgramRig()
     rig.switch("hold")
     rig.run(0.1)
@@ -109,7 +109,7 @@ def test_pid_takes_positions_cable_lengths_and_a_lower_speed() -> None:
     rig.program.command({"cable_m": [0.026, 0.026, None]})
     rig.run(1.0)
     np.testing.assert_allclose(rig.setpoint.position_rad, [2.0, 1.0, 3.0])
-    # on the way an axis that is to stay where it is stops as soon as it can
+    # a moving axis with a distance of 0 brakes immediately
     rig.program.command({"position_rad": [50.0, 1.0, 3.0]})
     rig.run(0.3)
     there = rig.setpoint.position_rad[0] + rig.setpoint.velocity_rad_s[0] ** 2 / 160.0
@@ -120,7 +120,7 @@ def test_pid_takes_positions_cable_lengths_and_a_lower_speed() -> None:
 
 
 @pytest.mark.parametrize("name", ["pid", "sweep"])
-def test_a_way_too_short_to_divide_by_is_arrived_at(name: str) -> None:
+def test_a_denormal_distance_is_reached_without_overflow(name: str) -> None:
     rig = ProgramRig((0.0, 0.0, 0.0))
     with np.errstate(over="raise", divide="raise", invalid="raise"):
         rig.switch(name, {"distance_rad": [5e-324, 0.0, -1e-310]})
@@ -129,7 +129,7 @@ def test_a_way_too_short_to_divide_by_is_arrived_at(name: str) -> None:
     assert np.isfinite(rig.setpoint.position_rad).all()
 
 
-def test_sweep_goes_back_and_forth_at_constant_speed() -> None:
+def test_sweep_moves_back_and_forth_at_constant_speed() -> None:
     rig = ProgramRig(load_Nm=(0.0, 0.0, 0.0))
     rig.switch("hold")
     rig.run(0.05)
@@ -145,7 +145,7 @@ def test_sweep_goes_back_and_forth_at_constant_speed() -> None:
         rig.setpoint.position_rad, start + np.array([0.5, -0.5, 0.0]), atol=1e-9
     )
     turns = np.flatnonzero(np.diff(np.sign(rig.array("velocity")[50:, 0])) != 0)
-    assert turns.size == 6  # off, to rest and back at either end, and to rest
+    assert turns.size == 6  # start, rest and reversal at either end, and rest
     # the controller has no integral: a steady lag of friction over gain
     gain = rig.model.sweep_gain_Nm_rad[0]
     lag = rig.array("position")[300, 0] - rig.array("angle")[300, 0]
@@ -175,14 +175,14 @@ def test_follow_pays_out_cable_as_the_hand_moves() -> None:
     rig.run(0.6)
     assert rig.program.at_rest
     assert rig.program.progress()["stream"] == "stopped"
-    # a hand that comes back somewhere else moves nothing by that
+    # a hand that returns elsewhere moves nothing
     rig.send((1.0, 1.0, 1.0))
     rig.run(0.4)
     np.testing.assert_allclose(rig.setpoint.position_rad, start + way)
 
 
-def test_a_stream_that_is_there_at_once_begins_where_the_axes_are() -> None:
-    """Not where an earlier one has left its target."""
+def test_a_stream_that_begins_immediately_starts_where_the_axes_are() -> None:
+    """Not at the target that an earlier stream has left."""
     rig = ProgramRig()
     rig.switch("follow")
     for k in range(30):
@@ -195,12 +195,12 @@ def test_a_stream_that_is_there_at_once_begins_where_the_axes_are() -> None:
     rig.send((0.0, 0.0, 0.0))
     rig.run(0.4)
     way = rig.setpoint.position_rad - turning
-    # braked, and neither on to the old target nor back
+    # it has only braked
     assert way[0] == pytest.approx(-(5.0**2) / 160.0, rel=0.01)
     np.testing.assert_array_equal(way[1:], 0.0)
 
 
-def test_an_axis_slower_than_the_hand_does_not_run_on_for_long() -> None:
+def test_an_axis_slower_than_the_hand_stops_soon_after_the_stream() -> None:
     rig = ProgramRig()
     rig.switch("follow")
     for k in range(30):
@@ -212,14 +212,14 @@ def test_an_axis_slower_than_the_hand_does_not_run_on_for_long() -> None:
     assert rig.program.at_rest
     place = rig.setpoint.position_rad[0]
     assert 0.0 < place - before < 40.0 * (0.3 + 0.1 + 40.0 / 160.0)
-    # what was left of the way when silence braked it is not made up for later
+    # the rest of the way is not made up for later
     rig.send((0.0, 0.0, 0.0))
     rig.run(0.4)
     assert rig.setpoint.position_rad[0] == place
 
 
 @pytest.mark.parametrize("name", ["hold", "jog", "sweep", "pid", "follow"])
-def test_stop_brakes_any_program_and_it_takes_no_more_orders(name: str) -> None:
+def test_a_stopped_program_brakes_and_rejects_further_requests(name: str) -> None:
     rig = ProgramRig()
     rig.switch("jog", {"velocity_rad_s": [20.0, -20.0, 20.0]})
     rig.run(0.45)
@@ -291,7 +291,7 @@ def test_unsupported_requests_are_rejected_and_change_nothing(
     assert json.dumps(rig.program.progress()) == progress
 
 
-def test_updates_keep_no_memory() -> None:
+def test_updates_retain_no_memory() -> None:
     rig = ProgramRig()
     orders = {
         "idle": None,

@@ -1,4 +1,4 @@
-"""The page on programs and the programs themselves."""
+"""The page on programs lists every program and key."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from cdpr_rt.programs.registry import build_programs, platform_parts
 
 PAGE = Path(__file__).parents[3] / "docs" / "reference" / "programs.md"
 OF_ANGLES = {"rotation_rad", "turn_rad"}
-"""Keys that programs know where angles are controlled, which `planar-3` does not."""
+"""Keys of robots with controlled angles, which `planar-3` does not have."""
 
 
 def tables() -> list[dict[str, set[str]]]:

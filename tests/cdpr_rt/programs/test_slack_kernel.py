@@ -1,4 +1,4 @@
-"""When a cable whose slack is taken up counts as tight, and what its winch may pull with."""
+"""When a cable counts as tight as its slack is taken up, and how hard its winch may pull."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def one(value: float) -> FloatArray:
 
 @dataclass
 class OneCable:
-    """A cable by itself, whose winch turns and pulls as it is told to."""
+    """A single cable whose winch turns and pulls as a test says."""
 
     phase: IntArray = field(default_factory=lambda: np.zeros(1, np.int64))
     state: FloatArray = field(default_factory=lambda: np.zeros((1, kernel.STATE)))
@@ -44,7 +44,7 @@ class OneCable:
         kernel.enter(phase, self.phase, self.state, self.position)
 
     def run(self, seconds: float, tension_N: float, inwards_m_s: float = 0.0) -> int:
-        """Turn so fast, pulling so hard, until its phase changes; return the phase."""
+        """Turn at a speed and tension until the phase changes or time is over; return the phase."""
         before = self.phase[0]
         self.winch.tension_N[0] = tension_N
         self.winch.speed_rad_s[0] = -inwards_m_s / CABLE_m
@@ -60,7 +60,7 @@ class OneCable:
 
 
 def reeled_in(by_m: float, tension_N: float = 3.0) -> OneCable:
-    """Return a cable that has been reeled in so far since it was first paid out, with that."""
+    """Return a cable that was reeled in by a length with a tension after it was paid out."""
     cable = OneCable()
     cable.enter(kernel.LOOSENED)
     assert cable.run(0.5, -3.0, -0.05) == kernel.NEXT
@@ -71,24 +71,24 @@ def reeled_in(by_m: float, tension_N: float = 3.0) -> OneCable:
     return cable
 
 
-def test_a_cable_is_tight_where_what_has_turned_its_winch_turns_it_no_more() -> None:
+def test_a_cable_is_tight_if_the_tension_that_turned_its_winch_no_longer_does() -> None:
     assert reeled_in(0.03, 9.0).run(0.5, 8.0) == kernel.REELED_IN
     assert reeled_in(0.03, 9.0).run(0.5, 9.0) == kernel.PAID_OUT
 
 
-def test_it_is_not_tight_with_less_than_the_stand_surely_holds() -> None:
-    """Cogging may have turned its winch by itself."""
+def test_a_cable_is_not_tight_below_the_tension_that_any_stand_holds() -> None:
+    """Cogging alone may have turned its winch."""
     assert reeled_in(0.03, 1.0).run(0.5, 0.9 * HARMLESS_N) == kernel.REELED_IN
     assert reeled_in(0.03, 1.0).run(0.5, HARMLESS_N) == kernel.PAID_OUT
 
 
-def test_it_is_not_tight_while_it_is_further_out_than_it_was() -> None:
-    """Where it sticks, though more than winches take up pulls at it, it is."""
+def test_a_cable_is_not_tight_while_it_is_longer_than_before() -> None:
+    """Unless it sticks although the tension exceeds the friction of winches."""
     assert reeled_in(-0.004, 9.0).run(0.5, 12.0) == kernel.REELED_IN
     assert reeled_in(-0.004, 9.0).run(0.5, ENOUGH_N) == kernel.PAID_OUT
 
 
-def test_nor_is_one_that_was_left_with_slack_until_it_is_reeled_in_again() -> None:
+def test_a_cable_left_with_slack_is_tight_only_after_reeling_in_again() -> None:
     cable = reeled_in(0.03, 9.0)
     cable.enter(kernel.CLOSING)
     assert cable.run(0.5, 12.0) == kernel.CLOSING
@@ -97,7 +97,7 @@ def test_nor_is_one_that_was_left_with_slack_until_it_is_reeled_in_again() -> No
     assert cable.winch.high_N[0] == cable.state[0, kernel.TIGHT_N] == pytest.approx(9.0)
 
 
-def test_a_winch_may_pull_with_more_only_while_it_stands_still() -> None:
+def test_a_winch_may_pull_harder_only_while_it_stands_still() -> None:
     cable = reeled_in(0.02, 5.0)
     may_N = cable.winch.high_N[0]
     assert 4.0 < may_N < 6.0
@@ -107,8 +107,8 @@ def test_a_winch_may_pull_with_more_only_while_it_stands_still() -> None:
     assert may_N < cable.winch.high_N[0] < may_N + 2.5 * 0.03 * ENOUGH_N
 
 
-def test_its_winch_does_not_pull_with_what_only_drags_the_platform() -> None:
-    """Nor does what turned it as it dragged the platform count as what it needs without load."""
+def test_a_winch_that_drags_the_platform_does_not_pull_harder() -> None:
+    """Nor does the tension that dragged the platform count as the one needed without load."""
     cable = reeled_in(0.02, 1.0)
     cable.winch.stands_N[0] = 2.0
     for _ in range(20):
@@ -116,7 +116,7 @@ def test_its_winch_does_not_pull_with_what_only_drags_the_platform() -> None:
         cable.run(0.02, cable.winch.high_N[0], 0.05)
     most_N = HARMLESS_N + 2.0
     assert cable.winch.high_N[0] <= most_N
-    for _ in range(3):  # nor as it is reeled in once more, what dragged it being known
+    for _ in range(3):  # nor when it is reeled in again
         cable.enter(kernel.CLOSING)
         cable.run(0.02, 1.0, 0.05)
         for _ in range(20):
@@ -125,7 +125,7 @@ def test_its_winch_does_not_pull_with_what_only_drags_the_platform() -> None:
         assert cable.winch.high_N[0] <= most_N
 
 
-def test_a_heavy_cable_whose_turn_it_is_does_not_run_out() -> None:
+def test_a_heavy_cable_does_not_run_out_when_its_turn_begins() -> None:
     cable = OneCable()
     hangs_N = 3.0 * ENOUGH_N
     cable.winch.hangs_N[:] = hangs_N
@@ -134,7 +134,7 @@ def test_a_heavy_cable_whose_turn_it_is_does_not_run_out() -> None:
     assert 0.85 * hangs_N < cable.winch.high_N[0] < 0.95 * hangs_N
 
 
-def test_one_cable_after_the_other_is_reeled_in() -> None:
+def test_cables_are_reeled_in_one_after_the_other() -> None:
     phase = np.array([kernel.PAID_OUT, kernel.NEXT, kernel.NEXT])
     assert kernel._whose_turn(phase) == -1
     phase[0] = kernel.WAITING
@@ -143,22 +143,22 @@ def test_one_cable_after_the_other_is_reeled_in() -> None:
     assert kernel._whose_turn(phase) == -1
 
 
-def test_a_tight_cable_is_released_at_once() -> None:
+def test_a_tight_cable_is_released_immediately() -> None:
     cable = reeled_in(0.03, 9.0)
     assert cable.winch.high_N[0] > 0.0
     assert cable.run(0.5, 9.0) == kernel.PAID_OUT
     assert cable.winch.high_N[0] == 0.0
 
 
-def test_it_is_not_tight_with_what_its_own_weight_pulls() -> None:
+def test_a_cable_is_not_tight_below_the_tension_of_its_weight() -> None:
     cable = reeled_in(0.03, 9.0)
     cable.winch.hangs_N[:] = 40.0
     assert cable.run(0.5, 1.1 * ENOUGH_N) == kernel.REELED_IN
     assert cable.run(0.5, 40.0) == kernel.PAID_OUT
 
 
-def test_a_motor_that_dithers_by_a_count_stands_still() -> None:
-    """A count in a cycle is a speed at which its winch pulls with less for some cycles."""
+def test_a_motor_that_alternates_by_one_count_stands_still() -> None:
+    """A count in a cycle is a speed, for which the winch reduces its tension for some cycles."""
     count_rad = one(1.5 * 0.0001 / CABLE_m)
     for still_for, far in ((3, 1.0), (60, 1.0), (3, 4.0)):
         stillness = Stillness(one(CABLE_m), count_rad, PERIOD_S)
@@ -170,8 +170,8 @@ def test_a_motor_that_dithers_by_a_count_stands_still() -> None:
         assert any(lasted) == (still_for == 3 and far == 1.0)
 
 
-def test_a_heavy_cable_is_paid_out_a_little_and_held_against_what_it_pulls() -> None:
-    """With no more than what keeps light ones from sticking it would run out."""
+def test_a_heavy_cable_is_paid_out_a_little_and_held_against_its_tension() -> None:
+    """The limit for light cables would let it run out."""
     pulls_N, inertia_kg_m2 = 2.5 * ENOUGH_N, 2.3e-4
     cable, feedback, torque_Nm = OneCable(), AxisFeedback(1), np.zeros(1)
     loop = WinchSpeedLoop(one(inertia_kg_m2), one(CABLE_m), PERIOD_S)
@@ -191,7 +191,7 @@ def test_a_heavy_cable_is_paid_out_a_little_and_held_against_what_it_pulls() -> 
         loop.update(feedback, torque_Nm)
         speed_rad_s += PERIOD_S / inertia_kg_m2 * float(torque_Nm[0] + CABLE_m * pulls_N)
         feedback.position_rad += PERIOD_S * speed_rad_s
-    assert cable.phase[0] == kernel.CLOSING  # having waited for no others
+    assert cable.phase[0] == kernel.CLOSING  # without waiting for other cables
     assert w.high_N[0] >= pulls_N
     assert CABLE_m * feedback.position_rad[0] == pytest.approx(0.005, abs=0.001)
     assert CABLE_m * speed_rad_s == pytest.approx(kernel.TAKE_UP_m_s, rel=0.3)

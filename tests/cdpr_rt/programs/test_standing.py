@@ -1,4 +1,4 @@
-"""What the lengths of cables tell of a platform that is said to stand at home."""
+"""Whether cable lengths agree that the platform stands at home, and its pretension there."""
 
 from __future__ import annotations
 
@@ -49,13 +49,13 @@ def parts_of(name: str, allowed_m: float | None = None) -> PlatformParts:
 
 
 def why_not(parts: PlatformParts, longer_m: FloatArray) -> str:
-    """Return what speaks against home with cables that are so much longer than there, (n,)."""
+    """Return why cables longer than at home by these lengths, (n,), contradict home."""
     low_N, feedback = parts.control.low_N, AxisFeedback(longer_m.size)
     feedback.valid[:] = True
     return why_not_at_home(parts, parts.control.lengths_at_home(low_N) + longer_m, low_N, feedback)
 
 
-def test_no_platform_that_is_turned_over_stands_at_home(parts: PlatformParts) -> None:
+def test_the_lengths_of_an_overturned_platform_contradict_home(parts: PlatformParts) -> None:
     rng, model = np.random.default_rng(SEED), parts.model
     home_m = model.kinematics.lengths(model.home_pose).copy()
     for turned_deg in (20, 40, 60, 90, 120, 150, 180):
@@ -68,7 +68,7 @@ def test_no_platform_that_is_turned_over_stands_at_home(parts: PlatformParts) ->
             assert "not at home" in why_not(parts, longer_m), (turned_deg, axis)
 
 
-def test_one_cable_that_has_slipped_does_not_speak_against_home(parts: PlatformParts) -> None:
+def test_one_slipped_cable_does_not_contradict_home(parts: PlatformParts) -> None:
     n = parts.control.low_N.size
     assert not why_not(parts, np.zeros(n))
     for cable in range(n):
@@ -77,7 +77,7 @@ def test_one_cable_that_has_slipped_does_not_speak_against_home(parts: PlatformP
         assert "the lengths of 2 cables are up to 300 mm" in why_not(parts, two)
 
 
-def test_slack_is_not_wound_in_where_cables_do_not_even_reach_home(parts: PlatformParts) -> None:
+def test_slack_is_not_wound_in_if_cables_are_too_short_for_home(parts: PlatformParts) -> None:
     rng, model, n = np.random.default_rng(SEED), parts.model, parts.control.low_N.size
     home_m = parts.control.lengths_at_home(np.zeros(n))
     refused = 0
@@ -87,7 +87,7 @@ def test_slack_is_not_wound_in_where_cables_do_not_even_reach_home(parts: Platfo
         lies_m = model.kinematics.lengths(there) + rng.uniform(0.0, 0.3, n)
         if why_not_to_wind_in(parts, lies_m):
             refused += 1
-            # nor does it stand there when these are wound in, as far as they can be
+            # the lengths still contradict home when slack is wound in as far as possible
             assert "not at home" in why_not(parts, np.minimum(lies_m - home_m, 0.0))
     assert refused > 100
     assert "2 cables are up to 300 mm too short" in why_not_to_wind_in(
@@ -98,14 +98,14 @@ def test_slack_is_not_wound_in_where_cables_do_not_even_reach_home(parts: Platfo
         assert not why_not_to_wind_in(parts, home_m + slack_m - (0.3 + slack_m) * np.eye(n)[2])
 
 
-def test_tensions_that_add_up_to_the_weight_carry_it_where_they_do_not_cancel(
+def test_a_platform_does_not_rest_if_upward_tensions_carry_its_weight(
     parts: PlatformParts,
 ) -> None:
     model, control, n = parts.model, parts.control, parts.control.low_N.size
     feedback, tension_N = AxisFeedback(n), parts.estimator.estimate.tension_N
     length_m = control.lengths_at_home(control.low_N)
     W, weight_N = model.kinematics.wrench_matrix(model.home_pose), parts.platform.mass_kg * G_m_s2
-    # the least tensions that pull up with a share of the weight, and hold all other directions
+    # the least tensions that carry a share of the weight and balance all other directions
     for share, rests in ((1.0, False), (0.85, False), (0.6, True)):
         wrench = np.zeros(len(W))
         wrench[model.positions - 1] = share * weight_N
@@ -114,8 +114,8 @@ def test_tensions_that_add_up_to_the_weight_carry_it_where_they_do_not_cancel(
         assert rests_at_home(parts, length_m, feedback) == rests
 
 
-def test_a_platform_that_rests_is_not_taken_to_hang_on_what_friction_leaves() -> None:
-    """Tensions of cables from all sides cancel each other, whatever they add up to."""
+def test_a_platform_rests_if_its_tensions_cancel_each_other() -> None:
+    """Tensions of cables from all sides cancel each other, whatever their sum is."""
     parts = parts_of("spatial-8")
     control, model, n = parts.control, parts.model, parts.control.low_N.size
     W = model.kinematics.wrench_matrix(model.home_pose).copy()
@@ -125,13 +125,13 @@ def test_a_platform_that_rests_is_not_taken_to_hang_on_what_friction_leaves() ->
     home_m, feedback = model.kinematics.lengths(model.home_pose).copy(), AxisFeedback(n)
     length_m = control.lengths_at_home(control.low_N)
     assert hangs(parts) and rests_at_home(parts, length_m, feedback)
-    # elsewhere nothing tells that it lies on something
+    # away from home nothing shows that it rests on something
     raised = model.home + 2.0 * parts.platform.home_tolerance_m * np.eye(len(W))[2]
     raised_m = model.kinematics.lengths(model.pose(raised)) - home_m
     assert not rests_at_home(parts, length_m + raised_m, feedback)
 
 
-def test_of_a_large_frame_lengths_may_disagree_by_more_away_from_home() -> None:
+def test_a_large_frame_allows_more_disagreement_away_from_home() -> None:
     parts = parts_of("spatial-8", 0.15)
     control, feedback = parts.control, AxisFeedback(8)
     feedback.valid[:] = True
@@ -141,18 +141,16 @@ def test_of_a_large_frame_lengths_may_disagree_by_more_away_from_home() -> None:
     assert parts.platform.home_tolerance_m < control.residual_m < 0.15
     assert not disagreement(parts, "last")
     told = disagreement(parts, "home")
-    assert "50 mm allowed, one of axis 1, " in told, "the likeliest is named first"
+    assert "50 mm allowed, one of axis 1, " in told, "the most likely cable is named first"
     assert "; it does not stand at home" in told
 
 
-# With which tensions cables are tightened around a platform that stands.
+# Tensions at a standing platform.
 
 
 @pytest.mark.parametrize(("mass_kg", "share"), [(6.0, 1.0), (12.0, 0.75), (14.0, 0.25)])
-def test_no_cable_is_pulled_less_than_the_others_bounds_make_it(
-    mass_kg: float, share: float
-) -> None:
-    """Friction leaves cables that hardly pull to sag, and their lengths tell another pose.
+def test_the_least_tension_is_as_high_as_the_bounds_allow(mass_kg: float, share: float) -> None:
+    """With little tension, friction lets cables sag, and their lengths give a wrong pose.
 
     The heavier a platform that is pressed down with its weight, the less is left for that.
     """
@@ -173,10 +171,10 @@ def test_no_cable_is_pulled_less_than_the_others_bounds_make_it(
 @pytest.mark.parametrize(
     ("mass_kg", "taken_up_N", "share"), [(14.0, 20.0, 1.0), (14.0, 23.0, 0.75), (18.0, 26.0, 0.5)]
 )
-def test_winches_that_may_take_up_all_pull_harder_and_press_the_platform_less(
+def test_winches_with_high_friction_pull_harder_and_press_the_platform_less(
     mass_kg: float, taken_up_N: float, share: float
 ) -> None:
-    """Else a cable hangs all but slack, as its winch is wound in, and its length is anything."""
+    """Otherwise friction leaves a cable nearly slack, and its length is arbitrary."""
     machine = heavier(spatial(), mass_kg)
     model, low_N = machine.model(), machine.control().low_N
     most_N, taken_up = np.full(machine.n, 1e3), np.full(machine.n, taken_up_N)
@@ -188,7 +186,7 @@ def test_winches_that_may_take_up_all_pull_harder_and_press_the_platform_less(
     np.testing.assert_allclose(W @ tension_N, share * model.weight(), atol=1e-6)
 
 
-def test_the_more_winches_may_take_up_the_harder_cables_are_pulled() -> None:
+def test_tensions_increase_with_the_friction_of_winches() -> None:
     machine = heavier(spatial(), 14.0)
     model, low_N = machine.model(), machine.control().low_N
     least_N = []
@@ -204,10 +202,10 @@ def test_the_more_winches_may_take_up_the_harder_cables_are_pulled() -> None:
 
 
 @pytest.mark.parametrize(("taken_up_N", "pulled_N"), [(28.0, 33.6), (44.0, 39.6)])
-def test_they_are_pulled_with_more_than_is_planned_with_where_winches_take_that_up(
+def test_tensions_exceed_the_planned_ones_at_high_friction(
     taken_up_N: float, pulled_N: float
 ) -> None:
-    """Up to their bounds: 1.2 times what winches take up, or three quarters of that."""
+    """Up to their bounds: 1.2 times the friction of winches, or three quarters of that."""
     machine = heavier(spatial(), 14.0)
     model, low_N = machine.model(), np.full(machine.n, 20.0)
     standing = StandingTensions(

@@ -1,4 +1,4 @@
-"""A hand that leads a platform into what is in its way: it stops a clearance before."""
+"""A hand that leads a platform into an obstacle: it stops at the clearance."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def clearances(robot: IdealPlatform) -> np.ndarray:
 
 
 def lead(robot: IdealPlatform, way_m: tuple[float, float, float], seconds: float) -> set[str]:
-    """Lead it by `way_m` in that time, then keep the hand still; return what was told meanwhile."""
+    """Lead the platform by `way_m` in a time, then hold; return the reported obstacles."""
     told = set()
     robot.pose.command({"stream": True})
     for share in np.minimum(np.arange(0.0, seconds + 1.5, 0.02) / seconds, 1.0):
@@ -48,7 +48,7 @@ def lead(robot: IdealPlatform, way_m: tuple[float, float, float], seconds: float
     ],
 )
 @pytest.mark.parametrize("seconds", [0.8, 3.0])
-def test_it_stops_a_clearance_before_and_names_the_pair(robot, way_m, told, seconds):
+def test_the_platform_stops_at_the_clearance_and_the_pair_is_named(robot, way_m, told, seconds):
     robot.restart(np.array([0.0, 0.1, 1.1, 0.0, 0.0, 0.0]))
     words = lead(robot, way_m, seconds)
     least = clearances(robot)

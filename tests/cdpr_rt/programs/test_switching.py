@@ -1,4 +1,4 @@
-"""Programs change without a bump: laws that hold for any sequence of programs and any stream."""
+"""Programs change without a step, for any sequence of programs and any stream."""
 
 import numpy as np
 import pytest
@@ -35,9 +35,9 @@ samples = st.one_of(
 
 
 def check_set_points(rig: ProgramRig) -> None:
-    """No step in velocity beyond the acceleration, and the position is the velocity's integral."""
+    """Velocity changes within the acceleration, and the position is its integral."""
     position, velocity = rig.array("position"), rig.array("velocity")
-    # in idle the set-point goes along with the axis, wherever that is turned to
+    # in idle the set-point follows the axis
     moved = rig.array("program")[1:] != "idle"
     steps = np.abs(np.diff(velocity, axis=0))[moved]
     assert np.all(steps <= rig.model.acceleration_rad_s2 * PERIOD_S * (1 + 1e-9) + 1e-7)
@@ -49,7 +49,7 @@ def check_set_points(rig: ProgramRig) -> None:
 
 @settings(max_examples=40)
 @given(st.lists(st.tuples(orders, CYCLE_S, samples), min_size=1, max_size=10))
-def test_no_step_in_velocity_whatever_is_ordered(
+def test_no_sequence_of_programs_causes_a_step_in_velocity(
     sequence: list[tuple[tuple[str, dict[str, object] | None], float, tuple[float, ...] | None]],
 ) -> None:
     rig = ProgramRig()
@@ -73,10 +73,10 @@ def test_no_step_in_velocity_whatever_is_ordered(
     st.sets(st.integers(0, 39), max_size=12),
     st.lists(st.tuples(st.floats(-0.1, 0.1), st.floats(-1, 1)), min_size=40, max_size=40),
 )
-def test_no_step_in_velocity_whatever_the_stream_does(
+def test_no_stream_causes_a_step_in_velocity(
     transits: list[float], dropped: set[int], shakes: list[tuple[float, float]]
 ) -> None:
-    """The hand shakes and leaps, a fifth is lost, the rest comes late, twice, in another order."""
+    """The hand shakes and leaps; packets are lost, late, doubled and reordered."""
     rig = ProgramRig()
     rig.switch("hold")
     rig.run(0.05)
@@ -109,7 +109,7 @@ NAMES = tuple(ProgramRig().programs)
 
 @pytest.mark.parametrize("first", NAMES)
 @pytest.mark.parametrize("second", NAMES)
-def test_the_next_program_begins_with_the_torque_of_the_last(first: str, second: str) -> None:
+def test_a_program_begins_with_the_torque_of_the_previous_one(first: str, second: str) -> None:
     wanted = {
         "jog": {"velocity_rad_s": [5.0] * N},
         "pid": {"distance_rad": [-3.0] * N},
@@ -127,8 +127,8 @@ def test_the_next_program_begins_with_the_torque_of_the_last(first: str, second:
     unchanged.cycle()
     shared = rig.programs["hold"].controller
     if all(rig.programs[name].controller is shared for name in (first, second)):
-        # the same loop goes on: what differs is the first cycle's share of a new motion, and the
-        # friction known of the last axis
+        # the same controller continues; the difference is the first cycle of a new motion and the
+        # known friction of the last axis
         gains = rig.model.gains[0]
         share = rig.model.acceleration_rad_s2 * PERIOD_S**2
         stiffness = gains.proportional_Nm_rad + gains.derivative_Nms_rad / PERIOD_S
@@ -138,7 +138,7 @@ def test_the_next_program_begins_with_the_torque_of_the_last(first: str, second:
         np.testing.assert_allclose(rig.torque, last, atol=1e-12)
 
 
-def test_a_load_is_held_through_every_change() -> None:
+def test_a_load_is_held_through_changes_of_program() -> None:
     rig = ProgramRig(load_Nm=(0.4, -0.3, 0.0))
     rig.switch("hold")
     rig.run(5.0)
@@ -146,5 +146,5 @@ def test_a_load_is_held_through_every_change() -> None:
         rig.switch(name)
         rig.run(0.2)
     settled = rig.array("angle")[-1200:]
-    # nothing moved by more than the encoder's reading plays
+    # no motion beyond the encoder's noise
     assert np.all(np.ptp(settled, axis=0) <= 20 * COUNT_RAD)
