@@ -66,7 +66,7 @@ def test_a_position_is_feasible_if_linear_programming_finds_tensions(name: str) 
     assert not feasible.all() and feasible.any()
 
 
-def test_invalid_input_is_reported_with_what_is_wanted() -> None:
+def test_invalid_input_is_reported_with_what_is_allowed() -> None:
     model = cdpr.load("spatial-8")
     with pytest.raises(cdpr.InvalidArgument, match=r"position: .*want finite \(..., 3\) or"):
         model.lengths([0.0, 1.0])

@@ -1,4 +1,4 @@
-"""What the programs write for themselves is for nobody but their user, whatever the umask."""
+"""State files and folders are private to their user, whatever the umask."""
 
 from __future__ import annotations
 
@@ -26,7 +26,9 @@ def mode(path: Path) -> int:
 
 
 @pytest.mark.parametrize("kind", ["recording", "state"])
-def test_its_folders_and_files_are_its_users(open_umask: None, tmp_path: Path, kind: str) -> None:
+def test_folders_and_files_are_readable_by_their_user_only(
+    open_umask: None, tmp_path: Path, kind: str
+) -> None:
     path = tmp_path / "cdpr-rt" / "kept" / "file"
     if kind == "recording":
         RecordingFile(path, Context(), {}).close()

@@ -1,4 +1,4 @@
-"""A refusal in words, as JSON, and back."""
+"""A refusal as text, as JSON, and read back from JSON."""
 
 from __future__ import annotations
 
@@ -72,17 +72,17 @@ REFUSALS = [
 ]
 
 
-def test_every_code_is_among_these() -> None:
+def test_every_refusal_code_has_an_example() -> None:
     assert {refusal.code for refusal, _ in REFUSALS} == set(RefusalCode)
 
 
 @pytest.mark.parametrize(("refusal", "text"), REFUSALS)
-def test_it_is_reported_as_text_and_survives_json(refusal: CommandRefusal, text: str) -> None:
+def test_a_refusal_has_its_text_and_survives_json(refusal: CommandRefusal, text: str) -> None:
     assert str(refusal) == str(ControlError(refusal)) == text
     assert CommandRefusal.from_json(json.loads(json.dumps(refusal.as_json()))) == refusal
 
 
-def test_the_loop_s_error_can_be_pickled_and_takes_other_words() -> None:
+def test_a_refused_error_can_be_pickled_and_given_another_text() -> None:
     refusal = REFUSALS[0][0]
     copy = pickle.loads(pickle.dumps(RefusedError(refusal)))
     assert type(copy) is RefusedError
@@ -90,7 +90,7 @@ def test_the_loop_s_error_can_be_pickled_and_takes_other_words() -> None:
     assert str(type(copy)("other words")) == "other words"
 
 
-def test_an_error_carries_it_and_one_of_words_none() -> None:
+def test_an_error_carries_its_refusal_and_an_error_with_text_only_has_none() -> None:
     refusal = REFUSALS[0][0]
     assert refusal_of(ControlError(refusal)) is refusal
     assert refusal_of(ControlError("words")) is None

@@ -1,4 +1,4 @@
-"""The service that tests of its policies share, one for each module."""
+"""A service shared by the tests of a module."""
 
 from collections.abc import Iterator
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""A receiver of the set-point stream on a real socket, with what stands behind it."""
+"""A receiver of the set-point stream on a real socket, with its memory block and lease."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from cdpr_rt.service.stream_packet import (
 
 
 class Robot:
-    """A receiver with what stands behind it."""
+    """A receiver with its memory block and lease."""
 
     def __init__(self, key: bytes | None = None, host: str = "127.0.0.1", port: int = 0) -> None:
         self.block = SharedBlock.create(1, 0.1, 1000.0)
@@ -30,7 +30,7 @@ class Robot:
         _, self.port = self.stream.address
 
     def give(self) -> StreamSession:
-        """Take the right to move, where nobody has it, and give its holder a session."""
+        """Take the right to move if nobody has it, and return a session for its holder."""
         with contextlib.suppress(LeaseError):
             self.token = self.lease.take("console", 10.0)
         return self.stream.sessions.issue(self.token)

@@ -1,4 +1,4 @@
-"""Rows that look like a robot's, and a recorder in a process of its own."""
+"""Rows like a robot's, and a recorder in a separate process."""
 
 from __future__ import annotations
 
@@ -81,7 +81,7 @@ def put(writer: RowWriter, rows: Row) -> None:
 
 
 class RecorderProcess:
-    """A recorder in another process, which may be killed or have no room for files."""
+    """A recorder in another process, which may be killed or lack disk space."""
 
     def __init__(self, block: SharedBlock, folder: Path, most_file_bytes: int = 0) -> None:
         arguments = [str(block.fd), str(folder), str(most_file_bytes)]
@@ -130,7 +130,7 @@ def run_for(writer: RowWriter, seconds: float, first: int) -> int:
 
 
 def stock_messages(path: Path, topic: str) -> list[tuple[int, dict[str, Any]]]:
-    """Read a file with the `mcap` package alone: log times and values."""
+    """Read log times and values from a file with the `mcap` package alone."""
     with path.open("rb") as file:
         messages = make_reader(file, validate_crcs=True).iter_messages(topics=[topic])
         return [(message.log_time, json.loads(message.data)) for _, _, message in messages]

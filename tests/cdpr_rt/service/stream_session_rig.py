@@ -1,4 +1,4 @@
-"""A rig of the set-point stream with what stands behind it, on a clock of its own."""
+"""A rig of the set-point stream with its memory block and lease, on a test clock."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ BASE = StreamSetpoint(7, 1, 1000, (0.1, 0.2, 0.3), (1.0, 0.0, 0.0, 0.0), 0.125, 
 
 
 class StreamRig:
-    """A rig with its block and lease, on a clock of its own.
+    """A rig with its block and lease, on a test clock.
 
     Without a shared key its holder has the right to move under `token`, and the session `given`.
     """
@@ -89,5 +89,5 @@ class StreamRig:
 
     @property
     def until_ns(self) -> int:
-        """Until when the loop is told that somebody holds the right."""
+        """The published time until which the right is held."""
         return int(self.block.counters["right_until_ns"][0])

@@ -1,4 +1,4 @@
-"""Log lines that others can provoke."""
+"""Limits of log lines that remote clients can cause."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from cdpr_tools.daemon.service_process import BoundedLog
 
 
 class Log:
-    """A logger with the filter, its lines, and a clock that the test sets."""
+    """A logger with the filter, its lines, and a clock set by the test."""
 
     def __init__(self) -> None:
         self.now_s = 0.0
@@ -35,7 +35,7 @@ def log() -> Iterator[Log]:
     one.logger.removeHandler(one.handler)
 
 
-def test_a_few_of_a_kind_are_shown_and_the_rest_is_counted(log: Log) -> None:
+def test_five_lines_of_a_kind_are_shown_and_the_rest_is_counted(log: Log) -> None:
     for k in range(1000):
         log.logger.error("refused: %s", k)
         log.logger.warning("slow") if k < 3 else None
@@ -47,7 +47,7 @@ def test_a_few_of_a_kind_are_shown_and_the_rest_is_counted(log: Log) -> None:
     assert log.lines()[-1] == "refused: again"
 
 
-def test_texts_without_end_are_one_kind_in_the_end(log: Log) -> None:
+def test_too_many_different_texts_are_counted_together(log: Log) -> None:
     for k in range(10_000):
         log.logger.error(f"made up {k}")
     shown = len(log.lines())

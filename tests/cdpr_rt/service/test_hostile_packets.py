@@ -1,4 +1,4 @@
-"""Packets of the set-point stream that are spoilt, forged or nonsense."""
+"""Packets of the set-point stream that are damaged, forged or random."""
 
 from __future__ import annotations
 
@@ -86,7 +86,7 @@ def besieged(request: pytest.FixtureRequest) -> Iterator[tuple[Robot, StreamClie
         robot(key) as there,
         StreamClient("127.0.0.1", there.port, key or there.give()) as client,
     ):
-        patch.setattr(setpoint_stream, "SILENCE_NS", 10_000_000_000)  # a busy machine's
+        patch.setattr(setpoint_stream, "SILENCE_NS", 10_000_000_000)  # longer, for a busy machine
         patch.setattr(stream_client, "_SILENCE_S", 60.0)
         converse(client, lambda: client.answered >= 2)
         yield there, client
@@ -97,11 +97,11 @@ def besieged(request: pytest.FixtureRequest) -> Iterator[tuple[Robot, StreamClie
     suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow],
 )  # fmt: skip
 @given(packets=st.lists(HOSTILE, min_size=1, max_size=12))
-def test_nothing_hostile_gets_through_or_disturbs(
+def test_hostile_packets_neither_pass_nor_disturb_the_holder(
     besieged: tuple[Robot, StreamClient], packets: list[bytes]
 ) -> None:
     there, client = besieged
-    client.receive()  # who hears nothing for 2.5 s greets anew
+    client.receive()  # a client without answers for 2.5 s would greet again
     holder = there.stream.status()["holder"]
     before = there.posted, there.count("accepted")
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as enemy:
@@ -117,11 +117,11 @@ def test_nothing_hostile_gets_through_or_disturbs(
 
 @settings(max_examples=150)
 @given(packets=st.lists(HOSTILE | PLAUSIBLE, min_size=1, max_size=12))
-def test_whatever_reaches_the_loop_can_be_worked_with(
+def test_every_sample_that_reaches_the_loop_is_valid(
     alone: StreamRig, packets: list[bytes | StreamSetpoint]
 ) -> None:
-    """The holder itself signs all of it, good-byes and leaps of its numbers among it."""
-    alone.now_ns += 11_000_000_000  # the right of the last example has run out
+    """The holder signs all packets, including good-byes and leaps of sequence numbers."""
+    alone.now_ns += 11_000_000_000  # the right of the previous example has expired
     alone.begin()
     given, numbers = alone.given, itertools.count(1)
     before, total = alone.posted, sum(alone.sessions.counts.values())
@@ -144,5 +144,5 @@ def test_whatever_reaches_the_loop_can_be_worked_with(
 
 @pytest.fixture(scope="module")
 def alone() -> StreamRig:
-    """Without sockets: one that is given back loses what waits in it."""
+    """Without sockets, because packets waiting in a closed socket would be lost."""
     return StreamRig()

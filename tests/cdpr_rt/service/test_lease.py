@@ -1,4 +1,4 @@
-"""The right to move: one holder at most, lost by silence."""
+"""The right to move: at most one holder, which loses it by silence."""
 
 from __future__ import annotations
 
@@ -29,18 +29,18 @@ def made() -> tuple[Lease, Clock]:
 
 
 def until_ns() -> int:
-    """Until when the loop is told that the newest grant holds."""
+    """The published time until which the newest grant is valid."""
     return int(BLOCK.counters["right_until_ns"][0])
 
 
-def test_nobody_holds_it_at_first_whatever_an_earlier_service_has_published() -> None:
+def test_nobody_holds_the_right_at_first_whatever_an_earlier_service_published() -> None:
     BLOCK.counters["right_until_ns"] = 1 << 62
     lease, _ = made()
     assert until_ns() == 0
     assert lease.holder() is None
 
 
-def test_the_loop_is_reported_until_when_and_each_sign_of_life_extends_it() -> None:
+def test_renewing_extends_the_published_time() -> None:
     lease, clock = made()
     token = lease.take("maria", 2.0)
     assert until_ns() == clock.ns + 2_000_000_000
@@ -49,7 +49,7 @@ def test_the_loop_is_reported_until_when_and_each_sign_of_life_extends_it() -> N
     assert until_ns() == clock.ns + 2_000_000_000
 
 
-def test_another_is_refused_by_the_holders_name_until_it_has_been_silent() -> None:
+def test_another_client_is_rejected_until_the_holder_has_been_silent() -> None:
     lease, clock = made()
     lease.take("maria", 2.0)
     with pytest.raises(LeaseError, match="maria holds the right to move"):
@@ -61,7 +61,7 @@ def test_another_is_refused_by_the_holders_name_until_it_has_been_silent() -> No
     assert holder.client == "jan"
 
 
-def test_who_was_silent_has_lost_it_also_where_nobody_else_took_it() -> None:
+def test_a_silent_holder_loses_the_right_even_if_nobody_takes_it() -> None:
     lease, clock = made()
     token = lease.take("maria", 0.5)
     clock.ns += 600_000_000
@@ -70,7 +70,7 @@ def test_who_was_silent_has_lost_it_also_where_nobody_else_took_it() -> None:
     assert until_ns() < clock.ns
 
 
-def test_released_it_is_gone_at_once() -> None:
+def test_a_released_right_ends_immediately() -> None:
     lease, _ = made()
     token = lease.take("maria", 2.0)
     lease.release(token)
@@ -81,7 +81,7 @@ def test_released_it_is_gone_at_once() -> None:
 
 
 @pytest.mark.parametrize("ttl_s", [0.0, -1.0, 0.19, 10.01, float("nan"), float("inf")])
-def test_no_silence_of_any_length(ttl_s: float) -> None:
+def test_an_invalid_time_to_live_is_rejected(ttl_s: float) -> None:
     lease, _ = made()
     with pytest.raises(LeaseError, match=r"allowed: 0\.2 to 10 s"):
         lease.take("maria", ttl_s)
@@ -100,10 +100,10 @@ OPERATIONS = st.lists(
 
 @settings(max_examples=200)
 @given(OPERATIONS)
-def test_at_most_one_token_counts_and_only_while_it_is_renewed(
+def test_at_most_one_token_is_valid_and_only_while_it_is_renewed(
     operations: list[tuple[str, int, float]],
 ) -> None:
-    """Against a model that knows the time at which each token was last good."""
+    """Compared with a model that knows until when each token is valid."""
     lease, clock = made()
     tokens: dict[int, str] = {}
     holder, end_ns, ttl_ns = -1, 0, 0
@@ -135,7 +135,7 @@ def test_at_most_one_token_counts_and_only_while_it_is_renewed(
         assert BLOCK.counters["right_number"][0] == number
 
 
-def test_of_many_who_ask_at_once_one_gets_it() -> None:
+def test_one_of_many_simultaneous_clients_gets_the_right() -> None:
     lease = Lease(PublishedRight(BLOCK))
     got: list[str] = []
     begin = threading.Barrier(16)
@@ -156,7 +156,7 @@ def test_of_many_who_ask_at_once_one_gets_it() -> None:
     assert len(got) == 1
 
 
-def test_numbers_go_on_where_an_earlier_service_has_left_them() -> None:
+def test_grant_numbers_continue_after_a_restart_of_the_service() -> None:
     first, _ = made()
     number = first.renew(first.take("maria", 2.0)).number
     second, _ = made()

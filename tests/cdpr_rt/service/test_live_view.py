@@ -1,4 +1,4 @@
-"""The live view, watched by a WebSocket client that knows Foxglove's protocol and nothing else."""
+"""The live view, watched by a WebSocket client that knows only Foxglove's protocol."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def running(block: SharedBlock) -> Iterator[LiveView]:
 
 @contextmanager
 def repeating(block: SharedBlock, row: Row) -> Iterator[None]:
-    """Write one row over and over, as a loop at 1 kHz would."""
+    """Write one row repeatedly, as a loop at 1 kHz would."""
     end = threading.Event()
     writer = RowWriter(block)
 
@@ -94,7 +94,7 @@ async def watch(
     return {channel["topic"]: channel for channel in channels.values()}, messages
 
 
-def test_a_client_sees_axes_tensions_pose_and_times() -> None:
+def test_a_client_receives_axes_tensions_pose_and_times() -> None:
     block = block_with_clock()
     row = made_rows(100, 1)
     row["position_rad"], row["setpoint_rad"] = [[math.pi, 1.0]], [[math.pi / 2, 1.0]]
@@ -115,17 +115,17 @@ def test_a_client_sees_axes_tensions_pose_and_times() -> None:
     axes = json.loads(data)
     assert axes["left"]["position_deg"] == pytest.approx(180.0)
     assert axes["left"]["error_deg"] == pytest.approx(-90.0)
-    assert "cable_length_m" not in axes["right"]  # what is not known is not there
+    assert "cable_length_m" not in axes["right"]  # unknown values are left out
     assert time_ns == 1_800_000_000_100_000_000
     assert json.loads(messages["/tensions"][-1][1]) == {"left": 55.0}
     cycle_time = json.loads(messages["/cycle_time"][-1][1])
     assert cycle_time["compute_ms"] == pytest.approx(0.2)
-    assert cycle_time["stream_age_s"] == 0.5  # no wall time: as it is
+    assert cycle_time["stream_age_s"] == 0.5  # not a wall time, so unchanged
     assert json.loads(messages["/state"][-1][1]) == {"state": "active", "reaction": "none"}
     assert channels["/pose"]["schemaName"] == "foxglove.PoseInFrame"
     assert struct.pack("<d", 3.0) in messages["/pose"][-1][1]
     assert "/pose_setpoint" in channels and "/pose_setpoint" not in messages
-    # decimated: by far not all of the rows
+    # decimated to at most 50 Hz
     assert len(messages["/axes"]) <= seconds * 50 + 5
 
 
@@ -142,7 +142,7 @@ def test_events_appear_in_the_live_log() -> None:
         asyncio.run(watch(view.status()["url"], tripped_and_told))
 
 
-def test_where_it_ends_by_itself_it_says_why() -> None:
+def test_the_view_reports_why_it_ended() -> None:
     block, told = block_with_clock(), list[str]()
     listener = listen_tcp("127.0.0.1", 0)
     view = LiveView(block, "bench", listener, ended=told.append)
@@ -154,7 +154,7 @@ def test_where_it_ends_by_itself_it_says_why() -> None:
     assert view.status()["error"] == text
 
 
-def test_a_client_that_does_not_read_holds_nobody_up() -> None:
+def test_a_client_that_does_not_read_does_not_delay_others() -> None:
     block = block_with_clock()
 
     lazily: Any = {"subprotocols": [PROTOCOL], "max_queue": 1, "close_timeout": 0.1}
@@ -172,7 +172,7 @@ def test_a_client_that_does_not_read_holds_nobody_up() -> None:
         assert view.status()["error"] == ""
 
 
-def test_axes_whose_names_are_spelled_alike_are_all_shown() -> None:
+def test_axes_with_names_that_differ_only_in_punctuation_are_all_shown() -> None:
     block = block_with_clock()
     block.write_description({"axes": [{"name": "top left"}, {"name": "top_left"}]})
     with running(block) as view, repeating(block, made_rows(100, 1)):
@@ -180,7 +180,7 @@ def test_axes_whose_names_are_spelled_alike_are_all_shown() -> None:
     assert set(json.loads(messages["/axes"][-1][1])) == {"top_left", "top_left_"}
 
 
-def test_clients_that_talk_nonsense_leave_no_lines_in_the_log(
+def test_invalid_requests_leave_no_lines_in_the_log(
     caplog: pytest.LogCaptureFixture,
 ) -> None:
     with running(block_with_clock()) as view:
@@ -218,11 +218,11 @@ def _asked(view: LiveView, *headers: str) -> str:
         ("Host: localhost", f"Origin: {FOXGLOVE}", "Origin: http://evil.example"),
         ("Host: rebound.evil.example:8765",),
         ("Host: rebound.evil.example", f"Origin: {FOXGLOVE}"),
-        (f"Host: {socket.gethostname()}.local:8765",),  # whoever answers to it on the network
+        (f"Host: {socket.gethostname()}.local:8765",),  # another machine may answer to it
         ("Host: ",),
     ],
 )
-def test_a_page_of_another_host_does_not_look_on(headers: tuple[str, ...]) -> None:
+def test_a_page_of_another_host_is_rejected(headers: tuple[str, ...]) -> None:
     view = LiveView(block_with_clock(), "bench", listen_tcp("127.0.0.1", 0), [FOXGLOVE])
     view.start()
     try:
@@ -235,7 +235,7 @@ def test_a_page_of_another_host_does_not_look_on(headers: tuple[str, ...]) -> No
 
 
 @pytest.mark.parametrize("origin", [(), (f"Origin: {FOXGLOVE}",), (f"origin: {FOXGLOVE.upper()}",)])
-def test_programs_look_on_and_so_do_pages_that_were_named(origin: tuple[str, ...]) -> None:
+def test_programs_and_allowed_pages_may_watch(origin: tuple[str, ...]) -> None:
     view = LiveView(block_with_clock(), "bench", listen_tcp("127.0.0.1", 0), [f"{FOXGLOVE}/"])
     view.start()
     try:
@@ -256,14 +256,14 @@ def _listening() -> set[str]:
     return {line[9] for line in lines if line[3] == "0A" and line[9] in mine}
 
 
-def test_there_is_one_port_and_none_behind_it() -> None:
+def test_the_view_listens_on_a_single_port() -> None:
     before = _listening()
     with running(block_with_clock()) as view:
         asyncio.run(watch(view.status()["url"], lambda _: True))
         assert len(_listening() - before) == 1
 
 
-def test_who_connects_over_and_over_costs_few_descriptors() -> None:
+def test_repeated_connections_use_few_descriptors() -> None:
     with running(block_with_clock()) as view:
         address = ("127.0.0.1", int(view.status()["url"].rsplit(":", 1)[1]))
         before, most = len(list(Path("/proc/self/fd").iterdir())), 0
@@ -279,7 +279,7 @@ def test_who_connects_over_and_over_costs_few_descriptors() -> None:
 
 @contextmanager
 def _joined(view: LiveView) -> Iterator[socket.socket]:
-    """A viewer that has subscribed to everything, and does nothing by itself."""
+    """A viewer that has subscribed to everything and does nothing else."""
     with socket.socket() as viewer:
         viewer.settimeout(60.0)
         viewer.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
@@ -304,7 +304,7 @@ def _cut_off(view: LiveView) -> bool:
     return not view.status()["viewers"]
 
 
-def test_a_viewer_that_never_reads_is_cut_off(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_viewer_that_never_reads_is_disconnected(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(foxglove_view, "_TIMEOUT_S", 0.2)
     monkeypatch.setattr(foxglove_view, "_MOST_UNSENT_BYTES", 4096)
     block = block_with_clock()
@@ -314,16 +314,16 @@ def test_a_viewer_that_never_reads_is_cut_off(monkeypatch: pytest.MonkeyPatch) -
 
 
 @pytest.mark.parametrize("head", [0x81, 0x82, 0x89, 0x01], ids=["text", "data", "ping", "part"])
-def test_a_viewer_that_talks_without_end_is_cut_off(head: int) -> None:
+def test_a_viewer_that_floods_the_view_is_disconnected(head: int) -> None:
     with running(block_with_clock()) as view, _joined(view) as viewer:
         with suppress(ConnectionError):
-            for _ in range(100):  # 13 MB: more than may be said while all of it is read
+            for _ in range(100):  # 13 MB: more than the limit even if all of it is read
                 viewer.sendall(_frame(head, b"x" * 125) * 1000)
         assert _cut_off(view)
         assert view.status()["error"] == ""
 
 
-def test_invalid_requests_change_nothing() -> None:
+def test_invalid_messages_have_no_effect() -> None:
     block = block_with_clock()
     nonsense: list[str | bytes] = [
         "",
@@ -355,7 +355,7 @@ def test_invalid_requests_change_nothing() -> None:
         assert view.status()["error"] == ""
 
 
-def test_axes_that_are_called_otherwise_are_other_topics() -> None:
+def test_renamed_axes_replace_the_topics() -> None:
     block = block_with_clock()
 
     def renamed(messages: Messages) -> bool:
@@ -370,7 +370,7 @@ def test_axes_that_are_called_otherwise_are_other_topics() -> None:
     assert {"left", "right"} == set(json.loads(messages["/axes"][0][1]))
 
 
-def test_strange_letters_of_a_refused_page_can_be_told() -> None:
+def test_the_status_contains_odd_characters_of_a_rejected_origin() -> None:
     with running(block_with_clock()) as view:
         address = ("127.0.0.1", int(view.status()["url"].rsplit(":", 1)[1]))
         with socket.create_connection(address, LONGEST_S) as client:
@@ -379,7 +379,7 @@ def test_strange_letters_of_a_refused_page_can_be_told() -> None:
         assert view.status()["refused_last"].encode().startswith(b"Origin: ")
 
 
-def test_who_says_nothing_makes_room_and_too_many_are_reported(
+def test_idle_connections_make_room_and_excess_viewers_get_503(
     caplog: pytest.LogCaptureFixture,
 ) -> None:
     with running(block_with_clock()) as view:
@@ -392,12 +392,12 @@ def test_who_says_nothing_makes_room_and_too_many_are_reported(
             watching[-1].sendall(f"{UPGRADE}Host: localhost\r\n\r\n".encode())
             assert b" 101 " in watching[-1].recv(4096)
         assert " 503 " in _asked(view, "Host: localhost")
-    for one in (*silent, *watching):  # cut with the view's end
+    for one in (*silent, *watching):  # closed with the view
         one.close()
     assert not caplog.records
 
 
-def test_there_are_not_more_of_them_where_many_come_at_once() -> None:
+def test_the_limit_of_viewers_holds_for_simultaneous_connections() -> None:
     with running(block_with_clock()) as view:
         port = int(view.status()["url"].rsplit(":", 1)[1])
         request = f"{UPGRADE}Host: localhost\r\n\r\n".encode()
@@ -415,7 +415,7 @@ def test_there_are_not_more_of_them_where_many_come_at_once() -> None:
         one.close()
 
 
-def test_it_stays_where_no_cycles_run() -> None:
+def test_the_view_waits_while_no_cycles_run() -> None:
     block = block_with_clock()
     with running(block) as view:
         time.sleep(0.2)
@@ -433,7 +433,7 @@ DESCRIPTION = {"platform": {"exit_points_m": EXITS, "anchor_points_m": ANCHORS},
 
 
 def doubles(point: list[float]) -> bytes:
-    """Return a point as protobuf holds it: a tag and eight bytes each, zeros left out."""
+    """Return a point in protobuf: a tag and eight bytes each, without zeros."""
     tagged = zip((b"\x09", b"\x11", b"\x19"), point, strict=True)
     return b"".join(tag + struct.pack("<d", value) for tag, value in tagged if value)
 
@@ -442,7 +442,7 @@ def colour(r: float, g: float, b: float) -> bytes:
     return doubles([r, g, b]) + b"\x21" + struct.pack("<d", 1.0)
 
 
-def test_cables_lead_to_the_turned_platform_and_are_coloured_by_tension() -> None:
+def test_cables_end_at_the_turned_platform_and_are_coloured_by_tension() -> None:
     half = math.sqrt(0.5)
     pose = np.array([0.5, 1.5, 0.0, half, 0.0, 0.0, half])  # turned by a quarter
     tension = np.array([20.0, 120.0, 1.0])
@@ -454,13 +454,13 @@ def test_cables_lead_to_the_turned_platform_and_are_coloured_by_tension() -> Non
         for k in range(len(scene) - 9)
         if scene[k : k + 1] == b"\x11"
     }
-    # the first anchor, to the left, is below the middle now
+    # the first anchor point, to the left before, is now below the middle
     assert any(value == pytest.approx(1.4, abs=1e-12) for value in coordinates)
     for shade in (colour(0.0, 0.0, 1.0), colour(1.0, 0.0, 0.0), colour(0.6, 0.6, 0.6)):
         assert shade in scene
 
 
-def test_limits_without_room_between_them_still_have_colours() -> None:
+def test_equal_tension_limits_still_give_colours() -> None:
     limits = {**LIMITS, "tension_min_N": [50.0] * 3, "tension_max_N": [50.0] * 3}
     view = CableScene({**DESCRIPTION, "limits": limits})
     pose, tension = np.array([0.5, 1.5, 0.0, 1.0, 0.0, 0.0, 0.0]), np.array([49.0, 50.0, 51.0])

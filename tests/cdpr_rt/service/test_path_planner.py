@@ -1,4 +1,4 @@
-"""The service's planner: one path at a time, in a process that it waits for."""
+"""The service's planner: one path at a time, in a separate process."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def planned(status: int, text: str, stopped: str = "") -> dict[str, Any]:
     return job
 
 
-def test_a_plan_has_its_name_and_figures():
+def test_a_finished_plan_has_its_name_and_duration():
     job = planned(0, json.dumps({"plan": "ab", "duration_s": 2.0}))
     assert job == {"number": 1, "planning": False, "error": None, "plan": "ab", "duration_s": 2.0}
 
@@ -48,18 +48,18 @@ def test_an_infeasible_path_is_reported_by_the_users_file_name():
     assert planned(1, "no JSON")["error"].startswith("planning ended with status 1: out of memory?")
 
 
-def test_a_stop_while_it_is_planned_leaves_nothing_to_follow():
+def test_a_stop_during_planning_discards_the_plan():
     job = planned(0, json.dumps({"plan": "ab", "duration_s": 2.0}), "hold by somebody")
     assert job["plan"] is None
     assert job["error"] == "not followed: hold by somebody while it was planned"
 
 
-def test_without_the_robot_nothing_is_planned():
+def test_planning_without_a_robot_is_rejected():
     with pytest.raises(PlannerBusyError):
         PathPlanRunner().begin(WANTED)
 
 
-def test_a_long_error_is_cut_before_every_look_repeats_it():
+def test_a_long_error_is_truncated():
     job = planned(2, json.dumps({"error": "FILE:3: " + "x" * 900_000}))
     assert job["error"].startswith("part.nc:3: x")
     assert len(job["error"]) <= 2000

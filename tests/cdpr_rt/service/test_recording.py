@@ -1,4 +1,4 @@
-"""Recording: nothing is missing, whatever ends it, and the stock `mcap` package reads it."""
+"""Recording: no row is missing however it ends, and the `mcap` package reads it."""
 
 import json
 import os
@@ -50,13 +50,13 @@ def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return _recorded(tmp_path_factory.mktemp("recording"))
 
 
-def test_every_row_is_there_as_it_was(recorded: Path) -> None:
+def test_every_row_is_recorded_unchanged(recorded: Path) -> None:
     messages = stock_messages(recorded, "/cycle")
     rows = made_rows(0, 3000)
     assert [value["cycle"] for _, value in messages] == list(range(3000))
     assert messages[2999][1]["position_rad"] == pytest.approx(rows["position_rad"][2999], abs=1e-9)
     assert messages[0][1]["cable_length_m"] == [None, None]
-    # the time of day follows from one instant on both clocks
+    # the time of day follows from one instant that was read on both clocks
     assert [at for at, _ in messages] == [
         1_800_000_000_000_000_000 + k * 1_000_000 for k in range(3000)
     ]
@@ -70,7 +70,7 @@ def read_columns(path: Path, fields: list[str] | None = None) -> Columns:
     return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
 
 
-def test_read_back_as_columns(recorded: Path) -> None:
+def test_a_recording_is_read_back_as_columns(recorded: Path) -> None:
     rows = made_rows(0, 3000)
     columns = read_columns(recorded)
     for name in ("cycle", "stamp_ns", "statusword", "valid", "state"):
@@ -85,7 +85,7 @@ def test_read_back_as_columns(recorded: Path) -> None:
 
 
 def _without_some_messages(path: Path, out: Path, dropped: set[tuple[str, int]]) -> Path:
-    """Write the file anew in small chunks, without messages of some topics and cycles."""
+    """Rewrite the file in small chunks, without messages of some topics and cycles."""
     with path.open("rb") as file, out.open("wb") as target:
         reader = make_reader(file)
         writer = Writer(target, chunk_size=3000)
@@ -105,17 +105,17 @@ def _without_some_messages(path: Path, out: Path, dropped: set[tuple[str, int]])
     return out
 
 
-def test_wall_times_stand_apart_and_are_joined_again(tmp_path: Path) -> None:
+def test_wall_times_are_stored_separately_and_joined_again(tmp_path: Path) -> None:
     path = _recorded(tmp_path, 500)
     assert not set(WALL_TIMES) & stock_messages(path, "/cycle")[0][1].keys()
     assert set(WALL_TIMES) < stock_messages(path, "/timing")[0][1].keys()
-    chunks = tmp_path / "chunks.mcap"  # many of them end between a row and its timing
+    chunks = tmp_path / "chunks.mcap"  # many chunks end between a row and its timing
     _without_some_messages(path, chunks, set())
     with chunks.open("rb") as file:
         summary = make_reader(file).get_summary()
         assert summary is not None and len(summary.chunk_indexes) > 100
     assert (read_columns(chunks)["stamp_ns"] == made_rows(0, 500)["stamp_ns"]).all()
-    # the last row is missing of which the file has the timing
+    # the last row is missing although its timing is in the file
     _without_some_messages(path, chunks, {("/cycle", 499)})
     assert (read_columns(chunks)["stamp_ns"] == made_rows(0, 499)["stamp_ns"]).all()
 
@@ -129,7 +129,7 @@ def test_a_row_never_gets_the_timing_of_another(tmp_path: Path) -> None:
     assert rows == made_rows(0, len(rows))["stamp_ns"].tolist()
 
 
-def test_two_runs_at_other_times_give_the_same_messages(tmp_path: Path) -> None:
+def test_two_equal_runs_at_different_times_give_the_same_messages(tmp_path: Path) -> None:
     told = []
     for run in range(2):
         block = block_with_clock()
@@ -145,7 +145,7 @@ def test_two_runs_at_other_times_give_the_same_messages(tmp_path: Path) -> None:
         block.write_status({**status, "reason": "x", "buses": {"can0": {"url": f"simbus:{run}"}}})
         recorder.remark("somebody came", client="panel")
         recorder.look()
-        for late in range(3):  # only what is no longer of the run has changed: no message
+        for late in range(3):  # changes of values that are left out cause no message
             block.write_status({**block.status(), "count": {"late": late + run}})
             recorder.look()
         recorder.finish()
@@ -158,12 +158,14 @@ def test_two_runs_at_other_times_give_the_same_messages(tmp_path: Path) -> None:
 
 
 @pytest.mark.long
-def test_killed_it_is_whole_and_the_next_goes_on_without_a_gap(tmp_path: Path) -> None:
+def test_the_file_of_a_killed_recorder_is_complete_and_the_next_one_continues_it(
+    tmp_path: Path,
+) -> None:
     block = block_with_clock()
     writer = RowWriter(block)
     first = RecorderProcess(block, tmp_path)
     written = run_for(writer, 2.0, 0)
-    # all but the last second; a recorder that had to wait for a core is a little later
+    # all but the last second, as a recorder may wait for a core
     wait_until(lambda: int(block.counters["recorded"][0]) >= written - 1000)
     first.kill()
     safe = int(block.counters["recorded"][0])
@@ -182,7 +184,7 @@ def test_killed_it_is_whole_and_the_next_goes_on_without_a_gap(tmp_path: Path) -
     assert stock_cycles(*sorted(tmp_path.iterdir())) == list(range(written))
 
 
-def test_cut_anywhere_the_rows_before_are_read(recorded: Path, tmp_path: Path) -> None:
+def test_a_truncated_recording_is_read_up_to_the_cut(recorded: Path, tmp_path: Path) -> None:
     data = recorded.read_bytes()
     path = tmp_path / "cut.mcap"
     counts = []
@@ -196,7 +198,7 @@ def test_cut_anywhere_the_rows_before_are_read(recorded: Path, tmp_path: Path) -
     assert counts == sorted(counts) and counts[-1] == 3000
 
 
-def test_damaged_in_the_middle_it_is_read_up_to_there(recorded: Path, tmp_path: Path) -> None:
+def test_a_damaged_recording_is_read_up_to_the_damage(recorded: Path, tmp_path: Path) -> None:
     data = bytearray(recorded.read_bytes())
     middle = len(data) // 2
     data[middle : middle + 64] = os.urandom(64)
@@ -233,7 +235,7 @@ def _foreign(path: Path, profile: str, schema: bytes, data: bytes, **metadata: s
     return path
 
 
-def test_mcap_files_of_others_are_said_to_be_that(tmp_path: Path) -> None:
+def test_foreign_mcap_files_are_reported(tmp_path: Path) -> None:
     for schema in (b"", b"{}", b"\xff\xfe\x00"):
         for profile in ("", "ros2"):
             path = _foreign(tmp_path / "other.mcap", profile, schema, b"\xff", part="1")
@@ -258,7 +260,7 @@ def test_reading_a_corrupt_recording_ends_at_the_corruption(tmp_path: Path) -> N
         list(RecordingReader(path).cycles(["position_rad"]))
 
 
-def test_lengths_that_are_damaged_are_no_end_of_memory(recorded: Path, tmp_path: Path) -> None:
+def test_damaged_length_fields_do_not_exhaust_memory(recorded: Path, tmp_path: Path) -> None:
     data = bytearray(recorded.read_bytes())
     chunk = data.index(b"\x06", 8 + 9 + 20)
     path = tmp_path / "damaged.mcap"
@@ -272,12 +274,12 @@ def test_lengths_that_are_damaged_are_no_end_of_memory(recorded: Path, tmp_path:
             continue
 
 
-def test_rotated_by_size_each_file_stands_alone(tmp_path: Path) -> None:
+def test_each_rotated_file_can_be_read_alone(tmp_path: Path) -> None:
     block = block_with_clock()
     recorder = Recorder(block, tmp_path, "bench", most_bytes=40_000, reserve_bytes=0)
     recorder.start()
     writer, written = RowWriter(block), 0
-    while len(list(tmp_path.iterdir())) < 4:  # whenever the recorder comes to it
+    while len(list(tmp_path.iterdir())) < 4:  # when the recorder rotates its files
         written = run_for(writer, 0.5, written)
     recorder.stop()
     paths = sorted(tmp_path.iterdir())
@@ -306,7 +308,7 @@ def test_lost_rows_are_counted(tmp_path: Path) -> None:
     assert stock_messages(path, "/events")[-1][1]["lost_rows"] == told["lost_rows"]
 
 
-def test_events_say_what_changed_and_why(tmp_path: Path) -> None:
+def test_events_record_changes_with_their_reasons(tmp_path: Path) -> None:
     block = block_with_clock()
     recorder = Recorder(block, tmp_path, "bench", reserve_bytes=0)
     rows = made_rows(0, 100)
@@ -356,7 +358,7 @@ def test_an_operators_confirmation_is_recorded_once() -> None:
     assert confirmation(stream_buttons(clutch=True, confirmed=256)) == 1
 
 
-def test_states_without_cycles_are_events_too(tmp_path: Path) -> None:
+def test_state_changes_without_cycles_are_recorded_as_events(tmp_path: Path) -> None:
     block = block_with_clock()
     recorder = Recorder(block, tmp_path, "bench", reserve_bytes=0)
     block.write_status({"state": "unconfigured", "reason": ""})

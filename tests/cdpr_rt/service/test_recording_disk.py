@@ -1,4 +1,4 @@
-"""Recordings and their disk: full, small, taken away; names and moments of writing."""
+"""Recordings and their disk: full, small or removed; file names and order of writes."""
 
 import io
 import os
@@ -27,7 +27,7 @@ from tests.cdpr_rt.service.recording_rig import (
 pytestmark = pytest.mark.long
 
 
-def test_a_full_disk_ends_the_recording_and_nothing_else(tmp_path: Path) -> None:
+def test_a_full_disk_ends_only_the_recording(tmp_path: Path) -> None:
     block = block_with_clock()
     writer = RowWriter(block)
     recorder = RecorderProcess(block, tmp_path, most_file_bytes=300_000)
@@ -43,18 +43,18 @@ def test_a_full_disk_ends_the_recording_and_nothing_else(tmp_path: Path) -> None
     assert not told["recording"]
     run_for(writer, 0.3, written)
     told = recorder.stop()
-    (path,) = tmp_path.iterdir()  # it never began again
+    (path,) = tmp_path.iterdir()  # no second file was begun
     assert path.stat().st_size <= 300_000
     kept = stock_cycles(path)
     assert kept == list(range(len(kept))) and len(kept) > 100
-    # what was not safe is not counted as such
+    # only rows on the disk are counted as recorded
     assert int(block.counters["recorded"][0]) == len(kept)
 
 
-def test_at_no_moment_of_writing_is_the_end_missing(
+def test_the_file_is_readable_after_power_fails_during_any_write(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The power is cut between any two writes, and in the middle of each."""
+    """Power may fail between any two writes and in the middle of each."""
     writes: list[tuple[bytes, int]] = []
     pwrite = os.pwrite
 
@@ -67,7 +67,7 @@ def test_at_no_moment_of_writing_is_the_end_missing(
     recorder = Recorder(block, tmp_path, "bench", reserve_bytes=0)
     recorder.start()
     writer, at = RowWriter(block), 0
-    while len(writes) <= 6:  # so often, whenever the recorder comes to it
+    while len(writes) <= 6:  # until the recorder has written often enough
         at = run_for(writer, 0.5, at)
     recorder.stop()
     disk, least = bytearray(), 0
@@ -79,7 +79,7 @@ def test_at_no_moment_of_writing_is_the_end_missing(
         half = data[: len(data) // 2]
         torn[at : at + len(half)] = half
         kept = NonSeekingReader(io.BytesIO(torn)).iter_messages(["/cycle"])
-        if len(data) > 100:  # the few bytes of the old end stand in one sector
+        if len(data) > 100:  # the few bytes of the old end are in one sector
             assert sum(1 for _ in kept) >= least
         disk[at : at + len(data)] = data
         count = sum(1 for _ in make_reader(io.BytesIO(disk)).iter_messages(["/cycle"]))
@@ -88,7 +88,7 @@ def test_at_no_moment_of_writing_is_the_end_missing(
     assert least == recorder.status()["rows"] > 0 and len(writes) > 4
 
 
-def test_rows_that_never_stop_coming_are_made_safe_all_the_same(tmp_path: Path) -> None:
+def test_rows_reach_the_disk_although_new_ones_keep_arriving(tmp_path: Path) -> None:
     block = block_with_clock(seconds=60.0)
     recorder = Recorder(block, tmp_path, "bench", reserve_bytes=0)
     newest = block.counters["rows"]
@@ -121,7 +121,7 @@ def test_a_file_that_is_removed_ends_the_recording(tmp_path: Path) -> None:
     assert "001.mcap: recording ended: the file has been removed" in recorder.status()["error"]
 
 
-def test_daemons_of_one_second_and_folder_do_not_take_each_others_files(tmp_path: Path) -> None:
+def test_recorders_started_in_the_same_second_use_different_files(tmp_path: Path) -> None:
     recorders = [Recorder(block_with_clock(), tmp_path, "bench") for _ in range(4)]
     threads = [threading.Thread(target=recorder.start) for recorder in recorders]
     for thread in threads:
@@ -133,7 +133,7 @@ def test_daemons_of_one_second_and_folder_do_not_take_each_others_files(tmp_path
     assert len(list(tmp_path.iterdir())) == 4
 
 
-def test_the_thousandth_file_of_a_session_is_not_the_last(tmp_path: Path) -> None:
+def test_file_numbers_continue_beyond_999(tmp_path: Path) -> None:
     for number in (999, 1000):
         (tmp_path / f"bench-20270115T080000Z-{number}.mcap").write_bytes(b"")
     recorder = Recorder(block_with_clock(), tmp_path, "bench")
@@ -147,7 +147,7 @@ def test_a_small_disk_keeps_a_small_reserve(tmp_path: Path) -> None:
     assert reserve_of(1 << 40) == 64 << 20
 
 
-def test_no_room_at_all_is_said_at_the_start(tmp_path: Path) -> None:
+def test_an_unusable_folder_is_reported_at_the_start(tmp_path: Path) -> None:
     folder = tmp_path / "file"
     folder.write_text("")
     ends: list[str] = []
@@ -158,7 +158,7 @@ def test_no_room_at_all_is_said_at_the_start(tmp_path: Path) -> None:
     assert not recorder.status()["recording"] and "cannot record" in recorder.status()["error"]
 
 
-def test_it_ends_before_the_disk_is_full(tmp_path: Path) -> None:
+def test_recording_ends_before_the_disk_is_full(tmp_path: Path) -> None:
     block = block_with_clock()
     ends: list[str] = []
     recorder = Recorder(block, tmp_path, "bench", reserve_bytes=1 << 60, ended=ends.append)
@@ -173,7 +173,7 @@ def test_it_ends_before_the_disk_is_full(tmp_path: Path) -> None:
     assert stock_cycles(path) == list(range(10))
 
 
-def test_old_recordings_and_those_beyond_the_size_are_removed_the_oldest_first(
+def test_retention_removes_the_oldest_recordings_beyond_age_and_size(
     tmp_path: Path,
 ) -> None:
     def leave(name: str, days: float) -> Path:
@@ -206,12 +206,12 @@ def test_old_recordings_and_those_beyond_the_size_are_removed_the_oldest_first(
     assert f"removed 1 old recordings: {gone.name}" in told
 
 
-def test_a_clock_that_was_wrong_and_is_set_takes_no_recording(tmp_path: Path) -> None:
+def test_a_clock_correction_removes_no_recording(tmp_path: Path) -> None:
     now_s = time.time()
     for k, written_s in enumerate((3600.0, 7200.0, now_s - 7200.0, now_s + 9e8)):
         path = tmp_path / f"bench-2026010{k + 1}T080000Z-001.mcap"
         path.write_bytes(bytes(1000))
         os.utime(path, (written_s, written_s))
     assert Retention(days=30.0).prune(tmp_path, "bench") == []
-    # the size still counts, and the newest stays whatever it is
+    # the size limit still applies, and the newest file stays
     assert len(Retention(total_bytes=1.0).prune(tmp_path, "bench")) == 3

@@ -1,4 +1,4 @@
-"""Rows as JSON: what is written is what was in the row, and what the schema says."""
+"""Rows as JSON: the values of the row, and valid by the schema."""
 
 import json
 import math
@@ -30,7 +30,7 @@ def _written(values: list[float]) -> list[float | None]:
 
 @given(st.lists(st.floats(), min_size=1, max_size=40))
 @settings(max_examples=300)
-def test_any_number_comes_back_to_a_billionth(values: list[float]) -> None:
+def test_any_number_is_read_back_to_a_billionth(values: list[float]) -> None:
     for value, read in zip(values, _written(values), strict=True):
         if not math.isfinite(value):
             assert read is None
@@ -43,7 +43,7 @@ def test_any_number_comes_back_to_a_billionth(values: list[float]) -> None:
 
 @given(data=st.data())
 @settings(max_examples=60)
-def test_every_bit_pattern_of_whole_fields(data: st.DataObject) -> None:
+def test_any_value_of_integer_fields_is_read_back_exactly(data: st.DataObject) -> None:
     rows = np.zeros(3, cycle_dtype(16))
     for name in (*SCALARS, *AXES):
         kind = rows.dtype[name].base
@@ -61,7 +61,7 @@ def test_every_bit_pattern_of_whole_fields(data: st.DataObject) -> None:
                 assert read[name] == row[name].tolist()
 
 
-def test_more_rows_than_fit_at_once_are_as_each_alone() -> None:
+def test_many_rows_give_the_same_texts_as_single_rows() -> None:
     rows = made_rows(0, 700, 16)
     texts = _TEXTS[16](rows)
     assert len(texts) == 700
@@ -71,7 +71,7 @@ def test_more_rows_than_fit_at_once_are_as_each_alone() -> None:
 
 
 @pytest.mark.parametrize("n", [1, 16])
-def test_texts_are_what_the_schema_says(n: int) -> None:
+def test_texts_are_valid_by_the_schema(n: int) -> None:
     rows = made_rows(10, 4, n)
     rows["pose"][0] = [1, 2, 3, 1, 0, 0, 0]
     check = jsonschema_rs.Draft7Validator(cycle_schema(n))
@@ -97,8 +97,8 @@ def test_texts_are_what_the_schema_says(n: int) -> None:
             check.validate({**value, name: [wrong] * n if name != "cycle" else wrong})
 
 
-def test_viewers_find_one_plain_type_for_each_field() -> None:
-    # those that plot understand no list of types and no reference
+def test_each_field_has_a_single_plain_type_in_the_schema() -> None:
+    # plotting viewers understand no list of types and no reference
     for one in cycle_schema(3)["properties"].values():
         inner = one["items"] if one["type"] == "array" else one
         assert inner["type"] in {"number", "integer", "boolean"}

@@ -1,4 +1,4 @@
-"""The set-point stream over real UDP sockets, among friends and others."""
+"""The set-point stream over real UDP sockets, with its client and strangers."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ from tests.cdpr_rt.service.stream_session_rig import KEY
 
 @pytest.mark.parametrize("key", [None, KEY])
 @pytest.mark.parametrize("host", ["127.0.0.1", "::1"])
-def test_a_client_streams_and_sees_the_robot(host: str, key: bytes | None) -> None:
+def test_a_client_streams_and_receives_the_robots_state(host: str, key: bytes | None) -> None:
     with (
         robot(key, host) as there,
         StreamClient(host, there.port, key or there.give()) as client,
@@ -40,11 +40,11 @@ def test_a_client_streams_and_sees_the_robot(host: str, key: bytes | None) -> No
         told: dict[str, Any] = {}
 
         def holds_it() -> bool:
-            """Who is not silent, as a machine may be that does other things, has the right."""
+            """The client holds the right, unless a busy machine has made it silent."""
             told.update(there.stream.status())
             return told["holder"] is not None and there.until_ns > time.monotonic_ns()
 
-        # the robot knows how long an answer took to come back once a packet has said so
+        # the robot knows the delay once a packet has reported it
         converse(
             client,
             lambda: (
@@ -66,13 +66,13 @@ def test_a_client_streams_and_sees_the_robot(host: str, key: bytes | None) -> No
         assert (there.until_ns == 0) is (key is not None), "its own right, or the console's"
 
 
-def test_a_client_goes_on_after_the_robot_was_away(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_client_continues_after_the_robot_has_restarted(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("cdpr_rt.service.stream_client._SILENCE_S", 0.3)
     with robot(KEY) as first:
         port = first.port
         client = StreamClient("127.0.0.1", port, KEY)
         converse(client, lambda: client.answered >= 2)
-    for _ in range(30):  # nobody listens
+    for _ in range(30):  # while no robot listens
         client.send((0.0, 0.0, 0.0))
         client.receive()
         time.sleep(0.01)
@@ -84,8 +84,8 @@ def test_a_client_goes_on_after_the_robot_was_away(monkeypatch: pytest.MonkeyPat
         again.stream.stop()
 
 
-def test_the_second_waits_for_the_first(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(setpoint_stream, "SILENCE_NS", 10_000_000_000)  # a busy machine's
+def test_a_second_client_waits_until_the_first_has_ended(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(setpoint_stream, "SILENCE_NS", 10_000_000_000)  # longer, for a busy machine
     with robot(KEY) as there, StreamClient("127.0.0.1", there.port, KEY) as second:
         with StreamClient("127.0.0.1", there.port, KEY) as first:
             converse(first, lambda: first.answered >= 2)
@@ -95,8 +95,8 @@ def test_the_second_waits_for_the_first(monkeypatch: pytest.MonkeyPatch) -> None
         converse(second, lambda: there.count("accepted") >= taken + 3)
 
 
-def test_nobody_else_on_this_machine_streams_or_gets_the_right_to_move() -> None:
-    """Whoever can reach the port but not the control interface, also as the holder falls silent."""
+def test_strangers_on_this_machine_neither_stream_nor_get_the_right() -> None:
+    """Clients that reach the port but not the control interface, also after the right has ended."""
     with robot() as there, StreamClient("127.0.0.1", there.port, there.give()) as hand:
         converse(hand, lambda: hand.answered >= 2)
         until(lambda: hand.receive() is not None and hand.answered == hand.sent)
@@ -136,11 +136,11 @@ def test_a_wrong_key_is_not_answered() -> None:
         assert (there.posted, there.until_ns) == (0, 0)
 
 
-def test_forged_hellos_do_not_keep_out_who_has_the_key() -> None:
+def test_forged_hellos_do_not_block_a_client_with_the_key() -> None:
     forged = seal(Hello(7, bytes(16)), b"a key of its own")
     with robot(KEY) as there, socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as forger:
         forger.connect(("127.0.0.1", there.port))
-        for _ in range(10):  # at once more than any limit of tries would allow
+        for _ in range(10):  # more at a time than any limit of attempts
             before = there.count("tag")
             for _ in range(100):
                 forger.send(forged)
@@ -150,7 +150,7 @@ def test_forged_hellos_do_not_keep_out_who_has_the_key() -> None:
         assert there.posted >= 5
 
 
-def test_a_stream_that_others_can_reach_needs_a_key() -> None:
+def test_a_stream_on_all_addresses_needs_a_key() -> None:
     for host in ("0.0.0.0", "::"):
         with pytest.raises(ListenError, match="others can reach it; give a key"):
             listen_udp(host, 0)
@@ -187,7 +187,7 @@ while True:
 
 @contextmanager
 def flooding(port: int) -> Iterator[None]:
-    """Send nonsense and strangers' set-points as fast as a process of its own can."""
+    """Send random packets and strangers' set-points as fast as a separate process can."""
     command = [sys.executable, "-c", FLOOD, str(port)]
     with subprocess.Popen(command, stdout=subprocess.PIPE) as process:
         try:
@@ -198,7 +198,7 @@ def flooding(port: int) -> Iterator[None]:
             process.kill()
 
 
-def test_a_flood_neither_pushes_the_holder_aside_nor_fills_memory() -> None:
+def test_a_flood_neither_blocks_the_holder_nor_fills_memory() -> None:
     with robot() as there, StreamClient("127.0.0.1", there.port, there.give()) as client:
         converse(client, lambda: client.answered >= 2)
         with flooding(there.port):
@@ -214,7 +214,7 @@ def test_a_flood_neither_pushes_the_holder_aside_nor_fills_memory() -> None:
             assert there.count("session") > 0
 
 
-def test_descriptors_beyond_what_select_takes_do_not_end_it() -> None:
+def test_file_descriptors_beyond_1024_do_not_end_the_stream() -> None:
     limits = resource.getrlimit(resource.RLIMIT_NOFILE)
     resource.setrlimit(resource.RLIMIT_NOFILE, (min(2048, limits[1]), limits[1]))
     held: list[int] = []

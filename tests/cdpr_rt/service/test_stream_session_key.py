@@ -49,7 +49,7 @@ def test_a_good_bye_frees_the_stream_and_the_right() -> None:
     assert (rig.sessions.holder, rig.until_ns, rig.lease.holder()) == (None, 0, None)
 
 
-def test_with_the_key_the_stream_takes_the_right_to_move_and_lives_by_it() -> None:
+def test_with_the_key_the_stream_takes_and_renews_the_right_to_move() -> None:
     rig = StreamRig(KEY)
     key = rig.greet()
     rig.answer(BASE, key)
@@ -61,7 +61,7 @@ def test_with_the_key_the_stream_takes_the_right_to_move_and_lives_by_it() -> No
     assert rig.until_ns == rig.now_ns + SILENCE_NS
 
 
-def test_a_right_held_already_is_shared_and_stays_its_holders() -> None:
+def test_a_stream_shares_the_right_of_its_holder_without_ending_it() -> None:
     rig = StreamRig(KEY)
     token = rig.lease.take("console", 1.0)
     for wrong in (right_digest("guessed"), right_digest("")):
@@ -81,7 +81,7 @@ def test_a_right_held_already_is_shared_and_stays_its_holders() -> None:
     assert rig.answer(late, rig.greet(), ms=1001.0).standing == Standing.NO_RIGHT
 
 
-def test_a_given_session_goes_before_those_that_begin_with_the_key() -> None:
+def test_a_given_session_has_priority_over_sessions_with_the_key() -> None:
     rig = StreamRig(KEY)
     rig.begin()
     assert rig.answer(BASE, rig.greet(), THERE).standing == Standing.BUSY
@@ -90,7 +90,7 @@ def test_a_given_session_goes_before_those_that_begin_with_the_key() -> None:
     assert rig.answer(BASE, rig.greet(), THERE).standing == Standing.ACCEPTED
 
 
-def test_forged_packets_use_up_nothing_of_who_has_the_key() -> None:
+def test_forged_packets_do_not_block_a_sender_with_the_key() -> None:
     rig = StreamRig(KEY)
     wrong = seal(Hello(7, bytes(16)), stream_key(b"another key that is long"))
     for k in range(10_000):
@@ -99,12 +99,12 @@ def test_forged_packets_use_up_nothing_of_who_has_the_key() -> None:
     assert rig.take(seal(Hello(7, bytes(16)), stream_key(KEY)), ms=0.0) is not None
 
 
-def test_a_key_must_be_one() -> None:
+def test_a_short_key_is_rejected() -> None:
     with pytest.raises(ControlError, match="at least 16"):
         StreamRig(b"short")
 
 
-def test_with_a_key_nobody_without_it_is_answered() -> None:
+def test_packets_without_the_key_are_not_answered() -> None:
     rig = StreamRig(KEY)
     good = seal(BASE, rig.greet())
     for data in (
@@ -158,7 +158,7 @@ def test_a_rejected_packet_cannot_be_used_later(obstacle: str) -> None:
 
 
 @pytest.mark.parametrize("key", [None, KEY])
-def test_a_sender_written_after_the_documentation_gets_on(key: bytes | None) -> None:
+def test_a_sender_written_by_the_documentation_is_accepted(key: bytes | None) -> None:
     """Follow docs/reference/setpoint-stream.md alone, without the module's help."""
 
     def sealed(body: bytearray, secret: bytes) -> bytes:

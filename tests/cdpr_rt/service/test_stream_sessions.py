@@ -1,4 +1,4 @@
-"""Who may stream set-points, and which of them reach the loop."""
+"""Which clients may stream set-points, and which set-points reach the loop."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def test_a_sample_reaches_the_loop_as_it_was_sent() -> None:
     assert sample["right"] == rig.block.counters["right_number"][0] == 1
 
 
-def test_the_answer_tells_how_the_robot_stands() -> None:
+def test_the_answer_contains_the_robots_state_and_pose() -> None:
     rig = StreamRig()
     row = rig.block.rows[0:1]
     row["state"], row["program"], row["reaction"], row["limit"] = 3, 2, 1, 4
@@ -51,7 +51,7 @@ def test_the_answer_tells_how_the_robot_stands() -> None:
     assert state.pose_setpoint == (7.0, 8.0, 9.0, 10.0, 11.0, 12.0, 13.0)
 
 
-def test_the_robot_sees_the_delay_as_well() -> None:
+def test_the_robot_also_measures_the_delay() -> None:
     rig = StreamRig()
     first = rig.answer(BASE)
     held = 5 * MS
@@ -62,7 +62,7 @@ def test_the_robot_sees_the_delay_as_well() -> None:
 
 
 @pytest.mark.parametrize("echo_ns", [-1, 1, 1 << 62, -(1 << 63), (1 << 63) - 1])
-def test_a_delay_that_cannot_be_is_not_believed(echo_ns: int) -> None:
+def test_an_impossible_delay_is_ignored(echo_ns: int) -> None:
     rig = StreamRig()
     rig.now_ns = 120_000_000_000
     rig.answer(replace(BASE, echo_ns=echo_ns))
@@ -89,7 +89,9 @@ def test_a_delay_that_cannot_be_is_not_believed(echo_ns: int) -> None:
         ({"session": 0}, PacketFault.ABSURD),
     ],
 )
-def test_nonsense_is_dropped_and_counted(change: dict[str, object], fault: PacketFault) -> None:
+def test_implausible_packets_are_dropped_and_counted(
+    change: dict[str, object], fault: PacketFault
+) -> None:
     rig = StreamRig()
     packet = replace(BASE, **{"session": rig.given.number, **change})  # type: ignore[arg-type]
     if packet.session == 0:
@@ -122,7 +124,7 @@ def test_other_versions_kinds_and_lengths_are_dropped_and_counted() -> None:
     assert rig.posted == 0
 
 
-def test_repeated_and_very_old_ones_count_once() -> None:
+def test_repeated_and_very_old_packets_are_rejected() -> None:
     rig = StreamRig()
     for sequence in (100, 101, 103):
         assert rig.answer(replace(BASE, sequence=sequence)).standing == Standing.ACCEPTED
@@ -136,7 +138,7 @@ def test_repeated_and_very_old_ones_count_once() -> None:
     assert rig.posted == 6
 
 
-def test_the_window_agrees_with_a_set() -> None:
+def test_the_window_agrees_with_a_set_of_numbers() -> None:
     window, taken = Window(), set[int]()
     numbers = [(i * i * 7 + i * 13) % 200 + i for i in range(500)]
     for number in numbers:
@@ -146,7 +148,7 @@ def test_the_window_agrees_with_a_set() -> None:
             taken.add(number)
 
 
-# -- sessions that the control interface has given
+# -- sessions given by the control interface
 
 
 def test_a_session_belongs_to_the_first_address_that_uses_it() -> None:
@@ -158,8 +160,8 @@ def test_a_session_belongs_to_the_first_address_that_uses_it() -> None:
     assert rig.sessions.holder == HERE
 
 
-def test_without_a_key_nobody_streams_to_whom_no_session_was_given() -> None:
-    """Whoever can open the port: no right is taken for them, and none of them is answered."""
+def test_without_a_key_only_given_sessions_may_stream() -> None:
+    """Packets of strangers are not answered and take no right."""
     rig = StreamRig()
     rig.lease.release(rig.token)
     strangers = (
@@ -189,14 +191,14 @@ def test_only_the_holder_of_the_right_is_given_a_session() -> None:
         rig.sessions.issue(rig.token)
 
 
-def test_nothing_counts_any_more_after_a_good_bye() -> None:
-    """Replayed from any port, while the right of its sender is still valid."""
+def test_packets_after_a_good_bye_are_ignored() -> None:
+    """Also replayed from another port, while the sender's right is still valid."""
     rig = StreamRig()
     heard = [rig.packet(k) for k in range(1, 4)]
     for data in heard:
         assert rig.take(data) is not None
     rig.take(seal(Bye(rig.given.number, 4), rig.given.key), THERE)
-    assert rig.sessions.holder == HERE, "somebody else's good-bye"
+    assert rig.sessions.holder == HERE, "a good-bye from another address"
     rig.take(seal(Bye(rig.given.number, 4), rig.given.key))
     heard += [rig.packet(k) for k in range(4, 9)]
     for data in heard:
@@ -207,7 +209,7 @@ def test_nothing_counts_any_more_after_a_good_bye() -> None:
     assert rig.answer(BASE, address=THERE).standing == Standing.ACCEPTED
 
 
-def test_another_session_of_the_same_holder_ends_the_one_before() -> None:
+def test_a_new_session_of_the_holder_ends_the_previous_one() -> None:
     rig = StreamRig()
     rig.answer(BASE)
     before = rig.packet(2)
@@ -218,7 +220,7 @@ def test_another_session_of_the_same_holder_ends_the_one_before() -> None:
     assert rig.block.samples["session"][:2].tolist() == [1, 2]
 
 
-def test_a_session_ends_with_the_right_that_it_was_given_for() -> None:
+def test_a_session_ends_with_its_right() -> None:
     rig = StreamRig()
     rig.answer(BASE)
     rig.lease.release(rig.token)
@@ -242,7 +244,7 @@ def test_a_session_renews_its_right_and_neither_takes_nor_releases_it() -> None:
     assert rig.lease.renew(rig.token).number == 1
 
 
-def test_who_was_silent_goes_on_while_the_right_lasts() -> None:
+def test_a_silent_session_continues_while_the_right_lasts() -> None:
     rig = StreamRig()
     rig.answer(BASE)
     assert rig.answer(BASE, ms=9000.0).standing == Standing.REPEATED
@@ -251,7 +253,7 @@ def test_who_was_silent_goes_on_while_the_right_lasts() -> None:
     assert rig.posted == 2
 
 
-def test_a_flood_from_the_holder_is_cut_to_what_the_loop_takes() -> None:
+def test_a_flood_from_the_holder_is_limited_to_the_allowed_rate() -> None:
     rig = StreamRig()
     standings = [rig.answer(replace(BASE, sequence=k), ms=0.5).standing for k in range(1, 2001)]
     accepted = standings.count(Standing.ACCEPTED)
@@ -260,7 +262,7 @@ def test_a_flood_from_the_holder_is_cut_to_what_the_loop_takes() -> None:
     assert rig.posted == accepted
 
 
-def test_repeating_what_the_holder_has_sent_neither_silences_nor_outlives_it() -> None:
+def test_replayed_packets_neither_block_the_holder_nor_renew_its_right() -> None:
     rig = StreamRig()
     rig.answer(BASE)
     for k in range(2, 62):
@@ -268,6 +270,6 @@ def test_repeating_what_the_holder_has_sent_neither_silences_nor_outlives_it() -
         assert standings == {Standing.REPEATED}
         assert rig.answer(replace(BASE, sequence=k)).standing == Standing.ACCEPTED
     rig.now_ns = rig.until_ns - 100 * MS
-    for _ in range(6):  # the holder is gone, its packets still come
+    for _ in range(6):  # the holder is gone, and its packets are repeated
         rig.answer(BASE)
     assert rig.lease.holder() is None

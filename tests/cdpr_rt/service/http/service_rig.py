@@ -1,4 +1,4 @@
-"""A service on real sockets, in a thread, over a loop that does as a test says."""
+"""A service on real sockets, in a thread, over a loop that tests control."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ NOT_TIGHT = {"code": "not_tight", "command": "pose", "asked": {}, "arguments": {
 
 
 class MadeUpLoop:
-    """Takes commands as the loop does, notes them, and writes rows while it `turns`."""
+    """Takes and records commands as the loop does, and writes rows while it `turns`."""
 
     def __init__(self, block: SharedBlock) -> None:
         self.block = block
@@ -63,7 +63,7 @@ class MadeUpLoop:
                     self.turn()
 
     def stand_still(self) -> None:
-        """Turn no more from now on."""
+        """Stop turning."""
         with self._turning:
             self.turns = False
 
@@ -124,7 +124,7 @@ class Rig:
             thread.join()
 
     def reset(self) -> None:
-        """Have everything as at the beginning, but for events and the count of cycles."""
+        """Restore the initial state, except for events and the count of cycles."""
         loop, lease = self.loop, self.service.lease
         loop.answers = loop.turns = True
         time.sleep(0.05)
@@ -209,7 +209,7 @@ def wait_for(seen: Callable[[], bool], seconds: float = 60.0) -> None:
 
 
 def raw(rig: Rig, text: bytes, wait_s: float = 5.0, port: int = 0) -> bytes:
-    """Send bytes, return what came until the other side closed or paused."""
+    """Send bytes and return those received until the other side closed or paused."""
     with socket.create_connection(("127.0.0.1", port or rig.port), wait_s) as sock:
         sock.sendall(text)
         sock.settimeout(wait_s)

@@ -1,4 +1,4 @@
-"""Who is let in: over real sockets."""
+"""Access control over real sockets."""
 
 from __future__ import annotations
 
@@ -33,14 +33,14 @@ UPGRADE = {
 
 
 @pytest.fixture
-def refused_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    """For tests with many wrong requests that are not about how late these are answered."""
+def without_throttling(monkeypatch: pytest.MonkeyPatch) -> None:
+    """For tests with many wrong requests that do not test delays of answers."""
     monkeypatch.setattr(access_control, "_THROTTLE_S", 0.0)
 
 
 @pytest.fixture
 def throttled(monkeypatch: pytest.MonkeyPatch) -> list[float]:
-    """How long each answer that was held back has been, in their order."""
+    """The delay of each throttled answer, in order."""
     delays_s: list[float] = []
 
     async def sleep(delay_s: float) -> None:
@@ -57,8 +57,8 @@ def throttled(monkeypatch: pytest.MonkeyPatch) -> list[float]:
 # -- the key
 
 
-@pytest.mark.usefixtures("refused_at_once")
-def test_without_the_key_there_is_the_status_and_nothing_else(rig: Rig) -> None:
+@pytest.mark.usefixtures("without_throttling")
+def test_without_the_key_only_the_status_is_readable(rig: Rig) -> None:
     with httpx.Client(base_url=rig.guarded_url) as client:
         assert client.get("/status").status_code == 200
         paths = client.get("/openapi.json").json()["paths"]
@@ -76,8 +76,8 @@ def test_without_the_key_there_is_the_status_and_nothing_else(rig: Rig) -> None:
     assert rig.loop.commands == []
 
 
-@pytest.mark.usefixtures("refused_at_once")
-def test_where_no_key_was_given_any_user_may_look_on_and_stop_and_nothing_else(rig: Rig) -> None:
+@pytest.mark.usefixtures("without_throttling")
+def test_without_a_key_file_anyone_may_read_and_stop_only(rig: Rig) -> None:
     with httpx.Client(base_url=rig.url) as client:
         refused = 0
         for path, methods in client.get("/openapi.json").json()["paths"].items():
@@ -101,7 +101,7 @@ def test_where_no_key_was_given_any_user_may_look_on_and_stop_and_nothing_else(r
     assert rig.service.lease.holder() is None
 
 
-@pytest.mark.usefixtures("refused_at_once")
+@pytest.mark.usefixtures("without_throttling")
 @pytest.mark.parametrize(
     "given",
     ["", "Bearer", "Bearer x", f"Basic {KEY.decode()}", f"Bearer {KEY.decode()}x", "Bearer \xe9"],
@@ -118,7 +118,7 @@ def test_the_key_opens_everything(rig: Rig) -> None:
     assert [command["do"] for command in rig.loop.commands] == ["hold"]
 
 
-def test_wrong_keys_are_answered_ever_more_slowly_and_the_right_one_at_once(
+def test_wrong_keys_are_throttled_and_the_right_one_is_not(
     rig: Rig, throttled: list[float]
 ) -> None:
     with httpx.Client(base_url=rig.guarded_url, headers={"Authorization": "Bearer x"}) as guesser:
@@ -131,7 +131,7 @@ def test_wrong_keys_are_answered_ever_more_slowly_and_the_right_one_at_once(
     assert throttled == [THROTTLE_S]
 
 
-def test_guesses_at_the_token_are_slowed_down_but_no_stop_is(
+def test_guesses_of_the_token_are_throttled_and_stops_are_not(
     rig: Rig, throttled: list[float]
 ) -> None:
     url = rig.guarded_url
@@ -158,7 +158,7 @@ def ticket_of(rig: Rig) -> str:
 
 
 def opened(rig: Rig, port: int, query: str, origin: str | None = None) -> int:
-    """Return the status of the answer to who opens the WebSocket of `/control`."""
+    """Return the status of the answer to opening the WebSocket of `/control`."""
     try:
         with connect(
             f"ws://127.0.0.1:{port}/control?client=page&{query}",
@@ -171,7 +171,7 @@ def opened(rig: Rig, port: int, query: str, origin: str | None = None) -> int:
     return 101
 
 
-def test_a_ticket_opens_one_websocket_where_the_key_is_asked(rig: Rig) -> None:
+def test_a_ticket_opens_one_websocket_instead_of_the_key(rig: Rig) -> None:
     ticket = ticket_of(rig)
     own = f"http://127.0.0.1:{rig.guarded_port}"
     assert opened(rig, rig.guarded_port, f"ticket={ticket}", own) == 101
@@ -179,22 +179,22 @@ def test_a_ticket_opens_one_websocket_where_the_key_is_asked(rig: Rig) -> None:
     assert httpx.post(f"{rig.guarded_url}/ticket").status_code == 401
 
 
-def test_a_ticket_is_of_no_use_to_another_page_or_at_another_address(rig: Rig) -> None:
+def test_a_ticket_opens_nothing_for_another_page_or_address(rig: Rig) -> None:
     ticket = ticket_of(rig)
     assert opened(rig, rig.guarded_port, f"ticket={ticket}", "http://evil.example") == 403
     assert opened(rig, rig.port, f"ticket={ticket}") == 401
     with httpx.Client(base_url=rig.guarded_url) as client:
         assert client.get("/events", params={"ticket": ticket}).status_code == 401
-    assert opened(rig, rig.guarded_port, f"ticket={ticket}") == 101  # nobody has used it up
+    assert opened(rig, rig.guarded_port, f"ticket={ticket}") == 101  # it is still unused
 
 
 @pytest.mark.parametrize("query", ["", "ticket=", "ticket=made-up", "x&" * 2000 + "ticket=1"])
-def test_without_a_ticket_that_was_given_no_websocket_opens(rig: Rig, query: str) -> None:
+def test_no_websocket_opens_without_a_valid_ticket(rig: Rig, query: str) -> None:
     ticket_of(rig)
     assert opened(rig, rig.guarded_port, query) == 401
 
 
-def test_a_ticket_is_good_for_a_short_time_and_there_are_not_many() -> None:
+def test_tickets_expire_and_their_number_is_limited() -> None:
     now_s = 0.0
     given = access_control.Tickets(lambda: now_s)
     late = given.issue()
@@ -204,25 +204,25 @@ def test_a_ticket_is_good_for_a_short_time_and_there_are_not_many() -> None:
     assert [given.redeem(one) for one in many] == [False] + [True] * access_control.MOST_TICKETS
 
 
-def test_the_description_names_the_key(rig: Rig) -> None:
+def test_the_openapi_description_names_the_key(rig: Rig) -> None:
     described = httpx.get(f"{rig.guarded_url}/openapi.json").json()
     assert described["components"]["securitySchemes"]["key"]["scheme"] == "bearer"
     assert described["paths"]["/enable"]["post"]["security"] == [{"key": []}]
     assert described["paths"]["/status"]["get"]["security"] == []
 
 
-# -- pages of others
+# -- other websites
 
 
 @pytest.mark.parametrize(
     "host", ["robot.example.com", "127.0.0.1.example.com", "localhost.evil:80", "", "[::1].x"]
 )
-def test_a_name_that_was_pointed_here_is_not_ours(rig: Rig, host: str) -> None:
+def test_a_foreign_host_name_is_rejected(rig: Rig, host: str) -> None:
     answer = httpx.get(f"{rig.url}/status", headers={"Host": host})
     assert answer.status_code == 403
 
 
-def test_nor_does_the_key_make_it_ours(rig: Rig) -> None:
+def test_a_foreign_host_name_is_rejected_also_with_the_key(rig: Rig) -> None:
     foreign = {"Host": "robot.example.com"}
     for path in ("/status", "/docs", "/control"):
         answer = httpx.get(f"{rig.guarded_url}{path}", headers={**RIGHT, **foreign})
@@ -253,7 +253,7 @@ def test_a_page_of_another_host_opens_no_websocket(
 
 
 @pytest.mark.parametrize("host", ["localhost", "LOCALHOST:8080", "127.0.0.1:1", "[::1]:99"])
-def test_this_machines_own_names_are_ours(rig: Rig, host: str) -> None:
+def test_names_of_this_machine_are_accepted(rig: Rig, host: str) -> None:
     assert httpx.get(f"{rig.url}/status", headers={"Host": host}).status_code == 200
 
 
@@ -266,7 +266,7 @@ def test_a_page_of_another_host_cannot_even_stop_the_robot(rig: Rig, origin: str
     assert rig.loop.commands == []
 
 
-def test_a_page_of_our_own_may(rig: Rig) -> None:
+def test_the_services_own_page_may_stop_the_robot(rig: Rig) -> None:
     assert httpx.post(f"{rig.url}/hold", headers={"Origin": rig.url}).status_code == 200
 
 
@@ -278,9 +278,7 @@ def test_the_unix_socket_is_for_this_user_only(rig: Rig) -> None:
     assert rig.socket.stat().st_uid == os.getuid()
 
 
-def test_a_socket_in_use_is_refused_and_one_left_behind_is_replaced(
-    rig: Rig, tmp_path: Path
-) -> None:
+def test_a_socket_in_use_is_rejected_and_a_stale_one_is_replaced(rig: Rig, tmp_path: Path) -> None:
     with pytest.raises(ListenError, match="another daemon listens there"):
         listen_unix(rig.socket)
     left = tmp_path / "left.sock"
@@ -290,7 +288,7 @@ def test_a_socket_in_use_is_refused_and_one_left_behind_is_replaced(
         assert listener_pid(left) == os.getpid()
 
 
-def test_a_file_in_the_sockets_place_is_left_alone(tmp_path: Path) -> None:
+def test_a_file_in_place_of_the_socket_is_left_unchanged(tmp_path: Path) -> None:
     file = tmp_path / "notes.txt"
     file.write_text("mine")
     with pytest.raises(ListenError, match="something else"):
@@ -298,10 +296,10 @@ def test_a_file_in_the_sockets_place_is_left_alone(tmp_path: Path) -> None:
     assert file.read_text() == "mine"
 
 
-def test_a_key_file_that_cannot_be_replaced_is_named(
+def test_a_socket_that_cannot_be_created_is_named(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def refuse(_path: Path) -> None:  # as of a stranger's socket in /tmp
+    def refuse(_path: Path) -> None:  # as for another user's socket in /tmp
         raise PermissionError(errno.EPERM, "Operation not permitted")
 
     left = tmp_path / "left.sock"
@@ -313,14 +311,14 @@ def test_a_key_file_that_cannot_be_replaced_is_named(
         listen_unix(tmp_path / (300 * "x"))
 
 
-def test_an_address_in_use_is_named(rig: Rig) -> None:
+def test_an_address_in_use_or_unknown_is_named(rig: Rig) -> None:
     with pytest.raises(ListenError, match=f"127.0.0.1:{rig.port}: .*in use"):
         listen_tcp("127.0.0.1", rig.port)
     with pytest.raises(ListenError, match=r"no\.such\.host"):
         listen_tcp("no.such.host.invalid", 1)
 
 
-def test_a_listener_on_loopback_does_not_answer_to_names_of_the_network() -> None:
+def test_a_listener_on_loopback_rejects_network_names() -> None:
     name = f"{socket.gethostname().lower()}.local:8000"
     assert is_own_host(name, AccessPolicy.on_tcp(None, "0.0.0.0").hosts)
     inside = AccessPolicy.on_tcp(None, "localhost", loopback=True)

@@ -1,4 +1,4 @@
-"""Clients that are too many, ask too much, or mean no good: over real sockets."""
+"""Too many clients, too many requests and hostile clients, over real sockets."""
 
 from __future__ import annotations
 
@@ -27,18 +27,20 @@ from tests.cdpr_rt.service.http.service_rig import KEY, Rig, raw, reachable, wai
 RIGHT = {"Authorization": f"Bearer {KEY.decode()}"}
 
 
-def test_a_body_too_large_is_not_taken_in(rig: Rig) -> None:
+def test_a_body_that_is_too_large_is_rejected(rig: Rig) -> None:
     with rig.client() as client:
         assert client.post("/hold", content=b"x" * 16385).status_code == 413
         endless = (b"x" * 4096 for _ in range(1 << 20))
-        with pytest.raises(httpx.HTTPError):  # the connection is closed in its face
+        with pytest.raises(httpx.HTTPError):  # the service closes the connection
             answer = client.post("/hold", content=endless)
             assert answer.status_code == 413
             raise httpx.WriteError("answered early")
     assert rig.loop.commands == []
 
 
-def test_a_body_that_never_comes_is_given_up(rig: Rig, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_request_whose_body_never_arrives_times_out(
+    rig: Rig, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(access_control, "_BODY_S", 0.3)
     head = b"POST /hold HTTP/1.1\r\nHost: localhost\r\nContent-Length: 10\r\n\r\n{"
     assert raw(rig, head, 60.0).startswith(b"HTTP/1.1 408")
@@ -53,7 +55,7 @@ def _ended(sock: socket.socket) -> bool:
 
 
 def _idle(rig: Rig, kind: str, most: int) -> list[socket.socket]:
-    """Open connections that say nothing."""
+    """Open connections that send nothing."""
     opened = []
     for _ in range(most):
         opened.append(
@@ -65,7 +67,7 @@ def _idle(rig: Rig, kind: str, most: int) -> list[socket.socket]:
 
 
 @pytest.mark.parametrize("kind", ["unix", "tcp"])
-def test_connections_that_ask_nothing_make_room_for_those_that_do(rig: Rig, kind: str) -> None:
+def test_idle_connections_are_closed_in_favour_of_new_ones(rig: Rig, kind: str) -> None:
     silent = _idle(rig, kind, 80)
     try:
         for _ in range(5):
@@ -82,14 +84,14 @@ def test_connections_that_ask_nothing_make_room_for_those_that_do(rig: Rig, kind
 
 @pytest.mark.parametrize("kind", ["unix", "tcp"])
 @pytest.mark.parametrize("have_asked", [False, True])
-def test_of_one_clients_idle_connections_only_some_are_kept(
+def test_only_a_limited_number_of_idle_connections_per_client_is_kept(
     rig: Rig, kind: str, have_asked: bool
 ) -> None:
     more = 6
     kept = _idle(rig, kind, server.MOST_IDLE_OF_PEER + more)
     try:
         for sock in kept if have_asked else ():
-            with suppress(ConnectionError):  # ended while it was idle
+            with suppress(ConnectionError):  # the service closed it while it was idle
                 sock.sendall(b"HEAD /status HTTP/1.1\r\nHost: localhost\r\n\r\n")
                 sock.recv(4096)
         wait_for(lambda: sum(map(_has_ended, kept)) == more, 5.0)
@@ -105,8 +107,8 @@ def _has_ended(sock: socket.socket) -> bool:
     return bool(poll.poll(0))
 
 
-def test_one_client_cannot_keep_all_requests_waiting_and_its_stop_is_taken(rig: Rig) -> None:
-    rig.loop.answers = False  # whatever is asked of it is waited for
+def test_waiting_requests_of_one_client_block_neither_others_nor_its_stop(rig: Rig) -> None:
+    rig.loop.answers = False  # so that each request waits
     head = (
         b"POST /check HTTP/1.1\r\nHost: localhost\r\nAuthorization: Bearer "
         + KEY
@@ -152,7 +154,7 @@ asyncio.run(guess_all())
 """
 
 
-def test_wrong_keys_from_the_same_address_do_not_shut_out_the_right_one(rig: Rig) -> None:
+def test_wrong_keys_from_the_same_address_do_not_block_the_right_one(rig: Rig) -> None:
     command = [sys.executable, "-c", GUESSING, str(rig.guarded_port)]
     with subprocess.Popen(command, stdout=subprocess.PIPE) as guessing:
         try:
@@ -170,14 +172,16 @@ def test_wrong_keys_from_the_same_address_do_not_shut_out_the_right_one(rig: Rig
 
 
 @pytest.mark.parametrize("sent", [b"", b"GET /sta", b"GET /status HTTP/1.1\r\nHost: local"])
-def test_a_connection_that_asks_nothing_is_ended(
+def test_an_idle_connection_is_closed(
     rig: Rig, monkeypatch: pytest.MonkeyPatch, sent: bytes
 ) -> None:
     monkeypatch.setattr(server, "IDLE_S", 0.2)
     assert raw(rig, sent, 3600.0) == b""
 
 
-def test_an_answer_that_is_not_taken_is_given_up(rig: Rig, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_answer_that_the_client_does_not_read_is_abandoned(
+    rig: Rig, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(server, "ANSWER_S", 0.5)
     with socket.socket(socket.AF_UNIX) as sock:
         sock.connect(str(rig.socket))
@@ -194,7 +198,7 @@ def test_an_answer_that_is_not_taken_is_given_up(rig: Rig, monkeypatch: pytest.M
 @pytest.mark.parametrize(
     "head", ["?" + 2500 * "a=1&" + " HTTP/1.1", " HTTP/1.1" + 300 * "\r\nA: b"]
 )
-def test_a_websocket_that_is_not_understood_is_ended(
+def test_a_websocket_with_an_oversized_head_is_closed(
     rig: Rig, head: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(server, "IDLE_S", 0.2)
@@ -239,7 +243,7 @@ def test_malformed_requests_have_no_effect(
     assert [one.getMessage() for one in caplog.records if one.levelno >= logging.ERROR] == []
 
 
-def test_a_client_that_resets_its_connection_is_forgotten(rig: Rig) -> None:
+def test_reset_connections_do_not_use_up_the_limit(rig: Rig) -> None:
     for _ in range(50):
         sock = socket.create_connection(("127.0.0.1", rig.port))
         sock.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
@@ -248,10 +252,10 @@ def test_a_client_that_resets_its_connection_is_forgotten(rig: Rig) -> None:
     assert reachable(rig)
 
 
-# How many requests are taken.
+# Limits of requests.
 
 
-def test_requests_without_end_are_slowed_down_and_a_stop_still_comes_through(rig: Rig) -> None:
+def test_a_flood_of_requests_is_limited_and_a_stop_still_accepted(rig: Rig) -> None:
     connection = http.client.HTTPConnection("127.0.0.1", rig.port, timeout=10.0)
     answers = set()
     while 429 not in answers:
@@ -266,7 +270,7 @@ def test_requests_without_end_are_slowed_down_and_a_stop_still_comes_through(rig
         assert client.get("/control").status_code == 200
 
 
-def test_a_flood_does_not_shut_out_the_one_that_may_move_from_the_same_address(
+def test_a_flood_does_not_block_the_holder_of_the_right_at_the_same_address(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(access_control, "time", SimpleNamespace(monotonic=lambda: 0.0))
@@ -281,7 +285,7 @@ def test_a_flood_does_not_shut_out_the_one_that_may_move_from_the_same_address(
 
 
 @pytest.mark.parametrize("path", sorted(access_control.STOP_PATHS))
-def test_only_what_stops_is_free_from_the_measure_of_requests(
+def test_only_stops_are_exempt_from_the_request_limit(
     path: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(access_control, "time", SimpleNamespace(monotonic=lambda: 0.0))
@@ -300,7 +304,7 @@ def test_only_what_stops_is_free_from_the_measure_of_requests(
 def _asking(
     holds_right: Callable[[str], bool], policy: AccessPolicy
 ) -> Callable[..., Coroutine[Any, Any, int]]:
-    """Return what asks over TCP with the key and returns the status of the answer."""
+    """Return a function that sends a request with the key and returns the answer's status."""
 
     async def app(scope: Any, receive: Any, send: Any) -> None:
         await send({"type": "http.response.start", "status": 200, "headers": []})

@@ -1,4 +1,4 @@
-"""Commands, the right to move, status, events and metrics over a real socket."""
+"""Commands and the right to move over a real socket."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def test_motion_without_the_right_to_move_never_reaches_the_loop(rig: Rig) -> No
     assert rig.loop.commands == []
 
 
-def test_its_holder_moves_and_others_are_reported_who_that_is(rig: Rig) -> None:
+def test_the_holder_of_the_right_moves_and_others_learn_its_name(rig: Rig) -> None:
     with rig.client() as client:
         headers = take(client)
         wanted = {"velocity_rad_s": [0.5, 0]}
@@ -63,7 +63,7 @@ def test_its_holder_moves_and_others_are_reported_who_that_is(rig: Rig) -> None:
     assert command["client"] == "maria"
 
 
-def test_an_order_carries_the_number_of_the_grant_it_was_given_under(rig: Rig) -> None:
+def test_a_command_carries_the_number_of_its_grant(rig: Rig) -> None:
     with rig.client() as client:
         for name in ("maria", "jan"):
             headers = take(client, name)
@@ -78,10 +78,10 @@ def test_an_order_carries_the_number_of_the_grant_it_was_given_under(rig: Rig) -
         client.post("/hold")
     numbers = [command.get("right") for command in rig.loop.commands]
     last = int(rig.block.counters["right_number"][0])
-    assert numbers == [last - 1] * 4 + [last] * 4 + [None], "hold is everybody's"
+    assert numbers == [last - 1] * 4 + [last] * 4 + [None], "hold needs no right"
 
 
-def test_power_on_needs_no_body(rig: Rig) -> None:
+def test_enable_needs_no_body(rig: Rig) -> None:
     with rig.client() as client:
         assert client.post("/enable", headers=take(client)).status_code == 200
     assert rig.loop.commands[-1]["program"] == "hold"
@@ -98,7 +98,7 @@ def test_malformed_json_and_invalid_values_have_different_errors(rig: Rig, path:
     assert rig.loop.commands == []
 
 
-def test_the_holder_alone_is_given_a_session_of_the_stream(rig: Rig) -> None:
+def test_only_the_holder_of_the_right_is_given_a_stream_session(rig: Rig) -> None:
     with rig.client() as client:
         headers = take(client)
         answer = client.post("/stream", headers=headers)
@@ -131,14 +131,14 @@ def test_the_holder_alone_is_given_a_session_of_the_stream(rig: Rig) -> None:
 
 
 @pytest.mark.parametrize("do", ["hold", "disable", "shutdown"])
-def test_anybody_may_stop_while_somebody_else_moves(rig: Rig, do: str) -> None:
+def test_anyone_may_stop_while_another_client_moves(rig: Rig, do: str) -> None:
     with rig.client() as client:
         take(client)
         assert client.post(f"/{do}").status_code == 200
     assert [command["do"] for command in rig.loop.commands] == [do]
 
 
-def test_a_shutdown_reaches_the_loop_before_anything_is_done_to_the_launcher(rig: Rig) -> None:
+def test_a_shutdown_reaches_the_loop_before_the_launcher_wakes(rig: Rig) -> None:
     reached: list[list[str]] = []
 
     def wake() -> None:
@@ -153,7 +153,7 @@ def test_a_shutdown_reaches_the_loop_before_anything_is_done_to_the_launcher(rig
     assert reached == [["shutdown"]]
 
 
-def test_silence_ends_the_right_by_itself(rig: Rig, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_silence_ends_the_right_to_move(rig: Rig, monkeypatch: pytest.MonkeyPatch) -> None:
     ahead_ns = 0
     monkeypatch.setattr(rig.service.lease, "_clock_ns", lambda: time.monotonic_ns() + ahead_ns)
     with rig.client() as client:
@@ -167,14 +167,14 @@ def test_silence_ends_the_right_by_itself(rig: Rig, monkeypatch: pytest.MonkeyPa
         take(client, "jan")
 
 
-def test_released_the_loop_knows_at_once(rig: Rig) -> None:
+def test_a_released_right_ends_immediately_in_the_loop(rig: Rig) -> None:
     with rig.client() as client:
         headers = take(client, ttl_s=10.0)
         assert client.delete("/control", headers=headers).json()["held"] is False
     assert rig.lease_left_s < 0.0
 
 
-def test_the_right_outlasts_a_command_that_takes_long_but_not_a_client_that_leaves(
+def test_the_right_outlasts_a_long_command_but_not_a_client_that_disconnects(
     rig: Rig,
 ) -> None:
     rig.loop.answers = False
@@ -207,9 +207,7 @@ def test_a_refusal_of_the_loop_is_returned_with_its_state(rig: Rig) -> None:
     assert answer.json()["refusal"] == NOT_TIGHT
 
 
-def test_many_who_ask_for_hold_at_once_are_one_command(
-    rig: Rig, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_simultaneous_holds_are_one_command(rig: Rig, monkeypatch: pytest.MonkeyPatch) -> None:
     rig.loop.answers = False
     answers: list[int] = []
     asked: list[str] = []
@@ -217,7 +215,7 @@ def test_many_who_ask_for_hold_at_once_are_one_command(
 
     async def counted(do: str, wait_s: float, **fields: Any) -> Any:
         answer = asyncio.create_task(command(do, 10.0 * wait_s, **fields))
-        await asyncio.sleep(0.0)  # it is on its way before the loop may answer
+        await asyncio.sleep(0.0)  # it is posted before the loop may answer
         asked.append(do)
         return await answer
 
@@ -238,7 +236,7 @@ def test_many_who_ask_for_hold_at_once_are_one_command(
     assert [command["do"] for command in rig.loop.commands] == ["hold"]
 
 
-def test_a_loop_that_does_not_answer_is_said_to(rig: Rig) -> None:
+def test_a_loop_that_does_not_answer_is_reported(rig: Rig) -> None:
     rig.loop.answers = False
     with rig.client() as client:
         answer = client.post("/hold")
@@ -257,7 +255,7 @@ def test_a_loop_that_does_not_turn_gets_no_commands(rig: Rig) -> None:
     assert rig.block.take_command() is None
 
 
-def test_a_loop_that_dies_is_said_to_be_dead_also_to_those_who_wait(own_rig: Rig) -> None:
+def test_a_dead_loop_is_reported_also_to_waiting_clients(own_rig: Rig) -> None:
     rig = own_rig
     rig.loop.answers = False
     process = subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE)
@@ -330,7 +328,7 @@ def test_meaningless_values_are_rejected_by_name(
         ("", ""),
     ],
 )
-def test_however_deep_a_body_is_it_is_refused_and_nothing_breaks(
+def test_a_body_of_any_depth_is_rejected_without_a_traceback(
     rig: Rig, capfd: pytest.CaptureFixture[str], depth: int, before: str, after: str
 ) -> None:
     with rig.client() as client:
@@ -344,7 +342,7 @@ def test_however_deep_a_body_is_it_is_refused_and_nothing_breaks(
     assert capfd.readouterr().err == ""
 
 
-def test_a_long_body_of_many_keys_is_refused_before_it_is_parsed(rig: Rig) -> None:
+def test_a_long_body_other_than_a_file_is_rejected_before_parsing(rig: Rig) -> None:
     many = "{" + ",".join(f'"k{k}":1' for k in range(150_000)) + "}"
     flood = ["1," * 900_000, "[" * 1_900_000, '"' * 1_900_000, "9" * 1_900_000, many]
     with rig.client() as client:
@@ -354,11 +352,11 @@ def test_a_long_body_of_many_keys_is_refused_before_it_is_parsed(rig: Rig) -> No
             assert answer.json()["error"].startswith("body: more than 16384 bytes; allowed: ")
 
 
-def test_a_long_file_is_taken_whatever_signs_are_in_it(rig: Rig) -> None:
+def test_a_long_file_is_accepted_with_any_characters(rig: Rig) -> None:
     text = 'G1 X1 ("a", [b]: {c})\\\n' * 60_000
     with rig.client() as client:
         answer = client.post("/path", json={"name": "part.nc", "text": text})
-    assert answer.status_code == 409, "validated, and refused as this service has no planner"
+    assert answer.status_code == 409, "validated, and rejected because this service has no planner"
     assert "plans no paths" in answer.json()["error"]
 
 
@@ -371,7 +369,7 @@ def test_only_one_of_many_unknown_keys_is_reported() -> None:
         assert "key0" in str(refused.value)
 
 
-def test_a_command_too_long_for_the_loop_is_refused(rig: Rig) -> None:
+def test_a_command_too_long_for_the_loop_is_rejected(rig: Rig) -> None:
     wanted = {f"key_{k}": ["x" * 64] * 3 for k in range(30)}
     with rig.client() as client:
         answer = client.post("/set", json={"wanted": wanted}, headers=take(client))

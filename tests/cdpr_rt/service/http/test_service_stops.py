@@ -1,4 +1,4 @@
-"""Stops come before all else, but not those of strangers without end: over real sockets."""
+"""Stops during floods and planning, over real sockets."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ from tests.cdpr_rt.service.http.service_rig import KEY, Rig, wait_for
 RIGHT = {"Authorization": f"Bearer {KEY.decode()}"}
 
 
-def test_no_stop_is_one_too_many(rig: Rig) -> None:
-    """One client asks for a hold as fast as it can; another disables all the while."""
+def test_every_stop_of_a_flood_is_accepted(rig: Rig) -> None:
+    """Two clients send holds as fast as they can while others disable."""
     ended = threading.Event()
     seen: Counter[int] = Counter()
 
@@ -43,7 +43,7 @@ def test_no_stop_is_one_too_many(rig: Rig) -> None:
     assert set(seen) == {200}
 
 
-def test_a_stop_that_the_loop_took_itself_is_noted_once_and_ends_the_planning(rig: Rig) -> None:
+def test_a_stop_taken_by_the_loop_is_one_event_and_cancels_planning(rig: Rig) -> None:
     planned = threading.Event()
 
     async def plan(_file: Path, _request: dict[str, Any]) -> tuple[int, str]:

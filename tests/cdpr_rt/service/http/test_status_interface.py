@@ -1,4 +1,4 @@
-"""Status, events, metrics and the page of the interface, over a real socket."""
+"""Status, events, metrics and the interface's page, over a real socket."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ class Unstartable:
         raise OSError("no folder to record into")
 
 
-def test_the_status_tells_what_does_not_work_of_what_was_asked_for(own_rig: Rig) -> None:
+def test_the_status_reports_parts_that_have_failed(own_rig: Rig) -> None:
     service = own_rig.service
     sock = listen_udp("127.0.0.1", 0)
     ended = partial(service.note_failure, SetpointStream.name)
@@ -53,7 +53,7 @@ def test_status_is_strict_json_with_every_axis(rig: Rig) -> None:
     assert status["cycle"]["state"] == "ready"
 
 
-def test_events_tell_what_happened_in_order(rig: Rig) -> None:
+def test_events_are_reported_in_order(rig: Rig) -> None:
     with rig.client() as client:
         wait_for(lambda: bool(client.get("/events").json()["events"]))
         last = client.get("/events").json()["events"][-1]["number"]
@@ -73,7 +73,7 @@ def test_events_tell_what_happened_in_order(rig: Rig) -> None:
     assert "5 allowed" in found[2]["text"]
 
 
-def test_metrics_are_read_by_prometheus_own_parser_and_count_every_cycle(own_rig: Rig) -> None:
+def test_prometheus_parser_reads_the_metrics_and_every_cycle_is_counted(own_rig: Rig) -> None:
     rig = own_rig
     with rig.client() as client:
         wait_for(lambda: int(rig.block.counters["rows"][0]) > 500)
@@ -102,7 +102,7 @@ def test_metrics_are_read_by_prometheus_own_parser_and_count_every_cycle(own_rig
     assert samples[("cdpr_stream_age_seconds", ())] == 0.0
 
 
-def test_the_page_needs_nothing_from_elsewhere(rig: Rig) -> None:
+def test_the_page_loads_nothing_from_other_hosts(rig: Rig) -> None:
     with rig.client() as client:
         answer = client.get("/docs")
         paths = client.get("/openapi.json").json()["paths"]

@@ -1,4 +1,4 @@
-"""The WebSockets: figures as they come, readers that do not read, the right to move."""
+"""The WebSockets: live values, clients that do not read, and the right to move."""
 
 from __future__ import annotations
 
@@ -52,10 +52,10 @@ def closed_for(connection: ClientConnection) -> tuple[int, str]:
     return closing.value.rcvd.code, closing.value.rcvd.reason
 
 
-# -- looking on
+# -- live values
 
 
-def test_it_begins_with_what_stays_and_goes_on_with_what_changes(rig: Rig) -> None:
+def test_live_sends_description_and_status_first_and_then_changes(rig: Rig) -> None:
     with open_unix(rig, "/live?rate_Hz=50&fields=cycle,position_rad,tension_N") as connection:
         messages = [json.loads(connection.recv(60.0)) for _ in range(30)]
         rig.loop.publish(state="fault", reason="broken cable of left")
@@ -78,8 +78,8 @@ def test_it_begins_with_what_stays_and_goes_on_with_what_changes(rig: Rig) -> No
     assert "velocity_rad_s" not in cycles[0]
 
 
-def test_never_faster_than_asked_for(rig: Rig) -> None:
-    begin = time.monotonic()  # before all that may be sent while nobody here reads
+def test_live_never_exceeds_the_requested_rate(rig: Rig) -> None:
+    begin = time.monotonic()  # before messages may be sent that are not read yet
     with open_unix(rig, "/live?rate_Hz=10&fields=cycle") as connection:
         cycles = 0
         while cycles < 8:
@@ -88,18 +88,18 @@ def test_never_faster_than_asked_for(rig: Rig) -> None:
 
 
 @pytest.mark.parametrize("query", ["rate_Hz=51", "rate_Hz=0", "rate_Hz=nan", "rate_Hz=x"])
-def test_no_rate_beyond_what_a_person_can_see(rig: Rig, query: str) -> None:
+def test_invalid_and_excessive_rates_are_rejected(rig: Rig, query: str) -> None:
     with pytest.raises(InvalidStatus):
         open_unix(rig, f"/live?{query}")
 
 
-def test_a_field_that_no_cycle_has_is_named(rig: Rig) -> None:
+def test_an_unknown_field_is_named(rig: Rig) -> None:
     with open_unix(rig, "/live?fields=cycle,colour") as connection:
         assert closed_for(connection) == (1008, "fields: colour is not a field of a cycle")
 
 
 @pytest.mark.parametrize("letter", ["\x01", "\u00e9", "\U0001fff0"])
-def test_a_field_of_strange_letters_is_refused_without_a_traceback(
+def test_a_field_with_odd_characters_is_rejected_without_a_traceback(
     rig: Rig, letter: str, caplog: pytest.LogCaptureFixture
 ) -> None:
     with open_unix(rig, f"/live?fields={quote(80 * letter)}") as connection:
@@ -109,7 +109,7 @@ def test_a_field_of_strange_letters_is_refused_without_a_traceback(
     assert caplog.text == ""
 
 
-def test_who_answers_no_ping_is_released_without_a_traceback(
+def test_a_client_that_answers_no_ping_is_dropped_without_a_traceback(
     rig: Rig, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     protocol = WebSocketsSansIOProtocol
@@ -120,7 +120,7 @@ def test_who_answers_no_ping_is_released_without_a_traceback(
     assert caplog.text == ""
 
 
-def test_a_client_that_does_not_read_is_dropped_and_others_are_not(rig: Rig) -> None:
+def test_only_the_client_that_does_not_read_is_dropped(rig: Rig) -> None:
     asleep = socket.create_connection(("127.0.0.1", rig.port))
     asleep.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
     asleep.sendall(
@@ -131,7 +131,7 @@ def test_a_client_that_does_not_read_is_dropped_and_others_are_not(rig: Rig) -> 
     with open_unix(rig, "/live?rate_Hz=50&fields=cycle") as connection:
         deadline = time.monotonic() + 300.0
         wait_for(lambda: rig.service.counts["live_clients"] == 2)
-        while rig.service.counts["live_clients"] == 2:  # it answers no ping either
+        while rig.service.counts["live_clients"] == 2:  # nor does it answer pings
             connection.recv(60.0)
             assert time.monotonic() < deadline
         json.loads(connection.recv(60.0))
@@ -139,7 +139,7 @@ def test_a_client_that_does_not_read_is_dropped_and_others_are_not(rig: Rig) -> 
     wait_for(lambda: rig.service.counts["live_clients"] == 0)
 
 
-def test_pings_whose_answers_nobody_reads_do_not_pile_up(rig: Rig) -> None:
+def test_a_flood_of_pings_without_reading_ends_the_connection(rig: Rig) -> None:
     flood = socket.create_connection(("127.0.0.1", rig.guarded_port))
     flood.sendall(
         b"GET /control?client=x&ttl_s=10 HTTP/1.1\r\nHost: localhost\r\nConnection: Upgrade\r\n"
@@ -157,7 +157,7 @@ def test_pings_whose_answers_nobody_reads_do_not_pile_up(rig: Rig) -> None:
     flood.close()
 
 
-def test_no_more_lookers_on_than_can_be_served(rig: Rig) -> None:
+def test_the_number_of_live_clients_is_limited(rig: Rig) -> None:
     with ExitStack() as watching:
         for _ in range(websocket_routes._MOST_LIVE):
             watching.enter_context(open_unix(rig, "/live?rate_Hz=1"))
@@ -194,7 +194,7 @@ def test_the_connection_is_the_right_to_move(rig: Rig) -> None:
     assert rig.loop.commands[2]["client"] == "maria"
 
 
-def test_a_hold_goes_before_all_orders_of_its_own_connection(rig: Rig) -> None:
+def test_a_hold_overtakes_and_cancels_earlier_requests_of_its_connection(rig: Rig) -> None:
     rig.loop.answers = False
     with open_unix(rig, "/control?client=maria&ttl_s=10") as connection:
         connection.recv(60.0)
@@ -206,16 +206,16 @@ def test_a_hold_goes_before_all_orders_of_its_own_connection(rig: Rig) -> None:
         refused = [json.loads(connection.recv(60.0)) for _ in range(2)]
         assert [(one["id"], one["ok"]) for one in refused] == [(1, False), (2, False)]
         assert refused[0]["error"] == "set: a stop was asked for after it"
-        wait_for(lambda: len(rig.service.link._pending) >= 2)  # the hold is posted as well
+        wait_for(lambda: len(rig.service.link._pending) >= 2)  # the hold is posted too
         rig.loop.answers = True
         answers = {one["id"]: one for one in (json.loads(connection.recv(60.0)) for _ in range(3))}
         assert answers.keys() == {0, 3, 4}
         assert answers[3]["ok"] and answers[4]["ok"]
-    # this loop, unlike the real one, obeys what a stop has made void
+    # unlike the real loop, this one obeys requests that a stop has cancelled
     assert [command["do"] for command in rig.loop.commands] == ["hold", "program", "set"]
 
 
-def test_who_goes_while_an_order_waits_loses_the_right_at_once(rig: Rig) -> None:
+def test_a_client_that_disconnects_while_waiting_loses_the_right_immediately(rig: Rig) -> None:
     rig.loop.answers = False
     with open_unix(rig, "/control?client=maria&ttl_s=10") as connection:
         connection.recv(60.0)
@@ -225,7 +225,7 @@ def test_who_goes_while_an_order_waits_loses_the_right_at_once(rig: Rig) -> None
         wait_for(lambda: rig.lease_until_s == 0.0)
 
 
-def test_who_waits_for_an_answer_is_not_called_silent(
+def test_a_client_waiting_for_an_answer_keeps_the_right(
     rig: Rig, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     rig.loop.answers = False
@@ -243,7 +243,7 @@ def test_who_waits_for_an_answer_is_not_called_silent(
         assert json.loads(connection.recv(60.0))["ok"] is True
 
 
-def test_who_has_lost_the_right_may_stop_all_the_same(rig: Rig) -> None:
+def test_a_client_that_has_lost_the_right_may_still_stop(rig: Rig) -> None:
     with open_unix(rig, "/control?client=maria&ttl_s=10") as connection:
         token = json.loads(connection.recv(60.0))["token"]
         rig.service.lease.release(token)
@@ -253,7 +253,7 @@ def test_who_has_lost_the_right_may_stop_all_the_same(rig: Rig) -> None:
     assert [command["do"] for command in rig.loop.commands] == ["hold"]
 
 
-def test_a_client_that_is_there_but_silent_loses_it(rig: Rig) -> None:
+def test_a_silent_client_loses_the_right(rig: Rig) -> None:
     with open_unix(rig, "/control?client=maria&ttl_s=4") as connection:
         connection.recv(60.0)
         assert ask(connection, do="renew")["ok"] is True
@@ -280,7 +280,7 @@ def test_a_client_that_is_there_but_silent_loses_it(rig: Rig) -> None:
         b'{"do": "hold"}',
     ],
 )
-def test_nonsense_is_answered_and_moves_nothing(rig: Rig, text: str | bytes) -> None:
+def test_invalid_messages_are_answered_and_have_no_effect(rig: Rig, text: str | bytes) -> None:
     with open_unix(rig, "/control?client=maria&ttl_s=10") as connection:
         connection.recv(60.0)
         connection.send(text)
@@ -303,10 +303,10 @@ def test_binary_messages_close_the_connection_without_a_traceback(
     assert rig.loop.commands == []
 
 
-def test_a_message_too_long_or_too_many_end_the_connection(
+def test_a_message_too_long_or_too_many_messages_end_the_connection(
     rig: Rig, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    # however long it takes to read all of them, they have come at once
+    # all messages arrive at the same time, however long reading them takes
     monkeypatch.setattr(control_socket, "time", SimpleNamespace(monotonic=lambda: 0.0))
     with open_unix(rig, "/control?client=maria") as connection:
         connection.recv(60.0)
