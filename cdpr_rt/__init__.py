@@ -16,6 +16,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from cdpr_rt.model.own_distribution import TensionDistribution
     from cdpr_rt.offline import Model, load
     from cdpr_rt.platform.own_controller import Controller, State, Target
     from cdpr_rt.robot import (
@@ -48,6 +49,7 @@ __all__ = [
     "Robot",
     "State",
     "Target",
+    "TensionDistribution",
     "connect",
     "load",
     "run",
@@ -63,6 +65,7 @@ _HOMES = {
     "simulate": "cdpr_tools.lockstep_robot",
     "State": "cdpr_rt.platform.own_controller",
     "Target": "cdpr_rt.platform.own_controller",
+    "TensionDistribution": "cdpr_rt.model.own_distribution",
 }
 """Modules of these names; all others are in `cdpr_rt.robot`."""
 

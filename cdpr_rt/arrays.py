@@ -19,3 +19,10 @@ def rms(values: FloatArray) -> float:
     It is nan if there are none.
     """
     return math.sqrt(float(np.square(values).sum()) / len(values)) if len(values) else math.nan
+
+
+def read_only(array: FloatArray) -> FloatArray:
+    """Return a view that shows the values of `array` and cannot be written."""
+    view = array.view()
+    view.flags.writeable = False
+    return view

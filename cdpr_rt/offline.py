@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -10,25 +12,44 @@ from numpy.typing import ArrayLike
 from cdpr_profiles import load_robot
 from cdpr_profiles.errors import ProfileError
 from cdpr_rt.arrays import BoolArray, FloatArray
-from cdpr_rt.errors import GeometryError
+from cdpr_rt.errors import ControlError
+from cdpr_rt.model.own_distribution import (
+    TensionDistribution,
+    TensionDistributionError,
+    named_distribution,
+    require_code_allowed,
+)
 from cdpr_rt.model.platform_model import PlatformModel, platform_model_of
 from cdpr_rt.model.pose import Pose
 from cdpr_rt.model.rigid_body import in_space
 from cdpr_rt.robot import InvalidArgument, InvalidRobot
 
 
-def load(robot: str | Path) -> Model:
+def load(
+    robot: str | Path,
+    *,
+    tension_distribution: TensionDistribution | None = None,
+    allow_code: bool = False,
+) -> Model:
     """Return the model of a robot from its name or file. Nothing is started.
 
-    Raises InvalidRobot if the robot is unknown, if its file cannot be used, or if it has no
-    platform.
+    `tension_distribution` replaces the one that the file names. If the file names code,
+    `allow_code` allows it from now on; `Model.tensions` runs it. Raises InvalidRobot if the robot
+    is unknown, if its file cannot be used, or if it has no platform.
     """
     try:
         profile = load_robot(robot)
         if profile.platform is None:
             raise InvalidRobot(f"{profile.path}: the robot has no platform; add a [platform] table")
-        return Model(platform_model_of(profile), [axis.name for axis in profile.axes])
-    except (ProfileError, GeometryError) as error:
+        if allow_code:
+            require_code_allowed(profile, allow_code=True)
+        own = tension_distribution
+        return Model(
+            platform_model_of(profile),
+            [axis.name for axis in profile.axes],
+            lambda: own or named_distribution(profile),
+        )
+    except (ProfileError, ControlError) as error:
         raise InvalidRobot(str(error)) from error
 
 
@@ -43,9 +64,15 @@ class Model:
     InvalidArgument for a wrong shape and for nan.
     """
 
-    def __init__(self, model: PlatformModel, cables: list[str]) -> None:
-        """Take the platform's model and the names of the cables."""
+    def __init__(
+        self,
+        model: PlatformModel,
+        cables: list[str],
+        own_distribution: Callable[[], TensionDistribution | None] = lambda: None,
+    ) -> None:
+        """Take the platform's model, the names of the cables, and a distribution's loader."""
         self._model = model
+        self._own_distribution = cache(own_distribution)
         self.cables = cables
         """Names of the n cables."""
 
@@ -132,6 +159,8 @@ class Model:
 
         `wrench` (d,) or (..., d) acts on the platform besides gravity. Tensions are in the middle
         of the cables, and keep the controller's reserve from both bounds. nan where there are none.
+        A distribution of your own gets the built-in one's tensions as `previous`. Raises
+        InvalidRobot if code that the file names must not run, and InvalidArgument if it fails.
         """
         rows, shape = self._rows(position)
         acting = np.zeros((len(rows), 6))
@@ -139,9 +168,14 @@ class Model:
         force = acting[:, :3] + self._weight_N()
         # about the centre of mass, where gravity has no moment
         moment = acting[:, 3:] - np.cross(self._centres_m(rows), acting[:, :3])
-        found, carried = self._model.planned_tensions(
-            self._model.poses(rows), self._reduced(force, moment)
-        )
+        try:
+            found, carried = self._model.planned_tensions(
+                self._model.poses(rows), self._reduced(force, moment), self._own_distribution()
+            )
+        except ProfileError as error:
+            raise InvalidRobot(str(error)) from error
+        except TensionDistributionError as error:
+            raise InvalidArgument(str(error)) from error
         found[~carried] = np.nan
         return found.reshape(*shape, self.n)
 

@@ -1,8 +1,10 @@
 """The platform of a cable robot: mass, exit and anchor points, workspace, limits."""
 
 import math
+import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from importlib.metadata import entry_points
 from itertools import combinations, product
 from typing import Annotated, Any, Final, Literal
 
@@ -63,8 +65,25 @@ _Rotation = Annotated[
 ]
 """A single number is an array of one."""
 
-TensionMethod = Literal["minimum-norm", "minimum-deviation", "closed-form", "polygon-centroid"]
-"""Methods of tension distribution."""
+TENSION_METHODS: Final = ("minimum-norm", "minimum-deviation", "closed-form", "polygon-centroid")
+"""Built-in methods of tension distribution."""
+DISTRIBUTIONS: Final = "cdpr_rt.tension_distributions"
+"""Group of entry points under which installed packages register further ones by name."""
+_USUAL_METHOD: Final = "minimum-deviation"
+_IN_FILE: Final = re.compile(r"[^:\0]+\.py:[^\W\d]\w*")
+
+
+def _known_distribution(value: str) -> str:
+    """Raise ValueError if no distribution is called `value`; its code is not loaded."""
+    if value in TENSION_METHODS or _IN_FILE.fullmatch(value):
+        return value
+    names = [point.name for point in entry_points(group=DISTRIBUTIONS)]
+    if value not in names:
+        allowed = ", ".join(map(repr, (*TENSION_METHODS, *names)))
+        raise ValueError(f"value {value_text(value)}; allowed: {allowed} or 'FILE.py:NAME'")
+    return value
+
+
 CableModelName = Literal["rigid", "elastic", "catenary"]
 DirectionName = Literal["x", "y", "z", "angle", "rx", "ry", "rz"]
 DIRECTIONS: Final[dict[int, tuple[DirectionName, ...]]] = {
@@ -121,7 +140,8 @@ class PlatformFile(Profile):
     """Along and about each direction, on paths; by default the acceleration is reached in 0.1 s."""
     controlled: tuple[DirectionName, ...] | None = None
     """Directions that the cables control; by default all that they can."""
-    tension_distribution: TensionMethod = "minimum-deviation"
+    tension_distribution: Annotated[str, AfterValidator(_known_distribution)] = _USUAL_METHOD
+    """A built-in method, a name that an installed package registers, or FILE.py:NAME."""
     cable_model: CableModelName = "elastic"
     clearance_m: float | None = Field(default=None, gt=0, le=1)
     """Two cables (centre lines), or a cable and a box, are in contact if nearer than this."""
@@ -161,7 +181,7 @@ class Platform:
     angular_jerk_rad_s3: float = 0.0
     controlled: tuple[str, ...] = ()
     """Some of DIRECTIONS, in their order."""
-    tension_distribution: str = "minimum-deviation"
+    tension_distribution: str = _USUAL_METHOD
     cable_model: str = "elastic"
     clearance_m: float = CLEARANCE_m
     body: BoxFile | None = None
@@ -196,6 +216,18 @@ class Platform:
         filled["angular_jerk_rad_s3"] = self.angular_jerk_rad_s3 or turning / _RISE_S
         for key, value in filled.items():
             object.__setattr__(self, key, value)
+
+    @property
+    def tension_method(self) -> str:
+        """The built-in method; the usual one if the distribution is not built in."""
+        built_in = self.tension_distribution in TENSION_METHODS
+        return self.tension_distribution if built_in else _USUAL_METHOD
+
+    @property
+    def own_distribution(self) -> str:
+        """The distribution that is not built in, FILE.py:NAME or a registered name; else ""."""
+        own = self.tension_distribution
+        return "" if own in TENSION_METHODS else own
 
     @property
     def is_planar(self) -> bool:

@@ -27,6 +27,7 @@ from cdpr_drivers.robot.machine import RobotMachine
 from cdpr_profiles import load_robot
 from cdpr_profiles.calibration.in_force import calibrated
 from cdpr_profiles.errors import ProfileError
+from cdpr_profiles.platform import NO_PLATFORM
 from cdpr_rt.core.clock import Clock
 from cdpr_rt.core.cycle_row import Row
 from cdpr_rt.core.shared_block import RowReader, SharedBlock
@@ -36,9 +37,9 @@ from cdpr_rt.loop.engine import LoopParts
 from cdpr_rt.loop.loop import ControlLoop
 from cdpr_rt.loop.realtime import one_core
 from cdpr_rt.loop.right import PublishedRight
+from cdpr_rt.model.own_distribution import TensionDistribution, require_code_allowed
 from cdpr_rt.model.robot_arrays import limits_of
 from cdpr_rt.platform.own_controller import Controller
-from cdpr_rt.programs.base import Program
 from cdpr_rt.refusal import CommandRefusal
 from cdpr_rt.robot import Error, InvalidArgument, InvalidRobot, NotRunning, Refused, Robot
 from cdpr_rt.service.lease import Lease, LeaseError
@@ -53,6 +54,7 @@ from cdpr_rt.service.stream_packet import (
 )
 from cdpr_tools.composition.fault_injection import injection_of
 from cdpr_tools.composition.loop_parts import control_loop, loop_parts
+from cdpr_tools.composition.own_code import OwnCode
 from cdpr_tools.composition.simulator import OwnLoadCells, OwnSimulator
 from cdpr_tools.errors import BadInputError, CommandError
 from cdpr_tools.recordings.pose_log import PoseLogTail
@@ -183,23 +185,31 @@ _names = count()
 
 
 def simulate(
-    robot: str | Path, *, plant: str | Path | None = None, controller: Controller | None = None
+    robot: str | Path,
+    *,
+    plant: str | Path | None = None,
+    controller: Controller | None = None,
+    tension_distribution: TensionDistribution | None = None,
+    allow_code: bool = False,
 ) -> Robot:
     """Return a robot on simulated drives in this process, ready and without power.
 
     `robot` is the name or file of a robot, `plant` a file with the deviations of the simulated
-    machine from it. `controller` replaces the built-in controller of the platform. Bus time passes
-    only while a method waits, as fast as this machine computes: the same script gives the same
-    rows. Use the handle from one thread. Closing it removes the power. Raises InvalidRobot, and
-    Error if the drives do not get ready.
+    machine from it. `controller` replaces the built-in controller of the platform,
+    `tension_distribution` the tension distribution that the robot's file names. If that file names
+    code, `allow_code` allows it from now on. Bus time passes only while a method waits, as fast as
+    this machine computes: the same script gives the same rows. Use the handle from one thread.
+    Closing it removes the power. Raises InvalidRobot, and Error if the drives do not get ready.
     """
     plant_file = None if plant is None else Path(plant)
     try:
-        made = LockstepRobot(
-            robot, plant=plant_file, controller=controller, ring_s=_LOG_S, pinned=False
-        )
-        if controller is not None and made.robot.platform is None:
-            raise InvalidArgument(f"controller: {robot} has no platform to control")
+        own = OwnCode(controller, tension_distribution)
+        made = LockstepRobot(robot, plant=plant_file, own=own, ring_s=_LOG_S, pinned=False)
+        for name, given in vars(own).items():
+            if given is not None and made.robot.platform is None:
+                raise InvalidArgument(f"{name}: {robot} {NO_PLATFORM}")
+        if allow_code:
+            require_code_allowed(made.robot, allow_code=True)
         return Robot(made.__enter__())
     except (ProfileError, BadInputError) as error:
         raise InvalidRobot(str(error)) from error
@@ -214,7 +224,7 @@ class LockstepRobot:
 
     `robot` is a profile's name or file, `plant` the simulator's plant file. The simulator logs the
     true pose to `truth_log`, by default a temporary file. `record` is a folder for the recording
-    (MCAP); without it nothing is recorded. `programs` are added to the robot's own.
+    (MCAP); without it nothing is recorded. `own` is code of the user's, run by the loop.
     `commissioned` is the folder with the commissioning results of the motors, if the robot's file
     does not name it. Unless `compensated`, they are not used; unless `learns`, the control does
     not learn the other motors. Unless `as_calibrated`, the calibration in force is not used; with
@@ -235,8 +245,7 @@ class LockstepRobot:
         plant: Path | None = None,
         truth_log: Path | None = None,
         record: Path | None = None,
-        programs: Mapping[str, Program] | None = None,
-        controller: Controller | None = None,
+        own: OwnCode | None = None,
         commissioned: Path | None = None,
         compensated: bool = True,
         learns: bool = True,
@@ -258,8 +267,7 @@ class LockstepRobot:
         self._plant, self._truth_path, self._record = plant, truth_log, record
         self._scanner, self._camera, self._learns = scanner, camera, learns
         self._ring_s, self._pinned = ring_s, pinned
-        self._more_programs = dict(programs or {})
-        self._controller = controller
+        self._own = own
         self._limits = limits_of(self.robot, calibration_in_doubt=calibration_in_doubt)
         self._stack = ExitStack()
         self._turns = self._status_seen = self._began = 0
@@ -297,7 +305,7 @@ class LockstepRobot:
             self._limits,
             self.block,
             learns=self._learns,
-            controller=self._controller,
+            own=self._own,
         )
 
     def _start(self, stack: ExitStack) -> None:
@@ -332,9 +340,8 @@ class LockstepRobot:
         self.machine = RobotMachine(robot, [bus], tension_port=port, limits=limits)
         stack.callback(self.machine.clock.close)
         stack.callback(self.machine.close)
-        programs = {**parts.programs, **self._more_programs}
         # doubts about the calibration of a real robot do not concern a simulated one
-        parts = replace(parts, programs=programs, before_power=lambda: None)
+        parts = replace(parts, before_power=lambda: None)
         self.loop = control_loop(robot, limits, block, self.machine, parts, lambda: self.now_ns)
         self.description = block.description()
         self.right = RightInBusTime(block, lambda: self.now_ns)

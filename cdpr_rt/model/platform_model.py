@@ -15,6 +15,7 @@ from cdpr_rt.core.supervisor import Limits
 from cdpr_rt.model.cable_kernel import ANCHOR, RADIUS
 from cdpr_rt.model.interference import Interference, in_words
 from cdpr_rt.model.kinematics import CableKinematics
+from cdpr_rt.model.own_distribution import OwnDistribution, TensionDistribution
 from cdpr_rt.model.pose import Pose
 from cdpr_rt.model.pose_tracking import poses_of_coordinates
 from cdpr_rt.model.rigid_body import (
@@ -195,23 +196,28 @@ class PlatformModel:
         return TensionSolver("minimum-deviation", low_N, high_N, self.wrench_scale, low_N)
 
     def planned_tensions(
-        self, poses: FloatArray, others: FloatArray
+        self, poses: FloatArray, others: FloatArray, own: TensionDistribution | None = None
     ) -> tuple[FloatArray, BoolArray]:
         """Return the tensions (m, n) that the file's distribution plans, and whether they carry.
 
         At poses (m, 4, 3), against wrenches (m, d) of all but the cables about the centre of mass,
-        without the cables' weight; within the limits of the motors' torque, and the reserve.
+        without the cables' weight; within the limits of the motors' torque, and the reserve. They
+        are those of `own` if it is given, and of the built-in method otherwise. Raises
+        TensionDistributionError.
         """
         low, high = self.low_N + self.reserve_N, self.torque_limited_N - self.reserve_N
-        method = self.platform.tension_distribution
+        method = self.platform.tension_method
         wanted = low if method == "minimum-deviation" else None
         distribution = TensionSolver(method, low, high, self.wrench_scale, wanted)
+        checked = None if own is None else OwnDistribution(own, low, high, self.wrench_scale)
         workspace = self.workspace(0.0, 0.0)
         others = others + workspace.hanging_wrenches(poses)
         tensions, carried = np.zeros((len(poses), self.kinematics.n)), np.zeros(len(poses), bool)
         for i, W in enumerate(workspace.wrench_matrices(poses)):
             outcome = distribution.solve(W, others[i], tensions[i])
             carried[i] = outcome is TensionOutcome.FEASIBLE
+            if carried[i] and checked is not None:
+                checked.solve(W, others[i], tensions[i].copy(), tensions[i])
         return tensions, carried
 
     def pose(self, position: FloatArray) -> Pose:

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from cdpr_profiles import RobotAxis
-from cdpr_rt.arrays import BoolArray, FloatArray
+from cdpr_rt.arrays import BoolArray, FloatArray, read_only
 from cdpr_rt.control.compensation import Compensation
 from cdpr_rt.core.exchange import AxisFeedback, Setpoint
 from cdpr_rt.errors import GeometryError
@@ -26,11 +26,12 @@ from cdpr_rt.model.cable_kernel import (
     write_tension_rises,
 )
 from cdpr_rt.model.free_rotation_kernel import SHAPING_s, rotation_of
+from cdpr_rt.model.own_distribution import OwnDistribution, TensionDistribution
 from cdpr_rt.model.platform_model import PlatformModel
 from cdpr_rt.model.pose import Pose, place_text
 from cdpr_rt.model.pose_search import DISTINCT
 from cdpr_rt.model.robot_arrays import LEAST_REDUNDANCY
-from cdpr_rt.model.tension_distribution import TensionSolver
+from cdpr_rt.model.tension_distribution import TensionOutcome, TensionSolver
 from cdpr_rt.model.tension_split import OK, split
 from cdpr_rt.model.workspace import SHARES, infeasibility_text
 from cdpr_rt.platform import loop_kernel as loop
@@ -45,7 +46,6 @@ from cdpr_rt.platform.own_controller import (
     OwnController,
     State,
     Target,
-    read_only,
 )
 from cdpr_rt.platform.pull_fit import PullFit
 
@@ -300,6 +300,7 @@ class CableControl(PlaceChecks):
         self._check = cell_check(model, axes, period_s)
         self._moves = moves = np.zeros((4, 6))
         self._own: OwnController | None = None
+        self._own_distribution: OwnDistribution | None = None
         self._bind_pose(moves)
         self._bind_force(moves)
         self._bind_tensions()
@@ -383,18 +384,24 @@ class CableControl(PlaceChecks):
     def _bind_tensions(self) -> None:
         """Bind the arrays of the kernels that turn the force into tensions and torques."""
         model, motors, scale = self.model, self._motors, self.model.wrench_scale
-        n, d, method = model.kinematics.n, model.size, model.platform.tension_distribution
+        n, d, method = model.kinematics.n, model.size, model.platform.tension_method
         self._distribution: TensionSolver | None = None  # the split's own
         if method != "minimum-deviation":
             self._distribution = TensionSolver(method, self.low_N, self.high_N, scale)
         plan, size = np.array([self.low_N, self.high_N]), max(n, 8)
         self._slow_N, self._feedforward_N = plan[0].copy(), plan[0].copy()
         space, position = np.zeros((n + 1, n)), np.zeros(n)
-        self._split = bound(
-            split, self._W, self._wrench, self._force, scale, plan, model.reserve_N,
-            self._period_s / (self._period_s + _LIFT_S), self._distribution is not None,
-            self._slow_N, self._feedforward_N, self.tension_N, np.zeros(d), np.zeros((3, n)),
-            np.zeros((2, n)), np.zeros((d, n + 1)), space, np.zeros((4, size, size)),
+        scratch = (
+            np.zeros(d), np.zeros((3, n)), np.zeros((2, n)), np.zeros((d, n + 1)), space,
+            np.zeros((4, size, size)),
+        )  # fmt: skip
+        self._split, self._split_given = (
+            bound(
+                split, self._W, self._wrench, self._force, scale, plan, model.reserve_N,
+                self._period_s / (self._period_s + _LIFT_S), given, self._slow_N,
+                self._feedforward_N, self.tension_N, *scratch,
+            )
+            for given in (self._distribution is not None, True)
         )  # fmt: skip
         self._drive = bound(
             loop.drive, self._settings, motors[tracking.M_PER_RAD], motors[tracking.INERTIA],
@@ -405,10 +412,20 @@ class CableControl(PlaceChecks):
 
     # -- Controller
 
-    def use(self, controller: Controller) -> None:
-        """Let the user's controller choose the tensions from now on, see `Controller`."""
+    def use_own(
+        self, controller: Controller | None, distribution: TensionDistribution | None
+    ) -> None:
+        """Let code of the user's choose the tensions off the stand from now on."""
+        if distribution is not None:
+            self._own_distribution = OwnDistribution(
+                distribution, self.low_N, self.high_N, self.model.wrench_scale, self._period_s
+            )
+        if controller is not None:
+            self._use(controller)
+
+    def _use(self, controller: Controller) -> None:
         model, d, n = self.model, self.model.size, self.model.kinematics.n
-        method, planned = model.platform.tension_distribution, self.low_N
+        method, planned = model.platform.tension_method, self.low_N
         solver = TensionSolver(
             method, planned, self.high_N, model.wrench_scale,
             planned if method == "minimum-deviation" else None,
@@ -417,7 +434,9 @@ class CableControl(PlaceChecks):
 
         def distribute(force: FloatArray) -> FloatArray:
             np.subtract(self._wrench, force, out=wrench)
-            solver.solve(self._W, wrench, tension_N)
+            carried = solver.solve(self._W, wrench, tension_N) <= TensionOutcome.SUBSTITUTED
+            if self._own_distribution is not None and carried:
+                self._own_distribution.solve(self._W, wrench, last_N, tension_N)
             return tension_N
 
         last_N = np.array(self.tension_N)
@@ -431,14 +450,17 @@ class CableControl(PlaceChecks):
         self._own = OwnController(controller, state, target, last_N)
 
     def stand_in(self) -> None:
-        """Control the platform without the user's controller until the next `begin`."""
-        if self._own is not None:
-            self._own.stand_in()
+        """Control the platform without code of the user's until the next `begin`."""
+        for own in (self._own, self._own_distribution):
+            if own is not None:
+                own.stand_in()
 
     def reset(self) -> None:
         """Reset the integral part."""
         if self._own is not None:
             self._own.restart(self.tension_N)
+        if self._own_distribution is not None:
+            self._own_distribution.restart()
         self._state[:] = 0.0
         self._state[self.model.size] = 1.0
         self._slow_N[:] = self.low_N
@@ -492,9 +514,14 @@ class CableControl(PlaceChecks):
             self._rest(on_stand=False)
         self._correct(self.share, self._rate_inconsistency_m_s)
         self._compensate(feedback, setpoint)
+        carried = True
         if self._distribution is not None:
-            self._distribution.solve(self._W, self._wrench, self._feedforward_N)
+            outcome = self._distribution.solve(self._W, self._wrench, self._feedforward_N)
+            carried = outcome <= TensionOutcome.SUBSTITUTED
         self.outcome, self.share, null_directions = self._split()
+        if self._own_distribution is not None and self._distributes_own(carried):
+            self._slow_N[:] = self._feedforward_N
+            self.outcome, self.share, null_directions = self._split_given()
         if self._own is not None and self._on_stand:
             self._own.restart(self.tension_N)
         elif self._own is not None:
@@ -503,6 +530,20 @@ class CableControl(PlaceChecks):
             self._feedforward_N[:] = self.tension_N
         self._limited = self._drive(null_directions, slope, torque_Nm)
         self._oscillation.update(setpoint.position_rad)
+
+    def _distributes_own(self, carried: bool) -> bool:
+        """Return whether the user's distribution has written the tensions that carry the platform.
+
+        It is asked off the stand if the built-in tensions have `carried`, and if no controller of
+        the user's replaces them.
+        """
+        own = self._own_distribution
+        assert own is not None
+        replaced = self._own is not None and self._own.in_use
+        if self._on_stand or not carried or self.outcome != OK or replaced:
+            own.restart()
+            return False
+        return own.write(self._W, self._wrench, self._feedforward_N)
 
     def _was_exerted(self) -> bool:
         """Return whether the cables exerted the last cycle's force completely."""
@@ -536,8 +577,9 @@ class CableControl(PlaceChecks):
         The cables have `tension_N` (n,) at their winches, which may be far from planned
         tensions.
         """
-        if self._own is not None:
-            self._own.revive()
+        for own in (self._own, self._own_distribution):
+            if own is not None:
+                own.revive()
         motors = self._motors
         motors[tracking.THETA] = feedback.position_rad
         motors[[tracking.OMEGA, tracking.LOWPASSED_ONCE, tracking.LOWPASSED]] = 0.0

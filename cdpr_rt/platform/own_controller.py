@@ -3,25 +3,14 @@
 from __future__ import annotations
 
 import math
-import sys
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
-from importlib import import_module
-from importlib.util import module_from_spec, spec_from_file_location
-from pathlib import Path
 
 import numpy as np
 
 from cdpr_rt.arrays import FloatArray
-from cdpr_rt.errors import ControlError
-
-
-def read_only(array: FloatArray) -> FloatArray:
-    """Return a view that shows the values of `array` and cannot be written."""
-    view = array.view()
-    view.flags.writeable = False
-    return view
+from cdpr_rt.model.own_distribution import FADE_S
 
 
 @dataclass(frozen=True)
@@ -58,7 +47,7 @@ class State:
     distribute: Callable[[FloatArray], FloatArray]
     """Return the tensions (n,) that exert a force (d,) in addition to carrying `wrench`.
 
-    By the distribution that the robot's file names. If the bounds leave no such tensions, return
+    By the robot's tension distribution. If the bounds leave no such tensions, return
     those that come nearest.
     """
 
@@ -90,38 +79,6 @@ class Controller(ABC):
         """Return the tensions of this cycle, (n,), N. It has to take less than a cycle."""
 
 
-def load_controller(reference: str) -> Controller:
-    """Return a new controller from "FILE.py:CLASS" or "MODULE:CLASS"; this runs the code there.
-
-    Raises ControlError that names the reference and the error.
-    """
-    home, _, name = reference.rpartition(":")
-    try:
-        if home.endswith(".py"):
-            spec = spec_from_file_location(f"controller_{Path(home).stem}", home)
-            if spec is None or spec.loader is None or not Path(home).is_file():
-                raise ControlError(f"--controller {reference}: there is no file {home}")
-            module = sys.modules[spec.name] = module_from_spec(spec)
-            spec.loader.exec_module(module)
-        else:
-            module = import_module(home)
-        found = getattr(module, name)
-        controller = found() if isinstance(found, type) else found
-    except ControlError:
-        raise
-    except (Exception, SystemExit) as error:  # whatever the code there does
-        raise ControlError(
-            f"--controller {reference}: {type(error).__name__}: {error}; give FILE.py:CLASS or "
-            "MODULE:CLASS"
-        ) from error
-    if not isinstance(controller, Controller):
-        raise ControlError(f"--controller {reference}: derive {name} from cdpr_rt.Controller")
-    return controller
-
-
-_FADE_S = 0.2
-
-
 class OwnController:
     """Asks a `Controller` for the tensions of each cycle, until it fails."""
 
@@ -133,7 +90,7 @@ class OwnController:
         self._failed, self._cycle = False, 0
         self._low_N, self._high_N = state.low_N.copy(), state.high_N.copy()
         self._last_N, self._bounded_N = last_N, np.zeros_like(last_N)
-        self._fade_cycles = max(1, round(_FADE_S / state.period_s))
+        self._fade_cycles = max(1, round(FADE_S / state.period_s))
 
     def restart(self, tension_N: FloatArray) -> None:
         """Have the controller reset before the next cycle; take the tensions of this one, (n,)."""

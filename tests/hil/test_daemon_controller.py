@@ -1,4 +1,4 @@
-"""A user's controller in a daemon: `cdpr run ROBOT --controller FILE.py:CLASS`."""
+"""A user's own code in a daemon: `cdpr run ROBOT --controller FILE.py:CLASS`."""
 
 from __future__ import annotations
 
@@ -38,6 +38,16 @@ class Blocking(Mine):
 
 class Other:
     pass
+
+def middle(W, w, low, high, previous):
+    t, free = 0.5 * (low + high), np.full(3, True)
+    while True:
+        t[free] -= np.linalg.pinv(W[:, free]) @ (W @ t + w)
+        outside = np.maximum(low - t, t - high)
+        if outside.max() <= 0.0:
+            return t
+        worst = outside.argmax()
+        t[worst], free[worst] = np.clip(t[worst], low[worst], high[worst]), False
 """
 
 
@@ -46,9 +56,11 @@ def running(folder: Path, controller: str, paced: bool = False) -> Iterator[Real
     file, robot = folder / "mine.py", folder / "planar.toml"
     file.write_text(MINE)
     shipped = (SHIPPED / "planar-3.toml").read_text()
-    robot.write_text(shipped.replace("sync_period_s = 0.001", f"sync_period_s = {PERIOD_S}"))
+    shipped = shipped.replace("sync_period_s = 0.001", f"sync_period_s = {PERIOD_S}")
+    named = '[platform]\ntension_distribution = "mine.py:middle"'
+    robot.write_text(shipped.replace("[platform]", named))
     env = {"XDG_STATE_HOME": str(folder)}
-    mine = ("--no-record", "--controller", f"{file}:{controller}")
+    mine = ("--no-record", "--controller", f"{file}:{controller}", "--allow-code")
     daemon = RealDaemon(folder, *mine, robot=robot, env=env, paced=paced)
     try:
         yield daemon
@@ -63,7 +75,7 @@ def done(daemon: RealDaemon, *command: str) -> dict[str, object]:
     return told
 
 
-def test_a_controller_from_a_file_moves_the_platform_and_is_shown(tmp_path: Path) -> None:
+def test_code_from_files_moves_the_platform_and_is_shown(tmp_path: Path) -> None:
     with running(tmp_path, "Mine") as daemon:
         done(daemon, "enable")
         done(daemon, "tighten")
@@ -71,6 +83,7 @@ def test_a_controller_from_a_file_moves_the_platform_and_is_shown(tmp_path: Path
         assert moved["position_m"] == pytest.approx([0.1, 1.6], abs=0.005)
         notices = daemon.status()["notices"]
         assert any("mine.py:Mine controls the platform" in notice for notice in notices)
+        assert "mine.py:middle distributes the tensions off the stand" in notices
 
 
 @pytest.mark.alone

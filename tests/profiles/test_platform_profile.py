@@ -64,7 +64,8 @@ def test_values_of_the_file_are_read(tmp_path: Path) -> None:
     assert platform.centre_of_mass_m == (0.0, -0.01)
     assert platform.home_rotation_rad == (0.1,)
     assert platform.controlled == ("x", "y")
-    assert (platform.cable_model, platform.tension_distribution) == ("catenary", "closed-form")
+    assert (platform.cable_model, platform.tension_method) == ("catenary", "closed-form")
+    assert not platform.own_distribution
     assert platform.pulley_radius_m == (0.0, 0.0, 0.03)
     assert platform.pulley_axes == ((0.0, 1.0), (0.0, 1.0), (0.0, -1.0))
 
@@ -154,6 +155,8 @@ HOME = "home_m = [0.0, 0.0, 0.5]"
         (WALL, "mass_kg", 'cable_model = "rope"\nmass_kg', "platform.cable_model", "'catenary'"),
         (WALL, "mass_kg", 'tension_distribution = "x"\nmass_kg',
          "platform.tension_distribution", "'closed-form'"),
+        (WALL, "mass_kg", 'tension_distribution = "os:system"\nmass_kg',
+         "platform.tension_distribution", "'FILE.py:NAME'"),
         (CAMERA, "[0.0, 0.0, 0.0]", "[0.1, 0.0, 0.0]", "axes", "all anchor points alike"),
         (CAMERA, "mass_kg", 'controlled = ["x", "y", "z", "rz"]\nmass_kg', "platform.controlled",
          "no angle where all anchor points are alike"),

@@ -114,6 +114,30 @@ PlantOption = Annotated[
 JsonOption = Annotated[
     bool, typer.Option("--json", help="End with one JSON line on standard output.")
 ]
+ControllerOption = Annotated[
+    str | None,
+    typer.Option(
+        "--controller",
+        "--control",
+        metavar="FILE.py:CLASS",
+        help="Your own controller of the platform, or MODULE:CLASS. This runs the code there.",
+    ),
+]
+TensionDistributionOption = Annotated[
+    str | None,
+    typer.Option(
+        "--tension-distribution",
+        metavar="FILE.py:NAME",
+        help="Your own tension distribution, or MODULE:NAME. This runs the code there.",
+    ),
+]
+AllowCodeOption = Annotated[
+    bool,
+    typer.Option(
+        "--allow-code",
+        help="Run the code that the robot's file names, from now on while it does not change.",
+    ),
+]
 YesOption = Annotated[
     bool, typer.Option("--yes", help="Do not ask before a real motor is energised.")
 ]

@@ -12,12 +12,16 @@ import typer
 from cdpr_profiles import load_robot
 from cdpr_tools.commands.options import (
     AgainOption,
+    AllowCodeOption,
     CommissionedOption,
+    ControllerOption,
     JsonOption,
     RobotArgument,
     RobotPlantOption,
     SeedOption,
+    TensionDistributionOption,
 )
+from cdpr_tools.composition.own_code import OwnCodeOptions
 from cdpr_tools.errors import BadInputError
 from cdpr_tools.loading import loading_notice
 from cdpr_tools.output import Output
@@ -61,6 +65,9 @@ def trial(
         typer.Option(min=0.1, help="Speed of lines, else 10; of a path, else the robot's."),
     ] = None,
     commissioned: CommissionedOption = None,
+    controller: ControllerOption = None,
+    tension_distribution: TensionDistributionOption = None,
+    allow_code: AllowCodeOption = False,
     without_compensation: Annotated[
         bool,
         typer.Option("--without-compensation", help="Use nothing that commissioning has learnt."),
@@ -96,6 +103,8 @@ def trial(
         if folder.exists() and any(folder.iterdir()):
             raise BadInputError(f"--out {folder}: holds something already; allowed: a new folder")
         default = trials.KINDS[kind]
+        own = OwnCodeOptions(controller, tension_distribution)
+        own.require_use(profile, allow_code=allow_code)
         if minutes is not None and default.at_speed:
             raise BadInputError(f"--minutes {minutes:g}: {kind} lasts as long as it lasts")
         if speed_mm_s is not None and not default.at_speed:
@@ -110,6 +119,7 @@ def trial(
             minutes=default.minutes if minutes is None else minutes,
             commissioned=None if commissioned is None else str(commissioned.absolute()),
             compensated=not without_compensation,
+            own=own,
             **({} if speed_mm_s is None else {"speed_m_s": 1e-3 * speed_mm_s}),
         )
         with interrupted_by_sigterm():

@@ -36,13 +36,17 @@ from cdpr_rt.service.listening import listener_pid
 from cdpr_rt.service.retention import BYTES_PER_AXIS, Retention, size_text
 from cdpr_rt.state_file import make_private_folder
 from cdpr_tools.commands.options import (
+    AllowCodeOption,
+    ControllerOption,
     ExitWithStdinOption,
     JsonOption,
     RobotBusOption,
     SafetyIoOption,
+    TensionDistributionOption,
     YesOption,
 )
 from cdpr_tools.compiling import compiling_notices_to
+from cdpr_tools.composition.own_code import OwnCodeOptions
 from cdpr_tools.composition.simulator import OwnSimulator
 from cdpr_tools.consent import require_consent
 from cdpr_tools.daemon.launcher import Launcher, ServiceManager
@@ -143,13 +147,9 @@ def run(
             metavar="DIR", help="What `cdpr commission ROBOT` has left: motors to compensate."
         ),
     ] = None,
-    controller: Annotated[
-        str | None,
-        typer.Option(
-            metavar="FILE.py:CLASS",
-            help="Your own controller of the platform, or MODULE:CLASS. This runs the code there.",
-        ),
-    ] = None,
+    controller: ControllerOption = None,
+    tension_distribution: TensionDistributionOption = None,
+    allow_code: AllowCodeOption = False,
     yes: YesOption = False,
     as_json: JsonOption = False,
     exit_with_stdin: ExitWithStdinOption = False,
@@ -169,7 +169,8 @@ def run(
         profile, bus=bus, plant=plant, http=http, unix=unix, key_file=key_file, record=record,
         no_record=no_record, keep_days=keep_days, keep_gb=keep_gb, live=live,
         live_origin=live_origin, stream=stream, read_only=read_only, safety_io=safety_io,
-        tension_port=tension_port, commissioned=commissioned, controller=controller,
+        tension_port=tension_port, commissioned=commissioned,
+        own=OwnCodeOptions(controller, tension_distribution), allow_code=allow_code,
     )  # fmt: skip
     if camera is not None and not starts_own_simulator(bus or ()):
         raise BadInputError("--camera: only for a simulator that the command starts (simbus:)")
@@ -273,7 +274,8 @@ def settings_for(
     safety_io: str | None,
     tension_port: str | None = None,
     commissioned: Path | None = None,
-    controller: str | None = None,
+    own: OwnCodeOptions | None = None,
+    allow_code: bool = False,
 ) -> RunSettings:
     """Return the settings from the options of `cdpr run`; raises BadInputError."""
     if len(robot.axes) > MOST_AXES:
@@ -282,8 +284,8 @@ def settings_for(
     load_profiles(with_commissioned(robot, commissioned))
     if record is not None and no_record:
         raise BadInputError("--record and --no-record: one of them")
-    if controller is not None and robot.platform is None:
-        raise BadInputError(f"--controller: {robot.profile} has no platform to control")
+    own = own or OwnCodeOptions()
+    own.require_use(robot, allow_code=allow_code)
     own_simulator = starts_own_simulator(bus or ())
     if plant is not None and not own_simulator:
         raise BadInputError("--plant: only for a simulator that the command starts (simbus:)")
@@ -303,7 +305,7 @@ def settings_for(
         safety_io=safety_io,
         tension_port=tension_port,
         commissioned=commissioned,
-        controller=controller,
+        own=own,
         socket=unix or default_socket(robot.profile),
         http=None if http is None else Address.parse("--http", http),
         key_file=key_file,

@@ -23,7 +23,6 @@ from cdpr_rt.loop.stop_socket import StopSocket
 from cdpr_rt.loop.warm_up import warm_up_supervision
 from cdpr_rt.model.calibration_state import not_calibrated_reason
 from cdpr_rt.model.robot_arrays import described, supervisor_limits, winches_of
-from cdpr_rt.platform.own_controller import Controller
 from cdpr_rt.programs.lower import LowerProgram, lowering_s
 from cdpr_rt.programs.model import model_of
 from cdpr_rt.programs.platform_program import PlatformParts
@@ -32,6 +31,7 @@ from cdpr_rt.programs.registry import (
     platform_parts,
     warm_up_programs,
 )
+from cdpr_tools.composition.own_code import OwnCode, with_distribution
 
 _OTHER_CALIBRATION = "a calibration was taken over or undone; start the daemon again"
 
@@ -61,13 +61,15 @@ def loop_parts(
     block: SharedBlock,
     *,
     learns: bool = True,
-    controller: Controller | None = None,
+    own: OwnCode | None = None,
 ) -> LoopParts:
     """Return the parts that the loop of `robot` runs within `limits`, compiled and ready.
 
     `learns`: it learns cogging and friction of a platform's uncommissioned motors in motion.
-    The user's `controller` replaces the built-in one of the platform.
+    Code of the user's `own` replaces built-in parts of the platform's control, as does the tension
+    distribution that the robot's file names. Raises ProfileError if that must not run.
     """
+    own = with_distribution(own or OwnCode(), robot)
     axes, n, period_s = robot.axes, len(robot.axes), robot.sync_period_s
     latencies = [axis.winch.latency_s for axis in axes]
     known = compensation_of(robot, load_profiles(robot, limits), limits)
@@ -94,9 +96,8 @@ def loop_parts(
     )
     warm_up_programs(programs, n, platform)
     warm_up_supervision(estimator, parts.supervisor, n)
-    if controller is not None:
-        assert platform is not None  # the callers have one
-        platform.control.use(controller)
+    if platform is not None:  # not for the imaginary cycles of the warm-up
+        platform.control.use_own(own.controller, own.tension_distribution)
     return parts
 
 

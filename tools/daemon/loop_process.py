@@ -25,7 +25,6 @@ from cdpr_rt.loop.machine import Machine
 from cdpr_rt.loop.realtime import freeze_memory
 from cdpr_rt.loop.stop_socket import STOP_SUFFIX, StopSocket
 from cdpr_rt.model.robot_arrays import limits_of
-from cdpr_rt.platform.own_controller import load_controller
 from cdpr_rt.programs.path_store import PathStore, paths_folder
 from cdpr_rt.state_file import state_path
 from cdpr_tools.compiling import announce_compiling, compiling_notices_to
@@ -33,7 +32,7 @@ from cdpr_tools.composition.loop_parts import control_loop, loop_parts
 from cdpr_tools.daemon.child import POWER_UNCONFIRMED, end_with_launcher
 from cdpr_tools.daemon.loop_file import POWER_OFF_SIGNAL
 from cdpr_tools.daemon.settings import RunSettings
-from cdpr_tools.errors import BAD_INPUT, DONE
+from cdpr_tools.errors import BAD_INPUT, DONE, BadInputError
 from cdpr_tools.streams import guard_streams, outlive_output
 
 
@@ -60,10 +59,9 @@ def main() -> int:
                 limits=limits,
             )  # fmt: skip
         with compiling_notices_to(lambda text: block.write_status({"notices": [text]})):
-            own = None if settings.controller is None else load_controller(settings.controller)
-            parts = loop_parts(robot, limits, block, controller=own)
+            parts = loop_parts(robot, limits, block, own=settings.own.load())
         stops = _stop_socket(settings.socket.with_suffix(STOP_SUFFIX))
-    except (ProfileError, DriverError, ControlError) as error:
+    except (ProfileError, DriverError, ControlError, BadInputError) as error:
         print(f"cdpr: {printable(str(error))}", file=sys.stderr)
         return BAD_INPUT
     simulated = any(url.is_simulated for url in robot_urls(robot, settings.buses).values())
@@ -75,8 +73,7 @@ def main() -> int:
         _open_paths(parts.paths, robot, settings, block)
     loop = control_loop(robot, limits, block, machine, parts, stops=stops, simulated=simulated)
     loop.engine.notices += freeze_memory()
-    if settings.controller is not None:
-        loop.engine.notices.append(f"{settings.controller} controls the platform off its stand")
+    loop.engine.notices += settings.own.notices(robot)
     _obey_signals(loop)
     end_with_launcher(settings.launcher_pid)
     counters = block.counters

@@ -20,6 +20,7 @@ from cdpr_profiles.bounded_input import open_regular, path_of
 from cdpr_profiles.errors import ProfileError
 from cdpr_rt.service.listening import ListenError, listen_tcp, listen_udp
 from cdpr_rt.service.retention import Retention
+from cdpr_tools.composition.own_code import OwnCodeOptions
 from cdpr_tools.errors import BadInputError, WorkFailedError
 
 _SECRET_CHARS, _MOST_KEY_BYTES = 16, 4096
@@ -106,8 +107,8 @@ class RunSettings(BaseModel):
     read_only: bool = False
     commissioned: _Path | None = None
     """Folder with the cogging profiles of the axes' motors."""
-    controller: str | None = None
-    """The user's own controller of the platform: FILE.py:CLASS or MODULE:CLASS."""
+    own: OwnCodeOptions = OwnCodeOptions()
+    """Code of the user's own that the loop runs."""
     safety_io: str | None = None
     tension_port: str | None = None
     """Serial port of the robot's tension sensors."""

@@ -20,6 +20,7 @@ from cdpr_rt.diagnosis.predictions import CableLoss, free_rotation
 from cdpr_rt.diagnosis.subject import Subject
 from cdpr_rt.identification import windows
 from cdpr_rt.loop.warm_up import warm_up
+from cdpr_rt.model.own_distribution import OwnDistribution
 from cdpr_rt.model.platform_model import platform_model_of
 from cdpr_rt.model.reachable import Reach
 from cdpr_rt.model.robot_arrays import limits_of
@@ -86,8 +87,9 @@ def _loops(*names: str) -> None:
 
 
 def _platform_loops() -> None:
-    """Make the loops of a planar and of a spatial platform."""
+    """Make the loops of a planar and of a spatial platform, and check a user's tensions."""
     _loops("planar-3", "spatial-8")
+    OwnDistribution(lambda *_: 0.0, np.zeros(2), np.ones(2), np.ones(2))
 
 
 def _contacts() -> None:

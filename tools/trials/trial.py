@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from itertools import chain
 from pathlib import Path
 from typing import Any, Final
@@ -14,6 +14,7 @@ from cdpr_drivers.robot.commissioned import uncommissioned_text, with_commission
 from cdpr_profiles import Robot, load_robot
 from cdpr_profiles.calibration.in_force import calibrated
 from cdpr_rt.diagnosis.checks import refuse_impossible
+from cdpr_tools.composition.own_code import OwnCodeOptions
 from cdpr_tools.errors import BadInputError
 from cdpr_tools.output import Output, to_json
 from cdpr_tools.recordings.stored_settings import load_settings
@@ -44,6 +45,8 @@ class TrialSettings:
     compensated: bool
     speed_m_s: float = line.SPEED_m_s
     """Speed of lines and paths."""
+    own: OwnCodeOptions = field(default_factory=OwnCodeOptions)
+    """Code of the user's own that is tried."""
 
     @classmethod
     def load(cls, folder: Path) -> TrialSettings:
@@ -142,7 +145,9 @@ def perform(settings: TrialSettings, folder: Path, out: Output) -> dict[str, Any
         out.note(text)
     if kind.as_calibrated and (known := calibrated(robot).calibration) is not None:
         out.note(calibration_text(known.summary()))
-    plant = _plant(settings, robot, folder)
+    plant, own = _plant(settings, robot, folder), settings.own.load()
+    for notice in settings.own.notices(robot):
+        out.note(notice)
     for part in settings.parts:
         compensated = settings.compensated and part != line.WITHOUT
         out.note(f"{settings.robot}, {settings.kind}: starting the simulated robot ...")
@@ -158,6 +163,7 @@ def perform(settings: TrialSettings, folder: Path, out: Output) -> dict[str, Any
                 compensated=compensated,
                 learns=compensated or len(settings.parts) == 1,
                 as_calibrated=kind.as_calibrated,
+                own=own,
             ) as run,
         ):
             kind.drive(run, settings)

@@ -1,0 +1,128 @@
+"""Load code of the user's own: from a file, a module, or an installed package."""
+
+from __future__ import annotations
+
+import hashlib
+import sys
+from importlib import import_module
+from importlib.metadata import entry_points
+from pathlib import Path
+from types import ModuleType
+from typing import Any, Final
+
+from cdpr_profiles.bounded_input import path_of, read_bytes, resolved
+from cdpr_profiles.errors import ProfileError
+from cdpr_rt.errors import ControlError
+from cdpr_rt.state_file import read_state, state_path, write_state
+
+_MOST_BYTES: Final = 1 << 22
+
+
+class CodeError(ControlError):
+    """Code cannot be loaded, or must not run; the message begins with its reference."""
+
+
+def load_code(reference: str) -> Any:
+    """Return what "FILE.py:NAME" or "MODULE:NAME" names, an instance if that is a class.
+
+    This runs the code there. Raises CodeError.
+    """
+    home, _, name = reference.rpartition(":")
+    try:
+        if home.endswith(".py"):
+            return _member(_run(Path(home), _read(reference, Path(home))), name)
+        return _member(import_module(home), name)
+    except CodeError:
+        raise
+    except (Exception, SystemExit) as error:  # whatever the code there does
+        raise CodeError(
+            f"{reference}: {type(error).__name__}: {error}; give FILE.py:NAME or MODULE:NAME"
+        ) from error
+
+
+def load_registered(group: str) -> dict[str, Any]:
+    """Return what installed packages register in a group of entry points, by name, as `load_code`.
+
+    Raises CodeError that names the package.
+    """
+    return {point.name: _loaded(point) for point in entry_points(group=group)}
+
+
+def load_registered_one(group: str, name: str) -> Any:
+    """Return what an installed package registers under a name, as `load_code`; raises CodeError."""
+    for point in entry_points(group=group, name=name):
+        return _loaded(point)
+    raise CodeError(f"{name}: no installed package registers this name in {group!r}")
+
+
+def _loaded(point: Any) -> Any:
+    try:
+        found = point.load()
+        return found() if isinstance(found, type) else found
+    except (Exception, SystemExit) as error:
+        package = "" if point.dist is None else f" of the package {point.dist.name}"
+        raise CodeError(
+            f"{point.name}{package}: {type(error).__name__}: {error}; mend or uninstall it"
+        ) from error
+
+
+# Code that a robot's file names runs only if the user has allowed this content of this file.
+
+
+def require_allowed(reference: str, folder: Path, *, allow: bool = False) -> None:
+    """Raise CodeError unless the user has allowed the code of "FILE.py:NAME", FILE from `folder`.
+
+    `allow` allows it from now on, as long as the file keeps its content.
+    """
+    _allowed_source(reference, folder, allow=allow)
+
+
+def load_allowed(reference: str, folder: Path, *, allow: bool = False) -> Any:
+    """Return what "FILE.py:NAME" names, as `load_code`, from the very bytes that were allowed.
+
+    Raises CodeError if they were not, see `require_allowed`.
+    """
+    file, source = _allowed_source(reference, folder, allow=allow)
+    try:
+        return _member(_run(file, source), reference.rpartition(":")[2])
+    except (Exception, SystemExit) as error:
+        raise CodeError(f"{reference}: {type(error).__name__}: {error}") from error
+
+
+def _allowed_source(reference: str, folder: Path, *, allow: bool) -> tuple[Path, bytes]:
+    file = resolved(path_of(folder, reference.rpartition(":")[0]))
+    source = _read(reference, file)
+    digest = hashlib.sha256(source).hexdigest()
+    path = state_path("allowed-code", hashlib.sha256(str(file).encode()).hexdigest()[:32])
+    if allow:
+        write_state(path, {"file": str(file), "sha256": digest})
+        return file, source
+    known = read_state(path) or {}
+    if known.get("file") != str(file) or known.get("sha256") != digest:
+        changed = " and has changed since you allowed it" if known else ""
+        raise CodeError(
+            f"{reference}: {file} is code that would run with your rights{changed}; "
+            "read it, then allow it with --allow-code, in Python with allow_code=True"
+        )
+    return file, source
+
+
+def _read(reference: str, file: Path) -> bytes:
+    try:
+        return read_bytes(file, _MOST_BYTES)
+    except ProfileError as error:
+        raise CodeError(f"{reference}: {error}") from None
+
+
+def _run(file: Path, source: bytes) -> ModuleType:
+    """Run a file's bytes as a new module, without the cache of compiled code beside the file."""
+    module = ModuleType(f"own_code_{file.stem}")
+    module.__file__ = str(file)
+    sys.modules[module.__name__] = module  # where dataclasses and pickle look for it
+    exec(compile(source, str(file), "exec"), module.__dict__)
+    return module
+
+
+def _member(module: ModuleType, name: str) -> Any:
+    found = getattr(module, name)
+    return found() if isinstance(found, type) else found

@@ -1,0 +1,94 @@
+"""Code of the user's own that a control loop runs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from cdpr_profiles import Robot
+from cdpr_profiles.platform import NO_PLATFORM
+from cdpr_rt.code_loader import load_code
+from cdpr_rt.errors import ControlError
+from cdpr_rt.model.own_distribution import (
+    TensionDistribution,
+    checked_distribution,
+    named_distribution,
+    require_code_allowed,
+)
+from cdpr_rt.platform.own_controller import Controller
+from cdpr_tools.errors import BadInputError
+
+
+@dataclass(frozen=True)
+class OwnCode:
+    """Code that replaces or extends what is built in."""
+
+    controller: Controller | None = None
+    tension_distribution: TensionDistribution | None = None
+
+
+@dataclass(frozen=True)
+class OwnCodeOptions:
+    """Options of commands that name code: FILE.py:NAME or MODULE:NAME, None for nothing."""
+
+    controller: str | None = None
+    tension_distribution: str | None = None
+
+    def require_use(self, robot: Robot, *, allow_code: bool) -> None:
+        """Raise BadInputError if the robot has no use for the code. No code runs.
+
+        Raises ProfileError if the robot's file names code that is not allowed; `allow_code` allows
+        it from now on.
+        """
+        for option, reference in (
+            ("--controller", self.controller),
+            ("--tension-distribution", self.tension_distribution),
+        ):
+            if reference is not None and robot.platform is None:
+                raise BadInputError(f"{option}: {robot.profile} {NO_PLATFORM}")
+        if self.tension_distribution is None:
+            require_code_allowed(robot, allow_code=allow_code)
+
+    def load(self) -> OwnCode:
+        """Run the code and return what is named; raises BadInputError."""
+        return OwnCode(
+            None if self.controller is None else _controller(self.controller),
+            None if self.tension_distribution is None else _distribution(self.tension_distribution),
+        )
+
+    def notices(self, robot: Robot) -> list[str]:
+        """Return what operators should know: whose code controls the platform off its stand."""
+        named = "" if robot.platform is None else robot.platform.own_distribution
+        distribution = self.tension_distribution or named
+        return [
+            *([f"{self.controller} controls the platform off its stand"] * bool(self.controller)),
+            *([f"{distribution} distributes the tensions off the stand"] * bool(distribution)),
+        ]
+
+
+def _controller(reference: str) -> Controller:
+    try:
+        found = load_code(reference)
+    except ControlError as error:
+        raise BadInputError(f"--controller {error}") from error
+    if isinstance(found, Controller):
+        return found
+    name = reference.rpartition(":")[2]
+    also = "; a tension distribution is given with --tension-distribution" * callable(found)
+    raise BadInputError(f"--controller {reference}: derive {name} from cdpr_rt.Controller{also}")
+
+
+def _distribution(reference: str) -> TensionDistribution:
+    try:
+        return checked_distribution(reference, load_code(reference))
+    except ControlError as error:
+        raise BadInputError(f"--tension-distribution {error}") from error
+
+
+def with_distribution(own: OwnCode, robot: Robot) -> OwnCode:
+    """Return `own` with the distribution that the robot's file names, unless it has one.
+
+    Raises ProfileError if that is code that is not allowed, or that fails.
+    """
+    if own.tension_distribution is not None:
+        return own
+    return OwnCode(own.controller, named_distribution(robot))
