@@ -16,7 +16,7 @@ WordArray = NDArray[np.uint16]
 def rms(values: FloatArray) -> float:
     """Return sqrt(Σ|v|²/m), the root mean square of m numbers (m,) or lengths of vectors (m, d).
 
-    It is nan if there are none.
+    It is nan if m is 0.
     """
     return math.sqrt(float(np.square(values).sum()) / len(values)) if len(values) else math.nan
 

@@ -158,7 +158,7 @@ class Model:
         """Return the tensions (..., n), N, at rest by the distribution that the file names.
 
         `wrench` (d,) or (..., d) acts on the platform besides gravity. Tensions are in the middle
-        of the cables, and keep the controller's reserve from both bounds. nan where there are none.
+        of the cables, and keep the controller's reserve from both bounds; nan if none do so.
         A distribution of your own gets the built-in one's tensions as `previous`. Raises
         InvalidRobot if code that the file names must not run, and InvalidArgument if it fails.
         """

@@ -47,7 +47,7 @@ class CommandRefusal:
     command: str
     """The command, or the program that it was for."""
     asked: Mapping[str, Any] = field(default_factory=dict)
-    """The refused keys and their values; empty if the command is refused whatever its arguments."""
+    """The refused keys and their values; empty if the reason is not in the arguments."""
     arguments: Mapping[str, Any] = field(default_factory=dict)
 
     def __str__(self) -> str:
@@ -88,7 +88,7 @@ class CommandRefusal:
 
     @classmethod
     def from_json(cls, value: Any) -> CommandRefusal | None:
-        """Return the refusal in an answer, None if it is none or has an unknown form."""
+        """Return the refusal in an answer, None for any other answer."""
         try:
             refusal = cls(**{**value, "code": RefusalCode(value["code"])})
         except (TypeError, KeyError, ValueError):

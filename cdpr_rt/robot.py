@@ -127,7 +127,7 @@ class Log(np.ndarray[Any, np.dtype[np.void]]):
     axes: tuple[str, ...] = ()
     """Names of the axes, n."""
     _field = ""
-    """The field of which these are the rows, if it is a single one."""
+    """The field that these rows belong to, if it is a single one."""
 
     def __array_finalize__(self, other: Any) -> None:
         self.axes = getattr(other, "axes", ())
@@ -369,7 +369,7 @@ class Robot:
 
         `rotation_rad` is the rotation vector from the orientation at home. Omitted coordinates keep
         their values. `speed_m_s` is the top speed, by default that of the robot's file. With
-        `wait=False` the call returns at once; `wait_until_done` waits for the end.
+        `wait=False` the call returns immediately; `wait_until_done` waits for the end.
         """
         position = self._vector("position_m", position_m, self._k, "coordinate, in m")
         rotation = self._vector("rotation_rad", rotation_rad, self._c, "controlled angle, in rad")
@@ -486,7 +486,7 @@ class Robot:
         self.run("path", plan=self._backend.plan(file))
 
     def run(self, program: str, /, **arguments: Any) -> None:
-        """Run a program with its arguments until it is done; `hold` and `idle` return at once.
+        """Run a program with its arguments until it is done; `hold` and `idle` return immediately.
 
         Programs and arguments are those of the reference page "Programs".
         """

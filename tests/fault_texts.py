@@ -8,5 +8,5 @@ from cdpr_rt.core.fault import fault_text
 
 
 def alarm(device: Any) -> str:
-    """Return the faults of `device` as text, "" if there are none."""
+    """Return the faults of `device` as text, or ""."""
     return "; ".join(fault_text(fault, ()) for fault in device.faults())

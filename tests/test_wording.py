@@ -1,9 +1,11 @@
-"""Documentation, help and messages avoid idioms that readers have to read twice."""
+"""Documentation, messages, docstrings and comments avoid idioms that readers must read twice."""
 
 from __future__ import annotations
 
 import ast
+import io
 import re
+import tokenize
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -26,6 +28,7 @@ IDIOMS = {
     r"\bnothing is known of\b": "unidentified",
 }
 """Regular expression of an idiom, and what to write instead."""
+ANY_IDIOM = re.compile("|".join(IDIOMS))
 
 
 def lines_of_documents() -> Iterator[tuple[str, str]]:
@@ -35,38 +38,47 @@ def lines_of_documents() -> Iterator[tuple[str, str]]:
 
 
 def texts_of(path: Path) -> Iterator[tuple[str, str]]:
-    """Yield the texts in a source file, and the docstrings of commands, which are their help."""
-    tree = ast.parse(path.read_text())
-    comments = {
-        id(node.value)
-        for node in ast.walk(tree)
-        if isinstance(node, ast.Expr)
-        and isinstance(node.value, ast.Constant)
-        and not (path.parent.name == "commands" and is_help(node, tree))
-    }
-    for node in ast.walk(tree):
-        if (
-            isinstance(node, ast.Constant)
-            and isinstance(node.value, str)
-            and id(node) not in comments
-        ):
+    """Yield the texts in a source file: messages, help, docstrings and comments."""
+    source = path.read_text()
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.Constant) and isinstance(node.value, str):
             yield f"{path.relative_to(ROOT)}:{node.lineno}", node.value
+    yield from comments_of(path, source)
 
 
-def is_help(docstring: ast.Expr, tree: ast.Module) -> bool:
-    return any(
-        isinstance(node, ast.FunctionDef) and node.decorator_list and node.body[0] is docstring
-        for node in ast.walk(tree)
-    )
+def remarks_of(path: Path) -> Iterator[tuple[str, str]]:
+    """Yield the docstrings and comments of a test file; its other texts quote the product."""
+    source = path.read_text()
+    if not ANY_IDIOM.search(source):  # this saves most of the time
+        return
+    for node in ast.walk(ast.parse(source)):
+        match node:
+            case ast.Expr(ast.Constant(str(text))):
+                yield f"{path.relative_to(ROOT)}:{node.lineno}", text
+    yield from comments_of(path, source)
 
 
-def test_documents_help_and_messages_have_no_private_idiom() -> None:
+def comments_of(path: Path, source: str) -> Iterator[tuple[str, str]]:
+    if not any(ANY_IDIOM.search(line) for line in source.splitlines() if "#" in line):
+        return
+    for token in tokenize.generate_tokens(io.StringIO(source).readline):
+        if token.type == tokenize.COMMENT:
+            yield f"{path.relative_to(ROOT)}:{token.start[0]}", token.string
+
+
+def test_documents_sources_and_tests_have_no_private_idiom() -> None:
     sources = [path for one in PRODUCT for path in sorted((ROOT / one).rglob("*.py"))]
-    read = [*lines_of_documents(), *(text for path in sources for text in texts_of(path))]
+    tests = sorted((ROOT / "tests").rglob("*.py"))
+    read = [
+        *lines_of_documents(),
+        *(text for path in sources for text in texts_of(path)),
+        *(text for path in tests for text in remarks_of(path)),
+    ]
     assert len(read) > 10_000
     found = [
         f"{where}: {match.group()!r}: write {instead}"
         for where, text in read
+        if ANY_IDIOM.search(text)
         for idiom, instead in IDIOMS.items()
         for match in re.finditer(idiom, text)
     ]

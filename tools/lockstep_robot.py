@@ -447,7 +447,7 @@ class LockstepRobot:
     ) -> None:
         """Send a command as the service does, and run cycles until the reply arrives.
 
-        Raises Refused if it is refused or fails.
+        Raises Refused if it is rejected or fails.
         """
         fields = {"program": program} if program else {}
         answers: list[dict[str, Any]] = []

@@ -1,4 +1,4 @@
-"""Options that take several numbers, each of which may be negative: `--to -100 200`."""
+"""Options that take several numbers, which may be negative: `--to -100 200`."""
 
 from __future__ import annotations
 

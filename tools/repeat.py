@@ -287,7 +287,7 @@ def _leaves(where: str, value: Any, run: Run) -> Iterator[Piece]:
 
 
 def difference(one: Iterator[Piece], other: Iterator[Piece]) -> str:
-    """Return the first difference as text; "" if there is none."""
+    """Return the first difference as text, or ""."""
     for a, b in zip_longest(one, other):
         if a != b:
             return _described(a, b)

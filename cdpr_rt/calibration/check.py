@@ -68,7 +68,7 @@ class DetectedChange:
     who: str
     """The cable as text, with the others that it might be."""
     alike: tuple[int, ...] = ()
-    """Other cables whose change of this kind would fit nearly as well."""
+    """Other cables for which a change of this kind fits nearly equally."""
     pose: int = 0
     """The first pose after a slip, counted from 0 (home)."""
 

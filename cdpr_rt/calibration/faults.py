@@ -271,7 +271,7 @@ def _with_distance(fault: Fault, found: Fit, seen: Observations) -> Fault:
 
 
 def _worst(found: Fit) -> list[Fault]:
-    """Return the readings that may be the worst contradiction; an empty list if there is none."""
+    """Return the readings that may be the worst contradiction, or an empty list."""
     n, seen = found.geometry.n, found.seen
     residual, hat, weight = _hats(found)
     redundancy = 1.0 - np.array([np.diag(h) for h in hat]).T

@@ -222,7 +222,7 @@ def _designed(
 def _at_crossover(
     inertia: float, latency: float, crossover_Hz: float, period: float
 ) -> PidDesign | None:
-    """Return the loop with the wanted phase margin at that crossover, None if there is none."""
+    """Return the loop with the wanted phase margin at that crossover, or None."""
     omega = 2.0 * math.pi * crossover_Hz
     filter_s = 1.0 / (DERIVATIVE_FILTER_RATIO * omega)
     at = np.array([omega])

@@ -209,7 +209,7 @@ class SharedBlock:
         return self._post("commands", self._commands, value)
 
     def take_command(self) -> dict[str, Any] | None:
-        """Return the next command, None if there is none."""
+        """Return the next command, or None."""
         return self._take("commands", self._commands)
 
     def void_commands(self) -> None:
@@ -224,7 +224,7 @@ class SharedBlock:
         return self._post("urgent", self._urgent, value, sign=-1)
 
     def take_urgent(self) -> dict[str, Any] | None:
-        """Return the next stop, None if there is none; its number is negative."""
+        """Return the next stop, or None; its number is negative."""
         return self._take("urgent", self._urgent)
 
     def post_reply(self, value: Mapping[str, Any]) -> int:
@@ -232,7 +232,7 @@ class SharedBlock:
         return self._post("replies", self._replies, value)
 
     def take_reply(self) -> dict[str, Any] | None:
-        """Return the next reply, None if there is none."""
+        """Return the next reply, or None."""
         return self._take("replies", self._replies)
 
     def _post(

@@ -47,7 +47,7 @@ ALLOWED: Final[dict[Transition, tuple[LoopState, ...]]] = {
     Transition.DISABLE: (LoopState.READY, LoopState.ACTIVE),
     Transition.ACKNOWLEDGE: (LoopState.FAULT,),
 }
-"""The states in which each transition is allowed; in all others it is refused."""
+"""The states in which each transition is allowed; in all others it is rejected."""
 
 
 class Reaction(IntEnum):

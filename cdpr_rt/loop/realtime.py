@@ -144,7 +144,7 @@ def one_core(*others: int) -> Iterator[None]:
 
 @contextmanager
 def _free_core(usable: set[int]) -> Iterator[int | None]:
-    """Claim a free core, None if there is none; the kernel frees the claim."""
+    """Claim a free core and return it, or None; the kernel frees the claim."""
     with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as claim:
         for core in sorted(usable, reverse=True):
             try:

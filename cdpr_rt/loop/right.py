@@ -57,7 +57,7 @@ class RightToMove:
 
     @property
     def current(self) -> int:
-        """The number of the current grant, 0 if there is none.
+        """The number of the current grant, or 0.
 
         An expiry more than `LONGEST_S` ahead is not the service's and counts as no grant.
         """
@@ -77,7 +77,7 @@ class RightToMove:
         self._mover[0] = number
 
     def refusal(self, number: int) -> str:
-        """Return why a command with this number is refused, "" if it is not."""
+        """Return why a command with this number is rejected, "" if it is not."""
         current = self.current
         if current == 0:
             return "nobody holds the right to move; take it first"

@@ -215,7 +215,7 @@ class CableModel:
 def unstretched_length(
     across: float, height: float, tension: float, compliance: float, weight: float
 ) -> float:
-    """Return the length without tension of a cable between two points; nan if there is none.
+    """Return the length without tension of a cable between two points, or nan.
 
     The end at which `tension` acts is `height` above the other one, which is `across` beside it.
     Elastic catenary: with H, V the components of `tension` t, T' = √(H² + (V - wL)²) the tension at

@@ -128,7 +128,7 @@ def winches_of(axes: Sequence[RobotAxis]) -> WinchArrays:
 
 
 def described(limits: Limits, n: int) -> dict[str, Any]:
-    """Return limits for a robot's description: arrays over the axes, None if there is none."""
+    """Return limits for a robot's description: arrays over the axes, or None."""
     table: dict[str, Any] = {}
     for name in limits.__dataclass_fields__:
         value = getattr(limits, name)

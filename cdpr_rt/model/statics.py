@@ -166,7 +166,7 @@ class PlatformStatics:
     def least_tensions_N(self, position_m: FloatArray, reserve_N: float = 0.0) -> FloatArray:
         """Return the tensions (..., n) at rest nearest to the lower bounds and a reserve above.
 
-        In the orientation of home. No tension is below that; nan if there are none.
+        In the orientation of home. No tension is below that; nan if no tensions exist.
         """
         n, low = self.model.kinematics.n, self.low_N + reserve_N
         still = self.model.workspace(0.0)
@@ -249,7 +249,7 @@ def _slabs(
 
 
 def _longest_run(good: BoolArray) -> tuple[int, int]:
-    """Return the first and the last place of the longest run of True, 0 and 0 if there is none.
+    """Return the first and the last place of the longest run of True, or 0 and 0.
 
     Of runs of the same length, the one nearest to the middle.
     """

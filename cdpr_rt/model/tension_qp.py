@@ -31,7 +31,7 @@ def project(
     """Write the tensions t = t0 + N' lambda (n,) within bounds nearest to the wanted ones.
 
     `space` (n + 1, n) is that of `null_space` with `r` null directions, as are `bounds` (3, n).
-    `scratch` (4, m, m), m >= n and 8, is overwritten. Returns False if there are none: then the
+    `scratch` (4, m, m), m >= n and 8, is overwritten. Returns False if none exist: then the
     cables whose bounds contradict each other are at these bounds, and all others between
     theirs.
     """

@@ -85,7 +85,7 @@ class OwnController:
     def __init__(
         self, controller: Controller, state: State, target: Target, last_N: FloatArray
     ) -> None:
-        """Take the array (n,) of which `state.tension_N` is a read-only view."""
+        """Take the array (n,) behind the read-only view `state.tension_N`."""
         self._controller, self._state, self._target = controller, state, target
         self._failed, self._cycle = False, 0
         self._low_N, self._high_N = state.low_N.copy(), state.high_N.copy()

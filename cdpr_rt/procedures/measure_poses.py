@@ -66,7 +66,7 @@ class PoseReader(Protocol):
 
 
 class PlatformOperator(PoseReader, Protocol):
-    """Moves a platform as well."""
+    """Also moves a platform."""
 
     def move_to(self, place: FloatArray) -> TargetNotReached | None:
         """Take it to a place (d,); None where it has come there.
@@ -140,7 +140,7 @@ def measure_poses(
 ) -> None:
     """Go to places (d,) and read each; by way of `between` where it does not go straight.
 
-    One that is not reached is read where the platform stands, on the way by `between` as well.
+    One that is not reached is read where the platform stands, also on the way by `between`.
     Raises TripError where the motion is ended, or where five places in turn are not reached or do
     not come to rest.
     """

@@ -116,7 +116,7 @@ class Program(ABC):
         """Return the preparation of a command with these arguments, None for nothing.
 
         It may take long, for example to read a file, and is called in another thread. If it raises,
-        the command is refused.
+        the command is rejected.
         """
         return None
 

@@ -91,7 +91,7 @@ class PathProgram(PlatformProgram):
         return self._stage == "path" and cycle - self._last_cycle in (0, 1)
 
     def left(self) -> dict[str, Any] | None:
-        """Return the path that can be resumed, None if there is none."""
+        """Return the path that can be resumed, or None."""
         if self._plan is None or self.store.unfinished is None:
             return None
         return self._told(self._plan)

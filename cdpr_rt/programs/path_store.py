@@ -47,7 +47,7 @@ def progress_file(folder: Path, *, simulated: bool = False) -> Path:
 
 
 def read_progress(folder: Path, *, simulated: bool = False) -> NDArray[Any]:
-    """Return the `PATH` row in a folder of paths; a row without a path if there is none."""
+    """Return the `PATH` row in a folder of paths, or a row without a path."""
     try:
         with os.fdopen(open_regular(progress_file(folder, simulated=simulated)), "rb") as file:
             data = file.read(PATH.itemsize)

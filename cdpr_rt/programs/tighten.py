@@ -347,7 +347,7 @@ class TightenProgram(PlatformProgram):
     and slackens the cables again if a cable does not become tight, if lengths disagree, or if by
     its lengths the platform is not at the expected pose. A platform that hangs because brakes have
     kept it is held by its pose immediately, from the torques of the last cycle on. If the pose does
-    not follow from the lengths, the command is refused, and nothing changes.
+    not follow from the lengths, the command is rejected, and nothing changes.
     """
 
     name = "tighten"
@@ -603,7 +603,7 @@ class TightenProgram(PlatformProgram):
             self._finish(feedback, setpoint, torque_Nm)
 
     def _let_down(self, feedback: AxisFeedback, torque_Nm: FloatArray, slack: str) -> None:
-        """Pay out cables of which some is slack, so that the lengths taken are wrong."""
+        """Pay out cables because some of them is slack and the lengths taken are wrong."""
         self._hands_over = False
         self._parts.estimator.forget_lengths()
         speed_rad_s = self._parts.estimator.estimate.velocity_rad_s

@@ -35,7 +35,7 @@ class TrackProgram(Program):
         self.controller, self._motion = controller, motion
 
     def start(self, _feedback: AxisFeedback, _setpoint: Setpoint, _torque_Nm: FloatArray) -> None:
-        """Begin the motion; raises ProgramError if there is none."""
+        """Begin the motion; raises ProgramError without one."""
         if self._motion is None:
             raise ProgramError(f"{self.name}: allowed: from a procedure, which gives it a motion")
         self.controller.reset()

@@ -94,7 +94,7 @@ class Lease:
             self._right.until(0)
 
     def holder(self) -> Holder | None:
-        """Return the holder, None if there is none."""
+        """Return the holder, or None."""
         with self._lock:
             left_s = self._left_s()
             return Holder(self._client, left_s) if left_s > 0.0 else None

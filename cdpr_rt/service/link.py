@@ -18,7 +18,7 @@ from cdpr_rt.errors import ControlError
 from cdpr_rt.loop.stop_socket import STOPS
 from cdpr_rt.service.rows import PublishedText, WallClock
 
-# Event log of the daemon: states, reasons, commands, faults of its own parts.
+# Event log of the daemon: states, reasons, commands, faults of its parts.
 
 _KEPT: Final = 512
 _LONGEST: Final = 1000

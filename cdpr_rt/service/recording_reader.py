@@ -186,7 +186,7 @@ class RecordingReader:
         schemas: dict[int, Schema],
         fields: Collection[str] | None,
     ) -> Columns:
-        """Take in one chunk; return the rows in it, nothing if there are none."""
+        """Take in one chunk; return the rows in it, if any."""
         rows: list[bytes] = []
         for record in breakup_chunk(chunk, validate_crc=True):
             if isinstance(record, Schema):

@@ -172,7 +172,7 @@ class StreamAnswer:
     """Number of the running program in the robot's description."""
     reaction: int = 0
     limit: int = 0
-    """Number of the limit that caused the reaction, 0 if there is none."""
+    """Number of the limit that caused the reaction, or 0."""
     pose: tuple[float, ...] = UNKNOWN_POSE
     pose_setpoint: tuple[float, ...] = UNKNOWN_POSE
     round_trip_s: float = math.nan

@@ -291,7 +291,7 @@ class AxisGroup:
     def let_other_buses_follow(self) -> None:
         """Advance time on all buses that this process leads to the time of this one.
 
-        A cycle moves only the time of its own bus, and the clock shows the earliest of all.
+        A cycle moves only the time of its bus, and the clock shows the earliest of all.
         """
         if isinstance(self._reader, SimulatedBus):
             self.clock.sleep_until(self._reader.now_s)

@@ -75,7 +75,7 @@ class BusMember(ABC):
             self._lose(error)
             return True
 
-    def tick(self, now_s: float) -> float:  # noqa: ARG002  # nothing is due by itself
+    def tick(self, now_s: float) -> float:  # noqa: ARG002  # nothing is due without a call
         """Return that no event is ever due."""
         return math.inf
 

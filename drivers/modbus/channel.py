@@ -118,7 +118,7 @@ class ByteChannel:
             self._lose()
         return True
 
-    def tick(self, now_s: float) -> float:  # noqa: ARG002  # nothing is due by itself
+    def tick(self, now_s: float) -> float:  # noqa: ARG002  # nothing is due without a call
         """Return that no event is ever due."""
         return math.inf
 
@@ -154,7 +154,7 @@ def refusal(answer: ExceptionResponse) -> str:
 
 
 def answer_in(data: bytes, framer: FramerBase, unit: int, number: int = 0) -> ModbusPDU | None:
-    """Return the answer in `data` to the request with this number; None if there is none."""
+    """Return the answer in `data` to the request with this number, or None."""
     try:
         return framer.handleFrame(data, unit, number)[1]
     except (ModbusException, ValueError, IndexError, struct.error):

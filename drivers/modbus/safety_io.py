@@ -351,7 +351,7 @@ class SafetyIo:
         return self
 
     def energise(self) -> None:
-        """Close the contactor and monitor from now on; raises SafetyIoError if that is refused."""
+        """Close the contactor and monitor from now on; raises SafetyIoError if not allowed."""
         tripped = self._tripped or self._saved_trip()
         if tripped:
             raise SafetyIoError(f"{tripped}; see to it, then acknowledge it: cdpr io ack")

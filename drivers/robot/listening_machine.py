@@ -147,7 +147,7 @@ class ListeningMachine:
     def set_brakes(self, released: bool) -> None:
         """Do nothing, as `power_off`."""
 
-    def brakes_are(self, released: bool) -> bool:  # noqa: ARG002  # there are none here
+    def brakes_are(self, released: bool) -> bool:  # noqa: ARG002  # without brakes
         """Return True: there are no brakes to wait for."""
         return True
 

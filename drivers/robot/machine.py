@@ -429,7 +429,7 @@ class RobotMachine:
             move(*self._safety.braked)
 
     def brakes_are(self, released: bool) -> bool:
-        """Whether the brakes have followed; true if there are none."""
+        """Whether the brakes have followed; true without brakes."""
         if self._safety is None or not self._safety.braked:
             return True
         brakes = self._safety.io.state.brakes_released

@@ -68,7 +68,7 @@ def trip_file(reference: str) -> Path:
 
 
 def kept_trip(reference: str) -> dict[str, Any] | None:
-    """Return the stored trip (reason, date), or None if there is none; tolerates damage."""
+    """Return the stored trip (reason, date), or None; tolerates damage."""
     try:
         return read_state(trip_file(reference))
     except StateFileError as error:

@@ -388,7 +388,7 @@ def _details(node: dict[str, Any]) -> list[str]:
 
 
 def signs_of_a_master(traffic: Traffic) -> str:
-    """Return the signs of an active master; "" if there are none."""
+    """Return the signs of an active master, or ""."""
     signs = sorted(traffic.heard)
     if traffic.sdo_requests:
         nodes = ", ".join(map(str, sorted(traffic.sdo_requests)))

@@ -263,7 +263,7 @@ def measure(
 
 
 def refuse_foreign(folder: Path) -> CalibrationData | None:
-    """Return the data in a folder, None if there are none.
+    """Return the data in a folder, or None.
 
     Raises BadInputError if files in the folder have the names of a run but no run wrote them.
     """

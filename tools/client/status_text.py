@@ -190,7 +190,7 @@ def platform_text(status: dict[str, Any]) -> str:
 
 
 def learnt_text(status: dict[str, Any]) -> str:
-    """Return the estimates for motors that were not commissioned; empty if there are none."""
+    """Return the estimates for motors that were not commissioned, or ""."""
     progress = status.get("program_progress") or {}
     parts = []
     for what in ("friction", "cogging"):
@@ -217,7 +217,7 @@ def place_text(progress: dict[str, Any]) -> str:
 
 
 def target_text(progress: dict[str, Any]) -> str:
-    """Return the target of the platform or the axes; empty if there is none."""
+    """Return the target of the platform or the axes, or ""."""
     target = _place(progress, "target_")
     if not target and progress.get("target_rad"):
         target = f"{_listed(progress['target_rad'], math.degrees(1.0), 1)} deg"
@@ -225,7 +225,7 @@ def target_text(progress: dict[str, Any]) -> str:
 
 
 def _place(progress: dict[str, Any], of: str = "") -> str:
-    """Return a place and the rotation there in mm and deg; empty if there is none."""
+    """Return a place and the rotation there in mm and deg, or ""."""
     place, turned = progress.get(f"{of or 'position_'}m"), progress.get(f"{of}rotation_rad")
     text = f"{_listed(place, 1e3, 1)} mm" if place else ""
     if text and turned:

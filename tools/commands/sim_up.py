@@ -244,7 +244,7 @@ def _require_simulated(text: str, url: BusUrl) -> None:
 
 
 def _refuse_platforms(truth_log: Path | None, scanner: Path | None, camera: Path | None) -> None:
-    """Raise BadInputError for options that need a platform, because there is none."""
+    """Raise BadInputError for options that need a platform, which the robot lacks."""
     robot = "a robot with its platform on the cables"
     for option, path, whose in (
         ("--truth-log", truth_log, f"a winch, or {robot}"),

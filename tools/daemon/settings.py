@@ -202,7 +202,7 @@ class RunSettings(BaseModel):
         return tuple(fd for fd in fds if fd >= 0)
 
     def key(self) -> bytes | None:
-        """Return the shared key stored by the launcher; None if there is none."""
+        """Return the shared key stored by the launcher, or None."""
         return None if self.key_fd < 0 else os.pread(self.key_fd, _MOST_KEY_BYTES, 0)
 
     @classmethod

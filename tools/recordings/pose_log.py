@@ -45,7 +45,7 @@ class PoseLogTail:
         return max(0, os.fstat(self._fd).st_size - _HEADER_BYTES) // self.dtype.itemsize
 
     def last(self) -> Any:
-        """Return the newest record, a scalar of `dtype`; raises BadInputError if there is none."""
+        """Return the newest record, a scalar of `dtype`; raises BadInputError without one."""
         count = len(self)
         if not count:
             raise BadInputError(f"{self.path}: holds no record yet")

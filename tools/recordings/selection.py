@@ -193,7 +193,7 @@ def check_target(path: Path, overwrite: bool) -> None:
 def export(selection: Selection, path: Path) -> int:
     """Write the rows to `path`, one column for each field and axis; return their number.
 
-    Raises BadInputError if there are none, WorkFailedError if the file cannot be written.
+    Raises BadInputError without any, WorkFailedError if the file cannot be written.
     """
     with os_error_as(WorkFailedError, f"{path}: cannot be written"):
         path.parent.mkdir(parents=True, exist_ok=True)

@@ -60,7 +60,7 @@ def gcode(directions: Directions, speed_m_s: float) -> str:
 
 
 def plan_of(planner: PathPlanner, directions: Directions, speed_m_s: float) -> PathPlan:
-    """Return the plan of the trial's path; raises WorkFailedError if there is none."""
+    """Return the plan of the trial's path; raises WorkFailedError without one."""
     origin = 0.5 * (directions.low_m + directions.high_m)
     settings = GcodeSettings(origin, 0.0)
     path = read_gcode(gcode(directions, speed_m_s), FILE, planner.coordinates, settings)

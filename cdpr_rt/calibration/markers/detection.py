@@ -343,7 +343,7 @@ class IntrinsicsFit:
     left_out: tuple[str, ...]
     """Images that were left out, with reasons."""
     missing: tuple[str, ...]
-    """Missing views, as text; the intrinsics are good if there are none."""
+    """Missing views, as text; empty if the intrinsics are good."""
 
 
 def fit_intrinsics(images: Sequence[tuple[str, NDArray[np.uint8]]], board: Board) -> IntrinsicsFit:

@@ -50,7 +50,7 @@ class ControlSocket:
     """One accepted connection of `client`, which holds the right under `token`.
 
     Orders are carried out one after the other, except `hold`: it overtakes all of them, and those
-    sent before it that have not begun are refused.
+    sent before it that have not begun are rejected.
     """
 
     def __init__(

@@ -45,7 +45,7 @@ def camera_robot(
     knowledge: Knowledge = KNOWN,
     identified: tuple[str, ...] = USUAL,
 ) -> CameraRobot:
-    """Return readings of spatial-8 at random poses in its box, of which the first is home."""
+    """Return readings of spatial-8 at random poses in its box; the first is home."""
     print(f"camera robot of seed {seed}")
     robot = load_robot("spatial-8")
     geometry = CableGeometry.of(robot, identified, knowledge)

@@ -47,7 +47,7 @@ def _usual(_: Question, default: str, wrong: str) -> str:
 
 @dataclass(frozen=True)
 class PointSet:
-    """A synthetic robot with points measured at some poses, of which the first is home."""
+    """A synthetic robot with points measured at some poses; the first is home."""
 
     robot: Robot
     what: MadeUp

@@ -55,6 +55,6 @@ def with_rate(rate_Nm_s: float) -> Limits:
 
 
 def reason_of(supervisor: Supervisor, names: Sequence[str] = ()) -> str:
-    """Return the worst finding of the last cycle as text, "" if there is none."""
+    """Return the worst finding of the last cycle as text, or ""."""
     fault = supervisor.fault()
     return "" if fault is None else fault_text(fault, names)

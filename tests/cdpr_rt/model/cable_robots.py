@@ -36,7 +36,7 @@ def wrench_matrix(p: FloatArray, rotation: FloatArray) -> FloatArray:
 
 
 def suspended_poses(count: int, seed: int) -> list[FloatArray]:
-    """Return W of `count` poses, most of which carry 100 kg."""
+    """Return W of `count` poses; most of them carry 100 kg."""
     rng = np.random.default_rng(seed)
     at = rng.uniform([-6.5, -4.5, 0.2], [6.5, 4.5, 4.5], (count, 3))
     turned = Rotation.from_euler("xyz", rng.uniform(-25, 25, (count, 3)), degrees=True)

@@ -68,7 +68,7 @@ def test_figures_print_a_line_for_each_row_and_target() -> None:
 
 def test_bench_cycle_exchanges_the_same_frames_with_either_library() -> None:
     """The bus counts SYNC, 8 TPDOs and 8 RPDOs. Our master adds its heartbeat."""
-    # two blocks, of which the second is shorter
+    # two blocks; the second is shorter
     figures, text = bench("cycle", "--cycles", "520")
     rows = figures["rows"]
     assert rows[CANOPEN]["frames"] == 17.0

@@ -162,7 +162,7 @@ def opened(rig: Rig, port: int, query: str, origin: str | None = None) -> int:
     try:
         with connect(
             f"ws://127.0.0.1:{port}/control?client=page&{query}",
-            origin=origin,  # type: ignore[arg-type]  # a str of its own
+            origin=origin,  # type: ignore[arg-type]  # a subtype of str
         ) as connection:
             connection.recv(60.0)
     except InvalidStatus as refused:
