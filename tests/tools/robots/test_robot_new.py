@@ -1,4 +1,4 @@
-"""`cdpr robot new`: what it asks, writes and refuses."""
+"""`cdpr robot new`: its questions, files and rejected answers."""
 
 from __future__ import annotations
 
@@ -34,7 +34,9 @@ def usual(question: Question, default: str, wrong: str) -> str:
 
 
 @pytest.mark.parametrize("kind", list(KINDS))
-def test_the_defaults_of_every_kind_are_a_robot_that_works(kind: str, tmp_path: Path) -> None:
+def test_the_default_answers_of_every_kind_give_a_robot_without_findings(
+    kind: str, tmp_path: Path
+) -> None:
     path = tmp_path / "mine.toml"
     robot = write_robot(answers_of(path, {"kind": kind}, usual), path)
     assert diagnose(robot) == []
@@ -54,7 +56,7 @@ FRAMES = [(kind, width_m) for kind in KINDS for width_m in (1.5, 3.0, 8.0, 15.0)
 
 @pytest.mark.long
 @pytest.mark.parametrize(("kind", "widest_m"), FRAMES)
-def test_the_defaults_of_a_frame_of_any_size_are_a_robot_that_works(
+def test_the_default_answers_for_any_frame_size_give_a_robot_without_findings(
     kind: str, widest_m: float, tmp_path: Path
 ) -> None:
     usual_m = kind_of(kind).frame_m
@@ -68,15 +70,15 @@ def test_the_defaults_of_a_frame_of_any_size_are_a_robot_that_works(
     assert side_m == pytest.approx(scale * kind_of(kind).side_m, rel=0.02)
 
 
-def test_the_box_that_is_proposed_of_a_wide_and_low_frame_is_all_of_targets(tmp_path: Path) -> None:
+def test_the_proposed_box_of_a_wide_and_low_frame_is_feasible(tmp_path: Path) -> None:
     path = tmp_path / "stadium.toml"
     given = {"kind": "point-4", "frame_m": "80 50 20"}
     told = diagnose(write_robot(answers_of(path, given, usual), path))
-    # the smallest winches that hold the platform are proposed, and cables of 50 m sag in their pull
+    # the proposed winches are the smallest that hold the platform, and their cables of 50 m sag
     assert [finding.key for finding in told] == ["limits.tension_min_N"]
 
 
-def test_a_platform_too_light_for_its_winches_is_told_what_would_do(tmp_path: Path) -> None:
+def test_the_error_for_a_platform_too_light_names_a_possible_mass(tmp_path: Path) -> None:
     path = tmp_path / "light.toml"
     given = {"kind": "suspended-6", "frame_m": "1.5 1.5 1.5", "mass_kg": "1"}
     with pytest.raises(ProfileError) as caught:
@@ -100,7 +102,7 @@ def test_smaller_winches_and_a_smaller_frame_get_a_smaller_platform(tmp_path: Pa
     np.testing.assert_allclose(np.ptp(platform.exit_points_m, axis=0)[:2], (3.0, 2.0), atol=0.02)
 
 
-def test_the_stand_is_in_the_middle_of_a_frame_about_the_room_s_zero(tmp_path: Path) -> None:
+def test_the_stand_is_in_the_middle_of_the_frame(tmp_path: Path) -> None:
     path = tmp_path / "mine.toml"
     given = {"kind": "suspended-8", "frame_m": "3 2 2"}
     platform = write_robot(answers_of(path, given, usual), path).platform
@@ -108,7 +110,7 @@ def test_the_stand_is_in_the_middle_of_a_frame_about_the_room_s_zero(tmp_path: P
     assert platform.home_m[:2] == (0.0, 0.0)
 
 
-def test_kinds_are_reported_before_the_first_question(tmp_path: Path) -> None:
+def test_the_kinds_are_listed_before_the_first_question(tmp_path: Path) -> None:
     path = tmp_path / "mine.toml"
     done = cdpr_here("robot", "new", path, stdin="planar-5\n\n")
     assert done.returncode == 2 and not path.exists()
@@ -117,7 +119,7 @@ def test_kinds_are_reported_before_the_first_question(tmp_path: Path) -> None:
     assert "value 'planar-5'; allowed: planar-3, planar-4, point-4" in done.stderr
 
 
-def test_the_defaults_are_a_robot_that_works(tmp_path: Path) -> None:
+def test_yes_writes_a_robot_like_planar_3_and_never_overwrites_it(tmp_path: Path) -> None:
     path = tmp_path / "mine.toml"
     done = cdpr_here("robot", "new", path, "--yes", "--json")
     assert done.returncode == 0, done.stderr
@@ -138,21 +140,21 @@ def test_the_defaults_are_a_robot_that_works(tmp_path: Path) -> None:
     assert load_robot(path) == robot
 
 
-def test_defaults_follow_from_where_the_cables_leave(tmp_path: Path) -> None:
+def test_defaults_follow_from_the_exit_points(tmp_path: Path) -> None:
     given = {"exit_1_m": "-2, 0", "exit_2_m": "2, 0", "exit_3_m": "0.2, 3", "side_m": "0.2"}
     path = tmp_path / "upright.toml"
     robot = write_robot(answers_of(path, given, usual), path)
     assert diagnose(robot) == []
     platform = robot.platform
     assert platform is not None
-    # one corner up, the others towards their exit points
+    # one corner points up, the others towards their exit points
     (x1, y1), (x2, y2), (x3, y3) = platform.anchor_points_m
     assert x1 < 0 < x2 and y1 < 0 and y2 < 0 and abs(x3) < 1e-9 and y3 > 0
     assert platform.home_m[1] < platform.workspace_min_m[1]
     assert [axis.name for axis in robot.axes] == ["cable 1", "cable 2", "cable 3"]
 
 
-def test_answers_are_asked_again_until_they_can_be(tmp_path: Path) -> None:
+def test_questions_are_repeated_until_their_answer_is_valid(tmp_path: Path) -> None:
     answers = [
         "",
         "Wall robot",
@@ -190,7 +192,7 @@ def test_answers_are_asked_again_until_they_can_be(tmp_path: Path) -> None:
     assert platform.mass_kg == 1.5
 
 
-def test_questions_nobody_answers_write_nothing(tmp_path: Path) -> None:
+def test_unanswered_questions_write_no_file(tmp_path: Path) -> None:
     path = tmp_path / "mine.toml"
     done = cdpr_here("robot", "new", path, stdin="\nMine\n\n")
     assert done.returncode == 2
@@ -198,7 +200,7 @@ def test_questions_nobody_answers_write_nothing(tmp_path: Path) -> None:
     assert "Traceback" not in done.stderr and not path.exists()
 
 
-def test_all_wrong_keys_are_named_with_those_of_the_kind(tmp_path: Path) -> None:
+def test_all_unknown_keys_are_named_with_the_allowed_keys(tmp_path: Path) -> None:
     given = {"kind": "planar-4", "width_m": "3", "height": "2"}
     with pytest.raises(BadInputError) as caught:
         answers_of(tmp_path / "mine.toml", given, usual)
@@ -220,7 +222,7 @@ def test_all_wrong_keys_are_named_with_those_of_the_kind(tmp_path: Path) -> None
         ("name", "two\nlines", "allowed: a text of one line"),
     ],
 )
-def test_wrong_answers_beforehand_are_refused(
+def test_invalid_answers_by_set_are_rejected(
     tmp_path: Path, key: str, value: str, problem: str
 ) -> None:
     with pytest.raises(BadInputError) as caught:
@@ -228,7 +230,7 @@ def test_wrong_answers_beforehand_are_refused(
     assert problem in str(caught.value)
 
 
-def test_two_answers_to_one_question_are_refused(tmp_path: Path) -> None:
+def test_two_answers_to_one_question_are_rejected(tmp_path: Path) -> None:
     path = tmp_path / "twice.toml"
     answers = "--set", "kind=planar-3", "--set", "kind=planar-4"
     done = cdpr_here("robot", "new", path, "--yes", *answers)
@@ -236,7 +238,7 @@ def test_two_answers_to_one_question_are_refused(tmp_path: Path) -> None:
     assert "--set kind: 'planar-3' and 'planar-4'; allowed: one of them" in done.stderr
 
 
-def test_what_cannot_work_is_reported_and_not_written(tmp_path: Path) -> None:
+def test_an_impossible_robot_is_reported_and_not_written(tmp_path: Path) -> None:
     path = tmp_path / "point.toml"
     line = ["exit_1_m=-1,2", "exit_2_m=0,2", "exit_3_m=1,2", "side_m=0", 'name=A "line" é']
     done = cdpr_here("robot", "new", path, "--yes", *(p for text in line for p in ("--set", text)))
@@ -245,13 +247,13 @@ def test_what_cannot_work_is_reported_and_not_written(tmp_path: Path) -> None:
     assert "--set side_m=0 --set 'name=A \"line\" é' --yes" in done.stderr
 
 
-def test_a_file_can_only_be_new_toml_in_a_folder(tmp_path: Path) -> None:
+def test_a_file_in_a_missing_folder_is_rejected(tmp_path: Path) -> None:
     done = cdpr_here("robot", "new", tmp_path / "nowhere" / "mine.toml", "--yes")
     assert done.returncode == 2
     assert "allowed: NAME.toml in a folder that is there" in done.stderr
 
 
-def test_names_in_the_picture_are_clear_of_its_numbers(tmp_path: Path) -> None:
+def test_names_in_the_picture_stay_inside_its_axes(tmp_path: Path) -> None:
     path = tmp_path / "mine.toml"
     given = {"kind": "suspended-8", "frame_m": "3 2 2"}
     robot = write_robot(answers_of(path, given, usual), path)
@@ -283,7 +285,7 @@ def test_a_platform_that_cables_hold_down_to_the_floor_has_a_stand(
     assert answers["low_m"][-1] > answers["home_m"][-1]
 
 
-# Robots with other numbers of cables than `cdpr robot new` describes, as the pages say.
+# Robots with other numbers of cables than `cdpr robot new` writes, as the pages describe.
 
 
 def _point(axis: str, key: str, point_m: tuple[float, ...]) -> str:
@@ -309,7 +311,7 @@ def _require_works(path: Path, head: str, axes: list[str]) -> None:
 
 @pytest.mark.parametrize("kind", ["planar-4", "suspended-6", "suspended-8", "spatial-8"])
 @pytest.mark.parametrize("above", [False, True])
-def test_one_more_cable_straight_below_or_above_the_middle(
+def test_a_robot_with_one_more_cable_below_or_above_the_middle_is_feasible(
     kind: str, above: bool, tmp_path: Path
 ) -> None:
     path = tmp_path / "mine.toml"
@@ -327,7 +329,7 @@ def test_one_more_cable_straight_below_or_above_the_middle(
     _require_works(path, head, [*axes, more])
 
 
-def test_a_point_on_two_cables_in_a_plane(tmp_path: Path) -> None:
+def test_a_point_on_two_cables_in_a_plane_is_feasible(tmp_path: Path) -> None:
     path = tmp_path / "mine.toml"
     head, axes = _file_of("planar-3", path)
     head = re.sub(r"^mass_kg = \S+", "mass_kg = 6.5", head, flags=re.MULTILINE)
@@ -335,7 +337,7 @@ def test_a_point_on_two_cables_in_a_plane(tmp_path: Path) -> None:
     _require_works(path, head, upper)
 
 
-def test_a_point_on_three_cables_from_above(tmp_path: Path) -> None:
+def test_a_point_on_three_cables_from_above_is_feasible(tmp_path: Path) -> None:
     path = tmp_path / "mine.toml"
     head, axes = _file_of("point-4", path)
     _, y_m, z_m = (float(x) for x in re.findall(r"exit_point_m = \[(.*?)\]", axes[2])[0].split(","))
