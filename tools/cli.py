@@ -18,9 +18,9 @@ from cdpr_drivers.errors import ConfigurationError, DriverError
 from cdpr_profiles.errors import ProfileError, printable
 from cdpr_rt.errors import ControlError, InvalidRequestError
 from cdpr_sim_bus.errors import BusSetupError, SimulatorError
-from cdpr_tools.command_group import group_of
+from cdpr_tools.command_group import ROBOT_VARIABLE, group_of
 from cdpr_tools.compiling import announce_compiling
-from cdpr_tools.errors import BAD_INPUT, DONE, FAILED, CommandError
+from cdpr_tools.errors import BAD_INPUT, DONE, FAILED, BadInputError, CommandError
 from cdpr_tools.streams import OutputLostError, guard_streams
 
 MODULES = {
@@ -45,15 +45,14 @@ MODULES = {
         "controller": "Run a program (a controller with its motion) until it is done, then hold.",
         "tighten": "Tighten the cables, measure where the platform is, and hold it.",
         "lower": "Lower the platform onto its stand and slacken the cables; the power stays on.",
-        "pause": "Stop a motion and hold; `cdpr resume` continues it.",
-        "resume": "Continue the move or path that was paused.",
+        "resume": "Continue the move or path that was stopped by `cdpr hold` or Ctrl-C.",
     },
     "daemon_state": {
         "status": "Show the state of the daemon and its robot.",
         "check": "Boot the drives again and check the bus, without power.",
         "enable": "Switch the drives on; they hold their position.",
         "disable": "Stop the motion under control, then switch the drives off.",
-        "hold": "Stop the motion and hold the position; the power stays on.",
+        "hold": "Stop the motion and hold the position with power; `cdpr resume` continues it.",
         "ack": "Acknowledge a fault after its cause has been removed; gives no power.",
         "stop": "Stop the motion under control, switch the drives off and end the daemon.",
     },
@@ -90,7 +89,7 @@ MODULES = {
         "poses": "Draw random poses that a robot can reach.",
     },
     "path": {
-        "path": "Preview, run and resume paths from G-code or way points.",
+        "path": "Check, run and resume paths from G-code or way points.",
     },
     "profiles": {
         "profiles": "List and show the profiles of motors, drives, cables, winches and robots.",
@@ -108,7 +107,7 @@ MODULES = {
 PANELS = {
     "Run": ("run", "status", "check", "enable", "ack", "service-unit"),
     "Move": ("tighten", "move", "jog", "path", "controller", "teleop", "resume"),
-    "Stop": ("hold", "pause", "lower", "disable", "stop", "estop"),
+    "Stop": ("hold", "lower", "disable", "stop", "estop"),
     "Look": ("log", "bus"),
     "Describe": ("robot", "profiles"),
     "Commission": ("commission", "drive", "cogging", "tension", "io", "rail"),
@@ -117,8 +116,34 @@ PANELS = {
     "Machine": ("doctor",),
 }
 """Which commands the help shows, and under which headings; it hides the others."""
-ALIASES = {"goto": "move", "clear": "ack", "reset": "ack", "start": "run"}
-"""Names that users of other controllers type."""
+ALIASES = {
+    "clear": "ack",
+    "reset": "ack",
+    "start": "run",
+    "pause": "hold",
+    "robot list": "profiles list robots",
+    "robot check": "robot show",
+}
+"""What users of other controllers type, and the command that runs instead; none of them moves."""
+GUESSES = {
+    "goto": "this moves the robot: type `cdpr move --to X Y [Z]`",
+    "home": "this moves the robot: `cdpr lower` puts the platform on its stand",
+    "gui": "there is no page in a browser yet; `cdpr teleop robot ROBOT` moves a robot by keyboard,"
+    " `cdpr run ROBOT --live PORT` shows it in Foxglove",
+}
+"""What users type for something that moves, or does not exist, and what they are told instead."""
+STOPS = """Which stop do I want? In danger: the emergency-stop button, no command.
+
+hold     brake; the motors hold the position           power stays on
+Ctrl-C   of move, jog, path or teleop: as hold         power stays on
+lower    put the platform on its stand, cables loose   power stays on
+disable  brake and lower the platform                  then power off
+stop     as disable, then end the daemon               then power off
+Ctrl-C   of run: as stop; a second one: as estop
+estop    no braking: a raised platform falls           power off immediately"""
+"""Ends the help of every command that stops."""
+_HINTS = f"""Name the robot by --robot ROBOT in any command, or once for all by the environment
+variable {ROBOT_VARIABLE}. `cdpr stop --help` compares the ways to stop."""
 _INTERRUPTED = 130
 _MOST_CHARS = 10_000
 """Longest message of an error."""
@@ -137,8 +162,19 @@ _UsageError: Any = BadParameter.__base__
 _CommandLineError: Any = _UsageError.__base__
 
 
-class _Commands(group_of(MODULES, PANELS, ALIASES)):  # type: ignore[misc]
+class _Commands(group_of(MODULES, PANELS, dict.fromkeys(PANELS["Stop"], STOPS))):  # type: ignore[misc]
     """All commands; errors in their arguments are reported like all other errors."""
+
+    @override
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
+        for words in () if ctx.resilient_parsing else (" ".join(args[:2]), args[0]):
+            if words in GUESSES:
+                raise BadInputError(f"{words}: {GUESSES[words]}")
+            if words in ALIASES:
+                print(f"this is `cdpr {ALIASES[words]}`", file=sys.stderr)
+                args = [*ALIASES[words].split(), *args[len(words.split()) :]]
+                break
+        return super().resolve_command(ctx, args)
 
     @override
     def invoke(self, ctx: Any) -> Any:
@@ -146,6 +182,8 @@ class _Commands(group_of(MODULES, PANELS, ALIASES)):  # type: ignore[misc]
             return super().invoke(ctx)
         except _UsageError as error:
             if isinstance(error, BadParameter):
+                if getattr(error.param, "envvar", None) == ROBOT_VARIABLE and not error.message:
+                    error.message = f"Name it, or set {ROBOT_VARIABLE}"
                 for pattern, words in _WORDS:
                     error.message = re.sub(pattern, words, error.message)
             elif "unexpected extra argument" in error.message and _names_robot(error.ctx.command):
@@ -161,6 +199,7 @@ def _names_robot(command: Any) -> bool:
 app = typer.Typer(
     cls=_Commands,
     name="cdpr",
+    epilog=" ".join(_HINTS.split()),
     help="Commission, run and simulate the winches of cable-driven parallel robots.",
     no_args_is_help=True,
     pretty_exceptions_enable=False,
@@ -201,7 +240,7 @@ def main() -> None:
     announce_compiling()
     try:
         try:
-            status = app(standalone_mode=False)
+            status = app(standalone_mode=False, prog_name="cdpr")
         finally:
             sys.stdout.flush()  # here a failure can still be reported
     except BrokenPipeError:

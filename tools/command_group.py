@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import inspect
+import os
 from collections.abc import Mapping, Sequence
 from difflib import get_close_matches
 from functools import cache
@@ -15,6 +16,8 @@ from typing_extensions import override
 
 from cdpr_tools.loading import loading_notice
 
+ROBOT_VARIABLE = "CDPR_ROBOT"
+"""Environment variable that names the robot of a command that names none."""
 HARMLESS = frozenset({"Look", "Describe", "Simulate", "Machine"})
 """Headings of commands that neither move anything nor switch power."""
 
@@ -39,8 +42,50 @@ def _unwrap(command: Any) -> None:
         _shorten(param)
     paragraphs = inspect.cleandoc(command.help or "").split("\n\n")
     command.help = "\n\n".join(paragraph.replace("\n", " ") for paragraph in paragraphs)
+    _accept_robot_option(command)
     for other in getattr(command, "commands", {}).values():
         _unwrap(other)
+
+
+def _accept_robot_option(command: Any) -> None:
+    """Let `--robot ROBOT` stand for the first argument of a command that is a robot.
+
+    If another argument follows it and is a choice, ROBOT_VARIABLE stands for a robot that is left
+    out; for other commands the argument itself reads the variable.
+    """
+    arguments = [param for param in command.params if param.param_type_name == "argument"]
+    is_option = any("--robot" in param.opts for param in command.params)
+    if is_option or not arguments or "ROBOT" not in arguments[0].metavar.strip("[]").split("|"):
+        return
+    parse = command.parse_args
+    choices = arguments[1].type_descriptor.choices or () if len(arguments) > 1 else ()
+
+    def parse_args(ctx: Any, args: list[str]) -> Any:
+        robot, args = _robot_option(args)
+        usual = os.environ.get(ROBOT_VARIABLE)
+        if robot is None and usual and choices:
+            typed, _, _ = command.make_parser(ctx).parse_args(list(args))
+            if typed.get(arguments[0].name) in [one.value for one in choices]:
+                robot = usual
+        return parse(ctx, args if robot is None else [robot, *args])
+
+    command.parse_args = parse_args
+
+
+def _robot_option(args: Sequence[str]) -> tuple[str | None, list[str]]:
+    """Return the value of `--robot` and the other words; None if it is not given."""
+    words = iter(args)
+    robot, others = None, []
+    for word in words:
+        if word == "--robot":
+            robot = next(words, None)
+        elif word.startswith("--robot="):
+            robot = word.partition("=")[2]
+        else:
+            others.append(word)
+        if word == "--":
+            break
+    return robot, [*others, *words]
 
 
 def _no_type(ctx: Any) -> None:
@@ -72,14 +117,14 @@ def _shorten(param: Any) -> None:
 def group_of(
     modules: Mapping[str, Mapping[str, str]],
     panels: Mapping[str, Sequence[str]] | None = None,
-    aliases: Mapping[str, str] | None = None,
+    epilogs: Mapping[str, str] | None = None,
 ) -> type[TyperGroup]:
     """Return the class of a group of commands.
 
     `modules` has, for each module of cdpr_tools.commands, the names and first lines of its
     commands. The group's own help shows these lines without importing the modules' libraries.
     With `panels` the help sorts the commands under headings and hides those that have none.
-    `aliases` are further names of commands. For a mistyped name, only commands under a heading of
+    `epilogs` end the help of commands. For a mistyped name, only commands under a heading of
     `HARMLESS` are suggested, never one that moves or cuts power.
     """
     module_of = {name: module for module, lines in modules.items() for name in lines}
@@ -115,13 +160,15 @@ def group_of(
 
         @override
         def resolve_command(self, ctx: Any, args: list[str]) -> Any:
-            name = (aliases or {}).get(args[0], args[0])
+            name = args[0]
             if name in module_of:
-                self.add_command(load(module_of[name], name))
+                command = load(module_of[name], name)
+                command.epilog = (epilogs or {}).get(name)
+                self.add_command(command)
             elif not ctx.resilient_parsing and not name.startswith("-"):
                 near = " or ".join(map(repr, get_close_matches(name, suggested)))
                 ctx.fail(f"No such command '{name}'" + (near and f"; did you mean {near}?"))
-            return super().resolve_command(ctx, [name, *args[1:]])
+            return super().resolve_command(ctx, args)
 
     return _Group
 

@@ -23,7 +23,7 @@ from cdpr_drivers.bus import BusUrl
 
 GCODE = "G21 G90 G64 P10\nG0 X-200 Y0\nG1 X100 F4000\nY100\nG3 X0 Y100 I-50 J0\nG1 X-200\nM2\n"
 ENCODER_FAULT = 0x7305  # by 2F00h
-HELD = "`cdpr path --resume` goes on"
+HELD = "`cdpr path resume` goes on"
 
 
 @pytest.fixture
@@ -77,9 +77,9 @@ def _still(daemon: RealDaemon) -> float | None:
 def pause(daemon: RealDaemon, folder: Path) -> None:
     """Follow the path from its beginning until it is paused."""
     # an origin in the plane: X is horizontal, Y is up
-    with following(daemon, folder / "part.nc", "--run", "--origin=0 1700") as path:
+    with following(daemon, "run", folder / "part.nc", "--origin=0 1700") as path:
         until_time(daemon, 0.5)
-        assert cdpr("pause", *daemon.at).returncode == 0
+        assert cdpr("hold", *daemon.at).returncode == 0
         said = path.communicate()[0]
     assert path.returncode == 0
     assert re.search(r"path part.nc left at \d+ %, line \d+, paused by .*; " + HELD, said)
@@ -109,7 +109,7 @@ def lead(daemon: RealDaemon) -> None:
 
 def break_a_drive(daemon: RealDaemon) -> None:
     """Let an encoder fail on the path, then recover the robot."""
-    with following(daemon, "--resume", "--feed", "50") as path:
+    with following(daemon, "resume", "--feed", "50") as path:
         seen = until_time(daemon, told(daemon)["time_s"] + 0.2)
         with third_party(BusUrl.parse(f"{daemon.bus}-can0")) as network:
             network.write(1, 0x2F00, 1, ENCODER_FAULT)
@@ -128,22 +128,22 @@ def test_a_path_resumes_where_it_was_paused_faulted_or_killed(folder: Path) -> N
         pause(daemon, folder)
         lead(daemon)
         break_a_drive(daemon)
-        with following(daemon, "--resume") as path:
+        with following(daemon, "resume") as path:
             seen = until_time(daemon, told(daemon)["time_s"] + 0.2)
             assert seen["feed"] == 0.5
             os.kill(daemon.children()["loop"], signal.SIGKILL)
             path.communicate()
         assert path.returncode == 1
     with running(folder) as daemon:
-        with following(daemon, "--resume", "--json") as path:
+        with following(daemon, "resume", "--json") as path:
             here = until(lambda: told(daemon) if told(daemon).get("stage") == "to the path" else {})
             assert here["time_s"] >= seen["time_s"]
             out, errors = path.communicate()
         assert path.returncode == 0, errors
         assert json.loads(out.splitlines()[-1])["path"]["time_s"] == here["duration_s"]
-        done = cdpr("path", "--resume", *daemon.at)
+        done = cdpr("path", "resume", *daemon.at)
         assert done.returncode in (1, 2)
-        assert "--resume: no path has been left; allowed: --run with a path's FILE" in done.stderr
+        assert "path resume: no path has been left; allowed: cdpr path run FILE" in done.stderr
 
 
 def test_a_path_of_several_plans_is_completed(folder: Path) -> None:
@@ -151,7 +151,7 @@ def test_a_path_of_several_plans_is_completed(folder: Path) -> None:
     lines = "".join(f"X{-100.0 + 200.0 * i / count:.3f}\n" for i in range(1, count + 1))
     (folder / "long.nc").write_text(f"G21 G90\nG0 X-100 Y0\nG1 F6000\n{lines}M2\n")
     with running(folder) as daemon:
-        with following(daemon, folder / "long.nc", "--run", "--origin=0 1700", "--json") as path:
+        with following(daemon, "run", folder / "long.nc", "--origin=0 1700", "--json") as path:
             out, errors = path.communicate()
         assert path.returncode == 0, errors
         progress = json.loads(out.splitlines()[-1])["path"]

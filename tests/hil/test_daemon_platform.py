@@ -107,9 +107,10 @@ def test_a_platform_is_tightened_moved_and_lowered_to_its_stand(daemon: RealDaem
     with subprocess.Popen([*command, *daemon.at], stderr=subprocess.PIPE, text=True) as going:
         target = pytest.approx([-0.3, 1.9])
         until(lambda: daemon.status()["program_progress"].get("target_m") == target)
-        paused = output_of(daemon, "pause")
-        assert paused["program"] == "hold"
-        assert paused["position_m"] != pytest.approx([-0.3, 1.9], abs=0.05)
+        output_of(daemon, "hold")
+        held = daemon.status()
+        assert held["program"] == "hold"
+        assert held["program_progress"]["position_m"] != pytest.approx([-0.3, 1.9], abs=0.05)
         assert "pose was ended: hold by" in going.communicate()[1]
     assert going.returncode == 1
     assert output_of(daemon, "resume")["position_m"] == pytest.approx([-0.3, 1.9], abs=0.005)

@@ -22,6 +22,7 @@ from cdpr_rt.loop.stop_socket import STOP_SUFFIX, StopUnansweredError, send_stop
 from cdpr_rt.refusal import CommandRefusal
 from cdpr_tools.client.refusals import DaemonRefusalError
 from cdpr_tools.client.status_text import DEAD, death_text
+from cdpr_tools.command_group import ROBOT_VARIABLE
 from cdpr_tools.daemon.loop_file import LoopFile, launcher_does
 from cdpr_tools.daemon.paths import (
     LAUNCHER_SUFFIX,
@@ -272,6 +273,8 @@ def _only_socket(robot: str | None) -> Path:
         return found[0]
     if not found:
         whose = "" if robot is None else f" for {robot}"
+        if robot is not None and robot == os.environ.get(ROBOT_VARIABLE):
+            whose += f" (from {ROBOT_VARIABLE})"
         doing = _launcher_does(find_launcher_files(robot))
         if doing is not None:
             what = f"is still starting, {doing}" if doing else "is starting, or ending"

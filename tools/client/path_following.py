@@ -25,7 +25,7 @@ _NOT_IN_NAMES: Final = re.compile(r"[^A-Za-z0-9_. -]")
 _NAME_CHARS: Final = 48
 Opened = AbstractContextManager[Daemon]
 """What `open_daemon` returns."""
-BACK: Final = "`cdpr path --back MM` steps back"
+BACK: Final = "`cdpr path back MM` steps back"
 
 
 def follow(
@@ -54,7 +54,8 @@ def follow(
             # a path that needs several plans: plan the next one while this one is followed
             body["line"] = line
             number = daemon.post("/path", body)["number"]
-            later = f"from line {line} on it is not followed yet: --run --line {line} goes on there"
+            rest = f"`cdpr path run {file} --line {line}`"
+            later = f"from line {line} on it is not followed yet; next: {rest}"
             lasts = _run(daemon, out, arguments, later, planned_s=duration_s)
             if lasts:
                 out.note(f"{file.name}: goes on with line {line}")
@@ -143,8 +144,8 @@ def _run(
         if not goes_on:  # a hold would also end the planning of the next part
             robot.hold()
 
-    typed = "--back" if "back_m" in arguments else "--resume"
-    with in_typed_words("path", typed, instead="--run with a path's FILE"):
+    typed = "path back" if "back_m" in arguments else "path resume"
+    with in_typed_words("path", typed, instead="cdpr path run FILE"):
         outcome = carry_out(daemon, out, motion, notice="")
     if goes_on and not outcome.stopped:
         return True

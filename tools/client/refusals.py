@@ -20,7 +20,7 @@ _KEYS: Final = {
     "speed_rad_s": (_DEG, "deg/s", "--speed"),
     "speed_m_s": (_MM, "mm/s", "--speed"),
     "duration_s": (1.0, "s", "--seconds"),
-    "back_m": (_MM, "mm", "--back"),
+    "back_m": (_MM, "mm", "path back"),
 }
 """By the key of a program: factor and unit of the command line, and the option, if any."""
 # what to do in a state in which a command was refused

@@ -62,7 +62,7 @@ def unheard_axes(status: dict[str, Any]) -> list[str]:
     return [str(axis.get("name")) for axis in status["axes"] if axis.get("alive") is False]
 
 
-GO_ON = "`cdpr path --resume` goes on"
+GO_ON = "`cdpr path resume` goes on"
 _OPTIONS = {"live_view": "--live", "stream": "--stream"}
 _STAGES = {
     ("tighten", "slack"): "winding in the slack of the cables",

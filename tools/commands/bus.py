@@ -41,7 +41,7 @@ from cdpr_tools.busview.scan import (
     responding,
     signs_of_a_master,
 )
-from cdpr_tools.commands.options import JsonOption, WinchOrRobotArgument, YesOption
+from cdpr_tools.commands.options import JsonOption, RobotOrWinchArgument, YesOption
 from cdpr_tools.consent import require_consent
 from cdpr_tools.errors import BAD_INPUT, WorkFailedError
 from cdpr_tools.output import Output, TableText
@@ -262,7 +262,7 @@ _LOW, _HIGH = 1.0, 10_000.0
 
 @app.command()
 def budget(
-    machine: WinchOrRobotArgument,
+    machine: RobotOrWinchArgument,
     rate: Annotated[
         float | None,
         typer.Option(min=_LOW, max=_HIGH, help="Cycles a second, instead of the profile's."),

@@ -23,8 +23,8 @@ from cdpr_tools.commands.options import (
     JsonOption,
     OverwriteOption,
     PlantOption,
+    RobotOrWinchArgument,
     SafetyIoOption,
-    WinchOrRobotArgument,
     YesOption,
 )
 from cdpr_tools.commission import build, summary
@@ -128,7 +128,7 @@ class _Request:
 
 @app.command()
 def commission(
-    machine: WinchOrRobotArgument,
+    machine: RobotOrWinchArgument,
     bus: Annotated[
         list[str] | None,
         typer.Option(

@@ -1,4 +1,4 @@
-"""`cdpr jog|move|controller|tighten|lower|pause|resume`: motion through a daemon."""
+"""`cdpr jog|move|controller|tighten|lower|resume`: motion through a daemon."""
 
 from __future__ import annotations
 
@@ -300,17 +300,8 @@ def lower(
 
 @app.command()
 @with_daemon
-def pause(daemon: Daemon, out: Output) -> None:
-    """Stop a motion and hold; `cdpr resume` continues it."""
-    _require_platform(daemon, "pause")
-    daemon.post("/hold")
-    finish(daemon, out, Outcome())
-
-
-@app.command()
-@with_daemon
 def resume(daemon: Daemon, out: Output) -> None:
-    """Continue the move or path that was paused."""
+    """Continue the move or path that was stopped by `cdpr hold` or Ctrl-C."""
     if (daemon.get("/status").get("program_progress") or {}).get("path"):
         from cdpr_tools.client.path_following import go_on  # noqa: PLC0415  # slow to load
 

@@ -169,7 +169,7 @@ def disable(daemon: Daemon, out: Output) -> None:
 @app.command()
 @with_daemon_at_once
 def hold(daemon: Daemon, out: Output) -> None:
-    """Stop the motion and hold the position; the power stays on."""
+    """Stop the motion and hold the position with power; `cdpr resume` continues it."""
     _show(out, daemon.post("/hold"))
 
 

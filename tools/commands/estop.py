@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from contextlib import closing
 from dataclasses import asdict
 from pathlib import Path
@@ -9,10 +10,11 @@ from typing import Annotated
 
 import typer
 
+from cdpr_tools.command_group import ROBOT_VARIABLE
 from cdpr_tools.commands.options import JsonOption, SocketOption
 from cdpr_tools.daemon.estop import EmergencyStop
 from cdpr_tools.daemon.loop_file import LoopFile, find_loops
-from cdpr_tools.daemon.paths import found_instead
+from cdpr_tools.daemon.paths import found_instead, short_name
 from cdpr_tools.errors import FAILED, BadInputError, WorkFailedError
 from cdpr_tools.output import Output
 
@@ -74,6 +76,8 @@ def _chosen(robots: tuple[str | None, ...], every: bool, socket: Path | None) ->
     if every or robot is not None or len(found) == 1:
         return found
     live = [path for path in found if _lives(path)]
+    if usual := [path for path in live if path.stem == short_name(os.getenv(ROBOT_VARIABLE, ""))]:
+        return usual
     if len(live) > 1:
         names = ", ".join(path.stem for path in live)
         raise BadInputError(f"{len(live)} daemons run: name one of {names}, or give --all")

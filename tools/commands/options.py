@@ -14,6 +14,7 @@ import typer
 
 from cdpr_profiles.bounded_input import may_replace
 from cdpr_rt.procedures.measurement import Index
+from cdpr_tools.command_group import ROBOT_VARIABLE
 from cdpr_tools.errors import BadInputError
 from cdpr_tools.report.save import OWN_MARK
 
@@ -84,7 +85,12 @@ PngOption = Annotated[
 ]
 
 RobotArgument = Annotated[
-    str, typer.Argument(help="Robot profile: a name or the path of a file.", metavar="ROBOT")
+    str,
+    typer.Argument(
+        help="Robot profile: a name or the path of a file.",
+        metavar="ROBOT",
+        envvar=ROBOT_VARIABLE,
+    ),
 ]
 RobotPlantOption = Annotated[
     Path | None, typer.Option(help="Plant file: the truth about robot, cables and motors.")
@@ -171,8 +177,22 @@ SensorsPortOption = Annotated[
     str | None, typer.Option("--tension-port", help="Serial port of the tension sensors' line.")
 ]
 
+
+def _or_usual(context: typer.Context, robot: str | None) -> str | None:
+    """Return the robot of a daemon that is given, or named by the environment."""
+    # options that are given come first, whatever their order
+    if robot is None and not context.params.get("socket") and not context.params.get("url"):
+        return os.environ.get(ROBOT_VARIABLE) or None
+    return robot
+
+
 RobotOption = Annotated[
-    str | None, typer.Option("--robot", help="Which robot's daemon, where several run.")
+    str | None,
+    typer.Option(
+        "--robot",
+        help=f"Which robot's daemon, if several run; {ROBOT_VARIABLE} is its default.",
+        callback=_or_usual,
+    ),
 ]
 SocketOption = Annotated[
     Path | None, typer.Option("--socket", help="The daemon's Unix socket, if not this user's.")
@@ -201,10 +221,12 @@ OverwriteOption = Annotated[
 ExitWithStdinOption = Annotated[
     bool, typer.Option("--exit-with-stdin", help="Stop when standard input, a pipe, ends.")
 ]
-WinchOrRobotArgument = Annotated[
+RobotOrWinchArgument = Annotated[
     str,
     typer.Argument(
-        help="Winch or robot profile: a name or the path of a file.", metavar="WINCH|ROBOT"
+        help="Robot or winch profile: a name or the path of a file.",
+        metavar="ROBOT|WINCH",
+        envvar=ROBOT_VARIABLE,
     ),
 ]
 RecordedWinchOption = Annotated[

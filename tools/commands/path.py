@@ -1,56 +1,68 @@
-"""`cdpr path`: preview a path, follow it, and resume it."""
+"""`cdpr path show|run|resume|back`: check a path, follow it, resume it, and step back along it."""
 
 from __future__ import annotations
 
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
+from typer.core import TyperGroup
+from typing_extensions import override
 
 from cdpr_profiles import Robot
 from cdpr_profiles.calibration.in_force import load_calibrated
 from cdpr_profiles.errors import ProfileError
+from cdpr_tools.command_group import ROBOT_VARIABLE
 from cdpr_tools.commands.options import (
     JsonOption,
     KeyFileOption,
+    RobotOption,
     SocketOption,
     UrlOption,
+    shares,
     written_as,
 )
 from cdpr_tools.errors import BadInputError, CommandError, os_error_as
 from cdpr_tools.output import Output
 
-app = typer.Typer()
+if TYPE_CHECKING:
+    from cdpr_tools.paths.options import PathOptions
 
 
-@app.command()
-def path(
+class _Verbs(TyperGroup):
+    """Commands on paths; a file without a command is rejected with the commands."""
+
+    @override
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
+        if Path(args[0]).suffix:
+            ctx.fail(f"{args[0]}: allowed: `cdpr path show {args[0]}`, `cdpr path run {args[0]}`")
+        return super().resolve_command(ctx, args)
+
+
+app = typer.Typer(
+    name="path",
+    cls=_Verbs,
+    help="Check, run and resume paths from G-code or way points.",
+    no_args_is_help=True,
+)
+
+
+class PathFile(NamedTuple):
+    """A path as typed."""
+
+    file: Path
+    options: PathOptions
+
+
+@shares
+@contextmanager
+def _with_path(
     file: Annotated[
-        Path | None,
-        typer.Argument(
-            help="Way points (.toml, .csv) or G-code (.nc, .ngc, .gcode, .tap, .cnc).",
-            metavar="[FILE]",
-        ),
-    ] = None,
-    robot: Annotated[
-        str | None,
-        typer.Option(
-            "--robot",
-            help="Robot profile, a name or a file, or the name of a daemon's robot; with --run, "
-            "--resume and --back which daemon's, where several run.",
-        ),
-    ] = None,
-    picture: Annotated[
-        Path | None,
-        typer.Option(
-            "--png",
-            "--picture",
-            metavar="FILE",
-            help="Draw it into NAME.png.",
-            callback=written_as(".png"),
-        ),
-    ] = None,
+        Path,
+        typer.Argument(help="Way points (.toml, .csv) or G-code (.nc, .ngc, .gcode, .tap, .cnc)."),
+    ],
     origin: Annotated[
         str | None,
         typer.Option(
@@ -89,68 +101,124 @@ def path(
     line: Annotated[
         int, typer.Option(min=0, help="Begin with this line of the file, from where it begins.")
     ] = 0,
-    run: Annotated[
-        bool, typer.Option("--run", help="Follow it on the running daemon; Ctrl-C holds on it.")
-    ] = False,
-    resume: Annotated[
-        bool, typer.Option("--resume", help="Take up the path that was left, where it was left.")
-    ] = False,
-    back: Annotated[
-        float | None,
-        typer.Option(min=0.1, help="Step back by so many mm along the path that was left."),
-    ] = None,
-    feed: Annotated[
-        float | None,
-        typer.Option(
-            min=1.0,
-            max=100.0,
-            help="Percent of the planned speed: 100, or what it was left with.",
-        ),
-    ] = None,
-    keep: Annotated[
-        bool, typer.Option("--keep", help="Leave the plan to the robot's daemon, by a name.")
-    ] = False,
-    socket: SocketOption = None,
-    url: UrlOption = None,
-    key_file: KeyFileOption = None,
     as_json: JsonOption = False,
-) -> None:
-    """Preview, run and resume paths from G-code or way points.
-
-    Exit with status 2 if the robot cannot follow the path, and report the first problem. With
-    --run the running daemon plans and follows the path.
-    """  # fmt: skip
-    from cdpr_tools.client import path_following as following  # noqa: PLC0415  # slow to load
-    from cdpr_tools.client.client import open_daemon  # noqa: PLC0415  # slow to load
+) -> Iterator[tuple[PathFile, Output]]:
+    """Pass the path that these options describe, and the output, to a command."""
     from cdpr_tools.paths.options import PathOptions  # noqa: PLC0415  # slow to load
 
     out = Output(as_json)
     options = PathOptions(origin, blend, ignore, z, scale, rotate, mirror, dwell, line)
     if hint := options.metres_hint():
         out.note(hint)
-    follows = run or resume or back is not None
-    share = None if feed is None else 0.01 * feed
-    if sum((run, resume, back is not None)) > 1:
-        raise BadInputError("--run, --resume, --back: allowed: one of them")
-    looks = ["--png"] * (picture is not None) + ["--keep"] * keep
-    if follows and looks:
-        raise BadInputError(f"{', '.join(looks)}: allowed: without --run, --resume and --back")
-    if (file is None) != (resume or back is not None):
-        raise BadInputError(
-            "FILE: allowed: a path's file, or none with --resume and --back, which go on with "
-            "the path that was left"
-        )
-    if follows:
-        opened = open_daemon(robot, socket, url, key_file)
-        if file is not None:
-            following.follow(opened, out, file, options, share)
-        else:
-            following.resume_path(opened, out, back, share)
-        return
-    assert file is not None  # see above
-    if robot is None:
-        raise BadInputError("--robot: missing; allowed: a robot's name or file, or --run")
-    _preview(robot_by_name(robot), file, options, out, picture, keep)
+    yield PathFile(file, options), out
+
+
+FeedOption = Annotated[
+    float | None,
+    typer.Option(
+        min=1.0,
+        max=100.0,
+        help="Percent of the planned speed; by default 100, or as before when it is resumed.",
+    ),
+]
+
+
+@app.command()
+@_with_path
+def show(
+    path: PathFile,
+    out: Output,
+    robot: Annotated[
+        str,
+        typer.Option(
+            "--robot",
+            help="Robot profile, a name or a file, or the name of a daemon's robot; "
+            f"{ROBOT_VARIABLE} is its default.",
+            envvar=ROBOT_VARIABLE,
+        ),
+    ],
+    picture: Annotated[
+        Path | None,
+        typer.Option(
+            "--png",
+            "--picture",
+            metavar="FILE",
+            help="Draw it into NAME.png.",
+            callback=written_as(".png"),
+        ),
+    ] = None,
+    keep: Annotated[
+        bool, typer.Option("--keep", help="Leave the plan to the robot's daemon, by a name.")
+    ] = False,
+) -> None:
+    """Plan a path and show its duration, tensions and first problem; nothing moves.
+
+    Exit with status 2 if the robot cannot follow the path.
+    """
+    _preview(robot_by_name(robot), path, out, picture, keep)
+
+
+@app.command()
+@_with_path
+def run(
+    path: PathFile,
+    out: Output,
+    feed: FeedOption = None,
+    robot: RobotOption = None,
+    socket: SocketOption = None,
+    url: UrlOption = None,
+    key_file: KeyFileOption = None,
+) -> None:
+    """Let the running daemon plan a path and follow it to its end.
+
+    Ctrl-C holds the platform on the path. Exit with status 2 if the robot cannot follow the path.
+    """
+    from cdpr_tools.client import path_following as following  # noqa: PLC0415  # slow to load
+    from cdpr_tools.client.client import open_daemon  # noqa: PLC0415  # slow to load
+
+    opened = open_daemon(robot, socket, url, key_file)
+    following.follow(opened, out, path.file, path.options, _share(feed))
+
+
+@app.command()
+def resume(
+    feed: FeedOption = None,
+    robot: RobotOption = None,
+    socket: SocketOption = None,
+    url: UrlOption = None,
+    key_file: KeyFileOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Continue the path that was left, from where it was left."""
+    from cdpr_tools.client import path_following as following  # noqa: PLC0415  # slow to load
+    from cdpr_tools.client.client import open_daemon  # noqa: PLC0415  # slow to load
+
+    opened = open_daemon(robot, socket, url, key_file)
+    following.resume_path(opened, Output(as_json), None, _share(feed))
+
+
+@app.command()
+def back(
+    distance: Annotated[
+        float, typer.Argument(min=0.1, metavar="MM", help="How far, in mm along the path.")
+    ],
+    feed: FeedOption = None,
+    robot: RobotOption = None,
+    socket: SocketOption = None,
+    url: UrlOption = None,
+    key_file: KeyFileOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Step back along the path that was left, and hold there."""
+    from cdpr_tools.client import path_following as following  # noqa: PLC0415  # slow to load
+    from cdpr_tools.client.client import open_daemon  # noqa: PLC0415  # slow to load
+
+    opened = open_daemon(robot, socket, url, key_file)
+    following.resume_path(opened, Output(as_json), distance, _share(feed))
+
+
+def _share(percent: float | None) -> float | None:
+    return None if percent is None else 0.01 * percent
 
 
 def robot_by_name(name: str) -> Robot:
@@ -170,13 +238,11 @@ def robot_by_name(name: str) -> Robot:
         raise
 
 
-def _preview(
-    robot: Robot, file: Path, options: Any, out: Output, picture: Path | None, keep: bool
-) -> None:
+def _preview(robot: Robot, path: PathFile, out: Output, picture: Path | None, keep: bool) -> None:
     from cdpr_tools.paths import preview as previews  # noqa: PLC0415  # slow to load
 
     with out.progress("planning", 10.0) as advance:
-        shown = previews.preview(robot, file, options, lambda _, part: advance(10.0 * part))
+        shown = previews.preview(robot, *path, lambda _, part: advance(10.0 * part))
     preview_figures = previews.figures(shown)
     out.say(*previews.lines(shown, robot, preview_figures))
     if picture is not None:

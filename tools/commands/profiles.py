@@ -25,12 +25,21 @@ app = typer.Typer(
 
 
 @app.command("list")
-def list_(as_json: JsonOption = False) -> None:
+def list_(
+    kind: Annotated[
+        str | None, typer.Argument(help="Only these: robots, winches, ...", metavar="[KIND]")
+    ] = None,
+    as_json: JsonOption = False,
+) -> None:
     """List the profiles by kind: shipped ones, and your own."""
     out = Output(as_json)
     names = catalogue.list_profiles()
-    for kind, of_kind in names.items():
-        out.say(f"{kind}:")
+    if kind is not None:
+        if kind not in names:
+            raise BadInputError(f"{kind}: allowed: {', '.join(names)}")
+        names = {kind: names[kind]}
+    for shown, of_kind in names.items():
+        out.say(f"{shown}:")
         out.say("  " + ", ".join(of_kind))
     out.result({"ok": True} | dict(names.items()))
 

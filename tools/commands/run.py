@@ -41,6 +41,7 @@ from cdpr_tools.commands.options import (
     ExitWithStdinOption,
     JsonOption,
     RobotBusOption,
+    RobotOrWinchArgument,
     SafetyIoOption,
     TensionDistributionOption,
     YesOption,
@@ -73,12 +74,7 @@ app = typer.Typer()
 
 @app.command()
 def run(
-    robot: Annotated[
-        str,
-        typer.Argument(
-            help="Robot or winch profile: a name or the path of a file.", metavar="ROBOT|WINCH"
-        ),
-    ],
+    robot: RobotOrWinchArgument,
     bus: RobotBusOption = None,
     plant: Annotated[
         Path | None, typer.Option(help="Plant file for the simulator that `simbus:` starts.")

@@ -19,6 +19,7 @@ from cdpr_profiles import Robot, load_robot
 from cdpr_rt.model.robot_arrays import can_lower
 from cdpr_rt.programs.lower import lowering_s
 from cdpr_tools.commands import run
+from cdpr_tools.commands.options import RobotOrWinchArgument
 from cdpr_tools.report.page import rendered
 
 _SOCKETS = Path("/run/cdpr-rt")
@@ -36,7 +37,7 @@ app = typer.Typer()
 )
 def print_unit(
     context: typer.Context,
-    robot: Annotated[str, typer.Argument(metavar="ROBOT|WINCH", help="As for `cdpr run`.")],
+    robot: RobotOrWinchArgument,
     user: Annotated[
         str | None, typer.Option(help="Who runs it; by default you, or `cdpr` where that is root.")
     ] = None,

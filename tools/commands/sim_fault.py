@@ -10,6 +10,7 @@ from cdpr_drivers.robot.robot_buses import robot_urls
 from cdpr_profiles import ProfileError, Robot, RobotAxis, Winch, load_winch_or_robot
 from cdpr_profiles.errors import printable
 from cdpr_profiles.robot import robot_of_winch
+from cdpr_tools.command_group import ROBOT_VARIABLE
 from cdpr_tools.composition.fault_injection import (
     InjectedFault,
     inject_beside,
@@ -25,12 +26,13 @@ def fault(
     machine: Annotated[
         str,
         typer.Argument(
-            help="Winch or robot that is simulated, or the name of its daemon.",
-            metavar="WINCH|ROBOT",
+            help="Robot or winch that is simulated, or the name of its daemon.",
+            metavar="ROBOT|WINCH",
+            envvar=ROBOT_VARIABLE,
         ),
     ],
     what: Annotated[
-        str,  # for an enum, typer would also list all choices as the type, with bad line breaks
+        InjectedFault,
         typer.Argument(
             help=f"What goes wrong, immediately: {', '.join(InjectedFault)}.",
             metavar="FAULT",

@@ -26,7 +26,7 @@ from cdpr_sim_bus.robot.cable_robot import CableRobot
 from cdpr_sim_bus.robot.plant import Plant
 from cdpr_sim_bus.robot.robot_plant import RobotPlant
 from cdpr_sim_bus.robot.truth_log import BoardPose, PoseLog, PoseScanner
-from cdpr_tools.commands.options import ExitWithStdinOption, WinchOrRobotArgument
+from cdpr_tools.commands.options import ExitWithStdinOption, RobotOrWinchArgument
 from cdpr_tools.compiling import announce_compiling
 from cdpr_tools.composition.robot_physics import physics_of
 from cdpr_tools.composition.simulator import OwnCamera
@@ -37,7 +37,7 @@ app = typer.Typer()
 
 @app.command()
 def up(
-    machine: WinchOrRobotArgument,
+    machine: RobotOrWinchArgument,
     bus: Annotated[
         list[str],
         typer.Option(

@@ -14,6 +14,7 @@ from typer.core import TyperGroup
 
 from cdpr_drivers.errors import ConfigurationError
 from cdpr_profiles import load_robot
+from cdpr_tools.command_group import ROBOT_VARIABLE
 from cdpr_tools.commands.options import (
     AgainOption,
     CommissionedOption,
@@ -68,7 +69,12 @@ class Device(StrEnum):
 
 @app.command(_LEAD)
 def robot(
-    robot: Annotated[str, typer.Argument(help="The robot that a daemon runs.")],
+    robot: Annotated[
+        str,
+        typer.Argument(
+            help="The robot that a daemon runs.", metavar="ROBOT", envvar=ROBOT_VARIABLE
+        ),
+    ],
     device: Annotated[Device, typer.Option("--device", help="Input device.")] = Device.KEYBOARD,
     scale: Annotated[
         str,

@@ -252,7 +252,7 @@ def _listen(settings: RunSettings, app: ASGIApp, service: Service) -> list[Serve
 _PATH_OPTIONS: Final = (
     "origin_mm", "blend_mm", "ignore", "z_mm", "scale", "rotate_deg", "mirror", "dwell", "line",
 )  # fmt: skip
-"""Options of `cdpr path`, with their units."""
+"""Options of `cdpr path show`, with their units."""
 
 
 async def plan_in_process(robot: str, file: Path, request: dict[str, Any]) -> tuple[int, str]:
@@ -262,7 +262,7 @@ async def plan_in_process(robot: str, file: Path, request: dict[str, Any]) -> tu
         for key in _PATH_OPTIONS
         if request.get(key) is not None
     ]
-    command = [sys.executable, "-P", "-m", "cdpr_tools.cli", "path", str(file)]
+    command = [sys.executable, "-P", "-m", "cdpr_tools.cli", "path", "show", str(file)]
     process = await asyncio.create_subprocess_exec(
         "sh", "-c", _WITHIN, "sh", *command, "--robot", robot, "--keep", "--json", *options,
         stdin=asyncio.subprocess.DEVNULL, stdout=asyncio.subprocess.PIPE,

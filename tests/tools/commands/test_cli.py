@@ -20,7 +20,7 @@ from cdpr_here import cdpr_here
 from typer.core import TyperArgument
 
 from cdpr_profiles.places import KINDS
-from cdpr_tools.cli import ALIASES, MODULES, PANELS, app
+from cdpr_tools.cli import ALIASES, GUESSES, MODULES, PANELS, STOPS, app
 from tests.tools.commands.cli_rig import OWN, WINCH, cdpr, done, refused
 
 
@@ -70,10 +70,52 @@ def test_a_typo_suggests_no_command_that_moves_or_switches_power(typed: str, ans
 
 
 @pytest.mark.parametrize("alias", ALIASES)
-def test_an_alias_runs_its_command(alias: str) -> None:
-    told = cdpr_here(alias, "--help")
-    assert told.returncode == 0
-    assert f"cdpr {ALIASES[alias]} [" in told.stdout
+def test_an_alias_names_the_command_and_runs_it(alias: str) -> None:
+    result = cdpr_here(*alias.split(), "--help")
+    assert result.returncode == 0
+    assert result.stderr == f"this is `cdpr {ALIASES[alias]}`\n"
+    words = ALIASES[alias].removesuffix(" robots")
+    assert f"Usage: cdpr {words} [" in result.stdout
+
+
+@pytest.mark.parametrize("guess", GUESSES)
+def test_a_guess_that_would_move_is_not_carried_out(guess: str) -> None:
+    result = cdpr_here(guess, "300", "2000")
+    assert result.returncode == 2
+    assert result.stderr == f"cdpr: {guess}: {GUESSES[guess]}\n"
+
+
+def test_no_alias_leads_to_a_command_that_moves_or_cuts_power() -> None:
+    moving = {*PANELS["Move"], *PANELS["Stop"], "enable", "drive", "rail", "commission"} - {"hold"}
+    assert moving.isdisjoint(command.split()[0] for command in ALIASES.values())
+
+
+def test_stop_commands_end_their_help_with_the_comparison_of_the_page() -> None:
+    page = (Path(__file__).parents[3] / "docs/how-to/which-stop.md").read_text()
+    for name in PANELS["Stop"]:
+        assert "Which stop do I want?" in cdpr_here(name, "--help").stdout
+        assert f"\n{name} " in STOPS and f"`cdpr {name}`" in page
+
+
+def test_a_robot_is_named_by_argument_option_or_environment(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    named = (("planar-3",), ("--robot", "planar-3"), ("--robot=planar-3",))
+    told = [cdpr_here("bus", "budget", *words).stdout for words in named]
+    assert "3 cables" in told[0]
+    assert told[1:] == told[:1] * 2
+    missing = cdpr_here("bus", "budget")
+    assert "Name it, or set CDPR_ROBOT" in missing.stderr
+    monkeypatch.setenv("CDPR_ROBOT", "planar-3")
+    assert cdpr_here("bus", "budget").stdout == told[0]
+    # before another argument
+    assert (
+        "simbus:x-can0: no simulated bus"
+        in cdpr_here("sim", "fault", "slip", "--bus", "simbus:x").stderr
+    )
+    assert "for planar-3 (from CDPR_ROBOT)" in cdpr_here("hold").stderr
+    assert "for planar-4;" in cdpr_here("hold", "--robot", "planar-4").stderr
+    assert "CDPR_ROBOT" not in cdpr_here("hold", "--socket", "/none").stderr
 
 
 def _commands(group: Any, words: tuple[str, ...] = ()) -> Iterator[tuple[str, Any]]:

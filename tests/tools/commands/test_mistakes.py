@@ -41,7 +41,7 @@ MISTAKES = (
     ("Key file that others can read", "cdpr status --url http://robot:8080 --key-file key"),
     ("Robot's file that already exists", "cdpr robot new misspelt.toml"),
     ("File that is not a recording", "cdpr log info notes.mcap"),
-    ("File that contains no path", "cdpr path notes.mcap --run"),
+    ("File that contains no path", "cdpr path run notes.mcap"),
     ("Unsupported picture format", "cdpr log plot notes.mcap --png run.jpg"),
 )
 HEAD = """\

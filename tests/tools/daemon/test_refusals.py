@@ -55,7 +55,7 @@ def test_rejections_give_allowed_values_as_typed() -> None:
         ({"velocity_rad_s": 2.0}, 1, "right=114.592: allowed: -57.3 to 57.3 deg/s"),
         ({"cable_m": 2.0}, 0, "left=2000: allowed: -1000 to 1000 mm"),
         ({"speed_rad_s": 2.0}, None, "--speed 114.592: allowed: -57.3 to 57.3 deg/s"),
-        ({"back_m": 2.0}, None, "--back 2000: allowed: -1000 to 1000 mm"),
+        ({"back_m": 2.0}, None, "path back 2000: allowed: -1000 to 1000 mm"),
     ],
 )
 def test_a_number_out_of_range_is_reported_in_the_typed_units(

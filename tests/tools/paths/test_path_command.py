@@ -33,7 +33,7 @@ def test_a_preview_writes_a_picture_and_the_plan_for_the_daemon(file, tmp_path, 
     take_over(robot, calibration(robot))
     picture = tmp_path / "part.png"
     done = cdpr_here(
-        "path", file, "--robot", "spatial-8", ORIGIN, "--png", picture, "--keep", "--json"
+        "path", "show", file, "--robot", "spatial-8", ORIGIN, "--png", picture, "--keep", "--json"
     )
     assert done.returncode == 0, done.stderr
     told = json.loads(done.stdout.splitlines()[-1])
@@ -60,23 +60,28 @@ def test_a_preview_writes_a_picture_and_the_plan_for_the_daemon(file, tmp_path, 
         (("", ""), [ORIGIN, "--ignore=G3"], "part.nc: --ignore G3: other lines depend on it"),
         (("", ""), [ORIGIN, "--z=5"], r"part.nc:2: Z: --z is for files that do not name it"),
         (("", ""), ["--origin=1 2"], "--origin 1 2: allowed: 3 numbers in mm"),
-        (("", ""), [ORIGIN, "--run", "--resume"], "--run, --resume, --back: allowed: one"),
     ],
 )
 def test_an_infeasible_path_ends_with_status_2(file, change, options, told):
     import re  # noqa: PLC0415
 
     file.write_text(GCODE.replace(*change) if change[0] else GCODE)
-    done = cdpr_here("path", file, "--robot", "spatial-8", *options)
+    done = cdpr_here("path", "show", file, "--robot", "spatial-8", *options)
     assert done.returncode == 2
     assert re.search(told, done.stderr), done.stderr
     assert "Traceback" not in done.stderr
 
 
+def test_a_file_without_a_command_is_rejected_with_the_commands(file):
+    done = cdpr_here("path", file, ORIGIN)
+    assert done.returncode == 2
+    assert f"{file}: allowed: `cdpr path show {file}`, `cdpr path run {file}`" in done.stderr
+
+
 def test_options_place_the_path_of_a_file(file):
     file.write_text("M104 S200\nG0 X0 Y0\nG1 X100 F6000\n")
     placed = [ORIGIN, "--z=50", "--scale=2", "--rotate=90", "--mirror=x"]
-    done = cdpr_here("path", file, "--robot", "spatial-8", *placed, "--json")
+    done = cdpr_here("path", "show", file, "--robot", "spatial-8", *placed, "--json")
     assert done.returncode == 0, done.stderr
     figures = json.loads(done.stdout.splitlines()[-1])
     assert figures["length_m"] == pytest.approx(0.2)
