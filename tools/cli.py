@@ -131,7 +131,7 @@ GUESSES = {
     "gui": "there is no page in a browser yet; `cdpr teleop robot ROBOT` moves a robot by keyboard,"
     " `cdpr run ROBOT --live PORT` shows it in Foxglove",
 }
-"""What users type for something that moves, or does not exist, and what they are told instead."""
+"""What users type for something that moves, or does not exist, and the answer."""
 STOPS = """Which stop do I want? In danger: the emergency-stop button, no command.
 
 hold     brake; the motors hold the position           power stays on
