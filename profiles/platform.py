@@ -2,8 +2,8 @@
 
 import math
 import re
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from importlib.metadata import entry_points
 from itertools import combinations, product
 from typing import Annotated, Any, Final, Literal
@@ -51,6 +51,7 @@ def _one_or_several(allowed: str) -> BeforeValidator:
 
 _Coordinate = Annotated[float, AfterValidator(_in_metres)]
 Point = Annotated[tuple[_Coordinate, ...], Field(min_length=2, max_length=3)]
+_PoseName = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_-]{0,31}$")]
 Direction = Annotated[
     tuple[float, ...], Field(min_length=2, max_length=3), AfterValidator(_direction)
 ]
@@ -145,6 +146,8 @@ class PlatformFile(Profile):
     cable_model: CableModelName = "elastic"
     clearance_m: float | None = Field(default=None, gt=0, le=1)
     """Two cables (centre lines), or a cable and a box, are in contact if nearer than this."""
+    poses_m: dict[_PoseName, Point] = Field(default={}, max_length=100)
+    """Named positions that `cdpr move --to NAME` goes to."""
     body: BoxFile | None = None
     """The platform's body, in its own frame."""
     obstacles: tuple[BoxFile, ...] = Field(default=(), max_length=100)
@@ -184,6 +187,7 @@ class Platform:
     tension_distribution: str = _USUAL_METHOD
     cable_model: str = "elastic"
     clearance_m: float = CLEARANCE_m
+    poses_m: Mapping[str, tuple[float, ...]] = field(default_factory=dict, hash=False)
     body: BoxFile | None = None
     obstacles: tuple[BoxFile, ...] = ()
     pulley_radius_m: tuple[float, ...] = ()
@@ -495,3 +499,21 @@ def _box_faults(file: PlatformFile) -> Iterator[tuple[str, str]]:
             yield f"platform.home_m[{i}]", problem
         elif i < size - 1 and not low <= home <= high:
             yield f"platform.home_m[{i}]", f"value {home:g}; allowed: {low:g} to {high:g}"
+    for name, point in file.poses_m.items():
+        yield from _pose_faults(file, name, point)
+
+
+def _pose_faults(
+    file: PlatformFile, name: str, point: tuple[float, ...]
+) -> Iterator[tuple[str, str]]:
+    """Yield faults of a named pose, which must be in the box of targets."""
+    key = f"platform.poses_m.{name}"
+    if name == "home":
+        yield key, "the name stands for home_m; allowed: another name"
+    if len(point) != len(file.home_m):
+        yield key, _of_another_length(point, f"{len(file.home_m)} coordinates, as home_m has")
+        return
+    box = zip(file.workspace_min_m, point, file.workspace_max_m, strict=True)
+    for i, (low, value, high) in enumerate(box):
+        if not low <= value <= high:
+            yield f"{key}[{i}]", f"value {value:g}; allowed: {low:g} to {high:g}"

@@ -40,7 +40,7 @@ MODULES = {
         "service-unit": "Print a systemd unit that runs the robot's daemon.",
     },
     "daemon_motion": {
-        "jog": "Turn axes at a constant speed for a while.",
+        "jog": "Turn axes at a constant speed for a while, or move a platform by one step.",
         "move": "Move axes or the platform to a position and wait until they are there.",
         "controller": "Run a program (a controller with its motion) until it is done, then hold.",
         "tighten": "Tighten the cables, measure where the platform is, and hold it.",

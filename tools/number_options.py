@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 from typer.core import TyperCommand
@@ -22,7 +22,7 @@ def numbers_command(*options: str) -> type[TyperCommand]:
             joined: list[str] = []
             takes = False
             for word in args:
-                if takes and _is_number(word):
+                if takes and is_number(word):
                     joined[-1] += f" {word}" if "=" in joined[-1] else f"={word}"
                     continue
                 takes = word in options
@@ -32,23 +32,34 @@ def numbers_command(*options: str) -> type[TyperCommand]:
     return _NumbersCommand
 
 
-def numbers(option: str, text: str, names: Sequence[str], unit: str, factor: float) -> list[float]:
-    """Return the numbers of an option in SI, one for each name; raises BadInputError."""
-    allowed = f"{' '.join(names).upper()} in {unit}"
-    words = text.split()
-    for word in words:
-        if not _is_number(word):
+def numbers(
+    option: str,
+    text: str,
+    names: Sequence[str],
+    unit: str,
+    factor: float,
+    words: Iterable[str] = (),
+) -> list[float]:
+    """Return the numbers of an option in SI, one for each name; raises BadInputError.
+
+    `words` are other values that are allowed.
+    """
+    allowed = ", or ".join([f"{' '.join(names).upper()} in {unit}", *words])
+    typed = text.split()
+    for word in typed:
+        if not is_number(word):
             raise BadInputError(f"{option} {text}: {word!r} is no number; allowed: {allowed}")
-    if len(words) != len(names):
-        many = "1 number" if len(words) == 1 else f"{len(words)} numbers"
+    if len(typed) != len(names):
+        many = "1 number" if len(typed) == 1 else f"{len(typed)} numbers"
         raise BadInputError(f"{option} {text}: {many}; allowed: {len(names)}, {allowed}")
-    values = [float(word) for word in words]
+    values = [float(word) for word in typed]
     if not all(map(math.isfinite, values)):
         raise BadInputError(f"{option} {text}: allowed: finite numbers, {allowed}")
     return [factor * value for value in values]
 
 
-def _is_number(word: str) -> bool:
+def is_number(word: str) -> bool:
+    """Whether a word is a number."""
     try:
         float(word)
     except ValueError:

@@ -218,6 +218,22 @@ def test_exit_points_without_platform_and_too_few_cables_are_rejected(tmp_path: 
         load_robot(path)
 
 
+def test_named_poses_are_inside_the_workspace(tmp_path: Path) -> None:
+    def with_poses(poses: str) -> Path:
+        return changed(tmp_path, ("mass_kg = 2.0", f"mass_kg = 2.0\nposes_m = {poses}"))
+
+    platform = load_robot(with_poses("{ load = [0.3, 2.0] }")).platform
+    assert platform is not None and platform.poses_m == {"load": (0.3, 2.0)}
+    for poses, problem in (
+        ("{ load = [0.3, 2.5] }", r"poses_m.load\[1\]: value 2.5; allowed: 1.4 to 2.4"),
+        ("{ load = [0.3, 2.0, 0.0] }", "poses_m.load: .* 2 coordinates"),
+        ("{ home = [0.3, 2.0] }", "poses_m.home: the name stands for home_m"),
+        ('{ "2" = [0.3, 2.0] }', "poses_m"),
+    ):
+        with pytest.raises(ProfileError, match=problem):
+            load_robot(with_poses(poses))
+
+
 def test_home_may_be_below_the_workspace_or_in_it(tmp_path: Path) -> None:
     for y_m in (0.2, 1.4, 2.4):
         path = changed(tmp_path, ("home_m = [0.0, 1.3]", f"home_m = [0.0, {y_m}]"))

@@ -16,7 +16,7 @@ from cdpr_tools.client.motion import Outcome, carry_out, finish, require_platfor
 from cdpr_tools.client.refusals import in_typed_words
 from cdpr_tools.commands.with_daemon import with_daemon
 from cdpr_tools.errors import BadInputError, WorkFailedError
-from cdpr_tools.number_options import numbers, numbers_command
+from cdpr_tools.number_options import is_number, numbers, numbers_command
 from cdpr_tools.output import Output
 
 _STANDING = frozenset({"hold", "idle"})
@@ -57,7 +57,7 @@ class PlatformMove:
         platform = description["platform"]
         names = _COORDINATES[len(platform["home_m"])]
         turns = [name for name in platform.get("controlled", ()) if name in _ANGLES]
-        to = None if self.to is None else numbers("--to", self.to, names, "mm", 1e-3)
+        to = None if self.to is None else self._position(self.to, names, platform)
         rotate = None
         if self.rotate is not None:
             if not turns:
@@ -76,16 +76,33 @@ class PlatformMove:
         given["speed_m_s"] = None if self.speed is None else 1e-3 * self.speed
         return {key: value for key, value in given.items() if value is not None}
 
+    def _position(self, to: str, names: Sequence[str], platform: dict[str, Any]) -> Sequence[float]:
+        """Return a position that is typed in mm or by the name of a pose; raises BadInputError."""
+        poses = dict(platform.get("poses_m", {}))
+        if _is_inside(platform["home_m"], platform):
+            poses["home"] = platform["home_m"]
+        if to in poses:
+            if self.relative:
+                raise BadInputError(f"--to {to}: a pose; allowed: without --relative")
+            return list(poses[to])
+        if to == "home":
+            raise BadInputError(
+                "--to home: home is on the stand, outside the workspace; `cdpr lower` puts the "
+                "platform there"
+            )
+        return numbers("--to", to, names, "mm", 1e-3, words=poses)
+
     def _require_millimetres(self, to: Sequence[float], platform: dict[str, Any]) -> None:
         """Raise BadInputError if the typed position is in the workspace only if read as metres."""
-        box = list(zip(platform["workspace_min_m"], platform["workspace_max_m"], strict=True))
-
-        def is_inside(factor: float) -> bool:
-            return all(low <= factor * x <= high for x, (low, high) in zip(to, box, strict=True))
-
-        if is_inside(1e3) and not is_inside(1.0):
+        if _is_inside([1e3 * x for x in to], platform) and not _is_inside(to, platform):
             in_mm = " ".join(f"{1e6 * x:g}" for x in to)
             raise BadInputError(f"--to {self.to}: were metres typed? In mm: --to {in_mm}")
+
+
+def _is_inside(position_m: Sequence[float], platform: dict[str, Any]) -> bool:
+    """Whether a position is in the box of targets."""
+    low, high = platform["workspace_min_m"], platform["workspace_max_m"]
+    return all(a <= x <= b for a, x, b in zip(low, position_m, high, strict=True))
 
 
 app = typer.Typer()
@@ -97,14 +114,25 @@ def jog(
     daemon: Daemon,
     out: Output,
     axes: Annotated[
-        list[str], typer.Argument(help="Speeds in deg/s at the motor.", metavar="AXIS=SPEED...")
+        list[str],
+        typer.Argument(
+            help="Speeds in deg/s at the motor; or one step of a platform along x, y, z in mm, "
+            "about angle, rx, ry, rz in deg, such as x=10.",
+            metavar="AXIS=SPEED... | DIRECTION=STEP...",
+        ),
     ],
     seconds: Annotated[float, typer.Option(min=0.1, max=3600.0, help="Duration.")] = 1.0,
     cable: Annotated[
         bool, typer.Option("--cable", help="Speeds are mm/s of cable, positive pays out.")
     ] = False,
 ) -> None:
-    """Turn axes at a constant speed for a while."""
+    """Turn axes at a constant speed for a while, or move a platform by one step."""
+    if (step := _step(daemon, axes)) is not None:
+        if cable:
+            raise BadInputError(f"{' '.join(axes)}: allowed: without --cable")
+        with in_typed_words("jog", " ".join(axes)):
+            run_to_end(daemon, out, "pose", step.arguments(daemon), arrived=True)
+        return
     n, speeds = _given(daemon, axes, "mm/s" if cable else "deg/s")
     factor = 1e-3 if cable else math.radians(1.0)
     values = [factor * speeds.get(axis, 0.0) for axis in range(n)]
@@ -128,7 +156,10 @@ def move(
     ] = None,
     to: Annotated[
         str | None,
-        typer.Option(metavar="X Y [Z]", help="The platform to this position, in mm."),
+        typer.Option(
+            metavar="X Y [Z] | NAME",
+            help="The platform to this position, in mm, or to a pose that the robot's file names.",
+        ),
     ] = None,
     rotate: Annotated[
         str | None,
@@ -180,6 +211,25 @@ def move(
     with in_typed_words("move", axes=_names(daemon)):
         outcome = carry_out(daemon, out, motion)
     finish(daemon, out, outcome, arrived=True)
+
+
+def _step(daemon: Daemon, texts: Sequence[str]) -> PlatformMove | None:
+    """Return one step of the platform; None if axes are given. Raises BadInputError."""
+    platform = daemon.get("/description").get("platform")
+    if platform is None:
+        return None
+    places = _COORDINATES[len(platform["home_m"])]
+    turns = [name for name in platform.get("controlled", ()) if name in _ANGLES]
+    given = dict(text.partition("=")[::2] for text in texts)
+    if given.keys().isdisjoint({*places, *turns} - set(_names(daemon))):
+        return None
+    for text in texts:
+        name, _, value = text.partition("=")
+        if name not in (*places, *turns) or not is_number(value) or given[name] != value:
+            allowed = ", ".join([*(f"{x}=MM" for x in places), *(f"{x}=DEG" for x in turns)])
+            raise BadInputError(f"{text}: allowed: {allowed}, each once")
+    to, rotate = (" ".join(given.get(name, "0") for name in some) for some in (places, turns))
+    return PlatformMove(to, rotate or None, True, ReferenceFrame.ROOM, None)
 
 
 def _names(daemon: Daemon) -> list[str]:

@@ -38,6 +38,7 @@ ROOM = {
     "home_rotation_rad": [0.0, 0.0, 0.4],
     "workspace_angle_rad": math.radians(20.0),
 }
+NAMED = PLANE | {"poses_m": {"load": [0.3, 2.0]}}
 HERE = {"target_m": [0.1, 0.2, 1.0], "target_rotation_rad": [0.1, -0.05, 0.2]}
 
 
@@ -106,6 +107,11 @@ def test_millimetres_and_degrees_are_converted_to_si() -> None:
     assert asked["rotation_rad"] == pytest.approx([math.radians(5.0), 0.0, math.radians(-10.0)])
 
 
+def test_a_pose_is_named_instead_of_numbers() -> None:
+    assert wanted(Told(NAMED), "load") == {"position_m": [0.3, 2.0]}
+    assert wanted(Told(ROOM), "home") == {"position_m": [0.0, 0.0, 0.5]}
+
+
 def test_a_relative_motion_is_sent_as_distance_and_turn() -> None:
     asked = wanted(Told(ROOM), "50 20 -30", "3 -2 4", True, ReferenceFrame.PLATFORM)
     assert asked == {
@@ -119,9 +125,12 @@ def test_a_relative_motion_is_sent_as_distance_and_turn() -> None:
     ("platform", "typed", "told"),
     [
         (PLANE, {"to": "0.3 2.0"}, "--to 0.3 2.0: were metres typed.* --to 300 2000"),
-        (PLANE, {"to": "abc"}, "--to abc: 'abc' is no number; allowed: X Y in mm"),
+        (PLANE, {"to": "abc"}, "--to abc: 'abc' is no number; allowed: X Y in mm$"),
         (PLANE, {"to": "0 2000 5"}, "--to 0 2000 5: 3 numbers; allowed: 2, X Y in mm"),
         (ROOM, {"to": "0 2000"}, "--to 0 2000: 2 numbers; allowed: 3, X Y Z in mm"),
+        (NAMED, {"to": "lod"}, "--to lod: 'lod' is no number; allowed: X Y in mm, or load"),
+        (NAMED, {"to": "load", "relative": True}, "--to load: a pose; allowed: without --relative"),
+        (NAMED, {"to": "home"}, "--to home: home is on the stand, .*; `cdpr lower` puts"),
         (PLANE, {"to": "nan 2000"}, "--to nan 2000: allowed: finite numbers, X Y in mm"),
         (PLANE, {"rotate": "5"}, "--rotate 5: no angle of this platform is controlled"),
         (TURNING, {"rotate": "1 2 3"}, "--rotate 1 2 3: 3 numbers; allowed: 1, ANGLE in deg"),
@@ -189,6 +198,34 @@ def test_options_take_all_following_numbers(
         key: pytest.approx(value, abs=1e-12) for key, value in asked.items()
     }
     assert json.loads(result.stdout.splitlines()[-1])["arrived"] is True
+
+
+@pytest.mark.parametrize(
+    ("words", "asked"),
+    [
+        (["x=10"], {"distance_m": [0.01, 0.0, 0.0], "turn_rad": [0.0, 0.0, 0.0]}),
+        (["z=-5", "rx=2"],
+         {"distance_m": [0.0, 0.0, -0.005], "turn_rad": [math.radians(2.0), 0.0, 0.0]}),
+    ],
+)  # fmt: skip
+def test_a_jog_along_a_direction_is_one_step_of_the_platform(
+    monkeypatch: pytest.MonkeyPatch, words: list[str], asked: dict[str, Any]
+) -> None:
+    told = Told(ROOM, HERE)
+    result = typed(monkeypatch, told, *words, command="jog")
+    assert result.exit_code == 0, result.output
+    assert told.posted[0]["wanted"] == {
+        "frame": "room", **{key: pytest.approx(value) for key, value in asked.items()}
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize("words", [["x=10", "left=3"], ["x=fast"], ["x=1", "x=2"], ["x"]])
+def test_a_step_takes_each_direction_once(
+    monkeypatch: pytest.MonkeyPatch, words: list[str]
+) -> None:
+    result = typed(monkeypatch, Told(ROOM, HERE), *words, command="jog")
+    assert isinstance(result.exception, BadInputError)
+    assert "allowed: x=MM, y=MM, z=MM, rx=DEG, ry=DEG, rz=DEG, each once" in str(result.exception)
 
 
 @pytest.mark.parametrize(
