@@ -536,7 +536,7 @@ class Robot:
             warnings.warn(str(trouble), RuntimeWarning, stacklevel=4)
 
     def inject_fault(self, axis: str | int, fault: str, value: int | None = None) -> None:
-        """Inject a fault into a simulated axis, given by name or index from 0.
+        """Inject a fault into a simulated axis, given by name or index from 0, or "mend" it.
 
         Faults and values are those of `cdpr sim fault`, such as "drive-fault" and "cut-cable".
         """

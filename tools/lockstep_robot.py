@@ -52,7 +52,7 @@ from cdpr_rt.service.stream_packet import (
     parse,
     seal,
 )
-from cdpr_tools.composition.fault_injection import injection_of
+from cdpr_tools.composition.fault_injection import writes_of
 from cdpr_tools.composition.loop_parts import control_loop, loop_parts
 from cdpr_tools.composition.own_code import OwnCode
 from cdpr_tools.composition.simulator import OwnLoadCells, OwnSimulator
@@ -616,7 +616,8 @@ class LockstepRobot:
     def inject_fault(self, axis: int, fault: str, value: int | None) -> None:
         """Inject a fault by its name."""
         with self._for_script():
-            self.inject(axis, *injection_of(fault, value))
+            for sub, amount in writes_of(fault, value):
+                self.inject(axis, sub, amount)
 
     def end(self) -> None:
         """End under control, then without power."""

@@ -108,6 +108,7 @@ class StatusPage:
         progress = self._progress()
         self._note_failure(progress)
         lateness = None if engine.cycle is None else engine.cycle.lateness
+        last = engine.parts.last_stop
         return {
             "state": life.state.label,
             "since_ns": life.since_ns,
@@ -119,6 +120,7 @@ class StatusPage:
             "commanded": engine.commanded,
             "program_progress": progress,
             "failure": self._failure,
+            "last_stop": last and {"fallen": last.fallen, "broken": list(last.broken.values())},
             "driving": engine.driving,
             "reacting": engine.reacting.label,
             "busy": self._runner.busy,

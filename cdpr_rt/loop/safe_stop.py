@@ -106,7 +106,7 @@ class SafeStop:
                 doubtful = limit is Limit.BROKEN_CABLE and self.pays_out_blind
                 found = fault._replace(code=OR_LANDED) if doubtful else fault
                 if (last := self._engine.parts.last_stop) and limit is Limit.BROKEN_CABLE:
-                    last.broken = "; ".join(filter(None, (last.broken, life.text(found))))
+                    last.broken[found.axis] = life.text(found)
                 life.add_fault(self._engine.program_fault or found)
 
     def react(self, reaction: Reaction, torque_Nm: FloatArray, drives: Sequence[Fault]) -> None:
@@ -143,7 +143,7 @@ class SafeStop:
                 self._life.add_fault(other)
             self._highest_N.clear()
             if (last := engine.parts.last_stop) and supervisor.limit is Limit.BROKEN_CABLE:
-                last.broken = self._life.text(fault)
+                last.broken[fault.axis] = self._life.text(fault)
         if state is LoopState.ACTIVE:
             self.stop(reaction, LoopState.FAULT, torque_Nm)
         else:

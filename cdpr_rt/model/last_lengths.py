@@ -59,8 +59,8 @@ class LastLengths:
         """What contradicts the lengths in use, so that they are not kept; else empty."""
         self.fallen = False
         """Whether it hung, or may have, when the power was removed suddenly or a drive was lost."""
-        self.broken = ""
-        """Which cable seemed broken since the last tightening, and why; else empty."""
+        self.broken: dict[int, str] = {}
+        """Cables that seemed broken since all were last tight, by their axes, and why."""
 
     def load(self, n: int, longest_m: float) -> None:
         """Read the file of a robot with n axes; a damaged file leaves no lengths.

@@ -71,11 +71,9 @@ class PlatformHold(Program):
         return self._active.pose_setpoint
 
     def progress(self) -> dict[str, Any]:
-        """Return whether the platform or the axes are held, where, and whether it has fallen."""
+        """Return whether the platform or the axes are held, and where."""
         parts = self._parts
         progress = {"tight": parts.tight, **self._active.progress()}
-        if parts.last_stop.fallen:
-            progress["fallen"] = True
         left = self._path.left()
         return progress if left is None else {**progress, "path": left}
 

@@ -192,11 +192,11 @@ class PlatformParts:
 
     def notices(self) -> list[str]:
         """Return what an operator should know of the robot."""
-        broken = self.last_stop.broken
-        mend = f"{broken}: mend the cable, then `cdpr tighten --from home`" if broken else ""
+        broken = "; ".join(self.last_stop.broken.values())
+        repair = f"{broken}: repair it, then `cdpr tighten --from home`" if broken else ""
         if self._shows_right_lengths():
             self.off_home = ""
-        told = (self.not_calibrated_reason, mend, *self.control.notices(), self.off_home)
+        told = (self.not_calibrated_reason, repair, *self.control.notices(), self.off_home)
         return [text for text in told if text]
 
     def _shows_right_lengths(self) -> bool:

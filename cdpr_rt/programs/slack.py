@@ -319,7 +319,8 @@ class SlackTakeUp:
         reeled_m = (self._state[i, FROM_rad] - position_rad[i]) * self._cable[i]
         return (
             f"{self._names[i]}: {1e3 * reeled_m:.1f} mm reeled in since it was tight, "
-            f"{1e3 * LOOSE_m:.1f} mm allowed: the platform has moved on its stand; {_REMEDY}"
+            f"{1e3 * LOOSE_m:.1f} mm allowed: its cable is broken, or the platform has moved on "
+            f"its stand; {_REMEDY}"
         )
 
     def why_moved(self, position_rad: FloatArray, pulled: bool) -> str:
@@ -359,8 +360,8 @@ class SlackTakeUp:
             )
         return (
             f"{self._names[i]} had {1e3 * more_m:.1f} mm more slack than {self._names[j]}, "
-            f"{1e3 * allowed_m:.1f} mm allowed: the torque that overcomes the friction of the "
-            f"winches also moves this light platform; {_REMEDY}"
+            f"{1e3 * allowed_m:.1f} mm allowed: its cable is broken, or the torque that overcomes "
+            f"the friction of the winches also moves this light platform; {_REMEDY}"
         )
 
     def _slack_m(self, position_rad: FloatArray) -> FloatArray:

@@ -116,7 +116,7 @@ class LettingGo:
             return ""
         return (
             f"{self._parts.names[i]}: its winch runs in with {-self._inwards_m_s[i]:.2f} m/s, "
-            f"{_RUNS_IN_m_s:g} m/s allowed: its cable was slack; {_REMEDY}"
+            f"{_RUNS_IN_m_s:g} m/s allowed: its cable is broken, or was slack; {_REMEDY}"
         )
 
     def disagree(self) -> str:
@@ -638,7 +638,7 @@ class TightenProgram(PlatformProgram):
         parts = self._parts
         parts.cycle, parts.tight = feedback.cycle, True
         parts.last_stop.displaced = parts.last_stop.fallen = False
-        parts.last_stop.broken = ""
+        parts.last_stop.broken.clear()
         super().start(feedback, setpoint, torque_Nm)
         if stopping:
             self.stop()
@@ -653,11 +653,14 @@ class TightenProgram(PlatformProgram):
         # a platform on its stand does not move once its cables are tight
         allowed_m = self._once_tight_m if self._stage > 0 else _SLACK_m
         if moved_m[i] > allowed_m:
-            return (
+            pull_N = self._winches.tension_N[i]
+            found = (
                 f"{self._parts.names[i]}: {1e3 * moved_m[i]:.1f} mm reeled in and not tight, "
-                f"{1e3 * allowed_m:.1f} mm allowed"
-                + (": is its cable broken, unhooked, or wound off?" if self._stage == 0 else "")
+                f"{1e3 * allowed_m:.1f} mm allowed: its winch turns with {pull_N:.0f} N; its cable "
+                "is broken, unhooked, or wound off its drum"
             )
+            self._parts.last_stop.broken.setdefault(i, found)
+            return found
         if self._cycles * self._parts.period_s > _TIGHT_WITHIN_S:
             return self._late()
         return ""
@@ -674,6 +677,11 @@ class TightenProgram(PlatformProgram):
     def _fail_if(self, trouble: str) -> None:
         self._failure = trouble
         self._stopping = bool(trouble)
+        if trouble:
+            names, broken = self._parts.names, self._parts.last_stop.broken
+            others = [why for i, why in broken.items() if not trouble.startswith(f"{names[i]}: ")]
+            if others:
+                self._failure += f"; before that, {'; '.join(others)}: is it repaired?"
 
     # -- the search for indices
 

@@ -17,6 +17,7 @@ from cdpr_sim_bus.robot.motor_state import (
     Transmission,
     build_motor,
     lengthen_cable,
+    mend_cable,
     remove_cable,
 )
 from cdpr_sim_bus.robot.plant import Plant
@@ -67,6 +68,9 @@ class Axis:
         self.flags = 0
         self.cell_off_N = 0.0
         """Deviation of the cable's load cell from the tension."""
+        self.cable_cut = False
+        self.slipped_m = 0.0
+        """Length that has slipped through the cable's fastening on purpose."""
         self.position_offset = 0
         self._lowest, self._highest = -math.inf, math.inf
         self.clipped = False
@@ -125,19 +129,35 @@ class Axis:
         """Make the encoder miscount once; its index pulse keeps its place on the rotor."""
         self.motor["zero"] -= counts
 
+    @property
+    def _has_cable(self) -> bool:
+        return self._robot is not None or self.plant.load.kind != "none"
+
     def cut_cable(self) -> bool:
-        """Cut the cable permanently; return whether there is one."""
+        """Cut the cable; return whether there is one."""
         if self._robot is not None:
             self._robot.cut()
-            return True
-        return remove_cable(self.motor)
+        elif self._has_cable:
+            remove_cable(self.motor)
+        self.cable_cut = self._has_cable
+        return self._has_cable
 
     def slip_cable(self, metres: float) -> bool:
         """Let a length of cable slip at its fastening on the drum; return whether there is one."""
         if self._robot is not None:
             self._robot.slip(metres)
-            return True
-        return lengthen_cable(self.motor, metres)
+        elif self._has_cable:
+            lengthen_cable(self.motor, metres)
+        self.slipped_m += metres * self._has_cable
+        return self._has_cable
+
+    def mend_cable(self) -> None:
+        """Attach the cable again and fasten it on the drum."""
+        if self._robot is not None:
+            self._robot.mend(self.cable_cut, self.slipped_m)
+        elif self._has_cable:
+            mend_cable(self.motor, self.plant.load, self.slipped_m)
+        self.cable_cut, self.slipped_m = False, 0.0
 
     def read(self, field: str) -> float:
         """Return a field of the motor's record."""

@@ -41,9 +41,11 @@ _FALL_SILENT, _DOUBLE_TPDOS, _DELAY_TPDOS, _BABBLE, _VANISH_IN_SDO = 6, 7, 8, 9,
 _JUMP, _CUT_CABLE, _SLIP, _CELL_OFF = 11, 12, 13, 14
 _COUNTED = (_DROP_TPDOS, _DOUBLE_TPDOS, _DELAY_TPDOS, _VANISH_IN_SDO)
 _DEFAULT_TPDO = (0x180, 0x280, 0x380, 0x480)
-_ERROR_CONTROL, _SDO_ANSWER, _EMCY = 0x700, 0x580, 0x080
+_ERROR_CONTROL, _SDO_ANSWER, _SDO_REQUEST, _EMCY = 0x700, 0x580, 0x600, 0x080
 _FUNCTION, _NODE = 0x780, 0x07F
 _FOR_GOOD_MS = 0xFFFF
+_END_OF_SILENCE = bytes.fromhex("2b002f0600000000")
+"""SDO download of 0 to 2F00h:6, the only frame that a silent drive receives."""
 _BABBLE_FRAME = b"\x00\xff\x81BABBL"
 """EMCY FF00h (device specific)."""
 
@@ -81,10 +83,18 @@ class FaultInjection:
             _SLIP: self._slip,
             _CELL_OFF: self._set_cell_off,
         }
+        readers: dict[int, Callable[[], Value]] = {
+            _CUT_CABLE: lambda: int(self._axis.cable_cut),
+            _SLIP: lambda: min(round(self._axis.slipped_m * 1e3), 0xFFFF),
+            _CELL_OFF: lambda: round(self._axis.cell_off_N),
+        }
         writers |= {sub: self._counter(sub) for sub in _COUNTED}
         for sub, writer in writers.items():
             if (0x2F00, sub) in od:
                 od.on_write(0x2F00, sub, writer)
+        for sub, reader in readers.items():
+            if (0x2F00, sub) in od:
+                od.on_read(0x2F00, sub, reader)
 
     def reset(self) -> None:
         """End all faults."""
@@ -99,6 +109,13 @@ class FaultInjection:
     def is_silent(self, now: float) -> bool:
         """Return whether the drive neither receives nor sends at bus time `now`."""
         return now < self._silent_until
+
+    def ends_silence(self, frame: bytes, node_id: int) -> bool:
+        """End the silence if this frame writes 0 to its object; return whether it does."""
+        if frame != pack_frame(_SDO_REQUEST + node_id, _END_OF_SILENCE):
+            return False
+        self._silent_until = 0.0
+        return True
 
     def alter_outbox(self, now: float) -> None:
         """Drop, delay, double or add frames of the outbox, as the active faults require."""
@@ -174,11 +191,15 @@ class FaultInjection:
             self._state_machine.trip(int(code))
 
     def _cut_cable(self, cut: Value) -> None:
-        if cut and not self._axis.cut_cable():
+        if not cut:
+            self._axis.mend_cable()
+        elif not self._axis.cut_cable():
             raise SdoAbort(Abort.HARDWARE_ERROR)
 
     def _slip(self, millimetres: Value) -> None:
-        if millimetres and not self._axis.slip_cable(int(millimetres) * 1e-3):
+        if not millimetres:
+            self._axis.mend_cable()
+        elif not self._axis.slip_cable(int(millimetres) * 1e-3):
             raise SdoAbort(Abort.HARDWARE_ERROR)
 
     def _set_cell_off(self, newton: Value) -> None:
@@ -194,7 +215,7 @@ class FaultInjection:
 
     def _silence_after_the_answer(self, ms: Value) -> None:
         self._silence_ms = int(ms)
-        self._left[_VANISH_IN_SDO] = 1
+        self._left[_VANISH_IN_SDO] = int(bool(ms))
         self._update_active()
 
     def _fall_silent(self) -> None:
@@ -386,7 +407,9 @@ class SimDrive(SlaveApplication):
                 self._log.append(self.sync_count, now, self.axis.sample[4:])
                 self._log_due_s = now + _LOG_STEP_S
             self.sync_count += 1
-        if not (self.fault_injection.active and self.fault_injection.is_silent(now)):
+        injection = self.fault_injection
+        silent = injection.active and injection.is_silent(now)
+        if not silent or injection.ends_silence(frame, self.node_id):
             self._slave.receive(frame, now)
         if self._board is not None:
             self._board.publish_power()

@@ -140,8 +140,7 @@ class CableRobot:
         gain = transmission.cable_m_per_rad * (1.0 + error)
         motor["load_kind"] = LOAD_KINDS.index("platform")
         motor["cable_gain"] = gain
-        motor["rigidity"] = transmission.cable_stiffness_N * (1.0 + plant.stiffness_error)
-        motor["weight"] = self._weights[i] if plant.sag else 0.0
+        self._attach(i)
         known_s, true_s = transmission.cable_damping_s, plant.damping_s
         motor["damping_time"] = known_s if true_s is None else true_s
         motor["creep_share"] = plant.creep_shares
@@ -158,9 +157,21 @@ class CableRobot:
         motor["carriage_offset"] = winding.carriage_offset_m
         motor["carriage_distance"] = winding.carriage_distance_m
         motor["angle_start"] = motor["angle"]
-        slack_m = np.broadcast_to(self._plant.start.slack_m, self.n)
-        motor["cable_start"] = self.distance_m(i) + float(slack_m[i])
+        motor["cable_start"] = self._slack_length_m(i)
         return motor
+
+    def _attach(self, i: int) -> None:
+        """Connect cable `i` with the platform."""
+        plant, motor = self._plant.cables, self.motors[i : i + 1]
+        stiffness_N = self._transmissions[i].cable_stiffness_N
+        motor["rigidity"] = stiffness_N * (1.0 + plant.stiffness_error)
+        motor["weight"] = self._weights[i] if plant.sag else 0.0
+        motor["creep"] = 0.0
+
+    def _slack_length_m(self, i: int) -> float:
+        """Return the length of cable `i` that has the slack of a start, for the present pose."""
+        slack_m = np.broadcast_to(self._plant.start.slack_m, self.n)
+        return self.distance_m(i) + float(slack_m[i])
 
     def step(self, i: int, until: float) -> MotorSample:
         """Advance all to `until`; return the `motor.Sample` of motor `i`."""
@@ -198,13 +209,28 @@ class CableRobot:
         return np.array(self.motors["winch_tension"])
 
     def cut(self, i: int) -> None:
-        """Cut cable `i` permanently."""
+        """Cut cable `i`."""
         self.motors["rigidity"][i] = 1e-9
         self.motors["weight"][i] = 0.0
 
     def slip(self, i: int, metres: float) -> None:
         """Let this length of cable `i` slip through its fastening on the drum."""
         self.motors["cable_start"][i] += metres
+
+    def mend(self, i: int, cut: bool, slipped_m: float) -> None:
+        """Attach cable `i` again if it was cut, and undo its slip.
+
+        Where that would pull, the cable has the slack of a start instead; a tight one stays as it
+        is.
+        """
+        motor = self.motors[i]
+        reeled_m = float(motor["cable_gain"] * (motor["angle"] - motor["angle_start"]))
+        loose_m = self._slack_length_m(i) - reeled_m  # as `cable_start`
+        if cut:
+            self._attach(i)
+        else:
+            loose_m = min(loose_m, float(motor["cable_start"]))
+        self.motors["cable_start"][i] = max(float(motor["cable_start"]) - slipped_m, loose_m)
 
     def distance_m(self, i: int) -> float:
         """Return the distance of cable `i` from exit to anchor point, over its pulley, m."""
@@ -234,3 +260,7 @@ class RobotMember:
     def slip(self, metres: float) -> None:
         """See `CableRobot.slip`."""
         self.robot.slip(self.number, metres)
+
+    def mend(self, cut: bool, slipped_m: float) -> None:
+        """See `CableRobot.mend`."""
+        self.robot.mend(self.number, cut, slipped_m)

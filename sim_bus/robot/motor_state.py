@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cdpr_sim_bus.robot.plant import MAX_COGGING_TERMS, Plant
+from cdpr_sim_bus.robot.plant import MAX_COGGING_TERMS, LoadPlant, Plant
 
 CONTROL_STEP_S = 5e-5
 """Period of the inner loops, and the longest step of the physics."""
@@ -215,20 +215,32 @@ def build_motor(
     return motor
 
 
-def remove_cable(motor: MotorArray) -> bool:
-    """Remove the cable of a motor outside any robot; return whether there was one."""
+def remove_cable(motor: MotorArray) -> None:
+    """Remove the cable of a motor outside any robot."""
     m: Any = motor[0]
-    had_one = bool(m["load_kind"] != LOAD_KINDS.index("none"))
     m["load_kind"] = LOAD_KINDS.index("none")
     m["tension"] = m["winch_tension"] = m["load_friction"] = 0.0
-    return had_one
 
 
-def lengthen_cable(motor: MotorArray, metres: float) -> bool:
-    """Lengthen the cable of a motor outside any robot; return whether there is one."""
+def lengthen_cable(motor: MotorArray, metres: float) -> None:
+    """Lengthen the cable of a motor outside any robot."""
     m: Any = motor[0]
     m["cable_start"] -= metres
-    return bool(m["load_kind"] != LOAD_KINDS.index("none"))
+
+
+def mend_cable(motor: MotorArray, load: LoadPlant, slipped_m: float) -> None:
+    """Attach the cable of a motor outside any robot again, and undo its slip.
+
+    Where that would pull, the cable is just slack instead; a tight one stays as it is.
+    """
+    m: Any = motor[0]
+    kind, start = LOAD_KINDS.index(load.kind), float(m["cable_start"])
+    reeled_m = float(m["cable_gain"] * (m["angle"] - m["angle_start"]))
+    loose_m = reeled_m - float(m["mass_position"])
+    if m["load_kind"] == kind:
+        loose_m = max(loose_m, start)
+    m["load_kind"] = kind
+    m["cable_start"] = min(start + slipped_m, loose_m)
 
 
 def _set_physics(m: Any, plant: Plant) -> None:

@@ -132,9 +132,9 @@ def test_the_remaining_winches_lower_the_platform(
     assert hanging.state is LoopState.FAULT
     for text in told:
         assert text in hanging.loop.life.reason
-    mend = [text for text in hanging.status()["notices"] if "mend the cable" in text]
-    assert len(mend) == ("broken" in told[0])
-    assert all(text.startswith(told[0]) for text in mend)
+    repair = [text for text in hanging.status()["notices"] if ": repair it, then" in text]
+    assert len(repair) == ("broken" in told[0])
+    assert all(text.startswith(told[0]) for text in repair)
     # cable lengths remain known only after a fault of a drive
     assert hanging.loop.engine.parts.estimator.estimate.length_known.all() == (told == ("7305h",))
     records = truth.read()

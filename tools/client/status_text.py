@@ -122,8 +122,14 @@ def _lines(status: dict[str, Any]) -> list[Text]:
     return [
         *lines,
         *_loop_lines(status),
-        *(Text(f"note: {x}", style="dim") for x in status["notices"]),
+        *(Text(f"note: {x}", style="dim") for x in status["notices"] if not _is_reason(x, status)),
+        *(Text(step, style="bold") for step in next_steps(status)),
     ]
+
+
+def _is_reason(notice: str, status: dict[str, Any]) -> bool:
+    """Return whether a notice only repeats the reason of a fault."""
+    return bool(status["reason"]) and notice.startswith(status["reason"])
 
 
 def _calibration(status: dict[str, Any]) -> str:
@@ -247,14 +253,46 @@ _LOOSE_N = 1.0
 """Tension below which a cable is called loose."""
 
 
-def fallen_text(status: dict[str, Any]) -> str:
-    """Return what to do with a platform that has come down; empty if it has not."""
-    if not (status.get("program_progress") or {}).get("fallen"):
-        return ""
-    text = "; it has come down: look at it, then `cdpr tighten --from home` where it stands there"
-    if any(axis.get("cable_length_m") is None for axis in status["axes"]):
-        return f"{text}, upright"
-    return f"{text}, or `--from lengths` where it stands upright elsewhere"
+def next_steps(status: dict[str, Any]) -> list[str]:
+    """Return the steps, as lines with commands, before a robot can move; none if it can or moves.
+
+    What is broken is what the controller knows: the cause of a fault, and cables that seemed
+    broken and were not tight since.
+    """
+    state, last = status["state"], status.get("last_stop")
+    if status["read_only"] or status.get("busy") or status.get("reacting", "none") != "none":
+        return []
+    progress = status.get("program_progress") or {}
+    loose = last and status["program"] == "hold" and progress.get("tight") is False
+    if state not in ("fault", "ready") and not (state == "active" and loose):
+        return []
+    steps = []
+    broken = bool(last and last["broken"])
+    if broken or state == "fault":
+        what = "repair the cable" if broken else "remove the cause"
+        injected = is_simulated(status)
+        mend = f"; if it was injected: `cdpr sim fault {status['robot']} mend`" if injected else ""
+        steps.append(f"{what}{mend}")
+    ready = ["`cdpr ack`"] * (state == "fault") + ["`cdpr enable`"] * (state != "active")
+    if last is not None and not last["fallen"]:
+        ready.append(f"`cdpr tighten{' --from home' * broken}`")
+    if ready:
+        steps.append(", ".join(ready))
+    if last is not None and last["fallen"]:
+        elsewhere = ""
+        if all(axis.get("cable_length_m") is not None for axis in status["axes"]):
+            elsewhere = "; if it stands upright elsewhere: `cdpr tighten --from lengths`"
+        steps.append(
+            "look at the platform, which has come down; if it stands at home, upright: "
+            f"`cdpr tighten --from home`{elsewhere}"
+        )
+    return [f"next: {steps[0]}", *(f"      {step}" for step in steps[1:])]
+
+
+def is_simulated(status: dict[str, Any]) -> bool:
+    """Return whether all buses of the robot are simulated."""
+    urls = [str(bus.get("url", "")) for bus in (status.get("buses") or {}).values()]
+    return bool(urls) and all(url.startswith("simbus:") for url in urls)
 
 
 def tightness_text(status: dict[str, Any]) -> str:
@@ -269,7 +307,7 @@ def tightness_text(status: dict[str, Any]) -> str:
     most_N = max((axis.get("tension_N") or 0.0 for axis in status["axes"]), default=0.0)
     # as after an interrupted `tighten`: a hold keeps the tension of the cables
     cables = f"not tight, pulled with up to {most_N:.0f} N" if most_N >= _LOOSE_N else "loose"
-    return f"cables {cables}, power on{fallen_text(status)}"
+    return f"cables {cables}, power on"
 
 
 def _listed(values: Iterable[float], factor: float, digits: int) -> str:

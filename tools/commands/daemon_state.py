@@ -16,7 +16,8 @@ from cdpr_tools.client.daemon_end import end_daemon
 from cdpr_tools.client.daemon_robot import commanded
 from cdpr_tools.client.refusals import DaemonRefusalError
 from cdpr_tools.client.status_text import (
-    fallen_text,
+    is_simulated,
+    next_steps,
     status_text,
 )
 from cdpr_tools.commands.options import (
@@ -105,14 +106,14 @@ def enable(
     status = _booted(daemon, out)
     if status["state"] == "active":
         _require_no_stop(status)
-        out.say(f"has power already, program {status['program']}", *_next(status))
+        out.say(f"has power already, program {status['program']}", *next_steps(status))
         out.result({"ok": True, "state": "active", "text": ""})
         return
     _confirm(status, yes)
     with commanded(daemon) as robot:
         robot.enable(program)
     status = daemon.get("/status")
-    _show(out, {"state": status["state"], "text": ""}, *_next(status))
+    _show(out, {"state": status["state"], "text": ""}, *next_steps(status))
 
 
 def _require_no_stop(status: dict[str, Any]) -> None:
@@ -123,15 +124,6 @@ def _require_no_stop(status: dict[str, Any]) -> None:
             f"the robot is being stopped, {reaction} under way{reason}; `cdpr status` says when it "
             "has ended"
         )
-
-
-def _next(status: dict[str, Any]) -> list[str]:
-    """Return the steps before a platform that has power but is not held yet can move."""
-    progress = status.get("program_progress") or {}
-    if progress.get("tight") is not False or status["program"] != "hold":
-        return []
-    fallen = fallen_text(status)
-    return [f"cables loose{fallen or '; next: `cdpr tighten`, then it can be moved'}"]
 
 
 def _booted(daemon: Daemon, out: Output) -> dict[str, Any]:
@@ -183,7 +175,8 @@ def ack(daemon: Daemon, out: Output) -> None:
         out.say("no fault to acknowledge")
         out.result({"ok": True, "state": state, "text": ""})
         return
-    _show(out, daemon.post("/acknowledge"))
+    answer = daemon.post("/acknowledge")
+    _show(out, answer, *next_steps(daemon.get("/status")))
 
 
 @app.command()
@@ -220,6 +213,6 @@ def _confirm(state: dict[str, Any], yes: bool) -> None:
     """Ask before motors on a real bus get power."""
     urls = [str(bus.get("url", "")) for bus in state.get("buses", {}).values()]
     real = [url for url in urls if not url.startswith("simbus:")]
-    if real or not urls:
+    if not is_simulated(state):
         where = " and ".join(real) or "its buses"
         require_consent(f"{state['robot']} on {where}: the drives get power.", yes)

@@ -12,11 +12,14 @@ from cdpr_profiles.errors import printable
 from cdpr_profiles.robot import robot_of_winch
 from cdpr_tools.command_group import ROBOT_VARIABLE
 from cdpr_tools.composition.fault_injection import (
+    MEND,
     InjectedFault,
-    inject_beside,
-    named_injection,
+    InjectionAccess,
+    fault_words,
 )
 from cdpr_tools.errors import BadInputError
+
+LIST = "list"
 
 app = typer.Typer()
 
@@ -34,8 +37,9 @@ def fault(
     what: Annotated[
         InjectedFault,
         typer.Argument(
-            help=f"What goes wrong, immediately: {', '.join(InjectedFault)}.",
-            metavar="FAULT",
+            help=f"What goes wrong, immediately: {', '.join(InjectedFault)}; {MEND}: repair "
+            f"everything, {LIST}: show what is broken.",
+            metavar=f"FAULT|{MEND}|{LIST}",
         ),
     ],
     value: Annotated[
@@ -52,19 +56,39 @@ def fault(
         list[str] | None,
         typer.Option(help="The simulator's buses; those of the robot's daemon where left out."),
     ] = None,
-    axis: Annotated[str, typer.Option(help="Axis by its name, or by its number from 1.")] = "1",
+    axis: Annotated[
+        str | None,
+        typer.Option(
+            help="Axis by its name, or by its number from 1; 1 if left out, to mend and to list "
+            "all of them."
+        ),
+    ] = None,
 ) -> None:
-    """Inject a fault into a running simulated robot: a cable, an encoder, a drive.
+    """Inject a fault into a running simulated robot: a cable, an encoder, a drive; or mend it.
 
     It writes object 2F00h, which no real drive has, while the robot's master keeps running. For
-    pre-operational it sends the NMT command.
+    pre-operational it sends the NMT command. No controller reads what is broken from the simulator.
     """
     profile, daemon = _profile(machine, by_daemon=not bus)
     robot = robot_of_winch(profile) if isinstance(profile, Winch) else profile
-    chosen = _axis(robot, axis)
-    url = robot_urls(robot, bus or _buses_of_daemon(daemon))[chosen.bus]
-    amount = inject_beside(robot, chosen, url, what, value)
-    typer.echo(printable(f"{chosen.name}: {what}{_amount_text(what, amount)}"))
+    shows = what in (MEND, LIST)
+    axes = robot.axes if shows and axis is None else (_axis(robot, axis or "1"),)
+    urls = robot_urls(robot, bus or _buses_of_daemon(daemon))
+    if shows and value is not None:
+        raise BadInputError(f"{what} {value}: {what} takes no value")
+    lines = []
+    for one in axes:
+        with InjectionAccess(robot, one, urls[one.bus]) as access:
+            if not shows:
+                lines.append(f"{one.name}: {fault_words(what, access.inject(what, value))}")
+                continue
+            found = access.injected()
+            if what == MEND:
+                access.inject(MEND, None)
+        if found:
+            lines.append(f"{one.name}: {'mended: ' * (what == MEND)}{', '.join(found)}")
+    for line in lines or ["nothing is broken"]:
+        typer.echo(printable(line))
 
 
 def _profile(machine: str, *, by_daemon: bool) -> tuple[Winch | Robot, str]:
@@ -93,16 +117,6 @@ def _buses_of_daemon(robot: str) -> list[str]:
     with open_daemon(robot, None, None, None) as daemon:
         buses = daemon.get("/status")["buses"]
     return [f"{name}={bus['url']}" for name, bus in buses.items()]
-
-
-def _amount_text(what: str, amount: int) -> str:
-    if what in (InjectedFault.CUT_CABLE, InjectedFault.PRE_OPERATIONAL):
-        return ""
-    return (
-        f" {amount:#06x}"
-        if what == InjectedFault.DRIVE_FAULT
-        else f" {amount} {named_injection(what).unit}"
-    )
 
 
 def _axis(robot: Robot, text: str) -> RobotAxis:

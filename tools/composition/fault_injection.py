@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from enum import StrEnum
-from typing import Final, NamedTuple
+from typing import Final, NamedTuple, Self
 
 from cdpr_drivers.bus import BusUrl
 from cdpr_drivers.canopen.network import CanNetwork
-from cdpr_drivers.errors import BusError, SdoError
+from cdpr_drivers.errors import BusError, SdoError, SdoTimeoutError
 from cdpr_profiles import Robot, RobotAxis
 from cdpr_profiles.eds import load_dictionary
 from cdpr_rt.core.clock import PacedClock
@@ -59,47 +61,102 @@ _INJECTIONS = {
     InjectedFault.PRE_OPERATIONAL: FaultInjection(0, 1, 1, 1, ""),
     InjectedFault.CELL_OFF: FaultInjection(14, 40, -(2**15), 2**15 - 1, "N"),
 }
+_LASTING: Final = (InjectedFault.CUT_CABLE, InjectedFault.SLIP, InjectedFault.CELL_OFF)
+"""Faults that last until they are mended, besides silence; the others happen once."""
+MEND: Final = "mend"
+"""Repairs them all."""
 
 
-def injection_of(what: str, value: int | None) -> tuple[int, int]:
-    """Return sub-index and value of object 2F00h for a fault; raises BadInputError."""
+def writes_of(what: str, value: int | None) -> list[tuple[int, int]]:
+    """Return sub-indices and values of object 2F00h for a fault or `MEND`; raises BadInputError."""
+    if what == MEND:
+        return [(_INJECTIONS[fault].sub, 0) for fault in (InjectedFault.SILENCE, *_LASTING)]
     if what == InjectedFault.PRE_OPERATIONAL:
         raise BadInputError(f"{what}: allowed: with `cdpr sim fault`")
     injection = named_injection(what)
-    return injection.sub, injection.amount(what, None if value is None else str(value))
+    return [(injection.sub, injection.amount(what, None if value is None else str(value)))]
 
 
 def named_injection(what: str) -> FaultInjection:
     """Return how a fault is injected; raises BadInputError for an unknown one."""
     if what not in _INJECTIONS:
-        raise BadInputError(f"FAULT {what!r}; allowed: {', '.join(InjectedFault)}")
+        raise BadInputError(f"FAULT {what!r}; allowed: {', '.join((*InjectedFault, MEND))}")
     return _INJECTIONS[InjectedFault(what)]
 
 
-def inject_beside(robot: Robot, axis: RobotAxis, url: BusUrl, what: str, value: str | None) -> int:
-    """Inject a fault into an axis, whoever runs the robot; return the value used.
+def fault_words(what: str, amount: int) -> str:
+    """Return a fault and its value with its unit as text."""
+    if what in (InjectedFault.CUT_CABLE, InjectedFault.PRE_OPERATIONAL):
+        return what
+    if what == InjectedFault.DRIVE_FAULT:
+        return f"{what} {amount:#06x}"
+    return f"{what} {amount} {named_injection(what).unit}"
 
-    For pre-operational it sends the NMT command. Raises BadInputError and WorkFailedError.
+
+class InjectionAccess:
+    """Access to object 2F00h of one simulated drive, whoever runs the robot; a context manager.
+
+    Raises BadInputError if the bus does not exist. Its methods raise WorkFailedError.
     """
-    injection, winch = named_injection(what), axis.winch
-    amount = injection.amount(what, value)
-    if what == InjectedFault.CELL_OFF and robot.tension_sensors is None:
-        raise BadInputError(
-            f"{what}: {robot.name} has no load cells, its tensions are estimated from torques; "
-            "allowed: for a robot whose file names tension_sensors"
-        )
-    with raised_as(BadInputError, BusError):
-        network = CanNetwork(
-            url, PacedClock(), [winch.node_id], robot.master_node_id, robot.master_heartbeat_s
-        )
-    try:
-        network.add_node(winch.node_id, load_dictionary(winch.drive.eds, winch.node_id))
-        if what == InjectedFault.PRE_OPERATIONAL:
-            network.stop_process_data(winch.node_id)
-        else:
-            network.write(winch.node_id, INJECTION_OBJECT, injection.sub, amount)
-    except (SdoError, BusError) as error:
-        raise WorkFailedError(f"axis {axis.name!r}: {error}") from error
-    finally:
-        network.close()
-    return amount
+
+    def __init__(self, robot: Robot, axis: RobotAxis, url: BusUrl) -> None:
+        self._robot, self._axis, node = robot, axis, axis.winch.node_id
+        with raised_as(BadInputError, BusError):
+            self._network = CanNetwork(
+                url, PacedClock(), [node], robot.master_node_id, robot.master_heartbeat_s
+            )
+        self._network.add_node(node, load_dictionary(axis.winch.drive.eds, node))
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._network.close()
+
+    def inject(self, what: str, value: str | None) -> int:
+        """Inject a fault or mend; return the value used. Pre-operational is an NMT command.
+
+        Raises BadInputError for an invalid value.
+        """
+        if what == MEND:
+            with self._errors():
+                for sub, zero in writes_of(what, None):
+                    self._write(sub, zero)
+            return 0
+        injection = named_injection(what)
+        amount = injection.amount(what, value)
+        if what == InjectedFault.CELL_OFF and self._robot.tension_sensors is None:
+            raise BadInputError(
+                f"{what}: {self._robot.name} has no load cells, its tensions are estimated from "
+                "torques; allowed: for a robot whose file names tension_sensors"
+            )
+        with self._errors():
+            if what == InjectedFault.PRE_OPERATIONAL:
+                self._network.stop_process_data(self._axis.winch.node_id)
+            else:
+                self._write(injection.sub, amount)
+        return amount
+
+    def injected(self) -> list[str]:
+        """Return the faults that last, as text."""
+        node, found = self._axis.winch.node_id, []
+        with self._errors():
+            for what in _LASTING:
+                try:
+                    amount = self._network.read_int(
+                        node, INJECTION_OBJECT, _INJECTIONS[what].sub, attempts=1
+                    )
+                except SdoTimeoutError:
+                    return [f"{InjectedFault.SILENCE}, which hides any other fault"]
+                found += [fault_words(what, amount)] * bool(amount)
+        return found
+
+    def _write(self, sub: int, value: int) -> None:
+        self._network.write(self._axis.winch.node_id, INJECTION_OBJECT, sub, value)
+
+    @contextmanager
+    def _errors(self) -> Iterator[None]:
+        try:
+            yield
+        except (SdoError, BusError) as error:
+            raise WorkFailedError(f"axis {self._axis.name!r}: {error}") from error

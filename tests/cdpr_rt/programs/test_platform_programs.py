@@ -124,7 +124,8 @@ def test_a_broken_cable_is_reported_and_all_cables_are_released(robot: Standing)
     robot.switch("tighten")
     told = robot.until_done(60.0)
     assert told["trouble"].startswith("upper right: 1000.0 mm reeled in and not tight")
-    assert told["trouble"].endswith("is its cable broken, unhooked, or wound off?")
+    assert told["trouble"].endswith("its cable is broken, unhooked, or wound off its drum")
+    assert robot.parts.last_stop.broken == {1: told["trouble"]}
     robot.run(0.5)
     assert robot.program.at_rest
     assert not robot.torque.any()
@@ -190,6 +191,21 @@ def test_a_cable_that_goes_slack_ends_tightening(robot: Standing):
     told = robot.until_done(20.0)
     assert told["trouble"].startswith("upper left: 5")
     assert "reeled in and not tight" in told["trouble"]
+
+
+def test_a_cable_that_seemed_broken_is_named_until_all_are_tight(robot: Standing):
+    robot.slack_m[0] += 5.0
+    robot.parts.last_stop.broken[2] = "lower: the cable seems broken"
+    robot.switch("tighten")
+    told = robot.until_done(60.0)
+    assert told["trouble"].startswith("upper left: 1000.0 mm reeled in and not tight")
+    assert told["trouble"].endswith("; before that, lower: the cable seems broken: is it repaired?")
+    (notice,) = (text for text in robot.parts.notices() if "repair it" in text)
+    assert "upper left: " in notice and "lower: " in notice
+    robot.run(0.5)
+    robot.slack_m[0] -= 4.0
+    tightened(robot)
+    assert not robot.parts.last_stop.broken
 
 
 def test_a_tight_robot_cannot_be_tightened_from_home_again(robot: Standing):

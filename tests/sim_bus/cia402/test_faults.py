@@ -190,3 +190,11 @@ def test_only_a_drive_with_a_cable_accepts_cut_and_slip() -> None:
         pulled.write(0x2F00, value, sub)
         pulled.run(0.02)
         assert motor["tension"][0] == 0.0
+        pulled.write(0x2F00, 0, sub)
+        pulled.run(0.02)
+        assert (
+            motor["tension"][0] < 1.0
+        )  # just slack after a cut, fastened at its mark after a slip
+        motor["angle"] -= 0.5
+        pulled.run(0.02)
+        assert motor["tension"][0] > 15.0

@@ -112,6 +112,27 @@ def test_a_cut_cable_has_no_tension_and_the_platform_swings_on_the_others() -> N
     assert y < 1.5 - 0.1, "the platform falls"
     reach = np.hypot(x - 2.0, y - 3.0)
     assert reach < free_length_m(robot)[1] + 0.2, "the remaining cable holds it"
+    robot.mend(0, cut=True, slipped_m=0.0)
+    slack_m = free_length_m(robot)[0] - robot.distance_m(0)
+    assert slack_m == pytest.approx(0.0, abs=1e-9), "its old length would pull"
+    highest_N = 0.0
+    for k in range(20):  # it swings on both
+        run(robot, 0.05, begin_s=0.45 + 0.05 * k)
+        highest_N = max(highest_N, float(robot.tension_N[0]))
+    assert highest_N > 5.0
+
+
+def test_a_mended_slip_is_undone_as_far_as_the_cable_is_slack() -> None:
+    robot = body(locked=True, cables={"damping_s": 0.002})
+    run(robot, 0.05)
+    start_m = float(robot.motors["cable_start"][0])
+    robot.slip(0, 0.1)
+    robot.mend(0, cut=False, slipped_m=0.1)
+    assert robot.motors["cable_start"][0] == pytest.approx(robot.distance_m(0))
+    robot.motors["cable_start"][0] = start_m
+    robot.slip(0, 0.001)
+    robot.mend(0, cut=False, slipped_m=0.001)
+    assert robot.motors["cable_start"][0] == pytest.approx(start_m + 0.001), "it is tight"
 
 
 @pytest.mark.parametrize("length_m", [0.05, 0.2, 1.0])

@@ -20,8 +20,8 @@ from cdpr_profiles import ProfileError
 from cdpr_rt.core.clock import LockstepClock
 from cdpr_sim_bus.robot.truth_log import HEADER_BYTES
 from cdpr_tools.client import client
-from cdpr_tools.commands.sim_fault import fault
-from cdpr_tools.composition.fault_injection import InjectedFault
+from cdpr_tools.commands.sim_fault import LIST, fault
+from cdpr_tools.composition.fault_injection import MEND, InjectedFault
 from cdpr_tools.errors import BadInputError, WorkFailedError
 from tests.tools.robot_rig import Simulator, simulated, unique
 
@@ -85,7 +85,7 @@ class Robot:
         assert len(seen) == before + count
         return seen[-1]
 
-    def fault(self, what: InjectedFault, value: str | None = None, axis: str = "1") -> None:
+    def fault(self, what: str, value: str | None = None, axis: str | None = None) -> None:
         fault("planar-3", what, value, bus=[f"simbus:{self.name}"], axis=axis)
 
     def close(self) -> None:
@@ -139,6 +139,33 @@ def test_a_cable_is_cut_while_the_robot_runs(
     # by number; more cable than was taut
     robot.fault(InjectedFault.SLIP, "500", axis="1")
     assert robot.sync(0.05)["tension_N"][0] < 0.5
+    capsys.readouterr()
+    robot.fault(LIST)
+    broken = "upper left: slip 500 mm\nupper right: cut-cable\n"
+    assert capsys.readouterr().out == broken
+    robot.fault(MEND, axis="upper right")
+    robot.fault(MEND)
+    assert capsys.readouterr().out == (
+        "upper right: mended: cut-cable\nupper left: mended: slip 500 mm\n"
+    )
+    assert robot.sync(0.5)["tension_N"][:2].min() > 1e-3
+    robot.fault(LIST)
+    assert capsys.readouterr().out == "nothing is broken\n"
+
+
+def test_a_silent_drive_is_listed_and_mended(
+    robot: Robot, capsys: pytest.CaptureFixture[str]
+) -> None:
+    robot.fault(InjectedFault.SILENCE, axis="lower")
+    robot.fault(LIST)
+    robot.fault(MEND)
+    robot.fault(LIST)
+    assert capsys.readouterr().out.splitlines() == [
+        "lower: silence 65535 ms",
+        "lower: silence, which hides any other fault",
+        "lower: mended: silence, which hides any other fault",
+        "nothing is broken",
+    ]
 
 
 def test_a_drive_is_sent_to_pre_operational(
@@ -159,6 +186,7 @@ def test_a_drive_is_sent_to_pre_operational(
         ),
         ((InjectedFault.SLIP, "0"), "slip 0: allowed: whole numbers 1 to 65535"),
         ((InjectedFault.ENCODER_JUMP, "far"), "encoder-jump far: allowed: whole numbers"),
+        ((MEND, "3"), "mend 3: mend takes no value"),
         ((InjectedFault.CELL_OFF,), "cell-off: Planar robot with 3 cables has no load cells"),
     ],
 )

@@ -14,6 +14,7 @@ from cdpr_tools.client.status_text import (
     compensation_text,
     death_text,
     learnt_text,
+    next_steps,
     stage_text,
     status_text,
 )
@@ -39,6 +40,13 @@ def status_of(**keys: Any) -> dict[str, Any]:
         "parts": {},
         **keys,
     }
+
+
+LOWERED: dict[str, Any] = {"fallen": False, "broken": []}
+FALLEN: dict[str, Any] = {"fallen": True, "broken": ["left: broken"]}
+LOOSE: dict[str, Any] = {"program": "hold", "program_progress": {"tight": False}}
+TIGHT: dict[str, Any] = {"program": "hold", "program_progress": {"tight": True}}
+SIMULATED = {"can0": {"url": "simbus:own-1-can0"}}
 
 
 @pytest.mark.parametrize(
@@ -106,18 +114,51 @@ def test_cables_under_tension_but_not_tight_are_not_reported_as_loose() -> None:
     assert "cables loose, power on" in lines
 
 
-def test_a_fallen_platform_shows_how_to_tighten_it() -> None:
-    status = status_of(state="active", program="hold", program_progress={"tight": False})
-    assert "cables loose, power on" in [str(line) for line in status_text(status)]
-    status["program_progress"]["fallen"] = True
-    home = "it has come down: look at it, then `cdpr tighten --from home` where it stands there, "
-    for length_m, told in (
-        (1.2, "or `--from lengths` where it stands upright elsewhere"),
-        (None, "upright"),  # unknown lengths are rejected
-    ):
+@pytest.mark.parametrize(
+    ("status", "told"),
+    [
+        ({"state": "ready"}, ["`cdpr enable`"]),
+        ({"state": "fault"}, ["remove the cause", "`cdpr ack`, `cdpr enable`"]),
+        ({"state": "fault", "reacting": "quick stop"}, []),
+        ({"state": "active"}, []),
+        ({"state": "ready", "last_stop": LOWERED}, ["`cdpr enable`, `cdpr tighten`"]),
+        ({"state": "active", "last_stop": LOWERED, **LOOSE}, ["`cdpr tighten`"]),
+        ({"state": "active", "last_stop": LOWERED, **TIGHT}, []),
+        (
+            {"state": "fault", "last_stop": LOWERED | {"broken": ["left: broken"]}},
+            ["repair the cable", "`cdpr ack`, `cdpr enable`, `cdpr tighten --from home`"],
+        ),
+        (
+            {"state": "ready", "last_stop": FALLEN, "buses": SIMULATED},
+            [
+                "repair the cable; if it was injected: `cdpr sim fault bench mend`",
+                "`cdpr enable`",
+                "look at the platform, which has come down; if it stands at home, upright: "
+                "`cdpr tighten --from home`",
+            ],
+        ),
+    ],
+)
+def test_the_steps_until_a_robot_can_move_are_listed(
+    status: dict[str, Any], told: list[str]
+) -> None:
+    lines = [str(line) for line in status_text(status_of(**status))]
+    begin = next((i for i, line in enumerate(lines) if line.startswith("next: ")), -1)
+    steps = lines[begin : begin + len(told)] if told else []
+    assert [step.removeprefix("next: ").strip() for step in steps] == told
+    assert bool(told) == (begin >= 0)
+
+
+def test_a_fallen_platform_with_known_lengths_may_be_tightened_elsewhere() -> None:
+    status = status_of(state="active", last_stop=LOWERED | {"fallen": True}, **LOOSE)
+    for length_m, told in ((1.2, True), (None, False)):
         status["axes"] = [{"name": "left", "cable_length_m": x} for x in (1.1, length_m)]
-        (line,) = (str(line) for line in status_text(status) if "loose" in str(line))
-        assert line.endswith(home + told)
+        assert ("`cdpr tighten --from lengths`" in next_steps(status)[-1]) is told
+
+
+def test_a_notice_that_repeats_the_reason_is_not_shown() -> None:
+    status = status_of(state="fault", reason="left: broken", notices=["left: broken: repair it"])
+    assert not any(str(line).startswith("note") for line in status_text(status))
 
 
 def test_a_failing_part_is_reported_with_its_option() -> None:
