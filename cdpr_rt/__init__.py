@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from cdpr_rt.model.own_distribution import TensionDistribution
     from cdpr_rt.offline import Model, load
     from cdpr_rt.platform.own_controller import Controller, State, Target
+    from cdpr_rt.programs.own_program import Program
     from cdpr_rt.robot import (
         AlreadyRunning,
         Error,
@@ -45,6 +46,7 @@ __all__ = [
     "Model",
     "MotionEnded",
     "NotRunning",
+    "Program",
     "Refused",
     "Robot",
     "State",
@@ -61,6 +63,7 @@ _HOMES = {
     "Model": "cdpr_rt.offline",
     "connect": "cdpr_tools.client.daemon_robot",
     "load": "cdpr_rt.offline",
+    "Program": "cdpr_rt.programs.own_program",
     "run": "cdpr_tools.client.daemon_robot",
     "simulate": "cdpr_tools.lockstep_robot",
     "State": "cdpr_rt.platform.own_controller",

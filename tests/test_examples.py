@@ -20,6 +20,7 @@ PRINTED = {
         "state act",
     ],
     "own_controller.py": ["built-in controller: ", "PoseController: "],
+    "own_program.py": ["circle: at most ", "ended: circle: at ", "active, hold at"],
     "own_tension_distribution.py": ["built-in: [", "near_wanted: [", "mm off"],
     "workspace.py": ["% of the grid can be held", "lowest tension", "wrote "],
     "relative_moves_daemon.py": ["refused: pose: distance_m", "recorded", "the daemon has ended"],

@@ -40,6 +40,7 @@ from cdpr_rt.loop.right import PublishedRight
 from cdpr_rt.model.own_distribution import TensionDistribution, require_code_allowed
 from cdpr_rt.model.robot_arrays import limits_of
 from cdpr_rt.platform.own_controller import Controller
+from cdpr_rt.programs.own_program import Program
 from cdpr_rt.refusal import CommandRefusal
 from cdpr_rt.robot import Error, InvalidArgument, InvalidRobot, NotRunning, Refused, Robot
 from cdpr_rt.service.lease import Lease, LeaseError
@@ -190,23 +191,26 @@ def simulate(
     plant: str | Path | None = None,
     controller: Controller | None = None,
     tension_distribution: TensionDistribution | None = None,
+    programs: Sequence[Program] = (),
     allow_code: bool = False,
 ) -> Robot:
     """Return a robot on simulated drives in this process, ready and without power.
 
     `robot` is the name or file of a robot, `plant` a file with the deviations of the simulated
     machine from it. `controller` replaces the built-in controller of the platform,
-    `tension_distribution` the tension distribution that the robot's file names. If that file names
-    code, `allow_code` allows it from now on. Bus time passes only while a method waits, as fast as
-    this machine computes: the same script gives the same rows. Use the handle from one thread.
-    Closing it removes the power. Raises InvalidRobot, and Error if the drives do not get ready.
+    `tension_distribution` the tension distribution that the robot's file names. `programs` are
+    further programs for `Robot.run`. If the robot's file names code, `allow_code` allows it from
+    now on. Bus time passes only while a method waits, as fast as this machine computes: the same
+    script gives the same rows. Use the handle from one thread. Closing it removes the power. Raises
+    InvalidRobot, and Error if the drives do not get ready.
     """
     plant_file = None if plant is None else Path(plant)
     try:
-        own = OwnCode(controller, tension_distribution)
+        named = [(f"programs[{i}]", program) for i, program in enumerate(programs)]
+        own = OwnCode(controller, tension_distribution, named)
         made = LockstepRobot(robot, plant=plant_file, own=own, ring_s=_LOG_S, pinned=False)
         for name, given in vars(own).items():
-            if given is not None and made.robot.platform is None:
+            if given and made.robot.platform is None:
                 raise InvalidArgument(f"{name}: {robot} {NO_PLATFORM}")
         if allow_code:
             require_code_allowed(made.robot, allow_code=True)

@@ -124,7 +124,7 @@ class PoseProgram(PlatformProgram):
     def _held_back(self) -> str:
         """Return why set-point or target are held back, "" if they are not."""
         lags = super()._held_back()
-        if lags or not self._following:
+        if lags or not self._goal_moves:
             return lags
         if self._contact_pair >= 0:
             return self._control.contact(self._contact_pair)
@@ -137,9 +137,14 @@ class PoseProgram(PlatformProgram):
             return ""
         return f"{place_text(position, self._k)}: {why_not}"
 
+    @property
+    def _goal_moves(self) -> bool:
+        """Whether the goal may move anywhere in each cycle: its way has not been checked."""
+        return self._following
+
     # -- commands
 
-    def check(self, arguments: Mapping[str, Any]) -> tuple[str, FloatArray | None, float]:
+    def check(self, arguments: Mapping[str, Any]) -> Any:
         """Return checked arguments for `apply`; raises ProgramError."""
         angles = () if self._about.size else ("rotation_rad", "turn_rad")
         allowed = [key for key in _KEYS if key not in angles]
@@ -236,37 +241,57 @@ class PoseProgram(PlatformProgram):
         The position is not checked if an absolute motion does not change it.
         """
         k, most_rad = self._k, self._parts.model.angle_rad
-        inside, leads = position[:k], "" if asked.keys() & {*_ABSOLUTE} else "leads to "
+        leads = "" if asked.keys() & {*_ABSOLUTE} else "leads to "
         if asked.keys() & {"position_m", *_RELATIVE}:
-            inside = np.clip(inside, self._low, self._high)
-        if np.abs(position[:k] - inside).max() > _ROUNDING:
-            i = int(np.abs(position[:k] - inside).argmax())
-            why = (
-                f"{leads}{'xyz'[self._directions[i]]} {1e3 * position[i]:.6g} mm; allowed: "
-                f"{1e3 * self._low[i]:g} to {1e3 * self._high[i]:g} mm, the workspace"
-            )
-            raise ProgramError(_not_feasible(asked, why, outside=True))
-        position[:k] = inside
+            if beyond := self._beyond_box(position):
+                raise ProgramError(self._not_feasible(asked, leads + beyond, outside=True))
+            position[:k] = np.clip(position[:k], self._low, self._high)
+        if asked.keys() & {"turn_rad", "rotation_rad"} and (beyond := self._beyond_angle(position)):
+            raise ProgramError(self._not_feasible(asked, leads + beyond, outside=True))
         angle = float(np.linalg.norm(position[k:]))
         if angle > most_rad:
-            if asked.keys() & {"turn_rad", "rotation_rad"} and angle > most_rad + _ROUNDING:
-                why = (
-                    f"{leads}{math.degrees(angle):.4g} deg from the orientation at home; "
-                    f"allowed: up to {math.degrees(most_rad):.4g} deg"
-                )
-                raise ProgramError(_not_feasible(asked, why, outside=True))
             position[k:] *= most_rad / angle
         if why_not := self._control.infeasibility(position):
-            raise ProgramError(_not_feasible(asked, why_not))
+            raise ProgramError(self._not_feasible(asked, why_not))
         self._require_way(position, asked)
+
+    def _beyond_box(self, position: FloatArray) -> str:
+        """Return which coordinate is out of the box of targets, "" if none is."""
+        off = np.abs(position[: self._k] - np.clip(position[: self._k], self._low, self._high))
+        i = int(off.argmax())
+        if off[i] <= _ROUNDING:
+            return ""
+        return (
+            f"{'xyz'[self._directions[i]]} {1e3 * position[i]:.6g} mm; allowed: "
+            f"{1e3 * self._low[i]:g} to {1e3 * self._high[i]:g} mm, the workspace"
+        )
+
+    def _beyond_angle(self, position: FloatArray) -> str:
+        """Return that a rotation is larger than that of targets, "" if it is not."""
+        angle, most_rad = float(np.linalg.norm(position[self._k :])), self._parts.model.angle_rad
+        if angle <= most_rad + _ROUNDING:
+            return ""
+        return (
+            f"{math.degrees(angle):.4g} deg from the orientation at home; "
+            f"allowed: up to {math.degrees(most_rad):.4g} deg"
+        )
 
     def _require_way(self, position: FloatArray, asked: Mapping[str, Any]) -> None:
         """Raise ProgramError if the straight way to a position (d,) is not feasible."""
         why_not = self._control.way_infeasibility(position)
         if why_not:
-            raise ProgramError(_not_feasible(asked, f"on the way, {why_not}"))
+            raise ProgramError(self._not_feasible(asked, f"on the way, {why_not}"))
 
-    def _apply(self, checked: tuple[str, FloatArray | None, float]) -> None:
+    def _not_feasible(
+        self, asked: Mapping[str, Any], why: str, *, outside: bool = False
+    ) -> CommandRefusal:
+        arguments = {"why": why, "outside": outside}
+        return CommandRefusal(RefusalCode.NOT_FEASIBLE, self.name, asked, arguments)
+
+    def _apply(self, checked: Any) -> None:
+        action: str
+        position: FloatArray | None
+        speed: float
         action, position, speed = checked
         self._commanded_speed[:] = self._parts.speeds(speed)
         self._following = action == "stream"
@@ -377,16 +402,16 @@ class PoseProgram(PlatformProgram):
         saved[0], saved[1], saved[2] = control.position, control.velocity, control.acceleration
         arrived = self._go_towards(goal)
         self._stopping_position()
-        if self._following:
+        if self._goal_moves:
             self._stop_straight()
         stops = control.is_feasible(self._rest)
         # all of the way to a pose has been checked before
-        near = control.contact_ahead(self._rest) if self._following else -1
+        near = control.contact_ahead(self._rest) if self._goal_moves else -1
         if near >= 0:
             self._contact_pair = near
         if near >= 0 or (self._stops_feasibly and not stops):
             control.position[:], control.velocity[:], control.acceleration[:] = saved
-            if self._following:
+            if self._goal_moves:
                 self._stop_straight()
                 usual, self._acceleration = self._acceleration, self._stopping_acceleration
                 self._go_towards(self._rest)
@@ -407,8 +432,3 @@ class PoseProgram(PlatformProgram):
         stopping_position(
             control.position, control.velocity, self._stopping_acceleration, self._rest
         )
-
-
-def _not_feasible(asked: Mapping[str, Any], why: str, *, outside: bool = False) -> CommandRefusal:
-    arguments = {"why": why, "outside": outside}
-    return CommandRefusal(RefusalCode.NOT_FEASIBLE, "pose", asked, arguments)

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import Any
+
 import numpy as np
 
 from cdpr_profiles import Robot
@@ -21,6 +24,7 @@ from cdpr_rt.programs.idle import IdleProgram
 from cdpr_rt.programs.jog import JogProgram
 from cdpr_rt.programs.lower import LowerProgram
 from cdpr_rt.programs.model import AxesModel
+from cdpr_rt.programs.own_program import OwnProgram, checked_programs
 from cdpr_rt.programs.path import PathProgram
 from cdpr_rt.programs.pid import PidProgram
 from cdpr_rt.programs.platform_axes import PlatformHold, PlatformIdle, PlatformJog
@@ -56,16 +60,24 @@ def platform_parts(
 
 
 def build_programs(
-    model: AxesModel, block: SharedBlock, parts: PlatformParts | None = None
+    model: AxesModel,
+    block: SharedBlock,
+    parts: PlatformParts | None = None,
+    own: Sequence[tuple[str, Any]] = (),
 ) -> dict[str, Program]:
     """Return a robot's programs by name, in the order of their numbers in its description.
 
-    `block` has the set-point stream; `parts` are given if the robot's platform is moved.
+    `block` has the set-point stream; `parts` are given if the robot's platform is moved. Then
+    `own` are further programs, see `checked_programs`. Raises ControlError.
     """
     loop = PositionLoop(model)
     stream = PoseStream(block, model.period_s)
     if parts is not None:
-        return {program.name: program for program in _of_platform(model, loop, stream, parts)}
+        built_in = {program.name: program for program in _of_platform(model, loop, stream, parts)}
+        return built_in | {
+            one.name: OwnProgram(one, parts, model.torque_Nm, stream)
+            for one in checked_programs(own, built_in)
+        }
     programs: tuple[Program, ...] = (
         IdleProgram(model),
         AxisProgram(model, loop),  # which brakes and holds

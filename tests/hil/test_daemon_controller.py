@@ -39,6 +39,18 @@ class Blocking(Mine):
 class Other:
     pass
 
+class Side(cdpr.Program):
+    'A step to the side.'
+
+    name = "side"
+    arguments = {"step_m": (0.0, 0.2, 0.1)}
+
+    def begin(self, position, step_m):
+        self.goal = position + [step_m, 0.0]
+
+    def target(self, time_s):
+        return self.goal if time_s < 0.1 else None
+
 def middle(W, w, low, high, previous):
     t, free = 0.5 * (low + high), np.full(3, True)
     while True:
@@ -61,6 +73,7 @@ def running(folder: Path, controller: str, paced: bool = False) -> Iterator[Real
     robot.write_text(shipped.replace("[platform]", named))
     env = {"XDG_STATE_HOME": str(folder)}
     mine = ("--no-record", "--controller", f"{file}:{controller}", "--allow-code")
+    mine += ("--program", f"{file}:Side")
     daemon = RealDaemon(folder, *mine, robot=robot, env=env, paced=paced)
     try:
         yield daemon
@@ -81,6 +94,12 @@ def test_code_from_files_moves_the_platform_and_is_shown(tmp_path: Path) -> None
         done(daemon, "tighten")
         moved = done(daemon, "move", "--to", "100", "1600")
         assert moved["position_m"] == pytest.approx([0.1, 1.6], abs=0.005)
+        moved = done(daemon, "controller", "side", "step_m=0.05")
+        assert moved["position_m"] == pytest.approx([0.15, 1.6], abs=0.005)
+        schemas = daemon.http.get("/openapi.json").json()["components"]["schemas"]
+        name = schemas["ProgramRequest"]["properties"]["program"]
+        assert "side" in name["examples"]
+        assert "A step to the side. (step_m from 0 to 0.2, 0.1 by default)" in name["description"]
         notices = daemon.status()["notices"]
         assert any("mine.py:Mine controls the platform" in notice for notice in notices)
         assert "mine.py:middle distributes the tensions off the stand" in notices

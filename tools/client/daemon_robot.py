@@ -95,18 +95,19 @@ def run(
     record: str | Path | None = None,
     controller: str | None = None,
     tension_distribution: str | None = None,
+    programs: Sequence[str] = (),
     allow_code: bool = False,
     yes: bool = False,
 ) -> Robot:
     """Start a daemon as `cdpr run` does and return its robot.
 
     `bus` are URLs as for `--bus`, such as "simbus:" for simulated drives; by default those of the
-    robot's file. `record` is the folder of the recording. `controller` and `tension_distribution`
-    are your own: "FILE.py:NAME" or "MODULE:NAME". If the robot's file names code, `allow_code`
-    allows it from now on. A bus with real drives needs `yes`. The daemon ends when the handle is
-    closed or the script dies: it lowers the platform and removes the power. Raises AlreadyRunning,
-    InvalidRobot, InvalidArgument without a necessary `yes`, and Error if the daemon does not start,
-    or does not confirm at its end that the power is off.
+    robot's file. `record` is the folder of the recording. `controller`, `tension_distribution` and
+    `programs` are your own: "FILE.py:NAME" or "MODULE:NAME". If the robot's file names code,
+    `allow_code` allows it from now on. A bus with real drives needs `yes`. The daemon ends when the
+    handle is closed or the script dies: it lowers the platform and removes the power. Raises
+    AlreadyRunning, InvalidRobot, InvalidArgument without a necessary `yes`, and Error if the daemon
+    does not start, or does not confirm at its end that the power is off.
     """
     _require_no_daemon(str(robot))
     buses = [bus] if isinstance(bus, str) else list(bus or ())
@@ -123,6 +124,7 @@ def run(
         ("--tension-distribution", tension_distribution),
     ):
         options += [] if value is None else [option, str(value)]
+    options += [word for program in programs for word in ("--program", program)]
     options += ["--allow-code"] * allow_code
     with ExitStack() as stack, _errors_of_opening():
         try:

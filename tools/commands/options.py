@@ -137,6 +137,14 @@ TensionDistributionOption = Annotated[
         help="Your own tension distribution, or MODULE:NAME. This runs the code there.",
     ),
 ]
+ProgramOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--program",
+        metavar="FILE.py:CLASS",
+        help="A program of your own, or MODULE:CLASS; repeatable. This runs the code there.",
+    ),
+]
 AllowCodeOption = Annotated[
     bool,
     typer.Option(

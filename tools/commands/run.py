@@ -40,6 +40,7 @@ from cdpr_tools.commands.options import (
     ControllerOption,
     ExitWithStdinOption,
     JsonOption,
+    ProgramOption,
     RobotBusOption,
     RobotOrWinchArgument,
     SafetyIoOption,
@@ -145,6 +146,7 @@ def run(
     ] = None,
     controller: ControllerOption = None,
     tension_distribution: TensionDistributionOption = None,
+    program: ProgramOption = None,
     allow_code: AllowCodeOption = False,
     yes: YesOption = False,
     as_json: JsonOption = False,
@@ -166,7 +168,8 @@ def run(
         no_record=no_record, keep_days=keep_days, keep_gb=keep_gb, live=live,
         live_origin=live_origin, stream=stream, read_only=read_only, safety_io=safety_io,
         tension_port=tension_port, commissioned=commissioned,
-        own=OwnCodeOptions(controller, tension_distribution), allow_code=allow_code,
+        own=OwnCodeOptions(controller, tension_distribution, tuple(program or ())),
+        allow_code=allow_code,
     )  # fmt: skip
     if camera is not None and not starts_own_simulator(bus or ()):
         raise BadInputError("--camera: only for a simulator that the command starts (simbus:)")

@@ -25,13 +25,14 @@ from cdpr_rt.model.calibration_state import not_calibrated_reason
 from cdpr_rt.model.robot_arrays import described, supervisor_limits, winches_of
 from cdpr_rt.programs.lower import LowerProgram, lowering_s
 from cdpr_rt.programs.model import model_of
+from cdpr_rt.programs.own_program import OwnProgram
 from cdpr_rt.programs.platform_program import PlatformParts
 from cdpr_rt.programs.registry import (
     build_programs,
     platform_parts,
     warm_up_programs,
 )
-from cdpr_tools.composition.own_code import OwnCode, with_distribution
+from cdpr_tools.composition.own_code import OwnCode, completed
 
 _OTHER_CALIBRATION = "a calibration was taken over or undone; start the daemon again"
 
@@ -67,16 +68,17 @@ def loop_parts(
 
     `learns`: it learns cogging and friction of a platform's uncommissioned motors in motion.
     Code of the user's `own` replaces built-in parts of the platform's control, as does the tension
-    distribution that the robot's file names. Raises ProfileError if that must not run.
+    distribution that the robot's file names, and adds programs, as do installed packages. Raises
+    ProfileError if the file's code must not run, and ControlError for unsuitable code.
     """
-    own = with_distribution(own or OwnCode(), robot)
+    own = completed(own or OwnCode(), robot)
     axes, n, period_s = robot.axes, len(robot.axes), robot.sync_period_s
     latencies = [axis.winch.latency_s for axis in axes]
     known = compensation_of(robot, load_profiles(robot, limits), limits)
     model = model_of(axes, period_s, latencies, limits, known)
     estimator = Estimator(n, period_s, winches_of(axes))
     platform = platform_parts(robot, limits, model, estimator, learns=learns)
-    programs = build_programs(model, block, platform)
+    programs = build_programs(model, block, platform, own.programs)
     lowering = None
     if platform is not None:
         lowering = Lowering(LowerProgram.name, lowering_s(platform.platform))
@@ -138,6 +140,11 @@ def description(robot: Robot, limits: Limits, parts: LoopParts) -> dict[str, Any
         ],
         "limits": described(limits, len(robot.axes)),
         "programs": list(parts.programs),
+        "own_programs": {
+            name: one.described()
+            for name, one in parts.programs.items()
+            if isinstance(one, OwnProgram)
+        },
         "lowering_s": 0.0 if parts.lowering is None else parts.lowering.longest_s,
         "platform": None if robot.platform is None else _platform_description(robot.platform),
         "geometry_sha256": geometry_sha256(robot),

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from cdpr_profiles import Robot
 from cdpr_profiles.platform import NO_PLATFORM
-from cdpr_rt.code_loader import load_code
+from cdpr_rt.code_loader import load_code, load_registered
 from cdpr_rt.errors import ControlError
 from cdpr_rt.model.own_distribution import (
     TensionDistribution,
@@ -15,6 +17,7 @@ from cdpr_rt.model.own_distribution import (
     require_code_allowed,
 )
 from cdpr_rt.platform.own_controller import Controller
+from cdpr_rt.programs.own_program import PROGRAMS
 from cdpr_tools.errors import BadInputError
 
 
@@ -24,6 +27,8 @@ class OwnCode:
 
     controller: Controller | None = None
     tension_distribution: TensionDistribution | None = None
+    programs: Sequence[tuple[str, Any]] = ()
+    """Further programs of a platform, each with the reference for messages."""
 
 
 @dataclass(frozen=True)
@@ -32,6 +37,7 @@ class OwnCodeOptions:
 
     controller: str | None = None
     tension_distribution: str | None = None
+    programs: tuple[str, ...] = ()
 
     def require_use(self, robot: Robot, *, allow_code: bool) -> None:
         """Raise BadInputError if the robot has no use for the code. No code runs.
@@ -42,6 +48,7 @@ class OwnCodeOptions:
         for option, reference in (
             ("--controller", self.controller),
             ("--tension-distribution", self.tension_distribution),
+            ("--program", self.programs[0] if self.programs else None),
         ):
             if reference is not None and robot.platform is None:
                 raise BadInputError(f"{option}: {robot.profile} {NO_PLATFORM}")
@@ -53,6 +60,7 @@ class OwnCodeOptions:
         return OwnCode(
             None if self.controller is None else _controller(self.controller),
             None if self.tension_distribution is None else _distribution(self.tension_distribution),
+            [_program(reference) for reference in self.programs],
         )
 
     def notices(self, robot: Robot) -> list[str]:
@@ -84,11 +92,21 @@ def _distribution(reference: str) -> TensionDistribution:
         raise BadInputError(f"--tension-distribution {error}") from error
 
 
-def with_distribution(own: OwnCode, robot: Robot) -> OwnCode:
-    """Return `own` with the distribution that the robot's file names, unless it has one.
+def _program(reference: str) -> tuple[str, Any]:
+    try:
+        return f"--program {reference}", load_code(reference)
+    except ControlError as error:
+        raise BadInputError(f"--program {error}") from error
 
-    Raises ProfileError if that is code that is not allowed, or that fails.
+
+def completed(own: OwnCode, robot: Robot) -> OwnCode:
+    """Return `own` with the distribution that the robot's file names and registered programs.
+
+    A distribution of `own` comes before that of the file. Raises ProfileError if that is code that
+    is not allowed, or that fails, and CodeError if a package's code fails.
     """
-    if own.tension_distribution is not None:
+    if robot.platform is None:
         return own
-    return OwnCode(own.controller, named_distribution(robot))
+    distribution = own.tension_distribution or named_distribution(robot)
+    registered = load_registered(PROGRAMS).items()
+    return OwnCode(own.controller, distribution, [*own.programs, *registered])

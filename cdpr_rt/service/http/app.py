@@ -309,7 +309,37 @@ def create_app(service: Service) -> FastAPI:
     _add_path(app, service)
     WebSocketRoutes(service).add(app)
     _add_key(app)
+    _add_programs(app, service)
     return app
+
+
+def _add_programs(app: FastAPI, service: Service) -> None:
+    """Describe the robot's programs in the application's description, once the loop is known."""
+    described = app.openapi()  # the application caches it
+    schemas = described["components"]["schemas"]
+
+    def openapi() -> dict[str, Any]:
+        robot = service.link.description()
+        if names := robot.get("programs"):
+            own = ". ".join(
+                f"{name}: {one['text']} {_bounds(one['arguments'])}".rstrip()
+                for name, one in robot.get("own_programs", {}).items()
+            )
+            for schema in ("Enable", "ProgramRequest"):
+                name = schemas[schema]["properties"]["program"]
+                name["examples"] = names
+                name["description"] = f"A program's name. {own}".rstrip()
+        return described
+
+    app.openapi = openapi  # type: ignore[method-assign]
+
+
+def _bounds(arguments: Mapping[str, Any]) -> str:
+    each = (
+        f"{key} from {bounds['low']:g} to {bounds['high']:g}, {bounds['default']:g} by default"
+        for key, bounds in arguments.items()
+    )
+    return f"({'; '.join(each)})" if arguments else ""
 
 
 def _add_key(app: FastAPI) -> None:
