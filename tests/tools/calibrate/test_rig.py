@@ -142,7 +142,7 @@ def test_a_drive_fault_during_the_motion_marks_the_pose_as_tried(
 
         def failing(*arguments: Any, **options: Any) -> None:
             begin(*arguments, **options)
-            operator.rig.inject_fault(1, 1, 0x2310)
+            operator.rig.inject(1, 1, 0x2310)
 
         monkeypatch.setattr(operator.robot, "move_to", failing)
         with pytest.raises(TripError) as caught:
@@ -156,7 +156,7 @@ def test_a_drive_fault_before_the_motion_does_not_mark_the_pose_as_tried() -> No
     with simulated_rig("planar-3", plant=None, scanner=False) as operator:
         operator.tighten()
         measured = Measured(lambda: None)
-        operator.rig.inject_fault(1, 1, 0x2310)
+        operator.rig.inject(1, 1, 0x2310)
         with pytest.raises(NotThePoseError):
             measure_poses(operator, places.chosen[:1], places.middle, measured, Notes())
     assert measured.tried == []
