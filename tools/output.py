@@ -59,9 +59,10 @@ def to_json(result: dict[str, Any], indent: int | None = None) -> str:
 
 _KEPT: Final = re.compile(r"`[^`]*`|(?:(?<=: )|(?<=^ {6}))cdpr .*")
 """A command within a text: somebody may copy it, so it stays in one line."""
-_LABEL: Final = re.compile(r"\s*(?:\S+(?: \S+)?\s{2,})?")
+_GAPS: Final = re.compile(r"^\s+|\s{2,}(?=\S)")
+"""What separates labels from the text after them."""
 _SPACE: Final = "\0"
-_LEAST_TEXT: Final = 24
+_LEAST_TEXT: Final = 20
 """Fewest columns that are left to a text beside its label, and to the first column of a table."""
 
 
@@ -80,10 +81,8 @@ def fold(text: str, width: int | None) -> str:
 def _fold_line(line: str, width: int) -> str:
     if len(line) <= width:
         return line
-    label = _LABEL.match(line)
-    indent = 0 if label is None else label.end()
-    if indent > width - _LEAST_TEXT:
-        indent = 0
+    gaps = [gap.end() for gap in _GAPS.finditer(line) if gap.end() <= width - _LEAST_TEXT]
+    indent = max(gaps, default=0)
     whole = _KEPT.sub(lambda found: found[0].replace(" ", _SPACE), line)
     folded = wrap(
         whole,

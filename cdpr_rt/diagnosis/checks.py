@@ -229,7 +229,7 @@ def _tensions(statics: PlatformStatics) -> Iterator[Finding]:
             low, high = point_text(smaller.low_m), point_text(smaller.high_m)
             text += f"in all of {low} to {high} m they would be; "
         worst = np.unravel_index(moving_N.argmin(), moving_N.shape)
-        text += why_not_held(statics, points[worst[1:]], turns[worst[0]])
+        text += f"at the worst place, {why_not_held(statics, points[worst[1:]], turns[worst[0]])}"
         yield Finding("platform.workspace_min_m", text, impossible=taken == 0.0)
 
 

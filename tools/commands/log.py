@@ -11,7 +11,7 @@ from cdpr_rt.service.retention import size_text
 from cdpr_tools.commands.options import JsonOption, written_as
 from cdpr_tools.daemon.paths import default_recordings
 from cdpr_tools.errors import BadInputError, os_error_as
-from cdpr_tools.output import Output
+from cdpr_tools.output import Output, TableText
 from cdpr_tools.recordings.selection import (
     Selection,
     check_target,
@@ -67,13 +67,14 @@ def list_command(
         out.say(f"no recordings in {where}")
         out.result({"ok": True, "folder": where, "sessions": found})
         return
+    rows = [["session", "files", "size"]]
     for name, files in sessions(files_of([where])).items():
         with os_error_as(BadInputError, f"{where}: cannot be read"):
             size = sum(path.stat().st_size for path in files)
         count = f"{len(files)} file{'s' if len(files) > 1 else ''}"
-        out.say(f"{name:40}  {count:>9}  {size_text(size):>9}")
+        rows.append([name, count, size_text(size)])
         found.append({"session": name, "files": files, "bytes": size})
-    out.say(f"in {where}")
+    out.say(TableText(rows), f"in {where}")
     out.result({"ok": True, "folder": where, "sessions": found})
 
 

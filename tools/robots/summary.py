@@ -351,7 +351,9 @@ def _sketch(statics: PlatformStatics, platform: Platform) -> list[str]:
     for i, position_m in enumerate(platform.exit_points_m):
         put(position_m, str((i + 1) % 10))
     put(platform.home_m, "o")
-    legend = "1, 2 ... exit points   o at rest   # targets   . also held   "
-    legend += "! targets that are not taken"
+    legend = [
+        "1, 2 ... exit points, o at rest, # targets, . also held,",
+        "! targets that are not taken",
+    ]
     rows_shown = ["".join(row).rstrip() for row in cells[::-1]]
-    return ["\n".join(rows_shown).strip("\n"), legend]
+    return ["\n".join(rows_shown).strip("\n"), *legend]
