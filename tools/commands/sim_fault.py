@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from enum import StrEnum
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -21,6 +22,11 @@ from cdpr_tools.errors import BadInputError
 
 LIST = "list"
 
+if TYPE_CHECKING:
+    FaultWord = str
+else:
+    FaultWord = StrEnum("FaultWord", [(word, word) for word in (*InjectedFault, MEND, LIST)])
+
 app = typer.Typer()
 
 
@@ -35,7 +41,7 @@ def fault(
         ),
     ],
     what: Annotated[
-        InjectedFault,
+        FaultWord,
         typer.Argument(
             help=f"What goes wrong, immediately: {', '.join(InjectedFault)}; {MEND}: repair "
             f"everything, {LIST}: show what is broken.",
