@@ -12,10 +12,12 @@ from numpy.typing import ArrayLike
 from cdpr_profiles import load_robot
 from cdpr_profiles.errors import ProfileError
 from cdpr_rt.arrays import BoolArray, FloatArray
+from cdpr_rt.code_loader import CodeError
 from cdpr_rt.errors import ControlError
 from cdpr_rt.model.own_distribution import (
     TensionDistribution,
     TensionDistributionError,
+    checked_distribution,
     named_distribution,
     require_code_allowed,
 )
@@ -44,11 +46,15 @@ def load(
         if allow_code:
             require_code_allowed(profile, allow_code=True)
         own = tension_distribution
+        if own is not None:
+            checked_distribution("tension_distribution", own)
         return Model(
             platform_model_of(profile),
             [axis.name for axis in profile.axes],
             lambda: own or named_distribution(profile),
         )
+    except CodeError as error:
+        raise InvalidArgument(str(error)) from error
     except (ProfileError, ControlError) as error:
         raise InvalidRobot(str(error)) from error
 

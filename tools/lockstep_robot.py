@@ -28,6 +28,7 @@ from cdpr_profiles import load_robot
 from cdpr_profiles.calibration.in_force import calibrated
 from cdpr_profiles.errors import ProfileError
 from cdpr_profiles.platform import NO_PLATFORM
+from cdpr_rt.code_loader import CodeError
 from cdpr_rt.core.clock import Clock
 from cdpr_rt.core.cycle_row import Row
 from cdpr_rt.core.shared_block import RowReader, SharedBlock
@@ -37,7 +38,11 @@ from cdpr_rt.loop.engine import LoopParts
 from cdpr_rt.loop.loop import ControlLoop
 from cdpr_rt.loop.realtime import one_core
 from cdpr_rt.loop.right import PublishedRight
-from cdpr_rt.model.own_distribution import TensionDistribution, require_code_allowed
+from cdpr_rt.model.own_distribution import (
+    TensionDistribution,
+    checked_distribution,
+    require_code_allowed,
+)
 from cdpr_rt.model.robot_arrays import limits_of
 from cdpr_rt.platform.own_controller import Controller
 from cdpr_rt.programs.own_program import Program
@@ -206,6 +211,8 @@ def simulate(
     """
     plant_file = None if plant is None else Path(plant)
     try:
+        if tension_distribution is not None:
+            checked_distribution("tension_distribution", tension_distribution)
         named = [(f"programs[{i}]", program) for i, program in enumerate(programs)]
         own = OwnCode(controller, tension_distribution, named)
         made = LockstepRobot(robot, plant=plant_file, own=own, ring_s=_LOG_S, pinned=False)
@@ -217,6 +224,8 @@ def simulate(
         return Robot(made.__enter__())
     except (ProfileError, BadInputError) as error:
         raise InvalidRobot(str(error)) from error
+    except CodeError as error:
+        raise InvalidArgument(str(error)) from error
     except (CommandError, DriverError, ControlError) as error:
         raise Error(str(error)) from error
 

@@ -207,8 +207,9 @@ def _refused(robot: Robot, error: ControlError) -> ProfileError:
 
 
 def checked_distribution(reference: str, found: Any) -> TensionDistribution:
-    """Return what was loaded if it can be called; raises CodeError that begins with `reference`."""
-    if not callable(found):
-        raise CodeError(f"{reference}: is no function f(W, w, low, high, previous)")
+    """Return `found` if it can be called; raises CodeError that begins with `reference`."""
+    if not callable(found) or isinstance(found, type):
+        shown = getattr(found, "__name__", None) or repr(found)[:60]
+        raise CodeError(f"{reference}: {shown} is no function f(W, w, low, high, previous)")
     function: TensionDistribution = found
     return function

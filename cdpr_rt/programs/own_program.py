@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cdpr_rt.arrays import FloatArray
-from cdpr_rt.errors import ControlError
+from cdpr_rt.code_loader import CodeError
 from cdpr_rt.motion.pose_stream import PoseStream
 from cdpr_rt.motion.trajectory import stopping_position
 from cdpr_rt.programs.base import CommandArguments, ProgramError
@@ -205,21 +205,21 @@ def checked_programs(found: Iterable[tuple[str, Any]], taken: Iterable[str]) -> 
     """Return loaded programs after a check of their names and arguments.
 
     `found` are pairs of a reference and what it names, `taken` the names of built-in programs.
-    Raises ControlError that begins with the reference.
+    Raises CodeError that begins with the reference.
     """
     names, programs = set(taken), list[Program]()
     for reference, program in found:
         if not isinstance(program, Program):
-            raise ControlError(f"{reference}: is no program; derive it from cdpr_rt.Program")
+            raise CodeError(f"{reference}: is no program; derive it from cdpr_rt.Program")
         name = getattr(program, "name", None)
         if not isinstance(name, str) or not _NAME.fullmatch(name):
-            raise ControlError(f"{reference}: name: {name!r}; allowed: small letters, digits, -, _")
+            raise CodeError(f"{reference}: name: {name!r}; allowed: small letters, digits, -, _")
         if name in names:
-            raise ControlError(f"{reference}: name: {name!r} is taken; allowed: another name")
+            raise CodeError(f"{reference}: name: {name!r} is taken; allowed: another name")
         for key, bounds in program.arguments.items():
             low, high, default = (*bounds, *[np.nan] * 3)[:3]
             if not _KEY.fullmatch(key) or not low <= default <= high or len(bounds) != 3:
-                raise ControlError(
+                raise CodeError(
                     f"{reference}: arguments: {key!r}: {bounds!r}; allowed: a name of letters, "
                     "digits and _, with its least and largest value and the default between them"
                 )

@@ -131,6 +131,15 @@ def test_time_waits_for_a_target_that_is_too_fast(robot: cdpr.Robot) -> None:
         assert np.abs(speed_m_s).max() < 0.6
 
 
+def test_what_is_no_program_and_no_distribution_is_an_invalid_argument() -> None:
+    with pytest.raises(cdpr.InvalidArgument, match=r"programs\[0\]: is no program; derive it"):
+        cdpr.simulate("planar-3", programs=[Swing])  # type: ignore[list-item]
+    for wrong in ("mine.py:spread", Swing):
+        for use in (cdpr.simulate, cdpr.load):
+            with pytest.raises(cdpr.InvalidArgument, match="is no function f"):
+                use("planar-3", tension_distribution=wrong)  # type: ignore[operator]
+
+
 class Named(Swing):
     def __init__(self, name: object, arguments: object = None) -> None:
         self.name = name  # type: ignore[assignment]

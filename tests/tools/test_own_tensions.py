@@ -136,12 +136,33 @@ def test_a_robots_file_runs_code_only_if_the_user_allows_it(naming: Path) -> Non
         cdpr.load(naming).tensions(place)
 
 
+def test_a_robots_file_may_name_what_an_installed_package_registers(
+    naming: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder, text = naming.parent, naming.read_text()
+    naming.write_text(text.replace("mine.py:spread", "spread"))
+    with pytest.raises(cdpr.InvalidRobot, match="value 'spread'; allowed: 'minimum-norm'"):
+        cdpr.load(naming)
+    info = folder / "of_others-1.0.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: of-others\nVersion: 1.0\n")
+    group = "[cdpr_rt.tension_distributions]\nspread = tensions_of_others:spread\n"
+    (info / "entry_points.txt").write_text(group)
+    (folder / "tensions_of_others.py").write_text(CODE)
+    monkeypatch.syspath_prepend(str(folder))
+    with pytest.raises(cdpr.InvalidArgument, match="spread: ZeroDivisionError: it has run"):
+        cdpr.load(naming).tensions([0.0, 1.8])
+
+
 @pytest.mark.parametrize(
     ("options", "text"),
     [
         ([], "mine.py is code that would run with your rights"),
         (["--tension-distribution", "mine.py:missing"], "--tension-distribution mine.py:missing:"),
-        (["--tension-distribution", "math:pi"], "math:pi: is no function f(W, w, low, high,"),
+        (
+            ["--tension-distribution", "math:pi"],
+            "math:pi: 3.141592653589793 is no function f(W, w, low,",
+        ),
         (["--control", "mine.py:spread", "--allow-code"], "with --tension-distribution"),
     ],
 )
