@@ -181,8 +181,8 @@ class Service:
         """
         if self.stream is None:
             raise StreamError(
-                f"{self.robot}: its daemon takes no set-point stream; allowed: one that was "
-                "started with --stream HOST:PORT"
+                f"{self.robot}: its daemon receives no set-point stream: it was started with "
+                "--no-stream or --read-only"
             )
         given, (host, port) = self.stream.sessions.issue(token), self.stream.address
         return {"session": given.number, "key": given.key.hex(), "host": host, "port": port}

@@ -227,7 +227,7 @@ def test_hold_disable_and_stop_work_while_the_service_hangs(tmp_path: Path) -> N
 
 @pytest.mark.long
 def test_hold_and_stop_work_while_all_interfaces_are_flooded(tmp_path: Path) -> None:
-    options = (*with_key(tmp_path), "--stream", "127.0.0.1:0", "--no-record")
+    options = (*with_key(tmp_path), "--no-record")
     daemon = RealDaemon(tmp_path, *options)
     parts = daemon.status()["parts"]
     http, stream = parts["service"]["http"], parts["stream"]["address"]

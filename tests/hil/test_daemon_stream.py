@@ -35,7 +35,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def daemon(folder: Path) -> Iterator[RealDaemon]:
-    running = RealDaemon(folder, "--stream", "127.0.0.1:0", "--record", str(folder / "rec"))
+    running = RealDaemon(folder, "--record", str(folder / "rec"))
     try:
         yield running
     finally:

@@ -46,7 +46,7 @@ def daemon(folder: Path) -> Iterator[RealDaemon]:
     robot = folder / "planar.toml"
     period = f"sync_period_s = {PERIOD_S}"
     robot.write_text(SHIPPED.read_text().replace("sync_period_s = 0.001", period))
-    options = ("--stream", "127.0.0.1:0", "--record", str(folder / "rec"))
+    options = ("--record", str(folder / "rec"))
     one = RealDaemon(folder, *options, robot=robot)
     try:
         start_up(one)

@@ -128,8 +128,14 @@ def run(
     ] = None,
     stream: Annotated[
         str | None,
-        typer.Option(metavar="HOST:PORT", help="Receive a set-point stream (UDP) there."),
+        typer.Option(
+            metavar="HOST:PORT",
+            help="Receive the set-point stream (UDP) there, not at a free port of loopback.",
+        ),
     ] = None,
+    no_stream: Annotated[
+        bool, typer.Option("--no-stream", help="Receive no set-point stream.")
+    ] = False,
     read_only: Annotated[
         bool, typer.Option("--read-only", help="Listen to another master's bus; send nothing.")
     ] = False,
@@ -166,8 +172,8 @@ def run(
     settings = settings_for(
         profile, bus=bus, plant=plant, http=http, unix=unix, key_file=key_file, record=record,
         no_record=no_record, keep_days=keep_days, keep_gb=keep_gb, live=live,
-        live_origin=live_origin, stream=stream, read_only=read_only, safety_io=safety_io,
-        tension_port=tension_port, commissioned=commissioned,
+        live_origin=live_origin, stream=stream, no_stream=no_stream, read_only=read_only,
+        safety_io=safety_io, tension_port=tension_port, commissioned=commissioned,
         own=OwnCodeOptions(controller, tension_distribution, tuple(program or ())),
         allow_code=allow_code,
     )  # fmt: skip
@@ -269,6 +275,7 @@ def settings_for(
     live: int | None,
     live_origin: list[str] | None = None,
     stream: str | None,
+    no_stream: bool = False,
     read_only: bool,
     safety_io: str | None,
     tension_port: str | None = None,
@@ -283,6 +290,8 @@ def settings_for(
     load_profiles(with_commissioned(robot, commissioned))
     if record is not None and no_record:
         raise BadInputError("--record and --no-record: one of them")
+    if stream is not None and no_stream:
+        raise BadInputError("--stream and --no-stream: one of them")
     own = own or OwnCodeOptions()
     own.require_use(robot, allow_code=allow_code)
     own_simulator = starts_own_simulator(bus or ())
@@ -312,9 +321,16 @@ def settings_for(
         keep=_kept(record, keep_days, keep_gb),
         live=live,
         live_origins=tuple(map(checked_origin, live_origin or ())),
-        stream=None if stream is None else Address.parse("--stream", stream),
+        stream=_stream_address(stream, no_stream or read_only),
         launcher_pid=os.getpid(),
     )
+
+
+def _stream_address(stream: str | None, off: bool) -> Address | None:
+    """Return where set-points are received: by default at a free port of loopback."""
+    if stream is None:
+        return None if off else Address(host="127.0.0.1", port=0)
+    return Address.parse("--stream", stream)
 
 
 def _kept(record: Path | None, days: float | None, gb: float | None) -> Retention:

@@ -18,7 +18,7 @@ from rich.live import Live
 from cdpr_rt.service.stream_client import StreamClient
 from cdpr_rt.service.stream_packet import StreamSession
 from cdpr_tools.client.client import Daemon, open_daemon
-from cdpr_tools.daemon.settings import Address
+from cdpr_tools.daemon.settings import Address, is_loopback
 from cdpr_tools.errors import BadInputError, CommandError, WorkFailedError
 from cdpr_tools.output import Output
 from cdpr_tools.signals import stop_on_signals
@@ -171,13 +171,17 @@ def stream_address(status: dict[str, Any], settings: TeleopSettings) -> tuple[st
     bound = status["parts"].get("stream", {}).get("address")
     if bound is None:
         raise BadInputError(
-            f"{status['robot']}: its daemon takes no set-point stream; allowed: one that was "
-            "started with --stream HOST:PORT"
+            f"{status['robot']}: its daemon receives no set-point stream: it was started with "
+            "--no-stream or --read-only"
         )
     host, _, port = bound.rpartition(":")
-    if host in _EVERYWHERE:
-        host = "127.0.0.1" if settings.url is None else str(urlsplit(settings.url).hostname)
-    return host, int(port)
+    url_host = "127.0.0.1" if settings.url is None else str(urlsplit(settings.url).hostname)
+    if is_loopback(host) and not is_loopback(url_host):
+        raise BadInputError(
+            f"{status['robot']}: its daemon receives set-points only from its own machine; "
+            "allowed: --via, or a daemon that was started with --stream HOST:PORT and --key-file"
+        )
+    return url_host if host in _EVERYWHERE else host, int(port)
 
 
 def directions_of(description: dict[str, Any]) -> Directions:

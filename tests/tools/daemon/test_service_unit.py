@@ -88,6 +88,7 @@ def test_systemd_reports_no_problem_with_the_unit(tmp_path: Path) -> None:
         (("--key-file", "/nowhere/key"), "cannot be read"),
         (("--plant", "here.toml"), "simbus:"),
         (("--record", "here", "--no-record"), "one of them"),
+        (("--stream", "7710", "--no-stream"), "one of them"),
     ],
 )
 def test_a_unit_for_an_invalid_run_is_rejected(options: tuple[str, ...], words: str) -> None:

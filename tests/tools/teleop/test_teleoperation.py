@@ -35,5 +35,13 @@ def test_the_stream_has_the_host_of_the_daemon() -> None:
 
 
 def test_a_daemon_without_stream_is_reported() -> None:
-    with pytest.raises(BadInputError, match=r"planar-3: .*started with --stream HOST:PORT"):
+    with pytest.raises(
+        BadInputError, match=r"planar-3: .* started with --no-stream or --read-only"
+    ):
         address(None)
+
+
+def test_a_stream_on_loopback_cannot_be_reached_from_another_machine() -> None:
+    assert address("127.0.0.1:7710", url="http://localhost:7711") == ("127.0.0.1", 7710)
+    with pytest.raises(BadInputError, match=r"only from its own machine; allowed: .* --stream"):
+        address("127.0.0.1:7710", url="http://robot.example:7711")

@@ -103,7 +103,7 @@ def test_only_the_holder_of_the_right_is_given_a_stream_session(rig: Rig) -> Non
         headers = take(client)
         answer = client.post("/stream", headers=headers)
         assert answer.status_code == 404
-        assert "takes no set-point stream" in answer.json()["error"]
+        assert "receives no set-point stream" in answer.json()["error"]
         stream = SetpointStream(rig.block, rig.service.lease, listen_udp("127.0.0.1", 0))
         rig.service.start_parts([stream])
         try:
