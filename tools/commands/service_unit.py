@@ -20,10 +20,12 @@ from cdpr_rt.model.robot_arrays import can_lower
 from cdpr_rt.programs.lower import lowering_s
 from cdpr_tools.commands import run
 from cdpr_tools.commands.options import RobotOrWinchArgument
+from cdpr_tools.composition.own_code import OwnCodeOptions
 from cdpr_tools.report.page import rendered
 
 _SOCKETS = Path("/run/cdpr-rt")
 _ASIDE = ("robot", "yes", "as_json", "exit_with_stdin")
+_OWN_CODE = ("controller", "tension_distribution", "program")
 _OF_THE_SIMULATOR = "camera"
 """An option that the daemon's own processes do not know."""
 
@@ -52,8 +54,10 @@ def print_unit(
         asked = dict(read.params)
     if asked["unix"] is None:
         asked["unix"] = _SOCKETS / f"{profile.profile}.sock"
-    apart = (*_ASIDE, _OF_THE_SIMULATOR)
-    run.settings_for(profile, **{k: v for k, v in asked.items() if k not in apart})
+    apart = (*_ASIDE, _OF_THE_SIMULATOR, *_OWN_CODE)
+    controller, tensions, programs = (asked[name] for name in _OWN_CODE)
+    own = OwnCodeOptions(controller, tensions, tuple(programs or ()))
+    run.settings_for(profile, own=own, **{k: v for k, v in asked.items() if k not in apart})
     buses = asked["bus"] or []
     urls = [] if starts_own_simulator(buses) else list(robot_urls(profile, buses).values())
     if user is None:
@@ -76,7 +80,7 @@ def _words(asked: dict[str, Any]) -> Iterator[str]:
 
 
 def _absolute(name: str, value: Any) -> str:
-    if name == "controller" and ".py:" in value:  # FILE.py:CLASS
+    if name in _OWN_CODE and ".py:" in value:  # FILE.py:NAME
         return str(Path(value).absolute())
     is_file = isinstance(value, Path) or (name == "safety_io" and Path(value).is_file())
     return str(Path(value).absolute()) if is_file else str(value)
