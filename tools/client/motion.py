@@ -9,13 +9,16 @@ from dataclasses import dataclass
 from typing import Any
 
 from cdpr_profiles.platform import NO_PLATFORM
+from cdpr_rt.refusal import RefusalCode
 from cdpr_rt.robot import Robot, end_text, is_at_rest
 from cdpr_tools.client.client import Daemon
 from cdpr_tools.client.daemon_robot import commanded
+from cdpr_tools.client.refusals import DaemonRefusalError
 from cdpr_tools.client.status_text import (
     DEAD,
     ProgressNotes,
     death_text,
+    next_steps,
     platform_text,
     tightness_text,
 )
@@ -88,7 +91,14 @@ def run_to_end(
         robot.run(program, **arguments)
         robot.hold()
 
-    finish(daemon, out, carry_out(daemon, out, motion), where, **figures)
+    try:
+        outcome = carry_out(daemon, out, motion)
+    except DaemonRefusalError as error:
+        if error.refusal is not None and error.refusal.code is RefusalCode.NOT_TIGHT:
+            for step in next_steps(daemon.get("/status")):
+                error.add_note(step.strip())
+        raise
+    finish(daemon, out, outcome, where, **figures)
 
 
 def finish(

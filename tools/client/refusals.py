@@ -78,7 +78,10 @@ def in_typed_words(
         text = f"{typed}: {refusal.reason(**words)}"
         if refusal.arguments.get("outside"):
             raise BadInputError(text) from None
-        raise DaemonRefusalError.of(refusal, text) from None
+        worded = DaemonRefusalError.of(refusal, text)
+        for note in getattr(error, "__notes__", ()):
+            worded.add_note(note)
+        raise worded from None
 
 
 def _out_of_range(refusal: CommandRefusal, axes: Sequence[str]) -> str:

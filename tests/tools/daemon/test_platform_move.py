@@ -258,6 +258,28 @@ def test_a_rejection_by_the_daemon_quotes_the_typed_input(monkeypatch: pytest.Mo
     assert str(result.exception) == "--to 0 0 700: cable 1 would need 9 N"
 
 
+class Fallen(Told):
+    """A stand-in for a daemon whose platform has come down after a fault."""
+
+    def get(self, path: str) -> dict[str, Any]:
+        last_stop = {"broken": [], "fallen": True}
+        status = {"program": "hold", "read_only": False, "last_stop": last_stop}
+        return super().get(path) | (status if path == "/status" else {})
+
+
+def test_a_move_of_a_fallen_platform_is_refused_with_the_next_step(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    loose = CommandRefusal(RefusalCode.NOT_TIGHT, "pose", {"position_m": [0.0, 0.0, 0.7]})
+    told = Fallen(ROOM, HERE | {"tight": False}, loose)
+    result = typed(monkeypatch, told, "--to", "0", "0", "700")
+    assert isinstance(result.exception, WorkFailedError)
+    assert str(result.exception) == "--to 0 0 700: the cables are not tight; run tighten first"
+    (note,) = result.exception.__notes__
+    assert note.startswith("next: look at the platform, which has come down")
+    assert "`cdpr tighten --from home`" in note
+
+
 def test_an_obstructed_platform_is_reported_once(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
