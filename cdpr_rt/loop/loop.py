@@ -30,6 +30,28 @@ _AFTERWARDS = ("hold", "idle")
 """Programs that run after another program has ended."""
 
 
+_PACE_NS = 3_000_000_000
+
+
+class SimulationPace:
+    """Bus time over wall-clock time, over the last three to six seconds."""
+
+    def __init__(self) -> None:
+        self._marks: list[tuple[int, float]] = []
+        """Up to two times at the wall and at the bus, at least three seconds apart."""
+
+    def factor(self, wall_ns: int, bus_s: float) -> float | None:
+        """Return the real-time factor, rounded; None until it has been measured."""
+        if self._marks and bus_s < self._marks[-1][1]:  # another simulator
+            self._marks = []
+        if not self._marks or wall_ns - self._marks[-1][0] >= _PACE_NS:
+            self._marks = [*self._marks[-1:], (wall_ns, bus_s)]
+        began_ns, began_s = self._marks[0]
+        if wall_ns - began_ns < _PACE_NS:
+            return None
+        return round(1e9 * (bus_s - began_s) / (wall_ns - began_ns), 2)
+
+
 class StatusPage:
     """Writes the status into the shared memory, at every change of state and twice a second."""
 
@@ -48,6 +70,7 @@ class StatusPage:
         self._clock_ns = clock_ns
         self._checked_ns = 0
         self._written: dict[str, Any] = {}
+        self._pace = SimulationPace()
         self._failure = ""
         """Program that failed last and why, until another one moves the robot."""
 
@@ -109,6 +132,8 @@ class StatusPage:
         self._note_failure(progress)
         lateness = None if engine.cycle is None else engine.cycle.lateness
         last = engine.parts.last_stop
+        lockstep = engine.cycle is not None and engine.cycle.device.lockstep
+        bus_s = engine.machine.clock.now_s
         return {
             "state": life.state.label,
             "since_ns": life.since_ns,
@@ -125,7 +150,8 @@ class StatusPage:
             "reacting": engine.reacting.label,
             "busy": self._runner.busy,
             "read_only": engine.machine.read_only,
-            "lockstep": engine.cycle is not None and engine.cycle.device.lockstep,
+            "lockstep": lockstep,
+            "real_time_factor": self._pace.factor(self._clock_ns(), bus_s) if lockstep else None,
             "notices": [
                 *(f"also: {life.text(fault)}" for fault in life.further),
                 *map(life.text, engine.parts.supervisor.peaks()),

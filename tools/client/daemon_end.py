@@ -81,7 +81,7 @@ def end_daemon(daemon: Daemon, out: Output, socket: Path | None) -> None:
         if not had_died:
             if status["state"] != DEAD:  # a drive may have fallen silent in the meantime
                 ended = status
-            notes(str(status["program"]), status.get("program_progress") or {})
+            notes(status)
         time.sleep(_WATCH_S)
     raise WorkFailedError(f"the daemon still runs {end_s:g} s after it was asked to end")
 

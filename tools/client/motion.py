@@ -61,9 +61,8 @@ def carry_out(
     def look(status: Mapping[str, Any]) -> None:
         if stop_requested() or time.monotonic() > deadline:
             raise _OverError
-        progress = status.get("program_progress") or {}
-        notes(str(status["program"]), progress)
-        outcome.ended = progress
+        notes(status)
+        outcome.ended = status.get("program_progress") or {}
 
     with stop_on_signals(notice) as stop_requested, commanded(daemon) as robot:
         robot.on_status = look

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import Any, Final
 
 from rich.text import Text
@@ -94,7 +94,9 @@ def status_text(status: dict[str, Any]) -> list[Text | str]:
 
 def _lines(status: dict[str, Any]) -> list[Text]:
     state = status["state"]
-    how = ["read-only"] * bool(status["read_only"]) + ["lockstep"] * bool(status["lockstep"])
+    factor = status.get("real_time_factor")
+    lockstep = "lockstep" if factor is None else f"lockstep at {factor:.2f} of real time"
+    how = ["read-only"] * bool(status["read_only"]) + [lockstep] * bool(status["lockstep"])
     first = Text.assemble(
         f"{status['robot']}: ",
         (state, f"bold {_COLOURS.get(state, 'yellow')}"),
@@ -112,6 +114,8 @@ def _lines(status: dict[str, Any]) -> list[Text]:
         )
         if not status["lockstep"]:  # in lockstep, time stands still with the loop
             lines.append(Text(power_text(status), style="red"))
+    if slow := slow_text(status):
+        lines.append(Text(f"{slow}: this machine is busy, or too slow", style="yellow"))
     if status["reason"]:
         lines.append(Text(f"reason: {status['reason']}", style="yellow"))
     if state == DEAD:
@@ -289,6 +293,18 @@ def next_steps(status: dict[str, Any]) -> list[str]:
     return [f"next: {steps[0]}", *(f"      {step}" for step in steps[1:])]
 
 
+_SLOW: Final = 0.9
+"""Real-time factor below which a simulation is called slow."""
+
+
+def slow_text(status: Mapping[str, Any]) -> str:
+    """Return that a simulated robot runs slower than real time; empty if it does not."""
+    factor = status.get("real_time_factor")
+    if factor is None or factor >= _SLOW:
+        return ""
+    return f"the simulation runs at {factor:.2f} of real time"
+
+
 def is_simulated(status: dict[str, Any]) -> bool:
     """Return whether all buses of the robot are simulated."""
     urls = [str(bus.get("url", "")) for bus in (status.get("buses") or {}).values()]
@@ -383,17 +399,22 @@ class ProgressNotes:
 
     def __init__(self, out: Output | None, status: dict[str, Any] | None = None) -> None:
         self._out = out
-        self._stage = self._held_back = ""
+        self._stage = self._held_back = self._slow = ""
         if status is not None:
             progress = status.get("program_progress") or {}
             self._stage = _motion_stage(str(status["program"]), progress)
             self._held_back = progress.get("held_back") or ""
-        self._next_s = time.monotonic() + _TELL_S
+        self._slow_s = self._next_s = time.monotonic() + _TELL_S
 
-    def __call__(self, program: str, progress: dict[str, Any]) -> None:
-        """Process the progress of a program."""
+    def __call__(self, status: Mapping[str, Any]) -> None:
+        """Process the progress of the running program."""
         if self._out is None:
             return
+        program, progress = str(status["program"]), status.get("program_progress") or {}
+        if not self._slow and time.monotonic() >= self._slow_s:
+            self._slow = slow_text(status)
+            if self._slow:
+                self._out.note(self._slow)
         stage = _motion_stage(program, progress)
         if stage and stage != self._stage:
             self._out.note(f"{stage} ...")

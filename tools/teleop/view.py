@@ -10,6 +10,7 @@ from rich.console import Console, ConsoleOptions, RenderResult
 from rich.text import Text
 
 from cdpr_rt.core.states import LoopState
+from cdpr_tools.client.status_text import slow_text
 from cdpr_tools.teleop.session import TeleopSession
 
 _WIDTH, _HEIGHT, _LEAST_HEIGHT = 64, 22, 8
@@ -113,7 +114,8 @@ class View:
             texts = [f"{name} {'-' if t is None else f'{t:.0f}'}" for name, t in named]
             lines.append(Text(f"tensions in N: {', '.join(texts)}"))
         refused = self._status.get("program_progress", {}).get("held_back")
-        for text in (hand.trouble, refused, self._status.get("reason")):
+        slow = slow_text(self._status)
+        for text in (hand.trouble, refused, self._status.get("reason"), slow):
             if text and text != self._reason:
                 lines.append(Text(str(text), style="yellow"))
         lines.append(Text(session.device.hint, style="dim"))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from typing import Any
 
 import pytest
@@ -279,9 +280,40 @@ def test_progress_of_an_earlier_motion_is_not_reported(capsys: pytest.CaptureFix
     moved = {"target_m": [0.1, 0.2], "held_back": "friction"}
     before = status_of(state="active", program="hold", program_progress=moved)
     notes = ProgressNotes(Output(False), before)
-    notes("hold", moved)
+    notes(before)
     assert not capsys.readouterr().err
-    notes("lower", {"stage": "home", "held_back": "friction"})
+    home = {"stage": "home", "held_back": "friction"}
+    notes(status_of(program="lower", program_progress=home))
     assert len(capsys.readouterr().err.splitlines()) == 1
-    ProgressNotes(Output(False))("hold", moved)
+    ProgressNotes(Output(False))(before)
     assert "moving to 100.0, 200.0 mm" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("factor", "first", "slow"),
+    [
+        (None, "bench: active, lockstep", []),
+        (0.97, "bench: active, lockstep at 0.97 of real time", []),
+        (
+            0.4,
+            "bench: active, lockstep at 0.40 of real time",
+            ["the simulation runs at 0.40 of real time"],
+        ),
+    ],
+)
+def test_a_slow_simulation_is_reported(
+    factor: float | None,
+    first: str,
+    slow: list[str],
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    status = status_of(state="active", lockstep=True, real_time_factor=factor)
+    lines = [str(line) for line in status_text(status)]
+    assert lines[0] == first
+    assert [line.partition(": ")[0] for line in lines if "simulation" in line] == slow
+    notes, now_s = ProgressNotes(Output(False)), time.monotonic()
+    monkeypatch.setattr(time, "monotonic", lambda: now_s + 3.0)
+    notes(status)
+    notes(status)
+    assert capsys.readouterr().err.splitlines() == slow

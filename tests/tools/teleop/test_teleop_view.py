@@ -100,6 +100,12 @@ def test_stale_values_are_not_shown_as_current(monkeypatch: pytest.MonkeyPatch) 
     assert lines[0].startswith("NO ANSWER for 1.2 s")
 
 
+def test_a_slow_simulation_is_shown() -> None:
+    slow = "the simulation runs at 0.40 of real time"
+    for factor, shown in ((0.4, True), (0.95, False), (None, False)):
+        assert (slow in seen(UNKNOWN_POSE, {"real_time_factor": factor})) is shown
+
+
 def test_a_small_terminal_shows_the_figures_before_the_picture() -> None:
     pose = (0.5, 0.5, 0.0, 1.0, 0.0, 0.0, 0.0)
     lines = seen(pose, {}, height=24)
