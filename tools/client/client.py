@@ -23,7 +23,7 @@ from cdpr_rt.refusal import CommandRefusal
 from cdpr_tools.client.refusals import DaemonRefusalError
 from cdpr_tools.client.status_text import DEAD, death_text
 from cdpr_tools.command_group import ROBOT_VARIABLE
-from cdpr_tools.daemon.loop_file import LoopFile, launcher_does
+from cdpr_tools.daemon.loop_file import LoopFile, launcher_does, launcher_loads
 from cdpr_tools.daemon.paths import (
     LAUNCHER_SUFFIX,
     find_launcher_files,
@@ -264,7 +264,7 @@ def answers(robot: str | None, unix: Path | None) -> bool:
 
 def is_starting(robot: str) -> bool:
     """Whether a daemon of the robot is starting or ending."""
-    return _launcher_does(find_launcher_files(robot)) is not None
+    return _start_stage(robot, None) is not None
 
 
 def _only_socket(robot: str | None) -> Path:
@@ -275,7 +275,7 @@ def _only_socket(robot: str | None) -> Path:
         whose = "" if robot is None else f" for {robot}"
         if robot is not None and robot == os.environ.get(ROBOT_VARIABLE):
             whose += f" (from {ROBOT_VARIABLE})"
-        doing = _launcher_does(find_launcher_files(robot))
+        doing = _start_stage(robot, None)
         if doing is not None:
             what = f"is still starting, {doing}" if doing else "is starting, or ending"
             raise NoDaemonError(f"the daemon{whose} {what}: it does not answer")
@@ -287,9 +287,11 @@ def _only_socket(robot: str | None) -> Path:
     raise BadInputError(f"{len(found)} daemons run: choose one by --robot ({names})")
 
 
-def _launcher_does(marks: list[Path]) -> str | None:
-    """Return the step of the first of these launchers that runs; None if none runs."""
-    return next((doing for doing in map(launcher_does, marks) if doing is not None), None)
+def _start_stage(robot: str | None, unix: Path | None) -> str | None:
+    """Return the step of the first launcher of the robot or at the socket; None if none runs."""
+    marks = find_launcher_files(robot) if unix is None else [unix.with_suffix(LAUNCHER_SUFFIX)]
+    doing = next((doing for doing in map(launcher_does, marks) if doing is not None), None)
+    return "its program is loaded" if doing is None and launcher_loads(robot, unix) else doing
 
 
 def _is_alive(path: Path) -> bool:
@@ -349,10 +351,7 @@ def await_socket(robot: str | None, unix: Path | None, out: Output) -> None:
     """
     waiting = _Waiting(out)
     while not answers(robot, unix):
-        marks = find_launcher_files(robot)
-        if unix is not None:
-            marks = [unix.with_suffix(LAUNCHER_SUFFIX)]
-        if (doing := _launcher_does(marks)) is None:
+        if (doing := _start_stage(robot, unix)) is None:
             return  # and none is expected
         waiting.go_on(doing or "its simulated drives and its processes come up")
 

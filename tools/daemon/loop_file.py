@@ -172,6 +172,9 @@ def started(pid: int) -> int:
         return 0
 
 
+_PROGRAMS: Final = ("cdpr", "cdpr_tools.cli")
+_RUNS: Final = ("run", "start")
+_RUNTIME_VARIABLE: Final = b"XDG_RUNTIME_DIR"
 _MOST_DOING: Final = 160
 _MOST_LAUNCHER_BYTES: Final = 64 + _MOST_DOING
 
@@ -273,6 +276,39 @@ def launcher_does(path: Path) -> str | None:
     """
     named = _named_launcher(path)
     return None if named is None else named[1]
+
+
+def launcher_loads(robot: str | None, socket: Path | None) -> bool:
+    """Return whether a `cdpr run` of this user has been started and has no lock yet.
+
+    It still loads its modules, which takes seconds on a busy machine. It runs this robot or any, at
+    this socket or in the runtime folder.
+    """
+    return any(_loads(process, robot, socket) for process in Path("/proc").glob("[0-9]*"))
+
+
+def _loads(process: Path, robot: str | None, socket: Path | None) -> bool:
+    try:
+        if process.stat().st_uid != os.geteuid():
+            return False
+        program, *words = (process / "cmdline").read_bytes().decode(errors="replace").split("\0")
+        while words and words[0].startswith("-"):
+            del words[0]
+        is_run = len(words) > 1 and Path(words[0]).name in _PROGRAMS and words[1] in _RUNS
+        if not is_run or not Path(program).name.startswith("python"):
+            return False
+        if socket is not None:
+            is_it = str(socket) in words
+        else:
+            of_robot = robot is None or short_name(robot) in map(short_name, words)
+            environment = (process / "environ").read_bytes().split(b"\0")
+            variables = dict(each.partition(b"=")[::2] for each in environment)
+            here = os.environb.get(_RUNTIME_VARIABLE) == variables.get(_RUNTIME_VARIABLE)
+            is_it = of_robot and here and "--socket" not in words
+        open_files = [fd.readlink().suffix for fd in (process / "fd").iterdir()] if is_it else []
+    except OSError:  # it has ended
+        return False
+    return is_it and LAUNCHER_SUFFIX not in open_files
 
 
 def launcher_pid(path: Path) -> int | None:

@@ -18,7 +18,7 @@ import pytest
 from typing_extensions import override
 
 from cdpr_tools.client.client import NoDaemonError, await_socket, open_daemon
-from cdpr_tools.daemon.loop_file import LauncherLock, launcher_does, started
+from cdpr_tools.daemon.loop_file import LauncherLock, launcher_does, launcher_loads, started
 from cdpr_tools.daemon.paths import LAUNCHER_SUFFIX, default_socket
 from cdpr_tools.output import Output
 from tests.cdpr_here import cdpr_here
@@ -89,6 +89,33 @@ def test_a_command_does_not_wait_without_a_launcher(path: Path) -> None:
     os.mkfifo(mark)
     assert launcher_does(mark) is None
     assert out.told == []
+
+
+def test_a_command_waits_for_a_launcher_that_still_loads_its_program(path: Path) -> None:
+    script = path.parent / "cdpr"
+    script.write_text(
+        "import sys\n"
+        "for line in sys.stdin:\n"
+        "    file = open(line.strip(), 'w')\n"
+        "    print(flush=True)\n"
+    )
+    command = [sys.executable, "-P", str(script), "run", "mine"]
+    with subprocess.Popen(
+        command, text=True, stdin=subprocess.PIPE, stdout=subprocess.PIPE
+    ) as loading:
+        assert loading.stdin is not None and loading.stdout is not None
+        assert not launcher_loads("another", None)
+        assert not launcher_loads(None, path)
+        with pytest.raises(NoDaemonError, match="mine is still starting, its program is loaded"):
+            where("mine")
+        out = ComesUp(path)
+        with out.server:
+            await_socket(None, None, out)
+        assert out.told == ["the daemon is still starting: its program is loaded ..."]
+        path.unlink()
+        print(path.with_suffix(LAUNCHER_SUFFIX), file=loading.stdin, flush=True)
+        loading.stdout.readline()
+        assert not launcher_loads(None, None)
 
 
 class StillStarting(BaseHTTPRequestHandler):
