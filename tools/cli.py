@@ -28,13 +28,14 @@ MODULES = {
         "commission": "Measure, identify, validate and report motors, each detached from its load.",
     },
     "doctor": {
-        "doctor": "Check this machine, and say what to fix before it runs a robot.",
+        "doctor": "Check this machine, and list what to fix before it runs a robot.",
     },
     "estop": {
         "estop": "Remove the power from a robot's drives immediately: no braking, no lowering.",
     },
     "run": {
-        "run": "Start a robot's control loop as a daemon. It gives no power until you enable it.",
+        "run": "Start a robot's control loop as a daemon. The motors get no power until you "
+        "enable them.",
     },
     "service_unit": {
         "service-unit": "Print a systemd unit that runs the robot's daemon.",
@@ -146,7 +147,7 @@ _HINTS = f"""Name the robot by --robot ROBOT in any command, or once for all by 
 variable {ROBOT_VARIABLE}. `cdpr stop --help` compares the ways to stop."""
 _INTERRUPTED = 130
 _MOST_CHARS = 10_000
-"""Longest message of an error."""
+"""Longest error message, in characters."""
 _BAD_INPUTS = (ProfileError, BusSetupError, ConfigurationError, InvalidRequestError)
 
 _WORDS = (
@@ -187,7 +188,7 @@ class _Commands(group_of(MODULES, PANELS, dict.fromkeys(PANELS["Stop"], STOPS)))
                 for pattern, words in _WORDS:
                     error.message = re.sub(pattern, words, error.message)
             elif "unexpected extra argument" in error.message and _names_robot(error.ctx.command):
-                error.message += "; a robot is named by --robot"
+                error.message += "; name the robot with --robot"
             error.message = printable(error.message)
             raise
 

@@ -22,9 +22,10 @@ _LOG = logging.getLogger("cdpr.compiling")
 _listeners: list[Callable[[str], None]] = []
 
 _NAME = "CDPR_COMPILING_TOLD"
-"""Variable with the name of a socket with room for one: who connects reports the compiling."""
+"""Environment variable with the name of a socket that accepts one connection: the process that
+connects reports the compiling."""
 _sockets: list[socket.socket] = []
-"""Kept open until the process ends."""
+"""Sockets that stay open until the process ends."""
 
 
 @contextmanager
@@ -112,7 +113,7 @@ class _Notice(logging.Handler):
         self._teller = None
 
     def _how_far(self) -> str:
-        return f"{NOTICE} {self._what} goes on: {self._kernels} kernels so far ..."
+        return f"{NOTICE} {self._what} continues: {self._kernels} kernels so far ..."
 
     def _say(self, text: str) -> None:
         print(text, file=sys.stderr, flush=True)

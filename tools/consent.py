@@ -21,4 +21,4 @@ def require_consent(question: str, yes: bool, undone: str = "nothing was energis
     except typer.Abort:  # nobody can answer
         agreed = False
     if not agreed:
-        raise BadInputError(f"not confirmed (--yes does it beforehand); {undone}")
+        raise BadInputError(f"not confirmed (--yes confirms in advance); {undone}")

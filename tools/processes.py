@@ -70,7 +70,7 @@ def _by_pool(pool: Pool, jobs: Sequence[Job[_T]]) -> Iterator[_T]:
         except multiprocessing.TimeoutError:
             if not started <= {child.pid for child in multiprocessing.active_children()}:
                 raise WorkFailedError(
-                    "a process that did a part of the work has died; is there too little memory?"
+                    "a worker process has died; is there too little memory?"
                 ) from None
 
 

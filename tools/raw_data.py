@@ -17,8 +17,8 @@ def refuse_loss(folder: Path, raw: Path, overwrite: bool) -> None:
     """Raise BadInputError if earlier recordings in `raw` would be lost from --out `folder`."""
     if raw.is_dir() and any(raw.iterdir()) and not overwrite:
         raise BadInputError(
-            f"--out {folder}: holds the data of an earlier run; choose another folder, or "
-            "replace it with --overwrite"
+            f"--out {folder}: contains the data of an earlier run; choose another folder, "
+            "or replace it with --overwrite"
         )
 
 

@@ -300,7 +300,7 @@ def _described(a: Piece | None, b: Piece | None) -> str:
         assert there is not None  # one of the two has more
         return f"{there[0]}: the {ends} has no more"
     if a[0] != b[0]:
-        return f"{a[0]} in the one, {b[0]} in the other"
+        return f"{a[0]} in one file, {b[0]} in the other"
     if a[0].startswith("byte "):
         first = next(
             (k for k, (x, y) in enumerate(zip(a[1], b[1], strict=False)) if x != y),
@@ -377,7 +377,7 @@ def _verdict(name: str, runs: Sequence[Run], paths: Sequence[Path | None]) -> Ve
     found = ""
     for run, path in zip(runs, paths, strict=True):
         if path is None:
-            found = found or f"run {run.number} has not written it"
+            found = found or f"run {run.number} did not write it"
             continue
         try:
             hashes.append(_hash(path, run))

@@ -11,8 +11,8 @@ from cdpr_tools.streams import write_notice
 
 _STOPPING = "stopping under control; press Ctrl-C again to remove the power immediately"
 HELD = (
-    "the motion stops and the motors hold it under power; `cdpr disable` or `cdpr stop` removes "
-    "the power"
+    "the motion stops and the motors hold the robot under power; `cdpr disable` or "
+    "`cdpr stop` removes the power"
 )
 """Effect of a Ctrl-C on a command that moves something through a daemon."""
 

@@ -190,7 +190,7 @@ class LoopLink:
         if int(self.block.counters["loop_pid"][0]) == 0:
             raise LoopGoneError("the loop has not started yet")
         if self.silent_s() > _SILENT_S:
-            raise LoopGoneError(f"the loop has not turned for {self.silent_s():.1f} s")
+            raise LoopGoneError(f"the loop has run no cycle for {self.silent_s():.1f} s")
 
     def _send(self, do: str, fields: dict[str, Any]) -> asyncio.Future[Reply]:
         urgent = do in STOPS

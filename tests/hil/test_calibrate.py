@@ -67,7 +67,7 @@ def test_a_killed_run_resumes_reports_a_slip_and_its_calibration_can_be_checked(
     assert again.returncode == 2 and "--resume" in again.stderr
     done = cdpr_here("calibrate", "run", robot, "--resume", "--out", folder, "--json")
     assert done.returncode == 0, done.stderr
-    assert "going on after" in done.stderr
+    assert "continuing after" in done.stderr
     told = json.loads(done.stdout.splitlines()[-1])
     data = load_data(folder / "data.json")
     assert len(data.poses) == 15 and len(data.restarts) == 1 and told["poses"] == 15

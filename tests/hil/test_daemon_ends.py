@@ -40,14 +40,14 @@ def test_only_one_of_two_simultaneously_started_daemons_runs_and_estop_reaches_i
         refused, running = sorted(both, key=lambda one: one.poll() is None)
         told, why = refused.communicate(timeout=PATIENCE_S)
         assert (refused.returncode, told) == (2, "")
-        assert f"a daemon runs there already, process {running.pid}; `cdpr stop`" in why
+        assert f"a daemon already runs there, process {running.pid}; `cdpr stop`" in why
         assert running.stdout is not None
         assert json.loads(running.stdout.readline())["ready"]["pid"] == running.pid
         assert cdpr("enable", *at).returncode == 0
         loop = LoopFile.read(tmp_path / "control.loop").pid
         assert Path(f"/proc/{loop}/stat").read_text().split()[3] == str(running.pid)
         done = cdpr("estop", *at)
-        assert (done.returncode, "every drive says so" in done.stdout) == (0, True)
+        assert (done.returncode, "every drive confirms it" in done.stdout) == (0, True)
         assert '"state": "fault"' in cdpr("status", "--json", *at).stdout
         running.terminate()
         assert running.wait(PATIENCE_S) == 0

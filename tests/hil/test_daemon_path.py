@@ -115,7 +115,7 @@ def break_a_drive(daemon: RealDaemon) -> None:
             network.write(1, 0x2F00, 1, ENCODER_FAULT)
         errors = path.communicate()[1]
     assert path.returncode == 1
-    assert "7305h" in errors and f"once the robot is well, {HELD}" in errors
+    assert "7305h" in errors and f"when the robot works again, {HELD}" in errors
     daemon.wait_for("fault")
     fallen_where_it_stands = ("tighten", "--from", "lengths")
     for command in (("ack",), ("enable",), fallen_where_it_stands):

@@ -83,9 +83,9 @@ def test_a_platform_is_tightened_moved_and_lowered_to_its_stand(daemon: RealDaem
 
     for command, named in (
         (("move", "--to", "0", "9000"), "--to 0 9000: y 9000 mm; allowed: 1400 to 2400 mm"),
-        (("move", "--to", "0.3", "2.0"), "were metres typed? In mm: --to 300 2000"),
+        (("move", "--to", "0.3", "2.0"), "are these metres? In mm: --to 300 2000"),
         (("move", "--to", "0", "1600", "lower=5"), "not together with axes"),
-        (("move", "--rotate", "5"), "--rotate 5: no angle of this platform is controlled"),
+        (("move", "--rotate", "5"), "--rotate 5: this platform has no controlled angle"),
         (("tighten", "--from", "home"), "tighten --from home: the cables are tight already"),
         (("controller", "idle"), "lower it first"),
     ):
@@ -119,8 +119,8 @@ def test_a_platform_is_tightened_moved_and_lowered_to_its_stand(daemon: RealDaem
     assert lowered["program"] == "hold"
     assert until(lambda: daemon.status()["program_progress"].get("tight") is False)
     again = cdpr("lower", *daemon.at)
-    assert again.returncode == 0 and "letting the platform down" not in again.stderr
-    assert "letting the cables out; a platform" in again.stderr
+    assert again.returncode == 0 and "lowering the platform" not in again.stderr
+    assert "paying out the cables; a platform" in again.stderr
 
 
 def test_a_platform_does_not_move_after_a_rail_moved_until_marked_calibrated(
@@ -168,7 +168,7 @@ def test_a_platform_turns_to_the_given_angle(turning: RealDaemon) -> None:
 def test_poses_are_recorded_for_a_calibration(turning: RealDaemon, tmp_path: Path) -> None:
     read = ("calibrate", "read", "--out", str(tmp_path / "cal"))
     status, why = refused(turning, *read)
-    assert (status, "not held on its cables" in why) == (1, True)
+    assert (status, "the cables do not hold the platform" in why) == (1, True)
     output_of(turning, "tighten")
     assert output_of(turning, *read)["pose"] == 1
     output_of(turning, "move", "--to", "150", "1500", "--rotate", "4")
@@ -194,13 +194,17 @@ def test_a_daemon_moves_to_the_poses_of_a_calibration(turning: RealDaemon, tmp_p
     poses.write_text("x_m,y_m,angle_rad\n" + "\n".join(rows) + "\n")
     command = ("calibrate", "measure", "--poses", str(poses), "--ask", "--dry-run")
     status, why = refused(turning, *command, "--out", str(folder))
-    assert (status, "not held on its cables" in why, folder.exists()) == (1, True, False)
+    assert (status, "the cables do not hold the platform" in why, folder.exists()) == (
+        1,
+        True,
+        False,
+    )
     output_of(turning, "tighten")
     typed = "0 1000\n\n\n0 1450 0.5\n"
     # fifteen poses, and a fit
     done = cdpr(*command, *turning.at, "--out", folder, typed=typed, timeout_s=240.0)
     assert done.stderr.count("measured x y in mm") == 5, done.stderr  # end of the typed input
-    assert "the platform is held at the last pose" in done.stdout
+    assert "the robot holds the platform at the last pose" in done.stdout
     data = load_data(folder / "data.json")
     assert len(data.poses) == 15 and data.simulated
     assert {pose.target for pose in data.poses[1:]} == set(places)

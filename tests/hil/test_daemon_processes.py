@@ -92,7 +92,7 @@ def test_other_processes_leave_the_core_of_a_real_time_loop_alone(tmp_path: Path
 def test_a_second_daemon_for_the_same_robot_is_rejected(daemon: RealDaemon) -> None:
     second = cdpr("run", daemon.robot, "--bus", "simbus:", "--no-record", *daemon.at)
     assert second.returncode == 2
-    assert "a daemon runs there already" in second.stderr
+    assert "a daemon already runs there" in second.stderr
     assert "Traceback" not in second.stderr
     assert daemon.status()["loop"]["alive"]
 
@@ -117,7 +117,7 @@ def test_a_killed_loop_is_reported_and_the_watchdog_is_not_fed(
             in refused.stderr
         )
     shown = cdpr("status", *daemon.at).stdout
-    assert "next: `cdpr stop`" in shown and "what follows is of" in shown
+    assert "next: `cdpr stop`" in shown and "the following is that old" in shown
     stopped = cdpr("stop", *daemon.at)  # ends the remaining processes
     assert stopped.returncode == 1
     assert "its loop had died: its drives had been told to have no power" in stopped.stderr

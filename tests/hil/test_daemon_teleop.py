@@ -193,9 +193,9 @@ def test_impossible_teleoperation_is_reported(
     script.write_text("0 0 0")
     plays = ("--device", "script", "--script", str(script))
     for options, status, told in (
-        (("--device", "gamepad"), 2, "--device gamepad: none is plugged in"),
+        (("--device", "gamepad"), 2, "--device gamepad: no gamepad has all"),
         ((*plays, "--scale", "1000:1"), 2, "--scale 1000:1: allowed: 0.001 to 100"),
-        (("--device", "script"), 2, "--script: allowed: together with --device script"),
+        (("--device", "script"), 2, "--script: required with --device script"),
         (("--turn-axes", "rx,ry,rz"), 2, "--turn-axes rx,ry,rz: allowed: together with --device g"),
         ((*plays, "--axes", "ABS_X"), 2, "--axes ABS_X: allowed: together with --device gamepad"),
         ((*plays, "--via", "nowhere"), 2, "--via nowhere: allowed: HOST:PORT"),

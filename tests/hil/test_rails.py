@@ -330,7 +330,7 @@ def test_the_emergency_stop_ends_a_move(rails: Rails) -> None:
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        (("--to", "1.5", "--cables-slack-checked"), "--to 1.5: allowed are 0 to 1.2 m"),
+        (("--to", "1.5", "--cables-slack-checked"), "--to 1.5: allowed: 0 to 1.2 m"),
         (("--to", "0.1", "--safety-io", "nobody"), "the cables must be slack"),
         (("--to", "0.1", "--cables-slack-checked"), "--safety-io: Rail 1"),
         (

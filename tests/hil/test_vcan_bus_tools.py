@@ -96,4 +96,7 @@ def test_replay_sends_frames_and_disables_drives_at_the_end() -> None:
     assert enabled[:2] == (0x205, 4)
     # a recording may end in motion
     assert off == (0x605, 8, bytes.fromhex("2B40600000000000"))
-    assert notes == ["asked to switch their power off: node 5", "sent 1 frames to socketcan:vcan0"]
+    assert notes == [
+        "commanded to switch their power off: node 5",
+        "sent 1 frames to socketcan:vcan0",
+    ]

@@ -109,7 +109,7 @@ def test_the_text_lists_facts_and_gaps(tmp_path: Path) -> None:
     status, text, _ = cdpr("import", GENERIC.eds, "--out", tmp_path)
     assert status == 0
     assert "vendor_id               00CD9A01h" in text
-    assert "What the file cannot tell:" in text
+    assert "Not in the file:" in text
     assert "to find out: `cdpr drive jog WINCH" in text
     status, _, errors = cdpr("import", GENERIC.eds, "--out", tmp_path)
     assert status == 2
@@ -337,7 +337,10 @@ def test_a_drive_without_objects_for_torque_control_is_rejected(tmp_path: Path) 
     told = refused(with_key("6064", "DataType", "0x0003"), tmp_path)
     assert "[6064] DataType: value 0x0003 has 16 bits; allowed: one of 32 bits" in told
     told = refused(with_key("6502", "DefaultValue", "0x21"), tmp_path)
-    assert "[6502] DefaultValue: value 0x21 has the modes 1, 6 only; allowed: one with 4" in told
+    assert (
+        "[6502] DefaultValue: value 0x21 has only the modes 1, 6; allowed: a drive with mode 4"
+        in told
+    )
 
 
 def test_a_drive_whose_pdo_maps_cannot_contain_torque_is_rejected(tmp_path: Path) -> None:
@@ -363,13 +366,17 @@ def test_missing_objects_are_listed_with_their_consequence(tmp_path: Path) -> No
     path.write_text(text)
     told = imported(path, tmp_path / "out")
     unknown = {one["what"]: one["why"] for one in told["unknown"]}
-    assert "notice a master that falls silent" in unknown["1016h is not in the EDS"]
+    assert "detect the loss of the master" in unknown["1016h is not in the EDS"]
     assert "step K" in unknown["1017h is not in the EDS"]
     assert {"homing methods", "modes of operation"} <= set(unknown)
     assert any("touch probe" in what for what in unknown)
-    assert any("maps 60B9h:0 with 16 bits, which the file" in text for text in told["remarks"])
+    assert any("maps 60B9h:0 with 16 bits, but the file" in text for text in told["remarks"])
     assert told["facts"]["homing_methods"] == {
-        **{"value": [33, 34], "status": "assumed", "how": "the standard's, to the index"}
+        **{
+            "value": [33, 34],
+            "status": "assumed",
+            "how": "those of the standard that end at the index",
+        }
     }
     assert told["facts"]["supported_modes"]["status"] == "assumed"
 

@@ -87,7 +87,7 @@ def test_a_command_that_fails_or_writes_nothing_is_an_error(tmp_path: Path) -> N
     told = verified("--", "no-such-command", status=2)
     assert "ended with exit status 2: No such command 'no-such-command'" in told["error"]
     told = verified("--busy", "0", "--", "/bin/true", status=1)
-    assert told["error"] == "the command wrote no file that is compared"
+    assert told["error"] == "the command wrote no file that can be compared"
     told = verified("--", tmp_path / "missing", status=2)
     assert told["error"] == f"{tmp_path}/missing: cannot be run: No such file or directory"
 
@@ -186,7 +186,7 @@ def test_the_first_difference_is_reported(tmp_path: Path) -> None:
         "short.raw": "runs 1 and 3: byte 100",
         "run.json": "runs 1 and 3: a.b[1]: 1.0 | 2.0",
         "frames.log": "runs 1 and 3: line 5: the second has no more",
-        "more.json": "run 1 has not written it",
+        "more.json": "run 1 did not write it",
         "bad.json": "in run 1: cannot be read: Expecting property name enclosed in double quotes: "
         "line 1 column 2 (char 1)",
     }

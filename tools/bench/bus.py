@@ -73,7 +73,7 @@ def measure_vcan(exchanges: int, out: Output) -> dict[str, Row]:
 def compare(url: BusUrl, exchanges: int, out: Output, **stock: Any) -> dict[str, Row]:
     """Return the rows of a bus: by our port, and by python-can with the options `stock`."""
     name = url.interface
-    out.note(f"{exchanges} exchanges of each way on {name} ...")
+    out.note(f"{exchanges} exchanges with each implementation on {name} ...")
     ways: dict[str, Way] = {
         f"{name}, ours": lambda: _ours(url),
         f"{name}, python-can": lambda: _python_can(name, **stock),
@@ -143,7 +143,9 @@ def _far_end(bus: str) -> Iterator[dict[str, Any]]:
     try:
         line = process.stdout.readline()
         if not line:
-            raise WorkFailedError(process.communicate()[1].strip() or "the far end did not start")
+            raise WorkFailedError(
+                process.communicate()[1].strip() or "the other end of the bus did not start"
+            )
         yield json.loads(line)["ready"]
     finally:
         end_by_stdin(process, _STOP_TIMEOUT_S)

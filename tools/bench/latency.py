@@ -29,7 +29,7 @@ from cdpr_tools.output import Output
 from cdpr_tools.processes import module_command
 
 ORDINARY, REALTIME = "ordinary process", "real-time settings"
-_LOADS = {"idle": "nothing else asked of the machine", "loaded": "every processor kept busy"}
+_LOADS = {"idle": "no other load", "loaded": "every processor busy"}
 _ROUNDS, _WARM_UP, _BINS_A_DECADE = 2, 100, 12
 _COLOURS = {ORDINARY: "#d1581a", REALTIME: "#2f6fb0"}
 # reads and writes more than a cache holds, so that processes also compete for memory
@@ -88,7 +88,7 @@ def _draw(late: Lateness, rate_Hz: float, path: Path) -> None:
             ax.hist(us, bins=bins, histtype="stepfilled", color=_COLOURS[way], alpha=0.25)
             ax.hist(us, bins=bins, histtype="step", color=_COLOURS[way], label=way)
         ax.axvline(1e6 / rate_Hz, color="#555555", lw=0.9, ls="--", label="one period")
-        ax.set(xscale="log", yscale="log", title=text, xlabel="wake-up behind its deadline, µs")
+        ax.set(xscale="log", yscale="log", title=text, xlabel="delay of the wake-up, µs")
     axes[0].set_ylabel("cycles per bar")
     legend_above(figure, axes[0])
     with os_error_as(BadInputError, f"--out {path}: cannot be written"):

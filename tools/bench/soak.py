@@ -183,7 +183,8 @@ class Soak:
         cycles = round(self.bus_s / self.session.device.period_s)
         failed = [f"{lost} frames were lost"] if lost else []
         failed += [
-            f"the {name} gained {gain.memory_KiB} KiB and {gain.open_files} open files"
+            f"the {name} uses {gain.memory_KiB} KiB more memory and {gain.open_files} more "
+            "open files"
             for name, gain in grown.items()
             if name in leaks
         ]

@@ -177,15 +177,17 @@ class Summary:
         totals = [f"{what} in {self.duration_s:.3f} s{whose}"]
         if self.load is not None:
             rate = f"{self.bitrate_bit_s / 1e3:g} kbit/s"
-            totals.append(f"bus load {100 * self.load:.1f} % of {rate}, stuffed as badly as can be")
+            totals.append(
+                f"bus load {100 * self.load:.1f} % of {rate}, with worst-case bit stuffing"
+            )
         totals.append(f"{self.problems} with a problem (marked !)")
         lines = ["; ".join(totals)]
         if self.missed:
             lines.append(
-                f"{self.missed} frames went by unseen: the bus was faster than the monitor"
+                f"{self.missed} frames were lost because the bus was faster than the monitor"
             )
         if self.led:
-            lines.append("a master leads this bus: its time moves by that master's packets alone")
+            lines.append("a master leads this bus: only its packets move bus time")
         if self._by_id:
             lines.append(f"{'id':>8} {'node':>5}  {'what':<10}{'frames':>9}{'per s':>10}")
         for row in self.rows():
@@ -292,7 +294,7 @@ class LogFile:
     def __init__(self, path: Path) -> None:
         self._path = path
         if not may_replace(path):
-            raise BadInputError(f"--log {path}: is there already; allowed: another name")
+            raise BadInputError(f"--log {path}: already exists; choose another name")
         with os_error_as(BadInputError, f"--log {path}: cannot be written"):
             self._file = path.open("w", encoding="ascii")
 
@@ -380,7 +382,7 @@ def known_bus(
     Raises BadInputError, ProfileError.
     """
     if sum(name is not None for name in (drive, winch, robot)) > 1:
-        raise BadInputError("--profile, --winch, --robot: one of them says who is on the bus")
+        raise BadInputError("--profile, --winch, --robot: give only one of them")
     if winch is not None:
         one = load_winch(winch)
         nodes = {one.node_id: KnownNode.of_winch(one)}
@@ -408,7 +410,8 @@ def _of_robot(robot: Robot, name: str, url: BusUrl | None) -> KnownBus:
     if len(nodes) < len(axes):
         choice = " or ".join(f"--robot {robot.reference}:{one}" for one in buses)
         raise BadInputError(
-            f"--robot {robot.reference}: its buses have node ids in common: choose {choice}"
+            f"--robot {robot.reference}: several of its buses use the same node ids: choose "
+            f"{choice}"
         )
     return KnownBus(nodes, bitrate_bit_s=_bitrate(url, buses[axes[0].bus].bitrate_bit_s))
 
@@ -429,13 +432,13 @@ _LAST_NODE = 127
 
 def parse_identifiers(text: str) -> frozenset[int]:
     """Return the 11-bit identifiers in a list as `181,700-77F`, hexadecimal; BadInputError."""
-    allowed = "no identifier; write them hexadecimal up to 7FF, as in 181,700-77F"
+    allowed = "not an identifier; write hexadecimal numbers up to 7FF, such as 181,700-77F"
     return frozenset(_numbers("--ids", text, 16, range(_LAST + 1), allowed))
 
 
 def parse_node_ids(text: str) -> list[int]:
     """Return the node ids in a list as `1,5,20-23`, decimal, in their order; BadInputError."""
-    allowed = "no node id; allowed: 1 to 127, as in 1,5,20-23"
+    allowed = "not a node id; allowed: 1 to 127, such as 1,5,20-23"
     return sorted(_numbers("--nodes", text, 10, range(1, _LAST_NODE + 1), allowed))
 
 

@@ -49,7 +49,9 @@ def read_frames(path: Path, channel: str | None) -> Iterator[LogEntry]:
             yield logged
         elif channel is None:
             names = ", ".join(sorted(there))
-            raise BadInputError(f"{path}: holds several buses ({names}): choose with --channel")
+            raise BadInputError(
+                f"{path}: contains several buses ({names}); choose one with --channel"
+            )
     if channel is not None and channel not in there:
         names = ", ".join(sorted(there)) or "nothing"
         raise BadInputError(f"--channel {channel}: {path} holds {names}")
@@ -75,7 +77,7 @@ def _frames(path: Path) -> Iterator[LogEntry]:
                 yield from read_log(str(path), iter(partial(lines.readline, _MOST_LINE), ""))
         else:
             if path.suffix.lower() == ".gz":  # it may expand to any amount of data
-                raise BadInputError(f"{path}: is packed; allowed: what is in it, unpacked")
+                raise BadInputError(f"{path}: is compressed; unpack it first")
             os.close(open_regular(path))  # python-can would open a file of any kind
             if path.suffix.lower() == ".blf":
                 _require_bounded_blf(path)
@@ -85,7 +87,7 @@ def _frames(path: Path) -> Iterator[LogEntry]:
     except OSError as error:
         raise BadInputError(f"{path}: cannot be read: {error.strerror or error}") from error
     except UnicodeDecodeError as error:
-        raise BadInputError("standard input: is no text, so no log of candump") from error
+        raise BadInputError("standard input: is not text, so it is not a candump log") from error
 
 
 # python-can unpacks a container of a BLF file as a whole, and joins objects across containers.
@@ -231,7 +233,7 @@ class Sender:
                 self._port.send(Frame(0.0, _SDO_REQUEST + node_id, _DISABLE_VOLTAGE).pack())
                 asked.append(str(node_id))
         if asked:
-            self._note(f"asked to switch their power off: node {', '.join(asked)}")
+            self._note(f"commanded to switch their power off: node {', '.join(asked)}")
 
     def __enter__(self) -> Sender:
         return self
@@ -269,7 +271,7 @@ def play(
             pacer.wait_for(logged.frame)
             if stop_requested() or viewer.closed:
                 if sender is not None:
-                    raise WorkFailedError("stopped on request, not all was sent")
+                    raise WorkFailedError("stopped on request; not all frames were sent")
                 return
             if sender is not None:
                 sender.send(logged.frame)

@@ -249,12 +249,12 @@ def drive_profiles(folder: Path | None) -> dict[str, DriveProfile]:
     if folder is None:
         return drives
     if not folder.is_dir():
-        raise BadInputError(f"--profiles {folder}: is no folder")
+        raise BadInputError(f"--profiles {folder}: is not a folder")
     for path in sorted(folder.glob("*.toml")):
         if "eds" in read_toml(path):  # motors, winches and cables may be in the same folder
             drives[str(path)] = load_drive(path)
     if not any(Path(name).parent == folder for name in drives):
-        raise ProfileError(folder, "", "holds no drive profile")
+        raise ProfileError(folder, "", "contains no drive profile")
     return drives
 
 
@@ -313,15 +313,15 @@ def problems(found: NodeInfo) -> list[str]:
             + (f", differing for {', '.join(found.differing)}" if found.differing else "")
         )
     if not found.answers:
-        closed = "; a stopped node never does" if found.nmt_state == STOPPED else ""
-        texts.append(f"heartbeats only, it answers no SDO (a master?{closed})")
+        closed = "; a stopped node never answers" if found.nmt_state == STOPPED else ""
+        texts.append(f"sends only heartbeats and does not answer SDO (a master?{closed})")
     elif not found.is_drive:
         device = found.number(0x1000)
         if device is None:
             texts.append("does not give its device type (1000h)")
         else:
             profile = device & 0xFFFF
-            kind = f"CiA {profile}" if profile else "no device profile, as a bootloader has"
+            kind = f"CiA {profile}" if profile else "no device profile, such as a bootloader"
             texts.append(f"not a CiA 402 drive: device type {device:08X}h ({kind})")
     register = found.number(0x1001)
     if register:

@@ -77,7 +77,7 @@ def before(out: Output, file: Robot) -> Before | None:
     points, hand_eye = (Path(x) if x else None for x in (known.points_file, known.hand_eye_file))
     for path in filter(None, (Path(known.raw_data), points, hand_eye)):
         if not path.exists():
-            out.note(f"{path}: is gone, and the map with it; the camera is left aside")
+            out.note(f"{path}: is missing, and so is the map; the camera is not used")
             return None
     data = with_hand_eye(
         load_data(Path(known.raw_data)), None if hand_eye is None else HandEye.load_file(hand_eye)
@@ -90,8 +90,9 @@ def before(out: Output, file: Robot) -> Before | None:
     off_mm = 1e3 * float(np.abs(exits - np.array(known.exit_points_m)).max())
     if off_mm > _SAME_mm:
         out.note(
-            f"{known.raw_data}: exit points come out up to {off_mm:.2f} mm from those of the "
-            "calibration in force: files or software have changed since; the camera is left aside"
+            f"{known.raw_data}: exit points come out up to {off_mm:.2f} mm from those of "
+            "the calibration in force: files or software have changed since; the camera is "
+            "not used"
         )
         return None
     return Before(data, found)
@@ -152,9 +153,9 @@ def checked_running(
         raise BadInputError(f"{file.reference}: the daemon of this name runs {robot.reference}")
     known = before(out, file)
     if known is None and camera is not None:
-        raise BadInputError("--camera: allowed: of a robot that was calibrated with one")
+        raise BadInputError("--camera: allowed only if the robot was calibrated with a camera")
     if known is not None and camera is None:
-        out.note("--camera is left out: lengths alone are looked at")
+        out.note("--camera is not given: only lengths are checked")
         known = None
     if known is None:
         require_spare_length(CableGeometry.of(robot))
@@ -185,19 +186,21 @@ def _stopped() -> Iterator[None]:
     try:
         yield
     except StoppedError:
-        raise WorkFailedError("stopped; nothing is said of the robot") from None
+        raise WorkFailedError("stopped; the robot was not checked") from None
 
 
 def _require_other_folder(folder: Path) -> None:
     """Raise BadInputError if files in the folder that are not a check's would be overwritten."""
     if (folder / DATA).exists():
-        raise BadInputError(f"--out {folder}: has the poses of a calibration; allowed: another")
+        raise BadInputError(
+            f"--out {folder}: contains the poses of a calibration; choose another folder"
+        )
     try:
         load_data(folder / CHECK)
     except FileMissingError:
         return
     except ProfileError as error:
-        raise BadInputError(f"{error}; allowed: another --out, or move it away") from None
+        raise BadInputError(f"{error}; choose another --out, or move the file away") from None
 
 
 def _judged(robot: Robot, known: Before | None, data: CalibrationData) -> Check:
@@ -220,8 +223,8 @@ def lines(found: Check, robot: Robot) -> list[str]:
     verdict[0] = f"{robot.profile} against {against}: {verdict[0]}"
     if found.moved:
         verdict.append(
-            f"mend what moved, or recalibrate: cdpr calibrate run {robot.reference}; until then "
-            "positions are off by what is said above"
+            f"repair what moved, or recalibrate: cdpr calibrate run {robot.reference}; "
+            "until then positions have the errors given above"
         )
     return verdict
 

@@ -73,9 +73,7 @@ def robot_of(daemon: Daemon, as_calibrated: bool = False) -> tuple[Robot, dict[s
         )
     if description["geometry_sha256"] != geometry_sha256(robot):
         what = "or its calibration, " if as_calibrated else ""
-        raise BadInputError(
-            f"{robot.path}: {what}has been changed since the daemon was started with it"
-        )
+        raise BadInputError(f"{robot.path}: {what}has changed since the daemon started")
     return robot, description
 
 
@@ -160,10 +158,11 @@ def data_of(folder: Path, robot: Robot, simulated: bool) -> CalibrationData:
         simulated,
     ):
         raise BadInputError(
-            f"{folder / DATA}: of another robot, bus or state of its file; allowed: another --out"
+            f"{folder / DATA}: is of another robot, another bus or an older robot file; "
+            "choose another --out"
         )
     if not (folder / COUNTED).exists():
-        raise BadInputError(f"{folder}: holds an automatic run; allowed: another --out")
+        raise BadInputError(f"{folder}: contains an automatic run; choose another --out")
     return data
 
 
@@ -203,7 +202,9 @@ def _camera_setup(
         _require_same("--markers", markers, data.camera.sheets)
         return data.camera
     if data.poses:
-        raise BadInputError("--camera: the poses before were read without; allowed: another --out")
+        raise BadInputError(
+            "--camera: the earlier poses were read without a camera; choose another --out"
+        )
     if intrinsics is None or markers is None:
         raise BadInputError("--camera: the first pose also needs --intrinsics and --markers")
     return CameraSetup.of(CameraIntrinsics.load_file(intrinsics), MarkerSheets.load_file(markers))
@@ -221,8 +222,8 @@ def _require_same(option: str, path: Path | None, kept: Profile) -> None:
     ]
     if other:
         raise BadInputError(
-            f"{option} {path}: {'; '.join(other)}; allowed: the same, leave it out, or another "
-            "--out"
+            f"{option} {path}: {'; '.join(other)}; give the same values, omit the option, "
+            "or choose another --out"
         )
 
 
@@ -297,7 +298,7 @@ def read_places(
             update = {"left_out": tuple(measured.refused), "tried": tuple(measured.tried)}
             kept.data = kept.data.model_copy(update=update)
             kept.save()
-    out.note(f"{len(measured.readings)} poses only: all others were refused")
+    out.note(f"only {len(measured.readings)} poses: the robot refused all others")
 
 
 def _going_on(kept: DaemonPoses) -> str:
@@ -305,7 +306,7 @@ def _going_on(kept: DaemonPoses) -> str:
         return "nothing was read yet"
     count = len(kept.data.poses)
     are = "1 pose is" if count == 1 else f"{count} poses are"
-    return f"{are} kept in {kept.folder}; the same command goes on behind"
+    return f"{are} saved in {kept.folder}; the same command continues after them"
 
 
 # Ask a person for the measured position while the platform stands; store it in a file of points.
@@ -368,8 +369,8 @@ class AskedPoints:
         while True:
             # the person who measures stands beside a robot that moves after the answer
             self._out.note(
-                f"pose {pose} stands: measured {names} in mm [and sigma], Enter for none; stand "
-                "clear, it moves on then:"
+                f"pose {pose} stands: type the measured {names} in mm [and sigma], or press "
+                "Enter to skip; leave the workspace first, because the robot moves on:"
             )
             words = self._line(pose, origin_m).split()
             if not words:
@@ -377,8 +378,8 @@ class AskedPoints:
             numbers = self._numbers(words)
             if not numbers:
                 self._out.note(
-                    f"allowed: {names}, numbers in mm, a decimal point, blanks between them; and "
-                    "how sure, above 0, where not 2 mm"
+                    f"allowed: {names}, numbers in mm, with a decimal point, separated by spaces; "
+                    "then the standard deviation, above 0, if not 2 mm"
                 )
                 continue
             off_m = float(np.linalg.norm(1e-3 * np.array(numbers[: len(origin_m)]) - origin_m))
@@ -388,8 +389,8 @@ class AskedPoints:
             doubted = words
             by_cables = " ".join(f"{1e3 * x:.0f}" for x in origin_m)
             self._out.note(
-                f"that is {1e3 * off_m:.0f} mm from where its cables have it, {by_cables}; "
-                "where it is right, type the same again"
+                f"that is {1e3 * off_m:.0f} mm from the position given by the cable lengths, "
+                f"{by_cables}; if it is right, type it again"
             )
 
     def _numbers(self, words: list[str]) -> list[float]:
@@ -422,8 +423,8 @@ class AskedPoints:
     def _require_there(self, pose: int, origin_m: FloatArray) -> None:
         if np.abs(self._origin_m() - origin_m).max() > _MOVED_m:
             raise WorkFailedError(
-                f"the platform was moved after pose {pose} had been read, so that nothing measured "
-                "belongs to it"
+                f"the platform moved after pose {pose} was read, so the measured position does "
+                "not belong to it"
             )
 
     def _append(self, line: str) -> None:

@@ -77,9 +77,7 @@ def with_hand_eye(data: CalibrationData, known: HandEye | None) -> CalibrationDa
     if known is None:
         return data
     if data.camera is None:
-        raise BadInputError(
-            "--hand-eye: no camera has looked at these poses; allowed: leave it out"
-        )
+        raise BadInputError("--hand-eye: these poses have no images; omit the option")
     camera = data.camera.model_copy(update={"hand_eye": known})
     return data.model_copy(update={"camera": camera})
 
@@ -150,7 +148,7 @@ def finish(
         out.say(*known.lines())
     why_not = _why_not(outcome, dry_run)
     taken: dict[str, Any] | None = None
-    more = [f"nothing was taken over: {why_not}"]
+    more = [f"the calibration was not adopted: {why_not}"]
     if why_not is None:
         files = CalibrationFiles(*(_path_text(path) for path in (source, points, hand_eye)))
         taken, more = _taken(outcome, source, files, data.simulated)
@@ -176,9 +174,10 @@ def _why_not(outcome: Outcome, dry_run: bool) -> str | None:
         return None
     if outcome.worse:
         return (
-            "its changes are not significant, and it predicts unused poses worse than the file does"
+            "its changes are not significant, and it predicts unused poses worse than the "
+            "robot's file"
         )
-    return "its changes are not significant (--adopt takes it over all the same)"
+    return "its changes are not significant (--adopt adopts it anyway)"
 
 
 def _path_text(path: Path | None) -> str:
@@ -192,19 +191,18 @@ def _taken(
     robot = outcome.robot
     found, path = _take_over(outcome, files, simulated)
     if not simulated or source.with_name(COUNTED).exists():
-        how = "--running, once it runs again, tight and at home"
+        how = "--running, after you have restarted the robot and tightened it at home"
     else:
-        how = "--plant FILE, where the run had one"
+        how = "--plant FILE, if the run had one"
     check = f"cdpr calibrate check {robot.reference} {how}"
     lines = [
         f"calibration {found.version} ({found.identity}) takes effect at the next start: {path}",
-        f"take it back: cdpr calibrate undo {robot.reference}",
-        f"see whether it still holds, in two minutes: {check}",
+        f"to undo it: cdpr calibrate undo {robot.reference}",
+        f"to check it later, in two minutes: {check}",
     ]
     if simulated:
         lines.append(
-            "it was measured on a simulated robot: the robot does not start with it on any bus "
-            "other than simbus"
+            "it was measured on a simulated robot: with it the robot starts only on simbus"
         )
     return {**found.summary(), "file": str(path)}, lines
 
@@ -250,10 +248,10 @@ def distrust_again(robot: Robot) -> None:
     try:
         known = in_force(robot)
     except ProfileError:
-        mark_not_calibrated(robot.profile, "a calibration that cannot be read was taken back")
+        mark_not_calibrated(robot.profile, "an unreadable calibration was undone")
         return
     if known is not None and known.distrusted_before:
-        why = f"calibration {known.version} was taken back; before it: {known.distrusted_before}"
+        why = f"calibration {known.version} was undone; before it: {known.distrusted_before}"
         mark_not_calibrated(robot.profile, why)
 
 
@@ -262,7 +260,7 @@ def _lines(outcome: Outcome, data: CalibrationData) -> list[str]:
     result = outcome.as_json()
     lines = [f"{outcome.robot.name}: {result['poses']} poses, in the frame of {result['frame']}"]
     if data.left_out:
-        lines.append(f"{len(data.left_out)} poses were refused, the last: {data.left_out[-1]}")
+        lines.append(f"{len(data.left_out)} poses were left out, the last: {data.left_out[-1]}")
     lines.append("changes to the robot's file, ± 3 sigma (predicted):")
     lines += [
         f"  {row['name']:26}{row['change']:+9.2f} ± {3.0 * row['std']:.2f} {row['unit']}"

@@ -72,7 +72,7 @@ def found_figure(outcome: Outcome) -> Figure:
         label = f"{names[fault.cable]} jumped by {1e3 * fault.size:+.1f} mm"
         below.axvline(fault.pose + 0.5, color=BACKWARD, lw=0.9, label=label)
     below.axhline(0.0, color="#777777", lw=0.8)
-    below.set(xlabel="pose", ylabel="length left by the fit (mm)", xlim=(0.5, poses[-1] + 0.5))
+    below.set(xlabel="pose", ylabel="length residual (mm)", xlim=(0.5, poses[-1] + 0.5))
     below.xaxis.set_major_locator(MaxNLocator(integer=True, min_n_ticks=1))
     legend_above(figure, above, below)
     return figure
@@ -153,7 +153,7 @@ def held_out_figure(comparison: TruthComparison) -> Figure:
         ):
             size = scale * np.linalg.norm(getattr(errors, key), axis=1)
             ax.bar(numbers + shift, size, 0.4, color=colour, label=label if ax is axes[0] else None)
-        ax.set(xlabel="pose not used", ylabel=f"off the scanner ({unit})")
+        ax.set(xlabel="pose not used", ylabel=f"error by the scanner ({unit})")
         ax.set_xticks(numbers, [str(j + 1) for j in comparison.index], rotation=90)
     legend_above(figure, axes[0])
     return figure

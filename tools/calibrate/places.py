@@ -121,13 +121,15 @@ def _listed(robot: Robot, path: Path) -> FloatArray:
         if why_not := _why_not(reach.model, place, bool(inside)):
             raise PathError(path, line, why_not)
         if tuple(place) in seen:
-            raise PathError(path, line, "is there before; allowed: each pose once")
+            raise PathError(path, line, "occurs twice; list each pose once")
         seen.add(tuple(place))
     for share, why, line in zip(*reach.shares(places), read.lines, strict=True):
         if why != WHOLE:
             what = "touches something" if why == CONTACT else "cannot be held"
             middle = ", ".join(f"{x:.3f}" for x in reach.start[: reach.model.positions])
-            text = f"the straight way from the middle, {middle} m, {what} after {share:.0%} of it"
+            text = (
+                f"the straight way from the middle, {middle} m, {what} after {share:.0%} of the way"
+            )
             raise PathError(path, line, text)
     return places
 

@@ -75,18 +75,21 @@ class PoseCamera:
         self._note(f"pose {number}: its image is not used: {seen.problem}")
         if self._bad >= _MOST_BAD:
             raise NotThePoseError(
-                f"{self._bad} images in turn are of no use, the last: {seen.problem}; look at the "
-                "camera's light, lens and exposure"
+                f"{self._bad} images in a row cannot be used, the last: {seen.problem}; check "
+                "light, lens and exposure of the camera"
             )
         return replace(seen, corners_px={})
 
     def _tell(self, seen: Sighting) -> None:
         """Note the problem of each marker, once."""
         for markers, what in (
-            (seen.repeated, "twice in an image: its id was printed twice; it is left out there"),
-            (seen.mirrored, "printed as its mirror image, and is left out"),
+            (
+                seen.repeated,
+                "is twice in an image: its id was printed twice; it is left out of that image",
+            ),
+            (seen.mirrored, "is printed as a mirror image, and is left out"),
         ):
-            for text in (f"marker {marker} is {what}" for marker in markers):
+            for text in (f"marker {marker} {what}" for marker in markers):
                 if text not in self._noted:
                     self._noted.add(text)
                     self._note(f"{seen.name}: {text}")
@@ -101,15 +104,15 @@ class PoseCamera:
             self.close()
             if not left:
                 raise
-            self._note(f"{error}; it is opened again")
+            self._note(f"{error}; opening it again")
             return None
         if image is None:
-            raise CameraError(f"camera {self._url}: has no further image")
+            raise CameraError(f"camera {self._url}: has no more images")
         if image.pixels.shape[::-1] != self._size:
             width, height = image.pixels.shape[::-1]
             raise BadInputError(
-                f"camera {self._url} gives {width} x {height} pixels, the intrinsics are of "
-                f"{self._size[0]} x {self._size[1]}: another camera, or another resolution"
+                f"camera {self._url} gives {width} x {height} pixels, but the intrinsics are "
+                f"for {self._size[0]} x {self._size[1]}: is it another camera or resolution?"
             )
         return image
 
@@ -160,7 +163,7 @@ def _by_board(out: Output, scene: CameraPlant) -> CameraIntrinsics:
             "mount": MountPlant(position_m=(0.0, 0.0, 0.0)),
         }
     )  # fmt: skip
-    with out.stage("camera: the simulated one is made"):
+    with out.stage("camera: starting the simulated camera"):
         camera = SimCamera(before_board)
     images = []
     with out.progress("camera: images of a ChArUco board", float(_BOARD_IMAGES)) as advance:
@@ -168,7 +171,7 @@ def _by_board(out: Output, scene: CameraPlant) -> CameraIntrinsics:
             images.append((f"board {k + 1}", camera.grab(state)))
             advance(k + 1.0)
     known = Board(board.columns, board.rows, board.square_m, board.marker_m, board.dictionary)
-    with out.stage("camera: fitting its lens to these images"):
+    with out.stage("camera: calibrating its lens with these images"):
         found = fit_intrinsics(images, known)
     one = found.intrinsics
     out.say(

@@ -86,7 +86,7 @@ class PoseOperator:
             raise StoppedError
         silent_s = status.get("loop", {}).get("silent_s", 0.0)
         if silent_s > _SILENT_S:
-            raise WorkFailedError(f"the loop has not turned for {silent_s:.0f} s")
+            raise WorkFailedError(f"the loop has run no cycle for {silent_s:.0f} s")
         self._seen = status
         if status["cycle"]["time_s"] > self._deadline_s:
             raise _LateError
@@ -179,8 +179,8 @@ class PoseOperator:
         if self._program or status["reacting"] != "none":
             raise self._ended(status)
         raise WorkFailedError(
-            f"the platform is not held on its cables ({status['state']}, {status['program']}); "
-            "allowed: after `cdpr enable`, `cdpr tighten`, `cdpr move`"
+            f"the cables do not hold the platform ({status['state']}, {status['program']}); "
+            "run `cdpr enable`, `cdpr tighten` and `cdpr move` first"
         )
 
     @staticmethod
@@ -241,5 +241,5 @@ def _not_reached(
     if directions.turns:
         apart += f" and {math.degrees(float(np.linalg.norm((start - place)[k:]))):.1f} deg"
     kept = progress["trouble"] or progress["held_back"] or progress["missing"]
-    why = f"{apart} off after {allowed_s:.0f} s: {kept or 'still on its way'}"
+    why = f"{apart} off after {allowed_s:.0f} s: {kept or 'still moving'}"
     return TargetNotReached(start, why)

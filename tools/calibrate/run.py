@@ -82,7 +82,7 @@ class CalibrationRunSettings(Profile):
     @classmethod
     def _alike(cls, places: tuple[Numbers, ...] | None) -> tuple[Numbers, ...] | None:
         if places is not None and len(set(map(len, places))) > 1:
-            raise ValueError("as many numbers in each")
+            raise ValueError("the same number of values in each")
         return places
 
     def save(self, folder: Path) -> None:
@@ -103,7 +103,7 @@ class CalibrationRunSettings(Profile):
             if (places is None) != (self.places is None):
                 kind = "a list of poses" if self.places is not None else "no list of poses"
                 raise BadInputError(
-                    f"--poses: allowed: as the run that goes on was begun, with {kind}"
+                    f"--poses: the run to be continued began with {kind}; give that again"
                 )
             update |= {"poses": poses, "places": places}
         return self.model_copy(update=update)
@@ -135,7 +135,8 @@ class StoredRun:
         before = refuse_foreign(folder)
         if before is not None and not before.simulated:
             raise BadInputError(
-                f"{folder / DATA}: was read of a real robot; allowed: another --out, or remove it"
+                f"{folder / DATA}: contains readings of a real robot; choose another --out, or "
+                "remove it"
             )
         try:
             # remove the settings first: if they exist, --resume expects data to go on with
@@ -164,7 +165,8 @@ class StoredRun:
         data = load_data(folder / DATA)
         if data.geometry_sha256 != geometry_sha256(robot):
             raise BadInputError(
-                f"{folder / DATA}: of another state of {robot.profile!r}; allowed: --overwrite"
+                f"{folder / DATA}: was read with another version of {robot.profile!r}; give "
+                "--overwrite to replace it"
             )
         try:
             outside = list(OutsidePoses.load_file(folder / OUTSIDE).poses)[: len(data.poses)]
@@ -278,10 +280,10 @@ def refuse_foreign(folder: Path) -> CalibrationData | None:
         if names[0] == SETTINGS:
             CalibrationRunSettings.load(folder)
             return None
-        why = "no calibration has written it"
+        why = "it was not written by a calibration"
     except ProfileError as error:
         why = brief(error.problem)
-    raise BadInputError(f"{folder / names[0]}: {why}; allowed: another --out, or move it away")
+    raise BadInputError(f"{folder / names[0]}: {why}; choose another --out, or move the file away")
 
 
 def report_faults_only(criterion: StopCriterion) -> StopCriterion:
@@ -319,7 +321,8 @@ def _going_on(robot: Robot, kept: StoredRun) -> str:
     if not kept.data.poses:
         return "nothing was read yet"
     return (
-        f"{len(kept.data.poses)} poses are kept in {kept.folder}; go on with: cdpr calibrate run "
+        f"{len(kept.data.poses)} poses are saved in {kept.folder}; continue with: cdpr "
+        "calibrate run "
         f"{robot.reference} --resume --out {kept.folder}"
     )
 
@@ -346,7 +349,7 @@ class _Measuring:
         self._restarts = before.restarts
         if before.poses:
             self._restarts += (len(before.poses),)
-            out.note(f"going on after {len(before.poses)} poses: home is read again first")
+            out.note(f"continuing after {len(before.poses)} poses; reading home again first")
         self._measured = Measured(
             self._keep, list(before.poses), list(before.left_out), list(before.tried)
         )
@@ -388,7 +391,7 @@ class _Measuring:
                 return
             if len(left) and self._judged(criterion):
                 return
-        self._out.note(f"{len(measured.readings)} poses only: all others were refused")
+        self._out.note(f"only {len(measured.readings)} poses: the robot refused all others")
 
     def _look_at_home(self) -> None:
         """Report camera problems before the robot moves far; raises WorkFailedError."""
@@ -396,9 +399,9 @@ class _Measuring:
         if seen is None or setup is None or seen.problem is not None:
             return  # the image's problem is already reported; the next one may be better
         if not seen.markers:
-            why = "was another set printed, or does the camera not look at the sheets?"
+            why = "was another dictionary printed, or are the sheets out of view?"
             if seen.mirrored:
-                why = f"{listed(seen.mirrored)} read as mirror images: are all printed so?"
+                why = f"{listed(seen.mirrored)} are mirror images: are all printed like that?"
             raise WorkFailedError(
                 f"at home the camera sees no marker of {setup.sheets.dictionary}: {why}"
             )
@@ -434,8 +437,9 @@ def points_of(path: Path, robot: Robot) -> list[MeasuredPoint]:
     at_m = float(np.abs([np.nan_to_num(point.position_m) for point in points]).max(initial=0.0))
     if 0.0 < at_m < furthest_m / _METRES:
         raise BadInputError(
-            f"--points {path}: all within {1e3 * at_m:.3g} mm of the room's origin, where targets "
-            f"are up to {1e3 * furthest_m:.0f} mm from it; were metres typed? allowed: mm"
+            f"--points {path}: all within {1e3 * at_m:.3g} mm of the room's origin, but "
+            f"targets are up to {1e3 * furthest_m:.0f} mm from it; are they in metres? "
+            "Write mm"
         )
     return points
 
@@ -465,8 +469,9 @@ def source_of(robot: Robot, **given: bool) -> PoseSource:
         )
     if asked[0] == "camera" and robot.platform is not None and len(robot.platform.controlled) < 6:
         raise BadInputError(
-            f"--camera: {robot.profile} does not turn its platform about two axes, which is what "
-            "tells where the camera sits on it; allowed: --scanner, --points, --redundancy"
+            f"--camera: {robot.profile} does not turn its platform about two axes, which is "
+            "needed to find where the camera sits; allowed: --scanner, --points, "
+            "--redundancy"
         )
     chosen: PoseSource = asked[0]
     return chosen

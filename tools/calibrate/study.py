@@ -233,7 +233,7 @@ def held_poses(robot: str, count: int, seed: int) -> FloatArray:
         found += list(poses[margins >= 0.0])
         if len(found) >= count:
             return np.array(found[:count])
-    raise BadInputError(f"{robot}: hardly a pose in its frame is held by its cables")
+    raise BadInputError(f"{robot}: its cables can hold almost no pose in its frame")
 
 
 def cases() -> list[StudyCase]:
@@ -311,7 +311,7 @@ def lines(rows: Rows) -> list[str]:
     shown: list[str] = []
     for title, figures in (
         ("noise at 100 poses (sigma), beside the thesis' table 3.1:", ("B.4", "B.5", "B.6")),
-        ("the same bias at all of 100 poses, figures B.1 to B.3:", ("B.1", "B.2", "B.3")),
+        ("the same bias at all 100 poses, figures B.1 to B.3:", ("B.1", "B.2", "B.3")),
         ("noise of two kinds at 100 poses, figures C.1 to C.6:", tuple(PAIRS)),
         *((f"errors by the number of poses, figure {name}:", (name,)) for name in FIGURES),
     ):
@@ -320,7 +320,8 @@ def lines(rows: Rows) -> list[str]:
     for one in plateaus(rows):
         shown.append(
             f"figure {one['figure']}: of e(a) {one['floor_exit_mm']:.2f} mm, of e(rho_0) "
-            f"{one['floor_offset_mm']:.2f} mm stay at any number of poses; noise makes as much at "
+            f"{one['floor_offset_mm']:.2f} mm remain at any number of poses; noise has the "
+            "same effect at "
             f"{_count(one['exit_poses'])} and {_count(one['offset_poses'])} poses"
         )
     return shown

@@ -109,11 +109,11 @@ class TruthComparison:
         """Return the errors as lines of text."""
         shown = (
             ("the scanner, relative to the first pose", self.scanner),
-            ("the same by the robot's file", self.scanner_before),
+            ("the same with the robot's file", self.scanner_before),
             (f"the scanner, in the frame of marker {self.marker}", self.in_marker_frame),
-            ("what was true, relative to the first pose", self.truth),
-            ("what was true, absolute", self.absolute),
-            ("what was true, absolute, by the robot's file", self.absolute_before),
+            ("truth, relative to the first pose", self.truth),
+            ("truth, absolute, with the robot's file", self.absolute),
+            ("truth, absolute, with the robot's file", self.absolute_before),
         )
         lines = []
         for what, errors in shown:
@@ -125,13 +125,13 @@ class TruthComparison:
                     f"{figures['mean_orientation_error_deg']:.3f} deg, worst "
                     f"{figures['worst_position_error_mm']:.2f} mm and "
                     f"{figures['worst_orientation_error_deg']:.3f} deg; distances between them are "
-                    f"{errors.scale.text} times those by lengths"
+                    f"{errors.scale.text} times those from cable lengths"
                 )
         far_mm, turned_deg = 1e3 * self.scanner_alone[0], np.degrees(self.scanner_alone[1])
         lines.insert(
             1,
-            f"the scanner's own errors alone make {far_mm:.2f} mm and {turned_deg:.3f} deg of that "
-            "on the average",
+            f"the scanner's own errors alone make {far_mm:.2f} mm and {turned_deg:.3f} deg "
+            "of that on average",
         )
         return lines
 

@@ -101,7 +101,7 @@ class Daemon:
                 if not left:
                     raise
                 time.sleep(_STOP_AGAIN_S)
-        raise AssertionError("there is one try at least")
+        raise AssertionError("there is at least one try")
 
     def _stop(self, path: str) -> dict[str, Any] | None:
         """Request a stop directly from the loop; return its answer, None if it has no socket."""
@@ -167,7 +167,7 @@ class Daemon:
         if not isinstance(answer, dict):
             if response.status_code == HTTPStatus.SERVICE_UNAVAILABLE:
                 raise CrowdedError(f"{self.where}: has too many connections; try again")
-            raise WorkFailedError(f"{self.where}: does not answer as a daemon does")
+            raise WorkFailedError(f"{self.where}: is not a daemon")
         if response.is_success:
             return answer
         message = str(answer.get("error", response.reason_phrase))
@@ -236,7 +236,7 @@ def open_daemon(
 def _require_file(daemon: Daemon, path: Path) -> None:
     """Raise BadInputError if a daemon of this name runs another file than the given one.
 
-    The loop's file says which; this works even if the service hangs.
+    The loop's file names the robot, so this works even if the service hangs.
     """
     try:
         runs = LoopFile.read(LoopFile.beside(Path(daemon.where))).reference
@@ -318,11 +318,11 @@ def axis_values(texts: list[str], axes: list[dict[str, Any]], unit: str) -> dict
                 f"{quote(f'{names[0]}=20')}"
             )
         if names.index(name) in values:
-            raise BadInputError(f"{text}: {name} is there twice")
+            raise BadInputError(f"{text}: {name} is given twice")
         try:
             values[names.index(name)] = float(number)
         except ValueError:
-            raise BadInputError(f"{text}: {number!r} is no number of {unit}") from None
+            raise BadInputError(f"{text}: {number!r} is not a number of {unit}") from None
     return values
 
 
@@ -353,7 +353,7 @@ def await_socket(robot: str | None, unix: Path | None, out: Output) -> None:
     while not answers(robot, unix):
         if (doing := _start_stage(robot, unix)) is None:
             return  # and none is expected
-        waiting.go_on(doing or "its simulated drives and its processes come up")
+        waiting.go_on(doing or "its simulated drives and processes are starting")
 
 
 def await_start(daemon: Daemon, out: Output) -> None:
@@ -393,12 +393,12 @@ class _Waiting:
 def _startup_stage(status: dict[str, Any], waited: bool) -> str:
     """Return the present step of a daemon that is starting; "" if it is ready.
 
-    If the command waits for the daemon, it goes on to check its bus; else it may stay inactive.
+    If this command has started the daemon, the start includes the check of the bus.
     """
     if status.get("state") == "starting":
         notices = "; ".join(status.get("notices") or ())
         return (
-            notices or "its control loop is loaded, and compiled where this machine runs it first"
+            notices or "its control loop is loading (compiling, if it runs here for the first time)"
         )
     booting = ("unconfigured", "inactive") if waited else ("unconfigured",)
     if status.get("state") in booting and not status.get("reason", "none yet"):

@@ -31,7 +31,7 @@ from cdpr_tools.output import Output
 
 _WATCH_S = 0.2
 _END_S = 90.0
-"""In addition to the time to lower a platform."""
+"""Time for the end, in addition to lowering a platform."""
 _LAUNCHER_S = 10.0
 """Once the loop has ended, a working launcher ends the service within this time."""
 
@@ -55,7 +55,7 @@ def end_daemon(daemon: Daemon, out: Output, socket: Path | None) -> None:
     notes, deadline = ProgressNotes(out, status), time.monotonic() + end_s
     alone_at = deadline
     if status["state"] == "active":
-        out.note("stopping: what moves is brought to rest, then the power goes off ...")
+        out.note("stopping: the robot brakes, then the power goes off ...")
     while time.monotonic() < deadline:
         try:
             status = daemon.get("/status")
@@ -121,7 +121,10 @@ def _may_run(socket: Path | None, error: NoDaemonError) -> bool:
 
 
 def _unknown_end(error: Exception) -> str:
-    return f"{error}; it was asked to end, and whether it has is not known: look at the robot"
+    return (
+        f"{error}; the daemon was asked to end, but it is not known whether it has: "
+        "look at the robot"
+    )
 
 
 def _without_launcher(daemon: Daemon, status: dict[str, Any]) -> str:

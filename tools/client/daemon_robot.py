@@ -65,7 +65,7 @@ _OBSERVED: Final = ("position_rad", "cable_length_m", "tension_N")
 _LEAST_ROWS: Final = 2
 _SILENT_S: Final = 5.0
 _LOOKED_AFTER_S: Final = 1.0
-"""A loop that has not turned for this time hangs."""
+"""A loop that has run no cycle for this time hangs."""
 _END_S: Final = 90.0
 """Time for a daemon to end, besides lowering the platform."""
 
@@ -225,7 +225,7 @@ class _Remote:
         self._renewer.start()
 
     def renew_right(self) -> None:
-        """Renew the right to move if it is held, and looked after."""
+        """Renew the right to move if this handle holds it and the script still uses it."""
         if self.watched_only and time.monotonic() - self._looked_s > _LOOKED_AFTER_S:
             return
         with self._lock:
@@ -285,7 +285,7 @@ class _Remote:
         return status
 
     def _statuses(self, pause_s: float) -> Iterator[dict[str, Any]]:
-        """Yield statuses, at this pause, as long as the loop turns and bus time passes."""
+        """Yield statuses at this interval, as long as the loop runs and bus time advances."""
         last_s, passed_s = -1.0, time.monotonic()
         while True:
             status = self.status()
@@ -329,7 +329,7 @@ class _Remote:
                 self._looked_s = time.monotonic()
                 time.sleep(_PLAN_S)
         if job["number"] != number:
-            raise Refused(f"{file}: somebody else had a path planned meanwhile")
+            raise Refused(f"{file}: another client has planned a path meanwhile")
         if job["error"]:
             raise Refused(str(job["error"]))
         if (line := job.get("next_line")) is not None:
@@ -339,7 +339,7 @@ class _Remote:
     def log(self, fields: Sequence[str]) -> Row:
         last = _recorded_file(self.status())
         if not self._file or not last:
-            raise Error(f"{self.description['robot']}: its daemon records nothing")
+            raise Error(f"{self.description['robot']}: its daemon does not record")
         until_ns, deadline = time.monotonic_ns(), time.monotonic() + _RECORDED_S
         while True:
             time.sleep(_RECORD_S)  # the recorder writes data older than a second

@@ -1,4 +1,4 @@
-"""Motions that a command runs on a daemon's robot: shown, ended by Ctrl-C, and reported."""
+"""Motions that a command runs on a daemon's robot: show progress, end on Ctrl-C, report the end."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def carry_out(
 ) -> Outcome:
     """Run a motion on the daemon's robot; Ctrl-C ends it, and the robot holds.
 
-    It also ends after some seconds. Raises the command's errors if something else ends it.
+    It also ends after a given time. Raises the command's errors if something else ends it.
     """
     outcome, notes, deadline = Outcome(), ProgressNotes(out), time.monotonic() + seconds
 

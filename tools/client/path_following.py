@@ -58,7 +58,7 @@ def follow(
             later = f"from line {line} on it is not followed yet; next: {rest}"
             lasts = _run(daemon, out, arguments, later, planned_s=duration_s)
             if lasts:
-                out.note(f"{file.name}: goes on with line {line}")
+                out.note(f"{file.name}: continues with line {line}")
                 planned = _planned(daemon, body, number)
 
 
@@ -70,7 +70,7 @@ def plain_name(file: Path) -> str:
 
 
 def resume_path(opened: Opened, out: Output, back_mm: float | None, feed: float | None) -> None:
-    """Continue the path that was left, or step back along it; by default at its own feed."""
+    """Continue the interrupted path, or go back along it; by default at its last feed."""
     with opened as daemon:
         _require_platform(daemon, out)
         where = {"resume": True} if back_mm is None else {"back_m": 1e-3 * back_mm}
@@ -87,7 +87,7 @@ def _planned(daemon: Daemon, body: dict[str, Any], number: int) -> dict[str, Any
         while True:
             job = daemon.get("/path")
             if job["number"] != number:
-                raise WorkFailedError(f"{body['name']}: somebody else has had a path planned")
+                raise WorkFailedError(f"{body['name']}: another client has planned a path")
             if not job["planning"]:
                 break
             if stop_requested():
@@ -136,10 +136,10 @@ def _run(
             robot.run("path", **arguments)
         except MotionEnded as error:
             if not (paused := _paused(robot.status)):
-                raise MotionEnded(f"{error}; once the robot is well, {GO_ON}") from None
+                raise MotionEnded(f"{error}; when the robot works again, {GO_ON}") from None
             return
         except Faulted as error:
-            raise Faulted(f"{error}; once the robot is well, {GO_ON}") from None
+            raise Faulted(f"{error}; when the robot works again, {GO_ON}") from None
         goes_on = bool(later) and not (robot.status["program_progress"].get("path") or {}).get(
             "waiting"
         )

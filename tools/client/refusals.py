@@ -25,10 +25,10 @@ _KEYS: Final = {
 """By the key of a program: factor and unit of the command line, and the option, if any."""
 # what to do in a state in which a command was refused
 _REMEDIES: Final = {
-    "unconfigured": "`cdpr status` says why, `cdpr check` tries again",
-    "inactive": "`cdpr status` says why, `cdpr check` tries again",
-    "ready": "`cdpr enable` gives power",
-    "fault": "`cdpr status` says why, `cdpr ack` acknowledges it",
+    "unconfigured": "`cdpr status` gives the reason, `cdpr check` tries again",
+    "inactive": "`cdpr status` gives the reason, `cdpr check` tries again",
+    "ready": "`cdpr enable` switches the power on",
+    "fault": "`cdpr status` gives the reason, `cdpr ack` acknowledges it",
 }
 
 

@@ -27,17 +27,17 @@ def has_died(status: dict[str, Any]) -> bool:
 def power_text(status: dict[str, Any]) -> str:
     """Return the known state of the drives' power since the loop died."""
     if status.get("read_only"):
-        return "it only listened, and commanded no drive"
+        return "it only listened and commanded no drive"
     if not status.get("driving") and not status.get("busy"):  # busy with giving or taking it
-        return "its drives had been told to have no power"
-    return "drives that had power stop without its heartbeat: check that they have"
+        return "its drives had been commanded to switch off"
+    return "drives that had power stop without its heartbeat: check that they have stopped"
 
 
 def death_text(status: dict[str, Any]) -> str:
-    """Return that the control loop has died, the state of the drives' power, the next command."""
+    """Return that the control loop has died, the power of the drives, and the next command."""
     return (
-        f"{status['reason']}; {power_text(status)}; next: `cdpr stop` ends what is left of the "
-        "daemon, then `cdpr run` starts it again"
+        f"{status['reason']}; {power_text(status)}; next: `cdpr stop` ends the rest of "
+        "the daemon, then `cdpr run` starts it again"
     )
 
 
@@ -49,7 +49,7 @@ def after_stop_text(status: dict[str, Any]) -> str:
         return f"ended: {power_text(status)}"
     if not (unheard := unheard_axes(status)):
         return "stopped, power off"
-    return f"stopped; unheard, and not known to be without power: {', '.join(unheard)}"
+    return f"stopped; these drives do not answer and may have power: {', '.join(unheard)}"
 
 
 def unheard_axes(status: dict[str, Any]) -> list[str]:
@@ -67,22 +67,22 @@ _OPTIONS = {"live_view": "--live", "stream": "--stream"}
 _STAGES = {
     ("tighten", "slack"): "winding in the slack of the cables",
     ("tighten", "pull"): "pulling the cables tight",
-    ("tighten", "beyond"): "pulling half as much again, to tell friction and cogging",
-    ("tighten", "back"): "pulling as before",
-    ("tighten", "below"): "pulling half as much, to tell friction and cogging",
-    ("tighten", "lengths"): "taking the cables' lengths",
+    ("tighten", "beyond"): "raising the tensions by half, to measure friction and cogging",
+    ("tighten", "back"): "returning to the first tensions",
+    ("tighten", "below"): "halving the tensions, to measure friction and cogging",
+    ("tighten", "lengths"): "measuring the cable lengths",
     ("tighten", "index"): "moving the platform until each motor's index has passed",
     ("tighten", "held"): "holding the platform",
-    ("lower", "home"): "taking the platform home, above its stand",
-    ("lower", "down"): "letting the platform down",
-    ("lower", "fade"): "letting the cables go loose",
-    ("path", "set out"): "coming to rest before the path",
-    ("path", "to the path"): "moving to where the path is taken up",
+    ("lower", "home"): "moving the platform home, above its stand",
+    ("lower", "down"): "lowering the platform",
+    ("lower", "fade"): "slackening the cables",
+    ("path", "set out"): "braking before the path",
+    ("path", "to the path"): "moving to where the path continues",
     ("path", "path"): "following the path",
 }
 """Text for each stage of a program."""
 _SILENT_s: Final = 1.0
-"""A loop that has not turned for this time hangs: its data about the robot are old."""
+"""A loop that has run no cycle for this time hangs: its data about the robot are old."""
 _COLOURS = {"active": "green", "fault": "red", "dead": "red", "ready": "cyan"}
 
 
@@ -108,7 +108,7 @@ def _lines(status: dict[str, Any]) -> list[Text]:
     if state != DEAD and silent_s > _SILENT_s:
         lines.append(
             Text(
-                f"the loop has not turned for {silent_s:.1f} s: what follows is of then",
+                f"the loop has run no cycle for {silent_s:.1f} s: the following is that old",
                 style="red",
             )
         )
@@ -169,7 +169,7 @@ def _loop_lines(status: dict[str, Any]) -> list[Text]:
             lines.append(Text(f"bus {name}: {words}; {bus['state']}", style="yellow"))
     for part, option in _OPTIONS.items():
         if error := status["parts"].get(part, {}).get("error"):
-            lines.append(Text(f"{option} does not work: {error}", style="red"))
+            lines.append(Text(f"{option} failed: {error}", style="red"))
     recording = status["parts"].get("recording")
     if recording:
         lines.append(Text(_recording(recording)))
@@ -179,11 +179,11 @@ def _loop_lines(status: dict[str, Any]) -> list[Text]:
 def _of_dead(status: dict[str, Any]) -> list[Text]:
     """Return the known facts of a robot whose control loop has died, and what to do next."""
     place = place_text(status.get("program_progress") or {})
-    last = f"; {place} then, where it is now is not known" if place else ""
+    last = f"; {place} at that time; its present position is not known" if place else ""
     return [
         Text(power_text(status)),
-        Text("next: `cdpr stop` ends what is left of the daemon, `cdpr run` starts it again"),
-        Text(f"what follows is of {status['loop']['silent_s']:.0f} s ago{last}", style="dim"),
+        Text("next: `cdpr stop` ends the rest of the daemon, `cdpr run` starts it again"),
+        Text(f"the following is {status['loop']['silent_s']:.0f} s old{last}", style="dim"),
     ]
 
 
@@ -211,8 +211,8 @@ def learnt_text(status: dict[str, Any]) -> str:
 
 
 def left_text(path: dict[str, Any]) -> str:
-    """Return where a path was left that can be resumed."""
-    return f"path {path['name']} left at {percent_text(path)}, line {path['line']}"
+    """Return where an interrupted path can be resumed."""
+    return f"path {path['name']} stopped at {percent_text(path)}, line {path['line']}"
 
 
 def percent_text(path: dict[str, Any]) -> str:
@@ -247,7 +247,7 @@ def stage_text(program: str, progress: dict[str, Any]) -> str:
     """Return the present stage of a program that has stages; empty for others."""
     stage = str(progress.get("stage") or "")
     if progress.get("was_tight") is False and stage in ("home", "down"):  # it may be standing
-        return "letting the cables out; a platform that hangs on them comes down"
+        return "paying out the cables; a platform that hangs on them comes down"
     if stage == "home" and progress.get("blind"):  # the way there is unknown
         stage = "down"
     return _STAGES.get((program, stage), stage)
@@ -332,7 +332,7 @@ def _listed(values: Iterable[float], factor: float, digits: int) -> str:
 
 def _recording(recording: dict[str, Any]) -> str:
     if not recording.get("recording"):
-        return f"nothing is recorded: {recording.get('error') or 'ended'}"
+        return f"not recording: {recording.get('error') or 'ended'}"
     lost = f", {recording['lost_rows']} cycles lost" if recording.get("lost_rows") else ""
     return f"recording {recording['file']}, {recording['bytes'] / 1e6:.1f} MB{lost}"
 
@@ -366,7 +366,7 @@ def _trouble(axis: dict[str, Any]) -> str:
 def compensation_text(axes: list[dict[str, Any]]) -> str:
     """Return which motors' cogging is compensated; empty if none is known."""
     parts = []
-    for known, words in ((True, "compensated"), (False, "not compensated before its index passes")):
+    for known, words in ((True, "compensated"), (False, "not compensated until its index passes")):
         names = [
             str(axis["name"])
             for axis in axes
@@ -392,7 +392,7 @@ _TELL_S: Final = 2.0
 
 
 class ProgressNotes:
-    """Reports the progress of a motion, each thing once: its stages, delays and progress.
+    """Reports stages, delays and progress of a motion, each once.
 
     Facts that were in an earlier `status` are not reported.
     """

@@ -1,4 +1,4 @@
-"""`cdpr bench`: measure this project's cost on this machine, by cdpr_tools.bench."""
+"""`cdpr bench`: measure the cost of this software on this machine."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def _option(text: str, least: float, most: float | None = None, **more: Any) -> 
 
 
 def _run(bench: str, as_json: bool, **given: Any) -> None:
-    """Measure with the module of a bench, and show its figures."""
+    """Run the benchmark of a module and show its figures."""
     with loading_notice():
         module = importlib.import_module(f"cdpr_tools.bench.{bench}")
     out = Output(as_json)
@@ -62,7 +62,7 @@ def control(
 ) -> None:
     """Measure one update of a platform's control: pose, wrench, tensions, torques.
 
-    A plain controller in NumPy and SciPy gets the same angles in the same run, in turns.
+    A plain controller in NumPy and SciPy gets the same angles; both take turns in the same run.
     """
     with raised_as(BadInputError, GeometryError):
         _run("control", as_json, name=robot, cycles=cycles)
@@ -87,8 +87,8 @@ def kinematics(
 ) -> None:
     """Measure the pose from cable lengths: along a path, and from bad starts.
 
-    On spatial-8, from the last pose and from starts that are up to 0.5 m and 10 or 40 degrees off,
-    beside SciPy's Levenberg-Marquardt.
+    The robot is spatial-8. The search starts at the last pose, or up to 0.5 m and 10 or 40 degrees
+    off. SciPy's Levenberg-Marquardt solves the same problems.
     """
     _run("kinematics", as_json, poses=poses)
 
@@ -96,7 +96,7 @@ def kinematics(
 @app.command()
 def latency(
     seconds: Annotated[float, _option("Duration of each of the four curves.", 0.1, 86_400)] = 5.0,
-    rate: Annotated[float, _option("Cycles a second.", 1, 10_000)] = 1000.0,
+    rate: Annotated[float, _option("Cycles per second.", 1, 10_000)] = 1000.0,
     picture: Annotated[Path, typer.Option("--out", help="File for the picture.")] = Path(
         "out/latency.png"
     ),
@@ -104,7 +104,7 @@ def latency(
 ) -> None:
     """Measure how late a loop wakes up, with and without the real-time settings, as a picture.
 
-    Each is measured on the machine as it is, and with every processor kept busy by the command.
+    Both are measured on the machine as it is, and while the command keeps every processor busy.
     """
     _run("latency", as_json, rate_Hz=rate, seconds=seconds, picture=picture)
 
@@ -113,14 +113,18 @@ def latency(
 def loop(
     seconds: Annotated[float, _option("Duration of each variant.", 3, 3600)] = 30.0,
     robot: Annotated[
-        str, typer.Option(help="Robot profile; a platform is led to and fro. Default: bare axes.")
+        str,
+        typer.Option(
+            help="Robot profile, whose platform is moved to and fro. Default: axes without a "
+            "platform."
+        ),
     ] = "",
     as_json: JsonOption = False,
 ) -> None:
     """Measure the control loop of 8 axes on two simulated buses at 1 kHz.
 
-    The motors turn, or lead their platform; the simulator runs in a separate process. In the same
-    run a baseline loop turns bare axes on the canopen package's PDOs and NumPy.
+    The motors turn, or move their platform. The simulator runs in a separate process. In the same
+    run a baseline loop, on the canopen package's PDOs and NumPy, turns axes without a platform.
     """
     _run("loop", as_json, seconds=seconds, name=robot)
 
@@ -130,18 +134,18 @@ def soak(
     hours: Annotated[float, _option("Hours of bus time.", 1e-4, 1e4)] = 1.0,
     wall_minutes: Annotated[
         float,
-        _option("End after so many minutes; not before --hours by default.", 0.01,
+        _option("End after this many minutes, even before --hours.", 0.01,
                 show_default=False),
     ] = math.inf,
     robot: Annotated[str, typer.Option(help="Robot profile: a name or a path.")] = "bench-8",
     rate: Annotated[
-        float | None, _option("Cycles a second, instead of the robot's.", 1, 10_000)
+        float | None, _option("Cycles per second, instead of the robot's.", 1, 10_000)
     ] = None,
     as_json: JsonOption = False,
 ) -> None:  # fmt: skip
-    """Move a simulated robot in lockstep for hours; no memory may leak and no frame be lost.
+    """Move a simulated robot in lockstep for hours, and watch for leaked memory and lost frames.
 
-    Exit status 1 if one does.
+    The exit status is 1 if memory leaks or a frame is lost.
     """
     given = {"robot": load_robot(robot), "hours": hours, "rate_Hz": rate}
     _run("soak", as_json, most_wall_s=60.0 * wall_minutes, **given)

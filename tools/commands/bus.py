@@ -52,7 +52,7 @@ app = typer.Typer(
 )
 
 _LATE_S = 0.05
-"""How long frames that the bus has counted may take to arrive here."""
+"""Longest delay until frames that the bus has counted arrive here."""
 
 
 _ProfileOption = Annotated[
@@ -108,7 +108,7 @@ def monitor(
     if source.lost is not None:
         raise source.lost
     if not summary.frames:
-        out.note("nothing was heard")
+        out.note("no frames were received")
     out.result({"ok": True, "bus": str(url), "log": log, **summary.table()})
 
 
@@ -122,7 +122,7 @@ def replay(
     robot: _RobotOption = None,
     ids: _IdsOption = None,
     channel: Annotated[
-        str | None, typer.Option("--channel", help="Which bus, where the file holds several.")
+        str | None, typer.Option("--channel", help="Which bus, if the file contains several.")
     ] = None,
     speed: Annotated[
         float | None,
@@ -133,7 +133,7 @@ def replay(
         ),
     ] = None,
     to: Annotated[
-        str | None, typer.Option("--to", help="Also send all of it to this bus.", metavar="URL")
+        str | None, typer.Option("--to", help="Also send all frames to this bus.", metavar="URL")
     ] = None,
     raw: _RawOption = False,
     yes: YesOption = False,
@@ -202,7 +202,7 @@ def scan(
         list[str], typer.Option("--bus", help="simbus:NAME, socketcan:can0, ...", metavar="URL")
     ],
     nodes: Annotated[
-        str, typer.Option("--nodes", help="Node ids to ask, as 1-127 or 1,5,20-23.")
+        str, typer.Option("--nodes", help="Node ids to ask, such as 1-127 or 1,5,20-23.")
     ] = "1-127",
     profiles: Annotated[
         Path | None, typer.Option("--profiles", help="Folder with drive profiles of your own.")
@@ -229,7 +229,7 @@ def scan(
     out.result({"ok": True, "buses": results})
 
 
-_NOBODY = "nobody answers: check power, wiring, termination, bit rate and node ids"
+_NOBODY = "no node answers: check power, wiring, termination, bit rate and node ids"
 
 
 def _visit(
@@ -241,13 +241,13 @@ def _visit(
         scan_.listen(LISTEN_S)
         if scan_.traffic.sdo_requests and not force:
             raise WorkFailedError(
-                f"{url}: another master is busy with {signs_of_a_master(scan_.traffic)}: "
-                "it would also get the answers to our requests, in the middle of its "
-                "transfers; wait until it is done, or use --force"
+                f"{url}: another master is busy with {signs_of_a_master(scan_.traffic)}: it "
+                "would also get the answers to our requests, during its transfers; wait until "
+                "it has finished, or use --force"
             )
         scan_.ask()
     signs = signs_of_a_master(scan_.traffic)
-    warning = f"a master is at work ({signs}); the scan has only read" if signs else ""
+    warning = f"another master is active ({signs}); the scan only read" if signs else ""
     return {
         "bus": str(url),
         "nodes": [entry(found, drives) for found in responding(scan_.found)],
@@ -265,13 +265,13 @@ def budget(
     machine: RobotOrWinchArgument,
     rate: Annotated[
         float | None,
-        typer.Option(min=_LOW, max=_HIGH, help="Cycles a second, instead of the profile's."),
+        typer.Option(min=_LOW, max=_HIGH, help="Cycles per second, instead of the profile's."),
     ] = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Compute the worst-case time of the cycle on each bus, the highest rate, and what is left.
+    """Compute the worst-case time of the cycle on each bus, the highest rate, and the time left.
 
-    Exit status 2 when the cycle does not fit.
+    The exit status is 2 if the cycle does not fit.
     """
     out = Output(as_json)
     profile = load_winch_or_robot(machine)
@@ -329,10 +329,11 @@ def _report(name: str, budgets: list[BusBudget]) -> list[str]:
 def _explanation(b: BusBudget) -> str:
     """Return what the remaining time is needed for."""
     text = (
-        f"{b.bus}: heartbeats take {b.heartbeat_share * b.period_s * _US:.1f} us a cycle; what is "
-        f"left is for computing, EMCY and {b.sdo_transfers_s:.0f} SDO transfers a second"
+        f"{b.bus}: heartbeats take {b.heartbeat_share * b.period_s * _US:.1f} us per "
+        f"cycle; the remaining time is for computing, EMCY and {b.sdo_transfers_s:.0f} "
+        "SDO transfers a second"
     )
     if b.changes_s and math.isfinite(b.recovery_cycles):
         cycles = f"{b.recovery_cycles:.0f} cycle{'s' if b.recovery_cycles > 1 else ''}"
-        text += f", and tells a change in every drive within {cycles}"
+        text += f", and a change in every drive is seen within {cycles}"
     return text + f"; SYNC may come up to {b.longest_wait_s * _US:.0f} us late"

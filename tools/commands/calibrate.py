@@ -46,8 +46,8 @@ PointsOption = Annotated[
 IdentifyOption = Annotated[
     str | None,
     typer.Option(
-        help="What is identified, with commas between: exit, offset, drum, elongation (these by "
-        "default), anchor, pulley.",
+        help="Parameters to identify, separated by commas: exit, offset, drum, elongation "
+        "(these by default), anchor, pulley.",
         metavar="LIST",
     ),
 ]
@@ -55,47 +55,49 @@ KnownMmOption = Annotated[
     float | None,
     typer.Option(
         "--known-mm", min=0.1, max=500.0,
-        help="Standard deviation with which the exit points of the robot's file are known; 50 by "
-        "default, as with a tape.",
+        help="Standard deviation of the exit points in the robot's file, mm; default 50, as "
+        "measured with a tape.",
     ),
 ]  # fmt: skip
 CalibrationPlantOption = Annotated[
     Path | None,
     typer.Option(help="Plant file: the truth about robot, cables, motors and camera."),
 ]
-DryRunOption = Annotated[
-    bool, typer.Option("--dry-run", help="Tell what is found; take nothing over.")
-]
+DryRunOption = Annotated[bool, typer.Option("--dry-run", help="Report the result; adopt nothing.")]
 AdoptOption = Annotated[
     bool,
-    typer.Option("--adopt", help="Take it over even if its changes are not significant."),
+    typer.Option("--adopt", help="Adopt it even if its changes are not significant."),
 ]
 PosesOption = Annotated[
     str | None,
     typer.Option(
         metavar="N|FILE",
-        help="How many poses, home among them, or a list as `cdpr poses` writes it; else up to "
-        "100, while more bring something.",
+        help="Number of poses including home, or a list written by `cdpr poses`. Default: "
+        "up to 100, as long as more poses improve the result.",
     ),
 ]
 ScannerOption = Annotated[
-    bool, typer.Option("--scanner", help="With poses that the simulated scanner measures.")
+    bool, typer.Option("--scanner", help="Measure the poses with the simulated scanner.")
 ]
 OutDirOption = Annotated[
     Path | None,
     typer.Option(
-        "--out", help="Folder for data, images, result and report; else out/calibrate-ROBOT."
+        "--out", help="Folder for data, images, result and report; default out/calibrate-ROBOT."
     ),
 ]
 CameraUrlOption = Annotated[
     str | None,
-    typer.Option("--camera", help="Take images with it, such as opencv:0.", metavar="CAMERA"),
+    typer.Option("--camera", help="Camera on the platform, such as opencv:0.", metavar="CAMERA"),
 ]
 IntrinsicsOption = Annotated[
-    Path | None, typer.Option(help="Of the camera, for the first pose.", metavar="FILE")
+    Path | None,
+    typer.Option(help="Intrinsics of the camera; needed for the first pose.", metavar="FILE"),
 ]
 MarkersOption = Annotated[
-    Path | None, typer.Option(help="Sizes of the sheets, for the first pose.", metavar="FILE")
+    Path | None,
+    typer.Option(
+        help="File with the sizes of the sheets; needed for the first pose.", metavar="FILE"
+    ),
 ]
 
 
@@ -129,7 +131,7 @@ def measure(
     camera: CameraUrlOption = None,
     ask: Annotated[
         bool,
-        typer.Option("--ask", help="Ask at each pose where the platform is measured to be."),
+        typer.Option("--ask", help="Ask at each pose for the measured position of the platform."),
     ] = False,
     poses: PosesOption = None,
     intrinsics: IntrinsicsOption = None,
@@ -142,12 +144,12 @@ def measure(
     dry_run: DryRunOption = False,
     adopt: AdoptOption = False,
 ) -> None:
-    """Move a running robot through poses, read its cables, identify; put a good result in force.
+    """Move a running robot through poses, read its cables, identify; adopt a good result.
 
     Start with the robot at home on tight cables, as after `cdpr tighten`; it is held at the last
     pose. Without --camera and --ask it uses only lengths and tensions. If the folder already has
-    poses, also from `cdpr calibrate read`, it continues after them. Ctrl-C holds the platform.
-    The exit status is as for `cdpr calibrate run`.
+    poses, also from `cdpr calibrate read`, it continues after them. Ctrl-C holds the platform. The
+    exit status is as for `cdpr calibrate run`.
     """
     with out.stage("choosing poses"):
         from cdpr_tools.calibrate import daemon_run  # noqa: PLC0415
@@ -190,7 +192,7 @@ def measure(
             criterion if count is None else report_faults_only(criterion),
             asked or (lambda _pose: None),
         )  # fmt: skip
-    out.say("the platform is held at the last pose; `cdpr lower` takes it back onto its stand")
+    out.say("the robot holds the platform at the last pose; `cdpr lower` returns it to its stand")
     finish(
         *(out, robot, kept.data, points if points.exists() else None, geometry),
         *(folder / DATA, folder, dry_run, adopt),
@@ -207,7 +209,7 @@ def read(
     daemon: Daemon,
     out: Output,
     out_dir: Annotated[
-        Path, typer.Option("--out", help="Folder of the poses; the first one begins it.")
+        Path, typer.Option("--out", help="Folder of the poses; the first pose creates it.")
     ],
     camera: CameraUrlOption = None,
     intrinsics: IntrinsicsOption = None,
@@ -237,7 +239,7 @@ def read(
     points = f" --points {out_dir / POINTS}" if (out_dir / POINTS).exists() else ""
     out.say(f"{number} poses in {out_dir / DATA}")
     if number >= _ENOUGH:
-        out.say(f"fit them: cdpr calibrate fit {robot.reference} --data {out_dir}{points}")
+        out.say(f"to fit them: cdpr calibrate fit {robot.reference} --data {out_dir}{points}")
     reading = data.poses[-1]
     figures = {"pose": number, **reading.model_dump(include={"target", "length_m", "tension_N"})}
     out.result({"ok": True, **figures, "data": out_dir / DATA})
@@ -259,14 +261,14 @@ def fit_data(
     robot: RobotArgument,
     data: Annotated[
         Path,
-        typer.Option(help="Folder of a run, or readings as its data.json.", metavar="FOLDER|FILE"),
+        typer.Option(help="Folder of a run, or its data.json.", metavar="FOLDER|FILE"),
     ],
     points: PointsOption = None,
     hand_eye: HandEyeOption = None,
     identify: IdentifyOption = None,
     known_mm: KnownMmOption = None,
     out_dir: Annotated[
-        Path | None, typer.Option("--out", help="Folder for the result; else that of --data.")
+        Path | None, typer.Option("--out", help="Folder for the result; default that of --data.")
     ] = None,
     dry_run: DryRunOption = False,
     adopt: AdoptOption = False,
@@ -275,9 +277,9 @@ def fit_data(
     """Identify from poses measured before, as at the end of a run; nothing moves.
 
     For the folder of a run, held-out poses are also compared with its simulator's scanner and
-    truth. The number after ± is three standard deviations (3 sigma). If the result is not good, it
-    is not put in force and the exit status is 1. If it changes nothing significantly, it is not
-    put in force either, with status 0.
+    truth. The number after ± is three standard deviations (3 sigma). A result that is not good is
+    not adopted, and the exit status is 1. A result without significant changes is not adopted
+    either, with status 0.
     """
     from cdpr_rt.calibration.readings import load_data  # noqa: PLC0415
     from cdpr_tools.calibrate import run as runs  # noqa: PLC0415
@@ -304,12 +306,11 @@ def run(
         bool,
         typer.Option(
             "--camera",
-            help="With the camera on the platform; so without any of these where it has six "
-            "directions.",
+            help="Use the camera on the platform; the default for platforms with six directions.",
         ),
     ] = False,
     redundancy: Annotated[
-        bool, typer.Option("--redundancy", help="From encoder lengths and tensions alone.")
+        bool, typer.Option("--redundancy", help="Use only encoder lengths and tensions.")
     ] = False,
     scanner: ScannerOption = False,
     points: PointsOption = None,
@@ -317,11 +318,17 @@ def run(
     plant: CalibrationPlantOption = None,
     intrinsics: Annotated[
         Path | None,
-        typer.Option(help="Of the camera; else found by a board first.", metavar="FILE"),
+        typer.Option(
+            help="Intrinsics of the camera; by default calibrated with a board first.",
+            metavar="FILE",
+        ),
     ] = None,
     markers: Annotated[
         Path | None,
-        typer.Option(help="Sizes of the sheets, known places; else as ordered.", metavar="FILE"),
+        typer.Option(
+            help="File with sizes and known places of the sheets; by default those of the plant.",
+            metavar="FILE",
+        ),
     ] = None,
     hand_eye: HandEyeOption = None,
     seed: SeedOption = 1,
@@ -329,22 +336,22 @@ def run(
     known_mm: KnownMmOption = None,
     out_dir: OutDirOption = None,
     resume: Annotated[
-        bool, typer.Option("--resume", help="Go on with what a run has left that ended early.")
+        bool, typer.Option("--resume", help="Continue a run that ended early.")
     ] = False,
     overwrite: OverwriteOption = False,
     dry_run: DryRunOption = False,
     adopt: AdoptOption = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Move a simulated robot through poses, read its cables, identify, verify, put in force.
+    """Move a simulated robot through poses, read its cables, identify, verify, adopt.
 
-    It starts a simulator and runs over the bus, from home and with the geometry of its file.
-    The number after ± is three standard deviations (3 sigma). If the result is not good, it is not
-    put in force and the exit status is 1. If it changes nothing significantly, it is not put in
-    force either, with status 0.
+    The command starts a simulator. The robot starts at home with the geometry of its file. The
+    number after ± is three standard deviations (3 sigma). A result that is not good is not adopted,
+    and the exit status is 1. A result without significant changes is not adopted either, with
+    status 0.
     """
     out = Output(as_json)
-    with out.stage("looking at the robot's file"):
+    with out.stage("checking the robot's file"):
         from cdpr_rt.diagnosis.checks import refuse_impossible  # noqa: PLC0415
         from cdpr_tools.calibrate import run as runs  # noqa: PLC0415
         from cdpr_tools.calibrate.finish import (  # noqa: PLC0415  # slow to load
@@ -407,12 +414,14 @@ def _require_as_begun(given: Mapping[str, object]) -> None:
     """Raise BadInputError for options that only a new run accepts."""
     for option, value in given.items():
         if value:
-            raise BadInputError(f"{option}: not with --resume, which goes on as the run was begun")
+            raise BadInputError(
+                f"{option}: not with --resume, which continues with the options of the run"
+            )
 
 
 def _require_camera(hand_eye: HandEye | None, source: str) -> None:
     if hand_eye is not None and source != "camera":
-        raise BadInputError("--hand-eye: is of a camera; allowed: with --camera")
+        raise BadInputError("--hand-eye: allowed only with --camera")
 
 
 def _camera_setup(
@@ -427,7 +436,7 @@ def _camera_setup(
 def _require_new(folder: Path, name: str, overwrite: bool) -> None:
     if (folder / name).exists() and not overwrite:
         raise BadInputError(
-            f"{folder / name}: is there already; allowed: --resume to go on with it, --overwrite"
+            f"{folder / name}: already exists; give --resume to continue it, or --overwrite"
         )
 
 
@@ -438,13 +447,18 @@ def check(
     plant: CalibrationPlantOption = None,
     running: Annotated[
         bool,
-        typer.Option("--running", help="The robot that a daemon runs instead, tight and at home."),
+        typer.Option(
+            "--running",
+            help="Check the robot that a daemon runs; its platform must be tight and at home.",
+        ),
     ] = False,
     camera: CameraUrlOption = None,
     seed: SeedOption = 1,
     out_dir: Annotated[
         Path | None,
-        typer.Option("--out", help="Folder for the readings, check.json; else out/check-ROBOT."),
+        typer.Option(
+            "--out", help="Folder for the readings (check.json); default out/check-ROBOT."
+        ),
     ] = None,
     socket: SocketOption = None,
     url: UrlOption = None,
@@ -457,7 +471,7 @@ def check(
     point has changed enough to matter.
     """
     out = Output(as_json)
-    with out.stage("looking at the robot's file"):
+    with out.stage("checking the robot's file"):
         from cdpr_rt.diagnosis.checks import refuse_impossible  # noqa: PLC0415
         from cdpr_tools.calibrate import check as checks  # noqa: PLC0415  # slow to load
 

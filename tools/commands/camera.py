@@ -77,7 +77,7 @@ def calibrate(
     marker_mm: Annotated[float, typer.Option(min=1.0, max=1000.0, help="Side of a marker.")] = 20.0,
     dictionary: Annotated[str, typer.Option(help="Set of the board's markers.")] = "5X5_100",
     count: Annotated[
-        int, typer.Option(min=5, max=500, help="Images to take with a camera, one a second.")
+        int, typer.Option(min=5, max=500, help="Images to take with a camera, one per second.")
     ] = 30,
     overwrite: OverwriteOption = False,
     as_json: JsonOption = False,

@@ -103,7 +103,7 @@ def sweep_axis(
     """Turn a motor as `sweep` does, for `fit`, through this machine's running daemon.
 
     The daemon's programs turn the motor and its recording holds the data; the other axes hold.
-    Ctrl-C stops the motor. The drives have no power afterwards, however the command ends.
+    Ctrl-C stops the motor. Afterwards the drives have no power, even if the command fails.
     """
     # imported here: commissioning a single winch does not need the packages of the daemon
     from cdpr_tools.client.client import open_daemon  # noqa: PLC0415
@@ -115,7 +115,7 @@ def sweep_axis(
         profile = load_robot(description["reference"])
         swept = axis_sweep.SweptAxis.of(description, daemon.get("/status"), axis, profile)
         paths = prepare(out_dir, overwrite)
-        what = f"the sweep turns the motor of {axis}: its cable has to be off the drum."
+        what = f"the sweep turns the motor of {axis}: take its cable off the drum first."
         require_consent(what, yes or swept.is_simulated)
         recorded: list[str] = []
 
@@ -155,14 +155,14 @@ def _recorded_identity(paths: Paths) -> tuple[str, DriveIdentity, float | None]:
     """Return the winch, its drive, and its latency, which older recordings do not contain."""
     sweeps = paths.passes("sweep")
     if not sweeps:
-        raise BadInputError(f"{paths.out}: holds no recorded sweep (raw/sweep-0.raw, ...)")
+        raise BadInputError(f"{paths.out}: contains no recorded sweep (raw/sweep-0.raw, ...)")
     try:
         header = read_raw_log(sweeps[0]).header
         whose, latency = header["identity"], header.get("latency_s")
         identity = DriveIdentity(**{key: whose[key] for key in DriveIdentity.model_fields})
         return str(whose["winch"]), identity, latency if latency is None else float(latency)
     except (KeyError, TypeError, ValueError) as error:
-        raise RawLogError(f"{sweeps[0]}: does not say which drive it is of") from error
+        raise RawLogError(f"{sweeps[0]}: does not name its drive") from error
 
 
 @app.command()

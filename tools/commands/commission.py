@@ -67,10 +67,10 @@ def chosen_axes(
     known = {axis.name: axis for axis in robot.axes}
     allowed = ", ".join(repr(name) for name in known)
     if every == bool(names):
-        raise BadInputError(f"{robot.name}: give --axis NAME ({allowed}) or --all, one of them")
+        raise BadInputError(f"{robot.name}: give either --axis NAME ({allowed}) or --all")
     for name in names:
         if name not in known:
-            raise BadInputError(f"--axis {name}: no axis of {robot.name}; allowed: {allowed}")
+            raise BadInputError(f"--axis {name}: not an axis of {robot.name}; allowed: {allowed}")
     chosen = list(known.values()) if every else [known[name] for name in dict.fromkeys(names)]
     return tuple(_motor(robot, axis, folder) for axis in chosen)
 
@@ -134,24 +134,24 @@ def commission(
         typer.Option(
             "--bus",
             help="simbus: (starts simulated drives), simbus:NAME, socketcan:can0, ...; "
-            "for a robot also BUS=URL, or as its file says.",
+            "for a robot also BUS=URL; default: the URLs in its file.",
             metavar="URL",
         ),
     ] = None,
     axis: Annotated[
         list[str] | None,
-        typer.Option(help="Of a robot, the axis whose motor is measured; may be repeated."),
+        typer.Option(help="For a robot: the axis whose motor is measured; may be repeated."),
     ] = None,
     every: Annotated[
-        bool, typer.Option("--all", help="Of a robot, all motors one after the other.")
+        bool, typer.Option("--all", help="For a robot: measure all motors, one after the other.")
     ] = False,
     plant: PlantOption = None,
     out_dir: Annotated[
         Path | None,
         typer.Option(
             "--out",
-            help="Folder for raw data, profile and report, of a robot one in it for each axis; "
-            "else out/commission-NAME.",
+            help="Folder for raw data, profile and report, with a subfolder for each axis of a "
+            "robot; default out/commission-NAME.",
         ),
     ] = None,
     bandwidth_Hz: Annotated[
@@ -198,7 +198,7 @@ def _only(buses: Sequence[str] | None) -> str:
 
 def _ask(motors: Sequence[_MotorOfRobot], urls: Sequence[BusUrl], yes: bool) -> None:
     for motor, url in zip(motors, urls, strict=True):
-        what = f"commissioning axis {motor.axis.name} {_TURNS}: its cable has to be off the drum"
+        what = f"commissioning axis {motor.axis.name} {_TURNS}: take its cable off the drum first"
         confirm_motion(url, yes, what)
 
 
@@ -248,8 +248,8 @@ def prepare(folder: Path, overwrite: bool) -> Paths:
     refuse_loss(folder, raw, overwrite)
     if folder.is_dir() and any(folder.iterdir()) and not raw.is_dir() and not overwrite:
         raise BadInputError(
-            f"--out {folder}: holds other things; choose a new folder, or put a commissioning "
-            "beside them with --overwrite"
+            f"--out {folder}: contains other files; choose a new folder, or write the "
+            "results there with --overwrite"
         )
     with os_error_as(BadInputError, f"--out {folder}: cannot be written"):
         if discard_raw_data(raw):

@@ -53,7 +53,7 @@ class PlatformMove:
     def arguments(self, daemon: Daemon) -> dict[str, Any]:
         """Return the arguments of the program `pose`; raises BadInputError."""
         description = daemon.get("/description")
-        require_platform(description, self.typed, "; its axes are moved by AXIS=ANGLE...")
+        require_platform(description, self.typed, "; move its axes with AXIS=ANGLE...")
         platform = description["platform"]
         names = _COORDINATES[len(platform["home_m"])]
         turns = [name for name in platform.get("controlled", ()) if name in _ANGLES]
@@ -62,12 +62,12 @@ class PlatformMove:
         if self.rotate is not None:
             if not turns:
                 raise BadInputError(
-                    f"--rotate {self.rotate}: no angle of this platform is controlled; allowed: "
-                    f"--to {' '.join(names).upper()}"
+                    f"--rotate {self.rotate}: this platform has no controlled angle; allowed: --to "
+                    f"{' '.join(names).upper()}"
                 )
             rotate = numbers("--rotate", self.rotate, turns, "deg", math.radians(1.0))
         if not self.relative and self.frame is not ReferenceFrame.ROOM:
-            raise BadInputError(f"--frame {self.frame}: allowed: together with --relative")
+            raise BadInputError(f"--frame {self.frame}: allowed only with --relative")
         if to is not None and not self.relative:
             self._require_millimetres(to, platform)
         keys = ("distance_m", "turn_rad") if self.relative else ("position_m", "rotation_rad")
@@ -96,7 +96,7 @@ class PlatformMove:
         """Raise BadInputError if the typed position is in the workspace only if read as metres."""
         if _is_inside([1e3 * x for x in to], platform) and not _is_inside(to, platform):
             in_mm = " ".join(f"{1e6 * x:g}" for x in to)
-            raise BadInputError(f"--to {self.to}: were metres typed? In mm: --to {in_mm}")
+            raise BadInputError(f"--to {self.to}: are these metres? In mm: --to {in_mm}")
 
 
 def _is_inside(position_m: Sequence[float], platform: dict[str, Any]) -> bool:
@@ -165,8 +165,8 @@ def move(
         str | None,
         typer.Option(
             metavar="RX RY RZ | ANGLE",
-            help="The platform to this rotation vector from its orientation at home, in deg; an "
-            "angle in a plane.",
+            help="Turn the platform to this rotation vector from its orientation at home, in "
+            "deg; in a plane one angle.",
         ),
     ] = None,
     relative: Annotated[
@@ -174,7 +174,7 @@ def move(
     ] = False,
     frame: Annotated[
         ReferenceFrame,
-        typer.Option(help="With --relative: along and about whose axes the platform moves."),
+        typer.Option(help="With --relative: the axes along and about which the platform moves."),
     ] = ReferenceFrame.ROOM,
     cable: Annotated[
         bool, typer.Option("--cable", help="Relative, in mm of cable; positive pays out.")
@@ -183,7 +183,8 @@ def move(
         float | None,
         typer.Option(
             min=0.01,
-            help="Top speed: deg/s at the motor; mm/s of a platform, its rotation scaled alike.",
+            help="Top speed: deg/s at the motor, or mm/s of a platform, whose rotation slows "
+            "down in proportion.",
         ),
     ] = None,
 ) -> None:
@@ -200,7 +201,7 @@ def move(
             run_to_end(daemon, out, "pose", move.arguments(daemon), arrived=True)
         return
     if frame is not ReferenceFrame.ROOM:
-        raise BadInputError(f"--frame {frame}: allowed: together with --to or --rotate")
+        raise BadInputError(f"--frame {frame}: allowed only with --to or --rotate")
     goals = _goals(daemon, axes or [], cable)
 
     def motion(robot: Robot) -> None:
@@ -244,7 +245,7 @@ def _goals(daemon: Daemon, axes: list[str], cable: bool) -> list[float]:
         )
     if "pid" not in daemon.get("/description").get("programs", ["pid"]):
         raise BadInputError(
-            f"{axes[0]}: the platform is moved as a whole; allowed: --to and --rotate, or "
+            f"{axes[0]}: this robot moves its platform; allowed: --to and --rotate, or "
             "`cdpr jog` for a single winch"
         )
     n, goals = _given(daemon, axes, "mm" if cable else "deg")
@@ -265,7 +266,7 @@ def controller(
     seconds: Annotated[
         float | None,
         typer.Option(
-            min=0.1, help="End after this many seconds; at the program's own end otherwise."
+            min=0.1, help="End after this many seconds; by default when the program is done."
         ),
     ] = None,
 ) -> None:
@@ -310,9 +311,9 @@ def tighten(
         LengthSource | None,
         typer.Option(
             "--from",
-            help="From what the cables' lengths follow: the platform stands at home, they are "
-            "those of the last stop, or the lengths that the daemon knows. By default what it "
-            "knows, else home.",
+            help="Source of the cable lengths: the platform stands at home, the lengths of the "
+            "last stop, or the lengths that the daemon knows. Default: what it knows, else "
+            "home.",
         ),
     ] = None,
 ) -> None:
@@ -331,7 +332,7 @@ def lower(
     out: Output,
     blind: Annotated[
         bool,
-        typer.Option("--blind", help="Every winch just lets its cable out, wherever that leads."),
+        typer.Option("--blind", help="Every winch pays out its cable, wherever that leads."),
     ] = False,
 ) -> None:
     """Lower the platform onto its stand and slacken the cables; the power stays on."""
@@ -340,8 +341,8 @@ def lower(
     status = daemon.get("/status")
     if status["program"] == "lower" and status["control"]["held"]:
         raise WorkFailedError(
-            f"lower: the platform is being lowered already, by {status['control']['client']}; "
-            "`cdpr status --watch` shows it"
+            f"lower: {status['control']['client']} is already lowering the platform; `cdpr "
+            "status --watch` shows it"
         )
     tight = (status.get("program_progress") or {}).get("tight")
     where = "lowered blind" if blind else "on its stand" if tight else "where it is"

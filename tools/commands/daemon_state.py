@@ -37,7 +37,7 @@ from cdpr_tools.signals import stop_on_signals
 
 _WATCH_S = 0.2
 _ANSWER_S = 10.0
-"""A service that takes longer hangs; then a signal asks the loop to end."""
+"""Longest time of an answer; a slower service hangs, and a signal then ends the loop."""
 _BOOT_S = 60.0
 _BOOTING = ("unconfigured", "inactive")
 
@@ -101,7 +101,7 @@ def enable(
 ) -> None:
     """Switch the drives on; they hold their position.
 
-    If they have power already, nothing changes.
+    If they already have power, nothing changes.
     """
     status = _booted(daemon, out)
     if status["state"] == "active":
@@ -117,12 +117,11 @@ def enable(
 
 
 def _require_no_stop(status: dict[str, Any]) -> None:
-    """Raise WorkFailedError if the robot is being stopped: the stop would undo the request."""
+    """Raise WorkFailedError during a stop, because the stop would undo the request."""
     if (reaction := str(status.get("reacting", "none"))) != "none":
         reason = f": {status['reason']}" if status["reason"] else ""
         raise WorkFailedError(
-            f"the robot is being stopped, {reaction} under way{reason}; `cdpr status` says when it "
-            "has ended"
+            f"the robot is stopping ({reaction}){reason}; `cdpr status` shows when it has ended"
         )
 
 
@@ -153,7 +152,11 @@ def disable(daemon: Daemon, out: Output) -> None:
         if refusal is None or refusal.arguments.get("state") != "fault":
             raise
         answer = {"state": "fault", "text": daemon.get("/status")["reason"]}
-        _show(out, answer, "stopped by it already; next: `cdpr ack`, once its cause is gone")
+        _show(
+            out,
+            answer,
+            "it has already stopped the robot; next: `cdpr ack`, after its cause is removed",
+        )
         return
     _show(out, answer)
 
@@ -168,7 +171,7 @@ def hold(daemon: Daemon, out: Output) -> None:
 @app.command()
 @with_daemon
 def ack(daemon: Daemon, out: Output) -> None:
-    """Acknowledge a fault after its cause has been removed; gives no power."""
+    """Acknowledge a fault after its cause has been removed; the power stays off."""
     status = daemon.get("/status")
     if (state := status["state"]) in ("ready", "active"):
         _require_no_stop(status)
@@ -189,9 +192,9 @@ def stop(
 ) -> None:
     """Stop the motion under control, switch the drives off and end the daemon.
 
-    The exit status is 0 if the drives have no power afterwards, or nothing ran. It is 1 if the loop
-    had died or dies meanwhile, if a drive does not answer and may have power, or if the daemon does
-    not end or may not have ended.
+    The exit status is 0 if the drives have no power afterwards, or if no daemon ran. It is 1 if the
+    loop died, if a drive does not answer and may have power, or if it is not certain that the
+    daemon has ended.
     """
     out = Output(as_json)
     try:
@@ -215,4 +218,4 @@ def _confirm(state: dict[str, Any], yes: bool) -> None:
     real = [url for url in urls if not url.startswith("simbus:")]
     if not is_simulated(state):
         where = " and ".join(real) or "its buses"
-        require_consent(f"{state['robot']} on {where}: the drives get power.", yes)
+        require_consent(f"{state['robot']} on {where}: the drives will be switched on.", yes)

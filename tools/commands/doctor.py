@@ -24,29 +24,31 @@ def doctor(
     report: Annotated[
         Path | None,
         typer.Option(
-            help="Write all that a report of a fault should have into this file; it holds no keys.",
+            help="Write everything that a fault report needs into this file; it contains no keys.",
         ),
     ] = None,
     robot: Annotated[
         list[str] | None,
-        typer.Option("--robot", help="With --report: a robot's file to put in; may be repeated."),
+        typer.Option("--robot", help="With --report: a robot's file to include; may be repeated."),
     ] = None,
     overwrite: Annotated[
-        bool, typer.Option("--overwrite", help="Replace the --report that is there already.")
+        bool, typer.Option("--overwrite", help="Replace an existing --report file.")
     ] = False,
     compile_all: Annotated[
         bool,
         typer.Option(
             "--compile",
-            help="Only compile all numeric kernels, for minutes; no command does it later.",
+            help="Only compile all numeric kernels. This takes minutes, and no command does it "
+            "later.",
         ),
     ] = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Check this machine, and say what to fix before it runs a robot.
+    """Check this machine, and list what to fix before it runs a robot.
 
-    Changes no setting. A `problem` must be fixed; a `note` would make cycles more punctual.
-    --report writes versions, findings, robot files and the end of the last recording to a file.
+    Changes no setting. A `problem` must be fixed. A `note` would make the timing of cycles more
+    regular. --report writes versions, findings, robot files and the end of the last recording to a
+    file.
     """
     out = Output(as_json)
     if compile_all:
@@ -55,9 +57,9 @@ def doctor(
 
         if not compile_kernels(len(os.sched_getaffinity(0))):
             raise WorkFailedError(
-                "--compile: compiled kernels cannot be kept: neither the program's folder nor the "
-                f"user's cache can be written, nor can {temporary_folder()}; set NUMBA_CACHE_DIR "
-                "to a folder that can be written"
+                "--compile: compiled kernels cannot be kept: the program's folder, the user's "
+                f"cache and {temporary_folder()} are not writable; set NUMBA_CACHE_DIR to a "
+                "writable folder"
             )
         out.say("all kernels are compiled")
         out.result({"ok": True})
@@ -67,7 +69,7 @@ def doctor(
     if report is not None:
         require_free("--report", report, overwrite)
         if not report.parent.is_dir():
-            raise BadInputError(f"--report {report}: allowed: a file in a folder that is there")
+            raise BadInputError(f"--report {report}: allowed: a file in an existing folder")
     findings = list(look_around())
     for f in findings:
         out.say(*lines_of(f))

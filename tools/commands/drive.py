@@ -117,7 +117,7 @@ def enable(
 @app.command()
 @with_winch
 def reset(winch: WinchOnBus, out: Output, safety_io: SafetyIoOption = None) -> None:
-    """Acknowledge the drive's fault; gives no power."""
+    """Acknowledge the drive's fault; the power stays off."""
     opened = open_winch(winch.profile, winch.url, out, winch.plant, safety_io=safety_io, reset=True)
     with opened as session:
         state = session.device.states()[0].label
@@ -142,7 +142,7 @@ def home(
     with winch.powered("homing turns the motor by up to a turn") as session:
         session.find_index(method)
         position = math.degrees(session.device.feedback.position_rad[0])
-        out.say(f"homed by method {method}; the motor stands {position:.2f} deg from there")
+        out.say(f"homed by method {method}; the motor is {position:.2f} deg from the origin")
     out.result({"ok": True, "method": method, "position_deg": position})
 
 
@@ -175,7 +175,7 @@ def jog(
         moved = math.degrees(session.device.feedback.position_rad[0] - start[0])
         session.disable()
     asked = speed_deg_s * seconds
-    out.say(f"turned by {moved:.2f} deg, asked for {asked:g} deg")
+    out.say(f"turned by {moved:.2f} deg; commanded {asked:g} deg")
     out.result({"ok": True, "moved_deg": moved, "asked_deg": asked})
 
 
@@ -192,7 +192,7 @@ def _jog_controller(session: Session) -> Pid:
 def od(
     winch: WinchOnBus,
     out: Output,
-    entry: Annotated[str, typer.Argument(help="Object, as 6064 or 1018:1, hexadecimal.")],
+    entry: Annotated[str, typer.Argument(help="Object, hexadecimal, such as 6064 or 1018:1.")],
     value: Annotated[
         str | None, typer.Option("--set", help="Write this integer (0x.. for hexadecimal).")
     ] = None,
@@ -206,7 +206,9 @@ def od(
             try:
                 number = int(value, 0)
             except ValueError:
-                raise BadInputError(f"--set {value}: an integer is wanted, as 12 or 0x0C") from None
+                raise BadInputError(
+                    f"--set {value}: allowed: an integer, such as 12 or 0x0C"
+                ) from None
             confirm_motion(winch.url, yes, f"object {index:04X}h:{sub} is set to {number}")
             network.write(node, index, sub, number)
         read = network.read(node, index, sub)
@@ -223,7 +225,7 @@ def _object(text: str) -> tuple[int, int]:
     except ValueError:
         numbers = -1, -1
     if not (0 < numbers[0] <= 0xFFFF and 0 <= numbers[1] <= 0xFF):
-        raise BadInputError(f"object {text!r}: write it as 6064 or 1018:1, hexadecimal")
+        raise BadInputError(f"object {text!r}: write it in hexadecimal, such as 6064 or 1018:1")
     return numbers
 
 
@@ -233,10 +235,10 @@ def configure(
     winch: WinchOnBus,
     out: Output,
     store: Annotated[
-        bool, typer.Option("--store", help="Have the drive keep it over power-off (1010h).")
+        bool, typer.Option("--store", help="Store the configuration in the drive (1010h).")
     ] = False,
 ) -> None:
-    """Write into the drive what differs from its profile; nothing is enabled."""
+    """Write the configuration of the profile to the drive; nothing is enabled."""
     profile = winch.profile
     node = profile.node_id
     with winch.network() as network:
@@ -246,9 +248,9 @@ def configure(
     for change in report.changed:
         out.say(f"written: {change}")
     for absent in report.absent:
-        out.say(f"not there: {absent}")
+        out.say(f"the drive does not have: {absent}")
     if report.stamp_matched:
-        out.say("the drive holds this configuration stored (1020h)")
+        out.say("the drive has stored this configuration (1020h)")
     elif not report.changed:
         out.say("nothing differs")
     if store and not (report.stored or report.stamp_matched):
@@ -280,7 +282,7 @@ def errors(winch: WinchOnBus, out: Output) -> None:
         more = f", manufacturer's {record.additional:04X}h" if record.additional else ""
         out.say(f"{record}{more}")
     if not history:
-        out.say("no errors remembered")
+        out.say("no stored errors")
     out.result(
         {
             "ok": True,

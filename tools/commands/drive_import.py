@@ -54,7 +54,9 @@ app = typer.Typer()
 def import_drive(
     file: Annotated[Path, typer.Argument(help="EDS or DCF of the drive.", metavar="FILE")],
     out_dir: Annotated[Path, typer.Option("--out", help="Folder for the profile.")] = Path(),
-    name: Annotated[str | None, typer.Option(help="Name of the profile; else the file's.")] = None,
+    name: Annotated[
+        str | None, typer.Option(help="Name of the profile; default the name of the file.")
+    ] = None,
     as_json: JsonOption = False,
 ) -> None:
     """Make a drive profile from an EDS or DCF file, and list what is missing."""
@@ -135,7 +137,7 @@ def _show(out: Output, eds: DataSheet, made: Proposal, profile: Path, copy: Path
     for key, (status, how) in made.verified.items():
         out.say(f"{key:23} {_shown(key, made.table[key]):43} {status}: {how}")
     out.say("")
-    out.say("What the file cannot tell:")
+    out.say("Not in the file:")
     for unknown in made.unknown:
         out.say(f"  {unknown.what}")
         out.say(f"      {unknown.why}")
@@ -191,7 +193,7 @@ class Proposal:
 
 
 _LOOK = "`cdpr drive od WINCH {} --bus URL` reads it"
-_REFUSES = "the boot refuses a drive whose identity differs"
+_REFUSES = "the boot rejects a drive whose identity differs"
 _SCAN = "`cdpr bus scan --bus URL` shows it; write it into the profile"
 _TOPICS = {
     **{
@@ -200,29 +202,29 @@ _TOPICS = {
     },
     "firmware": Unknown(
         "revision of your drive",
-        "makers ship newer firmware than the EDS is for, which the boot refuses (step N)",
-        "`cdpr bus scan --bus URL`; ask the maker whether the EDS fits that firmware",
+        "a drive may have newer firmware than the EDS, which the boot rejects (step N)",
+        "`cdpr bus scan --bus URL`; ask the maker whether the EDS is for that firmware",
     ),
     "modes": Unknown(
         "modes of operation",
-        "the EDS has no value of 6502h; they are guessed from the objects that are there",
+        "the EDS has no value of 6502h; the modes are guessed from the objects in it",
         _LOOK.format("6502") + ", bit 3 is PT, bit 9 CST",
     ),
     "slope": Unknown(
         "torque_slope_Nm_s (6087h)",
         "in PT the torque follows a ramp, which is a lag in the loop",
-        "the steepest that 6087h takes: manual, or upper limit in the EDS",
+        "the steepest slope that 6087h accepts: manual, or upper limit in the EDS",
     ),
     "homing": Unknown(
         "homing methods",
         "the EDS has no list of them (60E3h)",
-        "manual; `cdpr drive home WINCH --method 34 --bus URL` shows whether it takes one",
+        "manual; `cdpr drive home WINCH --method 34 --bus URL` shows whether it accepts one",
     ),
     "torque_unit": Unknown(
         "torque_unit (6071h, 6077h)",
         "a wrong one makes every torque wrong by a factor",
-        "manual (a drive without 6076h rather counts in mNm); 6077h beside the current of "
-        "6078h while the motor is held",
+        "manual (a drive without 6076h often uses mNm); compare 6077h with the current "
+        "in 6078h while the motor is held",
     ),
     "other_units": Unknown(
         "velocity_unit, acceleration_unit (6099h, 609Ah)",
@@ -231,19 +233,19 @@ _TOPICS = {
     ),
     "position_sign": Unknown(
         "position_sign",
-        "the controller must know which way 6064h counts",
-        "turn the shaft by hand the way that is to be positive; "
+        "the controller must know the direction in which 6064h counts",
+        "turn the shaft by hand in the positive direction; "
         + _LOOK.format("6064")
         + ", it must grow",
     ),
     "torque_sign": Unknown(
         "torque_sign",
-        "with a wrong one the first motion runs away, and is stopped",
+        "with the wrong sign the motor runs away at the first motion, and is stopped",
         "`cdpr drive jog WINCH --bus URL` on a free shaft: it ends if something is wrong",
     ),
     "homing_sign": Unknown(
         "homing_sign",
-        "method 34 must turn the way position grows",
+        "method 34 must turn in the direction in which the position grows",
         "`cdpr drive home WINCH --method 34 --bus URL` on a free shaft",
     ),
     "quirks": Unknown(
@@ -258,24 +260,24 @@ _TOPICS = {
     ),
     "delays": Unknown(
         "feedback_delay_s, torque_delay_s",
-        "the compensation looks ahead by them",
-        "manual: cycle of the position and current loop; the commissioning's report shows a "
-        "residue that grows with speed when they are wrong",
+        "the compensation looks ahead by these delays",
+        "manual: cycle of the position and current loop; if they are wrong, the "
+        "commissioning report shows an error that grows with speed",
     ),
     "timeouts": Unknown(
         "state_timeout_s, mode_display_timeout_s",
         "drives with a brake or a slow power stage need longer",
-        "manual; `cdpr drive enable WINCH --bus URL` tells which state was not reached",
+        "manual; `cdpr drive enable WINCH --bus URL` shows which state was not reached",
     ),
     "mode_display": Unknown(
         "mode display in a PDO",
-        "6061h is in no map, so the mode is asked for by SDO",
+        "no PDO maps 6061h, so the master reads the mode by SDO",
         "nothing to do; a TPDO with 6061h is quicker",
     ),
     "touch_probe": Unknown(
         "touch probe (60B8h, 60B9h, 60BAh)",
-        "not in the maps: the index can be found by homing only",
-        "manual: zero pulse as a source of the touch probe",
+        "not mapped: the index can be found only by homing",
+        "manual: the zero pulse as source of the touch probe",
     ),
 }
 _ASSUMPTIONS = {
@@ -288,7 +290,7 @@ _ASSUMPTIONS = {
     "homing_sign": (1, "no EDS tells it"),
     "mode_display_timeout_s": (0.5, "generous"),
     "state_timeout_s": (1.0, "generous"),
-    "feedback_delay_s": (0.0005, "usual for a drive which samples at 2 kHz"),
+    "feedback_delay_s": (0.0005, "usual for a drive that samples at 2 kHz"),
     "torque_delay_s": (0.00032, "first-order lag of a 500 Hz current loop"),
     "heartbeat_producer_s": (0.1, "our choice, written to 1017h"),
     "heartbeat_consumer_s": (0.5, "our choice, written to 1016h"),
@@ -300,11 +302,12 @@ _MAKERS = {
 _CONSEQUENCES = {
     0x1006: "the drive does not know the cycle's period",
     0x1008: "the boot cannot show the device's name",
-    0x1016: "the drive does not notice a master that falls silent: find out what stops it then",
+    0x1016: "the drive does not detect the loss of the master: find out what stops the "
+    "drive in that case",
     0x1017: "the drive sends no heartbeat: the master cannot supervise it (step K)",
-    0x6007: "what the drive does when its master is lost is not set: manual",
-    0x603F: "faults are reported without their code",
-    0x605A: "how the drive stops is not set: manual",
+    0x6007: "the reaction to the loss of the master is not set: manual",
+    0x603F: "faults are reported without a code",
+    0x605A: "the reaction to quick stop is not set: manual",
     0x6072: "the drive does not limit the torque as the master does",
     0x6076: "the motor's rated torque is taken from its profile",
     0x608F: "the encoder's resolution is taken from the winch's file",
@@ -322,7 +325,7 @@ def propose(eds: DataSheet) -> Proposal:
         entry = eds.get(index)
         if entry is None or bits_of(entry) != _BITS[index]:
             has = (
-                "is no variable"
+                "is not a variable"
                 if entry is None
                 else (f"value 0x{entry.data_type:04X} has {bits_of(entry)} bits")
             )
@@ -418,8 +421,9 @@ def _modes(made: Proposal, eds: DataSheet) -> None:
         raise ProfileError(
             eds.path,
             "[6502] DefaultValue",
-            f"value {mask:#x} has the modes {', '.join(map(str, modes))} only; allowed: one with 4 "
-            "(PT, bit 3) or 10 (CST, bit 9), since winches are driven by torque",
+            f"value {mask:#x} has only the modes {', '.join(map(str, modes))}; allowed: a "
+            "drive with mode 4 (PT, bit 3) or 10 (CST, bit 9), because winches need torque "
+            "control",
         )
     made.set("supported_modes", modes, *source)
     made.set("mode_torque", int(torque[0]), *source)
@@ -435,7 +439,7 @@ def _torque_slope(made: Proposal, eds: DataSheet) -> None:
         how = "upper limit of 6087h by the default of 6076h in the EDS"
         made.set("torque_slope_Nm_s", round(steepest, 3), _MANUAL, how)
     else:
-        how = "steep enough not to be felt"
+        how = "steep enough to have no effect"
         made.set("torque_slope_Nm_s", _DEFAULT_SLOPE_Nm_s, _ASSUMED, how)
     made.find_out("slope")
 
@@ -455,7 +459,9 @@ def _homing(made: Proposal, eds: DataSheet) -> None:
     if methods:
         made.set("homing_methods", methods, _MANUAL, "60E3h in the EDS")
     elif _IN_PLACE in eds.od.indices:
-        made.set("homing_methods", [33, 34], _ASSUMED, "the standard's, to the index")
+        made.set(
+            "homing_methods", [33, 34], _ASSUMED, "those of the standard that end at the index"
+        )
         made.find_out("homing")
     else:
         made.set("homing_methods", [], _MANUAL, "6098h is not in the EDS")
@@ -467,8 +473,8 @@ def _pdos(made: Proposal, eds: DataSheet) -> None:
         status = _MANUAL if choice.how.startswith("map by default") else _ASSUMED
         made.set(key, choice.pdos, status, choice.how)
         if status == _ASSUMED:
-            what, why = f"{key}: {choice.how}", "a drive may refuse a map that its EDS allows"
-            how = "the boot writes it and says which object was refused (step J)"
+            what, why = f"{key}: {choice.how}", "a drive may reject a map that its EDS allows"
+            how = "the boot writes it and names the rejected object (step J)"
             made.unknown.append(Unknown(what, why, how))
     if _MODE_SHOWN not in tpdos.indexes:
         made.find_out("mode_display")
@@ -574,7 +580,7 @@ def _choose(
     blocked = [index for index in objects if not _mappable(eds, index)]
     for offer in usable:
         if not blocked and offer.room >= len(objects):
-            how = "a map of our own, which by the EDS the drive lets be written"
+            how = "a map chosen here; according to the EDS it can be written"
             return _Choice([offer.table(_whole(objects), _EVERY_SYNC)], how)
     missing, chosen = list(objects), []
     for offer in usable:
@@ -586,7 +592,7 @@ def _choose(
             chosen.append(offer.table(entries, _EVERY_SYNC))
             missing = [index for index in missing if index not in {e[0] for e in entries}]
         if not missing:
-            return _Choice(chosen, "spread over several PDOs, since none has room for all")
+            return _Choice(chosen, "in several PDOs, because no PDO has room for all")
     raise ProfileError(eds.path, kind, _reason(offers, usable, blocked, objects, kind))
 
 
@@ -602,10 +608,13 @@ def _reason(
     if not offers:
         return problem + f"the file describes no {kind}"
     if not usable:
-        return problem + "none can answer every SYNC (transmission type 1 cannot be written)"
+        return (
+            problem
+            + "no PDO can be set to answer every SYNC (transmission type 1 cannot be written)"
+        )
     if blocked:
         names = ", ".join(f"[{index:04X}] PDOMapping" for index in blocked)
-        return problem + f"{names} is not 1, and no map by default has it"
+        return problem + f"{names} is not 1, and no default map contains it"
     return problem + "the maps are fixed, or have too few entries that can be written"
 
 
@@ -615,7 +624,7 @@ def _offers(eds: DataSheet, first: int, predefined: int) -> list[_Offer]:
 
 
 def _offer(eds: DataSheet, first: int, number: int, predefined: int) -> _Offer | None:
-    """Return a PDO of the file, None if it is missing or has no usable identifier."""
+    """Return a PDO of the file, or None if it is missing or has no usable identifier."""
     index, mapping = first + number - 1, first + number + 0x1FF
     kind, count, places = eds.get(index, 2), eds.get(mapping), eds.subs(mapping)
     if eds.get(index, 1) is None or kind is None or not places:
@@ -640,7 +649,10 @@ def _entries(eds: DataSheet, mapping: int) -> tuple[_Entry, ...]:
         index, of, bits = value >> 16, value >> 8 & 0xFF, value & 0xFF
         mapped = eds.get(index, of)
         if mapped is None or bits_of(mapped) != bits or bits not in (8, 16, 32):
-            problem = f"maps {index:04X}h:{of} with {bits} bits, which the file does not have so"
+            problem = (
+                f"maps {index:04X}h:{of} with {bits} bits, but the file describes the object "
+                "differently"
+            )
             eds.remarks.add(f"[{mapping:04X}sub{sub:X}]", problem)
             return ()
         entries.append((index, of, bits))
@@ -678,9 +690,9 @@ def profile_text(made: Proposal, eds_name: str, source: str) -> str:
     """Return the profile as TOML with comments."""
     table = made.table
     lines = [
-        f"# Made from {_printable(source)} by `cdpr drive import`: see [verified] for what is "
-        "assumed,",
-        "# and docs/how-to/describing-your-drive.md for how to find it out.",
+        f"# Made from {_printable(source)} by `cdpr drive import`: see [verified] for "
+        "assumed values,",
+        "# and docs/how-to/describing-your-drive.md for how to check them.",
         f"name = {_toml(table['name'])}",
         f"eds = {_toml(eds_name)}",
         "",

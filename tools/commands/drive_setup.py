@@ -56,7 +56,7 @@ class _Device:
         return dataclasses.asdict(self.address) | {"node_id": own, "profile": self.profile}
 
     def __str__(self) -> str:
-        without = {UNCONFIGURED: "no node id", NODE_ID_UNKNOWN: "node id not told"}
+        without = {UNCONFIGURED: "no node id", NODE_ID_UNKNOWN: "node id unknown"}
         node_id = without.get(self.node_id, f"node id {self.node_id}")
         return f"{self.address}: {node_id}; " + (
             f"profile {self.profile}" if self.profile else "no profile fits"
@@ -96,33 +96,32 @@ def lss(
     ] = False,
     node_id: Annotated[int | None, typer.Option(min=1, max=127, help="Node id to give it.")] = None,
     bitrate: Annotated[
-        str | None, typer.Option(help="Bit rate to give it, as 500k; counts from power-on.")
+        str | None,
+        typer.Option(help="Bit rate to give it, such as 500k; takes effect at the next power-on."),
     ] = None,
     activate: Annotated[
         bool,
         typer.Option(
-            "--activate", help="Change the bit rate immediately; you change that of the bus."
+            "--activate", help="Change the bit rate immediately; you must change that of the bus."
         ),
     ] = False,
     switch_delay_ms: Annotated[
         int, typer.Option(min=1, max=30_000, help="Silence before and after --activate.")
     ] = 1000,
-    store: Annotated[bool, typer.Option("--store/--no-store", help="Keep it over power-off.")] = (
+    store: Annotated[bool, typer.Option("--store/--no-store", help="Store it in the device.")] = (
         True
     ),
     timeout_ms: Annotated[
-        int, typer.Option("--timeout-ms", min=1, max=10_000, help="A device answers within this.")
+        int, typer.Option("--timeout-ms", min=1, max=10_000, help="Longest time for an answer.")
     ] = 100,
-    yes: Annotated[bool, typer.Option("--yes", help="Do not ask before it is written.")] = False,
+    yes: Annotated[bool, typer.Option("--yes", help="Do not ask before writing.")] = False,
     as_json: JsonOption = False,
 ) -> None:
     """Find drives by LSS (CiA 305) and set a node id and bit rate."""
     out = Output(as_json)
     url = open_bus(bus)
     if url.starts_own_simulator:
-        raise BadInputError(
-            f"--bus {bus}: name the bus whose drives are looked for, as simbus:NAME"
-        )
+        raise BadInputError(f"--bus {bus}: name an existing bus, such as simbus:NAME")
     if activate and bitrate is None:
         raise BadInputError("--activate: only with --bitrate")
     if serial is not None and serial > 0xFFFFFFFF:
@@ -264,10 +263,10 @@ def _check_power(master: LssMaster, node_id: int) -> None:
         if state in POWER_OFF:
             return
         raise WorkFailedError(
-            f"node {node_id} has its power stage enabled: stop whoever drives it first"
+            f"node {node_id} has its power stage enabled: stop the other master first"
         )
     raise WorkFailedError(
-        f"node {node_id} does not tell whether its power stage is enabled: {reason}"
+        f"node {node_id} does not report whether its power stage is enabled: {reason}"
     )
 
 
@@ -282,7 +281,7 @@ def _set(master: LssMaster, device: _Device, new: _NewSettings, out: Output) -> 
             master.store()
         except LssError as error:
             raise WorkFailedError(
-                f"{error}; what was set is lost at power-off (--no-store does without storing)"
+                f"{error}; the settings are lost at power-off (--no-store skips storing)"
             ) from error
     out.say(f"{device.address}: {new} set" + (" and stored" if new.store else ", not stored"))
     if new.node_id is not None:
@@ -309,13 +308,14 @@ def _change_over(master: LssMaster, device: _Device, new: _NewSettings, out: Out
     rate = f"{(new.bitrate_bit_s or 0) // 1000} kbit/s"
     if new.activate_delay_s is None:
         out.say(
-            f"{rate} count from the next power-on, when the whole bus must have them: every other "
-            "drive, the adapter, and bitrate_bit_s in the winch's file"
+            f"{rate} take effect at the next power-on; then the whole bus must use this "
+            "rate: every other drive, the adapter, and bitrate_bit_s in the winch's file"
         )
         return
     _select(master, device)
     master.activate_bitrate(new.activate_delay_s)
     out.say(
-        f"the device falls silent, changes to {rate} after {new.activate_delay_s:g} s and speaks "
-        f"again {new.activate_delay_s:g} s later; change the adapter's bit rate in between"
+        f"the device stops sending, changes to {rate} after {new.activate_delay_s:g} s "
+        f"and sends again {new.activate_delay_s:g} s later; change the adapter's bit "
+        "rate in between"
     )

@@ -25,7 +25,7 @@ app = typer.Typer()
 def estop(
     robot: Annotated[
         str | None,
-        typer.Argument(metavar="[ROBOT]", help="Which robot, where several daemons run."),
+        typer.Argument(metavar="[ROBOT]", help="Which robot, if several daemons run."),
     ] = None,
     named: Annotated[str | None, typer.Option("--robot", help="The same as ROBOT.")] = None,
     every: Annotated[
@@ -37,9 +37,9 @@ def estop(
     """Remove the power from a robot's drives immediately: no braking, no lowering.
 
     The command goes directly to the control loop's process, independent of the daemon's other
-    processes, and waits until the drives report that they have no power. If this cannot be
-    confirmed, it says so and the exit status is 1. This is not an emergency stop in the sense of a
-    safety standard: only the button is.
+    processes, and waits until the drives report that they have no power. If they do not, the
+    command says so and the exit status is 1. This is not an emergency stop in the sense of a safety
+    standard; that requires a button in hardware.
     """
     out = Output(as_json)
     # first send all stops, then wait
@@ -72,7 +72,7 @@ def _chosen(robots: tuple[str | None, ...], every: bool, socket: Path | None) ->
     if not found:
         whose = "" if robot is None else f" for {robot}"
         others = found_instead(filter(_lives, find_loops(None)), "; --all stops it")
-        raise WorkFailedError(f"no daemon's loop was found{whose}: nothing was stopped{others}")
+        raise WorkFailedError(f"no running loop was found{whose}: nothing was stopped{others}")
     if every or robot is not None or len(found) == 1:
         return found
     live = [path for path in found if _lives(path)]
@@ -85,7 +85,7 @@ def _chosen(robots: tuple[str | None, ...], every: bool, socket: Path | None) ->
 
 
 def _lives(path: Path) -> bool:
-    """Return whether the loop named in the file runs; True if that cannot be determined."""
+    """Return whether the loop named in the file runs; True if unknown."""
     try:
         return LoopFile.read(path).runs()
     except WorkFailedError:

@@ -10,11 +10,11 @@ DRIVE = {
     "drive": {
         "info": "Show the drive's identity and state; reads only.",
         "enable": "Enable the drive in torque mode without torque for a while, then switch it off.",
-        "reset": "Acknowledge the drive's fault; gives no power.",
+        "reset": "Acknowledge the drive's fault; the power stays off.",
         "home": "Find the encoder index by homing; the motor turns by up to a turn.",
         "jog": "Turn the motor at a constant speed under the PID, then switch it off.",
         "od": "Read or write an object of the drive's dictionary.",
-        "configure": "Write into the drive what differs from its profile; nothing is enabled.",
+        "configure": "Write the configuration of the profile to the drive; nothing is enabled.",
         "errors": "Show the drive's stored errors (1003h), newest first; reads only.",
     },
     "drive_setup": {
@@ -28,7 +28,7 @@ DRIVE = {
 ROBOT = {
     "robot": {
         "show": "Show a robot's platform, cables and workspace, and check whether it can work.",
-        "mark-calibrated": "Confirm the geometry in the robot's file, as after moving a rail.",
+        "mark-calibrated": "Confirm the geometry in the robot's file, e.g. after moving a rail.",
         "new": "Write a robot's file by answering questions.",
     },
     "robot_trial": {
@@ -46,19 +46,19 @@ SIM = {
     "sim_devices": {
         "safety-io": "Run a simulated safety I/O until Ctrl-C.",
         "panel": "Press or release the emergency stop of a simulated safety I/O, or break it.",
-        "rail": "Run a simulated rail until Ctrl-C; tells on standard output when it is up.",
+        "rail": "Run a simulated rail until Ctrl-C; prints a line when it is ready.",
     },
     "sim_fault": {
         "fault": "Inject a fault into a running simulated robot: a cable, an encoder, a drive.",
     },
     "sim_camera": {
-        "camera": "Run a camera on a simulated platform until Ctrl-C; other commands know it as "
+        "camera": "Run a camera on a simulated platform until Ctrl-C; other commands use it as "
         "sim:SOCKET.",
         "photos": "Write images of a simulated camera from random poses, and its intrinsics.",
     },
     "sim_tension": {
-        "tension": "Run simulated load cells on a pseudo-terminal until Ctrl-C; tells its path "
-        "when it is up.",
+        "tension": "Run simulated load cells on a pseudo-terminal until Ctrl-C; prints its path "
+        "when ready.",
         "hang": 'Hang a mass on a simulated cable whose plant has load.kind = "hung_mass".',
     },
     "sim_verify": {

@@ -26,7 +26,9 @@ app = typer.Typer(name="io", help="Show and test the safety I/O.", no_args_is_he
 _IoArgument = Annotated[
     str, typer.Argument(help="Profile: a name, a file, NAME@HOST:PORT.", metavar="IO")
 ]
-_Seconds = Annotated[float, typer.Option(min=0.1, max=86400.0, help="How long; Ctrl-C ends it.")]
+_Seconds = Annotated[
+    float, typer.Option(min=0.1, max=86400.0, help="Duration; Ctrl-C ends it early.")
+]
 
 
 @app.command()
@@ -84,7 +86,7 @@ def light(
         try:
             _keep(link, lamp.coil, not lamp.inverted, seconds)
             if not link.state().lights[colour]:
-                raise WorkFailedError(f"{colour} was set, but output {lamp.coil} reads otherwise")
+                raise WorkFailedError(f"{colour} was set, but output {lamp.coil} does not show it")
         except KeyboardInterrupt:
             out.note("stopped on request")
         finally:
@@ -115,7 +117,7 @@ def brake(
                 f"{link.name}: its outputs for contactor or brakes are on: another command uses it "
                 "(or has died: cdpr io off)"
             )
-        require_consent(f"{axis} is held by nothing but its drive then.", yes)
+        require_consent(f"Then only its drive holds {axis}.", yes)
         link.set_watchdog()
         with stop_on_signals() as stop_requested:
             try:
@@ -162,7 +164,7 @@ def ack(io: _IoArgument, as_json: JsonOption = False) -> None:
     kept = kept_trip(io)
     with connect(io, PacedClock()) as safety:
         safety.acknowledge()
-    out.say("no trip was kept" if kept is None else f"acknowledged: {kept.get('reason')}")
+    out.say("no trip to acknowledge" if kept is None else f"acknowledged: {kept.get('reason')}")
     out.result({"ok": True, "acknowledged": kept})
 
 

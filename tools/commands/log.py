@@ -36,13 +36,13 @@ _FilesArgument = Annotated[
     ),
 ]
 _FromOption = Annotated[
-    float, typer.Option("--from", help="Begin so many seconds after the first cycle.", min=0.0)
+    float, typer.Option("--from", help="Begin this many seconds after the first cycle.", min=0.0)
 ]
 _UntilOption = Annotated[
     float,
     typer.Option(
         "--until",
-        help="End so many seconds after the first cycle; with the last one by default.",
+        help="End this many seconds after the first cycle; default: the last cycle.",
         show_default=False,
     ),
 ]
@@ -54,7 +54,7 @@ def list_command(
     folder: Annotated[
         Path | None,
         typer.Argument(
-            help="Folder of recordings; that of `cdpr run` by default.", metavar="[FOLDER]"
+            help="Folder of recordings; default: that of `cdpr run`.", metavar="[FOLDER]"
         ),
     ] = None,
     as_json: JsonOption = False,
@@ -94,11 +94,13 @@ def export_command(
     files: _FilesArgument,
     target: Annotated[Path, typer.Option("--out", help="A name ending in .csv or .parquet.")],
     fields: Annotated[
-        str | None, typer.Option(help="Only these fields, with commas; all by default.")
+        str | None, typer.Option(help="Only these fields, separated by commas; default: all.")
     ] = None,
     from_s: _FromOption = 0.0,
     until_s: _UntilOption = float("inf"),
-    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the target.")] = False,
+    overwrite: Annotated[
+        bool, typer.Option("--overwrite", help="Replace an existing file.")
+    ] = False,
     as_json: JsonOption = False,
 ) -> None:
     """Write the cycles of recordings, one after the other, into one table."""
@@ -140,11 +142,11 @@ def plot(
     found = sessions(files_of(files))
     name = list(found)[-1]
     if len(found) > 1 and not every:
-        out.note(f"draws {name}, the newest of {len(found)} sessions; --all draws all")
+        out.note(f"drawing {name}, the newest of {len(found)} sessions; --all draws all")
         found = {name: found[name]}
     files = [path for some in found.values() for path in some]
     path = target or files[0].with_name(f"{name if len(files) > 1 else files[0].stem}.png")
-    with out.stage("loading what draws", quick=True):
+    with out.stage("loading the plotting library", quick=True):
         from cdpr_tools.recordings.picture import FIELDS, draw  # noqa: PLC0415  # slow to load
 
     selection = Selection(files, FIELDS, from_s, until_s)

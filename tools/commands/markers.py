@@ -142,8 +142,8 @@ def _require_fit(size_mm: float, squares: int, page: str) -> None:
     most = min(width - 2.0 * _MARGIN_mm, height - 2.0 * _MARGIN_mm - _TEXT_mm)
     if needed > most:
         raise BadInputError(
-            f"--size-mm {size_mm:g}: with the white around it {needed:.0f} mm; on {page} there are "
-            f"{most:.0f} mm, so {most * squares / (squares + 2):.0f} mm is the largest"
+            f"--size-mm {size_mm:g}: needs {needed:.0f} mm with its white edge; {page} has "
+            f"{most:.0f} mm, so {most * squares / (squares + 2):.0f} mm is the largest size"
         )
 
 
@@ -192,7 +192,7 @@ def _draw_bar(ax: Axes, width: float, y: float) -> None:
     ax.text(
         start + _BAR_mm / 2.0,
         y - 5.0,
-        "this bar is 100 mm long: measure it; print without scaling (100 %)",
+        "this bar should measure 100 mm; print without scaling (100 %)",
         ha="center",
         fontsize=8,
     )
@@ -230,7 +230,7 @@ def draw_map(fit: MapFit, path: Path) -> None:
     top.set(xlabel="x (m)", ylabel="y (m)", aspect="equal", title="marker map")
     top.autoscale_view()
     legend_beside_title(top)
-    colour_bar(figure, shades, top, "place known to (mm, 3 sigma)")
+    colour_bar(figure, shades, top, "uncertainty of the place (mm, 3 sigma)")
     start = map_.ids.index(fit.fixed[0])
     away = np.linalg.norm(map_.position_m - map_.position_m[start], axis=1)
     turn = map_.rotation[start]
@@ -238,7 +238,7 @@ def draw_map(fit: MapFit, path: Path) -> None:
     along = 3e3 * np.sqrt(variance[:, :2].sum(axis=1))
     low.plot(away[placed], along, "o", ms=4, label="along the plane of the reference marker")
     low.plot(away[placed], 3e3 * np.sqrt(variance[:, 2]), "s", ms=4, label="across it")
-    low.set(xlabel=f"distance from marker {fit.fixed[0]} (m)", ylabel="known to (mm, 3 sigma)")
+    low.set(xlabel=f"distance from marker {fit.fixed[0]} (m)", ylabel="uncertainty (mm, 3 sigma)")
     low.set_ylim(bottom=0.0)
     legend_beside_title(low)
     save_figure(figure, path)
@@ -252,10 +252,12 @@ _SizeOption = Annotated[
     float | None,
     typer.Option("--size-mm", min=1.0, max=10000.0, help="Width of the black square, outer edges."),
 ]
-_DictionaryOption = Annotated[str, typer.Option(help="Set of markers, as OpenCV calls it.")]
+_DictionaryOption = Annotated[
+    str, typer.Option(help="Dictionary of markers, by its name in OpenCV.")
+]
 _SheetsOption = Annotated[
     Path | None,
-    typer.Option("--markers", help="File with sizes, and places that are known, of markers."),
+    typer.Option("--markers", help="File with sizes and known places of markers."),
 ]
 _PageOption = Annotated[str, typer.Option(help=f"Paper: {', '.join(PAGES_mm)}.")]
 _PdfOption = Annotated[
@@ -266,7 +268,7 @@ _MIRROR_CHECKS = 12
 
 @app.command("print")
 def print_command(
-    ids: Annotated[str, typer.Argument(help="Marker numbers, as 0-39 or 0,3,7.", metavar="IDS")],
+    ids: Annotated[str, typer.Argument(help="Marker ids, such as 0-39 or 0,3,7.", metavar="IDS")],
     size_mm: _SizeOption = None,
     dictionary: _DictionaryOption = "4X4_100",
     sheets: _SheetsOption = None,
@@ -320,13 +322,16 @@ def map_command(
     folder: Annotated[Path, typer.Argument(help="Images, in the order of their names.")],
     camera: Annotated[
         Path | None,
-        typer.Option(help="Intrinsics of the camera; camera.toml in FOLDER where left out."),
+        typer.Option(help="Intrinsics of the camera; default: camera.toml in FOLDER."),
     ] = None,
     size_mm: _SizeOption = None,
     dictionary: _DictionaryOption = "4X4_100",
     sheets: _SheetsOption = None,
     reference: Annotated[
-        int | None, typer.Option(help="Marker in whose frame the map is; one is chosen otherwise.")
+        int | None,
+        typer.Option(
+            help="Marker whose frame is that of the map; chosen automatically by default."
+        ),
     ] = None,
     target: Annotated[
         Path | None, typer.Option("--out", help="Write the map here, as a file for --markers.")
@@ -385,7 +390,8 @@ def _require_set(pixels: NDArray[np.uint8], dictionary: str) -> None:
     shown = dictionary_shown(pixels)
     if shown is not None and shown != dictionary:
         raise BadInputError(
-            f"--dictionary {dictionary}: no image shows a marker of it; they show some of {shown}"
+            f"--dictionary {dictionary}: no image shows a marker of this dictionary; they "
+            f"show markers of {shown}"
         )
 
 
@@ -393,18 +399,21 @@ def _require_size(image: Image, intrinsics: CameraIntrinsics) -> None:
     height, width = image.pixels.shape
     if (width, height) != (intrinsics.width_px, intrinsics.height_px):
         raise BadInputError(
-            f"{image.name} has {width} x {height} pixels, the intrinsics are for "
-            f"{intrinsics.width_px} x {intrinsics.height_px}: another camera, or another resolution"
+            f"{image.name} has {width} x {height} pixels, but the intrinsics are for "
+            f"{intrinsics.width_px} x {intrinsics.height_px}: is it another camera or "
+            "resolution?"
         )
 
 
 def _sheets(path: Path | None, size_mm: float | None, dictionary: str) -> MarkerSheets:
     if path is not None:
         if size_mm is not None:
-            raise BadInputError("--size-mm and --markers: the file has the sizes; give one of them")
+            raise BadInputError(
+                "--size-mm and --markers: give only one of them, because the file has the sizes"
+            )
         return MarkerSheets.load_file(path)
     if size_mm is None:
-        raise BadInputError("--size-mm is missing: the width of the black square, as measured")
+        raise BadInputError("--size-mm is missing: give the measured width of the black square")
     table = {"dictionary": dictionary, "size_m": size_mm / 1e3}
     with raised_as(BadInputError, ProfileError):
         return validated(Path("--dictionary"), table, MarkerSheets)

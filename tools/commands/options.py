@@ -54,10 +54,10 @@ def shares(
 def written_as(
     *endings: str, mark: bytes = OWN_MARK
 ) -> Callable[[typer.CallbackParam, Path | None], Path | None]:
-    """Return the callback of an option for a file to write, whose name has one of these endings.
+    """Return the callback of an option for an output file, whose name has one of these endings.
 
-    It raises BadInputError before the work if the file could not be written afterwards, or if it
-    exists and `mark` is not at its beginning.
+    Before the work begins, it raises BadInputError if the file cannot be written, or if it exists
+    and does not begin with `mark`.
     """
 
     def checked(param: typer.CallbackParam, value: Path | None) -> Path | None:
@@ -70,7 +70,7 @@ def written_as(
             raise BadInputError(f"{typed}: allowed: a file in a folder that can be written to")
         if not may_replace(value, mark):
             raise BadInputError(
-                f"{typed}: is there already and was not written by cdpr; allowed: another name"
+                f"{typed}: already exists and was not written by cdpr; choose another name"
             )
         return value
 
@@ -97,10 +97,11 @@ RobotPlantOption = Annotated[
 ]
 SeedOption = Annotated[int, typer.Option(min=0, help="Random seed.")]
 CommissionedOption = Annotated[
-    Path | None, typer.Option(help="Folder that `cdpr commission ROBOT` has left.", metavar="DIR")
+    Path | None,
+    typer.Option(help="Folder with the results of `cdpr commission ROBOT`.", metavar="DIR"),
 ]
 AgainOption = Annotated[
-    bool, typer.Option("--again", help="Evaluate the data in --out again; nothing moves.")
+    bool, typer.Option("--again", help="Evaluate the data in --out again, without motion.")
 ]
 WinchArgument = Annotated[
     str, typer.Argument(help="Winch profile: a name or the path of a file.", metavar="WINCH")
@@ -160,7 +161,7 @@ IndexOption = Annotated[
     Index,
     typer.Option(
         "--index",
-        help="Find the encoder index by homing, or by the touch probe in ordinary motion.",
+        help="Find the encoder index by homing, or by touch probe during a normal motion.",
     ),
 ]
 
@@ -168,7 +169,7 @@ SafetyIoOption = Annotated[
     str | None,
     typer.Option(
         "--safety-io",
-        help="Safety I/O without which there is no power: a name, a file, NAME@HOST:PORT.",
+        help="Safety I/O that must permit power: a name, a file, NAME@HOST:PORT.",
         metavar="IO",
     ),
 ]
@@ -177,7 +178,7 @@ SensorsOption = Annotated[
     str | None,
     typer.Option(
         "--sensors",
-        help="Tension sensors, a name or a file: too much tension or none known stops the motion.",
+        help="Tension sensors, a name or a file: too high or unknown tension stops the motion.",
         metavar="SENSORS",
     ),
 ]
@@ -203,28 +204,30 @@ RobotOption = Annotated[
     ),
 ]
 SocketOption = Annotated[
-    Path | None, typer.Option("--socket", help="The daemon's Unix socket, if not this user's.")
+    Path | None, typer.Option("--socket", help="The daemon's Unix socket, if not the default.")
 ]
 UrlOption = Annotated[
-    str | None, typer.Option("--url", metavar="http://HOST:PORT", help="A daemon elsewhere.")
+    str | None,
+    typer.Option("--url", metavar="http://HOST:PORT", help="URL of a daemon on another machine."),
 ]
 KeyFileOption = Annotated[
     Path | None, typer.Option("--key-file", help="File with the key for --url.")
 ]
 ClusterOption = Annotated[
     str | None,
-    typer.Option("--cluster", metavar="ADDRESS", help="A Ray cluster that does the work instead."),
+    typer.Option("--cluster", metavar="ADDRESS", help="Compute on this Ray cluster."),
 ]
 HandEyeOption = Annotated[
     Path | None,
     typer.Option(
         "--hand-eye",
-        help="Where the camera sits on the platform, as measured; else the robot's turning tells.",
+        help="Measured place of the camera on the platform; by default found from the "
+        "robot's rotations.",
         metavar="FILE",
     ),
 ]
 OverwriteOption = Annotated[
-    bool, typer.Option("--overwrite", help="Replace what is in --out already.")
+    bool, typer.Option("--overwrite", help="Replace files that are already in --out.")
 ]
 ExitWithStdinOption = Annotated[
     bool, typer.Option("--exit-with-stdin", help="Stop when standard input, a pipe, ends.")
@@ -238,7 +241,7 @@ RobotOrWinchArgument = Annotated[
     ),
 ]
 RecordedWinchOption = Annotated[
-    str | None, typer.Option("--winch", help="Winch profile; the one recorded by default.")
+    str | None, typer.Option("--winch", help="Winch profile; default: the recorded one.")
 ]
 RobotBusOption = Annotated[
     list[str] | None,

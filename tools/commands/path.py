@@ -67,7 +67,7 @@ def _with_path(
         str | None,
         typer.Option(
             metavar="'X Y Z'",
-            help="Where G-code's zero is in the room, in mm; 'X Y Z G55 X Y Z' for two.",
+            help="Position of G-code's zero in the room, in mm; 'X Y Z G55 X Y Z' for two zeros.",
         ),
     ] = None,
     blend: Annotated[
@@ -75,21 +75,22 @@ def _with_path(
         typer.Option(
             min=0.0,
             max=1000.0,
-            help="Tolerance, mm, for cutting G-code's corners where it has no G61 or G64 P.",
+            help="Tolerance in mm for cutting corners of G-code without G61 or G64 P.",
         ),
     ] = 1.0,
     ignore: Annotated[
         str,
         typer.Option(
             metavar="'U M777 ...'",
-            help="Letters of G-code that are dropped, M codes whose lines are skipped.",
+            help="G-code letters to drop, and M codes whose lines are skipped.",
         ),
     ] = "",
     z: Annotated[
-        float | None, typer.Option(min=-1e6, max=1e6, help="Z, mm, of G-code that names none.")
+        float | None, typer.Option(min=-1e6, max=1e6, help="Z in mm, for G-code without Z.")
     ] = None,
     scale: Annotated[
-        float, typer.Option(min=1e-3, max=1e3, help="Factor of G-code's lengths, not of F.")
+        float,
+        typer.Option(min=1e-3, max=1e3, help="Scale factor of G-code's lengths, but not of F."),
     ] = 1.0,
     rotate: Annotated[
         float, typer.Option(min=-360.0, max=360.0, help="Turn G-code around Z, degrees.")
@@ -99,7 +100,7 @@ def _with_path(
     ] = "",
     dwell: Annotated[str, typer.Option(metavar="s|ms", help="Unit of P of G-code's G4.")] = "s",
     line: Annotated[
-        int, typer.Option(min=0, help="Begin with this line of the file, from where it begins.")
+        int, typer.Option(min=0, help="Begin with this line of the file, at its start position.")
     ] = 0,
     as_json: JsonOption = False,
 ) -> Iterator[tuple[PathFile, Output]]:
@@ -148,7 +149,7 @@ def show(
         ),
     ] = None,
     keep: Annotated[
-        bool, typer.Option("--keep", help="Leave the plan to the robot's daemon, by a name.")
+        bool, typer.Option("--keep", help="Store the plan for the robot's daemon, under its name.")
     ] = False,
 ) -> None:
     """Plan a path and show its duration, tensions and first problem; nothing moves.

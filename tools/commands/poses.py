@@ -1,4 +1,4 @@
-"""`cdpr poses`: draw poses that a robot reaches straight from a start, held and without contact."""
+"""`cdpr poses`: draw poses that a robot can reach on a straight way without contact."""
 
 from __future__ import annotations
 
@@ -30,19 +30,19 @@ _SHOWN = 5
 def poses(
     robot: RobotArgument,
     count: Annotated[
-        int, typer.Option("-n", "--count", min=1, max=100_000, help="How many poses.")
+        int, typer.Option("-n", "--count", min=1, max=100_000, help="Number of poses.")
     ] = 100,
     start: Annotated[
         str | None,
-        typer.Option("--from", metavar="X Y [Z]", help="Where ways begin, in mm; else home."),
+        typer.Option("--from", metavar="X Y [Z]", help="Start of all ways, in mm; default: home."),
     ] = None,
     seed: SeedOption = 1,
     by: Annotated[
         Choose,
         typer.Option(
             "--choose",
-            help="All that are drawn, those furthest from each other, or those that tell most of "
-            "exit points and initial lengths.",
+            help="Which poses to choose: as drawn, far from each other, or with most "
+            "information about exit points and initial lengths.",
         ),
     ] = Choose.RANDOM,
     angle: Annotated[
@@ -51,13 +51,13 @@ def poses(
             min=0.0,
             max=179.0,
             metavar="DEG",
-            help="How far they may be turned from home's orientation; as targets may if left out.",
+            help="Largest rotation from home's orientation; default: as for targets.",
         ),
     ] = None,
     share: Annotated[
         float,
         typer.Option(
-            min=0.01, max=1.0, help="Share followed of a path that stops short of its target."
+            min=0.01, max=1.0, help="Share of the way to use if it ends before its target."
         ),
     ] = SHARE,
     out_file: Annotated[
@@ -68,8 +68,8 @@ def poses(
 ) -> None:
     """Draw random poses that a robot can reach.
 
-    On the whole way the cables hold the moving platform, and nothing comes into contact. This is
-    proved for every place on the way, not only checked at samples. Nothing moves.
+    On the whole way the cables can hold the moving platform, and nothing comes into contact. This
+    is proved for every place on the way, not only checked at samples. The command moves nothing.
     """
     out = Output(as_json)
     profile = load_calibrated(robot)
@@ -117,7 +117,7 @@ def poses(
 
 
 def _angle_rad(model: PlatformModel, angle_deg: float | None) -> float | None:
-    """Return the largest angle of poses; raises BadInputError for more than targets may turn."""
+    """Return the largest rotation of poses; raises BadInputError if it exceeds that of targets."""
     if angle_deg is None:
         return None
     most = math.degrees(model.angle_rad)
@@ -139,22 +139,22 @@ def _start(model: PlatformModel, text: str | None) -> FloatArray | None:
 
 def _nearest(chosen: Chosen) -> str:
     if not math.isfinite(chosen.clearance_m):
-        return "of this robot nothing can touch"
-    return f"nearest to contact {1e3 * chosen.clearance_m:.0f} mm"
+        return "this robot has no possible contacts"
+    return f"smallest distance {1e3 * chosen.clearance_m:.0f} mm"
 
 
 def _say(out: Output, model: PlatformModel, chosen: Chosen, count: int) -> None:
     drawn, k = chosen.drawn, model.positions
     out.say(
         f"{count} poses of {drawn.drawn} drawn; ways cut short by contact {drawn.cut_by_contact}, "
-        f"by tensions {drawn.cut_by_tensions}; left out {drawn.outside} that end outside the box "
-        "of targets, or down on the stand",
-        f"{_nearest(chosen)}; tensions keep {chosen.margin_N:.1f} N and more beyond the control's "
-        "reserve",
+        f"by tensions {drawn.cut_by_tensions}; {drawn.outside} left out, because they "
+        "end outside the box of targets or on the stand",
+        f"{_nearest(chosen)}; tensions keep at least {chosen.margin_N:.1f} N beyond the "
+        "control's reserve",
     )
     if chosen.deviation_m is not None:
         out.say(
-            f"calibrated with these, exit points would be known within "
+            f"a calibration with these poses would give exit points within "
             f"{1e3 * chosen.deviation_m:.1f} mm (one standard deviation of a coordinate)"
         )
     for position in chosen.positions[:_SHOWN]:

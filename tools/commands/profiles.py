@@ -55,8 +55,8 @@ def show(
     if not kinds:
         names = itertools.chain(*catalogue.list_profiles().values())
         meant = closest(name, names)
-        hint = f"did you mean {meant!r}?" if meant else "`cdpr profiles list` shows what there is"
-        raise BadInputError(f"profile {name!r}: not there; {hint}")
+        hint = f"did you mean {meant!r}?" if meant else "`cdpr profiles list` shows all profiles"
+        raise BadInputError(f"profile {name!r}: does not exist; {hint}")
     content = _plain(load_profile(kinds[0], name))
     out.say(f"{kinds[0]}: {name}")
     for key, value in _flat(content):

@@ -78,19 +78,21 @@ def reset(
 @app.command("move")
 def move_(
     rail: _RailArgument,
-    to_m: Annotated[float, typer.Option("--to", help="Where to, in m.", metavar="M")],
+    to_m: Annotated[float, typer.Option("--to", help="Target position, in m.", metavar="M")],
     bus: _BusOption = None,
     safety_io: SafetyIoOption = None,
     sensors: Annotated[
         str | None,
-        typer.Option(help="Tension sensors that tell whether the cables are slack."),
+        typer.Option(help="Tension sensors, to check that the cables are slack."),
     ] = None,
     tension_port: Annotated[
         str | None, typer.Option(help="Serial line of the tension sensors.", metavar="TTY")
     ] = None,
     cables_slack_checked: Annotated[
         bool,
-        typer.Option("--cables-slack-checked", help="You have looked: all cables hang slack."),
+        typer.Option(
+            "--cables-slack-checked", help="Confirm that you have seen all cables hang slack."
+        ),
     ] = False,
     winch_bus: Annotated[
         list[str] | None,
@@ -107,7 +109,7 @@ def move_(
     profile = load_rail(rail)
     if not profile.travel_min_m <= to_m <= profile.travel_max_m:
         raise BadInputError(
-            f"--to {to_m:g}: allowed are {profile.travel_min_m:g} to {profile.travel_max_m:g} m"
+            f"--to {to_m:g}: allowed: {profile.travel_min_m:g} to {profile.travel_max_m:g} m"
         )
     require_options(profile, bus, safety_io)
     simulated = profile.cia402 is not None and bus is not None and bus.startswith("simbus:")
@@ -138,6 +140,6 @@ def move_(
             )
     out.say(f"{profile.name}: from {done.from_m:z.4f} m to {done.to_m:z.4f} m, braked")
     if done.brake_moved_m is None:
-        out.say("the brake could not be tried: this drive cannot push")
-    out.say(f"robot {profile.robot} is not calibrated any more")
+        out.say("the brake was not tested: this drive cannot push")
+    out.say(f"robot {profile.robot} is no longer calibrated")
     out.result({"ok": True, **dataclasses.asdict(done), "robot": profile.robot})

@@ -40,9 +40,9 @@ def show(robot: RobotArgument, png: PngOption = None, as_json: JsonOption = Fals
     platform = profile.platform
     if platform is None:
         raise BadInputError(
-            f"{profile.path}: {NO_PLATFORM}; `cdpr profiles show` tells what else there is"
+            f"{profile.path}: {NO_PLATFORM}; `cdpr profiles show` prints its other keys"
         )
-    with out.stage(f"{profile.profile}: computing tensions, control and what cannot work"):
+    with out.stage(f"{profile.profile}: computing tensions and control, looking for problems"):
         subject = Subject(profile)
         figures = summary.figures(subject)
         found = [*checks.diagnose(profile), *_bus_findings(profile)]
@@ -56,7 +56,7 @@ def show(robot: RobotArgument, png: PngOption = None, as_json: JsonOption = Fals
     out.say("")
     _say_findings(out, found)
     if not found:
-        out.say("nothing to object to")
+        out.say("no problems found")
     figures["findings"] = [
         {"key": f.key, "text": f.text, "impossible": f.impossible} for f in found
     ]
@@ -75,10 +75,10 @@ def _bus_findings(profile: Robot) -> list[Finding]:
 @app.command("mark-calibrated")
 def mark_calibrated_(
     robot: RobotArgument,
-    why: Annotated[str, typer.Option("--why", help="How the exit points in its file are known.")],
+    why: Annotated[str, typer.Option("--why", help="How you know the exit points in its file.")],
     as_json: JsonOption = False,
 ) -> None:
-    """Confirm the geometry in the robot's file, as after moving a rail."""
+    """Confirm the geometry in the robot's file, e.g. after moving a rail."""
     out = Output(as_json)
     state = mark_calibrated(load_robot(robot).profile, why)
     out.say(f"robot {state.robot}: calibrated since {state.date}: {state.why}")
@@ -93,8 +93,8 @@ def new(
         typer.Option(
             "--set",
             metavar="KEY=VALUE",
-            help="Answer in advance, such as frame_m='3 2'; may be repeated. A wrong key is "
-            "answered with all keys.",
+            help="Answer in advance, such as frame_m='3 2'; may be repeated. A wrong key lists "
+            "all keys.",
         ),
     ] = None,
     yes: Annotated[
@@ -112,9 +112,9 @@ def new(
     """
     out = Output(as_json)
     if path.exists():
-        raise BadInputError(f"{path}: is never written over; allowed: a file that is not there yet")
+        raise BadInputError(f"{path}: already exists and is never overwritten; choose another name")
     if path.suffix != ".toml" or not path.parent.is_dir():
-        raise BadInputError(f"{path}: allowed: NAME.toml in a folder that is there")
+        raise BadInputError(f"{path}: allowed: NAME.toml in an existing folder")
     given = _given(answers or ())
     if "kind" not in given and not yes:
         typer.echo(SKETCH, err=True)
@@ -128,13 +128,15 @@ def new(
 
     complete = new_robot.answers_of(path, given, _default if yes else ask)
     try:
-        with out.stage("checking whether it can work"):
+        with out.stage("checking the robot"):
             profile = new_robot.write_robot(complete, path)
             found = checks.diagnose(profile)
     except ProfileError as error:
         options = " ".join(f"--set {quote(f'{key}={text}')}" for key, text in typed.items())
         again = f"cdpr robot new {path} {options} --yes"
-        raise BadInputError(f"{error}\nnothing was written; with other answers: {again}") from None
+        raise BadInputError(
+            f"{error}\nnothing was written; to answer differently: {again}"
+        ) from None
     out.say(f"{path}: written")
     _say_findings(out, found)
     if png is not None and profile.platform is not None:
@@ -148,7 +150,7 @@ def _given(answers: Sequence[str]) -> dict[str, str]:
     given: dict[str, str] = {}
     for key, value in map(_key_and_value, answers):
         if key in given:
-            raise BadInputError(f"--set {key}: {given[key]!r} and {value!r}; allowed: one of them")
+            raise BadInputError(f"--set {key}: given as {given[key]!r} and {value!r}; give it once")
         given[key] = value
     return given
 

@@ -48,21 +48,21 @@ def trial(
     kind: Annotated[
         KindOfTrial,
         typer.Argument(
-            help="targets: accuracy at rest; line: lines and turns with compensation and without; "
-            "random: targets at the limits; path: lines, arcs and cut corners of a G-code file; "
-            "stream: a hand that leads through a bad network; "
-            "tape: exit points 20 to 50 mm off what the robot's file says."
+            help="targets: accuracy at rest; line: lines and turns with and without "
+            "compensation; random: targets at full speed; path: lines, arcs and cut "
+            "corners of a G-code file; stream: set-points of a hand over a bad network; "
+            "tape: exit points that differ from the robot's file by 20 to 50 mm."
         ),
     ],
     plant: RobotPlantOption = None,
     seed: SeedOption = 1,
     minutes: Annotated[
         float | None,
-        typer.Option(min=0.05, max=600.0, help="Duration in the robot's time; not for line."),
+        typer.Option(min=0.05, max=600.0, help="Duration in bus time; not for line."),
     ] = None,
     speed_mm_s: Annotated[
         float | None,
-        typer.Option(min=0.1, help="Speed of lines, else 10; of a path, else the robot's."),
+        typer.Option(min=0.1, help="Speed; default: 10 for lines, the robot's for a path."),
     ] = None,
     commissioned: CommissionedOption = None,
     controller: ControllerOption = None,
@@ -70,7 +70,7 @@ def trial(
     allow_code: AllowCodeOption = False,
     without_compensation: Annotated[
         bool,
-        typer.Option("--without-compensation", help="Use nothing that commissioning has learnt."),
+        typer.Option("--without-compensation", help="Do not use commissioning results."),
     ] = False,
     out_dir: Annotated[
         Path | None,
@@ -83,8 +83,8 @@ def trial(
 ) -> None:
     """Try a robot in simulation and judge its accuracy against the truth.
 
-    Every cycle crosses the simulated bus to the daemon's own loop, in bus time: ten minutes take a
-    few. The exit status is 0 after judging, even if a figure misses its limit.
+    The daemon's own loop runs over the simulated bus in lockstep, faster than real time. The exit
+    status is 0 even if a figure misses its limit.
     """
     with loading_notice():
         from cdpr_tools.trials import trial as trials  # noqa: PLC0415  # slow to load
@@ -92,23 +92,23 @@ def trial(
     out = Output(as_json)
     if again:
         if out_dir is None:
-            raise BadInputError("--again: needs --out, the folder of a trial that was run")
+            raise BadInputError("--again: needs --out, the folder of a finished trial")
         result = trials.judge(out_dir)
         if result["kind"] != kind.value:
-            raise BadInputError(f"{out_dir}: holds a trial of {result['kind']}, not {kind}")
+            raise BadInputError(f"{out_dir}: contains a trial of {result['kind']}, not {kind}")
     else:
         profile = load_robot(robot)
         name = f"trial-{profile.profile}-{kind}-{time.strftime('%Y%m%d-%H%M%S')}"
         folder = out_dir or Path("out") / name
         if folder.exists() and any(folder.iterdir()):
-            raise BadInputError(f"--out {folder}: holds something already; allowed: a new folder")
+            raise BadInputError(f"--out {folder}: is not empty; choose a new folder")
         default = trials.KINDS[kind]
         own = OwnCodeOptions(controller, tension_distribution)
         own.require_use(profile, allow_code=allow_code)
         if minutes is not None and default.at_speed:
-            raise BadInputError(f"--minutes {minutes:g}: {kind} lasts as long as it lasts")
+            raise BadInputError(f"--minutes {minutes:g}: the duration of {kind} cannot be set")
         if speed_mm_s is not None and not default.at_speed:
-            raise BadInputError(f"--speed-mm-s {speed_mm_s:g}: allowed: with line and path")
+            raise BadInputError(f"--speed-mm-s {speed_mm_s:g}: allowed only with line and path")
         if speed_mm_s is None and kind is KindOfTrial.PATH and profile.platform is not None:
             speed_mm_s = 1e3 * profile.platform.speed_m_s
         settings = trials.TrialSettings(

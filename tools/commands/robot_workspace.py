@@ -54,7 +54,7 @@ class _Typed:
             raise BadInputError(f"--rotate {self.rotate}: not together with --within")
         axes = [i - 3 for i in directions_of(platform) if i >= 3]
         if not axes:
-            raise BadInputError(f"{option}: no angle of this platform is controlled; leave it out")
+            raise BadInputError(f"{option}: this platform has no controlled angle; omit the option")
         turn = np.zeros(3)
         if self.rotate is not None:
             names = [name for name in platform.controlled if name in _ANGLES]
@@ -97,7 +97,10 @@ class _Typed:
 def workspace(
     robot: RobotArgument,
     static: Annotated[
-        bool, typer.Option("--static", help="At rest, without the accelerations of its file.")
+        bool,
+        typer.Option(
+            "--static", help="Workspace at rest, without the accelerations of the robot's file."
+        ),
     ] = False,
     margin: Annotated[
         float, typer.Option(min=0.0, help="Margin that all tensions keep from their bounds, N.")
@@ -106,36 +109,40 @@ def workspace(
         str | None,
         typer.Option(
             metavar="RX RY RZ | ANGLE",
-            help="Turned by this rotation vector from its orientation at home, in deg; an angle in "
-            "a plane.",
+            help="Platform turned by this rotation vector from its orientation at home, in deg; "
+            "in a plane one angle.",
         ),
     ] = None,
     within: Annotated[
         float | None,
         typer.Option(
-            metavar="DEG", help="At all orientations up to so many deg from that at home."
+            metavar="DEG",
+            help="Places that allow all orientations up to this many deg from home's.",
         ),
     ] = None,
     contact_free: Annotated[
         bool,
         typer.Option(
             "--contact-free",
-            help="Leave out places where cables touch each other, the platform or obstacles.",
+            help="Exclude places where cables touch each other, the platform or obstacles.",
         ),
     ] = False,
     low: Annotated[
-        str | None, typer.Option(metavar="X Y [Z]", help="Where the search begins, in mm.")
+        str | None, typer.Option(metavar="X Y [Z]", help="Lower corner of the search, in mm.")
     ] = None,
     high: Annotated[
-        str | None, typer.Option(metavar="X Y [Z]", help="Where it ends; by default around it all.")
+        str | None,
+        typer.Option(
+            metavar="X Y [Z]", help="Upper corner of the search; by default around the whole robot."
+        ),
     ] = None,
     centre: Annotated[
         str | None,
         typer.Option(
-            metavar="X Y [Z]", help="Where rays start, in mm; by default amid its targets."
+            metavar="X Y [Z]", help="Start of the rays, in mm; default: the middle of the targets."
         ),
     ] = None,
-    rays: Annotated[int, typer.Option(min=20, max=1_000_000, help="How many rays.")] = 5000,
+    rays: Annotated[int, typer.Option(min=20, max=1_000_000, help="Number of rays.")] = 5000,
     cells: Annotated[
         int, typer.Option(min=4, max=400, help="Cells of the grid along the longest side.")
     ] = 60,
@@ -150,14 +157,14 @@ def workspace(
     ] = None,
     workers: Annotated[
         int | None,
-        typer.Option(min=1, max=256, help="Processes; by default as many as there are cores."),
+        typer.Option(min=1, max=256, help="Number of processes; default: one for each core."),
     ] = None,
     cluster: ClusterOption = None,
     as_json: JsonOption = False,
 ) -> None:
     """Compute where the cables can hold the platform.
 
-    The exit status is 1 if they hold it nowhere.
+    The exit status is 1 if they can hold it nowhere.
     """
     from cdpr_tools.robots.workspace_report import figures, lines  # noqa: PLC0415  # slow to load
 
@@ -172,7 +179,9 @@ def workspace(
     box = typed.box(platform)
     settings = Search(criterion, box, cells, rays, typed.start(box), workers, cluster)
     if mesh is not None and platform.is_planar:
-        raise BadInputError(f"--mesh {mesh}: allowed: of robots in space; this one's is flat")
+        raise BadInputError(
+            f"--mesh {mesh}: allowed only for robots in space; this robot is planar"
+        )
     found = search(settings, out)
     results = figures(profile, settings, found)
     out.say(*lines(profile, settings, results))

@@ -82,29 +82,32 @@ def run(
     ] = None,
     camera: Annotated[
         Path | None,
-        typer.Option(help="Socket to make of a camera on the platform, for that simulator."),
+        typer.Option(help="Socket to create for a simulated camera on the platform."),
     ] = None,
     http: Annotated[
         str | None,
-        typer.Option(metavar="HOST:PORT", help="Listen there too, besides the Unix socket."),
+        typer.Option(metavar="HOST:PORT", help="Also listen at this address."),
     ] = None,
     unix: Annotated[
         Path | None,
-        typer.Option("--socket", help="Unix socket of the control interface, if not this user's."),
+        typer.Option("--socket", help="Unix socket of the control interface, if not the default."),
     ] = None,
     key_file: Annotated[
         Path | None,
-        typer.Option(help="Secret of those who may move the robot over --http or --stream."),
+        typer.Option(
+            help="File with the key of clients that may move the robot over --http or --stream."
+        ),
     ] = None,
     record: Annotated[
         Path | None,
-        typer.Option(metavar="DIR", help="Record into this folder instead of the user's."),
+        typer.Option(metavar="DIR", help="Record into this folder instead of the default one."),
     ] = None,
     no_record: Annotated[bool, typer.Option("--no-record", help="Record nothing.")] = False,
     keep_days: Annotated[
         float | None,
         typer.Option(
-            min=0.01, help="Remove older recordings of this robot; 30 in the user's folder."
+            min=0.01,
+            help="Remove older recordings of this robot; default: 30 in the user's folder.",
         ),
     ] = None,
     keep_gb: Annotated[
@@ -112,7 +115,8 @@ def run(
         typer.Option(
             "--keep-gb",
             min=0.01,
-            help="Remove its oldest recordings beyond so much in all; 20 in the user's folder.",
+            help="Remove its oldest recordings above this total size; default: 20 in the user's "
+            "folder.",
         ),
     ] = None,
     live: Annotated[
@@ -123,7 +127,7 @@ def run(
         list[str] | None,
         typer.Option(
             metavar="ORIGIN",
-            help="A web page that may look at the live view, such as https://app.foxglove.dev.",
+            help="A web page that may use the live view, such as https://app.foxglove.dev.",
         ),
     ] = None,
     stream: Annotated[
@@ -147,7 +151,9 @@ def run(
     commissioned: Annotated[
         Path | None,
         typer.Option(
-            metavar="DIR", help="What `cdpr commission ROBOT` has left: motors to compensate."
+            metavar="DIR",
+            help="Folder with the results of `cdpr commission ROBOT`, used to compensate the "
+            "motors.",
         ),
     ] = None,
     controller: ControllerOption = None,
@@ -158,9 +164,9 @@ def run(
     as_json: JsonOption = False,
     exit_with_stdin: ExitWithStdinOption = False,
 ) -> None:
-    """Start a robot's control loop as a daemon. It gives no power until you enable it.
+    """Start a robot's control loop as a daemon. The motors get no power until you enable them.
 
-    It reports on standard output when it is up. Ctrl-C and SIGTERM end it with a controlled stop.
+    It prints a line when it is ready. Ctrl-C and SIGTERM end it with a controlled stop.
     """
     out = Output(as_json)
     if exit_with_stdin:
@@ -237,8 +243,8 @@ def _simulator(
 def _writable(folder: Path | None, asked: Path | None, out: Output) -> Path | None:
     """Make a folder for recordings and return it; a new one is private to this user.
 
-    If it cannot be written, raises BadInputError if the user `asked` for it; else nothing is
-    recorded.
+    If it is not writable, raises BadInputError if the user `asked` for it; otherwise the daemon
+    records nothing.
     """
     if folder is None:
         return None
@@ -250,12 +256,12 @@ def _writable(folder: Path | None, asked: Path | None, out: Output) -> Path | No
         if asked is not None:
             raise BadInputError(f"--record {asked}: {error.strerror or error}") from None
         why = f"{folder} cannot be written ({error.strerror or error})"
-        out.note(f"nothing will be recorded: {why}; --record DIR records elsewhere")
+        out.note(f"not recording: {why}; --record DIR records elsewhere")
         return None
 
 
 def _note_doubts(robot: Robot, out: Output) -> None:
-    """Note doubts about the robot; raises ProfileError for one that cannot work."""
+    """Print warnings about the robot; raises ProfileError for one that cannot work."""
     for doubt in refuse_impossible(robot):
         out.note(doubt)
 
@@ -299,8 +305,8 @@ def settings_for(
         raise BadInputError("--plant: only for a simulator that the command starts (simbus:)")
     if read_only and own_simulator:
         raise BadInputError(
-            "--read-only: no other master is on a simulator that the command starts; "
-            "give --bus simbus:NAME of one that runs"
+            "--read-only: a simulator that the command starts has no other master; give "
+            "--bus simbus:NAME of a running one"
         )
     return RunSettings(
         robot=robot.reference,
@@ -334,7 +340,7 @@ def _stream_address(stream: str | None, off: bool) -> Address | None:
 
 
 def _kept(record: Path | None, days: float | None, gb: float | None) -> Retention:
-    """Return which recordings are kept: in a folder that the user gives, all by default."""
+    """Return which recordings are kept; by default all in a folder that the user gives."""
     usual_days, usual_gb = (_KEPT_DAYS, _KEPT_GB) if record is None else (math.inf, math.inf)
     return Retention(usual_days if days is None else days, 1e9 * (usual_gb if gb is None else gb))
 
@@ -398,7 +404,7 @@ def _require_possible(control: Path) -> None:
     if control.suffix != SOCKET_SUFFIX:  # the loop's file beside it differs only in the suffix
         raise BadInputError(f"--socket {control}: allowed: a name that ends in {SOCKET_SUFFIX}")
     if not os.access(control.parent, os.W_OK | os.X_OK):
-        raise BadInputError(f"--socket {control}: {control.parent} is no folder to write into")
+        raise BadInputError(f"--socket {control}: {control.parent} is not a writable folder")
 
 
 def _require_free(control: Path) -> None:
@@ -425,4 +431,4 @@ def _ask(robot: Robot, settings: RunSettings, yes: bool, exit_with_stdin: bool) 
         where = " and ".join(real)
         if exit_with_stdin and not yes:  # a pipe cannot answer a question
             raise BadInputError(f"{where}: with --exit-with-stdin, real drives need --yes")
-        require_consent(f"{robot.name} on {where}: its motors will turn when told to.", yes)
+        require_consent(f"{robot.name} on {where}: its motors will turn on command.", yes)

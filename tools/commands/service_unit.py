@@ -27,7 +27,7 @@ _SOCKETS = Path("/run/cdpr-rt")
 _ASIDE = ("robot", "yes", "as_json", "exit_with_stdin")
 _OWN_CODE = ("controller", "tension_distribution", "program")
 _OF_THE_SIMULATOR = "camera"
-"""An option that the daemon's own processes do not know."""
+"""Options that only the simulator of the command understands."""
 
 
 app = typer.Typer()
@@ -41,7 +41,8 @@ def print_unit(
     context: typer.Context,
     robot: RobotOrWinchArgument,
     user: Annotated[
-        str | None, typer.Option(help="Who runs it; by default you, or `cdpr` where that is root.")
+        str | None,
+        typer.Option(help="User that runs it; by default you, or `cdpr` if you are root."),
     ] = None,
 ) -> None:
     """Print a systemd unit that runs the robot's daemon.

@@ -29,12 +29,14 @@ app = typer.Typer()
 
 @app.command()
 def camera(
-    socket: Annotated[Path, typer.Argument(help="Unix socket to make.", metavar="SOCKET")],
-    board: Annotated[Path, typer.Option(help="Physics board of the robot that carries it.")],
+    socket: Annotated[Path, typer.Argument(help="Unix socket to create.", metavar="SOCKET")],
+    board: Annotated[
+        Path, typer.Option(help="Physics board of the robot that carries the camera.")
+    ],
     plant: _PlantOption = None,
     exit_with_stdin: ExitWithStdinOption = False,
 ) -> None:
-    """Run a camera on a simulated platform until Ctrl-C; other commands know it as sim:SOCKET.
+    """Run a camera on a simulated platform until Ctrl-C; other commands use it as sim:SOCKET.
 
     Type `dark`, `defocus 6` or `unplug` to break it, and `mend` to repair it.
     """
@@ -42,7 +44,7 @@ def camera(
     with PhysicsBoard.attach(board) as shared:
         platform = shared.platform
         if platform.state() is None:
-            raise BadInputError(f"--board {board}: no platform moves on its axes' cables")
+            raise BadInputError(f"--board {board}: its axes carry no platform")
         lens = made.plant.lens
         details = {"width_px": lens.width_px, "height_px": lens.height_px}
         CameraServer(made, platform, socket).serve(exit_with_stdin, details)
@@ -62,7 +64,7 @@ def photos(
     ] = "0.2 0.6 1.75",
     tilt_deg: Annotated[float, typer.Option(min=0.0, max=80.0, help="Most rotation.")] = 15.0,
     overwrite: Annotated[
-        bool, typer.Option("--overwrite", help="Replace what is in FOLDER already.")
+        bool, typer.Option("--overwrite", help="Replace files that are already in FOLDER.")
     ] = False,
     as_json: JsonOption = False,
 ) -> None:

@@ -40,10 +40,10 @@ def safety_io(
         typer.Option(help="Physics board whose axes are those of the profile; may be repeated."),
     ] = None,
     port: Annotated[
-        int | None, typer.Option(min=0, max=65535, help="Port of 127.0.0.1; 0: any that is free.")
+        int | None, typer.Option(min=0, max=65535, help="Port of 127.0.0.1; 0: any free port.")
     ] = None,
     plant: Annotated[
-        Path | None, typer.Option(help="Plant file: delays and where the limit switches stand.")
+        Path | None, typer.Option(help="Plant file: delays and positions of the limit switches.")
     ] = None,
     exit_with_stdin: ExitWithStdinOption = False,
 ) -> None:
@@ -74,7 +74,9 @@ def panel(
         str, typer.Argument(help=f"press, release, mend, {', '.join(_FAULTS)}.", metavar="ACTION")
     ],
     port: Annotated[int, typer.Option(min=1, max=65535, help="Port of the simulated safety I/O.")],
-    unit: Annotated[int, typer.Option(help="The panel's unit, as `sim safety-io` tells.")] = 247,
+    unit: Annotated[
+        int, typer.Option(help="The panel's unit, as `sim safety-io` prints it.")
+    ] = 247,
 ) -> None:
     """Press or release the emergency stop of a simulated safety I/O, or break it."""
     if action in ("press", "release"):
@@ -89,14 +91,14 @@ def panel(
         refused = client.write_register(register, value, device_id=unit).isError()
     except ModbusException:
         raise WorkFailedError(
-            f"127.0.0.1:{port}: no simulated safety I/O answers there; `cdpr sim safety-io` tells "
-            "its port"
+            f"127.0.0.1:{port}: no simulated safety I/O answers there; `cdpr sim safety-io` "
+            "prints its port"
         ) from None
     finally:
         client.close()  # type: ignore[no-untyped-call]
     if refused:
         raise WorkFailedError(
-            f"127.0.0.1:{port}: unit {unit} is no panel of a simulated safety I/O"
+            f"127.0.0.1:{port}: unit {unit} is not the panel of a simulated safety I/O"
         )
 
 
@@ -111,14 +113,14 @@ def rail(
     board: Annotated[
         Path | None,
         typer.Option(
-            help="For CiA 402: make this physics board, for its brake. For Modbus: the board of a "
-            "simulator in lockstep, whose time the rail lives in."
+            help="For CiA 402: physics board to create, for the brake. For Modbus: board of a "
+            "simulator in lockstep, whose time the rail uses."
         ),
     ] = None,
     lockstep: Annotated[
         bool,
         typer.Option(
-            "--lockstep/--paced", help="For CiA 402: bus time moves with its master, or the clock."
+            "--lockstep/--paced", help="For CiA 402: bus time follows the master, or the clock."
         ),
     ] = False,
     plant: Annotated[
@@ -129,7 +131,7 @@ def rail(
     ] = None,
     exit_with_stdin: ExitWithStdinOption = False,
 ) -> None:
-    """Run a simulated rail until Ctrl-C; tells on standard output when it is up."""
+    """Run a simulated rail until Ctrl-C; prints a line when it is ready."""
     profile = load_rail(rail_name)
     if profile.modbus is not None:
         _serve_modbus(profile, profile.modbus, board, port, exit_with_stdin)

@@ -51,16 +51,16 @@ def fault(
     value: Annotated[
         str | None,
         typer.Argument(
-            help="How much: mm to slip (100 by default), counts to jump (500), error code of the "
-            "drive (0x7305), ms of silence (65535: for good, by default), N that a load cell shows "
-            "too much (40).",
+            help="Size of the fault: mm of slip (default 100), counts of the jump (500), error "
+            "code of the drive (0x7305), ms of silence (default 65535: permanent), N added "
+            "to a load cell (40).",
             metavar="VALUE",
         ),
     ] = None,
     *,
     bus: Annotated[
         list[str] | None,
-        typer.Option(help="The simulator's buses; those of the robot's daemon where left out."),
+        typer.Option(help="The simulator's buses; default: those of the robot's daemon."),
     ] = None,
     axis: Annotated[
         str | None,

@@ -36,11 +36,11 @@ def tension(
     ] = None,
     fault: Annotated[
         list[str] | None,
-        typer.Option(help='Broken from the start, as "silent 3" or "wrong-crc all".'),
+        typer.Option(help='Faults from the start, such as "silent 3" or "wrong-crc all".'),
     ] = None,
     exit_with_stdin: ExitWithStdinOption = False,
 ) -> None:
-    """Run simulated load cells on a pseudo-terminal until Ctrl-C; tells its path when it is up.
+    """Run simulated load cells on a pseudo-terminal until Ctrl-C; prints its path when ready.
 
     Type a fault and a unit, such as `silent 3`, or `unplug`, to break it; `mend all` repairs it.
     """

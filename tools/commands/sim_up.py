@@ -49,12 +49,10 @@ def up(
     ] = None,
     lockstep: Annotated[
         bool,
-        typer.Option(
-            "--lockstep/--paced", help="Bus time moves with each SYNC, or with the clock."
-        ),
+        typer.Option("--lockstep/--paced", help="Bus time follows the SYNCs, or the clock."),
     ] = True,
     nodes: Annotated[
-        int, typer.Option(min=1, max=16, help="Number of drives, node ids counted up.")
+        int, typer.Option(min=1, max=16, help="Number of drives, with consecutive node ids.")
     ] = 1,
     truth_log: Annotated[
         Path | None,
@@ -62,14 +60,14 @@ def up(
     ] = None,
     scanner: Annotated[
         Path | None,
-        typer.Option(help="Write the platform's pose to this file, as measured with errors."),
+        typer.Option(help="Write the platform's pose to this file, measured with errors."),
     ] = None,
     frame_log: Annotated[
         Path | None,
         typer.Option(
             "--frame-log",
             envvar="CDPR_SIM_FRAME_LOG",
-            help="Write every frame, at bus time, to this file, as candump does.",
+            help="Write every frame with its bus time to this file, in candump format.",
         ),
     ] = None,
     unconfigured: Annotated[
@@ -77,7 +75,7 @@ def up(
     ] = False,
     store: Annotated[
         Path | None,
-        typer.Option(help="Folder where the drives keep what is stored in them (1010h, LSS)."),
+        typer.Option(help="Folder for parameters that the drives store (1010h, LSS)."),
     ] = None,
     slcan: Annotated[
         bool, typer.Option("--slcan", help="Also offer the bus as a serial CAN adapter.")
@@ -90,15 +88,17 @@ def up(
     ] = None,
     detached: Annotated[
         bool,
-        typer.Option("--detached", help="A robot whose cables are not attached: motors alone."),
+        typer.Option("--detached", help="Simulate the motors of a robot without their cables."),
     ] = False,
     board: Annotated[
         Path | None,
-        typer.Option(help="Make this file, a physics board for simulated sensors and safety I/O."),
+        typer.Option(
+            help="Create this file, a physics board for simulated sensors and safety I/O."
+        ),
     ] = None,
     camera: Annotated[
         Path | None,
-        typer.Option(help="Unix socket to make of a camera on a robot's platform: sim:SOCKET."),
+        typer.Option(help="Unix socket to create for a camera on a robot's platform: sim:SOCKET."),
     ] = None,
     exit_with_stdin: ExitWithStdinOption = False,
 ) -> None:
@@ -120,9 +120,11 @@ def up(
         if scanner is not None or camera is not None:
             raise BadInputError("--scanner, --camera: for a robot with a platform")
         if detached:
-            raise BadInputError("--detached: for a robot; a winch's plant file says what it pulls")
+            raise BadInputError(
+                "--detached: only for a robot; a winch's plant file describes its load"
+            )
         if truth_log is not None and nodes > 1:
-            raise BadInputError("--truth-log: one drive only; leave out --nodes")
+            raise BadInputError("--truth-log: only for one drive; omit --nodes")
         body, plants = None, [Plant.load_file(plant)] * nodes
         winches, urls = _numbered(profile, nodes, unconfigured), {"": _bus(bus)}
     with ExitStack() as stack:
@@ -178,7 +180,7 @@ def _shared_board(
 
 
 def _numbered(winch: Winch, nodes: int, unconfigured: bool) -> list[Winch]:
-    """Return `nodes` copies of the winch, with node ids counted up, or without if unconfigured."""
+    """Return `nodes` copies of the winch with consecutive node ids, or without if unconfigured."""
     last = winch.node_id + nodes - 1
     if last > 127:
         raise BadInputError(f"--nodes {nodes}: node ids end at 127, the first is {winch.node_id}")
@@ -263,7 +265,8 @@ def _record(
     scanner: Path | None,
     board: PhysicsBoard | None,
 ) -> None:
-    """Set up the logs of the pose, one per drive; a platform has at least three drives."""
+    """Set up the log of the true pose, or of each drive's motion; a platform has three drives or
+    more."""
     if truth_log is not None:
         with os_error_as(BadInputError, f"--truth-log {truth_log}"):
             drives[0].record_with(PoseLog(truth_log, body))

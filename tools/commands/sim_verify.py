@@ -30,27 +30,29 @@ def verify(
     command: Annotated[
         list[str],
         typer.Argument(
-            help="After --: what would stand after `cdpr`, or a program by its path, with a /.",
+            help="After --: the arguments of `cdpr`, or the path of a program (with a /).",
             metavar="-- COMMAND...",
         ),
     ],
-    runs: Annotated[int, typer.Option(min=2, max=1000, help="How often it is run.")] = 2,
+    runs: Annotated[int, typer.Option(min=2, max=1000, help="Number of runs.")] = 2,
     seed: Annotated[
-        int | None, typer.Option(min=0, help="Random seed of the disturbances; any where left out.")
+        int | None, typer.Option(min=0, help="Random seed of the disturbances; default: random.")
     ] = None,
     busy: Annotated[
         int | None,
-        typer.Option(min=0, help="Busy processes beside; one more than cores where left out."),
+        typer.Option(
+            min=0, help="Number of busy processes beside it; default: one more than cores."
+        ),
     ] = None,
     keep: Annotated[
-        Path | None, typer.Option(help="New folder for all that is written.", metavar="DIR")
+        Path | None, typer.Option(help="New folder for all output.", metavar="DIR")
     ] = None,
     as_json: JsonOption = False,
 ) -> None:
     """Run a command several times on simulated drives and compare all files.
 
-    The first run is undisturbed. The others run beside busy processes, and one of their processes
-    after another is stopped for 0.1 to 5 s. Each run has an empty working folder.
+    The first run is undisturbed. The others run beside busy processes, and their own processes are
+    stopped, one after another, for 0.1 to 5 s. Each run has an empty working folder.
     """
     out = Output(as_json)
     chosen = random.randrange(_SEEDS) if seed is None else seed
@@ -61,7 +63,7 @@ def verify(
             passing = tempfile.TemporaryDirectory(prefix="cdpr-verify-")
             folder = Path(stack.enter_context(passing))
         else:
-            with os_error_as(BadInputError, f"--keep {keep}: cannot be made"):
+            with os_error_as(BadInputError, f"--keep {keep}: cannot be created"):
                 keep.mkdir(parents=True)
             folder = keep.absolute()
         stop_requested = stack.enter_context(stop_on_signals())
@@ -92,9 +94,10 @@ def verify(
 
 
 def _show(out: Output, runs: Sequence[Run], verdicts: Sequence[Verdict]) -> bool:
-    """Print the verdicts; return whether all files are equal. Raises WorkFailedError for none."""
+    """Print the verdicts; return whether all files are equal. Raises WorkFailedError if there are
+    none."""
     if not any(verdict.same is not None for verdict in verdicts):
-        raise WorkFailedError("the command wrote no file that is compared")
+        raise WorkFailedError("the command wrote no file that can be compared")
     for verdict in verdicts:
         out.say(verdict.line())
     same = all(verdict.same is not False for verdict in verdicts)

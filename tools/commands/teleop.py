@@ -1,4 +1,4 @@
-"""`cdpr teleop ROBOT`: lead a robot by hand through its daemon; and the experiment with it."""
+"""`cdpr teleop`: move a robot by hand through its daemon; and the teleoperation experiment."""
 
 from __future__ import annotations
 
@@ -84,7 +84,7 @@ def robot(
         Path | None,
         typer.Option(
             metavar="FILE",
-            help="For --device script; each line: SECONDS X_MM Y_MM, after these if wanted z=MM, "
+            help="For --device script; each line: SECONDS X_MM Y_MM, then optionally z=MM, "
             "turn=RX,RY,RZ (deg), clutch, confirm.",
         ),
     ] = None,
@@ -92,28 +92,30 @@ def robot(
         str | None,
         typer.Option(
             metavar="HOST:PORT",
-            help="Send the stream there instead, as through a tunnel or a proxy.",
+            help="Send the stream to this address instead, for example a tunnel or proxy.",
         ),
     ] = None,
     input_path: Annotated[
         Path | None,
-        typer.Option("--input", help="The gamepad's node; the first that fits otherwise."),
+        typer.Option("--input", help="The gamepad's device node; default: the first suitable one."),
     ] = None,
     axes: Annotated[
         str | None,
         typer.Option(
             metavar="X,Y[,Z]",
-            help="Axes that move; - turns one round. Left stick, directional pad.",
+            help="Axes that move the platform; - reverses one. Default: left stick, directional "
+            "pad.",
         ),
     ] = None,
     turn_axes: Annotated[
         str | None,
         typer.Option(
-            metavar="AXIS[,...]", help="Axes that turn the platform. Right stick, directional pad."
+            metavar="AXIS[,...]",
+            help="Axes that turn the platform. Default: right stick, directional pad.",
         ),
     ] = None,
     dead_man: Annotated[
-        str, typer.Option(help="Button that is held while the stick leads.")
+        str, typer.Option(help="Button to hold while the stick moves the robot.")
     ] = "BTN_TR",
     confirm: Annotated[str, typer.Option(help="Button that confirms a target.")] = "BTN_SOUTH",
     dead_zone: Annotated[
@@ -128,7 +130,7 @@ def robot(
     key_file: KeyFileOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Lead a robot that has power by hand, through its daemon's set-point stream.
+    """Move a robot that has power by hand, through its daemon's set-point stream.
 
     The robot follows while this command runs, and holds when it ends for any reason.
     """
@@ -137,11 +139,11 @@ def robot(
     factor = parse_scale(scale)
     lines = () if script is None else read_script(script, factor)
     if (device is Device.SCRIPT) != (script is not None):
-        raise BadInputError("--script: allowed: together with --device script, and needed there")
+        raise BadInputError("--script: required with --device script, and allowed only there")
     of_gamepad = (("--input", input_path), ("--axes", axes), ("--turn-axes", turn_axes))
     for option, given in of_gamepad if device is not Device.GAMEPAD else ():
         if given is not None:
-            raise BadInputError(f"{option} {given}: allowed: together with --device gamepad")
+            raise BadInputError(f"{option} {given}: allowed only with --device gamepad")
 
     def open_device(directions: Directions) -> InputDevice:
         """Open the device after everything else has been checked."""
@@ -168,7 +170,7 @@ def experiment(
     plant: RobotPlantOption = None,
     commissioned: CommissionedOption = None,
     without_compensation: Annotated[
-        bool, typer.Option("--without-compensation", help="Use nothing learnt of the motors.")
+        bool, typer.Option("--without-compensation", help="Do not use commissioning results.")
     ] = False,
     places: Annotated[str, typer.Option(help="Places of the pattern.")] = "A,B,C",
     scales: Annotated[str, typer.Option(help="Scales, robot to hand.")] = "8:1,4:1,2:1",
@@ -194,17 +196,20 @@ def experiment(
     ] = None,
     out_dir: Annotated[
         Path | None,
-        typer.Option("--out", help="Folder for all that is measured; goes on with one that was "
-                     "broken off.", metavar="DIR"),
+        typer.Option(
+            "--out", help="Folder for all data; continues an interrupted experiment.",
+            metavar="DIR",
+        ),
     ] = None,
     again: AgainOption = False,
     as_json: JsonOption = False,
 ) -> None:  # fmt: skip
-    """Let a simulated operator lead a simulated robot along the thesis' path; judge the errors.
+    """Let a simulated operator move a simulated robot along the thesis' path; evaluate the errors.
 
     By default 54 runs: 10 targets at three places, three scales and three delays, each repeated.
-    Every cycle crosses the simulated bus, every packet the daemon's stream; all is recorded. Prints
-    tables 2.1 and 2.2 beside the thesis' and draws figures 2.10 to 2.12.
+    The robot runs over the simulated bus, the operator over the daemon's stream, and both are
+    recorded. The command prints tables 2.1 and 2.2 beside the thesis' and draws figures 2.10 to
+    2.12.
     """
     from cdpr_tools.experiment import experiment as experiments  # noqa: PLC0415  # slow to load
     from cdpr_tools.experiment.operator import OperatorParameters, Station  # noqa: PLC0415
@@ -219,7 +224,7 @@ def experiment(
         return
     for path, name in ((plant, "--plant"), (commissioned, "--commissioned")):
         if path is not None and not path.exists():
-            raise BadInputError(f"{name} {path}: there is no such file or folder")
+            raise BadInputError(f"{name} {path}: no such file or folder")
     settings = ExperimentSettings(
         robot=load_robot(robot).reference,
         plant=None if plant is None else str(plant.resolve()),
@@ -246,10 +251,10 @@ def _run(out: Output, settings: ExperimentSettings, folder: Path, jobs: int) -> 
     try:
         experiments.perform(settings, folder, jobs, out)
     except KeyboardInterrupt:
-        out.note(f"broken off; the same command with --out {folder} goes on")
+        out.note(f"interrupted; the same command with --out {folder} continues")
         raise
     except (CommandError, ConfigurationError) as error:
-        raise type(error)(f"{error}; the same command with --out {folder} goes on") from error
+        raise type(error)(f"{error}; the same command with --out {folder} continues") from error
     _show(out, experiments.judge(folder, jobs), folder)
 
 

@@ -51,7 +51,8 @@ _SensorsOption = Annotated[
     str, typer.Option("--sensors", help="Tension sensors: a name or a file.", metavar="SENSORS")
 ]
 _PortOption = Annotated[
-    str, typer.Option("--tension-port", help="Serial port of the RS-485 line, as /dev/ttyUSB0.")
+    str,
+    typer.Option("--tension-port", help="Serial port of the RS-485 line, such as /dev/ttyUSB0."),
 ]
 _FIRST_READING_S = 2.0
 _STANDARD_GRAVITY = 9.80665
@@ -68,7 +69,7 @@ def watch(
     ] = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Show the tensions live, and their figures at the end; reads only."""
+    """Show the tensions live, and their mean and spread at the end; reads only."""
     out = Output(as_json)
     profile = load_tension_sensors(sensors)
     clock = PacedClock()
@@ -151,23 +152,21 @@ def calibrate(
     winch: WinchOnBus,
     out: Output,
     masses: Annotated[
-        str | None, typer.Option(help="Masses to hang, in kg, as 2,5,10: at least three.")
+        str | None, typer.Option(help="At least three masses to hang, in kg, such as 2,5,10.")
     ] = None,
     sensors: Annotated[
-        str | None, typer.Option(help="Load cells in place of masses: a name or a file.")
+        str | None, typer.Option(help="Load cells instead of masses: a name or a file.")
     ] = None,
     port: Annotated[
         str | None,
-        typer.Option(
-            "--tension-port", help="Serial port of the load cells' line, as /dev/ttyUSB0."
-        ),
+        typer.Option("--tension-port", help="Serial port of the load cells, such as /dev/ttyUSB0."),
     ] = None,
     cable: Annotated[
         str | None, typer.Option(help="The load cell's cable; the first by default.")
     ] = None,
     out_dir: Annotated[
         Path | None,
-        typer.Option("--out", help="Folder for raw data and result; else out/tension-WINCH."),
+        typer.Option("--out", help="Folder for raw data and result; default out/tension-WINCH."),
     ] = None,
     overwrite: OverwriteOption = False,
     speed_mm_s: Annotated[
@@ -177,20 +176,24 @@ def calibrate(
         ),
     ] = None,
     lead_mm: Annotated[
-        float, typer.Option("--lead-mm", min=20.0, max=2000.0, help="Wound in before measuring.")
+        float,
+        typer.Option("--lead-mm", min=20.0, max=2000.0, help="Cable to wind in before measuring."),
     ] = 160.0,
-    turns: Annotated[int, typer.Option(min=1, max=20, help="Motor turns measured each way.")] = 2,
+    turns: Annotated[
+        int, typer.Option(min=1, max=20, help="Motor turns to measure in each direction.")
+    ] = 2,
     gravity: Annotated[
         float, typer.Option(min=9.7, max=9.9, help="Local gravity, m/s2.")
     ] = _STANDARD_GRAVITY,
     lowest_N: Annotated[float, typer.Option("--lowest-n", help="Lowest tension, N.")] = 10.0,
     highest_N: Annotated[float, typer.Option("--highest-n", help="Highest tension, N.")] = 80.0,
     travel_mm: Annotated[
-        float, typer.Option("--travel-mm", min=1.0, help="Most cable wound in, its end made fast.")
+        float,
+        typer.Option("--travel-mm", min=1.0, help="With a fastened cable: most cable to wind in."),
     ] = 500.0,
     board: Annotated[
         Path | None,
-        typer.Option(help="Physics board of a simulator: masses are hung there, not asked for."),
+        typer.Option(help="Physics board of a simulator, which then hangs the masses itself."),
     ] = None,
     safety_io: SafetyIoOption = None,
     yes: YesOption = False,
@@ -209,7 +212,7 @@ def calibrate(
         check_masses(profile, kilograms, gravity)
         speed = speed_mm_s or _MASS_SPEED_mm_s
         hoist = plan_hoist(profile, speed * 1e-3, lead_mm * 1e-3, turns)
-        run.prepare(overwrite, yes, "masses are raised and lowered by the winch")
+        run.prepare(overwrite, yes, "the winch raises and lowers masses")
         run.by_masses(hoist, kilograms, gravity, board)
     else:
         cells = load_tension_sensors(sensors or "")
@@ -220,7 +223,7 @@ def calibrate(
             raise BadInputError("--sensors needs --tension-port, the serial port of the load cells")
         # use this cell only: the others may be silent and must not delay it
         cell = cells.model_copy(update={"sensors": (cells.sensors[number],)})
-        run.prepare(overwrite, yes, "the made-fast cable is pulled by the winch")
+        run.prepare(overwrite, yes, "the winch pulls the fastened cable")
         run.by_load_cell(pull, cell, port)
     _finish(out, run.folder, profile)
 
@@ -256,7 +259,7 @@ class _Run:
             measure_masses(session, out, raw, plan, masses_kg, hang, gravity)
 
     def by_load_cell(self, plan: AnchorPlan, cell: TensionSensors, port: str) -> None:
-        """Record the pull at a fastened cable."""
+        """Record a pull on a fastened cable."""
         at, out = self.winch, self.winch.out
         with ExitStack() as stack:
             stack.enter_context(keeping_raw_data(tension_calibration.raw_folder(self.folder)))
@@ -276,7 +279,7 @@ def fit(
     winch: RecordedWinchOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Identify again from the recordings of a tension_calibration."""
+    """Identify again from the recordings of a tension calibration."""
     out = Output(as_json)
     _finish(out, folder, load_winch(winch or tension_calibration.recorded_winch(folder)))
 
@@ -298,7 +301,7 @@ def _masses(text: str) -> list[float]:
     try:
         return [float(part) for part in text.split(",")]
     except ValueError:
-        raise BadInputError(f"--masses {text}: numbers in kg are wanted, as 2,5,10") from None
+        raise BadInputError(f"--masses {text}: allowed: numbers in kg, such as 2,5,10") from None
 
 
 def _bus_and_hanging(

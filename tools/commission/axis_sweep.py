@@ -57,16 +57,20 @@ class SweptAxis:
         """Return the axis called `name` of the daemon's `robot`; raises BadInputError."""
         places = {axis.name: i for i, axis in enumerate(robot.axes)}
         if name not in places:
-            raise BadInputError(f"{name}: no axis of {robot.name}; allowed: {', '.join(places)}")
+            raise BadInputError(
+                f"{name}: not an axis of {robot.name}; allowed: {', '.join(places)}"
+            )
         if "sweep" not in description.get("programs", ()):
             raise BadInputError(
-                f"{robot.name}: its cables hold a platform together; end the daemon, take them "
+                f"{robot.name}: its motors share a platform; end the daemon, take the cables "
                 f"off, and use `cdpr commission {robot.profile} --axis {name!r}`"
             )
         if status["read_only"]:
             raise BadInputError(f"{robot.name}: its daemon only listens (--read-only)")
         if not status["parts"].get("recording", {}).get("recording"):
-            raise BadInputError(f"{robot.name}: its daemon records nothing; start it to record")
+            raise BadInputError(
+                f"{robot.name}: its daemon does not record; start it with a recording"
+            )
         if status["state"] != "ready":
             raise BadInputError(f"{robot.name} is {status['state']}; allowed: ready, without power")
         axis = robot.axes[places[name]]
@@ -99,9 +103,9 @@ def sweep(robot: Robot, axis: SweptAxis, turns: int, speed_rad_s: float, out: Ou
         robot.turn_by(distances(_INDEX_RAD), speed_rad_s=_INDEX_SPEED_RAD_S)
         if not robot.status["axes"][axis.place]["index_known"]:
             turned = f"{_INDEX_RAD / math.tau:g} turns"
-            raise WorkFailedError(f"{axis.name}: no encoder index was seen in {turned}")
+            raise WorkFailedError(f"{axis.name}: no encoder index was found in {turned}")
         angle_rad = SWEEP_LEAD_IN_RAD + turns * math.tau
-        out.note(f"sweeping there and back, {2.0 * angle_rad / speed_rad_s / 60.0:.1f} min ...")
+        out.note(f"sweeping in both directions, {2.0 * angle_rad / speed_rad_s / 60.0:.1f} min ...")
         robot.run("sweep", distance_rad=distances(angle_rad), speed_rad_s=speed_rad_s, legs=2)
         out.note("turning at other speeds ...")
         for speed, distance in _FAST_LEGS:

@@ -50,7 +50,7 @@ _TORQUE_SHARE = 0.25
 _SPOKEN = {
     "sweep": "slow sweeps",
     "fast": "turns at other speeds",
-    "index": "a turn to see the index",
+    "index": "a turn to find the index",
 }
 _METHODS = {
     "none": "no compensation",
@@ -276,7 +276,7 @@ class Commissioning:
         self._measure.track("index", design, None, [turn])
         session.disable()
         if not session.device.feedback.index_known.all():
-            raise TripError(f"no encoder index was seen in {_PROBE_TURNS:g} turns")
+            raise TripError(f"no encoder index was found in {_PROBE_TURNS:g} turns")
 
     def measure(self) -> None:
         """Record the sweeps and the fast legs."""

@@ -94,7 +94,7 @@ def tables(
         low, high = ax.get_ylim()
         ax.fill_between(
             degrees, low, high, where=repaired[side], color=REPAIRED, alpha=0.35, lw=0,
-            label="rotor ran away: repaired",
+            label="rotor left the ramp: repaired",
         )  # fmt: skip
         ax.set(ylabel="torque (Nm)", ylim=(low, high), title=DIRECTIONS[side])
         _over_turn(ax)
@@ -220,8 +220,8 @@ def bandwidths(
             ax.xaxis.set_minor_locator(NullLocator())
             _log_labels(ax.yaxis)
         left.set_ylabel(label)
-    axes[0].set_title("left by each method")
-    axes[1].set_title("times smaller than without")
+    axes[0].set_title("error with each method")
+    axes[1].set_title("times smaller than without compensation")
     for ax in axes[-2:]:
         ax.set_xlabel("closed-loop bandwidth (Hz)")
     legend_above(figure, axes[0])

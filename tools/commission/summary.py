@@ -41,7 +41,8 @@ def show_identified(out: Output, found: dict[str, Any]) -> None:
         f"{1e3 * found['coulomb_backward_Nm']:.1f} mNm forward / backward, "
         f"inertia {found['inertia_kg_m2']:.3e} kg m2, "
         f"unexplained {1e3 * found['residual_rms_Nm']:.2f} mNm RMS",
-        "thesis' method: the rotor ran away, and the other direction was used, at "
+        "thesis' method: the rotor left the ramp, and the curve of the other direction "
+        "was used, at "
         f"{100 * found['repaired_fraction']:.1f} % of the angles",
     )
 
@@ -83,5 +84,6 @@ def _show_shortfall(out: Output, validation: dict[str, Any]) -> None:
         ]
         if missed:
             out.say(
-                f"{_NAMES[method]}: below its target in {', '.join(missed)}; the report says why"
+                f"{_NAMES[method]}: below its target in {', '.join(missed)}; the report "
+                "explains why"
             )

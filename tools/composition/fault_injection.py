@@ -72,7 +72,7 @@ def writes_of(what: str, value: int | None) -> list[tuple[int, int]]:
     if what == MEND:
         return [(_INJECTIONS[fault].sub, 0) for fault in (InjectedFault.SILENCE, *_LASTING)]
     if what == InjectedFault.PRE_OPERATIONAL:
-        raise BadInputError(f"{what}: allowed: with `cdpr sim fault`")
+        raise BadInputError(f"{what}: allowed only with `cdpr sim fault`")
     injection = named_injection(what)
     return [(injection.sub, injection.amount(what, None if value is None else str(value)))]
 

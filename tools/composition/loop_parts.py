@@ -34,7 +34,7 @@ from cdpr_rt.programs.registry import (
 )
 from cdpr_tools.composition.own_code import OwnCode, completed
 
-_OTHER_CALIBRATION = "a calibration was taken over or undone; start the daemon again"
+_OTHER_CALIBRATION = "a calibration was adopted or undone; restart the daemon"
 
 
 def control_loop(

@@ -79,7 +79,7 @@ def tension_watch(sensors: str | None, port: str | None) -> Watching:
     """
     if (sensors is None) != (port is None):
         raise ConfigurationError(
-            "--sensors and --tension-port go together: the load cells and their line"
+            "--sensors and --tension-port: give both, the load cells and their serial port"
         )
     if sensors is None or port is None:
         return no_watches
@@ -141,7 +141,7 @@ class Session(Operator):
         self.between_cycles(lambda: device.ask_mode(modes))
         timeout_s = max(axis.winch.drive.mode_display_timeout_s for axis in self.robot.axes)
         try:
-            self.wait(device.mode_confirmed, timeout_s, "the modes' confirmation")
+            self.wait(device.mode_confirmed, timeout_s, "confirmation of the modes")
         except NotInTimeError as error:
             if device.mode_confirmed():
                 raise

@@ -92,7 +92,7 @@ class EmergencyStop:
             block = self._block = _attach(self._found)
         except (OSError, SharedBlockError) as error:
             ended = "its loop has ended; " + _own_stop_notice(self._found)
-            unseen = f"what its drives say cannot be seen: {error}"
+            unseen = f"the state of its drives is not known: {error}"
             return self._failed(ended if isinstance(error, FileNotFoundError) else unseen)
         while not (off := self._power_is_off()):
             if self._ended(_LOOK_S):
@@ -112,16 +112,16 @@ class EmergencyStop:
             waits = since_s <= _LISTENS_S
             return "" if waits else "this daemon only listens: stop the master that runs its drives"
         if since_s > _UNHEARD_S and self._cycling() is None:
-            return "its drives are not heard, and are not given power"
+            return "its drives do not answer, and it gives them no power"
         if since_s > _CONFIRM_S:
             return f"not every drive has confirmed within {_CONFIRM_S:g} s that its power is off"
         return ""
 
     def _kill(self) -> EmergencyStopResult:
         signal.pidfd_send_signal(self._pidfd, signal.SIGKILL)
-        killed = "was killed" if self._ended(_KILLED_S) else "does not even end when it is killed"
+        killed = "was killed" if self._ended(_KILLED_S) else "does not end even when killed"
         return self._failed(
-            f"its loop has not turned for {_STALLED_S:g} s and {killed}; "
+            f"its loop has run no cycle for {_STALLED_S:g} s and {killed}; "
             + _own_stop_notice(self._found)
         )
 
@@ -149,7 +149,7 @@ class EmergencyStop:
         off = all(state_of(int(word)) in POWER_OFF for word in row["statusword"])
         if row["state"] == LoopState.ACTIVE or not off or not row["alive"].all():
             return ""
-        return f"power is off, every drive says so ({self._reported_state()})"
+        return f"power is off, every drive confirms it ({self._reported_state()})"
 
     def _listens(self) -> bool:
         """Whether the loop only listens and commands no drive."""
@@ -196,8 +196,8 @@ def _attach(found: LoopFile) -> SharedBlock:
 
 def _own_stop_notice(found: LoopFile) -> str:
     return (
-        "drives that had power from it stop without its heartbeat within "
-        f"{found.drives_stop_s:g} s: check that they have"
+        f"its drives stop within {found.drives_stop_s:g} s without its heartbeat: check "
+        "that they have stopped"
     )
 
 
@@ -246,7 +246,7 @@ def end_leftover_processes(robot: str | None, socket: Path | None) -> list[str]:
 
 
 def _is_there(path: Path) -> bool:
-    with os_error_as(WorkFailedError, f"{path}: cannot be looked at"):
+    with os_error_as(WorkFailedError, f"{path}: cannot be read"):
         return path.exists()
 
 

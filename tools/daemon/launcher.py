@@ -225,7 +225,7 @@ class Launcher:
     def _watch_loop(self) -> None:
         if self._loop.end:
             if self._up and not self.reason and self._loop.process.returncode not in _ON_COMMAND:
-                self.reason = f"the loop has died: {self._loop.end}"
+                self.reason = f"the loop has ended unexpectedly: {self._loop.end}"
                 self._block.write_status(
                     {
                         **self._status(),
@@ -235,7 +235,10 @@ class Launcher:
                         "faults": [],
                     }
                 )
-                self._say(f"{self.reason}; its drives stop without heartbeat. The service stays")
+                self._say(
+                    f"{self.reason}; its drives stop without its heartbeat. The service keeps "
+                    "running"
+                )
             return
         stalled = self._up and self._silence_s("loop_alive_ns") > _LOOP_STALLED_S
         if stalled != self._stalled:
@@ -243,9 +246,9 @@ class Launcher:
             if self._status().get("lockstep"):  # time stands still with it: no cycle is missed
                 return
             self._say(
-                f"the loop has not turned for {_LOOP_STALLED_S:g} s"
+                f"the loop has run no cycle for {_LOOP_STALLED_S:g} s"
                 if stalled
-                else "the loop turns again"
+                else "the loop runs again"
             )
 
     def _write_loop_file(self) -> None:
@@ -315,7 +318,7 @@ class Launcher:
             if loading_s > _SERVICE_LOADING_S:
                 silent_s, allowed_s = loading_s, _SERVICE_LOADING_S
         if silent_s > allowed_s:
-            self._say(f"the service has not turned for {allowed_s:g} s and is killed")
+            self._say(f"the service has not responded for {allowed_s:g} s and is killed")
             service.process.kill()
             service.process.wait()
 

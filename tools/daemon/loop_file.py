@@ -101,7 +101,7 @@ class LoopFile(BaseModel):
             what = error.errors()[0]["msg"]
             raise WorkFailedError(f"{path}: does not name a loop: {what}") from None
         if found.uid != owner:
-            raise WorkFailedError(f"{path}: does not name a loop: it is of user {owner}")
+            raise WorkFailedError(f"{path}: does not name a loop: it belongs to user {owner}")
         return found
 
     def open(self) -> int | None:
@@ -123,7 +123,7 @@ class LoopFile(BaseModel):
         if ended:
             return None
         raise WorkFailedError(
-            f"process {self.pid} is no loop of user {self.uid}: nothing was sent to it"
+            f"process {self.pid} is not a loop of user {self.uid}: no signal was sent"
         )
 
     def runs(self) -> bool:
@@ -222,7 +222,7 @@ class LauncherLock:
         found = os.fstat(fd)
         if not stat.S_ISREG(found.st_mode) or not is_trusted(self._path, found.st_uid):
             raise BadInputError(
-                f"--socket {socket}: {self._path} is no file of yours; remove it, or choose "
+                f"--socket {socket}: {self._path} is not your file; remove it, or choose "
                 "another --socket"
             )
         try:
@@ -265,7 +265,7 @@ class LauncherLock:
 def _taken(socket: Path, pid: int | None) -> BadInputError:
     whose = "" if pid is None else f", process {pid}"
     return BadInputError(
-        f"--socket {socket}: a daemon runs there already{whose}; `cdpr stop` ends it"
+        f"--socket {socket}: a daemon already runs there{whose}; `cdpr stop` ends it"
     )
 
 

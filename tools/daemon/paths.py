@@ -28,7 +28,9 @@ def default_socket(robot: str) -> Path:
     try:
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
     except OSError as error:
-        raise BadInputError(f"{folder}: cannot be made: {error.strerror}; give --socket") from None
+        raise BadInputError(
+            f"{folder}: cannot be created: {error.strerror}; give --socket"
+        ) from None
     if not is_private(folder, os.geteuid()):
         raise BadInputError(f"{folder}: is open to others or not this user's; give --socket")
     return folder / f"{robot}{SOCKET_SUFFIX}"
@@ -68,9 +70,9 @@ def unsearched_folders() -> str:
     """Return as text which folders were not searched although daemons may be there."""
     folder, reasons = runtime_folder(), []
     if os.path.lexists(folder) and not is_private(folder, os.geteuid()):
-        reasons.append(f"{folder} is open to others or not this user's, and was not looked into")
+        reasons.append(f"{folder} is open to others or not this user's, so it was not searched")
     if _SYSTEM.is_dir() and not os.access(_SYSTEM, os.R_OK | os.X_OK):
-        reasons.append(f"{_SYSTEM} is closed to this user, try it with `sudo`")
+        reasons.append(f"{_SYSTEM} is closed to this user; try `sudo`")
     return "; ".join(reasons)
 
 
@@ -80,7 +82,7 @@ def found_instead(running: Iterable[Path], remark: str = "") -> str:
     `running` are their files, `remark` is added to them; empty if there is nothing to report.
     """
     names = ", ".join(path.stem for path in running)
-    hints = names and f"what runs: {names}{remark}", unsearched_folders()
+    hints = names and f"running: {names}{remark}", unsearched_folders()
     return "".join(f"; {hint}" for hint in hints if hint)
 
 

@@ -43,8 +43,8 @@ def checked_origin(origin: str) -> str:
     """Return the origin of a web page; raises BadInputError if it is not a browser's origin."""
     if not _ORIGIN.fullmatch(origin):
         raise BadInputError(
-            f"--live-origin {origin}: allowed: where a web page is from, such as "
-            "https://app.foxglove.dev or http://localhost:8080, without a path"
+            f"--live-origin {origin}: allowed: the origin of a web page without a path, "
+            "such as https://app.foxglove.dev or http://localhost:8080"
         )
     return origin.lower()
 
@@ -234,6 +234,6 @@ def read_key(path: Path) -> bytes:
     if len(key) < _SECRET_CHARS or not key.isascii():
         raise BadInputError(
             f"--key-file {path}: {len(key)} characters; allowed: {_SECRET_CHARS} to "
-            f"{_MOST_KEY_BYTES} of ASCII, such as `openssl rand -hex 32` writes"
+            f"{_MOST_KEY_BYTES} ASCII characters, for example from `openssl rand -hex 32`"
         )
     return key

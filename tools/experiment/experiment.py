@@ -46,7 +46,9 @@ def begin(settings: ExperimentSettings, folder: Path) -> None:
     path = folder / SETTINGS
     if path.exists():
         if load(folder) != settings:
-            raise BadInputError(f"{path}: holds an experiment with other options; choose --out")
+            raise BadInputError(
+                f"{path}: contains an experiment with other options; choose another --out"
+            )
         return
     with os_error_as(BadInputError, str(folder)):
         folder.mkdir(parents=True, exist_ok=True)
@@ -71,7 +73,7 @@ def perform(settings: ExperimentSettings, folder: Path, jobs: int, out: Output) 
     total = len(settings.sessions())
     if not missing:
         return
-    out.note(f"{total - len(missing)} of {total} sessions are there; {jobs} side by side ...")
+    out.note(f"{total - len(missing)} of {total} sessions exist; running {jobs} in parallel ...")
     done, failed = total - len(missing), []
     work = partial(_perform_session, settings, folder)
     with processes(jobs) as pool, out.progress("sessions", total * _SESSION_S) as advance:

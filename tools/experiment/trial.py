@@ -231,7 +231,7 @@ class RobotPlant:
         answer = self._rig.stream.take(packet)
         standing = None if answer is None else self._hand.answer_of(answer).standing
         if standing is not Standing.ACCEPTED:
-            raise WorkFailedError(f"the robot did not take a packet of the stream: {standing}")
+            raise WorkFailedError(f"the robot rejected a packet of the stream: {standing}")
 
 
 class _Link:
@@ -420,7 +420,7 @@ def _points_of_path(recorded: Recorded, path: dict[str, Any]) -> Points:
     entries = path["points"]
     if len(found) != len(entries):
         raise WorkFailedError(
-            f"{recorded.folder}: {len(found)} confirmations recorded, {len(entries)} given"
+            f"{recorded.folder}: {len(found)} confirmations recorded, but {len(entries)} given"
         )
     plane = list(plane_of(recorded.directions.k))
     looks = [[recorded.row(cycle) for cycle in entry["look_cycles"]] for entry in entries]

@@ -54,7 +54,7 @@ def _simbus() -> HostFinding:
         socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET).close()
     except OSError as error:
         return HostFinding("embedded bus", "problem", error.strerror or "", "run on Linux")
-    return HostFinding("embedded bus", "ok", "packet sockets are there")
+    return HostFinding("embedded bus", "ok", "packet sockets are available")
 
 
 def _socketcan() -> HostFinding:
@@ -78,13 +78,13 @@ def can_interface(interface: CanInterface) -> HostFinding:
     if interface.bitrate_bit_s:
         found += f", {interface.bitrate_bit_s / 1000:g} kbit/s"
     if interface.state == "bus-off":
-        remedy = f"mend the wire, then: ip link set {name} type can restart"
+        remedy = f"repair the wiring, then: ip link set {name} type can restart"
         return HostFinding(what, "problem", found, remedy)
     if not interface.is_up:
         kind = "" if interface.is_virtual else " type can bitrate 1000000 restart-ms 100"
         return HostFinding(what, "note", found, f"ip link set {name} up{kind}")
     if interface.state not in ("error-active", "up"):
-        remedy = "look at cable, termination, bit rate and the power of the other nodes"
+        remedy = "check cable, termination, bit rate and the power of the other nodes"
         return HostFinding(what, "note", found, remedy)
     if interface.queue_frames < _QUEUE_FRAMES:
         remedy = f"a burst of commands may not fit: ip link set {name} txqueuelen 1000"
@@ -97,15 +97,15 @@ def _folders() -> Iterator[HostFinding]:
     from cdpr_rt.jit import machine_code_folder  # noqa: PLC0415
 
     kept = machine_code_folder()
-    what, remedy = "compiled kernels", "set NUMBA_CACHE_DIR to a folder that is yours and stays"
+    what, remedy = "compiled kernels", "set NUMBA_CACHE_DIR to a permanent folder of yours"
     if kept is None:
-        yield HostFinding(what, "note", "new ones are kept nowhere: compiled at each start", remedy)
+        yield HostFinding(what, "note", "not kept: compiled again at each start", remedy)
     elif kept.is_relative_to(temporary_folder()):
-        yield HostFinding(what, "note", f"kept until the next restart only: {kept}", remedy)
+        yield HostFinding(what, "note", f"kept only until the next restart: {kept}", remedy)
     else:
         yield HostFinding(what, "ok", f"kept in {kept}")
     for what, folder, remedy in (
-        ("state, recordings", state_folder(), "set XDG_STATE_HOME to a folder that is yours"),
+        ("state, recordings", state_folder(), "set XDG_STATE_HOME to a folder of yours"),
         ("sockets", runtime_folder(), "set XDG_RUNTIME_DIR, or give --socket to each command"),
     ):
         if can_write(folder):
@@ -119,7 +119,7 @@ def _serial_ports() -> HostFinding:
     closed = [str(p) for p in ports if not os.access(p, os.R_OK | os.W_OK)]
     if closed:
         remedy = f"join their group: usermod -aG {_group_of(Path(closed[0]))} $USER"
-        return HostFinding("serial adapters", "note", f"not for you: {', '.join(closed)}", remedy)
+        return HostFinding("serial adapters", "note", f"no permission: {', '.join(closed)}", remedy)
     return HostFinding("serial adapters", "ok", ", ".join(map(str, ports)) or "none plugged in")
 
 
@@ -134,7 +134,7 @@ def _cores() -> HostFinding:
     count = len(os.sched_getaffinity(0))
     if count >= 2:
         return HostFinding("processors", "ok", f"{count} usable")
-    remedy = "the loop wants one to itself: two are better"
+    remedy = "the loop needs a separate core: two are better"
     return HostFinding("processors", "note", f"{count} usable", remedy)
 
 
@@ -180,7 +180,7 @@ def _throttling() -> HostFinding:
 def _memory() -> HostFinding:
     _, hard = resource.getrlimit(resource.RLIMIT_MEMLOCK)
     if os.geteuid() == 0 or hard == resource.RLIM_INFINITY or hard >= _MEMLOCK_BYTES:
-        return HostFinding("locked memory", "ok", "enough may be locked")
+        return HostFinding("locked memory", "ok", "enough memory may be locked")
     remedy = f"add '@realtime - memlock unlimited' to {_LIMITS_FILE}, log in again"
     return HostFinding("locked memory", "note", f"only {hard >> 10} KiB may be locked", remedy)
 
@@ -236,14 +236,14 @@ def _clock_source() -> HostFinding:
     used = _text(_CLOCKS / "current_clocksource")
     if not used or used in _GOOD_CLOCKS:
         return HostFinding("clock source", "ok", used or "not told")
-    found = f"{used}: each look at the clock is slow"
+    found = f"{used}: reading the clock is slow"
     available = _text(_CLOCKS / "available_clocksource").split()
     better = next((clock for clock in available if clock in _GOOD_CLOCKS), "")
     if better:
         return HostFinding(
             "clock source", "note", found, f"echo {better} > {_CLOCKS}/current_clocksource"
         )
-    remedy = "dmesg tells why tsc was given up; a firmware update may mend it"
+    remedy = "dmesg shows why the kernel rejected tsc; a firmware update may help"
     return HostFinding("clock source", "note", found, remedy)
 
 
@@ -262,7 +262,7 @@ def _isolation() -> HostFinding:
         return HostFinding("isolated processors", "ok", isolated)
     count = os.cpu_count() or 1
     if count < 3:
-        return HostFinding("isolated processors", "ok", "none, and none to spare")
+        return HostFinding("isolated processors", "ok", "none, and too few cores to isolate one")
     last = count - 1
     remedy = f"boot with isolcpus=managed_irq,domain,{last} nohz_full={last} rcu_nocbs={last}"
     return HostFinding("isolated processors", "note", "none", remedy)

@@ -46,8 +46,8 @@ class PathOptions:
         for word in self.ignored():
             if not _WORD.fullmatch(word):
                 raise BadInputError(
-                    f"--ignore {word}: allowed: words of G-code such as 'S T M3', a letter each "
-                    "or with its number"
+                    f"--ignore {word}: allowed: words of G-code such as 'S T M3', a letter, or a "
+                    "letter with its number"
                 )
         if self.mirror not in _MIRRORED:
             raise BadInputError(f"--mirror {self.mirror}: allowed: x, y")
@@ -58,8 +58,9 @@ class PathOptions:
         for origin in self._origins_mm().values():
             if origin.size not in _COORDINATES or not (np.abs(origin) <= _FURTHEST_mm).all():
                 raise BadInputError(
-                    f"--origin {self.origin_mm}: allowed: 2 or 3 numbers in mm, as many as the "
-                    f"robot has coordinates, each up to {_FURTHEST_mm:g}; then perhaps G55 and "
+                    f"--origin {self.origin_mm}: allowed: 2 or 3 numbers in mm, one for each "
+                    f"coordinate of the robot, each up to {_FURTHEST_mm:g}; then "
+                    "optionally G55 and "
                     "its numbers, and so on to G59"
                 )
 
@@ -69,7 +70,9 @@ class PathOptions:
         given -= {"blend_mm", "line"}
         if given and file.suffix.lower() not in GCODE:
             names = " ".join("--" + name.split("_", 1)[0] for name in sorted(given))
-            raise BadInputError(f"{names}: allowed: with G-code; {file.name} holds way points")
+            raise BadInputError(
+                f"{names}: allowed only with G-code; {file.name} contains way points"
+            )
 
     def request(self) -> dict[str, Any]:
         """Return the options in the form that a daemon accepts."""
@@ -82,8 +85,8 @@ class PathOptions:
             return ""
         in_mm = " ".join(f"{1e3 * x:g}" for x in origin)
         return (
-            f"--origin {self.origin_mm}: within {_LIKE_METRES_mm:g} mm of the room's zero; were "
-            f"metres typed? In mm: --origin '{in_mm}'"
+            f"--origin {self.origin_mm}: within {_LIKE_METRES_mm:g} mm of the room's zero; "
+            f"are these metres? In mm: --origin '{in_mm}'"
         )
 
     def _origins_mm(self) -> dict[str, FloatArray]:
@@ -106,7 +109,7 @@ class PathOptions:
         if any(place.size != k for place in origins_m.values()):
             raise BadInputError(f"--origin {self.origin_mm}: allowed: {k} numbers in mm")
         if self.z_mm is not None and k < 3:
-            raise BadInputError(f"--z {self.z_mm:g}: allowed: for a robot that moves in space")
+            raise BadInputError(f"--z {self.z_mm:g}: allowed only for a robot that moves in space")
         c, s = math.cos(math.radians(self.rotate_deg)), math.sin(math.radians(self.rotate_deg))
         turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
         return GcodeSettings(

@@ -69,7 +69,7 @@ def preview(robot: Robot, file: Path, options: PathOptions, advance: Advance) ->
             obstacle = Obstacle(
                 int(plan.nodes.line[plan.timed.node[sample]]),
                 plan.timed.samples[sample, 0],
-                "no tensions within their bounds carry the platform's motion",
+                "the motion of the platform needs tensions outside their bounds",
             )
     box = planner.platform
     note = size_note(plan.path, np.array(box.workspace_min_m), np.array(box.workspace_max_m))
@@ -156,7 +156,7 @@ def lines(shown: Preview, robot: Robot, table: dict[str, Any]) -> list[str]:
             f"{time_text(table['constant_limit_s'])}, {table['gain']:.1f} times as long",
         ]
     if table.get("slowed_moves"):
-        text.append(f"note: {table['slowed_moves']} moves want more speed than the robot has")
+        text.append(f"note: {table['slowed_moves']} moves ask for more speed than the robot has")
     tensions = shown.tensions
     if tensions is not None:
         least, most = tensions.tension_N.min(axis=0), tensions.tension_N.max(axis=0)

@@ -50,7 +50,7 @@ _TIMES = {"answers in": "exchange_s", "computing": "compute_s", "late by": "late
 _POWERLESS, _REACTING, _FAULT = range(1, 4)
 _GAP_S, _NOT_RECORDED = 0.5, "not recorded"
 """Rows further apart in time than this are not joined by a line."""
-_BEYOND, _ENDED = 0.02, "not recorded any more"
+_BEYOND, _ENDED = 0.02, "no longer recorded"
 """Extra share of time drawn after a recording that ends while active, and its label."""
 _SHADES = {
     _POWERLESS: ("#e3e5e8", "without power"),
@@ -310,7 +310,7 @@ def pose_curves(columns: Columns) -> dict[str, Curves]:
     found = {label: curves for label, curves in panels.items() if curves}
     if panels["platform (m)"]:
         off = np.linalg.norm(poses[0][:, :3] - poses[1][:, :3], axis=1)
-        found["off its set-point (mm)"] = {"distance": (1e3 * off, np.full(off.size, np.nan))}
+        found["distance from set-point (mm)"] = {"distance": (1e3 * off, np.full(off.size, np.nan))}
     return found
 
 

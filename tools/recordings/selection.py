@@ -74,7 +74,7 @@ def fields_of(text: str | None) -> list[str] | None:
         if name not in FIELDS:
             raise BadInputError(f"--fields {name}: allowed: {', '.join(FIELDS)}")
     if not names:
-        raise BadInputError("--fields: names none; allowed: names with commas between them")
+        raise BadInputError("--fields: is empty; allowed: names separated by commas")
     return names
 
 
@@ -151,7 +151,7 @@ class Selection:
         robot = (reader.metadata.get("robot"), reader.metadata.get("axes"))
         first = self._robot = self._robot or robot
         if robot != first:
-            said = "{}: of {} with {} axes, and those before it of {} with {}"
+            said = "{}: is of {} with {} axes, but earlier files are of {} with {}"
             raise BadInputError(
                 said.format(reader.path, *robot, *first) + "; allowed: recordings of one robot"
             )
@@ -163,13 +163,14 @@ class Selection:
             size += sum(column.nbytes for column in part.values())
             if size > _MOST_BYTES:
                 raise BadInputError(
-                    f"{self.readers[0].path}: more than {_MOST_BYTES / 1e9:g} GB of columns; "
-                    "allowed: less, by --from and --until"
+                    f"{self.readers[0].path}: more than {_MOST_BYTES / 1e9:g} GB of "
+                    "columns; choose "
+                    "less with --from and --until"
                 )
             parts.append(part)
         if not parts:
             names = ", ".join(str(reader.path) for reader in self.readers)
-            raise BadInputError(f"{names}: no cycles in what was asked for")
+            raise BadInputError(f"{names}: no cycles in the selected time")
         return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
 
 
@@ -214,7 +215,7 @@ def _write(selection: Selection, file: IO[bytes], suffix: str) -> int:
             count += table.num_rows
         if writer is None:
             names = ", ".join(str(reader.path) for reader in selection.readers)
-            raise BadInputError(f"{names}: no cycles in what was asked for")
+            raise BadInputError(f"{names}: no cycles in the selected time")
         if suffix == ".parquet":
             described = json.dumps(selection.readers[-1].description)
             writer.add_key_value_metadata({"description": described})

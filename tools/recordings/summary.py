@@ -25,7 +25,7 @@ _EARLY_ns: Final = 50_000_000
 
 WHILE_ACTIVE: Final = "the recording ends while the robot was active"
 LOOP_ENDED: Final = "the control loop ended without a stop"
-_WRITER_ENDED: Final = "its writer was ended, or still writes"
+_WRITER_ENDED: Final = "its writer was killed, or still writes"
 
 
 class Reasons:
@@ -282,7 +282,7 @@ def _run_text(run: dict[str, Any], axes: Sequence[str]) -> str:
     time = f"{run['from_s']:10.3f} s to {run['until_s']:9.3f} s"
     why = f"failed: {run['failed_by']}; then" if "failed_by" in run else "ended,"
     if "cut_short_by" in run:
-        why = f"cut short: {run['cut_short_by']}; then"
+        why = f"interrupted: {run['cut_short_by']}; then"
     return f"  {time}  {run['program']}: {why} {where}"
 
 
@@ -326,8 +326,8 @@ def summary_lines(figures: dict[str, Any], most_events: int) -> Sequence[str]:
     """Return the figures of one file as lines of text."""
     end = {
         "closed": "",
-        "not closed": ", not closed by its writer, or not yet",
-        "cut short": ", cut short",
+        "not closed": ", not closed by its writer",
+        "cut short": ", truncated",
     }
     lines = [
         f"{figures['file']}: {figures['robot']}, {len(figures['axes'])} axes, "
@@ -361,6 +361,6 @@ def summary_lines(figures: dict[str, Any], most_events: int) -> Sequence[str]:
         lines.append(f"  ({len(events) - len(shown)} more events are in --json)")
     for event in shown:
         at = f"{event['after_s']:10.3f} s" if event["after_s"] is not None else " " * 12
-        times = f" ({event['times']} times alike)" if event["times"] > 1 else ""
+        times = f" ({event['times']} times)" if event["times"] > 1 else ""
         lines.append(f"  {at}  {event['text']}{times}")
     return lines

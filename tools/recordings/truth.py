@@ -63,7 +63,7 @@ class Truth:
             records["sync_index"][place], sync_index
         ):
             raise BadInputError(
-                f"{self._path}: does not hold the SYNCs {first} to {last} of a recording"
+                f"{self._path}: does not contain the SYNCs {first} to {last} of a recording"
             )
         angle = np.asarray(records["angle_from_index_rad"][place], float)
         turns = round(float(np.median(measured_rad - angle)) / math.tau)

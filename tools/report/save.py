@@ -16,7 +16,7 @@ OWN_MARK: Final = b"cdpr-rt"
 def require_own(path: Path) -> None:
     """Raise FileExistsError if `path` holds something that was not written by this project."""
     if not may_replace(path, OWN_MARK):
-        text = "is there already and was not written by cdpr; move it, or choose another name"
+        text = "already exists and was not written by cdpr; move it, or choose another name"
         raise FileExistsError(errno.EEXIST, text)
 
 
@@ -26,8 +26,7 @@ def require_free(option: str, path: Path, overwrite: bool) -> None:
         occupied = any(path.iterdir()) if path.is_dir() else path.exists()
     if occupied and not overwrite:
         raise BadInputError(
-            f"{option} {path}: is there already; choose another name, or replace it with "
-            "--overwrite"
+            f"{option} {path}: already exists; choose another name, or replace it with --overwrite"
         )
 
 

@@ -40,14 +40,14 @@ def _which(known: dict[str, Any]) -> str:
 
 def _known_to(known: dict[str, Any]) -> list[str]:
     """Return the accuracy of positions, orientations and absolute positions."""
-    against = f"positions are known to {known['predicted_3_sigma_mm']:.2f} mm"
+    against = f"positions are uncertain by {known['predicted_3_sigma_mm']:.2f} mm"
     if known["predicted_3_sigma_deg"] is not None:
-        against += f" and orientations to {known['predicted_3_sigma_deg']:.3f} deg"
-    lines = [f"{against} against each other (3 sigma, predicted)"]
+        against += f" and orientations by {known['predicted_3_sigma_deg']:.3f} deg"
+    lines = [f"{against} relative to each other (3 sigma, predicted)"]
     frame = f"in the frame of {known['frame']}"
     if known["absolute_3_sigma_mm"] is None:  # the calibration did not compute it
         return [*lines, frame]
-    absolute = f"absolute positions are known to {known['absolute_3_sigma_mm']:.1f} mm"
+    absolute = f"absolute positions are uncertain by {known['absolute_3_sigma_mm']:.1f} mm"
     if known["absolute_3_sigma_deg"] is not None:
-        absolute += f" and absolute orientations to {known['absolute_3_sigma_deg']:.2f} deg"
+        absolute += f" and absolute orientations by {known['absolute_3_sigma_deg']:.2f} deg"
     return [*lines, f"{absolute} (3 sigma, predicted) {frame}"]

@@ -211,7 +211,7 @@ def write_robot(answers: Answers, path: Path) -> Robot:
         with path.open("x", encoding="utf-8") as file:
             file.write(text)
     except FileExistsError:
-        raise BadInputError(f"{path}: exists already, and is not written over") from None
+        raise BadInputError(f"{path}: already exists, and is not overwritten") from None
     except OSError as error:
         raise BadInputError(f"{path}: {error.strerror}") from None
     try:

@@ -152,7 +152,7 @@ def _draw_workspace(figure: Figure, all_axes: list[Axes], sections: list[_Sectio
         label = "distance of all tensions\nfrom their limits, at rest (N)"
         colour_bar(figure, filled, all_axes, label, 0.8 / len(sections))
     if any(section.moving_N.max() > 0.0 for section in sections):
-        all_axes[0].plot([], [], ":", color=LINES, lw=1.0, label="targets can be taken")
+        all_axes[0].plot([], [], ":", color=LINES, lw=1.0, label="targets are accepted")
 
 
 def _draw_machine(ax: Axes, robot: Robot, platform: Platform, view: _View) -> None:

@@ -93,9 +93,9 @@ KINDS = (".csv", ".toml")
 def checked_file(path: Path) -> Path:
     """Return the path if a list of poses can be written there; raises BadInputError."""
     if path.suffix not in KINDS or not path.parent.is_dir():
-        raise BadInputError(f"{path}: allowed: NAME.csv or NAME.toml in a folder that is there")
+        raise BadInputError(f"{path}: allowed: NAME.csv or NAME.toml in an existing folder")
     if not may_replace(path):
-        raise BadInputError(f"--out {path}: is there already; allowed: another name")
+        raise BadInputError(f"--out {path}: already exists; choose another name")
     return path
 
 

@@ -17,12 +17,12 @@ from cdpr_profiles.platform import Platform, WIDEST_m
 # Kinds of cable robots that `cdpr robot new` describes; each is modelled on a shipped robot.
 
 KINDS = {
-    "planar-3": "in a plane, x and y: 3 cables, two to hold and one to pull tight; it turns freely",
-    "planar-4": "in a plane, x, y and angle: 4 cables, one more than directions, to pull tight",
-    "point-4": "a point in space, x, y, z: 4 cables from above; 3 would do for a small place",
-    "suspended-6": "a platform in space on 6 cables from above, as few as its 6 directions take",
-    "suspended-8": "a platform in space on 8 cables from above: a larger place, and larger angles",
-    "spatial-8": "a platform in space, 8 cables from above and below: pulled tight from all sides",
+    "planar-3": "in a plane, x and y: 3 cables, and the platform turns freely",
+    "planar-4": "in a plane, x, y and angle: 4 cables, one more than directions",
+    "point-4": "a point in space, x, y, z: 4 cables from above",
+    "suspended-6": "a platform in space on 6 cables from above, the fewest for its 6 directions",
+    "suspended-8": "a platform in space on 8 cables from above: larger workspace and angles",
+    "spatial-8": "a platform in space, 8 cables from above and below: fully constrained",
 }
 """By name: a description, and the reason for the number of cables."""
 SKETCH = r"""
@@ -263,7 +263,7 @@ def _turning(kind: RobotKind) -> list[Question]:
     acceleration_deg_s2 = math.degrees(platform.angular_acceleration_rad_s2)
     return [
         Question(
-            "angle_deg", "How far targets may be turned from home's orientation (deg; 0: not)",
+            "angle_deg", "Largest rotation of targets from home's orientation (deg; 0: none)",
             _degrees(0.0, 179.0), lambda _: _figure(math.degrees(platform.workspace_angle_rad)),
         ),
         Question(

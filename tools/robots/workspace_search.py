@@ -111,7 +111,7 @@ def _centre(settings: Search, grid: Grid) -> FloatArray:
     if not depth_N >= 0.0:
         near = f"nearest to it is {in_mm(deepest)} mm, {-depth_N:.1f} N short"
         if not np.isfinite(depth_N):
-            near = "some direction is held by no tensions anywhere"
+            near = "nowhere can the tensions act in all directions"
         raise WorkFailedError(
             f"no place of the grid from {in_mm(settings.box.low_m)} to "
             f"{in_mm(settings.box.high_m)} mm is in this workspace; {near}"
@@ -128,8 +128,8 @@ def _centre(settings: Search, grid: Grid) -> FloatArray:
         centre = deepest
     if not settings.criterion.clear_shares(centre, centre[None])[0] > 0.0:
         raise BadInputError(
-            f"--contact-free: something is in contact where the rays start, at {in_mm(centre)} mm; "
-            "allowed: another --centre, or orientation"
+            f"--contact-free: there is a contact at the start of the rays, {in_mm(centre)} "
+            "mm; choose another --centre or orientation"
         )
     return centre
 

@@ -172,7 +172,7 @@ class Gamepad:
             self._first = False
             stick.reset()  # presses before the first read do not count
         stick.advance(now_s, _LONGEST_S)
-        trouble = "" if self._device is not None else "the gamepad is gone: plug it in again"
+        trouble = "" if self._device is not None else "the gamepad is unplugged: plug it in again"
         return InputSample(
             stick.position_m, stick.quaternion, not stick.held, stick.confirmed, trouble
         )
@@ -246,7 +246,7 @@ def stick_map(
     named = [axis for axis, _ in (*moves, *turns)]
     if len(set(named)) < len(named):
         given = ",".join(filter(None, (axes or AXES[k], turn_axes or TURN_AXES[len(about)])))
-        raise BadInputError(f"--axes, --turn-axes {given}: allowed: different ones")
+        raise BadInputError(f"--axes, --turn-axes {given}: each axis may be used only once")
     held, pressed = _code("--dead-man", dead_man, "BTN_"), _code("--confirm", confirm, "BTN_")
     if held == pressed:
         raise BadInputError(f"--confirm {confirm}: allowed: another button than --dead-man")
@@ -295,18 +295,20 @@ class EvdevFinder:
                 raise BadInputError(f"--input {path}: {device.name}: has no {missing}")
         if refused:
             raise BadInputError(
-                f"{refused}: this user may not read it; allowed: members of its group, mostly "
-                "`input`"
+                f"{refused}: no permission; join the group of the device, usually `input`"
             )
         return None
 
     def missing_text(self) -> str:
         """Return the text that says why no device was found."""
         if self._path is not None:
-            return f"--input {self._path}: is no input device; allowed: /dev/input/event0 and so on"
+            return (
+                f"--input {self._path}: is not an input device; allowed: /dev/input/event0 and "
+                "so on"
+            )
         return (
-            "--device gamepad: none is plugged in that has the axes and buttons which --axes, "
-            "--turn-axes, --dead-man and --confirm name"
+            "--device gamepad: no gamepad has all axes and buttons of --axes, --turn-axes, "
+            "--dead-man and --confirm"
         )
 
     def _missing(self, device: EvdevDevice) -> str:
@@ -323,7 +325,7 @@ def _code(option: str, name: str, prefix: str) -> int:
     codes: dict[str, int] = _evdev().ecodes.ecodes
     if not name.startswith(prefix) or name not in codes:
         raise BadInputError(
-            f"{option}: {name!r}; allowed: a name of the kernel's, such as "
+            f"{option}: {name!r}; allowed: a name of the Linux kernel, such as "
             f"{'ABS_X' if prefix == 'ABS_' else 'BTN_SOUTH'} (`evtest` shows a device's)"
         )
     return codes[name]

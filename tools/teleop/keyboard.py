@@ -128,19 +128,20 @@ class Keyboard:
             termios.tcflush(fd, termios.TCIFLUSH)  # earlier input must not move the robot
         except (termios.error, OSError) as error:
             raise BadInputError(
-                f"--device keyboard: standard input is no terminal ({error.args[-1]})"
+                f"--device keyboard: standard input is not a terminal ({error.args[-1]})"
             ) from None
 
     @property
     def hint(self) -> str:
         """Return a line on what each key does."""
         return (
-            f"arrows or wasd: {self._keys.step_m * 1e3:g} mm of the hand, held to go on"
-            f"{self._more}; + and -: longer, shorter; space: hold; Enter: confirm; q: end"
+            f"arrows or wasd: {self._keys.step_m * 1e3:g} mm step of the hand, hold the key "
+            "to continue"
+            f"{self._more}; + and -: longer, shorter steps; space: clutch; Enter: confirm; q: end"
         )
 
     def read(self, now_s: float) -> InputSample:
-        """Return the present sample; it reports the end if the terminal is gone.
+        """Return the present sample; it reports the end if the terminal was closed.
 
         Keys typed before the first call have no effect.
         """

@@ -52,7 +52,7 @@ def read_script(path: Path, scale: float = 1.0) -> tuple[ScriptLine, ...]:
             if lines and line.time_s <= lines[-1].time_s:
                 raise BadInputError(
                     f"--script {path}, line {number}: {line.time_s:g} s; allowed: more than "
-                    f"{lines[-1].time_s:g} s, the time of the line before"
+                    f"{lines[-1].time_s:g} s, the time of the previous line"
                 )
             lines.append(line)
             way_m, most_m = (
@@ -61,8 +61,9 @@ def read_script(path: Path, scale: float = 1.0) -> tuple[ScriptLine, ...]:
             )
             if way_m > most_m:
                 raise BadInputError(
-                    f"--script {path}, line {number}: {way_m:g} m from the first line's place; "
-                    f"allowed: {most_m:g} m at this scale"
+                    f"--script {path}, line {number}: {way_m:g} m from the first "
+                    "position; allowed: "
+                    f"{most_m:g} m at this scale"
                 )
     if not lines:
         raise BadInputError(f"--script {path}: no lines; allowed: {_SHAPE}")
@@ -86,7 +87,7 @@ def _parsed(where: str, words: list[str]) -> ScriptLine:
             allowed = ", ".join((*_WORDS, "z=", "turn="))
             raise BadInputError(f"{where}: {brief(word)!r}; allowed: {allowed}")
     if not (math.isfinite(time_s) and time_s >= 0.0):
-        raise BadInputError(f"{where}: {brief(words[0])} s; allowed: 0 and more")
+        raise BadInputError(f"{where}: {brief(words[0])} s; allowed: 0 or more")
     x, y, z = x_mm * 1e-3, y_mm * 1e-3, z_mm * 1e-3
     if not (abs(x) <= _LONGEST_m and abs(y) <= _LONGEST_m and abs(z) <= _LONGEST_m):
         raise BadInputError(f"{where}: {x_mm:g} {y_mm:g} mm; allowed: up to {_LONGEST_m:g} m")
@@ -107,7 +108,7 @@ def _numbers(where: str, word: str, text: str, count: int) -> list[float]:
 class ScriptDevice:
     """Plays a script from the first read on; positions are relative to its first line."""
 
-    hint = "a script leads; Ctrl-C ends"
+    hint = "a script moves the hand; Ctrl-C ends"
 
     def __init__(self, lines: tuple[ScriptLine, ...]) -> None:
         self._lines = lines
@@ -139,7 +140,7 @@ class ScriptDevice:
             from_vector((rx, ry, rz)),
             clutch=done > 0 and last.clutch,
             confirmed=sum(line.confirm for line in lines[:done]),
-            end=End("the script is done", arrive=True) if done == len(lines) else None,
+            end=End("the script has ended", arrive=True) if done == len(lines) else None,
         )
 
     def close(self) -> None:

@@ -32,7 +32,7 @@ _MOST_KEPT: Final = 36_000
 _NEVER_ANSWERED: Final = ": its stream cannot be reached there"
 _WHY_NOT: Final = {
     Standing.BUSY: "another sender holds the set-point stream",
-    Standing.NO_RIGHT: "the right to move has ended, or is somebody else's now",
+    Standing.NO_RIGHT: "the right to move has expired, or another client has it",
 }
 
 

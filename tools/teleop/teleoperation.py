@@ -74,13 +74,13 @@ def teleoperate(settings: TeleopSettings, out: Output) -> None:
             daemon.post("/program", {"program": program, "wanted": arguments}, token)
             number = description["programs"].index(program)
             session = TeleopSession(stream, device, settings.scale, number, directions[0])
-            out.note(f"leading {name} over {host}:{port}; {device.hint}")
+            out.note(f"controlling {name} over {host}:{port}; {device.hint}")
             try:
                 end = _shown(
                     session, View(session, description, status["reason"]), daemon, out, ended
                 )
                 if session.silent_s > _UNHEARD_S:  # the next answer may take as long
-                    out.note(f"{end.text}; it is asked to hold")
+                    out.note(f"{end.text}; asking the robot to hold")
                 with suppress(CommandError) if end.failed else nullcontext():  # `end` says why
                     daemon.post("/hold")
             except BaseException:
@@ -98,7 +98,7 @@ def _stream(host: str, port: int, daemon: Daemon, token: str) -> StreamClient:
     try:
         return StreamClient(host, port, session)
     except (OSError, UnicodeError) as error:
-        why = getattr(error, "strerror", None) or "is no name of a host"
+        why = getattr(error, "strerror", None) or "is not a host name"
         raise BadInputError(f"set-points to {host}:{port}: {why}") from None
 
 
@@ -198,7 +198,7 @@ def _program_of(description: dict[str, Any]) -> tuple[str, dict[str, Any]]:
         return "pose", {"stream": True}
     if "follow" in programs:
         return "follow", {}
-    raise WorkFailedError("the daemon does not know its robot yet; `cdpr status` says why")
+    raise WorkFailedError("the daemon is not ready yet; `cdpr status` gives the reason")
 
 
 def _tell_figures(session: TeleopSession, out: Output) -> None:

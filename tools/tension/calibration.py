@@ -154,7 +154,7 @@ class _Recording:
         if pull.travel_rad > plan.most_travel_rad:
             raise TripError(
                 f"wound in by {1e3 * pull.travel_rad * self._per_rad_m:.0f} mm and the tension is "
-                f"{tension_N:.1f} N; is the cable made fast? (--travel-mm)"
+                f"{tension_N:.1f} N; is the end of the cable fastened? (--travel-mm)"
             )
         if tension_N >= plan.highest_N:
             self._winding_in = False
@@ -218,7 +218,7 @@ def anchored_points(path: Path) -> tuple[list[TorquePoint], int]:
     try:
         wind_in, order = int(log.header["wind_in"]), int(log.header["pole_pairs"])
     except (KeyError, TypeError, ValueError) as error:
-        raise RawLogError(f"{path}: not a recording of a pulled cable ({error})") from None
+        raise RawLogError(f"{path}: not a recording of a fastened cable ({error})") from None
     columns = [log.column(c) for c in ("tension_N", "torque_sent_Nm", "winding_in", "position_rad")]
     angle = columns[-1]
     reversal = angle[np.argmax(wind_in * angle)]
@@ -387,7 +387,7 @@ def _refuse_uneven(each: FloatArray, winding_in: bool, header: dict[str, Any]) -
         shown = ", ".join(f"{value:.3f}" for value in each)
         raise CalibrationRefusedError(
             f"{header.get('mass_kg')} kg {'raised' if winding_in else 'lowered'}: the turns took "
-            f"{shown} Nm; the mass did not hang freely all the time: take up the slack, or give a "
+            f"{shown} Nm; the mass did not always hang freely: take up the slack, or give a "
             "longer --lead-mm"
         )
 
@@ -404,7 +404,7 @@ Hang = Callable[[float, Clock], None]
 
 def not_hung(mass_kg: float) -> InvalidRequestError:
     """Return the error for a mass that was not hung."""
-    return InvalidRequestError(f"nobody has hung {mass_kg:g} kg; the drive is without power")
+    return InvalidRequestError(f"{mass_kg:g} kg were not hung; the drive has no power")
 
 
 def plan_hoist(winch: Winch, speed_m_s: float, lead_m: float, turns: int) -> HoistPlan:
@@ -471,9 +471,9 @@ def _refuse_another_mass(points: Sequence[TorquePoint], mass_kg: float, gain_m2_
     lifted_kg = sum(point.torque_Nm for point in points) / len(points) / gain_m2_s2
     if abs(lifted_kg - mass_kg) > MOST_GAIN_ERROR * mass_kg:
         raise CalibrationRefusedError(
-            f"{mass_kg:g} kg were asked for, and the torque is that of {lifted_kg:.1f} kg by the "
-            "geometry; does that mass hang there, and are cable_sign, drum_radius_m and "
-            "gear_ratio of the winch's profile right?"
+            f"{mass_kg:g} kg should hang there, but the torque corresponds to "
+            f"{lifted_kg:.1f} kg; is it the right mass, and are cable_sign, drum_radius_m "
+            "and gear_ratio of the winch's profile right?"
         )
 
 
@@ -528,8 +528,9 @@ def _hoist(
         if session.device.faults() or abs(controller.effort_Nm[0]) < limit:
             raise
         raise TripError(
-            f"{error}: {limit:.2f} Nm, the most that was allowed, do not lift {mass_kg:g} kg; see "
-            "that the cable runs free and that no heavier mass hangs there, or take lighter ones"
+            f"{error}: {limit:.2f} Nm, the largest allowed torque, do not lift {mass_kg:g} "
+            "kg; check that the cable runs freely and that the mass is right, or use "
+            "lighter ones"
         ) from None
     finally:
         log.close()
@@ -573,7 +574,7 @@ def _found(folder: Path) -> list[Path]:
 def _recordings(folder: Path) -> list[Path]:
     found = _found(folder)
     if not found:
-        raise InvalidRequestError(f"{folder}: holds no recordings of a calibration (raw/...)")
+        raise InvalidRequestError(f"{folder}: contains no recordings of a calibration (raw/...)")
     return found
 
 
@@ -584,7 +585,7 @@ def _identity(path: Path) -> Mapping[str, Any]:
         or not {"winch", "motor"} <= whose.keys()
         or not isinstance(whose.get("serial"), int)
     ):
-        raise RawLogError(f"{path}: does not say which winch it is of")
+        raise RawLogError(f"{path}: does not name its winch")
     return whose
 
 

@@ -31,6 +31,6 @@ def draw_calibration(path: Path, points: Sequence[TorquePoint], found: WinchCali
     above.plot(line, [found.torque_Nm(t) for t in line], "--", color="#444444", label=label)
     above.set(ylabel="motor torque (Nm)")
     below.axhline(0.0, color="#777777", lw=0.8)
-    below.set(xlabel="cable tension (N)", ylabel="left by the lines (mNm)", xlim=line)
+    below.set(xlabel="cable tension (N)", ylabel="residual (mNm)", xlim=line)
     legend_above(figure, above)
     save_figure(figure, path)

@@ -131,7 +131,7 @@ def by_prompt(mass_kg: float, clock: Clock) -> None:
         while (
             line := clock.run_blocking(partial(typed_line, question, stop_requested))
         ).strip() and line.endswith("\n"):
-            typer.echo("Enter alone, please.", err=True)
+            typer.echo("Press only Enter.", err=True)
     if stop_requested() or not line.endswith("\n"):
         raise not_hung(mass_kg)
 

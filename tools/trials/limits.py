@@ -159,7 +159,7 @@ def judge(recorded: Recorded, robot: Robot) -> list[Figure]:
         Figure("top_speed_m_s", "fastest along a direction", float(speed.max()), "m/s"),
         *held_figures(recorded, robot),
         Figure("overshoot_mm", "overshoot", 1e3 * float(beyond[:, :k].max()), "mm", OVERSHOOT_mm),
-        Figure("off_mm", "farthest from the box of a leg, sideways too", 1e3 * off, "mm"),
+        Figure("off_mm", "farthest from the box of a leg, in any direction", 1e3 * off, "mm"),
     ]
     if of_rest:
         text = "overshoot beyond where the platform came to rest"
@@ -190,6 +190,6 @@ def held_figures(recorded: Recorded, robot: Robot) -> list[Figure]:
         Figure(
             "slack_cycles", "cycles with a slack cable", (tension < slack).any(axis=1).sum(), "", 0
         ),
-        Figure("torque_sent_Nm", "greatest torque asked of a motor", float(sent.max()), *bound),
+        Figure("torque_sent_Nm", "greatest commanded torque of a motor", float(sent.max()), *bound),
         Figure("torque_true_Nm", "greatest torque of a motor", float(np.abs(torque).max()), "Nm"),
     ]

@@ -175,11 +175,11 @@ def judge(recorded: Recorded, robot: Robot, speed_m_s: float) -> list[Figure]:
         Figure("path_worst_mm", "worst distance from it", float(errors.off_mm.max()), "mm"),
         Figure("lag_mm", "RMS distance from the set-point", rms(errors.lag_mm), "mm"),
         Figure(
-            "corner_mm", "planned path's farthest from the file's, in corners",
+            "corner_mm", "largest distance of the planned path from the file's, in corners",
             float(errors.corner_mm.max()), "mm", BLEND_mm,
         ),
         Figure(
-            "setpoint_mm", "set-point's farthest from the planned path",
+            "setpoint_mm", "largest distance of the set-point from the planned path",
             float(errors.setpoint_off_mm.max()), "mm",
         ),
     ]  # fmt: skip

@@ -166,7 +166,7 @@ def _held(axes: tuple[Axes, Axes], recorded: Recorded, robot: Robot) -> None:
     for sign in (-1.0, 1.0):
         torque.axhline(sign * float(np.max(limit.torque_Nm)), color=BOUND, lw=1.0)
     tension.set(xlabel="min", ylabel="N", title="true tension of the cables, and its bounds")
-    torque.set(xlabel="min", ylabel="Nm", title="torque asked of the motors, and its limit")
+    torque.set(xlabel="min", ylabel="Nm", title="commanded torque of the motors, and its limit")
 
 
 def _rest(axes: list[Axes], recorded: Recorded) -> None:
@@ -197,7 +197,9 @@ def of_stream(recorded: Recorded) -> Figure:
     _steps(step, recorded, 1e3 * steps[:, :k], 1e3 * directions.acceleration[0])
     place.set(ylabel="m", title="way since the beginning (excerpt)")
     speed.set(ylabel="m/s", title="commanded velocity (excerpt)")
-    step.set(xlabel="s", ylabel="mm/s", title="step of the commanded velocity a cycle, its limit")
+    step.set(
+        xlabel="s", ylabel="mm/s", title="step of the commanded velocity per cycle, and its limit"
+    )
     if turned:
         angle, turn = axes[3:]
         _followed(angle, recorded, directions.turns, float(np.degrees(1.0)))

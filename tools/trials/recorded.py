@@ -138,8 +138,8 @@ class Recorded:
         swings_rad = age_s**2 * rms(np.gradient(speed, self.period_s, axis=0).ravel())
         if not old or not rest < _MISFIT_rad + swings_rad:
             raise WorkFailedError(
-                f"{self.folder}: recording and {TRUTH} do not belong together: the motors' angles "
-                "are not those of the same SYNCs"
+                f"{self.folder}: recording and {TRUTH} do not belong together: the motor angles "
+                "differ at the same SYNCs"
             )
 
 
@@ -160,6 +160,6 @@ def _joined(truth: Truth, index: NDArray[np.int64]) -> Truth:
     rows = index.astype(np.int64) - first
     if rows[0] < 0 or rows[-1] >= truth.size or not (truth["sync_index"][rows] == index).all():
         raise WorkFailedError(
-            f"{TRUTH}: does not hold the SYNCs {int(index[0])} to {int(index[-1])}"
+            f"{TRUTH}: does not contain the SYNCs {int(index[0])} to {int(index[-1])}"
         )
     return truth[rows]

@@ -103,7 +103,9 @@ class TrialRun:
                 self.mark("refused", **self.directions.marked(place, "target"), reason=reason)
                 continue
             return place
-        raise WorkFailedError(f"{_TRIES} places in the workspace were refused, the last: {reason}")
+        raise WorkFailedError(
+            f"{_TRIES} targets in the workspace were rejected, the last: {reason}"
+        )
 
     def go(self, place: FloatArray, speed_m_s: float | None = None) -> None:
         """Move to a place (d,) and wait until the set-point stands there."""

@@ -73,7 +73,7 @@ def judge(recorded: Recorded, robot: Robot) -> list[Figure]:
     targets = targets.reshape(-1, directions.d)
     off = np.linalg.norm(recorded.true_m[rows] - targets[:, : directions.k], axis=1)
     cut_short = bool(recorded.marked(_TIME_OVER))
-    text = f"poses, out and back{f', of {POSES}: its time was over' if cut_short else ''}"
+    text = f"poses, out and back{f', of {POSES}: the time was over' if cut_short else ''}"
     figures = [
         Figure("poses", text, len(marks), "", 1 if cut_short else POSES, True),
         Figure("minutes", "bus time", float(recorded.time_s[-1]) / 60.0, "min"),

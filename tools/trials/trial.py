@@ -136,9 +136,9 @@ def perform(settings: TrialSettings, folder: Path, out: Output) -> dict[str, Any
     knows = settings.commissioned is not None or any(axis.commissioned for axis in robot.axes)
     if kind.compares and settings.compensated and not knows:
         raise BadInputError(
-            f"{settings.kind}: compares motion with compensation and without, and the motors "
-            "are not identified; allowed: --commissioned DIR, what `cdpr commission "
-            f"{settings.robot} --all` has left, or --without-compensation"
+            f"{settings.kind}: compares motion with and without compensation, but the "
+            "motors are not commissioned; give --commissioned DIR with the results of "
+            f"`cdpr commission {settings.robot} --all`, or --without-compensation"
         )
     text = uncommissioned_text(with_commissioned(robot, _path(settings.commissioned)))
     if settings.compensated and text:

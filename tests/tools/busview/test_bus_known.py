@@ -42,7 +42,7 @@ def test_a_robot_with_ambiguous_node_ids_requires_the_name_of_a_bus(tmp_path: Pa
     file = tmp_path / "pair.toml"
     buses = bus.format("left", 500_000) + bus.format("right", 1_000_000)
     file.write_text('name = "Pair"\n' + buses + axis.format("left") + axis.format("right"))
-    with pytest.raises(BadInputError, match="node ids in common"):
+    with pytest.raises(BadInputError, match="use the same node ids"):
         known_bus(url("simbus:elsewhere"), None, None, str(file))
     assert known_bus(None, None, None, f"{file}:left").bitrate_bit_s == 500_000
 

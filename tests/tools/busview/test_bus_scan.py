@@ -162,12 +162,12 @@ def test_scan_reports_devices_that_are_not_drives_or_do_not_answer(
         silent.network.unsubscribe(0x616)  # does not answer
         silent.nmt.start_heartbeat(100)
         found = scan(lab, "--nodes", "20-23")
-    assert "as a bootloader has" in found[20]["problems"][0]
+    assert "such as a bootloader" in found[20]["problems"][0]
     assert found[20]["cia402"] is False
     assert "CiA 401" in found[21]["problems"][0]
     assert found[22]["answers_sdo"] is False
     assert found[22]["heartbeats"] >= 5
-    assert "answers no SDO" in found[22]["problems"][0]
+    assert "does not answer SDO" in found[22]["problems"][0]
     assert found[23]["cia402"] is True
     assert found[23]["supported_modes"] == [10]
     assert found[23]["profiles"] == []

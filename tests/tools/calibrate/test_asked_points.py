@@ -83,8 +83,8 @@ def test_a_point_far_from_the_pose_by_cables_is_asked_again(
     points = load_points(tmp_path / "points.csv")
     assert [point.position_m[0] for point in points] == pytest.approx([0.01, 0.41])
     said = capsys.readouterr().err
-    assert "that is 301 mm from where its cables have it, 10 20 300;" in said
-    assert said.count("type the same again") == 2
+    assert "that is 301 mm from the position given by the cable lengths, 10 20 300;" in said
+    assert said.count("type it again") == 2
     os.close(typed)
 
 
@@ -109,7 +109,7 @@ def test_no_point_is_stored_if_the_platform_moved_meanwhile(tmp_path: Path, type
 
     ask = AskedPoints(Output(as_json=False), tmp_path / "points.csv", 3, moved)
     os.write(typed, b"10 20 300\n")
-    with pytest.raises(WorkFailedError, match="moved after pose 4 had been read"):
+    with pytest.raises(WorkFailedError, match="moved after pose 4 was read"):
         ask(4)
     assert not load_points(tmp_path / "points.csv")
     os.close(typed)

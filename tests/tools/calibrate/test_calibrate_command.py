@@ -110,7 +110,7 @@ def test_a_calibration_by_points_is_adopted_shown_and_undone(tmp_path: Path) -> 
     assert "of 20" in shown.stderr and "cdpr calibrate undo spatial-8" in shown.stderr
     undone = cdpr_here("calibrate", "undo", "spatial-8", "--json")
     assert undone.returncode == 0 and result(undone)["in_force"] is None
-    assert "1 was taken back; before it: " in not_calibrated_reason("spatial-8")
+    assert "1 was undone; before it: " in not_calibrated_reason("spatial-8")
     assert calibrated(robot) is robot
     again = cdpr_here("calibrate", "undo", "spatial-8")
     assert again.returncode == 2 and "none to undo" in again.stderr
@@ -146,7 +146,7 @@ def test_an_insignificant_calibration_is_adopted_only_on_request(tmp_path: Path)
     assert told["good"] and not told["change"]["significant"]
     assert told["in_force"] is None and "not significant" in told["not_taken_over"]
     assert "± 3 sigma" in done.stderr and "not significant: noise alone" in done.stderr
-    assert "nothing was taken over" in done.stderr and "--adopt" in done.stderr
+    assert "the calibration was not adopted" in done.stderr and "--adopt" in done.stderr
     report = Path(told["report"]).read_text()
     assert "not significant" in report
     for text in (done.stderr, report):  # all figures have the same convention
@@ -400,7 +400,7 @@ def test_a_check_fits_the_map_with_the_options_of_the_calibration(
     assert exits == pytest.approx(np.array(known.exit_points_m), abs=1e-6)
     points.write_text(points.read_text().replace(",0.5", ",5"))
     capsys.readouterr()
-    assert before(out, robot) is None and "the camera is left aside" in capsys.readouterr().err
+    assert before(out, robot) is None and "the camera is not used" in capsys.readouterr().err
     points.unlink()
     assert before(out, robot) is None and "p.csv: is gone" in capsys.readouterr().err
 
@@ -410,10 +410,10 @@ def test_a_hand_eye_file_without_camera_is_rejected(tmp_path: Path) -> None:
     told.write_text("position_m = [0.0, 0.0, -0.28]\nrotation_deg = [180.0, 0.0, 0.0]\n")
     blind = data_of(made_up("spatial-8", 20, 12), tmp_path / "data.json")
     fit = cdpr_here("calibrate", "fit", "spatial-8", "--data", blind, "--hand-eye", told)
-    assert fit.returncode == 2 and "--hand-eye: no camera has looked" in fit.stderr
+    assert fit.returncode == 2 and "--hand-eye: these poses have no images" in fit.stderr
     run = ("calibrate", "run", "spatial-8", "--out", tmp_path / "run", "--hand-eye", told)
     scanned = cdpr_here(*run, "--scanner")
-    assert scanned.returncode == 2 and "--hand-eye: is of a camera" in scanned.stderr
+    assert scanned.returncode == 2 and "--hand-eye: allowed only with --camera" in scanned.stderr
     told.write_text("position_mm = [0.0, 0.0, -280.0]\n")
     done = cdpr_here(*run)
     assert done.returncode == 2 and "hand-eye.toml: position_mm" in done.stderr
@@ -427,4 +427,6 @@ def test_a_resumed_run_rejects_options_of_its_start(given: tuple[str, ...], tmp_
     where = ("--resume", "--out", tmp_path)
     done = cdpr_here("calibrate", "run", "planar-4", *where, *given)
     assert done.returncode == 2
-    assert f"{given[0]}: not with --resume, which goes on as the run was begun" in done.stderr
+    assert (
+        f"{given[0]}: not with --resume, which continues with the options of the run" in done.stderr
+    )

@@ -160,7 +160,7 @@ def test_a_resumed_run_keeps_measured_poses_and_measures_the_rest(
     assert 5 <= len(left.poses) <= 7 and left.restarts == ()
     if raised is not KeyboardInterrupt:
         told = " ".join([str(caught.value), *getattr(caught.value, "__notes__", ())])
-        assert f"{len(left.poses)} poses are kept" in told and "--resume" in told
+        assert f"{len(left.poses)} poses are saved" in told and "--resume" in told
     data = go_on(tmp_path, settings())
     assert len(data.poses) == 15 and data.restarts == (len(left.poses),)
     assert data.poses[: len(left.poses)] == left.poses
@@ -380,7 +380,7 @@ def test_a_run_rejects_a_folder_with_files_of_the_user(tmp_path: Path, name: str
     kept = tmp_path / name / "pose-0001.png" if name == run.IMAGES else tmp_path / name
     kept.parent.mkdir(exist_ok=True)
     kept.write_text("somebody else's")
-    with pytest.raises(BadInputError, match="allowed: another --out, or move it away"):
+    with pytest.raises(BadInputError, match="choose another --out, or move the file away"):
         run.StoredRun.new(tmp_path, ROBOT, SETUP)
     assert kept.read_text() == "somebody else's"
 
@@ -396,7 +396,7 @@ def test_a_new_run_keeps_files_of_the_user_among_its_images(tmp_path: Path) -> N
 def test_a_simulation_does_not_overwrite_readings_of_a_real_robot(tmp_path: Path) -> None:
     kept = run.StoredRun.new(tmp_path, ROBOT, None)
     kept.data.model_copy(update={"simulated": False}).save(tmp_path / run.DATA)
-    with pytest.raises(BadInputError, match="was read of a real robot"):
+    with pytest.raises(BadInputError, match="contains readings of a real robot"):
         run.StoredRun.new(tmp_path, ROBOT, None)
     assert (tmp_path / run.DATA).exists()
 
@@ -407,5 +407,5 @@ def test_data_of_a_changed_robot_cannot_be_resumed(
     rigs()
     data = begin(tmp_path, settings())
     data.model_copy(update={"geometry_sha256": "0" * 64}).save(tmp_path / run.DATA)
-    with pytest.raises(BadInputError, match="another state of 'planar-4'"):
+    with pytest.raises(BadInputError, match="another version of 'planar-4'"):
         go_on(tmp_path, settings())

@@ -142,12 +142,12 @@ def of_a_run(told: StandingDaemon, folder: Path) -> None:
         (shift("calibration", {"version": 1}), BadInputError, "cdpr calibrate undo planar-4"),
         (shift("geometry_sha256", "0"), BadInputError, "changed since the daemon"),
         (away, BadInputError, "mm from home; allowed for the first pose: home"),
-        (unpowered, WorkFailedError, "not held on its cables .ready, hold."),
-        (lowered, WorkFailedError, "not held on its cables .active, hold."),
-        (hung, WorkFailedError, "the loop has not turned for"),
+        (unpowered, WorkFailedError, "the cables do not hold the platform .ready, hold."),
+        (lowered, WorkFailedError, "the cables do not hold the platform .active, hold."),
+        (hung, WorkFailedError, "the loop has run no cycle for"),
         (swinging, WorkFailedError, "did not come to rest"),
-        (of_the_simulator, BadInputError, "of another robot, bus or state"),
-        (of_a_run, BadInputError, "holds an automatic run"),
+        (of_the_simulator, BadInputError, "of another robot, another bus"),
+        (of_a_run, BadInputError, "contains an automatic run"),
     ],
 )
 def test_poses_of_a_different_robot_state_or_source_are_rejected(

@@ -92,7 +92,7 @@ class Moved(StandingDaemon):
         assert (path, (body or {})["program"]) == ("/program", "pose")
         assert wanted["speed_m_s"] == 0.5 * ROBOT.platform.speed_m_s  # type: ignore[union-attr]
         if self.silent:
-            raise WorkFailedError("the loop has not turned for 2.0 s")
+            raise WorkFailedError("the loop has run no cycle for 2.0 s")
         if self.reacting != "none":
             raise refused("the robot is being stopped")
         if wanted["position_m"][0] in self.refused:
@@ -160,7 +160,7 @@ def test_a_rejected_place_is_omitted_and_a_missed_one_is_read(
     data = measurement.run().data
     told = capsys.readouterr().err
     assert "a cable is in the way" in told
-    assert "mm" in told and "still on its way" not in told and "a cable would be slack" in told
+    assert "mm" in told and "still moving" not in told and "a cable would be slack" in told
     assert set(data.tried) == {PLACES[1], PLACES[2]}
     assert len(data.poses) == 4
 
@@ -172,7 +172,7 @@ def test_a_fault_ends_the_measurement_and_keeps_readings(
     measurement.daemon.faulty, measurement.daemon.limit = {-0.1}, limit
     with pytest.raises(TripError, match="the motion was ended: axis 1: slack") as caught:
         measurement.run()
-    assert "the same command goes on behind" in caught.value.__notes__[0]
+    assert "the same command continues after them" in caught.value.__notes__[0]
     data = load_data(measurement.folder / "data.json")
     assert len(data.tried) == tried and 1 <= len(data.poses) < 5
 
@@ -202,7 +202,7 @@ def test_a_reacting_robot_ends_the_measurement_before_the_next_place(
 def test_a_silent_loop_does_not_count_as_rejection_of_a_place(measurement: Measurement) -> None:
     measurement.run(2)
     measurement.daemon.silent = True
-    with pytest.raises(WorkFailedError, match="has not turned"):
+    with pytest.raises(WorkFailedError, match="has run no cycle"):
         measurement.run()
     assert measurement.daemon.rights == 2
     assert load_data(measurement.folder / "data.json").tried == ()
@@ -234,7 +234,7 @@ def test_a_stop_request_holds_the_robot_and_a_lost_daemon_is_reported(
 
     daemon.post = stopped_on_the_way  # type: ignore[method-assign]
     daemon.stuck = {place[0] for place in PLACES}
-    with pytest.raises(WorkFailedError, match="stopped; 2 poses are kept"):
+    with pytest.raises(WorkFailedError, match="stopped; 2 poses are saved"):
         measurement.run()
     assert daemon.program == "hold"
     measurement.stopped, daemon.lost = False, True
@@ -301,7 +301,7 @@ def test_a_check_requires_a_robot_that_runs_with_its_calibration(
 ) -> None:
     out, folder = Output(as_json=False), tmp_path / "out"
     daemon = Calibrated(calibrated(file), 0.0)
-    with pytest.raises(BadInputError, match="calibrated with one"):
+    with pytest.raises(BadInputError, match="calibrated with a camera"):
         checked_running(out, file, daemon, "opencv:0", 1, folder)  # type: ignore[arg-type]
     with pytest.raises(BadInputError, match="the daemon of this name runs"):
         checked_running(out, ROBOT, daemon, None, 1, folder)  # type: ignore[arg-type]
@@ -315,7 +315,7 @@ def test_a_check_does_not_overwrite_data_of_a_calibration(file: Robot, tmp_path:
     read(StandingDaemon(), tmp_path)
     daemon = Calibrated(calibrated(file), 0.0)
     before = {path.name: path.read_bytes() for path in tmp_path.iterdir() if path.is_file()}
-    with pytest.raises(BadInputError, match="has the poses of a calibration; allowed: another"):
+    with pytest.raises(BadInputError, match="contains the poses of a calibration; choose another"):
         checked_running(Output(as_json=False), file, daemon, None, 1, tmp_path)  # type: ignore[arg-type]
     assert before == {path.name: path.read_bytes() for path in tmp_path.iterdir() if path.is_file()}
     assert daemon.rights == 0
@@ -328,6 +328,8 @@ def test_a_check_requires_a_platform_held_at_home(file: Robot, tmp_path: Path) -
     with pytest.raises(BadInputError, match=r"\d+ mm from home; allowed for the first pose"):
         checked_running(out, file, daemon, None, 1, folder)  # type: ignore[arg-type]
     daemon.state = "ready"
-    with pytest.raises(WorkFailedError, match=r"not held on its cables \(ready, hold\)"):
+    with pytest.raises(
+        WorkFailedError, match=r"the cables do not hold the platform \(ready, hold\)"
+    ):
         checked_running(out, file, daemon, None, 1, folder)  # type: ignore[arg-type]
     assert not folder.exists() and daemon.rights == 0

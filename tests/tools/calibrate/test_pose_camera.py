@@ -102,7 +102,7 @@ def test_one_bad_pose_is_reported_and_five_in_a_row_end_the_run(
     assert camera.see(3, lambda _: None).corners_px
     for number in range(4, 8):
         camera.see(number, lambda _: None)
-    with pytest.raises(NotThePoseError, match=r"5 images in turn are of no use.*light, lens"):
+    with pytest.raises(NotThePoseError, match=r"5 images in a row cannot be used.*light, lens"):
         camera.see(8, lambda _: None)
 
 
@@ -125,5 +125,7 @@ def test_a_wrong_resolution_and_duplicate_ids_are_reported(
     assert [text for text in said if "twice" in text] == [
         "pose 1: marker 3 is twice in an image: its id was printed twice; it is left out there"
     ]
-    with pytest.raises(BadInputError, match="320 x 200 pixels, the intrinsics are of 320 x 240"):
+    with pytest.raises(
+        BadInputError, match="320 x 200 pixels, but the intrinsics are for 320 x 240"
+    ):
         camera.see(3, lambda _: None)

@@ -135,8 +135,8 @@ def test_an_existing_file_is_not_overwritten(words: tuple[str, ...], tmp_path: P
     endings = {"--png": ".png", "--mesh": ".stl", "--out": ".csv"}
     file = tmp_path / f"precious{endings[words[-1]]}"
     file.write_text("precious")
-    assert "is there already" in refused(2, *words, file)
-    with pytest.raises(BadInputError, match="is there already"):
+    assert "already exists" in refused(2, *words, file)
+    with pytest.raises(BadInputError, match="already exists"):
         LogFile(file)
     assert file.read_text() == "precious"
 
@@ -144,7 +144,7 @@ def test_an_existing_file_is_not_overwritten(words: tuple[str, ...], tmp_path: P
 def test_commission_rejects_a_folder_with_other_files(tmp_path: Path) -> None:
     (tmp_path / "thesis.tex").write_text("precious")
     message = refused(2, "commission", WINCH, *OWN, "--out", tmp_path)
-    assert message.startswith(f"--out {tmp_path}: holds other things")
+    assert message.startswith(f"--out {tmp_path}: contains other files")
     assert [path.name for path in tmp_path.iterdir()] == ["thesis.tex"]
 
 
@@ -154,11 +154,11 @@ def test_commission_rejects_a_folder_with_other_files(tmp_path: Path) -> None:
         (("robot", "show", "planar-3", "--png", "a.jpg"), "--png a.jpg: allowed: a name that ends"),
         (("poses", "planar-3", "--png", "a.pdf"), "--png a.pdf: allowed: a name that ends in .png"),
         (("markers", "print", "0", "--out", "a.png"), "--out a.png: allowed: a name that ends in"),
-        (("doctor", "--report", "/nowhere/a"), "allowed: a file in a folder that is there"),
+        (("doctor", "--report", "/nowhere/a"), "allowed: a file in an existing folder"),
         (("markers", "map", "/nowhere"), "/nowhere: allowed: a folder with images"),
         (("profiles", "show", "nothing-of-the-kind"), "cdpr profiles list"),
         *(
-            (("run", "planar-3", *OWN, "--live-origin", typed), "allowed: where a web page")
+            (("run", "planar-3", *OWN, "--live-origin", typed), "allowed: the origin of a web page")
             for typed in ("foo", "ftp://a.b", "https://a.b/view", "https://")
         ),
     ],

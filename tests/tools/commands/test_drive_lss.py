@@ -183,7 +183,7 @@ def test_an_enabled_drive_gets_no_node_id() -> None:
             while node.sdo[0x6041].raw & 0x6F != state:
                 assert time.monotonic() < end
         message = refused(1, f"simbus:{name}", "--alone", "--node-id", "9")
-        assert "node 1 has its power stage enabled: stop whoever drives it first" in message
+        assert "node 1 has its power stage enabled: stop the other master first" in message
         assert node.sdo[0x6041].raw & 0x6F == 0x27
         network.send_message(0, bytes([2, 1]))  # stopped: it does not answer SDO
         message = refused(1, f"simbus:{name}", "--alone", "--node-id", "9")
@@ -218,7 +218,7 @@ def test_writing_on_a_real_bus_needs_a_confirmation() -> None:
         notifier = can.Notifier(device, [answering], timeout=0.05)
         try:
             message = refused(2, bus, "--alone", "--node-id", "9")
-            assert "not confirmed (--yes does it beforehand); nothing was changed" in message
+            assert "not confirmed (--yes confirms in advance); nothing was changed" in message
             assert answering.written == []
             status, text, errors = lss(bus, "--alone", "--node-id", "9", "--yes")
             assert (status, "it cannot store" in errors) == (1, True), errors

@@ -248,7 +248,7 @@ def test_a_pose_is_drawn_for_the_directions_that_move(tmp_path: Path) -> None:
     rows["pose"][:10] = np.nan
     curves = pose_curves({name: rows[name] for name in ("pose", "pose_setpoint")})
     assert {label: list(each) for label, each in curves.items()} == {
-        "platform (m)": ["y"], "turned (deg)": ["ry"], "off its set-point (mm)": ["distance"],
+        "platform (m)": ["y"], "turned (deg)": ["ry"], "distance from set-point (mm)": ["distance"],
     }  # fmt: skip
     is_there, wanted = curves["turned (deg)"]["ry"]
     assert np.isnan(is_there[:10]).all()
@@ -312,8 +312,8 @@ def test_recordings_of_several_robots_cannot_be_exported_together(
         (("export", "FOLDER", "--out", "x.txt"), "allowed: a name that ends in .csv or .parquet"),
         (("export", "FOLDER", "--out", "there.csv"), "there.csv: is there already"),
         (("export", "FOLDER", "--out", "x.csv", "--fields", "speed"), "--fields speed: allowed:"),
-        (("export", "FOLDER", "--out", "x.csv", "--fields", ","), "names none"),
-        (("export", "FOLDER", "--out", "x.csv", "--from", "99"), "no cycles in what was asked"),
+        (("export", "FOLDER", "--out", "x.csv", "--fields", ","), "is empty"),
+        (("export", "FOLDER", "--out", "x.csv", "--from", "99"), "no cycles in the selected time"),
         (("plot", "FOLDER", "--out", "x.png", "--from", "2", "--until", "1"), "--until 1: allowed"),
         (("plot", "FOLDER", "--out", "x.png", "--axis", "top"), "allowed: left, right"),
         (("plot", "FOLDER", "--out", "x.pdf"), "allowed: a name that ends in .png"),

@@ -50,7 +50,7 @@ def test_a_ready_daemon_provides_the_data_for_a_sweep() -> None:
 @pytest.mark.parametrize(
     ("programs", "more", "text"),
     [
-        (["idle", "hold", "lower"], {}, "hold a platform together"),
+        (["idle", "hold", "lower"], {}, "motors share a platform"),
         (PROGRAMS, {"read_only": True}, "only listens"),
         (PROGRAMS, {"parts": {}}, "records nothing"),
         (PROGRAMS, {"state": "active"}, "is active; allowed: ready"),

@@ -71,7 +71,7 @@ def test_a_robot_given_as_argument_gets_a_hint_at_the_option(
 ) -> None:
     told = " ".join(cdpr_here(*words).stderr.split())
     assert "unexpected extra argument" in told
-    assert ("a robot is named by --robot" in told) == hint
+    assert ("name the robot with --robot" in told) == hint
 
 
 def test_files_of_a_killed_daemon_are_ignored(listening: list[Path], folder: Path) -> None:

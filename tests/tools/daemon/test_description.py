@@ -36,13 +36,13 @@ def test_targets_require_the_calibration_in_force(tmp_path, monkeypatch) -> None
     assert known is not None
     assert calibration_text(known.summary()).startswith("calibration 1 ")
     look_at_calibration(before, platform)  # type: ignore[arg-type]
-    assert "start the daemon again" in platform.not_calibrated_reason
+    assert "restart the daemon" in platform.not_calibrated_reason
     now = load_calibrated("planar-4")
     look_at_calibration(now, platform)  # type: ignore[arg-type]
     assert platform.not_calibrated_reason == ""
     undo(before)
     look_at_calibration(now, platform)  # type: ignore[arg-type]
-    assert "taken over or undone" in platform.not_calibrated_reason
+    assert "adopted or undone" in platform.not_calibrated_reason
 
 
 def test_a_calibration_of_a_simulated_robot_is_rejected_on_a_real_bus() -> None:

@@ -264,7 +264,7 @@ def test_the_watchdog_is_fed_only_while_the_loop_turns(start: Start) -> None:
     assert "has not turned" in daemon.line("told")["told"]
     daemon.starves()
     os.kill(loop, signal.SIGCONT)
-    assert "turns again" in daemon.line("told")["told"]
+    assert "runs again" in daemon.line("told")["told"]
     daemon.feeds()
 
 
@@ -363,7 +363,7 @@ def test_the_robot_is_locked_until_the_loop_of_a_killed_launcher_has_ended(start
     daemon = start({"stopping_s": 2.0})
     daemon.line("ready")
     loop, control = daemon.pid("loop"), daemon.folder / "control.sock"
-    with pytest.raises(BadInputError, match=f"runs there already, process {daemon.process.pid};"):
+    with pytest.raises(BadInputError, match=f"already runs there, process {daemon.process.pid};"):
         LauncherLock(control)
     daemon.process.kill()
     daemon.process.wait()

@@ -74,7 +74,7 @@ def test_a_process_without_signal_handler_is_not_signalled(
     path.write_text(json.dumps(named(process.pid)))
     outcome = stopped(path)
     assert not outcome.confirmed
-    assert f"process {process.pid} is no loop of user {os.geteuid()}" in outcome.text
+    assert f"process {process.pid} is not a loop of user {os.geteuid()}" in outcome.text
     assert process.poll() is None
 
 
@@ -99,10 +99,10 @@ def test_a_loop_file_for_another_users_process_is_not_trusted(
     path.write_text(json.dumps(named(process.pid)))
     found = LoopFile.read(path)
     assert found.runs()
-    with pytest.raises(WorkFailedError, match="is no loop of user 65534"):
+    with pytest.raises(WorkFailedError, match="is not a loop of user 65534"):
         found.model_copy(update={"uid": NOBODY}).runs()
     path.write_text(json.dumps(named(process.pid, uid=NOBODY)))
-    with pytest.raises(WorkFailedError, match="does not name a loop: it is of user"):
+    with pytest.raises(WorkFailedError, match="does not name a loop: it belongs to user"):
         LoopFile.read(path)
     assert is_trusted(path, os.geteuid())
     assert not is_trusted(path, NOBODY)
@@ -235,7 +235,7 @@ def test_a_second_daemon_is_rejected_while_the_service_of_the_first_starts(
     (tmp_path / "r.loop").write_text(json.dumps(named(process.pid)))
     told = cdpr(*run, tmp_path / "r.sock")
     assert told.returncode == 2
-    assert "a daemon runs there already" in told.stderr
+    assert "a daemon already runs there" in told.stderr
 
 
 def test_a_lock_remains_until_an_inheriting_process_has_ended(tmp_path: Path) -> None:
@@ -245,7 +245,7 @@ def test_a_lock_remains_until_an_inheriting_process_has_ended(tmp_path: Path) ->
             [sys.executable, "-c", "input()"], stdin=subprocess.PIPE, pass_fds=[lock.fd]
         )
     assert file.exists()
-    with pytest.raises(BadInputError, match="a daemon runs there already"):
+    with pytest.raises(BadInputError, match="a daemon already runs there"):
         LauncherLock(control)
     child.communicate(b"\n", timeout=60)
     with LauncherLock(control):

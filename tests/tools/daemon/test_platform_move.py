@@ -132,7 +132,7 @@ def test_a_relative_motion_is_sent_as_distance_and_turn() -> None:
         (NAMED, {"to": "load", "relative": True}, "--to load: a pose; allowed: without --relative"),
         (NAMED, {"to": "home"}, "--to home: home is on the stand, .*; `cdpr lower` puts"),
         (PLANE, {"to": "nan 2000"}, "--to nan 2000: allowed: finite numbers, X Y in mm"),
-        (PLANE, {"rotate": "5"}, "--rotate 5: no angle of this platform is controlled"),
+        (PLANE, {"rotate": "5"}, "--rotate 5: this platform has no controlled angle"),
         (TURNING, {"rotate": "1 2 3"}, "--rotate 1 2 3: 3 numbers; allowed: 1, ANGLE in deg"),
         (ROOM, {"rotate": "1"}, "--rotate 1: 1 number; allowed: 3, RX RY RZ in deg"),
         (PLANE, {"to": "5 0", "frame": ReferenceFrame.PLATFORM},
@@ -318,12 +318,12 @@ def test_lower_reports_the_client_that_is_already_lowering(monkeypatch: pytest.M
     monkeypatch.setattr(down, "get", lambda path: told(path) | held)
     result = typed(monkeypatch, down, command="lower")
     assert isinstance(result.exception, WorkFailedError)
-    assert "is being lowered already, by a@b" in str(result.exception)
+    assert "a@b is already lowering the platform" in str(result.exception)
     assert not down.posted
 
 
 def test_move_without_a_platform_names_the_command_for_axes() -> None:
     bare = Told(PLANE)
     bare.platform = None  # type: ignore[assignment]
-    with pytest.raises(BadInputError, match=r"--to 1 2: .*has no platform; .* by AXIS=ANGLE"):
+    with pytest.raises(BadInputError, match=r"--to 1 2: .*has no platform; .* with AXIS=ANGLE"):
         wanted(bare, "1 2")

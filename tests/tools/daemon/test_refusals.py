@@ -79,7 +79,11 @@ def test_a_number_without_an_option_is_reported_in_the_loops_words() -> None:
     [
         ("ready", ["active"], "; `cdpr enable` gives power"),
         ("ready", ["inactive"], ""),
-        ("fault", ["ready", "active"], "; `cdpr status` says why, `cdpr ack` acknowledges it"),
+        (
+            "fault",
+            ["ready", "active"],
+            "; `cdpr status` gives the reason, `cdpr ack` acknowledges it",
+        ),
         ("shutting-down", ["active"], ""),
     ],
 )

@@ -75,7 +75,12 @@ def test_the_calibration_in_force_is_shown_with_its_accuracy() -> None:
     shown = [str(line) for line in status_text(status_of(calibration=known.summary()))]
     (line,) = (line for line in shown if "calibration" in line)
     assert line.startswith(f"calibration 1 ({known.identity}) of 2026-03-04 05:06 UTC is in force")
-    for figure in ("0.50 mm", "0.120 deg", "absolute positions are known to 14.6 mm", "3 sigma"):
+    for figure in (
+        "0.50 mm",
+        "0.120 deg",
+        "absolute positions are uncertain by 14.6 mm",
+        "3 sigma",
+    ):
         assert figure in line
 
 
@@ -196,7 +201,7 @@ def test_learnt_motor_friction_is_shown_once_significant() -> None:
     [
         ({"driving": True}, "drives that had power stop without its heartbeat"),
         ({"busy": True}, "drives that had power stop without its heartbeat"),
-        ({}, "its drives had been told to have no power"),
+        ({}, "its drives had been commanded to switch off"),
         ({"read_only": True, "driving": True}, "it only listened"),
     ],
 )
@@ -212,7 +217,7 @@ def test_a_dead_loop_is_shown_with_old_values_marked_as_such(
     assert lines[1] == f"reason: {reason}"
     assert lines[2].startswith(power)
     assert lines[3].startswith("next: `cdpr stop`")
-    assert "of 14 s ago" in lines[4] and "where it is now is not known" in lines[4]
+    assert "is 14 s old" in lines[4] and "its present position is not known" in lines[4]
     assert len(lines) == 5
     assert power in death_text(status | told) and "next: `cdpr stop`" in death_text(status)
 
@@ -245,7 +250,7 @@ def test_lowering_a_platform_of_unknown_pose_is_not_described_as_moving_home() -
     assert stage_text("lower", {"stage": "home", "blind": True}) == "letting the platform down"
     for stage in ("home", "down"):  # it already stands, or its pose is unknown
         slack = {"stage": stage, "blind": True, "was_tight": False}
-        assert stage_text("lower", slack).startswith("letting the cables out")
+        assert stage_text("lower", slack).startswith("paying out the cables")
 
 
 def test_a_path_is_shown_as_left_until_it_is_complete() -> None:
@@ -263,7 +268,7 @@ def test_a_path_is_shown_as_left_until_it_is_complete() -> None:
         ({"axes": []}, "stopped, power off"),  # before the drive booted
         (
             {"axes": [{"name": "left", "alive": False}, {"name": "right", "alive": True}]},
-            "stopped; unheard, and not known to be without power: left",
+            "stopped; these drives do not answer and may have power: left",
         ),
         ({"read_only": True}, "ended: it only listened, and commanded no drive"),
         (

@@ -24,4 +24,4 @@ def test_a_report_contains_versions_checks_and_robots_but_no_keys(
         assert part in text
     assert KEY not in text
     again = cdpr_here(*asked)
-    assert again.returncode == 2 and "is there already" in again.stderr
+    assert again.returncode == 2 and "already exists" in again.stderr

@@ -46,7 +46,7 @@ def test_planar_poses_from_another_place_are_written_as_toml(tmp_path: Path) -> 
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
     assert "3 poses of 3 drawn; ways cut short by contact 0" in done.stdout
-    assert "nothing can touch" in done.stdout
+    assert "no possible contacts" in done.stdout
     points = tomllib.loads(table.read_text())["points"]
     assert len(points) == 3 and all(len(point["position_m"]) == 2 for point in points)
 
@@ -59,7 +59,7 @@ def test_planar_poses_from_another_place_are_written_as_toml(tmp_path: Path) -> 
         (("spatial-8", "--from", "0", "0"), "--from 0 0: 2 numbers; allowed: 3, X Y Z in mm"),
         (("spatial-8", "--from", "1500", "0", "1500"), "the start at 1.500, 0.000, 1.500 m: cable"),
         (("spatial-8", "--out", "poses.xlsx"), "poses.xlsx: allowed: NAME.csv or NAME.toml"),
-        (("spatial-8", "--out", "/nowhere/poses.csv"), "in a folder that is there"),
+        (("spatial-8", "--out", "/nowhere/poses.csv"), "in an existing folder"),
         (("spatial-8", "--choose", "best"), "'best'; allowed: 'random', 'spread'"),
         (("spatial-8", "-n", "0"), "allowed: 1 or more"),
     ],

@@ -136,7 +136,7 @@ def test_yes_writes_a_robot_like_planar_3_and_never_overwrites_it(tmp_path: Path
     points = statics.box.grid(21, 21)
     assert statics.margin_N(points, platform.acceleration_m_s2).min() > 0.85 * spare
     again = cdpr_here("robot", "new", path, "--yes")
-    assert again.returncode == 2 and "not there yet" in again.stderr
+    assert again.returncode == 2 and "never overwritten" in again.stderr
     assert load_robot(path) == robot
 
 
@@ -235,7 +235,7 @@ def test_two_answers_to_one_question_are_rejected(tmp_path: Path) -> None:
     answers = "--set", "kind=planar-3", "--set", "kind=planar-4"
     done = cdpr_here("robot", "new", path, "--yes", *answers)
     assert done.returncode == 2 and not path.exists()
-    assert "--set kind: 'planar-3' and 'planar-4'; allowed: one of them" in done.stderr
+    assert "--set kind: given as 'planar-3' and 'planar-4'; give it once" in done.stderr
 
 
 def test_an_impossible_robot_is_reported_and_not_written(tmp_path: Path) -> None:
@@ -250,7 +250,7 @@ def test_an_impossible_robot_is_reported_and_not_written(tmp_path: Path) -> None
 def test_a_file_in_a_missing_folder_is_rejected(tmp_path: Path) -> None:
     done = cdpr_here("robot", "new", tmp_path / "nowhere" / "mine.toml", "--yes")
     assert done.returncode == 2
-    assert "allowed: NAME.toml in a folder that is there" in done.stderr
+    assert "allowed: NAME.toml in an existing folder" in done.stderr
 
 
 def test_names_in_the_picture_stay_inside_its_axes(tmp_path: Path) -> None:

@@ -70,7 +70,7 @@ def test_contact_can_be_ignored() -> None:
     volume = free["grid"]["volume_m3"]
     assert 0.0 < volume < 0.9 * searched(*turned)["grid"]["volume_m3"]
     told = refused("spatial-8", "--rotate", "0", "0", "60", *COARSE, "--contact-free")
-    assert "something is in contact where the rays start" in told
+    assert "there is a contact at the start of the rays" in told
 
 
 @pytest.mark.parametrize("suffix", [".ply", ".obj"])
@@ -118,7 +118,7 @@ def test_a_centre_outside_the_workspace_is_rejected_with_one_inside() -> None:
     ("arguments", "told"),
     [
         (["bench-2"], "has no platform; allowed: robots with a [platform]"),
-        (["point-4", "--rotate", "1", "2", "3"], "no angle of this platform is controlled"),
+        (["point-4", "--rotate", "1", "2", "3"], "this platform has no controlled angle"),
         (["planar-4", "--rotate", "-200"], "less than 180 deg"),
         (["planar-4", "--within", "180"], "less than 180 deg"),
         (["planar-4", "--within", "-1"], "less than 180 deg"),
@@ -128,7 +128,7 @@ def test_a_centre_outside_the_workspace_is_rejected_with_one_inside() -> None:
         (["planar-3", "--low", "1", "2", "3"], "3 numbers; allowed: 2, X Y in mm"),
         (["planar-3", "--low", "0", "0", "--high", "100", "0"], "--low below --high"),
         (["planar-3", "--low", "-1e9", "0"], "within 1000 m"),
-        (["planar-3", "--mesh", "a.stl"], "this one's is flat"),
+        (["planar-3", "--mesh", "a.stl"], "this robot is planar"),
         (["spatial-8", "--mesh", "a.xyz"], "allowed: a name that ends in .stl, .ply, .obj"),
         (["spatial-8", "--png", "/nowhere/a.png"], "a file in a folder that can be written to"),
         (["nobody"], "nobody"),

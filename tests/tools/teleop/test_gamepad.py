@@ -196,7 +196,7 @@ def test_a_missing_gamepad_is_rejected(tmp_path: Path) -> None:
     missing = tmp_path / "event0"
     finder = EvdevFinder(missing, MAP)
     assert finder.find() is None
-    assert f"--input {missing}: is no input device" in finder.missing_text()
+    assert f"--input {missing}: is not an input device" in finder.missing_text()
     missing.write_text("no device either")
     assert EvdevFinder(missing, MAP).find() is None
 
@@ -205,8 +205,13 @@ def test_a_missing_gamepad_is_rejected(tmp_path: Path) -> None:
     ("axes", "dead_man", "confirm", "told"),
     [
         ("ABS_X", "BTN_TR", "BTN_SOUTH", "--axes ABS_X: 1 axes; allowed: 2 for this robot"),
-        ("ABS_X,ABS_X", "BTN_TR", "BTN_SOUTH", "ABS_X,ABS_X: allowed: different ones"),
-        ("ABS_X,ABS_Q", "BTN_TR", "BTN_SOUTH", "--axes: 'ABS_Q'; allowed: a name of the kernel's"),
+        ("ABS_X,ABS_X", "BTN_TR", "BTN_SOUTH", "ABS_X,ABS_X: each axis may be used only once"),
+        (
+            "ABS_X,ABS_Q",
+            "BTN_TR",
+            "BTN_SOUTH",
+            "--axes: 'ABS_Q'; allowed: a name of the Linux kernel",
+        ),
         ("ABS_X,ABS_Y", "KEY_A", "BTN_SOUTH", "--dead-man: 'KEY_A'"),
         ("ABS_X,ABS_Y", "BTN_TR", "BTN_TR", "--confirm BTN_TR: allowed: another button"),
     ],
@@ -252,7 +257,7 @@ def test_axes_that_do_not_fit_the_robot_are_rejected() -> None:
     for axes, turns, told in (
         ("ABS_X,ABS_Y", None, "--axes ABS_X,ABS_Y: 2 axes; allowed: 3 for this robot, x, y, z"),
         (None, "ABS_RX", "--turn-axes ABS_RX: 1 axes; allowed: 3 for this robot, about x, y, z"),
-        (None, "ABS_X,ABS_RX,ABS_RY", "allowed: different ones"),
+        (None, "ABS_X,ABS_RX,ABS_RY", "each axis may be used only once"),
     ):
         with pytest.raises(BadInputError, match=told):
             stick_map(ROOM, axes, turns, "BTN_TR", "BTN_SOUTH", 0.1, 0.05)

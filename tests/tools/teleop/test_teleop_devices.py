@@ -108,7 +108,7 @@ def test_keys_lift_and_turn_about_the_room_s_axes() -> None:
         ("0 0 0 turn=5", "line 1: 'turn=5'; allowed: numbers, 3 of up to 180"),
         ("0 0 0 turn=0,0,nan", "line 1: 'turn=0,0,nan'; allowed: numbers, 3"),
         ("1 0 0\n1 0 0", "line 2: 1 s; allowed: more than 1 s"),
-        ("-1 0 0", "line 1: -1 s; allowed: 0 and more"),
+        ("-1 0 0", "line 1: -1 s; allowed: 0 or more"),
         ("nan 0 0", "line 1: nan s"),
         ("0 nan 0", "line 1: nan 0 mm; allowed: up to 20 m"),
         ("0 0 30000", "line 1: 0 30000 mm"),
@@ -245,7 +245,7 @@ def test_a_closed_terminal_ends_teleoperation() -> None:
 
 def test_keyboard_without_a_terminal_is_rejected() -> None:
     reading, writing = os.pipe()
-    with pytest.raises(BadInputError, match="standard input is no terminal"):
+    with pytest.raises(BadInputError, match="standard input is not a terminal"):
         Keyboard(1.0, reading)
     os.close(reading)
     os.close(writing)

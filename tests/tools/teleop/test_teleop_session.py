@@ -129,7 +129,7 @@ def test_hand_motion_reaches_the_loop_and_the_answer_returns(robot: Robot) -> No
         ScriptLine(0.4, (0.0, 0.0, 0.0), confirm=True),
     )
     session, end = teleoperate(robot, Unhurried(ScriptDevice(lines)))
-    assert (end.failed, end.text) == (False, "the script is done")
+    assert (end.failed, end.text) == (False, "the script has ended")
     samples = robot.samples()
     assert np.all(samples["scale"] == SCALE)
     numbers = confirmation(samples["buttons"].astype(np.int64))
@@ -167,7 +167,7 @@ def test_a_fault_ends_teleoperation(robot: Robot) -> None:
 
 def test_losing_the_right_to_move_ends_teleoperation(robot: Robot) -> None:
     _, end = teleoperate(robot, Still(), lambda: robot.lease.release(robot.token))
-    assert end.failed and end.text.startswith("the right to move has ended")
+    assert end.failed and end.text.startswith("the right to move has expired")
 
 
 def test_a_robot_lost_during_a_script_is_reported(robot: Robot) -> None:

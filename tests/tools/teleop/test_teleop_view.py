@@ -83,7 +83,7 @@ def test_the_picture_shows_robot_and_target_at_their_positions() -> None:
         "left 40, right -, lower 20",
         "left: 12 N are missing",
         "a reason",
-        "a script leads",
+        "a script moves the hand",
     ):
         assert told in text
 

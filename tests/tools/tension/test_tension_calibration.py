@@ -33,10 +33,10 @@ def test_a_recording_of_a_different_kind_is_rejected(tmp_path: Path) -> None:
     log.close()
     with pytest.raises(RawLogError, match="not a recording of a hoist"):
         mass_points([path])
-    with pytest.raises(RawLogError, match="does not say which winch"):
+    with pytest.raises(RawLogError, match="does not name its winch"):
         recorded_winch(tmp_path)
     (path.parent / "mass-2kg.raw").unlink()
-    with pytest.raises(InvalidRequestError, match="holds no recordings of a calibration"):
+    with pytest.raises(InvalidRequestError, match="contains no recordings of a calibration"):
         recorded_winch(tmp_path)
 
 

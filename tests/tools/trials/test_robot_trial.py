@@ -143,9 +143,9 @@ def test_a_log_of_different_syncs_is_rejected(trial, tmp_path, by):
 @pytest.mark.parametrize(
     ("robot", "kind", "options", "told"),
     [
-        ("planar-3", KindOfTrial.LINE, {"minutes": 1.0}, "lasts as long as it lasts"),
+        ("planar-3", KindOfTrial.LINE, {"minutes": 1.0}, "cannot be set"),
         ("planar-3", KindOfTrial.LINE, {}, "--commissioned DIR"),
-        ("planar-3", KindOfTrial.TARGETS, {"speed_mm_s": 20.0}, "20: allowed: with line"),
+        ("planar-3", KindOfTrial.TARGETS, {"speed_mm_s": 20.0}, "20: allowed only with line"),
         ("planar-3", KindOfTrial.LINE, {"speed_mm_s": 900.0}, "900: allowed: up to 500"),
         ("planar-3", KindOfTrial.TAPE, {"plant": Path("/nowhere.toml")}, "/nowhere.toml"),
         ("bench-2", KindOfTrial.TARGETS, {}, "has no platform; allowed"),
@@ -161,7 +161,7 @@ def test_an_impossible_trial_is_rejected(tmp_path, robot, kind, options, told):
 
 def test_an_earlier_trial_is_not_overwritten(trial):
     folder, _ = trial
-    with pytest.raises(BadInputError, match="holds something already"):
+    with pytest.raises(BadInputError, match="is not empty"):
         robot_trial.trial("planar-3", KindOfTrial.TARGETS, minutes=0.1, out_dir=folder)
 
 

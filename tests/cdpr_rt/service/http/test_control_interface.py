@@ -251,7 +251,7 @@ def test_a_loop_that_does_not_turn_gets_no_commands(rig: Rig) -> None:
         assert client.get("/status").json()["loop"]["silent_s"] > 5.0
         answer = client.post("/hold")
     assert answer.status_code == 503
-    assert "has not turned" in answer.json()["error"]
+    assert "has run no cycle" in answer.json()["error"]
     assert rig.block.take_command() is None
 
 
