@@ -113,7 +113,7 @@ def test_the_text_lists_facts_and_gaps(tmp_path: Path) -> None:
     assert "to find out: `cdpr drive jog WINCH" in text
     status, _, errors = cdpr("import", GENERIC.eds, "--out", tmp_path)
     assert status == 2
-    assert "generic-cia402.toml: is there already; choose another --name or --out" in errors
+    assert "generic-cia402.toml: already exists; choose another --name or --out" in errors
 
 
 def test_a_dcf_gives_the_values_of_the_winch(tmp_path: Path) -> None:

@@ -72,7 +72,7 @@ def robot_of(daemon: Daemon, as_calibrated: bool = False) -> tuple[Robot, dict[s
             f"allowed: by its file: cdpr calibrate undo {robot.reference}, then start it again"
         )
     if description["geometry_sha256"] != geometry_sha256(robot):
-        what = "or its calibration, " if as_calibrated else ""
+        what = "the file or its calibration " if as_calibrated else ""
         raise BadInputError(f"{robot.path}: {what}has changed since the daemon started")
     return robot, description
 

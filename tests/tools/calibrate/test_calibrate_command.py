@@ -402,7 +402,7 @@ def test_a_check_fits_the_map_with_the_options_of_the_calibration(
     capsys.readouterr()
     assert before(out, robot) is None and "the camera is not used" in capsys.readouterr().err
     points.unlink()
-    assert before(out, robot) is None and "p.csv: is gone" in capsys.readouterr().err
+    assert before(out, robot) is None and "p.csv: is missing" in capsys.readouterr().err
 
 
 def test_a_hand_eye_file_without_camera_is_rejected(tmp_path: Path) -> None:

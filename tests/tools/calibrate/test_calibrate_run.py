@@ -187,7 +187,7 @@ def test_all_poses_of_a_list_are_visited_despite_an_interruption(
     home = data.poses[0].target
     assert {reading.target for reading in data.poses} == {home, *listed}
     assert len(data.poses) == 18 and go_on(tmp_path, again) == data
-    with pytest.raises(BadInputError, match="was begun, with a list of poses"):
+    with pytest.raises(BadInputError, match="began with a list of poses"):
         again.resumed(30, None, None)
 
 

@@ -306,7 +306,7 @@ def test_a_check_requires_a_robot_that_runs_with_its_calibration(
     with pytest.raises(BadInputError, match="the daemon of this name runs"):
         checked_running(out, ROBOT, daemon, None, 1, folder)  # type: ignore[arg-type]
     undo(file)
-    with pytest.raises(BadInputError, match="or its calibration, has been changed"):
+    with pytest.raises(BadInputError, match="or its calibration has changed"):
         checked_running(out, file, daemon, None, 1, folder)  # type: ignore[arg-type]
     assert not folder.exists() and daemon.rights == 0
 

@@ -113,7 +113,7 @@ def test_a_camera_that_stays_disconnected_ends_the_run(
     camera.see(1, lambda _: None)
     with pytest.raises(CameraError, match="no image any more"):
         camera.see(2, lambda _: None)
-    assert len(opens) == 3 and "opened again" in said[0]
+    assert len(opens) == 3 and "opening it again" in said[0]
 
 
 def test_a_wrong_resolution_and_duplicate_ids_are_reported(
@@ -123,7 +123,7 @@ def test_a_wrong_resolution_and_duplicate_ids_are_reported(
     assert list(camera.see(1, lambda _: None).corners_px) == [7]
     camera.see(2, lambda _: None)
     assert [text for text in said if "twice" in text] == [
-        "pose 1: marker 3 is twice in an image: its id was printed twice; it is left out there"
+        "pose 1: marker 3 is twice in an image: its id was printed twice; it is left out of that image"
     ]
     with pytest.raises(
         BadInputError, match="320 x 200 pixels, but the intrinsics are for 320 x 240"

@@ -188,7 +188,7 @@ def test_an_enabled_drive_gets_no_node_id() -> None:
         network.send_message(0, bytes([2, 1]))  # stopped: it does not answer SDO
         message = refused(1, f"simbus:{name}", "--alone", "--node-id", "9")
         assert (
-            "node 1 does not tell whether its power stage is enabled: no answer to SDO" in message
+            "node 1 does not report whether its power stage is enabled: no answer to SDO" in message
         )
 
 
@@ -222,7 +222,7 @@ def test_writing_on_a_real_bus_needs_a_confirmation() -> None:
             assert answering.written == []
             status, text, errors = lss(bus, "--alone", "--node-id", "9", "--yes")
             assert (status, "it cannot store" in errors) == (1, True), errors
-            assert "serial 0: node id not told; no profile fits" in text
+            assert "serial 0: node id unknown; no profile fits" in text
             assert answering.written == [0x11, 0x17]
         finally:
             notifier.stop()

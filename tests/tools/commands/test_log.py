@@ -78,7 +78,7 @@ def test_info_counts_recorded_and_missing_cycles(folder: Path) -> None:
     assert one["axes"] == ["left", "right"] and one["robot"] == "bench"
     assert [event["text"] for event in two["events"]] == ["state active", "state fault"]
     _, shown, _ = _log("info", folder)
-    assert "cut short" in shown and "10 cycles not recorded" in shown and "state fault" in shown
+    assert "truncated" in shown and "10 cycles not recorded" in shown and "state fault" in shown
 
 
 def test_exports_contain_the_recorded_rows(folder: Path, tmp_path: Path) -> None:
@@ -292,7 +292,7 @@ def test_recordings_of_several_robots_cannot_be_exported_together(
     for command, name in (("export", "x.csv"), ("export", "x.parquet"), ("plot", "x.png")):
         status, _, errors = _log(command, tmp_path, "--out", tmp_path / name)
         assert status == 2 and errors.count("\n") == 1
-        assert f"{second}: of bench with 3 axes, and those before it of bench with 2" in errors
+        assert f"{second}: is of bench with 3 axes, but earlier files are of bench with 2" in errors
         assert not (tmp_path / name).exists()
     assert capfd.readouterr().err == ""  # no warning about an unfinished table
     assert len(_done("info", tmp_path)["recordings"]) == 2
@@ -310,7 +310,7 @@ def test_recordings_of_several_robots_cannot_be_exported_together(
             "cannot be written: File name too long",
         ),
         (("export", "FOLDER", "--out", "x.txt"), "allowed: a name that ends in .csv or .parquet"),
-        (("export", "FOLDER", "--out", "there.csv"), "there.csv: is there already"),
+        (("export", "FOLDER", "--out", "there.csv"), "there.csv: already exists"),
         (("export", "FOLDER", "--out", "x.csv", "--fields", "speed"), "--fields speed: allowed:"),
         (("export", "FOLDER", "--out", "x.csv", "--fields", ","), "is empty"),
         (("export", "FOLDER", "--out", "x.csv", "--from", "99"), "no cycles in the selected time"),

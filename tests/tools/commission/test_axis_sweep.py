@@ -52,7 +52,7 @@ def test_a_ready_daemon_provides_the_data_for_a_sweep() -> None:
     [
         (["idle", "hold", "lower"], {}, "motors share a platform"),
         (PROGRAMS, {"read_only": True}, "only listens"),
-        (PROGRAMS, {"parts": {}}, "records nothing"),
+        (PROGRAMS, {"parts": {}}, "does not record"),
         (PROGRAMS, {"state": "active"}, "is active; allowed: ready"),
         (PROGRAMS, {"state": "fault"}, "is fault; allowed: ready"),
     ],

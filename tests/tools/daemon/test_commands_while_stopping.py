@@ -94,7 +94,7 @@ def test_commands_during_a_reaction_report_its_reason(run: Run, command: str) ->
     stopping = {"reacting": "controlled stop", "reason": "left: angle jumped"}
     error = run(Daemon(lambda _: stopping), command).exception
     assert isinstance(error, WorkFailedError)
-    assert "controlled stop under way: left: angle jumped" in str(error)
+    assert "the robot is stopping (controlled stop): left: angle jumped" in str(error)
 
 
 def refusing(state: str) -> Daemon:

@@ -172,7 +172,7 @@ AXES: list[dict[str, Any]] = [{"name": "left"}, {"name": "x=y"}]
 def test_numbers_are_assigned_to_axes_by_name() -> None:
     assert axis_values(["left=-2.5", "x=y=3"], AXES, "deg") == {0: -2.5, 1: 3.0}
     assert axis_values(["7"], AXES[:1], "deg") == {0: 7.0}
-    with pytest.raises(BadInputError, match="left=3: left is there twice"):
+    with pytest.raises(BadInputError, match="left=3: left is given twice"):
         axis_values(["left=2", "left=3"], AXES, "deg")
 
 
@@ -225,7 +225,7 @@ def test_a_command_waits_for_a_starting_daemon(
             thread.join()
     told = capsys.readouterr().err
     assert asked == ["/status"] * 5 + ["/description"] and ended.value.code == 2
-    assert told.count("the daemon is still starting: its control loop is loaded, ") == 1
+    assert told.count("the daemon is still starting: its control loop is loading (") == 1
 
 
 def test_a_user_without_a_name_can_send_commands(monkeypatch: pytest.MonkeyPatch) -> None:

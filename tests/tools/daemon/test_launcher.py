@@ -182,7 +182,7 @@ def test_notifications_are_repeated_until_systemd_accepts_them(start: Start) -> 
 
 @pytest.mark.parametrize(
     ("number", "told"),
-    [(signal.SIGKILL, "killed by signal 9"), (signal.SIGSTOP, "has not turned")],
+    [(signal.SIGKILL, "killed by signal 9"), (signal.SIGSTOP, "has run no cycle")],
 )
 def test_a_dead_or_hanging_service_is_restarted_and_the_loop_continues(
     start: Start, number: signal.Signals, told: str
@@ -202,7 +202,7 @@ def test_a_dead_or_hanging_service_is_restarted_and_the_loop_continues(
 
 def test_a_service_that_hangs_before_its_first_turn_is_restarted(start: Start) -> None:
     daemon = start({"freeze_service": True, "service_start_s": 5.0})
-    assert "has not turned for 5 s" in daemon.line("told")["told"]
+    assert "has not responded for 5 s" in daemon.line("told")["told"]
     assert daemon.line("ready")["ready"]["state"] == "ready"
     daemon.process.terminate()
     assert daemon.ends() == 0
@@ -261,7 +261,7 @@ def test_the_watchdog_is_fed_only_while_the_loop_turns(start: Start) -> None:
     daemon.feeds()
     loop = daemon.pid("loop")
     os.kill(loop, signal.SIGSTOP)
-    assert "has not turned" in daemon.line("told")["told"]
+    assert "has run no cycle" in daemon.line("told")["told"]
     daemon.starves()
     os.kill(loop, signal.SIGCONT)
     assert "runs again" in daemon.line("told")["told"]
@@ -285,7 +285,7 @@ def test_a_hanging_loop_is_killed_when_the_daemon_ends(start: Start) -> None:
     daemon = start({"stalled_s": 1.0})
     daemon.line("ready")
     os.kill(daemon.pid("loop"), signal.SIGSTOP)
-    assert "has not turned" in daemon.line("told")["told"]
+    assert "has run no cycle" in daemon.line("told")["told"]
     daemon.process.terminate()
     assert "was killed" in daemon.line("reason")["reason"]
     assert daemon.ends() == 1
@@ -296,7 +296,7 @@ def test_a_loop_that_turns_again_gets_its_time_to_end(start: Start) -> None:
     daemon = start({"stalled_s": 2.0, "stopping_s": 4.0})
     daemon.line("ready")
     os.kill(daemon.pid("loop"), signal.SIGSTOP)
-    assert "has not turned" in daemon.line("told")["told"]
+    assert "has run no cycle" in daemon.line("told")["told"]
     daemon.process.terminate()
     os.kill(daemon.pid("loop"), signal.SIGCONT)
     assert daemon.line("reason")["reason"] == ""

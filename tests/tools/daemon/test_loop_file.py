@@ -87,7 +87,7 @@ def test_a_process_that_ignores_the_signal_counts_as_ended_loop(
     assert not LoopFile.read(path).runs()
     outcome = stopped(path)
     assert not outcome.confirmed
-    assert outcome.text.startswith("its loop has ended; drives that had power")
+    assert outcome.text.startswith("its loop has ended; its drives stop within")
     assert process.poll() is None
 
 

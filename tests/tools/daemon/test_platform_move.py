@@ -136,7 +136,7 @@ def test_a_relative_motion_is_sent_as_distance_and_turn() -> None:
         (TURNING, {"rotate": "1 2 3"}, "--rotate 1 2 3: 3 numbers; allowed: 1, ANGLE in deg"),
         (ROOM, {"rotate": "1"}, "--rotate 1: 1 number; allowed: 3, RX RY RZ in deg"),
         (PLANE, {"to": "5 0", "frame": ReferenceFrame.PLATFORM},
-         "--frame platform: allowed: together"),
+         "--frame platform: allowed only"),
     ],
 )  # fmt: skip
 def test_rejections_quote_the_input_as_typed(
@@ -234,7 +234,7 @@ def test_a_step_takes_each_direction_once(
         (["--to"], "requires an argument"),
         (["--to", "1", "2", "left=3"], "not together with axes"),
         (["--to", "1", "2mm"], "2mm; allowed: numbers without a unit, of mm and deg"),
-        (["--frame", "platform", "left=3"], "--frame platform: allowed: together with"),
+        (["--frame", "platform", "left=3"], "--frame platform: allowed only with"),
         (["--to", "1", "2"], "2 numbers; allowed: 3, X Y Z in mm"),
     ],
 )

@@ -77,7 +77,7 @@ def test_a_number_without_an_option_is_reported_in_the_loops_words() -> None:
 @pytest.mark.parametrize(
     ("state", "allowed", "remedy"),
     [
-        ("ready", ["active"], "; `cdpr enable` gives power"),
+        ("ready", ["active"], "; `cdpr enable` switches the power on"),
         ("ready", ["inactive"], ""),
         (
             "fault",

@@ -183,7 +183,7 @@ def test_the_status_shows_which_motors_are_compensated() -> None:
     ]
     told = compensation_text(axes)
     assert told == (
-        "compensated: left; not compensated before its index passes: right; not commissioned: lower"
+        "compensated: left; not compensated until its index passes: right; not commissioned: lower"
     )
     assert compensation_text([{"name": "left"}]) == ""
 
@@ -270,7 +270,7 @@ def test_a_path_is_shown_as_left_until_it_is_complete() -> None:
             {"axes": [{"name": "left", "alive": False}, {"name": "right", "alive": True}]},
             "stopped; these drives do not answer and may have power: left",
         ),
-        ({"read_only": True}, "ended: it only listened, and commanded no drive"),
+        ({"read_only": True}, "ended: it only listened and commanded no drive"),
         (
             {"state": "dead", "driving": True},
             "ended; its loop had died: drives that",

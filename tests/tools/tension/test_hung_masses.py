@@ -43,7 +43,7 @@ def test_only_an_empty_line_confirms_the_mass(
         by_prompt(5.0, LockstepClock())
         assert answers.read() == "for the next\n"
         told = capsys.readouterr().err
-        assert told.count("Hang 5 kg") == 3 and told.count("Enter alone") == 2
+        assert told.count("Hang 5 kg") == 3 and told.count("Press only Enter") == 2
         with pytest.raises(InvalidRequestError, match="2 kg were not hung; the drive has no power"):
             by_prompt(2.0, LockstepClock())
 
