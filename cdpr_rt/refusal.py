@@ -66,7 +66,7 @@ class CommandRefusal:
             case RefusalCode.OUT_OF_RANGE:
                 return "allowed: {numbers}{low:g} to {high:g}{unit}".format(**arguments)
             case RefusalCode.NOTHING_LEFT:
-                return "no {left} has been left; allowed: {instead}".format(**arguments)
+                return "there is no {left} to continue; allowed: {instead}".format(**arguments)
             case RefusalCode.NOT_TIGHT:
                 return "the cables are not tight; run tighten first"
             case RefusalCode.BAD_SOURCE if arguments["allowed"]:

@@ -65,10 +65,10 @@ def open_regular(path: Path, *, links: bool = True) -> int:
     except OSError as error:
         raise ProfileError(path, "", f"cannot be read: {error.strerror}") from None
     except ValueError:  # a name with a zero byte
-        raise ProfileError(path, "", "cannot be read: no file has such a name") from None
+        raise ProfileError(path, "", "cannot be read: not a valid file name") from None
     if not stat.S_ISREG(os.fstat(fd).st_mode):
         os.close(fd)
-        raise ProfileError(path, "", "is no regular file; allowed: a file, or a link to one")
+        raise ProfileError(path, "", "is not a regular file; allowed: a file, or a link to one")
     return fd
 
 
@@ -199,7 +199,7 @@ def is_there(path: Path) -> bool:
     except OSError as error:
         if isinstance(error, PermissionError) and not _is_own(path):
             return False  # in another user's home, which can happen to a user without a home
-        raise ProfileError(path, "", f"cannot be looked for: {error.strerror}") from None
+        raise ProfileError(path, "", f"cannot be searched: {error.strerror}") from None
     except ValueError:  # a name with a zero byte
         return False
     if stat.S_ISLNK(entry.st_mode) and not path.exists():
@@ -219,8 +219,8 @@ def _lost_link(path: Path, link: Path) -> ProfileError:
     return ProfileError(
         path,
         "",
-        f"{link} is a link to {link.readlink()}, which is not there; mount or restore it, or "
-        "remove the link to go on without",
+        f"{link} is a link to {link.readlink()}, which does not exist; mount or restore "
+        "it, or remove the link to continue without it",
     )
 
 
@@ -275,7 +275,7 @@ def _check_toml(path: Path, text: str) -> None:
 def _checked_value(path: Path, key: str, value: Any, depth: int) -> Any:
     """Return a TOML value with tuples for arrays; raises ProfileError if it is too deep or big."""
     if isinstance(value, list | dict) and depth > MOST_DEPTH:
-        raise ProfileError(path, brief(key), f"is too deep; allowed: {MOST_DEPTH} levels")
+        raise ProfileError(path, brief(key), f"is nested too deeply; allowed: {MOST_DEPTH} levels")
     if isinstance(value, list):
         return tuple(_checked_value(path, key, v, depth + 1) for v in value)
     if isinstance(value, dict):
@@ -295,7 +295,7 @@ def _unique_keys(source: Path | str) -> Callable[[list[tuple[str, Any]]], dict[s
         if len(table) < len(pairs):
             counts = Counter(name for name, _ in pairs)
             twice = next(name for name, count in counts.items() if count > 1)
-            raise ProfileError(source, brief(twice), "is there twice; allowed: each key once")
+            raise ProfileError(source, brief(twice), "is given twice; allowed: each key once")
         return table
 
     return take
@@ -315,7 +315,7 @@ def _bounded_number(
 
 def _refuse_depth(source: Path | str, text: str, at: int) -> NoReturn:
     where = f"line {text.count(chr(10), 0, at) + 1}"
-    raise ProfileError(source, where, f"is too deep; allowed: {MOST_DEPTH} levels")
+    raise ProfileError(source, where, f"is nested too deeply; allowed: {MOST_DEPTH} levels")
 
 
 def _refuse_digits(source: Path | str, text: str, token: re.Match[str]) -> NoReturn:

@@ -57,8 +57,8 @@ def load_motor(name: str | Path, beside: Path | None = None) -> Motor:
             raise ProfileError(
                 series_path,
                 f"detail.{str(name)[3:]}",
-                f"the source gives the ratings of {name} only, not its torque constant and winding;"
-                " write these into a motor file of your own",
+                f"the data sheet has only the ratings of {name}, not its torque constant and "
+                "winding; write a motor file with these values",
             )
     raise unknown_profile("motors", name, beside, _names("motors"))
 
@@ -77,7 +77,9 @@ def load_drive(name: str | Path, beside: Path | None = None) -> DriveProfile:
     drive = read_toml_model(path, DriveProfile)
     eds = path.parent / drive.eds
     if not is_file(eds):
-        raise ProfileError(path, "eds", f"value {str(drive.eds)!r}; allowed: a file beside this")
+        raise ProfileError(
+            path, "eds", f"value {str(drive.eds)!r}; allowed: a file beside this one"
+        )
     return drive.model_copy(update={"eds": resolved(eds)})
 
 
@@ -101,7 +103,7 @@ def load_winch(name: str | Path, beside: Path | None = None) -> Winch:
     folder = path.parent
     if file.node_id == file.master_node_id:
         raise ProfileError(
-            path, "node_id", f"value {file.node_id}; allowed: another than master_node_id"
+            path, "node_id", f"value {file.node_id}; allowed: other than master_node_id"
         )
     return Winch(
         profile=path.stem,

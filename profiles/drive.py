@@ -137,8 +137,8 @@ class DriveProfile(Profile):
             )
         if self.mode_torque == _PROFILE_TORQUE and self.torque_slope_Nm_s is None:
             raise ValueError(
-                "torque_slope_Nm_s: is missing; allowed: above 0, which mode_torque = 4 (PT) needs "
-                "for 6087h"
+                "torque_slope_Nm_s: is missing, but mode_torque = 4 (PT) needs it for 6087h; "
+                "allowed: above 0"
             )
         for kind, pdos in (("rpdos", self.rpdos), ("tpdos", self.tpdos)):
             for key in ("number", "cob_id_offset"):
@@ -148,8 +148,8 @@ class DriveProfile(Profile):
         both = {p.cob_id_offset for p in self.rpdos} & {p.cob_id_offset for p in self.tpdos}
         if both:
             raise ValueError(
-                f"rpdos: cob_id_offset {min(both):03X}h is that of a TPDO too; allowed: each "
-                "value once, as two senders of one identifier destroy each other's frames"
+                f"rpdos: cob_id_offset {min(both):03X}h is also that of a TPDO; allowed: each "
+                "value once, because two senders of one identifier destroy each other's frames"
             )
         unknown = [fact for fact in self.verified if fact not in type(self).model_fields]
         if unknown:

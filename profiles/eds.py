@@ -245,10 +245,10 @@ def _sections(sheet: DataSheet, text: str) -> _Sections:
             section.spelling.setdefault(key.lower(), key)
             first = section.keys.setdefault(key.lower(), value)
             if first != value:
-                problem = f"is there twice; the first value counts, not {value_text(value)}"
+                problem = f"is given twice; the first value counts, not {value_text(value)}"
                 remarks.add(section.place(key), problem)
     if not sections:
-        problem = "is no EDS or DCF: it has no section such as [DeviceInfo] or [1000]"
+        problem = "is not an EDS or DCF: it has no section such as [DeviceInfo] or [1000]"
         raise ProfileError(sheet.path, "", problem)
     return sections
 
@@ -257,12 +257,12 @@ def _begin(line: str, number: int, sections: _Sections) -> _Section:
     """Return the section that a header begins; the keys of a broken header are dropped."""
     match = _HEADER.fullmatch(line)
     if match is None or not match[1].strip():
-        problem = f"{value_text(line)} is no section; left out with its keys"
+        problem = f"{value_text(line)} is not a section; left out with its keys"
         sections.remarks.add(f"line {number}", problem)
         return _Section("")
     name = match[1].strip()
     if name.lower() in sections:
-        sections.remarks.add(f"[{name}]", "is there twice; of each key the first value counts")
+        sections.remarks.add(f"[{name}]", "is there twice; the first value of each key counts")
     return sections.put(_Section(name))
 
 
@@ -342,7 +342,7 @@ def _expand(sections: _Sections) -> None:
         for i in range(count):
             cob_id = f"$NODEID+{identifier + i * 0x100:#x}" if i < _PREDEFINED else hex(_OFF)
             _add_pdo(sections, first + i, present, cob_id)
-        problem = "not described one by one; taken as PDOs that can be mapped"
+        problem = "not described individually; assumed to be PDOs that can be mapped"
         sections.remarks.add(info.place("CompactPDO"), f"{count_key}={count}: {problem}")
 
 
@@ -424,7 +424,7 @@ class _Objects:
             self._remarks.add(head.place("ObjectType"), problem)
             return _RECORD if has_entries else _VAR
         if has_entries and not head.get("DataType"):
-            problem = "a variable with sub-indices; taken as record"
+            problem = "a variable with sub-indices; assumed to be a record"
             self._remarks.add(head.place("ObjectType"), problem)
             return _RECORD
         return _VAR
@@ -446,7 +446,7 @@ class _Objects:
             problem = (
                 f"value {value_text(section.get('AccessType'))}; allowed: {', '.join(_ACCESS)}"
             )
-            self._remarks.add(section.place("AccessType"), f"{problem}; taken as ro")
+            self._remarks.add(section.place("AccessType"), f"{problem}; assumed to be ro")
             variable.access_type = "ro"
         variable.pdo_mappable = bool(_number(section, "PDOMapping", (0, 1), self._remarks))
         if data_type in (datatypes.BOOLEAN, *datatypes.INTEGER_TYPES):
@@ -483,8 +483,8 @@ class _Objects:
             return None
         if data_type in _TYPES:
             return data_type
-        problem = f"value {value_text(text)} is no type of CiA 301 (0x0001 to 0x001B)"
-        self._remarks.add(place, f"{problem}; taken as plain bytes")
+        problem = f"value {value_text(text)} is not a type of CiA 301 (0x0001 to 0x001B)"
+        self._remarks.add(place, f"{problem}; assumed to be plain bytes")
         return int(datatypes.DOMAIN)
 
     def _value(self, section: _Section, key: str, variable: ODVariable) -> Value | None:
@@ -520,7 +520,9 @@ class _Objects:
             value -= 1 << bits  # given as raw bits, in hexadecimal
         if value is not None and low <= value <= high:
             return value if node is None else value + self._node_id
-        allowed = "a number as 10, 0x0A or $NODEID+0x180" if value is None else f"{low} to {high}"
+        allowed = (
+            "a number such as 10, 0x0A or $NODEID+0x180" if value is None else f"{low} to {high}"
+        )
         problem = f"value {value_text(text)}; allowed: {allowed}; left out"
         self._remarks.add(section.place(key), problem)
         return None

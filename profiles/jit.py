@@ -188,8 +188,8 @@ class _ReadOnlyCache(FunctionCache):
         if _WARNED not in os.environ:
             os.environ[_WARNED] = "1"
             _LOG.warning(
-                "note: compiled kernels are not kept, each command compiles them for minutes: %s, "
-                "nor can %s; set NUMBA_CACHE_DIR to a folder that can be written",
+                "note: compiled kernels are not kept, so each command compiles them for minutes: "
+                "%s, nor can %s; set NUMBA_CACHE_DIR to a writable folder",
                 _UNWRITABLE, temporary_folder(),
             )  # fmt: skip
 

@@ -80,7 +80,8 @@ class Motor(Profile):
         ):
             if peak < rated:
                 raise ValueError(
-                    f"peak_{what}: value {peak}; allowed: not below rated or stall ({rated})"
+                    f"peak_{what}: value {peak}; allowed: at least the rated or stall value "
+                    f"({rated})"
                 )
         rated_Nm = self.torque_constant_Nm_per_Arms * self.rated_current_Arms
         if not rated_Nm / _TORQUE_RATIO <= self.rated_torque_Nm <= rated_Nm * _TORQUE_RATIO:

@@ -85,7 +85,7 @@ def unknown_profile(
         known |= {path.stem for path in _toml_files(beside) if _is_of(kind, path)}
     one = kind.removesuffix("es" if kind == "winches" else "s").replace("_", " ")
     if is_file(path_of(folder, text)):
-        problem = f"{text!r} is no {one}'s file (TOML, its name ends in .toml)"
+        problem = f"{text!r} is not a {one} file (TOML, with a name that ends in .toml)"
         return ProfileError(kind, "", f"{problem}; allowed: {', '.join(sorted(known))}")
     problem = f"no profile named {text!r}"
     if (ending := Path(text).suffix) and not ending[1:].isdigit():

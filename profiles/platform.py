@@ -23,8 +23,8 @@ WIDEST_m: Final = 300.0
 def _in_metres(value: float) -> float:
     if abs(value) > FURTHEST_m:
         raise ValueError(
-            f"value {value:g}; allowed: -{FURTHEST_m:g} to {FURTHEST_m:g}, in metres (were "
-            f"millimetres written? In metres: {0.001 * value:g})"
+            f"value {value:g}; allowed: -{FURTHEST_m:g} to {FURTHEST_m:g}, in metres (are "
+            f"these millimetres? In metres: {0.001 * value:g})"
         )
     return value
 
@@ -92,7 +92,7 @@ DIRECTIONS: Final[dict[int, tuple[DirectionName, ...]]] = {
     3: ("x", "y", "z", "rx", "ry", "rz"),
 }
 """Directions of a platform by its number of coordinates: positions, then angles."""
-NO_PLATFORM: Final = "has no platform; allowed: robots with a [platform]"
+NO_PLATFORM: Final = "has no platform; allowed: a robot with a [platform]"
 """Error text, after its name or path, for a robot without the required platform."""
 _LEAST_ARM_m = 0.1
 _RISE_S = 0.1
@@ -280,7 +280,7 @@ def platform_faults(
     if file is None:
         for i, points in enumerate(zip(exits, anchors, strict=True)):
             if points != (None, None):
-                yield f"axes[{i}]", "exit_point_m, anchor_point_m: allowed: along with [platform]"
+                yield f"axes[{i}]", "exit_point_m, anchor_point_m: allowed only with [platform]"
         return
     size = len(file.home_m)
     found = False
@@ -355,8 +355,8 @@ def _size_faults(
         yield "axes[0].exit_point_m", problem
     if 0.0 < platform_m < _PLATFORM_FAULTS_LEAST_ARM_m:
         problem = (
-            f"anchor points are {platform_m:g} m apart at most; allowed: all alike, or "
-            f"{_PLATFORM_FAULTS_LEAST_ARM_m:g} m and more (which unit are they in?)"
+            f"anchor points are {platform_m:g} m apart at most; allowed: all equal, or at "
+            f"least {_PLATFORM_FAULTS_LEAST_ARM_m:g} m apart (are the units right?)"
         )
         yield "axes[0].anchor_point_m", problem
     if file.centre_of_mass_m is not None and math.hypot(*file.centre_of_mass_m) > frame_m:
@@ -389,8 +389,9 @@ def _reach_faults(
         i = beside_m.index(max(beside_m))
         if beside_m[i] > _OFF_BODY_m:
             problem = (
-                f"value {list(anchors[i])}; {beside_m[i]:.3g} m beside platform.body; allowed: on "
-                f"it, or up to {_OFF_BODY_m:g} m beside it (does the body reach to all of them?)"
+                f"value {list(anchors[i])}; {beside_m[i]:.3g} m beside platform.body; allowed: "
+                f"on it, or up to {_OFF_BODY_m:g} m beside it (does the body include all anchor "
+                "points?)"
             )
             yield f"axes[{i}].anchor_point_m", problem
         points += [body.min_m, body.max_m]
@@ -404,7 +405,7 @@ def _reach_faults(
         what = "anchor points" if body is None else "anchor points and body"
         problem = (
             f"value {list(centre)}; {off_m:.3g} m beside the box around {what}; allowed: in it, or "
-            f"up to {allowed_m:.3g} m beside it (platform.body says how far the platform reaches)"
+            f"up to {allowed_m:.3g} m beside it (platform.body gives the extent of the platform)"
         )
         yield "platform.centre_of_mass_m", problem
 
@@ -432,7 +433,7 @@ def _inertia_faults(
     if not moments.min() > 0.0:
         yield key, f"principal moments {shown}; allowed: all above 0"
     elif len(moments) == 3 and moments[2] > (1.0 + _ROUNDING) * (moments[0] + moments[1]):
-        problem = f"principal moments {shown}; allowed: none above the sum of the two others"
+        problem = f"principal moments {shown}; allowed: none larger than the sum of the other two"
         yield key, problem
     elif math.sqrt(moments.max() / mass_kg) > 0.5 * frame_m:
         problem = (
@@ -459,24 +460,24 @@ def _direction_faults(
     if len(controlled) > n:
         problem = f"{n}; allowed: {len(controlled)} and more to control {', '.join(given)}"
         if size == 3 and len(controlled) == 6:
-            problem += ", or all anchor points alike: a point in space takes 3"
+            problem += ", or all anchor points equal: a point in space needs 3"
         yield "axes", problem
     if len(set(anchors)) == 1 and len(controlled) > size:
-        problem = f"value {list(controlled)}; allowed: no angle where all anchor points are alike"
+        problem = f"value {list(controlled)}; allowed: no angle if all anchor points are equal"
         yield "platform.controlled", problem
     if file.workspace_angle_rad > 0.0:
         if len(controlled) == size:
-            problem = f"value {file.workspace_angle_rad:g}; allowed: 0 where no angle is controlled"
+            problem = f"value {file.workspace_angle_rad:g}; allowed: 0 if no angle is controlled"
             yield "platform.workspace_angle_rad", problem
         else:
             for key in ("angular_speed_rad_s", "angular_acceleration_rad_s2"):
                 if getattr(file, key) is None:
-                    allowed = "allowed: given where workspace_angle_rad is above 0"
+                    allowed = "required if workspace_angle_rad is above 0"
                     yield f"platform.{key}", f"missing; {allowed}"
     if file.tension_distribution == "polygon-centroid" and n > len(controlled) + 2:
         problem = (
-            f"value {file.tension_distribution!r}; allowed: for up to {len(controlled) + 2} cables "
-            f"where {len(controlled)} directions are controlled, not {n}"
+            f"value {file.tension_distribution!r}; allowed for up to {len(controlled) + 2} "
+            f"cables with {len(controlled)} controlled directions, not {n}"
         )
         yield "platform.tension_distribution", problem
 

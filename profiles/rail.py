@@ -119,8 +119,8 @@ class RailProfile(Profile):
         given = [kind for kind in ("cia402", "modbus") if getattr(self, kind) is not None]
         if given != [self.kind]:
             raise ValueError(
-                f"kind: value {self.kind!r}; allowed: the one table there is, of cia402 and modbus "
-                f"(given: {', '.join(given) or 'none'})"
+                f"kind: value {self.kind!r}; allowed: cia402 or modbus, with the table of that "
+                f"name (given: {', '.join(given) or 'none'})"
             )
         return self
 

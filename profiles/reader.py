@@ -99,7 +99,7 @@ def _refused(path: Path, model: type[BaseModel], error: ValidationError) -> Prof
     key, problem = found[0]
     further = [f"\n{path}: {k}: {p}" if k else f"\n{path}: {p}" for k, p in found[1:_MOST_FAULTS]]
     if len(found) > _MOST_FAULTS:
-        further.append(f"\n{path}: there is more that is wrong")
+        further.append(f"\n{path}: there are more errors")
     return ProfileError(path, key, problem + "".join(further))
 
 
@@ -128,7 +128,7 @@ def _faults(model: type[BaseModel], errors: list[ErrorDetails]) -> Iterable[tupl
             yield dotted(loc), f"unknown key; {hint}"
     for error in errors:
         if error["type"] == "missing" and error["loc"] not in explained:
-            yield dotted(error["loc"]), "this key is required and missing"
+            yield dotted(error["loc"]), "this required key is missing"
         elif error["type"] == "value_error":
             yield dotted(error["loc"]), error["msg"].removeprefix("Value error, ")
         elif error["type"] == "too_long":

@@ -90,7 +90,10 @@ class RobotFile(Profile):
             if bus.name in names[:i]:
                 yield f"buses[{i}].name", f"value {bus.name!r}; allowed: each name once"
             elif all(axis.bus != bus.name for axis in self.axes):
-                yield f"buses[{i}].name", f"value {bus.name!r}; allowed: a bus that an axis is on"
+                yield (
+                    f"buses[{i}].name",
+                    f"value {bus.name!r}; allowed: a bus with at least one axis",
+                )
 
     def _node_faults(self) -> Iterator[tuple[str, str]]:
         names = [bus.name for bus in self.buses]
@@ -105,15 +108,15 @@ class RobotFile(Profile):
             first = first_on_bus.setdefault((axis.bus, axis.node_id), i)
             if first != i:
                 problem = (
-                    f"value {axis.node_id}; allowed: each node id once on a bus, "
-                    f"axes[{first}] has it on {axis.bus!r}"
+                    f"value {axis.node_id}; allowed: each node id once on a bus, but axes[{first}] "
+                    f"also has it on {axis.bus!r}"
                 )
                 yield f"axes[{i}].node_id", problem
             other = first_of_all.setdefault(axis.node_id, i)
             if self.safety_io is not None and self.axes[other].bus != axis.bus:
                 problem = (
-                    f"value {axis.node_id}; allowed: each node id once on all buses where there is "
-                    f"a safety_io, which knows its brakes by it (axes[{other}] has it too)"
+                    f"value {axis.node_id}; allowed: with a safety_io, which identifies brakes by "
+                    f"node id, each node id once on all buses (axes[{other}] also has it)"
                 )
                 yield f"axes[{i}].node_id", problem
 
@@ -121,14 +124,17 @@ class RobotFile(Profile):
         if self.platform is not None:
             for key in ("tension_min_N", "tension_max_N"):
                 if getattr(self.limits, key) is None:
-                    yield f"limits.{key}", "missing; allowed: given where there is a [platform]"
+                    yield f"limits.{key}", "missing; required with a [platform]"
 
     def _repeated_names(self) -> Iterator[tuple[str, str]]:
         names = [axis.name or default_name(i) for i, axis in enumerate(self.axes)]
         for i, name in enumerate(names):
             if name in names[:i]:
                 where = f"axes[{names.index(name)}]"
-                yield f"axes[{i}].name", f"value {name!r}; allowed: each once, {where} has it"
+                yield (
+                    f"axes[{i}].name",
+                    f"value {name!r}; allowed: each once, but {where} also has it",
+                )
 
 
 def default_name(axis: int) -> str:

@@ -71,7 +71,7 @@ class Limit(IntEnum):
     BROKEN_CABLE = (
         9,
         "quick stop",
-        "the cable seems broken, or has slipped: tension fell suddenly to {:.1f} N, from above "
+        "the cable seems broken or has slipped: tension fell suddenly to {:.1f} N, from above "
         "{:.1f} N",
         "N",
         1.0,
@@ -91,7 +91,7 @@ class Limit(IntEnum):
     LATE = (
         14,
         "controlled stop",
-        "the loop was held up for {:.0f} ms, {:.0f} ms allowed",
+        "the loop was delayed for {:.0f} ms, {:.0f} ms allowed",
         "s",
         1e3,
     )
@@ -218,7 +218,7 @@ class RobotLimits(Profile):
                 if a >= b:
                     raise ValueError(f"{low}[{i}]: value {a:g}; allowed: below {high} ({b:g})")
         if self.slack_N is not None and self.tension_min_N is None:
-            raise ValueError("slack_N: allowed: along with tension_min_N")
+            raise ValueError("slack_N: allowed only with tension_min_N")
         return self
 
     def faults(self, axes: int) -> Iterator[tuple[str, str]]:

@@ -152,8 +152,8 @@ class SafetyIoProfile(Profile):
         for key, output in self.outputs():
             if output.inverted and not key.startswith("lights."):
                 raise ValueError(
-                    f"{key}.inverted: value True; allowed: False, for without its supply a "
-                    "contactor has to open and a brake to hold"
+                    f"{key}.inverted: value True; allowed: False, because without supply a "
+                    "contactor must open and a brake must hold"
                 )
         for key in ("axis", "node_id"):
             values = [getattr(axis, key) for axis in self.axes if getattr(axis, key) is not None]
@@ -177,8 +177,8 @@ def _once(points: list[tuple[str, int]], what: str) -> None:
     for key, address in points:
         if address in owners:
             raise ValueError(
-                f"{key}: {what} {address} is that of {owners[address]} already; "
-                f"allowed: each {what} once"
+                f"{key}: {what} {address} is already used by {owners[address]}; allowed: each "
+                f"{what} once"
             )
         owners[address] = key
     if max(owners) - min(owners) >= MOST_POINTS:

@@ -72,7 +72,7 @@ class WinchCalibration(Profile):
 
     def to_toml(self) -> str:
         """Return the text of the file."""
-        return self.toml_text("Tension-to-torque gain and friction of one winch, as measured.")
+        return self.toml_text("Measured tension-to-torque gain and friction of one winch.")
 
     def save(self, path: Path) -> None:
         """Write the file; raises ProfileError with its name."""

@@ -93,7 +93,7 @@ class FrameLog:
         Bus time begins at zero, so a recording of real time cannot be mistaken for a simulator's.
         """
         if not may_replace(path, b"(0000"):
-            raise FileExistsError(errno.EEXIST, "is there already and is no log of a simulator")
+            raise FileExistsError(errno.EEXIST, "exists and is not a log of a simulator")
         self._file = path.open("ab", buffering=0)
         try:
             fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)

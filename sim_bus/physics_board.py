@@ -268,8 +268,8 @@ class PhysicsBoard:
         """
         if (machine := platform.machine()) not in _IN_ORDER:
             raise BusSetupError(
-                f"{path}: this machine's processor is {machine}; allowed for devices that share a "
-                f"physics board, which has no lock: {', '.join(_IN_ORDER)}"
+                f"{path}: this machine's processor is {machine}; devices can share a physics "
+                f"board, which has no lock, only on {', '.join(_IN_ORDER)}"
             )
         path = Path(path)
         try:
@@ -332,7 +332,7 @@ def common_time(boards: Sequence[PhysicsBoard]) -> Callable[[], float] | None:
     if len(kinds) > 1:
         names = ", ".join(str(board.path) for board in boards if board.lockstep)
         raise BusSetupError(
-            f"physics boards in lockstep ({names}) and paced ones do not go together"
+            f"physics boards in lockstep ({names}) and paced ones cannot be combined"
         )
     if kinds != {True}:
         return None

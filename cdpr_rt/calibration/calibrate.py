@@ -65,7 +65,8 @@ def calibrate(
     """
     if seen.poses < LEAST_POSES:
         raise InvalidRequestError(
-            f"{seen.poses} poses; allowed: {LEAST_POSES} and more, some verify what the others tell"
+            f"{seen.poses} poses; allowed: {LEAST_POSES} or more, because some verify the "
+            "result of the others"
         )
     slack = _SLACK_SHARE * np.asarray(limits_of(robot).slack_N, float)
     if images is None:

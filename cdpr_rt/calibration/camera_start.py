@@ -61,8 +61,8 @@ def turned_camera(platform: FloatArray, camera: FloatArray) -> FloatArray:
     spread = np.sqrt(np.linalg.eigvalsh(b.T @ b / max(len(b), 1))) if len(b) else np.zeros(3)
     if spread[1] < _LEAST_TURN_rad:
         raise InvalidRequestError(
-            f"the platform turns by {np.degrees(spread[1]):.1f} deg only about a second axis, which"
-            " does not tell how the camera sits on it; allowed: hand_eye in the data, as measured"
+            f"the platform turns by {np.degrees(spread[1]):.1f} deg about a second axis, "
+            "too little to find where the camera sits; give a measured hand_eye in the data"
         )
     weight = np.ones(len(a))
     for _ in range(_ROUNDS):
@@ -218,9 +218,9 @@ def _require_likely(
     most_deg = max(_LIKELY_deg, _LIKELY_SIGMAS * told.rotation_std_deg)
     if off_deg > most_deg:
         raise InvalidRequestError(
-            f"hand_eye.rotation_deg: value {list(told.rotation_deg)}: the platform's turns tell "
-            f"another, {off_deg:.0f} deg off; allowed: up to {most_deg:.0f} deg; without it the "
-            "turns alone tell how the camera sits"
+            f"hand_eye.rotation_deg: value {list(told.rotation_deg)}: it differs by "
+            f"{off_deg:.0f} deg from the one found from the platform's rotations; allowed: "
+            f"up to {most_deg:.0f} deg; omit it to use the rotations alone"
         )
 
 
@@ -239,9 +239,10 @@ def _moved_m(room: Rigid, map_: MarkerMap) -> float:
 def _other_room(room: Rigid, map_: MarkerMap) -> str:
     return (
         f"the known markers put the platform {_moved_m(room, map_):.2f} m and "
-        f"{math.degrees(angles(room.rotation)):.0f} deg from where the robot's file has it: their "
-        "places are taken for a separate frame, and do not tell where the robot is in its "
-        "room; check them if they were measured in its frame"
+        f"{math.degrees(angles(room.rotation)):.0f} deg from its place by the robot's "
+        "file: the fit assumes that the markers have a separate frame, so they do not "
+        "give the robot's place in its room; check their places if they were measured "
+        "in the robot's frame"
     )
 
 

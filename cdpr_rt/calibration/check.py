@@ -45,9 +45,10 @@ _NO_SPARE_LENGTH = (
     "lengths agree with some pose; check it with a camera or --scanner"
 )
 _ADVICE = {
-    "exit": "look at its pulley, at what that is fixed to, and at its rail",
-    "length": "its cable has slipped on the drum or at the platform, or its encoder has",
-    "drum": "look at its drum, its belt and how its cable is wound",
+    "exit": "check its pulley, the mount of the pulley, and its rail",
+    "length": "check whether its cable slipped on the drum or at the platform, or its "
+    "encoder slipped",
+    "drum": "check its drum, its belt and the winding of its cable",
     "slip": "it slipped during this check: tighten at home and check again",
 }
 
@@ -80,10 +81,10 @@ class DetectedChange:
         sure = f"± {3e3 * float(self.std.max()):.1f} mm (3 sigma)"
         what = {
             "exit": f"the exit point of {who} has moved by ({many}) {sure}",
-            "length": f"{who} is {many} {sure} longer than it is taken for",
-            "slip": f"{who} is {many} {sure} longer than it is taken for from pose {self.pose} on",
+            "length": f"{who} is {many} {sure} longer than assumed",
+            "slip": f"{who} is {many} {sure} longer than assumed from pose {self.pose} on",
             "drum": f"a turn of the motor of {who} pays out {100 * float(self.size[0]):+.2f} ± "
-            f"{300 * float(self.std[0]):.2f} % (3 sigma) of what it did",
+            f"{300 * float(self.std[0]):.2f} % (3 sigma) relative to the calibration",
         }[self.kind]
         effect = f"positions are off by up to {1e3 * self.effect_m:.1f} mm"
         return f"{what}; {effect}: {_ADVICE[self.kind]}"
@@ -126,13 +127,13 @@ class Check:
 
     def verdict(self) -> list[str]:
         """Return the result as lines of text."""
-        off = f"lengths at {self.poses} poses are off by {1e3 * self.residual_m:.2f} mm rms"
+        off = f"lengths at {self.poses} poses disagree by {1e3 * self.residual_m:.2f} mm rms"
         if not self.moved:
             small = [f"harmless so far: {change.text}" for change in self.changes]
             return [f"UNCHANGED: {off}", *small]
         told = [f"MOVED: {change.text}" for change in self.changes]
         if self.misfit > _MISFIT:
-            told.append("MOVED: more than single cables explain: the frame, or several cables")
+            told.append("MOVED: not explained by single cables: the frame, or several cables")
         return [off, *told]
 
 

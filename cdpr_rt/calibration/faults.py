@@ -43,7 +43,7 @@ _TOLD = 0.05
 _ENDS = 2
 """Poses at both ends at which a jump looks like an outlier."""
 _FAR = 3.0
-_UNSURE = ": lengths alone do not tell"
+_UNSURE = ": lengths alone cannot show which"
 
 
 @dataclass(frozen=True)
@@ -147,13 +147,13 @@ def without_slipped_points(
     elif causes:
         text = (
             "undecided: measured points contradict lengths and the robot's file: "
-            f"{', or '.join(causes)}; nothing tells which: measure one distance between two poses "
-            "by other means"
+            f"{', or '.join(causes)}; to find out which, measure one distance between two "
+            "poses in another way"
         )
     else:
         text = (
-            "undecided: measured points contradict lengths and the robot's file, and no single "
-            "slip or wrong value explains it: measure some of them again"
+            "undecided: measured points contradict lengths and the robot's file, and no "
+            "single slip or wrong value explains this: measure some points again"
         )
     fault = Fault("points", -1, -1, verdict.off, text)
     return replace(seen.unmeasured(), markers=seen.markers), [fault]
@@ -245,8 +245,8 @@ def _with_size(fault: Fault, found: Fit, seen: Observations) -> Fault:
     size = float(found.jumps_m[found.seen.jumps.index((fault.cable, fault.pose))])
     who = found.geometry.cables_text(fault.cable, fault.alike, _UNSURE)
     text = (
-        f"{who} is {1e3 * size:+.1f} mm off from pose {fault.pose + 1} on: "
-        "its encoder, coupling or drum slipped between that pose and the one before"
+        f"{who} is {1e3 * size:+.1f} mm off from pose {fault.pose + 1} on: its encoder, "
+        "coupling or drum slipped just before that pose"
     )
     return replace(fault, size=size, text=text)
 
@@ -259,14 +259,14 @@ def _with_distance(fault: Fault, found: Fit, seen: Observations) -> Fault:
     measured = np.where(np.isfinite(std_m), seen.position_m[j, :k], np.nan)
     size = float(np.sqrt(np.nansum((measured - there) ** 2)))
     text = (
-        f"pose {j + 1}: the measured point is {1e3 * size:.1f} mm from where all other readings "
-        "put it"
+        f"pose {j + 1}: the measured point is {1e3 * size:.1f} mm from the position by "
+        "all other readings"
     )
     if slip := row_slip(measured, there, float(std_m.min())):
         text += f"; it fits if {slip}"
     if fault.alike:
         cables = " or ".join(found.geometry.cable_name(cable) for cable in fault.alike)
-        text += f", or {cables} was slack or caught there: nothing tells which"
+        text += f", or {cables} was slack or caught there: it is not known which"
     return replace(fault, size=size, text=f"{text}; it is left out")
 
 
@@ -298,12 +298,12 @@ def _worst(found: Fit) -> list[Fault]:
     if max(points[j], single[j, i]) < _OUTLIER:
         return []
     size = float(residual[j, i] / weight[j, i] / redundancy[j, i]) if told[j, i] else 0.0
-    what = "slack or caught somewhere" if size > 0.0 else "longer than it was paid out"
+    what = "slack or caught" if size > 0.0 else "longer than it was paid out"
     alike = _alike(single[j], i)
     who = found.geometry.cables_text(i, alike, _UNSURE)
     text = (
-        f"{who} at pose {j + 1} is {1e3 * size:+.1f} mm off what all "
-        f"others say: {what}; its length there is left out"
+        f"{who} at pose {j + 1} is {1e3 * size:+.1f} mm off the other lengths: {what}; "
+        "its length there is left out"
     )
     tried = [Fault("point", -1, j, 0.0, "")] if points[j] > _MAYBE * single[j, i] else []
     if single[j, i] > _MAYBE * points[j]:
@@ -372,13 +372,14 @@ def parameter_faults(found: Fit) -> list[Fault]:
             if abs(error) > _FAR * known.drum:
                 text = (
                     f"{geometry.cable_name(i)}: a turn of its motor pays out {100 * error:+.2f} % "
-                    f"(± {300 * std[i]:.2f} %, 3 sigma) of what the file says: check "
-                    "drum_radius_m and gear_ratio of its winch"
+                    f"(± {300 * std[i]:.2f} %, 3 sigma) relative to the file: check drum_radius_m "
+                    "and gear_ratio of its winch"
                 )
                 faults.append(Fault("drum", i, -1, float(error), text))
     if geometry.shared and abs(geometry.elongation) > _FAR * known.elongation:
         text = (
-            f"the cables yield by {100 * geometry.elongation:+.0f} % of what the file says: check "
+            f"the elongation of the cables differs by {100 * geometry.elongation:+.0f} % "
+            "from the file: check "
             "elongation_percent_per_N of the cable"
         )
         faults.append(Fault("elongation", -1, -1, geometry.elongation, text))
@@ -463,7 +464,7 @@ def moved_or_slipped(faults: Sequence[Fault]) -> list[Fault]:
         Fault(
             "camera", -1, pose, 0.0,
             f"{UNDECIDED}{cables} cables are off from pose {pose + 1} on: either they slipped "
-            "together, or the camera was moved on its platform; look at both, and measure again",
+            "together, or the camera moved on its platform; check both, and measure again",
         )
         for pose, cables in at.items()
         if cables >= _AT_ONCE
@@ -498,7 +499,7 @@ def told_right(geometry: CableGeometry, found: Fit, first: MapFit) -> tuple[Fit,
         return _believed(geometry, best)
     causes = [" and ".join(_cause(kind, one.fit)[1] for kind in one.kinds) for one in alike]
     text = "cables and camera contradict each other: " + ", or ".join(causes)
-    advice = "; nothing tells which: measure a black square, and one distance between two poses"
+    advice = "; to find out which, measure a black square, and one distance between two poses"
     kind = best.kinds[0]
     return found, [Fault(kind, -1, -1, _cause(kind, best.fit)[0], UNDECIDED + text + advice)]
 
@@ -537,7 +538,7 @@ def _tried(geometry: CableGeometry, found: Fit, kinds: tuple[FaultKind, ...]) ->
 
 def _believed(geometry: CableGeometry, best: _Cause) -> tuple[Fit, list[Fault]]:
     """Return the fit by the only explanation, and faults for the wrong figures."""
-    why = "; exit points, and what was measured, agree best with that, and it is believed"
+    why = "; this agrees best with exit points and measurements, so it is used"
     found, faults = best.fit, []
     for kind in best.kinds:
         if kind == "drum" and not _all_drums(geometry, found):
@@ -575,13 +576,13 @@ def _cause(kind: FaultKind, found: Fit) -> tuple[float, str]:
     if kind == "size":
         size = camera.size_change
         how = "larger" if size > 0.0 else "smaller"
-        return size, f"all sheets are {100.0 * abs(size):.2f} % {how} than told"
+        return size, f"all sheets are {100.0 * abs(size):.2f} % {how} than stated"
     if kind == "drum":
         alike = float(np.median(found.geometry.cable[:, DRUM]))
-        return alike, f"all drums pay out {100.0 * alike:+.2f} % of what the robot's file says"
+        return alike, f"all drums pay out {100.0 * alike:+.2f} % relative to the robot's file"
     focal = float((camera.lens[:2] / camera.knowledge.lens[:2]).mean()) - 1.0
     return focal, (
-        f"the intrinsics are not this camera's as it is now (focal length {100.0 * focal:+.2f} %): "
+        f"the intrinsics do not fit the camera as it is now (focal length {100.0 * focal:+.2f} %): "
         "was the lens turned or the resolution changed? `cdpr camera calibrate`"
     )
 

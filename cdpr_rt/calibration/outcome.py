@@ -119,11 +119,14 @@ class Outcome:
         """Return the objections to adopting it, each with what to do."""
         found, told = self.found, []
         if not found.converged:
-            told.append("the fit did not settle: the start is too far off, or data contradict")
+            told.append(
+                "the fit did not converge: its start is too far off, or the data contradict "
+                "each other"
+            )
         if found.variance_factor > _MISFIT:
             told.append(
-                f"lengths disagree {math.sqrt(found.variance_factor):.1f} times as much as they "
-                "should: something moves that is taken to be fixed (an anchor, a pulley, a frame)"
+                f"lengths disagree {math.sqrt(found.variance_factor):.1f} times as much as "
+                "expected: a part that should be fixed moves (an anchor, a pulley, a frame)"
             )
         told += [
             fault.text
@@ -132,9 +135,9 @@ class Outcome:
         ]
         if found.corner_factor > _MISFIT:
             told.append(
-                f"corners fit {math.sqrt(found.corner_factor):.1f} times worse together with the "
-                "cables than alone: the camera moved on the platform, or the platform "
-                "while images were taken"
+                f"corners fit {math.sqrt(found.corner_factor):.1f} times worse together with "
+                "the cables than alone: the camera moved on the platform, or the platform "
+                "moved while images were taken"
             )
         left_out = [fault for fault in self.faults if fault.kind in ("outlier", "slack", "jump")]
         if len(left_out) > _MOST_LEFT_OUT * found.seen.used.size:
@@ -143,9 +146,9 @@ class Outcome:
         slipped = any(fault.kind == "points" for fault in self.faults)
         if self.predicted_3_sigma_mm > most_mm and not slipped:
             told.append(
-                f"positions would be known to {self.predicted_3_sigma_mm:.1f} mm only (3 sigma, "
-                f"predicted; allowed: {most_mm:.1f} mm): measure points, or say how well the exit "
-                "points of the robot's file are known (--known-mm)"
+                f"positions would be uncertain by {self.predicted_3_sigma_mm:.1f} mm (3 sigma, "
+                f"predicted; allowed: {most_mm:.1f} mm): measure points, or state how well the "
+                "exit points of the robot's file are known (--known-mm)"
             )
         if self.worse and (self.told_from_file or self.adopt):
             told.append(
@@ -154,8 +157,8 @@ class Outcome:
             )
         if self.method == "camera" and self.verified.kind == "none":
             told.append(
-                "no three of the poses not used show two markers of the map, so nothing verifies "
-                "it: take more poses, or lay more sheets"
+                "fewer than three held-out poses show two markers of the map, so the "
+                "calibration is not verified: take more poses, or lay out more sheets"
             )
         return told + self._points() + self._islands() + self._impossible()
 
@@ -172,8 +175,8 @@ class Outcome:
         by_points = self.method == "points" or self.verifying_points_left_out > 0
         if by_points and "points" not in kinds and verifying < LEAST_VERIFYING:
             told.append(
-                f"not verified: the position was measured at {verifying} of the poses that the "
-                f"fit has not used, {LEAST_VERIFYING} are needed: measure all coordinates at "
+                f"not verified: the position was measured at {verifying} of the held-out poses, "
+                f"but {LEAST_VERIFYING} are needed: measure all coordinates at "
                 f"{2 * LEAST_VERIFYING} poses or more, far apart"
             )
         return told
@@ -186,8 +189,8 @@ class Outcome:
         if self.cover is None or not self.cover.apart:
             return []
         return [
-            f"markers fall into {1 + len(self.cover.apart)} islands that no image connects: the "
-            f"map leaves out all that are not with {listed(self.cover.islands[0])}"
+            f"markers fall into {1 + len(self.cover.apart)} islands that no image connects: "
+            f"the map contains only the markers with {listed(self.cover.islands[0])}"
         ]
 
     def insignificance(self) -> str | None:
@@ -198,13 +201,13 @@ class Outcome:
         moved = f"positions would move by {1e3 * change.moved_m:.2f} mm (root mean square)"
         if change.by_noise:
             return (
-                f"not significant: noise alone changes parameters as much as this in "
-                f"{100.0 * change.chance:.0f} % of cases; {moved}, and the robot's file may be "
-                "right already"
+                "not significant: noise alone causes changes of this size in "
+                f"{100.0 * change.chance:.0f} % of cases; {moved}, and the robot's file may "
+                "already be right"
             )
         return (
-            f"not significant: {moved}, which is less than they are known to by the calibration, "
-            "and poses not used are not told much better; the robot's file may be right already"
+            f"not significant: {moved}, less than their uncertainty, and held-out poses do "
+            "not improve much; the robot's file may already be right"
         )
 
     def _impossible(self) -> list[str]:
@@ -214,14 +217,14 @@ class Outcome:
                 self.robot
             )
         except ValidationError as error:
-            return [f"the result is no geometry: {error.errors()[0]['msg']}"]
-        what = "is something of the robot's file wrong, or was pose 1 not home?"
+            return [f"the result is not a possible geometry: {error.errors()[0]['msg']}"]
+        what = "is the robot's file wrong, or was pose 1 not home?"
         return [f"{key}: {problem}: {what}" for key, problem in faults]
 
     def advice(self) -> str:
         """Return the benefit of more poses."""
         return (
-            f"{MORE} more poses would bring {self.predicted_3_sigma_mm:.2f} mm to "
+            f"{MORE} more poses would improve {self.predicted_3_sigma_mm:.2f} mm to "
             f"{self.with_more_3_sigma_mm:.2f} mm (3 sigma, predicted)"
         )
 
@@ -247,11 +250,11 @@ class Outcome:
     def accuracy(self) -> str:
         """Return the accuracy of positions and orientations as text, and whether it suffices."""
         wanted, known = wanted_mm(self.robot), self.predicted
-        relative = "" if self.known_room else " against each other"
-        text = f"positions are known to {known.position_mm:.2f} mm{relative}"
+        relative = "" if self.known_room else "  relative to each other"
+        text = f"positions are uncertain by {known.position_mm:.2f} mm{relative}"
         enough = known.position_mm <= wanted
         if known.orientation_deg is not None:
-            text += f", orientations to {known.orientation_deg:.3f} deg against each other"
+            text += f", orientations by {known.orientation_deg:.3f} deg relative to each other"
             enough &= known.orientation_deg <= _WANTED_deg
         text += " (3 sigma, predicted)"
         if enough:
@@ -266,20 +269,20 @@ class Outcome:
             for axis, moved in zip("xyz", self.shift_m.tolist(), strict=False)
         )
         text = (
-            f"absolute positions move by {axes} on the average, and are known to "
+            f"absolute positions change by {axes} on average, and are uncertain by "
             f"{self.absolute.position_mm:.1f} mm"
         )
         if (turned := self.absolute.orientation_deg) is not None:
-            text += f", absolute orientations to {turned:.2f} deg"
+            text += f", absolute orientations by {turned:.2f} deg"
         text += f" (3 sigma, predicted) in the frame of {frame_of(self)}"
         if self.known_room:
             return (
-                f"{text}, if the scale of what was measured in the room is right to "
-                f"{300.0 * SHARED_SCALE_STD:.1f} % (3 sigma); no other figure contains an error "
-                "that all points share (scale, origin, axes)"
+                f"{text}, if the scale of the measurements in the room is right to "
+                f"{300.0 * SHARED_SCALE_STD:.1f} % (3 sigma); the other figures do not include "
+                "errors that all points share (scale, origin, axes)"
             )
         return (
-            f"{text}: nothing that was measured tells where the robot is in its room "
+            f"{text}: the measurements do not determine where the robot is in its room "
             "(measured points or known markers do)"
         )
 
@@ -288,9 +291,10 @@ class Outcome:
         lines = []
         if self.verified.errors_m.size:
             lines.append(
-                f"verified on {len(self.verified.errors_m)} poses not used: mean "
+                f"verified on {len(self.verified.errors_m)} held-out poses: mean "
                 f"{self.verified.mean_mm:.2f} mm, worst {self.verified.worst_mm:.2f} mm off "
-                f"{self.verified.reference} (by the robot's file: {self.before.mean_mm:.2f} and "
+                f"{self.verified.reference} (with the robot's file: {self.before.mean_mm:.2f} "
+                "and "
                 f"{self.before.worst_mm:.2f})"
             )
         if count := self.verifying_points_left_out:
@@ -300,8 +304,8 @@ class Outcome:
             )
         if math.isfinite(self.verified.scale.factor):
             lines.append(
-                f"distances between them are {self.verified.scale.text} times those that lengths "
-                f"tell (± is 3 sigma; by the robot's file: {self.before.scale.text})"
+                f"distances between them are {self.verified.scale.text} times those from cable "
+                f"lengths (± is 3 sigma; with the robot's file: {self.before.scale.text})"
             )
         if self.verified.turn_errors_rad.size:
             lines.append(
@@ -309,14 +313,14 @@ class Outcome:
                 f"{self.before.mean_deg:.2f})"
             )
         lines.append(
-            f"lengths at poses not used contradict each other by "
+            f"lengths at held-out poses contradict each other by "
             f"{1e3 * self.verified.residual_m:.2f} mm rms (before: "
             f"{1e3 * self.before.residual_m:.2f})"
         )
         if self.verified_left_out:
             lines.append(
-                f"{self.verified_left_out} readings at poses not used are of slack cables, or next "
-                "to a slip, and count for nothing there"
+                f"{self.verified_left_out} readings at held-out poses are of slack cables, or "
+                "next to a slip, and are not used"
             )
         return lines
 
@@ -381,10 +385,10 @@ def number_or_none(value: float) -> float | None:
 def frame_of(outcome: Outcome) -> str:
     """Return the frame of the identified coordinates, as text."""
     if outcome.found.seen.measured.sum() >= LEAST_POINTS:
-        return "the room in which the platform was measured"
+        return "the room, by measured points"
     if outcome.known_room:
-        return "the room in which places of markers are known"
-    return "the robot's file, as its exit points and its home tell it"
+        return "the room, by known places of markers"
+    return "the robot's file, by its exit points and home"
 
 
 def calibration_of(

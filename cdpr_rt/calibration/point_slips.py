@@ -366,20 +366,20 @@ def _of_robot(file: CableGeometry, model: _ByLengths, null: _Score) -> list[tupl
     if DRUM in rows:
         drums = [i * len(rows) + rows.index(DRUM) for i in range(file.n)]
         tried += [
-            (f"{file.cable_name(i)} has another drum than in the file", each[:, [drum]], _DRUM)
+            (f"the drum of {file.cable_name(i)} differs from the file", each[:, [drum]], _DRUM)
             for i, drum in enumerate(drums)
         ]
         alike = each[:, drums].sum(axis=1, keepdims=True)
         tried.append(("all drums pay out more or less than in the file", alike, _DRUM))
     if 0 in rows:
         tried += [
-            (f"the exit point of {file.cable_name(i)} is not where the file has it",
+            (f"the exit point of {file.cable_name(i)} differs from the file",
              each[:, i * len(rows) : i * len(rows) + k], _EXIT_m)
             for i in range(file.n)
         ]  # fmt: skip
     if file.shared:
         yielding = each[:, [file.size - 1]]
-        tried.append(("the cables yield otherwise than in the file", yielding, _ELONGATION))
+        tried.append(("the elongation of the cables differs from the file", yielding, _ELONGATION))
     return [(model.cost_of_file(null, directions, most), name) for name, directions, most in tried]
 
 
@@ -544,11 +544,11 @@ def _text(slip: _Slip, points: Points, score: _Score) -> tuple[str, float]:
         size = float(np.linalg.norm(off_m))
         text = (
             f"all measured points are off by ({', '.join(f'{1e3 * x:.0f}' for x in off_m)}) mm: "
-            "their origin is not that of the robot's file, or another point of the platform was "
-            "measured"
+            "their origin differs from that of the robot's file, or another point of the "
+            "platform was measured"
         )
     elif what == "turn":
-        text = "the axes of all measured points are turned against those of the robot's file"
+        text = "the axes of all measured points are turned relative to those of the robot's file"
     elif what == "unit":
         text = f"all measured points are in {rest}, not in mm"
     elif what == "axes":

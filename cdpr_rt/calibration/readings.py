@@ -348,7 +348,9 @@ class CalibrationData(Profile):
     def _camera_where_images(self) -> CalibrationData:
         for j, reading in enumerate(self.poses):
             if reading.image is not None and self.camera is None:
-                raise ValueError(f"poses[{j}].image: allowed: where `camera` says what took it")
+                raise ValueError(
+                    f"poses[{j}].image: allowed only with `camera`, which describes the camera"
+                )
         if any(pose >= len(self.poses) for pose in self.restarts):
             raise ValueError(f"restarts {self.restarts}; allowed: poses of the data")
         return self
@@ -368,10 +370,10 @@ class CalibrationData(Profile):
         if other:
             raise InvalidRequestError(
                 f"the data are of another state of {self.robot!r}: {robot.path}, or a file of its "
-                "winches, has been changed since; allowed: the files they were measured with"
+                "winches, has changed since; use the files with which they were measured"
             )
         if not self.poses:
-            raise InvalidRequestError("the data hold no poses; allowed: at least a few")
+            raise InvalidRequestError("the data contain no poses")
         n, d = len(robot.axes), model.size
         for j, reading in enumerate(self.poses):
             counts = (len(reading.length_m), len(reading.tension_N), len(reading.target))
@@ -403,7 +405,7 @@ class CalibrationData(Profile):
         k = model.positions
         if off[:k].max() > model.platform.home_tolerance_m or (off[k:] > _TURNED_rad).any():
             raise InvalidRequestError(
-                f"pose 1 was to be at {list(self.poses[0].target)}; allowed: home, "
+                f"pose 1 has the target {list(self.poses[0].target)}; allowed: home, "
                 f"{model.home.tolist()}, where the platform stands before it moves"
             )
 
@@ -444,7 +446,7 @@ def load_points(path: Path) -> list[MeasuredPoint]:
         reader = csv.reader(io.StringIO(read_text(path, _MOST_BYTES)))
         lines = [(reader.line_num, row) for row in reader]
     except csv.Error as error:
-        raise ProfileError(path, "", f"is no CSV: {error}") from None
+        raise ProfileError(path, "", f"is not a CSV file: {error}") from None
     lines = [(line, row) for line, row in lines if row and not row[0].lstrip().startswith("#")]
     first, names = (lines[0][0], [name.strip() for name in lines[0][1]]) if lines else (1, [])
     if names not in (

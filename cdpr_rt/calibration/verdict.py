@@ -61,13 +61,13 @@ def require_enough(geometry: CableGeometry, seen: Observations) -> None:
         return
     if each <= 0.0:
         raise InvalidRequestError(
-            f"{n} cables and {d} directions leave nothing over at a pose if nothing else of it is "
-            "known; allowed: with measured points (--points)"
+            f"{n} cables and {d} directions have no redundancy to calibrate with; give "
+            "measured points (--points)"
         )
     missing = int(np.ceil((unknown + _LEAST_SPARE - told) / each))
     raise InvalidRequestError(
-        f"{seen.poses} poses with {told} readings for {unknown} unknowns are too few; allowed: at "
-        f"least {missing} poses more of this kind, or measured points"
+        f"{seen.poses} poses with {told} readings are too few for {unknown} unknowns; "
+        f"take at least {missing} more poses of this kind, or measured points"
     )
 
 
@@ -108,21 +108,21 @@ def _motions(found: Fit) -> Iterator[tuple[str, str, FloatArray]]:
         cable = np.zeros((geometry.n, CABLE_ROWS))
         cable[:, axis] = 1.0
         yield (
-            f"where all exit points together are along {_AXES[axis]}",
+            f"the position of all exit points together along {_AXES[axis]}",
             measure,
             _vector(geometry, cable),
         )
     for axis in range(3) if k == 3 else (2,):
         cable = np.zeros((geometry.n, CABLE_ROWS))
         cable[:, EXIT] = np.cross(np.eye(3)[axis], exits - middle)
-        what = f"how all exit points together are turned about {_AXES[axis]}"
+        what = f"the rotation of all exit points together about {_AXES[axis]}"
         yield what, measure, _vector(geometry, cable)
     cable = np.zeros((geometry.n, CABLE_ROWS))
     cable[:, EXIT] = exits - middle
     cable[:, OFFSET] = found.seen.reference_m
     cable[:, DRUM] = 1.0
     advice = "measure one distance: the platform's position at two poses far apart"
-    yield "the scale of it all", advice, _vector(geometry, cable)
+    yield "the scale of the whole geometry", advice, _vector(geometry, cable)
 
 
 def _vector(geometry: CableGeometry, cable: FloatArray) -> FloatArray:
@@ -145,11 +145,11 @@ def _of_single_cables(
         numbers = {i // len(geometry.rows) for i in chosen if i < of_cables}
         cables = [geometry.cable_name(number) for number in sorted(numbers)]
         if told == ["elongation"]:
-            advice = "add poses at which tensions differ more, or take the cable's data sheet"
+            advice = "add poses at which tensions differ more, or use the cable's data sheet"
         else:
             advice = "add poses further apart, where its length and direction change more"
             if len(geometry.free) > geometry.coordinates:
-                advice += ", and turned ones"
+                advice += ", and poses with other rotations"
             advice += f" ({', '.join(cables)})" if cables else ""
         rest = float(column @ variance @ column)
         found.append(OpenDirection(" with ".join(told), advice, rest))

@@ -99,10 +99,10 @@ class Verification:
     def reference(self) -> str:
         """Reference as text."""
         if self.kind != "camera":
-            return "measured points" if self.errors_m.size else "nothing but the lengths"
+            return "measured points" if self.errors_m.size else "the lengths alone"
         return (
-            "the camera, on a map by the images of the poses used alone, sheet sizes and lens as "
-            "calibrated"
+            "the camera, with a map from the images of the fitted poses alone, and sheet "
+            "sizes and lens as calibrated"
         )
 
     @property

@@ -212,9 +212,11 @@ def _designed(
         or design.sensitivity_peak > MAX_SENSITIVITY
     ):
         raise TuningError(
-            f"a closed-loop bandwidth of {bandwidth_Hz:g} Hz cannot be had with a phase margin of "
+            f"a closed-loop bandwidth of {bandwidth_Hz:g} Hz is not possible with a phase "
+            "margin of "
             f"{PHASE_MARGIN_deg:g} deg, a gain margin of {GAIN_MARGIN_dB:g} dB and a sensitivity "
-            f"below {MAX_SENSITIVITY:g} at a latency of {latency_s * 1e3:.2f} ms; ask for less"
+            f"below {MAX_SENSITIVITY:g} at a latency of {latency_s * 1e3:.2f} ms; choose a "
+            "lower one"
         )
     return design
 

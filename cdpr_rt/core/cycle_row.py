@@ -64,7 +64,7 @@ SCALAR_FIELDS: Final = (
         "lateness_s",
         "<f8",
         "cycle.late_s",
-        "wake-up behind its deadline; 0 in lockstep",
+        "delay of the wake-up after its deadline; 0 in lockstep",
         wall=True,
         live=True,
         metric="lateness",
@@ -73,7 +73,7 @@ SCALAR_FIELDS: Final = (
         "exchange_s",
         "<f8",
         "exchange_s",
-        "from SYNC until the last answer, or until it was given up",
+        "from SYNC until the last answer, or the end of the wait for it",
         wall=True,
         live=True,
         metric="exchange",
@@ -108,7 +108,7 @@ SCALAR_FIELDS: Final = (
         "stream_age_s",
         "<f8",
         "last_program.stream_age_s",
-        "age of the newest sample of the set-point stream; null without",
+        "age of the newest sample of the set-point stream; null without a stream",
         live=True,
         metric="stream_age_seconds",
     ),
@@ -137,14 +137,14 @@ SCALAR_FIELDS: Final = (
         labels=Reaction,
     ),
     CycleField("limit", "<u1", "limit", f"the limit that caused it: {_listed(Limit, 'key')}"),
-    CycleField("limit_axis", "<i2", "limit_axis", "the axis concerned, -1 without"),
+    CycleField("limit_axis", "<i2", "limit_axis", "the axis concerned, -1 for none"),
     CycleField("answered", "<u2", "answered", "axes that answered this SYNC", live=True),
     CycleField(
         "lengths_disagree_m",
         "<f8",
         "lengths_disagree_m",
-        "how far a platform's cable lengths are from agreeing, as the limit of that name judges "
-        "them; 0 while slack or where none is redundant, null without power",
+        "disagreement of a platform's cable lengths, as checked by the limit "
+        "`lengths`; 0 with slack cables or if none is redundant, null without power",
         live=True,
         metric="lengths_disagree_metres",
     ),
@@ -156,12 +156,12 @@ AXIS_FIELDS: Final = (
         "setpoint_rad",
         "<f8",
         "setpoint.position_rad",
-        "where the motor should be",
+        "set-point of the motor",
         status=True,
         live=True,
     ),
     CycleField(
-        "setpoint_velocity_rad_s", "<f8", "setpoint.velocity_rad_s", "how fast the set-point moves"
+        "setpoint_velocity_rad_s", "<f8", "setpoint.velocity_rad_s", "speed of the set-point"
     ),
     CycleField(
         "position_rad",
@@ -213,7 +213,7 @@ AXIS_FIELDS: Final = (
         "tension_N",
         "<f8",
         "parts.estimator.estimate.tension_N",
-        "cable tension, measured or estimated; null where neither",
+        "cable tension, measured or estimated; null if unknown",
         status=True,
         metric="tension_newtons",
     ),
@@ -221,7 +221,7 @@ AXIS_FIELDS: Final = (
         "cable_length_m",
         "<f8",
         "parts.estimator.estimate.cable_length_m",
-        "length of the cable; null where it is not known",
+        "length of the cable; null if unknown",
         status=True,
         live=True,
         metric="cable_length_metres",
@@ -230,7 +230,7 @@ AXIS_FIELDS: Final = (
         "index_rad",
         "<f8",
         "cycle.device.feedback.index_rad",
-        "motor angle of the encoder's index, where it is known",
+        "motor angle of the encoder's index, if known",
     ),
     CycleField(
         "statusword",
@@ -247,10 +247,14 @@ AXIS_FIELDS: Final = (
         status=True,
     ),
     CycleField(
-        "alive", "?", "cycle.device.feedback.alive", "whether its heartbeats come", status=True
+        "alive",
+        "?",
+        "cycle.device.feedback.alive",
+        "whether its heartbeats arrive in time",
+        status=True,
     ),
     CycleField(
-        "rate_ok", "?", "cycle.device.feedback.rate_ok", "whether its answers come at their rate"
+        "rate_ok", "?", "cycle.device.feedback.rate_ok", "whether its answers arrive at their rate"
     ),
     CycleField(
         "index_known",
@@ -263,17 +267,20 @@ AXIS_FIELDS: Final = (
         "tension_measured",
         "?",
         "parts.estimator.estimate.tension_measured",
-        "whether the tension is a sensor's",
+        "whether the tension comes from a sensor",
         status=True,
     ),
 )
 """One value for each axis."""
 
-_SEVEN = "x, y, z in m and quaternion w, x, y, z; null where it is not known"
+_SEVEN = "x, y, z in m and quaternion w, x, y, z; null if unknown"
 POSE_FIELDS: Final = (
     CycleField("pose", "<f8", "last_program.pose", f"the platform's pose: {_SEVEN}"),
     CycleField(
-        "pose_setpoint", "<f8", "program.pose_setpoint", f"where the platform should be: {_SEVEN}"
+        "pose_setpoint",
+        "<f8",
+        "program.pose_setpoint",
+        f"set-point of the platform's pose: {_SEVEN}",
     ),
 )
 """Seven values, nan if they are not known."""

@@ -79,15 +79,17 @@ _BY_CODE: Final = {
     "not_operational": "{drive} left the NMT state operational and is {detail}: find out what else "
     "commands it, then acknowledge",
     "not_finite": "the torque for {drive} was not a finite number; 0 was sent",
-    POWER_UNCONFIRMED: "{drive} does not confirm that its power is off and was reset: make "
-    "sure that it has no power",
+    POWER_UNCONFIRMED: "{drive} does not confirm that its power is off and was reset: "
+    "check that it "
+    "has no power",
     BUS_LOST: "{detail}",
     BUS_OFF: "{detail}",
-    POWER_UNKNOWN: "not known to be without power: {detail}",
+    POWER_UNKNOWN: "may still have power: {detail}",
     LOAD_CELL: "{detail}",
     LOAD_CELL_HIGH: "{source}: {value:.1f} N, {allowed:g} N allowed",
-    PEAK: "tension {value:.0f} N or more for some ms, {allowed:.0f} N allowed: the cable slipped "
-    "or caught, or the loop swings it; check the cable, its drum and its ends",
+    PEAK: "tension {value:.0f} N or more for some ms, {allowed:.0f} N allowed: the cable "
+    "slipped or caught, or the control loop oscillates; check the cable, its drum "
+    "and its ends",
 }
 _ACTIONS: Final = (
     ("73", "check the encoder and its cable"),
@@ -125,7 +127,7 @@ def fault_text(fault: Fault, names: Sequence[str]) -> str:
             limit.factor * fault.value, limit.factor * fault.allowed
         )
     if code == OR_LANDED:
-        text += "; or the platform came to rest, which makes a cable slack as suddenly: check it"
+        text += "; or the platform landed, which also makes a cable slack suddenly: check it"
     if fault.suspects:
         text += f", one of {', '.join(axis_name(i, names) for i in fault.suspects)}"
     return text if fault.axis < 0 else f"{axis_name(fault.axis, names)}: {text}"

@@ -140,7 +140,8 @@ class SharedBlock:
         if (machine := platform.machine()) not in _IN_ORDER:
             raise SharedBlockError(
                 f"this machine's processor is {machine}: processes that share memory without a "
-                f"lock need one that shows stores in order; allowed: {', '.join(_IN_ORDER)}"
+                "lock need one that makes stores visible in order; allowed: "
+                f"{', '.join(_IN_ORDER)}"
             )
         size = os.fstat(fd).st_size
         if size < _COUNTERS.itemsize:
@@ -200,7 +201,7 @@ class SharedBlock:
             if before % 2 == 0 and int(counter[0]) == before:
                 value: dict[str, Any] = json.loads(data)
                 return value
-        raise SharedBlockError(f"{name}: its writer ended in the middle of it")
+        raise SharedBlockError(f"{name}: its writer ended while writing")
 
     # -- messages: commands to the loop, replies from it
 
@@ -240,7 +241,7 @@ class SharedBlock:
     ) -> int:
         written, taken = int(self.counters[name][0]), int(self.counters[f"{name}_taken"][0])
         if written - taken >= len(slots):
-            raise SharedBlockError(f"{name}: {len(slots)} wait to be taken already")
+            raise SharedBlockError(f"{name}: {len(slots)} messages are already waiting")
         number = sign * (written + 1)
         data = json.dumps({**value, "number": number}).encode()
         slot = slots[written % len(slots)]

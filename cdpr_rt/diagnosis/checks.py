@@ -56,18 +56,18 @@ def stand_findings(s: Subject) -> Iterator[Finding]:
     i = int((pulled_N / needed_N).argmin())
     names = ", ".join(s.axes[j].name for j in np.flatnonzero(weak))
     text = (
-        f"value {s.model.high_N[i]:g}; on its stand the platform lets {names} be pulled with "
-        f"{pulled_N[i]:.2g} N at least, and such winches usually rub with up to "
-        f"{needed_N[i]:.2g} N: tighten may find cables slack, and end"
+        f"value {s.model.high_N[i]:g}; on its stand the platform resists only "
+        f"{pulled_N[i]:.2g} N of {names}, but the friction of such winches is usually "
+        f"up to {needed_N[i]:.2g} N: tighten may find slack cables and end"
     )
-    remedy = "winches that rub less, or a home where cables pull less against each other, help"
+    remedy = "winches with less friction, or a home where cables pull less against each other, help"
     for times in _TIMES:
         high_N, torque_Nm = times * np.asarray(s.limits.tension_max_N), times * s.torque_Nm
         higher = replace(s.limits, tension_max_N=high_N, torque_Nm=torque_Nm)
         if (pretension_N(platform_model_of(s.robot, higher), torque_Nm) >= needed_N).all():
             most_Nm = float(np.max(high_N * s.arm_m))
             remedy = f"enough: {np.max(high_N):.0f}, which is {most_Nm:.2g} Nm at the motor; or "
-            remedy += "winches that rub less"
+            remedy += "winches with less friction"
             break
     yield Finding("limits.tension_max_N", f"{text}; {remedy}", impossible=False)
 
@@ -85,9 +85,9 @@ def unwinding(s: Subject) -> Iterator[Finding]:
     i = int(np.where(unwinds, hangs_N / rubs_N, 0.0).argmax())
     names = ", ".join(s.axes[j].name for j in np.flatnonzero(unwinds))
     text = (
-        f"without power the weight of a slack cable, up to {hangs_N[i]:.2g} N, may unwind the "
-        f"drums of {names}, which may rub with no more than {rubs_N[i]:.2g} N; a brake for each "
-        "(safety_io) keeps them"
+        f"without power the weight of a slack cable, up to {hangs_N[i]:.2g} N, may "
+        f"unwind the drums of {names}, whose friction may be only {rubs_N[i]:.2g} N; a "
+        "brake for each (safety_io) prevents this"
     )
     yield Finding(f"axes[{i}].winch", text, impossible=False)
 
@@ -167,8 +167,9 @@ def _cycle(robot: Robot) -> Iterator[Finding]:
         yield Finding("axes", text, impossible=True)
     if robot.sync_period_s > LONGEST_PERIOD_s:
         text = (
-            f"value {robot.sync_period_s:g}; allowed: up to {LONGEST_PERIOD_s:g} for a platform, "
-            "whose control would be too soft to overcome its winches' friction"
+            f"value {robot.sync_period_s:g}; allowed: up to {LONGEST_PERIOD_s:g} for a "
+            "platform, because its control would be too soft to overcome the friction of "
+            "the winches"
         )
         yield Finding("sync_period_s", text, impossible=True)
 
@@ -179,7 +180,7 @@ def _shape(s: Subject) -> Iterator[Finding]:
     for i, j, distance in apart:
         if max(distance, float(np.linalg.norm(b[i] - b[j]))) < _ALIKE_m:
             text = f"{distance:.3g} m from that of axes[{j}], and so are their anchor points; "
-            text += "allowed: one cable in one place"
+            text += "allowed: one cable at each place"
             yield Finding(f"axes[{i}].exit_point_m", text, impossible=True)
     span = max(distance for _, _, distance in apart)
     if span < _NEAREST_m:
@@ -196,8 +197,8 @@ def _shape(s: Subject) -> Iterator[Finding]:
         return
     box, home = statics.points(), np.array(statics.platform.home_m)
     for points, key, what in (
-        (box, "workspace_min_m", "the box of targets goes"),
-        (home, "home_m", "the platform at rest comes"),
+        (box, "workspace_min_m", "the box of targets reaches"),
+        (home, "home_m", "the platform at rest reaches"),
     ):
         free_m = statics.free_lengths(points).reshape(-1, n)
         for i, nearest in enumerate(free_m.min(axis=0)):
@@ -224,10 +225,10 @@ def _tensions(statics: PlatformStatics) -> Iterator[Finding]:
     taken = float(np.mean(moving_N >= statics.model.reserve_N))
     if taken < 1.0:
         # do not round 99.9 % up to all
-        text = f"in {math.floor(100 * taken)} % of the box targets are taken; "
+        text = f"targets are accepted in {math.floor(100 * taken)} % of the box; "
         if (smaller := statics.largest_box(statics.box)) is not None:
             low, high = point_text(smaller.low_m), point_text(smaller.high_m)
-            text += f"in all of {low} to {high} m they would be; "
+            text += f"they would be in all of {low} to {high} m; "
         worst = np.unravel_index(moving_N.argmin(), moving_N.shape)
         text += f"at the worst place, {why_not_held(statics, points[worst[1:]], turns[worst[0]])}"
         yield Finding("platform.workspace_min_m", text, impossible=taken == 0.0)
@@ -258,8 +259,8 @@ def _motors(s: Subject) -> Iterator[Finding]:
     if held_N[i] * arm_m[i] > rated_Nm[i]:
         text = (
             f"to stand somewhere in the box axes[{i}] needs {held_N[i] * arm_m[i]:.3g} Nm, its "
-            f"motor is rated for {rated_Nm[i]:g} Nm; the drive will not bear it for long: a "
-            "smaller box or a larger gear helps"
+            f"motor is rated for {rated_Nm[i]:g} Nm; the drive cannot sustain this: a "
+            "smaller box or a larger gear ratio helps"
         )
         yield Finding("platform.workspace_max_m", text, impossible=False)
 
@@ -295,9 +296,10 @@ def _friction(s: Subject) -> Iterator[Finding]:
     kept_N, rated_N = s.model.reserve_N, float(s.rated_N.max())
     if 0.0 < kept_N < _FRICTION_SHARE * rated_N:
         text = (
-            f"tensions keep {kept_N:.2g} N from their bounds for the control, friction and cogging "
-            f"of such winches may take up {_FRICTION_SHARE * rated_N:.2g} N: it sticks, and runs "
-            "over its targets; smaller winches, or a mass for tensions mid of their bounds, help"
+            f"tensions keep {kept_N:.2g} N from their bounds for the control, but friction "
+            f"and cogging of such winches may need {_FRICTION_SHARE * rated_N:.2g} N: the "
+            "platform sticks and overshoots its targets; smaller winches, or a mass that "
+            "brings tensions to the middle of their bounds, help"
         )
         yield Finding("platform.mass_kg", text, impossible=False)
 
@@ -328,9 +330,9 @@ def _sagging(s: Subject) -> Iterator[Finding]:
     if m_per_N[i] > _SAGS_m_N:
         enough_N = _ROUNDED_UP * math.cbrt(moment[i] / _SAGS_m_N)
         text = (
-            f"value {statics.low_N[i]:g}; with the least tension that is planned the cable of "
-            f"axes[{i}] sags so much that a newton more takes {m_per_N[i]:.2g} m of it in, and "
-            f"lengths tell little of where the platform is; enough: {enough_N:.2g}"
+            f"value {statics.low_N[i]:g}; at the lowest planned tension the cable of "
+            f"axes[{i}] sags so much that one more newton shortens it by {m_per_N[i]:.2g} "
+            f"m, and lengths do not determine the position well; enough: {enough_N:.2g}"
         )
         yield Finding("limits.tension_min_N", text, impossible=False)
 
@@ -348,8 +350,8 @@ def _contact(statics: PlatformStatics) -> Iterator[Finding]:
     things = in_words(interference.things(int(pairs[i])), float(clearances_m[i]))
     share = math.floor(100 * touching.mean()) or "less than 1"
     text = (
-        f"value {interference.clearance_m:g}; in {share} % of the box, turned as at home, "
-        "something is nearer, and no move goes there: at "
+        f"value {interference.clearance_m:g}; in {share} % of the box, at home's "
+        "orientation, parts are nearer, so moves there are rejected: at "
         f"{point_text(points.reshape(-1, points.shape[-1])[i])} m {things}"
     )
     everywhere = bool(touching.all()) and all(
@@ -388,13 +390,16 @@ def why_not_held(statics: PlatformStatics, position_m: FloatArray, turn_rad: Flo
     if reserve < 0.0:
         text = f"{where} the cables would need {needed} N; {allowed}"
     else:
-        text = f"{where} the cables have {needed} N; {allowed}, which leaves too little for motion"
+        text = (
+            f"{where} the cables have {needed} N; {allowed}, which leaves too little "
+            "reserve for motion"
+        )
     return f"{text}; {_what_helps(statics, position_m, turn_rad)}"
 
 
 def _singular(statics: PlatformStatics) -> str:
     """Return that a direction is not held, and which points in a line or plane cause it."""
-    text = "the cables cannot hold one direction, whatever their tensions"
+    text = "the cables cannot hold one direction with any tensions"
     for name, points in (("exit points", statics.exits_m), ("anchor points", statics.anchors_m)):
         spread = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
         dimensions = int(np.sum(spread > _FLAT * max(float(spread[0]), _FLAT)))
@@ -447,13 +452,16 @@ def _what_helps(statics: PlatformStatics, position_m: FloatArray, turn_rad: Floa
     if heavy is not None:
         text = f"a platform of {heavy:.3g} kg and more is possible there"
         if loose is not None:
-            text += f", or tension_min_N up to {loose * low_N.min():.3g} with winches as small"
+            text += (
+                f", or tension_min_N up to {loose * low_N.min():.3g} with correspondingly small "
+                "winches"
+            )
         return text
     if loose is not None:
         return f"tension_min_N up to {loose * low_N.min():.3g} is possible there"
     turned = len(platform.controlled) > len(platform.home_m)
-    others = ", or other anchor points, which turn it both ways about each axis"
-    return f"only a place further inside the exit points helps{others if turned else ''}"
+    others = ", or other anchor points, whose cables turn it both ways about each axis"
+    return f"only a place farther inside the exit points helps{others if turned else ''}"
 
 
 def _turn(turn_rad: FloatArray, coordinates: int) -> str:

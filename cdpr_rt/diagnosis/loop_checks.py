@@ -103,12 +103,13 @@ def turned_by_friction(s: Subject) -> str:
                 worst = share
                 told = float(np.sqrt(np.linalg.inv(J.T @ J)[i, i])) * 1e-3
                 text = (
-                    f"friction of {friction_N:.2g} N, usual in such winches, turns the "
-                    f"platform by {math.degrees(turned[i]):.2g} deg{_about(model, i)} until "
-                    f"the control overcomes it (1 mm in each cable is {math.degrees(told):.2g} "
-                    f"deg); at {point_text(q[:k])} m the cables hold it turned by up to "
-                    f"{math.degrees(share * turned[i]):.2g} deg: anchor points that turn it with "
-                    "longer arms help, or more cables, or winches with less gear"
+                    f"friction of {friction_N:.2g} N, usual for such winches, turns the "
+                    "platform by "
+                    f"{math.degrees(turned[i]):.2g} deg{_about(model, i)} until the control "
+                    f"overcomes it (1 mm of each cable is {math.degrees(told):.2g} "
+                    f"deg); at {point_text(q[:k])} m the cables can hold it turned by at most "
+                    f"{math.degrees(share * turned[i]):.2g} deg: longer arms to the anchor points, "
+                    "more cables, or winches with a smaller gear ratio help"
                 )
     return text
 
@@ -157,12 +158,12 @@ def loop_findings(s: Subject) -> Iterator[Finding]:
         off_mm = 1e3 * moved_by_friction_m(s)
         yield_mm = 1e3 * stretched_by_acceleration_m(s)
         text = (
-            f"a stable loop moves the platform's slowest mode at {slowest_Hz:.2g} Hz, so that it "
-            "takes long to come to rest and runs over its targets: its cables yield by "
-            f"{yield_mm:.2g} mm as it is accelerated, and friction that is usual in such winches "
-            f"moves it by {off_mm:.2g} mm until the control overcomes it; {_SLOW_Hz:g} Hz and more "
-            "wanted: stiffer cables, less acceleration, a lighter platform or a shorter "
-            "sync_period_s help"
+            f"the slowest mode of a stable loop is at {slowest_Hz:.2g} Hz, so the platform "
+            "settles slowly and overshoots its targets: its cables stretch by "
+            f"{yield_mm:.2g} mm when it accelerates, and the usual friction of such winches "
+            f"moves it by {off_mm:.2g} mm until the control overcomes it; the goal is "
+            f"{_SLOW_Hz:g} Hz or more: stiffer cables, less acceleration, a lighter "
+            "platform or a shorter sync_period_s help"
         )
         yield Finding("platform.mass_kg", text, impossible=False)
     if loop.gains.follows_pose and (text := turned_by_friction(s)):
@@ -190,13 +191,14 @@ def _swinging(loop: DesignedLoop, model: PlatformModel) -> Iterator[Finding]:
     if loop.gains.follows_pose:
         key, held, helps = "platform.mass_kg", "", "stiffer cables, a lighter platform"
     else:  # the platform may be turned anywhere by friction
-        key, held = "axes[0].anchor_point_m", "held by its tensions as by springs, "
+        key, held = "axes[0].anchor_point_m", "its tensions act like springs, and "
         helps = "longer arms, less tension_max_N"
     text = (
         f"{held}with the platform at {point_text(place[: model.positions])} m it may "
-        f"swing at {mode.frequency_Hz:.2g} Hz, with {100.0 * mode.damping_ratio:.1g} % of critical "
-        f"damping, for {mode.dies_down_s:.2g} s after it has moved, besides what winches rub; "
-        f"up to {_SWINGS_s:g} s wanted: {helps} or a shorter sync_period_s help"
+        f"swing at {mode.frequency_Hz:.2g} Hz, with {100.0 * mode.damping_ratio:.1g} % "
+        f"of critical damping, for {mode.dies_down_s:.2g} s after a motion, without the "
+        f"friction of the winches; the goal is up to {_SWINGS_s:g} s: {helps} or a "
+        "shorter sync_period_s help"
     )
     yield Finding(key, text, impossible=False)
 
@@ -208,10 +210,10 @@ def _growing(loop: DesignedLoop, period_s: float, model: PlatformModel) -> Itera
     at_poses = zip(loop.growing_modes, design_poses(model), strict=True)
     mode, place = min(at_poses, key=lambda at: at[0].damping_ratio)
     text = (
-        f"value {period_s:g}; the loop leans on what the cables are assumed to take out "
-        f"of a swing (damping_s of their profile): with {1e3 * LITTLE_DAMPING_s:g} ms a mode at "
+        f"value {period_s:g}; the loop relies on the assumed damping of the cables "
+        f"(damping_s of their profile): with {1e3 * LITTLE_DAMPING_s:g} ms a mode at "
         f"{mode.frequency_Hz:.2g} Hz grows with the platform at "
-        f"{point_text(place[: model.positions])} m; a shorter cycle helps, or that value "
-        "measured, which the loop is designed for then"
+        f"{point_text(place[: model.positions])} m; a shorter cycle helps, or a "
+        "measured damping_s, for which the loop is then designed"
     )
     yield Finding("sync_period_s", text, impossible=False)

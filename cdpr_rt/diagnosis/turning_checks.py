@@ -33,16 +33,17 @@ def free_rotation(statics: PlatformStatics) -> Iterator[Finding]:
     if np.isnan(angle).any():
         where = point_text(places[int(np.isnan(angle).argmax())])
         text = (
-            f"at {where} m the cables would turn the platform over; each cable should be made fast "
-            "on the side of the platform that faces its exit point"
+            f"at {where} m the cables would turn the platform over; fasten each cable on "
+            "the side of the platform that faces its exit point"
         )
         yield Finding("axes[0].anchor_point_m", text, impossible=True)
         return
     degrees = np.abs(np.degrees(angle))
     if degrees[0] > _TIPPED_deg:
         text = (
-            f"there the cables would turn the platform by {degrees[0]:.0f} deg, and may tip it on "
-            "its stand; choose a home where it turns less: cable lengths are measured there"
+            f"there the cables would turn the platform by {degrees[0]:.0f} deg, and may tip "
+            "it on its stand; choose a home where it turns less, because cable lengths are "
+            "measured there"
         )
         yield Finding("platform.home_m", text, impossible=False)
     if degrees.max() > _FAR_TURNED_deg:
@@ -84,9 +85,9 @@ def angles(statics: PlatformStatics) -> Iterator[Finding]:
         about = refused(at_rad / angle_rad)
         if about is not None:
             text = (
-                f"value {angle_rad:g}; turned by {math.degrees(at_rad):.3g} deg{about}, it is held "
-                "nowhere in the box, or something touches, so that no target is taken; allowed: "
-                f"up to {allowed_rad:.3g}"
+                f"value {angle_rad:g}; turned by {math.degrees(at_rad):.3g} deg{about}, the "
+                "cables can hold it nowhere in the box without contact, so no target is "
+                f"accepted; allowed: up to {allowed_rad:.3g}"
             )
             yield Finding("platform.workspace_angle_rad", text, impossible=True)
             return
@@ -110,8 +111,9 @@ def stand_clearance(statics: PlatformStatics) -> Iterator[Finding]:
     above_m = platform.workspace_min_m[up] - platform.home_m[up]
     if angle > 0.0 and lower_m > above_m:
         text = (
-            f"turned so, the lowest anchor point is {lower_m:.2f} m lower, and the box begins "
-            f"{above_m:.2f} m above home: the platform may meet what it stands on; a box from "
+            f"in this orientation the lowest anchor point is {lower_m:.2f} m lower, and the "
+            f"box begins {above_m:.2f} m above home: the platform may touch its stand; a "
+            "box from "
             f"{platform.home_m[up] + lower_m:.2f} m upward helps"
         )
         yield Finding("platform.workspace_angle_rad", text, impossible=False)
@@ -122,9 +124,9 @@ def upright(statics: PlatformStatics) -> Iterator[Finding]:
     tips_at = statics.model.tips_at
     if tips_at < _TIPS_AT:
         text = (
-            f"{100.0 * tips_at:.2g} % of its weight tip it over on its stand, and cables that "
-            "become tight one after the other pull with more: hold it until all are tight, or give "
-            "it a foot, which platform.body tells"
+            f"{100.0 * tips_at:.2g} % of its weight tip it over on its stand, and cables "
+            "that become tight one after the other pull harder: hold it until all are "
+            "tight, or give it a wider foot and describe it in platform.body"
         )
         yield Finding("axes[0].anchor_point_m", text, impossible=False)
 
@@ -184,7 +186,7 @@ def _hanging(
     if not axes.size:  # no anchor point moves: a rod about itself, or a knot
         hangs = np.linalg.norm(_moved(poses[0], centre, N[0])) > LEAST_ARM_m
         return (
-            "its weight swings about these axes, and no cable measures that" if hangs else "",
+            "the platform swings about these axes, and no cable measures that" if hangs else "",
             False,
         )
     N = N @ axes
@@ -192,9 +194,11 @@ def _hanging(
     least = np.linalg.eigvalsh(stiffness)[:, 0]
     n = t.shape[1]
     mend = (
-        "its cables can control them" if n >= _ENOUGH_CABLES else "to control them takes 6 cables"
+        "its cables can control them"
+        if n >= _ENOUGH_CABLES
+        else "to control them, it needs 6 cables"
     )
-    mend = f"; {mend}; anchor points nearer together, far above the centre of mass, help"
+    mend = f"; {mend}; anchor points close together, far above the centre of mass, help"
     if least.min() <= 0.0:
         where = point_text(places[least.argmin()])
         return f"at {where} m cables and weight turn the platform over{mend}", True
@@ -223,14 +227,14 @@ def _in_words(
         return "the platform swings about these axes", False
     k = int((apart_m if contradicting else off_mm).argmax())
     text = (
-        f"at {point_text(places[k])} m the platform hangs turned by {angle_deg[k]:.1f} deg, which "
-        "is not computed with"
+        f"at {point_text(places[k])} m the platform hangs turned by {angle_deg[k]:.1f} "
+        "deg, which the control does not compute"
     )
     if contradicting:
         apart_mm, allowed_mm = 1e3 * apart_m[k], 1e3 * disagree_m
         text += f": its lengths disagree by {apart_mm:.1f} mm, {allowed_mm:.1f} mm allowed"
     else:
-        text += f", {off_mm[k]:.1f} mm from where it seems to be, and swings"
+        text += f", {off_mm[k]:.1f} mm from its estimated place, and swings"
     return text, contradicting
 
 

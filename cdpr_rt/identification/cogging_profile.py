@@ -164,7 +164,7 @@ class CoggingProfile(_Part):
             if len(forward) != len(backward):
                 raise CoggingProfileError(
                     f"{path}: {name}.table_Nm: rows of {len(forward)} and {len(backward)} values; "
-                    "allowed: of the same number"
+                    "allowed: rows of the same length"
                 )
         return profile
 
@@ -200,8 +200,8 @@ class CoggingProfile(_Part):
             other = getattr(identity, key)
             if other != mine:
                 raise CoggingProfileError(
-                    f"the cogging profile is of a drive with {key} = {mine}, "
-                    f"this axis has {other}: commission it again"
+                    f"the cogging profile is for a drive with {key} = {mine}, but this axis has "
+                    f"{other}: commission it again"
                 )
         return (self.thesis if method == "thesis" else self.harmonic).compensation(bounds)
 

@@ -414,7 +414,7 @@ def _identify(legs: Sequence[SweepData], start: _Start) -> HarmonicResult:
     windows = [w for run in runs if (w := cut(run, start.latency_s)) is not None]
     for sign, word in ((1.0, "increasing"), (-1.0, "decreasing")):
         if not any(np.any(w.moving & (w.direction == sign)) for w in windows):
-            raise IdentificationError(f"the rotor was never seen moving with {word} angle")
+            raise IdentificationError(f"the recordings contain no motion with {word} angle")
     shape = start.before.shape if start.before else FrictionShape()
     every = ColumnLayout(tuple(range(1, MAX_ORDER + 1)), shape)
     equations = design.accumulate(windows, every)
@@ -635,7 +635,9 @@ def rms_deviation_rad(legs: Sequence[SweepData]) -> float:
         cut = slice(part.start, part.stop)
         deviations.append(float(np.std(part.run.angle_rad[cut] - part.run.setpoint_rad[cut])))
     if not deviations:
-        raise IdentificationError("no leg of the second pass holds a whole turn at constant speed")
+        raise IdentificationError(
+            "no leg of the second pass contains a whole turn at constant speed"
+        )
     return max(deviations)
 
 

@@ -43,7 +43,9 @@ class RawLog:
         wanted = name if name in names else f"{name}[{axis}]"
         if wanted not in names:
             there = brief(", ".join(names))
-            raise RawLogError(f"{self.path}: no column {name!r} for axis {axis}; it has {there}")
+            raise RawLogError(
+                f"{self.path}: no column {name!r} for axis {axis}; its columns: {there}"
+            )
         return self.rows[:, names.index(wanted)]
 
 
@@ -114,7 +116,7 @@ def read_raw_log(path: Path) -> RawLog:
         raise RawLogError(f"{path}: not a raw log of version {_VERSION}, or cut within its header")
     samples = (len(data) - _HEADER_BYTES) // (8 * len(columns))
     if samples == 0:
-        raise RawLogError(f"{path}: holds no whole row of measurements")
+        raise RawLogError(f"{path}: contains no complete row of measurements")
     # without a copy: a sweep's file is large, and so are the arrays computed from it
     values = np.frombuffer(data, "<f8", samples * len(columns), offset=_HEADER_BYTES)
     rows = values.reshape(samples, len(columns))

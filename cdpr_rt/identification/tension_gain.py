@@ -111,8 +111,8 @@ def _least_squares(
     scaled = matrix / scale
     if np.linalg.cond(scaled) > 1e6:
         raise CalibrationRefusedError(
-            "the measurements cannot tell gain, friction and cogging apart; use more and more "
-            "different tensions"
+            "the measurements cannot separate gain, friction and cogging; use more "
+            "tensions in a wider range"
         )
     solution, *_ = np.linalg.lstsq(scaled, target, rcond=None)
     residual = target - scaled @ solution
@@ -132,8 +132,8 @@ def _refuse_few(points: Sequence[TorquePoint]) -> None:
         levels = {round(p.tension_N, 1) for p in points if p.winding_in is winding_in}
         if len(levels) < LEAST_LEVELS:
             raise CalibrationRefusedError(
-                f"{len(levels)} tensions were measured {name}; at least {LEAST_LEVELS} different "
-                "ones are needed to tell the gain from friction"
+                f"{len(levels)} tensions were measured {name}; at least {LEAST_LEVELS} "
+                "different ones are needed to separate gain and friction"
             )
         if max(levels) < LEAST_SPAN * min(levels):
             raise CalibrationRefusedError(
@@ -159,14 +159,14 @@ def _refuse_unsound(found: TensionGain, nominal_m: float) -> None:
     if abs(gain - nominal_m) > MOST_GAIN_ERROR * nominal_m:
         raise CalibrationRefusedError(
             f"the gain, {gain * 1e3:.2f} mNm/N, is far from the geometry's {nominal_m * 1e3:.2f} "
-            "(drum_radius_m / gear_ratio); are gear, drum, masses or sensor scale what they are "
-            "said to be?"
+            "(drum_radius_m / gear_ratio); are the given gear ratio, drum radius, masses "
+            "and sensor scale right?"
         )
     middle = 0.5 * (found.lowest_N + found.highest_N)
     friction = found.friction_Nm.value + found.friction_per_N_m.value * middle
     slack = found.friction_Nm.half_width + found.friction_per_N_m.half_width * middle
     if friction < -slack:
         raise CalibrationRefusedError(
-            f"winding in takes less torque than paying out (friction {friction:.3f} Nm); is the "
-            "torque's or the cable's sign exchanged?"
+            f"winding in takes less torque than paying out (friction {friction:.3f} Nm); is "
+            "the sign of the torque or the cable wrong?"
         )

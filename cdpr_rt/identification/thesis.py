@@ -155,7 +155,7 @@ def _average(parts: list[Stretch]) -> tuple[FloatArray, BoolArray]:
         np.where(sound, count - lost, count),
     )
     if not seen.any():
-        raise IdentificationError("the sweep holds no samples")
+        raise IdentificationError("the sweep contains no samples")
     where = np.flatnonzero(seen)
     around = np.concatenate([where[-1:] - GRID, where, where[:1] + GRID])
 

@@ -25,7 +25,7 @@ Command = Mapping[str, Any]
 _MOST_TEXT, _SHORT_TEXT = 1500, 200
 _LONGEST_CABLE_m = 1000.0
 _ANOTHER = "another command came after it"
-_OBEYED = "obeyed; its end is not reported"
+_OBEYED = "accepted; its end is not reported"
 _MOVING = frozenset({"enable", "program", "set"})
 _CHANGING = frozenset({"enable", "disable", "program", "hold", "shutdown"})
 """Commands that decide what runs."""
@@ -90,7 +90,7 @@ class CommandDispatcher:
     def poll(self) -> None:
         """Take one stop from each source, then one command if there is any, or a deferred one."""
         if self._deferred is not None and self._is_superseded(self._deferred):
-            self._cancel(self._deferred, self._life.reason or "something else came first")
+            self._cancel(self._deferred, self._life.reason or "another command came first")
         if self._stops is not None and (stop := self._stops.take()) is not None:
             self._void = self._commands[0]
             self._life.changed = True
@@ -127,7 +127,7 @@ class CommandDispatcher:
                 raise RefusedError(f"do: {do!r}; allowed: {', '.join(self._handlers)}")
             void = max(self._void, int(self._counters["commands_void"][0]))
             if do in _MOVING and number <= void:
-                raise RefusedError(f"{do}: given up: a stop was asked for after it")
+                raise RefusedError(f"{do}: cancelled by a later stop")
             steps = handler(command)
         except ControlError as error:
             answer(refusal_of(error) or str(error))
@@ -181,7 +181,7 @@ class CommandDispatcher:
     def _cancel(self, deferred: _Deferred, why: str) -> None:
         self._deferred = None
         self._engine.machine.clock.cancel(deferred.task)
-        self._reply(_number(deferred.command), f"given up: {why}")
+        self._reply(_number(deferred.command), f"cancelled: {why}")
 
     def send_replies(self) -> None:
         """Reply to the commands that were completed, refused or cancelled since the last call.
@@ -268,7 +268,9 @@ class CommandDispatcher:
         self._require_running("set")
         right, program = self._right("set", command), self._engine.program
         if program.needs_lease and right != self._engine.right.mover:
-            raise RefusedError(f"set: {program.name} was not started by who holds the right now")
+            raise RefusedError(
+                f"set: {program.name} was not started by the present holder of the right to move"
+            )
         if self._prepare(command, program):
             return
         program.command(self._arguments(command))
@@ -293,7 +295,7 @@ class CommandDispatcher:
             or not isinstance(lengths, list)
             or len(lengths) != n
         ):
-            raise RefusedError(f"wanted: allowed: cable_length_m, {n} lengths or null")
+            raise RefusedError(f"wanted: allowed: cable_length_m with {n} lengths or null")
         for i, length in enumerate(lengths):
             is_number = isinstance(length, int | float) and not isinstance(length, bool)
             if length is not None and not (is_number and 0.0 < length <= _LONGEST_CABLE_m):
@@ -313,8 +315,8 @@ class CommandDispatcher:
         """Return the reason why the loop takes no command at present, "" if it does."""
         if self._engine.reacting:
             why = f" ({reason})" if (reason := self._life.reason) else ""
-            return f"the robot is being stopped{why}, a platform lowered; the power goes off then"
-        return "another command is being carried out"
+            return f"the robot is stopping{why}, and lowers a platform; then the power goes off"
+        return "another command is running"
 
     def _require_running(self, what: str) -> None:
         engine = self._engine

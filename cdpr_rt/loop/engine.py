@@ -508,7 +508,7 @@ class TransitionRunner:
         """Advance `steps` once per turn from now on, in place of any other."""
         before, self._steps = self._steps, steps
         if before is not None:
-            self._tell(f"given up: {self._engine.life.reason or 'something else came first'}")
+            self._tell(f"cancelled: {self._engine.life.reason or 'another command came first'}")
         if listener is not None:
             self.listen(listener)
         self._engine.life.changed = True

@@ -31,7 +31,7 @@ def _schedule_fifo(also: int = 0) -> str:
     try:
         os.sched_setscheduler(0, os.SCHED_FIFO | also, os.sched_param(_PRIORITY))
     except OSError as error:
-        return f"scheduling stays ordinary: {error.strerror} (grant rtprio to this user)"
+        return f"no real-time scheduling: {error.strerror} (grant rtprio to this user)"
     return ""
 
 
@@ -69,7 +69,7 @@ def _take_core() -> str:
     usable = os.sched_getaffinity(0)
     isolated = _isolated_cores()
     if len(usable | isolated) < _CORES_NEEDED:
-        return f"{len(usable)} core for everything: the loop has none to itself"
+        return f"{len(usable)} core for everything: the loop has no separate core"
     ordinary = sorted(usable - isolated)[1:]  # the first core is for the rest of the machine
     for core in (*sorted(isolated, reverse=True), *reversed(ordinary)):
         claim = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
@@ -82,8 +82,8 @@ def _take_core() -> str:
         _claims.append(claim)
         if core in isolated:
             return ""
-        return "no core is isolated (isolcpus=): others may run on the loop's core"
-    return "every core has a loop already: this one has none to itself"
+        return "no core is isolated (isolcpus=): other processes may run on the loop's core"
+    return "every core already has a loop: this one has no separate core"
 
 
 def _isolated_cores() -> set[int]:

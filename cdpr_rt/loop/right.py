@@ -81,11 +81,11 @@ class RightToMove:
         current = self.current
         if current == 0:
             return "nobody holds the right to move; take it first"
-        return "" if number == current else "the right to move is somebody else's by now"
+        return "" if number == current else "another client has the right to move now"
 
     def loss(self) -> str:
         """Return why the program's grant is not the current one, "" while it is."""
         current = self.current
         if current == 0:
-            return "nobody holds the right to move any more"
-        return "" if self.mover == current else "the right to move has changed hands"
+            return "nobody holds the right to move now"
+        return "" if self.mover == current else "another client has taken the right to move"

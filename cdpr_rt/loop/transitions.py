@@ -125,8 +125,8 @@ class Transitions:
             if missed <= max(1.0, allowed):
                 return
         raise RefusedError(
-            f"check: {missed} of {cycles * device.n} answers did not come in time, looked at "
-            f"{_ATTEMPTS} times; see `cdpr bus monitor`"
+            f"check: {missed} of {cycles * device.n} answers did not come in time, in the "
+            f"last of {_ATTEMPTS} attempts; see `cdpr bus monitor`"
         )
 
     def _count_answers(self, cycles: int) -> Steps:

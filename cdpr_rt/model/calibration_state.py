@@ -37,7 +37,7 @@ def calibration_state(robot: str) -> CalibrationState:
         return CalibrationState(robot, False, "it has never been calibrated", "")
     calibrated, why, date = (held.get(key) for key in ("calibrated", "why", "date"))
     if not (isinstance(calibrated, bool) and isinstance(why, str) and isinstance(date, str)):
-        problem = f"{path}: is damaged: calibrated, why and date are wanted"
+        problem = f"{path}: is damaged: it needs the keys calibrated, why and date"
         return CalibrationState(robot, False, problem, "")
     return CalibrationState(robot, calibrated, why, date)
 
@@ -64,9 +64,10 @@ def not_calibrated_reason(robot: str) -> str:
         return ""
     since = f" since {state.date}" if state.date else ""
     return (
-        f"robot {robot!r} is not calibrated{since}: {state.why}; calibrate it, or say that it is "
-        "(`cdpr robot mark-calibrated ROBOT --why ...`, ROBOT as it is run), and give it power "
-        "again: `cdpr disable`, `cdpr enable`, `cdpr tighten`"
+        f"robot {robot!r} is not calibrated{since}: {state.why}; calibrate it, or "
+        "confirm its geometry (`cdpr robot mark-calibrated ROBOT --why ...`, with "
+        "ROBOT as for `cdpr run`), and switch it off and on: `cdpr disable`, `cdpr "
+        "enable`, `cdpr tighten`"
     )
 
 

@@ -111,7 +111,9 @@ class CableKinematics:
         self._unstretch(self._no_tension if tension_N is None else tension_N, rho)
         if not np.isfinite(rho).all():
             i = int(np.argmin(np.isfinite(rho)))
-            raise GeometryError(f"cable {i + 1}: does not carry itself under the tension given")
+            raise GeometryError(
+                f"cable {i + 1}: the given tension is too low to carry its own weight"
+            )
         return rho
 
     def jacobian(self, pose: Pose) -> FloatArray:
@@ -252,7 +254,7 @@ class CableKinematics:
         cable_kernel.run_cables(self.geometry, pose.array, self._cables)
         if not self._cables[cable_kernel.FREE].min() > 0.0:
             i = int(np.argmin(self._cables[cable_kernel.FREE] > 0.0))
-            raise GeometryError(f"cable {i + 1}: its anchor point is in its exit point or pulley")
+            raise GeometryError(f"cable {i + 1}: its anchor point lies in its exit point or pulley")
 
     def _unstretch(self, tension_N: FloatArray, rho: FloatArray) -> None:
         cables = self._cables

@@ -78,14 +78,14 @@ class LastLengths:
             self.why, self.fallen = str(error), True
         except (KeyError, TypeError, ValueError):
             self.why = (
-                f"{self.path}: is damaged: lengths of {n} cables are wanted, in metres, up to "
+                f"{self.path}: is damaged: it needs the lengths of {n} cables in metres, up to "
                 f"{most_m:.4g}"
             )
             self.fallen = True
 
     def _take(self, held: dict[str, Any], n: int, most_m: float) -> None:
         if held["stopped"] is not True:
-            self.why = f"{self.path}: the robot was in motion when it was last heard of"
+            self.why = f"{self.path}: the robot was moving at the last record"
             self.fallen = True
             return
         self.fallen, self.displaced = (held.get(key, False) is not False for key in _FLAGS)
@@ -93,8 +93,7 @@ class LastLengths:
             return  # the robot was never tightened
         if held.get("geometry", "") != self.geometry:
             self.why = (
-                f"{self.path}: the robot was stopped with another calibration of its geometry than "
-                "that which is in force"
+                f"{self.path}: the robot was stopped with a calibration other than the one in force"
             )
             return
         lengths, at_index = (np.array([_length_m(x, most_m) for x in held[key]]) for key in _FIELDS)
@@ -107,9 +106,9 @@ class LastLengths:
         """Raise StateFileError if the lengths of the next stop could not be kept."""
         if self.path is not None and not can_write(self.path.parent):
             raise StateFileError(
-                f"{self.path.parent}: cannot be written, and the cables' lengths at the next stop "
-                "have to be kept there; allow it, or start `cdpr run` with XDG_STATE_HOME set to a "
-                "folder that can be written"
+                f"{self.path.parent}: is not writable, but must store the cable lengths at the "
+                "next stop; make it writable, or start `cdpr run` with XDG_STATE_HOME set to a "
+                "writable folder"
             )
 
     def begin_to_move(self, position_rad: FloatArray) -> None:
@@ -184,8 +183,9 @@ def index_disagreement(
     if off_m[worst] <= allowed[worst]:
         return ""
     return (
-        f"{names[worst]}: its motor's index is {1e3 * off_m[worst]:.1f} mm from where the last "
-        f"stop has it, {1e3 * allowed[worst]:.1f} mm allowed: lower, and tighten from home"
+        f"{names[worst]}: its motor's index is {1e3 * off_m[worst]:.1f} mm from its "
+        f"place at the last stop, {1e3 * allowed[worst]:.1f} mm allowed: lower the "
+        "platform, and tighten from home"
     )
 
 

@@ -379,7 +379,7 @@ class Reach:
         cut = np.zeros(3, np.int64)
         while found < count:
             if drawn > _MOST_DRAWN * (count + _AT_ONCE):
-                raise GeometryError(f"of {drawn} ways {found} lead to a target; wanted: {count}")
+                raise GeometryError(f"only {found} of {drawn} ways lead to a pose; wanted: {count}")
             ends = self._drawn(rng, min(_AT_ONCE, count - found), most)
             shares, why = self.shares(ends)
             gone = np.where(why == WHOLE, 1.0, share * shares)

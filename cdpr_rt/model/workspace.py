@@ -221,7 +221,7 @@ def infeasibility_text(
 ) -> str:
     """Return as text why tensions (n,) are not feasible that are outside by a negative margin."""
     if not math.isfinite(margin_N):
-        return "the cables cannot hold one direction, whatever their tensions"
+        return "the cables cannot hold one direction with any tensions"
     i = int(np.argmax(np.maximum(low_N - tension_N, tension_N - high_N)))
     return (
         f"cable {i + 1} would need {tension_N[i]:.1f} N, {low_N[i]:g} to {high_N[i]:g} N allowed: "

@@ -512,7 +512,7 @@ class LoopModel:
                 return best, loops
         if self._swings is None:
             raise UnstableError(
-                "its tensions turn the platform away faster than a loop can hold it"
+                "its tensions turn the platform away faster than a control loop can react"
             )
         raise self._swinging(CABLE_DAMPING_s)
 
@@ -522,9 +522,8 @@ class LoopModel:
         assert self._swings is not None
         mode = self._least_damped(self._swings, self._hardest, cable_damping_s)
         return SwingsError(
-            f"whatever its gains, the loop drives a mode at {mode.frequency_Hz:.3g} Hz to "
-            f"swing where the platform is at ({place}) m"
-            + (f", turned by ({turn}) rad" if turn else "")
+            f"with any gains, a mode of the loop at {mode.frequency_Hz:.3g} Hz is unstable "
+            f"with the platform at ({place}) m" + (f", turned by ({turn}) rad" if turn else "")
         )
 
     def _loops(

@@ -113,7 +113,7 @@ def linear_plant(
     M, _ = _mass_matrix(model, pose)
     J = kinematics.jacobian(pose)
     if np.linalg.matrix_rank(J) < J.shape[1]:
-        raise GeometryError("the cables cannot hold one direction, whatever their tensions")
+        raise GeometryError("the cables cannot hold one direction with any tensions")
     orthogonal, R = np.linalg.qr(J)
     inverse = np.linalg.inv(R)
     mass_kg, modes = np.linalg.eigh(inverse.T @ M[np.ix_(directions, directions)] @ inverse)

@@ -112,11 +112,12 @@ class Oscillation:
             return ""
         case, i, frequency_Hz = self._found
         return (
-            f"{self._names[i]}: the platform's loop swings this winch, for "
+            f"{self._names[i]}: the control loop oscillates at this winch: for "
             f"{LASTS_S[case]:g} s at {frequency_Hz:.0f} Hz by more than "
-            f"{1e3 * self._threshold_m[case, i]:.2f} mm of cable to either side, and tensions "
-            "may leave their bounds: take the power; do cables stretch and damp, the platform "
-            "weigh and drives answer as their files say?"
+            f"{1e3 * self._threshold_m[case, i]:.2f} mm of cable to either side, and "
+            "tensions may leave their bounds: switch the power off, and check stiffness "
+            "and damping of the cables, the mass of the platform and the delays of the "
+            "drives in their files"
         )
 
     def clear(self) -> None:

@@ -274,7 +274,7 @@ class _Run(_Part):
     @model_validator(mode="after")
     def _has_its_default(self) -> Self:
         if self.bandwidth_Hz not in self.bandwidths_Hz:
-            raise ValueError("bandwidths_Hz: allowed: bandwidth_Hz among them")
+            raise ValueError("bandwidths_Hz: must contain bandwidth_Hz")
         if len(self.pid) != len(self.bandwidths_Hz):
             raise ValueError("pid: allowed: one for each of bandwidths_Hz")
         return self
@@ -286,7 +286,9 @@ def read_run(paths: Paths) -> dict[str, Any]:
         read_json_model(paths.run, _Run)
         run: dict[str, Any] = read_json(paths.run)
     except ProfileError as error:
-        raise InvalidRequestError(f"{error}; {paths.out} holds no finished commissioning") from None
+        raise InvalidRequestError(
+            f"{error}; {paths.out} contains no finished commissioning"
+        ) from None
     return run
 
 

@@ -160,7 +160,9 @@ def measure_poses(
         if failure:
             notifier.note(f"{what}, {failure}")
         if measured.failures >= _MOST_FAILURES:
-            raise TripError(f"{measured.failures} poses in turn, the last {what}, {failure}")
+            raise TripError(
+                f"{measured.failures} poses in a row failed, the last {what}, {failure}"
+            )
 
 
 def _go(
@@ -172,7 +174,7 @@ def _go(
         held = operator.move_to(between)
         if held is None:
             return operator.move_to(place)
-        return replace(held, why=f"on its way by {_listed(between)} {held.why}")
+        return replace(held, why=f"on its way through {_listed(between)} {held.why}")
 
 
 def _read(

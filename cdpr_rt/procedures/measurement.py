@@ -130,7 +130,7 @@ def recording(log: RawLog) -> Recording:
             f"{begin:.1f} s"
         )
     if not log.column("index_known")[answered].all():
-        raise RawLogError(f"{log.path}: the encoder index was not known in this run")
+        raise RawLogError(f"{log.path}: the encoder index is not known in this recording")
     index = log.column("index_rad")[answered]
     sweep = SweepData(
         time_s=log.column("time_s")[answered],
@@ -140,7 +140,7 @@ def recording(log: RawLog) -> Recording:
         setpoint_velocity_rad_s=log.column("setpoint_velocity_rad_s")[answered],
     )
     if not all(np.isfinite(getattr(sweep, field.name)).all() for field in fields(sweep)):
-        raise RawLogError(f"{log.path}: holds numbers that are not finite")
+        raise RawLogError(f"{log.path}: contains numbers that are not finite")
     return Recording(
         sweep=sweep,
         effort_Nm=log.column("effort_Nm")[answered],

@@ -33,10 +33,10 @@ from cdpr_rt.motion.path.time_scaling import (
 # it. A slip is only called one where the path fits once it is undone.
 
 _FACTORS: Final = {
-    1.0 / 25.4: "25.4 times too large: mm that are read as inches (G20 for G21)",
-    1.0 / 1000.0: "1000 times too large: mm that are read as m",
-    25.4: "25.4 times too small: inches that are read as mm (G21 for G20)",
-    1000.0: "1000 times too small: m that are read as mm",
+    1.0 / 25.4: "25.4 times too large: mm read as inches (G20 instead of G21)",
+    1.0 / 1000.0: "1000 times too large: mm read as m",
+    25.4: "25.4 times too small: inches read as mm (G21 instead of G20)",
+    1000.0: "1000 times too small: m read as mm",
 }
 _SMALL: Final = 0.04
 """A path not larger than this share of the workspace may be one in wrong units."""
@@ -74,7 +74,8 @@ def size_note(path: PathDescription, low_m: FloatArray, high_m: FloatArray) -> s
     if not size.any() or (size > _SMALL * room).any():
         return ""
     return (
-        f"the whole path is only {_told(size)}, of {_told(room)} of workspace: are its units right?"
+        f"the whole path is only {_told(size)}, in a workspace of {_told(room)}: are "
+        "its units right?"
     )
 
 
@@ -402,7 +403,7 @@ class PathPlanner:
         model = self.model
         workspace = model.workspace(0.0)
         why = workspace.infeasibility(model.pose(position))
-        return why or "the motors' torque does not hold it"
+        return why or "the torque of the motors cannot hold it"
 
     # -- figures
 

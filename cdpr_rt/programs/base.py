@@ -31,7 +31,7 @@ class CommandArguments:
         self._arguments = arguments
         for key in arguments:
             if key not in allowed:
-                words = ", ".join(allowed) if allowed else "none: it takes no set-point"
+                words = ", ".join(allowed) if allowed else "none: this program has no set-point"
                 raise ProgramError(f"{program}: key {shown(key)}; allowed: {words}")
 
     def __contains__(self, key: str) -> bool:
@@ -195,7 +195,7 @@ class CommandedProgram(Program):
         """Check a command and apply it; raises ProgramError and changes nothing then."""
         checked = self.check(arguments)
         if self._stopping:
-            raise ProgramError(f"{self.name}: it is being stopped; start it again")
+            raise ProgramError(f"{self.name}: the program is stopping; start it again")
         self.apply(checked)
 
     def stop(self) -> None:

@@ -262,8 +262,9 @@ class LowerProgram(PlatformProgram):
                 if self._still * period_s <= _STILL_S:
                     self._parts.last_stop.fallen = True
                     self._trouble = (
-                        f"the platform did not come to rest within {self._down_s:.0f} s; it may "
-                        "fall when the power goes"
+                        f"the platform did not come to rest within {self._down_s:.0f} s; it "
+                        "may fall "
+                        "when the power goes off"
                     )
                 self._stage = "fade"
                 low_N[winches.left_m > 0.0] = 0.0

@@ -446,7 +446,7 @@ class PathStore:
 
         Raises ProgramError if the plan is missing, for another robot, or violates the limits.
         """
-        allowed = "allowed: the name that planning has given"
+        allowed = "allowed: the name of a planned path"
         if self.folder is None or _NAME.fullmatch(name) is None:
             raise ProgramError(f"path: plan: value {name[:40]!r}; {allowed}")
         path, model = self.folder / f"{name}.path", self._model
@@ -456,7 +456,7 @@ class PathStore:
                 raise ValueError
             plan, robot = _parsed_plan(name, data, model.size)
         except FileMissingError:
-            raise ProgramError(f"path: plan: value {name!r}: is not there; {allowed}") from None
+            raise ProgramError(f"path: plan: value {name!r}: no such plan; {allowed}") from None
         except ProfileError as error:
             raise ProgramError(f"{error}: plan the path again") from None
         except (ValueError, KeyError, TypeError, ArithmeticError, RecursionError):

@@ -98,7 +98,7 @@ class PlatformIdle(IdleProgram):
         if hangs(self._parts):
             carried_N = float(np.nansum(self._parts.estimator.estimate.tension_N))
             raise ProgramError(
-                f"idle: its cables pull with {carried_N:.0f} N, the platform may hang on them; "
+                f"idle: its cables carry {carried_N:.0f} N, so the platform may hang on them; "
                 "lower it first"
             )
 

@@ -370,8 +370,8 @@ class PlatformProgram(CommandedProgram):
         if not self._arrival.over or swing_m < SWINGS_m:
             return ""
         return (
-            f"the platform may still turn to and fro by {math.degrees(swing_rad):.1f} deg or more, "
-            f"its anchor points by {1e3 * swing_m:.0f} mm: no cable keeps it from turning"
+            f"the platform may still swing by {math.degrees(swing_rad):.1f} deg or more, "
+            f"its anchor points by {1e3 * swing_m:.0f} mm, because no cable controls its angle"
         )
 
     def _held_back(self) -> str:
@@ -379,7 +379,7 @@ class PlatformProgram(CommandedProgram):
         lag_m = self._lag_m()
         if lag_m < _WAITING_m or not self._parts.pose_known:
             return ""
-        return f"the platform is {1e3 * lag_m:.0f} mm behind: friction, or something in its way"
+        return f"the platform is {1e3 * lag_m:.0f} mm behind: friction, or an obstacle"
 
     def _move(self) -> bool:
         """Move the platform's set-point; return whether it has arrived."""

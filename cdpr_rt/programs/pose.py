@@ -33,7 +33,7 @@ _BLOCKED_m = 1e-3
 _HELD_BACK = {
     hand_target.FREE: "",
     hand_target.AT_EDGE: "at the edge of the workspace",
-    hand_target.ON_STAND: "below the workspace, as on its stand: up first",
+    hand_target.ON_STAND: "below the workspace, for example on its stand: move up first",
 }
 _ROUNDING = 1e-9
 _ABSOLUTE, _RELATIVE = ("position_m", "rotation_rad"), ("distance_m", "turn_rad")
@@ -116,7 +116,7 @@ class PoseProgram(PlatformProgram):
                 None if commanded is None else commanded[k:].tolist()
             )
         if self._blocked:
-            state["trouble"] = f"no way on, {self._infeasibility_at(self._examined_goal)}"
+            state["trouble"] = f"the way is blocked, {self._infeasibility_at(self._examined_goal)}"
         if self._following:
             state |= {"stream": self.stream.state.name.lower(), **self.stream.counts()}
         return state

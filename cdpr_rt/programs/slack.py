@@ -296,7 +296,8 @@ class SlackTakeUp:
         """Return the present and the highest pull of those of `which` (n,) whose turn it is."""
         pull_N, may_N = self._winches.tension_N, self._winches.high_N
         return "; ".join(
-            f"{self._names[i]} pulls with {pull_N[i]:.1f} N, up to {may_N[i]:.1f} N asked for"
+            f"{self._names[i]} pulls with {pull_N[i]:.1f} N, but only up to {may_N[i]:.1f} "
+            "N were commanded"
             for i in np.flatnonzero(which & (self._phase != NEXT))
         )
 
@@ -353,10 +354,11 @@ class SlackTakeUp:
             return ""
         if slack_m[j] < _TURNED_m and self._winches.high_N[j] < self._enough_N[j]:
             return (
-                f"{self._names[j]}: {self._winches.high_N[j]:.0f} N have not reeled it in, as "
-                f"{self._names[i]} was by {1e3 * slack_m[i]:.1f} mm: its winch may rub with up to "
-                f"{self._enough_N[j] / _ENOUGH:.0f} N, and its cable be slack; have the cables "
-                "pulled with more: see `cdpr robot show`"
+                f"{self._names[j]}: {self._winches.high_N[j]:.0f} N did not reel it in, but "
+                f"{self._names[i]} by {1e3 * slack_m[i]:.1f} mm: the friction of its winch may "
+                "be up to "
+                f"{self._enough_N[j] / _ENOUGH:.0f} N, and its cable may be slack; increase the "
+                "tensions: see `cdpr robot show`"
             )
         return (
             f"{self._names[i]} had {1e3 * more_m:.1f} mm more slack than {self._names[j]}, "
@@ -398,10 +400,13 @@ class SlackTakeUp:
         if in_m[i] > 0.0 and np.count_nonzero(off_m > _ALONE_m) == 1:
             if off_m[i] > self._alone_m[i]:
                 return "", ""  # the others would have shown it: the winch had stuck
-            return "", f"{told}: its winch had stuck, or the platform may stand about so far off"
+            return (
+                "",
+                f"{told}: its winch was stuck, or the platform may stand about this far from home",
+            )
         return (
-            f"{told}: a winch has pulled the platform along on its stand; put it back to its "
-            f"home, and {_REMEDY}"
+            f"{told}: a winch has dragged the platform on its stand; put it back at home, "
+            f"and {_REMEDY}"
         ), ""
 
     def _along(self, position_rad: FloatArray) -> str:
@@ -416,7 +421,7 @@ class SlackTakeUp:
         if max(aside_m, turned_m) <= _ALONG_m:
             return ""
         turned_deg = math.degrees(turned_m / self._arm_m)
-        turned = f", and be turned by up to about {turned_deg:.0f} degrees" if turned_m else ""
+        turned = f", and may be turned by up to about {turned_deg:.0f} degrees" if turned_m else ""
         return (
             "the torque that overcomes the friction of the winches also slides this light platform "
             f"on its stand: with this slack it may stand up to about {1e3 * aside_m:.0f} mm from "

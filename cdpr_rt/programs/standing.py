@@ -21,11 +21,11 @@ _MOST_LOOKS = 200
 _CARRIED_SHARE = 0.8
 """Sum of the tensions over the weight below which the cables do not carry the platform."""
 _FALLEN = (
-    "the platform hung when the power was taken, or a drive or cable lost: it has come down, "
-    "may have turned over, and cables may lie around it. Look at it. Where it stands at home, "
-    "upright, all cables free: tighten from home"
+    "the platform hung when the power went off, or when a drive or cable failed. "
+    "It has come down, may have turned over, and cables may lie around it. Look at "
+    "it. If it stands at home, upright, with all cables free: tighten from home"
 )
-_FALLEN_ELSEWHERE = "; where it stands so elsewhere: from lengths"
+_FALLEN_ELSEWHERE = "; if it stands like this elsewhere: from lengths"
 
 
 def bad_source(asked: Mapping[str, Any], why: str, *allowed: str) -> CommandRefusal:
@@ -43,12 +43,12 @@ def source_refusal(
     """
     last = parts.last_stop
     if asked and parts.tight:
-        return bad_source(asked, "the cables are tight already; lower it first")
+        return bad_source(asked, "the cables are already tight; lower the platform first")
     if last.fallen and not asked:
         elsewhere, allowed = (_FALLEN_ELSEWHERE, ("lengths",)) if parts.pose_known else ("", ())
         return bad_source(asked, _FALLEN + elsewhere, "home", *allowed)
     if source == "home" and last.displaced and not asked:
-        why = "the platform was released elsewhere, and its place is not known; stand it at home"
+        why = "the platform was released elsewhere, and its place is not known; put it at home"
         return bad_source(asked, why, "home")
     if source == "lengths" and (last.contradicted or not parts.pose_known):
         why = last.contradicted or "the cables' lengths are not known"
@@ -74,7 +74,7 @@ def why_not_to_wind_in(parts: PlatformParts, length_m: FloatArray) -> str:
     if many <= 1:
         return ""
     return _not_at_home(
-        f"{many} cables are up to {1e3 * short_m.max():.0f} mm too short to reach there, "
+        f"{many} cables are up to {1e3 * short_m.max():.0f} mm too short to reach it, "
         f"{1e3 * allowed_m:.0f} mm allowed"
     )
 
@@ -95,7 +95,8 @@ def why_not_at_home(
     many = np.count_nonzero(off_m > allowed_m)
     if many > 1:
         return _not_at_home(
-            f"the lengths of {many} cables are up to {1e3 * off_m.max():.0f} mm from those there, "
+            f"the lengths of {many} cables are up to {1e3 * off_m.max():.0f} mm from those "
+            "at home, "
             f"{1e3 * allowed_m:.0f} mm allowed"
         )
     control.take_lengths(length_m, feedback)
@@ -109,9 +110,9 @@ def why_not_at_home(
 
 def _not_at_home(why: str) -> str:
     return (
-        f"the platform is not at home: by its cables' lengths, followed since they were known, "
-        f"{why}; stand it at home, upright, all cables free. Where these lengths are wrong: end "
-        "the daemon and start it again"
+        f"the platform is not at home: by its cable lengths, {why}; put it at home, "
+        "upright, with all cables free. If these lengths are wrong, end the daemon and "
+        "start it again"
     )
 
 
@@ -138,7 +139,7 @@ def why_not_to_pull(
 
 def would_move(parts: PlatformParts) -> str:
     """Return the message that tight cables would move the platform from its place."""
-    why = ", where tight cables would pull it along"
+    why = ", where tight cables would drag it"
     return _not_pulled(parts.control.estimated, parts.model.positions, why)
 
 
@@ -182,12 +183,12 @@ def why_not_to_hold(
     carried = standing.carry(model.pose(control.estimated))
     if not why and (_turned_much(parts) or not carried):
         place = _place(control.estimated, model.positions)
-        why = f"by its cables' lengths it is {place}, where they could not hold it"
+        why = f"by its cable lengths it is {place}, where they could not hold it"
     if not why:
         return ""
     return (
-        f"the platform may hang on its cables, and {why}: each cable is held as it is; lower it, "
-        "stand it at home and tighten from home"
+        f"the platform may hang on its cables, and {why}: each winch holds its cable; "
+        "lower the platform, put it at home and tighten from home"
     )
 
 
@@ -198,8 +199,8 @@ def _turned_much(parts: PlatformParts) -> bool:
 
 def _not_pulled(here: FloatArray, k: int, why: str) -> str:
     return (
-        f"the platform is {_place(here, k)}{why}: it is not pulled at; stand it at home, upright, "
-        "all cables free, and tighten from home"
+        f"the platform is {_place(here, k)}{why}: the cables are not tightened; put it "
+        "at home, upright, with all cables free, and tighten from home"
     )
 
 
@@ -208,8 +209,8 @@ def disagreement(parts: PlatformParts, source: str = "lengths") -> str:
     at_home = source == "home"
     off = _off(parts, parts.home_lengths_allowed_m if at_home else parts.lengths_allowed_m)
     if off and at_home:
-        return f"{off}; it does not stand at home, or a point is not where the robot's file has it"
-    return f"{off}; stand the platform at home and tighten from it" if off else ""
+        return f"{off}; it does not stand at home, or a point differs from the robot's file"
+    return f"{off}; put the platform at home and tighten from home" if off else ""
 
 
 def _off(parts: PlatformParts, allowed_m: float) -> str:

@@ -85,8 +85,8 @@ stand causes up to 4 mm, which ends as winches turn."""
 _RUNS_IN_m_s = 0.2
 """Speed that no winch reaches if its cable is tight while the platform stands."""
 _REMEDY = (
-    "take up slack by hand, have the platform held, or have the cables pulled with more than their "
-    "winches rub: see `cdpr robot show`"
+    "take up slack by hand, hold the platform, or choose tensions above the "
+    "friction of the winches: see `cdpr robot show`"
 )
 
 
@@ -125,9 +125,9 @@ class LettingGo:
         if control.residual_m <= self._allowed_m:
             return ""
         return (
-            f"the cables' lengths, just taken at home, disagree by {1e3 * control.residual_m:.1f} "
-            f"mm{self._parts.suspects_text()}; {1e3 * self._allowed_m:.1f} mm allowed, which "
-            "friction may make: a cable was slack, or the platform has moved on its stand; "
+            f"the cable lengths, just measured at home, disagree by {1e3 * control.residual_m:.1f} "
+            f"mm{self._parts.suspects_text()}; {1e3 * self._allowed_m:.1f} mm allowed for "
+            "friction: a cable was slack, or the platform has moved on its stand; "
             f"{_REMEDY}"
         )
 
@@ -146,9 +146,9 @@ class LettingGo:
         if here.size > k:
             off += f", turned by {math.degrees(np.linalg.norm(here[k:])):.1f} deg"
         return (
-            f"by the cables' lengths, taken at home, the platform is {off}: targets will be "
-            f"as far off, or further; cables sagged or were slack, or it has moved; {_REMEDY}, "
-            "and tighten from home again"
+            f"by the cable lengths, measured at home, the platform is {off}: targets will "
+            "be wrong by this much or more; cables sagged or were slack, or the platform "
+            f"has moved; {_REMEDY}, and tighten from home again"
         )
 
 
@@ -204,10 +204,12 @@ class LengthsAtHome:
         if in_m[i] <= allowed_m[i]:
             return ""
         return (
-            f"{parts.names[i]}: came in by {1e3 * in_m[i]:.1f} mm as it was pulled with "
-            f"{harder * pull_N[i]:.0f} N in place of {pull_N[i]:.0f} N, {1e3 * allowed_m[i]:.1f} "
-            "mm allowed: what it was pulled with before did not overcome its winch's friction, or "
-            "the platform has moved on its stand; take up slack by hand, or hold the platform"
+            f"{parts.names[i]}: came in by {1e3 * in_m[i]:.1f} mm when its tension rose "
+            f"from {pull_N[i]:.0f} N to {harder * pull_N[i]:.0f} N, "
+            f"{1e3 * allowed_m[i]:.1f} "
+            "mm allowed: the first tension did not overcome the friction of its winch, or "
+            "the platform has moved on its stand; take up slack by hand, or hold the "
+            "platform"
         )
 
     def take(self, feedback: AxisFeedback) -> FloatArray:

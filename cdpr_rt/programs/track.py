@@ -37,14 +37,16 @@ class TrackProgram(Program):
     def start(self, _feedback: AxisFeedback, _setpoint: Setpoint, _torque_Nm: FloatArray) -> None:
         """Begin the motion; raises ProgramError without one."""
         if self._motion is None:
-            raise ProgramError(f"{self.name}: allowed: from a procedure, which gives it a motion")
+            raise ProgramError(
+                f"{self.name}: only a procedure can start it, because it needs a motion"
+            )
         self.controller.reset()
         self._cycle, self._last = 0, round(self._motion.duration_s / self._period_s)
         self.at_rest = self._stopping = False
 
     def check(self, _arguments: Mapping[str, Any]) -> Any:
         """Raise ProgramError: there are no arguments to check."""
-        raise ProgramError(f"{self.name}: allowed: from a procedure, which gives it a motion")
+        raise ProgramError(f"{self.name}: only a procedure can start it, because it needs a motion")
 
     def update(self, feedback: AxisFeedback, setpoint: Setpoint, torque_Nm: FloatArray) -> None:
         """Write this cycle's set-point and torques, (n,) each, in place."""

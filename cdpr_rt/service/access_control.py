@@ -215,8 +215,8 @@ class AccessControl:
                 HTTPStatus.UNAUTHORIZED,
                 "Authorization: Bearer KEY is missing or wrong"
                 if self._policy.key
-                else "nobody can show a key here: everybody may look on, hold and disable; for the "
-                "rest use the Unix socket, or start the daemon with --key-file",
+                else "this daemon has no key: over TCP everybody may read, hold and disable; for "
+                "the rest use the Unix socket, or start the daemon with --key-file",
             )
         if _is_stop(scope):
             return ""
@@ -231,7 +231,7 @@ class AccessControl:
         if self._policy.local:
             return ""
         if not self._requests.take(who, time.monotonic()):
-            raise _RefusedError(HTTPStatus.TOO_MANY_REQUESTS, "too many requests; go slower")
+            raise _RefusedError(HTTPStatus.TOO_MANY_REQUESTS, "too many requests; send fewer")
         return who
 
     def _check_page(self, headers: Mapping[bytes, bytes]) -> None:
@@ -327,7 +327,7 @@ async def _read_body(receive: Receive, most: int) -> Receive:
             while True:
                 message = await receive()
                 if message["type"] == "http.disconnect":
-                    raise _RefusedError(HTTPStatus.BAD_REQUEST, "the body is not whole")
+                    raise _RefusedError(HTTPStatus.BAD_REQUEST, "the body is incomplete")
                 body += message.get("body", b"")
                 if len(body) > most:
                     raise _RefusedError(
@@ -347,7 +347,7 @@ async def _read_body(receive: Receive, most: int) -> Receive:
         raise _RefusedError(
             HTTPStatus.UNPROCESSABLE_ENTITY,
             f"body: more than {MOST_BODY_BYTES} bytes; allowed: up to {MOST_PATH_BYTES} with up to "
-            f"{_MOST_STRINGS} keys and texts, the file included",
+            f"{_MOST_STRINGS} keys and texts, including the file",
         )
     whole: list[Message] = [{"type": "http.request", "body": content, "more_body": False}]
 

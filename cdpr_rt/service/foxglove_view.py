@@ -190,15 +190,15 @@ class FoxgloveServer:
         hosts, origins = request.headers.get_all("Host"), request.headers.get_all("Origin")
         strange = [origin for origin in origins if origin.lower() not in self._origins]
         if strange:
-            reason = f"Origin: {strange[0] or 'null'} may not look on; see --live-origin"
+            reason = f"Origin: {strange[0] or 'null'} is not allowed; see --live-origin"
         elif len(hosts) != 1 or not is_own_host(
             hosts[0], ()
         ):  # on loopback no program needs a name
             given = ", ".join(hosts)
-            reason = f"Host: {given}: allowed: localhost, or an address in figures"
+            reason = f"Host: {given}: allowed: localhost, or a numeric address"
         elif len(self._viewers) >= MOST_VIEWERS:
             status = HTTPStatus.SERVICE_UNAVAILABLE
-            reason = f"{MOST_VIEWERS} others look on already"
+            reason = f"{MOST_VIEWERS} others are already watching"
         else:
             return None
         return viewer.respond(status, f"{self._note(reason)}\n")

@@ -66,7 +66,7 @@ class Lease:
             left_s = self._left_s()
             if left_s > 0.0:
                 raise LeaseError(
-                    f"{self._client} holds the right to move, for {left_s:.1f} s more at least"
+                    f"{self._client} holds the right to move for at least {left_s:.1f} s"
                 )
             self._client, self._token = client, secrets.token_urlsafe(18)
             self._ttl_ns = round(ttl_s * 1e9)
@@ -128,5 +128,5 @@ class Lease:
             raise LeaseError(f"the right to move is not this client's; {who}")
         if not held:
             raise LeaseError(
-                f"the right to move has run out: {self._client} was silent for too long"
+                f"the right to move has expired: {self._client} was silent for too long"
             )

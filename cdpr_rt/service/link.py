@@ -195,7 +195,7 @@ class LoopLink:
     def _send(self, do: str, fields: dict[str, Any]) -> asyncio.Future[Reply]:
         urgent = do in STOPS
         if not urgent and len(self._pending) >= _MOST_PENDING:
-            raise LoopBusyError(f"{_MOST_PENDING} commands wait for the loop already")
+            raise LoopBusyError(f"{_MOST_PENDING} commands are already waiting for the loop")
         post = self.block.post_urgent if urgent else self.block.post_command
         try:
             number = post({"do": do, **fields})

@@ -26,7 +26,7 @@ def listen_unix(path: Path) -> socket.socket:
     try:
         if path.exists() or path.is_symlink():
             if not stat.S_ISSOCK(path.lstat().st_mode):
-                raise ListenError(f"socket {path}: is something else than a socket")
+                raise ListenError(f"socket {path}: is not a socket")
             if listener_pid(path) is not None:
                 raise ListenError(f"socket {path}: another daemon listens there")
             path.unlink()

@@ -468,7 +468,7 @@ class Recorder(Part):
         if free < least:
             raise RecordingError(
                 f"{self._folder}: recording ended: {size_text(free)} free, less than the "
-                f"{size_text(least)} that are left to others"
+                f"{size_text(least)} reserved for other uses"
             )
         if file.size >= self._most_bytes:
             self._close()

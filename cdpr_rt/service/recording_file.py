@@ -246,7 +246,7 @@ def _text_schema(title: str, description: str, **properties: str) -> dict[str, A
 
 STATUS_SCHEMA: Final = _text_schema(
     "Status",
-    "State, program, reasons and notices of the loop, each time one of them changed",
+    "State, program, reasons and notices of the loop, each time one of them changes",
     state="string",
     program="string",
     reason="string",

@@ -144,10 +144,10 @@ class RecordingReader:
         except _BROKEN as error:
             self.ended = CUT
             if not self.metadata:
-                reason = str(error).partition(", invalid magic")[0] or "nothing in it"
+                reason = str(error).partition(", invalid magic")[0] or "the file is empty"
                 raise RecordingError(f"{self.path}: not a recording: {reason}") from None
         if not self.metadata:
-            raise RecordingError(f"{self.path}: not a recording: does not say of what")
+            raise RecordingError(f"{self.path}: not a recording: it does not name its robot")
 
     def _require_bounds(self, chunk: Chunk) -> None:
         """Raise RecordingError for a chunk larger than a recorder writes.
@@ -170,8 +170,8 @@ class RecordingReader:
         most = max(_LEAST_BYTES, _MOST_RATIO * self.position)
         if self._held_bytes > most:
             raise RecordingError(
-                f"{self.path}: its first {self.position} bytes hold more than {most}; allowed: up "
-                f"to {_MOST_RATIO} times as many"
+                f"{self.path}: its first {self.position} bytes contain more than {most}; "
+                f"allowed: up to {_MOST_RATIO} times as many"
             )
 
     def _take_metadata(self, metadata: dict[str, str]) -> None:
@@ -269,7 +269,7 @@ def _joined(
         if wanted is None or wanted & (properties.keys() - {"cycle"}):
             columns = _columns(messages, properties, wanted)
             if not np.array_equal(joined["cycle"], columns["cycle"]):
-                raise ValueError("rows and their timing belong to other cycles")
+                raise ValueError("rows and their timing belong to different cycles")
             joined |= columns
     names = sorted(joined, key=lambda name: _PLACES.get(name, len(_PLACES)))
     return {name: joined[name] for name in names if fields is None or name in fields}
@@ -288,7 +288,7 @@ def _columns(
         widths[name] = one["minItems"] if is_array else 0
     text = b"\n".join(rows)
     if len(rows) * sum(max(width, 1) for width in widths.values()) > len(text):
-        raise ValueError("rows do not hold what their schema says")
+        raise ValueError("rows do not fit their schema")
     table = arrow_json.read_json(
         pa.BufferReader(text),
         read_options=arrow_json.ReadOptions(use_threads=False, block_size=len(text) + 1),

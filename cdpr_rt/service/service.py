@@ -67,7 +67,7 @@ class PathPlanRunner:
             self._cancelled = why
 
     async def _plan(self, work: Plan, request: dict[str, Any]) -> None:
-        answer: dict[str, Any] = {"error": "planning was ended"}
+        answer: dict[str, Any] = {"error": "planning was cancelled"}
         try:
             with tempfile.TemporaryDirectory(prefix="cdpr-path-") as folder:
                 file = Path(folder) / request["name"]
@@ -75,9 +75,9 @@ class PathPlanRunner:
                 status, text = await work(file, request)
             answer = _read(status, text.replace(str(file), request["name"]))
             if self._cancelled:
-                answer = {"error": f"not followed: {self._cancelled} while it was planned"}
+                answer = {"error": f"not started: {self._cancelled} during planning"}
         except TimeoutError:  # a kind of OSError, but without a text
-            answer = {"error": "cannot be planned: takes too long; divide the path"}
+            answer = {"error": "planning takes too long; divide the path"}
         except OSError as error:
             answer = {"error": f"cannot be planned: {error.strerror}"}
         finally:
@@ -172,7 +172,7 @@ class Service:
             try:
                 part.stop()
             except Exception as error:
-                self.events.add(part.name, f"{part.name}: did not end well: {error}")
+                self.events.add(part.name, f"{part.name}: failed to end: {error}")
 
     def issue_stream_session(self, token: str | None) -> dict[str, Any]:
         """Give the holder of the right to move a session of the stream, as `models.StreamAccess`.
@@ -324,8 +324,8 @@ class Service:
         if client != self._held_by:
             gone, self._held_by = self._held_by, client
             text = (
-                f"{client} may move"
+                f"{client} has the right to move"
                 if client
-                else f"{gone} does not hold the right to move any more"
+                else f"{gone} no longer has the right to move"
             )
             self.events.add("control", text)

@@ -194,7 +194,7 @@ class StreamSessionManager:
         if session is not None and session.is_of(name, address):
             return parse(data, session.key), session.key
         if self._key is None:
-            raise PacketError(PacketFault.SESSION, f"session {name} was never given")
+            raise PacketError(PacketFault.SESSION, f"session {name} is unknown")
         # no limit of attempts: only forgers could use it up, and a tag cannot be guessed anyway
         greets = kind in (PacketKind.HELLO, PacketKind.WELCOME)
         key = self._key if greets else session_key(self._key, self._nonce, name)

@@ -213,7 +213,7 @@ LONGEST_BYTES: Final = max(_SIZES.values()) + TAG_BYTES
 def peek(data: bytes) -> tuple[PacketKind, int]:
     """Return kind and session of a packet whose head and length are right; raises PacketError."""
     if len(data) < _HEAD.size:
-        raise PacketError(PacketFault.SIZE, f"{len(data)} bytes are no packet")
+        raise PacketError(PacketFault.SIZE, f"{len(data)} bytes are not a packet")
     magic, version, number, _, session = _HEAD.unpack_from(data)
     if magic != MAGIC:
         raise PacketError(PacketFault.MAGIC, f"begins with {magic!r}, not {MAGIC!r}")

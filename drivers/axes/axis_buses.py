@@ -100,7 +100,7 @@ class AxisBuses:
                 raise BusError(
                     f"bus {bus.name} ({group.network.url}) is {clocks[group.lockstep]}, bus "
                     f"{self.buses[0].name} is {clocks[self.groups[0].lockstep]}: all buses of a "
-                    "robot keep time alike"
+                    "robot must be of the same kind"
                 )
         return self.groups[0].lockstep
 

@@ -423,7 +423,7 @@ class AxisGroup:
         enabled has an unacknowledged fault, ModeRefusedError if its mode is not confirmed.
         """
         if state not in TARGETS:
-            raise ValueError(f"{state.label} cannot be asked for")
+            raise ValueError(f"{state.label} cannot be requested")
         if state == State.OPERATION_ENABLED:
             for axis, faulted in zip(self.axes, self.faulted(), strict=True):
                 if faulted:
@@ -511,7 +511,7 @@ class AxisGroup:
         for i, (axis, mode) in enumerate(zip(self.axes, requested, strict=True)):
             if self._ints[codec.STATE, i] == State.OPERATION_ENABLED:
                 raise ModeRefusedError(
-                    f"{axis.label}: the mode is not changed while the drive is enabled"
+                    f"{axis.label}: the mode cannot change while the drive is enabled"
                 )
             if not supports(axis.supported_modes, mode):
                 raise ModeRefusedError(
@@ -533,7 +533,7 @@ class AxisGroup:
             self._ints[codec.MODE_DISPLAYED, i] = self.network.read_int(node, 0x6061)
         except SdoError as error:
             raise ModeRefusedError(
-                f"{self.axes[i].label}: mode {mode_name(mode)} was refused: {error}"
+                f"{self.axes[i].label}: the drive rejected mode {mode_name(mode)}: {error}"
             ) from error
 
     def mode_confirmed(self) -> bool:
@@ -553,11 +553,12 @@ class AxisGroup:
         label = self.axes[i].label
         if requested[i] == NO_MODE:
             return ModeRefusedError(
-                f"{label}: no mode of operation was asked for yet, or the last was refused"
+                f"{label}: no mode of operation was requested yet, or the drive rejected the "
+                "last one"
             )
         return ModeRefusedError(
-            f"{label}: asked for mode {mode_name(int(requested[i]))}, "
-            f"but the drive reports {mode_name(int(displayed[i]))} (6061h); it was not enabled"
+            f"{label}: mode {mode_name(int(requested[i]))} was requested, but the drive "
+            f"reports {mode_name(int(displayed[i]))} (6061h); it was not enabled"
         )
 
     # -- the encoder index
@@ -581,7 +582,7 @@ class AxisGroup:
         if armed and not self.reports_probe(axis):
             raise DriveFaultError(
                 f"drive profile {self.axes[axis].drive.name!r}: tpdos: no TPDO holds both 60B9h "
-                "and 60BAh, which finding the index by touch probe needs"
+                "and 60BAh, which the touch probe needs to find the index"
             )
         if armed:
             self._ints[codec.PROBE_STATUS, axis] = 0
@@ -613,12 +614,12 @@ class AxisGroup:
             left = [a.label for a in self.axes if not self.network.switch_off(a.node_id)]
         except BusError as error:
             nodes = ", ".join(axis.label for axis in self.axes)
-            return f"{nodes}: not known to be without power: {error}"
+            return f"{nodes}: may still have power: {error}"
         if not left:
             return ""
         return (
-            f"{', '.join(left)}: does not confirm that its power stage is off; it was reset (NMT), "
-            "but see to it that it has no power"
+            f"{', '.join(left)}: does not confirm that its power stage is off; it was reset "
+            "(NMT); check that it has no power"
         )
 
     def _switch_off_by_cycles(self) -> bool:

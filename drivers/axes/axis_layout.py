@@ -185,8 +185,8 @@ def _feedback_tpdos(drive: DriveProfile) -> dict[int, int]:
                 found.setdefault(index, number)
         if index not in found:
             raise DriverError(
-                f"drive profile {drive.name!r}: tpdos: no TPDO of transmission_type 1 "
-                f"holds {index:04X}h, which torque control needs of every cycle"
+                f"drive profile {drive.name!r}: tpdos: no TPDO of transmission_type 1 contains "
+                f"{index:04X}h, which torque control needs in every cycle"
             )
     return found
 
@@ -203,15 +203,15 @@ def _command_rpdos(drive: DriveProfile) -> list[Pdo]:
                 found[index] = pdo
         if index not in found:
             raise DriverError(
-                f"drive profile {drive.name!r}: rpdos: no RPDO holds {index:04X}h with 16 bits, "
+                f"drive profile {drive.name!r}: rpdos: no RPDO contains {index:04X}h with 16 bits, "
                 "which torque control needs"
             )
     pdos = [pdo for pdo in drive.rpdos if pdo in found.values()]
     for index in (entry.index for pdo in pdos for entry in pdo.entries):
         if index not in _RPDO_FIELDS and index >= _OBJECTS:
             raise DriverError(
-                f"drive profile {drive.name!r}: rpdos: {index:04X}h is in one RPDO with what is "
-                "sent every cycle, and would be set to 0; allowed: 6040h, 6071h and dummies"
+                f"drive profile {drive.name!r}: rpdos: {index:04X}h is in an RPDO that is sent "
+                "every cycle, and would be set to 0; allowed: 6040h, 6071h and dummies"
             )
     return pdos
 

@@ -247,7 +247,7 @@ def _join(port: AdapterPort) -> SharedAdapter:
         if shared is None:
             shared = _registry[_key(url)] = SharedAdapter(url, port)
         elif _settings(shared.url) != _settings(url):
-            raise BusError(f"{url}: is in use with other settings ({shared.url})")
+            raise BusError(f"{url}: is already in use with other settings ({shared.url})")
         else:
             shared.add(port)
         return shared
@@ -303,5 +303,5 @@ class AdapterPort(FramePort):
     def lost(self, error: OSError | None = None) -> BusError:
         """Return the BusError that says why the bus is no longer usable."""
         if self._shared.reason:
-            return BusError(f"{self.url}: the bus has gone away ({self._shared.reason})")
+            return BusError(f"{self.url}: the bus is lost ({self._shared.reason})")
         return super().lost(error)

@@ -91,8 +91,9 @@ class BusBudget:
         period = f" (sync_period_s {math.ceil(1e6 / rate_Hz) * 1e-6:g})" if rate_Hz > 0.0 else ""
         return (
             f"bus {self.bus}: {len(self.nodes)} drives need {self.cycle_s * 1e6:.0f} us of each "
-            f"cycle in the worst case and {self.heartbeat_share * self.period_s * 1e6:.1f} us for "
-            f"heartbeats, a cycle at {1.0 / self.period_s:.6g} Hz has {self.period_s * 1e6:.0f} us"
+            f"cycle in the worst case and {self.heartbeat_share * self.period_s * 1e6:.1f} "
+            f"us for heartbeats, but a cycle at {1.0 / self.period_s:.6g} Hz has "
+            f"{self.period_s * 1e6:.0f} us"
             f"; highest rate at {self.bitrate_bit_s} bit/s: {math.floor(rate_Hz)} Hz{period}"
         )
 

@@ -148,9 +148,9 @@ class FramePort(ABC):
     def lost(self, error: OSError | None = None) -> BusError:
         """Return the BusError that says why the bus is no longer usable."""
         if isinstance(error, BlockingIOError):
-            return BusError(f"{self.url}: the bus takes or gives no frames (time-out)")
+            return BusError(f"{self.url}: the bus accepts or delivers no frames (timeout)")
         reason = (error.strerror or error) if error else "connection closed"
-        return BusError(f"{self.url}: the bus has gone away ({reason})")
+        return BusError(f"{self.url}: the bus is lost ({reason})")
 
 
 class Batch:

@@ -32,7 +32,7 @@ from cdpr_rt.core.clock import Clock, LockstepClock, PacedClock
 
 _ANSWER_TIMEOUT_S = 5.0
 _CONTROL_BYTES = 65536
-_CLOSED = "the simulated bus closed the connection; it takes the user who runs it, and root"
+_CLOSED = "the simulated bus closed the connection; it accepts only the user who runs it, and root"
 # the hub accepts control messages below 448 bytes; a pair takes up to 24
 _FILTERS_A_MESSAGE = 16
 
@@ -95,13 +95,13 @@ def exchange(sock: socket.socket, filters: Filters | None) -> dict[str, Any]:
                 raise BusError(f"the simulated bus refused: {answer['error']}")
             return dict(answer["status"])
     except (ProfileError, LookupError, TypeError, ValueError) as error:
-        raise BusError(f"the simulated bus answered what is no status: {error}") from None
+        raise BusError(f"the simulated bus sent an invalid status: {error}") from None
     except TimeoutError:
         raise BusError(f"the simulated bus did not answer in {_ANSWER_TIMEOUT_S:g} s") from None
     except (BrokenPipeError, ConnectionResetError):
         raise BusError(_CLOSED) from None
     except OSError as error:
-        raise BusError(f"the simulated bus went away ({error.strerror})") from None
+        raise BusError(f"the simulated bus is lost ({error.strerror})") from None
     finally:
         sock.settimeout(before)
 

@@ -134,10 +134,10 @@ class SimBus(can.BusABC):
                 raise self._gone(error.strerror) from error
             else:
                 return
-        raise can.CanOperationError(f"{self.channel_info}: the bus takes no frames (buffer full)")
+        raise can.CanOperationError(f"{self.channel_info}: the bus accepts no frames (buffer full)")
 
     def _gone(self, reason: str | None) -> can.CanOperationError:
-        return can.CanOperationError(f"{self.channel_info}: the bus has gone away ({reason})")
+        return can.CanOperationError(f"{self.channel_info}: the bus is lost ({reason})")
 
     def fileno(self) -> int:
         """Return the descriptor that is readable when a frame waits."""

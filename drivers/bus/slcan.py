@@ -70,7 +70,7 @@ class SlcanAdapter:
             self._begin(url, code, baud)
         except OSError as error:
             self._serial.close()
-            raise BusError(f"{url}: the adapter has gone away ({error.strerror})") from None
+            raise BusError(f"{url}: the adapter is lost ({error.strerror})") from None
         except BusError:
             self._serial.close()
             raise
@@ -90,10 +90,10 @@ class SlcanAdapter:
                     f"bit rate {url.options['bitrate']} ({code})" if command != "O" else "to open"
                 )
                 advice = "" if code else "; it may need ?bitrate=1000000"
-                raise BusError(f"{url}: the adapter refuses {what}{advice}")
+                raise BusError(f"{url}: the adapter rejects {what}{advice}")
         if version is None and not any(answers):
             raise BusError(
-                f"{url}: nothing there answers as a serial CAN adapter (slcan) at {baud} baud; "
+                f"{url}: no serial CAN adapter (slcan) answers at {baud} baud; "
                 "check the port and ?tty_baudrate="
             )
         if (self._command("F") or b"").startswith(b"F"):
@@ -129,7 +129,7 @@ class SlcanAdapter:
         except OSError as error:
             data, reason = b"", f": {error.strerror}"
         if not data:
-            raise OSError(errno.ENODEV, f"the serial adapter has been pulled out{reason}")
+            raise OSError(errno.ENODEV, f"the serial adapter was unplugged{reason}")
         return data
 
     def read(self, wake: int, /) -> list[bytes]:
@@ -236,7 +236,7 @@ def _bitrate_code(url: BusUrl) -> str | None:
         return None
     if bitrate not in BITRATE_CODES:
         known = ", ".join(str(rate) for rate in BITRATE_CODES)
-        raise BusError(f"{url}: bitrate {bitrate}: allowed are {known}")
+        raise BusError(f"{url}: bitrate {bitrate}; allowed: {known}")
     return BITRATE_CODES[bitrate]
 
 
@@ -248,15 +248,15 @@ def _open_port(url: BusUrl, baud: Any) -> Any:
         raise BusError(f"{url}: tty_baudrate {baud!r}: this port cannot be set to that") from None
     except serial.SerialException as error:
         reason = {
-            errno.ENOENT: f"there is no serial port {path}; `ls /dev/serial/by-id` lists adapters",
+            errno.ENOENT: f"there is not a serial port {path}; `ls /dev/serial/by-id` lists adapters",
             errno.ENODEV: f"there is no adapter at {path}",
             errno.ENXIO: f"there is no adapter at {path}",
-            errno.EIO: f"there is no adapter at {path} any more",
+            errno.EIO: f"the adapter at {path} is gone",
             errno.EACCES: f"no permission for {path}; join its group (dialout) and log in again",
             errno.EBUSY: f"{path} is in use by another program",
             errno.EWOULDBLOCK: f"{path} is in use by another program",
-            errno.EISDIR: f"{path} is no serial port",
+            errno.EISDIR: f"{path} is not a serial port",
         }.get(error.errno or 0)
         if reason is None and "configure" in str(error):
-            reason = f"{path} is no serial port"
+            reason = f"{path} is not a serial port"
         raise BusError(f"{url}: {reason or error}") from None

@@ -56,7 +56,7 @@ class SocketCanPort(FramePort):
             return BusError(f"{self.url}: {_queue_full(self.url.channel)}")
         if number in (errno.ENETDOWN, errno.ENXIO, errno.ENODEV):
             problem = interface_problem(self.url) or "it went down for a moment"
-            return BusError(f"{self.url}: the bus has gone away: {problem}")
+            return BusError(f"{self.url}: the bus is lost: {problem}")
         return super().lost(error)
 
     def _send_retrying(self, frame: Bytes) -> int:
@@ -133,7 +133,7 @@ def interface_problem(url: BusUrl) -> str:
                 f"CAN interfaces here: {', '.join(can_interfaces(sock)) or 'none'}"
             )
     if kind != _ARPHRD_CAN:
-        return f"the network interface {channel!r} is no CAN interface"
+        return f"the network interface {channel!r} is not a CAN interface"
     if not flags & _IFF_UP:
         how = "" if channel.startswith("v") else " type can bitrate 1000000"
         return (

@@ -62,7 +62,9 @@ class SocketcandAdapter:
             self._greet()
         except OSError as error:
             self.sock.close()
-            raise BusError(f"{url}: the socketcand server went away ({error})") from None
+            raise BusError(
+                f"{url}: the connection to the socketcand server is lost ({error})"
+            ) from None
         except BusError:
             self.sock.close()
             raise
@@ -81,7 +83,7 @@ class SocketcandAdapter:
                 said = answer.decode("ascii", "replace")
                 raise BusError(
                     f"{self._url}: the server answers {said!r} to {command or 'the connection'!r}"
-                    + (f"; has it a bus {channel!r}?" if "open" in command else "")
+                    + (f"; does it have a bus {channel!r}?" if "open" in command else "")
                 )
 
     def _answer(self) -> bytes:
@@ -135,7 +137,7 @@ class SocketcandAdapter:
         """Send a frame; raises OSError, also for remote frames, which the protocol lacks."""
         can_id, length, data = FRAME.unpack(frame)
         if can_id & RTR_FLAG:
-            raise OSError(errno.EOPNOTSUPP, "socketcand carries no remote frames")
+            raise OSError(errno.EOPNOTSUPP, "socketcand cannot send remote frames")
         head = f"{can_id & EFF_MASK:08X}" if can_id & EFF_FLAG else f"{can_id & SFF_MASK:03X}"
         # two spaces if there is no data, as python-can's client sends it
         text = f"< send {head} {length} {data[:length].hex(' ')} >".encode()
@@ -146,7 +148,7 @@ class SocketcandAdapter:
                 self.sock.sendall(text)
         except (BlockingIOError, TimeoutError):
             # half a message may have been sent: the server would not understand what follows
-            raise self._lose("it takes no frames") from None
+            raise self._lose("it accepts no frames") from None
         except OSError as error:
             raise self._lose(error.strerror) from None
 

@@ -92,7 +92,7 @@ class BusUrl:
 
 def _simbus_name(text: str, rest: str, options: dict[str, Option]) -> str:
     if options:
-        raise BusError(f"bus {text!r}: a simbus takes no options, only simbus:NAME or simbus:")
+        raise BusError(f"bus {text!r}: a simbus has no options; allowed: simbus:NAME or simbus:")
     if rest and _NAME.fullmatch(rest) is None:
         raise BusError(
             f"bus {text!r}: a simbus name has 1 to 64 letters, digits, '_', '.' or '-' and "
@@ -184,7 +184,7 @@ def _taken(url: BusUrl) -> str:
             return "another process runs the drives on this bus"  # and accepts no more connections
         credentials = caller.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, _CREDENTIALS.size)
     pid, _, _ = _CREDENTIALS.unpack(credentials)
-    return f"process {pid}{_command_of(pid)} runs the drives on this bus; end that first"
+    return f"process {pid}{_command_of(pid)} runs the drives on this bus; end that process first"
 
 
 def _command_of(pid: int) -> str:

@@ -76,7 +76,11 @@ def grey(pixels: NDArray[np.uint8], name: str) -> NDArray[np.uint8]:
 _KINDS = {
     "opencv": ("opencv_camera", "OpencvCamera", "opencv:0 or opencv:rtsp://HOST/PATH"),
     "folder": ("folder_camera", "FolderCamera", "folder:DIRECTORY"),
-    "genicam": ("genicam_camera", "GenicamCamera", "genicam:PRODUCER.cti, with #SERIAL of one"),
+    "genicam": (
+        "genicam_camera",
+        "GenicamCamera",
+        "genicam:PRODUCER.cti, with #SERIAL for one of several",
+    ),
     "sim": ("sim_camera", "SimulatedCamera", "sim:SOCKET"),
 }
 _EXTRAS = {"cv2": "camera", "harvesters": "genicam", "genicam": "genicam"}

@@ -49,7 +49,7 @@ class FolderCamera(Camera):
             raise CameraError(f"folder {folder}: {len(found)} images; allowed: {_MOST_IMAGES}")
         if not found:
             allowed = ", ".join(_SUFFIXES)
-            raise CameraError(f"folder {folder}: holds no image; allowed: {allowed}")
+            raise CameraError(f"folder {folder}: contains no image; allowed: {allowed}")
         self.files = sorted(found, key=_order)
         self._next = 0
 

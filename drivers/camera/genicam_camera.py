@@ -98,7 +98,7 @@ class GenicamCamera(Camera):
             buffer = self._acquirer.fetch(timeout=_TIMEOUT_S)
             if buffer is None:
                 raise CameraError(
-                    f"camera {self.name}: an image came incomplete; is its network overloaded?"
+                    f"camera {self.name}: an image was incomplete; is the network overloaded?"
                 )
             with buffer:
                 component = buffer.payload.components[0]
@@ -110,7 +110,7 @@ class GenicamCamera(Camera):
             raise
         except Exception as error:  # each producer has its own errors
             raise CameraError(
-                f"camera {self.name} gives no image: {str(error) or type(error).__name__}; is it "
+                f"camera {self.name} sends no image: {str(error) or type(error).__name__}; is it "
                 "unplugged, or used by another program?"
             ) from None
         self._number += 1

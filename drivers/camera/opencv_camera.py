@@ -33,7 +33,7 @@ class OpencvCamera(Camera):
         except cv2.error as error:
             raise CameraError(f"camera {self.name}: {error}") from None
         if not self._capture.isOpened():
-            hint = "; `ls /dev/video*` shows those there are" if device else ""
+            hint = "; `ls /dev/video*` lists the cameras" if device else ""
             raise CameraError(f"camera {self.name} cannot be opened{hint}")
         # by default a driver returns older images first
         self._capture.set(cv2.CAP_PROP_BUFFERSIZE, 1)
@@ -44,8 +44,8 @@ class OpencvCamera(Camera):
         there, pixels = self._capture.read()
         if not there or pixels is None:
             raise CameraError(
-                f"camera {self.name} gives no image any more: unplugged, its stream ended, or it "
-                "is used by another program"
+                f"camera {self.name} sends no more images: it was unplugged, its stream ended, "
+                "or another program uses it"
             )
         self._number += 1
         name = f"image {self._number}"

@@ -52,11 +52,11 @@ class SimulatedCamera(Camera):
             number, time_s = int(answer["number"]), float(answer["time_s"])
         except OSError as error:
             raise CameraError(
-                f"camera {self.name} gives no image any more: {error.strerror or error}; is it "
+                f"camera {self.name} sends no more images: {error.strerror or error}; is it "
                 "unplugged?"
             ) from None
         except (ProfileError, KeyError, ValueError, TypeError) as error:
-            raise CameraError(f"camera {self.name} answers what is no image: {error}") from None
+            raise CameraError(f"camera {self.name} sent an invalid image: {error}") from None
         pixels = np.frombuffer(data, np.uint8).reshape(height, width)
         return Image(pixels, self._clock.now_s, time_s, f"image {number + 1}")
 

@@ -227,7 +227,7 @@ class _NodeBoot:
         self._configure()
         timeout_s = 5.0 * self._profile.heartbeat_producer_s + _HEARTBEAT_MARGIN_S
         if network.wait_for_heartbeat(node_id, timeout_s) is None:
-            raise self._error("K", "no heartbeat came", "check 1017h and the load of the bus")
+            raise self._error("K", "it sends no heartbeat", "check 1017h and the load of the bus")
         self._read_ratings()
         if store_configuration and (self._report.changed or not self._report.stamp_matched):
             self._store()
@@ -248,8 +248,8 @@ class _NodeBoot:
                 return None
             raise self._error(
                 "B",
-                f"it refuses to say what it is ({error})",
-                "switch it off and on; if that does not help, check that it is the drive meant",
+                f"it does not give its device type ({error})",
+                "switch it off and on; if that does not help, check that it is the intended drive",
             ) from error
         except SdoError as error:
             raise self._error(
@@ -266,7 +266,7 @@ class _NodeBoot:
         if state == State.OPERATION_ENABLED:
             raise self._error(
                 "L",
-                "its power stage is already enabled, so somebody drives it",
+                "its power stage is already enabled, so another master uses it",
                 "stop the other master, or switch the drive off and on",
             )
 
@@ -306,7 +306,7 @@ class _NodeBoot:
                     letter,
                     f"its {what} is {_hex(found)}, the profile {profile.name!r} has "
                     f"{expected:08X}h",
-                    "choose the profile of this drive, or connect the drive that was meant",
+                    "choose the profile of this drive, or connect the intended drive",
                 )
 
     def _configure(self) -> None:
@@ -336,7 +336,7 @@ class _NodeBoot:
             raise self._error(
                 "J",
                 f"its configuration could not be stored: {error}",
-                "boot without storing; it is then written at each boot",
+                "boot without storing; then each boot writes it",
             ) from error
 
     def _rated_torque_Nm(self) -> float:
@@ -396,7 +396,7 @@ class _NodeBoot:
             raise self._error(
                 "J",
                 f"rated torque {report.rated_torque_Nm} Nm (6076h) or encoder resolution "
-                f"{increments}/{turns} (608Fh) make no sense",
+                f"{increments}/{turns} (608Fh) are not plausible",
                 "set the drive's motor data first",
             )
         report.counts_per_turn = increments // turns

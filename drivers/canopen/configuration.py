@@ -182,8 +182,8 @@ class _Builder:
             data = self.variable(index, sub).encode_raw(value)
         except (struct.error, ObjectDictionaryError, ValueError, TypeError) as error:
             raise DriverError(
-                f"object {index:04X}h:{sub} cannot be set to {value}: it does not fit the type "
-                f"that the EDS gives it ({error})"
+                f"object {index:04X}h:{sub} cannot be set to {value}: it does not fit its type "
+                f"in the EDS ({error})"
             ) from error
         self.entries.append(DcfEntry(index, sub, bytes(data)))
 

@@ -73,7 +73,7 @@ _FASTSCAN, _FROM_THE_START = 0x51, 128
 _INQUIRE, _INQUIRE_NODE_ID = 0x5A, 0x5E
 _SET_NODE_ID, _SET_BIT_TIMING, _ACTIVATE, _STORE = 0x11, 0x13, 0x15, 0x17
 _REASONS = {
-    (_SET_NODE_ID, 1): "it takes node ids 1 to 127 only",
+    (_SET_NODE_ID, 1): "it accepts only node ids 1 to 127",
     (_SET_BIT_TIMING, 1): "it does not support this bit rate",
     (_STORE, 1): "it cannot store node id and bit rate",
     (_STORE, 2): "its memory could not be written",
@@ -271,8 +271,8 @@ class LssMaster(BusMember):
                 return sorted(found)
             self._settle_s *= 2.0  # answers of several devices overlapped the next request
         raise LssError(
-            "the devices without a node id do not answer the fastscan in a way that makes sense; "
-            "give them a longer --timeout, or connect one at a time"
+            "the devices without a node id give contradictory answers to the fastscan; use "
+            "a longer --timeout-ms, or connect one at a time"
         )
 
     def find(
@@ -457,5 +457,5 @@ class LssMaster(BusMember):
             return
         reason = _REASONS.get((command, error), f"LSS error code {error}")
         if error == _VENDOR_SPECIFIC:
-            reason = f"for a reason of the maker's own, code {maker_code}"
-        raise LssError(f"the device refuses {what}: {reason}")
+            reason = f"for a manufacturer-specific reason, code {maker_code}"
+        raise LssError(f"the device rejects {what}: {reason}")

@@ -323,8 +323,8 @@ class CanNetwork(BusMember):
         unexpected = self.clients[node_id].await_unexpected(_LATE_ANSWERS_S)
         if unexpected >= _FEWEST_UNEXPECTED:
             return (
-                f"two devices have this node id, or another program reads it by SDO at the same "
-                f"time: {unexpected} answers came that we had not asked for"
+                "two devices have this node id, or another program reads it by SDO at the same "
+                f"time: {unexpected} unrequested answers arrived"
             )
         return ""
 
@@ -442,7 +442,9 @@ class CanNetwork(BusMember):
         """Return an integer object's value; raises SdoError, BusError."""
         value = self.read(node_id, index, sub, attempts=attempts)
         if not isinstance(value, int):
-            raise SdoError(f"node {node_id}: object {index:04X}h:{sub} is no integer: {value!r}")
+            raise SdoError(
+                f"node {node_id}: object {index:04X}h:{sub} is not an integer: {value!r}"
+            )
         return value
 
     def read_bytes(self, node_id: int, index: int, sub: int = 0, *, block: bool = False) -> bytes:
@@ -535,7 +537,7 @@ class CanNetwork(BusMember):
                 raise SdoCancelledError(f"{where}{error}") from error
             except (struct.error, ObjectDictionaryError, ValueError, TypeError) as error:
                 raise SdoError(
-                    f"{where}its value does not fit the type that the EDS gives it ({error})"
+                    f"{where}its value does not fit its type in the EDS ({error})"
                 ) from error
 
     def _variable(self, node_id: int, index: int, sub: int) -> ODVariable:

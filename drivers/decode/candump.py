@@ -95,7 +95,7 @@ def parse_line(text: str) -> LogEntry:
     match = _LINE.fullmatch(text.strip())
     if match is None:
         if _CAN_FD.match(text.strip()):
-            raise ValueError("is a CAN FD frame, which no CANopen bus carries")
+            raise ValueError("is a CAN FD frame, which CANopen does not use")
         shown = text.strip()[:_SHOWN_CHARS]
         raise ValueError(f"{shown!r} is not of the form (1699999999.123456) can0 123#DEADBEEF")
     identifier, wide = int(match["id"], 16), len(match["id"]) > 3

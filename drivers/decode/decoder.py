@@ -151,7 +151,7 @@ _CIA_EPOCH = datetime.datetime(1984, 1, 1)
 
 def _nmt_command(data: bytes) -> Reading:
     nodes = f"node {data[1]}" if data[1] else "all nodes"
-    command = _NMT_COMMANDS.get(data[0], f"command {data[0]}, which there is not")
+    command = _NMT_COMMANDS.get(data[0], f"unknown command {data[0]}")
     return f"{command}: {nodes}", False
 
 
@@ -181,7 +181,7 @@ _LSS_RANGES = (
     *("lowest serial", "highest serial"),
 )
 _LSS_INQUIRE = {0x5A + i: name for i, name in enumerate(_LSS_IDENTITY)} | {0x5E: "node id"}
-_LSS_UNKNOWN = "command {command:02X}h, which there is not"
+_LSS_UNKNOWN = "unknown command {command:02X}h"
 _LSS_REQUESTS = {
     0x04: "all to {state}",
     0x11: "{node_id}",

@@ -171,7 +171,9 @@ class SdoDecoder:
     def _segment(self, data: bytes) -> SdoEvent:
         transfer = self._transfer
         if transfer is None:
-            return SdoEvent(Step.UNEXPECTED, note="segment of a transfer whose begin was not seen")
+            return SdoEvent(
+                Step.UNEXPECTED, note="segment of a transfer whose start was not received"
+            )
         toggle = data[0] >> 4 & 1
         if toggle != transfer.toggle or transfer.last:
             transfer.whole = False  # sent again, or one was missed

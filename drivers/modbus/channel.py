@@ -200,7 +200,7 @@ class ModbusTcp:
         what = _named("holding register", start, count)
         answer = self._ask(what, ReadHoldingRegistersRequest(address=start, count=count))
         if len(answer.registers) != count:
-            raise self._wrong(what, f"{len(answer.registers)} registers came, not {count}")
+            raise self._wrong(what, f"{len(answer.registers)} registers arrived, not {count}")
         return list(answer.registers)
 
     def write_coil(self, address: int, on: bool) -> None:
@@ -208,20 +208,20 @@ class ModbusTcp:
         what = f"set coil {address} to {int(on)}"
         answer = self._ask(what, WriteSingleCoilRequest(address=address, bits=[on]))
         if answer.address != address or answer.bits[0] != on:
-            raise self._wrong(what, "the answer is that to another request")
+            raise self._wrong(what, "the answer belongs to another request")
 
     def write_registers(self, start: int, values: list[int]) -> None:
         """Set holding registers from address `start` on, in one request."""
         what = f"set {_named('holding register', start, len(values))} to {values}"
         answer = self._ask(what, WriteMultipleRegistersRequest(address=start, registers=values))
         if answer.address != start or answer.count != len(values):
-            raise self._wrong(what, "the answer is that to another request")
+            raise self._wrong(what, "the answer belongs to another request")
 
     def _bits(self, kind: str, request: type[ModbusPDU], start: int, count: int) -> list[bool]:
         what = _named(kind, start, count)
         answer = self._ask(what, request(address=start, count=count))
         if not count <= len(answer.bits) < count + 8:
-            raise self._wrong(what, f"{len(answer.bits)} bits came, not {count}")
+            raise self._wrong(what, f"{len(answer.bits)} bits arrived, not {count}")
         return list(answer.bits[:count])
 
     def _ask(self, what: str, request: ModbusPDU) -> ModbusPDU:
@@ -236,7 +236,7 @@ class ModbusTcp:
             raise ModbusError(f"{self.name}: {what}: {refusal(answer)}")
         if answer.function_code != request.function_code:
             code, asked = answer.function_code, request.function_code
-            raise self._wrong(what, f"function {code} was answered, {asked} was asked")
+            raise self._wrong(what, f"function {code} was answered, but {asked} was requested")
         return answer
 
     def _connect(self) -> ByteChannel:
@@ -262,10 +262,10 @@ class ModbusTcp:
             silent = f"no answer within {self._timeout_s:g} s from unit {self._unit}"
             return "the device has closed the connection" if lost else silent
         if len(data) > _UNIT_AT and self._unit and data[_UNIT_AT] != self._unit:
-            return f"unit {data[_UNIT_AT]} answered, unit {self._unit} was asked"
+            return f"unit {data[_UNIT_AT]} answered, but unit {self._unit} was asked"
         if len(data) < _HEADER_BYTES or not _is_whole(data):
             return f"the answer was cut off after {len(data)} bytes"
-        return f"the answer makes no sense ({data[:16].hex(' ')})"
+        return f"the answer is invalid ({data[:16].hex(' ')})"
 
     def _wrong(self, what: str, reason: str) -> ModbusError:
         """Close the connection, whose state is unknown, and return the error."""
@@ -349,8 +349,8 @@ class ModbusLine:
             number = getattr(error, "errno", None) or error.args[0]
             reason = os.strerror(number) if isinstance(number, int) else str(error)
             raise LineError(
-                f"{self.name}: cannot be opened: {reason}; is the adapter plugged in, the port "
-                "yours to use, and no other program at it?"
+                f"{self.name}: cannot be opened: {reason}; is the adapter plugged in, do you "
+                "have permission for the port, and does no other program use it?"
             ) from None
         self._channel = ByteChannel(self._clock, self._port.fileno())
         return self._channel
@@ -371,7 +371,7 @@ class ModbusLine:
         what = f"{kind} register{'s' * (count > 1)} {start}{last}"
         answer = self._ask(unit, what, request)
         if len(answer.registers) != count:
-            raise self._wrong(unit, what, f"{len(answer.registers)} registers came, not {count}")
+            raise self._wrong(unit, what, f"{len(answer.registers)} registers arrived, not {count}")
         return list(answer.registers)
 
     def write_register(self, unit: int, address: int, value: int) -> None:
@@ -399,7 +399,7 @@ class ModbusLine:
         data = channel.ask(question, lambda data: len(data) >= _size(data, code), self._timeout_s)
         if channel.lost:
             self.close()
-            raise LineError(f"{self.name}: the serial port is gone; was the adapter pulled out?")
+            raise LineError(f"{self.name}: the serial port is gone; was the adapter unplugged?")
         if clock.lockstep:
             taken_s = (len(question) + len(data)) * self._byte_s + _TURNAROUND_S
             clock.wait(None, asked_s + taken_s)
@@ -413,8 +413,8 @@ class ModbusLine:
     def _missing_answer_reason(self, data: bytes, unit: int, code: int) -> str:
         if not data:
             return (
-                f"no answer within {self._timeout_s:g} s; is it powered, its unit id and the "
-                "line's baud rate and parity right, A and B not exchanged?"
+                f"no answer within {self._timeout_s:g} s; check its power, its unit id, baud "
+                "rate and parity of the line, and whether A and B are exchanged"
             )
         whole = _size(data, code)
         if len(data) < whole:
@@ -422,8 +422,8 @@ class ModbusLine:
         if not FramerRTU.check_CRC(data[: whole - 2], int.from_bytes(data[whole - 2 : whole])):
             return "the answer's checksum (CRC) is wrong; check shield, termination, baud rate"
         if data[0] != unit:
-            return f"unit {data[0]} answered; have two amplifiers changed places or ids?"
-        return f"the answer makes no sense ({data[:16].hex(' ')})"
+            return f"unit {data[0]} answered; are two amplifiers or their ids exchanged?"
+        return f"the answer is invalid ({data[:16].hex(' ')})"
 
     def _wrong(self, unit: int, what: str, reason: str) -> ModbusError:
         return ModbusError(f"{self.name}: unit {unit}: {what}: {reason}")

@@ -354,7 +354,7 @@ class SafetyIo:
         """Close the contactor and monitor from now on; raises SafetyIoError if not allowed."""
         tripped = self._tripped or self._saved_trip()
         if tripped:
-            raise SafetyIoError(f"{tripped}; see to it, then acknowledge it: cdpr io ack")
+            raise SafetyIoError(f"{tripped}; remove the cause, then acknowledge it: cdpr io ack")
         self._refuse(self._obstacle(self._next()))
         self._rules.restart(self.clock.now_s)
         self._armed = self._outputs[self._contactor] = True
@@ -529,7 +529,7 @@ class SafetyIo:
         age = self.clock.now_s - self._last_poll_s
         return (
             f"{self.name}: no good poll for {age:.2f} s, {self._timeout_s:g} s allowed "
-            f"({self._error or 'no answer has come'})"
+            f"({self._error or 'no answer has arrived'})"
         )
 
     def _obstacle(self, state: IoState, limits: bool = True) -> str:
@@ -542,13 +542,13 @@ class SafetyIo:
         if state.contactor_closed and not self._outputs[self._contactor]:
             feedback = self.profile.contactor.feedback.input
             return (
-                f"the contactor is closed (input {feedback}) though output {self._contactor} is 0; "
-                "is it welded?"
+                f"the contactor is closed (input {feedback}) although output {self._contactor} "
+                "is 0; is it welded?"
             )
         for axis, brake in self._brakes.items():
             if state.brakes_released[axis] and not self._outputs[brake.output.coil]:
                 return (
-                    f"the brake of {axis} is released (input {brake.feedback.input}) though "
+                    f"the brake of {axis} is released (input {brake.feedback.input}) although "
                     f"output {brake.output.coil} is 0; is it stuck?"
                 )
         return state.limits[0] if limits and state.limits else ""
@@ -558,9 +558,9 @@ class SafetyIo:
     def _refuse_in_use(self, state: IoState) -> None:
         if state.contactor_asked or any(state.brakes_asked.values()):
             raise SafetyIoError(
-                f"{self.name}: its outputs for contactor or brakes are on already: another command "
-                "uses it, or has died (the device's own watchdog switches them off then; "
-                "otherwise: cdpr io off)"
+                f"{self.name}: its outputs for contactor or brakes are already on: another "
+                "command uses it, or has died (then the device's own watchdog switches them "
+                "off; otherwise: cdpr io off)"
             )
 
     def _refuse(self, obstacle: str) -> None:
@@ -578,7 +578,7 @@ class SafetyIo:
         brake = self._brakes.get(axis)
         if brake is None:
             known = ", ".join(repr(name) for name in self._brakes) or "none"
-            raise SafetyIoError(f"{self.name}: {axis!r} has no brake there; with one: {known}")
+            raise SafetyIoError(f"{self.name}: {axis!r} has no brake; axes with one: {known}")
         return brake
 
     def _next(self) -> IoState:

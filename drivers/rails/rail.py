@@ -33,7 +33,7 @@ _LOOK_S: Final = 0.01
 _SETTLE_S: Final = 0.3
 _EXTRA_TIME_S: Final = 3.0
 """Time that a move may take in addition to twice its nominal time."""
-_VOIDED: Final = "; the robot is not calibrated any more"
+_VOIDED: Final = "; the robot is no longer calibrated"
 
 
 class RailError(DriverError):
@@ -107,8 +107,8 @@ def move(
     end_m = axis.position_m()
     if abs(end_m - target_m) > rail.tolerance_m:
         raise RailError(
-            f"{rail.name}: stands at {end_m:.4f} m after it was braked, {target_m:.4f} m was "
-            f"wanted ({rail.tolerance_m:g} m allowed): does the brake hold?"
+            f"{rail.name}: stands at {end_m:.4f} m with the brake applied, but the target "
+            f"is {target_m:.4f} m ({rail.tolerance_m:g} m allowed): does the brake hold?"
         )
     return MoveResult(start_m, end_m, pushed_m)
 
@@ -169,11 +169,11 @@ def _follow(
         cables_tight = conditions.cables_tight()
         if cables_tight:
             raise RailError(
-                f"{rail.name}: stopped, for the cables are not slack any more: {cables_tight}"
+                f"{rail.name}: stopped, because the cables are no longer slack: {cables_tight}"
             )
         powered = conditions.powered()
         if powered:
-            raise RailError(f"{rail.name}: stopped, for a winch may have power: {powered}")
+            raise RailError(f"{rail.name}: stopped, because a winch may have power: {powered}")
         if clock.now_s - began > allowed_s:
             raise RailError(f"{rail.name}: did not arrive within {allowed_s:.1f} s")
         clock.sleep(_LOOK_S)
@@ -276,7 +276,7 @@ class Cia402RailAxis:
         self._write(0x6040, _ENABLED | _AT_ONCE | _NEW_SET_POINT)
         self._await_bit(_ACKNOWLEDGE, True, "does not acknowledge the set-point")
         self._write(0x6040, _ENABLED)
-        self._await_bit(_ACKNOWLEDGE, False, "does not take its acknowledgement back")
+        self._await_bit(_ACKNOWLEDGE, False, "does not clear its acknowledgement")
 
     def arrived(self) -> bool:
         """Return whether the target is reached; raises RailError if it lags or loses power."""
@@ -326,7 +326,7 @@ class Cia402RailAxis:
         deadline = self._clock.now_s + self._drive.mode_display_timeout_s
         while (shown := self._network.read_int(self._node, 0x6061)) != mode:
             if self._clock.now_s > deadline:
-                raise self._wrong(f"shows mode {shown} (6061h) and not {int(mode)}")
+                raise self._wrong(f"shows mode {shown} (6061h) instead of {int(mode)}")
             self._clock.sleep(_LOOK_S)
 
     def _reach_state(self, target: State) -> None:
@@ -390,8 +390,8 @@ class ModbusRailAxis:
             self._client.write_registers(watchdog.timeout_register, [units])
         if self._is(self._map.status.enabled):
             raise RailError(
-                f"{self._rail.name}: the drive is enabled already: another command moves it, or "
-                "has died (its watchdog takes the power then; otherwise switch it off)"
+                f"{self._rail.name}: the drive is already enabled: another command moves it, or "
+                "has died (then its watchdog switches it off; otherwise switch it off)"
             )
 
     def close(self) -> None:
@@ -427,7 +427,7 @@ class ModbusRailAxis:
         """Cut the power and clear every command except the brake's, which stays applied."""
         self._write(0)
         self.push(0.0)
-        self._await(self._map.status.enabled, False, _ENABLE_S, "does not give its power up")
+        self._await(self._map.status.enabled, False, _ENABLE_S, "does not switch its power off")
 
     def push(self, share: float) -> bool:
         """Push with a share of the rated torque if the drive can."""
@@ -464,7 +464,7 @@ class ModbusRailAxis:
         self._write(self._command | bit if released else self._command & ~bit)
         wanted = "released" if released else "applied"
         timeout_s = self._map.brake_timeout_s
-        text = f"the brake is not {wanted} {timeout_s:g} s after it was told to"
+        text = f"the brake is not {wanted} {timeout_s:g} s after the command"
         self._await(self._map.status.brake_released, released, timeout_s, text)
 
     def _set(self, register: int, values: list[int]) -> None:

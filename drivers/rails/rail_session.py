@@ -80,9 +80,9 @@ class PowerWatch:
         for node, word in sorted(self._words.items()):
             state = state_of(word)
             if state not in POWER_OFF:
-                return f"node {node} on {self.url} is {state.label}, which is with power"
+                return f"node {node} on {self.url} is {state.label}, which means that it has power"
             if now_s - self._heard_s[node] > _ANSWER_TIMEOUT_S:
-                return f"node {node} on {self.url} does not answer any more: has it power?"
+                return f"node {node} on {self.url} no longer answers: it may have power"
         return ""
 
     def close(self) -> None:
@@ -173,7 +173,8 @@ def require_options(rail: RailProfile, bus: str | None, safety_io: str | None) -
     _bus_of(rail, bus)
     if safety_io is None:
         raise ConfigurationError(
-            f"--safety-io: {rail.name} needs the one that has its brake, {rail.cia402.brake_axis!r}"
+            f"--safety-io: {rail.name} needs the safety I/O with its brake, "
+            f"{rail.cia402.brake_axis!r}"
         )
 
 
@@ -219,9 +220,9 @@ def power_watch(
             watches.append(watch)
         seen = sum(len(watch.nodes) for watch in watches)
         out.note(
-            f"drives beside the rail's that were asked whether they have power: {seen}"
+            f"other drives that were checked for power: {seen}"
             if seen
-            else "no winch's drive was asked whether it has power (--winch-bus)"
+            else "no winch was checked for power (--winch-bus)"
         )
         asking = clock.start(lambda: _keep_asking(clock, watches))
         stack.callback(clock.cancel, asking)
@@ -247,13 +248,13 @@ def slack_watch(
     if sensors is None:
         if not checked:
             raise ConfigurationError(
-                "the cables must be slack: name load cells that measure it (--sensors, "
-                "--tension-port), or look, and say so with --cables-slack-checked"
+                "the cables must be slack: give load cells that measure this (--sensors, "
+                "--tension-port), or check it yourself and give --cables-slack-checked"
             )
         yield lambda: ""
         return
     if port is None:
-        raise ConfigurationError("--sensors: also name the serial line, --tension-port")
+        raise ConfigurationError("--sensors: also give the serial port, --tension-port")
     with TensionSampler(load_tension_sensors(sensors), port, clock) as sampler:
         sampler.await_readings(_FIRST_READINGS_S)
         exchange = sampler.exchange
@@ -280,7 +281,7 @@ def _bus_of(rail: RailProfile, bus: str | None) -> BusUrl:
         raise ConfigurationError(str(error)) from error
     if url.starts_own_simulator:
         raise ConfigurationError(
-            "--bus simbus: has no rails; cdpr sim rail starts one, then simbus:NAME"
+            "--bus simbus: has no rails; start one with `cdpr sim rail`, then give simbus:NAME"
         )
     return url
 

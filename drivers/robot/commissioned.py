@@ -65,8 +65,8 @@ def with_commissioned(robot: Robot, folder: Path | None) -> Robot:
         subfolders = ", ".join(folder_of(axis) for axis in robot.axes)
         raise ConfigurationError(
             f"--commissioned {folder}: no {Paths(folder).profile.name} in a subfolder of an axis "
-            f"of {robot.name}; allowed: what `cdpr commission {robot.profile}` has left, in "
-            f"{subfolders}"
+            f"of {robot.name}; allowed: the results of `cdpr commission {robot.profile}`, "
+            f"in {subfolders}"
         )
     return _with_paths(robot, {i: found.get(i, a.commissioned) for i, a in enumerate(robot.axes)})
 
@@ -102,8 +102,8 @@ def load_profiles(robot: Robot, limits: Limits | None = None) -> CoggingProfiles
     if len(lengths) > 1:
         paths = " and ".join(f"{robot.axes[i].commissioned}" for i in lengths.values())
         raise ConfigurationError(
-            f"{paths}: harmonic.table_Nm of {' and '.join(map(str, lengths))} values; allowed: as "
-            "many for every axis"
+            f"{paths}: harmonic.table_Nm of {' and '.join(map(str, lengths))} values; "
+            "allowed: the same number for every axis"
         )
     return found
 
@@ -163,7 +163,7 @@ def check_drive_identities(
         of = 0 if axis.calibration is None else axis.calibration.drive_serial
         if of and report.serial not in (0, of):
             raise ConfigurationError(
-                f"{robot.path}: axes[{i}].calibration: is of a winch whose drive has serial {of}, "
+                f"{robot.path}: axes[{i}].calibration: is for a drive with serial {of}, but "
                 f"that of axis {axis.name} has {report.serial}; calibrate it again"
             )
         if profile is None:

@@ -100,7 +100,7 @@ class ListeningMachine:
         """Whether a master runs the axes; raises MachineError after a while without one."""
         if not self._led and self.clock.now_s > self._sync_deadline_s:
             raise MachineError(
-                f"no SYNC came for {_MASTER_S:g} s: no other master runs {self._robot.name}; "
+                f"no SYNC for {_MASTER_S:g} s: no other master runs {self._robot.name}; "
                 "start it, then check again"
             )
         return self._led

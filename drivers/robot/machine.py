@@ -94,7 +94,7 @@ class RobotTensions:
         """Return a note about sensors that are not read, or an empty text."""
         if self._profile is not None or robot.tension_sensors is None:
             return ""
-        return f"{robot.tension_sensors} is not read: give --tension-port to have it measure"
+        return f"{robot.tension_sensors} is not read: give --tension-port to use it"
 
 
 _P = ParamSpec("_P")
@@ -229,7 +229,7 @@ class RobotMachine:
                 try:
                     homing.arm(group, place)
                 except DriverError as error:
-                    notes.append(f"{axis.name}: its encoder's index is not sought: {error}")
+                    notes.append(f"{axis.name}: cannot look for its encoder index: {error}")
         return notes
 
     def _open_safety(self, stack: ExitStack) -> SessionSafety | None:
@@ -242,7 +242,9 @@ class RobotMachine:
         safety = self._safety
         if safety is None or safety.braked or not any(a.brake for a in safety.io.profile.axes):
             return ""
-        return "none of the safety I/O's brakes belongs to these nodes (key node_id): none moves"
+        return (
+            "no brake of the safety I/O belongs to these nodes (key node_id), so no brake will move"
+        )
 
     @_as_machine_error
     def prepare(self) -> None:

@@ -44,12 +44,12 @@ def robot_urls(robot: Robot, texts: Sequence[str]) -> dict[str, BusUrl]:
         if url.starts_own_simulator:
             raise ConfigurationError(
                 f"--bus {bus.name}={text}: a single bus needs a name (simbus:NAME); `simbus:` "
-                "alone starts a simulator for all of them"
+                "alone starts a simulator for all buses"
             )
         same = next((name for name, other in urls.items() if other == url), None)
         if same is not None:
             raise ConfigurationError(
-                f"buses {same!r} and {bus.name!r}: both are {url}; allowed: once"
+                f"buses {same!r} and {bus.name!r}: both are {url}; give each URL once"
             )
         urls[bus.name] = url
     return urls
@@ -70,8 +70,8 @@ def refuse_simulated_calibration(robot: Robot, texts: Sequence[str]) -> None:
     if real := real_buses(robot, texts):
         raise ConfigurationError(
             f"{robot.path}: calibration {known.version} was measured on a simulated robot; "
-            f"allowed: simbus, not {' and '.join(real)}; take it back: "
-            f"cdpr calibrate undo {robot.reference}"
+            f"allowed: simbus, not {' and '.join(real)}; to undo it: cdpr calibrate undo "
+            f"{robot.reference}"
         )
 
 
@@ -82,14 +82,14 @@ def _given(robot: Robot, names: list[str], texts: Sequence[str]) -> dict[str, st
         if match is None:
             if len(texts) > 1:
                 raise ConfigurationError(
-                    f"--bus {text}: several are written BUS=URL, one for each bus"
+                    f"--bus {text}: write several buses as BUS=URL, one for each bus"
                 )
             return _for_all(robot, names, text)
         bus = match["bus"]
         if bus not in names:
             raise ConfigurationError(f"--bus {text}: no bus {bus!r}; allowed: {', '.join(names)}")
         if bus in given:
-            raise ConfigurationError(f"--bus {text}: {bus!r} was given before as {given[bus]}")
+            raise ConfigurationError(f"--bus {text}: {bus!r} is already given as {given[bus]}")
         given[bus] = match["url"]
     return given
 
@@ -129,5 +129,5 @@ def require_fit(machine: Winch | Robot) -> None:
     if reason:
         raise ConfigurationError(
             f"{machine.path}: sync_period_s: {machine.sync_period_s:g}: {reason}; "
-            "`cdpr bus budget` shows the parts"
+            "`cdpr bus budget` shows the details"
         )

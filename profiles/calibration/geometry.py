@@ -153,9 +153,7 @@ class GeometryCalibration(Profile):
 
     def to_toml(self) -> str:
         """Return the text of the file."""
-        return self.toml_text(
-            "Geometry of a robot as calibrated; `cdpr calibrate undo` takes it away."
-        )
+        return self.toml_text("Calibrated geometry of a robot; `cdpr calibrate undo` removes it.")
 
     def summary(self) -> dict[str, Any]:
         """Return the data for descriptions and recordings."""

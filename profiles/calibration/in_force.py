@@ -88,9 +88,9 @@ def undo(robot: Robot) -> GeometryCalibration | None:
     """
     path = calibration_file(robot)
     if not is_there(path):
-        raise ProfileError(path, "", "there is no calibration in force, so none to undo")
+        raise ProfileError(path, "", "no calibration is in force")
     if not is_file(path):
-        raise ProfileError(path, "", "is no file, so it cannot be taken back; move it away")
+        raise ProfileError(path, "", "is not a file, so it cannot be undone; move it away")
     older, before = _last_before(robot, path)
     try:
         version = GeometryCalibration.load_file(path).version
@@ -115,9 +115,9 @@ def _require_of(robot: Robot, found: GeometryCalibration, path: Path) -> None:
         raise ProfileError(
             path,
             "geometry_sha256",
-            f"{robot.path}, or a file of its winches, has been changed since this calibration of "
-            f"{found.date:%Y-%m-%d %H:%M}; allowed: recalibrate, or take the files as they are: "
-            f"cdpr calibrate undo {robot.reference}",
+            f"{robot.path}, or a file of its winches, has changed since this calibration of "
+            f"{found.date:%Y-%m-%d %H:%M}; recalibrate, or use the files as they are: cdpr "
+            f"calibrate undo {robot.reference}",
         )
     for key, problem in found.faults(robot):
         raise ProfileError(path, key, problem)

@@ -152,8 +152,8 @@ def listening_socket(name: str) -> socket.socket:
     """
     if _NAME.fullmatch(name) is None:
         raise BusSetupError(
-            f"bus name {name!r}: allowed are 1 to 64 letters, digits, '_', '.' or '-', beginning "
-            "with a letter or digit"
+            f"bus name {name!r}: allowed: 1 to 64 letters, digits, '_', '.' or '-', "
+            "beginning with a letter or digit"
         )
     sock = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET | socket.SOCK_NONBLOCK)
     try:
@@ -230,8 +230,8 @@ class Listener:
         if not self._refusal_printed:
             self._refusal_printed = True
             print(
-                f"simbus:{self._name}: user {uid} may not join; allowed: the user who runs the bus,"
-                " and root (others after this one are not told)",
+                f"simbus:{self._name}: user {uid} may not join; allowed: the user who runs the "
+                "bus, and root (later attempts are not reported)",
                 file=sys.stderr,
                 flush=True,
             )

@@ -121,7 +121,7 @@ class Lead:
         """Make `client` the leader; return the answer for it."""
         clock = self._clock
         if clock.mode is ClockMode.PACED:
-            return {"error": "lead: this bus is paced, its time is the clock's"}
+            return {"error": "lead: this bus is paced; its time is that of the clock"}
         if self.leader not in (None, client):
             return {"error": "lead: another client leads this bus"}
         clock.stop(time.monotonic())
@@ -228,7 +228,7 @@ def _request(packet: bytes) -> tuple[str, Any]:
     if len(packet) == PACKET_BYTES:
         raise _RefusedError(f"a control message has less than {PACKET_BYTES} bytes; send several")
     if is_go(packet):
-        raise _RefusedError("go: only the client that leads the bus moves its time")
+        raise _RefusedError("go: only the client that leads the bus may move its time")
     try:
         ((key, value),) = parse_json(packet, "message").items()
     except (ProfileError, ValueError, AttributeError):

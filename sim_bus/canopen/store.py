@@ -60,7 +60,7 @@ class ParameterStore:
                 key = _key(entry)
                 raise StoreError(
                     f"{self._path}: values.{key}: value {brief(repr(self._values[key]))}; allowed: "
-                    f"what {entry.index:04X}h:{entry.sub} can hold"
+                    f"a value of {entry.index:04X}h:{entry.sub}"
                 ) from None
 
     def keeps(self, index: int) -> bool:

@@ -173,7 +173,7 @@ class LoadPlant(Profile):
     def _slack_or_taut(self) -> Self:
         if self.slack_m > 0.0 and (self.pretension_N > 0.0 or self.height_m > 0.0):
             raise ValueError(
-                f"slack_m = {self.slack_m} must be 0 where pretension_N or height_m is given"
+                f"slack_m = {self.slack_m} must be 0 if pretension_N or height_m is given"
             )
         return self
 

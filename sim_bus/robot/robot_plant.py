@@ -198,13 +198,19 @@ class RobotPlant(PlantFile):
             if point is not None and len(point) != size:
                 raise ValueError(f"{key}: value {value_text(point)}; allowed: {size} coordinates")
         if size == 2 and self.start.rotation_deg is not None:
-            raise ValueError("start.rotation_deg: allowed: in space; in a plane start.angle_deg")
+            raise ValueError(
+                "start.rotation_deg: allowed only in space; in a plane use start.angle_deg"
+            )
         if size == 3 and self.start.angle_deg is not None:
-            raise ValueError("start.angle_deg: allowed: in a plane; in space start.rotation_deg")
+            raise ValueError(
+                "start.angle_deg: allowed only in a plane; in space use start.rotation_deg"
+            )
         for i, motor in enumerate(self.motors or (self.motor,)):
             if motor.load.model_copy(update={"inertia_kg_m2": 0.0}) != LoadPlant():
                 where = f"motors[{i}].load" if self.motors else "motor.load"
-                raise ValueError(f"{where}: allowed: inertia_kg_m2; the platform is the load")
+                raise ValueError(
+                    f"{where}: allowed: only inertia_kg_m2, because the platform is the load"
+                )
 
     def motor_plants(self, n: int, winches: Sequence[Winch] = ()) -> list[Plant]:
         """Return the plant of each of n motors; `winches`, if given, belong to them."""

@@ -42,7 +42,7 @@ class RecordFile:
     def __init__(self, path: Path, header: Mapping[str, Any]) -> None:
         """Create the file, replacing an earlier one; raises OSError."""
         if not may_replace(path, b'{"format": "cdpr-rt'):
-            raise FileExistsError(errno.EEXIST, "is there already and is no log of a simulator")
+            raise FileExistsError(errno.EEXIST, "exists and is not a log of a simulator")
         self._file = path.open("wb", buffering=0)
         self.write(json.dumps(header).encode().ljust(HEADER_BYTES - 1) + b"\n")
 

@@ -91,4 +91,4 @@ def test_a_killed_run_resumes_reports_a_slip_and_its_calibration_can_be_checked(
     assert other.returncode == 1, other.stderr
     change = json.loads(other.stdout.splitlines()[-1])["changes"][0]
     assert change["kind"] == "drum" and 3 in (change["cable"], *change["or_cables"])
-    assert "look at its drum" in other.stderr and "recalibrate" in other.stderr
+    assert "check its drum" in other.stderr and "recalibrate" in other.stderr

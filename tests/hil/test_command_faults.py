@@ -222,7 +222,7 @@ def test_a_drive_that_rejects_the_mode_is_reported(lab: Lab) -> None:
 def test_a_drive_in_a_wrong_mode_is_not_enabled(lab: Lab, sub: int, value: int, shown: str) -> None:
     lab.inject_fault(sub, value)
     told = fails("drive", "enable", WINCH, "--bus", lab.bus)
-    assert "asked for mode 10 (cyclic torque)" in told
+    assert "mode 10 (cyclic torque) was requested" in told
     assert f"reports {shown}" in told
     assert lab.state() == OFF
 
@@ -286,7 +286,7 @@ def test_a_simulator_killed_during_a_sweep_is_reported(tmp_path: Path) -> None:
         lab.process.kill()
         told = complaint(command, FAILED)
     lab.close()
-    assert f"{lab.bus}: the bus has gone away" in told
+    assert f"{lab.bus}: the bus is lost" in told
     assert rows_of(tmp_path) > 2000
 
 

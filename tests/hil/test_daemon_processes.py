@@ -80,7 +80,9 @@ def test_other_processes_leave_the_core_of_a_real_time_loop_alone(tmp_path: Path
         children = daemon.children()
         taken = os.sched_getaffinity(children["loop"])
         if len(taken) > 1:  # the loop could not get a separate core, and reports it
-            assert any("none to itself" in n or "ordinary" in n for n in daemon.status()["notices"])
+            assert any(
+                "no separate core" in n or "ordinary" in n for n in daemon.status()["notices"]
+            )
             return
         for pid in (daemon.process.pid, children["service"]):
             for task in Path(f"/proc/{pid}/task").iterdir():

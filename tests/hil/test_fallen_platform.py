@@ -73,7 +73,9 @@ def test_tighten_does_not_pull_at_a_platform_that_has_turned_over(folder: Path) 
         assert highest_N(robot, since) < LOOSE_N
         robot.program("tighten", **{"from": "lengths"})
         robot.finish(120.0)  # each cable is reeled in separately by decimetres at 50 mm/s
-        assert re.search(r"turned by \d+ deg.*: it is not pulled at", robot.progress["trouble"])
+        assert re.search(
+            r"turned by \d+ deg.*: the cables are not tightened", robot.progress["trouble"]
+        )
         assert robot.progress["stage"] == "slack" and not robot.progress["tight"]
         assert highest_N(robot, since) < TAKES_UP_N
 

@@ -135,7 +135,7 @@ def test_conditions_of_a_move_are_checked_again_after_a_slow_disk_write(
     why = f"not moved while a winch has power: node 1 on {bus} is" if meanwhile == "power" else ""
     said = str(outcome.exception)
     assert (why or "stopped on request") in said
-    assert said.endswith("; the robot is not calibrated any more")
+    assert said.endswith("; the robot is no longer calibrated")
     assert abs(moved_m) < 2e-4 and rails.braked("cia402")  # play of the brake
     assert not enabled
 
@@ -171,7 +171,7 @@ def test_a_brake_that_does_not_hold_is_detected_before_the_move(rails: Rails, ki
     [
         (RailFault.TARGET_LOST, "holding register 100 was set to"),
         (RailFault.DRIVE_FAULT, "the drive is in fault"),
-        (RailFault.BRAKE_STUCK, f"the brake is not released {ANSWER_S:g} s after it was told to"),
+        (RailFault.BRAKE_STUCK, f"the brake is not released {ANSWER_S:g} s after the command"),
         (RailFault.TRUNCATED, "the answer was cut off after"),
         (RailFault.SILENT, f"no answer within {ANSWER_S:g} s from unit 1"),
     ],
@@ -201,7 +201,7 @@ def test_tight_cables_prevent_or_end_a_move(rails: Rails) -> None:
     command = rails.move("cia402", before + 0.5, *cells)
     await_motion(rails, "cia402", command, before + 0.01)
     rails.pull(40.0)
-    assert "the cables are not slack any more" in result(command, FAILED)["error"]
+    assert "the cables are no longer slack" in result(command, FAILED)["error"]
     assert rails.braked("cia402")
     assert before + 0.01 < rails.position_m("cia402") < before + 0.3
 
@@ -228,7 +228,7 @@ def test_a_modbus_rail_obeys_the_safety_io_and_only_one_command(rails: Rails) ->
     slack = ("--cables-slack-checked", "--safety-io", rails.io_device.reference)
     command = rails.move("modbus", before + 0.5, *slack)
     await_motion(rails, "modbus", command, before + 0.005)
-    with pytest.raises(RailError, match="enabled already: another command moves it"):
+    with pytest.raises(RailError, match="already enabled: another command moves it"):
         ModbusRailAxis(load_rail(rails.modbus), CLOCK).open()
     rails.io_device.press()
     assert "the emergency-stop chain is open" in result(command, FAILED)["error"]

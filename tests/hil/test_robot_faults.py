@@ -275,7 +275,7 @@ def test_a_cable_slack_after_landing_is_reported_as_possibly_broken(
     end_of_fault(hanging)
     notes = [note for note in hanging.status()["notices"] if "seems broken" in note]
     assert notes
-    assert all("or the platform came to rest" in note for note in notes)
+    assert all("or the platform landed" in note for note in notes)
 
 
 def test_two_cables_that_break_together_are_both_reported(hanging: LockstepRobot) -> None:

@@ -37,7 +37,7 @@ CELL, IO, CIA402, MODBUS = (
         (CELL, "[[sensors]]", '[[sensors]]\ncable = "x"\nunit = 1\n[[sensors]]', "unit [1, 1]; "),
         (IO, "{ input = 2 }", "{ input = 3 }", "input 3 is that of axes[0].brake.feedback already"),
         (IO, "coil = 1 }", "coil = 0 }", "coil 0 is that of contactor.output already"),
-        (IO, "{ coil = 1 }", "{ coil = 1, inverted = true }", "a brake to hold"),
+        (IO, "{ coil = 1 }", "{ coil = 1, inverted = true }", "a brake must hold"),
         (IO, "trip_timeout_s = 0.2", "trip_timeout_s = 0.03", "at least two poll periods (0.04)"),
         (IO, "input = 7,", "input = 4000,", "input 4000; allowed: less than 1968 from the first"),
         (IO, "port = 502", "port = 70000", "port: value 70000; allowed: less than or equal to 6"),

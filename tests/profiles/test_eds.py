@@ -143,7 +143,7 @@ def test_expressions_with_the_node_id_are_evaluated(
     [
         (variable("2000", DataType="0x00ZZ"), "[2000] DataType: value '0x00ZZ'; allowed"),
         (variable("2000", DataType=""), "[2000] DataType: is missing"),
-        (variable("2000", DataType="0x0040"), "[2000] DataType: value '0x0040' is no type"),
+        (variable("2000", DataType="0x0040"), "[2000] DataType: value '0x0040' is not a type"),
         (variable("2000", AccessType="r/w"), "[2000] AccessType: value 'r/w'; allowed: ro, wo"),
         (variable("2000", PDOMapping="yes"), "[2000] PDOMapping: value 'yes'; allowed: 0, 1"),
         (variable("2000", DefaultValue="lots"), "[2000] DefaultValue: value 'lots'; allowed"),
@@ -154,7 +154,7 @@ def test_expressions_with_the_node_id_are_evaluated(
         (variable("2000sub1"), "[2000sub1]: there is no section [2000] for it; left out"),
         (variable("2000") + variable("2000sub1"), "2000h is a variable, without sub-indices"),
         (variable("2000") + variable("2000", DataType="5"), "[2000]: is there twice"),
-        ("[2000\nParameterName=x\n", "'[2000' is no section; left out with its keys"),
+        ("[2000\nParameterName=x\n", "'[2000' is not a section; left out with its keys"),
         ("some words\n", "'some words' is not KEY=VALUE; left out"),
         ("[DeviceComissioning]\nNodeID=200\n", "NodeID: value '200'; allowed: 1 to 127"),
         ("[DeviceComissioning]\nBaudrate=501\n", "Baudrate: value '501'; allowed: 10, 20"),
@@ -218,9 +218,9 @@ def test_files_not_in_ascii_are_read_and_remarked_on(tmp_path: Path, encoding: s
 @pytest.mark.parametrize(
     ("content", "problem"),
     [
-        (b"", "is no EDS or DCF: it has no section"),
-        (b"\x7fELF\x00\x01\x02" * 50, "is no EDS or DCF"),
-        (b"<xml/>", "is no EDS or DCF"),
+        (b"", "is not an EDS or DCF: it has no section"),
+        (b"\x7fELF\x00\x01\x02" * 50, "is not an EDS or DCF"),
+        (b"<xml/>", "is not an EDS or DCF"),
         (HEAD.encode(), r"\[1000\]: is missing; every CANopen device"),
         (
             (

@@ -98,7 +98,7 @@ def test_undo_restores_one_version_at_a_time(robot: Robot) -> None:
     assert undo(robot) is None
     assert calibrated(robot) is robot
     assert next_version(robot) == 3, "no version number is used twice"
-    with pytest.raises(ProfileError, match="none to undo"):
+    with pytest.raises(ProfileError, match="no calibration is in force"):
         undo(robot)
 
 
@@ -108,7 +108,7 @@ def test_calibration_is_rejected_after_the_robots_geometry_changed(robot: Robot)
     robot.path.write_text(text + "\n# a remark\n")
     assert calibrated(load_robot(robot.path)).calibration is not None
     robot.path.write_text(text.replace("home_m = [0.0,", "home_m = [0.01,", 1))
-    with pytest.raises(ProfileError, match=r"has been changed since .* cdpr calibrate undo"):
+    with pytest.raises(ProfileError, match=r"has changed since .* cdpr calibrate undo"):
         calibrated(load_robot(robot.path))
 
 
@@ -184,7 +184,7 @@ def test_a_calibration_that_cannot_be_read_is_an_error(robot: Robot) -> None:
     assert calibrated(robot).calibration is not None, "a link to a file is as good as the file"
     elsewhere.rename(elsewhere.with_name("unmounted"))
     for refused in (calibrated, next_version, undo):
-        with pytest.raises(ProfileError, match=r"is a link to .*, which is not there; mount or"):
+        with pytest.raises(ProfileError, match=r"is a link to .*, which does not exist; mount or"):
             refused(robot)
     path.unlink()
     path.mkdir()
@@ -200,5 +200,5 @@ def test_a_calibration_folder_that_is_not_mounted_is_an_error(
     shipped = load_robot("planar-4")
     assert calibrated(shipped) is shipped
     (tmp_path / "cdpr-rt").symlink_to(tmp_path / "share")
-    with pytest.raises(ProfileError, match=r"cdpr-rt is a link to .*share, which is not there"):
+    with pytest.raises(ProfileError, match=r"cdpr-rt is a link to .*share, which does not exist"):
         calibrated(shipped)

@@ -87,7 +87,7 @@ def test_values_of_the_file_are_read(tmp_path: Path) -> None:
         (("mass_kg = 2.0", "mass_kg = 0.0"), "platform.mass_kg", "greater than 0"),
         (("mass_kg = 2.0", "mass_kg = nan"), "platform.mass_kg", "finite number"),
         (("mass_kg", "mas_kg"), "platform.mas_kg", "did you mean 'mass_kg'?"),
-        (("tension_min_N = 20.0\n", "\n"), "limits.tension_min_N", "where there is a [platform]"),
+        (("tension_min_N = 20.0\n", "\n"), "limits.tension_min_N", "with a [platform]"),
     ],
 )
 def test_impossible_platforms_are_rejected(
@@ -122,7 +122,7 @@ HOME = "home_m = [0.0, 0.0, 0.5]"
         (HALL, INERTIA, "inertia_kg_m2 = 1.0", "platform.inertia_kg_m2",
          "value [1.0]; allowed: 6 numbers in space"),
         (HALL, "16.7, 0.0,", "16.7, 17.0,", "platform.inertia_kg_m2", "all above 0"),
-        (HALL, "16.7, 0.0,", "40.0, 0.0,", "platform.inertia_kg_m2", "sum of the two others"),
+        (HALL, "16.7, 0.0,", "40.0, 0.0,", "platform.inertia_kg_m2", "sum of the other two"),
         (HALL, HOME, HOME + "\nhome_rotation_rad = [0.0, 0.0, 90.0]",
          "platform.home_rotation_rad", "is it in degrees?"),
         (HALL, HOME, HOME + "\nhome_rotation_rad = 0.1", "platform.home_rotation_rad",
@@ -159,9 +159,9 @@ HOME = "home_m = [0.0, 0.0, 0.5]"
          "platform.tension_distribution", "'FILE.py:NAME'"),
         (CAMERA, "[0.0, 0.0, 0.0]", "[0.1, 0.0, 0.0]", "axes", "all anchor points alike"),
         (CAMERA, "mass_kg", 'controlled = ["x", "y", "z", "rz"]\nmass_kg', "platform.controlled",
-         "no angle where all anchor points are alike"),
+         "no angle if all anchor points are equal"),
         (CAMERA, "mass_kg", "workspace_angle_rad = 0.1\nmass_kg", "platform.workspace_angle_rad",
-         "allowed: 0 where no angle is controlled"),
+         "allowed: 0 if no angle is controlled"),
         (WALL, "exit_point_m = [-2.0, 3.0]", "exit_point_m = [-350.0, 3.0]", "axes[0].exit_point_m",
          "are they in millimetres?"),
     ],
@@ -203,7 +203,7 @@ def test_polygon_centroid_allows_at_most_two_more_cables_than_directions(
     polygon = 'controlled = ["x", "y", "z"]\ntension_distribution = "polygon-centroid"\nmass_kg'
     text = re.sub(r"workspace_angle_rad.*\n", "", HALL.replace("mass_kg", polygon, 1))
     path.write_text(text)
-    with pytest.raises(ProfileError, match="allowed: for up to 5 cables"):
+    with pytest.raises(ProfileError, match="allowed for up to 5 cables"):
         load_robot(path)
 
 

@@ -106,7 +106,7 @@ def test_a_limit_is_one_number_for_all_axes_or_one_for_each(tmp_path: Path) -> N
             "limits",
             "tension_min_N[1]: value 20; allowed: below tension_max_N (10)",
         ),
-        ({"limits": "slack_N = 2.0"}, "limits", "slack_N: allowed: along with tension_min_N"),
+        ({"limits": "slack_N = 2.0"}, "limits", "slack_N: allowed only with tension_min_N"),
         ({"limits": "missed_cycles = -1"}, "limits.missed_cycles", "greater than or equal to 0"),
         (
             {"reactions": 'speed = "clamp"'},
@@ -115,8 +115,8 @@ def test_a_limit_is_one_number_for_all_axes_or_one_for_each(tmp_path: Path) -> N
         ),
         ({"reactions": 'safety_alarm = "hold"'}, "limits.reactions.safety_alarm", "'torque off'"),
         ({"reactions": 'sped = "hold"'}, "limits.reactions.sped", "did you mean 'speed'?"),
-        ({"first": 'name = "axis 2"'}, "axes[1].name", "each once, axes[0] has it"),
-        ({"first": 'name = "a"', "second": 'name = "a"'}, "axes[1].name", "axes[0] has it"),
+        ({"first": 'name = "axis 2"'}, "axes[1].name", "each once, but axes[0] also has it"),
+        ({"first": 'name = "a"', "second": 'name = "a"'}, "axes[1].name", "axes[0] also has it"),
         ({"first": "cable_sign = 0"}, "axes[0].cable_sign", "-1 or 1"),
         ({"top": "master_heartbeat_s = 0.001"}, "master_heartbeat_s", "equal to 0.01"),
         (

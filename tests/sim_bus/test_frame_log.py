@@ -112,7 +112,7 @@ def test_two_simulators_write_to_different_files(tmp_path: Path) -> None:
 def test_a_recording_of_a_real_bus_is_not_overwritten(tmp_path: Path) -> None:
     path = tmp_path / "frames.log"
     path.write_text("(1764335419.123456) can0 080#\n")
-    with pytest.raises(OSError, match="is no log of a simulator"):
+    with pytest.raises(OSError, match="is not a log of a simulator"):
         FrameLog(path)
     assert path.read_text() == "(1764335419.123456) can0 080#\n"
 

@@ -53,7 +53,9 @@ def test_cogging_profiles_with_tables_of_different_length_are_rejected(learnt: P
     table["harmonic"]["table_Nm"] = [row[::2] for row in table["harmonic"]["table_Nm"]]
     path.write_text(json.dumps(table))
     told = said(cdpr_here("run", "planar-3", "--bus", "simbus:", "--commissioned", learnt))
-    assert "harmonic.table_Nm of 512 and 256 values; allowed: as many for every axis" in told
+    assert (
+        "harmonic.table_Nm of 512 and 256 values; allowed: the same number for every axis" in told
+    )
 
 
 def make_deep(path: Path) -> None:
@@ -84,8 +86,8 @@ def make_huge(path: Path) -> None:
     [
         (make_deep, "line 1: is too deep; allowed: 16 levels"),
         (make_long, "line 1: a number of 6000 digits; allowed: 99"),
-        (make_pipe, "is no regular file; allowed: a file, or a link to one"),
-        (make_device, "is no regular file; allowed: a file, or a link to one"),
+        (make_pipe, "is not a regular file; allowed: a file, or a link to one"),
+        (make_device, "is not a regular file; allowed: a file, or a link to one"),
         (make_huge, "is too long; allowed: up to"),
     ],
 )

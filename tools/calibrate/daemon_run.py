@@ -211,7 +211,7 @@ def _camera_setup(
 
 
 def _require_same(option: str, path: Path | None, kept: Profile) -> None:
-    """Raise BadInputError if a file differs from that of the first pose; ProfileError."""
+    """Raise BadInputError if a file differs from that of the first pose; raises ProfileError."""
     if path is None:
         return
     given = type(kept).load_file(path).model_dump()
@@ -244,12 +244,12 @@ def lines(robot: Robot, data: CalibrationData) -> list[str]:
 
 
 Ask = Callable[[int], None]
-"""Asks a person what they measured at the pose, counted from 1, at which the platform stands."""
+"""Asks a person for the measured position at a pose, counted from 1."""
 
 
 @contextmanager
 def going_on(kept: DaemonPoses) -> Iterator[None]:
-    """Add to any error of the block how to go on; StoppedError becomes WorkFailedError."""
+    """Add to any error of the block how to continue; StoppedError becomes WorkFailedError."""
     try:
         yield
     except StoppedError:
@@ -316,11 +316,12 @@ _NAMES: Final = ("x", "y", "z")
 _BYTES: Final = 4096
 _MOVED_m: Final = 2e-3
 _DOUBTFUL_m: Final = 0.2
-"""Ask again for a point that is further off: no exit point may be moved by more."""
+"""A point that is further off must be typed twice: no exit point may move by more."""
 
 
 def require_points_of(poses: int, path: Path) -> None:
-    """Raise BadInputError if a file has points of poses that have not been read; ProfileError.
+    """Raise BadInputError if a file has points of poses that have not been read; raises
+    ProfileError.
 
     They were measured at poses of an earlier run, whose data are no longer in the folder.
     """

@@ -1,4 +1,4 @@
-"""Finish a measured calibration: identify, print, report, and put a good result in force."""
+"""Finish a measured calibration: identify, print, report, and adopt a good result."""
 
 from __future__ import annotations
 
@@ -85,7 +85,7 @@ def with_hand_eye(data: CalibrationData, known: HandEye | None) -> CalibrationDa
 def stop_criterion(
     out: Output, robot: Robot, points: Path | None, geometry: CableGeometry
 ) -> Callable[[CalibrationData], str | None]:
-    """Return the check after each batch of poses: it reports faults and says if they suffice."""
+    """Return the check after each batch: it reports faults and whether the poses suffice."""
     named: set[str] = set()
 
     def check(data: CalibrationData) -> str | None:
@@ -127,12 +127,12 @@ def finish(
     compare: CompareWithTruth | None = None,
     hand_eye: Path | None = None,
 ) -> None:
-    """Identify, print, report, and put a good calibration in force; `source` is the data file.
+    """Identify, print, report, and adopt a good calibration; `source` is the data file.
 
     `hand_eye` is the file of the hand-eye transform, if it does not come from the data.
 
-    A calibration without significant changes is put in force only with `adopt`, and not if it
-    predicts held-out poses worse than the robot's file does, by more than noise.
+    A calibration without significant changes is adopted only with `adopt`, and not if it predicts
+    held-out poses significantly worse than the robot's file.
 
     Raises typer.Exit with status 1 if the calibration is not good.
     """
@@ -165,7 +165,7 @@ def finish(
 
 
 def _why_not(outcome: Outcome, dry_run: bool) -> str | None:
-    """Return why a calibration is not put in force, None if it is."""
+    """Return why a calibration is not adopted, None if it is."""
     if dry_run:
         return "--dry-run"
     if not outcome.good:
@@ -187,7 +187,7 @@ def _path_text(path: Path | None) -> str:
 def _taken(
     outcome: Outcome, source: Path, files: CalibrationFiles, simulated: bool
 ) -> tuple[dict[str, Any], list[str]]:
-    """Put a good calibration in force; return it for JSON, and the lines to print."""
+    """Adopt a good calibration; return it for JSON, and the lines to print."""
     robot = outcome.robot
     found, path = _take_over(outcome, files, simulated)
     if not simulated or source.with_name(COUNTED).exists():
@@ -230,7 +230,7 @@ def _reported(
 def _take_over(
     outcome: Outcome, files: CalibrationFiles, simulated: bool
 ) -> tuple[GeometryCalibration, Path]:
-    """Put a good calibration in force, if the robot can work with it; raises ProfileError."""
+    """Adopt a good calibration, if the robot can work with it; raises ProfileError."""
     robot = outcome.robot
     before = "" if simulated else not_calibrated_reason(robot.profile)
     found = calibration_of(

@@ -38,7 +38,7 @@ from cdpr_tools.report.style import (
 _COLOURS = 10
 """Largest number of cables that strong colours alone distinguish."""
 _PLACED_m = 0.5
-"""A marker whose position is known no better than this was left out of the fit."""
+"""Standard deviation of a marker's position from which the marker counts as left out of the fit."""
 _ARROW_m = 0.08
 """Length at which an error of typical size is drawn."""
 _FINE, _COARSE = 15, 3
@@ -160,7 +160,7 @@ def held_out_figure(comparison: TruthComparison) -> Figure:
 
 
 def markers_figure(found: Fit) -> Figure:
-    """Draw markers from above, how well they are known against each other, and the camera."""
+    """Draw markers from above with their relative uncertainty, and the camera."""
     camera, poses = found.camera, found.poses
     assert camera is not None  # only drawn for a calibration with a camera
     placed, std_m = _known_to(found, camera)

@@ -36,11 +36,12 @@ class Places:
     """Places (m, d), the most informative first, and the place from which they are reached."""
 
     middle: FloatArray
-    """(d,); the ways from here to chosen places and back are free of contact and held."""
+    """(d,); on the ways from here to chosen places and back there is no contact, and the cables can
+    hold the platform."""
     chosen: FloatArray
 
     def batches(self) -> Iterator[FloatArray]:
-        """Yield them in batches; in a batch each place is the nearest to the previous one."""
+        """Yield the places in batches; in a batch each place is the nearest to the previous one."""
         last = self.middle
         scale = np.ptp(self.chosen, axis=0) + 1e-9
         for first in range(0, len(self.chosen), BATCH):

@@ -30,7 +30,7 @@ _MOST_BAD = 5
 
 
 class PoseCamera:
-    """Grabs an image at each pose; repeats twice if no image comes or it cannot be used.
+    """Takes an image at each pose; tries again twice if there is no usable image.
 
     Images go into `folder`. Raises CameraError if the camera cannot be opened.
     """

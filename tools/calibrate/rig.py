@@ -190,7 +190,7 @@ def simulated_rig(
 ) -> Iterator[RigOperator]:
     """Open a robot on its own simulator; raises CommandError, DriverError and ProfileError.
 
-    With `scanner` readings contain the scanner's pose; `camera` opens the camera of a URL. The
+    With `scanner`, readings contain the scanner's pose; `camera` opens the camera of a URL. The
     robot is shut down under control however the block ends, unless it no longer responds.
     """
     with TemporaryDirectory(prefix="cdpr-calibrate-") as folder:

@@ -368,7 +368,7 @@ class _Measuring:
         self._advance(float(count))
 
     def go(self, robot: Robot, places: Places, criterion: StopCriterion) -> None:
-        """Read home, then one batch of places after another until there are enough."""
+        """Read home, then batches of places until there are enough."""
         try:
             self._go(robot, places, criterion)
         finally:

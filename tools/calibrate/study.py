@@ -60,7 +60,7 @@ _STEPS = 12
 _DIRECTION: Final = (1.0 / 3.0, 2.0 / 3.0, 2.0 / 3.0)
 """Direction of a bias of position and rotation: arbitrary, but the same in all trials."""
 _NONE_m: Final = 1e-9
-"""Errors below this come from rounding alone."""
+"""Errors below this come only from rounding."""
 _ENDS: Final = (("exit", FORWARD, "exit points a"), ("offset", BACKWARD, "initial lengths ρ_0"))
 _UNITS: Final = {
     "length": ("length_mm", "lengths (mm)"),

@@ -1,4 +1,4 @@
-"""Booted drives, run by a loop for a command; however it ends, they are without power."""
+"""Booted drives, run by a loop for a command; they have no power after any end."""
 
 from __future__ import annotations
 
@@ -164,7 +164,7 @@ class Session(Operator):
         self.set_mode(self.device.torque_modes)
 
     def expect_index(self) -> None:
-        """Let the first drive latch its index in the ordinary motion that follows."""
+        """Let the first drive latch its index during the following motion."""
         group, place = self.device.group_of(0)
         self.run_task(lambda: touch_probe.arm(group, place))
 

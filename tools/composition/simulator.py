@@ -25,13 +25,12 @@ _numbers = count(1)
 
 
 class _OwnProcess:
-    """A command of this package that runs until its standard input closes, also if we die."""
+    """A command of this package that ends when its standard input closes, so also when we die."""
 
     def __init__(self, *command: str, meanwhile: Callable[[], None] | None = None) -> None:
         """Run it and wait until it is ready; raises its BadInputError and WorkFailedError.
 
-        It reports that it is ready in one line of JSON: `ready`. `meanwhile` is called while it
-        starts.
+        When ready, it prints one line of JSON with `ready`. `meanwhile` is called while it starts.
         """
         self.process = subprocess.Popen(
             module_command("cdpr_tools.cli", *command, "--exit-with-stdin"),

@@ -1,4 +1,4 @@
-"""The daemon's two processes as their launcher sees them, and how they end with it."""
+"""Start and end of the daemon's two processes, which end together with their launcher."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def signal_launcher(launcher_pid: int, number: signal.Signals) -> None:
 
 
 def is_running(pid: int) -> bool:
-    """Whether the process exists; a process that has ended but was not waited for counts too."""
+    """Whether the process exists; a zombie counts too."""
     try:
         os.kill(pid, 0)
     except ProcessLookupError:
@@ -61,7 +61,7 @@ def is_running(pid: int) -> bool:
 
 
 _STOP_S: Final = 30.0
-"""A controlled stop from full speed, including the brakes, takes less, besides lowering."""
+"""Longest time of a controlled stop from full speed, with brakes but without lowering."""
 
 
 def loop_stop_s(block: SharedBlock) -> float:
@@ -121,7 +121,7 @@ class Child:
         return now - self._used_at
 
     def stop(self, timeout_s: float) -> bool:
-        """Terminate it and wait; return whether it ended before it had to be killed."""
+        """Terminate it and wait; return False if it had to be killed."""
         if self.process.poll() is None:
             self.process.terminate()
         try:

@@ -83,8 +83,8 @@ class EmergencyStop:
     def outcome(self) -> EmergencyStopResult:
         """Wait until every drive has confirmed, or it is certain that some will not.
 
-        A loop that does not turn is killed: its drives stop when its heartbeat ends.
-        A loop that only listens is left alone.
+        A loop that hangs is killed: its drives stop when its heartbeat ends. A loop that only
+        listens continues.
         """
         if self._known is not None:
             return self._known
@@ -136,7 +136,8 @@ class EmergencyStop:
         return (time.monotonic_ns() - then_ns) * 1e-9
 
     def _cycling(self) -> Row | None:
-        """Return the row of the newest cycle if it began after the request to cut the power."""
+        """Return the row of the newest cycle if that cycle began after the request to cut the
+        power."""
         assert self._block is not None  # attached
         row = newest_row(self._block)
         return row if row is not None and int(row["stamp_ns"]) > self._asked_ns else None
@@ -223,11 +224,11 @@ def launcher_left(socket: Path) -> str:
 
 
 def end_leftover_processes(robot: str | None, socket: Path | None) -> list[str]:
-    """End a daemon whose service does not answer; return the actions, as lines.
+    """End a daemon whose service does not answer; return lines that describe the actions.
 
-    A loop without a service stops under control. A daemon that is starting ends as by Ctrl-C.
-    If neither runs, do nothing and return no line. Raises BadInputError if several run
-    and none was named, WorkFailedError if it belongs to another user or does not end.
+    A loop without a service stops under control. A daemon that is starting ends as by Ctrl-C. If
+    neither runs, do nothing and return no line. Raises BadInputError if several run and none was
+    named, WorkFailedError if it belongs to another user or does not end.
     """
     paths = find_loops(robot) if socket is None else [LoopFile.beside(socket)]
     found = [(path, LoopFile.read(path)) for path in paths if _is_there(path)]

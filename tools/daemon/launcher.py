@@ -55,9 +55,9 @@ class ServiceManager:
         return bool(self._address)
 
     def notify(self, **fields: str | int) -> None:
-        """Send assignments such as READY=1; those that the manager does not accept now are kept.
+        """Send assignments such as READY=1; keep those that the manager does not accept now.
 
-        For each name only the newest is kept, until `retry` succeeds.
+        For each name the newest one is kept until `retry` succeeds.
         """
         self._pending.update({key: _one_line(str(value)) for key, value in fields.items()})
         self.retry()
@@ -252,7 +252,8 @@ class Launcher:
             )
 
     def _write_loop_file(self) -> None:
-        """Name the loop's process in the runtime folder for `cdpr estop`, once it would obey.
+        """Write the loop's file into the runtime folder for `cdpr estop`, once the loop obeys
+        signals.
 
         A daemon whose loop cannot be named ends before it reports that it is ready.
         """
@@ -278,7 +279,8 @@ class Launcher:
         self._loop_file = named
 
     def _leave_core(self) -> None:
-        """Leave the loop's core, once it has one, to the loop; a new service inherits that."""
+        """Move this process off the loop's core, once the loop has one; a new service inherits
+        that."""
         if self._left_core or self._loop.end:
             return
         loop_cores = os.sched_getaffinity(self._loop.process.pid)
@@ -333,7 +335,7 @@ class Launcher:
         self._fault = fault
 
     def _report(self, status: dict[str, Any], now: float) -> None:
-        """Inform the service manager; feed its watchdog while the loop lives and turns."""
+        """Inform the service manager; feed its watchdog while the loop runs."""
         text = _summary(status)
         if text == self._reported:
             self._manager.retry()

@@ -40,7 +40,7 @@ _MOST_FD = 1 << 20
 
 
 class LoopFile(BaseModel):
-    """Names the process that runs a robot's loop, and its shared memory."""
+    """The process that runs a robot's loop, and its shared memory."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
@@ -105,7 +105,7 @@ class LoopFile(BaseModel):
         return found
 
     def open(self) -> int | None:
-        """Return a pidfd of the process; None if it has ended or its loop has turned last.
+        """Return a pidfd of the process; None if it has ended or its loop has run its last turn.
 
         Raises WorkFailedError if it is another user's, or `POWER_OFF_SIGNAL` would end it.
         """
@@ -147,7 +147,8 @@ class LoopFile(BaseModel):
 def find_loops(robot: str | None) -> list[Path]:
     """Return the files that name the loops of this robot, by name or file, or of any robot.
 
-    A loop has the name of its robot, as its socket does. For a file, it must run that very file.
+    A loop and its socket have the name of the robot. If a file is given, the loop must run that
+    file.
     """
     paths = find_loop_files()
     return paths if robot is None else [path for path in paths if _is_of(path, robot)]

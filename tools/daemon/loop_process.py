@@ -112,7 +112,7 @@ def _lengths_file(robot: Robot, settings: RunSettings) -> Path | None:
 
 
 def _open_paths(paths: PathStore, robot: Robot, settings: RunSettings, block: SharedBlock) -> None:
-    """Load planned paths from their folder; a robot without a folder runs all the same."""
+    """Load planned paths from their folder; without a folder the robot runs without paths."""
     try:
         paths.open(
             paths_folder(robot.profile), block.counters["path"], simulated=settings.simulated

@@ -77,7 +77,7 @@ def unsearched_folders() -> str:
 
 
 def found_instead(running: Iterable[Path], remark: str = "") -> str:
-    """Return as text which other daemons run, if one was not found, and what was not searched.
+    """Return as text the other running daemons and the folders that were not searched.
 
     `running` are their files, `remark` is added to them; empty if there is nothing to report.
     """

@@ -118,7 +118,7 @@ class RunSettings(BaseModel):
     record: _Path | None = None
     """Folder for recordings; None to record nothing."""
     keep: Retention = Retention()
-    """Rules for the recordings that stay in that folder."""
+    """Rules for which recordings to keep in that folder."""
     live: int | None = Field(default=None, ge=0, le=_HIGHEST_PORT)
     """Port of the live view, on loopback."""
     live_origins: tuple[str, ...] = ()
@@ -155,10 +155,10 @@ class RunSettings(BaseModel):
         return self.key_file is not None or self.key_fd >= 0
 
     def with_key_loaded(self) -> RunSettings:
-        """Return settings that do not need the key's file: the file is read now, once.
+        """Return settings that contain the key; its file is read now, once.
 
-        Processes started later inherit the key in sealed memory, even if the file changes.
-        Raises BadInputError.
+        Processes started later inherit the key in sealed memory, even if the file changes. Raises
+        BadInputError.
         """
         if self.key_file is None:
             return self

@@ -71,7 +71,7 @@ def _socketcan() -> HostFinding:
 
 
 def can_interface(interface: CanInterface) -> HostFinding:
-    """Check one CAN interface: is it up, does its queue hold a cycle, how is its controller."""
+    """Check one CAN interface: its link, its transmit queue, and the state of its controller."""
     name = interface.name
     what = f"CAN {name}"
     found = f"{interface.state}, queue of {interface.queue_frames} frames"
@@ -151,7 +151,7 @@ def _scheduling() -> HostFinding:
 
 
 def _fifo_refused() -> str:
-    """Try it briefly, because a control group may forbid what the limits allow."""
+    """Try SCHED_FIFO briefly, because a control group may forbid what the limits allow."""
     before = os.sched_getscheduler(0), os.sched_getparam(0)
     try:
         os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(1))

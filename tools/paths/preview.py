@@ -170,7 +170,7 @@ def lines(shown: Preview, robot: Robot, table: dict[str, Any]) -> list[str]:
 
 
 def obstacle_text(shown: Preview) -> str:
-    """Return where and why a path cannot be followed; an empty text if it can."""
+    """Return where and why the path cannot be followed; an empty text if it can be."""
     obstacle = shown.obstacle
     if obstacle is None:
         return ""

@@ -457,7 +457,7 @@ def _finish(
         inverse = cho_solve(cho_factor(S / np.outer(root, root)), np.diag(1.0 / root)).T / root
     except LinAlgError:
         raise BundleError(
-            "what the images show leaves open where a marker or the camera is"
+            "the images do not determine the place of every marker and of the camera"
         ) from None
     sheets = sheet_errors(now, used, weights)
     covariance = np.zeros((now.parameters, now.parameters))

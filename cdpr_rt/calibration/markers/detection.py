@@ -260,7 +260,7 @@ class MarkerDetector:
 def _exposure_problem(pixels: NDArray[np.uint8]) -> str | None:
     low, high = np.percentile(pixels, (1.0, 99.5))
     if high < _DARK:
-        return f"black: hardly a pixel is brighter than {high:.0f} of 255"
+        return f"black: almost no pixel is brighter than {high:.0f} of 255"
     if high - low < _FLAT:
         return f"without contrast: grey levels from {low:.0f} to {high:.0f} of 255"
     return None
@@ -328,8 +328,8 @@ class Board:
             )
         except cv2.error:
             raise InvalidRequestError(
-                f"board of {self.columns} x {self.rows} squares: {self.dictionary} has too few "
-                "markers for it, or it is too small"
+                f"board of {self.columns} x {self.rows} squares: the board is too small, or "
+                f"{self.dictionary} has too few markers"
             ) from None
 
 
@@ -359,8 +359,8 @@ def fit_intrinsics(images: Sequence[tuple[str, NDArray[np.uint8]]], board: Board
         why = f"; left out: {'; '.join(left_out[:3])}" if left_out else ""
         cause = "" if views else "".join(f"; {text}" for text in _why_none(images, board))
         raise CalibrationError(
-            f"{len(views)} images show the board; {_LEAST_VIEWS} are the least, "
-            f"{_ENOUGH_VIEWS} enough{cause}{why}"
+            f"{len(views)} images show the board; {_LEAST_VIEWS} are needed, "
+            f"{_ENOUGH_VIEWS} recommended{cause}{why}"
         )
     height, width = images[0][1].shape
     found = _solved(views, (width, height))
@@ -368,7 +368,7 @@ def fit_intrinsics(images: Sequence[tuple[str, NDArray[np.uint8]]], board: Board
     good = rms <= max(_BAD_VIEW * float(np.median(rms)), _GOOD_rms_px)
     if not good.all() and good.sum() >= _LEAST_VIEWS:
         left_out += [
-            f"{name}: fits to {error:.2f} px only, others to {np.median(rms):.2f}"
+            f"{name}: fits only to {error:.2f} px, others to {np.median(rms):.2f}"
             for (name, _, _), error, kept in zip(views, rms, good, strict=True)
             if not kept
         ]
@@ -427,7 +427,7 @@ def _why_none(images: Sequence[tuple[str, NDArray[np.uint8]]], board: Board) -> 
     if len(read) >= _LEAST_CORNERS // 2:
         return [
             f"{len(read)} markers of {board.dictionary} are read, but no board of {board.columns} "
-            f"columns and {board.rows} rows has them so: were they exchanged?"
+            f"columns and {board.rows} rows has this arrangement: were columns and rows exchanged?"
         ]
     sets = (dictionary_shown(pixels) for _, pixels in images[:_LOOKED_AT])
     shown = next((name for name in sets if name), None)
@@ -463,27 +463,27 @@ def _missing(
     ):
         if not filled[row, column]:
             missing.append(
-                f"no image has the board in its {name} corner: distortion is a guess there"
+                f"no image has the board in its {name} corner: the distortion there is not known"
             )
     if filled.mean() < _ENOUGH_CELLS and not any("corner" in line for line in missing):
-        missing.append(f"the board was seen in {100.0 * filled.mean():.0f} % of the image only")
+        missing.append(f"the board covered only {100.0 * filled.mean():.0f} % of the image")
     normals = [cv2.Rodrigues(turn)[0][:, 2] for turn in turns]
     tilt = [math.degrees(math.acos(min(1.0, abs(normal[2])))) for normal in normals]
     if sum(angle > _TILT_deg for angle in tilt) < _TILTED_VIEWS:
         missing.append(
-            f"hardly any image has the board tilted by more than {_TILT_deg:.0f} deg (most: "
-            f"{max(tilt):.0f} deg): focal length and distance cannot be told apart"
+            f"almost no image has the board tilted by more than {_TILT_deg:.0f} deg (most: "
+            f"{max(tilt):.0f} deg): focal length and distance cannot be separated"
         )
     away = [float(np.linalg.norm(shift)) for shift in shifts]
     if max(away) < _DISTANCE_RATIO * min(away):
         missing.append(
-            f"all images from {min(away):.2f} to {max(away):.2f} m: take some from "
-            "nearer or further"
+            f"all images from {min(away):.2f} to {max(away):.2f} m: take some from nearer "
+            "or farther away"
         )
     rms, sigmas = intrinsics.rms_px or 0.0, intrinsics.sigmas or (0.0,) * 9
     if rms > _GOOD_rms_px:
-        missing.append(f"corners fit to {rms:.2f} px only: is the board flat and the image sharp?")
+        missing.append(f"corners fit only to {rms:.2f} px: is the board flat and the image sharp?")
     if sigmas[0] > _GOOD_FOCAL_SIGMA * intrinsics.focal_px[0]:
         share = 300.0 * sigmas[0] / intrinsics.focal_px[0]
-        missing.append(f"the focal length is known to {share:.2f} % (3 sigma) only")
+        missing.append(f"the focal length is uncertain by {share:.2f} % (3 sigma)")
     return missing

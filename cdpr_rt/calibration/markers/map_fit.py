@@ -116,8 +116,8 @@ def _judged(
         return Suspect(
             marker,
             "size",
-            f"marker {marker} is {100.0 * (size - 1.0):+.1f} % of its size larger than told: was "
-            "it printed at another scale?",
+            f"marker {marker} is {100.0 * (size - 1.0):+.1f} % larger than stated: was it "
+            "printed at another scale?",
         )
     far = _off(bundle.off_px[rows]) > limit
     whole = _stand(rows[far], bundle, seen, limit)
@@ -125,8 +125,8 @@ def _judged(
         return Suspect(
             marker,
             "covered",
-            f"marker {marker} is partly covered in {far.sum()} of {len(rows)} images, by another "
-            "sheet or what else there is; these are left out",
+            f"marker {marker} is partly covered in {far.sum()} of {len(rows)} images, by "
+            "another sheet or an object; these images are left out",
             tuple(images[far].tolist()),
         )
     split, apart = _two_places(place)
@@ -150,7 +150,7 @@ def _judged(
     return Suspect(
         marker,
         "twice",
-        f"marker {marker} is there twice, {1e3 * apart:.0f} mm apart: one of them must go",
+        f"marker {marker} is there twice, {1e3 * apart:.0f} mm apart: remove one of them",
     )
 
 
@@ -629,19 +629,22 @@ def _faults(cover: Coverage, lens: LensSuspicion, known: KnownFit | None) -> lis
     faults = []
     if len(cover.islands) > 1:
         faults.append(
-            f"{len(cover.islands)} islands: the map holds the largest, {len(cover.islands[0])} of "
+            f"{len(cover.islands)} islands: the map contains the largest, "
+            f"{len(cover.islands[0])} of "
             f"{len(cover.ids)} markers"
         )
     if lens.wrong:
         faults.append(
-            f"the intrinsics are not this camera's as it is now: the images ask for a focal "
-            f"length {100.0 * lens.focal_change:+.2f} % different and fit to {lens.rms_px:.2f} px "
-            "then; was the lens turned or the resolution changed? `cdpr camera calibrate`"
+            "the intrinsics do not fit the camera as it is now: the images show a focal "
+            f"length {100.0 * lens.focal_change:+.2f} % different, with which they fit to "
+            f"{lens.rms_px:.2f} px; was the lens turned or the resolution changed? `cdpr "
+            "camera calibrate`"
         )
     if known is not None and abs(known.scale - 1.0) > _SCALE_OFF:
         faults.append(
-            f"known markers are {100.0 * (known.scale - 1.0):+.2f} % further apart than the size "
-            f"told makes them: measure the black square; it may be {known.scale:.4f} times as large"
+            f"known markers are {100.0 * (known.scale - 1.0):+.2f} % farther apart than "
+            f"with the stated size: measure the black square; it may be {known.scale:.4f} "
+            "times as large"
         )
     return faults
 
@@ -653,8 +656,8 @@ def misfits(bundle: Bundle) -> list[str]:
     if share <= _MISFIT_SHARE:
         return []
     return [
-        f"{100.0 * share:.0f} % of all corners do not fit, and no one marker is to blame: was the "
-        "camera moving, or are several sheets loose?"
+        f"{100.0 * share:.0f} % of all corners do not fit, and no single marker "
+        "explains it: was the camera moving, or are several sheets loose?"
     ]
 
 
@@ -668,20 +671,23 @@ def _notes(
     notes = list(cover.advice)
     if known is None:
         notes.append(
-            f"the map's scale is that of the size told ({1e3 * sheets.size_m:g} mm): images alone "
-            "cannot see it wrong; two markers at known places, or the robot's cables, can"
+            f"the map's scale comes from the stated size ({1e3 * sheets.size_m:g} mm): "
+            "images alone cannot verify it; two markers at known places, or the robot's "
+            "cables, can"
         )
     if bundle.sheets.sigma_m > 0.0:
         notes.append(
             f"corners are {1e3 * bundle.sheets.sigma_m:.2f} mm off on their sheets, the same in "
-            "all images: paper that is not flat, or the printer's scale; more images do not help"
+            "all images: the paper is not flat, or the printer's scale is wrong; more "
+            "images do not help"
         )
     in_frame, shape = (_typical_mm(one) for one in (bundle.marker_sigma_m, bundle.shape_sigma_m))
     if len(fixed) == 1 and in_frame > _FRAME_RATIO * shape:
         notes.append(
-            f"places are known to {shape:.2f} mm against each other, to {in_frame:.2f} mm "
-            f"in the frame of marker {fixed[0]} (3 sigma): one sheet tells little about its "
-            "tilt; a larger one, or known places, give a better frame"
+            f"places are uncertain by {shape:.2f} mm relative to each other, and by "
+            f"{in_frame:.2f} mm in the frame of marker {fixed[0]} (3 sigma), because the "
+            "tilt of one sheet is not well known; a larger sheet or known places give a "
+            "better frame"
         )
     return notes
 
@@ -705,7 +711,7 @@ def verdict(fit: MapFit) -> str:
     return (
         f"{how}{without}: {int(fit.map.placed.sum())} markers from "
         f"{int(fit.map.located.sum())} images, corners fit to "
-        f"{rms:.3f} px; places are known to {_typical_mm(fit.bundle.shape_sigma_m):.2f} mm against "
-        f"each other (3 sigma), worst marker "
-        f"{ids[worst]} to {sigma[worst]:.2f} mm"
+        f"{rms:.3f} px; places are uncertain by "
+        f"{_typical_mm(fit.bundle.shape_sigma_m):.2f} mm relative to each other (3 "
+        f"sigma), at worst marker {ids[worst]} by {sigma[worst]:.2f} mm"
     )

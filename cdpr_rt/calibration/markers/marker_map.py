@@ -56,7 +56,7 @@ class SeenMarkers:
             raise InvalidRequestError(f"marker {marker} is there twice in image number {image}")
         ids = tuple(sorted({marker for _, marker in places}))
         if missing := [marker for marker in ids if marker not in size_m]:
-            raise InvalidRequestError(f"marker {missing[0]} was seen, but has no size")
+            raise InvalidRequestError(f"marker {missing[0]} was seen, but its size is not stated")
         number = {marker: k for k, marker in enumerate(ids)}
         return cls(
             names=tuple(names),
@@ -285,7 +285,7 @@ def _advice(
 ) -> list[str]:
     said = []
     if not islands:
-        return ["no image shows a marker: is the dictionary the one that was printed?"]
+        return ["no image shows a marker: is it the dictionary that was printed?"]
     for island in islands[1:]:
         said.append(
             f"no image shows {listed(island)} together with the others: take one that shows one "
@@ -297,8 +297,8 @@ def _advice(
         said.append(f"{listed(seldom)} seen in fewer than {_FEW_IMAGES} images: add poses there")
     if useless > images // 4:
         said.append(
-            f"{useless} of {images} images show fewer than two markers and tell nothing of "
-            "how markers lie: put sheets closer together, or go higher"
+            f"{useless} of {images} images show fewer than two markers and cannot be used "
+            "for the map: put sheets closer together, or move the camera up"
         )
     return said
 
@@ -308,7 +308,7 @@ def _mirrored(sightings: Sequence[Sighting], ids: Sequence[int]) -> list[str]:
     mirrored = sorted({marker for one in sightings for marker in one.mirrored})
     if len(mirrored) <= len(ids):
         return []
-    return [f"{listed(mirrored)} read as mirror images: are all sheets, or the images, so?"]
+    return [f"{listed(mirrored)} are mirror images: are all sheets, or the images, mirrored?"]
 
 
 def _strange(ids: set[int]) -> list[str]:
@@ -316,8 +316,8 @@ def _strange(ids: set[int]) -> list[str]:
     if not ids:
         return []
     return [
-        f"{listed(sorted(ids))} read, but not among those laid out (placed): left out; something "
-        "else that the images show reads so"
+        f"{listed(sorted(ids))} detected, but not among the markers laid out (placed): "
+        "left out; another object looks like these markers"
     ]
 
 
@@ -395,18 +395,19 @@ def consistent_places(map_: MarkerMap, sheets: MarkerSheets, std_m: float) -> Kn
     ids = layout.ids
     if (good.sum() < 2 and count > 1) or 2 * good.sum() < count:
         text = (
-            f"the known places of {listed(ids)} contradict the map that the images tell, and it "
-            "cannot be said which of them are wrong: measure them again"
+            f"the known places of {listed(ids)} contradict the map from the images, and it "
+            "is not known which are wrong: measure them again"
         )
         return KnownPlaces(_without(sheets, ids), (text,), contradictory=True)
     faults = [
-        f"{listed(sorted((ids[i], ids[j])))} are exchanged: each lies where the other one is known "
-        "to be; their places are not used: exchange their ids in the file of the markers"
+        f"{listed(sorted((ids[i], ids[j])))} are exchanged: each lies at the known "
+        "place of the other; their places are not used: exchange their ids in the file "
+        "of the markers"
         for i, j in exchanged
     ]
     faults += [
-        f"marker {ids[k]} does not lie where it is known to be, by the images and the other known "
-        "markers; its place is not used: measure it again"
+        f"marker {ids[k]} does not lie at its known place, according to the images and "
+        "the other known markers; its place is not used: measure it again"
         for k in np.flatnonzero(~good)
     ]
     wrong = {k for pair in exchanged for k in pair} | set(np.flatnonzero(~good).tolist())

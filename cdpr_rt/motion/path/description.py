@@ -121,7 +121,7 @@ class PathDescription:
         for i, move in enumerate(self.moves):
             if move.line >= line:
                 return i
-        raise PathError(self.source, line, "nothing moves from this line on")
+        raise PathError(self.source, line, "there is no motion from this line on")
 
     def part(self, begin: int, end: int) -> PathDescription:
         """Return the path of the moves begin to end - 1, from the end of the move before."""

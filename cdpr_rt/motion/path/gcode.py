@@ -42,8 +42,8 @@ def arc_by_centre(start: FloatArray, end: FloatArray, centre: FloatArray, clockw
         raise ValueError("its centre is one of its ends")
     if abs(r - other) > max(_OFF_m, _OFF_SHARE * r):
         raise ValueError(
-            f"its ends are {1e3 * r:.4f} mm and {1e3 * other:.4f} mm from its centre; allowed: "
-            "as far as each other"
+            f"its ends are {1e3 * r:.4f} mm and {1e3 * other:.4f} mm from its centre; "
+            "allowed: equal distances"
         )
     chord = end - start
     length = float(np.hypot(*chord))
@@ -233,8 +233,8 @@ class _Reader:
                 self._go_on_from(block)
         if self._path is None or not self._path.moves:
             missing = self._missing()
-            why = f"{missing} never named" if missing else "nothing moves"
-            hint = ": --z says at which height" if missing == "Z" else ""
+            why = f"{missing} is never given" if missing else "nothing moves"
+            hint = ": give the height with --z" if missing == "Z" else ""
             # a rejected line may contain it
             if not found.problems:
                 found.refuse(self._last, f"{why}; allowed: a path through two positions{hint}")
@@ -294,7 +294,7 @@ class _Reader:
             if len(both) > 1:
                 raise _LineError(f"{' '.join(both)}: allowed: one of them in a line")
         if self._settings.z_m is not None and "Z" in block.words:
-            raise _LineError("Z: --z is for files that do not name it")
+            raise _LineError("Z: --z is only for files without Z")
         for letter in sorted(words.keys() - self._known_letters):
             del words[letter]
             problem = "is not known"
@@ -369,7 +369,7 @@ class _Reader:
                 letter = self._letters[i]
                 raise _LineError(
                     f"{letter}: a relative move before the position is known; "
-                    "name an absolute position (G90) first"
+                    "give an absolute position (G90) first"
                 )
         return target
 
@@ -391,7 +391,7 @@ class _Reader:
                 state.kept_offset[:] = 0.0
             return
         if not named and self._findings.ignored.get("E", [0])[-1] != self._last:
-            raise _LineError("G92: names no axis")
+            raise _LineError("G92: no axis given")
         for i in named:
             value = self._value(words, i)
             if math.isfinite(state.here[i]):
@@ -413,14 +413,14 @@ class _Reader:
     def _move(self, block: Block, words: dict[str, float], in_room: bool) -> None:
         motion = self._state.motion
         if motion == "G80":
-            raise _LineError("a position, but after G80 no motion; allowed: G0, G1 before it")
+            raise _LineError("a position without a motion after G80; give G0 or G1 first")
         if motion in _CYCLES:
             self._drill(block, words)
             return
         target = self._target_in_room(words) if in_room else self._target(words)
         arc = self._arc(words, target) if motion in ("G2", "G3") else None
         if self._path is None and arc is not None:
-            raise _LineError(f"{motion}: {self._missing()} not named before")
+            raise _LineError(f"{motion}: {self._missing()} not given before")
         self._append(block.line, target, motion, arc)
 
     def _append(self, line: int, target: FloatArray, motion: str, arc: Arc | None = None) -> None:
@@ -499,9 +499,11 @@ class _Reader:
         """Carry out a drilling cycle at the position that the words name."""
         state, motion, line = self._state, self._state.motion, block.line
         if self._k < 3 or state.plane != "G17":
-            raise _LineError(f"{motion}: allowed: in the plane of X and Y (G17) of a robot with Z")
+            raise _LineError(
+                f"{motion}: allowed only in the plane of X and Y (G17) of a robot with Z"
+            )
         if self._path is None:
-            raise _LineError(f"{motion}: {self._missing() or 'a position'} not named before")
+            raise _LineError(f"{motion}: {self._missing() or 'a position'} not given before")
         for letter in "ZRPQ":
             if letter in words:
                 unit = 1.0 if letter == "P" else state.unit_m

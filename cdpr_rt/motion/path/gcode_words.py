@@ -200,7 +200,7 @@ def _is_skipped(line: str, number: int, findings: Findings, ignored: frozenset[s
         return False
     if other := _CODE.search(line, first.end()):
         code = line[other.start() :].split(maxsplit=1)[0]
-        findings.refuse(number, f"{name} and {code[:8]} share a line: divide it")
+        findings.refuse(number, f"{name} and {code[:8]} are on one line: divide it")
     else:
         findings.ignore(number, f"the line of {name}")
     return True
@@ -260,11 +260,11 @@ def _words(line: str, number: int, findings: Findings, ignored: frozenset[str]) 
             findings.ignore(number, name)
             alone = name if name in _ALONE else alone
         elif name in ignored or name in _IDLE_LINES:
-            findings.refuse(number, f"{name} shares a line with other words: divide it")
+            findings.refuse(number, f"{name} is on a line with other words: divide it")
         elif letter in _REPEATED:
             codes.append(name)
         elif letter in words:
-            findings.refuse(number, f"{letter} stands twice in this line")
+            findings.refuse(number, f"{letter} occurs twice in this line")
             return None
         else:
             words[letter] = value

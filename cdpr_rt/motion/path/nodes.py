@@ -303,7 +303,7 @@ def nodes_of(path: PathDescription, scale: FloatArray) -> PathNodes:
         i = int(wrong.argmax())
         raise PathError(
             path.source, int(nodes.line[i]),
-            f"the path is {1e3 * off[i]:.4g} mm from what the file says; allowed: "
+            f"the path is {1e3 * off[i]:.4g} mm from the path in the file; allowed: "
             f"{1e3 * _tolerances(places, pieces)[i]:.4g} mm: divide this move",
         )  # fmt: skip
     nodes = replace(nodes, deviation_m=float(off.max()))

@@ -60,7 +60,7 @@ def read_toml_points(path: Path, coordinates: Coordinates) -> PathDescription:
     table = read_toml_model(path, _PathTable)
     text = read_text(path, 1 << 20)
     if not text.endswith("\n"):
-        raise PathError(path, text.count("\n") + 1, "does not end with a line end: was it cut off?")
+        raise PathError(path, text.count("\n") + 1, "does not end with a newline: is it truncated?")
     lines = [text.count("\n", 0, head.start()) + 1 for head in _HEADS.finditer(text)]
     lines += [0] * (len(table.points) - len(lines))  # an array in one line
     k, d = coordinates.positions, len(coordinates.names)
@@ -100,7 +100,7 @@ def read_csv_points(
     """
     if not text.endswith("\n"):
         last = text.count("\n") + 1
-        raise PathError(source, last, "does not end with a line end: was it cut short?")
+        raise PathError(source, last, "does not end with a newline: is it truncated?")
     rows = csv.reader(text.removeprefix(_BOM).split("\n"))
     columns: list[tuple[str, float]] = []
     found: PathDescription | None = None
@@ -114,7 +114,7 @@ def read_csv_points(
             named = {what for what, _ in columns}
             if all_columns and (left := [one for one in coordinates.names if one not in named]):
                 allowed = ", ".join(coordinates.names)
-                problem = f"column {left[0]} is missing; allowed: {allowed}, with their unit each"
+                problem = f"column {left[0]} is missing; allowed: {allowed}, each with its unit"
                 raise PathError(source, line, problem)
             continue
         kept |= {"dwell": 0.0, "wait": 0.0}
@@ -129,7 +129,7 @@ def read_csv_points(
                 continue
         found.add(Move(line, end, kept["speed"], kept["blend"], kept["dwell"], kept["wait"] != 0.0))
     if found is None or not found.moves:
-        raise PathError(source, 0, "holds less than two way points")
+        raise PathError(source, 0, "contains fewer than two way points")
     return found
 
 
@@ -181,7 +181,7 @@ def _cells(
         try:
             value = factor * float(cell)
         except ValueError:
-            raise PathError(source, line, f"{key}: value {cell[:40]!r}: no number") from None
+            raise PathError(source, line, f"{key}: value {cell[:40]!r} is not a number") from None
         low, high = _BOUNDS.get(key, (-1e6, 1e6))
         if not low <= value <= high:
             raise PathError(
@@ -205,8 +205,7 @@ def require_kind(path: Path) -> str:
         raise PathError(
             path,
             0,
-            f"no kind of path's file; allowed: way points {' '.join(_POINTS)}, "
-            f"G-code {' '.join(GCODE)}",
+            f"not a path file; allowed: way points {' '.join(_POINTS)}, G-code {' '.join(GCODE)}",
         )
     return suffix
 

@@ -122,10 +122,12 @@ class MetricsCollector(Collector):
             state.add_metric([label], float(label == now))
         yield state
         yield GaugeMetricFamily(
-            "cdpr_loop_silent_seconds", "Since the loop's last turn", service.link.silent_s()
+            "cdpr_loop_silent_seconds", "Time since the loop's last turn", service.link.silent_s()
         )
         held = float(service.lease.holder() is not None)
-        yield GaugeMetricFamily("cdpr_control_held", "1 while somebody may move", held)
+        yield GaugeMetricFamily(
+            "cdpr_control_held", "1 while a client holds the right to move", held
+        )
         yield CounterMetricFamily(
             "cdpr_rows_not_seen", "Cycles missing in the histograms", self._rows.lost
         )
@@ -147,7 +149,7 @@ class MetricsCollector(Collector):
 
     def _of_parts(self) -> Metric:
         family = GaugeMetricFamily(
-            "cdpr_part_figure", "What the service's parts tell", labels=["part", "figure"]
+            "cdpr_part_figure", "Figures of the service's parts", labels=["part", "figure"]
         )
         for part, figures in self._service.part_figures().items():
             for name, value in _numbers(figures):
@@ -258,18 +260,18 @@ _STATUS: Final[dict[type[Exception], HTTPStatus]] = {
 _ERRORS: Final[dict[int | str, dict[str, Any]]] = {
     400: {"model": models.Error, "description": "The body is not JSON"},
     401: {"model": models.Error, "description": "The key is missing or wrong"},
-    403: {"model": models.Error, "description": "Asked by a page of another host, or by its name"},
-    408: {"model": models.Error, "description": "The body came too slowly"},
-    413: {"model": models.Error, "description": "Too much to take"},
-    422: {"model": models.Error, "description": "Not what this takes"},
+    403: {"model": models.Error, "description": "The page or the name of another host"},
+    408: {"model": models.Error, "description": "The body arrived too slowly"},
+    413: {"model": models.Error, "description": "The body is too long"},
+    422: {"model": models.Error, "description": "Invalid key or value"},
     429: {"model": models.Error, "description": "Too many requests; never for a stop"},
 }
 _REFUSALS: Final[dict[int | str, dict[str, Any]]] = {
     409: {
         "model": models.Error,
-        "description": "The loop, or the holder of the right to move, is in the way",
+        "description": "Rejected by the loop's state, or another client holds the right to move",
     },
-    503: {"model": models.Error, "description": "No loop takes commands"},
+    503: {"model": models.Error, "description": "No loop accepts commands"},
 }
 _NO_STREAM: Final[dict[int | str, dict[str, Any]]] = {
     404: {"model": models.Error, "description": "No set-point stream is received"},
@@ -280,7 +282,7 @@ Token = Annotated[
     Header(
         alias="X-Control-Token",
         max_length=_TOKEN_MOST,
-        description="What `POST /control` has given.",
+        description="The token from `POST /control`.",
     ),
 ]
 
@@ -349,7 +351,7 @@ def _add_key(app: FastAPI) -> None:
         "key": {
             "type": "http",
             "scheme": "bearer",
-            "description": "The shared key; on the Unix socket none is asked.",
+            "description": "The shared key; not needed on the Unix socket.",
         }
     }
     for path, operations in described["paths"].items():
@@ -410,9 +412,11 @@ def _add_reading(app: FastAPI, service: Service) -> None:
     @app.get("/events")
     async def events(
         after: Annotated[
-            int, Query(ge=0, le=2**53, description="Only those behind this number.")
+            int, Query(ge=0, le=2**53, description="Only events after this number.")
         ] = 0,
-        most: Annotated[int, Query(ge=1, le=512, description="Only the newest of them.")] = 100,
+        most: Annotated[
+            int, Query(ge=1, le=512, description="At most this many, the newest.")
+        ] = 100,
     ) -> models.Events:
         """Events: states, reasons with their values, commands, who may move."""
         return models.Events.model_validate({"events": service.events.since(after, most)})
@@ -473,10 +477,12 @@ def _add_control(app: FastAPI, service: Service) -> None:
 _OPEN_COMMANDS: Final = {
     "configure": "Boot the drives; no power.",
     "check": "Run the cycle without power and see whether all drives answer: inactive to ready.",
-    "acknowledge": "Acknowledge a fault whose cause is gone; nothing gets power by it.",
-    "hold": "Stop the motion and stay there, with power; for everybody who is let in.",
-    "disable": "Stop the motion, then take the power off; for everybody who is let in.",
-    "shutdown": "Stop the motion, take the power off, end the daemon; for everybody who is let in.",
+    "acknowledge": "Acknowledge a fault whose cause is gone; the power stays off.",
+    "hold": "Stop the motion and hold the position with power; every client with access "
+    "may do this.",
+    "disable": "Stop the motion, then switch the power off; every client with access may do this.",
+    "shutdown": "Stop the motion, switch the power off, end the daemon; every client with "
+    "access may do this.",
 }
 """Commands that need no right to move."""
 

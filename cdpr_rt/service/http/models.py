@@ -69,7 +69,7 @@ _Client = Annotated[
     str,
     Field(
         pattern=r"^[ -~]{1,64}$",
-        description="Who asks, as others see it: 1 to 64 characters of printable ASCII.",
+        description="Name of the client, shown to others: 1 to 64 characters of printable ASCII.",
         examples=["maria@laptop"],
     ),
 ]
@@ -78,7 +78,7 @@ _Wanted = Annotated[
     AfterValidator(_checked),
     WithJsonSchema(_WANTED),
     Field(
-        description="What the program is to do; its page tells which keys it knows.",
+        description="Arguments of the program; see the page about programs.",
         examples=[{"position_m": [0.2, 0.1, 1.8], "rotation_rad": [0.0, 0.0, 0.1]}],
     ),
 ]
@@ -109,7 +109,11 @@ class TakeControl(_Body):
     client: _Client
     ttl_s: Annotated[
         float,
-        Field(ge=SHORTEST_S, le=LONGEST_S, description="Without a sign of life this long: hold."),
+        Field(
+            ge=SHORTEST_S,
+            le=LONGEST_S,
+            description="The robot holds if the client is silent for this time.",
+        ),
     ] = 2.0
 
 
@@ -134,33 +138,35 @@ class PathFile(ClientRequest):
         str,
         Field(
             pattern=r"^[A-Za-z0-9][A-Za-z0-9_. -]{0,59}\.(toml|csv|nc|ngc|gcode|tap|cnc)$",
-            description="Its name; what comes after the dot says what it is.",
+            description="File name; its ending gives the format.",
             examples=["part.nc"],
         ),
     ]
-    text: Annotated[str, Field(max_length=1 << 21, description="What is in it.")]
+    text: Annotated[str, Field(max_length=1 << 21, description="Content of the file.")]
     origin_mm: Annotated[
         str | None,
         Field(
             pattern=r"^[-+.0-9G ]{1,200}$",
-            description="Where G-code's zero is in the room, then those of G55 to G59.",
+            description="Position of G-code's zero in the room, then those of G55 to G59.",
         ),
     ] = None
     blend_mm: Annotated[
-        float, Field(ge=0, le=1000, description="Within which G-code's corners may be cut.")
+        float, Field(ge=0, le=1000, description="Tolerance for cutting corners of G-code.")
     ] = 1.0
     ignore: Annotated[
-        str, Field(pattern=r"^[A-Za-z0-9. ]{0,64}$", description="Words of G-code to be skipped.")
+        str, Field(pattern=r"^[A-Za-z0-9. ]{0,64}$", description="Words of G-code to ignore.")
     ] = ""
-    z_mm: Annotated[
-        float | None, Field(ge=-1e6, le=1e6, description="Z of G-code that names none.")
-    ] = None
-    scale: Annotated[float, Field(ge=1e-3, le=1e3, description="Factor of G-code's lengths.")] = 1.0
+    z_mm: Annotated[float | None, Field(ge=-1e6, le=1e6, description="Z of G-code without Z.")] = (
+        None
+    )
+    scale: Annotated[
+        float, Field(ge=1e-3, le=1e3, description="Scale factor of G-code's lengths.")
+    ] = 1.0
     rotate_deg: Annotated[
-        float, Field(ge=-360, le=360, description="By how much G-code is turned around Z.")
+        float, Field(ge=-360, le=360, description="Rotation of G-code about Z.")
     ] = 0.0
     mirror: Annotated[
-        str, Field(pattern="^(x|y)?$", description="Axis whose sign G-code changes, if any.")
+        str, Field(pattern="^(x|y)?$", description="Axis along which G-code is mirrored, if any.")
     ] = ""
     dwell: Annotated[str, Field(pattern="^(s|ms)$", description="Unit of P of G4.")] = "s"
     line: Annotated[int, Field(ge=0, le=1 << 24, description="Line of the file to begin with.")] = 0
@@ -242,7 +248,7 @@ class StreamAccess(_Answer):
 
     session: int
     key: str = Field(description="32 bytes in hexadecimal; signs the packets.")
-    host: str = Field(description="Where the stream is received; 0.0.0.0 is every address.")
+    host: str = Field(description="Address of the stream; 0.0.0.0 is every address.")
     port: int
 
 

@@ -97,7 +97,7 @@ class ControlSocket:
             except TimeoutError:
                 if self._is_working or self._holds:  # the client waits for its answer
                     continue
-                return SILENT, f"nothing came for {self._ttl_s:g} s"
+                return SILENT, f"no message for {self._ttl_s:g} s"
             if message["type"] != "websocket.receive":
                 return None
             if not messages.take("", time.monotonic()):
@@ -116,9 +116,9 @@ class ControlSocket:
             self._holds.add(hold)
             hold.add_done_callback(self._holds.discard)
             for one in before:
-                await self._refuse(one.id, f"{one.do}: a stop was asked for after it")
+                await self._refuse(one.id, f"{one.do}: cancelled by a later stop")
         elif self._orders.full():
-            await self._refuse(order.id, f"{_MOST_WAITING} orders wait already")
+            await self._refuse(order.id, f"{_MOST_WAITING} orders are already waiting")
         else:
             self._orders.put_nowait(order)
 
@@ -227,7 +227,7 @@ class WebSocketRoutes:
             if unknown:
                 await socket.close(UNFIT, reason(f"fields: {unknown[0]} is not a field of a cycle"))
             elif self._service.counts["live_clients"] >= _MOST_LIVE:
-                await socket.close(BUSY, f"{_MOST_LIVE} others look on already")
+                await socket.close(BUSY, f"{_MOST_LIVE} others are already watching")
             else:
                 await self._show(socket, rate_Hz, wanted)
 
@@ -268,7 +268,7 @@ class WebSocketRoutes:
             yield gone
         except TimeoutError:
             counts["slow_clients_dropped"] += 1
-            self._service.events.add("live", "a client that read too slowly was dropped")
+            self._service.events.add("live", "disconnected a client that read too slowly")
         except WebSocketDisconnect:
             pass
         finally:

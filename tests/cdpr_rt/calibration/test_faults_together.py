@@ -248,7 +248,7 @@ def test_a_moved_camera_is_reported_as_possible_cause_of_several_slips() -> None
     readings.slip(6, 14, 0.008)
     outcome = readings.outcome()
     assert any(
-        "off from pose 11 on: either they slipped together, or the camera was moved" in text
+        "off from pose 11 on: either they slipped together, or the camera moved" in text
         for text in outcome.objections()
     )
     assert ("jump", 6, 14) in {_short(fault) for fault in outcome.faults}

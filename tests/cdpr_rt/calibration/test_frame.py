@@ -87,10 +87,10 @@ def test_the_verdict_reports_accuracy_of_absolute_positions_and_orientations() -
     what = made_up("spatial-8", 45, 4, noise_m=2e-4, home_first=True)
     outcome = calibrate(load_robot("spatial-8"), what.file, measured(what, 1e-3, 2e-3, 8), "points")
     text = "\n".join(outcome.verdict())
-    assert "absolute positions move by" in text
+    assert "absolute positions change by" in text
     assert outcome.predicted.orientation_deg is not None
-    assert f"orientations to {outcome.predicted.orientation_deg:.3f} deg" in text
+    assert f"orientations by {outcome.predicted.orientation_deg:.3f} deg" in text
     assert outcome.absolute.orientation_deg is not None
-    assert f"absolute orientations to {outcome.absolute.orientation_deg:.2f} deg" in text
+    assert f"absolute orientations by {outcome.absolute.orientation_deg:.2f} deg" in text
     poor = replace(outcome, predicted=replace(outcome.predicted, orientation_deg=0.2))
     assert not poor.accuracy().endswith("good") and "0.15 deg wanted" in poor.accuracy()

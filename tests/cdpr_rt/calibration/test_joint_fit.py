@@ -239,4 +239,4 @@ def test_a_fit_without_held_out_verification_is_not_adopted() -> None:
     ]
     done = outcome_of(what, what.seen, replace(what.images, sightings=blind))
     assert done.as_json()["verification"]["reference"] == "none"
-    assert any("nothing verifies it" in text for text in done.objections())
+    assert any("the calibration is not verified" in text for text in done.objections())

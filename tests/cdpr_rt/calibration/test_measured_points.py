@@ -149,13 +149,13 @@ SLIPS: dict[str, tuple[Callable[[PointSet, FloatArray], FloatArray], str]] = {
     "sign of x": (_sign, "all measured points are (-x, y"),
     "a line late": (_a_line_late, "belong 1 line earlier"),
     "another origin": (_origin, "their origin"),
-    "turned": (_turned, "turned against"),
+    "turned": (_turned, "turned relative to"),
     "tape and one off": (
         lambda one, points: _one_off(one, 1.016 * points),
         "the scale of all measured points is +",
     ),
     "one in cm": (_one_in_cm, "it fits if it is in cm"),
-    "one 120 mm off": (_one_off, "mm from where all other readings put it"),
+    "one 120 mm off": (_one_off, "mm from the position by all other readings"),
 }
 """Changes of points and the required report."""
 _LEFT_OUT = ("one in cm", "one 120 mm off")

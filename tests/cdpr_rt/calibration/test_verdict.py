@@ -81,7 +81,7 @@ def test_frame_and_scale_are_reported_as_undetermined_without_points() -> None:
     what = made_up("spatial-8", 60, 7, noise_m=2e-4)
     blind = [one.what for one in open_directions(fit(what.file, what.seen))]
     for axis in "xyz":
-        assert any(f"together are along {axis}" in text for text in blind)
+        assert any(f"together along {axis}" in text for text in blind)
         assert any(f"turned about {axis}" in text for text in blind)
     assert any("scale" in text for text in blind)
     seen = measured(what, 1e-3, 2e-3, 4)
@@ -108,7 +108,7 @@ def test_unobservable_parameters_are_reported_with_their_cable() -> None:
 
 def test_too_few_poses_are_rejected_with_the_missing_number() -> None:
     what = made_up("spatial-8", 60, 7)
-    with pytest.raises(InvalidRequestError, match=r"at least \d+ poses more"):
+    with pytest.raises(InvalidRequestError, match=r"at least \d+ more poses"):
         require_enough(what.file, what.seen.some(np.arange(8)))
     require_enough(what.file, what.seen)
     robot = load_robot("spatial-8")

@@ -268,7 +268,7 @@ CASES = [
     Case(
         Limit.LATE,
         late(0.021),
-        "the loop was held up for 21 ms, 20 ms allowed",
+        "the loop was delayed for 21 ms, 20 ms allowed",
         axis=-1,
         value=0.021,
         does_not=(late(0.019),),

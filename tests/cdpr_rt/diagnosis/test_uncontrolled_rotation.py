@@ -120,7 +120,7 @@ def test_a_platform_that_turns_over_is_impossible(
 ) -> None:
     found = rotation_finding(tmp_path, hanging(arm_m, below_m))
     assert found is not None and found.impossible
-    assert says in found.text and "takes 6 cables" in found.text
+    assert says in found.text and "needs 6 cables" in found.text
 
 
 def test_a_platform_whose_lengths_would_disagree_is_impossible(tmp_path: Path) -> None:
@@ -165,4 +165,4 @@ def test_loads_beside_a_rod_or_below_a_knot_are_reported_as_swinging_but_accepte
     for text in (rod(0.0, 0.02), knot):
         found = rotation_finding(tmp_path, text)
         assert found is not None and not found.impossible
-        assert "its weight swings about these axes" in found.text
+        assert "the platform swings about these axes" in found.text

@@ -47,7 +47,7 @@ def test_errors_of_unreadable_logs_state_the_reason(tmp_path: Path) -> None:
             read_raw_log(path)
     write(path)
     path.write_bytes(path.read_bytes()[:4100])
-    with pytest.raises(RawLogError, match="no whole row"):
+    with pytest.raises(RawLogError, match="no complete row"):
         read_raw_log(path)
     write(path)
     with pytest.raises(RawLogError, match="no column 'effort_Nm'"):

@@ -184,17 +184,17 @@ def test_a_lost_bus_loses_no_measured_row(tmp_path: Path) -> None:
         def sync(self) -> None:
             super().sync()
             if self.feedback.cycle > self.last:
-                raise ConnectionError("the bus has gone away")
+                raise ConnectionError("the bus is lost")
 
         def transmit(self) -> None:
             super().transmit()
             if self.feedback.cycle > self.last:
-                raise ConnectionError("the bus has gone away")
+                raise ConnectionError("the bus is lost")
 
     device, writer = Cut(), log(tmp_path / "a.raw")
     with powered(device) as rig:
         device.last = rig.began + 500
-        with pytest.raises(TripError, match="the bus has gone away"):
+        with pytest.raises(TripError, match="the bus is lost"):
             rig.follow(log=writer)
     writer.close()
     assert len(read_raw_log(tmp_path / "a.raw").rows) == 500

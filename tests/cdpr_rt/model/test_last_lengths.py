@@ -167,8 +167,8 @@ def test_a_motor_that_was_turned_by_40_degrees_is_reported_at_any_gear_ratio(
     told = index_disagreement(off_m, cable_m, 0.03, names)
     off_mm, allowed_mm = 1e3 * m_per_turn * 40.0 / 360.0, 1e3 * m_per_turn * 0.05
     assert told == (
-        f"right: its motor's index is {off_mm:.1f} mm from where the last stop has it, "
-        f"{allowed_mm:.1f} mm allowed: lower, and tighten from home"
+        f"right: its motor's index is {off_mm:.1f} mm from its place at the last stop, "
+        f"{allowed_mm:.1f} mm allowed: lower the platform, and tighten from home"
     )
 
 
@@ -177,4 +177,4 @@ def test_lengths_by_another_geometry_are_not_used(path: Path):
     last = LastLengths(path)
     last.geometry = "5f3a"
     last.load(3, 3.0)
-    assert last.lengths is None and "another calibration" in last.why
+    assert last.lengths is None and "a calibration other than" in last.why

@@ -140,7 +140,7 @@ def test_a_start_without_any_way_is_rejected_with_the_reason(
     with pytest.raises(GeometryError, match="platform and obstacle 1 touch"):
         Reach(inside)
     caged = changed("spatial-8", workspace_min_m=(5.0, 5.0, 1.4), workspace_max_m=(5.1, 5.1, 1.5))
-    with pytest.raises(GeometryError, match="ways 0 lead to a target; wanted: 2"):
+    with pytest.raises(GeometryError, match="ways lead to a pose; wanted: 2"):
         Reach(caged).draw(2, 1)
 
 

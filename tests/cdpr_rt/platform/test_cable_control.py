@@ -59,7 +59,7 @@ def test_winches_that_swing_at_rest_are_reported_until_notices_are_cleared() -> 
         feedback.position_rad[:] = at_rest_rad + 0.2 * turn
         control.update(feedback, physics.setpoint, physics.torque)
     (told,) = control.notices()
-    assert "the platform's loop swings this winch, for 1 s at 20 Hz" in told
+    assert "the control loop oscillates at this winch: for 1 s at 20 Hz" in told
     control.clear_notices()
     assert not control.notices()
 

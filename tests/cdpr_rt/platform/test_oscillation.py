@@ -57,7 +57,7 @@ def test_oscillation_longer_than_three_seconds_is_reported(
     wave = sine(frequency_Hz, MUCH_m, mean_m)
     assert not winches.told(wave, 2.9)
     told = winches.told(wave, 1.4)
-    assert told.startswith("two: the platform's loop swings this winch, for 3 s at ")
+    assert told.startswith("two: the control loop oscillates at this winch: for 3 s at ")
     assert "by more than 0.40 mm of cable to either side" in told
     told_Hz = float(told.split(" at ")[1].split(" Hz")[0])
     assert abs(told_Hz - frequency_Hz) <= max(1.0, 0.03 * frequency_Hz)

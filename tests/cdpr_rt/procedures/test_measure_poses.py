@@ -132,14 +132,14 @@ def test_a_platform_stopped_on_its_detour_is_measured_where_it_stands() -> None:
     assert [reading.target[0] for reading in measured.readings] == [1, 2, 1.25, 4]
     assert measured.tried == [(3.0, 2.0)] and not measured.refused
     assert notes.lines == [
-        "pose 3, at 3.000, 2.000, is read where the platform stands: on its way by 0.500, 2.000 "
+        "pose 3, at 3.000, 2.000, is read where the platform stands: on its way through 0.500, 2.000 "
         "700 mm off after 12 s: no way on"
     ]
     shaky = Operator(behind=3.0, held_on_way_to=0.5, shaky=1.25)
     measured, _ = collected()
     measure_poses(shaky, PLACES[:4], BETWEEN, measured, notes)
     assert shaky.gone == [1.0, 2.0, 0.5, 4.0] and len(measured.readings) == 3
-    assert "on its way by 0.500" in measured.refused[0] and "10.00 mm" in measured.refused[0]
+    assert "on its way through 0.500" in measured.refused[0] and "10.00 mm" in measured.refused[0]
 
 
 @pytest.mark.parametrize("ended_on_the_way", [True, False])
@@ -164,7 +164,7 @@ def test_a_trip_marks_the_pose_as_tried_unless_the_pose_was_not_its_cause(
 def test_five_shaking_poses_in_turn_end_the_measurement_and_keep_its_readings() -> None:
     measured, _ = collected()
     places = [PLACES[0], *[np.array([7.0, float(k)]) for k in range(9)]]
-    with pytest.raises(TripError, match="5 poses in turn"):
+    with pytest.raises(TripError, match="5 poses in a row"):
         measure_poses(Operator(shaky=7.0), places, BETWEEN, measured, Notes())
     assert len(measured.readings) == 1 and len(measured.refused) == 5
 
@@ -180,7 +180,7 @@ def test_at_most_five_consecutive_unreached_poses_are_measured_where_they_stand(
         "cable 2 would need 200 N"
     )
     measured, _ = collected()
-    with pytest.raises(TripError, match=r"5 poses in turn, the last pose 7, at 9\.000"):
+    with pytest.raises(TripError, match=r"5 poses in a row, the last pose 7, at 9\.000"):
         measure_poses(Operator(beyond=4.0), PLACES[2:], BETWEEN, measured, notes)
     assert [reading.target[0] for reading in measured.readings] == [3, 4, 4, 4, 4, 4, 4]
 

@@ -189,7 +189,7 @@ def test_invalid_path_commands_are_rejected(rig, tmp_path):
     rig.platform.restart()
     for wanted, told in (
         ({"plan": "../../etc/passwd"}, "plan: value"),
-        ({"plan": "0" * 32}, "is not there"),
+        ({"plan": "0" * 32}, "no such plan"),
         ({"resume": True}, "no path has been left"),
         ({"resume": 1}, "allowed: true"),
         ({"plan": rig.name, "feed": 2.0}, "feed: value 2.0; allowed"),

@@ -210,7 +210,9 @@ def test_a_cable_that_seemed_broken_is_named_until_all_are_tight(robot: Standing
 
 def test_a_tight_robot_cannot_be_tightened_from_home_again(robot: Standing):
     tightened(robot)
-    with pytest.raises(ProgramError, match="the cables are tight already; lower it first"):
+    with pytest.raises(
+        ProgramError, match="the cables are already tight; lower the platform first"
+    ):
         robot.programs["tighten"].check({"from": "home"})
     robot.programs["tighten"].check({})
 

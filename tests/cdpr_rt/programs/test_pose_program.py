@@ -147,7 +147,7 @@ def test_a_platform_that_may_swing_is_reported_on_arrival() -> None:
         told = robot.program.progress()
         if told["trouble"]:
             break
-    assert told["done"] and "may still turn to and fro by" in told["trouble"]
+    assert told["done"] and "may still swing by" in told["trouble"]
 
 
 def test_a_platform_kept_off_its_target_by_friction_is_awaited_for_5_s(
@@ -245,7 +245,7 @@ def test_a_way_through_an_infeasible_region_stops_before_it_with_a_reason(
     assert wide.control.velocity == pytest.approx(np.zeros(2), abs=1e-9)
     wide.check_motion()
     told = wide.program.progress()
-    assert not told["done"] and "no way on, at " in told["trouble"]
+    assert not told["done"] and "the way is blocked, at " in told["trouble"]
     assert "N outside" in told["trouble"]
     wide.program.command({"position_m": [0.0, 1.8]})
     assert not wide.program.progress()["trouble"]

@@ -235,7 +235,7 @@ def test_a_stopped_program_brakes_and_rejects_further_requests(name: str) -> Non
     assert rig.program.at_rest
     np.testing.assert_array_equal(rig.setpoint.velocity_rad_s, 0.0)
     orders = {"jog": {"velocity_rad_s": [0.0] * N}, **wanted}
-    with pytest.raises(ProgramError, match=f"{name}: it is being stopped"):
+    with pytest.raises(ProgramError, match=f"{name}: the program is stopping"):
         rig.program.command(orders.get(name, {}))
 
 

@@ -112,7 +112,7 @@ def test_an_adapter_is_opened_with_the_expected_commands(start: Start) -> None:
     [
         ({b"S": b"\a"}, r"refuses bit rate 1000000 \(S8\)"),
         ({b"O": b"\a"}, "refuses to open"),
-        (dict.fromkeys(GOOD, b""), "nothing there answers as a serial CAN adapter"),
+        (dict.fromkeys(GOOD, b""), "no serial CAN adapter"),
     ],
 )
 def test_a_command_rejected_by_the_adapter_is_reported(
@@ -246,7 +246,7 @@ def test_several_ports_share_one_adapter(start: Start) -> None:
     first.send(frame(0x701, b"\x05"))  # other ports receive it, as on SocketCAN
     assert receive(second) == frame(0x701, b"\x05")
     assert first.drain() == 0
-    with pytest.raises(BusError, match="is in use with other settings"):
+    with pytest.raises(BusError, match="is already in use with other settings"):
         open_port(BusUrl.parse(f"slcan:{adapter.path}?bitrate=500000"))
     first.close()
     first.close()
@@ -262,11 +262,11 @@ def test_an_unplugged_adapter_is_reported_to_all_ports_and_its_name_is_free(star
     adapter = start(GOOD)
     ports = opened(adapter.url), opened(adapter.url)
     adapter.pull_out()
-    told = f"{adapter.url}: the bus has gone away (the serial adapter has been pulled out"
+    told = f"{adapter.url}: the bus is lost (the serial adapter was unplugged"
     for port in ports:
         assert port.recv_into(bytearray(16)) == 0
         assert told in str(port.lost())
-        with pytest.raises(OSError, match="pulled out") as caught:
+        with pytest.raises(OSError, match="unplugged") as caught:
             port.send(frame(0x80))
         assert told in str(port.lost(caught.value))
     # nothing keeps the name in use, so that the next adapter can get it
@@ -326,7 +326,7 @@ def test_a_lost_server_can_be_reopened_before_the_old_port_is_closed() -> None:
     old = opened(server.url)
     server.client.close()
     assert old.recv_into(bytearray(16)) == 0
-    assert "the bus has gone away (lost the socketcand server: " in str(old.lost())
+    assert "the bus is lost (lost the socketcand server: " in str(old.lost())
     with pytest.raises(OSError, match="lost the socketcand server"):
         old.send(frame(0x80))
     server.serve()
@@ -364,7 +364,7 @@ def test_messages_of_a_server_may_be_split_or_joined() -> None:
     while len(heard) < len(wanted):
         heard += server.client.recv(4096)
     assert heard == wanted
-    with pytest.raises(OSError, match="no remote frames"):
+    with pytest.raises(OSError, match="cannot send remote frames"):
         port.send(FRAME.pack(RTR_FLAG | 0x701, 1, b""))
     port.close()
     server.close()
@@ -389,7 +389,7 @@ def test_sending_to_a_server_that_reads_nothing_fails_in_bounded_time() -> None:
     server = Server(*GREETING)
     port = open_port(server.url, [])
     longest = 0.0
-    with pytest.raises(OSError, match="takes no frames"):
+    with pytest.raises(OSError, match="accepts no frames"):
         while True:
             started = time.monotonic()
             port.send(frame(0x181, bytes(8)))
@@ -416,8 +416,11 @@ def test_keepalive_detects_a_vanished_server_within_5_s() -> None:
 @pytest.mark.parametrize(
     ("greeting", "message"),
     [
-        ((b"< hi >", b"< error could not open bus >"), "could not open bus.*has it a bus 'can0'"),
-        ((b"SSH-2.0-OpenSSH", b""), "went away"),
+        (
+            (b"< hi >", b"< error could not open bus >"),
+            "could not open bus.*does it have a bus 'can0'",
+        ),
+        ((b"SSH-2.0-OpenSSH", b""), "is lost"),
         ((b"< hello >",), "'hello' to 'the connection'"),
     ],
 )
@@ -440,7 +443,7 @@ def test_a_server_that_does_not_open_the_bus_is_reported(
         ("slcan:/dev/ttyNOTHING?bitrate=1000000", "there is no serial port /dev/ttyNOTHING"),
         ("slcan:/dev/null?bitrate=1000000", "/dev/null is no serial port"),
         ("slcan:/tmp?bitrate=1000000", "/tmp is no serial port"),
-        ("slcan:/dev/ptmx?bitrate=123456", "bitrate 123456: allowed are 10000, "),
+        ("slcan:/dev/ptmx?bitrate=123456", "bitrate 123456; allowed: 10000, "),
         ("slcan:/dev/ptmx?bitrte=1000000", "unknown option 'bitrte'; allowed: bitrate, "),
         ("slcan:/dev/ptmx?tty_baudrate=fast", "tty_baudrate 'fast': this port cannot be set"),
         ("socketcand://127.0.0.1:1/can0", r"no socketcand server at 127\.0\.0\.1:1 \(Connection"),

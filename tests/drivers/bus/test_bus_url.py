@@ -51,7 +51,7 @@ def test_known_forms_are_parsed(
         ("socketcan:a-name-much-too-long", "cannot be a network interface"),
         ("simbus:a b", "a simbus name has"),
         ("simbus:../x", "a simbus name has"),
-        ("simbus:one?bitrate=5", "takes no options"),
+        ("simbus:one?bitrate=5", "has no options"),
         ("slcan:/dev/ttyACM0?bitrate", "options are written"),
         ("socketcand:can0", "write it as socketcand://"),
         ("socketcand://host:99999/can0", "write it as socketcand://"),

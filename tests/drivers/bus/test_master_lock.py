@@ -47,7 +47,7 @@ def test_a_second_master_is_rejected_with_the_process_id_of_the_first(url: BusUr
     refuse_second_master(url)
     with held_elsewhere(str(url)) as process:
         for attempt in (MasterLock, refuse_second_master):
-            with pytest.raises(BusError, match=f"process {process.pid} .*end that first"):
+            with pytest.raises(BusError, match=f"process {process.pid} .*end that process first"):
                 attempt(url)
         process.kill()  # without cleaning up
         process.wait()

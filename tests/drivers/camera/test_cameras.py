@@ -57,7 +57,7 @@ def test_a_video_is_read_by_opencv_and_its_end_is_reported(tmp_path: Path) -> No
         first, second = camera.grab(), camera.grab()
         assert first is not None and second is not None
         assert abs(int(first.pixels.mean()) - 40) < 5 < second.pixels.mean() - 150
-        with pytest.raises(CameraError, match="gives no image any more: unplugged"):
+        with pytest.raises(CameraError, match="sends no more images: unplugged"):
             camera.grab()
 
 
@@ -227,13 +227,13 @@ def test_a_simulated_camera_shows_the_platform_until_it_is_unplugged(tmp_path: P
             assert later is not None
             assert later.device_time_s == 3.0
             assert np.abs(later.pixels.astype(float) - image.pixels).max() > 50
-            with pytest.raises(CameraError, match=r"gives no image any more.*unplugged\?"):
+            with pytest.raises(CameraError, match=r"sends no more images.*unplugged\?"):
                 camera.grab()
         with open_camera(f"sim:{path}", clock) as camera:  # plugged in again
             again = camera.grab()
             assert again is not None and again.device_time_s == 3.0
             server.terminate()
             server.join()
-            with pytest.raises(CameraError, match=r"gives no image any more.*unplugged\?"):
+            with pytest.raises(CameraError, match=r"sends no more images.*unplugged\?"):
                 camera.grab()
     assert not path.exists()

@@ -189,7 +189,7 @@ def test_a_camera_that_cannot_be_opened_is_reported_and_its_producer_released(
     [
         ({"fails": TimeoutError()}, "no image: TimeoutError; is it unplugged"),
         ({"fails": RuntimeError("device lost")}, "no image: device lost; is it unplugged"),
-        ({"incomplete": True}, "came incomplete; is its network overloaded"),
+        ({"incomplete": True}, "was incomplete; is the network overloaded"),
         ({"data_format": "YCbCr8"}, "PixelFormat YCbCr8 of uint8; allowed: Mono8"),
         (
             {"pixels": np.zeros((6, 8), np.uint16), "data_format": "Mono12"},
@@ -213,7 +213,7 @@ def test_an_incomplete_old_image_is_reported(
     harvester.triggered, harvester.incomplete = False, True
     with (
         opened(tmp_path) as camera,
-        pytest.raises(CameraError, match="came incomplete; is its network overloaded"),
+        pytest.raises(CameraError, match="was incomplete; is the network overloaded"),
     ):
         camera.grab()
 

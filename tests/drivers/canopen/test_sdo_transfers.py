@@ -99,8 +99,8 @@ def test_segments_lost_from_a_block_are_sent_again(network: CanNetwork, bus: str
         (0x05040005, "out of memory"),
         (0x06040042, "PDO length exceeded"),
         (0x08000022, "present device state"),
-        (0x06090099, "value error, of a kind no standard names"),
-        (0xDEADBEEF, "a code no standard has"),
+        (0x06090099, "value error, of a kind that no standard defines"),
+        (0xDEADBEEF, "a code of no standard"),
     ],
 )
 def test_abort_codes_are_reported_as_text_and_as_a_number(

@@ -126,7 +126,7 @@ def test_a_full_transmit_queue_raises_a_bus_error_without_blocking(
     os.kill(simulator[1], signal.SIGSTOP)
     try:
         begin = time.monotonic()
-        with pytest.raises(BusError, match="takes or gives no frames") as caught:
+        with pytest.raises(BusError, match="accepts or delivers no frames") as caught:
             for _ in range(100_000):
                 rig.group.transmit()
         assert time.monotonic() - begin < 5.0

@@ -238,7 +238,7 @@ def test_other_register_maps_work_and_an_unplugged_adapter_is_reported(tmp_path:
                 sampler.start()
             assert rig.tell("unplug") == {"unplugged": True}
             rig.process.wait(120)
-            with pytest.raises(LineError, match="pulled out"):
+            with pytest.raises(LineError, match="unplugged"):
                 cells.read(0)
             with pytest.raises(LineError, match="cannot be opened"):
                 cells.read(0)

@@ -82,7 +82,7 @@ def test_a_valid_answer_is_read(device: Babbler, client: ModbusTcp) -> None:
     ("body", "said"),
     [
         (bytes([1, 2, 0, 0]), "function 1 was answered, 2 was asked"),
-        (bytes([2, 1, 0]), "8 bits came, not 9"),
+        (bytes([2, 1, 0]), "8 bits arrived, not 9"),
         (bytes([0x82, 2]), "exception 2 .illegal data address"),
         (bytes([0x82, 200]), "exception 200 .unknown exception"),
     ],

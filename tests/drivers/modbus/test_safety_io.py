@@ -152,7 +152,7 @@ def test_a_poll_waiting_for_its_answer_trips_after_the_trip_timeout(
         io.energise()
         io_device.break_(SafetyIoFault.SILENT)
         wait_until(io.stop_reason)
-        assert "no answer has come" in io.stop_reason()
+        assert "no answer has arrived" in io.stop_reason()
     finally:
         io_device.break_(SafetyIoFault(0))
         assert "no good poll" in io.close()
@@ -196,7 +196,7 @@ def test_a_welded_contactor_is_detected(io_device: SafetyIoProcess) -> None:
     io = SafetyIo(io_device.profile(), CLOCK).open()
     io.energise()
     io_device.break_(SafetyIoFault.CONTACTOR_WELDED)
-    assert "the contactor is closed (input 1) though output 0 is 0; is it welded?" in io.close()
+    assert "the contactor is closed (input 1) although output 0 is 0; is it welded?" in io.close()
     with SafetyIo(io_device.profile(), CLOCK) as io:
         with pytest.raises(SafetyIoError, match="welded"):
             io.energise()

@@ -268,7 +268,7 @@ def test_a_bus_name_in_use_is_rejected(start_bus: StartBus) -> None:
 @pytest.mark.parametrize("name", ["", "a b", "/tmp/x", "x" * 65, "-x", "é"])
 def test_a_malformed_bus_name_is_rejected(name: str) -> None:
     hub = Hub(name=name)
-    with pytest.raises(BusSetupError, match="allowed are 1 to 64 letters"):
+    with pytest.raises(BusSetupError, match="allowed: 1 to 64 letters"):
         hub.listen()
     hub.close()
 

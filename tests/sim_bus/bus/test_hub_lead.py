@@ -162,7 +162,7 @@ def test_only_one_client_leads_at_a_time(start_bus: StartBus, stub_node: type) -
     assert other.ask({"lead": True}) == {"error": "lead: another client leads this bus"}
     other.sock.send(GO.pack(b"bus-go\0\0", 1.0, 0.0))
     refused = json.loads(other.recv())
-    assert refused == {"error": "go: only the client that leads the bus moves its time"}
+    assert refused == {"error": "go: only the client that leads the bus may move its time"}
     member.go(2.0)
     member.sock.send(b'{"lead": false}  ')
     assert not member.status()["led"]
@@ -188,7 +188,7 @@ def test_time_of_a_released_bus_stands_until_the_next_frame(
 def test_a_paced_bus_cannot_be_led(start_bus: StartBus) -> None:
     member = start_bus(mode=ClockMode.PACED).join()
     answer = member.ask({"lead": True})
-    assert answer == {"error": "lead: this bus is paced, its time is the clock's"}
+    assert answer == {"error": "lead: this bus is paced; its time is that of the clock"}
 
 
 def test_time_follows_the_wall_clock_after_the_leader_disconnects(

@@ -377,7 +377,7 @@ def test_the_simulator_ends_when_its_standard_input_closes(plain: Simulator, tra
     [
         (f"simbus:{NAME}", "is in use by another simulator"),
         ("slcan:/dev/ttyACM0", "run on simbus:NAME or socketcan:IFACE"),
-        ("simbus:", "allowed are"),
+        ("simbus:", "allowed: 1 to 64"),
         ("socketcan:nocan9", "socketcan:nocan9"),
     ],
     ids=["taken", "adapter", "unnamed", "no-interface"],

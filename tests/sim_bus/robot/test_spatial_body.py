@@ -70,8 +70,8 @@ def test_a_planar_body_has_one_angle_and_one_inertia() -> None:
 @pytest.mark.parametrize(
     ("start", "size", "reason"),
     [
-        ({"angle_deg": 3.0}, 3, "start.angle_deg: allowed: in a plane"),
-        ({"rotation_deg": (0.0, 0.0, 3.0)}, 2, "start.rotation_deg: allowed: in space"),
+        ({"angle_deg": 3.0}, 3, "start.angle_deg: allowed only in a plane"),
+        ({"rotation_deg": (0.0, 0.0, 3.0)}, 2, "start.rotation_deg: allowed only in space"),
     ],
 )
 def test_a_spatial_angle_in_a_plane_or_vice_versa_is_rejected(

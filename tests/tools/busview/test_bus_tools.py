@@ -109,8 +109,8 @@ def test_monitor_decodes_a_session_to_text(session: Session) -> None:
 def test_monitor_prints_a_summary(session: Session) -> None:
     head, _, *rows = session.errors.splitlines()
     assert re.fullmatch(
-        r"\d+ frames in \d+\.\d{3} s of bus time; bus load \d+\.\d % of 1000 kbit/s, with worst-case "
-        r"bit stuffing; 0 with a problem \(marked !\)",
+        r"\d+ frames in \d+\.\d{3} s of bus time; bus load \d+\.\d % of 1000 kbit/s, with "
+        r"worst-case bit stuffing; 0 with a problem \(marked !\)",
         head,
     )
     assert "frames were lost" not in session.errors

@@ -113,7 +113,7 @@ def test_a_calibration_by_points_is_adopted_shown_and_undone(tmp_path: Path) -> 
     assert "1 was undone; before it: " in not_calibrated_reason("spatial-8")
     assert calibrated(robot) is robot
     again = cdpr_here("calibrate", "undo", "spatial-8")
-    assert again.returncode == 2 and "none to undo" in again.stderr
+    assert again.returncode == 2 and "no calibration is in force" in again.stderr
 
 
 def test_the_folder_of_a_run_can_be_fitted_again(tmp_path: Path) -> None:
@@ -346,7 +346,7 @@ def test_markers_and_cables_are_fitted_together(tmp_path: Path) -> None:
     assert told["coverage"]["share_seen"] is None and len(told["coverage"]["islands"]) == 1
     proof = told["verification"]
     assert proof["reference"] == "camera"
-    assert proof["by"].startswith("the camera, on a map by the images")
+    assert proof["by"].startswith("the camera, with a map from the images")
     assert proof["mean_position_error_mm"] < 2.0 < proof["mean_position_error_before_mm"]
     assert proof["mean_orientation_error_deg"] < 0.2
     assert "off the camera, on a map by" in done.stderr

@@ -50,7 +50,7 @@ def test_a_number_gives_the_number_of_poses() -> None:
     [
         (2, 0, "9.0", r"poses\.csv:3: pose at 9, .* outside the workspace; allowed: \[-0\.5"),
         (2, 5, "0.5", r"poses\.csv:3: .*: turned by .* deg; allowed: up to 15\.0 deg"),
-        (2, 1, "much", r"poses\.csv:3: y: value 'much': no number"),
+        (2, 1, "much", r"poses\.csv:3: y: value 'much' is not a number"),
         (2, 5, None, r"poses\.csv:3: 5 cells; allowed: 6"),
         (
             0,

@@ -49,7 +49,7 @@ class Scripted(Camera):
     def grab(self) -> Image:
         image = self._images.pop(0)
         if image is None:
-            raise CameraError("camera scripted gives no image any more")
+            raise CameraError("camera scripted sends no more images")
         return Image(image, 0.0, None, "x")
 
     def close(self) -> None:
@@ -111,7 +111,7 @@ def test_a_camera_that_stays_disconnected_ends_the_run(
 ) -> None:
     camera, opens, said = opened([GOOD] + [GONE] * 3, tmp_path, monkeypatch)
     camera.see(1, lambda _: None)
-    with pytest.raises(CameraError, match="no image any more"):
+    with pytest.raises(CameraError, match="no more images"):
         camera.see(2, lambda _: None)
     assert len(opens) == 3 and "opening it again" in said[0]
 
@@ -123,7 +123,8 @@ def test_a_wrong_resolution_and_duplicate_ids_are_reported(
     assert list(camera.see(1, lambda _: None).corners_px) == [7]
     camera.see(2, lambda _: None)
     assert [text for text in said if "twice" in text] == [
-        "pose 1: marker 3 is twice in an image: its id was printed twice; it is left out of that image"
+        "pose 1: marker 3 is twice in an image: its id was printed twice; it is left out of that "
+        "image"
     ]
     with pytest.raises(
         BadInputError, match="320 x 200 pixels, but the intrinsics are for 320 x 240"

@@ -82,7 +82,7 @@ def test_intrinsics_of_a_different_lens_are_rejected_with_the_reason(
         "markers", "map", photos, "--size-mm", "150", "--camera", tmp_path / "wrong.toml"
     )
     assert done.returncode == 1
-    assert "the intrinsics are not this camera's" in done.stdout
+    assert "the intrinsics do not fit the camera" in done.stdout
     (tmp_path / "small.toml").write_text(true.model_copy(update={"width_px": 640}).toml_text())
     done = cdpr_here(
         "markers", "map", photos, "--size-mm", "150", "--camera", tmp_path / "small.toml"
@@ -99,7 +99,7 @@ def test_mirrored_images_are_reported(photos: Path, tmp_path: Path) -> None:
         *("markers", "map", tmp_path, "--size-mm", "150", "--camera", photos / "camera.toml")
     )
     assert done.returncode == 2
-    assert "7 read as mirror images: are all sheets, or the images, so?" in done.stderr
+    assert "7 are mirror images: are all sheets, or the images, mirrored?" in done.stderr
 
 
 @pytest.mark.parametrize(
@@ -174,7 +174,7 @@ def test_intrinsics_are_computed_from_a_folder_or_its_gaps_reported(tmp_path: Pa
     found = CameraIntrinsics.load_file(tmp_path / "lens.toml")
     assert found.focal_px[0] == pytest.approx(415.0, rel=0.02)
     few = cdpr_here("camera", "calibrate", tmp_path, "--out", tmp_path / "few.toml")
-    assert few.returncode == 1 and "holds no image" in few.stderr
+    assert few.returncode == 1 and "contains no image" in few.stderr
 
 
 def test_images_of_a_camera_are_stored_with_their_times(photos: Path, tmp_path: Path) -> None:

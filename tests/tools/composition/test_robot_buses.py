@@ -53,7 +53,7 @@ def test_a_robot_with_one_bus_takes_one_url(tmp_path: Path):
         (("middle=socketcan:can0",), "no bus 'middle'; allowed: left, right"),
         (("left=socketcan:a", "left=socketcan:b"), "'left' was given before as socketcan:a"),
         (("left=socketcan:a", "right=socketcan:a"), "'left' and 'right': both are socketcan:a"),
-        (("left=socketcan:a", "simbus:x"), "several are written BUS=URL"),
+        (("left=socketcan:a", "simbus:x"), "write several buses as BUS=URL"),
         (("left=simbus:", "right=simbus:x"), "a single bus needs a name"),
         (("left=smoke:signals",), "unknown interface 'smoke'"),
     ],

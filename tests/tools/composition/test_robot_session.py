@@ -158,7 +158,7 @@ def test_a_mode_rejected_on_one_bus_enables_no_drive_on_the_other(session: Sessi
     device = session.device
     device.groups[1].ask_mode(Mode.HOMING)
     session.idle(0.001)
-    with pytest.raises(ModeRefusedError, match=r"node 5 \(axis 5\): asked for mode 6"):
+    with pytest.raises(ModeRefusedError, match=r"node 5 \(axis 5\): mode 6 \\(.*\\) was requested"):
         device.request(State.OPERATION_ENABLED)
     session.idle(0.05)
     assert all(state == State.SWITCH_ON_DISABLED for state in device.states())
@@ -170,14 +170,14 @@ def test_a_lost_bus_leaves_the_drives_of_the_other_without_power(tmp_path: Path)
     buses = [f"left={left.ready['bus']}", f"right={right.ready['bus']}"]
     try:
         with (
-            pytest.raises(TripError, match="has gone away") as caught,
+            pytest.raises(TripError, match="is lost") as caught,
             open_robot(robot, buses, OUT) as opened,
         ):
             opened.enable()
             hold(opened, 0.3)
             left.kill()
             hold(opened, 1e4)
-        assert any("not known to be without power" in note for note in caught.value.__notes__)
+        assert any("may still have power" in note for note in caught.value.__notes__)
         one = load_robot(robot_file(tmp_path, [("right", 1)]))
         with open_robot(one, buses[1:], OUT) as opened:
             # the master switched it off, not its heartbeat timeout

@@ -152,7 +152,7 @@ def test_the_status_shows_position_and_rotation_of_a_platform() -> None:
         "rotation_rad": [0.0, 0.0, math.radians(5.0)],
         "target_m": [0.0, 0.0, 0.0],
         "target_rotation_rad": [0.0, 0.0, 0.0],
-        "trouble": "no way on, at 500.0, 1000.0, 2000.0 mm: cable 1",
+        "trouble": "the way is blocked, at 500.0, 1000.0, 2000.0 mm: cable 1",
     }
     assert platform_text({"program_progress": progress}) == (
         "platform at 100.0, 200.0, 300.0 mm, turned by 0.00, 0.00, 5.00 deg; "
@@ -294,10 +294,13 @@ def test_a_blocked_motion_ends_with_the_reason(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     told = Told(ROOM, HERE)
-    told.ways = [{}, {"trouble": "no way on, at 100.0, 0.0, 700.0 mm: cable 1 would need 9 N"}]
+    told.ways = [
+        {},
+        {"trouble": "the way is blocked, at 100.0, 0.0, 700.0 mm: cable 1 would need 9 N"},
+    ]
     result = typed(monkeypatch, told, "--to", "0", "0", "700")
     assert isinstance(result.exception, WorkFailedError)
-    assert "no way on, at 100.0, 0.0, 700.0 mm: cable 1" in str(result.exception)
+    assert "the way is blocked, at 100.0, 0.0, 700.0 mm: cable 1" in str(result.exception)
 
 
 def test_a_target_missed_by_friction_is_reported_and_the_move_succeeds(

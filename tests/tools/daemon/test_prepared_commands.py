@@ -83,7 +83,7 @@ def test_another_command_cancels_a_preparation(rig: LoopRig, urgent: bool) -> No
     rig.turn(20)
     answers = {answer["to"]: answer for answer in iter(rig.block.take_reply, None)}
     assert answers[number]["ok"] is False
-    assert "given up: " in answers[number]["text"]
+    assert "cancelled: " in answers[number]["text"]
     assert rig.loop.engine.program.name == "hold"
 
 
@@ -130,7 +130,7 @@ def test_losing_the_right_to_move_cancels_a_preparation(rig: LoopRig) -> None:
     rig.drop_right()
     rig.take_right()
     why = "jog: the right to move has changed hands; held"
-    assert answer_to(rig, number) == f"given up: {why}"
+    assert answer_to(rig, number) == f"cancelled: {why}"
     assert (rig.loop.engine.program.name, rig.status["reason"]) == ("hold", why)
 
 

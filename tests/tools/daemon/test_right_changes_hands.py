@@ -65,7 +65,7 @@ def test_motion_ends_when_the_right_changes_hands_between_two_checks(rig: LoopRi
     assert rig.status["reason"] == "jog: the right to move has changed hands; held"
     for do in ("program", "set"):
         answer = rig.command(do, program="jog", wanted=JOG, right=before)
-        assert answer["text"] == f"{do}: the right to move is somebody else's by now"
+        assert answer["text"] == f"{do}: another client has the right to move now"
     rig.obeyed("program", program="jog", wanted=JOG)
     rig.obeyed("disable")
 
@@ -80,7 +80,7 @@ def test_enabling_under_a_lost_right_ends_with_a_hold(rig: LoopRig) -> None:
     answer = rig.block.take_reply()
     assert answer is not None
     assert (answer["to"], answer["ok"]) == (number, False)
-    assert answer["text"] == "jog: the right to move is somebody else's by now; held"
+    assert answer["text"] == "jog: another client has the right to move now; held"
     assert (rig.status["state"], rig.status["program"]) == ("active", "hold")
     # cogging moves an axis without power: hold brakes that motion and adds none
     speeds = np.abs(rig.run(0.2)["setpoint_velocity_rad_s"])

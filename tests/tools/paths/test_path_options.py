@@ -56,7 +56,7 @@ def test_a_file_of_any_name_gets_a_name_that_the_daemon_accepts(tmp_path: Path) 
     for name in ("part.nc", "Träger (2).NC", "_a.csv", f"{200 * 'long'}.toml", "ü.tap"):
         PathFile(name=plain_name(tmp_path / name), text="")
     assert plain_name(tmp_path / "part 1.nc") == "part 1.nc"
-    with pytest.raises(PathError, match=r"README.md: no kind of path's file; allowed: way points"):
+    with pytest.raises(PathError, match=r"README.md: not a path file; allowed: way points"):
         plain_name(tmp_path / "README.md")
 
 

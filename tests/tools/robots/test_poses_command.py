@@ -54,7 +54,7 @@ def test_planar_poses_from_another_place_are_written_as_toml(tmp_path: Path) -> 
 @pytest.mark.parametrize(
     ("arguments", "problem"),
     [
-        (("bench-8",), "has no platform; allowed: robots with a [platform]"),
+        (("bench-8",), "has no platform; allowed: a robot with a [platform]"),
         (("spatial-8", "--angle", "20"), "--angle 20: allowed: up to 15 deg"),
         (("spatial-8", "--from", "0", "0"), "--from 0 0: 2 numbers; allowed: 3, X Y Z in mm"),
         (("spatial-8", "--from", "1500", "0", "1500"), "the start at 1.500, 0.000, 1.500 m: cable"),

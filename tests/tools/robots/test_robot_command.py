@@ -155,13 +155,13 @@ def test_a_slow_control_loop_is_reported(tmp_path: Path) -> None:
     assert off_mm is not None
     alone_m = 12.0 / (60.0 * (2.0 * np.pi * 0.34) ** 2)
     assert alone_m / 1.5 < 1e-3 * float(off_mm[1]) < alone_m * 1.5
-    yield_mm = re.search(r"yield by ([\d.]+) mm as it is", found.text)
+    yield_mm = re.search(r"stretch by ([\d.]+) mm when it", found.text)
     assert yield_mm is not None
     slower = re.sub(r"^acceleration_m_s2 = .*$", "acceleration_m_s2 = 0.1", text, flags=re.M)
     slower = re.sub(r"^sync_period_s = .*$", "sync_period_s = 0.004", slower, flags=re.M)
     path.write_text(slower)
     (found,) = diagnose(load_robot(path))
-    less_mm = re.search(r"yield by ([\d.]+) mm as it is", found.text)
+    less_mm = re.search(r"stretch by ([\d.]+) mm when it", found.text)
     accelerated = load_robot("suspended-6").platform
     assert less_mm is not None and accelerated is not None
     share = 0.1 / accelerated.acceleration_m_s2
@@ -171,10 +171,13 @@ def test_a_slow_control_loop_is_reported(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("arguments", "problem"),
     [
-        (["one-bus-8"], "has no platform; allowed: robots with a [platform]"),
+        (["one-bus-8"], "has no platform; allowed: a robot with a [platform]"),
         (["planr-3"], "did you mean 'planar-3'?"),
         (["planar-3.tml"], "no such file: 'planar-3.tml'"),
-        ([__file__.rpartition("/")[2]], "is no robot's file (TOML, its name ends in .toml)"),
+        (
+            [__file__.rpartition("/")[2]],
+            "is not a robot file (TOML, with a name that ends in .toml)",
+        ),
         (["planar-3", "--png", "/nowhere/robot.png"], "a file in a folder that can be written to"),
     ],
 )

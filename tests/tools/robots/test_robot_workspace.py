@@ -117,7 +117,7 @@ def test_a_centre_outside_the_workspace_is_rejected_with_one_inside() -> None:
 @pytest.mark.parametrize(
     ("arguments", "told"),
     [
-        (["bench-2"], "has no platform; allowed: robots with a [platform]"),
+        (["bench-2"], "has no platform; allowed: a robot with a [platform]"),
         (["point-4", "--rotate", "1", "2", "3"], "this platform has no controlled angle"),
         (["planar-4", "--rotate", "-200"], "less than 180 deg"),
         (["planar-4", "--within", "180"], "less than 180 deg"),

@@ -33,8 +33,8 @@ def test_an_oscillating_loop_is_reported_in_the_status(
         if not oscillates:
             assert not told
             return
-        (notice,) = (text for text in told if "swings this winch" in text)
-        assert ": the platform's loop swings this winch, for 1 s at 3" in notice
+        (notice,) = (text for text in told if "oscillates at this winch" in text)
+        assert ": the control loop oscillates at this winch: for 1 s at 3" in notice
         robot.carry_out("lower")
         robot.program("tighten")  # tightening starts a new detection
         assert not any("swings this winch" in text for text in robot.status()["notices"])

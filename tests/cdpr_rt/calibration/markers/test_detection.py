@@ -111,8 +111,8 @@ def test_intrinsics_from_a_board_are_true_within_their_uncertainty() -> None:
     level = random_poses(Box((-0.02, -0.02, 0.5), (0.02, 0.02, 0.55), 8.0), 5, 8)
     alike = [(f"{k}", camera.grab(state)) for k, state in enumerate(level)]
     said = " ".join(fit_intrinsics(alike, Board()).missing)
-    assert "tilted" in said and "corner" in said and "nearer or further" in said
-    with pytest.raises(CalibrationError, match="0 images show the board; 5 are the least"):
+    assert "tilted" in said and "corner" in said and "nearer or farther" in said
+    with pytest.raises(CalibrationError, match="0 images show the board; 5 are needed"):
         fit_intrinsics([("a", np.full((384, 480), 90, np.uint8))], Board())
     with pytest.raises(InvalidRequestError, match="images differ in size"):
         fit_intrinsics([images[0], ("b", images[1][1][1:])], Board())
@@ -122,7 +122,11 @@ def test_intrinsics_from_a_board_are_true_within_their_uncertainty() -> None:
     ("board", "flipped", "said"),
     [
         (Board(dictionary="6X6_100"), False, "markers of 5X5_50 are read, none of 6X6_100"),
-        (Board(6, 9), False, "no board of 6 columns and 9 rows has them so: were they exchanged"),
+        (
+            Board(6, 9),
+            False,
+            "no board of 6 columns and 9 rows has this arrangement: were columns and rows exchanged",
+        ),
         (Board(), True, "markers read as mirror images: is the board, or the image, so"),
     ],
 )

@@ -130,7 +130,7 @@ def test_out_of_plane_errors_of_a_map_are_mostly_tilt_of_its_reference_marker() 
     told = np.sqrt((fit.bundle.shape_sigma_m**2).sum(axis=1).mean())
     assert np.sqrt((left**2).sum(axis=1).mean()) < 2.0 * told
     assert told < 0.5 * sigma[2]
-    assert any("tells little about its tilt" in note for note in fit.notes)
+    assert any("the tilt of one sheet is not well known" in note for note in fit.notes)
 
 
 def test_markers_never_seen_together_are_reported_as_islands_with_advice(one: Room) -> None:
@@ -165,7 +165,7 @@ def test_a_misread_id_does_not_join_groups_of_markers(one: Room) -> None:
     assert "2 islands" in fit.faults[0] and not fit.warnings
     assert fit.map.placed.sum() == 12 and 33 not in fit.map.ids
     assert difference(fit.map, one.truth).position_error_m.max() < 0.004
-    assert any("marker 33 read, but not among those laid out" in note for note in fit.notes)
+    assert any("marker 33 read, but not among the markers laid out" in note for note in fit.notes)
 
 
 def test_a_map_requires_images_with_two_markers() -> None:
@@ -240,7 +240,7 @@ def test_only_known_places_reveal_a_wrong_size_of_all_sheets(one: Room) -> None:
     wrong = MarkerSheets(size_m=0.153)
     blind = fit_map(one.sightings(), intrinsics(), wrong)
     assert not blind.faults
-    assert any("images alone cannot see it wrong" in note for note in blind.notes)
+    assert any("images alone cannot verify it" in note for note in blind.notes)
     told = wrong.model_copy(update={"known": known_places(one, 0, 8, 19)})
     fit = fit_map(one.sightings(), intrinsics(), told)
     assert fit.known is not None
@@ -287,7 +287,7 @@ def test_a_wrong_known_place_is_reported_and_omitted(one: Room) -> None:
     x, *rest = known[2].position_m
     known[2] = known[2].model_copy(update={"position_m": (x + 0.2, *rest)})
     fit = fit_map(one.sightings(), intrinsics(), SHEETS.model_copy(update={"known": tuple(known)}))
-    assert len(fit.faults) == 1 and "marker 15 does not lie where it is known" in fit.faults[0]
+    assert len(fit.faults) == 1 and "marker 15 does not lie at its known place" in fit.faults[0]
     assert fit.fixed == (0, 4, 19)
 
 
@@ -296,7 +296,7 @@ def test_known_places_without_a_consistent_majority_are_all_omitted(one: Room) -
     off = [tuple((np.array(k.position_m) + rng.uniform(-1, 1, 3)).tolist()) for k in known]
     wrong = tuple(k.model_copy(update={"position_m": p}) for k, p in zip(known, off, strict=True))
     fit = fit_map(one.sightings(), intrinsics(), SHEETS.model_copy(update={"known": wrong}))
-    assert "cannot be said which of them are wrong" in fit.faults[0]
+    assert "is not known which are wrong" in fit.faults[0]
     assert len(fit.fixed) == 1 and fit.known is None
 
 
@@ -309,7 +309,7 @@ def test_intrinsics_of_another_camera_are_recognised(one: Room, change: tuple[in
     lens[at : at + (2 if at == 0 else 5)] *= 1.0 + share
     fit = fit_map(one.sightings(), intrinsics(lens), SHEETS)
     assert fit.lens.wrong
-    assert "intrinsics are not this camera's" in fit.faults[0]
+    assert "intrinsics do not fit the camera" in fit.faults[0]
     if at == 0:
         assert fit.lens.focal_change == pytest.approx(-0.0196, abs=0.004)
 
@@ -369,5 +369,5 @@ def test_duplicate_or_sizeless_markers_are_rejected() -> None:
     corners = np.zeros((4, 2))
     with pytest.raises(Exception, match="marker 3 is there twice in image number 0"):
         SeenMarkers.of(["a"], [(0, 3, corners), (0, 3, corners)], {3: 0.1})
-    with pytest.raises(Exception, match="marker 4 was seen, but has no size"):
+    with pytest.raises(Exception, match="marker 4 was seen, but its size is not stated"):
         SeenMarkers.of(["a"], [(0, 3, corners), (0, 4, corners)], {3: 0.1})

@@ -68,7 +68,7 @@ def test_a_stop_at_the_first_point_is_at_the_beginning_of_the_path(tmp_path):
         (CSV + "1,1.6,,-5,,,\n", r":4: speed: value -5"),
         ("x_m,y_m,z_m\n", r":1: column 'z_m'; allowed: x_m, y_m, angle_rad"),
         ("x_deg,y_m\n", r":1: column 'x_deg'"),
-        ("x_m,y_m\n0,1\n", r"less than two"),
+        ("x_m,y_m\n0,1\n", r"fewer than two"),
     ],
 )
 def test_invalid_csv_is_rejected(tmp_path, text, told):
