@@ -14,7 +14,7 @@ WordArray = NDArray[np.uint16]
 
 
 def rms(values: FloatArray) -> float:
-    """Return sqrt(Σ|v|²/m), the root mean square of m numbers (m,) or lengths of vectors (m, d).
+    """Return sqrt(Σ|v|²/m), the root mean square of m numbers (m,) or vectors (m, d).
 
     It is nan if m is 0.
     """

@@ -6,7 +6,7 @@ class ControlError(Exception):
 
 
 class InvalidRequestError(ControlError):
-    """A procedure cannot begin or go on as requested; no motor has power."""
+    """A procedure cannot begin or continue as requested; no motor has power."""
 
 
 class TripError(ControlError):
@@ -14,11 +14,11 @@ class TripError(ControlError):
 
 
 class NotInTimeError(TripError):
-    """A device's own procedure took longer than it may; nothing else was wrong."""
+    """A device's own procedure took longer than allowed."""
 
 
 class InterruptedMotionError(ControlError):
-    """The operator asked for a stop; the motion was ended under control."""
+    """The operator requested a stop; the motion ended under control."""
 
 
 class RawLogError(ControlError):
@@ -26,4 +26,4 @@ class RawLogError(ControlError):
 
 
 class GeometryError(ControlError):
-    """A geometry no robot can have; the message names the cable and the value."""
+    """A geometry that is impossible; the message names the cable and the value."""

@@ -46,8 +46,8 @@ def bound(kernel: Callable[..., _T], *arrays: Any, then: tuple[Any, ...] = ()) -
 
     An ordinary call looks up the machine code for the types of its arguments every time, which
     costs more than most kernels. Here it is looked up once. `then` has an example of each remaining
-    argument; their types are not checked any more, so an array must have the same type and
-    contiguity as its example. Compiles the kernel if necessary.
+    argument. Later calls do not check types, so an array must have the type and contiguity of its
+    example. Compiles the kernel if necessary.
     """
     dispatcher: Any = kernel
     type_of: Callable[[Any], Any] = numba.typeof
@@ -56,7 +56,7 @@ def bound(kernel: Callable[..., _T], *arrays: Any, then: tuple[Any, ...] = ()) -
 
 
 def bound_to(bind: Callable[[*_Objects], _F]) -> Callable[[*_Objects], _F]:
-    """Return `bind`, called only if an argument is another object than in the last call.
+    """Return a function that calls `bind` only if an argument is another object than last time.
 
     For kernels `bound` to the arrays of up to four objects that stay the same from cycle to cycle;
     otherwise the last result is returned again.

@@ -104,7 +104,8 @@ class Model:
 
     @property
     def high_N(self) -> FloatArray:
-        """Upper bounds of the tensions, (n,): limits, and torque left while rotors accelerate."""
+        """Upper bounds of the tensions, (n,): the limits, or less if the motors' torque is also
+        needed to accelerate the rotors."""
         return self._model.torque_limited_N.copy()
 
     @property
@@ -144,8 +145,8 @@ class Model:
     def position(self, lengths_m: ArrayLike, start: ArrayLike | None = None) -> FloatArray:
         """Return the positions (..., d) at which unloaded cables have these lengths (..., n).
 
-        Least squares, searched from the position `start` (d,), by default from home. nan if none is
-        found.
+        Found by least squares from the position `start` (d,), by default home; nan if the search
+        fails.
         """
         kinematics = self._model.kinematics
         begin = self._model.pose(self.home if start is None else self._one(start))
@@ -188,8 +189,8 @@ class Model:
     def capacity_margin(self, position: ArrayLike, acceleration_m_s2: float = 0.0) -> FloatArray:
         """Return how far all tensions can keep from their bounds, (...), N; below 0: infeasible.
 
-        With an acceleration, the least over all combinations of directions. -inf where the cables
-        do not control a direction.
+        With an acceleration it is the least over all combinations of directions. It is -inf if the
+        cables do not control a direction.
         """
         rows, shape = self._rows(position)
         if not 0.0 <= acceleration_m_s2 < np.inf:

@@ -27,13 +27,13 @@ class RefusalCode(StrEnum):
     NOT_FEASIBLE = "not_feasible"
     """The platform cannot be at a place, or on the way to it (`why`; `outside` its workspace)."""
     NOTHING_LEFT = "nothing_left"
-    """There is nothing to go on with (`left`: target or path, `instead`: what to ask for)."""
+    """There is nothing to continue (`left`: target or path, `instead`: the alternative)."""
     NOT_TIGHT = "not_tight"
     """The cables are not tight."""
     NOT_CALIBRATED = "not_calibrated"
     """The platform's geometry is not known well enough to move it (`why`)."""
     BAD_SOURCE = "bad_source"
-    """Cable lengths are not to be taken from there (`why`, `allowed`: sources, perhaps none)."""
+    """The source of cable lengths cannot be used (`why`, `allowed`: sources, perhaps none)."""
 
 
 @dataclass(frozen=True)
@@ -83,7 +83,7 @@ class CommandRefusal:
         )
 
     def as_json(self) -> dict[str, Any]:
-        """Return it as the daemon's answers hold it."""
+        """Return it in the form of the daemon's answers."""
         return asdict(self)
 
     @classmethod

@@ -34,7 +34,7 @@ class NotRunning(Error):  # noqa: N818
 
 
 class AlreadyRunning(Error):  # noqa: N818
-    """A daemon of this robot runs already; `connect` uses it."""
+    """A daemon of this robot is already running; `connect` uses it."""
 
 
 class Refused(Error):  # noqa: N818
@@ -52,14 +52,14 @@ class Refused(Error):  # noqa: N818
 class MotionEnded(Error):  # noqa: N818
     """A motion ended before its target, and the drives still have power.
 
-    Somebody else commanded a hold or took over, or the platform cannot go on.
+    Another client commanded a hold or took the right to move, or the platform is blocked.
     """
 
 
 class Faulted(Error):  # noqa: N818
     """A fault ended the motion and removed the power.
 
-    `limit` is the key of the limit, `axis` the name of the axis. Each is None if the fault is of no
+    `limit` is the key of the limit, `axis` the name of the axis. Each is None if the fault has no
     single limit or axis.
     """
 
@@ -343,7 +343,7 @@ class Robot:
     # -- motion of a platform
 
     def tighten(self, source: str | None = None) -> None:
-        """Take up the slack of the cables and find the pose; the cables hold the platform then.
+        """Take up the slack of the cables and find the pose; then the cables hold the platform.
 
         `source` says where the cable lengths come from: "home" (the platform stands at home),
         "last" (those of the last stop) or "lengths" (those the loop knows).
@@ -353,7 +353,7 @@ class Robot:
     def lower(self, *, blind: bool = False) -> None:
         """Lower the platform onto its stand; the power stays on.
 
-        `blind`: every winch pays its cable out without a measured pose.
+        With `blind` every winch pays out its cable, without a measured pose.
         """
         self.run("lower", **({"blind": True} if blind else {}))
 
@@ -389,7 +389,8 @@ class Robot:
         speed_m_s: float | None = None,
         wait: bool = True,
     ) -> None:
-        """Move the platform by a distance (k,) and a turn (c,), from its target or where it is.
+        """Move the platform by a distance (k,) and a turn (c,), from its target or present
+        position.
 
         `frame` is "room" or "platform": the axes along which and about which it moves. The rest is
         as in `move_to`.
@@ -452,7 +453,7 @@ class Robot:
         self._jog("velocity_rad_s", velocity_rad_s, "axis, in rad/s", duration_s)
 
     def jog_cable(self, velocity_m_s: ArrayLike, duration_s: float) -> None:
-        """Pay out cable at speeds (n,), m/s, negative to wind it in, as `jog`."""
+        """Pay out cable at speeds (n,), m/s, negative to wind it in, for a time, as `jog`."""
         self._jog("cable_velocity_m_s", velocity_m_s, "axis, in m/s", duration_s)
 
     def _jog(self, key: str, value: ArrayLike, each: str, duration_s: float) -> None:
@@ -476,9 +477,9 @@ class Robot:
     def follow(self, path: str | Path) -> None:
         """Plan and follow the path in a file of way points (.toml, .csv) or G-code in the room.
 
-        The whole path is planned before anything moves. The call returns when the path waits, and
-        `resume` goes on. Raises Refused with the line that the robot cannot follow, or if the path
-        takes more than one plan.
+        The whole path is planned before anything moves. The call also returns when the path waits;
+        `resume` continues it. Raises Refused if the robot cannot follow the path (with the line),
+        or if the path needs more than one plan.
         """
         file = Path(path)
         if not file.is_file():
@@ -493,12 +494,12 @@ class Robot:
         self._carry_out(program, arguments)
 
     def hold(self) -> None:
-        """Stop the motion and stay there with power, whoever moves; `resume` goes on."""
+        """Stop any motion and hold the position with power; `resume` continues it."""
         self._backend.command("hold")
         self._started = ""
 
     def resume(self) -> None:
-        """Go on to the target, or along the path, that a hold interrupted."""
+        """Continue to the target, or along the path, that a hold interrupted."""
         self.run("path" if self._progress().get("path") else "pose", resume=True)
 
     def wait(self, seconds: float) -> None:
@@ -512,17 +513,17 @@ class Robot:
                 self._require_power(powered, self._look())
 
     def observe(self, seconds: float) -> Row:
-        """Let time pass as `wait`; return the cycles that were seen meanwhile, (cycles,).
+        """Let time pass as `wait`; return the cycles received meanwhile, (cycles,), at least two.
 
-        At least two. A daemon's are some 50 a second, with `time_s`, `position_rad`,
-        `cable_length_m` and `tension_N` only.
+        A daemon sends some 50 per second, with only `time_s`, `position_rad`, `cable_length_m` and
+        `tension_N`.
         """
         powered, rows = self.state == "active", self._backend.observe(seconds)
         self._require_power(powered, self._look())
         return rows
 
     def wait_until_done(self) -> None:
-        """Wait until the motion that was started last is done. Raises Faulted and MotionEnded."""
+        """Wait until the last started motion is done. Raises Faulted and MotionEnded."""
         program = self._started
         if not program:
             return
@@ -595,7 +596,7 @@ class Robot:
             raise self._fault(status)
 
     def _settle(self, program: str) -> None:
-        """Wait until the motors have followed their set-points, or have not for a while."""
+        """Wait until the motors have reached their set-points, up to a time limit."""
         waited_s = 0.0
         while waited_s < _SETTLE_S and not all(map(is_at_rest, self.status["axes"])):
             self._backend.wait(self._backend.look_s)
@@ -603,7 +604,7 @@ class Robot:
             self._running(program)
 
     def _fault(self, status: dict[str, Any]) -> Error:
-        """Return the error of a robot that has lost its power, once its reaction has ended."""
+        """Return the error of a robot that has lost its power, after its reaction has ended."""
         self._started = ""
         most_s = _REACTION_S + float(self.description.get("lowering_s", 0.0))
         waited_s = 0.0
@@ -648,9 +649,9 @@ class Robot:
 
 
 class _HeldOnError:
-    """Holds the robot if an error, such as a Ctrl-C, leaves the block while its motion goes on.
+    """Holds the robot if an error, such as a Ctrl-C, leaves the block during a motion.
 
-    Errors of the types `but` are ignored. A fault or another client ends the motion itself: then
+    Errors of the types `but` are ignored. If a fault or another client has ended the motion,
     nothing is held.
     """
 
@@ -672,7 +673,7 @@ class _HeldOnError:
 
 
 def end_text(status: Mapping[str, Any]) -> str:
-    """Return why a program does not run any more: a fault, a hold, or another command."""
+    """Return why a program no longer runs: a fault, a hold, or another command."""
     return str(status["reason"] or status.get("commanded") or f"{status['program']} runs")
 
 
@@ -685,7 +686,7 @@ def is_done(progress: Mapping[str, Any]) -> bool:
 
 
 def is_at_rest(axis: Mapping[str, Any]) -> bool:
-    """Whether a motor stands at its set-point, by its part of a status."""
+    """Whether a motor stands at its set-point, according to its part of a status."""
     angle, speed = _number(axis.get("position_rad")), _number(axis.get("velocity_rad_s"))
     off = abs(angle - _number(axis.get("setpoint_rad")))
     return not (off > _REST_RAD or abs(speed) > _REST_RAD_S)

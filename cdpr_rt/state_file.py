@@ -1,4 +1,4 @@
-"""Small files that outlive a command: one JSON object each, replaced as a whole."""
+"""Small files that outlive a command: one JSON object each, replaced atomically."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def read_state(path: Path) -> dict[str, Any] | None:
 
 
 def write_state(path: Path, state: dict[str, Any]) -> None:
-    """Replace the file as a whole, so that a power loss at any time leaves the old or the new one.
+    """Replace the file atomically: a power loss leaves the old or the new one.
 
     Raises StateFileError.
     """
@@ -78,7 +78,7 @@ def write_state(path: Path, state: dict[str, Any]) -> None:
 
 
 def remove_state(path: Path) -> None:
-    """Remove the file, if it is there; raises StateFileError."""
+    """Remove the file if it exists; raises StateFileError."""
     try:
         path.unlink(missing_ok=True)
     except OSError as error:

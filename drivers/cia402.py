@@ -92,7 +92,7 @@ TARGETS: Final = (
     State.OPERATION_ENABLED,
     State.QUICK_STOP,
 )
-"""States that a drive can be asked for."""
+"""States that can be requested of a drive."""
 
 
 def _next_word(target: State, state: State) -> int:

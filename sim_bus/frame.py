@@ -125,7 +125,7 @@ class FrameLog:
         self._file.close()
 
     def _write(self, before_s: float) -> None:
-        """Write the frames before `before_s`, to which no bus can add any more."""
+        """Write the frames before `before_s`, to which no bus can add any later."""
         parts = [listener.take(before_s) for listener in self._listeners]
         self._waiting -= sum(map(len, parts))
         lines = heapq.merge(*parts, key=lambda entry: entry[0])

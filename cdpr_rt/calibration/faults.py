@@ -109,7 +109,7 @@ def fit_without_faults(
         gains.append(found.total_cost - without.total_cost)
         left_out.append(fault)
         found = without
-    # readings that stood out before others were left out may not stand out any more
+    # readings that were outliers before others were left out may now fit
     least = _LEAST_GAIN * max(found.variance_factor, 1.0)
     sure = [fault for fault, gain in zip(left_out, gains, strict=True) if gain > least]
     if len(sure) < len(left_out):

@@ -16,7 +16,7 @@ class Controller(Protocol):
     compensation_Nm: FloatArray
     """Feed-forward torque from the model of the motor, or its cable's tension, (n,)."""
     motor_loss_Nm: FloatArray
-    """Part of the compensation that the motor's cogging and friction take up, (n,)."""
+    """Part of the compensation for the motor's cogging and friction, (n,)."""
     cogging_Nm: FloatArray
     """Cogging: the part of `motor_loss_Nm` whose mean over a motor turn is 0, (n,)."""
 

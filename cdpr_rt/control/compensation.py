@@ -204,7 +204,7 @@ class Compensation:
         self._state[:] = 0.0
 
     def standing_Nm(self, position_rad: FloatArray, feedback: AxisFeedback) -> FloatArray:
-        """Return the torque that motors at these angles take up, (n,), mean of both directions.
+        """Return the torque lost in motors at rest at these angles, (n,), mean of both directions.
 
         That is cogging, and half of the difference in friction. 0 if there is no profile or no
         index is known.

@@ -1,4 +1,4 @@
-"""Gains of the motor's position loops from inertia and latency, by stated margins."""
+"""Gains of the motor's position loops from inertia, latency and wanted margins."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ MAX_SENSITIVITY = 2.0
 DERIVATIVE_FILTER_RATIO = 10.0
 """The derivative's filter pole lies at this multiple of the crossover frequency."""
 INERTIA_RATIO = 50.0
-"""Inertia that a firm loop tolerates over the rotor's, for example with a mass on the cable."""
+"""Ratio of total to rotor inertia that a firm loop tolerates, e.g. with a mass on the cable."""
 SWEEP_PHASE = 0.3
 """Phase in radians that the latency may take at the sweep's natural frequency."""
 _MOST_FACTOR = 8.0

@@ -18,7 +18,7 @@ HANGING_LOAD_1_s = 4.0
 UNKNOWN_POSE_m_s = 0.15
 """Speed at which the cables lower a platform whose pose is not known."""
 FASTEST_IN_m_s = 0.5
-"""Speed at which they take in slack during that lowering."""
+"""Highest speed at which they wind in slack during that lowering."""
 DRUM_TENSION_SHARE = 0.25
 """Tension that keeps a cable on its drum during that lowering, over the least tension."""
 SPARE_m = 0.05
@@ -52,7 +52,7 @@ def control_speed(
     for i in range(position.size):
         raw = (position[i] - last[i]) / period
         last[i] = position[i]
-        # a jump of the encoder lasts one cycle and is no speed; a winch that runs away goes on
+        # a jump of the encoder lasts one cycle and is not a speed; a winch that runs away continues
         fast = abs(cable[i] * raw) >= _FASTEST_m_s
         if not fast or jumped[i]:
             speed[i] += weight * (raw - speed[i])

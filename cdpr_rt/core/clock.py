@@ -51,7 +51,7 @@ class Task(Generic[_T]):
             self.done = True
 
     def is_due(self, now_s: float) -> bool:
-        """Return whether the task can go on."""
+        """Return whether the task can continue."""
         return now_s >= self.wake_s or (self._condition is not None and bool(self._condition()))
 
     def advance(self) -> None:
@@ -60,7 +60,7 @@ class Task(Generic[_T]):
         self._greenlet.switch()
 
     def suspend(self, condition: Condition | None, wake_s: float) -> None:
-        """Suspend the task, from within, until its condition holds or its time has come."""
+        """Suspend the task, from within, until its condition holds or at its wake-up time."""
         self._condition, self.wake_s = condition, wake_s
         parent = self._greenlet.parent
         assert parent is not None  # a task runs only when it is advanced
@@ -86,7 +86,7 @@ class Task(Generic[_T]):
 _BLOCKING_POLL_S = 0.002
 """Period of polling work in another thread."""
 _MADE_UP_S = 0.02
-"""Largest lag of simulated time behind wall-clock time that is caught up."""
+"""Largest lag of simulated time behind wall-clock time that is made up for."""
 _LONGEST_GRANT_S = 0.1
 """Longest step of bus time, so that a request to end is noticed in between."""
 
@@ -95,7 +95,7 @@ class Readable(Protocol):
     """Object with a file descriptor to wait for."""
 
     def fileno(self) -> int:
-        """Return the descriptor that is readable when something has come."""
+        """Return the descriptor that is readable when something has arrived."""
 
 
 class EventSource(Readable, Protocol):
@@ -113,15 +113,15 @@ class SteppedBus(Protocol):
 
     now_s: float
     next_s: float
-    """Time of the next event there, as far as is known."""
+    """Time of the next known event on the bus."""
     gone: bool
     """Whether the bus is lost, and its time with it."""
 
     def go(self, until_s: float) -> bool:
-        """Make the bus process what was sent, then advance to `until_s` or until a frame comes.
+        """Make the bus process what was sent, then advance to `until_s` or until a frame arrives.
 
-        Takes in the frames that come; returns whether there were any. With a time in the past the
-        bus does not advance, but everything that was sent has been answered afterwards.
+        Stores the frames that arrive; returns whether there were any. With a time in the past the
+        bus does not advance, but it answers everything that was sent.
         """
 
 
@@ -169,7 +169,8 @@ class Clock(ABC):
     def wait(self, condition: Condition | None, until_s: float = math.inf) -> bool:
         """Wait until `condition` is true, at most until `until_s`; return whether it is.
 
-        The condition is checked whenever something has come or a task has run; None is never true.
+        The condition is checked whenever something has arrived or a task has run; None is never
+        true.
         """
         while True:
             if condition is not None and condition():
@@ -182,7 +183,7 @@ class Clock(ABC):
                 self._wait_once(until_s)
 
     def poll(self) -> None:
-        """Process what has come already, so that later events are newer."""
+        """Process what has already arrived, so that later events are newer."""
         for source in self._sources:
             source.poll()
 
@@ -205,7 +206,7 @@ class Clock(ABC):
 
     @abstractmethod
     def _listen(self, until_s: float) -> None:
-        """Poll the sources; if nothing has come, wait for it up to `until_s`."""
+        """Poll the sources; if nothing has arrived, wait up to `until_s`."""
 
     @abstractmethod
     def sleep_until(self, until_s: float) -> None:
@@ -220,7 +221,7 @@ class Clock(ABC):
         return task
 
     def gather(self, works: Iterable[Callable[[], _T]]) -> list[Task[_T]]:
-        """Run several works as tasks side by side, and return them once all have ended.
+        """Run several calls as parallel tasks, and return them once all have ended.
 
         If anything else ends the wait (an interrupt, a cancellation), the tasks are cancelled.
         """

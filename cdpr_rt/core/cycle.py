@@ -20,7 +20,7 @@ class Watch(Protocol):
     def fault(self) -> Fault | None:
         """Return why the motion must end, None if it need not; cheap, called every cycle.
 
-        Its limit is `SAFETY_ALARM` if the torque must go immediately, else `SAFETY_STOP`.
+        Its limit is `SAFETY_ALARM` if the torque must be removed immediately, else `SAFETY_STOP`.
         """
 
 
@@ -46,7 +46,7 @@ class Cycle:
         self.watches = tuple(watches)
         self.lateness = Lateness()
         self.late_s = 0.0
-        """Delay of this cycle's begin behind its deadline, 0 in lockstep."""
+        """Delay of this cycle's start after its deadline, 0 in lockstep."""
         self.began_ns = 0
         """CLOCK_MONOTONIC when this cycle's SYNC went out."""
         self.elapsed_s = device.period_s
@@ -55,14 +55,14 @@ class Cycle:
         self._deadline_s = 0.0
         self._no_deadline_yet = True
         self._free_s = 0.0
-        """Time at which the last cycle's commands are off the wire at the latest."""
+        """Latest time at which the last cycle's commands are off the wire."""
 
     def begin(self) -> None:
         """Note that no cycles have run for a while, so that the next one does not count as late."""
         self._no_deadline_yet = self._no_elapsed_yet = True
 
     def exchange(self) -> int:
-        """Wait for the deadline, send SYNC, take in the answers; return how many axes answered."""
+        """Wait for the deadline, send SYNC, receive the answers; return how many axes answered."""
         if not self.device.lockstep:
             self._await_deadline()
         self._measure_elapsed()

@@ -32,7 +32,8 @@ class CycleField:
     """Path of attributes to its value, from the engine."""
     meaning: str
     wall: bool = False
-    """Whether it describes the machine that ran the loop; all else follows from the bus."""
+    """Whether it depends on the machine that runs the loop; all other quantities follow from the
+    bus."""
     status: bool = False
     """Whether the status shows it for each axis; scalars are always shown."""
     live: bool = False

@@ -14,7 +14,7 @@ from cdpr_rt.core.exchange import AxisFeedback, TensionFeedback
 from cdpr_rt.jit import bound, bound_to, jit
 
 FILTER_S = 0.01
-"""Filter time of speed and torque: one encoder step per cycle would be hundreds a second."""
+"""Filter time of speed and torque: unfiltered, one encoder step per cycle is a high speed."""
 _AT_ONCE_S = 0.001
 """Filter time for a tension that rises within some ms."""
 _FRICTION_FULL_rad_s = 0.1
@@ -85,7 +85,7 @@ class AxisEstimate:
         self.tension_N: FloatArray = np.full(n, np.nan)
         """Measured, or estimated from the torque; nan if neither is possible."""
         self.tension_at_once_N: FloatArray = np.full(n, np.nan)
-        """The same by the torque, filtered over 1 ms only: noisy, but it shows a snatch."""
+        """The same from the torque, filtered over only 1 ms: noisy, but it shows a snatch."""
         self.slack_allowed = False
         """Whether cables are being tightened or slackened, so that a slack one is no fault."""
         self.tension_measured: BoolArray = np.zeros(n, np.bool_)
@@ -216,11 +216,11 @@ class Estimator:
         motor_loss_Nm: FloatArray | None = None,
         cogging_Nm: FloatArray | None = None,
     ) -> None:
-        """Take in this cycle's feedback and the tensions as last read.
+        """Process this cycle's feedback and the last tension readings.
 
         `elapsed_s` is from the last SYNC to this one, if it was not one period; `motor_loss_Nm`
-        (n,) is the part of the torque that the motors' own cogging and friction take up,
-        `cogging_Nm` (n,) the part of cogging alone.
+        (n,) is the part of the torque for the motors' own cogging and friction, `cogging_Nm` (n,)
+        the part for cogging alone.
         """
         estimate = self.estimate
         estimate.elapsed_s = elapsed_s or self._period_s

@@ -37,7 +37,7 @@ class AxisFeedback:
         self.alive: BoolArray = np.zeros(n, np.bool_)
         """Whether its drive was heard and operational at the end of the last cycle."""
         self.rate_ok: BoolArray = np.zeros(n, np.bool_)
-        """Whether it answers once per SYNC: just now, and with rare exceptions before."""
+        """Whether it answers once per SYNC: to the last one, and to nearly all before it."""
         self.index_rad: FloatArray = np.zeros(n)
         self.index_known: BoolArray = np.zeros(n, np.bool_)
 
@@ -90,7 +90,7 @@ class AxisDevice(Protocol):
         """Encode `command` and send it, to act from the next SYNC on."""
 
     def faults(self) -> Sequence[Fault]:
-        """Return why the drives must not be driven any longer, one fault for each failed axis.
+        """Return why the drives must not run any longer, one fault for each failed axis.
 
         The fault of a bus has axis -1. Cheap to call.
         """
@@ -133,7 +133,7 @@ class TensionFeedback:
 
 
 class TensionExchange:
-    """Passes readings from the task that samples to the cycle, which may run in between."""
+    """Passes readings from the sampling task to the cycle, which may run during a reading."""
 
     def __init__(self, cables: Sequence[str], stale_after_s: float, clock: Clock) -> None:
         n = len(cables)
@@ -183,7 +183,7 @@ class TensionExchange:
 
 
 class TensionWatch:
-    """Brakes a winch whose tension is too high or no longer known (a watch of the loop).
+    """Watch of the loop that brakes a winch whose tension is too high or unknown.
 
     No cable may exceed `stop_above_N`.
     """

@@ -35,7 +35,7 @@ class Fault(NamedTuple):
 
     limit: Limit
     axis: int = -1
-    """Number of the axis, -1 if it is of no single axis or the axis is not known."""
+    """Number of the axis, -1 if the fault has no single axis or the axis is not known."""
     code: str = ""
     """Kind within the limit: an error code as "7305h", a word as "silent", "" for the only kind."""
     source: str = ""
@@ -101,7 +101,7 @@ _ACTIONS: Final = (
     ("82", "check the bus cable and the load of the bus"),
     ("8", "check that winch and cable run freely"),
 )
-"""What to do about an error code of CiA 402, by its first digits."""
+"""Advice for an error code of CiA 402, by its first digits."""
 
 
 def fault_text(fault: Fault, names: Sequence[str]) -> str:

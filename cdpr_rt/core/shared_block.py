@@ -55,7 +55,7 @@ _COUNTERS: Final = np.dtype(
         ("status", "<u8"),
         ("commands", "<u8"),  # messages written since the beginning, and those taken
         ("commands_taken", "<u8"),
-        ("commands_void", "<u8"),  # commands up to this number must not start motion any more
+        ("commands_void", "<u8"),  # commands up to this number must no longer start a motion
         ("urgent", "<u8"),  # stops: read before commands
         ("urgent_taken", "<u8"),
         ("replies", "<u8"),
@@ -164,7 +164,7 @@ class SharedBlock:
     # -- texts: the loop writes, others read
 
     def write_description(self, value: Mapping[str, Any]) -> None:
-        """Publish what stays while drives are booted: the robot, its axes, limits, programs."""
+        """Publish what does not change after a boot: the robot, its axes, limits, programs."""
         self._write_text("description", self._description, value)
 
     def write_status(self, value: Mapping[str, Any]) -> None:

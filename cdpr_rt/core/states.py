@@ -55,7 +55,7 @@ class Reaction(IntEnum):
 
     NONE = 0
     CLAMP = 1
-    """The value is limited, the motion goes on."""
+    """The value is limited, the motion continues."""
     HOLD = 2
     """The set-point stops where it is; the drives keep their power."""
     CONTROLLED_STOP = 3

@@ -20,7 +20,7 @@ from cdpr_rt.jit import bound, bound_to, jit
 # Limits of a supervisor, and the reaction to each.
 
 POSE_UNRELIABLE: Final = frozenset(limit for limit in Limit if limit.unreliable)
-"""Limits after which a platform's pose is unreliable, or not all of its winches obey."""
+"""Limits after which a platform's pose is unreliable, or a winch does not respond."""
 
 LENGTHS_UNRELIABLE: Final = frozenset(limit for limit in Limit if limit.unreliable == "lengths")
 """Limits after which even the cables' lengths are unknown."""
@@ -68,9 +68,11 @@ class Limits:
     slack_s: float = math.inf
     """Longest time for which a tension may be below `tension_min_N`, and below `slack_N`."""
     broken_within_s: float = 0.0
-    """A cable that goes from `tension_min_N` to below `slack_N` faster than this has broken."""
+    """A cable whose tension drops from `tension_min_N` to below `slack_N` faster than this counts
+    as broken."""
     runaway_m_s: float = math.inf
-    """A cable without tension has broken if it comes in this much faster than its set-point."""
+    """A cable without tension counts as broken if its winch winds in this much faster than its
+    set-point."""
     missed_in_window: int = 1 << 30
     window_cycles: int = 1
     stale_cycles: int = 1 << 30
@@ -152,17 +154,18 @@ _JUMP_rad: Final = 0.05
 _JUMPS_S: Final = 0.01
 """Time for which a jump of an angle affects speeds."""
 _SNAPPED_SHARE, _MEAN_S = 0.6, 0.1
-"""A cable that runs in has snapped below this share of its mean tension over such a time."""
+"""A cable whose winch winds in fast counts as broken below this share of its mean tension over this
+time."""
 _SUDDEN_m_s, _SUDDEN_S = 0.35, 0.05
-"""How much faster than over this time a winch that pays out blindly runs in if its cable breaks.
-While a winch takes in slack of a swinging platform, it was up to 0.34 m/s faster."""
+"""Increase of the winding-in speed, over this time, by which a broken cable is detected during
+blind lowering. A winch that winds in the slack of a swinging platform reached 0.34 m/s."""
 _PAID_OUT_m: Final = 5e-4
-"""A cable is not broken if this much was paid out while its tension fell."""
+"""A cable does not count as broken if this much was paid out while its tension fell."""
 
 
 @jit
 def _exceeded(worst: Any, limit: int, axis: int, value: float, allowed: float) -> None:
-    """Keep the most severe exceeded limit, of all and of this axis, the first of equals."""
+    """Keep the most severe exceeded limit, of all axes and of this one; of equal ones the first."""
     verdicts, reactions = worst
     for row in (0, 1 + axis):
         verdict = verdicts[row]
@@ -263,7 +266,7 @@ def _has_snapped(
 
 @jit
 def _watch_peak(limits: Any, history: Any, elapsed: float, tension: float) -> None:
-    """Keep the highest tension above its limit, except while a jump of the angle affects it."""
+    """Store the highest tension above its limit, except while a jump of the angle affects it."""
     history["jumped_s"] = max(history["jumped_s"] - elapsed, 0.0)
     if tension > limits["tension_max_N"] and history["jumped_s"] == 0.0:
         history["peak_N"] = max(history["peak_N"], tension)
@@ -388,7 +391,7 @@ def no_suspects(_jump: bool) -> Sequence[int]:
 class Supervisor:
     """Clamps torque and returns the reaction to the most severe of the exceeded limits.
 
-    It latches nothing: its caller acts.
+    It does not latch: its caller must act.
     """
 
     def __init__(self, limits: Limits, n: int, period_s: float) -> None:
@@ -498,7 +501,7 @@ class Supervisor:
         return int(self._verdict["reaction"][0])
 
     def report(self, fault: Fault) -> int:
-        """Take in a fault that another part found, such as a drive's alarm; return the `Reaction`.
+        """Process a fault that another part found, such as a drive's alarm; return the `Reaction`.
 
         It counts until the next `check`, and only if it is worse than the findings of that one.
         """
@@ -525,7 +528,7 @@ class Supervisor:
                 yield self._fault(row)
 
     def peaks(self) -> list[Fault]:
-        """Return which cables exceeded their highest tension since power-on, if only shortly.
+        """Return which cables exceeded their highest tension since power-on, even if only briefly.
 
         A tension that is short enough ends before its filtered value exceeds the limit.
         """
@@ -547,7 +550,7 @@ class Supervisor:
 
     @property
     def axis(self) -> int:
-        """Axis that exceeded it, -1 if it is of no single axis."""
+        """Axis that exceeded it, -1 if there is no single axis."""
         return int(self._verdict["axis"][0]) if self.limit else -1
 
     def fault(self) -> Fault | None:

@@ -105,9 +105,9 @@ LONGEST_PERIOD_s = 0.005
 _NEAREST_m = 0.1
 """An anchor point closer than this to an exit point might be pulled into it."""
 _ALIKE_m = 0.01
-"""Two cables closer than this at both ends pull alike: an axis was described twice."""
+"""Two cables closer than this at both ends act as one: an axis was described twice."""
 _SAGS_m_N = 0.01
-"""Largest change of length by sag per newton: a motor's friction is some newtons."""
+"""Largest allowed change of length by sag per newton; a motor's friction is some newtons."""
 _ROUNDED_UP = 1.05
 """Factor that keeps a value sufficient after rounding to two digits."""
 _FRICTION_SHARE = 0.06
@@ -235,7 +235,7 @@ def _tensions(statics: PlatformStatics) -> Iterator[Finding]:
 
 
 def standing_tensions_N(statics: PlatformStatics) -> FloatArray:
-    """Return the largest tensions (n,) at winches, N, with which it stands in its box."""
+    """Return the largest tensions (n,) at the winches, N, at rest anywhere in its box."""
     points = statics.points()
     taken = points[statics.is_target(points)]
     held_N = statics.least_tensions_N(taken, reserve_N=statics.model.reserve_N)
@@ -378,7 +378,7 @@ _MORE = np.geomspace(1.02, 100.0, 230)
 
 
 def why_not_held(statics: PlatformStatics, position_m: FloatArray, turn_rad: FloatArray) -> str:
-    """Return why the platform cannot be at a position (k,), turned (3,), and what would help."""
+    """Return why a position (k,) with a rotation (3,) is not feasible, and what would help."""
     where = f"at {point_text(position_m)} m"
     reserve = float(statics.margin_N(position_m, 0.0, turn_rad))
     if turn_rad.any():
@@ -398,7 +398,8 @@ def why_not_held(statics: PlatformStatics, position_m: FloatArray, turn_rad: Flo
 
 
 def _singular(statics: PlatformStatics) -> str:
-    """Return that a direction is not held, and which points in a line or plane cause it."""
+    """Return as text that the cables cannot hold a direction, and which points in a line or plane
+    cause it."""
     text = "the cables cannot hold one direction with any tensions"
     for name, points in (("exit points", statics.exits_m), ("anchor points", statics.anchors_m)):
         spread = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
@@ -426,7 +427,7 @@ def _is_upright(points: FloatArray) -> bool:
 
 
 def _what_helps(statics: PlatformStatics, position_m: FloatArray, turn_rad: FloatArray) -> str:
-    """Return how much one figure would have to change for a target there."""
+    """Return how much one value of the robot's file must change to make a target feasible there."""
     platform, low_N = statics.platform, statics.low_N
     acceleration, mass_kg = platform.acceleration_m_s2, platform.mass_kg
 

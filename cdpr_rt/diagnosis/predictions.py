@@ -296,7 +296,8 @@ _NOTICED_LATE, _NOTICING_S, _NOTICED_S = 1.5, 0.015, 0.25
 """Time until the break is detected: a factor on the time in which the rotor exceeds its speed
 limit, the delay of filters and buses, and the longest time, for cables with almost no tension."""
 _MISLED_SHARE = 0.25
-"""Force of the misled control over the span of tensions; its proportional part saturates."""
+"""Force of the control that follows a wrong pose, over the span of tensions; its proportional part
+saturates."""
 FRICTIONS: Final = (0.0, 0.03, MOST_SHARE + COGGING_SHARE)
 """Friction of the winches over the motors' rated torques, up to the share that a robot's file
 includes; each is simulated."""
@@ -359,10 +360,10 @@ class CableLoss:
 
     - At rest, tensions are the least that keep the control's reserve from their lower bounds.
     - Until the loss is detected, each motor pulls as before. The pose that the control computes
-      follows the cable as it runs in, and the platform is pulled the other way, with a quarter of
-      the span of tensions. With the broken cable's tension t, its rotor's mass m at the cable and
-      the highest speed v of the limits, that lasts 1.5 m v/t + 15 ms, 0.25 s at most.
-      Other losses are detected after 15 ms.
+      follows the cable that is wound in, and the control pulls the platform the other way, with a
+      quarter of the span of tensions. With the broken cable's tension t, its rotor's mass m at
+      the cable and the highest speed v of the limits, that lasts 1.5 m v/t + 15 ms, at most
+      0.25 s. Other losses are detected after 15 ms.
     - Then the winches lower it as the program `lower` does without a known pose.
     - Cables are elastic, with the damping of their profiles, at most 2 ms of their stiffness. If
       their weight counts, half of it is on the platform, and winches hold the hanging cables;
@@ -619,7 +620,7 @@ def _snatch_N(
 ) -> FloatArray:
     """Return the highest tensions (n,) of cables that slip at rest, the worst of several slips.
 
-    Each rotor runs in under the torque that held its cable until the cable is taut. The platform
+    Each rotor winds in under the torque that held its cable, until the cable is taut. The platform
     is assumed to be fixed and the winches without friction.
     """
     slip_m = np.array(_SLIPS_m)[:, None]

@@ -24,7 +24,7 @@ class Finding:
     key: str
     text: str
     impossible: bool
-    """Whether the robot cannot work like this; otherwise it works, but less well than it seems."""
+    """Whether the robot cannot work like this; otherwise it works with a restriction."""
 
 
 class Subject:
@@ -52,7 +52,7 @@ class Subject:
         self.damping_s = np.array([winch.cable.damping_s for winch in winches])
         rotors = np.array([winch.motor.rotor_inertia_kg_m2 for winch in winches])
         self.rotor_kg = rotors / self.arm_m**2
-        """The rotors as their cables feel them."""
+        """The rotors' inertia, as masses on their cables."""
 
     @cached_property
     def loop(self) -> DesignedLoop:

@@ -1,4 +1,4 @@
-"""Impossible or doubtful ways in which a platform turns, or tips over."""
+"""Impossible or doubtful rotations of a platform, and tipping over."""
 
 from __future__ import annotations
 
@@ -56,10 +56,10 @@ def free_rotation(statics: PlatformStatics) -> Iterator[Finding]:
 
 
 def angles(statics: PlatformStatics) -> Iterator[Finding]:
-    """Check for angles at which no place in the box takes a target, in either direction.
+    """Check for angles at which the box contains no feasible target, in either direction.
 
-    Either tensions do not hold it there, or something touches; crossed cables may only touch at
-    small angles.
+    Either the cables cannot hold the platform there, or there is a contact; crossed cables may
+    touch only at small angles.
     """
     platform, interference = statics.platform, statics.model.interference
     points, angle_rad = statics.points(), platform.workspace_angle_rad

@@ -28,7 +28,7 @@ _ANOTHER = "another command came after it"
 _OBEYED = "accepted; its end is not reported"
 _MOVING = frozenset({"enable", "program", "set"})
 _CHANGING = frozenset({"enable", "disable", "program", "hold", "shutdown"})
-"""Commands that decide what runs."""
+"""Commands that change what runs."""
 
 
 @dataclass(frozen=True)
@@ -46,9 +46,9 @@ class CommandDispatcher:
     """Takes commands, refuses those that the state forbids, and replies once to each.
 
     A command that needs preparation, such as reading a file, is deferred until that is done, and
-    then dispatched again. It is cancelled if another command is carried out meanwhile, or anything
-    else changes state or program, such as a hold by the supervisor.
-    Stops come from the service through the shared memory, and from local clients through `stops`.
+    then dispatched again. It is cancelled if another command, or for example a hold by the
+    supervisor, changes state or program meanwhile. Stops come from the service through the shared
+    memory, and from local clients through `stops`.
     """
 
     def __init__(
@@ -312,7 +312,7 @@ class CommandDispatcher:
             raise RefusedError(f"{transition.name.lower()}: {self._occupied()}")
 
     def _occupied(self) -> str:
-        """Return the reason why the loop takes no command at present, "" if it does."""
+        """Return why the loop accepts no command at present, "" if it does."""
         if self._engine.reacting:
             why = f" ({reason})" if (reason := self._life.reason) else ""
             return f"the robot is stopping{why}, and lowers a platform; then the power goes off"

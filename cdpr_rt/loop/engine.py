@@ -334,12 +334,12 @@ class Engine:
         self.driving = False
         """Whether the drives have power and obey the program."""
         self.reacting = Reaction.NONE
-        """The reaction that is ending the motion, NONE while none is."""
+        """The reaction that is ending the motion, else NONE."""
         self.missed = 0
         self.cycle: Cycle | None = None
         self.notices: list[str] = []
         self.lost_bus: Fault | None = None
-        """A lost bus, without which cycles cannot go on."""
+        """A lost bus, without which cycles cannot continue."""
         self.exchange_s = 0.0
         """Time from the last SYNC to its last answer."""
         self.compute_s = 0.0
@@ -351,7 +351,7 @@ class Engine:
         self.reaction = self.limit = 0
         """Reaction of the supervisor in the last cycle, and the limit that caused it."""
         self.limit_axis = -1
-        """Axis that exceeded it, -1 if it is of no single axis."""
+        """Axis that exceeded it, -1 if there is no single axis."""
         self.lengths_disagree_m = math.nan
         """Largest normalised residual of a platform's cable lengths, nan without power."""
         self.right = RightToMove(block, clock_ns)

@@ -119,7 +119,7 @@ class StatusPage:
             return {"error": f"{type(error).__name__}: {error}"}
 
     def _note_failure(self, progress: Mapping[str, Any]) -> None:
-        """Keep why a program fails: its client then ends it, and its progress is lost."""
+        """Store why a program fails: its client then ends it, and its progress is lost."""
         name, trouble = self._engine.program.name, progress.get("trouble")
         if trouble and progress.get("done") != 1.0:
             self._failure = f"{name}: {trouble}"
@@ -275,7 +275,7 @@ class ControlLoop:
     def _end(self) -> None:
         if self.runner.task_running:
             return
-        # again if a fault has come between
+        # again if there was a fault in between
         if not self._stopping or not (self.runner.busy or self.transitions.ended):
             self._stopping = True
             self.runner.begin(self.transitions.shut_down())

@@ -13,7 +13,7 @@ from cdpr_rt.errors import ControlError
 
 
 class MachineError(ControlError):
-    """The drives could not be booted, prepared or left; the message says which and why."""
+    """The drives could not be booted, prepared or released; the message says which and why."""
 
 
 class Machine(Protocol):
@@ -59,7 +59,7 @@ class Machine(Protocol):
         """Acknowledge what the safety I/O has latched."""
 
     def pause(self) -> None:
-        """Leave the drives, which have no power, without cycles until `prepare`."""
+        """Stop the cycles of the drives, which have no power, until `prepare`."""
 
     def confirm_power_off(self) -> Sequence[Fault]:
         """Remove the power of drives that do not answer; return those that do not confirm it."""

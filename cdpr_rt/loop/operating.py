@@ -89,7 +89,7 @@ class Operator:
         self._do(self._transitions.enable(HOLD, {}, 0))
 
     def disable(self) -> None:
-        """Apply the brakes and remove the power; cycles go on."""
+        """Apply the brakes and remove the power; cycles continue."""
         self._do(self._transitions.disable())
 
     def reset(self) -> None:

@@ -1,7 +1,7 @@
 """The right to move: a lease with a fencing token, in the shared memory.
 
 Every grant has a number, higher than all before, and an expiry time. A command or a sample counts
-only with the number of the current grant, so that nothing commanded under one grant goes on under
+only with the number of the current grant, so that nothing commanded under one grant continues under
 the next.
 """
 

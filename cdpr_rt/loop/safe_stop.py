@@ -29,13 +29,13 @@ class StopMethod(Enum):
     """Method to end a motion."""
 
     BRAKE = auto()
-    """By its program, which then holds the axes, or lowers the platform."""
+    """The program brakes, then holds the axes or lowers the platform."""
     LOWER_WITHOUT_POSE = auto()
-    """By the winches that still obey, without using the platform's pose."""
+    """The winches that still work lower the platform, without using its pose."""
     QUICK_STOP = auto()
-    """By the drives' own quick stop."""
+    """The drives make their own quick stop."""
     TORQUE_OFF = auto()
-    """By removing the torque immediately."""
+    """The torque is removed immediately."""
 
 
 class SafeStop:
@@ -110,7 +110,7 @@ class SafeStop:
                 life.add_fault(self._engine.program_fault or found)
 
     def react(self, reaction: Reaction, torque_Nm: FloatArray, drives: Sequence[Fault]) -> None:
-        """React to the supervisor's finding, within its cycle.
+        """React to the supervisor's finding, within the same cycle.
 
         `torque_Nm` (n,) is the torque to be sent, `drives` are the faults of drives.
         """

@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Any, Final
 
 STOPS: Final = frozenset({"hold", "disable", "shutdown"})
-"""Commands that anybody may send, at any time."""
+"""Commands that every local client may send, at any time."""
 STOP_SUFFIX: Final = ".stop"
 _MOST_BYTES: Final = 1024
 _MOST_REPLY_BYTES: Final = 1 << 16

@@ -143,13 +143,13 @@ def hanging_wrenches(
 
 @jit
 def _wind(geometry: FloatArray, pose: FloatArray, cables: FloatArray, i: int) -> None:
-    """Lead cable `i`, straight so far, over its swivel pulley.
+    """Lead cable `i`, which is straight so far, over its swivel pulley.
 
-    In the plane of swivel axis k and anchor let the anchor be `beside` the axis and `along` it
-    from the exit point, at which the cable comes in along k; with X = beside - r and
-    d² = X² + along² the free length is l = √(d² - r²), and the wound angle θ has
-    sin θ = (X l + along r)/d² and cos θ = (along l - X r)/d². The length is l + r θ; its derivative
-    by the anchor is the direction of the free part. An anchor within the pulley has l = 0.
+    In the plane of swivel axis k and anchor let the anchor be `beside` the axis and `along` it from
+    the exit point, at which the cable arrives along k; with X = beside - r and d² = X² + along² the
+    free length is l = √(d² - r²), and the wound angle θ has sin θ = (X l + along r)/d² and cos θ =
+    (along l - X r)/d². The length is l + r θ; its derivative by the anchor is the direction of the
+    free part. An anchor within the pulley has l = 0.
     """
     r = geometry[RADIUS, i]
     kx, ky, kz = geometry[AXIS, i], geometry[AXIS + 1, i], geometry[AXIS + 2, i]

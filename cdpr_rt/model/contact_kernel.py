@@ -1,7 +1,7 @@
 """Kernels of clearances at poses, and of the first contact on a straight way, without gaps.
 
 Tremblay (thesis), eqs. (3.27), (3.36), (3.37), by conservative advancement: at a place of the way
-each pair has a distance d, along the unit vector n between its nearest points. Both its things are
+each pair has a distance d, along the unit vector n between its nearest points. Both its bodies are
 convex. They stay apart by more than the clearance c until an end has moved along n by d - c plus
 its distance behind the nearest point. With the speed g of an end along n and a bound h of its
 acceleration, both per share s of the way, that holds for
@@ -355,7 +355,7 @@ TOUCH_m: Final = 1e-6
 _LEAVING: Final = 0.9
 """Share of its distance that a pair in contact at the start has to keep."""
 _LEAVES: Final = 4.0
-"""Longest motion of the platform until overlapping things have come apart, in clearances."""
+"""Longest motion of the platform until overlapping things are apart, in clearances."""
 _WATCHES: Final = 32
 """Number of checks during that motion."""
 _DEEPER: Final = 0.05
@@ -613,7 +613,7 @@ def _swings(rates: FloatArray, i: int, trim: float) -> float:
 
 @jit
 def _apart_at_anchor(scene: Scene, pair: IntArray, way: FloatArray, rates: FloatArray) -> float:
-    """Return how fast two cables that share an anchor may approach near it; that point is common.
+    """Return how fast two cables that share an anchor may approach each other near it.
 
     Otherwise a way of many metres would need one check per trimmed length.
     """

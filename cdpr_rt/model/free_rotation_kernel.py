@@ -80,7 +80,7 @@ def turn_to_rest(
 ) -> float:
     """Turn a pose until tensions (n,) have no moment, by Newton's method; return the angle.
 
-    STEEPNESS is not above 0 then if the tensions turn the platform over.
+    Afterwards STEEPNESS is 0 or less if the tensions turn the platform over.
     """
     angle = 0.0
     for _ in range(_NEWTON_STEPS):
@@ -107,7 +107,7 @@ def _arm(
 
 
 def rotation_of(platform: Platform) -> FloatArray:
-    """Return the constant entries of a platform's `rotation`, (ROWS,); the rest is 0."""
+    """Return a platform's `rotation`, (ROWS,), with its constant entries; the others are 0."""
     rotation = np.zeros(ROWS)
     rotation[MASS] = platform.mass_kg
     rotation[INERTIA] = inertia_kg_m2(platform)[2, 2]

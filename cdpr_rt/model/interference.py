@@ -44,7 +44,7 @@ class Contact:
     things: tuple[str, str]
     distance_m: float
     known: bool
-    """Whether they really come so near, or only could not be proved to stay clear."""
+    """True if they really come this near, False if only the proof of clearance failed."""
 
     def __str__(self) -> str:
         text = in_words(self.things, self.distance_m)

@@ -21,18 +21,18 @@ from cdpr_rt.state_file import StateFileError, read_state, write_state
 _FIELDS = ("cable_length_m", "cable_at_index_m")
 _FLAGS = ("fallen", "displaced")
 _INDEX_TURNS = 0.05
-"""Share of a motor's turn by which its index may be off: a latched count is far more exact."""
+"""Allowed error of an index, as a share of a motor's turn; a latched count is far more exact."""
 _MOST_OF_LONGEST = 2.0
-"""After lowering anywhere, cables may be paid out this much further than in use."""
+"""Ratio of the longest possible length, after lowering anywhere, to the longest in use."""
 
 
 @dataclass(frozen=True)
 class StoppedLengths:
-    """Cable lengths when the power was removed, (n,), without tension."""
+    """Cable lengths without tension when the power was removed, (n,)."""
 
     cable_length_m: FloatArray
     cable_at_index_m: FloatArray
-    """Length with the motor at the index that it had found, nan if it had found none."""
+    """Length with the motor at its index, nan if the index was not known."""
     date: str
     """ISO 8601, UTC."""
     position_rad: FloatArray
@@ -54,9 +54,9 @@ class LastLengths:
         self.why = "the lengths at its last stop are not known"
         """Reason why no lengths are known, "" if they are."""
         self.displaced = False
-        """Whether the platform has been released since, other than at home."""
+        """Whether the platform has since been released away from home."""
         self.contradicted = ""
-        """What contradicts the lengths in use, so that they are not kept; else empty."""
+        """What contradicts the lengths in use, so that they are not stored; else empty."""
         self.fallen = False
         """Whether it hung, or may have, when the power was removed suddenly or a drive was lost."""
         self.broken: dict[int, str] = {}
@@ -127,9 +127,9 @@ class LastLengths:
         return lengths
 
     def keep(self, estimate: AxisEstimate, feedback: AxisFeedback) -> None:
-        """Keep the lengths at which the robot has stopped, if known; raises StateFileError.
+        """Store the lengths at which the robot has stopped, if known; raises StateFileError.
 
-        If they are not, and no cable has been wound since, those of the stop before remain valid.
+        If they are unknown, and no cable has moved, those of the previous stop remain valid.
         """
         if estimate.length_known.all() and not self.contradicted:
             turned = feedback.index_rad - feedback.position_rad

@@ -18,7 +18,7 @@ FACTOR, GRADIENT, STEP, DIRECTIONS, ACCEPTED, SAVED_POSES, SOLVER_ROWS = 6, 12, 
 _LEAST_PIVOT = 1e-13
 _LEAST_REDUNDANCY = 1e-4
 DISTINCT = 0.8
-"""Share of the largest normalised residual above which another cable may be the cause."""
+"""Another cable is a suspect if its normalised residual exceeds this share of the largest."""
 
 
 @jit

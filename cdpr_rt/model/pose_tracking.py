@@ -52,9 +52,8 @@ _NO_RESTARTS: int = np.int64(0)  # type: ignore[assignment]
 def observe(motors: FloatArray, position: FloatArray, filters: FloatArray) -> None:
     """Track each motor's angle and velocity: an observer with a double pole at OBSERVER.
 
-    A rotor on its cable oscillates at some ten Hz and above, at which latency inverts the effect
-    of damping. So the velocity that damps the platform is partly low-passed by a double pole at
-    SMOOTHER.
+    A rotor on its cable oscillates at ten Hz and more, where latency inverts the effect of damping.
+    So the velocity that damps the platform is partly low-passed by a double pole at SMOOTHER.
     """
     period = filters[PERIOD]
     decay = math.exp(-filters[OBSERVER] * period)

@@ -71,7 +71,7 @@ _FORCE, _MOMENT = 0, 1
 def held_until(
     geometry: FloatArray, chosen: IntArray, sets: WrenchSets, way: FloatArray, until: float
 ) -> tuple[float, int]:
-    """Return the share of the way, `until` at most, up to which all wrenches are carried.
+    """Return the share of the way, at most `until`, up to which tensions carry all wrenches.
 
     Also returns the number of places checked. `geometry` is that about the centre of the wrenches,
     `chosen` (d,) are the controlled directions.
@@ -310,7 +310,7 @@ _MOST_DRAWN = 20
 
 @dataclass(frozen=True)
 class Reached:
-    """Positions (m, d) that are reached, and the fate of all that were drawn."""
+    """Positions (m, d) that are reached, and counts of all drawn ones."""
 
     positions: FloatArray
     shares: FloatArray

@@ -1,4 +1,4 @@
-"""A robot's file as arrays over the axes that are run."""
+"""A robot's file as arrays over its axes."""
 
 from __future__ import annotations
 
@@ -31,10 +31,11 @@ FOLLOWING_m: Final = 0.15
 """Default following error of a platform's cables: three times the lag at which its set-point
 waits for it."""
 RUNAWAY_m_s: Final = 0.75
-"""Speed beyond the set-point's at which a cable has broken, if no other cable's length shows it: a
-held platform would have to be thrown, a rotor alone reaches it within 10 to 50 ms."""
+"""Excess over the set-point's speed at which a cable counts as broken, if no other cable's length
+shows it. A platform on its cables does not reach it; a rotor alone reaches it within 10 to 50 ms.
+"""
 LOW_SHARE: Final = 0.5
-"""Supervised over planned least tension, if tensions are estimated from torques."""
+"""Ratio of the monitored to the planned least tension, if tensions are estimated from torques."""
 
 
 def can_lower(robot: Robot) -> bool:
@@ -150,8 +151,8 @@ def _finite(value: Any) -> Any:
 
 TAPE_SHARE: Final = 0.01
 TAPE_m: Final = 0.022
-"""Normalised residual that exit points by tape measure can cause: over the diagonal of the box
-around them, and at most."""
+"""Normalised residual that exit points measured by tape can cause: as a share of the diagonal of
+the box around them, and at most in m."""
 DRUM_SHARE: Final = 0.003
 """Standard deviation of a drum's radius, as a share of it."""
 SIGMAS: Final = 3.0
@@ -190,8 +191,8 @@ def allowed_disagreement_m(platform: Platform, calibration: GeometryCalibration 
 def allowed_jump_m(platform: Platform, disagreement_m: float, strain: FloatArray) -> float:
     """Return the largest allowed sudden change of a residual, if `disagreement_m` is its limit.
 
-    A quarter of that, but at least a quarter of the longest stretch at home. `strain` (n,) is the
-    stretch of a cable between its lowest and highest tension, over its length. Errors of the
+    It is a quarter of that, but at least a quarter of the longest stretch at home. `strain` (n,) is
+    the stretch of a cable between its lowest and highest tension, over its length. Errors of the
     geometry change residuals only as the platform moves, forces change them by cables' stretch.
     """
     lengths_m, _ = _cables(platform, platform.home_m)

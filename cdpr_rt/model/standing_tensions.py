@@ -1,4 +1,4 @@
-"""Tensions that pull cables tight without moving a platform that stands on something."""
+"""Tensions that tighten the cables of a standing platform without moving it."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from cdpr_rt.model.pose import Pose
 from cdpr_rt.model.tension_distribution import TensionOutcome, TensionSolver
 
 OVERSHOOT = 1.5
-"""Tension over pretension, for a moment: on the way back friction acts in the other direction, so
-its effect on the angles cancels out."""
+"""Ratio of the short overshoot to the pretension: on the way back friction acts in the other
+direction, so its effect on the angles cancels out."""
 _CARRIED = 0.85 / OVERSHOOT
 """Share of the weight that is carried by tensions that do not press the platform down."""
 _HIGHEST = 0.9
@@ -21,8 +21,8 @@ _FLOORS = (1.0, 0.75, 0.5, 0.25)
 _PRESSED_LESS, _SHARES = (0.75, 0.5), (1.0, 0.75, 0.5, 0.25, 0.0)
 """Shares of the weight that press a platform down whose cables might otherwise stay slack."""
 _CLEAR, _CLEARED = 1.2, (1.0, 0.75, 0.5)
-"""Tension over what winches take up below which a cable that is wound in may be nearly slack; and
-shares of it that are tried from the highest."""
+"""Tension, as a multiple of the friction of the winches, below which a cable that is wound in may
+be nearly slack; and the shares of it that are tried, from the highest."""
 
 
 class StandingTensions:
@@ -30,13 +30,13 @@ class StandingTensions:
 
     Their wrench is along the weight. If the cables can do so without pulling hard, it presses the
     platform down, with none below the least tension, and all as far above it as possible up to the
-    planned ones, because friction leaves cables to sag. If winches may take up all of that, it
-    presses with less than the weight, so that cables can be pulled harder, if need be harder than
-    planned. Otherwise it carries 0.57 of the weight, too little to lift the platform even at the
-    overshoot. Tensions then exceed what winches may take up as far as possible, or each is 0.57 of
-    the one that would carry all, which may be below the least tension. Friction changes the
-    tensions by some newtons, so a platform whose weight is nearly carried would not stand still.
-    The cables' weight counts with the platform's.
+    planned ones, because friction leaves cables to sag. If the friction of the winches may exceed
+    these tensions, it presses with less than the weight, so that cables can be pulled harder, if
+    necessary harder than planned. Otherwise it carries 0.57 of the weight, too little to lift the
+    platform even at the overshoot. Tensions then exceed the friction of the winches as far as
+    possible, or each is 0.57 of the one that would carry all of the weight, which may be below the
+    least tension. Friction changes the tensions by some newtons, so a platform whose weight is
+    nearly carried would not stand still. The cables' weight counts with the platform's.
     """
 
     def __init__(
@@ -44,7 +44,7 @@ class StandingTensions:
     ) -> None:
         """Take the planned least tensions, and the highest of the motors, (n,) each.
 
-        `taken_up_N` (n,) is the part of their cables' tensions that winches may take up.
+        `taken_up_N` (n,) is the friction of the winches, as tensions of their cables.
         """
         self._kinematics, self._weight = model.kinematics, model.weight()
         self._most_N = most_N / OVERSHOOT
@@ -63,7 +63,7 @@ class StandingTensions:
             for floor_N in floors_N
             if (floor_N >= self._clear_N).all()
         ]
-        # to exceed what winches take up, with more than is planned if necessary
+        # to exceed the friction of the winches, if necessary with more than planned
         self._harder = [
             (part, model.least_tensions(np.clip(part * self._clear_N, least_N, most), most))
             for part in _CLEARED
@@ -108,7 +108,8 @@ class StandingTensions:
         return stays
 
     def _press(self, tensions: list[tuple[TensionSolver, float]]) -> bool:
-        """Use the first that press the platform down by a share of its weight; whether any do."""
+        """Use the first tensions that press the platform down by a share of its weight; return
+        whether there are any."""
         return any(
             solver.solve(self._W, self._hanging - share * self._weight, self._t)
             is TensionOutcome.FEASIBLE

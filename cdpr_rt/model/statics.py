@@ -197,7 +197,7 @@ class PlatformStatics:
         return angle.reshape(np.shape(position_m)[:-1])
 
     def largest_box(self, inside: Box) -> Box | None:
-        """Return a box within `inside` that is all of targets if it is the box of targets, or None.
+        """Return a box within `inside` that, as box of targets, consists of targets only; or None.
 
         The largest at all orientations, as exact as a grid of 45 by 45 points, 11 by 11 by 11 in
         space. The control's reserve follows from the middle of the box: while the reserve of the
@@ -220,7 +220,8 @@ class PlatformStatics:
         return box.grid(*(_FINE[len(box.low_m)] for _ in box.low_m))
 
     def largest_held(self, inside: Box) -> Box | None:
-        """Return the largest box within that is held with the reserve of this box of targets."""
+        """Return the largest box within it where the cables can hold the platform with this box's
+        reserve."""
         points = self._fine(inside)
         good = self.is_target(points, self.orientations)
         best, found = 0, None

@@ -1,6 +1,6 @@
 """Tension distribution for any robot with at least as many cables as controlled directions.
 
-Wanted are tensions t (n,) with W t + w_e = 0, eq. (3.80), and low <= t <= high: W (d, n) is the
+It finds tensions t (n,) with W t + w_e = 0, eq. (3.80), and low <= t <= high: W (d, n) is the
 wrench matrix, w_e (d,) the wrench of all else on the platform.
 """
 
@@ -29,7 +29,7 @@ class TensionOutcome(IntEnum):
     """Outcome of a tension distribution."""
 
     FEASIBLE = 0
-    """They carry the wrench within their bounds."""
+    """The tensions carry the wrench within their bounds."""
     SUBSTITUTED = 1
     """As FEASIBLE, but by minimum deviation, because the method itself found none."""
     NEAREST = 2
@@ -86,7 +86,8 @@ def closed_form(
 # vertices are walked counter-clockwise. With one cable more it is a segment, with none a point.
 
 _PARALLEL = 1e-12
-"""A cable whose tension changes by less, per newton along a line, does not bound that line."""
+"""A cable whose tension changes by less than this, per newton along a line, does not bound that
+line."""
 _THIN = 1e-12
 """Area, as a share of the perimeter's square, from which on a polygon counts as a segment."""
 

@@ -2,9 +2,9 @@
 
 The tensions of the known wrench, weight and acceleration, are the ones within the planned bounds
 nearest to slowly varying wanted ones. Those with the loop's force are the ones nearest to them,
-within bounds that a reserve makes wider. What the force has to change between the cables moves
-within the reserve immediately. The tightening that it requires follows slowly, because tensions
-that followed every swing of the force would form a second loop.
+within bounds that a reserve makes wider. Within the reserve, tensions change immediately with the
+force. Additional tightening follows slowly, because tensions that followed every swing of the force
+would form a second loop.
 """
 
 from __future__ import annotations

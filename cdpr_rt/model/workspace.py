@@ -72,7 +72,7 @@ class CableWorkspace:
         self._there = Pose(np.zeros(3))
 
     def prepared(self) -> CableWorkspace:
-        """Return it with all arrays and kernels that cycles need made beforehand."""
+        """Return it after preparing all arrays and kernels that cycles need."""
         self._one, self._way  # noqa: B018
         return self
 
@@ -138,7 +138,7 @@ class CableWorkspace:
         return bool(self._one.margins[0] >= 0.0)
 
     def infeasibility(self, pose: Pose) -> str:
-        """Return why the platform is not held at a pose, "" if it is."""
+        """Return why the cables cannot hold the platform at a pose, "" if they can."""
         if self.is_feasible(pose):
             return ""
         self._one.run()
@@ -149,7 +149,7 @@ class CableWorkspace:
     def first_infeasible(self, poses: FloatArray) -> tuple[Pose, str] | None:
         """Return the first of the poses (33, 4, 3) of a way that is not held, and why; or None.
 
-        A start that is not held may be left. The pose is overwritten by the next call.
+        A way may leave a start that is not held. The pose is overwritten by the next call.
         """
         self._way.poses[:] = poses
         self._way.run_margins()

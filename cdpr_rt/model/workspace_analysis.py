@@ -420,7 +420,8 @@ class Grid:
     def unseen_share(self, rays: Rays) -> float:
         """Return the share of the places inside that no straight line from the centre reaches.
 
-        Only places further than the nearest rays by more than a diagonal of a cell count.
+        Only places that are farther out than the nearest rays, by more than a diagonal of a cell,
+        count.
         """
         inside = self.points[self.depths.ravel() >= 0.0]
         if not len(inside):

@@ -23,7 +23,7 @@ from cdpr_rt.jit import bound, jit
 # since the first sample.
 
 QUEUE_LENGTH = 64
-"""Most samples that wait to be played."""
+"""Largest number of samples that wait to be played."""
 SCALE, BUTTONS, COLUMNS = 7, 8, 9
 """Columns of a row, after the pose: x y z, quaternion w x y z."""
 PLAYED, ARRIVED, NOW, EARLIEST, EARLIEST_BEFORE = range(5)

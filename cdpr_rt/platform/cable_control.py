@@ -485,7 +485,7 @@ class CableControl(PlaceChecks):
     def measure_tensions(self, tension_N: FloatArray, measured: BoolArray) -> None:
         """Correct the cables' tensions by readings (n,) that others keep up to date, if valid.
 
-        Without a reading the motor's torque constant and known losses are relied on.
+        Without a reading the control relies on the motor's torque constant and known losses.
         """
         learnt_Nm = np.zeros(len(tension_N)) if self.learning is None else self.learning.torque_Nm
         self._cells = CellFeedback(
@@ -494,7 +494,7 @@ class CableControl(PlaceChecks):
         )  # fmt: skip
 
     def notices(self) -> list[str]:
-        """Return which load cell is off, and whether the loop oscillates; until `clear_notices`."""
+        """Return which load cell is wrong and if the loop oscillates, until `clear_notices`."""
         return [text for text in (self._check.trouble, self._oscillation.trouble) if text]
 
     def clear_notices(self) -> None:
@@ -572,10 +572,9 @@ class CableControl(PlaceChecks):
     # -- pose of the platform
 
     def begin(self, feedback: AxisFeedback, tension_N: FloatArray | None = None) -> None:
-        """Take the motors to be at rest, and the platform at the pose given by its cables.
+        """Assume the motors at rest, and the platform at the pose given by its cables.
 
-        The cables have `tension_N` (n,) at their winches, which may be far from planned
-        tensions.
+        The cables have `tension_N` (n,) at their winches, which may be far from planned tensions.
         """
         for own in (self._own, self._own_distribution):
             if own is not None:

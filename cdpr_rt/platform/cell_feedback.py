@@ -1,9 +1,9 @@
 """Feedback of measured tensions: corrections of the motors' torques.
 
-A cable's tension t is the commanded one, a, minus d, which friction, cogging and errors of torque
-constants take up, plus a correction b of this feedback: t = a - d + b. With ḃ = k (a - t), t
-becomes a - d s/(s + k), whatever the loop does with a. So neither disturbs the other. a is
-low-passed like the reading.
+A cable's tension t is the commanded one, a, minus the loss d by friction, cogging and errors of
+torque constants, plus a correction b of this feedback: t = a - d + b. With ḃ = k (a - t), t becomes
+a - d s/(s + k), whatever the loop does with a. So neither disturbs the other. a is low-passed like
+the reading.
 
 A cell may be wrong without being silent. So b may only use what the loop's force leaves of the
 reserve between planned tensions and their bounds: whatever a cell reads, a + b is within the
@@ -69,7 +69,7 @@ def compare(
     balance: FloatArray,
     found: FloatArray,
 ) -> int:
-    """Take in one cycle; return which cell is off the furthest, -1 if none can be identified.
+    """Process one cycle; return the cell with the largest error, -1 if none can be identified.
 
     A cell at a winch shows `rise` (n,) more than z, which like t is in the middle of its cable.
     `asked` (n,) are the commanded tensions, as late as readings are, `correction` (n,) what is
@@ -152,7 +152,7 @@ class CellCheck:
         self._settling = self._cycles
 
     def update(self) -> None:
-        """Take in one cycle with readings."""
+        """Process one cycle with readings."""
         worst = self._compare()
         if self._settling:
             self._settling -= 1

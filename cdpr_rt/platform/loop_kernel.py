@@ -2,19 +2,19 @@
 
 In addition to the known wrench, the cables exert F = D (ė + M^-1 D e/(4 ζ²)) and an integral part.
 This is a loop of damping ratio ζ in each mode of the platform. Its bandwidth is ω, or less if its
-damping D = (1/(2 ζ ω) M^-1 + 1/c (J^T J)^-1)^-1 would require more than c of the cables.
-The proportional part is saturated, the damping is not: far from its target the platform returns at
-the speed at which both are equal. The integral part has a deadband for errors that friction can
+damping D = (1/(2 ζ ω) M^-1 + 1/c (J^T J)^-1)^-1 would require more than c of the cables. The
+proportional part is saturated, the damping is not: far from its target the platform returns at the
+speed at which both are equal. The integral part has a deadband for errors that friction can
 explain, so that the platform stands still at its target. A sigmoid leads into the deadband, with
-hysteresis as in Tremblay (thesis), fig. 2.3: leaving it takes twice the error.
-What the integral part gains at rest acts against friction of unknown sign. In motion friction is
-compensated, so when motion begins, up to the friction is removed from that gain. With both, a
-direction in which the cables' friction is large against the loop's stiffness would leap.
+hysteresis as in Tremblay (thesis), fig. 2.3: leaving it takes twice the error. What the integral
+part gains at rest acts against friction of unknown sign. In motion friction is compensated, so when
+motion begins, this gain is reduced by at most the friction. Otherwise the platform would leap in
+directions in which the cables' friction is large relative to the loop's stiffness.
 
 Arrays besides those of the kinematics' kernels: a loop's row of SETTINGS, and its STATE: the
-integral part (d,), N and Nm; then the share of its rate that the deadband leaves, 0 to 1; the
-twist (d,), low-passed until an encoder's counts no longer look like speed; and the integral part
-(d,) at the end of the last motion.
+integral part (d,), N and Nm; then the share of its rate that the deadband leaves, 0 to 1; the twist
+(d,), low-passed until an encoder's counts no longer look like speed; and the integral part (d,) at
+the end of the last motion.
 """
 
 from __future__ import annotations

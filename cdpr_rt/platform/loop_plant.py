@@ -36,7 +36,7 @@ from cdpr_rt.platform.body_kernel import body_of, write_mass_matrix, write_wrenc
 ComplexArray = NDArray[np.complex128]
 
 CABLE_DAMPING_s, LITTLE_DAMPING_s = ASSUMED_DAMPING_s, 5e-4
-"""b, as assumed, and of cables that damp little: 5 % of critical at 30 Hz."""
+"""b, as assumed, and of cables with little damping: 5 % of critical at 30 Hz."""
 _TAUT_N = 1.0
 """Least tension at which a cable's sag is approximated by a flat parabola."""
 _OF_LEAST = (0.0, 1 / 16, 1 / 8, 1 / 4, 1 / 2, 1.0, 0.875, 0.625, 0.0)
@@ -132,7 +132,8 @@ def linear_plant(
 
 
 def cable_stiffness(model: PlatformModel, pose: Pose, stiffness_N: FloatArray) -> FloatArray:
-    """Return k of cables of EA `stiffness_N` (n,) at the tensions of all levels, (LEVELS, n).
+    """Return the stiffness k of cables of EA `stiffness_N` (n,) at the tensions of all levels,
+    (LEVELS, n).
 
     EA/ρ, and in series, if the weight w per length counts, the yield of a flat parabola under its
     tension t: 12 t³/((w a)² ρ) with a across (Ernst, 1965). Below the least tensions, which are

@@ -12,18 +12,18 @@ from cdpr_rt.arrays import BoolArray, FloatArray
 from cdpr_rt.jit import bound, jit
 from cdpr_rt.platform.loop_plant import latency_s
 
-# Kernels that learn from a platform's motion the torque that its motors take up. Of each motor:
-# dry friction, and cogging of as many periods a turn as it has pole pairs. The platform lacks
-# the torque taken up. With v = q̇_d - q̇ and M = M_p + m_r A, the platform under the loop's
-# force F and the motors' corrections u (n,), all low-passed by L(s) = ω/(s + ω), obeys
-# L F + M ω (v - L v) + Σ J_i/g_i L u_i = Σ J_i/g_i L φ_i·w_i + c, φ = (sign θ̇_d, sin pθ,
-# cos pθ). A Kalman filter finds w (n, 3), Nm, from one of these d equations a cycle. u is the
-# sum of all added torques, whatever their source. c (d,) is a wrench that stays for seconds: a
-# payload, errors of mass and torque constants, a hand that pulls. It is far more uncertain than
-# w, so effects that keep their sign when the motion reverses count as c, not as friction. w is
-# bounded. The filter's states x (m,), m = 3 n + d, are w, row by row, and c. Without evidence
-# from motion they return to 0: ẋ = -x/T + noise, which without a measurement would give a
-# standard deviation σ. `filters` (4 n + 2 d,) are φ row by row, u, F and v, low-passed.
+# Kernels that learn the torque lost in the motors from the motion of the platform. Of each motor:
+# dry friction, and cogging of as many periods a turn as it has pole pairs. This torque does not
+# reach the platform. With v = q̇_d - q̇ and M = M_p + m_r A, the platform under the loop's force F
+# and the motors' corrections u (n,), all low-passed by L(s) = ω/(s + ω), obeys L F + M ω (v - L v)
+# + Σ J_i/g_i L u_i = Σ J_i/g_i L φ_i·w_i + c, φ = (sign θ̇_d, sin pθ, cos pθ). A Kalman filter
+# finds w (n, 3), Nm, from one of these d equations a cycle. u is the sum of all added torques,
+# whatever their source. c (d,) is a wrench that stays for seconds: a payload, errors of mass and
+# torque constants, a hand that pulls. It is far more uncertain than w, so effects that keep their
+# sign when the motion reverses count as c, not as friction. w is bounded. The filter's states x
+# (m,), m = 3 n + d, are w, row by row, and c. Without evidence from motion they return to 0: ẋ =
+# -x/T + noise, which without a measurement would give a standard deviation σ. `filters` (4 n + 2
+# d,) are φ row by row, u, F and v, low-passed.
 
 TERMS = 3
 PERIOD, POLE, REVERSAL, LATENCY, NOISE_N, SETTINGS = range(6)
@@ -86,7 +86,8 @@ def learn(
     direction: int,
     usable: bool,
 ) -> int:
-    """Take in one cycle: `x` (m,) and their covariance `P` (m, m); return the next direction.
+    """Process one cycle: update `x` (m,) and their covariance `P` (m, m); return the next
+    direction.
 
     `most` (3, n) bounds friction and cogging. Only the lower half of M (d, d) is used. `usable` is
     whether the force was exerted. Nothing is learnt if it was not, if no motor has to turn, or if
@@ -222,7 +223,8 @@ class MotorLearning:
         reserve_N: float,
         period_s: float,
     ) -> None:
-        """Take how far a unit of each direction counts, `scale` (d,), and the tensions' reserve."""
+        """Take the length that a unit of each direction counts for, `scale` (d,), and the tensions'
+        reserve."""
         n, d = len(axes), scale.size
         m = TERMS * n + d
         rated_Nm = np.array([axis.winch.motor.rated_torque_Nm for axis in axes])

@@ -40,11 +40,10 @@ def swinging(
     rows: FloatArray,
     setpoint_rad: FloatArray,
 ) -> tuple[int, int]:
-    """Take in one cycle; return the case and the motor that swings the furthest, -1 for none.
+    """Process one cycle; return the case and the motor with the largest oscillation, -1 for none.
 
-    `position_rad` and `setpoint_rad` are (n,), `velocity` (d,) is the set-point's.
-    `threshold_rad` (2, n) and `rows` (2, ROWS, n), kept from cycle to cycle, are those of each
-    case.
+    `position_rad` and `setpoint_rad` are (n,), `velocity` (d,) is the set-point's. `threshold_rad`
+    (2, n) and `rows` (2, ROWS, n), kept from cycle to cycle, are those of each case.
     """
     share = LEAST_Hz * period_s / (1.0 + LEAST_Hz * period_s)
     case, found, most, moves = ALWAYS, -1, 0.0, False
@@ -99,7 +98,7 @@ class Oscillation:
         self._found: tuple[int, int, float] | None = None
 
     def update(self, setpoint_rad: FloatArray) -> None:
-        """Take in one cycle, with the motors' set-points (n,)."""
+        """Process one cycle with the motors' set-points (n,)."""
         case, found = self._swinging(setpoint_rad)
         if found >= 0 and self._found is None:
             changes, lasting_s = self._rows[case, [CHANGES, LASTING], found]

@@ -31,8 +31,8 @@ class State:
     wrench: FloatArray
     """Wrench without the cables' tensions if the platform follows the target, (d,), N and Nm.
 
-    Gravity, the weight of the cables, and the inertia against the target's acceleration. The
-    tensions t carry it if W t + wrench = 0.
+    It contains gravity, the weight of the cables, and the inertia for the target's acceleration.
+    The tensions t carry it if W t + wrench = 0.
     """
     cable_length_m: FloatArray
     """Lengths of the unloaded cables, (n,)."""
@@ -72,11 +72,11 @@ class Controller(ABC):
     """
 
     def reset(self, state: State) -> None:  # noqa: B027  # optional
-        """Forget the past: the next cycle follows one of another controller."""
+        """Reset all internal state: the next cycle follows one of another controller."""
 
     @abstractmethod
     def update(self, state: State, target: Target) -> FloatArray:
-        """Return the tensions of this cycle, (n,), N. It has to take less than a cycle."""
+        """Return the tensions of this cycle, (n,), N. It must take less than a cycle."""
 
 
 class OwnController:

@@ -1,4 +1,4 @@
-"""Torque that motors take up, and their angles, from cables that are pulled tight."""
+"""Friction and cogging of motors, and their angles, from cables that are pulled tight."""
 
 from __future__ import annotations
 
@@ -17,19 +17,19 @@ from cdpr_rt.platform.motor_learning import (
     MotorLearning,
 )
 
-# Kernels that fit the torque a motor takes up to its rotation while its cable was pulled tight.
-# The platform stands at home, so that the length of a cable without tension, l, follows from
-# its tension alone. A tension a is commanded, and the angle θ is measured. With c of cable paid
-# out per radian, and e = -dl/dt, a motor that slides obeys, in Nm at the motor, y = c (l(a) -
-# l(P) - c θ)/e = -(c²/e) θ_P + s c (a - P) + f sign θ̇ + A sin pθ + B cos pθ, with θ_P the angle
-# at which the cable has the tension P, s the relative excess of the tension's growth over the
-# commanded one, f dry friction and (A, B) cogging. If the platform slides on its stand while it
-# is pulled harder than before, which makes the cable longer by m(a) λ, with m going from 0 at P
-# to 1 at the greatest pull, -(c/e) m λ is added. The kernel sums the squares and products of
-# this equation's factors and of y, `sums` (n, 7, 7), lower halves. Friction reverses with the
-# direction over the distance in which a contact yields before it slides: z in -1 to 1 replaces
-# sign θ̇, dz/dθ = (1 - z sign θ̇)/δ (Dahl, 1968). Flicker of an encoder is no motion: `seen`
-# (2, n) are the least and the greatest angle, as in a model of play.
+# Kernels that fit a motor's friction and cogging to its rotation while its cable was pulled tight.
+# The platform stands at home, so that the length of a cable without tension, l, follows from its
+# tension alone. A tension a is commanded, and the angle θ is measured. With c of cable paid out per
+# radian, and e = -dl/dt, a motor that slides obeys, in Nm at the motor, y = c (l(a) - l(P) - c θ)/e
+# = -(c²/e) θ_P + s c (a - P) + f sign θ̇ + A sin pθ + B cos pθ, with θ_P the angle at which the
+# cable has the tension P, s the relative excess of the tension's growth over the commanded one, f
+# dry friction and (A, B) cogging. If the platform slides on its stand while it is pulled harder
+# than before, which makes the cable longer by m(a) λ, with m going from 0 at P to 1 at the greatest
+# pull, -(c/e) m λ is added. The kernel sums the squares and products of this equation's factors and
+# of y, `sums` (n, 7, 7), lower halves. Friction reverses with the direction over the distance in
+# which a contact yields before it slides: z in -1 to 1 replaces sign θ̇, dz/dθ = (1 - z sign θ̇)/δ
+# (Dahl, 1968). Flicker of an encoder is no motion: `seen` (2, n) are the least and the greatest
+# angle, as in a model of play.
 
 UNKNOWNS = 5
 ANGLE, STEEPER, FRICTION, SINE, COSINE = range(UNKNOWNS)
@@ -57,11 +57,11 @@ def take(
     position: FloatArray,
     tension: FloatArray,
 ) -> None:
-    """Take in the angles (n,) of a cycle at the commanded tensions (n,).
+    """Process the angles (n,) of a cycle at the commanded tensions (n,).
 
-    `lengths` (2, m, n) are l - l(P) and e of each cable at m even `shares` of P. `yielding`
-    (n,) are z, `turned` (2, n) the rotation of each motor in either direction, rad. The weight of
-    an angle is its distance from the earlier ones. `h` (7,) is overwritten.
+    `lengths` (2, m, n) are l - l(P) and e of each cable at m even `shares` of P. `yielding` (n,)
+    are z, `turned` (2, n) the rotation of each motor in either direction, rad. The weight of an
+    angle is its distance from the earlier ones. `h` (7,) is overwritten.
     """
     step = shares[1] - shares[0]
     for i in range(position.size):
@@ -108,7 +108,7 @@ def _farther(play: float, seen: FloatArray, theta: float, i: int) -> float:
 
 
 NOISE_SHARE = 0.01
-"""Other torque that a motor takes up (standard deviation), over its rated torque."""
+"""Standard deviation of a motor's other losses of torque, over its rated torque."""
 _STEEPER, _LEAST_STEEP = 0.15, 0.5
 """Relative error of the growth of a tension (standard deviation), for example from another
 stiffness; and its least growth, over the commanded one."""
@@ -126,7 +126,8 @@ _TURNED_rad = 0.005
 _SLID_rad = 3.0 * YIELD_rad
 """Rotation after which a motor's friction has almost completely reversed."""
 _TOLD = 0.7
-"""Friction from others of a kind is used if its standard deviation is below this share of usual."""
+"""The friction of other motors of a kind is used if its standard deviation is below this share of
+the usual one."""
 _MISFIT = 3.0
 """Residual over noise above which a fit is rejected, for example because the platform moved."""
 _SLIDE_m = 0.005
@@ -174,7 +175,7 @@ class PullFit:
         self._motors[M_PER_RAD] = [axis.winch.cable_m_per_motor_rad for axis in axes]
         rated_N = self._rated_Nm / np.abs(self._motors[M_PER_RAD])
         self.taken_up_N = (MOST_SHARE + COGGING_SHARE) * rated_N
-        """Largest part of their cables' tensions that winches usually take up, (n,)."""
+        """Largest usual friction of the winches, as tensions of their cables, (n,)."""
         self._motors[POLE_PAIRS] = [axis.winch.motor.pole_pairs for axis in axes]
         self._alike_rad = _ALIKE_rad / self._motors[POLE_PAIRS]
         usual = np.full((n, UNKNOWNS), [_ANYWHERE_rad, _STEEPER, np.inf, 1.0, 1.0])
@@ -217,7 +218,7 @@ class PullFit:
         self._yielding[:] = -np.sign(self._motors[M_PER_RAD])
 
     def take(self, position_rad: FloatArray, tension_N: FloatArray) -> None:
-        """Take in a cycle's angles (n,) and the commanded tensions, (n,)."""
+        """Process a cycle's angles (n,) and the commanded tensions, (n,)."""
         self._take(position_rad, tension_N)
 
     def end(self) -> FloatArray:
@@ -307,7 +308,7 @@ class PullFit:
         return (counts * weighted).sum(axis=1) / known, np.sqrt(unlike[:, 0] + 1.0 / known)
 
     def _weighted_sums(self) -> FloatArray:
-        """Return the sums (n, 7, 7) over the variance of other torques that a motor takes up."""
+        """Return the sums (n, 7, 7) over the variance of a motor's other losses of torque."""
         sums = self._sums + np.swapaxes(np.tril(self._sums, -1), 1, 2)
         noise = self._alike_rad * (NOISE_SHARE * self._rated_Nm) ** 2
         return np.asarray(sums / noise[:, None, None])

@@ -1,4 +1,4 @@
-"""What a commissioning leaves: its files, the identified motor, its results as one table."""
+"""The results of a commissioning: its files, the identified motor, and one table for the report."""
 
 from __future__ import annotations
 
@@ -42,11 +42,11 @@ METHODS = ("none", "thesis", "harmonic")
 FIGURES = ("rms_position_error_deg", "peak_pid_effort_Nm", "peak_velocity_error_deg_s")
 
 AngleOf = Callable[[RawLog, Recording], FloatArray]
-"""Gives the angle from the index on which a recorded pass is judged, (samples,)."""
+"""Returns the angle from the index, (samples,), with which a recorded pass is evaluated."""
 
 
 def judge(paths: Sequence[Path], angle_of: AngleOf | None) -> ValidationMetrics:
-    """Return the figures of the passes, the worst of each; on the encoder's angle by default."""
+    """Return the worst of each figure over the passes; by default with the encoder's angle."""
     figures = []
     for path in paths:
         log = read_raw_log(path)
@@ -67,7 +67,7 @@ def judge(paths: Sequence[Path], angle_of: AngleOf | None) -> ValidationMetrics:
 
 
 def compare(runs: Mapping[str, Sequence[Path]], angle_of: AngleOf | None = None) -> dict[str, Any]:
-    """Return the figures of each method and how many times smaller than without each is."""
+    """Return the figures of each method, and their ratios to those without compensation."""
     metrics = {method: judge(paths, angle_of) for method, paths in runs.items()}
     return {
         method: {**_figures(m), "ratios": asdict(ratios(metrics["none"], m))}
@@ -78,7 +78,7 @@ def compare(runs: Mapping[str, Sequence[Path]], angle_of: AngleOf | None = None)
 def lowest(
     design: PidDesign, counts_per_turn: int, torque_step_Nm: float, period_s: float
 ) -> dict[str, Any]:
-    """Return what the encoder's and the torque's steps alone leave in this loop."""
+    """Return the figures that encoder and torque steps alone cause in this loop."""
     step_rad = math.tau / counts_per_turn
     return _figures(
         floor(
@@ -102,7 +102,7 @@ class Paths:
 
     @property
     def raw_folder(self) -> Path:
-        """Return where the recorded passes are."""
+        """Return the folder of the recorded passes."""
         return self.out / "raw"
 
     def raw(self, name: str) -> Path:
@@ -121,7 +121,7 @@ class Paths:
 
     @property
     def run(self) -> Path:
-        """Return the file of what the report must know besides the recordings."""
+        """Return the file with the data of the report that are not in the recordings."""
         return self.out / "run.json"
 
     @property
@@ -136,7 +136,7 @@ class Paths:
 
     @property
     def truth(self) -> Path:
-        """Return the simulator's own log, which only the report reads."""
+        """Return the simulator's log of the truth, which only the report reads."""
         return self.out / "simulator-truth.log"
 
 
@@ -152,13 +152,13 @@ class Identified:
 
 
 def legs(paths: list[Path]) -> list[SweepData]:
-    """Return recorded passes as the identification takes them; raises RawLogError."""
+    """Return recorded passes in the form that the identification needs; raises RawLogError."""
     # nothing but the sweep stays in memory: a recording is large
     return [recording(read_raw_log(path)).sweep for path in paths]
 
 
 def identify(winch: Winch, latency_s: float, paths: Paths) -> Identified:
-    """Identify from the recorded passes in `paths`, all rounds of the second pass included.
+    """Identify from the recorded passes in `paths`, including all rounds of the second pass.
 
     Raises RawLogError and IdentificationError.
     """
@@ -215,7 +215,8 @@ TARGETS = {
     "thesis": {"rms_position_error": 3.0, "peak_pid_effort": 6.0, "peak_velocity_error": 5.0},
     "harmonic": {"rms_position_error": 10.0, "peak_pid_effort": 10.0, "peak_velocity_error": 8.0},
 }
-"""Times smaller than without compensation: what the thesis reached, and what is aimed at here."""
+"""Target ratios to the figures without compensation: those of the thesis, and those of this
+project."""
 
 
 _Positive = Annotated[float, Field(gt=0.0, le=1e9)]
@@ -253,7 +254,7 @@ class _Pid(_Part):
     crossover_Hz: _Positive
     phase_margin_deg: _Number
     gain_margin_dB: _Number | None
-    """None where no gain is too much."""
+    """None if the loop is stable with any gain."""
     sensitivity_peak: _Positive
 
 
@@ -281,7 +282,7 @@ class _Run(_Part):
 
 
 def read_run(paths: Paths) -> dict[str, Any]:
-    """Return the run on the bus; raises InvalidRequestError where a part of it is missing."""
+    """Return the data of the run on the bus; raises InvalidRequestError if a part is missing."""
     try:
         read_json_model(paths.run, _Run)
         run: dict[str, Any] = read_json(paths.run)
@@ -295,9 +296,9 @@ def read_run(paths: Paths) -> dict[str, Any]:
 def assemble(
     paths: Paths, run: dict[str, Any], found: Identified, true_angle: AngleOf | None
 ) -> dict[str, Any]:
-    """Return everything the report tells; raises RawLogError and what `true_angle` raises.
+    """Return all data of the report; raises RawLogError and the errors of `true_angle`.
 
-    Validation is judged on `true_angle` where a simulator has told it, else on the encoder.
+    The validation uses `true_angle` of a simulator if there is one, else the encoder's angle.
     """
     # runs from before this was noted are all of drives that take per mille
     run = {"torque_step_Nm": run["rated_torque_Nm"] / 1000.0, **run}
@@ -315,7 +316,7 @@ def assemble(
 
 
 def identification(found: Identified) -> dict[str, Any]:
-    """Return what was identified, in plain values."""
+    """Return the identified values for JSON."""
     harmonic, thesis = found.harmonic, found.thesis
     harmonics = harmonic.harmonics
     friction = harmonic.friction

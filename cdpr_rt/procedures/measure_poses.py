@@ -1,4 +1,4 @@
-"""Take a platform from pose to pose, and read lengths, tensions and markers where it stands."""
+"""Move a platform from pose to pose, and read lengths, tensions and markers at each."""
 
 from __future__ import annotations
 
@@ -22,19 +22,19 @@ _MOST_FAILURES = 5
 
 
 class PoseRefusedError(Exception):
-    """The robot does not go to a pose; the message says why. It stands where it was."""
+    """The robot rejects a pose; the message says why. It has not moved."""
 
 
 class NotThePoseError(TripError):
-    """The motion was ended by what no pose has a part in, such as an emergency stop."""
+    """The motion ended for a reason that does not depend on the pose, such as an emergency stop."""
 
 
 @dataclass(frozen=True)
 class TargetNotReached:
-    """A platform that has not come to its target in time, and is held where it is."""
+    """A platform that has not reached its target in time; the robot holds it there."""
 
     place: FloatArray
-    """(d,), as its controller has it."""
+    """Present place (d,), according to its controller."""
     why: str
 
 
@@ -46,46 +46,46 @@ class Readings:
     """(cycles, n)"""
     tension_N: FloatArray
     position_m: FloatArray | None = None
-    """Measured from outside, (3,)."""
+    """Externally measured position, (3,)."""
     position_std_m: float | None = None
     rotation: FloatArray | None = None
     rotation_std_rad: float | None = None
 
 
 class PoseReader(Protocol):
-    """Reads a platform's cables and its camera; whatever robot and bus they are on."""
+    """Reads a platform's cables and its camera, on any robot and bus."""
 
     def wait(self, seconds: float) -> None:
-        """Let time pass; raises TripError where the motion is ended meanwhile."""
+        """Let time pass; raises TripError if the motion ends meanwhile."""
 
     def read(self, seconds: float) -> Readings:
-        """Let time pass and return what was read; raises TripError."""
+        """Let time pass and return the readings; raises TripError."""
 
     def image(self) -> Sighting | None:
-        """Return what the camera sees, None without one; raises TripError."""
+        """Return the markers that the camera sees, None without a camera; raises TripError."""
 
 
 class PlatformOperator(PoseReader, Protocol):
     """Also moves a platform."""
 
     def move_to(self, place: FloatArray) -> TargetNotReached | None:
-        """Take it to a place (d,); None where it has come there.
+        """Move the platform to a place (d,); return None if it has arrived.
 
-        Raises PoseRefusedError, TripError where motion is ended.
+        Raises PoseRefusedError, and TripError if the motion ends early.
         """
 
 
 class PoseNotifier(Protocol):
-    """Is told how the procedure goes on."""
+    """Receives notes about the progress of the procedure."""
 
     def note(self, text: str) -> None:
-        """Take a line."""
+        """Show a line of text."""
 
 
 def read_pose(operator: PoseReader, target: FloatArray) -> PoseReading:
-    """Wait until the platform stands still and return what is read there.
+    """Wait until the platform stands still, and return the readings there.
 
-    Raises PoseRefusedError where it does not come to rest within some ten readings.
+    Raises PoseRefusedError if it does not come to rest within some ten readings.
     """
     operator.wait(SETTLE_S)
     for _ in range(_MOST_READINGS):
@@ -103,29 +103,30 @@ def read_pose(operator: PoseReader, target: FloatArray) -> PoseReading:
 
 @dataclass
 class Measured:
-    """Readings of a procedure so far; `keep` is called after each that is added."""
+    """Readings of a procedure so far; `keep` is called after each addition."""
 
     keep: Callable[[], None]
     readings: list[PoseReading] = field(default_factory=list)
     refused: list[str] = field(default_factory=list)
-    """Places that were not read, and why."""
+    """Reasons why places were not read."""
     tried: list[tuple[float, ...]] = field(default_factory=list)
-    """Places (d,) that were not read, or not reached: not to be gone to again."""
+    """Places (d,) that were not read or not reached, and are not tried again."""
     failures: int = 0
-    """Places in turn that were not reached, or at which the platform did not come to rest."""
+    """Number of places in a row that were not reached, or at which the platform did not come to
+    rest."""
 
     def add(self, reading: PoseReading) -> None:
-        """Take a reading."""
+        """Add a reading."""
         self.readings.append(reading)
         self.keep()
 
     def leave_out(self, place: FloatArray, why: str) -> None:
-        """Give up a place (d,) that cannot be read."""
+        """Leave out a place (d,) that cannot be read."""
         self.refused.append(f"{_listed(place)}: {why}")
         self.tried.append(tuple(place.tolist()))
 
     def interrupted(self, place: FloatArray, error: TripError) -> None:
-        """Give up a place (d,) at which the motion was ended, unless that was not its fault."""
+        """Leave out a place (d,) at which the motion ended, if the place may be the cause."""
         if not isinstance(error, NotThePoseError):
             # nobody knows whether it would not happen there again
             self.leave_out(place, str(error))
@@ -138,7 +139,7 @@ def measure_poses(
     measured: Measured,
     notifier: PoseNotifier,
 ) -> None:
-    """Go to places (d,) and read each; by way of `between` where it does not go straight.
+    """Go to places (d,) and read each; go through `between` if the straight way is rejected.
 
     One that is not reached is read where the platform stands, also on the way by `between`.
     Raises TripError where the motion is ended, or where five places in turn are not reached or do
@@ -180,7 +181,7 @@ def _go(
 def _read(
     operator: PlatformOperator, place: FloatArray, held: TargetNotReached | None, measured: Measured
 ) -> str:
-    """Read a pose where the platform has come to; return what was wrong, empty for nothing."""
+    """Read a pose where the platform stands; return the problem, "" for none."""
     try:
         reading = read_pose(operator, place if held is None else held.place)
     except PoseRefusedError as error:

@@ -1,4 +1,4 @@
-"""Runs that measure a motor: what is commanded, and where in the recording to look."""
+"""Runs that measure a motor: their commanded motion, and the part of the recording to evaluate."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from cdpr_rt.loop.operating import Operator
 from cdpr_rt.motion.trajectory import TrapezoidalMove
 
 Index = Literal["homing", "probe"]
-"""How the encoder index is found: by homing, or by the touch probe during ordinary motion."""
+"""How to find the encoder index: by homing, or by the touch probe during a normal motion."""
 
 # the rotor trails the set-point by friction over gain; both directions' trail fits in here
 SWEEP_LEAD_IN_RAD = math.radians(30.0)
@@ -32,12 +32,12 @@ class Pass:
     speed_rad_s: float
     """Signed."""
     lead_in_rad: float
-    """Covered first and left out, so that friction and controller have settled."""
+    """Covered first and not evaluated, so that friction and controller have settled."""
     distance_rad: float
     ramp_s: float = 0.5
     """Time to reach the speed, and to stop."""
     with_ramps: bool = False
-    """Whether speeding up and slowing down count too, as they must to tell the inertia."""
+    """Whether to evaluate the ramps too, which the inertia requires."""
 
     def move(self, start_rad: FloatArray) -> TrapezoidalMove:
         """Return the set-point of n axes that start at `start_rad` (n,)."""
@@ -46,11 +46,11 @@ class Pass:
         return TrapezoidalMove(start_rad, speed, cruise, self.ramp_s)
 
     def duration_s(self) -> float:
-        """Return how long the pass takes."""
+        """Return the duration of the pass."""
         return (self.lead_in_rad + self.distance_rad) / abs(self.speed_rad_s) + 2.0 * self.ramp_s
 
     def measured(self) -> tuple[float, float]:
-        """Return from when to when, in seconds from the start, the pass counts."""
+        """Return the times, in s from the start, between which the pass is evaluated."""
         if self.with_ramps:
             return 0.0, self.duration_s()
         begin = self.ramp_s + self.lead_in_rad / abs(self.speed_rad_s)
@@ -71,9 +71,9 @@ def run_pass(
     meta: dict[str, Any],
     on_progress: Callable[[float], None] | None = None,
 ) -> Path:
-    """Run `controller` along one pass from where the axes stand, recording into `path`.
+    """Run `controller` along one pass from the present position, recording into `path`.
 
-    Raises what `Operator.follow` raises; the file is closed and kept in every case.
+    Raises the errors of `Operator.follow`; the file is always closed and kept.
     """
     device = operator.device
     begin, end = what.measured()
@@ -103,17 +103,17 @@ class Recording:
     effort_Nm: FloatArray
     cycle: FloatArray
     judged: BoolArray
-    """The samples that count: at full speed after the lead-in."""
+    """The samples to evaluate: at full speed after the lead-in."""
     period_s: float
     complete: bool
-    """False when the recording ends before the pass does."""
+    """False if the recording ends before the pass."""
 
 
 def recording(log: RawLog) -> Recording:
-    """Take a raw log as the recording of a pass and refer it to the encoder index.
+    """Return the recording of a pass from a raw log, with angles from the encoder index.
 
-    Raises RawLogError when the log is of something else, ends before the part that counts, or
-    the index was not known in it.
+    Raises RawLogError if the log is of another kind, ends before the part to evaluate, or does not
+    contain the index.
     """
     try:
         period = float(log.header["period_s"])

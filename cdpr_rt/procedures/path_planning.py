@@ -1,4 +1,4 @@
-"""A path for one robot: from its file to samples in time, or to the first place it cannot be at."""
+"""A path for one robot: from its file to samples in time, or to the first infeasible place."""
 
 from __future__ import annotations
 
@@ -39,11 +39,11 @@ _FACTORS: Final = {
     1000.0: "1000 times too small: m read as mm",
 }
 _SMALL: Final = 0.04
-"""A path not larger than this share of the workspace may be one in wrong units."""
+"""A path not larger than this share of the workspace may have wrong units."""
 
 
 def size_fault(path: PathDescription, low_m: FloatArray, high_m: FloatArray) -> None:
-    """Raise PathError where a path only fits the workspace's box with its units undone."""
+    """Raise PathError if a path fits the workspace's box only after a correction of its units."""
     k = path.coordinates.positions
     points = path.points[:, :k]
     inside = ((points >= low_m) & (points <= high_m)).all(axis=1)
@@ -68,7 +68,7 @@ def size_fault(path: PathDescription, low_m: FloatArray, high_m: FloatArray) -> 
 
 
 def size_note(path: PathDescription, low_m: FloatArray, high_m: FloatArray) -> str:
-    """Return the likely mistake of unit by the size of a path that is inside, "" for none."""
+    """Return the likely mistake of units, from the size of a path inside the box; "" for none."""
     points = path.points[:, : path.coordinates.positions]
     size, room = np.ptp(points, axis=0), high_m - low_m
     if not size.any() or (size > _SMALL * room).any():
@@ -84,23 +84,23 @@ def _told(size_m: FloatArray) -> str:
 
 
 LONGEST_s: Final = MOST_SAMPLES * PERIOD_S
-"""Of one plan; a longer path takes several."""
+"""Longest duration of one plan; a longer path needs several."""
 MOST_WAITS: Final = 60
 _POSES_m: Final = 0.02
-"""Between the poses at most at which wrenches and contacts are looked at."""
+"""Largest distance between the poses at which wrenches and contacts are checked."""
 _ROUNDING_m: Final = 1e-8
-"""By so much a position may be out of the box; also rad."""
+"""Tolerance of a position at the sides of the box, in m and rad."""
 
 Advance = Callable[[str, float], None]
-"""Told what is being done, and which part of the whole is done."""
+"""Receives the present step, and the completed share of the whole."""
 
 
 @dataclass(frozen=True)
 class Obstacle:
-    """The first place of a path at which the platform cannot be."""
+    """The first infeasible place of a path."""
 
     line: int
-    """In the path's file."""
+    """Line in the path's file."""
     position: FloatArray
     """(d,)"""
     text: str
@@ -115,17 +115,17 @@ class PathPlan:
     limits: PathLimits
     obstacle: Obstacle | None
     timed: TimedPath | None
-    """None with an obstacle that has nothing to do with time."""
+    """None if the obstacle was found before timing."""
     constant_s: float
-    """Duration at the one speed and acceleration that every place allows."""
+    """Duration at the constant speed and acceleration that every place allows."""
     slowed: int
-    """Moves whose wanted speed the robot does not reach anywhere."""
+    """Number of moves whose wanted speed the robot never reaches."""
     next_line: int | None = None
-    """Line of the file from which another plan goes on, None if this one ends the path."""
+    """Line of the file at which the next plan continues, None if this one ends the path."""
 
     @property
     def deviation_m(self) -> float:
-        """Greatest distance of the set-point from what the file says, cut corners included."""
+        """Largest distance of the set-point from the file's path, including cut corners."""
         return self.nodes.deviation_m + (self.timed.departure_m if self.timed else 0.0)
 
 
@@ -153,8 +153,8 @@ class PathPlanner:
     ) -> PathPlan:
         """Return the plan of a path from a line on, as much of it as fits into one plan.
 
-        The platform rests where the plan ends. If the path begins with it, the places of what
-        comes later are looked at too. Raises PathError for a path of a size in wrong units.
+        The platform rests where the plan ends. The first plan of a path also checks the places of
+        the later ones. Raises PathError for a path with wrong units.
         """
         advance("corners", 0.0)
         size_fault(path, *self._box())
@@ -205,10 +205,10 @@ class PathPlanner:
     # -- parts
 
     def _divide(self, path: PathDescription, begin: int) -> list[int]:
-        """Return where plans end, as numbers of moves, each after as long as one plan may take.
+        """Return where plans end, as numbers of moves; each lasts as long as one plan may take.
 
-        By the shortest time that moves may take: of half the longest plan, for what braking takes
-        besides. Raises PathError for a move that takes too long.
+        It adds up the shortest times of moves to half the longest plan, to leave time for braking.
+        Raises PathError for a move that takes too long.
         """
         k = self.model.positions
         points = path.points
@@ -235,7 +235,7 @@ class PathPlanner:
         lines = [move.line for move in path.moves[begin:]]
         for i, share in enumerate(used):
             total += share
-            # between lines only, so that a line says where to go on
+            # only between lines, so that a line number says where to continue
             if total > 1.0 and i and lines[i] != lines[i - 1]:
                 ends.append(begin + i)
                 total = float(share)
@@ -259,7 +259,7 @@ class PathPlanner:
         )
 
     def _least_s(self, nodes: PathNodes) -> float:
-        """Return how long a path takes at least, however it is followed."""
+        """Return a lower bound for the duration of a path."""
         fastest = np.sqrt(speed_bounds(nodes, self.limits))
         step = np.diff(nodes.s)
         moves = step > 0.0
@@ -275,7 +275,7 @@ class PathPlanner:
         return np.array(platform.workspace_min_m), np.array(platform.workspace_max_m)
 
     def _obstacle(self, nodes: PathNodes) -> tuple[WrenchBounds, Obstacle | None]:
-        """Return the bounds of wrenches along the path, and the first place it cannot be at."""
+        """Return the bounds of wrenches along the path, and its first infeasible place."""
         outside = self._outside(nodes, *self._box())
         if outside is not None:
             return WrenchBounds.none(0, self.model.size), outside
@@ -283,9 +283,9 @@ class PathPlanner:
         return wrenches, self._first(nodes, obstacle, self._contact(nodes))
 
     def _outside(self, nodes: PathNodes, low: FloatArray, high: FloatArray) -> Obstacle | None:
-        """Return the first place out of the box of targets, or turned too far, between nodes too.
+        """Return the first place outside the box of targets or turned too far.
 
-        The curve between two nodes is looked at in four places.
+        The curve between two nodes is checked at four places.
         """
         first: tuple[float, Obstacle] | None = None
         for part in (0.0, 0.25, 0.5, 0.75):
@@ -324,7 +324,8 @@ class PathPlanner:
         )
 
     def _wrenches(self, nodes: PathNodes) -> tuple[WrenchBounds, Obstacle | None]:
-        """Return the bounds of wrenches along the path, or the first place that is not held."""
+        """Return the bounds of wrenches along the path, or the first place where the cables cannot
+        hold the platform."""
         model = self.model
         chosen = self.looked_at(nodes)
         positions = nodes.q[chosen]
@@ -361,7 +362,7 @@ class PathPlanner:
     def _contact(self, nodes: PathNodes) -> Obstacle | None:
         """Return the first contact of cables, platform and boxes, along chords of the path.
 
-        Of straight pieces 20 mm long, else from node to node.
+        Chords are 20 mm long on straight pieces, else from node to node.
         """
         bent = np.flatnonzero(np.any(nodes.second != 0.0, axis=1))
         chosen = np.union1d(self.looked_at(nodes), bent)
@@ -382,7 +383,7 @@ class PathPlanner:
         return one if away[0] <= away[1] else other
 
     def _most_wrench(self, nodes: PathNodes, by_u: FloatArray, by_x: FloatArray) -> FloatArray:
-        """Return how large each entry of the wrench can be within the limits, (N, d)."""
+        """Return the largest value of each entry of the wrench within the limits, (N, d)."""
         fastest = speed_bounds(nodes, self.limits)[:, None]
         fastest[nodes.runs.ravel()] = 0.0
         with np.errstate(divide="ignore"):
@@ -392,7 +393,7 @@ class PathPlanner:
         return np.asarray(np.abs(by_u) * steepest[:, None] + np.abs(by_x) * fastest)
 
     def looked_at(self, nodes: PathNodes) -> IntArray:
-        """Return nodes not farther from each other than 20 mm, those at stops among them."""
+        """Return nodes that are at most 20 mm apart, including those at stops."""
         cell = np.floor(nodes.s / _POSES_m).astype(np.int64)
         fresh = np.concatenate([[True], np.diff(cell) > 0])
         fresh[nodes.runs.ravel()] = True
@@ -423,7 +424,7 @@ class PathPlanner:
         return float(times.sum() + nodes.dwell_s.sum())
 
     def _slowed(self, nodes: PathNodes) -> int:
-        """Return how many moves want more speed than the robot has in any direction."""
+        """Return how many moves ask for more speed than the robot has."""
         finite = np.isfinite(nodes.speed)
         k = self.model.positions
         most = np.where(
@@ -441,21 +442,21 @@ _MOST: Final = 20_000
 
 @dataclass(frozen=True)
 class PathTensions:
-    """Tensions at some of a plan's samples, evenly chosen where there are too many."""
+    """Tensions at a plan's samples, or at evenly chosen ones if there are too many."""
 
     sample: IntArray
-    """Which, (m,)."""
+    """Numbers of these samples, (m,)."""
     tension_N: FloatArray
     """(m, n)"""
     low_N: FloatArray
-    """Bounds that are planned with: the file's, with the control's reserve, (n,)."""
+    """Bounds used for planning: the file's, reduced by the control's reserve, (n,)."""
     high_N: FloatArray
     carried: BoolArray
     """Whether tensions are within these bounds, (m,)."""
 
 
 def path_tensions(model: PlatformModel, timed: TimedPath) -> PathTensions:
-    """Return the tensions along a plan, within what the motors' torque leaves."""
+    """Return the tensions along a plan, within the limits of the motors' torque."""
     step = -(-len(timed.samples) // _MOST)
     chosen = np.arange(0, len(timed.samples), step)
     q, v, a = (np.ascontiguousarray(timed.samples[chosen, i]) for i in range(3))

@@ -59,7 +59,7 @@ class AxisProgram(CommandedProgram):
         self._zero_velocity = np.zeros(model.n)
 
     def start(self, feedback: AxisFeedback, setpoint: Setpoint, torque_Nm: FloatArray) -> None:
-        """Go on from the present set-point and torque, (n,) each, as the last cycle left them."""
+        """Continue from the last cycle's set-point and torque, (n,) each."""
         self._setpoint = setpoint
         self._stopping = self._at_rest = False
         self._loop.take_over(feedback, torque_Nm)
@@ -96,7 +96,7 @@ _LEAST_DISTANCE_RAD = 1e-9
 class PointToPoint:
     """Takes the set-points to a target; axes that start from standstill arrive together.
 
-    The path is then the straight line from start to target. Axes that are already moving go on
+    The path is then the straight line from start to target. Axes that are already moving continue
     within their own bounds.
     """
 

@@ -1,4 +1,4 @@
-"""Base classes of programs: what the loop runs in its cycles."""
+"""Base classes of programs, which the loop runs in its cycles."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ class CommandArguments:
         """Return one number per axis, (n,), of magnitude up to `limit` (n,).
 
         With `optional` an axis may have no number (null), which is nan in the result. `each` is the
-        text for a refusal that says what the numbers are for, unless they are for axes.
+        text of a refusal that names the meaning of each number, by default an axis.
         """
         value = self._arguments.get(key)
         if not isinstance(value, Sequence) or isinstance(value, str) or len(value) != limit.size:
@@ -96,10 +96,10 @@ REST_S: Final = 5.0
 class Program(ABC):
     """A set-point over time and the controller that follows it.
 
-    One program runs at a time. The next one goes on from the set-point and the torque that the
-    last one left, so that neither steps. `update` allocates nothing, does no I/O and reads no
-    clock: time advances by one period per call. The methods that are not abstract suit a program
-    without arguments, platform and stream.
+    One program runs at a time. The next one continues from the last one's set-point and torque, so
+    that neither steps. `update` allocates nothing, does no I/O and reads no clock: time advances by
+    one period per call. The methods that are not abstract suit a program without arguments,
+    platform and stream.
     """
 
     name: str
@@ -110,7 +110,7 @@ class Program(ABC):
 
     @abstractmethod
     def start(self, feedback: AxisFeedback, setpoint: Setpoint, torque_Nm: FloatArray) -> None:
-        """Go on from the present set-point and torque, (n,) each, as the last cycle left them."""
+        """Continue from the last cycle's set-point and torque, (n,) each."""
 
     def preparation(self, _arguments: Mapping[str, Any]) -> Callable[[], None] | None:
         """Return the preparation of a command with these arguments, None for nothing.
@@ -140,7 +140,7 @@ class Program(ABC):
 
     @abstractmethod
     def stop(self) -> None:
-        """Begin to brake to a standstill; `update` goes on being called until `at_rest`."""
+        """Begin to brake to a standstill; `update` is still called until `at_rest`."""
 
     @property
     @abstractmethod

@@ -57,7 +57,7 @@ class FollowProgram(AxisProgram):
         self._follow(np.zeros(model.n), 0.0)
 
     def start(self, feedback: AxisFeedback, setpoint: Setpoint, torque_Nm: FloatArray) -> None:
-        """Go on from the present set-point and torque; brakes until the stream begins."""
+        """Continue from the last set-point and torque; brake until the stream begins."""
         super().start(feedback, setpoint, torque_Nm)
         # where the axes come to rest: the stream may begin before
         speed = setpoint.velocity_rad_s

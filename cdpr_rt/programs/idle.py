@@ -46,7 +46,7 @@ class IdleProgram(Program):
         self._first = True
 
     def start(self, feedback: AxisFeedback, _setpoint: Setpoint, torque_Nm: FloatArray) -> None:
-        """Go on from the present set-point and torque, (n,) each, as the last cycle left them."""
+        """Continue from the last cycle's set-point and torque, (n,) each."""
         self._first = True
         self._loop.take_over(feedback, torque_Nm)
 

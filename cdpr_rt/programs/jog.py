@@ -43,13 +43,13 @@ class JogProgram(AxisProgram):
         self._duration: float = math.inf
 
     def start(self, feedback: AxisFeedback, setpoint: Setpoint, torque_Nm: FloatArray) -> None:
-        """Go on from the present set-point and torque; brakes until speeds are commanded."""
+        """Continue from the last set-point and torque; brake until speeds are commanded."""
         super().start(feedback, setpoint, torque_Nm)
         self._cycles_left = self._cycles = 0
         self._duration = math.inf
 
     def progress(self) -> dict[str, Any]:
-        """Return the commanded speeds, how long they hold without being renewed, and `done`.
+        """Return the commanded speeds, how long they last without renewal, and `done`.
 
         `done` is the elapsed share of the duration, if one was given.
         """

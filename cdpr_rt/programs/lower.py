@@ -44,7 +44,7 @@ _MOST_S = 30.0
 
 
 def lowering_s(platform: Platform) -> float:
-    """Return the longest that `lower` may take, from anywhere in the box of targets."""
+    """Return the longest duration of `lower`, from anywhere in the box of targets."""
     return _home_s(platform) + _down_s(platform) + _STILL_S + _FADE_S
 
 
@@ -159,7 +159,7 @@ class LowerProgram(PlatformProgram):
             torque_Nm[:] = 0.0
 
     def stop(self) -> None:
-        """Go on: lowering is the quickest stop; it is at rest when the platform stands."""
+        """Continue: lowering is the quickest stop; it is at rest when the platform stands."""
         self._control.stand_in()
 
     def progress(self) -> dict[str, Any]:
@@ -187,7 +187,7 @@ class LowerProgram(PlatformProgram):
         self._without_pose = self._without_pose or blind
 
     def _rubs_N(self, cable_m: FloatArray) -> FloatArray:
-        """Return how much of its cable's tension each winch's friction may take up, (n,)."""
+        """Return the largest friction of each winch, as a tension of its cable, (n,)."""
         known = self._parts.compensation
         known_N = 0.0 if known is None else known.friction_Nm / np.abs(cable_m)
         return np.asarray(np.maximum(known_N, self._control.pull_fit.taken_up_N))
@@ -201,7 +201,8 @@ class LowerProgram(PlatformProgram):
     def _need(self, spare_m: float) -> None:
         """Set the length each cable needs from the set-point to the stand, plus `spare_m`.
 
-        The platform was no farther than the set-point, and a jump of an encoder does not affect it.
+        The platform was not farther away than the set-point, which a jump of an encoder does not
+        affect.
         """
         self._there.array[:] = self._parts.model.poses(self._control.shaped[None])[0]
         here_m = self._parts.model.kinematics.lengths(self._there)
@@ -211,7 +212,7 @@ class LowerProgram(PlatformProgram):
         """Begin with the tensions that carry the weight at `_there`, without pretension.
 
         Pretension would fling the platform if one of the cables has broken. So would tensions for
-        the estimated pose, which follows a cable that runs in or an encoder that jumps.
+        the estimated pose, which follows a cable that is wound in fast, or an encoder that jumps.
         """
         kinematics = self._parts.model.kinematics
         kinematics.wrench_matrix(self._there, self._W)
@@ -242,7 +243,8 @@ class LowerProgram(PlatformProgram):
     def _watch_rest(self, feedback: AxisFeedback) -> None:
         winches, period_s = self._winches, self._parts.period_s
         low_N = winches.low_N
-        # a cable that runs in carries nothing, even if its winch trembles: it may be broken
+        # a cable that is wound in fast carries nothing, even if its winch trembles: it may be
+        # broken
         running_in = self._cable * winches.speed_rad_s < -_RUNNING_IN_m_s
         bottom_N = np.where(winches.left_m > 0.0, -winches.push_N, low_N)
         unloaded = winches.tension_N <= bottom_N + _LIGHT * np.abs(bottom_N)

@@ -71,7 +71,7 @@ class PathProgram(PlatformProgram):
         self._play(0.0)
 
     def start(self, feedback: AxisFeedback, setpoint: Setpoint, torque_Nm: FloatArray) -> None:
-        """Go on from the present set-point; if it is on the path, it stays there."""
+        """Continue from the last set-point; if it is on the path, it stays there."""
         if self.is_on_path(feedback.cycle):
             self._stopping = self._at_rest = False
             self._arrival.restart()

@@ -32,7 +32,7 @@ class PidProgram(AxisProgram):
         self._has_target = False
 
     def start(self, feedback: AxisFeedback, setpoint: Setpoint, torque_Nm: FloatArray) -> None:
-        """Go on from the present set-point and torque; brakes until a position is commanded."""
+        """Continue from the last set-point and torque; brake until a position is commanded."""
         super().start(feedback, setpoint, torque_Nm)
         self._motion.stay(setpoint)
         self._has_target = False

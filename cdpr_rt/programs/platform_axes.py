@@ -38,7 +38,7 @@ class PlatformHold(Program):
         self.controller = self._active.controller
 
     def start(self, feedback: AxisFeedback, setpoint: Setpoint, torque_Nm: FloatArray) -> None:
-        """Go on from the present set-point and torque, (n,) each, as the last cycle left them."""
+        """Continue from the last cycle's set-point and torque, (n,) each."""
         if self._parts.tight and self._path.is_on_path(feedback.cycle):
             self._active = self._path
             self._path.stop()
@@ -86,7 +86,7 @@ class PlatformIdle(IdleProgram):
         self._parts = parts
 
     def start(self, feedback: AxisFeedback, setpoint: Setpoint, torque_Nm: FloatArray) -> None:
-        """Go on from the present set-point and torque; the cables count as slack."""
+        """Continue from the last set-point and torque; the cables count as slack."""
         self._parts.slacken()
         super().start(feedback, setpoint, torque_Nm)
 
@@ -111,13 +111,14 @@ class PlatformJog(JogProgram):
         self._parts = parts
 
     def check(self, arguments: Mapping[str, Any]) -> Any:
-        """Return what `apply` takes; raises ProgramError, also for a platform on its cables."""
+        """Return checked arguments for `apply`; raises ProgramError, also for a platform on its
+        cables."""
         if self._parts.tight:
             raise ProgramError("jog: the platform hangs on its cables; lower it first")
         return super().check(arguments)
 
     def start(self, feedback: AxisFeedback, setpoint: Setpoint, torque_Nm: FloatArray) -> None:
-        """Go on from the present set-point and torque; brakes until speeds are commanded."""
+        """Continue from the last set-point and torque; brake until speeds are commanded."""
         self._parts.slacken()
         self._parts.last_stop.take()
         super().start(feedback, setpoint, torque_Nm)

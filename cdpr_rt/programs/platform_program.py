@@ -108,7 +108,7 @@ def along_velocity(velocity: FloatArray, most: FloatArray, acceleration: FloatAr
 
 @jit
 def synchronise(position: FloatArray, target: FloatArray, most: FloatArray) -> None:
-    """Lower bounds `most` of speed or acceleration so that all ways take the same time; (d,)."""
+    """Reduce bounds `most` (d,) of speed or acceleration so that all ways take equally long."""
     longest = 0.0
     for i in range(most.size):
         longest = max(longest, abs(target[i] - position[i]) / most[i])
@@ -137,7 +137,7 @@ class PlatformParts:
     ) -> None:
         self.model, self.platform = model, model.platform
         self.lengths_allowed_m = lengths_disagree_m
-        """By how much the cables' lengths may disagree."""
+        """Largest allowed disagreement of the cables' lengths."""
         self.home_lengths_allowed_m = min(model.platform.home_tolerance_m, lengths_disagree_m)
         """The same at home, where the error of the drums has no effect."""
         self.names = tuple(names) or tuple(map(default_name, range(control.torque_Nm.size)))
@@ -232,7 +232,7 @@ class PlatformParts:
         return f", {which} {', '.join(names)}" if names else ""
 
     def assume_at_home(self, feedback: AxisFeedback) -> None:
-        """Take the platform to be at home on tight cables, for the warm-up."""
+        """Assume the platform at home on tight cables, for the warm-up."""
         lengths_m = self.control.lengths_at_home(self.control.least_N)
         self.control.take_lengths(lengths_m, feedback)
         self.control.begin(feedback)
@@ -253,7 +253,7 @@ class PlatformParts:
         self.follow_origins()
 
     def follow_origins(self) -> None:
-        """Forget what was learnt of motors whose angles have a new origin since."""
+        """Forget what was learnt about motors whose angles have a new origin."""
         if self._origins_lost != self.estimator.origins_lost:
             self._origins_lost = self.estimator.origins_lost
             self.control.forget_motors()
@@ -285,7 +285,7 @@ class PlatformProgram(CommandedProgram):
         self._write_setpoint(self._target)
 
     def start(self, feedback: AxisFeedback, _setpoint: Setpoint, torque_Nm: FloatArray) -> None:
-        """Go on from the present set-point and torque; the platform brakes and stays."""
+        """Continue from the last set-point and torque; the platform brakes and stays."""
         parts, control = self._parts, self._control
         self._stopping = False
         self._at_rest = False

@@ -72,7 +72,7 @@ class PoseProgram(PlatformProgram):
         self._commanded: FloatArray | None = None
         """The last position commanded and not reached, to which `resume` goes."""
         self._asked_m_s = float(parts.speed[0])
-        """The speed it was commanded with, which `resume` uses unless it is given another."""
+        """The speed of that command, which `resume` uses unless another is given."""
         self._has_command = False
         self._cycle = -2
         """The last cycle in which this program moved the platform."""
@@ -91,7 +91,7 @@ class PoseProgram(PlatformProgram):
         synchronise(self._target, self._target, self._commanded_speed)
 
     def start(self, feedback: AxisFeedback, setpoint: Setpoint, torque_Nm: FloatArray) -> None:
-        """Go on from the present set-point and torque; brakes until a position is commanded."""
+        """Continue from the last set-point and torque; brake until a position is commanded."""
         super().start(feedback, setpoint, torque_Nm)
         self._following = self._has_command = self._stops_feasibly = False
         self._braking = self._blocked = False
@@ -339,7 +339,7 @@ class PoseProgram(PlatformProgram):
         return at_rest
 
     def _set_out_again(self) -> None:
-        """Start straight to the target again after a way that no tensions hold; or give it up."""
+        """Start again straight to the target after an infeasible way; or give the target up."""
         here, commanded, scale_m = self._control.position, self._commanded, self._parts.scale_m
         if self._blocked or commanded is None:
             return

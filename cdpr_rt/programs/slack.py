@@ -1,4 +1,4 @@
-"""Take-up of slack without pulling the platform off its place."""
+"""Take up slack without moving the platform."""
 
 from __future__ import annotations
 
@@ -19,16 +19,17 @@ TAKE_UP_m_s = 0.05
 TAKE_UP_SHARE = 0.4
 """Tension while some cables are slack, as a share of the pretension."""
 LOOSE_m = 0.02
-"""How far cables may be reeled in together. If one goes further, friction was taken for tension,
-or the platform has moved."""
+"""Largest distance by which cables may be reeled in together. Beyond it, friction was mistaken for
+tension, or the platform has moved."""
 PULLED = 0.95
-"""Share of its tension bound above which a winch counts as pulling with all of it."""
+"""Share of its tension bound above which a winch counts as pulling with its full bound."""
 _SLOW_SHARE, _MEAN_S = 1.0 / 3.0, 0.04
 """Below that share of the speed, averaged over this time, a cable may be tight."""
 _HELD = 0.9
-"""Share of the tension up to which a cable sags that holds it without making it count as tight."""
+"""Share of the sag tension with which a winch holds a cable that does not count as tight."""
 _RAISED_1_s = 2.0
-"""Increase of a stationary winch's pull in a second, over the pull at which none sticks."""
+"""Increase per second of a stationary winch's pull, as a share of the pull at which no winch
+sticks."""
 _LEFT_m, _LEAVE_S = 0.005, 0.5
 """Slack left to a cable until all have been tight, and the longest time to pay it out."""
 
@@ -49,7 +50,7 @@ there."""
 
 
 class Winches(NamedTuple):
-    """Speeds, tensions and bounds of n winches, (n,) each, as `WinchSpeedLoop` has them."""
+    """Speeds, tensions and bounds of n winches, (n,) each, as in `WinchSpeedLoop`."""
 
     period_s: float
     at_once: bool
@@ -60,8 +61,8 @@ class Winches(NamedTuple):
     harmless_N: FloatArray
     """Tensions with which one cable alone does not move the platform on its stand."""
     stands_N: FloatArray
-    """Pull that the platform withstands. More than that, in addition to what turns a winch whose
-    cable surely is slack, only drags it along."""
+    """Pull that the platform withstands. A larger pull, in addition to the friction of the winch,
+    only drags the platform."""
     hangs_N: FloatArray
     """Tensions up to which a cable sags under its own weight, and is not tight."""
     speed_rad_s: FloatArray
@@ -209,25 +210,25 @@ def _drive(w: Winches, i: int, phase: int, state: FloatArray, most: float) -> No
 
 
 _ENOUGH = 1.25
-"""Tension at which no winch sticks, over what winches usually take up."""
+"""Tension at which no winch sticks, as a multiple of the usual friction of winches."""
 _STILL_m, _STILL_S, _STILL_COUNTS = 0.0003, 0.3, 2.5
 _TURNED_m = 0.005
 """A winch that has turned this far has not just stuck."""
 _WEAK_S = 0.04
 """Time for which a motor may pull with less after its encoder has shown a count or two."""
 _USUAL_SHARE = 0.45
-"""Tension that usually turns a winch with a slack cable, over the most that it may take up."""
+"""Tension that usually turns a winch with a slack cable, as a share of its largest friction."""
 _STAND_FRICTION, _ASIDE_SHARE = 0.3, 0.5
 """Friction of the stand over the platform's weight; share of it that one cable may pull with."""
 _HANGING_SHARES = np.linspace(0.05, 1.0, 96)[:, None]
 """Shares of the pretension at which the sag of the cables is computed."""
 _MOVED_m, _ALONE_m = 0.005, 0.0025
-"""Difference between the lengths at which a cable was tight alone and together that shows motion;
-difference of all others below which only its winch had stuck."""
+"""Difference between a cable's lengths when tight alone and when all are tight, above which the
+platform has moved; and the difference of all other cables below which only its winch was stuck."""
 _LEAST_SHARE = 0.2
 """Least tension of a cable, as a share of its pull, if its winch's friction is as much."""
 _ALONG_m = 1.5 * LOOSE_m
-"""Least distance that is reported if a light platform may have been pulled along."""
+"""Least distance that is reported if a light platform may have been dragged."""
 _DIRECTIONS, _POINTS, _ABOUT_UP = 16, 0.2, 5
 """Horizontal directions examined, how much a cable has to point there to pull, and which component
 of a twist turns about the vertical."""
@@ -235,14 +236,14 @@ _REMEDY = "take up slack by hand, or hold the platform"
 
 
 class SlackTakeUp:
-    """Reels in n cables until all are tight, while the platform stands on something.
+    """Reels in n cables until all are tight, while the platform stands.
 
     One cable may have much more slack than another, and the platform's weight withstands only some
     newtons. So each cable is paid out a little, reeled in until it is tight, and paid out a little
-    again. Then all become tight together, and each is pulled with no more than that took. A winch
-    may pull with more than has turned it only while it stands still. Its cable is tight if it
-    stands although it is pulled with the most that has turned it, and with what the stand surely
-    withstands, or with more than winches take up. If the pull that turns a winch can slide or tip a
+    again. Then all become tight together, each with no more pull than before. A winch may pull
+    harder than has turned it before only while it stands still. Its cable is tight if the winch
+    stands although its pull has turned it before and the stand surely withstands it, or although
+    the pull exceeds the friction of winches. If the pull that turns a winch can slide or tip a
     light platform on its stand, the cables are reeled in together from the beginning.
     """
 
@@ -293,7 +294,8 @@ class SlackTakeUp:
         return np.logical_and(self._loose, self._busy, out=self._loose)
 
     def pulls(self, which: BoolArray) -> str:
-        """Return the present and the highest pull of those of `which` (n,) whose turn it is."""
+        """Return the present and the highest pull of those of `which` (n,) that are being reeled
+        in."""
         pull_N, may_N = self._winches.tension_N, self._winches.high_N
         return "; ".join(
             f"{self._names[i]} pulls with {pull_N[i]:.1f} N, but only up to {may_N[i]:.1f} "
@@ -305,7 +307,7 @@ class SlackTakeUp:
         """Return which tight cable was reeled in too far, "" for none.
 
         When cables are reeled in together, friction may have held one that was slack. It was not
-        tight if it has come in no further in total than the others.
+        tight if it was reeled in no farther in total than the others.
         """
         i = self._dragged
         if i < 0:
@@ -325,9 +327,10 @@ class SlackTakeUp:
         )
 
     def why_moved(self, position_rad: FloatArray, pulled: bool) -> str:
-        """Return why the platform is not at home any more, "" if it may be.
+        """Return why the platform is no longer at home, "" if it may be.
 
-        If slack may have let a light platform be pulled along a little, `off_home` reports that.
+        If uneven slack may have let the cables drag a light platform a little, `off_home` reports
+        that.
 
         Either all cables have just become tight, or they have been `pulled` with their pretension.
         """
@@ -340,10 +343,10 @@ class SlackTakeUp:
         return why
 
     def _uneven(self, position_rad: FloatArray, pulled: bool) -> str:
-        """Return whose slack was so much more that the platform may have moved, "" for none.
+        """Return whose slack was so much larger that the platform may have moved, "" for none.
 
-        Slack is how far a cable has come in until now, without its stretch. A winch that did not
-        turn as the others became tight may turn only once all are `pulled` harder.
+        Slack is the length of cable reeled in so far, without its stretch. A winch that did not
+        turn while the others became tight may turn only once all are `pulled` harder.
         """
         slack_m = self._slack_m(position_rad)
         told = pulled | (np.abs(slack_m) > _TURNED_m)
@@ -367,7 +370,7 @@ class SlackTakeUp:
         )
 
     def _slack_m(self, position_rad: FloatArray) -> FloatArray:
-        """Return how far each cable has come in until now, (n,), without its stretch."""
+        """Return the length of each cable reeled in so far, (n,), without its stretch."""
         on_m = (self._state[:, FROM_rad] - position_rad) * self._cable
         stretch_m = self._lengths_at_home(self.tight_N) - self._lengths_at_home(
             self._winches.high_N
@@ -375,16 +378,16 @@ class SlackTakeUp:
         return np.asarray(self._state[:, SLACK_m] + on_m - stretch_m)
 
     def _moved(self) -> tuple[str, str]:
-        """Return why not to pull at it, and a notice; either is "" for nothing.
+        """Return why the cables must not be tightened, and a notice; "" for none.
 
-        If a cable is tight at another length than when it first was tight alone, apart from
-        stretch and friction, the platform has moved meanwhile. If only one is, and further in, its
-        winch may have stuck; it surely has if several cables would have shown such a motion.
+        If a cable is tight at another length than when it first was tight alone, apart from stretch
+        and friction, the platform has moved meanwhile. If only one is, and farther in, its winch
+        may have been stuck; this is certain if several cables would have shown such a motion.
         """
         state, length_m = self._state, self._lengths_at_home
         in_m = (state[:, FIRST_rad] - state[:, FROM_rad]) * self._cable
         in_m -= length_m(state[:, FIRST_N]) - length_m(self.tight_N)
-        # friction may take up as much of the pull
+        # friction may be as large as this pull
         true_N = np.maximum(self.tight_N - self._usual_N, _LEAST_SHARE * self.tight_N)
         rubbed_m = length_m(true_N) - length_m(self.tight_N)
         # a cable that sagged where it was first tight had no length there
@@ -410,11 +413,11 @@ class SlackTakeUp:
         ), ""
 
     def _along(self, position_rad: FloatArray) -> str:
-        """Return how far a light platform may stand from home, "" for not far.
+        """Return how far a light platform may stand from home, "" if it is near.
 
-        Cables that are reeled in together pull it along until all cables pointing that way have
-        become tight: t = min s_i/(u_i e), with the slack s_i of a cable along u_i, in the
-        horizontal direction e that gives the furthest distance. They turn it likewise.
+        Cables that are reeled in together drag it until all cables that point in one direction are
+        tight: t = min s_i/(u_i e), with the slack s_i of a cable along u_i, in the horizontal
+        direction e that gives the furthest distance. They turn it likewise.
         """
         slack_m = np.maximum(self._slack_m(position_rad), 0.0)
         aside_m, turned_m = _most_m(self._aside, slack_m), _most_m(self._about_up, slack_m)
@@ -431,7 +434,7 @@ class SlackTakeUp:
     def begin(self, position_rad: FloatArray) -> None:
         """Begin again at these angles (n,), with no cable known as tight.
 
-        All are paid out a little first: how much a winch takes up is unknown until it turns.
+        All are paid out a little first: the friction of a winch is unknown until it turns.
         """
         self._state[:, (MAY_N, TURNED_N, FREE_N, SLACK_m)] = 0.0
         self._state[:, FIRST_rad] = np.nan
@@ -442,8 +445,8 @@ class SlackTakeUp:
     def update(self, position_rad: FloatArray, pretension_N: FloatArray, share: float) -> bool:
         """Raise the winches' bounds of tension and set speeds, (n,); return whether it continues.
 
-        Cables that are reeled in pull with a share of what they may, which grows to 1; they pull
-        with more only if the bounds already allow it.
+        Cables that are reeled in pull with a share of their allowed tension, which grows to 1; they
+        pull harder only if the bounds already allow it.
         """
         self._dragged = self._take_up(position_rad, pretension_N, share)
         phases, furthest = int(self._phase.sum()), self._furthest
@@ -472,7 +475,7 @@ def _towards_exits(parts: PlatformParts) -> FloatArray:
 
 
 def _seen_alone(parts: PlatformParts) -> FloatArray:
-    """Return by how much one cable at most changes per m of change of all others, (n,).
+    """Return the largest change of each cable per m of change of all others, (n,).
 
     |J_i J_o^+| in the sum norm, with the rows J_o of the others, for motion of the platform at
     home; infinite if the others leave a direction free.
@@ -502,7 +505,7 @@ def _turned(parts: PlatformParts) -> tuple[FloatArray, float]:
 def _hanging_N(parts: PlatformParts, pretension_N: FloatArray) -> FloatArray:
     """Return the tensions (n,) below which reeling in mostly reduces sag, 0 for none.
 
-    From there to the pretension a straight cable comes in by its stretch at the pretension.
+    From there to the pretension a straight cable is reeled in by its stretch at the pretension.
     """
     tensions_N = _HANGING_SHARES * pretension_N
     lengths_m = np.array([parts.control.lengths_at_home(tension_N) for tension_N in tensions_N])
@@ -529,7 +532,7 @@ class Stillness:
         self._at_rad[:], self._still = position_rad, 0
 
     def lasts(self, position_rad: FloatArray, pulled: bool) -> bool:
-        """Take in a cycle; return whether they have stood still, and were pulled, for long enough.
+        """Process a cycle; return whether they have stood still, and were pulled, for long enough.
 
         A count in a cycle is a speed at which a winch pulls with less for a moment.
         """

@@ -1,4 +1,4 @@
-"""Checks by cables that are just tight whether a platform stands as `tighten` assumes."""
+"""Checks with just tight cables whether a platform stands as `tighten` assumes."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from cdpr_rt.programs.platform_program import PlatformParts, distance_m
 from cdpr_rt.refusal import CommandRefusal, RefusalCode
 
 _TURNED_MORE_rad = math.radians(30.0)
-"""A platform may stand turned by this much more than it turns in use."""
+"""Allowed rotation of a standing platform beyond that of targets."""
 _MOST_LOOKS = 200
 _CARRIED_SHARE = 0.8
 """Sum of the tensions over the weight below which the cables do not carry the platform."""
@@ -37,9 +37,9 @@ def bad_source(asked: Mapping[str, Any], why: str, *allowed: str) -> CommandRefu
 def source_refusal(
     parts: PlatformParts, source: str, asked: Mapping[str, Any]
 ) -> CommandRefusal | None:
-    """Return why not to take the lengths from a source, None for nothing.
+    """Return why lengths from this source cannot be used, None if they can.
 
-    After a fall or a release of the platform the source has to be `asked` for by name.
+    After a fall or a release of the platform the user must name the source (`asked`).
     """
     last = parts.last_stop
     if asked and parts.tight:
@@ -62,11 +62,12 @@ def source_refusal(
 
 
 def why_not_to_wind_in(parts: PlatformParts, length_m: FloatArray) -> str:
-    """Return why not to wind in the slack of a platform said to stand at home, "" for nothing.
+    """Return why the slack of a platform that should stand at home must not be wound in, "" if it
+    may.
 
-    Winding in alone may drag a platform along that lies elsewhere. If cables of length `length_m`
-    (n,) do not even reach home, within its tolerance and that of lengths, it is not at home,
-    however slack they are. One cable may have slipped, as in `why_not_at_home`.
+    Winding in may drag a platform that lies elsewhere. If cables of length `length_m` (n,) do not
+    even reach home, within its tolerance and that of lengths, it is not at home, however slack they
+    are. One cable may have slipped, as in `why_not_at_home`.
     """
     short_m = parts.control.lengths_at_home(np.zeros(length_m.size)) - length_m
     allowed_m = parts.platform.home_tolerance_m + parts.home_lengths_allowed_m
@@ -82,7 +83,8 @@ def why_not_to_wind_in(parts: PlatformParts, length_m: FloatArray) -> str:
 def why_not_at_home(
     parts: PlatformParts, length_m: FloatArray, tension_N: FloatArray, feedback: AxisFeedback
 ) -> str:
-    """Return why not to pull at a platform said to stand at home, "" for nothing.
+    """Return why the cables of a platform that should stand at home must not be tightened, "" if
+    they may.
 
     The cables' lengths `length_m` (n,), tracked since they were known, have to be those of home at
     `tension_N` (n,), each within the tolerance of home and that of lengths. One may be further off:
@@ -119,7 +121,7 @@ def _not_at_home(why: str) -> str:
 def why_not_to_pull(
     parts: PlatformParts, length_m: FloatArray, tension_N: FloatArray, feedback: AxisFeedback
 ) -> str:
-    """Return why not to pull at the platform where it is, "" for nothing.
+    """Return why the cables must not be tightened at the platform's present place, "" if they may.
 
     Its pose follows from the cables' lengths `length_m` (n,) at `tension_N` (n,), which have to
     agree. It must not be turned much, and the straight way home must be free of contact.
@@ -138,7 +140,7 @@ def why_not_to_pull(
 
 
 def would_move(parts: PlatformParts) -> str:
-    """Return the message that tight cables would move the platform from its place."""
+    """Return the message that tight cables would move the platform."""
     why = ", where tight cables would drag it"
     return _not_pulled(parts.control.estimated, parts.model.positions, why)
 
@@ -171,7 +173,7 @@ def rests_at_home(parts: PlatformParts, length_m: FloatArray, feedback: AxisFeed
 def why_not_to_hold(
     parts: PlatformParts, standing: StandingTensions, length_m: FloatArray, feedback: AxisFeedback
 ) -> str:
-    """Return why a hanging platform must not be held by its pose, "" for nothing.
+    """Return why a hanging platform must not be held by its pose, "" if it may.
 
     The pose follows from the cables' lengths `length_m` (n,), which have to agree. It must not be
     turned much, and tensions within their bounds have to carry the platform there.

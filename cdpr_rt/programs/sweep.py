@@ -43,7 +43,7 @@ class SweepProgram(AxisProgram):
         self._legs = self._leg = 0
 
     def start(self, feedback: AxisFeedback, setpoint: Setpoint, torque_Nm: FloatArray) -> None:
-        """Go on from the present set-point and torque; brakes until a sweep is commanded."""
+        """Continue from the last set-point and torque; brake until a sweep is commanded."""
         super().start(feedback, setpoint, torque_Nm)
         self._legs = self._leg = 0
 

@@ -78,12 +78,12 @@ def index_path(
 # Whether cables are tight while the force that presses a platform on its stand is released.
 
 _AGREE_m = 0.002
-"""By how much lengths just taken may disagree, in addition to stretch caused by friction."""
+"""Allowed disagreement of lengths just measured, in addition to stretch caused by friction."""
 _OFF_HOME_m = 0.006
-"""Distance from home, by lengths just taken there, up to which nothing is reported: friction on the
-stand causes up to 4 mm, which ends as winches turn."""
+"""Distance from home, by lengths just measured there, up to which nothing is reported: friction on
+the stand causes up to 4 mm, which disappears when winches turn."""
 _RUNS_IN_m_s = 0.2
-"""Speed that no winch reaches if its cable is tight while the platform stands."""
+"""Speed of a winch that is impossible with a tight cable while the platform stands."""
 _REMEDY = (
     "take up slack by hand, hold the platform, or choose tensions above the "
     "friction of the winches: see `cdpr robot show`"
@@ -91,7 +91,7 @@ _REMEDY = (
 
 
 class LettingGo:
-    """Detects slack cables that were taken for tight, by their speeds and lengths.
+    """Detects slack cables that were mistaken for tight ones, by their speeds and lengths.
 
     Lengths taken where the platform stands agree there, whatever the errors of the geometry. While
     tensions change to those that hold it, friction of the winches explains a small disagreement. A
@@ -155,8 +155,8 @@ class LettingGo:
 # The cables' lengths from a platform that stands at home with tight cables.
 
 _CAME_IN_m = 0.003
-"""By how much more than twice its stretch a tight cable may come in when pulled harder: the stretch
-that friction had prevented before."""
+"""Length beyond twice its stretch by which a tight cable may be reeled in when pulled harder: the
+stretch that friction had prevented before."""
 
 
 class LengthsAtHome:
@@ -189,9 +189,11 @@ class LengthsAtHome:
         self._rising_rad[:] = feedback.position_rad
 
     def slack_before(self, feedback: AxisFeedback, harder: float) -> str:
-        """Return which cable was not tight when angles were kept, now pulled `harder`, "" for none.
+        """Return which cable was not tight when angles were stored, now pulled `harder`, "" for
+        none.
 
-        A tight cable comes in by its stretch. Not needed if the lengths can contradict each other.
+        A tight cable is reeled in only by its stretch. Not needed if the lengths can contradict
+        each other.
         """
         parts, pull_N = self._parts, self._pretension_N
         if self._cable.size > parts.model.size:
@@ -279,7 +281,7 @@ class LengthSource:
         return parts.estimator.estimate.cable_length_m if known else None
 
     def take_last(self) -> None:
-        """Take the lengths of the last stop, which nobody can use then; forget those at home.
+        """Take the lengths of the last stop, which are then used up; forget those at home.
 
         They are used if they are the source.
         """
@@ -296,7 +298,8 @@ class LengthSource:
         return self.at_home.take(feedback)
 
     def lacks_index(self, feedback: AxisFeedback) -> BoolArray:
-        """Return which indices (n,) are missing that compensation or the last lengths need.
+        """Return which indices (n,) are missing although compensation or the last lengths need
+        them.
 
         The indices check the lengths of the last stop.
         """
@@ -336,7 +339,7 @@ _STAGES = (
     ("beyond", OVERSHOOT), ("lengths", 1.0),
 )  # fmt: skip
 _FITTED_FROM = 2
-"""Stage from which angles show what motors take up: the first rise takes winches along."""
+"""Stage from which angles show friction and cogging; during the first rise they also show slack."""
 
 
 class TightenProgram(PlatformProgram):
@@ -374,7 +377,7 @@ class TightenProgram(PlatformProgram):
         inertia = np.full(cable_m.size, parts.control.inertia_kg_m2)
         self._winches = WinchSpeedLoop(inertia, cable_m, parts.period_s)
         self._slack = SlackTakeUp(self._winches, parts, self._cable, self._home_pretension_N)
-        # a long cable comes in by its sag rather than by its stretch, above the friction
+        # a long cable is reeled in by its sag rather than by its stretch, above the friction
         shares = np.array([0.0, 0.5 * TAKE_UP_SHARE, OVERSHOOT])[:, None]
         lengths_m = [parts.control.lengths_at_home(N) for N in shares * self._pretension_N]
         self._once_tight_m = _ONCE_TIGHT_m + float(np.ptp(lengths_m, axis=0).max())
@@ -502,7 +505,7 @@ class TightenProgram(PlatformProgram):
     # -- taking up slack
 
     def _bound_tension(self, feedback: AxisFeedback) -> None:
-        """Make the winches pull with a share of the pretension, or as their slack ended.
+        """Make the winches pull with a share of the pretension, or as at the end of the take-up.
 
         After a stop the bounds decrease from their present values.
         """
@@ -609,14 +612,15 @@ class TightenProgram(PlatformProgram):
         self._hands_over = False
         self._parts.estimator.forget_lengths()
         speed_rad_s = self._parts.estimator.estimate.velocity_rad_s
-        # the torque on a winch that runs in holds nothing
+        # the torque of a winch that winds in fast holds nothing
         runs_in = speed_rad_s * self._cable < -TAKE_UP_m_s
         self._winches.begin(feedback, speed_rad_s, np.where(runs_in, 0.0, torque_Nm))
         np.maximum(-torque_Nm / self._cable, 0.0, out=self._winches.high_N)
         self._fail_if(slack)
 
     def _why_not_to_pull(self, feedback: AxisFeedback) -> str:
-        """Return why not to pull on; if lengths are known, set the tensions for that pose."""
+        """Return why the cables must not be pulled further; if lengths are known, set the tensions
+        for that pose."""
         parts, length_m = self._parts, self._source.before(self._source.name, feedback)
         if length_m is None:
             return ""

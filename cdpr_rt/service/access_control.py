@@ -45,7 +45,7 @@ class Tickets:
         return ticket
 
     def redeem(self, ticket: str) -> bool:
-        """Use a ticket up; return whether it was valid."""
+        """Use a ticket, which is then void; return whether it was valid."""
         until_s = self._until_s.pop(ticket, None)
         return until_s is not None and self._clock_s() < until_s
 
@@ -101,7 +101,7 @@ class AccessPolicy:
         """Return the policy of a listener on TCP at `host`.
 
         The listener also answers to this machine's names, except on loopback: there nobody needs
-        them, and on a network without DNS anybody may answer to them.
+        them, and on a network without DNS any machine may answer to them.
         """
         names = frozenset[str]() if loopback else names_of_this_machine()
         return cls(key, hosts=names | {host.lower()})
@@ -133,12 +133,12 @@ class AccessControl:
     """Checks the key, blocks web pages, and limits the rate and size of requests.
 
     A page open in a browser can send requests to this machine. Those carry the page's `Origin`; if
-    its name was redirected to this machine afterwards, they carry that name as `Host`.
-    No limit here is for stops, but the server's limit of TCP connections applies to all requests.
-    Clients of the Unix socket, which all belong to its user, share no rate limit.
-    `refused` is called for every client that is rejected. `holds_right` returns whether a token is
-    that of the client that may move: a flood from its own address must not block it. If a key is
-    required, one of `tickets` opens a WebSocket.
+    its name was redirected to this machine afterwards, they carry that name as `Host`. No limit
+    here applies to stops, but the server's limit of TCP connections applies to all requests.
+    Clients of the Unix socket, which all belong to its user, share no rate limit. `refused` is
+    called for every client that is rejected. `holds_right` returns whether a token is that of the
+    client that may move: a flood from its own address must not block it. If a key is required, one
+    of `tickets` opens a WebSocket.
     """
 
     def __init__(
@@ -160,7 +160,7 @@ class AccessControl:
         self._throttled = 0
         self._serving = Counter[str]()
         self._turns = asyncio.Lock()
-        """One request begins in each pass of the event loop, so a stop waits for one at most."""
+        """One request begins in each pass of the event loop, so a stop waits for at most one."""
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Let a request through, or answer it here."""
@@ -265,7 +265,7 @@ class AccessControl:
         return self._tickets.redeem(query.get("ticket", [""])[0])
 
     def _is_public(self, scope: Scope) -> bool:
-        """Whether everybody who can connect may request this, with or without the key."""
+        """Whether every client that can connect may request this, with or without the key."""
         kind, method, path = scope["type"], scope.get("method", ""), scope["path"]
         reads = kind == "http" and method in ("GET", "HEAD")
         if self._policy.key is not None:

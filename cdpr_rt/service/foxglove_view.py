@@ -151,7 +151,7 @@ class FoxgloveServer:
             viewer.subscriptions.clear()
 
     def is_wanted(self, topic: Topic) -> bool:
-        """Whether anybody has subscribed to it."""
+        """Whether a viewer has subscribed to it."""
         return any(topic.number in viewer.subscriptions for viewer in self._viewers)
 
     def send(self, topic: Topic, data: bytes, time_ns: int) -> None:

@@ -20,7 +20,7 @@ PROFILE: Final = "cdpr-rt"
 """The MCAP profile, which identifies a file as a recording."""
 _MAGIC: Final = b"\x89MCAP0\r\n"
 _CHUNK_BYTES: Final = 1 << 22
-"""Largest chunk after much has come in one go; readers hold a whole chunk in memory."""
+"""Largest chunk after a large amount of data; readers hold a whole chunk in memory."""
 _DATA_END: Final = struct.pack("<BQI", 0x0F, 4, 0)
 _FOOTER_WITHOUT_SUMMARY: Final = struct.pack("<BQQQI", 0x02, 20, 0, 0, 0)
 _END: Final = _DATA_END + _FOOTER_WITHOUT_SUMMARY + _MAGIC
@@ -28,7 +28,7 @@ _END: Final = _DATA_END + _FOOTER_WITHOUT_SUMMARY + _MAGIC
 
 
 class RecordingError(ControlError):
-    """The recording cannot go on; the message names the file and says why."""
+    """The recording cannot continue; the message names the file and says why."""
 
 
 class NameTakenError(RecordingError):

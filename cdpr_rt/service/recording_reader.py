@@ -1,4 +1,4 @@
-"""Reads recordings, whole or cut short: cycles as arrays, the other topics as tables of JSON."""
+"""Reads recordings, complete or truncated: cycles as arrays, the other topics as tables of JSON."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ _MOST_CHUNK_BYTES: Final = 1 << 24
 _MOST_RATIO: Final = 1000
 """Content of the chunks over the size of a file: rows that differ only in time reach 400."""
 _LEAST_BYTES: Final = 1 << 26
-"""Content that a file may hold whatever its size."""
+"""Content that a file of any size may hold."""
 _MOST_MESSAGE_BYTES: Final = 1 << 18
 """Bytes of a description, a status or an event."""
 _MOST_EVENTS: Final = 100_000
@@ -60,7 +60,7 @@ _MOST_EVENT_BYTES: Final = 1 << 24
 _MOST_STATES: Final = 64
 _MOST_TIMINGS: Final = 100_000
 _MOST_TIMING_BYTES: Final = 1 << 25
-"""Bytes of timings whose rows have not come yet."""
+"""Bytes of timings whose rows have not arrived yet."""
 _MOST_CHANNELS: Final = 64
 """Channels, and schemas: a recording has five of each."""
 _TYPES: Final = {"number": pa.float64(), "integer": pa.int64(), "boolean": pa.bool_()}
@@ -124,7 +124,7 @@ class RecordingReader:
             raise RecordingError(str(error)) from None
 
     def _chunks(self, file: IO[bytes]) -> Iterator[Chunk]:
-        """Yield the chunks; take in the records between them."""
+        """Yield the chunks; process the records between them."""
         stream = StreamReader(file, emit_chunks=True, record_size_limit=_MOST_CHUNK_BYTES)
         try:
             for record in stream.records:

@@ -217,7 +217,7 @@ class Service:
                 await asyncio.sleep(_TURN_S)
 
     async def command(self, do: str, client: str, **fields: Any) -> Reply:
-        """Send a command that anybody may give; raises the errors of `LoopLink.command`.
+        """Send a command that needs no right to move; raises the errors of `LoopLink.command`.
 
         If the loop has died, `shutdown` also ends the daemon: the drives have stopped without the
         loop.

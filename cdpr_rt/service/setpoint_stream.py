@@ -277,7 +277,7 @@ class StreamSessionManager:
     def _end(self) -> None:
         session, self._session = self._session, None
         if session is not None and session.own:
-            with contextlib.suppress(LeaseError):  # it has expired, or is another client's by now
+            with contextlib.suppress(LeaseError):  # it has expired, or another client has taken it
                 self._lease.release(session.token)
 
     def _renew_nonce(self) -> None:
@@ -392,7 +392,7 @@ class SetpointStream(Part):
             except BlockingIOError:
                 return count
             except OSError:
-                continue  # the result of an earlier answer: nobody listens there any more
+                continue  # the result of an earlier answer: nobody listens there now
             answer = self.sessions.receive(bytes(buffer[:size]), address, time.monotonic_ns())
             if answer is not None:
                 with contextlib.suppress(OSError):

@@ -108,7 +108,7 @@ class StreamClient:
         return True
 
     def receive(self) -> list[StreamAnswer]:
-        """Return the answers that have come, in their order of arrival; perhaps none."""
+        """Return the answers that have arrived, in order; perhaps none."""
         answers: list[StreamAnswer] = []
         while True:
             try:

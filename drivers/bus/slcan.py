@@ -248,7 +248,7 @@ def _open_port(url: BusUrl, baud: Any) -> Any:
         raise BusError(f"{url}: tty_baudrate {baud!r}: this port cannot be set to that") from None
     except serial.SerialException as error:
         reason = {
-            errno.ENOENT: f"there is not a serial port {path}; `ls /dev/serial/by-id` lists adapters",
+            errno.ENOENT: f"there is no serial port {path}; `ls /dev/serial/by-id` lists adapters",
             errno.ENODEV: f"there is no adapter at {path}",
             errno.ENXIO: f"there is no adapter at {path}",
             errno.EIO: f"the adapter at {path} is gone",

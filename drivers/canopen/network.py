@@ -366,10 +366,10 @@ class CanNetwork(BusMember):
         return False
 
     def release(self, node_id: int) -> None:
-        """Release a node: without power it need not monitor the master's heartbeat any more.
+        """Release a node: without power it no longer needs to monitor the master's heartbeat.
 
-        Otherwise it would report the missing heartbeat to the next master. Best effort; a node
-        that may still have power continues to monitor, so that it stops without a master.
+        Otherwise it would report the missing heartbeat to the next master. Best effort; a node that
+        may still have power continues to monitor, so that it stops without a master.
         """
         self._errors.release(node_id)
         try:

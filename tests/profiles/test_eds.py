@@ -239,7 +239,7 @@ def test_a_file_that_is_no_eds_is_rejected(tmp_path: Path, content: bytes, probl
 def test_a_missing_file_or_a_folder_is_rejected(tmp_path: Path) -> None:
     with pytest.raises(ProfileError, match="cannot be read: No such file"):
         read_eds(tmp_path / "nothing.eds")
-    with pytest.raises(ProfileError, match="is no regular file"):
+    with pytest.raises(ProfileError, match="is not a regular file"):
         load_dictionary(tmp_path)
 
 

@@ -161,7 +161,7 @@ def test_error_for_invalid_toml_names_the_line(content: bytes, part: str, tmp_pa
 def test_a_missing_file_and_a_folder_are_rejected(tmp_path: Path):
     with pytest.raises(ProfileError, match="cannot be read: No such file"):
         cdpr_profiles.load_motor(tmp_path / "none.toml")
-    with pytest.raises(ProfileError, match="is no regular file"):
+    with pytest.raises(ProfileError, match="is not a regular file"):
         cdpr_profiles.load_motor(tmp_path)
 
 

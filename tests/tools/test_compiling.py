@@ -96,7 +96,7 @@ def test_a_long_compilation_is_reported_repeatedly(
     assert first == f"{NOTICE} the test once for this machine; this may take minutes ..."
     assert further
     for line in further:
-        assert re.fullmatch(rf"{NOTICE} the test goes on: \d+ kernels so far \.\.\.", line)
+        assert re.fullmatch(rf"{NOTICE} the test continues: \d+ kernels so far \.\.\.", line)
 
 
 LISTENED = """
@@ -108,7 +108,7 @@ announce_compiling("the test")
 with compiling_notices_to(heard.append):
     for _ in range(2):
         logging.getLogger("cdpr.compiling").info("a kernel")
-    pass_on("compiling the drives goes on: 5 kernels so far ...\\n")
+    pass_on("compiling the drives continues: 5 kernels so far ...\\n")
 logging.getLogger("cdpr.compiling").info("a kernel")
 print(*heard, sep="\\n")
 """
@@ -119,11 +119,11 @@ def test_a_listener_gets_each_kernel_and_forwarded_progress() -> None:
         [sys.executable, "-c", LISTENED], capture_output=True, text=True, check=True
     )
     assert done.stdout.splitlines() == [
-        f"{NOTICE} the test goes on: 1 kernels so far",
-        f"{NOTICE} the test goes on: 2 kernels so far",
-        f"{NOTICE} the drives goes on: 5 kernels so far",
+        f"{NOTICE} the test continues: 1 kernels so far",
+        f"{NOTICE} the test continues: 2 kernels so far",
+        f"{NOTICE} the drives continues: 5 kernels so far",
     ]
-    assert f"{NOTICE} the drives goes on: 5 kernels so far ...\n" in done.stderr
+    assert f"{NOTICE} the drives continues: 5 kernels so far ...\n" in done.stderr
 
 
 TASKS = """

@@ -122,4 +122,4 @@ def test_a_pipe_instead_of_a_file_is_rejected_immediately(
     make_pipe(path)
     done = cdpr_here(*command, path)
     assert done.returncode in (1, 2)
-    assert "is no regular file" in done.stderr
+    assert "is not a regular file" in done.stderr

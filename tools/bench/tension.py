@@ -109,7 +109,7 @@ def _osqp(model: PlatformModel, W: FloatArray) -> Solve:
 
 def _daqp(model: PlatformModel) -> Solve:
     """Return DAQP with its default settings."""
-    import daqp  # noqa: PLC0415  # not everybody has it
+    import daqp  # noqa: PLC0415  # an optional package
 
     n, d = model.kinematics.n, model.size
     scale, b = model.wrench_scale[:, None], -model.weight() / model.wrench_scale

@@ -139,7 +139,7 @@ class StoredRun:
                 "remove it"
             )
         try:
-            # remove the settings first: if they exist, --resume expects data to go on with
+            # remove the settings first: if they exist, --resume expects data to continue with
             for name in (SETTINGS, DATA, OUTSIDE, COUNTED):
                 (folder / name).unlink(missing_ok=True)
             for image in (folder / IMAGES).glob("pose-[0-9][0-9][0-9][0-9].png"):
@@ -209,8 +209,8 @@ def measure(
 ) -> CalibrationData:
     """Measure the missing poses on a separate simulator; return all data.
 
-    All readings are kept, even after an error, and the error says how to go on. Raises the errors
-    of the robot and its camera, and WorkFailedError if the user stops the run.
+    All readings are kept, even after an error, and the error says how to continue. Raises the
+    errors of the robot and its camera, and WorkFailedError if the user stops the run.
     """
     most, listed = settings.poses or MOST_POSES, kept.remaining(settings.places)
     if listed is not None:  # home is read at each start

@@ -95,7 +95,7 @@ def _perform_session(settings: ExperimentSettings, folder: Path, name: str) -> t
     try:
         run_session(settings, settings.sessions()[name], session)
         points_of_session(session)
-    except Exception as error:  # the other sessions go on after any error
+    except Exception as error:  # the other sessions continue after any error
         return name, str(error) or repr(error)
     (session / _DONE).touch()
     return name, ""

@@ -44,7 +44,7 @@ _SHRUNK = np.linspace(1.0, 0.5, 26)
 def answers_of(path: Path, given: Mapping[str, str], ask: Ask) -> Answers:
     """Return all answers about the robot that `path` will describe.
 
-    Answers in `given` are not asked for; raises BadInputError if one of them is invalid.
+    Answers in `given` are not asked again; raises BadInputError if one of them is invalid.
     """
     first = kind_question()
     answers: Answers = {first.key: _answer(first, {}, given, ask)}

@@ -76,8 +76,8 @@ def lines(robot: Robot, settings: Search, found: dict[str, Any]) -> list[str]:
     if found["reaches_sides"]:
         sides = ", ".join(found["reaches_sides"])
         text.append(
-            f"mind       it reaches sides of what was searched ({sides}) and may go on beyond: "
-            "--low, --high"
+            f"mind       it reaches the sides of the searched box ({sides}) and may extend "
+            "beyond them: use --low, --high"
         )
     return text
 

@@ -171,7 +171,7 @@ class TeleopSession:
         elif now_s - self._fine_s > (_TAKEN_AWAY_S if self.leading else _GREET_S):
             standing = None if self.answer is None else self.answer.standing
             why = "" if standing is None else _WHY_NOT.get(standing, "")
-            since = " any more" if self.leading else ""
+            since = " any longer" if self.leading else ""
             return End(why or f"the robot does not follow the stream{since}", failed=True)
         return None
 

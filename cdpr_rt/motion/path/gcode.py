@@ -25,7 +25,8 @@ from cdpr_rt.motion.path.gcode_words import Block, Findings, blocks, require_ign
 
 _OFF_m: Final = 2e-5
 _OFF_SHARE: Final = 2e-3
-"""Largest distance of an arc's end from its circle by rounding in the file; the larger counts."""
+"""Largest distance of an arc's end from its circle, due to rounding in the file; the larger value
+applies."""
 _NOTHING_m: Final = 1e-9
 _LARGEST_m: Final = 1000.0
 

@@ -199,7 +199,7 @@ MOST_NODES: Final = 1_000_000
 _PLACES: Final = (0.25, 0.5, 0.75, 1.0)
 """Shares of an interval at which the path is compared with the file."""
 _MOST_CUTS: Final = 12
-"""How often the cut of a corner that leaves its tolerance is halved."""
+"""Largest number of times that the cut of a corner outside its tolerance is halved."""
 _AT_ONCE: Final = 50_000
 _AFTER_ALL: Final = 1e9
 """Number of a corner's nodes: after all nodes of the piece."""

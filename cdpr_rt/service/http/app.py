@@ -243,10 +243,11 @@ def _kind(schema: dict[str, Any]) -> str:
 
 _ABOUT = """State, motion and figures of one robot's control loop.
 
-Reading needs nothing but the connection. `enable`, `program` and `set` need the right to move:
+Reading needs only the connection. `enable`, `program` and `set` need the right to move:
 `POST /control` gives it to one client at a time, the token goes into the header `X-Control-Token`.
-`hold`, `disable` and `shutdown` are for everybody let in; no limit of requests is for them. With
-too many connections over TCP any request gets status 503 and plain text: then send the stop again.
+`hold`, `disable` and `shutdown` are open to every client with access, without a limit of requests.
+With too many connections over TCP any request gets status 503 and plain text: then send the stop
+again.
 Clients that ask at the same time get one answer. Commands that still wait do not start.
 """
 _STATUS: Final[dict[type[Exception], HTTPStatus]] = {
@@ -475,7 +476,7 @@ def _add_control(app: FastAPI, service: Service) -> None:
 
 
 _OPEN_COMMANDS: Final = {
-    "configure": "Boot the drives; no power.",
+    "configure": "Boot the drives; the power stays off.",
     "check": "Run the cycle without power and see whether all drives answer: inactive to ready.",
     "acknowledge": "Acknowledge a fault whose cause is gone; the power stays off.",
     "hold": "Stop the motion and hold the position with power; every client with access "

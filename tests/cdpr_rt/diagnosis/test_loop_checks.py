@@ -76,7 +76,7 @@ def test_a_stable_but_weakly_damped_pose_is_doubtful() -> None:
     # decay to 2 %; the damping has one digit
     assert lasts_s * frequency_Hz * damping == pytest.approx(100 * math.log(50) / math.tau, rel=0.2)
     assert re.search(
-        r"^sync_period_s: value 0\.004; the loop relies on the assumed damping of the cables .*damping_s "
+        r"^sync_period_s: value 0\.004; the loop relies on the assumed damping .*damping_s "
         r".*: with 0\.5 ms a mode at [34]\d Hz grows with the platform at \(.*\) m; ",
         leans,
     )

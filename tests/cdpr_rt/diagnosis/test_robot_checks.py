@@ -254,7 +254,7 @@ def test_pairs_of_cables_may_share_exit_points(tmp_path: Path) -> None:
         ([("mass_kg = 2.0", "mass_kg = 15.0")], "platform.workspace_min_m", "up to 3 kg is", True),
         ([("[0.0, 1.3]", "[0.5, 0.3]")], "platform.home_m", "farther inside", True),
         ([("[0.0, 1.3]", "[0.6, -0.5]")], "platform.home_m", "only a place", True),
-        ([("[-0.6, 1.4]", "[-0.6, 0.9]")], "platform.workspace_min_m", "they would be in all", False),
+        ([("[-0.6, 1.4]", "[-0.6, 0.9]")], "platform.workspace_min_m", "they would be in", False),
         ([("n_m_s2 = 2.0", "n_m_s2 = 50")], "platform.home_m", "acceleration_m_s2 up to", True),
         ([("torque_Nm = 4.5", "torque_Nm = 2.5")], "limits.tension_max_N", "up to 96 N", True),
         ([("speed_m_s = 0.5", "speed_m_s = 5")], "platform.speed_m_s", "allowed: up to 1.9", True),

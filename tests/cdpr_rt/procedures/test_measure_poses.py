@@ -132,8 +132,8 @@ def test_a_platform_stopped_on_its_detour_is_measured_where_it_stands() -> None:
     assert [reading.target[0] for reading in measured.readings] == [1, 2, 1.25, 4]
     assert measured.tried == [(3.0, 2.0)] and not measured.refused
     assert notes.lines == [
-        "pose 3, at 3.000, 2.000, is read where the platform stands: on its way through 0.500, 2.000 "
-        "700 mm off after 12 s: no way on"
+        "pose 3, at 3.000, 2.000, is read where the platform stands: on its way through "
+        "0.500, 2.000 700 mm off after 12 s: no way on"
     ]
     shaky = Operator(behind=3.0, held_on_way_to=0.5, shaky=1.25)
     measured, _ = collected()

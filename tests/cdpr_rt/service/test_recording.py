@@ -216,7 +216,7 @@ def test_a_file_that_is_no_recording_is_reported(tmp_path: Path) -> None:
         with pytest.raises(RecordingError, match=r"other\.mcap: not a recording"):
             list(RecordingReader(other).cycles())
     os.mkfifo(tmp_path / "pipe.mcap")
-    with pytest.raises(RecordingError, match=r"pipe\.mcap: is no regular file"):
+    with pytest.raises(RecordingError, match=r"pipe\.mcap: is not a regular file"):
         list(RecordingReader(tmp_path / "pipe.mcap").cycles())
     with pytest.raises(RecordingError, match="No such file"):
         list(RecordingReader(tmp_path / "missing.mcap").cycles())

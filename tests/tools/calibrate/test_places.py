@@ -92,7 +92,7 @@ def test_a_duplicate_pose_is_rejected(tmp_path: Path) -> None:
     listed(path)
     lines = path.read_text().splitlines()
     path.write_text("\n".join([*lines, lines[5]]) + "\n")
-    with pytest.raises(InvalidRequestError, match=r"poses\.csv:22: is there before"):
+    with pytest.raises(InvalidRequestError, match=r"poses\.csv:22: occurs twice"):
         poses_wanted(ROBOT, str(path))
 
 

@@ -88,7 +88,7 @@ def test_intrinsics_of_a_different_lens_are_rejected_with_the_reason(
         "markers", "map", photos, "--size-mm", "150", "--camera", tmp_path / "small.toml"
     )
     assert done.returncode == 2
-    assert "has 480 x 384 pixels, the intrinsics are for 640 x 384" in done.stderr
+    assert "has 480 x 384 pixels, but the intrinsics are for 640 x 384" in done.stderr
 
 
 def test_mirrored_images_are_reported(photos: Path, tmp_path: Path) -> None:
@@ -108,7 +108,7 @@ def test_mirrored_images_are_reported(photos: Path, tmp_path: Path) -> None:
         (("map", "{photos}"), "--size-mm is missing"),
         (("map", "{photos}", "--size-mm", "150", "--dictionary", "4x4"), "did you mean"),
         (("map", "{photos}", "--size-mm", "150", "--reference", "77"), "is not in the map"),
-        (("map", "{photos}", "--size-mm", "150", "--dictionary", "6X6_50"), "some of 4X4_50"),
+        (("map", "{photos}", "--size-mm", "150", "--dictionary", "6X6_50"), "markers of 4X4_50"),
         (("map", "/nowhere", "--size-mm", "150"), "a folder with images"),
         (("print", "0-3", "--size-mm", "190"), "150 mm is the largest"),
         (("print", "3-x", "--size-mm", "100"), "allowed: such as 0-39"),

@@ -20,5 +20,5 @@ def test_motors_to_commission_are_selected_by_name(tmp_path: Path) -> None:
     for names, every in (((), False), (("lower",), True)):
         with pytest.raises(BadInputError, match="'upper left', 'upper right', 'lower'"):
             chosen_axes(robot, names, every, tmp_path)
-    with pytest.raises(BadInputError, match=r"--axis left: no axis of .*'upper left'"):
+    with pytest.raises(BadInputError, match=r"--axis left: not an axis of .*'upper left'"):
         chosen_axes(robot, ("left",), False, tmp_path)

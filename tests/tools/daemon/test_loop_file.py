@@ -139,7 +139,7 @@ def test_a_file_that_no_daemon_wrote_is_rejected_with_a_reason(
 def test_a_pipe_or_link_instead_of_a_loop_file_is_rejected_immediately(tmp_path: Path) -> None:
     path, other = tmp_path / "r.loop", tmp_path / "other"
     os.mkfifo(path)
-    assert "is no regular file" in stopped(path).text
+    assert "is not a regular file" in stopped(path).text
     path.unlink()
     other.write_text(json.dumps(named(os.getpid())))
     path.symlink_to(other)

@@ -58,7 +58,7 @@ def test_a_command_waits_for_a_daemon_whose_launcher_runs(path: Path, named: boo
     with LauncherLock(path), out.server:
         await_socket("mine" if named else None, None if named else path, out)
     assert out.told == [
-        "the daemon is still starting: its simulated drives and its processes come up ..."
+        "the daemon is still starting: its simulated drives and processes are starting ..."
     ]
     assert not path.with_suffix(LAUNCHER_SUFFIX).exists()
 

@@ -47,7 +47,7 @@ def test_a_file_is_mirrored_then_turned() -> None:
 def test_options_of_gcode_are_rejected_with_way_points() -> None:
     for options in (PathOptions("1 2 3"), PathOptions(scale=2.0), PathOptions(z_mm=1.0)):
         options.require_use(Path("part.nc"))
-        with pytest.raises(BadInputError, match="allowed: with G-code; part"):
+        with pytest.raises(BadInputError, match="allowed only with G-code; part"):
             options.require_use(Path("part.csv"))
     PathOptions(blend_mm=5.0).require_use(Path("part.csv"))
 
@@ -63,7 +63,10 @@ def test_a_file_of_any_name_gets_a_name_that_the_daemon_accepts(tmp_path: Path) 
 @pytest.mark.parametrize(
     ("status", "told"),
     [
-        ({"state": "ready"}, "not in state ready; allowed in active; `cdpr enable` gives power"),
+        (
+            {"state": "ready"},
+            "not in state ready; allowed in active; `cdpr enable` switches the power on",
+        ),
         ({"state": "fault"}, "not in state fault; .* `cdpr ack` acknowledges it"),
         ({"state": "active", "program_progress": {"tight": False}}, "`cdpr tighten` first"),
     ],

@@ -68,7 +68,7 @@ def test_a_motion_ended_by_an_emergency_stop_is_reported_as_such(tmp_path: Path)
     programs = ["idle", "pose", "path"]
     path = record(tmp_path, rows, said=said, axes=LEFT_RIGHT, programs=programs)
     told = shown(path)
-    assert f"path: cut short: {ESTOP}; then left" in told and "pose: ended, left" in told
+    assert f"path: interrupted: {ESTOP}; then left" in told and "pose: ended, left" in told
     assert [text for _, text in faults(path)] == [f"state fault: {ESTOP}"]
 
 
@@ -92,7 +92,7 @@ def test_a_lowering_caused_by_a_stop_is_reported_as_ended(tmp_path: Path) -> Non
     rows["reaction"][300:320] = Reaction.CONTROLLED_STOP
     rows["state"][803:] = LoopState.FAULT  # program idle runs in the last cycles with power
     told = shown(record(tmp_path, rows, axes=LEFT_RIGHT, programs=["idle", "pose", "lower"]))
-    assert "pose: cut short: a fault; then left" in told
+    assert "pose: interrupted: a fault; then left" in told
     assert "lower: ended, left" in told
 
 
@@ -161,7 +161,7 @@ def test_a_recording_ended_by_a_killed_loop_is_reported_as_such(tmp_path: Path) 
     path, ((end_s, told),) = ends_active(tmp_path, "dead")
     assert end_s == pytest.approx(0.999) and "while the robot was active" in told
     assert f"{told}\n" in shown(path)
-    assert "path: cut short: the control loop ended without a" in shown(path)
+    assert "path: interrupted: the control loop ended without a" in shown(path)
     selection = Selection([path], FIELDS, until_s=0.5)
     assert end_while_active(selection, selection.columns()) == []
     other, told_of_it = ends_active(tmp_path / "other", "active")
@@ -180,6 +180,6 @@ def test_a_truncated_recording_is_reported_unless_another_file_continues_it(
 ) -> None:
     path, _ = ends_active(tmp_path, "active")
     path.write_bytes(path.read_bytes()[:-100])
-    assert "ends while the robot was active: its writer was ended, or still writes" in shown(path)
+    assert "ends while the robot was active: its writer was killed, or still writes" in shown(path)
     shutil.copy(path, path.with_name(path.name.replace("-001", "-002")))
     assert "while the robot was active" not in shown(path)

@@ -133,7 +133,7 @@ def test_invalid_scripts_are_rejected(tmp_path: Path) -> None:
     for name, told in (
         ("binary", "binary: is not UTF-8 text"),
         ("missing", "missing: cannot be read: No such file"),
-        (".", "is no regular file"),
+        (".", "is not a regular file"),
     ):
         with pytest.raises(BadInputError, match=f"--script .*{told}"):
             read_script(tmp_path / name)

@@ -125,7 +125,7 @@ def test_intrinsics_from_a_board_are_true_within_their_uncertainty() -> None:
         (
             Board(6, 9),
             False,
-            "no board of 6 columns and 9 rows has this arrangement: were columns and rows exchanged",
+            "columns and 9 rows has this arrangement: were columns and rows exchanged",
         ),
         (Board(), True, "markers read as mirror images: is the board, or the image, so"),
     ],
