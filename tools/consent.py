@@ -16,7 +16,7 @@ def require_consent(question: str, yes: bool, undone: str = "nothing was energis
     if yes:
         return
     try:
-        asked = fold(f"{printable(question)} Go on?", width_of(sys.stderr))
+        asked = fold(f"{printable(question)} Continue?", width_of(sys.stderr))
         agreed = typer.confirm(asked, err=True)
     except typer.Abort:  # nobody can answer
         agreed = False

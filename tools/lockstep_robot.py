@@ -439,7 +439,7 @@ class LockstepRobot:
         self._turn_until(done_or_lost, within_s, what)
         if not done():
             self._turn_until(lambda: not self.loop.busy, within_s, "the drives' power off")
-            raise Error(f"{what}: {self.loop.life.reason or 'the power was taken'}")
+            raise Error(f"{what}: {self.loop.life.reason or 'the power was removed'}")
 
     def _turn_until(self, done: Callable[[], bool], within_s: float, what: str) -> None:
         clock = self.machine.clock  # bus time also passes without cycles, as in a boot

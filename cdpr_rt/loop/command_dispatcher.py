@@ -132,7 +132,7 @@ class CommandDispatcher:
         except ControlError as error:
             answer(refusal_of(error) or str(error))
             return
-        except Exception as error:  # whatever a command contains, the loop goes on
+        except Exception as error:  # whatever a command contains, the loop continues
             answer(f"{do}: {type(error).__name__}: {error}")
             return
         deferred = self._deferred

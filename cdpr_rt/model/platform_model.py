@@ -200,9 +200,9 @@ class PlatformModel:
     ) -> tuple[FloatArray, BoolArray]:
         """Return the tensions (m, n) that the file's distribution plans, and whether they carry.
 
-        At poses (m, 4, 3), against wrenches (m, d) of all but the cables about the centre of mass,
-        without the cables' weight; within the limits of the motors' torque, and the reserve. They
-        are those of `own` if it is given, and of the built-in method otherwise. Raises
+        They balance the wrenches (m, d) about the centre of mass at poses (m, 4, 3), without those
+        of the cables and their weight. They keep the limits of the motors' torque and the reserve.
+        They are those of `own` if it is given, and of the built-in method otherwise. Raises
         TensionDistributionError.
         """
         low, high = self.low_N + self.reserve_N, self.torque_limited_N - self.reserve_N

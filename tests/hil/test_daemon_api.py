@@ -166,7 +166,7 @@ def test_closing_a_daemon_whose_loop_died_is_an_error(
     robot = cdpr.run(write_robot(tmp_path), bus="simbus:", record=tmp_path)
     robot.enable()
     os.kill(LoopFile.read(LoopFile.beside(find_sockets()[0])).pid, signal.SIGKILL)
-    with pytest.raises(cdpr.Error, match="the loop has ended unexpectedly"):
+    with pytest.raises(cdpr.Error, match="the loop has died"):
         robot.close()
     assert not find_sockets()
 

@@ -118,7 +118,7 @@ def test_a_controller_runs_to_its_end_and_then_holds(quick: RealDaemon, terminal
             2,
             "middle=3: allowed: AXIS=deg/s of 'left', 'right', such as left=20",
         ),
-        (("jog", "left=fast"), 2, "'fast' is no number of deg/s"),
+        (("jog", "left=fast"), 2, "'fast' is not a number of deg/s"),
         (("jog", "left=nan"), 2, "left=nan: allowed: a finite number"),
         (("jog", "left=1e6"), 2, "left=1e+06: allowed: -4749 to 4749 deg/s"),
         (("move", "left=1e9"), 2, "left=1e+09: allowed: -573000 to 573000 deg"),

@@ -82,9 +82,9 @@ def pause(daemon: RealDaemon, folder: Path) -> None:
         assert cdpr("hold", *daemon.at).returncode == 0
         said = path.communicate()[0]
     assert path.returncode == 0
-    assert re.search(r"path part.nc left at \d+ %, line \d+, paused by .*; " + HELD, said)
+    assert re.search(r"path part.nc stopped at \d+ %, line \d+, paused by .*; " + HELD, said)
     shown = cdpr("status", *daemon.at).stdout
-    assert re.search(r"path part.nc left at \d+ %, line \d+; " + HELD, shown)
+    assert re.search(r"path part.nc stopped at \d+ %, line \d+; " + HELD, shown)
 
 
 def lead(daemon: RealDaemon) -> None:

@@ -115,14 +115,14 @@ def test_a_killed_loop_is_reported_and_the_watchdog_is_not_fed(
         refused = cdpr(command, *daemon.at)
         assert refused.returncode == 1
         assert (
-            "killed by signal 9; its drives had been told to have no power; next: `cdpr stop`"
+            "killed by signal 9; its drives had been commanded to switch off; next: `cdpr stop`"
             in refused.stderr
         )
     shown = cdpr("status", *daemon.at).stdout
     assert "next: `cdpr stop`" in shown and "the following is that old" in shown
     stopped = cdpr("stop", *daemon.at)  # ends the remaining processes
     assert stopped.returncode == 1
-    assert "its loop had died: its drives had been told to have no power" in stopped.stderr
+    assert "its loop had died: its drives had been commanded to switch off" in stopped.stderr
     assert daemon.process.wait(60.0) == 1
     nothing = cdpr("stop", *daemon.at)
     assert (nothing.returncode, nothing.stdout) == (0, "nothing runs\n")

@@ -59,7 +59,7 @@ def test_ctrl_c_stops_the_motor_and_cuts_power(daemon: RealDaemon, tmp_path: Pat
 
 
 @pytest.mark.parametrize(
-    ("axis", "text"), [("middle", "allowed: left, right"), ("left", "records nothing")]
+    ("axis", "text"), [("middle", "allowed: left, right"), ("left", "does not record")]
 )
 def test_an_impossible_sweep_is_reported_before_power_is_on(
     daemon: RealDaemon, tmp_path: Path, axis: str, text: str

@@ -64,7 +64,7 @@ def fallen(
 def test_tighten_does_not_pull_at_a_platform_that_has_turned_over(folder: Path) -> None:
     with fallen(folder, [-0.45, -0.3, 1.7], [0.18, 0.18, 0.0]) as robot:
         assert turned_deg(robot) > 60.0
-        with pytest.raises(Refused, match="it has come down, may have turned over"):
+        with pytest.raises(Refused, match="It has come down, may have turned over"):
             robot.program("tighten")
         since = robot.cycle + robot.machine.sync_offset
         with pytest.raises(Refused, match=r"\d cables are up to \d+ mm too short"):
@@ -128,7 +128,7 @@ def test_tighten_from_lengths_keeps_a_suspended_platform_in_place(
         length_m = known.estimate.cable_length_m.copy()
         slipped_m = np.eye(8)[0] * 0.3
         known.set_lengths(known.position_rad, length_m + slipped_m)
-        with pytest.raises(Refused, match=r"disagree by .* held as it is; lower it"):
+        with pytest.raises(Refused, match=r"disagree by .* each winch holds its cable; lower"):
             robot.program("tighten", **{"from": "lengths"})
         robot.run(0.5)
         assert np.ravel(robot.truth()["position_m"]) == pytest.approx(position_m, abs=0.01)
@@ -152,5 +152,5 @@ def test_tighten_is_rejected_after_all_drives_lost_power_together(folder: Path) 
         assert robot.state is LoopState.FAULT
         robot.command("acknowledge")
         robot.enable()
-        with pytest.raises(Refused, match="it has come down, may have turned over"):
+        with pytest.raises(Refused, match="It has come down, may have turned over"):
             robot.program("tighten")

@@ -489,7 +489,7 @@ def test_cable_lengths_that_contradict_the_index_are_neither_used_nor_stored(
         elsewhere = last.lengths.cable_at_index_m + turned_m
         last.lengths = replace(last.lengths, cable_at_index_m=elsewhere)
         robot.enable()
-        told = "upper right: its motor's index is 20.* mm from where the last stop has it"
+        told = "upper right: its motor's index is 20.* mm from its place at the last stop"
         with pytest.raises(Error, match=told):
             robot.carry_out("tighten", 30.0, **{"from": "last"})
         robot.run(3.0)  # the robot is at rest and has not carried out the command

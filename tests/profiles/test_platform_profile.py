@@ -157,7 +157,7 @@ HOME = "home_m = [0.0, 0.0, 0.5]"
          "platform.tension_distribution", "'closed-form'"),
         (WALL, "mass_kg", 'tension_distribution = "os:system"\nmass_kg',
          "platform.tension_distribution", "'FILE.py:NAME'"),
-        (CAMERA, "[0.0, 0.0, 0.0]", "[0.1, 0.0, 0.0]", "axes", "all anchor points alike"),
+        (CAMERA, "[0.0, 0.0, 0.0]", "[0.1, 0.0, 0.0]", "axes", "all anchor points equal"),
         (CAMERA, "mass_kg", 'controlled = ["x", "y", "z", "rz"]\nmass_kg', "platform.controlled",
          "no angle if all anchor points are equal"),
         (CAMERA, "mass_kg", "workspace_angle_rad = 0.1\nmass_kg", "platform.workspace_angle_rad",

@@ -189,4 +189,4 @@ def test_doctor_fails_without_a_cache_folder_only_after_compiling_a_kernel(
     )  # fmt: skip
     assert (done.returncode, done.stdout.split()) == (1, ["True", "False"]), done.stderr
     error = done.stderr.splitlines()[-1]
-    assert "/proc/nowhere/own; set NUMBA_CACHE_DIR to a folder that can be written" in error
+    assert "/proc/nowhere/own are not writable; set NUMBA_CACHE_DIR to a writable folder" in error

@@ -104,7 +104,7 @@ def _write(file: Path, folder: Path, stem: str, made: Proposal) -> tuple[Path, P
         writes[copy] = read_bytes(file, MOST_EDS_BYTES)
     for path in writes:
         if path.exists():
-            raise BadInputError(f"{path}: is there already; choose another --name or --out")
+            raise BadInputError(f"{path}: already exists; choose another --name or --out")
     _check(file, made)
     with os_error_as(WorkFailedError, f"{folder}: cannot be written"):
         folder.mkdir(parents=True, exist_ok=True)
@@ -281,7 +281,7 @@ _TOPICS = {
     ),
 }
 _ASSUMPTIONS = {
-    "torque_unit": ("per_mille_of_rated", "as CiA 402-2 has it for 6071h"),
+    "torque_unit": ("per_mille_of_rated", "as CiA 402-2 defines it for 6071h"),
     "rated_torque_unit": ("mNm", "as CiA 402-2 has it; the boot compares 6076h with the motor"),
     "velocity_unit": ("counts_per_s", "as CiA 402-2 has it without scaling"),
     "acceleration_unit": ("counts_per_s2", "as CiA 402-2 has it without scaling"),

@@ -227,8 +227,9 @@ def _none_found(master: LssMaster, kind: DriveProfile | None) -> str:
         )
     if kind is None and master.has_unconfigured():
         return (
-            "no device found: one without a node id is there, but takes no part in the search: "
-            "give its --profile and --serial, or connect it alone and use --alone"
+            "no device found: there is a device without a node id, but it does not take "
+            "part in the search: give its --profile and --serial, or connect it alone and "
+            "use --alone"
         )
     looked_for = "" if kind is None else f" of vendor {kind.vendor_id:08X}h"
     return (

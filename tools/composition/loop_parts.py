@@ -66,7 +66,7 @@ def loop_parts(
 ) -> LoopParts:
     """Return the parts that the loop of `robot` runs within `limits`, compiled and ready.
 
-    `learns`: it learns cogging and friction of a platform's uncommissioned motors in motion.
+    With `learns` it learns cogging and friction of a platform's uncommissioned motors in motion.
     Code of the user's `own` replaces built-in parts of the platform's control, as does the tension
     distribution that the robot's file names, and adds programs, as do installed packages. Raises
     ProfileError if the file's code must not run, and ControlError for unsuitable code.

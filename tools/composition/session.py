@@ -207,7 +207,7 @@ class Session(Operator):
         return self.network.url.is_simulated
 
     def bus_record(self) -> dict[str, Any]:
-        """Return the data about the first axis' bus for reports."""
+        """Return data about the first axis' bus for reports."""
         status = self.machine.simulated_status().get(self.robot.axes[0].bus, {})
         known = {key: status[key] for key in ("load", "peak_cycle_load", "overruns") if status}
         return {"url": str(self.network.url), "missed": self.device.missed, **known}

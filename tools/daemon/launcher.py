@@ -225,7 +225,7 @@ class Launcher:
     def _watch_loop(self) -> None:
         if self._loop.end:
             if self._up and not self.reason and self._loop.process.returncode not in _ON_COMMAND:
-                self.reason = f"the loop has ended unexpectedly: {self._loop.end}"
+                self.reason = f"the loop has died: {self._loop.end}"
                 self._block.write_status(
                     {
                         **self._status(),

@@ -183,9 +183,9 @@ def lines(result: dict[str, Any]) -> list[str]:
     ]  # fmt: skip
     if alone is not None:
         shown += [
-            "Where the errors come from, 3 sigma, mm: judged = the error that the operator was "
-            "content with; hand, robot = the motion of either from then on; beside it the same "
-            "operator's total with a robot without error, and the distance from the set-point",
+            "Where the errors come from, 3 sigma, mm: judged = the error that the operator "
+            "accepted; hand, robot = their motion after that; then the same operator's total "
+            "with an ideal robot, and the distance from the set-point",
             _table(_xy("judged", "hand", "robot", "total", "perfect", "off"), rows, [
                 [*(value for part in row["parts_three_sigma_mm"].values() for value in part),
                  *row["three_sigma_mm"], *ideal["three_sigma_mm"],

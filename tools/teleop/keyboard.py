@@ -171,7 +171,7 @@ class Keyboard:
         if data:
             self._keys.press(data.decode("utf-8", "ignore"), passed_s)
         else:
-            self._gone = "the terminal is gone"
+            self._gone = "the terminal was closed"
 
     def close(self) -> None:
         """Restore the terminal's settings."""

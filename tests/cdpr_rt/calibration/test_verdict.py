@@ -172,7 +172,7 @@ def test_changes_that_noise_explains_are_not_significant(robot: str) -> None:
         assert outcome.good, outcome.objections()
         chances.append(outcome.change.chance)
         if not outcome.told_from_file:
-            assert "may be right already" in "\n".join(outcome.verdict())
+            assert "may already be right" in "\n".join(outcome.verdict())
     assert min(chances) > 0.001 and np.mean(chances) > 0.1  # 0.5 on average
     wrong = made_up(robot, 45, 1, exit_m=0.003, drum=0.001, offset_m=0.0, noise_m=3e-4)
     outcome = calibrate(load_robot(robot), wrong.file, measured(wrong, 1e-3, 2e-3, 8), "points")

@@ -81,7 +81,7 @@ def test_a_stable_but_weakly_damped_pose_is_doubtful() -> None:
         leans,
     )
     (leans,) = findings_with_bounds(short_arms(), 20.0, 200.0, 2e-3, impossible=False)
-    assert leans.startswith("sync_period_s: value 0.002; the loop leans on")
+    assert leans.startswith("sync_period_s: value 0.002; the loop relies on")
     assert findings_with_bounds(short_arms(), 20.0, 200.0, 1e-3, impossible=False) == []
     assert (
         findings_with_bounds(

@@ -104,7 +104,9 @@ def test_measurements_that_are_too_few_or_too_poor_are_rejected() -> None:
     assert_rejected(
         points([20.0, 50.0, 80.0], gain=0.052, share=0.0), "far from the geometry's 26.00"
     )
-    assert_rejected(points([20.0, 50.0, 80.0], friction=-0.2, share=0.0), "sign exchanged")
+    assert_rejected(
+        points([20.0, 50.0, 80.0], friction=-0.2, share=0.0), "torque or the cable wrong"
+    )
     wild = [
         TorquePoint(p.tension_N, p.torque_Nm + 0.3 * (-1) ** i, p.winding_in)
         for i, p in enumerate(points([20.0, 50.0, 80.0]))
@@ -118,5 +120,5 @@ def test_a_pull_too_short_to_separate_cogging_from_gain_is_rejected() -> None:
         for p in points(list(np.linspace(10.0, 80.0, 50)), cogging=0.06)
     ]
     assert_rejected(
-        short, "cannot tell gain, friction and cogging apart|is uncertain by", cogging_order=4
+        short, "cannot separate gain, friction and cogging|is uncertain by", cogging_order=4
     )

@@ -97,7 +97,9 @@ def test_other_programs_take_over_while_handing_over_without_a_step(robot: Stand
         assert not robot.torque.any()
 
 
-@pytest.mark.parametrize(("slack_m_s", "told"), [(4.0, "its winch runs in"), (0.04, "disagree by")])
+@pytest.mark.parametrize(
+    ("slack_m_s", "told"), [(4.0, "its winch winds in"), (0.04, "disagree by")]
+)
 def test_a_slack_cable_ends_the_handover_and_lengths_are_forgotten(
     robot: Standing, slack_m_s: float, told: str
 ):

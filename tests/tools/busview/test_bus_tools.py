@@ -278,7 +278,7 @@ def test_monitor_reports_a_bus_that_goes_away_and_keeps_the_log(
     lab.close()
     _, errors = monitor.communicate(timeout=120)
     assert monitor.returncode == 1
-    assert errors.splitlines()[-1].startswith(f"cdpr: {lab.bus}: the bus has gone away")
+    assert errors.splitlines()[-1].startswith(f"cdpr: {lab.bus}: the bus is lost")
     assert "7FF" in errors  # the summary is still printed
     assert "bus load" not in errors  # but the elapsed bus time is unknown
     assert cdpr_here("bus", "replay", log).returncode == 0

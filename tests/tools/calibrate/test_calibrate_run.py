@@ -143,7 +143,7 @@ def go_on(folder: Path, wanted: run.CalibrationRunSettings) -> CalibrationData:
     ("failure", "raised"),
     [
         (StoppedError(), WorkFailedError),
-        (CameraError("camera sim:x gives no image any more"), CameraError),
+        (CameraError("camera sim:x sends no more images"), CameraError),
         (KeyboardInterrupt(), KeyboardInterrupt),  # as sudden as SIGKILL
     ],
 )

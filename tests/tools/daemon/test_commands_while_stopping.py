@@ -211,7 +211,7 @@ def test_a_hanging_launcher_is_reported_with_the_state_of_the_power(
     assert isinstance(error, WorkFailedError)
     pid = os.getpid()
     assert str(error) == (
-        f"{ENDED}; its drives had been told to have no power; its launcher, process {pid}, does "
+        f"{ENDED}; its drives had been commanded to switch off; its launcher, process {pid}, does "
         f"not respond: end it with `kill -9 {pid}`"
     )
 

@@ -42,7 +42,9 @@ def test_rejections_give_allowed_values_as_typed() -> None:
     states = {"state": "ready", "allowed": ["active"]}
     refusal = CommandRefusal(RefusalCode.NOT_IN_STATE, "program", arguments=states)
     text = text_of(refusal, "resume", instead="cdpr move --to")
-    assert text == "resume: not in state ready; allowed in active; `cdpr enable` gives power"
+    assert (
+        text == "resume: not in state ready; allowed in active; `cdpr enable` switches the power on"
+    )
     sources = {"why": "the cables' lengths are not known", "allowed": ["home"]}
     refusal = CommandRefusal(RefusalCode.BAD_SOURCE, "tighten", {"from": "lengths"}, sources)
     text = text_of(refusal, "tighten", "tighten --from lengths", option="--from ")

@@ -114,7 +114,7 @@ def test_cables_under_tension_but_not_tight_are_not_reported_as_loose() -> None:
     status = status_of(state="active", program="hold", program_progress={"tight": False})
     status["axes"] = [{"name": "left", "tension_N": N} for N in (0.4, 65.7)]
     lines = [str(line) for line in status_text(status)]
-    assert "cables not tight, pulled with up to 66 N, power on" in lines
+    assert "cables not tight, tensions up to 66 N, power on" in lines
     status["axes"][1]["tension_N"] = None
     lines = [str(line) for line in status_text(status)]
     assert "cables loose, power on" in lines
@@ -171,7 +171,7 @@ def test_a_failing_part_is_reported_with_its_option() -> None:
     parts = {"live_view": {"error": "the live view ended: why"}, "stream": {"error": ""}}
     status = status_of(parts=parts)
     lines = [str(line) for line in status_text(status)]
-    assert "--live does not work: the live view ended: why" in lines
+    assert "--live failed: the live view ended: why" in lines
     assert not any("--stream" in line for line in lines)
 
 
@@ -225,11 +225,11 @@ def test_a_dead_loop_is_shown_with_old_values_marked_as_such(
 def test_a_hanging_loop_is_reported_before_older_values() -> None:
     status = status_of(program="hold") | {"driving": True, "loop": {"silent_s": 13.6}}
     lines = [str(line) for line in status_text(status)[:-1]]
-    assert lines[1] == "the loop has not turned for 13.6 s: what follows is of then"
+    assert lines[1] == "the loop has run no cycle for 13.6 s: what follows is of then"
     assert lines[2].startswith("drives that had power stop without its heartbeat")
     # in lockstep, the time of the simulated drives stands too
     lines = [str(line) for line in status_text(status | {"lockstep": True})[:-1]]
-    assert lines[1].startswith("the loop has not turned")
+    assert lines[1].startswith("the loop has run no cycle")
     assert not any("stop without" in line for line in lines)
 
 
@@ -246,8 +246,8 @@ def test_a_stop_in_progress_without_reason_names_the_command() -> None:
 
 
 def test_lowering_a_platform_of_unknown_pose_is_not_described_as_moving_home() -> None:
-    assert stage_text("lower", {"stage": "home", "blind": False}).startswith("taking the platform")
-    assert stage_text("lower", {"stage": "home", "blind": True}) == "letting the platform down"
+    assert stage_text("lower", {"stage": "home", "blind": False}).startswith("moving the platform")
+    assert stage_text("lower", {"stage": "home", "blind": True}) == "lowering the platform"
     for stage in ("home", "down"):  # it already stands, or its pose is unknown
         slack = {"stage": stage, "blind": True, "was_tight": False}
         assert stage_text("lower", slack).startswith("paying out the cables")
@@ -256,7 +256,7 @@ def test_lowering_a_platform_of_unknown_pose_is_not_described_as_moving_home() -
 def test_a_path_is_shown_as_left_until_it_is_complete() -> None:
     path = {"name": "part.nc", "line": 7, "time_s": 5.0, "duration_s": 10.0}
     status = status_of(state="active", program="hold", program_progress={"path": path})
-    assert "path part.nc left at 50 %, line 7" in str(status_text(status)[1])
+    assert "path part.nc stopped at 50 %, line 7" in str(status_text(status)[1])
     path["time_s"] = 10.0
     assert not any("part.nc" in str(line) for line in status_text(status))
 

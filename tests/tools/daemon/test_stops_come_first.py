@@ -147,7 +147,7 @@ def test_a_stop_precedes_a_full_queue(active: LoopRig) -> None:
     active.turn(MESSAGES)
     assert active.loop.engine.program.name == "hold"
     while (reply := block.take_reply()) is not None:
-        assert "a stop was asked for after it" in reply["text"]
+        assert "cancelled by a later stop" in reply["text"]
     active.obeyed("program", **JOG)  # later commands are accepted again
     active.obeyed("hold")
 

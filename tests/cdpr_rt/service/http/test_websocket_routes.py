@@ -205,7 +205,7 @@ def test_a_hold_overtakes_and_cancels_earlier_requests_of_its_connection(rig: Ri
             connection.send(json.dumps({"do": order, "id": number, **wanted}))
         refused = [json.loads(connection.recv(60.0)) for _ in range(2)]
         assert [(one["id"], one["ok"]) for one in refused] == [(1, False), (2, False)]
-        assert refused[0]["error"] == "set: a stop was asked for after it"
+        assert refused[0]["error"] == "set: cancelled by a later stop"
         wait_for(lambda: len(rig.service.link._pending) >= 2)  # the hold is posted too
         rig.loop.answers = True
         answers = {one["id"]: one for one in (json.loads(connection.recv(60.0)) for _ in range(3))}
