@@ -53,8 +53,8 @@ MODULES = {
         "check": "Boot the drives again and check the bus, without power.",
         "enable": "Switch the drives on; they hold their position.",
         "disable": "Stop the motion under control, then switch the drives off.",
-        "hold": "Stop the motion and hold the position with power; `cdpr resume` continues it.",
-        "ack": "Acknowledge a fault after its cause has been removed; gives no power.",
+        "hold": "Stop the motion and hold the position under power; `cdpr resume` continues it.",
+        "ack": "Acknowledge a fault after its cause has been removed; the power stays off.",
         "stop": "Stop the motion under control, switch the drives off and end the daemon.",
     },
     "bench": {
@@ -125,7 +125,7 @@ ALIASES = {
     "robot list": "profiles list robots",
     "robot check": "robot show",
 }
-"""What users of other controllers type, and the command that runs instead; none of them moves."""
+"""What users of other controllers type, and the command that runs instead, never one that moves."""
 GUESSES = {
     "goto": "this moves the robot: type `cdpr move --to X Y [Z]`",
     "home": "this moves the robot: `cdpr lower` puts the platform on its stand",

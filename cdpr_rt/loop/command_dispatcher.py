@@ -171,7 +171,7 @@ class CommandDispatcher:
         self._deferred = None
         try:
             deferred.task.result()
-        except Exception as error:  # whatever a file contains, the loop goes on
+        except Exception as error:  # whatever a file contains, the loop continues
             mistake = "" if isinstance(error, ControlError) else f"{type(error).__name__}: "
             said = refusal_of(error) or f"{mistake}{error}"
             self._reply(_number(deferred.command), said)

@@ -23,7 +23,7 @@ from cdpr_drivers.bus import BusUrl
 
 GCODE = "G21 G90 G64 P10\nG0 X-200 Y0\nG1 X100 F4000\nY100\nG3 X0 Y100 I-50 J0\nG1 X-200\nM2\n"
 ENCODER_FAULT = 0x7305  # by 2F00h
-HELD = "`cdpr path resume` goes on"
+HELD = "`cdpr path resume` continues"
 
 
 @pytest.fixture

@@ -55,7 +55,7 @@ def follow(
             body["line"] = line
             number = daemon.post("/path", body)["number"]
             rest = f"`cdpr path run {file} --line {line}`"
-            later = f"from line {line} on it is not followed yet; next: {rest}"
+            later = f"the path from line {line} on is still to do; next: {rest}"
             lasts = _run(daemon, out, arguments, later, planned_s=duration_s)
             if lasts:
                 out.note(f"{file.name}: continues with line {line}")
@@ -136,10 +136,10 @@ def _run(
             robot.run("path", **arguments)
         except MotionEnded as error:
             if not (paused := _paused(robot.status)):
-                raise MotionEnded(f"{error}; when the robot works again, {GO_ON}") from None
+                raise MotionEnded(f"{error}; when the robot works again, {CONTINUE}") from None
             return
         except Faulted as error:
-            raise Faulted(f"{error}; when the robot works again, {GO_ON}") from None
+            raise Faulted(f"{error}; when the robot works again, {CONTINUE}") from None
         goes_on = bool(later) and not (robot.status["program_progress"].get("path") or {}).get(
             "waiting"
         )
@@ -160,9 +160,9 @@ def _run(
         out.say(paused)
         figures["paused"] = True
     if waiting := progress.get("waiting"):
-        out.say(f"line {progress['line']}: {waiting}; {GO_ON}")
+        out.say(f"line {progress['line']}: {waiting}; {CONTINUE}")
     if outcome.stopped:
-        out.note(f"held on the path; {GO_ON}, {BACK}")
+        out.note(f"held on the path; {CONTINUE}, {BACK}")
     figures |= {"path": progress} if progress else {}
     finish(daemon, out, outcome, **figures)
     return False
@@ -173,4 +173,4 @@ def _paused(status: dict[str, Any]) -> str:
     path = (status.get("program_progress") or {}).get("path")
     if (status["state"], status["program"]) != ("active", "hold") or not path or status["reason"]:
         return ""
-    return f"{left_text(path)}, paused by {end_text(status)}; {GO_ON}, {BACK}"
+    return f"{left_text(path)}, paused by {end_text(status)}; {CONTINUE}, {BACK}"

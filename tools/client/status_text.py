@@ -62,7 +62,7 @@ def unheard_axes(status: dict[str, Any]) -> list[str]:
     return [str(axis.get("name")) for axis in status["axes"] if axis.get("alive") is False]
 
 
-GO_ON = "`cdpr path resume` goes on"
+CONTINUE = "`cdpr path resume` continues"
 _OPTIONS = {"live_view": "--live", "stream": "--stream"}
 _STAGES = {
     ("tighten", "slack"): "winding in the slack of the cables",
@@ -144,7 +144,7 @@ def _calibration(status: dict[str, Any]) -> str:
 def _left_path(status: dict[str, Any]) -> str:
     path = (status.get("program_progress") or {}).get("path")
     if path and status["program"] == "hold" and path["time_s"] < path["duration_s"]:
-        return f"{left_text(path)}; {GO_ON}"
+        return f"{left_text(path)}; {CONTINUE}"
     return ""
 
 

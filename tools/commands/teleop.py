@@ -42,7 +42,7 @@ _LEAD = "robot"
 
 
 class _RobotOrCommand(TyperGroup):
-    """Reads `cdpr teleop planar-3` as `cdpr teleop robot planar-3`; other commands need names."""
+    """Reads `cdpr teleop planar-3` as `cdpr teleop robot planar-3`."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Insert the command `robot` if no command is named."""
@@ -72,7 +72,7 @@ def robot(
     robot: Annotated[
         str,
         typer.Argument(
-            help="The robot that a daemon runs.", metavar="ROBOT", envvar=ROBOT_VARIABLE
+            help="Robot whose daemon is running.", metavar="ROBOT", envvar=ROBOT_VARIABLE
         ),
     ],
     device: Annotated[Device, typer.Option("--device", help="Input device.")] = Device.KEYBOARD,

@@ -142,8 +142,8 @@ def lines(shown: Preview, robot: Robot, table: dict[str, Any]) -> list[str]:
     text += [f"note: {notice}" for notice in table["notices"]]
     if (line := table["next_line"]) is not None:
         text.append(
-            f"note: one plan leads up to line {shown.plan.path.moves[-1].line}; `cdpr path run` "
-            f"goes on from there with the next one, --line {line} shows it"
+            f"note: this plan ends at line {shown.plan.path.moves[-1].line}; `cdpr path run` "
+            f"continues there with the next one, which --line {line} shows"
         )
     if shown.note:
         text.append(f"note: {shown.note}")

@@ -98,7 +98,7 @@ def test_bus_counters_are_shown() -> None:
 
 def test_a_starting_loop_shows_notices_but_no_axes() -> None:
     """Names of axes are not known yet. Notices report the compilation."""
-    notices = ["compiling the control loop goes on: 20 kernels so far"]
+    notices = ["compiling the control loop: 20 kernels so far"]
     lines = status_text(status_of(state="starting", notices=notices, axes=[{"name": None}] * 3))
     assert [str(line) for line in lines] == ["bench: starting", f"note: {notices[0]}"]
     shown = status_text(status_of(axes=[{"name": "left"}]))
