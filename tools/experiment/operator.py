@@ -27,11 +27,21 @@ _REMEMBERED = 64
 class OperatorParameters:
     """A practised operator with a stylus and a picture. SI units; hand noise is per direction.
 
-    Sources are abbreviated; docs/how-to/experiment.md has them in full.
+    Sources:
+    Ferrell, Remote manipulation with transmission delay, IEEE Trans. HFE 6, 1965;
+    Meyer et al., Optimality in human motor performance, Psychological Review 95, 1988;
+    Burdet, Milner, Quantization of human motions and learning of accurate movements, Biological
+    Cybernetics 78, 1998; Card, Moran, Newell, The Psychology of Human-Computer Interaction, 1983;
+    Flash, Hogan, The coordination of arm movements, Journal of Neuroscience 5, 1985;
+    Schmidt et al., Motor-output variability, Psychological Review 86, 1979;
+    Wells et al., Comparison of baseline tremor under various microsurgical conditions, IEEE SMC,
+    2013; Riviere, Rader, Khosla, Characteristics of hand motion of eye surgeons, IEEE EMBS, 1997;
+    Wolf et al., Understanding the Heisenberg effect of spatial interaction, CHI 2020;
+    Casiez, Roussel, Vogel, 1 euro filter, CHI 2012.
     """
 
     reaction_s: float = 0.24
-    """From seeing something to the begin of a movement (Card, Moran & Newell 1983: 240 ms)."""
+    """From seeing something to the beginning of a movement (Card, Moran & Newell 1983: 240 ms)."""
     press_s: float = 0.10
     """From the decision to press a button until it closes (same source: 70 ms, plus travel)."""
     shortest_move_s: float = 0.25

@@ -23,20 +23,14 @@ MISTAKES = (
     ("Misspelt key in a robot's file", "cdpr robot show misspelt.toml"),
     ("Unknown bus in a robot's file", "cdpr robot show other-bus.toml"),
     ("Bus without its kind", "cdpr run planar-3 --bus can0"),
-    ("Missing bus", "cdpr drive info winch-mpp0923d"),
     ("Simulated bus that is not running", "cdpr drive info winch-mpp0923d --bus simbus:lab"),
     ("No daemon is running", "cdpr move --to 300 2000"),
     ("Output folder already used", "cdpr commission winch-mpp0923d --bus simbus: --out used"),
     ("Motor not chosen", "cdpr commission planar-3 --bus simbus:"),
-    ("Speed out of range", "cdpr drive jog winch-mpp0923d --bus simbus: --speed-deg-s 99999"),
-    ("Unknown choice", "cdpr tighten --from nowhere"),
-    ("Folder without commissioning results", "cdpr run planar-3 --bus simbus: --commissioned used"),
     ("Open to the network without a key", "cdpr run planar-3 --bus simbus: --http 0.0.0.0:8080"),
     ("Key file that others can read", "cdpr status --url http://robot:8080 --key-file key"),
     ("Robot's file that already exists", "cdpr robot new misspelt.toml"),
     ("File that is not a recording", "cdpr log info notes.mcap"),
-    ("File that contains no path", "cdpr path run notes.mcap"),
-    ("Unsupported picture format", "cdpr log plot notes.mcap --png run.jpg"),
 )
 HEAD = """\
 # Common mistakes and their messages

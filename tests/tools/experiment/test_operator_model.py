@@ -85,7 +85,7 @@ def test_with_the_clutch_the_hand_adds_no_error_before_the_confirmation() -> Non
 
 
 def test_without_clutch_the_error_of_the_hand_agrees_with_the_thesis() -> None:
-    """In both, the variance grows by (0.18 mm * scale)^2, see docs/how-to/experiment.md."""
+    """In both, the variance grows by (0.18 mm * scale)^2."""
     spread_at = {
         scale: spread_mm(points(scale, 0.0, OF_THE_THESIS)["hand_m"]).mean() for scale in (2, 8)
     }
