@@ -48,7 +48,7 @@ def numbers(
     typed = text.split()
     for word in typed:
         if not is_number(word):
-            raise BadInputError(f"{option} {text}: {word!r} is no number; allowed: {allowed}")
+            raise BadInputError(f"{option} {text}: {word!r} is not a number; allowed: {allowed}")
     if len(typed) != len(names):
         many = "1 number" if len(typed) == 1 else f"{len(typed)} numbers"
         raise BadInputError(f"{option} {text}: {many}; allowed: {len(names)}, {allowed}")

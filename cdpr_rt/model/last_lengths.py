@@ -58,7 +58,7 @@ class LastLengths:
         self.contradicted = ""
         """What contradicts the lengths in use, so that they are not stored; else empty."""
         self.fallen = False
-        """Whether it hung, or may have, when the power was removed suddenly or a drive was lost."""
+        """Whether it may have hung when the power was removed suddenly or a drive was lost."""
         self.broken: dict[int, str] = {}
         """Cables that seemed broken since all were last tight, by their axes, and why."""
 

@@ -138,7 +138,7 @@ class OwnProgram(PoseProgram):
         if self._time_s < 0.0:
             arrived = super()._move()
             if self._blocked:
-                self._end(f"no way on, {self._infeasibility_at(self._examined_goal)}")
+                self._end(f"the way is blocked, {self._infeasibility_at(self._examined_goal)}")
             elif arrived:
                 self._time_s = 0.0
                 self._speed[:], self._acceleration[:] = self._parts.speed, self._parts.acceleration

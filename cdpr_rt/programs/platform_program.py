@@ -191,7 +191,7 @@ class PlatformParts:
         return self.speed * min(most_m_s / float(self.speed[0]), 1.0)
 
     def notices(self) -> list[str]:
-        """Return what an operator should know of the robot."""
+        """Return notices to the operator."""
         broken = "; ".join(self.last_stop.broken.values())
         repair = f"{broken}: repair it, then `cdpr tighten --from home`" if broken else ""
         if self._shows_right_lengths():

@@ -115,7 +115,7 @@ class LettingGo:
         if self._inwards_m_s[i] >= -_RUNS_IN_m_s:
             return ""
         return (
-            f"{self._parts.names[i]}: its winch runs in with {-self._inwards_m_s[i]:.2f} m/s, "
+            f"{self._parts.names[i]}: its winch winds in at {-self._inwards_m_s[i]:.2f} m/s, "
             f"{_RUNS_IN_m_s:g} m/s allowed: its cable is broken, or was slack; {_REMEDY}"
         )
 

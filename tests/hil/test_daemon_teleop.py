@@ -164,7 +164,7 @@ def test_keys_move_the_robot_until_the_terminal_closes(daemon: RealDaemon) -> No
         os.close(terminal)  # in motion
         assert process.wait(timeout=60.0) == 1
         assert process.stderr is not None
-        assert "the terminal is gone" in process.stderr.read()
+        assert "the terminal was closed" in process.stderr.read()
     assert daemon.status()["program"] == "hold"
     assert abs(place(daemon)[1] - begin[1]) < 3e-3
     rest = place(daemon)

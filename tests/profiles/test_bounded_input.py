@@ -36,10 +36,13 @@ def test_motor_figures_out_of_range_are_rejected(change: dict[str, object], told
 @pytest.mark.parametrize(
     ("text", "told"),
     [
-        ("a = " + "[" * 17 + "]" * 17, "line 1: is too deep; allowed: 16 levels"),
-        ("\n" + "a." * 17 + "a = 1", "line 2: is too deep; allowed: 16 levels"),
-        ("x = " + "{a.b.c.d.e.f.g = " * 5 + "1" + "}" * 5, "x: is too deep; allowed: 16 levels"),
-        ("[" + ".".join("a" * 18) + "]", "line 1: is too deep; allowed: 16 levels"),
+        ("a = " + "[" * 17 + "]" * 17, "line 1: is nested too deeply; allowed: 16 levels"),
+        ("\n" + "a." * 17 + "a = 1", "line 2: is nested too deeply; allowed: 16 levels"),
+        (
+            "x = " + "{a.b.c.d.e.f.g = " * 5 + "1" + "}" * 5,
+            "x: is nested too deeply; allowed: 16 levels",
+        ),
+        ("[" + ".".join("a" * 18) + "]", "line 1: is nested too deeply; allowed: 16 levels"),
         ("x = 1" + "0" * 99, "line 1: a number of 100 digits; allowed: 99"),
         ("x = 1_" + "0_" * 60 + "0", "line 1: a number of 123 digits; allowed: 99"),
         ("x = 0x" + "f" * 20_000, "line 1: a number of 20002 digits; allowed: 99"),
@@ -70,7 +73,7 @@ def test_brackets_and_digits_in_strings_and_comments_do_not_count(tmp_path: Path
 @pytest.mark.parametrize(
     ("text", "told"),
     [
-        ("[" * 17 + "]" * 17, "x: line 1: is too deep; allowed: 16 levels"),
+        ("[" * 17 + "]" * 17, "x: line 1: is nested too deeply; allowed: 16 levels"),
         ("1" * 100, "x: line 1: a number of 100 digits; allowed: 99"),
         ("1" * 21, "x: value 111111111111111111111; allowed: 64 bits"),
         ('{"a": NaN}', "x: value NaN; allowed: a finite number"),

@@ -84,7 +84,7 @@ def make_huge(path: Path) -> None:
 @pytest.mark.parametrize(
     ("make", "told"),
     [
-        (make_deep, "line 1: is too deep; allowed: 16 levels"),
+        (make_deep, "line 1: is nested too deeply; allowed: 16 levels"),
         (make_long, "line 1: a number of 6000 digits; allowed: 99"),
         (make_pipe, "is not a regular file; allowed: a file, or a link to one"),
         (make_device, "is not a regular file; allowed: a file, or a link to one"),

@@ -322,7 +322,7 @@ def tightness_text(status: dict[str, Any]) -> str:
         return f"held by its cables{agree}"
     most_N = max((axis.get("tension_N") or 0.0 for axis in status["axes"]), default=0.0)
     # as after an interrupted `tighten`: a hold keeps the tension of the cables
-    cables = f"not tight, pulled with up to {most_N:.0f} N" if most_N >= _LOOSE_N else "loose"
+    cables = f"not tight, tensions up to {most_N:.0f} N" if most_N >= _LOOSE_N else "loose"
     return f"cables {cables}, power on"
 
 

@@ -106,7 +106,7 @@ def enable(
     status = _booted(daemon, out)
     if status["state"] == "active":
         _require_no_stop(status)
-        out.say(f"has power already, program {status['program']}", *next_steps(status))
+        out.say(f"already has power, program {status['program']}", *next_steps(status))
         out.result({"ok": True, "state": "active", "text": ""})
         return
     _confirm(status, yes)
@@ -164,7 +164,7 @@ def disable(daemon: Daemon, out: Output) -> None:
 @app.command()
 @with_daemon_at_once
 def hold(daemon: Daemon, out: Output) -> None:
-    """Stop the motion and hold the position with power; `cdpr resume` continues it."""
+    """Stop the motion and hold the position under power; `cdpr resume` continues it."""
     _show(out, daemon.post("/hold"))
 
 

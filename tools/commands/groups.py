@@ -49,7 +49,7 @@ SIM = {
         "rail": "Run a simulated rail until Ctrl-C; prints a line when it is ready.",
     },
     "sim_fault": {
-        "fault": "Inject a fault into a running simulated robot: a cable, an encoder, a drive.",
+        "fault": "Break a running simulated robot: a cable, an encoder, a drive; or mend it.",
     },
     "sim_camera": {
         "camera": "Run a camera on a simulated platform until Ctrl-C; other commands use it as "

@@ -43,7 +43,7 @@ def fault(
     what: Annotated[
         FaultWord,
         typer.Argument(
-            help=f"What goes wrong, immediately: {', '.join(InjectedFault)}; {MEND}: repair "
+            help=f"Fault to inject immediately: {', '.join(InjectedFault)}; {MEND}: repair "
             f"everything, {LIST}: show what is broken.",
             metavar=f"FAULT|{MEND}|{LIST}",
         ),
@@ -70,10 +70,11 @@ def fault(
         ),
     ] = None,
 ) -> None:
-    """Inject a fault into a running simulated robot: a cable, an encoder, a drive; or mend it.
+    """Break a running simulated robot: a cable, an encoder, a drive; or mend it.
 
-    It writes object 2F00h, which no real drive has, while the robot's master keeps running. For
-    pre-operational it sends the NMT command. No controller reads what is broken from the simulator.
+    The command writes object 2F00h, which no real drive has, while the robot's master keeps
+    running. For `pre-operational` it sends the NMT command. No controller reads what is broken from
+    the simulator.
     """
     profile, daemon = _profile(machine, by_daemon=not bus)
     robot = robot_of_winch(profile) if isinstance(profile, Winch) else profile

@@ -127,8 +127,8 @@ class InjectionAccess:
         amount = injection.amount(what, value)
         if what == InjectedFault.CELL_OFF and self._robot.tension_sensors is None:
             raise BadInputError(
-                f"{what}: {self._robot.name} has no load cells, its tensions are estimated from "
-                "torques; allowed: for a robot whose file names tension_sensors"
+                f"{what}: {self._robot.name} has no load cells; allowed only for a robot whose "
+                "file has tension_sensors"
             )
         with self._errors():
             if what == InjectedFault.PRE_OPERATIONAL:

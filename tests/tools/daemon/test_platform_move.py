@@ -124,11 +124,11 @@ def test_a_relative_motion_is_sent_as_distance_and_turn() -> None:
 @pytest.mark.parametrize(
     ("platform", "typed", "told"),
     [
-        (PLANE, {"to": "0.3 2.0"}, "--to 0.3 2.0: were metres typed.* --to 300 2000"),
-        (PLANE, {"to": "abc"}, "--to abc: 'abc' is no number; allowed: X Y in mm$"),
+        (PLANE, {"to": "0.3 2.0"}, "--to 0.3 2.0: are these metres.* --to 300 2000"),
+        (PLANE, {"to": "abc"}, "--to abc: 'abc' is not a number; allowed: X Y in mm$"),
         (PLANE, {"to": "0 2000 5"}, "--to 0 2000 5: 3 numbers; allowed: 2, X Y in mm"),
         (ROOM, {"to": "0 2000"}, "--to 0 2000: 2 numbers; allowed: 3, X Y Z in mm"),
-        (NAMED, {"to": "lod"}, "--to lod: 'lod' is no number; allowed: X Y in mm, or load"),
+        (NAMED, {"to": "lod"}, "--to lod: 'lod' is not a number; allowed: X Y in mm, or load"),
         (NAMED, {"to": "load", "relative": True}, "--to load: a pose; allowed: without --relative"),
         (NAMED, {"to": "home"}, "--to home: home is on the stand, .*; `cdpr lower` puts"),
         (PLANE, {"to": "nan 2000"}, "--to nan 2000: allowed: finite numbers, X Y in mm"),

@@ -58,7 +58,7 @@ def test_a_preview_writes_a_picture_and_the_plan_for_the_daemon(file, tmp_path, 
         (("G21", "G20"), [ORIGIN], "part.nc:3: the path is .* perhaps 25.4 times too large"),
         (("M2", "G41 D1\nM98 P2"), [ORIGIN], r"part.nc:6: G41: .*\n.*part.nc:7: M98: "),
         (("", ""), [ORIGIN, "--ignore=G3"], "part.nc: --ignore G3: other lines depend on it"),
-        (("", ""), [ORIGIN, "--z=5"], r"part.nc:2: Z: --z is for files that do not name it"),
+        (("", ""), [ORIGIN, "--z=5"], r"part.nc:2: Z: --z is only for files without Z"),
         (("", ""), ["--origin=1 2"], "--origin 1 2: allowed: 3 numbers in mm"),
     ],
 )

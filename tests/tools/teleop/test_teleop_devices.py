@@ -238,7 +238,7 @@ def test_a_closed_terminal_ends_teleoperation() -> None:
     device = Keyboard(1.0, its)
     os.close(ours)
     end = read_soon(device, "end").end
-    assert end is not None and end.failed and "terminal is gone" in end.text
+    assert end is not None and end.failed and "terminal was closed" in end.text
     device.close()
     os.close(its)
 

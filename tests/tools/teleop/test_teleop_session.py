@@ -156,7 +156,7 @@ def test_a_hand_in_trouble_does_not_move_the_robot(robot: Robot) -> None:
 
 def test_the_end_of_the_program_ends_teleoperation(robot: Robot) -> None:
     session, end = teleoperate(robot, Still(), lambda: robot.run(IDLE))
-    assert end.failed and end.text == "the robot does not follow the stream any more"
+    assert end.failed and end.text == "the robot does not follow the stream any longer"
     assert session.leading
 
 
@@ -173,7 +173,7 @@ def test_losing_the_right_to_move_ends_teleoperation(robot: Robot) -> None:
 def test_a_robot_lost_during_a_script_is_reported(robot: Robot) -> None:
     done = ScriptDevice((ScriptLine(0.0, (0.0, 0.0, 0.0)),))
     _, end = teleoperate(robot, done, lambda: robot.run(IDLE))
-    assert end.failed and end.text == "the robot does not follow the stream any more"
+    assert end.failed and end.text == "the robot does not follow the stream any longer"
 
 
 def test_silence_of_the_robot_ends_teleoperation(
