@@ -14,7 +14,7 @@ from cdpr_rt.robot import Faulted, MotionEnded, Robot, end_text
 from cdpr_tools.client.client import Daemon, await_start
 from cdpr_tools.client.motion import LOOK_S, carry_out, finish, require_platform
 from cdpr_tools.client.refusals import DaemonRefusalError, in_typed_words
-from cdpr_tools.client.status_text import GO_ON, left_text, next_steps
+from cdpr_tools.client.status_text import CONTINUE, left_text, next_steps
 from cdpr_tools.errors import BadInputError, WorkFailedError
 from cdpr_tools.output import Output, time_text
 from cdpr_tools.paths.options import PathOptions
