@@ -86,9 +86,8 @@ class SlcanAdapter:
         for command in ([code] if code else []) + ["O"]:
             answers.append(self._command(command))
             if answers[-1] == b"\a":
-                what = (
-                    f"bit rate {url.options['bitrate']} ({code})" if command != "O" else "to open"
-                )
+                rate = f"bit rate {url.options.get('bitrate')} ({code})"
+                what = rate if command != "O" else "the command to open"
                 advice = "" if code else "; it may need ?bitrate=1000000"
                 raise BusError(f"{url}: the adapter rejects {what}{advice}")
         if version is None and not any(answers):

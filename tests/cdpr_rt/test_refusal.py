@@ -51,7 +51,7 @@ REFUSALS = [
             {"resume": True},
             {"left": "path", "instead": "plan"},
         ),
-        "path: resume: no path has been left; allowed: plan",
+        "path: resume: there is no path to continue; allowed: plan",
     ),
     (
         CommandRefusal(RefusalCode.NOT_TIGHT, "pose"),

@@ -143,7 +143,9 @@ def test_a_path_resumes_where_it_was_paused_faulted_or_killed(folder: Path) -> N
         assert json.loads(out.splitlines()[-1])["path"]["time_s"] == here["duration_s"]
         done = cdpr("path", "resume", *daemon.at)
         assert done.returncode in (1, 2)
-        assert "path resume: no path has been left; allowed: cdpr path run FILE" in done.stderr
+        assert (
+            "path resume: there is no path to continue; allowed: cdpr path run FILE" in done.stderr
+        )
 
 
 def test_a_path_of_several_plans_is_completed(folder: Path) -> None:

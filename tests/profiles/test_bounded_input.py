@@ -79,7 +79,7 @@ def test_brackets_and_digits_in_strings_and_comments_do_not_count(tmp_path: Path
         ('{"a": NaN}', "x: value NaN; allowed: a finite number"),
         ("[-Infinity]", "x: value -Infinity; allowed: a finite number"),
         ("1e400", "x: value 1e400; allowed: a finite number"),
-        ('{"a": {"b": 1, "b": 2}}', "x: b: is there twice; allowed: each key once"),
+        ('{"a": {"b": 1, "b": 2}}', "x: b: is given twice; allowed: each key once"),
         (b"\xff", "x: is not UTF-8 text (byte 0)"),
         ("{", "x: is not valid JSON: "),
     ],

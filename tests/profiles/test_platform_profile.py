@@ -211,10 +211,10 @@ def test_exit_points_without_platform_and_too_few_cables_are_rejected(tmp_path: 
     start, end = PLANAR.index("[platform]"), PLANAR.index("[limits]")
     path = tmp_path / "mine.toml"
     path.write_text(PLANAR[:start] + PLANAR[end:])
-    with pytest.raises(ProfileError, match=r"axes\[0\]: .*along with \[platform\]"):
+    with pytest.raises(ProfileError, match=r"axes\[0\]: .*allowed only with \[platform\]"):
         load_robot(path)
     path.write_text(PLANAR[: PLANAR.index("[[axes]]", PLANAR.index("[[axes]]") + 1)])
-    with pytest.raises(ProfileError, match="axes: 1; allowed: 2 and more to control x, y"):
+    with pytest.raises(ProfileError, match="axes: 1; allowed: 2 or more to control x, y"):
         load_robot(path)
 
 

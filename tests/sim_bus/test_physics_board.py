@@ -87,9 +87,7 @@ def test_a_processor_with_weak_memory_order_cannot_attach_to_a_board(
 ) -> None:
     with PhysicsBoard.create(tmp_path / "board", 1):
         monkeypatch.setattr(platform, "machine", lambda: "aarch64")
-        with pytest.raises(
-            BusSetupError, match=r"board: .* processor is aarch64; allowed .*x86_64"
-        ):
+        with pytest.raises(BusSetupError, match=r"board: .* processor is aarch64; .*x86_64"):
             PhysicsBoard.attach(tmp_path / "board")
         monkeypatch.setattr(platform, "machine", lambda: "x86_64")
         PhysicsBoard.attach(tmp_path / "board").close()

@@ -295,7 +295,7 @@ def settings_for(
     require_fit(robot)
     load_profiles(with_commissioned(robot, commissioned))
     if record is not None and no_record:
-        raise BadInputError("--record and --no-record: one of them")
+        raise BadInputError("--record and --no-record: give only one of them")
     if stream is not None and no_stream:
         raise BadInputError("--stream and --no-stream: one of them")
     own = own or OwnCodeOptions()

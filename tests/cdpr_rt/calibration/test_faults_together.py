@@ -190,7 +190,7 @@ def test_cable_lengths_reveal_a_wrong_size_of_all_sheets() -> None:
     readings.wrong_size(1.04)
     outcome = readings.outcome()
     (sized,) = (fault for fault in outcome.faults if fault.kind == "size")
-    assert "smaller than told" in sized.text
+    assert "smaller than stated" in sized.text
     assert sized.size == pytest.approx(-0.0385, abs=0.008)
     assert readings.off_mm(outcome) < 3.0
     assert "places of markers are known" in outcome.as_json()["frame"]

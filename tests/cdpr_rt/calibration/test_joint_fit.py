@@ -216,7 +216,9 @@ def test_a_contradictory_camera_orientation_is_rejected() -> None:
     assert setup.hand_eye is not None
     wrong = setup.hand_eye.model_copy(update={"rotation_deg": (0.0, 0.0, 0.0)})
     setup = setup.model_copy(update={"hand_eye": wrong})
-    with pytest.raises(InvalidRequestError, match=r"hand_eye\.rotation_deg: .* 1[78][0-9] deg off"):
+    with pytest.raises(
+        InvalidRequestError, match=r"hand_eye\.rotation_deg: .*differs by 1[78][0-9] deg"
+    ):
         camera_start(what.geometry, what.seen, setup, what.images.sightings)
 
 

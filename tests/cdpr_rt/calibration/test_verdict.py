@@ -112,7 +112,7 @@ def test_too_few_poses_are_rejected_with_the_missing_number() -> None:
         require_enough(what.file, what.seen.some(np.arange(8)))
     require_enough(what.file, what.seen)
     robot = load_robot("spatial-8")
-    with pytest.raises(InvalidRequestError, match="15 and more"):
+    with pytest.raises(InvalidRequestError, match="15 or more"):
         calibrate(robot, what.file, what.seen.some(np.arange(9)), "redundancy")
 
 

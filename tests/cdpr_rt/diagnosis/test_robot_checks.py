@@ -90,7 +90,7 @@ def test_sagging_cables_are_reported_with_a_sufficient_tension(low_N: float, hig
     slope = float((sag_m(planned_N - 0.01) - sag_m(planned_N + 0.01)).max()) / 0.02
     assert bool(told) == (slope > 0.01) == (low_N < 20.0)
     if told:
-        assert f"{slope:.2g} m of it" in told[0]
+        assert f"{slope:.2g} m, and" in told[0]
         enough_N = float(told[0].split("enough: ")[1])
         better = hall(enough_N, high_N + enough_N)
         assert not any(f.key == "limits.tension_min_N" for f in diagnose(better))
@@ -202,7 +202,7 @@ def test_winch_friction_above_the_reserve_for_control_is_reported(tmp_path: Path
     # share of the motor's rated 115 N
     told = diagnose(robot_of(tmp_path, ("max_N = 150", "max_N = 60")))
     about = [f for f in told if f.key == "platform.mass_kg"]
-    assert about and "may take up 6.9 N" in about[0].text and not about[0].impossible
+    assert about and "may need 6.9 N" in about[0].text and not about[0].impossible
 
 
 def test_a_problem_at_all_places_is_reported_in_general(tmp_path: Path) -> None:
@@ -381,7 +381,7 @@ def test_friction_that_turns_a_planar_platform_is_reported_without_axis(tmp_path
     told = findings_of(tmp_path, text)["axes[0].anchor_point_m"]
     found = re.search(
         r"friction of 12 N, .* turns the platform by ([\d.]+) deg until the control overcomes it "
-        r"\(1 mm in each cable is ([\d.]+) deg\).*hold it turned by up to ([\d.]+) deg",
+        r"\(1 mm of each cable is ([\d.]+) deg\).*hold it turned by at most ([\d.]+) deg",
         told,
     )
     assert found is not None, told
@@ -393,5 +393,5 @@ def test_a_stand_too_close_to_an_exit_point_is_reported(tmp_path: Path) -> None:
     # the lower anchor point is 87 mm below the platform's origin
     told = diagnose(robot_of(tmp_path, ("exit_point_m = [0.0, 0.0]", "exit_point_m = [0.0, 1.15]")))
     about = [f for f in told if f.key == "platform.home_m" and f.impossible]
-    assert about and about[0].text.startswith("the platform at rest comes up to 0.063 m from")
+    assert about and about[0].text.startswith("the platform at rest reaches up to 0.063 m from")
     assert "axes[2] (lower); allowed: 0.1 m and more" in about[0].text

@@ -114,7 +114,7 @@ def spoil(change):
         ),
         (
             lambda: spoil(lambda d: d.update(better=d.pop("harmonic"))),
-            "harmonic: this key is required and missing",
+            "harmonic: this required key is missing",
         ),
     ],
 )

@@ -60,7 +60,7 @@ def test_a_robot_that_was_not_stopped_leaves_no_lengths(path: Path):
     stopped(path).begin_to_move(np.zeros(3))
     last = read(path)
     assert last.lengths is None
-    assert "in motion" in last.why
+    assert "was moving" in last.why
     assert last.fallen
 
 

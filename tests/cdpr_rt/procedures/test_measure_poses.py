@@ -180,7 +180,7 @@ def test_at_most_five_consecutive_unreached_poses_are_measured_where_they_stand(
         "cable 2 would need 200 N"
     )
     measured, _ = collected()
-    with pytest.raises(TripError, match=r"5 poses in a row, the last pose 7, at 9\.000"):
+    with pytest.raises(TripError, match=r"5 poses in a row failed, the last pose 7, at 9\.000"):
         measure_poses(Operator(beyond=4.0), PLACES[2:], BETWEEN, measured, notes)
     assert [reading.target[0] for reading in measured.readings] == [3, 4, 4, 4, 4, 4, 4]
 

@@ -190,7 +190,7 @@ def test_invalid_path_commands_are_rejected(rig, tmp_path):
     for wanted, told in (
         ({"plan": "../../etc/passwd"}, "plan: value"),
         ({"plan": "0" * 32}, "no such plan"),
-        ({"resume": True}, "no path has been left"),
+        ({"resume": True}, "there is no path to continue"),
         ({"resume": 1}, "allowed: true"),
         ({"plan": rig.name, "feed": 2.0}, "feed: value 2.0; allowed"),
         ({"plan": rig.name, "resume": True}, "allowed: one of"),
@@ -325,7 +325,7 @@ def test_an_invalid_stored_time_is_clipped_or_rejected(rig: PathRig, time_s: flo
     rig.live["time_s"] = time_s
     rig.begin_anew()
     if np.isnan(time_s):
-        with pytest.raises(ProgramError, match="no path has been left"):
+        with pytest.raises(ProgramError, match="there is no path to continue"):
             rig.check_command(resume=True)
         return
     rig.begin(resume=True)

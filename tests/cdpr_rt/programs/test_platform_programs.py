@@ -224,7 +224,7 @@ def test_a_platform_lowered_blindly_is_not_assumed_to_stand_at_home(robot: Stand
     tighten = robot.programs["tighten"]
     tighten.check({})  # its cables' lengths are known
     robot.estimator.forget_lengths()
-    with pytest.raises(ProgramError, match="stand it at home; allowed: from home"):
+    with pytest.raises(ProgramError, match="put it at home; allowed: from home"):
         tighten.check({})
     robot.switch("tighten", {"from": "home"})
     robot.until_done(20.0)

@@ -186,7 +186,7 @@ def test_a_target_that_changes_in_motion_does_not_step(robot: LedPlatform) -> No
         ({"position_m": [0.0, 1.9, 0.0]}, "a list of 2"),
         ({"position_m": [0.0, 1.9], "stream": True}, "one of"),
         ({"stream": 1}, "stream: value 1; allowed: true"),
-        ({"resume": True}, "no target has been left"),
+        ({"resume": True}, "there is no target to continue"),
         ({"position_m": [0.0, 1.9], "speed_m_s": 0.6}, "speed_m_s"),
         ({"velocity": 1}, "velocity"),
     ],

@@ -65,7 +65,7 @@ def test_a_silent_holder_loses_the_right_even_if_nobody_takes_it() -> None:
     lease, clock = made()
     token = lease.take("maria", 0.5)
     clock.ns += 600_000_000
-    with pytest.raises(LeaseError, match="run out: maria was silent"):
+    with pytest.raises(LeaseError, match="expired: maria was silent"):
         lease.renew(token)
     assert until_ns() < clock.ns
 

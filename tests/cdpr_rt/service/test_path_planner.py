@@ -51,7 +51,7 @@ def test_an_infeasible_path_is_reported_by_the_users_file_name():
 def test_a_stop_during_planning_discards_the_plan():
     job = planned(0, json.dumps({"plan": "ab", "duration_s": 2.0}), "hold by somebody")
     assert job["plan"] is None
-    assert job["error"] == "not followed: hold by somebody while it was planned"
+    assert job["error"] == "not started: hold by somebody during planning"
 
 
 def test_planning_without_a_robot_is_rejected():

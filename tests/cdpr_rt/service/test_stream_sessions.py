@@ -187,7 +187,7 @@ def test_only_the_holder_of_the_right_is_given_a_session() -> None:
         with pytest.raises(LeaseError):
             rig.sessions.issue(token)
     rig.now_ns += 10_001 * MS
-    with pytest.raises(LeaseError, match="run out"):
+    with pytest.raises(LeaseError, match="has expired"):
         rig.sessions.issue(rig.token)
 
 

@@ -137,7 +137,7 @@ def test_feedback_that_is_not_sent_at_every_sync_is_rejected() -> None:
         p.model_copy(update={"transmission_type": 0 if p.number == 3 else 1}) for p in SPLIT.tpdos
     )
     drive = SPLIT.model_copy(update={"tpdos": late})
-    with pytest.raises(DriverError, match="no TPDO of transmission_type 1 holds 6077h"):
+    with pytest.raises(DriverError, match="no TPDO of transmission_type 1 contains 6077h"):
         GroupLayout([AxisConfig(1, drive, 3.0, 8192, 0x2D, 2.0)])
 
 

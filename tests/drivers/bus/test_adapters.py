@@ -110,8 +110,8 @@ def test_an_adapter_is_opened_with_the_expected_commands(start: Start) -> None:
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({b"S": b"\a"}, r"refuses bit rate 1000000 \(S8\)"),
-        ({b"O": b"\a"}, "refuses to open"),
+        ({b"S": b"\a"}, r"rejects bit rate 1000000 \(S8\)"),
+        ({b"O": b"\a"}, "rejects the command to open"),
         (dict.fromkeys(GOOD, b""), "no serial CAN adapter"),
     ],
 )
@@ -441,8 +441,8 @@ def test_a_server_that_does_not_open_the_bus_is_reported(
     ("url", "message"),
     [
         ("slcan:/dev/ttyNOTHING?bitrate=1000000", "there is no serial port /dev/ttyNOTHING"),
-        ("slcan:/dev/null?bitrate=1000000", "/dev/null is no serial port"),
-        ("slcan:/tmp?bitrate=1000000", "/tmp is no serial port"),
+        ("slcan:/dev/null?bitrate=1000000", "/dev/null is not a serial port"),
+        ("slcan:/tmp?bitrate=1000000", "/tmp is not a serial port"),
         ("slcan:/dev/ptmx?bitrate=123456", "bitrate 123456; allowed: 10000, "),
         ("slcan:/dev/ptmx?bitrte=1000000", "unknown option 'bitrte'; allowed: bitrate, "),
         ("slcan:/dev/ptmx?tty_baudrate=fast", "tty_baudrate 'fast': this port cannot be set"),

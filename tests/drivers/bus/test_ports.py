@@ -75,7 +75,7 @@ def test_a_wait_ends_at_its_timeout(url: BusUrl, timeout_s: float) -> None:
     with pytest.raises(BlockingIOError) as caught:
         port.recv_into(bytearray(16))
     assert timeout_s <= time.monotonic() - started
-    assert "time-out" in str(port.lost(caught.value))
+    assert "timeout" in str(port.lost(caught.value))
     port.close()
 
 

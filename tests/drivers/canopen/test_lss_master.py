@@ -178,7 +178,9 @@ def test_a_node_id_in_use_by_a_stopped_node_is_detected_by_heartbeat() -> None:
 def test_rejections_by_a_device_are_reported_as_text(tmp_path: Path) -> None:
     with master_of(device(1, 4, store=tmp_path / "missing" / "drive.json")) as master:
         master.select(address(1))
-        with pytest.raises(LssError, match="refuses node id 128: it takes node ids 1 to 127 only"):
+        with pytest.raises(
+            LssError, match="rejects node id 128: it accepts only node ids 1 to 127"
+        ):
             master.set_node_id(128)
         with pytest.raises(LssError, match="to store its settings: its memory could not be"):
             master.store()

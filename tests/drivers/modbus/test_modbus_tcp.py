@@ -81,7 +81,7 @@ def test_a_valid_answer_is_read(device: Babbler, client: ModbusTcp) -> None:
 @pytest.mark.parametrize(
     ("body", "said"),
     [
-        (bytes([1, 2, 0, 0]), "function 1 was answered, 2 was asked"),
+        (bytes([1, 2, 0, 0]), "function 1 was answered, but 2 was requested"),
         (bytes([2, 1, 0]), "8 bits arrived, not 9"),
         (bytes([0x82, 2]), "exception 2 .illegal data address"),
         (bytes([0x82, 200]), "exception 200 .unknown exception"),
@@ -101,7 +101,7 @@ def test_a_wrong_answer_is_reported(
 
 def test_an_echo_of_a_different_write_is_rejected(device: Babbler, client: ModbusTcp) -> None:
     device.answer = lambda request: framed(request, bytes([5, 0, 6, 0xFF, 0]))
-    with pytest.raises(ModbusError, match="set coil 5 to 1: the answer is that to another request"):
+    with pytest.raises(ModbusError, match="set coil 5 to 1: the answer belongs to another request"):
         client.write_coil(5, True)
     device.answer = lambda request: framed(request, bytes([16, 0, 100, 0, 1]))
     with pytest.raises(ModbusError, match="another request"):

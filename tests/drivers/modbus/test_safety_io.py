@@ -119,7 +119,7 @@ def test_the_emergency_stop_trips_until_it_is_acknowledged(
             r"no good poll for \d\.\d+ s, 0\.4 s allowed .*no answer within 0\.2 s",
         ),
         (SafetyIoFault.TRUNCATED, r"no good poll .*the answer was cut off after \d+ bytes"),
-        (SafetyIoFault.WRONG_UNIT, r"no good poll .*unit 2 answered, unit 1 was asked"),
+        (SafetyIoFault.WRONG_UNIT, r"no good poll .*unit 2 answered, but unit 1 was asked"),
         (SafetyIoFault.EXCEPTIONS, r"no good poll .*refused with exception 4 \(device failure\)"),
     ],
 )

@@ -257,7 +257,7 @@ def test_invalid_points_are_rejected(tmp_path: Path, text: str, named: str) -> N
 def test_invalid_data_and_requests_are_rejected(tmp_path: Path) -> None:
     few = data_of(made_up("spatial-8", 9, 12, home_first=True), tmp_path / "few.json")
     done = cdpr_here("calibrate", "fit", "spatial-8", "--data", few)
-    assert done.returncode == 2 and "15 and more" in done.stderr
+    assert done.returncode == 2 and "15 or more" in done.stderr
     other = cdpr_here("calibrate", "fit", "planar-4", "--data", few)
     assert other.returncode == 2 and "not of 'planar-4'" in other.stderr
     few.write_text("{}")

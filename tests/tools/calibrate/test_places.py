@@ -56,7 +56,7 @@ def test_a_number_gives_the_number_of_poses() -> None:
             0,
             5,
             None,
-            r"poses\.csv:1: column rz is missing; allowed: x, .*, rz, with",
+            r"poses\.csv:1: column rz is missing; allowed: x, .*, rz, each with",
         ),
         (0, 0, "q_m", r"poses\.csv:1: .*'q_m'"),
         (2, 1, "1" * 200_000, r"poses\.csv:3: field larger than"),

@@ -49,7 +49,7 @@ def test_a_bus_that_returns_can_be_acknowledged(lab: tuple[Path, str]) -> None:
         simulator.kill()
         rig.turn_until(lambda: rig.state is LoopState.FAULT)
         rig.turn_until(lambda: not rig.loop.busy)
-        assert "gone" in rig.status["reason"]
+        assert "lost" in rig.status["reason"]
         answer = rig.command("acknowledge")
         assert not answer["ok"]
         assert rig.state is LoopState.FAULT

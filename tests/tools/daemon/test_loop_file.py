@@ -119,7 +119,7 @@ def test_a_loop_file_for_another_users_process_is_not_trusted(
         ({"drives_stop_s": float("inf")}, "allowed: a finite number"),
         ({"block_fd": 2**63}, "less than or equal to 1048576"),
         ({"more": 1}, "Extra inputs are not permitted"),
-        ("[" * 2000, "is too deep"),
+        ("[" * 2000, "is nested too deeply"),
         ("{}", "Field required"),
         (" " * 5000, "is not valid JSON"),
     ],

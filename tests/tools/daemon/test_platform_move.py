@@ -157,7 +157,7 @@ def test_the_status_shows_position_and_rotation_of_a_platform() -> None:
     assert platform_text({"program_progress": progress}) == (
         "platform at 100.0, 200.0, 300.0 mm, turned by 0.00, 0.00, 5.00 deg; "
         "target 0.0, 0.0, 0.0 mm, turned by 0.00, 0.00, 0.00 deg; "
-        "no way on, at 500.0, 1000.0, 2000.0 mm: cable 1"
+        "the way is blocked, at 500.0, 1000.0, 2000.0 mm: cable 1"
     )
 
 

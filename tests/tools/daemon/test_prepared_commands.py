@@ -115,7 +115,7 @@ def test_a_fault_during_preparation_cancels_it(
     with monkeypatch.context() as found:
         found.setattr(supervisor, "check", lambda *_: supervisor.report(fault))
         rig.turn(1)
-    assert answer_to(rig, number) == "given up: axis 1: this was found"
+    assert answer_to(rig, number) == "cancelled: axis 1: this was found"
     rig.turn_until(lambda: not rig.loop.busy)
     assert rig.status["reason"].startswith("axis 1: this was found")
     faulty = limit is Limit.DRIVE
@@ -129,7 +129,7 @@ def test_losing_the_right_to_move_cancels_a_preparation(rig: LoopRig) -> None:
     number = begun_in_a_jog(rig, "without a right")
     rig.drop_right()
     rig.take_right()
-    why = "jog: the right to move has changed hands; held"
+    why = "jog: another client has taken the right to move; held"
     assert answer_to(rig, number) == f"cancelled: {why}"
     assert (rig.loop.engine.program.name, rig.status["reason"]) == ("hold", why)
 

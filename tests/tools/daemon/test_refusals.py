@@ -37,7 +37,7 @@ def test_rejections_give_allowed_values_as_typed() -> None:
     nothing = {"left": "target", "instead": "position_m"}
     refusal = CommandRefusal(RefusalCode.NOTHING_LEFT, "pose", {"resume": True}, nothing)
     text = text_of(refusal, "resume", instead="cdpr move --to")
-    assert text == "resume: no target has been left; allowed: cdpr move --to"
+    assert text == "resume: there is no target to continue; allowed: cdpr move --to"
     # the same arguments with a different rejection of the command
     states = {"state": "ready", "allowed": ["active"]}
     refusal = CommandRefusal(RefusalCode.NOT_IN_STATE, "program", arguments=states)

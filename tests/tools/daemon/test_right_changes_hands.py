@@ -62,7 +62,7 @@ def test_motion_ends_when_the_right_changes_hands_between_two_checks(rig: LoopRi
     assert np.all(np.diff(rows["setpoint_velocity_rad_s"], axis=0) <= 0.0)
     assert np.all(rows["setpoint_velocity_rad_s"][-1] == 0.0)
     assert (rig.status["state"], rig.status["program"]) == ("active", "hold")
-    assert rig.status["reason"] == "jog: the right to move has changed hands; held"
+    assert rig.status["reason"] == "jog: another client has taken the right to move; held"
     for do in ("program", "set"):
         answer = rig.command(do, program="jog", wanted=JOG, right=before)
         assert answer["text"] == f"{do}: another client has the right to move now"

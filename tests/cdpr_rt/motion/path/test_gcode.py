@@ -43,7 +43,7 @@ def test_the_path_begins_after_all_coordinates_were_named():
     path = read("G0 Z50", "G0 X1 Y2", "G1 X5 F100", "M30", origin=(0.1, 0.2, 0.3))
     np.testing.assert_allclose(path.start[:3], [0.101, 0.202, 0.35])
     assert len(path.moves) == 1
-    with pytest.raises(PathError, match=r"part.nc:3: Y never named"):
+    with pytest.raises(PathError, match=r"part.nc:3: Y is never given"):
         read("G0 X1 Z2", "X5", "M2")
 
 
@@ -117,7 +117,7 @@ def test_a_full_circle_and_a_helix_have_their_angle_and_length():
         (["G0 X0 Y0 Z0", "G0 X1 I5"], ROOM, r":2: I: has no meaning with G0"),
         (["G0 X0 Y0 Z0", "G0 G1 X5"], ROOM, r":2: G0 G1: allowed: one"),
         (["G90 G91", "G0 X0 Y0 Z0"], ROOM, r":1: G90 G91: allowed: one"),
-        (["G0 X0 Y0 Z0", "X1 X2"], ROOM, r":2: X stands twice"),
+        (["G0 X0 Y0 Z0", "X1 X2"], ROOM, r":2: X occurs twice"),
         (["G0 X0 Y0 Z0", "X1 Yes"], ROOM, r":2: 'Yes': allowed: words"),
         (["G0 X0 Y0 Z0", "X1e2"], ROOM, r":2: X1e2: allowed: numbers without exponent"),
         (["G0 X0 Y0 Z0", "G4 X2"], ROOM, r":2: G4: allowed: P or S, without axes"),
@@ -133,7 +133,7 @@ def test_a_full_circle_and_a_helix_have_their_angle_and_length():
         ),
         (["G0 X0 Y0 Z0 F60", "G1 X1", "M48 X5 Y5"], ROOM, r":3: M48: X has no meaning with it"),
         (["G0 X0 Y0 Z0 F60", "G90.1 G2 X5 I2"], ROOM, r":2: G2: after G90.1 both I and J"),
-        (["G0 X0 Y0 Z0", "M104 S200 G1 X5"], ROOM, r":2: M104 and G1 share a line"),
+        (["G0 X0 Y0 Z0", "M104 S200 G1 X5"], ROOM, r":2: M104 and G1 are on one line"),
         (["G0 X0 Y0 Z0", "M220 S50"], ROOM, r":2: M220: is not supported"),
         (["G0 X0 Y0 Z0", "(" * 5000], ROOM, r":2: the line is longer than 4096 characters"),
         (["G0 X0 Y0 Z0", "(open"], ROOM, r":2: a comment is not closed"),
@@ -141,7 +141,7 @@ def test_a_full_circle_and_a_helix_have_their_angle_and_length():
         (["G0 X0 Y0", "Z5"], PLANE, r":2: Z: the robot has no such axis; --ignore Z drops it"),
         (["G0 X0 Y0", "G18"], PLANE, r":2: G18: the robot moves in one plane"),
         (["G0 X0 Y0 Z0", "G4 P-1"], ROOM, r":2: G4: allowed"),
-        (["G0 X0 Y0"], ROOM, r"Z never named; .*: give the height with --z"),
+        (["G0 X0 Y0"], ROOM, r"Z is never given; .*: give the height with --z"),
     ],
 )
 def test_unsupported_codes_are_rejected(lines, where, told):
@@ -250,7 +250,7 @@ def test_relative_reference_moves_in_a_programs_head_are_followed():
 def test_a_file_without_z_takes_its_height_from_the_settings():
     path = read("G0 X0 Y0", "X5", "M2", z_m=0.02, origin=(0.0, 0.0, 1.0))
     assert ends_mm(path) == [[5, 0, 1020]]
-    with pytest.raises(PathError, match=r":1: Z: --z is for files that do not name it \(2 lines\)"):
+    with pytest.raises(PathError, match=r":1: Z: --z is only for files without Z \(2 lines\)"):
         read("G0 X0 Y0 Z5", "Z6", "M2", z_m=0.02)
 
 

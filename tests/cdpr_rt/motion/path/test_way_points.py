@@ -61,7 +61,7 @@ def test_a_stop_at_the_first_point_is_at_the_beginning_of_the_path(tmp_path):
 @pytest.mark.parametrize(
     ("text", "told"),
     [
-        (CSV + "100,1.6,5", r":4: does not end with a line end: was it cut short"),
+        (CSV + "100,1.6,5", r":4: does not end with a newline: is it truncated"),
         (CSV + "100,1.6\n", r":4: 2 cells; allowed: 7"),
         (CSV + "a,1.6,,,,,\n", r":4: x: value 'a'"),
         (CSV + "nan,1.6,,,,,\n", r":4: x: value nan"),

@@ -163,7 +163,7 @@ def test_silence_ends_the_right_to_move(rig: Rig, monkeypatch: pytest.MonkeyPatc
         ahead_ns = 10_000_000_000
         answer = client.put("/control", headers=headers)
         assert answer.status_code == 409
-        assert "run out" in answer.json()["error"]
+        assert "has expired" in answer.json()["error"]
         take(client, "jan")
 
 
