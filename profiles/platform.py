@@ -458,7 +458,7 @@ def _direction_faults(
         yield "platform.controlled", problem
         return
     if len(controlled) > n:
-        problem = f"{n}; allowed: {len(controlled)} and more to control {', '.join(given)}"
+        problem = f"{n}; allowed: {len(controlled)} or more to control {', '.join(given)}"
         if size == 3 and len(controlled) == 6:
             problem += ", or all anchor points equal: a point in space needs 3"
         yield "axes", problem

@@ -184,7 +184,7 @@ def _shape(s: Subject) -> Iterator[Finding]:
             yield Finding(f"axes[{i}].exit_point_m", text, impossible=True)
     span = max(distance for _, _, distance in apart)
     if span < _NEAREST_m:
-        text = f"exit points are up to {span:.3g} m apart; allowed: {_NEAREST_m:g} m and more"
+        text = f"exit points are up to {span:.3g} m apart; allowed: {_NEAREST_m:g} m or more"
         yield Finding("axes[0].exit_point_m", text, impossible=True)
         return
     wide = max(float(np.linalg.norm(b[i] - b[j])) for i in range(n) for j in range(i))
@@ -205,7 +205,7 @@ def _shape(s: Subject) -> Iterator[Finding]:
             if nearest < _NEAREST_m:
                 text = (
                     f"{what} up to {nearest:.2g} m from the exit point of "
-                    f"axes[{i}] ({s.axes[i].name}); allowed: {_NEAREST_m:g} m and more"
+                    f"axes[{i}] ({s.axes[i].name}); allowed: {_NEAREST_m:g} m or more"
                 )
                 yield Finding(f"platform.{key}", text, impossible=True)
 
@@ -451,7 +451,7 @@ def _what_helps(statics: PlatformStatics, position_m: FloatArray, turn_rad: Floa
     heavier = (replace(platform, mass_kg=times * mass_kg) for times in _MORE)
     heavy = next((changed.mass_kg for changed in heavier if helps(changed, low_N)), None)
     if heavy is not None:
-        text = f"a platform of {heavy:.3g} kg and more is possible there"
+        text = f"a platform of {heavy:.3g} kg or more is possible there"
         if loose is not None:
             text += (
                 f", or tension_min_N up to {loose * low_N.min():.3g} with correspondingly small "

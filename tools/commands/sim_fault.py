@@ -45,7 +45,7 @@ def fault(
         typer.Argument(
             help=f"Fault to inject immediately: {', '.join(InjectedFault)}; {MEND}: repair "
             f"everything, {LIST}: show what is broken.",
-            metavar=f"FAULT|{MEND}|{LIST}",
+            metavar="FAULT",
         ),
     ],
     value: Annotated[

@@ -193,7 +193,7 @@ def test_cable_lengths_reveal_a_wrong_size_of_all_sheets() -> None:
     assert "smaller than stated" in sized.text
     assert sized.size == pytest.approx(-0.0385, abs=0.008)
     assert readings.off_mm(outcome) < 3.0
-    assert "places of markers are known" in outcome.as_json()["frame"]
+    assert "known places of markers" in outcome.as_json()["frame"]
 
 
 @pytest.mark.parametrize("drums", [(0.02,) * 8, (0.0, 0.0, 0.03, 0.0, 0.0, 0.0, 0.0, 0.0)])

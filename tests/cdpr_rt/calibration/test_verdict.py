@@ -82,7 +82,7 @@ def test_frame_and_scale_are_reported_as_undetermined_without_points() -> None:
     blind = [one.what for one in open_directions(fit(what.file, what.seen))]
     for axis in "xyz":
         assert any(f"together along {axis}" in text for text in blind)
-        assert any(f"turned about {axis}" in text for text in blind)
+        assert any(f"rotation of all exit points together about {axis}" in text for text in blind)
     assert any("scale" in text for text in blind)
     seen = measured(what, 1e-3, 2e-3, 4)
     told = [one.what for one in open_directions(fit(what.file, seen))]

@@ -222,7 +222,7 @@ CASES = [
     Case(
         Limit.BROKEN_CABLE,
         tension(0.0, after_cycles=20),
-        "axis 2: the cable seems broken, or has slipped: tension fell suddenly to 4.8 N, "
+        "axis 2: the cable seems broken or has slipped: tension fell suddenly to 4.8 N, "
         "from above 20.0 N",
         at=18,
         value=50.0 / 21.0 * 2,

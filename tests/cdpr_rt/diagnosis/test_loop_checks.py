@@ -66,7 +66,8 @@ def test_a_platform_stabilised_by_tensions_is_accepted() -> None:
 def test_a_stable_but_weakly_damped_pose_is_doubtful() -> None:
     late, leans = findings_with_bounds(short_arms(), 20.0, 200.0, 4e-3, impossible=False)
     found = re.match(
-        r"axes\[0\]\.anchor_point_m: held by its tensions .* at \(.*\) m it may swing at (\d+) Hz, "
+        r"axes\[0\]\.anchor_point_m: its tensions act like springs, .* at \(.*\) m "
+        r"it may swing at (\d+) Hz, "
         r"with (0\.\d+) % of critical damping, for ([\d.]+) s ",
         late,
     )

@@ -121,6 +121,9 @@ def test_a_calibration_of_a_winch_with_another_drive_is_rejected(
     drive = robot.axes[0].winch.drive
     report = BootReport(node_id=1, vendor_id=drive.vendor_id, serial=booted)
     axes = (replace(robot.axes[0], calibration=calibration()), *robot.axes[1:])
-    told = r"axes\[0\]\.calibration: .*serial 1, but that of axis upper left has 77; calibrate it again"
+    told = (
+        r"axes\[0\]\.calibration: .*serial 1, but that of axis upper left has 77; "
+        "calibrate it again"
+    )
     with pytest.raises(ConfigurationError, match=told) if refused else nullcontext():
         check_drive_identities(replace(robot, axes=axes), (None,) * 3, [report])

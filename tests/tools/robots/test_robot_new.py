@@ -84,7 +84,7 @@ def test_the_error_for_a_platform_too_light_names_a_possible_mass(tmp_path: Path
     with pytest.raises(ProfileError) as caught:
         write_robot(answers_of(path, given, usual), path)
     assert re.search(
-        r"a platform of \d+\.?\d* kg and more is possible there, or tension_min_N up to 0\.\d+ "
+        r"a platform of \d+\.?\d* kg or more is possible there, or tension_min_N up to 0\.\d+ "
         "with correspondingly small winches",
         str(caught.value),
     )

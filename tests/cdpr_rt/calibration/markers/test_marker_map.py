@@ -165,7 +165,9 @@ def test_a_misread_id_does_not_join_groups_of_markers(one: Room) -> None:
     assert "2 islands" in fit.faults[0] and not fit.warnings
     assert fit.map.placed.sum() == 12 and 33 not in fit.map.ids
     assert difference(fit.map, one.truth).position_error_m.max() < 0.004
-    assert any("marker 33 read, but not among the markers laid out" in note for note in fit.notes)
+    assert any(
+        "marker 33 detected, but not among the markers laid out" in note for note in fit.notes
+    )
 
 
 def test_a_map_requires_images_with_two_markers() -> None:
