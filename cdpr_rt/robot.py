@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Final, Protocol, Self
+from typing import Any, Final, Protocol, Self, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -91,6 +92,9 @@ class Backend(Protocol):
 
     def plan(self, file: Path) -> str:
         """Plan the path in a file; return the name of the plan."""
+
+    def open_stream(self) -> AbstractContextManager[Callable[[Sequence[float], float], None]]:
+        """Open a set-point stream; yield what sends a position (3,), m, and its scale."""
 
     def log(self, fields: Sequence[str]) -> Row:
         """Return these fields of all cycles since the handle was opened."""
@@ -485,6 +489,28 @@ class Robot:
         if not file.is_file():
             raise InvalidArgument(f"{file}: no such file")
         self.run("path", plan=self._backend.plan(file))
+
+    @contextmanager
+    def stream(self, scale: float = 1.0) -> Iterator[Callable[[ArrayLike], None]]:
+        """Follow a hand within the block, then hold; yield a function that takes its position.
+
+        Call it 30 to 60 times a second with (k,) coordinates in m, and `wait` in between. The
+        platform moves as the hand does from its first position on, `scale` times as far. It stops
+        if no position arrives for 0.5 s. Without a platform the coordinates are lengths that the
+        first winches, three at most, pay out. Raises Refused if the daemon has no stream.
+        """
+        factor, k = _positive("scale", scale), self._k or min(3, len(self.axes))
+        assert factor is not None  # it was given
+        with self._backend.open_stream() as send_packet, _HeldOnError(self, Refused):
+
+            def send(position_m: ArrayLike) -> None:
+                position = self._vector("position_m", position_m, k, "coordinate, in m")
+                send_packet([*cast(list[float], position), 0.0, 0.0][:3], factor)
+
+            program = "pose" if self._k else "follow"
+            self._start(program, {"stream": True} if self._k else {})
+            yield send
+            self.hold()
 
     def run(self, program: str, /, **arguments: Any) -> None:
         """Run a program with its arguments until it is done; `hold` and `idle` return immediately.

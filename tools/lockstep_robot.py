@@ -621,6 +621,18 @@ class LockstepRobot:
         lines = plan.nodes.line[plan.timed.node]
         return write_plan(folder, plan.timed, lines, file.name, shown.planner.model)
 
+    @contextmanager
+    def open_stream(self) -> Iterator[Callable[[Sequence[float], float], None]]:
+        """Open a stream under the right held here; yield what sends a position and its scale."""
+        self._require_open()
+        sender = self.stream.sender()
+
+        def send(position_m: Sequence[float], scale: float) -> None:
+            self._require_open()
+            self.stream.take(sender.packet(self.now_s, position_m, scale))
+
+        yield send
+
     def log(self, fields: Sequence[str]) -> Row:
         """Return these fields of the rows since the robot was ready, at most the last `ring_s`."""
         self._require_open()

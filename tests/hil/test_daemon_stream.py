@@ -15,6 +15,7 @@ import pytest
 from daemon_rig import RealDaemon, cdpr, until
 from hostile_proxy import hostile
 
+import cdpr_rt as api
 from cdpr_profiles import load_winch
 from cdpr_rt.core.states import LoopState
 from cdpr_rt.service.recording_reader import RecordingReader
@@ -86,6 +87,24 @@ def setpoints(daemon: RealDaemon) -> list[float]:
     """Return the set-points in m of cable, which motors follow softly at this slow cycle."""
     axes = daemon.status()["axes"]
     return [float(axis["setpoint_rad"]) * WINCH.cable_m_per_motor_rad for axis in axes]
+
+
+def test_a_script_leads_the_robot_and_holds_it_at_the_end(daemon: RealDaemon) -> None:
+    with api.connect(socket=daemon.socket) as robot:
+        robot.enable()
+        before = setpoints(daemon)
+        with robot.stream(scale=SCALE) as send:
+
+            def there() -> bool:
+                send([0.0, 0.0])
+                robot.wait(1.0 / RATE_Hz)
+                send([0.02, 0.0])
+                robot.wait(0.2)
+                return bool(np.subtract(setpoints(daemon), before)[0] > 0.5 * 0.02 * SCALE)
+
+            until(there)
+            assert robot.program == "follow"
+        assert robot.program == "hold"
 
 
 def test_the_robot_follows_a_hand_and_stops_when_it_disappears(daemon: RealDaemon) -> None:

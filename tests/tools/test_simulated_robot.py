@@ -84,6 +84,22 @@ def test_a_path_of_way_points_is_planned_and_followed(robot: cdpr.Robot, tmp_pat
         robot.follow(tmp_path / "none.csv")
 
 
+def test_a_platform_follows_a_stream_and_holds_at_its_end(robot: cdpr.Robot) -> None:
+    robot.move_to([0.0, 1.8])
+    with robot.stream(scale=0.5) as send:
+        for k in range(60):
+            send([1.0 + 0.002 * k, 0.0])  # only its motion counts
+            robot.wait(1.0 / 60.0)
+        robot.wait(0.4)
+        assert robot.program == "pose"
+        with pytest.raises(cdpr.InvalidArgument, match=r"position_m: shape \(3,\); allowed: \(2,"):
+            send([0.0, 0.0, 0.0])
+    assert robot.program == "hold"
+    assert robot.position_m == pytest.approx([0.059, 1.8], abs=2e-3)
+    with pytest.raises(cdpr.InvalidArgument, match="scale: 0;"), robot.stream(scale=0):
+        pass
+
+
 def test_wrong_shapes_and_values_move_nothing(robot: cdpr.Robot) -> None:
     for target, message in (
         ([0.1, 1.8, 0.0], r"position_m: shape \(3,\); allowed: \(2,\), one number for each coord"),

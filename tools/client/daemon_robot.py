@@ -9,7 +9,7 @@ import tempfile
 import threading
 import time
 import weakref
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import Any, Final
@@ -31,6 +31,8 @@ from cdpr_rt.robot import (
     Refused,
     Robot,
 )
+from cdpr_rt.service.stream_client import StreamClient
+from cdpr_rt.service.stream_packet import StreamSession
 from cdpr_tools.client.client import (
     ConnectionLostError,
     CrowdedError,
@@ -93,6 +95,7 @@ def run(
     bus: str | Sequence[str] | None = None,
     plant: str | Path | None = None,
     record: str | Path | None = None,
+    stream: str | None = None,
     controller: str | None = None,
     tension_distribution: str | None = None,
     programs: Sequence[str] = (),
@@ -102,8 +105,9 @@ def run(
     """Start a daemon as `cdpr run` does and return its robot.
 
     `bus` are URLs as for `--bus`, such as "simbus:" for simulated drives; by default those of the
-    robot's file. `record` is the folder of the recording. `controller`, `tension_distribution` and
-    `programs` are your own: "FILE.py:NAME" or "MODULE:NAME". If the robot's file names code,
+    robot's file. `record` is the folder of the recording. `stream` is the HOST:PORT at which
+    `Robot.stream` reaches the daemon, such as "127.0.0.1:0". `controller`, `tension_distribution`
+    and `programs` are your own: "FILE.py:NAME" or "MODULE:NAME". If the robot's file names code,
     `allow_code` allows it from now on. A bus with real drives needs `yes`. The daemon ends when the
     handle is closed or the script dies: it lowers the platform and removes the power. Raises
     AlreadyRunning, InvalidRobot, InvalidArgument if `yes` is missing, and Error if the daemon does
@@ -120,6 +124,7 @@ def run(
     for option, value in (
         ("--plant", plant),
         ("--record", record),
+        ("--stream", stream),
         ("--controller", controller),
         ("--tension-distribution", tension_distribution),
     ):
@@ -335,6 +340,21 @@ class _Remote:
         if (line := job.get("next_line")) is not None:
             raise Refused(f"{file}: is too long for one plan; divide it at line {line}")
         return str(job["plan"])
+
+    @contextmanager
+    def open_stream(self) -> Iterator[Callable[[Sequence[float], float], None]]:
+        """Open the daemon's stream; yield what sends a position and its scale."""
+        token = self.take_right()
+        with self._errors():
+            given = self._daemon.post("/stream", token=token)
+        session = StreamSession(int(given["session"]), bytes.fromhex(given["key"]))
+        with StreamClient(given["host"], int(given["port"]), session) as client:
+
+            def send(position_m: Sequence[float], scale: float) -> None:
+                client.send(position_m, scale=scale)
+                client.receive()
+
+            yield send
 
     def log(self, fields: Sequence[str]) -> Row:
         last = _recorded_file(self.status())
