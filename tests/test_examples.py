@@ -23,6 +23,8 @@ PRINTED = {
     "own_program.py": ["circle: at most ", "ended: circle: at ", "active, hold at"],
     "own_tension_distribution.py": ["built-in: [", "near_wanted: [", "mm off"],
     "workspace.py": ["% of the grid can be held", "lowest tension", "wrote "],
+    "drawing.py": ["drawing.csv: ", "drawing.nc: "],
+    "teleoperate.py": ["mm at the end", "active, hold at"],
     "relative_moves_daemon.py": ["refused: pose: distance_m", "recorded", "the daemon has ended"],
 }
 
