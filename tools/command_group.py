@@ -14,6 +14,7 @@ import typer
 from typer.core import TyperCommand, TyperGroup
 from typing_extensions import override
 
+from cdpr_tools.errors import BadInputError
 from cdpr_tools.loading import loading_notice
 
 ROBOT_VARIABLE = "CDPR_ROBOT"
@@ -78,11 +79,13 @@ def _robot_option(args: Sequence[str]) -> tuple[str | None, list[str]]:
     robot, others = None, []
     for word in words:
         if word == "--robot":
-            robot = next(words, None)
+            robot = next(words, "")
         elif word.startswith("--robot="):
             robot = word.partition("=")[2]
         else:
             others.append(word)
+        if robot is not None and (not robot or robot.startswith("-")):
+            raise BadInputError("--robot: give the name or the file of a robot after it")
         if word == "--":
             break
     return robot, [*others, *words]

@@ -291,8 +291,7 @@ class ControlLoop:
             feedback, blind = cycle.device.feedback, safe_stop.pays_out_blind
             reaction = supervisor.check(feedback, estimate, engine.setpoint, torque_Nm, blind)
             if engine.program_s >= supervisor.limits.late_s and engine.program_fault is None:
-                engine.program_fault = _too_long(engine, supervisor.limits.late_s)
-                reaction = supervisor.report(engine.program_fault)
+                reaction = supervisor.report(_too_long(engine, supervisor.limits.late_s))
             if parts.lengths_disagree is not None:
                 engine.lengths_disagree_m, axis, jump_m, jumped = parts.lengths_disagree()
                 reaction = supervisor.compare_lengths(

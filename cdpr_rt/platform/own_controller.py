@@ -119,10 +119,10 @@ class OwnController:
         if self._failed:
             return
         self._failed = True  # until this cycle succeeds
-        if self._cycle == 0:
-            self._controller.reset(self._state)
         state = self._state
         try:
+            if self._cycle == 0:
+                self._controller.reset(state)
             wanted = np.asarray(self._controller.update(state, self._target), float)
         except SystemExit as error:  # it must not end the loop's process
             raise RuntimeError(f"SystemExit: {error}") from error

@@ -204,6 +204,15 @@ class _Builder:
             enabled |= int(self.variable(parameters, 1).default or 0) & _NO_RTR
         if not fixed:
             self.require(parameters, 1, enabled | _PDO_OFF)
+        elif int(self.variable(parameters, 1).default or 0) & (_PDO_OFF | _IDENTIFIER) != (
+            enabled & _IDENTIFIER
+        ):
+            default = int(self.variable(parameters, 1).default or 0)
+            raise DriverError(
+                f"object {parameters:04X}h:1 cannot be written, and its identifier is "
+                f"{default:X}h; the profile needs {pdo.cob_id(node_id):X}h (cob_id_offset "
+                f"{pdo.cob_id_offset:X}h)"
+            )
         self.require(mapping, 0, 0)
         self.require(parameters, 2, pdo.transmission_type)
         times = (3, round(pdo.inhibit_time_s * 1e4)), (5, round(pdo.event_timer_s * 1e3))

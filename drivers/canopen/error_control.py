@@ -118,10 +118,16 @@ class ErrorControl:
     # -- queries
 
     def wait_for_boot_up(self, node_id: int, timeout_s: float) -> bool:
-        """Wait for a node's boot-up; return whether it has booted since `expect_reset`."""
+        """Wait for a node's boot-ups; return whether it has booted since `expect_reset`.
+
+        Boot-ups that do not come in time are not expected any more.
+        """
         node = self._nodes[node_id]
         until_s = self._clock.now_s + timeout_s
-        return self._clock.wait(lambda: node.boot_ups > node.boot_ups_at_reset, until_s)
+        self._clock.wait(lambda: not node.boot_ups_expected, until_s)
+        booted = node.boot_ups > node.boot_ups_at_reset
+        node.boot_ups_expected = 0 if booted else node.boot_ups_expected
+        return booted
 
     def wait_for_heartbeat(self, node_id: int, timeout_s: float) -> int | None:
         """Return the NMT state of a node's next heartbeat; None if none arrived."""

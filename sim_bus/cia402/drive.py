@@ -51,7 +51,7 @@ _BABBLE_FRAME = b"\x00\xff\x81BABBL"
 
 
 class FaultInjection:
-    """Object 2F00h, which real drives do not have; an EDS may lack all or part of it."""
+    """Object 2F00h of simulated drives; an EDS may lack all or part of it."""
 
     def __init__(
         self, od: ObjectDictionary, state_machine: StateMachine, outbox: list[bytes]

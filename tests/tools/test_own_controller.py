@@ -95,6 +95,18 @@ def test_a_failing_controller_stops_the_robot_like_any_fault(robot_file: Path) -
             robot.acknowledge()
 
 
+def test_a_controller_whose_reset_ends_the_process_stops_the_robot(robot_file: Path) -> None:
+    class Leaving(PoseController):
+        def reset(self, state: cdpr.State) -> None:
+            raise SystemExit("no start")
+
+    with cdpr.simulate(robot_file, controller=Leaving()) as robot:
+        robot.enable()
+        with pytest.raises(cdpr.Faulted, match="SystemExit: no start"):
+            robot.tighten("home")
+            robot.move_to([0.2, 1.8])
+
+
 def test_the_built_in_controller_brakes_and_lowers_after_any_fault(robot_file: Path) -> None:
     mine = PoseController()
     with cdpr.simulate(robot_file, controller=mine) as robot:

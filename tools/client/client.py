@@ -267,6 +267,11 @@ def is_starting(robot: str) -> bool:
     return _start_stage(robot, None) is not None
 
 
+def live_sockets() -> list[Path]:
+    """Return the sockets of all running daemons that this user may command."""
+    return [path for path in find_sockets() if _is_alive(path)]
+
+
 def _only_socket(robot: str | None) -> Path:
     found = [path for path in find_sockets(robot) if _is_alive(path)]
     if len(found) == 1:
@@ -279,7 +284,7 @@ def _only_socket(robot: str | None) -> Path:
         if doing is not None:
             what = f"is still starting, {doing}" if doing else "is starting, or ending"
             raise NoDaemonError(f"the daemon{whose} {what}: it does not answer")
-        others = found_instead(filter(_is_alive, find_sockets()))
+        others = found_instead(live_sockets())
         raise NoDaemonError(f"no daemon runs{whose}; `cdpr run ROBOT` starts one{others}")
     if robot is not None:  # this user's before the system's
         return found[0]

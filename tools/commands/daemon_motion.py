@@ -19,6 +19,7 @@ from cdpr_tools.errors import BadInputError, WorkFailedError
 from cdpr_tools.number_options import is_number, numbers, numbers_command
 from cdpr_tools.output import Output
 
+_JOG_S: Final = 1.0
 _STANDING = frozenset({"hold", "idle"})
 
 
@@ -121,15 +122,18 @@ def jog(
             metavar="AXIS=SPEED... | DIRECTION=STEP...",
         ),
     ],
-    seconds: Annotated[float, typer.Option(min=0.1, max=3600.0, help="Duration.")] = 1.0,
+    seconds: Annotated[
+        float | None,
+        typer.Option(min=0.1, max=3600.0, help="Duration of a speed; 1 if left out."),
+    ] = None,
     cable: Annotated[
         bool, typer.Option("--cable", help="Speeds are mm/s of cable, positive pays out.")
     ] = False,
 ) -> None:
     """Turn axes at a constant speed for a while, or move a platform by one step."""
     if (step := _step(daemon, axes)) is not None:
-        if cable:
-            raise BadInputError(f"{' '.join(axes)}: allowed: without --cable")
+        if cable or seconds is not None:
+            raise BadInputError(f"{' '.join(axes)}: allowed: without --cable and --seconds")
         with in_typed_words("jog", " ".join(axes)):
             run_to_end(daemon, out, "pose", step.arguments(daemon), arrived=True)
         return
@@ -138,7 +142,7 @@ def jog(
     values = [factor * speeds.get(axis, 0.0) for axis in range(n)]
 
     def motion(robot: Robot) -> None:
-        (robot.jog_cable if cable else robot.jog)(values, seconds)
+        (robot.jog_cable if cable else robot.jog)(values, seconds or _JOG_S)
 
     with in_typed_words("jog", axes=_names(daemon)):
         outcome = carry_out(daemon, out, motion)

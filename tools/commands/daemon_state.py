@@ -11,7 +11,7 @@ from rich.console import Group
 from rich.live import Live
 from rich.text import Text
 
-from cdpr_tools.client.client import Daemon, NoDaemonError, open_daemon
+from cdpr_tools.client.client import Daemon, NoDaemonError, live_sockets, open_daemon
 from cdpr_tools.client.daemon_end import end_daemon
 from cdpr_tools.client.daemon_robot import commanded
 from cdpr_tools.client.refusals import DaemonRefusalError
@@ -203,7 +203,10 @@ def stop(
     except NoDaemonError:  # no request was sent yet
         if url is not None:  # the daemon may run on another machine
             raise
-        out.say(*end_leftover_processes(robot, socket) or ["nothing runs"])
+        ended = end_leftover_processes(robot, socket)
+        if not ended and socket is None and live_sockets():
+            raise  # another robot runs, which the caller may have meant
+        out.say(*ended or ["nothing runs"])
     out.result({"ok": True})
 
 

@@ -21,6 +21,7 @@ from cdpr_rt.programs.lower import lowering_s
 from cdpr_tools.commands import run
 from cdpr_tools.commands.options import RobotOrWinchArgument
 from cdpr_tools.composition.own_code import OwnCodeOptions
+from cdpr_tools.errors import BadInputError
 from cdpr_tools.report.page import rendered
 
 _SOCKETS = Path("/run/cdpr-rt")
@@ -53,6 +54,11 @@ def print_unit(
     profile = load_robot(robot)
     with get_command(run.app).make_context("cdpr run", [robot, *context.args]) as read:
         asked = dict(read.params)
+    if asked["allow_code"]:
+        raise BadInputError(
+            "--allow-code: a service must not allow code that changes later; start `cdpr run` once "
+            "with it, as the service's user"
+        )
     if asked["unix"] is None:
         asked["unix"] = _SOCKETS / f"{profile.profile}.sock"
     apart = (*_ASIDE, _OF_THE_SIMULATOR, *_OWN_CODE)

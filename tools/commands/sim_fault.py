@@ -72,7 +72,7 @@ def fault(
 ) -> None:
     """Break a running simulated robot: a cable, an encoder, a drive; or mend it.
 
-    The command writes object 2F00h, which no real drive has, while the robot's master keeps
+    The command writes object 2F00h of the simulated drives while the robot's master keeps
     running. For `pre-operational` it sends the NMT command. No controller reads what is broken from
     the simulator.
     """

@@ -1,4 +1,4 @@
-"""Faults injected into a simulated drive by object 2F00h, which real drives do not have."""
+"""Faults injected into a simulated drive by its object 2F00h."""
 
 from __future__ import annotations
 
@@ -61,6 +61,8 @@ _INJECTIONS = {
     InjectedFault.PRE_OPERATIONAL: FaultInjection(0, 1, 1, 1, ""),
     InjectedFault.CELL_OFF: FaultInjection(14, 40, -(2**15), 2**15 - 1, "N"),
 }
+_VIRTUAL: Final = ("vcan", "vxcan")
+"""Beginnings of the names of virtual CAN interfaces on Linux, to which no drive is wired."""
 _LASTING: Final = (InjectedFault.CUT_CABLE, InjectedFault.SLIP, InjectedFault.CELL_OFF)
 """Faults that last until they are mended, besides silence; the others happen once."""
 MEND: Final = "mend"
@@ -101,6 +103,12 @@ class InjectionAccess:
 
     def __init__(self, robot: Robot, axis: RobotAxis, url: BusUrl) -> None:
         self._robot, self._axis, node = robot, axis, axis.winch.node_id
+        virtual = url.interface == "socketcan" and url.channel.startswith(_VIRTUAL)
+        if not (url.is_simulated or virtual):
+            raise BadInputError(
+                f"bus {url}: allowed: a simulated bus, or socketcan:vcan0 and the like; real "
+                "drives may use object 2F00h for something else"
+            )
         with raised_as(BadInputError, BusError):
             self._network = CanNetwork(
                 url, PacedClock(), [node], robot.master_node_id, robot.master_heartbeat_s

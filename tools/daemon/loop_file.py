@@ -22,6 +22,7 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationErr
 from cdpr_profiles.bounded_input import open_regular, parse_json
 from cdpr_profiles.errors import ProfileError, brief
 from cdpr_rt.loop.stop_socket import STOP_SUFFIX
+from cdpr_tools.command_group import ROBOT_VARIABLE
 from cdpr_tools.daemon.paths import (
     LAUNCHER_SUFFIX,
     LOOP_SUFFIX,
@@ -301,9 +302,11 @@ def _loads(process: Path, robot: str | None, socket: Path | None) -> bool:
         if socket is not None:
             is_it = str(socket) in words
         else:
-            of_robot = robot is None or short_name(robot) in map(short_name, words)
             environment = (process / "environ").read_bytes().split(b"\0")
             variables = dict(each.partition(b"=")[::2] for each in environment)
+            named = [word.removeprefix("--robot=") for word in words]
+            named.append(variables.get(ROBOT_VARIABLE.encode(), b"").decode(errors="replace"))
+            of_robot = robot is None or short_name(robot) in map(short_name, named)
             here = os.environb.get(_RUNTIME_VARIABLE) == variables.get(_RUNTIME_VARIABLE)
             is_it = of_robot and here and "--socket" not in words
         open_files = [fd.readlink().suffix for fd in (process / "fd").iterdir()] if is_it else []

@@ -198,3 +198,13 @@ def test_read_stamp_returns_none_if_1020h_is_unused(network: CanNetwork) -> None
     assert read_stamp(network, 1) is None
     network.write(1, 0x1020, 1, 5)
     assert read_stamp(network, 1) == Stamp(5, 0)
+
+
+def test_a_fixed_identifier_that_differs_from_the_profile_is_rejected() -> None:
+    objects = dictionary(1)
+    objects[0x1400][1].access_type = "ro"
+    assert make_configuration(DRIVE, objects, 1, SETTINGS, 3.0).entries
+    moved = DRIVE.rpdos[0].model_copy(update={"cob_id_offset": 0x300})
+    profile = DRIVE.model_copy(update={"rpdos": (moved,)})
+    with pytest.raises(DriverError, match=r"1400h:1 cannot be written, .* is 201h; .* needs 301h"):
+        make_configuration(profile, objects, 1, SETTINGS, 3.0)

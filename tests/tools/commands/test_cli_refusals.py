@@ -244,3 +244,17 @@ def test_a_missing_optional_package_is_named(module: str, words: list[str]) -> N
     assert ended.stderr == (
         f"cdpr: needs {module}, which comes with: pip install 'cdpr-rt[daemon]'\n"
     )
+
+
+@pytest.mark.parametrize("words", [("--robot",), ("--robot", "--json"), ("--robot=",)])
+def test_a_robot_option_without_a_robot_is_rejected(
+    words: tuple[str, ...], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("CDPR_ROBOT", "planar-3")
+    assert "--robot: give the name or the file of a robot" in refused(2, "robot", "show", *words)
+
+
+def test_a_fault_is_injected_on_buses_of_simulated_drives_only() -> None:
+    bus = ("--bus", "socketcan:can0")
+    message = refused(2, "sim", "fault", WINCH, "cut-cable", *bus)
+    assert "socketcan:can0: allowed: a simulated bus" in message

@@ -89,6 +89,7 @@ def test_systemd_reports_no_problem_with_the_unit(tmp_path: Path) -> None:
         (("--plant", "here.toml"), "simbus:"),
         (("--record", "here", "--no-record"), "one of them"),
         (("--stream", "7710", "--no-stream"), "one of them"),
+        (("--allow-code",), "a service must not allow code that changes later"),
     ],
 )
 def test_a_unit_for_an_invalid_run_is_rejected(options: tuple[str, ...], words: str) -> None:
