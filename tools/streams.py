@@ -1,7 +1,7 @@
 """Standard output and error that may fail: a full disk, a closed terminal, no reader.
 
-Writing to standard error never fails. Standard output has the result of a command:
-its failure is raised once, as OutputLostError.
+Writing to standard error never fails. Standard output has the result of a command: its failure is
+raised once, as OutputLostError. Standard input may have what was typed before its question.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ import os
 import select
 import signal
 import sys
+import termios
 from contextlib import suppress
 from typing import Any, Final
 
@@ -23,6 +24,12 @@ _OUT: Final = 1
 _ERROR: Final = 2
 _PATIENCE_S: Final = 0.2
 """Time that a daemon waits for a reader that reads nothing, such as a paused terminal."""
+
+
+def discard_typed_ahead() -> None:
+    """Discard what has been typed at the terminal before the question that is asked now."""
+    if sys.stdin.isatty():
+        termios.tcflush(sys.stdin, termios.TCIFLUSH)
 
 
 class OutputLostError(WorkFailedError):

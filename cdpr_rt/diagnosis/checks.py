@@ -217,8 +217,8 @@ def _tensions(statics: PlatformStatics) -> Iterator[Finding]:
     for place, where in ((home[None], ""), (way, "on the way to the box of targets, ")):
         missing = ~statics.is_target(place)
         if missing.any():
-            text = where + why_not_held(statics, place[missing.argmax()], NONE_rad)
-            yield Finding("platform.home_m", text, impossible=True)
+            why, helps = why_not_held(statics, place[missing.argmax()], NONE_rad)
+            yield Finding("platform.home_m", where + why, impossible=True, helps=helps)
             break
     points, turns = statics.points(), statics.orientations
     moving_N = np.array([statics.margin_N(points, platform.acceleration_m_s2, t) for t in turns])
@@ -230,8 +230,9 @@ def _tensions(statics: PlatformStatics) -> Iterator[Finding]:
             low, high = point_text(smaller.low_m), point_text(smaller.high_m)
             text += f"they would be in all of {low} to {high} m; "
         worst = np.unravel_index(moving_N.argmin(), moving_N.shape)
-        text += f"at the worst place, {why_not_held(statics, points[worst[1:]], turns[worst[0]])}"
-        yield Finding("platform.workspace_min_m", text, impossible=taken == 0.0)
+        why, helps = why_not_held(statics, points[worst[1:]], turns[worst[0]])
+        text += f"at the worst place, {why}"
+        yield Finding("platform.workspace_min_m", text, taken == 0.0, helps)
 
 
 def standing_tensions_N(statics: PlatformStatics) -> FloatArray:
@@ -377,14 +378,19 @@ _MORE = np.geomspace(1.02, 100.0, 230)
 """Increasing factors, likewise."""
 
 
-def why_not_held(statics: PlatformStatics, position_m: FloatArray, turn_rad: FloatArray) -> str:
-    """Return why a position (k,) with a rotation (3,) is not feasible, and what would help."""
+def why_not_held(
+    statics: PlatformStatics, position_m: FloatArray, turn_rad: FloatArray
+) -> tuple[str, str]:
+    """Return why a position (k,) with a rotation (3,) is not feasible, and what would help.
+
+    That is a text, and the key of the value that would help, "" if it is the position.
+    """
     where = f"at {point_text(position_m)} m"
     reserve = float(statics.margin_N(position_m, 0.0, turn_rad))
     if turn_rad.any():
         where += f", turned by {_turn(turn_rad, position_m.size)}"
     if not math.isfinite(reserve):
-        return f"{where} {_singular(statics)}"
+        return f"{where} {_singular(statics)}", "axes[0].anchor_point_m"
     needed = ", ".join(str(round(value)) for value in statics.tensions_N(position_m, turn_rad))
     allowed = f"{statics.low_N.min():g} to {statics.model.torque_limited_N.max():.4g} N are allowed"
     if reserve < 0.0:
@@ -394,7 +400,8 @@ def why_not_held(statics: PlatformStatics, position_m: FloatArray, turn_rad: Flo
             f"{where} the cables have {needed} N; {allowed}, which leaves too little "
             "reserve for motion"
         )
-    return f"{text}; {_what_helps(statics, position_m, turn_rad)}"
+    helps, key = _what_helps(statics, position_m, turn_rad)
+    return f"{text}; {helps}", key
 
 
 def _singular(statics: PlatformStatics) -> str:
@@ -426,8 +433,10 @@ def _is_upright(points: FloatArray) -> bool:
     return abs(float(normal[2])) < _FLAT
 
 
-def _what_helps(statics: PlatformStatics, position_m: FloatArray, turn_rad: FloatArray) -> str:
-    """Return how much one value of the robot's file must change to make a target feasible there."""
+def _what_helps(
+    statics: PlatformStatics, position_m: FloatArray, turn_rad: FloatArray
+) -> tuple[str, str]:
+    """Return how much one value of the robot's file must change for a target there, and its key."""
     platform, low_N = statics.platform, statics.low_N
     acceleration, mass_kg = platform.acceleration_m_s2, platform.mass_kg
 
@@ -439,14 +448,17 @@ def _what_helps(statics: PlatformStatics, position_m: FloatArray, turn_rad: Floa
     for share in _FACTORS if turn_rad.any() else ():
         if bool(statics.is_target(position_m, share * turn_rad)):
             angle = share * platform.workspace_angle_rad
-            return f"workspace_angle_rad up to {angle:.3g} is possible there"
+            text = f"workspace_angle_rad up to {angle:.3g} is possible there"
+            return text, "platform.workspace_angle_rad"
     slowest = replace(platform, acceleration_m_s2=_FACTORS[-1] * acceleration)
     for share in _FACTORS if helps(slowest, low_N) else ():
         if helps(replace(platform, acceleration_m_s2=share * acceleration), low_N):
-            return f"acceleration_m_s2 up to {share * acceleration:.3g} is possible there"
+            text = f"acceleration_m_s2 up to {share * acceleration:.3g} is possible there"
+            return text, "platform.acceleration_m_s2"
     for share in _FACTORS:
         if helps(replace(platform, mass_kg=share * mass_kg), low_N):
-            return f"a platform of up to {share * mass_kg:.3g} kg is possible there"
+            text = f"a platform of up to {share * mass_kg:.3g} kg is possible there"
+            return text, "platform.mass_kg"
     loose = next((share for share in _FACTORS if helps(platform, share * low_N)), None)
     heavier = (replace(platform, mass_kg=times * mass_kg) for times in _MORE)
     heavy = next((changed.mass_kg for changed in heavier if helps(changed, low_N)), None)
@@ -457,12 +469,13 @@ def _what_helps(statics: PlatformStatics, position_m: FloatArray, turn_rad: Floa
                 f", or tension_min_N up to {loose * low_N.min():.3g} with correspondingly small "
                 "winches"
             )
-        return text
+        return text, "platform.mass_kg"
     if loose is not None:
-        return f"tension_min_N up to {loose * low_N.min():.3g} is possible there"
+        text = f"tension_min_N up to {loose * low_N.min():.3g} is possible there"
+        return text, "limits.tension_min_N"
     turned = len(platform.controlled) > len(platform.home_m)
     others = ", or other anchor points, whose cables turn it both ways about each axis"
-    return f"only a place farther inside the exit points helps{others if turned else ''}"
+    return f"only a place farther inside the exit points helps{others if turned else ''}", ""
 
 
 def _turn(turn_rad: FloatArray, coordinates: int) -> str:

@@ -146,7 +146,7 @@ def loop_findings(s: Subject) -> Iterator[Finding]:
         if isinstance(error, SwingsError):
             text = f"value {robot.sync_period_s:g}; {error}: a shorter cycle, longer arms or less "
             text += f"tension_max_N help{_known_damping(robot)}"
-            yield Finding("sync_period_s", text, impossible=True)
+            yield Finding("sync_period_s", text, impossible=True, helps="limits.tension_max_N")
         elif isinstance(error, UnstableError):
             text = (
                 f"{error}: anchor points that lie towards their exit points, with longer arms, help"

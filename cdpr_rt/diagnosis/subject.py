@@ -25,6 +25,8 @@ class Finding:
     text: str
     impossible: bool
     """Whether the robot cannot work like this; otherwise it works with a restriction."""
+    helps: str = ""
+    """Another key whose change the text proposes, if it does."""
 
 
 class Subject:

@@ -6,7 +6,6 @@ import math
 import os
 import select
 import sys
-import termios
 from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager
 from datetime import UTC, datetime
@@ -42,6 +41,7 @@ from cdpr_tools.calibrate.run import COUNTED, DATA, IMAGES, StopCriterion, refus
 from cdpr_tools.client.client import Daemon
 from cdpr_tools.errors import BadInputError, CommandError, WorkFailedError
 from cdpr_tools.output import Output
+from cdpr_tools.streams import discard_typed_ahead
 
 # Read the pose at which a daemon's robot stands into the data of a calibration.
 
@@ -360,9 +360,7 @@ class AskedPoints:
         if not self._open:
             return
         with self._out.paused():
-            if sys.stdin.isatty():
-                # discard input typed during the motion: nobody has measured this pose yet
-                termios.tcflush(sys.stdin, termios.TCIFLUSH)
+            discard_typed_ahead()  # nobody has measured this pose yet
             self._ask(pose, self._origin_m())
 
     def _ask(self, pose: int, origin_m: FloatArray) -> None:

@@ -14,7 +14,7 @@ from cdpr_drivers.bus.budget import machine_budget
 from cdpr_drivers.robot.robot_buses import refusal
 from cdpr_profiles import Robot, load_robot
 from cdpr_profiles.calibration.in_force import load_calibrated
-from cdpr_profiles.errors import ProfileError, printable
+from cdpr_profiles.errors import printable
 from cdpr_profiles.platform import NO_PLATFORM, Platform
 from cdpr_rt.diagnosis import checks
 from cdpr_rt.diagnosis.subject import Finding, Subject
@@ -24,7 +24,8 @@ from cdpr_tools.errors import BAD_INPUT, BadInputError
 from cdpr_tools.output import Output
 from cdpr_tools.robots import new_robot, summary
 from cdpr_tools.robots.calibration_text import calibration_lines
-from cdpr_tools.robots.questions import KINDS, SKETCH, Question
+from cdpr_tools.robots.questions import KINDS, SKETCH, Default, Question
+from cdpr_tools.streams import discard_typed_ahead
 
 app = typer.Typer()
 
@@ -107,8 +108,8 @@ def new(
 
     It describes robots in a plane and in space, with 3 to 8 cables. The first question lists the
     kinds and explains their numbers of cables. Each question has a default; most defaults follow
-    from earlier answers. Never overwrites a file. If the robot cannot work, it is rejected, and you
-    can change your answers.
+    from earlier answers. Never overwrites a file. If the robot cannot work, you are asked for other
+    answers to the questions that matter. The file is written anyway, and you can edit it.
     """
     out = Output(as_json)
     if path.exists():
@@ -120,30 +121,108 @@ def new(
         typer.echo(SKETCH, err=True)
         for name, what in KINDS.items():
             typer.echo(f"{name:12} {what}", err=True)
-    typed = dict(given)
-
-    def ask(question: Question, default: str, problem: str) -> str:
-        typed[question.key] = _ask(question, default, problem)
-        return typed[question.key]
-
-    complete = new_robot.answers_of(path, given, _default if yes else ask)
-    try:
-        with out.stage("checking the robot"):
-            profile = new_robot.write_robot(complete, path)
-            found = checks.diagnose(profile)
-    except ProfileError as error:
-        options = " ".join(f"--set {quote(f'{key}={text}')}" for key, text in typed.items())
-        again = f"cdpr robot new {path} {options} --yes"
-        raise BadInputError(
-            f"{error}\nnothing was written; to answer differently: {again}"
-        ) from None
-    out.say(f"{path}: written")
+    profile, found = _described(path, given, yes, out)
     _say_findings(out, found)
     if png is not None and profile.platform is not None:
         _draw(profile, profile.platform, png, out)
     out.say(f"next: cdpr robot show {path}")
     out.say(f"      cdpr run {path} --bus simbus:      # on simulated winches")
     out.result({"ok": True, "file": str(path)})
+
+
+def _described(
+    path: Path, given: dict[str, str], yes: bool, out: Output
+) -> tuple[Robot, list[Finding]]:
+    """Ask about a robot that can work, and write its file; return it with its findings.
+
+    Raises BadInputError if the questions are not all answered, or the last robot cannot work.
+    """
+    ask, before = _Asker(path, given, yes), None
+    while True:
+        complete = new_robot.answers_of(path, {} if ask.rejected else given, ask, out.stage)
+        with out.stage("checking whether it can work"):
+            profile, found = new_robot.write_robot(complete, path, over=ask.rejected)
+        wrong = [finding for finding in found if finding.impossible]
+        if profile is not None and not wrong:
+            out.say(f"{path}: written")
+            return profile, found
+        keys = new_robot.questioned(wrong, complete, ask.typed)
+        ask.reject(wrong, keys)
+        if yes or not keys or complete == before:
+            raise BadInputError(ask.rejection)
+        before = complete
+
+
+class _Asker:
+    """Asks the questions at the terminal, or takes all defaults if `yes`.
+
+    Once a robot was rejected it asks only the questions that matter: the other answers stay, and
+    the other defaults follow.
+    """
+
+    def __init__(self, path: Path, given: dict[str, str], yes: bool) -> None:
+        self._path, self._yes = path, yes
+        self.typed = dict(given)
+        """The answers that are not defaults, by key."""
+        self.rejection = ""
+        """Why the robot was rejected last, "" if it was not."""
+        self._wanted: set[str] = set()
+        self._origin = ""
+
+    @property
+    def rejected(self) -> bool:
+        """Whether a robot was rejected, and its file written."""
+        return bool(self.rejection)
+
+    def reject(self, wrong: list[Finding], keys: set[str]) -> None:
+        """Show why a robot cannot work, and ask for `keys` the next time."""
+        reasons = [f"{finding.key}: {finding.text}" for finding in wrong]
+        self.rejection = "\n".join(
+            [
+                f"{self._path}: written, but this robot cannot work",
+                *reasons,
+                f"edit the file, then check it: cdpr robot show {self._path}",
+            ]
+        )
+        self._wanted, self._origin = keys, ""
+        if keys and not self._yes:
+            _say("this robot cannot work:", *reasons, "another answer, please:")
+
+    def __call__(self, question: Question, default: Default, problem: str) -> str:
+        """Return the answer to a question; raises BadInputError if there is none."""
+        key = question.key
+        if self._yes and problem:
+            raise BadInputError(f"{key}: {problem}; answer it with --set")
+        if not problem and (self._yes or (self.rejected and key not in self._wanted)):
+            return self.typed.get(key, default.text)
+        if problem:
+            _say(f"  {problem}")
+        elif default.origin not in ("", self._origin):
+            _say(f"  default: {default.origin}")
+        self._origin = default.origin
+        discard_typed_ahead()
+        try:
+            text = str(typer.prompt(question.text, default=default.text, err=True))
+        except typer.Abort:
+            typer.echo(err=True)  # end the line of the question
+            raise BadInputError(self.rejection or self._unfinished(key)) from None
+        self.typed.pop(key, None)
+        if text != default.text:
+            self.typed[key] = text
+        return text
+
+    def _unfinished(self, key: str) -> str:
+        options = " ".join(f"--set {quote(f'{key}={text}')}" for key, text in self.typed.items())
+        again = " ".join(["cdpr robot new", quote(str(self._path)), options])
+        return (
+            f"no answer to {key!r} (--yes takes the defaults); nothing was written\n"
+            f"to continue: {again.rstrip()}"
+        )
+
+
+def _say(*lines: str) -> None:
+    for line in lines:
+        typer.echo(printable(line), err=True)
 
 
 def _given(answers: Sequence[str]) -> dict[str, str]:
@@ -160,24 +239,6 @@ def _key_and_value(text: str) -> tuple[str, str]:
     if not equals:
         raise BadInputError(f"--set {text}: allowed: KEY=VALUE")
     return key.strip(), value.strip()
-
-
-def _default(question: Question, default: str, problem: str) -> str:
-    if problem:
-        raise BadInputError(f"{question.key}: {problem}; answer it with --set")
-    return default
-
-
-def _ask(question: Question, default: str, problem: str) -> str:
-    if problem:
-        typer.echo(printable(f"  {problem}"), err=True)
-    try:
-        return str(typer.prompt(question.text, default=default, err=True))
-    except typer.Abort:
-        typer.echo(err=True)  # end the line of the question
-        raise BadInputError(
-            f"no answer to {question.key!r} (--yes takes the defaults); nothing was written"
-        ) from None
 
 
 def _say_findings(out: Output, found: list[Finding]) -> None:

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+import re
+from collections.abc import Callable, Container, Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 
 import numpy as np
@@ -13,12 +15,11 @@ from cdpr_profiles import ProfileError, Robot, Winch, load_robot
 from cdpr_profiles.platform import Platform
 from cdpr_profiles.reader import closest
 from cdpr_rt.arrays import FloatArray
-from cdpr_rt.diagnosis.checks import (
-    refuse_impossible,
-    standing_tensions_N,
-)
+from cdpr_rt.diagnosis.checks import diagnose, standing_tensions_N
+from cdpr_rt.diagnosis.subject import Finding
 from cdpr_rt.diagnosis.turning_checks import lower_when_turned_m
 from cdpr_rt.model.platform_model import platform_model
+from cdpr_rt.model.robot_arrays import RATED_SPEED_SHARE
 from cdpr_rt.model.statics import Box, PlatformStatics
 from cdpr_tools.errors import BadInputError
 from cdpr_tools.report.page import rendered
@@ -26,32 +27,53 @@ from cdpr_tools.robots.questions import (
     KINDS,
     AnswerError,
     Answers,
+    Default,
     Question,
+    RobotKind,
     axis_names,
+    cable_speed_m_s,
     kind_question,
     places,
     questions,
 )
 
-Ask = Callable[[Question, str, str], str]
+Ask = Callable[[Question, Default, str], str]
 """Takes a question, its default and the error in the last answer; returns the answer."""
+Stage = Callable[[str], AbstractContextManager[None]]
+"""Takes a text about work that may take seconds, and shows it while a block runs."""
 _STAND_SHARE, _STAND_m = 0.1, 0.5
 """Gap between stand and box, as a share of the height in which targets are possible. Also the
 height of a stand that could be on the floor, as a share of the frame's, up to `_STAND_m`."""
+_OVERSPEED = 1.25
+"""Limit of the motors' speed over the speed that they need."""
+_MIDDLE, _MIDDLE_HEIGHT, _LOW = (0.3, 0.7), (0.25, 0.75), (0.0, 0.4)
+"""Part of the frame in which the box of targets is searched first in space: along width and depth,
+along its height, and along its height if all cables come from above."""
+_CENTRED_SHARE = 0.6
+"""A box about the frame's middle is proposed if it has this share of the largest one's area."""
+_HANGING_SHARE, _NEAR_m = 0.5, 0.01
+"""Where masses are tried: height over that of the exit points above, half a side of a box there."""
+_MASSES = np.geomspace(0.02, 50.0, 80)
 _SHRUNK = np.linspace(1.0, 0.5, 26)
 
 
-def answers_of(path: Path, given: Mapping[str, str], ask: Ask) -> Answers:
+def _silently(_: str) -> AbstractContextManager[None]:
+    return nullcontext()
+
+
+def answers_of(path: Path, given: Mapping[str, str], ask: Ask, stage: Stage = _silently) -> Answers:
     """Return all answers about the robot that `path` will describe.
 
-    Answers in `given` are not asked again; raises BadInputError if one of them is invalid.
+    Answers in `given` are not asked for; raises BadInputError if one of them is invalid. The
+    entry "origins" says where each default comes from that was taken.
     """
     first = kind_question()
-    answers: Answers = {first.key: _answer(first, {}, given, ask)}
+    answers: Answers = {"origins": {}}
+    _answer(first, answers, given, ask)
     kind = answers["kind"]
-    asked = questions(path.parent, path.stem, kind)
+    asked = questions(path.parent, path.stem, kind, held_masses)
     nowhere = (0.0,) * kind.size
-    last = [q.key for q in places(kind, nowhere, nowhere, proposed_stand)]
+    last = [q.key for q in places(kind, nowhere, nowhere, proposed_stand, 0.0)]
     known = [first.key, *(q.key for q in asked), *last]
     unknown = [key for key in given if key not in known]
     if unknown:
@@ -62,20 +84,29 @@ def answers_of(path: Path, given: Mapping[str, str], ask: Ask) -> Answers:
             f"allowed for {kind.name}: {', '.join(known)}"
         )
     for question in asked:
-        answers[question.key] = _answer(question, answers, given, ask)
-    for question in places(kind, *proposed_box(answers), proposed_stand):
-        answers[question.key] = _answer(question, answers, given, ask)
+        _answer(question, answers, given, ask)
+    with stage("computing where the cables hold the platform"):
+        box = proposed_box(answers)
+    angle_deg = math.degrees(answers.get("angle_deg", 0.0))
+    for question in places(kind, *box, proposed_stand, angle_deg):
+        _answer(question, answers, given, ask)
     return answers
 
 
-def _answer(question: Question, answers: Answers, given: Mapping[str, str], ask: Ask) -> object:
+def _answer(question: Question, answers: Answers, given: Mapping[str, str], ask: Ask) -> None:
+    """Add the answer to a question, unless earlier answers make it meaningless."""
+    if not question.is_asked(answers):
+        return
     default, problem = question.default(answers), ""
     while True:
         text = given.get(question.key)
         if text is None:
             text = ask(question, default, problem)
         try:
-            return question.read(text, answers)
+            answers[question.key] = question.read(text, answers)
+            if text == default.text and default.origin:
+                answers["origins"][question.key] = default.origin
+            return
         except AnswerError as error:
             problem = f"value {text!r}; {error}"
             if question.key in given:
@@ -83,11 +114,12 @@ def _answer(question: Question, answers: Answers, given: Mapping[str, str], ask:
 
 
 def proposed_box(answers: Answers) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    """Return the largest box of targets that the cables can hold, to the cm, or a first guess.
+    """Return a large box of targets that the cables can hold, to the cm, or a first guess.
 
-    A gap below it, of a tenth or the depth of a turned platform, is left for the stand. Cables from
-    above can lower a platform to the floor: its stand is higher, to leave room below. The box is
-    smaller if the motors could not hold the platform continuously.
+    In space it is searched in the middle of the frame first, and not high up under cables that all
+    come from above. A gap below it, of a tenth or the depth of a turned platform, is left for the
+    stand. Cables from above can lower a platform to the floor: its stand is higher, to leave room
+    below. The box is smaller if the motors could not hold the platform continuously.
     """
     exits = np.array([answers[f"exit_{i + 1}_m"] for i in range(answers["kind"].cables)])
     least, most = exits.min(axis=0), exits.max(axis=0)
@@ -97,21 +129,60 @@ def proposed_box(answers: Answers) -> tuple[tuple[float, ...], tuple[float, ...]
         lowest_m = min(answers[f"anchor_{i + 1}_m"][-1] for i in range(answers["kind"].cables))
         stand_m = min(_STAND_SHARE * most[-1], _STAND_m) - min(lowest_m, 0.0)
     middle, size = 0.5 * (least + most), most - least
-    around = Box(_point(least), _point(most))
-    statics = _statics_of(answers, around)
-    # if no box keeps the reserve at all orientations, take one that is at least held
-    for found in (statics.largest_box(around), statics.largest_held(around)):
-        if found is None:
-            continue
+    for found in _held_boxes(answers, least, most):
         whole_m = found.high_m[-1] - found.low_m[-1]
         gap_m = max(_STAND_SHARE * whole_m, _lower_when_turned_m(answers, found))
         gap_m += max(stand_m - found.low_m[-1], 0.0)
         low = np.array(found.low_m) + gap_m * np.eye(len(size))[-1]
         low, high = np.ceil(100.0 * low) / 100.0, np.floor(100.0 * np.array(found.high_m)) / 100.0
         if (low < high).all():
-            return _settled(answers, Box(*_bearable(answers, low, high)))
+            return _settled(answers, _centred(Box(*_bearable(answers, low, high)), middle))
     aside = np.maximum(0.1 * size, 0.05)
     return _point(middle - aside), _point(middle + aside)
+
+
+def _held_boxes(answers: Answers, least: FloatArray, most: FloatArray) -> Iterator[Box]:
+    """Yield the largest boxes in parts of the frame that are held, the best part first."""
+    around = Box(_point(least), _point(most))
+    inner = around
+    if least.size == 3:
+        ways = [_MIDDLE, _MIDDLE, _LOW if answers["kind"].hangs else _MIDDLE_HEIGHT]
+        low, high = (least + np.array(ends) * (most - least) for ends in zip(*ways, strict=True))
+        inner = Box(_point(low), _point(high))
+    for part in dict.fromkeys((inner, around)):
+        if (box := _statics_of(answers, part).largest_box(part)) is not None:
+            yield box
+    # if no box keeps the reserve at all orientations, take one that is at least held
+    if (box := _statics_of(answers, around).largest_held(around)) is not None:
+        yield box
+
+
+def held_masses(answers: Answers, usual_kg: float) -> tuple[float, float] | None:
+    """Return the least and greatest mass that can be accelerated in the middle of the frame.
+
+    Of masses up to `_MASSES` times as large or small as a usual one; None if none can.
+    """
+    exits = np.array([answers[f"exit_{i + 1}_m"] for i in range(answers["kind"].cables)])
+    place = 0.5 * (exits.min(axis=0) + exits.max(axis=0))
+    if answers["kind"].hangs:
+        place[-1] *= _HANGING_SHARE
+    around = Box(_point(place - _NEAR_m), _point(place + _NEAR_m))
+    held = [
+        kg
+        for kg in usual_kg * _MASSES
+        if _statics_of(answers | {"mass_kg": float(kg)}, around).is_target(place)
+    ]
+    return (held[0], held[-1]) if held else None
+
+
+def _centred(box: Box, middle_m: FloatArray) -> Box:
+    """Return the box, or the largest one in it about the frame's middle if it is not much less."""
+    low, high = np.array(box.low_m), np.array(box.high_m)
+    half = np.minimum(high - middle_m, middle_m - low)[:-1]
+    if half.min() <= 0.0 or np.prod(2.0 * half / (high - low)[:-1]) < _CENTRED_SHARE:
+        return box
+    low[:-1], high[:-1] = middle_m[:-1] - half, middle_m[:-1] + half
+    return Box(_point(np.round(low, 2)), _point(np.round(high, 2)))
 
 
 def _settled(answers: Answers, box: Box) -> tuple[tuple[float, ...], tuple[float, ...]]:
@@ -179,19 +250,20 @@ def _statics_of(answers: Answers, box: Box) -> PlatformStatics:
 
 
 def _platform_of(answers: Answers, box: Box) -> Platform:
-    cables = range(answers["kind"].cables)
+    kind: RobotKind = answers["kind"]
+    cables = range(kind.cables)
     return Platform(
         mass_kg=answers["mass_kg"],
         home_m=_point(0.5 * (np.array(box.low_m) + box.high_m)),
         home_tolerance_m=0.05,
         workspace_min_m=box.low_m,
         workspace_max_m=box.high_m,
-        speed_m_s=answers["speed_m_s"],
+        speed_m_s=kind.platform.speed_m_s,  # nothing here depends on speeds
         acceleration_m_s2=answers["acceleration_m_s2"],
         exit_points_m=tuple(answers[f"exit_{i + 1}_m"] for i in cables),
         anchor_points_m=tuple(answers[f"anchor_{i + 1}_m"] for i in cables),
         workspace_angle_rad=answers.get("angle_deg", 0.0),
-        angular_speed_rad_s=answers.get("angular_speed_deg_s", 0.0),
+        angular_speed_rad_s=kind.platform.angular_speed_rad_s,
         angular_acceleration_rad_s2=answers.get("angular_acceleration_deg_s2", 0.0),
     )
 
@@ -200,27 +272,58 @@ def _point(point_m: FloatArray) -> tuple[float, ...]:
     return tuple(float(x) for x in point_m)
 
 
-def write_robot(answers: Answers, path: Path) -> Robot:
-    """Write the answers into a new file and return the robot that it describes.
+def write_robot(
+    answers: Answers, path: Path, *, over: bool = False
+) -> tuple[Robot | None, list[Finding]]:
+    """Write the answers into a file; return the robot that it describes, and what is wrong with it.
 
-    Raises BadInputError if the file exists or cannot be written, ProfileError if the robot is
-    inconsistent or cannot work; the file is removed then.
+    The robot is None if its file cannot be read again. A file that exists is replaced only if it
+    has been written by this command, which is `over`; else raises BadInputError, also if writing
+    fails.
     """
-    text = text_of(answers)
     try:
-        with path.open("x", encoding="utf-8") as file:
-            file.write(text)
+        with path.open("w" if over else "x", encoding="utf-8") as file:
+            file.write(text_of(answers))
     except FileExistsError:
         raise BadInputError(f"{path}: already exists, and is not overwritten") from None
     except OSError as error:
         raise BadInputError(f"{path}: {error.strerror}") from None
     try:
         robot = load_robot(path)
-        refuse_impossible(robot)
-        return robot
-    except ProfileError:
-        path.unlink()
-        raise
+    except ProfileError as error:
+        return None, [Finding(error.key, error.problem, impossible=True)]
+    return robot, diagnose(robot)
+
+
+_ANSWERED_BY = {
+    "node_id": "nodes",
+    "workspace_min_m": "low_m",
+    "workspace_max_m": "high_m",
+    "workspace_angle_rad": "angle_deg",
+    "angular_speed_rad_s": "angular_speed_deg_s",
+    "angular_acceleration_rad_s2": "angular_acceleration_deg_s2",
+}
+"""Keys of a robot's file whose question has another key, of those without a number."""
+
+
+def questioned(found: Sequence[Finding], answers: Answers, typed: Container[str]) -> set[str]:
+    """Return the keys of the questions whose other answers may help against findings.
+
+    That is the key that a finding names as a remedy, else its own. A point that is a default
+    follows from the size of the frame or platform, which is asked for instead.
+    """
+    keys = set()
+    for finding in found:
+        where, _, key = (finding.helps or finding.key).partition(".")
+        key = key.partition("[")[0]
+        key = _ANSWERED_BY.get(key, key)
+        if point := re.fullmatch(r"(exit|anchor)_point_m", key):
+            number = 1 + int(where.partition("[")[2].rstrip("]"))
+            key = f"{point[1]}_{number}_m"
+            size = {"exit": "frame_m", "anchor": "side_m"}[point[1]]
+            key = size if key not in typed and size in answers else key
+        keys.add(key)
+    return keys & answers.keys()
 
 
 def text_of(answers: Answers) -> str:
@@ -252,12 +355,12 @@ def text_of(answers: Answers) -> str:
 
 
 def _speed_limit(answers: Answers) -> float | None:
-    """Return the shipped robot's motor speed limit if the new robot uses the same winch."""
-    robot = answers["kind"].robot
-    most = robot.limits.speed_rad_s
-    if most is None or answers["winch"][0] != robot.axes[0].winch.profile:
-        return None
-    return float(most[0])
+    """Return the limit of the motors' speed, rad/s; None if its default is enough."""
+    winch: Winch = answers["winch"][1]
+    speeds = answers["speed_m_s"], answers.get("angular_speed_deg_s", 0.0)
+    needed = cable_speed_m_s(answers, *speeds) / abs(winch.cable_m_per_motor_rad)
+    limit = math.ceil(_OVERSPEED * needed)
+    return limit if limit > RATED_SPEED_SHARE * winch.motor.rated_speed_rad_s else None
 
 
 def _aligned(line: str) -> str:

@@ -7,12 +7,16 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import combinations
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from cdpr_profiles import ProfileError, Robot, Winch, load_robot, load_winch
 from cdpr_profiles.platform import Platform, WIDEST_m
+from cdpr_rt.arrays import FloatArray
+from cdpr_rt.diagnosis.checks import rounded_down
+from cdpr_rt.model.robot_arrays import CABLE_SAFETY
+from cdpr_rt.platform.motor_learning import FRICTION_SHARE
 
 # Kinds of cable robots that `cdpr robot new` describes; each is modelled on a shipped robot.
 
@@ -39,6 +43,8 @@ _BUS_DRIVES = 4
 """Largest number of drives on a bus of 1 Mbit/s at 1 kHz."""
 _APART_m = 0.15
 """Least distance of two proposed exit points: two winches side by side."""
+_ROUND_m = 0.5
+"""Proposed frames are multiples of this."""
 
 
 @dataclass(frozen=True)
@@ -85,11 +91,17 @@ class RobotKind:
         return "width, height" if self.size == 2 else "width, depth, height"
 
     @property
+    def hangs(self) -> bool:
+        """Whether all its cables come from above: only its weight tightens them."""
+        heights = [point[-1] for point in self.platform.exit_points_m]
+        return min(heights) > 0.5 * max(heights)
+
+    @property
     def frame_m(self) -> tuple[float, ...]:
-        """Size of its frame: the extent of the exit points; the height is from the floor."""
+        """Size of its frame: the extent of the exit points, rounded; the height is from floor."""
         exits = np.array(self.platform.exit_points_m)
-        spans = exits.max(axis=0) - exits.min(axis=0)
-        return (*(float(span) for span in spans[:-1]), float(exits[:, -1].max()))
+        size = [*np.ptp(exits, axis=0)[:-1], exits[:, -1].max()]
+        return tuple(max(round(float(x) / _ROUND_m), 1) * _ROUND_m for x in size)
 
     @property
     def side_m(self) -> float:
@@ -97,25 +109,37 @@ class RobotKind:
         return max(math.dist(*pair) for pair in combinations(self.platform.anchor_points_m, 2))
 
     def exits_m(self, frame_m: tuple[float, ...]) -> list[tuple[float, ...]]:
-        """Return the exit points with the frame scaled to another size, to the mm.
+        """Return exit points in the corners of a frame, to the mm.
 
-        Points that would be too close to each other are moved apart within the frame.
+        The room's zero is the middle of the floor. Each exit point of the shipped robot moves to
+        the nearest corner or middle of a side. Two cables in one place leave side by side.
         """
-        exits = np.array(self.platform.exit_points_m) * np.array(frame_m) / self.frame_m
+        exits = np.array(self.platform.exit_points_m)
         low, high = exits.min(axis=0), exits.max(axis=0)
+        beside = (2.0 * exits - low - high)[:, :-1] / (high - low)[:-1]
+        corners = np.column_stack([np.round(beside), np.round(exits[:, -1] / high[-1])])
+        places = corners * np.array([*(0.5 * x for x in frame_m[:-1]), frame_m[-1]])
         for i, j in combinations(range(self.cables), 2):
-            way = exits[j] - exits[i]
-            if (distance := float(np.linalg.norm(way))) < _APART_m:
-                pair = 0.5 * (exits[i] + exits[j]) + np.outer([-0.5, 0.5], way) * (
-                    _APART_m / distance
-                )
-                pair += np.maximum(low - pair.min(axis=0), 0.0)
-                exits[[i, j]] = pair + np.minimum(high - pair.max(axis=0), 0.0)
-        return [tuple(round(float(x), 3) + 0.0 for x in point) for point in exits]
+            if (corners[i] == corners[j]).all():
+                aside = _side_by_side(corners[i, :-1], beside[[i, j]])
+                apart_m = max(_APART_m, self.scale(frame_m) * math.dist(exits[i], exits[j]))
+                places[[i, j], :-1] += aside * (apart_m / np.linalg.norm(aside[1] - aside[0]))
+        return [tuple(round(float(x), 3) + 0.0 for x in point) for point in places]
 
     def scale(self, frame_m: tuple[float, ...]) -> float:
         """Return the least ratio of a frame side to that of the shipped robot."""
         return min(size_m / usual_m for size_m, usual_m in zip(frame_m, self.frame_m, strict=True))
+
+
+def _side_by_side(corner: FloatArray, beside: FloatArray) -> FloatArray:
+    """Return directions (2, k) in which two cables leave a place that they share.
+
+    `beside` (2, k) are their usual places, from -1 to 1. In a corner each moves inward along the
+    direction in which it is usually the inner one; on a side they move away from each other.
+    """
+    inner = np.abs(beside) < np.abs(beside[::-1])
+    apart = 0.5 * np.sign(beside - beside[::-1])
+    return np.where(corner == 0.0, apart, -corner * inner)
 
 
 def kind_of(name: str) -> RobotKind:
@@ -128,13 +152,38 @@ def kind_of(name: str) -> RobotKind:
 Answers = dict[str, Any]
 """The answers by key, in SI units, with the type that `Question.read` returns."""
 _COUNTS = ("no", "one", "two", "three", "four", "five", "six", "seven", "eight")
+Masses = Callable[[Answers, float], tuple[float, float] | None]
+"""Returns the least and greatest mass that the cables hold in the middle of the frame, given the
+answers so far and a mass to start with; None if it finds none."""
 _POINTS = {2: "-2, 3", 3: "-2, 1.5, 3"}
+_PEAK_SHARE, _RATED_TIMES = 0.5, 2.0
+"""Proposed torque over peak and rated torque, the lesser of both, if the rated one is too little
+for cables that pull against each other."""
+_RANGE = 10.0
+"""Least ratio of greatest to least tension for which the rated torque is enough there."""
 _TORQUE_RESERVE = 0.85
 """Share of the torque available for tensions; the rest is for friction and control."""
+_LEAST, _LEAST_HANGING = 0.25, 0.1
+"""Largest proposed least tension over the greatest; if only the weight tightens the cables."""
+_LEAST_MASS, _MOST_MASS = 1.25, 0.5
+"""Proposed mass over the least and the greatest that the cables hold: limits of both."""
+_HANGING_MASS = 0.75
+"""Proposed mass over the greatest, if only the weight tightens the cables: a lighter platform has a
+smaller box of targets."""
+_DEFAULT_SPEED_SHARE, _SPEED_SHARE = 0.5, 0.8
+"""Shares of the winches' rated speed: that of proposed speeds along and about all directions
+together, and that of the highest speed along all directions that may be answered."""
 
 
 class AnswerError(ValueError):
     """An invalid answer; the text says what is allowed."""
+
+
+class Default(NamedTuple):
+    """The default of a question, and where it comes from as text, "" if that is obvious."""
+
+    text: str
+    origin: str = ""
 
 
 @dataclass(frozen=True)
@@ -148,7 +197,8 @@ class Question:
     key: str
     text: str
     read: Callable[[str, Answers], Any]
-    default: Callable[[Answers], str]
+    default: Callable[[Answers], Default]
+    is_asked: Callable[[Answers], bool] = lambda _: True
 
 
 def kind_question() -> Question:
@@ -159,16 +209,18 @@ def kind_question() -> Question:
             raise AnswerError(f"allowed: {', '.join(KINDS)}")
         return kind_of(text)
 
-    return Question("kind", "Kind of robot", read, lambda _: next(iter(KINDS)))
+    return Question("kind", "Kind of robot", read, lambda _: Default(next(iter(KINDS))))
 
 
-def questions(folder: Path, name: str, kind: RobotKind) -> list[Question]:
-    """Return the questions about a kind in order; `folder` is the first to search for files."""
-    drives = _drives(folder, name, kind)
+def questions(folder: Path, name: str, kind: RobotKind, masses: Masses) -> list[Question]:
+    """Return the questions about a kind up to the box of targets, in order.
+
+    `folder` is the first to search for files.
+    """
     return [
-        *drives,
+        *_drives(folder, name, kind),
         *_geometry(kind),
-        *_limits(kind),
+        *_limits(kind, masses),
         *(_turning(kind) if kind.controls_angles else []),
     ]
 
@@ -177,113 +229,173 @@ def _drives(folder: Path, name: str, kind: RobotKind) -> list[Question]:
     """Return the questions on winches, buses and drives."""
     usual = kind.robot.axes[0].winch.profile
     buses = [
-        Question("bus", "URL of the CAN bus", _name, lambda _: "socketcan:can0"),
-        Question("bus_2", "URL of the second CAN bus", _name, lambda _: "socketcan:can1"),
+        Question("bus", "URL of the CAN bus", _name, lambda _: Default("socketcan:can0")),
+        Question("bus_2", "URL of the second CAN bus", _name, lambda _: Default("socketcan:can1")),
     ]
     return [
-        Question("name", "Name of the robot", _name, lambda _: name),
+        Question("name", "Name of the robot", _name, lambda _: Default(name)),
         Question(
             "winch", "Winches: name (`cdpr profiles list`) or path of a profile",
-            lambda text, _: _winch(text, folder), lambda _: usual,
+            lambda text, _: _winch(text, folder),
+            lambda _: Default(usual, f"those of {kind.name}"),
         ),
         *buses[: kind.buses],
         Question(
             "nodes", f"Node ids of the {_COUNTS[kind.cables]} drives", _nodes(kind.cables),
-            lambda _: ", ".join(str(i + 1) for i in range(kind.cables)),
+            lambda _: Default(", ".join(str(i + 1) for i in range(kind.cables))),
         ),
     ]  # fmt: skip
 
 
 def _geometry(kind: RobotKind) -> list[Question]:
     """Return the questions on the frame, the exit points and the anchor points."""
+    frame = Default(_text(kind.frame_m), f"about that of {kind.name}")
+    zero = ", ".join("0" * kind.size)
     return [
-        Question("frame_m", f"Frame: {kind.sides} (m)", _size(kind), lambda _: _text(kind.frame_m)),
+        Question(
+            "frame_m", f"Frame: {kind.sides} (m), with {zero} in the middle of its floor",
+            _size(kind), lambda _: frame,
+        ),
         *(_exit(i, kind) for i in range(kind.cables)),
         *([] if kind.is_point else [_side(kind)]),
         *(_anchor(i, kind) for i in range(kind.cables)),
-    ]
+    ]  # fmt: skip
 
 
-def _limits(kind: RobotKind) -> list[Question]:
-    """Return the questions on torques, tensions, mass and motion."""
-    platform, limits = kind.platform, kind.robot.limits
-    torque, highest, least = (
-        values[0] if values else otherwise
-        for values, otherwise in (
-            (limits.torque_Nm, 0.0), (limits.tension_max_N, 0.0), (limits.tension_min_N, 1.0),
-        )
-    )  # fmt: skip
+def _limits(kind: RobotKind, masses: Masses) -> list[Question]:
+    """Return the questions on torques, tensions, acceleration and mass."""
+    platform = kind.platform
+    assert kind.robot.limits.tension_max_N is not None
+    usual_N = kind.robot.limits.tension_max_N[0]
 
-    def usual(value: float, otherwise: Callable[[Answers], str]) -> Callable[[Answers], str]:
-        """Default to the shipped robot's value if it has the same winch and is not the first."""
-
-        def default(answers: Answers) -> str:
-            same = answers["winch"][0] == kind.robot.axes[0].winch.profile
-            return f"{value:g}" if same and kind.name != next(iter(KINDS)) else otherwise(answers)
-
-        return default
+    def mass(answers: Answers) -> Default:
+        """Return the shipped robot's mass, scaled if its weight tightens the cables, or less."""
+        share = answers["tension_max_N"] / usual_N if kind.hangs else 1.0
+        kg, origin = share * platform.mass_kg, f"that of {kind.name}"
+        if kind.hangs:
+            origin = f"that of {kind.name}, scaled with the greatest tension"
+        if (held := masses(answers, kg)) is None:
+            return Default(f"{kg:.2g}", origin)
+        least, most = held
+        share = _HANGING_MASS if kind.hangs else _MOST_MASS
+        if share * most < kg:
+            kg, origin = share * most, f"{100.0 * share:.0f} % of the most"
+        origin += f"; the cables hold {least:.2g} to {most:.2g} kg"
+        return Default(f"{max(kg, _LEAST_MASS * least):.2g}", origin)
 
     return [
         Question(
-            "torque_Nm", "Torque limit at the motors (Nm)", _torque,
-            usual(torque, lambda answers: f"{answers['winch'][1].motor.rated_torque_Nm:g}"),
+            "torque_Nm", "Torque limit at the motors (Nm)", _torque, _usual_torque,
         ),
-        Question(
-            "tension_min_N", "Least tension (N)", _number(0.1, 1e5),
-            usual(least, lambda answers: f"{answers['winch'][1].cable.min_tension_N:g}"),
-        ),
-        Question(
-            "tension_max_N", "Greatest tension (N)", _tension_max, usual(highest, _bearable_tension)
-        ),
-        Question(
-            "mass_kg", "Mass of the platform (kg)", _number(0.01, 1e4),
-            lambda answers: _figure(platform.mass_kg * answers["tension_max_N"] / highest),
-        ),
-        Question(
-            "speed_m_s", "Speed along each direction (m/s)", _number(1e-3, 20.0),
-            lambda answers: _figure(_speed_share(answers) * platform.speed_m_s),
-        ),
+        Question("tension_max_N", "Greatest tension (N)", _tension_max, _bearable),
+        Question("tension_min_N", "Least tension (N)", _tension_min, _taut),
         Question(
             "acceleration_m_s2", "Acceleration along each direction (m/s2)", _number(1e-3, 100.0),
-            lambda _: f"{platform.acceleration_m_s2:g}",
+            lambda _: Default(f"{platform.acceleration_m_s2:g}", f"that of {kind.name}"),
         ),
+        Question("mass_kg", "Mass of the platform (kg)", _number(0.01, 1e4), mass),
     ]  # fmt: skip
 
 
 def _turning(kind: RobotKind) -> list[Question]:
     """Return the questions on turned targets; angles are asked in degrees."""
     platform = kind.platform
+    angle = _figure(math.degrees(platform.workspace_angle_rad))
 
-    def share(answers: Answers) -> float:
-        """Return the share of the shipped robot's angular speed for a larger platform."""
-        side_m: float = answers["side_m"]
-        return _speed_share(answers) * min(kind.side_m / side_m, 1.0)
+    def acceleration(answers: Answers) -> Default:
+        """Return the shipped robot's, less for a larger platform."""
+        share = min(kind.side_m / answers["side_m"], 1.0)
+        value = _figure(share * math.degrees(platform.angular_acceleration_rad_s2))
+        return Default(value, f"that of {kind.name}, scaled with the platform")
 
-    speed_deg_s = math.degrees(platform.angular_speed_rad_s)
-    acceleration_deg_s2 = math.degrees(platform.angular_acceleration_rad_s2)
     return [
         Question(
-            "angle_deg", "Largest rotation of targets from home's orientation (deg; 0: none)",
-            _degrees(0.0, 179.0), lambda _: _figure(math.degrees(platform.workspace_angle_rad)),
-        ),
-        Question(
-            "angular_speed_deg_s", "Angular speed about each axis (deg/s)", _degrees(0.1, 5000.0),
-            lambda answers: _figure(share(answers) * speed_deg_s),
+            "angle_deg", "How far targets may be turned from home's orientation (deg; 0: not)",
+            _degrees(0.0, 179.0), lambda _: Default(angle, f"that of {kind.name}"),
         ),
         Question(
             "angular_acceleration_deg_s2", "Angular acceleration about each axis (deg/s2)",
-            _degrees(0.1, 5e5), lambda answers: _figure(share(answers) * acceleration_deg_s2),
+            _degrees(0.1, 5e5), acceleration, lambda answers: answers["angle_deg"] > 0.0,
         ),
     ]  # fmt: skip
 
 
-def _speed_share(answers: Answers) -> float:
-    """Return the winches' speed over that of the shipped robot's winches, at most 1.0."""
-    winches: tuple[Winch, Winch] = (answers["winch"][1], answers["kind"].robot.axes[0].winch)
-    taken, usual = (
-        abs(winch.cable_m_per_motor_rad) * winch.motor.rated_speed_rad_s for winch in winches
+# Speeds: what the winches can do in all directions together, and what the box has room for.
+
+
+def _speeds(kind: RobotKind) -> list[Question]:
+    """Return the questions on speeds, once box and accelerations are known."""
+
+    def speed(answers: Answers) -> Default:
+        wanted, share = _reached(answers)[0], _winch_share(answers)
+        return Default(f"{share * wanted:.2g}", _speed_origin(answers, share))
+
+    def angular_speed(answers: Answers) -> Default:
+        wanted, share = _reached(answers)[1], _winch_share(answers)
+        most = _spare_m_s(answers) / cable_speed_m_s(answers, 0.0, 1.0)
+        value = math.degrees(min(share * wanted, _DEFAULT_SPEED_SHARE * most))
+        return Default(f"{value:.2g}", _speed_origin(answers, share))
+
+    def read_angular(text: str, answers: Answers) -> float:
+        most = math.degrees(_spare_m_s(answers) / cable_speed_m_s(answers, 0.0, 1.0))
+        return _degrees(0.01, _rounded_down(most))(text, answers)
+
+    def read_speed(text: str, answers: Answers) -> float:
+        most = _SPEED_SHARE * rated_speed_m_s(answers) / cable_speed_m_s(answers, 1.0, 0.0)
+        return _number(1e-3, _rounded_down(most))(text, answers)
+
+    turning = Question(
+        "angular_speed_deg_s", "Angular speed about each axis (deg/s)", read_angular,
+        angular_speed, lambda answers: answers["angle_deg"] > 0.0,
+    )  # fmt: skip
+    return [
+        Question("speed_m_s", "Speed along each direction (m/s)", read_speed, speed),
+        *([turning] if kind.controls_angles else []),
+    ]
+
+
+def rated_speed_m_s(answers: Answers) -> float:
+    """Return the speed of a cable at the motor's rated speed."""
+    winch: Winch = answers["winch"][1]
+    return abs(winch.cable_m_per_motor_rad) * winch.motor.rated_speed_rad_s
+
+
+def cable_speed_m_s(answers: Answers, speed_m_s: float, angular_speed_rad_s: float) -> float:
+    """Return the highest speed of a cable with these speeds along and about all directions."""
+    kind: RobotKind = answers["kind"]
+    anchors_m = [answers[f"anchor_{i + 1}_m"] for i in range(kind.cables)]
+    reach_m = max(math.hypot(*anchor_m) for anchor_m in anchors_m)
+    angles = len(kind.platform.controlled) - kind.size
+    turning_m_s = math.sqrt(angles) * angular_speed_rad_s * reach_m
+    return math.sqrt(kind.size) * speed_m_s + turning_m_s
+
+
+def _reached(answers: Answers) -> tuple[float, float]:
+    """Return the speeds √(a L/2) that are reached within a quarter of box and angles, L."""
+    longest_m = max(np.subtract(answers["high_m"], answers["low_m"]))
+    angle_rad = answers.get("angle_deg", 0.0)
+    return (
+        math.sqrt(0.5 * answers["acceleration_m_s2"] * longest_m),
+        math.sqrt(answers.get("angular_acceleration_deg_s2", 0.0) * angle_rad),
     )
-    return min(taken / usual, 1.0)
+
+
+def _winch_share(answers: Answers) -> float:
+    """Return which share of these speeds takes half of the winches' rated speed, at most 1."""
+    needed_m_s = cable_speed_m_s(answers, *_reached(answers))
+    return min(_DEFAULT_SPEED_SHARE * rated_speed_m_s(answers) / needed_m_s, 1.0)
+
+
+def _spare_m_s(answers: Answers) -> float:
+    """Return what the answered speed leaves of the winches' rated speed."""
+    return rated_speed_m_s(answers) - cable_speed_m_s(answers, answers["speed_m_s"], 0.0)
+
+
+def _speed_origin(answers: Answers, share: float) -> str:
+    winches = f"rated speed of the winches, {rated_speed_m_s(answers):.2g} m/s"
+    if share < 1.0:
+        return f"all directions together take half of the {winches}"
+    return f"reached within a quarter of the box; {winches}"
 
 
 def places(
@@ -291,34 +403,37 @@ def places(
     low_m: tuple[float, ...],
     high_m: tuple[float, ...],
     stand: Callable[[Answers], tuple[float, ...]],
+    angle_deg: float,
 ) -> list[Question]:
-    """Return the questions on the box of targets and the place of rest.
+    """Return the questions on the box of targets, the place of rest and the speeds.
 
     `low_m` and `high_m` are the proposed box; `stand` proposes a place of rest under the final box.
     """
     point = _point(kind.size)
     names = ", ".join("xyz"[: kind.size])
+    origin = "a box in which the cables hold the platform" + (
+        f", turned by up to {angle_deg:.3g} deg" if angle_deg > 0.0 else ""
+    )
     return [
-        Question("low_m", f"Box of targets, least {names} (m)", point, lambda _: _text(low_m)),
         Question(
-            "high_m",
-            f"Box of targets, greatest {names} (m)",
-            _upper_corner(kind.size),
-            lambda _: _text(high_m),
+            "low_m", f"Box of targets, least {names} (m)", point,
+            lambda _: Default(_text(low_m), origin),
         ),
         Question(
-            "home_m",
-            f"Where the platform stands at rest: {names} (m)",
-            _home(kind.size),
-            lambda answers: _text(stand(answers), digits=2),
+            "high_m", f"Box of targets, greatest {names} (m)", _upper_corner(kind.size),
+            lambda _: Default(_text(high_m), origin),
         ),
-    ]
+        Question(
+            "home_m", f"Where the platform stands at rest: {names} (m)", _home(kind.size),
+            lambda answers: Default(_text(stand(answers), digits=2), "below the box"),
+        ),
+        *_speeds(kind),
+    ]  # fmt: skip
 
 
 def _exit(i: int, kind: RobotKind) -> Question:
-    def default(answers: Answers) -> str:
-        """Return the shipped robot's exit point, with its frame scaled to the answered size."""
-        return _text(kind.exits_m(answers["frame_m"])[i])
+    def default(answers: Answers) -> Default:
+        return Default(_text(kind.exits_m(answers["frame_m"])[i]), "on the edges of the frame")
 
     names = ", ".join("xyz"[: kind.size])
     return Question(
@@ -333,15 +448,15 @@ def _side(kind: RobotKind) -> Question:
         text = "Greatest distance of two anchor points on the platform (m)"
     least = 0.0 if kind.turns_freely else 0.01
 
-    def default(answers: Answers) -> str:
-        """Return the shipped robot's value, scaled with the frame."""
-        return _figure(min(kind.scale(answers["frame_m"]) * kind.side_m, 10.0))
+    def default(answers: Answers) -> Default:
+        value = min(kind.scale(answers["frame_m"]) * kind.side_m, 10.0)
+        return Default(_figure(value), f"that of {kind.name}, scaled with the frame")
 
     return Question("side_m", text, _number(least, 10.0), default)
 
 
 def _anchor(i: int, kind: RobotKind) -> Question:
-    def facing(answers: Answers) -> str:
+    def facing(answers: Answers) -> Default:
         """Return the corner that faces the exit point; the cables keep their order around."""
         n = kind.cables
         exits = np.array([answers[f"exit_{j + 1}_m"] for j in range(n)])
@@ -353,11 +468,15 @@ def _anchor(i: int, kind: RobotKind) -> Question:
         turn = int(np.where(order == i)[0][0]) - int(np.where(order == lone)[0][0])
         angle = first + turn * math.tau / n
         radius = answers["side_m"] / math.sqrt(3.0)
-        return _text((radius * math.cos(angle), radius * math.sin(angle)), digits=4)
+        place = radius * math.cos(angle), radius * math.sin(angle)
+        return Default(_text(place, digits=4), "the corner that faces the exit point")
 
-    def scaled(answers: Answers) -> str:
-        share = 0.0 if kind.is_point else answers["side_m"] / kind.side_m
-        return _text(tuple(share * x for x in kind.platform.anchor_points_m[i]), digits=4)
+    def scaled(answers: Answers) -> Default:
+        if kind.is_point:
+            return Default(_text((0.0,) * kind.size), "all cables meet in one point")
+        share = answers["side_m"] / kind.side_m
+        place = tuple(share * x for x in kind.platform.anchor_points_m[i])
+        return Default(_text(place, digits=4), f"that of {kind.name}, scaled with the platform")
 
     names = ", ".join("xyz"[: kind.size])
     return Question(
@@ -426,6 +545,10 @@ def _figure(value: float) -> str:
     return f"{value:.3g}"
 
 
+def _rounded_down(value: float) -> float:
+    return float(rounded_down(value))
+
+
 def _degrees(low: float, high: float) -> Callable[[str, Answers], float]:
     read = _number(low, high)
     return lambda text, answers: math.radians(read(text, answers))
@@ -463,20 +586,56 @@ def _torque(text: str, answers: Answers) -> float:
 
 
 def _tension_max(text: str, answers: Answers) -> float:
-    low_N = answers["tension_min_N"]
-    high_N = answers["winch"][1].cable.breaking_force_N
-    value = _number(low_N, high_N)(text, answers)
-    if value == low_N:
-        raise AnswerError(f"allowed: more than {low_N:g}, the least tension")
+    return _number(1.0, answers["winch"][1].cable.breaking_force_N)(text, answers)
+
+
+def _tension_min(text: str, answers: Answers) -> float:
+    value = _number(0.1, high_N := answers["tension_max_N"])(text, answers)
+    if value == high_N:
+        raise AnswerError(f"allowed: less than {high_N:g}, the greatest tension")
     return value
 
 
-def _bearable_tension(answers: Answers) -> str:
-    arm_m = abs(answers["winch"][1].cable_m_per_motor_rad)
-    bears_N = min(
-        _TORQUE_RESERVE * answers["torque_Nm"] / arm_m, answers["winch"][1].cable.breaking_force_N
+def _usual_torque(answers: Answers) -> Default:
+    """Return the rated torque; more if cables that pull against each other need it for a moment.
+
+    To stand in the proposed box of targets takes no more than the rated torque in any case.
+    """
+    winch: Winch = answers["winch"][1]
+    motor = winch.motor
+    rated_N = _TORQUE_RESERVE * motor.rated_torque_Nm / abs(winch.cable_m_per_motor_rad)
+    if answers["kind"].hangs or rated_N > _RANGE * winch.cable.min_tension_N:
+        return Default(f"{motor.rated_torque_Nm:g}", "their rated torque")
+    torque_Nm = min(_PEAK_SHARE * motor.peak_torque_Nm, _RATED_TIMES * motor.rated_torque_Nm)
+    origin = (
+        f"for short times; {motor.rated_torque_Nm:g} Nm rated, {motor.peak_torque_Nm:g} Nm peak"
     )
-    return f"{max(math.floor(bears_N), 1.1 * answers['tension_min_N']):g}"
+    return Default(f"{torque_Nm:.2g}", origin)
+
+
+def _bearable(answers: Answers) -> Default:
+    winch: Winch = answers["winch"][1]
+    bears_N = _TORQUE_RESERVE * answers["torque_Nm"] / abs(winch.cable_m_per_motor_rad)
+    origin = f"{100.0 * _TORQUE_RESERVE:.0f} % of the torque limit"
+    if (breaks_N := winch.cable.breaking_force_N / CABLE_SAFETY) < bears_N:
+        bears_N, origin = breaks_N, f"the breaking force of the cable over {CABLE_SAFETY:g}"
+    return Default(f"{max(math.floor(bears_N), 1.0):g}", origin)
+
+
+def _taut(answers: Answers) -> Default:
+    """Return the least tension that the cable needs, and that exceeds the winch's friction.
+
+    Less if the greatest is little more: the planned tensions are between both.
+    """
+    winch: Winch = answers["winch"][1]
+    rubs_N = FRICTION_SHARE * winch.motor.rated_torque_Nm / abs(winch.cable_m_per_motor_rad)
+    value_N, origin = winch.cable.min_tension_N, "that of the cable's profile"
+    if rubs_N > value_N:
+        value_N, origin = rubs_N, "the usual friction of such winches"
+    share = _LEAST_HANGING if answers["kind"].hangs else _LEAST
+    if (most_N := share * answers["tension_max_N"]) < value_N:
+        value_N, origin = most_N, f"{100.0 * share:.0f} % of the greatest tension"
+    return Default(f"{value_N:.2g}", origin)
 
 
 def _upper_corner(size: int) -> Callable[[str, Answers], tuple[float, ...]]:

@@ -24,6 +24,7 @@ from cdpr_rt.core.exchange import TensionFault
 from cdpr_sim_bus.physics_board import PhysicsBoard
 from cdpr_tools.output import Output
 from cdpr_tools.signals import stop_on_signals
+from cdpr_tools.streams import discard_typed_ahead
 from cdpr_tools.tension.calibration import Hang, not_hung
 
 _LOOK_S = 0.02
@@ -141,6 +142,7 @@ def typed_line(question: str, stop_requested: Callable[[], bool]) -> str:
 
     A request to stop cannot interrupt `input`, so it is not used.
     """
+    discard_typed_ahead()
     typer.echo(f"{question}: ", nl=False, err=True)
     line = b""
     while not line.endswith(b"\n") and not stop_requested():

@@ -19,7 +19,7 @@ from cdpr_rt.calibration.parameters import CableGeometry
 from cdpr_rt.calibration.readings import Observations, load_points
 from cdpr_rt.calibration.verification import LEAST_VERIFYING, held_out
 from cdpr_tools.robots.new_robot import answers_of, write_robot
-from cdpr_tools.robots.questions import Question
+from cdpr_tools.robots.questions import Default, Question
 from tests.cdpr_rt.calibration.made_up import MadeUp, made_up, measured
 
 SHIPPED = ("planar-3", "spatial-8")
@@ -40,9 +40,9 @@ def robots(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
     return {name: name for name in SHIPPED} | {one: str(folder / f"{one}.toml") for one in MADE_UP}
 
 
-def _usual(_: Question, default: str, wrong: str) -> str:
+def _usual(_: Question, default: Default, wrong: str) -> str:
     assert not wrong
-    return default
+    return default.text
 
 
 @dataclass(frozen=True)

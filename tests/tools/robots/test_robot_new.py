@@ -1,10 +1,14 @@
-"""`cdpr robot new`: its questions, files and rejected answers."""
+"""`cdpr robot new`: what it asks, writes and rejects."""
 
 from __future__ import annotations
 
 import json
 import math
+import os
+import pty
 import re
+import threading
+from functools import cache
 from itertools import combinations
 from pathlib import Path
 
@@ -13,14 +17,15 @@ import pytest
 from cdpr_here import cdpr_here
 
 from cdpr_drivers.robot.robot_buses import require_fit
-from cdpr_profiles import ProfileError, load_robot
-from cdpr_rt.diagnosis.checks import diagnose, refuse_impossible
+from cdpr_profiles import Robot, load_robot
+from cdpr_rt.diagnosis.checks import refuse_impossible
+from cdpr_rt.diagnosis.subject import Finding
 from cdpr_rt.model.platform_model import RESERVE
 from cdpr_rt.model.statics import statics_of
 from cdpr_tools.errors import BadInputError
-from cdpr_tools.robots.new_robot import answers_of, write_robot
+from cdpr_tools.robots.new_robot import answers_of, questioned, text_of, write_robot
 from cdpr_tools.robots.picture import figure_of
-from cdpr_tools.robots.questions import KINDS, Question, kind_of
+from cdpr_tools.robots.questions import KINDS, Answers, Default, Question, kind_of
 
 
 @pytest.fixture(autouse=True)
@@ -28,30 +33,56 @@ def _wide(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("COLUMNS", "100")
 
 
-def usual(question: Question, default: str, wrong: str) -> str:
+def usual(question: Question, default: Default, wrong: str) -> str:
     assert not wrong
-    return default
+    return default.text
+
+
+@cache
+def usual_answers(kind: str) -> Answers:
+    """Return the defaults of a kind, which take seconds to compute."""
+    return answers_of(Path("mine.toml"), {"kind": kind}, usual)
+
+
+def described(path: Path, given: dict[str, str]) -> Robot:
+    """Return the robot that is described with these answers, about which nothing is doubtful."""
+    robot, found = write_robot(answers_of(path, given, usual), path)
+    assert robot is not None and found == []
+    return robot
+
+
+def found_wrong(path: Path, given: dict[str, str]) -> list[Finding]:
+    """Return the findings about a robot with these answers."""
+    return write_robot(answers_of(path, given, usual), path)[1]
 
 
 @pytest.mark.parametrize("kind", list(KINDS))
-def test_the_default_answers_of_every_kind_give_a_robot_without_findings(
-    kind: str, tmp_path: Path
-) -> None:
-    path = tmp_path / "mine.toml"
-    robot = write_robot(answers_of(path, {"kind": kind}, usual), path)
-    assert diagnose(robot) == []
+def test_the_defaults_of_every_kind_are_a_robot_that_works(kind: str, tmp_path: Path) -> None:
+    answers = usual_answers(kind)
+    robot, found = write_robot(answers, tmp_path / "mine.toml")
     shipped = load_robot(kind)
-    assert robot.platform is not None and shipped.platform is not None
-    assert robot.platform.controlled == shipped.platform.controlled
-    assert robot.platform.workspace_angle_rad == pytest.approx(
+    assert robot is not None and found == []
+    platform = robot.platform
+    assert platform is not None and shipped.platform is not None
+    assert platform.controlled == shipped.platform.controlled
+    assert platform.workspace_angle_rad == pytest.approx(
         shipped.platform.workspace_angle_rad, abs=1e-3
     )
     assert [len(robot.axes_on(bus.name)) for bus in robot.buses] == [
         len(robot.axes) // len(robot.buses)
     ] * len(robot.buses)
+    # winches stand on the edges of the frame, and the box is in the middle between them
+    *sides_m, height_m = answers["frame_m"]
+    exits_m = np.array(platform.exit_points_m)
+    on_wall = np.abs(exits_m[:, :-1]) == np.array(sides_m) / 2.0
+    centre = (exits_m[:, :-1] == 0.0) & (len(sides_m) == 1)
+    assert (on_wall | centre).any(axis=1).all()
+    assert set(exits_m[:, -1]) <= {0.0, height_m}
+    assert platform.workspace_min_m[0] == -platform.workspace_max_m[0]
+    assert platform.speed_m_s >= 0.3
 
 
-FRAMES = [(kind, width_m) for kind in KINDS for width_m in (1.5, 3.0, 8.0, 15.0)]
+FRAMES = [(kind, width_m) for kind in KINDS for width_m in (1.5, 15.0)]
 
 
 @pytest.mark.long
@@ -62,55 +93,75 @@ def test_the_default_answers_for_any_frame_size_give_a_robot_without_findings(
     usual_m = kind_of(kind).frame_m
     scale = widest_m / max(usual_m)
     frame = ", ".join(f"{scale * side:.3f}" for side in usual_m)
-    path = tmp_path / "mine.toml"
-    robot = write_robot(answers_of(path, {"kind": kind, "frame_m": frame}, usual), path)
-    assert diagnose(robot) == []
+    robot = described(tmp_path / "mine.toml", {"kind": kind, "frame_m": frame})
     assert robot.platform is not None
     side_m = max(math.dist(*pair) for pair in combinations(robot.platform.anchor_points_m, 2))
     assert side_m == pytest.approx(scale * kind_of(kind).side_m, rel=0.02)
 
 
-def test_the_proposed_box_of_a_wide_and_low_frame_is_feasible(tmp_path: Path) -> None:
-    path = tmp_path / "stadium.toml"
+WINCH_OF_2_m_s = """\
+name = "Winch for 2 m/s"
+motor = "MPP0923D"
+drive = "generic-cia402"
+cable = "dyneema-4.8mm"
+gear_ratio = 13.0
+drum_radius_m = 0.05
+encoder_counts_per_turn = 8192
+node_id = 1
+"""
+
+
+@pytest.mark.parametrize("kind", ["planar-3", "suspended-8"])
+def test_the_speed_is_what_the_winches_can_do(kind: str, tmp_path: Path) -> None:
+    (tmp_path / "fast.toml").write_text(WINCH_OF_2_m_s)
+    path = tmp_path / "mine.toml"
+    given = {"kind": kind, "winch": "fast.toml"}
+    robot, found = write_robot(answers_of(path, given, usual), path)
+    assert robot is not None and not any(finding.impossible for finding in found)
+    platform, (limit_rad_s,) = robot.platform, robot.limits.speed_rad_s or (0.0,)
+    assert platform is not None and platform.speed_m_s > 0.4
+    winch = robot.axes[0].winch
+    assert limit_rad_s < winch.motor.rated_speed_rad_s
+    assert limit_rad_s * winch.cable_m_per_motor_rad > math.sqrt(2.0) * platform.speed_m_s
+    # cables between winches on all sides hold a light platform as well
+    assert kind == "suspended-8" or platform.mass_kg == 2.0
+
+
+def test_a_speed_above_what_the_winches_can_do_is_asked_again(tmp_path: Path) -> None:
+    (tmp_path / "fast.toml").write_text(WINCH_OF_2_m_s)
+    with pytest.raises(BadInputError, match=r"speed_m_s: value '3'; allowed: a number from 0.001"):
+        answers_of(tmp_path / "mine.toml", {"winch": "fast.toml", "speed_m_s": "3"}, usual)
+
+
+def test_the_box_of_a_wide_and_low_frame_is_all_of_targets(tmp_path: Path) -> None:
     given = {"kind": "point-4", "frame_m": "80 50 20"}
-    told = diagnose(write_robot(answers_of(path, given, usual), path))
-    # the proposed winches are the smallest that hold the platform, and their cables of 50 m sag
-    assert [finding.key for finding in told] == ["limits.tension_min_N"]
+    found = found_wrong(tmp_path / "stadium.toml", given)
+    # the smallest winches that hold the platform are proposed, and cables of 50 m sag in their pull
+    assert [finding.key for finding in found] == ["limits.tension_min_N"]
 
 
 def test_the_error_for_a_platform_too_light_names_a_possible_mass(tmp_path: Path) -> None:
     path = tmp_path / "light.toml"
     given = {"kind": "suspended-6", "frame_m": "1.5 1.5 1.5", "mass_kg": "1"}
-    with pytest.raises(ProfileError) as caught:
-        write_robot(answers_of(path, given, usual), path)
+    worst = found_wrong(path, given)[0]
+    assert worst.impossible and worst.helps == "platform.mass_kg"
     assert re.search(
         r"a platform of \d+\.?\d* kg or more is possible there, or tension_min_N up to 0\.\d+ "
         "with correspondingly small winches",
-        str(caught.value),
+        worst.text,
     )
 
 
 def test_smaller_winches_and_a_smaller_frame_get_a_smaller_platform(tmp_path: Path) -> None:
-    path = tmp_path / "mine.toml"
     given = {"kind": "suspended-8", "frame_m": "3 2 2", "winch": "winch-300n"}
-    robot = write_robot(answers_of(path, given, usual), path)
-    platform = robot.platform
-    assert diagnose(robot) == []
+    platform = described(tmp_path / "mine.toml", given).platform
     assert platform is not None and 20.0 < platform.mass_kg < 40.0
     assert max(math.dist(*pair) for pair in combinations(platform.anchor_points_m, 2)) < 0.35
     assert min(math.dist(*pair) for pair in combinations(platform.exit_points_m, 2)) > 0.149
     np.testing.assert_allclose(np.ptp(platform.exit_points_m, axis=0)[:2], (3.0, 2.0), atol=0.02)
 
 
-def test_the_stand_is_in_the_middle_of_the_frame(tmp_path: Path) -> None:
-    path = tmp_path / "mine.toml"
-    given = {"kind": "suspended-8", "frame_m": "3 2 2"}
-    platform = write_robot(answers_of(path, given, usual), path).platform
-    assert platform is not None
-    assert platform.home_m[:2] == (0.0, 0.0)
-
-
-def test_the_kinds_are_listed_before_the_first_question(tmp_path: Path) -> None:
+def test_kinds_are_reported_before_the_first_question(tmp_path: Path) -> None:
     path = tmp_path / "mine.toml"
     done = cdpr_here("robot", "new", path, stdin="planar-5\n\n")
     assert done.returncode == 2 and not path.exists()
@@ -125,7 +176,7 @@ def test_yes_writes_a_robot_like_planar_3_and_never_overwrites_it(tmp_path: Path
     assert done.returncode == 0, done.stderr
     assert json.loads(done.stdout.splitlines()[-1]) == {"ok": True, "file": str(path)}
     robot = load_robot(path)
-    assert robot.name == "mine" and diagnose(robot) == []
+    assert robot.name == "mine"
     assert [axis.name for axis in robot.axes] == ["upper left", "upper right", "lower"]
     platform, shipped = robot.platform, load_robot("planar-3").platform
     assert platform is not None and shipped is not None
@@ -143,8 +194,7 @@ def test_yes_writes_a_robot_like_planar_3_and_never_overwrites_it(tmp_path: Path
 def test_defaults_follow_from_the_exit_points(tmp_path: Path) -> None:
     given = {"exit_1_m": "-2, 0", "exit_2_m": "2, 0", "exit_3_m": "0.2, 3", "side_m": "0.2"}
     path = tmp_path / "upright.toml"
-    robot = write_robot(answers_of(path, given, usual), path)
-    assert diagnose(robot) == []
+    robot = described(path, given)
     platform = robot.platform
     assert platform is not None
     # one corner points up, the others towards their exit points
@@ -154,33 +204,28 @@ def test_defaults_follow_from_the_exit_points(tmp_path: Path) -> None:
     assert [axis.name for axis in robot.axes] == ["cable 1", "cable 2", "cable 3"]
 
 
-def test_questions_are_repeated_until_their_answer_is_valid(tmp_path: Path) -> None:
-    answers = [
-        "",
-        "Wall robot",
-        "winch-mpp0932d",
-        "",
-        "socketcan:can1",
-        "1, 1, 2",
-        "4 5 6",
-        "3, 2.5",
-    ]
-    answers += ["", "", "here", "0.1, 0.1", "-1", "0.2", "", "", "", "400", "4", "15"]
-    answers += ["10", "140", "1.5", "", "", "", "-5, 0", "0.3, 1.9", "9, 9", ""]
+def test_answers_are_asked_again_until_they_can_be(tmp_path: Path) -> None:
+    answers = ["", "Wall robot", "winch-mpp0932d", "", "socketcan:can1", "1, 1, 2", "4 5 6"]
+    answers += ["0, 2.5", "3, 2.5", "", "", "here", "0.1, 0.1", "-1", "0.2", "", "", ""]
+    answers += ["400", "4", "1e9", "140", "150", "15", "", "1.5"]
+    answers += ["", "-5, 0", "0.3, 1.9", "9, 9", "", "99", "0.4"]
     path = tmp_path / "wall.toml"
     done = cdpr_here("robot", "new", path, stdin="\n".join(answers) + "\n")
-    assert done.returncode == 0, done.stderr
+    told = done.stderr
     for problem in (
         "did you mean 'winch-mpp0923d'?",
         "allowed: 3 different numbers from 1 to 126",
+        "allowed: two numbers in m above 0",
         "value 'here'; allowed: two numbers in m",
-        "allowed: a number from 0 to 10",
-        "allowed: a number from 0.001 to 11.55",
-        "allowed: a number from 15 to",
-        "allowed: above -0",
-        "allowed: x from -0",
+        "value '-1'; allowed: a number from 0 to 10",
+        "value '400'; allowed: a number from 0.001 to 11.55",
+        "value '1e9'; allowed: a number from 1 to",
+        "value '150'; allowed: a number from 0.1 to 140",
+        "value '-5, 0'; allowed: above -0",
+        "value '9, 9'; allowed: x from -0",
+        "value '99'; allowed: a number from 0.001 to 7",
     ):
-        assert problem in done.stderr, problem
+        assert problem in told, problem
     robot = load_robot(path)
     platform = robot.platform
     assert platform is not None
@@ -189,18 +234,96 @@ def test_questions_are_repeated_until_their_answer_is_valid(tmp_path: Path) -> N
     assert platform.exit_points_m == ((-1.5, 2.5), (1.5, 2.5), (0.1, 0.1))
     assert platform.workspace_max_m == (0.3, 1.9)
     assert (robot.limits.tension_min_N, robot.limits.tension_max_N) == ((15.0,), (140.0,))
-    assert platform.mass_kg == 1.5
+    assert (platform.mass_kg, platform.speed_m_s) == (1.5, 0.4)
+
+
+def test_a_question_says_where_its_default_comes_from(tmp_path: Path) -> None:
+    path = tmp_path / "mine.toml"
+    done = cdpr_here("robot", "new", path, stdin="\n" * 30)
+    assert done.returncode == 0, done.stderr
+    for origin, text in (
+        ("85 % of the torque limit", "Greatest tension"),
+        ("that of planar-3; the cables hold 0.0", "Mass of the platform"),
+        ("a box in which the cables hold the platform", "Box of targets, least"),
+        ("reached within a quarter of the box; rated speed of the winches, 13 m/s", "Speed along"),
+    ):
+        assert re.search(rf"default: {re.escape(origin)}.*\n{text}", done.stderr), origin
+        assert f"default: {origin}" in path.read_text()
+
+
+def test_what_a_rejection_names_is_asked_again(tmp_path: Path) -> None:
+    path = tmp_path / "heavy.toml"
+    answers = *[""] * 17, "80", *[""] * 4, "1.5"
+    done = cdpr_here("robot", "new", path, stdin="\n".join(answers) + "\n")
+    assert done.returncode == 0, done.stderr
+    before, _, after = done.stderr.partition("this robot cannot work:\n")
+    assert before.count("Mass of the platform") == 1 and "kg is possible there" in after
+    assert re.findall(r"^[A-Z][^:\n]*", after, re.MULTILINE) == ["Mass of the platform (kg) [2]"]
+    platform = load_robot(path).platform
+    assert platform is not None and platform.mass_kg == 1.5
+    # the box follows from the new answer
+    assert platform.workspace_max_m[0] == pytest.approx(0.5, abs=0.2)
+
+
+def test_a_rejected_robot_is_written_so_that_it_can_be_edited(tmp_path: Path) -> None:
+    path = tmp_path / "heavy.toml"
+    set_ = ("--set", "mass_kg=80", "--set", 'name=A "line" é')
+    done = cdpr_here("robot", "new", path, *set_, "--yes")
+    assert done.returncode == 2
+    assert f"{path}: written, but this robot cannot work\nplatform.home_m: " in done.stderr
+    assert f"edit the file, then check it: cdpr robot show {path}" in done.stderr
+    assert "another answer" not in done.stderr
+    robot = load_robot(path)
+    assert robot.name == 'A "line" é'
+    path.write_text(path.read_text().replace("mass_kg = 80.0", "mass_kg = 1.5"))
+    refuse_impossible(load_robot(path))
+
+
+@pytest.mark.parametrize("answer", ["", "80\n"])
+def test_a_rejected_robot_stays_written_if_no_other_answer_follows(
+    answer: str, tmp_path: Path
+) -> None:
+    path = tmp_path / "heavy.toml"
+    done = cdpr_here("robot", "new", path, "--set", "mass_kg=80", stdin="\n" * 21 + answer)
+    assert done.returncode == 2 and "Traceback" not in done.stderr
+    assert done.stderr.count("Mass of the platform") == 1
+    assert f"{path}: written, but this robot cannot work" in done.stderr
+    platform = load_robot(path).platform
+    assert platform is not None and platform.mass_kg == 80.0
 
 
 def test_unanswered_questions_write_no_file(tmp_path: Path) -> None:
     path = tmp_path / "mine.toml"
-    done = cdpr_here("robot", "new", path, stdin="\nMine\n\n")
+    done = cdpr_here("robot", "new", path, stdin="planar-4\nMy wall\n\n")
     assert done.returncode == 2
     assert "no answer to 'bus' (--yes takes the defaults); nothing was written" in done.stderr
+    again = f"to continue: cdpr robot new {path} --set kind=planar-4 --set 'name=My wall'"
+    assert again in done.stderr
     assert "Traceback" not in done.stderr and not path.exists()
 
 
-def test_all_unknown_keys_are_named_with_the_allowed_keys(tmp_path: Path) -> None:
+def test_typed_ahead_lines_answer_no_question(tmp_path: Path) -> None:
+    path = tmp_path / "mine.toml"
+    person, terminal = pty.openpty()
+    os.write(person, b"\n\n\n")  # while the command loads
+    over = threading.Event()
+
+    def leave() -> None:
+        while not over.wait(0.05):
+            os.write(person, b"\x04")  # end of input, once somebody reads
+
+    leaving = threading.Thread(target=leave)
+    with os.fdopen(terminal) as stdin:
+        leaving.start()
+        done = cdpr_here("robot", "new", path, stdin=stdin)
+        over.set()
+        leaving.join()
+    os.close(person)
+    assert done.returncode == 2 and not path.exists()
+    assert "no answer to 'kind'" in done.stderr and "Name of the robot" not in done.stderr
+
+
+def test_all_wrong_keys_are_named_with_those_of_the_kind(tmp_path: Path) -> None:
     given = {"kind": "planar-4", "width_m": "3", "height": "2"}
     with pytest.raises(BadInputError) as caught:
         answers_of(tmp_path / "mine.toml", given, usual)
@@ -238,13 +361,17 @@ def test_two_answers_to_one_question_are_rejected(tmp_path: Path) -> None:
     assert "--set kind: given as 'planar-3' and 'planar-4'; give it once" in done.stderr
 
 
-def test_an_impossible_robot_is_reported_and_not_written(tmp_path: Path) -> None:
-    path = tmp_path / "point.toml"
-    line = ["exit_1_m=-1,2", "exit_2_m=0,2", "exit_3_m=1,2", "side_m=0", 'name=A "line" é']
-    done = cdpr_here("robot", "new", path, "--yes", *(p for text in line for p in ("--set", text)))
-    assert done.returncode == 2
-    assert f"cdpr: {path}: platform." in done.stderr and not path.exists()
-    assert "--set side_m=0 --set 'name=A \"line\" é' --yes" in done.stderr
+def test_a_point_that_is_a_default_is_mended_by_the_size(tmp_path: Path) -> None:
+    answers = usual_answers("planar-4")
+    found = [
+        Finding("axes[2].anchor_point_m", "", impossible=True),
+        Finding("axes[1].exit_point_m", "", impossible=True),
+        Finding("platform.workspace_max_m[1]", "", impossible=True),
+        Finding("sync_period_s", "", impossible=True),
+    ]
+    assert questioned(found, answers, {}) == {"side_m", "frame_m", "high_m"}
+    typed = {"anchor_3_m": "0, 0", "exit_2_m": "1, 1"}
+    assert questioned(found, answers, typed) == {"anchor_3_m", "exit_2_m", "high_m"}
 
 
 def test_a_file_in_a_missing_folder_is_rejected(tmp_path: Path) -> None:
@@ -256,8 +383,9 @@ def test_a_file_in_a_missing_folder_is_rejected(tmp_path: Path) -> None:
 def test_names_in_the_picture_stay_inside_its_axes(tmp_path: Path) -> None:
     path = tmp_path / "mine.toml"
     given = {"kind": "suspended-8", "frame_m": "3 2 2"}
-    robot = write_robot(answers_of(path, given, usual), path)
-    assert robot.platform is not None
+    robot, _ = write_robot(answers_of(path, given, usual), path)
+    assert robot is not None and robot.platform is not None
+    assert robot.platform.home_m[:2] == (0.0, 0.0)
     figure = figure_of(robot, robot.platform)
     figure.draw_without_rendering()
     (from_above,) = [ax for ax in figure.axes if ax.texts]
@@ -270,17 +398,13 @@ def test_names_in_the_picture_stay_inside_its_axes(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("given", "under_m"),
-    [
-        ({"kind": "suspended-6"}, 0.4),
-        ({"kind": "point-4"}, 0.4),
-        ({"kind": "point-4", "frame_m": "80 50 20"}, 0.5),
-    ],
+    ("kind", "under_m"),
+    [("suspended-6", 0.4), ("point-4", 0.4)],
 )
 def test_a_platform_that_cables_hold_down_to_the_floor_has_a_stand(
-    given: dict[str, str], under_m: float, tmp_path: Path
+    kind: str, under_m: float
 ) -> None:
-    answers = answers_of(tmp_path / "mine.toml", given, usual)
+    answers = usual_answers(kind)
     assert answers["home_m"][-1] >= under_m
     assert answers["low_m"][-1] > answers["home_m"][-1]
 
@@ -292,10 +416,9 @@ def _point(axis: str, key: str, point_m: tuple[float, ...]) -> str:
     return re.sub(rf"^{key} = \[.*?\]", f"{key} = {list(point_m)}", axis, flags=re.MULTILINE)
 
 
-def _file_of(kind: str, path: Path) -> tuple[str, list[str]]:
+def _file_of(kind: str) -> tuple[str, list[str]]:
     """Return the head and the axes of a file as `cdpr robot new` writes it."""
-    write_robot(answers_of(path, {"kind": kind}, usual), path)
-    head, *axes = path.read_text().split("\n[[axes]]\n")
+    head, *axes = text_of(usual_answers(kind)).split("\n[[axes]]\n")
     return head, axes
 
 
@@ -309,18 +432,19 @@ def _require_works(path: Path, head: str, axes: list[str]) -> None:
     assert statics_of(robot).is_target(np.mean(box, axis=0))
 
 
-@pytest.mark.parametrize("kind", ["planar-4", "suspended-6", "suspended-8", "spatial-8"])
-@pytest.mark.parametrize("above", [False, True])
-def test_a_robot_with_one_more_cable_below_or_above_the_middle_is_feasible(
+@pytest.mark.parametrize(
+    ("kind", "above"),
+    [("planar-4", False), ("suspended-6", True), ("suspended-8", False), ("spatial-8", True)],
+)
+def test_one_more_cable_straight_below_or_above_the_middle(
     kind: str, above: bool, tmp_path: Path
 ) -> None:
     path = tmp_path / "mine.toml"
-    head, axes = _file_of(kind, path)
-    robot = load_robot(path)
-    assert robot.platform is not None
-    size = len(robot.platform.home_m)
-    top_m = max(point[-1] for point in robot.platform.exit_points_m)
-    place_m = (*(0.0,) * (size - 1), top_m if above else robot.platform.home_m[-1] - 0.2)
+    head, axes = _file_of(kind)
+    answers = usual_answers(kind)
+    size = len(answers["home_m"])
+    top_m = max(answers[f"exit_{i + 1}_m"][-1] for i in range(len(axes)))
+    place_m = (*(0.0,) * (size - 1), top_m if above else answers["home_m"][-1] - 0.2)
     more = _point(axes[-1], "exit_point_m", place_m)
     more = _point(more, "anchor_point_m", (0.0,) * size)
     more = re.sub(r"node_id = \d+", f"node_id = {len(axes) + 1}", more)
@@ -331,14 +455,14 @@ def test_a_robot_with_one_more_cable_below_or_above_the_middle_is_feasible(
 
 def test_a_point_on_two_cables_in_a_plane_is_feasible(tmp_path: Path) -> None:
     path = tmp_path / "mine.toml"
-    head, axes = _file_of("planar-3", path)
-    head = re.sub(r"^mass_kg = \S+", "mass_kg = 6.5", head, flags=re.MULTILINE)
+    head, axes = _file_of("planar-3")
+    head = re.sub(r"^mass_kg = \S+", "mass_kg = 10.0", head, flags=re.MULTILINE)
     upper = [_point(axis, "anchor_point_m", (0.0, 0.0)) for axis in axes[:2]]
     _require_works(path, head, upper)
 
 
 def test_a_point_on_three_cables_from_above_is_feasible(tmp_path: Path) -> None:
     path = tmp_path / "mine.toml"
-    head, axes = _file_of("point-4", path)
+    head, axes = _file_of("point-4")
     _, y_m, z_m = (float(x) for x in re.findall(r"exit_point_m = \[(.*?)\]", axes[2])[0].split(","))
     _require_works(path, head, [*axes[:2], _point(axes[2], "exit_point_m", (0.0, y_m, z_m))])
