@@ -189,7 +189,7 @@ class _Asker:
             _say("this robot cannot work:", *reasons, "another answer, please:")
 
     def __call__(self, question: Question, default: Default, problem: str) -> str:
-        """Return the answer to a question; raises BadInputError if there is none."""
+        """Return the answer to a question; raises BadInputError without one."""
         key = question.key
         if self._yes and problem:
             raise BadInputError(f"{key}: {problem}; answer it with --set")

@@ -123,7 +123,7 @@ def test_the_speed_is_what_the_winches_can_do(kind: str, tmp_path: Path) -> None
     winch = robot.axes[0].winch
     assert limit_rad_s < winch.motor.rated_speed_rad_s
     assert limit_rad_s * winch.cable_m_per_motor_rad > math.sqrt(2.0) * platform.speed_m_s
-    # cables between winches on all sides hold a light platform as well
+    # cables between winches on all sides also hold a light platform
     assert kind == "suspended-8" or platform.mass_kg == 2.0
 
 
