@@ -347,11 +347,15 @@ class LockstepClock(Clock):
     @property
     def now_s(self) -> float:
         """The earliest time of all buses; once all are lost, it continues from the latest."""
-        buses = self._buses
+        buses, earliest_s = self._buses, math.inf
         if len(buses) == 1 and not buses[0].gone:
             return buses[0].now_s
-        led_s = [bus.now_s for bus in buses if not bus.gone]
-        return min(led_s) if led_s else max([self._alone_s, *(bus.now_s for bus in buses)])
+        for bus in buses:  # a generator costs twice as much, several times a cycle
+            if bus.now_s < earliest_s and not bus.gone:
+                earliest_s = bus.now_s
+        if earliest_s < math.inf:
+            return earliest_s
+        return max([self._alone_s, *(bus.now_s for bus in buses)])
 
     def sleep_until(self, until_s: float) -> None:
         """Advance time until then."""
