@@ -71,7 +71,7 @@ def test_a_camera_run_survives_a_slip_a_mirrored_sheet_and_an_unplugged_camera(
         *("--intrinsics", lens, "--out", tmp_path / "out", "--json"),
     )
     assert done.returncode == 0, done.stderr
-    assert "pose 1: marker 50 is printed as its mirror image, and is left out" in done.stderr
+    assert "pose 1: marker 50 is printed as a mirror image, and is left out" in done.stderr
     assert "sends no more images" in done.stderr and "opening it again" in done.stderr
     told = json.loads(done.stdout.splitlines()[-1])
     (jump,) = (fault for fault in told["faults"] if fault["kind"] != "marker")

@@ -214,7 +214,7 @@ def test_a_node_in_fault_is_reported_as_text(lab: Lab) -> None:
 def test_a_drive_that_rejects_the_mode_is_reported(lab: Lab) -> None:
     lab.inject_fault(3, 1)
     told = fails("drive", "enable", WINCH, "--bus", lab.bus)
-    assert "10 (cyclic torque) was refused" in told
+    assert "the drive rejected mode 10 (cyclic torque)" in told
     assert lab.state() == OFF
 
 

@@ -181,7 +181,7 @@ def test_a_user_without_home_folder_can_run_a_robot(tmp_path: Path) -> None:
     finally:
         assert daemon.end() == 0
     told = daemon.errors()
-    assert told.count("nothing will be recorded: /proc/nowhere/cdpr-rt/recordings") == 1
+    assert told.count("not recording: /proc/nowhere/cdpr-rt/recordings") == 1
     assert "Traceback" not in told
 
 

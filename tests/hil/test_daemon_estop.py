@@ -206,7 +206,7 @@ def test_estop_requires_a_name_or_all_if_several_robots_run(tmp_path: Path) -> N
         assert estop("left", "--all", **env)[0] == 2
         assert estop("left", "--robot", "right", **env)[0] == 2
         status, told = estop("letf", **env)
-        assert (status, "what runs: left, right; --all stops it" in told["error"]) == (1, True)
+        assert (status, "running: left, right; --all stops it" in told["error"]) == (1, True)
         assert one.status()["state"] == "ready"  # no robot was stopped
         status, told = estop("--all", **env)
         assert (status, len(told["robots"])) == (0, 2)

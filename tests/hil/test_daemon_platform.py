@@ -86,7 +86,7 @@ def test_a_platform_is_tightened_moved_and_lowered_to_its_stand(daemon: RealDaem
         (("move", "--to", "0.3", "2.0"), "are these metres? In mm: --to 300 2000"),
         (("move", "--to", "0", "1600", "lower=5"), "not together with axes"),
         (("move", "--rotate", "5"), "--rotate 5: this platform has no controlled angle"),
-        (("tighten", "--from", "home"), "tighten --from home: the cables are tight already"),
+        (("tighten", "--from", "home"), "tighten --from home: the cables are already tight"),
         (("controller", "idle"), "lower it first"),
     ):
         status, why = refused(daemon, *command)

@@ -332,7 +332,7 @@ def test_power_is_rejected_if_cable_lengths_cannot_be_stored(planar: Path) -> No
     with LockstepRobot(planar) as robot:
         last = robot.loop.engine.parts.last_stop
         last.path = Path("/proc/nowhere/cdpr-rt/lengths.planar-3.json")
-        told = r"/proc/nowhere/cdpr-rt: cannot be written, .* XDG_STATE_HOME"
+        told = r"/proc/nowhere/cdpr-rt: is not writable, .* XDG_STATE_HOME"
         with pytest.raises(Refused, match=told):
             robot.enable()
         assert robot.machine.unpowered()

@@ -120,7 +120,7 @@ def test_a_slave_without_process_data_boots_as_far_as_possible(
         assert json.loads(told.stdout.splitlines()[-1])["profile_fits"] is True
         ended = cdpr("drive", "enable", winch, "--bus", bus)
         assert ended.returncode == 1
-        assert "node 1 did not boot (step K): no heartbeat came" in ended.stderr
+        assert "node 1 did not boot (step K): it sends no heartbeat" in ended.stderr
         assert node.sdo[0x1A00][2].raw == 0x60640020  # its configuration was written
 
         def obey(can_id: int, data: bytearray, time_s: float) -> None:

@@ -127,7 +127,7 @@ def test_readers_and_senders_detect_an_interface_that_goes_down() -> None:
     try:
         with pytest.raises(OSError, match="down") as caught:
             port.recv_into(bytearray(16))
-        assert "bus has gone away: the network interface 'vcan1' is down" in str(
+        assert "the bus is lost: the network interface 'vcan1' is down" in str(
             port.lost(caught.value)
         )
         with pytest.raises(OSError, match=r".") as caught:

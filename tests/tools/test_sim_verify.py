@@ -63,7 +63,7 @@ def test_a_motion_is_identical_beside_busy_and_with_stopped_processes(tmp_path: 
     assert (keep / "run-1" / "output.txt").read_text()
     assert processes_of(keep / "run-2" / "files") == []
     refused = verified("--keep", keep, "--", *JOG, status=2)
-    assert "kept: cannot be made: File exists" in refused["error"]
+    assert "kept: cannot be created: File exists" in refused["error"]
 
 
 def test_a_drive_with_different_noise_is_found(tmp_path: Path) -> None:

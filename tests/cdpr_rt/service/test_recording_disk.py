@@ -166,7 +166,7 @@ def test_recording_ends_before_the_disk_is_full(tmp_path: Path) -> None:
     put(RowWriter(block), made_rows(0, 10))
     wait_until(lambda: recorder.status()["error"])
     recorder.stop()
-    assert "GB free, less than the 1.15e+09 GB that" in recorder.status()["error"] and ends == [
+    assert "GB free, less than the 1.15e+09 GB reserved" in recorder.status()["error"] and ends == [
         recorder.status()["error"]
     ]
     (path,) = tmp_path.iterdir()

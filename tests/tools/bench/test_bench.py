@@ -82,7 +82,7 @@ def test_bench_cycle_exchanges_the_same_frames_with_either_library() -> None:
     ("arguments", "message"),
     [
         (("cycle", "--cycles", "0"), "--cycles"),
-        (("control", "--robot", "bench-2"), "bench-2.toml: has no platform; allowed: robots with"),
+        (("control", "--robot", "bench-2"), "bench-2.toml: has no platform; allowed: a robot with"),
     ],
 )
 def test_invalid_input_prints_one_message(arguments: tuple[str, ...], message: str) -> None:

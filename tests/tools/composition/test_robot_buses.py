@@ -51,7 +51,7 @@ def test_a_robot_with_one_bus_takes_one_url(tmp_path: Path):
         (("left=socketcan:can0",), "bus 'right' has no url; add it there or give --bus right=URL"),
         (("socketcan:can0",), "has 2 buses; write --bus left=URL --bus right=URL"),
         (("middle=socketcan:can0",), "no bus 'middle'; allowed: left, right"),
-        (("left=socketcan:a", "left=socketcan:b"), "'left' was given before as socketcan:a"),
+        (("left=socketcan:a", "left=socketcan:b"), "'left' is already given as socketcan:a"),
         (("left=socketcan:a", "right=socketcan:a"), "'left' and 'right': both are socketcan:a"),
         (("left=socketcan:a", "simbus:x"), "write several buses as BUS=URL"),
         (("left=simbus:", "right=simbus:x"), "a single bus needs a name"),

@@ -233,6 +233,6 @@ def test_the_profile_of_another_drive_prevents_the_start(
     stored.write_text(stored.read_text().replace('"serial": 2', '"serial": 7'))
     with opened(path, url) as rig:
         assert rig.state is LoopState.UNCONFIGURED
-        reason = rig.status()["reason"]
+        reason = rig.status["reason"]
         assert "axis axis 2: " in reason
         assert "serial = 7, this axis has 2: commission it again" in reason

@@ -182,7 +182,7 @@ def test_notifications_are_repeated_until_systemd_accepts_them(start: Start) -> 
 
 @pytest.mark.parametrize(
     ("number", "told"),
-    [(signal.SIGKILL, "killed by signal 9"), (signal.SIGSTOP, "has run no cycle")],
+    [(signal.SIGKILL, "killed by signal 9"), (signal.SIGSTOP, "has not responded for 1 s")],
 )
 def test_a_dead_or_hanging_service_is_restarted_and_the_loop_continues(
     start: Start, number: signal.Signals, told: str

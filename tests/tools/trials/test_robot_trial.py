@@ -85,7 +85,7 @@ def test_a_trial_can_be_evaluated_again(trial, capsys):
     robot_trial.trial("planar-3", KindOfTrial.TARGETS, out_dir=folder, again=True, as_json=True)
     again = json.loads(capsys.readouterr().out.splitlines()[-1])
     assert again["figures"] == told["figures"]
-    with pytest.raises(BadInputError, match="holds a trial of targets, not line"):
+    with pytest.raises(BadInputError, match="contains a trial of targets, not line"):
         robot_trial.trial("planar-3", KindOfTrial.LINE, out_dir=folder, again=True)
 
 
