@@ -203,7 +203,7 @@ def test_impossible_teleoperation_is_reported(
         ),
         ((*plays, "--axes", "ABS_X"), 2, "--axes ABS_X: allowed only with --device gamepad"),
         ((*plays, "--via", "nowhere"), 2, "--via nowhere: allowed: HOST:PORT"),
-        ((*plays, "--via", "a..b:7710"), 2, "set-points to a..b:7710: is no name of a host"),
+        ((*plays, "--via", "a..b:7710"), 2, "set-points to a..b:7710: is not a host name"),
         ((*plays, "--via", "127.0.0.1:9"), 1, "the robot has not answered for 0.5 s"),
     ):
         error = CliRunner().invoke(app, [str(daemon.robot), *daemon.at, *options]).exception
