@@ -235,4 +235,4 @@ def test_the_profile_of_another_drive_prevents_the_start(
         assert rig.state is LoopState.UNCONFIGURED
         reason = rig.status["reason"]
         assert "axis axis 2: " in reason
-        assert "serial = 7, this axis has 2: commission it again" in reason
+        assert "serial = 7, but this axis has 2" in reason
