@@ -97,7 +97,7 @@ def test_estop_kills_a_hanging_loop_and_reports_it_as_unconfirmed(
             expect_stop(ear, at_s)
         status, told = estop(*daemon.at)
         assert status == 1
-        assert "its loop has ended; its drives stop within from it stop without" in str(told)
+        assert "its loop has ended; its drives stop within 0.2 s without its heartbeat" in str(told)
     finally:
         daemon.end()
 
