@@ -15,7 +15,7 @@ from cdpr_profiles.winch import BITRATES_bit_s, Winch
 from cdpr_profiles.winch_calibration import WinchCalibration
 
 if TYPE_CHECKING:
-    from cdpr_profiles.calibration.geometry import GeometryCalibration
+    from cdpr_profiles.geometry_calibration import GeometryCalibration
 
 HEARTBEAT_TIMEOUT_PERIODS = 1.75
 """Heartbeat timeout of the drives in periods of the master's heartbeat: fewer than two."""

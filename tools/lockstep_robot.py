@@ -25,7 +25,7 @@ from cdpr_drivers.errors import DriverError
 from cdpr_drivers.robot.commissioned import with_commissioned, without_commissioned
 from cdpr_drivers.robot.machine import RobotMachine
 from cdpr_profiles import load_robot
-from cdpr_profiles.calibration.in_force import calibrated
+from cdpr_profiles.calibration_in_force import calibrated
 from cdpr_profiles.errors import ProfileError
 from cdpr_profiles.platform import NO_PLATFORM
 from cdpr_rt.code_loader import CodeError
@@ -603,8 +603,8 @@ class LockstepRobot:
         """Plan the path in a file; return the name of the plan."""
         # imported here: most scripts follow no path
         from cdpr_rt.programs.path_store import write_plan  # noqa: PLC0415
-        from cdpr_tools.paths.options import PathOptions  # noqa: PLC0415
-        from cdpr_tools.paths.preview import obstacle_text, preview  # noqa: PLC0415
+        from cdpr_tools.robots.path_options import PathOptions  # noqa: PLC0415
+        from cdpr_tools.robots.path_preview import obstacle_text, preview  # noqa: PLC0415
 
         self._require_open()
         try:

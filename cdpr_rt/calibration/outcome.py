@@ -12,7 +12,7 @@ from pydantic import ValidationError
 from scipy.spatial.transform import Rotation
 
 from cdpr_profiles import Robot
-from cdpr_profiles.calibration.geometry import GeometryCalibration, geometry_sha256
+from cdpr_profiles.geometry_calibration import GeometryCalibration, geometry_sha256
 from cdpr_profiles.platform import Platform
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.calibration.faults import UNDECIDED, Fault

@@ -15,9 +15,9 @@ from pydantic import Field, model_validator
 
 from cdpr_profiles import Robot
 from cdpr_profiles.bounded_input import read_text
-from cdpr_profiles.calibration.geometry import geometry_sha256, write_text
 from cdpr_profiles.camera import CameraIntrinsics, MarkerSheets
 from cdpr_profiles.errors import ProfileError, value_text
+from cdpr_profiles.geometry_calibration import geometry_sha256, write_text
 from cdpr_profiles.reader import Profile, read_json_model
 from cdpr_rt.arrays import BoolArray, FloatArray, IntArray
 from cdpr_rt.calibration.markers.marker_map import SeenMarkers, Sighting

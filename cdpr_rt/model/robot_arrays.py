@@ -11,7 +11,7 @@ from typing import Any, Final
 import numpy as np
 
 from cdpr_profiles import Robot, RobotAxis
-from cdpr_profiles.calibration.geometry import GeometryCalibration
+from cdpr_profiles.geometry_calibration import GeometryCalibration
 from cdpr_profiles.platform import Platform
 from cdpr_profiles.tension_sensor import load_tension_sensors
 from cdpr_rt.arrays import FloatArray

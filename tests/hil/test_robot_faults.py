@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 from cdpr_profiles import load_robot
-from cdpr_profiles.calibration.in_force import take_over
+from cdpr_profiles.calibration_in_force import take_over
 from cdpr_rt.core.states import LoopState
 from cdpr_rt.diagnosis.predictions import slips
 from cdpr_rt.diagnosis.subject import Subject

@@ -10,16 +10,16 @@ from pathlib import Path
 import pytest
 
 from cdpr_profiles import ProfileError, Robot, load_robot
-from cdpr_profiles.calibration.geometry import (
-    GeometryCalibration,
-    geometry_sha256,
-)
-from cdpr_profiles.calibration.in_force import (
+from cdpr_profiles.calibration_in_force import (
     calibrated,
     calibration_file,
     next_version,
     take_over,
     undo,
+)
+from cdpr_profiles.geometry_calibration import (
+    GeometryCalibration,
+    geometry_sha256,
 )
 from cdpr_profiles.places import SHIPPED
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cdpr_profiles import Robot
-from cdpr_profiles.calibration.in_force import calibrated, in_force
+from cdpr_profiles.calibration_in_force import calibrated, in_force
 from cdpr_profiles.errors import FileMissingError, ProfileError
 from cdpr_rt.calibration.camera_start import with_seen_poses
 from cdpr_rt.calibration.check import Check, check_geometry, require_spare_length

@@ -17,10 +17,10 @@ from pydantic import Field
 
 from cdpr_drivers.errors import DriverError
 from cdpr_profiles import Robot, load_robot
-from cdpr_profiles.calibration.geometry import geometry_sha256, write_text
-from cdpr_profiles.calibration.in_force import calibrated
+from cdpr_profiles.calibration_in_force import calibrated
 from cdpr_profiles.camera import CameraIntrinsics, MarkerSheets
 from cdpr_profiles.errors import ProfileError
+from cdpr_profiles.geometry_calibration import geometry_sha256, write_text
 from cdpr_profiles.platform import NO_PLATFORM
 from cdpr_profiles.reader import Profile, read_json_model
 from cdpr_rt.arrays import FloatArray

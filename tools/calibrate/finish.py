@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 from cdpr_profiles import Robot
-from cdpr_profiles.calibration.geometry import GeometryCalibration
-from cdpr_profiles.calibration.in_force import in_force, next_version, take_over
+from cdpr_profiles.calibration_in_force import in_force, next_version, take_over
 from cdpr_profiles.errors import ProfileError
+from cdpr_profiles.geometry_calibration import GeometryCalibration
 from cdpr_rt.calibration.calibrate import calibrate
 from cdpr_rt.calibration.outcome import (
     CalibrationFiles,

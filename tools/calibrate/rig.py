@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 from typing_extensions import override
 
 from cdpr_profiles.bounded_input import parse_json
-from cdpr_profiles.calibration.geometry import write_text
+from cdpr_profiles.geometry_calibration import write_text
 from cdpr_profiles.reader import Profile, read_json_model
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.calibration.markers.marker_map import Sighting

@@ -17,7 +17,7 @@ from cdpr_tools.client.refusals import DaemonRefusalError, in_typed_words
 from cdpr_tools.client.status_text import CONTINUE, left_text, next_steps
 from cdpr_tools.errors import BadInputError, WorkFailedError
 from cdpr_tools.output import Output, time_text
-from cdpr_tools.paths.options import PathOptions
+from cdpr_tools.robots.path_options import PathOptions
 from cdpr_tools.signals import stop_on_signals
 
 _MOST_BYTES: Final = 1 << 20

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from cdpr_profiles import Robot, load_robot
-from cdpr_profiles.calibration.in_force import undo as take_back
+from cdpr_profiles.calibration_in_force import undo as take_back
 from cdpr_tools.client.client import Daemon, open_daemon
 from cdpr_tools.commands.options import (
     ClusterOption,

@@ -12,7 +12,7 @@ from typer.core import TyperGroup
 from typing_extensions import override
 
 from cdpr_profiles import Robot
-from cdpr_profiles.calibration.in_force import load_calibrated
+from cdpr_profiles.calibration_in_force import load_calibrated
 from cdpr_profiles.errors import ProfileError
 from cdpr_tools.command_group import ROBOT_VARIABLE
 from cdpr_tools.commands.options import (
@@ -28,7 +28,7 @@ from cdpr_tools.errors import BadInputError, CommandError, os_error_as
 from cdpr_tools.output import Output
 
 if TYPE_CHECKING:
-    from cdpr_tools.paths.options import PathOptions
+    from cdpr_tools.robots.path_options import PathOptions
 
 
 class _Verbs(TyperGroup):
@@ -105,7 +105,7 @@ def _with_path(
     as_json: JsonOption = False,
 ) -> Iterator[tuple[PathFile, Output]]:
     """Pass the path that these options describe, and the output, to a command."""
-    from cdpr_tools.paths.options import PathOptions  # noqa: PLC0415  # slow to load
+    from cdpr_tools.robots.path_options import PathOptions  # noqa: PLC0415  # slow to load
 
     out = Output(as_json)
     options = PathOptions(origin, blend, ignore, z, scale, rotate, mirror, dwell, line)
@@ -240,14 +240,14 @@ def robot_by_name(name: str) -> Robot:
 
 
 def _preview(robot: Robot, path: PathFile, out: Output, picture: Path | None, keep: bool) -> None:
-    from cdpr_tools.paths import preview as previews  # noqa: PLC0415  # slow to load
+    from cdpr_tools.robots import path_preview as previews  # noqa: PLC0415  # slow to load
 
     with out.progress("planning", 10.0) as advance:
         shown = previews.preview(robot, *path, lambda _, part: advance(10.0 * part))
     preview_figures = previews.figures(shown)
     out.say(*previews.lines(shown, robot, preview_figures))
     if picture is not None:
-        from cdpr_tools.paths.preview import draw_path  # noqa: PLC0415  # slow to load
+        from cdpr_tools.robots.path_preview import draw_path  # noqa: PLC0415  # slow to load
 
         with os_error_as(BadInputError, f"--png {picture}"):
             draw_path(shown, robot, picture)

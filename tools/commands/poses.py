@@ -9,7 +9,7 @@ from typing import Annotated
 import numpy as np
 import typer
 
-from cdpr_profiles.calibration.in_force import load_calibrated
+from cdpr_profiles.calibration_in_force import load_calibrated
 from cdpr_profiles.platform import NO_PLATFORM
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.errors import GeometryError

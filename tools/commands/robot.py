@@ -13,7 +13,7 @@ import typer
 from cdpr_drivers.bus.budget import machine_budget
 from cdpr_drivers.robot.robot_buses import refusal
 from cdpr_profiles import Robot, load_robot
-from cdpr_profiles.calibration.in_force import load_calibrated
+from cdpr_profiles.calibration_in_force import load_calibrated
 from cdpr_profiles.errors import printable
 from cdpr_profiles.platform import NO_PLATFORM, Platform
 from cdpr_rt.diagnosis import checks

@@ -11,7 +11,7 @@ import numpy as np
 import typer
 
 from cdpr_profiles import Robot
-from cdpr_profiles.calibration.in_force import load_calibrated
+from cdpr_profiles.calibration_in_force import load_calibrated
 from cdpr_profiles.platform import NO_PLATFORM, FURTHEST_m, Platform
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.model.rigid_body import directions_of

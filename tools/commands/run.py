@@ -29,7 +29,7 @@ from cdpr_drivers.robot.robot_buses import (
     starts_own_simulator,
 )
 from cdpr_profiles import Robot
-from cdpr_profiles.calibration.in_force import load_calibrated
+from cdpr_profiles.calibration_in_force import load_calibrated
 from cdpr_rt.core.shared_block import MOST_AXES, SharedBlock
 from cdpr_rt.diagnosis.checks import refuse_impossible
 from cdpr_rt.service.listening import listener_pid

@@ -34,8 +34,8 @@ from cdpr_tools.teleop.keyboard import Keyboard
 from cdpr_tools.teleop.script import ScriptDevice, read_script
 
 if TYPE_CHECKING:
-    from cdpr_tools.experiment.operator import OperatorParameters
-    from cdpr_tools.experiment.trial import ExperimentSettings
+    from cdpr_tools.teleop.experiment_operator import OperatorParameters
+    from cdpr_tools.teleop.experiment_trial import ExperimentSettings
 
 
 _LEAD = "robot"
@@ -211,9 +211,9 @@ def experiment(
     recorded. The command prints tables 2.1 and 2.2 beside the thesis' and draws figures 2.10 to
     2.12.
     """
-    from cdpr_tools.experiment import experiment as experiments  # noqa: PLC0415  # slow to load
-    from cdpr_tools.experiment.operator import OperatorParameters, Station  # noqa: PLC0415
-    from cdpr_tools.experiment.trial import ExperimentSettings  # noqa: PLC0415
+    from cdpr_tools.teleop import experiment as experiments  # noqa: PLC0415  # slow to load
+    from cdpr_tools.teleop.experiment_operator import OperatorParameters, Station  # noqa: PLC0415
+    from cdpr_tools.teleop.experiment_trial import ExperimentSettings  # noqa: PLC0415
 
     out = Output(as_json)
     cores = jobs or len(os.sched_getaffinity(0))
@@ -245,7 +245,7 @@ def experiment(
 
 
 def _run(out: Output, settings: ExperimentSettings, folder: Path, jobs: int) -> None:
-    from cdpr_tools.experiment import experiment as experiments  # noqa: PLC0415  # slow to load
+    from cdpr_tools.teleop import experiment as experiments  # noqa: PLC0415  # slow to load
 
     experiments.begin(settings, folder)
     try:

@@ -8,9 +8,9 @@ from typing import Any
 
 from cdpr_drivers.robot.commissioned import compensation_of, load_profiles
 from cdpr_profiles import Robot
-from cdpr_profiles.calibration.geometry import geometry_sha256
-from cdpr_profiles.calibration.in_force import in_force
+from cdpr_profiles.calibration_in_force import in_force
 from cdpr_profiles.errors import ProfileError
+from cdpr_profiles.geometry_calibration import geometry_sha256
 from cdpr_profiles.platform import Platform
 from cdpr_rt.core.estimate import Estimator
 from cdpr_rt.core.shared_block import SharedBlock

@@ -15,7 +15,7 @@ from cdpr_drivers.robot.listening_machine import ListeningMachine
 from cdpr_drivers.robot.machine import RobotMachine
 from cdpr_drivers.robot.robot_buses import refuse_simulated_calibration, require_fit, robot_urls
 from cdpr_profiles import Robot
-from cdpr_profiles.calibration.in_force import load_calibrated
+from cdpr_profiles.calibration_in_force import load_calibrated
 from cdpr_profiles.errors import ProfileError, printable
 from cdpr_rt.core.shared_block import SharedBlock
 from cdpr_rt.diagnosis.checks import refuse_impossible

@@ -27,8 +27,8 @@ from cdpr_rt.errors import ControlError
 from cdpr_rt.programs.path_store import keep_progress, paths_folder
 from cdpr_rt.service.access_control import AccessControl, AccessPolicy
 from cdpr_rt.service.foxglove_view import LiveView
-from cdpr_rt.service.http.app import create_app
-from cdpr_rt.service.http.server import Server
+from cdpr_rt.service.http_app import create_app
+from cdpr_rt.service.http_server import Server
 from cdpr_rt.service.listening import listen_unix
 from cdpr_rt.service.part import Part
 from cdpr_rt.service.recording import Recorder

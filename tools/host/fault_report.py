@@ -10,7 +10,7 @@ from importlib.metadata import distributions
 
 from cdpr_profiles import load_robot
 from cdpr_profiles.bounded_input import MOST_TOML_BYTES, is_file, read_text
-from cdpr_profiles.calibration.in_force import calibration_file
+from cdpr_profiles.calibration_in_force import calibration_file
 from cdpr_tools.daemon.paths import default_recordings, find_loop_files
 from cdpr_tools.errors import BadInputError
 from cdpr_tools.output import Output

@@ -6,7 +6,7 @@ from datetime import datetime
 from typing import Any
 
 from cdpr_profiles import Robot
-from cdpr_profiles.calibration.geometry import GeometryCalibration
+from cdpr_profiles.geometry_calibration import GeometryCalibration
 
 
 def calibration_text(known: dict[str, Any]) -> str:

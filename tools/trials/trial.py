@@ -12,7 +12,7 @@ from matplotlib.figure import Figure as Picture
 
 from cdpr_drivers.robot.commissioned import uncommissioned_text, with_commissioned
 from cdpr_profiles import Robot, load_robot
-from cdpr_profiles.calibration.in_force import calibrated
+from cdpr_profiles.calibration_in_force import calibrated
 from cdpr_rt.diagnosis.checks import refuse_impossible
 from cdpr_tools.composition.own_code import OwnCodeOptions
 from cdpr_tools.errors import BadInputError

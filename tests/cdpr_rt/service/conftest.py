@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.cdpr_rt.service.http.service_rig import Rig, running
+from tests.cdpr_rt.service.service_rig import Rig, running
 
 
 @pytest.fixture(scope="module")

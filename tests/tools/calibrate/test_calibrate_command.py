@@ -14,8 +14,8 @@ import pytest
 from cdpr_here import cdpr_here
 
 from cdpr_profiles import load_robot
-from cdpr_profiles.calibration.geometry import geometry_sha256
-from cdpr_profiles.calibration.in_force import calibrated
+from cdpr_profiles.calibration_in_force import calibrated
+from cdpr_profiles.geometry_calibration import geometry_sha256
 from cdpr_rt.calibration.parameters import CableGeometry
 from cdpr_rt.calibration.readings import CalibrationData, PoseReading, load_data
 from cdpr_rt.calibration.verification import Verification

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from cdpr_profiles import Robot, load_robot
-from cdpr_profiles.calibration.geometry import geometry_sha256
-from cdpr_profiles.calibration.in_force import calibrated, take_over, undo
+from cdpr_profiles.calibration_in_force import calibrated, take_over, undo
+from cdpr_profiles.geometry_calibration import geometry_sha256
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.calibration.parameters import CableGeometry
 from cdpr_rt.calibration.readings import load_data

@@ -13,7 +13,7 @@ from cdpr_here import cdpr_here
 from matplotlib.figure import Figure
 from matplotlib.image import imread
 
-from cdpr_profiles.calibration.geometry import write_text
+from cdpr_profiles.geometry_calibration import write_text
 from cdpr_rt.core.cycle_row import Row
 from cdpr_rt.core.shared_block import RowWriter
 from cdpr_rt.core.states import LoopState, Reaction

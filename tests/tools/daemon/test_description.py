@@ -8,7 +8,7 @@ import pytest
 from cdpr_drivers.errors import ConfigurationError
 from cdpr_drivers.robot.robot_buses import refuse_simulated_calibration
 from cdpr_profiles import load_robot
-from cdpr_profiles.calibration.in_force import load_calibrated, take_over, undo
+from cdpr_profiles.calibration_in_force import load_calibrated, take_over, undo
 from cdpr_profiles.catalogue import list_profiles
 from cdpr_rt.model.calibration_state import mark_calibrated
 from cdpr_rt.model.robot_arrays import limits_of

@@ -17,7 +17,7 @@ from cdpr_profiles import load_robot
 from cdpr_profiles.robot_limits import Limit
 from cdpr_rt.core.fault import fault_text
 from cdpr_rt.core.states import LoopState
-from cdpr_rt.service.http.app import create_app
+from cdpr_rt.service.http_app import create_app
 from cdpr_rt.service.recording import Recorder
 from cdpr_rt.service.service import Service
 from cdpr_tools.composition.loop_parts import description

@@ -13,7 +13,7 @@ from mcap.reader import make_reader
 
 from cdpr_drivers.errors import ConfigurationError
 from cdpr_profiles import load_robot
-from cdpr_profiles.calibration.in_force import take_over, undo
+from cdpr_profiles.calibration_in_force import take_over, undo
 from cdpr_profiles.errors import ProfileError
 from cdpr_tools.commands import robot_trial
 from cdpr_tools.commands.robot_trial import KindOfTrial

@@ -14,13 +14,13 @@ import httpx
 import pytest
 from pydantic import ValidationError
 
-from cdpr_rt.service.http import models
-from cdpr_rt.service.http.websocket_routes import Order
+from cdpr_rt.service import http_models as models
 from cdpr_rt.service.listening import listen_udp
 from cdpr_rt.service.setpoint_stream import SetpointStream
 from cdpr_rt.service.stream_client import StreamClient
 from cdpr_rt.service.stream_packet import Standing, StreamSession
-from tests.cdpr_rt.service.http.service_rig import NOT_TIGHT, Rig, wait_for
+from cdpr_rt.service.websocket_routes import Order
+from tests.cdpr_rt.service.service_rig import NOT_TIGHT, Rig, wait_for
 
 
 def take(client: httpx.Client, name: str = "maria", ttl_s: float = 10.0) -> dict[str, str]:

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from cdpr_rt.motion.path.description import PathError
-from cdpr_rt.service.http.models import PathFile
+from cdpr_rt.service.http_models import PathFile
 from cdpr_tools.client.path_following import plain_name, require_held
 from cdpr_tools.errors import BadInputError, WorkFailedError
-from cdpr_tools.paths.options import PathOptions
+from cdpr_tools.robots.path_options import PathOptions
 
 
 @pytest.mark.parametrize("typed", ["foo", "", "1", "1 2 3 4", "nan 0", "0 2e6"])

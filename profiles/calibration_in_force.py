@@ -12,13 +12,13 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from cdpr_profiles.bounded_input import is_file, is_there
-from cdpr_profiles.calibration.geometry import (
+from cdpr_profiles.catalogue import load_robot
+from cdpr_profiles.errors import ProfileError
+from cdpr_profiles.geometry_calibration import (
     GeometryCalibration,
     geometry_sha256,
     write_text,
 )
-from cdpr_profiles.catalogue import load_robot
-from cdpr_profiles.errors import ProfileError
 from cdpr_profiles.places import SHIPPED, user_folder
 from cdpr_profiles.robot import Robot
 

@@ -28,9 +28,8 @@ from cdpr_rt.arrays import FloatArray
 from cdpr_rt.core.cycle_row import AXIS_FIELDS, SCALAR_FIELDS, CycleField, Row
 from cdpr_rt.core.shared_block import RowReader
 from cdpr_rt.core.states import LoopState
+from cdpr_rt.service import http_models as models
 from cdpr_rt.service.access_control import VALID_S
-from cdpr_rt.service.http import models
-from cdpr_rt.service.http.websocket_routes import WebSocketRoutes
 from cdpr_rt.service.lease import LeaseError
 from cdpr_rt.service.link import (
     DEAD,
@@ -43,6 +42,7 @@ from cdpr_rt.service.link import (
 from cdpr_rt.service.rows import newest_row
 from cdpr_rt.service.service import PlannerBusyError, Service
 from cdpr_rt.service.setpoint_stream import StreamError
+from cdpr_rt.service.websocket_routes import WebSocketRoutes
 
 # Figures for Prometheus.
 

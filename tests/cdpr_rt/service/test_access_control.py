@@ -20,7 +20,7 @@ from websockets.sync.client import connect
 from cdpr_rt.service import access_control
 from cdpr_rt.service.access_control import AccessPolicy, is_own_host
 from cdpr_rt.service.listening import ListenError, listen_tcp, listen_unix, listener_pid
-from tests.cdpr_rt.service.http.service_rig import KEY, Rig, wait_for
+from tests.cdpr_rt.service.service_rig import KEY, Rig, wait_for
 
 THROTTLE_S = 0.2
 RIGHT = {"Authorization": f"Bearer {KEY.decode()}"}

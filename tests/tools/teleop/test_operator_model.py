@@ -10,14 +10,14 @@ from scipy import signal
 
 from cdpr_profiles import load_robot
 from cdpr_tools.errors import BadInputError, WorkFailedError
-from cdpr_tools.experiment import trial
-from cdpr_tools.experiment.operator import (
+from cdpr_tools.teleop import experiment_trial as trial
+from cdpr_tools.teleop.experiment_operator import (
     HandModel,
     OperatorParameters,
     Station,
 )
-from cdpr_tools.experiment.tables import spread_mm
-from cdpr_tools.experiment.trial import (
+from cdpr_tools.teleop.experiment_tables import spread_mm
+from cdpr_tools.teleop.experiment_trial import (
     PACKET_S,
     Condition,
     PerfectRobot,

@@ -16,8 +16,8 @@ from starlette.websockets import WebSocketDisconnect
 from cdpr_rt.core.cycle_row import FIELDS
 from cdpr_rt.errors import ControlError
 from cdpr_rt.loop.right import LONGEST_S
+from cdpr_rt.service import http_models as models
 from cdpr_rt.service.access_control import TokenBuckets
-from cdpr_rt.service.http import models
 from cdpr_rt.service.lease import SHORTEST_S, LeaseError
 from cdpr_rt.service.link import Reply
 from cdpr_rt.service.rows import newest_row, row_table

@@ -17,9 +17,9 @@ from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIO
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection, unix_connect
 
-from cdpr_rt.service.http import websocket_routes
-from cdpr_rt.service.http import websocket_routes as control_socket
-from tests.cdpr_rt.service.http.service_rig import AXES, KEY, NOT_TIGHT, Rig, running, wait_for
+from cdpr_rt.service import websocket_routes
+from cdpr_rt.service import websocket_routes as control_socket
+from tests.cdpr_rt.service.service_rig import AXES, KEY, NOT_TIGHT, Rig, running, wait_for
 
 
 @pytest.fixture(scope="module")

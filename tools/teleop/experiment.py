@@ -12,8 +12,11 @@ import numpy as np
 
 from cdpr_profiles import load_robot
 from cdpr_tools.errors import BadInputError, WorkFailedError, os_error_as
-from cdpr_tools.experiment.tables import draw, lines, rows, variance_analysis
-from cdpr_tools.experiment.trial import (
+from cdpr_tools.output import Output, to_json
+from cdpr_tools.processes import processes
+from cdpr_tools.recordings.stored_settings import load_settings
+from cdpr_tools.teleop.experiment_tables import draw, lines, rows, variance_analysis
+from cdpr_tools.teleop.experiment_trial import (
     ExperimentSettings,
     Points,
     centre_m,
@@ -21,9 +24,6 @@ from cdpr_tools.experiment.trial import (
     points_of_session,
     run_session,
 )
-from cdpr_tools.output import Output, to_json
-from cdpr_tools.processes import processes
-from cdpr_tools.recordings.stored_settings import load_settings
 from cdpr_tools.trials.directions import platform_of
 
 SETTINGS: Final = "experiment.json"

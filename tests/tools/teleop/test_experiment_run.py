@@ -13,15 +13,15 @@ import numpy as np
 import pytest
 
 from cdpr_tools.errors import BadInputError, WorkFailedError
-from cdpr_tools.experiment import experiment
-from cdpr_tools.experiment.operator import OperatorParameters, Station
-from cdpr_tools.experiment.trial import (
+from cdpr_tools.output import Output
+from cdpr_tools.teleop import experiment
+from cdpr_tools.teleop.experiment_operator import OperatorParameters, Station
+from cdpr_tools.teleop.experiment_trial import (
     Condition,
     ExperimentSettings,
     points_of_session,
     run_session,
 )
-from cdpr_tools.output import Output
 
 pytestmark = pytest.mark.long
 
@@ -39,7 +39,7 @@ def session(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Run two targets with unidentified motors and an easily satisfied operator."""
     folder = tmp_path_factory.mktemp("experiment") / "A-350ms-1"
     with pytest.MonkeyPatch.context() as patch:
-        short = "cdpr_tools.experiment.trial.targets_m"
+        short = "cdpr_tools.teleop.experiment_trial.targets_m"
         patch.setattr(short, lambda centre: centre + np.array(OFFSETS_M))
         run_session(SETTINGS, [CONDITION], folder)
     return folder

@@ -26,7 +26,7 @@ from cdpr_rt.motion.pose_stream import CLUTCH, confirmation
 from cdpr_rt.motion.trajectory import approach
 from cdpr_rt.service.stream_packet import Standing
 from cdpr_tools.errors import BadInputError, WorkFailedError
-from cdpr_tools.experiment.operator import (
+from cdpr_tools.teleop.experiment_operator import (
     HandModel,
     OperatorModel,
     OperatorParameters,

@@ -20,9 +20,9 @@ import httpx
 import pytest
 
 from cdpr_rt.service import access_control
+from cdpr_rt.service import http_server as server
 from cdpr_rt.service.access_control import AccessControl, AccessPolicy, Tickets
-from cdpr_rt.service.http import server
-from tests.cdpr_rt.service.http.service_rig import KEY, Rig, raw, reachable, wait_for
+from tests.cdpr_rt.service.service_rig import KEY, Rig, raw, reachable, wait_for
 
 RIGHT = {"Authorization": f"Bearer {KEY.decode()}"}
 

@@ -19,8 +19,8 @@ import numpy as np
 from cdpr_rt.core.shared_block import RowWriter, SharedBlock
 from cdpr_rt.core.states import LoopState
 from cdpr_rt.service.access_control import AccessControl, AccessPolicy
-from cdpr_rt.service.http.app import create_app
-from cdpr_rt.service.http.server import Server
+from cdpr_rt.service.http_app import create_app
+from cdpr_rt.service.http_server import Server
 from cdpr_rt.service.lease import LeaseError
 from cdpr_rt.service.listening import listen_tcp, listen_unix
 from cdpr_rt.service.service import Service

@@ -10,7 +10,7 @@ from cdpr_here import cdpr_here
 from PIL import Image
 
 from cdpr_profiles import load_robot
-from cdpr_profiles.calibration.in_force import load_calibrated, take_over
+from cdpr_profiles.calibration_in_force import load_calibrated, take_over
 from cdpr_rt.model.platform_model import platform_model_of
 from cdpr_rt.programs.path_store import PathStore, paths_folder
 from tests.profiles.test_geometry_calibration import calibration

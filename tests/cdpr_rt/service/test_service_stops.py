@@ -11,7 +11,7 @@ from typing import Any
 
 import httpx
 
-from tests.cdpr_rt.service.http.service_rig import KEY, Rig, wait_for
+from tests.cdpr_rt.service.service_rig import KEY, Rig, wait_for
 
 RIGHT = {"Authorization": f"Bearer {KEY.decode()}"}
 

@@ -27,7 +27,6 @@ from cdpr_rt.procedures.path_planning import (
 )
 from cdpr_rt.programs.path_store import paths_folder, write_plan
 from cdpr_tools.output import TableText, time_text
-from cdpr_tools.paths.options import PathOptions
 from cdpr_tools.report.style import (
     BOUND,
     LINES,
@@ -39,6 +38,7 @@ from cdpr_tools.report.style import (
     legend_below,
     save_figure,
 )
+from cdpr_tools.robots.path_options import PathOptions
 
 
 @dataclass(frozen=True)

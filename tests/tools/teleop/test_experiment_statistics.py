@@ -7,9 +7,16 @@ import re
 import numpy as np
 import pytest
 
-from cdpr_tools.experiment import tables
-from cdpr_tools.experiment.tables import PLACE, SCALE, lines, rows, run_times_s, variance_analysis
-from cdpr_tools.experiment.trial import POINT
+from cdpr_tools.teleop import experiment_tables as tables
+from cdpr_tools.teleop.experiment_tables import (
+    PLACE,
+    SCALE,
+    lines,
+    rows,
+    run_times_s,
+    variance_analysis,
+)
+from cdpr_tools.teleop.experiment_trial import POINT
 
 
 def made_up(sigma_mm: dict[float, float], runs: int = 30) -> np.ndarray:

@@ -11,7 +11,7 @@ from prometheus_client.parser import text_string_to_metric_families
 
 from cdpr_rt.service.listening import listen_udp
 from cdpr_rt.service.setpoint_stream import SetpointStream
-from tests.cdpr_rt.service.http.service_rig import AXES, Rig, wait_for
+from tests.cdpr_rt.service.service_rig import AXES, Rig, wait_for
 
 
 class Unstartable:

@@ -1,1 +1,0 @@
-"""The interface over HTTP and WebSocket, and its access control."""

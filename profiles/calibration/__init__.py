@@ -1,1 +1,0 @@
-"""Calibrations of a robot's geometry, kept beside its file."""

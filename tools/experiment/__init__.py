@@ -1,1 +1,0 @@
-"""The teleoperation experiment: a simulated operator leads a robot along a path of targets."""

@@ -1,1 +1,0 @@
-"""Paths on the command line: preview, picture, and following them."""
