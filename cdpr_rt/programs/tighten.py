@@ -663,7 +663,8 @@ class TightenProgram(PlatformProgram):
             found = (
                 f"{self._parts.names[i]}: {1e3 * moved_m[i]:.1f} mm reeled in and not tight, "
                 f"{1e3 * allowed_m:.1f} mm allowed: its winch turns with {pull_N:.0f} N; its cable "
-                "is broken, unhooked, or wound off its drum"
+                "is broken, unhooked, or wound off its drum, or the platform is not at home: put "
+                "it there"
             )
             self._parts.last_stop.broken.setdefault(i, found)
             return found

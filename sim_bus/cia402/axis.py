@@ -159,6 +159,12 @@ class Axis:
             mend_cable(self.motor, self.plant.load, self.slipped_m)
         self.cable_cut, self.slipped_m = False, 0.0
 
+    def put_platform_back(self) -> bool:
+        """Put the robot's platform at its start pose; return whether there is one."""
+        if self._robot is not None:
+            self._robot.put_back()
+        return self._robot is not None
+
     def read(self, field: str) -> float:
         """Return a field of the motor's record."""
         return float(self.motor[field][0])

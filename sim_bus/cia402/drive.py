@@ -38,14 +38,16 @@ from cdpr_sim_bus.robot.truth_log import NO_SYNC, TruthLog
 
 _RAISE_FAULT, _DROP_TPDOS, _REFUSE_MODES, _SHOW_MODE, _MUTE_HEARTBEAT = 1, 2, 3, 4, 5
 _FALL_SILENT, _DOUBLE_TPDOS, _DELAY_TPDOS, _BABBLE, _VANISH_IN_SDO = 6, 7, 8, 9, 10
-_JUMP, _CUT_CABLE, _SLIP, _CELL_OFF = 11, 12, 13, 14
+_JUMP, _CUT_CABLE, _SLIP, _CELL_OFF, _PUT_BACK = 11, 12, 13, 14, 15
 _COUNTED = (_DROP_TPDOS, _DOUBLE_TPDOS, _DELAY_TPDOS, _VANISH_IN_SDO)
 _DEFAULT_TPDO = (0x180, 0x280, 0x380, 0x480)
 _ERROR_CONTROL, _SDO_ANSWER, _SDO_REQUEST, _EMCY = 0x700, 0x580, 0x600, 0x080
-_FUNCTION, _NODE = 0x780, 0x07F
+_FUNCTION, _NODE, _DATA_AT = 0x780, 0x07F, 8
 _FOR_GOOD_MS = 0xFFFF
-_END_OF_SILENCE = bytes.fromhex("2b002f0600000000")
-"""SDO download of 0 to 2F00h:6, the only frame that a silent drive receives."""
+_EXPEDITED_MASK, _EXPEDITED = 0xE2, 0x22
+"""First byte of an SDO: an expedited download, of any size."""
+_NO_SILENCE = bytes.fromhex("002f0600000000")
+"""The rest of an SDO download of 0 to 2F00h:6."""
 _BABBLE_FRAME = b"\x00\xff\x81BABBL"
 """EMCY FF00h (device specific)."""
 
@@ -82,6 +84,7 @@ class FaultInjection:
             _CUT_CABLE: self._cut_cable,
             _SLIP: self._slip,
             _CELL_OFF: self._set_cell_off,
+            _PUT_BACK: self._put_back,
         }
         readers: dict[int, Callable[[], Value]] = {
             _CUT_CABLE: lambda: int(self._axis.cable_cut),
@@ -111,8 +114,13 @@ class FaultInjection:
         return now < self._silent_until
 
     def ends_silence(self, frame: bytes, node_id: int) -> bool:
-        """End the silence if this frame writes 0 to its object; return whether it does."""
-        if frame != pack_frame(_SDO_REQUEST + node_id, _END_OF_SILENCE):
+        """End the silence if this frame writes 0 to 2F00h:6; return whether it does.
+
+        A silent drive receives no other frame. The size of the 0 does not matter.
+        """
+        kind = frame[_DATA_AT]
+        zero = pack_frame(_SDO_REQUEST + node_id, bytes((kind,)) + _NO_SILENCE)
+        if kind & _EXPEDITED_MASK != _EXPEDITED or frame != zero:
             return False
         self._silent_until = 0.0
         return True
@@ -204,6 +212,10 @@ class FaultInjection:
 
     def _set_cell_off(self, newton: Value) -> None:
         self._axis.cell_off_N = float(newton)
+
+    def _put_back(self, wanted: Value) -> None:
+        if wanted and not self._axis.put_platform_back():
+            raise SdoAbort(Abort.HARDWARE_ERROR)
 
     def _mute(self, on: Value) -> None:
         self._muted = bool(on)

@@ -123,6 +123,7 @@ class CableRobot:
         self._weights = list(shape.weights_N_m)
         self._slips = sorted(plant.cables.slips, key=lambda slip: slip.at_s)
         self.platform = build_platform(shape, plant, n, self._rng)
+        self._at_start = self.platform.copy()
         # compile now, before the clock runs
         run_together(self.motors, self.platform, 0.0, self.kinds, self.targets, self._flags)
         self.commands: list[MotorCommand] = [lambda: (servo.OFF, 0.0)] * n
@@ -172,6 +173,12 @@ class CableRobot:
         """Return the length of cable `i` that has the slack of a start, for the present pose."""
         slack_m = np.broadcast_to(self._plant.start.slack_m, self.n)
         return self.distance_m(i) + float(slack_m[i])
+
+    def _slack_start_m(self, i: int) -> float:
+        """Return the `cable_start` with which cable `i` has that slack at the present angle."""
+        motor = self.motors[i]
+        reeled_m = float(motor["cable_gain"] * (motor["angle"] - motor["angle_start"]))
+        return self._slack_length_m(i) - reeled_m
 
     def step(self, i: int, until: float) -> MotorSample:
         """Advance all to `until`; return the `motor.Sample` of motor `i`."""
@@ -223,14 +230,19 @@ class CableRobot:
         Where that would pull, the cable has the slack of a start instead; a tight one stays as it
         is.
         """
-        motor = self.motors[i]
-        reeled_m = float(motor["cable_gain"] * (motor["angle"] - motor["angle_start"]))
-        loose_m = self._slack_length_m(i) - reeled_m  # as `cable_start`
+        start_m, loose_m = float(self.motors["cable_start"][i]), self._slack_start_m(i)
         if cut:
             self._attach(i)
         else:
-            loose_m = min(loose_m, float(motor["cable_start"]))
-        self.motors["cable_start"][i] = max(float(motor["cable_start"]) - slipped_m, loose_m)
+            loose_m = min(loose_m, start_m)
+        self.motors["cable_start"][i] = max(start_m - slipped_m, loose_m)
+
+    def put_back(self) -> None:
+        """Put the platform at its start pose, at rest; cables that are too short get slack."""
+        self.platform[:] = self._at_start
+        start_m = self.motors["cable_start"]
+        for i in range(self.n):
+            start_m[i] = max(float(start_m[i]), self._slack_start_m(i))
 
     def distance_m(self, i: int) -> float:
         """Return the distance of cable `i` from exit to anchor point, over its pulley, m."""
@@ -264,3 +276,7 @@ class RobotMember:
     def mend(self, cut: bool, slipped_m: float) -> None:
         """See `CableRobot.mend`."""
         self.robot.mend(self.number, cut, slipped_m)
+
+    def put_back(self) -> None:
+        """See `CableRobot.put_back`."""
+        self.robot.put_back()

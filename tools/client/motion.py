@@ -20,6 +20,7 @@ from cdpr_tools.client.status_text import (
     death_text,
     next_steps,
     platform_text,
+    put_back_text,
     tightness_text,
 )
 from cdpr_tools.errors import BadInputError, WorkFailedError
@@ -96,6 +97,10 @@ def run_to_end(
         if error.refusal is not None and error.refusal.code is RefusalCode.NOT_TIGHT:
             for step in next_steps(daemon.get("/status")):
                 error.add_note(step.strip())
+        raise
+    except WorkFailedError as error:
+        if program == "tighten" and (put_back := put_back_text(daemon.get("/status"))):
+            error.add_note(put_back)
         raise
     finish(daemon, out, outcome, where, **figures)
 

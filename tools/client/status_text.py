@@ -290,7 +290,16 @@ def next_steps(status: dict[str, Any]) -> list[str]:
             "look at the platform, which has come down; if it stands at home, upright: "
             f"`cdpr tighten --from home`{elsewhere}"
         )
+        if put_back := put_back_text(status):
+            steps.append(put_back)
     return [f"next: {steps[0]}", *(f"      {step}" for step in steps[1:])]
+
+
+def put_back_text(status: dict[str, Any]) -> str:
+    """Return how to carry a simulated platform home after a fall, "" if it has not fallen."""
+    if not (is_simulated(status) and (status.get("last_stop") or {}).get("fallen")):
+        return ""
+    return f"`cdpr sim fault {status['robot']} put-back` carries the platform back to its start"
 
 
 _SLOW: Final = 0.9

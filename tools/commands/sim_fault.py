@@ -21,6 +21,7 @@ from cdpr_tools.composition.fault_injection import (
 from cdpr_tools.errors import BadInputError
 
 LIST = "list"
+_FAULTS = [fault for fault in InjectedFault if fault is not InjectedFault.PUT_BACK]
 
 if TYPE_CHECKING:
     FaultWord = str
@@ -43,8 +44,9 @@ def fault(
     what: Annotated[
         FaultWord,
         typer.Argument(
-            help=f"Fault to inject immediately: {', '.join(InjectedFault)}; {MEND}: repair "
-            f"everything, {LIST}: show what is broken.",
+            help=f"Fault to inject immediately: {', '.join(_FAULTS)}; {MEND}: repair everything; "
+            f"{InjectedFault.PUT_BACK}: carry the platform back to where it started; {LIST}: show "
+            "what is broken.",
             metavar="FAULT",
         ),
     ],
@@ -83,17 +85,20 @@ def fault(
     urls = robot_urls(robot, bus or _buses_of_daemon(daemon))
     if shows and value is not None:
         raise BadInputError(f"{what} {value}: {what} takes no value")
+    clears = "`cdpr drive reset`" if isinstance(profile, Winch) else "`cdpr ack`"
     lines = []
     for one in axes:
         with InjectionAccess(robot, one, urls[one.bus]) as access:
             if not shows:
                 lines.append(f"{one.name}: {fault_words(what, access.inject(what, value))}")
                 continue
-            found = access.injected()
+            found, code = access.injected(), access.fault_code()
             if what == MEND:
                 access.inject(MEND, None)
         if found:
             lines.append(f"{one.name}: {'mended: ' * (what == MEND)}{', '.join(found)}")
+        if code:
+            lines.append(f"{one.name}: the drive is in fault {code:#06x}; {clears} clears it")
     for line in lines or ["nothing is broken"]:
         typer.echo(printable(line))
 

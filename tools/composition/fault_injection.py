@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from enum import StrEnum
 from typing import Final, NamedTuple, Self
 
@@ -16,6 +16,8 @@ from cdpr_rt.core.clock import PacedClock
 from cdpr_tools.errors import BadInputError, WorkFailedError, raised_as
 
 INJECTION_OBJECT: Final = 0x2F00
+_STATUSWORD, _ERROR_CODE = 0x6041, 0x603F
+_FAULT_MASK, _FAULT = 0x4F, 0x08
 
 
 class InjectedFault(StrEnum):
@@ -28,6 +30,8 @@ class InjectedFault(StrEnum):
     SILENCE = "silence"
     PRE_OPERATIONAL = "pre-operational"
     CELL_OFF = "cell-off"
+    PUT_BACK = "put-back"
+    """Not a fault, but the way out of some: it stands for the person who carries the platform."""
 
 
 class FaultInjection(NamedTuple):
@@ -60,6 +64,7 @@ _INJECTIONS = {
     InjectedFault.SILENCE: FaultInjection(6, 0xFFFF, 1, 0xFFFF, "ms"),
     InjectedFault.PRE_OPERATIONAL: FaultInjection(0, 1, 1, 1, ""),
     InjectedFault.CELL_OFF: FaultInjection(14, 40, -(2**15), 2**15 - 1, "N"),
+    InjectedFault.PUT_BACK: FaultInjection(15, 1, 1, 1, ""),
 }
 _VIRTUAL: Final = ("vcan", "vxcan")
 """Beginnings of the names of virtual CAN interfaces on Linux, to which no drive is wired."""
@@ -88,7 +93,7 @@ def named_injection(what: str) -> FaultInjection:
 
 def fault_words(what: str, amount: int) -> str:
     """Return a fault and its value with its unit as text."""
-    if what in (InjectedFault.CUT_CABLE, InjectedFault.PRE_OPERATIONAL):
+    if what in (InjectedFault.CUT_CABLE, InjectedFault.PRE_OPERATIONAL, InjectedFault.PUT_BACK):
         return what
     if what == InjectedFault.DRIVE_FAULT:
         return f"{what} {amount:#06x}"
@@ -158,6 +163,14 @@ class InjectionAccess:
                     return [f"{InjectedFault.SILENCE}, which hides any other fault"]
                 found += [fault_words(what, amount)] * bool(amount)
         return found
+
+    def fault_code(self) -> int:
+        """Return the error code of a drive in fault; 0 if it is not in fault or does not answer."""
+        node = self._axis.winch.node_id
+        with self._errors(), suppress(SdoTimeoutError):
+            if self._network.read_int(node, _STATUSWORD, attempts=1) & _FAULT_MASK == _FAULT:
+                return self._network.read_int(node, _ERROR_CODE)
+        return 0
 
     def _write(self, sub: int, value: int) -> None:
         self._network.write(self._axis.winch.node_id, INJECTION_OBJECT, sub, value)

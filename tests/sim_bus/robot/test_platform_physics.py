@@ -135,6 +135,24 @@ def test_a_mended_slip_is_undone_as_far_as_the_cable_is_slack() -> None:
     assert robot.motors["cable_start"][0] == pytest.approx(start_m + 0.001), "it is tight"
 
 
+def test_a_fallen_platform_is_put_back_at_rest_with_slack_cables() -> None:
+    floor = {"present": True, "friction": 0.3}
+    robot = body(pretension_N=0.0, start={"slack_m": 0.05}, floor=floor)
+    run(robot, 0.3)
+    start_m = robot.position_m
+    robot.cut(0)
+    robot.platform["velocity"][0, :2] = 1.5, 2.0
+    run(robot, 0.8, begin_s=0.3)
+    assert np.linalg.norm(robot.position_m - start_m) > 0.3
+    robot.mend(0, cut=True, slipped_m=0.0)
+    robot.put_back()
+    np.testing.assert_allclose(robot.position_m, start_m, atol=1e-3)
+    assert not robot.platform["velocity"].any()
+    run(robot, 0.3, begin_s=1.1)
+    np.testing.assert_allclose(robot.position_m, start_m, atol=2e-3)
+    assert robot.tension_N.max() < 1.0
+
+
 @pytest.mark.parametrize("length_m", [0.05, 0.2, 1.0])
 def test_stiff_short_cables_stay_stable(length_m: float) -> None:
     exits = ((-length_m - 0.075, 1.5433), (length_m + 0.075, 1.5433), (0.0, 1.4134 - length_m))

@@ -153,6 +153,31 @@ def test_a_cable_is_cut_while_the_robot_runs(
     assert capsys.readouterr().out == "nothing is broken\n"
 
 
+@pytest.mark.parametrize("size", [1, 2, 4])
+def test_any_size_of_zero_ends_the_silence(
+    robot: Robot, size: int, capsys: pytest.CaptureFixture[str]
+) -> None:
+    robot.fault(InjectedFault.SILENCE, axis="lower")
+    capsys.readouterr()
+    kind = 0x23 | (4 - size) << 2  # an expedited SDO download
+    frame = bytes((kind, 0x00, 0x2F, 0x06, 0, 0, 0, 0))
+    robot.bus.send(can.Message(arbitration_id=0x603, data=frame, is_extended_id=False))
+    time.sleep(0.1)
+    robot.fault(LIST)
+    assert capsys.readouterr().out == "nothing is broken\n"
+
+
+def test_a_drive_in_fault_is_listed_with_what_clears_it(
+    robot: Robot, capsys: pytest.CaptureFixture[str]
+) -> None:
+    robot.fault(InjectedFault.DRIVE_FAULT, axis="lower")
+    robot.fault(LIST)
+    told = "lower: the drive is in fault 0x7305; `cdpr ack` clears it"
+    assert told in capsys.readouterr().out.splitlines()
+    reset = can.Message(arbitration_id=0, data=b"\x81\x03", is_extended_id=False)
+    robot.bus.send(reset)
+
+
 def test_a_silent_drive_is_listed_and_mended(
     robot: Robot, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -141,6 +141,7 @@ def test_cables_under_tension_but_not_tight_are_not_reported_as_loose() -> None:
                 "`cdpr enable`",
                 "look at the platform, which has come down; if it stands at home, upright: "
                 "`cdpr tighten --from home`",
+                "`cdpr sim fault bench put-back` carries the platform back to its start",
             ],
         ),
     ],
