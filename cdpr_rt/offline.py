@@ -14,6 +14,7 @@ from cdpr_profiles.errors import ProfileError
 from cdpr_rt.arrays import BoolArray, FloatArray
 from cdpr_rt.code_loader import CodeError
 from cdpr_rt.errors import ControlError
+from cdpr_rt.model.hanging import HangingSearch, upward
 from cdpr_rt.model.own_distribution import (
     TensionDistribution,
     TensionDistributionError,
@@ -23,6 +24,7 @@ from cdpr_rt.model.own_distribution import (
 )
 from cdpr_rt.model.platform_model import PlatformModel, platform_model_of
 from cdpr_rt.model.pose import Pose
+from cdpr_rt.model.pose_tracking import write_quaternion
 from cdpr_rt.model.rigid_body import in_space
 from cdpr_rt.robot import InvalidArgument, InvalidRobot
 
@@ -93,6 +95,11 @@ class Model:
         return self._model.size
 
     @property
+    def hangs_freely(self) -> bool:
+        """Whether the platform hangs in space on too few cables to control its rotation."""
+        return self._model.kinematics.hangs_freely
+
+    @property
     def home(self) -> FloatArray:
         """The position on the stand, (d,)."""
         return self._model.home.copy()
@@ -143,23 +150,78 @@ class Model:
         return self._reduced(force, np.cross(moment_arms_m, force)).reshape(*shape, self.d)
 
     def position(self, lengths_m: ArrayLike, start: ArrayLike | None = None) -> FloatArray:
-        """Return the positions (..., d) at which unloaded cables have these lengths (..., n).
+        """Return the positions (..., d) at which the cables have these lengths (..., n).
+
+        As `pose`, but the controlled directions only.
+        """
+        unturned = Pose(np.zeros(3), self._model.home_pose.Q)
+        directions = list(self._model.kinematics.directions)
+        given, poses = self._found(lengths_m, start)
+        found = [np.full(6, np.nan) if pose is None else pose.minus(unturned) for pose in poses]
+        return np.reshape(found, (-1, 6))[:, directions].reshape(*given.shape[:-1], self.d)
+
+    def pose(
+        self,
+        lengths_m: ArrayLike,
+        start: ArrayLike | None = None,
+        *,
+        tension_N: ArrayLike | None = None,
+        tilt_rad: ArrayLike | None = None,
+    ) -> FloatArray:
+        """Return the poses (..., 7), x y z w x y z, at which cables have these lengths (..., n).
 
         Found by least squares from the position `start` (d,), by default home; nan if the search
-        fails.
+        fails. A platform in space on fewer than six cables that do not control its rotation hangs
+        in equilibrium, as the control assumes: then load cells at the winches, `tension_N`
+        (..., n), and an inclinometer, `tilt_rad` (..., 2), make the pose more accurate. That has
+        roll and pitch of the platform's frame, turned by roll about x, pitch about y, yaw about z.
         """
+        given, poses = self._found(lengths_m, start, tension_N, tilt_rad)
+        found = np.full((len(poses), 7), np.nan)
+        for row, pose in zip(found, poses, strict=True):
+            if pose is not None:
+                write_quaternion(pose.array, row)
+        return found.reshape(*given.shape[:-1], 7)
+
+    def _found(
+        self,
+        lengths_m: ArrayLike,
+        start: ArrayLike | None,
+        tension_N: ArrayLike | None = None,
+        tilt_rad: ArrayLike | None = None,
+    ) -> tuple[FloatArray, list[Pose | None]]:
+        """Return the lengths as an array, and the pose of each row of them, None if not found."""
         kinematics = self._model.kinematics
         begin = self._model.pose(self.home if start is None else self._one(start))
-        unturned = Pose(np.zeros(3), self._model.home_pose.Q)
-        given = _numbers("lengths_m", lengths_m)
-        if given.ndim == 0 or given.shape[-1] != self.n or not np.isfinite(given).all():
-            raise InvalidArgument(f"lengths_m: shape {given.shape}; want finite (..., {self.n})")
-        found = np.full((int(np.prod(given.shape[:-1])), self.d), np.nan)
-        for row, lengths in zip(found, given.reshape(-1, self.n), strict=True):
-            solution = kinematics.pose_from_lengths(lengths, begin, restarts=8)
-            if solution.converged:
-                row[:] = solution.pose.minus(unturned)[list(kinematics.directions)]
-        return found.reshape(*given.shape[:-1], self.d)
+        given = self._readings("lengths_m", lengths_m, self.n)
+        rows = given.reshape(-1, self.n)
+        sensed: list[FloatArray | None] = [None] * len(rows)
+        pulled = list(sensed)
+        if not kinematics.hangs_freely:
+            if tension_N is not None or tilt_rad is not None:
+                why = "allowed only for a platform on fewer than 6 cables that hangs freely"
+                raise InvalidArgument(f"tension_N, tilt_rad: {why}")
+            found = (kinematics.pose_from_lengths(row, begin, restarts=8) for row in rows)
+            return given, [Pose(s.pose.p, s.pose.Q) if s.converged else None for s in found]
+        if tension_N is not None:
+            pulled = list(self._readings("tension_N", tension_N, self.n, given.shape[:-1]))
+        if tilt_rad is not None:
+            tilts = self._readings("tilt_rad", tilt_rad, 2, given.shape[:-1])
+            sensed = [upward(tilt) for tilt in tilts]
+        search = HangingSearch(self._model)
+        of_rows = zip(rows, pulled, sensed, strict=True)
+        return given, [search.find(row, begin, *seen) for row, *seen in of_rows]
+
+    def _readings(
+        self, name: str, given: ArrayLike, size: int, shape: tuple[int, ...] | None = None
+    ) -> FloatArray:
+        """Return readings (..., size), or with a `shape` of rows as (m, size)."""
+        values = _numbers(name, given)
+        fits = values.ndim > 0 and values.shape[-1] == size and np.isfinite(values).all()
+        if not fits or shape not in (None, values.shape[:-1]):
+            wanted = f"(..., {size})" if shape is None else (*shape, size)
+            raise InvalidArgument(f"{name}: shape {values.shape}; want finite {wanted}")
+        return values if shape is None else values.reshape(-1, size)
 
     def tensions(self, position: ArrayLike, wrench: ArrayLike | None = None) -> FloatArray:
         """Return the tensions (..., n), N, at rest by the distribution that the file names.

@@ -146,7 +146,8 @@ def uncontrolled_rotation(statics: PlatformStatics, disagree_m: float) -> Iterat
     motions are x = N φ_u with N_u = 1, N_c = -J_c^+ J_u. Constant tensions, as planned there, and
     weight leave a wrench w and give the stiffness K = -∂w/∂x (6, 6). The platform rests
     at N^T K N φ_u = N^T w, and turns over if N^T K N is not positive definite. The residuals
-    of lengths are J x; normalised ones may be up to `disagree_m`.
+    of lengths are J x; normalised ones may be up to `disagree_m`. With fewer than 6 cables the
+    control computes this equilibrium itself, and lengths do not disagree.
     """
     platform, model = statics.platform, statics.model
     left = [i for i in (3, 4, 5) if i not in model.kinematics.directions]
@@ -206,16 +207,19 @@ def _hanging(
     redundancy = 1.0 - np.einsum("mnd,mdn->mn", held, inverse)
     apart_m = np.abs(J @ x[..., None])[..., 0] / np.sqrt(np.maximum(redundancy, LEAST_REDUNDANCY))
     apart_m = np.where(redundancy > LEAST_REDUNDANCY, apart_m, 0.0).max(axis=1)
-    what, impossible = _in_words(places, x, apart_m, disagree_m)
+    computed = model.kinematics.hangs_freely
+    apart_m *= not computed
+    what, impossible = _in_words(places, x, apart_m, disagree_m, computed)
     return what + mend, impossible
 
 
 def _in_words(
-    places: FloatArray, x: FloatArray, apart_m: FloatArray, disagree_m: float
+    places: FloatArray, x: FloatArray, apart_m: FloatArray, disagree_m: float, computed: bool
 ) -> tuple[str, bool]:
     """Return as text the worst of the motions (m, 6) into rest, at places (m, 3).
 
-    `apart_m` (m,) is the largest normalised residual at each place.
+    `apart_m` (m,) is the largest normalised residual at each place. `computed` is whether the
+    control computes the equilibrium.
     """
     angle_deg = np.degrees(np.linalg.norm(x[:, 3:], axis=1))
     off_mm = 1e3 * np.linalg.norm(x[:, :3], axis=1)
@@ -226,10 +230,14 @@ def _in_words(
     if not contradicting and angle_deg.max() < _LEAST_deg and off_mm.max() < _LEAST_mm:
         return "the platform swings about these axes", False
     k = int((apart_m if contradicting else off_mm).argmax())
-    text = (
-        f"at {point_text(places[k])} m the platform hangs turned by {angle_deg[k]:.1f} "
-        "deg, which the control does not compute"
-    )
+    text = f"at {point_text(places[k])} m the platform hangs turned by {angle_deg[k]:.1f} deg, "
+    if computed:
+        return (
+            f"{text}as the control computes from equilibrium, {off_mm[k]:.1f} mm from where it "
+            "would be without that, and swings; an inclinometer measures it",
+            False,
+        )
+    text += "which the control does not compute"
     if contradicting:
         apart_mm, allowed_mm = 1e3 * apart_m[k], 1e3 * disagree_m
         text += f": its lengths disagree by {apart_mm:.1f} mm, {allowed_mm:.1f} mm allowed"

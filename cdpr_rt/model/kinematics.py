@@ -99,6 +99,13 @@ class CableKinematics:
         anchors = self.geometry[cable_kernel.ANCHOR : cable_kernel.RADIUS]
         return self.directions == PLANAR_POINT and bool(np.ptp(anchors, axis=1).any())
 
+    @property
+    def hangs_freely(self) -> bool:
+        """Whether a platform in space has too few cables to control its orientation."""
+        anchors = self.geometry[cable_kernel.ANCHOR : cable_kernel.RADIUS]
+        in_space, free = bool(self._up[2]), len(self.directions) < len(SPATIAL)
+        return in_space and free and self.n < len(SPATIAL) and bool(np.ptp(anchors, axis=1).any())
+
     def lengths(self, pose: Pose, tension_N: FloatArray | None = None) -> FloatArray:
         """Return the lengths (n,) without tension of cables that hold `tension_N` (n,) at `pose`.
 

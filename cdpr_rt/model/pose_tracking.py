@@ -18,11 +18,13 @@ Arrays besides those of `cable_kernel` and `pose_search`, of float64:
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
-from cdpr_rt.arrays import FloatArray, IntArray
+from cdpr_rt.arrays import BoolArray, FloatArray, IntArray
 from cdpr_rt.jit import jit
+from cdpr_rt.model import equilibrium_kernel as equilibrium
 from cdpr_rt.model import free_rotation_kernel as free
 from cdpr_rt.model.cable_kernel import ARC, ERROR, FREE, run_cables, unstretched_length
 from cdpr_rt.model.pose import exponential, logarithm
@@ -33,6 +35,7 @@ from cdpr_rt.model.pose_search import (
     find_pose,
     largest_jump,
     largest_residual,
+    move,
     substitute,
 )
 
@@ -40,12 +43,36 @@ THETA, OMEGA, LOWPASSED_ONCE, LOWPASSED, LENGTH, RATE, TENSION, STRETCH, AT_ZERO
 M_PER_RAD, COMPLIANCE, WEIGHT, INERTIA, RESIDUAL, SETTLED, MOTOR_ROWS = 9, 10, 11, 12, 13, 14, 15
 PERIOD, OBSERVER, SMOOTHER, LOWPASS_SHARE, FILTERS = range(5)
 ANGLE, SPIN, AMPLITUDE, AMPLITUDE_m, SWING = range(5)
+FIXED, TURNS, HANGS = range(3)
+"""How an uncontrolled rotation is estimated: not; in its plane; in space."""
 JUMP_S = 0.2
 """Time constant with which SETTLED follows RESIDUAL: a slip takes some 30 ms, while errors of the
 geometry change the residual only as slowly as the platform moves."""
 _MOST_TURN_rad, _SMALL = 0.02, 1e-4
+LAG, LAG_S = 0, 0.1
+_STANDS_m = 5e-3
+"""Height over home up to which a platform counts as standing there."""
 # of the type that comes from Python: with a literal numba would compile the search again
 _NO_RESTARTS: int = np.int64(0)  # type: ignore[assignment]
+
+
+class Hanging(NamedTuple):
+    """Arrays for a platform that hangs in space on too few cables, see `equilibrium_kernel`."""
+
+    known: FloatArray
+    tensions: FloatArray
+    normal: FloatArray
+    rows: FloatArray
+    settings: FloatArray
+    """(1,): time constant LAG with which the rotation follows, s."""
+    home: FloatArray
+    """Pose at home, (4, 3), where it stands."""
+    scratch: FloatArray
+    """(4, 3)"""
+    measured_N: FloatArray
+    """Readings of load cells at the winches, (n,)."""
+    measured: BoolArray
+    """Whether they are valid, (n,)."""
 
 
 @jit
@@ -84,19 +111,22 @@ def track_pose(
     twist: FloatArray,
     rotation: FloatArray,
     swing: FloatArray,
-    turns: bool,
+    freedom: int,
+    hanging: Hanging,
     position: FloatArray,
 ) -> tuple[float, int, float, float, int]:
     """Update `pose` and `twist` (6,) from the motors' angles (n,).
 
     Returns the largest normalised residual of the lengths, m, its cable, -1 if the lengths do not
     identify it, the root mean square of the rates' errors, m/s, and the largest jump of a residual,
-    m, and its cable, see `largest_jump`. `turns` is whether the platform turns freely in its plane:
-    then it is put at the angle without moment. Eqs. (2.6) to (2.9), (3.13) to (3.15).
+    m, and its cable, see `largest_jump`. If its cables leave the platform a `freedom` to turn, it
+    is put at the rotation of the equilibrium. Eqs. (2.6) to (2.9), (3.13) to (3.15).
     """
     observe(motors, position, filters)
-    if turns:
+    if freedom == TURNS:
         _turn_to_equilibrium(motors, filters, geometry, pose, rotation, swing)
+    elif freedom == HANGS:
+        _hang(motors, filters, geometry, pose, cables, hanging)
     _, _, cost = find_pose(geometry, cables, solver, motors[LENGTH], pose, _NO_RESTARTS)
     stretch(motors, cables, up)
     n, residual, suspect, jump, jumped = motors.shape[1], math.sqrt(cost), -1, 0.0, -1
@@ -135,6 +165,38 @@ def stretch(motors: FloatArray, cables: FloatArray, up: FloatArray) -> None:
         length += cables[ARC, i] / (1.0 + tension * compliance)
         if length > 0.0:
             motors[STRETCH, i] = (free + cables[ARC, i]) / length
+
+
+@jit
+def _hang(
+    motors: FloatArray,
+    filters: FloatArray,
+    geometry: FloatArray,
+    pose: FloatArray,
+    cables: FloatArray,
+    hanging: Hanging,
+) -> None:
+    """Turn the platform towards its equilibrium, or at home's height to its rotation on the stand.
+
+    The true platform swings about the equilibrium, and follows it no faster than LAG.
+    """
+    lag_s = hanging.settings[LAG]
+    share = filters[PERIOD] / (filters[PERIOD] + lag_s)
+    if not pose[0, 2] > hanging.home[0, 2] + _STANDS_m:
+        back = hanging.rows[0]
+        _turn_between(hanging.home, pose, hanging.scratch)
+        for k in range(6):
+            back[k] = 0.0 if k < 3 else share * hanging.scratch[0, k - 3]
+        move(pose, back)
+        return
+    equilibrium.say_tensions(
+        motors[TENSION], hanging.measured_N, hanging.measured, geometry, cables, hanging.known,
+        hanging.tensions,
+    )  # fmt: skip
+    equilibrium.turn_to_equilibrium(
+        geometry, motors[LENGTH], pose, cables, hanging.known, hanging.tensions, hanging.normal,
+        hanging.rows, share,
+    )  # fmt: skip
 
 
 @jit

@@ -7,7 +7,8 @@ bounds, so that no cable is unwound and the motors never pull against each other
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -25,6 +26,7 @@ from cdpr_rt.model.cable_kernel import (
     run_cables,
     write_tension_rises,
 )
+from cdpr_rt.model.equilibrium_kernel import TENSIONS, known_of
 from cdpr_rt.model.free_rotation_kernel import SHAPING_s, rotation_of
 from cdpr_rt.model.own_distribution import OwnDistribution, TensionDistribution
 from cdpr_rt.model.platform_model import PlatformModel
@@ -332,11 +334,23 @@ class CableControl(PlaceChecks):
         self._planned_at = (found, self._pose.array) if follows else (wanted, self._wanted.array)
         filters = tracking_filters(self.gains, self._period_s)
         self._swing, self._seven, position = np.zeros(tracking.SWING), np.zeros(7), np.zeros(n)
-        self._track = bound(
-            tracking.track_pose, motors, filters, kinematics.geometry, self._up, self._pose.array,
-            found, kinematics.solver, moves[loop.TWIST], rotation_of(model.platform),
-            self._swing, kinematics.turns_freely, then=(position,),
+        self._hanging = tracking.Hanging(
+            known_of(model.platform, model.reserve_N), np.zeros((TENSIONS, n)),
+            np.zeros((6 + n, 6 + n)), np.zeros((8, 6 + n)), np.array([tracking.LAG_S]),
+            self._home.array, np.zeros((4, 3)), np.zeros(n), np.zeros(n, np.bool_),
         )  # fmt: skip
+        self._hanging.tensions[:] = self.low_N
+
+        def track_with(hanging: tracking.Hanging) -> Callable[..., Any]:
+            return bound(
+                tracking.track_pose, motors, filters, kinematics.geometry, self._up,
+                self._pose.array, found, kinematics.solver, moves[loop.TWIST],
+                rotation_of(model.platform), self._swing, freedom, hanging, then=(position,),
+            )  # fmt: skip
+
+        freedom = tracking.TURNS if kinematics.turns_freely else tracking.FIXED
+        freedom = tracking.HANGS if kinematics.hangs_freely else freedom
+        self._track_with, self._track = track_with, track_with(self._hanging)
         self._write_coordinates = bound(
             tracking.coordinates_of_pose,
             self._pose.array, self._directions, self._home.array, self._scratch, self.estimated,
@@ -487,6 +501,8 @@ class CableControl(PlaceChecks):
 
         Without a reading the control relies on the motor's torque constant and known losses.
         """
+        self._hanging = self._hanging._replace(measured_N=tension_N, measured=measured)
+        self._track = self._track_with(self._hanging)
         learnt_Nm = np.zeros(len(tension_N)) if self.learning is None else self.learning.torque_Nm
         self._cells = CellFeedback(
             tension_N, measured, self._motors[tracking.M_PER_RAD], self.model.reserve_N,
@@ -585,10 +601,12 @@ class CableControl(PlaceChecks):
         planned_N = np.maximum(motors[tracking.TENSION], self.low_N)
         motors[tracking.TENSION] = planned_N
         self._pose.array[:] = self._home.array
+        self._hanging.settings[tracking.LAG] = 0.0
         for _ in range(_SETTLING_STEPS):
             if tension_N is not None:
                 motors[tracking.TENSION] = tension_N - self._rises_N(self._found)
             self.observe(feedback)
+        self._hanging.settings[tracking.LAG] = tracking.LAG_S
         self._swing[:] = 0.0
         motors[tracking.TENSION] = planned_N
         motors[tracking.SETTLED] = np.nan

@@ -29,6 +29,7 @@ ROBOT = {
     "robot": {
         "show": "Show a robot's platform, cables and workspace, and check whether it can work.",
         "mark-calibrated": "Confirm the geometry in the robot's file, e.g. after moving a rail.",
+        "pose": "Compute poses from a table of cable lengths, and their errors.",
         "new": "Write a robot's file by answering questions.",
     },
     "robot_trial": {

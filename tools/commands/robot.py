@@ -1,4 +1,4 @@
-"""`cdpr robot new|show|mark-calibrated`: describe a cable robot, and show it."""
+"""`cdpr robot new|show|pose|mark-calibrated`: describe a cable robot, and show it."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from pathlib import Path
 from shlex import quote
 from typing import Annotated
 
+import numpy as np
 import typer
 
 from cdpr_drivers.bus.budget import machine_budget
@@ -16,12 +17,13 @@ from cdpr_profiles import Robot, load_robot
 from cdpr_profiles.calibration_in_force import load_calibrated
 from cdpr_profiles.errors import printable
 from cdpr_profiles.platform import NO_PLATFORM, Platform
+from cdpr_rt import offline
 from cdpr_rt.diagnosis import checks
 from cdpr_rt.diagnosis.subject import Finding, Subject
 from cdpr_rt.model.calibration_state import mark_calibrated
 from cdpr_tools.commands.options import JsonOption, PngOption, RobotArgument
-from cdpr_tools.errors import BAD_INPUT, BadInputError
-from cdpr_tools.output import Output
+from cdpr_tools.errors import BAD_INPUT, BadInputError, os_error_as
+from cdpr_tools.output import Output, TableText
 from cdpr_tools.robots import new_robot, summary
 from cdpr_tools.robots.calibration_text import calibration_lines
 from cdpr_tools.robots.questions import KINDS, SKETCH, Default, Question
@@ -71,6 +73,53 @@ def _bus_findings(profile: Robot) -> list[Finding]:
     """Return a finding if the cycle does not fit the buses, else an empty list."""
     reason = refusal(machine_budget(profile))
     return [Finding("sync_period_s", reason, impossible=True)] if reason else []
+
+
+@app.command()
+def pose(
+    robot: RobotArgument,
+    table: Annotated[
+        Path,
+        typer.Argument(
+            metavar="TABLE",
+            help="CSV with the columns length_1_m, length_2_m, ... and, if measured, tension_1_N, "
+            "... at the winches, roll_rad and pitch_rad, and the pose: x_m y_m z_m, qw qx qy qz.",
+        ),
+    ],
+    poses: Annotated[
+        Path | None, typer.Option("--out", metavar="FILE", help="Write the poses, NAME.csv.")
+    ] = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Compute poses from a table of cable lengths, and their errors.
+
+    The control computes them in the same way. Errors are shown if the table has measured poses.
+    Lengths are those of the straight cables under load, with the parts on their pulleys.
+    """
+    from cdpr_tools.robots import pose_table  # noqa: PLC0415  # slow to load
+
+    out = Output(as_json)
+    model = offline.load(robot)
+    given = pose_table.read_pose_table(table, model.n)
+    with out.stage(f"{table.name}: computing {len(given.length_m)} poses"):
+        found = pose_table.estimates(model, given)
+    *_, (best, last) = found.items()
+    lost = int(np.isnan(last).any(axis=1).sum())
+    out.say(f"{table}: {len(last)} poses from {best}" + f", {lost} not found" * bool(lost))
+    figures = {name: pose_table.errors(rows, given) for name, rows in found.items()}
+    rows = [
+        [name, what, *(f"{value:.2f}" for value in of_it.values())]
+        for name, of_each in figures.items()
+        for what, of_it in of_each.items()
+    ]
+    if rows:
+        header = ["pose from", "error of", "mean", "rms", "largest"]
+        out.say(TableText([header, *rows], left=("error of",)))
+    if poses is not None:
+        with os_error_as(BadInputError, str(poses)):
+            pose_table.write_pose_table(poses, last)
+        out.say(f"poses: {poses}")
+    out.result({"ok": not lost, "poses": len(last), "not_found": lost, "errors": figures})
 
 
 @app.command("mark-calibrated")

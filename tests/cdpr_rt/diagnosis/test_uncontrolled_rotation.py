@@ -19,7 +19,10 @@ from cdpr_rt.model.statics import PlatformStatics, statics_of
 CAMERA = (SHIPPED / "robots" / "point-4.toml").read_text()
 SUSPENDED = (SHIPPED / "robots" / "suspended-8.toml").read_text()
 STANDARD_GRAVITY = 9.80665
-TURNED = r"at \((.*), (.*), (.*)\) m the platform hangs turned by (\S+) deg, .*, (\S+) mm from"
+TURNED = (
+    r"at \((.*), (.*), (.*)\) m the platform hangs turned by (\S+) deg, as the control computes "
+    r"from equilibrium, (\S+) mm from"
+)
 
 
 def hanging(arm_m: float, below_m: float, origin_m: float = 0.0) -> str:

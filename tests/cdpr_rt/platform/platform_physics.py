@@ -107,6 +107,35 @@ def spatial() -> Machine:
     return Machine(platform, (axis,) * 8, 20.0, 200.0, 6.0)
 
 
+def hung(
+    centre_m: tuple[float, float, float] = (0.0, 0.0, -0.1),
+    moved_m: tuple[float, float, float] = (0.0, 0.0, 0.0),
+) -> Machine:
+    """A platform of 12 kg that hangs on 4 cables, 0.2 m apart, which do not control its rotation.
+
+    `moved_m` is the distance of the third exit point from a corner of the frame.
+    """
+    corners = np.hstack([_CORNERS, np.full((4, 1), 0.0)])
+    exits = np.array([1.2, 1.2, 0.0]) * corners + [0.0, 0.0, 2.0]
+    exits[2] += moved_m
+    platform = Platform(
+        mass_kg=12.0,
+        home_m=(0.0, 0.0, 0.4),
+        home_tolerance_m=0.05,
+        workspace_min_m=(-0.4, -0.4, 0.5),
+        workspace_max_m=(0.4, 0.4, 1.2),
+        speed_m_s=0.3,
+        acceleration_m_s2=0.5,
+        exit_points_m=tuple(map(tuple, exits)),
+        anchor_points_m=tuple(map(tuple, 0.1 * corners)),
+        centre_of_mass_m=centre_m,
+        inertia_kg_m2=(0.2, 0.15, 0.2, 0.0, 0.0, 0.0),
+        controlled=("x", "y", "z"),
+        cable_model="elastic",
+    )
+    return Machine(platform, (_PLANAR.axes[0],) * 4, 10.0, 300.0, 8.0)
+
+
 def short_arms() -> Machine:
     """A plate of 0.12 m on 8 cables in a frame of 4 x 3 x 2 m, all in one plane of it.
 

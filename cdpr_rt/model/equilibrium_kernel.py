@@ -1,0 +1,245 @@
+"""Kernel of the rotation of a platform in space that its cables do not control completely.
+
+The pose and the tensions t in the middle of the n cables are those that agree best, in weighted
+least squares, with
+
+    lengths       ρ_i(pose) = l_i        standard deviation LENGTH_STD_m
+    equilibrium   -J^T t + weight = 0    FORCE_SHARE of the weight, CENTRE_STD_m times the weight
+    tensions      t_i = s_i              s_i is what motors or load cells say, see `say_tensions`
+    inclinometer  Q s = (0, 0, 1)        TILT_STD_rad; s is its upward direction
+
+Without sensors, tensions say little: mainly how far cables pull against each other, which lengths
+of stiff cables do not tell. Arrays of float64 besides those of `cable_kernel`:
+
+    known      (9,)       WEIGHT, N; CENTRE of mass in the platform's frame, m; STD_N, standard
+                          deviation of tensions by the motors; SENSED, 1 if there is an
+                          inclinometer's reading, and that reading UP (3,) in the platform's frame
+    tensions   (3, n)     FOUND; SAID; their PRECISION, 1/σ²
+    normal     (6 + n, 6 + n)  normal equations, and `rows` (8, 6 + n), scratch
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from cdpr_profiles.platform import Platform
+from cdpr_rt.arrays import BoolArray, FloatArray
+from cdpr_rt.jit import jit
+from cdpr_rt.model.cable_kernel import ANCHOR, ARC, FREE, hang, run_cables, tension_rise
+from cdpr_rt.model.pose_search import move
+from cdpr_rt.model.rigid_body import G_m_s2, in_space
+
+WEIGHT, CENTRE, STD_N, SENSED, UP, KNOWN = 0, 1, 4, 5, 6, 9
+FOUND, SAID, PRECISION, TENSIONS = range(4)
+LENGTH_STD_m = 2e-3
+CELL_SHARE = 0.15
+"""Standard deviation of a load cell's reading as a share of the control's reserve of tension, which
+is that of what motors say."""
+FORCE_SHARE, CENTRE_STD_m, TILT_STD_rad = 0.004, 1e-3, 2e-3
+"""Uncertainty of weight, centre of mass, and inclinometer."""
+_MOST_TURN_rad, _LEAST_PIVOT = 0.2, 1e-12
+
+
+@jit
+def say_tensions(
+    motor_N: FloatArray,
+    measured_N: FloatArray,
+    measured: BoolArray,
+    geometry: FloatArray,
+    cables: FloatArray,
+    known: FloatArray,
+    tensions: FloatArray,
+) -> None:
+    """Write what load cells at the winches say, or else motors in the middle of the cables."""
+    for i in range(motor_N.size):
+        std_N = known[STD_N]
+        tensions[SAID, i] = motor_N[i]
+        if measured[i]:
+            std_N *= CELL_SHARE
+            tensions[SAID, i] = measured_N[i] - tension_rise(geometry, cables, i)
+        tensions[PRECISION, i] = 1.0 / (std_N * std_N)
+
+
+@jit
+def turn_to_equilibrium(
+    geometry: FloatArray,
+    lengths: FloatArray,
+    pose: FloatArray,
+    cables: FloatArray,
+    known: FloatArray,
+    tensions: FloatArray,
+    normal: FloatArray,
+    rows: FloatArray,
+    share: float,
+) -> float:
+    """Turn a pose, and change the tensions FOUND, by a `share` of one Gauss-Newton step.
+
+    Returns the angle of the whole step, rad, nan if the equations are singular. The position does
+    not change: it follows from the lengths (n,) at this rotation. Writes `cables`.
+    """
+    run_cables(geometry, pose, cables)
+    size, gradient = normal.shape[0], rows[6]
+    for j in range(size):
+        gradient[j] = 0.0
+        for k in range(j + 1):
+            normal[j, k] = 0.0
+    _add_equilibrium(geometry, pose, cables, known, tensions[FOUND], rows, normal)
+    precision = 1.0 / LENGTH_STD_m**2
+    for i in range(size - 6):
+        error = cables[FREE, i] + cables[ARC, i] - lengths[i]
+        for j in range(6):
+            gradient[j] -= precision * cables[j, i] * error
+            for k in range(j + 1):
+                normal[j, k] += precision * cables[j, i] * cables[k, i]
+        weight = tensions[PRECISION, i]
+        gradient[6 + i] -= weight * (tensions[FOUND, i] - tensions[SAID, i])
+        normal[6 + i, 6 + i] += weight
+    if known[SENSED] > 0.0:
+        _add_tilt(pose, known, gradient, normal)
+    if not _solve(normal, gradient):
+        return math.nan
+    angle = math.sqrt(gradient[3] ** 2 + gradient[4] ** 2 + gradient[5] ** 2)
+    share *= min(1.0, _MOST_TURN_rad / angle) if angle > 0.0 else 1.0
+    for k in range(size):
+        gradient[k] *= 0.0 if k < 3 else share
+    move(pose, gradient)
+    for i in range(size - 6):
+        tensions[FOUND, i] += gradient[6 + i]
+    return angle
+
+
+@jit
+def _add_equilibrium(
+    geometry: FloatArray,
+    pose: FloatArray,
+    cables: FloatArray,
+    known: FloatArray,
+    tension: FloatArray,
+    rows: FloatArray,
+    normal: FloatArray,
+) -> None:
+    """Add the balance of forces and moments; its derivatives are written to `rows`.
+
+    The derivatives leave out the pulleys' small part.
+    """
+    size, weight, gradient, wrench = normal.shape[0], known[WEIGHT], rows[6], rows[7]
+    for j in range(6):
+        wrench[j] = 0.0
+        for k in range(size):
+            rows[j, k] = 0.0
+    x, y, z = _turned(pose, known[CENTRE], known[CENTRE + 1], known[CENTRE + 2])
+    wrench[2] -= weight
+    wrench[3] -= weight * y
+    wrench[4] += weight * x
+    # by the rotation's change φ × (x, y, z)
+    rows[3, 3], rows[3, 5] = rows[3, 3] + weight * z, rows[3, 5] - weight * x
+    rows[4, 4], rows[4, 5] = rows[4, 4] + weight * z, rows[4, 5] - weight * y
+    hang(geometry, pose, cables, wrench)
+    for i in range(tension.size):
+        t, free = tension[i], cables[FREE, i]
+        ux, uy, uz = cables[0, i], cables[1, i], cables[2, i]
+        rx, ry, rz = _turned(
+            pose, geometry[ANCHOR, i], geometry[ANCHOR + 1, i], geometry[ANCHOR + 2, i]
+        )
+        for k in range(6):
+            wrench[k] -= t * cables[k, i]
+            rows[k, 6 + i] = -cables[k, i]
+            # velocity v of the anchor point, change d of the direction
+            vx, vy, vz = 1.0 * (k == 0), 1.0 * (k == 1), 1.0 * (k == 2)
+            if k == 3:
+                vy, vz = -rz, ry
+            elif k == 4:
+                vx, vz = rz, -rx
+            elif k == 5:
+                vx, vy = -ry, rx
+            along = ux * vx + uy * vy + uz * vz
+            dx, dy = (vx - along * ux) / free, (vy - along * uy) / free
+            dz = (vz - along * uz) / free
+            rows[0, k] -= t * dx
+            rows[1, k] -= t * dy
+            rows[2, k] -= t * dz
+            rows[3, k] -= t * (ry * dz - rz * dy)
+            rows[4, k] -= t * (rz * dx - rx * dz)
+            rows[5, k] -= t * (rx * dy - ry * dx)
+            if k >= 3:
+                rows[3, k] -= t * (vy * uz - vz * uy)
+                rows[4, k] -= t * (vz * ux - vx * uz)
+                rows[5, k] -= t * (vx * uy - vy * ux)
+    for j in range(6):
+        std = weight * (FORCE_SHARE if j < 3 else CENTRE_STD_m)
+        precision = 1.0 / (std * std)
+        for a in range(size):
+            entry = precision * rows[j, a]
+            gradient[a] -= entry * wrench[j]
+            for b in range(a + 1):
+                normal[a, b] += entry * rows[j, b]
+
+
+@jit
+def _add_tilt(
+    pose: FloatArray, known: FloatArray, gradient: FloatArray, normal: FloatArray
+) -> None:
+    """Add the inclinometer's reading s: Q s is upward."""
+    x, y, z = _turned(pose, known[UP], known[UP + 1], known[UP + 2])
+    precision = 1.0 / TILT_STD_rad**2
+    # by φ × (x, y, z): x changes by φ_y z - φ_z y, y by φ_z x - φ_x z
+    gradient[3] += precision * z * y
+    gradient[4] -= precision * z * x
+    normal[3, 3] += precision * z * z
+    normal[4, 4] += precision * z * z
+    normal[5, 3] -= precision * x * z
+    normal[5, 4] -= precision * y * z
+    normal[5, 5] += precision * (x * x + y * y)
+
+
+@jit
+def _turned(pose: FloatArray, x: float, y: float, z: float) -> tuple[float, float, float]:
+    """Return a vector of the platform's frame along the room's axes."""
+    return (
+        pose[1, 0] * x + pose[1, 1] * y + pose[1, 2] * z,
+        pose[2, 0] * x + pose[2, 1] * y + pose[2, 2] * z,
+        pose[3, 0] * x + pose[3, 1] * y + pose[3, 2] * z,
+    )
+
+
+@jit
+def _solve(normal: FloatArray, x: FloatArray) -> bool:
+    """Solve N x = g in place by Cholesky's method; on entry `x` is g. False if N is singular."""
+    for j in range(x.size):
+        pivot = normal[j, j]
+        for k in range(j):
+            pivot -= normal[j, k] ** 2
+        if not pivot > _LEAST_PIVOT * normal[j, j]:
+            return False
+        root = math.sqrt(pivot)
+        normal[j, j] = root
+        for i in range(j + 1, x.size):
+            entry = normal[i, j]
+            for k in range(j):
+                entry -= normal[i, k] * normal[j, k]
+            normal[i, j] = entry / root
+    for j in range(x.size):
+        entry = x[j]
+        for k in range(j):
+            entry -= normal[j, k] * x[k]
+        x[j] = entry / normal[j, j]
+    for j in range(x.size - 1, -1, -1):
+        entry = x[j]
+        for k in range(j + 1, x.size):
+            entry -= normal[k, j] * x[k]
+        x[j] = entry / normal[j, j]
+    return True
+
+
+def known_of(platform: Platform, reserve_N: float) -> FloatArray:
+    """Return a platform's `known`, (KNOWN,), without a reading of an inclinometer.
+
+    Motors say tensions as well as the control's reserve assumes.
+    """
+    known = np.zeros(KNOWN)
+    known[WEIGHT] = platform.mass_kg * G_m_s2
+    known[CENTRE : CENTRE + 3] = in_space(platform.centre_of_mass_m)
+    known[STD_N] = reserve_N
+    return known
