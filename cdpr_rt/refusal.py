@@ -25,7 +25,8 @@ class RefusalCode(StrEnum):
     OUT_OF_RANGE = "out_of_range"
     """A number is out of its bounds (`index` in a list or None, `low`, `high`)."""
     NOT_FEASIBLE = "not_feasible"
-    """The platform cannot be at a place, or on the way to it (`why`; `outside` its workspace)."""
+    """The platform cannot be at a place, or on the way to it (`why`; `outside` its workspace;
+    `enter_m`: the nearest place of the workspace, if the platform is outside)."""
     NOTHING_LEFT = "nothing_left"
     """There is nothing to continue (`left`: target or path, `instead`: the alternative)."""
     NOT_TIGHT = "not_tight"
@@ -72,7 +73,11 @@ class CommandRefusal:
             case RefusalCode.BAD_SOURCE if arguments["allowed"]:
                 sources = ", ".join(arguments["allowed"])
                 return f"{arguments['why']}; allowed: {arguments['option']}{sources}"
-        return str(arguments["why"])
+        enter = arguments.get("enter") or f"position_m {arguments.get('enter_m')}"
+        entering = (
+            f"; the platform is not in it yet: first {enter}" if "enter_m" in arguments else ""
+        )
+        return f"{arguments['why']}{entering}"
 
     def _keys(self) -> str:
         index = self.arguments.get("index")

@@ -36,6 +36,7 @@ _HELD_BACK = {
     hand_target.ON_STAND: "below the workspace, for example on its stand: move up first",
 }
 _ROUNDING = 1e-9
+_AT_BOUND_m = 1e-4
 _ABSOLUTE, _RELATIVE = ("position_m", "rotation_rad"), ("distance_m", "turn_rad")
 _FRAMES = ("room", "platform")
 _KEYS = (*_ABSOLUTE, *_RELATIVE, "frame", "stream", "resume", "speed_m_s")
@@ -128,7 +129,16 @@ class PoseProgram(PlatformProgram):
             return lags
         if self._contact_pair >= 0:
             return self._control.contact(self._contact_pair)
-        return self._infeasibility_at(self._examined_goal) or _HELD_BACK[self._hindrance]
+        why = self._infeasibility_at(self._examined_goal) or _HELD_BACK[self._hindrance]
+        if self._hindrance != hand_target.AT_EDGE or why != _HELD_BACK[self._hindrance]:
+            return why
+        here, names = self._target[: self._k], self._directions
+        at = [
+            f"{'xyz'[names[i]]} {1e3 * here[i]:.5g} mm"
+            for i in range(self._k)
+            if min(here[i] - self._low[i], self._high[i] - here[i]) < _AT_BOUND_m
+        ]
+        return ", ".join([why, *at])
 
     def _infeasibility_at(self, position: FloatArray) -> str:
         """Return where and why a position is not feasible, "" if it is."""
@@ -232,19 +242,25 @@ class PoseProgram(PlatformProgram):
             exponential(axes @ turn, step)
             logarithm(step @ Q, turned)
             position[k:] = turned[about]
-        self._keep_inside(position, asked)
+        self._keep_inside(position, asked, start)
         return position
 
-    def _keep_inside(self, position: FloatArray, asked: Mapping[str, Any]) -> None:
+    def _keep_inside(
+        self, position: FloatArray, asked: Mapping[str, Any], start: FloatArray | None = None
+    ) -> None:
         """Raise ProgramError for a target (d,) that cannot be reached; round it into its bounds.
 
-        The position is not checked if an absolute motion does not change it.
+        A relative motion begins at `start`. The position is not checked if an absolute motion does
+        not change it.
         """
         k, most_rad = self._k, self._parts.model.angle_rad
         leads = "" if asked.keys() & {*_ABSOLUTE} else "leads to "
         if asked.keys() & {"position_m", *_RELATIVE}:
             if beyond := self._beyond_box(position):
-                raise ProgramError(self._not_feasible(asked, leads + beyond, outside=True))
+                more = {}
+                if start is not None and self._beyond_box(start):
+                    more["enter_m"] = np.clip(start[:k].round(3), self._low, self._high).tolist()
+                raise ProgramError(self._not_feasible(asked, leads + beyond, outside=True, **more))
             position[:k] = np.clip(position[:k], self._low, self._high)
         if asked.keys() & {"turn_rad", "rotation_rad"} and (beyond := self._beyond_angle(position)):
             raise ProgramError(self._not_feasible(asked, leads + beyond, outside=True))
@@ -283,9 +299,9 @@ class PoseProgram(PlatformProgram):
             raise ProgramError(self._not_feasible(asked, f"on the way, {why_not}"))
 
     def _not_feasible(
-        self, asked: Mapping[str, Any], why: str, *, outside: bool = False
+        self, asked: Mapping[str, Any], why: str, *, outside: bool = False, **more: Any
     ) -> CommandRefusal:
-        arguments = {"why": why, "outside": outside}
+        arguments = {"why": why, "outside": outside, **more}
         return CommandRefusal(RefusalCode.NOT_FEASIBLE, self.name, asked, arguments)
 
     def _apply(self, checked: Any) -> None:

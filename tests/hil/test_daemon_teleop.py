@@ -94,6 +94,21 @@ def play(daemon: RealDaemon, folder: Path, script: str, *options: str) -> dict[s
     return figures
 
 
+def test_a_script_beyond_the_workspace_names_the_limit(daemon: RealDaemon, folder: Path) -> None:
+    # from the stand, sideways below the box of targets: nothing moves
+    path = folder / "aside"
+    path.write_text("0 0 0\n0.5 0 0\n1 5 0\n1.5 5 0\n")
+    command = teleop(daemon, "--device", "script", "--script", path)
+    told = subprocess.run(command, capture_output=True, text=True, timeout=60.0, check=False)
+    assert told.returncode == 1
+    assert "did not follow the hand: below the workspace" in told.stderr
+    up = play(daemon, folder, "0 0 0\n0.5 0 0\n4 0 300\n4.5 0 300\n")
+    assert up["held_back"] == ""
+    down = play(daemon, folder, "0 0 0\n0.5 0 0\n6 0 -500\n6.5 0 -500\n")
+    assert down["held_back"] == "at the edge of the workspace, y 1400 mm"
+    play(daemon, folder, "0 0 0\n0.5 0 0\n3 0 100\n3.5 0 100\n")
+
+
 @contextmanager
 def at_the_keys(daemon: RealDaemon) -> Iterator[tuple[subprocess.Popen[str], int]]:
     """Run teleoperation by keyboard. Yield the command and the other end of its terminal."""

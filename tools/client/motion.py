@@ -126,7 +126,7 @@ def finish(
     if status["state"] == DEAD:
         raise WorkFailedError(death_text(status))
     if status["state"] == "active":
-        out.say(*_where(status, where if ended and not stopped else ""))
+        out.say(*where_text(status, where if ended and not stopped else ""))
     if trouble := (ended or {}).get("trouble"):
         figures["trouble"] = trouble
         out.say(str(trouble))
@@ -146,8 +146,8 @@ def finish(
     out.result({"ok": True, **there, **figures})
 
 
-def _where(status: dict[str, Any], where: str) -> list[str]:
-    """Return where the motion has ended: a platform as a whole, else each axis."""
+def where_text(status: dict[str, Any], where: str = "") -> list[str]:
+    """Return where the platform is, or each axis, and what holds it; or `where` if it is given."""
     if where:
         return [where]
     tightness = tightness_text(status)

@@ -74,6 +74,8 @@ def in_typed_words(
             if _KEYS.keys().isdisjoint(refusal.asked):
                 raise
             raise BadInputError(_out_of_range(refusal, axes)) from None
+        if enter_m := refusal.arguments.get("enter_m"):
+            words["enter"] = f"`cdpr move --to {' '.join(f'{_MM * x:.6g}' for x in enter_m)}`"
         typed = asked if refusal.asked and asked else command
         text = f"{typed}: {refusal.reason(**words)}"
         if refusal.arguments.get("outside"):

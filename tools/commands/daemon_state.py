@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from contextlib import suppress
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -14,6 +15,7 @@ from rich.text import Text
 from cdpr_tools.client.client import Daemon, NoDaemonError, live_sockets, open_daemon
 from cdpr_tools.client.daemon_end import end_daemon
 from cdpr_tools.client.daemon_robot import commanded
+from cdpr_tools.client.motion import where_text
 from cdpr_tools.client.refusals import DaemonRefusalError
 from cdpr_tools.client.status_text import (
     is_simulated,
@@ -31,7 +33,7 @@ from cdpr_tools.commands.options import (
 from cdpr_tools.commands.with_daemon import with_daemon, with_daemon_at_once
 from cdpr_tools.consent import require_consent
 from cdpr_tools.daemon.estop import end_leftover_processes
-from cdpr_tools.errors import WorkFailedError
+from cdpr_tools.errors import CommandError, WorkFailedError
 from cdpr_tools.output import Output
 from cdpr_tools.signals import stop_on_signals
 
@@ -165,7 +167,14 @@ def disable(daemon: Daemon, out: Output) -> None:
 @with_daemon_at_once
 def hold(daemon: Daemon, out: Output) -> None:
     """Stop the motion and hold the position under power; `cdpr resume` continues it."""
-    _show(out, daemon.post("/hold"))
+    answer = daemon.post("/hold")
+    more: list[str] = []
+    with suppress(CommandError):  # the robot holds even if its service does not answer
+        status = daemon.get("/status")
+        more = [*where_text(status), *next_steps(status)]
+        if status["program"] == "hold" and not next_steps(status):
+            more.append("next: `cdpr resume` continues an interrupted move or path")
+    _show(out, answer, *more)
 
 
 @app.command()

@@ -35,10 +35,18 @@ class _Verbs(TyperGroup):
     """Commands on paths; a file without a command is rejected with the commands."""
 
     @override
-    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
-        if Path(args[0]).suffix:
-            ctx.fail(f"{args[0]}: allowed: `cdpr path show {args[0]}`, `cdpr path run {args[0]}`")
-        return super().resolve_command(ctx, args)
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Reject a command that is typed as an option, and a file without a command."""
+        first = args[0] if args else ""
+        if (verb := first.removeprefix("--")) != first and verb in self.commands:
+            ctx.fail(
+                f"{first}: commands have no dashes: `{' '.join(['cdpr path', verb, *args[1:]])}`"
+            )
+        if Path(first).suffix:
+            verbs = [word[2:] for word in args if word[:2] == "--" and word[2:] in self.commands]
+            lines = [f"`cdpr path {verb} {first}`" for verb in verbs or ("show", "run")]
+            ctx.fail(f"{first}: name a command first: {' or '.join(lines)}")
+        return super().parse_args(ctx, args)
 
 
 app = typer.Typer(

@@ -42,11 +42,11 @@ _LEAD = "robot"
 
 
 class _RobotOrCommand(TyperGroup):
-    """Reads `cdpr teleop planar-3` as `cdpr teleop robot planar-3`."""
+    """Reads `cdpr teleop planar-3` as `cdpr teleop robot planar-3`, also before `--help`."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Insert the command `robot` if no command is named."""
-        if args and args[0] not in self.commands and args[0] not in self.get_help_option_names(ctx):
+        if args and args[0] not in self.commands:
             args = [_LEAD, *args]
         return super().parse_args(ctx, args)
 
@@ -133,6 +133,8 @@ def robot(
     """Move a robot that has power by hand, through its daemon's set-point stream.
 
     The robot follows while this command runs, and holds when it ends for any reason.
+
+    `cdpr teleop experiment` lets a simulated operator do this; see `cdpr teleop experiment --help`.
     """
     from cdpr_tools.teleop.teleoperation import TeleopSettings, teleoperate  # noqa: PLC0415  # slow to load
 

@@ -70,6 +70,10 @@ class TeleopSession:
         self.confirmations: list[Confirmation] = []
         self.round_trips_s: deque[float] = deque(maxlen=_MOST_KEPT)
         """Round trips of the newest answers, the last one at the end."""
+        self.moved_m = 0.0
+        """Largest distance of the set-point from where the hand began to lead; the change of the
+        quaternion counts like metres."""
+        self._led_from: tuple[float, ...] = ()
         self._program = program
         self._begin_s = self._heard_s = self._fine_s = time.monotonic()
 
@@ -152,6 +156,10 @@ class TeleopSession:
             for _ in self.stream.receive():
                 self._heard_s = time.monotonic()
                 self.round_trips_s.append(self.stream.round_trip_s)
+                if self.leading and math.isfinite(self._setpoint[0]):
+                    self._led_from = self._led_from or self._setpoint
+                    moved_m = math.dist(self._led_from, self._setpoint)
+                    self.moved_m = max(self.moved_m, moved_m)
 
     def _runs(self) -> bool:
         """Return whether the robot accepts set-points and its program follows them."""

@@ -29,6 +29,7 @@ from cdpr_tools.teleop.view import View
 _STATUS_S: Final = 0.1
 _ANSWER_S: Final = 10.0
 _UNHEARD_S: Final = 1.0
+_UNMOVED_m: Final = 1e-4
 _PICTURES_Hz: Final = 10.0
 _ABOUT: Final = {"angle": 2, "rx": 0, "ry": 1, "rz": 2}
 _EVERYWHERE: Final = frozenset({"0.0.0.0", "::", ""})
@@ -74,11 +75,10 @@ def teleoperate(settings: TeleopSettings, out: Output) -> None:
             daemon.post("/program", {"program": program, "wanted": arguments}, token)
             number = description["programs"].index(program)
             session = TeleopSession(stream, device, settings.scale, number, directions[0])
+            view = View(session, description, status["reason"])
             out.note(f"controlling {name} over {host}:{port}; {device.hint}")
             try:
-                end = _shown(
-                    session, View(session, description, status["reason"]), daemon, out, ended
-                )
+                end = _shown(session, view, daemon, out, ended)
                 if session.silent_s > _UNHEARD_S:  # the next answer may take as long
                     out.note(f"{end.text}; asking the robot to hold")
                 with suppress(CommandError) if end.failed else nullcontext():  # `end` says why
@@ -89,7 +89,7 @@ def teleoperate(settings: TeleopSettings, out: Output) -> None:
                 raise
             finally:
                 _tell_figures(session, out)
-        _tell(session, end, daemon, status["reason"], out)
+        _tell(session, end, daemon, status["reason"], view.held_back, out)
 
 
 def _stream(host: str, port: int, daemon: Daemon, token: str) -> StreamClient:
@@ -107,7 +107,8 @@ def _shown(
 ) -> End:
     """Run it, with a view if there is a terminal."""
     if not out.notes.is_terminal:
-        return session.teleoperate(ended)
+        with _watched(view, daemon):
+            return session.teleoperate(ended)
     live = Live(
         get_renderable=lambda: view,
         console=out.notes,
@@ -217,10 +218,12 @@ def _tell_figures(session: TeleopSession, out: Output) -> None:
         )
 
 
-def _tell(session: TeleopSession, end: End, daemon: Daemon, before: str, out: Output) -> None:
-    """Report how it ended; raises WorkFailedError if it failed.
+def _tell(
+    session: TeleopSession, end: End, daemon: Daemon, before: str, held_back: str, out: Output
+) -> None:
+    """Report how it ended; raises WorkFailedError if it failed, or if a limit prevented any motion.
 
-    `before` is the robot's reason before it was led.
+    `before` is the robot's reason before it was led, `held_back` the last limit it has met.
     """
     try:
         status = daemon.get("/status")
@@ -230,7 +233,11 @@ def _tell(session: TeleopSession, end: End, daemon: Daemon, before: str, out: Ou
         reason = status["reason"] if status["reason"] != before else ""
         why = f" ({reason})" if reason else ""
         raise WorkFailedError(f"{end.text}{why}; {status['state']}, {status['program']}")
+    if held_back and session.moved_m < _UNMOVED_m:
+        raise WorkFailedError(f"{end.text}; the robot did not follow the hand: {held_back}")
     with suppress(OSError):
+        if held_back:
+            out.say(f"the robot did not follow the hand everywhere: {held_back}")
         out.say(f"{end.text}; {status['state']}, {status['program']}")
         out.result(
             {
@@ -238,6 +245,7 @@ def _tell(session: TeleopSession, end: End, daemon: Daemon, before: str, out: Ou
                 "robot": status["robot"],
                 "scale": session.scale,
                 "ended": end.text,
+                "held_back": held_back,
                 "state": status["state"],
                 "program": status["program"],
                 **session.figures(),

@@ -41,10 +41,13 @@ class View:
         self._axes = [str(axis.get("name")) for axis in description.get("axes", [])]
         self._reason = reason
         self._last_status: tuple[float, dict[str, Any]] = -math.inf, {}
+        self.held_back = ""
+        """The last reason why the robot did not follow the hand."""
 
     def tell(self, status: dict[str, Any]) -> None:
         """Show the daemon's status until it is too old."""
         self._last_status = time.monotonic(), status
+        self.held_back = (status.get("program_progress") or {}).get("held_back") or self.held_back
 
     @property
     def _status(self) -> dict[str, Any]:

@@ -252,7 +252,7 @@ def test_a_hand_turns_the_platform_no_further_than_the_allowed_angle(robot: Idea
     robot.pose.command({"stream": True})
     for angle in np.linspace(0.0, 1.0, 120):
         robot.hand((0.0, 0.0, 0.0), Rotation.from_rotvec([0.0, 0.0, angle]))
-    assert "edge of the workspace" in robot.pose.progress()["held_back"]
+    assert robot.pose.progress()["held_back"] == "at the edge of the workspace"
     robot.run(0.4)
     angles = np.linalg.norm(np.array(robot.path)[:, robot.model.positions :], axis=1)
     assert angles.max() <= robot.model.angle_rad * (1 + 1e-9)

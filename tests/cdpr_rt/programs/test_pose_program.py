@@ -339,6 +339,20 @@ def test_a_hand_must_lift_a_platform_off_its_stand_before_moving_it_sideways(
     assert robot.control.position[0] == pytest.approx(start[0] + 0.2, abs=5e-3)
 
 
+def test_a_step_on_the_stand_is_rejected_with_the_way_into_the_workspace(
+    robot: LedPlatform,
+) -> None:
+    assert robot.platform is not None
+    home_m, low_m = robot.platform.home_m, robot.platform.workspace_min_m
+    robot.restart(np.array(home_m))
+    with pytest.raises(ProgramError) as refused:
+        robot.program.check({"distance_m": [0.0, 0.02]})
+    refusal = refused.value.args[0]
+    enter_m = refusal.arguments["enter_m"]
+    assert enter_m == [home_m[0], low_m[1]]
+    robot.program.check({"position_m": enter_m})
+
+
 def test_the_platform_stops_soon_after_a_quick_hand_has_stopped(robot: LedPlatform) -> None:
     robot.program.command({"stream": True})
     robot.lead(np.linspace([0.0, 0.0], [0.5, 0.0], 10))

@@ -75,7 +75,14 @@ def test_an_infeasible_path_ends_with_status_2(file, change, options, told):
 def test_a_file_without_a_command_is_rejected_with_the_commands(file):
     done = cdpr_here("path", file, ORIGIN)
     assert done.returncode == 2
-    assert f"{file}: allowed: `cdpr path show {file}`, `cdpr path run {file}`" in done.stderr
+    assert f"{file}: name a command first: `cdpr path show {file}` or `cdpr" in done.stderr
+
+
+def test_a_command_typed_as_an_option_is_rejected_with_the_right_spelling(file):
+    for words in (("--run", file), (file, "--run")):
+        done = cdpr_here("path", *words)
+        assert done.returncode == 2
+        assert f"`cdpr path run {file}`" in done.stderr
 
 
 def test_options_place_the_path_of_a_file(file):
