@@ -243,7 +243,7 @@ def test_hold_and_stop_work_while_all_interfaces_are_flooded(tmp_path: Path) -> 
             until(lambda: _refused(daemon) > refused + 100)
             for _ in range(3):
                 held = cdpr("hold", *daemon.at)
-                assert held.stdout == "active\n" or "state ready" in held.stderr, held.stderr
+                assert held.stdout.startswith("active\n") or "state ready" in held.stderr
             done = cdpr("stop", *daemon.at)
             assert (done.returncode, done.stdout) == (0, "stopped, power off\n"), done.stderr
         assert daemon.process.wait(PATIENCE_S) == 0

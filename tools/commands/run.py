@@ -393,6 +393,8 @@ def _report_ready(report: dict[str, Any], out: Output) -> None:
         + (f": {report['reason']}" if report["reason"] else "")
     )
     out.say(f"socket {report['socket']}; Ctrl-C ends it")
+    if report["state"] == "ready":
+        out.say("next: `cdpr enable` in a second terminal")
 
 
 def _ended(reason: str, status: int) -> CommandError:
