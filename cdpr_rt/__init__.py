@@ -33,7 +33,7 @@ if TYPE_CHECKING:
         Robot,
     )
     from cdpr_tools.client.daemon_robot import connect, run
-    from cdpr_tools.lockstep_robot import simulate
+    from cdpr_tools.simulate import simulate
 
 __all__ = [
     "AlreadyRunning",
@@ -65,7 +65,7 @@ _HOMES = {
     "load": "cdpr_rt.offline",
     "Program": "cdpr_rt.programs.own_program",
     "run": "cdpr_tools.client.daemon_robot",
-    "simulate": "cdpr_tools.lockstep_robot",
+    "simulate": "cdpr_tools.simulate",
     "State": "cdpr_rt.platform.own_controller",
     "Target": "cdpr_rt.platform.own_controller",
     "TensionDistribution": "cdpr_rt.model.own_distribution",

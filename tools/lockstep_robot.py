@@ -1,4 +1,4 @@
-"""`cdpr_rt.simulate`: a robot on simulated drives in this process, cycle by cycle in bus time.
+"""A robot on simulated drives, run by this process cycle by cycle in bus time.
 
 The loop, its programs, its supervisor and the bus are those of `cdpr run`. Only leases and streams
 use bus time as their clock, so that minutes of motion pass as fast as the machine computes them.
@@ -8,13 +8,11 @@ from __future__ import annotations
 
 import os
 import signal
-import tempfile
 import threading
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import replace
-from itertools import count
 from pathlib import Path
 from types import FrameType
 from typing import TYPE_CHECKING, Any, Final, Self
@@ -27,27 +25,17 @@ from cdpr_drivers.robot.machine import RobotMachine
 from cdpr_profiles import load_robot
 from cdpr_profiles.calibration_in_force import calibrated
 from cdpr_profiles.errors import ProfileError
-from cdpr_profiles.platform import NO_PLATFORM
-from cdpr_rt.code_loader import CodeError
 from cdpr_rt.core.clock import Clock
 from cdpr_rt.core.cycle_row import Row
 from cdpr_rt.core.shared_block import RowReader, SharedBlock
 from cdpr_rt.core.states import LoopState
 from cdpr_rt.errors import ControlError
-from cdpr_rt.loop.engine import LoopParts
 from cdpr_rt.loop.loop import ControlLoop
 from cdpr_rt.loop.realtime import one_core
 from cdpr_rt.loop.right import PublishedRight
-from cdpr_rt.model.own_distribution import (
-    TensionDistribution,
-    checked_distribution,
-    require_code_allowed,
-)
 from cdpr_rt.model.robot_arrays import limits_of
-from cdpr_rt.platform.own_controller import Controller
-from cdpr_rt.programs.own_program import Program
 from cdpr_rt.refusal import CommandRefusal
-from cdpr_rt.robot import Error, InvalidArgument, InvalidRobot, NotRunning, Refused, Robot
+from cdpr_rt.robot import Error, InvalidArgument, NotRunning, Refused
 from cdpr_rt.service.lease import Lease, LeaseError
 from cdpr_rt.service.rows import cycle_figures
 from cdpr_rt.service.setpoint_stream import Address, StreamSessionManager
@@ -61,7 +49,7 @@ from cdpr_rt.service.stream_packet import (
 from cdpr_tools.composition.fault_injection import writes_of
 from cdpr_tools.composition.loop_parts import control_loop, loop_parts
 from cdpr_tools.composition.own_code import OwnCode
-from cdpr_tools.composition.simulator import OwnLoadCells, OwnSimulator
+from cdpr_tools.composition.simulator import LockstepSimulator, OwnLoadCells
 from cdpr_tools.errors import BadInputError, CommandError
 from cdpr_tools.recordings.pose_log import PoseLogTail
 
@@ -184,50 +172,8 @@ class StreamSender:
 
 
 RING_S: Final = 30.0
-_LOG_S: Final = 300.0
 _REPLY_S: Final = 120.0
 _LOOK_CYCLES: Final = 512
-_names = count()
-
-
-def simulate(
-    robot: str | Path,
-    *,
-    plant: str | Path | None = None,
-    controller: Controller | None = None,
-    tension_distribution: TensionDistribution | None = None,
-    programs: Sequence[Program] = (),
-    allow_code: bool = False,
-) -> Robot:
-    """Return a robot on simulated drives in this process, ready and without power.
-
-    `robot` is the name or file of a robot, `plant` a file with the deviations of the simulated
-    machine from it. `controller` replaces the built-in controller of the platform,
-    `tension_distribution` the tension distribution that the robot's file names. `programs` are
-    further programs for `Robot.run`. If the robot's file names code, `allow_code` allows it from
-    now on. Bus time passes only while a method waits, as fast as this machine computes: the same
-    script gives the same rows. Use the handle from one thread. Closing it removes the power. Raises
-    InvalidRobot, and Error if the drives do not get ready.
-    """
-    plant_file = None if plant is None else Path(plant)
-    try:
-        if tension_distribution is not None:
-            checked_distribution("tension_distribution", tension_distribution)
-        named = [(f"programs[{i}]", program) for i, program in enumerate(programs)]
-        own = OwnCode(controller, tension_distribution, named)
-        made = LockstepRobot(robot, plant=plant_file, own=own, ring_s=_LOG_S, pinned=False)
-        for name, given in vars(own).items():
-            if given and made.robot.platform is None:
-                raise InvalidArgument(f"{name}: {robot} {NO_PLATFORM}")
-        if allow_code:
-            require_code_allowed(made.robot, allow_code=True)
-        return Robot(made.__enter__())
-    except (ProfileError, BadInputError) as error:
-        raise InvalidRobot(str(error)) from error
-    except CodeError as error:
-        raise InvalidArgument(str(error)) from error
-    except (CommandError, DriverError, ControlError) as error:
-        raise Error(str(error)) from error
 
 
 class LockstepRobot:
@@ -244,9 +190,10 @@ class LockstepRobot:
     `calibration_in_doubt` limits are those of a robot without one.
     `scanner` is the file in which a simulated external scanner logs the poses it measures,
     `camera` the socket of a simulated camera on the platform. Rows of the last `ring_s` are kept.
-    If `pinned`, the simulator and all of this process share one core. The right to move is held
-    from the beginning, see `right`. Raises CommandError, DriverError and ProfileError as `cdpr
-    run` does, Error if the robot does not get ready.
+    If `pinned`, the simulator and all of this process share one core. `simulator` is one that has
+    been started with these arguments; it belongs to this robot from `__enter__` on. The right to
+    move is held from the beginning, see `right`. Raises CommandError, DriverError and ProfileError
+    as `cdpr run` does, Error if the robot does not get ready.
     """
 
     look_s = 0.02
@@ -268,6 +215,7 @@ class LockstepRobot:
         camera: Path | None = None,
         ring_s: float = RING_S,
         pinned: bool = True,
+        simulator: LockstepSimulator | None = None,
     ) -> None:
         loaded = load_robot(robot)
         self.robot = with_commissioned(
@@ -280,7 +228,7 @@ class LockstepRobot:
         self._plant, self._truth_path, self._record = plant, truth_log, record
         self._scanner, self._camera, self._learns = scanner, camera, learns
         self._ring_s, self._pinned = ring_s, pinned
-        self._own = own
+        self._own, self._simulator = own, simulator
         self._limits = limits_of(self.robot, calibration_in_doubt=calibration_in_doubt)
         self._stack = ExitStack()
         self._turns = self._status_seen = self._began = 0
@@ -312,45 +260,24 @@ class LockstepRobot:
         self._closed = True
         self._stack.close()
 
-    def _parts(self) -> LoopParts:
-        return loop_parts(
-            self.robot,
-            self._limits,
-            self.block,
-            learns=self._learns,
-            own=self._own,
-        )
-
     def _start(self, stack: ExitStack) -> None:
-        robot, n = self.robot, len(self.robot.axes)
-        bus = f"simbus:trial-{os.getpid()}-{next(_names)}"
-        folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="cdpr-trial-")))
-        self.folder = folder
-        if self._truth_path is None and robot.platform is not None:
-            self._truth_path = folder / "truth.log"
-        board = None if robot.tension_sensors is None else folder / "board"
-        self.block = block = SharedBlock.create(n, self._ring_s, 1.0 / self.period_s)
-        stack.callback(os.close, block.fd)
-        limits, made = self._limits, list[LoopParts]()
-        simulator = OwnSimulator(
-            self._reference,
-            bus,
-            self._plant,
-            self._truth_path,
-            board=board,
-            scanner=self._scanner,
-            camera=self._camera,
-            meanwhile=lambda: made.append(self._parts()),
+        robot, limits, port = self.robot, self._limits, None
+        self.simulator = simulator = self._simulator or LockstepSimulator(
+            *(robot, self._reference, self._plant, self._truth_path, self._scanner, self._camera)
         )
         stack.callback(simulator.stop)
-        self.simulator, port, parts = simulator, None, made[0]
-        if board is not None:
-            self.cells = OwnLoadCells(str(robot.tension_sensors), board)
+        self.folder, self._truth_path = simulator.folder, simulator.truth_log
+        self.block = block = SharedBlock.create(len(robot.axes), self._ring_s, 1.0 / self.period_s)
+        stack.callback(os.close, block.fd)
+        parts = loop_parts(robot, limits, block, learns=self._learns, own=self._own)
+        simulator.await_ready()
+        if simulator.board is not None:
+            self.cells = OwnLoadCells(str(robot.tension_sensors), simulator.board)
             stack.callback(self.cells.stop)
             port = self.cells.port
         block.counters["start_monotonic_ns"] = time.monotonic_ns()
         block.counters["start_realtime_ns"] = time.time_ns()
-        self.machine = RobotMachine(robot, [bus], tension_port=port, limits=limits)
+        self.machine = RobotMachine(robot, [simulator.bus], tension_port=port, limits=limits)
         stack.callback(self.machine.clock.close)
         stack.callback(self.machine.close)
         # doubts about the calibration of a real robot do not concern a simulated one

@@ -10,8 +10,12 @@ import time
 from collections.abc import Callable
 from itertools import count
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import IO
 
+from typing_extensions import override
+
+from cdpr_profiles.robot import Robot
 from cdpr_tools.compiling import NOTICE, pass_on
 from cdpr_tools.errors import BadInputError, WorkFailedError
 from cdpr_tools.processes import end_by_stdin, module_command
@@ -21,16 +25,18 @@ _START_TIMEOUT_S = 600.0
 # a process that is only delayed still completes its logs
 _STOP_TIMEOUT_S = 60.0
 
-_numbers = count(1)
+_numbers, _trials = count(1), count()
 
 
 class _OwnProcess:
     """A command of this package that ends when its standard input closes, so also when we die."""
 
-    def __init__(self, *command: str, meanwhile: Callable[[], None] | None = None) -> None:
-        """Run it and wait until it is ready; raises its BadInputError and WorkFailedError.
+    def __init__(
+        self, *command: str, meanwhile: Callable[[], None] | None = None, waits: bool = True
+    ) -> None:
+        """Run it and, if it `waits`, wait until it is ready, see `await_ready`.
 
-        When ready, it prints one line of JSON with `ready`. `meanwhile` is called while it starts.
+        `meanwhile` is called while it starts.
         """
         self.process = subprocess.Popen(
             module_command("cdpr_tools.cli", *command, "--exit-with-stdin"),
@@ -42,12 +48,17 @@ class _OwnProcess:
         try:
             if meanwhile is not None:
                 meanwhile()
-            self.ready = self._await_ready()
+            if waits:
+                self.ready = self.await_ready()
         except BaseException:
             self.stop()
             raise
 
-    def _await_ready(self) -> str:
+    def await_ready(self) -> str:
+        """Wait for the line of JSON with `ready` that it prints, and return it.
+
+        Raises the BadInputError or WorkFailedError with which it ends instead.
+        """
         out, errors = self._pipe(self.process.stdout), self._pipe(self.process.stderr)
         deadline, output = time.monotonic() + _START_TIMEOUT_S, ""
         heard = [out, errors]
@@ -114,6 +125,7 @@ class OwnSimulator(_OwnProcess):
         scanner: Path | None = None,
         camera: Path | None = None,
         meanwhile: Callable[[], None] | None = None,
+        waits: bool = True,
     ) -> None:
         command = ["sim", "up", winch, "--bus", bus, "--paced" if paced else "--lockstep"]
         command += ["--nodes", str(nodes)]
@@ -131,7 +143,46 @@ class OwnSimulator(_OwnProcess):
             if path is not None:
                 command += [option, str(path)]
         self.bus = bus
-        super().__init__(*command, meanwhile=meanwhile)
+        super().__init__(*command, meanwhile=meanwhile, waits=waits)
+
+
+class LockstepSimulator(OwnSimulator):
+    """A simulator of `robot` in lockstep, on a separate bus, with a folder for its files.
+
+    It has started, but is ready only after `await_ready`.
+    `reference` is the name or file of the robot. The true pose of a platform is logged to
+    `truth_log`, by default to a file in the folder.
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        reference: str,
+        plant: Path | None,
+        truth_log: Path | None = None,
+        scanner: Path | None = None,
+        camera: Path | None = None,
+    ) -> None:
+        self._temporary = TemporaryDirectory(prefix="cdpr-trial-")
+        self.folder = Path(self._temporary.name)
+        """For temporary files, removed at the end."""
+        if truth_log is None and robot.platform is not None:
+            truth_log = self.folder / "truth.log"
+        self.truth_log = truth_log
+        self.board = None if robot.tension_sensors is None else self.folder / "board"
+        super().__init__(
+            *(reference, f"simbus:trial-{os.getpid()}-{next(_trials)}", plant, truth_log),
+            board=self.board,
+            scanner=scanner,
+            camera=camera,
+            waits=False,
+        )
+
+    @override
+    def stop(self) -> None:
+        """End it, and remove its folder."""
+        super().stop()
+        self._temporary.cleanup()
 
 
 class OwnCamera(_OwnProcess):

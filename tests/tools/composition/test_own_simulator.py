@@ -22,10 +22,10 @@ def test_work_is_done_while_the_simulator_starts() -> None:
 
     class Noted(OwnSimulator):
         @override
-        def _await_ready(self) -> str:
+        def await_ready(self) -> str:
             assert self.process.poll() is None
             done.append("waiting")
-            return super()._await_ready()
+            return super().await_ready()
 
     bus = f"simbus:{unique()}"
     Noted("winch-mpp0923d", bus, meanwhile=lambda: done.append("work")).stop()

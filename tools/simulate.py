@@ -1,0 +1,80 @@
+"""`cdpr_rt.simulate`: a robot on simulated drives for a script.
+
+The simulator starts before this process loads the controller, so that both load at the same time.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from contextlib import ExitStack
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
+
+from cdpr_drivers.errors import DriverError
+from cdpr_profiles import load_robot
+from cdpr_profiles.errors import ProfileError
+from cdpr_profiles.platform import NO_PLATFORM
+from cdpr_rt.code_loader import CodeError
+from cdpr_rt.errors import ControlError
+from cdpr_rt.robot import Error, InvalidArgument, InvalidRobot, Robot
+from cdpr_tools.composition.simulator import LockstepSimulator
+from cdpr_tools.errors import BadInputError, CommandError
+
+if TYPE_CHECKING:
+    from cdpr_rt.model.own_distribution import TensionDistribution
+    from cdpr_rt.platform.own_controller import Controller
+    from cdpr_rt.programs.own_program import Program
+
+_LOG_S: Final = 300.0
+
+
+def simulate(
+    robot: str | Path,
+    *,
+    plant: str | Path | None = None,
+    controller: Controller | None = None,
+    tension_distribution: TensionDistribution | None = None,
+    programs: Sequence[Program] = (),
+    allow_code: bool = False,
+) -> Robot:
+    """Return a robot on simulated drives in this process, ready and without power.
+
+    `robot` is the name or file of a robot, `plant` a file with the deviations of the simulated
+    machine from it. `controller` replaces the built-in controller of the platform,
+    `tension_distribution` the tension distribution that the robot's file names. `programs` are
+    further programs for `Robot.run`. If the robot's file names code, `allow_code` allows it from
+    now on. Bus time passes only while a method waits, as fast as this machine computes: the same
+    script gives the same rows. Use the handle from one thread. Closing it removes the power. Raises
+    InvalidRobot, and Error if the drives do not get ready.
+    """
+    plant_file = None if plant is None else Path(plant)
+    try:
+        with ExitStack() as stack:
+            simulator = LockstepSimulator(load_robot(robot), str(robot), plant_file)
+            stack.callback(simulator.stop)
+            # imported here, while the simulator starts: both take as long
+            from cdpr_rt.model.own_distribution import (  # noqa: PLC0415
+                checked_distribution,
+                require_code_allowed,
+            )
+            from cdpr_tools.composition.own_code import OwnCode  # noqa: PLC0415
+            from cdpr_tools.lockstep_robot import LockstepRobot  # noqa: PLC0415
+
+            if tension_distribution is not None:
+                checked_distribution("tension_distribution", tension_distribution)
+            named = [(f"programs[{i}]", program) for i, program in enumerate(programs)]
+            own = OwnCode(controller, tension_distribution, named)
+            made = LockstepRobot(robot, own=own, ring_s=_LOG_S, pinned=False, simulator=simulator)
+            for name, given in vars(own).items():
+                if given and made.robot.platform is None:
+                    raise InvalidArgument(f"{name}: {robot} {NO_PLATFORM}")
+            if allow_code:
+                require_code_allowed(made.robot, allow_code=True)
+            stack.pop_all()  # the simulator belongs to the robot now
+        return Robot(made.__enter__())
+    except (ProfileError, BadInputError) as error:
+        raise InvalidRobot(str(error)) from error
+    except CodeError as error:
+        raise InvalidArgument(str(error)) from error
+    except (CommandError, DriverError, ControlError) as error:
+        raise Error(str(error)) from error
