@@ -15,7 +15,7 @@ import time
 from collections import deque
 from collections.abc import Callable
 from collections.abc import Set as AbstractSet
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 from cdpr_sim_bus.errors import BusSetupError
 from cdpr_sim_bus.frame import (
@@ -275,6 +275,14 @@ class LocalNode(Protocol):
 
     def close(self) -> None:
         """Flush and close the node's files."""
+
+
+@runtime_checkable
+class PreparingNode(Protocol):
+    """A node that can compute in advance."""
+
+    def prepare(self, until: float) -> None:
+        """Work for `advance(until)`, which will probably be next; change nothing visible."""
 
 
 def is_acyclic(can_id: int) -> bool:

@@ -24,6 +24,7 @@ from cdpr_sim_bus.bus.client import (
     Contention,
     Listener,
     LocalNode,
+    PreparingNode,
     Route,
 )
 from cdpr_sim_bus.clock import HOLD_S, BusClock, ClockMode
@@ -282,6 +283,7 @@ class Hub:
         self._clients: dict[int, Client] = {}
         self._routes: dict[int, Route] = {}
         self._accepts = [node.accepts for node in self.nodes]
+        self.prepares = [node.prepare for node in self.nodes if isinstance(node, PreparingNode)]
         # bus time 0 switches the nodes on
         self._now_s = -1.0
         self._leftover = False
@@ -660,6 +662,14 @@ class Hub:
                 self.settle()
             if leader is source:
                 self.lead.send_time()
+                if self is self.robot_hubs[-1]:
+                    self._prepare(now_s + period_s)
+
+    def _prepare(self, until_s: float) -> None:
+        """Let the nodes of all buses work on the next period while the master works on this one."""
+        for hub in self.robot_hubs:
+            for prepare in hub.prepares:
+                prepare(until_s)
 
     # -- frames of nodes
 

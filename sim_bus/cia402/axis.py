@@ -92,6 +92,11 @@ class Axis:
         self.flags = sample[0]
         return self.flags
 
+    def prepare(self, until: float) -> None:
+        """Compute the step to `until` in advance, if that can be done."""
+        if self._robot is not None:
+            self._robot.prepare(until)
+
     def _run(self, until: float) -> MotorSample:
         if self._robot is not None:
             return self._robot.step(until)

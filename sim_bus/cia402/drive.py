@@ -412,6 +412,11 @@ class SimDrive(SlaveApplication):
         if self.fault_injection.active:
             self.fault_injection.alter_outbox(now)
 
+    def prepare(self, until: float) -> None:
+        """Compute the first step to bus time `until` in advance: the bus waits for its master."""
+        time = self.axis.time
+        self.axis.prepare(until if until - time < 1.5 * TICK_S else time + TICK_S)
+
     def receive(self, frame: bytes, now: float) -> None:
         """Process a frame seen on the bus."""
         if frame[:4] == _SYNC_ID:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cdpr_profiles.jit import jit
+from cdpr_profiles.jit import bound, jit
 from cdpr_sim_bus.robot import motor as motor_physics
 from cdpr_sim_bus.robot import servo
 from cdpr_sim_bus.robot.motor import sample_of
@@ -21,7 +21,14 @@ from cdpr_sim_bus.robot.motor_state import (
     MotorArray,
     Transmission,
 )
-from cdpr_sim_bus.robot.platform import RobotShape, build_platform, step_platform, update_cable_ends
+from cdpr_sim_bus.robot.platform import (
+    PLATFORM_DTYPE,
+    PlatformArray,
+    RobotShape,
+    build_platform,
+    step_platform,
+    update_cable_ends,
+)
 from cdpr_sim_bus.robot.robot_plant import RobotPlant
 
 # Motors, cables and platform of one robot, advanced together (compiled).
@@ -102,30 +109,72 @@ MotorCommand = Callable[[], tuple[int, float]]
 """Returns the present kind of control of a power stage, named in `servo`, and its target."""
 
 
+class _State:
+    """All that `run_together` reads and writes, in one buffer, which can be copied and compared."""
+
+    def __init__(self, n: int) -> None:
+        kinds = (MOTOR_DTYPE, n), (PLATFORM_DTYPE, 1), (np.int64, n), (np.int64, n), (np.float64, n)
+        sizes = [np.dtype(kind).itemsize * count for kind, count in kinds]
+        self.bytes: NDArray[np.uint8] = np.zeros(sum(sizes), np.uint8)
+        ends = np.cumsum(sizes)
+        self.motors: MotorArray
+        self.platform: PlatformArray
+        self.flags: NDArray[np.int64]
+        self.motors, self.platform, self.flags, self._kinds, self._targets = (
+            self.bytes[end - size : end].view(kind)
+            for (kind, _), size, end in zip(kinds, sizes, ends, strict=True)
+        )
+        self._kinds[:] = servo.OFF
+        then = 0.0, self._kinds, self._targets, self.flags
+        self._run = bound(run_together, self.motors, self.platform, then=then)
+        self._samples = [bound(sample_of, self.motors[i : i + 1], then=(0,)) for i in range(n)]
+
+    def command(self, commands: Sequence[MotorCommand]) -> None:
+        """Store the present commands of the power stages."""
+        kinds, targets = self._kinds, self._targets
+        for i, command in enumerate(commands):
+            kinds[i], targets[i] = command()
+
+    def run(self, until: float) -> None:
+        """Advance all to bus time `until`, with the stored commands."""
+        self._run(until, self._kinds, self._targets, self.flags)
+
+    def sample(self, i: int, flags: int) -> MotorSample:
+        """Return the `motor.Sample` of motor `i`."""
+        sample: MotorSample = self._samples[i](flags)
+        return sample
+
+
 class CableRobot:
     """Motors, cables and platform; each drive advances it and reads its own motor.
 
-    The first drive that requests a time advances all, with every power stage as it is then.
+    The first drive that requests a time advances all, with every power stage as it is then. While
+    the bus waits for its master, `prepare` computes the next step in advance on a copy.
     """
 
     def __init__(
         self, shape: RobotShape, plant: RobotPlant, transmissions: Sequence[Transmission]
     ) -> None:
         self.n = n = len(transmissions)
-        self.motors: MotorArray = np.zeros(n, MOTOR_DTYPE)
+        self._state = _State(n)
+        self._ahead = _State(n)
+        """Copy of the state, for the step computed in advance."""
+        self._ahead_until = self._now = 0.0
+        self._ahead_from = b""
+        """Bytes of the state before that step, with the commands."""
+        self.motors = self._state.motors
         """One record per motor, filled by `adopt`."""
-        self.kinds: NDArray[np.int64] = np.full(n, servo.OFF, np.int64)
-        self.targets: FloatArray = np.zeros(n)
-        self._flags: NDArray[np.int64] = np.zeros(n, np.int64)
+        self._flags = self._state.flags
         self._plant = plant
         self._rng = np.random.default_rng([plant.seed, 1])
         self._transmissions = list(transmissions)
         self._weights = list(shape.weights_N_m)
         self._slips = sorted(plant.cables.slips, key=lambda slip: slip.at_s)
-        self.platform = build_platform(shape, plant, n, self._rng)
+        self.platform = self._state.platform
+        self.platform[:] = build_platform(shape, plant, n, self._rng)
         self._at_start = self.platform.copy()
         # compile now, before the clock runs
-        run_together(self.motors, self.platform, 0.0, self.kinds, self.targets, self._flags)
+        self._state.run(0.0)
         self.commands: list[MotorCommand] = [lambda: (servo.OFF, 0.0)] * n
         """Returns the present command of each power stage."""
 
@@ -182,18 +231,35 @@ class CableRobot:
 
     def step(self, i: int, until: float) -> MotorSample:
         """Advance all to `until`; return the `motor.Sample` of motor `i`."""
-        now = float(self.motors["time"][i])
-        if until - now > _SAME_TIME_S:
-            for k, command in enumerate(self.commands):
-                self.kinds[k], self.targets[k] = command()
-        while until - now > _SAME_TIME_S:
-            now = min(until, now + _LONGEST_STEP_S) if until - now > 1.5e-3 else until
-            run_together(self.motors, self.platform, now, self.kinds, self.targets, self._flags)
-        while self._slips and self._slips[0].at_s <= now:
+        if until - self._now > _SAME_TIME_S:
+            self._advance(until)
+        while self._slips and self._slips[0].at_s <= self._now:
             due = self._slips.pop(0)
             self.slip(due.cable - 1, due.slip_m)
         flags, self._flags[i] = int(self._flags[i]), 0
-        return sample_of(self.motors[i : i + 1], flags)
+        return self._state.sample(i, flags)
+
+    def _advance(self, until: float) -> None:
+        state, now = self._state, self._now
+        state.command(self.commands)
+        if until == self._ahead_until and state.bytes.tobytes() == self._ahead_from:
+            state.bytes[:] = self._ahead.bytes
+            self._now = until
+            return
+        while until - now > _SAME_TIME_S:
+            now = min(until, now + _LONGEST_STEP_S) if until - now > 1.5e-3 else until
+            state.run(now)
+        self._now = now
+
+    def prepare(self, until: float) -> None:
+        """Compute the step to `until` in advance, for the case that nothing changes before it."""
+        state, ahead = self._state, self._ahead
+        if until == self._ahead_until or not _SAME_TIME_S < until - self._now <= 1.5e-3:
+            return
+        state.command(self.commands)
+        ahead.bytes[:] = state.bytes
+        self._ahead_from, self._ahead_until = ahead.bytes.tobytes(), until
+        ahead.run(until)
 
     def members(self) -> list[RobotMember]:
         """Return each motor's part in the robot."""
@@ -264,6 +330,10 @@ class RobotMember:
     def step(self, until: float) -> MotorSample:
         """See `CableRobot.step`."""
         return self.robot.step(self.number, until)
+
+    def prepare(self, until: float) -> None:
+        """See `CableRobot.prepare`."""
+        self.robot.prepare(until)
 
     def cut(self) -> None:
         """See `CableRobot.cut`."""
