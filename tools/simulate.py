@@ -19,6 +19,7 @@ from cdpr_rt.errors import ControlError
 from cdpr_rt.robot import Error, InvalidArgument, InvalidRobot, Robot
 from cdpr_tools.composition.simulator import LockstepSimulator
 from cdpr_tools.errors import BadInputError, CommandError
+from cdpr_tools.loading import without_collection
 
 if TYPE_CHECKING:
     from cdpr_rt.model.own_distribution import TensionDistribution
@@ -49,7 +50,7 @@ def simulate(
     """
     plant_file = None if plant is None else Path(plant)
     try:
-        with ExitStack() as stack:
+        with ExitStack() as stack, without_collection():
             simulator = LockstepSimulator(load_robot(robot), str(robot), plant_file)
             stack.callback(simulator.stop)
             # imported here, while the simulator starts: both take as long
@@ -71,7 +72,7 @@ def simulate(
             if allow_code:
                 require_code_allowed(made.robot, allow_code=True)
             stack.pop_all()  # the simulator belongs to the robot now
-        return Robot(made.__enter__())
+            return Robot(made.__enter__())
     except (ProfileError, BadInputError) as error:
         raise InvalidRobot(str(error)) from error
     except CodeError as error:

@@ -76,7 +76,8 @@ class Transitions:
         life.clear_reason()
         try:
             yield from self._runner.run_task(machine.prepare)
-            gc.collect()  # the collector is off in paced cycles
+            if not machine.clock.lockstep:
+                gc.collect()  # the collector is off in paced cycles
             engine.start_cycles()
             if reset:
                 yield from self._reset_faults()

@@ -7,7 +7,6 @@ progress into memory that outlives it; `keep_progress` copies that to the disk.
 
 from __future__ import annotations
 
-import asyncio
 import hashlib
 import json
 import math
@@ -74,6 +73,9 @@ async def keep_progress(folder: Path, live: NDArray[Any], *, simulated: bool = F
 
     While the disk is full, the old copy stays; the path is followed all the same.
     """
+    # imported here: only the daemon, which has loaded it, keeps progress
+    import asyncio  # noqa: PLC0415
+
     kept = b""
     try:
         while True:

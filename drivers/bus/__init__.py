@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from cdpr_drivers.bus.adapters import AdapterPort
 from cdpr_drivers.bus.frames import Filters, FrameBuffer, FramePort
 from cdpr_drivers.bus.health import BusHealth, BusState
 from cdpr_drivers.bus.simbus import open_simbus, query_status
@@ -10,7 +9,6 @@ from cdpr_drivers.bus.socketcan import open_socketcan
 from cdpr_drivers.bus.url import BusUrl
 
 __all__ = [
-    "AdapterPort",
     "BusHealth",
     "BusState",
     "BusUrl",
@@ -41,4 +39,7 @@ def open_port(
         return open_simbus(url, filters, health)
     if url.interface == "socketcan":
         return open_socketcan(url, filters, health, receive_errors=receive_errors)
+    # imported here: python-can loads slowly, and simulated buses do without
+    from cdpr_drivers.bus.adapters import AdapterPort  # noqa: PLC0415
+
     return AdapterPort(url, filters, health, receive_errors=receive_errors)

@@ -11,8 +11,6 @@ from pathlib import Path
 from typing import Self
 from urllib.parse import parse_qsl, quote
 
-import can
-
 from cdpr_drivers.errors import BusError
 
 ALLOWED = (
@@ -49,6 +47,9 @@ class BusUrl:
         options = _options(text, query)
         if interface == "simbus":
             return cls(interface, _simbus_name(text, rest, options))
+        # imported here: it loads slowly, and simulated buses do without
+        import can  # noqa: PLC0415
+
         if interface not in can.VALID_INTERFACES:
             known = ", ".join(sorted(can.VALID_INTERFACES))
             raise BusError(

@@ -186,9 +186,10 @@ class RobotMachine:
             # the supervisor must detect the silence before the device does
             device.tolerate_silence(self._missed_cycles + 1)
             unsought = self._seek_indices(device)
-            # a collection blocks every thread: collect now and exempt the remaining objects
-            gc.collect()
-            gc.freeze()
+            if not self.clock.lockstep:
+                # a collection blocks every thread: collect now and exempt the remaining objects
+                gc.collect()
+                gc.freeze()
             for network in networks.values():
                 network.start_heartbeat()
             self._stack = stack.pop_all()

@@ -26,9 +26,8 @@ from cdpr_rt.procedures.commissioning_results import (
     validation_name,
 )
 from cdpr_rt.robot import Robot
-from cdpr_tools.commands.commission import prepare
+from cdpr_tools.commands.commission import IndexOption, prepare
 from cdpr_tools.commands.options import (
-    IndexOption,
     JsonOption,
     OverwriteOption,
     RecordedWinchOption,

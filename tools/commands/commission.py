@@ -19,7 +19,6 @@ from cdpr_rt.loop.realtime import one_core
 from cdpr_rt.procedures.commissioning_results import Paths, assemble, identify
 from cdpr_rt.procedures.measurement import Index
 from cdpr_tools.commands.options import (
-    IndexOption,
     JsonOption,
     OverwriteOption,
     PlantOption,
@@ -41,6 +40,14 @@ from cdpr_tools.errors import BadInputError, WorkFailedError, os_error_as
 from cdpr_tools.output import Output, to_json
 from cdpr_tools.raw_data import discard_raw_data, keeping_raw_data, refuse_loss
 from cdpr_tools.recordings.truth import true_angle
+
+IndexOption = Annotated[
+    Index,
+    typer.Option(
+        "--index",
+        help="Find the encoder index by homing, or by touch probe during a normal motion.",
+    ),
+]
 
 _TURNS = "turns the motor for about 20 minutes"
 

@@ -13,7 +13,6 @@ from typing import Annotated, Any
 import typer
 
 from cdpr_profiles.bounded_input import may_replace
-from cdpr_rt.procedures.measurement import Index
 from cdpr_tools.command_group import ROBOT_VARIABLE
 from cdpr_tools.errors import BadInputError
 from cdpr_tools.report.save import OWN_MARK
@@ -155,14 +154,6 @@ AllowCodeOption = Annotated[
 ]
 YesOption = Annotated[
     bool, typer.Option("--yes", help="Do not ask before a real motor is energised.")
-]
-
-IndexOption = Annotated[
-    Index,
-    typer.Option(
-        "--index",
-        help="Find the encoder index by homing, or by touch probe during a normal motion.",
-    ),
 ]
 
 SafetyIoOption = Annotated[

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from cdpr_drivers.bus import AdapterPort
+from cdpr_drivers.bus.adapters import AdapterPort
 from cdpr_drivers.canopen import network
 from cdpr_drivers.cia402 import Mode, State, state_of
 from tests.drivers.axis_rig import DRIVE, Rig, open_network
