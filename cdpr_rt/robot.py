@@ -84,6 +84,9 @@ class Backend(Protocol):
     def status(self) -> dict[str, Any]:
         """Return the present status as `GET /status` does."""
 
+    def brief_status(self) -> Mapping[str, Any]:
+        """Return the present status, at least state, program and its progress; called often."""
+
     def wait(self, seconds: float) -> None:
         """Let time of the robot pass, s."""
 
@@ -611,13 +614,14 @@ class Robot:
             raise MotionEnded(f"{program}: {progress['trouble']}")
         return progress
 
-    def _look(self) -> dict[str, Any]:
+    def _look(self) -> Mapping[str, Any]:
+        if self.on_status is None:
+            return self._backend.brief_status()
         status = self.status
-        if self.on_status is not None:
-            self.on_status(status)
+        self.on_status(status)
         return status
 
-    def _require_power(self, powered: bool, status: dict[str, Any]) -> None:
+    def _require_power(self, powered: bool, status: Mapping[str, Any]) -> None:
         if powered and (status["state"] != "active" or status["reacting"] != "none"):
             raise self._fault(status)
 
@@ -629,7 +633,7 @@ class Robot:
             waited_s += self._backend.look_s
             self._running(program)
 
-    def _fault(self, status: dict[str, Any]) -> Error:
+    def _fault(self, status: Mapping[str, Any]) -> Error:
         """Return the error of a robot that has lost its power, after its reaction has ended."""
         self._started = ""
         most_s = _REACTION_S + float(self.description.get("lowering_s", 0.0))
@@ -640,6 +644,7 @@ class Robot:
             self._backend.wait(_RENEW_S)
             waited_s += _RENEW_S
             status = self._look()
+        status = self.status
         if status["state"] == "ready":
             return MotionEnded(f"the power was removed: {status['reason'] or 'by a command'}")
         details = status.get("reason_limit") or {}

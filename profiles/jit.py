@@ -18,7 +18,7 @@ from typing import Any, TypeVar, cast
 
 import numba
 import numpy as np
-from numba.core import config, event, types
+from numba.core import codegen, config, event, types
 from numba.core.caching import (
     CompileResultCacheImpl,
     FunctionCache,
@@ -26,6 +26,7 @@ from numba.core.caching import (
     InTreeCacheLocator,
     UserProvidedCacheLocator,
 )
+from numba.core.compiler import CompileResult
 from numba.core.dispatcher import Dispatcher
 from typing_extensions import override
 
@@ -41,6 +42,7 @@ _LAYOUT = "kernels-1"
 """Folder of machine code; it changes with the naming scheme of its files."""
 _UNWRITABLE = "neither the program's folder nor the user's cache can be written"
 _SETTINGS: Any = config
+_BITCODE: Any = cast(Any, codegen).ll
 _NJIT: Any = numba.njit  # its types do not include all of its options
 _F = TypeVar("_F", bound=Callable[..., Any])
 
@@ -278,6 +280,38 @@ def _keep_by_content(kernel: Any) -> None:
             type(kept).save_overload(kept, *given)
 
     kept.open, kept.load_overload, kept.save_overload = open_cache, load, save
+    kept._impl.rebuild = _rebuild
+
+
+def _rebuild(target_context: Any, payload: Any) -> Any:
+    """Return the compile result of a cached kernel; parse its bitcode only if it is needed.
+
+    numba parses the bitcode of each kernel when it loads it, which takes twice as long as all the
+    rest. Only a kernel that is compiled later, and calls this one, needs it.
+    """
+    (name, kind, (machine_code, bitcode)), described, *others = payload
+    engine = target_context.codegen()._engine
+    engine._defined_symbols |= {described.llvm_func_name, described.llvm_cpython_wrapper_name}
+    library_data = name, kind, (machine_code, _empty_bitcode())
+    rebuild: Callable[..., Any] = CompileResult._rebuild
+    result = rebuild(target_context, library_data, described, *others)
+    library = result.library
+    library._shared_module = None
+
+    def module_for_linking() -> Any:
+        if library._shared_module is None:
+            library._shared_module = _BITCODE.parse_bitcode(bitcode)
+            engine._load_defined_symbols(library._shared_module)
+        return library._shared_module
+
+    library._get_module_for_linking = module_for_linking
+    return result
+
+
+@cache
+def _empty_bitcode() -> bytes:
+    empty: bytes = _BITCODE.parse_assembly("").as_bitcode()
+    return empty
 
 
 def _content(kernel: Any) -> str:

@@ -330,7 +330,8 @@ class LockstepRobot:
     @property
     def now_ns(self) -> int:
         """The same in ns."""
-        return round(self.now_s * 1e9)
+        device = self.machine.device  # not by `now_s`: it is read several times a cycle
+        return 0 if device is None else round(device.feedback.cycle * self.period_s * 1e9)
 
     def turn(self, turns: int = 1) -> None:
         """Run `turns` cycles."""
@@ -502,6 +503,11 @@ class LockstepRobot:
         self._require_open()
         self.loop.status.publish()
         return self.block.status() | cycle_figures(self.block, self.description)
+
+    def brief_status(self) -> dict[str, Any]:
+        """Return the status without the newest cycle, and publish nothing."""
+        self._require_open()
+        return self.loop.status.present()
 
     def state_text(self) -> str:
         """Return state, program and reason, for messages."""

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from cdpr_rt.arrays import BoolArray, FloatArray
 from cdpr_rt.core.exchange import AxisFeedback
-from cdpr_rt.jit import jit
+from cdpr_rt.jit import bound, bound_to, jit
 
 BANDWIDTH_rad_s = 100.0
 FILTER_S = 0.005
@@ -34,10 +36,8 @@ def control_speed(
     low: FloatArray,
     high: FloatArray,
     paying_out: FloatArray,
-    fastest_in: float,
     cable: FloatArray,
     gain: FloatArray,
-    integral_rate: float,
     left: FloatArray,
     push: FloatArray,
     position: FloatArray,
@@ -47,6 +47,8 @@ def control_speed(
     integral: FloatArray,
     tension: FloatArray,
     torque: FloatArray,
+    fastest_in: float,
+    integral_rate: float,
 ) -> None:
     """Write tensions and torques of a cycle; arrays are those of `WinchSpeedLoop`, (n,)."""
     for i in range(position.size):
@@ -115,6 +117,7 @@ class WinchSpeedLoop:
         """Filtered motor speed."""
         self._last, self._jumped = np.zeros(n), np.zeros(n, np.bool_)
         self._integral = np.zeros(n)
+        self._kernel = bound_to(self._bind)
 
     def begin(self, feedback: AxisFeedback, speed_rad_s: FloatArray, torque_Nm: FloatArray) -> None:
         """Begin with the last cycle's torques at the motors' present speeds, (n,) each."""
@@ -124,9 +127,15 @@ class WinchSpeedLoop:
 
     def update(self, feedback: AxisFeedback, torque_Nm: FloatArray) -> None:
         """Write the torques of this cycle."""
-        control_speed(
-            self._period_s, self._weight, self.low_N, self.high_N, self.paying_out_m_s,
-            self.fastest_in_m_s, self._cable, self._gain, self.integral_rate_1_s, self.left_m,
-            self.push_N, feedback.position_rad, self._last, self._jumped, self.speed_rad_s,
-            self._integral, self.tension_N, torque_Nm,
+        control = self._kernel(feedback, torque_Nm)
+        control(self.fastest_in_m_s, self.integral_rate_1_s)
+
+    def _bind(
+        self, feedback: AxisFeedback, torque_Nm: FloatArray
+    ) -> Callable[[float, float], None]:
+        return bound(
+            control_speed, self._period_s, self._weight, self.low_N, self.high_N,
+            self.paying_out_m_s, self._cable, self._gain, self.left_m, self.push_N,
+            feedback.position_rad, self._last, self._jumped, self.speed_rad_s, self._integral,
+            self.tension_N, torque_Nm, then=(0.0, 0.0),
         )  # fmt: skip

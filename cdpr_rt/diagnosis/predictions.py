@@ -133,9 +133,9 @@ def fall(
                 integral[i] = -max(winches[i].weight_N, winches[i].low_N)
         if cycle >= c.held_cycles:
             control_speed(
-                c.period_s, weight, low, winches["high_N"], out, c.fastest_in_m_s,
-                as_cable, winches["gain_N_s_m"], c.integral_rate_1_s, left, winches["push_N"],
-                length, last, jumped, speed, integral, pull, torque,
+                c.period_s, weight, low, winches["high_N"], out, as_cable, winches["gain_N_s_m"],
+                left, winches["push_N"], length, last, jumped, speed, integral, pull, torque,
+                c.fastest_in_m_s, c.integral_rate_1_s,
             )  # fmt: skip
         if c.dead >= 0:
             pull[c.dead] = 0.0

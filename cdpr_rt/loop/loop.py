@@ -84,7 +84,7 @@ class StatusPage:
 
     def publish(self) -> None:
         """Write the status if it differs from the last one."""
-        status = self._status()
+        status = self.present()
         if status == self._written:
             return
         try:
@@ -126,7 +126,8 @@ class StatusPage:
         elif name not in _AFTERWARDS:
             self._failure = ""
 
-    def _status(self) -> dict[str, Any]:
+    def present(self) -> dict[str, Any]:
+        """Return the present status."""
         engine, life = self._engine, self._life
         progress = self._progress()
         self._note_failure(progress)

@@ -315,8 +315,10 @@ def serve_fleet(
             )
             for bus in buses
         }
-        fleet = Fleet(list(hubs.values()))
-        stack.callback(fleet.close)
+        loop: Loop = hubs[buses[0].name]
+        if len(hubs) > 1:
+            loop = fleet = Fleet(list(hubs.values()))
+            stack.callback(fleet.close)
         report = {bus.name: {"bus": bus.url, **hubs[bus.name].status()} for bus in buses}
         ready = {"robot": robot, "pid": os.getpid(), "buses": report}
-        run_until_stopped(fleet, ready, mode, until_stdin_ends)
+        run_until_stopped(loop, ready, mode, until_stdin_ends)

@@ -281,6 +281,10 @@ class _Remote:
         except CommandError as error:
             raise Error(str(error)) from error
 
+    def brief_status(self) -> dict[str, Any]:
+        """See `Backend.brief_status`."""
+        return self.status()
+
     def status(self) -> dict[str, Any]:
         self._looked_s = time.monotonic()
         with self._errors():
