@@ -337,10 +337,10 @@ class LockstepRobot:
         """Run `turns` cycles."""
         loop, right, stream, recorder = self.loop, self.right, self.stream, self.recorder
         status = self.block.counters["status"]
-        for _ in range(turns):
+        for left in range(turns - 1, -1, -1):
             right.look()
             stream.look()
-            loop.turn()
+            loop.turn(another_follows=left > 0)
             self._turns += 1
             if recorder is not None and (
                 self._turns % _LOOK_CYCLES == 0 or status[0] != self._status_seen

@@ -241,6 +241,11 @@ class Clock(ABC):
         finally:
             self._running = running
 
+    @property
+    def has_tasks(self) -> bool:
+        """Whether tasks have been started and have not ended."""
+        return bool(self._tasks)
+
     def run_tasks(self) -> None:
         """Run every task that can continue, without waiting; for one call per cycle."""
         now_s = self.now_s

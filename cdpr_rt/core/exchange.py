@@ -89,6 +89,12 @@ class AxisDevice(Protocol):
     def transmit(self) -> None:
         """Encode `command` and send it, to act from the next SYNC on."""
 
+    def sync_ahead(self) -> None:
+        """Send the next cycle's SYNC after `transmit`: the drives work while the row is written.
+
+        Only in lockstep, and only if nothing else is sent before that cycle's `sync`.
+        """
+
     def faults(self) -> Sequence[Fault]:
         """Return why the drives must not run any longer, one fault for each failed axis.
 

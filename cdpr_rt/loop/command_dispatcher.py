@@ -87,6 +87,15 @@ class CommandDispatcher:
             "shutdown": self._shutdown,
         }
 
+    @property
+    def waiting(self) -> bool:
+        """Whether a command waits in the block, or one is deferred."""
+        return (
+            self._deferred is not None
+            or self._commands[0] != self._commands_taken[0]
+            or self._urgent[0] != self._urgent_taken[0]
+        )
+
     def poll(self) -> None:
         """Take one stop from each source, then one command if there is any, or a deferred one."""
         if self._deferred is not None and self._is_superseded(self._deferred):

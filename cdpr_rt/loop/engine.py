@@ -383,8 +383,12 @@ class Engine:
         cycle = self.cycle
         return max(1, round(seconds / (cycle.device.period_s if cycle else TURN_S)))
 
-    def run_cycle(self, judge: Judge) -> None:
-        """Exchange with the axes, run the program, supervise its torque, send and record it."""
+    def run_cycle(self, judge: Judge, is_quiet: Callable[[], bool] | None = None) -> None:
+        """Exchange with the axes, run the program, supervise its torque, send and record it.
+
+        In lockstep, `is_quiet` returns whether nothing else is sent before the next cycle, which
+        follows immediately: its SYNC then goes out now.
+        """
         cycle, machine = self.cycle, self.machine
         assert cycle is not None  # cycles run
         device = cycle.device
@@ -424,6 +428,8 @@ class Engine:
             torque[:] = 0.0  # the process was stopped, and its drives gave up meanwhile
         try:
             cycle.transmit()
+            if is_quiet is not None and is_quiet():
+                device.sync_ahead()
         except machine.failures as error:
             self.lost_bus = Fault(Limit.DRIVE, code=BUS_LOST, detail=str(error))
         sent_ns = time.monotonic_ns()

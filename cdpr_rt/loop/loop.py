@@ -227,12 +227,16 @@ class ControlLoop:
             self.engine.machine.close()
             self.status.publish()
 
-    def turn(self) -> None:
-        """Run one cycle, or sleep; then stop requests, commands, transition, status and replies."""
+    def turn(self, another_follows: bool = False) -> None:
+        """Run one cycle, or sleep; then stop requests, commands, transition, status and replies.
+
+        In lockstep, a caller that does nothing between this turn and the next tells it with
+        `another_follows`, so that the simulator computes meanwhile.
+        """
         self._alive[0] = time.monotonic_ns()
         engine = self.engine
         if engine.cycling:
-            engine.run_cycle(self._judge)
+            engine.run_cycle(self._judge, self._is_quiet if another_follows else None)
             engine.machine.clock.run_tasks()
         else:
             engine.machine.clock.sleep(TURN_S)
@@ -247,6 +251,16 @@ class ControlLoop:
             self.safe_stop.remove_power(mistake)
         self.status.update()
         self._commands.send_replies()
+
+    def _is_quiet(self) -> bool:
+        """Whether the rest of the turn sends nothing: no command, transition or transfer is due."""
+        requested = self._power_off_requested or self._stop_requested
+        return not (
+            requested
+            or self.runner.busy
+            or self._commands.waiting
+            or self.engine.machine.clock.has_tasks
+        )
 
     def request_stop(self) -> None:
         """End the loop under control. For signal handlers."""

@@ -131,6 +131,11 @@ class AxisBuses:
             except BusError as error:
                 self._mark_failed(i, error)
 
+    def sync_ahead(self) -> None:
+        """Send the SYNC of the next cycle now, see `AxisGroup.sync_ahead`."""
+        for group in self.groups:
+            group.sync_ahead()
+
     def receive(self) -> int:
         """Wait for the answers on all buses and decode them; return how many axes answered."""
         if self._single_group is not None and self.lockstep:

@@ -225,6 +225,8 @@ class AxisGroup:
         self._faults: tuple[Fault, ...] = ()
         self._faults_bits: Ints = np.zeros(self.n, np.int64)
         """Alarm bits from which `_faults` was made."""
+        self._synced_ahead = False
+        """Whether the SYNC of the next cycle has been sent."""
         self._alarm: Fault | None = None
         self._alarm_faults: tuple[Fault, ...] = ()
         """Faults made from `_alarm`, an alarm of the network."""
@@ -260,6 +262,20 @@ class AxisGroup:
         self._valid.fill(False)
         self._seen.fill(0)
         self._missing = self.n
+        if self._synced_ahead:
+            self._synced_ahead = False
+        else:
+            self._send_sync()
+
+    def sync_ahead(self) -> None:
+        """Send the SYNC of the next cycle now, for a caller that sends nothing else before it.
+
+        Only in a cycle, on a bus whose time this process leads: the answers wait.
+        """
+        self._send_sync()
+        self._synced_ahead = True
+
+    def _send_sync(self) -> None:
         try:
             self._port.send(self._sync_frame)
         except OSError as error:

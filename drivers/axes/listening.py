@@ -156,6 +156,9 @@ class ListeningDevice:
             for monitor in ahead:
                 monitor.skip_cycle()
 
+    def sync_ahead(self) -> None:
+        """Send nothing: the SYNC is the other master's."""
+
     def transmit(self) -> None:
         """Send nothing, regardless of `command`."""
         self.command.sent_torque_Nm.fill(0.0)
