@@ -18,7 +18,7 @@ from typing import Any, TypeVar, cast
 
 import numba
 import numpy as np
-from numba.core import codegen, config, event, types
+from numba.core import codegen, config, event, runtime, types
 from numba.core.caching import (
     CompileResultCacheImpl,
     FunctionCache,
@@ -42,6 +42,7 @@ _LAYOUT = "kernels-1"
 """Folder of machine code; it changes with the naming scheme of its files."""
 _UNWRITABLE = "neither the program's folder nor the user's cache can be written"
 _SETTINGS: Any = config
+_RUNTIME: Any = cast(Any, runtime).rtsys
 _BITCODE: Any = cast(Any, codegen).ll
 _NJIT: Any = numba.njit  # its types do not include all of its options
 _F = TypeVar("_F", bound=Callable[..., Any])
@@ -62,14 +63,12 @@ def _skip_blas() -> None:
             del sys.modules[blas]
 
 
-_skip_blas()
-
-
 class _CompileListener(event.Listener):
     """Logs kernels that are compiled because no machine code is cached."""
 
     @override
     def on_start(self, event: Any) -> None:
+        _skip_blas()
         if event.data["dispatcher"].stats.cache_path is not None:
             COMPILING.info("%s", event.data["dispatcher"].__name__)
 
@@ -268,10 +267,12 @@ def _keep_by_content(kernel: Any) -> None:
             digest,
         )
 
-    def load(*given: Any) -> Any:
+    def load(signature: Any, target_context: Any) -> Any:
         open_cache()
+        # numba first loads all that compiling needs, for 0.1 s; machine code needs only this
+        _RUNTIME.initialize(target_context)
         with suppress(OSError):
-            return type(kept).load_overload(kept, *given)
+            return kept._load_overload(signature, target_context)
         return None
 
     def save(*given: Any) -> None:
