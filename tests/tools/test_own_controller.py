@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 import cdpr_rt as cdpr
-from cdpr_profiles.places import SHIPPED
 
 
 class PoseController(cdpr.Controller):
@@ -36,18 +35,9 @@ class PoseController(cdpr.Controller):
         return tensions
 
 
-@pytest.fixture(scope="module")
-def robot_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Write the shipped robot with a quarter of the cycle rate, which takes less time."""
-    path = tmp_path_factory.mktemp("robot") / "planar-3.toml"
-    shipped = (SHIPPED / "robots" / "planar-3.toml").read_text()
-    path.write_text(shipped.replace("sync_period_s = 0.001", "sync_period_s = 0.004"))
-    return path
-
-
-def test_a_numpy_controller_moves_the_platform(robot_file: Path) -> None:
+def test_a_numpy_controller_moves_the_platform(planar_file: Path) -> None:
     mine = PoseController()
-    with cdpr.simulate(robot_file, controller=mine) as robot:
+    with cdpr.simulate(planar_file, controller=mine) as robot:
         robot.enable()
         assert mine.cycles == 0
         robot.tighten()
@@ -75,9 +65,9 @@ def division(_tensions: np.ndarray) -> object:
     raise ZeroDivisionError("no way on")
 
 
-def test_a_failing_controller_stops_the_robot_like_any_fault(robot_file: Path) -> None:
+def test_a_failing_controller_stops_the_robot_like_any_fault(planar_file: Path) -> None:
     mine = PoseController()
-    with cdpr.simulate(robot_file, controller=mine) as robot:
+    with cdpr.simulate(planar_file, controller=mine) as robot:
         for failing, reason in (
             (infinite, r"PoseController.update returned \[nan nan nan\]; return 3 finite tensions"),
             (too_few, "return 3 finite tensions in N"),
@@ -95,21 +85,21 @@ def test_a_failing_controller_stops_the_robot_like_any_fault(robot_file: Path) -
             robot.acknowledge()
 
 
-def test_a_controller_whose_reset_ends_the_process_stops_the_robot(robot_file: Path) -> None:
+def test_a_controller_whose_reset_ends_the_process_stops_the_robot(planar_file: Path) -> None:
     class Leaving(PoseController):
         def reset(self, state: cdpr.State) -> None:
             raise SystemExit("no start")
 
-    with cdpr.simulate(robot_file, controller=Leaving()) as robot:
+    with cdpr.simulate(planar_file, controller=Leaving()) as robot:
         robot.enable()
         with pytest.raises(cdpr.Faulted, match="SystemExit: no start"):
             robot.tighten("home")
             robot.move_to([0.2, 1.8])
 
 
-def test_the_built_in_controller_brakes_and_lowers_after_any_fault(robot_file: Path) -> None:
+def test_the_built_in_controller_brakes_and_lowers_after_any_fault(planar_file: Path) -> None:
     mine = PoseController()
-    with cdpr.simulate(robot_file, controller=mine) as robot:
+    with cdpr.simulate(planar_file, controller=mine) as robot:
         robot.enable()
         robot.tighten()
         robot.move_to([0.0, 1.8])
@@ -124,20 +114,20 @@ def test_the_built_in_controller_brakes_and_lowers_after_any_fault(robot_file: P
         assert mine.cycles < before + 50
 
 
-def test_the_state_of_a_controller_cannot_be_written(robot_file: Path) -> None:
+def test_the_state_of_a_controller_cannot_be_written(planar_file: Path) -> None:
     class Reaching(PoseController):
         def update(self, state: cdpr.State, target: cdpr.Target) -> np.ndarray:
             state.high_N[:] = 1e6
             return super().update(state, target)
 
-    with cdpr.simulate(robot_file, controller=Reaching()) as robot:
+    with cdpr.simulate(planar_file, controller=Reaching()) as robot:
         robot.enable()
         robot.tighten()
         with pytest.raises(cdpr.Faulted, match="read-only"):
             robot.move_to([0.0, 1.4])
 
 
-def test_tensions_are_limited_to_the_robots_bounds(robot_file: Path) -> None:
+def test_tensions_are_limited_to_the_robots_bounds(planar_file: Path) -> None:
     seen: list[np.ndarray] = []
 
     class Pulling(PoseController):
@@ -147,7 +137,7 @@ def test_tensions_are_limited_to_the_robots_bounds(robot_file: Path) -> None:
 
     mine = Pulling(lambda tensions: tensions + 1e4 * np.arange(-1.0, 2.0))
     model = cdpr.load("planar-3")
-    with cdpr.simulate(robot_file, controller=mine) as robot:
+    with cdpr.simulate(planar_file, controller=mine) as robot:
         robot.enable()
         robot.tighten()
         robot.move_to([0.0, 1.4])

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 import cdpr_rt as cdpr
-from cdpr_profiles.places import SHIPPED
 from cdpr_tools.cli import main
 
 Tensions = Callable[[np.ndarray], object]
@@ -38,27 +37,18 @@ class Spread:
         return t
 
 
-@pytest.fixture(scope="module")
-def robot_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The shipped robot with a quarter of the cycles a second, which take less time."""
-    path = tmp_path_factory.mktemp("robot") / "planar-3.toml"
-    shipped = (SHIPPED / "robots" / "planar-3.toml").read_text()
-    path.write_text(shipped.replace("sync_period_s = 0.001", "sync_period_s = 0.004"))
-    return path
-
-
 def raising(_tensions: np.ndarray) -> object:
     raise ZeroDivisionError("no way on")
 
 
 def test_a_distribution_carries_the_platform_and_stops_the_robot_if_it_fails(
-    robot_file: Path,
+    planar_file: Path,
 ) -> None:
     mine, place = Spread(), [0.2, 1.8]
-    expected = cdpr.load(robot_file, tension_distribution=mine).tensions(place)
-    assert expected.min() > cdpr.load(robot_file).tensions(place).min() + 10.0
+    expected = cdpr.load(planar_file, tension_distribution=mine).tensions(place)
+    assert expected.min() > cdpr.load(planar_file).tensions(place).min() + 10.0
     mine.calls = 0
-    with cdpr.simulate(robot_file, tension_distribution=mine) as robot:
+    with cdpr.simulate(planar_file, tension_distribution=mine) as robot:
         robot.enable()
         robot.tighten()
         assert mine.calls == 0  # it stands on its stand
@@ -84,18 +74,18 @@ def test_a_distribution_carries_the_platform_and_stops_the_robot_if_it_fails(
             robot.acknowledge()
 
 
-def test_a_controller_distributes_by_the_robots_distribution(robot_file: Path) -> None:
+def test_a_controller_distributes_by_the_robots_distribution(planar_file: Path) -> None:
     class Holding(cdpr.Controller):
         def update(self, state: cdpr.State, target: cdpr.Target) -> np.ndarray:
             error = target.position - state.position
             return state.distribute(1500.0 * error + 60.0 * (target.velocity - state.velocity))
 
     mine = Spread()
-    with cdpr.simulate(robot_file, controller=Holding(), tension_distribution=mine) as robot:
+    with cdpr.simulate(planar_file, controller=Holding(), tension_distribution=mine) as robot:
         robot.enable()
         robot.tighten()
         robot.move_to([0.0, 1.42])
-        expected = cdpr.load(robot_file, tension_distribution=Spread()).tensions([0.0, 1.42])
+        expected = cdpr.load(planar_file, tension_distribution=Spread()).tensions([0.0, 1.42])
         assert robot.status["program_progress"]["tension_N"] == pytest.approx(expected, abs=15.0)
 
 
@@ -108,11 +98,11 @@ def spread(W, w, low, high, previous):
 
 
 @pytest.fixture
-def naming(robot_file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def naming(planar_file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A robot's file that names code beside it."""
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
     path = tmp_path / "naming.toml"
-    text = robot_file.read_text()
+    text = planar_file.read_text()
     path.write_text(
         text.replace("[platform]", '[platform]\ntension_distribution = "mine.py:spread"')
     )

@@ -1,6 +1,7 @@
 """A robot's loop in the test process, with time, right to move, stream and truth in bus time."""
 
 from collections.abc import Iterator
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -23,6 +24,12 @@ def robot() -> Iterator[LockstepRobot]:
         opened.carry_out("tighten", 60.0)
         opened.carry_out("pose", position_m=[0.0, HEIGHT])
         yield opened
+
+
+@pytest.fixture(scope="module")
+def frames_of_jog() -> dict[str, bytes]:
+    """Keep the frames of the first robot for comparison."""
+    return {}
 
 
 @pytest.fixture(autouse=True)
@@ -121,6 +128,23 @@ def test_packets_of_a_stream_are_processed_as_in_the_daemon(robot):
     robot.run(1.5)
     assert robot.truth()["position_m"][1] == pytest.approx(HEIGHT + 0.098, abs=5e-3)
     assert robot.truth()["velocity_m_s"][1] == pytest.approx(0.0, abs=5e-3)
+
+
+@pytest.mark.parametrize("at_once", [1, 20])
+def test_cycles_in_one_call_send_the_same_frames_as_single_ones(
+    at_once: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, frames_of_jog: dict[str, bytes]
+) -> None:
+    monkeypatch.setenv("CDPR_SIM_FRAME_LOG", str(tmp_path / "frames.log"))
+    with LockstepRobot("bench-8") as robot:
+        robot.enable("jog", velocity_rad_s=[1.0] * 8, timeout_s=0.2)
+        for _ in range(100 // at_once):
+            robot.turn(at_once)
+        robot.inject(axis=5, sub=1, value=0x2310)
+        for _ in range(300 // at_once):
+            robot.turn(at_once)
+        assert robot.state is LoopState.FAULT
+    (log,) = tmp_path.glob("frames*.log")
+    assert frames_of_jog.setdefault("", log.read_bytes()) == log.read_bytes()
 
 
 def test_a_silent_drive_does_not_prevent_closing_two_buses():
