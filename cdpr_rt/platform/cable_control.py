@@ -541,7 +541,7 @@ class CableControl(PlaceChecks):
         if self._own is not None and self._on_stand:
             self._own.restart(self.tension_N)
         elif self._own is not None:
-            np.take(self._moves[loop.TWIST], self._directions, out=self._velocity)
+            self._moves[loop.TWIST].take(self._directions, out=self._velocity, mode="clip")
             self._own.write(self.tension_N)
             self._feedforward_N[:] = self.tension_N
         self._limited = self._drive(null_directions, slope, torque_Nm)

@@ -77,10 +77,10 @@ def test_a_failing_controller_stops_the_robot_like_any_fault(planar_file: Path) 
             mine.failing = None
             robot.enable()
             robot.tighten("home")
-            mine.failing, mine.fails_at = failing, mine.cycles + 250
+            mine.failing, mine.fails_at = failing, mine.cycles + 1000
             with pytest.raises(cdpr.Faulted, match=reason) as fault:
                 robot.move_to([0.2, 1.8], speed_m_s=0.1)
-            assert fault.value.limit == "not_finite"
+            assert fault.value.limit == "not_finite" and robot.state == "fault"
             assert mine.cycles == mine.fails_at  # the built-in controller has lowered the platform
             robot.acknowledge()
 

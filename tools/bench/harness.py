@@ -64,10 +64,8 @@ class Figures:
 
     def lines(self) -> list[str]:
         """Return the table, then targets and notes."""
-        columns = list(dict.fromkeys(column for row in self.rows.values() for column in row))
-        cells = [(name, [row.get(c, "") for c in columns]) for name, row in self.rows.items()]
         targets = [target.line() for target in self.targets.values()]
-        return [self.title, table(columns, cells), *targets, *self.notes]
+        return [self.title, table_of(self.rows), *targets, *self.notes]
 
     def as_json(self) -> dict[str, Any]:
         """Return all figures."""
@@ -142,6 +140,12 @@ def percentiles(
     found = np.percentile(values, percents)
     names = ("max" if p == 100.0 else f"p{p:g}" for p in percents)
     return {name: round(float(v), digits) for name, v in zip(names, found, strict=True)}
+
+
+def table_of(rows: Mapping[str, Row]) -> TableText:
+    """Return the rows under the names of all their columns."""
+    columns = list(dict.fromkeys(column for row in rows.values() for column in row))
+    return table(columns, [(name, [row.get(c, "") for c in columns]) for name, row in rows.items()])
 
 
 def table(

@@ -58,7 +58,7 @@ def measure(seconds: float, out: Output, name: str = "") -> Figures:
             runs |= {way: [] for way in periods}
         for k in range(ROUNDS):
             out.note(f"round {k + 1} of {ROUNDS}: the daemon, then the baseline loop ...")
-            runs[ours].append(_daemon(robot, seconds / ROUNDS, Path(folder)))
+            runs[ours].append(daemon(robot, seconds / ROUNDS, Path(folder)))
             for way, of in periods.items():
                 runs[way].append(baseline_loop.measure(of, seconds / ROUNDS, _SPEED_RAD_S))
     rows = {way: _combined(of) for way, of in runs.items()}
@@ -108,12 +108,15 @@ def with_tolerant_limits(robot: Robot, folder: Path) -> Robot:
     return load_robot(str(path))
 
 
-def _daemon(robot: Robot, seconds: float, folder: Path) -> Run:
-    """Run `cdpr run` for a while, with its recording and a client of the live view."""
+def daemon(robot: Robot, seconds: float, folder: Path, controller: str | None = None) -> Run:
+    """Run `cdpr run` for a while, with its recording and a client of the live view.
+
+    `controller` is one of a user's, as for `cdpr run`.
+    """
     record = folder / f"recordings-{time.monotonic_ns()}"
     with (
         baseline_loop.simulator(robot) as bus,
-        run(robot.path, bus=bus, record=record) as handle,
+        run(robot.path, bus=bus, record=record, controller=controller) as handle,
         _watched(default_socket(robot.profile)),
     ):
         to_and_fro = _motion(robot, handle)

@@ -12,8 +12,9 @@ import typer
 from cdpr_profiles import load_robot
 from cdpr_profiles.errors import printable
 from cdpr_rt.errors import GeometryError
+from cdpr_rt.robot import Error as RobotError
 from cdpr_tools.commands.options import JsonOption
-from cdpr_tools.errors import FAILED, BadInputError, raised_as
+from cdpr_tools.errors import FAILED, BadInputError, WorkFailedError, raised_as
 from cdpr_tools.loading import loading_notice
 from cdpr_tools.output import Output
 
@@ -39,6 +40,22 @@ def _run(bench: str, as_json: bool, **given: Any) -> None:
         out.result({**figures.as_json(), **failed})
         raise typer.Exit(FAILED)
     out.result({"ok": True, **figures.as_json()})
+
+
+@app.command()
+def api(
+    starts: Annotated[int, _option("First moves of a new script.", 1)] = 5,
+    cycles: Annotated[int, _option("Cycles in lockstep with each controller.", 200)] = 4_000,
+    seconds: Annotated[float, _option("Duration at 250 Hz with each controller.", 3, 3600)] = 20.0,
+    as_json: JsonOption = False,
+) -> None:
+    """Measure the Python interface: a script's first move, and controllers written in Python.
+
+    The same script runs on a simulation in lockstep and on a daemon in real time. A do-nothing
+    controller and one in NumPy take turns with the built-in one.
+    """
+    with raised_as(WorkFailedError, RobotError):
+        _run("api", as_json, starts=starts, cycles=cycles, seconds=seconds)
 
 
 @app.command()

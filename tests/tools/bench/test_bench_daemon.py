@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from cdpr_profiles import load_robot
-from cdpr_tools.bench import loop, stop
+from cdpr_tools.bench import api, loop, stop
 from cdpr_tools.output import Output
 
 PERIOD_S, WAKE_UP_S = 4e-3, 0.002
@@ -46,6 +46,17 @@ def test_the_baseline_loop_runs_the_same_axes_and_costs_more(tmp_path: Path) -> 
         assert 0.0 < row["computing p50"] <= row["computing p99.9"]
     ratio = baseline[1]["host CPU"] / ours["host CPU"]
     assert figures.targets["baseline_over_ours"].value == pytest.approx(ratio) and ratio > 1.5
+
+
+@ALONE
+def test_bench_api_measures_starts_and_controllers_in_lockstep_and_paced() -> None:
+    figures = api.measure(1, 200, 3.0, Output(as_json=True))
+    simulated, daemon = (figures.more["starts"][way] for way in (api.SIMULATED, api.DAEMON))
+    assert 0.0 < simulated["ready p50"] < simulated["moved p50"] < daemon["moved p50"]
+    assert set(figures.rows) == {api.BUILT_IN, api.NOTHING, api.POSE}
+    assert figures.rows[api.POSE]["CPU p50"] > figures.rows[api.NOTHING]["CPU p50"]
+    assert all(row["cycles"] > 0.5 * 3.0 / PERIOD_S for row in figures.more["paced"].values())
+    assert set(figures.targets) == {"start_s", "over_us", "late"}
 
 
 @ALONE
