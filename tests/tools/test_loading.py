@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import pty
 import subprocess
@@ -9,6 +10,8 @@ import sys
 from io import RawIOBase
 
 import pytest
+
+from cdpr_tools.loading import without_collection
 
 SCRIPT = """
 import sys, time
@@ -58,3 +61,10 @@ def test_no_notice_is_written_to_a_pipe() -> None:
     command = [sys.executable, "-c", SCRIPT, "0.0", "0.5"]
     done = subprocess.run(command, capture_output=True, text=True, check=True)
     assert done.stderr == "done\n"
+
+
+def test_no_garbage_is_collected_while_modules_load() -> None:
+    with pytest.raises(ModuleNotFoundError), without_collection():
+        assert not gc.isenabled()
+        raise ModuleNotFoundError("a package")
+    assert gc.isenabled()
