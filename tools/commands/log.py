@@ -18,6 +18,7 @@ from cdpr_tools.recordings.selection import (
     export,
     fields_of,
     files_of,
+    is_being_written,
     sessions,
 )
 from cdpr_tools.recordings.summary import summarise, summary_lines
@@ -154,5 +155,6 @@ def plot(
         columns = selection.columns()
     with out.stage(f"{path.name}: drawing", quick=True):
         rows = draw(selection, columns, axis, path)
-    out.say(f"{path}: {rows} cycles")
+    live = ", still being recorded" if is_being_written(files[-1]) else ""
+    out.say(f"{path}: {rows} cycles{live}")
     out.result({"ok": True, "out": path, "rows": rows})

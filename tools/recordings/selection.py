@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-import contextlib
 import json
+import os
 import re
 from collections.abc import Callable, Collection, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
@@ -21,7 +22,12 @@ from cdpr_rt.core.cycle_row import FIELDS, column_names
 from cdpr_rt.service.recording_file import RecordingError
 from cdpr_rt.service.recording_reader import Columns, RecordingReader
 from cdpr_tools.daemon.paths import default_recordings
-from cdpr_tools.errors import BadInputError, WorkFailedError, os_error_as, raised_as
+from cdpr_tools.errors import (
+    BadInputError,
+    WorkFailedError,
+    os_error_as,
+    raised_as,
+)
 from cdpr_tools.report.save import require_free
 
 ELAPSED = "elapsed_s"
@@ -48,6 +54,19 @@ def files_of(paths: Sequence[Path]) -> list[Path]:
             raise BadInputError(f"{path}: no recordings (*.mcap) in this folder")
         found += inside
     return found
+
+
+def is_being_written(path: Path) -> bool:
+    """Return whether a process has the file open for writing, as far as this user may know."""
+    target = str(path.resolve())
+    for link in Path("/proc").glob("[0-9]*/fd/*"):
+        with suppress(OSError):  # the process has ended, or is another user's
+            if str(link.readlink()) == target:
+                info = (link.parents[1] / "fdinfo" / link.name).read_text()
+                flags = int(info.partition("flags:")[2].split()[0], 8)
+                if flags & os.O_ACCMODE != os.O_RDONLY:
+                    return True
+    return False
 
 
 def sessions(files: Sequence[Path]) -> dict[str, list[Path]]:
@@ -222,7 +241,7 @@ def _write(selection: Selection, file: IO[bytes], suffix: str) -> int:
         writer.close()
     except BaseException:
         if writer is not None:
-            with contextlib.suppress(Exception):  # else it fails later because the file is closed
+            with suppress(Exception):  # else it fails later because the file is closed
                 writer.close()
         raise
     return count

@@ -18,14 +18,14 @@ from cdpr_rt.service.recording import FAILURE
 from cdpr_rt.service.recording_reader import CLOSED, Columns, RecordingReader
 from cdpr_tools.client.status_text import DEAD
 from cdpr_tools.output import Output
-from cdpr_tools.recordings.selection import ELAPSED, Selection
+from cdpr_tools.recordings.selection import ELAPSED, Selection, is_being_written
 
 _EARLY_ns: Final = 50_000_000
 """A reason may be stamped this long before the row that shows its reaction."""
 
 WHILE_ACTIVE: Final = "the recording ends while the robot was active"
 LOOP_ENDED: Final = "the control loop ended without a stop"
-_WRITER_ENDED: Final = "its writer was killed, or still writes"
+_WRITER_ENDED: Final = "its writer was killed, or is a daemon of another user and still writes"
 
 
 class Reasons:
@@ -69,7 +69,7 @@ def is_fault(event: dict[str, Any]) -> bool:
 def why_while_active(reader: RecordingReader, last_state: int) -> str:
     """Return why a completely read recording ends while active, in a row of state `last_state`.
 
-    "" if that state is not active, or another file continues the recording.
+    "" if that state is not active, another file continues the recording, or it still goes on.
     """
     if last_state != LoopState.ACTIVE:
         return ""
@@ -77,6 +77,8 @@ def why_while_active(reader: RecordingReader, last_state: int) -> str:
         return LOOP_ENDED
     next_name = f"{reader.metadata.get('session')}-{reader.part + 1:03d}.mcap"
     if reader.ended == CLOSED or reader.path.with_name(next_name).exists():
+        return ""
+    if is_being_written(reader.path):
         return ""
     return _WRITER_ENDED
 
@@ -210,7 +212,8 @@ def summarise(path: Path, out: Output) -> dict[str, Any]:
     for event in reader.events:
         stamp_ns = event["log_time_ns"] - reader.offset_ns
         event["after_s"] = count.when_s(stamp_ns) if count.rows else None
-    runs, why = _named_runs(count.runs, reader), why_while_active(reader, count.last_state)
+    runs = _named_runs(count.runs, reader)
+    why = why_while_active(reader, count.last_state)
     _note_failures(runs, reader.events)
     if why == LOOP_ENDED:  # a file that is still being written may be fine
         runs[-1].setdefault("cut_short_by", why)
@@ -218,6 +221,7 @@ def summarise(path: Path, out: Output) -> dict[str, Any]:
         "file": str(path),
         "bytes": path.stat().st_size,
         "ended": reader.ended,
+        "being_recorded": reader.ended != CLOSED and is_being_written(path),
         "ended_while_active": why or None,
         "robot": reader.metadata.get("robot"),
         "session": reader.metadata.get("session"),
@@ -331,7 +335,8 @@ def summary_lines(figures: dict[str, Any], most_events: int) -> Sequence[str]:
     }
     lines = [
         f"{figures['file']}: {figures['robot']}, {len(figures['axes'])} axes, "
-        f"{figures['bytes'] / 1e6:.1f} MB{end[figures['ended']]}"
+        f"{figures['bytes'] / 1e6:.1f} MB"
+        f"{', still being recorded' if figures['being_recorded'] else end[figures['ended']]}"
     ]
     states = ", ".join(f"{name} {time_s:.1f} s" for name, time_s in figures["states_s"].items())
     lines.append(f"  {figures['rows']} cycles in {figures['seconds']:.1f} s ({states})")

@@ -180,6 +180,12 @@ def test_a_truncated_recording_is_reported_unless_another_file_continues_it(
 ) -> None:
     path, _ = ends_active(tmp_path, "active")
     path.write_bytes(path.read_bytes()[:-100])
-    assert "ends while the robot was active: its writer was killed, or still writes" in shown(path)
+    assert "ends while the robot was active: its writer was killed, or is a daemon of" in shown(
+        path
+    )
+    with path.open("ab"):
+        live = shown(path)
+    assert "MB, still being recorded" in live
+    assert "while the robot was active" not in live
     shutil.copy(path, path.with_name(path.name.replace("-001", "-002")))
     assert "while the robot was active" not in shown(path)
