@@ -220,7 +220,9 @@ class Model:
         fits = values.ndim > 0 and values.shape[-1] == size and np.isfinite(values).all()
         if not fits or shape not in (None, values.shape[:-1]):
             wanted = f"(..., {size})" if shape is None else (*shape, size)
-            raise InvalidArgument(f"{name}: shape {values.shape}; want finite {wanted}")
+            raise InvalidArgument(
+                f"{name}: shape {values.shape}; allowed: finite numbers of shape {wanted}"
+            )
         return values if shape is None else values.reshape(-1, size)
 
     def tensions(self, position: ArrayLike, wrench: ArrayLike | None = None) -> FloatArray:
@@ -302,7 +304,9 @@ class Model:
         given, k = _numbers("position", position), self._model.positions
         if given.ndim == 0 or given.shape[-1] not in (k, self.d) or not np.isfinite(given).all():
             wanted = f"(..., {k})" + (f" or (..., {self.d})" if self.d > k else "")
-            raise InvalidArgument(f"position: shape {given.shape}; want finite {wanted}")
+            raise InvalidArgument(
+                f"position: shape {given.shape}; allowed: finite numbers of shape {wanted}"
+            )
         rows = np.zeros((int(np.prod(given.shape[:-1])), self.d))
         rows[:, : given.shape[-1]] = given.reshape(-1, given.shape[-1])
         return rows, given.shape[:-1]

@@ -115,7 +115,7 @@ class TableText(str):
     _left: Sequence[str]
 
     def __new__(cls, rows: Sequence[Sequence[str]], left: Sequence[str] = ()) -> Self:
-        """Lay the table out as wide as it is."""
+        """Lay the table out at its full width."""
         self = super().__new__(cls, "\n".join(_columns(rows, _aligned(rows, left))))
         self._rows, self._left = rows, left
         return self

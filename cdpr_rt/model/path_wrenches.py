@@ -77,9 +77,9 @@ def write_facets(
     """Write normals (m, f, d) and bounds (m, f) of the wrenches W t at m poses, low <= t <= high.
 
     Each d - 1 cables of `combinations` (f, d - 1) span a facet on both sides: hyperplane shifting
-    (Bouchard, Gosselin, Moore 2010; Gouttefarde, Krut 2010). Combinations that span less get a
-    normal of 0 within 0. `matrices` (m, d, n) map tensions to wrenches, `scale` (d,) is the amount
-    of each direction that counts as 1 N.
+    (Bouchard, Gosselin, Moore 2010; Gouttefarde, Krut 2010). Combinations that span no facet
+    get a normal and bounds of 0. `matrices` (m, d, n) map tensions to wrenches, `scale` (d,) is
+    the amount of each direction that counts as 1 N.
     """
     m, d, n = matrices.shape
     W, scratch = np.zeros((d, n)), np.zeros((d, d))

@@ -30,10 +30,10 @@ def project(
 ) -> bool:
     """Write the tensions t = t0 + N' lambda (n,) within bounds nearest to the wanted ones.
 
-    `space` (n + 1, n) is that of `null_space` with `r` null directions, as are `bounds` (3, n).
-    `scratch` (4, m, m), m >= n and 8, is overwritten. Returns False if none exist: then the
-    cables whose bounds contradict each other are at these bounds, and all others between
-    theirs.
+    `space` (n + 1, n) and `bounds` (3, n) are those of `null_space`, with `r` null directions.
+    `scratch` (4, m, m) is overwritten; m is at least n and at least 8. Returns False if no tensions
+    are within their bounds. Then `t` has the cables whose bounds contradict each other at these
+    bounds, and all other cables within theirs.
     """
     cable, active = _search(space, r, bounds, t, scratch)
     if cable < 0:

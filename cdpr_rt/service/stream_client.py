@@ -36,10 +36,10 @@ _SILENCE_S = 2.5
 class StreamClient:
     """Sends set-points to the robot at `host` and `port` and takes its answers; never waits.
 
-    `access` is the session that the control interface has given, or the key shared with the robot.
-    With the key, `token` is that of a right to move held already; without it, the stream requests
-    the right itself. There is no thread: call `send` 30 to 60 times a second and `receive` between,
-    or whenever `fileno` is readable. Raises OSError if there is no such host.
+    `access` is the session from the control interface, or the key shared with the robot. With a
+    key, `token` names a right to move that the caller already holds. Without `token` the stream
+    requests the right itself. There is no thread: call `send` 30 to 60 times a second, and
+    `receive` between, or whenever `fileno` is readable. Raises OSError if there is no such host.
     """
 
     def __init__(

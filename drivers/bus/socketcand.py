@@ -87,7 +87,7 @@ class SocketcandAdapter:
                 )
 
     def _answer(self) -> bytes:
-        """Return the next message; keep frames that already arrive."""
+        """Return the server's next message; what follows it stays in `_rest`."""
         deadline = time.monotonic() + _ANSWER_S
         while True:
             match = _MESSAGE.search(self._rest)

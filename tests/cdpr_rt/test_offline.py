@@ -68,7 +68,9 @@ def test_a_position_is_feasible_if_linear_programming_finds_tensions(name: str) 
 
 def test_invalid_input_is_reported_with_what_is_allowed() -> None:
     model = cdpr.load("spatial-8")
-    with pytest.raises(cdpr.InvalidArgument, match=r"position: .*want finite \(..., 3\) or"):
+    with pytest.raises(
+        cdpr.InvalidArgument, match=r"position: .*finite numbers of shape \(..., 3\) or"
+    ):
         model.lengths([0.0, 1.0])
     with pytest.raises(cdpr.InvalidArgument, match="position"):
         model.tensions([0.0, np.nan, 1.0])

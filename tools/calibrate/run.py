@@ -193,7 +193,7 @@ class StoredRun:
         self.save(measured)
 
     def save(self, measured: Measured) -> None:
-        """Store refused and tried places, without a new pose; raises ProfileError."""
+        """Store which places were refused and tried, but no new pose; raises ProfileError."""
         self.data = self.data.model_copy(
             update={"left_out": tuple(measured.refused), "tried": tuple(measured.tried)}
         )

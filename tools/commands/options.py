@@ -149,7 +149,7 @@ AllowCodeOption = Annotated[
     bool,
     typer.Option(
         "--allow-code",
-        help="Run the code that the robot's file names, from now on while it does not change.",
+        help="Trust the code that the robot's file names, and run it until it changes.",
     ),
 ]
 YesOption = Annotated[

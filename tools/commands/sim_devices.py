@@ -137,7 +137,9 @@ def rail(
         _serve_modbus(profile, profile.modbus, board, port, exit_with_stdin)
         return
     if bus is None:
-        raise BadInputError(f"--bus: {profile.name} is on a CAN bus; name it")
+        raise BadInputError(
+            f"--bus: is missing; {profile.name} is on a CAN bus, such as simbus:NAME"
+        )
     mode = ClockMode.LOCKSTEP if lockstep else ClockMode.PACED
     _serve_drive(rail_name, profile, bus, board, plant, mode, exit_with_stdin)
 

@@ -191,7 +191,7 @@ def _attach(found: LoopFile) -> SharedBlock:
     flags = os.O_RDONLY | os.O_NONBLOCK | os.O_NOCTTY | os.O_CLOEXEC
     block = SharedBlock.attach(os.open(f"/proc/{found.pid}/fd/{found.block_fd}", flags))
     if int(block.counters["loop_pid"][0]) != found.pid:
-        raise SharedBlockError("the shared memory is another loop's")
+        raise SharedBlockError("the shared memory belongs to another loop")
     return block
 
 

@@ -62,8 +62,8 @@ class Keys(Hand):
     def press(self, text: str, passed_s: float) -> None:
         """Process the characters that arrived within the last `passed_s`.
 
-        If there are more steps than keys can repeat in that time, or they waited for long, only
-        the first few count: they were pasted, or typed before the program listened.
+        Only as many steps count as a held key can repeat in that time, or in `_LONGEST_S` if that
+        is shorter. Any others were pasted, or typed before the program listened.
         """
         most = 1 + int(_FASTEST_Hz * min(passed_s, _LONGEST_S))
         text = self._left + text

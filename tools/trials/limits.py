@@ -128,8 +128,8 @@ def _legs(recorded: Recorded) -> list[tuple[FloatArray, slice]]:
 def swings_s(recorded: Recorded) -> FloatArray:
     """Return how long the platform took to stay within `SWING_mm` of each target, (m,).
 
-    Time counts from when the set-point stood there; legs with too short a rest are left out. If
-    the platform does not stay there, it is the whole rest.
+    The time begins when the set-point has reached the target. It is the whole rest there if the
+    platform does not settle. Targets with a rest shorter than `SWING_S` are left out.
     """
     found = []
     for target, rows in _legs(recorded):

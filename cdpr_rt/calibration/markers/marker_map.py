@@ -234,7 +234,7 @@ class Coverage:
         return [f"{many} markers seen", *self.advice]
 
     def as_json(self) -> dict[str, Any]:
-        """Return it for JSON."""
+        """Return the coverage as values for JSON."""
         return {
             "share_seen": self.share_seen,
             "islands": [list(island) for island in self.islands],

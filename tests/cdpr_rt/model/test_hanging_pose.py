@@ -115,7 +115,7 @@ def test_sensors_are_rejected_if_the_cables_control_the_rotation() -> None:
 def test_readings_of_a_wrong_shape_are_rejected() -> None:
     model, offline = model_of("mass in the middle")
     lengths = hanging(model, PLACES_m[0], 45.0)[1]
-    with pytest.raises(cdpr.InvalidArgument, match=r"tension_N: shape \(3,\); want finite \(4,\)"):
+    with pytest.raises(cdpr.InvalidArgument, match=r"tension_N: shape \(3,\); .* of shape \(4,\)"):
         offline.pose(lengths, tension_N=[1.0, 2.0, 3.0])
-    with pytest.raises(cdpr.InvalidArgument, match=r"tilt_rad: shape \(2,\); want finite \(1, 2\)"):
+    with pytest.raises(cdpr.InvalidArgument, match=r"tilt_rad: shape \(2,\); .* of shape \(1, 2\)"):
         offline.pose([lengths], tilt_rad=[0.0, 0.0])

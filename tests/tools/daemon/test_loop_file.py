@@ -208,7 +208,7 @@ def test_shared_memory_of_another_loop_does_not_confirm_power_off(tmp_path: Path
         outcome = stopped(path)
         loop.kill()
     assert not outcome.confirmed
-    assert "the shared memory is another loop's" in outcome.text
+    assert "the shared memory belongs to another loop" in outcome.text
 
 
 def test_a_socket_of_another_user_is_rejected(tmp_path: Path) -> None:
