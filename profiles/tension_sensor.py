@@ -1,4 +1,4 @@
-"""Tension sensors: load-cell amplifiers on one RS-485 line and their register map."""
+"""Sensors on one RS-485 line, load-cell amplifiers and an inclinometer, and their registers."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
+from cdpr_profiles.errors import ProfileError
 from cdpr_profiles.places import require
 from cdpr_profiles.reader import Profile, one_of, read_toml_model, require_unique
 
@@ -19,14 +20,53 @@ REGISTERS: dict[DataType, int] = {"int16": 1, "uint16": 1, "int32": 2, "uint32":
 MOST_REGISTERS = 32
 
 
-class ValueMap(Profile):
-    """Location of the measured value: newton = raw value × scale."""
+class RawValue(Profile):
+    """Location of a measured value."""
 
     kind: RegisterKind
     address: Address
     type: DataType
     word_order: Literal["big", "little"] = "big"
     """Word of a 32-bit value that comes first: the high one (big) or the low one."""
+
+    @model_validator(mode="after")
+    def _fits(self) -> Self:
+        most = _LAST_ADDRESS + 1 - REGISTERS[self.type]
+        if self.address > most:
+            raise ValueError(f"address: {self.address} for {self.type}; allowed: up to {most}")
+        return self
+
+
+class AngleValue(RawValue):
+    """Location of a measured angle: rad = raw value × scale - zero."""
+
+    scale_rad: float = Field(ge=-1.0, le=1.0)
+    """Negative if the sensor counts the other way."""
+    zero_rad: float = Field(default=0.0, ge=-1.0, le=1.0)
+
+    @model_validator(mode="after")
+    def _scaled(self) -> Self:
+        if self.scale_rad == 0.0:
+            raise ValueError("scale_rad: value 0; allowed: another number from -1 to 1")
+        return self
+
+
+class Inclinometer(Profile):
+    """An inclinometer or AHRS on the platform."""
+
+    unit: int = Field(ge=1, le=247)
+    roll: AngleValue
+    pitch: AngleValue
+    angles: Literal["roll-pitch", "inclinations"] = "roll-pitch"
+    """roll-pitch: roll about x, then pitch about y. inclinations: the roll is the angle of y above
+    the horizontal, the pitch that of x below it."""
+    mounting_rad: Annotated[tuple[float, ...], Field(min_length=3, max_length=3)] = (0.0, 0.0, 0.0)
+    """Rotation vector from the sensor's frame to the platform's."""
+
+
+class ValueMap(RawValue):
+    """Location of the measured value: newton = raw value × scale."""
+
     scale_N: float = Field(gt=0, le=1e6)
     broken_wire_raw: tuple[float, ...] = ()
     """Raw values that mean a broken wire, for amplifiers that signal it so."""
@@ -65,11 +105,6 @@ class Amplifier(Profile):
         if self.lowest_N >= self.highest_N:
             raise ValueError(f"lowest_N = {self.lowest_N} must be below {self.highest_N}")
         status = self.status
-        if self.value.address + REGISTERS[self.value.type] - 1 > _LAST_ADDRESS:
-            raise ValueError(
-                f"value.address: {self.value.address} for {self.value.type}; "
-                f"allowed: up to {_LAST_ADDRESS + 1 - REGISTERS[self.value.type]}"
-            )
         if status is not None and status.over_range_bit is status.broken_wire_bit is None:
             raise ValueError("status: allowed: at least one of over_range_bit, broken_wire_bit")
         return self
@@ -86,7 +121,8 @@ class Sensor(Profile):
 
 
 class TensionSensors(Profile):
-    """The load cells on one serial line, one per cable, in the order of the axes."""
+    """Sensors on one serial line: load cells, one per cable in the order of the axes, an
+    inclinometer, or both."""
 
     name: str = Field(min_length=1)
     notes: tuple[str, ...] = ()
@@ -103,13 +139,21 @@ class TensionSensors(Profile):
     """Age above which a reading is not valid."""
     stop_above_N: float = Field(default=1e6, gt=0, le=1e6)
     """Tension above which a motion is stopped."""
-    amplifier: Amplifier
-    sensors: tuple[Sensor, ...] = Field(min_length=1, max_length=64)
+    amplifier: Amplifier | None = None
+    sensors: tuple[Sensor, ...] = Field(default=(), max_length=64)
+    inclinometer: Inclinometer | None = None
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:
         for key in ("cable", "unit"):
             require_unique(f"sensors: {key}", [getattr(sensor, key) for sensor in self.sensors])
+        tilt = self.inclinometer
+        if (self.amplifier is None) is not (not self.sensors):
+            raise ValueError("amplifier and sensors: allowed: both or none")
+        if self.amplifier is None and tilt is None:
+            raise ValueError("amplifier: is missing; allowed without one only with an inclinometer")
+        if tilt is not None and tilt.unit in [sensor.unit for sensor in self.sensors]:
+            raise ValueError(f"inclinometer.unit: {tilt.unit} is that of a load cell")
         if self.stale_after_s < 2 * self.period_s:
             raise ValueError(
                 f"stale_after_s: value {self.stale_after_s}; allowed: at least two periods "
@@ -121,3 +165,11 @@ class TensionSensors(Profile):
 def load_tension_sensors(name: str | Path) -> TensionSensors:
     """Return tension sensors by name or path; raises ProfileError."""
     return read_toml_model(require("tension_sensors", name), TensionSensors)
+
+
+def load_load_cells(name: str | Path) -> tuple[TensionSensors, Amplifier]:
+    """Return tension sensors with load cells, and their amplifier; raises ProfileError."""
+    profile = load_tension_sensors(name)
+    if profile.amplifier is None:
+        raise ProfileError(str(name), "sensors", "is missing; allowed here: one or more load cells")
+    return profile, profile.amplifier

@@ -91,6 +91,8 @@ class AxisEstimate:
         self.tension_measured: BoolArray = np.zeros(n, np.bool_)
         self.sensor_ok: BoolArray = np.ones(n, np.bool_)
         """False if there is a tension sensor whose reading is not valid."""
+        self.upward: FloatArray = np.zeros(4)
+        """As in `TensionFeedback`."""
 
 
 @jit
@@ -232,6 +234,7 @@ class Estimator:
                 tension.tension_N, tension.valid, estimate.tension_N, estimate.tension_measured,
                 estimate.sensor_ok,
             )  # fmt: skip
+            np.copyto(estimate.upward, tension.upward)
 
     def _bind(
         self, feedback: AxisFeedback, loss: FloatArray, cogging: FloatArray

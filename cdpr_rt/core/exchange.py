@@ -136,6 +136,9 @@ class TensionFeedback:
         self.valid: BoolArray = np.zeros(n, np.bool_)
         self.fault: NDArray[np.uint8] = np.full(n, TensionFault.NO_READING, np.uint8)
         """`TensionFault`, NONE if `valid`."""
+        self.upward: FloatArray = np.zeros(4)
+        """1 for a valid reading of the inclinometer, -1 for none, 0 without one; and the upward
+        direction in the platform's frame, (3,)."""
 
 
 class TensionExchange:
@@ -149,6 +152,7 @@ class TensionExchange:
         self.feedback = TensionFeedback(n)
         self._clock = clock
         self._fault = self.feedback.fault.copy()
+        self._tilted_s = -math.inf
         self._stale: BoolArray = np.zeros(n, np.bool_)
 
     def publish(self, cable: int, tension_N: float, time_s: float, fault: TensionFault) -> None:
@@ -158,9 +162,19 @@ class TensionExchange:
         feedback.time_s[cable] = time_s
         self._fault[cable] = fault
 
+    def publish_upward(self, upward: FloatArray | None, time_s: float) -> None:
+        """Store an inclinometer's upward direction (3,), or None if it has none yet."""
+        if upward is None:
+            self.feedback.upward[0] = -1.0
+        else:
+            self.feedback.upward[1:], self._tilted_s = upward, time_s
+
     def update(self) -> None:
         """Update `feedback`; for the cycle: allocates no array."""
         feedback = self.feedback
+        if feedback.upward[0] != 0.0:
+            fresh = self._clock.now_s - self._tilted_s <= self.stale_after_s
+            feedback.upward[0] = 1.0 if fresh else -1.0
         np.subtract(self._clock.now_s, feedback.time_s, out=feedback.age_s)
         np.copyto(feedback.fault, self._fault)
         np.greater(feedback.age_s, self.stale_after_s, out=self._stale)

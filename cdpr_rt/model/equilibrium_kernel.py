@@ -11,10 +11,12 @@ least squares, with
 Without sensors, tensions say little: mainly how far cables pull against each other, which lengths
 of stiff cables do not tell. Arrays of float64 besides those of `cable_kernel`:
 
-    known      (9,)       WEIGHT, N; CENTRE of mass in the platform's frame, m; STD_N, standard
-                          deviation of tensions by the motors; SENSED, 1 if there is an
-                          inclinometer's reading, and that reading UP (3,) in the platform's frame
-    tensions   (3, n)     FOUND; SAID; their PRECISION, 1/σ²
+    known      (7,)       WEIGHT, N; CENTRE of mass in the platform's frame, m; STD_N, standard
+                          deviation of tensions by the motors; and what `learn_moment` writes:
+                          moments about x and y, Nm, that the rest does not explain
+    upward     (4,)       above 0 if an inclinometer's reading is valid; and its upward direction in
+                          the platform's frame
+    tensions   (4, n)     FOUND; SAID; their PRECISION, 1/σ²; OFFSET of load cells from motors
     normal     (6 + n, 6 + n)  normal equations, and `rows` (8, 6 + n), scratch
 """
 
@@ -31,8 +33,8 @@ from cdpr_rt.model.cable_kernel import ANCHOR, ARC, FREE, hang, run_cables, tens
 from cdpr_rt.model.pose_search import move
 from cdpr_rt.model.rigid_body import G_m_s2, in_space
 
-WEIGHT, CENTRE, STD_N, SENSED, UP, KNOWN = 0, 1, 4, 5, 6, 9
-FOUND, SAID, PRECISION, TENSIONS = range(4)
+WEIGHT, CENTRE, STD_N, MOMENT, KNOWN = 0, 1, 4, 5, 7
+FOUND, SAID, PRECISION, OFFSET, TENSIONS = range(5)
 LENGTH_STD_m = 2e-3
 CELL_SHARE = 0.15
 """Standard deviation of a load cell's reading as a share of the control's reserve of tension, which
@@ -51,15 +53,37 @@ def say_tensions(
     cables: FloatArray,
     known: FloatArray,
     tensions: FloatArray,
+    share: float,
 ) -> None:
-    """Write what load cells at the winches say, or else motors in the middle of the cables."""
+    """Write what motors say of the tensions in the middle, or load cells at the winches.
+
+    The OFFSET of a load cell from its motor is low-passed by `share` per cycle: the fast part of a
+    tension is that of a swing, which must not become a motion of the estimate.
+    """
     for i in range(motor_N.size):
-        std_N = known[STD_N]
-        tensions[SAID, i] = motor_N[i]
+        std_N, offset = known[STD_N], 0.0
         if measured[i]:
             std_N *= CELL_SHARE
-            tensions[SAID, i] = measured_N[i] - tension_rise(geometry, cables, i)
+            offset = measured_N[i] - tension_rise(geometry, cables, i) - motor_N[i]
+            offset = tensions[OFFSET, i] + share * (offset - tensions[OFFSET, i])
+        tensions[OFFSET, i], tensions[SAID, i] = offset, motor_N[i] + offset
         tensions[PRECISION, i] = 1.0 / (std_N * std_N)
+
+
+@jit
+def learn_moment(
+    pose: FloatArray, known: FloatArray, upward: FloatArray, rows: FloatArray, share: float
+) -> float:
+    """Move the unexplained MOMENT by a `share` of what turns the pose to an inclinometer's reading.
+
+    `rows` are those of the last step. In motion, the estimate follows the equilibrium quickly and
+    the inclinometer slowly: following a swing, it would let the control drive the swing on. Returns
+    the angle from the reading, which is that of the swing.
+    """
+    x, y, _ = _turned(pose, upward[1], upward[2], upward[3])
+    known[MOMENT] -= share * rows[3, 3] * y
+    known[MOMENT + 1] += share * rows[4, 4] * x
+    return math.hypot(x, y)
 
 
 @jit
@@ -69,6 +93,7 @@ def turn_to_equilibrium(
     pose: FloatArray,
     cables: FloatArray,
     known: FloatArray,
+    upward: FloatArray,
     tensions: FloatArray,
     normal: FloatArray,
     rows: FloatArray,
@@ -96,8 +121,8 @@ def turn_to_equilibrium(
         weight = tensions[PRECISION, i]
         gradient[6 + i] -= weight * (tensions[FOUND, i] - tensions[SAID, i])
         normal[6 + i, 6 + i] += weight
-    if known[SENSED] > 0.0:
-        _add_tilt(pose, known, gradient, normal)
+    if upward[0] > 0.0:
+        _add_tilt(pose, upward, gradient, normal)
     if not _solve(normal, gradient):
         return math.nan
     angle = math.sqrt(gradient[3] ** 2 + gradient[4] ** 2 + gradient[5] ** 2)
@@ -131,8 +156,8 @@ def _add_equilibrium(
             rows[j, k] = 0.0
     x, y, z = _turned(pose, known[CENTRE], known[CENTRE + 1], known[CENTRE + 2])
     wrench[2] -= weight
-    wrench[3] -= weight * y
-    wrench[4] += weight * x
+    wrench[3] += known[MOMENT] - weight * y
+    wrench[4] += known[MOMENT + 1] + weight * x
     # by the rotation's change φ × (x, y, z)
     rows[3, 3], rows[3, 5] = rows[3, 3] + weight * z, rows[3, 5] - weight * x
     rows[4, 4], rows[4, 5] = rows[4, 4] + weight * z, rows[4, 5] - weight * y
@@ -179,10 +204,10 @@ def _add_equilibrium(
 
 @jit
 def _add_tilt(
-    pose: FloatArray, known: FloatArray, gradient: FloatArray, normal: FloatArray
+    pose: FloatArray, upward: FloatArray, gradient: FloatArray, normal: FloatArray
 ) -> None:
     """Add the inclinometer's reading s: Q s is upward."""
-    x, y, z = _turned(pose, known[UP], known[UP + 1], known[UP + 2])
+    x, y, z = _turned(pose, upward[1], upward[2], upward[3])
     precision = 1.0 / TILT_STD_rad**2
     # by φ × (x, y, z): x changes by φ_y z - φ_z y, y by φ_z x - φ_x z
     gradient[3] += precision * z * y
@@ -234,7 +259,7 @@ def _solve(normal: FloatArray, x: FloatArray) -> bool:
 
 
 def known_of(platform: Platform, reserve_N: float) -> FloatArray:
-    """Return a platform's `known`, (KNOWN,), without a reading of an inclinometer.
+    """Return a platform's `known`, (KNOWN,).
 
     Motors say tensions as well as the control's reserve assumes.
     """

@@ -52,17 +52,17 @@ class HangingSearch:
         planned, _ = self._model.planned_tensions(found.pose.array[None], weight[None])
         measured = np.full(kinematics.n, tension_N is not None)
         given = planned[0] if tension_N is None else np.asarray(tension_N, float)
-        known[kernel.SENSED] = float(up is not None)
-        known[kernel.UP :] = 0.0 if up is None else up
+        upward = np.zeros(4) if up is None else np.array([1.0, *up])
         tensions[kernel.FOUND] = given
         for _ in range(_MOST_STEPS):
             pose = Pose(found.pose.p, found.pose.Q)
             kernel.say_tensions(
-                planned[0], given, measured, kinematics.geometry, self._cables, known, tensions
-            )
+                planned[0], given, measured, kinematics.geometry, self._cables, known, tensions,
+                1.0,
+            )  # fmt: skip
             angle = kernel.turn_to_equilibrium(
-                kinematics.geometry, lengths_m, pose.array, self._cables, known, tensions,
-                self._normal, self._rows, 1.0,
+                kinematics.geometry, lengths_m, pose.array, self._cables, known, upward,
+                tensions, self._normal, self._rows, 1.0,
             )  # fmt: skip
             found = kinematics.pose_from_lengths(lengths_m, pose)
             if angle < _DONE_rad and found.converged:

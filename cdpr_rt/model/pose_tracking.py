@@ -49,7 +49,8 @@ JUMP_S = 0.2
 """Time constant with which SETTLED follows RESIDUAL: a slip takes some 30 ms, while errors of the
 geometry change the residual only as slowly as the platform moves."""
 _MOST_TURN_rad, _SMALL = 0.02, 1e-4
-LAG, LAG_S = 0, 0.1
+LAG, REACH_m = 0, 1
+LAG_S, _SENSED_S, _MOST_LEARNT = 0.1, 1.0, 0.2
 _STANDS_m = 5e-3
 """Height over home up to which a platform counts as standing there."""
 # of the type that comes from Python: with a literal numba would compile the search again
@@ -64,15 +65,20 @@ class Hanging(NamedTuple):
     normal: FloatArray
     rows: FloatArray
     settings: FloatArray
-    """(1,): time constant LAG with which the rotation follows, s."""
+    """(2,): time constant LAG with which the rotation follows, s, and REACH_m, the largest distance
+    of an anchor point from the centre of mass."""
     home: FloatArray
     """Pose at home, (4, 3), where it stands."""
     scratch: FloatArray
     """(4, 3)"""
+    unsensed: FloatArray
+    """(4,), zero"""
     measured_N: FloatArray
     """Readings of load cells at the winches, (n,)."""
     measured: BoolArray
     """Whether they are valid, (n,)."""
+    upward: FloatArray
+    """Reading of an inclinometer, (4,)."""
 
 
 @jit
@@ -126,7 +132,7 @@ def track_pose(
     if freedom == TURNS:
         _turn_to_equilibrium(motors, filters, geometry, pose, rotation, swing)
     elif freedom == HANGS:
-        _hang(motors, filters, geometry, pose, cables, hanging)
+        _hang(motors, filters, geometry, pose, cables, swing, hanging)
     _, _, cost = find_pose(geometry, cables, solver, motors[LENGTH], pose, _NO_RESTARTS)
     stretch(motors, cables, up)
     n, residual, suspect, jump, jumped = motors.shape[1], math.sqrt(cost), -1, 0.0, -1
@@ -174,11 +180,13 @@ def _hang(
     geometry: FloatArray,
     pose: FloatArray,
     cables: FloatArray,
+    swing: FloatArray,
     hanging: Hanging,
 ) -> None:
     """Turn the platform towards its equilibrium, or at home's height to its rotation on the stand.
 
-    The true platform swings about the equilibrium, and follows it no faster than LAG.
+    The true platform swings about the equilibrium, and follows it no faster than LAG. Only an
+    inclinometer shows the amplitude of that swing.
     """
     lag_s = hanging.settings[LAG]
     share = filters[PERIOD] / (filters[PERIOD] + lag_s)
@@ -189,14 +197,21 @@ def _hang(
             back[k] = 0.0 if k < 3 else share * hanging.scratch[0, k - 3]
         move(pose, back)
         return
+    slow = filters[PERIOD] / (filters[PERIOD] + _SENSED_S) if lag_s > 0.0 else 1.0
     equilibrium.say_tensions(
         motors[TENSION], hanging.measured_N, hanging.measured, geometry, cables, hanging.known,
-        hanging.tensions,
+        hanging.tensions, slow,
     )  # fmt: skip
     equilibrium.turn_to_equilibrium(
-        geometry, motors[LENGTH], pose, cables, hanging.known, hanging.tensions, hanging.normal,
-        hanging.rows, share,
+        geometry, motors[LENGTH], pose, cables, hanging.known, hanging.unsensed, hanging.tensions,
+        hanging.normal, hanging.rows, share,
     )  # fmt: skip
+    if hanging.upward[0] > 0.0:
+        angle = equilibrium.learn_moment(
+            pose, hanging.known, hanging.upward, hanging.rows, min(slow, _MOST_LEARNT)
+        )
+        swing[AMPLITUDE] = max(angle, (1.0 - slow) * swing[AMPLITUDE])
+        swing[AMPLITUDE_m] = hanging.settings[REACH_m] * swing[AMPLITUDE]
 
 
 @jit

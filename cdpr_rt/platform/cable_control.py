@@ -20,9 +20,11 @@ from cdpr_rt.errors import GeometryError
 from cdpr_rt.jit import bound
 from cdpr_rt.model import pose_tracking as tracking
 from cdpr_rt.model.cable_kernel import (
+    ANCHOR,
     ARC,
     CABLE_ROWS,
     FREE,
+    RADIUS,
     run_cables,
     write_tension_rises,
 )
@@ -32,6 +34,7 @@ from cdpr_rt.model.own_distribution import OwnDistribution, TensionDistribution
 from cdpr_rt.model.platform_model import PlatformModel
 from cdpr_rt.model.pose import Pose, place_text
 from cdpr_rt.model.pose_search import DISTINCT
+from cdpr_rt.model.rigid_body import in_space
 from cdpr_rt.model.robot_arrays import LEAST_REDUNDANCY
 from cdpr_rt.model.tension_distribution import TensionOutcome, TensionSolver
 from cdpr_rt.model.tension_split import OK, split
@@ -238,6 +241,7 @@ def cell_check(model: PlatformModel, axes: Sequence[RobotAxis], period_s: float)
 
 
 _ON_STAND = 0.1  # of the integral part
+_NO_TILT = "the inclinometer gives no valid reading: the pose is less accurate"
 _SETTLING_STEPS, _LIFT_S, _COMES_AFTER_S = 60, 0.05, 0.1
 
 
@@ -334,12 +338,15 @@ class CableControl(PlaceChecks):
         self._planned_at = (found, self._pose.array) if follows else (wanted, self._wanted.array)
         filters = tracking_filters(self.gains, self._period_s)
         self._swing, self._seven, position = np.zeros(tracking.SWING), np.zeros(7), np.zeros(n)
+        arms = kinematics.geometry[ANCHOR:RADIUS].T - in_space(model.platform.centre_of_mass_m)
+        reach_m = float(np.linalg.norm(arms, axis=1).max())
         self._hanging = tracking.Hanging(
             known_of(model.platform, model.reserve_N), np.zeros((TENSIONS, n)),
-            np.zeros((6 + n, 6 + n)), np.zeros((8, 6 + n)), np.array([tracking.LAG_S]),
-            self._home.array, np.zeros((4, 3)), np.zeros(n), np.zeros(n, np.bool_),
+            np.zeros((6 + n, 6 + n)), np.zeros((8, 6 + n)), np.array([tracking.LAG_S, reach_m]),
+            self._home.array, np.zeros((4, 3)), np.zeros(4), np.zeros(n), np.zeros(n, np.bool_),
+            np.zeros(4),
         )  # fmt: skip
-        self._hanging.tensions[:] = self.low_N
+        self._hanging.tensions[0] = self.low_N
 
         def track_with(hanging: tracking.Hanging) -> Callable[..., Any]:
             return bound(
@@ -496,12 +503,17 @@ class CableControl(PlaceChecks):
         if self.learning is not None:
             self.learning.forget()
 
-    def measure_tensions(self, tension_N: FloatArray, measured: BoolArray) -> None:
+    def measure_tensions(
+        self, tension_N: FloatArray, measured: BoolArray, upward: FloatArray
+    ) -> None:
         """Correct the cables' tensions by readings (n,) that others keep up to date, if valid.
 
         Without a reading the control relies on the motor's torque constant and known losses.
+        `upward` (4,) is the reading of an inclinometer, for a platform that hangs freely.
         """
-        self._hanging = self._hanging._replace(measured_N=tension_N, measured=measured)
+        self._hanging = self._hanging._replace(
+            measured_N=tension_N, measured=measured, upward=upward
+        )
         self._track = self._track_with(self._hanging)
         learnt_Nm = np.zeros(len(tension_N)) if self.learning is None else self.learning.torque_Nm
         self._cells = CellFeedback(
@@ -510,8 +522,9 @@ class CableControl(PlaceChecks):
         )  # fmt: skip
 
     def notices(self) -> list[str]:
-        """Return which load cell is wrong and if the loop oscillates, until `clear_notices`."""
-        return [text for text in (self._check.trouble, self._oscillation.trouble) if text]
+        """Return which sensor is wrong and if the loop oscillates, until `clear_notices`."""
+        silent = _NO_TILT * bool(self._hanging.upward[0] < 0.0)
+        return [text for text in (self._check.trouble, self._oscillation.trouble, silent) if text]
 
     def clear_notices(self) -> None:
         """Forget the findings about load cells and loop."""

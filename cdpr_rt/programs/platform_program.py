@@ -153,7 +153,7 @@ class PlatformParts:
         self.estimator = estimator
         self._origins_lost = estimator.origins_lost
         known = estimator.estimate
-        control.measure_tensions(known.tension_N, known.tension_measured)
+        control.measure_tensions(known.tension_N, known.tension_measured, known.upward)
         self.period_s = period_s
         self.speed, self.acceleration = model.speed, model.acceleration
         """The most along each direction, (d,)."""

@@ -1,23 +1,30 @@
-"""Load-cell amplifiers on one serial line, sampled by a task beside the control cycle."""
+"""Load cells and an inclinometer on one serial line, sampled by a task beside the cycle."""
 
 from __future__ import annotations
 
+import math
 import struct
 from dataclasses import dataclass
 from typing import Final, Self
+
+import numpy as np
 
 from cdpr_drivers.modbus.channel import LineError, ModbusError, ModbusLine
 from cdpr_profiles.tension_sensor import (
     MOST_REGISTERS,
     REGISTERS,
     Amplifier,
+    AngleValue,
     DataType,
+    Inclinometer,
+    RawValue,
     RegisterKind,
     TensionSensors,
-    ValueMap,
 )
+from cdpr_rt.arrays import FloatArray
 from cdpr_rt.core.clock import Clock, Task
 from cdpr_rt.core.exchange import TensionExchange, TensionFault
+from cdpr_rt.model.rigid_body import rotation
 
 _FORMATS: Final[dict[DataType, str]] = {
     "int16": ">h",
@@ -38,7 +45,7 @@ class Reading:
     fault: TensionFault
 
 
-def raw_value(value: ValueMap, registers: list[int]) -> float:
+def raw_value(value: RawValue, registers: list[int]) -> float:
     """Return the number that registers hold, in the units of the amplifier."""
     words = registers if value.word_order == "big" else registers[::-1]
     packed = struct.pack(f">{len(words)}H", *words)
@@ -62,11 +69,13 @@ class LoadCells:
             timeout_s=profile.answer_timeout_s,
             retries=profile.retries,
         )
-        self._requests = _requests(profile.amplifier)
+        amplifier = profile.amplifier
+        self._requests = [] if amplifier is None else _requests(amplifier)
 
     def read(self, number: int) -> Reading:
         """Read one load cell, counted from 0."""
         sensor, amplifier = self.profile.sensors[number], self.profile.amplifier
+        assert amplifier is not None  # there are sensors
         got = {
             (kind, start + i): word
             for kind, start, count in self._requests
@@ -86,10 +95,30 @@ class LoadCells:
             fault = TensionFault.OVER_RANGE
         return Reading(sensor.cable, tension, fault)
 
+    def upward(self, tilt: Inclinometer) -> FloatArray:
+        """Read the inclinometer; return the upward direction in the platform's frame, (3,)."""
+        roll, pitch = self._angle(tilt.unit, tilt.roll), self._angle(tilt.unit, tilt.pitch)
+        x, y = -math.sin(pitch), math.sin(roll)
+        if tilt.angles == "roll-pitch":
+            y *= math.cos(pitch)
+        below = math.cos(roll) < 0.0
+        z = math.sqrt(max(1.0 - x * x - y * y, 0.0)) * (-1.0 if below else 1.0)
+        return np.asarray(rotation(np.array(tilt.mounting_rad)) @ [x, y, z])
+
+    def _angle(self, unit: int, value: AngleValue) -> float:
+        words = self.line.registers(value.kind, unit, value.address, REGISTERS[value.type])
+        angle = raw_value(value, words) * value.scale_rad - value.zero_rad
+        if not abs(angle) <= math.pi:
+            raise ModbusError(
+                f"inclinometer: an angle of {angle:.4g} rad; check type and scale_rad"
+            )
+        return angle
+
     def tare(self, number: int) -> None:
         """Set an amplifier's present reading as its zero; needs `amplifier.tare`."""
-        tare = self.profile.amplifier.tare
-        assert tare is not None
+        amplifier = self.profile.amplifier
+        assert amplifier is not None and amplifier.tare is not None
+        tare = amplifier.tare
         self.line.write_register(self.profile.sensors[number].unit, tare.address, tare.value)
 
     def close(self) -> None:
@@ -127,6 +156,11 @@ class TensionSampler:
         self.errors = [""] * len(names)
         self.readings = [0] * len(names)
         """Good answers of each sensor so far."""
+        self.tilt_error = ""
+        """The last error of the inclinometer."""
+        self._tilt = profile.inclinometer
+        if self._tilt is not None:
+            self.exchange.publish_upward(None, 0.0)
         self._cells = LoadCells(profile, port, clock)
         self._clock = clock
         self._rounds = 0
@@ -140,7 +174,15 @@ class TensionSampler:
 
     def await_readings(self, timeout_s: float) -> None:
         """Wait until every sensor has been read at least once; raises ModbusError."""
-        if not self._clock.wait(lambda: all(self.readings), self._clock.now_s + timeout_s):
+        upward = self.exchange.feedback.upward
+
+        def read() -> bool:
+            return all(self.readings) and (self._tilt is None or bool(upward[1:].any()))
+
+        if not self._clock.wait(read, self._clock.now_s + timeout_s):
+            if all(self.readings):
+                why = self.tilt_error or f"inclinometer: no reading within {timeout_s:g} s"
+                raise ModbusError(why)
             missing = self.readings.index(0)
             cable = self.exchange.cables[missing]
             why = self.errors[missing] or f"no reading within {timeout_s:g} s"
@@ -191,4 +233,14 @@ class TensionSampler:
             self.errors[number] = ""
             self.exchange.publish(number, reading.tension_N, asked_s, reading.fault)
             self.readings[number] += 1
+        if self._tilt is not None:
+            asked_s = self._clock.now_s
+            try:
+                self._cells.line.retrying = not self.tilt_error
+                self.exchange.publish_upward(self._cells.upward(self._tilt), asked_s)
+                self.tilt_error = ""
+            except LineError:
+                return _REOPEN_S
+            except ModbusError as error:
+                self.tilt_error = str(error)
         return 0.0

@@ -23,7 +23,7 @@ from cdpr_profiles import DriveProfile
 from cdpr_profiles.catalogue import load_rail_drive
 from cdpr_profiles.eds import load_dictionary
 from cdpr_profiles.rail import Cia402Rail, RailProfile
-from cdpr_profiles.tension_sensor import load_tension_sensors
+from cdpr_profiles.tension_sensor import load_load_cells
 from cdpr_rt.core.clock import Clock, PacedClock
 from cdpr_rt.loop.operating import Notifier
 
@@ -255,7 +255,8 @@ def slack_watch(
         return
     if port is None:
         raise ConfigurationError("--sensors: also give the serial port, --tension-port")
-    with TensionSampler(load_tension_sensors(sensors), port, clock) as sampler:
+    profile, _ = load_load_cells(sensors)
+    with TensionSampler(profile, port, clock) as sampler:
         sampler.await_readings(_FIRST_READINGS_S)
         exchange = sampler.exchange
 

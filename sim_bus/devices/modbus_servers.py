@@ -22,6 +22,7 @@ from pymodbus.framer.rtu import FramerRTU
 from pymodbus.server import ModbusSerialServer, ModbusTcpServer
 from pymodbus.simulator import DataType, SimData, SimDevice
 
+from cdpr_sim_bus.devices.sim_inclinometer import SimInclinometer
 from cdpr_sim_bus.devices.sim_load_cells import SimAmplifier, TensionFault
 from cdpr_sim_bus.errors import BusSetupError
 
@@ -183,7 +184,12 @@ class RtuServer:
     """
 
     def __init__(
-        self, units: Sequence[SimAmplifier], baudrate: int, bits_per_byte: int, *, lockstep: bool
+        self,
+        units: Sequence[SimAmplifier | SimInclinometer],
+        baudrate: int,
+        bits_per_byte: int,
+        *,
+        lockstep: bool,
     ) -> None:
         self._units = {unit.unit: unit for unit in units}
         self._byte_s = bits_per_byte / baudrate
@@ -305,7 +311,7 @@ class RtuServer:
 
 
 async def serve_rtu(
-    units: Sequence[SimAmplifier],
+    units: Sequence[SimAmplifier | SimInclinometer],
     baudrate: int,
     *,
     bits_per_byte: int,

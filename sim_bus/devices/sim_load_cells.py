@@ -12,11 +12,11 @@ from pydantic import Field
 from pymodbus.constants import ExcCodes
 from pymodbus.simulator import DataType, SimData, SimDevice
 
-from cdpr_profiles.tension_sensor import REGISTERS, Sensor, TensionSensors, ValueMap
+from cdpr_profiles.tension_sensor import REGISTERS, RawValue, Sensor, TensionSensors
 from cdpr_sim_bus.physics_board import BoardAxis
 from cdpr_sim_bus.plant_file import PlantFile
 
-_HOLDING_CODES = (3, 6, 16, 22, 23)
+HOLDING_CODES = (3, 6, 16, 22, 23)
 _BEYOND = 1.02
 """A converter's range is slightly larger than the specified range."""
 
@@ -35,6 +35,10 @@ class AmplifierPlant(PlantFile):
     """Relative error of every load cell."""
     zero_spread_N: Annotated[float, Field(ge=0.0, le=1000.0)] = 0.5
     """Standard deviation of the zeros of the load cells."""
+    tilt_noise_rad: Annotated[float, Field(ge=0.0, le=0.1)] = 0.0005
+    """Standard deviation of a reading of the inclinometer."""
+    tilt_zero_spread_rad: Annotated[float, Field(ge=0.0, le=0.1)] = 0.001
+    """Standard deviation of its zeros."""
 
 
 class TensionFault(Enum):
@@ -61,6 +65,7 @@ class SimAmplifier:
     ) -> None:
         self.unit = sensor.unit
         self.fault = TensionFault.NONE
+        assert profile.amplifier is not None  # there are sensors
         self._map = profile.amplifier
         self._plant = plant
         self._axis = axis
@@ -124,7 +129,7 @@ class SimAmplifier:
     ) -> ExcCodes | None:
         if values:
             return self._write(address, [int(value) for value in values])
-        kind = "holding" if code in _HOLDING_CODES else "input"
+        kind = "holding" if code in HOLDING_CODES else "input"
         raw, status = self._show()
         value, where = self._map.value, self._map.status
         if value.kind == kind:
@@ -158,14 +163,14 @@ class SimAmplifier:
             bits = _bit(status.broken_wire_bit if status else None)
         elif over or reading < map_.lowest_N:
             bits = _bit(status.over_range_bit if status else None)
-        return _registers(raw, value), bits
+        return registers_of(raw, value), bits
 
 
 def _bit(number: int | None) -> int:
     return 0 if number is None else 1 << number
 
 
-def _registers(raw: float, value: ValueMap) -> list[int]:
+def registers_of(raw: float, value: RawValue) -> list[int]:
     """Return a number in the format of a value's registers, saturated."""
     if value.type == "float32":
         packed = struct.pack(">f", raw)

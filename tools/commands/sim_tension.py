@@ -11,6 +11,7 @@ import typer
 
 from cdpr_profiles.tension_sensor import load_tension_sensors
 from cdpr_sim_bus.devices.modbus_servers import serve_rtu
+from cdpr_sim_bus.devices.sim_inclinometer import SimInclinometer
 from cdpr_sim_bus.devices.sim_load_cells import AmplifierPlant, SimAmplifier
 from cdpr_sim_bus.physics_board import PhysicsBoard, common_time
 from cdpr_tools.commands.options import ExitWithStdinOption
@@ -42,6 +43,8 @@ def tension(
 ) -> None:
     """Run simulated load cells on a pseudo-terminal until Ctrl-C; prints its path when ready.
 
+    If the file has an inclinometer, this is on the platform of the first board.
+
     Type a fault and a unit, such as `silent 3`, or `unplug`, to break it; `mend all` repairs it.
     """
     profile = load_tension_sensors(sensors)
@@ -53,10 +56,12 @@ def tension(
             raise BadInputError(
                 f"--board: {len(axes)} axes for {len(profile.sensors)} sensors of {sensors}"
             )
-        units = [
+        units: list[SimAmplifier | SimInclinometer] = [
             SimAmplifier(profile, sensor, truth, axis)
             for sensor, axis in zip(profile.sensors, axes, strict=False)
         ]
+        if profile.inclinometer is not None:
+            units.append(SimInclinometer(profile.inclinometer, truth, boards[0].platform))
         served = serve_rtu(
             units,
             profile.baudrate,

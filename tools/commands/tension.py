@@ -13,7 +13,7 @@ import typer
 from cdpr_drivers.bus import BusUrl
 from cdpr_drivers.modbus.tension import LoadCells, TensionSampler
 from cdpr_profiles import Winch, load_winch
-from cdpr_profiles.tension_sensor import TensionSensors, load_tension_sensors
+from cdpr_profiles.tension_sensor import TensionSensors, load_load_cells
 from cdpr_profiles.winch_calibration import WinchCalibration
 from cdpr_rt.core.clock import Clock, PacedClock
 from cdpr_tools.commands.options import (
@@ -71,7 +71,7 @@ def watch(
 ) -> None:
     """Show the tensions live, and their mean and spread at the end; reads only."""
     out = Output(as_json)
-    profile = load_tension_sensors(sensors)
+    profile, _ = load_load_cells(sensors)
     clock = PacedClock()
     with stop_on_signals() as stop_requested, TensionSampler(profile, port, clock) as sampler:
         figures = watching.watch(sampler, clock, out, seconds or float("inf"), stop_requested)
@@ -100,24 +100,24 @@ def tare(
     into the sensors' file.
     """
     out = Output(as_json)
-    profile = load_tension_sensors(sensors)
+    profile, amplifier = load_load_cells(sensors)
     chosen = [_number_of(profile, name) for name in cable or [s.cable for s in profile.sensors]]
     clock = PacedClock()
     cells = LoadCells(profile, port, clock)
     try:
         before = _means(cells, chosen, clock, seconds)
-        if profile.amplifier.tare is not None:
+        if amplifier.tare is not None:
             for number in chosen:
                 cells.tare(number)
-            clock.sleep(profile.amplifier.tare.settle_s)
-        after = _means(cells, chosen, clock, seconds) if profile.amplifier.tare else before
+            clock.sleep(amplifier.tare.settle_s)
+        after = _means(cells, chosen, clock, seconds) if amplifier.tare else before
     finally:
         cells.close()
     tared = []
     for number, was, now in zip(chosen, before, after, strict=True):
         sensor = profile.sensors[number]
         tared.append({"cable": sensor.cable, "before_N": was, "after_N": now})
-        if profile.amplifier.tare is not None:
+        if amplifier.tare is not None:
             out.say(f"{sensor.cable:12} {was:8.2f} N  ->  {now:8.2f} N")
         else:
             tared[-1]["zero_N"] = zero = sensor.zero_N + was
@@ -215,7 +215,7 @@ def calibrate(
         run.prepare(overwrite, yes, "the winch raises and lowers masses")
         run.by_masses(hoist, kilograms, gravity, board)
     else:
-        cells = load_tension_sensors(sensors or "")
+        cells, _ = load_load_cells(sensors or "")
         number = _number_of(cells, cable)
         speed = speed_mm_s or _ANCHOR_SPEED_mm_s
         pull = plan_anchor(profile, lowest_N, highest_N, speed * 1e-3, travel_mm * 1e-3)

@@ -31,7 +31,7 @@ from cdpr_profiles import Robot, Winch
 from cdpr_profiles.eds import load_dictionary
 from cdpr_profiles.robot import robot_of_winch
 from cdpr_profiles.robot_limits import Limit
-from cdpr_profiles.tension_sensor import load_tension_sensors
+from cdpr_profiles.tension_sensor import load_load_cells
 from cdpr_rt.core.clock import Clock
 from cdpr_rt.core.cycle import Watch
 from cdpr_rt.core.estimate import Estimator
@@ -83,7 +83,7 @@ def tension_watch(sensors: str | None, port: str | None) -> Watching:
         )
     if sensors is None or port is None:
         return no_watches
-    profile = load_tension_sensors(sensors)
+    profile, _ = load_load_cells(sensors)
 
     @contextmanager
     def watching(clock: Clock) -> Iterator[Sequence[Watch]]:
