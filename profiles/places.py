@@ -22,7 +22,7 @@ _DISTINCTIVE_KEYS: dict[ProfileKind, str] = {
     "cables": "breaking_force_kgf",
     "winches": "drum_radius_m",
     "robots": "axes",
-    "tension_sensors": "amplifier",
+    "tension_sensors": "baudrate",
 }
 """A key that all files of a kind have, and files of no other kind."""
 SERIES = ".series.toml"

@@ -28,7 +28,7 @@ CELL, IO, CIA402, MODBUS = (
         (CELL, "baudrate = 115200", "baud = 115200", "baud: unknown key; did you mean 'baudrate'"),
         (CELL, 'type = "int32"', 'type = "int24"', "amplifier.value.type: value 'int24'"),
         (CELL, 'address = 0\ntype = "int32"', 'address = 65535\ntype = "int32"',
-         "value.address: 65535 for int32; allowed: up to 65534"),
+         "amplifier.value: address: 65535 for int32; allowed: up to 65534"),
         (CELL, "scale_N = 0.01", "scale_N = 0.0", "amplifier.value.scale_N"),
         (CELL, "unit = 1", "unit = 248", "sensors[0].unit: value 248"),
         (CELL, "lowest_N = -100.0", "lowest_N = 2000.0", "lowest_N = 2000.0 must be below 1000.0"),
