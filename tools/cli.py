@@ -50,6 +50,7 @@ MODULES = {
     },
     "daemon_state": {
         "status": "Show the state of the daemon and its robot.",
+        "page": "Print the address of the robot's page for a browser, or open it.",
         "check": "Boot the drives again and check the bus, without power.",
         "enable": "Switch the drives on; they hold their position.",
         "disable": "Stop the motion under control, then switch the drives off.",
@@ -106,7 +107,7 @@ MODULES = {
     },
 }
 PANELS = {
-    "Run": ("run", "status", "check", "enable", "ack", "service-unit"),
+    "Run": ("run", "page", "status", "check", "enable", "ack", "service-unit"),
     "Move": ("tighten", "move", "jog", "path", "controller", "teleop", "resume"),
     "Stop": ("hold", "lower", "disable", "stop", "estop"),
     "Look": ("log", "bus"),
@@ -129,8 +130,8 @@ ALIASES = {
 GUESSES = {
     "goto": "this moves the robot: type `cdpr move --to X Y [Z]`",
     "home": "this moves the robot: `cdpr lower` puts the platform on its stand",
-    "gui": "there is no page in a browser yet; `cdpr teleop robot ROBOT` moves a robot by keyboard,"
-    " `cdpr run ROBOT --live PORT` shows it in Foxglove",
+    "gui": "`cdpr page` prints the address of a running robot's page for a browser, and "
+    "`cdpr run ROBOT --open` starts a robot and opens it",
 }
 """What users type for something that moves, or does not exist, and the answer."""
 STOPS = """Which stop do I want? In danger: the emergency-stop button, no command.

@@ -21,6 +21,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from cdpr_profiles.bounded_input import is_mostly_text
 from cdpr_rt.loop.stop_socket import STOPS
+from cdpr_rt.service.page import PAGE_PREFIX
 
 # A ticket opens one WebSocket instead of the key: browsers send no header with the request.
 
@@ -71,6 +72,7 @@ _MOST_PEERS: Final = 1024
 _MOST_FIELDS = 16
 STOP_PATHS: Final = frozenset(f"/{do}" for do in STOPS)
 _PUBLIC_PATHS = frozenset({"/", "/status", "/docs", "/openapi.json"})
+_LOCAL_PATHS: Final = frozenset({"/page-address"})
 _KEYLESS_STOPS = frozenset({("http", "POST", "/hold"), ("http", "POST", "/disable")})
 _LIVE_PATH = "/live"
 _HEADERS = [(b"x-content-type-options", b"nosniff"), (b"cache-control", b"no-store")]
@@ -87,9 +89,11 @@ class AccessPolicy:
     """Access policy of one listener."""
 
     key: bytes | None = None
-    """The shared key, required beyond the status; without one nobody can move or end anything here.
+    """The key, required beyond the status and the page's files; without one nobody can move."""
+    open_reading: bool = False
+    """Whether every client that can connect may watch, hold and disable without the key.
 
-    Any user of the machine can reach a loopback address: they may watch and stop.
+    For a loopback address without a key file, which any user of the machine can reach.
     """
     local: bool = False
     """A Unix socket: its file's permissions limit who may connect; clients may do everything."""
@@ -97,14 +101,16 @@ class AccessPolicy:
     """Names of this machine, in addition to localhost and numeric addresses."""
 
     @classmethod
-    def on_tcp(cls, key: bytes | None, host: str, *, loopback: bool = False) -> AccessPolicy:
+    def on_tcp(
+        cls, key: bytes | None, host: str, *, loopback: bool = False, open_reading: bool = False
+    ) -> AccessPolicy:
         """Return the policy of a listener on TCP at `host`.
 
         The listener also answers to this machine's names, except on loopback: there nobody needs
         them, and on a network without DNS any machine may answer to them.
         """
         names = frozenset[str]() if loopback else names_of_this_machine()
-        return cls(key, hosts=names | {host.lower()})
+        return cls(key, open_reading, hosts=names | {host.lower()})
 
 
 def names_of_this_machine() -> frozenset[str]:
@@ -213,11 +219,14 @@ class AccessControl:
             await self._throttle(peer)
             raise _RefusedError(
                 HTTPStatus.UNAUTHORIZED,
-                "Authorization: Bearer KEY is missing or wrong"
-                if self._policy.key
-                else "this daemon has no key: over TCP everybody may read, hold and disable; for "
-                "the rest use the Unix socket, or start the daemon with --key-file",
+                "this daemon has no key file: over TCP everybody may read, hold and disable; for "
+                "the rest use the Unix socket or the page (`cdpr page` prints its address), or "
+                "start the daemon with --key-file"
+                if self._policy.key is None or self._policy.open_reading
+                else "Authorization: Bearer KEY is missing or wrong",
             )
+        if scope["path"] in _LOCAL_PATHS and not self._policy.local:
+            raise _RefusedError(HTTPStatus.FORBIDDEN, f"{scope['path']}: only on the Unix socket")
         if _is_stop(scope):
             return ""
         token = headers.get(b"x-control-token", b"").decode("latin-1")
@@ -268,8 +277,8 @@ class AccessControl:
         """Whether every client that can connect may request this, with or without the key."""
         kind, method, path = scope["type"], scope.get("method", ""), scope["path"]
         reads = kind == "http" and method in ("GET", "HEAD")
-        if self._policy.key is not None:
-            return reads and path in _PUBLIC_PATHS
+        if self._policy.key is not None and not self._policy.open_reading:
+            return reads and (path in _PUBLIC_PATHS or path.startswith(PAGE_PREFIX))
         looks_on = kind == "websocket" and path == _LIVE_PATH
         return reads or looks_on or (kind, method, path) in _KEYLESS_STOPS
 

@@ -39,8 +39,9 @@ from cdpr_rt.service.link import (
     LoopGoneError,
     Reply,
 )
+from cdpr_rt.service.page import add_page
 from cdpr_rt.service.rows import newest_row
-from cdpr_rt.service.service import PlannerBusyError, Service
+from cdpr_rt.service.service import InjectionError, PlannerBusyError, Service
 from cdpr_rt.service.setpoint_stream import StreamError
 from cdpr_rt.service.websocket_routes import WebSocketRoutes
 
@@ -257,6 +258,7 @@ _STATUS: Final[dict[type[Exception], HTTPStatus]] = {
     LoopBusyError: HTTPStatus.SERVICE_UNAVAILABLE,
     CommandTooLongError: HTTPStatus.REQUEST_ENTITY_TOO_LARGE,
     StreamError: HTTPStatus.NOT_FOUND,
+    InjectionError: HTTPStatus.CONFLICT,
 }
 _ERRORS: Final[dict[int | str, dict[str, Any]]] = {
     400: {"model": models.Error, "description": "The body is not JSON"},
@@ -276,6 +278,12 @@ _REFUSALS: Final[dict[int | str, dict[str, Any]]] = {
 }
 _NO_STREAM: Final[dict[int | str, dict[str, Any]]] = {
     404: {"model": models.Error, "description": "No set-point stream is received"},
+}
+_NO_PAGE: Final[dict[int | str, dict[str, Any]]] = {
+    404: {"model": models.Error, "description": "No page is served"},
+}
+_NO_SIMULATION: Final[dict[int | str, dict[str, Any]]] = {
+    404: {"model": models.Error, "description": "The robot has real drives"},
 }
 _TOKEN_MOST = 64
 Token = Annotated[
@@ -310,7 +318,9 @@ def create_app(service: Service) -> FastAPI:
     _add_open_commands(app, service)
     _add_motion(app, service)
     _add_path(app, service)
+    _add_simulation(app, service)
     WebSocketRoutes(service).add(app)
+    add_page(app)
     _add_key(app)
     _add_programs(app, service)
     return app
@@ -427,8 +437,14 @@ def _add_reading(app: FastAPI, service: Service) -> None:
         """Figures for Prometheus."""
         return Response(metrics.text(), media_type="text/plain; version=0.0.4; charset=utf-8")
 
+    @app.get("/page-address", responses=_NO_PAGE)
+    async def page_address() -> models.PageAddress:
+        """The page's address with its key; only on the Unix socket."""
+        if not service.page_url:
+            raise HTTPException(404, "no page: the daemon was started with --no-page")
+        return models.PageAddress(url=service.page_url)
+
     @app.get("/docs", include_in_schema=False)
-    @app.get("/", include_in_schema=False)
     async def docs() -> Response:
         return docs_page(app.openapi())
 
@@ -534,6 +550,17 @@ def _add_motion(app: FastAPI, service: Service) -> None:
     async def lengths(body: models.Set, request: Request, token: Token = None) -> models.Done:
         """Set the present lengths of the cables: `cable_length_m`, one for each axis or null."""
         return await ask("lengths", body, token, request, wanted=body.wanted)
+
+
+def _add_simulation(app: FastAPI, service: Service) -> None:
+    @app.post("/simulated-fault", responses={**_REFUSALS, **_NO_SIMULATION})
+    async def simulated_fault(body: models.SimulatedFault) -> models.Injected:
+        """Break a simulated drive or cable, or mend it; only for a simulated robot."""
+        if service.inject is None:
+            raise HTTPException(404, "only a simulated robot can be broken on request")
+        text = await asyncio.to_thread(service.inject, body.axis, body.fault)
+        service.events.add("simulation", f"{text} by {body.client}")
+        return models.Injected(text=text)
 
 
 def _add_path(app: FastAPI, service: Service) -> None:

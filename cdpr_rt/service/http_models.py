@@ -172,6 +172,19 @@ class PathFile(ClientRequest):
     line: Annotated[int, Field(ge=0, le=1 << 24, description="Line of the file to begin with.")] = 0
 
 
+class SimulatedFault(ClientRequest):
+    """A fault for one axis of a simulated robot, or its repair."""
+
+    axis: Annotated[int, Field(ge=0, le=63, description="Number of the axis, from 0.")]
+    fault: Annotated[
+        str,
+        Field(
+            pattern="^[a-z-]{1,32}$",
+            description="As for `cdpr sim fault`, such as cut-cable; mend repairs.",
+        ),
+    ]
+
+
 class Set(ClientRequest):
     """New arguments of the running program."""
 
@@ -211,6 +224,12 @@ class Done(_Answer):
     state: str
 
 
+class Injected(_Answer):
+    """What is broken or mended now."""
+
+    text: str
+
+
 class Planned(_Answer):
     """A path that is being planned, or was planned last."""
 
@@ -241,6 +260,12 @@ class Ticket(_Answer):
 
     ticket: str
     valid_s: float
+
+
+class PageAddress(_Answer):
+    """Address of the page, with the key that moves the robot."""
+
+    url: str
 
 
 class StreamAccess(_Answer):

@@ -114,6 +114,10 @@ WAIT_S: Final = {
 _WAIT_S = 3.0
 
 
+class InjectionError(ControlError):
+    """A fault could not be injected into a simulated drive."""
+
+
 class Service:
     """One daemon's service: made once, used by all routes."""
 
@@ -136,10 +140,14 @@ class Service:
         """Further coroutines that run while the service does, until cancelled."""
         self.http: tuple[str, int] | None = None
         """Address at which it listens on TCP, None if it does not."""
+        self.page_url = ""
+        """Address of the page with its key, "" if there is none."""
         self.end_daemon: Callable[[], None] = lambda: None
         """Ends the daemon if its loop has died and no command can reach it."""
         self.wake_launcher: Callable[[], None] = lambda: None
         """Resumes the launcher if it was stopped (SIGSTOP, Ctrl-Z)."""
+        self.inject: Callable[[int, str], str] | None = None
+        """Breaks or mends a simulated axis and returns what it did; None for real drives."""
         self._held_by = ""
         self._noted: Reply | None = None
         self._stops_taken = int(self.link.status().get("stops", {}).get("taken", 0))

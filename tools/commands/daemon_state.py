@@ -1,4 +1,4 @@
-"""`cdpr status|check|enable|disable|hold|ack|stop`: show and change a daemon's state."""
+"""`cdpr status|page|check|enable|disable|hold|ack|stop`: show and change a daemon's state."""
 
 from __future__ import annotations
 
@@ -22,6 +22,7 @@ from cdpr_tools.client.status_text import (
     next_steps,
     status_text,
 )
+from cdpr_tools.commands.browser import open_page
 from cdpr_tools.commands.options import (
     JsonOption,
     KeyFileOption,
@@ -63,6 +64,24 @@ def status(
     else:
         out.say(*status_text(state))
     out.result({"ok": state["state"] not in ("fault", "dead"), **state})
+
+
+@app.command()
+@with_daemon
+def page(
+    daemon: Daemon,
+    out: Output,
+    open_it: Annotated[bool, typer.Option("--open", help="Open it in a browser.")] = False,
+) -> None:
+    """Print the address of the robot's page for a browser, or open it.
+
+    The address contains a key: whoever has it may move the robot.
+    """
+    address = daemon.get("/page-address")
+    if open_it:
+        open_page(address["url"], out)
+    out.say(address["url"])
+    out.result(address)
 
 
 def _watch(daemon: Daemon, out: Output, state: dict[str, Any]) -> dict[str, Any]:

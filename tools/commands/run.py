@@ -35,6 +35,7 @@ from cdpr_rt.diagnosis.checks import refuse_impossible
 from cdpr_rt.service.listening import listener_pid
 from cdpr_rt.service.retention import BYTES_PER_AXIS, Retention, size_text
 from cdpr_rt.state_file import make_private_folder
+from cdpr_tools.commands.browser import open_page
 from cdpr_tools.commands.options import (
     AllowCodeOption,
     ControllerOption,
@@ -86,8 +87,16 @@ def run(
     ] = None,
     http: Annotated[
         str | None,
-        typer.Option(metavar="HOST:PORT", help="Also listen at this address."),
+        typer.Option(
+            metavar="HOST:PORT", help="Listen at this address, not at a free port of loopback."
+        ),
     ] = None,
+    no_page: Annotated[
+        bool, typer.Option("--no-page", help="Serve no page for a browser: listen at no port.")
+    ] = False,
+    open_it: Annotated[
+        bool, typer.Option("--open", help="Open the robot's page in a browser.")
+    ] = False,
     unix: Annotated[
         Path | None,
         typer.Option("--socket", help="Unix socket of the control interface, if not the default."),
@@ -176,13 +185,16 @@ def run(
     profile = load_calibrated(robot)
     refuse_simulated_calibration(profile, bus or ())
     settings = settings_for(
-        profile, bus=bus, plant=plant, http=http, unix=unix, key_file=key_file, record=record,
-        no_record=no_record, keep_days=keep_days, keep_gb=keep_gb, live=live,
-        live_origin=live_origin, stream=stream, no_stream=no_stream, read_only=read_only,
-        safety_io=safety_io, tension_port=tension_port, commissioned=commissioned,
+        profile, bus=bus, plant=plant, http=http, no_page=no_page, unix=unix,
+        key_file=key_file, record=record, no_record=no_record, keep_days=keep_days, keep_gb=keep_gb,
+        live=live, live_origin=live_origin, stream=stream, no_stream=no_stream,
+        read_only=read_only, safety_io=safety_io, tension_port=tension_port,
+        commissioned=commissioned,
         own=OwnCodeOptions(controller, tension_distribution, tuple(program or ())),
         allow_code=allow_code,
     )  # fmt: skip
+    if open_it and settings.http is None:
+        raise BadInputError("--open and --no-page: give only one of them")
     if camera is not None and not starts_own_simulator(bus or ()):
         raise BadInputError("--camera: only for a simulator that the command starts (simbus:)")
     _require_possible(settings.socket)
@@ -209,7 +221,7 @@ def run(
         if settings.own_simulator:
             simulator = _simulator(profile, settings, plant, camera, out, lock.tell)
             stack.callback(simulator.stop)
-        _launch(profile, settings, out, manager, simulator)
+        _launch(profile, settings, out, manager, simulator, open_it=open_it)
 
 
 def _end_with_stdin() -> None:
@@ -272,6 +284,7 @@ def settings_for(
     bus: list[str] | None,
     plant: Path | None,
     http: str | None,
+    no_page: bool = False,
     unix: Path | None,
     key_file: Path | None,
     record: Path | None,
@@ -296,6 +309,8 @@ def settings_for(
     load_profiles(with_commissioned(robot, commissioned))
     if record is not None and no_record:
         raise BadInputError("--record and --no-record: give only one of them")
+    if http is not None and no_page:
+        raise BadInputError("--http and --no-page: give only one of them")
     if stream is not None and no_stream:
         raise BadInputError("--stream and --no-stream: one of them")
     own = own or OwnCodeOptions()
@@ -321,7 +336,8 @@ def settings_for(
         commissioned=commissioned,
         own=own,
         socket=unix or default_socket(robot.profile),
-        http=None if http is None else Address.parse("--http", http),
+        http=_page_address(http, no_page),
+        http_asked=http is not None,
         key_file=key_file,
         record=None if no_record else record or default_recordings(),
         keep=_kept(record, keep_days, keep_gb),
@@ -330,6 +346,13 @@ def settings_for(
         stream=_stream_address(stream, no_stream or read_only),
         launcher_pid=os.getpid(),
     )
+
+
+def _page_address(http: str | None, off: bool) -> Address | None:
+    """Return where HTTP is served: by default at the first free port for pages on loopback."""
+    if http is None:
+        return None if off else Address(host="127.0.0.1", port=0)
+    return Address.parse("--http", http)
 
 
 def _stream_address(stream: str | None, off: bool) -> Address | None:
@@ -363,6 +386,8 @@ def _launch(
     out: Output,
     manager: ServiceManager,
     simulator: OwnSimulator | None,
+    *,
+    open_it: bool,
 ) -> None:
     block = SharedBlock.create(len(robot.axes), _RING_S, 1.0 / robot.sync_period_s)
     block.counters["start_monotonic_ns"] = time.monotonic_ns()
@@ -371,7 +396,11 @@ def _launch(
 
     def ready(status: dict[str, Any]) -> None:
         report = {"robot": robot.name, "state": status["state"], "reason": status.get("reason", "")}
-        _report_ready({**report, "socket": str(settings.socket), "pid": os.getpid()}, out)
+        report |= {"socket": str(settings.socket), "pid": os.getpid()}
+        url = settings.page_url()
+        if url and open_it:
+            open_page(url, out)
+        _report_ready(report, url, out)
 
     out.note(_recording_text(robot, settings))
     out.note("starting the control loop ...")
@@ -383,8 +412,12 @@ def _launch(
     out.result({"ok": True})
 
 
-def _report_ready(report: dict[str, Any], out: Output) -> None:
-    """Report on standard output that the daemon is ready, as JSON unless a person reads it."""
+def _report_ready(report: dict[str, Any], url: str, out: Output) -> None:
+    """Report on standard output that the daemon is ready, as JSON unless a person reads it.
+
+    Only a person sees the page's key: other readers of the output may be logs.
+    """
+    report["page"] = url.partition("#")[0] or None
     if out.as_json or not sys.stdout.isatty():
         print(to_json({"ready": report}), flush=True)
         return
@@ -392,6 +425,8 @@ def _report_ready(report: dict[str, Any], out: Output) -> None:
         f"{report['robot']}: {report['state']}"
         + (f": {report['reason']}" if report["reason"] else "")
     )
+    if url:
+        out.say(f"page {url}")
     out.say(f"socket {report['socket']}; Ctrl-C ends it")
     if report["state"] == "ready":
         out.say("next: `cdpr enable` in a second terminal")

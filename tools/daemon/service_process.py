@@ -32,7 +32,7 @@ from cdpr_rt.service.http_server import Server
 from cdpr_rt.service.listening import listen_unix
 from cdpr_rt.service.part import Part
 from cdpr_rt.service.recording import Recorder
-from cdpr_rt.service.service import Service
+from cdpr_rt.service.service import InjectionError, Service
 from cdpr_rt.service.setpoint_stream import SetpointStream
 from cdpr_tools.daemon.child import (
     end_with_launcher,
@@ -42,7 +42,7 @@ from cdpr_tools.daemon.child import (
     signal_launcher,
 )
 from cdpr_tools.daemon.settings import RunSettings
-from cdpr_tools.errors import DONE, FAILED, CommandError
+from cdpr_tools.errors import DONE, FAILED, BadInputError, CommandError
 from cdpr_tools.streams import guard_streams, outlive_output
 
 # Log lines that clients can trigger: a few of each kind a minute; the others are counted.
@@ -150,6 +150,8 @@ def main() -> int:
         partial(keep_progress, folder, block.counters["path"], simulated=settings.simulated)
     )
     service.planner.work = partial(plan_in_process, settings.robot)
+    if settings.simulated:
+        service.inject = partial(inject_fault, settings)
     try:
         asyncio.run(_serve(settings, service))
     except (ControlError, CommandError) as error:
@@ -242,11 +244,40 @@ def _listen(settings: RunSettings, app: ASGIApp, service: Service) -> list[Serve
     unix = listen_unix(settings.socket)
     servers = [Server(AccessControl(app, AccessPolicy(local=True), *shared), unix)]
     if (address := settings.http) is not None:
-        policy = AccessPolicy.on_tcp(settings.key(), address.host, loopback=address.is_loopback)
+        policy = AccessPolicy.on_tcp(
+            settings.page_key(),
+            address.host,
+            loopback=address.is_loopback,
+            open_reading=settings.http_asked and not settings.has_key,
+        )
         listener = socket.socket(fileno=settings.http_fd)
         service.http = listener.getsockname()[:2]
+        service.page_url = settings.page_url()
         servers.append(Server(AccessControl(app, policy, *shared), listener))
     return servers
+
+
+def inject_fault(settings: RunSettings, axis: int, fault: str) -> str:
+    """Break or mend one simulated axis; return what was done. Raises InjectionError."""
+    # loaded with the first fault: no real robot needs it
+    from cdpr_drivers.robot.robot_buses import robot_urls  # noqa: PLC0415
+    from cdpr_profiles import load_robot  # noqa: PLC0415
+    from cdpr_tools.composition.fault_injection import (  # noqa: PLC0415
+        MEND,
+        InjectionAccess,
+        fault_words,
+    )
+
+    try:
+        robot = load_robot(settings.robot)
+        if axis >= len(robot.axes):
+            raise BadInputError(f"axis {axis}; allowed: 0 to {len(robot.axes) - 1}")
+        one = robot.axes[axis]
+        with InjectionAccess(robot, one, robot_urls(robot, settings.buses)[one.bus]) as access:
+            amount = access.inject(fault, None)
+    except CommandError as error:
+        raise InjectionError(str(error)) from None
+    return f"{one.name}: {'mended' if fault == MEND else fault_words(fault, amount)}"
 
 
 _PATH_OPTIONS: Final = (

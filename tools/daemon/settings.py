@@ -10,8 +10,10 @@ import socket
 import stat
 import sys
 from collections.abc import Callable
+from contextlib import suppress
 from functools import partial
 from pathlib import Path
+from secrets import token_urlsafe
 from typing import Annotated, Self
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
@@ -27,6 +29,7 @@ _SECRET_CHARS, _MOST_KEY_BYTES = 16, 4096
 _ALL_SEALS = fcntl.F_SEAL_WRITE | fcntl.F_SEAL_GROW | fcntl.F_SEAL_SHRINK | fcntl.F_SEAL_SEAL
 _OPEN_TO_OTHERS = stat.S_IRWXG | stat.S_IRWXO
 _HIGHEST_PORT = 65535
+_PAGE_PORTS = range(8400, 8420)
 _LIVE_HOST = "127.0.0.1"
 _ORIGIN = re.compile(r"https?://[a-z0-9.-]+(:\d{1,5})?", re.IGNORECASE)
 
@@ -114,6 +117,9 @@ class RunSettings(BaseModel):
     """Serial port of the robot's tension sensors."""
     socket: _Path
     http: Address | None = None
+    http_asked: bool = False
+    """Whether the user gave `http`, for other programs than the page: then, on loopback without a
+    key file, everybody may read, hold and disable there."""
     key_file: _Path | None = None
     record: _Path | None = None
     """Folder for recordings; None to record nothing."""
@@ -132,6 +138,8 @@ class RunSettings(BaseModel):
     """Lock that marks the robot as in use, held until the last process that inherits it ends."""
     key_fd: int = -1
     """The key's descriptor, inherited only by the service, instead of `key_file`."""
+    page_key_fd: int = -1
+    """Descriptor of the page's key, made for this daemon; also inherited by the service."""
     http_fd: int = -1
     stream_fd: int = -1
     live_fd: int = -1
@@ -157,16 +165,15 @@ class RunSettings(BaseModel):
     def with_key_loaded(self) -> RunSettings:
         """Return settings that contain the key; its file is read now, once.
 
-        Processes started later inherit the key in sealed memory, even if the file changes. Raises
-        BadInputError.
+        Without a file, the page gets a key of its own. Processes started later inherit the key in
+        sealed memory, even if the file changes. Raises BadInputError.
         """
-        if self.key_file is None:
-            return self
-        key = read_key(self.key_file)
-        fd = os.memfd_create("cdpr-rt-key", os.MFD_CLOEXEC | os.MFD_ALLOW_SEALING)
-        os.write(fd, key)
-        fcntl.fcntl(fd, fcntl.F_ADD_SEALS, _ALL_SEALS)
-        return self.model_copy(update={"key_file": None, "key_fd": fd})
+        if self.key_file is not None:
+            fd = _sealed(read_key(self.key_file))
+            return self.model_copy(update={"key_file": None, "key_fd": fd})
+        if self.http is not None:
+            return self.model_copy(update={"page_key_fd": _sealed(token_urlsafe(24).encode())})
+        return self
 
     def with_ports_bound(self) -> RunSettings:
         """Return settings with sockets at `http`, `stream` and `live`, which are bound now, once.
@@ -174,7 +181,7 @@ class RunSettings(BaseModel):
         So no other process can take a trusted port between two services. Raises WorkFailedError.
         """
         asked: list[tuple[str, str, Address | None, Callable[[str, int], socket.socket]]] = [
-            ("--http", "http_fd", self.http, listen_tcp),
+            ("--http", "http_fd", self.http, listen_tcp if self.http_asked else _listen_page),
             ("--live", "live_fd", self._live_address, listen_tcp),
             ("--stream", "stream_fd", self.stream, partial(listen_udp, has_key=self.has_key)),
         ]
@@ -190,6 +197,16 @@ class RunSettings(BaseModel):
     def _live_address(self) -> Address | None:
         return None if self.live is None else Address(host=_LIVE_HOST, port=self.live)
 
+    def page_url(self) -> str:
+        """Return the page's address with its key, "" if nothing listens on TCP."""
+        if self.http is None:
+            return ""
+        with socket.socket(fileno=os.dup(self.http_fd)) as listener:
+            at = Address(host=self.http.host, port=listener.getsockname()[1])
+        if at.host in ("0.0.0.0", "::"):  # every address of this machine
+            at = Address(host=socket.gethostname(), port=at.port)
+        return f"http://{at}/#key={(self.page_key() or b'').decode()}"
+
     @property
     def shared_fds(self) -> tuple[int, ...]:
         """The descriptors that loop and service inherit."""
@@ -198,17 +215,38 @@ class RunSettings(BaseModel):
     @property
     def service_fds(self) -> tuple[int, ...]:
         """The descriptors that each service inherits, besides the shared memory's."""
-        fds = (self.key_fd, self.http_fd, self.stream_fd, self.live_fd)
+        fds = (self.key_fd, self.page_key_fd, self.http_fd, self.stream_fd, self.live_fd)
         return tuple(fd for fd in fds if fd >= 0)
 
     def key(self) -> bytes | None:
         """Return the shared key stored by the launcher, or None."""
         return None if self.key_fd < 0 else os.pread(self.key_fd, _MOST_KEY_BYTES, 0)
 
+    def page_key(self) -> bytes | None:
+        """Return the key for the page and other clients over TCP, or None."""
+        fd = self.key_fd if self.key_fd >= 0 else self.page_key_fd
+        return None if fd < 0 else os.pread(fd, _MOST_KEY_BYTES, 0)
+
     @classmethod
     def from_argv(cls) -> RunSettings:
         """Return the settings that the launcher passed to this process."""
         return cls.model_validate_json(sys.argv[1])
+
+
+def _listen_page(host: str, port: int) -> socket.socket:
+    """Return a socket at the first free port of `_PAGE_PORTS`, which browsers can remember."""
+    for usual in () if port else _PAGE_PORTS:
+        with suppress(ListenError):
+            return listen_tcp(host, usual)
+    return listen_tcp(host, port)
+
+
+def _sealed(key: bytes) -> int:
+    """Return the descriptor of memory that holds the key and that nobody can change."""
+    fd = os.memfd_create("cdpr-rt-key", os.MFD_CLOEXEC | os.MFD_ALLOW_SEALING)
+    os.write(fd, key)
+    fcntl.fcntl(fd, fcntl.F_ADD_SEALS, _ALL_SEALS)
+    return fd
 
 
 def read_key(path: Path) -> bytes:

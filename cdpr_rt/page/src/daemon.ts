@@ -1,0 +1,231 @@
+// The daemon's interface: requests with the key, live figures, and the right to move.
+import type { components, paths } from "./api";
+
+export type Status = components["schemas"]["Status"];
+export type DaemonEvent = components["schemas"]["Event"];
+type Path = keyof paths;
+
+/** A request that the daemon rejected, or that did not reach it. */
+export class Rejected extends Error {}
+
+/** What the description says about a platform; positions have two coordinates in a plane. */
+export interface Platform {
+  home_m: number[];
+  workspace_min_m: number[];
+  workspace_max_m: number[];
+  workspace_angle_rad: number;
+  exit_points_m: number[][];
+  anchor_points_m: number[][];
+  controlled: string[];
+  body: { min_m: number[]; max_m: number[] } | null;
+  obstacles: { min_m: number[]; max_m: number[] }[];
+  speed_m_s: number;
+  poses_m: Record<string, number[]>;
+}
+
+export interface Description {
+  robot: string;
+  axes: { name: string; motor: string }[];
+  limits: { tension_min_N: (number | null)[]; tension_max_N: (number | null)[] };
+  programs: string[];
+  platform: Platform | null;
+  simulated: boolean;
+}
+
+/** One cycle, reduced to what the page shows. */
+export interface Cycle {
+  time_s: number;
+  tension_N: (number | null)[];
+  tension_measured: boolean[];
+  /** x, y, z in m, then the quaternion w, x, y, z. */
+  pose: (number | null)[];
+  pose_setpoint: (number | null)[];
+}
+
+const FIELDS = "time_s,tension_N,tension_measured,pose,pose_setpoint";
+const RATE_Hz = 30;
+const RETRY_MS = 1000;
+const SILENT_MS = 4000;
+const KEY = "cdpr-key";
+
+/** Take the key from the address, where `cdpr run` puts it, and keep it for this tab. */
+function takeKey(): string {
+  const given = new URLSearchParams(location.hash.slice(1)).get("key");
+  if (given) {
+    sessionStorage.setItem(KEY, given);
+    history.replaceState(null, "", location.pathname);
+  }
+  return sessionStorage.getItem(KEY) ?? "";
+}
+
+let key = takeKey();
+
+export const hasKey = (): boolean => key !== "";
+
+export function setKey(text: string): void {
+  key = text;
+  sessionStorage.setItem(KEY, text);
+}
+
+export async function request<T>(
+  method: "GET" | "POST" | "PUT" | "DELETE", path: Path, body?: unknown, token?: string,
+): Promise<T> {
+  const headers: Record<string, string> = {};
+  if (key) headers["Authorization"] = `Bearer ${key}`;
+  if (body !== undefined) headers["Content-Type"] = "application/json";
+  if (token) headers["X-Control-Token"] = token;
+  let answer: Response;
+  try {
+    answer = await fetch(path, { method, headers, body: body === undefined ? null : JSON.stringify(body) });
+  } catch {
+    throw new Rejected("The daemon does not answer. Is `cdpr run` still running?");
+  }
+  const text = await answer.text();
+  if (answer.ok) return JSON.parse(text) as T;
+  let why = text;
+  try {
+    why = (JSON.parse(text) as { error: string }).error;
+  } catch {
+    // an answer that is not JSON is shown as it is
+  }
+  throw new Rejected(why);
+}
+
+async function socketTo(path: string, query: Record<string, string>): Promise<WebSocket> {
+  if (key) query["ticket"] = (await request<{ ticket: string }>("POST", "/ticket")).ticket;
+  return new WebSocket(`ws://${location.host}${path}?${new URLSearchParams(query)}`);
+}
+
+export interface LiveListener {
+  description(value: Description): void;
+  status(value: Status): void;
+  event(value: DaemonEvent): void;
+  cycle(value: Cycle): void;
+  connected(value: boolean): void;
+}
+
+/** Follow the daemon for as long as the page is open; a lost connection is tried again. */
+export function follow(listener: LiveListener): void {
+  void (async () => {
+    for (;;) {
+      try {
+        await watch(await socketTo("/live", { rate_Hz: String(RATE_Hz), fields: FIELDS }), listener);
+      } catch {
+        // tried again below
+      }
+      listener.connected(false);
+      await new Promise((resume) => setTimeout(resume, RETRY_MS));
+    }
+  })();
+}
+
+function watch(socket: WebSocket, listener: LiveListener): Promise<void> {
+  return new Promise((ended) => {
+    let heard = Date.now();
+    const watching = setInterval(() => {
+      if (Date.now() - heard > SILENT_MS) socket.close();
+    }, RETRY_MS);
+    socket.onmessage = ({ data }) => {
+      heard = Date.now();
+      const message = JSON.parse(data as string);
+      if (message.kind === "cycle") listener.cycle(message);
+      else if (message.kind === "status") listener.status(message.status);
+      else if (message.kind === "event") listener.event(message.event);
+      else if (message.kind === "description") listener.description(message.description);
+      listener.connected(true);
+    };
+    socket.onclose = () => {
+      clearInterval(watching);
+      ended();
+    };
+  });
+}
+
+const TTL_S = 2;
+const RENEW_MS = 500;
+
+/**
+ * The right to move, held for as long as its connection lives.
+ *
+ * If this page is closed or goes silent for `TTL_S`, the daemon brakes the robot and holds it.
+ */
+export class Right {
+  #socket: WebSocket | null = null;
+  #token = "";
+  #number = 0;
+  #waiting = new Map<number, (answer: { ok: boolean; error: string | null }) => void>();
+  changed: () => void = () => undefined;
+
+  get held(): boolean {
+    return this.#token !== "";
+  }
+
+  /** Take the right if it is not held yet; throws `Rejected` with the holder's name. */
+  async take(): Promise<void> {
+    if (this.held) return;
+    const socket = await socketTo("/control", { client: clientName(), ttl_s: String(TTL_S) });
+    await new Promise<void>((taken, failed) => {
+      socket.onmessage = ({ data }) => {
+        const message = JSON.parse(data as string);
+        if (message.kind === "held") {
+          this.#token = message.token;
+          this.#socket = socket;
+          this.changed();
+          taken();
+        } else {
+          this.#waiting.get(message.id)?.(message);
+          this.#waiting.delete(message.id);
+        }
+      };
+      socket.onclose = ({ reason }) => {
+        this.#forget(reason || "The connection to the daemon was lost.");
+        failed(new Rejected(reason || "The daemon did not give this page the right to move."));
+      };
+    });
+    const renewing = setInterval(() => {
+      if (this.#socket !== socket) clearInterval(renewing);
+      else socket.send(JSON.stringify({ do: "renew" }));
+    }, RENEW_MS);
+  }
+
+  release(): void {
+    this.#socket?.close();
+  }
+
+  async enable(): Promise<void> {
+    await this.take();
+    await request("POST", "/enable", { client: clientName(), program: "hold" }, this.#token);
+  }
+
+  async program(program: string, wanted: Record<string, unknown> = {}): Promise<void> {
+    await this.take();
+    const id = ++this.#number;
+    const answer = await new Promise<{ ok: boolean; error: string | null }>((resolve) => {
+      this.#waiting.set(id, resolve);
+      this.#socket?.send(JSON.stringify({ do: "program", program, wanted, id, client: clientName() }));
+    });
+    if (!answer.ok) throw new Rejected(answer.error ?? "refused");
+  }
+
+  #forget(why: string): void {
+    this.#token = "";
+    this.#socket = null;
+    for (const resolve of this.#waiting.values()) resolve({ ok: false, error: why });
+    this.#waiting.clear();
+    this.changed();
+  }
+}
+
+/** Name of this tab, as others see it. */
+export function clientName(): string {
+  const name = "cdpr-client";
+  const known = sessionStorage.getItem(name);
+  if (known) return known;
+  const fresh = `page ${Math.floor(Math.random() * 0x10000).toString(16).padStart(4, "0")}`;
+  sessionStorage.setItem(name, fresh);
+  return fresh;
+}
+
+/** Commands that need no right to move. */
+export const command = (path: "/configure" | "/check" | "/acknowledge" | "/hold" | "/disable"): Promise<unknown> =>
+  request("POST", path, { client: clientName() });

@@ -1,0 +1,192 @@
+// What is only looked at: the robot, tensions, curves, events, axes.
+import { useEffect, useRef } from "preact/hooks";
+import { type Cycle, type Description } from "./daemon";
+import { RobotScene, tensionColour } from "./scene";
+import { progressOf } from "./situation";
+import { store, useCycles, useStore } from "./store";
+import { type Curve, SPAN_S, Trend, curveColour } from "./trend";
+
+export function RobotView() {
+  const { description, status, preview } = useStore();
+  const host = useRef<HTMLDivElement>(null);
+  const scene = useRef<RobotScene | null>(null);
+  useEffect(() => {
+    try {
+      scene.current = new RobotScene(host.current!);
+    } catch {
+      host.current!.textContent = "This browser cannot draw in three dimensions (WebGL). All else works.";
+    }
+    return () => scene.current?.close();
+  }, []);
+  useEffect(() => {
+    if (description) scene.current?.describe(description);
+  }, [description]);
+  useCycles((cycle) => scene.current?.show(cycle), []);
+  const progress = status && progressOf(status);
+  const moving = progress?.target_m && (progress.done ?? 1) < 1;
+  useEffect(() => {
+    if (preview) scene.current?.aim(preview.position_m, preview.rotation_rad);
+    else if (moving) scene.current?.aim(progress!.target_m!, progress!.target_rotation_rad ?? null);
+    else scene.current?.aim(null, null);
+  }, [preview, moving, String(progress?.target_m)]);
+  return (
+    <section class="card robot" aria-label="The robot in three dimensions">
+      <div class="scene" ref={host} />
+      <Place />
+    </section>
+  );
+}
+
+const mm = (value: number | null | undefined): string => (value == null ? "–" : (1e3 * value).toFixed(1));
+
+/** The platform's position as numbers. */
+function Place() {
+  const { description } = useStore();
+  const text = useRef<HTMLOutputElement>(null);
+  const names = (description?.platform?.controlled ?? []).filter((name) => name.length === 1);
+  useCycles((cycle) => {
+    if (!text.current) return;
+    const known = cycle.pose[0] != null;
+    text.current.textContent = known
+      ? names.map((name, number) => `${name} ${mm(cycle.pose[number])}`).join("   ") + " mm"
+      : "position unknown until the cables are tight";
+  }, [names.join()]);
+  return description?.platform ? <output class="place" ref={text} /> : null;
+}
+
+export function Tensions() {
+  const { description } = useStore();
+  if (!description) return null;
+  return (
+    <section class="card" aria-labelledby="tensions">
+      <h2 id="tensions">Cable tensions</h2>
+      <ul class="tensions">
+        {description.axes.map((axis, number) => <Tension key={axis.name} number={number} name={axis.name} limits={description.limits} />)}
+      </ul>
+    </section>
+  );
+}
+
+function Tension({ number, name, limits }: { number: number; name: string; limits: Description["limits"] }) {
+  const bar = useRef<HTMLDivElement>(null), text = useRef<HTMLSpanElement>(null), meter = useRef<HTMLDivElement>(null);
+  const low = limits.tension_min_N[number] ?? null, high = limits.tension_max_N[number] ?? null;
+  const full = 1.15 * (high ?? 100);
+  const left = (value: number): { left: string } => ({ left: `${(100 * value) / full}%` });
+  useCycles((cycle) => {
+    if (!bar.current || !text.current || !meter.current) return;
+    const tension = cycle.tension_N[number] ?? null;
+    const share = Math.min(Math.max(tension ?? 0, 0) / full, 1);
+    bar.current.style.transform = `scaleX(${share})`;
+    bar.current.style.background = `#${tensionColour(tension, low, high).getHexString()}`;
+    const measured = cycle.tension_measured[number];
+    text.current.textContent = tension === null ? "unknown" : `${measured ? "" : "~"}${tension.toFixed(0)} N`;
+    text.current.title = measured ? "measured by a sensor" : "estimated from the motor's torque";
+    meter.current.setAttribute("aria-valuenow", (tension ?? 0).toFixed(0));
+  }, [number, full]);
+  return (
+    <li>
+      <span class="name"><i style={{ background: curveColour(number) }} />{name}</span>
+      <div class="meter" role="meter" aria-label={`Tension of ${name} in N`} aria-valuemin={0} aria-valuemax={Math.round(full)} aria-valuenow={0} ref={meter}>
+        <div class="bar" ref={bar} />
+        {low !== null && <i class="limit" style={left(low)} title={`lowest allowed: ${low} N`} />}
+        {high !== null && <i class="limit" style={left(high)} title={`highest allowed: ${high} N`} />}
+      </div>
+      <span class="value" ref={text} />
+    </li>
+  );
+}
+
+const distance_mm = ({ pose, pose_setpoint }: Cycle): number | null => {
+  if (pose[0] == null || pose_setpoint[0] == null) return null;
+  return 1e3 * Math.hypot(...[0, 1, 2].map((axis) => (pose[axis] ?? 0) - (pose_setpoint[axis] ?? 0)));
+};
+
+export function Trends() {
+  const { description } = useStore();
+  if (!description) return null;
+  return (
+    <section class="card trends" aria-label={`The last ${SPAN_S} s`}>
+      {description.platform && <TrendView title="Distance from the set-point, mm" curves={[{ name: "distance", unit: "mm" }]} values={(cycle) => [distance_mm(cycle)]} floor={1} />}
+      <TrendView title="Tensions, N" curves={description.axes.map((axis) => ({ name: axis.name, unit: "N" }))} values={(cycle) => cycle.tension_N} floor={Math.max(...description.limits.tension_max_N.map((one) => one ?? 10))} />
+    </section>
+  );
+}
+
+function TrendView({ title, curves, values, floor }: { title: string; curves: Curve[]; values: (cycle: Cycle) => (number | null)[]; floor: number }) {
+  const host = useRef<HTMLDivElement>(null), trend = useRef<Trend | null>(null), count = useRef(0);
+  useEffect(() => {
+    trend.current = new Trend(host.current!, curves, floor);
+    return () => trend.current?.close();
+  }, [curves.map((one) => one.name).join()]);
+  useCycles((cycle) => {
+    trend.current?.add(cycle.time_s, values(cycle));
+    if (count.current++ % 3 === 0) trend.current?.draw(); // ten times a second is enough for a curve
+  }, []);
+  return (
+    <figure>
+      <figcaption>{title}</figcaption>
+      <div class="trend" ref={host} />
+    </figure>
+  );
+}
+
+export function Events() {
+  const { events } = useStore();
+  return (
+    <section class="card" aria-labelledby="events">
+      <h2 id="events">Events</h2>
+      {events.length === 0 && <p class="quiet">Nothing has happened since this page was opened.</p>}
+      <ol class="events">
+        {events.map((one) => (
+          <li key={one.number} class={one.kind === "reason" ? "reason" : ""}>
+            <time>{one.time.slice(11, 19)}</time> {one.text}{one.times > 1 ? ` (${one.times} times)` : ""}
+          </li>
+        ))}
+      </ol>
+    </section>
+  );
+}
+
+export function Axes() {
+  const { status } = useStore();
+  if (!status?.axes.length || !status.axes[0]?.["name"]) return null;
+  const number = (value: unknown, digits: number, factor = 1): string => (typeof value === "number" ? (factor * value).toFixed(digits) : "–");
+  return (
+    <section class="card" aria-labelledby="drives">
+      <h2 id="drives">Drives</h2>
+      <div class="scroll" tabIndex={0} role="region" aria-labelledby="drives">
+        <table>
+          <thead><tr><th>axis</th><th>node</th><th>answers</th><th>angle, deg</th><th>torque, Nm</th><th>cable, m</th></tr></thead>
+          <tbody>
+            {status.axes.map((axis) => (
+              <tr key={String(axis["name"])}>
+                <td>{String(axis["name"])}</td>
+                <td>{String(axis["node_id"])}</td>
+                <td>{axis["alive"] === false ? "silent" : axis["valid"] === false ? "not valid" : "yes"}</td>
+                <td>{number(axis["position_rad"], 1, 180 / Math.PI)}</td>
+                <td>{number(axis["torque_actual_Nm"], 3)}</td>
+                <td>{number(axis["cable_length_m"], 4)}</td>
+              </tr>
+            ))}
+          </tbody>
+        </table>
+      </div>
+    </section>
+  );
+}
+
+export function Recording() {
+  const { status } = useStore();
+  const recording = status?.parts["recording"] as { recording?: boolean; file?: string; bytes?: number; error?: string } | undefined;
+  const text = !recording
+    ? <>Nothing is recorded: the daemon was started with <code>--no-record</code>.</>
+    : recording.recording
+      ? <>{recording.file?.split("/").pop()}, {((recording.bytes ?? 0) / 1e6).toFixed(1)} MB. <code>cdpr log plot</code> draws it.</>
+      : <>Not recording: {recording.error || "ended"}</>;
+  return (
+    <section class="card" aria-labelledby="recording">
+      <h2 id="recording">Recording</h2>
+      <p class="quiet">{store.connected ? text : "–"}</p>
+    </section>
+  );
+}

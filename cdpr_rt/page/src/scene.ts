@@ -1,0 +1,235 @@
+// The robot in three dimensions: frame, cables coloured by tension, platform, box of targets, target.
+import {
+  BoxGeometry, BufferGeometry, Color, CylinderGeometry, EdgesGeometry, GridHelper, Group,
+  HemisphereLight, DirectionalLight, LineBasicMaterial, LineDashedMaterial, LineSegments, Mesh,
+  MeshBasicMaterial, MeshStandardMaterial, PerspectiveCamera, Points, PointsMaterial, Quaternion, Scene, SphereGeometry, Vector3,
+  WebGLRenderer, Box3,
+} from "three";
+import { OrbitControls } from "three/addons/controls/OrbitControls.js";
+import type { Cycle, Description, Platform } from "./daemon";
+
+const LOW = new Color("#3d8bd4"), MIDDLE = new Color("#3fae6b"), HIGH = new Color("#d64545"), SLACK = new Color("#8a8f98");
+const UP = new Vector3(0, 1, 0);
+const SLOW_MS = 12, SHARE = 4;
+const SMALLEST_BODY_M = 0.04;
+
+/** A point of the robot's file as a vector; in a plane the third coordinate is 0. */
+const at = (point: number[]): Vector3 => new Vector3(point[0] ?? 0, point[1] ?? 0, point[2] ?? 0);
+
+/** Return a colour from slack over low and middle to high tension. */
+export function tensionColour(tension: number | null, low: number | null, high: number | null): Color {
+  if (tension === null || low === null || high === null || tension < low / 4) return SLACK.clone();
+  const share = Math.min(Math.max((tension - low) / (high - low), 0), 1);
+  return share < 0.5 ? LOW.clone().lerp(MIDDLE, 2 * share) : MIDDLE.clone().lerp(HIGH, 2 * share - 1);
+}
+
+function bodyOf(platform: Platform): { centre: Vector3; size: Vector3 } {
+  const box = platform.body
+    ? new Box3(at(platform.body.min_m), at(platform.body.max_m))
+    : new Box3().setFromPoints(platform.anchor_points_m.map(at));
+  const size = box.getSize(new Vector3());
+  size.set(...(size.toArray().map((one) => Math.max(one, SMALLEST_BODY_M)) as [number, number, number]));
+  return { centre: box.getCenter(new Vector3()), size };
+}
+
+function outline(size: Vector3, centre: Vector3, material: LineBasicMaterial): LineSegments {
+  const lines = new LineSegments(new EdgesGeometry(new BoxGeometry(size.x, size.y, size.z)), material);
+  lines.position.copy(centre);
+  return lines;
+}
+
+export class RobotScene {
+  #renderer: WebGLRenderer;
+  #scene = new Scene();
+  #camera = new PerspectiveCamera(40, 1, 0.05, 500);
+  #controls: OrbitControls;
+  #room = new Group();
+  #platform = new Group();
+  #ghost = new Group();
+  #cables: Mesh<CylinderGeometry, MeshBasicMaterial>[] = [];
+  #exits: Vector3[] = [];
+  #description: Description | null = null;
+  #asked = false;
+  #again = false;
+  #shown = "";
+  #observer: ResizeObserver;
+
+  /** Throws if the browser offers no WebGL. */
+  constructor(private readonly host: HTMLElement) {
+    this.#renderer = new WebGLRenderer({ antialias: true, alpha: true });
+    this.#renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
+    host.append(this.#renderer.domElement);
+    this.#controls = new OrbitControls(this.#camera, this.#renderer.domElement);
+    this.#controls.addEventListener("change", () => this.#draw());
+    const sun = new DirectionalLight("#ffffff", 1.6);
+    sun.position.set(3, 8, 5);
+    this.#scene.add(new HemisphereLight("#ffffff", "#7788aa", 1.6), sun, this.#room);
+    this.#observer = new ResizeObserver(() => this.#resize());
+    this.#observer.observe(host);
+    this.#resize();
+  }
+
+  close(): void {
+    this.#observer.disconnect();
+    this.#controls.dispose();
+    this.#renderer.dispose();
+    this.#renderer.domElement.remove();
+  }
+
+  /** Build the scene of a robot; z of a spatial robot points up, and y of a planar one. */
+  describe(description: Description): void {
+    this.#description = description;
+    this.#room.clear();
+    this.#platform.clear();
+    this.#ghost.clear();
+    const platform = description.platform;
+    if (!platform) return;
+    const planar = platform.workspace_min_m.length === 2;
+    this.#room.rotation.x = planar ? 0 : -Math.PI / 2;
+    const exits = platform.exit_points_m.map(at);
+    const points = new BufferGeometry().setFromPoints(exits);
+    this.#room.add(new Points(points, new PointsMaterial({ color: "#7a8797", size: 9, sizeAttenuation: false })));
+    this.#addTargets(platform);
+    this.#addPlatform(platform);
+    this.#exits = exits;
+    const radius = new Box3().setFromPoints(exits).getSize(new Vector3()).length() / 700;
+    this.#cables = exits.map(() => new Mesh(new CylinderGeometry(radius, radius, 1, 6), new MeshBasicMaterial({ color: SLACK })));
+    this.#room.add(this.#platform, this.#ghost, ...this.#cables);
+    this.#ghost.visible = false;
+    this.#place(this.#platform, at(platform.home_m), new Quaternion());
+    this.#stretch(null);
+    this.#addFloor(exits, planar);
+    this.#look(exits, platform, planar);
+  }
+
+  /** Show a cycle: the platform's pose and the cables' tensions. */
+  show(cycle: Cycle): void {
+    const platform = this.#description?.platform;
+    if (!platform) return;
+    const seen = [cycle.pose.map((one) => one?.toFixed(4)), cycle.tension_N.map((one) => one && Math.round(one / 2))].join();
+    if (seen === this.#shown) return; // nothing that one could see has changed
+    this.#shown = seen;
+    const [x, y, z, w, qx, qy, qz] = cycle.pose;
+    if (x != null && y != null) {
+      const turned = w == null ? new Quaternion() : new Quaternion(qx ?? 0, qy ?? 0, qz ?? 0, w);
+      this.#place(this.#platform, new Vector3(x, y, z ?? 0), turned);
+    }
+    this.#stretch(cycle);
+    this.#draw();
+  }
+
+  /** Show where a move will end, or nothing. */
+  aim(target_m: number[] | null, rotation_rad: number[] | null): void {
+    this.#ghost.visible = target_m !== null;
+    if (target_m) {
+      const turn = rotation_rad?.length === 1 ? new Vector3(0, 0, rotation_rad[0]) : at(rotation_rad ?? []);
+      const angle = turn.length();
+      const turned = new Quaternion().setFromAxisAngle(angle ? turn.divideScalar(angle) : new Vector3(0, 0, 1), angle);
+      this.#place(this.#ghost, at(target_m), turned);
+    }
+    this.#draw();
+  }
+
+  #addTargets(platform: Platform): void {
+    const box = new Box3(at(platform.workspace_min_m), at(platform.workspace_max_m));
+    const material = new LineDashedMaterial({ color: "#9a6fd0", dashSize: 0.06, gapSize: 0.04 });
+    const lines = outline(box.getSize(new Vector3()), box.getCenter(new Vector3()), material);
+    lines.computeLineDistances();
+    this.#room.add(lines);
+    for (const one of platform.obstacles) {
+      const block = new Box3(at(one.min_m), at(one.max_m));
+      this.#room.add(outline(block.getSize(new Vector3()), block.getCenter(new Vector3()), new LineBasicMaterial({ color: "#b02f2f" })));
+    }
+  }
+
+  #addPlatform(platform: Platform): void {
+    const { centre, size } = bodyOf(platform);
+    const block = new Mesh(
+      new BoxGeometry(size.x, size.y, size.z),
+      new MeshStandardMaterial({ color: "#ffb454", transparent: true, opacity: 0.85, roughness: 0.6 }),
+    );
+    block.position.copy(centre);
+    this.#platform.add(block, outline(size, centre, new LineBasicMaterial({ color: "#8a5a10" })));
+    const knot = new SphereGeometry(Math.max(size.length() / 60, 0.006), 12, 8);
+    for (const anchor of platform.anchor_points_m) {
+      const mesh = new Mesh(knot, new MeshStandardMaterial({ color: "#444c57" }));
+      mesh.position.copy(at(anchor));
+      this.#platform.add(mesh);
+    }
+    this.#ghost.add(outline(size, centre, new LineBasicMaterial({ color: "#9a6fd0" })));
+  }
+
+  #addFloor(exits: Vector3[], planar: boolean): void {
+    this.#scene.children.filter((one) => one instanceof GridHelper).forEach((one) => this.#scene.remove(one));
+    const box = new Box3().setFromPoints(exits);
+    const size = box.getSize(new Vector3());
+    const side = 1.2 * Math.max(size.x, planar ? size.x / 2 : size.y);
+    const floor = new GridHelper(side, Math.round(side * 2), "#8894a3", "#8894a3");
+    const centre = box.getCenter(new Vector3());
+    const down = planar ? box.min.y : Math.min(box.min.z, 0);
+    floor.position.set(centre.x, down, planar ? 0 : -centre.y);
+    (floor.material as LineBasicMaterial).transparent = true;
+    (floor.material as LineBasicMaterial).opacity = 0.25;
+    this.#scene.add(floor);
+  }
+
+  #look(exits: Vector3[], platform: Platform, planar: boolean): void {
+    this.#room.updateMatrixWorld(true);
+    const box = new Box3().setFromPoints([...exits, at(platform.home_m)].map((one) => this.#room.localToWorld(one.clone())));
+    const centre = box.getCenter(new Vector3());
+    const reach = box.getSize(new Vector3()).length();
+    const from = planar ? new Vector3(0.1, 0.08, 1) : new Vector3(0.75, 0.5, 1);
+    this.#camera.position.copy(centre).addScaledVector(from.normalize(), reach * (planar ? 1.15 : 1.05));
+    this.#controls.target.copy(centre);
+    this.#controls.update();
+  }
+
+  #place(group: Group, position: Vector3, rotation: Quaternion): void {
+    group.position.copy(position);
+    group.quaternion.copy(rotation);
+    group.updateMatrix();
+  }
+
+  #stretch(cycle: Cycle | null): void {
+    const { platform, limits } = this.#description!;
+    this.#cables.forEach((cable, number) => {
+      const anchor = at(platform!.anchor_points_m[number]!).applyMatrix4(this.#platform.matrix);
+      const along = anchor.clone().sub(this.#exits[number]!);
+      cable.position.copy(anchor).add(this.#exits[number]!).divideScalar(2);
+      cable.scale.y = along.length();
+      cable.quaternion.setFromUnitVectors(UP, along.normalize());
+      const tension = cycle?.tension_N[number] ?? null;
+      const colour = tensionColour(tension, limits.tension_min_N[number] ?? null, limits.tension_max_N[number] ?? null);
+      cable.material.color.copy(colour);
+    });
+  }
+
+  #resize(): void {
+    const { clientWidth: width, clientHeight: height } = this.host;
+    if (!width || !height) return;
+    this.#renderer.setSize(width, height);
+    this.#camera.aspect = width / height;
+    this.#camera.updateProjectionMatrix();
+    this.#draw();
+  }
+
+  #draw(): void {
+    if (this.#asked) {
+      this.#again = true;
+      return;
+    }
+    this.#asked = true;
+    requestAnimationFrame(() => {
+      const began = performance.now();
+      this.#renderer.render(this.#scene, this.#camera);
+      this.#renderer.getContext().finish();
+      const cost_ms = performance.now() - began;
+      // without a graphics processor a picture takes long: leave most of the time to the rest of the page
+      setTimeout(() => {
+        this.#asked = false;
+        if (this.#again) this.#draw();
+        this.#again = false;
+      }, cost_ms > SLOW_MS ? SHARE * cost_ms : 0);
+    });
+  }
+}

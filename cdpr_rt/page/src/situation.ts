@@ -1,0 +1,124 @@
+// The robot's situation in plain words, and the one next step.
+import type { Description, Status } from "./daemon";
+
+export type Tone = "off" | "ready" | "on" | "busy" | "fault";
+export type Step = "configure" | "check" | "enable" | "tighten" | "tighten-home" | "acknowledge" | "move";
+
+export interface Situation {
+  tone: Tone;
+  title: string;
+  /** What has happened, or what to know before the next step. */
+  detail: string;
+  next: Step | null;
+}
+
+export const STEP_LABELS: Record<Step, string> = {
+  configure: "Boot the drives",
+  check: "Check the bus",
+  enable: "Enable",
+  tighten: "Tighten",
+  "tighten-home": "Platform stands at home: tighten",
+  acknowledge: "Acknowledge",
+  move: "Move",
+};
+
+const STAGES: Record<string, string> = {
+  "tighten slack": "Winding in the slack of the cables",
+  "tighten pull": "Pulling the cables tight",
+  "tighten below": "Measuring friction with less tension",
+  "tighten beyond": "Measuring friction with more tension",
+  "tighten back": "Returning to the first tensions",
+  "tighten lengths": "Measuring the cable lengths",
+  "tighten index": "Searching the index of each motor",
+  "lower home": "Moving home, above the stand",
+  "lower down": "Lowering the platform",
+  "lower fade": "Slackening the cables",
+  "path to the path": "Moving to the path",
+  "path path": "Following the path",
+};
+
+/** Progress of the running program, as far as the page shows it. */
+export interface Progress {
+  stage?: string;
+  tight?: boolean;
+  done?: number;
+  trouble?: string;
+  missing?: string;
+  held_back?: string;
+  target_m?: number[];
+  target_rotation_rad?: number[];
+  path?: { stage?: string; name: string; time_s: number; duration_s: number };
+}
+
+export const progressOf = (status: Status): Progress => (status.program_progress ?? {}) as Progress;
+
+interface LastStop {
+  fallen: boolean;
+  broken: string[];
+}
+
+const lastStop = (status: Status): LastStop =>
+  ((status as { last_stop?: LastStop | null }).last_stop ?? { fallen: false, broken: [] });
+
+const sentence = (text: string): string => {
+  const trimmed = text.trim();
+  if (!trimmed) return "";
+  const begun = trimmed[0]!.toUpperCase() + trimmed.slice(1);
+  return /[.!?]$/.test(begun) ? begun : `${begun}.`;
+};
+
+const situation = (tone: Tone, title: string, detail = "", next: Step | null = null): Situation => ({
+  tone, title, detail: sentence(detail), next,
+});
+
+export function situationOf(status: Status | null, description: Description | null, connected: boolean): Situation {
+  if (!connected || !status) return situation("off", "No connection", "The daemon does not answer. This page keeps trying");
+  switch (status.state) {
+    case "starting": return situation("busy", "Starting", "The control loop is starting");
+    case "dead": return situation("fault", "The control loop has ended", `${status.reason}. Start it again with \`cdpr run\``);
+    case "fault": return faultOf(status);
+    case "unconfigured": return situation("off", "Drives not booted", status.reason, "configure");
+    case "inactive": return situation("off", "No power", status.reason || "The drives are booted", "check");
+    case "ready": return readyOf(status);
+    case "active": return activeOf(status, description);
+    default: return situation("off", status.state, status.reason);
+  }
+}
+
+function faultOf(status: Status): Situation {
+  const cause = (status.faults[0] as { text?: string } | undefined)?.text ?? status.reason;
+  const broken = lastStop(status).broken;
+  const repair = broken.length ? `Repair the cable (${broken.join(", ")}), then acknowledge` : "Remove the cause, then acknowledge";
+  return situation("fault", `Fault: ${cause}`, repair, "acknowledge");
+}
+
+function readyOf(status: Status): Situation {
+  const { fallen, broken } = lastStop(status);
+  const words = [status.reason];
+  if (broken.length) words.push(`Repair the cable first: ${broken.join(", ")}`);
+  else if (fallen) words.push("The platform has come down: look at it before you enable");
+  return situation("ready", "No power", words.filter(Boolean).join(". ") || "The drives are ready. Keep clear of the robot", "enable");
+}
+
+function activeOf(status: Status, description: Description | null): Situation {
+  const progress = progressOf(status);
+  if ((status as { reacting?: string }).reacting !== "none") return situation("busy", "Stopping", status.reason);
+  const stage = STAGES[`${status.program} ${progress.path?.stage ?? progress.stage ?? ""}`];
+  if (status.program === "tighten" && progress.tight === false) return situation("busy", stage ?? "Tightening", progress.trouble);
+  if (status.program === "lower") return situation("busy", stage ?? "Lowering the platform", progress.trouble);
+  if (description?.platform && progress.tight === false) return slackOf(status);
+  if (progress.done !== undefined && progress.done < 1 && status.program !== "hold") {
+    return situation("busy", stage ?? "Moving", progress.held_back || progress.missing || progress.trouble);
+  }
+  const detail = progress.trouble || status.failure || status.reason;
+  return situation("on", description?.platform ? "Holding the platform" : "Holding", detail, "move");
+}
+
+function slackOf(status: Status): Situation {
+  const { fallen, broken } = lastStop(status);
+  const unsure = fallen || broken.length > 0;
+  const detail = unsure
+    ? "The cables are slack. Put the platform on its stand, upright, then tighten from there"
+    : status.failure || "The cables are slack";
+  return situation("ready", "Power on", detail, unsure ? "tighten-home" : "tighten");
+}
