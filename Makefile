@@ -12,7 +12,7 @@ SOAK_MINUTES ?= 10
 # tests that are not about the wall clock, which one after another runs at the end
 WHICH ?= not alone
 
-.PHONY: demo test test-all tests soak check docs lock clean
+.PHONY: demo test test-all tests soak check docs page lock clean
 
 demo: $(STAMP)  ## commission one simulated winch on the embedded bus
 	$(BIN)/cdpr commission winch-mpp0923d --bus simbus: --out out/demo --overwrite
@@ -38,6 +38,10 @@ check: $(STAMP)  ## formatting, lint, types, import directions
 
 docs: $(STAMP)  ## the pages and the interfaces of the packages as a site, in build/site
 	$(BIN)/mkdocs build -q --strict -d build/site
+
+page: $(STAMP)  ## check and build the operator's page; needs Node.js 20 or later
+	$(BIN)/python -m cdpr_rt.service.openapi > cdpr_rt/page/openapi.json
+	cd cdpr_rt/page && npm ci --no-audit --no-fund --silent && npm run --silent types && npm run --silent check && npm run --silent build
 
 lock:  ## resolve the versions anew (maintainers)
 	$(PYTHON) -m venv build/lock && build/lock/bin/pip install -q uv

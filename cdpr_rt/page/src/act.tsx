@@ -63,20 +63,17 @@ export function NextStep() {
       <h1 aria-live="polite">{title}</h1>
       {detail && <p>{detail}</p>}
       {rejected && <p class="rejected" role="alert">{rejected} <button class="plain" onClick={() => store.change({ rejected: "" })}>Close</button></p>}
-      {next && next !== "move" && (hasKey()
-        ? <button class="next" disabled={working} onClick={() => void press(next)}>{STEP_LABELS[next]}</button>
-        : <Key />)}
-      {next === "move" && !hasKey() && <Key />}
+      {next && next !== "move" && hasKey() && <button class="next" disabled={working} onClick={() => void press(next)}>{STEP_LABELS[next]}</button>}
+      {!hasKey() && <Key />}
     </section>
   );
 }
 
-/** Without the key, this page only looks and stops. */
+/** Without the key, this page can at most look on and stop. */
 function Key() {
   const [text, setText] = useState("");
   return (
     <form class="key" onSubmit={(event) => { event.preventDefault(); setKey(text.trim()); location.reload(); }}>
-      <p>This page can look and stop. To move the robot, open the address that <code>cdpr run</code> printed, or enter the key.</p>
       <label>Key <input type="password" value={text} autocomplete="off" onInput={(event) => setText(event.currentTarget.value)} /></label>
       <button disabled={!text.trim()}>Use the key</button>
     </form>
@@ -108,6 +105,7 @@ export function Simulation() {
       <div class="row">
         {FAULTS.map(([fault, words]) => <button key={fault} onClick={() => void store.attempt(() => inject(fault, axis))}>{words}</button>)}
         <button onClick={() => void store.attempt(mend)}>Mend everything</button>
+        <button onClick={() => void store.attempt(() => inject("put-back", 0))} title="Carry a fallen platform back to its stand">Put the platform back</button>
       </div>
     </section>
   );

@@ -136,7 +136,7 @@ export function Events() {
     <section class="card" aria-labelledby="events">
       <h2 id="events">Events</h2>
       {events.length === 0 && <p class="quiet">Nothing has happened since this page was opened.</p>}
-      <ol class="events">
+      <ol class="events" tabIndex={0} aria-labelledby="events">
         {events.map((one) => (
           <li key={one.number} class={one.kind === "reason" ? "reason" : ""}>
             <time>{one.time.slice(11, 19)}</time> {one.text}{one.times > 1 ? ` (${one.times} times)` : ""}
@@ -154,7 +154,7 @@ export function Axes() {
   return (
     <section class="card" aria-labelledby="drives">
       <h2 id="drives">Drives</h2>
-      <div class="scroll" tabIndex={0} role="region" aria-labelledby="drives">
+      <div class="scroll" tabIndex={0}>
         <table>
           <thead><tr><th>axis</th><th>node</th><th>answers</th><th>angle, deg</th><th>torque, Nm</th><th>cable, m</th></tr></thead>
           <tbody>

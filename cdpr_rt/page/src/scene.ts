@@ -9,6 +9,8 @@ import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 import type { Cycle, Description, Platform } from "./daemon";
 
 const LOW = new Color("#3d8bd4"), MIDDLE = new Color("#3fae6b"), HIGH = new Color("#d64545"), SLACK = new Color("#8a8f98");
+/** Opacity of the platform, if its pose is known and if not. */
+const SURE = 0.9, UNSURE = 0.3;
 const UP = new Vector3(0, 1, 0);
 const SLOW_MS = 12, SHARE = 4;
 const SMALLEST_BODY_M = 0.04;
@@ -49,6 +51,7 @@ export class RobotScene {
   #cables: Mesh<CylinderGeometry, MeshBasicMaterial>[] = [];
   #exits: Vector3[] = [];
   #description: Description | null = null;
+  #block = new MeshStandardMaterial({ color: "#ffb454", transparent: true, opacity: UNSURE, roughness: 0.6 });
   #asked = false;
   #again = false;
   #shown = "";
@@ -110,6 +113,7 @@ export class RobotScene {
     if (seen === this.#shown) return; // nothing that one could see has changed
     this.#shown = seen;
     const [x, y, z, w, qx, qy, qz] = cycle.pose;
+    this.#block.opacity = x == null ? UNSURE : SURE;
     if (x != null && y != null) {
       const turned = w == null ? new Quaternion() : new Quaternion(qx ?? 0, qy ?? 0, qz ?? 0, w);
       this.#place(this.#platform, new Vector3(x, y, z ?? 0), turned);
@@ -146,7 +150,7 @@ export class RobotScene {
     const { centre, size } = bodyOf(platform);
     const block = new Mesh(
       new BoxGeometry(size.x, size.y, size.z),
-      new MeshStandardMaterial({ color: "#ffb454", transparent: true, opacity: 0.85, roughness: 0.6 }),
+      this.#block,
     );
     block.position.copy(centre);
     this.#platform.add(block, outline(size, centre, new LineBasicMaterial({ color: "#8a5a10" })));
@@ -179,7 +183,7 @@ export class RobotScene {
     const centre = box.getCenter(new Vector3());
     const reach = box.getSize(new Vector3()).length();
     const from = planar ? new Vector3(0.1, 0.08, 1) : new Vector3(0.75, 0.5, 1);
-    this.#camera.position.copy(centre).addScaledVector(from.normalize(), reach * (planar ? 1.15 : 1.05));
+    this.#camera.position.copy(centre).addScaledVector(from.normalize(), reach * (planar ? 1.15 : 1.2));
     this.#controls.target.copy(centre);
     this.#controls.update();
   }

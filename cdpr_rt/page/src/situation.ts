@@ -1,5 +1,5 @@
 // The robot's situation in plain words, and the one next step.
-import type { Description, Status } from "./daemon";
+import { type Description, type Status, hasKey } from "./daemon";
 
 export type Tone = "off" | "ready" | "on" | "busy" | "fault";
 export type Step = "configure" | "check" | "enable" | "tighten" | "tighten-home" | "acknowledge" | "move";
@@ -72,6 +72,7 @@ const situation = (tone: Tone, title: string, detail = "", next: Step | null = n
 });
 
 export function situationOf(status: Status | null, description: Description | null, connected: boolean): Situation {
+  if (!connected && !hasKey()) return situation("off", "This page needs its key", "Open the address that `cdpr page` prints, or enter the key");
   if (!connected || !status) return situation("off", "No connection", "The daemon does not answer. This page keeps trying");
   switch (status.state) {
     case "starting": return situation("busy", "Starting", "The control loop is starting");
@@ -86,16 +87,17 @@ export function situationOf(status: Status | null, description: Description | nu
 }
 
 function faultOf(status: Status): Situation {
-  const cause = (status.faults[0] as { text?: string } | undefined)?.text ?? status.reason;
-  const broken = lastStop(status).broken;
-  const repair = broken.length ? `Repair the cable (${broken.join(", ")}), then acknowledge` : "Remove the cause, then acknowledge";
-  return situation("fault", `Fault: ${cause}`, repair, "acknowledge");
+  const texts = status.faults.map((fault) => (fault as { text: string }).text);
+  const [cause = status.reason, ...others] = texts;
+  const repair = lastStop(status).broken.length ? "Repair the cable, then acknowledge" : "Remove the cause, then acknowledge";
+  const detail = others.length ? `${repair}. After it: ${others.join("; ")}` : repair;
+  return situation("fault", `Fault: ${cause}`, detail, "acknowledge");
 }
 
 function readyOf(status: Status): Situation {
   const { fallen, broken } = lastStop(status);
   const words = [status.reason];
-  if (broken.length) words.push(`Repair the cable first: ${broken.join(", ")}`);
+  if (broken.length) words.push("Repair the cable before you enable");
   else if (fallen) words.push("The platform has come down: look at it before you enable");
   return situation("ready", "No power", words.filter(Boolean).join(". ") || "The drives are ready. Keep clear of the robot", "enable");
 }
@@ -105,7 +107,11 @@ function activeOf(status: Status, description: Description | null): Situation {
   if ((status as { reacting?: string }).reacting !== "none") return situation("busy", "Stopping", status.reason);
   const stage = STAGES[`${status.program} ${progress.path?.stage ?? progress.stage ?? ""}`];
   if (status.program === "tighten" && progress.tight === false) return situation("busy", stage ?? "Tightening", progress.trouble);
-  if (status.program === "lower") return situation("busy", stage ?? "Lowering the platform", progress.trouble);
+  if (status.program === "lower") {
+    return (progress.done ?? 0) < 1
+      ? situation("busy", stage ?? "Lowering the platform", progress.trouble)
+      : situation("ready", "On its stand", "The cables are loose, the power is on", "tighten");
+  }
   if (description?.platform && progress.tight === false) return slackOf(status);
   if (progress.done !== undefined && progress.done < 1 && status.program !== "hold") {
     return situation("busy", stage ?? "Moving", progress.held_back || progress.missing || progress.trouble);

@@ -31,7 +31,7 @@ export class Trend {
         legend: { show: false },
         scales: { x: { time: false }, y: { range: (_, low, high) => [Math.min(low ?? 0, 0), Math.max(1.05 * (high ?? 0), floor)] } },
         axes: [
-          { ...axis, values: (_, ticks) => ticks.map((one) => `${one} s`) },
+          { ...axis, size: 26, values: (_, ticks) => ticks.map((one) => `${one} s`) },
           { ...axis, size: 46 },
         ],
         series: [

@@ -1,0 +1,180 @@
+"""The operator's page in a real Chromium, against a real daemon on the simulated bus."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import signal
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+from daemon_rig import PATIENCE_S, RealDaemon, until
+
+_CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
+pytestmark = [
+    pytest.mark.long,
+    pytest.mark.skipif(_CHROMIUM is None, reason="no Chromium is installed (package chromium)"),
+]
+playwright_api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
+axe = pytest.importorskip("axe_playwright_python.sync_playwright")
+
+_WITHOUT_SCREEN = [
+    "--no-sandbox", "--disable-background-networking", "--disable-component-update",
+    "--disable-sync", "--no-first-run", "--use-angle=swiftshader", "--enable-unsafe-swiftshader",
+]  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def daemon(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RealDaemon]:
+    made = RealDaemon(tmp_path_factory.mktemp("page"), "--no-record", robot=Path("planar-3"))
+    try:
+        yield made
+    finally:
+        assert made.end() == 0, made.errors()
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[playwright_api.Browser]:
+    with playwright_api.sync_playwright() as api:
+        browser = api.chromium.launch(executable_path=_CHROMIUM, args=_WITHOUT_SCREEN)
+        yield browser
+        browser.close()
+
+
+@contextmanager
+def opened(
+    browser: playwright_api.Browser, url: str, scheme: str = "light", width: int = 900
+) -> Iterator[playwright_api.Page]:
+    """Open the page in a window of its own; errors on its console fail the test."""
+    context = browser.new_context(
+        color_scheme=scheme, viewport={"width": width, "height": 700}, reduced_motion="reduce"
+    )
+    context.set_default_timeout(1e3 * PATIENCE_S)
+    page = context.new_page()
+    wrong: list[str] = []
+    page.on("pageerror", lambda error: wrong.append(str(error)))
+    page.on("console", lambda one: wrong.append(one.text) if "Security" in one.text else None)
+    page.goto(url)
+    try:
+        yield page
+    finally:
+        context.close()
+    assert not wrong
+
+
+def address(daemon: RealDaemon) -> str:
+    """Return the page's address with its key, as `cdpr page` prints it."""
+    return str(daemon.http.get("/page-address").json()["url"])
+
+
+def press(page: playwright_api.Page, name: str) -> None:
+    page.get_by_role("button", name=name, exact=True).click()
+
+
+def see(page: playwright_api.Page, heading: str) -> None:
+    """Wait until the page's heading begins with a text."""
+    page.locator(".situation h1").filter(has_text=heading).wait_for()
+
+
+def make_tight(page: playwright_api.Page) -> None:
+    """Go by clicks from no power to a platform that the cables hold."""
+    press(page, "Enable")
+    press(page, "Tighten")
+    see(page, "Holding the platform")
+
+
+def position_m(daemon: RealDaemon) -> list[float]:
+    position: list[float] = daemon.status()["program_progress"]["position_m"]
+    return position
+
+
+def send_to(page: playwright_api.Page, x_mm: str, y_mm: str) -> None:
+    page.get_by_label("x, mm").fill(x_mm)
+    page.get_by_label("y, mm").fill(y_mm)
+    press(page, "Go")
+
+
+def test_a_day_by_clicks_moves_breaks_and_repairs_a_robot(
+    daemon: RealDaemon, browser: playwright_api.Browser
+) -> None:
+    with opened(browser, address(daemon)) as page:
+        make_tight(page)
+        send_to(page, "200", "1800")
+        until(lambda: position_m(daemon) == pytest.approx([0.2, 1.8], abs=2e-3))
+        see(page, "Holding the platform")
+        press(page, "x plus 10 mm")
+        until(lambda: position_m(daemon)[0] > 0.208)
+        send_to(page, "2000", "1800")
+        page.get_by_role("alert").filter(has_text="2000").wait_for()
+        page.get_by_label("Axis").select_option(label="lower")
+        press(page, "Cut the cable")
+        see(page, "Fault: lower")
+        press(page, "Mend everything")
+        press(page, "Put the platform back")
+        press(page, "Acknowledge")
+        press(page, "Enable")
+        press(page, "Platform stands at home: tighten")
+        see(page, "Holding the platform")
+        press(page, "Lower")
+        page.get_by_role("button", name="Tighten", exact=True).wait_for()
+        press(page, "Power off")
+        daemon.wait_for("ready")
+
+
+def test_the_space_bar_stops_a_motion_that_another_page_leads(
+    daemon: RealDaemon, browser: playwright_api.Browser
+) -> None:
+    url = address(daemon)
+    with opened(browser, url) as leader, opened(browser, url) as other:
+        make_tight(leader)
+        send_to(leader, "-400", "2300")
+        see(other, "Moving")
+        other.keyboard.press("Space")
+        until(lambda: daemon.status()["program"] == "hold")
+        assert position_m(daemon)[1] < 2.25
+        other.get_by_text("has the right to move").first.wait_for()
+        assert other.get_by_role("button", name="Go").is_disabled()
+
+
+def test_a_motion_holds_when_its_page_is_closed(
+    daemon: RealDaemon, browser: playwright_api.Browser
+) -> None:
+    with opened(browser, address(daemon)) as page:
+        see(page, "Holding the platform")
+        send_to(page, "0", "1450")
+        see(page, "Moving")
+    until(lambda: daemon.status()["program"] == "hold")
+    assert "right to move" in daemon.status()["reason"]
+
+
+def test_without_its_key_the_page_shows_nothing_and_asks_for_it(
+    daemon: RealDaemon, browser: playwright_api.Browser
+) -> None:
+    with opened(browser, address(daemon).partition("#")[0]) as page:
+        see(page, "This page needs its key")
+        assert page.get_by_role("button", name="Go").count() == 0
+        page.get_by_label("Key").fill(address(daemon).partition("=")[2])
+        press(page, "Use the key")
+        see(page, "Holding the platform")
+
+
+@pytest.mark.parametrize(("scheme", "width"), [("light", 1400), ("dark", 390)])
+def test_the_page_is_accessible(
+    daemon: RealDaemon, browser: playwright_api.Browser, scheme: str, width: int
+) -> None:
+    with opened(browser, address(daemon), scheme, width) as page:
+        see(page, "Holding the platform")
+        found = axe.Axe().run(page).response["violations"]
+        assert [(one["id"], one["nodes"][0]["html"]) for one in found] == []
+
+
+def test_a_page_finds_the_daemon_again_after_its_service_was_killed(
+    daemon: RealDaemon, browser: playwright_api.Browser
+) -> None:
+    with opened(browser, address(daemon)) as page:
+        see(page, "Holding the platform")
+        os.kill(daemon.children()["service"], signal.SIGKILL)
+        see(page, "No connection")
+        see(page, "Holding the platform")
