@@ -134,7 +134,9 @@ def pytest_sessionfinish(session: pytest.Session) -> None:
     }
     if hasattr(session.config, "workeroutput"):
         session.config.workeroutput["compiled"] = sorted(ours)
-    elif session.config.getoption("--compiled"):
+        return
+    _judge_vcan(session)
+    if session.config.getoption("--compiled"):
         if os.environ.get("NUMBA_CACHE_DIR"):
             print("\nNUMBA_CACHE_DIR is set: not checked whether commands compile kernels")
             return
@@ -146,6 +148,23 @@ def pytest_sessionfinish(session: pytest.Session) -> None:
             for file in late:
                 file.unlink(missing_ok=True)
             session.exitstatus = pytest.ExitCode.TESTS_FAILED
+
+
+def _is_on_vcan(nodeid: str) -> bool:
+    return "/test_vcan_" in nodeid and "/test_vcan_guest" not in nodeid
+
+
+def _judge_vcan(session: pytest.Session) -> None:
+    """Report how many tests used a real vcan; with CDPR_VCAN=required, fail if none of them ran."""
+    stats = session.config.pluginmanager.get_plugin("terminalreporter").stats
+    ran, skipped = (
+        sum(_is_on_vcan(one.nodeid) for outcome in kinds for one in stats.get(outcome, ()))
+        for kinds in (("passed", "failed"), ("skipped",))
+    )
+    if ran or skipped:
+        print(f"\non a real vcan: {ran} tests ran, {skipped} were skipped")
+    if skipped and not ran and os.environ.get("CDPR_VCAN") == "required":
+        session.exitstatus = pytest.ExitCode.TESTS_FAILED
 
 
 @pytest.hookimpl(trylast=True)

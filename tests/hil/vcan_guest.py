@@ -165,6 +165,18 @@ def run(
     return GuestRun(int(code.read_text()) if code.exists() else None, f"{tail}{problem}")
 
 
+def _has_amx() -> bool:
+    return "amx_tile" in Path("/proc/cpuinfo").read_text().split()
+
+
+def whole_xstate(folder: Path) -> Path:
+    """Compile the library without which the guest's kernel panics on processors with AMX."""
+    library = folder / "whole_xstate.so"
+    source = Path(__file__).parent / "whole_xstate.c"
+    _run(["cc", "-shared", "-fPIC", "-O2", "-o", str(library), str(source), "-ldl"], folder)
+    return library
+
+
 def _boot(guest: Guest, run_dir: Path, console: Path, timeout_s: float) -> str:
     """Run the guest kernel to its end. Return the error as text, "" if there was none."""
     words = [
@@ -180,6 +192,8 @@ def _boot(guest: Guest, run_dir: Path, console: Path, timeout_s: float) -> str:
         "HOME": str(run_dir),
         "TMPDIR": str(shm if roomy else run_dir),
     }
+    if _has_amx():
+        environment["LD_PRELOAD"] = str(whole_xstate(run_dir))
     with console.open("wb") as out:
         try:
             process = subprocess.Popen(
