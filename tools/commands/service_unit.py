@@ -25,7 +25,7 @@ from cdpr_tools.errors import BadInputError
 from cdpr_tools.report.page import rendered
 
 _SOCKETS = Path("/run/cdpr-rt")
-_ASIDE = ("robot", "yes", "as_json", "exit_with_stdin")
+_ASIDE = ("open_it", "robot", "yes", "as_json", "exit_with_stdin")
 _OWN_CODE = ("controller", "tension_distribution", "program")
 _OF_THE_SIMULATOR = "camera"
 """Options that only the simulator of the command understands."""
