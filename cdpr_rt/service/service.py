@@ -141,7 +141,7 @@ class Service:
         self.http: tuple[str, int] | None = None
         """Address at which it listens on TCP, None if it does not."""
         self.page_url = ""
-        """Address of the page with its key, "" if there is none."""
+        """Address of the page with its key, "" without a page."""
         self.end_daemon: Callable[[], None] = lambda: None
         """Ends the daemon if its loop has died and no command can reach it."""
         self.wake_launcher: Callable[[], None] = lambda: None

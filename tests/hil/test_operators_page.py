@@ -47,7 +47,7 @@ def browser() -> Iterator[playwright_api.Browser]:
 def opened(
     browser: playwright_api.Browser, url: str, scheme: str = "light", width: int = 900
 ) -> Iterator[playwright_api.Page]:
-    """Open the page in a window of its own; errors on its console fail the test."""
+    """Open the page in a separate window; errors on its console fail the test."""
     context = browser.new_context(
         color_scheme=scheme, viewport={"width": width, "height": 700}, reduced_motion="reduce"
     )

@@ -165,7 +165,7 @@ class RunSettings(BaseModel):
     def with_key_loaded(self) -> RunSettings:
         """Return settings that contain the key; its file is read now, once.
 
-        Without a file, the page gets a key of its own. Processes started later inherit the key in
+        Without a file, the page gets a separate key. Processes started later inherit the key in
         sealed memory, even if the file changes. Raises BadInputError.
         """
         if self.key_file is not None:
