@@ -96,9 +96,10 @@ class CableGeometry:
         identified: Iterable[str] = USUAL,
         knowledge: Knowledge | None = None,
     ) -> Self:
-        """Return the geometry of a robot's file; raises InvalidRequestError without platform.
+        """Return the geometry of a robot's file.
 
-        Elongation is left out if the file models the cables as rigid.
+        Elongation is left out if the file models the cables as rigid. Raises InvalidRequestError
+        without platform, and if the platform's tilt would be taken for errors of the geometry.
         """
         if robot.platform is None:
             raise InvalidRequestError(f"{robot.path}: {NO_PLATFORM}")
@@ -107,6 +108,12 @@ class CableGeometry:
             allowed = ", ".join(KINDS)
             raise InvalidRequestError(f"identified: {sorted(unknown)[0]!r}; allowed: {allowed}")
         model, n = platform_model_of(robot), len(robot.axes)
+        if model.kinematics.hangs_freely:
+            raise InvalidRequestError(
+                f"{robot.path}: platform.controlled: the platform hangs tilted on {n} cables, and "
+                "the calibration would take the tilt for errors of all drums; measure exit and "
+                "anchor points, lengths and drums by hand"
+            )
         how = robot.platform.cable_model
         cables = [axis.winch.cable for axis in robot.axes]
         soft = np.array([1.0 / cable.stiffness_N for cable in cables]) * (how != "rigid")
