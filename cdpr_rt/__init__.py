@@ -9,7 +9,7 @@
 
 `simulate`, `connect` and `run` return a `Robot`. They need simulator, drivers and daemon, which the
 controller itself does not import: names are loaded when they are first used. `load` returns the
-`Model` of a robot for offline work.
+`Model` of a robot for offline work. `commission` measures a motor, `calibrate` a robot's geometry.
 """
 
 from importlib import import_module
@@ -32,7 +32,9 @@ if TYPE_CHECKING:
         Refused,
         Robot,
     )
+    from cdpr_tools.calibrate.calibrate_robot import calibrate
     from cdpr_tools.client.daemon_robot import connect, run
+    from cdpr_tools.commission.run import commission
     from cdpr_tools.simulate import simulate
 
 __all__ = [
@@ -52,6 +54,8 @@ __all__ = [
     "State",
     "Target",
     "TensionDistribution",
+    "calibrate",
+    "commission",
     "connect",
     "load",
     "run",
@@ -61,6 +65,8 @@ __all__ = [
 _HOMES = {
     "Controller": "cdpr_rt.platform.own_controller",
     "Model": "cdpr_rt.offline",
+    "calibrate": "cdpr_tools.calibrate.calibrate_robot",
+    "commission": "cdpr_tools.commission.run",
     "connect": "cdpr_tools.client.daemon_robot",
     "load": "cdpr_rt.offline",
     "Program": "cdpr_rt.programs.own_program",

@@ -93,6 +93,9 @@ class Backend(Protocol):
     def observe(self, seconds: float) -> Row:
         """Let time of the robot pass; return the cycles that were seen meanwhile."""
 
+    def true_pose(self) -> FloatArray:
+        """Return the true pose (7,) of a simulated platform."""
+
     def plan(self, file: Path) -> str:
         """Plan the path in a file; return the name of the plan."""
 
@@ -181,7 +184,9 @@ class Robot:
     rad, tensions in N, torques in Nm, times in s. n is the number of axes, k the number of
     coordinates of the platform (2 or 3), c the number of its controlled angles. Motions return
     when they are done. They raise Refused before anything moves, Faulted if a fault removes the
-    power, and MotionEnded if somebody else ends them. Ctrl-C stops a motion and holds the robot.
+    power, and MotionEnded if somebody else ends them. Ctrl-C stops a motion and holds the robot
+    until the `with` block closes the handle. Without such a block, as in a notebook, Ctrl-C in a
+    motion or `wait` lowers the platform and removes the power.
     """
 
     def __init__(self, backend: Backend) -> None:
@@ -197,9 +202,12 @@ class Robot:
         self._k = len(platform.get("home_m", ()))
         self._started = ""
         """The motion that this handle has started and not ended."""
+        self._in_block = False
+        """Whether a `with` block closes the handle after a Ctrl-C."""
         self._c = len([name for name in platform.get("controlled", ()) if name in _ANGLES])
 
     def __enter__(self) -> Self:
+        self._in_block = True
         return self
 
     def __exit__(
@@ -208,6 +216,7 @@ class Robot:
         error: BaseException | None,
         traceback: TracebackType | None,
     ) -> None:
+        self._in_block = False
         try:
             self.close()
         except Error as failed:
@@ -262,6 +271,15 @@ class Robot:
     def pose(self) -> FloatArray:
         """Pose of the platform, (7,): x, y, z in m, quaternion w, x, y, z; nan if not known."""
         return _numbers((self.status["cycle"] or {}).get("pose"), 7)
+
+    @property
+    def true_pose(self) -> FloatArray:
+        """True pose of a simulated platform, as `pose`, which the controller does not know.
+
+        For comparison, or to simulate a measuring device. Raises Error if `simulate` has not
+        opened the robot, and InvalidArgument for a robot without a platform.
+        """
+        return self._backend.true_pose()
 
     @property
     def position_m(self) -> FloatArray:
@@ -682,6 +700,7 @@ class Robot:
 class _HeldOnError:
     """Holds the robot if an error, such as a Ctrl-C, leaves the block during a motion.
 
+    After a Ctrl-C outside a `with` block nothing would close the handle, so the power is removed.
     Errors of the types `but` are ignored. If a fault or another client has ended the motion,
     nothing is held.
     """
@@ -694,13 +713,17 @@ class _HeldOnError:
         pass
 
     def __exit__(self, _kind: Any, error: BaseException | None, _traceback: Any) -> None:
-        if error is None or isinstance(error, self._but) or not self._robot._started:
+        if error is None or isinstance(error, self._but):
             return
+        robot = self._robot
         try:
-            self._robot.hold()
+            if isinstance(error, KeyboardInterrupt) and not robot._in_block:
+                robot.disable()
+            elif robot._started:
+                robot.hold()
         except Error as failed:
             if str(failed) != str(error):
-                error.add_note(f"the robot could not be held: {failed}")
+                error.add_note(f"the robot could not be stopped: {failed}")
 
 
 def end_text(status: Mapping[str, Any]) -> str:

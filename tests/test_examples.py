@@ -2,10 +2,17 @@
 
 from __future__ import annotations
 
+import json
 import os
+import re
 import subprocess
 import sys
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from threading import Timer
+from typing import Any
 
 import pytest
 
@@ -26,18 +33,29 @@ PRINTED = {
     "drawing.py": ["drawing.csv: ", "drawing.nc: "],
     "teleoperate.py": ["mm at the end", "active, hold at"],
     "relative_moves_daemon.py": ["refused: pose: distance_m", "recorded", "the daemon has ended"],
+    "commission_motor.py": ["cogging of order 4: ", "compensation harmonic: 0.", "report: "],
+    "calibrate_robot.py": ["unused poses: ", "good: True; report: "],
+    "gym_environment.py": [" mm from the target after 2 s"],
 }
+NEEDED = {"gym_environment.py": "gymnasium"}
+NOTEBOOK = EXAMPLES / "live_plot.ipynb"
 
 
-def test_each_example_is_listed_here_and_has_at_most_60_lines() -> None:
+def test_each_example_is_listed_and_has_at_most_60_lines() -> None:
     files = {path.name: path.read_text().count("\n") for path in EXAMPLES.glob("*.py")}
     assert files.keys() == PRINTED.keys()
+    cells = json.loads(NOTEBOOK.read_text())["cells"]
+    files[NOTEBOOK.name] = sum(len(cell["source"]) for cell in cells)
     assert max(files.values()) <= MOST_LINES
+    page = (EXAMPLES.parent / "docs" / "reference" / "examples.md").read_text()
+    assert re.findall(r"\[`(\w+\.\w+)`\]\(\S+examples/\1\)", page) == sorted(files)
 
 
 @pytest.mark.long
 @pytest.mark.parametrize("name", PRINTED)
 def test_example_succeeds_and_prints_its_results(name: str, tmp_path: Path) -> None:
+    if name in NEEDED:
+        pytest.importorskip(NEEDED[name])
     done = subprocess.run(
         [sys.executable, str(EXAMPLES / name)],
         cwd=tmp_path,
@@ -52,3 +70,102 @@ def test_example_succeeds_and_prints_its_results(name: str, tmp_path: Path) -> N
         assert words in done.stdout
     if name == "move_a_robot.py":
         assert (tmp_path / "move_a_robot.png").stat().st_size > 10_000
+
+
+def test_an_example_without_its_package_names_it_in_one_sentence(tmp_path: Path) -> None:
+    (tmp_path / "gymnasium.py").write_text("raise ImportError")
+    done = subprocess.run(
+        [sys.executable, str(EXAMPLES / "gym_environment.py")],
+        env={**os.environ, "PYTHONPATH": str(tmp_path)},
+        capture_output=True,
+        text=True,
+        timeout=60.0,
+        check=False,
+    )
+    assert done.returncode == 1
+    wanted = "gymnasium is not installed; install it with: pip install gymnasium\n"
+    assert done.stderr == wanted
+
+
+@pytest.mark.long
+def test_the_gymnasium_environment_passes_the_check_of_gymnasium(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    pytest.importorskip("gymnasium")
+    from gymnasium.utils.env_checker import check_env  # noqa: PLC0415  # an extra
+
+    monkeypatch.syspath_prepend(EXAMPLES)
+    from gym_environment import Reach  # noqa: PLC0415  # needs it too
+
+    env = Reach()
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")  # also for numbers that are repeated only nearly
+        warnings.filterwarnings("ignore", message=".*platform (stands|may still swing)")
+        check_env(env, skip_render_check=True)
+    assert env.robot.state == "active"
+    first_robot, start = env.robot, env.reset()[0]
+    assert env.robot is first_robot  # moved back, not started again
+    while not (ended := env.step(env.action_space.high)[2]):
+        pass
+    assert ended
+    assert env.robot.state == "fault"
+    again = env.reset()[0]
+    assert env.robot is not first_robot
+    assert abs(again[:2]).max() < 0.15
+    assert (again != start).any()
+    env.close()
+
+
+@contextmanager
+def kernel(folder: Path) -> Iterator[Any]:
+    """Run a notebook's kernel in a folder; yield the client of an empty notebook."""
+    nbformat, nbclient = pytest.importorskip("nbformat"), pytest.importorskip("nbclient")
+    pytest.importorskip("ipykernel")
+    manager = pytest.importorskip("jupyter_client").KernelManager(kernel_name="python3")
+    where = {"metadata": {"path": str(folder)}}
+    book = nbformat.v4.new_notebook()
+    client = nbclient.NotebookClient(book, km=manager, timeout=300, resources=where)
+    with client.setup_kernel():
+        yield client
+
+
+def executed(client: Any, code: str) -> Any:
+    """Execute a new cell; return its outputs as text."""
+    nbformat = pytest.importorskip("nbformat")
+    cell = nbformat.v4.new_code_cell(code)
+    client.nb.cells.append(cell)
+    client.execute_cell(cell, len(client.nb.cells) - 1)
+    return "".join(output.get("text", "") for output in cell.outputs)
+
+
+@pytest.mark.long
+def test_the_notebook_plots_a_moving_robot(tmp_path: Path) -> None:
+    nbformat = pytest.importorskip("nbformat")
+    book = nbformat.read(NOTEBOOK, as_version=4)
+    with kernel(tmp_path) as client:
+        client.nb = book
+        for index, cell in enumerate(book.cells):
+            client.execute_cell(cell, index)
+    plots = [out for cell in book.cells for out in cell.get("outputs", ()) if "data" in out]
+    assert any("image/png" in out["data"] for out in plots)
+    assert "active at [-0.3  1.6] m" in book.cells[-1].outputs[0]["text"]
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("motion", ["robot.move_to([0.0, 2.2], speed_m_s=0.01)", "robot.wait(60)"])
+def test_interrupting_the_kernel_lowers_the_platform_and_removes_the_power(
+    motion: str, tmp_path: Path
+) -> None:
+    nbclient = pytest.importorskip("nbclient")
+    with kernel(tmp_path) as client:
+        executed(client, "import cdpr_rt as cdpr\nrobot = cdpr.simulate('planar-3')")
+        executed(client, "robot.enable(); robot.tighten(); robot.move_to([0.0, 1.6])")
+        late = Timer(3.0, client.km.interrupt_kernel)
+        late.start()
+        with pytest.raises(nbclient.exceptions.CellExecutionError, match="KeyboardInterrupt"):
+            executed(client, motion)
+        late.join()
+        told = executed(client, "print(robot.state, robot.time_s, robot.true_pose[:2].round(3))")
+        assert told.startswith("ready ")
+        assert told.endswith("[0.  1.3]\n")
+        assert executed(client, "robot.enable(); print(robot.state)") == "active\n"

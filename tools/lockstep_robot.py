@@ -18,6 +18,7 @@ from types import FrameType
 from typing import TYPE_CHECKING, Any, Final, Self
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from cdpr_drivers.errors import DriverError
 from cdpr_drivers.robot.commissioned import with_commissioned, without_commissioned
@@ -25,6 +26,8 @@ from cdpr_drivers.robot.machine import RobotMachine
 from cdpr_profiles import load_robot
 from cdpr_profiles.calibration_in_force import calibrated
 from cdpr_profiles.errors import ProfileError
+from cdpr_profiles.platform import NO_PLATFORM
+from cdpr_rt.arrays import FloatArray
 from cdpr_rt.core.clock import Clock
 from cdpr_rt.core.cycle_row import Row
 from cdpr_rt.core.shared_block import RowReader, SharedBlock
@@ -282,7 +285,9 @@ class LockstepRobot:
         stack.callback(self.machine.close)
         # doubts about the calibration of a real robot do not concern a simulated one
         parts = replace(parts, before_power=lambda: None)
-        self.loop = control_loop(robot, limits, block, self.machine, parts, lambda: self.now_ns)
+        self.loop = control_loop(
+            robot, limits, block, self.machine, parts, lambda: self.now_ns, simulated=True
+        )
         self.description = block.description()
         self.right = RightInBusTime(block, lambda: self.now_ns)
         self.stream = StreamInBusTime(block, self.right, lambda: self.now_ns)
@@ -531,6 +536,15 @@ class LockstepRobot:
         began = self.rows_written
         self.wait(seconds)
         return self.kept_rows(began)
+
+    def true_pose(self) -> FloatArray:
+        """Return the true pose at the last SYNC, (7,)."""
+        self._require_open()
+        if self._truth is None:
+            raise InvalidArgument(f"true_pose: {self._reference} {NO_PLATFORM}")
+        true = self._truth.last()
+        x, y, z, w = Rotation.from_matrix(true["rotation"]).as_quat(canonical=True)
+        return np.array([*true["position_m"], w, x, y, z])
 
     def plan(self, file: Path) -> str:
         """Plan the path in a file; return the name of the plan."""

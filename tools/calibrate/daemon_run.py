@@ -6,7 +6,7 @@ import math
 import os
 import select
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager
 from datetime import UTC, datetime
 from pathlib import Path
@@ -61,6 +61,11 @@ def robot_of(daemon: Daemon, as_calibrated: bool = False) -> tuple[Robot, dict[s
     BadInputError if it does not, has no platform, or its file or calibration has changed since.
     """
     description = daemon.get("/description")
+    return profile_of(description, as_calibrated), description
+
+
+def profile_of(description: Mapping[str, Any], as_calibrated: bool = False) -> Robot:
+    """Return the robot of such a description; raises BadInputError as `robot_of`."""
     robot = load_robot(description["reference"])
     if robot.platform is None:
         raise BadInputError(f"{robot.path}: {NO_PLATFORM}")
@@ -73,8 +78,8 @@ def robot_of(daemon: Daemon, as_calibrated: bool = False) -> tuple[Robot, dict[s
         )
     if description["geometry_sha256"] != geometry_sha256(robot):
         what = "the file or its calibration " if as_calibrated else ""
-        raise BadInputError(f"{robot.path}: {what}has changed since the daemon started")
-    return robot, description
+        raise BadInputError(f"{robot.path}: {what}has changed since the robot started")
+    return robot
 
 
 def no_poses(robot: Robot, simulated: bool) -> CalibrationData:
@@ -335,22 +340,46 @@ def require_points_of(poses: int, path: Path) -> None:
         )
 
 
-class AskedPoints:
-    """Asks on standard input for a position at each pose, and stores it in a file for `--points`.
+class PointsFile:
+    """A file of measured positions for `--points`; raises ProfileError if writing fails.
 
-    `coordinates` is the number of coordinates of the platform's origin, 2 or 3. `place` returns
-    the platform's place (d,) from its cables; it raises if the platform is no longer held or the
-    user stops. It is called while waiting for input. Raises ProfileError if writing fails.
+    `coordinates` is the number of coordinates of the platform's origin, 2 or 3.
+    """
+
+    def __init__(self, path: Path, coordinates: int) -> None:
+        self.names = _NAMES[:coordinates]
+        self._path = path
+        if not path.exists():
+            self._append(",".join(["pose", *(f"{name}_mm" for name in self.names), "sigma_mm"]))
+
+    def add(self, pose: int, numbers_mm: Sequence[float]) -> None:
+        """Append the position and perhaps its sigma at a pose, counted from 1; nan is unknown."""
+        cells = ("" if math.isnan(number) else repr(float(number)) for number in numbers_mm)
+        self._append(",".join([str(pose), *cells]))
+
+    def _append(self, line: str) -> None:
+        try:
+            self._path.parent.mkdir(parents=True, exist_ok=True)
+            with self._path.open("a", encoding="utf-8") as file:
+                file.write(f"{line}\n")
+        except OSError as error:
+            raise ProfileError(self._path, "", f"cannot be written: {error.strerror}") from None
+
+
+class AskedPoints:
+    """Asks on standard input for a position at each pose, and stores it in a `PointsFile`.
+
+    `place` returns the platform's place (d,) from its cables; it raises if the platform is no
+    longer held or the user stops. It is called while waiting for input.
     """
 
     def __init__(
         self, out: Output, path: Path, coordinates: int, place: Callable[[], FloatArray]
     ) -> None:
-        self._out, self._path, self._names = out, path, _NAMES[:coordinates]
+        self._out, self._file = out, PointsFile(path, coordinates)
+        self._names = self._file.names
         self._place, self._read = place, b""
         self._open = sys.stdin is not None  # None: closed by a shell's `<&-`
-        if not path.exists():
-            self._append(",".join(["pose", *(f"{name}_mm" for name in self._names), "sigma_mm"]))
 
     def __call__(self, pose: int) -> None:
         """Ask for the position at a pose, counted from 1, at which the platform stands now.
@@ -383,7 +412,7 @@ class AskedPoints:
                 continue
             off_m = float(np.linalg.norm(1e-3 * np.array(numbers[: len(origin_m)]) - origin_m))
             if off_m <= _DOUBTFUL_m or words == doubted:
-                self._append(",".join([str(pose), *map(repr, numbers)]))
+                self._file.add(pose, numbers)
                 return
             doubted = words
             by_cables = " ".join(f"{1e3 * x:.0f}" for x in origin_m)
@@ -425,11 +454,3 @@ class AskedPoints:
                 f"the platform moved after pose {pose} was read, so the measured position does "
                 "not belong to it"
             )
-
-    def _append(self, line: str) -> None:
-        try:
-            self._path.parent.mkdir(parents=True, exist_ok=True)
-            with self._path.open("a", encoding="utf-8") as file:
-                file.write(f"{line}\n")
-        except OSError as error:
-            raise ProfileError(self._path, "", f"cannot be written: {error.strerror}") from None

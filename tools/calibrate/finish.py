@@ -127,14 +127,34 @@ def finish(
     compare: CompareWithTruth | None = None,
     hand_eye: Path | None = None,
 ) -> None:
-    """Identify, print, report, and adopt a good calibration; `source` is the data file.
+    """Print the result of `concluded`; raises typer.Exit with status 1 if it is not good."""
+    result = concluded(
+        *(out, robot, data, points, geometry, source, folder, dry_run, adopt, compare),
+        hand_eye=hand_eye,
+    )
+    out.result(result)
+    if not result["ok"]:
+        raise typer.Exit(WorkFailedError.exit_status)
 
-    `hand_eye` is the file of the hand-eye transform, if it does not come from the data.
 
-    A calibration without significant changes is adopted only with `adopt`, and not if it predicts
-    held-out poses significantly worse than the robot's file.
+def concluded(
+    out: Output,
+    robot: Robot,
+    data: CalibrationData,
+    points: Path | None,
+    geometry: CableGeometry,
+    source: Path,
+    folder: Path,
+    dry_run: bool,
+    adopt: bool,
+    compare: CompareWithTruth | None = None,
+    hand_eye: Path | None = None,
+) -> dict[str, Any]:
+    """Identify, report, and adopt a good calibration; return the result for JSON.
 
-    Raises typer.Exit with status 1 if the calibration is not good.
+    `source` is the data file. `hand_eye` is the file of the hand-eye transform, if it does not
+    come from the data. A calibration without significant changes is adopted only with `adopt`, and
+    not if it predicts held-out poses significantly worse than the robot's file.
     """
     refuse_foreign_report(folder)
     with out.stage(f"fitting {len(data.poses)} poses"):
@@ -159,9 +179,7 @@ def finish(
     with out.stage("drawing the report"):
         result |= _reported(outcome, data, known, more, folder, source.parent / _IMAGES)
     out.say(*more, f"report: {result['report']}")
-    out.result({"ok": outcome.good, **result, "in_force": taken, "not_taken_over": why_not})
-    if not outcome.good:
-        raise typer.Exit(WorkFailedError.exit_status)
+    return {"ok": outcome.good, **result, "in_force": taken, "not_taken_over": why_not}
 
 
 def _why_not(outcome: Outcome, dry_run: bool) -> str | None:

@@ -21,6 +21,7 @@ from cdpr_drivers.errors import DriverError
 from cdpr_drivers.robot.robot_buses import real_buses
 from cdpr_profiles import load_robot
 from cdpr_profiles.errors import ProfileError
+from cdpr_rt.arrays import FloatArray
 from cdpr_rt.core.cycle_row import Row, cycle_dtype
 from cdpr_rt.robot import (
     AlreadyRunning,
@@ -329,6 +330,9 @@ class _Remote:
             raise Error(f"the loop has run no cycle for {_SILENT_S:g} s")
         dtype = cycle_dtype(len(self.description["axes"]))
         return np.array(rows, [(name, dtype[name]) for name in ("time_s", *_OBSERVED)])
+
+    def true_pose(self) -> FloatArray:
+        raise Error("true_pose: only of a robot that simulate() has opened")
 
     def plan(self, file: Path) -> str:
         with self._errors():

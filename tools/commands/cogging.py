@@ -26,7 +26,7 @@ from cdpr_rt.procedures.commissioning_results import (
     validation_name,
 )
 from cdpr_rt.robot import Robot
-from cdpr_tools.commands.commission import IndexOption, prepare
+from cdpr_tools.commands.commission import IndexOption
 from cdpr_tools.commands.options import (
     JsonOption,
     OverwriteOption,
@@ -38,6 +38,7 @@ from cdpr_tools.commands.options import (
 from cdpr_tools.commands.with_winch import WinchOnBus, with_winch
 from cdpr_tools.commission import axis_sweep, build, summary
 from cdpr_tools.commission.commissioning import DEFAULT_BANDWIDTH_HZ, Commissioning, Plan
+from cdpr_tools.commission.run import prepare
 from cdpr_tools.composition.session import confirm_motion, open_winch
 from cdpr_tools.consent import require_consent
 from cdpr_tools.errors import BadInputError, WorkFailedError

@@ -16,7 +16,7 @@ from cdpr_drivers.robot.commissioned import folder_of
 from cdpr_drivers.robot.robot_buses import require_fit, robot_urls, starts_own_simulator
 from cdpr_profiles import Robot, RobotAxis, Winch, load_winch_or_robot
 from cdpr_rt.loop.realtime import one_core
-from cdpr_rt.procedures.commissioning_results import Paths, assemble, identify
+from cdpr_rt.procedures.commissioning_results import Paths
 from cdpr_rt.procedures.measurement import Index
 from cdpr_tools.commands.options import (
     JsonOption,
@@ -26,20 +26,12 @@ from cdpr_tools.commands.options import (
     SafetyIoOption,
     YesOption,
 )
-from cdpr_tools.commission import build, summary
-from cdpr_tools.commission.commissioning import (
-    DEFAULT_BANDWIDTH_HZ,
-    QUICK,
-    THOROUGH,
-    Commissioning,
-    Plan,
-)
-from cdpr_tools.composition.session import confirm_motion, open_bus, open_winch
+from cdpr_tools.commission.commissioning import DEFAULT_BANDWIDTH_HZ, QUICK, THOROUGH
+from cdpr_tools.commission.run import Request, commission_winch, prepare
+from cdpr_tools.composition.session import confirm_motion, open_bus
 from cdpr_tools.composition.simulator import OwnSimulator
-from cdpr_tools.errors import BadInputError, WorkFailedError, os_error_as
-from cdpr_tools.output import Output, to_json
-from cdpr_tools.raw_data import discard_raw_data, keeping_raw_data, refuse_loss
-from cdpr_tools.recordings.truth import true_angle
+from cdpr_tools.errors import BadInputError
+from cdpr_tools.output import Output
 
 IndexOption = Annotated[
     Index,
@@ -123,16 +115,6 @@ def _lines_for_robot(robot: Robot, motors: Sequence[_MotorOfRobot]) -> list[str]
     return lines
 
 
-@dataclass(frozen=True)
-class _Request:
-    """How a motor is commissioned."""
-
-    plan: Plan
-    bandwidth_Hz: float
-    index: Index
-    safety_io: str | None
-
-
 @app.command()
 def commission(
     machine: RobotOrWinchArgument,
@@ -180,7 +162,7 @@ def commission(
     out = Output(as_json)
     profile = load_winch_or_robot(machine)
     folder = out_dir or Path("out") / f"commission-{profile.profile}"
-    request = _Request(QUICK if quick else THOROUGH, bandwidth_Hz, index, safety_io)
+    request = Request(QUICK if quick else THOROUGH, bandwidth_Hz, index, safety_io)
     if isinstance(profile, Robot):
         motors = chosen_axes(profile, axis or (), every, folder)
         for motor in motors:
@@ -194,7 +176,7 @@ def commission(
     url = open_bus(_only(bus))
     paths = prepare(folder, overwrite)
     confirm_motion(url, yes, f"commissioning {_TURNS}")
-    out.result(_commission(profile, url, paths, request, out, plant))
+    out.result(commission_winch(profile, url, paths, request, out, plant))
 
 
 def _only(buses: Sequence[str] | None) -> str:
@@ -213,60 +195,14 @@ def _commission_robot(
     robot: Robot,
     motors: Sequence[_MotorOfRobot],
     urls: Sequence[BusUrl],
-    request: _Request,
+    request: Request,
     out: Output,
 ) -> dict[str, Any]:
     """Commission one motor after the other; return the result of the command."""
     results = {}
     for motor, url in zip(motors, urls, strict=True):
         out.say(f"axis {motor.axis.name}, node {motor.axis.node_id} on {url}")
-        results[motor.axis.name] = _commission(motor.winch, url, motor.paths, request, out)
+        results[motor.axis.name] = commission_winch(motor.winch, url, motor.paths, request, out)
     out.say(*_lines_for_robot(robot, motors))
     folder = motors[0].paths.out.parent
     return {"ok": True, "robot": robot.reference, "commissioned": str(folder), "axes": results}
-
-
-def _commission(
-    winch: Winch,
-    url: BusUrl,
-    paths: Paths,
-    request: _Request,
-    out: Output,
-    plant: Path | None = None,
-) -> dict[str, Any]:
-    """Commission the motor of `winch`; return the results for the report."""
-    with keeping_raw_data(paths.raw_folder):
-        with open_winch(winch, url, out, plant, paths.truth, request.safety_io) as session:
-            run = Commissioning(session, out, paths, request.plan).run(
-                request.bandwidth_Hz, request.index
-            )
-        write(paths.run, to_json(run, indent=1))
-        found = identify(winch, run["latency_s"], paths)
-        results = assemble(paths, run, found, true_angle(paths.truth))
-        build(paths, winch, results, found)
-    summary.show(out, results)
-    return results
-
-
-def prepare(folder: Path, overwrite: bool) -> Paths:
-    """Return the paths in `folder`; raises BadInputError if an earlier run would be lost."""
-    paths = Paths(folder)
-    raw = paths.raw_folder
-    refuse_loss(folder, raw, overwrite)
-    if folder.is_dir() and any(folder.iterdir()) and not raw.is_dir() and not overwrite:
-        raise BadInputError(
-            f"--out {folder}: contains other files; choose a new folder, or write the "
-            "results there with --overwrite"
-        )
-    with os_error_as(BadInputError, f"--out {folder}: cannot be written"):
-        if discard_raw_data(raw):
-            for path in (paths.run, paths.results, paths.page, paths.profile, paths.truth):
-                path.unlink(missing_ok=True)
-        raw.mkdir(parents=True, exist_ok=True)
-    return paths
-
-
-def write(path: Path, text: str) -> None:
-    """Write a small file; raises WorkFailedError that names it."""
-    with os_error_as(WorkFailedError, f"{path}: cannot be written"):
-        path.write_text(text + "\n", encoding="utf-8")

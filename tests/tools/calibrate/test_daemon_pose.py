@@ -140,7 +140,7 @@ def of_a_run(told: StandingDaemon, folder: Path) -> None:
     [
         (shift("reference", "bench-2"), BadInputError, "has no platform"),
         (shift("calibration", {"version": 1}), BadInputError, "cdpr calibrate undo planar-4"),
-        (shift("geometry_sha256", "0"), BadInputError, "changed since the daemon"),
+        (shift("geometry_sha256", "0"), BadInputError, "changed since the robot"),
         (away, BadInputError, "mm from home; allowed for the first pose: home"),
         (unpowered, WorkFailedError, "the cables do not hold the platform .ready, hold."),
         (lowered, WorkFailedError, "the cables do not hold the platform .active, hold."),

@@ -14,7 +14,7 @@ from cdpr_here import cdpr_here
 
 from cdpr_rt.identification.rawlog import RawLogWriter
 from cdpr_tools.busview.monitor import LogFile
-from cdpr_tools.commands.commission import prepare
+from cdpr_tools.commission.run import prepare
 from cdpr_tools.errors import BadInputError
 from tests.tools.commands.cli_rig import OWN, WINCH, refused, usage_error
 

@@ -1,0 +1,160 @@
+"""`cdpr_rt.calibrate`: calibrate the robot of a handle, simulated or run by a daemon."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from cdpr_drivers.errors import DriverError
+from cdpr_profiles import Robot as Profile
+from cdpr_profiles.errors import ProfileError
+from cdpr_rt.arrays import FloatArray
+from cdpr_rt.calibration.parameters import USUAL, CableGeometry, Knowledge
+from cdpr_rt.errors import ControlError, InvalidRequestError
+from cdpr_rt.robot import Error, InvalidArgument, InvalidRobot, Robot
+from cdpr_tools.calibrate import daemon_run
+from cdpr_tools.calibrate.finish import concluded, stop_criterion
+from cdpr_tools.calibrate.places import MOST_POSES, places_of, poses_wanted
+from cdpr_tools.calibrate.pose_operator import PoseOperator
+from cdpr_tools.calibrate.run import DATA, POINTS, report_faults_only
+from cdpr_tools.errors import BadInputError, CommandError
+from cdpr_tools.output import Output
+
+Measure = Callable[[FloatArray], ArrayLike | None]
+"""Returns the measured position of the platform's origin (k,), m, which stands near the given one.
+
+nan is an unknown coordinate, None an unknown position.
+"""
+_LEAST_m, _MOST_m = 1e-6, 0.5
+
+
+def calibrate(
+    robot: Robot,
+    *,
+    measured: Measure | None = None,
+    measured_std_m: float = 0.002,
+    poses: int | str | Path | None = None,
+    folder: str | Path | None = None,
+    resume: bool = False,
+    identify: Sequence[str] = USUAL,
+    known_exit_m: float | None = None,
+    seed: int = 1,
+    adopt: bool = False,
+) -> dict[str, Any]:
+    """Calibrate a robot's geometry as `cdpr calibrate measure` does; return its result.
+
+    The robot stands at home on tight cables, as after `tighten`. It moves to poses, reads lengths
+    and tensions there, and is held at the last pose. At each pose `measured` is called with the
+    position by the cables, (k,), m. It returns the position from your measuring device, (k,), m,
+    or None. `measured_std_m` is the standard deviation of a coordinate. Without `measured` the
+    result knows neither the room nor the scale.
+
+    `poses` is a number, or a file that `cdpr poses` wrote; by default as many as improve the
+    result. `identify` and `known_exit_m` are as `--identify` and `--known-mm`. Data and report go
+    into `folder`, by default out/calibrate-ROBOT; `resume` continues after the poses there. With
+    `adopt` a good and significant result is adopted from the next start on.
+
+    The result is that of `cdpr calibrate fit --json`: `good`, `verdict`, `parameters` with their
+    changes, `predicted_3_sigma_mm`, `report` and more. Progress goes to standard error. Raises
+    InvalidRobot, InvalidArgument, Error, and what `measured` raises; poses that were read are kept.
+    """
+    out, on_status = Output(as_json=True), robot.on_status
+    with _errors_of_calibrating():
+        profile = daemon_run.profile_of(robot.description)
+        _require_length("measured_std_m", measured_std_m)
+        known = Knowledge()
+        if known_exit_m is not None:
+            known = Knowledge(exit_m=_require_length("known_exit_m", known_exit_m))
+        geometry = CableGeometry.of(profile, identify, known)
+        count, listed = poses_wanted(profile, None if poses is None else str(poses))
+        kept = _poses_in(profile, robot, folder, resume)
+        file = kept.folder / POINTS
+        daemon_run.require_points_of(len(kept.data.poses), file)
+        operator = PoseOperator(robot, profile)
+        try:
+            kept.require_home(profile, operator.place())
+            points = file if measured is not None or file.exists() else None
+            criterion = stop_criterion(out, profile, points, geometry)
+            with out.stage("choosing poses"):
+                places, most = places_of(profile, count, listed, seed), count or MOST_POSES
+            with daemon_run.going_on(kept):
+                daemon_run.read_places(
+                    *(out, profile, operator, kept, places, most),
+                    criterion if count is None else report_faults_only(criterion),
+                    _asking(operator, measured, measured_std_m, file),
+                )
+        finally:
+            robot.on_status = on_status
+        source = kept.folder / DATA
+        return concluded(
+            *(out, profile, kept.data, points, geometry, source, kept.folder),
+            dry_run=not adopt,
+            adopt=False,
+        )
+
+
+def _require_length(name: str, length_m: float) -> float:
+    if not _LEAST_m <= length_m <= _MOST_m:
+        raise InvalidArgument(f"{name}: {length_m!r}; allowed: {_LEAST_m:g} to {_MOST_m:g} m")
+    return length_m
+
+
+def _poses_in(
+    profile: Profile, robot: Robot, folder: str | Path | None, resume: bool
+) -> daemon_run.DaemonPoses:
+    """Return the poses in a folder; raises InvalidArgument for earlier ones unless `resume`."""
+    where = Path("out") / f"calibrate-{profile.profile}" if folder is None else Path(folder)
+    data = daemon_run.data_of(where, profile, bool(robot.description["simulated"]))
+    if data.poses and not resume:
+        raise InvalidArgument(
+            f"folder: {where} contains {len(data.poses)} poses; choose another one, or continue "
+            "after them with resume=True"
+        )
+    return daemon_run.DaemonPoses(where, data)
+
+
+def _asking(
+    operator: PoseOperator, measured: Measure | None, std_m: float, path: Path
+) -> daemon_run.Ask:
+    """Return what stores the measured position at a pose, counted from 1."""
+    if measured is None:
+        return lambda _pose: None
+    k = operator.directions.k
+    file = daemon_run.PointsFile(path, k)
+
+    def ask(pose: int) -> None:
+        by_cables = operator.place()[:k]
+        answer = measured(by_cables)
+        if answer is None:
+            return
+        position = np.asarray(answer, float)
+        if position.shape != (k,) or np.isinf(position).any():
+            raise InvalidArgument(f"measured: returned {answer!r}; allowed: {k} numbers in m")
+        file.add(pose, [*(1e3 * position), 1e3 * std_m])
+
+    return ask
+
+
+@contextmanager
+def _errors_of_calibrating() -> Iterator[None]:
+    try:
+        yield
+    except ProfileError as error:
+        raise InvalidRobot(str(error)) from error
+    except (BadInputError, InvalidRequestError) as error:
+        raise InvalidArgument(_as_arguments(str(error))) from error
+    except (CommandError, ControlError, DriverError) as error:
+        raised = Error(_as_arguments(str(error)))
+        for note in getattr(error, "__notes__", ()):
+            raised.add_note(note)
+        raise raised from error
+
+
+def _as_arguments(text: str) -> str:
+    """Return a message with the options of the commands as arguments of `calibrate`."""
+    return text.replace("--out", "folder").replace("--poses", "poses")
