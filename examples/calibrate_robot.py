@@ -1,7 +1,7 @@
 """Calibrate planar-4, whose cables leave elsewhere than its file says, and read the result.
 
-You see the corrections of the exit points beside the true errors, and the accuracy of positions
-before and after. In place of the simulated laser tracker read your measuring device. For a real
+You see the corrections of the exit points with their uncertainty, the true errors, and how far the
+robot is off at unused poses before and after. In place of the simulated laser tracker read your measuring device. For a real
 robot replace `cdpr.simulate(...)` by `cdpr.connect()`. It takes about a minute.
 """
 
@@ -32,7 +32,13 @@ def main(folder: Path) -> None:
         robot.enable()
         robot.tighten()
         result = cdpr.calibrate(
-            robot, measured=tracker, measured_std_m=TRACKER_STD_M, poses=15, folder=folder / "run"
+            robot,
+            measured=tracker,
+            measured_std_m=TRACKER_STD_M,
+            poses=15,
+            identify=["exit", "offset"],
+            known_exit_m=0.01,  # standard deviation of the exit points in the robot's file
+            folder=folder / "run",
         )
         robot.lower()
 
