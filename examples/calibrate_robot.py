@@ -1,8 +1,8 @@
 """Calibrate planar-4, whose cables leave elsewhere than its file says, and read the result.
 
 You see the corrections of the exit points with their uncertainty, the true errors, and how far the
-robot is off at unused poses before and after. In place of the simulated laser tracker read your measuring device. For a real
-robot replace `cdpr.simulate(...)` by `cdpr.connect()`. It takes about a minute.
+robot is off at unused poses before and after. In place of the simulated laser tracker read your
+measuring device. For a real robot replace `cdpr.simulate(...)` by `cdpr.connect()`.
 """
 
 import sys
