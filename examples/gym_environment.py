@@ -1,7 +1,6 @@
 """Train a controller in a Gymnasium environment: pull the platform of planar-3 to a target.
 
-You see how near a simple policy brings it. A seed in `reset` restarts the simulation, which the
-same seed and actions then repeat exactly; without a seed the same platform moves to a new start.
+You see how near a simple policy brings it. A seed in `reset` restarts the simulation.
 """
 
 import numpy as np
@@ -31,12 +30,13 @@ class Reach(gym.Env):  # actions: force / MOST_N; observations: offset from the 
         if seed is not None or self.robot is None or self.robot.state != "active":
             self.close()
             self.agent = Agent()
+            self.agent.force, self.agent.offset = None, 0.0
             self.robot = cdpr.simulate("planar-3", controller=self.agent)
             self.robot.enable()
             self.robot.tighten()
+            self.robot.move_to(TARGET_M)
         self.agent.force, self.agent.offset = None, self.np_random.uniform(-0.1, 0.1, 2)
-        self.robot.move_to(TARGET_M, wait=False)
-        self.robot.wait(1.5)
+        self.robot.wait(1.0)
         return self.agent.seen, {}
 
     def step(self, action):
