@@ -75,7 +75,7 @@ class MarkerSize(Profile):
 class MarkerSheets(Profile):
     """The markers in use: which set, how large, and the known places of some.
 
-    A size is that of the black square with its border, over its outer edges.
+    A size is the side of the whole black square, to the outer edges of its border.
     """
 
     dictionary: str = "4X4_100"

@@ -264,7 +264,7 @@ class PhysicsBoard:
     def attach(cls, path: str | Path) -> Self:
         """Open a board that a simulator created. Raises BusSetupError.
 
-        Also raised on a processor that may show another process stores out of order.
+        It is also raised on processors that may reorder the stores that another process sees.
         """
         if (machine := platform.machine()) not in _IN_ORDER:
             raise BusSetupError(

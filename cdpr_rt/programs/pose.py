@@ -259,7 +259,9 @@ class PoseProgram(PlatformProgram):
             if beyond := self._beyond_box(position):
                 more = {}
                 if start is not None and self._beyond_box(start):
-                    more["enter_m"] = np.clip(start[:k].round(3), self._low, self._high).tolist()
+                    more["enter_m"] = np.clip(
+                        start[:k].round(3) + 0.0, self._low, self._high
+                    ).tolist()
                 raise ProgramError(self._not_feasible(asked, leads + beyond, outside=True, **more))
             position[:k] = np.clip(position[:k], self._low, self._high)
         if asked.keys() & {"turn_rad", "rotation_rad"} and (beyond := self._beyond_angle(position)):

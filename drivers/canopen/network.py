@@ -144,11 +144,11 @@ _LATE_ANSWERS_S = 0.05
 
 
 class CanNetwork(BusMember):
-    """Acyclic side of a CANopen master on one bus; it waits by `clock` only.
+    """Acyclic side of a CANopen master on one bus; all its waits use `clock`.
 
     While no cycles run and a task waits, it sends the master's heartbeat and monitors the nodes'.
     `hand_heartbeat_to_cycle` hands both duties to the cycle: then a hung loop sends no heartbeat
-    and the drives stop. It has the only port on the bus: a cycle uses `reader` too.
+    and the drives stop. It has the only port on the bus, so a cycle reads through `reader` too.
     Raises BusError if the bus cannot be opened.
 
     In tasks, SDO transfers to different nodes run in parallel. Their errors name node, object and

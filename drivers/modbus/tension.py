@@ -55,7 +55,7 @@ def raw_value(value: RawValue, registers: list[int]) -> float:
 class LoadCells:
     """The load cells of a profile on an open line; reads and tares them individually.
 
-    Methods raise ModbusError. For one task of `clock` at a time.
+    Methods raise ModbusError. Only one task of `clock` may use it at a time.
     """
 
     def __init__(self, profile: TensionSensors, port: str, clock: Clock) -> None:

@@ -46,8 +46,8 @@ _CLOCK_READINGS, _PUT_OFF_S = 3, 5e-5
 class Client:
     """A peer that sends and receives frames through `sock`.
 
-    With `stamped`, the kernel reports when each packet was sent; the packet counts as sent then,
-    whenever it is read.
+    With `stamped`, the kernel reports when each packet was sent. That time counts, however late the
+    packet is read.
     """
 
     __slots__ = (

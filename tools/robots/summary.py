@@ -200,8 +200,8 @@ def _broken_lines(axes: Sequence[dict[str, Any]]) -> list[str]:
         rows.append([axis["name"], point_text(broken["at_m"]), lengths[0], *turned, *lengths[1:]])
     return [
         TableText(rows),
-        "Predicted for the worst of the corners, or of the targets nearest to them: the swing "
-        f"within {SWING_S:g} s, and the largest distances away and aside until the other cables "
+        "Predicted for the worst corner of the box, or the worst target near one: the swing within "
+        f"{SWING_S:g} s, and the largest distances, in all and sideways, until the other cables "
         "have lowered the platform to its ground.",
     ]
 
@@ -241,9 +241,9 @@ def _slip_lines(axes: Sequence[dict[str, Any]]) -> list[str]:
         rows.append([axis["name"], *seen, f"{slip['peak_N']:.0f}", most])
     return [
         TableText(rows),
-        "Predicted for rest at the worst of home and the same places: the largest slip that the "
-        "lengths do not show, if it is sudden or slow, and how far the platform is off then; and "
-        "the peak tension when the cable is taut again.",
+        "Predicted for a platform at rest at home or at the same places, whichever is worst: the "
+        "largest sudden and the largest slow slip that the lengths do not show, the position error "
+        "that follows, and the peak tension when the cable is taut again.",
     ]
 
 
@@ -289,7 +289,7 @@ def _loop_lines(loop: dict[str, float]) -> list[str]:
         f"up to {_STIFFNESS_OFF:.0%} softer or stiffer it has a gain margin of "
         f"{loop['gain_margin']:.1f} and a phase margin of "
         f"{math.degrees(loop['phase_margin_rad']):.0f} deg",
-        f"           least damped of all that swings: {loop['least_damped_Hz']:.1f} Hz, damping "
+        f"           least damped oscillation: {loop['least_damped_Hz']:.1f} Hz, damping "
         f"ratio {loop['least_damping_ratio']:.2g}",
     ]
     if not loop["tensions_follow_pose"]:
@@ -303,10 +303,10 @@ def _free_rotation_lines(swings: dict[str, float] | None) -> list[str]:
     if swings is None:
         return []
     lines = [
-        f"           and swings so at {swings['slowest_Hz']:.1f} to {swings['fastest_Hz']:.1f} Hz: "
-        f"a move at full speed leaves {math.degrees(swings['swing_rad']):.2f} deg, its anchor "
-        f"points by {1e3 * swings['swing_m']:.1f} mm; friction and being lifted also set it "
-        "swinging",
+        f"           this rotation swings at {swings['slowest_Hz']:.1f} to "
+        f"{swings['fastest_Hz']:.1f} Hz: by {math.degrees(swings['swing_rad']):.2f} deg after a "
+        f"move at full speed, {1e3 * swings['swing_m']:.1f} mm at the anchor points; friction and "
+        "lifting also excite it",
     ]
     if swings["lasts_s"] > 0.0:
         lines.append(
@@ -353,7 +353,7 @@ def _sketch(statics: PlatformStatics, platform: Platform) -> list[str]:
     put(platform.home_m, "o")
     legend = [
         "1, 2 ... exit points, o at rest, # targets, . also held,",
-        "! targets that are not taken",
+        "! targets that are rejected",
     ]
     rows_shown = ["".join(row).rstrip() for row in cells[::-1]]
     return ["\n".join(rows_shown).strip("\n"), *legend]

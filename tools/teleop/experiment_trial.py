@@ -1,8 +1,9 @@
 """Run along the path of targets, with a recorded robot on its simulator or with a perfect one.
 
 Tremblay (thesis), section 2.6: 10 targets on a pattern of 600 x 300 mm, the right half first,
-ending at the start. The text does not say which points of the pattern figure 2.8 uses. Assumed are
-its corners, the points on its edges a quarter of the width from the middle, and its centre.
+ending at the start. The text does not say which points of the pattern figure 2.8 uses. This
+module assumes its corners, the points on its edges a quarter of the width from the middle, and its
+centre.
 In space the pattern stands upright along x, in the middle of the workspace's depth.
 """
 
@@ -142,7 +143,7 @@ class PerfectRobot:
     """A platform that follows the hand within its speed and acceleration, without any error.
 
     As in the program `pose`, each movement of the hand moves the target by `scale` times as much,
-    unless the clutch was pressed at its begin. All errors with it come from the operator.
+    unless the clutch was pressed when it began. All remaining errors come from the operator.
     """
 
     def __init__(self, platform: Platform, begin_m: FloatArray) -> None:

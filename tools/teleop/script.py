@@ -38,7 +38,7 @@ def read_script(path: Path, scale: float = 1.0) -> tuple[ScriptLine, ...]:
     """Return the lines of a script; raises BadInputError, which names file and line.
 
     `#` begins a comment. Between two lines the hand moves straight at constant speed. No line
-    leads a robot further than set-points can at `scale`.
+    moves a robot further than set-points can reach at `scale`.
     """
     try:
         text = read_text(path, _MOST_BYTES)
