@@ -18,7 +18,6 @@ from types import FrameType
 from typing import TYPE_CHECKING, Any, Final, Self
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from cdpr_drivers.errors import DriverError
 from cdpr_drivers.robot.commissioned import with_commissioned, without_commissioned
@@ -539,6 +538,8 @@ class LockstepRobot:
 
     def true_pose(self) -> FloatArray:
         """Return the true pose at the last SYNC, (7,)."""
+        from scipy.spatial.transform import Rotation  # noqa: PLC0415  # slow to load
+
         self._require_open()
         if self._truth is None:
             raise InvalidArgument(f"true_pose: {self._reference} {NO_PLATFORM}")
