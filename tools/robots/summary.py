@@ -254,7 +254,7 @@ def _tension_lines(figures: dict[str, Any]) -> list[str]:
     least = "" if reserve is None or reserve < 0.0 else f" ({reserve:.0f} N at the worst place)"
     lines = [
         f"tensions   hold the platform in {held} % of the box; targets are accepted in {taken} % "
-        f"of it, where tensions in motion stay {kept:.0f} N away from their limits, for the "
+        f"of it: there, tensions in motion stay {kept:.0f} N from their limits, the reserve of the "
         f"control{least}",
     ]
     lowest = figures["lowest_resonance_Hz"]
