@@ -19,6 +19,7 @@ from cdpr_tools.errors import BadInputError
 from cdpr_tools.teleop.input_device import InputDevice, InputSample, parse_scale
 from cdpr_tools.teleop.keyboard import Keyboard, Keys, STEPS_mm
 from cdpr_tools.teleop.script import ScriptDevice, read_script
+from tests.cdpr_here import cdpr_here
 
 UP, DOWN, RIGHT, LEFT = "\x1b[A", "\x1b[B", "\x1b[C", "\x1bOD"
 TICK_S = 1.0 / 60.0
@@ -249,3 +250,9 @@ def test_keyboard_without_a_terminal_is_rejected() -> None:
         Keyboard(1.0, reading)
     os.close(reading)
     os.close(writing)
+
+
+def test_the_help_of_teleoperation_shows_its_options() -> None:
+    shown = cdpr_here("teleop", "--help").stdout
+    assert "--scale" in shown and "--device" in shown
+    assert "cdpr teleop experiment --help" in " ".join(shown.split())
