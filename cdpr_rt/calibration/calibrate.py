@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Final
 
 import numpy as np
@@ -28,6 +29,7 @@ from cdpr_rt.calibration.fit import Fit, fit, fit_with_noise_seen, locate
 from cdpr_rt.calibration.markers.geometry import exponentials, logarithms
 from cdpr_rt.calibration.markers.map_fit import MapFit
 from cdpr_rt.calibration.markers.marker_map import best_fit, coverage, laid_out
+from cdpr_rt.calibration.noise import noise_seen
 from cdpr_rt.calibration.outcome import LEAST_POINTS, CalibrationMethod, Outcome
 from cdpr_rt.calibration.parameters import DRUM, EXIT, CableGeometry
 from cdpr_rt.calibration.readings import Images, Observations
@@ -59,9 +61,10 @@ def calibrate(
     """Return the calibration that observations support; raise InvalidRequestError for too few.
 
     With images, camera and markers are fitted too. One fit uses all poses except faulty readings; a
-    second fit also leaves out one pose in five. Those poses verify the second fit, which does not
-    use them at all, not even to find faults. Measured points that the fit to all poses has found
-    wrong do not verify either; the outcome gives their number.
+    second fit also leaves out one pose in five, or blocks of time while the platform moves. Those
+    poses verify the second fit, which does not use them at all, not even to find faults. Measured
+    points that the fit to all poses has found wrong do not verify either; the outcome gives their
+    number. Without images, the noise of readings is estimated first.
     """
     if seen.poses < LEAST_POSES:
         raise InvalidRequestError(
@@ -69,7 +72,11 @@ def calibrate(
             "result of the others"
         )
     slack = _SLACK_SHARE * np.asarray(limits_of(robot).slack_N, float)
+    noise = None
     if images is None:
+        require_enough(geometry, seen.some(~held_out(seen)))
+        noise = noise_seen(geometry, seen, partial(_without_faults, slack))
+        geometry, seen = noise.geometry, noise.seen
         all_of_it = _of_cables(geometry, seen, slack)
     else:
         all_of_it = _with_camera(geometry, seen, slack, images)
@@ -79,7 +86,8 @@ def calibrate(
         geometry, all_of_it.weighed, all_of_it.seen, slack, found, first_map, all_of_it.images
     )
     grid = _grid(found.geometry)
-    birge = unused.birge_ratio()
+    honesty = unused.honesty()
+    birge = honesty.ratio
     larger = max(birge, 1.0) if known_room and math.isfinite(birge) else 1.0
     known = predicted_3_sigma(found, grid, not known_room, larger)
     with_more = predicted_3_sigma(with_more_poses(found), grid, not known_room, larger)
@@ -99,7 +107,7 @@ def calibrate(
         robot, found, method, all_of_it.faults, open_directions(found),
         unused.verified(), unused.before(geometry), int((~unused.seen.used).sum()),
         known, with_more.position_mm, absolute, known_room,
-        position_shift(found, geometry, grid), unused, change, birge, cover=cover,
+        position_shift(found, geometry, grid), unused, change, honesty, cover=cover, noise=noise,
         verifying_points_left_out=all_of_it.verifying_left_out,
     )  # fmt: skip
 
@@ -124,13 +132,20 @@ class _Whole:
 
 
 def _of_cables(geometry: CableGeometry, seen: Observations, slack_N: FloatArray) -> _Whole:
-    require_enough(geometry, seen.some(~held_out(seen)))
     seen, of_points = without_slipped_points(geometry, seen, slack_N)
     found, faults = fit_without_faults(geometry, seen, slack_N)
     found, weighed = fit_with_noise_seen(found, geometry)
     faults = of_points + faults
     left_out = _verifying_left_out(seen, faults)
     return _Whole(found, weighed, faults, without_points(seen, faults), left_out)
+
+
+def _without_faults(
+    slack_N: FloatArray, geometry: CableGeometry, seen: Observations
+) -> tuple[Fit, int]:
+    """Return the fit without faulty readings, and their number."""
+    found, faults = fit_without_faults(geometry, seen, slack_N)
+    return found, sum(fault.pose >= 0 for fault in faults)
 
 
 def _verifying_left_out(seen: Observations, faults: list[Fault]) -> int:

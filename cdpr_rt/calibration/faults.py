@@ -81,8 +81,8 @@ def without_slack(
     faults = [
         Fault(
             "slack", int(i), int(j), float(seen.tension_N[j, i]),
-            f"{geometry.cable_name(i)} was slack at pose {j + 1} ({seen.tension_N[j, i]:.1f} N); "
-            "its length there is left out",
+            f"{geometry.cable_name(i)} was slack at pose {seen.number(int(j))} "
+            f"({seen.tension_N[j, i]:.1f} N); its length there is left out",
         )
         for j, i in np.argwhere(slack)
     ]  # fmt: skip
@@ -245,7 +245,7 @@ def _with_size(fault: Fault, found: Fit, seen: Observations) -> Fault:
     size = float(found.jumps_m[found.seen.jumps.index((fault.cable, fault.pose))])
     who = found.geometry.cables_text(fault.cable, fault.alike, _UNSURE)
     text = (
-        f"{who} is {1e3 * size:+.1f} mm off from pose {fault.pose + 1} on: its encoder, "
+        f"{who} is {1e3 * size:+.1f} mm off from pose {seen.number(fault.pose)} on: its encoder, "
         "coupling or drum slipped just before that pose"
     )
     return replace(fault, size=size, text=text)
@@ -259,7 +259,7 @@ def _with_distance(fault: Fault, found: Fit, seen: Observations) -> Fault:
     measured = np.where(np.isfinite(std_m), seen.position_m[j, :k], np.nan)
     size = float(np.sqrt(np.nansum((measured - there) ** 2)))
     text = (
-        f"pose {j + 1}: the measured point is {1e3 * size:.1f} mm from the position by "
+        f"pose {seen.number(j)}: the measured point is {1e3 * size:.1f} mm from the position by "
         "all other readings"
     )
     if slip := row_slip(measured, there, float(std_m.min())):
@@ -302,7 +302,7 @@ def _worst(found: Fit) -> list[Fault]:
     alike = _alike(single[j], i)
     who = found.geometry.cables_text(i, alike, _UNSURE)
     text = (
-        f"{who} at pose {j + 1} is {1e3 * size:+.1f} mm off the other lengths: {what}; "
+        f"{who} at pose {seen.number(j)} is {1e3 * size:+.1f} mm off the other lengths: {what}; "
         "its length there is left out"
     )
     tried = [Fault("point", -1, j, 0.0, "")] if points[j] > _MAYBE * single[j, i] else []

@@ -277,9 +277,9 @@ def fit(
     is always one minimum, and parameters that no observation determines stay as in the file. That
     fixes the gauge: without measured poses or known markers the frame is that in which the exit
     points, taken together, are moved least. `robust` applies Huber's loss to lengths and to
-    distances from measured points, and Cauchy's to corners. `start` is the first geometry, by
-    default `geometry`. With `camera`, which also is the start of its parameters, these are fitted
-    too and seen markers count. Raises InvalidRequestError for no poses.
+    distances from measured points and rotations, and Cauchy's to corners. `start` is the first
+    geometry, by default `geometry`. With `camera`, which also is the start of its parameters, these
+    are fitted too and seen markers count. Raises InvalidRequestError for no poses.
     """
     if seen.poses == 0:
         raise InvalidRequestError("no poses; allowed: at least one")
@@ -358,9 +358,12 @@ class _Search:
         if not self._robust:
             return float(squares.sum())
         n, points = self._seen.length_m.shape[1], at.points
-        point = squares[:, points].sum(axis=1)
-        rest = float(squares[:, n : points.start].sum() + squares[:, points.stop :].sum())
-        return rest + float(_huber_cost(squares[:, :n]).sum() + _huber_cost(point).sum())
+        point, turn = (
+            squares[:, rows].sum(axis=1) for rows in (points, slice(points.stop, points.stop + 3))
+        )
+        rest = float(squares[:, n : points.start].sum())
+        robust = (squares[:, :n], point, turn)
+        return rest + sum(float(_huber_cost(one).sum()) for one in robust)
 
     def _corner_cost(self, camera: CameraModel, off_px: FloatArray) -> float:
         if self._fixed is None:
@@ -375,8 +378,9 @@ class _Search:
         weights = np.ones_like(at.residual)
         if self._robust:
             weights[:, :n] = _huber_weight(np.abs(at.residual[:, :n]))
-            distance = np.linalg.norm(at.residual[:, at.points], axis=1)
-            weights[:, at.points] = _huber_weight(distance)[:, None]
+            for rows in (at.points, slice(at.points.stop, at.points.stop + 3)):
+                distance = np.linalg.norm(at.residual[:, rows], axis=1)
+                weights[:, rows] = _huber_weight(distance)[:, None]
         return weights
 
     def _weighted(self) -> Linearised:
@@ -466,7 +470,9 @@ class _Search:
         left, taken, pose_covariance = normal.left_of(weighted)
         hats = left @ covariance @ np.swapaxes(left, 1, 2)
         hats += taken @ np.swapaxes(weighted.by_pose, 1, 2)
-        rows = int((weighted.by_pose != 0.0).any(axis=2).sum())
+        counts = (weighted.by_pose != 0.0).any(axis=2)
+        counts[:, -3:] &= np.isfinite(self._seen.rotation_std_rad)  # a target is no reading
+        rows = int(counts.sum())
         corner_factor = 1.0
         if here.camera is not None and self._markers is not None:
             unknowns = float(np.trace(hats, axis1=1, axis2=2).sum())
@@ -533,7 +539,9 @@ def moved(poses: FloatArray, moves: FloatArray, free: tuple[int, ...]) -> FloatA
 
 def locate(geometry: CableGeometry, seen: Observations) -> Fit:
     """Return the poses determined by lengths alone, with the geometry held fixed."""
-    return fit(replace(geometry, identified=()), seen.unmeasured(), robust=False)
+    known = replace(geometry.knowledge, alike=1.0)  # each pose by its own reading
+    still = replace(geometry, identified=(), knowledge=known)
+    return fit(still, seen.unmeasured(), robust=False)
 
 
 # Standard deviations of lengths and tensions from residuals, because neither is known before.
@@ -637,7 +645,7 @@ def with_noise_seen(found: Fit, file: CableGeometry, told_N: float | None) -> Ca
         free = np.diagonal(found.seen.tension_free, axis1=1, axis2=2)
         squares = float((soft**2 * free).mean())
     before = known.length_m**2 + squares * (known.yielding * known.tension_N) ** 2
-    variance = found.variance_factor * before
+    variance = found.variance_factor * known.alike * before
     tension_N = max(told_N or guess.tension_N, _LEAST_N)
     if squares > 0.0 and yielding > 0.0:
         tension_N = max(min(tension_N, math.sqrt(variance / squares) / yielding), _LEAST_N)

@@ -18,6 +18,7 @@ from cdpr_rt.arrays import FloatArray
 from cdpr_rt.calibration.faults import UNDECIDED, Fault
 from cdpr_rt.calibration.fit import Fit
 from cdpr_rt.calibration.markers.marker_map import Coverage, listed
+from cdpr_rt.calibration.noise import NoiseSeen
 from cdpr_rt.calibration.parameters import DRUM
 from cdpr_rt.calibration.verdict import (
     SHARED_SCALE_STD,
@@ -27,7 +28,13 @@ from cdpr_rt.calibration.verdict import (
     camera_table,
     parameter_table,
 )
-from cdpr_rt.calibration.verification import LEAST_VERIFYING, MORE, Unused, Verification
+from cdpr_rt.calibration.verification import (
+    LEAST_VERIFYING,
+    MORE,
+    Honesty,
+    Unused,
+    Verification,
+)
 
 CalibrationMethod = Literal["points", "redundancy", "camera"]
 _WANTED_mm_PER_m = 0.3
@@ -37,6 +44,8 @@ _WANTED_deg = 0.15
 _MOST_OVER_WANTED = 3.0
 """Ratio of predicted to wanted error above which a calibration is not adopted."""
 _MISFIT = 9.0
+_DISHONEST = 3.0
+"""Ratio of actual to predicted errors above which a calibration is not adopted."""
 LEAST_POINTS = 3
 """Least number of measured poses that determine where the robot is in its room."""
 _MOST_LEFT_OUT = 0.1
@@ -80,12 +89,16 @@ class Outcome:
     unused: Unused
     change: CalibrationChange
     """Change of the robot's file."""
-    birge_ratio: float
-    """Ratio of errors at unused measured points to predicted ones (Birge); nan without points."""
+    honesty: Honesty
+    """Errors at unused measured points, and predicted ones."""
     adopt: bool = False
     """Whether to adopt it even if its changes are not significant."""
+    wanted_mm: float | None = None
+    """Largest allowed 3 sigma of positions; None: errors must be less than with the file."""
     verifying_points_left_out: int = 0
     """Measured points at poses for verification that contradict all other readings."""
+    noise: NoiseSeen | None = None
+    """Noise of readings by the data; None with images."""
     cover: Coverage | None = None
     """Connection of the images; None without images."""
 
@@ -142,14 +155,7 @@ class Outcome:
         left_out = [fault for fault in self.faults if fault.kind in ("outlier", "slack", "jump")]
         if len(left_out) > _MOST_LEFT_OUT * found.seen.used.size:
             told.append(f"{len(left_out)} readings contradict the others: measure again")
-        most_mm = _MOST_OVER_WANTED * wanted_mm(self.robot)
-        slipped = any(fault.kind == "points" for fault in self.faults)
-        if self.predicted_3_sigma_mm > most_mm and not slipped:
-            told.append(
-                f"positions would be uncertain by {self.predicted_3_sigma_mm:.1f} mm (3 sigma, "
-                f"predicted; allowed: {most_mm:.1f} mm): measure points, or state how well the "
-                "exit points of the robot's file are known (--known-mm)"
-            )
+        told += self._too_uncertain()
         if self.worse and (self.told_from_file or self.adopt):
             told.append(
                 "at the poses kept for verification the errors are significantly larger than with "
@@ -161,6 +167,40 @@ class Outcome:
                 "calibration is not verified: take more poses, or lay out more sheets"
             )
         return told + self._points() + self._islands() + self._impossible()
+
+    def _too_uncertain(self) -> list[str]:
+        """Return objections to the predicted error, and to errors much larger than predicted.
+
+        Errors at poses that were measured show whether a calibration is better than the file. Then
+        only the user decides how accurate it must be; otherwise the prediction must be small.
+        """
+        most_mm, known_mm = self.wanted_mm, self.predicted_3_sigma_mm
+        if any(fault.kind == "points" for fault in self.faults):
+            return []
+        if math.isfinite(self.honesty.ratio) and self.honesty.ratio > _DISHONEST:
+            return [
+                f"errors at the poses kept for verification are {self.honesty.ratio:.1f} times as "
+                "large as predicted: something moves or bends that the fit assumes to be fixed, or "
+                "the measured points are less accurate than sigma_mm says"
+            ]
+        if most_mm is None:
+            most_mm = _MOST_OVER_WANTED * wanted_mm(self.robot)
+            if len(self.verified.errors_m) >= LEAST_VERIFYING and self._better:
+                return []
+        if known_mm <= most_mm:
+            return []
+        how = "measure points, or state how well the exit points of the robot's file are known"
+        if self.wanted_mm is not None:
+            how = "measure more poses, further apart, or more accurately, or raise --wanted-mm"
+        return [
+            f"positions would be uncertain by {known_mm:.1f} mm (3 sigma, predicted; allowed: "
+            f"{most_mm:.1f} mm): {how}" + (" (--known-mm)" if self.wanted_mm is None else "")
+        ]
+
+    @property
+    def _better(self) -> bool:
+        """Whether held-out poses are predicted better than by the robot's file."""
+        return self.verified.mean_mm < self.before.mean_mm and not self.worse
 
     def _points(self) -> list[str]:
         """Return objections to the measured points: too many are wrong, or too few verify."""
@@ -249,7 +289,7 @@ class Outcome:
 
     def accuracy(self) -> str:
         """Return the accuracy of positions and orientations as text, and whether it suffices."""
-        wanted, known = wanted_mm(self.robot), self.predicted
+        wanted, known = self.wanted_mm or wanted_mm(self.robot), self.predicted
         relative = "" if self.known_room else "  relative to each other"
         text = f"positions are uncertain by {known.position_mm:.2f} mm{relative}"
         enough = known.position_mm <= wanted
@@ -288,7 +328,7 @@ class Outcome:
 
     def proof(self) -> list[str]:
         """Return the errors at the poses that verify it, as text."""
-        lines = []
+        lines = [] if self.noise is None else self.noise.lines()
         if self.verified.errors_m.size:
             lines.append(
                 f"verified on {len(self.verified.errors_m)} held-out poses: mean "
@@ -296,6 +336,11 @@ class Outcome:
                 f"{self.verified.reference} (with the robot's file: {self.before.mean_mm:.2f} "
                 "and "
                 f"{self.before.worst_mm:.2f})"
+            )
+        if math.isfinite(self.honesty.ratio):
+            lines.append(
+                f"a coordinate there is off by {self.honesty.actual_mm:.2f} mm rms, "
+                f"{self.honesty.predicted_mm:.2f} mm were predicted (1 sigma)"
             )
         if count := self.verifying_points_left_out:
             lines.append(
@@ -368,10 +413,13 @@ class Outcome:
                 "scale_factor_before": number_or_none(self.before.scale.factor),
                 "reference": self.verified.kind,
                 "by": self.verified.reference,
-                "birge_ratio": number_or_none(self.birge_ratio),
+                "birge_ratio": number_or_none(self.honesty.ratio),
+                "coordinate_error_rms_mm": number_or_none(self.honesty.actual_mm),
+                "coordinate_error_predicted_mm": number_or_none(self.honesty.predicted_mm),
                 "length_residual_mm": 1e3 * self.verified.residual_m,
                 "length_residual_before_mm": 1e3 * self.before.residual_m,
             },
+            "noise": None if self.noise is None else self.noise.as_json(),
             "camera": camera_table(self.found),
             "coverage": None if self.cover is None else self.cover.as_json(),
         }

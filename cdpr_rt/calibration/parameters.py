@@ -6,6 +6,7 @@ the elongation if it is identified. Each is added to the value of the robot's fi
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -55,6 +56,8 @@ class Knowledge:
     """Relative, of the elongation by tension."""
     length_m: float = 0.0003
     """Standard deviation of a cable length by the encoder, from one pose to the next."""
+    length_known: bool = False
+    """Whether `length_m` is known; otherwise the readings show whether it is larger."""
     tension_N: float = 3.0
     """Standard deviation of a tension by the motor's torque: its dry friction."""
     yielding: float = 1.0
@@ -62,11 +65,18 @@ class Knowledge:
     slope_noise: float = 0.0
     """Spurious information about the elongation by noise of tensions, per pose, which the fit takes
     out; see `cdpr_rt.calibration.fit`."""
+    alike: float = 1.0
+    """Number of successive readings with the same error: together they count as one."""
+    aim_rad: float = math.inf
+    """Standard deviation of the platform's rotation about its target; inf if that is not used."""
+    loose_drum: float | None = None
+    """In place of `drum` if readings show that the file's drums are wrong."""
 
     def of_cable(self) -> FloatArray:
         """Return the standard deviations of a cable's parameters, (9,)."""
         anchors = [self.anchor_m] * 3
-        rows = [*[self.exit_m] * 3, self.offset_m, self.drum, *anchors, self.pulley_m]
+        drum = self.drum if self.loose_drum is None else self.loose_drum
+        rows = [*[self.exit_m] * 3, self.offset_m, drum, *anchors, self.pulley_m]
         return np.array(rows)
 
 

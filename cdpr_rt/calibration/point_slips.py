@@ -171,10 +171,8 @@ class _ByLengths:
         blind = seen.unmeasured()
         there = locate(at, blind.without_jumps(jumps_m)).poses
         rows = linearise(at, blind, there, jumps_m)
-        first, noise = rows.points.start, 1.0 / math.sqrt(max(variance_factor, 1.0))
-        r, Jp, Jx = (
-            part[:, :first] * noise for part in (rows.residual, rows.by_parameter, rows.by_pose)
-        )
+        noise = 1.0 / math.sqrt(max(variance_factor, 1.0))
+        r, Jp, Jx = (part * noise for part in (rows.residual, rows.by_parameter, rows.by_pose))
         across = np.swapaxes(Jx, 1, 2)
         H = across @ Jx
         own = np.linalg.pinv(H, rcond=_SINGULAR, hermitian=True)

@@ -5,13 +5,14 @@ from __future__ import annotations
 import csv
 import io
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Literal, Self
 
 import numpy as np
 from pydantic import Field, model_validator
+from scipy.spatial.transform import Rotation
 
 from cdpr_profiles import Robot
 from cdpr_profiles.bounded_input import read_text
@@ -23,6 +24,7 @@ from cdpr_rt.arrays import BoolArray, FloatArray, IntArray
 from cdpr_rt.calibration.markers.marker_map import SeenMarkers, Sighting
 from cdpr_rt.errors import InvalidRequestError
 from cdpr_rt.model.platform_model import PlatformModel
+from cdpr_rt.model.robot_arrays import limits_of
 
 # Data of a camera on the platform in a calibration: its setup, and its images.
 
@@ -170,6 +172,8 @@ class Observations:
     """Point of the platform to which `position_m` belongs, (3,)."""
     reference_m: FloatArray
     """Lengths when the encoders began to count; drum errors have no effect there, (n,)."""
+    target_rotation: FloatArray
+    """Rotations that the platform was told to have, (N, 3, 3)."""
     jumps: tuple[tuple[int, int], ...] = ()
     """(cable, pose) at which a cable's length jumped: from this pose on it has another offset."""
     markers: SeenMarkers | None = None
@@ -177,6 +181,12 @@ class Observations:
     tension_free: FloatArray | None = None
     """Projections onto the remaining noise of tensions, (N, n, n), after their balance has removed
     the rest; None if all remains."""
+    time_s: FloatArray | None = None
+    """Times of readings while the platform moves, (N,); None if it stood still."""
+    every: int = 1
+    """Number of readings of which one is used; the others tell the same."""
+    std_guessed: bool = False
+    """Whether the standard deviation of positions is not known: the fit then estimates it."""
 
     @classmethod
     def of_lengths(
@@ -201,8 +211,9 @@ class Observations:
         zero = np.zeros((count, 3))
         first = lengths[0].copy() if count else np.zeros(lengths.shape[1])
         return cls(
-            lengths, tensions, poses, used, zero, nowhere, turn, nowhere.copy(), np.zeros(3), first
-        )
+            lengths, tensions, poses, used, zero, nowhere, turn, nowhere.copy(), np.zeros(3), first,
+            poses[:, 1:].copy(),
+        )  # fmt: skip
 
     @property
     def poses(self) -> int:
@@ -264,10 +275,16 @@ class Observations:
             position_std_m=self.position_std_m[index],
             rotation=self.rotation[index],
             rotation_std_rad=self.rotation_std_rad[index],
+            target_rotation=self.target_rotation[index],
             jumps=jumps,
             tension_free=None if self.tension_free is None else self.tension_free[index],
+            time_s=None if self.time_s is None else self.time_s[index],
             markers=None if self.markers is None else self.markers.of_images(index),
         )
+
+    def number(self, pose: int) -> int:
+        """Return the number of a pose, counted from 0, as the data count it, from 1."""
+        return self.every * pose + 1
 
     def without_jumps(self, offsets_m: FloatArray) -> Observations:
         """Return lengths after correcting jumps by one offset each."""
@@ -280,7 +297,10 @@ class Observations:
 _MOST_BYTES, _MOST_DATA_BYTES = 4 << 20, 64 << 20
 _AXES = "xyz"
 _STD_mm = 2.0
-_COLUMNS = ("pose", "x_mm", "y_mm", "z_mm", "sigma_mm")
+_STD_deg = 0.5
+_TURNS = ("rx_deg", "ry_deg", "rz_deg")
+_REQUIRED = ("pose", "x_mm", "y_mm")
+_COLUMNS = (*_REQUIRED, "z_mm", "sigma_mm", *_TURNS, "sigma_deg")
 _FURTHEST_mm = 1e6
 _ROTATION = 1e-4
 _TURNED_rad = 0.2
@@ -296,7 +316,10 @@ class PoseReading(Profile):
     it; the first search begins there."""
     length_m: Numbers
     """Unstretched lengths by encoders and the robot's file, (n,)."""
-    tension_N: Numbers
+    tension_N: Numbers | None = None
+    """None if not measured: the middle of the allowed tensions is assumed."""
+    time_s: float | None = None
+    """Time of the readings; only for readings while the platform moves."""
     position_m: Numbers | None = None
     """Measured externally, (3,)."""
     position_std_m: float | None = Field(default=None, gt=0)
@@ -376,7 +399,8 @@ class CalibrationData(Profile):
             raise InvalidRequestError("the data contain no poses")
         n, d = len(robot.axes), model.size
         for j, reading in enumerate(self.poses):
-            counts = (len(reading.length_m), len(reading.tension_N), len(reading.target))
+            tensions = n if reading.tension_N is None else len(reading.tension_N)
+            counts = (len(reading.length_m), tensions, len(reading.target))
             if counts != (n, n, d):
                 raise InvalidRequestError(
                     f"pose {j + 1} has {counts} lengths, tensions and coordinates; allowed: "
@@ -386,11 +410,41 @@ class CalibrationData(Profile):
         start = model.poses(np.array([reading.target for reading in self.poses]))
         seen = Observations.of_lengths(
             np.array([reading.length_m for reading in self.poses]),
-            np.array([reading.tension_N for reading in self.poses]),
+            self._tensions(robot, model),
             start,
         )
         anew = tuple((cable, pose) for pose in self.restarts for cable in range(n))
-        return replace(self._with_measured(seen, model.positions), jumps=anew)
+        seen = self._with_measured(seen, model.positions)
+        return replace(seen, jumps=anew, time_s=self._times())
+
+    def _tensions(self, robot: Robot, model: PlatformModel) -> FloatArray:
+        """Return tensions (N, n), assumed ones if none was measured."""
+        without = [j for j, reading in enumerate(self.poses) if reading.tension_N is None]
+        if without and model.kinematics.turns_freely:
+            raise InvalidRequestError(
+                f"pose {without[0] + 1} has no tension_N, but the tensions turn this platform; "
+                "record the tensions too"
+            )
+        limits = limits_of(robot)
+        least_N = np.maximum(np.asarray(limits.tension_min_N, float), 0.0)
+        middle = 0.5 * (least_N + np.asarray(limits.tension_max_N, float))
+        assumed = np.broadcast_to(middle, len(robot.axes)).tolist()
+        return np.array([one.tension_N or assumed for one in self.poses], float)
+
+    def _times(self) -> FloatArray | None:
+        """Return the times of readings (N,), or None; raises InvalidRequestError."""
+        times = [reading.time_s for reading in self.poses]
+        if all(time is None for time in times):
+            return None
+        told = np.array([math.nan if time is None else time for time in times])
+        bad = ~np.isfinite(told)
+        bad[1:] |= ~(np.diff(told) > 0.0)
+        if bad.any():
+            raise InvalidRequestError(
+                f"pose {int(bad.argmax()) + 1}: time_s is missing or not later than that of the "
+                "pose before; sort the poses by time, and give all of them a time, or none"
+            )
+        return told
 
     def sightings(self) -> list[Sighting]:
         """Return the markers in the images of all poses; empty without image."""
@@ -435,12 +489,19 @@ class MeasuredPoint:
     """Counted from 0."""
     position_m: FloatArray
     std_m: float
+    std_guessed: bool = False
+    """Whether the file has no standard deviation for it."""
+    turn_rad: FloatArray | None = None
+    """Measured rotation vector of the platform (3,); nan for a coordinate without a column."""
+    turn_std_rad: float = math.radians(_STD_deg)
 
 
 def load_points(path: Path) -> list[MeasuredPoint]:
-    """Return measured points: CSV, columns pose,x_mm,y_mm,z_mm,sigma_mm, poses counted from 1.
+    """Return measured points: CSV, poses counted from 1.
 
-    Coordinates may be empty; sigma_mm is 2 by default. Raises ProfileError.
+    Columns are pose, x_mm, y_mm, and optionally z_mm, sigma_mm, the rotation vector rx_deg, ry_deg,
+    rz_deg, and sigma_deg. Cells may be empty; sigma_mm is 2 by default, sigma_deg 0.5. Raises
+    ProfileError.
     """
     try:
         reader = csv.reader(io.StringIO(read_text(path, _MOST_BYTES)))
@@ -449,11 +510,10 @@ def load_points(path: Path) -> list[MeasuredPoint]:
         raise ProfileError(path, "", f"is not a CSV file: {error}") from None
     lines = [(line, row) for line, row in lines if row and not row[0].lstrip().startswith("#")]
     first, names = (lines[0][0], [name.strip() for name in lines[0][1]]) if lines else (1, [])
-    if names not in (
-        [c for c in _COLUMNS if c not in left]
-        for left in ((), ("z_mm",), ("sigma_mm",), ("z_mm", "sigma_mm"))
-    ):
-        raise ProfileError(path, f"line {first}", f"allowed: the columns {','.join(_COLUMNS)}")
+    known, required = set(names) <= set(_COLUMNS), set(names) >= set(_REQUIRED)
+    if not known or not required or len(set(names)) < len(names):
+        problem = f"allowed: the columns {','.join(_COLUMNS)}; only the first three are required"
+        raise ProfileError(path, f"line {first}", problem)
     points: list[MeasuredPoint] = []
     line_of: dict[int, int] = {}
     for line, row in lines[1:]:
@@ -491,7 +551,29 @@ def _point(path: Path, line: int, row: dict[str, str]) -> MeasuredPoint:
     if not sigma > 0.0:
         raise ProfileError(path, f"line {line}: sigma_mm", f"value {sigma:g}; allowed: above 0")
     at = np.array([number(f"{axis}_mm", math.nan) for axis in _AXES])
-    return MeasuredPoint(int(pose) - 1, 1e-3 * at, 1e-3 * sigma)
+    turn_deg, sigma_deg = _turn(path, line, row, number), number("sigma_deg", _STD_deg)
+    if not sigma_deg > 0.0:
+        raise ProfileError(
+            path, f"line {line}: sigma_deg", f"value {sigma_deg:g}; allowed: above 0"
+        )
+    return MeasuredPoint(
+        int(pose) - 1, 1e-3 * at, 1e-3 * sigma, not row.get("sigma_mm", "").strip(),
+        None if turn_deg is None else np.radians(turn_deg), math.radians(sigma_deg),
+    )  # fmt: skip
+
+
+def _turn(
+    path: Path, line: int, row: dict[str, str], number: Callable[[str, float], float]
+) -> FloatArray | None:
+    """Return the rotation vector of a row, deg, (3,); None if its cells are empty."""
+    empty = [name for name in _TURNS if name in row and not row[name].strip()]
+    given = [name for name in _TURNS if name in row and name not in empty]
+    if not given:
+        return None
+    if empty:
+        problem = "is empty; give all angles of a pose, or none"
+        raise ProfileError(path, f"line {line}: {empty[0]}", problem)
+    return np.array([number(name, math.nan) for name in _TURNS])
 
 
 def with_points(
@@ -500,6 +582,10 @@ def with_points(
     """Return observations in which points replace other measured positions at their poses."""
     position = np.where(np.isfinite(seen.position_std_m), seen.position_m, np.nan)
     std = np.where(np.isfinite(seen.position_std_m), seen.position_std_m, 1.0)
+    turn_std = seen.rotation_std_rad.copy()
+    turn = np.where(np.isfinite(turn_std[:, :1, None]), seen.rotation, np.nan)
+    turn_std = np.where(np.isfinite(turn_std), turn_std, 1.0)
+    about = slice(0, 3) if coordinates == 3 else slice(2, 3)
     for point in points:
         if point.pose >= seen.poses:
             raise InvalidRequestError(
@@ -507,4 +593,15 @@ def with_points(
             )
         position[point.pose, :coordinates] = point.position_m[:coordinates]
         std[point.pose] = point.std_m
-    return replace(seen.with_positions(position, std, seen.target_m), used=seen.used)
+        if point.turn_rad is None:
+            continue
+        vector = np.zeros(3)
+        vector[about] = point.turn_rad[about]
+        if not np.isfinite(vector).all():
+            needed = ", ".join(_TURNS[about])
+            raise InvalidRequestError(f"a rotation of this robot has the columns {needed}")
+        turn[point.pose] = Rotation.from_rotvec(vector).as_matrix()
+        turn_std[point.pose] = point.turn_std_rad
+    guessed = bool(points) and all(point.std_guessed for point in points)
+    seen = replace(seen.with_positions(position, std, seen.target_m), std_guessed=guessed)
+    return seen.with_rotations(turn, turn_std)

@@ -14,11 +14,15 @@ vector u from exit to anchor, angle θ on the pulley and compliance c_i (1 + κ)
 
 Measured positions are p + Q c - p~, rotations log(Q Q~^T). If a platform turns freely in its
 plane, Σ t_i (Q b_i × u_i) and its weight's moment are in balance. Each row is divided
-by its standard deviation.
+by its standard deviation, and by the root of the number of successive readings that err alike.
+
+Lengths hardly determine the rotation of some platforms. There it stays near its target: rows of
+poses without a measured rotation are log(Q Q_t^T) with the target's rotation Q_t.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -90,17 +94,20 @@ def linearise(
     _closure(geometry, seen, poses, jumps_m, cables, kernel, chosen, out)
     if geometry.turns_freely:
         _balance(geometry, seen, poses, cables, kernel, chosen, out)
-    _measured_poses(seen, poses, chosen, out)
+    _measured_poses(geometry, seen, poses, chosen, out)
     return out
 
 
 def length_std_m(geometry: CableGeometry, seen: Observations) -> FloatArray:
-    """Return the standard deviation of each length, including the tension's effect, (N, n)."""
+    """Return the standard deviation of each length, including the tension's effect, (N, n).
+
+    It is larger by the root of the number of readings that err alike.
+    """
     known = geometry.knowledge
     uncertain = known.yielding * seen.length_m * geometry.compliance_1_N * known.tension_N
     if seen.tension_free is not None:
         uncertain *= np.sqrt(np.diagonal(seen.tension_free, axis1=1, axis2=2))
-    return np.asarray(np.hypot(known.length_m, uncertain))
+    return np.asarray(math.sqrt(known.alike) * np.hypot(known.length_m, uncertain))
 
 
 def lengths_told(geometry: CableGeometry, poses: FloatArray, tension_N: FloatArray) -> FloatArray:
@@ -201,7 +208,8 @@ def _balance(
     by_angle -= weight_N * centre[:, 1]
     # the moment's standard deviation: that of a tension, with a share of the arms as its lever
     arms = geometry.model.kinematics.geometry[ANCHOR : ANCHOR + 2]
-    held = geometry.knowledge.tension_N * _MISSED * float(np.linalg.norm(arms))
+    known = geometry.knowledge
+    held = math.sqrt(known.alike) * known.tension_N * _MISSED * float(np.linalg.norm(arms))
     weight = np.asarray(seen.used.all(axis=1) / held)
     out.residual[:, n] = weight * moment
     by_pose = {0: by_place[..., 0].sum(axis=1), 1: by_place[..., 1].sum(axis=1), 5: by_angle}
@@ -219,21 +227,29 @@ def _balance(
 
 
 def _measured_poses(
-    seen: Observations, poses: FloatArray, chosen: list[int], out: Linearised
+    geometry: CableGeometry,
+    seen: Observations,
+    poses: FloatArray,
+    chosen: list[int],
+    out: Linearised,
 ) -> None:
     """Write the last six rows, of positions and rotations measured from outside."""
     arm = poses[:, 1:] @ seen.target_m
     first = out.points.start
-    weight = 1.0 / seen.position_std_m
+    known = geometry.knowledge
+    root = math.sqrt(known.alike)
+    weight = 1.0 / (root * seen.position_std_m)
     out.residual[:, out.points] = weight * (poses[:, 0] + arm - seen.position_m)
     by_twist = np.zeros((len(poses), 6, 6))
     by_twist[:, :3, :3] = np.eye(3)
     by_twist[:, :3, 3:] = -cross_matrices(arm)
     by_twist[:, :3] *= weight[..., None]
-    if np.isfinite(seen.rotation_std_rad).any():
-        turn = poses[:, 1:] @ np.swapaxes(seen.rotation, 1, 2)
-        phi = Rotation.from_matrix(turn).as_rotvec()
-        weight = 1.0 / seen.rotation_std_rad
+    measured = np.asarray(np.isfinite(seen.rotation_std_rad).any(axis=1))[:, None]
+    if measured.any() or math.isfinite(known.aim_rad):
+        near = np.where(measured[..., None], seen.rotation, seen.target_rotation)
+        std_rad = np.where(measured, root * seen.rotation_std_rad, known.aim_rad)
+        phi = Rotation.from_matrix(poses[:, 1:] @ np.swapaxes(near, 1, 2)).as_rotvec()
+        weight = 1.0 / std_rad
         out.residual[:, first + 3 :] = weight * phi
         skew = cross_matrices(phi)
         # inverse of the left Jacobian of SO(3), to second order

@@ -280,8 +280,7 @@ def _by_parameters(found: Fit, poses: FloatArray, relative: bool) -> FloatArray:
     """Return the derivatives (M, d, P) of poses by lengths, as for `predicted_std`."""
     geometry = found.geometry
     at = _at(found, poses)
-    rows = geometry.n + int(geometry.turns_freely)
-    x, p = at.by_pose[:, :rows], at.by_parameter[:, :rows, : geometry.size]
+    x, p = at.by_pose, at.by_parameter[..., : geometry.size]
     across = np.swapaxes(x, 1, 2)
     A = np.asarray(-np.linalg.solve(across @ x, across @ p))
     return _less_rigid_motion(A, poses, geometry.free) if relative else A
@@ -293,6 +292,7 @@ def _at(found: Fit, poses: FloatArray) -> Linearised:
     lengths = lengths_told(geometry, poses, tension)
     there = Observations.of_lengths(lengths, tension, poses)
     there = replace(there, reference_m=seen.reference_m)
+    geometry = replace(geometry, knowledge=replace(geometry.knowledge, alike=1.0))
     return linearise(geometry, there, poses, np.zeros(0))
 
 

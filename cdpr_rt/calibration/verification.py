@@ -175,7 +175,7 @@ def verify(
     """
     told = seen.without_jumps(jumps_m)
     there = locate(geometry, told)
-    off = there.length_residual_m * length_std_m(geometry, told)
+    off = there.length_residual_m * length_std_m(there.geometry, told)
     squares = np.asarray((off**2).sum(axis=1))
     rms = float(np.sqrt(squares.sum() / max(int(seen.used.sum()), 1)))
     k = geometry.coordinates
@@ -238,6 +238,8 @@ def _seen_from_first(poses: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 _EACH = 5
 """One pose in this number is kept from the fit and verifies it."""
+_BLOCKS = 25
+"""Number of blocks of successive readings of a moving platform."""
 LEAST_VERIFYING = 3
 """Least number of measured points that verify a calibration."""
 LEAST_POSES = _EACH * LEAST_VERIFYING
@@ -248,8 +250,11 @@ def held_out(seen: Observations) -> BoolArray:
     """Return which poses are kept from the fit, (N,).
 
     One in five, but at least three of those with a measured point if there are six or more, so
-    that the fit also keeps three.
+    that the fit also keeps three. While the platform moves, one block of time in five.
     """
+    if seen.time_s is not None:
+        block = (np.arange(seen.poses) * (_BLOCKS / seen.poses)).astype(int)
+        return np.asarray(every_fifth(_BLOCKS)[block])
     points, held = np.isfinite(seen.position_std_m).any(axis=1), np.zeros(seen.poses, bool)
     for these in (np.flatnonzero(points), np.flatnonzero(~points)):
         held[these[every_fifth(len(these))]] = True
@@ -277,6 +282,18 @@ class Reference:
     map: MapFit
     images: Images
     """Images of the held-out poses."""
+
+
+@dataclass(frozen=True)
+class Honesty:
+    """Errors of held-out positions against predicted ones; nan if no positions were measured."""
+
+    actual_mm: float
+    """Root mean square of a coordinate's error."""
+    predicted_mm: float
+    """Standard deviation of a coordinate."""
+    ratio: float
+    """Root mean square of errors over their standard deviations (Birge, Phys. Rev. 40, 1932)."""
 
 
 @dataclass(frozen=True)
@@ -308,25 +325,25 @@ class Unused:
         """
         return self._compared(file, self.jumps_m)
 
-    def birge_ratio(self) -> float:
-        """Return the ratio of actual to predicted errors, against measured points.
+    def honesty(self) -> Honesty:
+        """Return actual and predicted errors against measured points.
 
-        The root mean square of errors by lengths over their standard deviations: by the fit's
-        uncertainty, by lengths of one pose, and by the measurement (Birge, Phys. Rev. 40, 1932).
-        nan if no positions were measured.
+        Predicted are the fit's uncertainty, that of lengths of one pose, and of the measurement.
         """
         part, seen = self.part, self.seen
         there = locate(part.geometry, seen.without_jumps(self.jumps_m))
         k = part.geometry.coordinates
         known = np.isfinite(seen.position_std_m[:, :k])
         if not known.any():
-            return float("nan")
+            return Honesty(math.nan, math.nan, math.nan)
         p = there.poses[:, 0] + there.poses[:, 1:] @ seen.target_m
         own = np.diagonal(there.pose_covariance, axis1=1, axis2=2) * max(part.variance_factor, 1.0)
         variance = predicted_std(part, there.poses)[:, :k] ** 2 + own[:, :k]
         variance += np.where(known, seen.position_std_m[:, :k], 0.0) ** 2
-        squares = (p - seen.position_m)[:, :k] ** 2 / variance
-        return float(np.sqrt(squares[known].mean()))
+        squares = ((p - seen.position_m)[:, :k] ** 2)[known]
+        ratio = float(np.sqrt((squares / variance[known]).mean()))
+        actual, predicted = (1e3 * math.sqrt(float(x.mean())) for x in (squares, variance[known]))
+        return Honesty(actual, predicted, ratio)
 
     def _compared(self, geometry: CableGeometry, jumps_m: FloatArray) -> Verification:
         """Return the errors of poses by lengths alone with a geometry.

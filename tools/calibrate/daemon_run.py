@@ -237,8 +237,9 @@ def lines(robot: Robot, data: CalibrationData) -> list[str]:
     assert robot.platform is not None  # see `robot_of`
     reading = data.poses[-1]
     place = ", ".join(f"{1e3 * x:.1f}" for x in reading.target[: len(robot.platform.home_m)])
-    low, high = min(reading.tension_N), max(reading.tension_N)
-    said = [f"pose {len(data.poses)} at {place} mm: tensions {low:.1f} to {high:.1f} N"]
+    tensions = reading.tension_N or (math.nan,)
+    said = [f"pose {len(data.poses)} at {place} mm: tensions {min(tensions):.1f} to "]
+    said[0] += f"{max(tensions):.1f} N"
     if reading.image is not None:
         said[0] += f"; {len(reading.image.markers)} markers in the image"
     if data.restarts and data.restarts[-1] == len(data.poses) - 1:

@@ -126,11 +126,13 @@ def finish(
     adopt: bool,
     compare: CompareWithTruth | None = None,
     hand_eye: Path | None = None,
+    wanted_mm: float | None = None,
 ) -> None:
     """Print the result of `concluded`; raises typer.Exit with status 1 if it is not good."""
     result = concluded(
         *(out, robot, data, points, geometry, source, folder, dry_run, adopt, compare),
         hand_eye=hand_eye,
+        wanted_mm=wanted_mm,
     )
     out.result(result)
     if not result["ok"]:
@@ -149,16 +151,20 @@ def concluded(
     adopt: bool,
     compare: CompareWithTruth | None = None,
     hand_eye: Path | None = None,
+    wanted_mm: float | None = None,
 ) -> dict[str, Any]:
     """Identify, report, and adopt a good calibration; return the result for JSON.
 
     `source` is the data file. `hand_eye` is the file of the hand-eye transform, if it does not
-    come from the data. A calibration without significant changes is adopted only with `adopt`, and
+    come from the data. `wanted_mm` is the largest allowed 3 sigma of positions; without it, held-out
+    poses must improve. A calibration without significant changes is adopted only with `adopt`, and
     not if it predicts held-out poses significantly worse than the robot's file.
     """
     refuse_foreign_report(folder)
     with out.stage(f"fitting {len(data.poses)} poses"):
-        outcome = replace(identified(robot, data, points, geometry), adopt=adopt)
+        outcome = replace(
+            identified(robot, data, points, geometry), adopt=adopt, wanted_mm=wanted_mm
+        )
         known = None if compare is None else compare(outcome)
     result: dict[str, Any] = {**outcome.as_json(), "data": str(source)}
     out.say(*_lines(outcome, data))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -59,6 +60,30 @@ KnownMmOption = Annotated[
         "measured with a tape.",
     ),
 ]  # fmt: skip
+KnownDrumOption = Annotated[
+    float | None,
+    typer.Option(
+        "--known-drum-percent", min=0.001, max=50.0,
+        help="Standard deviation of the cable that a turn of a drum pays out by its file, %; "
+        "default 0.5.",
+    ),
+]  # fmt: skip
+LengthNoiseOption = Annotated[
+    float | None,
+    typer.Option(
+        "--length-noise-mm", min=0.001, max=100.0,
+        help="Standard deviation of a cable length by its encoder, mm; default: estimated from the "
+        "data, at least 0.3.",
+    ),
+]  # fmt: skip
+WantedMmOption = Annotated[
+    float | None,
+    typer.Option(
+        "--wanted-mm", min=0.01, max=1000.0,
+        help="Largest allowed uncertainty of positions, mm (3 sigma); default: held-out poses "
+        "must improve, and their errors must be as predicted.",
+    ),
+]  # fmt: skip
 CalibrationPlantOption = Annotated[
     Path | None,
     typer.Option(help="Plant file: the truth about robot, cables, motors and camera."),
@@ -108,7 +133,13 @@ def hand_eye_of(path: Path | None) -> HandEye | None:
     return None if path is None else HandEye.load_file(path)
 
 
-def geometry_of(robot: Robot, identify: str | None, known_mm: float | None) -> CableGeometry:
+def geometry_of(
+    robot: Robot,
+    identify: str | None,
+    known_mm: float | None,
+    drum_percent: float | None = None,
+    length_mm: float | None = None,
+) -> CableGeometry:
     """Return the parameters to identify; raises InvalidRequestError for an unknown kind."""
     from cdpr_rt.calibration.parameters import (  # noqa: PLC0415  # slow to load
         USUAL,
@@ -116,7 +147,13 @@ def geometry_of(robot: Robot, identify: str | None, known_mm: float | None) -> C
         Knowledge,
     )
 
-    known = Knowledge() if known_mm is None else Knowledge(exit_m=1e-3 * known_mm)
+    known = Knowledge(length_known=length_mm is not None)
+    if known_mm is not None:
+        known = replace(known, exit_m=1e-3 * known_mm)
+    if drum_percent is not None:
+        known = replace(known, drum=1e-2 * drum_percent)
+    if length_mm is not None:
+        known = replace(known, length_m=1e-3 * length_mm)
     kinds = USUAL if identify is None else tuple(part.strip() for part in identify.split(","))
     return CableGeometry.of(robot, kinds, known)
 
@@ -267,6 +304,9 @@ def fit_data(
     hand_eye: HandEyeOption = None,
     identify: IdentifyOption = None,
     known_mm: KnownMmOption = None,
+    drum_percent: KnownDrumOption = None,
+    length_mm: LengthNoiseOption = None,
+    wanted_mm: WantedMmOption = None,
     out_dir: Annotated[
         Path | None, typer.Option("--out", help="Folder for the result; default that of --data.")
     ] = None,
@@ -292,10 +332,12 @@ def fit_data(
         compare = runs.truth_comparison_of_folder(profile, data)
         data /= runs.DATA
     read_before = with_hand_eye(load_data(data), hand_eye_of(hand_eye))
+    geometry = geometry_of(profile, identify, known_mm, drum_percent, length_mm)
     finish(
-        *(out, profile, read_before, points, geometry_of(profile, identify, known_mm)),
+        *(out, profile, read_before, points, geometry),
         *(data, out_dir or data.parent, dry_run, adopt, compare),
         hand_eye=hand_eye,
+        wanted_mm=wanted_mm,
     )
 
 

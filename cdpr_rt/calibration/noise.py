@@ -1,0 +1,320 @@
+"""Noise of readings by the data themselves, estimated before any reading is called a fault.
+
+The residuals of a fit, over the root of their redundancy, have the standard deviations that the fit
+assumed if these are right. Their robust scale (median) corrects the assumption, and the fit is
+repeated. Lengths, positions and rotations have one scale each.
+
+While the platform moves, errors of successive readings are alike: wrong parts of the model act at
+neighbouring places. With the autocorrelation ρ_k of residuals, 1 + 2 Σ ρ_k readings count as one.
+Lengths and measured points may also have different clocks. For an offset τ of the points, lengths
+l(t + τ) are used; τ comes from the residuals r and the rates J of lengths (Gauss and Newton).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from cdpr_rt.arrays import FloatArray
+from cdpr_rt.calibration.fit import Fit, fit
+from cdpr_rt.calibration.parameters import DRUM, CableGeometry, Knowledge
+from cdpr_rt.calibration.readings import Observations
+from cdpr_rt.calibration.residuals import length_std_m
+
+MOST_READINGS = 250
+"""Number of readings of a moving platform that a fit uses."""
+_ROUNDS = 6
+_NORMAL_MEDIAN = 0.6745
+_TOLD = 0.1
+"""Least redundancy of a residual that counts in a scale."""
+_LEAST_TOLD = 20
+"""Least number of residuals for a scale."""
+_LARGER, _SAME = 1.3, 1.1
+"""Scale above which noise of a platform at rest is larger than assumed; scale that is no change."""
+_LEAST_RHO, _WINDOW = 0.05, 20
+_GAP = 2.5
+"""Time between readings over the median, from which on they are separate."""
+_OFFSET_STD_s, _SMALL_s = 0.05, 5e-5
+_LOOSE_DRUM, _FAR = 0.1, 3.0
+"""Standard deviation of drums at first; multiple of the assumed one beyond which they are wrong."""
+_AIM_SHARE = 0.25
+"""Standard deviation of the platform's rotation about its target, over the largest target."""
+
+WithoutFaults = Callable[[CableGeometry, Observations], tuple[Fit, int]]
+"""Returns a fit without faulty readings, and their number."""
+
+
+@dataclass(frozen=True)
+class NoiseSeen:
+    """Readings as the fit uses them, and the noise that they have."""
+
+    geometry: CableGeometry
+    """With the standard deviation of lengths by the data."""
+    seen: Observations
+    """With the standard deviations of points by the data, without time offset."""
+    assumed_length_m: float
+    offset_s: float = 0.0
+    """Time by which points are later than the lengths of the same reading."""
+    offset_std_s: float = 0.0
+    """0 if no offset was fitted."""
+
+    def lines(self) -> list[str]:
+        """Return the noise as text; empty if it is as assumed."""
+        known, seen, told = self.geometry.knowledge, self.seen, []
+        if known.length_m > _SAME * self.assumed_length_m or seen.time_s is not None:
+            told.append(
+                f"noise of the lengths by the data: {1e3 * known.length_m:.2f} mm (standard "
+                f"deviation; {1e3 * self.assumed_length_m:.2f} mm was assumed)"
+            )
+        if seen.time_s is None:
+            return told
+        measured = np.isfinite(seen.position_std_m)
+        if measured.any():
+            std_mm = 1e3 * float(np.median(seen.position_std_m[measured]))
+            told.append(f"noise of the measured points: {std_mm:.2f} mm (standard deviation)")
+        used = "all readings" if seen.every == 1 else f"one reading in {seen.every}"
+        told.append(
+            f"the platform moved: {used} used, {seen.poses} in all; {known.alike:.1f} of them "
+            "err alike and count as one"
+        )
+        if self.offset_std_s:
+            told.append(
+                f"time offset: measured points are {1e3 * self.offset_s:+.1f} ms (± "
+                f"{3e3 * self.offset_std_s:.1f} ms, 3 sigma) later than the lengths with the same "
+                "number; it is corrected"
+            )
+        return told
+
+    def as_json(self) -> dict[str, object]:
+        """Return it for JSON."""
+        known, moving = self.geometry.knowledge, self.seen.time_s is not None
+        return {
+            "length_std_mm": 1e3 * known.length_m,
+            "length_std_assumed_mm": 1e3 * self.assumed_length_m,
+            "readings_alike": known.alike,
+            "one_reading_in": self.seen.every,
+            "time_offset_ms": 1e3 * self.offset_s if moving else None,
+            "time_offset_std_ms": 1e3 * self.offset_std_s if moving else None,
+        }
+
+
+def noise_seen(
+    geometry: CableGeometry, seen: Observations, without_faults: WithoutFaults
+) -> NoiseSeen:
+    """Return readings with the noise that they have.
+
+    For a platform at rest, only the noise of lengths is estimated, and it is only increased, if
+    faults of single readings do not explain the residuals.
+    """
+    geometry = replace(geometry, knowledge=_with_aim(geometry, seen))
+    first = geometry.knowledge.length_m
+    if seen.time_s is not None:
+        return _while_moving(geometry, seen, without_faults)
+    known = geometry.knowledge.length_known
+    if known or _scale(fit(geometry, seen), _lengths(geometry)) <= _LARGER:
+        return NoiseSeen(geometry, seen, first)
+    for _ in range(_ROUNDS):
+        found, _faults = without_faults(geometry, seen)
+        larger = _scale(found, _lengths(geometry))
+        if larger <= _LARGER:
+            break
+        length_m = larger * geometry.knowledge.length_m
+        geometry = replace(geometry, knowledge=replace(geometry.knowledge, length_m=length_m))
+    return NoiseSeen(geometry, seen, first)
+
+
+def _with_aim(geometry: CableGeometry, seen: Observations) -> Knowledge:
+    """Return the knowledge with the standard deviation of rotations about their targets."""
+    known, turns = geometry.knowledge, len(geometry.free) > geometry.coordinates
+    if geometry.turns_freely or not turns:
+        return known
+    aim_rad = _AIM_SHARE * geometry.model.angle_rad
+    measured = np.isfinite(seen.rotation_std_rad).any(axis=1)
+    if measured.sum() >= _LEAST_TOLD:
+        turn = seen.rotation[measured] @ np.swapaxes(seen.target_rotation[measured], 1, 2)
+        cosine = np.clip(0.5 * (np.trace(turn, axis1=1, axis2=2) - 1.0), -1.0, 1.0)
+        aim_rad = max(aim_rad, float(np.median(np.arccos(cosine))) / _NORMAL_MEDIAN)
+    return replace(known, aim_rad=aim_rad or math.inf)
+
+
+def _lengths(geometry: CableGeometry) -> slice:
+    return slice(0, geometry.n)
+
+
+def _scale(found: Fit, rows: slice) -> float:
+    """Return the robust scale of residuals of some rows; 1 for too few."""
+    at, information = found.at, found.covariance / found.inflation
+    own = (found.taken[:, rows] * at.by_pose[:, rows]).sum(axis=2)
+    own *= np.sqrt(found.weights[:, rows])
+    left = found.left[:, rows]
+    spare = 1.0 - own - np.einsum("jap,pq,jaq->ja", left, information, left, optimize=True)
+    told = (spare > _TOLD) & (np.abs(at.by_pose[:, rows]).max(axis=2) > 0.0)
+    if told.sum() < _LEAST_TOLD:
+        return 1.0
+    off = np.abs(at.residual[:, rows][told]) / np.sqrt(spare[told])
+    return math.sqrt(found.geometry.knowledge.alike) * float(np.median(off)) / _NORMAL_MEDIAN
+
+
+# A platform that moves.
+
+
+def _while_moving(
+    geometry: CableGeometry, whole: Observations, without_faults: WithoutFaults
+) -> NoiseSeen:
+    every = -(-whole.poses // MOST_READINGS)
+    seen, first = _thinned(whole, every), geometry.knowledge.length_m
+    points = seen.position_std_m, seen.rotation_std_rad
+    offset_s = offset_std_s = 0.0
+    fits = int(seen.measured.sum()) >= _LEAST_TOLD
+    # wrong drums of the file would look like noise, which would then hold the fit to them
+    geometry = _with_drums(geometry, _LOOSE_DRUM)
+    for _ in range(_ROUNDS):
+        found = fit(geometry, seen)
+        geometry, seen, same = _rescaled(found, seen, first, points)
+        step_s = 0.0
+        if fits:
+            step_s, offset_std_s = _time_step(found, whole, every, offset_s)
+            offset_s += step_s
+            seen = replace(seen, length_m=_lengths_at(whole, offset_s)[::every])
+        if same and abs(step_s) < _SMALL_s:
+            break
+    geometry = _with_drums(geometry, _contradictory_drums(found))
+    geometry = replace(geometry, knowledge=replace(geometry.knowledge, alike=_alike(found)))
+    for _ in range(_ROUNDS):
+        found, faults = without_faults(geometry, seen)
+        geometry, seen, same = _rescaled(found, seen, first, points)
+        if not faults or same:
+            break
+    return NoiseSeen(geometry, seen, first, offset_s, offset_std_s if fits else 0.0)
+
+
+def _with_drums(geometry: CableGeometry, std: float | None) -> CableGeometry:
+    known = replace(geometry.knowledge, loose_drum=std)
+    return replace(geometry, knowledge=known)
+
+
+def _contradictory_drums(found: Fit) -> float | None:
+    """Return the root mean square error of the file's drums if it is far too large, else None."""
+    if "drum" not in found.geometry.identified:
+        return None
+    off = found.geometry.cable[:, DRUM]
+    if np.abs(off).max() < _FAR * found.geometry.knowledge.drum:
+        return None
+    return float(np.sqrt((off**2).mean()))
+
+
+def _thinned(seen: Observations, every: int) -> Observations:
+    """Return one reading in `every`, the first included."""
+    return replace(seen.some(np.arange(0, seen.poses, every)), every=every)
+
+
+def _rescaled(
+    found: Fit,
+    seen: Observations,
+    least_m: float,
+    points: tuple[FloatArray, FloatArray],
+) -> tuple[CableGeometry, Observations, bool]:
+    """Return geometry and readings with the noise by the residuals, and whether it is the same.
+
+    `least_m` is the least noise of lengths, `points` are the given deviations of positions and
+    rotations, which are reduced only if they are guesses.
+    """
+    geometry, knowledge, at = found.geometry, found.geometry.knowledge, found.at.points
+    lengths = 1.0 if knowledge.length_known else _scale(found, _lengths(geometry))
+    length_m = max(lengths * knowledge.length_m, least_m)
+    positions, turns = _scale(found, at), _scale(found, slice(at.stop, at.stop + 3))
+    # until faults are looked for, each reading counts, so that the file does not hold the fit
+    alike = knowledge.alike if knowledge.loose_drum == _LOOSE_DRUM else _alike(found)
+    given_m, given_rad = points
+    position_m, rotation_rad = positions * seen.position_std_m, turns * seen.rotation_std_rad
+    if not seen.std_guessed:
+        position_m = np.maximum(position_m, given_m)
+        rotation_rad = np.maximum(rotation_rad, given_rad)
+    changes = [length_m / knowledge.length_m, alike / knowledge.alike]
+    changes += [
+        float(np.nanmax(now[np.isfinite(now)] / before[np.isfinite(now)], initial=1.0))
+        for now, before in (
+            (position_m, seen.position_std_m), (rotation_rad, seen.rotation_std_rad),
+        )
+    ]  # fmt: skip
+    file = replace(
+        geometry.with_values(np.zeros(geometry.size)),
+        knowledge=replace(knowledge, length_m=length_m, alike=alike),
+    )
+    other = replace(seen, position_std_m=position_m, rotation_std_rad=rotation_rad)
+    return file, other, max(abs(math.log(one)) for one in changes) < math.log(_SAME)
+
+
+def _alike(found: Fit) -> float:
+    """Return how many successive readings err alike: 1 + 2 Σ ρ_k for residuals of lengths.
+
+    Readings with a gap between them are independent.
+    """
+    seen, n = found.seen, found.geometry.n
+    assert seen.time_s is not None
+    off = found.at.residual[:, :n] * np.sqrt(found.weights[:, :n])
+    piece = _pieces(seen.time_s)
+    square, total = float((off**2).mean()), 1.0
+    for lag in range(1, max(2, seen.poses // _WINDOW)):
+        together = piece[lag:] == piece[:-lag]
+        if not together.any() or not square:
+            break
+        rho = float((off[lag:] * off[:-lag])[together].mean()) / square
+        if rho < _LEAST_RHO:
+            break
+        total += 2.0 * rho
+    return total
+
+
+def _pieces(time_s: FloatArray) -> FloatArray:
+    """Return the number of the piece without a gap to which each reading belongs, (N,)."""
+    between = np.diff(time_s)
+    return np.append(0, np.cumsum(between > _GAP * np.median(between)))
+
+
+def _rates(seen: Observations) -> FloatArray:
+    """Return the derivatives of lengths by time, (N, n); 0 for single readings."""
+    assert seen.time_s is not None
+    rate, piece = np.zeros_like(seen.length_m), _pieces(seen.time_s)
+    for one in range(int(piece[-1]) + 1):
+        these = piece == one
+        if these.sum() > 1:
+            rate[these] = np.gradient(seen.length_m[these], seen.time_s[these], axis=0)
+    return rate
+
+
+def _lengths_at(seen: Observations, offset_s: float) -> FloatArray:
+    """Return lengths (N, n) later by an offset; straight on beyond the ends of a piece."""
+    assert seen.time_s is not None
+    out, rate, piece = seen.length_m.copy(), _rates(seen), _pieces(seen.time_s)
+    for one in range(int(piece[-1]) + 1):
+        these = np.flatnonzero(piece == one)
+        time_s = seen.time_s[these]
+        wanted = time_s + offset_s
+        inside = np.clip(wanted, time_s[0], time_s[-1])
+        for i in range(out.shape[1]):
+            beyond = np.where(wanted > inside, rate[these[-1], i], rate[these[0], i])
+            at = np.interp(inside, time_s, seen.length_m[these, i])
+            out[these, i] = at + beyond * (wanted - inside)
+    return out
+
+
+def _time_step(found: Fit, whole: Observations, every: int, offset_s: float) -> tuple[float, float]:
+    """Return the change of the time offset that reduces the residuals most, and its deviation."""
+    now = replace(whole, length_m=_lengths_at(whole, offset_s))
+    rows, seen = _lengths(found.geometry), found.seen
+    root = np.sqrt(found.weights[:, rows])
+    by_time = root * _rates(now)[::every] * seen.used / length_std_m(found.geometry, seen)
+    by_pose = found.at.by_pose[:, rows] * root[..., None]
+    taken = np.einsum("jad,jbd,jb->ja", found.taken[:, rows], by_pose, by_time, optimize=True)
+    by_parameter = np.einsum("jap,ja->p", found.left[:, rows], by_time)
+    covariance = found.covariance / found.inflation
+    information = float((by_time * (by_time - taken)).sum())
+    information -= float(by_parameter @ covariance @ by_parameter)
+    information = max(information, 0.0) + _OFFSET_STD_s**-2
+    gradient = float((by_time * root * found.at.residual[:, rows]).sum())
+    gradient += offset_s / _OFFSET_STD_s**2
+    return -gradient / information, math.sqrt(found.inflation / information)
