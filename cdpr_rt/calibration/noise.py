@@ -40,8 +40,9 @@ _GAP = 2.5
 _OFFSET_STD_s, _SMALL_s = 0.05, 5e-5
 _LOOSE_DRUM, _FAR = 0.1, 3.0
 """Standard deviation of drums at first; multiple of the assumed one beyond which they are wrong."""
-_AIM_SHARE = 0.25
-"""Standard deviation of the platform's rotation about its target, over the largest target."""
+_AIM_SHARE, _COPY_SHARE = 0.25, 0.1
+"""Standard deviation of the platform's rotation about its target, over the largest target; share of
+that below which targets are copies of measured rotations."""
 
 WithoutFaults = Callable[[CableGeometry, Observations], tuple[Fit, int]]
 """Returns a fit without faulty readings, and their number."""
@@ -109,7 +110,6 @@ def noise_seen(
     For a platform at rest, only the noise of lengths is estimated, and it is only increased, if
     faults of single readings do not explain the residuals.
     """
-    geometry = replace(geometry, knowledge=_with_aim(geometry, seen))
     first = geometry.knowledge.length_m
     if seen.time_s is not None:
         return _while_moving(geometry, seen, without_faults)
@@ -136,7 +136,9 @@ def _with_aim(geometry: CableGeometry, seen: Observations) -> Knowledge:
     if measured.sum() >= _LEAST_TOLD:
         turn = seen.rotation[measured] @ np.swapaxes(seen.target_rotation[measured], 1, 2)
         cosine = np.clip(0.5 * (np.trace(turn, axis1=1, axis2=2) - 1.0), -1.0, 1.0)
-        aim_rad = max(aim_rad, float(np.median(np.arccos(cosine))) / _NORMAL_MEDIAN)
+        seen_rad = float(np.median(np.arccos(cosine))) / _NORMAL_MEDIAN
+        # targets that are copies of the measured rotations show nothing
+        aim_rad = seen_rad if seen_rad > _COPY_SHARE * aim_rad else aim_rad
     return replace(known, aim_rad=aim_rad or math.inf)
 
 
@@ -164,6 +166,7 @@ def _scale(found: Fit, rows: slice) -> float:
 def _while_moving(
     geometry: CableGeometry, whole: Observations, without_faults: WithoutFaults
 ) -> NoiseSeen:
+    geometry = replace(geometry, knowledge=_with_aim(geometry, whole))
     every = -(-whole.poses // MOST_READINGS)
     seen, first = _thinned(whole, every), geometry.knowledge.length_m
     points = seen.position_std_m, seen.rotation_std_rad

@@ -340,7 +340,7 @@ class Outcome:
         if math.isfinite(self.honesty.ratio):
             lines.append(
                 f"a coordinate there is off by {self.honesty.actual_mm:.2f} mm rms, "
-                f"{self.honesty.predicted_mm:.2f} mm were predicted (1 sigma)"
+                f"{self.honesty.predicted_mm:.2f} mm were predicted (standard deviation)"
             )
         if count := self.verifying_points_left_out:
             lines.append(
