@@ -17,9 +17,11 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.ndimage import median_filter
+from scipy.spatial.transform import Rotation
 
 from cdpr_rt.arrays import FloatArray
-from cdpr_rt.calibration.fit import Fit, fit
+from cdpr_rt.calibration.fit import Fit, fit, locate
 from cdpr_rt.calibration.parameters import DRUM, CableGeometry, Knowledge
 from cdpr_rt.calibration.readings import Observations
 from cdpr_rt.calibration.residuals import length_std_m
@@ -37,6 +39,8 @@ _LARGER, _SAME = 1.3, 1.1
 _LEAST_RHO, _WINDOW = 0.05, 20
 _GAP = 2.5
 """Time between readings over the median, from which on they are separate."""
+_GLITCH, _BESIDE, _LEAST_m, _LEAST_rad = 6.0, 9, 0.003, 0.02
+"""A point that jumps by more standard deviations, and by more, is a glitch; neighbours in time."""
 _OFFSET_STD_s, _SMALL_s = 0.05, 5e-5
 _LOOSE_DRUM, _FAR = 0.1, 3.0
 """Standard deviation of drums at first; multiple of the assumed one beyond which they are wrong."""
@@ -61,6 +65,8 @@ class NoiseSeen:
     """Time by which points are later than the lengths of the same reading."""
     offset_std_s: float = 0.0
     """0 if no offset was fitted."""
+    glitches: int = 0
+    """Number of readings whose measured point or rotation jumps for a moment, and is left out."""
 
     def lines(self) -> list[str]:
         """Return the noise as text; empty if it is as assumed."""
@@ -70,17 +76,23 @@ class NoiseSeen:
                 f"noise of the lengths by the data: {1e3 * known.length_m:.2f} mm (standard "
                 f"deviation; {1e3 * self.assumed_length_m:.2f} mm was assumed)"
             )
+        if seen.every > 1 or seen.time_s is not None:
+            used = "all readings are" if seen.every == 1 else f"one reading in {seen.every} is"
+            told.append(f"{used} used, {seen.poses} in all")
+        if known.alike > 1.0:
+            told.append(
+                f"errors of successive readings are alike: {known.alike:.1f} readings count as one"
+            )
         if seen.time_s is None:
             return told
         measured = np.isfinite(seen.position_std_m)
         if measured.any():
             std_mm = 1e3 * float(np.median(seen.position_std_m[measured]))
             told.append(f"noise of the measured points: {std_mm:.2f} mm (standard deviation)")
-        used = "all readings" if seen.every == 1 else f"one reading in {seen.every}"
-        told.append(
-            f"the platform moved: {used} used, {seen.poses} in all; {known.alike:.1f} of them "
-            "err alike and count as one"
-        )
+        if self.glitches:
+            told.append(
+                f"{self.glitches} measured points or rotations jump for a moment and are left out"
+            )
         if self.offset_std_s:
             told.append(
                 f"time offset: measured points are {1e3 * self.offset_s:+.1f} ms (± "
@@ -97,6 +109,7 @@ class NoiseSeen:
             "length_std_assumed_mm": 1e3 * self.assumed_length_m,
             "readings_alike": known.alike,
             "one_reading_in": self.seen.every,
+            "glitches": self.glitches,
             "time_offset_ms": 1e3 * self.offset_s if moving else None,
             "time_offset_std_ms": 1e3 * self.offset_std_s if moving else None,
         }
@@ -108,22 +121,21 @@ def noise_seen(
     """Return readings with the noise that they have.
 
     For a platform at rest, only the noise of lengths is estimated, and it is only increased, if
-    faults of single readings do not explain the residuals.
+    faults of single readings do not explain the residuals. Of very many readings, one in a few is
+    used.
     """
-    first = geometry.knowledge.length_m
-    if seen.time_s is not None:
-        return _while_moving(geometry, seen, without_faults)
-    known = geometry.knowledge.length_known
-    if known or _scale(fit(geometry, seen), _lengths(geometry)) <= _LARGER:
-        return NoiseSeen(geometry, seen, first)
-    for _ in range(_ROUNDS):
-        found, _faults = without_faults(geometry, seen)
-        larger = _scale(found, _lengths(geometry))
-        if larger <= _LARGER:
-            break
-        length_m = larger * geometry.knowledge.length_m
-        geometry = replace(geometry, knowledge=replace(geometry.knowledge, length_m=length_m))
-    return NoiseSeen(geometry, seen, first)
+    every = -(-seen.poses // MOST_READINGS)
+    known, moves = geometry.knowledge, seen.time_s is not None
+    if moves:
+        geometry = replace(geometry, knowledge=_with_aim(geometry, seen))
+        seen, glitches = _without_glitches(geometry, seen)
+        return replace(_by_data(geometry, seen, every, without_faults), glitches=glitches)
+    some = _thinned(seen, every)
+    if known.length_known or _scale(fit(geometry, some), _lengths(geometry)) <= _LARGER:
+        return NoiseSeen(geometry, some, known.length_m)
+    if _scale(without_faults(geometry, some)[0], _lengths(geometry)) <= _LARGER:
+        return NoiseSeen(geometry, some, known.length_m)
+    return _by_data(geometry, seen, every, without_faults)
 
 
 def _with_aim(geometry: CableGeometry, seen: Observations) -> Knowledge:
@@ -160,25 +172,24 @@ def _scale(found: Fit, rows: slice) -> float:
     return math.sqrt(found.geometry.knowledge.alike) * float(np.median(off)) / _NORMAL_MEDIAN
 
 
-# A platform that moves.
+# Noise that is larger than assumed, and a platform that moves.
 
 
-def _while_moving(
-    geometry: CableGeometry, whole: Observations, without_faults: WithoutFaults
+def _by_data(
+    geometry: CableGeometry, whole: Observations, every: int, without_faults: WithoutFaults
 ) -> NoiseSeen:
-    geometry = replace(geometry, knowledge=_with_aim(geometry, whole))
-    every = -(-whole.poses // MOST_READINGS)
+    """Return one reading in `every` with the noise that residuals show, and without time offset."""
     seen, first = _thinned(whole, every), geometry.knowledge.length_m
     points = seen.position_std_m, seen.rotation_std_rad
     offset_s = offset_std_s = 0.0
-    fits = int(seen.measured.sum()) >= _LEAST_TOLD
+    timed = whole.time_s is not None and int(seen.measured.sum()) >= _LEAST_TOLD
     # wrong drums of the file would look like noise, which would then hold the fit to them
     geometry = _with_drums(geometry, _LOOSE_DRUM)
     for _ in range(_ROUNDS):
         found = fit(geometry, seen)
         geometry, seen, same = _rescaled(found, seen, first, points)
         step_s = 0.0
-        if fits:
+        if timed:
             step_s, offset_std_s = _time_step(found, whole, every, offset_s)
             offset_s += step_s
             seen = replace(seen, length_m=_lengths_at(whole, offset_s)[::every])
@@ -191,7 +202,35 @@ def _while_moving(
         geometry, seen, same = _rescaled(found, seen, first, points)
         if not faults or same:
             break
-    return NoiseSeen(geometry, seen, first, offset_s, offset_std_s if fits else 0.0)
+    return NoiseSeen(geometry, seen, first, offset_s, offset_std_s)
+
+
+def _without_glitches(geometry: CableGeometry, seen: Observations) -> tuple[Observations, int]:
+    """Return readings without points that jump for moments, and the number of these.
+
+    They are far from the positions by lengths, compared with their neighbours in time. Errors of
+    the geometry are the same at these; a frozen or displaced camera is not a glitch.
+    """
+    there = locate(geometry, seen).poses
+    off = np.zeros((seen.poses, 6))
+    off[:, :3] = there[:, 0] + there[:, 1:] @ seen.target_m - seen.position_m
+    # the rotation by lengths may be uncertain: the measured one is compared with itself
+    off[:, 3:] = Rotation.from_matrix(seen.rotation).as_rotvec()
+    known = np.isfinite(np.column_stack([seen.position_std_m, seen.rotation_std_rad]))
+    wrong = np.zeros((seen.poses, 2), bool)
+    for kind, columns in enumerate((slice(0, 3), slice(3, 6))):
+        told = known[:, columns].any(axis=1)
+        if told.sum() < _LEAST_TOLD:
+            continue
+        part = np.where(known[told, columns], off[told, columns], 0.0)
+        beside = median_filter(part, size=(_BESIDE, 1), mode="nearest")
+        away = np.linalg.norm(part - beside, axis=1)
+        far = _GLITCH * np.median(away) / _NORMAL_MEDIAN + (_LEAST_rad if kind else _LEAST_m)
+        wrong[told, kind] = away > far
+    nowhere = np.where(wrong[:, :1], np.inf, seen.position_std_m)
+    unturned = np.where(wrong[:, 1:], np.inf, seen.rotation_std_rad)
+    seen = replace(seen, position_std_m=nowhere, rotation_std_rad=unturned)
+    return seen, int(wrong.any(axis=1).sum())
 
 
 def _with_drums(geometry: CableGeometry, std: float | None) -> CableGeometry:
@@ -232,8 +271,10 @@ def _rescaled(
     # until faults are looked for, each reading counts, so that the file does not hold the fit
     alike = knowledge.alike if knowledge.loose_drum == _LOOSE_DRUM else _alike(found)
     given_m, given_rad = points
+    if seen.time_s is None:  # points by hand are few, and may be wrong together
+        positions = turns = 1.0
     position_m, rotation_rad = positions * seen.position_std_m, turns * seen.rotation_std_rad
-    if not seen.std_guessed:
+    if seen.time_s is None or not seen.std_guessed:
         position_m = np.maximum(position_m, given_m)
         rotation_rad = np.maximum(rotation_rad, given_rad)
     changes = [length_m / knowledge.length_m, alike / knowledge.alike]
@@ -257,9 +298,8 @@ def _alike(found: Fit) -> float:
     Readings with a gap between them are independent.
     """
     seen, n = found.seen, found.geometry.n
-    assert seen.time_s is not None
     off = found.at.residual[:, :n] * np.sqrt(found.weights[:, :n])
-    piece = _pieces(seen.time_s)
+    piece = np.zeros(seen.poses) if seen.time_s is None else _pieces(seen.time_s)
     square, total = float((off**2).mean()), 1.0
     for lag in range(1, max(2, seen.poses // _WINDOW)):
         together = piece[lag:] == piece[:-lag]
