@@ -71,6 +71,9 @@ def calibrate(
             f"{seen.poses} poses; allowed: {LEAST_POSES} or more, because some verify the "
             "result of the others"
         )
+    if seen.tension_assumed:
+        kinds = tuple(kind for kind in geometry.identified if kind != "elongation")
+        geometry = replace(geometry, identified=kinds)
     slack = _SLACK_SHARE * np.asarray(limits_of(robot).slack_N, float)
     noise = None
     if images is None:

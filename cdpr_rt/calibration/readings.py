@@ -185,6 +185,8 @@ class Observations:
     """Times of readings while the platform moves, (N,); None if it stood still."""
     every: int = 1
     """Number of readings of which one is used; the others tell the same."""
+    tension_assumed: bool = False
+    """Whether no tension was measured: then the elongation cannot be identified."""
     std_guessed: bool = False
     """Whether the standard deviation of positions is not known: the fit then estimates it."""
 
@@ -415,7 +417,8 @@ class CalibrationData(Profile):
         )
         anew = tuple((cable, pose) for pose in self.restarts for cable in range(n))
         seen = self._with_measured(seen, model.positions)
-        return replace(seen, jumps=anew, time_s=self._times())
+        assumed = all(reading.tension_N is None for reading in self.poses)
+        return replace(seen, jumps=anew, time_s=self._times(), tension_assumed=assumed)
 
     def _tensions(self, robot: Robot, model: PlatformModel) -> FloatArray:
         """Return tensions (N, n), assumed ones if none was measured."""

@@ -156,9 +156,9 @@ def concluded(
     """Identify, report, and adopt a good calibration; return the result for JSON.
 
     `source` is the data file. `hand_eye` is the file of the hand-eye transform, if it does not
-    come from the data. `wanted_mm` is the largest allowed 3 sigma of positions; without it, held-out
-    poses must improve. A calibration without significant changes is adopted only with `adopt`, and
-    not if it predicts held-out poses significantly worse than the robot's file.
+    come from the data. `wanted_mm` is the largest allowed 3 sigma of positions; without it,
+    held-out poses must improve. A calibration without significant changes is adopted only with
+    `adopt`, and not if it predicts held-out poses significantly worse than the robot's file.
     """
     refuse_foreign_report(folder)
     with out.stage(f"fitting {len(data.poses)} poses"):

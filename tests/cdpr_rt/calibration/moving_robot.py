@@ -88,7 +88,7 @@ def uncrossed(path: Path) -> Robot:
     for anchor in ("-0.2, -0.1", "0.2, -0.1", "0.2, 0.1", "-0.2, 0.1"):
         x, y = (float(number) for number in anchor.split(","))
         text = text.replace(f"anchor_point_m = [{anchor}]", f"anchor_point_m = [{x}, {-y} ]")
-    path.write_text(text)
+    path.write_text(text.replace("workspace_angle_rad = 0.2618", "workspace_angle_rad = 0.1"))
     return load_robot(path)
 
 

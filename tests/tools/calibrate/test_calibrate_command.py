@@ -28,6 +28,7 @@ from cdpr_tools.errors import BadInputError
 from cdpr_tools.output import Output
 from tests.cdpr_rt.calibration.camera_robot import camera_robot
 from tests.cdpr_rt.calibration.made_up import MadeUp, made_up
+from tests.cdpr_rt.calibration.moving_robot import MovingErrors, moving_robot, uncrossed
 from tests.cdpr_rt.calibration.synthetic_readings import HAND_EYE_m
 
 
@@ -215,6 +216,25 @@ def test_a_slipped_encoder_is_reported_and_tolerated(tmp_path: Path) -> None:
     faults = result(done)["faults"]
     assert [(f["kind"], f["cable"], f["pose"]) for f in faults] == [("jump", 7, 21)]
     assert "cable 7 is -15" in done.stderr
+
+
+def test_readings_in_motion_are_fitted_with_what_the_user_states(tmp_path: Path) -> None:
+    robot = uncrossed(tmp_path / "wall.toml")
+    what = moving_robot(robot, 3, MovingErrors(offset_s=0.02), duration_s=8.0)
+    data, points = tmp_path / "data.json", tmp_path / "points.csv"
+    what.data().save(data)
+    fit = ("calibrate", "fit", robot.path, "--data", data, "--points", what.write_points(points))
+    done = cdpr_here(*fit, "--length-noise-mm", "1.4", "--known-drum-percent", "1", "--json")
+    assert done.returncode == 0, done.stderr
+    told = result(done)
+    assert told["noise"]["length_std_mm"] == pytest.approx(1.4)
+    assert told["noise"]["time_offset_ms"] == pytest.approx(20.0, abs=1.5)
+    assert told["in_force"]["version"] == 1 and not told["faults"]
+    proof = told["verification"]
+    assert proof["mean_position_error_mm"] < 0.5 * proof["mean_position_error_before_mm"]
+    asked = cdpr_here(*fit, "--wanted-mm", "0.5", "--dry-run")
+    assert asked.returncode == 1
+    assert "allowed: 0.5 mm): measure more poses" in asked.stdout
 
 
 def test_points_of_later_poses_do_not_end_a_run(tmp_path: Path) -> None:
