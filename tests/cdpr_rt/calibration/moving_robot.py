@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
@@ -84,11 +85,11 @@ class MovingRobot:
 
 def uncrossed(path: Path) -> Robot:
     """Return planar-4 with each cable at the nearest corner, which leaves its angle uncertain."""
-    text = (load_robot("planar-4").path).read_text()
-    for anchor in ("-0.2, -0.1", "0.2, -0.1", "0.2, 0.1", "-0.2, 0.1"):
-        x, y = (float(number) for number in anchor.split(","))
-        text = text.replace(f"anchor_point_m = [{anchor}]", f"anchor_point_m = [{x}, {-y} ]")
-    path.write_text(text.replace("workspace_angle_rad = 0.2618", "workspace_angle_rad = 0.1"))
+    text = load_robot("planar-4").path.read_text()
+    upper, lower = (re.compile(rf"(anchor_point_m = .*), {y}]") for y in ("-0.1", "0.1"))
+    text = lower.sub(r"\1, -0.10]", upper.sub(r"\1, 0.10]", text))
+    text = text.replace("workspace_angle_rad = 0.2618", "workspace_angle_rad = 0.1")
+    path.write_text(text.replace("[platform]\n", '[platform]\ncable_model = "rigid"\n'))
     return load_robot(path)
 
 
