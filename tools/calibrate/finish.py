@@ -260,7 +260,11 @@ def _take_over(
     found = calibration_of(
         outcome, next_version(robot), files, simulated=simulated, distrusted_before=before
     )
-    refuse_impossible(found.applied(robot))
+    try:
+        refuse_impossible(found.applied(robot))
+    except ProfileError as error:
+        problem = f"with the calibrated geometry: {error.problem}; change it and fit again"
+        raise ProfileError(error.file, error.key, problem) from None
     path = take_over(robot, found)
     if not simulated:
         mark_calibrated(robot.profile, f"calibration {found.version} ({found.identity})")
