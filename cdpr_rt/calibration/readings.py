@@ -184,7 +184,7 @@ class Observations:
     time_s: FloatArray | None = None
     """Times of readings while the platform moves, (N,); None if it stood still."""
     every: int = 1
-    """Number of readings of which one is used; the others tell the same."""
+    """The fit uses one reading in this number; errors of its neighbours are alike."""
     tension_assumed: bool = False
     """Whether no tension was measured: then the elongation cannot be identified."""
     std_guessed: bool = False
