@@ -41,6 +41,8 @@ CLUSTERS_PER_TURN = 24
 _ROUNDS = 5
 _LEAST_SPREAD_Nm = 1e-5
 _EMPTY = 1e-20
+_DEPENDENT = 1e-6
+"""Least determinant of an order's normalised 2 x 2 block."""
 _EXTRA = 3
 """Columns after the harmonics: static lag, trend of the cogging, trend of the friction."""
 _TREND_SD_1_s = 3e-4
@@ -115,7 +117,7 @@ def gather(windows: Sequence[Windows], layout: ColumnLayout) -> Rows:
         clusters = int(place.max()) + 1
         xs.append(design.matrix(w, layout, 0, w.torque_Nm.size)[keep])
         ys.append(w.torque_Nm[keep])
-        accelerations.append(w.acceleration_rad_s2[keep] * (not w.quick))
+        accelerations.append(w.acceleration_rad_s2[keep] * (not w.weighs))
         ks.append(kind[keep])
         ds.append(w.direction[keep])
         ts.append(w.centre_s[keep])
@@ -238,124 +240,173 @@ def _score_covariance(score: FloatArray, cluster: IntArray) -> FloatArray:
     return np.asarray(sums.T @ sums * (count / max(1, count - score.shape[1] // 8)))
 
 
-# Choice of the cogging's orders by cross-validation over turns.
+# Choice of the cogging's orders by an information criterion.
 
 _MOST = 40
-_RIDGE = 1e-10
+_ROWS_PER_ORDER = 8
+_RIDGE = 1e-9
+_OVERLAP = 2.1
+"""Rows over independent rows if only the overlap of the windows correlates them."""
+_MOST_CORRELATED = 50
+_UNCORRELATED = 0.05
 
 
 @dataclass(frozen=True)
 class OrderSelection:
-    """The chosen orders, rising, and the cross-validation error with 0, 1, ... of them.
+    """The chosen orders, rising, and the error of fits with 0, 1, ... of them.
 
-    `error_Nm` (k + 1,) is the rms error of prediction of held-back turns with 0, 1, ... k orders.
+    `error_Nm` (k + 1,) is the rms residual with the 0, 1, ... k most significant orders.
     """
 
     orders: tuple[int, ...]
     error_Nm: FloatArray
 
 
+@dataclass(frozen=True)
+class RowWeights:
+    """For each kind of row: one over the variance of its noise, and rows per independent row.
+
+    The weight is 0 for kinds with too few rows.
+    """
+
+    weight: FloatArray
+    correlation: FloatArray
+
+
 def solve(normal: Normal, columns: list[int]) -> FloatArray:
     """Return the coefficients of the chosen columns; 0 for columns that are zero in all rows."""
-    lower, scale = _factor(normal, columns)
-    beta = scipy.linalg.cho_solve((lower, True), normal.xy[columns] / scale)
-    return np.asarray(beta / scale)
-
-
-def _factor(normal: Normal, columns: list[int]) -> tuple[FloatArray, FloatArray]:
-    """Return the Cholesky factor of the chosen columns' scaled normal matrix, and the scale.
-
-    The factor for the first k columns consists of its first k rows and columns.
-    """
     xx = normal.xx[np.ix_(columns, columns)]
-    size = np.diag(xx)
-    scale = np.sqrt(np.where(size > _EMPTY * size.max(), size, np.inf))
-    xx /= np.outer(scale, scale)
+    scale = _scale(np.diag(xx))
+    xx = xx / np.outer(scale, scale)
     xx[np.diag_indices_from(xx)] += _RIDGE
-    return np.asarray(np.linalg.cholesky(xx)), np.asarray(scale)
+    return np.asarray(np.linalg.solve(xx, normal.xy[columns] / scale) / scale)
 
 
-def squared_error(part: Normal, columns: list[int], beta: FloatArray) -> float:
-    """Return the sum of squared errors of a prediction over a part's rows."""
-    xy, xx = part.xy[columns], part.xx[np.ix_(columns, columns)]
-    return max(0.0, float(part.yy - 2.0 * beta @ xy + beta @ xx @ beta))
+def _scale(diagonal: FloatArray) -> FloatArray:
+    """Return the columns' norms, infinite for a column that is zero in all rows."""
+    return np.asarray(np.sqrt(np.where(diagonal > _EMPTY * diagonal.max(), diagonal, np.inf)))
 
 
-def rows_counted(equations: Equations) -> FloatArray:
-    """Return the weight 1 for each kind of row that is frequent enough, 0 for the others."""
-    return np.where(equations.parts.rows.sum(axis=0) >= _FEWEST_ROWS, 1.0, 0.0)
+def choose(equations: Equations, fixed: list[int], rows: RowWeights) -> OrderSelection:
+    """Choose the orders by the extended Bayesian information criterion (Chen and Chen, 2008).
 
-
-def noise_weights(equations: Equations, columns: list[int], beta: FloatArray) -> FloatArray:
-    """Return weights of the kinds of rows: one over the mean squared error, 0 for too few rows."""
-    kinds = equations.parts.sum()
-    squares = np.array(
-        [squared_error(kinds.part(k), columns, beta) for k in range(kinds.rows.size)]
-    )
-    mean = np.maximum(squares / np.maximum(kinds.rows, 1.0), 1e-10)
-    return np.where(kinds.rows >= _FEWEST_ROWS, 1.0 / mean, 0.0)
-
-
-def choose(equations: Equations, fixed: list[int], weight: FloatArray) -> OrderSelection:
-    """Choose the orders whose harmonics predict turns that were not fitted.
-
-    Each fold is held back once. The others rank the orders by significance (Wald statistic), and
-    increasingly large sets predict the fold. The result is the smallest set whose error exceeds the
-    best by no more than one standard error of the paired differences between folds.
+    Orders are added one by one; each is the one that lowers the sum of squares S most. The result
+    minimises N ln(S) + 2 k (ln N + ln K) for k orders of K candidates and N independent rows: of
+    the neighbouring rows, which contain the same noise, `rows.correlation` count as one.
     """
-    layout, folds = equations.layout, equations.by_fold(weight)
-    held = np.flatnonzero(folds.rows >= _FEWEST_ROWS)
-    errors = []
-    for fold in held:
-        train = folds.sum(np.flatnonzero(np.arange(folds.rows.size) != fold))
-        ranking = _rank(train, fixed, layout)
-        errors.append(_path(train, folds.part(int(fold)), fixed, layout, ranking))
-    everything = folds.sum()
-    overall = _rank(everything, fixed, layout)
-    mean = np.mean(errors, axis=0)
-    best = int(np.argmin(mean))
-    gap = np.array(errors) - np.array(errors)[:, best : best + 1]
-    spread = gap.std(axis=0, ddof=1) / math.sqrt(len(held)) if len(held) > 1 else 0.0 * mean
-    size = int(np.flatnonzero(gap.mean(axis=0) <= spread)[0])
-    per_row = everything.rows / max(float((equations.parts.rows @ weight).sum()), 1e-300)
+    kinds = equations.parts
+    used = rows.weight > 0.0
+    independent = float((kinds.rows[used] / rows.correlation[used]).sum())
+    total = kinds.weighted(np.where(used, rows.weight / rows.correlation, 0.0))
+    count = len(equations.layout.orders)
+    most = min(_MOST, int(independent / _ROWS_PER_ORDER))
+    added, left = _forward(total, fixed, equations.layout, most)
+    size = np.arange(left.size)
+    criterion = independent * np.log(left) + 2.0 * size * math.log(max(independent, 2.0) * count)
+    best = int(np.argmin(criterion))
+    per_row = total.rows / max(float(kinds.rows @ rows.weight), 1e-300)
     return OrderSelection(
-        tuple(sorted(layout.orders[i] for i in overall[:size])), np.sqrt(mean * per_row)
+        tuple(sorted(equations.layout.orders[i] for i in added[:best])),
+        np.sqrt(left / total.rows * per_row),
     )
 
 
-def _rank(train: Normal, fixed: list[int], layout: ColumnLayout) -> IntArray:
-    """Return the indices of the orders by decreasing significance."""
-    columns = fixed + [c for i in range(len(layout.orders)) for c in layout.order(i)]
-    lower, scale = _factor(train, columns)
-    inverse = scipy.linalg.lapack.dtrtri(lower, lower=1)[0]
+def _forward(
+    total: Normal, fixed: list[int], layout: ColumnLayout, most: int
+) -> tuple[list[int], FloatArray]:
+    """Return the indices of the orders in the order of their addition, and the sums of squares.
+
+    The fixed columns are always included. After each addition the normal equations are those of
+    the remainders: the parts of columns and torque that the included columns do not explain.
+    """
+    columns = [*fixed, *range(design.FIXED, layout.columns)]
     first = len(fixed)
-    beta = (inverse.T @ (inverse @ (train.xy[columns] / scale)))[first:].reshape(-1, 2, 1)
-    # 2 x 2 blocks on the diagonal of the inverse normal matrix
-    pairs = inverse[:, first:].reshape(len(columns), -1, 2)
-    covariance = np.einsum("rni,rnj->nij", pairs, pairs)
-    statistic = (beta * np.linalg.solve(covariance, beta)).sum(axis=(1, 2))
-    return np.argsort(-statistic)
+    scale = _scale(np.diag(total.xx)[columns])
+    xx = total.xx[np.ix_(columns, columns)] / np.outer(scale, scale)
+    xy, left = total.xy[columns] / scale, float(total.yy)
+
+    def include(some: list[int]) -> None:
+        nonlocal xx, xy, left
+        block = xx[np.ix_(some, some)] + _RIDGE * np.eye(len(some))
+        gain = np.linalg.solve(block, np.column_stack([xy[some], xx[some]]))
+        left -= float(xy[some] @ gain[:, 0])
+        xy, xx = xy - xx[:, some] @ gain[:, 0], xx - xx[:, some] @ gain[:, 1:]
+
+    include(list(range(first)))
+    added: list[int] = []
+    squares = [left]
+    cosine = np.arange(first, len(columns), 2)
+    while len(added) < most:
+        a, b, c = xx[cosine, cosine], xx[cosine + 1, cosine + 1], xx[cosine, cosine + 1]
+        x, y, sound = xy[cosine], xy[cosine + 1], a * b - c * c > _DEPENDENT
+        gain = np.zeros(cosine.size)
+        np.divide(b * x**2 - 2.0 * c * x * y + a * y**2, a * b - c * c, out=gain, where=sound)
+        gain[added] = 0.0
+        best = int(np.argmax(gain))
+        if gain[best] <= 0.0:
+            break
+        include([first + 2 * best, first + 2 * best + 1])
+        added.append(best)
+        squares.append(max(left, 1e-12 * squares[0], 1e-300))
+    return added, np.array(squares)
 
 
-def _path(
-    train: Normal, test: Normal, fixed: list[int], layout: ColumnLayout, ranking: IntArray
+def rows_counted(equations: Equations) -> RowWeights:
+    """Return equal weights for all kinds of row that are frequent enough."""
+    weight = np.where(equations.parts.rows >= _FEWEST_ROWS, 1.0, 0.0)
+    return RowWeights(weight, np.full(weight.size, _OVERLAP))
+
+
+def rows_by_noise(
+    equations: Equations, windows: Sequence[Windows], columns: list[int], beta: FloatArray
+) -> RowWeights:
+    """Return the weights by the noise that a fit leaves, and the noise's correlation.
+
+    N neighbouring rows with correlations r1, r2, ... count as N / (1 + 2 (r1 + r2 + ...)).
+    """
+    rows = equations.parts.rows
+    squares, correlation = np.zeros(rows.size), np.zeros(rows.size)
+    for w, kind in zip(windows, design.kinds(windows), strict=True):
+        left = _left(w, equations.layout, columns, beta)
+        for k in range(rows.size):
+            part = np.where(kind == k, left, 0.0)
+            squares[k] += float(part @ part)
+            correlation[k] += _correlated_sum(part)
+    counted = rows >= _FEWEST_ROWS
+    mean = np.maximum(squares / np.maximum(rows, 1.0), 1e-10)
+    share = 1.0 + 2.0 * correlation / np.maximum(squares, 1e-300)
+    return RowWeights(np.where(counted, 1.0 / mean, 0.0), np.maximum(share, _OVERLAP))
+
+
+def _left(
+    windows: Windows, layout: ColumnLayout, columns: list[int], beta: FloatArray
 ) -> FloatArray:
-    """Return the mean squared (weighted) error on held-back rows with 0, 1, ... orders."""
-    most = min(_MOST, ranking.size)
-    columns = fixed + [c for i in ranking[:most] for c in layout.order(int(i))]
-    lower, scale = _factor(train, columns)
-    solved = scipy.linalg.solve_triangular(lower, train.xy[columns] / scale, lower=True)
-    errors = np.zeros(most + 1)
-    for size in range(most + 1):
-        k = len(fixed) + 2 * size
-        beta = scipy.linalg.solve_triangular(lower[:k, :k], solved[:k], lower=True, trans=1)
-        errors[size] = squared_error(test, columns[:k], beta / scale[:k]) / test.rows
-    return errors
+    """Return what a fit of some columns of the layout leaves of the windows' torque."""
+    orders = tuple(layout.orders[(c - design.FIXED) // 2] for c in columns if c >= design.FIXED)
+    part = ColumnLayout(orders[::2], layout.shape)
+    fixed = [c for c in columns if c < design.FIXED]
+    x = design.matrix(windows, part, 0, windows.torque_Nm.size)
+    x = x[:, [*fixed, *range(design.FIXED, part.columns)]]
+    return np.asarray(windows.torque_Nm - x @ beta)
+
+
+def _correlated_sum(left: FloatArray) -> float:
+    """Return the sum of products of residuals at distances 1, 2, ... up to the uncorrelated."""
+    total, square = 0.0, float(left @ left)
+    for distance in range(1, min(_MOST_CORRELATED, left.size // 4)):
+        product = float(left[distance:] @ left[:-distance])
+        if product < _UNCORRELATED * square:
+            break
+        total += product
+    return total
 
 
 MAX_ORDER = 200
 _BINS = 360
 """Bins over a turn for the coverage."""
+_LEAST_TURN = 0.95
+_MOST_DROPPED = 0.5
+_CHOICE_ROUNDS = 2
 _LATENCY_SD_s = 1e-3
 _LATENCY_SD_AGAIN_s = 2e-4
 _LAG_SD_rad = np.deg2rad(1.0)
@@ -373,16 +424,20 @@ _INERTIA_SHARE = 0.01
 
 
 def identify_harmonic_model(
-    legs: Sequence[SweepData], inertia_kg_m2: float, latency_s: float, pole_pairs: int
+    legs: Sequence[SweepData],
+    inertia_kg_m2: float,
+    latency_s: float,
+    pole_pairs: int,
+    slots: int | None = None,
 ) -> HarmonicResult:
-    """Identify the motor from slow sweeps and short fast legs, in both directions.
+    """Identify the motor from slow sweeps and short fast legs, best in both directions.
 
     `inertia_kg_m2` is kept if no leg is fast enough to measure it; `latency_s` is the nominal
-    one (see compensation.AxisCompensation). Raises IdentificationError if the rotor does not
-    move in both directions.
+    one (see compensation.AxisCompensation). Legs of one direction give the sum of cogging and one
+    friction, without the lag between directions. Raises IdentificationError for less than a turn.
     """
     check_runs(legs)
-    start = _Start(latency_s, pole_pairs, inertia_kg_m2, None)
+    start = _Start(latency_s, pole_pairs, slots, inertia_kg_m2, None)
     return _identify(legs, start)
 
 
@@ -394,7 +449,8 @@ def refine(before: HarmonicResult, run_legs: Sequence[SweepData]) -> HarmonicRes
     """
     check_runs(run_legs)
     inertia = before.inertia_kg_m2.value
-    start = _Start(before.latency_s.value, before.pole_pairs, inertia, before)
+    latency = before.latency_s.value
+    start = _Start(latency, before.pole_pairs, before.slots, inertia, before)
     return _identify(run_legs, start)
 
 
@@ -404,6 +460,7 @@ class _Start:
 
     latency_s: float
     pole_pairs: int
+    slots: int | None
     inertia_kg_m2: float
     before: HarmonicResult | None
 
@@ -411,36 +468,85 @@ class _Start:
 def _identify(legs: Sequence[SweepData], start: _Start) -> HarmonicResult:
     """Choose orders, find the friction's shape, then fit all parameters jointly."""
     runs = contiguous(legs)
+    dropped = _dropped(legs, runs)
     windows = [w for run in runs if (w := cut(run, start.latency_s)) is not None]
-    for sign, word in ((1.0, "increasing"), (-1.0, "decreasing")):
-        if not any(np.any(w.moving & (w.direction == sign)) for w in windows):
-            raise IdentificationError(f"the recordings contain no motion with {word} angle")
-    shape = start.before.shape if start.before else FrictionShape()
+    directions = _directions(runs, windows)
+    windows = windows if start.before else _weighing(windows)
+    # one speed in one direction does not show the friction's curve apart from the cogging
+    curved = len(directions) == 2 or any(w.fast for w in windows)
+    shape = start.before.shape if start.before else FrictionShape(0.25 if curved else 0.0)
     every = ColumnLayout(tuple(range(1, MAX_ORDER + 1)), shape)
-    equations = design.accumulate(windows, every)
-    choice, beta, inertia = _choose(equations)
+    choice, beta, inertia = _choose(windows, every)
     inertia = inertia or start.inertia_kg_m2
-    fast = any(w.fast for w in windows)
+    used = _used(windows, directions, start)
     quick = any(w.quick for w in windows)
-    used = [design.INERTIA] if quick else []
-    if any(not w.quasi_static for w in windows):
-        used += [design.COULOMB, design.COULOMB + 1]
-    if any(w.quasi_static for w in windows):
-        used += [design.CREEP, design.CREEP + 1]
-    used += [design.VISCOUS] if fast or start.before else []
-    used += [design.LATENCY] if fast else []
     lag = (start.before.lag_rad.value if start.before else 0.0, _LAG_SD_rad)
     priors = _priors(start.before, quick)
     starts = [start.before.shape, *STARTS] if start.before else list(STARTS)
     for _ in range(_HARMONIC_MODEL_ROUNDS):
-        shape = _shape(runs, start, choice.orders, beta, inertia, starts) or shape
+        if curved:
+            shape = _shape(runs, start, choice.orders, beta, inertia, starts) or shape
         starts = [shape]
         fitted = fit(windows, ColumnLayout(choice.orders, shape), used, priors, lag, inertia)
         beta = fitted.beta[len(used) : len(fitted.used)]
         quick = quick and _plausible(fitted.value(design.INERTIA), start)
-        used = [c for c in used if c != design.INERTIA or quick]
-        inertia = fitted.value(design.INERTIA) if quick else start.inertia_kg_m2
-    return _result(fitted, windows, choice, start, quick)
+        used = [c for c in used if c != design.INERTIA or quick or not start.before]
+        inertia = fitted.value(design.INERTIA) if used[0] == design.INERTIA else inertia
+    return _result(fitted, windows, choice, start, quick, directions, dropped)
+
+
+def _dropped(legs: Sequence[SweepData], runs: Sequence[SweepData]) -> float:
+    """Return the share of samples in pieces that are too short for a fit."""
+    recorded = sum(leg.time_s.size for leg in legs)
+    share = 1.0 - sum(run.time_s.size for run in runs) / recorded
+    if share > _MOST_DROPPED:
+        raise IdentificationError(
+            f"{share:.0%} of {recorded} samples lie in pieces of less than 100 samples between "
+            "jumps of the time: record at a constant rate, or resample with `cdpr import`"
+        )
+    return share
+
+
+def _directions(runs: Sequence[SweepData], windows: Sequence[Windows]) -> tuple[int, ...]:
+    """Return the directions of motion, +1 and -1 or one of them.
+
+    Raises IdentificationError if no direction was recorded, or if the angles do not span a turn.
+    """
+    found = tuple(d for d in (1, -1) if any(np.any(w.moving & (w.direction == d)) for w in windows))
+    if not found:
+        raise IdentificationError("the rotor does not move in the recordings")
+    step = 0.5 * TWO_PI / _BINS
+    spans = [np.arange(r.angle_rad.min(), r.angle_rad.max(), step) for r in runs]
+    seen = _seen(spans)
+    if seen < _LEAST_TURN:
+        raise IdentificationError(
+            f"the recordings contain {seen:.0%} of a turn: record at least one whole turn"
+        )
+    return found
+
+
+def _weighing(windows: list[Windows]) -> list[Windows]:
+    """Return the windows, with the inertia fitted on slow runs if no run is quick.
+
+    There hunting shows it, but with the errors of friction. It only keeps the cogging unbiased.
+    """
+    if any(w.quick for w in windows):
+        return windows
+    return [replace(w, weighs=w.swings) for w in windows]
+
+
+def _used(windows: list[Windows], directions: tuple[int, ...], start: _Start) -> list[int]:
+    """Return the columns, apart from the harmonics, that the runs can show."""
+    fast = any(w.fast for w in windows)
+    side = [0 if d > 0 else 1 for d in directions]
+    used = [design.INERTIA] if any(w.weighs for w in windows) else []
+    if any(not w.quasi_static for w in windows):
+        used += [design.COULOMB + i for i in side]
+    if any(w.quasi_static for w in windows):
+        used += [design.CREEP + i for i in side]
+    both = len(directions) == 2
+    used += [design.VISCOUS] if (fast and both) or start.before else []
+    return used + ([design.LATENCY] if fast else [])
 
 
 def _plausible(inertia: float, start: _Start) -> bool:
@@ -449,30 +555,33 @@ def _plausible(inertia: float, start: _Start) -> bool:
     return start.before is None or abs(inertia - before) < _INERTIA_CHANGE * before
 
 
-def _choose(equations: Equations) -> tuple[OrderSelection, FloatArray, float]:
-    """Choose the orders and weight the kinds of rows, in two rounds.
+def _choose(
+    windows: Sequence[Windows], every: ColumnLayout
+) -> tuple[OrderSelection, FloatArray, float]:
+    """Choose the orders and weight the kinds of rows, in some rounds.
 
     Also return the harmonics' coefficients and the inertia, 0 if no run shows it.
     """
+    equations = design.accumulate(windows, every)
     fixed = [design.INERTIA, design.COULOMB, design.COULOMB + 1, design.VISCOUS]
     fixed += [design.CREEP, design.CREEP + 1]
-    weight = rows_counted(equations)
-    for _ in range(2):
-        choice = choose(equations, fixed, weight)
-        everything = equations.by_fold(weight).sum()
+    rows = rows_counted(equations)
+    for _ in range(_CHOICE_ROUNDS):
+        choice = choose(equations, fixed, rows)
+        everything = equations.parts.weighted(rows.weight / rows.correlation)
         for step in range(2):
-            columns = fixed + [c for n in choice.orders for c in equations.layout.order(n - 1)]
+            columns = fixed + [c for n in choice.orders for c in every.order(n - 1)]
             beta = solve(everything, columns)
             if step == 0:
                 choice = replace(choice, orders=_significant(choice.orders, beta, len(fixed)))
-        weight = noise_weights(equations, columns, beta)
+        rows = rows_by_noise(equations, windows, columns, beta)
     return choice, beta[len(fixed) :], float(beta[0])
 
 
 def _significant(orders: tuple[int, ...], beta: FloatArray, first: int) -> tuple[int, ...]:
     """Return the orders that are not small relative to the largest and to Coulomb friction.
 
-    Hunting is periodic with the cogging and thus passes cross-validation.
+    Hunting is periodic with the cogging and thus not seen as noise.
     """
     amplitude = np.hypot(beta[first::2], beta[first + 1 :: 2])
     coulomb = np.abs(beta[1:3]).max()
@@ -533,29 +642,24 @@ def _estimate(fitted: HarmonicFit, column: int) -> ConfidenceInterval:
 
 
 def _result(
-    fitted: HarmonicFit, windows: list[Windows], choice: OrderSelection, start: _Start, quick: bool
+    fitted: HarmonicFit,
+    windows: list[Windows],
+    choice: OrderSelection,
+    start: _Start,
+    quick: bool,
+    directions: tuple[int, ...],
+    dropped: float,
 ) -> HarmonicResult:
     """Assemble the result."""
     layout, before = fitted.layout, start.before
-    measured = quick
-    rotor = (
-        _estimate(fitted, design.INERTIA) if quick else ConfidenceInterval(start.inertia_kg_m2, 0.0)
-    )
-    if not quick and before is not None:
-        rotor, measured = before.inertia_kg_m2, before.inertia_measured
-    rotor = ConfidenceInterval(
-        rotor.value, math.hypot(rotor.half_width, _INERTIA_SHARE * rotor.value)
-    )
     delay = _estimate(fitted, design.LATENCY)
     lag_half = _CONFIDENCE * fitted.lag_deviation_rad
     rows = sum(w.moving.size for w in windows)
     lost = sum(int(np.sum(~w.moving)) for w in windows)
-    level = design.COULOMB if design.COULOMB in fitted.used else design.CREEP
-    coulomb = [_estimate(fitted, level + i) for i in (0, 1)]
-    rise = layout.shape.rise if level == design.COULOMB else 0.0
+    coulomb, rise = _coulomb(fitted, directions)
     viscous = _estimate(fitted, design.VISCOUS)
     return HarmonicResult(
-        harmonics=tuple(_harmonic(fitted, i, start.pole_pairs) for i in range(len(layout.orders))),
+        harmonics=tuple(_harmonic(fitted, i, start) for i in range(len(layout.orders))),
         friction=FrictionFeedforward(
             coulomb[0].value,
             coulomb[1].value,
@@ -568,20 +672,56 @@ def _result(
         coulomb_forward_Nm=coulomb[0],
         coulomb_backward_Nm=coulomb[1],
         viscous_Nms_rad=viscous,
-        inertia_kg_m2=rotor,
-        inertia_measured=measured,
+        inertia_kg_m2=_inertia(fitted, start, quick),
+        inertia_measured=before.inertia_measured if before is not None and not quick else quick,
         latency_s=ConfidenceInterval(start.latency_s + delay.value, delay.half_width),
         lag_rad=ConfidenceInterval(fitted.lag_rad, lag_half),
         pole_pairs=start.pole_pairs,
-        coverage=_coverage(windows),
+        slots=start.slots,
+        directions=directions,
+        coverage=_seen([w.centre_rad[w.moving] for w in windows]),
         cogging_trend_1_s=fitted.cogging_trend_1_s,
+        dropped_fraction=dropped,
         excluded_fraction=lost / rows,
         residual_rms_Nm=rms(fitted.residual_Nm),
-        held_out_error_Nm=choice.error_Nm,
+        error_by_orders_Nm=choice.error_Nm,
     )
 
 
-def _harmonic(fitted: HarmonicFit, which: int, pole_pairs: int) -> Harmonic:
+def _inertia(fitted: HarmonicFit, start: _Start, quick: bool) -> ConfidenceInterval:
+    """Return the inertia: of quick runs, or else the one known before."""
+    if quick:
+        rotor = _estimate(fitted, design.INERTIA)
+    elif start.before is not None:
+        rotor = start.before.inertia_kg_m2
+    else:
+        rotor = ConfidenceInterval(start.inertia_kg_m2, 0.0)
+    return replace(rotor, half_width=math.hypot(rotor.half_width, _INERTIA_SHARE * rotor.value))
+
+
+def _coulomb(
+    fitted: HarmonicFit, directions: tuple[int, ...]
+) -> tuple[list[ConfidenceInterval], float]:
+    """Return Coulomb friction forward and backward, and its relative rise at standstill.
+
+    An unmeasured direction gets the friction of the other, with an interval from zero. Raises
+    IdentificationError for negative friction.
+    """
+    sliding = design.COULOMB in fitted.used or design.COULOMB + 1 in fitted.used
+    level = design.COULOMB if sliding else design.CREEP
+    found = {d: _estimate(fitted, level + (d < 0)) for d in directions}
+    for d, one in found.items():
+        if one.value + one.half_width < 0.0:
+            word = "increasing" if d > 0 else "decreasing"
+            raise IdentificationError(
+                f"the friction at {word} angle is negative, {1e3 * one.value:.1f} mNm: the sign of "
+                "the torque or of the angle is wrong, or a load turns the motor"
+            )
+    both = [found.get(d) or ConfidenceInterval(found[-d].value, found[-d].value) for d in (1, -1)]
+    return both, fitted.layout.shape.rise if sliding else 0.0
+
+
+def _harmonic(fitted: HarmonicFit, which: int, start: _Start) -> Harmonic:
     """Return one order; amplitude and phase get their confidence from both coefficients."""
     order = fitted.layout.orders[which]
     column = fitted.layout.order(which)
@@ -601,16 +741,16 @@ def _harmonic(fitted: HarmonicFit, which: int, pole_pairs: int) -> Harmonic:
             math.degrees(math.atan2(a, b)),
             min(180.0, math.degrees(_CONFIDENCE * spread[1] / amplitude)),
         ),
-        per_pole_pair=order / pole_pairs,
-        hint=likely_cause(order, pole_pairs),
+        per_pole_pair=order / start.pole_pairs,
+        hint=likely_cause(order, start.pole_pairs, start.slots),
     )
 
 
-def _coverage(windows: list[Windows]) -> float:
-    """Return the share of the turn on which the rotor followed the ramp."""
+def _seen(angles_rad: Sequence[FloatArray]) -> float:
+    """Return the share of the turn in which there are angles."""
     seen = np.zeros(_BINS, np.bool_)
-    for w in windows:
-        turn = w.centre_rad[w.moving] / TWO_PI
+    for angle in angles_rad:
+        turn = angle / TWO_PI
         seen[np.floor((turn - np.floor(turn)) * _BINS).astype(int) % _BINS] = True
     return float(np.mean(seen))
 

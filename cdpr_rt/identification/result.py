@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -52,15 +53,21 @@ class HarmonicResult:
     lag_rad: ConfidenceInterval
     """Static part of the lag: half the shift between the curves of the two directions."""
     pole_pairs: int
+    slots: int | None
+    """Slots of the stator, if known."""
+    directions: tuple[int, ...]
+    """Measured directions, 1 and -1. The friction of the other is assumed to be the same."""
     coverage: float
     """Share of the turn on which the rotor was sliding."""
     cogging_trend_1_s: float
     """Relative change of the cogging per second, as the motor warms up."""
+    dropped_fraction: float
+    """Share of the samples in pieces, between jumps of the time, that are too short for a fit."""
     excluded_fraction: float
     """Share of the windows in which the rotor stood still or turned against the ramp."""
     residual_rms_Nm: float
-    held_out_error_Nm: FloatArray
-    """Prediction error for held-back turns with 0, 1, 2, ... orders, (k + 1,)."""
+    error_by_orders_Nm: FloatArray
+    """Residual (rms) with the 0, 1, 2, ... most significant orders, (k + 1,)."""
 
     @property
     def orders(self) -> tuple[int, ...]:
@@ -87,18 +94,28 @@ class HarmonicResult:
         return np.vstack([self.cogging_Nm(angle - lag), self.cogging_Nm(angle + lag)])
 
 
-def likely_cause(order: int, pole_pairs: int) -> str:
-    """Return the usual cause of a cogging of this order, as text."""
+def likely_cause(order: int, pole_pairs: int, slots: int | None = None) -> str:
+    """Return the usual cause of a cogging of this order, as text; `slots` is None if unknown."""
+    poles = 2 * pole_pairs
     known = {
         2: "twice per turn: oval stator, bent shaft or coupling",
         1: "once per turn: eccentric rotor, encoder or coupling",
-        2 * pole_pairs: "twice per pole pair: unequal gains of the current sensors, or magnets",
+        poles: "twice per pole pair: unequal gains of the current sensors, or magnets",
         pole_pairs: "once per pole pair: offset of a current sensor, or unequal magnets",
     }
     if order in known:
         return known[order]
+    if slots and order % math.lcm(slots, poles) == 0:
+        return f"a multiple of {slots} slots and {poles} poles: slots against magnets"
+    if slots and order % slots == 0:
+        return f"a multiple of the {slots} slots: unequal magnets"
+    if slots and order % poles == 0:
+        return f"a multiple of the {poles} poles: unequal slots"
     if order % (6 * pole_pairs) == 0:
         return "a multiple of six per pole pair: slots against magnets, or the back EMF's shape"
     if order % pole_pairs == 0:
-        return "a multiple of the pole pairs: slots against magnets"
+        cause = "unequal poles, or the back EMF's shape" if slots else "slots against magnets"
+        return f"a multiple of the pole pairs: {cause}"
+    if slots:
+        return "no multiple of pole pairs or slots: unequal slots or magnets, or something coupled"
     return "no multiple of the pole pairs: unequal slots or magnets, or something coupled"

@@ -104,18 +104,18 @@ class ThesisResult:
 def identify_thesis(legs: Sequence[SweepData]) -> ThesisResult:
     """Identify one curve per direction from slow sweeps under the proportional controller.
 
-    Only whole turns at constant set-point velocity count. Raises IdentificationError if a
-    direction has none.
+    Only whole turns at constant set-point velocity count. A direction without any gets the
+    variation of the other and the opposite mean. Raises IdentificationError if both have none.
     """
     check_runs(legs)
     whole = [t for s in stretches(legs) if (t := s.last_whole_turns()) is not None]
+    if not whole:
+        raise IdentificationError("the sweeps contain no whole turn at constant speed")
     raw, bad, turns = [], [], []
-    for direction, word in ((1, "increasing"), (-1, "decreasing")):
+    for direction in (1, -1):
         mine = [s for s in whole if s.direction == direction]
-        if not mine:
-            raise IdentificationError(f"no whole turn at constant speed with {word} angle")
-        average, lost = _average(mine)
-        raw.append(average)
+        average, lost = _average(mine or whole)
+        raw.append(average if mine else average - 2.0 * average.mean())
         bad.append(lost)
         turns.append(round(sum(s.turns for s in mine)))
     both = np.vstack(bad)

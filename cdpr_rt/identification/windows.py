@@ -134,6 +134,8 @@ _SLOWEST_rad_s = 0.03
 _RELAXED_rad = 0.02
 _PLAY = 3.0
 _QUASI_STATIC_rad_s = np.deg2rad(10.0)
+_CLEAR = 5.0
+"""Acceleration over the encoder's noise in it, so that the noise hardly biases the inertia."""
 
 
 @dataclass(frozen=True)
@@ -165,6 +167,10 @@ class Windows:
     """Whether the set-point is fast enough to identify viscous friction."""
     quick: bool
     """Whether the run is fast enough to identify the inertia despite the encoder's noise."""
+    weighs: bool
+    """Whether the inertia's torque is fitted on this run; elsewhere a known inertia is used."""
+    swings: bool
+    """Whether the rotor's acceleration is large compared with the encoder's noise in it."""
     play_rad: float
     """Largest movement of the smoothed angle that may be noise."""
     cruise_rad_s: float
@@ -235,6 +241,9 @@ def cut(run: SweepData, latency_s: float, spacing_s: float | None = None) -> Win
     )
     smooth_torque = _smoothed_torque(run, latency_s / period, step)
     mean = ndimage.uniform_filter1d(velocity, 2 * step + 1)[centre]
+    acceleration = boxed[centre + step] - 2.0 * boxed[centre] + boxed[centre - step]
+    acceleration /= (step * period) ** 2
+    noise_acceleration = 2.0 * noise / math.sqrt(step) / (step * period) ** 2
     quasi_static = speed < _QUASI_STATIC_rad_s
     turned, wanted = angle[centre] - angle[0], run.setpoint_velocity_rad_s[centre]
     return Windows(
@@ -244,8 +253,7 @@ def cut(run: SweepData, latency_s: float, spacing_s: float | None = None) -> Win
         stride=stride,
         torque_Nm=smooth_torque[centre],
         torque_rate_Nm_s=(smooth_torque[centre + 1] - smooth_torque[centre - 1]) / (2.0 * period),
-        acceleration_rad_s2=(boxed[centre + step] - 2.0 * boxed[centre] + boxed[centre - step])
-        / (step * period) ** 2,
+        acceleration_rad_s2=acceleration,
         centre_rad=angle[centre],
         centre_s=run.time_s[centre],
         speed_rad_s=mean,
@@ -254,6 +262,8 @@ def cut(run: SweepData, latency_s: float, spacing_s: float | None = None) -> Win
         quasi_static=quasi_static,
         fast=speed > _FAST_rad_s,
         quick=speed > _QUICK_rad_s,
+        weighs=speed > _QUICK_rad_s,
+        swings=not quasi_static and bool(np.std(acceleration) > _CLEAR * noise_acceleration),
         play_rad=_PLAY * noise / math.sqrt(max(1.0, 0.5 * smoothing * _GAUSSIAN_WIDTH)),
         cruise_rad_s=speed,
     )
@@ -512,11 +522,10 @@ def _residuals(
     return [m.torque_Nm - x @ beta for x, m, _ in parts]
 
 
-# Design matrix of the regression over windows, and its normal equations by fold and kind.
+# Design matrix of the regression over windows, and its normal equations by kind of row.
 
 _CHUNK = 1024
 _DESIGN_QUICK_rad_s = 1.0
-_FOLDS = 6
 
 INERTIA, LATENCY = 0, 1
 COULOMB = 2  # forward, backward
@@ -552,37 +561,30 @@ class Normal:
     rows: FloatArray
 
     @classmethod
-    def empty(cls, *parts: int, columns: int) -> Normal:
+    def empty(cls, parts: int, columns: int) -> Normal:
         """Return sums of zero rows for this number of parts and columns."""
-        shapes = (*parts, columns, columns), (*parts, columns), parts, parts
+        shapes = (parts, columns, columns), (parts, columns), (parts,), (parts,)
         return cls(*(np.zeros(shape) for shape in shapes))
 
-    def sum(self, parts: IntArray | slice = slice(None)) -> Normal:
-        """Return the sum of some of the parts along the first axis."""
-        sums = (self.xx, self.xy, self.yy, self.rows)
-        return Normal(*(np.asarray(one[parts].sum(axis=0)) for one in sums))
+    def weighted(self, weight: FloatArray) -> Normal:
+        """Return the sum over the parts along the first axis, each times its weight.
 
-    def part(self, which: int) -> Normal:
-        """Return one of the parts along the first axis."""
-        return Normal(self.xx[which], self.xy[which], self.yy[which], self.rows[which])
+        The number of rows is that of the parts with a weight.
+        """
+        return Normal(
+            np.tensordot(weight, self.xx, 1),
+            weight @ self.xy,
+            np.asarray(weight @ self.yy),
+            np.asarray((weight > 0.0) @ self.rows),
+        )
 
 
 @dataclass(frozen=True)
 class Equations:
-    """Normal equations by (fold, kind); kinds are numbered by run class and sliding or creeping."""
+    """Normal equations by kind of row."""
 
     layout: ColumnLayout
     parts: Normal
-
-    def by_fold(self, weight: FloatArray) -> Normal:
-        """Return the sums over kinds, weighted by `weight` (kinds,), for each fold."""
-        parts, counted = self.parts, (weight > 0.0).astype(float)
-        return Normal(
-            np.einsum("fkpq,k->fpq", parts.xx, weight),
-            np.einsum("fkp,k->fp", parts.xy, weight),
-            parts.yy @ weight,
-            parts.rows @ counted,
-        )
 
 
 @jit
@@ -629,7 +631,7 @@ def matrix(windows: Windows, layout: ColumnLayout, first: int, last: int) -> Flo
         out[:, CREEP] = np.maximum(windows.direction[rows], 0.0)
         out[:, CREEP + 1] = np.minimum(windows.direction[rows], 0.0)
         return out
-    if windows.quick:
+    if windows.weighs:
         out[:, INERTIA] = windows.acceleration_rad_s2[rows]
     out[:, LATENCY] = windows.torque_rate_Nm_s[rows] * (
         np.abs(windows.speed_rad_s[rows]) > _DESIGN_QUICK_rad_s
@@ -651,28 +653,17 @@ def kinds(windows: Sequence[Windows]) -> list[FloatArray]:
     return numbered
 
 
-def folds(windows: Sequence[Windows]) -> list[FloatArray]:
-    """Number the rows of each run by their turn; whole turns stay together."""
-    numbered, offset = [], 0
-    for w in windows:
-        turn = np.floor(np.abs(w.centre_rad - w.centre_rad[0]) / TWO_PI).astype(int)
-        numbered.append((turn + offset) % _FOLDS)
-        offset += int(turn.max()) + 1
-    return numbered
-
-
 def accumulate(windows: Sequence[Windows], layout: ColumnLayout) -> Equations:
-    """Sum the normal equations of all runs, by fold and kind, in chunks of bounded memory."""
-    kind, fold = kinds(windows), folds(windows)
+    """Sum the normal equations of all runs, by kind, in chunks of bounded memory."""
+    kind = kinds(windows)
     count = 1 + max((int(one.max(initial=-1)) for one in kind), default=-1)
-    sums = Normal.empty(_FOLDS, count, columns=layout.columns)
-    for w, k, f in zip(windows, kind, fold, strict=True):
+    sums = Normal.empty(count, columns=layout.columns)
+    for w, k in zip(windows, kind, strict=True):
         for first in range(0, w.torque_Nm.size, _CHUNK):
             rows = slice(first, min(first + _CHUNK, w.torque_Nm.size))
             x, y = matrix(w, layout, rows.start, rows.stop), w.torque_Nm[rows]
-            for key in {(int(a), int(b)) for a, b in zip(f[rows], k[rows], strict=True) if b >= 0}:
-                mask = (f[rows] == key[0]) & (k[rows] == key[1])
-                x_part, y_part = x[mask], y[mask]
+            for key in {int(b) for b in k[rows] if b >= 0}:
+                x_part, y_part = x[k[rows] == key], y[k[rows] == key]
                 sums.xx[key] += x_part.T @ x_part
                 sums.xy[key] += x_part.T @ y_part
                 sums.yy[key] += float(y_part @ y_part)

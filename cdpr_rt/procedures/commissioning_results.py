@@ -175,8 +175,10 @@ def identify(winch: Winch, latency_s: float, paths: Paths) -> Identified:
 def identify_first(winch: Winch, latency_s: float, paths: Paths) -> Identified:
     """Identify from the sweeps and the fast legs alone."""
     sweep, fast = (legs(paths.passes(name)) for name in ("sweep", "fast"))
-    inertia, pole_pairs = winch.motor.rotor_inertia_kg_m2, winch.motor.poles // 2
-    harmonic = identify_harmonic_model(sweep + fast, inertia, latency_s, pole_pairs)
+    motor = winch.motor
+    harmonic = identify_harmonic_model(
+        sweep + fast, motor.rotor_inertia_kg_m2, latency_s, motor.pole_pairs, motor.slots
+    )
     return Identified(identify_thesis(sweep), harmonic)
 
 
@@ -330,8 +332,10 @@ def identification(found: Identified) -> dict[str, Any]:
         "residual_rms_Nm": harmonic.residual_rms_Nm,
         "repaired_fraction": thesis.repaired_fraction,
         "coverage": harmonic.coverage,
+        "directions": list(harmonic.directions),
+        "dropped_fraction": harmonic.dropped_fraction,
         "excluded_fraction": harmonic.excluded_fraction,
-        "held_back_error_Nm": harmonic.held_out_error_Nm,
+        "error_by_orders_Nm": harmonic.error_by_orders_Nm,
         "coulomb_forward_Nm": harmonic.coulomb_forward_Nm.value,
         "coulomb_backward_Nm": harmonic.coulomb_backward_Nm.value,
         "viscous_Nms_rad": harmonic.viscous_Nms_rad.value,

@@ -107,11 +107,11 @@ def spectrum(
     orders: Sequence[int],
     amplitudes_Nm: FloatArray,
     confidence_Nm: FloatArray,
-    held_back_Nm: FloatArray,
+    error_Nm: FloatArray,
 ) -> str:
     """Draw the harmonics with 95 % intervals, and how their number was chosen.
 
-    `held_back_Nm` (k + 1,) is the prediction error on held-back turns with 0, 1, ... orders.
+    `error_Nm` (k + 1,) is the residual with the 0, 1, ... most significant orders.
     """
     figure, (left, right) = canvas(columns=2, height=3.0)
     places = np.arange(len(orders))
@@ -130,11 +130,11 @@ def spectrum(
     left.set_xticks(places, [str(order) for order in orders], rotation=60 * (len(orders) > 10))
     left.set_xlim(-0.7, len(orders) - 0.3)
     left.set(xlabel="order (periods a turn)", ylabel="amplitude (mNm)", title="Found")
-    count = np.arange(held_back_Nm.size)
-    right.plot(count, held_back_Nm * 1e3, ".-", color=COLOURS["none"], ms=4)
-    chosen = min(len(orders), held_back_Nm.size - 1)
-    right.plot(chosen, held_back_Nm[chosen] * 1e3, "o", color=COLOURS["harmonic"], label="chosen")
-    right.set(xlabel="number of orders", ylabel="error on held-back turns (mNm)", title="Choice")
+    count = np.arange(error_Nm.size)
+    right.plot(count, error_Nm * 1e3, ".-", color=COLOURS["none"], ms=4)
+    chosen = min(len(orders), error_Nm.size - 1)
+    right.plot(chosen, error_Nm[chosen] * 1e3, "o", color=COLOURS["harmonic"], label="chosen")
+    right.set(xlabel="number of orders", ylabel="residual (mNm RMS)", title="Choice")
     right.set_yscale("log")
     _log_labels(right.yaxis)
     legend_beside_title(right)

@@ -119,9 +119,9 @@ def _pictures(
     judged, facts = results["validation"], results["identification"]
     thesis, harmonic = found.thesis, found.harmonic
     tables_Nm = harmonic.tables(thesis.raw_Nm.shape[1]) + thesis.mean_Nm[:, None]
-    amplitudes, widths, held_back = (
+    amplitudes, widths, by_orders = (
         np.asarray(facts[key], float)
-        for key in ("amplitudes_Nm", "confidence_Nm", "held_back_error_Nm")
+        for key in ("amplitudes_Nm", "confidence_Nm", "error_by_orders_Nm")
     )
     speeds = np.geomspace(*_SPEEDS_RAD_S, 200)
     frictions = np.array([curves.friction_Nm(harmonic, one) for one in speeds.tolist()]).T
@@ -138,7 +138,7 @@ def _pictures(
         "raw": figures.raw_curves(thesis.raw_Nm),
         "overlay": figures.overlay(thesis.raw_Nm, order),
         "tables": figures.tables(thesis.raw_Nm, thesis.curve_Nm, tables_Nm, thesis.repaired),
-        "spectrum": figures.spectrum(facts["orders"], amplitudes, widths, held_back),
+        "spectrum": figures.spectrum(facts["orders"], amplitudes, widths, by_orders),
         "friction": figures.friction(speeds, *frictions),
         "position": deviations(
             "position_error_deg", position, "position error (deg)", "floor (rms, deg)"
@@ -178,7 +178,7 @@ _TOP = (
 )  # fmt: skip
 _IDENTIFICATION = (
     "orders", "amplitudes_Nm", "confidence_Nm", "phases_deg", "per_pole_pair", "hints",
-    "residual_rms_Nm", "repaired_fraction", "coverage", "excluded_fraction", "held_back_error_Nm",
+    "residual_rms_Nm", "repaired_fraction", "coverage", "excluded_fraction", "error_by_orders_Nm",
 )  # fmt: skip
 
 

@@ -36,15 +36,23 @@ def show_identified(out: Output, found: dict[str, Any]) -> None:
     ]
     head = ["order", "amplitude", "95 %", "likely cause"]
     out.say("identified cogging", TableText([head, *rows], left=["likely cause"]))
+    forward, backward = (1e3 * found[f"coulomb_{way}_Nm"] for way in ("forward", "backward"))
+    both = f"friction {forward:.1f} / {backward:.1f} mNm forward / backward"
+    if len(found["directions"]) == 1:
+        way = "increasing" if found["directions"][0] > 0 else "decreasing"
+        both = f"friction {forward:.1f} mNm, measured at {way} angle only and assumed for both"
     out.say(
-        f"friction {1e3 * found['coulomb_forward_Nm']:.1f} / "
-        f"{1e3 * found['coulomb_backward_Nm']:.1f} mNm forward / backward, "
-        f"inertia {found['inertia_kg_m2']:.3e} kg m2, "
+        f"{both}, inertia {found['inertia_kg_m2']:.3e} kg m2, "
         f"unexplained {1e3 * found['residual_rms_Nm']:.2f} mNm RMS",
         "thesis' method: the rotor left the ramp, and the curve of the other direction "
         "was used, at "
         f"{100 * found['repaired_fraction']:.1f} % of the angles",
     )
+    if found["dropped_fraction"] > 0.0:
+        out.say(
+            f"{found['dropped_fraction']:.1%} of the samples were not used: they lie between jumps "
+            "of the time that are less than 100 samples apart"
+        )
 
 
 def show_validation(out: Output, validation: dict[str, Any], bandwidth_Hz: float) -> None:

@@ -127,11 +127,14 @@ def harmonic_result() -> HarmonicResult:
         latency_s=ConfidenceInterval(LATENCY_s, 1e-4),
         lag_rad=nothing,
         pole_pairs=4,
+        slots=None,
+        directions=(1, -1),
         coverage=1.0,
         cogging_trend_1_s=-1e-5,
+        dropped_fraction=0.0,
         excluded_fraction=0.01,
         residual_rms_Nm=1.5e-3,
-        held_out_error_Nm=np.array([0.04, 0.015, 0.0015, 0.0016]),
+        error_by_orders_Nm=np.array([0.04, 0.015, 0.0015, 0.0016]),
     )
 
 
