@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-import scipy
 
 from cdpr_rt.arrays import FloatArray, rms
 from cdpr_rt.control.compensation import FrictionFeedforward
@@ -38,6 +37,7 @@ from cdpr_rt.identification.windows import (
 # The final fit over windows with chosen orders: coefficients, lags, and their confidence.
 
 CLUSTERS_PER_TURN = 24
+_CLUSTERS_PER_COLUMN = 4
 _ROUNDS = 5
 _LEAST_SPREAD_Nm = 1e-5
 _EMPTY = 1e-20
@@ -133,13 +133,15 @@ def fit(
     priors: list[Prior],
     lag_prior: tuple[float, float],
     inertia_kg_m2: float,
+    correlation: FloatArray,
 ) -> HarmonicFit:
     """Fit the used columns, all harmonics and the static lag by Gauss-Newton steps.
 
     `lag_prior` is mean and standard deviation in rad. In slow runs the noise of the acceleration
     would bias the inertia low. There the inertia from the other runs is used, or `inertia_kg_m2`
     if there are no others. The covariance is the sandwich estimator over clusters of neighbouring
-    windows, whose errors may be correlated.
+    windows, whose errors may be correlated. A single turn has too few clusters; there it is that
+    over rows, times `correlation`, the rows per independent row of each kind.
     """
     rows = gather(windows, layout)
     columns = [*used, *range(design.FIXED, layout.columns)]
@@ -158,7 +160,13 @@ def fit(
             lag += float(beta[-_EXTRA])
             weight = _weights(rows, residual)
             inertia = float(beta[0]) if used[0] == design.INERTIA else inertia
-    score_covariance = _score_covariance(x * (weight * residual)[:, None], rows.cluster)
+    score = x * (weight * residual)[:, None]
+    if np.unique(rows.cluster).size < _CLUSTERS_PER_COLUMN * len(columns):
+        score *= np.sqrt(correlation)[rows.kind, None]
+        independent = float((1.0 / correlation[rows.kind]).sum())
+        score_covariance = score.T @ score / max(1.0 - len(columns) / independent, 0.1)
+    else:
+        score_covariance = _score_covariance(score, rows.cluster)
     covariance = inverse @ (score_covariance + np.diag(precision)) @ inverse
     return HarmonicFit(layout, columns, beta, covariance, lag + float(beta[-_EXTRA]), residual)
 
@@ -260,6 +268,8 @@ class OrderSelection:
 
     orders: tuple[int, ...]
     error_Nm: FloatArray
+    correlation: FloatArray
+    """Of each kind of row, see RowWeights."""
 
 
 @dataclass(frozen=True)
@@ -308,6 +318,7 @@ def choose(equations: Equations, fixed: list[int], rows: RowWeights) -> OrderSel
     return OrderSelection(
         tuple(sorted(equations.layout.orders[i] for i in added[:best])),
         np.sqrt(left / total.rows * per_row),
+        rows.correlation,
     )
 
 
@@ -487,7 +498,8 @@ def _identify(legs: Sequence[SweepData], start: _Start) -> HarmonicResult:
         if curved:
             shape = _shape(runs, start, choice.orders, beta, inertia, starts) or shape
         starts = [shape]
-        fitted = fit(windows, ColumnLayout(choice.orders, shape), used, priors, lag, inertia)
+        layout = ColumnLayout(choice.orders, shape)
+        fitted = fit(windows, layout, used, priors, lag, inertia, choice.correlation)
         beta = fitted.beta[len(used) : len(fitted.used)]
         quick = quick and _plausible(fitted.value(design.INERTIA), start)
         used = [c for c in used if c != design.INERTIA or quick or not start.before]
@@ -575,6 +587,7 @@ def _choose(
             if step == 0:
                 choice = replace(choice, orders=_significant(choice.orders, beta, len(fixed)))
         rows = rows_by_noise(equations, windows, columns, beta)
+    choice = replace(choice, correlation=rows.correlation)
     return choice, beta[len(fixed) :], float(beta[0])
 
 

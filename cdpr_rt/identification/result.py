@@ -105,17 +105,17 @@ def likely_cause(order: int, pole_pairs: int, slots: int | None = None) -> str:
     }
     if order in known:
         return known[order]
-    if slots and order % math.lcm(slots, poles) == 0:
-        return f"a multiple of {slots} slots and {poles} poles: slots against magnets"
-    if slots and order % slots == 0:
-        return f"a multiple of the {slots} slots: unequal magnets"
-    if slots and order % poles == 0:
-        return f"a multiple of the {poles} poles: unequal slots"
-    if order % (6 * pole_pairs) == 0:
-        return "a multiple of six per pole pair: slots against magnets, or the back EMF's shape"
-    if order % pole_pairs == 0:
-        cause = "unequal poles, or the back EMF's shape" if slots else "slots against magnets"
-        return f"a multiple of the pole pairs: {cause}"
-    if slots:
-        return "no multiple of pole pairs or slots: unequal slots or magnets, or something coupled"
-    return "no multiple of the pole pairs: unequal slots or magnets, or something coupled"
+    by_slots = [
+        (math.lcm(slots, poles), f"{slots} slots and {poles} poles: slots against magnets"),
+        (slots, f"the {slots} slots: unequal magnets"),
+        (poles, f"the {poles} poles: unequal slots"),
+        (pole_pairs, "the pole pairs: unequal poles, or the back EMF's shape"),
+    ] if slots else [
+        (6 * pole_pairs, "six per pole pair: slots against magnets, or the back EMF's shape"),
+        (pole_pairs, "the pole pairs: slots against magnets"),
+    ]  # fmt: skip
+    for period, cause in by_slots:
+        if order % period == 0:
+            return f"a multiple of {cause}"
+    also = " or slots" if slots else ""
+    return f"no multiple of the pole pairs{also}: unequal slots or magnets, or something coupled"
