@@ -78,6 +78,9 @@ MODULES = {
         "robot": "Describe a cable robot, check it, and try it in simulation.",
         "sim": "Simulate drives, robots, cameras and faults.",
     },
+    "import_recordings": {
+        "import": "Convert recordings of other programs: CSV, OptiTrack, Vicon.",
+    },
     "io": {
         "io": "Show and test the safety I/O.",
     },
@@ -110,7 +113,7 @@ PANELS = {
     "Run": ("run", "page", "status", "check", "enable", "ack", "service-unit"),
     "Move": ("tighten", "move", "jog", "path", "controller", "teleop", "resume"),
     "Stop": ("hold", "lower", "disable", "stop", "estop"),
-    "Look": ("log", "bus"),
+    "Look": ("log", "bus", "import"),
     "Describe": ("robot", "profiles"),
     "Commission": ("commission", "drive", "cogging", "tension", "io", "rail"),
     "Calibrate": ("calibrate", "camera", "markers", "poses"),

@@ -418,6 +418,7 @@ _BINS = 360
 _LEAST_TURN = 0.95
 _MOST_DROPPED = 0.5
 _CHOICE_ROUNDS = 2
+_LAG_ORDERS, _LAG_MOST = 100, 15
 _LATENCY_SD_s = 1e-3
 _LATENCY_SD_AGAIN_s = 2e-4
 _LAG_SD_rad = np.deg2rad(1.0)
@@ -482,7 +483,7 @@ def _identify(legs: Sequence[SweepData], start: _Start) -> HarmonicResult:
     dropped = _dropped(legs, runs)
     windows = [w for run in runs if (w := cut(run, start.latency_s)) is not None]
     directions = _directions(runs, windows)
-    windows = windows if start.before else _weighing(windows)
+    windows = windows if start.before else weighing(windows)
     # one speed in one direction does not show the friction's curve apart from the cogging
     curved = len(directions) == 2 or any(w.fast for w in windows)
     shape = start.before.shape if start.before else FrictionShape(0.25 if curved else 0.0)
@@ -537,7 +538,7 @@ def _directions(runs: Sequence[SweepData], windows: Sequence[Windows]) -> tuple[
     return found
 
 
-def _weighing(windows: list[Windows]) -> list[Windows]:
+def weighing(windows: list[Windows]) -> list[Windows]:
     """Return the windows, with the inertia fitted on slow runs if no run is quick.
 
     There hunting shows it, but with the errors of friction. It only keeps the cogging unbiased.
@@ -589,6 +590,16 @@ def _choose(
         rows = rows_by_noise(equations, windows, columns, beta)
     choice = replace(choice, correlation=rows.correlation)
     return choice, beta[len(fixed) :], float(beta[0])
+
+
+def explained(windows: Sequence[Windows]) -> tuple[float, float]:
+    """Return the share of the torque's squares that most orders leave, and the independent rows."""
+    every = ColumnLayout(tuple(range(1, _LAG_ORDERS + 1)), FrictionShape(0.0))
+    equations = design.accumulate(windows, every)
+    rows = rows_counted(equations)
+    fixed = [c for c in range(design.FIXED) if c not in (design.LATENCY, design.VISCOUS)]
+    _, left = _forward(equations.parts.weighted(rows.weight), fixed, every, _LAG_MOST)
+    return float(left[-1] / left[0]), float((equations.parts.rows / rows.correlation).sum())
 
 
 def _significant(orders: tuple[int, ...], beta: FloatArray, first: int) -> tuple[int, ...]:

@@ -12,7 +12,11 @@ from cdpr_drivers.robot.commissioned import load_profile
 from cdpr_profiles import Winch, load_robot, load_winch
 from cdpr_profiles.motor_bounds import MotorBounds
 from cdpr_rt.errors import RawLogError
-from cdpr_rt.identification.cogging_profile import CoggingProfileError, DriveIdentity
+from cdpr_rt.identification.cogging_profile import (
+    CoggingProfile,
+    CoggingProfileError,
+    DriveIdentity,
+)
 from cdpr_rt.identification.rawlog import read_raw_log
 from cdpr_rt.procedures.commissioning_results import (
     METHODS,
@@ -36,13 +40,13 @@ from cdpr_tools.commands.options import (
     YesOption,
 )
 from cdpr_tools.commands.with_winch import WinchOnBus, with_winch
-from cdpr_tools.commission import axis_sweep, build, summary
+from cdpr_tools.commission import axis_sweep, build, comparison, summary
 from cdpr_tools.commission.commissioning import DEFAULT_BANDWIDTH_HZ, Commissioning, Plan
 from cdpr_tools.commission.run import prepare
 from cdpr_tools.composition.session import confirm_motion, open_winch
 from cdpr_tools.consent import require_consent
 from cdpr_tools.errors import BadInputError, WorkFailedError
-from cdpr_tools.output import Output
+from cdpr_tools.output import Output, TableText
 from cdpr_tools.raw_data import keeping_raw_data
 from cdpr_tools.recordings.truth import true_angle
 
@@ -143,12 +147,42 @@ def fit(
     paths = Paths(folder)
     recorded_winch, identity, latency = _recorded_identity(paths)
     profile = load_winch(winch or recorded_winch)
-    found = identify(profile, latency or profile.latency_s, paths)
+    found = identify(profile, profile.latency_s if latency is None else latency, paths)
     store_profile(profile, identity, found, paths)
     result = identification(found)
     summary.show_identified(out, result)
     out.say(f"profile: {paths.profile}")
     out.result({"ok": True, "identification": result, "profile": str(paths.profile)})
+
+
+@app.command(name="compare")
+def compare_runs(
+    folder: Annotated[Path, typer.Argument(help="Folder in which `fit` wrote a profile.")],
+    others: Annotated[
+        list[Path], typer.Argument(help="Folders with other recordings.", metavar="OTHER...")
+    ],
+    as_json: JsonOption = False,
+) -> None:
+    """Compare how well each method explains the torque of other recordings of the motor.
+
+    R2 is the share of the torque's variance that the curve over the angle explains. Recordings in
+    FOLDER itself are marked: the curves were identified from them.
+    """
+    out = Output(as_json)
+    profile = CoggingProfile.load(Paths(folder).profile)
+    used = comparison.runs_of(folder)
+    curves = comparison.tables(profile, [run for run in used if run.path.stem[:3] != "map"])
+    rows, results = [["recording", *comparison.CURVES]], []
+    for run in [*used, *(run for other in others for run in comparison.runs_of(other))]:
+        by_method = {
+            name: comparison.explained(curves[name][run.direction], run)
+            for name in comparison.CURVES
+        }
+        own = " (identified from it)" if run in used else ""
+        rows.append([f"{run.path}{own}", *(f"{r2:.4f}" for r2 in by_method.values())])
+        results.append({"recording": str(run.path), "identified_from": bool(own), "r2": by_method})
+    out.say("R2 of the torque, friction's mean left out", TableText(rows, left=["recording"]))
+    out.result({"ok": True, "runs": results})
 
 
 def _recorded_identity(paths: Paths) -> tuple[str, DriveIdentity, float | None]:

@@ -1,0 +1,107 @@
+"""Which column of a table holds which quantity, and how its numbers become SI units."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Annotated, Final, Literal
+
+import numpy as np
+from pydantic import Field
+
+from cdpr_profiles import Winch
+from cdpr_profiles.errors import ProfileError
+from cdpr_profiles.reader import Profile
+from cdpr_rt.arrays import FloatArray
+from cdpr_tools.imports.tables import Table
+
+_Finite = Annotated[float, Field(ge=-1e9, le=1e9)]
+TIMES: Final = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
+LENGTHS: Final = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}
+ANGLES: Final = {"rad": 1.0, "deg": math.pi / 180.0, "turns": math.tau}
+FORCES: Final = {"N": 1.0, "kN": 1e3, "kgf": 9.80665}
+NUMBERS: Final = {"": 1.0}
+
+
+class Column(Profile):
+    """One quantity: value = sign · gain · number + offset, in `unit`."""
+
+    name: str
+    unit: str = ""
+    """By default that which the file states, or else the SI unit."""
+    sign: Annotated[int, Field(ge=-1, le=1)] = 1
+    gain: _Finite = 1.0
+    offset: _Finite = 0.0
+    time_offset_s: Annotated[float, Field(ge=-1e6, le=1e6)] = 0.0
+    """Time of the value minus the time of its row."""
+
+    def read(self, table: Table, units: Mapping[str, float]) -> FloatArray:
+        """Return the values in SI units, (rows,), nan for empty cells; raises ProfileError.
+
+        The first of `units`, by name, is the default.
+        """
+        numbers = table.column(self.name)
+        unit = self.unit or table.units.get(self.name, next(iter(units)))
+        if unit not in units:
+            allowed = ", ".join(units)
+            problem = f"column {self.name!r} has the unit {unit!r}; allowed: {allowed}"
+            raise ProfileError(table.path, "", problem)
+        if self.sign == 0:
+            raise ProfileError(
+                table.path, "", f"column {self.name!r} has the sign 0; allowed: 1 and -1"
+            )
+        return np.asarray(units[unit] * (self.sign * self.gain * numbers + self.offset))
+
+    def read_all(self, table: Table, units: Mapping[str, float]) -> FloatArray:
+        """Return the values as `read`; raises ProfileError also for an empty cell."""
+        values = self.read(table, units)
+        if not np.isfinite(values).all():
+            row = int(np.argmin(np.isfinite(values)))
+            raise table.fault(self.name, row, "is empty; allowed: a number in every row")
+        return values
+
+
+def read_time(column: Column, table: Table) -> FloatArray:
+    """Return the time in s, (rows,); raises ProfileError if it does not increase."""
+    time = column.read_all(table, TIMES)
+    late = np.flatnonzero(np.diff(time) <= 0.0)
+    if late.size:
+        row = int(late[0]) + 1
+        problem = f"the time does not increase: {time[row - 1]:.6f} s, then {time[row]:.6f} s"
+        raise table.fault(column.name, row, f"{problem}; remove the row, or split the file")
+    return time
+
+
+class MotorColumns(Profile):
+    """Columns of a motor's recording; without time it is a static map, one angle after another."""
+
+    time: Column | None = None
+    angle: Column
+    """Motor angle from the encoder index; units rad, deg, turns, counts."""
+    torque: Column
+    """Units Nm, mNm, A_rms, A_peak, permille (of the rated torque)."""
+
+
+class MotorMapping(Profile):
+    """Mapping of a motor's recording."""
+
+    columns: MotorColumns
+    torque_lag_s: Annotated[float, Field(ge=0.0, le=2.0)] | Literal["fit"] = 0.0
+    """Time constant of the low-pass filter in the drive's reading of torque or current."""
+    from_s: float = -math.inf
+    until_s: float = math.inf
+
+
+def motor_units(winch: Winch) -> tuple[dict[str, float], dict[str, float]]:
+    """Return the units of angle and torque of a motor."""
+    motor = winch.motor
+    per_A = motor.torque_constant_Nm_per_Arms
+    angles = {**ANGLES, "counts": math.tau / winch.encoder_counts_per_turn}
+    torques = {
+        "Nm": 1.0,
+        "mNm": 1e-3,
+        "A_rms": per_A,
+        "A_peak": per_A / math.sqrt(2.0),
+        "permille": 1e-3 * motor.rated_torque_Nm,
+    }
+    return angles, torques
