@@ -13,7 +13,6 @@ import numpy as np
 import scipy
 
 from cdpr_rt.arrays import FloatArray
-from cdpr_rt.identification import windows as design
 from cdpr_rt.identification.harmonic_model import explained, weighing
 from cdpr_rt.identification.result import ConfidenceInterval
 from cdpr_rt.identification.windows import SweepData, contiguous, cut
@@ -22,6 +21,7 @@ _SHORTEST_s, _LONGEST_s = 0.002, 0.5
 _CLOSE = 0.02
 _CONFIDENCE = 1.96
 _STEP = 0.1
+MOST_RESIDUAL = 0.02
 
 
 @dataclass(frozen=True)
@@ -69,13 +69,30 @@ def resampled(reading: Reading, lag_s: float, period_s: float) -> SweepData:
     return SweepData(grid, angle, mean, setpoint, np.full(grid.size, speed))
 
 
-def fit_torque_lag(
-    readings: Sequence[Reading], period_s: float
-) -> tuple[ConfidenceInterval, float]:
-    """Return the filter's time constant in s, and the residual with it over that without filter.
+@dataclass(frozen=True)
+class FittedLag:
+    """A filter found in recordings.
+
+    `residual` is what the harmonics leave of the torque's squares, and `gain` that residual over
+    the one without a filter. A rotor that sticks and slips leaves too much: then the time constant
+    is not `reliable`.
+    """
+
+    lag_s: ConfidenceInterval
+    residual: float
+    gain: float
+
+    @property
+    def reliable(self) -> bool:
+        """Whether the harmonics explain the torque well enough to show a filter."""
+        return self.residual < MOST_RESIDUAL
+
+
+def fit_torque_lag(readings: Sequence[Reading], period_s: float) -> FittedLag:
+    """Return the filter's time constant.
 
     Hunting, both directions, or different speeds show it: with a wrong time constant, the same
-    angle needs a different torque. Both residuals are relative to the torque's variance.
+    angle needs a different torque.
     """
 
     def unexplained(lag_s: float) -> tuple[float, float]:
@@ -95,6 +112,5 @@ def fit_torque_lag(
     beside = [cost(found.x + side * _STEP) for side in (-1.0, 1.0)]
     curvature = max(independent * (sum(beside) - 2.0 * math.log(share)) / _STEP**2, 1e-12)
     lag = math.exp(found.x)
-    return ConfidenceInterval(lag, _CONFIDENCE * lag * math.sqrt(2.0 / curvature)), share / (
-        unexplained(0.0)[0]
-    )
+    half_width = _CONFIDENCE * lag * math.sqrt(2.0 / curvature)
+    return FittedLag(ConfidenceInterval(lag, half_width), share, share / unexplained(0.0)[0])

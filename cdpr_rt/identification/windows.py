@@ -64,16 +64,19 @@ class Stretch:
     @property
     def turns(self) -> float:
         """Travel of the set-point in turns."""
-        samples = self.stop - self.start
-        return samples * period_s(self.run) * abs(self.velocity_rad_s) / TWO_PI
+        time = self.run.time_s
+        lasted_s = time[self.stop - 1] - time[self.start] + period_s(self.run)
+        return float(lasted_s * abs(self.velocity_rad_s) / TWO_PI)
 
     def last_whole_turns(self) -> Stretch | None:
         """Return the last whole turns of the stretch, None if it has no whole turn."""
         whole = math.floor(self.turns + 1.0 - _SHORTEST_TURNS)
         if whole < 1:
             return None
-        samples = round(whole * TWO_PI / (abs(self.velocity_rad_s) * period_s(self.run)))
-        start = max(self.start, self.stop - samples)
+        time, period = self.run.time_s, period_s(self.run)
+        lasts_s = whole * TWO_PI / abs(self.velocity_rad_s)
+        begin_s = time[self.stop - 1] - lasts_s + 0.5 * period
+        start = max(self.start, int(np.searchsorted(time, begin_s)))
         return Stretch(self.run, start, self.stop, self.velocity_rad_s)
 
 

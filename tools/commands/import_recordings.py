@@ -19,14 +19,14 @@ app = typer.Typer(
 )
 
 
-
 @app.callback()
 def _group() -> None:
     """Convert recordings of other programs: CSV, OptiTrack, Vicon."""
 
 
 FilesArgument = Annotated[
-    list[Path], typer.Argument(help="CSV files, or exports of OptiTrack or Vicon.", metavar="FILE...")
+    list[Path],
+    typer.Argument(help="CSV files, or exports of OptiTrack or Vicon.", metavar="FILE..."),
 ]
 MapOption = Annotated[
     Path, typer.Option("--map", help="Which column is what, TOML.", metavar="FILE")

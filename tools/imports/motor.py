@@ -15,7 +15,12 @@ from cdpr_profiles import Winch
 from cdpr_profiles.errors import ProfileError
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.identification.rawlog import AXIS_COLUMNS, RawLogWriter, column_names
-from cdpr_rt.identification.torque_lag import Reading, fit_torque_lag, resampled
+from cdpr_rt.identification.torque_lag import (
+    MOST_RESIDUAL,
+    Reading,
+    fit_torque_lag,
+    resampled,
+)
 from cdpr_rt.identification.windows import SweepData
 from cdpr_rt.procedures.commissioning_results import Paths
 from cdpr_tools.errors import BadInputError
@@ -87,9 +92,7 @@ def import_motor(files: Sequence[Path], mapping_path: Path, winch: Winch, paths:
     return Imported(written, notes, lag_s, passes)
 
 
-def _pieces(
-    table: Table, mapping: MotorMapping, winch: Winch, notes: list[str]
-) -> list[_Piece]:
+def _pieces(table: Table, mapping: MotorMapping, winch: Winch, notes: list[str]) -> list[_Piece]:
     """Return the motions in one direction; add a note for each part that is left out."""
     columns = mapping.columns
     angles, torques = motor_units(winch)
@@ -102,7 +105,9 @@ def _pieces(
     torque = _shifted(time, torque, columns.torque.time_offset_s - base)
     inside = np.flatnonzero((time >= mapping.from_s) & (time <= mapping.until_s))
     if inside.size < _FEWEST_SAMPLES:
-        problem = f"{inside.size} rows between from_s and until_s; allowed: {_FEWEST_SAMPLES} or more"
+        problem = (
+            f"{inside.size} rows between from_s and until_s; allowed: {_FEWEST_SAMPLES} or more"
+        )
         raise ProfileError(table.path, "", problem)
     time, angle, torque = time[inside], angle[inside], torque[inside]
     found = []
@@ -152,14 +157,21 @@ def _lag(
     mapping: MotorMapping, readings: Sequence[Reading], period_s: float, notes: list[str]
 ) -> float:
     """Return the time constant to remove; add a note about a filter that the recording shows."""
-    fitted, share = fit_torque_lag(readings, period_s)
-    shown = f"{fitted.value:.3g} ± {fitted.half_width:.2g} s"
-    if mapping.torque_lag_s == "fit":
-        notes.append(f"the torque reading is low-passed with a time constant of {shown}")
-        return fitted.value
     given = mapping.torque_lag_s
-    off = abs(fitted.value - given) > max(3.0 * fitted.half_width, 0.3 * given)
-    if share < _LATE and off:
+    fitted = fit_torque_lag(readings, period_s)
+    lag = fitted.lag_s
+    shown = f"{lag.value:.3g} ± {lag.half_width:.2g} s"
+    if given == "fit" and not fitted.reliable:
+        raise BadInputError(
+            f"torque_lag_s: cannot be fitted, because harmonics of the angle leave "
+            f"{fitted.residual:.0%} of the torque (allowed: {MOST_RESIDUAL:.0%}; the motor sticks "
+            "and slips, or a column is wrong); write the time constant of the drive's filter, or 0"
+        )
+    if given == "fit":
+        notes.append(f"the torque reading is low-passed with a time constant of {shown}")
+        return lag.value
+    off = abs(lag.value - given) > max(3.0 * lag.half_width, 0.3 * given)
+    if fitted.reliable and fitted.gain < _LATE and off:
         notes.append(
             f"the torque reading seems to be low-passed with {shown}, but torque_lag_s is "
             f"{given:g}: amplitudes of high orders come out wrong; check the drive's filter, or "
@@ -199,9 +211,7 @@ def _meta(
     }
 
 
-def _write(
-    path: Path, what: str, run: SweepData, valid: FloatArray, meta: dict[str, Any]
-) -> None:
+def _write(path: Path, what: str, run: SweepData, valid: FloatArray, meta: dict[str, Any]) -> None:
     """Write one pass; the index is at zero."""
     period = float(run.time_s[1] - run.time_s[0])
     columns = {

@@ -90,7 +90,10 @@ def _rows(path: Path, text: str) -> Iterator[tuple[int, list[str]]]:
     try:
         for number, line in enumerate(lines, 1):
             if line.strip() and not line.lstrip().startswith("#"):
-                yield number, [cell.strip() for cell in next(csv.reader([line], delimiter=delimiter))]
+                yield (
+                    number,
+                    [cell.strip() for cell in next(csv.reader([line], delimiter=delimiter))],
+                )
     except csv.Error as error:
         raise ProfileError(path, f"line {number}", f"is not a CSV line: {error}") from None
 

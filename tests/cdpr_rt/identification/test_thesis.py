@@ -64,9 +64,10 @@ def test_tables_interpolate_around_the_turn():
     assert found.tables(720).shape == (2, 720)
 
 
-def test_a_missing_direction_is_named():
-    with pytest.raises(IdentificationError, match="decreasing"):
-        identify_thesis([sweep(1, curve(1))])
+def test_sweeps_without_a_whole_turn_are_refused():
+    short = SweepData(*(a[: a.size // 4] for a in vars(sweep(1, curve(1))).values()))
+    with pytest.raises(IdentificationError, match="no whole turn"):
+        identify_thesis([short])
 
 
 def test_broken_records_are_rejected():
