@@ -7,9 +7,15 @@ from typing import Annotated
 
 import typer
 
-from cdpr_profiles import load_winch
+from cdpr_profiles import load_robot, load_winch
 from cdpr_tools.commands.commission import prepare
-from cdpr_tools.commands.options import JsonOption, OverwriteOption, WinchArgument
+from cdpr_tools.commands.options import (
+    JsonOption,
+    OverwriteOption,
+    RobotArgument,
+    WinchArgument,
+)
+from cdpr_tools.errors import BadInputError, os_error_as
 from cdpr_tools.output import Output, TableText
 
 app = typer.Typer(
@@ -71,3 +77,38 @@ def motor(
             "notes": found.notes,
         }
     )
+
+
+@app.command()
+def calibration(
+    robot: RobotArgument,
+    cables: Annotated[Path, typer.Argument(help="File with the cable lengths.", metavar="FILE")],
+    mapping: MapOption,
+    out_dir: Annotated[Path, typer.Option("--out", help="Folder for data.json.", metavar="DIR")],
+    poses: Annotated[
+        Path | None,
+        typer.Option(help="File with the poses, if it is another one.", metavar="FILE"),
+    ] = None,
+    overwrite: OverwriteOption = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Convert cable lengths and measured poses for `cdpr calibrate fit ROBOT --data DIR`.
+
+    The platform must be at home in the first row that is used. Tensions and rotations may be
+    missing.
+    """
+    from cdpr_tools.imports.calibration import import_calibration  # noqa: PLC0415  # slow to load
+
+    out = Output(as_json)
+    path = out_dir / "data.json"
+    if path.exists() and not overwrite:
+        raise BadInputError(f"{path}: exists already; replace it with --overwrite")
+    profile = load_robot(robot)
+    data, notes = import_calibration(cables, poses or cables, mapping, profile)
+    for note in notes:
+        out.note(note)
+    with os_error_as(BadInputError, f"--out {out_dir}: cannot be written"):
+        out_dir.mkdir(parents=True, exist_ok=True)
+    data.save(path)
+    out.say(f"written: {path}, {len(data.poses)} poses")
+    out.result({"ok": True, "data": str(path), "poses": len(data.poses), "notes": notes})

@@ -105,3 +105,42 @@ def motor_units(winch: Winch) -> tuple[dict[str, float], dict[str, float]]:
         "permille": 1e-3 * motor.rated_torque_Nm,
     }
     return angles, torques
+
+
+class CableColumns(Profile):
+    """Columns of the cables, each with one for every axis in the order of the robot's file."""
+
+    time: Column
+    lengths: tuple[Column, ...]
+    """Units m, cm, mm."""
+    tensions: tuple[Column, ...] = ()
+    """Units N, kN, kgf; may be omitted."""
+
+
+class PoseColumns(Profile):
+    """Columns of a pose that a motion capture measured, in its own frame."""
+
+    time: Column
+    position: Annotated[tuple[Column, ...], Field(min_length=3, max_length=3)]
+    """x, y, z of the frame of the file; units m, cm, mm."""
+    quaternion: Annotated[tuple[Column, ...], Field(min_length=4, max_length=4)] | None = None
+    """x, y, z, w."""
+    rotation_vector: Annotated[tuple[Column, ...], Field(min_length=3, max_length=3)] | None = None
+    """x, y, z, as Vicon exports it; units rad, deg."""
+    axes: tuple[str, str, str] = ("x", "y", "z")
+    """The axis of the file's frame along each axis of the robot's room, such as "-x"."""
+    offset_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    """Added to the position, in the room."""
+    position_std_m: Annotated[float, Field(gt=0.0, le=1.0)] = 0.001
+    rotation_std_deg: Annotated[float, Field(gt=0.0, le=90.0)] = 0.5
+
+
+class CalibrationMapping(Profile):
+    """Mapping of recorded cable lengths and poses."""
+
+    cables: CableColumns
+    pose: PoseColumns
+    from_s: float = -math.inf
+    until_s: float = math.inf
+    rate_Hz: Annotated[float, Field(gt=0.0, le=1e4)] = 100.0
+    """Highest rate of the readings that are taken."""

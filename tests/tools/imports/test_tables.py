@@ -1,0 +1,95 @@
+"""Exports of motion capture and CSV dialects are read as named columns."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cdpr_profiles.errors import ProfileError
+from cdpr_tools.imports.tables import read_table
+
+OPTITRACK = """\
+Format Version,1.23,Take Name,Take 1,Capture Frame Rate,120.000000,Rotation Type,Quaternion,\
+Length Units,Millimeters,Coordinate Space,Global
+
+,,Rigid Body,Rigid Body,Rigid Body,Rigid Body,Rigid Body,Rigid Body,Rigid Body
+,Name,Platform,Platform,Platform,Platform,Platform,Platform,Platform
+,,"1","1","1","1","1","1","1"
+,,Rotation,Rotation,Rotation,Rotation,Position,Position,Position
+Frame,Time (Seconds),X,Y,Z,W,X,Y,Z
+0,0.000000,0.1,0.0,0.0,0.995,1.5,2.5,3.5
+1,0.008333,,,,,,,
+2,0.016667,0.1,0.0,0.0,0.995,1.6,2.5,3.5
+"""
+VICON = """\
+Segments
+100
+,,robot:Platform,,,,,
+Frame,Sub Frame,RX,RY,RZ,TX,TY,TZ
+,,rad,rad,rad,mm,mm,mm
+11,0,0.1,0.2,0.3,100.0,200.0,300.0
+12,0,0.1,0.2,0.3,101.0,,300.0
+
+Trajectories
+100
+,,m1,,
+Frame,Sub Frame,X,Y,Z
+,,mm,mm,mm
+11,0,1,2,3
+"""
+
+
+def written(folder: Path, text: str | bytes) -> Path:
+    path = folder / "export.csv"
+    path.write_bytes(text if isinstance(text, bytes) else text.encode())
+    return path
+
+
+def test_an_optitrack_export_has_columns_by_body_and_axis(tmp_path: Path) -> None:
+    table = read_table(written(tmp_path, OPTITRACK))
+    assert table.column("time_s") == pytest.approx([0.0, 0.008333, 0.016667])
+    x = table.column("Platform Position X")
+    assert (x[0], x[2]) == (1.5, 1.6) and np.isnan(x[1])
+    assert table.column("Platform Rotation W")[0] == 0.995
+    assert table.units["Platform Position X"] == "mm"
+
+
+def test_a_vicon_export_has_columns_by_body_and_time_from_frames(tmp_path: Path) -> None:
+    table = read_table(written(tmp_path, VICON))
+    assert table.column("time_s") == pytest.approx([0.10, 0.11])
+    assert list(table.column("Platform TX")) == [100.0, 101.0]
+    assert np.isnan(table.column("Platform TY")[1])
+    assert (table.units["Platform RX"], table.units["Platform TZ"]) == ("rad", "mm")
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "t,a\n0,1\n1,2\n",
+        "t;a\r\n0;1\r\n1;2\r\n",
+        "\ufefft\ta\n# note\n0\t1\n\n1\t2\n",
+        'time,note\n"t","a"\n'.replace("time,note\n", "") + '"0","1"\n"1","2"\n',
+        "t;a;µ\n0;1;\n1;2;\n".encode("latin-1"),
+    ],
+)
+def test_csv_dialects_give_the_same_columns(tmp_path: Path, text: str | bytes) -> None:
+    table = read_table(written(tmp_path, text))
+    assert list(table.column("t")) == [0.0, 1.0]
+    assert list(table.column("a")) == [1.0, 2.0]
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", "contains no lines"),
+        ("a,b\n", "contains no rows"),
+        ("a,a\n1,2\n", "a different name for each column"),
+        ("Format Version,1.2\nFrame,Time\n0,0\n", "export from Motive with all header rows"),
+        ("Segments\nfast\n,,a\nFrame,Sub Frame,RX\n,,rad\n1,0,1\n", "the rate in Hz"),
+    ],
+)
+def test_a_broken_export_is_refused(tmp_path: Path, text: str, message: str) -> None:
+    with pytest.raises(ProfileError, match=message):
+        read_table(written(tmp_path, text))

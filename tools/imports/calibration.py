@@ -1,0 +1,196 @@
+"""Recorded cable lengths and poses of motion capture, as data for `cdpr calibrate fit`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from scipy.spatial.transform import Rotation, Slerp
+
+from cdpr_profiles import Robot
+from cdpr_profiles.errors import ProfileError
+from cdpr_profiles.geometry_calibration import geometry_sha256
+from cdpr_rt.arrays import FloatArray
+from cdpr_rt.calibration.readings import CalibrationData, PoseReading
+from cdpr_rt.model.platform_model import PlatformModel, platform_model_of
+from cdpr_tools.errors import BadInputError
+from cdpr_tools.imports.mapping import (
+    ANGLES,
+    FORCES,
+    LENGTHS,
+    NUMBERS,
+    CalibrationMapping,
+    PoseColumns,
+    read_time,
+)
+from cdpr_tools.imports.tables import Table, read_table
+
+_GAP_S: Final = 0.05
+"""Poses farther apart are not interpolated."""
+_FEWEST: Final = 3
+
+
+@dataclass(frozen=True)
+class _Poses:
+    """Measured poses over time, in the room: positions (k, 3), rotations of length k or None."""
+
+    time_s: FloatArray
+    position_m: FloatArray
+    rotation: Rotation | None
+
+
+def import_calibration(
+    cables: Path, poses: Path, mapping_path: Path, robot: Robot
+) -> tuple[CalibrationData, list[str]]:
+    """Return the readings at the times of the cable lengths, with the poses interpolated there.
+
+    The rotation is that since the first reading, where the platform is at home. Also returns notes
+    on what was left out. Raises ProfileError and BadInputError.
+    """
+    mapping = CalibrationMapping.load_file(mapping_path)
+    model = platform_model_of(robot)
+    table = read_table(cables)
+    measured = _read_poses(table if poses == cables else read_table(poses), mapping.pose)
+    time, lengths, tensions = _read_cables(table, mapping, len(robot.axes))
+    row = _rows(time, measured.time_s, mapping)
+    if row.size < _FEWEST:
+        raise BadInputError(
+            f"{cables}: {row.size} rows lie within the time of the poses, {measured.time_s[0]:.2f} "
+            f"to {measured.time_s[-1]:.2f} s (the cables': {time[0]:.2f} to {time[-1]:.2f} s); "
+            "check the unit of the times, and correct the difference of the clocks by `offset`"
+        )
+    at = time[row]
+    position = np.column_stack(
+        [np.interp(at, measured.time_s, values) for values in measured.position_m.T]
+    )
+    turned = None
+    if measured.rotation is not None:
+        turned = Slerp(measured.time_s, measured.rotation)(at)
+        turned = turned * turned[0].inv() * Rotation.from_matrix(model.home_pose.Q)
+    _require_home(poses, position[0], model)
+    columns = mapping.pose
+    readings = [
+        PoseReading(
+            target=tuple(_target(model, position[i], None if turned is None else turned[i])),
+            length_m=tuple(lengths[j].tolist()),
+            tension_N=None if tensions is None else tuple(tensions[j].tolist()),
+            time_s=float(at[i]),
+            position_m=tuple(position[i].tolist()),
+            position_std_m=columns.position_std_m,
+            **_rotation(columns, None if turned is None else turned[i]),
+        )
+        for i, j in enumerate(row)
+    ]
+    notes = [f"{row.size} of {time.size} rows are used, at most {mapping.rate_Hz:g} a second"]
+    data = CalibrationData(
+        robot=robot.profile,
+        geometry_sha256=geometry_sha256(robot),
+        simulated=False,
+        date=datetime.now(UTC).replace(microsecond=0).isoformat(),
+        poses=tuple(readings),
+    )
+    return data, notes
+
+
+def _read_cables(
+    table: Table, mapping: CalibrationMapping, cables: int
+) -> tuple[FloatArray, FloatArray, FloatArray | None]:
+    """Return times, lengths (rows, n), and tensions (rows, n) or None."""
+    columns = mapping.cables
+    for what, given in (("lengths", columns.lengths), ("tensions", columns.tensions)):
+        if len(given) != cables and (given or what == "lengths"):
+            raise ProfileError(
+                table.path,
+                f"cables.{what}",
+                f"{len(given)} columns; allowed: {cables}, one a cable",
+            )
+    time = read_time(columns.time, table)
+    lengths = np.column_stack([one.read_all(table, LENGTHS) for one in columns.lengths])
+    if not columns.tensions:
+        return time, lengths, None
+    return time, lengths, np.column_stack([c.read_all(table, FORCES) for c in columns.tensions])
+
+
+def _read_poses(table: Table, columns: PoseColumns) -> _Poses:
+    """Return the poses in the room; rows with an empty cell, where the body was hidden, are out."""
+    time = read_time(columns.time, table)
+    to_room = _to_room(table, columns)
+    position = np.column_stack([one.read(table, LENGTHS) for one in columns.position])
+    seen = np.isfinite(position).all(axis=1)
+    turns = None
+    for given, units in ((columns.quaternion, NUMBERS), (columns.rotation_vector, ANGLES)):
+        if given is not None:
+            turns = np.column_stack([one.read(table, units) for one in given])
+            seen &= np.isfinite(turns).all(axis=1)
+    if np.count_nonzero(seen) < _FEWEST:
+        problem = f"{np.count_nonzero(seen)} rows with a pose; allowed: {_FEWEST} or more"
+        raise ProfileError(table.path, "", problem)
+    rotation = None
+    if turns is not None:
+        kind = Rotation.from_quat if turns.shape[1] == 4 else Rotation.from_rotvec
+        basis = Rotation.from_matrix(to_room)
+        rotation = basis * kind(turns[seen]) * basis.inv()
+    return _Poses(time[seen], position[seen] @ to_room.T + columns.offset_m, rotation)
+
+
+def _to_room(table: Table, columns: PoseColumns) -> FloatArray:
+    """Return the rotation matrix from the file's frame to the room; raises ProfileError."""
+    matrix = np.zeros((3, 3))
+    for i, axis in enumerate(columns.axes):
+        name = axis.removeprefix("-")
+        if name not in ("x", "y", "z"):
+            problem = f"value {axis!r}; allowed: x, y, z, -x, -y, -z"
+            raise ProfileError(table.path, f"pose.axes[{i}]", problem)
+        matrix[i, "xyz".index(name)] = -1.0 if axis.startswith("-") else 1.0
+    if not np.isclose(np.linalg.det(matrix), 1.0):
+        problem = f"value {list(columns.axes)}; allowed: each axis once, as a right-handed frame"
+        raise ProfileError(table.path, "pose.axes", problem)
+    return matrix
+
+
+def _rows(time: FloatArray, poses_s: FloatArray, mapping: CalibrationMapping) -> FloatArray:
+    """Return the rows of the cables that lie between two poses, thinned to the highest rate."""
+    after = np.clip(np.searchsorted(poses_s, time), 1, poses_s.size - 1)
+    inside = (time >= poses_s[after - 1]) & (time <= poses_s[after])
+    inside &= poses_s[after] - poses_s[after - 1] <= _GAP_S
+    inside &= (time >= mapping.from_s) & (time <= mapping.until_s)
+    kept, last = [], -np.inf
+    for i in np.flatnonzero(inside):
+        if time[i] - last >= (1.0 - 1e-3) / mapping.rate_Hz:
+            kept.append(i)
+            last = time[i]
+    return np.array(kept, int)
+
+
+def _target(model: PlatformModel, position_m: FloatArray, turned: Rotation | None) -> list[float]:
+    """Return the coordinates (d,) of a pose."""
+    vector = np.zeros(6)
+    vector[:3] = position_m
+    if turned is not None:
+        home = Rotation.from_matrix(model.home_pose.Q)
+        vector[3:] = (turned * home.inv()).as_rotvec()
+    return [float(vector[i]) for i in model.kinematics.directions]
+
+
+def _rotation(columns: PoseColumns, turned: Rotation | None) -> dict[str, Any]:
+    if turned is None:
+        return {}
+    return {
+        "rotation": tuple(map(tuple, turned.as_matrix().tolist())),
+        "rotation_std_rad": float(np.radians(columns.rotation_std_deg)),
+    }
+
+
+def _require_home(path: Path, first_m: FloatArray, model: PlatformModel) -> None:
+    """Raise BadInputError if the first pose is not home."""
+    k = model.positions
+    if np.abs(first_m[:k] - model.home[:k]).max() > model.platform.home_tolerance_m:
+        at = np.round(first_m[:k], 5).tolist()
+        raise BadInputError(
+            f"{path}: the platform is at {at} m in the first row that is used, but home_m is "
+            f"{list(model.platform.home_m)}; write home_m = {at} into the robot's file, or select "
+            "another part of the recording by from_s"
+        )
