@@ -17,6 +17,7 @@ from cdpr_rt.arrays import FloatArray
 from cdpr_rt.calibration.readings import CalibrationData, PoseReading
 from cdpr_rt.model.platform_model import PlatformModel, platform_model_of
 from cdpr_tools.errors import BadInputError
+from cdpr_tools.imports.logs import read_any
 from cdpr_tools.imports.mapping import (
     ANGLES,
     FORCES,
@@ -26,7 +27,7 @@ from cdpr_tools.imports.mapping import (
     PoseColumns,
     read_time,
 )
-from cdpr_tools.imports.tables import Table, read_table
+from cdpr_tools.imports.tables import Table
 
 _GAP_S: Final = 0.05
 """Poses farther apart are not interpolated."""
@@ -52,8 +53,8 @@ def import_calibration(
     """
     mapping = CalibrationMapping.load_file(mapping_path)
     model = platform_model_of(robot)
-    table = read_table(cables)
-    measured = _read_poses(table if poses == cables else read_table(poses), mapping.pose)
+    table = read_any(cables)
+    measured = _read_poses(table if poses == cables else read_any(poses), mapping.pose)
     time, lengths, tensions = _read_cables(table, mapping, len(robot.axes))
     row = _rows(time, measured.time_s, mapping)
     if row.size < _FEWEST:

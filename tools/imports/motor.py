@@ -24,8 +24,9 @@ from cdpr_rt.identification.torque_lag import (
 from cdpr_rt.identification.windows import SweepData
 from cdpr_rt.procedures.commissioning_results import Paths
 from cdpr_tools.errors import BadInputError
+from cdpr_tools.imports.logs import read_any
 from cdpr_tools.imports.mapping import MotorMapping, motor_units, read_time
-from cdpr_tools.imports.tables import Table, read_table
+from cdpr_tools.imports.tables import Table
 
 _LONGEST_STEP_S: Final = 2.5e-3
 """Longest period of the imported passes: shorter than the windows of the identification."""
@@ -69,7 +70,9 @@ def import_motor(files: Sequence[Path], mapping_path: Path, winch: Winch, paths:
     notes: list[str] = []
     if mapping.columns.time is None:
         return _import_maps(files, mapping_path, mapping, winch, paths)
-    pieces = [piece for path in files for piece in _pieces(read_table(path), mapping, winch, notes)]
+    pieces = [
+        piece for path in files for piece in _pieces(read_any(path, winch), mapping, winch, notes)
+    ]
     if not pieces:
         raise BadInputError(
             f"{files[0]}: no motion of at least half a turn in one direction; "
@@ -254,7 +257,7 @@ def _import_maps(
     angles, torques = motor_units(winch)
     written, passes = [], []
     for k, path in enumerate(files):
-        table = read_table(path)
+        table = read_any(path, winch)
         angle = mapping.columns.angle.read_all(table, angles)
         torque = mapping.columns.torque.read_all(table, torques)
         count = angle.size

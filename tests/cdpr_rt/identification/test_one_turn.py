@@ -1,4 +1,4 @@
-"""The harmonic model from a single turn: what is found, and what is refused."""
+"""The harmonic model from a single turn: what is found, and what is rejected."""
 
 from __future__ import annotations
 
@@ -53,13 +53,13 @@ def test_an_inertia_that_is_wrong_by_a_factor_hardly_changes_the_cogging():
     assert not found[1].inertia_measured and found[1].inertia_kg_m2.value == 6e-4
 
 
-def test_an_incomplete_turn_is_refused():
+def test_an_incomplete_turn_is_rejected():
     run = turn(TruePlant(terms=TERMS, breakaway=0.085), 40.0)
     with pytest.raises(IdentificationError, match=r"contain 7\d% of a turn"):
         identified(part(run, slice(0, run.time_s.size * 3 // 4)))
 
 
-def test_irregular_samples_are_refused_with_their_share():
+def test_irregular_samples_are_rejected_with_their_share():
     run = turn(TruePlant(terms=TERMS, breakaway=0.085), 40.0)
     kept = np.random.default_rng(1).random(run.time_s.size) < 0.3
     with pytest.raises(IdentificationError, match=r"% of \d+ samples lie in pieces"):

@@ -64,7 +64,7 @@ def test_tables_interpolate_around_the_turn():
     assert found.tables(720).shape == (2, 720)
 
 
-def test_sweeps_without_a_whole_turn_are_refused():
+def test_sweeps_without_a_whole_turn_are_rejected():
     short = SweepData(*(a[: a.size // 4] for a in vars(sweep(1, curve(1))).values()))
     with pytest.raises(IdentificationError, match="no whole turn"):
         identify_thesis([short])

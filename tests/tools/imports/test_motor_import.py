@@ -83,7 +83,7 @@ def test_signs_turn_the_motor_around(recorded: dict[str, Path], tmp_path: Path) 
     assert done("cogging", "fit", tmp_path)["identification"]["directions"] == [-1]
 
 
-def test_negative_friction_is_refused_with_the_cause(
+def test_negative_friction_is_rejected_with_the_cause(
     recorded: dict[str, Path], tmp_path: Path
 ) -> None:
     wrong = mapping(tmp_path, torque='torque = { name = "iq", unit = "A_peak", sign = -1 }')

@@ -90,6 +90,6 @@ def test_csv_dialects_give_the_same_columns(tmp_path: Path, text: str | bytes) -
         ("Segments\nfast\n,,a\nFrame,Sub Frame,RX\n,,rad\n1,0,1\n", "the rate in Hz"),
     ],
 )
-def test_a_broken_export_is_refused(tmp_path: Path, text: str, message: str) -> None:
+def test_a_broken_export_is_rejected(tmp_path: Path, text: str, message: str) -> None:
     with pytest.raises(ProfileError, match=message):
         read_table(written(tmp_path, text))
