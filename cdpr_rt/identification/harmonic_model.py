@@ -484,7 +484,7 @@ def _identify(legs: Sequence[SweepData], start: _Start) -> HarmonicResult:
     windows = [w for run in runs if (w := cut(run, start.latency_s)) is not None]
     directions = _directions(runs, windows)
     windows = windows if start.before else weighing(windows)
-    # one speed in one direction does not show the friction's curve apart from the cogging
+    # one direction at low speed does not show the friction's curve apart from the cogging
     curved = len(directions) == 2 or any(w.fast for w in windows)
     shape = start.before.shape if start.before else FrictionShape(0.25 if curved else 0.0)
     every = ColumnLayout(tuple(range(1, MAX_ORDER + 1)), shape)

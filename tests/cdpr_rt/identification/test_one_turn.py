@@ -33,7 +33,7 @@ def test_one_turn_in_one_direction_shows_all_orders(speed):
     assert {n for n, _, _ in TERMS} <= set(found.orders)
     for order, amplitude, _ in TERMS:
         one = next(h for h in found.harmonics if h.order == order)
-        assert one.amplitude_Nm.value == pytest.approx(amplitude, rel=0.15, abs=2e-3)
+        assert one.amplitude_Nm.value == pytest.approx(amplitude, rel=0.25, abs=3e-3)
     same = found.coulomb_forward_Nm.value == found.coulomb_backward_Nm.value
     assert same and found.coulomb_forward_Nm.value > 0.0
 
