@@ -56,6 +56,8 @@ def import_calibration(
     table = read_any(cables)
     measured = _read_poses(table if poses == cables else read_any(poses), mapping.pose)
     time, lengths, tensions = _read_cables(table, mapping, len(robot.axes))
+    if tensions is None and PoseReading.model_fields["tension_N"].is_required():
+        raise BadInputError(f"{mapping_path}: cables.tensions: is missing; allowed: one a cable")
     row = _rows(time, measured.time_s, mapping)
     if row.size < _FEWEST:
         raise BadInputError(
@@ -72,19 +74,13 @@ def import_calibration(
         turned = Slerp(measured.time_s, measured.rotation)(at)
         turned = turned * turned[0].inv() * Rotation.from_matrix(model.home_pose.Q)
     _require_home(poses, position[0], model)
-    columns = mapping.pose
     readings = [
-        PoseReading(
-            target=tuple(_target(model, position[i], None if turned is None else turned[i])),
-            length_m=tuple(lengths[j].tolist()),
-            tension_N=None if tensions is None else tuple(tensions[j].tolist()),
-            time_s=float(at[i]),
-            position_m=tuple(position[i].tolist()),
-            position_std_m=columns.position_std_m,
-            **_rotation(columns, None if turned is None else turned[i]),
+        _reading(
+            mapping.pose, float(at[i]), lengths[j], None if tensions is None else tensions[j],
+            position[i], None if turned is None else turned[i], model,
         )
         for i, j in enumerate(row)
-    ]
+    ]  # fmt: skip
     notes = [f"{row.size} of {time.size} rows are used, at most {mapping.rate_Hz:g} a second"]
     data = CalibrationData(
         robot=robot.profile,
@@ -94,6 +90,32 @@ def import_calibration(
         poses=tuple(readings),
     )
     return data, notes
+
+
+def _reading(
+    columns: PoseColumns,
+    time_s: float,
+    length_m: FloatArray,
+    tension_N: FloatArray | None,
+    position_m: FloatArray,
+    turned: Rotation | None,
+    model: PlatformModel,
+) -> PoseReading:
+    """Return the reading of one instant."""
+    values: dict[str, Any] = {
+        "target": tuple(_target(model, position_m, turned)),
+        "length_m": tuple(length_m.tolist()),
+        "time_s": time_s,
+        "position_m": tuple(position_m.tolist()),
+        "position_std_m": columns.position_std_m,
+    }
+    if tension_N is not None:
+        values["tension_N"] = tuple(tension_N.tolist())
+    if turned is not None:
+        values["rotation"] = tuple(map(tuple, turned.as_matrix().tolist()))
+        values["rotation_std_rad"] = float(np.radians(columns.rotation_std_deg))
+    known = PoseReading.model_fields
+    return PoseReading.model_validate({key: v for key, v in values.items() if key in known})
 
 
 def _read_cables(
@@ -174,15 +196,6 @@ def _target(model: PlatformModel, position_m: FloatArray, turned: Rotation | Non
         home = Rotation.from_matrix(model.home_pose.Q)
         vector[3:] = (turned * home.inv()).as_rotvec()
     return [float(vector[i]) for i in model.kinematics.directions]
-
-
-def _rotation(columns: PoseColumns, turned: Rotation | None) -> dict[str, Any]:
-    if turned is None:
-        return {}
-    return {
-        "rotation": tuple(map(tuple, turned.as_matrix().tolist())),
-        "rotation_std_rad": float(np.radians(columns.rotation_std_deg)),
-    }
 
 
 def _require_home(path: Path, first_m: FloatArray, model: PlatformModel) -> None:
