@@ -79,7 +79,7 @@ MODULES = {
         "sim": "Simulate drives, robots, cameras and faults.",
     },
     "import_recordings": {
-        "import": "Convert recordings of other programs: CSV, OptiTrack, Vicon.",
+        "import": "Convert recordings of other programs: CSV, OptiTrack, Vicon, candump, MCAP.",
     },
     "io": {
         "io": "Show and test the safety I/O.",

@@ -215,9 +215,12 @@ def stored_thesis(result: ThesisResult) -> StoredMethod:
     return _stored(result.tables(TABLE_SAMPLES), result.friction, 0.0, 0.0)
 
 
-def stored_harmonic_model(result: HarmonicResult) -> StoredMethod:
-    """Return the harmonic model's tables, friction and timing for storage."""
-    ahead = max(0.0, result.latency_s.value)
+def stored_harmonic_model(result: HarmonicResult, latency_s: float | None = None) -> StoredMethod:
+    """Return the harmonic model's tables, friction and timing for storage.
+
+    `latency_s` replaces the identified one, which is not that of the drive in imported recordings.
+    """
+    ahead = max(0.0, result.latency_s.value if latency_s is None else latency_s)
     return _stored(result.tables(TABLE_SAMPLES), result.friction, ahead, OBSERVER_s)
 
 

@@ -191,7 +191,9 @@ def store_profile(winch: Winch, identity: DriveIdentity, found: Identified, path
     """Write the cogging profile."""
     harmonic = found.harmonic
     names = ("sweep", "fast", *(round_name(number) for number in range(MOST_ROUNDS)))
-    raw = [path.name for name in names for path in paths.passes(name)]
+    recorded = [path for name in names for path in paths.passes(name)]
+    raw = [path.name for path in recorded]
+    imported = any("source" in read_raw_log(path).header for path in recorded[:1])
     CoggingProfile(
         motor=winch.motor.model,
         drive=winch.drive.name,
@@ -204,7 +206,7 @@ def store_profile(winch: Winch, identity: DriveIdentity, found: Identified, path
         repaired_fraction=found.thesis.repaired_fraction,
         coverage=harmonic.coverage,
         thesis=stored_thesis(found.thesis),
-        harmonic=stored_harmonic_model(harmonic),
+        harmonic=stored_harmonic_model(harmonic, winch.latency_s if imported else None),
     ).save(paths.profile)
 
 

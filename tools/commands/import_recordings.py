@@ -20,19 +20,19 @@ from cdpr_tools.output import Output, TableText
 
 app = typer.Typer(
     name="import",
-    help="Convert recordings of other programs: CSV, OptiTrack, Vicon.",
+    help="Convert recordings of other programs: CSV, OptiTrack, Vicon, candump, MCAP.",
     no_args_is_help=True,
 )
 
 
 @app.callback()
 def _group() -> None:
-    """Convert recordings of other programs: CSV, OptiTrack, Vicon."""
+    """Convert recordings of other programs: CSV, OptiTrack, Vicon, candump, MCAP."""
 
 
 FilesArgument = Annotated[
     list[Path],
-    typer.Argument(help="CSV files, or exports of OptiTrack or Vicon.", metavar="FILE..."),
+    typer.Argument(help="CSV, candump or MCAP files.", metavar="FILE..."),
 ]
 MapOption = Annotated[
     Path, typer.Option("--map", help="Which column is what, TOML.", metavar="FILE")

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from cdpr_here import cdpr_here
 
+from cdpr_profiles import load_winch
 from cdpr_rt.identification.rawlog import read_raw_log
 from tests.cdpr_rt.identification.bench import Bench, TruePlant
 from tests.tools.imports.made_up_recording import HUNTING, WINCH, mapping, turn
@@ -46,6 +47,8 @@ def test_the_cogging_is_identified_from_a_csv_of_one_direction(
     amplitude = dict(zip(found["orders"], found["amplitudes_Nm"], strict=True))
     assert amplitude[4] == pytest.approx(0.03, rel=0.05)
     assert amplitude[24] == pytest.approx(0.02, rel=0.1)
+    stored = json.loads((tmp_path / "cogging-profile.json").read_text())
+    assert stored["harmonic"]["look_ahead_s"] == load_winch(WINCH).latency_s
     text = cdpr_here("cogging", "fit", tmp_path).stdout
     assert "measured at increasing angle only and assumed for both" in text
 
