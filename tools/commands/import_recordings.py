@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from cdpr_profiles import load_robot, load_winch
-from cdpr_tools.commands.commission import prepare
+from cdpr_tools.commission.run import prepare
 from cdpr_tools.commands.options import (
     JsonOption,
     OverwriteOption,

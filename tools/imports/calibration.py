@@ -153,9 +153,10 @@ def _read_poses(table: Table, columns: PoseColumns) -> _Poses:
         raise ProfileError(table.path, "", problem)
     rotation = None
     if turns is not None:
-        kind = Rotation.from_quat if turns.shape[1] == 4 else Rotation.from_rotvec
-        basis = Rotation.from_matrix(to_room)
-        rotation = basis * kind(turns[seen]) * basis.inv()
+        by_quaternion = columns.rotation_vector is None
+        basis, told = Rotation.from_matrix(to_room), turns[seen]
+        of_body = Rotation.from_quat(told) if by_quaternion else Rotation.from_rotvec(told)
+        rotation = basis * of_body * basis.inv()
     return _Poses(time[seen], position[seen] @ to_room.T + columns.offset_m, rotation)
 
 

@@ -44,7 +44,8 @@ def _read_candump(path: Path, data: bytes, winch: Winch) -> Table:
     decoder = Decoder({winch.node_id: KnownNode.of_winch(winch)})
     rows: list[dict[str, float]] = []
     units = {TIME: "s"}
-    sync_s, row = None, {}
+    sync_s: float | None = None
+    row: dict[str, float] = {}
     for _, frame in read_log(str(path), data.decode("ascii", "replace").splitlines(keepends=True)):
         record = decoder.decode(frame)
         sync_s = frame.time_s if record.kind == "SYNC" else sync_s

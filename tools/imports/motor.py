@@ -261,7 +261,7 @@ def _import_maps(
         angle = mapping.columns.angle.read_all(table, angles)
         torque = mapping.columns.torque.read_all(table, torques)
         count = angle.size
-        run = SweepData(np.arange(count) * 1.0, angle, torque, angle, np.ones(count))
+        run = SweepData(np.arange(count, dtype=float), angle, torque, angle, np.ones(count))
         to = paths.raw(f"map-{k}")
         _write(to, "map", run, np.ones(count), _meta(table, mapping_path, winch, 1.0, 0.0))
         written.append(to)
