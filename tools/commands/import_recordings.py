@@ -8,13 +8,13 @@ from typing import Annotated
 import typer
 
 from cdpr_profiles import load_robot, load_winch
-from cdpr_tools.commission.run import prepare
 from cdpr_tools.commands.options import (
     JsonOption,
     OverwriteOption,
     RobotArgument,
     WinchArgument,
 )
+from cdpr_tools.commission.run import prepare
 from cdpr_tools.errors import BadInputError, os_error_as
 from cdpr_tools.output import Output, TableText
 
