@@ -31,6 +31,7 @@ ROBOT = {
         "mark-calibrated": "Confirm the geometry in the robot's file, e.g. after moving a rail.",
         "pose": "Compute poses from a table of cable lengths, and their errors.",
         "new": "Write a robot's file by answering questions.",
+        "import": "Write a robot's file from a CASPR model.",
     },
     "robot_trial": {
         "trial": "Try a robot in simulation and judge its accuracy against the truth.",

@@ -1,4 +1,4 @@
-"""`cdpr robot new|show|pose|mark-calibrated`: describe a cable robot, and show it."""
+"""`cdpr robot new|import|show|pose|mark-calibrated`: describe a cable robot, and show it."""
 
 from __future__ import annotations
 
@@ -26,6 +26,7 @@ from cdpr_tools.errors import BAD_INPUT, BadInputError, os_error_as
 from cdpr_tools.output import Output, TableText
 from cdpr_tools.robots import new_robot, summary
 from cdpr_tools.robots.calibration_text import calibration_lines
+from cdpr_tools.robots.caspr import ModelAnswers, read_caspr
 from cdpr_tools.robots.questions import KINDS, SKETCH, Default, Question
 from cdpr_tools.streams import discard_typed_ahead
 
@@ -161,10 +162,7 @@ def new(
     answers to the questions that matter. The file is written anyway, and you can edit it.
     """
     out = Output(as_json)
-    if path.exists():
-        raise BadInputError(f"{path}: already exists and is never overwritten; choose another name")
-    if path.suffix != ".toml" or not path.parent.is_dir():
-        raise BadInputError(f"{path}: allowed: NAME.toml in an existing folder")
+    _require_new(path)
     given = _given(answers or ())
     if "kind" not in given and not yes:
         typer.echo(SKETCH, err=True)
@@ -177,6 +175,67 @@ def new(
     out.say(f"next: cdpr robot show {path}")
     out.say(f"      cdpr run {path} --bus simbus:      # on simulated winches")
     out.result({"ok": True, "file": str(path)})
+
+
+@app.command("import")
+def import_(
+    bodies: Annotated[
+        Path, typer.Argument(help="The model's file of bodies.", metavar="BODIES.xml")
+    ],
+    cables: Annotated[
+        Path, typer.Argument(help="The model's file of cables.", metavar="CABLES.xml")
+    ],
+    path: Annotated[Path, typer.Argument(help="The file to write, NAME.toml.", metavar="FILE")],
+    answers: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--set",
+            metavar="KEY=VALUE",
+            help="Answer as for `cdpr robot new`, such as winch=NAME; may be repeated.",
+        ),
+    ] = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Write a robot's file from a CASPR model: two XML files, of its bodies and its cables.
+
+    Geometry, mass and tensions come from the model, all else from the defaults of `cdpr robot new`.
+    The platform's origin is its centre of mass. If the robot cannot work with its winches, the file
+    is written anyway, and you can edit it.
+    """
+    out = Output(as_json)
+    _require_new(path)
+    given = _given(answers or ())
+    ask = ModelAnswers(read_caspr(bodies, cables))
+    complete = new_robot.answers_of(path, given, ask, out.stage)
+    for note in ask.notes:
+        out.say(f"not from the model: {note}")
+    with out.stage("checking whether it can work"):
+        profile, found = new_robot.write_robot(complete, path)
+    wrong = [finding for finding in found if finding.impossible]
+    if profile is None or wrong:
+        raise BadInputError(_rejection(path, wrong))
+    out.say(f"{path}: written")
+    _say_findings(out, found)
+    out.say(f"next: cdpr robot show {path}")
+    out.result({"ok": True, "file": str(path), "not_from_model": ask.notes})
+
+
+def _require_new(path: Path) -> None:
+    if path.exists():
+        raise BadInputError(f"{path}: already exists and is never overwritten; choose another name")
+    if path.suffix != ".toml" or not path.parent.is_dir():
+        raise BadInputError(f"{path}: allowed: NAME.toml in an existing folder")
+
+
+def _rejection(path: Path, wrong: list[Finding]) -> str:
+    """Return why the robot of a file that was written cannot work, and what to do."""
+    return "\n".join(
+        [
+            f"{path}: written, but this robot cannot work",
+            *(f"{finding.key}: {finding.text}" for finding in wrong),
+            f"edit the file, then check it: cdpr robot show {path}",
+        ]
+    )
 
 
 def _described(
@@ -226,13 +285,7 @@ class _Asker:
     def reject(self, wrong: list[Finding], keys: set[str]) -> None:
         """Show why a robot cannot work, and ask for `keys` the next time."""
         reasons = [f"{finding.key}: {finding.text}" for finding in wrong]
-        self.rejection = "\n".join(
-            [
-                f"{self._path}: written, but this robot cannot work",
-                *reasons,
-                f"edit the file, then check it: cdpr robot show {self._path}",
-            ]
-        )
+        self.rejection = _rejection(self._path, wrong)
         self._wanted, self._origin = keys, ""
         if keys and not self._yes:
             _say("this robot cannot work:", *reasons, "another answer, please:")

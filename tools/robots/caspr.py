@@ -1,0 +1,151 @@
+"""Read the model of a cable robot for CASPR, as answers to the questions of `cdpr robot new`.
+
+CASPR (https://github.com/darwinlau/CASPR) keeps a robot in two XML files: its bodies and its
+cables. Lengths are in m, masses in kg, forces in N.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Final
+from xml.etree import ElementTree
+
+import numpy as np
+
+from cdpr_profiles.bounded_input import read_text
+from cdpr_rt.arrays import FloatArray
+from cdpr_tools.errors import BadInputError
+from cdpr_tools.robots.questions import KINDS, Default, Question
+
+_PLANAR: Final = ("PLANAR_XY", "P_XY")
+_LEAST_SHARE: Final = 0.01
+"""Least tension over the greatest one, for models whose cables may be slack."""
+_MOST_BYTES: Final = 1 << 20
+
+
+def read_caspr(bodies: Path, cables: Path) -> dict[str, str]:
+    """Return answers from a model with one rigid body; the platform's origin is its centre of mass.
+
+    Of several sets of cables, the model's default is taken. Raises BadInputError that names the
+    file and the element.
+    """
+    links = _root(bodies, "bodies_system").findall("links/*")
+    if len(links) != 1:
+        raise BadInputError(f"{bodies}: links: {len(links)} bodies; allowed: one, the platform")
+    link = links[0]
+    joint = _found(link, "joint", bodies).get("type", "")
+    size = 2 if joint in _PLANAR else 3
+    if size == 3 and not joint.startswith(("SPATIAL", "P_XYZ")):
+        raise BadInputError(
+            f"{bodies}: joint: type {joint!r}; allowed: {', '.join(_PLANAR)}, P_XYZ, SPATIAL_..."
+        )
+    room_m = _point(link, "parent/location", bodies)
+    centre_m = _point(link, "physical/com_location", bodies)
+    answers = {"mass_kg": _text(link, "physical/mass", bodies)}
+    exits, anchors, forces = [], [], []
+    for cable in _default_set(cables):
+        ends = cable.findall("attachments/attachment")
+        if [_text(end, "link", cables) for end in ends] != ["0", "1"]:
+            raise BadInputError(
+                f"{cables}: {cable.get('name')}: attachments; allowed: from link 0 to link 1"
+            )
+        on_frame, on_platform = (_point(end, "location", cables) for end in ends)
+        of_origin = cable.get("attachment_reference") != "com"
+        exits.append(on_frame - room_m)
+        anchors.append(on_platform - centre_m * of_origin)
+        keys = ("properties/force_min", "properties/force_max")
+        forces.append([_number(cable, key, cables) for key in keys])
+    least_N, most_N = np.min(forces, axis=0)[0], np.min(forces, axis=0)[1]
+    answers["tension_max_N"] = f"{most_N:g}"
+    answers["tension_min_N"] = f"{max(least_N, _LEAST_SHARE * most_N):g}"
+    for name, points in (("exit", exits), ("anchor", anchors)):
+        for number, point in enumerate(points, start=1):
+            answers[f"{name}_{number}_m"] = ", ".join(f"{x:.6g}" for x in point[:size])
+    return {"kind": _kind(np.array(exits)[:, :size], np.array(anchors), cables), **answers}
+
+
+class ModelAnswers:
+    """Answers the questions from a model, with the default where it gives nothing or nothing valid.
+
+    `notes` says which values of the model were not taken, and why.
+    """
+
+    def __init__(self, model: dict[str, str]) -> None:
+        self._model = model
+        self.notes: list[str] = []
+
+    def __call__(self, question: Question, default: Default, problem: str) -> str:
+        """Return the answer to a question."""
+        text = self._model.get(question.key)
+        if problem:
+            self.notes.append(f"{question.key}: {problem}; instead: {default.text}")
+        return default.text if text is None or problem else text
+
+
+def _kind(exits_m: FloatArray, anchors_m: FloatArray, file: Path) -> str:
+    """Return the kind of `KINDS` with this number of cables; raises BadInputError for others."""
+    count, size = exits_m.shape
+    heights = exits_m[:, -1]
+    if size == 2:
+        kind = f"planar-{count}"
+    elif not np.ptp(anchors_m, axis=0).any():
+        kind = f"point-{count}"
+    else:
+        kind = f"{'suspended' if heights.min() > 0.5 * heights.max() else 'spatial'}-{count}"
+    if kind not in KINDS:
+        raise BadInputError(
+            f"{file}: {count} cables make it {kind}; allowed: {', '.join(KINDS)}; for another "
+            "number write the file with the nearest kind by `cdpr robot new` and add [[axes]]"
+        )
+    return kind
+
+
+def _default_set(file: Path) -> list[ElementTree.Element]:
+    root = _root(file, "cables")
+    wanted = root.get("default_cable_set")
+    for one in root.findall("cable_set"):
+        if wanted in (None, one.get("id")):
+            return list(one)
+    raise BadInputError(f"{file}: cable_set: none is called {wanted!r}, the default_cable_set")
+
+
+def _root(file: Path, tag: str) -> ElementTree.Element:
+    try:
+        root = ElementTree.fromstring(read_text(file, _MOST_BYTES))
+    except ElementTree.ParseError as error:
+        raise BadInputError(f"{file}: is not XML: {error}") from None
+    if root.tag != tag:
+        raise BadInputError(f"{file}: begins with <{root.tag}>; allowed: <{tag}>")
+    return root
+
+
+def _found(parent: ElementTree.Element, path: str, file: Path) -> ElementTree.Element:
+    found = parent.find(path)
+    if found is None:
+        where = parent.get("name", parent.tag)
+        raise BadInputError(f"{file}: {where}: {path} is missing")
+    return found
+
+
+def _text(parent: ElementTree.Element, path: str, file: Path) -> str:
+    return (_found(parent, path, file).text or "").strip()
+
+
+def _number(parent: ElementTree.Element, path: str, file: Path) -> float:
+    return float(_numbers(parent, path, file, 1)[0])
+
+
+def _point(parent: ElementTree.Element, path: str, file: Path) -> FloatArray:
+    return _numbers(parent, path, file, 3)
+
+
+def _numbers(parent: ElementTree.Element, path: str, file: Path, count: int) -> FloatArray:
+    text = _text(parent, path, file)
+    try:
+        numbers = np.array(text.split(), float)
+    except ValueError:
+        numbers = np.empty(0)
+    if numbers.size != count or not np.isfinite(numbers).all():
+        where = parent.get("name", parent.tag)
+        raise BadInputError(f"{file}: {where}: {path}: {text!r}; allowed: {count} numbers")
+    return numbers
