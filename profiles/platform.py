@@ -114,7 +114,7 @@ class PlatformFile(Profile):
     All points are in m. Three coordinates are a room, z upward.
     """
 
-    mass_kg: float = Field(gt=0, le=10_000)
+    mass_kg: float = Field(gt=0, le=100_000)
     home_m: Point
     """Position of its origin at rest on its stand, where sessions begin and end."""
     home_tolerance_m: float = Field(default=0.05, gt=0, le=1)

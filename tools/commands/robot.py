@@ -199,7 +199,8 @@ def import_(
     """Write a robot's file from a CASPR model: two XML files, of its bodies and its cables.
 
     Geometry, mass and tensions come from the model, all else from the defaults of `cdpr robot new`.
-    The platform's origin is its centre of mass. If the robot cannot work with its winches, the file
+    The platform's origin is its centre of mass, and the plane of a planar robot vertical, with y
+    upward. If the robot cannot work with its winches, the file
     is written anyway, and you can edit it.
     """
     out = Output(as_json)

@@ -26,8 +26,8 @@ _MOST_BYTES: Final = 1 << 20
 def read_caspr(bodies: Path, cables: Path) -> dict[str, str]:
     """Return answers from a model with one rigid body; the platform's origin is its centre of mass.
 
-    Of several sets of cables, the model's default is taken. Raises BadInputError that names the
-    file and the element.
+    The plane of a planar robot is taken as vertical, y upward. Of several sets of cables, the
+    model's default is taken. Raises BadInputError that names the file and the element.
     """
     links = _root(bodies, "bodies_system").findall("links/*")
     if len(links) != 1:
@@ -41,7 +41,7 @@ def read_caspr(bodies: Path, cables: Path) -> dict[str, str]:
         )
     room_m = _point(link, "parent/location", bodies)
     centre_m = _point(link, "physical/com_location", bodies)
-    answers = {"mass_kg": _text(link, "physical/mass", bodies)}
+    answers = {"mass_kg": f"{_number(link, 'physical/mass', bodies):g}"}
     exits, anchors, forces = [], [], []
     for cable in _default_set(cables):
         ends = cable.findall("attachments/attachment")
@@ -77,6 +77,8 @@ class ModelAnswers:
     def __call__(self, question: Question, default: Default, problem: str) -> str:
         """Return the answer to a question."""
         text = self._model.get(question.key)
+        if question.key == "tension_max_N" and text and float(text) > float(default.text):
+            problem = f"value {text}; these winches hold {default.text} N"
         if problem:
             self.notes.append(f"{question.key}: {problem}; instead: {default.text}")
         return default.text if text is None or problem else text
@@ -86,9 +88,10 @@ def _kind(exits_m: FloatArray, anchors_m: FloatArray, file: Path) -> str:
     """Return the kind of `KINDS` with this number of cables; raises BadInputError for others."""
     count, size = exits_m.shape
     heights = exits_m[:, -1]
+    is_point = not np.ptp(anchors_m, axis=0).any()
     if size == 2:
-        kind = f"planar-{count}"
-    elif not np.ptp(anchors_m, axis=0).any():
+        kind = f"planar-{count}" if not is_point else "a point in a plane"
+    elif is_point:
         kind = f"point-{count}"
     else:
         kind = f"{'suspended' if heights.min() > 0.5 * heights.max() else 'spatial'}-{count}"

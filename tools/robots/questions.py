@@ -293,7 +293,7 @@ def _limits(kind: RobotKind, masses: Masses) -> list[Question]:
             "acceleration_m_s2", "Acceleration along each direction (m/s2)", _number(1e-3, 100.0),
             lambda _: Default(f"{platform.acceleration_m_s2:g}", f"that of {kind.name}"),
         ),
-        Question("mass_kg", "Mass of the platform (kg)", _number(0.01, 1e4), mass),
+        Question("mass_kg", "Mass of the platform (kg)", _number(0.01, 1e5), mass),
     ]  # fmt: skip
 
 

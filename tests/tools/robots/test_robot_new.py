@@ -338,7 +338,7 @@ def test_all_wrong_keys_are_named_with_those_of_the_kind(tmp_path: Path) -> None
     ("key", "value", "problem"),
     [
         ("mass", "2", "--set mass: no such question; did you mean 'mass_kg'?"),
-        ("mass_kg", "nan", "--set mass_kg: value 'nan'; allowed: a number from 0.01 to 10000"),
+        ("mass_kg", "nan", "--set mass_kg: value 'nan'; allowed: a number from 0.01 to 100000"),
         ("exit_1_m", "1,2,3", "--set exit_1_m: value '1,2,3'; allowed: two numbers"),
         ("frame_m", "3x2", "value '3x2'; allowed: two numbers in m, such as `4, 3`"),
         ("frame_m", "3000, 2000", "allowed: up to 300 m each (in metres, not millimetres)"),

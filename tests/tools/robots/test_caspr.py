@@ -1,0 +1,101 @@
+"""`cdpr robot import` writes a robot's file from a CASPR model."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from cdpr_profiles import load_robot
+from tests.cdpr_here import cdpr_here
+
+BODIES = """<?xml version="1.0" encoding="utf-8"?>
+<!DOCTYPE bodies_system SYSTEM "../../../../templates/bodies.dtd">
+<bodies_system><links><link_rigid num="1" name="Link 1">
+  <joint type="PLANAR_XY" q_initial="0 0 0"/>
+  <physical><mass>2.5</mass><com_location>0.02 -0.01 0</com_location></physical>
+  <parent><num>0</num><location>0.5 0 0</location></parent>
+</link_rigid></links></bodies_system>
+"""
+CABLE = """<cable_ideal name="cable {number}" attachment_reference="{reference}">
+  <properties><force_min>{least}</force_min><force_max>{most}</force_max></properties>
+  <attachments>
+    <attachment><link>0</link><location>{exit} 0</location></attachment>
+    <attachment><link>1</link><location>{anchor} 0</location></attachment>
+  </attachments></cable_ideal>"""
+EXITS = ["-1.5 0.2", "-1.5 2.8", "2.5 2.8", "2.5 0.2"]
+ANCHORS = ["-0.1 0.1", "-0.1 -0.1", "0.1 -0.1", "0.1 0.1"]
+
+
+def cables(
+    exits: list[str] = EXITS, reference: str = "joint", least: float = 0.0, most: float = 120.0
+) -> str:
+    each = (
+        CABLE.format(
+            number=number + 1, reference=reference, exit=exit_m, anchor=ANCHORS[number % 4],
+            least=least, most=most,
+        )
+        for number, exit_m in enumerate(exits)
+    )  # fmt: skip
+    unused = '<cable_set id="other"></cable_set>'
+    chosen = f'<cable_set id="basic">{"".join(each)}</cable_set>'
+    return f'<cables default_cable_set="basic">{unused}{chosen}</cables>'
+
+
+def imported(folder: Path, bodies: str = BODIES, cables: str = cables()) -> tuple[int, str, Path]:
+    """Import a model; return the exit status, the output and the robot's file."""
+    (folder / "b.xml").write_text(bodies)
+    (folder / "c.xml").write_text(cables)
+    path = folder / "robot.toml"
+    done = cdpr_here("robot", "import", str(folder / "b.xml"), str(folder / "c.xml"), str(path))
+    return done.returncode, done.stdout + done.stderr, path
+
+
+def test_geometry_and_mass_come_from_the_model(tmp_path: Path) -> None:
+    status, output, path = imported(tmp_path)
+    assert status == 0, output
+    robot = load_robot(path)
+    assert robot.platform is not None
+    assert robot.platform.mass_kg == 2.5
+    # relative to the parent, and to the centre of mass
+    assert robot.platform.exit_points_m[0] == pytest.approx((-2.0, 0.2))
+    assert robot.platform.anchor_points_m[0] == pytest.approx((-0.12, 0.11))
+    assert robot.limits.tension_max_N == (120.0,)
+    assert robot.limits.tension_min_N == pytest.approx((1.2,))
+
+
+def test_attachments_may_refer_to_the_centre_of_mass(tmp_path: Path) -> None:
+    *_, path = imported(tmp_path, cables=cables(reference="com"))
+    platform = load_robot(path).platform
+    assert platform is not None
+    assert platform.anchor_points_m[0] == pytest.approx((-0.1, 0.1))
+
+
+def test_tensions_beyond_the_winches_are_not_taken_and_named(tmp_path: Path) -> None:
+    _, output, path = imported(tmp_path, cables=cables(most=5000.0))
+    assert "not from the model: tension_max_N: value 5000" in output
+    assert max(load_robot(path).limits.tension_max_N or ()) < 500.0
+
+
+@pytest.mark.parametrize(
+    ("bodies", "given", "reason"),
+    [
+        (BODIES.replace("PLANAR_XY", "S_EULER_XYZ"), cables(), "joint: type 'S_EULER_XYZ'"),
+        (BODIES.replace("2.5<", "<"), cables(), "mass"),
+        (BODIES.replace("0.02 -0.01 0", "0.02 x 0"), cables(), "com_location: '0.02 x 0'"),
+        ("<bodies_system><links/></bodies_system>", cables(), "links: 0 bodies"),
+        ("<other/>", cables(), "begins with <other>"),
+        ("no xml", cables(), "is not XML"),
+        (BODIES, cables(EXITS[:2]), "2 cables make it planar-2; allowed: planar-3"),
+        (BODIES, cables().replace("<link>0", "<link>1"), "attachments"),
+        (BODIES, cables().replace('"basic"', '"new"', 1), "none is called 'new'"),
+    ],
+)
+def test_a_model_that_cannot_be_imported_is_rejected_with_file_and_element(
+    tmp_path: Path, bodies: str, given: str, reason: str
+) -> None:
+    status, output, path = imported(tmp_path, bodies, given)
+    assert status == 2
+    assert reason in output
+    assert "Traceback" not in output
+    assert not path.exists()
