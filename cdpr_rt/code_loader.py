@@ -1,4 +1,4 @@
-"""Load code of the user's own: from a file, a module, or an installed package."""
+"""Load the user's own code from a file, a module, or an installed package."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ _MOST_BYTES: Final = 1 << 22
 
 
 class CodeError(ControlError):
-    """Code cannot be loaded, or must not run; the message begins with its reference."""
+    """Code cannot be loaded or is not allowed to run; the message begins with its reference."""
 
 
 def load_code(reference: str) -> Any:
-    """Return what "FILE.py:NAME" or "MODULE:NAME" names, an instance if that is a class.
+    """Load the object at "FILE.py:NAME" or "MODULE:NAME"; if it is a class, return an instance.
 
-    This runs the code there. Raises CodeError.
+    Loading runs the code of the file or module. Raises CodeError.
     """
     home, _, name = reference.rpartition(":")
     try:
@@ -34,22 +34,26 @@ def load_code(reference: str) -> Any:
         return _member(import_module(home), name)
     except CodeError:
         raise
-    except (Exception, SystemExit) as error:  # whatever the code there does
+    except (Exception, SystemExit) as error:  # the user's code may raise anything
         raise CodeError(
             f"{reference}: {type(error).__name__}: {error}; give FILE.py:NAME or MODULE:NAME"
         ) from error
 
 
 def load_registered(group: str) -> dict[str, Any]:
-    """Return what installed packages register in a group of entry points, by name, as `load_code`.
+    """Load all objects that installed packages register in a group of entry points.
 
-    Raises CodeError that names the package.
+    Returns them by name; classes are instantiated as in `load_code`. Raises CodeError that names
+    the package.
     """
     return {point.name: _loaded(point) for point in entry_points(group=group)}
 
 
 def load_registered_one(group: str, name: str) -> Any:
-    """Return what an installed package registers under a name, as `load_code`; raises CodeError."""
+    """Load the object that an installed package registers under a name, as `load_code` does.
+
+    Raises CodeError.
+    """
     for point in entry_points(group=group, name=name):
         return _loaded(point)
     raise CodeError(f"{name}: no installed package registers this name in {group!r}")
@@ -70,17 +74,18 @@ def _loaded(point: Any) -> Any:
 
 
 def require_allowed(reference: str, folder: Path, *, allow: bool = False) -> None:
-    """Raise CodeError unless the user has allowed the code of "FILE.py:NAME", FILE from `folder`.
+    """Raise CodeError unless the user has allowed the code of "FILE.py:NAME".
 
-    `allow` allows it from now on, as long as the file keeps its content.
+    FILE is relative to `folder`. `allow` permits the code from now on, as long as the file does not
+    change.
     """
     _allowed_source(reference, folder, allow=allow)
 
 
 def load_allowed(reference: str, folder: Path, *, allow: bool = False) -> Any:
-    """Return what "FILE.py:NAME" names, as `load_code`, from the very bytes that were allowed.
+    """Load the object at "FILE.py:NAME" as `load_code` does, from the allowed bytes only.
 
-    Raises CodeError if they were not, see `require_allowed`.
+    Raises CodeError if the user has not allowed the file's content, see `require_allowed`.
     """
     file, source = _allowed_source(reference, folder, allow=allow)
     try:

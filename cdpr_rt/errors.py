@@ -14,7 +14,7 @@ class TripError(ControlError):
 
 
 class NotInTimeError(TripError):
-    """A device's own procedure took longer than allowed."""
+    """A procedure that runs in the device took longer than allowed."""
 
 
 class InterruptedMotionError(ControlError):

@@ -22,22 +22,23 @@ def jit(function: _F) -> _F:
 
 
 def machine_code_folder() -> Path | None:
-    """Return the folder of this machine's compiled kernels, or None."""
+    """Return the folder with the compiled kernels of this machine; None if there is none."""
     kernel: Any = jit(lambda: None)
     kept = kernel.stats.cache_path
     return None if kept is None else Path(kept)
 
 
 def jit_inlined(function: _F) -> _F:
-    """Return `function` compiled as by `jit`, and put into each kernel that calls it.
+    """Return `function` compiled as by `jit` and inlined into each kernel that calls it.
 
-    For functions that take less time than a call, which passes nine numbers per array.
+    Use it for functions that take less time than the call itself, which passes nine numbers per
+    array.
     """
     return compiled(function, forceinline=True)
 
 
 def jit_unlocked(function: _F) -> _F:
-    """Return `function` compiled as by `jit`; other threads run while it waits for the system."""
+    """Return `function` compiled as by `jit`, without the GIL: other threads run while it waits."""
     return compiled(function, nogil=True)
 
 
@@ -45,9 +46,9 @@ def bound(kernel: Callable[..., _T], *arrays: Any, then: tuple[Any, ...] = ()) -
     """Return the compiled `kernel` with its first arguments fixed.
 
     An ordinary call looks up the machine code for the types of its arguments every time, which
-    costs more than most kernels. Here it is looked up once. `then` has an example of each remaining
-    argument. Later calls do not check types, so an array must have the type and contiguity of its
-    example. Compiles the kernel if necessary.
+    costs more than most kernels. The bound kernel looks it up once. `then` has an example of each
+    remaining argument. Later calls do not check types, so an array must have the type and
+    contiguity of its example. Compiles the kernel if necessary.
     """
     dispatcher: Any = kernel
     type_of: Callable[[Any], Any] = numba.typeof
@@ -56,12 +57,12 @@ def bound(kernel: Callable[..., _T], *arrays: Any, then: tuple[Any, ...] = ()) -
 
 
 def bound_to(bind: Callable[[*_Objects], _F]) -> Callable[[*_Objects], _F]:
-    """Return a function that calls `bind` only if an argument is another object than last time.
+    """Return a function that calls `bind` again only if one of its arguments is a different object.
 
-    For kernels `bound` to the arrays of up to four objects that stay the same from cycle to cycle;
-    otherwise the last result is returned again.
+    If all arguments are the same objects as in the last call, it returns the last result. Use it
+    for kernels `bound` to the arrays of up to four objects that rarely change between cycles.
     """
-    # four names in place of a tuple: this is called several times a cycle
+    # four names are faster than a tuple; this function is called several times a cycle
     last_a: Any = None
     last_b: Any = None
     last_c: Any = None
@@ -80,7 +81,7 @@ def bound_to(bind: Callable[[*_Objects], _F]) -> Callable[[*_Objects], _F]:
 
 @cast(Callable[[Callable[..., Any]], Callable[[int, int, int], None]], intrinsic)
 def copy_bytes(_typing: Any, to: Any, source: Any, size: Any) -> Any:
-    """Within a kernel: copy `size` bytes from the address `source` to the address `to`."""
+    """In a kernel, copy `size` bytes from the address `source` to the address `to`."""
 
     def generate(_context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
         there, here = (builder.inttoptr(address, cgutils.voidptr_t) for address in arguments[:2])

@@ -37,9 +37,9 @@ def load(
 ) -> Model:
     """Return the model of a robot from its name or file. Nothing is started.
 
-    `tension_distribution` replaces the one that the file names. If the file names code,
-    `allow_code` allows it from now on; `Model.tensions` runs it. Raises InvalidRobot if the robot
-    is unknown, if its file cannot be used, or if it has no platform.
+    `tension_distribution` replaces the distribution in the robot's file. If the file names the
+    user's own code, `allow_code` permits that code from now on; `Model.tensions` runs it. Raises
+    InvalidRobot if the robot is unknown, if its file cannot be used, or if it has no platform.
     """
     try:
         profile = load_robot(robot)
@@ -78,7 +78,7 @@ class Model:
         cables: list[str],
         own_distribution: Callable[[], TensionDistribution | None] = lambda: None,
     ) -> None:
-        """Take the platform's model, the names of the cables, and a distribution's loader."""
+        """Take the platform's model, the cable names, and a loader of the distribution."""
         self._model = model
         self._own_distribution = cache(own_distribution)
         self.cables = cables
@@ -111,8 +111,10 @@ class Model:
 
     @property
     def high_N(self) -> FloatArray:
-        """Upper bounds of the tensions, (n,): the limits, or less if the motors' torque is also
-        needed to accelerate the rotors."""
+        """Upper bounds of the tensions, (n,).
+
+        They are the limits, or less if the motors' torque is also needed to accelerate the rotors.
+        """
         return self._model.torque_limited_N.copy()
 
     @property
@@ -122,18 +124,18 @@ class Model:
         return np.array([platform.workspace_min_m, platform.workspace_max_m])
 
     def lengths(self, position: ArrayLike) -> FloatArray:
-        """Return the lengths (..., n), m, of unloaded cables, with the part on their pulleys."""
+        """Return the lengths (..., n), m, of unloaded cables, including the part on the pulleys."""
         kinematics = self._model.kinematics
         rows, shape = self._rows(position)
         lengths = [kinematics.lengths(Pose(pose[0], pose[1:])) for pose in self._model.poses(rows)]
         return np.array(lengths).reshape(*shape, self.n)
 
     def jacobian(self, position: ArrayLike) -> FloatArray:
-        """Return J (..., n, d): the lengths change by J times the twist."""
+        """Return the Jacobian J (..., n, d): the rates of the lengths are J times the twist."""
         return -np.swapaxes(self.wrench_matrix(position), -1, -2)
 
     def wrench_matrix(self, position: ArrayLike) -> FloatArray:
-        """Return W = -J^T (..., d, n): tensions t pull on the platform with the wrench W t.
+        """Return the wrench matrix W = -J^T (..., d, n): tensions t exert the wrench W t.
 
         Tensions and the other wrenches w are in equilibrium if W t + w = 0. The columns are nan if
         an anchor is in its exit point.
@@ -152,7 +154,7 @@ class Model:
     def position(self, lengths_m: ArrayLike, start: ArrayLike | None = None) -> FloatArray:
         """Return the positions (..., d) at which the cables have these lengths (..., n).
 
-        As `pose`, but the controlled directions only.
+        This is `pose` reduced to the controlled directions.
         """
         unturned = Pose(np.zeros(3), self._model.home_pose.Q)
         directions = list(self._model.kinematics.directions)
@@ -170,11 +172,12 @@ class Model:
     ) -> FloatArray:
         """Return the poses (..., 7), x y z w x y z, at which cables have these lengths (..., n).
 
-        Found by least squares from the position `start` (d,), by default home; nan if the search
-        fails. A platform in space on fewer than six cables that do not control its rotation hangs
-        in equilibrium, as the control assumes: then load cells at the winches, `tension_N`
-        (..., n), and an inclinometer, `tilt_rad` (..., 2), make the pose more accurate. That has
-        roll and pitch of the platform's frame, turned by roll about x, pitch about y, yaw about z.
+        A least-squares search starts at the position `start` (d,), by default home. Poses are nan
+        if the search fails. If the cables do not control the rotation of a platform in space, it
+        hangs in equilibrium. Readings of load cells at the winches, `tension_N` (..., n), and of an
+        inclinometer, `tilt_rad` (..., 2), then make the pose more accurate. `tilt_rad` is roll and
+        pitch of the platform's frame, which is turned by roll about x, pitch about y and yaw about
+        z.
         """
         given, poses = self._found(lengths_m, start, tension_N, tilt_rad)
         found = np.full((len(poses), 7), np.nan)
@@ -190,7 +193,7 @@ class Model:
         tension_N: ArrayLike | None = None,
         tilt_rad: ArrayLike | None = None,
     ) -> tuple[FloatArray, list[Pose | None]]:
-        """Return the lengths as an array, and the pose of each row of them, None if not found."""
+        """Return the lengths as an array, and a pose per row, None if the search fails."""
         kinematics = self._model.kinematics
         begin = self._model.pose(self.home if start is None else self._one(start))
         given = self._readings("lengths_m", lengths_m, self.n)
@@ -215,7 +218,7 @@ class Model:
     def _readings(
         self, name: str, given: ArrayLike, size: int, shape: tuple[int, ...] | None = None
     ) -> FloatArray:
-        """Return readings (..., size), or with a `shape` of rows as (m, size)."""
+        """Return sensor readings as an array (..., size), or (m, size) if `shape` is given."""
         values = _numbers(name, given)
         fits = values.ndim > 0 and values.shape[-1] == size and np.isfinite(values).all()
         if not fits or shape not in (None, values.shape[:-1]):
@@ -226,12 +229,13 @@ class Model:
         return values if shape is None else values.reshape(-1, size)
 
     def tensions(self, position: ArrayLike, wrench: ArrayLike | None = None) -> FloatArray:
-        """Return the tensions (..., n), N, at rest by the distribution that the file names.
+        """Return the tensions (..., n), N, at rest, by the distribution of the robot's file.
 
-        `wrench` (d,) or (..., d) acts on the platform besides gravity. Tensions are in the middle
-        of the cables, and keep the controller's reserve from both bounds; nan if none do so.
-        A distribution of your own gets the built-in one's tensions as `previous`. Raises
-        InvalidRobot if code that the file names must not run, and InvalidArgument if it fails.
+        `wrench` (d,) or (..., d) acts on the platform besides gravity. Tensions apply to the middle
+        of each cable. They keep the controller's reserve from both bounds; they are nan if that is
+        impossible. A user-written distribution receives the tensions of the built-in one as
+        `previous`. Raises InvalidRobot if the user has not allowed the code in the file, and
+        InvalidArgument if that code fails.
         """
         rows, shape = self._rows(position)
         acting = np.zeros((len(rows), 6))
@@ -251,10 +255,10 @@ class Model:
         return found.reshape(*shape, self.n)
 
     def capacity_margin(self, position: ArrayLike, acceleration_m_s2: float = 0.0) -> FloatArray:
-        """Return how far all tensions can keep from their bounds, (...), N; below 0: infeasible.
+        """Return the margin of all tensions to their bounds, (...), N; below 0: infeasible.
 
-        With an acceleration it is the least over all combinations of directions. It is -inf if the
-        cables do not control a direction.
+        With an acceleration, it is the smallest margin over all combinations of acceleration
+        directions. It is -inf if the cables do not control a direction.
         """
         rows, shape = self._rows(position)
         if not 0.0 <= acceleration_m_s2 < np.inf:
@@ -263,7 +267,7 @@ class Model:
         return workspace.capacity_margins(self._model.poses(rows)).reshape(shape)
 
     def is_feasible(self, position: ArrayLike, acceleration_m_s2: float = 0.0) -> BoolArray:
-        """Return whether tensions within their bounds hold the platform, (...)."""
+        """Return whether tensions within the bounds can hold the platform, (...)."""
         return np.asarray(self.capacity_margin(position, acceleration_m_s2) >= 0.0)
 
     def _weight_N(self) -> FloatArray:
@@ -300,7 +304,7 @@ class Model:
         return np.asarray(rows[0])
 
     def _rows(self, position: ArrayLike) -> tuple[FloatArray, tuple[int, ...]]:
-        """Return positions as rows (m, d), and the leading shape."""
+        """Return the positions as rows (m, d), and their leading shape."""
         given, k = _numbers("position", position), self._model.positions
         if given.ndim == 0 or given.shape[-1] not in (k, self.d) or not np.isfinite(given).all():
             wanted = f"(..., {k})" + (f" or (..., {self.d})" if self.d > k else "")
@@ -313,7 +317,7 @@ class Model:
 
 
 def _numbers(name: str, given: ArrayLike) -> FloatArray:
-    """Return what was given as an array; raises InvalidArgument."""
+    """Convert the argument `name` to an array; raises InvalidArgument."""
     try:
         return np.asarray(given, float)
     except (TypeError, ValueError):

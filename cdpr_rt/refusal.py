@@ -18,15 +18,15 @@ _PLACE_UNITS: Final = {
 
 
 class RefusalCode(StrEnum):
-    """Reason of a refusal; in brackets its arguments, besides the refused values."""
+    """Reason of a refusal; the arguments of each, besides the refused values, are in brackets."""
 
     NOT_IN_STATE = "not_in_state"
-    """The loop's state does not allow it (`state`, `allowed`: names of states)."""
+    """The loop's state does not allow the command (`state`, `allowed`: names of states)."""
     OUT_OF_RANGE = "out_of_range"
     """A number is out of its bounds (`index` in a list or None, `low`, `high`)."""
     NOT_FEASIBLE = "not_feasible"
-    """The platform cannot be at a place, or on the way to it (`why`; `outside` its workspace;
-    `enter_m`: the nearest place of the workspace, if the platform is outside)."""
+    """The platform cannot hold a position, or cannot get there on a straight way (`why`; `outside`
+    its workspace; `enter_m`: the nearest place of the workspace, if the platform is outside)."""
     NOTHING_LEFT = "nothing_left"
     """There is nothing to continue (`left`: target or path, `instead`: the alternative)."""
     NOT_TIGHT = "not_tight"
@@ -41,7 +41,7 @@ class RefusalCode(StrEnum):
 class CommandRefusal:
     """Why a command was refused, for programs; `str` gives the text for people.
 
-    An error of the loop that is raised with it instead of a text carries it to the reply.
+    The loop raises an error with a refusal instead of a text; the reply then contains the refusal.
     """
 
     code: RefusalCode
@@ -58,7 +58,7 @@ class CommandRefusal:
         return ": ".join(part for part in parts if part)
 
     def reason(self, **others: Any) -> str:
-        """Return the text of the reason; `others` replace arguments."""
+        """Return the reason as text; `others` replace arguments of the same name."""
         arguments = {"numbers": "", "unit": "", "option": "", **self.arguments, **others}
         match self.code:
             case RefusalCode.NOT_IN_STATE:
@@ -88,12 +88,12 @@ class CommandRefusal:
         )
 
     def as_json(self) -> dict[str, Any]:
-        """Return it in the form of the daemon's answers."""
+        """Return the refusal as JSON, as it appears in the daemon's answers."""
         return asdict(self)
 
     @classmethod
     def from_json(cls, value: Any) -> CommandRefusal | None:
-        """Return the refusal in an answer, None for any other answer."""
+        """Return the refusal in an answer; None if the answer is no refusal."""
         try:
             refusal = cls(**{**value, "code": RefusalCode(value["code"])})
         except (TypeError, KeyError, ValueError):
@@ -101,7 +101,7 @@ class CommandRefusal:
         return refusal if refusal._is_sound() else None
 
     def _is_sound(self) -> bool:
-        """Return whether its members have their types, and all arguments of its code are there.
+        """Return whether all members have valid types and no argument of the code is missing.
 
         Further arguments, for example from a newer daemon, do not matter.
         """
@@ -118,7 +118,7 @@ class CommandRefusal:
 
 
 def _in_units_of_places(key: str, value: Any) -> str:
-    """Return a value as text; places in the units that the reasons use."""
+    """Return a value as text; positions are converted to the units of the messages."""
     if key not in _PLACE_UNITS or not isinstance(value, list) or not all(map(_is_number, value)):
         return shown(value)
     factor, unit = _PLACE_UNITS[key]
@@ -150,7 +150,7 @@ _ARGUMENTS: Final[Mapping[RefusalCode, Mapping[str, Callable[[Any], bool]]]] = {
     RefusalCode.NOT_CALIBRATED: {"why": _is_text},
     RefusalCode.BAD_SOURCE: {"why": _is_text, "allowed": _are_texts},
 }
-"""By the code: its arguments, and the check of each."""
+"""The arguments of each code, with a function that checks each of them."""
 
 
 def shown(value: Any) -> str:
@@ -160,6 +160,6 @@ def shown(value: Any) -> str:
 
 
 def refusal_of(error: Exception) -> CommandRefusal | None:
-    """Return the refusal that an error of the loop carries, None if it has only a text."""
+    """Return the refusal in an error of the loop; None if the error has only a text."""
     first = error.args[0] if error.args else None
     return first if isinstance(first, CommandRefusal) else None

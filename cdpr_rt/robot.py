@@ -71,7 +71,7 @@ class Faulted(Error):  # noqa: N818
 
 
 class Backend(Protocol):
-    """Carries out the commands of a `Robot`. All methods raise errors of this module."""
+    """Executes the commands of a `Robot`. All methods raise errors of this module."""
 
     description: Mapping[str, Any]
     """The robot as `GET /description` returns it."""
@@ -79,7 +79,7 @@ class Backend(Protocol):
     """Time between two checks of a motion."""
 
     def command(self, do: str, program: str = "", wanted: Mapping[str, Any] | None = None) -> None:
-        """Send a command and wait for the reply; take the right to move if it needs that."""
+        """Send a command and wait for the reply; take the right to move if the command needs it."""
 
     def status(self) -> dict[str, Any]:
         """Return the present status as `GET /status` does."""
@@ -88,10 +88,10 @@ class Backend(Protocol):
         """Return the present status, at least state, program and its progress; called often."""
 
     def wait(self, seconds: float) -> None:
-        """Let time of the robot pass, s."""
+        """Let this time pass on the robot's clock, s."""
 
     def observe(self, seconds: float) -> Row:
-        """Let time of the robot pass; return the cycles that were seen meanwhile."""
+        """Let this time pass on the robot's clock, s; return the cycles received during it."""
 
     def true_pose(self) -> FloatArray:
         """Return the true pose (7,) of a simulated platform."""
@@ -100,16 +100,16 @@ class Backend(Protocol):
         """Plan the path in a file; return the name of the plan."""
 
     def open_stream(self) -> AbstractContextManager[Callable[[Sequence[float], float], None]]:
-        """Open a set-point stream; yield what sends a position (3,), m, and its scale."""
+        """Open a set-point stream; yield a function that sends a position (3,), m, and a scale."""
 
     def log(self, fields: Sequence[str]) -> Row:
-        """Return these fields of all cycles since the handle was opened."""
+        """Return these fields of all cycles recorded since the handle was opened."""
 
     def inject_fault(self, axis: int, fault: str, value: int | None) -> None:
         """Inject a fault into a simulated drive."""
 
     def end(self) -> None:
-        """Lower the platform, remove the power, and end the robot."""
+        """Lower the platform, remove the power, and end the robot's process."""
 
     def close(self) -> None:
         """Release the robot; idempotent."""
@@ -131,13 +131,13 @@ _REST_RAD, _REST_RAD_S = math.radians(0.5), math.radians(2.0)
 class Log(np.ndarray[Any, np.dtype[np.void]]):
     """Recorded cycles: a structured NumPy array, (cycles,).
 
-    `log["pose"]` is the array of one field, (cycles, 7) here.
+    `log["pose"]` is the array of one field, here of shape (cycles, 7).
     """
 
     axes: tuple[str, ...] = ()
     """Names of the axes, n."""
     _field = ""
-    """The field that these rows belong to, if it is a single one."""
+    """Name of the field if the rows belong to a single one."""
 
     def __array_finalize__(self, other: Any) -> None:
         self.axes = getattr(other, "axes", ())
@@ -147,16 +147,17 @@ class Log(np.ndarray[Any, np.dtype[np.void]]):
         if isinstance(found, Log):
             if isinstance(key, str):
                 found._field = key
-            elif not isinstance(key, tuple) and found.ndim == self.ndim:  # some of its rows
+            elif not isinstance(key, tuple) and found.ndim == self.ndim:  # a selection of rows
                 found._field = self._field
         return found
 
     def to_pandas(self) -> Any:
         """Return a pandas.DataFrame with a column for each scalar, axis and pose coordinate.
 
-        Columns are named as by `cdpr log export`: `time_s`, `tension_N[left]`, `pose[qw]`. The rows
-        of a single field, as `log["pose"]`, give its columns. Raises Error for numbers computed
-        from a log, which have no names, and if pandas is not installed.
+        Columns have the names that `cdpr log export` gives them: `time_s`, `tension_N[left]`,
+        `pose[qw]`. A single field such as `log["pose"]` gives only its own columns. Raises Error if
+        pandas is not installed, and for arrays computed from a log, because they have no column
+        names.
         """
         try:
             import pandas as pd  # noqa: PLC0415
@@ -180,13 +181,13 @@ class Log(np.ndarray[Any, np.dtype[np.void]]):
 class Robot:
     """A robot that a script commands; a context manager.
 
-    `cdpr_rt.simulate`, `cdpr_rt.connect` and `cdpr_rt.run` make one. Lengths are in m, angles in
-    rad, tensions in N, torques in Nm, times in s. n is the number of axes, k the number of
-    coordinates of the platform (2 or 3), c the number of its controlled angles. Motions return
-    when they are done. They raise Refused before anything moves, Faulted if a fault removes the
-    power, and MotionEnded if somebody else ends them. Ctrl-C stops a motion and holds the robot
-    until the `with` block closes the handle. Without such a block, as in a notebook, Ctrl-C in a
-    motion or `wait` lowers the platform and removes the power.
+    `cdpr_rt.simulate`, `cdpr_rt.connect` and `cdpr_rt.run` return a robot. Lengths are in m, angles
+    in rad, tensions in N, torques in Nm, times in s. n is the number of axes, k the number of
+    coordinates of the platform (2 or 3), c the number of its controlled angles. Methods that move
+    the robot return when the motion is done. They raise Refused before anything moves, Faulted if a
+    fault removes the power, and MotionEnded if another client ends the motion. Ctrl-C stops a
+    motion and holds the robot until the `with` block closes the handle. Without such a block, as in
+    a notebook, Ctrl-C in a motion or `wait` lowers the platform and removes the power.
     """
 
     def __init__(self, backend: Backend) -> None:
@@ -197,11 +198,11 @@ class Robot:
         self.axes = tuple(str(axis["name"]) for axis in description["axes"])
         """Names of the axes, n."""
         self.on_status: Callable[[Mapping[str, Any]], object] | None = None
-        """Called with each status while a motion lasts; if it raises, the robot is held."""
+        """Function called with each status during a motion; if it raises, the robot holds."""
         platform = description.get("platform") or {}
         self._k = len(platform.get("home_m", ()))
         self._started = ""
-        """The motion that this handle has started and not ended."""
+        """Name of the program that this handle has started and that is not done yet."""
         self._in_block = False
         """Whether a `with` block closes the handle after a Ctrl-C."""
         self._c = len([name for name in platform.get("controlled", ()) if name in _ANGLES])
@@ -228,7 +229,11 @@ class Robot:
         return f"<Robot {self.name!r}>"
 
     def close(self) -> None:
-        """Release the robot. `simulate` ends it, `connect` holds it, `run` lowers and ends it."""
+        """Release the robot.
+
+        A robot from `simulate` ends, one from `connect` holds its position, and one from `run`
+        lowers its platform and ends.
+        """
         self._backend.close()
 
     # -- state
@@ -274,10 +279,11 @@ class Robot:
 
     @property
     def true_pose(self) -> FloatArray:
-        """True pose of a simulated platform, as `pose`, which the controller does not know.
+        """True pose of a simulated platform, in the format of `pose`.
 
-        For comparison, or to simulate a measuring device. Raises Error if `simulate` has not
-        opened the robot, and InvalidArgument for a robot without a platform.
+        The controller does not know it. Use it for comparison, or to simulate a measuring device.
+        Raises Error if `simulate` has not opened the robot, and InvalidArgument for a robot without
+        a platform.
         """
         return self._backend.true_pose()
 
@@ -333,7 +339,7 @@ class Robot:
     # -- power
 
     def enable(self, program: str = "hold") -> None:
-        """Give the drives power and run a program. No change if they have it already."""
+        """Switch on the drives and run a program. No change if the drives already have power."""
         if self.state != "active":
             self._backend.command("enable", program)
 
@@ -342,7 +348,9 @@ class Robot:
         try:
             self._backend.command("disable")
         except Refused as error:
-            if error.code is not RefusalCode.NOT_IN_STATE:  # in those states there is no power
+            if (
+                error.code is not RefusalCode.NOT_IN_STATE
+            ):  # in other states the power is already off
                 raise
         self._started = ""
 
@@ -357,8 +365,8 @@ class Robot:
     def shut_down(self) -> None:
         """Lower the platform, remove the power, end the robot and close the handle.
 
-        A daemon ends also if the script has not started it. The call returns when it has ended.
-        Raises Error if the power may still be on.
+        This also ends a daemon that the script has not started. The call returns when the daemon
+        has ended. Raises Error if the power may still be on.
         """
         try:
             self._backend.end()
@@ -370,15 +378,15 @@ class Robot:
     def tighten(self, source: str | None = None) -> None:
         """Take up the slack of the cables and find the pose; then the cables hold the platform.
 
-        `source` says where the cable lengths come from: "home" (the platform stands at home),
-        "last" (those of the last stop) or "lengths" (those the loop knows).
+        `source` is the source of the cable lengths: "home" (the platform stands at home), "last"
+        (lengths of the last stop) or "lengths" (lengths that the loop already knows).
         """
         self.run("tighten", **({} if source is None else {"from": source}))
 
     def lower(self, *, blind: bool = False) -> None:
         """Lower the platform onto its stand; the power stays on.
 
-        With `blind` every winch pays out its cable, without a measured pose.
+        With `blind`, every winch pays out its cable without using a measured pose.
         """
         self.run("lower", **({"blind": True} if blind else {}))
 
@@ -392,9 +400,9 @@ class Robot:
     ) -> None:
         """Move the platform to a position (k,) and a rotation (c,) on a straight line.
 
-        `rotation_rad` is the rotation vector from the orientation at home. Omitted coordinates keep
-        their values. `speed_m_s` is the top speed, by default that of the robot's file. With
-        `wait=False` the call returns immediately; `wait_until_done` waits for the end.
+        `rotation_rad` is the rotation vector from the orientation at home. An omitted position or
+        rotation stays unchanged. `speed_m_s` is the top speed, by default that of the robot's file.
+        With `wait=False` the call returns immediately; `wait_until_done` waits for the end.
         """
         position = self._vector("position_m", position_m, self._k, "coordinate, in m")
         rotation = self._vector("rotation_rad", rotation_rad, self._c, "controlled angle, in rad")
@@ -414,11 +422,10 @@ class Robot:
         speed_m_s: float | None = None,
         wait: bool = True,
     ) -> None:
-        """Move the platform by a distance (k,) and a turn (c,), from its target or present
-        position.
+        """Move the platform by a distance (k,) and a rotation (c,) from its target or position.
 
-        `frame` is "room" or "platform": the axes along which and about which it moves. The rest is
-        as in `move_to`.
+        The axes of the motion are those of `frame`, "room" or "platform". All else is as in
+        `move_to`.
         """
         distance = self._vector("distance_m", distance_m, self._k, "coordinate, in m")
         turn = self._vector("turn_rad", turn_rad, self._c, "controlled angle, in rad")
@@ -497,14 +504,14 @@ class Robot:
                 self._settle("jog")
         self.hold()
 
-    # -- any motion
+    # -- motion of any robot
 
     def follow(self, path: str | Path) -> None:
-        """Plan and follow the path in a file of way points (.toml, .csv) or G-code in the room.
+        """Plan and follow the path in a file: way points (.toml, .csv) or G-code, in the room.
 
         The whole path is planned before anything moves. The call also returns when the path waits;
-        `resume` continues it. Raises Refused if the robot cannot follow the path (with the line),
-        or if the path needs more than one plan.
+        `resume` continues it. Raises Refused if the path needs more than one plan, or if the robot
+        cannot follow it; the message then gives the line.
         """
         file = Path(path)
         if not file.is_file():
@@ -513,12 +520,13 @@ class Robot:
 
     @contextmanager
     def stream(self, scale: float = 1.0) -> Iterator[Callable[[ArrayLike], None]]:
-        """Follow a hand within the block, then hold; yield a function that takes its position.
+        """Follow an input device within the block, then hold; yield a function for its position.
 
-        Call it 30 to 60 times a second with (k,) coordinates in m, and `wait` in between. The
-        platform moves as the hand does from its first position on, `scale` times as far. It stops
-        if no position arrives for 0.5 s. Without a platform the coordinates are lengths that the
-        first winches, three at most, pay out. Raises Refused if the daemon has no stream.
+        Call the function 30 to 60 times a second with (k,) coordinates in m, and `wait` in between.
+        The platform copies the motion from the first position on, multiplied by `scale`. It stops
+        if no position arrives for 0.5 s. If the robot has no platform, the coordinates are the
+        cable lengths that the first winches, at most three, pay out. Raises Refused if the daemon
+        has no stream.
         """
         factor, k = _positive("scale", scale), self._k or min(3, len(self.axes))
         assert factor is not None  # it was given
@@ -536,7 +544,7 @@ class Robot:
     def run(self, program: str, /, **arguments: Any) -> None:
         """Run a program with its arguments until it is done; `hold` and `idle` return immediately.
 
-        Programs and arguments are those of the reference page "Programs".
+        The reference page "Programs" lists the programs and their arguments.
         """
         self._carry_out(program, arguments)
 
@@ -546,11 +554,11 @@ class Robot:
         self._started = ""
 
     def resume(self) -> None:
-        """Continue to the target, or along the path, that a hold interrupted."""
+        """Continue the motion or path that a hold interrupted."""
         self.run("path" if self._progress().get("path") else "pose", resume=True)
 
     def wait(self, seconds: float) -> None:
-        """Let time of the robot pass, s. Raises Faulted if a fault removes the power meanwhile."""
+        """Let this time pass on the robot's clock, s; raises Faulted if a fault removes power."""
         if not math.isfinite(seconds) or seconds < 0.0:
             raise InvalidArgument(f"seconds: {seconds!r}; allowed: a number from 0")
         with _HeldOnError(self):
@@ -560,7 +568,7 @@ class Robot:
                 self._require_power(powered, self._look())
 
     def observe(self, seconds: float) -> Row:
-        """Let time pass as `wait`; return the cycles received meanwhile, (cycles,), at least two.
+        """Wait as `wait` does; return the cycles received meanwhile, (cycles,), at least two.
 
         A daemon sends some 50 per second, with only `time_s`, `position_rad`, `cable_length_m` and
         `tension_N`.
@@ -584,7 +592,7 @@ class Robot:
             warnings.warn(str(trouble), RuntimeWarning, stacklevel=4)
 
     def inject_fault(self, axis: str | int, fault: str, value: int | None = None) -> None:
-        """Inject a fault into a simulated axis, given by name or index from 0, or "mend" it.
+        """Inject a fault into a simulated axis, given by name or index from 0; "mend" repairs it.
 
         Faults and values are those of `cdpr sim fault`, such as "drive-fault" and "cut-cable".
         """
@@ -598,7 +606,9 @@ class Robot:
     # -- helpers
 
     def _carry_out(self, program: str, wanted: Mapping[str, Any], wait: bool = True) -> None:
-        with _HeldOnError(self, Refused, InvalidArgument):  # the wait has a guard for these
+        with _HeldOnError(
+            self, Refused, InvalidArgument
+        ):  # `wait_until_done` handles the other errors
             self._start(program, wanted)
             if wait:
                 self.wait_until_done()
@@ -620,7 +630,7 @@ class Robot:
         return np.array([_number(axis.get(field)) for axis in self.status["axes"]], float)
 
     def _running(self, program: str) -> dict[str, Any]:
-        """Return the progress of a program; raises Faulted and MotionEnded if it has ended."""
+        """Return the progress of a program; raises Faulted or MotionEnded if it has ended."""
         status = self._look()
         if status["state"] != "active" or status["reacting"] != "none":
             raise self._fault(status)
@@ -652,7 +662,7 @@ class Robot:
             self._running(program)
 
     def _fault(self, status: Mapping[str, Any]) -> Error:
-        """Return the error of a robot that has lost its power, after its reaction has ended."""
+        """Wait until the reaction to a fault has ended; return the error to raise."""
         self._started = ""
         most_s = _REACTION_S + float(self.description.get("lowering_s", 0.0))
         waited_s = 0.0
@@ -675,7 +685,7 @@ class Robot:
     def _vector(
         self, name: str, value: ArrayLike | None, size: int, each: str, optional: bool = False
     ) -> list[float | None] | None:
-        """Return numbers as a list, nan as None if `optional`; raises InvalidArgument."""
+        """Return numbers as a list, with None for nan if `optional`; raises InvalidArgument."""
         if value is None:
             return None
         try:
@@ -701,8 +711,8 @@ class _HeldOnError:
     """Holds the robot if an error, such as a Ctrl-C, leaves the block during a motion.
 
     After a Ctrl-C outside a `with` block nothing would close the handle, so the power is removed.
-    Errors of the types `but` are ignored. If a fault or another client has ended the motion,
-    nothing is held.
+    Errors of the types `but` do not hold the robot. Nor do errors after a fault or another client
+    has ended the motion.
     """
 
     def __init__(self, robot: Robot, *but: type[Error]) -> None:
@@ -732,7 +742,7 @@ def end_text(status: Mapping[str, Any]) -> str:
 
 
 def is_done(progress: Mapping[str, Any]) -> bool:
-    """Whether a program is at its end: a sweep after its last leg, a path also when it waits."""
+    """Whether a program is done: a sweep after its last leg, a path also while it waits."""
     if path := progress.get("path"):
         over = progress.get("done") == 1.0 and path.get("time_s") == path.get("duration_s")
         return over or path.get("waiting") in _STANDS
@@ -740,7 +750,7 @@ def is_done(progress: Mapping[str, Any]) -> bool:
 
 
 def is_at_rest(axis: Mapping[str, Any]) -> bool:
-    """Whether a motor stands at its set-point, according to its part of a status."""
+    """Whether a motor has stopped at its set-point, according to the axis's part of a status."""
     angle, speed = _number(axis.get("position_rad")), _number(axis.get("velocity_rad_s"))
     off = abs(angle - _number(axis.get("setpoint_rad")))
     return not (off > _REST_RAD or abs(speed) > _REST_RAD_S)

@@ -14,14 +14,14 @@ from cdpr_profiles.errors import FileMissingError, ProfileError
 from cdpr_profiles.user_folders import state_folder
 from cdpr_rt.errors import ControlError
 
-# Files that the programs write for themselves: only their user needs access.
+# These files are private to the programs: only the user who runs them needs access.
 
 FILE_MODE: Final = 0o600
 FOLDER_MODE: Final = 0o700
 
 
 def make_private_folder(folder: Path) -> None:
-    """Make a folder for this user only, and its missing parents; raises OSError."""
+    """Create a folder that only this user can access, and its missing parents; raises OSError."""
     missing = [one for one in (folder, *folder.parents) if not one.exists()]
     for one in reversed(missing):
         one.mkdir(mode=FOLDER_MODE, exist_ok=True)
@@ -37,7 +37,7 @@ class StateFileError(ControlError):
 def state_path(kind: str, name: str) -> Path:
     """Return the file that keeps the state of `kind` for `name`.
 
-    It lies in $XDG_STATE_HOME/cdpr-rt, by default ~/.local/state/cdpr-rt.
+    The file is in $XDG_STATE_HOME/cdpr-rt, by default ~/.local/state/cdpr-rt.
     """
     safe = re.sub(r"[^A-Za-z0-9_.-]", "-", name)
     return state_folder() / f"{kind}.{safe}.json"
