@@ -22,7 +22,7 @@ def jit(function: _F) -> _F:
 
 
 def machine_code_folder() -> Path | None:
-    """Return the folder with the compiled kernels of this machine; None if there is none."""
+    """Return the folder with the compiled kernels of this machine, or None if there is no cache."""
     kernel: Any = jit(lambda: None)
     kept = kernel.stats.cache_path
     return None if kept is None else Path(kept)
