@@ -56,8 +56,6 @@ def import_calibration(
     table = read_any(cables)
     measured = _read_poses(table if poses == cables else read_any(poses), mapping.pose)
     time, lengths, tensions = _read_cables(table, mapping, len(robot.axes))
-    if tensions is None and PoseReading.model_fields["tension_N"].is_required():
-        raise BadInputError(f"{mapping_path}: cables.tensions: is missing; allowed: one a cable")
     row = _rows(time, measured.time_s, mapping)
     if row.size < _FEWEST:
         raise BadInputError(
@@ -114,8 +112,7 @@ def _reading(
     if turned is not None:
         values["rotation"] = tuple(map(tuple, turned.as_matrix().tolist()))
         values["rotation_std_rad"] = float(np.radians(columns.rotation_std_deg))
-    known = PoseReading.model_fields
-    return PoseReading.model_validate({key: v for key, v in values.items() if key in known})
+    return PoseReading.model_validate(values)
 
 
 def _read_cables(
