@@ -83,7 +83,7 @@ def state_of(statusword: int) -> State:
 
 
 POWER_OFF: Final = (State.NOT_READY, State.SWITCH_ON_DISABLED, State.READY, State.FAULT)
-"""States in which the power stage is off; "switched on" may have voltage."""
+"""States in which the power stage is off; in "switched on" it may have voltage."""
 
 TARGETS: Final = (
     State.SWITCH_ON_DISABLED,
@@ -98,7 +98,7 @@ TARGETS: Final = (
 def _next_word(target: State, state: State) -> int:
     """Return the controlword of one step from `state` towards `target`; CiA 402-2, transitions."""
     if target == State.SWITCH_ON_DISABLED or state not in TARGETS:
-        return DISABLE_VOLTAGE  # also the answer to a fault, so that bit 7 has a rising edge later
+        return DISABLE_VOLTAGE  # also in a fault, so that bit 7 has a rising edge later
     if target == State.QUICK_STOP:
         stopping = state in (State.OPERATION_ENABLED, State.QUICK_STOP)
         return QUICK_STOP_COMMAND if stopping else DISABLE_VOLTAGE

@@ -10,7 +10,8 @@ from cdpr_profiles import DriveProfile
 _OF_RATED = {"per_mille_of_rated": 1e-3, "percent_of_rated": 1e-2}
 _ABSOLUTE_Nm = {"mNm": 1e-3, "cNm": 1e-2}
 _SAME_TORQUE = 0.5
-"""The units of 6076h differ by 1000, so that even another motor's torque shows which is meant."""
+"""Relative tolerance for matching torques. It may be large, because the units of 6076h differ by
+a factor of 1000."""
 _RATED_Nm = {"mNm": 1e-3, "uNm": 1e-6}
 _RAD_S_PER_RPM = math.tau / 60.0
 
@@ -27,7 +28,7 @@ def rated_torque_unit_Nm(drive: DriveProfile) -> float:
 
 
 def suspected_unit(drive: DriveProfile, shown_Nm: float, expected_Nm: float) -> str:
-    """Return the unit of 6076h with which a drive shows the expected torque; "" if none does."""
+    """Return the unit of 6076h in which a drive reports the expected torque; "" if none fits."""
     shown = shown_Nm / rated_torque_unit_Nm(drive)
     return next(
         (

@@ -21,7 +21,7 @@ from cdpr_rt.core.fault import Fault
 
 _STOP_TIMEOUT_S = 1.0
 _SHORTEST_SLEEP_S = 5e-5
-"""Shorter waits are done by the sockets."""
+"""Shorter waits are left to the timeouts of the sockets."""
 _RISE, _FALL = 0.1, 0.995
 
 
@@ -40,12 +40,12 @@ class BusAxes:
 class AxisBuses:
     """n axes on several buses; implements `cdpr_rt.core.exchange.AxisDevice` as `AxisGroup` does.
 
-    If the axes are numbered bus by bus, the arrays of each bus are slices of the whole and
-    nothing is copied; otherwise their values are copied once a cycle. A failure on one bus does
-    not keep the others from being exchanged, or from being switched off at the end.
+    If the axes are numbered bus by bus, the arrays of each bus are slices of the whole and nothing
+    is copied; otherwise their values are copied once a cycle. If one bus fails, the loop still
+    exchanges the others, and switches them off at the end.
 
-    Raises BusError if some buses keep time in lockstep and some do not, and DriverError for a PDO
-    map that does not support torque control.
+    Raises BusError if only some of the buses run in lockstep, and DriverError for a PDO map that
+    does not support torque control.
     """
 
     def __init__(self, buses: Sequence[BusAxes], period_s: float) -> None:
@@ -220,7 +220,7 @@ class AxisBuses:
             group.stop_cycling()
 
     def tolerate_silence(self, cycles: int) -> None:
-        """Bridge this number of cycles without an answer; see `AxisGroup.tolerate_silence`."""
+        """Tolerate this many cycles without an answer; see `AxisGroup.tolerate_silence`."""
         for group in self.groups:
             group.tolerate_silence(cycles)
 
@@ -252,7 +252,7 @@ class AxisBuses:
             group.acknowledge_fault()
 
     def switch_off_lost(self) -> None:
-        """Start to cut the power of drives that do not follow the cycle; see `AxisGroup`."""
+        """Start to cut the power of drives that do not follow; see `AxisGroup.switch_off_lost`."""
         for group in self.groups:
             group.switch_off_lost()
 
@@ -272,7 +272,7 @@ class AxisBuses:
         return all(group.mode_confirmed() for group in self.groups)
 
     def unconfirmed_mode(self) -> ModeRefusedError:
-        """Return the error that names the first axis whose mode is not the requested one."""
+        """Return the error that names the first axis that is not in its requested mode."""
         groups = (group for group in self.groups if not group.mode_confirmed())
         return next(groups, self.groups[0]).unconfirmed_mode()
 
@@ -290,7 +290,7 @@ class AxisBuses:
     def close(self) -> str:
         """Remove torque and power from the drives of all buses; a second call does nothing.
 
-        Returns which drives have not confirmed that their power stage is off; else an empty text.
+        Returns, as text, the drives that have not confirmed that their power stage is off, or "".
         """
         if self._closed:
             return ""
@@ -298,7 +298,8 @@ class AxisBuses:
         try:
             self._stop_together()
         finally:
-            # those with power last: they may take seconds, while the others' heartbeats continue
+            # close powered groups last: that may take seconds, in which the others' heartbeats
+            # continue
             unconfirmed = [group.close() for group in sorted(self.groups, key=_has_power)]
         return "; ".join(text for text in unconfirmed if text)
 
@@ -319,7 +320,7 @@ class AxisBuses:
             self.clock.run_tasks()
             if not self.lockstep:
                 self.clock.sleep(self.period_s)
-            elif live:  # the time of a bus whose group has dropped out would stand still
+            elif live:  # a bus whose group has dropped out still needs somebody to advance its time
                 live[0].let_other_buses_follow()
 
 
@@ -401,9 +402,9 @@ class AnswerWait:
             self._clock.sleep_until(until_s)
 
     def learn(self, took_s: float, too_early: bool) -> None:
-        """Adapt to the time that all answers took and to whether some were late after the sleep."""
+        """Adapt to the time of the last answer; `too_early` if the sleep ended before it."""
         if too_early:
             took_s = min(took_s, self._most_s)
             self._expected_s += _RISE * (took_s - self._expected_s)
-        else:  # they may have arrived earlier, which only an earlier wake-up can show
+        else:  # the answers may have come earlier; only an earlier wake-up can show that
             self._expected_s *= _FALL

@@ -1,7 +1,7 @@
 """Compiled kernels between CAN frames and arrays over axes.
 
-The state of a group is in a few two-dimensional arrays, one row per quantity and one column per
-axis, because every array passed to a kernel costs time in each cycle. The names below are the rows.
+The state of a group is in a few two-dimensional arrays, because every array passed to a kernel
+costs time in each cycle. A row is a quantity, named below; a column is an axis.
 """
 
 from __future__ import annotations
@@ -98,7 +98,7 @@ _CYCLE_OVER = 1 << 62
 """Bit of TPDOS_RECEIVED from the end of a cycle to the next SYNC."""
 _MEMORY_CYCLES = 64.0
 _FAIR_SHARE, _WORST_SHARE = 0.05, 0.4
-"""Share of cycles without exactly one answer above which the rate is bad, or the loop trips."""
+"""Limits of the share of cycles without exactly one answer: the rate is bad; the loop trips."""
 _MOST_EXTRA_FRAMES = 400
 
 
@@ -144,7 +144,7 @@ def decode(
         # byte 3 holds the flags of extended, remote and error frames
         identifier = np.int64(frame[0]) | np.int64(frame[1]) << 8
         known = identifier <= 0x7FF and not frame[2] and not frame[3]
-        slot = identifier if known else 0  # the slot of no axis
+        slot = identifier if known else 0  # this slot belongs to no axis
         i, kind = slots[slot, 0], slots[slot, 1]
         if i < 0 or kind >= EMCY:
             others[0] += 1
@@ -197,7 +197,7 @@ def _take_tpdo(
             continue
         start = fields[i, k, 2]
         if start + size > frame[4]:
-            return 0  # shorter than it was configured
+            return 0  # the frame is shorter than configured
         field = fields[i, k, 1]
         ints[field, i] = _number(frame, _DATA + start, size, fields[i, k, 4])
         fields_came |= 1 << field

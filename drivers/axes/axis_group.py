@@ -48,7 +48,7 @@ NO_MODE = -1000
 """Requested mode of an axis for which no mode was requested."""
 
 _PACED_SILENT_CYCLES = 3
-# a heartbeat late by most of a period is lost: CAN repeats disturbed frames automatically
+# a heartbeat that is late by most of a period was not sent: CAN repeats disturbed frames itself
 _HEARTBEAT_TIMEOUT_PERIODS = 1.75
 
 # maximum for one drive; a bus of 1 Mbit/s carries about 9000 frames a second in total
@@ -59,8 +59,8 @@ class StateArrays:
     """State of n axes as arrays: the rows named in `axis_codec`, one column per axis."""
 
     def __init__(self, n: int) -> None:
-        # one column is unused: so these arrays are strided like views of some axes, and kernels are
-        # compiled once for both
+        # the extra column gives these arrays the strides of a view of some axes, so that kernels
+        # are compiled for one memory layout only
         self.ints: Ints = np.zeros((codec.INT_ROWS, n + 1), np.int64)[:, :n]
         self.floats: FloatArray = np.zeros((codec.FLOAT_ROWS, n + 1))[:, :n]
         self.flags: BoolArray = np.zeros((codec.FLAG_ROWS, n + 1), np.bool_)[:, :n]
@@ -101,7 +101,7 @@ class StateArrays:
         ints[codec.TARGET] = State.SWITCH_ON_DISABLED
         ints[codec.STATE] = State.UNKNOWN
         ints[codec.MODE_REQUESTED] = NO_MODE
-        # in lockstep, time stands still until the wait for the answer is given up
+        # in lockstep, bus time stands still until the wait for the answer ends
         ints[codec.SILENCE_LIMIT] = 1 if lockstep else _PACED_SILENT_CYCLES
         for i, axis in enumerate(axes):
             floats[codec.RAD_PER_COUNT, i] = axis.rad_per_count
@@ -118,7 +118,7 @@ class StateArrays:
 # Faults of a group of axes, derived from their alarm bits.
 
 _MASTER_LOST_CODES = (0x8130, 0x8250)
-"""EMCY codes of a drive that misses the master's heartbeat or commands."""
+"""EMCY codes of a drive that misses the master's heartbeat or its commands."""
 
 
 def axis_faults(axes: Sequence[AxisConfig], ints: Ints) -> tuple[Fault, ...]:
@@ -134,7 +134,8 @@ def _axis_fault(axis: AxisConfig, i: int, column: Ints) -> Fault:
     nmt = int(column[codec.NMT_STATE])
     code, _, meaning = error.partition(" ")
     if bits & codec.SILENT and int(column[codec.EMERGENCY]) in _MASTER_LOST_CODES:
-        # while the cycle waits for an answer it sends nothing: a missing master is not the cause
+        # the cycle sends nothing while it waits for an answer, so the drive reports a missing
+        # master: a consequence of the silence, not its cause
         bits &= ~codec.EMERGENCY_MESSAGE
     state, none = int(column[codec.STATE]), math.nan
     modes = f"{mode_name(displayed)}, not {mode_name(requested)}"
@@ -162,13 +163,13 @@ def _axis_fault(axis: AxisConfig, i: int, column: Ints) -> Fault:
 # The cyclic exchange of n axes on one bus: SYNC out, feedback in, commands out.
 
 _SYNC_ID = 0x080
-# if another process leads the lockstep: wall time for the first answer, because the simulator may
-# be delayed; for the last answer, less than bus time stands still; if one was missing last time
+# wall time, if another process leads the lockstep: for the first answer, because the simulator may
+# be delayed; for the last answer, shorter than bus time stands still; after a cycle that missed one
 _ANSWER_TIMEOUT_S, _PARTIAL_ANSWER_TIMEOUT_S, _REPEATED_TIMEOUT_S = 2.0, 0.4, 0.02
 _PACED_SHARE = 0.75
 _POWER_OFF_TIMEOUT_S = 1.0
 _LOST_TIMEOUT_S = 0.1
-"""Timeout of the single SDO answer of a lost drive, which may be pulling meanwhile."""
+"""Timeout for the answer of a lost drive to an SDO; short, because the drive may be pulling."""
 
 
 def has_deadline(axis: AxisConfig) -> bool:
@@ -210,7 +211,7 @@ class AxisGroup:
         self._commands = self._port.batch(self._layout.rpdos)
         self._others = np.zeros(len(self._reader.frames.rows) + 1, np.int64)
         self._sync_frame = FRAME.pack(_SYNC_ID, 0, bytes(8))
-        # measured by the bus clock: delayed cycles are fewer cycles, not slower heartbeats
+        # bus time, not a number of cycles: delayed cycles must not delay the heartbeat
         self._heartbeat_every_s = network.heartbeat_s - 0.5 * period_s
         self._heartbeat_at_s = 0.0
         self._cycling = self._closed = False
@@ -239,7 +240,8 @@ class AxisGroup:
         self._seen = state.ints[codec.TPDOS_RECEIVED]
         network.set_extra_filters(self._layout.identifiers)
         layout, rows = self._layout, (state.ints, state.floats)
-        # bind and thereby compile here: a first cycle that takes seconds would be a silent master
+        # bind, and thereby compile, here: a first cycle that takes seconds would look like a lost
+        # master
         self._decode = bound(
             codec.decode, self._reader.frames.bytes, layout.slots, layout.fields, STATE_TABLE,
             *rows, state.words, state.flags, self._others, then=(0,),
@@ -270,7 +272,7 @@ class AxisGroup:
     def sync_ahead(self) -> None:
         """Send the SYNC of the next cycle now, for a caller that sends nothing else before it.
 
-        Only in a cycle, on a bus whose time this process leads: the answers wait.
+        Call it only within a cycle, on a bus whose time this process leads: there the answers wait.
         """
         self._send_sync()
         self._synced_ahead = True
@@ -385,7 +387,7 @@ class AxisGroup:
         return int(self._ints[codec.REPEATED].sum())
 
     def _begin_cycling(self) -> None:
-        """Take over the master's heartbeat and forget frames received while no cycles ran."""
+        """Take over the master's heartbeat; forget frames that arrived while no cycles ran."""
         self.network.hand_heartbeat_to_cycle()
         self._heartbeat_at_s = 0.0  # the last one between cycles may be a whole period old
         for axis in self.axes:
@@ -394,7 +396,8 @@ class AxisGroup:
         self._reader.settle()
         for i, axis in enumerate(self.axes):
             if axis.node_id in self.network.restarted:
-                # while no cycles ran, and permanently: only a new boot makes the index usable again
+                # the drive has restarted while no cycles ran: only a new boot makes its index
+                # usable again
                 self._flags[codec.INDEX_KNOWN, i] = False
                 self._ints[codec.ALARM, i] |= codec.RESTARTED
         self._ints[codec.HEARTBEAT_AGE] = 0
@@ -428,7 +431,7 @@ class AxisGroup:
         self._end_cycling()
 
     def tolerate_silence(self, cycles: int) -> None:
-        """Bridge this number of consecutive cycles without an answer; in lockstep bridge none."""
+        """Tolerate this many consecutive cycles without an answer; in lockstep, none."""
         if not self.lockstep:
             self._ints[codec.SILENCE_LIMIT] = cycles + 1
 
@@ -500,7 +503,7 @@ class AxisGroup:
             if self._ints[codec.STATE, i] in POWER_OFF:
                 continue
             self._switching_off.add(node)
-            self.network.cancel(node)  # an unanswered transfer would come first
+            self.network.cancel(node)  # otherwise the next transfer waits for an unanswered one
             self.clock.start(partial(self._take_power, node))
 
     def _take_power(self, node: int) -> None:
@@ -520,8 +523,8 @@ class AxisGroup:
         """Request a mode of operation, one for all axes or one each.
 
         `mode_confirmed` reports when they have it. Raises ModeRefusedError if an axis is enabled
-        or lacks its mode, which changes nothing, or if a drive refuses, with its
-        reason; then no axis can be enabled until a mode is requested again.
+        or lacks its mode; then nothing has changed. Raises it with the drive's reason if a drive
+        refuses; then no axis can be enabled until a mode is requested again.
         """
         requested = [modes] * self.n if isinstance(modes, int) else list(modes)
         for i, (axis, mode) in enumerate(zip(self.axes, requested, strict=True)):
@@ -563,7 +566,7 @@ class AxisGroup:
         return bool(np.all(self._ints[codec.MODE_DISPLAYED] == self._ints[codec.MODE_REQUESTED]))
 
     def unconfirmed_mode(self) -> ModeRefusedError:
-        """Return the error that names the first axis whose mode is not the requested one."""
+        """Return the error that names the first axis that is not in its requested mode."""
         displayed, requested = self._ints[codec.MODE_DISPLAYED], self._ints[codec.MODE_REQUESTED]
         i = int(np.flatnonzero(displayed != requested)[0])
         label = self.axes[i].label
@@ -610,9 +613,10 @@ class AxisGroup:
     def close(self) -> str:
         """Remove torque and power from the drives and end the cycles; a second call does nothing.
 
-        The cycle does it first; a drive that does not follow is commanded by SDO, then reset as the
-        last resort. Returns which drives have not confirmed that their power stage is off, else an
-        empty text. A lost bus is no error here: its drives miss the master's heartbeat and stop.
+        The cycles switch the drives off first. A drive that does not follow gets the commands by
+        SDO, and a reset as the last resort. Returns the drives that have not confirmed that their
+        power stage is off, as text; "" if all have. Raises nothing for a lost bus: its drives miss
+        the master's heartbeat and stop.
         """
         if self._closed:
             return ""

@@ -48,7 +48,7 @@ class AxisConfig:
     counts_per_turn: int
     """608Fh, or the winch's value if the drive has none."""
     supported_modes: int
-    """6502h, or the profile's modes instead."""
+    """6502h; the profile's modes if the drive has no 6502h."""
     torque_limit_Nm: float
     name: str = ""
     """Name in messages beside its node id; may be empty."""
@@ -176,7 +176,7 @@ class GroupLayout:
 
 
 def _feedback_tpdos(drive: DriveProfile) -> dict[int, int]:
-    """Return which TPDO, by its place in the profile, answers every SYNC with each object."""
+    """Return for each object the TPDO that carries it after every SYNC, by place in the profile."""
     found: dict[int, int] = {}
     for index in _EVERY_CYCLE:
         for number, pdo in enumerate(drive.tpdos):
@@ -192,9 +192,10 @@ def _feedback_tpdos(drive: DriveProfile) -> dict[int, int]:
 
 
 def _command_rpdos(drive: DriveProfile) -> list[Pdo]:
-    """Return the RPDOs that carry controlword and target torque, and otherwise only gaps.
+    """Return the RPDOs that carry controlword and target torque, and nothing else but gaps.
 
-    Other objects in them, such as mode of operation or torque limit, would become 0 each cycle.
+    Any other object in them, such as mode of operation or torque limit, would be set to 0 each
+    cycle.
     """
     found: dict[int, Pdo] = {}
     for index in _RPDO_FIELDS:

@@ -24,18 +24,18 @@ from cdpr_rt.core.fault import Fault
 _SYNC_ID = 0x080
 _SYNC_HEAD = bytes([_SYNC_ID, 0, 0, 0])
 _SYNC_WAIT_S = 0.05
-"""Longest wait of one cycle for a SYNC; then it ends without."""
+"""Longest wait for SYNC; after it the cycle ends without one."""
 _PAUSE_S = 0.5
 """After this time without a SYNC, the next one clears the alarms."""
 _ANSWER_SHARE = 1.0
 _LOCKSTEP_ANSWER_S = 0.2
 _SETTLE_SHARE = 0.25
-"""Share of a period after a cycle's answers: by then its SYNC has arrived on all buses."""
+"""Time after a cycle's answers until its SYNC is on all buses, as a share of the period."""
 _LOCKSTEP_SETTLE_S = 0.005
 _MOST_CYCLES_AHEAD = 8
 _FRAMES_PER_AXIS, _SPARE_FRAMES = 8, 64
 _OTHER_MASTERS_ALARMS = codec.WRONG_MODE | codec.LEFT_ENABLED
-"""Alarms about states and modes, which here the other master commands; ignored here."""
+"""Alarms about states and modes; ignored, because the other master commands them."""
 
 
 @dataclass(frozen=True)
@@ -140,13 +140,13 @@ class ListeningDevice:
         return answered
 
     def _align_buses(self) -> None:
-        """Skip a cycle of those buses that stay ahead of others, which have lost a cycle.
+        """Skip a cycle on the buses that stay ahead because the others have lost one.
 
-        Only after several cycles, because SYNC does not arrive on all buses at the same instant.
+        It waits for several cycles, because SYNC does not arrive on all buses at the same instant.
         """
         deadline_s = self.clock.now_s + self._settle_s
         ahead = [monitor for monitor in self._monitors if monitor.sync_waiting(deadline_s)]
-        if 0 < len(ahead) < len(self._monitors):  # it may have arrived at that very time
+        if 0 < len(ahead) < len(self._monitors):  # the other SYNCs may just be arriving
             deadline_s = self.clock.now_s + self._settle_s
             ahead = [monitor for monitor in self._monitors if monitor.sync_waiting(deadline_s)]
         self._cycles_ahead += 1 if 0 < len(ahead) < len(self._monitors) else -1
@@ -157,7 +157,7 @@ class ListeningDevice:
                 monitor.skip_cycle()
 
     def sync_ahead(self) -> None:
-        """Send nothing: the SYNC is the other master's."""
+        """Send nothing: the other master sends SYNC."""
 
     def transmit(self) -> None:
         """Send nothing, regardless of `command`."""
@@ -242,7 +242,7 @@ class _BusMonitor:
         self._port.drain()
 
     def _compile(self) -> None:
-        """Compile the kernels before a cycle could be late because of it."""
+        """Compile the kernels now, so that no cycle is late because of it."""
         self._decode(0)
         self.end_cycle()
         self.ints[codec.MISSED] = self.ints[codec.SILENT_CYCLES] = 0
@@ -289,9 +289,9 @@ class _BusMonitor:
         return answered
 
     def _listen(self, deadline: float) -> bool:
-        """Receive frames until a SYNC (true), the last expected answer, or `deadline` (false).
+        """Receive frames until SYNC or `deadline`; return whether SYNC arrived.
 
-        While answers are expected, their arrival also ends the wait.
+        If answers are expected, the last of them also ends the wait.
         """
         recv_into, rows = self._port.recv_into, self._rx.rows
         awaited = self._missing > 0

@@ -39,7 +39,7 @@ def open_port(
         return open_simbus(url, filters, health)
     if url.interface == "socketcan":
         return open_socketcan(url, filters, health, receive_errors=receive_errors)
-    # imported here: python-can loads slowly, and simulated buses do without
+    # imported here: python-can loads slowly, and simulated buses do not need it
     from cdpr_drivers.bus.adapters import AdapterPort  # noqa: PLC0415
 
     return AdapterPort(url, filters, health, receive_errors=receive_errors)

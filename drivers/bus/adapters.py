@@ -162,7 +162,8 @@ class SharedAdapter:
 
     def _run(self) -> None:
         with contextlib.suppress(PermissionError):
-            # it waits and copies; a cycle that depends on it must not wait for ordinary processes
+            # the thread only waits and copies, but cycles need it: ordinary processes must not
+            # delay it
             os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(_PRIORITY))
         try:
             while not self._stopping:

@@ -27,7 +27,7 @@ def worst_case_bits(n: int) -> int:
 
 
 def bare_bits(n: int) -> int:
-    """Return the bits of such a frame without stuff bits."""
+    """Return the number of bits of a frame with `n` data bytes, without stuff bits."""
     return 8 * n + 47
 
 
@@ -46,11 +46,11 @@ class BusBudget:
     commands_s: float
     """Part of the cycle that the master sends, without SYNC."""
     heartbeat_share: float
-    """Share of the wire used by heartbeats (and by PDOs limited by their own times)."""
+    """Share of the wire used by heartbeats and by PDOs with an inhibit time or event timer."""
     changes_s: float
-    """PDOs that drives send on a change, all at the same time; they wait for gaps."""
+    """Time of the PDOs that drives send on a change, if all send together; they wait for gaps."""
     longest_wait_s: float
-    """Longest time that SYNC may wait for a frame that has begun."""
+    """Longest time that SYNC may wait for the end of another frame."""
 
     @property
     def margin_s(self) -> float:

@@ -33,7 +33,7 @@ EFF_FLAG, RTR_FLAG = 0x80000000, 0x40000000
 EFF_MASK, SFF_MASK = 0x1FFFFFFF, 0x7FF
 
 HEAD_BYTES = 24
-"""Size of the head of a packet of the simulated bus that has several frames."""
+"""Size of the header of a packet of the simulated bus with several frames."""
 BUFFER_BYTES = 1 << 21
 SEND_TIMEOUT_S = 1.0
 """Time that `send` waits for room before it raises."""
@@ -55,13 +55,13 @@ def passes(can_id: int, filters: Filters | None) -> bool:
 class FrameBuffer:
     """Buffer of `n` frames: an array of bytes, a structured one and `n` views of the same memory.
 
-    The memory before the frames has room for the head of a packet that contains all of them.
+    The memory before the frames has room for the header of a packet that contains all of them.
     """
 
     def __init__(self, n: int) -> None:
         memory = np.zeros(HEAD_BYTES + n * FRAME_BYTES, np.uint8)
         self.packet: memoryview = memoryview(memory.data)
-        """Head and frames."""
+        """Header and frames."""
         self.bytes: NDArray[np.uint8] = memory[HEAD_BYTES:].reshape(n, FRAME_BYTES)
         """Shape (n, 16)."""
         self.rows: list[memoryview] = [memoryview(row.data) for row in self.bytes]
@@ -209,13 +209,13 @@ _errno: Any = types.ExternalFunction("__errno_location", _INT_POINTER())
 
 @jit_unlocked
 def _send_all(descriptor: int, messages: int, n: int) -> int:
-    """Return how many were sent, or a negative number."""
+    """Send `n` messages; return how many were sent, or a negative number."""
     return int(_send(descriptor, messages, n, 0))
 
 
 @jit_unlocked
 def _receive_all(descriptor: int, messages: int, n: int, flags: int) -> int:
-    """Return how many have arrived, or -errno."""
+    """Receive up to `n` messages; return how many have arrived, or -errno."""
     came = _receive(descriptor, messages, n, flags, 0)
     return int(came if came >= 0 else -_errno()[0])
 

@@ -180,7 +180,7 @@ class _PacketBatch(KernelBatch):
 
 
 class SimulatedBus(FrameReader):
-    """A simulated bus that this process leads; `docs/reference/wire.md` has the packets.
+    """A simulated bus that this process leads; `docs/reference/wire.md` describes the packets.
 
     Frames arrive in the order of the bus, up to the time that the bus has reported. So a delay of
     this process or of the bus changes no result. `on_failure` is called once when the bus is lost.
@@ -222,7 +222,7 @@ class SimulatedBus(FrameReader):
     def receive_until_time(self) -> bool:
         """Process all frames up to the next time packet; return whether there were any.
 
-        A time packet follows the answers to each SYNC and each `go`, and carries the last of them.
+        A time packet ends the answers to each SYNC and each `go`; it also carries the last of them.
         Raises BusError.
         """
         packet, came = self.frames.packet, False
@@ -257,7 +257,7 @@ class SimulatedBus(FrameReader):
             self.port.set_filters([])
 
     def release(self) -> None:
-        """Stop leading: the bus' time stands until another client sends on the bus."""
+        """Stop leading: bus time stands still until another client sends on the bus."""
         with contextlib.suppress(OSError):
             self.port.send(control_message({"lead": False}))
         self.port.close()
@@ -305,7 +305,7 @@ class SimulatedBusClock(LockstepClock):
             time.sleep(_LOST_S)
 
     def close(self) -> None:
-        """Stop leading, in order; if this process died, bus time would run with wall time."""
+        """Stop leading in order; if this process just died, bus time would run with wall time."""
         super().close()
         self.sleep(_LAST_S)
         for bus in self._by_url.values():

@@ -117,7 +117,7 @@ class SlcanAdapter:
         return None
 
     def _fetch(self, timeout_s: float) -> bytes:
-        """Return the bytes that arrive within the time, or b""; raises OSError at the end."""
+        """Return the bytes that arrive in time, or b""; raises OSError if the port is lost."""
         return self._read() if select.select([self._fd], [], [], timeout_s)[0] else b""
 
     def _read(self) -> bytes:

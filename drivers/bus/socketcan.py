@@ -35,7 +35,8 @@ class SocketCanPort(FramePort):
     def arrival_s(self) -> float:
         """Return the kernel's time stamp of the last frame taken, seconds since 1970.
 
-        It is read per frame and on request, so that a cycle that does not need it has no cost.
+        The stamp is read only on request, so that a cycle that does not need it does not pay for
+        it.
         """
         try:
             stamp = fcntl.ioctl(self._sock, _SIOCGSTAMPNS, bytes(_TIMESPEC.size))
@@ -60,7 +61,7 @@ class SocketCanPort(FramePort):
         return super().lost(error)
 
     def _send_retrying(self, frame: Bytes) -> int:
-        """Send; if the interface's transmit queue is full, wait, as CAN does not block then."""
+        """Send; wait while the transmit queue is full, because a CAN socket does not block then."""
         attempts = _TRIES
         while True:
             try:
@@ -102,7 +103,7 @@ def open_socketcan(
     try:
         _enlarge_buffer(sock)
         with contextlib.suppress(OSError):
-            # fails because no frame has arrived, but the kernel stamps frames from now on
+            # this call fails because no frame has arrived, but the kernel stamps frames from now on
             fcntl.ioctl(sock, _SIOCGSTAMPNS, bytes(_TIMESPEC.size))
         port = SocketCanPort(url, sock, health)
         if filters is not None:

@@ -26,7 +26,7 @@ _OPTIONS = ("host", "port", "lockstep")
 _ANSWER_S = 5.0
 _READ_BYTES = 1 << 16
 _LONGEST_MESSAGE = 4096
-# a peer that falls silent permanently (power, cable) is given up after about 3 s
+# a peer that stays silent (power or cable lost) counts as gone after about 3 s
 _KEEPALIVE = (
     (socket.TCP_KEEPIDLE, 1),
     (socket.TCP_KEEPINTVL, 1),
@@ -37,7 +37,7 @@ _MESSAGE = re.compile(rb"<([^<>]*)>")
 
 
 class SocketcandAdapter:
-    """A connection to a socketcand server; unlike python-can's client, it reports its end."""
+    """A connection to a socketcand server; unlike python-can's client, it reports when it ends."""
 
     def __init__(self, url: BusUrl) -> None:
         """Connect and enter raw mode; raises BusError."""

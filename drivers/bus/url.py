@@ -47,7 +47,7 @@ class BusUrl:
         options = _options(text, query)
         if interface == "simbus":
             return cls(interface, _simbus_name(text, rest, options))
-        # imported here: it loads slowly, and simulated buses do without
+        # imported here: it loads slowly, and simulated buses do not need it
         import can  # noqa: PLC0415
 
         if interface not in can.VALID_INTERFACES:
@@ -141,9 +141,9 @@ _CREDENTIALS = struct.Struct("iII")
 class MasterLock:
     """The right of this process to command the nodes on `url`, until `close` or process end.
 
-    It is an abstract socket, so that a killed process leaves nothing behind. Programs in
-    containers with their own network, and on other machines, do not see it; boot listens
-    for those. Raises BusError, with the other process, if another one has the lock.
+    It is an abstract socket, so that a killed process leaves nothing behind. Masters in
+    containers with their own network and on other machines do not see it; boot listens for
+    their frames. Raises BusError, which names the other process, if another one has the lock.
     """
 
     def __init__(self, url: BusUrl) -> None:
@@ -182,7 +182,7 @@ def _taken(url: BusUrl) -> str:
         except ConnectionRefusedError:
             return ""
         except OSError:
-            return "another process runs the drives on this bus"  # and accepts no more connections
+            return "another process runs the drives on this bus"  # its lock takes no more callers
         credentials = caller.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, _CREDENTIALS.size)
     pid, _, _ = _CREDENTIALS.unpack(credentials)
     return f"process {pid}{_command_of(pid)} runs the drives on this bus; end that process first"
@@ -198,7 +198,7 @@ def _command_of(pid: int) -> str:
 
 
 def _address(url: BusUrl) -> str:
-    """Return the lock's name: the same for all spellings of a bus that is one wire here."""
+    """Return the lock's name, the same for all URLs of one physical bus of this machine."""
     channel = url.channel
     if channel.startswith("/"):
         channel = str(Path(channel).resolve())

@@ -27,7 +27,7 @@ class Image:
     time_s: float
     """When the image arrived, by the clock given to the camera."""
     device_time_s: float | None
-    """By the camera's own clock, if it has one; bus time for a simulated camera."""
+    """When the image was taken, by the camera's clock, if any; bus time for a simulated camera."""
     name: str
     """Name of the image for messages: a file name, or a number."""
 
@@ -57,7 +57,7 @@ class Camera(ABC):
 
 
 def grey(pixels: NDArray[np.uint8], name: str) -> NDArray[np.uint8]:
-    """Return an image's grey levels (height, width); raises CameraError for another kind.
+    """Return an image's grey levels (height, width); raises CameraError for other kinds of images.
 
     Colours blue, green, red are weighted 0.114, 0.587 and 0.299 (ITU-R BT.601).
     """

@@ -22,7 +22,7 @@ from cdpr_profiles.errors import ProfileError
 from cdpr_rt.core.clock import Clock
 
 _READ = cv2.IMREAD_GRAYSCALE | cv2.IMREAD_ANYDEPTH | cv2.IMREAD_IGNORE_ORIENTATION
-"""In sensor orientation: intrinsics belong to the sensor, however a telephone was held."""
+"""Read in sensor orientation, to which the intrinsics belong, even if a phone was rotated."""
 _DEPTHS = 8, 10, 12, 14, 16
 """Possible bits of a grey level in 16-bit files."""
 _SINGLE = 99.99
@@ -78,7 +78,7 @@ class FolderCamera(Camera):
     def _bits(self) -> int:
         """Bits in use in 16-bit files: the brightest image of the folder decides for all.
 
-        With a separate depth, a dark image would become as bright as the others.
+        If each image had its own depth, a dark image would become as bright as the others.
         """
         top = 0
         for path in self.files:
@@ -109,7 +109,7 @@ def decoded_image(path: Path) -> NDArray[Any]:
 
 
 def _require_size(data: bytes, path: Path) -> None:
-    """Raise CameraError if the header of an image, the only part read here, gives too many pixels.
+    """Read the header of an image; raise CameraError if the image has too many pixels.
 
     OpenCV cannot read only the header. Pillow is installed with Matplotlib.
     """

@@ -27,8 +27,8 @@ _TO_GREY = {
     "RGB8": cv2.COLOR_RGB2GRAY, "BGR8": cv2.COLOR_BGR2GRAY,
     "RGBa8": cv2.COLOR_RGBA2GRAY, "BGRa8": cv2.COLOR_BGRA2GRAY,
 }  # fmt: skip
-"""By the names of the Pixel Format Naming Convention; Bayer formats by the first colours of the
-first row."""
+"""Conversion by format name (Pixel Format Naming Convention), which for Bayer formats contains the
+first colours of the first row."""
 
 
 class GenicamCamera(Camera):
@@ -82,7 +82,7 @@ class GenicamCamera(Camera):
             nodes.TriggerSelector.value = "FrameStart"
             nodes.TriggerSource.value = "Software"
             nodes.TriggerMode.value = "On"
-        except Exception:  # a camera without a trigger runs freely
+        except Exception:  # a camera without a trigger stays free-running
             return False
         return True
 

@@ -152,8 +152,8 @@ def boot_all(
     whose stored configuration differs is commanded to store this one (1010h). `bitrate_bit_s` is
     that of the bus; its load is computed from it.
 
-    After all have ended, raises the BootError of the lowest node id that failed, with the others'
-    as notes (and which node floods the bus, if that is the likely cause), and BusError.
+    Waits for all, then raises the BootError of the lowest node id that failed. Notes list the other
+    errors, and the node that floods the bus if that is the likely cause. Raises BusError.
     """
     _refuse_second_master(network, drives)
     network.clear_alarm()
@@ -383,7 +383,7 @@ class _NodeBoot:
             increments, turns = self._counts_per_turn()
             if 0x6502 in self._dictionary:
                 report.supported_modes = self._read_int(0x6502)
-            # a drive without the object, or with 0 in it, announces nothing
+            # if the drive lacks 6502h, or reports 0 there, the profile's modes apply
             report.supported_modes = report.supported_modes or mode_bits(
                 self._profile.supported_modes
             )
@@ -404,7 +404,7 @@ class _NodeBoot:
         self._check_rated_torque(report.rated_torque_Nm)
 
     def _check_velocity_unit(self, shown: int) -> None:
-        """Compare the unit that the drive shows in 60A9h, 0 for none, with the profile's."""
+        """Compare the unit that the drive reports in 60A9h, 0 for none, with the profile's."""
         unit, assumed = VELOCITY_UNITS.get(shown), self._profile.velocity_unit
         if not shown or unit == assumed:
             return

@@ -72,9 +72,12 @@ class Configuration:
     """Objects that the master would set but the drive's EDS does not have."""
 
     def concise_dcf(self) -> bytes:
-        """Return it as the DOMAIN of 1F22h (CiA 302): count, then index, sub, size, data of each.
+        """Return the configuration as the DOMAIN of 1F22h (CiA 302): count, then the entries.
 
-        All numbers are little-endian (U32; U16, U8, U32).
+        An entry has index (U16), sub-index (U8), size (U32) and data. All numbers are
+        little-endian; the count has 32 bits.
+
+
         """
         parts = [_HEAD.pack(e.index, e.sub, len(e.data)) + e.data for e in self.entries]
         return _COUNT.pack(len(parts)) + b"".join(parts)
@@ -82,8 +85,8 @@ class Configuration:
     def stamp(self) -> Stamp:
         """Return the expected configuration date and time (1F26h, 1F27h).
 
-        It is derived from the content: if two configurations differ in a byte, their stamps differ,
-        and the master needs no memory.
+        It is derived from the content: if two configurations differ in a byte, their stamps differ.
+        So the master need not remember what it has written.
         """
         digest = hashlib.sha256(self.concise_dcf()).digest()
         days, ms = struct.unpack_from("<II", digest)
@@ -115,7 +118,7 @@ def is_pdo(block: tuple[DcfEntry, ...]) -> bool:
 
 
 def is_application(block: tuple[DcfEntry, ...]) -> bool:
-    """Return whether a block is of the application, which no communication reset restores."""
+    """Return whether a block has application objects, which no communication reset restores."""
     return block[0].index >= _APPLICATION
 
 
@@ -171,7 +174,7 @@ class _Builder:
         return found
 
     def is_fixed(self, index: int, sub: int) -> bool:
-        """Return whether the EDS has the object, but does not let it be written."""
+        """Return whether the EDS has the object, but does not allow writing it."""
         return self.has(index, sub) and not self.variable(index, sub).writable
 
     def put(self, index: int, sub: int, value: int) -> None:
@@ -259,7 +262,7 @@ def make_configuration(
     build.put(0x605A, 0, _SLOW_DOWN_THEN_OFF)
     for index, value in torque_settings(profile, rated_torque_Nm, settings.torque_limit_Nm):
         build.put(index, 0, value)
-    build.put(0x60B2, 0, 0)  # a torque offset from earlier would be added to every torque
+    build.put(0x60B2, 0, 0)  # an earlier torque offset would be added to every torque
     for pdos, first in ((profile.rpdos, _RPDO), (profile.tpdos, _TPDO)):
         used = {first + pdo.number - 1: pdo for pdo in pdos}
         for parameters in range(first, first + _PDOS):
@@ -335,8 +338,10 @@ def _write_block(network: CanNetwork, node_id: int, block: Block, changed: list[
 
 
 def _found(network: CanNetwork, node_id: int, index: int, sub: int) -> int | None:
-    """Return an object's value; None if it does not exist: in some drives the mapping has
-    entries only up to the number in sub-index 0."""
+    """Return an object's value; None if it does not exist.
+
+    In some drives, the mapping has only as many entries as sub-index 0 says.
+    """
     try:
         return network.read_int(node_id, index, sub)
     except SdoAbortError as error:

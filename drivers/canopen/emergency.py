@@ -12,7 +12,7 @@ LENGTH = 8
 _LAYOUT = struct.Struct("<HB5s")
 _KEPT = 256
 _FLOOD, _FLOOD_WINDOW_S = 100, 1.0
-"""More messages of one node within the window than this are a flood."""
+"""More messages than this from one node within the window are a flood."""
 _REGISTER_BITS = (
     "generic",
     "current",
@@ -50,7 +50,7 @@ class Emergency:
 
     @property
     def is_reset(self) -> bool:
-        """Whether it reports that an error is gone (error codes 00xxh)."""
+        """Whether the message reports that an error has cleared (error codes 00xxh)."""
         return not self.code >> 8
 
     @property
@@ -88,7 +88,7 @@ class EmergencyLog:
         self._recent: dict[int, tuple[float, int]] = {}
 
     def add(self, emergency: Emergency) -> str:
-        """Store a message; if too many came, return how many and the last; else ""."""
+        """Store a message; in a flood, return their number and the last one as text, else ""."""
         self.kept.append(emergency)
         standing = self._standing.setdefault(emergency.node_id, {})
         if not emergency.is_reset:

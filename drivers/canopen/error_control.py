@@ -23,7 +23,7 @@ def nmt_name(state: int) -> str:
 
 
 _TIMEOUT_PERIODS = 1.75
-"""A heartbeat late by most of a period is lost: CAN repeats disturbed frames automatically."""
+"""A heartbeat late by most of a period was not sent: CAN repeats disturbed frames itself."""
 
 
 class _Node:
@@ -120,7 +120,7 @@ class ErrorControl:
     def wait_for_boot_up(self, node_id: int, timeout_s: float) -> bool:
         """Wait for a node's boot-ups; return whether it has booted since `expect_reset`.
 
-        Boot-ups that do not come in time are not expected any more.
+        If the boot-ups do not come in time, they are no longer expected.
         """
         node = self._nodes[node_id]
         until_s = self._clock.now_s + timeout_s
@@ -150,7 +150,7 @@ class ErrorControl:
     def look_for_losses(self) -> None:
         """Raise the alarm for nodes whose heartbeat is overdue, once each.
 
-        Call it only if no message waits: otherwise a busy master would take nodes for lost.
+        Call it only if no message waits: otherwise a delayed master would report nodes as lost.
         """
         now = self._clock.now_s
         for node in self._nodes.values():

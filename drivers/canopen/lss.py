@@ -1,7 +1,7 @@
 """LSS master of CiA 305: find drives by their identity, set their node id and bit rate.
 
 The `canopen` package's master is not used, because it accepts any frame as the answer to the last
-request: with several drives without a node id its fastscan can assemble an identity that none
+request: with several drives without a node id, its fastscan can assemble an identity that none
 of them has. It also waits 0.2 s for each number of an address and drops the error codes.
 """
 
@@ -51,7 +51,7 @@ __all__ = [
 UNCONFIGURED = 255
 """Node id of a device without one."""
 NODE_ID_UNKNOWN = 0
-"""Node id of a device that does not report it, such as early ones."""
+"""Node id of a device that does not report it; early devices do not."""
 
 BITRATE_INDEX = {
     1_000_000: 0,
@@ -84,7 +84,7 @@ _NO_ANSWER = {
     "the bit rate with the maker's tool, and the node id without --bitrate",
     _STORE: "the device does not answer to the request to store its settings",
 }
-"""Problems with a device that answered before, by the request that it leaves unanswered."""
+"""Problems with a device that has answered before, by the request that it does not answer."""
 
 _SEARCHES = 4
 _ALL = (0, 0xFFFFFFFF)
@@ -112,15 +112,15 @@ class LssAddress:
 class LssMaster(BusMember):
     """LSS on one bus; a context manager that leaves every device in the waiting state.
 
-    `timeout_s` is the longest time that a device may take to answer. Silence is also an answer
-    (fastscan asks bit by bit), so it also determines the duration of a search. Raises BusError if
-    the bus cannot be opened, or is lost later.
+    `timeout_s` is the longest time that a device may take to answer. It also determines the
+    duration of a search, because fastscan asks bit by bit and no answer is a valid answer. Raises
+    BusError if the bus cannot be opened, or is lost later.
     """
 
     def __init__(self, url: BusUrl, clock: Clock, timeout_s: float = 0.1) -> None:
         self.timeout_s = timeout_s
         self.hides_others = False
-        """Whether a device of the last fastscan answered to everything, which hides others."""
+        """Whether a device found by the last fastscan answers every request and so hides others."""
         self._frames: deque[tuple[int, bytes]] = deque(maxlen=_MOST_WAITING)
         self._lost: BusError | None = None
         self._clients: dict[int, SdoClient] = {}
@@ -153,7 +153,7 @@ class LssMaster(BusMember):
         self._answering.discard(node_id)
         with suppress(SdoAbortError, SdoTimeoutError):
             self._upload(node_id, 0x1000)
-        if node_id in self._answering:  # whichever node it answers
+        if node_id in self._answering:  # even if it answers another node
             return "it answers to SDO"
         deadline = self.clock.now_s + listen_s
         while (frame := self._receive(deadline)) is not None:
@@ -222,7 +222,7 @@ class LssMaster(BusMember):
         return answers
 
     def _receive(self, deadline: float) -> tuple[int, bytes] | None:
-        """Return the next frame, even one that waits after the deadline; None without one."""
+        """Return the next frame, even one that waits after the deadline; None if no frame waits."""
         if deadline - self.clock.now_s < -_LONGEST_DRAIN_S:
             return None  # otherwise a babbling node would block this loop
         self.poll()
@@ -252,7 +252,7 @@ class LssMaster(BusMember):
     # -- searching
 
     def release(self) -> None:
-        """Return all devices to the waiting state; one with its first node id boots now."""
+        """Return all devices to the waiting state; one that got its first node id boots now."""
         self._send(bytes([_SWITCH_GLOBAL, _WAITING]))
 
     def has_unconfigured(self) -> bool:
@@ -285,7 +285,7 @@ class LssMaster(BusMember):
     ) -> list[LssAddress]:
         """Return the devices of one type, with a node id or without, in inclusive ranges.
 
-        `usual_revision` is tried first, which saves a search for each device that has it.
+        `usual_revision` is tried first: each device that has it needs no search for its revision.
         """
         kind = vendor_id, product_code
         found = []
@@ -361,15 +361,16 @@ class LssMaster(BusMember):
     def _fastscan_all(self) -> set[LssAddress] | None:
         """Return the devices found by repeated fastscans; None if a scan does not complete.
 
-        A device is in the configuration state once it is found, and then takes no part by CiA 305.
-        Devices with the CANopenNode stack answer every request in that state, until they have a
-        node id and are released. They hide the devices that are not found yet.
+        A device is in the configuration state once it is found; CiA 305 then excludes it from
+        fastscans. But devices with the CANopenNode stack answer every request in that state, until
+        they have a node id and are released. They hide the devices that are not found yet.
         """
         self.release()
         self.hides_others = False
         found: set[LssAddress] = set()
         while self._scan(0, _FROM_THE_START, 0, 0):
-            # every waiting device expects the first number now, so none may answer to the last
+            # every waiting device now expects the first number, so none may answer a request for
+            # the last
             self.hides_others = bool(found) and self._scan(0, 31, 3, 3)
             if self.hides_others:
                 break

@@ -46,7 +46,7 @@ class BusMember(ABC):
         self.url = url
         self.clock = clock
         self.health = BusHealth()
-        """State of the wire by the controller's error frames."""
+        """State of the wire according to the controller's error frames."""
         self.reader = self._open(filters)
         self.reader.take = self.take
         self.reader.on_failure = self._lose
@@ -58,7 +58,7 @@ class BusMember(ABC):
         if led is None:
             return FrameReader(open_port(self.url, filters, self.health, receive_errors=True))
         led.set_filters(filters)
-        led.settle()  # discards frames still in transit
+        led.settle()  # discards frames that were sent before
         return led
 
     # -- as a source of the clock
@@ -75,8 +75,8 @@ class BusMember(ABC):
             self._lose(error)
             return True
 
-    def tick(self, now_s: float) -> float:  # noqa: ARG002  # nothing is due without a call
-        """Return that no event is ever due."""
+    def tick(self, now_s: float) -> float:  # noqa: ARG002  # no event is ever scheduled
+        """Return infinity: no event is ever scheduled."""
         return math.inf
 
     def _lose(self, error: BusError) -> None:
@@ -110,7 +110,7 @@ class BusMember(ABC):
             raise self.reader.lost(error) from error
 
     def close(self) -> None:
-        """Leave the bus; a lost bus is no error here, nor is a second call."""
+        """Leave the bus; a lost bus or a second call is no error."""
         self.clock.remove(self)
         self.reader.close()
 
@@ -135,20 +135,21 @@ _LOOK_S = 0.1
 _LOCKSTEP_SLACK_S = 1.0
 """Slack for heartbeats if another process leads the bus in lockstep: its time may stand still."""
 _FEWEST_SYNCS = 2
-"""A single SYNC may be the last one of a master that has just ended."""
+"""SYNCs that prove a master; a single one may be the last of a master that has just ended."""
 _FEWEST_UNEXPECTED = 3
 _MOST_BOOT_UPS = 4
 _OPERATIONAL_DATA = bytes([nmt.OPERATIONAL])
 _LATE_ANSWERS_S = 0.05
-"""Wait for a second device, which may be slower than the first."""
+"""Wait for the answer of a second device, which may be slower than the first."""
 
 
 class CanNetwork(BusMember):
     """Acyclic side of a CANopen master on one bus; all its waits use `clock`.
 
     While no cycles run and a task waits, it sends the master's heartbeat and monitors the nodes'.
-    `hand_heartbeat_to_cycle` hands both duties to the cycle: then a hung loop sends no heartbeat
-    and the drives stop. It has the only port on the bus, so a cycle reads through `reader` too.
+    `hand_heartbeat_to_cycle` hands both duties to the cycle: if the loop then hangs, no heartbeat
+    is sent and the drives stop. It has the only port on the bus, so a cycle reads through `reader`
+    too.
     Raises BusError if the bus cannot be opened.
 
     In tasks, SDO transfers to different nodes run in parallel. Their errors name node, object and
@@ -302,7 +303,7 @@ class CanNetwork(BusMember):
     # -- sent frames
 
     def reset_communication(self, node_id: int, timeout_s: float, boot_ups: int = 1) -> bool:
-        """Reset the node's communication; return whether its boot-up message came in time.
+        """Reset the node's communication; return whether its boot-up message arrived in time.
 
         `boot_ups` is how often the drive sends that message. Raises BusError.
         """
@@ -317,7 +318,8 @@ class CanNetwork(BusMember):
         `usual_boot_ups` is how often one such drive sends its boot-up message.
         """
         boot_ups = self._errors.boot_ups_since_reset(node_id)
-        # more boot-ups are the heartbeats of a device that stays in NMT state initialising
+        # a device that stays in NMT state initialising sends heartbeats that look like more
+        # boot-ups
         if usual_boot_ups < boot_ups <= _MOST_BOOT_UPS:
             return f"two devices have this node id: {boot_ups} boot-up messages followed one reset"
         unexpected = self.clients[node_id].await_unexpected(_LATE_ANSWERS_S)
@@ -329,7 +331,7 @@ class CanNetwork(BusMember):
         return ""
 
     def start(self, node_id: int, heartbeat_s: float = 0.0) -> None:
-        """Command the node to operational, and monitor that it stays so; raises BusError.
+        """Command the node to operational, and monitor that it stays there; raises BusError.
 
         `heartbeat_s` is the period of its heartbeat; its loss between cycles then raises an alarm.
         """
@@ -369,7 +371,7 @@ class CanNetwork(BusMember):
         """Release a node: without power it no longer needs to monitor the master's heartbeat.
 
         Otherwise it would report the missing heartbeat to the next master. Best effort; a node that
-        may still have power continues to monitor, so that it stops without a master.
+        may still have power continues to monitor, so that it stops if no master is there.
         """
         self._errors.release(node_id)
         try:
@@ -399,11 +401,11 @@ class CanNetwork(BusMember):
     # -- heartbeat of the master
 
     def hand_heartbeat_to_cycle(self) -> None:
-        """Hand the master's heartbeat to the cycle, so that it stops with a hung cycle."""
+        """Hand the master's heartbeat to the cycle, so that it ends if the cycle hangs."""
         self.cycling = True
 
     def release_cycle(self) -> None:
-        """Take over from the cycle the master's heartbeat and the monitoring of the nodes."""
+        """Take the master's heartbeat and the monitoring of the nodes back from the cycle."""
         self._errors.restart_watch()
         if self.cycling:
             self.cycling = False
@@ -411,7 +413,7 @@ class CanNetwork(BusMember):
 
     def start_heartbeat(self) -> None:
         """Start the master's heartbeat; the drives monitor it from the first one on."""
-        # twice as often as configured: a master that computes for a while misses some
+        # twice as often as configured, because a master that computes for a while misses some
         self._heartbeat_at_s = self.clock.now_s + 0.5 * self.heartbeat_s
         try:
             self.send_frame(self.heartbeat_frame)

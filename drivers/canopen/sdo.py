@@ -90,7 +90,7 @@ class SdoClient:
 
     If several tasks transfer, each waits until the previous transfer has ended.
 
-    An answer to no request (a duplicate, another client's, a second device's) is
+    An answer without a request (a duplicate, another client's, a second device's) is
     discarded and counted. Uploads and downloads raise SdoAbortError, SdoTimeoutError,
     SdoCancelledError and BusError, all without naming node and object.
     """
@@ -136,7 +136,7 @@ class SdoClient:
     def upload(self, index: int, sub: int, timeout_s: float, *, block: bool = False) -> bytes:
         """Return the data of an object; `timeout_s` applies to each answer.
 
-        With `block` a node may answer with many segments at a time; a node that cannot is read in
+        With `block` a node may answer with many segments at a time; if it cannot, it is read in
         single segments.
         """
         with self._transfer(index, sub, timeout_s):
@@ -208,7 +208,7 @@ class SdoClient:
         return bytes(data)
 
     def _block(self, data: bytearray) -> tuple[int, bool]:
-        """Process the segments of one block; return how many arrived in order, and if the last did.
+        """Process the segments of a block; return how many came in order, and whether the last did.
 
         Segments after a lost one are discarded: the node sends them again.
         """
@@ -282,7 +282,7 @@ class SdoClient:
             return None
         frame = self._answers.popleft()
         code = abort_code(frame)
-        # some nodes do not name the object
+        # some nodes leave out index and sub-index
         if code is not None and frame[1:4] in (self._multiplexer, bytes(3)):
             raise SdoAbortError(code)
         return frame

@@ -23,7 +23,7 @@ class Frame(NamedTuple):
     remote: bool = False
     error: bool = False
     length: int = 0
-    """Length that a remote frame requests; 0 in others."""
+    """Length that a remote frame requests; 0 in other frames."""
 
     @classmethod
     def unpack(cls, time_s: float, packet: bytes | bytearray) -> Frame:
@@ -117,7 +117,7 @@ def parse_line(text: str) -> LogEntry:
 def read_log(name: str, lines: Iterable[str]) -> Iterator[LogEntry]:
     """Yield the frames of a log file; skip empty lines and comments.
 
-    A last line without line end, left by an interrupted logger, is ignored.
+    Ignore a last line without line end, which an interrupted logger leaves.
 
     Raises:
         LogError: a line is not a candump line; the message has `name` and the line's number.

@@ -41,7 +41,7 @@ _BASES = {"RPDO": (0x1400, 0x1600), "TPDO": (0x1800, 0x1A00)}
 
 @dataclass
 class PdoView:
-    """One PDO of a node, as far as known."""
+    """What is known about one PDO of a node."""
 
     node: NodeView
     kind: str
@@ -59,7 +59,7 @@ class PdoView:
         for position in range(1, (self.count or 0) + 1):
             entry = self.entries.get(position)
             if entry is None or entry & 7:
-                # the position of values after an unknown entry is unknown
+                # without its length, the position of the values that follow is unknown
                 return values, f"entry {position} of the map not known: {_hex(data[start:])}"
             end = start + (entry & 0xFF) // 8
             if end > len(data):
@@ -91,7 +91,7 @@ class PdoTable:
             self._by_id[pdo.cob_id(node.node_id)] = view
 
     def at(self, identifier: int, node: NodeView) -> PdoView | None:
-        """Return the PDO with this identifier, from the predefined connection set if unknown.
+        """Return the PDO with this identifier; if unknown, that of the predefined connection set.
 
         `node` is the owner of the identifier in that set.
         """

@@ -21,14 +21,14 @@ class Step(Enum):
     ANNOUNCE = auto()
     """The server announces a value of `size` bytes."""
     VALUE = auto()
-    """The server has delivered the end of a value; `data` is all of it if all was seen."""
+    """The server has sent the end of a value; `data` is the whole value if no part was missed."""
     WRITTEN = auto()
     """The server has confirmed a write; `data` is the written value if it was seen."""
     SEGMENT = auto()
     CONTROL = auto()
     ABORT = auto()
     UNEXPECTED = auto()
-    """It does not belong to the transfer, as far as that was seen."""
+    """The frame does not belong to the transfer, as far as that was seen."""
 
 
 @dataclass(frozen=True)
@@ -112,7 +112,7 @@ class SdoDecoder:
         self._transfer, self._streams = None, ""
 
     def _announced(self, step: Step, data: bytes, size_bit: int, note: str = "") -> SdoEvent:
-        """Return the event of a frame that names an object, and its size if a bit is set."""
+        """Return the event of a frame that names an object, with its size if `size_bit` is set."""
         size = int.from_bytes(data[4:], "little") if data[0] & size_bit else None
         return SdoEvent(step, *_object(data), size=size, note=note)
 
@@ -176,7 +176,7 @@ class SdoDecoder:
             )
         toggle = data[0] >> 4 & 1
         if toggle != transfer.toggle or transfer.last:
-            transfer.whole = False  # sent again, or one was missed
+            transfer.whole = False  # the segment was repeated, or one was missed
         part, transfer.last = segment(data)
         transfer.toggle = 1 - toggle
         transfer.data += part

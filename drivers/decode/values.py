@@ -95,7 +95,7 @@ _POSITIONS = frozenset(
 )
 _VELOCITIES = frozenset((0x606B, 0x606C, 0x60FF))
 _SPEEDS = frozenset((0x607F, 0x6081, 0x6082, 0x6099))
-"""Velocities without direction; 6099h is a record of two."""
+"""Objects that hold speeds, without a sign; 6099h is a record of two."""
 _TORQUES = frozenset((0x6071, 0x6074, 0x6077, 0x60B2))
 _TORQUE_LIMITS = frozenset((0x6072, 0x60E0, 0x60E1))
 _HOMING, _CYCLIC = 6, (8, 9, 10)
@@ -118,7 +118,7 @@ class DecodedValue:
     name: str
     raw: bytes
     value: float | str
-    """In `unit`; as text if the object is a word of bits or a name."""
+    """Value in `unit`; text if the object is a word of bits or a name."""
     unit: str
     text: str
 
@@ -128,7 +128,7 @@ class DecodedValue:
 
 @dataclass
 class NodeView:
-    """Knowledge about one node, extended by its traffic."""
+    """What is known about one node; its traffic adds to it."""
 
     node_id: int
     names: ObjectNames

@@ -1,4 +1,4 @@
-"""Modbus to one device: a byte channel waited for by the robot's clock, TCP and RTU on it."""
+"""Modbus to one device: a byte channel that waits by the robot's clock, and TCP and RTU on it."""
 
 from __future__ import annotations
 
@@ -43,8 +43,8 @@ _DEAD_PEER_S: Final = 30.0
 class ByteChannel:
     """Requests and answers through a descriptor; a source of the clock.
 
-    In lockstep, bus time stands still until the answer has arrived, however late the device's
-    process is; it marks an answer that is missing or cut off (docs/reference/wire.md).
+    In lockstep, bus time stands still until the answer has arrived, even if the device's process
+    is late. That process marks an answer that is missing or cut off (docs/reference/wire.md).
     """
 
     def __init__(self, clock: Clock, descriptor: int) -> None:
@@ -59,7 +59,7 @@ class ByteChannel:
     def ask(self, question: bytes, is_whole: Callable[[bytes], bool], timeout_s: float) -> bytes:
         """Send `question` and return the bytes received until they are complete or time is up."""
         self.poll()
-        self._received = b""  # late bytes of the previous answer
+        self._received = b""  # late bytes of the previous answer are discarded
         try:
             if os.write(self._descriptor, question) < len(question):
                 self._lose()
@@ -89,7 +89,7 @@ class ByteChannel:
             self.poll()
 
     def close(self) -> None:
-        """Remove it from the clock; the owner closes the descriptor."""
+        """Remove the channel from the clock; the owner closes the descriptor."""
         self._clock.remove(self)
 
     def _lose(self) -> None:
@@ -118,8 +118,8 @@ class ByteChannel:
             self._lose()
         return True
 
-    def tick(self, now_s: float) -> float:  # noqa: ARG002  # nothing is due without a call
-        """Return that no event is ever due."""
+    def tick(self, now_s: float) -> float:  # noqa: ARG002  # no event is ever scheduled
+        """Return infinity: no event is ever scheduled."""
         return math.inf
 
 
@@ -139,7 +139,7 @@ _EXCEPTIONS: Final = {
     11: "gateway target does not respond: is the unit id right?",
 }
 
-# what the library logs is raised here as this module's errors
+# this module raises its own errors for everything that the library logs
 logging.getLogger("pymodbus").setLevel(logging.CRITICAL)
 
 
@@ -148,7 +148,7 @@ class ModbusError(DriverError):
 
 
 def refusal(answer: ExceptionResponse) -> str:
-    """Return as text that, and why, a device refuses."""
+    """Return as text that a device refuses, and why."""
     code = answer.exception_code
     return f"refused with exception {code} ({_EXCEPTIONS.get(code, 'unknown exception')})"
 
@@ -324,7 +324,7 @@ class ModbusLine:
             "parity": "N" if Path(port).resolve().is_relative_to("/dev/pts") else parity,
             "stopbits": stop_bits,
             "exclusive": True,
-            # VMIN 1: distinguishes an empty read from a lost port
+            # VMIN 1: with it, an empty read means that the port is lost
             "inter_byte_timeout": 0,
         }
         self._clock = clock
@@ -430,7 +430,7 @@ class ModbusLine:
 
 
 def _size(data: bytes, code: int) -> int:
-    """Return the length of an answer that begins with `data`, as far as it is known."""
+    """Return the length of an answer that begins with `data`, or the part of it known so far."""
     if len(data) > 1 and data[1] & 0x80:
         return _EXCEPTION_BYTES
     if code in _READ_CODES and len(data) > 2 and data[1] == code:

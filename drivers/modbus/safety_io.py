@@ -25,7 +25,7 @@ from cdpr_rt.state_file import StateFileError, read_state, remove_state, write_s
 # State of a safety I/O from one poll, and the rules that derive alarms from it.
 
 _OVERWRITTEN_POLLS = 2
-"""Successive polls in which an output differs from the written value before an alarm."""
+"""Polls in a row in which an output differs from the written value before the alarm."""
 
 
 class Trip(str):
@@ -102,7 +102,7 @@ def _on(output: DigitalOutput, coils: dict[int, bool]) -> bool:
 
 
 class FeedbackMonitor:
-    """Monitors that a feedback contact follows its output in time, and stays there."""
+    """Checks that a feedback contact follows its output in time and then stays there."""
 
     def __init__(self, what: str, device: Contactor | Brake, on: str, off: str) -> None:
         self._name, self._device = what, device
@@ -166,7 +166,7 @@ class Rules:
         outputs: dict[int, bool],
         overwritten: dict[int, bool],
     ) -> Trip:
-        """Return why the torque must be removed immediately, by the most likely cause, or "".
+        """Return why the torque must be removed immediately: the most likely cause, or "".
 
         `outputs` are the coils as written, `overwritten` those that read back a different value.
         """
@@ -259,7 +259,7 @@ class IoLink:
 
 
 def _span(addresses: Iterable[int]) -> tuple[int, int]:
-    """Return start and count of the shortest span over all addresses."""
+    """Return first address and count of the shortest span that holds all addresses."""
     known = sorted(addresses)
     return known[0], known[-1] - known[0] + 1
 
@@ -277,11 +277,11 @@ class SafetyIo:
     """One safety I/O.
 
     A task of `clock` polls and writes. `stop_reason` checks the age of the last good poll, so that
-    it also trips while the task waits for an answer. While no task waits by the clock and no cycles
-    run, there are no polls: then the device's own watchdog opens the contactor and applies the
-    brakes. A trip stays until `acknowledge`, also in the file `latch`.
-    The contactor closes only by `energise`. Leaving the block applies the brakes and
-    opens the contactor.
+    it also trips while the task waits for an answer. If no task waits by the clock and no cycles
+    run, nothing polls: then the device's own watchdog opens the contactor and applies the
+    brakes. A trip stays until `acknowledge`; the file `latch` also stores it.
+    Only `energise` closes the contactor. The end of the block applies the brakes and opens the
+    contactor.
     """
 
     def __init__(self, profile: SafetyIoProfile, clock: Clock, latch: Path | None = None) -> None:
@@ -318,8 +318,8 @@ class SafetyIo:
         now = self.clock.now_s
         last_poll_s, timeout = self._last_poll_s, self._timeout_s
         if now - last_poll_s > timeout and self._armed and not self._stop:
-            # cycles that start after a pause without polls do not count as silence: the time-out is
-            # extended once for each good poll
+            # if cycles start after a pause without polls, that pause is not a silence of the
+            # device: the timeout is extended once for each good poll
             if now - self._last_check_s > timeout and last_poll_s != self._extended_poll_s:
                 self._extended_poll_s, self._extended_at_s = last_poll_s, now
             elif last_poll_s != self._extended_poll_s or now - self._extended_at_s > timeout:
@@ -382,7 +382,7 @@ class SafetyIo:
         self._await(lambda s: all(s.brakes_released[n] == released for n in names), longest)
 
     def de_energise(self) -> str:
-        """Apply the brakes, open the contactor; return which did not follow; else an empty text."""
+        """Apply the brakes, open the contactor; return which of them did not follow, or ""."""
         self._armed = False
         if self._task is not None and self._task.done:  # an interrupt may have ended it
             self._task = self.clock.start(self._run)
@@ -394,7 +394,7 @@ class SafetyIo:
         return "; ".join(dict.fromkeys(text for text in (unconfirmed, opened) if text))
 
     def acknowledge(self) -> None:
-        """Clear a trip whose cause is gone; raises SafetyIoError while it is not."""
+        """Clear a trip whose cause is gone; raises SafetyIoError while the cause remains."""
         self._refuse(self._obstacle(self._next(), limits=False))
         self._alarm = self._stop = NO_TRIP
         self._trip_saved = False
@@ -404,7 +404,7 @@ class SafetyIo:
             remove_state(self._latch_file)
 
     def close(self) -> str:
-        """Apply the brakes, open the contactor and disconnect; return which did not follow."""
+        """Apply the brakes, open the contactor, disconnect; return which did not follow, or ""."""
         if self._task is None:
             return ""
         unconfirmed = self.de_energise()
@@ -442,7 +442,7 @@ class SafetyIo:
             except ModbusError as error:
                 self._error = str(error)
             except Exception as error:
-                # a task that has ended could not switch off anything; this counts as silence
+                # a task that has ended cannot switch anything off, so its end counts as silence
                 self._error = f"{type(error).__name__}: {error}"
             self._save_trip()
 
@@ -479,7 +479,7 @@ class SafetyIo:
         self._write()
 
     def _light(self, state: IoState) -> None:
-        """Show red: tripped or stopped; yellow: power is on; green: ready; with the next poll."""
+        """Set the light for the next poll: red if tripped or stopped, else yellow or green."""
         red = bool(self._tripped or not state.chain_ok)
         yellow = state.contactor_closed
         shown = {"red": red, "yellow": yellow, "green": not red and not yellow}
@@ -502,7 +502,7 @@ class SafetyIo:
             self._stop, self._stop_at_s = stop, self.clock.now_s
 
     def _save_trip(self) -> None:
-        """Save a new trip for later commands; never in the control cycle, because disks block."""
+        """Save a new trip for later commands; not in the control cycle, because disks block."""
         reason, latch = self._tripped, self._latch_file
         if not reason or self._trip_saved or latch is None:
             return
@@ -582,11 +582,11 @@ class SafetyIo:
         return brake
 
     def _next(self) -> IoState:
-        """Return the state at a poll that begins after now; raises SafetyIoError without one."""
+        """Return the state at a poll that begins after this call; raises SafetyIoError if none."""
         return self._await(lambda _: True, 0.0)
 
     def _await(self, done: Callable[[IoState], bool], timeout_s: float) -> IoState:
-        """Wait until `done` holds at a poll that begins after now; raises SafetyIoError."""
+        """Wait until `done` holds at a poll that begins after this call; raises SafetyIoError."""
         clock, asked_s = self.clock, self.clock.now_s
 
         def settled() -> bool:
@@ -594,7 +594,7 @@ class SafetyIo:
                 self.state.at_s > asked_s and done(self.state)
             )
 
-        # the rules find the cause more precisely, in a poll after the same time
+        # the rules detect the same timeout in a poll, and give a more precise cause
         followed = clock.wait(settled, asked_s + timeout_s + self._timeout_s)
         state = self.state
         if self._armed and self._tripped:

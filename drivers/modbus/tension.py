@@ -90,7 +90,7 @@ class LoadCells:
         over = None if status is None else status.over_range_bit
         fault = TensionFault.NONE
         if raw != raw or raw in value.broken_wire_raw or _is_set(bits, broken):  # noqa: PLR0124
-            fault = TensionFault.BROKEN_WIRE  # a NaN is no value of a load cell
+            fault = TensionFault.BROKEN_WIRE  # a load cell never measures NaN
         elif _is_set(bits, over) or not amplifier.lowest_N <= tension <= amplifier.highest_N:
             fault = TensionFault.OVER_RANGE
         return Reading(sensor.cable, tension, fault)
@@ -131,7 +131,7 @@ def _is_set(bits: int, bit: int | None) -> bool:
 
 
 def _requests(amplifier: Amplifier) -> list[tuple[RegisterKind, int, int]]:
-    """Return (kind, start, count) of the reads: a single request if it covers all."""
+    """Return (kind, start, count) of each read request; a single one if it covers all."""
     value, status = amplifier.value, amplifier.status
     size = REGISTERS[value.type]
     if status is None:
@@ -144,10 +144,10 @@ def _requests(amplifier: Amplifier) -> list[tuple[RegisterKind, int, int]]:
 
 
 class TensionSampler:
-    """Read all load cells in turn in a task of `clock` and publish the readings.
+    """Reads all load cells in turn in a task of `clock` and publishes the readings.
 
-    The cycle reads `exchange`. Failed sensors are polled again in turn; a lost port is opened
-    again; `errors` has the last error of each sensor.
+    The cycle reads `exchange`. Failed sensors are polled again in turn, and a lost port is opened
+    again. `errors` has the last error of each sensor.
     """
 
     def __init__(self, profile: TensionSensors, port: str, clock: Clock) -> None:

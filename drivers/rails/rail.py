@@ -1,4 +1,4 @@
-"""Move a rail: check slack cables and brake, void the calibration, brake at the end."""
+"""Move a rail: check slack cables and brake, invalidate the calibration, brake at the end."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ _VOIDED: Final = "; the robot is no longer calibrated"
 
 
 class RailError(DriverError):
-    """A rail was not moved, or not to its target; says why."""
+    """A rail did not move, or not to its target; the message says why."""
 
 
 class RailStoppedError(RailError):
@@ -51,12 +51,12 @@ class MoveResult:
     from_m: float
     to_m: float
     brake_moved_m: float | None
-    """Movement when pushed against the applied brake; None if the drive cannot push."""
+    """Movement under a push against the applied brake; None if the drive cannot push."""
 
 
 @dataclass(frozen=True)
 class MoveConditions:
-    """Conditions of a move, checked before and during it."""
+    """What must hold before and during a move."""
 
     cables_tight: Callable[[], str]
     """Why the cables do not count as slack, or an empty text."""
@@ -90,7 +90,7 @@ def move(
         pushed_m = _test_brake(rail, axis, clock)
         _stop_on_request(rail, conditions, voided="")
         _void_calibration(rail, clock, f"{rail.name} was moved from {start_m:.4f} m")
-        _refuse(rail, conditions, voided=_VOIDED)  # the disk may have been slow
+        _refuse(rail, conditions, voided=_VOIDED)  # the write to disk may have been slow
         axis.check()
         _stop_on_request(rail, conditions)
         axis.enable()
@@ -114,7 +114,7 @@ def move(
 
 
 def _void_calibration(rail: RailProfile, clock: Clock, why: str) -> None:
-    """Write it to disk, which may take a second; meanwhile keep the drive's heartbeat alive."""
+    """Write the mark to disk, which may take a second; keep the drive's heartbeat alive."""
     clock.run_blocking(lambda: mark_not_calibrated(rail.robot, why))
 
 
@@ -185,7 +185,7 @@ def _hold(axis: RailAxis, clock: Clock) -> None:
         axis.set_brake(False)
     finally:
         axis.disable()
-    clock.sleep(_SETTLE_S)  # time in which a slipping brake becomes visible
+    clock.sleep(_SETTLE_S)  # in this time, a slipping brake becomes visible
 
 
 # A rail on a CiA 402 drive in profile position mode, by SDO alone.
@@ -279,7 +279,7 @@ class Cia402RailAxis:
         self._await_bit(_ACKNOWLEDGE, False, "does not clear its acknowledgement")
 
     def arrived(self) -> bool:
-        """Return whether the target is reached; raises RailError if it lags or loses power."""
+        """Return whether the target is reached; raises RailError if the drive lags or is off."""
         word = self._statusword()
         if state_of(word) != State.OPERATION_ENABLED:
             raise self._wrong(f"left operation enabled and is {state_of(word).label}")
@@ -366,9 +366,8 @@ _ENABLE_S: Final = 2.0
 class ModbusRailAxis:
     """The axis of a rail of kind "modbus".
 
-    Methods raise RailError and ModbusError. Every request feeds the drive's watchdog, so that it
-    stops and brakes when requests end. Trips of `safety`, if there is one, end
-    the move.
+    Methods raise RailError and ModbusError. Every request feeds the drive's watchdog, so that the
+    drive stops and brakes when requests end. A trip of `safety`, if there is one, ends the move.
     """
 
     def __init__(self, rail: RailProfile, clock: Clock, safety: SafetyIo | None = None) -> None:

@@ -42,8 +42,8 @@ _ANSWER_TIMEOUT_S: Final = 2.0
 class PowerWatch:
     """Polls the statuswords (6041h) of all drives on a bus except `exclude`.
 
-    Nodes that do not answer, or refuse, do not count as drives with power: their control supply
-    is off, or they are other devices. Methods raise BusError.
+    Nodes that do not answer, or refuse, do not count as drives with power: either their control
+    supply is off, or they are other devices. Methods raise BusError.
     """
 
     def __init__(self, url: BusUrl, clock: Clock, exclude: Collection[int]) -> None:
@@ -111,7 +111,7 @@ class PowerWatch:
                     self._heard_s[node] = self._clock.now_s
 
 
-# there is no exchange with SYNC; the drive only needs some period
+# the rail does not use SYNC, but the drive needs some period
 _SYNC_PERIOD_S = 0.01
 _FIRST_READINGS_S = 3.0
 _ASK_S = 0.05
@@ -119,7 +119,7 @@ _ASK_S = 0.05
 
 @contextmanager
 def rail_clock(rail: RailProfile, bus: str | None, winch_buses: Sequence[str]) -> Iterator[Clock]:
-    """Yield the clock of a rail's bus and of those of winches; raises ConfigurationError."""
+    """Yield the clock of a rail's bus and the winches' buses; raises ConfigurationError."""
     named = [*winch_buses] if rail.cia402 is None else [bus, *winch_buses]
     urls = [_bus_of(rail, text) for text in named]
     clock = open_clock({str(url): url for url in urls}.values())
@@ -140,8 +140,8 @@ def open_rail(
 ) -> Iterator[RailAxis]:
     """Open a rail, ready to move; however the block ends, its drive has no power afterwards.
 
-    Raises ConfigurationError for options that the rail's kind needs and that are missing, and the
-    drivers' errors.
+    Raises ConfigurationError for missing options that the rail's kind needs, and the drivers'
+    errors.
     """
     with ExitStack() as stack:
         if rail.cia402 is None:
@@ -167,7 +167,7 @@ def open_rail(
 
 
 def require_options(rail: RailProfile, bus: str | None, safety_io: str | None) -> None:
-    """Raise ConfigurationError for options that the rail's kind needs and that are missing."""
+    """Raise ConfigurationError for missing options that the rail's kind needs."""
     if rail.cia402 is None:
         return
     _bus_of(rail, bus)
@@ -230,7 +230,7 @@ def power_watch(
 
 
 def _keep_asking(clock: Clock, watches: Sequence[PowerWatch]) -> None:
-    """Poll without end, so that the answers stay fresh while a drive boots or a disk writes."""
+    """Poll without end, so that the answers stay recent while a drive boots or a disk writes."""
     while True:
         for watch in watches:
             watch.reason()
@@ -241,7 +241,7 @@ def _keep_asking(clock: Clock, watches: Sequence[PowerWatch]) -> None:
 def slack_watch(
     rail: RailProfile, sensors: str | None, port: str | None, checked: bool, clock: Clock
 ) -> Iterator[Callable[[], str]]:
-    """Yield a function that returns which cable is tight: by load cells, or "" if the user checked.
+    """Yield a function that returns which cable is tight, "" if none; by load cells or `checked`.
 
     Raises ConfigurationError if neither is given, ModbusError if load cells do not answer.
     """
@@ -307,8 +307,8 @@ def _network(
 def _open_safety(reference: str | None, out: Notifier, clock: Clock) -> Iterator[SafetyIo | None]:
     """Connect to a safety I/O and keep its contactor closed while the block runs.
 
-    Yields None if none is named. Raises ModbusError if the I/O does not answer and SafetyIoError
-    if it forbids to energise, or did not open its contactor at the end.
+    Yields None if none is named. Raises ModbusError if the I/O does not answer. Raises
+    SafetyIoError if it does not allow power, or did not open its contactor at the end.
     """
     if reference is None:
         yield None

@@ -1,4 +1,4 @@
-"""Commissioning results of a robot's motors: found, checked, ready for the control."""
+"""Find and check the commissioning results of a robot's motors, and prepare them for control."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def with_commissioned(robot: Robot, folder: Path | None) -> Robot:
     if folder is None:
         return robot
     found = {i: folder / folder_of(axis) for i, axis in enumerate(robot.axes)}
-    # a path that exists but is no file is rejected when it is read, not treated as missing
+    # a path that exists but is no file counts as found: reading it reports the error
     there = {i: path for i, path in found.items() if os.path.lexists(Paths(path).profile)}
     found = {i: path.resolve() for i, path in there.items()}
     if not found:
@@ -72,7 +72,7 @@ def with_commissioned(robot: Robot, folder: Path | None) -> Robot:
 
 
 def uncommissioned_text(robot: Robot) -> str:
-    """Return which axes have no profile although others do; empty if all or none have one."""
+    """Return which axes lack a profile although others have one; empty if all or none have one."""
     names = [axis.name for axis in robot.axes if axis.commissioned is None]
     if len(names) in (0, len(robot.axes)):
         return ""
@@ -95,7 +95,7 @@ def load_profiles(robot: Robot, limits: Limits | None = None) -> CoggingProfiles
     They are checked against the torques of `limits` (default: those of the robot's file).
 
     Raises ConfigurationError, naming axis and file, for a profile that cannot be read, belongs to
-    another motor or is impossible for this one.
+    another motor or has values that this motor cannot have.
     """
     found = tuple(map(_load, robot.axes, _bounds(robot, limits)))
     lengths = {len(one.harmonic.table_Nm[0]): i for i, one in enumerate(found) if one is not None}
@@ -125,7 +125,7 @@ def _load(axis: RobotAxis, bounds: MotorBounds) -> CoggingProfile | None:
 def load_profile(path: Path, bounds: MotorBounds, whose: str = "") -> CoggingProfile:
     """Return the cogging profile of a motor; raises ConfigurationError, which begins with `whose`.
 
-    The error names file, key and value of whatever is impossible for the motor.
+    The error names file, key and value that the motor cannot have.
     """
     try:
         profile = CoggingProfile.load(path)
@@ -154,8 +154,8 @@ def check_drive_identities(
 ) -> None:
     """Raise CoggingProfileError, naming the axis, if a profile belongs to another drive.
 
-    Raise ConfigurationError if a winch's calibration does, because it contains the torque constant
-    of its drive. Drives without a serial number (0) cannot be checked.
+    Raise ConfigurationError if a winch's calibration belongs to another drive, because it contains
+    that drive's torque constant. Drives without a serial number (0) cannot be checked.
     """
     bounds = _bounds(robot)
     for i, report in enumerate(reports):

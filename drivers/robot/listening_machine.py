@@ -32,7 +32,7 @@ class ListeningMachine:
     watches: Sequence[Watch] = ()
     notices: Sequence[str] = (_NOTICE,)
     safety = ""
-    """Left to the other master."""
+    """Empty: the other master monitors the safety I/O."""
 
     def __init__(self, robot: Robot, buses: Sequence[str]) -> None:
         self.clock = PacedClock()
@@ -77,14 +77,14 @@ class ListeningMachine:
         return ()
 
     def close(self) -> str:
-        """Leave the buses; return an empty text, because nothing is uncertain."""
+        """Leave the buses; return an empty text, because no drive's power is uncertain."""
         device, self.device = self.device, None
         return "" if device is None else device.close()
 
     # -- in a cycle
 
     def read_tension(self) -> TensionFeedback | None:
-        """Return None: load cells answer one master only."""
+        """Return None: load cells answer only one master."""
         return None
 
     def bus_state(self) -> dict[str, Any]:
@@ -136,7 +136,7 @@ class ListeningMachine:
             self.device.forget_alarms()
 
     def intact(self) -> bool:
-        """Whether the buses are there."""
+        """Whether the buses still work."""
         return self.device is not None
 
     def faultless(self) -> bool:

@@ -91,7 +91,7 @@ class RobotTensions:
         return "" if self._sampler is None else self._sampler.exchange.reason()
 
     def missing(self, robot: Robot) -> str:
-        """Return a note about sensors that are not read, or an empty text."""
+        """Return a note about sensors that nobody reads, or an empty text."""
         if self._profile is not None or robot.tension_sensors is None:
             return ""
         return f"{robot.tension_sensors} is not read: give --tension-port to use it"
@@ -122,8 +122,9 @@ class RobotMachine:
     """All axes of `robot` on the buses given with --bus; implements `Machine`.
 
     Power is possible only while the `safety_io` allows it; by default it is the robot's own, unless
-    all buses are simulated. Tensions are measured if their sensors are at a `tension_port`.
-    Simulated buses in lockstep run as fast as they can; with `real_time`, no faster than wall time.
+    all buses are simulated. Tensions are measured if `tension_port` names the port of their
+    sensors. Simulated buses in lockstep run as fast as they can; with `real_time`, no faster than
+    wall time.
     If `optional` is set, non-mandatory axes that do not boot are left out.
     By default its `limits` are those of its file.
     """
@@ -161,7 +162,7 @@ class RobotMachine:
         self.networks: dict[str, CanNetwork] = {}
         """The buses, by their names in the robot's file; filled after the boot."""
         self.reports: Sequence[BootReport] = ()
-        """What each drive reported when it booted, in the order of the axes."""
+        """The report of each drive from its boot, in the order of the axes."""
         self._drives: dict[str, dict[str, dict[str, int]]] = {}
         self._safety: SessionSafety | None = None
         self._stack = ExitStack()
@@ -183,11 +184,12 @@ class RobotMachine:
             reports = list(booted.values())
             check_drive_identities(self.robot, self._profiles, reports)
             stack.callback(device.close)
-            # the supervisor must detect the silence before the device does
+            # the supervisor must report the silence before the device does
             device.tolerate_silence(self._missed_cycles + 1)
             unsought = self._seek_indices(device)
             if not self.clock.lockstep:
-                # a collection blocks every thread: collect now and exempt the remaining objects
+                # garbage collection blocks every thread: collect now and exempt the remaining
+                # objects
                 gc.collect()
                 gc.freeze()
             for network in networks.values():
@@ -217,9 +219,9 @@ class RobotMachine:
     def _seek_indices(self, device: AxisBuses) -> list[str]:
         """Let each drive latch its encoder's index in any later motion (touch probe).
 
-        This is required if a cogging profile counts from the index. A daemon also seeks the other
+        A cogging profile that counts from the index requires it. A daemon also seeks the other
         indices: they show whether motors were turned while no loop ran, and sweeps count from them.
-        Returns a note for each of these that is not sought.
+        Returns a note for each of these other indices that it does not seek.
         """
         notes = []
         for i, (axis, profile) in enumerate(zip(self.robot.axes, self._profiles, strict=True)):

@@ -61,7 +61,7 @@ def open_networks(
 def boot_robot(
     stack: ExitStack, robot: Robot, networks: Mapping[str, CanNetwork], torque_Nm: Sequence[float]
 ) -> tuple[dict[int, BootReport], dict[int, str]]:
-    """Boot all buses at the same time; return reports, and why optional axes are missing, by axis.
+    """Boot all buses at the same time; return, by axis, the reports and reasons for missing axes.
 
     Each drive's torque is limited (6072h) to `torque_Nm`, one for each axis of the robot. `stack`
     releases the drives. Raises RobotBootError if a mandatory drive does not boot.
@@ -108,7 +108,7 @@ def _error_text(error: DriverError) -> str:
 
 
 def boot_settings(winch: Winch, torque_Nm: float) -> BootSettings:
-    """Return the master's settings for a winch's drive besides its profile, 6072h `torque_Nm`."""
+    """Return the settings that the master adds to a drive's profile; `torque_Nm` is for 6072h."""
     return BootSettings(
         winch.master_node_id,
         winch.sync_period_s,
@@ -150,7 +150,7 @@ def device_of(
 
 
 def _lacking_guards(node: str, report: BootReport) -> str:
-    """Return what to check if a drive lacks objects that stop it or limit it; else ""."""
+    """Return what to check if a drive lacks objects that stop it or limit its torque; else ""."""
     lacking = [name for name in report.absent if name.startswith(_GUARDS)]
     texts = []
     if lacking:

@@ -27,7 +27,7 @@ def robot_urls(robot: Robot, texts: Sequence[str]) -> dict[str, BusUrl]:
     """Return the URL of each bus of `robot`, by its name there.
 
     `texts` are the values of --bus: `simbus:NAME`, which stands for simbus:NAME-BUS on every bus,
-    or BUS=URL for some buses; for the others the robot's file counts. Raises
+    or BUS=URL for some buses. The others keep the URL of the robot's file. Raises
     ConfigurationError.
     """
     names = [bus.name for bus in robot.buses]

@@ -17,7 +17,7 @@ CLOSED: Final = "the chain is closed, the contactor is on"
 
 
 class SessionSafety:
-    """The safety I/O of a session and the axes whose brakes it controls; a watch of the loop."""
+    """The safety I/O of a session and the axes whose brakes it controls; the loop queries it."""
 
     def __init__(self, io: SafetyIo, node_ids: Sequence[int]) -> None:
         self.io = io
@@ -60,7 +60,8 @@ class SessionSafety:
 def trip_file(reference: str) -> Path:
     """Return the file that keeps a safety I/O's trip until it is acknowledged.
 
-    One for each place, because several devices may share a profile. Raises ProfileError.
+    Each reference has its own file, because several devices may share a profile. Raises
+    ProfileError.
     """
     profile = load_safety_io(reference)
     name = Path(reference.partition("@")[0]).stem
@@ -68,7 +69,7 @@ def trip_file(reference: str) -> Path:
 
 
 def kept_trip(reference: str) -> dict[str, Any] | None:
-    """Return the stored trip (reason, date), or None; tolerates damage."""
+    """Return the stored trip (reason, date), or None; for a damaged file, its error."""
     try:
         return read_state(trip_file(reference))
     except StateFileError as error:
