@@ -9,6 +9,6 @@ if TYPE_CHECKING:
 
 def __getattr__(name: str) -> Any:
     """Import the models on first use, so that programs that need only the errors skip pydantic."""
-    if name.startswith("_"):  # such as `__path__`, which the import system requests
+    if name.startswith("_"):  # for example `__path__`, which the import system requests
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     return getattr(import_module(f"{__name__}.public"), name)

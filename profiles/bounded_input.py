@@ -1,7 +1,7 @@
 """Read files and messages from outside within bounds on size, depth and digits.
 
-Input that is too long, too deep or not a regular file is rejected before a parser sees it. So no
-input causes a hang, an endless recursion or an exception of a library.
+Input that is too long, too deep or not a regular file is rejected before a parser reads it. So no
+input causes a hang, an endless recursion or a library's exception.
 """
 
 from __future__ import annotations
@@ -24,14 +24,14 @@ from cdpr_profiles.errors import FileMissingError, ProfileError, brief
 MOST_TOML_BYTES: Final = 1 << 18
 MOST_JSON_BYTES: Final = 1 << 21
 MOST_PARTS: Final = 500_000
-"""Strings, arrays, objects and commas of JSON: the report of each wrong one costs 2 kB."""
+"""Limit of strings, arrays, objects and commas in JSON: reporting a wrong one costs 2 kB each."""
 MOST_DEPTH: Final = 16
 """Largest nesting of tables and arrays."""
 MOST_DIGITS: Final = 99
 """Most digits of one number; an integer must also fit 64 bits."""
 
 _LEAST_INTEGER, _MOST_INTEGER = -(2**63), 2**64 - 1
-# strings and comments are skipped; possessive quantifiers, so that no text makes them slow
+# skips strings and comments; possessive quantifiers, so that no text makes the search slow
 _JSON_TOKEN: Final = re.compile(
     r'(?P<part>"(?:[^"\\]++|\\.)*+"?|,)|(?P<open>[\[{])|(?P<close>[\]}])'
     rf"|(?P<number>[0-9]{{{MOST_DIGITS + 1},}}+)",
@@ -139,11 +139,11 @@ def parse_json(text: str | bytes, source: Path | str) -> Any:
 
 
 def is_mostly_text(data: bytes, most_strings: int, most_other: int) -> bool:
-    """Return whether a JSON text has at most these numbers of strings, and of bytes beside them.
+    """Return whether a JSON text has at most so many strings, and so many bytes outside them.
 
-    Such a text is parsed and validated quickly, however long its strings are.
+    Such a text is quick to parse and validate, even if its strings are long.
     """
-    plain = data.replace(b"\\\\", b"").replace(b'\\"', b"")  # quotes left delimit strings
+    plain = data.replace(b"\\\\", b"").replace(b'\\"', b"")  # the remaining quotes delimit strings
     parts = plain.split(b'"', 2 * most_strings + 1)
     return len(parts) <= 2 * most_strings + 1 and sum(map(len, parts[::2])) <= most_other
 
@@ -151,8 +151,9 @@ def is_mostly_text(data: bytes, most_strings: int, most_other: int) -> bool:
 def may_replace(path: Path, mark: bytes | None = None) -> bool:
     """Return whether writing to `path` destroys only data written by this project.
 
-    True for a file with `mark` in its first 4096 bytes, an empty one, a pipe or device, or no file.
-    Without a mark, for which a format may have no room, no other file counts as the project's.
+    True for a file with `mark` in its first 4096 bytes, an empty file, a pipe or device, or if
+    there is no file. Without `mark`, for formats that have no room for one, no other file counts as
+    the project's.
     """
     try:
         with os.fdopen(open_regular(path), "rb") as file:
@@ -166,7 +167,7 @@ def may_replace(path: Path, mark: bytes | None = None) -> bool:
 def replacing(path: Path) -> Iterator[BinaryIO]:
     """Yield a new file, which replaces `path` as a whole if the block ends without an exception.
 
-    It is in the folder of `path` and has an unused name, so that no file of the user is lost.
+    The new file is in the folder of `path` and has an unused name, so that no user file is lost.
     Raises OSError.
     """
     fresh = path.with_name(f".cdpr-{secrets.token_hex(8)}.part")
@@ -198,7 +199,7 @@ def is_there(path: Path) -> bool:
         return False
     except OSError as error:
         if isinstance(error, PermissionError) and not _is_own(path):
-            return False  # in another user's home, which can happen to a user without a home
+            return False  # in another user's home; a user without a home may get here
         raise ProfileError(path, "", f"cannot be searched: {error.strerror}") from None
     except ValueError:  # a name with a zero byte
         return False

@@ -11,7 +11,7 @@ Positive = Annotated[float, Field(gt=0)]
 N_PER_KGF = 9.80665
 
 ASSUMED_DAMPING_s = 2e-3
-"""Damping of a cable over its stiffness if it was not measured."""
+"""Assumed ratio of damping to stiffness of a cable that was not measured."""
 
 
 class ElongationPoint(Profile):
@@ -33,7 +33,7 @@ class Cable(Profile):
     elongation_percent_per_N: float = Field(ge=1e-9, le=10)
     elongation_measured_up_to_N: Positive | None = None
     damping_s: float = Field(default=ASSUMED_DAMPING_s, ge=0, le=0.05)
-    """Damping over stiffness, T = EA (strain + damping_s rate); assumed by default."""
+    """Ratio of damping to stiffness: T = EA (strain + damping_s * strain rate)."""
     breaking_force_kgf: float = Field(ge=0.1, le=1e6)
     min_tension_N: float = Field(ge=0)
     data_sheet_code: str | None = None

@@ -1,7 +1,7 @@
-"""The calibration in force of a robot's geometry: find it beside its file, take over, undo.
+"""The calibration in force of a robot's geometry: find, replace and undo it.
 
-The one in force is NAME.calibration beside NAME.toml; earlier ones are NAME.calibration.1 and so
-on, undone ones NAME.calibration.undone.2. Those of a shipped robot are in the user's own folder.
+The calibration in force is NAME.calibration beside NAME.toml. Earlier ones are NAME.calibration.1
+and so on, undone ones NAME.calibration.undone.2. Those of a shipped robot are in the user's folder.
 """
 
 from __future__ import annotations
@@ -51,10 +51,11 @@ def calibrated(robot: Robot) -> Robot:
 
 
 def in_force(robot: Robot) -> GeometryCalibration | None:
-    """Return the calibration in force, even for another state of the files; raises ProfileError.
+    """Return the calibration in force, even if the robot's files have changed; raises ProfileError.
 
-    None if the robot's file applies. A calibration that cannot be read, such as a link to a share
-    that is not mounted, is an error: otherwise the robot would move by another geometry unnoticed.
+    Returns None if the robot's file applies. A calibration that cannot be read, such as a link to a
+    share that is not mounted, is an error: otherwise the robot would move by a wrong geometry
+    unnoticed.
     """
     path = calibration_file(robot)
     if robot.platform is None or robot.is_winch or not is_there(path):
@@ -81,9 +82,9 @@ def take_over(robot: Robot, found: GeometryCalibration) -> Path:
 
 
 def undo(robot: Robot) -> GeometryCalibration | None:
-    """Restore the calibration before the one in force; return it, None for the robot's file.
+    """Restore the calibration before the one in force; return it, or None for the robot's file.
 
-    Calibrations of another state of the robot's files are skipped. Raises ProfileError if none is
+    Skips calibrations made for another state of the robot's files. Raises ProfileError if none is
     in force.
     """
     path = calibration_file(robot)
@@ -99,7 +100,7 @@ def undo(robot: Robot) -> GeometryCalibration | None:
     undone = path.with_name(f"{path.name}.undone.{version}")
     try:
         undone.unlink(missing_ok=True)
-        undone.hardlink_to(path)  # it stays in force until the other one replaces it
+        undone.hardlink_to(path)  # the undone one stays in force until the other replaces it
         if older is None:
             path.unlink()
         else:
@@ -139,12 +140,12 @@ def _numbered(path: Path, number: int) -> Path:
 
 
 def _newest(path: Path) -> int:
-    """Return the highest number of the stored ones, including undone ones; 0 for none."""
+    """Return the highest number of the stored calibrations, including undone ones; 0 if none."""
     return max((number for number, _ in _versions(path, _ALL)), default=0)
 
 
 def _versions(path: Path, between: str) -> Iterator[tuple[int, Path]]:
-    """Return numbers and files of the calibrations that are stored beside the one in force."""
+    """Return numbers and files of the calibrations stored beside the one in force."""
     for old in path.parent.glob(glob.escape(path.name) + ".*"):
         if match := re.fullmatch(between + r"(\d+)", old.name[len(path.name) :]):
             yield int(match[1]), old

@@ -27,14 +27,14 @@ DICTIONARIES = (
 
 
 class CameraIntrinsics(Profile):
-    """A pinhole with the lens distortion of Brown and Conrady, as in OpenCV.
+    """A pinhole camera with the lens distortion of Brown and Conrady, as in OpenCV.
 
-    With x, y the direction (X/Z, Y/Z) and s = x² + y², a point is seen at
+    A point in direction x, y (X/Z, Y/Z) is seen at u, v; with s = x² + y²:
 
         u = fx x' + cx,  x' = x (1 + k1 s + k2 s² + k3 s³) + 2 p1 x y + p2 (s + 2 x²)
         v = fy y' + cy,  y' = y (1 + k1 s + k2 s² + k3 s³) + p1 (s + 2 y²) + 2 p2 x y
 
-    with (0, 0) in the middle of the first pixel.
+    (0, 0) is in the middle of the first pixel.
     """
 
     width_px: _Pixels
@@ -57,7 +57,7 @@ class CameraIntrinsics(Profile):
 
 
 class KnownMarker(Profile):
-    """Measured place of a marker: its middle, x along its upper edge, z out of the sheet."""
+    """Measured place of a marker's middle; x is along its upper edge, z points out of the sheet."""
 
     id: _Id
     position_m: Annotated[tuple[_Length_m, ...], Field(min_length=3, max_length=3)]
@@ -66,14 +66,14 @@ class KnownMarker(Profile):
 
 
 class MarkerSize(Profile):
-    """Markers of another size than the others."""
+    """Markers that have another size than the others."""
 
     ids: Annotated[tuple[_Id, ...], Field(min_length=1, max_length=1024)]
     size_m: _Size_m
 
 
 class MarkerSheets(Profile):
-    """The markers in use: which set, how large, and the known places of some.
+    """The markers in use: their dictionary, their sizes, and the known places of some.
 
     A size is the side of the whole black square, to the outer edges of its border.
     """
@@ -85,7 +85,7 @@ class MarkerSheets(Profile):
     """Ids of all markers that were laid out, if known."""
     known: Annotated[tuple[KnownMarker, ...], Field(max_length=1024)] = ()
     known_std_m: Annotated[float, Field(ge=1e-6, le=1.0)] | None = None
-    """Standard deviation of each coordinate of a corner of these; None if unknown."""
+    """Standard deviation of each coordinate of the corners of `known`; None if unknown."""
 
     @model_validator(mode="after")
     def _check(self) -> Self:

@@ -72,7 +72,7 @@ def load_motor_ratings(name: str) -> MotorRatings:
 
 
 def load_drive(name: str | Path, beside: Path | None = None) -> DriveProfile:
-    """Return a drive by name or path, its `eds` an existing absolute path; raises ProfileError."""
+    """Return a drive by name or path; `eds` is an existing absolute path. Raises ProfileError."""
     path = require("drives", name, beside)
     drive = read_toml_model(path, DriveProfile)
     eds = path.parent / drive.eds
@@ -94,7 +94,7 @@ def load_cable(name: str | Path, beside: Path | None = None) -> Cable:
 
 
 def load_winch(name: str | Path, beside: Path | None = None) -> Winch:
-    """Return a winch by name or path with the motor, drive and cable it names.
+    """Return a winch by name or path, with the motor, drive and cable that its file names.
 
     These are searched beside the winch's file first. Raises ProfileError.
     """
@@ -116,10 +116,10 @@ def load_winch(name: str | Path, beside: Path | None = None) -> Winch:
 
 
 def load_robot(name: str | Path) -> Robot:
-    """Return a robot by name or path with the winches it names; raises ProfileError.
+    """Return a robot by name or path, with the winches that its file names; raises ProfileError.
 
-    The winches are searched beside the robot's file first. If `name` is that of a winch,
-    the robot has this one axis.
+    The winches are searched beside the robot's file first. If `name` is that of a winch, the
+    robot has this winch as its only axis.
     """
     path = find("robots", name)
     if path is None or "motor" in read_toml(path):
@@ -328,7 +328,7 @@ def _names(kind: ProfileKind) -> set[str]:
 
 
 def _load_reference(file: Path, key: str, load: Callable[..., _T], *named: str | Path) -> _T:
-    """Load the profile that a file's key names; errors about its name give that file and key."""
+    """Load the profile that a key in `file` names; an error about that name gives file and key."""
     try:
         return load(*named)
     except ProfileError as error:

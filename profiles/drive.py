@@ -39,7 +39,7 @@ class PdoEntry(Profile):
 
 
 class Pdo(Profile):
-    """One PDO as the master configures it; a time of 0 turns its function off."""
+    """One PDO as the master configures it; a time of 0 switches the timer off."""
 
     number: int = Field(ge=1, le=512)
     cob_id_offset: int = Field(ge=0x180, le=0x500)
@@ -63,14 +63,14 @@ class Pdo(Profile):
 class Quirks(Profile):
     """Deviations of a drive from the state machine of CiA 402.
 
-    The mode of an enabled drive is never changed, so drives that reject such changes need
+    The master never changes the mode of an enabled drive, so drives that reject such changes need
     no key.
     """
 
     halt_before_mode_change: bool = False
-    """6060h is accepted only while bit 8 of the controlword (halt) is set."""
+    """The drive accepts 6060h only while bit 8 of the controlword (halt) is set."""
     homing_done_by_bit_12_alone: bool = False
-    """Bit 10 of the statusword has no meaning in homing mode; bit 12 is set once at rest."""
+    """Bit 10 of the statusword has no meaning in homing mode; bit 12 is set only at standstill."""
     boot_ups: int = Field(default=1, ge=1, le=3)
     """Number of boot-up messages that the drive sends after one reset."""
 
@@ -85,17 +85,17 @@ class Evidence(Profile):
 class DriveProfile(Profile):
     """One CiA 402 drive type.
 
-    `eds` is the path of its electronic data sheet. Objects missing in the EDS are not read: without
-    6076h the motor's rated torque applies, without 608Fh the winch's encoder resolution and without
-    6502h `supported_modes`.
+    `eds` is the path of its electronic data sheet. Objects that the EDS lacks are not read. Instead
+    of 6076h the motor's rated torque applies, instead of 608Fh the winch's encoder resolution, and
+    instead of 6502h `supported_modes`.
 
     `torque_unit`, `rated_torque_unit`, `velocity_unit` and `acceleration_unit` are units of the
-    drive's objects. Each sign turns one of the drive's directions into the motor's:
+    drive's objects. Each sign converts a direction of the drive into the motor's:
     `position_sign` is -1 if 6064h falls while the motor turns forward, `torque_sign` if a positive
     6071h drives it backward, and `homing_sign` if method 34 seeks the index backward.
 
     `torque_slope_Nm_s` is written to 6087h for modes with a torque ramp (PT, 4). It should be as
-    steep as the drive accepts, because a ramp is a lag in the loop. `torque_delay_s` is the
+    steep as the drive accepts, because a ramp adds a lag to the loop. `torque_delay_s` is the
     nominal lag of its current loop, `feedback_delay_s` the nominal age of the reported position.
     `rpdos` must carry 6040h and 6071h, in one PDO or in two; `tpdos` 6041h, 6064h and 6077h, in
     any number of PDOs that answer every SYNC (transmission type 1).

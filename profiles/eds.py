@@ -24,7 +24,7 @@ from cdpr_profiles.errors import ProfileError, value_text
 
 MOST_EDS_BYTES = 2 << 20
 _MOST_OBJECTS = 20_000
-"""Most sections, including those that short forms stand for."""
+"""Maximum number of sections, including those that the short forms imply."""
 _MOST_REMARKS = 200
 _MOST_PDOS = 512
 _PDO_ENTRIES = 8
@@ -84,12 +84,12 @@ class Remarks:
 class DataSheet:
     """Content of an EDS or DCF, with `remarks` on parts that could not be understood.
 
-    Defaults and values relative to the node id are those for the node id given when reading.
+    Defaults and values that depend on the node id are those for the node id given when reading.
     """
 
     path: Path
     od: ObjectDictionary = field(default_factory=ObjectDictionary)
-    """Including the device information; `node_id` and `bitrate` are those of a DCF."""
+    """The objects and the device information; `node_id` and `bitrate` are those of a DCF."""
     remarks: Remarks = field(default_factory=Remarks)
     relative_values: set[tuple[int, int]] = field(default_factory=set)
     """Index and sub-index of DCF values that are relative to the node id."""
@@ -109,7 +109,7 @@ class DataSheet:
         return [entry for sub, entry in sorted(found.subindices.items()) if sub]
 
     def require(self, index: int, why: str) -> ODVariable | ODRecord | ODArray:
-        """Return an object or record; raises ProfileError, with the remarks on it, if missing."""
+        """Return an object or record; raises ProfileError with its remarks if it is missing."""
         found: ODVariable | ODRecord | ODArray | None = self.od.indices.get(index)
         if found is None:
             place = f"[{index:04X}"
@@ -120,7 +120,7 @@ class DataSheet:
 
 @dataclass
 class _Section:
-    """One section: its name as written, and its keys, folded to lower case."""
+    """One section: its name as written, and its keys in lower case."""
 
     name: str
     keys: dict[str, str] = field(default_factory=dict)
@@ -136,7 +136,7 @@ class _Section:
 
 
 class _Sections(dict[str, _Section]):
-    """The sections of a file, by folded name."""
+    """The sections of a file, by their names in lower case."""
 
     def __init__(self, sheet: DataSheet) -> None:
         super().__init__()
@@ -155,7 +155,7 @@ class _Sections(dict[str, _Section]):
         return self.put(_Section(name, keys | {"accesstype": access, "defaultvalue": value}))
 
     def add_record(self, index: int, name: str) -> None:
-        """Add the head of a record unless the file has it."""
+        """Add the first section of a record unless the file has it."""
         keys = {"parametername": name, "objecttype": hex(_RECORD)}
         self.put(_Section(f"{index:04X}", keys))
 
@@ -225,7 +225,7 @@ def _decoded(content: bytes, remarks: Remarks) -> str:
 
 
 def _sections(sheet: DataSheet, text: str) -> _Sections:
-    """Return the sections by folded name; the first value of a key counts."""
+    """Return the sections by name in lower case; the first value of a repeated key counts."""
     sections, remarks = _Sections(sheet), sheet.remarks
     section = None
     for number, raw in enumerate(text.splitlines(), 1):
@@ -279,7 +279,7 @@ def integer(text: str) -> int | None:
     return sign * int(digits, 8 if octal else 10)
 
 
-# The device, and the short forms (CompactSubObj, CompactPDO) written out in full.
+# The device, and the short forms (CompactSubObj, CompactPDO), which are expanded to sections.
 
 
 def _read_device(sections: _Sections, sheet: DataSheet) -> None:
@@ -312,7 +312,7 @@ def _read_device(sections: _Sections, sheet: DataSheet) -> None:
 def _number(
     section: _Section, key: str, allowed: Sequence[int] | None, remarks: Remarks
 ) -> int | None:
-    """Return an integer key of a section, None with a remark if not in `allowed` (None: any)."""
+    """Return an integer key; None, with a remark, if not in `allowed` (None allows any)."""
     text = section.get(key)
     value = integer(text)
     if value is not None and (allowed is None or value in allowed):
@@ -326,7 +326,7 @@ def _number(
 
 
 def _expand(sections: _Sections) -> None:
-    """Add the sections that the short forms of a file stand for."""
+    """Add the sections that the short forms of a file imply."""
     for key in [key for key in sections if _OBJECT.fullmatch(key)]:
         if sections[key].get("CompactSubObj"):
             _expand_array(key, sections)
@@ -368,7 +368,7 @@ def _expand_array(key: str, sections: _Sections) -> None:
 
 
 def _add_pdo(sections: _Sections, index: int, present: int, cob_id: str) -> None:
-    """Add a PDO that [DeviceInfo] only counts, with the sub-indices given by CompactPDO."""
+    """Add a PDO that [DeviceInfo] only counts; CompactPDO gives its sub-indices."""
     subs = [sub for sub in _PDO_PARAMETERS if present >> (sub - 1) & 1]
     if f"{index:04x}" not in sections and subs:
         sections.add_record(index, "PDO communication parameter")
@@ -468,7 +468,7 @@ class _Objects:
         return variable
 
     def _data_type(self, section: _Section, usual: int | None) -> int | None:
-        """Return the type's code; that of plain bytes if it is unknown, None if it is missing."""
+        """Return the type's code; the one of plain bytes if unknown, None if the key is missing."""
         text = section.get("DataType")
         data_type = integer(text) if text or usual is None else usual
         if data_type is not None and data_type > max(_TYPES):
@@ -488,7 +488,7 @@ class _Objects:
         return int(datatypes.DOMAIN)
 
     def _value(self, section: _Section, key: str, variable: ODVariable) -> Value | None:
-        """Return the value of a key in its type, None if it is missing or wrong."""
+        """Return the value of a key, converted to the variable's type; None if missing or wrong."""
         text, data_type = section.get(key), variable.data_type
         if not text or data_type in _STRINGS:
             return text or None
@@ -517,7 +517,7 @@ class _Objects:
         signed = variable.data_type in datatypes.SIGNED_TYPES
         low, high = (-1 << bits - 1, (1 << bits - 1) - 1) if signed else (0, (1 << bits) - 1)
         if value is not None and signed and high < value < 1 << bits:
-            value -= 1 << bits  # given as raw bits, in hexadecimal
+            value -= 1 << bits  # the file has the raw bits in hexadecimal
         if value is not None and low <= value <= high:
             return value if node is None else value + self._node_id
         allowed = (

@@ -7,7 +7,7 @@ _MOST_CHARS = 200
 _MOST_LINE_CHARS = 1000
 
 
-# C0 except tab and line end, DEL, C1, bidirectional marks, lone surrogates
+# C0 except tab and line feed, DEL, C1, bidirectional marks, lone surrogates
 _ACTING = re.compile(
     "[\x00-\x08\x0b-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069\ud800-\udfff]"
 )

@@ -28,15 +28,15 @@ _DRUM, _ELONGATION = (0.9, 1.1), (0.1, 10.0)
 
 
 class GeometryCalibration(Profile):
-    """Exit points, home, drums and elongation of a robot as calibrated; the file has the rest."""
+    """Calibrated exit points, home, drums and elongation; the robot's file has all other values."""
 
     robot: str
     geometry_sha256: str
-    """Hash of the replaced and scaled values as loaded: if it changed, the robot is another one."""
+    """Hash of the replaced and scaled values of the file; if it differs, so does the robot."""
     simulated: bool
-    """Whether it was measured on a simulated robot: it is not valid on another bus."""
+    """Whether it was measured on a simulated robot; then it is valid only on a simulated bus."""
     distrusted_before: str = ""
-    """Why the previous geometry was not trusted at the takeover, empty if it was."""
+    """Why the previous geometry was not trusted when this one replaced it; empty if it was."""
     version: int = Field(ge=1)
     date: datetime
     method: Literal["points", "redundancy", "camera"]
@@ -48,34 +48,34 @@ class GeometryCalibration(Profile):
     """Position of the platform on its stand."""
     home_rotation_rad: tuple[float, ...]
     drum_scales: tuple[float, ...]
-    """Cable paid out by a turn of each motor, over the file's value."""
+    """Cable paid out per turn of each motor, divided by the file's value."""
     elongation_scale: float
     poses: int = Field(ge=1)
     exit_std_m: tuple[float, ...]
-    """Predicted standard deviation of each exit point, its worst coordinate."""
+    """Predicted standard deviation of each exit point, in its worst coordinate."""
     predicted_3_sigma_mm: float = Field(ge=0)
-    """Of a position in the workspace, by the uncertainty of the fit."""
+    """Uncertainty of a position in the workspace, from the covariance of the fit."""
     predicted_3_sigma_deg: float | None = Field(default=None, ge=0)
-    """Of relative orientations; None for platforms whose orientation is not estimated."""
+    """Uncertainty of relative orientations; None if the platform's is not estimated."""
     absolute_3_sigma_mm: float | None = Field(default=None, ge=0)
-    """Of an absolute position, with the uncertainty of the frame included."""
+    """Uncertainty of an absolute position, including that of the frame."""
     absolute_3_sigma_deg: float | None = Field(default=None, ge=0)
     verified_poses: int = Field(ge=0)
     verified_mean_mm: float | None = None
-    """At poses that the fit did not use, against measurements there; None without points."""
+    """Mean error against measurements at poses that the fit did not use; None without points."""
     verified_worst_mm: float | None = None
     raw_data: str
     points_file: str = ""
-    """Additional measured positions, empty without."""
+    """File of additional measured positions; empty without."""
     hand_eye_file: str = ""
-    """The given place of the camera on its platform, empty if the raw data have it."""
+    """File with the pose of the camera on its platform; empty if the raw data have it."""
     identified: tuple[str, ...] = ("exit", "offset", "drum", "elongation")
     known_exit_m: float = Field(default=0.05, gt=0)
     """Assumed standard deviation of exit points in the robot's file."""
 
     @property
     def identity(self) -> str:
-        """Short hash of its whole content."""
+        """Short hash of the whole content."""
         text = self.model_dump_json().encode()
         return hashlib.sha256(text).hexdigest()[:_HASH_CHARS]
 
@@ -175,7 +175,7 @@ class GeometryCalibration(Profile):
 
 
 def geometry_sha256(robot: Robot) -> str:
-    """Return the hash of the values that a calibration replaces or scales, by the robot's files."""
+    """Return the hash of the values in the robot's files that a calibration replaces or scales."""
     platform = robot.platform
     points: tuple[Any, ...] = ()
     if platform is not None:
@@ -191,9 +191,9 @@ def geometry_sha256(robot: Robot) -> str:
 
 
 def write_text(path: Path, text: str) -> None:
-    """Replace a file as a whole, so that a power failure leaves the old or the new one.
+    """Replace a file as a whole, so that a power failure leaves the old file or the new one.
 
-    Raises ProfileError with its name.
+    Raises ProfileError with the file's name.
     """
     try:
         path.parent.mkdir(parents=True, exist_ok=True)

@@ -33,13 +33,13 @@ from typing_extensions import override
 from cdpr_profiles.user_folders import is_private, temporary_folder
 
 COMPILING = logging.getLogger("cdpr.compiling")
-"""Logs each kernel without cached machine code on this machine, at level INFO."""
+"""Logs at level INFO each kernel that has no cached machine code on this machine."""
 
 _LOG = logging.getLogger("cdpr.kernels")
 _WARNED = "CDPR_KERNELS_NOT_KEPT"
 """Environment variable set after the warning, so that processes started later do not repeat it."""
 _LAYOUT = "kernels-1"
-"""Folder of machine code; it changes with the naming scheme of its files."""
+"""Name of the folder of machine code; it changes with the naming scheme of the files."""
 _UNWRITABLE = "neither the program's folder nor the user's cache can be written"
 _SETTINGS: Any = config
 _RUNTIME: Any = cast(Any, runtime).rtsys
@@ -51,8 +51,8 @@ _F = TypeVar("_F", bound=Callable[..., Any])
 def _skip_blas() -> None:
     """Load numba's array functions without scipy.linalg, which saves 0.2 s per process start.
 
-    numba looks for scipy's BLAS to decide whether kernels may call np.cov and np.corrcoef. Its
-    other functions of linear algebra look for it when they are compiled.
+    numba searches for scipy's BLAS to decide whether kernels may call np.cov and np.corrcoef. Its
+    other functions of linear algebra search for it when they are compiled.
     """
     blas = "scipy.linalg.cython_blas"
     if blas not in sys.modules:
@@ -91,17 +91,18 @@ def _call_template(dispatcher: Any, args: Any, kws: Any) -> Any:
 
 
 def jit(function: _F, **options: bool) -> _F:
-    """Return `function` compiled by numba, cached on disk, with its type kept for the checker.
+    """Return `function` compiled by numba and cached on disk; type checkers see its own type.
 
     Machine code is written to NUMBA_CACHE_DIR or beside the function's module. If numba can write
     neither there nor to the user's cache, it is written to a temporary folder. If that fails too,
-    it is not kept. Machine code beside the module is read even if nothing can be written there:
-    another user may have installed it. If a cache fails later, the kernel is compiled again.
+    it is lost at the end of the process. Machine code beside the module is read even if nothing can
+    be written there: another user may have installed it. If a cache fails later, the kernel is
+    compiled again.
     """
     # numba keeps separate machine code for each path to a source file: give it only one
     source = Path(function.__code__.co_filename).resolve()
     function.__code__ = function.__code__.replace(co_filename=str(source))
-    # no C code calls kernels, and the wrapper for C is a twentieth of the compile time
+    # no C code calls kernels, and the C wrapper takes a twentieth of the compile time
     compile_it = partial(_NJIT, no_cfunc_wrapper=True, **options)
     compiled = None
     for base in _caches(_SETTINGS.CACHE_DIR or str(source.parent / "__pycache__")):
@@ -131,10 +132,10 @@ def _caches(usual: str) -> Iterator[str]:
 
 @cache
 def _substitute_cache() -> str | None:
-    """Return the last-resort folder for machine code, or None if it cannot be written.
+    """Return the folder for machine code used as a last resort; None if it cannot be written.
 
-    Log a warning that names the folder. Processes started from here use the same folder and do not
-    repeat the warning.
+    Logs a warning that names the folder. Child processes use the same folder and do not repeat the
+    warning.
     """
     folder, kept = temporary_folder(), None
     with suppress(OSError):  # a read-only system
@@ -143,7 +144,7 @@ def _substitute_cache() -> str | None:
             tempfile.TemporaryFile(dir=folder).close()
             kept = str(folder / "kernels")
     if kept is not None:
-        # for processes started from here
+        # for child processes
         os.environ["NUMBA_CACHE_DIR"] = kept
         os.environ.setdefault("MPLCONFIGDIR", str(folder / "matplotlib"))
         _LOG.warning("note: compiled kernels are kept in %s: %s", kept, _UNWRITABLE)
@@ -198,8 +199,8 @@ class _ReadOnlyCache(FunctionCache):
 class _Files(IndexDataCacheFile):
     """The files of one kernel: an index, and machine code for each type of its arguments.
 
-    numba numbers these: two processes that compile a kernel for different types at the same time
-    could take the same number, and one's machine code would be called with the other's arguments.
+    numba numbers these files: two processes that compile a kernel for different types at the same
+    time could take the same number. Then one's code would be called with the other's arguments.
     """
 
     def __init__(self, folder: str, beside: str, name: str, digest: str) -> None:
@@ -242,7 +243,7 @@ def _locked(folder: str) -> Iterator[None]:
     """Make other processes wait before they change an index in this folder."""
     opened = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
     try:
-        with suppress(OSError):  # a file system without locks: another entry may get lost
+        with suppress(OSError):  # a file system without locks: an entry may get lost
             fcntl.flock(opened, fcntl.LOCK_EX)
         yield
     finally:
@@ -252,8 +253,8 @@ def _locked(folder: str) -> Iterator[None]:
 def _keep_by_content(kernel: Any) -> None:
     """Cache machine code of `kernel` under the digest of its content, see `_content`.
 
-    numba compares the age of the source file: it compiles a whole file again after a touch, and
-    keeps machine code that contains an old version of a callee from another file.
+    numba compares the age of the source file instead: it compiles a whole file again after a touch,
+    and keeps machine code that contains an old version of a kernel from another file.
     """
     kept, files = kernel._cache, cast(Any, _Files)
 
@@ -269,7 +270,7 @@ def _keep_by_content(kernel: Any) -> None:
 
     def load(signature: Any, target_context: Any) -> Any:
         open_cache()
-        # numba first loads all that compiling needs, for 0.1 s; machine code needs only this
+        # numba first loads everything for compilation, in 0.1 s; machine code needs only this
         _RUNTIME.initialize(target_context)
         with suppress(OSError):
             return kept._load_overload(signature, target_context)
@@ -287,8 +288,8 @@ def _keep_by_content(kernel: Any) -> None:
 def _rebuild(target_context: Any, payload: Any) -> Any:
     """Return the compile result of a cached kernel; parse its bitcode only if it is needed.
 
-    numba parses the bitcode of each kernel when it loads it, which takes twice as long as all the
-    rest. Only a kernel that is compiled later, and calls this one, needs it.
+    numba parses the bitcode of each kernel when it loads it, which doubles to triples the loading
+    time. Only kernels that call this one, and are compiled later, need the bitcode.
     """
     (name, kind, (machine_code, bitcode)), described, *others = payload
     engine = target_context.codegen()._engine
@@ -365,7 +366,7 @@ def _codes(code: CodeType) -> Iterator[CodeType]:
 
 
 def _constant_text(value: Any) -> str:
-    """Return a text for a constant, the same in every process; for other objects their name."""
+    """Return a text for a constant, the same in every process; for other objects, their name."""
     if isinstance(value, np.ndarray):
         return f"{value.dtype} {value.shape} {hashlib.sha256(value.tobytes()).hexdigest()}"
     if isinstance(value, tuple):

@@ -15,7 +15,7 @@ Dashed = Annotated[float, Field(gt=0)] | None
 RAD_S_PER_RPM = 2.0 * math.pi / 60.0
 _DASH = "—"
 _TORQUE_RATIO = 2.0
-"""Largest factor between the rated torque and torque constant times rated current."""
+"""Largest factor between the rated torque and the product of torque constant and rated current."""
 
 
 def dash_to_none(value: Any) -> Any:

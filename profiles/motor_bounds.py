@@ -1,6 +1,6 @@
 """Physical bounds of the parameters that are identified for a motor or its winch.
 
-They do not judge the quality of a parameter. Beyond them a parameter is impossible for such a
+They do not judge the quality of a parameter. A parameter beyond them is impossible for such a
 motor, and compensation with it would move the motor.
 """
 
@@ -14,27 +14,28 @@ from typing import Final
 from cdpr_profiles.motor import Motor
 
 COMPENSATION_SHARE: Final = 0.25
-"""Of the rated torque, for cogging and dry friction together; 0.02 to 0.1 is usual."""
+"""Cogging and dry friction together, as a share of rated torque; 0.02 to 0.1 is usual."""
 BIAS_SHARE: Final = 0.02
-"""Of the rated torque, for the mean torque over a turn and both directions.
+"""Mean torque over a turn and both directions, as a share of rated torque.
 
-Cogging has no mean, and friction differs less by direction. Dry friction balances it.
+Cogging has zero mean, and the friction of the two directions differs less than this. A mean torque
+up to this share does not overcome dry friction.
 """
 VISCOUS_SHARE: Final = 0.2
-"""Of the rated torque, for viscous friction at rated speed; 0.1 is usual."""
+"""Viscous friction at rated speed, as a share of rated torque; 0.1 is usual."""
 LEAST_INERTIA_RATIO: Final = 0.5
-"""Inertia over the rotor's; below 1 because the torque constant may be wrong."""
+"""Inertia divided by the rotor's; below 1 because the torque constant may be wrong."""
 MOST_INERTIA_RATIO: Final = 50.0
 MOST_SPEED_RATIO: Final = 2.0
-"""An axis' speed limit over the motor's rated speed."""
+"""An axis' speed limit divided by the motor's rated speed."""
 LEAST_STRIBECK_RAD_S: Final = 1e-4
 MOST_GAIN_ERROR: Final = 0.5
-"""Relative difference of torque per tension from drum radius over gear ratio."""
+"""Relative difference between torque per tension and drum radius over gear ratio."""
 WINCH_FRICTION_SHARE: Final = 0.5
-"""Of the rated torque, for bias and friction of a winch without tension."""
+"""Bias and friction of a winch without tension, as a share of rated torque."""
 
 Faults = Iterator[tuple[str, str]]
-"""(key, problem) for each figure outside its bounds."""
+"""(key, problem) for each value outside its bounds."""
 
 
 @dataclass(frozen=True)
@@ -68,12 +69,12 @@ class MotorBounds:
         yield from within(key, viscous_Nms_rad, -most, most, of)
 
     def stribeck_speed(self, key: str, speed_rad_s: float) -> Faults:
-        """Yield a fault for a Stribeck speed beyond the motor's own."""
+        """Yield a fault for a Stribeck speed beyond the motor's rated speed."""
         most = self.motor.rated_speed_rad_s
         yield from within(key, speed_rad_s, LEAST_STRIBECK_RAD_S, most, "rad/s, the rated speed")
 
     def inertia(self, key: str, inertia_kg_m2: float) -> Faults:
-        """Yield a fault for an inertia of another order of magnitude than the rotor's."""
+        """Yield a fault for an inertia far from the rotor's."""
         rotor = self.motor.rotor_inertia_kg_m2
         low, high = LEAST_INERTIA_RATIO * rotor, MOST_INERTIA_RATIO * rotor
         of = f"kg m2, {LEAST_INERTIA_RATIO:g} to {MOST_INERTIA_RATIO:g} times the rotor's inertia"
@@ -96,6 +97,6 @@ class MotorBounds:
 
 
 def within(key: str, value: float, low: float, high: float, of: str) -> Faults:
-    """Yield a fault for a value not from `low` to `high`; `of` is their unit and reason."""
+    """Yield a fault for a value outside `low` to `high`; `of` is the unit and the reason."""
     if not low <= value <= high:
         yield key, f"value {value:.6g}; allowed: {low:.4g} to {high:.4g} {of}"

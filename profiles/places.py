@@ -1,4 +1,4 @@
-"""Search path of profiles: beside the file that names them, the user's folder, shipped ones."""
+"""Search profiles beside the file that names them, in the user's folder, among the shipped ones."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _DISTINCTIVE_KEYS: dict[ProfileKind, str] = {
 }
 """A key that all files of a kind have, and files of no other kind."""
 SERIES = ".series.toml"
-"""End of the file name of a series of motors or cables, which is not itself a profile."""
+"""End of the file name of a series of motors or cables; a series itself is not a profile."""
 
 
 def user_folder() -> Path:
@@ -54,7 +54,7 @@ def _toml_files(folder: Path) -> list[Path]:
 
 
 def find(kind: ProfileKind, name: str | Path, beside: Path | None = None) -> Path | None:
-    """Return the file of a profile given by name or path, None if no file has this name.
+    """Return the file of a profile given by name or path; None if there is no such file.
 
     `beside` is a folder that is searched first and from which relative paths start.
     """
@@ -105,7 +105,7 @@ def _is_of(kind: ProfileKind, path: Path) -> bool:
 
 
 def reference(kind: ProfileKind, path: Path) -> str:
-    """Return a reference valid in any folder and for any user: a shipped profile's name, or a path.
+    """Return a reference that is valid in any folder and for any user: a shipped name, or a path.
 
     A user's own profile hides a shipped one with the same name, which then needs its path.
     """

@@ -17,7 +17,7 @@ from cdpr_profiles.reader import Profile
 FURTHEST_m = 1000.0
 """Largest allowed coordinate."""
 WIDEST_m: Final = 300.0
-"""Largest distance of two exit points: more than most stadiums, less than most frames in mm."""
+"""Largest distance of two exit points: above that of most stadiums, below that of frames in mm."""
 
 
 def _in_metres(value: float) -> float:
@@ -37,7 +37,7 @@ def _direction(values: tuple[float, ...]) -> tuple[float, ...]:
 
 
 def _one_or_several(allowed: str) -> BeforeValidator:
-    """Accept a single number as an array of one; reject matrices and texts with `allowed`."""
+    """Accept a single number as an array of one; reject matrices and texts, listing `allowed`."""
 
     def check(value: Any) -> Any:
         if isinstance(value, int | float) and not isinstance(value, bool):
@@ -55,7 +55,7 @@ _PoseName = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_-]{0,31}$")]
 Direction = Annotated[
     tuple[float, ...], Field(min_length=2, max_length=3), AfterValidator(_direction)
 ]
-"""A direction in the room; its length does not matter, and is 1 after reading."""
+"""A direction in the room; its length in the file does not matter, reading normalises it."""
 _Inertia = Annotated[
     tuple[float, ...],
     _one_or_several("six numbers Ixx Iyy Izz Ixy Ixz Iyz, not a matrix; in a plane one number"),
@@ -64,12 +64,12 @@ _Rotation = Annotated[
     tuple[float, ...],
     _one_or_several("three numbers, a rotation vector, not a matrix; in a plane one angle"),
 ]
-"""A single number is an array of one."""
+"""Rotation or angle; a single number is an array of one."""
 
 TENSION_METHODS: Final = ("minimum-norm", "minimum-deviation", "closed-form", "polygon-centroid")
 """Built-in methods of tension distribution."""
 DISTRIBUTIONS: Final = "cdpr_rt.tension_distributions"
-"""Group of entry points under which installed packages register further ones by name."""
+"""Entry-point group under which installed packages register further methods by name."""
 _USUAL_METHOD: Final = "minimum-deviation"
 _IN_FILE: Final = re.compile(r"[^:\0]+\.py:[^\W\d]\w*")
 
@@ -96,9 +96,9 @@ NO_PLATFORM: Final = "has no platform; allowed: a robot with a [platform]"
 """Error text, after its name or path, for a robot without the required platform."""
 _LEAST_ARM_m = 0.1
 _RISE_S = 0.1
-"""Default time in which the acceleration is reached, if no jerk is given."""
+"""Time in which the acceleration is reached, if the file gives no jerk."""
 CLEARANCE_m: Final = 0.01
-"""Default distance between centre lines of cables; thicker cables increase it."""
+"""Default minimum distance of the centre lines of two cables; thicker cables increase it."""
 
 
 class BoxFile(Profile):
@@ -109,45 +109,45 @@ class BoxFile(Profile):
 
 
 class PlatformFile(Profile):
-    """The table [platform] of a robot's file; two coordinates are a vertical plane, y upward.
+    """The table [platform] of a robot's file; all points are in m.
 
-    All points are in m. Three coordinates are a room, z upward.
+    Two coordinates are for a vertical plane, y upward; three are for space, z upward.
     """
 
     mass_kg: float = Field(gt=0, le=100_000)
     home_m: Point
-    """Position of its origin at rest on its stand, where sessions begin and end."""
+    """Position of the platform's origin at rest on its stand, where sessions begin and end."""
     home_tolerance_m: float = Field(default=0.05, gt=0, le=1)
-    """Largest deviation from `home_m`."""
+    """Largest deviation of the position from `home_m`."""
     workspace_min_m: Point
     workspace_max_m: Point
-    """The box in which targets may lie."""
+    """Upper corner of the box in which targets may lie."""
     speed_m_s: float = Field(gt=0, le=20)
     acceleration_m_s2: float = Field(gt=0, le=100)
-    """Along each direction."""
+    """Acceleration limit along each direction."""
     inertia_kg_m2: _Inertia | None = None
-    """Ixx Iyy Izz Ixy Ixz Iyz about the centre of mass in the platform's frame; one in a plane."""
+    """Ixx Iyy Izz Ixy Ixz Iyz about the centre of mass in the platform's frame; in a plane, one."""
     centre_of_mass_m: Point | None = None
-    """In the platform's frame; by default its origin."""
+    """Centre of mass in the platform's frame; by default the origin."""
     home_rotation_rad: _Rotation | None = None
-    """Rotation vector from the room's axes to the platform's at home, an angle in a plane."""
+    """Rotation vector from the room's axes to the platform's at home; in a plane, an angle."""
     workspace_angle_rad: float = Field(default=0.0, ge=0)
     """Largest angle of targets from the orientation at home."""
     angular_speed_rad_s: float | None = Field(default=None, gt=0, le=100)
     angular_acceleration_rad_s2: float | None = Field(default=None, gt=0, le=10_000)
-    """About each axis."""
+    """Acceleration limit about each axis."""
     jerk_m_s3: float | None = Field(default=None, gt=0, le=100_000)
     angular_jerk_rad_s3: float | None = Field(default=None, gt=0, le=10_000_000)
-    """Along and about each direction, on paths; by default the acceleration is reached in 0.1 s."""
+    """Jerk limit on paths; by default, the acceleration is reached in 0.1 s."""
     controlled: tuple[DirectionName, ...] | None = None
     """Directions that the cables control; by default all that they can."""
     tension_distribution: Annotated[str, AfterValidator(_known_distribution)] = _USUAL_METHOD
     """A built-in method, a name that an installed package registers, or FILE.py:NAME."""
     cable_model: CableModelName = "elastic"
     clearance_m: float | None = Field(default=None, gt=0, le=1)
-    """Two cables (centre lines), or a cable and a box, are in contact if nearer than this."""
+    """Distance below which two cables (centre lines), or a cable and a box, count as in contact."""
     poses_m: dict[_PoseName, Point] = Field(default={}, max_length=100)
-    """Named positions that `cdpr move --to NAME` goes to."""
+    """Named positions, the targets of `cdpr move --to NAME`."""
     body: BoxFile | None = None
     """The platform's body, in its own frame."""
     obstacles: tuple[BoxFile, ...] = Field(default=(), max_length=100)
@@ -159,10 +159,10 @@ class Platform:
     """A platform on the cables of a robot's axes; points in the order of the axes.
 
     Fields of `PlatformFile` have the same meaning here. `exit_points_m` are in the room,
-    `anchor_points_m` in the platform's frame, whose origin `home_m` and targets refer to.
+    `anchor_points_m` are in the platform's frame, whose origin `home_m` and targets refer to.
     Missing values (empty, or 0 for an angular speed, acceleration or jerk) get defaults. With the
-    default angular speed and acceleration, the furthest anchor point, at least 0.1 m away,
-    moves with `speed_m_s` and `acceleration_m_s2`. Default jerks reach the accelerations in 0.1 s.
+    default angular limits, the anchor point farthest from the origin (at least 0.1 m) moves with
+    `speed_m_s` and `acceleration_m_s2`. Default jerks reach the accelerations in 0.1 s.
     """
 
     mass_kg: float
@@ -183,7 +183,7 @@ class Platform:
     jerk_m_s3: float = 0.0
     angular_jerk_rad_s3: float = 0.0
     controlled: tuple[str, ...] = ()
-    """Some of DIRECTIONS, in their order."""
+    """Controlled directions, a part of DIRECTIONS in the same order."""
     tension_distribution: str = _USUAL_METHOD
     cable_model: str = "elastic"
     clearance_m: float = CLEARANCE_m
@@ -191,11 +191,11 @@ class Platform:
     body: BoxFile | None = None
     obstacles: tuple[BoxFile, ...] = ()
     pulley_radius_m: tuple[float, ...] = ()
-    """One for each axis; 0 for an eye."""
+    """Radius of each axis' pulley; 0 for an eye."""
     cable_weights_N_m: tuple[float, ...] = ()
-    """Weight per length in lengths and tensions, one for each axis; 0: neglected."""
+    """Cable weight per length for each axis, used in lengths and tensions; 0 neglects it."""
     pulley_axes: tuple[tuple[float, ...], ...] = ()
-    """Unit vectors along which the cables come to their pulleys, one for each axis."""
+    """Unit vectors along which the cables arrive at their pulleys, one for each axis."""
 
     def __post_init__(self) -> None:
         """Fill in the defaults."""
@@ -223,19 +223,19 @@ class Platform:
 
     @property
     def tension_method(self) -> str:
-        """The built-in method; the usual one if the distribution is not built in."""
+        """The built-in method; the default one if the distribution is not built in."""
         built_in = self.tension_distribution in TENSION_METHODS
         return self.tension_distribution if built_in else _USUAL_METHOD
 
     @property
     def own_distribution(self) -> str:
-        """The distribution that is not built in, FILE.py:NAME or a registered name; else ""."""
+        """The distribution that is not built in: FILE.py:NAME or a registered name; else ""."""
         own = self.tension_distribution
         return "" if own in TENSION_METHODS else own
 
     @property
     def is_planar(self) -> bool:
-        """Whether it moves in a plane."""
+        """Whether the platform moves in a plane."""
         return len(self.home_m) == 2
 
     @property
@@ -251,8 +251,9 @@ class Platform:
 def controlled_by_default(anchor_points_m: Sequence[tuple[float, ...]]) -> tuple[str, ...]:
     """Return the directions that the cables of a platform with these anchor points can control.
 
-    They control the positions. They control the angles unless all cables end in one point, or at
-    most three cables hold a platform in a plane: these leave it free to turn.
+    They always control the positions. They also control the angles, except in two cases: all cables
+    end in one point, or at most three cables hold a platform in a plane, which leave it free to
+    turn.
     """
     size = len(anchor_points_m[0])
     free = len(set(anchor_points_m)) == 1 or (size == 2 and len(anchor_points_m) <= 3)
@@ -262,11 +263,11 @@ def controlled_by_default(anchor_points_m: Sequence[tuple[float, ...]]) -> tuple
 # Faults of the table [platform] of a robot's file, as far as the file alone shows them.
 
 _PLATFORM_FAULTS_LEAST_ARM_m = 0.01
-"""Anchor points closer than this probably are the same, or are in another unit."""
+"""Anchor points closer than this are probably the same, or in another unit."""
 _OFF_BODY_m = 0.03
-"""More than a calibration moves an anchor point on the platform's body."""
+"""Allowed distance of anchor points from the body: more than a calibration moves them."""
 _LEAST_OFF_m = 0.1
-"""Allowed distance of the centre of mass from the box around even the smallest platform."""
+"""Allowed distance of the centre of mass from the box around the platform, however small."""
 _ROUNDING = 1e-6
 
 
@@ -423,7 +424,7 @@ def _widest(points: Sequence[tuple[float, ...]]) -> float:
 def _inertia_faults(
     given: tuple[float, ...], mass_kg: float, frame_m: float
 ) -> Iterator[tuple[str, str]]:
-    """Yield faults of an inertia: impossible for any body, or too large for the frame."""
+    """Yield faults of an inertia that is impossible for any body, or too large for the frame."""
     key = "platform.inertia_kg_m2"
     moments = np.array(given)
     if len(given) == 6:
@@ -446,7 +447,7 @@ def _inertia_faults(
 def _direction_faults(
     file: PlatformFile, anchors: Sequence[tuple[float, ...]]
 ) -> Iterator[tuple[str, str]]:
-    """Yield faults of controlled directions, compared with the cables and required values."""
+    """Yield faults of the controlled directions: beyond the cables' control, or missing values."""
     size, n = len(file.home_m), len(anchors)
     known = DIRECTIONS[size]
     given = controlled_by_default(anchors) if file.controlled is None else file.controlled

@@ -15,10 +15,10 @@ Bit = Annotated[int, Field(ge=0, le=15)]
 
 
 class BrakeCheck(Profile):
-    """Test of the applied brake before a move: pushed in both directions, it must hold."""
+    """Test of the applied brake before a move: it must hold a push in both directions."""
 
     torque_percent: float = Field(default=10.0, gt=0, le=100)
-    """Of the rated torque; less than the brake's holding torque, more than friction."""
+    """Share of the rated torque; below the brake's holding torque, above the friction."""
     seconds: float = Field(default=0.2, gt=0, le=10)
     """Duration of the push in each direction."""
     allowed_m: float = Field(default=2e-4, gt=0, le=0.1)
@@ -63,7 +63,8 @@ class StatusBits(Profile):
 
 
 class ModbusRail(Profile):
-    """A position axis on Modbus TCP; all are holding registers, positions take two (high first)."""
+    """A position axis on Modbus TCP. All registers are holding registers; a position takes two,
+    high word first."""
 
     host: str = Field(min_length=1)
     port: int = Field(default=502, ge=1, le=65535)
@@ -77,7 +78,7 @@ class ModbusRail(Profile):
     command_register: Address
     status_register: Address
     push_register: Address | None = None
-    """Takes a torque in percent of the rated one (signed) while no move is running."""
+    """Register for a torque in percent of rated torque (signed), while no move is running."""
     command: CommandBits
     status: StatusBits
     brake_timeout_s: float = Field(default=0.5, gt=0, le=10)
@@ -96,7 +97,7 @@ class RailProfile(Profile):
     name: str = Field(min_length=1)
     notes: tuple[str, ...] = ()
     robot: str = Field(min_length=1)
-    """Robot that loses its calibration when the rail moves."""
+    """Robot whose calibration becomes invalid when the rail moves."""
     kind: Literal["cia402", "modbus"]
     travel_min_m: float
     travel_max_m: float

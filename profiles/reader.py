@@ -22,7 +22,7 @@ _MOST_FAULTS = 10
 class Profile(BaseModel):
     """Base of every model read from TOML: frozen, strict about types, unknown keys rejected.
 
-    Use tuples for arrays: lists of the file arrive as tuples.
+    Use tuples for arrays: lists in the file become tuples.
     """
 
     model_config = ConfigDict(
@@ -35,7 +35,7 @@ class Profile(BaseModel):
         return read_toml_model(Path(path), cls)
 
     def toml_text(self, *comments: str) -> str:
-        """Return a file's text from which `load_file` reads this model; None is left out."""
+        """Return the text of a file that `load_file` reads as this model; omit keys with None."""
         lines = [f"# {comment}" for comment in comments]
         for key, value in self.model_dump().items():
             if value is not None:
@@ -94,7 +94,7 @@ def validated(path: Path, table: Mapping[str, Any], model: type[_M]) -> _M:
 
 
 def _refused(path: Path, model: type[BaseModel], error: ValidationError) -> ProfileError:
-    """Return the first faults as one error."""
+    """Return the first faults of a validation as one error."""
     found = list(islice(_faults(model, error.errors(include_url=False)), _MOST_FAULTS + 1))
     key, problem = found[0]
     further = [f"\n{path}: {k}: {p}" if k else f"\n{path}: {p}" for k, p in found[1:_MOST_FAULTS]]
@@ -111,7 +111,7 @@ def closest(name: str, known: Iterable[str]) -> str | None:
 
 
 def _faults(model: type[BaseModel], errors: list[ErrorDetails]) -> Iterable[tuple[str, str]]:
-    """Yield (dotted key, problem), misspelt keys first, without missing keys that they explain."""
+    """Yield (dotted key, problem), misspelt keys first; skip missing keys that they explain."""
     explained: set[tuple[int | str, ...]] = set()
     for error in errors:
         if error["type"] == "extra_forbidden":
@@ -134,7 +134,7 @@ def _faults(model: type[BaseModel], errors: list[ErrorDetails]) -> Iterable[tupl
         elif error["type"] == "too_long":
             yield dotted(error["loc"]), _count_fault(error, "up to {max_length}")
         elif error["type"] == "too_short":
-            # the count excludes rejected entries, whose faults are reported separately
+            # the count leaves out rejected entries, whose faults are reported separately
             if len(error["input"]) < error["ctx"]["min_length"]:
                 yield dotted(error["loc"]), _count_fault(error, "{min_length} or more")
         elif error["type"] not in ("missing", "extra_forbidden"):
@@ -157,7 +157,7 @@ def dotted(loc: Iterable[int | str]) -> str:
 
 
 def _keys_at(model: type[BaseModel], loc: Iterable[int | str]) -> list[str]:
-    """Return the model's keys at a place in the file."""
+    """Return the keys that the model has at a place in the file."""
     annotation: Any = model
     for part in loc:
         fields = _fields_by_key(annotation)

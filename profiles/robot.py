@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from cdpr_profiles.geometry_calibration import GeometryCalibration
 
 HEARTBEAT_TIMEOUT_PERIODS = 1.75
-"""Heartbeat timeout of the drives in periods of the master's heartbeat: fewer than two."""
+"""Heartbeat timeout of the drives in periods of the master's heartbeat, less than two."""
 
 
 class RobotBus(Profile):
@@ -42,13 +42,13 @@ class AxisFile(Profile):
     commissioned: str | None = Field(default=None, min_length=1)
     """Folder in which `cdpr commission` wrote its motor's profile, or the profile's file."""
     exit_point_m: Point | None = None
-    """Point where its cable leaves for the platform."""
+    """Point where the cable leaves the frame."""
     anchor_point_m: Point | None = None
-    """Point where its cable is fixed, in the platform's frame."""
+    """Point where the cable is fixed to the platform, in the platform's frame."""
     pulley_radius_m: float = Field(default=0.0, ge=0, le=1)
-    """Radius of the pulley over which its cable leaves; 0 for an eye."""
+    """Radius of the pulley at the exit point; 0 for an eye."""
     pulley_axis: Direction | None = None
-    """Direction in which the cable comes to that pulley, the swivel axis; by default up."""
+    """Swivel axis of that pulley, the direction in which the cable arrives; by default up."""
 
 
 class RobotFile(Profile):
@@ -68,7 +68,7 @@ class RobotFile(Profile):
     platform: PlatformFile | None = None
 
     def faults(self) -> Iterator[tuple[str, str]]:
-        """Yield (key, problem) for contradictions."""
+        """Yield (key, problem) for values that contradict each other."""
         yield from self.limits.faults(len(self.axes))
         yield from self._repeated_names()
         yield from self._unbounded_tensions()
@@ -144,7 +144,7 @@ def default_name(axis: int) -> str:
 
 @dataclass(frozen=True)
 class RobotAxis:
-    """One axis: its winch, with bit rate, cycle, node ids and heartbeat of the robot.
+    """One axis: its winch, which takes bit rate, cycle, node ids and heartbeat from the robot.
 
     `name` is its name in messages, `calibration` its measured tension-to-torque gain,
     `commissioned` the path of its motor's cogging profile: a file, or the folder that holds it.
@@ -164,7 +164,7 @@ class Robot:
     """A robot with the winches it names; axes keep the order of its file on all buses.
 
     `safety_io`, `tension_sensors` and `rails` are arguments of their loaders. The master sends its
-    heartbeat every `master_heartbeat_s`; the drives stop (1016h, 6007h) when they miss it for
+    heartbeat every `master_heartbeat_s`. The drives stop (1016h, 6007h) if none arrives for
     `HEARTBEAT_TIMEOUT_PERIODS` of that time.
     """
 
@@ -190,7 +190,7 @@ class Robot:
 
     @property
     def geometry_identity(self) -> str:
-        """Identity of the calibration of its geometry, empty for that of its file."""
+        """Identity of the calibration of the geometry; empty if the file's geometry applies."""
         return "" if self.calibration is None else self.calibration.identity
 
     @property

@@ -1,4 +1,4 @@
-"""Limits that a supervisor monitors: number, text and reaction of each, and a robot's values."""
+"""The limits that a supervisor monitors, with number, text and reaction, and a robot's values."""
 
 from __future__ import annotations
 
@@ -17,20 +17,21 @@ _DEG = 180.0 / math.pi
 class Limit(IntEnum):
     """A limit that can be exceeded; a robot's file uses its name in lower case.
 
-    A member is its number, the reaction to it, the text with its value and the allowed one, their
-    unit in SI, the factor to the unit of the text, and the data that are unreliable after it.
+    The value of a member is its number. Its further data are the reaction to it, the text with the
+    measured and the allowed value, their SI unit, the factor to the unit of the text, and the data
+    that are unreliable after it.
 
     The numbers are in recordings and in compiled kernels: a new one gets a new number.
     """
 
     reaction: str
-    """Reaction to it, unless a robot's file has a more severe one."""
+    """Reaction to the limit, unless a robot's file has a more severe one."""
     text: str
-    """Value and allowed value in the unit of messages; "" if another part reports the reason."""
+    """Measured and allowed value in the unit of messages; "" if another part reports the reason."""
     unit: str
     factor: float
     unreliable: Literal["", "pose", "lengths"]
-    """Data that are unreliable after it.
+    """Data that are unreliable after the limit was exceeded.
 
     `pose`: the platform's pose is unreliable, or not all winches obey. `lengths`: the cables'
     lengths are unreliable too.
@@ -104,9 +105,9 @@ class Limit(IntEnum):
         "pose",
     )
     SAFETY_STOP = 16, "controlled stop"
-    """A safety monitor beside the axes requests braking."""
+    """A safety monitor beside the axes requests a controlled stop."""
     SAFETY_ALARM = 17, "torque off"
-    """A safety monitor beside the axes requests the torque off."""
+    """A safety monitor beside the axes requests that the torque is removed."""
     DRIVE = 18, "quick stop", "", "", 1.0, "pose"
     """A drive or its bus has failed."""
     LENGTHS = (
@@ -140,7 +141,7 @@ class Limit(IntEnum):
 
     @property
     def key(self) -> str:
-        """Its name in a robot's file."""
+        """Name of the limit in a robot's file."""
         return self.name.lower()
 
 
@@ -168,17 +169,17 @@ def _reaction_fields() -> dict[str, Any]:
 class Reactions(
     create_model("Reactions", __base__=Profile, **_reaction_fields())  # type: ignore[misc]
 ):
-    """The reaction to each limit; the default or a more severe one.
+    """The reaction to each limit: the default or a more severe one.
 
-    If a platform can be lowered, a default of quick stop is replaced by a controlled stop.
+    If a platform can be lowered, a controlled stop replaces quick stop as the default.
     """
 
 
 class RobotLimits(Profile):
     """The limits of a robot's axes, at the motors unless stated otherwise.
 
-    Missing limits are derived from the motors and cables, or not monitored if they are
-    unknown; the documentation describes each.
+    Limits that the file does not give are derived from motors and cables. If these are unknown, the
+    limit is not monitored. The documentation describes each.
     """
 
     torque_Nm: PerAxis | None = None
@@ -191,15 +192,15 @@ class RobotLimits(Profile):
     tension_max_N: PerAxis | None = None
     slack_N: PerAxis | None = None
     slack_s: float = Field(default=0.1, ge=0, le=10)
-    """How long a tension may be below `tension_min_N`, and below `slack_N`."""
+    """Longest time that a tension may be below `tension_min_N`, or below `slack_N`."""
     broken_within_s: float = Field(default=0.05, gt=0, le=1)
-    """A cable whose tension falls from `tension_min_N` to below `slack_N` faster has broken."""
+    """If a tension falls from `tension_min_N` to `slack_N` faster than this, the cable broke."""
     missed_cycles: int = Field(default=10, ge=0, le=1000)
-    """Consecutive cycles without an answer that are tolerated."""
+    """Tolerated number of consecutive cycles without an answer."""
     missed_in_window: int = Field(default=50, ge=0, le=10_000)
     window_cycles: int = Field(default=1000, ge=1, le=10_000)
     stale_cycles: int = Field(default=250, ge=1, le=10_000)
-    """Cycles for which a drive may be silent or its answers irregular."""
+    """Tolerated number of cycles in which a drive is silent or its answers are irregular."""
     lengths_disagree_m: float | None = Field(default=None, gt=0, le=10)
     """Largest normalised residual by which the cables of a platform may contradict each other; the
     default depends on the size of the frame, and on whether it is calibrated."""
@@ -222,7 +223,7 @@ class RobotLimits(Profile):
         return self
 
     def faults(self, axes: int) -> Iterator[tuple[str, str]]:
-        """Yield (key, problem) for limits with neither one value nor one for each axis."""
+        """Yield (key, problem) for limits that have neither one value nor one for each axis."""
         for key in type(self).model_fields:
             value = getattr(self, key)
             if isinstance(value, tuple) and len(value) not in (1, axes):

@@ -12,28 +12,28 @@ from cdpr_profiles.places import require
 from cdpr_profiles.reader import Profile, read_toml_model, require_unique, validated
 
 Address = Annotated[int, Field(ge=0, le=0xFFFF)]
-# limit of one Modbus request, for reading and writing, so that each image takes one request
+# limit of one Modbus request: all inputs, or all outputs, must fit into one
 MOST_POINTS = 1968
 
 LightColour = Literal["red", "yellow", "green", "blue", "white"]
 
 
 class DigitalInput(Profile):
-    """A discrete input; `inverted` if 0 means the state that the key names."""
+    """A discrete input; `inverted` if 0 stands for the state that the key names."""
 
     input: Address
     inverted: bool = False
 
 
 class DigitalOutput(Profile):
-    """A coil; `inverted` if writing 0 does what the key names."""
+    """A coil; `inverted` if writing 0 has the effect that the key names."""
 
     coil: Address
     inverted: bool = False
 
 
 class Contactor(Profile):
-    """The enable contactor: closes on `output`; `feedback` is true while it is closed."""
+    """The enable contactor, which `output` closes; `feedback` is true while it is closed."""
 
     output: DigitalOutput
     feedback: DigitalInput
@@ -42,7 +42,7 @@ class Contactor(Profile):
 
 
 class Brake(Profile):
-    """A brake that is released by `output` and applied without it (and without supply)."""
+    """A brake that `output` releases; without output or supply it is applied."""
 
     output: DigitalOutput
     feedback: DigitalInput
@@ -87,11 +87,11 @@ class Lights(Profile):
 
 
 class DeviceWatchdog(Profile):
-    """The device's watchdog on its master: after `timeout_s` without requests, its outputs drop."""
+    """The device's watchdog: after `timeout_s` without requests, its outputs drop."""
 
     timeout_s: float = Field(gt=0, le=60)
     timeout_register: Address | None = None
-    """Holding register for `timeout_s`, if it is set by Modbus."""
+    """Holding register for `timeout_s`, if it can be set over Modbus."""
     timeout_unit_s: float = Field(default=1e-3, gt=0, le=1)
     trigger_register: Address | None = None
     """Holding register that must be written repeatedly with changing values; without one, any
@@ -108,7 +108,7 @@ class DeviceWatchdog(Profile):
 
 
 class SafetyIoProfile(Profile):
-    """One remote I/O and its wiring."""
+    """One remote I/O and how it is wired."""
 
     name: str = Field(min_length=1)
     notes: tuple[str, ...] = ()
@@ -120,7 +120,7 @@ class SafetyIoProfile(Profile):
     trip_timeout_s: float = Field(default=0.1, ge=0.01, le=5)
     """Time without a valid poll after which the motion is stopped."""
     chain: DigitalInput
-    """The emergency-stop chain: true while it is closed (all well)."""
+    """The emergency-stop chain: true while it is closed, which allows power."""
     contactor: Contactor
     axes: tuple[AxisPoints, ...] = ()
     lights: Lights = Lights()

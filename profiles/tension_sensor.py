@@ -1,4 +1,4 @@
-"""Sensors on one RS-485 line, load-cell amplifiers and an inclinometer, and their registers."""
+"""Sensors on one RS-485 line: amplifiers of load cells and an inclinometer, and their registers."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class AngleValue(RawValue):
     """Location of a measured angle: rad = raw value × scale - zero."""
 
     scale_rad: float = Field(ge=-1.0, le=1.0)
-    """Negative if the sensor counts the other way."""
+    """Negative if the sensor counts in the opposite direction."""
     zero_rad: float = Field(default=0.0, ge=-1.0, le=1.0)
 
     @model_validator(mode="after")
@@ -58,8 +58,8 @@ class Inclinometer(Profile):
     roll: AngleValue
     pitch: AngleValue
     angles: Literal["roll-pitch", "inclinations"] = "roll-pitch"
-    """roll-pitch: roll about x, then pitch about y. inclinations: the roll is the angle of y above
-    the horizontal, the pitch that of x below it."""
+    """roll-pitch: roll about x, then pitch about y. inclinations: roll is the angle of y above the
+    horizontal, pitch the angle of x below it."""
     mounting_rad: Annotated[tuple[float, ...], Field(min_length=3, max_length=3)] = (0.0, 0.0, 0.0)
     """Rotation vector from the sensor's frame to the platform's."""
 
@@ -69,7 +69,7 @@ class ValueMap(RawValue):
 
     scale_N: float = Field(gt=0, le=1e6)
     broken_wire_raw: tuple[float, ...] = ()
-    """Raw values that mean a broken wire, for amplifiers that signal it so."""
+    """Raw values by which some amplifiers report a broken wire."""
 
 
 class StatusMap(Profile):
@@ -87,7 +87,7 @@ class TareMap(Profile):
     address: Address
     value: int = Field(default=1, ge=0, le=0xFFFF)
     settle_s: float = Field(default=0.5, ge=0, le=60)
-    """Time that the amplifier needs."""
+    """Time that the amplifier needs for it."""
 
 
 class Amplifier(Profile):
@@ -98,7 +98,7 @@ class Amplifier(Profile):
     tare: TareMap | None = None
     lowest_N: float = Field(default=-1e6, ge=-1e6, le=1e6)
     highest_N: float = Field(ge=-1e6, le=1e6)
-    """Readings beyond these are over range, whatever the status register says."""
+    """Readings outside these are over range, even if the status register reports no fault."""
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:

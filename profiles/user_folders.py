@@ -1,4 +1,4 @@
-"""This user's own folders for data that programs keep."""
+"""The present user's own folders for data that programs keep."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def temporary_folder() -> Path:
 
 
 def is_private(folder: Path, owner: int | None) -> bool:
-    """Return whether a folder, not a link, is writable only by this owner; None for any owner."""
+    """Return whether a folder (no link) is writable only by `owner`; None allows any owner."""
     try:
         held = folder.lstat()
     except OSError:
@@ -39,7 +39,7 @@ def can_write(folder: Path) -> bool:
     """Return whether a file can be written into a folder that exists or can be made."""
     try:
         there = next(one for one in (folder, *folder.parents) if one.exists())
-        tempfile.TemporaryFile(dir=there).close()  # it has no name there
+        tempfile.TemporaryFile(dir=there).close()  # this file has no name there
     except OSError:
         return False
     return True

@@ -38,7 +38,7 @@ class WinchFile(Profile):
 class Winch:
     """A winch with the profiles it names.
 
-    `gear_ratio` is motor turns per drum turn; `drum_radius_m` is effective, with belt and rope;
+    `gear_ratio` is motor turns per drum turn. `drum_radius_m` is effective: with belt and rope.
     `cable_sign` is +1 if a positive motor angle pays cable out.
     """
 
@@ -70,5 +70,5 @@ class Winch:
 
     @property
     def latency_s(self) -> float:
-        """Nominal delay from a true angle to the middle of the cycle in which its torque acts."""
+        """Nominal delay from an angle to the middle of the cycle in which its torque acts."""
         return self.drive.feedback_delay_s + self.drive.torque_delay_s + 1.5 * self.sync_period_s

@@ -18,9 +18,9 @@ from cdpr_profiles.winch import Winch
 class WinchCalibration(Profile):
     """Winding torque = gain × tension + bias ± (friction + friction_per_N × tension).
 
-    Plus while the cable is wound in, minus while it is paid out. Torques are those requested from
-    the drive, so the gain includes an error of the torque constant. Half-widths belong to 95 %
-    confidence intervals.
+    Plus applies while the cable is wound in, minus while it is paid out. Torques are those
+    commanded to the drive, so the gain contains the error of the torque constant. Half-widths are
+    those of 95 % confidence intervals.
     """
 
     winch: str
