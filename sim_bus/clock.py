@@ -14,7 +14,7 @@ class ClockMode(Enum):
     PACED = "paced"
     """Bus time is wall time."""
     LOCKSTEP = "lockstep"
-    """SYNC and the master that leads the bus advance bus time; without leader, wall time also."""
+    """SYNC and the master that leads the bus advance bus time; without a leader, wall time too."""
 
 
 class BusClock:
@@ -81,7 +81,7 @@ class BusClock:
         return self._base_s
 
     def wall_wait(self, wall_s: float, event_s: float) -> float:
-        """Return the wall time until bus time `event_s`, or until a held clock runs."""
+        """Return the wall time until bus time `event_s`, or until a held clock runs again."""
         if self.held:
             return max(self._base_wall_s - wall_s, 0.0)
         return max(event_s - self.peek(wall_s), 0.0)

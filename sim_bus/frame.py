@@ -35,8 +35,8 @@ def pack_frame(can_id: int, data: bytes = b"") -> bytes:
 def worst_case_bits(n: int, *, extended: bool = False) -> int:
     """Return the maximum number of bits of a frame with `n` data bytes, with interframe space.
 
-    From start of frame to the CRC a stuff bit may follow after the first 4 bits and then after
-    every 4 more (each stuff bit starts the next run of five); 13 bits (CRC delimiter,
+    From start of frame to the CRC a stuff bit may follow after the first 5 bits and then after
+    every 4 more, because each stuff bit starts the next run of five. 13 bits (CRC delimiter,
     acknowledge, end of frame, interframe space) are never stuffed. ISO 11898-1, and Davis et al.,
     "Controller Area Network (CAN) schedulability analysis", Real-Time Systems 35 (2007).
     """
@@ -81,16 +81,16 @@ _MOST_WAITING = 1 << 18
 
 
 class FrameLog:
-    """Writes the frames of its listeners by bus time; at the same time, in the order of the buses.
+    """Writes its listeners' frames by bus time, frames of the same time in the order of the buses.
 
-    So the order does not depend on which bus the simulator polled first. If the file can no longer
-    be written, the log ends with a message and the buses continue.
+    So the order does not depend on which bus the simulator polled first. If the file becomes
+    unwritable, the log ends with a message and the buses continue.
     """
 
     def __init__(self, path: Path) -> None:
         """Create the file, replacing an earlier log; raises OSError.
 
-        Bus time begins at zero, so a recording of real time cannot be mistaken for a simulator's.
+        Times count from zero, so nobody can mistake the log for a recording in real time.
         """
         if not may_replace(path, b"(0000"):
             raise FileExistsError(errno.EEXIST, "exists and is not a log of a simulator")
@@ -125,7 +125,7 @@ class FrameLog:
         self._file.close()
 
     def _write(self, before_s: float) -> None:
-        """Write the frames before `before_s`, to which no bus can add any later."""
+        """Write the frames before `before_s`; no bus can add earlier ones any more."""
         parts = [listener.take(before_s) for listener in self._listeners]
         self._waiting -= sum(map(len, parts))
         lines = heapq.merge(*parts, key=lambda entry: entry[0])
@@ -165,7 +165,7 @@ class FrameListener:
         self.now_s = now
 
     def next_event(self) -> float:
-        """Return that no event is ever due."""
+        """Return infinity: no event is ever scheduled."""
         return math.inf
 
     def close(self) -> None:

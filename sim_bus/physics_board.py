@@ -23,7 +23,7 @@ _T = TypeVar("_T")
 _HEADER = struct.Struct("<8sIII")
 _MAGIC = b"cdprPHB2"
 _MAX_AXES = 256
-# other processors may show a reader a sequence number before the data that it protects
+# on other processors, a reader may see a sequence number before the data that it protects
 _IN_ORDER = ("x86_64", "i686", "i386")
 # each 8 bytes: first the drive's own part, after its sequence number, then the inputs of others
 _SEQUENCE, _TIME, _TENSION, _ANGLE, _SPEED, _POWER_ON, _COUNT = range(7)
@@ -70,7 +70,7 @@ class PlatformState(NamedTuple):
 
 
 class BoardPlatform:
-    """The platform of a board, for devices that it carries. The robot publishes; all may read."""
+    """The platform of a board, for devices on it. The robot publishes its state; all may read."""
 
     def __init__(self, words: memoryview[int], numbers: memoryview[float]) -> None:
         self._words, self._numbers = words, numbers
@@ -97,8 +97,9 @@ class BoardPlatform:
 class BoardAxis:
     """One axis of a board. The drive calls `publish`; other devices call the setters; all may read.
 
-    Every field has one writer. Reads of the drive's part are consistent: they are repeated during
-    a write (a sequence lock, which relies on stores becoming visible in order: see `attach`).
+    Every field has one writer. Reads of the drive's part are consistent, because they are repeated
+    if a write occurs (a sequence lock, which needs stores that become visible in order: see
+    `attach`).
     """
 
     def __init__(self, words: memoryview[int], numbers: memoryview[float]) -> None:
@@ -118,7 +119,7 @@ class BoardAxis:
     ) -> None:
         """Write the state of the axis; only its drive may call it."""
         words, numbers = self._words, self._numbers
-        # odd while the data change, also after a writer that died during a write
+        # an odd number marks a write in progress, or a writer that died in it
         sequence = words[_SEQUENCE] | 1
         words[_SEQUENCE] = sequence
         numbers[_TIME] = time_s
@@ -148,7 +149,7 @@ class BoardAxis:
     def tension_history(self, after: int) -> tuple[int, list[Window]]:
         """Return the number of tension samples so far, and the samples after number `after`.
 
-        A sample is (bus time, tension in N), at most one a millisecond; only the last
+        A sample is (bus time, tension in N). At most one a millisecond is stored, and the last
         `_SAMPLES` are kept.
         """
         count, ring = _consistent(
@@ -171,7 +172,7 @@ class BoardAxis:
         self.allow_power(_ALWAYS if allowed else _NEVER)
 
     def allow_power(self, when: Window) -> None:
-        """Allow the drive power during `when`; later changes are written in advance."""
+        """Allow power to the drive during `when`; a later end can be written in advance."""
         self._numbers[_POWER_FROM], self._numbers[_POWER_UNTIL] = when
 
     def allows_power(self, at_s: float) -> bool:
@@ -211,26 +212,26 @@ class BoardAxis:
 
 
 def _consistent(words: memoryview[int], sequence: int, read: Callable[[], _T]) -> _T:
-    """Return a result of `read` during which no process wrote, as `words[sequence]` shows."""
+    """Return a result of `read` that no other process changed meanwhile; see `words[sequence]`."""
     for attempt in range(_TRIES):
         before = words[sequence]
         value = read()
         if not before & 1 and words[sequence] == before:
             break
-        if attempt > _SPINS:  # the writer waits for a core, perhaps for this one
+        if attempt > _SPINS:  # the writer waits for a processor core, perhaps for this one
             time.sleep(_PAUSE_S)
     return value
 
 
 class PhysicsBoard:
-    """A board for n axes in a file, best in /dev/shm; it starts with power and released brakes."""
+    """A board for n axes in a file, best in /dev/shm; at first with power and released brakes."""
 
     def __init__(self, path: Path, memory: mmap.mmap, axes: int, lockstep: bool) -> None:
-        """Do not call; use `create` or `attach`."""
+        """Use `create` or `attach` instead of this."""
         self.path = path
         self.axes = axes
         self.lockstep = lockstep
-        """Whether a master moves its bus time; else bus time follows the clock."""
+        """Whether a master advances bus time; else it follows the clock."""
         self._memory = memory
         self._owned = False
         self._views: list[memoryview[Any]] = []
@@ -242,7 +243,7 @@ class PhysicsBoard:
             raise ValueError(f"axes = {axes}; allowed: 1 to {_MAX_AXES}")
         path = Path(path)
         if path.exists():
-            cls.attach(path).close()  # replace only a killed simulator's board, no other file
+            cls.attach(path).close()  # replace the board of a killed simulator, but no other file
         fresh = path.with_name(f".{path.name}.{os.getpid()}")
         words = bytearray(8 * _WORDS * (1 + axes))
         _HEADER.pack_into(words, 0, _MAGIC, axes, _WORDS, lockstep)

@@ -29,7 +29,7 @@ from cdpr_sim_bus.frame import (
 )
 
 PACKET_BYTES = 448
-"""Longest packet accepted from a client; Python's own pool provides bytes objects of this size."""
+"""Longest packet accepted from a client; Python allocates bytes objects of this size quickly."""
 
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}")
 _SO_SNDBUFFORCE = 32
@@ -46,8 +46,8 @@ _CLOCK_READINGS, _PUT_OFF_S = 3, 5e-5
 class Client:
     """A peer that sends and receives frames through `sock`.
 
-    With `stamped`, the kernel reports when each packet was sent. That time counts, however late the
-    packet is read.
+    With `stamped`, the kernel reports when each packet was sent. The bus uses that time even if it
+    reads the packet late.
     """
 
     __slots__ = (
@@ -282,14 +282,14 @@ class PreparingNode(Protocol):
     """A node that can compute in advance."""
 
     def prepare(self, until: float) -> None:
-        """Work for `advance(until)`, which will probably be next; change nothing visible."""
+        """Compute ahead for `advance(until)`, the probable next call; change nothing visible."""
 
 
 def is_acyclic(can_id: int) -> bool:
     """Return whether the identifier belongs to acyclic traffic, which waits for gaps between PDOs.
 
-    SDO, heartbeat and LSS of the predefined connection set (CiA 301): they lose arbitration
-    against SYNC and PDOs, so they never make a cycle too long by more than one frame.
+    These are SDO, heartbeat and LSS of the predefined connection set (CiA 301). They lose
+    arbitration against SYNC and PDOs, so they lengthen a cycle by one frame at most.
     """
     base = base_id(can_id)
     return 0x580 <= base <= 0x67F or 0x700 <= base <= 0x77F or base in (0x7E4, 0x7E5)
@@ -368,7 +368,7 @@ class Route:
 
 
 class Contention:
-    """The head of each client's queue; each client's own order is kept.
+    """The next frame of each client, for arbitration; each client's frames keep their order.
 
     In lockstep the smallest identifier wins. In paced mode frames have times. A frame sent while
     the wire could still be busy with an earlier one contends with it; a later frame waits, even if

@@ -60,7 +60,7 @@ def join(name: str) -> socket.socket:
 
 
 def receive_all(sock: socket.socket, *, listen: bool) -> None:
-    """Set the filters to all frames, or to none."""
+    """Set the filters to pass all frames, or none."""
     sock.send(encode({"filters": [[0, 0]] if listen else []}))
 
 
@@ -76,13 +76,13 @@ def report(message: dict[str, Any]) -> None:
 
 
 class Gateway:
-    """A gateway process that ends with the simulator; a kill unplugs it."""
+    """A gateway process that ends with the simulator; killing it unplugs it."""
 
     def __init__(self, *arguments: str) -> None:
-        """Start it with these arguments and wait until it is ready.
+        """Start the process with these arguments and wait until it is ready.
 
         Raises:
-            BusSetupError: it did not start; contains its reason.
+            BusSetupError: it did not start; the message has its reason.
         """
         self._process = subprocess.Popen(
             [sys.executable, "-P", "-m", _MODULE, *arguments],
@@ -95,18 +95,18 @@ class Gateway:
         self.report: dict[str, Any] = (
             json.loads(line) if line else {"error": f"{arguments[0]} ended"}
         )
-        """The message that it printed at its start."""
+        """The message that the process printed when it started."""
         if "error" in self.report:
             self.close()
             raise BusSetupError(self.report["error"])
 
     @property
     def pid(self) -> int:
-        """Its process id."""
+        """Process id of the gateway."""
         return self._process.pid
 
     def close(self) -> None:
-        """End it."""
+        """End the process."""
         assert self._process.stdin is not None  # opened with PIPE
         assert self._process.stdout is not None
         self._process.stdin.close()
@@ -134,7 +134,7 @@ PASSIVE, BUS_ERROR = 0x20, 0x80
 
 
 class LawicelAdapter:
-    """Commands in, answers out; frames are 16 bytes, laid out as `struct can_frame`.
+    """Executes commands and returns answers; frames are 16 bytes, laid out as `struct can_frame`.
 
     An adapter whose bit rate differs from that of the bus transfers no frames: no node
     acknowledges its frames, and it becomes error-passive.
@@ -295,7 +295,7 @@ def _octets(text: str) -> bytes:
 
 
 LINE_BAUD = 1_000_000
-"""Speed of the serial line, whatever the terminal's setting: about that of USB adapters."""
+"""Speed of the serial line, about that of USB adapters; the terminal's setting has no effect."""
 _CHARACTER_S = 10 / LINE_BAUD
 _QUEUED_FRAMES = 256
 _READ_BYTES = 512
@@ -438,7 +438,7 @@ class Connection:
                 data = self._sock.recv(_TCP_READ_BYTES)
                 if not data:
                     raise ConnectionResetError
-                # a client that keeps TCP's delays would wait for our acknowledgement
+                # acknowledge immediately: a client with TCP's default delays would wait for it
                 self._sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_QUICKACK, 1)
                 self._take(data.decode("ascii", "replace"))
         except BlockingIOError:
@@ -585,11 +585,11 @@ def _read_stdin(_events: int) -> bytes:
 
 def serve_socketcand(name: str, listener: socket.socket) -> None:
     """Serve the bus `name` to all clients until standard input ends or the bus is gone."""
-    bus = join(name)  # a client without filters: its socket closes when the bus ends
+    bus = join(name)  # joined without filters, only to notice the end of the bus
     connections: list[Connection] = []
     with selectors.DefaultSelector() as selector:
         selector.register(sys.stdin, selectors.EVENT_READ, _read_stdin)
-        # frames sent before the hub set the filters do not mean the end
+        # before the hub has set the filters, frames may arrive; only an error means the end
         selector.register(bus, selectors.EVENT_READ, lambda _: bus.recv(FRAME_BYTES))
         selector.register(listener, selectors.EVENT_READ, None)
         while True:

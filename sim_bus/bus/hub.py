@@ -136,7 +136,7 @@ class Lead:
         return {"lead": {"now_s": now_s, "next_s": None if next_s == math.inf else next_s}}
 
     def release(self, client: Client) -> None:
-        """End the lead of `client`; bus time stands until a client sends or leads."""
+        """End the lead of `client`; bus time stands still until a client sends or leads."""
         if client is self.leader:
             client.send = client.sock.send
             with contextlib.suppress(OSError):  # it does not read
@@ -408,7 +408,7 @@ class Hub:
         elif events:
             self._watcher.handlers[events[0][0]]()
         if self._paced:
-            # while frames wait, time advances with them, so that none comes too late
+            # the times of waiting frames advance the clock; a timer must not overtake them
             if not events and not self._waiting.heads:
                 self._tick(self.clock.now(self._watcher.looked_s))
         elif self.clock.stopped:
@@ -503,7 +503,8 @@ class Hub:
             if not waiting.heads:
                 return
             winner, frame = waiting.pop()
-            # the sender of a SYNC waits for the answers, unless time has moved since
+            # after its SYNC a client waits for answers, so read from it only if time has moved
+            # since
             if not self._take(frame, winner) or self._paced or winner.queued:
                 self._fetch(winner)
 
@@ -545,7 +546,7 @@ class Hub:
         except BlockingIOError:
             return
         except ConnectionResetError:
-            return  # it left unread frames; its sent frames come next, then the end
+            return  # its unread frames are lost; those it has sent come next, then the end
         except OSError as error:
             self._remove(client, f"lost: {error.strerror}")
 

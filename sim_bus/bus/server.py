@@ -53,11 +53,11 @@ def serve(
 ) -> None:
     """Run `nodes` on `bus` until SIGTERM or SIGINT, then close them.
 
-    `bus` is simbus:NAME, which is opened here, or socketcan:IFACE, which must exist. When all
-    is ready, one line of JSON goes to standard output: {"ready": {"bus", "pid", and the bus
-    status}}; a terminal gets a few readable lines instead. With `until_stdin_ends`, the end of
-    standard input (a pipe whose other end the parent holds) also stops it, so that a simulator
-    never outlives the command that started it. `frame_log` receives all frames, as those of can0.
+    `bus` is simbus:NAME, which is opened here, or socketcan:IFACE, which must exist. When all is
+    ready, one line of JSON goes to standard output: {"ready": {"bus", "pid", and the bus status}};
+    a terminal gets a few readable lines instead. With `until_stdin_ends`, the end of standard input
+    also stops it: if the parent holds the other end of this pipe, the simulator never outlives it.
+    `frame_log` receives all frames, as those of can0.
 
     A simbus can also be reached through a serial CAN adapter (`slcan`) on a pseudo-terminal and by
     the socketcand protocol on a port of 127.0.0.1 (0: any free port). "ready" then contains

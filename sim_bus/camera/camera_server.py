@@ -39,8 +39,8 @@ class _EndedError(Exception):
 class CameraServer:
     """Answers clients until SIGTERM, SIGINT or `unplug`; one request at a time.
 
-    Lines on standard input create and mend faults: `dark`, `defocus 6`, `mend`, `unplug`; each is
-    answered with a line of JSON on standard output.
+    Lines on standard input create and mend faults: `dark`, `defocus 6`, `mend`, `unplug`. The
+    server answers each with a line of JSON on standard output.
     """
 
     def __init__(self, camera: SimCamera, platform: BoardPlatform, path: Path) -> None:

@@ -13,7 +13,7 @@ _FLAT = 1e-6
 
 @jit
 def texel(texture: Any, x: float, y: float) -> float:
-    """Return the interpolated texture at x, y, counted in texels from their centres."""
+    """Return the texture interpolated at x, y in texels; whole numbers are texel centres."""
     rows, columns = texture.shape
     x = min(max(x, 0.0), columns - 1.000001)
     y = min(max(y, 0.0), rows - 1.000001)
@@ -30,9 +30,9 @@ def look(
 ) -> float:
     """Return the level, 0 to 1, that a ray sees, or -1 if it misses the sheet.
 
-    `sheet` is (half width, half height, curvature). The ray starts at the camera, in the sheet's
-    frame at origins[0] + time origins[1], and has the direction that the first, second and third
-    matrix of `turns` give (x, y, 1), times 1, time and time².
+    `sheet` is (half width, half height, curvature). In the sheet's frame, the ray starts at the
+    camera, origins[0] + time origins[1]. Its direction is (turns[0] + time turns[1] + time²
+    turns[2]) (x, y, 1).
     """
     half_x, half_y, bend = sheet
     d = (
@@ -72,7 +72,7 @@ def look(
 def _corners(
     sheet: Any, texture: Any, origins: Any, turns: Any, ray: Any, right: Any, down: Any
 ) -> tuple[float, float]:
-    """Return the minimum and the maximum that a pixel's corners see."""
+    """Return the minimum and the maximum level that the corners of a pixel see."""
     lowest, highest = math.inf, -math.inf
     for k in range(4):
         a, b = (k % 2) - 0.5, (k // 2) - 0.5

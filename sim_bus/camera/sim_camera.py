@@ -94,7 +94,7 @@ class SimCamera:
         self.sheets = build_scene(plant)
         self._rays = ray_table(plant.lens)
         steps = np.arange(1, plant.samples + 1)[:, None] * _PLASTIC % 1.0
-        steps[:, :2] -= steps[:, :2].mean(axis=0)  # on average, a pixel looks at its centre
+        steps[:, :2] -= steps[:, :2].mean(axis=0)  # the mean ray of a pixel goes through its centre
         steps[:, 2] = (steps[:, 2] - steps[:, 2].mean()) * plant.sensor.exposure_s
         self._offsets = np.ascontiguousarray(steps)
         self._light = self._light_field()
@@ -185,7 +185,7 @@ class SimCamera:
         )
 
     def _span_s(self) -> float:
-        """Return the times between which light falls on any row."""
+        """Return the time from the first row's start of exposure to the last row's end."""
         sensor = self.plant.sensor
         return sensor.exposure_s + (sensor.readout_s if sensor.shutter == "rolling" else 0.0)
 

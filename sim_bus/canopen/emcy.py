@@ -56,8 +56,9 @@ class EmergencyProducer:
     def raise_error(
         self, code: int, register_bits: int, vendor: bytes = b"", source: str = ""
     ) -> None:
-        """Report an error once, until every `source` that raised it has cleared it.
+        """Raise an error for `source`, and report it if it is not active yet.
 
+        The error stays active until each source that raised it has cleared it.
         `register_bits` are its bits in 1001h, `vendor` is up to 5 bytes for the EMCY frame.
         """
         self._sources.setdefault(code, set()).add(source)
@@ -72,7 +73,8 @@ class EmergencyProducer:
     def clear(self, code: int | None = None, source: str = "") -> None:
         """Clear one error of `source`, or all errors of all sources.
 
-        Error code 0000h is sent, with the remaining register, once no source holds it.
+        When the last source clears an error, an EMCY with code 0000h reports the remaining
+        register.
         """
         if code is None:
             standing = bool(self._active)

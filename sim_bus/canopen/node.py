@@ -183,7 +183,7 @@ class CanopenSlave:
         return self.timers.next_due
 
     def emergency(self, code: int, register_bits: int, vendor: bytes = b"") -> None:
-        """Report an error: EMCY frame, 1001h (bit 0 is added), 1003h; nothing if it is active."""
+        """Report an error (EMCY, 1001h with bit 0 added, 1003h) unless it is already active."""
         self._emcy.raise_error(code, register_bits, vendor)
 
     def emergency_clear(self, code: int | None = None) -> None:
@@ -195,7 +195,7 @@ class CanopenSlave:
         self._emcy.raise_error(code, emcy.COMMUNICATION_BIT, vendor, emcy.COMMUNICATION)
 
     def communication_error_clear(self, code: int) -> None:
-        """Clear a communication error; the application may still hold it."""
+        """Clear a communication error; it stays active if the application has raised it too."""
         self._emcy.clear(code, emcy.COMMUNICATION)
 
     def set_nmt_state(self, state: NmtState) -> None:
@@ -258,7 +258,7 @@ class CanopenSlave:
         self.accepts = frozenset(identifier & ~RTR_FLAG for identifier in handlers)
 
     def close(self) -> None:
-        """End; no file is open."""
+        """Do nothing: the communication part has no open file."""
 
     def _boot(self, _now: float) -> None:
         self.reset_node()

@@ -30,8 +30,8 @@ DOMAIN = 0x0F
 class Codec:
     """One data type: its size, its struct letter and the two conversions.
 
-    `size` is None for types of any length; `letter` is empty if `struct` has none; such an
-    object cannot be mapped into a PDO.
+    `size` is None for types of any length. `letter` is empty if `struct` has none; an object of
+    such a type cannot be mapped into a PDO.
     """
 
     size: int | None
@@ -113,8 +113,8 @@ class Entry:
     """One object (index, sub-index) with its value.
 
     A device may keep an entry and assign `value` in its cycle; PDOs use it at their next sampling.
-    `getter` replaces the stored value when reading; `hook` is called before a write from the bus
-    is stored and may reject it with `SdoAbort`.
+    `getter` replaces the stored value when reading. `hook` is called before a write from the bus is
+    stored, and may reject it with `SdoAbort`.
     """
 
     __slots__ = (
@@ -229,7 +229,7 @@ class ObjectDictionary:
 
     @classmethod
     def from_eds(cls, path: str | Path, node_id: int) -> ObjectDictionary:
-        """Return the dictionary that an EDS describes; `$NODEID` defaults are taken at `node_id`.
+        """Return the dictionary that an EDS describes, with `$NODEID` defaults for `node_id`.
 
         Raises DictionaryError if the file cannot be read as an EDS.
         """
@@ -258,7 +258,7 @@ class ObjectDictionary:
         return od
 
     def _add_identity(self, info: DeviceInformation) -> None:
-        """Complete 1018h by [DeviceInfo], in which some makers state the identity only there.
+        """Complete 1018h from [DeviceInfo]; some makers give the identity only there.
 
         An object that the EDS lacks is hidden from the bus.
         """
@@ -351,7 +351,7 @@ class ObjectDictionary:
 
 
 def _default_count(record: ODRecord | ODArray) -> int:
-    """Return the count of a record whose EDS gives none; a PDO maps the objects that have one."""
+    """Return the count of a record without one in the EDS; PDO maps count entries with default."""
     mapped = 0
     if record.index not in _MAPPINGS:
         return int(max(record.subindices))

@@ -54,7 +54,7 @@ class Mapped:
 
 
 class PdoRecord:
-    """Protects the parameters of one PDO and reports their changes.
+    """Protects the parameters of one PDO from writes that CiA 301 forbids, and reports changes.
 
     Rules of CiA 301: COB-ID, inhibit time and SYNC start value of an existing PDO cannot change;
     its mapping can be written only while it does not exist, the entries only while the count is 0.
@@ -125,7 +125,7 @@ class PdoRecord:
         self._changed()
 
     def _locked(self) -> bool:
-        """Return whether the PDO exists; one whose COB-ID is fixed can be mapped nevertheless."""
+        """Return whether the map is locked: the PDO exists, and its COB-ID can be written."""
         fixed = (self._com, 1) in self._od and not self._od.entry(self._com, 1).writable
         return not fixed and not self._get(1, INVALID) & INVALID
 
@@ -508,7 +508,7 @@ class PdoService:
             rpdo.fault = 0
 
     def report_faults(self) -> None:
-        """Match the EMCYs of RPDOs to their present errors."""
+        """Raise and clear the EMCYs of RPDOs to match their present errors."""
         for code in (emcy.PDO_TOO_SHORT, emcy.PDO_TOO_LONG, emcy.RPDO_TIMEOUT):
             numbers = [r.record.number for r in self._rpdos if r.fault == code]
             if numbers:

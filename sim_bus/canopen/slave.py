@@ -21,13 +21,13 @@ class Timer:
         self.due = math.inf
 
     def arm(self, due: float) -> None:
-        """Let it fire once, at bus time `due` (s)."""
+        """Let the timer fire once, at bus time `due` (s)."""
         self.due = due = due - _TOLERANCE_S
         timers = self._timers
         timers.next_due = min(timers.next_due, due)
 
     def stop(self) -> None:
-        """Cancel it."""
+        """Stop the timer."""
         self.due = math.inf
 
 

@@ -25,7 +25,7 @@ class StoreError(SimulatorError):
 class ParameterStore:
     """Stored parameters, in a JSON file if `path` is given, else in memory.
 
-    Only values that differ from the default are stored, so that COB-IDs relative to the node id
+    Only values that differ from the default are stored, so that COB-IDs which depend on the node id
     follow it. `volatile` lists indexes that are never stored: process data such as controlword and
     targets. Raises StoreError if the file exists and is not a parameter file.
     """

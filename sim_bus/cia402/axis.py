@@ -131,7 +131,7 @@ class Axis:
         self.configure()
 
     def jump(self, counts: int) -> None:
-        """Make the encoder miscount once; its index pulse keeps its place on the rotor."""
+        """Make the encoder miscount once; its index pulse stays at the same rotor angle."""
         self.motor["zero"] -= counts
 
     @property
@@ -278,11 +278,12 @@ _PULSE_EDGES = (
 class TouchProbes:
     """Latches the position at edges of the zero pulse.
 
-    Low byte of 60B8h: bit 0 enable, bit 1 continuous (else the first event only), bits 3 and 2
-    the source (01 zero pulse, 10 as in 60D0h), bits 4 and 5 the positive and negative edge; high
-    byte the same for probe 2. In 60B9h bit 0 shows enabled, bits 1 and 2 a stored positive and
-    negative edge; bits 6 and 7 of a continuous probe toggle with every positive and negative
-    edge. The positive edge is the beginning of the pulse, in either direction of motion.
+    Bits of 60B8h: 0 enables probe 1, 1 makes it continuous (else it latches only the first event),
+    3 and 2 select the source (01 zero pulse, 10 as in 60D0h), 4 and 5 select the positive and
+    negative edge. Bits of 60B9h: 0 shows enabled, 1 and 2 a stored positive and negative edge. Bits
+    6 and 7 of a continuous probe toggle with every positive and negative edge. The high bytes are
+    the same for probe 2. The positive edge is the beginning of the pulse, in either direction of
+    motion.
     """
 
     def __init__(self, axis: Axis) -> None:

@@ -301,7 +301,7 @@ class SimDrive(SlaveApplication):
         """Build the drive, switched on at bus time 0.
 
         `truth_log` and `store` (memory of 1010h and LSS) are files to write; `serial` is 1018h:4
-        if it differs from the EDS; `robot` is what its motor moves together with others. Raises
+        if it differs from the EDS; `robot` is the drive's part in a cable robot. Raises
         DictionaryError if the EDS lacks objects, StoreError if the store is damaged, OSError if
         the truth log cannot be created.
         """
@@ -413,7 +413,7 @@ class SimDrive(SlaveApplication):
             self.fault_injection.alter_outbox(now)
 
     def prepare(self, until: float) -> None:
-        """Compute the first step to bus time `until` in advance: the bus waits for its master."""
+        """Compute the first step towards `until` in advance, while the bus waits for its master."""
         time = self.axis.time
         self.axis.prepare(until if until - time < 1.5 * TICK_S else time + TICK_S)
 

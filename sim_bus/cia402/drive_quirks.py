@@ -43,7 +43,7 @@ class DriveQuirks:
     """Quirks of one drive type's firmware; the defaults are those of CiA 402."""
 
     torque_unit_Nm: float | None = None
-    """None: per mille of 6076h."""
+    """Unit of the torque objects; None: per mille of 6076h."""
     rated_torque_unit_Nm: float = 1e-3
     """Unit of 6076h."""
     velocity_in_rpm: bool = False
@@ -51,12 +51,12 @@ class DriveQuirks:
     modes: frozenset[int] | None = None
     """Modes of operation; None: those of 6502h."""
     homing_methods: frozenset[int] | None = None
-    """None: all methods of the firmware."""
+    """Homing methods; None: all of the firmware."""
     mode_change: ModeChange = ModeChange.ANY_TIME
     homing_reversed: bool = False
     """Each homing method moves in the direction opposite to the standard."""
     bit_10_in_homing: bool = True
-    """Target reached is shown in homing mode; else bit 12 is set when the motor stands."""
+    """Whether bit 10 (target reached) works in homing mode; else bit 12 is set at standstill."""
     statusword_set: int = 0
     """Bits that are always set."""
     statusword_clear: int = 0
@@ -69,7 +69,7 @@ class DriveQuirks:
     def supported_modes(self, announced: int) -> frozenset[int]:
         """Return the modes to which 6060h may be set, including 0 (no mode).
 
-        Some drives announce nothing (6502h = 0) and have all modes that their objects allow.
+        Some drives report no modes (6502h = 0) and have all modes that their objects allow.
         """
         if self.modes is not None:
             return self.modes | {0}
@@ -127,7 +127,7 @@ def quirks_of(od: ObjectDictionary) -> DriveQuirks:
 def add_missing_objects(od: ObjectDictionary, quirks: DriveQuirks) -> None:
     """Add the standard objects that the EDS lacks, for the firmware, hidden from the bus.
 
-    Objects with the standard's size get its sign, which some makers' files state wrongly.
+    Existing objects of the standard's size get its sign, which some makers' files state wrongly.
     """
     scaled = set(IN_VELOCITY_UNITS + IN_ACCELERATION_UNITS) if quirks.velocity_in_rpm else set()
     for model in _standard_objects():

@@ -293,8 +293,8 @@ def _feed_torque_offset(axis: Axis) -> None:
 
 # Homing mode (HM): methods 1 to 14 (switches and index), 33 and 34 (index), 35 and 37 (in
 # place). Every method with a switch ends in the same way: it crosses the switch's edge in a
-# final direction, and the first index pulse beyond the edge is home. The table gives the side and
-# the way there.
+# final direction, and the first index pulse beyond the edge is home. The table gives the search
+# for the switch and the last move of each method.
 
 _TURNS_WITHOUT_INDEX = 2
 

@@ -293,7 +293,7 @@ class StateMachine:
     def allow_power(self, allowed: bool) -> None:
         """Follow the safe-torque-off input: if it removes the power, the torque is off immediately.
 
-        A drive that was enabled goes to fault; one that was not cannot become ready until then.
+        Without power, an enabled drive goes to fault, and any other drive cannot become ready.
         """
         self.power_allowed = allowed
         if allowed:

@@ -30,7 +30,7 @@ _STEP_S = 0.002
 _UNIT_AT = 6
 _PANEL_UNITS = (247, 246)
 END_OF_ANSWER = bytes.fromhex("0000 ffff 0002 0000")
-"""Sent by devices in lockstep if an answer is missing or cut off: nothing more will come."""
+"""Sent by devices in lockstep if an answer is missing or cut off: no more bytes follow."""
 
 
 class AnswerFaults:
@@ -127,7 +127,7 @@ async def serve_units(
 
 def _say_ready(ready: dict[str, Any]) -> None:
     gc.collect()
-    gc.freeze()  # otherwise the collector scans all registers, for 0.1 s, while a client waits
+    gc.freeze()  # otherwise the collector scans all registers for 0.1 s while a client waits
     print(json.dumps({"ready": ready}), flush=True)
 
 
@@ -171,7 +171,7 @@ _CRC_BYTES = 2
 # time that a device needs to answer, besides the time on the wire
 _TURNAROUND_S = 0.001
 
-# a device does not report wrong requests of its masters
+# a device does not report invalid requests of its masters
 logging.getLogger("pymodbus").setLevel(logging.CRITICAL)
 
 
@@ -180,7 +180,7 @@ class RtuServer:
 
     Lines on standard input, if it is a pipe or a terminal, create and mend faults:
     `over-range 3`, `broken-wire all`, `silent 2`, `truncated 1`, `wrong-crc 1`, `wrong-unit 1`,
-    `mend all`, `unplug`; each is answered with a line of JSON on standard output.
+    `mend all`, `unplug`. The server answers each with a line of JSON on standard output.
     """
 
     def __init__(
@@ -246,13 +246,13 @@ class RtuServer:
         data = self._read(self._inside)
         if self._lockstep:  # the client lets bus time pass for the time on the wire
             self._deliver(data)
-        elif data:  # question and answer take their real time on the wire
+        elif data:  # request and answer take their real time on the wire
             wire_s = (self._asked + len(data)) * self._byte_s
             self._asked = 0
             loop.call_later(wire_s + _TURNAROUND_S, self._deliver, data)
 
     def _deliver(self, data: bytes) -> None:
-        with contextlib.suppress(OSError):  # closed in the meantime, or not read
+        with contextlib.suppress(OSError):  # the terminal was closed meanwhile, or nobody reads
             os.write(self._outside, data)
 
     @staticmethod
@@ -268,7 +268,7 @@ class RtuServer:
         if not sending:
             return data
         end = END_OF_ANSWER if self._lockstep else b""
-        # the server also answers for missing units; on a real line nobody does
+        # the library also answers for missing units; on a real line nobody does
         if unit is None or unit.fault is TensionFault.SILENT:
             return end
         if unit.fault is TensionFault.TRUNCATED:

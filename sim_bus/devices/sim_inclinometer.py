@@ -21,7 +21,7 @@ _LEVEL = (0.0, 0.0, 1.0)
 
 
 class SimInclinometer:
-    """An inclinometer: measures the direction against gravity and answers as `device`."""
+    """An inclinometer: measures its tilt against gravity and answers as `device`."""
 
     def __init__(
         self, profile: Inclinometer, plant: AmplifierPlant, platform: BoardPlatform
@@ -84,7 +84,7 @@ class SimInclinometer:
 
 
 def _turned_back(vector: tuple[float, ...], by_rad: tuple[float, ...]) -> tuple[float, ...]:
-    """Return a vector turned by a rotation vector backwards: Rodrigues' formula."""
+    """Return a vector rotated by the inverse of a rotation vector, by Rodrigues' formula."""
     angle = math.sqrt(sum(x * x for x in by_rad))
     if angle == 0.0:
         return vector

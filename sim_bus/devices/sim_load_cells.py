@@ -18,7 +18,7 @@ from cdpr_sim_bus.plant_file import PlantFile
 
 HOLDING_CODES = (3, 6, 16, 22, 23)
 _BEYOND = 1.02
-"""A converter's range is slightly larger than the specified range."""
+"""Ratio of a converter's range to the specified range."""
 
 
 class AmplifierPlant(PlantFile):
@@ -38,11 +38,11 @@ class AmplifierPlant(PlantFile):
     tilt_noise_rad: Annotated[float, Field(ge=0.0, le=0.1)] = 0.0005
     """Standard deviation of a reading of the inclinometer."""
     tilt_zero_spread_rad: Annotated[float, Field(ge=0.0, le=0.1)] = 0.001
-    """Standard deviation of its zeros."""
+    """Standard deviation of the inclinometer's zeros."""
 
 
 class TensionFault(Enum):
-    """Fault that a simulated amplifier or its line can show; the values are their names."""
+    """Faults that a simulated amplifier or its line can show; the values are their names."""
 
     NONE = "mend"
     OVER_RANGE = "over-range"
@@ -56,8 +56,8 @@ class TensionFault(Enum):
 class SimAmplifier:
     """One amplifier: follows the true tension of its cable and answers as `device`.
 
-    Its time is the bus time of its cable's drive: at each reading the filter has followed the
-    tension up to then, and the noise depends only on the number of the reading.
+    Its time is the bus time of its cable's drive. At each reading, the filter has followed the
+    tension up to that time. The noise depends only on the number of the reading.
     """
 
     def __init__(
@@ -90,7 +90,7 @@ class SimAmplifier:
             self._second += share * (self._first - self._second)
 
     def measured_N(self) -> float:
-        """Return a new reading before tare: filtered, with zero, gain error, noise and steps."""
+        """Return a new reading before tare, with filter, zero, gain error, noise, quantisation."""
         self._follow()
         plant = self._plant
         true = self._second * (1.0 + plant.gain_error) + self._zero_N
@@ -149,7 +149,7 @@ class SimAmplifier:
         return None
 
     def _show(self) -> tuple[list[int], int]:
-        """Return the present value registers, and the status."""
+        """Return the value registers of a new reading, and the status."""
         map_ = self._map
         value, status = map_.value, map_.status
         reading = self.measured_N() - self._tare_N
@@ -171,7 +171,7 @@ def _bit(number: int | None) -> int:
 
 
 def registers_of(raw: float, value: RawValue) -> list[int]:
-    """Return a number in the format of a value's registers, saturated."""
+    """Return a number as registers in the format of `value`, saturated."""
     if value.type == "float32":
         packed = struct.pack(">f", raw)
     else:

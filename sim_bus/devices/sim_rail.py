@@ -17,7 +17,7 @@ _STEP_S = 1e-3
 _BRAKE_S = 0.05
 _ENABLE_S = 0.03
 _SLIP_M_S = 0.01
-"""Speed of a carriage with a worn brake, pushed at full torque."""
+"""Speed of a carriage with a worn brake, if pushed at full torque."""
 
 
 class RailFault(IntFlag):
@@ -29,13 +29,13 @@ class RailFault(IntFlag):
     BRAKE_STUCK = 8
     DRIVE_FAULT = 16
     TARGET_LOST = 32
-    """The target register stores 0 whatever is written."""
+    """The target register stores 0 instead of any written value."""
 
 
 class SimRail:
-    """The positioning drive, its brake and carriage; panel registers: 0 unused, 1 faults.
+    """The positioning drive, its brake and carriage. Panel registers: 0 unused, 1 faults.
 
-    It runs on `bus_time`, that of a bus in lockstep, or on CLOCK_MONOTONIC, in steps of 1 ms.
+    Its time is `bus_time`, that of a bus in lockstep, or CLOCK_MONOTONIC, in steps of 1 ms.
     """
 
     def __init__(self, rail: RailProfile, bus_time: Callable[[], float] | None = None) -> None:

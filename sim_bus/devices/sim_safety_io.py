@@ -22,7 +22,7 @@ Delay = Annotated[float, Field(ge=0.0, le=10.0)]
 
 
 class SafetyAxisPlant(Profile):
-    """Positions of one axis' limit switches, by the motor's true angle over all turns."""
+    """Positions of one axis' limit switches, as true motor angle over all turns."""
 
     limit_negative_deg: float | None = None
     """Active below this angle."""
@@ -70,7 +70,7 @@ class DelayedContact:
         self._until: float | None = None
 
     def step(self, coil: bool, now: float) -> None:
-        """Advance to `now`; the coil has had this value since the last step."""
+        """Advance to `now`; `coil` is its value since the last step."""
         if self.stuck:
             return
         if coil == self.on:
@@ -81,7 +81,7 @@ class DelayedContact:
             self.on, self._until = coil, None
 
     def window(self, drop_s: float) -> Window:
-        """Return from when until when the contact is on if the coil drops at `drop_s`."""
+        """Return between which times the contact is on if the coil drops at `drop_s`."""
         if self.stuck:
             return (-math.inf, math.inf if self.on else -math.inf)
         since = -math.inf if self.on else math.inf
@@ -94,11 +94,11 @@ class DelayedContact:
 
 
 class SimSafetyIo:
-    """The safety I/O and its outputs; the profile's axes are `axes` of the board, in order.
+    """The safety I/O and its outputs; `axes` of the board are those of the profile, in order.
 
-    It runs on `bus_time`, that of the axes' buses in lockstep, or on CLOCK_MONOTONIC. In lockstep
-    it acts only on requests, while bus time stands still: changes until the next request are
-    written to the board in advance, with their bus times.
+    Its time is `bus_time`, that of the axes' buses in lockstep, or CLOCK_MONOTONIC. In lockstep
+    it acts only on requests, while bus time stands still. So it writes the changes that will occur
+    before the next request to the board in advance, with their bus times.
     """
 
     def __init__(
@@ -152,7 +152,7 @@ class SimSafetyIo:
     def step(self) -> None:
         """Advance contactor, brakes and inputs to now, and write them to the board."""
         now, drop_s = self._clock(), self._watchdog_drop_s
-        if now > drop_s:  # it accepts no outputs until it is fed again
+        if now > drop_s:  # it accepts no outputs until its watchdog is fed again
             if not self._dropped:
                 self._switch(drop_s)
             self._coils = [False] * len(self._coils)
@@ -165,7 +165,7 @@ class SimSafetyIo:
 
     @property
     def _watchdog_drop_s(self) -> float:
-        """Return when the device's own watchdog drops the outputs unless it is fed."""
+        """Return when the device's own watchdog drops the outputs if nobody feeds it."""
         return self._fed_at + self._watchdog_s
 
     def _switch(self, at_s: float) -> None:
@@ -183,7 +183,7 @@ class SimSafetyIo:
         return self._coils[self._profile.contactor.output.coil] and not self._pressed
 
     def _publish(self, now: float) -> None:
-        """Write power and brakes to the board; in lockstep, with the changes that are due."""
+        """Write power and brakes to the board; in lockstep, with their future changes."""
         power = _NEVER if self._pressed else self._contactor.window(self._watchdog_drop_s)
         worn = SafetyIoFault.BRAKES_WORN in self.fault
         for place, axis, brake in zip(self._board, self._profile.axes, self._brakes, strict=False):
@@ -283,7 +283,7 @@ class SimSafetyIo:
 
 
 def _fill(registers: list[int], bits: list[bool]) -> None:
-    """Write bits into the words from which the server answers."""
+    """Write bits into the words from which the server takes its answers."""
     for word in range((len(bits) + 15) // 16):
         part = bits[16 * word : 16 * word + 16]
         registers[word] = sum(1 << i for i, bit in enumerate(part) if bit)

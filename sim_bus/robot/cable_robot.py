@@ -45,11 +45,11 @@ def update_ends(platform: Any, motors: Any) -> None:
 
 @jit
 def stable_steps(motors: Any, p: Any, h: float) -> int:
-    """Return the number of steps in `h` that keeps the integration of the stiffest cable stable.
+    """Return the number of steps in `h` for which the stiffest cable is integrated stably.
 
-    A rotor on a cable oscillates at sqrt(EA c² / (l J)), c the cable paid out per radian. The
+    A rotor on a cable oscillates at sqrt(EA c² / (l J)), with c the cable paid out per radian. The
     platform on all cables and its feet oscillates at sqrt(mobility EA / l); the mobility (1/kg) is
-    its acceleration per unit of cable force. Their damping must not stop it more than once a step.
+    its acceleration per unit of cable force. In one step, damping must not reverse the motion.
     """
     most, stiffness, damping = 1, 0.0, 0.0
     if p.standing:
@@ -106,11 +106,11 @@ FloatArray = NDArray[np.float64]
 MotorSample = tuple[int, int, int, int, float, float, float, float, float, float]
 """A `motor.Sample` as the kernels return it."""
 MotorCommand = Callable[[], tuple[int, float]]
-"""Returns the present kind of control of a power stage, named in `servo`, and its target."""
+"""Returns the control mode of a power stage, named in `servo`, and its target."""
 
 
 class _State:
-    """All that `run_together` reads and writes, in one buffer, which can be copied and compared."""
+    """All that `run_together` reads and writes, in one buffer that can be copied and compared."""
 
     def __init__(self, n: int) -> None:
         kinds = (MOTOR_DTYPE, n), (PLATFORM_DTYPE, 1), (np.int64, n), (np.int64, n), (np.float64, n)
@@ -148,8 +148,9 @@ class _State:
 class CableRobot:
     """Motors, cables and platform; each drive advances it and reads its own motor.
 
-    The first drive that requests a time advances all, with every power stage as it is then. While
-    the bus waits for its master, `prepare` computes the next step in advance on a copy.
+    The first drive that requests a time advances the whole robot, with the present commands of all
+    power stages. While the bus waits for its master, `prepare` computes the next step in advance on
+    a copy.
     """
 
     def __init__(
@@ -176,7 +177,7 @@ class CableRobot:
         # compile now, before the clock runs
         self._state.run(0.0)
         self.commands: list[MotorCommand] = [lambda: (servo.OFF, 0.0)] * n
-        """Returns the present command of each power stage."""
+        """Functions that return the present command of each power stage."""
 
     def adopt(self, i: int, motor: MotorArray, command: MotorCommand) -> MotorArray:
         """Connect motor `i`, a record of shape (1,), to its cable; return the record to use."""
@@ -219,12 +220,12 @@ class CableRobot:
         motor["creep"] = 0.0
 
     def _slack_length_m(self, i: int) -> float:
-        """Return the length of cable `i` that has the slack of a start, for the present pose."""
+        """Return the length of cable `i` with the initial slack, for the present pose."""
         slack_m = np.broadcast_to(self._plant.start.slack_m, self.n)
         return self.distance_m(i) + float(slack_m[i])
 
     def _slack_start_m(self, i: int) -> float:
-        """Return the `cable_start` with which cable `i` has that slack at the present angle."""
+        """Return the `cable_start` that gives cable `i` this length at the present motor angle."""
         motor = self.motors[i]
         reeled_m = float(motor["cable_gain"] * (motor["angle"] - motor["angle_start"]))
         return self._slack_length_m(i) - reeled_m
@@ -252,7 +253,7 @@ class CableRobot:
         self._now = now
 
     def prepare(self, until: float) -> None:
-        """Compute the step to `until` in advance, for the case that nothing changes before it."""
+        """Compute the step to `until` in advance; it is used if nothing changes before."""
         state, ahead = self._state, self._ahead
         if until == self._ahead_until or not _SAME_TIME_S < until - self._now <= 1.5e-3:
             return
@@ -293,8 +294,8 @@ class CableRobot:
     def mend(self, i: int, cut: bool, slipped_m: float) -> None:
         """Attach cable `i` again if it was cut, and undo its slip.
 
-        Where that would pull, the cable has the slack of a start instead; a tight one stays as it
-        is.
+        If that would pull the platform, the cable gets the initial slack instead. A tight cable
+        stays as it is.
         """
         start_m, loose_m = float(self.motors["cable_start"][i]), self._slack_start_m(i)
         if cut:
@@ -304,7 +305,7 @@ class CableRobot:
         self.motors["cable_start"][i] = max(start_m - slipped_m, loose_m)
 
     def put_back(self) -> None:
-        """Put the platform at its start pose, at rest; cables that are too short get slack."""
+        """Put the platform at rest at its start pose; cables that are too short get slack."""
         self.platform[:] = self._at_start
         start_m = self.motors["cable_start"]
         for i in range(self.n):

@@ -23,7 +23,7 @@ _Count = Annotated[int, Field(ge=1, le=64)]
 
 
 class LensPlant(Profile):
-    """Pinhole and distortion of Brown and Conrady."""
+    """Pinhole camera with the distortion of Brown and Conrady."""
 
     width_px: Annotated[int, Field(ge=64, le=8192)] = 1280
     height_px: Annotated[int, Field(ge=64, le=8192)] = 1024
@@ -34,7 +34,7 @@ class LensPlant(Profile):
     )
     """k1, k2, p1, p2, k3."""
     blur_px: Annotated[float, Field(ge=0.0, le=50.0)] = 0.6
-    """Standard deviation of the blur of a point; a larger value is out of focus."""
+    """Standard deviation of the blur of a point; a large value means out of focus."""
 
 
 class SensorPlant(Profile):
@@ -47,11 +47,11 @@ class SensorPlant(Profile):
     noise: Annotated[float, Field(ge=0.0, le=100.0)] = 1.5
     """Standard deviation in the dark, grey levels of 255."""
     shot_noise: Annotated[float, Field(ge=0.0, le=100.0)] = 2.0
-    """Additional noise of white; grows with the square root of the light."""
+    """Additional noise of a white pixel; it grows with the square root of the light."""
 
 
 class MountPlant(Profile):
-    """True pose of the camera on its platform; it looks along its z axis, x points right."""
+    """True pose of the camera on its platform: z is the optical axis, x points to the right."""
 
     position_m: Vector = (0.02, -0.01, -0.28)
     rotation_deg: Turn = (180.0, 0.0, 0.0)
@@ -82,12 +82,12 @@ class MarkerPlant(Profile):
     rotation_deg: Turn = (0.0, 0.0, 0.0)
     mirrored: bool = False
     moves_after_image: Annotated[int, Field(ge=0)] | None = None
-    """Number of images after which somebody pushes it."""
+    """Number of images after which somebody moves the marker."""
     moves_m: Vector = (0.05, 0.0, 0.0)
 
 
 class GridPlant(Profile):
-    """Markers in rows on a plane, placed with human accuracy."""
+    """Markers in rows on a plane, placed by hand."""
 
     first_id: _Id = 0
     rows: _Count = 6
@@ -110,9 +110,9 @@ class PrintPlant(Profile):
     """Errors of a printed sheet."""
 
     scale_error: Annotated[float, Field(ge=-0.5, le=0.5)] = 0.002
-    """Relative, common to all sheets."""
+    """Relative error of the scale, common to all sheets."""
     scale_sigma: Annotated[float, Field(ge=0.0, le=0.1)] = 0.0005
-    """Relative, for each sheet and each of its directions."""
+    """Standard deviation of the relative error of scale, per sheet and direction."""
     bend_sigma_m: Annotated[float, Field(ge=0.0, le=0.1)] = 0.0003
     """Standard deviation of the height of a sheet's middle above its edges."""
 

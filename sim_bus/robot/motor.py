@@ -43,7 +43,7 @@ def random_bits(m: Any) -> Any:
 
 @jit
 def gaussian(m: Any) -> float:
-    """Draw from the standard normal distribution, by Box and Muller."""
+    """Draw from the standard normal distribution, by the Box-Muller transform."""
     z = random_bits(m)
     u = (float(z >> np.uint64(32)) + 0.5) * 2.0**-32
     v = float(z & np.uint64(0xFFFFFFFF)) * 2.0**-32
@@ -65,10 +65,11 @@ def step_rotor(m: Any, h: float, demand: float, energised: bool) -> None:
     if energised:
         for k in range(m.n_torque, m.n_cogging):
             offset += m.amplitude[k] * math.sin(m.order[k] * m.angle + m.phase[k])
-    # The loop controls its sensors' reading to the demand: the true current lacks their offset.
+    # The loop controls the measured current to the demand; the true current lacks the sensors'
+    # offset.
     m.current += (1.0 - math.exp(-m.current_rate * h)) * (demand - offset - m.current)
     if abs(m.current) < 1e-30:
-        m.current = 0.0  # denormal numbers would make every step twice as slow
+        m.current = 0.0  # denormal numbers would double the time of every step
     m.sensed = m.current + offset
     gain = m.torque_gain
     if m.sixth > 0.0 or m.twelfth > 0.0:
@@ -112,8 +113,8 @@ def braked(m: Any, A: float, B: float) -> float:
 def turn_loaded(m: Any, h: float, A: float, B: float) -> float:
     """Return the rotor's new velocity, A·w = B without load, and move the load.
 
-    The cable is a damped spring that cannot push; implicit Euler over rotor, cable and mass
-    together is stable at any stiffness. It adds a damping of `h` seconds to `cable_damping_s`.
+    The cable is a damped spring that cannot push. Implicit Euler over rotor, cable and mass
+    together is stable for any stiffness. It adds a damping of `h` seconds to `cable_damping_s`.
     """
     if m.load_kind == 0:
         return braked(m, A, B)
@@ -150,11 +151,11 @@ def turn_loaded(m: Any, h: float, A: float, B: float) -> float:
 
 @jit
 def cable_force(stretch: float, stiffness: float, sag: float, last: float) -> tuple[float, float]:
-    """Return tension and its slope over `stretch` of an elastic cable that sags.
+    """Return tension and its derivative with respect to `stretch`, for an elastic cable that sags.
 
     stretch = t / stiffness - sag / t²; the second part is the excess length of a flat parabola over
-    its chord (Irvine, Cable Structures, 1981). A slack cable without weight has no tension at all.
-    Newton's method starts from the last tension; below the root it climbs without overshoot,
+    its chord (Irvine, Cable Structures, 1981). A slack cable without weight has no tension.
+    Newton's method starts from the last tension. Below the root it converges without overshoot,
     because the curve is concave.
     """
     if sag <= 0.0:
@@ -176,8 +177,8 @@ def cable_force(stretch: float, stiffness: float, sag: float, last: float) -> tu
 def paid_out(m: Any) -> tuple[float, float]:
     """Return the unstretched cable between exit point and platform, m, and its rate, m/rad.
 
-    An eccentric drum adds and removes cable once a turn. A carriage that is off its cable guides it
-    at an angle, along the hypotenuse of the distance to the drum and of the offset.
+    An eccentric drum adds and removes cable once a turn. A carriage that is beside its cable leads
+    it along the hypotenuse of the distance to the drum and the offset.
     """
     turned = m.angle - m.angle_start
     length = m.cable_start + m.cable_gain * turned
@@ -200,13 +201,13 @@ def paid_out(m: Any) -> tuple[float, float]:
 def wind(m: Any, h: float, A: float, B: float) -> float:
     """Return the rotor's new velocity, A·w = B without load, if its cable holds a platform.
 
-    The platform stands still during the step: it is heavy, and the tension found here moves it
+    During the step the platform stands still, because it is heavy; the tension found here moves it
     afterwards. The spring acts at its present length (symplectic Euler), damping is implicit. The
     compliance of gear and belt adds to the cable's stretch. A hanging cable has the potential
-    energy -w L drop/2: the platform bears half of its weight, `hung_load`, and the winch w drop/2
-    more than the tension halfway, so a cable that is paid out goes down. Creep is a strain that
-    follows a share of the elastic one, d(creep)/dt = (share · t / EA - creep) / time: a chain of
-    Kelvin-Voigt elements.
+    energy -w L drop/2. So the platform bears half of its weight, `hung_load`, and at the winch the
+    tension is w drop/2 above that halfway; a cable that is paid out goes down. Creep is a strain
+    that follows a share of the elastic one, d(creep)/dt = (share · t / EA - creep) / time: a chain
+    of Kelvin-Voigt elements.
     """
     length, c = paid_out(m)
     hanging = m.weight * length * m.far_level
@@ -287,7 +288,7 @@ def read_counter(m: Any, angle: float) -> int:
 
 @jit
 def remember_angle(m: Any) -> None:
-    """Store time and angle for the delayed reading; skip close-lying ones."""
+    """Store time and angle for the delayed reading, unless the last ones are too recent."""
     if (m.time - m.slot_time[m.slot]) * (DELAY_SLOTS // 2) >= m.delay:
         m.slot = (m.slot + 1) % DELAY_SLOTS
         m.slot_time[m.slot] = m.time
@@ -296,7 +297,7 @@ def remember_angle(m: Any) -> None:
 
 @jit
 def delayed_angle(m: Any) -> float:
-    """Return the rotor angle `delay` ago, within jitter, interpolated between the stored ones."""
+    """Return the rotor angle `delay` ago, plus or minus jitter, interpolated from stored angles."""
     sample_time = m.time - m.delay
     if m.jitter > 0.0:
         unit = float(random_bits(m) >> np.uint64(11)) * 2.0**-53

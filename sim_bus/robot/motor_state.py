@@ -20,7 +20,7 @@ LINE_COUNTS = 4
 """Counts per line of the encoder's disc."""
 
 LOAD_KINDS = ("none", "hung_mass", "fixed_anchor", "platform")
-"""Names of `load_kind`, whose values are the positions here. The last belongs to a `CableRobot`."""
+"""Names of `load_kind`, by its value. The last one is for motors of a `CableRobot`."""
 _F8 = np.float64
 _PHYSICS = [
     # parameters
@@ -198,7 +198,7 @@ class Transmission:
     gear_ratio: float = 4.0
     """Motor turns per turn of the drum."""
     cable_damping_s: float = 0.002
-    """The cable's damping over its stiffness."""
+    """Ratio of the cable's damping to its stiffness."""
 
 
 def build_motor(
@@ -216,22 +216,22 @@ def build_motor(
 
 
 def remove_cable(motor: MotorArray) -> None:
-    """Remove the cable of a motor outside any robot."""
+    """Remove the cable of a motor that belongs to no robot."""
     m: Any = motor[0]
     m["load_kind"] = LOAD_KINDS.index("none")
     m["tension"] = m["winch_tension"] = m["load_friction"] = 0.0
 
 
 def lengthen_cable(motor: MotorArray, metres: float) -> None:
-    """Lengthen the cable of a motor outside any robot."""
+    """Lengthen the cable of a motor that belongs to no robot."""
     m: Any = motor[0]
     m["cable_start"] -= metres
 
 
 def mend_cable(motor: MotorArray, load: LoadPlant, slipped_m: float) -> None:
-    """Attach the cable of a motor outside any robot again, and undo its slip.
+    """Attach the cable of a motor that belongs to no robot again, and undo its slip.
 
-    Where that would pull, the cable is just slack instead; a tight one stays as it is.
+    If that would pull the load, the cable is just slack instead. A tight cable stays as it is.
     """
     m: Any = motor[0]
     kind, start = LOAD_KINDS.index(load.kind), float(m["cable_start"])
@@ -265,7 +265,7 @@ def _set_physics(m: Any, plant: Plant) -> None:
     m["heating_rate"] = 1.0 / thermal.time_constant_s
     m["rise_limit"] = thermal.rise_K
     m["angle"] = math.radians(plant.motor.initial_angle_deg)
-    # A stiff bristle on a light rotor oscillates; a fifth of a radian a step resolves it.
+    # A stiff bristle on a light rotor oscillates; steps of a fifth of a radian of phase resolve it.
     ringing = math.sqrt(friction.sigma0_Nm_rad / plant.inertia_kg_m2) * CONTROL_STEP_S
     m["steps_per_control"] = min(20, max(1, math.ceil(ringing / 0.2)))
 
@@ -337,8 +337,8 @@ def _angle(degrees: float | None, absent: float) -> float:
 
 def _set_servo(m: Any, plant: Plant, ratings: MotorRatings) -> None:
     drive = plant.drive
-    # Half the phase at the velocity loop's crossover is shared by observer, current loop and
-    # integrator; these ratios leave about 50 degrees of margin.
+    # At the velocity loop's crossover, observer, current loop and integrator cause half of the
+    # phase lag; these ratios leave a phase margin of about 50 degrees.
     crossover = 2.0 * math.pi * min(50.0, drive.current_loop_bandwidth_Hz / 10.0)
     m["velocity_gain"] = plant.inertia_kg_m2 * crossover
     m["integral_rate"] = crossover / 4.0

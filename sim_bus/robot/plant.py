@@ -12,21 +12,21 @@ from cdpr_sim_bus.plant_file import PlantFile
 
 MAX_COGGING_TERMS = 32
 _RATED_Nm, _PEAK_Arms = 3.00, 22.8
-"""Data of the MPP0923D, from which the defaults are taken."""
+"""Ratings of the motor MPP0923D, to which the default values belong."""
 _Angle_deg = Annotated[float, Field(ge=-1e6, le=1e6)]
 _Section = TypeVar("_Section", bound=Profile)
 
 
 class MotorPlant(Profile):
-    """Rotor and torque constant."""
+    """Errors and start state of the rotor and of the torque constant."""
 
     torque_constant_error: Annotated[float, Field(ge=-0.5, le=0.5)] = 0.04
-    """Relative: true torque constant = nominal × (1 + this)."""
+    """Relative error: true torque constant = nominal × (1 + this)."""
     inertia_kg_m2: Annotated[float, Field(ge=1e-6, le=10.0)] = 1.130e-4
     initial_angle_deg: Annotated[float, Field(ge=-36000.0, le=36000.0)] = 0.0
     """Mechanical angle at power-up; the encoder counts from zero there."""
     brake_torque_Nm: Annotated[float, Field(gt=0.0, le=1000.0)] = 8.0
-    """Torque of the holding brake; it is released unless a physics board applies it."""
+    """Torque of the holding brake, which is released unless a physics board applies it."""
 
 
 class CoggingTerm(Profile):
@@ -58,7 +58,7 @@ class FrictionPlant(Profile):
 
     coulomb_Nm: Annotated[float, Field(ge=0.0, le=100.0)] = 0.08
     breakaway_Nm: Annotated[float, Field(ge=0.0, le=200.0)] = 0.10
-    """At least `coulomb_Nm`; 1.25 times `coulomb_Nm` if only that is given."""
+    """At least `coulomb_Nm`. If only `coulomb_Nm` is given, 1.25 times that value."""
     stribeck_rad_s: Annotated[float, Field(ge=1e-4, le=100.0)] = 0.2
     viscous_Nms_rad: Annotated[float, Field(ge=0.0, le=10.0)] = 5e-4
     sigma0_Nm_rad: Annotated[float, Field(gt=0.0, le=1e6)] = 20.0
@@ -66,9 +66,9 @@ class FrictionPlant(Profile):
     sigma1_Nms_rad: Annotated[float, Field(ge=0.0, le=100.0)] = 0.02
     """Damping of the bristles."""
     direction_asymmetry: Annotated[float, Field(ge=-1.5, le=1.5)] = 0.1
-    """Relative: forward friction × (1 + a/2), backward × (1 − a/2)."""
+    """Relative difference a: forward friction × (1 + a/2), backward × (1 − a/2)."""
     angle_share: Annotated[float, Field(ge=0.0, le=0.9)] = 0.03
-    """Variation of the dry friction once a turn: × (1 + this · sin(angle + phase))."""
+    """Amplitude of the dry friction's variation once a turn: × (1 + this · sin(angle + phase))."""
     angle_phase_deg: Annotated[float, Field(ge=-360.0, le=360.0)] = 70.0
 
     @model_validator(mode="before")
@@ -97,15 +97,15 @@ class EncoderPlant(Profile):
     index_deg: Annotated[float, Field(ge=-360.0, le=360.0)] = 123.4
     """Mechanical angle of the index pulse."""
     index_present: bool = True
-    """False: there is no index pulse."""
+    """Whether there is an index pulse."""
     noise_counts: Annotated[float, Field(ge=0.0, le=1000.0)] = 0.3
     """Standard deviation of the reading before rounding."""
     eccentricity_rad: Annotated[float, Field(ge=0.0, le=0.1)] = 1.5e-4
-    """Error once a turn of a disc that is off the rotor's axis; zero at the index."""
+    """Amplitude of the error once a turn, because the disc is eccentric; zero at the index."""
     eccentricity_phase_deg: Annotated[float, Field(ge=-360.0, le=360.0)] = 50.0
-    """Phase from the index."""
+    """Phase of that error at the index."""
     interpolation_error: Annotated[float, Field(ge=0.0, le=0.25)] = 0.02
-    """Error once a line (four counts), as a share of the line."""
+    """Amplitude of the error once a line (four counts), as a share of the line."""
 
 
 class DrivePlant(Profile):
@@ -126,11 +126,11 @@ class DrivePlant(Profile):
     overspeed_ratio: Annotated[float, Field(ge=1.0, le=10.0)] = 1.2
     """Multiple of the maximum motor speed (6080h) that raises the overspeed fault."""
     off_when_pre_operational: bool = False
-    """Whether 6007h also acts in NMT state pre-operational; else the last torque stays."""
+    """Whether 6007h also acts in NMT state pre-operational; if not, the last torque stays."""
 
 
 class ThermalPlant(Profile):
-    """Warming of an energised drive from power-up, at which the other sections' values apply."""
+    """Warming of an energised drive; the values of the other sections are for the cold drive."""
 
     cogging_per_K: Annotated[float, Field(ge=-0.01, le=0.01)] = -0.001
     friction_per_K: Annotated[float, Field(ge=-0.01, le=0.01)] = -0.004
@@ -145,7 +145,7 @@ class LoadPlant(Profile):
     inertia_kg_m2: Annotated[float, Field(ge=0.0, le=100.0)] = 0.0
     """Inertia of the load on the motor side, rigidly coupled."""
     kind: Literal["none", "hung_mass", "fixed_anchor"] = "none"
-    """No cable; a mass that stands on the floor or hangs; a cable with a fixed end."""
+    """none: no cable; hung_mass: a mass hangs or stands on the floor; fixed_anchor: a fixed end."""
     mass_kg: Annotated[float, Field(ge=0.0, le=1000.0)] = 5.0
     height_m: Annotated[float, Field(ge=0.0, le=100.0)] = 0.0
     """Height of the mass above the floor at power-up; 0: it stands on the floor."""
@@ -154,15 +154,15 @@ class LoadPlant(Profile):
     pretension_N: Annotated[float, Field(ge=0.0, le=1e5)] = 0.0
     """Tension of a fixed cable at power-up."""
     cable_m: Annotated[float, Field(ge=0.01, le=1000.0)] = 3.0
-    """Free length of the cable at power-up; its stiffness remains that of this length."""
+    """Free length of the cable at power-up, which also determines its stiffness from then on."""
     cable_stiffness_N: Annotated[float, Field(ge=1.0, le=1e9)] | None = None
     """Axial stiffness EA; by default that of the cable's profile."""
     cable_damping_s: Annotated[float, Field(ge=0.0, le=1.0)] = 0.002
-    """Damping of the cable over its stiffness."""
+    """Ratio of the cable's damping to its stiffness."""
     anchor_stiffness_N_m: Annotated[float, Field(ge=1.0, le=1e9)] | None = None
     """Stiffness of a spring between cable and fixed anchor."""
     drum_radius_error: Annotated[float, Field(ge=-0.5, le=0.5)] = 0.0
-    """Relative: true drum radius = that of the winch's profile × (1 + this)."""
+    """Relative error: true drum radius = that of the winch's profile × (1 + this)."""
     winch_friction_Nm: Annotated[float, Field(ge=0.0, le=100.0)] = 0.0
     """Dry friction of gear and drum without tension, on the motor side."""
     friction_share: Annotated[float, Field(ge=0.0, le=0.9)] = 0.05
@@ -179,15 +179,15 @@ class LoadPlant(Profile):
 
 
 class LimitsPlant(Profile):
-    """Mechanical angles of the switches, over several turns; an omitted switch does not exist."""
+    """Mechanical angles of the switches, over several turns; None for a switch that is missing."""
 
     negative_deg: _Angle_deg | None = None
-    """Negative limit switch: active below."""
+    """Negative limit switch: active below this angle."""
     positive_deg: _Angle_deg | None = None
-    """Positive limit switch: active above."""
+    """Positive limit switch: active above this angle."""
     home_from_deg: _Angle_deg | None = None
     home_to_deg: _Angle_deg | None = None
-    """Home switch: active between the two; if only one is given, the other side is open."""
+    """Home switch: active between the two angles, or on the whole side of the only one."""
 
     @model_validator(mode="after")
     def _ordered(self) -> Self:
@@ -199,7 +199,7 @@ class LimitsPlant(Profile):
 
 
 def _filled(section: _Section, values: dict[str, float]) -> _Section:
-    """Return a section, with `values` for the keys that it was not given."""
+    """Return a section with `values` for the keys that its file does not give."""
     left_out = {k: v for k, v in values.items() if k not in section.model_fields_set}
     return section.model_copy(update=left_out)
 
@@ -224,7 +224,7 @@ class Plant(PlantFile):
         """Return this plant with omitted values taken from a winch's motor and encoder.
 
         Inertia, counts and overcurrent come from the profile; cogging and friction scale with
-        the rated torque. Given values, and values that this has once filled in, stay.
+        the rated torque. Values from the file, or from an earlier call, do not change.
         """
         motor = winch.motor
         size = motor.rated_torque_Nm / _RATED_Nm

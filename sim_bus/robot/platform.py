@@ -75,7 +75,7 @@ def update_cable_ends(p: Any, motors: Any) -> None:
         m.far_level = math.sqrt(max(0.0, level2))
         m.far_wound = wound
         m.far_drop = 0.0 if g == 0.0 else -free * rise / g
-        if wound > 0.0:  # only the free part sags, by the cube of its length
+        if wound > 0.0:  # only the free part sags, in proportion to the cube of its length
             m.far_level *= (free / (free + wound)) ** 1.5
 
 
@@ -83,12 +83,12 @@ def update_cable_ends(p: Any, motors: Any) -> None:
 def lead_cable(p: Any, i: int) -> tuple[float, float]:
     """Update the direction of cable i; return its free length and the length on its pulley, m.
 
-    The pulley swivels about the axis along which the cable comes, so that it points at the anchor
-    point. Relative to its centre, the cable comes at -r along the axis, and the anchor point at a
-    distance D lies at an angle φ from the axis. The wound angle is θ = φ + asin(r / D), the free
-    length sqrt(D² - r²) along the tangent at θ. Moving the anchor point along the tangent changes
-    only the free length; moving it across turns the tangent point accordingly. So the direction is
-    the slope of the whole length, and a pulley creates no energy.
+    The pulley swivels about the axis along which the cable arrives, so that its plane contains the
+    anchor point. Relative to the pulley's centre, the cable arrives at -r along the axis; the
+    anchor point is at distance D and at an angle φ from the axis. The wound angle is θ = φ + asin(r
+    / D), the free length sqrt(D² - r²) along the tangent at θ. Moving the anchor point along the
+    tangent changes only the free length; moving it across rotates the tangent point. So the cable's
+    direction is the gradient of the whole length, and a pulley creates no energy.
     """
     r = p.pulley_radius[i]
     way = p.way[i]
@@ -129,7 +129,8 @@ def anchor_velocity(p: Any, i: int) -> tuple[float, float, float]:
 def step_platform(p: Any, motors: Any, h: float) -> None:
     """Advance the platform by `h` seconds under the tensions of its motors' last step.
 
-    Symplectic Euler; the rotation follows the spin exactly, so that it stays a rotation.
+    Symplectic Euler for the translation; the rotation is exact, so that its matrix stays
+    orthogonal.
     """
     fx = p.mass * p.gravity[0] - p.air * p.velocity[0]
     fy = p.mass * p.gravity[1] - p.air * p.velocity[1]
@@ -211,8 +212,8 @@ def rotate(p: Any, h: float) -> None:
 def floor_force(p: Any, h: float) -> tuple[float, float, float, float, float, float]:
     """Return force and moment of the floor over the next `h` s: each foot on a damped spring.
 
-    A second spring acts along the floor while dry friction holds the foot: a foot that sticks stays
-    in place, one that slides drags its spring along.
+    While dry friction holds a foot, a second spring acts along the floor. A foot that sticks stays
+    in place; a foot that slides drags its spring along.
     """
     g = math.sqrt(p.gravity[0] ** 2 + p.gravity[1] ** 2 + p.gravity[2] ** 2)
     fx, fy, fz, tx, ty, tz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
@@ -254,7 +255,7 @@ def floor_force(p: Any, h: float) -> tuple[float, float, float, float, float, fl
     return fx, fy, fz, tx, ty, tz
 
 
-# The true record of a platform: its profile, with a plant's errors added.
+# Builds the true record of a platform from its profile and the errors in a plant file.
 
 _EVEN_m = 1e-6
 FloatArray = NDArray[np.float64]
@@ -269,23 +270,23 @@ class RobotShape:
 
     exit_points_m: ArrayLike
     anchor_points_m: ArrayLike
-    """In the platform's frame."""
+    """Anchor points in the platform's frame."""
     mass_kg: float
     home_m: Sequence[float]
     """Position of the platform's origin at power-up, unless the plant gives another."""
     weights_N_m: Sequence[float]
     """Weight of each cable."""
     home_rotation_rad: Sequence[float] = (0.0,)
-    """Rotation vector of the platform's frame at power-up, likewise."""
+    """Rotation vector of the platform's frame at power-up, unless the plant gives another."""
     inertia_kg_m2: Sequence[float] | None = None
     """Ixx Iyy Izz Ixy Ixz Iyz about the centre of mass, in the platform's frame; by default that of
     a plate whose corners are the anchor points."""
     centre_of_mass_m: Sequence[float] = (0.0, 0.0)
-    """In the platform's frame."""
+    """Centre of mass in the platform's frame."""
     pulley_radii_m: Sequence[float] | None = None
-    """Radius of the pulley at each exit point; by default points."""
+    """Radius of the pulley at each exit point; 0 by default."""
     pulley_axes: ArrayLike | None = None
-    """Unit vector along which each cable comes to its pulley, which swivels about it; by default
+    """Unit vector along which each cable arrives at its pulley, the swivel axis; by default
     upward."""
     feet_m: ArrayLike | None = None
     """Feet of the platform, in its frame; by default the corners of a box around its anchor
@@ -325,7 +326,7 @@ def build_platform(
 
 
 def _put_mass(p: Any, shape: RobotShape, plant: PlatformPlant, anchors: FloatArray) -> None:
-    """Set mass and inertia; a given inertia scales with the mass."""
+    """Set mass and inertia; an inertia from the profile scales with the mass."""
     p["mass"] = shape.mass_kg * (1.0 + plant.mass_error)
     if plant.radius_of_gyration_m is None and shape.inertia_kg_m2 is not None:
         p["inertia"] = (1.0 + plant.mass_error) * _tensor(shape.inertia_kg_m2)
@@ -399,7 +400,7 @@ def _vector(values: Sequence[float]) -> FloatArray:
 
 
 def _tensor(values: Sequence[float]) -> FloatArray:
-    """Return an inertia of six numbers, or one about the axis across a plane, as a matrix."""
+    """Return an inertia as a matrix: of six numbers, or of one about the normal of a plane."""
     if len(values) == 1:
         return values[0] * np.eye(3)
     xx, yy, zz, xy, xz, yz = values
@@ -407,7 +408,7 @@ def _tensor(values: Sequence[float]) -> FloatArray:
 
 
 def rotation_of(vector: ArrayLike) -> FloatArray:
-    """Return the matrix of a rotation vector, by Rodrigues' formula."""
+    """Return the rotation matrix of a rotation vector, by Rodrigues' formula."""
     v = np.asarray(vector, float)
     angle = float(np.linalg.norm(v))
     if angle == 0.0:
@@ -419,6 +420,6 @@ def rotation_of(vector: ArrayLike) -> FloatArray:
 
 
 def _plate_radius(anchors: FloatArray) -> float:
-    """Return the radius of gyration of a plate about its centre, from its corners' distance."""
+    """Return the radius of gyration of a plate about its centre, given its corners."""
     spread = float(np.sqrt(np.mean(np.sum((anchors - anchors.mean(axis=0)) ** 2, axis=1))))
     return max(0.01, spread / 2.0)

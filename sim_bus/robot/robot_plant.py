@@ -27,17 +27,17 @@ class PlatformPlant(Profile):
     """The rigid body; errors are relative to the robot's profile."""
 
     mass_error: _Relative = 0.0
-    """Relative: true mass = that of the profile × (1 + this)."""
+    """Relative error: true mass = that of the profile × (1 + this)."""
     centre_of_mass_m: Annotated[Vector, Field(min_length=2, max_length=3)] | None = None
-    """In the platform's frame; by default that of the profile."""
+    """Centre of mass in the platform's frame; by default that of the profile."""
     radius_of_gyration_m: Annotated[float, Field(gt=0.0, le=10.0)] | None = None
-    """About every axis; by default the profile's inertia or, without one, that of a plate whose
-    corners are the anchor points."""
+    """Radius of gyration about every axis; by default the profile's inertia applies or, without
+    one, that of a plate whose corners are the anchor points."""
     air_Ns_m: Annotated[float, Field(ge=0.0, le=1000.0)] = 0.5
 
 
 class GeometryPlant(Profile):
-    """True positions of points: first a vector for each cable, then a random error."""
+    """Errors of the true points: a given vector for each cable, plus a random error."""
 
     exit_errors_m: tuple[Vector, ...] = ()
     anchor_errors_m: tuple[Vector, ...] = ()
@@ -49,28 +49,28 @@ class SlipPlant(Profile):
     """A cable that slips through its fastening on the drum, once."""
 
     cable: Annotated[int, Field(ge=1, le=64)]
-    """Number of the cable, from 1."""
+    """Number of the cable, counted from 1."""
     at_s: Annotated[float, Field(ge=0.0, le=1e6)]
-    """Bus time."""
+    """Bus time of the slip."""
     slip_m: Annotated[float, Field(ge=-1.0, le=1.0)]
-    """Length by which it becomes longer then."""
+    """Length by which the slip lengthens the cable."""
 
 
 class CablesPlant(Profile):
     """The cables and their winches."""
 
     stiffness_error: _Relative = 0.0
-    """Relative: true EA = that of the cable's profile × (1 + this)."""
+    """Relative error: true EA = that of the cable's profile × (1 + this)."""
     damping_s: Annotated[float, Field(ge=0.0, le=0.05)] | None = None
-    """Damping over stiffness; by default that of the cable's profile."""
+    """Ratio of damping to stiffness; by default that of the cable's profile."""
     creep_shares: tuple[_Share, _Share] = (0.01, 0.01)
-    """Strain that follows the elastic one, as shares of it; a fast part and a slow one."""
+    """Creep strain as a share of the elastic strain: a fast part and a slow part."""
     creep_times_s: tuple[_Time_s, _Time_s] = (0.5, 60.0)
-    """Time after which 63 % of the creep has occurred."""
+    """Time after which 63 % of each part has occurred."""
     sag: bool = True
     """Whether cables have weight."""
     drum_radius_errors: tuple[_Relative, ...] = ()
-    """Relative, one for each axis or empty."""
+    """Relative errors of the drum radii: one for each axis, or empty."""
     drum_radius_sigma: Annotated[float, Field(ge=0.0, le=0.1)] = 0.0
     winch_friction_Nm: Annotated[float, Field(ge=0.0, le=100.0)] = 0.0
     """Dry friction of gear and drum without tension, on the motor side."""
@@ -80,18 +80,18 @@ class CablesPlant(Profile):
 
 
 class WindingPlant(Profile):
-    """Winding of the cables on their drums; carriages guide them to and fro."""
+    """Winding of the cables on their drums, guided by carriages that move along the drums."""
 
     run_out_m: Annotated[float, Field(ge=0.0, le=0.01)] = 3e-5
-    """Eccentricity of a drum: the cable is longer and shorter by this once a turn."""
+    """Eccentricity of a drum: amplitude of the variation of cable length once a turn."""
     pitch_m: Annotated[float, Field(ge=0.0, le=0.2)] = 0.006
     """Distance from one turn on the drum to the next."""
     carriage_error: Annotated[float, Field(ge=0.0, le=1.0)] = 0.02
-    """Share of its way along the drum by which a carriage lags behind; 1: it does not move."""
+    """Share of the drum's advance by which a carriage lags behind; 1: it does not move."""
     carriage_offset_m: Annotated[float, Field(ge=-0.5, le=0.5)] = 0.002
     """Offset of the carriage from its cable at power-up."""
     carriage_distance_m: Annotated[float, Field(gt=0.0, le=10.0)] = 0.3
-    """Distance from the drum."""
+    """Distance of the carriage from the drum."""
     gear_stiffness_Nm_rad: Annotated[float, Field(ge=100.0, le=1e9)] = 10_000.0
     """Stiffness of gear and belt, at the drum."""
 
@@ -111,18 +111,18 @@ class StartPlant(Profile):
     angle_deg: _Angle_deg | None = None
     """Angle of a platform in a plane; by default the profile's at home."""
     rotation_deg: Annotated[tuple[_Angle_deg, ...], Field(min_length=3, max_length=3)] | None = None
-    """Rotation vector of a platform in space; likewise."""
+    """Rotation vector of a platform in space; by default the profile's at home."""
     slack_m: Annotated[tuple[_Slack_m, ...], Field(min_length=1), BeforeValidator(_one_or_each)] = (
         0.02,
     )
-    """One value for every cable (a number in the file), or one for each."""
+    """Slack: one value for every cable (a number in the file), or one for each."""
 
 
 class FloorPlant(Profile):
     """The floor under the platform."""
 
     height_m: Annotated[float, Field(ge=-1000.0, le=1000.0)] | None = None
-    """By default such that the platform stands at rest in its pose at power-up."""
+    """Height of the floor; by default the platform stands on it at rest in its pose at power-up."""
     present: bool = True
     stiffness_N_m: Annotated[float, Field(gt=0.0, le=1e7)] = 1e6
     damping_Ns_m: Annotated[float, Field(ge=0.0, le=1e5)] = 500.0
@@ -130,10 +130,10 @@ class FloorPlant(Profile):
 
 
 class VariationPlant(Profile):
-    """Differences of the motors from the one in [motor]: uniform within plus and minus these."""
+    """Differences between the motors and the one in [motor], uniform within ± these values."""
 
     cogging: Annotated[float, Field(ge=0.0, le=0.9)] = 0.2
-    """Of each amplitude, relative; phases are random."""
+    """Relative variation of each amplitude; phases are random."""
     friction: Annotated[float, Field(ge=0.0, le=0.9)] = 0.2
     torque_constant: Annotated[float, Field(ge=0.0, le=0.3)] = 0.03
 
@@ -144,14 +144,14 @@ class ScannerPlant(Profile):
     position_sigma_m: Annotated[float, Field(ge=0.0, le=0.1)] = 0.002
     """Standard deviation of each coordinate."""
     rotation_sigma_rad: Annotated[float, Field(ge=0.0, le=0.1)] = 0.002
-    """Of each component of the rotation vector of its error."""
+    """Standard deviation of each component of the rotation error, a rotation vector."""
     rate_Hz: Annotated[float, Field(gt=0.0, le=1000.0)] = 10.0
 
 
 class RobotPlant(PlantFile):
     """All sections of a robot's plant file; every key has a default.
 
-    `motor` is the plant of one motor as for a single winch; `motors`, if given, has one each.
+    `motor` is the plant of one motor, as for a single winch. `motors`, if given, has one per motor.
     """
 
     seed: Annotated[int, Field(ge=0, lt=2**32)] = 7

@@ -48,7 +48,7 @@ def observe(m: Any, counter: int, h: float) -> None:
 
 @jit
 def engage(m: Any, kind: int) -> None:
-    """Start another kind of control from the present motion, without a jump in torque."""
+    """Start another control mode from the present motion, without a step in torque."""
     if m.kind == OFF:
         m.torque_demand = 0.0
     m.reference_position = m.observed_position
@@ -74,7 +74,7 @@ def ramp_velocity(m: Any, goal: float, h: float) -> None:
     braking = v * (goal - v) < 0.0
     step = (m.deceleration if braking else m.acceleration) * h
     if braking and v * goal < 0.0:
-        goal = 0.0  # a reversal passes through rest, where the acceleration may change
+        goal = 0.0  # a reversal passes through zero speed, where the acceleration may change
     new = _approach(v, goal, step)
     m.reference_acceleration = 0.0 if math.isinf(step) else (new - v) / h
     m.reference_velocity = new
@@ -83,7 +83,7 @@ def ramp_velocity(m: Any, goal: float, h: float) -> None:
 
 @jit
 def profile_position(m: Any, target: float, h: float) -> None:
-    """Advance the trapezoidal profile: use the highest speed that can still brake at the target."""
+    """Advance the trapezoidal profile at the highest speed from which it can stop at the target."""
     distance = target - m.reference_position
     d = m.deceleration
     half = 0.5 * d * h
@@ -120,7 +120,7 @@ def motion_torque(m: Any, kind: int, h: float) -> float:
     if kind != VELOCITY:
         lag = m.reference_position - m.observed_position
         velocity += m.position_gain * lag
-        # Within one count of rest, the integrator would only hunt because of stiction.
+        # Within one count of rest, stiction would make the integrator hunt.
         frozen = abs(lag) <= 1.0 and m.reference_velocity == 0.0
     else:
         frozen = False
@@ -179,7 +179,7 @@ def _lasting(now: float, since: float, holds: bool) -> float:
 
 @jit
 def watch(m: Any, kind: int, target: float, h: float) -> int:
-    """Update windows, load model and thresholds after `h` seconds; return their flags."""
+    """Update windows, load model and thresholds after `h` seconds; return the resulting flags."""
     flags = 0
     now = m.time
     m.standing_since = _lasting(

@@ -1,7 +1,8 @@
-"""Log of the true motion, written only for reports; and the record file used by all such logs.
+"""Log of the true motion, which only reports may read; and the record file of all such logs.
 
-There is one record at every SYNC, and some without SYNC, so that the log also shows a motor whose
-master has died; these have `NO_SYNC` as number. Records have the little-endian layout named in
+There is one record at every SYNC. Some records are written without SYNC, with `NO_SYNC` as number,
+so that the log also shows a motor whose master has died. Records have the little-endian layout
+named in
 the header of their `RecordFile`.
 """
 
@@ -28,15 +29,16 @@ from cdpr_sim_bus.robot.robot_plant import ScannerPlant
 
 HEADER_BYTES = 1024
 NO_SYNC = 0xFFFFFFFF
-"""Replaces the SYNC's number in a record that belongs to no SYNC."""
+"""Number in a record that belongs to no SYNC."""
 
 
 class RecordFile:
     """A file of true or externally measured values whose header describes its records.
 
-    One line of JSON, padded with spaces to HEADER_BYTES, newline included; then the records.
+    The header is one line of JSON, padded with spaces to HEADER_BYTES, newline included; the
+    records follow.
 
-    If the file can no longer be written, it ends with a message and the writer continues.
+    If the file becomes unwritable, the record ends with a message and the writer continues.
     """
 
     def __init__(self, path: Path, header: Mapping[str, Any]) -> None:
@@ -146,7 +148,7 @@ class PoseLog(RecordFile):
         ]
         self._row = np.zeros(1, np.dtype(fields))
         self._bytes = self._row.view(np.uint8).data
-        # views, because a record of n motors would be compiled again for each n
+        # views: otherwise the kernel would be compiled again for each number of motors
         self._parts = [self._row[field[0]][0] for field in fields[2:]]
         header = {
             "format": "cdpr-rt pose log 1",
@@ -202,7 +204,7 @@ _FIELDS = [("time_s", "<f8"), ("position_m", "<f8", (3,)), ("rotation", "<f8", (
 
 
 class PoseScanner(RecordFile):
-    """Appends a measured pose to a file at its rate, at the first call of `append` when it is due.
+    """Appends a measured pose to a file when a measurement is due, at the next call of `append`.
 
     Position and rotation have normally distributed errors, independent for each coordinate and
     reading; the rotation error is a rotation vector in the room. In a plane it measures x, y
@@ -245,7 +247,7 @@ class PoseScanner(RecordFile):
 
 
 class BoardPose:
-    """A log that keeps only the newest pose, on the board; initially that of power-up."""
+    """A log that keeps only the newest pose, on the board; at first the pose at power-up."""
 
     def __init__(self, robot: CableRobot, board: BoardPlatform) -> None:
         self._robot, self._board = robot, board
