@@ -7,7 +7,7 @@ Arrays, all of float64:
     pose      (4, 3)      position p, and below it the rotation matrix Q
     geometry  (13, n)     rows EXIT, ANCHOR (in the platform's frame), RADIUS of a swivel pulley,
                           AXIS of its swivelling: unit vector along which the cable comes up to it;
-                          WEIGHT per length as a vector in the room, N/m, 0 of weightless cables
+                          WEIGHT per length as a vector in the room, N/m, 0 for weightless cables
     cables    (9, n)      J transposed (6, n), then rows FREE, ARC, ERROR
 """
 
@@ -30,8 +30,8 @@ TINY = 1e-300
 def run_cables(geometry: FloatArray, pose: FloatArray, cables: FloatArray) -> None:
     """Write J^T, FREE and ARC of all cables at the pose; a cable's length is FREE + ARC.
 
-    Eqs. (3.2), (3.10): c = p + Q b - a, ρ = |c|, u = c/ρ, a row of J is (u, Q b × u). A cable
-    without length has a row of zeros.
+    Eqs. (3.2), (3.10): c = p + Q b - a, ρ = |c|, u = c/ρ, a row of J is (u, Q b × u). The row of a
+    cable without length is zero.
     """
     px, py, pz = pose[0, 0], pose[0, 1], pose[0, 2]
     xx, xy, xz = pose[1, 0], pose[1, 1], pose[1, 2]
@@ -68,7 +68,7 @@ def wrench_matrices(
 ) -> None:
     """Write -J^T of the chosen directions (d,) into `W` (m, d, n) for poses (m, 4, 3).
 
-    A cable without length has nan. `cables` is overwritten.
+    The column of a cable without length is nan. `cables` is overwritten.
     """
     for j in range(W.shape[0]):
         run_cables(geometry, poses[j], cables)
@@ -81,10 +81,11 @@ def wrench_matrices(
 def hang(geometry: FloatArray, pose: FloatArray, cables: FloatArray, wrench: FloatArray) -> None:
     """Add the wrench (6,) of the cables' own weight on the platform to `wrench`.
 
-    To second order of weight over tension, a cable of weight w per length (a vector) and free
-    length ρ, whose tension in the middle is t, pulls the platform with t towards its exit and with
-    half of its weight, ρ w/2, at Q b from the platform's origin. This is a parabola; no derivative
-    of t occurs. The winch feels t + `tension_rise`. `cables` are those at the pose.
+    A cable has weight w per length (a vector), free length ρ, and tension t in its middle. To
+    second order in weight over tension, it pulls the platform with t towards its exit point and
+    with half of its weight, ρ w/2, at Q b from the platform's origin. This approximates the
+    catenary by a parabola; no derivative of t occurs. The tension at the winch is t +
+    `tension_rise`. `cables` has the rows of `run_cables` at the pose.
     """
     for i in range(geometry.shape[1]):
         half = 0.5 * cables[FREE, i]
@@ -108,8 +109,9 @@ def hang(geometry: FloatArray, pose: FloatArray, cables: FloatArray, wrench: Flo
 def tension_rise(geometry: FloatArray, cables: FloatArray, i: int) -> float:
     """Return the excess of tension at a cable's exit over that in its middle: ρ u·w/2, N.
 
-    With u from exit to anchor: half of the weight times the height of the exit above the anchor.
-    At the platform the tension is lower by the same amount.
+    The unit vector u points from exit to anchor, so this is half of the weight per length times the
+    height of the exit above the anchor. The tension at the platform is lower than in the middle by
+    the same amount.
     """
     along = 0.0
     for k in range(3):
@@ -143,13 +145,14 @@ def hanging_wrenches(
 
 @jit
 def _wind(geometry: FloatArray, pose: FloatArray, cables: FloatArray, i: int) -> None:
-    """Lead cable `i`, which is straight so far, over its swivel pulley.
+    """Change cable `i` from a straight line to one that runs over its swivel pulley.
 
-    In the plane of swivel axis k and anchor let the anchor be `beside` the axis and `along` it from
-    the exit point, at which the cable arrives along k; with X = beside - r and d² = X² + along² the
-    free length is l = √(d² - r²), and the wound angle θ has sin θ = (X l + along r)/d² and cos θ =
-    (along l - X r)/d². The length is l + r θ; its derivative by the anchor is the direction of the
-    free part. An anchor within the pulley has l = 0.
+    The cable arrives at the exit point along the swivel axis k. In the plane through k and the
+    anchor, the anchor is at distance `beside` from the axis and at distance `along` from the exit
+    point in the direction of k. With X = beside - r and d² = X² + along² the free length is l =
+    √(d² - r²), and the wrap angle θ has sin θ = (X l + along r)/d² and cos θ = (along l - X r)/d².
+    The length is l + r θ. Its derivative with respect to the anchor position is the direction of
+    the free part. If the anchor is inside the pulley, l = 0.
     """
     r = geometry[RADIUS, i]
     kx, ky, kz = geometry[AXIS, i], geometry[AXIS + 1, i], geometry[AXIS + 2, i]
@@ -191,7 +194,7 @@ def compare(
     return cost
 
 
-# Cables that stretch and sag.
+# Kernels of cables that stretch and sag.
 
 _MOST_ITERATIONS = 100
 _SOLVED = 1e-14
@@ -199,14 +202,14 @@ _SOLVED = 1e-14
 
 @dataclass(frozen=True)
 class CableModel:
-    """Stiffness EA and weight of the cables, which give the unstretched length.
+    """Stiffness EA and weight of the cables, from which the unstretched length is computed.
 
-    With neither a cable is straight and rigid, with a stiffness straight and elastic, with a weight
-    an elastic catenary. Its part on a pulley has the same strain and no weight.
+    Without both, a cable is straight and rigid. With a stiffness it is straight and elastic; with a
+    weight it is an elastic catenary. The part on a pulley has the same strain and no weight.
     """
 
     stiffness_N: float = math.inf
-    """EA: tension over strain."""
+    """EA, the ratio of tension to strain."""
     weight_N_m: float = 0.0
     """Weight per unstretched length."""
 
@@ -215,18 +218,18 @@ class CableModel:
 def unstretched_length(
     across: float, height: float, tension: float, compliance: float, weight: float
 ) -> float:
-    """Return the length without tension of a cable between two points, or nan.
+    """Return the unstretched length of a cable between two points, or nan if no cable fits.
 
-    The end at which `tension` acts is `height` above the other one, which is `across` beside it.
-    Elastic catenary: with H, V the components of `tension` t, T' = √(H² + (V - wL)²) the tension at
-    the other end, k = 2/(t + T'), x = wL/(t + T'), compliance c = 1/EA
+    `tension` acts at one end. The other end is `height` below it and at the horizontal distance
+    `across`. The cable is an elastic catenary: with H, V the components of `tension` t, T' = √(H² +
+    (V - wL)²) the tension at the other end, k = 2/(t + T'), x = wL/(t + T'), compliance c = 1/EA
 
         across = H L (c + k artanh(x)/x)        height = (V - wL/2) L (c + k)
 
-    which is (3.81) to (3.84) with stretch and with ends at any height. Both give H and V in terms
-    of L, and H² + V² = t² is then a quadratic equation of L², whose smaller root is the taut
-    cable. The two brackets hardly depend on L and follow by iteration. Without weight the cable is
-    straight: L = √(across² + height²)/(1 + t/EA).
+    These are eqs. (3.81) to (3.84), extended to stretch and to ends at any height. They give H and
+    V in terms of L. H² + V² = t² is then a quadratic equation in L², and its smaller root is the
+    taut cable. The two brackets hardly depend on L and are found by iteration. Without weight the
+    cable is straight: L = √(across² + height²)/(1 + t/EA).
     """
     straight = math.sqrt(across * across + height * height)
     if weight == 0.0:
@@ -265,10 +268,10 @@ def write_unstretched_lengths(
     weight: float,
     lengths: FloatArray,
 ) -> None:
-    """Write the `lengths` (n,) without tension of cables under `tension` (n,) at the platform.
+    """Write the unstretched `lengths` (n,) of cables with `tension` (n,) at the platform.
 
-    `direction` (3, n) and `free` (n,) are those of the free parts as straight lines, `arc` (n,)
-    lengths on pulleys, `up` the unit vector against gravity.
+    `direction` (3, n) and `free` (n,) describe the free parts as straight lines. `arc` (n,) are the
+    lengths on the pulleys. `up` is the unit vector against gravity.
     """
     for i in range(lengths.size):
         x, y, z = direction[0, i], direction[1, i], direction[2, i]

@@ -18,7 +18,7 @@ class CalibrationState:
     why: str
     """Cause of the state: the calibration, or the part that has moved."""
     date: str
-    """ISO 8601, UTC; empty if no state was ever stored."""
+    """Date as ISO 8601, UTC; empty if no state has been stored yet."""
 
 
 def calibrated_flag_file(robot: str) -> Path:
@@ -27,7 +27,7 @@ def calibrated_flag_file(robot: str) -> Path:
 
 
 def calibration_state(robot: str) -> CalibrationState:
-    """Return the robot's state; without a file, or with a damaged one, it is not calibrated."""
+    """Return the robot's state: not calibrated if the file is missing or damaged."""
     path = calibrated_flag_file(robot)
     try:
         held = read_state(path)
@@ -43,7 +43,7 @@ def calibration_state(robot: str) -> CalibrationState:
 
 
 def mark_calibrated(robot: str, why: str) -> CalibrationState:
-    """Store that the robot is calibrated from now on; raises StateFileError."""
+    """Store that the robot is calibrated; raises StateFileError."""
     return _mark(robot, True, why)
 
 
@@ -53,9 +53,9 @@ def mark_not_calibrated(robot: str, why: str) -> CalibrationState:
 
 
 def not_calibrated_reason(robot: str) -> str:
-    """Return why the geometry of a robot is unreliable, "" if it is reliable.
+    """Return the reason why a robot's geometry is unreliable, or "" if it is reliable.
 
-    A robot that has never been calibrated has the geometry of its file.
+    The geometry of a robot that has never been calibrated is that of its file, and is reliable.
     """
     if not calibrated_flag_file(robot).exists():
         return ""

@@ -1,10 +1,11 @@
 """Kernels of clearances at poses, and of the first contact on a straight way, without gaps.
 
-Tremblay (thesis), eqs. (3.27), (3.36), (3.37), by conservative advancement: at a place of the way
-each pair has a distance d, along the unit vector n between its nearest points. Both its bodies are
-convex. They stay apart by more than the clearance c until an end has moved along n by d - c plus
-its distance behind the nearest point. With the speed g of an end along n and a bound h of its
-acceleration, both per share s of the way, that holds for
+The method is that of Tremblay (thesis), eqs. (3.27), (3.36), (3.37), with conservative advancement.
+At a position on the way, each pair of things has a distance d, along the unit vector n between its
+nearest points. Both things of a pair are convex. They stay more than the clearance c apart until an
+end of one of them has moved along n by d - c plus its distance behind the nearest point. With the
+speed g of an end along n and a bound h of its acceleration, both per share s of the way, they stay
+apart for
 
     s up to 2 m / (g + √(g² + 2 h m)),  m = d - c + distance behind
 
@@ -16,11 +17,11 @@ formula the acceleration is at most |TURN|² |b|.
 
     ends    (2, n, 3)    where the free part of each cable begins (at its exit point or the tangent
                          of its pulley) and where it ends, in the room
-    points  (4, 3)       ends of the segments of a pair, as far as they count
-    near    (2, 3)       their nearest points
+    points (4, 3) ends of the segments of a pair, without the parts that are left out near (2, 3)
+    the nearest points of the pair
 
-Of a cable the `least` metres next to a shared point are left out, at most half of it: TRIMMED has
-bits EXIT and ANCHOR.
+Next to a point that a cable shares with the other thing, `least` metres of it are left out, but at
+most half of the cable. The bits EXIT and ANCHOR of TRIMMED mark the ends at which this is done.
 """
 
 from __future__ import annotations
@@ -36,9 +37,9 @@ from cdpr_rt.model.cable_kernel import ANCHOR as ANCHORS
 from cdpr_rt.model.cable_kernel import AXIS, CABLE_ROWS, FREE, RADIUS, TINY, run_cables
 from cdpr_rt.model.pose import exponential
 
-# Kernels of distances between segments and boxes, in m; exact except for rounding. Points are
-# (3,), a box (2, 3) is its least and its greatest coordinates. The nearest points go into
-# `near` (2, 3), that of the thing named first in its first row.
+# Kernels of distances between segments and boxes, in m; exact except for rounding. Points are (3,).
+# A box (2, 3) has its least and its greatest coordinates as rows. The nearest points are written to
+# `near` (2, 3): the first row belongs to the first-named thing.
 
 _CUTS = 60
 _PARALLEL = 1e-12
@@ -51,8 +52,8 @@ def segment_to_segment(
 ) -> float:
     """Return the distance of the segments p q and r s: ζ of Tremblay (thesis), eq. (3.37).
 
-    The lines' nearest points, if both are on the segments; else one of the nearest points is
-    an end.
+    If the nearest points of the two lines are on the segments, they are the result. Otherwise one
+    of the nearest points is an end of a segment.
     """
     ux, uy, uz = q[0] - p[0], q[1] - p[1], q[2] - p[2]
     vx, vy, vz = s[0] - r[0], s[1] - r[1], s[2] - r[2]
@@ -86,9 +87,9 @@ def segment_to_segment(
 def segment_to_box(p: FloatArray, q: FloatArray, box: FloatArray, near: FloatArray) -> float:
     """Return the distance of the segment p q from a box, 0 if it enters it.
 
-    The square of a point's distance is convex along the segment, and its slope linear between the
-    crossings of the segment with planes of the box: the zero of the slope lies between the last
-    crossing with a slope below 0 and the first one above.
+    The squared distance of a point is convex along the segment. Its slope is linear between the
+    points at which the segment crosses the planes of the box. So the slope is zero between the last
+    crossing at which it is below 0 and the first one at which it is above 0.
     """
     low, high = 0.0, 1.0
     low_slope, high_slope = _slope(p, q, box, low), _slope(p, q, box, high)
@@ -119,10 +120,10 @@ def segment_to_box(p: FloatArray, q: FloatArray, box: FloatArray, near: FloatArr
 def box_to_box(
     pose: FloatArray, box: FloatArray, other: FloatArray, corners: FloatArray, near: FloatArray
 ) -> float:
-    """Return the distance of a box at a `pose` (4, 3) from one that is not turned; 0 inside.
+    """Return the distance of a box at a `pose` (4, 3) from an axis-aligned box; 0 if they overlap.
 
-    Of two boxes apart, an edge of one is at the nearest points. `corners` (8, 3) and `near` are
-    overwritten.
+    If two boxes are apart, one of the nearest points is on an edge of its box. `corners` (8, 3) and
+    `near` are overwritten.
     """
     least = math.inf
     _place_corners(pose, box, corners)
@@ -145,9 +146,9 @@ def box_to_box(
 
 @jit
 def segment_depth(p: FloatArray, q: FloatArray, box: FloatArray) -> float:
-    """Return how far the segment p q is inside a box: the largest depth of its points.
+    """Return the largest depth of a point of the segment p q inside a box, below 0 if outside.
 
-    The distance of a point beyond the sides is convex along the segment. Below 0 if outside.
+    How far a point is beyond the sides of the box is a convex function along the segment.
     """
     low, high = 0.0, 1.0
     for _ in range(_CUTS):
@@ -161,15 +162,15 @@ def segment_depth(p: FloatArray, q: FloatArray, box: FloatArray) -> float:
 
 @jit
 def box_depth(pose: FloatArray, box: FloatArray, other: FloatArray) -> float:
-    """Return how far a box at a `pose` (4, 3) overlaps one that is not turned.
+    """Return how far a box at a `pose` (4, 3) overlaps an axis-aligned box.
 
-    The least overlap along the directions at right angles to the sides of either box.
+    This is the least overlap along the face normals of both boxes.
     """
     least = math.inf
     for axis in range(6):
         apart, reach = 0.0, 0.0
         for j in range(3):
-            # the unit vector, of the room's or the box's axes, times both middles and half sizes
+            # projections on an axis of the room or of the box: both middles and half sizes
             n = pose[1 + j, axis - 3] if axis > 2 else (1.0 if j == axis else 0.0)
             apart += n * (pose[0, j] - 0.5 * (other[0, j] + other[1, j]))
             reach += abs(n) * 0.5 * (other[1, j] - other[0, j])
@@ -196,7 +197,7 @@ def _beyond(p: FloatArray, q: FloatArray, box: FloatArray, share: float) -> floa
 
 @jit
 def _place_corners(pose: FloatArray, box: FloatArray, corners: FloatArray) -> None:
-    """Write the corners (8, 3) of a box at a pose; bit k of a corner's number is its side."""
+    """Write the corners (8, 3) of a box at a pose; bit k of an index is the side along axis k."""
     for i in range(8):
         for j in range(3):
             corners[i, j] = pose[0, j]
@@ -230,12 +231,12 @@ KIND, FIRST, SECOND, TRIMMED = range(4)
 CABLES, CABLE_BODY, CABLE_BOX, BODY_BOX = range(4)
 EXIT, ANCHOR = 1, 2
 TRIM_TIMES: Final = 10.0
-"""Length that is left out, as a multiple of the clearance: cables that leave a point at more than
-1/10 rad (5.7 deg) from each other are clear of each other."""
+"""Length that is left out, as a multiple of the clearance: two cables from one point are then clear
+of each other if the angle between them is more than 1/10 rad (5.7 deg)."""
 
 
 class Scene(NamedTuple):
-    """Cables, platform and boxes of a robot, and the pairs of them that are compared."""
+    """Cables, platform and boxes of a robot, and the pairs of these things to be checked."""
 
     geometry: FloatArray
     """(10, n), as in `cable_kernel`."""
@@ -253,7 +254,7 @@ class Scene(NamedTuple):
 def write_clearances(
     scene: Scene, poses: FloatArray, clearances: FloatArray, nearest: IntArray
 ) -> None:
-    """Write the least distance of all pairs (m,), and the index of its pair, at poses (m, 4, 3)."""
+    """Write the least distance (m,) over all pairs, and that pair's index, at poses (m, 4, 3)."""
     n = scene.geometry.shape[1]
     cables, ends = np.empty((CABLE_ROWS, n)), np.empty((2, n, 3))
     points, near, corners = np.empty((4, 3)), np.empty((2, 3)), np.empty((8, 3))
@@ -292,7 +293,7 @@ def distance(
 ) -> float:
     """Return the distance of pair `k`; write its points and nearest points.
 
-    Those of a cable and the body are in the platform's frame, all others in the room's.
+    For a cable and the body the points are in the platform's frame, otherwise in the room's.
     """
     pair, boxes, trim = scene.pairs[k], scene.boxes, scene.trim
     kind, first, second = pair[KIND], pair[FIRST], pair[SECOND]
@@ -311,7 +312,7 @@ def distance(
 
 @jit
 def depth(scene: Scene, k: int, pose: FloatArray, ends: FloatArray, points: FloatArray) -> float:
-    """Return the penetration depth of pair `k`, which overlaps; 0 for two cables."""
+    """Return the penetration depth of the overlapping pair `k`; 0 for two cables."""
     pair, boxes, trim = scene.pairs[k], scene.boxes, scene.trim
     kind, first, second = pair[KIND], pair[FIRST], pair[SECOND]
     if kind == CABLES:
@@ -328,7 +329,7 @@ def depth(scene: Scene, k: int, pose: FloatArray, ends: FloatArray, points: Floa
 
 @jit
 def _take(ends: FloatArray, i: int, trimmed: int, trim: float, points: FloatArray) -> None:
-    """Write the ends of the part of a cable that counts."""
+    """Write the ends of a cable without the parts that are left out."""
     square = 0.0
     for k in range(3):
         square += (ends[1, i, k] - ends[0, i, k]) ** 2
@@ -353,22 +354,23 @@ START, STEP, TURNED, TURN, BASE, WAY_ROWS = 0, 1, 2, 3, 4, 7
 TOUCH_m: Final = 1e-6
 """Distance above the clearance below which a pair is in contact."""
 _LEAVING: Final = 0.9
-"""Share of its distance that a pair in contact at the start has to keep."""
+"""Share of its initial distance that a pair in contact at the start has to keep."""
 _LEAVES: Final = 4.0
-"""Longest motion of the platform until overlapping things are apart, in clearances."""
+"""Longest motion of the platform after which overlapping things must be apart, in clearances."""
 _WATCHES: Final = 32
 """Number of checks during that motion."""
 _DEEPER: Final = 0.05
-"""Increase of the depth that is allowed meanwhile, in clearances, for rounding and play."""
+"""Increase of the depth that is allowed during that motion, in clearances, for rounding and
+play."""
 _SPEED, _ACCELERATION, _EXIT, _FAR, _FREE, _HOLDS, _RATES = range(7)
 _TOGETHER = 0.02
-"""Pairs due within this share of the way are checked together with the others."""
+"""Pairs whose next check is due within this share of the way are checked together."""
 MOST_LOOKS: Final = 20_000
 _SMALL = 1e-4
 
 
 class _Look(NamedTuple):
-    """Arrays of one place of the way, overwritten at each."""
+    """Work arrays for one position on the way, overwritten at each position."""
 
     pose: FloatArray
     twist: FloatArray
@@ -379,18 +381,19 @@ class _Look(NamedTuple):
     rates: FloatArray
     """(7, n): bounds of speeds and accelerations of each cable's ends."""
     moves: FloatArray
-    """(4, 3): for both ends of both things of the pair, distance behind the nearest point, speed
-    along n, and acceleration."""
+    """(4, 3): distance behind the nearest point, speed along n, and acceleration of both ends of
+    both things of the pair."""
 
 
 @jit
 def first_contact(scene: Scene, way: FloatArray, most_looks: int) -> tuple[float, int, float, bool]:
     """Return the share of the way at which a pair comes into contact, the pair, and its distance.
 
-    Returns 2.0 and -1 if there is no contact. A pair in contact at the start has to stay about as
-    far apart, and to be clear at the end. Things that overlap there must not get deeper, have to be
-    clear before the platform has moved by _LEAVES clearances, and to stay so. A pair that
-    `most_looks` checks do not prove clear counts as in contact; last is whether contact is certain.
+    Returns 2.0 and -1 if there is no contact. A pair in contact at the start must not come much
+    closer, and must be clear at the end. Things that overlap at the start must not overlap more.
+    They must be clear before the platform has moved by _LEAVES clearances, and stay clear. A pair
+    that `most_looks` checks do not prove clear counts as in contact. The last value returned is
+    whether the contact is certain.
     """
     allowed = np.empty(scene.pairs.shape[0])
     allowed[:] = scene.clearance
@@ -405,7 +408,7 @@ def first_contact(scene: Scene, way: FloatArray, most_looks: int) -> tuple[float
 def _advance(
     scene: Scene, way: FloatArray, most_looks: int, allowed: FloatArray
 ) -> tuple[float, int, float, bool]:
-    """Return the first contact on the way; write the distance that each pair has to keep."""
+    """Return the first contact on the way; write the distances that pairs have to keep."""
     geometry, clearance = scene.geometry, scene.clearance
     n, count = geometry.shape[1], scene.pairs.shape[0]
     look = _Look(
@@ -441,7 +444,7 @@ def _advance(
                 until[k] = min(share + leaves / _WATCHES, leaves)
                 continue
             if allowed[k] < 0.0:
-                allowed[k] = clearance  # must have come apart
+                allowed[k] = clearance  # the overlap must have ended
             if apart - allowed[k] >= TOUCH_m and looks < most_looks:
                 kept = _clear_for(scene, k, apart, allowed[k], way, body_speed, look)
                 until[k] = share + kept
@@ -482,7 +485,7 @@ def _to_keep(apart: float, clearance: float) -> float:
 def place_on(
     way: FloatArray, share: float, scratch: FloatArray, pose: FloatArray, twist: FloatArray
 ) -> None:
-    """Write the pose at a share of the way, and its derivative there: twist (2, 3).
+    """Write the pose at a share of the way, and its derivative by the share: twist (2, 3).
 
     `scratch` (4, 3) is overwritten.
 
@@ -544,12 +547,12 @@ def _write_exit_speeds(
     ends: FloatArray,
     rates: FloatArray,
 ) -> None:
-    """Write bounds of the speed of the free parts' begin, and for how far all bounds hold.
+    """Write speed bounds for the starts of the free parts, and the share for which all bounds hold.
 
-    Over a pulley of radius r, an anchor at distance e from its swivel axis that moves at v, with a
-    free part l, moves the point at which the cable leaves by at most r (2 v/e + v/l). The bounds
-    hold while e and l are at least half of their present values. In the platform's frame that point
-    also moves because the platform turns.
+    The start is the point at which a cable leaves its pulley. Let r be the pulley's radius, e the
+    anchor's distance from the swivel axis, v its speed, and l the length of the free part. The
+    start then moves at r (2 v/e + v/l) at most. The bounds hold while e and l are at least half of
+    their present values. In the platform's frame the start also moves because the platform turns.
     """
     step, turn = size_of(way[STEP]), size_of(way[TURN])
     for i in range(geometry.shape[1]):
@@ -607,7 +610,9 @@ def _clear_for(
 
 @jit
 def _swings(rates: FloatArray, i: int, trim: float) -> float:
-    """Return a bound of the speed of a point `trim` from an end of a cable about that end."""
+    """Return a bound of the speed of a cable's point at distance `trim` from an end, about that
+    end.
+    """
     return trim * 2.0 * float(rates[_SPEED, i] + rates[_EXIT, i]) / float(rates[_FREE, i])
 
 
@@ -615,7 +620,7 @@ def _swings(rates: FloatArray, i: int, trim: float) -> float:
 def _apart_at_anchor(scene: Scene, pair: IntArray, way: FloatArray, rates: FloatArray) -> float:
     """Return how fast two cables that share an anchor may approach each other near it.
 
-    Otherwise a way of many metres would need one check per trimmed length.
+    Without this bound, a way of many metres would need one check per trimmed length.
     """
     speed = size_of(way[TURN]) * scene.clearance
     for row in range(2):
@@ -630,7 +635,7 @@ def _apart_at_anchor(scene: Scene, pair: IntArray, way: FloatArray, rates: Float
 def _write_moves(
     pair: IntArray, row: int, apart: float, trim: float, way: FloatArray, look: _Look
 ) -> None:
-    """Write how both ends of a cable, a pair's first or second (`row` 1) thing, may move."""
+    """Write how both ends of a pair's first or second (`row` 1) thing, a cable, may move."""
     pose, twist, points, near, rates, moves = look
     i, sign = pair[FIRST + row], (1.0 - 2.0 * row) / apart
     nx, ny = sign * (near[1, 0] - near[0, 0]), sign * (near[1, 1] - near[0, 1])
@@ -665,10 +670,10 @@ def _write_moves(
         moves[2 * row + end, 1], moves[2 * row + end, 2] = speed, bend
 
 
-# Kernel for every cycle: whether a short straight way leads into contact. If a pair is clear at
-# both ends of a part of the way, d0 and d1 apart, and the points of its things together move by
-# at most l, the least distance between is at least (d0 + d1 - l) / 2. If that does not suffice
-# for all of the way, the way is checked in parts.
+# Kernel for every cycle: whether a short straight way leads into contact. Let a pair be d0 and d1
+# apart at the ends of a part of the way, and let the points of its two things together move by at
+# most l. Then the least distance between the ends is at least (d0 + d1 - l) / 2. If that is too
+# little, the way is divided into more parts.
 
 _NOTHING_m: Final = 1e-9
 
@@ -687,9 +692,10 @@ def nears(
 ) -> int:
     """Return a pair that comes into contact on a `way`, as in `contact_kernel`, -1 for none.
 
-    A pair in contact at its start may separate, but not approach. With no `parts` only its end is
-    checked. `arm` is that of the platform's farthest point. Overwritten are `cables`, `ends`
-    (2, 2, n, 3), `poses` (3, 4, 3), `scratch` (5, 8, 3) and `before` (pairs,), of the last part.
+    A pair in contact at the start of the way may separate, but not approach. If `parts` is 0, only
+    the end of the way is checked. `arm` is the distance of the platform's farthest point from its
+    origin. `cables`, `ends` (2, 2, n, 3), `poses` (3, 4, 3), `scratch` (5, 8, 3) and `before`
+    (pairs,) are overwritten.
     """
     points, near, corners, scratch, twist = (
         scratch[0, :4], scratch[1, :2], scratch[2], scratch[3, :4], scratch[4, :2],
@@ -727,5 +733,5 @@ def nears(
 
 @jit
 def _together(pair: IntArray, moved: float) -> float:
-    """Return how far two things move together if the platform's points move by at most `moved`."""
+    """Return the sum of the motions of a pair's things if the platform's points move by `moved`."""
     return moved if pair[KIND] in (BODY_BOX, CABLE_BOX) else 2.0 * moved

@@ -5,15 +5,15 @@ least squares, with
 
     lengths       ρ_i(pose) = l_i        standard deviation LENGTH_STD_m
     equilibrium   -J^T t + weight = 0    FORCE_SHARE of the weight, CENTRE_STD_m times the weight
-    tensions      t_i = s_i              s_i is what motors or load cells say, see `say_tensions`
+    tensions t_i = s_i s_i is the reading of motors or load cells, see `say_tensions`
     inclinometer  Q s = (0, 0, 1)        TILT_STD_rad; s is its upward direction
 
-Without sensors, tensions say little: mainly how far cables pull against each other, which lengths
-of stiff cables do not tell. Arrays of float64 besides those of `cable_kernel`:
+Without load cells, the tensions add little: mainly how far cables pull against each other, which
+cannot be seen in the lengths of stiff cables. Arrays of float64 besides those of `cable_kernel`:
 
     known      (7,)       WEIGHT, N; CENTRE of mass in the platform's frame, m; STD_N, standard
-                          deviation of tensions by the motors; and what `learn_moment` writes:
-                          moments about x and y, Nm, that the rest does not explain
+                          deviation of tensions estimated from motors; and the moments about x and
+                          y, Nm, that the model does not explain, see `learn_moment`
     upward     (4,)       above 0 if an inclinometer's reading is valid; and its upward direction in
                           the platform's frame
     tensions   (4, n)     FOUND; SAID; their PRECISION, 1/σ²; OFFSET of load cells from motors
@@ -37,8 +37,8 @@ WEIGHT, CENTRE, STD_N, MOMENT, KNOWN = 0, 1, 4, 5, 7
 FOUND, SAID, PRECISION, OFFSET, TENSIONS = range(5)
 LENGTH_STD_m = 2e-3
 CELL_SHARE = 0.15
-"""Standard deviation of a load cell's reading as a share of the control's reserve of tension, which
-is that of what motors say."""
+"""Standard deviation of a load cell's reading, as a share of the control's reserve of tension. That
+reserve is the standard deviation of tensions estimated from the motors."""
 FORCE_SHARE, CENTRE_STD_m, TILT_STD_rad = 0.004, 1e-3, 2e-3
 """Uncertainty of weight, centre of mass, and inclinometer."""
 _MOST_TURN_rad, _LEAST_PIVOT = 0.2, 1e-12
@@ -55,10 +55,10 @@ def say_tensions(
     tensions: FloatArray,
     share: float,
 ) -> None:
-    """Write what motors say of the tensions in the middle, or load cells at the winches.
+    """Write the tensions in the middle of the cables, as measured by motors or load cells.
 
-    The OFFSET of a load cell from its motor is low-passed by `share` per cycle: the fast part of a
-    tension is that of a swing, which must not become a motion of the estimate.
+    The OFFSET between a load cell and its motor is low-passed by `share` per cycle. The fast part
+    of a tension comes from the platform's swing, which must not become a motion of the estimate.
     """
     for i in range(motor_N.size):
         std_N, offset = known[STD_N], 0.0
@@ -74,11 +74,11 @@ def say_tensions(
 def learn_moment(
     pose: FloatArray, known: FloatArray, upward: FloatArray, rows: FloatArray, share: float
 ) -> float:
-    """Move the unexplained MOMENT by a `share` of what turns the pose to an inclinometer's reading.
+    """Correct the unexplained MOMENT by a `share` of the value that explains the inclinometer.
 
     `rows` are those of the last step. In motion, the estimate follows the equilibrium quickly and
-    the inclinometer slowly: following a swing, it would let the control drive the swing on. Returns
-    the angle from the reading, which is that of the swing.
+    the inclinometer slowly: if it followed a swing, the control would excite the swing. Returns the
+    angle between the estimate and the reading, which is the angle of the swing.
     """
     x, y, _ = _turned(pose, upward[1], upward[2], upward[3])
     known[MOMENT] -= share * rows[3, 3] * y
@@ -101,8 +101,9 @@ def turn_to_equilibrium(
 ) -> float:
     """Turn a pose, and change the tensions FOUND, by a `share` of one Gauss-Newton step.
 
-    Returns the angle of the whole step, rad, nan if the equations are singular. The position does
-    not change: it follows from the lengths (n,) at this rotation. Writes `cables`.
+    Returns the angle of the whole step, rad; nan if the equations are singular. The position does
+    not change here: another kernel finds it from the lengths (n,) at this rotation. Writes
+    `cables`.
     """
     run_cables(geometry, pose, cables)
     size, gradient = normal.shape[0], rows[6]
@@ -147,7 +148,7 @@ def _add_equilibrium(
 ) -> None:
     """Add the balance of forces and moments; its derivatives are written to `rows`.
 
-    The derivatives leave out the pulleys' small part.
+    The derivatives neglect the small effect of the pulleys.
     """
     size, weight, gradient, wrench = normal.shape[0], known[WEIGHT], rows[6], rows[7]
     for j in range(6):
@@ -158,7 +159,7 @@ def _add_equilibrium(
     wrench[2] -= weight
     wrench[3] += known[MOMENT] - weight * y
     wrench[4] += known[MOMENT + 1] + weight * x
-    # by the rotation's change φ × (x, y, z)
+    # derivatives by a rotation, which changes the vector by φ × (x, y, z)
     rows[3, 3], rows[3, 5] = rows[3, 3] + weight * z, rows[3, 5] - weight * x
     rows[4, 4], rows[4, 5] = rows[4, 4] + weight * z, rows[4, 5] - weight * y
     hang(geometry, pose, cables, wrench)
@@ -209,7 +210,7 @@ def _add_tilt(
     """Add the inclinometer's reading s: Q s is upward."""
     x, y, z = _turned(pose, upward[1], upward[2], upward[3])
     precision = 1.0 / TILT_STD_rad**2
-    # by φ × (x, y, z): x changes by φ_y z - φ_z y, y by φ_z x - φ_x z
+    # a rotation φ changes x by φ_y z - φ_z y, and y by φ_z x - φ_x z
     gradient[3] += precision * z * y
     gradient[4] -= precision * z * x
     normal[3, 3] += precision * z * z
@@ -221,7 +222,7 @@ def _add_tilt(
 
 @jit
 def _turned(pose: FloatArray, x: float, y: float, z: float) -> tuple[float, float, float]:
-    """Return a vector of the platform's frame along the room's axes."""
+    """Return a vector of the platform's frame in the room's frame."""
     return (
         pose[1, 0] * x + pose[1, 1] * y + pose[1, 2] * z,
         pose[2, 0] * x + pose[2, 1] * y + pose[2, 2] * z,
@@ -259,9 +260,9 @@ def _solve(normal: FloatArray, x: FloatArray) -> bool:
 
 
 def known_of(platform: Platform, reserve_N: float) -> FloatArray:
-    """Return a platform's `known`, (KNOWN,).
+    """Return the array `known` of a platform, (KNOWN,).
 
-    Motors say tensions as well as the control's reserve assumes.
+    The standard deviation of tensions estimated from motors is the control's reserve.
     """
     known = np.zeros(KNOWN)
     known[WEIGHT] = platform.mass_kg * G_m_s2

@@ -1,14 +1,16 @@
 """Kernel of a platform's rotation in a plane that no cable controls.
 
-`rotation` (9,) has constants of the platform: its MASS, kg, INERTIA about its centre of mass, kg
-m2, and CENTRE_x, CENTRE_y of that in its frame, m. At the pose it has the MOMENT of the tensions
-about that centre, Nm, its decrease with the angle, STEEPNESS, Nm/rad, and for the swing with
-constant cable lengths the STIFFNESS κ, Nm/rad, SWINGING, the inertia I_s, kg m2, and the REACH of
-the farthest anchor point from the middle of that swing, m.
+The array `rotation` (9,) begins with constants of the platform: MASS, kg, INERTIA about the centre
+of mass, kg m2, and the coordinates CENTRE_x, CENTRE_y of that centre in the platform's frame, m.
+The other entries depend on the pose. MOMENT is the moment of the tensions about the centre of mass,
+Nm, and STEEPNESS its decrease with the angle, Nm/rad. Three entries describe the swing with
+constant cable lengths: STIFFNESS κ, Nm/rad, SWINGING, its inertia I_s, kg m2, and REACH, the
+distance of the farthest anchor point from the centre of the swing, m.
 
-With constant cable lengths the platform turns about the point where their lines almost meet:
-its centre of mass then moves by -B per radian, u_i·(b_i⊥ - B) = 0 in least squares over all
-cables, with u_i their directions and b_i their anchor points from that centre. So
+With constant cable lengths the platform turns about the point at which the cables' lines almost
+meet. Its centre of mass then moves by -B per radian, and B solves u_i·(b_i⊥ - B) = 0 in least
+squares over all cables. Here u_i is the direction of a cable and b_i its anchor point, measured
+from the centre of mass. So
 
     I_s = I + m |B|²        κ = Σ t_i (((b_i⊥ - B)·u_i⊥)² / ρ_i + u_i·b_i)
 """
@@ -28,9 +30,9 @@ from cdpr_rt.model.rigid_body import inertia_kg_m2
 MASS, INERTIA, CENTRE_x, CENTRE_y, MOMENT, STEEPNESS, STIFFNESS, SWINGING, REACH, ROWS = range(10)
 
 DAMPING_RATIO = 0.005
-"""Damping ratio of the swing, due to air and cables only, since no winch turns."""
+"""Damping ratio of the swing. Only air and cables damp it, because no winch turns."""
 SWINGS_m = 2e-3
-"""Amplitude of anchor points that is reported."""
+"""Amplitude of an anchor point from which a swing is reported."""
 SHAPING_s = 0.06
 """Time over which the control averages its set-points, so that their acceleration does not step."""
 _NEWTON_STEPS, _MOST_STEP_rad = 30, 0.2
@@ -78,9 +80,9 @@ def turn(pose: FloatArray, angle: float) -> None:
 def turn_to_rest(
     geometry: FloatArray, tension: FloatArray, pose: FloatArray, rotation: FloatArray
 ) -> float:
-    """Turn a pose until tensions (n,) have no moment, by Newton's method; return the angle.
+    """Turn a pose until tensions (n,) exert no moment, by Newton's method; return the angle.
 
-    Afterwards STEEPNESS is 0 or less if the tensions turn the platform over.
+    If the tensions turn the platform over, STEEPNESS is 0 or less afterwards.
     """
     angle = 0.0
     for _ in range(_NEWTON_STEPS):
@@ -98,7 +100,7 @@ def turn_to_rest(
 def _arm(
     geometry: FloatArray, pose: FloatArray, cx: float, cy: float, i: int
 ) -> tuple[float, float, float, float, float]:
-    """Return the anchor of cable i from the centre of mass, its direction, and its length."""
+    """Return a cable's anchor relative to the centre of mass, its direction, and its length."""
     x = pose[1, 0] * geometry[ANCHOR, i] + pose[1, 1] * geometry[ANCHOR + 1, i]
     y = pose[2, 0] * geometry[ANCHOR, i] + pose[2, 1] * geometry[ANCHOR + 1, i]
     ux, uy = geometry[0, i] - pose[0, 0] - x, geometry[1, i] - pose[0, 1] - y
@@ -107,7 +109,7 @@ def _arm(
 
 
 def rotation_of(platform: Platform) -> FloatArray:
-    """Return a platform's `rotation`, (ROWS,), with its constant entries; the others are 0."""
+    """Return the array `rotation` (ROWS,) of a platform; entries that depend on the pose are 0."""
     rotation = np.zeros(ROWS)
     rotation[MASS] = platform.mass_kg
     rotation[INERTIA] = inertia_kg_m2(platform)[2, 2]

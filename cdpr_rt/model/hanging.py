@@ -1,4 +1,4 @@
-"""Pose of a platform that hangs in space on too few cables, from lengths and its equilibrium."""
+"""Pose of a platform that hangs on too few cables, from its cable lengths and equilibrium."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _DONE_rad = 1e-9
 
 
 def upward(tilt_rad: FloatArray) -> FloatArray:
-    """Return the upward direction in the platform's frame, (3,), at roll and pitch (2,).
+    """Return the upward direction in the platform's frame, (3,), for roll and pitch (2,).
 
     The platform is turned by roll about its x, pitch about y and yaw about z: Q = Rz Ry Rx.
     """
@@ -24,7 +24,7 @@ def upward(tilt_rad: FloatArray) -> FloatArray:
 
 
 class HangingSearch:
-    """Finds the pose of a platform at rest, as the control estimates it in motion."""
+    """Finds the pose of a platform at rest with the equations that the control uses."""
 
     def __init__(self, model: PlatformModel) -> None:
         """Take the model of a platform whose kinematics `hangs_freely`."""
@@ -40,10 +40,11 @@ class HangingSearch:
         tension_N: FloatArray | None = None,
         up: FloatArray | None = None,
     ) -> Pose | None:
-        """Return the pose at which cables with lengths (n,) hold it; None if the search fails.
+        """Return the pose at which cables of these lengths (n,) hold the platform, or None.
 
-        `tension_N` (n,) are measured at the winches; without them, tensions are nearly those that
-        the control plans. `up` (3,) is an inclinometer's upward direction in the platform's frame.
+        None means that the search has failed. `tension_N` (n,) are measured at the winches; without
+        them, tensions are assumed to be close to those that the control plans. `up` (3,) is an
+        inclinometer's upward direction in the platform's frame.
         """
         kinematics, known, tensions = self._model.kinematics, self._known, self._tensions
         # lengths do not agree at this rotation: a restart might find its mirror image

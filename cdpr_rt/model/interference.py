@@ -27,24 +27,24 @@ from cdpr_rt.model.pose import place_text
 _PARTS: Final = 16
 """Number of parts in which a short way is checked."""
 _EVERYWHERE_m: Final = 1e4
-"""Depth of the boxes of a planar robot, on either side."""
+"""Depth of a planar robot's boxes on either side of the plane."""
 
 
 @dataclass(frozen=True)
 class Contact:
-    """The first place of a way at which two things are closer than the clearance."""
+    """The first position on a way at which two things are closer than the clearance."""
 
     position: FloatArray
     """Position of the platform, (d,): coordinates, then rotation vector."""
     coordinates: int
     part: int
-    """Index of the straight part of the way."""
+    """Index of the straight part in which the contact is."""
     share: float
-    """Share of that part."""
+    """Share of that part before the contact."""
     things: tuple[str, str]
     distance_m: float
     known: bool
-    """True if they really come this near, False if only the proof of clearance failed."""
+    """True if the two things come this near, False if only the proof of clearance failed."""
 
     def __str__(self) -> str:
         text = in_words(self.things, self.distance_m)
@@ -56,12 +56,12 @@ class Contact:
 class Interference:
     """Contacts among cables, the platform's body and boxes of the room.
 
-    Two cables, by the centre lines of their free parts, or a cable and a box, are in contact if
-    they are closer than the clearance; so are boxes. Near a point that two things share, or that is
-    closer than the clearance, cables do not count: ten times the clearance of their length is left
-    out there. Cables in a plane run in layers, beside each other and the body, so only boxes of the
-    room count for them. Cables are taken as straight: the clearance has to cover their sag. One
-    object serves one thread.
+    Two things are in contact if they are closer than the clearance. A cable is the straight centre
+    line of its free part, so the clearance has to cover its sag. If two things share a point, or
+    come closer than the clearance at an exit or anchor point, the cable is not checked near that
+    point, for a length of ten clearances. In a planar robot the cables run in layers beside each
+    other and the body, so they are checked against the boxes of the room only. An object must be
+    used by one thread only.
     """
 
     def __init__(
@@ -119,10 +119,11 @@ class Interference:
         return in_words(self.things(int(pair[0])), float(clearance[0]))
 
     def contact_ahead(self, start: FloatArray, end: FloatArray) -> int:
-        """Return a pair that comes into contact on a short way straight between positions (d,).
+        """Return a pair that comes into contact on a short straight way between positions (d,).
 
-        -1 for none. For use in every cycle: allocates no arrays, and may report contact if things
-        only pass each other quickly and closely. A pair in contact at the start may separate.
+        Returns -1 for none. The method is meant for every cycle: it allocates no arrays, and may
+        report contact if things only pass each other quickly and closely. A pair in contact at the
+        start may separate.
         """
         return self._on_way(start, end, _PARTS)
 
@@ -137,16 +138,16 @@ class Interference:
         return self._nears(parts)
 
     def within_clearance(self, pair: int) -> str:
-        """Return as text that a pair is in contact."""
+        """Return a text that says which pair is in contact."""
         return in_words(self.things(pair), self.clearance_m)
 
     def first_contact(self, positions: FloatArray, looks: int = MOST_LOOKS) -> Contact | None:
-        """Return the first contact on the way straight from position to position, (m, d).
+        """Return the first contact on the straight ways between successive positions (m, d).
 
-        Straight in the coordinates of `PlatformModel`, coordinates and rotation vector from home's
-        orientation. The result is proved for all places between, not sampled. A pair in contact
-        at the start of a straight part may not come much nearer, and has to be clear at its end. A
-        pair that `looks` checks of a part do not prove clear counts as in contact.
+        The ways are straight in the coordinates of `PlatformModel`: position and rotation vector
+        from home's orientation. The result is proved for all positions between, not sampled. A pair
+        in contact at the start of a way must not come much nearer, and must be clear at its end. A
+        pair that `looks` checks of a way do not prove clear counts as in contact.
         """
         for part in range(len(positions) - 1 if len(self.pairs) else 0):
             start, end = positions[part], positions[part + 1]
@@ -159,7 +160,7 @@ class Interference:
         return None
 
     def _lead(self, start: FloatArray, end: FloatArray) -> None:
-        """Write the way straight from one position (d,) to another."""
+        """Write the straight way from one position (d,) to another."""
         for k, direction in enumerate(self._directions):
             row, column = (START, direction) if direction < 3 else (TURNED, direction - 3)
             self._way[row, column], self._way[row + 1, column] = start[k], end[k] - start[k]
@@ -194,7 +195,7 @@ class Interference:
 
 
 def in_words(things: tuple[str, str], distance_m: float) -> str:
-    """Return as text that two things come near to each other."""
+    """Return a text that says how near two things come to each other."""
     if all(thing.startswith("cable ") for thing in things):
         who = f"cables {things[0][6:]} and {things[1][6:]}"
     else:

@@ -32,18 +32,18 @@ class PoseSolution:
 
     pose: Pose
     converged: bool = False
-    """Also False if the lengths leave a direction free."""
+    """Whether the search has converged; False also if the lengths do not determine a direction."""
     steps: int = 0
     residual_m: float = np.inf
     """Root mean square of the lengths' errors over the cables."""
 
 
 class CableKinematics:
-    """Lengths, Jacobian and pose from lengths of n cables, each straight, elastic or sagging.
+    """Lengths and Jacobian of n straight, elastic or sagging cables; pose from their lengths.
 
-    Eqs. (3.1) to (3.15) on the group of positions and rotations, with every cable's length, as
-    compiled kernels over (6, n). The methods write into arrays of the object and allocate nothing
-    if `out` is given; one object serves one thread.
+    Eqs. (3.1) to (3.15) for positions and rotations, with the lengths of all cables, as compiled
+    kernels over (6, n). The methods write into arrays of the object and allocate nothing if `out`
+    is given. An object must be used by one thread only.
     """
 
     def __init__(
@@ -61,11 +61,10 @@ class CableKinematics:
     ) -> None:
         """Take exit points in the room, anchor points on the platform: (n, 3), in a plane (n, 2).
 
-        Up is the last coordinate. `swivel_axes` (n, 3) are unit vectors along which cables come up
-        to their pulleys (default: up). `weights_N_m` are the cables' weights per length that
-        count in equilibrium, see `hanging_wrenches`. `home` has the rotation around which the
-        platform is turned, if at all, which restarts use; `length_std_m` is the standard
-        deviation of a length.
+        The last coordinate points up. `swivel_axes` (n, 3) are unit vectors along which cables come
+        up to their pulleys (default: up). `weights_N_m` are the weights of the cables per length,
+        used in the equilibrium, see `hanging_wrenches`. `home` has the orientation at home, from
+        which restarts of the search begin. `length_std_m` is the standard deviation of a length.
         """
         a, b = _points(exit_points_m), _points(anchor_points_m)
         self.n, self.directions = len(a), tuple(directions)
@@ -107,11 +106,11 @@ class CableKinematics:
         return in_space and free and self.n < len(SPATIAL) and bool(np.ptp(anchors, axis=1).any())
 
     def lengths(self, pose: Pose, tension_N: FloatArray | None = None) -> FloatArray:
-        """Return the lengths (n,) without tension of cables that hold `tension_N` (n,) at `pose`.
+        """Return the unstretched lengths (n,) of cables with tensions `tension_N` (n,) at `pose`.
 
-        Tensions act at the platform; without them they are 0. Lengths on pulleys are counted from
-        the point at which a cable comes in. Raises GeometryError if an anchor is in its exit point
-        or pulley, or if a cable cannot carry itself under that tension.
+        Tensions apply at the platform; by default they are 0. A length on a pulley begins at the
+        point at which the cable comes in. Raises GeometryError if an anchor is in its exit point or
+        pulley, or if the tension is too low for the cable to carry its own weight.
         """
         self._run(pose)
         rho = np.empty(self.n)
@@ -149,18 +148,18 @@ class CableKinematics:
     def hanging_wrenches(self, poses: FloatArray) -> FloatArray:
         """Return the wrench (m, d) of the cables' weight on the platform at poses (m, 4, 3).
 
-        Half of each cable's, at its anchor point; if w_e includes it, W t + w_e = 0 holds for the
-        tensions t in the middle of the cables, see `cable_kernel.hang`.
+        It is half of the weight of each cable at its anchor point. If w_e includes it, W t + w_e =
+        0 holds for the tensions t in the middle of the cables, see `cable_kernel.hang`.
         """
         out = np.zeros((len(poses), len(self.directions)))
         self.write_hanging_wrenches(poses, out)
         return out
 
     def hanging(self, pose: Pose) -> tuple[FloatArray, FloatArray]:
-        """Return the wrench (d,) of the cables' weight at a pose, and the winches' rise (n,), N.
+        """Return the wrench (d,) of the cables' weight at a pose, and the tension rises (n,), N.
 
-        The rise is the excess of tensions at the exits over those in the middle of the cables, see
-        `cable_kernel.tension_rise`. Raises GeometryError as `jacobian` does.
+        A rise is the excess of the tension at the exit point over that in the middle of the cable,
+        see `cable_kernel.tension_rise`. Raises GeometryError as `jacobian` does.
         """
         self._run(pose)
         rise_N = np.empty(self.n)
@@ -168,10 +167,10 @@ class CableKinematics:
         return self.hanging_wrenches(pose.array[None])[0], rise_N
 
     def sag_N3_m(self, pose: Pose) -> FloatArray:
-        """Return (w a)² ρ/12 of each cable, (n,): over t³ it is the shortening per newton.
+        """Return (w a)² ρ/12 of each cable, (n,); over t³ it is the change of length per newton.
 
-        It follows from the sag of a flat parabola of weight w per length and free length ρ, a of
-        it across, under tension t. 0 for weightless cables.
+        It follows from the sag of a flat parabola with weight w per length, free length ρ,
+        horizontal extent a, and tension t. It is 0 for weightless cables.
         """
         self._run(pose)
         u, free = self._cables[:3], self._cables[cable_kernel.FREE]
@@ -180,20 +179,21 @@ class CableKinematics:
         return np.asarray(across * free**3 / 12.0)
 
     def write_hanging_wrenches(self, poses: FloatArray, out: FloatArray) -> None:
-        """Write these into `out` (m, d), which is left unchanged if the cables are weightless."""
+        """Write `hanging_wrenches` into `out` (m, d), unchanged if the cables are weightless."""
         if self._hangs:
             cable_kernel.hanging_wrenches(self.geometry, poses, self._chosen, self._cables, out)
 
     def geometric_stiffness(self, pose: Pose, tension_N: FloatArray) -> FloatArray:
-        """Return ∂(J^T t)/∂(twist) (6, 6) of cables that hold tensions t (n,), all directions.
+        """Return ∂(J^T t)/∂(twist) (6, 6) at constant tensions t (n,), for all six directions.
 
         With b from the origin to an anchor, u the cable's direction, ρ its free length and n the
         unit vector across its pulley's plane, h from the swivel axis,
 
             Σ t B^T ((1 - u u^T - n n^T)/ρ + n n^T |axis × u|/h) B + t [u]× [b]×    B = (1, -[b]×)
 
-        the last about the axes alone; without a pulley the bracket is (1 - u u^T)/ρ. Behzadipour
-        and Khajepour, Stiffness of Cable-based Parallel Manipulators, J. Mech. Des. 128 (2006).
+        The last term is for rotations only. Without a pulley the bracket is (1 - u u^T)/ρ. Source:
+        Behzadipour and Khajepour, Stiffness of Cable-based Parallel Manipulators, J. Mech. Des. 128
+        (2006).
         """
         self._run(pose)
         stiffness = np.zeros((6, 6))
@@ -210,9 +210,9 @@ class CableKinematics:
         return stiffness
 
     def _swivels(self, pose: Pose, b: FloatArray, i: int) -> FloatArray:
-        """Return a pulley's effect on a cable's turn by its anchor, (3, 3): n n^T (|a×u|/h - 1/ρ).
+        """Return the pulley's term of the geometric stiffness, (3, 3): n n^T (|a×u|/h - 1/ρ).
 
-        Zero if the cable leaves along the swivel axis.
+        It is zero if the cable leaves along the swivel axis.
         """
         axis = self.geometry[cable_kernel.AXIS : cable_kernel.WEIGHT, i]
         exit_m = self.geometry[:3, i]
@@ -228,10 +228,10 @@ class CableKinematics:
     ) -> PoseSolution:
         """Return the pose that minimises Σ (ρ - lengths)², searched from `start`, eq. (3.15).
 
-        For straight cables. Directions that are not controlled stay as in `start`. If the lengths
+        Cables are straight. Directions that are not controlled stay as in `start`. If the lengths
         do not agree within 3 length_std_m, the search starts again from up to `restarts` other
-        poses, in case the start is far off. If no pose is found nothing is raised, see `converged`.
-        Raises GeometryError if there are not n lengths.
+        poses, in case the start is far off. If it finds no pose, it raises nothing, see
+        `converged`. Raises GeometryError if there are not n lengths.
         """
         found, lengths_m = self._solution, np.ascontiguousarray(lengths_m, float)
         if lengths_m.shape != (self.n,):  # compiled code would read past their end
@@ -241,7 +241,7 @@ class CableKinematics:
         return found
 
     def __getstate__(self) -> dict[str, Any]:
-        """Return the state to pickle: all but machine code bound to this object's arrays."""
+        """Return the state to pickle, without the machine code bound to this object's arrays."""
         return {name: value for name, value in self.__dict__.items() if name != "_find_pose"}
 
     @cached_property
@@ -272,6 +272,6 @@ class CableKinematics:
 
 
 def _points(given: FloatArray) -> FloatArray:
-    """Return points of a plane or of space as (n, 3)."""
+    """Return points in a plane or in space as (n, 3)."""
     points = np.asarray(given, float)
     return np.pad(points, ((0, 0), (0, 3 - points.shape[1])))

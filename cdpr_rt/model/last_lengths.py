@@ -1,4 +1,4 @@
-"""The cables' lengths of the last stop, for a start away from home."""
+"""Cable lengths at the last stop, for a start away from home."""
 
 from __future__ import annotations
 
@@ -21,14 +21,15 @@ from cdpr_rt.state_file import StateFileError, read_state, write_state
 _FIELDS = ("cable_length_m", "cable_at_index_m")
 _FLAGS = ("fallen", "displaced")
 _INDEX_TURNS = 0.05
-"""Allowed error of an index, as a share of a motor's turn; a latched count is far more exact."""
+"""Allowed error of an index position, as a share of a motor turn; a latched count is far more
+exact."""
 _MOST_OF_LONGEST = 2.0
 """Ratio of the longest possible length, after lowering anywhere, to the longest in use."""
 
 
 @dataclass(frozen=True)
 class StoppedLengths:
-    """Cable lengths without tension when the power was removed, (n,)."""
+    """Unstretched cable lengths (n,) at the time when the power was removed."""
 
     cable_length_m: FloatArray
     cable_at_index_m: FloatArray
@@ -36,7 +37,7 @@ class StoppedLengths:
     date: str
     """ISO 8601, UTC."""
     position_rad: FloatArray
-    """The motors' angles that belong to `cable_length_m`; nan until they are known again."""
+    """Motor angles at `cable_length_m`; nan after a restart until they are known again."""
 
     def at(self, position_rad: FloatArray, cable_m: FloatArray) -> FloatArray:
         """Return the lengths (n,) at other angles (n,); `cable_m` (n,) is paid out per radian."""
@@ -44,28 +45,31 @@ class StoppedLengths:
 
 
 class LastLengths:
-    """Cable lengths of the last stop, for the next start: in memory, and in a file."""
+    """Cable lengths of the last stop, kept in memory and in a file for the next start."""
 
     def __init__(self, path: Path | None = None) -> None:
         self.path = path
         self.geometry = ""
-        """Identity of the calibration by which lengths are known, empty for the robot's file."""
+        """Identity of the calibration to which the lengths belong, empty for the robot's file."""
         self.lengths: StoppedLengths | None = None
         self.why = "the lengths at its last stop are not known"
         """Reason why no lengths are known, "" if they are."""
         self.displaced = False
         """Whether the platform has since been released away from home."""
         self.contradicted = ""
-        """What contradicts the lengths in use, so that they are not stored; else empty."""
+        """Observation that contradicts the lengths in use, so that they are not stored; else
+        empty."""
         self.fallen = False
-        """Whether it may have hung when the power was removed suddenly or a drive was lost."""
+        """Whether the platform may have been hanging when the power or a drive was suddenly
+        lost."""
         self.broken: dict[int, str] = {}
-        """Cables that seemed broken since all were last tight, by their axes, and why."""
+        """Cables that seemed broken since all were last tight, by axis, with the reason."""
 
     def load(self, n: int, longest_m: float) -> None:
-        """Read the file of a robot with n axes; a damaged file leaves no lengths.
+        """Read the file of a robot with n axes; if it is damaged, no lengths are known.
 
-        Lengths above twice `longest_m`, the longest that a cable is in use, count as damaged.
+        `longest_m` is the greatest length of a cable in use. A file with more than twice that is
+        damaged.
         """
         if self.path is None:
             return
@@ -103,7 +107,7 @@ class LastLengths:
         self.lengths = StoppedLengths(lengths, at_index, str(held["date"]), nowhere)
 
     def require_writable(self) -> None:
-        """Raise StateFileError if the lengths of the next stop could not be kept."""
+        """Raise StateFileError if the file for the lengths of the next stop cannot be written."""
         if self.path is not None and not can_write(self.path.parent):
             raise StateFileError(
                 f"{self.path.parent}: is not writable, but must store the cable lengths at the "
@@ -112,7 +116,7 @@ class LastLengths:
             )
 
     def begin_to_move(self, position_rad: FloatArray) -> None:
-        """Note that the motors (n,) have stood still since the stop; they may turn from now on.
+        """Record that the motors (n,) have not turned since the stop but may turn from now on.
 
         Raises StateFileError.
         """
@@ -121,7 +125,7 @@ class LastLengths:
         self._write({"stopped": False})
 
     def take(self) -> StoppedLengths | None:
-        """Return the lengths and forget them, because cables are wound from now on."""
+        """Return the lengths and forget them, because the cables will be wound from now on."""
         lengths, self.lengths = self.lengths, None
         self.why = "the robot has moved since"
         return lengths
@@ -161,8 +165,8 @@ def off_index_m(
 ) -> FloatArray:
     """Return how much longer cables are than their motors' indices show, (n,).
 
-    Known except for whole turns; nan if an index is not known, now or then. `cable_m` (n,) is
-    paid out per radian.
+    The difference is known up to whole motor turns. It is nan if an index is not known now or was
+    not known at the stop. `cable_m` (n,) is paid out per radian.
     """
     at_index = length_m + cable_m * (feedback.index_rad - feedback.position_rad)
     turn = math.tau * np.abs(cable_m)
@@ -173,9 +177,10 @@ def off_index_m(
 def index_disagreement(
     off_m: FloatArray, cable_m: FloatArray, allowed_m: float, names: Sequence[str]
 ) -> str:
-    """Return whose index is too far off, by `off_index_m` (n,); "" for none.
+    """Return a text that names the axes whose index is too far off, by `off_index_m` (n,), or "".
 
-    Allowed are `allowed_m` and a share of a motor's turn; more than half a turn is impossible.
+    The limit is `allowed_m` plus a share of a motor turn. A difference above half a turn cannot
+    occur.
     """
     off_m = np.nan_to_num(np.abs(off_m))
     allowed = np.minimum(allowed_m, _INDEX_TURNS * math.tau * np.abs(cable_m))

@@ -17,7 +17,7 @@ from cdpr_rt.jit import jit
 _RANK = 1e-9
 """Share of the longest column below which the remainder of the others counts as zero."""
 _HUGE = 1e100
-"""Larger entries count as infinite, since their squares may be."""
+"""Larger entries count as infinite, because their squares may overflow."""
 
 
 @jit
@@ -33,11 +33,11 @@ def null_space(
     """Write the tensions that carry a wrench: `space` (n + 1, n), t0 first, then the rows of N.
 
     t0 has the least norm; n - rank rows of N are valid. Rows of W t = -w_e are divided by `scale`
-    (d,): A = W/scale and b = -w_e/scale are written as `scaled` = [A b] (d, n + 1). If W has not
-    full rank, `space` is not written.
-    `scratch` (4, m, m), m >= n and 8, is overwritten. Returns the rank, or -1 if W, w_e or
-    `bounds` (3, n), the lower and upper ones and the wanted tensions, is not finite or of
-    another size, or if a lower bound is above its upper one.
+    (d,): A = W/scale and b = -w_e/scale are written as `scaled` = [A b] (d, n + 1). If W is rank
+    deficient, `space` is not written. `scratch` (4, m, m), m >= n and 8, is overwritten. Returns
+    the rank, or -1 if an argument is invalid: W, w_e or `bounds` (3, n), which has rows of lower
+    bounds, upper bounds and wanted tensions, is not finite or has another size, or a lower bound is
+    above its upper bound.
     """
     n = space.shape[1]
     d = scale.size
@@ -73,10 +73,10 @@ def null_spaces(
 ) -> None:
     """Write the tensions that carry each of k wrenches (k, d) at each of m poses.
 
-    `matrices` (m, d, n) are the W of the poses, `hanging` (m, d) the wrench at each of them that is
-    added to every wrench; `spaces` (m, n + 1, n) is as in `null_space` for the first wrench,
-    `particular` (m, k, n) the t0 of each, `null_directions` (m,) their number, -1 if W is not
-    finite or has not full rank. `scaled` (d, n + 1) and `scratch` are
+    `matrices` (m, d, n) has W of each pose. `hanging` (m, d) is a wrench per pose that is added to
+    every wrench. Written are `spaces` (m, n + 1, n), as in `null_space` for the first wrench,
+    `particular` (m, k, n), t0 of each wrench, and `null_directions` (m,), the number of null
+    directions, -1 if W is not finite or rank deficient. `scaled` (d, n + 1) and `scratch` are
     overwritten.
     """
     m, d, n = matrices.shape
@@ -105,7 +105,7 @@ def add(wrench: FloatArray, other: FloatArray, both: FloatArray) -> None:
 def other_wrench(
     w_e: FloatArray, scale: FloatArray, scaled: FloatArray, scratch: FloatArray, t0: FloatArray
 ) -> None:
-    """Write the `t0` (n,) of another wrench (d,) right after `null_space`, if W has full rank.
+    """Write the `t0` (n,) of another wrench (d,) directly after `null_space`, if W has full rank.
 
     `scaled` and `scratch` are those of that call; the wrench's column of `scaled` is overwritten.
     """
@@ -153,8 +153,9 @@ def _factor(
 ) -> int:
     """Factor A'P = Q R by Householder reflections I - v v' with column pivots; return the rank.
 
-    `A` has n columns that count. The vectors v are the first columns of `M` from the diagonal on, R
-    (rank, d) is the upper part of `R`, `order` (d,) the permutation; `squares` (d,) is overwritten.
+    Only the first n columns of `A` are used. The vectors v are written to the first columns of `M`,
+    from the diagonal down, R (rank, d) to the upper part of `R`, and the permutation to `order`
+    (d,). `squares` (d,) is overwritten.
     """
     for k in range(d):
         order[k], squares[k] = k, 0.0
@@ -167,7 +168,7 @@ def _factor(
         for j in range(k + 1, d):
             if squares[j] > squares[best]:
                 best = j
-        square = 0.0  # recomputed, because updated values lose digits
+        square = 0.0  # computed again, because updated values lose digits
         for i in range(k, n):
             square += M[i, best] * M[i, best]
         norm = math.sqrt(square)
@@ -207,7 +208,7 @@ def _reflect(M: FloatArray, k: int, n: int, x: FloatArray) -> None:
 
 @jit
 def _solve(R: FloatArray, order: FloatArray, b: FloatArray, z: FloatArray) -> None:
-    """Write the z (d,) with R'z = P'b."""
+    """Write the solution z (d,) of R'z = P'b."""
     for k in range(b.size):
         value = b[int(order[k])]
         for j in range(k):
@@ -215,29 +216,29 @@ def _solve(R: FloatArray, order: FloatArray, b: FloatArray, z: FloatArray) -> No
         z[k] = value / R[k, k]
 
 
-# Capacity margin of tensions in closed form, for up to d + 2 cables. W t + w_e = 0, eq. (3.80),
-# leaves t = t0 + N' lambda with r = n - d rows of N. A circuit is a y (n,) with y N' = 0 and as
-# few entries as possible: r + 1 of them, the determinants of r columns of N each. Along it
-# y t = y t0 for all lambda, so tensions that keep a margin m from bounds can exist only if
-# sum min(y_i low_i, y_i high_i) + m |y|_1 <= y t0 <= sum max(y_i low_i, y_i high_i) - m |y|_1.
-# By Helly's theorem they do exist if that holds for all circuits. The circuits are the normals
-# of the facets of the wrenches that the cables can exert (the hyperplane shifting method of
-# Bouchard, Moore and Gosselin, 2010), found without a determinant of more than two rows. For
-# wrenches w_0 + sum a_k g_k, |a_k| <= 1, the worst along a circuit changes y t0 by the sum of
-# |y t(g_k)|, so the corners of that set are not needed.
+# Capacity margin of tensions in closed form, for up to d + 2 cables. The solutions of W t + w_e =
+# 0, eq. (3.80), are t = t0 + N' lambda with r = n - d rows of N. A circuit is a y (n,) with y N' =
+# 0 and as few entries as possible: r + 1 of them, the determinants of r columns of N each. Along it
+# y t = y t0 for all lambda, so tensions that keep a margin m from bounds can exist only if sum
+# min(y_i low_i, y_i high_i) + m |y|_1 <= y t0 <= sum max(y_i low_i, y_i high_i) - m |y|_1. By
+# Helly's theorem they do exist if that holds for all circuits. The circuits are the normals of the
+# facets of the wrenches that the cables can exert (the hyperplane shifting method of Bouchard,
+# Moore and Gosselin, 2010), found without a determinant of more than two rows. For wrenches w_0 +
+# sum a_k g_k, |a_k| <= 1, the worst along a circuit changes y t0 by the sum of |y t(g_k)|, so the
+# corners of that set are not needed.
 
 MOST_NULL_DIRECTIONS: Final = 2
 _NO_CIRCUIT = 1e-9
-"""Columns of N, whose rows have length 1, with a smaller determinant count as parallel."""
+"""Two columns of N with a smaller determinant count as parallel; rows of N have length 1."""
 
 
 class WrenchSets(NamedTuple):
-    """Wrenches that tensions within bounds have to carry, about one point of the platform."""
+    """Wrenches about one point of the platform that tensions within bounds have to carry."""
 
     centre: FloatArray
     """That point in the platform's frame, (3,)."""
     wrenches: FloatArray
-    """(k, d): w_0 of one or several sets of wrenches first, and last the g_k that all share."""
+    """(k, d): first w_0 of each set of wrenches, then the generators g_k that all sets share."""
     generators: int
     """Number of the g_k."""
     scale: FloatArray
@@ -258,12 +259,12 @@ def write_circuit_margins(
     scaled: FloatArray,
     scratch: FloatArray,
 ) -> None:
-    """Write the margins (m,) of m poses: of the worst wrench, N, -inf without a rank of d.
+    """Write the margins (m,) of m poses for the worst wrench, N; -inf if W is rank deficient.
 
-    `matrices` (m, d, n) are the W, n at most d + 2; `hanging` (m, d) acts in addition to the
-    wrenches of each set. A margin below `least` may be less still, because the search stops there.
-    `carrying` (k, n), `space` (n + 1, n), `scaled` (d, n + 1) and `scratch` as in `null_space` are
-    overwritten.
+    `matrices` (m, d, n) has W of each pose, with n at most d + 2. `hanging` (m, d) acts in addition
+    to the wrenches of each set. If a margin is below `least`, the true one may be lower still,
+    because the search stops there. `carrying` (k, n), `space` (n + 1, n), `scaled` (d, n + 1) and
+    `scratch` as in `null_space` are overwritten.
     """
     _, wrenches, generators, scale, bounds = sets
     d, n = scale.size, bounds.shape[1]
@@ -330,7 +331,7 @@ def _along(
     v: float,
     w: float,
 ) -> float:
-    """Return the lesser of `margin` and that along the circuit with u, v, w at cables a, b, c."""
+    """Return the lesser of `margin` and that of the circuit with u, v, w at cables a, b, c."""
     size = abs(u) + abs(v) + abs(w)
     if size < _NO_CIRCUIT:
         return margin

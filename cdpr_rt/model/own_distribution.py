@@ -21,21 +21,21 @@ TensionDistribution = Callable[
 ]
 """`f(W, w, low, high, previous)` returns tensions t (n,), N, with W t + w = 0, low <= t <= high.
 
-`W` (d, n) is the wrench matrix and `w` (d,) the wrench of all else on the platform, N and Nm, about
-its origin. `low` and `high` (n,) are the bounds, N. `previous` (n,) are the tensions of the last
-cycle, N, at first those of the built-in distribution. The arrays are read-only and overwritten in
-each cycle. It is only called if such tensions exist.
+`W` (d, n) is the wrench matrix. `w` (d,) is the wrench of all other forces on the platform, N and
+Nm, about its origin. `low` and `high` (n,) are the bounds, N. `previous` (n,) are the tensions of
+the last cycle, N, at first those of the built-in distribution. The arrays are read-only and
+overwritten in each cycle. The function is called only if such tensions exist.
 """
 
 TOLERANCE: Final = 1e-4
 """Allowed distance from a bound, as a share of the span between the bounds; and from equilibrium,
 as a share of the largest force among W t and w."""
 FADE_S: Final = 0.2
-"""Time in which a loop fades to code of the user's own."""
+"""Time in which a loop fades from the built-in distribution to the user's."""
 
 
 class TensionDistributionError(ControlError):
-    """A tension distribution of the user's own has failed; the message names it."""
+    """The user's tension distribution has failed; the message names it."""
 
 
 _RIGHT, _NOT_FINITE, _OUTSIDE, _UNBALANCED = range(4)
@@ -50,9 +50,10 @@ def _check(
     t: FloatArray,
     t_out: FloatArray,
 ) -> tuple[int, int, float]:
-    """Write tensions `t` (n,) into `t_out` if they are right, put on `bounds` (2, n) if beyond.
+    """Check tensions `t` (n,), and write them into `t_out`, clipped to `bounds` (2, n), if valid.
 
-    Returns what is wrong, the cable or direction, and the largest allowed |W t + w_e| in it.
+    Returns the kind of error, the cable or direction concerned, and the largest allowed |W t + w_e|
+    in that direction.
     """
     d, n = W.shape
     for i in range(n):
@@ -78,9 +79,10 @@ def _check(
 
 
 class OwnDistribution:
-    """Asks a `TensionDistribution` for tensions, and checks them. A loop stops asking if it fails.
+    """Calls a `TensionDistribution` and checks its tensions. If it fails, a loop no longer uses it.
 
-    Bounds (n,) are in N. `wrench_scale` (d,) is the amount of each direction that counts as 1 N.
+    Bounds (n,) are in N. `wrench_scale` (d,) is the size of a wrench in each direction that counts
+    as 1 N.
     """
 
     def __init__(
@@ -98,7 +100,7 @@ class OwnDistribution:
         self._previous_N, self._found_N = np.zeros((2, low_N.size))
         self._fade_cycles = max(1, round(FADE_S / period_s))
         self._cycle, self._failed = 0, False
-        W = np.zeros((wrench_scale.size, low_N.size))  # compiled here, not in a cycle
+        W = np.zeros((wrench_scale.size, low_N.size))  # compiles the kernel before the first cycle
         _check(W, wrench_scale, self._bounds_N, wrench_scale, self._found_N, self._found_N)
 
     def solve(
@@ -106,8 +108,8 @@ class OwnDistribution:
     ) -> None:
         """Write the function's tensions (n,) for W (d, n) and w_e (d,) into `t_out`.
 
-        Raises TensionDistributionError if it raises, or if they are not n finite numbers, within
-        their bounds and in equilibrium.
+        Raises TensionDistributionError if the function raises, or if the tensions are not n finite
+        numbers within their bounds and in equilibrium.
         """
         given = read_only(W), read_only(w_e), self._low_N, self._high_N, read_only(previous_N)
         try:
@@ -133,22 +135,22 @@ class OwnDistribution:
     def _error(self, what: str) -> TensionDistributionError:
         return TensionDistributionError(f"tension distribution {self._name}: {what}")
 
-    # -- in a loop
+    # -- use in a loop
 
     def restart(self) -> None:
         """Fade from the built-in distribution again."""
         self._cycle = 0
 
     def stand_in(self) -> None:
-        """Leave the tensions to the built-in distribution until `revive`."""
+        """Use the built-in distribution until `revive` is called."""
         self._failed = True
 
     def revive(self) -> None:
-        """Use the function again."""
+        """Use the user's function again."""
         self._failed, self._cycle = False, 0
 
     def write(self, W: FloatArray, w_e: FloatArray, tension_N: FloatArray) -> bool:
-        """Replace the built-in tensions (n,) by the function's; return False if it is not used.
+        """Replace the built-in tensions (n,) by the user's; return False if they are not used.
 
         Raises TensionDistributionError, after which the function is not used until `revive`.
         """
@@ -159,7 +161,7 @@ class OwnDistribution:
         self._failed = True  # until this cycle succeeds
         self.solve(W, w_e, self._previous_N, self._found_N)
         self._cycle = min(self._cycle + 1, self._fade_cycles)
-        # both carry the wrench within the bounds, and so does every mean of them
+        # both carry the wrench within the bounds, so any weighted mean of them does too
         tension_N += self._cycle / self._fade_cycles * (self._found_N - tension_N)
         self._previous_N[:] = tension_N
         self._failed = False
@@ -207,7 +209,7 @@ def _refused(robot: Robot, error: ControlError) -> ProfileError:
 
 
 def checked_distribution(reference: str, found: Any) -> TensionDistribution:
-    """Return `found` if it can be called; raises CodeError that begins with `reference`."""
+    """Return `found` if it is callable; otherwise raise CodeError that begins with `reference`."""
     if not callable(found) or isinstance(found, type):
         shown = getattr(found, "__name__", None) or repr(found)[:60]
         raise CodeError(f"{reference}: {shown} is no function f(W, w, low, high, previous)")

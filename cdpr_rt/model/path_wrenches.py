@@ -1,4 +1,4 @@
-"""Wrenches that motion along a path requires, and those that the cables can exert there."""
+"""Wrenches that a motion along a path requires, and wrenches that the cables can exert there."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _FLAT: Final = 1e-9
 
 @jit
 def _largest(scratch: FloatArray, r: int) -> tuple[int, int]:
-    """Return row and column of the entry that is farthest from 0, from r on, of (d - 1, d)."""
+    """Return row and column of the entry of largest magnitude, from index r on, of (d - 1, d)."""
     row, column = r, r
     for i in range(r, scratch.shape[0] - 1):
         for k in range(r, scratch.shape[1]):
@@ -31,9 +31,9 @@ def _largest(scratch: FloatArray, r: int) -> tuple[int, int]:
 
 @jit
 def _normal(W: FloatArray, columns: IntArray, scratch: FloatArray, normal: FloatArray) -> bool:
-    """Write the normal (d,) of d - 1 columns of W; False if it is not unique.
+    """Write the normal (d,) of d - 1 columns of W; return False if it is not unique.
 
-    Gauss' elimination with full pivoting.
+    The method is Gaussian elimination with full pivoting.
     """
     d = W.shape[0]
     order = np.arange(d)
@@ -76,10 +76,10 @@ def write_facets(
 ) -> None:
     """Write normals (m, f, d) and bounds (m, f) of the wrenches W t at m poses, low <= t <= high.
 
-    Each d - 1 cables of `combinations` (f, d - 1) span a facet on both sides: hyperplane shifting
-    (Bouchard, Gosselin, Moore 2010; Gouttefarde, Krut 2010). Combinations that span no facet
-    get a normal and bounds of 0. `matrices` (m, d, n) map tensions to wrenches, `scale` (d,) is
-    the amount of each direction that counts as 1 N.
+    The d - 1 cables in a row of `combinations` (f, d - 1) span two parallel facets: hyperplane
+    shifting (Bouchard, Gosselin, Moore 2010; Gouttefarde, Krut 2010). Combinations that span no
+    facet get a normal and bounds of 0. `matrices` (m, d, n) map tensions to wrenches, `scale` (d,)
+    is the size of a wrench in each direction that counts as 1 N.
     """
     m, d, n = matrices.shape
     W, scratch = np.zeros((d, n)), np.zeros((d, d))
@@ -111,8 +111,8 @@ _SMALL_rad = 1e-4
 class AvailableWrenches:
     """Half-spaces of the wrenches that can accelerate a platform at m poses.
 
-    lower <= normals · F <= upper for F (d,): force and moment about the centre of mass, in
-    addition to the wrench at rest.
+    A wrench F (d,) is available if lower <= normals · F <= upper. F is force and moment about the
+    centre of mass, in addition to the wrench at rest.
     """
 
     normals: FloatArray
@@ -127,13 +127,13 @@ class AvailableWrenches:
         return np.asarray(((self.lower <= 0.0) & (self.upper >= 0.0)).all(axis=1))
 
     def spare(self, most: FloatArray) -> BoolArray:
-        """Return whether a box of wrenches is carried, (m,); `most` (m, d) are half its sides."""
+        """Return whether a box of wrenches is available, (m,); `most` (m, d) is half its sides."""
         needed = np.einsum("mfd,md->mf", np.abs(self.normals), most)
         return np.asarray(((needed <= self.upper) & (-needed >= self.lower)).all(axis=1))
 
 
 def available_wrenches(model: PlatformModel, positions: FloatArray) -> AvailableWrenches:
-    """Return the wrenches at positions (m, d), for tensions with the model's reserve to bounds."""
+    """Return the available wrenches at positions (m, d); tensions keep the model's reserve."""
     workspace, poses = model.workspace(0.0, 0.0), model.poses(positions)
     matrices, hanging = workspace.wrench_matrices(poses), workspace.hanging_wrenches(poses)
     m, d, n = matrices.shape
@@ -193,7 +193,7 @@ class InertialWrenches:
 
 
 def _angular_velocity(turn: FloatArray, rate: FloatArray) -> FloatArray:
-    """Return the angular velocities (m, 3) of rotation vectors that change at a rate.
+    """Return the angular velocities (m, 3) of rotation vectors `turn` with derivatives `rate`.
 
     J(φ) = 1 + (1 - cos θ)/θ² [φ]× + (θ - sin θ)/θ³ [φ]×².
     """

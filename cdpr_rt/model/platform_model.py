@@ -44,14 +44,14 @@ class PlatformModel:
     """Kinematics, tension distribution and workspace of one platform; made by `platform_model`.
 
     A position (d,) has one entry for each controlled direction: coordinates of the origin, m, the
-    last one against gravity, and the rotation vector from the orientation at home, rad.
-    Positions (..., k) with coordinates only have home's orientation.
+    last one against gravity, and the rotation vector from the orientation at home, rad. Positions
+    (..., k) without a rotation vector have home's orientation.
     """
 
     platform: Platform
     kinematics: CableKinematics
     about_centre_of_mass: CableKinematics
-    """Kinematics about the centre of mass, with it as the origin."""
+    """Kinematics with the centre of mass as the platform's origin."""
     low_N: FloatArray
     high_N: FloatArray
     """Bounds of the tensions, (n,)."""
@@ -82,7 +82,7 @@ class PlatformModel:
 
     @cached_property
     def corners(self) -> FloatArray:
-        """The corners (8, 3) of its body, or the box around its anchor points, in its frame."""
+        """Corners (8, 3) of the body, or of the box around the anchors, in the platform's frame."""
         anchors, body = self.kinematics.geometry[ANCHOR:RADIUS].T, self.platform.body
         ends = np.array([anchors.min(axis=0), anchors.max(axis=0)])
         if body is not None:
@@ -91,11 +91,11 @@ class PlatformModel:
 
     @cached_property
     def tips_at(self) -> float:
-        """The horizontal pull over the weight at which it tips over on its stand, inf for never.
+        """Horizontal pull, as a share of the weight, at which the platform tips over on its stand.
 
-        Half the least width of its body, or of the box around the anchor points, over its height.
-        At home it stands on the lower face with its centre of mass in the middle, and is pulled at
-        the upper face.
+        It is half the least width of the body, or of the box around the anchor points, over its
+        height; inf for no height. The platform stands on its lower face, its centre of mass is in
+        the middle, and the cables pull at the upper face.
         """
         extent = np.ptp(self.corners @ self.home_pose.array[1:].T, axis=0)[: self.positions]
         width, height = float(extent[:-1].min()), float(extent[-1])
@@ -119,7 +119,7 @@ class PlatformModel:
 
     @property
     def angle_rad(self) -> float:
-        """Largest angle from home's orientation in which targets may lie."""
+        """Largest angle by which targets may be turned from home's orientation."""
         return self.platform.workspace_angle_rad
 
     @property
@@ -138,11 +138,11 @@ class PlatformModel:
     def workspace(
         self, acceleration_m_s2: float | None = None, reserve_N: float | None = None
     ) -> CableWorkspace:
-        """Return the workspace in which the platform can accelerate along all directions together.
+        """Return the workspace in which the platform can accelerate in all directions together.
 
-        By default with the file's acceleration and the control's reserve. Tensions are within
-        their lower bounds and `torque_limited_N`. If targets may be turned, the same share of the
-        angular acceleration is included; inertia is as at home.
+        Acceleration and reserve default to those of the robot's file and of the control. Tensions
+        are between their lower bounds and `torque_limited_N`. If targets may be turned, the same
+        share of the angular acceleration is included, with the inertia at home's orientation.
         """
         platform = self.platform
         wanted = platform.acceleration_m_s2 if acceleration_m_s2 is None else acceleration_m_s2
@@ -184,7 +184,7 @@ class PlatformModel:
         )
 
     def contact_on_way(self, positions: FloatArray, looks: int) -> str:
-        """Return what is in contact straight from position to position (m, d), "" for nothing.
+        """Return the contact on straight ways between successive positions (m, d) as text, or "".
 
         A pair that `looks` checks of a part of the way do not prove clear counts as in contact.
         """
@@ -192,18 +192,18 @@ class PlatformModel:
         return "" if contact is None else in_words(contact.things, contact.distance_m)
 
     def least_tensions(self, low_N: FloatArray, high_N: FloatArray) -> TensionSolver:
-        """Return the distribution that deviates least from the lower bounds (n,), in squares."""
+        """Return the distribution with the least squared deviation from the lower bounds (n,)."""
         return TensionSolver("minimum-deviation", low_N, high_N, self.wrench_scale, low_N)
 
     def planned_tensions(
         self, poses: FloatArray, others: FloatArray, own: TensionDistribution | None = None
     ) -> tuple[FloatArray, BoolArray]:
-        """Return the tensions (m, n) that the file's distribution plans, and whether they carry.
+        """Return the tensions (m, n) that the distribution plans, and whether they are feasible.
 
-        They balance the wrenches (m, d) about the centre of mass at poses (m, 4, 3), without those
-        of the cables and their weight. They keep the limits of the motors' torque and the reserve.
-        They are those of `own` if it is given, and of the built-in method otherwise. Raises
-        TensionDistributionError.
+        `others` (m, d) are the wrenches about the centre of mass at poses (m, 4, 3), without those
+        of the tensions and of the cables' weight. Tensions keep the reserve and the limits of the
+        motors' torque. The distribution is `own` if given, and the built-in method of the file
+        otherwise. Raises TensionDistributionError.
         """
         low, high = self.low_N + self.reserve_N, self.torque_limited_N - self.reserve_N
         method = self.platform.tension_method
@@ -245,9 +245,9 @@ def platform_model(
     high_N: FloatArray,
     torque_limited_N: FloatArray | None = None,
 ) -> PlatformModel:
-    """Return the model of a platform whose cables' tensions have these bounds, (n,).
+    """Return the model of a platform with these bounds (n,) of the tensions.
 
-    `torque_limited_N` (n,) are `high_N` if omitted.
+    `torque_limited_N` (n,) defaults to `high_N`.
     """
     low, high = np.array(low_N, float), np.array(high_N, float)
     kinematics = cable_kinematics(platform)
@@ -292,8 +292,8 @@ def _torque_limited_N(robot: Robot, limits: Limits, high_N: FloatArray) -> Float
     """Return the upper bounds (n,) of tensions that motors can hold while rotors accelerate.
 
     t = (τ - J a/r)/r with rotor inertia J, cable per radian r, and the largest acceleration a of an
-    anchor point. Bounds apply at the winches: if the cables' weight counts, tensions in their
-    middle are less by half the weight of a cable to the lowest place of its anchor.
+    anchor point. This bound applies at the winch. If cables have weight, the tension in the middle
+    is lower by half the weight of the cable with its anchor at the lowest position.
     """
     platform = robot.platform
     assert platform is not None  # callers check that there is one
@@ -311,8 +311,8 @@ def _torque_limited_N(robot: Robot, limits: Limits, high_N: FloatArray) -> Float
 def _largest_rise_N(platform: Platform) -> FloatArray:
     """Return the largest excess of tensions at the winches over those in the middle, (n,).
 
-    Half the weight of each cable, for a cable to the lowest place, times the sine of its slope:
-    half the weight per length times the height of the exit.
+    It is half the weight of each cable, with the anchor at its lowest position, times the sine of
+    its slope: half the weight per length times the height of the exit above the anchor.
     """
     reach = max(float(np.linalg.norm(anchor)) for anchor in platform.anchor_points_m)
     exits_m = np.array([point[-1] for point in platform.exit_points_m])

@@ -1,10 +1,10 @@
 """Poses of a platform: a position and a rotation; exponential and logarithm of rotations.
 
-A change of pose x (6,) is (change of position, rotation vector), both along the axes of the room:
+A change of pose x (6,) is (change of position, rotation vector), both in the room's frame:
 
     pose ⊞ x = (p + x_p, exp(x_φ) Q)          pose ⊟ other = (p - p', log(Q Q'^T))
 
-so that other ⊞ (pose ⊟ other) = pose. There are no angles about three axes anywhere.
+so that other ⊞ (pose ⊟ other) = pose. Euler angles are not used.
 """
 
 from __future__ import annotations
@@ -50,8 +50,8 @@ def exponential(phi: FloatArray, Q: FloatArray) -> None:
 def logarithm(Q: FloatArray, phi: FloatArray) -> None:
     """Write the rotation vector of `Q` (3, 3) into `phi` (3,): 0 to π rad long.
 
-    By the quaternion (s, v), from its largest component: φ = 2 atan2(|v|, s) v/|v|. At half a
-    turn it is either of the two possible vectors.
+    It is computed from the quaternion (s, v), whose largest component is found first: φ = 2
+    atan2(|v|, s) v/|v|. For half a turn the result is either of the two possible vectors.
     """
     trace = Q[0, 0] + Q[1, 1] + Q[2, 2]
     if trace >= max(Q[0, 0], Q[1, 1], Q[2, 2]):
@@ -76,11 +76,11 @@ def logarithm(Q: FloatArray, phi: FloatArray) -> None:
 class Pose:
     """Position `p` (3,), in m, and rotation matrix `Q` (3, 3) of a platform in the room.
 
-    Both are views of `array` (4, 3), in which the compiled code takes a pose.
+    Both are views of `array` (4, 3), the form in which kernels take a pose.
     """
 
     def __init__(self, position_m: FloatArray, rotation: FloatArray | None = None) -> None:
-        """Copy both; by default no rotation. Raises GeometryError for invalid values."""
+        """Copy position and rotation (default: none); raises GeometryError for invalid values."""
         self.array: FloatArray = np.zeros((4, 3))
         self.p = self.array[0]
         self.Q = self.array[1:]
@@ -110,9 +110,9 @@ class Pose:
 
 
 def place_text(position: FloatArray, coordinates: int) -> str:
-    """Return the place of a platform as text, in mm and deg, by `position` (d,).
+    """Return the `position` (d,) of a platform as text, in mm and deg.
 
-    It has this number of `coordinates`, in m, then a rotation vector, in rad.
+    It begins with this number of `coordinates`, in m; a rotation vector follows, in rad.
     """
     text = f"at {', '.join(f'{1e3 * x:z.1f}' for x in position[:coordinates])} mm"
     turned = position[coordinates:]

@@ -1,4 +1,4 @@
-"""Kernels that find the pose from cable lengths; arrays as in the kernels of cables, equations."""
+"""Kernels that find the pose from cable lengths."""
 
 from __future__ import annotations
 
@@ -8,17 +8,17 @@ from cdpr_rt.arrays import FloatArray
 from cdpr_rt.jit import jit, jit_inlined
 from cdpr_rt.model.cable_kernel import ANCHOR, ARC, ERROR, FREE, TINY, compare, run_cables
 
-# Kernels of the least squares over cable lengths: normal equations and their solution. Arrays
-# besides those of `cable_kernel`, of float64: solver (24, 6), scratch: NORMAL, FACTOR, GRADIENT,
-# STEP; DIRECTIONS: 1 for those of the twist that are solved for, 0 for the others, which do not
-# change; ACCEPTED, the sum of squares up to which lengths agree; and from SAVED_POSES on four
-# poses (4, 4, 3); the last one has the rotation at home
+# Kernels of least squares over cable lengths: normal equations and their solution. Besides the
+# arrays of `cable_kernel` they use `solver` (24, 6), float64. Its rows are NORMAL, FACTOR, GRADIENT
+# and STEP; DIRECTIONS, 1 for directions of the twist that are solved for, 0 for directions that
+# stay unchanged; ACCEPTED, the sum of squares below which lengths agree; and, from SAVED_POSES on,
+# four poses (4, 4, 3); the last one has the rotation at home.
 
 FACTOR, GRADIENT, STEP, DIRECTIONS, ACCEPTED, SAVED_POSES, SOLVER_ROWS = 6, 12, 13, 14, 15, 16, 24
 _LEAST_PIVOT = 1e-13
 _LEAST_REDUNDANCY = 1e-4
 DISTINCT = 0.8
-"""Another cable is a suspect if its normalised residual exceeds this share of the largest."""
+"""Another cable is also suspect if its normalised residual exceeds this share of the largest."""
 
 
 @jit
@@ -53,7 +53,7 @@ def _hold(solver: FloatArray) -> None:
 def add_curvature(
     geometry: FloatArray, pose: FloatArray, cables: FloatArray, solver: FloatArray
 ) -> None:
-    """Add Σ f ∂²ρ to N, of straight cables: Newton's method instead of Gauss-Newton.
+    """Add Σ f ∂²ρ to N, for straight cables: Newton's method instead of Gauss-Newton.
 
     With r = Q b, c = free · u, and a change of pose (δ, φ) that moves an anchor by v = δ + φ × r,
     ρ ∂²ρ = |v|² - (u·v)² + ρ ((u·φ)(r·φ) - (u·r) |φ|²).
@@ -86,7 +86,7 @@ def add_curvature(
 
 @jit_inlined
 def factorise(solver: FloatArray, damping: float) -> bool:
-    """Write the FACTOR of N + damping · diag(N) = L D L^T; False if that is singular.
+    """Write the FACTOR of N + damping · diag(N) = L D L^T; return False if the sum is singular.
 
     L is below the diagonal, 1/D on it, (L D)^T above.
     """
@@ -140,13 +140,13 @@ def find_step(solver: FloatArray) -> tuple[float, float]:
 def largest_residual(
     lengths: FloatArray, cables: FloatArray, solver: FloatArray, normalised: FloatArray
 ) -> tuple[float, int]:
-    """Return the largest |r_i| / sqrt(p_ii) of cables at the pose that `lengths` (n,) have, in m.
+    """Return the largest |r_i| / sqrt(p_ii) of cables, m, at the pose found from `lengths` (n,).
 
     r are the residuals, p_ii = 1 - J_i N^-1 J_i^T the redundancy numbers, with an undamped FACTOR
-    of N (data snooping: Baarda, A testing procedure for use in geodetic networks, 1968). A single
-    length that is wrong by s has s sqrt(p_ii) of it, and more than every other. Also returns its
-    index, -1 if another cable comes near, so that the cause is not certain. Writes
-    r_i / sqrt(p_ii) to `normalised` (n,), 0 for cables that contradict no other.
+    of N (data snooping: Baarda, A testing procedure for use in geodetic networks, 1968). If a
+    single length is wrong by s, its normalised residual is s sqrt(p_ii), the largest of all. Also
+    returns the index of that cable, or -1 if another cable comes near, so that the cause is
+    uncertain. Writes r_i / sqrt(p_ii) to `normalised` (n,), 0 for cables that contradict no other.
     """
     largest, second, index = 0.0, 0.0, -1
     x = solver[STEP]
@@ -175,7 +175,7 @@ def largest_jump(normalised: FloatArray, settled: FloatArray, share: float) -> t
     """Return the largest change of residuals from their low-passed values, m, and its cable.
 
     `normalised` (n,) are those of `largest_residual`; `settled` (n,) follow them by `share` per
-    cycle and start from them if NaN. The cable is -1 if another one comes near.
+    cycle and start from them if NaN. The cable is -1 if the change of another residual comes near.
     """
     largest, second, index = 0.0, 0.0, -1
     for i in range(normalised.size):
@@ -194,10 +194,10 @@ HOME = 3
 _BEFORE, _START, _BEST = 0, 1, 2
 
 CONVERGED, UNFINISHED, SINGULAR, STALLED = 0, 1, 2, 3
-"""Outcome of a search: converged; out of steps; rank deficient; in a local minimum."""
+"""Outcome of a search: converged; out of steps; rank deficient; stalled in a local minimum."""
 
 TOLERANCE = 1e-9
-"""A search ends if the remaining distance, in m and rad, is less."""
+"""A search ends if the remaining distance to the solution, m and rad, is less."""
 MOST_STEPS = 30
 _SMALL_STEP = 3e-5
 _NEAR = 0.05
@@ -220,13 +220,14 @@ def descend(
     kept: FloatArray,
     accepted: float,
 ) -> tuple[int, int, float]:
-    """Go from `pose` to the next minimum of the errors' squares, by Gauss-Newton, eq. (3.15).
+    """Move `pose` to the nearest minimum of the squared errors, by Gauss-Newton, eq. (3.15).
 
-    If that is slow, as with lengths that disagree, it uses Newton's method; a step that makes
-    things worse is undone and damped (Levenberg-Marquardt). It ends when the last two steps show
-    that the remaining distance is below TOLERANCE. It ends as STALLED if the next step would
-    reduce a cost above `accepted` only a little: on the way to lengths that agree a step removes
-    all of it. Returns outcome, steps, and the cost; lengths that are nan end as SINGULAR.
+    If convergence is slow, as with lengths that disagree, the search uses Newton's method. A step
+    that increases the cost is undone and damped (Levenberg-Marquardt). The search ends when the
+    last two steps show that the remaining distance is below TOLERANCE. It ends as STALLED if the
+    cost is above `accepted` and the next step would reduce it only a little, because a step towards
+    lengths that agree removes nearly all of the cost. Returns outcome, number of steps, and cost.
+    If a length is nan, the outcome is SINGULAR.
     """
     cost = compare(geometry, lengths, pose, cables)
     if not cost < math.inf:
@@ -267,11 +268,11 @@ def descend(
 def _factorise_damped(cables: FloatArray, solver: FloatArray, damping: float) -> tuple[bool, float]:
     """Factorise the equations; return whether a direction is free, and the damping used.
 
-    The damping is negative if none helps.
+    The damping is negative if the factorisation fails with every value.
     """
     if factorise(solver, damping):
         return False, damping
-    # curved downwards, unless it is a free direction
+    # the cost is concave here, unless a direction is free
     assemble(cables, solver)
     singular = not factorise(solver, damping)
     damping = max(damping, _REGULAR_DAMPING)
@@ -280,9 +281,10 @@ def _factorise_damped(cables: FloatArray, solver: FloatArray, damping: float) ->
 
 @jit_inlined
 def _converged(size: float, before: float, cost: float) -> bool:
-    """Return whether the remaining distance after a step of this size, and cost, is negligible.
+    """Return whether the remaining distance after a step of this size is negligible.
 
-    The distance shrinks as in the last two steps, faster if lengths agree.
+    It is assumed to shrink as in the last two steps, or faster if the cost shows that lengths
+    agree.
     """
     shrunk = size / before if cost < _AGREE * size * size and before > 0.0 else 1.0
     return size < _SMALL_STEP and size * size * shrunk < TOLERANCE * (before - size)
@@ -299,8 +301,8 @@ def find_pose(
 ) -> tuple[int, int, float]:
     """Find the pose whose lengths are nearest to `lengths` (n,), from the start in `pose`.
 
-    If the sum of the errors' squares stays above ACCEPTED, the search starts again from up to
-    `restarts` other poses. Writes `pose`; returns the outcome, all steps, and the sum.
+    If the sum of squared errors stays above ACCEPTED, the search starts again from up to `restarts`
+    other poses. Writes `pose`. Returns the outcome, the number of all steps, and the sum.
     """
     kept = solver[SAVED_POSES:].reshape(4, 4, 3)
     accepted = solver[ACCEPTED, 0]
@@ -340,9 +342,9 @@ def _restart(
 ) -> None:
     """Write the pose of the `attempt`-th restart, counted from 0.
 
-    The restarts begin from the start with its own rotation or that at home, the nearer one to the
-    start's first; then from the best pose so far; then from the start turned to either side about
-    each axis. Each takes some steps towards the minimum of the relaxed problem.
+    The first two restarts begin at the start's position, with the rotation of the start and with
+    that at home. Later ones begin at the best pose so far, and then at the start turned to either
+    side about each axis. Each restart takes some steps towards the minimum of the relaxed problem.
     """
     copy_pose(kept[_BEST if attempt == 2 else _START], pose)
     if attempt < 2:
@@ -377,9 +379,9 @@ def _restart(
 def _relax(geometry: FloatArray, lengths: FloatArray, pose: FloatArray, cables: FloatArray) -> None:
     """Write rows and errors of the relaxed problem, in which |p|² is a separate unknown.
 
-    (|c|² - ρ²)/2 is linear in p except for |p|²/2, which all cables have in common, so differences
-    from the mean over the cables do not contain it. Thus the mirror image of a pose in the plane of
-    the exit points, whose lengths are nearly the same, is no longer a minimum.
+    (|c|² - ρ²)/2 is linear in p except for the term |p|²/2. This term is the same for all cables,
+    so it cancels in the differences from their mean. The mirror image of a pose in the plane of the
+    exit points has nearly the same lengths; it is no minimum of the relaxed problem.
     """
     n = lengths.size
     run_cables(geometry, pose, cables)
@@ -401,8 +403,8 @@ def _relax(geometry: FloatArray, lengths: FloatArray, pose: FloatArray, cables: 
 def move(pose: FloatArray, x: FloatArray) -> None:
     """Change the pose by `x` (6,): p + x_p, and Q turned by the Cayley map of x_φ.
 
-    That agrees with the exponential map up to the second order, is a rotation for every x and
-    takes no trigonometry; a search ends in the same pose with either.
+    The Cayley map agrees with the exponential map up to second order, gives a rotation for every x,
+    and needs no trigonometric functions. A search ends in the same pose with either map.
     """
     i, j, k = 0.5 * x[3], 0.5 * x[4], 0.5 * x[5]
     w = 1.0 / math.sqrt(1.0 + i * i + j * j + k * k)

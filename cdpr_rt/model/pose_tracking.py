@@ -1,4 +1,4 @@
-"""Kernels of one cycle: pose of the platform from motors' angles, and motors' set-points.
+"""Kernels of one cycle: the platform's pose from motor angles, and the motors' set-points.
 
 Arrays besides those of `cable_kernel` and `pose_search`, of float64:
 
@@ -11,7 +11,7 @@ Arrays besides those of `cable_kernel` and `pose_search`, of float64:
                        of the length; SETTLED, the same low-passed, NaN before the first
     filters   (4,)     PERIOD, s; OBSERVER, SMOOTHER, rad/s; LOWPASS_SHARE, of low-passed velocity
     rotation  (9,)     of a platform that turns freely, as in `free_rotation_kernel`
-    swing     (4,)     likewise: ANGLE, rad from the angle without moment; SPIN, rad/s;
+    swing     (4,)     of the same platform: ANGLE, rad, from the angle without moment; SPIN, rad/s;
                        AMPLITUDE, rad, and AMPLITUDE_m of an anchor point
 """
 
@@ -44,16 +44,16 @@ M_PER_RAD, COMPLIANCE, WEIGHT, INERTIA, RESIDUAL, SETTLED, MOTOR_ROWS = 9, 10, 1
 PERIOD, OBSERVER, SMOOTHER, LOWPASS_SHARE, FILTERS = range(5)
 ANGLE, SPIN, AMPLITUDE, AMPLITUDE_m, SWING = range(5)
 FIXED, TURNS, HANGS = range(3)
-"""How an uncontrolled rotation is estimated: not; in its plane; in space."""
+"""How an uncontrolled rotation is estimated: not at all, in the plane, or in space."""
 JUMP_S = 0.2
-"""Time constant with which SETTLED follows RESIDUAL: a slip takes some 30 ms, while errors of the
-geometry change the residual only as slowly as the platform moves."""
+"""Time constant with which SETTLED follows RESIDUAL. A slip takes about 30 ms; errors of the
+geometry change the residual only as fast as the platform moves."""
 _MOST_TURN_rad, _SMALL = 0.02, 1e-4
 LAG, REACH_m = 0, 1
 LAG_S, _SENSED_S, _MOST_LEARNT = 0.1, 1.0, 0.2
 _STANDS_m = 5e-3
-"""Height over home up to which a platform counts as standing there."""
-# of the type that comes from Python: with a literal numba would compile the search again
+"""Height above home up to which a platform counts as standing at home."""
+# has the type that Python passes: with a literal, numba would compile the search again
 _NO_RESTARTS: int = np.int64(0)  # type: ignore[assignment]
 
 
@@ -68,7 +68,7 @@ class Hanging(NamedTuple):
     """(2,): time constant LAG with which the rotation follows, s, and REACH_m, the largest distance
     of an anchor point from the centre of mass."""
     home: FloatArray
-    """Pose at home, (4, 3), where it stands."""
+    """Pose at home, (4, 3), at which the platform stands."""
     scratch: FloatArray
     """(4, 3)"""
     unsensed: FloatArray
@@ -85,8 +85,9 @@ class Hanging(NamedTuple):
 def observe(motors: FloatArray, position: FloatArray, filters: FloatArray) -> None:
     """Track each motor's angle and velocity: an observer with a double pole at OBSERVER.
 
-    A rotor on its cable oscillates at ten Hz and more, where latency inverts the effect of damping.
-    So the velocity that damps the platform is partly low-passed by a double pole at SMOOTHER.
+    A rotor on its cable oscillates at 10 Hz or more. At these frequencies, latency inverts the
+    effect of damping. So the velocity that damps the platform is partly low-passed, by a double
+    pole at SMOOTHER.
     """
     period = filters[PERIOD]
     decay = math.exp(-filters[OBSERVER] * period)
@@ -123,10 +124,10 @@ def track_pose(
 ) -> tuple[float, int, float, float, int]:
     """Update `pose` and `twist` (6,) from the motors' angles (n,).
 
-    Returns the largest normalised residual of the lengths, m, its cable, -1 if the lengths do not
-    identify it, the root mean square of the rates' errors, m/s, and the largest jump of a residual,
-    m, and its cable, see `largest_jump`. If its cables leave the platform a `freedom` to turn, it
-    is put at the rotation of the equilibrium. Eqs. (2.6) to (2.9), (3.13) to (3.15).
+    Returns the largest normalised residual of the lengths, m; its cable, -1 if the lengths do not
+    identify it; the root mean square of the rates' errors, m/s; the largest jump of a residual, m,
+    and its cable, see `largest_jump`. If the cables leave the platform a `freedom` to turn, its
+    rotation is that of the equilibrium. Eqs. (2.6) to (2.9), (3.13) to (3.15).
     """
     observe(motors, position, filters)
     if freedom == TURNS:
@@ -140,7 +141,7 @@ def track_pose(
         cables[ERROR, i] = -motors[RATE, i]
     assemble(cables, solver)
     if factorise(solver, 0.0):
-        if cost < math.inf:  # lengths that are nan do not agree
+        if cost < math.inf:  # false for nan lengths, which do not agree
             normalised = motors[RESIDUAL]
             residual, suspect = largest_residual(motors[LENGTH], cables, solver, normalised)
             share = filters[PERIOD] / (filters[PERIOD] + JUMP_S)
@@ -159,7 +160,7 @@ def track_pose(
 
 @jit
 def stretch(motors: FloatArray, cables: FloatArray, up: FloatArray) -> None:
-    """Write each cable's STRETCH under its TENSION at the pose of `cables`, if there is one."""
+    """Write each cable's STRETCH under its TENSION at the pose of `cables`, if that is known."""
     for i in range(motors.shape[1]):
         sine = 0.0
         for k in range(3):
@@ -183,7 +184,7 @@ def _hang(
     swing: FloatArray,
     hanging: Hanging,
 ) -> None:
-    """Turn the platform towards its equilibrium, or at home's height to its rotation on the stand.
+    """Turn the platform towards its equilibrium or, at home's height, to its rotation at home.
 
     The true platform swings about the equilibrium, and follows it no faster than LAG. Only an
     inclinometer shows the amplitude of that swing.
@@ -226,7 +227,7 @@ def _turn_to_equilibrium(
     """Turn the platform about z by one Newton step to the angle at which tensions have no moment.
 
     The true platform swings about that angle, because it does not follow immediately. Its `swing`
-    is computed from its inertia, and reported, but its phase is not known well enough to be used.
+    is computed from the inertia and reported. The phase is too uncertain for use in the control.
     """
     free.rotational_stiffness(geometry, motors[TENSION], pose, rotation)
     if rotation[free.STEEPNESS] > 0.0:
@@ -238,10 +239,10 @@ def _turn_to_equilibrium(
 
 @jit
 def _swing(filters: FloatArray, rotation: FloatArray, moved: float, swing: FloatArray) -> None:
-    """Advance a swing by a cycle in which its middle ψ has moved by the angle `moved`.
+    """Advance a swing by a cycle in which its centre ψ has moved by the angle `moved`.
 
-    With lengths that follow ψ, the platform deviates from there by δ: I_s δ̈ = -κ δ - I ψ̈, minus
-    damping.
+    The cable lengths follow ψ, and the platform deviates from ψ by the angle δ: I_s δ̈ = -κ δ - I
+    ψ̈, minus damping.
     """
     if rotation[free.STIFFNESS] <= 0.0:
         return
@@ -254,16 +255,17 @@ def _swing(filters: FloatArray, rotation: FloatArray, moved: float, swing: Float
     swing[AMPLITUDE_m] = rotation[free.REACH] * swing[AMPLITUDE]
 
 
-# A platform's set-point as a pose, and as its motors' set-points. A set-point is (d,), one entry
-# for each controlled direction: coordinates of the origin, and the rotation vector φ from the
-# orientation at home, Q = exp(φ) Q_home. For angles below half a turn that is singular nowhere.
+# Kernels that convert a platform's set-point to a pose, and to the motors' set-points. A set-point
+# is (d,), one entry for each controlled direction: coordinates of the origin, and the rotation
+# vector φ from the orientation at home, Q = exp(φ) Q_home. This has no singularity at angles below
+# half a turn.
 
 
 @jit
 def pose_of_coordinates(
     q: FloatArray, directions: IntArray, home: FloatArray, scratch: FloatArray, pose: FloatArray
 ) -> None:
-    """Write the pose of a set-point `q` (d,); the rest is as at `home` (4, 3)."""
+    """Write the pose of a set-point `q` (d,); other directions are as at `home` (4, 3)."""
     phi, turn = scratch[0], scratch[1:4]
     for k in range(3):
         phi[k], pose[0, k] = 0.0, home[0, k]
@@ -348,7 +350,7 @@ def move_with(
     twist: FloatArray,
     acceleration: FloatArray,
 ) -> None:
-    """Write twist and its derivative (6,) of a set-point `shaped` (3, d) with its derivatives."""
+    """Write twist and its derivative (6,) for a set-point and its derivatives, `shaped` (3, d)."""
     phi, rate, slope, after = scratch[0], scratch[1], scratch[2], scratch[3]
     turns = False
     for k in range(6):
@@ -391,11 +393,12 @@ def motor_references(
     velocity_rad_s: FloatArray,
     acceleration_rad_s2: FloatArray,
 ) -> None:
-    """Write the commands from a set-point `shaped` (3, d): motions, error, and motors' set-points.
+    """Write the commands for a set-point `shaped` (3, d): motion, error, and motors' set-points.
 
-    `wanted` (4, 3) is its pose, `twist` and `acceleration` (6,) its motion, `error` (6,) wanted
-    ⊟ pose. The motors' are (n,) each, eqs. (2.2), (2.4), (3.2), (3.11), with the stretch of each
-    cable subtracted. If no angle is controlled the platform is assumed to keep its rotation.
+    `wanted` (4, 3) is its pose, `twist` and `acceleration` (6,) its motion, `error` (6,) wanted ⊟
+    pose. The set-points of the motors are (n,) each, eqs. (2.2), (2.4), (3.2), (3.11), with the
+    stretch of each cable subtracted. If no angle is controlled, the platform is assumed to keep its
+    rotation.
     """
     pose_of_coordinates(shaped[0], directions, home, scratch, wanted)
     if directions[directions.size - 1] < 3:

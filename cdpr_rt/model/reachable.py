@@ -44,26 +44,26 @@ from cdpr_rt.model.null_space import (
 )
 from cdpr_rt.model.platform_model import PlatformModel
 
-# Kernels that prove for how much of a straight way cables hold a platform. At a place of the
-# way let tensions t carry a wrench within bounds, a margin m inside of them. A share s further
-# on the wrench matrix is W + E, and t + δ carries it there if δ = -W⁺E (t + δ). With the
-# derivative D of W by the share, and a bound of the remainder, |E - s D| of each column at most
-# first s + second s²/2, no entry of δ is larger than m, and so t + δ within bounds, while l s +
-# k s²/2 <= m (1 - a s - b s²/2), that is s up to 2 m / (g + √(g² + 2 h m)) with g = l + m a,
-# h = k + m b. Here l, a are the largest row sums of |W⁺D| with tensions and without, and k, b
-# those of |W⁺| times the bound of the remainder. The margin is that of the worst wrench, so one
-# such s is valid for all wrenches. W⁺ = W'(W W')⁻¹ does not depend on the units of its rows.
-# If cables have weight the wrench changes too, by half the weight of the length by which each
-# free part changes. A bound of first order is added to E (t + δ) for that. See `contact_kernel`
-# for the way.
+# Kernels that prove for how much of a straight way cables hold a platform. At a position on the
+# way, let tensions t carry a wrench with a margin m to their bounds. Further along by a share s,
+# the wrench matrix is W + E, and t + δ carries the wrench if δ = -W⁺E (t + δ). With the derivative
+# D of W by the share, and a bound of the remainder, |E - s D| of each column at most first s +
+# second s²/2, no entry of δ is larger than m, and so t + δ within bounds, while l s + k s²/2 <= m
+# (1 - a s - b s²/2), that is s up to 2 m / (g + √(g² + 2 h m)) with g = l + m a, h = k + m b. Here
+# l, a are the largest row sums of |W⁺D| with tensions and without, and k, b those of |W⁺| times the
+# bound of the remainder. The margin is that of the worst wrench, so one such s is valid for all
+# wrenches. W⁺ = W'(W W')⁻¹ does not depend on the units of its rows. If cables have weight, the
+# wrench also changes: by half the weight of the length by which each free part changes. A
+# first-order bound of this change is added to E (t + δ). See `contact_kernel` for the arrays of a
+# way.
 
 LEAST_N: Final = 1e-3
-"""A way ends if its margin is less."""
+"""A way ends if the margin falls below this."""
 _MOST_LOOKS = 2000
 _SHARE_OF_LENGTH = 0.25
 """Share by which a cable's length may change from one check to the next."""
 _CLOSER = 1.0 / (1.0 - _SHARE_OF_LENGTH)
-"""Factor by which a quotient by the length may grow until then."""
+"""Factor by which one over the length may grow between two checks."""
 _FORCE, _MOMENT = 0, 1
 
 
@@ -73,8 +73,8 @@ def held_until(
 ) -> tuple[float, int]:
     """Return the share of the way, at most `until`, up to which tensions carry all wrenches.
 
-    Also returns the number of places checked. `geometry` is that about the centre of the wrenches,
-    `chosen` (d,) are the controlled directions.
+    Also returns the number of positions checked. `geometry` is that about the centre of the
+    wrenches, `chosen` (d,) are the controlled directions.
     """
     centre, wrenches, generators, scale, bounds = sets
     d, n = scale.size, geometry.shape[1]
@@ -117,7 +117,7 @@ def held_until(
 
 @jit
 def _about(pose: FloatArray, twist: FloatArray, centre: FloatArray) -> None:
-    """Convert pose and twist to those of a point of the platform."""
+    """Convert pose and twist from the platform's origin to the point `centre` of it."""
     x, y, z = (
         pose[1, 0] * centre[0] + pose[1, 1] * centre[1] + pose[1, 2] * centre[2],
         pose[2, 0] * centre[0] + pose[2, 1] * centre[1] + pose[2, 2] * centre[2],
@@ -143,11 +143,12 @@ def _write_changes(
 ) -> float:
     """Write the derivative `D` (6, n) of W, and bounds of the remainder; return their range.
 
-    `left` (2, 2, 2) is summed over the cables: of forces and of moments, those of first and of
-    second order, as they are and times the highest tension; the latter include the change of the
-    cables' weight. With the anchor's speed v and acceleration h over a length l the direction u
-    changes by v/l, and its change by h/l + 3 v²/l². Over a pulley whose axis is at distance e from
-    the anchor only a bound of first order is used, v/l + v/e.
+    The bounds `left` (2, 2, 2) are sums over the cables. The first index is for forces and moments,
+    the second for first and second order. The third is for the bound as it is, and for its product
+    with the highest tension, which includes the change of the cables' weight. If the anchor has
+    speed v and acceleration h, and the free part length l, the direction u changes at a rate of
+    v/l, which itself changes at h/l + 3 v²/l² at most. For a pulley whose axis is at distance e
+    from the anchor, only the first-order bound v/l + v/e is used.
     """
     step, turn = size_of(way[STEP]), size_of(way[TURN])
     left[:] = 0.0
@@ -193,7 +194,7 @@ def _write_derivative(
     i: int,
     D: FloatArray,
 ) -> float:
-    """Write the column of `D` of a cable without a pulley; return its anchor's speed."""
+    """Write the column of `D` for a cable without a pulley; return the speed of its anchor."""
     bx, by, bz = geometry[ANCHOR, i], geometry[ANCHOR + 1, i], geometry[ANCHOR + 2, i]
     wx, wy, wz = twist[1, 0], twist[1, 1], twist[1, 2]
     rx = pose[1, 0] * bx + pose[1, 1] * by + pose[1, 2] * bz
@@ -214,7 +215,7 @@ def _write_derivative(
 
 @jit
 def _beside(geometry: FloatArray, pose: FloatArray, i: int) -> float:
-    """Return how far an anchor point is from the swivel axis of its pulley."""
+    """Return the distance of an anchor point from the swivel axis of its pulley."""
     square, along = 0.0, 0.0
     for k in range(3):
         x = pose[0, k] - geometry[k, i]
@@ -229,7 +230,7 @@ def _beside(geometry: FloatArray, pose: FloatArray, i: int) -> float:
 def _kept_for(
     margin: float, inverse: FloatArray, D: FloatArray, left: FloatArray, bounds: FloatArray
 ) -> float:
-    """Return the share of the way for which tensions stay within bounds.
+    """Return the further share of the way for which tensions stay within bounds.
 
     `inverse` (6, n) is W⁺ transposed, 0 for directions that are not controlled.
     """
@@ -259,7 +260,7 @@ def _kept_for(
     return share
 
 
-# Kernel for how far a platform gets on straight ways, held and without contact.
+# Kernel for how far cables can hold a platform on straight ways without contact.
 
 WHOLE, CONTACT, NOT_HELD = range(3)
 """Why a way ends: at its target, at a contact, or where tensions are not feasible."""
@@ -305,36 +306,36 @@ SHARE: Final = 0.95
 """μ of eq. (3.38): share of the reached way to use if a way ends before its target."""
 _AT_ONCE = 512
 _MOST_DRAWN = 20
-"""Limit of draws over wanted poses, with one batch of poses added to these."""
+"""Limit of the number of draws: this many per wanted pose, counting one extra batch of poses."""
 
 
 @dataclass(frozen=True)
 class Reached:
-    """Positions (m, d) that are reached, and counts of all drawn ones."""
+    """Positions (m, d) that the platform reaches, and statistics of all draws."""
 
     positions: FloatArray
     shares: FloatArray
-    """Share of the way to the drawn pose that was covered, (m,)."""
+    """Share of the way to each drawn position that the platform covers, (m,)."""
     drawn: int
     cut_by_contact: int
     cut_by_tensions: int
     outside: int
-    """Number that ended outside the box of targets, or down on the stand, and are left out."""
+    """Number of draws left out because they end outside the box of targets or below the stand."""
 
 
 class Reach:
     """How far straight ways go from a start, with a proof for all places between.
 
-    All tensions stay within their bounds for targets, with the control's reserve, at full
-    acceleration; nothing comes into contact. Positions are those of `PlatformModel`, and ways are
-    straight in these, like motions of the program `pose`.
+    Along these ways all tensions stay within their bounds for targets, with the control's reserve,
+    at full acceleration, and nothing comes into contact. Positions are those of `PlatformModel`.
+    Ways are straight in these coordinates, like motions of the program `pose`.
     """
 
     def __init__(self, model: PlatformModel, start: FloatArray | None = None) -> None:
         """Take the position (d,) from which ways lead; home if none is given.
 
-        Raises GeometryError if the platform is not held or in contact there, or has more than
-        d + 2 cables.
+        Raises GeometryError if the cables cannot hold the platform there, if it is in contact
+        there, or if it has more than d + 2 cables.
         """
         self.model = model
         self.start = np.array(model.home if start is None else start, float)
@@ -351,9 +352,9 @@ class Reach:
         self._arrays = np.array(directions), model.interference.scene, geometry, workspace.sets
 
     def shares(self, ends: FloatArray) -> tuple[FloatArray, IntArray]:
-        """Return the share of the way to each of the positions (m, d) that is reached, and its end.
+        """Return how far the way to each of the positions (m, d) is reachable, and why it ends.
 
-        0 to 1, (m,), and WHOLE, CONTACT or NOT_HELD as above.
+        Shares are 0 to 1, (m,). The reason is WHOLE, CONTACT or NOT_HELD.
         """
         shares, why = np.zeros(len(ends)), np.zeros(len(ends), np.int64)
         reach_all(
@@ -365,12 +366,12 @@ class Reach:
     def draw(
         self, count: int, seed: int, angle_rad: float | None = None, share: float = SHARE
     ) -> Reached:
-        """Return `count` positions that are reached, drawn at random; the same for the same seed.
+        """Return `count` reachable positions, drawn at random; the same seed gives the same ones.
 
-        Uniformly in the box of targets, turned by up to `angle_rad` from home's orientation (by
-        default that of targets), uniformly as rotation vectors. If a way ends before its target,
-        `share` of it is covered, eq. (3.38), if that leads into the box. Raises
-        GeometryError if hardly anything is reached.
+        Coordinates are uniform in the box of targets. Rotation vectors from home's orientation are
+        uniform up to `angle_rad`, by default the workspace angle. If a way ends before its target,
+        the result is the position at `share` of the reached part, eq. (3.38), provided that this is
+        in the box. Raises GeometryError if hardly anything is reached.
         """
         rng = np.random.default_rng(seed)
         most = self.model.angle_rad if angle_rad is None else angle_rad
@@ -403,16 +404,16 @@ class Reach:
         return positions
 
     def are_targets(self, positions: FloatArray) -> BoolArray:
-        """Return which of the positions (m, d) are in the box of targets, and not on the stand."""
+        """Return which of the positions (m, d) are in the box of targets and above the stand."""
         platform, k = self.model.platform, self.model.positions
         low, high = np.array(platform.workspace_min_m), np.array(platform.workspace_max_m)
         inside = (positions[:, :k] >= low) & (positions[:, :k] <= high)
         return np.asarray(inside.all(axis=1)) & self._clears_stand(positions)
 
     def _clears_stand(self, positions: FloatArray) -> BoolArray:
-        """Return whether a platform that stands at home, under its targets, stays above its stand.
+        """Return whether the platform is above its stand, if the stand is below its targets.
 
-        Its underside is that of the box around its anchor points; turning lowers it.
+        The underside is that of the box around the anchor points; turning lowers it.
         """
         model, up = self.model, self.model.positions - 1
         platform = model.platform

@@ -13,12 +13,13 @@ from cdpr_rt.model.pose import exponential
 G_m_s2 = 9.80665
 """Standard gravity."""
 LEAST_ARM_m = 0.01
-"""If all anchor points are nearer to the centre of mass, it is a point without orientation."""
+"""If all anchor points are nearer to the centre of mass, the platform is a point without
+orientation."""
 _TWIST = {2: (0, 1, 5), 3: (0, 1, 2, 3, 4, 5)}
 
 
 def in_space(vector: tuple[float, ...]) -> FloatArray:
-    """Return a position of a plane or of space as (3,)."""
+    """Return a position in a plane or in space as (3,)."""
     return np.array((*vector, 0.0)[:3], float)
 
 
@@ -38,8 +39,8 @@ def home_rotation(platform: Platform) -> FloatArray:
 def inertia_kg_m2(platform: Platform) -> FloatArray:
     """Return the inertia (3, 3) about the centre of mass, in the platform's frame.
 
-    If the file has none it is that of a ball whose radius of gyration is half the anchor points'
-    distance from their middle (root of the mean of squares).
+    If the file gives no inertia, it is that of a ball. The radius of gyration is half the root mean
+    square distance of the anchor points from their centroid.
     """
     given = platform.inertia_kg_m2
     if given is None:
@@ -73,10 +74,10 @@ def directions_of(platform: Platform) -> tuple[int, ...]:
 
 
 def orientations(platform: Platform) -> FloatArray:
-    """Return rotation vectors (k, 3) from home that represent those of all targets.
+    """Return rotation vectors (k, 3) from home that represent the orientations of all targets.
 
-    First zero; then those of the largest angle about each controlled axis, and, if several are
-    controlled, about the diagonals between these.
+    The first is zero. The others have the largest angle, about each controlled axis and, if several
+    axes are controlled, about the diagonals between them.
     """
     axes = [i - 3 for i in directions_of(platform) if i >= 3]
     angle = platform.workspace_angle_rad

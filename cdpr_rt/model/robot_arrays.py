@@ -20,19 +20,20 @@ from cdpr_rt.core.supervisor import DEFAULT_REACTIONS, Limits, reactions_of
 from cdpr_rt.model.rigid_body import directions_of, home_rotation, in_space
 
 RATED_SPEED_SHARE: Final = 0.2
-"""Default speed limit over the motors' rated speed."""
+"""Default speed limit, as a share of the motors' rated speed."""
 TORQUE_RISE_S: Final = 0.005
-"""Default time in which the full torque may be built up."""
+"""Default time in which the torque may rise from zero to its limit."""
 CABLE_SAFETY: Final = 5.0
 """Default safety factor: breaking force over the highest tension."""
 SLACK_SHARE: Final = 0.25
-"""Default tension of a slack cable over the least tension allowed."""
+"""Default tension below which a cable is slack, as a share of the least tension allowed."""
 FOLLOWING_m: Final = 0.15
-"""Default following error of a platform's cables: three times the lag at which its set-point
-waits for it."""
+"""Default limit of the following error of a platform's cables: three times the lag at which the
+set-point waits for the platform."""
 RUNAWAY_m_s: Final = 0.75
-"""Excess over the set-point's speed at which a cable counts as broken, if no other cable's length
-shows it. A platform on its cables does not reach it; a rotor alone reaches it within 10 to 50 ms.
+"""Excess over the set-point's speed at which a cable counts as broken, if the lengths of the other
+cables do not show it. A rotor with its platform does not reach this; a free rotor does within 10 to
+50 ms.
 """
 LOW_SHARE: Final = 0.5
 """Ratio of the monitored to the planned least tension, if tensions are estimated from torques."""
@@ -46,7 +47,7 @@ def can_lower(robot: Robot) -> bool:
 def limits_of(robot: Robot, *, calibration_in_doubt: bool = False) -> Limits:
     """Return the limits of a robot's axes, with defaults for those that its file omits.
 
-    Lengths agree better once the geometry has been calibrated, unless that is in doubt.
+    With a calibrated geometry, unless it is in doubt, the limit of disagreeing lengths is tighter.
     """
     axes, file = robot.axes, robot.limits
 
@@ -98,8 +99,8 @@ def limits_of(robot: Robot, *, calibration_in_doubt: bool = False) -> Limits:
 def supervisor_limits(limits: Limits, robot: Robot) -> Limits:
     """Return the limits of a robot's supervisor from those used for planning.
 
-    A tension estimated from torques alone is uncertain by the motors' friction: a
-    platform's cables count as low below half the planned least tension.
+    The friction of the motors makes a tension estimated from torques alone uncertain. So the lower
+    limit of a platform's cables is then half the planned least tension.
     """
     if not can_lower(robot) or robot.tension_sensors is not None:
         return limits
@@ -109,7 +110,7 @@ def supervisor_limits(limits: Limits, robot: Robot) -> Limits:
 def winches_of(axes: Sequence[RobotAxis]) -> WinchArrays:
     """Return the winches' arrays for the estimate.
 
-    Without a calibration the tension follows from drum and gear, without friction.
+    Without a calibration, the tension is computed from drum and gear, without friction.
     """
     cable = np.array([axis.winch.cable_m_per_motor_rad for axis in axes])
 
@@ -129,7 +130,7 @@ def winches_of(axes: Sequence[RobotAxis]) -> WinchArrays:
 
 
 def described(limits: Limits, n: int) -> dict[str, Any]:
-    """Return limits for a robot's description: arrays over the axes, or None."""
+    """Return the limits for a robot's description; each is a list over the axes, or None."""
     table: dict[str, Any] = {}
     for name in limits.__dataclass_fields__:
         value = getattr(limits, name)
@@ -147,22 +148,22 @@ def _finite(value: Any) -> Any:
     return value if math.isfinite(value) else None
 
 
-# How far the cable lengths of a platform may disagree before something must have failed.
+# Limits of the disagreement of a platform's cable lengths. Beyond them something has failed.
 
 TAPE_SHARE: Final = 0.01
 TAPE_m: Final = 0.022
-"""Normalised residual that exit points measured by tape can cause: as a share of the diagonal of
-the box around them, and at most in m."""
+"""Normalised residual due to exit points measured by tape: as a share of the diagonal of the box
+around them, and its maximum in m."""
 DRUM_SHARE: Final = 0.003
 """Standard deviation of a drum's radius, as a share of it."""
 SIGMAS: Final = 3.0
 """Allowed number of standard deviations of the error that drums cause."""
 CALIBRATED_SHARE: Final = 1.0 / 3.0
 CALIBRATED_m: Final = 0.005
-"""Factor of the total once the geometry has been calibrated, and its least value then."""
+"""With a calibrated geometry: factor of the limit, and its least value."""
 JUMP_SHARE: Final = 0.25
-"""Share of the total that may change suddenly, and share of the cables' elastic stretch between
-their lowest and highest tension."""
+"""Largest sudden change: share of the limit, and share of the cables' elastic stretch between their
+lowest and highest tension."""
 _LEAST_LENGTH_m = 1e-6
 LEAST_REDUNDANCY = 1e-4
 """A cable with a smaller redundancy number contradicts no other."""
@@ -176,9 +177,10 @@ def exit_point_diagonal_m(platform: Platform) -> float:
 def allowed_disagreement_m(platform: Platform, calibration: GeometryCalibration | None) -> float:
     """Return the largest allowed normalised residual of the lengths.
 
-    min(1 % of the diagonal of the box around the exit points, 22 mm) + 3 s, where s is the standard
-    deviation of that residual with drums 0.3 % off, at the worst place of the box of targets. With
-    a calibration a third of it, but at least 5 mm and the error that was predicted.
+    min(1 % of the diagonal of the box around the exit points, 22 mm) + 3 s. s is the standard
+    deviation of that residual at the worst position in the box of targets, if drum radii have a
+    standard deviation of 0.3 %. With a calibration, the limit is a third of this, but at least 5 mm
+    and at least the predicted error.
     """
     tape_m = min(TAPE_m, TAPE_SHARE * exit_point_diagonal_m(platform))
     most_m = tape_m + SIGMAS * _of_drums_m(platform)
@@ -191,20 +193,21 @@ def allowed_disagreement_m(platform: Platform, calibration: GeometryCalibration 
 def allowed_jump_m(platform: Platform, disagreement_m: float, strain: FloatArray) -> float:
     """Return the largest allowed sudden change of a residual, if `disagreement_m` is its limit.
 
-    It is a quarter of that, but at least a quarter of the longest stretch at home. `strain` (n,) is
-    the stretch of a cable between its lowest and highest tension, over its length. Errors of the
-    geometry change residuals only as the platform moves, forces change them by cables' stretch.
+    It is a quarter of that limit, but at least a quarter of the longest stretch at home. `strain`
+    (n,) is the stretch of a cable between its lowest and highest tension, over its length. Errors
+    of the geometry change residuals only as the platform moves. Forces change them by the stretch.
     """
     lengths_m, _ = _cables(platform, platform.home_m)
     return JUMP_SHARE * max(disagreement_m, float((strain * lengths_m).max()))
 
 
 def _of_drums_m(platform: Platform) -> float:
-    """Return the largest standard deviation of a normalised residual that drums cause.
+    """Return the largest standard deviation of a normalised residual due to errors of drum radii.
 
-    Lengths are known at home: the length paid out since has a relative error of its drum, e. With
-    the projection P = I - J J^+ the residuals are P e and the normalised ones P e / sqrt(p_ii).
-    Computed in the corners of the box of targets, at home's orientation, without pulleys.
+    Lengths are exact at home. The length paid out since then has the relative error of its drum,
+    which causes length errors e. With the projection P = I - J J^+ the residuals are P e and the
+    normalised ones P e / sqrt(p_ii). They are computed at the corners of the box of targets, at
+    home's orientation, without pulleys.
     """
     home_m, _ = _cables(platform, platform.home_m)
     box = zip(platform.workspace_min_m, platform.workspace_max_m, strict=True)
@@ -220,7 +223,7 @@ def _of_drums_m(platform: Platform) -> float:
 
 
 def _cables(platform: Platform, place_m: tuple[float, ...]) -> tuple[FloatArray, FloatArray]:
-    """Return the lengths (n,) at a place, from exit to anchor point, and their Jacobian (n, d)."""
+    """Return lengths (n,) from exit to anchor point, and their Jacobian (n, d), at a position."""
     exits_m = np.array([in_space(point) for point in platform.exit_points_m])
     arms_m = np.array([in_space(point) for point in platform.anchor_points_m])
     arms_m = arms_m @ home_rotation(platform).T

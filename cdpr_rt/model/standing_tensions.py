@@ -10,41 +10,43 @@ from cdpr_rt.model.pose import Pose
 from cdpr_rt.model.tension_distribution import TensionOutcome, TensionSolver
 
 OVERSHOOT = 1.5
-"""Ratio of the short overshoot to the pretension: on the way back friction acts in the other
-direction, so its effect on the angles cancels out."""
+"""Ratio of the short overshoot to the pretension. When the tension falls again, friction acts in
+the other direction, so its effect on the angles cancels."""
 _CARRIED = 0.85 / OVERSHOOT
-"""Share of the weight that is carried by tensions that do not press the platform down."""
+"""Share of the weight that the tensions carry if they cannot press the platform down."""
 _HIGHEST = 0.9
 _PRESSING, _MODEST = (0.5, 0.25, 0.0), 0.4
 _FLOORS = (1.0, 0.75, 0.5, 0.25)
-"""Shares of the planned tension beyond the least one, tried from the highest."""
+"""Shares of the range between least and planned tension, tried from the highest."""
 _PRESSED_LESS, _SHARES = (0.75, 0.5), (1.0, 0.75, 0.5, 0.25, 0.0)
 """Shares of the weight that press a platform down whose cables might otherwise stay slack."""
 _CLEAR, _CLEARED = 1.2, (1.0, 0.75, 0.5)
-"""Tension, as a multiple of the friction of the winches, below which a cable that is wound in may
-be nearly slack; and the shares of it that are tried, from the highest."""
+"""Tension, as a multiple of the winches' friction, below which a cable may be nearly slack while it
+is wound in; and shares of this tension, tried from the highest."""
 
 
 class StandingTensions:
-    """Tensions (n,) at the winches under which a platform stays where it stands.
+    """Tensions (n,) at the winches under which a standing platform does not move.
 
-    Their wrench is along the weight. If the cables can do so without pulling hard, it presses the
-    platform down, with none below the least tension, and all as far above it as possible up to the
-    planned ones, because friction leaves cables to sag. If the friction of the winches may exceed
-    these tensions, it presses with less than the weight, so that cables can be pulled harder, if
-    necessary harder than planned. Otherwise it carries 0.57 of the weight, too little to lift the
-    platform even at the overshoot. Tensions then exceed the friction of the winches as far as
-    possible, or each is 0.57 of the one that would carry all of the weight, which may be below the
-    least tension. Friction changes the tensions by some newtons, so a platform whose weight is
-    nearly carried would not stand still. The cables' weight counts with the platform's.
+    Their wrench is vertical. If moderate tensions can press the platform down, they do so. No
+    tension is then below the least one, and all are as far above it as possible, up to the planned
+    ones, because friction would otherwise let cables sag. If the friction of the winches may exceed
+    these tensions, the wrench presses with less than the weight. The cables can then be pulled
+    harder, if necessary harder than planned.
+
+    If the cables cannot press the platform down, they carry 0.57 of its weight, which does not lift
+    it even at the overshoot. Tensions exceed the friction of the winches if possible. Otherwise
+    each is 0.57 of the tension that would carry the whole weight, which may be below the least
+    tension. Friction changes tensions by some newtons, so a platform whose weight is nearly carried
+    would not stand still. The weight includes that of the cables.
     """
 
     def __init__(
         self, model: PlatformModel, low_N: FloatArray, most_N: FloatArray, taken_up_N: FloatArray
     ) -> None:
-        """Take the planned least tensions, and the highest of the motors, (n,) each.
+        """Take the planned least tensions, and the highest tensions of the motors, (n,) each.
 
-        `taken_up_N` (n,) is the friction of the winches, as tensions of their cables.
+        `taken_up_N` (n,) is the friction of the winches, expressed as tensions of their cables.
         """
         self._kinematics, self._weight = model.kinematics, model.weight()
         self._most_N = most_N / OVERSHOOT
@@ -63,7 +65,7 @@ class StandingTensions:
             for floor_N in floors_N
             if (floor_N >= self._clear_N).all()
         ]
-        # to exceed the friction of the winches, if necessary with more than planned
+        # these exceed the friction of the winches, if necessary with more than the planned tension
         self._harder = [
             (part, model.least_tensions(np.clip(part * self._clear_N, least_N, most), most))
             for part in _CLEARED
@@ -74,7 +76,7 @@ class StandingTensions:
         self._hanging, self._rise_N = np.zeros(model.size), np.zeros(least_N.size)
 
     def at(self, pose: Pose) -> tuple[FloatArray, bool]:
-        """Return the tensions (n,) at a pose, overwritten, and whether they leave it standing."""
+        """Return the tensions (n,) at a pose, and whether they leave the platform standing."""
         t = self._t
         self._look(pose)
         stays = self._press(self._pressed)
@@ -89,12 +91,12 @@ class StandingTensions:
         elif not stays:
             stays = self._carry()
         t += self._rise_N
-        # less than the solution would exert another wrench
+        # clipped tensions would exert another wrench
         stays = stays and bool((t <= self._most_N).all())
         return np.minimum(t, self._most_N, out=t), stays
 
     def _carry(self) -> bool:
-        """Use tensions that carry a share of the weight; return whether there are any."""
+        """Use tensions that carry a share of the weight; return whether such tensions exist."""
         t = self._t
         carried = self._weight + self._hanging
         stays = self._least.solve(self._W, carried, t) is TensionOutcome.FEASIBLE
@@ -108,8 +110,10 @@ class StandingTensions:
         return stays
 
     def _press(self, tensions: list[tuple[TensionSolver, float]]) -> bool:
-        """Use the first tensions that press the platform down by a share of its weight; return
-        whether there are any."""
+        """Use the first tensions that press the platform down by a share of its weight.
+
+        Returns whether such tensions exist.
+        """
         return any(
             solver.solve(self._W, self._hanging - share * self._weight, self._t)
             is TensionOutcome.FEASIBLE
@@ -117,7 +121,7 @@ class StandingTensions:
         )
 
     def carry(self, pose: Pose) -> bool:
-        """Return whether tensions within their bounds, none of them negative, carry the weight."""
+        """Return whether nonnegative tensions within their bounds carry the weight."""
         self._look(pose)
         outcome = self._carrying.solve(self._W, self._weight + self._hanging, self._t)
         return outcome is TensionOutcome.FEASIBLE

@@ -39,7 +39,8 @@ class Box:
     def grid(self, *counts: int) -> FloatArray:
         """Return points that fill the box, edges included, with these counts along each coordinate.
 
-        Their shape is that of the counts reversed, and the coordinates: rows first in a plane.
+        The shape is the counts in reverse order, then the number of coordinates; in a plane, rows
+        come first.
         """
         sides = [np.linspace(*side) for side in zip(self.low_m, self.high_m, counts, strict=True)]
         points = np.stack(np.meshgrid(*sides, indexing="ij"), axis=-1)
@@ -69,9 +70,9 @@ def statics_of(robot: Robot, limits: Limits | None = None) -> PlatformStatics:
 class PlatformStatics:
     """Tensions of a platform's n cables at any position.
 
-    For whole arrays of positions (..., dimensions), m, at which the platform has its orientation of
-    home, or is turned from that by rotation vectors (k, 3), rad. After eqs. (2.13) to (2.19) and
-    (3.80), with all wrenches about the centre of mass.
+    Methods take arrays of positions (..., dimensions), m. The platform has home's orientation, or
+    is turned from it by rotation vectors (k, 3), rad. Eqs. (2.13) to (2.19) and (3.80), with all
+    wrenches about the centre of mass.
     """
 
     def __init__(self, model: PlatformModel) -> None:
@@ -85,9 +86,10 @@ class PlatformStatics:
         """Anchor points (n, dimensions) from the platform's origin, along the room's axes."""
         self.box = Box(platform.workspace_min_m, platform.workspace_max_m)
         self.turns_freely = model.kinematics.directions == PLANAR_POINT
-        """Whether no cable controls the platform's orientation in its plane."""
+        """Whether no cable controls the orientation of a planar platform."""
         self.orientations = orientations(platform)
-        """Rotation vectors (k, 3) from home that represent those of all targets, zero first."""
+        """Rotation vectors (k, 3) from home that represent the orientations of all targets, zero
+        first."""
 
     def points(self) -> FloatArray:
         """Return positions that fill the box of targets, edges included."""
@@ -95,7 +97,7 @@ class PlatformStatics:
         return self.box.grid(*grids[len(self.platform.home_m)])
 
     def lengths(self, position_m: FloatArray, turn_rad: FloatArray = NONE_rad) -> FloatArray:
-        """Return the cables' lengths (..., n), m, with the parts on their pulleys, eq. (3.2)."""
+        """Return the cable lengths (..., n), m, including the parts on the pulleys, eq. (3.2)."""
         return np.asarray(self._cables(position_m, turn_rad)[..., FREE : ARC + 1, :].sum(axis=-2))
 
     def free_lengths(self, position_m: FloatArray) -> FloatArray:
@@ -105,7 +107,7 @@ class PlatformStatics:
     def rises_N(self, position_m: FloatArray) -> FloatArray:
         """Return the excess of tensions at winches over those in the middle of cables, (..., n).
 
-        N, in the orientation of home; see `cable_kernel.tension_rise`.
+        They are in N, at home's orientation; see `cable_kernel.tension_rise`.
         """
         cables, weight = self._cables(position_m, NONE_rad), self.model.kinematics.geometry[WEIGHT:]
         return np.asarray(0.5 * cables[..., FREE, :] * (cables[..., :3, :] * weight).sum(axis=-2))
@@ -130,12 +132,13 @@ class PlatformStatics:
         acceleration_m_s2: float = 0.0,
         turns_rad: FloatArray = NONE_rad,
     ) -> FloatArray:
-        """Return how far all tensions can stay from both their bounds, the margin, N, (...).
+        """Return the margin (...), N: how far all tensions can stay from both their bounds.
 
-        Below zero: by how much some cable must be outside. With an acceleration: the least over
-        both its signs along all directions together, and the same share of the angular
-        acceleration if targets may be turned. The least over all `turns_rad` (k, 3) too. -inf if
-        no tensions hold some direction.
+        If it is negative, some tension must be outside its bounds by that much. With an
+        acceleration, the margin is the least over both signs of the acceleration in all directions
+        together, including the same share of the angular acceleration if targets may be turned. It
+        is also the least over all `turns_rad` (k, 3). It is -inf if the cables cannot hold some
+        direction.
         """
         workspace = self.model.workspace(acceleration_m_s2, 0.0)
         margins = [
@@ -145,9 +148,9 @@ class PlatformStatics:
         return np.asarray(np.min(margins, axis=0)).reshape(np.shape(position_m)[:-1])
 
     def is_target(self, position_m: FloatArray, turns_rad: FloatArray = NONE_rad) -> BoolArray:
-        """Return whether the platform can be held and accelerated with the controller's reserve.
+        """Return whether the cables can hold and accelerate the platform with the reserve.
 
-        At every one of the turns (k, 3).
+        They must do so in each orientation of `turns_rad` (k, 3).
         """
         moving = self.model.workspace(self.platform.acceleration_m_s2, 0.0)
         reserve_N, places = self.model.reserve_N, np.reshape(position_m, (-1, self.model.positions))
@@ -159,14 +162,15 @@ class PlatformStatics:
         return held.reshape(np.shape(position_m)[:-1])
 
     def tensions_N(self, position_m: FloatArray, turn_rad: FloatArray = NONE_rad) -> FloatArray:
-        """Return the tensions (..., n) at rest that stay furthest from their bounds."""
+        """Return the tensions (..., n) at rest with the largest margin to their bounds."""
         _, tensions = self.model.workspace(0.0, 0.0).margins(self.poses(position_m, turn_rad))
         return tensions.reshape(*np.shape(position_m)[:-1], -1)
 
     def least_tensions_N(self, position_m: FloatArray, reserve_N: float = 0.0) -> FloatArray:
-        """Return the tensions (..., n) at rest nearest to the lower bounds and a reserve above.
+        """Return the tensions (..., n) at rest nearest to the lower bounds plus a reserve.
 
-        In the orientation of home. No tension is below that; nan if no tensions exist.
+        The orientation is that of home. No tension is below that sum; nan if no such tensions
+        exist.
         """
         n, low = self.model.kinematics.n, self.low_N + reserve_N
         still = self.model.workspace(0.0)
@@ -180,15 +184,15 @@ class PlatformStatics:
         return found.reshape(*np.shape(position_m)[:-1], n)
 
     def angle_rad(self, position_m: FloatArray) -> FloatArray:
-        """Return the rotation of a platform that `turns_freely` at rest, (...).
+        """Return the rotation (...) at rest of a platform that `turns_freely`, nan if it topples.
 
-        nan if it turns over.
-
-        No cable controls its orientation: it takes the one at which the tensions have no moment.
+        No cable controls its orientation, so it turns until the tensions exert no moment.
         """
         poses, tensions = self.poses(position_m), self.tensions_N(position_m)
         angle, about = np.zeros(len(poses)), rotation_of(self.platform)
-        if np.linalg.norm(self.anchors_m, axis=1).max() >= _LEAST_ARM_m:  # else a point
+        if (
+            np.linalg.norm(self.anchors_m, axis=1).max() >= _LEAST_ARM_m
+        ):  # otherwise the platform is a point
             geometry, n = self.model.kinematics.geometry, tensions.shape[-1]
             for k, t in enumerate(tensions.reshape(-1, n)):
                 angle[k] = turn_to_rest(geometry, t, poses[k], about)
@@ -197,11 +201,11 @@ class PlatformStatics:
         return angle.reshape(np.shape(position_m)[:-1])
 
     def largest_box(self, inside: Box) -> Box | None:
-        """Return a box within `inside` that, as box of targets, consists of targets only; or None.
+        """Return the largest box within `inside` in which all positions are targets; or None.
 
-        The largest at all orientations, as exact as a grid of 45 by 45 points, 11 by 11 by 11 in
-        space. The control's reserve follows from the middle of the box: while the reserve of the
-        result exceeds the assumed one, the search continues within it.
+        All orientations of targets are checked. The resolution is a grid of 45 by 45 points, in
+        space 11 by 11 by 11. The control's reserve depends on the middle of the box. While the
+        reserve of the result exceeds the assumed one, the search continues within the result.
         """
         statics = self
         while (box := statics.largest_held(inside)) is not None:
@@ -220,8 +224,10 @@ class PlatformStatics:
         return box.grid(*(_FINE[len(box.low_m)] for _ in box.low_m))
 
     def largest_held(self, inside: Box) -> Box | None:
-        """Return the largest box within it where the cables can hold the platform with this box's
-        reserve."""
+        """Return the largest box within this one in which the cables hold the platform.
+
+        They hold it with the reserve of this box.
+        """
         points = self._fine(inside)
         good = self.is_target(points, self.orientations)
         best, found = 0, None
@@ -241,7 +247,7 @@ class PlatformStatics:
 def _slabs(
     good: BoolArray,
 ) -> Iterator[tuple[tuple[int, int], BoolArray]]:
-    """Yield (first, last) along the first coordinate, and which entries are good in all between."""
+    """Yield (first, last) along the first coordinate, and which entries are good throughout."""
     for first in range(len(good)):
         rest = np.ones(good.shape[1:], bool)
         for last in range(first, len(good)):
@@ -250,9 +256,9 @@ def _slabs(
 
 
 def _longest_run(good: BoolArray) -> tuple[int, int]:
-    """Return the first and the last place of the longest run of True, or 0 and 0.
+    """Return the first and the last index of the longest run of True, or 0 and 0.
 
-    Of runs of the same length, the one nearest to the middle.
+    Of runs with the same length, the one nearest to the middle is used.
     """
     edges = np.flatnonzero(np.diff(np.concatenate([[False], good, [False]])))
     if not edges.size:

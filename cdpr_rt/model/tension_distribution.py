@@ -26,21 +26,21 @@ from cdpr_rt.model.tension_qp import (
 
 
 class TensionOutcome(IntEnum):
-    """Outcome of a tension distribution."""
+    """Outcome of one call of a tension distribution."""
 
     FEASIBLE = 0
     """The tensions carry the wrench within their bounds."""
     SUBSTITUTED = 1
-    """As FEASIBLE, but by minimum deviation, because the method itself found none."""
+    """As FEASIBLE, but found by minimum deviation, because the chosen method found no tensions."""
     NEAREST = 2
-    """No tensions within the bounds carry the wrench; these exert the nearest one."""
+    """No tensions within the bounds carry the wrench; the result exerts the nearest wrench."""
     SINGULAR = 3
-    """The wrench matrix has not full rank; these exert the nearest wrench."""
+    """The wrench matrix is rank deficient; the result exerts the nearest wrench."""
     REFUSED = 4
-    """An argument is not finite, has another size, or bounds are reversed: nothing is written."""
+    """An argument is not finite or has a wrong size, or bounds are reversed; nothing is written."""
 
 
-# Tensions without search: Pott's closed form (2009), improved (2013).
+# Tensions without a search: Pott's closed form (2009) and its improvement (2013).
 
 
 @jit
@@ -53,11 +53,10 @@ def closed_form(
 ) -> bool:
     """Write the tensions t_m - W^+(w_e + W t_m) (n,) nearest to wanted ones t_m.
 
-    While one is outside its bounds, the one furthest outside is put on the bound and the others are
-    computed again, until none of the `r` null directions of `space` (n + 1, n) is left, which is
-    that of `null_space`, as are `bounds` (3, n). `scratch` (4, m, m), m >= n and 8, is overwritten.
-    Returns False if that leads to no tensions within bounds, which does not prove that there are
-    none.
+    While a tension is outside its bounds, the one furthest outside is fixed at its bound and the
+    others are computed again, until no null direction is left. `space` (n + 1, n) with `r` null
+    directions and `bounds` (3, n) are those of `null_space`. `scratch` (4, m, m), m >= n and 8, is
+    overwritten. Returns False if this finds no tensions within bounds, although some may exist.
     """
     Q, x, column, c, free = scratch[0], scratch[1, 0], scratch[1, 1], scratch[1, 2], scratch[1, 3]
     tolerance = start(space, r, bounds, x)
@@ -69,7 +68,7 @@ def closed_form(
             return False
         for k in range(r):
             column[k] = space[1 + k, cable]
-        # the direction that changes this cable's tension, but none of those that are fixed
+        # the direction that changes this cable's tension, but no fixed tension
         length = gram_schmidt(column, r, Q, fixed, c, free)
         if length <= NOTHING:
             return False
@@ -79,17 +78,17 @@ def closed_form(
     return False
 
 
-# The polygon of all tensions within bounds, for two cables more than directions. With t = t0 +
-# N' lambda and two null directions, each bound is a half plane of lambda, and the tensions
-# within bounds are a convex polygon: Gouttefarde, Lamaury, Reichert and Bruckmann (2015), "A
-# versatile tension distribution algorithm for n-DOF parallel robots driven by n+2 cables". Its
-# vertices are walked counter-clockwise. With one cable more it is a segment, with none a point.
+# The polygon of all tensions within bounds, for two redundant cables. With t = t0 + N' lambda and
+# two null directions, each bound is a half plane of lambda, and the tensions within bounds are a
+# convex polygon: Gouttefarde, Lamaury, Reichert and Bruckmann (2015), "A versatile tension
+# distribution algorithm for n-DOF parallel robots driven by n+2 cables". Its vertices are visited
+# counter-clockwise. With one redundant cable it is a segment, with none a point.
 
 _PARALLEL = 1e-12
-"""A cable whose tension changes by less than this, per newton along a line, does not bound that
+"""A cable does not bound a line if its tension changes by less than this per newton along the
 line."""
 _THIN = 1e-12
-"""Area, as a share of the perimeter's square, from which on a polygon counts as a segment."""
+"""Area, as a share of the squared perimeter, below which a polygon counts as a segment."""
 
 
 @jit
@@ -98,9 +97,9 @@ def centroid(
 ) -> bool:
     """Replace `t` (n,), any tensions within bounds, by the centroid of all of them.
 
-    `space` (n + 1, n) is that of `null_space` with `r` null directions, as are `bounds` (3, n).
-    `scratch` (4, m, m), m >= n and 8, is overwritten. Returns False, and leaves `t`, if r is
-    above 2.
+    `space` (n + 1, n) with `r` null directions and `bounds` (3, n) are those of `null_space`.
+    `scratch` (4, m, m), m >= n and 8, is overwritten. If r is above 2, it leaves `t` unchanged and
+    returns False.
     """
     n = space.shape[1]
     if r > 2:
@@ -151,10 +150,10 @@ def _walk(
 ) -> tuple[int, int]:
     """Write vertices of the polygon about `x` (2,); return the range of their indices.
 
-    From `x` along the first axis to the border, then from edge to edge; half plane 2i is cable i's
-    lower bound, 2i + 1 its upper one. `entered` (2n,) stores the vertex at which an edge was
-    entered: the first edge that comes again closes the polygon, since the walk may begin on a line
-    that only touches it.
+    The walk starts at `x`, goes along the first axis to the border, then from edge to edge. Half
+    plane 2i is the lower bound of cable i, 2i + 1 its upper bound. `entered` (2n,) stores the
+    vertex at which the walk entered each edge. The first edge that is entered twice closes the
+    polygon, because the walk may begin on a line that only touches it.
     """
     n = space.shape[1]
     for h in range(2 * n):
@@ -185,7 +184,7 @@ def _follow(
     ex: float,
     ey: float,
 ) -> tuple[int, float, float]:
-    """Return the first half plane whose border is met from p along e, and the distance."""
+    """Return the first half plane whose border the ray from p along e meets, and the distance."""
     edge, reach = -1, math.inf
     for i in range(space.shape[1]):
         rate = space[1, i] * ex + space[2, i] * ey
@@ -203,7 +202,7 @@ def _follow(
 
 @jit
 def _centre_of_area(X: FloatArray, Y: FloatArray, chosen: FloatArray) -> None:
-    """Write the centre of area, or the perimeter's of a polygon without area (a slack cable's)."""
+    """Write the centroid of the polygon, or of its perimeter if it has no area (a slack cable)."""
     area, cx, cy, perimeter, sx, sy = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for k in range(X.size):
         m = k + 1 if k + 1 < X.size else 0
@@ -228,9 +227,9 @@ def _centre_of_area(X: FloatArray, Y: FloatArray, chosen: FloatArray) -> None:
 CENTROID: Final = 0
 """The centroid of the polygon of all tensions within bounds."""
 MINIMUM_DEVIATION: Final = 1
-"""The tensions within bounds nearest to wanted ones; continuous in W, w_e and bounds."""
+"""The tensions within bounds nearest to the wanted ones; continuous in W, w_e and bounds."""
 CLOSED_FORM: Final = 2
-"""Pott's closed form about the wanted tensions; if it finds none, those nearest to them."""
+"""Pott's closed form about the wanted tensions; if it fails, the tensions nearest to these."""
 
 _FEASIBLE: Final = int(TensionOutcome.FEASIBLE)
 _SUBSTITUTED: Final = int(TensionOutcome.SUBSTITUTED)
@@ -254,9 +253,10 @@ def distribute(
 ) -> int:
     """Write the tensions `t` (n,) for W (d, n) and w_e (d,), and -(W t + w_e) as `missing` (d,).
 
-    `method` is one of the above. `bounds` (3, n) are the lower and upper ones and the wanted
-    tensions, `scale` (d,) the amount of a direction that counts as 1 N. `scaled` (d, n + 1),
-    `space` (n + 1, n) and `scratch` (4, m, m), m >= n and 8, are overwritten. Returns the outcome.
+    `method` is one of the constants above. Rows of `bounds` (3, n) are lower bounds, upper bounds
+    and wanted tensions. `scale` (d,) is the size of a wrench in each direction that counts as 1 N.
+    `scaled` (d, n + 1), `space` (n + 1, n) and `scratch` (4, m, m), m >= n and 8, are overwritten.
+    Returns the outcome.
     """
     n = space.shape[1]
     rank = null_space(W, w_e, scale, bounds, scaled, space, scratch) if t.size == n else -1
@@ -280,7 +280,7 @@ def distribute(
 
 
 _BY_NAME = {
-    "minimum-norm": MINIMUM_DEVIATION,  # from no tensions
+    "minimum-norm": MINIMUM_DEVIATION,  # deviation from zero
     "minimum-deviation": MINIMUM_DEVIATION,
     "closed-form": CLOSED_FORM,
     "polygon-centroid": CENTROID,
@@ -292,9 +292,9 @@ _OUTCOMES = tuple(TensionOutcome)  # members of an enumeration are slow to look 
 class TensionSolver:
     """Tensions that carry a wrench within their bounds, by one method.
 
-    Keeps nothing from one call to the next: the same W, w_e and bounds give the same tensions.
-    `low`, `high` and `wanted` (n,), N, may be changed in place between calls, for example for a cut
-    cable (0 to 0). By default the wanted tensions are the middle of the bounds.
+    It has no memory: the same W, w_e and bounds always give the same tensions. `low`, `high` and
+    `wanted` (n,), N, may be changed in place between calls, for example for a cut cable (0 to 0).
+    By default the wanted tensions are the middle of the bounds.
     """
 
     def __init__(
@@ -307,9 +307,9 @@ class TensionSolver:
     ) -> None:
         """Take the bounds (n,) and, for the d <= n controlled directions, `wrench_scale` (d,).
 
-        `method` is one of `METHODS`; "minimum-deviation" takes `wanted_N` (n,).
-        `wrench_scale` is the amount of each direction that counts as 1 N if a wrench cannot be
-        carried: 1 for a force and a characteristic length, m, for a moment.
+        `method` is one of `METHODS`; "minimum-deviation" takes `wanted_N` (n,). `wrench_scale` is
+        the size of a wrench in each direction that counts as 1 N, for use if no tensions carry the
+        wrench: 1 for a force and a characteristic length, m, for a moment.
         """
         low, high = np.array(low_N, float), np.array(high_N, float)
         if wanted_N is None:
@@ -327,8 +327,8 @@ class TensionSolver:
     def solve(self, W: FloatArray, w_e: FloatArray, t_out: FloatArray) -> TensionOutcome:
         """Write the tensions (n,) for W (d, n) and w_e (d,) into `t_out`.
 
-        All are float64 in C order: another layout is compiled on its first use. `missing` then
-        belongs to these tensions.
+        All arrays are float64 in C order; the first call with another layout compiles the kernel
+        again. Afterwards `missing` belongs to these tensions.
         """
         outcome = distribute(
             self._method, W, w_e, self.wrench_scale, self._bounds, self._scaled, self._space,

@@ -17,7 +17,7 @@ from cdpr_rt.jit import jit
 NOTHING: Final = 1e-9
 """A row of N, or the remainder of a unit normal, shorter than this counts as zero."""
 _BOUNDS = 1e-12
-"""Share of the largest tension by which a bound may be missed."""
+"""Share of the largest tension by which a tension may violate its bound."""
 
 
 @jit
@@ -32,8 +32,8 @@ def project(
 
     `space` (n + 1, n) and `bounds` (3, n) are those of `null_space`, with `r` null directions.
     `scratch` (4, m, m) is overwritten; m is at least n and at least 8. Returns False if no tensions
-    are within their bounds. Then `t` has the cables whose bounds contradict each other at these
-    bounds, and all other cables within theirs.
+    are within their bounds. Then the tensions whose bounds contradict each other are at these
+    bounds, and all other tensions are within theirs.
     """
     cable, active = _search(space, r, bounds, t, scratch)
     if cable < 0:
@@ -57,10 +57,10 @@ def write_margins(
     """Write the margins of tensions to all their bounds, at m poses under k wrenches each.
 
     `spaces` (m, n + 1, n), `particular` (m, k, n) and `null_directions` (m,) are those of
-    `null_spaces`, `bounds` (3, n) as in `project`. `margins` (m,) are those of the worst wrench, at
-    most `most`, N: below zero by how much some tension must be outside, -inf if the cables
-    cannot hold one direction. `tensions` (m, n) are that wrench's, with that margin. `shrunk`
-    (3, n) and `scratch` (4, l, l), l >= n and 8, are overwritten.
+    `null_spaces`, `bounds` (3, n) as in `project`. `margins` (m,) are those of the worst wrench, N,
+    at most `most`. A negative margin is the amount by which some tension must be outside its
+    bounds; -inf means that the cables cannot hold a direction. `tensions` (m, n) have that margin
+    and carry that wrench. `shrunk` (3, n) and `scratch` (4, l, l), l >= n and 8, are overwritten.
     """
     n = spaces.shape[2]
     for j in range(margins.size):
@@ -93,8 +93,9 @@ def _margin(
 ) -> float:
     """Return the greatest margin up to `most` to all bounds, and write tensions (n,) that have it.
 
-    Tensions are written if the margin is less than `most`, or if `written`. Margins are tried from
-    above, each a vertex of the dual, which has finitely many.
+    Tensions are written if the margin is less than `most`, or if `written` is true. Margins are
+    tried from the highest. Each is a vertex of the dual problem, and the number of vertices is
+    finite.
     """
     n = space.shape[1]
     found, margin = shrunk[3], most
@@ -109,7 +110,7 @@ def _margin(
             break
         side = 1.0 if found[cable] < shrunk[0, cable] else -1.0
         before, margin = margin, _most_margin(space, r, bounds, cable, side, active, scratch)
-        if not margin < before:  # only rounding
+        if not margin < before:  # the difference is only rounding
             margin = before
             break
     if margin < most or written:
@@ -130,9 +131,9 @@ def _most_margin(
 ) -> float:
     """Return the greatest margin by which contradicting bounds can be moved inward.
 
-    The bounds are those of `_search`; the `cable` among them is below (`side` 1.0) or above (-1.0)
-    its bound. With the weights y of the contradiction, sum of y_i (e_i + margin) = 0, e_i being how
-    far inside t0 bound i lies.
+    The bounds are those of `_search`. The tension of `cable` is below (`side` 1.0) or above (-1.0)
+    its bound. The contradiction has weights y, with sum of y_i (e_i + margin) = 0. Here e_i is how
+    far t0 is inside bound i.
     """
     length = 0.0
     for k in range(r):
@@ -160,9 +161,10 @@ def _search(
 ) -> tuple[int, int]:
     """Write t = t0 + N'x nearest to the wanted tensions, adding violated bounds one by one.
 
-    Returns the cable of the bound that contradicts others, -1 if none does, and the number of
-    those: in `scratch`, [3, 7] has their cables, [3, 4] the parts of its normal along theirs, which
-    are columns of [0]. The number is 0 if no null direction moves the cable.
+    Returns the cable whose bound contradicts others, -1 if there is no contradiction, and the
+    number of these other bounds. In `scratch`, [3, 7] has the cables of the others, the columns of
+    [0] are their normals, and [3, 4] has the coefficients of the cable's normal in terms of these.
+    The number is 0 if no null direction changes the cable's tension.
     """
     x, unit = scratch[3, 0], scratch[3, 1]
     tolerance = start(space, r, bounds, x)
@@ -189,7 +191,7 @@ def _search(
 
 @jit
 def start(space: FloatArray, r: int, bounds: FloatArray, x: FloatArray) -> float:
-    """Write the lambda x (r,) of the tensions nearest to the wanted ones, whatever their bounds.
+    """Write the lambda x (r,) of the tensions nearest to the wanted ones, ignoring the bounds.
 
     Returns the tolerance of the bounds.
     """
@@ -215,7 +217,8 @@ def furthest_outside(
 ) -> tuple[int, float]:
     """Write t = t0 + N'x; return the cable furthest outside its bounds and by how much.
 
-    Positive if the tension must grow. The cable is -1 if all are within.
+    The amount is positive if the tension must grow. The cable is -1 if all tensions are within
+    bounds.
     """
     cable, worst = -1, 0.0
     for i in range(space.shape[1]):
@@ -232,7 +235,7 @@ def furthest_outside(
 def gram_schmidt(
     unit: FloatArray, r: int, Q: FloatArray, active: int, c: FloatArray, z: FloatArray
 ) -> float:
-    """Write c = Q'unit and z = unit - Q c, by Gram and Schmidt twice; return the length of z."""
+    """Write c = Q'unit and z = unit - Q c by Gram-Schmidt, twice; return the length of z."""
     for k in range(r):
         z[k] = unit[k]
     for j in range(active):
@@ -260,7 +263,7 @@ def _contradict(
     step: FloatArray,
     cables: FloatArray,
 ) -> None:
-    """Put the cables that contradict each other on their bounds, all others between theirs."""
+    """Set tensions with contradicting bounds to these bounds, and clip all others to theirs."""
     for i in range(t.size):
         bound = bounds[0, i] if t[i] < 0.5 * (bounds[0, i] + bounds[1, i]) else bounds[1, i]
         contradicts = i == cable
@@ -275,10 +278,10 @@ def _add(
 ) -> tuple[int, bool]:
     """Move `x` (r,) until the constraint with normal `unit`, `distance` away, holds and is active.
 
-    Constraints that would have to push the other way are dropped first. Returns the number of
-    constraints then active, and False if they leave no room for the new one. In `scratch`: [0] the
-    active normals as columns, [1] an orthonormal basis Q of them, [2] the U with which they are
-    Q U, [3] vectors; the last one has the cables of the active constraints and of this one.
+    Constraints whose multipliers would become negative are dropped first. Returns the number of
+    active constraints, and False if the new one contradicts them. `scratch` contains: [0] the
+    active normals as columns, [1] an orthonormal basis Q of these, [2] the factor U, normals = Q U,
+    [3] vectors; the last one has the cables of the active constraints and of the new one.
     """
     normals, Q, U = scratch[0], scratch[1], scratch[2]
     multipliers, c, step, z = scratch[3, 2], scratch[3, 3], scratch[3, 4], scratch[3, 5]
@@ -353,12 +356,12 @@ def _drop(
     return active - 1
 
 
-# Check of tensions; if none within bounds carry the wrench, the nearest ones.
+# Check of tensions; if no tensions within bounds carry the wrench, those that come nearest.
 
 _ROUNDING = 1e-9
-"""Share of the terms of a wrench that may be missing from it."""
+"""Allowed error of the wrench, as a share of its largest terms."""
 _INDEPENDENT = 1e-9
-"""Share of a column that must be independent of those that are already free."""
+"""Share of a column that must be independent of the columns of the free cables."""
 
 
 @jit
@@ -373,9 +376,9 @@ def nearest_wrench(
 ) -> bool:
     """Check the tensions `t` (n,), or replace them by those with A t nearest to b.
 
-    `scaled` = [A b] (d, n + 1), A = W/scale and b = -w_e/scale, is that of `null_space`, as are the
-    `bounds` (3, n). If `found`, `t` is only clipped to its bounds because of rounding; else it is
-    the start: the search begins with the cables between their bounds as free. Writes
+    `scaled` = [A b] (d, n + 1), with A = W/scale and b = -w_e/scale, and `bounds` (3, n) are those
+    of `null_space`. If `found`, `t` is only clipped to its bounds, because of rounding. Otherwise
+    `t` is the start of the search, and the cables between their bounds are free at first. Writes
     `missing` = -(W t + w_e) (d,). `scratch` (4, m, m), m >= n and 8, is overwritten. Returns
     whether the wrench is exerted.
     """
@@ -409,7 +412,7 @@ def _missing(scaled: FloatArray, t: FloatArray, missing: FloatArray) -> float:
 
 @jit
 def _gradient(scaled: FloatArray, missing: FloatArray, i: int) -> float:
-    """Return a'(b - A t), a the column of cable `i`."""
+    """Return a'(b - A t), where a is the column of cable `i`."""
     pull = 0.0
     for k in range(missing.size):
         pull += scaled[k, i] * missing[k]
@@ -420,14 +423,14 @@ def _gradient(scaled: FloatArray, missing: FloatArray, i: int) -> float:
 def _bounded_least_squares(
     scaled: FloatArray, bounds: FloatArray, t: FloatArray, missing: FloatArray, scratch: FloatArray
 ) -> None:
-    """Move `t`, within its bounds, to the t within them of the least |A t - b|.
+    """Move `t` to the tensions within bounds that minimise |A t - b|.
 
-    The active set of Lawson and Hanson (1974) with two bounds (Stark and Parker, 1995): the cable
-    whose tension should leave its bound most is freed; the free ones take the least-squares
-    solution, or as much of the way to it as their bounds allow, which stops one of them again.
-    |A t - b| falls strictly, so no set of free cables comes twice. In `scratch`: rows of [0] an
-    orthonormal basis Q of the free columns, [1] the U with which they are Q U, [2] vectors: free
-    cables, barred cables, lengths of their columns, steps.
+    The method is the active set of Lawson and Hanson (1974) with two bounds (Stark and Parker,
+    1995). In each step it frees the cable with the largest gradient away from its bound. The free
+    tensions move to their least-squares solution, or as far towards it as the bounds allow; then
+    one of them is fixed again. |A t - b| falls strictly, so no set of free cables occurs twice.
+    `scratch` contains: [0] an orthonormal basis Q of the free columns, as rows, [1] the factor U,
+    columns = Q U, [2] vectors: free cables, barred cables, lengths of the columns, steps.
     """
     d, n = missing.size, t.size
     free, barred, length = scratch[2, 0], scratch[2, 1], scratch[2, 2]
@@ -454,7 +457,7 @@ def _bounded_least_squares(
         if _append(scaled, cable, count, d, scratch):
             free[count] = cable
             count = _step_towards(scaled, bounds, t, missing, count + 1, scratch)
-        if t[cable] == was:  # rounding: it cannot leave its bound
+        if t[cable] == was:  # due to rounding, this tension cannot leave its bound
             barred[cable] = 1.0
         else:
             for i in range(n):
@@ -465,9 +468,10 @@ def _bounded_least_squares(
 def _free_at_start(
     scaled: FloatArray, bounds: FloatArray, t: FloatArray, missing: FloatArray, scratch: FloatArray
 ) -> int:
-    """Free the cables between their bounds, and stop all together that would not stay there.
+    """Free the cables between their bounds, and fix all whose solution would be outside.
 
-    Repeated with the remaining ones until all of them stay. Returns how many are free.
+    This is repeated with the remaining ones until all solutions are within bounds. Returns the
+    number of free cables.
     """
     d, free, step = missing.size, scratch[2, 0], scratch[2, 3]
     while True:
@@ -491,7 +495,7 @@ def _free_at_start(
 
 @jit
 def _append(scaled: FloatArray, cable: int, count: int, d: int, scratch: FloatArray) -> bool:
-    """Add a cable's column to the factors Q U of `count` others; False if it depends on them."""
+    """Add a cable's column to the factors Q U of `count` others; False if it depends on these."""
     Q, U = scratch[0], scratch[1]
     before = scratch[2, 2, cable]
     for k in range(d):
@@ -499,7 +503,7 @@ def _append(scaled: FloatArray, cable: int, count: int, d: int, scratch: FloatAr
     for m in range(count):
         U[m, count] = 0.0
     left = before
-    while True:  # Gram and Schmidt, again if digits were lost
+    while True:  # Gram-Schmidt, repeated if digits were lost
         square = 0.0
         for m in range(count):
             product = 0.0
@@ -531,7 +535,7 @@ def _step_towards(
     count: int,
     scratch: FloatArray,
 ) -> int:
-    """Move the free tensions to their least-squares solution within bounds; return how many are."""
+    """Move the free tensions towards their least-squares solution; return how many stay free."""
     free, step, d = scratch[2, 0], scratch[2, 3], missing.size
     while count > 0:
         _least_squares(missing, count, scratch)

@@ -1,10 +1,10 @@
-"""Tensions of a loop in one cycle: those that carry the platform, plus the loop's force.
+"""Tensions of a control loop in one cycle: those that carry the platform, plus the loop's force.
 
-The tensions of the known wrench, weight and acceleration, are the ones within the planned bounds
-nearest to slowly varying wanted ones. Those with the loop's force are the ones nearest to them,
-within bounds that a reserve makes wider. Within the reserve, tensions change immediately with the
-force. Additional tightening follows slowly, because tensions that followed every swing of the force
-would form a second loop.
+The feed-forward tensions carry the known wrench of weight and acceleration. They are within the
+planned bounds, and as near as possible to wanted tensions that vary slowly. The tensions that also
+exert the loop's force are as near as possible to these, within bounds that are wider by a reserve.
+Within the reserve, tensions follow the force immediately. Further tightening follows slowly,
+because tensions that followed each oscillation of the force would form a second loop.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from cdpr_rt.model.tension_qp import nearest_wrench, project
 FAST = 0.85
 """Share of the reserve that a loop's force may use immediately."""
 _SLOW = 0.5
-"""Share of it beyond which the cables are tightened or slackened for it."""
+"""Share of the reserve beyond which the force makes the loop tighten or slacken the cables."""
 OK, INFEASIBLE, SINGULAR = 0, 1, 2
 
 
@@ -45,12 +45,13 @@ def split(
 ) -> tuple[int, float, int]:
     """Write tensions `t` (n,) that exert `force` (d,) in addition to carrying `feedforward` (d,).
 
-    `plan` (2, n) are the planned bounds. `slow_tensions` (n,), kept from cycle to cycle, go by
-    `slow_share` of the way to what the force needs. `feedforward_tensions` (n,) are written, or
-    taken if they are `external`. `missing` (d,) is the part of the wrench that is not exerted; if
-    it is not 0, `t` comes nearest to the wrench. The arrays after it are overwritten, as in
-    `null_space`. Returns OK, INFEASIBLE if nothing within the plan carries `feedforward`, or
-    SINGULAR; the share of the force exerted; the null directions in `space`.
+    `plan` (2, n) are the planned bounds. `slow_tensions` (n,) are kept from cycle to cycle; each
+    cycle moves them by `slow_share` of the distance to the tensions that the force needs.
+    `feedforward_tensions` (n,) are written, or read if they are `external`. `missing` (d,) is the
+    part of the wrench that is not exerted; if it is not 0, `t` exerts the nearest wrench. The
+    arrays after it are overwritten, as in `null_space`. Returns OK, INFEASIBLE if no tensions
+    within the plan carry `feedforward`, or SINGULAR; the share of the force exerted; and the number
+    of null directions in `space`.
     """
     d, n = W.shape
     for k in range(d):

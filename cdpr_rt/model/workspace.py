@@ -26,11 +26,11 @@ SHARES = np.linspace(0.0, 1.0, 33)
 
 
 class CableWorkspace:
-    """Wrench-feasible workspace: poses at which tensions within bounds carry each of some wrenches.
+    """Wrench-feasible workspace: poses at which tensions within bounds carry given wrenches.
 
     The margin of a pose is the greatest distance, N, that all tensions can keep from both their
-    bounds while they carry the worst of the wrenches: W t + w_e = 0, eq. (3.80). If negative, some
-    tension has to be outside by that much.
+    bounds while they carry the worst of the wrenches: W t + w_e = 0, eq. (3.80). If it is negative,
+    some tension must be outside its bounds by that much.
     """
 
     def __init__(
@@ -46,20 +46,22 @@ class CableWorkspace:
     ) -> None:
         """Take wrenches (k, d) on the platform without the cables, and the tensions' bounds (n,).
 
-        To each of them any sum a_k g_k of the `generators` g (j, d) may be added, |a_k| <= 1.
+        Any sum of a_k g_k, with |a_k| <= 1 and the `generators` g (j, d), may be added to each
+        wrench.
 
-        If those act at another point than the platform's origin, `centre_m` (3,) is that point in
-        the platform's frame, and the kinematics are those about it: then weight is the same however
-        the platform is turned. Poses are still those of the origin.
+        If the wrenches are about another point than the platform's origin, `centre_m` (3,) is that
+        point in the platform's frame, and the kinematics are about that point. If it is the centre
+        of mass, the wrench of the weight does not depend on the orientation. Poses are still those
+        of the origin.
 
-        A `reserve_N` to both bounds is left for effects that no plan includes; `wrench_scale` (d,)
-        is that of `TensionDistribution`.
+        The tensions keep `reserve_N` from both bounds, for effects that planning omits;
+        `wrench_scale` (d,) is that of `TensionDistribution`.
         """
         self.kinematics, self.reserve_N = kinematics, reserve_N
         first = np.atleast_2d(np.asarray(wrenches, float))
         added = np.zeros((0, first.shape[1])) if generators is None else generators
         self.wrenches = corners(first, added)
-        """The corners of all these wrenches, (c, d)."""
+        """The corners of the set of all wrenches with generators, (c, d)."""
         low, high = np.asarray(low_N, float) + reserve_N, np.asarray(high_N, float) - reserve_N
         self.sets = WrenchSets(
             np.zeros(3) if centre_m is None else np.array(centre_m, float),
@@ -72,7 +74,7 @@ class CableWorkspace:
         self._there = Pose(np.zeros(3))
 
     def prepared(self) -> CableWorkspace:
-        """Return it after preparing all arrays and kernels that cycles need."""
+        """Prepare all arrays and kernels that cycles need; return this object."""
         self._one, self._way  # noqa: B018
         return self
 
@@ -96,10 +98,10 @@ class CableWorkspace:
         return tried.margins, tried.tensions
 
     def capacity_margins(self, poses: FloatArray, least_N: float = -math.inf) -> FloatArray:
-        """Return the same margins (m,) alone, in closed form up to d + 2 cables.
+        """Return the margins (m,) of `margins` alone, in closed form up to d + 2 cables.
 
-        That is some ten times as fast. A margin below `least_N` may be less still: if only
-        feasibility matters, give the required margin.
+        This is about ten times as fast. If a returned margin is below `least_N`, the true one may
+        be lower still. If only feasibility matters, set `least_N` to the required margin.
         """
         if self.kinematics.n - len(self.kinematics.directions) > MOST_NULL_DIRECTIONS:
             return self.margins(poses)[0]
@@ -114,25 +116,25 @@ class CableWorkspace:
         return margins
 
     def wrench_matrices(self, poses: FloatArray) -> FloatArray:
-        """Return the W (m, d, n) of tensions at the poses, about the wrenches' point."""
+        """Return W (m, d, n) at the poses, about the point of the wrenches."""
         d, n = len(self.kinematics.directions), self.kinematics.n
         matrices = np.zeros((len(poses), d, n))
         self.kinematics.wrench_matrices(self._centred(poses), matrices)
         return matrices
 
     def hanging_wrenches(self, poses: FloatArray) -> FloatArray:
-        """Return what the cables' own weight adds to the wrenches at the poses, (m, d)."""
+        """Return the wrenches (m, d) of the cables' weight at the poses."""
         return self.kinematics.hanging_wrenches(self._centred(poses))
 
     def _centred(self, poses: FloatArray) -> FloatArray:
-        """Return the poses (m, 4, 3) of the wrenches' point."""
+        """Return the poses (m, 4, 3) of the point of the wrenches."""
         centred = np.array(poses, float)
         if self.sets.centre.any():
             centred[:, 0] += centred[:, 1:] @ self.sets.centre
         return centred
 
     def is_feasible(self, pose: Pose) -> bool:
-        """Return whether the platform is held at a pose; once `prepared` allocates no arrays."""
+        """Return whether the cables hold the platform; if `prepared`, allocate no arrays."""
         self._one.poses[0] = pose.array
         self._one.run_margins()
         return bool(self._one.margins[0] >= 0.0)
@@ -147,9 +149,10 @@ class CableWorkspace:
         return f"{why} (with a reserve of {self.reserve_N:.1f} N)" if self.reserve_N else why
 
     def first_infeasible(self, poses: FloatArray) -> tuple[Pose, str] | None:
-        """Return the first of the poses (33, 4, 3) of a way that is not held, and why; or None.
+        """Return the first infeasible pose among `poses` (33, 4, 3) of a way, and why; or None.
 
-        A way may leave a start that is not held. The pose is overwritten by the next call.
+        A way may begin at an infeasible pose and leave it. The pose is overwritten by the next
+        call.
         """
         self._way.poses[:] = poses
         self._way.run_margins()
@@ -200,7 +203,7 @@ class _Pass:
         self._write_margins()
 
     def run_margins(self) -> None:
-        """Write margins of `poses`, exact in their signs; in closed form up to d + 2 cables."""
+        """Write margins of `poses` whose signs are exact; in closed form up to d + 2 cables."""
         if self._circuits is None:
             self.run()
             return
@@ -219,7 +222,7 @@ class _Pass:
 def infeasibility_text(
     margin_N: float, tension_N: FloatArray, low_N: FloatArray, high_N: FloatArray
 ) -> str:
-    """Return as text why tensions (n,) are not feasible that are outside by a negative margin."""
+    """Return a text that says why tensions (n,) with a negative margin are infeasible."""
     if not math.isfinite(margin_N):
         return "the cables cannot hold one direction with any tensions"
     i = int(np.argmax(np.maximum(low_N - tension_N, tension_N - high_N)))
@@ -245,9 +248,10 @@ def wrenches_in_motion(
 ) -> tuple[FloatArray, FloatArray]:
     """Return the wrenches on a platform accelerated along all directions: w (1, d), g (j, d).
 
-    The weight against coordinate `up`. Either sign of each acceleration along the controlled
-    positions, and of the moments `turning_Nm` (3, 3), a row for the angular acceleration about each
-    axis, may be added to it; this includes rest. All about the centre of mass.
+    w is the weight, which acts against coordinate `up`. The generators g are the forces that
+    accelerate along each controlled coordinate, and the moments `turning_Nm` (3, 3), whose rows
+    belong to the angular acceleration about each axis. The set includes rest. All wrenches are
+    about the centre of mass.
     """
     motions = [np.eye(6)[i] * mass_kg * acceleration_m_s2 for i in directions if i < 3]
     if turning_Nm is not None and turning_Nm.any():

@@ -1,4 +1,4 @@
-"""The whole workspace: by a grid, by rays from its centre, its surface."""
+"""The whole workspace: as a grid, as rays from a centre, and its surface."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ from cdpr_rt.model.statics import Box, PlatformStatics
 
 @dataclass(frozen=True)
 class Criterion:
-    """The cables hold the platform at a place, at every one of some orientations.
+    """Criterion of a workspace: cables hold the platform at a position in all orientations.
 
-    All tensions carry the weight, with accelerations up to `acceleration_m_s2` and the same share
-    of the file's angular acceleration, and keep at least `least_N` from their bounds. At 0 m/s2
-    that is the static workspace, else the wrench-feasible one; at one orientation the workspace of
-    constant orientation, at several the total orientation workspace of these. It can be passed to
-    other processes.
+    Tensions carry the weight, with accelerations up to `acceleration_m_s2` and the same share of
+    the file's angular acceleration, and keep at least `least_N` from their bounds. At 0 m/s2 this
+    gives the static workspace, otherwise the wrench-feasible one. With one orientation it is the
+    constant-orientation workspace, with several the total-orientation workspace of these. The
+    object can be passed to other processes.
     """
 
     platform: Platform
@@ -39,14 +39,14 @@ class Criterion:
     """Rotation vectors from home's orientation."""
     least_N: float = 0.0
     contact_free: bool = False
-    """Whether a place must also be reached straight from the centre without contact: cables,
-    body and obstacles keep the clearance of the robot's file at each of the orientations."""
+    """Whether the straight way from the centre to a position must also be free of contact: cables,
+    body and obstacles keep the clearance of the robot's file in each orientation."""
 
     def depths(self, points: FloatArray) -> FloatArray:
-        """Return how far places (m, k) are inside, N, (m,): the margin less `least_N`.
+        """Return how far positions (m, k) are inside, N, (m,): the margin minus `least_N`.
 
-        Of the worst orientation; below zero outside, -inf if no tensions hold some direction.
-        Contact is ignored.
+        The margin is that of the worst orientation. The result is negative outside, and -inf if the
+        cables cannot hold some direction. Contact is ignored.
         """
         statics = self._statics
         workspace = statics.model.workspace(self.acceleration_m_s2, 0.0)
@@ -57,11 +57,12 @@ class Criterion:
         return np.asarray(np.min(found, axis=0) - self.least_N)
 
     def clear_shares(self, centre_m: FloatArray, ends_m: FloatArray) -> FloatArray:
-        """Return the shares (m,) of straight ways from a centre to places that are free of contact.
+        """Return the contact-free shares (m,) of straight ways from a centre to positions.
 
-        At constant orientation, of the worst one; 0 if something is in contact at the centre.
-        Two cables that meet pass through each other within millimetres, so places alone, however
-        close, would not show on which side they are.
+        Orientation is constant on a way; the share is that of the worst orientation. It is 0 if
+        things are in contact at the centre. Whole ways are checked because crossing cables are in
+        contact for a few millimetres only: contact checks at single positions, however dense, could
+        miss the crossing.
         """
         shares = np.ones(len(ends_m))
         model = self._statics.model
@@ -102,7 +103,8 @@ def criterion_of(
 def turns_within(platform: Platform, angle_rad: float) -> FloatArray:
     """Return rotation vectors (k, 3) that represent all up to an angle from home's orientation.
 
-    Zero; then those of the angle and of half of it, about each controlled axis and the diagonals.
+    The first is zero. The others have the full angle and half of it, about each controlled axis and
+    the diagonals between them.
     """
     whole = orientations(replace(platform, workspace_angle_rad=angle_rad))
     return np.concatenate([whole, 0.5 * whole[1:]])
@@ -115,13 +117,15 @@ def _statics(
     return PlatformStatics(platform_model(platform, np.array(low_N), np.array(high_N)))
 
 
-# Surface, volume and area of where values on a grid are not negative, by linear interpolation.
+# Surface, volume and area of the region in which values on a grid, interpolated linearly, are not
+# negative.
 
 Triangles = NDArray[np.int64]
 """Triples of vertices, anticlockwise as seen from outside, (f, 3)."""
 _OUTSIDE = 1e3
 _APART = 1e-3
-"""Share of an edge that a crossing keeps from its ends, so that no two of them coincide."""
+"""Least distance of a crossing from both ends of its edge, as a share of the edge, so that no two
+crossings coincide."""
 _CORNERS = np.array([(0, 0, 0), (1, 0, 0), (1, 1, 0), (1, 1, 1)])
 
 
@@ -130,9 +134,9 @@ def isosurface(
 ) -> tuple[FloatArray, Triangles]:
     """Return vertices (v, 3) and triangles of the closed surface around values (a, b, c) >= 0.
 
-    Six tetrahedra along the diagonal of each cell are cut (marching tetrahedra): neighbours agree
-    on every face, whatever the values, so there are no gaps. At the grid's sides the surface is
-    closed.
+    Each cell is divided into six tetrahedra around its diagonal (marching tetrahedra). Neighbours
+    agree on every face for all values, so there are no gaps. The surface is closed at the sides of
+    the grid.
     """
     outside = _outside(values)
     padded = np.pad(np.nan_to_num(values, neginf=outside), 1, constant_values=outside)
@@ -173,13 +177,13 @@ def area(values: FloatArray, cell_m2: float) -> float:
 
 
 def _outside(values: FloatArray) -> float:
-    """Return a value for outside that suits any neighbour."""
+    """Return a negative value for nodes outside the grid that suits any neighbour."""
     finite = np.abs(values[np.isfinite(values)])
     return -_OUTSIDE * max(float(finite.max(initial=0.0)), 1e-9)
 
 
 def _share(corners: FloatArray) -> FloatArray:
-    """Return the share of each triangle that is not negative; its values ascend, (3, m)."""
+    """Return the nonnegative share of each triangle; values at its `corners` (3, m) ascend."""
     a, b, c = corners
     with np.errstate(divide="ignore", invalid="ignore"):
         one, two = c * c / ((c - a) * (c - b)), 1.0 - a * a / ((a - b) * (a - c))
@@ -199,7 +203,7 @@ def _is_even(axes: tuple[int, ...]) -> bool:
 def _cut(
     tetrahedra: NDArray[np.int64], inside: NDArray[np.bool_], even: bool
 ) -> list[NDArray[np.int64]]:
-    """Return the triangles of all tetrahedra (t, 4) that are cut: (f, 3, 2) ends of edges."""
+    """Return the triangles of all cut tetrahedra (t, 4): (f, 3, 2), both ends of each edge."""
     code = inside[tetrahedra] @ np.array([1, 2, 4, 8])
     found = []
     for case, triangles in _CASES.items():
@@ -211,7 +215,7 @@ def _cut(
 
 
 def _cases() -> dict[int, list[list[tuple[int, int]]]]:
-    """Return the triangles for each set of corners of a tetrahedron inside, seen from outside."""
+    """Return the triangles for each set of a tetrahedron's corners inside, as seen from outside."""
     cases: dict[int, list[list[tuple[int, int]]]] = {}
     for case in range(1, 15):
         ins = [k for k in range(4) if case >> k & 1]
@@ -235,7 +239,8 @@ def _normal(edges: list[tuple[int, int]]) -> FloatArray:
 _CASES = _cases()
 
 
-# The border of a workspace along rays from its centre, eq. (3.35) as a search, section 3.4.2.
+# The border of a workspace along rays from its centre, found by a search for eq. (3.35), section
+# 3.4.2.
 
 _STEPS = 64
 _EXACT_m = 1e-4
@@ -253,8 +258,8 @@ class RayJob:
     def run(self) -> FloatArray:
         """Return the length of each ray up to its first exit from the workspace, m, (m,).
 
-        Within 0.1 mm, except that gaps narrower than 1/64 of the ray may be missed, but no contact;
-        the centre has to be inside.
+        The result is exact within 0.1 mm. The search may miss gaps narrower than 1/64 of the ray,
+        but no contact. The centre has to be inside.
         """
         reach = reaches(self.centre_m, self.directions, self.box)
         inside, outside = np.zeros(len(reach)), np.full(len(reach), np.inf)
@@ -279,7 +284,7 @@ class RayJob:
 
 @dataclass(frozen=True)
 class Rays:
-    """The border of the part of a workspace that straight lines from a centre reach."""
+    """The border of the part of a workspace that can be reached on straight lines from a centre."""
 
     centre_m: FloatArray
     directions: FloatArray
@@ -309,10 +314,7 @@ class Rays:
         return 0.5 * math.sin(turn) * float(self.lengths_m @ np.roll(self.lengths_m, -1))
 
     def reach_m(self, points: FloatArray) -> FloatArray:
-        """Return the reach in the directions of points (m, k): the longest of the nearest rays.
-
-        The number of nearest rays is that of the coordinates.
-        """
+        """Return the reach towards points (m, k): the longest of the k nearest rays."""
         ways = points - self.centre_m
         away = np.maximum(np.linalg.norm(ways, axis=1, keepdims=True), 1e-12)
         _, nearest = cKDTree(self.directions).query(ways / away, k=len(self.centre_m))
@@ -320,7 +322,7 @@ class Rays:
 
 
 def directions(count: int, dimensions: int) -> FloatArray:
-    """Return unit vectors (count, k) spread evenly: in space a Fibonacci lattice."""
+    """Return evenly spread unit vectors (count, k), in space by a Fibonacci lattice."""
     k = np.arange(count, dtype=np.float64)
     if dimensions == 2:
         angle = 2.0 * math.pi * k / count
@@ -331,7 +333,7 @@ def directions(count: int, dimensions: int) -> FloatArray:
 
 
 def reaches(centre_m: FloatArray, directions: FloatArray, box: Box) -> FloatArray:
-    """Return how far rays from a centre within a box go before they leave the box, m, (m,)."""
+    """Return the distances (m,), m, at which rays from a centre inside a box leave the box."""
     sides = np.where(directions > 0.0, np.array(box.high_m), np.array(box.low_m)) - centre_m
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.asarray(
@@ -339,38 +341,38 @@ def reaches(centre_m: FloatArray, directions: FloatArray, box: Box) -> FloatArra
         )
 
 
-# A workspace by the places of a grid, as ARACHNIS does it in the thesis, section 3.4.2.
+# A workspace as the positions of a grid, as ARACHNIS computes it in the thesis, section 3.4.2.
 
 
 @dataclass(frozen=True)
 class GridJob:
-    """Some places (m, k) of a grid."""
+    """Some positions (m, k) of a grid."""
 
     criterion: Criterion
     points: FloatArray
 
     def run(self) -> FloatArray:
-        """Return how far they are inside, N, (m,)."""
+        """Return how far the positions are inside the workspace, N, (m,)."""
         return self.criterion.depths(self.points)
 
 
 @dataclass(frozen=True)
 class WayJob:
-    """Straight ways from a centre (k,) to some places (m, k) of a grid."""
+    """Straight ways from a centre (k,) to some positions (m, k) of a grid."""
 
     criterion: Criterion
     centre_m: FloatArray
     points: FloatArray
 
     def run(self) -> FloatArray:
-        """Return 1 if the way is free of contact, else -1, (m,)."""
+        """Return 1 for a way without contact, otherwise -1, (m,)."""
         shares = self.criterion.clear_shares(self.centre_m, self.points)
         return np.where(shares < 1.0, -1.0, 1.0)
 
 
 @dataclass(frozen=True)
 class Grid:
-    """Places that fill a box, sides included, and how far each of them is inside.
+    """Positions that fill a box, sides included, and how far each is inside the workspace.
 
     `depths` (a, b) or (a, b, c), N, as in `Criterion.depths`, go along x, y and z.
     """
@@ -391,7 +393,7 @@ class Grid:
 
     @property
     def deepest(self) -> tuple[FloatArray, float]:
-        """The place (k,) that is furthest inside, and how far, N."""
+        """The position (k,) that is furthest inside, and how far it is inside, N."""
         k = int(self.depths.argmax())
         return self.points[k], float(self.depths.flat[k])
 
@@ -409,7 +411,7 @@ class Grid:
 
     @property
     def cut(self) -> list[str]:
-        """The sides of the box that the workspace reaches and may cross, as `x low` and so on."""
+        """The sides of the box, such as `x low`, that the workspace reaches and may cross."""
         sides = []
         for k, name in zip(range(self.depths.ndim), "xyz", strict=False):
             for end, where in ((0, "low"), (-1, "high")):
@@ -418,10 +420,9 @@ class Grid:
         return sides
 
     def unseen_share(self, rays: Rays) -> float:
-        """Return the share of the places inside that no straight line from the centre reaches.
+        """Return the share of the positions inside that no straight line from the centre reaches.
 
-        Only places that are farther out than the nearest rays, by more than a diagonal of a cell,
-        count.
+        These are positions farther out than the nearest rays by more than the diagonal of a cell.
         """
         inside = self.points[self.depths.ravel() >= 0.0]
         if not len(inside):
@@ -432,12 +433,12 @@ class Grid:
 
 
 def shape_of(box: Box, cells: int) -> tuple[int, ...]:
-    """Return the number of places along each coordinate for `cells` along the longest side."""
+    """Return the number of positions along each coordinate for `cells` along the longest side."""
     sides = np.subtract(box.high_m, box.low_m)
     return tuple(max(1, math.ceil(cells * side / sides.max() - 1e-9)) + 1 for side in sides)
 
 
 def grid_points(box: Box, shape: Sequence[int]) -> FloatArray:
-    """Return the places (m, k) of a grid, the last coordinate changing first."""
+    """Return the positions (m, k) of a grid; the last coordinate changes first."""
     sides = [np.linspace(*side) for side in zip(box.low_m, box.high_m, shape, strict=True)]
     return np.stack(np.meshgrid(*sides, indexing="ij"), axis=-1).reshape(-1, len(shape))
