@@ -288,8 +288,8 @@ def _keep_by_content(kernel: Any) -> None:
 def _rebuild(target_context: Any, payload: Any) -> Any:
     """Return the compile result of a cached kernel; parse its bitcode only if it is needed.
 
-    numba parses the bitcode of each kernel when it loads it, which doubles to triples the loading
-    time. Only kernels that call this one, and are compiled later, need the bitcode.
+    numba parses the bitcode of each kernel when it loads it, which takes twice as long as all other
+    loading. Only kernels that call this one, and are compiled later, need the bitcode.
     """
     (name, kind, (machine_code, bitcode)), described, *others = payload
     engine = target_context.codegen()._engine

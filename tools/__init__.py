@@ -7,8 +7,8 @@ import os
 _M_MMAP_THRESHOLD = -3
 _LARGE_BYTES = 1 << 20
 
-# Before numpy is loaded: the matrices are small, and threads of the algebra library that spin
-# while idle would take the core that controller and simulator share in lockstep.
+# Set this before numpy is loaded: the matrices are small, and idle threads of the algebra library
+# spin, which would take the core that controller and simulator share in lockstep.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 # glibc keeps memory freed by large arrays unless the threshold for "large" is set; a value set
 # by the user takes precedence, for example on machines with slow page faults.

@@ -129,14 +129,14 @@ ALIASES = {
     "robot list": "profiles list robots",
     "robot check": "robot show",
 }
-"""What users of other controllers type, and the command that runs instead, never one that moves."""
+"""What users of other controllers type, and the command that runs instead; it never moves."""
 GUESSES = {
     "goto": "this moves the robot: type `cdpr move --to X Y [Z]`",
     "home": "this moves the robot: `cdpr lower` puts the platform on its stand",
     "gui": "`cdpr page` prints the address of a running robot's page for a browser, and "
     "`cdpr run ROBOT --open` starts a robot and opens it",
 }
-"""What users type for something that moves, or does not exist, and the answer."""
+"""What users type for commands that move or do not exist, and the answer."""
 STOPS = """Which stop do I want? In danger: the emergency-stop button, no command.
 
 hold     brake; the motors hold the position           power stays on
@@ -273,7 +273,7 @@ def main() -> None:
 
 
 def _with_help(text: str, context: Any) -> str:
-    """Return a message about the command line in one line, and where to look for what to do."""
+    """Return a message about the command line in one line, and where to find the solution."""
     text = " ".join(text.split()).removesuffix(".")
     if context is None or text.endswith("?") or "allowed: " in text:
         return text

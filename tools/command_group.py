@@ -49,10 +49,10 @@ def _unwrap(command: Any) -> None:
 
 
 def _accept_robot_option(command: Any) -> None:
-    """Let `--robot ROBOT` stand for the first argument of a command that is a robot.
+    """Accept `--robot ROBOT` as the first argument of a command if that argument is a robot.
 
-    If another argument follows it and is a choice, ROBOT_VARIABLE stands for a robot that is left
-    out; for other commands the argument itself reads the variable.
+    If the next argument is a choice and the robot is omitted, ROBOT_VARIABLE replaces it. For other
+    commands, the argument itself reads the variable.
     """
     arguments = [param for param in command.params if param.param_type_name == "argument"]
     is_option = any("--robot" in param.opts for param in command.params)
@@ -92,12 +92,12 @@ def _robot_option(args: Sequence[str]) -> tuple[str | None, list[str]]:
 
 
 def _no_type(ctx: Any) -> None:
-    """Return the type of an argument that the help shows: none, its name says enough."""
+    """Return no type for an argument in the help, because its name says enough."""
     del ctx
 
 
 def _shorten(param: Any) -> None:
-    """Show the kind of a value by one word at most, and its range with the explanation."""
+    """Show at most one word for the kind of a value; show its range in the explanation."""
     kind = param.type_descriptor
     if param.param_type_name == "argument":
         param.metavar = param.metavar or str(param.name).upper()

@@ -120,7 +120,7 @@ class _Notice(logging.Handler):
 
 
 def announce_compiling(what: str = "the numerics") -> None:
-    """Report from now on when kernels must be compiled; `what` names them all."""
+    """Report from now on when kernels must be compiled; `what` describes these in the message."""
     _share_with_children()
     _LOG.handlers[:] = [_Notice(what)]
     _LOG.propagate = False

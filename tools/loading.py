@@ -1,4 +1,4 @@
-"""Load libraries: soon, and with a notice on a terminal if it takes a moment."""
+"""Load libraries: quickly, and with a notice on a terminal if it takes a moment."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ _TEXT, _WIPE = "loading ...", "\r\x1b[K"
 
 @contextmanager
 def without_collection() -> Iterator[None]:
-    """Load modules in the block without searching for garbage, which takes a tenth of the time.
+    """Load modules in the block without garbage collection, which would take a tenth of the time.
 
-    What the first block of a process has loaded, the collector never searches.
+    The collector never searches what the first block of a process has loaded.
     """
     enabled = gc.isenabled()
     gc.disable()
@@ -33,7 +33,7 @@ def without_collection() -> Iterator[None]:
 
 @contextmanager
 def loading_notice() -> Iterator[None]:
-    """Show it on a terminal soon after the block begins, and erase it at the end."""
+    """Show a notice on a terminal if the block takes a moment, and erase it at the end."""
     # a shell that requests completions has its line there
     if not sys.stderr.isatty() or "_CDPR_COMPLETE" in os.environ or os.getenv("TERM") == "dumb":
         yield

@@ -243,7 +243,7 @@ class LockstepRobot:
         self.right: RightInBusTime
         """The right to move, and who holds it."""
         self.folder: Path
-        """For the robot's temporary files, while it is open."""
+        """Folder for the robot's temporary files, while it is open."""
         self.stream: StreamInBusTime
         """Takes the packets of set-point streams."""
         self.cells: OwnLoadCells
@@ -333,7 +333,7 @@ class LockstepRobot:
 
     @property
     def now_ns(self) -> int:
-        """The same in ns."""
+        """Bus time since cycles began, in ns."""
         device = self.machine.device  # not by `now_s`: it is read several times a cycle
         return 0 if device is None else round(device.feedback.cycle * self.period_s * 1e9)
 

@@ -95,7 +95,7 @@ def _fold_line(line: str, width: int) -> str:
 
 
 def _folded(text: Text, width: int | None) -> Text:
-    """Return a styled text folded like its letters."""
+    """Return a styled text, folded at the same places as its plain text."""
     lines, end = [], 0
     for line in fold(text.plain, width).split("\n"):
         words = line.lstrip(" ")
@@ -325,7 +325,7 @@ class Advance:
         self._begun_s = time.monotonic()
 
     def __call__(self, time_s: float) -> None:
-        """Set the progress to `time_s` seconds; 0 starts the work after any wait."""
+        """Set the progress to `time_s` seconds; 0 marks the start of the work after any wait."""
         if not time_s:
             self._begun_s = time.monotonic()
         self.done = time_s

@@ -150,9 +150,9 @@ def module_command(module: str, *arguments: str) -> list[str]:
 
 
 def end_by_stdin(process: subprocess.Popen[Any], timeout_s: float) -> None:
-    """Close the standard input of a process that ends with it; kill it if it does not in time.
+    """Close the standard input of a process that ends with it; kill it if it does not end in time.
 
-    An interrupt kills it too. Its pipes are read while it runs, then closed; its own children
+    An interrupt kills it too. Its pipes are read while it runs, then closed. Its own children
     may keep them open.
     """
     with process:

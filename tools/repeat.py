@@ -86,7 +86,7 @@ class Stops:
     """Descriptor of the process that is stopped at present."""
 
     def turn(self, processes: Sequence[int]) -> None:
-        """Do the stops and continuations due; `processes` are those that may be stopped."""
+        """Stop and continue processes when due; `processes` are those that may be stopped."""
         now_s = time.monotonic()
         if now_s < self._next_s:
             return
@@ -120,16 +120,16 @@ class Run:
     number: int
     """Number, from 1."""
     folder: Path
-    """Its working folder, whose files are compared."""
+    """Working folder of the run, whose files are compared."""
     output: Path
-    """Its standard output and standard error."""
+    """Standard output and standard error of the run."""
     exit_status: int
     seconds: float
     processes: frozenset[int]
-    """Their ids, which may occur in names."""
+    """Process ids of the run, which may occur in names."""
     stops: int
     held_s: float
-    """Total time in which one of them was stopped."""
+    """Total time for which a process of the run was stopped."""
 
 
 def run_once(
@@ -181,7 +181,7 @@ def _running(command: Sequence[str], work: Path, out: int) -> Iterator[subproces
         words = [str(Path(command[0]).absolute()), *command[1:]]
     path = f"{Path(sys.executable).parent}:{os.environ.get('PATH', os.defpath)}"
     environment = {**os.environ, "PATH": path, _LOG_KEY: str(work / FRAMES)}
-    environment["XDG_STATE_HOME"] = str(work / "state")  # no run knows the results of another
+    environment["XDG_STATE_HOME"] = str(work / "state")  # no run may use the results of another
     with os_error_as(BadInputError, f"{words[0]}: cannot be run"):
         process = subprocess.Popen(
             words,
@@ -331,11 +331,11 @@ class Verdict:
     """Result of the comparison of one file."""
 
     file: str
-    """Its name in its run's folder, without the time of day and process ids."""
+    """Name of the file in its run's folder, without the time of day and process ids."""
     same: bool | None
-    """Whether it is the same in all runs; None if it is not compared."""
+    """Whether the file is the same in all runs; None if it is not compared."""
     hashes: Sequence[str]
-    """One for each run that has the file."""
+    """One hash for each run that has the file."""
     difference: str = ""
     """The first difference, as text."""
 

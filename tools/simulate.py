@@ -53,7 +53,7 @@ def simulate(
         with ExitStack() as stack, without_collection():
             simulator = LockstepSimulator(load_robot(robot), str(robot), plant_file)
             stack.callback(simulator.stop)
-            # imported here, while the simulator starts: both take as long
+            # imported here, while the simulator starts: both take equally long
             from cdpr_rt.model.own_distribution import (  # noqa: PLC0415
                 checked_distribution,
                 require_code_allowed,

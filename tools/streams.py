@@ -115,7 +115,7 @@ _guarded: dict[int, _Standard] = {}
 def guard_streams() -> None:
     """Let this process survive the loss of its standard output and error; call it first.
 
-    A closed descriptor then leads to /dev/null: no bus or file gets its number.
+    A closed descriptor then leads to /dev/null, so that no bus or file gets its number.
     """
     for number in range(_ERROR + 1):
         try:

@@ -1,1 +1,1 @@
-"""Benchmarks of the project's own cost, each compared with something that anyone can check."""
+"""Benchmarks of this software's own cost, each compared with something that anyone can check."""

@@ -97,7 +97,7 @@ class DoNothing(PoseController):
 
 
 def measure(starts: int, cycles: int, seconds: float, out: Output) -> Figures:
-    """Measure `starts` first moves each way, `cycles` cycles in lockstep, and `seconds` paced.
+    """Measure `starts` first moves in each way, `cycles` cycles in lockstep, and `seconds` paced.
 
     Raises WorkFailedError if a script fails.
     """
@@ -128,7 +128,7 @@ def measure(starts: int, cycles: int, seconds: float, out: Output) -> Figures:
 
 
 def _starts(count: int, folder: Path, out: Output) -> dict[str, Row]:
-    """Run the script with each way; a daemon moves in real time, so it runs only once."""
+    """Run the script in each way; with a daemon only once, because a daemon moves in real time."""
     robot = with_tolerant_limits(load_robot(ROBOT), folder)
     figures = {}
     for name, how, of, times in (

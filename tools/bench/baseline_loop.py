@@ -77,7 +77,7 @@ def measure(robot: Robot, seconds: float, speed_rad_s: float) -> dict[str, Any]:
 def simulator(robot: Robot) -> Iterator[str]:
     """Run a simulator of the robot in a separate process; yield its bus.
 
-    Its drives answer in time on a busy machine, as real drives do, if the system allows that.
+    If the system allows it, the drives answer in time even on a busy machine, as real drives do.
     """
     bus = f"simbus:bench-{os.getpid()}-{next(_numbers)}"
     own = OwnSimulator(robot.reference, bus, paced=True)
@@ -173,7 +173,7 @@ class CanopenAxes:
 
 
 class _Control:
-    """Cyclic torque control of all axes: a PID in arrays, limits checked, each cycle kept."""
+    """Cyclic torque control of all axes: a PID in arrays; checks limits and records each cycle."""
 
     def __init__(self, robot: Robot, cycles: int) -> None:
         # all axes are equal

@@ -65,7 +65,7 @@ def measure(exchanges: int, out: Output) -> Figures:
 
 
 def measure_vcan(exchanges: int, out: Output) -> dict[str, Row]:
-    """Return the rows of a virtual CAN."""
+    """Return the rows of a virtual CAN interface."""
     with _far_end(str(VCAN)) as ready, one_core(int(ready["pid"])):
         return compare(VCAN, exchanges, out, channel=VCAN.channel)
 

@@ -31,7 +31,7 @@ _NOISE_rad = 3e-4
 
 
 def measure(name: str, cycles: int, out: Output) -> Figures:
-    """Run both for `cycles` updates, with the same set-points and noisy angles of the motors.
+    """Run both controllers for `cycles` updates, with the same set-points and noisy motor angles.
 
     Raises GeometryError for a robot without a platform, or one that the baseline cannot compute.
     """
@@ -202,7 +202,7 @@ class PlainControl:
         return self._cables(self.p, self.Q)[1]
 
     def _tensions(self, W: FloatArray, wrench: FloatArray) -> FloatArray:
-        """Return the tensions within bounds nearest to the least ones: W t + wrench = 0.
+        """Return the tensions within bounds nearest to the lower bounds, with W t + wrench = 0.
 
         It is a least-distance problem, solved by non-negative least squares: Lawson and Hanson
         (1974), 23.4.

@@ -59,7 +59,7 @@ def measure(cycles: int, out: Output) -> Figures:
 
 
 def _counted(way: Way, bus: str, frames: list[int]) -> Way:
-    """Return the same way, but add the bus' counts to `frames`: all frames, and SYNCs."""
+    """Return `way` with the counts of the bus, all frames and SYNCs, added to `frames`."""
 
     @contextmanager
     def joined() -> Iterator[Iterator[Work]]:

@@ -26,7 +26,7 @@ from cdpr_tools.output import Output
 ROBOT = "bench-8"
 ROUNDS = 3
 SLOWER = 4
-"""Factor by which the baseline loop also runs slower: at 1 kHz it has no idle time, and its cost
+"""Factor by which the baseline loop also runs slower. At 1 kHz it has no idle time, so its cost
 could not be measured."""
 _SCHEDULED = 2  # CPUCLOCK_SCHED: as the scheduler counts, to the nanosecond
 _SPEED_RAD_S, _TO_AND_FRO_RAD, _BOX_SHARE = 1.0, 3.0, 0.25
@@ -111,7 +111,7 @@ def with_tolerant_limits(robot: Robot, folder: Path) -> Robot:
 def daemon(robot: Robot, seconds: float, folder: Path, controller: str | None = None) -> Run:
     """Run `cdpr run` for a while, with its recording and a client of the live view.
 
-    `controller` is one of a user's, as for `cdpr run`.
+    `controller` is the user's, as for `cdpr run`.
     """
     record = folder / f"recordings-{time.monotonic_ns()}"
     with (
@@ -160,7 +160,7 @@ def _motion(robot: Robot, handle: RobotHandle) -> Iterator[None]:
 
 
 def _processor_time_s(pid: int) -> float:
-    """Return the processor time of all threads of a process, past ones included."""
+    """Return the processor time of all threads of a process, including threads that have ended."""
     # id of the process' clock as from clock_getcpuclockid, which Python does not offer
     return time.clock_gettime_ns((~pid << 3) | _SCHEDULED) * 1e-9
 

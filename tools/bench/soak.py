@@ -30,7 +30,7 @@ LEG_S, _RAMP_S = 60.0, 0.5
 _WARM_UP_CYCLES = 12_000  # until every row of the recorder's ring has been written once
 _SPEED_RAD_S = 1.0
 _TORQUE_SHARE = 0.5
-# phase of the loop's natural frequency over the delay of one and a half cycles, in rad
+# phase, in rad, of the loop's natural frequency during the delay of one and a half cycles
 _PHASE = 0.25
 
 
@@ -103,7 +103,7 @@ def compare(
 
 
 def growth(samples: Sequence[Process]) -> Process:
-    """Return a process' growth: the minimum of the second half minus that of the first half."""
+    """Return a process' memory growth: the minimum of the second half minus that of the first."""
     middle = len(samples) // 2
     first, later = samples[:middle], samples[middle:]
     return Process(
@@ -135,7 +135,7 @@ class Soak:
     def run(
         self, seconds: float, advance: Callable[[float], None], most_wall_s: float = math.inf
     ) -> None:
-        """Move for `seconds` of bus time, or until the leg in which `most_wall_s` have passed.
+        """Move for `seconds` of bus time, or to the end of the leg after `most_wall_s`.
 
         Raises WorkFailedError if the motion ends early.
         """

@@ -81,7 +81,8 @@ class FrameSource:
     def ask(self) -> dict[str, float] | None:
         """Return the report of a simulated bus, None for any other bus; raises BusError.
 
-        `frames` and `bus_time_s` since this client joined, and whether it is `led`.
+        The report has `frames` and `bus_time_s` since this client joined, and whether the bus is
+        `led`.
         """
         before = self._port.status
         if not before:
@@ -114,7 +115,7 @@ class Summary:
     time_s: float | None = None
     """Duration of the traffic, if it is known from another source than the time stamps."""
     untimed: bool = False
-    """Whether the time stamps are not those of the traffic and its duration is unknown."""
+    """Whether the time stamps are not those of the traffic, so that its duration is unknown."""
     missed: int | None = None
     """Frames that the monitor missed, if known."""
     led: bool | None = None
@@ -141,7 +142,7 @@ class Summary:
 
     @property
     def load(self) -> float | None:
-        """Return the share of time that the wire was busy at most; None without a duration."""
+        """Return the largest share of time for which the wire was busy; None without a duration."""
         return self.bits / self.bitrate_bit_s / self.duration_s if self._has_rates else None
 
     @property
@@ -363,7 +364,7 @@ _USUAL_BITRATE_bit_s = 1_000_000
 
 @dataclass(frozen=True)
 class KnownBus:
-    """Knowledge about a bus before any frame arrives."""
+    """What is known about a bus before any frame arrives."""
 
     nodes: dict[int, KnownNode] = field(default_factory=dict)
     others: KnownNode | None = None
@@ -377,7 +378,7 @@ class KnownBus:
 def known_bus(
     url: BusUrl | None, drive: str | None, winch: str | None, robot: str | None
 ) -> KnownBus:
-    """Return the content of the named profile for a bus; `url` is None for a file.
+    """Return what the named profile says about a bus; `url` is None for a file.
 
     Raises BadInputError, ProfileError.
     """
@@ -400,7 +401,7 @@ def _bitrate(url: BusUrl | None, otherwise: int) -> int:
 
 
 def _of_robot(robot: Robot, name: str, url: BusUrl | None) -> KnownBus:
-    """Return one bus of a robot, or all if no node id identifies one."""
+    """Return one bus of a robot, or all together if no bus is named and their node ids differ."""
     buses = {bus.name: bus for bus in robot.buses}
     if name and name not in buses:
         allowed = " or ".join(f"--robot {robot.reference}:{one}" for one in buses)

@@ -26,7 +26,7 @@ from cdpr_tools.errors import BadInputError, WorkFailedError, raised_as
 _LOOK_S = 0.1
 _MOST_LINE = 4096
 BLOCK = 200
-"""Frames to show together, so that a long file is read fast."""
+"""Number of frames to show together; this speeds up long files."""
 _DISABLE_VOLTAGE = bytes.fromhex("2B40600000000000")
 """SDO request that writes 0 to the controlword (6040h)."""
 _SDO_REQUEST, _NODE, _FUNCTION = 0x600, 0x07F, 0x780
@@ -193,9 +193,9 @@ class Pacer:
 
 
 class Sender:
-    """Sends recorded frames to a bus; leaves no node with power that the frames may have enabled.
+    """Sends recorded frames to a bus; at the end it cuts the power that they may have switched on.
 
-    It requests power-off if the recording was not sent completely, and always on a real bus.
+    It requests this if the recording was not sent completely, and always on a real bus.
     """
 
     def __init__(self, url: BusUrl, note: Callable[[str], None]) -> None:
@@ -228,7 +228,7 @@ class Sender:
         """Request power-off of every node that was commanded."""
         asked = []
         for node_id in sorted(self._commanded):
-            # a lost bus carries nothing; the drives monitor for that
+            # on a lost bus nothing can be sent; its drives miss the master and stop
             with suppress(OSError):
                 self._port.send(Frame(0.0, _SDO_REQUEST + node_id, _DISABLE_VOLTAGE).pack())
                 asked.append(str(node_id))
@@ -261,7 +261,9 @@ def play(
     sender: Sender | None = None,
     block: int = 1,
 ) -> None:
-    """Show, and send, a recording until it or the user ends it, `block` frames at a time.
+    """Show a recording, and send it if there is a `sender`, until its end or the user's request.
+
+    Frames are processed `block` at a time.
 
     Raises WorkFailedError if sending ended early.
     """

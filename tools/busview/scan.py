@@ -205,7 +205,7 @@ class Scan(BusMember):
 
     def _request(self, found: NodeInfo, data: bytes) -> None:
         if data[0] == ABORT and not found.in_segments:
-            return  # it could only end another master's transfer
+            return  # this abort could only end another master's transfer
         found.in_segments = data[0] & 0xEF == _NEXT_SEGMENT
         found.asked[data[1:4] if data[0] == 0x40 else _SEGMENT] += data[0] != ABORT
         self.send(REQUEST + found.node_id, data)

@@ -26,7 +26,7 @@ from cdpr_tools.errors import BadInputError, CommandError
 from cdpr_tools.output import Output
 
 Measure = Callable[[FloatArray], ArrayLike | None]
-"""Returns the measured position of the platform's origin (k,), m, which stands near the given one.
+"""Takes the approximate position of the platform's origin (k,), m; returns the measured one.
 
 nan is an unknown coordinate, None an unknown position.
 """
@@ -52,7 +52,7 @@ def calibrate(
     and tensions there, and is held at the last pose. At each pose `measured` is called with the
     position by the cables, (k,), m. It returns the position from your measuring device, (k,), m,
     or None. `measured_std_m` is the standard deviation of a coordinate. Without `measured` the
-    result knows neither the room nor the scale.
+    data determine neither the position in the room nor the scale.
 
     `poses` is a number, or a file that `cdpr poses` wrote; by default as many as improve the
     result. `identify` and `known_exit_m` are as `--identify` and `--known-mm`. Data and report go
@@ -121,7 +121,7 @@ def _poses_in(
 def _asking(
     operator: PoseOperator, measured: Measure | None, std_m: float, path: Path
 ) -> daemon_run.Ask:
-    """Return what stores the measured position at a pose, counted from 1."""
+    """Return a function that stores the measured position at a pose, counted from 1."""
     if measured is None:
         return lambda _pose: None
     k = operator.directions.k

@@ -48,7 +48,7 @@ _LEAST = 5
 _SAME_mm = 0.01
 """Exit points of a repeated fit that differ by no more than this count as unchanged."""
 _SHARE = 1.0 / 3.0
-"""Share of the largest acceptable error; a change with a smaller effect does not matter yet."""
+"""Share of the largest acceptable error; a change with a smaller effect is still tolerated."""
 
 
 @dataclass(frozen=True)
@@ -143,7 +143,7 @@ def checked(
 def checked_running(
     out: Output, file: Robot, daemon: Daemon, camera: str | None, seed: int, folder: Path
 ) -> Check:
-    """Check the robot that a daemon runs with that calibration, starting at home.
+    """Check the robot that a daemon runs with its calibration in force, starting at home.
 
     `camera` is the URL of a camera, if there is one. Also raises CommandError.
     """

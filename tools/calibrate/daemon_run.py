@@ -326,8 +326,9 @@ _DOUBTFUL_m: Final = 0.2
 
 
 def require_points_of(poses: int, path: Path) -> None:
-    """Raise BadInputError if a file has points of poses that have not been read; raises
-    ProfileError.
+    """Raise BadInputError if a file has points of poses that have not been read.
+
+    Also raises ProfileError.
 
     They were measured at poses of an earlier run, whose data are no longer in the folder.
     """

@@ -85,7 +85,7 @@ def with_hand_eye(data: CalibrationData, known: HandEye | None) -> CalibrationDa
 def stop_criterion(
     out: Output, robot: Robot, points: Path | None, geometry: CableGeometry
 ) -> Callable[[CalibrationData], str | None]:
-    """Return the check after each batch: it reports faults and whether the poses suffice."""
+    """Return the check to run after each batch; it reports faults and whether the poses suffice."""
     named: set[str] = set()
 
     def check(data: CalibrationData) -> str | None:

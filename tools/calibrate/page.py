@@ -38,7 +38,7 @@ from cdpr_tools.report.style import (
 _COLOURS = 10
 """Largest number of cables that strong colours alone distinguish."""
 _PLACED_m = 0.5
-"""Standard deviation of a marker's position from which the marker counts as left out of the fit."""
+"""A marker whose position has a larger standard deviation counts as left out of the fit."""
 _ARROW_m = 0.08
 """Length at which an error of typical size is drawn."""
 _FINE, _COARSE = 15, 3
@@ -79,7 +79,7 @@ def found_figure(outcome: Outcome) -> Figure:
 
 
 def map_figure(outcome: Outcome, comparison: TruthComparison | None) -> Figure:
-    """Draw how well positions are known across the workspace, from above and from a side."""
+    """Draw how accurate positions are across the workspace, from above and from a side."""
     platform = outcome.found.geometry.model.platform
     views = [(0, 1)] if len(platform.home_m) == 2 else [(0, 1), (0, 2)]
     figure, axes = canvas(1, len(views), height=3.2)
@@ -97,7 +97,7 @@ def map_figure(outcome: Outcome, comparison: TruthComparison | None) -> Figure:
 
 
 def _shade(ax: Axes, outcome: Outcome, view: tuple[int, int]) -> QuadMesh:
-    """Draw the predicted position error, the worst along the third axis."""
+    """Draw the predicted position error; along the third axis, the worst counts."""
     geometry = outcome.found.geometry
     platform, k = geometry.model.platform, geometry.coordinates
     axes = [

@@ -21,7 +21,7 @@ from cdpr_tools.errors import BadInputError
 from cdpr_tools.robots.pose_choice import KINDS, Choose, choose, read_poses
 
 MOST_POSES = 100
-"""Used if the user gives no number."""
+"""Largest number of poses, if the user gives none."""
 _MOST_ASKED, _SPARE = 1000, 10
 """Largest number that a user may ask for, and spare poses for those that the robot refuses."""
 BATCH = 10
@@ -36,8 +36,8 @@ class Places:
     """Places (m, d), the most informative first, and the place from which they are reached."""
 
     middle: FloatArray
-    """(d,); on the ways from here to chosen places and back there is no contact, and the cables can
-    hold the platform."""
+    """(d,); from here to the chosen places and back, there is no contact and the cables can hold
+    the platform."""
     chosen: FloatArray
 
     def batches(self) -> Iterator[FloatArray]:

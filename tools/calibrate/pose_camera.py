@@ -133,7 +133,8 @@ class PoseCamera:
                 camera.close()
 
 
-# What a calibration knows beforehand about a simulated camera: its lens from a board, and sheets.
+# What a calibration knows beforehand about a simulated camera: its lens, fitted to images of a
+# board, and the marker sheets.
 
 _BOARD_IMAGES = 30
 _BOARD_BOX = Box((-0.08, -0.06, 0.25), (0.08, 0.06, 0.5), 40.0)

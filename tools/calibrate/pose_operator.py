@@ -43,7 +43,7 @@ _NO_POSE_MAKES: Final = frozenset(
         Limit.LATE,
     )
 )  # fmt: skip
-"""Limits whose violation has nothing to do with the pose."""
+"""Limits whose violation does not depend on the pose."""
 
 
 class StoppedError(Exception):

@@ -46,13 +46,13 @@ class OutsidePose(Profile):
     true_rotation: _Matrix
     position_m: _Vector | None = None
     position_std_m: float | None = None
-    """Of each coordinate."""
+    """Standard deviation of each coordinate."""
     rotation: _Matrix | None = None
     rotation_std_rad: float | None = None
-    """About each axis."""
+    """Standard deviation about each axis."""
 
     def with_truth_of(self, other: OutsidePose) -> OutsidePose:
-        """Return a copy with the true pose of another time."""
+        """Return a copy with the true pose of `other`, from another time."""
         of_other = ("true_position_m", "true_rotation")
         return self.model_copy(update={name: getattr(other, name) for name in of_other})
 
@@ -93,7 +93,7 @@ class ScannerTail:
         return (self._path.stat().st_size - _HEADER_BYTES) // self._dtype.itemsize
 
     def since(self, first: int) -> tuple[FloatArray, FloatArray]:
-        """Return positions (k, 3) and rotations (k, 3, 3) from a reading on."""
+        """Return positions (k, 3) and rotations (k, 3, 3) from reading `first` on."""
         offset = _HEADER_BYTES + first * self._dtype.itemsize
         rows = np.fromfile(self._path, self._dtype, count=self.count() - first, offset=offset)
         return np.array(rows["position_m"]), np.array(rows["rotation"])
@@ -143,7 +143,7 @@ class RigOperator(PoseOperator):
         return readings if seen is None else Readings(readings.length_m, readings.tension_N, *seen)
 
     def _scanned(self) -> tuple[FloatArray, float, FloatArray, float] | None:
-        """Return the scanner's mean pose since the platform stands, with standard deviations."""
+        """Return the scanner's mean pose since the platform stopped, with standard deviations."""
         position, rotation = self._scanner.since(self._standing or 0)
         if not len(position):
             return None
@@ -157,7 +157,7 @@ class RigOperator(PoseOperator):
     def outside(self) -> OutsidePose:
         """Return the true pose and the scanner's, which the calibration does not use.
 
-        The scanner's pose is the mean of its readings since the platform stands.
+        The scanner's pose is the mean of its readings since the platform came to rest.
         """
         truth, seen = self.rig.truth(), self._scanned()
         return OutsidePose(

@@ -58,7 +58,7 @@ DATA, SETTINGS, OUTSIDE, IMAGES = "data.json", "run.json", "outside.json", "imag
 POINTS = "points.csv"
 """Positions measured at the poses of `cdpr calibrate measure --ask`, or by hand."""
 COUNTED = "counted.json"
-"""Written by `cdpr calibrate read`; it marks a folder as one of poses read that way."""
+"""Written by `cdpr calibrate read`; it marks the folder of poses that this command has read."""
 _FIRST_S, _HELD_OUT_S = 8.0, 3.0
 
 PoseSource = Literal["camera", "scanner", "redundancy", "points"]
@@ -71,10 +71,10 @@ class CalibrationRunSettings(Profile):
     plant: str | None
     source: PoseSource
     poses: int | None = Field(ge=1)
-    """None: until more poses bring little."""
+    """Number of poses; None: until more poses improve the result only a little."""
     seed: int = Field(ge=0)
     places: tuple[Numbers, ...] | None = None
-    """(m, d), from a list; the run reads these and home only."""
+    """Listed places (m, d); the run reads only these and home."""
     points: str | None = None
     """File of measured positions, which a resumed run reads again."""
 
@@ -86,15 +86,15 @@ class CalibrationRunSettings(Profile):
         return places
 
     def save(self, folder: Path) -> None:
-        """Write them into the folder of the run; raises ProfileError."""
+        """Write the settings into the folder of the run; raises ProfileError."""
         write_text(folder / SETTINGS, self.model_dump_json(indent=1) + "\n")
 
     def resumed(
         self, poses: int | None, places: Listed | None, points: Path | None
     ) -> CalibrationRunSettings:
-        """Return them with another number or list of poses and other points, if given.
+        """Return the settings with another number or list of poses and other points, if given.
 
-        Raises BadInputError for a list if the run began without one, and the other way round.
+        Raises BadInputError for a list if the run began without one, and vice versa.
         """
         update: dict[str, object] = {}
         if points is not None:
@@ -110,7 +110,7 @@ class CalibrationRunSettings(Profile):
 
     @classmethod
     def load(cls, folder: Path) -> CalibrationRunSettings:
-        """Read them; raises ProfileError."""
+        """Read the settings; raises ProfileError."""
         return read_json_model(folder / SETTINGS, cls)
 
 
@@ -176,7 +176,7 @@ class StoredRun:
         return cls(folder, data.model_copy(update={"poses": data.poses[: len(outside)]}), outside)
 
     def done(self) -> set[tuple[float, ...]]:
-        """Return the targets (d,) that were read, or tried in vain."""
+        """Return the targets (d,) that were read, or tried without success."""
         return {reading.target for reading in self.data.poses} | set(self.data.tried)
 
     def remaining(self, places: Listed | None) -> Listed | None:
@@ -311,7 +311,7 @@ def truth_comparison_of(
 def truth_comparison_of_folder(
     robot: Robot, folder: Path
 ) -> Callable[[Outcome], TruthComparison] | None:
-    """Return that function for the folder of a run; None if it holds only readings."""
+    """Return the function for the folder of a run; None if the folder holds only readings."""
     if not (folder / SETTINGS).exists() or not (folder / OUTSIDE).exists():
         return None
     return truth_comparison_of(robot, CalibrationRunSettings.load(folder), folder)
@@ -425,11 +425,11 @@ class _Measuring:
 # Check the options of a run before anything moves.
 
 _METRES: Final = 300.0
-"""If all points are this many times nearer to the origin than targets, metres were typed."""
+"""If all points are nearer to the origin than targets by this factor, the user typed metres."""
 
 
 def points_of(path: Path, robot: Robot) -> list[MeasuredPoint]:
-    """Return the points of a file; raises BadInputError if metres were typed, ProfileError."""
+    """Return the points of a file; raises BadInputError if the user typed metres, ProfileError."""
     points, platform = load_points(path), robot.platform
     assert platform is not None  # callers have checked it
     box_m = np.abs([platform.workspace_min_m, platform.workspace_max_m])

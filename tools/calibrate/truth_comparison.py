@@ -48,7 +48,7 @@ class PoseErrors:
         return cls(poses[:, 0] - others[:, 0], turned, Scale.of(poses[:, 0], others[:, 0]))
 
     def as_json(self) -> dict[str, Any]:
-        """Return them for JSON."""
+        """Return the errors for JSON."""
         far_mm = 1e3 * np.linalg.norm(self.position_m, axis=1)
         turned_deg = np.degrees(np.linalg.norm(self.turn_rad, axis=1))
         return {
@@ -67,20 +67,20 @@ class TruthComparison:
     """Errors of a calibration against scanner and truth, on held-out poses."""
 
     scanner: PoseErrors
-    """Relative to the first pose."""
+    """Errors against the scanner, relative to the first pose."""
     scanner_before: PoseErrors
     """The same with the geometry of the robot's file."""
     scanner_alone: tuple[float, float]
     """Average share of the mean errors that the scanner's own errors cause, m and rad."""
     in_marker_frame: PoseErrors | None
-    """Against the scanner, in the frame of a marker."""
+    """Errors against the scanner, in the frame of a marker."""
     marker: int | None
     truth: PoseErrors
     absolute: PoseErrors
-    """Against the truth, in the frame of the robot's file."""
+    """Errors against the truth, in the frame of the robot's file."""
     absolute_before: PoseErrors
     index: IntArray
-    """Which poses they are, counted from 0."""
+    """Numbers of the poses, counted from 0."""
     places_m: FloatArray
     """True positions of the poses of `truth`, (M, 3)."""
     parameters: list[dict[str, Any]]
@@ -190,10 +190,11 @@ def _outside(outside: OutsidePoses, index: IntArray) -> tuple[FloatArray, FloatA
 def _scanner_alone(
     outside: OutsidePoses, index: IntArray, poses: FloatArray
 ) -> tuple[float, float]:
-    """Return the mean position and angle error, relative to the first pose, from its noise alone.
+    """Return the mean errors of position and angle that the scanner's noise alone would cause.
 
-    The length of a normal vector of standard deviation s is s sqrt(8/pi) on average; an angle
-    error at the first pose acts on the others in proportion to their distance.
+    Errors are relative to the first pose. The length of a normal vector of standard deviation s is
+    s sqrt(8/pi) on average. An angle error at the first pose acts on the others in proportion to
+    their distance.
     """
     stds = [(one.position_std_m or 0.0, one.rotation_std_rad or 0.0) for one in outside.poses]
     std_m, std_rad = np.array(stds)[index].T

@@ -124,7 +124,7 @@ class Daemon:
 
     @contextmanager
     def control(self) -> Iterator[str]:
-        """Hold the right to move in the block; yield its token. It is not renewed here."""
+        """Hold the right to move in the block; yield its token. This does not renew the right."""
         token = str(self.post("/control", {"ttl_s": _LEASE_S})["token"])
         try:
             yield token
@@ -286,7 +286,7 @@ def _only_socket(robot: str | None) -> Path:
             raise NoDaemonError(f"the daemon{whose} {what}: it does not answer")
         others = found_instead(live_sockets())
         raise NoDaemonError(f"no daemon runs{whose}; `cdpr run ROBOT` starts one{others}")
-    if robot is not None:  # this user's before the system's
+    if robot is not None:  # this user's daemons before the system's
         return found[0]
     names = ", ".join(path.stem for path in found)
     raise BadInputError(f"{len(found)} daemons run: choose one by --robot ({names})")

@@ -31,15 +31,15 @@ from cdpr_tools.output import Output
 
 _WATCH_S = 0.2
 _END_S = 90.0
-"""Time for the end, in addition to lowering a platform."""
+"""Longest time until a daemon has ended, without the time to lower a platform."""
 _LAUNCHER_S = 10.0
 """Once the loop has ended, a working launcher ends the service within this time."""
 
 
 def end_daemon(daemon: Daemon, out: Output, socket: Path | None) -> None:
-    """Request the end of the daemon and wait for it; raises WorkFailedError if it does not end.
+    """Request the end of the daemon and wait for it.
 
-    Raises it also if a drive may still have power.
+    Raises WorkFailedError if it does not end, or if a drive may still have power.
 
     `socket` is None for a daemon on another machine, which is known only by its answers.
     """
@@ -69,17 +69,17 @@ def end_daemon(daemon: Daemon, out: Output, socket: Path | None) -> None:
             out.say(told)
             return
         if has_died(status) and not had_died and not dies:
-            # if drives do not confirm, it ends with an error, which the service stays to report.
-            # If it ends normally, the end may be seen before the service has ended too.
+            # if drives do not confirm, the loop ends with an error, and the service stays to report
+            # it; otherwise its end may be visible before the service has also ended
             dies = str(status["reason"])
             with suppress(NoDaemonError):  # the next request detects it
                 daemon.post("/shutdown")
-        if status["state"] == DEAD:  # its launcher ends the rest
+        if status["state"] == DEAD:  # the launcher ends the other processes
             alone_at = min(alone_at, time.monotonic() + _LAUNCHER_S)
             if time.monotonic() > alone_at:
                 raise WorkFailedError(_without_launcher(daemon, status))
         if not had_died:
-            if status["state"] != DEAD:  # a drive may have fallen silent in the meantime
+            if status["state"] != DEAD:  # meanwhile a drive may have stopped answering
                 ended = status
             notes(status)
         time.sleep(_WATCH_S)
@@ -97,7 +97,7 @@ def _status_before_end(
 
 
 def _ask_to_end(daemon: Daemon, socket: Path | None) -> list[str]:
-    """Request the end of the daemon; return the actions on a loop whose service does not obey."""
+    """Request the end of the daemon; end it if its service does not obey, and return how."""
     try:
         daemon.post("/shutdown")
     except NoDaemonError as error:
@@ -128,6 +128,6 @@ def _unknown_end(error: Exception) -> str:
 
 
 def _without_launcher(daemon: Daemon, status: dict[str, Any]) -> str:
-    """Return the known facts of a daemon whose loop has ended and whose launcher does nothing."""
+    """Return what is known about a daemon whose loop has ended and whose launcher does nothing."""
     left = launcher_left(Path(daemon.where)) or "its launcher does not respond"
     return f"{status['reason']}; {power_text(status)}; {left}"

@@ -295,7 +295,7 @@ class _Remote:
         return status
 
     def _statuses(self, pause_s: float) -> Iterator[dict[str, Any]]:
-        """Yield statuses at this interval, as long as the loop runs and bus time advances."""
+        """Yield statuses at this interval while the loop runs and bus time advances."""
         last_s, passed_s = -1.0, time.monotonic()
         while True:
             status = self.status()
@@ -370,7 +370,7 @@ class _Remote:
             raise Error(f"{self.description['robot']}: its daemon does not record")
         until_ns, deadline = time.monotonic_ns(), time.monotonic() + _RECORDED_S
         while True:
-            time.sleep(_RECORD_S)  # the recorder writes data older than a second
+            time.sleep(_RECORD_S)  # the recorder writes data once they are a second old
             log = self._recorded(
                 Path(self._file), Path(last), {"stamp_ns": None, **dict.fromkeys(fields)}
             )
@@ -383,7 +383,7 @@ class _Remote:
 
     def _recorded(self, first: Path, last: Path, fields: Collection[str]) -> Row:
         """Return the rows since the handle was opened, from these recordings and those between."""
-        # loaded here: it takes pyarrow
+        # imported here: it needs pyarrow
         from cdpr_rt.service.recording_file import RecordingError  # noqa: PLC0415
         from cdpr_rt.service.recording_reader import RecordingReader  # noqa: PLC0415
 
@@ -495,9 +495,9 @@ class _DaemonProcess:
             raise
 
     def stop(self) -> None:
-        """End it under control and wait until it has ended; kill a daemon that hangs.
+        """End the daemon under control and wait until it has ended; kill a daemon that hangs.
 
-        A Ctrl-C takes effect afterwards. Raises Error if it does not confirm the power-off.
+        A Ctrl-C takes effect afterwards. Raises Error if the daemon does not confirm the power-off.
         """
         process, interrupted, status = self._process, False, None
         deadline = time.monotonic() + _END_S + self.lowering_s

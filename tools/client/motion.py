@@ -32,7 +32,7 @@ _SETTLE_S = 2.0
 
 
 class _OverError(Exception):
-    """The user requested the end of the motion, or its time is over."""
+    """The user has requested the end of the motion, or its time is up."""
 
 
 @dataclass
@@ -42,7 +42,7 @@ class Outcome:
     stopped: bool = False
     """Whether the user has stopped it."""
     ended: dict[str, Any] | None = None
-    """Its progress at its regular end; None if it was ended earlier."""
+    """The progress of the motion at its regular end; None if it was ended earlier."""
 
 
 def carry_out(
@@ -55,7 +55,7 @@ def carry_out(
 ) -> Outcome:
     """Run a motion on the daemon's robot; Ctrl-C ends it, and the robot holds.
 
-    It also ends after a given time. Raises the command's errors if something else ends it.
+    The motion also ends after `seconds`. Raises the command's errors if something else ends it.
     """
     outcome, notes, deadline = Outcome(), ProgressNotes(out), time.monotonic() + seconds
 
@@ -112,9 +112,9 @@ def finish(
     where: str = "",
     **figures: Any,
 ) -> None:
-    """Report where the platform or the axes are, once they have settled or a wait is over.
+    """Report where the platform or the axes are, once they have settled or a timeout has passed.
 
-    `where` is the text for the place at the regular end. Raises WorkFailedError if the user
+    `where` is the text to report after a regular end. Raises WorkFailedError if the user
     has stopped the motion, or a fault has ended it or is about to.
     """
     stopped, ended = outcome.stopped, outcome.ended

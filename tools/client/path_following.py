@@ -70,7 +70,7 @@ def plain_name(file: Path) -> str:
 
 
 def resume_path(opened: Opened, out: Output, back_mm: float | None, feed: float | None) -> None:
-    """Continue the interrupted path, or go back along it; by default at its last feed."""
+    """Continue the interrupted path, or move back along it; by default at its last feed."""
     with opened as daemon:
         _require_platform(daemon, out)
         where = {"resume": True} if back_mm is None else {"back_m": 1e-3 * back_mm}
@@ -109,7 +109,7 @@ def _require_platform(daemon: Daemon, out: Output) -> None:
 
 
 def require_held(status: dict[str, Any]) -> None:
-    """Raise WorkFailedError if the robot could not follow a path, before one is planned."""
+    """Raise WorkFailedError if the robot is in no state to follow a path, before one is planned."""
     state = str(status["state"])
     if state != "active":
         states = {"state": state, "allowed": ["active"]}

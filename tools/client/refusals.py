@@ -22,7 +22,7 @@ _KEYS: Final = {
     "duration_s": (1.0, "s", "--seconds"),
     "back_m": (_MM, "mm", "path back"),
 }
-"""By the key of a program: factor and unit of the command line, and the option, if any."""
+"""Factor and unit of the command line, and the option, if any, by the key of a program."""
 # what to do in a state in which a command was refused
 _REMEDIES: Final = {
     "unconfigured": "`cdpr status` gives the reason, `cdpr check` tries again",
@@ -41,7 +41,7 @@ class DaemonRefusalError(WorkFailedError):
 
     @classmethod
     def of(cls, refusal: CommandRefusal, text: str = "") -> Self:
-        """Return the error of a refusal, as its own text or `text`, with the remedy."""
+        """Return the error of a refusal: `text`, or its own text by default, and the remedy."""
         return cls((text or str(refusal)) + _remedy(refusal), refusal)
 
 
@@ -61,8 +61,8 @@ def in_typed_words(
 ) -> Iterator[None]:
     """Raise refusals in the block in terms of the typed `command`, or of the options in `asked`.
 
-    `axes` are their names, `words` replace arguments of the refusal. A number out of bounds
-    or a target outside the workspace is raised as BadInputError.
+    `axes` are the names of the axes; `words` replace arguments of the refusal. A number out of
+    bounds or a target outside the workspace is raised as BadInputError.
     """
     try:
         yield

@@ -16,7 +16,7 @@ from cdpr_tools.robots.calibration_text import calibration_text
 DEAD: Final = "dead"
 """The state that a daemon reports if its loop has died."""
 ENDED: Final = "the loop has ended"
-"""Reason of a dead loop for which no failure has been reported, or not yet."""
+"""Reason of a dead loop as long as no failure is reported."""
 
 
 def has_died(status: dict[str, Any]) -> bool:
@@ -28,7 +28,7 @@ def power_text(status: dict[str, Any]) -> str:
     """Return the known state of the drives' power since the loop died."""
     if status.get("read_only"):
         return "it only listened and commanded no drive"
-    if not status.get("driving") and not status.get("busy"):  # busy with giving or taking it
+    if not status.get("driving") and not status.get("busy"):  # busy switching power on or off
         return "its drives had been commanded to switch off"
     return "drives that had power stop without its heartbeat: check that they have stopped"
 
@@ -42,7 +42,7 @@ def death_text(status: dict[str, Any]) -> str:
 
 
 def after_stop_text(status: dict[str, Any]) -> str:
-    """Return that a daemon has ended, and the drives' power according to its last `status`."""
+    """Return that a daemon has ended, and the state of the drives' power in its last `status`."""
     if has_died(status):
         return f"ended; its loop had died: {power_text(status)}; next: `cdpr run` starts it again"
     if status["read_only"]:
@@ -216,7 +216,7 @@ def left_text(path: dict[str, Any]) -> str:
 
 
 def percent_text(path: dict[str, Any]) -> str:
-    """Return the completed share of a path."""
+    """Return the completed share of a path in percent."""
     return f"{100.0 * path['time_s'] / max(path['duration_s'], 1e-9):.0f} %"
 
 
@@ -258,10 +258,10 @@ _LOOSE_N = 1.0
 
 
 def next_steps(status: dict[str, Any]) -> list[str]:
-    """Return the steps, as lines with commands, before a robot can move; none if it can or moves.
+    """Return what to do before a robot can move, as lines with commands; none if it can or moves.
 
-    What is broken is what the controller knows: the cause of a fault, and cables that seemed
-    broken and were not tight since.
+    As broken it names what the controller knows: the cause of a fault, and cables that seemed
+    broken and have not been tight since.
     """
     state, last = status["state"], status.get("last_stop")
     if status["read_only"] or status.get("busy") or status.get("reacting", "none") != "none":
@@ -296,7 +296,7 @@ def next_steps(status: dict[str, Any]) -> list[str]:
 
 
 def put_back_text(status: dict[str, Any]) -> str:
-    """Return how to carry a simulated platform home after a fall, "" if it has not fallen."""
+    """Return how to carry a simulated platform home after a fall; "" if it has not fallen."""
     if not (is_simulated(status) and (status.get("last_stop") or {}).get("fallen")):
         return ""
     return f"`cdpr sim fault {status['robot']} put-back` carries the platform back to its start"

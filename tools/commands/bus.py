@@ -327,7 +327,7 @@ def _report(name: str, budgets: list[BusBudget]) -> list[str]:
 
 
 def _explanation(b: BusBudget) -> str:
-    """Return what the remaining time is needed for."""
+    """Return what needs the remaining time, as text."""
     text = (
         f"{b.bus}: heartbeats take {b.heartbeat_share * b.period_s * _US:.1f} us per "
         f"cycle; the remaining time is for computing, EMCY and {b.sdo_transfers_s:.0f} "

@@ -113,9 +113,9 @@ def _is_inside(position_m: Sequence[float], platform: dict[str, Any]) -> bool:
 
 
 def _meant_move(words: Sequence[str], relative: bool, daemon: Daemon) -> str:
-    """Return the command for a point that was typed in another way, "" if it is not clear.
+    """Return the command for a point that was typed in a wrong form; "" if it is unclear.
 
-    Coordinates that were left out are the present ones, within the box of targets.
+    Omitted coordinates are the present ones, within the box of targets.
     """
     platform, text = daemon.get("/description")["platform"], " ".join(words)
     names = _COORDINATES[len(platform["home_m"])]
@@ -270,7 +270,7 @@ def _step(daemon: Daemon, texts: Sequence[str]) -> PlatformMove | None:
 
 
 def _meant_step(words: Sequence[str], names: Sequence[str]) -> str:
-    """Return the command for a step that was typed in another way, "" if it is not clear."""
+    """Return the command for a step that was typed in a wrong form; "" if it is unclear."""
     meant = read_point(" ".join(words), names)
     step = " ".join(f"{name}={value:.6g}" for name, value in meant.items())
     return step and f"`cdpr jog {step}`"

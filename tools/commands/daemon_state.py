@@ -40,7 +40,7 @@ from cdpr_tools.signals import stop_on_signals
 
 _WATCH_S = 0.2
 _ANSWER_S = 10.0
-"""Longest time of an answer; a slower service hangs, and a signal then ends the loop."""
+"""Timeout of an answer; a slower service counts as hanging, and a signal ends the loop."""
 _BOOT_S = 60.0
 _BOOTING = ("unconfigured", "inactive")
 
@@ -228,7 +228,7 @@ def stop(
     try:
         with open_daemon(robot, socket, url, key_file, _ANSWER_S) as daemon:
             end_daemon(daemon, out, Path(daemon.where) if url is None else None)
-    except NoDaemonError:  # no request was sent yet
+    except NoDaemonError:  # no request has been sent yet
         if url is not None:  # the daemon may run on another machine
             raise
         ended = end_leftover_processes(robot, socket)

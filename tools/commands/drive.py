@@ -181,7 +181,7 @@ def jog(
 
 def _jog_controller(session: Session) -> Pid:
     motor, period = session.winch.motor, session.device.period_s
-    # with a soft loop, friction makes a rotor stick and slip, by turns at these speeds
+    # with a soft loop, friction makes a rotor stick and slip by whole turns at these speeds
     design = position_loop(motor.rotor_inertia_kg_m2, session.winch.latency_s, period)
     most = np.array([_TORQUE_SHARE * motor.rated_torque_Nm])
     return Pid([design.gains], most, period)

@@ -36,7 +36,7 @@ _BITS = {
 }
 """Sizes that CiA 402 defines for the objects exchanged in a cycle."""
 _HARMLESS = (*_COMMAND, 0x60B2)
-"""Objects allowed in a mapped RPDO; those that are not commands are sent as zero in every cycle."""
+"""Objects allowed in a mapped RPDO; except for the commands, they are sent as zero each cycle."""
 _MOST_PDOS = 512
 _FRAME_BITS = 64
 _MOST_ENTRIES = 8
@@ -572,7 +572,7 @@ def _choose(
     objects: tuple[int, ...],
     kind: str,
 ) -> _Choice:
-    """Use one PDO with its default map, else map one again, else spread objects over several."""
+    """Use one PDO with its default map, else remap one PDO, else spread objects over several."""
     usable = [offer for offer in offers if offer.serves(_EVERY_SYNC)]
     for offer in usable:
         if offer in as_they_are and offer.holds(objects):

@@ -196,7 +196,7 @@ def _only_device(master: LssMaster) -> _Device:
 
 
 def _select(master: LssMaster, device: _Device) -> None:
-    """Put the device into the configuration state; old devices only support the global switch."""
+    """Put the device into the configuration state; old devices support only the global switch."""
     if device.alone:
         master.select_only()
     else:

@@ -136,7 +136,7 @@ def _dictionary(name: str) -> Any:
 
 
 def _require_fit(size_mm: float, squares: int, page: str) -> None:
-    """Raise BadInputError unless a marker fits with a white square's width around it."""
+    """Raise BadInputError unless a marker fits with a white margin of one square around it."""
     width, height = PAGES_mm[page]
     needed = size_mm * (squares + 2) / squares
     most = min(width - 2.0 * _MARGIN_mm, height - 2.0 * _MARGIN_mm - _TEXT_mm)
@@ -207,7 +207,7 @@ def draw_map(fit: MapFit, path: Path) -> None:
     """Write the picture as PNG.
 
     The upper part shows the map from the front of its reference marker. The lower part shows the
-    accuracy of each position over its distance from there, along the reference marker's plane and
+    accuracy of each position over its distance from that marker, along the marker's plane and
     across it, like figures 3.20 and 3.21 of the thesis.
     """
     map_ = fit.map

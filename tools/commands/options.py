@@ -53,7 +53,7 @@ def shares(
 def written_as(
     *endings: str, mark: bytes = OWN_MARK
 ) -> Callable[[typer.CallbackParam, Path | None], Path | None]:
-    """Return the callback of an option for an output file, whose name has one of these endings.
+    """Return the callback of an option for an output file, whose name must have such an ending.
 
     Before the work begins, it raises BadInputError if the file cannot be written, or if it exists
     and does not begin with `mark`.
@@ -179,8 +179,8 @@ SensorsPortOption = Annotated[
 
 
 def _or_usual(context: typer.Context, robot: str | None) -> str | None:
-    """Return the robot of a daemon that is given, or named by the environment."""
-    # options that are given come first, whatever their order
+    """Return the robot of a daemon that is given as an option or named by the environment."""
+    # a given option takes precedence, whatever the order
     if robot is None and not context.params.get("socket") and not context.params.get("url"):
         return os.environ.get(ROBOT_VARIABLE) or None
     return robot

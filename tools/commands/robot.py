@@ -242,7 +242,7 @@ def _rejection(path: Path, wrong: list[Finding]) -> str:
 def _described(
     path: Path, given: dict[str, str], yes: bool, out: Output
 ) -> tuple[Robot, list[Finding]]:
-    """Ask about a robot that can work, and write its file; return it with its findings.
+    """Ask about a robot until it can work, and write its file; return it with its findings.
 
     Raises BadInputError if the questions are not all answered, or the last robot cannot work.
     """
@@ -265,8 +265,8 @@ def _described(
 class _Asker:
     """Asks the questions at the terminal, or takes all defaults if `yes`.
 
-    Once a robot was rejected it asks only the questions that matter: the other answers stay, and
-    the other defaults follow.
+    Once a robot was rejected, it asks only the questions that matter. The other typed answers stay,
+    and the other defaults adapt.
     """
 
     def __init__(self, path: Path, given: dict[str, str], yes: bool) -> None:

@@ -77,7 +77,7 @@ class _Typed:
         return Box(tuple(low), tuple(high))
 
     def start(self, box: Box) -> FloatArray | None:
-        """Return the place where rays start, None if not given."""
+        """Return the place where rays start; None if the user gave none."""
         if self.centre is None:
             return None
         return np.array(self._position("--centre", self.centre, box.low_m))

@@ -199,7 +199,7 @@ def run(
         raise BadInputError("--camera: only for a simulator that the command starts (simbus:)")
     _require_possible(settings.socket)
     with ExitStack() as stack:
-        # held from before anything starts until everything has ended
+        # hold the lock from before anything starts until everything has ended
         lock = stack.enter_context(LauncherLock(settings.socket))
         _require_free(settings.socket)
         _require_no_master(profile, settings)
@@ -210,7 +210,7 @@ def run(
             update={"lock_fd": lock.fd, "record": _writable(settings.record, record, out)}
         )
         settings = settings.with_key_loaded().with_ports_bound()
-        manager = ServiceManager()  # before any child is started: no child may speak for the daemon
+        manager = ServiceManager()  # before any child starts, so that no child notifies the manager
         for text in (
             uncommissioned_text(with_commissioned(profile, commissioned)),
             calibration_text(profile.calibration.summary()) if profile.calibration else "",

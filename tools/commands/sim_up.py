@@ -265,8 +265,7 @@ def _record(
     scanner: Path | None,
     board: PhysicsBoard | None,
 ) -> None:
-    """Set up the log of the true pose, or of each drive's motion; a platform has three drives or
-    more."""
+    """Set up the logs of the platform's pose, each at another drive; there are three or more."""
     if truth_log is not None:
         with os_error_as(BadInputError, f"--truth-log {truth_log}"):
             drives[0].record_with(PoseLog(truth_log, body))

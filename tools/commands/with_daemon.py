@@ -40,4 +40,4 @@ def _with_daemon(once_started: bool) -> Callable[[Callable[..., None]], Callable
 with_daemon_at_once = _with_daemon(once_started=False)
 """Passes the daemon that these options name, and the output, to a command."""
 with_daemon = _with_daemon(once_started=True)
-"""Does the same as `with_daemon_at_once`, but waits until the daemon has started."""
+"""Like `with_daemon_at_once`, but waits until the daemon has started."""

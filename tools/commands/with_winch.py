@@ -55,7 +55,7 @@ class WinchOnBus:
     def powered(
         self, what: str, tolerance: Tolerance | None = None
     ) -> AbstractContextManager[Session]:
-        """Ask the user to allow `what`, then boot the drive; see `open_winch`."""
+        """Ask the user for consent to `what`, then boot the drive; see `open_winch`."""
         confirm_motion(self.url, self.yes, what)
         return open_winch(
             self.profile,

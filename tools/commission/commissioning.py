@@ -344,8 +344,8 @@ class Commissioning:
     ) -> tuple[list[float], list[PidDesign]]:
         """Record the ramps of thesis 1.5 without and with each compensation.
 
-        Both ways at the default bandwidth, one way at the others. Returns the bandwidths that
-        were possible and the loops' designs.
+        The ramps go both ways at the default bandwidth, one way at the others. Returns the
+        bandwidths that were possible and the loops' designs.
         """
         session = self._session
         known: dict[str, AxisCompensation | None] = {

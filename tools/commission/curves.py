@@ -20,7 +20,7 @@ from cdpr_tools.recordings.truth import Truth
 
 _BINS = 720
 _COMPARABLE = 0.5
-"""Share of the turn that must have been passed twice to identify the repeating part."""
+"""Share of the turn that must be recorded twice to identify the part that repeats."""
 _STANDING = 0.1
 """Share of the ramp's speed below which the rotor counts as standing."""
 _SETTLING_rad = math.radians(60.0)
@@ -63,12 +63,12 @@ class ResidualEffort:
 
     forward: tuple[bool, ...]
     effort_Nm: FloatArray
-    """Over the turn about its mean, (d, m)."""
+    """Effort over the turn, about its mean, (d, m)."""
     amplitudes_Nm: FloatArray
     """Amplitudes of its orders 1, 2, ... (d, k)."""
     rms_Nm: float
     repeating_rms_Nm: float | None
-    """The part that repeats in the next turn; None if too little was recorded."""
+    """RMS of the part that repeats in the next turn; None if too little was recorded."""
 
 
 def read_residual_effort(paths: Sequence[Path], orders: int) -> ResidualEffort:
@@ -141,7 +141,7 @@ class TableError:
     gain: float
     """Amplitude of the strongest order in the curve divided by the model's."""
     behind_deg: float
-    """Motor angle by which that order is late, in the direction of motion."""
+    """Motor angle by which that order lags, in the direction of motion."""
 
 
 def table_errors(thesis: ThesisResult, harmonic: HarmonicResult) -> tuple[TableError, TableError]:
@@ -186,7 +186,7 @@ def filter_gain(order: int) -> float:
 def shift_deg(raw_Nm: FloatArray, order: int) -> float:
     """Return the shift between the curves of both directions, (2, m), in one order.
 
-    It is positive if each curve is late in its direction of motion.
+    It is positive if each curve lags in its direction of motion.
     """
     samples = raw_Nm.shape[1]
     turning = np.exp(-1j * order * np.arange(samples) * (math.tau / samples))

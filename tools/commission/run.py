@@ -132,7 +132,7 @@ def commission(
 
 @contextmanager
 def _ctrl_c_kept() -> Iterator[None]:
-    """Restore the effect of Ctrl-C after the block: a session ignores it from its first on."""
+    """Restore the effect of Ctrl-C after the block, because a session ignores all but the first."""
     if threading.current_thread() is not threading.main_thread():
         raise Error("commission: call it from the main thread, because Ctrl-C stops the motor")
     before = signal.getsignal(signal.SIGINT)

@@ -31,7 +31,7 @@ class InjectedFault(StrEnum):
     PRE_OPERATIONAL = "pre-operational"
     CELL_OFF = "cell-off"
     PUT_BACK = "put-back"
-    """Not a fault, but the way out of some: it stands for the person who carries the platform."""
+    """Not a fault but the remedy for some: it replaces the person who carries the platform home."""
 
 
 class FaultInjection(NamedTuple):
@@ -71,7 +71,7 @@ _VIRTUAL: Final = ("vcan", "vxcan")
 _LASTING: Final = (InjectedFault.CUT_CABLE, InjectedFault.SLIP, InjectedFault.CELL_OFF)
 """Faults that last until they are mended, besides silence; the others happen once."""
 MEND: Final = "mend"
-"""Repairs them all."""
+"""Repairs all lasting faults."""
 
 
 def writes_of(what: str, value: int | None) -> list[tuple[int, int]]:
@@ -101,7 +101,9 @@ def fault_words(what: str, amount: int) -> str:
 
 
 class InjectionAccess:
-    """Access to object 2F00h of one simulated drive, whoever runs the robot; a context manager.
+    """Access to object 2F00h of one simulated drive while any program runs the robot.
+
+    A context manager.
 
     Raises BadInputError if the bus does not exist. Its methods raise WorkFailedError.
     """
@@ -127,7 +129,7 @@ class InjectionAccess:
         self._network.close()
 
     def inject(self, what: str, value: str | None) -> int:
-        """Inject a fault or mend; return the value used. Pre-operational is an NMT command.
+        """Inject a fault or mend; return the value used. "pre-operational" is sent as NMT command.
 
         Raises BadInputError for an invalid value.
         """

@@ -67,8 +67,8 @@ def loop_parts(
     """Return the parts that the loop of `robot` runs within `limits`, compiled and ready.
 
     With `learns` it learns cogging and friction of a platform's uncommissioned motors in motion.
-    Code of the user's `own` replaces built-in parts of the platform's control, as does the tension
-    distribution that the robot's file names, and adds programs, as do installed packages. Raises
+    The user's `own` code, and the tension distribution that the robot's file names, replace
+    built-in parts of the platform's control. `own` and installed packages add programs. Raises
     ProfileError if the file's code must not run, and ControlError for unsuitable code.
     """
     own = completed(own or OwnCode(), robot)
@@ -104,7 +104,7 @@ def loop_parts(
 
 
 def look_at_calibration(robot: Robot, platform: PlatformParts | None) -> None:
-    """Make the programs refuse targets if the geometry cannot be trusted."""
+    """Make the programs reject targets if the geometry cannot be trusted."""
     if platform is None:
         return
     try:

@@ -40,7 +40,7 @@ class OwnCodeOptions:
     programs: tuple[str, ...] = ()
 
     def require_use(self, robot: Robot, *, allow_code: bool) -> None:
-        """Raise BadInputError if the robot has no use for the code. No code runs.
+        """Raise BadInputError if the robot has no use for the code. This runs no code.
 
         Raises ProfileError if the robot's file names code that is not allowed; `allow_code` allows
         it from now on.
@@ -56,7 +56,7 @@ class OwnCodeOptions:
             require_code_allowed(robot, allow_code=allow_code)
 
     def load(self) -> OwnCode:
-        """Run the code and return what is named; raises BadInputError."""
+        """Run the code and return the named objects; raises BadInputError."""
         return OwnCode(
             None if self.controller is None else _controller(self.controller),
             None if self.tension_distribution is None else _distribution(self.tension_distribution),
@@ -64,7 +64,7 @@ class OwnCodeOptions:
         )
 
     def notices(self, robot: Robot) -> list[str]:
-        """Return what operators should know: whose code controls the platform off its stand."""
+        """Return notes for operators: whose code controls the platform when it is off its stand."""
         named = "" if robot.platform is None else robot.platform.own_distribution
         distribution = self.tension_distribution or named
         return [
@@ -102,8 +102,8 @@ def _program(reference: str) -> tuple[str, Any]:
 def completed(own: OwnCode, robot: Robot) -> OwnCode:
     """Return `own` with the distribution that the robot's file names and registered programs.
 
-    A distribution of `own` comes before that of the file. Raises ProfileError if that is code that
-    is not allowed, or that fails, and CodeError if a package's code fails.
+    A distribution of `own` takes precedence over that of the file. Raises ProfileError if the
+    file's code is not allowed or fails, and CodeError if a package's code fails.
     """
     if robot.platform is None:
         return own

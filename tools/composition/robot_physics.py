@@ -24,7 +24,7 @@ from cdpr_tools.errors import BadInputError
 def physics_of(
     robot: Robot, plant: Path | None, detached: bool
 ) -> tuple[CableRobot | None, Sequence[Plant]]:
-    """Return the body that the axes move together, or None, and each motor's plant.
+    """Return the body that all axes move, or None, and the plant of each motor.
 
     Raises BadInputError if the plant file does not fit the robot.
     """

@@ -1,4 +1,4 @@
-"""Booted drives, run by a loop for a command; they have no power after any end."""
+"""Booted drives that a loop runs for a command; whatever ends it, they have no power then."""
 
 from __future__ import annotations
 
@@ -72,9 +72,9 @@ def no_watches(_: Clock) -> AbstractContextManager[Sequence[Watch]]:
 
 
 def tension_watch(sensors: str | None, port: str | None) -> Watching:
-    """Return a function that opens the tensions as a session's watch; none without `sensors`.
+    """Return a function that opens load cells as a session's watch; no watch without `sensors`.
 
-    Raises ConfigurationError if one of them is missing, and ProfileError; opening them raises
+    Raises ConfigurationError if one of both is missing, and ProfileError; opening the watch raises
     ModbusError if load cells do not answer.
     """
     if (sensors is None) != (port is None):
@@ -123,7 +123,7 @@ class Session(Operator):
         self.boot_s = 0.0
         """Bus time from the first frame until the last drive is operational."""
         self.simulator_pid: int | None = None
-        """Process of the simulator that the command started."""
+        """Process id of the simulator that the command started."""
 
     @property
     def device(self) -> AxisBuses:
@@ -156,7 +156,7 @@ class Session(Operator):
         self.run_task(homing.configure)
         self.set_mode(Mode.HOMING)
         try:
-            # the procedure has its own time-out; this one is for a drive that stops responding
+            # the procedure has its own timeout; this one is for a drive that no longer responds
             self.let_drive(homing.update, 2.0 * _INDEX_TIMEOUT_S, "the encoder index (homing)")
         except BaseException:
             homing.abort()
@@ -187,7 +187,7 @@ class Session(Operator):
 
     @property
     def drive_identity(self) -> DriveIdentity:
-        """The drive identity to which a cogging profile is bound, besides the motor."""
+        """Identity of the drive, to which a cogging profile is bound in addition to the motor."""
         return identity_of(self.boot)
 
     @property

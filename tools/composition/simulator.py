@@ -29,12 +29,12 @@ _numbers, _trials = count(1), count()
 
 
 class _OwnProcess:
-    """A command of this package that ends when its standard input closes, so also when we die."""
+    """A command of this package that ends when its standard input closes, so also if we die."""
 
     def __init__(
         self, *command: str, meanwhile: Callable[[], None] | None = None, waits: bool = True
     ) -> None:
-        """Run it and, if it `waits`, wait until it is ready, see `await_ready`.
+        """Start the command and, if it `waits`, wait until it is ready, see `await_ready`.
 
         `meanwhile` is called while it starts.
         """
@@ -55,7 +55,7 @@ class _OwnProcess:
             raise
 
     def await_ready(self) -> str:
-        """Wait for the line of JSON with `ready` that it prints, and return it.
+        """Wait for the line of JSON with `ready` that the process prints, and return it.
 
         Raises the BadInputError or WorkFailedError with which it ends instead.
         """
@@ -92,7 +92,7 @@ class _OwnProcess:
         return self._pipe(self.process.stdin).fileno()
 
     def stop(self) -> None:
-        """End it; its logs are complete afterwards."""
+        """End the process; its logs are complete afterwards."""
         end_by_stdin(self.process, _STOP_TIMEOUT_S)
 
 
@@ -165,7 +165,7 @@ class LockstepSimulator(OwnSimulator):
     ) -> None:
         self._temporary = TemporaryDirectory(prefix="cdpr-trial-")
         self.folder = Path(self._temporary.name)
-        """For temporary files, removed at the end."""
+        """Folder for temporary files, removed at the end."""
         if truth_log is None and robot.platform is not None:
             truth_log = self.folder / "truth.log"
         self.truth_log = truth_log
@@ -180,7 +180,7 @@ class LockstepSimulator(OwnSimulator):
 
     @override
     def stop(self) -> None:
-        """End it, and remove its folder."""
+        """End the simulator, and remove its folder."""
         super().stop()
         self._temporary.cleanup()
 

@@ -104,16 +104,16 @@ class Child:
 
     @property
     def end(self) -> str:
-        """How it ended, as text; empty while it runs."""
+        """How the process ended, as text; empty while it runs."""
         code = self.process.poll()
         if code is None:
             return ""
         return f"killed by signal {-code}" if code < 0 else f"ended with exit status {code}"
 
     def idle_s(self) -> float:
-        """Return the time since it was last seen to use a processor.
+        """Return the time since the process was last seen to use a processor.
 
-        On a slow or busy machine a process takes long, but it makes progress.
+        On a slow or busy machine the process takes long, but it makes progress.
         """
         used, now = _processor_ticks(self.process.pid), time.monotonic()
         if used != self._used:
@@ -121,7 +121,7 @@ class Child:
         return now - self._used_at
 
     def stop(self, timeout_s: float) -> bool:
-        """Terminate it and wait; return False if it had to be killed."""
+        """Terminate the process and wait; return False if it had to be killed."""
         if self.process.poll() is None:
             self.process.terminate()
         try:

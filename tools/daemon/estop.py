@@ -29,7 +29,7 @@ _CONFIRM_S: Final = 15.0
 _STALLED_S: Final = 1.0
 _KILLED_S: Final = 2.0
 _UNHEARD_S: Final = 1.0
-# a daemon that only listens sees the effect if the master gets a signal at the same time
+# the effect on a daemon that only listens, if its master is signalled at the same time
 _LISTENS_S: Final = 2.0
 
 
@@ -65,7 +65,7 @@ class EmergencyStop:
         if pidfd is None:
             return self._failed(f"its loop has ended; {_own_stop_notice(found)}")
         self._pidfd = pidfd
-        try:  # also sent to a loop that only listens: only its memory shows that; it ignores it
+        try:  # a loop that only listens ignores it; whether it does is only in its memory
             signal.pidfd_send_signal(pidfd, POWER_OFF_SIGNAL)
         except PermissionError:
             whose = _user(found.uid)
@@ -266,7 +266,7 @@ def _end_start(path: Path, pid: int) -> str:
     except ProcessLookupError:
         return done
     try:
-        if launcher_pid(path) == pid:  # and its number does not belong to another process by now
+        if launcher_pid(path) == pid:  # the pid may belong to another process by now
             signal.pidfd_send_signal(pidfd, signal.SIGTERM)
         if not select.select([pidfd], [], [], _STARTING_S)[0]:
             raise WorkFailedError(

@@ -68,7 +68,7 @@ class ServiceManager:
             self._pending.clear()
 
     def feed(self) -> bool:
-        """Feed the watchdog; return whether the message was accepted. It is not sent later."""
+        """Feed the watchdog; return whether it accepted the message, which is not repeated."""
         return self._sent({"WATCHDOG": "1"})
 
     def _sent(self, fields: Mapping[str, str]) -> bool:
@@ -96,7 +96,7 @@ DEAD: Final = "dead"
 _ON_COMMAND: Final = (DONE, POWER_UNCONFIRMED)
 """Exit statuses of a loop that has not died."""
 _TURN_S = 0.2
-# time after a second Ctrl-C: less is needed to cut the power and confirm it
+# after a second Ctrl-C; cutting the power and confirming it takes less
 _AT_ONCE_S = 10.0
 # a Ctrl-C relayed by a program such as sudo within this time is not a second one
 _SAME_PRESS_S = 0.2
@@ -106,9 +106,9 @@ _SERVICE_STOP_S = 10.0
 _LOOP_STALLED_S = 2.0
 # the service turns about ten times a second; a disk may delay it
 _SERVICE_STALLED_S = 10.0
-# if idle for this time, it is not even loading its libraries, however slow the machine
+# a service that is idle for so long is not even loading its libraries, on any machine
 _SERVICE_START_S = 30.0
-# by this time it has loaded everything, and is busy with something else
+# a service that is busy for so long has loaded everything and is busy with something else
 _SERVICE_LOADING_S = 600.0
 # delays before restarts: a service that dies immediately must not restart in a tight loop
 _RESTART_S = (0.1, 0.5, 2.0, 5.0)
@@ -243,7 +243,7 @@ class Launcher:
         stalled = self._up and self._silence_s("loop_alive_ns") > _LOOP_STALLED_S
         if stalled != self._stalled:
             self._stalled = stalled
-            if self._status().get("lockstep"):  # time stands still with it: no cycle is missed
+            if self._status().get("lockstep"):  # its time stands still with it: no cycle is missed
                 return
             self._say(
                 f"the loop has run no cycle for {_LOOP_STALLED_S:g} s"

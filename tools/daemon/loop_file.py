@@ -283,8 +283,8 @@ def launcher_does(path: Path) -> str | None:
 def launcher_loads(robot: str | None, socket: Path | None) -> bool:
     """Return whether a `cdpr run` of this user has been started and has no lock yet.
 
-    It still loads its modules, which takes seconds on a busy machine. It runs this robot or any, at
-    this socket or in the runtime folder.
+    Such a launcher still loads its modules, which takes seconds on a busy machine. `robot` and
+    `socket` select one; None stands for any robot, or the runtime folder.
     """
     return any(_loads(process, robot, socket) for process in Path("/proc").glob("[0-9]*"))
 

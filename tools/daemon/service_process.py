@@ -234,7 +234,7 @@ async def _wait_for_end(ended: asyncio.Event, settings: RunSettings, block: Shar
     pid, end_s = int(block.counters["loop_pid"][0]), time.monotonic() + loop_stop_s(block)
     while launcher_ended(settings.launcher_pid) and is_running(pid) and time.monotonic() < end_s:
         await asyncio.sleep(_TURN_S)
-    if settings.http is not None:  # remote clients see only in the status that it has ended
+    if settings.http is not None:  # remote clients learn of the end only from the status
         await asyncio.sleep(_TOLD_S)
 
 

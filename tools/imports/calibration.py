@@ -48,7 +48,7 @@ def import_calibration(
 ) -> tuple[CalibrationData, list[str]]:
     """Return the readings at the times of the cable lengths, with the poses interpolated there.
 
-    The rotation is that since the first reading, where the platform is at home. Also returns notes
+    Rotations are relative to the first reading, where the platform is at home. Also returns notes
     on what was left out. Raises ProfileError and BadInputError.
     """
     mapping = CalibrationMapping.load_file(mapping_path)
@@ -135,7 +135,7 @@ def _read_cables(
 
 
 def _read_poses(table: Table, columns: PoseColumns) -> _Poses:
-    """Return the poses in the room; rows with an empty cell, where the body was hidden, are out."""
+    """Return the poses in the room; skip rows with an empty cell, where the body was hidden."""
     time = read_time(columns.time, table)
     to_room = _to_room(table, columns)
     position = np.column_stack([one.read(table, LENGTHS) for one in columns.position])

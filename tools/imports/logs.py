@@ -36,7 +36,7 @@ def read_any(path: Path, winch: Winch | None = None) -> Table:
 
 
 def _read_candump(path: Path, data: bytes, winch: Winch) -> Table:
-    """Return what the winch's drive sent: a row for each position, columns such as "6077".
+    """Return the values that the drive sent: a row for each position, columns such as "6077".
 
     The drive's profile has the PDO map, unless the log contains its configuration. Values are in
     the units that `units` states. The time of a row is that of the SYNC before it.
@@ -75,7 +75,7 @@ def _read_mcap(path: Path, data: bytes) -> Table:
 
     Columns are named "topic.key"; a value of another topic holds until its next message.
     """
-    # imported here: other files do without it
+    # imported here: other files do not need it
     from mcap.exceptions import McapError  # noqa: PLC0415
     from mcap.reader import make_reader  # noqa: PLC0415
 

@@ -28,7 +28,7 @@ class Column(Profile):
 
     name: str
     unit: str = ""
-    """By default that which the file states, or else the SI unit."""
+    """Unit of the numbers; by default the one that the file states, or else the SI unit."""
     sign: Annotated[int, Field(ge=-1, le=1)] = 1
     gain: _Finite = 1.0
     offset: _Finite = 0.0
@@ -130,7 +130,7 @@ class PoseColumns(Profile):
     axes: tuple[str, str, str] = ("x", "y", "z")
     """The axis of the file's frame along each axis of the robot's room, such as "-x"."""
     offset_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    """Added to the position, in the room."""
+    """Offset that is added to the position, in the room."""
     position_std_m: Annotated[float, Field(gt=0.0, le=1.0)] = 0.001
     rotation_std_deg: Annotated[float, Field(gt=0.0, le=90.0)] = 0.5
 

@@ -128,12 +128,12 @@ def _pieces(table: Table, mapping: MotorMapping, winch: Winch, notes: list[str])
 
 
 def _shifted(time: FloatArray, values: FloatArray, by_s: float) -> FloatArray:
-    """Return the values at the times of the rows, if they belong to later times by `by_s`."""
+    """Return values that belong to times later by `by_s`, interpolated at the times of the rows."""
     return np.interp(time, time + by_s, values) if by_s else values
 
 
 def _one_way(angle: FloatArray) -> list[tuple[int, int]]:
-    """Return start and stop of each motion in one direction, without standing at its ends."""
+    """Return start and stop of each motion in one direction, without standstill at its ends."""
     turning = [0]
     extreme, sign = 0, 0.0
     for i, value in enumerate(angle):

@@ -213,7 +213,7 @@ def check_target(path: Path, overwrite: bool) -> None:
 def export(selection: Selection, path: Path) -> int:
     """Write the rows to `path`, one column for each field and axis; return their number.
 
-    Raises BadInputError without any, WorkFailedError if the file cannot be written.
+    Raises BadInputError if there are no rows, WorkFailedError if the file cannot be written.
     """
     with os_error_as(WorkFailedError, f"{path}: cannot be written"):
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -241,7 +241,7 @@ def _write(selection: Selection, file: IO[bytes], suffix: str) -> int:
         writer.close()
     except BaseException:
         if writer is not None:
-            with suppress(Exception):  # else it fails later because the file is closed
+            with suppress(Exception):  # otherwise it fails later because the file is closed
                 writer.close()
         raise
     return count

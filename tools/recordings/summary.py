@@ -41,7 +41,7 @@ class Reasons:
         )
 
     def after(self, at_ns: int, next_ns: float = float("inf")) -> str:
-        """Return the reason of a reaction at `at_ns`, "" for none; the next one is at `next_ns`.
+        """Return the reason of a reaction at `at_ns`, or ""; the next reaction is at `next_ns`.
 
         A state that follows a reaction has the same reason.
         """
@@ -67,9 +67,10 @@ def is_fault(event: dict[str, Any]) -> bool:
 
 
 def why_while_active(reader: RecordingReader, last_state: int) -> str:
-    """Return why a completely read recording ends while active, in a row of state `last_state`.
+    """Return why a recording, read to its end, ends while active; its last state is `last_state`.
 
-    "" if that state is not active, another file continues the recording, or it still goes on.
+    Returns "" if that state is not active, another file continues the recording, or it still goes
+    on.
     """
     if last_state != LoopState.ACTIVE:
         return ""

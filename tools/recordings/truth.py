@@ -51,8 +51,9 @@ class Truth:
     def angle_at(self, sync_index: FloatArray, measured_rad: FloatArray) -> FloatArray:
         """Return the true angle from the index at given SYNCs in rising order, (k,).
 
-        The index comes once a turn, and the drive may have latched another one than the simulator
-        counts from: whole turns are added so that the angle agrees with the measured one, (k,).
+        The index comes once a turn. The drive and the simulator may count from the index of
+        different turns, so whole turns are added until the angle agrees with the measured one,
+        (k,).
         Raises BadInputError if a SYNC is missing.
         """
         first, last = int(sync_index[0]), int(sync_index[-1])

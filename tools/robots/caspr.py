@@ -19,7 +19,7 @@ from cdpr_tools.robots.questions import KINDS, Default, Question
 
 _PLANAR: Final = ("PLANAR_XY", "P_XY")
 _LEAST_SHARE: Final = 0.01
-"""Least tension over the greatest one, for models whose cables may be slack."""
+"""Ratio of least to greatest tension, for models whose cables may be slack."""
 _MOST_BYTES: Final = 1 << 20
 
 
@@ -65,9 +65,9 @@ def read_caspr(bodies: Path, cables: Path) -> dict[str, str]:
 
 
 class ModelAnswers:
-    """Answers the questions from a model, with the default where it gives nothing or nothing valid.
+    """Answers the questions from a model, or with the default if the model has no valid value.
 
-    `notes` says which values of the model were not taken, and why.
+    `notes` says which values of the model were not used, and why.
     """
 
     def __init__(self, model: dict[str, str]) -> None:

@@ -45,14 +45,14 @@ _STAND_SHARE, _STAND_m = 0.1, 0.5
 """Gap between stand and box, as a share of the height in which targets are possible. Also the
 height of a stand that could be on the floor, as a share of the frame's, up to `_STAND_m`."""
 _OVERSPEED = 1.25
-"""Limit of the motors' speed over the speed that they need."""
+"""Ratio of the limit of the motors' speed to the speed that they need."""
 _MIDDLE, _MIDDLE_HEIGHT, _LOW = (0.3, 0.7), (0.25, 0.75), (0.0, 0.4)
 """Part of the frame in which the box of targets is searched first in space: along width and depth,
 along its height, and along its height if all cables come from above."""
 _CENTRED_SHARE = 0.6
 """A box about the frame's middle is proposed if it has this share of the largest one's area."""
 _HANGING_SHARE, _NEAR_m = 0.5, 0.01
-"""Where masses are tried: height over that of the exit points above, half a side of a box there."""
+"""Where masses are tried: share of the upper exit points' height; half the side of a box there."""
 _MASSES = np.geomspace(0.02, 50.0, 80)
 _SHRUNK = np.linspace(1.0, 0.5, 26)
 
@@ -65,7 +65,7 @@ def answers_of(path: Path, given: Mapping[str, str], ask: Ask, stage: Stage = _s
     """Return all answers about the robot that `path` will describe.
 
     Answers in `given` are not asked for; raises BadInputError if one of them is invalid. The
-    entry "origins" says where each default comes from that was taken.
+    entry "origins" gives the source of each default that was used.
     """
     first = kind_question()
     answers: Answers = {"origins": {}}
@@ -114,12 +114,12 @@ def _answer(question: Question, answers: Answers, given: Mapping[str, str], ask:
 
 
 def proposed_box(answers: Answers) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    """Return a large box of targets that the cables can hold, to the cm, or a first guess.
+    """Return a large box of targets that the cables can hold, rounded to cm, or a first guess.
 
-    In space it is searched in the middle of the frame first, and not high up under cables that all
-    come from above. A gap below it, of a tenth or the depth of a turned platform, is left for the
-    stand. Cables from above can lower a platform to the floor: its stand is higher, to leave room
-    below. The box is smaller if the motors could not hold the platform continuously.
+    In space, the middle of the frame is searched first; if all cables come from above, not its
+    upper part. Below the box a gap remains for the stand: a tenth of the height, or the depth of a
+    rotated platform. Cables from above can lower a platform to the floor, so its stand is higher,
+    to leave room below. The box is smaller if the motors could not hold the platform continuously.
     """
     exits = np.array([answers[f"exit_{i + 1}_m"] for i in range(answers["kind"].cables)])
     least, most = exits.min(axis=0), exits.max(axis=0)
@@ -160,7 +160,7 @@ def _held_boxes(answers: Answers, least: FloatArray, most: FloatArray) -> Iterat
 def held_masses(answers: Answers, usual_kg: float) -> tuple[float, float] | None:
     """Return the least and greatest mass that can be accelerated in the middle of the frame.
 
-    Of masses up to `_MASSES` times as large or small as a usual one; None if none can.
+    Masses are up to `_MASSES` times as large or small as `usual_kg`. Returns None if all fail.
     """
     exits = np.array([answers[f"exit_{i + 1}_m"] for i in range(answers["kind"].cables)])
     place = 0.5 * (exits.min(axis=0) + exits.max(axis=0))
@@ -176,7 +176,7 @@ def held_masses(answers: Answers, usual_kg: float) -> tuple[float, float] | None
 
 
 def _centred(box: Box, middle_m: FloatArray) -> Box:
-    """Return the box, or the largest one in it about the frame's middle if it is not much less."""
+    """Return the box, or the largest one in it about the frame's middle if almost as large."""
     low, high = np.array(box.low_m), np.array(box.high_m)
     half = np.minimum(high - middle_m, middle_m - low)[:-1]
     if half.min() <= 0.0 or np.prod(2.0 * half / (high - low)[:-1]) < _CENTRED_SHARE:
@@ -186,7 +186,7 @@ def _centred(box: Box, middle_m: FloatArray) -> Box:
 
 
 def _settled(answers: Answers, box: Box) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    """Return the largest box of targets inside, to the cm: the middle of the box has moved."""
+    """Return the largest box of targets in `box`, searched about its new middle, to the cm."""
     found = _statics_of(answers, box).largest_box(box) or box
     low, high = np.ceil(100.0 * np.array(found.low_m)), np.floor(100.0 * np.array(found.high_m))
     return (
@@ -220,8 +220,8 @@ def _bearable(
 def proposed_stand(answers: Answers) -> tuple[float, ...]:
     """Return a place under the middle of the box of targets.
 
-    For a platform that turns freely it is where the cables turn it least: otherwise they might
-    tilt it on its stand, and the lengths measured there would be wrong.
+    For a platform that turns freely, it is where the cables turn the platform least. Otherwise they
+    might tilt it on its stand, and the lengths measured there would be wrong.
     """
     low, high = np.array(answers["low_m"]), np.array(answers["high_m"])
     below_m = _STAND_SHARE / (1.0 - _STAND_SHARE) * (high[-1] - low[-1])
@@ -277,9 +277,8 @@ def write_robot(
 ) -> tuple[Robot | None, list[Finding]]:
     """Write the answers into a file; return the robot that it describes, and what is wrong with it.
 
-    The robot is None if its file cannot be read again. A file that exists is replaced only if it
-    has been written by this command, which is `over`; else raises BadInputError, also if writing
-    fails.
+    The robot is None if its file cannot be read again. An existing file is replaced only if this
+    command has written it, as `over` says. Otherwise, or if writing fails, raises BadInputError.
     """
     try:
         with path.open("w" if over else "x", encoding="utf-8") as file:
@@ -303,14 +302,14 @@ _ANSWERED_BY = {
     "angular_speed_rad_s": "angular_speed_deg_s",
     "angular_acceleration_rad_s2": "angular_acceleration_deg_s2",
 }
-"""Keys of a robot's file whose question has another key, of those without a number."""
+"""Key of the question by the key in a robot's file, if they differ and have no number."""
 
 
 def questioned(found: Sequence[Finding], answers: Answers, typed: Container[str]) -> set[str]:
-    """Return the keys of the questions whose other answers may help against findings.
+    """Return the keys of the questions to ask again: other answers may remove the findings.
 
-    That is the key that a finding names as a remedy, else its own. A point that is a default
-    follows from the size of the frame or platform, which is asked for instead.
+    A finding names such a key as a remedy; by default its own key counts. If a point is a default,
+    it follows from the size of the frame or platform, so that size is asked for instead.
     """
     keys = set()
     for finding in found:

@@ -89,7 +89,7 @@ def _title(platform: Platform, view: _View) -> str:
 
 
 def _has_room(figure: Figure, ax: Axes) -> bool:
-    """Return whether the names of exit points lie inside the axes; outside are the tick labels.
+    """Return whether the names of exit points lie inside the axes; outside, they cover tick labels.
 
     If not, widen the axes' limits: the drawing shrinks and the names do not.
     """

@@ -59,7 +59,7 @@ class Chosen:
     clearance_m: float
     margin_N: float
     deviation_m: float | None
-    """Of exit points after a calibration with these poses, if positions have 3 coordinates."""
+    """Deviation of exit points after a calibration with these poses; None unless k is 3."""
 
 
 def choose(

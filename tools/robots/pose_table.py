@@ -79,7 +79,7 @@ def read_pose_table(path: Path, n: int) -> PoseTable:
 
 
 def estimates(model: Model, table: PoseTable) -> dict[str, FloatArray]:
-    """Return the poses (m, 7) by each set of sensors, the one with all of them last."""
+    """Return the poses (m, 7) from each set of sensors; the set of all sensors comes last."""
     found = {"lengths": model.pose(table.length_m)}
     if not model.hangs_freely:
         return found
@@ -98,8 +98,8 @@ def estimates(model: Model, table: PoseTable) -> dict[str, FloatArray]:
 def errors(poses: FloatArray, table: PoseTable) -> dict[str, dict[str, float]]:
     """Return mean, root mean square and largest error of poses (m, 7) against measured ones.
 
-    Of the position, of the tilt, and of the rotation about the vertical axis. Poses that were not
-    found are left out.
+    These are errors of the position, of the tilt, and of the rotation about the vertical axis.
+    Poses that were not found are left out.
     """
     known = np.isfinite(poses).all(axis=1)
     found: dict[str, FloatArray] = {}

@@ -157,22 +157,22 @@ Masses = Callable[[Answers, float], tuple[float, float] | None]
 answers so far and a mass to start with; None if it finds none."""
 _POINTS = {2: "-2, 3", 3: "-2, 1.5, 3"}
 _PEAK_SHARE, _RATED_TIMES = 0.5, 2.0
-"""Proposed torque over peak and rated torque, the lesser of both, if the rated one is too little
-for cables that pull against each other."""
+"""Proposed torque, if rated torque is too little for cables that pull against each other: the
+smaller of these multiples of peak and rated torque."""
 _RANGE = 10.0
-"""Least ratio of greatest to least tension for which the rated torque is enough there."""
+"""Least ratio of greatest to least tension for which such cables need only the rated torque."""
 _TORQUE_RESERVE = 0.85
 """Share of the torque available for tensions; the rest is for friction and control."""
 _LEAST, _LEAST_HANGING = 0.25, 0.1
-"""Largest proposed least tension over the greatest; if only the weight tightens the cables."""
+"""Largest proposed ratio of least to greatest tension; the second if all cables come from above."""
 _LEAST_MASS, _MOST_MASS = 1.25, 0.5
-"""Proposed mass over the least and the greatest that the cables hold: limits of both."""
+"""Limits of the proposed mass: multiples of the least and greatest mass that the cables hold."""
 _HANGING_MASS = 0.75
-"""Proposed mass over the greatest, if only the weight tightens the cables: a lighter platform has a
-smaller box of targets."""
+"""Proposed mass as a share of the greatest, if only the weight tightens the cables. A lighter
+platform has a smaller box of targets."""
 _DEFAULT_SPEED_SHARE, _SPEED_SHARE = 0.5, 0.8
-"""Shares of the winches' rated speed: that of proposed speeds along and about all directions
-together, and that of the highest speed along all directions that may be answered."""
+"""Shares of the winches' rated speed: for the proposed speeds in all directions together, and for
+the highest speed along all directions that an answer may give."""
 
 
 class AnswerError(ValueError):
@@ -303,7 +303,7 @@ def _turning(kind: RobotKind) -> list[Question]:
     angle = _figure(math.degrees(platform.workspace_angle_rad))
 
     def acceleration(answers: Answers) -> Default:
-        """Return the shipped robot's, less for a larger platform."""
+        """Return the shipped robot's acceleration, less for a larger platform."""
         share = min(kind.side_m / answers["side_m"], 1.0)
         value = _figure(share * math.degrees(platform.angular_acceleration_rad_s2))
         return Default(value, f"that of {kind.name}, scaled with the platform")
@@ -371,7 +371,7 @@ def cable_speed_m_s(answers: Answers, speed_m_s: float, angular_speed_rad_s: flo
 
 
 def _reached(answers: Answers) -> tuple[float, float]:
-    """Return the speeds √(a L/2) that are reached within a quarter of box and angles, L."""
+    """Return the speeds √(a L/2), reached within a quarter of the range L of positions, angles."""
     longest_m = max(np.subtract(answers["high_m"], answers["low_m"]))
     angle_rad = answers.get("angle_deg", 0.0)
     return (
@@ -381,13 +381,13 @@ def _reached(answers: Answers) -> tuple[float, float]:
 
 
 def _winch_share(answers: Answers) -> float:
-    """Return which share of these speeds takes half of the winches' rated speed, at most 1."""
+    """Return the share, at most 1, of these speeds that needs half of the winches' rated speed."""
     needed_m_s = cable_speed_m_s(answers, *_reached(answers))
     return min(_DEFAULT_SPEED_SHARE * rated_speed_m_s(answers) / needed_m_s, 1.0)
 
 
 def _spare_m_s(answers: Answers) -> float:
-    """Return what the answered speed leaves of the winches' rated speed."""
+    """Return the part of the winches' rated speed that the answered speed leaves."""
     return rated_speed_m_s(answers) - cable_speed_m_s(answers, answers["speed_m_s"], 0.0)
 
 
@@ -597,9 +597,9 @@ def _tension_min(text: str, answers: Answers) -> float:
 
 
 def _usual_torque(answers: Answers) -> Default:
-    """Return the rated torque; more if cables that pull against each other need it for a moment.
+    """Return the rated torque; more if cables that pull against each other briefly need it.
 
-    To stand in the proposed box of targets takes no more than the rated torque in any case.
+    Standing in the proposed box of targets never needs more than the rated torque.
     """
     winch: Winch = answers["winch"][1]
     motor = winch.motor
@@ -623,9 +623,10 @@ def _bearable(answers: Answers) -> Default:
 
 
 def _taut(answers: Answers) -> Default:
-    """Return the least tension that the cable needs, and that exceeds the winch's friction.
+    """Return the least tension: what the cable needs, but above the winch's friction.
 
-    Less if the greatest is little more: the planned tensions are between both.
+    It is lower if the greatest tension is not much higher, because planned tensions are between
+    both.
     """
     winch: Winch = answers["winch"][1]
     rubs_N = FRICTION_SHARE * winch.motor.rated_torque_Nm / abs(winch.cable_m_per_motor_rad)

@@ -108,7 +108,7 @@ def _of_tensions(s: Subject, axes: Sequence[dict[str, Any]]) -> dict[str, Any]:
 
 
 def _lowered(swings: Sequence[Swing]) -> dict[str, float] | None:
-    """Return the fastest descent and the height at which friction may hold it; None if unknown."""
+    """Return the fastest descent, and the height where friction may hold the platform, or None."""
     if not swings:
         return None
     return {
@@ -228,7 +228,7 @@ def _lowered_lines(figures: dict[str, Any]) -> list[str]:
 
 
 def _slip_lines(axes: Sequence[dict[str, Any]]) -> list[str]:
-    """Return a table of the effect of a slip that is not noticed, and the tension afterwards."""
+    """Return a table of the effect of an unnoticed slip, and the tension afterwards."""
     titles = ["sudden, mm", "slow, mm", "platform off, mm", "peak, N", "allowed, N"]
     rows = [["cable slips", *titles]]
     for axis in axes:

@@ -47,7 +47,7 @@ class StickMap:
     moves: tuple[SignedAxis, ...]
     """Axes that move the hand along x, y, z; z may be missing."""
     turns: tuple[SignedAxis, ...]
-    """Axes that turn it about the room's axes in `about`."""
+    """Axes that turn the hand about the room's axes in `about`."""
     about: tuple[int, ...]
     dead_man: int
     confirm: int
@@ -142,7 +142,7 @@ _EVERY_DEVICE: Final = Path("/dev/input")
 AXES: Final = {2: "ABS_X,-ABS_Y", 3: "ABS_X,-ABS_Y,-ABS_HAT0Y"}
 """Left stick, and the directional pad upward: they move the hand along x, y, z."""
 TURN_AXES: Final = {0: "", 1: "-ABS_RX", 2: "ABS_RY,ABS_RX", 3: "ABS_RY,ABS_RX,-ABS_HAT0X"}
-"""Right stick, and the directional pad to the left: they turn it, by the number of angles."""
+"""Right stick, and the directional pad to the left: they turn the hand. Keys: number of angles."""
 
 
 class Gamepad:
@@ -277,7 +277,7 @@ class EvdevFinder:
         self._path, self._used = path, used
 
     def find(self) -> EvdevDevice | None:
-        """Open it; raises BadInputError if it is not readable or lacks a needed axis or button."""
+        """Open the device; raises BadInputError if it is unreadable or lacks an axis or button."""
         path, refused = self._path, ""
         for node in [path] if path is not None else sorted(_EVERY_DEVICE.glob("event*")):
             try:

@@ -70,12 +70,12 @@ class Hand:
         self.go_back()
 
     def go_back(self) -> None:
-        """Return it to its start."""
+        """Return the hand to its start."""
         self.position_m: Vector = (0.0, 0.0, 0.0)
         self.quaternion: Quaternion = (1.0, 0.0, 0.0, 0.0)
 
     def move(self, way_m: Vector) -> None:
-        """Move it by this vector."""
+        """Move the hand by this vector."""
         reach_m = self._reach_m
         x, y, z = (
             min(max(at + by, -reach_m), reach_m)
@@ -84,7 +84,7 @@ class Hand:
         self.position_m = (x, y, z)
 
     def turn(self, vector_rad: Vector) -> None:
-        """Turn it further by a rotation vector along the room's axes."""
+        """Turn the hand further by a rotation vector along the room's axes."""
         self.quaternion = product(from_vector(vector_rad), self.quaternion)
 
 

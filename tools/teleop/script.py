@@ -31,7 +31,7 @@ class ScriptLine:
     clutch: bool = False
     """Whether the clutch is open until the next line."""
     confirm: bool = False
-    """Whether it confirms once, at this time."""
+    """Whether the hand confirms once, at this time."""
 
 
 def read_script(path: Path, scale: float = 1.0) -> tuple[ScriptLine, ...]:

@@ -105,7 +105,7 @@ def _stream(host: str, port: int, daemon: Daemon, token: str) -> StreamClient:
 def _shown(
     session: TeleopSession, view: View, daemon: Daemon, out: Output, ended: Callable[[], bool]
 ) -> End:
-    """Run it, with a view if there is a terminal."""
+    """Run the session, with a view if there is a terminal."""
     if not out.notes.is_terminal:
         with _watched(view, daemon):
             return session.teleoperate(ended)
@@ -145,7 +145,7 @@ def _ended_by_signals() -> Iterator[Callable[[], bool]]:
 
 @contextmanager
 def _watched(view: View, daemon: Daemon) -> Iterator[None]:
-    """Give the view the daemon's status several times a second, read beside the stream."""
+    """Pass the daemon's status to the view several times a second, read in a separate thread."""
     over = threading.Event()
 
     def watch() -> None:
@@ -203,7 +203,7 @@ def _program_of(description: dict[str, Any]) -> tuple[str, dict[str, Any]]:
 
 
 def _tell_figures(session: TeleopSession, out: Output) -> None:
-    """Report what was confirmed, and the fate of the sent set-points."""
+    """Report what was confirmed, and what happened to the sent set-points."""
     figures = session.figures()
     trip = figures["round_trip_ms"]
     delay = f"; round trip {trip['p50']:.1f} ms, {trip['p99']:.1f} ms at most in 99 of 100"
@@ -221,7 +221,9 @@ def _tell_figures(session: TeleopSession, out: Output) -> None:
 def _tell(
     session: TeleopSession, end: End, daemon: Daemon, before: str, held_back: str, out: Output
 ) -> None:
-    """Report how it ended; raises WorkFailedError if it failed, or if a limit prevented any motion.
+    """Report how the session ended.
+
+    Raises WorkFailedError if it failed, or if a limit prevented any motion.
 
     `before` is the robot's reason before it was led, `held_back` the last limit it has met.
     """

@@ -89,7 +89,7 @@ class _Pull:
         return abs(self._speed_rad_s) * (self._now_s - self._since_s)
 
     def turn_back(self) -> None:
-        """Go the other way from here on."""
+        """Reverse the motion from here on."""
         self._from_rad = self._from_rad + self._speed_rad_s * (self._now_s - self._since_s)
         self._since_s, self._speed_rad_s = self._now_s, -self._speed_rad_s
 

@@ -29,11 +29,11 @@ _LONG_EVERY: Final = 5
 """One in this many finished moves is followed by a long rest."""
 _CHANGED_AFTER_S: Final = (0.05, 1.2)
 _MOVED: Final = 2e-3
-"""m or rad"""
+"""In a direction in which it moves less than this, a leg cannot overshoot, m or rad."""
 _THERE: Final = 1e-5
 """A set-point this near to its target counts as standing there, m or rad."""
 _TORQUE_STEP_SHARE: Final = 1e-3
-"""Torque is sent over the bus in per mille of the rated torque."""
+"""Step of the torque on the bus, per mille of the rated torque."""
 
 
 def drive(run: TrialRun, seconds: float) -> None:
@@ -67,12 +67,12 @@ class TargetLeg:
     def overshoot(self, true: FloatArray) -> FloatArray:
         """Return the largest distance of the platform (c, d) beyond its target, per direction.
 
-        It is 0 in a direction in which the leg hardly moves.
+        It is 0 in a direction in which the leg moves hardly or not.
         """
         return self._beyond(true, self.target)
 
     def overshoot_of_rest(self, true: FloatArray, rested: int) -> FloatArray | None:
-        """Return the same beyond the place of rest, None if it stood for less than `rested`."""
+        """Return the overshoot beyond the place of rest; None if that rest was below `rested`."""
         return None if self.stood < rested else self._beyond(true, true[self.rows][-1])
 
     def _beyond(self, true: FloatArray, place: FloatArray) -> FloatArray:

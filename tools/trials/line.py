@@ -15,9 +15,9 @@ from cdpr_tools.trials.run import TrialRun
 
 SPEED_m_s: Final = 0.01
 LENGTH_m: Final = 0.6
-"""Of each line, but at most half the workspace; motors make several turns along it."""
+"""Length of each line, but at most half the workspace; motors make several turns along it."""
 RATIO: Final = 3.0
-"""Least ratio at `SPEED_m_s`."""
+"""Least ratio of the distances without and with compensation, at `SPEED_m_s`."""
 SETPOINT_mm: Final = 2.0
 """Largest distance from the set-point at other speeds."""
 WITH, WITHOUT = "with", "without"
@@ -54,7 +54,7 @@ class LineErrors:
     """Index of its direction."""
     is_turn: bool
     way: FloatArray
-    """Along the line, m or rad, (c,)."""
+    """Position along the line, m or rad, (c,)."""
     across_mm: FloatArray
     """True distance from the line at right angles to it, (c, k - 1); (c, 0) for a turn."""
     off_mm: FloatArray
@@ -102,8 +102,8 @@ def _at_right_angles(along: FloatArray) -> FloatArray:
 def rms_mm(recorded: Recorded, less_mean: bool = False) -> tuple[float, float]:
     """Return the RMS distance over all lines, from the line and from the set-point.
 
-    With `less_mean` the mean of each line's errors is subtracted first: it shows how well the
-    start is known, not how a motor runs.
+    With `less_mean` the mean of each line's errors is subtracted first, because the mean shows how
+    well the start is known, not how a motor runs.
     """
     straight = [one for one in line_errors(recorded) if not one.is_turn]
     return (

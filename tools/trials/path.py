@@ -25,10 +25,10 @@ FILE: Final = "path.nc"
 BLEND_mm: Final = 20.0
 RMS_mm: Final = 2.0
 LATE: Final = 0.01
-"""Share of the planned duration."""
+"""Allowed delay, as a share of the planned duration."""
 _LAPS: Final = 3
 _SHARE: Final = 0.35
-"""Share of the workspace on either side of its middle."""
+"""Extent of the path on either side of the middle, as a share of the workspace."""
 _STEP_m: Final = 5e-4
 _LETTERS: Final = {"rx": "A", "ry": "B", "rz": "C", "angle": "C"}
 _STANDING_m: Final = 1e-6
@@ -102,9 +102,9 @@ class PathErrors:
     off_mm: FloatArray
     """True distance from the planned path, corners cut."""
     setpoint_off_mm: FloatArray
-    """The set-point's distance from it."""
+    """Distance of the set-point from the planned path."""
     corner_mm: FloatArray
-    """The planned path's distance from the file's."""
+    """Distance of the planned path from the file's."""
     lag_mm: FloatArray
     """True distance from the set-point of the same cycle."""
     planned_s: float

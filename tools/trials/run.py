@@ -92,7 +92,7 @@ class TrialRun:
         self._advance(self.elapsed_s)
 
     def start_random_move(self, speed_m_s: float | None = None) -> FloatArray:
-        """Start a move to a random place that the robot does not refuse; return it, (d,)."""
+        """Start a move to a random place that the robot accepts; return it, (d,)."""
         for _ in range(_TRIES):
             place = self.random_place()
             try:
@@ -117,7 +117,7 @@ class TrialRun:
         self.rig.finish(_MOVE_S + longer_s)
 
     def stay(self, seconds: float) -> None:
-        """Run cycles; raises WorkFailedError if the motion is ended meanwhile."""
+        """Run cycles; raises WorkFailedError if the motion ends meanwhile."""
         self.rig.turn(round(seconds / self.rig.period_s))
         if self.rig.loop.engine.program.name != "pose":
             raise WorkFailedError(f"the motion was ended: {self.rig.state_text()}")

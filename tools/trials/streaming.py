@@ -73,7 +73,7 @@ SCALE: Final = 4.0
 ROUNDING: Final = 0.5e-9
 """Rounding error of a recorded position in m, or of an entry of a quaternion."""
 _SENDER_AHEAD_s: Final = 1234.5
-"""The hand's clock differs from the robot's."""
+"""Lead of the hand's clock over the robot's."""
 _PHASE_S: Final = (2.0, 6.0)
 _SILENCE_S: Final = 1.2
 _CLUTCH_S: Final = 0.4
@@ -148,7 +148,7 @@ def drive(run: TrialRun, seconds: float) -> None:
 
 
 def hand_pose(directions: Directions, place: FloatArray) -> tuple[list[float], list[float]]:
-    """Return position (3) and quaternion (4) of a hand at a place; it is not turned at home."""
+    """Return position (3) and quaternion (4) of a hand at a place; its rotation at home is zero."""
     rotation = directions.rotations(place[None])[0] @ directions.home_rotation.T
     x, y, z, w = Rotation.from_matrix(rotation).as_quat().tolist()
     position_m = place[: directions.k].tolist() + [0.0] * (3 - directions.k)

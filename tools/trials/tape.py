@@ -65,7 +65,7 @@ def drive(run: TrialRun, seconds: float) -> None:
 def judge(recorded: Recorded, robot: Robot) -> list[Figure]:
     """Return the extremes of tension and torque, and the errors at the poses.
 
-    If the time ended first, one pose is enough: that others are missing is not the robot's fault.
+    If the time ended first, one pose is enough: missing poses are not the robot's fault.
     """
     directions, marks = recorded.directions, recorded.marked("pose")
     rows = [recorded.row(mark["cycle"]) for mark in marks]

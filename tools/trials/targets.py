@@ -12,11 +12,11 @@ from cdpr_tools.trials.recorded import Recorded
 from cdpr_tools.trials.run import TrialRun
 
 SETTLE_S: Final = 1.5
-"""From the end of the set-point's motion until the platform's position is evaluated."""
+"""Time from the end of the set-point's motion until the platform's position is evaluated."""
 LOOK_S: Final = 0.1
-"""The thesis takes the mean of ten samples at 100 Hz (section 2.5.2)."""
+"""Time over which the position is averaged: the thesis takes ten samples at 100 Hz (2.5.2)."""
 MEAN_mm: Final = {2: 0.3, 3: 0.5}
-"""Limit, by the number of coordinates of a position."""
+"""Limit of the mean error, by the number of coordinates of a position."""
 THREE_SIGMA_mm: Final = {2: 1.0, 3: 1.5}
 MEAN_deg: Final = 0.05
 THREE_SIGMA_deg: Final = 0.15
