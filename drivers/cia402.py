@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 
 class State(IntEnum):
-    """State of the CiA 402-2 drive state machine, as it is read from the statusword (6041h)."""
+    """State of the CiA 402-2 drive state machine, as reported in the statusword (6041h)."""
 
     NOT_READY = 0
     SWITCH_ON_DISABLED = 1

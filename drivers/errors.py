@@ -54,7 +54,7 @@ class SdoError(DriverError):
 
 
 class SdoAbortError(SdoError):
-    """A transfer was aborted, by the node or by us; `code` is the abort code of CiA 301."""
+    """The node or this client has aborted a transfer; `code` is the abort code of CiA 301."""
 
     def __init__(self, code: int, context: str = "") -> None:
         self.code = code

@@ -28,7 +28,7 @@ MOST_PARTS: Final = 500_000
 MOST_DEPTH: Final = 16
 """Largest nesting of tables and arrays."""
 MOST_DIGITS: Final = 99
-"""Most digits of one number; an integer must also fit 64 bits."""
+"""Maximum number of digits of a number; an integer must also fit 64 bits."""
 
 _LEAST_INTEGER, _MOST_INTEGER = -(2**63), 2**64 - 1
 # skips strings and comments; possessive quantifiers, so that no text makes the search slow

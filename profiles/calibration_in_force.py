@@ -34,7 +34,7 @@ def calibration_file(robot: Robot) -> Path:
 
 
 def load_calibrated(robot: str | Path) -> Robot:
-    """Return the robot of a name or file with its calibration in force; raises ProfileError."""
+    """Load a robot by name or file, with its calibration in force; raises ProfileError."""
     return calibrated(load_robot(robot))
 
 

@@ -23,7 +23,7 @@ DICTIONARIES = (
     *("ARUCO_ORIGINAL", "ARUCO_MIP_36H12"),
     *("APRILTAG_16H5", "APRILTAG_25H9", "APRILTAG_36H10", "APRILTAG_36H11"),
 )
-"""Names of the sets of markers, as in OpenCV without DICT_."""
+"""Names of the marker dictionaries, as in OpenCV but without DICT_."""
 
 
 class CameraIntrinsics(Profile):

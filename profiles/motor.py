@@ -46,7 +46,7 @@ class Motor(Profile):
     notes: tuple[str, ...] = ()
     poles: int = Field(ge=2, le=1000, multiple_of=2)
     slots: int | None = Field(default=None, ge=3, le=1000)
-    """Slots of the stator; explains the cogging's orders."""
+    """Number of stator slots, which explains the cogging orders."""
     torque_constant_Nm_per_Arms: Plausible
     rated_torque_Nm: Plausible
     stall_torque_Nm: Plausible

@@ -44,7 +44,7 @@ class MotorBounds:
 
     motor: Motor
     torque_Nm: float = math.inf
-    """Torque limit of its axis."""
+    """Torque limit of the motor's axis."""
 
     @property
     def compensation_Nm(self) -> float:

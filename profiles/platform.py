@@ -93,7 +93,7 @@ DIRECTIONS: Final[dict[int, tuple[DirectionName, ...]]] = {
 }
 """Directions of a platform by its number of coordinates: positions, then angles."""
 NO_PLATFORM: Final = "has no platform; allowed: a robot with a [platform]"
-"""Error text, after its name or path, for a robot without the required platform."""
+"""Error text for a robot without the required platform; it follows the robot's name or path."""
 _LEAST_ARM_m = 0.1
 _RISE_S = 0.1
 """Time in which the acceleration is reached, if the file gives no jerk."""
@@ -102,7 +102,7 @@ CLEARANCE_m: Final = 0.01
 
 
 class BoxFile(Profile):
-    """A box by two opposite corners, with edges along the axes of its frame."""
+    """A box given by two opposite corners, with edges along the axes of its frame."""
 
     min_m: Point
     max_m: Point

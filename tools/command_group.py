@@ -18,7 +18,7 @@ from cdpr_tools.errors import BadInputError
 from cdpr_tools.loading import loading_notice, without_collection
 
 ROBOT_VARIABLE = "CDPR_ROBOT"
-"""Environment variable that names the robot of a command that names none."""
+"""Environment variable with the robot for commands that are given none."""
 HARMLESS = frozenset({"Look", "Describe", "Simulate", "Machine"})
 """Headings of commands that neither move anything nor switch power."""
 

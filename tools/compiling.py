@@ -13,7 +13,7 @@ from contextlib import contextmanager
 from typing_extensions import override
 
 NOTICE = "compiling"
-"""Start of each notice line: a command that hides its simulator's output forwards these."""
+"""Start of each notice line; a command that hides its simulator's output forwards these lines."""
 
 _EVERY_S = 5.0
 _LOG = logging.getLogger("cdpr.compiling")
@@ -22,8 +22,8 @@ _LOG = logging.getLogger("cdpr.compiling")
 _listeners: list[Callable[[str], None]] = []
 
 _NAME = "CDPR_COMPILING_TOLD"
-"""Environment variable with the name of a socket that accepts one connection: the process that
-connects reports the compiling."""
+"""Environment variable with the name of a socket that accepts one connection. The process that
+connects is the one that reports the compilation."""
 _sockets: list[socket.socket] = []
 """Sockets that stay open until the process ends."""
 
@@ -32,8 +32,8 @@ _sockets: list[socket.socket] = []
 def compiling_notices_to(listener: Callable[[str], None]) -> Iterator[None]:
     """Call `listener` with the progress for each kernel that the block compiles.
 
-    It is called in the compiling thread, and for each forwarded notice of another process.
-    It works only after `announce_compiling`.
+    The call is made in the compiling thread, and for each forwarded notice of another process. It
+    needs `announce_compiling` first.
     """
     _listeners.append(listener)
     try:
@@ -43,7 +43,7 @@ def compiling_notices_to(listener: Callable[[str], None]) -> Iterator[None]:
 
 
 def pass_on(line: str) -> None:
-    """Print a notice of another process, a whole line, on its behalf."""
+    """Print a notice, a whole line, for another process."""
     print(line, end="", file=sys.stderr, flush=True)
     _tell_listeners(line)
 
@@ -84,7 +84,7 @@ def _share_with_children() -> None:
 
 
 class _Notice(logging.Handler):
-    """Reports once per command, then the progress of each process; on standard error."""
+    """Reports the compilation once per command, then each process' progress, on standard error."""
 
     def __init__(self, what: str) -> None:
         super().__init__()
@@ -103,7 +103,7 @@ class _Notice(logging.Handler):
             self._teller.start()
 
     def _go_on_telling(self) -> None:
-        """Report the number of kernels from time to time while it grows."""
+        """Report the number of compiled kernels from time to time while it grows."""
         noted, never = 0, threading.Event()
         while noted != self._kernels:
             noted = self._kernels

@@ -73,9 +73,9 @@ class RightInBusTime:
     def __init__(self, block: SharedBlock, clock_ns: Callable[[], int]) -> None:
         self._clock_ns = clock_ns
         self.token: str | None = None
-        """The token of the right held here, None if it is not held."""
+        """The token of the right, if it is held here; else None."""
         self.number = 0
-        """The number of the newest grant here, which commands carry."""
+        """The number of the newest grant to this process, which commands carry."""
         self._renewed_ns = 0
         self.lease = Lease(PublishedRight(block), clock_ns)
 
@@ -185,17 +185,17 @@ class LockstepRobot:
 
     `robot` is a profile's name or file, `plant` the simulator's plant file. The simulator logs the
     true pose to `truth_log`, by default a temporary file. `record` is a folder for the recording
-    (MCAP); without it nothing is recorded. `own` is code of the user's, run by the loop.
+    (MCAP); without it nothing is recorded. `own` is the user's code, which the loop runs.
     `commissioned` is the folder with the commissioning results of the motors, if the robot's file
-    does not name it. Unless `compensated`, they are not used; unless `learns`, the control does
-    not learn the other motors. Unless `as_calibrated`, the calibration in force is not used; with
-    `calibration_in_doubt` limits are those of a robot without one.
-    `scanner` is the file in which a simulated external scanner logs the poses it measures,
-    `camera` the socket of a simulated camera on the platform. Rows of the last `ring_s` are kept.
-    If `pinned`, the simulator and all of this process share one core. `simulator` is one that has
-    been started with these arguments; it belongs to this robot from `__enter__` on. The right to
-    move is held from the beginning, see `right`. Raises CommandError, DriverError and ProfileError
-    as `cdpr run` does, Error if the robot does not get ready.
+    does not name it. Unless `compensated`, they are not used; unless `learns`, the control does not
+    learn the other motors. Unless `as_calibrated`, the calibration in force is not used; with
+    `calibration_in_doubt`, the limits are those of a robot without a calibration. `scanner` is the
+    file in which a simulated external scanner logs the poses it measures, `camera` the socket of a
+    simulated camera on the platform. Rows of the last `ring_s` are kept. If `pinned`, the simulator
+    and all of this process share one core. `simulator` is a simulator that was started with these
+    arguments; it belongs to this robot from `__enter__` on. The right to move is held from the
+    beginning, see `right`. Raises CommandError, DriverError and ProfileError as `cdpr run` does,
+    Error if the robot does not get ready.
     """
 
     look_s = 0.02
@@ -571,7 +571,7 @@ class LockstepRobot:
 
     @contextmanager
     def open_stream(self) -> Iterator[Callable[[Sequence[float], float], None]]:
-        """Open a stream under the right held here; yield what sends a position and its scale."""
+        """Open a stream under the right held here; yield a sender of positions and scales."""
         self._require_open()
         sender = self.stream.sender()
 

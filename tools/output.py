@@ -34,7 +34,7 @@ _SLOW_S = 2.0
 _ESTIMATED_FROM = 0.005
 """Share of the work after which the remaining time is shown."""
 _TELL_S = (2.0, 5.0)
-"""Without a terminal: time of the first report of continuing work, then the interval."""
+"""Without a terminal: time until the first report that work continues, then the interval."""
 
 
 def _plain(value: Any) -> Any:
@@ -60,10 +60,10 @@ def to_json(result: dict[str, Any], indent: int | None = None) -> str:
 _KEPT: Final = re.compile(r"`[^`]*`|(?:(?<=: )|(?<=^ {6}))cdpr .*")
 """A command within a text: somebody may copy it, so it stays in one line."""
 _GAPS: Final = re.compile(r"^\s+|\s{2,}(?=\S)")
-"""What separates labels from the text after them."""
+"""The gap between a label and the text after it."""
 _SPACE: Final = "\0"
 _LEAST_TEXT: Final = 20
-"""Fewest columns that are left to a text beside its label, and to the first column of a table."""
+"""Least width, in characters, of a text next to its label and of the first column of a table."""
 
 
 def fold(text: str, width: int | None) -> str:
@@ -166,7 +166,7 @@ def _columns(rows: Sequence[Sequence[str]], aligned: Sequence[str]) -> list[str]
 
 
 def _folded_label(row: Sequence[str], width: int) -> list[list[str]]:
-    """Return a row whose label needs several lines as several rows; the figures are in the last."""
+    """Split a row whose label needs several lines into several rows; the last has the figures."""
     labels = fold(row[0], width).split("\n")
     return [*([label, *[""] * (len(row) - 1)] for label in labels[:-1]), [labels[-1], *row[1:]]]
 
@@ -181,7 +181,7 @@ def width_of(stream: IO[str]) -> int | None:
 
 
 _ORDINARY: Final = 80
-"""Columns of a terminal that does not report them."""
+"""Width of a terminal that does not report its width."""
 _NO_LIMIT: Final = 10_000
 
 

@@ -1,7 +1,7 @@
 """Run a command several times with different delays, and compare the files that it writes.
 
-Busy processes run beside it, and its own processes are stopped from time to time. Parts of a
-file that depend on the wall clock are ignored.
+Busy processes run in parallel, and the command's processes are stopped from time to time. Parts of
+a file that depend on the wall clock are ignored.
 """
 
 from __future__ import annotations
@@ -175,7 +175,7 @@ def run_once(
 
 @contextmanager
 def _running(command: Sequence[str], work: Path, out: int) -> Iterator[subprocess.Popen[bytes]]:
-    """Run the command during the block; then end it and its children, in order if possible."""
+    """Run the command during the block; then end it and its children, properly if possible."""
     words = module_command("cdpr_tools.cli", *command)
     if "/" in command[0]:
         words = [str(Path(command[0]).absolute()), *command[1:]]

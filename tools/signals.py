@@ -20,8 +20,8 @@ HELD = (
 class StopRequest:
     """Whether the user requests an end: the first request sets a flag, the second interrupts.
 
-    It interrupts only once, by KeyboardInterrupt: later ones would prevent the power from
-    being switched off.
+    It raises KeyboardInterrupt only once, because later ones would prevent the power from being
+    switched off.
     """
 
     def __init__(self, notice: str = "") -> None:

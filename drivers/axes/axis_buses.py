@@ -209,7 +209,7 @@ class AxisBuses:
 
     @property
     def missed(self) -> int:
-        """Answers that did not arrive in time since the beginning, over all axes."""
+        """Number of answers, over all axes, that have not arrived in time since the start."""
         return sum(group.missed for group in self.groups)
 
     # -- between cycles
@@ -239,7 +239,7 @@ class AxisBuses:
         return all(group.reached(state) for group in self.groups)
 
     def states(self) -> list[State]:
-        """Return the last state that each axis reported."""
+        """Return the state that each axis reported last."""
         return self._by_axis(AxisGroup.states)
 
     def faulted(self) -> BoolArray:

@@ -95,7 +95,7 @@ _FAULT_RESET = 0x80
 _OPERATIONAL, _NOT_HEARD = 5, 0
 _DATA = 8
 _CYCLE_OVER = 1 << 62
-"""Bit of TPDOS_RECEIVED from the end of a cycle to the next SYNC."""
+"""Bit of TPDOS_RECEIVED that is set from the end of a cycle until the next SYNC."""
 _MEMORY_CYCLES = 64.0
 _FAIR_SHARE, _WORST_SHARE = 0.05, 0.4
 """Limits of the share of cycles without exactly one answer: the rate is bad; the loop trips."""
@@ -114,7 +114,7 @@ def _number(frame: NDArray[np.uint8], start: int, size: int, signed: int) -> int
 
 @jit
 def _difference(new: int, old: int) -> int:
-    """Return new − old of two 32-bit counters that wrap around, as the nearest signed number."""
+    """Return new − old of a 32-bit counter that wraps around: the smallest signed difference."""
     return (new - old + 0x80000000) % 0x100000000 - 0x80000000
 
 

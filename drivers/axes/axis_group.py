@@ -75,7 +75,7 @@ class StateArrays:
 
     @cached_property
     def feedback(self) -> AxisFeedback:
-        """The feedback whose arrays are rows of these."""
+        """The feedback, whose arrays are rows of the state arrays."""
         feedback = AxisFeedback(self.ints.shape[1])
         feedback.position_rad = self.floats[codec.POSITION_RAD]
         feedback.torque_Nm = self.floats[codec.TORQUE_NM]
@@ -89,7 +89,7 @@ class StateArrays:
 
     @cached_property
     def command(self) -> AxisCommand:
-        """The command whose arrays are rows of these."""
+        """The command, whose arrays are rows of the state arrays."""
         command = AxisCommand(self.ints.shape[1])
         command.torque_Nm = self.floats[codec.COMMAND_NM]
         command.sent_torque_Nm = self.floats[codec.SENT_NM]
@@ -307,9 +307,9 @@ class AxisGroup:
         return self.n - self._missing
 
     def let_other_buses_follow(self) -> None:
-        """Advance time on all buses that this process leads to the time of this one.
+        """Bring the time of all other buses that this process leads up to the time of this bus.
 
-        A cycle moves only the time of its bus, and the clock shows the earliest of all.
+        A cycle advances only the time of its bus, and the clock shows the earliest time of all.
         """
         if isinstance(self._reader, SimulatedBus):
             self.clock.sleep_until(self._reader.now_s)
@@ -317,7 +317,7 @@ class AxisGroup:
     def _receive_until(self, until_s: float, silent_until_s: float) -> None:
         """Process received frames; wait for more only while an axis has not answered.
 
-        Wait until `silent_until_s` if no axis has answered.
+        The wait ends at `until_s`, or at `silent_until_s` if no axis has answered.
         """
         while True:
             self._reader.poll()
@@ -327,7 +327,7 @@ class AxisGroup:
                 self._late = self._missing > 0
                 return
             self.waits += 1
-            # the kernel's own receive time-out is too coarse for a cycle
+            # the kernel's own receive timeout is too coarse for a cycle
             select.select([self._port], [], [], left_s)
 
     def _take(self, last: int) -> None:
@@ -373,17 +373,17 @@ class AxisGroup:
 
     @property
     def missed(self) -> int:
-        """Answers that did not arrive in time since the beginning, over all axes."""
+        """Number of answers, over all axes, that have not arrived in time since the start."""
         return int(self._ints[codec.MISSED].sum())
 
     @property
     def late(self) -> int:
-        """Answers that arrived after their cycle since the beginning, over all axes."""
+        """Number of answers, over all axes, that have arrived after their cycle since the start."""
         return int(self._ints[codec.LATE].sum())
 
     @property
     def repeated(self) -> int:
-        """Answers that arrived more than once in a cycle since the beginning, over all axes."""
+        """Number of answers, over all axes, that were repeated within a cycle since the start."""
         return int(self._ints[codec.REPEATED].sum())
 
     def _begin_cycling(self) -> None:
@@ -594,7 +594,7 @@ class AxisGroup:
         return bool(self._layout.probe_mapped[axis])
 
     def expect_index(self, axis: int, armed: bool) -> None:
-        """Use the next latched touch probe position of an axis as its index, or stop doing so.
+        """Use the next touch probe position of an axis as its index; stop this if not `armed`.
 
         Raises DriverError when the drive's PDOs do not carry touch probe status and position.
         """

@@ -51,7 +51,7 @@ class AxisConfig:
     """6502h; the profile's modes if the drive has no 6502h."""
     torque_limit_Nm: float
     name: str = ""
-    """Name in messages beside its node id; may be empty."""
+    """Name for messages, next to the node id; may be empty."""
 
     @classmethod
     def from_boot(
@@ -109,9 +109,9 @@ class GroupLayout:
         self.slots: NDArray[np.int64] = np.full((2048, 2), -1, np.int64)
         """Axis and kind (TPDO number in the profile, EMCY, HEARTBEAT) by identifier."""
         self.fields: NDArray[np.int64] = np.zeros((len(axes), codec.MAX_FIELDS, 5), np.int64)
-        """By axis: TPDO, target row, first byte, bytes, signed; 0 bytes end the list."""
+        """By axis, a list of fields: TPDO, target row, first byte, size, signed; size 0 ends it."""
         self.command_offsets: NDArray[np.int64] = np.zeros((len(axes), 4), np.int64)
-        """By axis: row in `rpdos` and first byte of controlword, the same of target torque."""
+        """By axis: row in `rpdos` and first byte, of the controlword and of the target torque."""
         commands = [_command_rpdos(axis.drive) for axis in axes]
         self.rpdos = FrameBuffer(sum(len(pdos) for pdos in commands))
         """The RPDOs of all axes, to be filled and sent each cycle."""

@@ -84,7 +84,7 @@ class Homing:
     def update(self) -> bool:
         """Advance by one cycle, after its `receive`; return whether homing is done.
 
-        Raises DriveFaultError if the drive reports a homing error or exceeds the time-out in bus
+        Raises DriveFaultError if the drive reports a homing error or exceeds the timeout in bus
         time; the motion has then been halted.
         """
         now = self._group.feedback.time_s

@@ -1,4 +1,4 @@
-"""Axes that another master runs: their feedback is received, and no frame is sent."""
+"""Axes that another master runs: this process receives their feedback and sends no frame."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def monitored_axis(winch: Winch, node_id: int, name: str = "") -> AxisConfig:
 
 
 class ListeningDevice:
-    """n axes on several buses, received only; implements `cdpr_rt.core.exchange.AxisDevice`.
+    """n axes on several buses, receive-only; implements `cdpr_rt.core.exchange.AxisDevice`.
 
     Time comes from the SYNC of the master that runs them: `sync` waits for the next one, up to
     0.05 s. The cycles of further buses are matched to those of the first, and matched again
@@ -192,7 +192,7 @@ class ListeningDevice:
 
     @property
     def missed(self) -> int:
-        """Answers that did not arrive since the beginning, over all axes."""
+        """Number of answers, over all axes, that have not arrived since the start."""
         return int(sum(monitor.ints[codec.MISSED].sum() for monitor in self._monitors))
 
     def _row(self, row: int) -> codec.Ints:

@@ -62,10 +62,10 @@ class Adapter(Protocol):
 
 
 class PythonCanAdapter:
-    """A bus of any interface that python-can knows."""
+    """A bus of any interface that python-can supports."""
 
     def __init__(self, url: BusUrl) -> None:
-        """Open it; raises BusError."""
+        """Open the bus; raises BusError."""
         options: dict[str, Any] = dict(url.options)
         options.pop("lockstep", None)  # used by this package, unknown to the interface
         try:
@@ -138,7 +138,7 @@ class SharedAdapter:
             self._routes = {}
 
     def remove(self, port: AdapterPort) -> None:
-        """Remove `port`; with the last one the adapter closes."""
+        """Remove `port`; close the adapter with its last port."""
         with _registry_lock:
             with self._lock:
                 if port not in self._ports:

@@ -1,4 +1,4 @@
-"""Bus budget: do the frames of a cycle fit into its period with worst-case bit stuffing."""
+"""Bus budget: whether the frames of a cycle fit into its period, with worst-case bit stuffing."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ HEARTBEATS_IN_TOLERANCE = 4
 def worst_case_bits(n: int) -> int:
     """Return the maximum number of bits of a frame with an 11-bit identifier and `n` data bytes.
 
-    The 34 + 8n bits from start of frame to the CRC may be stuffed: once after five equal bits,
-    then, since a stuff bit counts as the first of the next five, after every four. 13 more bits,
+    The 34 + 8n bits from start of frame to the CRC may be stuffed: once after five equal bits, then
+    after every four, because a stuff bit counts as the first of the next five. 13 more bits,
     interframe space included, are never stuffed (ISO 11898-1).
     """
     return bare_bits(n) + (34 + 8 * n - 1) // 4
@@ -74,7 +74,7 @@ class BusBudget:
 
     @property
     def sdo_transfers_s(self) -> float:
-        """Expedited SDO transfers (request and answer) per second that fit beside the cycles."""
+        """Expedited SDO transfers (request and answer) per second that fit between the cycles."""
         transfer_s = 2 * worst_case_bits(_FULL_BYTES) / self.bitrate_bit_s
         return max(0.0, self.margin_s) / self.period_s / transfer_s
 

@@ -77,9 +77,9 @@ class FrameBuffer:
 class FramePort(ABC):
     """A bus as 16-byte frames (`struct can_frame`) on a socket.
 
-    `send` and `recv_into` raise OSError as sockets do, so that no layer lies between the cycle
-    and the kernel: `BlockingIOError` if the time-out passed without a frame; any other OSError, or
-    a `recv_into` of 0, if the bus is gone. `lost` turns that into a BusError.
+    `send` and `recv_into` raise OSError as sockets do, so that no layer lies between the cycle and
+    the kernel. `BlockingIOError` means that the timeout passed without a frame. Any other OSError,
+    or 0 from `recv_into`, means that the bus is gone; `lost` turns that into a BusError.
     """
 
     def __init__(
@@ -99,7 +99,7 @@ class FramePort(ABC):
         timeval = struct.pack("ll", int(SEND_TIMEOUT_S), 0)
         sock.setsockopt(socket.SOL_SOCKET, socket.SO_SNDTIMEO, timeval)
         self.recv_into: Callable[[bytearray | memoryview], int] = sock.recv_into
-        """Wait for a frame up to the time-out, write it into a buffer, and return its length."""
+        """Wait for a frame up to the timeout, write it into a buffer, and return its length."""
         self.fileno: Callable[[], int] = sock.fileno
         """Return the descriptor to poll for readability."""
         self.close: Callable[[], None] = sock.close
@@ -118,7 +118,7 @@ class FramePort(ABC):
         """Limit the wait of `recv_into`; None waits indefinitely, 0 does not wait.
 
         The kernel measures the time (SO_RCVTIMEO). This saves the poll that a Python socket
-        time-out would put before each receive.
+        timeout would put before each receive.
         """
         self._sock.setblocking(seconds != 0)
         fraction, whole = math.modf(seconds or 0.0)
@@ -264,7 +264,7 @@ _MOST_PASSES = 8
 
 
 def discard(_: object) -> None:
-    """Ignore the argument: nobody uses the bus."""
+    """Ignore the argument, for a bus that nobody uses."""
 
 
 class FrameReader:

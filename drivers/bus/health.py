@@ -96,7 +96,7 @@ class BusHealth:
 
     @property
     def usable(self) -> bool:
-        """Whether frames can go out: false while bus-off."""
+        """Whether frames can be sent; false while bus-off."""
         return self.state is not BusState.BUS_OFF
 
     def counts(self) -> dict[str, int]:

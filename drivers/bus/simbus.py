@@ -1,4 +1,4 @@
-"""The simulated bus: its socket and control messages, a port, and the clock of buses led here."""
+"""The simulated bus: its socket and control messages, a port, and the clock of led buses."""
 
 from __future__ import annotations
 
@@ -151,9 +151,9 @@ _MOST_FRAMES = 26
 """Maximum number of frames in a packet to the bus."""
 _MOST_STEPS = 10_000
 _LAST_S = 0.01
-"""Bus time in which the drives act on the last commands before the time stops."""
+"""Bus time for the drives to act on the last commands before time stops."""
 _LOST_S = 1e-3
-"""Wall time of a wait if all buses are lost; without it the loop would use all CPU time."""
+"""Wall time of a wait if all buses are lost, so that the loop does not use all CPU time."""
 
 
 class LedPort(SimbusPort):
@@ -193,7 +193,7 @@ class SimulatedBus(FrameReader):
         self.now_s, self.next_s = now_s, next_s
         self.acquired = self.gone = False
         self._ahead_s = 0.0
-        """Offset by which its clock is ahead of the bus."""
+        """Offset by which `now_s` is ahead of the time that the bus reports."""
 
     def set_time(self, now_s: float) -> None:
         """Set the time to `now_s`, by an offset to the bus' time."""
@@ -243,7 +243,7 @@ class SimulatedBus(FrameReader):
                 return came
 
     def poll(self) -> bool:
-        """Return False: frames arrive only with the time, so that the result is reproducible."""
+        """Return False: frames arrive only when time advances, so that results are reproducible."""
         return False
 
     def settle(self) -> None:
@@ -264,7 +264,7 @@ class SimulatedBus(FrameReader):
 
 
 class SimulatedBusClock(LockstepClock):
-    """The time of simulated buses, by their URLs; it stands still while nobody waits."""
+    """The clock of simulated buses, by their URLs; its time stands still while nobody waits."""
 
     def __init__(self, buses: Mapping[str, SimulatedBus], *, real_time: bool = False) -> None:
         super().__init__(list(buses.values()), real_time=real_time)

@@ -26,7 +26,7 @@ _REMOTE = re.compile(r"//(?P<host>\[[^\]]+\]|[^/:]+):(?P<port>\d+)/(?P<channel>[
 
 @dataclass(frozen=True)
 class BusUrl:
-    """A parsed bus URL: interface, channel and the interface's further options."""
+    """A parsed bus URL: interface, channel and further options of the interface."""
 
     interface: str
     channel: str

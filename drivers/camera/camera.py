@@ -36,7 +36,7 @@ class Camera(ABC):
     """A source of images; open it with `cdpr_drivers.camera.camera.open_camera`."""
 
     name: str
-    """The URL with which it was opened."""
+    """The URL with which the camera was opened."""
 
     @abstractmethod
     def grab(self) -> Image | None:

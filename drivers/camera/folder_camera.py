@@ -34,7 +34,7 @@ _SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".pgm")
 
 
 class FolderCamera(Camera):
-    """Numbers in names are ordered as numbers: 9.png comes before 10.png."""
+    """Reads images in the order of their names, in which numbers count: 9.png is before 10.png."""
 
     def __init__(self, place: str, clock: Clock) -> None:
         """List the folder; raises CameraError if it has no image."""
@@ -67,7 +67,7 @@ class FolderCamera(Camera):
         self._next = len(self.files)
 
     def _eight_bits(self, pixels: NDArray[Any], name: str) -> NDArray[np.uint8]:
-        """Return grey levels of 8 bits; of 16-bit levels, the upper 8 of the bits in use."""
+        """Return 8-bit grey levels; from 16-bit levels, take the upper 8 of the bits in use."""
         if pixels.dtype == np.uint8:
             return np.asarray(pixels, np.uint8)
         if pixels.dtype != np.uint16:

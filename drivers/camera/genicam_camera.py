@@ -1,8 +1,8 @@
 """Industrial cameras over GenICam (GigE Vision, USB3 Vision) with the library harvesters.
 
-Not tested with a camera, only with the simulated ones of the library's own producer, viky.cti. It
-needs the vendor's GenTL producer, a file that ends in .cti. If the camera supports them, it uses
-Mono8 and the software trigger, so that an image is taken after the request.
+This was not tested with a real camera, only with those that the library's own producer, viky.cti,
+simulates. It needs the vendor's GenTL producer, a file that ends in .cti. If the camera supports
+them, it uses Mono8 and the software trigger, so that an image is taken after the request.
 """
 
 from __future__ import annotations

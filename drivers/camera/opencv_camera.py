@@ -12,9 +12,9 @@ cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
 
 _STREAMS = ("rtsp://", "rtsps://", "rtmp://", "udp://", "rtp://")
 _STALE = 4
-"""Maximum number of old images that a V4L2 device may have waiting."""
+"""Maximum number of old images that may wait in a V4L2 device."""
 _FRESH_S, _MOST_STALE = 0.005, 200
-"""An image that a stream delivers only after this time is a new one."""
+"""An image for which a stream needs longer than this is new; maximum number of older images."""
 
 
 class OpencvCamera(Camera):

@@ -16,7 +16,7 @@ _MOST_HEADER, _MOST_PIXELS = 4096, 100_000_000
 
 
 class SimulatedCamera(Camera):
-    """Requests one image at a time; its own time is the time of the simulated bus."""
+    """Requests one image at a time; the device time of images is bus time."""
 
     def __init__(self, place: str, clock: Clock) -> None:
         """Connect; raises CameraError."""

@@ -87,7 +87,7 @@ _PROFILE_402 = 402
 _BOOT_UP_TIMEOUT_S = 2.0
 _HEARTBEAT_MARGIN_S = 1.0
 _LISTEN_SHARE, _LISTEN_LEAST_S = 0.6, 0.25
-"""Share of the drives' heartbeat time-out; a master sends several heartbeats within it."""
+"""Time to listen for a master: share of the drives' heartbeat timeout, and least time."""
 _STEPS_FAILED_BY_FLOOD = "BK"
 
 

@@ -26,7 +26,7 @@ _COUNT, _HEAD = struct.Struct("<I"), struct.Struct("<HBI")
 
 @dataclass(frozen=True)
 class BootSettings:
-    """Settings that the master configures in a drive besides its profile."""
+    """Settings that the master configures in a drive in addition to its profile."""
 
     master_node_id: int
     sync_period_s: float
@@ -36,7 +36,7 @@ class BootSettings:
     counts_per_turn: int | None = None
     """Encoder resolution of a drive that has no 608Fh."""
     mandatory: bool = True
-    """Whether the others may start only with this drive (CiA 302-2, 1F81h bit 3)."""
+    """Whether other drives may start only with this one (CiA 302-2, 1F81h bit 3)."""
 
 
 @dataclass(frozen=True)

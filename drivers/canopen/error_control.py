@@ -41,14 +41,14 @@ class _Node:
         self.boot_ups_expected = 1
         """Boot-ups still expected; initially one, because the node may just power up."""
         self.started = False
-        """Whether it was seen operational since it was started."""
+        """Whether the node was seen operational since it was started."""
         self.starting = False
 
 
 class ErrorControl:
     """Monitors the nodes' error control messages; calls `alarm` for events that must end a motion.
 
-    `slack_s` is added to the heartbeat time-out between cycles.
+    `slack_s` is added to the heartbeat timeout between cycles.
     """
 
     def __init__(self, alarm: Callable[[Fault], None], clock: Clock, slack_s: float) -> None:
@@ -163,6 +163,6 @@ class ErrorControl:
                 node.heartbeat_s = 0.0
 
     def restart_watch(self) -> None:
-        """Restart the heartbeat time-outs (until now the cycles monitored the heartbeats)."""
+        """Restart the heartbeat timeouts (until now the cycles monitored the heartbeats)."""
         for node in self._nodes.values():
             node.heard_s = self._clock.now_s

@@ -21,7 +21,7 @@ from cdpr_drivers.canopen.sdo import ANSWER, REQUEST, SdoClient
 from cdpr_drivers.errors import BusError, DriverError, SdoAbortError, SdoTimeoutError
 from cdpr_rt.core.clock import Clock
 
-# Frames between the LSS master and the devices on one bus: requests, answers, time-outs.
+# Frames between the LSS master and the devices on one bus: requests, answers, timeouts.
 
 _MASTER, _SLAVE = 0x7E5, 0x7E4
 _NMT, _HEARTBEAT = 0x000, 0x700
@@ -304,7 +304,7 @@ class LssMaster(BusMember):
         return found
 
     def select(self, address: LssAddress) -> int:
-        """Put one device into the configuration state; return its node id, or a constant above.
+        """Put one device into the configuration state; return its node id or a constant above.
 
         Raises LssError if it does not answer.
         """
@@ -449,7 +449,7 @@ class LssMaster(BusMember):
         self._set(_STORE, b"", "to store its settings")
 
     def activate_bitrate(self, delay_s: float) -> None:
-        """Let the selected device switch: `delay_s` of silence before and after."""
+        """Let the selected device switch its rate, with `delay_s` of silence before and after."""
         self._send(bytes([_ACTIVATE]) + round(delay_s * 1e3).to_bytes(2, "little"))
 
     def _set(self, command: int, content: bytes, what: str) -> None:

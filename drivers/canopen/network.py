@@ -37,7 +37,7 @@ from cdpr_rt.core.fault import BUS_LOST, BUS_OFF, Fault
 class BusMember(ABC):
     """Base of members that send and receive frames on one bus; a source of `clock`.
 
-    Frames arrive whenever a task waits by `clock`, which leads the bus if it can.
+    Frames are processed while a task waits by `clock`, which leads the bus if it can.
 
     Raises BusError if the bus cannot be opened.
     """
@@ -315,7 +315,7 @@ class CanNetwork(BusMember):
     def duplicate_node(self, node_id: int, usual_boot_ups: int = 1) -> str:
         """Return evidence of two devices with this node id since its reset, or an empty text.
 
-        `usual_boot_ups` is how often one such drive sends its boot-up message.
+        `usual_boot_ups` is how often a single drive of this type sends its boot-up message.
         """
         boot_ups = self._errors.boot_ups_since_reset(node_id)
         # a device that stays in NMT state initialising sends heartbeats that look like more

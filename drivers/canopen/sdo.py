@@ -99,7 +99,7 @@ class SdoClient:
         """Give an upload up after `most_bytes`."""
         self._most_bytes = most_bytes
         self.unexpected = 0
-        """Answers without a request since it was set to 0 or a request timed out."""
+        """Number of answers without a request, since it was set to 0 or a request timed out."""
         self._send = send
         self._clock = clock
         self._answers: deque[bytes] = deque()

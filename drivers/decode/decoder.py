@@ -279,7 +279,7 @@ class Record:
     text: str
     fields: tuple[DecodedValue, ...] = ()
     problem: bool = False
-    """Whether it reports an error or violates the standard."""
+    """Whether the frame reports an error or violates the standard."""
 
     def line(self, start_s: float) -> str:
         """Return the record as a readable line, with its time counted from `start_s`."""

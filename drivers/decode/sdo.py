@@ -40,7 +40,7 @@ class SdoEvent:
     sub: int = 0
     data: bytes | None = None
     size: int | None = None
-    """Bytes announced, or seen so far."""
+    """Number of bytes announced, or seen so far."""
     code: int = 0
     """Abort code."""
     note: str = ""
@@ -52,12 +52,12 @@ class _Transfer:
     sub: int
     data: bytearray = field(default_factory=bytearray)
     whole: bool = True
-    """Whether no part of it was missed."""
+    """Whether no part of the value was missed."""
     block_size: int = 127
     block: list[bytes] = field(default_factory=list)
     """Segments of the present block, in order."""
     last: bool = False
-    """Whether the latest segment says that it is the last."""
+    """Whether the latest segment is marked as the last one."""
     toggle: int = 0
 
 

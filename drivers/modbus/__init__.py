@@ -1,1 +1,1 @@
-"""Modbus devices beside the drives: serial lines, load cells, remote inputs and outputs."""
+"""Modbus devices other than drives: serial lines, load cells, remote inputs and outputs."""

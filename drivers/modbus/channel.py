@@ -82,7 +82,7 @@ class ByteChannel:
         return answer
 
     def _await_in_lockstep(self, ended: Callable[[], bool]) -> None:
-        """Read while bus time stands still; a device without any answer is dead."""
+        """Read while bus time stands still; a device that does not answer at all counts as dead."""
         waiting = select.poll()
         waiting.register(self._descriptor, select.POLLIN)
         while not ended() and waiting.poll(1e3 * _DEAD_PEER_S):
@@ -162,10 +162,10 @@ def answer_in(data: bytes, framer: FramerBase, unit: int, number: int = 0) -> Mo
 
 
 class ModbusTcp:
-    """Requests to one unit behind host:port; connects automatically, again after every error.
+    """Requests to one unit behind host:port; connects automatically, and again after every error.
 
-    For one task of `clock` at a time. Every method raises ModbusError, which names device, request
-    and reason.
+    Only one task of `clock` may use it at a time. Every method raises ModbusError, which names
+    device, request and reason.
     """
 
     def __init__(self, host: str, port: int, unit: int, timeout_s: float, clock: Clock) -> None:
@@ -290,7 +290,7 @@ _READS: Final[dict[str, type[ModbusPDU]]] = {
 _READ_CODES: Final = (3, 4)
 _EXCEPTION_BYTES, _ECHO_BYTES = 5, 8
 _TURNAROUND_S: Final = 0.001
-"""Time that a device needs to answer, besides the time on the wire."""
+"""Time that a device needs to answer, in addition to the time on the wire."""
 
 
 class LineError(ModbusError):
@@ -298,12 +298,12 @@ class LineError(ModbusError):
 
 
 class ModbusLine:
-    """Requests over one serial port; opens it automatically, again after the port was lost.
+    """Requests over one serial port; opens it automatically, and again after it was lost.
 
-    For one task of `clock` at a time. Every method raises ModbusError, which names port, unit,
-    request and reason (LineError if the port is the cause). In lockstep an answer is sampled at the
-    time of the request, and returned when it would have arrived: `clock` counts its time on
-    the wire.
+    Only one task of `clock` may use it at a time. Every method raises ModbusError, which names
+    port, unit, request and reason (LineError if the port is the cause). In lockstep an answer is
+    sampled at the time of the request, and returned when it would have arrived: `clock` counts its
+    time on the wire.
     """
 
     def __init__(

@@ -1,4 +1,4 @@
-"""A safety I/O polled beside the cycle: it trips on its inputs and on missing polls."""
+"""A safety I/O that is polled in parallel to the cycle; it trips on inputs and on missing polls."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ class IoState:
     contactor_closed: bool
     brakes_asked: dict[str, bool]
     brakes_released: dict[str, bool]
-    """By axis, from the feedback contacts."""
+    """Whether each axis' brake is released, from the feedback contacts."""
     limits: tuple[Trip, ...]
     """Limit switches that are active."""
     lights: dict[str, bool]
@@ -137,7 +137,7 @@ class FeedbackMonitor:
         )
 
     def restart(self, now_s: float) -> None:
-        """Restart the feedback's time-out, after the fault was acknowledged."""
+        """Restart the feedback's timeout, after the fault was acknowledged."""
         self._since_s, self.confirmed = now_s, False
 
     def _stuck(self) -> str:
@@ -265,7 +265,7 @@ def _span(addresses: Iterable[int]) -> tuple[int, int]:
 
 
 _STOP_GRACE_S: Final = 2.0
-"""Longest time of a controlled stop; then the power is cut in any case."""
+"""Longest time of a controlled stop; after it, the power is cut even during motion."""
 _STATE_COLOURS: Final = ("red", "yellow", "green")
 
 

@@ -1,4 +1,4 @@
-"""Load cells and an inclinometer on one serial line, sampled by a task beside the cycle."""
+"""Load cells and an inclinometer on one serial line, sampled by a task in parallel to the cycle."""
 
 from __future__ import annotations
 
@@ -212,7 +212,7 @@ class TensionSampler:
         """Read every sensor once; return the minimum wait before the next round.
 
         Only one of the sensors that failed last time is polled, and only once, so that silent
-        sensors do not make the readings of the others old.
+        sensors do not delay the readings of the others.
         """
         failing = [number for number, error in enumerate(self.errors) if error]
         again = failing[self._rounds % len(failing)] if failing else -1

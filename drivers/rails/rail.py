@@ -59,9 +59,9 @@ class MoveConditions:
     """What must hold before and during a move."""
 
     cables_tight: Callable[[], str]
-    """Why the cables do not count as slack, or an empty text."""
+    """Returns why the cables do not count as slack, or an empty text."""
     powered: Callable[[], str]
-    """Which winch has power, or an empty text."""
+    """Returns which winch has power, or an empty text."""
     stop_requested: Callable[[], bool]
     progress: Callable[[float], None]
     """Called with the position in m."""

@@ -25,7 +25,7 @@ from cdpr_rt.model.robot_arrays import limits_of
 from cdpr_rt.procedures.commissioning_results import Paths
 
 CoggingProfiles = tuple[CoggingProfile | None, ...]
-"""One for each axis of a robot; None if its motor has not been commissioned."""
+"""Profile of each axis of a robot; None if its motor has not been commissioned."""
 
 
 def identity_of(report: BootReport) -> DriveIdentity:

@@ -106,7 +106,7 @@ class ListeningMachine:
         return self._led
 
     def unprepared(self) -> str:
-        """Return the text that no other master was detected."""
+        """Return, as text, that no other master was detected."""
         return f"no other master runs {self._robot.name}"
 
     def power_on(self) -> None:

@@ -50,7 +50,7 @@ _FIRST_READINGS_S = 3.0
 
 
 class RobotTensions:
-    """The load cells of a robot, read beside the cycle while they are open.
+    """The load cells of a robot, read in parallel to the cycle while they are open.
 
     Without a `port`, tensions are estimated from torques instead. Raises ConfigurationError for a
     port without configured sensors, and for more sensors than axes.
@@ -144,7 +144,7 @@ class RobotMachine:
         limits: Limits | None = None,
     ) -> None:
         self.robot = robot
-        """After the boot, it has only the axes that booted."""
+        """The robot; after the boot, it has only the axes that booted."""
         self._optional = optional
         limits = limits or limits_of(robot)
         self._torque_Nm = np.broadcast_to(limits.torque_Nm, (len(robot.axes),)).tolist()
@@ -361,7 +361,7 @@ class RobotMachine:
 
     @property
     def safety(self) -> str:
-        """Name of the safety I/O, which monitors the power in addition; empty without one."""
+        """Name of the safety I/O, which also monitors the power; empty without one."""
         return "" if self._safety is None else self._safety.io.name
 
     @_as_machine_error

@@ -1,4 +1,4 @@
-"""A safety I/O beside a session on a bus: it must allow power; brakes follow the power stage."""
+"""A safety I/O for a session on a bus: it must allow power; brakes follow the power stage."""
 
 from __future__ import annotations
 

@@ -74,9 +74,9 @@ class Client:
         """Pairs (identifier, mask) as for CAN_RAW_FILTER; None for all frames."""
         self.dropped = 0
         self.delivered = False
-        """Whether a frame was delivered since this was last cleared."""
+        """Whether a frame was delivered since this flag was last cleared."""
         self.queued: deque[bytes] = deque()
-        """Frames of its last packet that are not carried yet."""
+        """Frames of the client's last packet that the bus has not carried yet."""
         self.sent_s = 0.0
         """Time of sending of the last packet, in seconds of the monotonic clock, if stamped."""
         self.receive: Callable[[int], bytes] = sock.recv
@@ -119,7 +119,7 @@ def sent_at(stamp_s: float) -> float:
     """Return the monotonic time of a wall-clock time, not later than now.
 
     The wall clock is read between two readings of the monotonic clock; this is repeated if the
-    process was interrupted between them. If the wall clock was set since, return now.
+    process was interrupted between them. If somebody has set the wall clock since then, return now.
     """
     shortest_s, sent_s = math.inf, 0.0
     for _ in range(_CLOCK_READINGS):

@@ -35,24 +35,24 @@ class Sheet:
 
     name: str
     texture: NDArray[np.float32]
-    """From 0, ink, to 1, paper; (rows, columns), top row first."""
+    """Brightness from 0 (ink) to 1 (paper), (rows, columns), top row first."""
     half_m: tuple[float, float]
-    """Half of its true width and height."""
+    """Half of the sheet's true width and height."""
     bend_1_m: float
-    """Curvature about its vertical axis."""
+    """Curvature about the sheet's vertical axis."""
     position_m: FloatArray
     rotation: FloatArray
     moves_after_image: int | None = None
     moves_m: tuple[float, ...] = (0.0, 0.0, 0.0)
 
     def place(self, images_taken: int) -> FloatArray:
-        """Return the position of its centre, (3,), for the next image."""
+        """Return the position of the sheet's centre, (3,), for the next image."""
         if self.moves_after_image is None or images_taken < self.moves_after_image:
             return self.position_m
         return np.add(self.position_m, self.moves_m)
 
     def outline(self) -> FloatArray:
-        """Return points on its edge in its own frame, (n, 3)."""
+        """Return points on the sheet's edge, in the sheet's frame, (n, 3)."""
         x, y = self.half_m
         border = np.array([(-1, 1), (0, 1), (1, 1), (1, 0), (1, -1), (0, -1), (-1, -1), (-1, 0)])
         flat = border * (x, y)

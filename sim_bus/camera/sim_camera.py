@@ -34,7 +34,7 @@ def distorted(x: FloatArray, y: FloatArray, lens: LensPlant) -> tuple[FloatArray
 def seen_at(points: FloatArray, lens: LensPlant) -> FloatArray:
     """Return the pixels (n, 2) at which points (n, 3) of the camera's frame appear.
 
-    nan for a point behind the camera, or outside the range of such a lens.
+    Returns nan for a point behind the camera, or outside the range of such a lens.
     """
     z = np.where(points[:, 2] > 1e-3, points[:, 2], np.nan)
     x, y = points[:, 0] / z, points[:, 1] / z
@@ -88,7 +88,7 @@ class SimCamera:
         self.taken = 0
         """Images taken so far."""
         self.dark = False
-        """Whether its light is off."""
+        """Whether the light is off."""
         self.defocus_px = 0.0
         """Blur in addition to the lens'."""
         self.sheets = build_scene(plant)
@@ -100,7 +100,7 @@ class SimCamera:
         self._light = self._light_field()
 
     def skip_unplugged(self) -> bool:
-        """Return whether it is unplugged at the next image, which is then skipped."""
+        """Return whether the camera is unplugged at the next image, which is then skipped."""
         unplugged = bool(self._faults("unplugged"))
         self.taken += unplugged
         return unplugged

@@ -143,7 +143,7 @@ class CanopenSlave:
         self.now = 0.0
         """Bus time of the last call."""
         self.muted = self.bitrate != self.bus_bitrate
-        """Whether it neither sends nor receives: its bit timing differs, or LSS is switching it."""
+        """Whether the node is off the bus: its bit timing differs, or LSS is switching it."""
         self.timers = Timers()
         self.timers.add(self._boot).arm(0.0)
         self._handlers: dict[int, cob_ids.Handler] = {}
@@ -179,7 +179,7 @@ class CanopenSlave:
             self.pdo.offer_events(now)
 
     def next_event(self) -> float:
-        """Latest bus time at which `advance` must be called; math.inf if none."""
+        """Bus time by which `advance` must be called next; math.inf if there is no event."""
         return self.timers.next_due
 
     def emergency(self, code: int, register_bits: int, vendor: bytes = b"") -> None:

@@ -159,22 +159,22 @@ class Entry:
 
     @property
     def readable(self) -> bool:
-        """Whether the bus may read it."""
+        """Whether the bus may read the object."""
         return self.access != "wo"
 
     @property
     def writable(self) -> bool:
-        """Whether the bus may write it."""
+        """Whether the bus may write the object."""
         return "w" in self.access
 
     @property
     def receivable(self) -> bool:
-        """Whether an RPDO may carry it."""
+        """Whether an RPDO may carry the object."""
         return self.mappable and self.access in ("wo", "rw", "rww")
 
     @property
     def transmittable(self) -> bool:
-        """Whether a TPDO may carry it."""
+        """Whether a TPDO may carry the object."""
         return self.mappable and self.access in ("ro", "rw", "rwr", "const")
 
     def read(self) -> Value:

@@ -391,7 +391,7 @@ class Tpdo:
 
 
 def _sampler(identifier: int, entries: list[Entry]) -> Callable[[], bytes]:
-    """Return a function that packs a whole frame; written out for common numbers of objects."""
+    """Return a function that packs a whole frame; unrolled for common numbers of objects."""
     layout = "<" + "".join(entry.codec.letter for entry in entries)
     size = struct.calcsize(layout)
     frame = struct.Struct(f"{cob_ids.FRAME_HEAD}{layout[1:]}{8 - size}x")

@@ -1,4 +1,4 @@
-"""SDO server of CiA 301: expedited, segmented and block transfers, aborts and the time-out."""
+"""SDO server of CiA 301: expedited, segmented and block transfers, aborts and the timeout."""
 
 from __future__ import annotations
 

@@ -70,7 +70,7 @@ class Axis:
         """Deviation of the cable's load cell from the tension."""
         self.cable_cut = False
         self.slipped_m = 0.0
-        """Length that has slipped through the cable's fastening on purpose."""
+        """Length that fault injection has let slip through the cable's fastening."""
         self.position_offset = 0
         self._lowest, self._highest = -math.inf, math.inf
         self.clipped = False

@@ -47,7 +47,7 @@ _FOR_GOOD_MS = 0xFFFF
 _EXPEDITED_MASK, _EXPEDITED = 0xE2, 0x22
 """First byte of an SDO: an expedited download, of any size."""
 _NO_SILENCE = bytes.fromhex("002f0600000000")
-"""The rest of an SDO download of 0 to 2F00h:6."""
+"""The bytes after the first one of an SDO download of 0 to 2F00h:6."""
 _BABBLE_FRAME = b"\x00\xff\x81BABBL"
 """EMCY FF00h (device specific)."""
 

@@ -35,7 +35,7 @@ class ModeChange(Enum):
     NOT_ENABLED = auto()
     """Rejects 6060h while enabled."""
     HALTED = auto()
-    """Rejects it while enabled, and ignores it unless the controlword's halt bit is set."""
+    """Rejects 6060h while enabled, and ignores it unless the controlword's halt bit is set."""
 
 
 @dataclass(frozen=True)

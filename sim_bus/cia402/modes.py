@@ -215,7 +215,7 @@ class CyclicPosition(_Cyclic):
 
 
 class ProfilePosition(Mode):
-    """PP: set-points by the handshake of bits 4 and 12; one may wait behind the active one."""
+    """PP: set-points by the handshake of bits 4 and 12; one may wait while another is active."""
 
     number = ModeNumber.PROFILE_POSITION
     torque_mode = False

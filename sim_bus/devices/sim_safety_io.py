@@ -25,9 +25,9 @@ class SafetyAxisPlant(Profile):
     """Positions of one axis' limit switches, as true motor angle over all turns."""
 
     limit_negative_deg: float | None = None
-    """Active below this angle."""
+    """Angle below which the negative switch is active."""
     limit_positive_deg: float | None = None
-    """Active above this angle."""
+    """Angle above which the positive switch is active."""
 
 
 class SafetyPlant(PlantFile):

@@ -136,7 +136,7 @@ class _State:
             kinds[i], targets[i] = command()
 
     def run(self, until: float) -> None:
-        """Advance all to bus time `until`, with the stored commands."""
+        """Advance the whole robot to bus time `until`, with the stored commands."""
         self._run(until, self._kinds, self._targets, self.flags)
 
     def sample(self, i: int, flags: int) -> MotorSample:
@@ -162,7 +162,7 @@ class CableRobot:
         """Copy of the state, for the step computed in advance."""
         self._ahead_until = self._now = 0.0
         self._ahead_from = b""
-        """Bytes of the state before that step, with the commands."""
+        """State before the step computed in advance, with the commands, as bytes."""
         self.motors = self._state.motors
         """One record per motor, filled by `adopt`."""
         self._flags = self._state.flags
@@ -231,7 +231,7 @@ class CableRobot:
         return self._slack_length_m(i) - reeled_m
 
     def step(self, i: int, until: float) -> MotorSample:
-        """Advance all to `until`; return the `motor.Sample` of motor `i`."""
+        """Advance the whole robot to `until`; return the `motor.Sample` of motor `i`."""
         if until - self._now > _SAME_TIME_S:
             self._advance(until)
         while self._slips and self._slips[0].at_s <= self._now:

@@ -45,7 +45,7 @@ class SensorPlant(Profile):
     readout_s: Annotated[float, Field(ge=0.0, le=1.0)] = 0.02
     """Time from the first row's exposure to the last row's, for a rolling shutter."""
     noise: Annotated[float, Field(ge=0.0, le=100.0)] = 1.5
-    """Standard deviation in the dark, grey levels of 255."""
+    """Standard deviation of a dark pixel, in grey levels of 0 to 255."""
     shot_noise: Annotated[float, Field(ge=0.0, le=100.0)] = 2.0
     """Additional noise of a white pixel; it grows with the square root of the light."""
 
@@ -73,7 +73,7 @@ class LightPlant(Profile):
 
 
 class MarkerPlant(Profile):
-    """True pose of one printed marker: its centre, z out of the sheet."""
+    """True pose of one printed marker: position of its centre; z points out of the sheet."""
 
     id: _Id
     size_m: _Size_m
@@ -137,13 +137,13 @@ class BoardPlant(Profile):
 
 
 class CameraFaultPlant(Profile):
-    """A temporary fault of the camera, counted in requested images."""
+    """A temporary fault of the camera, whose begin and end are counted in requested images."""
 
     kind: Literal["dark", "defocus", "unplugged"]
     from_image: Annotated[int, Field(ge=0)]
     images: Annotated[int, Field(ge=1)] = 1
     blur_px: Annotated[float, Field(gt=0.0, le=100.0)] = 8.0
-    """Standard deviation of the blur of a point, for a fault of focus."""
+    """Standard deviation of the blur of a point, if the focus is at fault."""
 
     def holds(self, image: int) -> bool:
         """Return whether the fault is active at an image, counted from 0."""

@@ -337,7 +337,7 @@ class Sample(NamedTuple):
     """True mechanical angle over all turns; the following values are also true."""
     velocity_rad_s: float
     motor_Nm: float
-    """inertia × acceleration = motor − cogging − friction + pull of the cable."""
+    """Motor torque: inertia × acceleration = motor − cogging − friction + pull of the cable."""
     cogging_Nm: float
     friction_Nm: float
     rise_K: float
@@ -367,7 +367,7 @@ def sample_of(
 def run(
     motor: Any, until: float, kind: int, target: float
 ) -> tuple[int, int, int, int, float, float, float, float, float, float]:
-    """Advance one motor to bus time `until` in one kind of control; see `Sample`."""
+    """Advance one motor to bus time `until` in one control mode; see `Sample`."""
     m = motor[0]
     dt = until - m.time
     flags = 0

@@ -115,7 +115,7 @@ class DrivePlant(Profile):
     feedback_delay_s: Annotated[float, Field(ge=0.0, le=0.01)] = 0.0005
     """Age of the encoder reading that a SYNC latches."""
     feedback_jitter_s: Annotated[float, Field(ge=0.0, le=0.001)] = 2e-5
-    """Variation of that age from one SYNC to the next, uniform within plus and minus this."""
+    """Variation of that age from one SYNC to the next, uniform within ± this value."""
     mode_display_delay_s: Annotated[float, Field(ge=0.0, le=10.0)] = 0.005
     """Time from writing 6060h until the mode acts and 6061h shows it."""
     enable_delay_s: Annotated[float, Field(ge=0.0, le=10.0)] = 0.002

@@ -56,7 +56,7 @@ PlatformArray = NDArray[np.void]
 
 @jit
 def update_cable_ends(p: Any, motors: Any) -> None:
-    """Update each motor's distance to the far end of its cable, and its rate."""
+    """Update the distance from each motor to the far end of its cable, and the rate of change."""
     g = math.sqrt(p.gravity[0] ** 2 + p.gravity[1] ** 2 + p.gravity[2] ** 2)
     for i in range(p.cables):
         m = motors[i]
@@ -265,7 +265,7 @@ FloatArray = NDArray[np.float64]
 class RobotShape:
     """Nominal robot from its profile; points are (n, 2) in a plane or (n, 3), m.
 
-    In a plane, rotation vectors and inertias have one number, about the axis across the plane.
+    In a plane, rotation vectors and inertias have one number, about the normal of the plane.
     """
 
     exit_points_m: ArrayLike

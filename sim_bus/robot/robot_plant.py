@@ -109,9 +109,9 @@ class StartPlant(Profile):
     position_m: Vector | None = None
     """Position of the platform's origin; by default the profile's home."""
     angle_deg: _Angle_deg | None = None
-    """Angle of a platform in a plane; by default the profile's at home."""
+    """Angle of a platform in a plane; by default that of the profile at home."""
     rotation_deg: Annotated[tuple[_Angle_deg, ...], Field(min_length=3, max_length=3)] | None = None
-    """Rotation vector of a platform in space; by default the profile's at home."""
+    """Rotation vector of a platform in space; by default that of the profile at home."""
     slack_m: Annotated[tuple[_Slack_m, ...], Field(min_length=1), BeforeValidator(_one_or_each)] = (
         0.02,
     )
@@ -213,7 +213,7 @@ class RobotPlant(PlantFile):
                 )
 
     def motor_plants(self, n: int, winches: Sequence[Winch] = ()) -> list[Plant]:
-        """Return the plant of each of n motors; `winches`, if given, belong to them."""
+        """Return the plant of each of n motors; `winches`, if given, belong to these motors."""
         plants = list(self.motors) or [self.motor] * n
         if winches:
             plants = [plant.of(winch) for plant, winch in zip(plants, winches, strict=True)]

@@ -13,11 +13,11 @@ from cdpr_profiles.jit import jit
 OFF = 0
 """Power stage off: the motor coasts."""
 TORQUE = 1
-"""Target in torque units, along the torque slope."""
+"""Target in torque units, approached along the torque slope."""
 VELOCITY = 2
-"""Target in counts/s, along acceleration and deceleration."""
+"""Target in counts/s, approached with the acceleration or the deceleration."""
 PROFILE_POSITION = 3
-"""Target in counts, along a trapezoidal velocity profile."""
+"""Target in counts, reached along a trapezoidal velocity profile."""
 FOLLOW_POSITION = 4
 """Target in counts, reached along a straight line at the end of the interpolation time."""
 

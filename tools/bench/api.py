@@ -190,7 +190,7 @@ def _turns(robot: LockstepRobot) -> Iterator[Work]:
 
 
 def _paced(seconds: float, folder: Path, out: Output) -> dict[str, Row]:
-    """Move to and fro in a daemon at 250 Hz, on simulated drives that are paced too."""
+    """Move back and forth in a daemon at 250 Hz, on simulated drives that also run paced."""
     path = folder / "paced.toml"
     shipped = load_robot(ROBOT).path.read_text()
     path.write_text(shipped.replace("sync_period_s = 0.001", f"sync_period_s = {PACED_PERIOD_S}"))

@@ -1,4 +1,4 @@
-"""Measure one cycle of a platform's control, beside a plain controller in NumPy and SciPy."""
+"""Measure one cycle of a platform's control, and of a plain controller in NumPy and SciPy."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ def control_of(robot: Robot) -> CableControl:
 
 
 class PeriodicMotion:
-    """A closed motion from the middle of the box, repeated for ever: arrays over one round."""
+    """A closed motion from the middle of the box, repeated endlessly, as arrays over one round."""
 
     def __init__(self, robot: Robot, control: CableControl) -> None:
         model = control.model
@@ -100,7 +100,7 @@ class PeriodicMotion:
 def updates(
     control: CableControl | PlainControl, motion: PeriodicMotion, torques: list[FloatArray]
 ) -> Iterator[Work]:
-    """Yield one update after the other, for ever; add the torques (n,) of each to `torques`."""
+    """Yield updates endlessly; add the torques (n,) of each to `torques`."""
     n = motion.angle_rad.shape[1]
     feedback, setpoint, torque = AxisFeedback(n), Setpoint(n), np.zeros(n)
     for row in cycle(range(len(motion.position))):
@@ -122,7 +122,7 @@ _SMOOTHING, _DAMPING = 0.3, 0.7
 
 
 class PlainControl:
-    """Simple computed-torque control: pose by Gauss-Newton, PD, tensions of least norm.
+    """Simple computed-torque control: pose by Gauss-Newton, PD, tensions of minimum norm.
 
     It assumes eyes as exit points and rigid cables. It learns nothing.
     """

@@ -1,4 +1,4 @@
-"""Measure the host's cost of one exchange with 8 axes, beside the canopen package on one bus.
+"""Measure the host's cost of one exchange with 8 axes on one bus, and that of the canopen package.
 
 Each way sends SYNC, takes the n TPDOs (6041h, 6064h, 6077h) and sends the n RPDOs (6040h, 6071h).
 """
@@ -27,7 +27,7 @@ from cdpr_tools.output import Output
 
 AXES = 8
 PERIOD_S = 2e-3
-"""Eight drives fill 1.9 ms of a bus at 1 Mbit/s."""
+"""Cycle period; eight drives use 1.9 ms of it on a bus at 1 Mbit/s."""
 OURS, CANOPEN = "ours: AxisGroup", "the canopen package's PDOs"
 _WINCH = "winch-mpp0923d"
 _BLOCK, _WARM_UP = 500, 50

@@ -1,6 +1,6 @@
 """Run as a program: flood a daemon's interfaces as fast as possible.
 
-The argument is the JSON of a `Target`. The program ends by SIGTERM, or after `seconds`, and prints
+The argument is the JSON of a `Target`. The program ends at SIGTERM, or after `seconds`, and prints
 one line of JSON: how many of each kind it sent.
 """
 

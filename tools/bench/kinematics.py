@@ -1,4 +1,4 @@
-"""Measure the cost of a pose from cable lengths, and how bad its start may be, beside SciPy."""
+"""Measure the cost of a pose from cable lengths, and how far off its start may be; and SciPy's."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Measure the cost of the daemon's control loop, beside a baseline loop in plain Python."""
+"""Measure the cost of the daemon's control loop, compared with a baseline loop in plain Python."""
 
 from __future__ import annotations
 
@@ -44,8 +44,8 @@ Run = Mapping[str, Any]
 def measure(seconds: float, out: Output, name: str = "") -> Figures:
     """Run each variant for `seconds`; raises WorkFailedError and what `cdpr_rt.run` raises.
 
-    The variants take turns, so that other load on the machine affects all equally. `name` is the
-    robot's; without it bare axes are turned. The baseline loop turns only bare axes.
+    The variants take turns, so that other load on the machine affects all equally. `name` selects a
+    robot; without it, bare axes turn. The baseline loop turns only bare axes.
     """
     with tempfile.TemporaryDirectory(prefix="cdpr-bench-") as folder:
         robot = with_tolerant_limits(load_robot(name or ROBOT), Path(folder))

@@ -39,7 +39,7 @@ class Process:
     """Resources that one process holds at one moment."""
 
     memory_KiB: int
-    """Its private memory, swapped out or not, without file-backed pages."""
+    """Private memory of the process, swapped out or not, without file-backed pages."""
     open_files: int
 
     @classmethod

@@ -1,4 +1,4 @@
-"""Measure cost and results of tension distribution from Python, beside general solvers."""
+"""Measure cost and results of tension distribution from Python, compared with general solvers."""
 
 from __future__ import annotations
 

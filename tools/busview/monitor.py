@@ -99,7 +99,7 @@ class FrameSource:
 
 
 _MORE_BITS_EXTENDED = 25
-"""20 bits of the identifier, and up to 5 stuff bits."""
+"""Additional bits of an extended frame: 20 bits, and up to 5 stuff bits."""
 
 
 @dataclass

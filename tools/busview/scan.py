@@ -61,10 +61,10 @@ class NodeInfo:
 
     node_id: int
     nmt_state: int | None = None
-    """State in its latest heartbeat."""
+    """NMT state in the node's latest heartbeat."""
     heartbeats: int = 0
     answers: bool = False
-    """Whether it answers SDO requests."""
+    """Whether the node answers SDO requests."""
     in_segments: bool = False
     """Whether this scan's last request was for a segment."""
     objects: dict[Object, bytes] = field(default_factory=dict)
@@ -73,7 +73,7 @@ class NodeInfo:
     answered: defaultdict[bytes, list[bytes]] = field(default_factory=lambda: defaultdict(list))
     """The answers to these requests, from any device."""
     is_shared: bool = False
-    """Whether another client makes transfers with it, so that answers may belong to those."""
+    """Whether another client makes transfers with the node and may be meant by its answers."""
 
     @property
     def repeated(self) -> set[bytes]:
@@ -84,7 +84,7 @@ class NodeInfo:
 
     @property
     def differing(self) -> list[str]:
-        """Those of the repeated objects whose answers differ."""
+        """Repeated objects whose answers differ."""
         objects = self.repeated - {_SEGMENT}
         return sorted(_NAMES[what] for what in objects if len(set(self.answered[what])) > 1)
 
@@ -117,12 +117,12 @@ class NodeInfo:
 
     @property
     def is_drive(self) -> bool:
-        """Whether its device type (1000h) is that of CiA 402."""
+        """Whether the node's device type (1000h) is that of CiA 402."""
         return (self.number(0x1000) or 0) & 0xFFFF == _CIA_402
 
 
 LISTEN_S = 1.2
-"""Long enough for heartbeats with a period of 1 s."""
+"""Listening time, long enough for heartbeats with a period of 1 s."""
 _IN_FLIGHT = 64
 _HEARTBEAT = 0x700
 _NODE, _FUNCTION = 0x07F, 0x780
@@ -132,7 +132,7 @@ _FILTERS += [(base, _FUNCTION) for base in (*_RPDOS, ANSWER, REQUEST, _HEARTBEAT
 _LAST_STANDARD_ID = 0x7FF
 _NEXT_SEGMENT = 0x60
 _MOST_BYTES = 1024
-"""No object that is read here is longer."""
+"""Maximum size of an object; the objects that this scan reads are shorter."""
 
 
 @dataclass
@@ -345,7 +345,7 @@ def responding(found: dict[int, NodeInfo]) -> list[NodeInfo]:
 
 
 def lines(entries: Sequence[dict[str, Any]]) -> list[str]:
-    """Return a readable table: a row for each node, below it its identity and its problems."""
+    """Return a readable table: a row for each node, below it the node's identity and problems."""
     rows = [_TITLES, *(_row(node) for node in entries)]
     widths = [max(len(row[i]) for row in rows) for i in range(len(_TITLES))]
     table: list[str] = []

@@ -190,7 +190,7 @@ def _stopped() -> Iterator[None]:
 
 
 def _require_other_folder(folder: Path) -> None:
-    """Raise BadInputError if files in the folder that are not a check's would be overwritten."""
+    """Raise BadInputError if the check would overwrite files that no check has written."""
     if (folder / DATA).exists():
         raise BadInputError(
             f"--out {folder}: contains the poses of a calibration; choose another folder"

@@ -57,15 +57,16 @@ class CountedFrom(Profile):
 def robot_of(daemon: Daemon, as_calibrated: bool = False) -> tuple[Robot, dict[str, Any]]:
     """Return the robot that a daemon runs, and the daemon's description of it.
 
-    It must run with the geometry of its file or, if `as_calibrated`, of its calibration. Raises
-    BadInputError if it does not, has no platform, or its file or calibration has changed since.
+    The robot must run with the geometry of its file or, if `as_calibrated`, of its calibration.
+    Raises BadInputError if it does not, if it has no platform, or if its file or calibration has
+    changed since the start.
     """
     description = daemon.get("/description")
     return profile_of(description, as_calibrated), description
 
 
 def profile_of(description: Mapping[str, Any], as_calibrated: bool = False) -> Robot:
-    """Return the robot of such a description; raises BadInputError as `robot_of`."""
+    """Return the robot that a daemon describes; raises BadInputError as `robot_of` does."""
     robot = load_robot(description["reference"])
     if robot.platform is None:
         raise BadInputError(f"{robot.path}: {NO_PLATFORM}")

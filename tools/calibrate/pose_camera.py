@@ -201,5 +201,5 @@ def _ordered(scene: CameraPlant) -> MarkerSheets:
 
 
 def _ids(sizes: list[tuple[int, float]], size_m: float | None) -> tuple[int, ...]:
-    """Return the ids of one size, or all ids if it is None, each once."""
+    """Return the ids of markers of one size (None: all sizes), without repetition."""
     return tuple(sorted({marker for marker, size in sizes if size_m is None or size == size_m}))

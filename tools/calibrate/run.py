@@ -328,9 +328,9 @@ def _going_on(robot: Robot, kept: StoredRun) -> str:
 
 
 def _scanned_s(pose: int) -> float:
-    """Return how much longer the scanner measures a pose, counted from 0, used for verification.
+    """Return the additional time of the scanner at a pose for verification, counted from 0.
 
-    It measures the first pose longest: all errors are relative to it and contain its error.
+    The first pose takes longest, because all errors are relative to it and contain its error.
     """
     if pose == 0:
         return _FIRST_S

@@ -200,8 +200,7 @@ def open_daemon(
 ) -> Iterator[Daemon]:
     """Yield the daemon that the options name; without options, the only one.
 
-    It must answer each request within `answer_s`.
-    Raises BadInputError and NoDaemonError.
+    The daemon must answer each request within `answer_s`. Raises BadInputError and NoDaemonError.
     """
     timeout = httpx.Timeout(_CONNECT_S, read=answer_s)
     if url is not None:
@@ -293,7 +292,7 @@ def _only_socket(robot: str | None) -> Path:
 
 
 def _start_stage(robot: str | None, unix: Path | None) -> str | None:
-    """Return the step of the first launcher of the robot or at the socket; None if none runs."""
+    """Return the present step of the first launcher of the robot or at the socket, or None."""
     marks = find_launcher_files(robot) if unix is None else [unix.with_suffix(LAUNCHER_SUFFIX)]
     doing = next((doing for doing in map(launcher_does, marks) if doing is not None), None)
     return "its program is loaded" if doing is None and launcher_loads(robot, unix) else doing

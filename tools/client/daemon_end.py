@@ -89,7 +89,7 @@ def end_daemon(daemon: Daemon, out: Output, socket: Path | None) -> None:
 def _status_before_end(
     daemon: Daemon, socket: Path | None
 ) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Return status and description; a service that hangs or is flooded must not delay a stop."""
+    """Return status and description; do not wait for a service that hangs or is flooded."""
     if socket is not None:
         with suppress(WorkFailedError, OSError, SharedBlockError):
             return status_in_memory(LoopFile.read(LoopFile.beside(socket)))

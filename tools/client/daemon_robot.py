@@ -70,7 +70,7 @@ _SILENT_S: Final = 5.0
 _LOOKED_AFTER_S: Final = 1.0
 """A loop that has run no cycle for this time hangs."""
 _END_S: Final = 90.0
-"""Time for a daemon to end, besides lowering the platform."""
+"""Time for a daemon to end, in addition to the time to lower the platform."""
 
 
 def connect(robot: str | Path | None = None, *, socket: str | Path | None = None) -> Robot:
@@ -156,7 +156,7 @@ def _require_no_daemon(robot: str) -> None:
 
 @contextmanager
 def commanded(daemon: Daemon, *, in_control: bool = False) -> Iterator[Robot]:
-    """Yield the daemon's robot to a command; its errors are raised as those of commands.
+    """Yield the daemon's robot to a command; its errors are raised as errors of the command.
 
     If it is `in_control`, the right to move is taken before the block, and the robot is held at its
     end.
@@ -176,7 +176,7 @@ def commanded(daemon: Daemon, *, in_control: bool = False) -> Iterator[Robot]:
 
 @contextmanager
 def robot_errors() -> Iterator[None]:
-    """Raise errors of a robot's handle in the block as those of commands."""
+    """Raise errors of a robot's handle in the block as errors of the command."""
     try:
         yield
     except Error as error:
@@ -184,7 +184,7 @@ def robot_errors() -> Iterator[None]:
 
 
 def command_error(error: Error) -> CommandError:
-    """Return the command's error for an error of the handle: its cause, if that is one."""
+    """Return the command's error for an error of the handle: its cause, if a CommandError."""
     cause = error.__cause__
     if not isinstance(cause, CommandError):
         bad = isinstance(error, InvalidArgument)
@@ -351,7 +351,7 @@ class _Remote:
 
     @contextmanager
     def open_stream(self) -> Iterator[Callable[[Sequence[float], float], None]]:
-        """Open the daemon's stream; yield what sends a position and its scale."""
+        """Open the daemon's stream; yield a function that sends a position and its scale."""
         token = self.take_right()
         with self._errors():
             given = self._daemon.post("/stream", token=token)
@@ -382,7 +382,7 @@ class _Remote:
         return log[list(fields)][log["stamp_ns"] <= until_ns]
 
     def _recorded(self, first: Path, last: Path, fields: Collection[str]) -> Row:
-        """Return the rows since the handle was opened, from these recordings and those between."""
+        """Return the rows since the handle was opened, from the recordings `first` to `last`."""
         # imported here: it needs pyarrow
         from cdpr_rt.service.recording_file import RecordingError  # noqa: PLC0415
         from cdpr_rt.service.recording_reader import RecordingReader  # noqa: PLC0415

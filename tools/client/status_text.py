@@ -34,7 +34,7 @@ def power_text(status: dict[str, Any]) -> str:
 
 
 def death_text(status: dict[str, Any]) -> str:
-    """Return that the control loop has died, the power of the drives, and the next command."""
+    """Return that the control loop has died, the state of the power, and the next command."""
     return (
         f"{status['reason']}; {power_text(status)}; next: `cdpr stop` ends the rest of "
         "the daemon, then `cdpr run` starts it again"

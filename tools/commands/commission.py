@@ -61,7 +61,7 @@ def chosen_axes(
 ) -> tuple[_MotorOfRobot, ...]:
     """Return the motors of the axes called `names`, or of all; files go into `folder`.
 
-    Raises BadInputError for an unknown name, and unless exactly one of names and all is given.
+    Raises BadInputError for an unknown name, and unless either `names` or `every` is given.
     """
     known = {axis.name: axis for axis in robot.axes}
     allowed = ", ".join(repr(name) for name in known)

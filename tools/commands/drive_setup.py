@@ -43,11 +43,11 @@ class _Device:
     node_id: int
     profile: str | None
     alone: bool = False
-    """Whether it is the only device on the bus, so that no search was needed."""
+    """Whether the device is the only one on the bus, so that no search was needed."""
 
     @property
     def has_node_id(self) -> bool:
-        """Whether it is known to have a node id."""
+        """Whether the device is known to have a node id."""
         return self.node_id not in (UNCONFIGURED, NODE_ID_UNKNOWN)
 
     @property

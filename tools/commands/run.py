@@ -225,7 +225,7 @@ def run(
 
 
 def _end_with_stdin() -> None:
-    """End this process as SIGTERM does when its standard input ends."""
+    """End this process, as SIGTERM does, when standard input ends."""
     with suppress(OSError, ValueError):
         while os.read(sys.stdin.fileno(), 4096):
             pass
@@ -273,7 +273,7 @@ def _writable(folder: Path | None, asked: Path | None, out: Output) -> Path | No
 
 
 def _note_doubts(robot: Robot, out: Output) -> None:
-    """Print warnings about the robot; raises ProfileError for one that cannot work."""
+    """Print warnings about the robot; raises ProfileError if it cannot work."""
     for doubt in refuse_impossible(robot):
         out.note(doubt)
 
@@ -415,7 +415,7 @@ def _launch(
 def _report_ready(report: dict[str, Any], url: str, out: Output) -> None:
     """Report on standard output that the daemon is ready, as JSON unless a person reads it.
 
-    Only a person sees the page's key: other readers of the output may be logs.
+    Only a terminal shows the page's key, because other output may go to a log.
     """
     report["page"] = url.partition("#")[0] or None
     if out.as_json or not sys.stdout.isatty():

@@ -94,7 +94,7 @@ def _absolute(name: str, value: Any) -> str:
 
 
 _STOP_S = 60.0
-"""Time that the launcher needs to end the loop and the recording, without lowering."""
+"""Time that the launcher needs to end the loop and the recording, without the time for lowering."""
 
 
 def service_unit(robot: Robot, urls: Sequence[BusUrl], options: Sequence[str], user: str) -> str:

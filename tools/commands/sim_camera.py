@@ -1,4 +1,4 @@
-"""`cdpr sim camera` and `cdpr sim photos`: a simulated camera beside a robot, or without one."""
+"""`cdpr sim camera` and `cdpr sim photos`: a simulated camera, with or without a robot."""
 
 from __future__ import annotations
 

@@ -104,7 +104,7 @@ def fault(
 
 
 def _profile(machine: str, *, by_daemon: bool) -> tuple[Winch | Robot, str]:
-    """Return the machine of a profile or of a daemon with this name, and its daemon's name."""
+    """Return the machine of the profile or daemon with this name, and the daemon's name."""
     try:
         profile = load_winch_or_robot(machine)
     except ProfileError:

@@ -94,8 +94,8 @@ def verify(
 
 
 def _show(out: Output, runs: Sequence[Run], verdicts: Sequence[Verdict]) -> bool:
-    """Print the verdicts; return whether all files are equal. Raises WorkFailedError if there are
-    none."""
+    """Print the verdicts; return whether all files are equal. Raises WorkFailedError without
+    files."""
     if not any(verdict.same is not None for verdict in verdicts):
         raise WorkFailedError("the command wrote no file that can be compared")
     for verdict in verdicts:

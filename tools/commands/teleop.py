@@ -148,7 +148,7 @@ def robot(
             raise BadInputError(f"{option} {given}: allowed only with --device gamepad")
 
     def open_device(directions: Directions) -> InputDevice:
-        """Open the device after everything else has been checked."""
+        """Open the device; called after everything else has been checked."""
         if device is Device.SCRIPT:
             return ScriptDevice(lines)
         if device is Device.KEYBOARD:

@@ -29,8 +29,8 @@ _FAST_LEGS: Final = (
     (math.radians(90.0), 1.0 * math.tau),
     (math.radians(12.0), 0.25 * math.tau),
 )
-"""Speed and distance, each there and back: fast turns for inertia and viscous friction, slower
-ones for the friction curve."""
+"""Speed and distance, there and back: fast turns for inertia and viscous friction, slower turns for
+the friction curve."""
 _INDEX_SPEED_RAD_S, _INDEX_RAD = math.radians(90.0), 1.2 * math.tau
 _FULL_SPEED_SHARE = 0.999
 FIELDS: Final = ("cycle", "time_s", "program", *AXIS_COLUMNS)
@@ -89,7 +89,7 @@ class SweptAxis:
 
 
 def sweep(robot: Robot, axis: SweptAxis, turns: int, speed_rad_s: float, out: Output) -> None:
-    """Find the index of one motor, sweep there and back, and turn at other speeds.
+    """Find the index of one motor, sweep it in both directions, and turn it at other speeds.
 
     The other axes hold their positions. The drives have no power afterwards, even after an error.
     """

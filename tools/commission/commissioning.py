@@ -74,7 +74,7 @@ class Measurement:
         self._limit_Nm = np.full(session.device.n, _TORQUE_SHARE * rated)
 
     def sweep(self, gain_Nm_rad: float, speed_rad_s: float, turns: int) -> list[Path]:
-        """Sweep both directions slowly under the proportional controller (Tremblay, 1.3, 1.4)."""
+        """Sweep slowly both ways under the proportional controller (Tremblay, 1.3, 1.4)."""
         controller = Proportional(np.full(self._session.device.n, gain_Nm_rad), self._limit_Nm)
         passes = both_ways(speed_rad_s, SWEEP_LEAD_IN_RAD, turns)
         return self._run("sweep", controller, passes, {"gain_Nm_rad": gain_Nm_rad})
@@ -183,7 +183,7 @@ def _refine(second: SecondPass, recorded: list[Path]) -> None:
 
 
 def planned_s(plan: Plan) -> float:
-    """Return the approximate bus time for which the motor turns by a plan."""
+    """Return the approximate bus time for which a plan turns the motor."""
     ramp = ramps(both=False)[0].duration_s()
     refining = both_ways(VALIDATION_SPEED_RAD_S, _SHORT_LEAD_IN_RAD, 1)
     others = len([b for b in plan.bandwidths_Hz if b != DEFAULT_BANDWIDTH_HZ])
@@ -293,8 +293,8 @@ class Commissioning:
         """Sweep both ways; if the rotor runs away, repeat with lower gain.
 
         The latency feeds energy into an oscillation in proportion to its squared amplitude, but
-        friction removes it only in proportion to the amplitude. A large enough snap therefore makes
-        the rotor run away if the gain is too high.
+        friction removes it only in proportion to the amplitude. If the gain is too high, a large
+        enough snap therefore makes the rotor run away.
         """
         plan = self._plan
         for attempt in range(_SWEEP_ATTEMPTS):
@@ -317,7 +317,7 @@ class Commissioning:
         self._session.enable()
 
     def measure_again(self, found: Identified, bandwidth_Hz: float) -> Identified:
-        """Record ramps under compensation and refine until they no longer get smoother."""
+        """Record ramps with compensation, and refine it until the ramps no longer get smoother."""
         session = self._session
         second = session.run_blocking(
             lambda: SecondPass(found.harmonic, legs(self._paths.passes("fast")))

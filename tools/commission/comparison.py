@@ -49,7 +49,8 @@ def runs_of(folder: Path) -> list[Run]:
 def explained(table_Nm: FloatArray, run: Run) -> float:
     """Return R2 of a run: the share of the torque's variance that a table over the turn explains.
 
-    Both are compared as the drive reads the torque, after its filter; the mean is friction.
+    Table and run are compared after the filter of the drive's torque reading. Their means are left
+    out, because the mean torque is friction.
     """
     sweep, count = run.sweep, table_Nm.size
     place = np.mod(sweep.angle_rad / (2.0 * np.pi), 1.0) * count
@@ -63,7 +64,7 @@ def explained(table_Nm: FloatArray, run: Run) -> float:
 
 
 def tables(profile: CoggingProfile, used: Sequence[Run]) -> dict[str, FloatArray]:
-    """Return the tables over the turn of each method, rows: increasing angle, decreasing angle."""
+    """Return each method's table over the turn; rows: increasing angle, decreasing angle."""
     return {
         "harmonic": np.array(profile.harmonic.table_Nm),
         "thesis": np.array(profile.thesis.table_Nm),

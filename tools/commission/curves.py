@@ -28,7 +28,7 @@ _SETTLING_rad = math.radians(60.0)
 
 @dataclass(frozen=True)
 class Ramp:
-    """The judged part of one validation pass; arrays (k,), deviations as used for judging."""
+    """The judged part of one validation pass: arrays (k,) with the deviations that are judged."""
 
     time_s: FloatArray
     position_error_deg: FloatArray
@@ -65,7 +65,7 @@ class ResidualEffort:
     effort_Nm: FloatArray
     """Effort over the turn, about its mean, (d, m)."""
     amplitudes_Nm: FloatArray
-    """Amplitudes of its orders 1, 2, ... (d, k)."""
+    """Amplitudes of the effort's orders 1, 2, ... (d, k)."""
     rms_Nm: float
     repeating_rms_Nm: float | None
     """RMS of the part that repeats in the next turn; None if too little was recorded."""
@@ -177,7 +177,7 @@ def strongest_order(harmonic: HarmonicResult) -> int:
 
 
 def filter_gain(order: int) -> float:
-    """Return the share of an order that the thesis' filter passes: degree 2 over 5 deg."""
+    """Return the share of an order that the thesis' filter (degree 2, window of 5 deg) passes."""
     half = round(0.5 * WINDOW_deg / 360.0 * GRID)
     weights = scipy.signal.savgol_coeffs(2 * half + 1, DEGREE)
     return float(weights @ np.cos(math.tau * order * np.arange(-half, half + 1) / GRID))

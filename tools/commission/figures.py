@@ -164,7 +164,7 @@ class Deviation:
 
 
 def deviations(time_s: FloatArray, curves: Mapping[str, FloatArray], what: Deviation) -> str:
-    """Draw a deviation on the ramp by method, and again on the best one's scale.
+    """Draw a deviation on the ramp by method, and again on the scale of the best method.
 
     Tremblay, figures 1.9 and 1.10; the second panel also has the floor as a band.
     """

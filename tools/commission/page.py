@@ -29,7 +29,7 @@ class _Quantity(NamedTuple):
     """One of the three figures of the validation."""
 
     ratio: str
-    """Its key among the ratios."""
+    """Key of the quantity among the ratios."""
     unit: str
     key: str
     name: str
@@ -157,7 +157,7 @@ def _pictures(
 
 
 def bus_facts(bus: dict[str, Any]) -> dict[str, Any]:
-    """Return the facts about the bus, with its cycle in ms and its speed if they are known."""
+    """Return the facts about the bus, with the cycle in ms and the bit rate if they are known."""
     facts = dict(bus)
     if bus.get("period_s"):
         facts["period_ms"] = f"{1e3 * bus['period_s']:g}"

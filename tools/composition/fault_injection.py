@@ -44,7 +44,7 @@ class FaultInjection(NamedTuple):
     unit: str
 
     def amount(self, what: str, text: str | None) -> int:
-        """Return the value that a text gives, by default the usual one; raises BadInputError."""
+        """Return the value that a text gives, or the usual value; raises BadInputError."""
         try:
             amount = self.usual if text is None else int(text, 0)
         except ValueError:
@@ -67,9 +67,9 @@ _INJECTIONS = {
     InjectedFault.PUT_BACK: FaultInjection(15, 1, 1, 1, ""),
 }
 _VIRTUAL: Final = ("vcan", "vxcan")
-"""Beginnings of the names of virtual CAN interfaces on Linux, to which no drive is wired."""
+"""Prefixes of the names of virtual CAN interfaces on Linux, to which no drive is wired."""
 _LASTING: Final = (InjectedFault.CUT_CABLE, InjectedFault.SLIP, InjectedFault.CELL_OFF)
-"""Faults that last until they are mended, besides silence; the others happen once."""
+"""Faults, in addition to silence, that last until they are mended; the others happen once."""
 MEND: Final = "mend"
 """Repairs all lasting faults."""
 

@@ -47,10 +47,10 @@ def control_loop(
     stops: StopSocket | None = None,
     **described: Any,
 ) -> ControlLoop:
-    """Return the loop that runs `machine` with `parts`; its description is then in `block`.
+    """Return the loop that runs `machine` with `parts`; write its description to `block`.
 
-    `described` are additional entries of the description. The right to move expires by `clock_ns`,
-    by default CLOCK_MONOTONIC. Local clients stop the motion through `stops`.
+    `described` are additional entries of the description. `clock_ns`, by default CLOCK_MONOTONIC,
+    is the clock by which the right to move expires. Local clients stop the motion through `stops`.
     """
     block.write_description({**description(robot, limits, parts), **described})
     return ControlLoop(block, machine, parts, clock_ns, stops)

@@ -1,4 +1,4 @@
-"""Code of the user's own that a control loop runs."""
+"""The user's own code that a control loop runs."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ from cdpr_tools.errors import BadInputError
 
 @dataclass(frozen=True)
 class OwnCode:
-    """Code that replaces or extends what is built in."""
+    """Code that replaces or extends built-in parts."""
 
     controller: Controller | None = None
     tension_distribution: TensionDistribution | None = None
     programs: Sequence[tuple[str, Any]] = ()
-    """Further programs of a platform, each with the reference for messages."""
+    """Further programs of a platform, each with its reference in messages."""
 
 
 @dataclass(frozen=True)

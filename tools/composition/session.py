@@ -249,7 +249,7 @@ def booted(
 def _loop_of(
     stack: ExitStack, machine: RobotMachine, tolerance: Tolerance
 ) -> tuple[ControlLoop, TrackProgram]:
-    """Return the loop of the machine's axes, and its program."""
+    """Return the loop of the machine's axes, and the program that it runs."""
     robot, n, period_s = machine.robot, len(machine.robot.axes), machine.robot.sync_period_s
     limits = _limits(robot, tolerance)
     block = SharedBlock.create(n, _RING_S, 1.0 / period_s)

@@ -102,7 +102,7 @@ class OwnLoadCells(_OwnProcess):
     def __init__(self, sensors: str, board: Path) -> None:
         super().__init__("sim", "tension", sensors, "--board", str(board))
         self.port = str(json.loads(self.ready)["ready"]["port"])
-        """Path of its serial line."""
+        """Path of the serial line."""
 
 
 class OwnSimulator(_OwnProcess):
@@ -149,9 +149,9 @@ class OwnSimulator(_OwnProcess):
 class LockstepSimulator(OwnSimulator):
     """A simulator of `robot` in lockstep, on a separate bus, with a folder for its files.
 
-    It has started, but is ready only after `await_ready`.
-    `reference` is the name or file of the robot. The true pose of a platform is logged to
-    `truth_log`, by default to a file in the folder.
+    The process has started, but it is ready only after `await_ready`. `reference` is the name or
+    file of the robot. The true pose of a platform is logged to `truth_log`, by default to a file in
+    the folder.
     """
 
     def __init__(
@@ -194,7 +194,7 @@ class OwnCamera(_OwnProcess):
 
 
 def _without_notices(output: str) -> str:
-    """Return output other than notices about compiled kernels, which are forwarded by lines."""
+    """Return output other than notices about compiled kernels, which are forwarded line by line."""
     kept = ""
     for line in output.splitlines(keepends=True):
         if line.startswith(NOTICE) and line.endswith("\n"):

@@ -52,7 +52,7 @@ def signal_launcher(launcher_pid: int, number: signal.Signals) -> None:
 
 
 def is_running(pid: int) -> bool:
-    """Whether the process exists; a zombie counts too."""
+    """Whether the process exists, even as a zombie."""
     try:
         os.kill(pid, 0)
     except ProcessLookupError:

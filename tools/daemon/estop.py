@@ -44,7 +44,7 @@ class EmergencyStopResult:
 
 
 class EmergencyStop:
-    """Signals one robot's loop to cut the power when created; `outcome` waits for the drives."""
+    """Signals one robot's loop, when created, to cut the power; `outcome` waits for the drives."""
 
     def __init__(self, path: Path) -> None:
         """Signal the loop that the file at `path` names."""
@@ -143,7 +143,7 @@ class EmergencyStop:
         return row if row is not None and int(row["stamp_ns"]) > self._asked_ns else None
 
     def _power_is_off(self) -> str:
-        """Return the text that every drive confirms in a later cycle; empty until then."""
+        """Return a text once every drive has confirmed in a later cycle; empty until then."""
         row = self._cycling()
         if row is None:
             return ""
@@ -212,7 +212,7 @@ def _user(uid: int) -> str:
 _LAUNCHER_S: Final = 10.0
 """Once the loop has ended, a working launcher ends within this time."""
 _STARTING_S: Final = 60.0
-"""A launcher ends the processes that it is starting within this time; none has power."""
+"""A launcher ends the processes that it is starting within this time; no drive has power yet."""
 
 
 def launcher_left(socket: Path) -> str:
@@ -226,9 +226,9 @@ def launcher_left(socket: Path) -> str:
 def end_leftover_processes(robot: str | None, socket: Path | None) -> list[str]:
     """End a daemon whose service does not answer; return lines that describe the actions.
 
-    A loop without a service stops under control. A daemon that is starting ends as by Ctrl-C. If
-    neither runs, do nothing and return no line. Raises BadInputError if several run and none was
-    named, WorkFailedError if it belongs to another user or does not end.
+    A loop without a service stops under control. A daemon that is starting ends as after Ctrl-C. If
+    neither runs, do nothing and return no line. Raises BadInputError if several daemons run and the
+    user named none. Raises WorkFailedError if the daemon belongs to another user or does not end.
     """
     paths = find_loops(robot) if socket is None else [LoopFile.beside(socket)]
     found = [(path, LoopFile.read(path)) for path in paths if _is_there(path)]
@@ -252,7 +252,7 @@ def _is_there(path: Path) -> bool:
 
 
 def end_starting(socket: Path) -> list[str]:
-    """End a daemon that is starting, as by Ctrl-C; return the action, no line if none runs."""
+    """End a daemon that is starting, as Ctrl-C does; return the action, or no line if none runs."""
     path = socket.with_suffix(LAUNCHER_SUFFIX)
     pid = launcher_pid(path)
     return [] if pid is None else [_end_start(path, pid)]

@@ -34,9 +34,10 @@ _MOST_CHARS: Final = 900
 
 
 class ServiceManager:
-    """The manager that started this process with Type=notify, if one did.
+    """The service manager (such as systemd) that started this process with Type=notify, if any.
 
-    Its variables are removed from the environment: children do not notify in place of this process.
+    The manager's variables are removed from the environment, so that children do not notify in
+    place of this process.
     """
 
     def __init__(self) -> None:
@@ -47,7 +48,7 @@ class ServiceManager:
         self._pending: dict[str, str] = {}
         watched = microseconds.isdigit() and whose in ("", str(os.getpid()))
         self.watchdog_s = int(microseconds) / 1e6 if watched else 0.0
-        """Watchdog time-out; 0 without a watchdog."""
+        """Watchdog timeout; 0 without a watchdog."""
 
     @property
     def asks(self) -> bool:
@@ -57,7 +58,7 @@ class ServiceManager:
     def notify(self, **fields: str | int) -> None:
         """Send assignments such as READY=1; keep those that the manager does not accept now.
 
-        For each name the newest one is kept until `retry` succeeds.
+        For each name, the newest assignment is kept until `retry` succeeds.
         """
         self._pending.update({key: _one_line(str(value)) for key, value in fields.items()})
         self.retry()
@@ -118,7 +119,8 @@ _STEADY_S = 30.0
 class Launcher:
     """Runs the daemon until a stop request, or until its loop has stopped on command.
 
-    `say` is called with messages for the user, `ready` with the loop's status once both run.
+    `say` is called with messages for the user, `ready` with the loop's status once both processes
+    run.
     """
 
     def __init__(
@@ -280,7 +282,7 @@ class Launcher:
 
     def _leave_core(self) -> None:
         """Move this process off the loop's core, once the loop has one; a new service inherits
-        that."""
+        this."""
         if self._left_core or self._loop.end:
             return
         loop_cores = os.sched_getaffinity(self._loop.process.pid)
@@ -357,7 +359,7 @@ class Launcher:
         return self._failure if self.reason else DONE
 
     def _stop_loop(self) -> str:
-        """End the loop; return why it failed to end correctly; empty if it did."""
+        """End the loop; return why it did not end correctly, or an empty text."""
         timeout_s = loop_stop_s(self._block)
         if self._status().get("driving") and not self._loop.end:
             self._say(self._stop_notice(timeout_s))

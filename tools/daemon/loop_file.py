@@ -1,8 +1,8 @@
 """The files that name a daemon's loop and its launcher, beside the daemon's socket.
 
-With the loop's file, a signal can make its process cut the power. The launcher writes the file
-once the loop obeys `POWER_OFF_SIGNAL`. The launcher's file is also the robot's lock.
-Its content is trusted only for processes of its owner, because the reader may be root.
+The loop's file names the process that a signal makes cut the power. The launcher writes the file
+once the loop obeys `POWER_OFF_SIGNAL`. The launcher's file is also the robot's lock. Its content is
+trusted only for processes of its owner, because the reader may be root.
 """
 
 from __future__ import annotations
@@ -75,7 +75,7 @@ class LoopFile(BaseModel):
             raise
 
     def remove(self, path: Path) -> None:
-        """Remove the file, and the remaining socket of a killed loop, unless it is another's."""
+        """Remove the file, and the socket left by a killed loop, unless another loop's."""
         with suppress(WorkFailedError, OSError):
             if LoopFile.read(path) == self:
                 path.unlink()
@@ -272,7 +272,7 @@ def _taken(socket: Path, pid: int | None) -> BadInputError:
 
 
 def launcher_does(path: Path) -> str | None:
-    """Return the present step of the launcher that the file names, as far as it reports it.
+    """Return the present step of the launcher that the file names, if it reports one.
 
     None if the launcher does not run, or if the file is not trusted.
     """

@@ -100,7 +100,7 @@ def _stop_socket(path: Path) -> StopSocket:
 
 
 def _lengths_file(robot: Robot, settings: RunSettings) -> Path | None:
-    """Return the path of the lengths of the last stop, separate for simulations and real robots.
+    """Return the path of the cable lengths at the last stop; simulations have their own file.
 
     A simulator that starts with the daemon starts at home, however the previous one ended.
     """

@@ -116,7 +116,7 @@ _PLANNING_S: Final = 600.0
 _NICER: Final = 10
 _LOG_FORMAT: Final = "service: %(message)s"
 _MOST_KiB: Final = 4 << 20
-"""Limit of the process's memory: an external file must not exhaust the daemon's."""
+"""Limit of the planning process' memory, so that a user's file cannot exhaust the machine's."""
 _WITHIN: Final = f'ulimit -v {_MOST_KiB} && exec nice -n{_NICER} "$@"'
 
 

@@ -111,15 +111,15 @@ class RunSettings(BaseModel):
     commissioned: _Path | None = None
     """Folder with the cogging profiles of the axes' motors."""
     own: OwnCodeOptions = OwnCodeOptions()
-    """Code of the user's own that the loop runs."""
+    """The user's own code that the loop runs."""
     safety_io: str | None = None
     tension_port: str | None = None
     """Serial port of the robot's tension sensors."""
     socket: _Path
     http: Address | None = None
     http_asked: bool = False
-    """Whether the user gave `http`, for other programs than the page: then, on loopback without a
-    key file, everybody may read, hold and disable there."""
+    """Whether the user gave `http`, for programs other than the page. If so, everybody may read,
+    hold and disable there, on loopback without a key file."""
     key_file: _Path | None = None
     record: _Path | None = None
     """Folder for recordings; None to record nothing."""
@@ -178,7 +178,8 @@ class RunSettings(BaseModel):
     def with_ports_bound(self) -> RunSettings:
         """Return settings with sockets at `http`, `stream` and `live`, which are bound now, once.
 
-        So no other process can take a trusted port between two services. Raises WorkFailedError.
+        So no other process can take a trusted port while the service restarts. Raises
+        WorkFailedError.
         """
         asked: list[tuple[str, str, Address | None, Callable[[str, int], socket.socket]]] = [
             ("--http", "http_fd", self.http, listen_tcp if self.http_asked else _listen_page),
@@ -214,7 +215,7 @@ class RunSettings(BaseModel):
 
     @property
     def service_fds(self) -> tuple[int, ...]:
-        """The descriptors that each service inherits, besides the shared memory's."""
+        """The descriptors that each service inherits in addition to that of the shared memory."""
         fds = (self.key_fd, self.page_key_fd, self.http_fd, self.stream_fd, self.live_fd)
         return tuple(fd for fd in fds if fd >= 0)
 

@@ -32,7 +32,7 @@ _LIMITS_FILE = "/etc/security/limits.d/realtime.conf"
 
 @dataclass(frozen=True)
 class HostFinding:
-    """One check: `level` is ok, note (works, but) or problem (will not work)."""
+    """One check: `level` is ok, note (works with a drawback) or problem (will not work)."""
 
     what: str
     level: str
@@ -200,7 +200,7 @@ def _kernel() -> HostFinding:
 
 
 def preemption(version: str, realtime: str, command_line: str) -> str:
-    """Return the kind of preemption by the kernel's version, /sys/kernel/realtime, /proc/cmdline.
+    """Return the kernel's preemption, from its version, /sys/kernel/realtime and /proc/cmdline.
 
     If the command line sets the mode of a kernel that can change it, the result includes it.
     """

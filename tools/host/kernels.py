@@ -178,5 +178,5 @@ _STAGES: Final[tuple[dict[str, Callable[[], None]], ...]] = (
     },
     {"the buses": _buses},
 )
-"""Tasks by what they compile. The kernels of a stage call those of earlier ones, and tasks that
-begin at the same time share few: no kernel is compiled twice."""
+"""Tasks by the kernels that they compile. Kernels of a stage call kernels of earlier stages. Tasks
+that begin at the same time share few kernels, so that no kernel is compiled twice."""

@@ -73,7 +73,7 @@ def read_time(column: Column, table: Table) -> FloatArray:
 
 
 class MotorColumns(Profile):
-    """Columns of a motor's recording; without time it is a static map, one angle after another."""
+    """Columns of a motor's recording; without time, it is a static map of angle after angle."""
 
     time: Column | None = None
     angle: Column
@@ -108,7 +108,7 @@ def motor_units(winch: Winch) -> tuple[dict[str, float], dict[str, float]]:
 
 
 class CableColumns(Profile):
-    """Columns of the cables, each with one for every axis in the order of the robot's file."""
+    """Columns of the cables: one of each kind for every axis, in the order of the robot's file."""
 
     time: Column
     lengths: tuple[Column, ...]
@@ -143,4 +143,4 @@ class CalibrationMapping(Profile):
     from_s: float = -math.inf
     until_s: float = math.inf
     rate_Hz: Annotated[float, Field(gt=0.0, le=1e4)] = 100.0
-    """Highest rate of the readings that are taken."""
+    """Highest rate at which readings are used."""

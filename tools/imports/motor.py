@@ -51,7 +51,7 @@ class _Piece:
 
 @dataclass(frozen=True)
 class Imported:
-    """What an import wrote, and what it left out."""
+    """Files that an import wrote, and notes on parts that it left out."""
 
     written: list[Path]
     notes: list[str]

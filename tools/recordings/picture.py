@@ -45,7 +45,7 @@ _LETTER = 0.015
 _SEEN_ns: Final = 200_000_000
 """Longest delay from a reaction to its reason, which recordings take from the loop's status."""
 _MOVED = 1e-6
-"""A coordinate that varies by less over a recording is not one of the robot's, m or rad."""
+"""A coordinate that varies by less (m or rad) over a recording is not one that the robot moves."""
 _TIMES = {"answers in": "exchange_s", "computing": "compute_s", "late by": "lateness_s"}
 _POWERLESS, _REACTING, _FAULT = range(1, 4)
 _GAP_S, _NOT_RECORDED = 0.5, "not recorded"
@@ -168,7 +168,7 @@ class _Grid:
     figure: Figure
     strips: list[Axes]
     timed: list[Axes]
-    """From the top left downward, then the right column."""
+    """Panels over time: from the top left downward, then the right column."""
     path: Axes | None
     """The platform's path, below the right column."""
 
@@ -214,8 +214,8 @@ def draw_programs(ax: Axes, columns: Columns, names: Sequence[str]) -> None:
 def faults_of(readers: Sequence[RecordingReader], columns: Columns) -> list[tuple[float, str]]:
     """Return when a limit made the loop react, and when its state became a fault, with texts.
 
-    The loop's reason is given with the first event that it caused. It is recorded some time later,
-    when further limits may be exceeded, such as the speed of a winch whose cable broke.
+    The loop's reason is given with the first event that it explains. The reason is recorded some
+    time later, when further limits may be exceeded, such as the speed of a winch whose cable broke.
     """
     stamped = [
         (event["log_time_ns"] - reader.offset_ns, event)
@@ -257,7 +257,7 @@ def _draw_limits(ax: Axes, description: dict[str, Any], chosen: Sequence[int]) -
 
 
 def _draw_path(ax: Axes, columns: Columns) -> None:
-    """Draw the platform's way from the front, and its set-point dashed."""
+    """Draw the platform's motion from the front, and its set-point dashed."""
     pose, setpoint = columns["pose"], columns["pose_setpoint"]
     upward = 1 if _flat(pose[:, 2]) else 2
     step = max(1, len(pose) // _PATH_POINTS)

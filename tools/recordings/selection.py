@@ -57,7 +57,7 @@ def files_of(paths: Sequence[Path]) -> list[Path]:
 
 
 def is_being_written(path: Path) -> bool:
-    """Return whether a process has the file open for writing, as far as this user may know."""
+    """Return whether a process that this user may inspect has the file open for writing."""
     target = str(path.resolve())
     for link in Path("/proc").glob("[0-9]*/fd/*"):
         with suppress(OSError):  # the process has ended, or is another user's
@@ -99,7 +99,7 @@ def fields_of(text: str | None) -> list[str] | None:
 
 @dataclass
 class _Time:
-    """Bus time on one scale; if cycles restart, the gap is taken from the stamps."""
+    """Bus time on one scale; if cycles restart, the time stamps give the length of the gap."""
 
     offset_s: float | None = None
     last_s: float = 0.0

@@ -174,7 +174,8 @@ class _Count:
     def _cut_short(self, stamps_ns: FloatArray) -> None:
         """Note when the last run was cut short, unless it is itself part of a reaction.
 
-        `stamps_ns` are the stamps of rows with a reaction; none means it was not cut short.
+        `stamps_ns` are the stamps of rows with a reaction; without such rows, the run was not cut
+        short.
         """
         run = self.runs[-1]
         if stamps_ns.size and not run["reaction"]:

@@ -26,8 +26,8 @@ _MOST_BYTES: Final = 1 << 20
 def read_caspr(bodies: Path, cables: Path) -> dict[str, str]:
     """Return answers from a model with one rigid body; the platform's origin is its centre of mass.
 
-    The plane of a planar robot is taken as vertical, y upward. Of several sets of cables, the
-    model's default is taken. Raises BadInputError that names the file and the element.
+    The plane of a planar robot counts as vertical, y upward. If there are several sets of cables,
+    the model's default set is used. Raises BadInputError that names the file and the element.
     """
     links = _root(bodies, "bodies_system").findall("links/*")
     if len(links) != 1:

@@ -42,8 +42,8 @@ Ask = Callable[[Question, Default, str], str]
 Stage = Callable[[str], AbstractContextManager[None]]
 """Takes a text about work that may take seconds, and shows it while a block runs."""
 _STAND_SHARE, _STAND_m = 0.1, 0.5
-"""Gap between stand and box, as a share of the height in which targets are possible. Also the
-height of a stand that could be on the floor, as a share of the frame's, up to `_STAND_m`."""
+"""Gap between stand and box, as a share of the height in which targets are possible. The same share
+of the frame's height, up to `_STAND_m`, is the height of a stand that could be on the floor."""
 _OVERSPEED = 1.25
 """Ratio of the limit of the motors' speed to the speed that they need."""
 _MIDDLE, _MIDDLE_HEIGHT, _LOW = (0.3, 0.7), (0.25, 0.75), (0.0, 0.4)

@@ -90,8 +90,7 @@ class PathOptions:
         )
 
     def _origins_mm(self) -> dict[str, FloatArray]:
-        """Return the zeros of the coordinate systems, G54 first; a zero that is not numbers is
-        empty."""
+        """Return the zeros of the coordinate systems, G54 first; an invalid zero is empty."""
         first, *others = _SYSTEMS.split(str(self.origin_mm).upper())
         texts = {"G54": first, **dict(zip(others[::2], others[1::2], strict=True))}
         try:

@@ -27,13 +27,13 @@ from cdpr_tools.report.style import (
 _PLATFORM = "#d1581a"
 _WIDE_in = 7.4
 _LEAST_HIGH = 0.32
-"""Least height of a view over its width, so that the colour bar's label has room beside it."""
+"""Least ratio of a view's height to its width; the colour bar's label needs this room."""
 _SEEN_THROUGH = 0.6
 """Opacity of the platform, which may cover the whole box of targets."""
 _SEEN_FROM = "from the side", "from the front", "from above"
 """The viewpoint along each axis."""
 _OUTLINE = 721
-"""Number of directions; the furthest anchor point in each belongs to the platform's outline."""
+"""Number of directions in which the furthest anchor point belongs to the platform's outline."""
 
 # shares of the exit points' extent: names of points closer than this would touch
 _CLOSE = 0.1
@@ -44,7 +44,7 @@ _LOOKS, _PAD = 4, 3.0
 _FINE, _COARSE = (121, 95), (41, 31)
 
 _View = tuple[int, int]
-"""The coordinates to the right and upward."""
+"""Coordinates that a view shows to the right and upward."""
 
 
 def draw_robot(robot: Robot, platform: Platform, path: Path) -> None:

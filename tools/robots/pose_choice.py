@@ -38,7 +38,7 @@ from cdpr_tools.report.style import (
 )
 
 AMONG = 20
-"""Number of poses drawn for each pose chosen."""
+"""Number of random poses for each chosen pose."""
 
 
 class Choose(StrEnum):
@@ -51,7 +51,7 @@ class Choose(StrEnum):
 
 @dataclass(frozen=True)
 class Chosen:
-    """Positions (m, d) in the order of choice, and the poses they were chosen from."""
+    """Chosen positions (m, d) in their order, and the poses from which they were chosen."""
 
     positions: FloatArray
     shares: FloatArray
@@ -59,7 +59,7 @@ class Chosen:
     clearance_m: float
     margin_N: float
     deviation_m: float | None
-    """Deviation of exit points after a calibration with these poses; None unless k is 3."""
+    """Deviation of exit points after a calibration with these poses; None in a plane."""
 
 
 def choose(

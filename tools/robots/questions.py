@@ -28,7 +28,7 @@ KINDS = {
     "suspended-8": "a platform in space on 8 cables from above: larger workspace and angles",
     "spatial-8": "a platform in space, 8 cables from above and below: fully constrained",
 }
-"""By name: a description, and the reason for the number of cables."""
+"""Description, and reason for the number of cables, by the kind's name."""
 SKETCH = r"""
 planar-3       planar-4       point-4        suspended-6, -8   spatial-8
 o         o    o         o    o         o    o  o     o  o     o  o     o  o
@@ -42,9 +42,9 @@ o         o    o         o    o         o    o  o     o  o     o  o     o  o
 _BUS_DRIVES = 4
 """Largest number of drives on a bus of 1 Mbit/s at 1 kHz."""
 _APART_m = 0.15
-"""Least distance of two proposed exit points: two winches side by side."""
+"""Least distance of two proposed exit points, for two winches side by side."""
 _ROUND_m = 0.5
-"""Proposed frames are multiples of this."""
+"""Proposed sizes of a frame are multiples of this."""
 
 
 @dataclass(frozen=True)
@@ -134,8 +134,9 @@ class RobotKind:
 def _side_by_side(corner: FloatArray, beside: FloatArray) -> FloatArray:
     """Return directions (2, k) in which two cables leave a place that they share.
 
-    `beside` (2, k) are their usual places, from -1 to 1. In a corner each moves inward along the
-    direction in which it is usually the inner one; on a side they move away from each other.
+    `beside` (2, k) are their usual places, from -1 to 1. In a corner, each cable moves inward along
+    the direction in which it is usually the inner one. On a side, the cables move away from each
+    other.
     """
     inner = np.abs(beside) < np.abs(beside[::-1])
     apart = 0.5 * np.sign(beside - beside[::-1])

@@ -83,7 +83,7 @@ class OperatorParameters:
     look_s: float = 0.28
     """Time for which a picture must stand still before it is judged."""
     still_m: float = 0.2e-3
-    """Motion allowed meanwhile: one pixel, plus one step of the master, scaled, from the hand."""
+    """Motion that still counts as still: one pixel, and one scaled step of the master."""
     patience_s: float = 2.0
     """Longest wait for a still picture before the operator judges a moving one."""
 
@@ -271,7 +271,7 @@ class TargetConfirmation:
     looked_s: tuple[float, float]
     """When the first and the last of the pictures judged were taken."""
     tries: int
-    """Movements towards this target."""
+    """Number of movements towards this target."""
 
 
 class OperatorModel:

@@ -36,7 +36,7 @@ class Variable(NamedTuple):
     """A variable in which the conditions differ."""
 
     column: str
-    """Its column in the points."""
+    """Column of the variable in the points."""
     name: str
     shown: str
     """Format of a level."""
@@ -91,7 +91,7 @@ def spread_mm(errors_m: FloatArray) -> FloatArray:
 
 
 def run_times_s(points: Points) -> FloatArray:
-    """Return the time of each run, from its begin to its last confirmation, (runs,)."""
+    """Return the time of each run, from its start to its last confirmation, (runs,)."""
     _, which = np.unique(points[_RUN], return_inverse=True)
     times = np.zeros(which.max() + 1)
     np.maximum.at(times, which, points["pressed_s"])

@@ -58,7 +58,7 @@ HEIGHT_M: Final = 0.3
 PLACES: Final[Mapping[str, tuple[float, float]]] = MappingProxyType(
     {"A": (0.0, 0.5), "B": (-0.2, 0.25), "C": (0.2, 0.75)}
 )
-"""Centre of the pattern, as shares of the workspace: from its middle, and up from its floor."""
+"""Centre of the pattern, as shares of the workspace: from the middle, and above the floor."""
 
 _PATTERN: Final = (
     (0.25, 0.5), (0.5, 0.5), (0.5, -0.5), (0.25, -0.5), (0.0, 0.0),
@@ -268,8 +268,9 @@ def run_trial(
     """Let an operator lead `plant`, which stands at the path's start, along `targets_m` (k, 2).
 
     Returns (ticks,) of TICK, and for each target: its number `target`, the `cycle` in which its
-    confirmation arrived, `begun_s` and `pressed_s` of the operator, the `look_cycles` of the first
-    and the last judged picture, and `tries`. Raises WorkFailedError if the path takes too long.
+    confirmation arrived, the operator's times `begun_s` and `pressed_s`, the `look_cycles` of the
+    first and the last judged picture, and `tries`. Raises WorkFailedError if the path takes too
+    long.
     """
     for_hand, for_eyes = condition.random(seed)
     there_s = SHARE_THERE * condition.round_trip_s

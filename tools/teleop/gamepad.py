@@ -1,6 +1,6 @@
 """A gamepad through evdev: found, read without waiting, and found again after unplugging.
 
-Also how its events act on a hand: sticks, a button to hold, one to confirm.
+Its events act on a hand: sticks move it, one button must be held, another one confirms.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ class AxisRange:
     most: int
 
     def part(self, value: int) -> float:
-        """Return a value as a share of the way from the middle, -1 to 1."""
+        """Return a value as a share of the travel from the middle, -1 to 1."""
         half = 0.5 * (self.most - self.least)
         return min(max((value - self.least) / half - 1.0, -1.0), 1.0) if half > 0.0 else 0.0
 
@@ -52,9 +52,9 @@ class StickMap:
     dead_man: int
     confirm: int
     dead_zone: float
-    """Share of the way, in any direction, in which a stick does nothing."""
+    """Share of a stick's travel around the middle in which it has no effect."""
     speed_m_s: float
-    """Speed of the hand with a fully pushed stick; it turns `TURN_RAD_PER_m` times as fast."""
+    """Speed of the hand with a fully pushed stick; it rotates `TURN_RAD_PER_m` times as fast."""
 
     @property
     def axes(self) -> tuple[int, ...]:
@@ -65,8 +65,8 @@ class StickMap:
 class Stick(Hand):
     """A hand that moves as fast as sticks are pushed, while the dead man's button is held.
 
-    The speed grows with the square of the way from the dead zone's edge, to allow slow motion.
-    Only a press that is seen counts: a button that was already held does not move the robot.
+    The speed grows with the square of the travel beyond the dead zone, to allow slow motion. Only a
+    press counts that this process has seen: a button that was already held does not move the robot.
     """
 
     def __init__(self, stick_map: StickMap, scale: float) -> None:

@@ -12,7 +12,7 @@ from cdpr_tools.errors import BadInputError
 SMALLEST_SCALE: Final = 1e-3
 _REACH_USED: Final = 0.9
 TURN_RAD_PER_m: Final = math.radians(100.0)
-"""Rotation of a hand for the input of one metre: a tenth of a degree for a millimetre."""
+"""Rotation of a hand for an input of one metre: a tenth of a degree per millimetre."""
 
 Vector = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]
@@ -26,7 +26,7 @@ class End:
 
     text: str
     failed: bool = False
-    """Whether it ends because of a failure."""
+    """Whether the teleoperation ends because of a failure."""
     arrive: bool = False
     """Whether the robot first moves to its last target; otherwise it brakes immediately."""
 

@@ -21,13 +21,13 @@ from cdpr_tools.teleop.input_device import End, InputDevice, InputSample
 RATE_Hz: Final = 60.0
 _GREET_S: Final = 3.0
 _SILENCE_S: Final = 2.5
-"""Longer than the right to move lasts without renewal: by then the robot holds."""
+"""Longer than the right to move lasts without renewal; after this time the robot holds."""
 _TAKEN_AWAY_S: Final = 0.4
 _STILL_m: Final = 2e-5
 _STILL_S: Final = 0.6
 _ARRIVE_S: Final = 15.0
 _UNSEEN_S: Final = 1.0
-"""Limit without a position of the robot: longer than received data wait to be played."""
+"""Longest time without a position of the robot; longer than received data wait to be played."""
 _MOST_KEPT: Final = 36_000
 _NEVER_ANSWERED: Final = ": its stream cannot be reached there"
 _WHY_NOT: Final = {
@@ -71,8 +71,8 @@ class TeleopSession:
         self.round_trips_s: deque[float] = deque(maxlen=_MOST_KEPT)
         """Round trips of the newest answers, the last one at the end."""
         self.moved_m = 0.0
-        """Largest distance of the set-point from where the hand began to lead; the change of the
-        quaternion counts like metres."""
+        """Largest distance of the set-point from where the hand began to lead; a change of the
+        quaternion counts as if in metres."""
         self._led_from: tuple[float, ...] = ()
         self._program = program
         self._begin_s = self._heard_s = self._fine_s = time.monotonic()

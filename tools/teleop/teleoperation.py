@@ -186,7 +186,7 @@ def stream_address(status: dict[str, Any], settings: TeleopSettings) -> tuple[st
 
 
 def directions_of(description: dict[str, Any]) -> Directions:
-    """Return the directions in which a robot is led; without a platform, two cables."""
+    """Return the directions in which the hand leads a robot; without a platform, two cables."""
     platform = description.get("platform") or {"home_m": (0.0, 0.0)}
     names = platform.get("controlled", ())
     return len(platform["home_m"]), tuple(_ABOUT[name] for name in names if name in _ABOUT)

@@ -15,11 +15,11 @@ from cdpr_tools.teleop.session import TeleopSession
 
 _WIDTH, _HEIGHT, _LEAST_HEIGHT = 64, 22, 8
 _WRAPPED = 3
-"""Additional lines if texts are wider than the terminal."""
+"""Number of additional lines for texts that are wider than the terminal."""
 _MARGIN_m = 0.1
 _SHOWN_TRIPS = 120
 _SILENT_S: Final = 0.5
-"""Longer than any usable round trip; older data are stale."""
+"""Age above which data are stale; longer than any usable round trip."""
 _STALE_S: Final = 2.0
 _MARKS: Final = {"target": ("+", "bold cyan"), "platform": ("o", "bold green")}
 

@@ -62,7 +62,7 @@ class AnchorPlan:
 def plan_anchor(
     winch: Winch, lowest_N: float, highest_N: float, speed_m_s: float, most_travel_m: float
 ) -> AnchorPlan:
-    """Return the plan; raises InvalidRequestError for tensions the motor cannot give."""
+    """Return the plan; raises InvalidRequestError for tensions that the motor cannot reach."""
     gain = abs(winch.cable_m_per_motor_rad)
     most = _TORQUE_SHARE * winch.motor.rated_torque_Nm / gain
     if not 0.0 < lowest_N < highest_N <= most:
@@ -74,7 +74,7 @@ def plan_anchor(
 
 
 class _Pull:
-    """The motion: constant speed one way until it is turned back; it may end at any time."""
+    """The motion: constant speed in one direction until it is reversed; it may end at any time."""
 
     duration_s = _LONGEST_S
 
@@ -254,7 +254,7 @@ class HoistPlan:
     lead_in_rad: float
     """Travel before the measured turns, to take up the slack and lift the mass off."""
     turns: int = 2
-    """Whole motor turns measured each way: over whole turns cogging does no work."""
+    """Whole motor turns measured in each direction; over whole turns, cogging does no work."""
 
     @property
     def travel_rad(self) -> float:
@@ -305,7 +305,7 @@ class Hoist:
 
 
 class _Lowering:
-    """From the current set-point back to the start; the motion is entered at half its duration."""
+    """Motion from the current set-point back to the start; it begins at half of its duration."""
 
     def __init__(self, here_rad: FloatArray, start_rad: FloatArray, speed_rad_s: float) -> None:
         travel = start_rad - here_rad
@@ -399,7 +399,7 @@ _MASSES_LIMIT_RATIO, _MASSES_LIMIT_MORE_Nm = 1.3, 0.6
 _SPEED_RATIO, _LEAST_SPEED_RAD_S = 5.0, 30.0
 
 Hang = Callable[[float, Clock], None]
-"""Has a mass, in kg, hung on the cable while time passes; returns when it hangs."""
+"""Asks somebody to hang a mass (kg) on the cable, lets time pass, and returns when it hangs."""
 
 
 def not_hung(mass_kg: float) -> InvalidRequestError:

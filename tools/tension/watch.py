@@ -120,7 +120,7 @@ _POLL_S = 0.05
 def by_prompt(mass_kg: float, clock: Clock) -> None:
     """Ask the person at the winch; the drive has no power, so Ctrl-C may end this immediately.
 
-    Only Enter alone raises the mass: a person who types a word wants something else.
+    Only an empty line raises the mass, because a person who types a word wants something else.
     """
     question = (
         f"Hang {mass_kg:g} kg on the cable, standing on its support, take up the slack, and "

@@ -1,4 +1,4 @@
-"""The trial at the limits: random targets at full speed and acceleration, some changed half-way."""
+"""The trial at the limits: random targets at full speed and acceleration, some changed en route."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _FINISHED_SHARE: Final = 0.7
 _REST_S: Final = (0.0, 1.0)
 _LONG_REST_S: Final = 4.0
 _LONG_EVERY: Final = 5
-"""One in this many finished moves is followed by a long rest."""
+"""A long rest follows every n-th finished move."""
 _CHANGED_AFTER_S: Final = (0.05, 1.2)
 _MOVED: Final = 2e-3
 """In a direction in which it moves less than this, a leg cannot overshoot, m or rad."""
@@ -67,7 +67,7 @@ class TargetLeg:
     def overshoot(self, true: FloatArray) -> FloatArray:
         """Return the largest distance of the platform (c, d) beyond its target, per direction.
 
-        It is 0 in a direction in which the leg moves hardly or not.
+        It is 0 in a direction in which the leg hardly moves.
         """
         return self._beyond(true, self.target)
 
@@ -94,7 +94,7 @@ class TargetLeg:
 def legs(recorded: Recorded) -> list[TargetLeg]:
     """Return all legs of a trial.
 
-    If a target was changed half-way, the set-point still moves. `stop` is where it turns in each
+    If a target was changed on the way, the set-point still moves. `stop` is where it turns in each
     direction, perhaps beyond the new target, but no farther than the acceleration limit and the
     delay of smoothing allow.
     """
@@ -111,7 +111,7 @@ def legs(recorded: Recorded) -> list[TargetLeg]:
 
 
 def _stood(recorded: Recorded, target: FloatArray, rows: slice) -> int:
-    """Return the number of last rows of a leg in which the set-point stood at the target."""
+    """Return how many of a leg's last rows have the set-point at the target."""
     coming = np.abs(recorded.setpoint_places[rows] - target).max(axis=1) > _THERE
     return coming.size if not coming.any() else int(coming[::-1].argmax())
 
@@ -128,8 +128,8 @@ def _legs(recorded: Recorded) -> list[tuple[FloatArray, slice]]:
 def swings_s(recorded: Recorded) -> FloatArray:
     """Return how long the platform took to stay within `SWING_mm` of each target, (m,).
 
-    The time begins when the set-point has reached the target. It is the whole rest there if the
-    platform does not settle. Targets with a rest shorter than `SWING_S` are left out.
+    The time begins when the set-point has reached the target. If the platform does not settle, it
+    is the duration of the whole rest. Targets with a rest shorter than `SWING_S` are left out.
     """
     found = []
     for target, rows in _legs(recorded):

@@ -27,7 +27,8 @@ NAMES: Final = {WITH: "with compensation", WITHOUT: "without"}
 def lines(directions: Directions) -> list[tuple[FloatArray, FloatArray]]:
     """Return the ends (d,) of a line along each direction through the middle of the workspace.
 
-    Along an angle it is a turn, from half the allowed angle on one side to half on the other.
+    Along an angle, the line is a turn, from half the allowed angle on one side to half on the
+    other.
     """
     middle, size = directions.middle, directions.high_m - directions.low_m
     reach = np.minimum(0.5 * LENGTH_m, 0.25 * size)
@@ -51,7 +52,7 @@ class LineErrors:
     """Recorded errors along one line, or turn, in mm and degrees, one row per cycle."""
 
     direction: int
-    """Index of its direction."""
+    """Index of the line's direction."""
     is_turn: bool
     way: FloatArray
     """Position along the line, m or rad, (c,)."""

@@ -92,7 +92,7 @@ def _angles(ax: Axes, recorded: Recorded) -> None:
 
 
 def of_lines(parts: dict[str, Recorded], speed_m_s: float) -> Figure:
-    """Draw the true distance from each line, or angle from each turn, over the way along it."""
+    """Draw the true distance from each line, or angle from each turn, over the position on it."""
     found = {part: line.line_errors(recorded) for part, recorded in parts.items()}
     directions = next(iter(parts.values())).directions
     first = next(iter(found.values()))
@@ -122,7 +122,7 @@ def of_lines(parts: dict[str, Recorded], speed_m_s: float) -> Figure:
 
 
 def of_limits(recorded: Recorded, robot: Robot) -> Figure:
-    """Draw tensions and torques over time, within their limits, and the platform's way."""
+    """Draw tensions and torques over time, within their limits, and the platform's motion."""
     directions = recorded.directions
     views = _VIEWS[directions.k]
     figure, axes = canvas(1 + (2 + len(views) + bool(directions.turns)) // 2, 2, height=3.0)
@@ -142,7 +142,7 @@ def of_limits(recorded: Recorded, robot: Robot) -> Figure:
 
 
 def of_tape(recorded: Recorded, robot: Robot) -> Figure:
-    """Draw tensions and torques over time, within their limits, and the platform's way."""
+    """Draw tensions and torques over time, within their limits, and the platform's motion."""
     views = len(_VIEWS[recorded.directions.k]) + bool(recorded.directions.turns)
     figure, axes = canvas(1 + (views + 1) // 2, 2, height=3.0)
     _held((axes[0], axes[1]), recorded, robot)
@@ -170,7 +170,7 @@ def _held(axes: tuple[Axes, Axes], recorded: Recorded, robot: Robot) -> None:
 
 
 def _rest(axes: list[Axes], recorded: Recorded) -> None:
-    """Draw the platform's way in each view, and its orientation if that is controlled."""
+    """Draw the platform's motion in each view, and its orientation if that is controlled."""
     views = _VIEWS[recorded.directions.k]
     for view, ax in zip(views, axes, strict=False):
         _ways(ax, recorded, view)
@@ -237,7 +237,7 @@ def _steps(ax: Axes, recorded: Recorded, steps: FloatArray, acceleration: float)
 
 
 def _ways(ax: Axes, recorded: Recorded, view: tuple[int, int]) -> None:
-    """Draw the true way in one view, with the workspace."""
+    """Draw the true motion in one view, with the workspace."""
     directions: Directions = recorded.directions
     name, other = (directions.names[i] for i in view)
     ax.plot(*recorded.true_m[::20, view].T, color="#bbbbbb", lw=0.4, label="way of the platform")

@@ -123,7 +123,7 @@ class Recorded:
     def _require_alignment(self) -> None:
         """Raise WorkFailedError if the recorded motor angles are not those of the log.
 
-        A drive's angle is slightly old when SYNC latches it, never from the future: this age is
+        A drive's angle is slightly old when SYNC latches it, but never from the future. Its age is
         the angle error divided by the speed. Motors that swing fast have larger errors.
         """
         measured, true = self.cycles["position_rad"], self.truth["motor_rad"]

@@ -24,7 +24,7 @@ _SETTLE_S = 2.0
 _TRIES = 100
 _CORNER_SHARE = 0.3
 _BORDER = 1.0 - 1e-9
-"""Share of the largest angle; rounding might make the full angle too large."""
+"""Share of the largest angle that is used; rounding might make the full angle too large."""
 
 
 class TrialRun:

@@ -91,7 +91,7 @@ def judge(recorded: Recorded) -> list[Figure]:
 
 
 def _orientation(errors: FloatArray) -> list[Figure]:
-    """Return the figures of the rotation vectors (m, 3) from wanted to true orientation.
+    """Return the figures of the rotation vectors (m, 3) from target to true orientation.
 
     The mean is the length of the mean vector; 3 sigma is that of the worst axis.
     """

@@ -46,7 +46,7 @@ class TrialSettings:
     speed_m_s: float = line.SPEED_m_s
     """Speed of lines and paths."""
     own: OwnCodeOptions = field(default_factory=OwnCodeOptions)
-    """Code of the user's own that is tried."""
+    """The user's own code that the trial runs."""
 
     @classmethod
     def load(cls, folder: Path) -> TrialSettings:
@@ -71,11 +71,11 @@ class TrialKind:
     minutes: float
     """Default duration, in bus time."""
     compares: bool = False
-    """Whether it runs with and without compensation."""
+    """Whether the trial runs with and without compensation."""
     at_speed: bool = False
-    """Whether it has a speed setting, which determines its duration."""
+    """Whether the trial has a speed setting, which determines its duration."""
     as_calibrated: bool = True
-    """Whether it uses the calibration in force."""
+    """Whether the trial uses the calibration in force."""
 
 
 KINDS: Final = {
